@@ -1,0 +1,138 @@
+/* Second-order blocks, exact or by differences.
+ *
+ * Central differences with step h = eps^(1/3) in units of the scene: truncation and round-off are both of the order
+ * eps^(2/3) (Dennis & Schnabel 1983, section 5.6). */
+#include <math.h>
+#include <string.h>
+#include "system.h"
+
+/* Each block: its place in the kind's table, the sweep it is the derivative of, and how to get from there to here. */
+static const struct {
+  size_t sweep, below;
+  enum { BLOCKS_RAW, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
+  int rates;   /* derivative by v instead of q */
+  int columns; /* as many rows as local columns, instead of kind->rows */
+} blocks_table[PW_BLOCKS] = {
+  [PW_JW_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_J_W, 0, 0 },
+  [PW_JTL_Q] = { offsetof (pw_kind, jtl_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, 0, 1 },
+  [PW_ETA_Q] = { offsetof (pw_kind, eta_q), offsetof (pw_kind, eta), BLOCKS_RAW, 0, 0 },
+  [PW_GAMMA_Q] = { offsetof (pw_kind, gamma_q), offsetof (pw_kind, gamma), BLOCKS_RAW, 0, 0 },
+  [PW_GAMMA_V] = { offsetof (pw_kind, gamma_v), offsetof (pw_kind, gamma), BLOCKS_RAW, 1, 0 },
+  [PW_FORCE_Q] = { offsetof (pw_kind, force_q), offsetof (pw_kind, force), BLOCKS_RAW, 0, 1 },
+  [PW_FORCE_V] = { offsetof (pw_kind, force_v), offsetof (pw_kind, force), BLOCKS_RAW, 1, 1 },
+};
+
+static pw_sweep *blocks_member (const pw_kind *kind, size_t offset) {
+  return *(pw_sweep *const *)(const void *)((const char *)kind + offset);
+}
+
+pw_sweep *pw_block_sweep (const pw_kind *kind, pw_block block) {
+  return blocks_member (kind, blocks_table[block].sweep);
+}
+
+int pw_block_rows (const pw_kind *kind, pw_block block) {
+  return blocks_table[block].columns ? 3 * kind->bodies + kind->own : kind->rows;
+}
+
+/* A batch of one element with poses of its own, which can be moved without moving its neighbours. */
+typedef struct {
+  pw_batch b;
+  int body[PW_MAX_BODIES];
+  pw_pose pose[PW_MAX_BODIES];
+  double q[PW_MAX_OWN], v[PW_MAX_OWN];
+} blocks_single;
+
+static void blocks_isolate (const pw_slab *k, int e, blocks_single *one) {
+  const pw_kind *kind = k->kind;
+  one->b = k->b;
+  one->b.count = 1;
+  one->b.element = (const char *)k->b.element + (size_t)e * kind->element;
+  for (int n = 0; n < kind->bodies; n++) {
+    one->pose[n] = k->b.pose[k->b.body[e * kind->bodies + n]];
+    one->body[n] = n;
+  }
+  for (int n = 0; n < kind->own; n++) {
+    one->q[n] = k->b.q[e * kind->own + n];
+    one->v[n] = k->b.v[e * kind->own + n];
+  }
+  one->b.body = one->body;
+  one->b.pose = one->pose;
+  one->b.q = one->q;
+  one->b.v = one->v;
+  one->b.u = k->b.u + 3 * e * kind->signals;
+  if (k->b.w) one->b.w = k->b.w + e * k->b.cols;
+  if (k->b.lambda) one->b.lambda = k->b.lambda + e * kind->rows;
+}
+
+/* The number behind local column c. */
+static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, int rates) {
+  if (c >= 3 * kind->bodies) return (rates ? one->v : one->q) + c - 3 * kind->bodies;
+  pw_pose *p = &one->pose[c / 3];
+  double *const q[] = { &p->x, &p->y, &p->phi }, *const v[] = { &p->vx, &p->vy, &p->omega };
+  return rates ? v[c % 3] : q[c % 3];
+}
+
+static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *one, double *y) {
+  pw_sweep *below = blocks_member (kind, blocks_table[block].below);
+  int rows = kind->rows, cols = one->b.cols;
+  double J[PW_MAX_ROWS * PW_MAX_COLS] = { 0 };
+  memset (y, 0, PW_MAX_COLS * sizeof *y);
+  for (int n = 0; n < kind->bodies; n++) {
+    one->pose[n].cos = cos (one->pose[n].phi);
+    one->pose[n].sin = sin (one->pose[n].phi);
+  }
+  if (below == NULL) return;
+  if (blocks_table[block].product == BLOCKS_RAW) {
+    below (&one->b, y);
+    return;
+  }
+  below (&one->b, J);
+  for (int r = 0; r < rows; r++)
+    for (int c = 0; c < cols; c++) {
+      if (blocks_table[block].product == BLOCKS_J_W)
+        y[r] += J[r * cols + c] * one->b.w[c];
+      else
+        y[c] += J[r * cols + c] * one->b.lambda[r];
+    }
+}
+
+/* A step in units of the scene, made exactly representable. */
+static double blocks_step (const pw_system *s, const pw_kind *kind, int c, int rates, double x) {
+  double unit = c < 3 * kind->bodies && c % 3 < 2 ? s->scale.length : 1;
+  if (rates) unit /= s->scale.time;
+  volatile double moved = x + cbrt (2.3e-16) * fmax (unit, fabs (x));
+  return moved - x;
+}
+
+void pw_difference (const pw_system *s, const pw_slab *k, int e, pw_block block, double *out) {
+  const pw_kind *kind = k->kind;
+  int rates = blocks_table[block].rates, rows = pw_block_rows (kind, block), cols = k->b.cols;
+  blocks_single one;
+  blocks_isolate (k, e, &one);
+  for (int c = 0; c < cols; c++) {
+    double plus[PW_MAX_COLS], minus[PW_MAX_COLS], *x = blocks_variable (kind, &one, c, rates), x0 = *x;
+    double h = blocks_step (s, kind, c, rates, x0);
+    *x = x0 + h;
+    blocks_value (kind, block, &one, plus);
+    *x = x0 - h;
+    blocks_value (kind, block, &one, minus);
+    *x = x0;
+    int ground = c < 3 * kind->bodies && k->column[e * kind->bodies + c / 3] >= s->coords;
+    for (int r = 0; r < rows; r++) out[r * cols + c] = ground ? 0 : (plus[r] - minus[r]) / (2 * h);
+  }
+}
+
+int pw_sweep_block (const pw_system *s, const pw_slab *k, pw_block block, double *out) {
+  pw_sweep *sweep = pw_block_sweep (k->kind, block);
+  if (sweep == NULL) return 0;
+  if (sweep != pw_by_differences)
+    sweep (&k->b, out);
+  else
+    for (int e = 0; e < k->b.count; e++) pw_difference (s, k, e, block, out + e * pw_block_rows (k->kind, block) * k->b.cols);
+  return 1;
+}
+
+void pw_by_differences (const pw_batch *b, double *out) {
+  (void)b; /* only its address is used */
+  (void)out;
+}

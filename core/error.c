@@ -1,0 +1,55 @@
+/* Errors with the nearest valid name. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <math.h>
+#include "util.h"
+
+int pw_fail (pw_error *error, int status, const char *format, ...) {
+  if (error == NULL || error->status != PW_OK) return status;
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (error->text, sizeof error->text, format, arguments);
+  va_end (arguments);
+  error->status = status;
+  return status;
+}
+
+/* Edit distance (Levenshtein 1966), by one row; names longer than the row count as far away. */
+static size_t error_distance (const char *a, const char *b) {
+  size_t row[64], n = strlen (b);
+  if (n >= sizeof row / sizeof *row) return n;
+  for (size_t j = 0; j <= n; j++) row[j] = j;
+  for (size_t i = 0; a[i]; i++) {
+    size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (size_t j = 0; j < n; j++) {
+      size_t substitute = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      size_t least = (row[j] < diagonal ? row[j] : diagonal) + 1;
+      row[j + 1] = substitute < least ? substitute : least;
+    }
+  }
+  return row[n];
+}
+
+void pw_nearest_try (pw_nearest *n, const char *candidate) {
+  size_t distance = error_distance (n->sought, candidate);
+  if (n->best && distance >= n->distance) return;
+  n->best = candidate;
+  n->distance = distance;
+}
+
+char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size) {
+  buffer[0] = 0;
+  if (n->best) snprintf (buffer, size, "; did you mean \"%s\"?", n->best);
+  return buffer;
+}
+
+const char *pw_domain_check (pw_domain domain, double value) {
+  if (!isfinite (value)) return "a finite number";
+  if (domain == PW_NONNEGATIVE && value < 0) return "a number >= 0";
+  if (domain == PW_POSITIVE && value <= 0) return "a number > 0";
+  if (domain == PW_COUNT && (value < 1 || value != floor (value) || value > 1e9)) return "a whole number >= 1";
+  return "";
+}

@@ -1,0 +1,177 @@
+/* Sweeps over the kinds in use, and the products and sums that go with them. */
+#include <math.h>
+#include <string.h>
+#include "system.h"
+
+void pw_sweep_J (pw_system *s) {
+  for (pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++) k->kind->J (&k->b, k->J);
+}
+
+/* One array over rows, filled by the same sweep of every kind; a kind without it leaves zeros. */
+static void evaluate_rows (pw_system *s, size_t sweep, int rows, double *out) {
+  for (pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0 && k->row < rows; k++) {
+    pw_sweep *f = *(pw_sweep *const *)(const void *)((const char *)k->kind + sweep);
+    if (f)
+      f (&k->b, out + k->row);
+    else
+      memset (out + k->row, 0, (size_t)(k->b.count * k->kind->rows) * sizeof *out);
+  }
+}
+
+void pw_sweep_g (pw_system *s, double *g) {
+  evaluate_rows (s, offsetof (pw_kind, g), s->holonomic, g);
+}
+
+void pw_sweep_g_size (pw_system *s, double *size) {
+  evaluate_rows (s, offsetof (pw_kind, g_size), s->holonomic, size);
+  for (int i = 0; i < s->holonomic; i++) size[i] = fmax (size[i], s->scale.length);
+}
+
+void pw_sweep_eta (pw_system *s, double *eta) {
+  evaluate_rows (s, offsetof (pw_kind, eta), s->rows, eta);
+}
+
+void pw_sweep_gamma (pw_system *s, double *gamma) {
+  evaluate_rows (s, offsetof (pw_kind, gamma), s->rows, gamma);
+}
+
+void pw_sweep_force (pw_system *s, double *f) {
+  memset (f, 0, (size_t)s->coords * sizeof *f);
+  for (int i = 0; i < s->slabs; i++) {
+    pw_slab *k = &s->slab[i];
+    if (k->kind->force == NULL) continue;
+    k->kind->force (&k->b, k->block);
+    int bodies = k->kind->bodies, own = k->kind->own;
+    const double *block = k->block;
+    for (int e = 0; e < k->b.count; e++) {
+      for (int n = 0; n < bodies; n++, block += 3) {
+        double *to = f + k->column[e * bodies + n];
+        to[0] += block[0];
+        to[1] += block[1];
+        to[2] += block[2];
+      }
+      for (int n = 0; n < own; n++) f[k->own + e * own + n] += *block++;
+    }
+  }
+}
+
+/* Sum of one number per element over all kinds that have the sweep. */
+static double evaluate_total (pw_system *s, size_t sweep) {
+  double sum = 0;
+  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    pw_sweep *f = *(pw_sweep *const *)(const void *)((const char *)k->kind + sweep);
+    if (f == NULL) continue;
+    f (&k->b, k->block);
+    for (int e = 0; e < k->b.count; e++) sum += k->block[e];
+  }
+  return sum;
+}
+
+double pw_potential (pw_system *s) {
+  return evaluate_total (s, offsetof (pw_kind, energy));
+}
+
+double pw_kinetic (const pw_system *s, const double *v) {
+  double sum = 0;
+  for (int j = 0; j < s->coords; j++) sum += s->mass[j] * v[j] * v[j];
+  return sum / 2;
+}
+
+void pw_sweep_ledger (pw_system *s, const double *lambda, double *rate) {
+  const pw_slab *swept = NULL;
+  int type = -1;
+  double *eta = s->scratch;
+  for (int i = 0; i < s->entries; i++) {
+    const pw_entry *entry = &s->entry[i];
+    pw_slab *k = &s->slab[entry->slab];
+    int drive = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL;
+    if (k != swept || (int)entry->type != type) {
+      k->b.lambda = lambda + k->row;
+      (drive ? k->kind->eta : entry->type == PW_WORK ? k->kind->power : k->kind->loss) (&k->b, drive ? eta : k->block);
+      swept = k;
+      type = (int)entry->type;
+    }
+    if (!drive) {
+      rate[i] = k->block[entry->element];
+      continue;
+    }
+    rate[i] = 0; /* the constraint force -J^T lambda does the work -lambda . J v = -lambda . eta */
+    for (int r = 0, n = k->kind->rows; r < n; r++) rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
+  }
+}
+
+void pw_mul_J (const pw_system *s, const double *w, double *out) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++) {
+    const double *J = k->J;
+    for (int e = 0; e < k->b.count; e++)
+      for (int r = 0; r < k->kind->rows; r++) {
+        double sum = 0;
+        for (int n = 0; n < k->kind->bodies; n++, J += 3) {
+          int j = k->column[e * k->kind->bodies + n];
+          if (j < s->coords) sum += J[0] * w[j] + J[1] * w[j + 1] + J[2] * w[j + 2];
+        }
+        for (int n = 0; n < k->kind->own; n++) sum += *J++ * w[k->own + e * k->kind->own + n];
+        *out++ = sum;
+      }
+  }
+}
+
+void pw_add_JT (const pw_system *s, const double *lambda, double *out) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++) {
+    const double *J = k->J;
+    for (int e = 0; e < k->b.count; e++)
+      for (int r = 0; r < k->kind->rows; r++, lambda++) {
+        for (int n = 0; n < k->kind->bodies; n++, J += 3) {
+          double *to = out + k->column[e * k->kind->bodies + n];
+          to[0] += J[0] * *lambda;
+          to[1] += J[1] * *lambda;
+          to[2] += J[2] * *lambda;
+        }
+        for (int n = 0; n < k->kind->own; n++) out[k->own + e * k->kind->own + n] += *J++ * *lambda;
+      }
+  }
+}
+
+/* (J v)_i and the sum of |J_ij v_j|, row by row, for the placed rates. */
+static void evaluate_speeds (const pw_system *s, double *jv, double *size) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++) {
+    const double *J = k->J;
+    for (int e = 0; e < k->b.count; e++)
+      for (int r = 0; r < k->kind->rows; r++) {
+        double sum = 0, sizes = 0;
+        for (int n = 0; n < k->kind->bodies; n++, J += 3) {
+          const pw_pose *p = &s->pose[k->b.body[e * k->kind->bodies + n]];
+          double x = J[0] * p->vx, y = J[1] * p->vy, w = J[2] * p->omega;
+          sum += x + y + w;
+          sizes += fabs (x) + fabs (y) + fabs (w);
+        }
+        for (int n = 0; n < k->kind->own; n++) {
+          double own = *J++ * k->b.v[e * k->kind->own + n];
+          sum += own;
+          sizes += fabs (own);
+        }
+        *jv++ = sum;
+        *size++ = sizes;
+      }
+  }
+}
+
+void pw_sweep_residuals (pw_system *s, pw_residuals *r) {
+  double *value = s->scratch, *size = value + s->rows, *eta = size + s->rows;
+  *r = (pw_residuals){ .row_position = -1, .row_velocity = -1 };
+  pw_sweep_g (s, value);
+  pw_sweep_g_size (s, size);
+  for (int i = 0; i < s->holonomic; i++) {
+    double scaled = fabs (value[i]) / size[i];
+    if (!(fabs (value[i]) <= r->g)) r->g = fabs (value[i]);
+    if (!(scaled <= r->position)) r->position = scaled, r->row_position = i;
+  }
+  evaluate_speeds (s, value, size);
+  pw_sweep_eta (s, eta);
+  double unit = s->scale.length / s->scale.time;
+  for (int i = 0; i < s->rows; i++) {
+    double error = fabs (value[i] - eta[i]), scaled = error / (size[i] + fabs (eta[i]) + unit);
+    if (!(error <= r->jv)) r->jv = error;
+    if (!(scaled <= r->velocity)) r->velocity = scaled, r->row_velocity = i;
+  }
+}

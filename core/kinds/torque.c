@@ -1,0 +1,38 @@
+/* torque: the signal u acts on body 1, and its opposite on body 2.
+ *
+ *   f = (0, 0, u | 0, 0, -u),  power = u (w1 - w2) */
+#include "pinwheel.h"
+
+static void torque_force (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    double u = b->u[3 * e];
+    out[0] = 0, out[1] = 0, out[2] = u, out[3] = 0, out[4] = 0, out[5] = -u;
+  }
+}
+
+static void torque_force_u (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) out[0] = 0, out[1] = 0, out[2] = 1, out[3] = 0, out[4] = 0, out[5] = -1;
+}
+
+static void torque_power (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e] * (b->pose[b->body[2 * e]].omega - b->pose[b->body[2 * e + 1]].omega);
+}
+
+static const pw_field torque_fields[] = {
+  { PW_AT (pw_torque, body), PW_BODY, .count = 2, .required = 1, .about = "the body it acts on, and the one it reacts on; ground for one of them" },
+  { PW_AT (pw_torque, value), PW_SIGNAL, .unit = "N m", .required = 1, .about = "torque on the first body" },
+  { .name = NULL },
+};
+
+const pw_kind pw_kind_torque = {
+  .name = "torque",
+  .about = "a torque on one body and its opposite on another",
+  .definition = sizeof (pw_torque),
+  .fields = torque_fields,
+  .bodies = 2,
+  .signals = 1,
+  .level = PW_FORCE,
+  .force = torque_force,
+  .force_u = torque_force_u,
+  .power = torque_power,
+};

@@ -1,0 +1,165 @@
+/* The description: parameters, bodies and elements as the build function declares them. */
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "model.h"
+
+static int model_no_memory (pw_model *m) {
+  return pw_fail (&m->error, PW_MACHINE, "model %s: out of memory", m->name ? m->name : "");
+}
+
+pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error) {
+  if (table->abi != PW_ABI || table->size != sizeof *table) {
+    pw_fail (error, PW_INPUT, "model %s was compiled for ABI %u of %zu bytes, this Pinwheel has ABI %u of %zu: compile it anew",
+             name, table->abi, table->size, (unsigned)PW_ABI, sizeof *table);
+    return NULL;
+  }
+  if (table->build == NULL) {
+    pw_fail (error, PW_INPUT, "model %s has no build function", name);
+    return NULL;
+  }
+  pw_model *m = calloc (1, sizeof *m);
+  if (m) {
+    m->table = table;
+    m->name = pw_arena_text (&m->arena, name);
+    m->parameters = pw_arena_take (&m->arena, table->parameters_size + 1);
+  }
+  if (m == NULL || m->name == NULL || m->parameters == NULL) {
+    pw_model_free (m);
+    pw_fail (error, PW_MACHINE, "model %s: out of memory", name);
+    return NULL;
+  }
+  for (const pw_parameter *p = table->parameters; p && p->name; p++)
+    memcpy (m->parameters + p->offset, &p->value, sizeof (double));
+  return m;
+}
+
+void pw_model_free (pw_model *m) {
+  if (m == NULL) return;
+  pw_arena_free (&m->arena);
+  free (m->body);
+  free (m->element);
+  free (m->given);
+  free (m);
+}
+
+int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
+  pw_nearest near = { .sought = parameter };
+  for (const pw_parameter *p = m->table->parameters; p && p->name; p++) {
+    if (strcmp (p->name, parameter) == 0) {
+      const char *expected = pw_domain_check (p->domain, value);
+      if (*expected)
+        return pw_fail (error, PW_INPUT, "model %s: parameter %s = %.17g: expected %s", m->name, parameter, value, expected);
+      memcpy (m->parameters + p->offset, &value, sizeof value);
+      return PW_OK;
+    }
+    pw_nearest_try (&near, p->name);
+  }
+  char hint[100];
+  return pw_fail (error, PW_INPUT, "model %s has no parameter \"%s\"%s", m->name, parameter,
+                  pw_nearest_text (&near, hint, sizeof hint));
+}
+
+int pw_build (pw_model *m, pw_error *error) {
+  m->table->build (m, m->parameters);
+  m->built = 1;
+  return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+}
+
+int pw_refuse (pw_model *m, const char *format, ...) {
+  char text[400];
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (text, sizeof text, format, arguments);
+  va_end (arguments);
+  return pw_fail (&m->error, PW_INPUT, "model %s: %s", m->name, text);
+}
+
+/* Makes room for one more in a growing array. */
+static int model_grow (pw_model *m, void *array, int count, int *room, size_t size) {
+  if (count < *room) return PW_OK;
+  int more = *room ? 2 * *room : 8;
+  void *p = realloc (*(void **)array, (size_t)more * size);
+  if (p == NULL) return model_no_memory (m);
+  *(void **)array = p;
+  *room = more;
+  return PW_OK;
+}
+
+static const char *model_text (pw_model *m, const char *text) {
+  if (text == NULL) return NULL;
+  char *copy = pw_arena_text (&m->arena, text);
+  if (copy == NULL) model_no_memory (m);
+  return copy;
+}
+
+int pw_add_body (pw_model *m, const pw_body *body) {
+  if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
+    return m->error.status;
+  pw_body *b = &m->body[m->bodies++];
+  *b = *body;
+  b->name = model_text (m, body->name);
+  return m->error.status;
+}
+
+int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
+  if (m->error.status != PW_OK ||
+      model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
+    return m->error.status;
+  void *copy = pw_arena_take (&m->arena, kind->definition);
+  if (copy == NULL) return model_no_memory (m);
+  memcpy (copy, definition, kind->definition);
+  const char **name = copy;
+  *name = model_text (m, *name);
+  for (int i = 0; i < kind->bodies; i++) {
+    const char **body = pw_field_at (kind, copy, PW_BODY, i);
+    *body = model_text (m, *body);
+  }
+  m->element[m->elements++] = (pw_element){ kind, copy };
+  return m->error.status;
+}
+
+void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k) {
+  static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double), sizeof (char *), sizeof (pw_signal), sizeof (int) };
+  for (const pw_field *f = kind->fields; f->name; f++) {
+    if (f->type != type) continue;
+    if (k < pw_field_count (f)) return (char *)(size_t)definition + f->offset + (size_t)k * size[type];
+    k -= pw_field_count (f);
+  }
+  return NULL;
+}
+
+int pw_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error) {
+  pw_nearest near = { .sought = element };
+  char hint[100];
+  for (int i = 0; i < m->elements; i++) {
+    const pw_element *e = &m->element[i];
+    const char *name = pw_element_name (e);
+    if (name == NULL) continue;
+    pw_nearest_try (&near, name);
+    if (strcmp (name, element) != 0) continue;
+    pw_nearest fields = { .sought = field };
+    for (const pw_field *f = e->kind->fields; f->name; f++) {
+      if (f->type != PW_SIGNAL) continue;
+      pw_nearest_try (&fields, f->name);
+      if (strcmp (f->name, field) != 0) continue;
+      memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
+      return PW_OK;
+    }
+    return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
+                    pw_nearest_text (&fields, hint, sizeof hint));
+  }
+  return pw_fail (error, PW_INPUT, "model %s has no element \"%s\"%s", m->name, element,
+                  pw_nearest_text (&near, hint, sizeof hint));
+}
+
+int pw_set_start (pw_model *m, const char *state, double value, pw_error *error) {
+  const char *expected = pw_domain_check (PW_REAL, value);
+  if (*expected) return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);
+  if (model_grow (m, &m->given, m->givens, &m->given_room, sizeof *m->given) == PW_OK) {
+    m->given[m->givens] = (pw_given){ model_text (m, state), value };
+    if (m->given[m->givens].state) m->givens++;
+  }
+  return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+}

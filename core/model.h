@@ -1,0 +1,47 @@
+/* The description from inside: what pw_compile reads. */
+#ifndef PW_MODEL_H
+#define PW_MODEL_H
+
+#include "util.h"
+
+typedef struct {
+  const pw_kind *kind;
+  void *definition; /* a copy; kind->definition bytes, the first member its name */
+} pw_element;
+
+typedef struct {
+  const char *state;
+  double value;
+} pw_given;
+
+struct pw_model {
+  const char *name;
+  const pw_plugin_table *table;
+  char *parameters; /* table->parameters_size bytes */
+  pw_arena arena;   /* strings and definitions */
+  pw_body *body;
+  int bodies, body_room;
+  pw_element *element;
+  int elements, element_room;
+  pw_given *given;
+  int givens, given_room;
+  int built;
+  pw_error error; /* the first one */
+};
+
+static inline const char *pw_element_name (const pw_element *e) {
+  return *(const char *const *)e->definition;
+}
+
+/* Checks every body and element against its field table: names, numbers, bodies' names, signals. */
+int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
+
+/* The k-th field of a type in a kind, counting each of its `count`; address inside the definition. */
+void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);
+
+/* How many a field stands for. */
+static inline int pw_field_count (const pw_field *f) {
+  return f->count > 0 ? f->count : 1;
+}
+
+#endif

@@ -1,0 +1,351 @@
+/* Pinwheel: planar multibody systems with pin joints and knife-edge wheels.
+ *
+ * This header is all that a model file includes.  It declares
+ *   - the description: bodies, elements, signals and parameters a model is made of,
+ *   - the element kinds that come with Pinwheel, and what a kind of your own has to provide,
+ *   - the compiled system that the solvers integrate.
+ *
+ * Units are SI, angles are radians, counter-clockwise.  The state is q = (x, y, phi) of each body's centre of
+ * mass, then the coordinates that elements own, and v = dq/dt.  The equations are
+ *
+ *     M a + J^T lambda = f(t, q, v),     g(q, t) = 0,     J v = eta(t, q),     J = [ G = dg/dq ; S(q, t) ]
+ *
+ * with the holonomic rows G first and the nonholonomic rows S after them; differentiated once more, J a = gamma. */
+#ifndef PINWHEEL_H
+#define PINWHEEL_H
+
+#include <stddef.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#define PW_ABI 1 /* raised whenever a plug-in compiled against an older header could be misread */
+#define PW_PI 3.14159265358979323846
+
+/* ---- Status and errors ---- */
+
+/* What a function returns: 0 good, > 0 the caller may retry with a smaller step, < 0 stop.  The negative of a
+ * negative status is the exit status of the program. */
+typedef enum {
+  PW_OK = 0,       /* good */
+  PW_RETRY = 1,    /* not usable, a smaller step may be */
+  PW_MACHINE = -1, /* out of memory, a file cannot be written */
+  PW_INPUT = -2,   /* the description or an option is wrong */
+  PW_START = -3,   /* the start cannot be made consistent */
+  PW_METHOD = -4   /* the method failed on the way */
+} pw_status;
+
+/* A caller-owned error: the first failure is kept, later ones do not overwrite it. */
+typedef struct {
+  int status;     /* a pw_status; 0: no error so far */
+  char text[500]; /* one line without a full stop: what was found, what was expected, the nearest valid name */
+} pw_error;
+
+/* Records a failure and returns its status.  A NULL error is allowed; an error already set stays. */
+int pw_fail (pw_error *error, int status, const char *format, ...)
+#ifdef __GNUC__
+    __attribute__ ((format (printf, 3, 4)))
+#endif
+    ;
+
+/* ---- Signals: what a torque, drive or heading does over time ---- */
+
+typedef enum { PW_CONSTANT, PW_HARMONIC, PW_FUNCTION } pw_signal_type;
+
+/* A signal computed by the caller.  `eval` stores the value and, if the signal serves a constraint, its first and
+ * second time derivative in value[0..2]; x holds the states named in `reads`, in that order, and gradient (NULL
+ * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run. */
+typedef struct {
+  int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
+  void *context;                                  /* passed to eval and breakpoint as it is */
+  const char *const *reads;                       /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
+  double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
+} pw_function;
+
+/* A signal; all zero is the constant 0. */
+typedef struct {
+  pw_signal_type type; /* which member of the union holds */
+  union {
+    double constant; /* PW_CONSTANT: the value */
+    struct {
+      double amplitude; /* unit of the signal */
+      double omega;     /* angular frequency [rad/s] */
+      double phase;     /* [rad] */
+      double offset;    /* unit of the signal */
+    } harmonic;         /* PW_HARMONIC: offset + amplitude cos (omega t + phase) */
+    pw_function function;
+  };
+} pw_signal;
+
+/* ---- The description ---- */
+
+typedef struct pw_model pw_model;
+
+/* A rigid body.  Its frame sits at its centre of mass.  Massless bodies are allowed. */
+typedef struct {
+  const char *name;  /* unique among bodies and elements; "ground" is reserved */
+  double mass;       /* [kg], >= 0 */
+  double inertia;    /* about the centre of mass [kg m^2], >= 0 */
+  double start[3];   /* x, y [m], phi [rad] at the start */
+  double rate[3];    /* vx, vy [m/s], omega [rad/s] at the start */
+} pw_body;
+
+/* The domain of a number. */
+typedef enum {
+  PW_REAL,        /* any finite number */
+  PW_NONNEGATIVE, /* >= 0 */
+  PW_POSITIVE,    /* > 0 */
+  PW_COUNT        /* a whole number >= 1 */
+} pw_domain;
+
+/* A named parameter of a model; it lives as a double at `offset` in the model's own parameter structure. */
+typedef struct {
+  const char *name;  /* as written after --set */
+  size_t offset;     /* byte offset in the structure handed to build; PW_AT gives name and offset */
+  double value;      /* default */
+  const char *unit;  /* "m", "kg m^2", ... or "" */
+  const char *about; /* what it means, in a few words */
+  pw_domain domain;  /* which values make sense */
+} pw_parameter;
+
+#define PW_AT(type, member) .name = #member, .offset = offsetof (type, member)
+
+/* How a model wants to be run when the user does not say; zeros leave Pinwheel's own choice. */
+typedef struct {
+  double t_end;       /* [s] */
+  double step;        /* [s], fixed-step methods */
+  double rtol;        /* relative tolerance, adaptive methods */
+  const char *method; /* "rk4+projection", ... */
+} pw_run_defaults;
+
+typedef struct pw_kind pw_kind;
+
+/* What a plug-in exports, under the name `pw_plugin`. */
+typedef struct {
+  unsigned abi;                     /* PW_ABI */
+  size_t size;                      /* sizeof (pw_plugin_table) */
+  const char *about;                /* one line: what the model is */
+  const pw_parameter *parameters;   /* ended by a NULL name; may be NULL */
+  size_t parameters_size;           /* bytes of the structure the parameters live in */
+  pw_run_defaults run;              /* how to run it by default */
+  void (*build) (pw_model *m, const void *parameters); /* declares bodies and elements */
+} pw_plugin_table;
+
+/* Ends a model file:  PW_MODEL (.about = "...", .parameters = ..., .build = build) */
+#define PW_MODEL(...)                                                                                                  \
+  extern const pw_plugin_table pw_plugin;                                                                              \
+  const pw_plugin_table pw_plugin = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), __VA_ARGS__ }
+
+/* Adds a body.  The model keeps a copy, the name included.  Returns PW_OK or the first error of the model, which
+ * pw_build reports: a build function need not look at it. */
+int pw_add_body (pw_model *m, const pw_body *body);
+
+/* Adds an element of any kind; `definition` is the kind's definition structure, of which a copy is kept, names and
+ * all.  Returns as pw_add_body. */
+int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
+
+/* Lets a build function refuse what it was given ("links: at most 1000").  Returns the status. */
+int pw_refuse (pw_model *m, const char *format, ...);
+
+/* ---- The element kinds ---- */
+
+/* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic rows. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];     /* the point in each body's frame [m]; on the ground: in the world */
+} pw_pin;
+
+/* Wheel: a knife edge; the point does not move across the heading.  One nonholonomic row. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];   /* contact point in the body's frame [m] */
+  double heading; /* rolling direction in the body's frame [rad] */
+} pw_wheel;
+
+/* Torque: acts on body 1, and its opposite on body 2. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  pw_signal value;     /* [N m] */
+} pw_torque;
+
+/* The list of kinds: the one line to add for a new file in core/kinds/. */
+#define PW_KINDS                                                                                                       \
+  PW_KIND (pin)                                                                                                        \
+  PW_KIND (wheel)                                                                                                      \
+  PW_KIND (torque)
+
+/* ---- What a kind provides ---- */
+
+typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE } pw_field_type;
+
+/* One field of a definition structure: serves validation, text models, `show`, `list kinds` and the manual. */
+typedef struct {
+  const char *name;           /* as written in a model file */
+  size_t offset;              /* in the definition structure */
+  pw_field_type type;         /* double, double[2], double[2], const char *, pw_signal, int */
+  int count;                  /* how many of them in a row; 0 means 1 */
+  const char *unit;           /* NULL where there is none */
+  int required;               /* a text model must write it */
+  pw_domain domain;           /* of a number */
+  const char *const *choices; /* NULL-terminated names of a choice's values 0, 1, ... */
+  const char *about;          /* meaning */
+} pw_field;
+
+/* Name and unit of a constraint row's reaction, or of an own coordinate. */
+typedef struct {
+  const char *name;  /* "Fx" */
+  const char *unit;  /* "N" */
+  const char *rate;  /* own coordinates only: the name of its velocity */
+  const char *about; /* sign and meaning */
+} pw_quantity;
+
+/* Where a body is and how it moves; the ground is a body at rest at the origin. */
+typedef struct {
+  double x, y, phi;       /* centre of mass [m], angle [rad] */
+  double cos, sin;        /* of phi */
+  double vx, vy, omega;   /* [m/s], [rad/s] */
+} pw_pose;
+
+/* All elements of one kind in a scene, as its sweeps see them.  Element e has local coordinates: (x, y, phi) of each
+ * of its bodies, then its own; there are `cols` of them.  Arrays are row-major, one element after the other. */
+typedef struct {
+  int count;            /* elements */
+  int cols;             /* 3 kind->bodies + kind->own */
+  const void *element;  /* count structures of kind->element bytes, made by kind->prepare */
+  const int *body;      /* count x kind->bodies indices into pose */
+  const pw_pose *pose;  /* of every body of the scene, and the ground */
+  const double *q;      /* count x kind->own: own coordinates */
+  const double *v;      /* count x kind->own: their rates */
+  const double *u;      /* count x kind->signals x 3: value, rate and acceleration of each signal */
+  const double *w;      /* count x cols: the direction w, for jw_q only */
+  const double *lambda; /* count x kind->rows: the multipliers, for jtl_q, power and loss only */
+} pw_batch;
+
+/* Fills one array for the whole batch. */
+typedef void pw_sweep (const pw_batch *b, double *out);
+
+/* In a second-order block's place: asks the core to difference the function below it. */
+pw_sweep pw_by_differences;
+#define PW_BY_DIFFERENCES pw_by_differences
+
+typedef enum {
+  PW_FORCE,        /* no rows */
+  PW_HOLONOMIC,    /* rows g (q, t) = 0 */
+  PW_NONHOLONOMIC  /* rows S (q, t) v = eta (t, q) */
+} pw_level;
+
+/* An element kind: one const table in one file.  A NULL sweep means identically zero; the self-test verifies it.
+ * Sizes are given per element. */
+struct pw_kind {
+  const char *name;           /* "pin" */
+  const char *about;          /* one line */
+  size_t definition;          /* bytes of the definition structure, whose first member is `const char *name` */
+  size_t element;             /* bytes of the prepared element */
+  const pw_field *fields;     /* ended by a NULL name; `name` itself is not listed */
+  int bodies;                 /* bodies an element touches: as many as its fields of type PW_BODY name */
+  int own;                    /* coordinates of its own */
+  int rows;                   /* constraint rows */
+  int signals;                /* signals, in the order of its fields */
+  pw_level level;             /* of its rows */
+  const pw_quantity *reaction;   /* one per row: what -lambda is */
+  const pw_quantity *coordinate; /* one per own coordinate */
+
+  /* Turns a checked definition into a prepared element; bodies are those it names, in order, the ground as a body
+   * without mass.  own_mass takes the inertia of each own coordinate.  Returns a status. */
+  int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, double *own_mass,
+                  pw_error *error);
+
+  pw_sweep *g;       /* rows: residual of holonomic rows */
+  pw_sweep *g_size;  /* rows: sum of the absolute values of the terms of g, against which g is judged */
+  pw_sweep *eta;     /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
+  pw_sweep *J;       /* rows x cols */
+  pw_sweep *gamma;   /* rows: right-hand side of J a = gamma */
+  pw_sweep *force;   /* cols: generalised force */
+  pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
+  pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch */
+  pw_sweep *jtl_q;   /* cols x cols: derivative of J^T lambda by q, lambda given in the batch */
+  pw_sweep *eta_q;   /* rows x cols */
+  pw_sweep *gamma_q; /* rows x cols */
+  pw_sweep *gamma_v; /* rows x cols */
+  pw_sweep *force_q; /* cols x cols */
+  pw_sweep *force_v; /* cols x cols */
+  pw_sweep *energy;  /* 1: potential energy [J] */
+  pw_sweep *power;   /* 1: power the element feeds into the system [W] */
+  pw_sweep *loss;    /* 1: power it dissipates [W], >= 0 */
+  pw_sweep *contact; /* 3: point on the ground [m] and heading [rad], for paths and pictures */
+};
+
+/* Every kind k of the list: its table pw_kind_k, and pw_add_k, which is pw_add with that table. */
+#define PW_KIND(k)                                                                                                     \
+  extern const pw_kind pw_kind_##k;                                                                                    \
+  static inline int pw_add_##k (pw_model *m, const pw_##k *definition) {                                               \
+    return pw_add (m, &pw_kind_##k, definition);                                                                       \
+  }
+PW_KINDS
+#undef PW_KIND
+
+/* The built-in kinds, ended by NULL. */
+extern const pw_kind *const pw_kinds[];
+
+/* ---- Models from outside a build function ---- */
+
+/* A model with its parameters at their defaults, not built yet.  `name` is copied; the table must outlive the model.
+ * NULL with the error filled if the table does not fit this library or memory is out. */
+pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error);
+void pw_model_free (pw_model *m);
+
+/* Sets a parameter before pw_build.  Errors: unknown name, value outside its domain. */
+int pw_set (pw_model *m, const char *parameter, double value, pw_error *error);
+
+/* Runs the model's build function.  Errors: whatever an added body or element is wrong about. */
+int pw_build (pw_model *m, pw_error *error);
+
+/* Replaces a signal of a built model: pw_set_signal (m, "rider", "value", &signal, e). */
+int pw_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
+
+/* Gives a start value, "frame.vx" or "wheel.spin", which the consistent start then holds. */
+int pw_set_start (pw_model *m, const char *state, double value, pw_error *error);
+
+/* ---- The compiled system ---- */
+
+/* A system belongs to one thread at a time; it does not refer to the model it was compiled from, but to the kinds
+ * and the function signals. */
+typedef struct pw_system pw_system;
+
+/* Checks and compiles a built model.  NULL with the error filled if it cannot be. */
+pw_system *pw_compile (const pw_model *m, pw_error *error);
+void pw_free (pw_system *s);
+
+/* Sizes: bodies, coordinates (q and v have as many entries each), constraint rows, of which the first are holonomic. */
+int pw_count_bodies (const pw_system *s);
+int pw_count_coordinates (const pw_system *s);
+int pw_count_rows (const pw_system *s);
+int pw_count_holonomic (const pw_system *s);
+
+/* Index of a body by name, or -1. */
+int pw_find_body (const pw_system *s, const char *name);
+
+/* Index of a state by name: i for coordinate q[i], n + i for its rate v[i], n the number of coordinates.  PW_INPUT
+ * and the error, with the nearest name, if there is no such state. */
+int pw_find_state (const pw_system *s, const char *name, pw_error *error);
+
+/* The name and unit of a state ("frame.vx", "m/s"); the name is written to the buffer, which is returned. */
+char *pw_state_name (const pw_system *s, int state, char *buffer, size_t size);
+const char *pw_state_unit (const pw_system *s, int state);
+
+/* The name and unit of a row's reaction ("B.Fx", "N"), as pw_state_name. */
+char *pw_reaction_name (const pw_system *s, int row, char *buffer, size_t size);
+const char *pw_reaction_unit (const pw_system *s, int row);
+
+/* The kind and name of a row's element ("wheel C"), as pw_state_name. */
+char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

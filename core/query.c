@@ -1,0 +1,133 @@
+/* Names and sizes of a compiled system. */
+#include <stdio.h>
+#include <string.h>
+#include "system.h"
+#include "util.h"
+
+static const char *const query_names[] = { "x", "y", "phi", "vx", "vy", "omega" };
+static const char *const query_units[] = { "m", "m", "rad", "m/s", "m/s", "rad/s" };
+
+int pw_count_bodies (const pw_system *s) {
+  return s->bodies;
+}
+
+int pw_count_coordinates (const pw_system *s) {
+  return s->coords;
+}
+
+int pw_count_rows (const pw_system *s) {
+  return s->rows;
+}
+
+int pw_count_holonomic (const pw_system *s) {
+  return s->holonomic;
+}
+
+int pw_count_ledger (const pw_system *s) {
+  return s->entries;
+}
+
+int pw_find_body (const pw_system *s, const char *name) {
+  for (int b = 0; b < s->bodies; b++)
+    if (strcmp (s->body_name[b], name) == 0) return b;
+  return -1;
+}
+
+/* The slab that owns a coordinate j >= 3 bodies, and the element's and quantity's numbers in it. */
+static const pw_slab *query_owner (const pw_system *s, int j, int *element, int *number) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    int n = j - k->own;
+    if (k->kind->own == 0 || n < 0 || n >= k->b.count * k->kind->own) continue;
+    *element = n / k->kind->own;
+    *number = n % k->kind->own;
+    return k;
+  }
+  return NULL;
+}
+
+char *pw_state_name (const pw_system *s, int state, char *buffer, size_t size) {
+  int rate = state >= s->coords, j = rate ? state - s->coords : state, e, n;
+  if (j < 3 * s->bodies) {
+    snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_names[3 * rate + j % 3]);
+    return buffer;
+  }
+  const pw_slab *k = query_owner (s, j, &e, &n);
+  if (k) snprintf (buffer, size, "%s.%s", k->name[e], rate ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
+  return buffer;
+}
+
+const char *pw_state_unit (const pw_system *s, int state) {
+  int rate = state >= s->coords, j = rate ? state - s->coords : state, e, n;
+  if (j < 3 * s->bodies) return query_units[3 * rate + j % 3];
+  const pw_slab *k = query_owner (s, j, &e, &n);
+  if (k == NULL) return "";
+  if (!rate) return k->kind->coordinate[n].unit;
+  return strcmp (k->kind->coordinate[n].unit, "m") == 0 ? "m/s" : "rad/s";
+}
+
+/* "body.what" to an index; `near` collects what was meant. */
+static int query_body_state (const pw_system *s, const char *name, pw_nearest *near, char *best, size_t size) {
+  const char *dot = strrchr (name, '.');
+  if (dot == NULL) return -1;
+  int b = 0;
+  while (b < s->bodies && (strncmp (s->body_name[b], name, (size_t)(dot - name)) != 0 || s->body_name[b][dot - name])) b++;
+  if (b == s->bodies) return -1;
+  pw_nearest what = { .sought = dot + 1 };
+  for (int i = 0; i < 6; i++) {
+    if (strcmp (dot + 1, query_names[i]) == 0) return i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
+    pw_nearest_try (&what, query_names[i]);
+  }
+  snprintf (best, size, "%s.%s", s->body_name[b], what.best);
+  near->best = best;
+  return -1;
+}
+
+int pw_find_state (const pw_system *s, const char *name, pw_error *error) {
+  char best[120], text[120], hint[160];
+  pw_nearest near = { .sought = name };
+  int state = query_body_state (s, name, &near, best, sizeof best);
+  if (state >= 0) return state;
+  for (int j = 3 * s->bodies; j < s->coords; j++)
+    for (int rate = 0; rate < 2; rate++)
+      if (strcmp (pw_state_name (s, j + rate * s->coords, text, sizeof text), name) == 0) return j + rate * s->coords;
+  int search = near.best == NULL;
+  for (int i = 0; search && i < 2 * s->coords; i++) {
+    pw_nearest_try (&near, pw_state_name (s, i, text, sizeof text));
+    if (near.best == text) near.best = strcpy (best, text);
+  }
+  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name, pw_nearest_text (&near, hint, sizeof hint));
+}
+
+/* The slab of a row, and the element and the row's number in it. */
+static const pw_slab *query_row (const pw_system *s, int row, int *element, int *number) {
+  const pw_slab *k = s->slab;
+  while (row >= k->row + k->b.count * k->kind->rows) k++;
+  *element = (row - k->row) / k->kind->rows;
+  *number = (row - k->row) % k->kind->rows;
+  return k;
+}
+
+char *pw_reaction_name (const pw_system *s, int row, char *buffer, size_t size) {
+  int e, n;
+  const pw_slab *k = query_row (s, row, &e, &n);
+  snprintf (buffer, size, "%s.%s", k->name[e], k->kind->reaction[n].name);
+  return buffer;
+}
+
+const char *pw_reaction_unit (const pw_system *s, int row) {
+  int e, n;
+  return query_row (s, row, &e, &n)->kind->reaction[n].unit;
+}
+
+char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size) {
+  int e, n;
+  const pw_slab *k = query_row (s, row, &e, &n);
+  snprintf (buffer, size, "%s %s", k->kind->name, k->name[e]);
+  return buffer;
+}
+
+char *pw_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
+  const pw_entry *x = &s->entry[entry];
+  snprintf (buffer, size, "%s.%s", s->slab[x->slab].name[x->element], x->type == PW_WORK ? "work" : "loss");
+  return buffer;
+}

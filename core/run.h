@@ -1,0 +1,75 @@
+/* What a method is asked and what it answers: settings, samples, statistics.  The methods themselves are in
+ * solvers/; see pinwheel-solvers.h. */
+#ifndef PW_RUN_H
+#define PW_RUN_H
+
+#include "pinwheel.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* How to integrate; zeros leave the defaults. */
+typedef struct {
+  double t;    /* start time [s] */
+  double span; /* about how long the run will be [s]; only sets the time scale of a scene that starts at rest */
+  double step; /* fixed-step methods: step size [s]; default 1e-3 */
+  double rtol; /* adaptive methods: relative tolerance; default 1e-6 */
+  double atol; /* absolute tolerance of every state; default rtol x (L, 1 rad, L/T, 1/T), see pw_scale */
+  int ledger;  /* 1: keep account of work, losses and the energy balance */
+} pw_settings;
+
+/* The scales of a scene, from its description and start: everything judged absolutely is judged against them. */
+typedef struct {
+  double length; /* L: largest distance of an attachment from its body's centre of mass, else radius of gyration [m] */
+  double time;   /* T: 1 / max (1 / span, fastest rate, square root of the fastest acceleration), in units of L [s] */
+} pw_scale;
+
+/* What a run has cost and how well it held the constraints, at accepted steps. */
+typedef struct {
+  long steps;          /* accepted */
+  long rejected;       /* retaken with another size */
+  long rhs;            /* evaluations of the accelerations, or of the residual */
+  long jacobians;      /* evaluations of an iteration matrix */
+  long factorisations; /* of any matrix */
+  double position;     /* worst scaled residual of g = 0 */
+  double velocity;     /* worst scaled residual of J v = eta */
+  double g;            /* worst |g| [m] or [rad] */
+  double jv;           /* worst |J v - eta| [m/s] or [rad/s] */
+} pw_statistics;
+
+/* The state at one time.  The arrays belong to the run and hold until its next call. */
+typedef struct {
+  double t;
+  const double *q, *v;   /* coordinates and rates: pw_count_coordinates each */
+  const double *a;       /* accelerations */
+  const double *lambda;  /* multipliers, M a + J^T lambda = f: pw_count_rows */
+  double position;       /* scaled residual of g = 0 here */
+  double velocity;       /* scaled residual of J v = eta here */
+  double kinetic;        /* [J] */
+  double potential;      /* [J] */
+  const double *ledger;  /* work or loss of each entry of the ledger [J]: pw_count_ledger; NULL if not kept */
+  double work;           /* fed in by active elements and drives since the start [J] */
+  double loss;           /* dissipated [J] */
+  double projection;     /* energy added by projections [J] */
+  double balance;        /* (kinetic + potential) - at the start - work + loss - projection [J] */
+} pw_sample;
+
+/* Entries of the ledger: the name of entry i is "rider.work" or "damper.loss". */
+int pw_count_ledger (const pw_system *s);
+char *pw_ledger_name (const pw_system *s, int entry, char *buffer, size_t size);
+
+/* What the consistent start did. */
+typedef struct {
+  const double *q_given, *v_given; /* the state as described */
+  const double *q, *v;             /* the state the run starts from */
+  int moved;                       /* number of states that differ */
+  int freed;                       /* 1: the values the user gave could not all be held */
+  double position, velocity;       /* scaled residuals before */
+} pw_start_report;
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

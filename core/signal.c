@@ -1,0 +1,29 @@
+/* Signals: values and time derivatives of what the user wants to happen over time. */
+#include <math.h>
+#include "signal.h"
+
+/* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p) */
+static void signal_harmonic (const pw_signal *s, double t, int derivatives, double u[3]) {
+  double w = s->harmonic.omega, angle = w * t + s->harmonic.phase, c = s->harmonic.amplitude * cos (angle);
+  u[0] = s->harmonic.offset + c;
+  if (!derivatives) return;
+  u[1] = -s->harmonic.amplitude * w * sin (angle);
+  u[2] = -w * w * c;
+}
+
+int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]) {
+  const pw_signal *s = &source->signal;
+  u[0] = u[1] = u[2] = 0;
+  if (s->type == PW_HARMONIC)
+    signal_harmonic (s, t, derivatives, u);
+  else if (s->type == PW_FUNCTION)
+    return s->function.eval (s->function.context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
+  else
+    u[0] = s->constant;
+  return 0;
+}
+
+double pw_signal_breakpoint (const pw_signal *s, double t) {
+  if (s->type != PW_FUNCTION || s->function.breakpoint == NULL) return INFINITY;
+  return s->function.breakpoint (s->function.context, t);
+}

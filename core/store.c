@@ -1,0 +1,91 @@
+/* Name tables, arenas and one-piece layouts. */
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include "util.h"
+
+/* FNV-1a (Fowler, Noll, Vo). */
+static uint64_t store_hash (const char *name) {
+  uint64_t h = 14695981039346656037u;
+  while (*name) h = (h ^ (unsigned char)*name++) * 1099511628211u;
+  return h;
+}
+
+int pw_names_open (pw_names *n, size_t entries) {
+  n->size = 16;
+  while (n->size < 2 * entries) n->size *= 2;
+  n->slot = calloc (n->size, sizeof *n->slot);
+  return n->slot ? PW_OK : PW_MACHINE;
+}
+
+void pw_names_close (pw_names *n) {
+  free (n->slot);
+  n->slot = NULL;
+}
+
+static struct pw_name *store_slot (const pw_names *n, const char *name) {
+  size_t i = (size_t)store_hash (name) & (n->size - 1);
+  while (n->slot[i].name && strcmp (n->slot[i].name, name) != 0) i = (i + 1) & (n->size - 1);
+  return &n->slot[i];
+}
+
+int pw_names_add (pw_names *n, const char *name, int value) {
+  struct pw_name *slot = store_slot (n, name);
+  if (slot->name) return slot->value;
+  slot->name = name;
+  slot->value = value;
+  return -1;
+}
+
+int pw_names_find (const pw_names *n, const char *name) {
+  const struct pw_name *slot = store_slot (n, name);
+  return slot->name ? slot->value : -1;
+}
+
+struct pw_chunk {
+  struct pw_chunk *next;
+  size_t used, size;
+  char data[];
+};
+
+#define STORE_ALIGN 16
+#define STORE_CHUNK 65536
+
+static size_t store_round (size_t bytes) {
+  return (bytes + STORE_ALIGN - 1) / STORE_ALIGN * STORE_ALIGN;
+}
+
+void *pw_arena_take (pw_arena *a, size_t bytes) {
+  bytes = store_round (bytes);
+  if (a->chunk == NULL || a->chunk->size - a->chunk->used < bytes) {
+    size_t size = bytes > STORE_CHUNK ? bytes : STORE_CHUNK;
+    struct pw_chunk *c = calloc (1, sizeof *c + size);
+    if (c == NULL) return NULL;
+    c->next = a->chunk;
+    c->size = size;
+    a->chunk = c;
+  }
+  void *p = a->chunk->data + a->chunk->used;
+  a->chunk->used += bytes;
+  return p;
+}
+
+char *pw_arena_text (pw_arena *a, const char *text) {
+  size_t n = strlen (text) + 1;
+  char *copy = pw_arena_take (a, n);
+  return copy ? memcpy (copy, text, n) : NULL;
+}
+
+void pw_arena_free (pw_arena *a) {
+  while (a->chunk) {
+    struct pw_chunk *next = a->chunk->next;
+    free (a->chunk);
+    a->chunk = next;
+  }
+}
+
+void *pw_take (pw_layout *l, size_t count, size_t size) {
+  void *p = l->base ? l->base + l->used : NULL;
+  l->used += store_round (count * size);
+  return p;
+}

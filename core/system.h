@@ -1,0 +1,118 @@
+/* The compiled system from inside: for core/ and solvers/, not for models.
+ *
+ * One allocation holds everything.  Index names: body b, slab k, element e of a slab, local column c of an element,
+ * global coordinate j, row i.  Arrays that are scattered into have three entries more than there are coordinates:
+ * the ground's, never read. */
+#ifndef PW_SYSTEM_H
+#define PW_SYSTEM_H
+
+#include "run.h"
+
+/* A signal of one element, with the states it reads. */
+typedef struct {
+  pw_signal signal;
+  int reads;        /* how many states a function signal reads */
+  const int *state; /* their indices: coordinate j, or coordinates + j for a rate */
+  double *x;        /* reads: their values, then reads: the gradient */
+} pw_source;
+
+/* One kind in use: its batch, and where its rows and coordinates are. */
+typedef struct {
+  pw_batch b;         /* as the kind sees it */
+  const pw_kind *kind;
+  int row;            /* global index of its first row */
+  int own;            /* global index of its first own coordinate */
+  const int *column;  /* count x bodies: first coordinate of each body; the ground's is s->coords */
+  double *J;          /* count x rows x cols */
+  double *block;      /* force kinds: count x cols scratch */
+  double *u;          /* count x signals x 3, as b.u */
+  pw_source *source;  /* count x signals */
+  const char **name;  /* count */
+} pw_slab;
+
+/* An account of work or loss. */
+typedef struct {
+  int slab, element;
+  enum { PW_WORK, PW_LOSS } type;
+} pw_entry;
+
+struct pw_system {
+  const char *model;
+  int bodies, coords, rows, holonomic, slabs, entries;
+  int readers;              /* function signals that read states */
+  int hold;                 /* 1: signals of forces keep their values (inputs=held) */
+  double t_signal;          /* the time the signals were last evaluated at; NaN: never */
+  pw_scale scale;
+  const char **body_name;   /* bodies */
+  double *mass;             /* coords: diagonal of M */
+  double *metric;           /* coords: M, and small weights where M is zero */
+  double *q0, *v0;          /* coords: the described start */
+  unsigned char *held;      /* 2 coords: given by the user, so held by the consistent start */
+  pw_pose *pose;            /* bodies + 1; the last is the ground */
+  pw_slab *slab;            /* slabs: holonomic kinds first, then nonholonomic ones, then forces */
+  double *scratch;          /* rows x 3 + coords + 3 */
+  pw_entry *entry;          /* entries */
+};
+
+/* ---- Placing: poses and signals for one (t, q, v), on which all sweeps below work ---- */
+
+int pw_place (pw_system *s, double t, const double *q, const double *v);
+/* New rates at unchanged time and positions. */
+void pw_place_rates (pw_system *s, const double *v);
+
+/* 1: the signals of forces keep the values of the last placed time; 0: they follow the time again. */
+void pw_hold (pw_system *s, int hold);
+
+/* ---- Sweeps; g and the like are `rows` long, f and w `coords` + 3 ---- */
+
+void pw_sweep_J (pw_system *s); /* fills every slab's J */
+void pw_sweep_g (pw_system *s, double *g); /* holonomic rows only */
+void pw_sweep_g_size (pw_system *s, double *size); /* not below the length scale */
+void pw_sweep_eta (pw_system *s, double *eta);
+void pw_sweep_gamma (pw_system *s, double *gamma);
+void pw_sweep_force (pw_system *s, double *f);
+double pw_potential (pw_system *s);
+double pw_kinetic (const pw_system *s, const double *v);
+/* Rates of the ledger's entries [W]; needs J, and lambda. */
+void pw_sweep_ledger (pw_system *s, const double *lambda, double *rate);
+
+/* out = J w, out += J^T lambda with the J last swept. */
+void pw_mul_J (const pw_system *s, const double *w, double *out);
+void pw_add_JT (const pw_system *s, const double *lambda, double *out);
+
+/* Global coordinate of a local column; >= coords: the ground's. */
+static inline int pw_global (const pw_slab *k, int e, int c) {
+  int n = 3 * k->kind->bodies;
+  return c < n ? k->column[e * k->kind->bodies + c / 3] + c % 3 : k->own + e * k->kind->own + c - n;
+}
+
+/* Residuals of the placed state with J swept: scaled and absolute worst. */
+typedef struct {
+  double position, velocity, g, jv;
+  int row_position, row_velocity; /* where */
+} pw_residuals;
+void pw_sweep_residuals (pw_system *s, pw_residuals *r);
+
+/* First discontinuity of any signal after t, or INFINITY. */
+double pw_next_breakpoint (const pw_system *s, double t);
+
+/* Second-order blocks: what the exact Newton matrices of implicit methods need besides M, J and J^T. */
+typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
+
+/* The most an element may have; plug-in kinds are checked against it. */
+enum { PW_MAX_BODIES = 4, PW_MAX_OWN = 4, PW_MAX_ROWS = 6, PW_MAX_SIGNALS = 4, PW_MAX_COLS = 3 * PW_MAX_BODIES + PW_MAX_OWN };
+
+/* The kind's sweep for a block: NULL if identically zero, pw_by_differences if the core has to difference. */
+pw_sweep *pw_block_sweep (const pw_kind *kind, pw_block block);
+
+/* Rows of a block per element: kind->rows, or the local columns. */
+int pw_block_rows (const pw_kind *kind, pw_block block);
+
+/* Fills count x block rows x cols for a slab whose poses, w and lambda are placed; by central differences of the
+ * function below where the kind asks for it.  Returns 0 and leaves out alone where the block is identically zero. */
+int pw_sweep_block (const pw_system *s, const pw_slab *k, pw_block block, double *out);
+
+/* The same block of element e by central differences, whatever the kind provides; for the self-test as well. */
+void pw_difference (const pw_system *s, const pw_slab *k, int e, pw_block block, double *out);
+
+#endif

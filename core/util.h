@@ -1,0 +1,49 @@
+/* Small things the core shares: error texts, nearest names, a name table, arenas. */
+#ifndef PW_UTIL_H
+#define PW_UTIL_H
+
+#include <stddef.h>
+#include "pinwheel.h"
+
+/* Keeps the valid name nearest to one that was not found; start with { .sought = name }. */
+typedef struct {
+  const char *sought;
+  const char *best;
+  size_t distance;
+} pw_nearest;
+void pw_nearest_try (pw_nearest *n, const char *candidate);
+/* ": did you mean \"steer\"?" or "", written to the buffer, which is returned. */
+char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size);
+
+/* Open-addressing table from names to numbers >= 0; it keeps the pointers, not copies. */
+typedef struct {
+  size_t size; /* a power of two */
+  struct pw_name {
+    const char *name;
+    int value;
+  } *slot;
+} pw_names;
+int pw_names_open (pw_names *n, size_t entries); /* PW_OK or PW_MACHINE */
+void pw_names_close (pw_names *n);
+int pw_names_add (pw_names *n, const char *name, int value); /* -1, or the value the name already has */
+int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
+
+/* A growing store that is freed as a whole. */
+typedef struct {
+  struct pw_chunk *chunk;
+} pw_arena;
+void *pw_arena_take (pw_arena *a, size_t bytes); /* zeroed, or NULL */
+char *pw_arena_text (pw_arena *a, const char *text);
+void pw_arena_free (pw_arena *a);
+
+/* Lays out one allocation: run the same takes twice, first with base NULL to learn the size. */
+typedef struct {
+  char *base;
+  size_t used;
+} pw_layout;
+void *pw_take (pw_layout *l, size_t count, size_t size);
+
+/* "" if a value lies in the domain, else what was expected (">= 0"). */
+const char *pw_domain_check (pw_domain domain, double value);
+
+#endif

@@ -1,0 +1,86 @@
+/* Pinwheel's methods: an integrator and a stabilisation, found by name, behind one table.
+ *
+ *     pw_run *r = pw_open (system, "rk4+projection", &settings, &error);
+ *     while (pw_advance (r, t_end, &error) == PW_OK && pw_time (r) < t_end) ...
+ *     pw_at (r, t, &sample, &error);
+ *     pw_close (r);
+ *
+ * A method is written  integrator[+stabilisation][:option=value]...,  "rk4+baumgarte:alpha=10:beta=10". */
+#ifndef PINWHEEL_SOLVERS_H
+#define PINWHEEL_SOLVERS_H
+
+#include "run.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef struct pw_run pw_run;
+
+/* An option of a method; a number, or one of some choices. */
+typedef struct {
+  const char *name;
+  const char *with;           /* the stabilisation it belongs to; NULL: all of the integrator's */
+  double value;               /* default: the number, or the choice's index */
+  pw_domain domain;           /* of a number */
+  const char *const *choices; /* NULL-terminated; NULL: a number */
+  const char *unit, *about;
+} pw_option;
+
+typedef struct {
+  const char *name, *about;
+} pw_stabilisation;
+
+/* An integrator: one const table in one file. */
+typedef struct {
+  const char *name;                       /* "rk4" */
+  const char *about;                      /* one line, with its source (author, year) */
+  int adaptive;                           /* 1: follows rtol and atol; 0: follows step */
+  int order;                              /* of convergence, of fixed-step methods; 0: variable */
+  const pw_stabilisation *stabilisations; /* ended by a NULL name; the first one is taken if none is named */
+  const pw_option *options;               /* ended by a NULL name */
+  int (*open) (pw_run *r, pw_error *error);
+  int (*advance) (pw_run *r, double t_end, pw_error *error);
+  int (*at) (pw_run *r, double t, pw_error *error); /* leaves the state in the run's sample arrays */
+  int (*restart) (pw_run *r, pw_error *error);
+  void (*close) (pw_run *r);
+} pw_method;
+
+/* All integrators, ended by NULL. */
+extern const pw_method *const pw_methods[];
+
+/* Makes the start of the system consistent and opens a method on it.  The system must outlive the run, and belongs
+ * to it meanwhile.  Errors: PW_INPUT for a method, option or setting that does not exist or fit, with the nearest
+ * valid name; PW_START for a start that cannot be made consistent; PW_MACHINE. */
+pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
+
+/* Checks a method's name and options without a system; fills the integrator and the stabilisation's number. */
+int pw_parse_method (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
+
+/* One accepted step that does not pass t_end.  Errors: PW_METHOD with the time reached and the reason. */
+int pw_advance (pw_run *r, double t_end, pw_error *error);
+
+/* Steps until t is reached or passed by a step that pw_at can look back into.  Returns as pw_advance. */
+int pw_advance_to (pw_run *r, double t, double t_end, pw_error *error);
+
+/* The time reached. */
+double pw_time (const pw_run *r);
+
+/* The state at a time inside the last accepted step, its end included. */
+int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error);
+
+/* Starts anew from a state at the time reached, after the caller has changed something.  The state is made consistent
+ * first.  q and v may be NULL: they stay. */
+int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error);
+
+void pw_close (pw_run *r);
+
+const pw_statistics *pw_run_statistics (const pw_run *r);
+const pw_start_report *pw_run_start (const pw_run *r);
+const pw_scale *pw_run_scale (const pw_run *r);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif
