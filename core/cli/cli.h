@@ -1,0 +1,82 @@
+/* The program from inside: its commands and what they share.
+ *
+ * A command is one file with one function, which gets the command line after the word "pinwheel" (argv[0] is
+ * "pinwheel run", for messages) and returns the exit status: 0 good, 1 machine, 2 input, 3 start, 4 method, 130
+ * interrupted.  It keeps a pw_error, and ends with `return pw_cli_end (&error)`, the one place that prints an error. */
+#ifndef PW_CLI_H
+#define PW_CLI_H
+
+#include <popt.h>
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+
+enum { PW_INTERRUPTED = 130 }; /* exit status after Ctrl-C */
+
+/* ---- Commands ---- */
+
+typedef struct {
+  const char *name;     /* "run" */
+  const char *synopsis; /* "MODEL [OPTION...]" */
+  const char *about;    /* one line */
+  int (*function) (int argc, const char **argv);
+} pw_command;
+
+int pw_cli_list (int argc, const char **argv);
+int pw_cli_show (int argc, const char **argv);
+int pw_cli_new (int argc, const char **argv);
+int pw_cli_run (int argc, const char **argv);
+
+/* ---- Options ---- */
+
+/* A command line that has been read; close it after the last use of its texts. */
+typedef struct {
+  poptContext popt;
+  const char **argument; /* what is no option, ended by NULL */
+  int arguments;         /* how many */
+} pw_cli_line;
+
+/* Reads a command line.  `options` is popt's table without help, which is added here; take texts with
+ * POPT_ARG_STRING, repeated ones with POPT_ARG_ARGV (a NULL-terminated list, or NULL if there were none), numbers as
+ * texts and pass them to pw_cli_number.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says
+ * what is expected ("MODEL [OPTION...]").  PW_OK; 1 if help was asked for and has been printed; PW_INPUT for an unknown
+ * option, with the nearest valid one, or one without its value.  Close the line in every case. */
+int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
+                 int least, int most, pw_error *error);
+void pw_cli_close (pw_cli_line *l);
+
+/* Reads the value of an option ("--step") in any locale; a NULL text leaves *value.  PW_INPUT if it is no number of the
+ * domain. */
+int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
+
+/* Entries of popt's table for --set and --start: two addresses of `const char **`, NULL at first. */
+#define PW_CLI_MODEL_OPTIONS(sets, starts)                                                                  \
+  { "set", 0, POPT_ARG_ARGV, (sets), 0, "Set a parameter of the model; may be repeated", "PARAM=VALUE" }, { \
+    "start", 0, POPT_ARG_ARGV, (starts), 0, "Set a start value, BODY.x|y|phi|vx|vy|omega; may be repeated", \
+        "STATE=VALUE"                                                                                       \
+  }
+
+/* ---- Models ---- */
+
+/* A model opened, built and compiled. */
+typedef struct {
+  pw_file *file;
+  pw_model *model;
+  pw_system *system;
+} pw_cli_model;
+
+/* Opens a model by name or path, sets "PARAM=VALUE" and "STATE=VALUE" (NULL-terminated lists, or NULL), builds and
+ * compiles it.  Returns a status; close the model in every case. */
+int pw_cli_open (pw_cli_model *m, const char *name, const char *const *sets, const char *const *starts,
+                 pw_error *error);
+void pw_cli_close_model (pw_cli_model *m);
+
+/* How to run a model by default: its own wishes, else 10 s of rk4+projection with steps of 1e-3 s.  rtol stays 0 where
+ * the model does not say. */
+pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
+
+/* ---- The end ---- */
+
+/* Prints an error, if there is one, as "pinwheel: TEXT" on standard error; returns the exit status. */
+int pw_cli_end (const pw_error *error);
+
+#endif
