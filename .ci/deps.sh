@@ -1,0 +1,201 @@
+#!/bin/sh
+# Checks what Pinwheel needs and installs only what is missing, with the system's package manager.
+#
+#   deps.sh [fresh] [style]     fresh: do not trust the last result; style: clang and clang-format too
+#
+# Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
+
+CC=${CC:-cc} BUILD=${BUILD:-build}
+[ -z "$NO_DEPS" ] || { echo "deps: skipped (NO_DEPS=$NO_DEPS)"; exit 0; }
+
+fresh= needs='cc sundials suitesparse libfyaml muparser popt cmocka gnuplot'
+for word; do
+  case $word in
+  fresh) fresh=1 ;;
+  style) needs="$needs clang clang-format" ;;
+  *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
+  esac
+done
+
+# The last good result stands as long as nothing it depends on has changed.
+key="$needs | $CC | $CPPFLAGS | $LDFLAGS" good=$BUILD/deps.ok
+if [ -z "$fresh" ] && [ -f "$good" ] && [ "$(cat "$good")" = "$key" ] && [ -z "$(find "$0" -newer "$good")" ]; then
+  exit 0
+fi
+
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+
+# ---- One tiny program per library ----
+
+source_of () {
+  case $1 in
+  sundials) cat <<'C' ;;
+#include <idas/idas.h>
+#include <cvodes/cvodes.h>
+#include <nvector/nvector_serial.h>
+#include <sunlinsol/sunlinsol_klu.h>
+#include <sunmatrix/sunmatrix_sparse.h>
+int try_sundials (void) { return SUNContext_Create && IDAInit && CVodeInit && N_VNew_Serial && SUNLinSol_KLU && SUNSparseMatrix; }
+C
+  suitesparse) cat <<'C' ;;
+#include <klu.h>
+#include <amd.h>
+int try_suitesparse (void) { return klu_defaults && klu_l_defaults && amd_order && amd_l_order; }
+C
+  libfyaml) cat <<'C' ;;
+#include <libfyaml.h>
+int try_libfyaml (void) { return fy_document_build_from_string && fy_node_report; }
+C
+  muparser) cat <<'C' ;;
+#include <muParserDLL.h>
+int try_muparser (void) { return mupCreate && mupEval; }
+C
+  popt) cat <<'C' ;;
+#include <popt.h>
+int try_popt (void) { return poptGetContext && poptGetNextOpt; }
+C
+  cmocka) cat <<'C' ;;
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+int try_cmocka (void) { return _cmocka_run_group_tests != 0; }
+C
+  esac
+}
+
+libs_of () {
+  case $1 in
+  sundials) echo -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lsundials_sunlinsolklu -lsundials_sunmatrixsparse ;;
+  suitesparse) echo -lklu -lamd ;;
+  libfyaml) echo -lfyaml ;;
+  *) echo "-l$1" ;;
+  esac
+}
+
+# Compiles and links the programs of the libraries named; quiet, the answer is the status.
+links () {
+  libs=
+  {
+    for l; do source_of "$l"; libs="$libs $(libs_of "$l")"; done
+    echo 'int main (void) { return'
+    for l; do echo "  !try_$l () ||"; done
+    echo '  0; }'
+  } >"$work/try.c"
+  $CC -w $CPPFLAGS "$work/try.c" -o "$work/try" $LDFLAGS $libs -lm >"$work/log" 2>&1 && "$work/try" >>"$work/log" 2>&1
+}
+
+# What is missing, in $missing.  All libraries are tried at once, and one by one only if that fails.
+look () {
+  missing= libraries=
+  for n in $needs; do
+    case $n in
+    cc) links || missing="$missing $n" ;;
+    gnuplot | clang | clang-format) command -v "$n" >/dev/null || missing="$missing $n" ;;
+    *) libraries="$libraries $n" ;;
+    esac
+  done
+  links $libraries && return
+  for n in $libraries; do links "$n" || missing="$missing $n"; done
+}
+
+# ---- Packages ----
+
+package_of () {
+  case $manager-$1 in
+  apt-cc) echo gcc libc6-dev ;;
+  apt-sundials) echo libsundials-dev ;;
+  apt-suitesparse) echo libsuitesparse-dev ;;
+  apt-gnuplot) echo gnuplot-nox ;;
+  apt-clang | apt-clang-format) echo "$1" ;;
+  apt-libfyaml) echo libfyaml-dev ;;
+  apt-*) echo "lib$1-dev" ;;
+
+  # unverified from here on
+  dnf-cc) echo gcc ;;
+  dnf-muparser) echo muParser-devel ;;
+  dnf-cmocka) echo libcmocka-devel ;;
+  dnf-gnuplot) echo gnuplot ;;
+  dnf-clang) echo clang ;;
+  dnf-clang-format) echo clang-tools-extra ;;
+  dnf-*) echo "$1-devel" ;;
+
+  pacman-cc) echo gcc ;;
+  pacman-clang-format) echo clang ;;
+  brew-cc) echo gcc ;;
+  brew-suitesparse) echo suite-sparse ;;
+  brew-clang) echo llvm ;;
+  *) echo "$1" ;;
+  esac
+}
+
+# The one command that installs $packages, in $command; apt's package lists are fetched only where they lack one.
+compose () {
+  as=$1
+  case $manager in
+  apt)
+    command="${as}env DEBIAN_FRONTEND=noninteractive apt-get install -q -y --no-install-recommends $packages"
+    [ -z "$update" ] || command="${as}apt-get update -q && $command" ;;
+  dnf) command="${as}dnf install -y $packages" ;;
+  pacman) command="${as}pacman -S --needed --noconfirm $packages" ;;
+  brew) command="brew install $packages" ;;
+  esac
+}
+
+# ---- From here it happens ----
+
+look
+if [ -z "$missing" ]; then
+  mkdir -p "$BUILD" && echo "$key" >"$good"
+  [ -z "$fresh" ] || echo "deps: everything is there"
+  exit 0
+fi
+echo "deps: missing:$missing"
+
+manager=
+for m in apt-get dnf pacman brew; do
+  command -v $m >/dev/null && { manager=${m%-get}; break; }
+done
+if [ -z "$manager" ]; then
+  echo "deps: no apt, dnf, pacman or brew here: please install what is missing, then say NO_DEPS=1" >&2
+  exit 1
+fi
+[ "$manager" = apt ] || echo "deps: the package names for $manager are unverified"
+
+packages=
+for n in $missing; do packages="$packages $(package_of "$n")"; done
+packages=${packages# } update=
+if [ "$manager" = apt ]; then apt-cache show $packages >/dev/null 2>&1 || update=1; fi
+
+if [ "$(id -u)" = 0 ] || [ "$manager" = brew ]; then
+  as=
+elif [ -t 0 ] && command -v sudo >/dev/null; then
+  as='sudo '
+else
+  compose 'sudo '
+  echo "deps: neither root nor a terminal to ask on; please run" >&2
+  echo "  $command" >&2
+  exit 1
+fi
+
+compose "$as"
+echo "deps: $command"
+if ! sh -c "$command"; then
+  # Package lists that are out of date name files the server no longer has.
+  [ "$manager-$update" = apt- ] || exit 1
+  update=1
+  compose "$as"
+  echo "deps: $command"
+  sh -c "$command" || exit 1
+fi
+
+look
+if [ -n "$missing" ]; then
+  echo "deps: still missing after installing:$missing (SUNDIALS must be 6.0 or later)" >&2
+  sed 's/^/  /' "$work/log" | head -20 >&2
+  exit 1
+fi
+mkdir -p "$BUILD" && echo "$key" >"$good"

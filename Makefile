@@ -1,0 +1,236 @@
+# Pinwheel.  `make help` says what there is; everything built goes to $(BUILD).
+
+VERSION := 0.1.0
+ABI     := 0
+
+BUILD  ?= build
+PREFIX ?= /usr/local
+CFLAGS ?= -O2 -g
+V      ?= 0
+Q      := $(if $(filter 0,$(V)),@)
+say     = $(if $(filter 0,$(V)),@printf '  %-7s %s\n' $(1) $@)
+
+# Every build uses all processors unless -j is given.
+ifeq ($(filter -j% --jobserver%,$(MAKEFLAGS)),)
+MAKEFLAGS += -j$(shell nproc 2>/dev/null || echo 2)
+endif
+
+# ---- How to compile and link ----
+
+WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes
+STRICT := -std=c11 -fPIC -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)
+PW_CFLAGS = $(STRICT) -D_POSIX_C_SOURCE=200809L $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN)
+
+# SuiteSparse has no pkg-config file; a folder that is not there does no harm.
+SUITESPARSE ?= /usr/include/suitesparse
+SYSTEM := -isystem $(SUITESPARSE)
+
+SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lsundials_sunlinsolklu \
+               -lsundials_sunmatrixsparse -lklu -lamd -lm
+FILES_LIBS  := -lfyaml -lmuparser -ldl -lm
+LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
+SHARED       = $(LINK) -shared -Wl,--no-undefined
+
+# ---- What there is: a file dropped into one of these folders is part of the build ----
+
+obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
+
+CORE    := $(wildcard core/*.c core/kinds/*.c)
+SOLVERS := $(wildcard solvers/*.c)
+FILES   := $(wildcard core/files/*.c)
+CLI     := $(wildcard core/cli/*.c)
+MODELS  := $(wildcard models/*.c)
+QUICK   := $(wildcard tests/test_*.c)
+SLOW    := $(wildcard tests/slow_*.c)
+SHELLS  := $(wildcard tests/*.sh)
+SHARE   := $(filter-out $(QUICK) $(SLOW),$(wildcard tests/*.c)) # linked to every test
+BENCH   := $(wildcard benchmarks/*.c)
+EMBED   := $(wildcard docs/*.c)
+
+HEADERS := core/pinwheel.h core/run.h solvers/pinwheel-solvers.h core/files/pinwheel-files.h
+INCLUDES := $(addprefix $(BUILD)/include/,$(notdir $(HEADERS)))
+
+LIB       := $(BUILD)/libpinwheel.so
+FILES_LIB := $(BUILD)/libpinwheel-files.so
+LIB_OBJ   := $(call obj,$(CORE) $(SOLVERS))
+FILES_OBJ := $(call obj,$(FILES))
+CLI_OBJ   := $(call obj,$(CLI))
+PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(wildcard models/*.yaml))
+TESTS     := $(QUICK:%.c=$(BUILD)/%)
+SLOWS     := $(SLOW:%.c=$(BUILD)/%)
+PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
+PROGRAM   := $(BUILD)/pinwheel
+
+.PHONY: all everything demo test test-all layers san clang format format-check bench-quick \
+        deps install uninstall clean help
+.DELETE_ON_ERROR:
+.SECONDARY:
+
+all: $(LIB) $(FILES_LIB) $(LIB:.so=.a) $(FILES_LIB:.so=.a) $(INCLUDES) $(PLUGINS) $(PROGRAM)
+
+everything: all $(TESTS) $(SLOWS) $(PROGRAMS)
+
+help:
+	@echo 'make                  the libraries, the program and the models, into $(BUILD)/'
+	@echo 'make deps             install the libraries that are missing'
+	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
+	@echo 'make test             the tests; test-all: the slow ones too'
+	@echo 'make bench-quick      what a run costs on this machine'
+	@echo 'make layers           proof of what depends on what'
+	@echo 'make san, make clang  the tests with ASan and UBSan; the build with clang -Werror'
+	@echo 'make format           clang-format on all sources; format-check: complain only'
+	@echo 'make install          to PREFIX (/usr/local) below DESTDIR; uninstall'
+	@echo 'make clean            remove $(BUILD)/'
+	@echo
+	@echo 'CC CFLAGS CPPFLAGS LDFLAGS BUILD as usual; WERROR=1; V=1 shows the commands;'
+	@echo 'NO_DEPS=1 leaves the system alone (demo and test begin with deps otherwise)'
+
+# ---- Dependencies: whoever asks to see something run gets the libraries first ----
+
+ifneq ($(filter demo test test-all bench-quick san,$(MAKECMDGOALS)),)
+ifndef NO_DEPS
+FIRST := deps
+endif
+endif
+
+deps:
+	@CC='$(CC)' CPPFLAGS='$(CPPFLAGS) $(SYSTEM)' LDFLAGS='$(LDFLAGS)' BUILD='$(BUILD)' NO_DEPS='$(NO_DEPS)' \
+	  sh .ci/deps.sh $(if $(filter deps,$(MAKECMDGOALS)),fresh) $(TOOLS)
+
+# ---- Objects; each folder sees only what it may include ----
+
+$(BUILD)/obj/core/%.o:       INCLUDE := -Icore
+$(BUILD)/obj/solvers/%.o:    INCLUDE := -Icore $(SYSTEM)
+$(BUILD)/obj/core/files/%.o: INCLUDE := -Icore $(SYSTEM)
+$(BUILD)/obj/core/cli/%.o:   INCLUDE := -Icore -Icore/files -Isolvers
+$(BUILD)/obj/tests/%.o:      INCLUDE := -Icore -Icore/files -Isolvers $(SYSTEM)
+$(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
+$(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
+$(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
+
+$(BUILD)/obj/%.o: %.c | $(FIRST)
+	@mkdir -p $(@D)
+	$(call say,CC)
+	$(Q)$(CC) $(PW_CFLAGS) -MMD -MP -c $< -o $@
+
+$(call obj,$(BENCH) $(EMBED)): | $(INCLUDES)
+
+-include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(BENCH) $(EMBED)))
+-include $(MODELS:%.c=$(BUILD)/obj/%.d)
+
+# ---- Libraries, headers, models, programs ----
+
+$(LIB): $(LIB_OBJ)
+	$(call say,LINK)
+	$(Q)$(SHARED) -Wl,-soname,$(@F).$(ABI) -o $@.$(ABI) $^ $(SOLVER_LIBS)
+	$(Q)ln -sf $(@F).$(ABI) $@
+
+$(FILES_LIB): $(FILES_OBJ) $(LIB)
+	$(call say,LINK)
+	$(Q)$(SHARED) -Wl,-soname,$(@F).$(ABI) -Wl,-rpath,'$$ORIGIN' -o $@.$(ABI) $(FILES_OBJ) -L$(BUILD) -lpinwheel $(FILES_LIBS)
+	$(Q)ln -sf $(@F).$(ABI) $@
+
+$(LIB:.so=.a): $(LIB_OBJ)
+$(FILES_LIB:.so=.a): $(FILES_OBJ)
+$(BUILD)/libtests.a: $(call obj,$(SHARE))
+$(BUILD)/%.a:
+	@rm -f $@
+	$(call say,AR)
+	$(Q)$(AR) rcs $@ $^
+
+$(BUILD)/include/%.h: core/%.h
+	@mkdir -p $(@D) && cp $< $@
+$(BUILD)/include/%.h: solvers/%.h
+	@mkdir -p $(@D) && cp $< $@
+$(BUILD)/include/%.h: core/files/%.h
+	@mkdir -p $(@D) && cp $< $@
+
+# A plug-in links to nothing: it finds Pinwheel in the program that opens it.
+$(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
+	@mkdir -p $(@D) $(BUILD)/obj/models
+	$(call say,PLUGIN)
+	$(Q)$(CC) $(STRICT) $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed -shared \
+	  -MMD -MP -MF $(BUILD)/obj/models/$*.d -o $@ $< -lm
+
+$(BUILD)/models/%.yaml: models/%.yaml
+	@mkdir -p $(@D) && cp $< $@
+
+HOUSE_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
+
+$(PROGRAM): $(CLI_OBJ) $(LIB) $(FILES_LIB)
+	$(call say,LINK)
+	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(HOUSE_LIBS) -lpopt -lm
+
+$(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
+	@mkdir -p $(@D)
+	$(call say,LINK)
+	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN/..' -o $@ $< $(HOUSE_LIBS) -lm
+
+# A test holds the libraries whole, so that the plug-ins it opens find them in it.
+$(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a)
+	@mkdir -p $(@D)
+	$(call say,LINK)
+	$(Q)$(LINK) $(WRAP) -rdynamic -o $@ $< $(BUILD)/libtests.a \
+	  -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive \
+	  $(FILES_LIBS) $(SOLVER_LIBS) -lcmocka -lpopt
+
+# These make every allocation fail in turn.
+$(BUILD)/tests/test_alloc% $(BUILD)/tests/slow_alloc%: WRAP := -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc
+
+# ---- Running things ----
+
+RUN_TESTS = PINWHEEL=$(PROGRAM) BUILD=$(BUILD) sh .ci/run-tests
+
+test: all $(TESTS) $(PROGRAMS)
+	@$(RUN_TESTS) $(TESTS)
+
+test-all: everything
+	@$(RUN_TESTS) $(TESTS) $(SLOWS) $(SHELLS)
+
+demo: all $(BUILD)/benchmarks/demo
+	@$(BUILD)/benchmarks/demo $(PROGRAM) $(BUILD)/demo
+
+bench-quick: all $(BUILD)/benchmarks/quick
+	@$(BUILD)/benchmarks/quick
+
+layers: all
+	@BUILD=$(BUILD) sh .ci/layers
+
+san:
+	@$(MAKE) --no-print-directory NO_DEPS=1 BUILD=$(BUILD)/san CFLAGS='-O1 -g' test \
+	  SAN='-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer'
+san: $(FIRST)
+
+clang:
+	@$(MAKE) --no-print-directory CC=clang WERROR=1 BUILD=$(BUILD)/clang everything
+
+SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests benchmarks docs,$(d)/*.c $(d)/*.h))
+
+format:
+	clang-format -i $(SOURCES)
+
+format-check:
+	@clang-format --dry-run -Werror $(SOURCES)
+
+# ---- Installing ----
+
+D := $(DESTDIR)$(PREFIX)
+
+install: all
+	install -d $(D)/bin $(D)/lib/pinwheel/models $(D)/lib/pkgconfig $(D)/include/pinwheel
+	install $(PROGRAM) $(D)/bin
+	for l in libpinwheel libpinwheel-files; do \
+	  install $(BUILD)/$$l.so.$(ABI) $(D)/lib && ln -sf $$l.so.$(ABI) $(D)/lib/$$l.so && \
+	  install -m 644 $(BUILD)/$$l.a $(D)/lib || exit 1; done
+	install -m 644 $(HEADERS) $(D)/include/pinwheel
+	install -m 644 $(PLUGINS) $(D)/lib/pinwheel/models
+	printf '%s\n' 'prefix=$(PREFIX)' 'Name: pinwheel' 'Description: planar multibody systems' 'Version: $(VERSION)' \
+	  'Cflags: -I$${prefix}/include/pinwheel' 'Libs: -L$${prefix}/lib -lpinwheel-files -lpinwheel' \
+	  'Libs.private: $(FILES_LIBS) $(SOLVER_LIBS)' > $(D)/lib/pkgconfig/pinwheel.pc
+
+uninstall:
+	rm -f $(D)/bin/pinwheel $(D)/lib/libpinwheel.* $(D)/lib/libpinwheel-files.* $(D)/lib/pkgconfig/pinwheel.pc
+	rm -rf $(D)/include/pinwheel $(D)/lib/pinwheel
+
+clean:
+	rm -rf $(BUILD)
