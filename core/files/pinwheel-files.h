@@ -67,7 +67,7 @@ typedef struct {
   const char *model, *method;
   const char *status; /* "ok", "input", "start", "method", "machine", "interrupted" */
   const char *reason;
-  double cpu;         /* [s], integration alone */
+  double cpu; /* [s], integration alone */
 } pw_summary;
 
 /* Writes the JSON summary.  s, sample and statistics may be NULL if the run did not get that far. */

@@ -1,0 +1,150 @@
+/* A model file in C becomes a shared object: the user's compiler, run without a shell, in a folder nobody else can
+ * write to. */
+#define _POSIX_C_SOURCE 200809L
+#include <errno.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include "files.h"
+
+extern char **environ;
+
+enum { BUILD_WORDS = 40 };
+
+/* The command line: the words of CC, then ours. */
+typedef struct {
+  char *text; /* a copy of CC, cut into words */
+  char *word[BUILD_WORDS];
+  int words;
+} build_command;
+
+static void build_word (build_command *c, const char *word) {
+  if (c->words < BUILD_WORDS - 1) c->word[c->words++] = (char *)(size_t)word;
+}
+
+/* CC may be more than one word ("ccache gcc"); half of the room is kept for our own. */
+static int build_compiler (build_command *c) {
+  const char *cc = getenv ("CC");
+  c->text = strdup (cc && cc[strspn (cc, " \t")] ? cc : "cc");
+  if (c->text == NULL) return PW_MACHINE;
+  char *rest = NULL;
+  for (char *w = strtok_r (c->text, " \t", &rest); w && c->words < BUILD_WORDS / 2; w = strtok_r (NULL, " \t", &rest))
+    build_word (c, w);
+  return PW_OK;
+}
+
+static void build_options (build_command *c, const char *include, const char *source, const char *object) {
+  static const char *const options[] = { "-std=c11",
+                                         "-O2",
+                                         "-ffp-contract=off",
+#ifdef __APPLE__
+                                         "-undefined",
+                                         "dynamic_lookup", /* the plug-in links to nothing */
+#endif
+                                         "-fPIC",
+                                         "-shared",
+                                         "-Wall" };
+  for (size_t i = 0; i < sizeof options / sizeof *options; i++) build_word (c, options[i]);
+  build_word (c, "-I");
+  build_word (c, include);
+  build_word (c, "-o");
+  build_word (c, object);
+  build_word (c, source);
+  build_word (c, "-lm");
+}
+
+/* Starts the compiler with its messages on standard error, and signals as a program expects them. */
+static int build_spawn (const build_command *c, const sigset_t *before, pid_t *child) {
+  posix_spawn_file_actions_t files;
+  posix_spawnattr_t attributes;
+  sigset_t pipe;
+  sigemptyset (&pipe);
+  sigaddset (&pipe, SIGPIPE);
+  int why = posix_spawn_file_actions_init (&files);
+  if (why) return why;
+  why = posix_spawnattr_init (&attributes);
+  if (why == 0) {
+    why = posix_spawn_file_actions_adddup2 (&files, STDERR_FILENO, STDOUT_FILENO);
+    posix_spawnattr_setsigmask (&attributes, before);
+    posix_spawnattr_setsigdefault (&attributes, &pipe);
+    posix_spawnattr_setflags (&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
+    if (why == 0) why = posix_spawnp (child, c->word[0], &files, &attributes, c->word, environ);
+    posix_spawnattr_destroy (&attributes);
+  }
+  posix_spawn_file_actions_destroy (&files);
+  return why;
+}
+
+/* Ctrl-C waits until the compiler, which gets it too, is gone: so the folder is removed in every case. */
+static int build_run (const build_command *c, const char *source, pw_error *error) {
+  sigset_t stop, before;
+  sigemptyset (&stop);
+  sigaddset (&stop, SIGINT);
+  sigaddset (&stop, SIGTERM);
+  sigaddset (&stop, SIGHUP);
+  pthread_sigmask (SIG_BLOCK, &stop, &before);
+  pid_t child;
+  int outcome = 0, why = build_spawn (c, &before, &child);
+  while (why == 0 && waitpid (child, &outcome, 0) < 0)
+    if (errno != EINTR) why = errno;
+  pthread_sigmask (SIG_SETMASK, &before, NULL);
+  if (why != 0 || (WIFEXITED (outcome) && WEXITSTATUS (outcome) == 127))
+    return pw_fail (
+        error, PW_INPUT,
+        "cannot run the C compiler \"%s\" that the model file %s needs (%s): install one, or name another in the "
+        "environment variable CC",
+        c->word[0], source, why ? strerror (why) : "not found");
+  if (!WIFEXITED (outcome) || WEXITSTATUS (outcome) != 0)
+    return pw_fail (error, PW_INPUT, "the model file %s does not compile; the messages of %s are above", source,
+                    c->word[0]);
+  return PW_OK;
+}
+
+static char *build_folder (pw_error *error) {
+  const char *tmp = getenv ("TMPDIR");
+  char *folder = pw_join (tmp && *tmp ? tmp : "/tmp", "pinwheel-XXXXXX", "");
+  if (folder && mkdtemp (folder)) return folder; /* mkdtemp gives mode 0700 */
+  pw_fail (error, PW_MACHINE, "cannot make a temporary folder %s: %s", folder ? folder : "", strerror (errno));
+  free (folder);
+  return NULL;
+}
+
+/* The compiler in the folder, with everything it needs. */
+static int build_object (const char *path, const char *object, pw_error *error) {
+  build_command c = { .words = 0 };
+  char *include = pw_search_include ();
+  int status = PW_OK;
+  if (include == NULL)
+    status = pw_fail (error, PW_INPUT,
+                      "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
+                      "\"../include/pinwheel\"",
+                      path);
+  else if (build_compiler (&c) != PW_OK)
+    status = pw_fail (error, PW_MACHINE, "out of memory");
+  if (status == PW_OK) {
+    build_options (&c, include, path, object);
+    status = build_run (&c, path, error);
+  }
+  free (c.text);
+  free (include);
+  return status;
+}
+
+int pw_compile_file (const char *path, char **folder, char **object, pw_error *error) {
+  *object = NULL;
+  *folder = build_folder (error);
+  if (*folder == NULL) return PW_MACHINE;
+  *object = pw_join (*folder, "model.so", "");
+  if (*object == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  return build_object (path, *object, error);
+}
+
+void pw_compile_remove (char *folder, char *object) {
+  if (object) unlink (object);
+  if (folder) rmdir (folder);
+  free (object);
+  free (folder);
+}

@@ -1,0 +1,172 @@
+/* Tables of samples, one line each, that Octave, Python and gnuplot read as they are.
+ *
+ *   t [s] | states of each body, of each own coordinate | contact points | reactions | residuals | energies */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "files.h"
+#include "system.h"
+
+struct pw_csv {
+  pw_output *output;
+  int ledger;
+  char *line; /* grows as needed */
+  size_t used, room;
+  int failed; /* out of memory */
+};
+
+/* ---- Lines ---- */
+
+static void csv_text (pw_csv *c, const char *text) {
+  size_t n = strlen (text);
+  if (c->used + n + 1 > c->room) {
+    size_t room = 2 * (c->used + n + 1) + 1000;
+    char *more = realloc (c->line, room);
+    if (more == NULL) {
+      c->failed = 1;
+      return;
+    }
+    c->line = more;
+    c->room = room;
+  }
+  memcpy (c->line + c->used, text, n + 1);
+  c->used += n;
+}
+
+static void csv_number (pw_csv *c, double value) {
+  char text[32];
+  if (c->used) csv_text (c, ",");
+  csv_text (c, isfinite (value) ? pw_format (text, value, 17) : "nan");
+}
+
+static void csv_name (pw_csv *c, const char *name, const char *unit) {
+  if (c->used) csv_text (c, ",");
+  csv_text (c, name);
+  if (unit == NULL || *unit == 0) return;
+  csv_text (c, " [");
+  csv_text (c, unit);
+  csv_text (c, "]");
+}
+
+/* Lines are written whole. */
+static int csv_end (pw_csv *c, pw_error *error) {
+  csv_text (c, "\n");
+  size_t used = c->used;
+  c->used = 0;
+  if (c->failed) return pw_fail (error, PW_MACHINE, "out of memory while writing a table");
+  return pw_output_text (c->output, c->line, used, error);
+}
+
+/* ---- The header ---- */
+
+static void csv_name_states (pw_csv *c, const pw_system *s) {
+  char name[300];
+  for (int b = 0; b < s->bodies; b++)
+    for (int i = 0; i < 6; i++) {
+      int state = i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
+      csv_name (c, pw_state_name (s, state, name, sizeof name), pw_state_unit (s, state));
+    }
+  for (int j = 3 * s->bodies; j < s->coords; j++)
+    for (int state = j; state < 2 * s->coords; state += s->coords)
+      csv_name (c, pw_state_name (s, state, name, sizeof name), pw_state_unit (s, state));
+}
+
+static void csv_name_contacts (pw_csv *c, const pw_system *s) {
+  char name[300];
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++)
+    for (int e = 0; k->kind->contact && e < k->b.count; e++)
+      for (int i = 0; i < 2; i++) {
+        snprintf (name, sizeof name, "%s.%c", k->name[e], "xy"[i]);
+        csv_name (c, name, "m");
+      }
+}
+
+static void csv_name_ledger (pw_csv *c, const pw_system *s) {
+  char name[300];
+  csv_name (c, "kinetic", "J");
+  csv_name (c, "potential", "J");
+  for (int i = 0; i < s->entries; i++) csv_name (c, pw_ledger_name (s, i, name, sizeof name), "J");
+  csv_name (c, "projection", "J");
+  csv_name (c, "balance", "J");
+}
+
+static int csv_header (pw_csv *c, const pw_system *s, pw_error *error) {
+  char name[300];
+  csv_name (c, "t", "s");
+  csv_name_states (c, s);
+  csv_name_contacts (c, s);
+  for (int i = 0; i < s->rows; i++) csv_name (c, pw_reaction_name (s, i, name, sizeof name), pw_reaction_unit (s, i));
+  csv_name (c, "residual.position", NULL);
+  csv_name (c, "residual.velocity", NULL);
+  if (c->ledger) csv_name_ledger (c, s);
+  return csv_end (c, error);
+}
+
+pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
+  pw_csv *c = calloc (1, sizeof *c);
+  if (c == NULL) {
+    pw_fail (error, PW_MACHINE, "out of memory while writing a table");
+    return NULL;
+  }
+  c->output = o;
+  c->ledger = ledger;
+  if (csv_header (c, s, error) == PW_OK) return c;
+  pw_csv_close (c);
+  return NULL;
+}
+
+void pw_csv_close (pw_csv *c) {
+  if (c == NULL) return;
+  free (c->line);
+  free (c);
+}
+
+/* ---- Samples ---- */
+
+static void csv_states (pw_csv *c, const pw_system *s, const pw_sample *x) {
+  for (int b = 0; b < s->bodies; b++) {
+    for (int i = 0; i < 3; i++) csv_number (c, x->q[3 * b + i]);
+    for (int i = 0; i < 3; i++) csv_number (c, x->v[3 * b + i]);
+  }
+  for (int j = 3 * s->bodies; j < s->coords; j++) {
+    csv_number (c, x->q[j]);
+    csv_number (c, x->v[j]);
+  }
+}
+
+static int csv_contacts (pw_csv *c, pw_system *s, const pw_sample *x, pw_error *error) {
+  if (pw_place (s, x->t, x->q, x->v) != PW_OK)
+    return pw_fail (error, PW_METHOD, "at t = %g s a signal of the model reports an error", x->t);
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    if (k->kind->contact == NULL) continue;
+    k->kind->contact (&k->b, k->block);
+    for (int e = 0; e < k->b.count; e++) {
+      csv_number (c, k->block[3 * e]);
+      csv_number (c, k->block[3 * e + 1]);
+    }
+  }
+  return PW_OK;
+}
+
+static void csv_ledger (pw_csv *c, const pw_system *s, const pw_sample *x) {
+  csv_number (c, x->kinetic);
+  csv_number (c, x->potential);
+  for (int i = 0; i < s->entries; i++) csv_number (c, x->ledger ? x->ledger[i] : NAN);
+  csv_number (c, x->projection);
+  csv_number (c, x->balance);
+}
+
+int pw_csv_write (pw_csv *c, pw_system *s, const pw_sample *sample, pw_error *error) {
+  csv_number (c, sample->t);
+  csv_states (c, s, sample);
+  int status = csv_contacts (c, s, sample, error);
+  if (status != PW_OK) {
+    c->used = 0;
+    return status;
+  }
+  for (int i = 0; i < s->rows; i++) csv_number (c, 0 - sample->lambda[i]); /* 0 - 0 is not -0 */
+  csv_number (c, sample->position);
+  csv_number (c, sample->velocity);
+  if (c->ledger) csv_ledger (c, s, sample);
+  return csv_end (c, error);
+}

@@ -1,0 +1,50 @@
+/* What the files of this folder share. */
+#ifndef PW_FILES_H
+#define PW_FILES_H
+
+#include "pinwheel-files.h"
+#include "util.h"
+
+/* ---- Where models are (search.c) ---- */
+
+typedef struct {
+  char *name; /* "ezyroller" */
+  char *path; /* of the file itself, links resolved */
+} pw_found;
+
+/* Every model file on the search path, in order of name, then of path. */
+typedef struct {
+  pw_arena arena;
+  pw_found *found;
+  int count, room;
+  char folders[400]; /* the folders that are there, ":/first:/second:", for messages */
+} pw_search;
+
+/* Looks into every folder of the search path.  Close in every case.  PW_OK or PW_MACHINE. */
+int pw_search_open (pw_search *s, pw_error *error);
+void pw_search_close (pw_search *s);
+
+/* The folder with pinwheel.h that belongs to this library, malloced; NULL if there is none. */
+char *pw_search_include (void);
+
+/* folder + "/" + name + ending, malloced; NULL without memory. */
+char *pw_join (const char *folder, const char *name, const char *ending);
+
+/* Whether a name ends in ".so" or the like, with something before it. */
+int pw_ends_in (const char *name, const char *ending);
+
+/* ---- Model files in C (build.c) ---- */
+
+/* Compiles a C file to a shared object in a private temporary folder; *folder and *object are malloced, and stay NULL
+ * if the folder could not be made.  PW_INPUT if it does not compile or there is no compiler; PW_MACHINE. */
+int pw_compile_file (const char *path, char **folder, char **object, pw_error *error);
+
+/* Removes and frees both; they may be NULL.  A loaded object stays usable. */
+void pw_compile_remove (char *folder, char *object);
+
+/* ---- Outputs (output.c) ---- */
+
+/* Writes; PW_MACHINE with the reason if that fails, or a write before it has failed. */
+int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
+
+#endif

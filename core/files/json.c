@@ -1,0 +1,198 @@
+/* The summary of a run as JSON: numbers with 17 digits, null for what is not known or not finite.
+ *
+ * libfyaml emits it.  Numbers and null go in as plain scalars, texts and names through json_text, which makes them
+ * scalars that stay texts whatever they look like. */
+#include <libfyaml.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "files.h"
+#include "system.h"
+
+/* A document in the making; the first failure is remembered, so that only the end asks. */
+typedef struct {
+  struct fy_document *document;
+  int failed; /* out of memory */
+} json;
+
+/* ---- Scalars ---- */
+
+/* Decodes one character of UTF-8; a byte that belongs to none becomes U+FFFD, the replacement character. */
+static unsigned json_decode (const unsigned char **text) {
+  static const unsigned least[] = { 0, 0x80, 0x800, 0x10000 };
+  const unsigned char *p = *text;
+  int more = p[0] < 0x80 ? 0 : p[0] >> 5 == 6 ? 1 : p[0] >> 4 == 14 ? 2 : p[0] >> 3 == 30 ? 3 : -1;
+  *text = p + 1;
+  if (more < 0) return 0xFFFD;
+  unsigned c = more ? p[0] & (0x3Fu >> more) : p[0];
+  for (int i = 1; i <= more; i++) {
+    if (p[i] >> 6 != 2) return 0xFFFD;
+    c = c << 6 | (p[i] & 0x3Fu);
+  }
+  if (c < least[more] || c > 0x10FFFF || (c >= 0xD800 && c < 0xE000)) return 0xFFFD;
+  *text = p + more + 1;
+  return c;
+}
+
+/* A text as a quoted scalar of YAML, in which everything but plain ASCII is escaped; libfyaml turns that into JSON. */
+static struct fy_node *json_text (json *j, const char *text) {
+  const unsigned char *p = (const unsigned char *)text;
+  char *quoted = malloc (10 * strlen (text) + 3), *to = quoted;
+  if (quoted == NULL) return NULL;
+  *to++ = '"';
+  while (*p) {
+    unsigned c = json_decode (&p);
+    if (c >= ' ' && c < 0x7F && c != '"' && c != '\\')
+      *to++ = (char)c;
+    else
+      to += sprintf (to, c > 0xFFFF ? "\\U%08X" : "\\u%04X", c);
+  }
+  *to++ = '"';
+  struct fy_node *node = fy_node_build_from_string (j->document, quoted, (size_t)(to - quoted));
+  free (quoted);
+  return node;
+}
+
+static struct fy_node *json_plain (json *j, const char *text) {
+  return fy_node_create_scalar_copy (j->document, text, FY_NT);
+}
+
+/* ---- Members of an object ---- */
+
+static void json_add (json *j, struct fy_node *object, const char *key, struct fy_node *value) {
+  struct fy_node *name = json_text (j, key);
+  if (object && name && value && fy_node_mapping_append (object, name, value) == 0) return;
+  fy_node_free (name);
+  fy_node_free (value);
+  j->failed = 1;
+}
+
+static void json_add_number (json *j, struct fy_node *object, const char *key, double value) {
+  char text[32];
+  json_add (j, object, key, json_plain (j, isfinite (value) ? pw_format (text, value, 17) : "null"));
+}
+
+static void json_add_text (json *j, struct fy_node *object, const char *key, const char *value) {
+  json_add (j, object, key, value ? json_text (j, value) : json_plain (j, "null"));
+}
+
+static void json_add_null (json *j, struct fy_node *object, const char *key) {
+  json_add (j, object, key, json_plain (j, "null"));
+}
+
+static struct fy_node *json_add_object (json *j, struct fy_node *object, const char *key) {
+  struct fy_node *inner = fy_node_create_mapping (j->document);
+  json_add (j, object, key, inner);
+  return j->failed ? NULL : inner;
+}
+
+/* ---- The parts of a summary ---- */
+
+static void json_bodies (json *j, struct fy_node *root, const pw_system *s, const pw_sample *x) {
+  static const char *const names[] = { "x", "y", "phi", "vx", "vy", "omega" };
+  struct fy_node *bodies = json_add_object (j, root, "bodies");
+  for (int b = 0; b < s->bodies && !j->failed; b++) {
+    struct fy_node *body = json_add_object (j, bodies, s->body_name[b]);
+    for (int i = 0; i < 6; i++) json_add_number (j, body, names[i], (i < 3 ? x->q : x->v - 3)[3 * b + i]);
+  }
+}
+
+/* Coordinates that elements own; most scenes have none, and then nothing is written. */
+static void json_elements (json *j, struct fy_node *root, const pw_system *s, const pw_sample *x) {
+  if (s->coords == 3 * s->bodies) return;
+  struct fy_node *elements = json_add_object (j, root, "elements");
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++)
+    for (int e = 0; k->kind->own > 0 && e < k->b.count && !j->failed; e++) {
+      struct fy_node *element = json_add_object (j, elements, k->name[e]);
+      for (int i = 0; i < k->kind->own; i++) {
+        int own = k->own + e * k->kind->own + i;
+        json_add_number (j, element, k->kind->coordinate[i].name, x->q[own]);
+        json_add_number (j, element, k->kind->coordinate[i].rate, x->v[own]);
+      }
+    }
+}
+
+static void json_reactions (json *j, struct fy_node *root, const pw_system *s, const pw_sample *x) {
+  char name[300];
+  struct fy_node *reactions = json_add_object (j, root, "reactions");
+  for (int i = 0; i < s->rows && !j->failed; i++)
+    json_add_number (j, reactions, pw_reaction_name (s, i, name, sizeof name), 0 - x->lambda[i]);
+}
+
+static void json_energy (json *j, struct fy_node *root, const pw_sample *x) {
+  struct fy_node *energy = json_add_object (j, root, "energy");
+  json_add_number (j, energy, "kinetic", x->kinetic);
+  json_add_number (j, energy, "potential", x->potential);
+  json_add_number (j, energy, "work", x->work);
+  json_add_number (j, energy, "loss", x->loss);
+  json_add_number (j, energy, "projection", x->projection);
+  json_add_number (j, energy, "balance", x->balance);
+}
+
+static void json_sample (json *j, struct fy_node *root, const pw_system *s, const pw_sample *x, int ledger) {
+  if (s && x) {
+    json_add_number (j, root, "t", x->t);
+    json_bodies (j, root, s, x);
+    json_elements (j, root, s, x);
+    json_reactions (j, root, s, x);
+  } else {
+    json_add_null (j, root, "t");
+    json_add_null (j, root, "bodies");
+    json_add_null (j, root, "reactions");
+  }
+  if (s && x && ledger)
+    json_energy (j, root, x);
+  else
+    json_add_null (j, root, "energy");
+}
+
+static void json_statistics (json *j, struct fy_node *root, const pw_statistics *n, double cpu) {
+  if (n == NULL) {
+    json_add_null (j, root, "residual");
+    json_add_null (j, root, "statistics");
+    return;
+  }
+  struct fy_node *residual = json_add_object (j, root, "residual");
+  json_add_number (j, residual, "position", n->position);
+  json_add_number (j, residual, "velocity", n->velocity);
+  struct fy_node *statistics = json_add_object (j, root, "statistics");
+  json_add_number (j, statistics, "steps", (double)n->steps);
+  json_add_number (j, statistics, "rejected", (double)n->rejected);
+  json_add_number (j, statistics, "rhs", (double)n->rhs);
+  json_add_number (j, statistics, "jacobians", (double)n->jacobians);
+  json_add_number (j, statistics, "factorisations", (double)n->factorisations);
+  json_add_number (j, statistics, "cpu_s", cpu);
+}
+
+/* ---- */
+
+static int json_emit (json *j, pw_output *o, pw_error *error) {
+  enum fy_emitter_cfg_flags as_json = FYECF_MODE_JSON | FYECF_WIDTH_INF | FYECF_INDENT_2;
+  char *text = j->failed ? NULL : fy_emit_document_to_string (j->document, as_json);
+  if (text == NULL) return pw_fail (error, PW_MACHINE, "out of memory while writing the summary");
+  int status = pw_output_text (o, text, strlen (text), error);
+  free (text);
+  return status;
+}
+
+int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
+                   const pw_statistics *statistics, pw_output *o, pw_error *error) {
+  /* Names are unique already, and libfyaml's own check is quadratic. */
+  const struct fy_parse_cfg configuration = { .flags = FYPCF_QUIET | FYPCF_ALLOW_DUPLICATE_KEYS };
+  json j = { .document = fy_document_create (&configuration) };
+  struct fy_node *root = j.document ? fy_node_create_mapping (j.document) : NULL;
+  if (root == NULL || fy_document_set_root (j.document, root) != 0) {
+    fy_document_destroy (j.document);
+    return pw_fail (error, PW_MACHINE, "out of memory while writing the summary");
+  }
+  json_add_number (&j, root, "schema", 1);
+  json_add_text (&j, root, "model", summary->model);
+  json_add_text (&j, root, "method", summary->method);
+  json_add_text (&j, root, "status", summary->status);
+  json_add_text (&j, root, "reason", summary->reason);
+  json_sample (&j, root, s, sample, ledger);
+  json_statistics (&j, root, statistics, summary->cpu);
+  int status = json_emit (&j, o, error);
+  fy_document_destroy (j.document);
+  return status;
+}

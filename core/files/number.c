@@ -1,0 +1,40 @@
+/* Numbers as text, the same in every locale. */
+#define _POSIX_C_SOURCE 200809L
+#include <ctype.h>
+#include <locale.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "pinwheel-files.h"
+
+/* Whatever printf writes between the digits of a number is the locale's decimal point: several bytes in some. */
+static void number_point (char *text) {
+  size_t begin = strspn (text, "+-0123456789");
+  size_t length = strcspn (text + begin, "+-0123456789e");
+  if (length == 0) return;
+  text[begin] = '.';
+  memmove (text + begin + 1, text + begin + length, strlen (text + begin + length) + 1);
+}
+
+char *pw_format (char buffer[32], double value, int digits) {
+  if (isnan (value)) return strcpy (buffer, "nan");
+  if (isinf (value)) return strcpy (buffer, value > 0 ? "inf" : "-inf");
+  snprintf (buffer, 32, "%.*g", digits < 1 ? 1 : digits > 17 ? 17 : digits, value);
+  number_point (buffer);
+  return buffer;
+}
+
+int pw_read_number (const char *text, double *value) {
+  if (*text == 0 || isspace ((unsigned char)*text)) return PW_INPUT;
+  locale_t c = newlocale (LC_ALL_MASK, "C", (locale_t)0);
+  if (c == (locale_t)0) return PW_MACHINE;
+  locale_t before = uselocale (c);
+  char *end;
+  double x = strtod (text, &end);
+  uselocale (before);
+  freelocale (c);
+  if (*end) return PW_INPUT;
+  *value = x;
+  return PW_OK;
+}

@@ -1,0 +1,190 @@
+/* Model files: found by name or path, loaded, and checked before anything of them is used. */
+#define _XOPEN_SOURCE 700 /* realpath */
+#include <dlfcn.h>
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include "files.h"
+
+struct pw_file {
+  char *name, *path;
+  void *handle; /* of dlopen */
+  const pw_plugin_table *table;
+};
+
+/* ---- Loading ---- */
+
+/* Parameters must lie inside their structure and start with a value that makes sense. */
+static int plugin_parameters (const pw_file *f, pw_error *error) {
+  const pw_plugin_table *t = f->table;
+  for (const pw_parameter *p = t->parameters; p && p->name; p++) {
+    const char *expected = pw_domain_check (p->domain, p->value);
+    if (p->offset + sizeof (double) > t->parameters_size)
+      return pw_fail (error, PW_INPUT,
+                      "%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof",
+                      f->path, p->name);
+    if (*expected)
+      return pw_fail (error, PW_INPUT, "%s: parameter %s has the default %g: expected %s", f->path, p->name, p->value,
+                      expected);
+  }
+  return PW_OK;
+}
+
+static int plugin_check (const pw_file *f, pw_error *error) {
+  const pw_plugin_table *t = f->table;
+  if (t->abi != PW_ABI || t->size != sizeof *t)
+    return pw_fail (error, PW_INPUT, "%s was compiled for another Pinwheel (ABI %u, this one has %u): compile it anew",
+                    f->path, t->abi, (unsigned)PW_ABI);
+  if (t->build == NULL)
+    return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", f->path);
+  return plugin_parameters (f, error);
+}
+
+/* dlerror repeats the path in front of its reason. */
+static const char *plugin_reason (const char *object) {
+  const char *why = dlerror ();
+  if (why == NULL) return "unknown reason";
+  size_t n = strlen (object);
+  return strncmp (why, object, n) == 0 && strncmp (why + n, ": ", 2) == 0 ? why + n + 2 : why;
+}
+
+static int plugin_load (pw_file *f, const char *object, pw_error *error) {
+  f->handle = dlopen (object, RTLD_NOW | RTLD_LOCAL);
+  if (f->handle == NULL) return pw_fail (error, PW_INPUT, "cannot load %s: %s", f->path, plugin_reason (object));
+  f->table = dlsym (f->handle, "pw_plugin");
+  if (f->table == NULL)
+    return pw_fail (error, PW_INPUT, "%s is no Pinwheel model: a model file ends with PW_MODEL (...)", f->path);
+  return plugin_check (f, error);
+}
+
+static int plugin_open_c (pw_file *f, pw_error *error) {
+  char *folder, *object;
+  int status = pw_compile_file (f->path, &folder, &object, error);
+  if (status == PW_OK) status = plugin_load (f, object, error);
+  pw_compile_remove (folder, object);
+  return status;
+}
+
+/* ---- Finding ---- */
+
+static const char *const plugin_endings[] = { ".so", ".c", ".yaml" };
+enum { PLUGIN_SO, PLUGIN_C, PLUGIN_YAML, PLUGIN_ENDINGS };
+
+static int plugin_ending (const char *name) {
+  int i = 0;
+  while (i < PLUGIN_ENDINGS && !pw_ends_in (name, plugin_endings[i])) i++;
+  return i;
+}
+
+/* Opens the file at f->path, which exists. */
+static int plugin_open_path (pw_file *f, pw_error *error) {
+  const char *base = strrchr (f->path, '/');
+  base = base ? base + 1 : f->path;
+  int ending = plugin_ending (base);
+  if (ending == PLUGIN_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
+  if (ending == PLUGIN_YAML)
+    return pw_fail (error, PW_INPUT, "%s: this Pinwheel cannot read models in YAML yet, only those in C", f->path);
+  f->name = strdup (base);
+  if (f->name == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  f->name[strlen (base) - strlen (plugin_endings[ending])] = 0;
+  return ending == PLUGIN_C ? plugin_open_c (f, error) : plugin_load (f, f->path, error);
+}
+
+static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
+  struct stat info;
+  f->path = realpath (path, NULL);
+  if (f->path == NULL) return pw_fail (error, PW_INPUT, "cannot open the model file %s: %s", path, strerror (errno));
+  if (stat (f->path, &info) == 0 && !S_ISREG (info.st_mode)) return pw_fail (error, PW_INPUT, "%s is not a file", path);
+  return PW_OK;
+}
+
+/* A file of the current directory must be named by path: says so if there is one, else gives the nearest name. */
+static int plugin_unknown (const pw_search *s, const char *name, pw_error *error) {
+  struct stat info;
+  char hint[120], here[200];
+  for (int i = 0; i < PLUGIN_ENDINGS; i++) {
+    snprintf (here, sizeof here, "%s%s", name, plugin_endings[i]);
+    if (stat (here, &info) == 0)
+      return pw_fail (error, PW_INPUT, "there is no model \"%s\" on the search path; to use the file here, write ./%s",
+                      name, here);
+  }
+  if (s->count == 0)
+    return pw_fail (error, PW_INPUT, "there is no model \"%s\": no model at all in %s", name,
+                    *s->folders ? s->folders : "the folders of PINWHEEL_MODELS and next to the program");
+  pw_nearest near = { .sought = name };
+  for (int i = 0; i < s->count; i++) pw_nearest_try (&near, s->found[i].name);
+  return pw_fail (error, PW_INPUT, "there is no model \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+}
+
+static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
+  pw_search s;
+  int status = pw_search_open (&s, error), first = 0;
+  if (status == PW_OK) {
+    while (first < s.count && strcmp (s.found[first].name, name) != 0) first++;
+    const pw_found *found = s.found + first;
+    if (first == s.count)
+      status = plugin_unknown (&s, name, error);
+    else if (first + 1 < s.count && strcmp (found[1].name, name) == 0)
+      status =
+          pw_fail (error, PW_INPUT, "two files answer to the model \"%s\": %s and %s; name one of them by its path",
+                   name, found[0].path, found[1].path);
+    else if ((f->path = strdup (found->path)) == NULL)
+      status = pw_fail (error, PW_MACHINE, "out of memory");
+  }
+  pw_search_close (&s);
+  return status;
+}
+
+pw_file *pw_file_open (const char *model, pw_error *error) {
+  if (model == NULL || *model == 0) {
+    pw_fail (error, PW_INPUT, "a model's name or path is missing");
+    return NULL;
+  }
+  pw_file *f = calloc (1, sizeof *f);
+  if (f == NULL) {
+    pw_fail (error, PW_MACHINE, "out of memory");
+    return NULL;
+  }
+  int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS;
+  int status = by_path ? plugin_find_path (f, model, error) : plugin_find_name (f, model, error);
+  if (status == PW_OK) status = plugin_open_path (f, error);
+  if (status == PW_OK) return f;
+  pw_file_close (f);
+  return NULL;
+}
+
+void pw_file_close (pw_file *f) {
+  if (f == NULL) return;
+  if (f->handle) dlclose (f->handle);
+  free (f->name);
+  free (f->path);
+  free (f);
+}
+
+/* ---- An open file ---- */
+
+pw_model *pw_file_model (const pw_file *f, pw_error *error) {
+  return pw_model_new (f->name, f->table, error);
+}
+
+const pw_plugin_table *pw_file_table (const pw_file *f) {
+  return f->table;
+}
+
+const char *pw_file_name (const pw_file *f) {
+  return f->name;
+}
+
+const char *pw_file_path (const pw_file *f) {
+  return f->path;
+}
+
+int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {
+  pw_search s;
+  int status = pw_search_open (&s, error);
+  for (int i = 0; status == PW_OK && i < s.count; i++)
+    if (each (context, s.found[i].name, s.found[i].path) != 0) break;
+  pw_search_close (&s);
+  return status;
+}

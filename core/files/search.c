@@ -1,0 +1,175 @@
+/* Where models are: the folders of PINWHEEL_MODELS, then those that belong to the running program and this library.
+ *
+ * Folders next to the program serve the build tree, those under ../lib and ../include an installed one; the library's
+ * own place serves programs that are elsewhere, such as a user's own. */
+#define _GNU_SOURCE /* dladdr */
+#include <dirent.h>
+#include <dlfcn.h>
+#include <limits.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "files.h"
+
+char *pw_join (const char *folder, const char *name, const char *ending) {
+  size_t size = strlen (folder) + strlen (name) + strlen (ending) + 2;
+  char *path = malloc (size);
+  if (path) snprintf (path, size, "%s/%s%s", folder, name, ending);
+  return path;
+}
+
+int pw_ends_in (const char *name, const char *ending) {
+  size_t n = strlen (name), e = strlen (ending);
+  return n > e && strcmp (name + n - e, ending) == 0;
+}
+
+/* The folder of the running program (0) or of this library (1), malloced; NULL if unknown. */
+static char *search_anchor (int which) {
+  char path[PATH_MAX];
+  if (which == 0) {
+    ssize_t n = readlink ("/proc/self/exe", path, sizeof path - 1);
+    if (n <= 0) return NULL;
+    path[n] = 0;
+  } else {
+    static const char here = 0; /* an address inside this library */
+    Dl_info info;
+    if (dladdr (&here, &info) == 0 || info.dli_fname == NULL || realpath (info.dli_fname, path) == NULL) return NULL;
+  }
+  char *slash = strrchr (path, '/');
+  if (slash == NULL) return NULL;
+  *slash = 0;
+  return strdup (path);
+}
+
+/* ---- Model files ---- */
+
+static int search_no_memory (pw_error *error) {
+  return pw_fail (error, PW_MACHINE, "out of memory while looking for models");
+}
+
+/* Keeps one model file; the same file reached twice counts once. */
+static int search_keep (pw_search *s, const char *name, size_t length, const char *path, pw_error *error) {
+  for (int i = 0; i < s->count; i++)
+    if (strcmp (s->found[i].path, path) == 0 && strncmp (s->found[i].name, name, length) == 0 &&
+        s->found[i].name[length] == 0)
+      return PW_OK;
+  if (s->count == s->room) {
+    int room = s->room ? 2 * s->room : 32;
+    pw_found *more = realloc (s->found, (size_t)room * sizeof *more);
+    if (more == NULL) return search_no_memory (error);
+    s->found = more;
+    s->room = room;
+  }
+  pw_found *f = &s->found[s->count];
+  f->path = pw_arena_text (&s->arena, path);
+  f->name = pw_arena_text (&s->arena, name);
+  if (f->path == NULL || f->name == NULL) return search_no_memory (error);
+  f->name[length] = 0;
+  s->count++;
+  return PW_OK;
+}
+
+static int search_entry (pw_search *s, const char *folder, const char *entry, pw_error *error) {
+  const char *ending = pw_ends_in (entry, ".so") ? ".so" : pw_ends_in (entry, ".yaml") ? ".yaml" : NULL;
+  if (ending == NULL || entry[0] == '.') return PW_OK;
+  char *path = pw_join (folder, entry, "");
+  if (path == NULL) return search_no_memory (error);
+  char *real = realpath (path, NULL);
+  struct stat info;
+  int status = PW_OK;
+  if (real && stat (real, &info) == 0 && S_ISREG (info.st_mode))
+    status = search_keep (s, entry, strlen (entry) - strlen (ending), real, error);
+  free (real);
+  free (path);
+  return status;
+}
+
+/* Notes a folder as ":/first:/second:"; 0 if it has been looked into before. */
+static int search_note (pw_search *s, const char *real) {
+  char entry[PATH_MAX + 3];
+  snprintf (entry, sizeof entry, ":%s:", real);
+  if (strstr (s->folders, entry)) return 0;
+  size_t used = strlen (s->folders);
+  snprintf (s->folders + used, sizeof s->folders - used, "%s", used ? entry + 1 : entry);
+  return 1;
+}
+
+/* A folder that is not there is passed over, as in PATH. */
+static int search_folder (pw_search *s, const char *folder, pw_error *error) {
+  char *real = realpath (folder, NULL);
+  int fresh = real && search_note (s, real);
+  free (real);
+  DIR *dir = fresh ? opendir (folder) : NULL;
+  if (dir == NULL) return PW_OK;
+  int status = PW_OK;
+  struct dirent *entry;
+  while (status == PW_OK && (entry = readdir (dir)) != NULL) status = search_entry (s, folder, entry->d_name, error);
+  closedir (dir);
+  return status;
+}
+
+static int search_environment (pw_search *s, pw_error *error) {
+  const char *list = getenv ("PINWHEEL_MODELS");
+  if (list == NULL) return PW_OK;
+  char *copy = strdup (list), *rest = copy, *folder;
+  if (copy == NULL) return search_no_memory (error);
+  int status = PW_OK;
+  while (status == PW_OK && (folder = strsep (&rest, ":")) != NULL)
+    if (*folder) status = search_folder (s, folder, error);
+  free (copy);
+  return status;
+}
+
+static int search_beside (pw_search *s, int which, pw_error *error) {
+  static const char *const where[2][2] = { { "models", "../lib/pinwheel/models" }, { "models", "pinwheel/models" } };
+  char *anchor = search_anchor (which);
+  int status = PW_OK;
+  for (int i = 0; anchor && status == PW_OK && i < 2; i++) {
+    char *folder = pw_join (anchor, where[which][i], "");
+    status = folder ? search_folder (s, folder, error) : search_no_memory (error);
+    free (folder);
+  }
+  free (anchor);
+  return status;
+}
+
+static int search_order (const void *a, const void *b) {
+  const pw_found *f = a, *g = b;
+  int names = strcmp (f->name, g->name);
+  return names ? names : strcmp (f->path, g->path);
+}
+
+int pw_search_open (pw_search *s, pw_error *error) {
+  *s = (pw_search){ .count = 0 };
+  int status = search_environment (s, error);
+  for (int which = 0; status == PW_OK && which < 2; which++) status = search_beside (s, which, error);
+  if (s->count > 1) qsort (s->found, (size_t)s->count, sizeof *s->found, search_order);
+  return status;
+}
+
+void pw_search_close (pw_search *s) {
+  pw_arena_free (&s->arena);
+  free (s->found);
+}
+
+/* ---- The header ---- */
+
+char *pw_search_include (void) {
+  static const char *const where[] = { "include", "../include/pinwheel" };
+  for (int which = 0; which < 2; which++) {
+    char *anchor = search_anchor (which);
+    for (int i = 0; anchor && i < 2; i++) {
+      char *folder = pw_join (anchor, where[i], ""), *header = folder ? pw_join (folder, "pinwheel.h", "") : NULL;
+      int found = header && access (header, R_OK) == 0;
+      free (header);
+      if (found) {
+        free (anchor);
+        return folder;
+      }
+      free (folder);
+    }
+    free (anchor);
+  }
+  return NULL;
+}
