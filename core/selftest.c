@@ -1,0 +1,224 @@
+/* The self-test of a kind: each check compares one sweep of its table with differences of another. */
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "probe.h"
+
+/* ---- What is differenced ---- */
+
+static void selftest_g (pw_probe *x, double *out) {
+  pw_probe_sweep (x, x->kind->g, "g", x->elements * x->rows, out);
+}
+
+static void selftest_energy (pw_probe *x, double *out) {
+  pw_probe_sweep (x, x->kind->energy, "energy", x->elements, out);
+}
+
+static void selftest_force (pw_probe *x, double *out) {
+  pw_probe_sweep (x, x->kind->force, "force", x->elements * x->cols, out);
+}
+
+/* J v - eta */
+static void selftest_drift (pw_probe *x, double *out) {
+  double eta[PW_PROBE_OUT + PW_PROBE_GUARD];
+  pw_probe_sweep (x, x->kind->eta, "eta", x->elements * x->rows, eta);
+  pw_probe_times (x, x->v_now, out);
+  for (int i = 0; i < x->elements * x->rows; i++) out[i] -= eta[i];
+}
+
+/* ---- First-order checks ---- */
+
+static void selftest_holonomic (pw_probe *x) {
+  double value[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT], slope[PW_PROBE_OUT];
+  int n = x->elements * x->rows;
+  for (int j = 0; j < x->s->coords; j++) {
+    pw_probe_slope (x, selftest_g, j, n, slope);
+    for (int i = 0; i < n * x->cols; i++)
+      if (pw_global (x->k, i / (x->rows * x->cols), i % x->cols) == j) reference[i] = slope[i / x->cols];
+  }
+  for (int i = 0; i < n * x->cols; i++)
+    if (pw_probe_ground (x, i / (x->rows * x->cols), i % x->cols)) reference[i] = 0;
+  pw_probe_sweep (x, x->kind->J, "J", n * x->cols, value);
+  pw_probe_compare (x, "J", "J = dg/dq", x->rows, x->cols, value, reference);
+
+  pw_probe_slope (x, selftest_g, PW_PROBE_TIME, n, reference);
+  for (int i = 0; i < n; i++) reference[i] = -reference[i];
+  pw_probe_sweep (x, x->kind->eta, "eta", n, value);
+  pw_probe_compare (x, "eta", "eta = -dg/dt", x->rows, 1, value, reference);
+
+  double worst = -INFINITY;
+  selftest_g (x, reference);
+  pw_probe_sweep (x, x->kind->g_size, "g_size", n, value);
+  for (int i = 0; i < n; i++) worst = fmax (worst, (fabs (reference[i]) - value[i]) / (1 + fabs (reference[i])));
+  pw_probe_note (x->report, "g_size", "g_size >= |g|", fmax (worst, 0), 16 * DBL_EPSILON,
+                 "16 eps: round-off of the sums", "");
+}
+
+static void selftest_gamma (pw_probe *x) {
+  double value[PW_PROBE_OUT], gamma[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT];
+  int n = x->elements * x->rows;
+  pw_probe_slope (x, selftest_drift, PW_PROBE_MOTION, n, reference);
+  pw_probe_times (x, x->a, value);
+  pw_probe_sweep (x, x->kind->gamma, "gamma", n, gamma);
+  for (int i = 0; i < n; i++) value[i] -= gamma[i];
+  pw_probe_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", x->rows, 1, value, reference);
+}
+
+static void selftest_force_u (pw_probe *x) {
+  double value[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT], plus[PW_PROBE_OUT + PW_PROBE_GUARD],
+      minus[PW_PROBE_OUT + PW_PROBE_GUARD];
+  int signals = x->kind->signals, n = x->elements * x->cols;
+  for (int u = 0; u < signals; u++) {
+    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] += PW_PROBE_H;
+    selftest_force (x, plus);
+    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] -= 2 * PW_PROBE_H;
+    selftest_force (x, minus);
+    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] += PW_PROBE_H;
+    for (int i = 0; i < n; i++) reference[i * signals + u] = (plus[i] - minus[i]) / (2 * PW_PROBE_H);
+  }
+  x->size = pw_probe_largest (n, plus);
+  pw_probe_sweep (x, x->kind->force_u, "force_u", n * signals, value);
+  pw_probe_compare (x, "force_u", "force_u = d force/du", x->cols * signals, 1, value, reference);
+}
+
+/* ---- Second-order blocks ---- */
+
+static void selftest_block (pw_probe *x, pw_block block, const char *name, const char *about, double size) {
+  double value[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT];
+  int rows = pw_block_rows (x->kind, block);
+  pw_sweep *sweep = pw_block_sweep (x->kind, block);
+  if (sweep == pw_by_differences)
+    pw_sweep_block (x->s, x->k, block, value);
+  else
+    pw_probe_sweep (x, sweep, name, x->elements * rows * x->cols, value);
+  for (int e = 0; e < x->elements; e++) pw_difference (x->s, x->k, e, block, reference + e * rows * x->cols);
+  x->size = size;
+  pw_probe_compare (x, name, about, rows, x->cols, value, reference);
+}
+
+static void selftest_blocks (pw_probe *x) {
+  double J[PW_PROBE_OUT + PW_PROBE_GUARD], gamma[PW_PROBE_OUT + PW_PROBE_GUARD], force[PW_PROBE_OUT + PW_PROBE_GUARD];
+  int n = x->elements * x->rows;
+  pw_probe_place (x, PW_PROBE_TIME, 0);
+  x->k->b.w = x->w;
+  x->k->b.lambda = x->lambda;
+  pw_probe_sweep (x, x->kind->J, "J", n * x->cols, J);
+  pw_probe_sweep (x, x->kind->gamma, "gamma", n, gamma);
+  selftest_force (x, force);
+  double sJ = pw_probe_largest (n * x->cols, J), sg = pw_probe_largest (n, gamma);
+  if (x->rows > 0) {
+    selftest_block (x, PW_JW_Q, "jw_q", "jw_q = d(J w)/dq", sJ);
+    selftest_block (x, PW_JTL_Q, "jtl_q", "jtl_q = d(J^T lambda)/dq", sJ);
+    selftest_block (x, PW_ETA_Q, "eta_q", "eta_q = d eta/dq", 0);
+    selftest_block (x, PW_GAMMA_Q, "gamma_q", "gamma_q = d gamma/dq", sg);
+    selftest_block (x, PW_GAMMA_V, "gamma_v", "gamma_v = d gamma/dv", sg);
+  }
+  double sf = pw_probe_largest (x->elements * x->cols, force);
+  selftest_block (x, PW_FORCE_Q, "force_q", "force_q = d force/dq", sf);
+  selftest_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", sf);
+}
+
+/* ---- Energy ---- */
+
+/* Changes v so that element e has J v = eta, by the least norm; returns 0 if its rows depend on each other. */
+static int selftest_obey (pw_probe *x, int e) {
+  double J[PW_PROBE_OUT + PW_PROBE_GUARD], A[PW_MAX_ROWS][PW_MAX_ROWS] = { { 0 } }, b[PW_PROBE_OUT];
+  int n = x->rows;
+  pw_probe_place (x, PW_PROBE_TIME, 0);
+  selftest_drift (x, b);
+  pw_probe_sweep (x, x->kind->J, "J", x->elements * n * x->cols, J);
+  double *row = J + e * n * x->cols, *rest = b + e * n;
+  for (int c = 0; c < x->cols; c++)
+    for (int r = 0; r < n; r++) row[r * x->cols + c] *= !pw_probe_ground (x, e, c);
+  for (int r = 0; r < n; r++)
+    for (int i = 0; i < n; i++) {
+      for (int c = 0; c < x->cols; c++) A[r][i] += row[r * x->cols + c] * row[i * x->cols + c];
+    }
+  for (int p = 0; p < n; p++) /* elimination: J J^T is positive definite */
+    for (int r = p + 1; r < n; r++) {
+      if (!(A[p][p] > 1e-6)) return 0;
+      double factor = A[r][p] / A[p][p];
+      for (int i = p; i < n; i++) A[r][i] -= factor * A[p][i];
+      rest[r] -= factor * rest[p];
+    }
+  if (!(A[n - 1][n - 1] > 1e-6)) return 0;
+  for (int p = n - 1; p >= 0; p--) {
+    for (int i = p + 1; i < n; i++) rest[p] -= A[p][i] * rest[i];
+    rest[p] /= A[p][p];
+  }
+  for (int c = 0; c < x->cols; c++)
+    for (int r = 0; r < n && !pw_probe_ground (x, e, c); r++)
+      x->v[pw_global (x->k, e, c)] -= row[r * x->cols + c] * rest[r];
+  return 1;
+}
+
+/* The power the element's forces feed into the motion of element e, constraint forces -J^T lambda included, must be
+ * what it takes from its energy and from outside, less its losses. */
+static void selftest_power_of (pw_probe *x, int e) {
+  double force[PW_PROBE_OUT + PW_PROBE_GUARD], drift[PW_PROBE_OUT], eta[PW_PROBE_OUT + PW_PROBE_GUARD];
+  double slope[PW_SPECIMEN_ELEMENTS], power[PW_SPECIMEN_ELEMENTS + PW_PROBE_GUARD],
+      loss[PW_SPECIMEN_ELEMENTS + PW_PROBE_GUARD];
+  pw_probe_slope (x, selftest_energy, PW_PROBE_MOTION, x->elements, slope);
+  selftest_force (x, force);
+  pw_probe_sweep (x, x->kind->power, "power", x->elements, power);
+  pw_probe_sweep (x, x->kind->loss, "loss", x->elements, loss);
+  double fed = 0, size = fmax (x->size, fmax (fabs (power[e]), fabs (loss[e])));
+  for (int c = 0; c < x->cols; c++) fed += force[e * x->cols + c] * pw_probe_local (x, x->v, e, c);
+  if (x->rows > 0) {
+    pw_probe_times (x, x->v, drift);
+    pw_probe_sweep (x, x->kind->eta, "eta", x->elements * x->rows, eta);
+  }
+  for (int r = e * x->rows; r < (e + 1) * x->rows; r++) {
+    fed -= x->lambda[r] * drift[r];
+    if (x->kind->power == NULL) power[e] -= x->lambda[r] * eta[r];
+  }
+  double error = fabs (fed + slope[e] - power[e] + loss[e]) / (1 + size + fabs (fed));
+  char where[120];
+  snprintf (where, sizeof where, "%s: %.9g for %.9g", x->k->name[e], fed, power[e] - loss[e] - slope[e]);
+  pw_probe_note (x->report, "power", "force . v = power - loss - d energy/dt", error, pw_probe_bound (),
+                 pw_probe_reason, where);
+  if (x->kind->loss) pw_probe_note (x->report, "loss", "loss >= 0", fmax (-loss[e], 0), 0, "exact", where);
+}
+
+static void selftest_power (pw_probe *x) {
+  double v[PW_PROBE_COORDS];
+  if (!x->kind->force && !x->kind->energy && !x->kind->power && !x->kind->loss) return;
+  memcpy (v, x->v, sizeof v);
+  for (int e = 0; e < x->elements; e++) {
+    if (x->rows == 0 || selftest_obey (x, e)) selftest_power_of (x, e);
+    memcpy (x->v, v, sizeof v);
+  }
+}
+
+/* ---- */
+
+static void selftest_all (pw_probe *x) {
+  double out[3 * PW_SPECIMEN_ELEMENTS + PW_PROBE_GUARD];
+  pw_probe_place (x, PW_PROBE_TIME, 0);
+  if (x->kind->level == PW_HOLONOMIC) selftest_holonomic (x);
+  if (x->rows > 0) selftest_gamma (x);
+  if (x->kind->signals > 0) selftest_force_u (x);
+  selftest_blocks (x);
+  selftest_power (x);
+  pw_probe_sweep (x, x->kind->contact, "contact", 3 * x->elements, out);
+}
+
+int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error) {
+  const char *fault = pw_specimen_fault (kind);
+  pw_probe_note (report, "table", "sizes, fields and sweeps go together", *fault != 0, 0, "exact", fault);
+  if (*fault) return PW_OK;
+  pw_random random = { seed };
+  pw_system *s = pw_specimen (kind, &random, error);
+  if (s == NULL) return error ? error->status : PW_INPUT;
+  pw_probe x = { .kind = kind, .s = s, .k = s->slab, .rows = kind->rows, .report = report };
+  x.elements = s->slab->b.count;
+  x.cols = s->slab->b.cols;
+  for (int j = 3 * s->bodies; j < s->coords; j++)
+    pw_probe_note (report, "table", "", !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
+                   "inertia of an own coordinate");
+  pw_probe_aim (&x, &random);
+  selftest_all (&x);
+  pw_free (s);
+  return PW_OK;
+}

@@ -1,0 +1,39 @@
+/* The self-test of a kind: every sweep of its table against differences of another one. */
+#ifndef PW_SELFTEST_H
+#define PW_SELFTEST_H
+
+#include "pinwheel.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { PW_SELFTEST_CHECKS = 20 };
+
+/* One comparison: the worst of all elements, entries and seeds. */
+typedef struct {
+  const char *name;   /* the sweep it judges: "gamma_q" */
+  const char *about;  /* what should hold: "J a - gamma = d(J v - eta)/dt" */
+  double error;       /* worst deviation, in units of the largest term it was computed from; inf: not a number */
+  double bound;       /* the most it may be */
+  const char *reason; /* where the bound comes from */
+  int failed;         /* 1: some error was above the bound */
+  char where[120];    /* the worst place, or what is wrong with the table */
+} pw_selftest_check;
+
+typedef struct {
+  int checks, failed; /* in use, and failed */
+  pw_selftest_check check[PW_SELFTEST_CHECKS];
+} pw_selftest_report;
+
+/* Tests a kind, built-in or a plug-in's, by its table alone, in a scene and at a state that follow from the seed.
+ * Start with a zeroed report; further calls with other seeds keep the worst of every check.  A check that fails is in
+ * the report; the status is PW_OK then, too.  Errors: PW_INPUT if the kind refuses whatever definition its field table
+ * allows, PW_MACHINE. */
+int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,24 @@
+/* A tiny scene of three elements of any one kind, at random, for the self-test. */
+#ifndef PW_SPECIMEN_H
+#define PW_SPECIMEN_H
+
+#include <stdint.h>
+#include "system.h"
+
+enum { PW_SPECIMEN_BODIES = 4, PW_SPECIMEN_ELEMENTS = 3 };
+
+/* Random numbers, the same on every machine. */
+typedef struct {
+  uint64_t state; /* the seed, at first */
+} pw_random;
+double pw_random_between (pw_random *r, double low, double high);
+
+/* "" if the table holds together, else what is wrong with it.  Anything else may crash on a table that does not. */
+const char *pw_specimen_fault (const pw_kind *kind);
+
+/* Compiles a scene of bodies b0 to b3 and elements e0 to e2, defined at random inside the domains of the kind's field
+ * table; e2 hangs on the ground with one of its bodies if it has several.  NULL and the error if the kind refuses every
+ * such definition, or memory is out. */
+pw_system *pw_specimen (const pw_kind *kind, pw_random *random, pw_error *error);
+
+#endif

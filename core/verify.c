@@ -1,0 +1,150 @@
+/* The independent verifier: plain loops over elements, rows and columns, nothing shared with the solvers but the kinds.
+ *
+ * Each residual is judged against the sum of the absolute values of its terms, and against what the scene's length L
+ * and time T make of its unit, so that round-off is about 1e-16 whatever the units.  Forces are judged against the
+ * largest in the scene, since those on a massless body may all be round-off themselves. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "system.h"
+#include "verify.h"
+
+/* Residuals and the sizes of their terms. */
+typedef struct {
+  pw_system *s;
+  double *position, *velocity, *acceleration, *force;
+  double *position_size, *velocity_size, *acceleration_size, *force_size;
+  double *block; /* what one kind's sweep fills */
+} verify;
+
+/* Adds a term to a sum and to its size. */
+static void verify_add (double *sum, double *size, double term) {
+  *sum += term;
+  *size += fabs (term);
+}
+
+/* Fills the block by a sweep of n numbers, with zeros if there is none. */
+static const double *verify_sweep (verify *x, const pw_slab *k, pw_sweep *f, int n) {
+  memset (x->block, 0, (size_t)n * sizeof *x->block);
+  if (f) f (&k->b, x->block);
+  return x->block;
+}
+
+/* Sums up J v, J a and J^T lambda of a slab. */
+static void verify_products (verify *x, const pw_slab *k, const double *v, const double *a, const double *lambda) {
+  int rows = k->kind->rows, cols = k->b.cols;
+  const double *J = verify_sweep (x, k, k->kind->J, k->b.count * rows * cols);
+  for (int e = 0; e < k->b.count; e++)
+    for (int r = 0; r < rows; r++)
+      for (int c = 0; c < cols; c++, J++) {
+        int i = k->row + e * rows + r, j = pw_global (k, e, c);
+        if (j >= x->s->coords) continue;
+        verify_add (&x->velocity[i], &x->velocity_size[i], *J * v[j]);
+        verify_add (&x->acceleration[i], &x->acceleration_size[i], *J * a[j]);
+        verify_add (&x->force[j], &x->force_size[j], *J * lambda[i]);
+      }
+}
+
+static void verify_rows (verify *x, const pw_slab *k, const double *v, const double *a, const double *lambda) {
+  const pw_kind *kind = k->kind;
+  int n = k->b.count * kind->rows, holonomic = kind->level == PW_HOLONOMIC;
+  verify_products (x, k, v, a, lambda);
+  const double *y = verify_sweep (x, k, kind->eta, n);
+  for (int i = 0; i < n; i++) verify_add (&x->velocity[k->row + i], &x->velocity_size[k->row + i], -y[i]);
+  y = verify_sweep (x, k, kind->gamma, n);
+  for (int i = 0; i < n; i++) verify_add (&x->acceleration[k->row + i], &x->acceleration_size[k->row + i], -y[i]);
+  if (!holonomic) return;
+  y = verify_sweep (x, k, kind->g, n);
+  for (int i = 0; i < n; i++) x->position[k->row + i] = y[i];
+  y = verify_sweep (x, k, kind->g_size, n);
+  for (int i = 0; i < n; i++) x->position_size[k->row + i] = y[i];
+}
+
+static void verify_forces (verify *x, const pw_slab *k) {
+  const double *y = verify_sweep (x, k, k->kind->force, k->b.count * k->b.cols);
+  for (int i = 0; i < k->b.count * k->b.cols; i++) {
+    int j = pw_global (k, i / k->b.cols, i % k->b.cols);
+    if (j < x->s->coords) verify_add (&x->force[j], &x->force_size[j], -y[i]);
+  }
+}
+
+/* ---- Verdicts ---- */
+
+static int verify_angle (const pw_system *s, int j) {
+  return j >= 3 * s->bodies || j % 3 == 2;
+}
+
+/* Gives every coordinate the size of the largest force in the scene, or of the largest moment; L makes one comparable
+ * with the other. */
+static void verify_force_sizes (verify *x) {
+  const pw_system *s = x->s;
+  double L = s->scale.length, largest = 0;
+  for (int j = 0; j < s->coords; j++)
+    largest = fmax (largest, verify_angle (s, j) ? x->force_size[j] / L : x->force_size[j]);
+  for (int j = 0; j < s->coords; j++) x->force_size[j] = verify_angle (s, j) ? largest * L : largest;
+}
+
+typedef char *verify_name (const pw_system *s, int i, char *buffer, size_t size);
+
+/* The worst of n residuals, none judged against less than `floor`. */
+static void verify_judge (const pw_system *s, int n, const double *residual, const double *size, double floor,
+                          verify_name *name, int first, pw_verdict *verdict) {
+  int worst = -1;
+  *verdict = (pw_verdict){ 0 };
+  for (int i = 0; i < n; i++) {
+    double error = fabs (residual[i]), scaled = error > 0 ? error / (size[i] + floor) : error;
+    if (isnan (error)) error = scaled = INFINITY;
+    verdict->absolute = fmax (verdict->absolute, error);
+    if (worst >= 0 && scaled <= verdict->scaled) continue;
+    verdict->scaled = scaled;
+    worst = i;
+  }
+  if (worst >= 0) name (s, first + worst, verdict->name, sizeof verdict->name);
+}
+
+static void verify_all (verify *x, const double *v, const double *a, const double *lambda, pw_verification *result) {
+  const pw_system *s = x->s;
+  double L = s->scale.length, T = s->scale.time;
+  for (int j = 0; j < s->coords; j++) verify_add (&x->force[j], &x->force_size[j], s->mass[j] * a[j]);
+  for (int i = 0; i < s->slabs; i++) {
+    if (s->slab[i].kind->rows > 0) verify_rows (x, &s->slab[i], v, a, lambda);
+    if (s->slab[i].kind->force) verify_forces (x, &s->slab[i]);
+  }
+  verify_force_sizes (x);
+  verify_judge (s, s->holonomic, x->position, x->position_size, L, pw_reaction_name, 0, &result->position);
+  verify_judge (s, s->rows, x->velocity, x->velocity_size, L / T, pw_reaction_name, 0, &result->velocity);
+  verify_judge (s, s->rows, x->acceleration, x->acceleration_size, L / (T * T), pw_reaction_name, 0,
+                &result->acceleration);
+  verify_judge (s, s->coords, x->force, x->force_size, 0, pw_state_name, s->coords, &result->force);
+}
+
+/* The most numbers a sweep of any kind in use fills. */
+static size_t verify_room (const pw_system *s) {
+  size_t most = 1;
+  for (int i = 0; i < s->slabs; i++) {
+    const pw_slab *k = &s->slab[i];
+    size_t n = (size_t)k->b.count * (size_t)k->b.cols * (size_t)(k->kind->rows > 0 ? k->kind->rows : 1);
+    if (n > most) most = n;
+  }
+  return most;
+}
+
+int pw_verify (pw_system *s, double t, const double *q, const double *v, const double *a, const double *lambda,
+               pw_verification *result) {
+  size_t rows = (size_t)s->rows, coords = (size_t)s->coords;
+  double *room = calloc (6 * rows + 2 * coords + verify_room (s), sizeof *room);
+  if (room == NULL) return PW_MACHINE;
+  verify x = { .s = s, .position = room };
+  x.velocity = x.position + rows;
+  x.acceleration = x.velocity + rows;
+  x.position_size = x.acceleration + rows;
+  x.velocity_size = x.position_size + rows;
+  x.acceleration_size = x.velocity_size + rows;
+  x.force = x.acceleration_size + rows;
+  x.force_size = x.force + coords;
+  x.block = x.force_size + coords;
+  int status = pw_place (s, t, q, v);
+  if (status == PW_OK) verify_all (&x, v, a, lambda, result);
+  free (room);
+  return status;
+}
