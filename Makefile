@@ -97,13 +97,13 @@ deps:
 	@CC='$(CC)' CPPFLAGS='$(CPPFLAGS) $(SYSTEM)' LDFLAGS='$(LDFLAGS)' BUILD='$(BUILD)' NO_DEPS='$(NO_DEPS)' \
 	  sh .ci/deps.sh $(if $(filter deps,$(MAKECMDGOALS)),fresh) $(TOOLS)
 
-# ---- Objects; each folder sees only what it may include ----
+# ---- Objects; each folder sees only what it may include (-iquote: core/signal.h is not <signal.h>) ----
 
-$(BUILD)/obj/core/%.o:       INCLUDE := -Icore
-$(BUILD)/obj/solvers/%.o:    INCLUDE := -Icore $(SYSTEM)
-$(BUILD)/obj/core/files/%.o: INCLUDE := -Icore $(SYSTEM)
-$(BUILD)/obj/core/cli/%.o:   INCLUDE := -Icore -Icore/files -Isolvers
-$(BUILD)/obj/tests/%.o:      INCLUDE := -Icore -Icore/files -Isolvers $(SYSTEM)
+$(BUILD)/obj/core/%.o:       INCLUDE := -iquote core
+$(BUILD)/obj/solvers/%.o:    INCLUDE := -iquote core $(SYSTEM)
+$(BUILD)/obj/core/files/%.o: INCLUDE := -iquote core $(SYSTEM)
+$(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers
+$(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
@@ -188,7 +188,11 @@ test-all: everything
 	@$(RUN_TESTS) $(TESTS) $(SLOWS) $(SHELLS)
 
 demo: all $(BUILD)/benchmarks/demo
-	@$(BUILD)/benchmarks/demo $(PROGRAM) $(BUILD)/demo
+	@$(BUILD)/benchmarks/demo
+	@mkdir -p $(BUILD)/demo
+	@$(PROGRAM) run ezyroller --energy --every 0.02 -o $(BUILD)/demo/ezyroller.csv --json $(BUILD)/demo/ezyroller.json \
+	  --plots $(BUILD)/demo
+	@echo 'figures and data: $(BUILD)/demo/'
 
 bench-quick: all $(BUILD)/benchmarks/quick
 	@$(BUILD)/benchmarks/quick

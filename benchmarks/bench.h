@@ -1,0 +1,44 @@
+/* What the benchmark programs share: a model opened and compiled, and a run that is timed. */
+#ifndef BENCH_H
+#define BENCH_H
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+
+typedef struct {
+  pw_file *file;
+  pw_model *model;
+  pw_system *system;
+} bench_scene;
+
+/* Ends the program with the error's text. */
+static inline void bench_fail (const char *what, const pw_error *error) {
+  fprintf (stderr, "%s: %s\n", what, error->text);
+  exit (-error->status);
+}
+
+/* Opens a model by name, with its parameters at their defaults. */
+static inline bench_scene bench_open (const char *name) {
+  pw_error error = { 0 };
+  bench_scene s = { .file = pw_file_open (name, &error) };
+  if (s.file) s.model = pw_file_model (s.file, &error);
+  if (s.model && pw_build (s.model, &error) == PW_OK) s.system = pw_compile (s.model, &error);
+  if (s.system == NULL) bench_fail (name, &error);
+  return s;
+}
+
+static inline void bench_close (bench_scene *s) {
+  pw_free (s->system);
+  pw_model_free (s->model);
+  pw_file_close (s->file);
+}
+
+/* Processor time used so far [s]. */
+static inline double bench_clock (void) {
+  return (double)clock () / CLOCKS_PER_SEC;
+}
+
+#endif

@@ -1,0 +1,54 @@
+/* quick: what 100 s of the EzyRoller cost on this machine, by method; the median of some repeats. */
+#include "bench.h"
+
+enum { QUICK_SECONDS = 100, QUICK_REPEATS = 9 };
+
+typedef struct {
+  const char *method;
+  double step, rtol;
+  int ledger;
+} quick_case;
+
+/* One run: its processor time, and what it counted. */
+static double quick_run (const quick_case *c, pw_statistics *statistics) {
+  pw_error error = { 0 };
+  bench_scene scene = bench_open ("ezyroller");
+  pw_settings settings = {
+    .span = QUICK_SECONDS, .step = c->step, .rtol = c->rtol, .atol = c->rtol, .ledger = c->ledger
+  };
+  double start = bench_clock ();
+  pw_run *r = pw_open (scene.system, c->method, &settings, &error);
+  while (r && pw_time (r) < QUICK_SECONDS)
+    if (pw_advance (r, QUICK_SECONDS, &error) != PW_OK) break;
+  double cpu = bench_clock () - start;
+  if (error.status != PW_OK) bench_fail (c->method, &error);
+  *statistics = *pw_run_statistics (r);
+  pw_close (r);
+  bench_close (&scene);
+  return cpu;
+}
+
+static int quick_order (const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+int main (void) {
+  static const quick_case cases[] = { { "rk4+projection", 1e-3, 0, 0 }, { "rk4+projection", 1e-3, 0, 1 },
+                                      { "rk4+baumgarte", 1e-3, 0, 0 },  { "rk4+none", 1e-3, 0, 0 },
+                                      { "ida+baumgarte", 0, 1e-10, 0 }, { "ida+ggl", 0, 1e-10, 0 } };
+  printf ("EzyRoller, %d s, median of %d runs (rk4: h = 1e-3 s; ida: rtol 1e-10)\n\n", QUICK_SECONDS, QUICK_REPEATS);
+  printf ("%-16s %-7s %9s %9s %9s %9s %9s %9s\n", "method", "energy", "CPU [s]", "least", "steps", "rhs", "ns/step",
+          "ns/rhs");
+  for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+    pw_statistics n;
+    double cpu[QUICK_REPEATS];
+    for (int k = 0; k < QUICK_REPEATS; k++) cpu[k] = quick_run (&cases[i], &n);
+    qsort (cpu, QUICK_REPEATS, sizeof *cpu, quick_order);
+    double median = cpu[QUICK_REPEATS / 2];
+    printf ("%-16s %-7s %9.4f %9.4f %9ld %9ld %9.0f %9.0f\n", cases[i].method, cases[i].ledger ? "yes" : "no", median,
+            cpu[0], n.steps, n.rhs, 1e9 * median / (double)n.steps, 1e9 * median / (double)n.rhs);
+  }
+  printf ("\nns/rhs of rk4+none is the cost of one evaluation of the accelerations and of its share of the step.\n");
+  return 0;
+}
