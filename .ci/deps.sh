@@ -170,13 +170,15 @@ for n in $missing; do packages="$packages $(package_of "$n")"; done
 packages=${packages# } update=
 if [ "$manager" = apt ]; then apt-cache show $packages >/dev/null 2>&1 || update=1; fi
 
+sudo=
+command -v sudo >/dev/null && sudo='sudo '
 if [ "$(id -u)" = 0 ] || [ "$manager" = brew ]; then
   as=
-elif [ -t 0 ] && command -v sudo >/dev/null; then
-  as='sudo '
+elif [ -t 0 ] && [ -n "$sudo" ]; then
+  as=$sudo
 else
-  compose 'sudo '
-  echo "deps: neither root nor a terminal to ask on; please run" >&2
+  compose "$sudo"
+  echo "deps: not root, and no terminal or no sudo to ask with; please run as root:" >&2
   echo "  $command" >&2
   exit 1
 fi
@@ -194,7 +196,8 @@ fi
 
 look
 if [ -n "$missing" ]; then
-  echo "deps: still missing after installing:$missing (SUNDIALS must be 6.0 or later)" >&2
+  echo "deps: still missing after installing:$missing" >&2
+  case $missing in *sundials*) echo "deps: SUNDIALS must be 6.0 or later, with KLU" >&2 ;; esac
   sed 's/^/  /' "$work/log" | head -20 >&2
   exit 1
 fi
