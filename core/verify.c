@@ -75,12 +75,14 @@ static int verify_angle (const pw_system *s, int j) {
 }
 
 /* Gives every coordinate the size of the largest force in the scene, or of the largest moment; L makes one comparable
- * with the other. */
+ * with the other.  Without any force, that of a mass times L / T^2. */
 static void verify_force_sizes (verify *x) {
   const pw_system *s = x->s;
-  double L = s->scale.length, largest = 0;
-  for (int j = 0; j < s->coords; j++)
-    largest = fmax (largest, verify_angle (s, j) ? x->force_size[j] / L : x->force_size[j]);
+  double L = s->scale.length, T = s->scale.time, largest = 0;
+  for (int j = 0; j < s->coords; j++) {
+    double unit = verify_angle (s, j) ? L : 1;
+    largest = fmax (largest, fmax (x->force_size[j] / unit, s->mass[j] / (unit * unit) * L / (T * T)));
+  }
   for (int j = 0; j < s->coords; j++) x->force_size[j] = verify_angle (s, j) ? largest * L : largest;
 }
 
