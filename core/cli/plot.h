@@ -1,0 +1,96 @@
+/* Figures from inside: what is kept of a run, and the steps from there to a picture. */
+#ifndef PW_PLOT_H
+#define PW_PLOT_H
+
+#include <stdio.h>
+#include "pinwheel-files.h"
+#include "plots.h"
+#include "system.h"
+
+enum {
+  PLOT_SAMPLES = 1600,    /* of a small scene */
+  PLOT_FEW = 240,         /* of a large one, at least */
+  PLOT_NUMBERS = 8000000, /* kept in all, unless that is less than PLOT_FEW samples */
+  PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be told apart */
+  PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
+  PLOT_KEYED = 12,        /* curves that get a name each; more are coloured by number */
+  PLOT_IMAGES = 60,       /* pictures of the mechanism along its way */
+  PLOT_PATH = 4096        /* longest path of a file, its end included */
+};
+
+/* What is kept of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each
+ * wheel drawn. */
+enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
+
+/* Attachment points of a body, in its frame [m]. */
+typedef struct {
+  int count;
+  double at[PLOT_POINTS][2];
+} pw_plot_body;
+
+/* A rectangle [m]. */
+typedef struct {
+  double x0, x1, y0, y1;
+} pw_plot_box;
+
+struct pw_plots {
+  const char *folder, *model;
+  const pw_system *s;
+  double t_end;
+  int samples, wanted; /* taken so far, and in all */
+  int width;           /* numbers per sample */
+  int bodies, wheels;  /* drawn */
+  int grounds;         /* points of the ground */
+  int closeup;         /* samples of the start that get a picture of their own; 0: none */
+  int *body;           /* bodies: index in the system */
+  int *slab, *element; /* wheels: where they are in the system */
+  pw_plot_body *shape; /* bodies */
+  double (*ground)[2]; /* grounds [m] */
+  double *data;        /* wanted x width */
+  pw_pose *pose;       /* of every body, and the ground */
+  double *contact;     /* scratch: what the largest batch of wheels fills */
+};
+
+/* Sample i, and the parts of one. */
+static inline double *pw_plot_sample (const pw_plots *p, int i) {
+  return p->data + (size_t)i * (size_t)p->width;
+}
+static inline double *pw_plot_motion (const pw_plots *p, int i, int body) {
+  return pw_plot_sample (p, i) + PLOT_FIRST + 6 * body;
+}
+static inline double *pw_plot_wheel (const pw_plots *p, int i, int wheel) {
+  return pw_plot_sample (p, i) + PLOT_FIRST + 6 * p->bodies + 3 * wheel;
+}
+
+static inline const char *pw_plot_body_name (const pw_plots *p, int body) {
+  return p->s->body_name[p->body[body]];
+}
+static inline const char *pw_plot_wheel_name (const pw_plots *p, int wheel) {
+  return p->s->slab[p->slab[wheel]].name[p->element[wheel]];
+}
+
+/* Opens a file of the folder for writing.  NULL and PW_MACHINE with path and reason if that fails. */
+FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error);
+/* Closes it.  PW_MACHINE if something could not be written. */
+int pw_plot_finish (const pw_plots *p, const char *name, FILE *file, pw_error *error);
+
+/* The smallest rectangle around all attachment points, centres and wheels of samples 0 ... n - 1, or around the paths
+ * of the wheels (of the centres, if there are no wheels). */
+pw_plot_box pw_plot_box_of (const pw_plots *p, int n);
+pw_plot_box pw_plot_box_of_paths (const pw_plots *p);
+
+/* Largest dimension of the mechanism at the start [m]. */
+double pw_plot_size (const pw_plots *p);
+
+/* Blocks of the mechanism's data, and whether there is anything in one. */
+enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
+int pw_plot_has (const pw_plots *p, int block);
+
+/* Writes the data files; sets p->closeup. */
+int pw_plot_write_data (pw_plots *p, pw_error *error);
+/* Writes the scripts. */
+int pw_plot_write_scripts (const pw_plots *p, pw_error *error);
+/* Runs gnuplot on them. */
+int pw_plot_run (const pw_plots *p, pw_error *error);
+
+#endif

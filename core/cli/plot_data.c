@@ -1,0 +1,210 @@
+/* Data files of the figures: plain columns, a comment line with names and units at the top. */
+#include <math.h>
+#include "plot.h"
+
+static void data_number (FILE *f, double value, const char *before) {
+  char text[32];
+  fputs (before, f);
+  fputs (pw_format (text, value, 10), f);
+}
+
+/* ---- Shapes ---- */
+
+/* A point of a body in the world. */
+static void data_point (const double *motion, const double *at, double out[2]) {
+  double c = cos (motion[2]), s = sin (motion[2]);
+  out[0] = motion[0] + c * at[0] - s * at[1];
+  out[1] = motion[1] + s * at[0] + c * at[1];
+}
+
+static void data_extend (pw_plot_box *box, const double *point) {
+  if (!isfinite (point[0]) || !isfinite (point[1])) return;
+  box->x0 = fmin (box->x0, point[0]);
+  box->x1 = fmax (box->x1, point[0]);
+  box->y0 = fmin (box->y0, point[1]);
+  box->y1 = fmax (box->y1, point[1]);
+}
+
+static void data_extend_sample (const pw_plots *p, int i, pw_plot_box *box) {
+  for (int b = 0; b < p->bodies; b++) {
+    const double *motion = pw_plot_motion (p, i, b);
+    data_extend (box, motion);
+    for (int k = 0; k < p->shape[b].count; k++) {
+      double point[2];
+      data_point (motion, p->shape[b].at[k], point);
+      data_extend (box, point);
+    }
+  }
+  for (int w = 0; w < p->wheels; w++) data_extend (box, pw_plot_wheel (p, i, w));
+}
+
+static const pw_plot_box data_nothing = { INFINITY, -INFINITY, INFINITY, -INFINITY };
+
+pw_plot_box pw_plot_box_of (const pw_plots *p, int n) {
+  pw_plot_box box = data_nothing;
+  for (int i = 0; i < n; i++) data_extend_sample (p, i, &box);
+  for (int g = 0; g < p->grounds; g++) data_extend (&box, p->ground[g]);
+  return box;
+}
+
+pw_plot_box pw_plot_box_of_paths (const pw_plots *p) {
+  pw_plot_box box = data_nothing;
+  for (int i = 0; i < p->samples; i++)
+    if (p->wheels > 0)
+      for (int w = 0; w < p->wheels; w++) data_extend (&box, pw_plot_wheel (p, i, w));
+    else
+      for (int b = 0; b < p->bodies; b++) data_extend (&box, pw_plot_motion (p, i, b));
+  return box;
+}
+
+static double data_diagonal (pw_plot_box box) {
+  return box.x1 >= box.x0 ? hypot (box.x1 - box.x0, box.y1 - box.y0) : 0;
+}
+
+double pw_plot_size (const pw_plots *p) {
+  double size = data_diagonal (pw_plot_box_of (p, 1));
+  return size > 0 ? size : p->s->scale.length;
+}
+
+/* A mechanism that goes far is small in the picture of its whole way: the beginning, as far as it fits a picture a few
+ * times its size, then gets one of its own. */
+static int data_closeup (const pw_plots *p) {
+  double size = pw_plot_size (p);
+  if (data_diagonal (pw_plot_box_of (p, p->samples)) < 10 * size) return 0;
+  pw_plot_box box = data_nothing;
+  int n = 0;
+  while (n < p->samples) {
+    data_extend_sample (p, n, &box);
+    if (data_diagonal (box) > 4 * size) break;
+    n++;
+  }
+  return n < 12 ? 0 : n;
+}
+
+/* ---- Files ---- */
+
+static int data_motion (const pw_plots *p, pw_error *error) {
+  static const char *const names[] = { "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
+  FILE *f = pw_plot_create (p, "motion.dat", error);
+  if (f == NULL) return PW_MACHINE;
+  fputs ("# t [s]", f);
+  for (int b = 0; b < p->bodies; b++)
+    for (int k = 0; k < 6; k++) fprintf (f, ", %s.%s", pw_plot_body_name (p, b), names[k]);
+  for (int i = 0; i < p->samples; i++) {
+    data_number (f, pw_plot_sample (p, i)[PLOT_T], "\n");
+    for (int k = 0; k < 6 * p->bodies; k++) data_number (f, pw_plot_motion (p, i, 0)[k], " ");
+  }
+  fputs ("\n", f);
+  return pw_plot_finish (p, "motion.dat", f, error);
+}
+
+static int data_wheels (const pw_plots *p, pw_error *error) {
+  if (p->wheels == 0) return PW_OK;
+  FILE *f = pw_plot_create (p, "wheels.dat", error);
+  if (f == NULL) return PW_MACHINE;
+  fputs ("# t [s]", f);
+  for (int w = 0; w < p->wheels; w++) {
+    const char *name = pw_plot_wheel_name (p, w);
+    fprintf (f, ", %s.x [m], %s.y [m], %s.heading [rad]", name, name, name);
+  }
+  for (int i = 0; i < p->samples; i++) {
+    data_number (f, pw_plot_sample (p, i)[PLOT_T], "\n");
+    for (int k = 0; k < 3 * p->wheels; k++) data_number (f, pw_plot_wheel (p, i, 0)[k], " ");
+  }
+  fputs ("\n", f);
+  return pw_plot_finish (p, "wheels.dat", f, error);
+}
+
+static int data_energy (const pw_plots *p, pw_error *error) {
+  FILE *f = pw_plot_create (p, "energy.dat", error);
+  if (f == NULL) return PW_MACHINE;
+  fputs ("# t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]", f);
+  for (int i = 0; i < p->samples; i++)
+    for (int k = 0; k < PLOT_FIRST; k++) data_number (f, pw_plot_sample (p, i)[k], k ? " " : "\n");
+  fputs ("\n", f);
+  return pw_plot_finish (p, "energy.dat", f, error);
+}
+
+/* ---- The mechanism: lines of "x y t", blank lines between pieces ---- */
+
+static void data_vertex (FILE *f, const double *point, double t) {
+  data_number (f, point[0], "");
+  data_number (f, point[1], " ");
+  data_number (f, t, " ");
+  fputs ("\n", f);
+}
+
+/* A body: from each attachment point to the centre of mass and on to the next one. */
+static void data_body (FILE *f, const pw_plots *p, int i, int body) {
+  const double *motion = pw_plot_motion (p, i, body), t = pw_plot_sample (p, i)[PLOT_T];
+  const pw_plot_body *shape = &p->shape[body];
+  for (int k = 0; k < shape->count; k++) {
+    double point[2];
+    data_point (motion, shape->at[k], point);
+    if (k != 1) data_vertex (f, k == 0 ? point : motion, t);
+    data_vertex (f, k == 0 ? motion : point, t);
+  }
+  if (shape->count > 0) fputs ("\n", f);
+}
+
+static void data_wheel (FILE *f, const pw_plots *p, int i, int wheel, double half) {
+  const double *contact = pw_plot_wheel (p, i, wheel), t = pw_plot_sample (p, i)[PLOT_T];
+  double c = half * cos (contact[2]), s = half * sin (contact[2]);
+  data_vertex (f, (double[]){ contact[0] - c, contact[1] - s }, t);
+  data_vertex (f, (double[]){ contact[0] + c, contact[1] + s }, t);
+  fputs ("\n", f);
+}
+
+/* Three blocks, two blank lines apart: bodies, wheels, centres of mass.  `images` pictures out of the first n samples.
+ * gnuplot counts blocks by their data, so an empty one gets a point that is not drawn. */
+static int data_mechanism (const pw_plots *p, const char *name, int n, int images, pw_error *error) {
+  FILE *f = pw_plot_create (p, name, error);
+  if (f == NULL) return PW_MACHINE;
+  if (images > n - 1) images = n - 1;
+  double half = 0.06 * pw_plot_size (p);
+  for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
+    static const char *const titles[] = { "bodies", "wheels", "centres of mass" };
+    fprintf (f, "%s# %s: x [m], y [m], t [s]\n", block ? "\n\n" : "", titles[block]);
+    if (!pw_plot_has (p, block)) fputs ("nan nan nan\n", f);
+    for (int k = 0; k <= images; k++) {
+      int i = (int)((long long)k * (n - 1) / images);
+      for (int b = 0; b < p->bodies && block == PLOT_BODIES; b++) data_body (f, p, i, b);
+      for (int w = 0; w < p->wheels && block == PLOT_WHEELS; w++) data_wheel (f, p, i, w, half);
+      for (int b = 0; b < p->bodies && block == PLOT_CENTRES; b++)
+        data_vertex (f, pw_plot_motion (p, i, b), pw_plot_sample (p, i)[PLOT_T]);
+    }
+  }
+  return pw_plot_finish (p, name, f, error);
+}
+
+int pw_plot_has (const pw_plots *p, int block) {
+  if (block == PLOT_WHEELS) return p->wheels > 0;
+  int b = 0;
+  while (block == PLOT_BODIES && b < p->bodies && p->shape[b].count == 0) b++;
+  return b < p->bodies;
+}
+
+static int data_ground (const pw_plots *p, pw_error *error) {
+  if (p->grounds == 0) return PW_OK;
+  FILE *f = pw_plot_create (p, "ground.dat", error);
+  if (f == NULL) return PW_MACHINE;
+  fputs ("# points of the ground: x [m], y [m]\n", f);
+  for (int g = 0; g < p->grounds; g++) {
+    data_number (f, p->ground[g][0], "");
+    data_number (f, p->ground[g][1], " ");
+    fputs ("\n", f);
+  }
+  return pw_plot_finish (p, "ground.dat", f, error);
+}
+
+int pw_plot_write_data (pw_plots *p, pw_error *error) {
+  p->closeup = data_closeup (p);
+  int status = data_motion (p, error);
+  if (status == PW_OK) status = data_wheels (p, error);
+  if (status == PW_OK) status = data_energy (p, error);
+  if (status == PW_OK) status = data_ground (p, error);
+  if (status == PW_OK) status = data_mechanism (p, "mechanism.dat", p->samples, PLOT_IMAGES, error);
+  if (status == PW_OK && p->closeup > 0)
+    status = data_mechanism (p, "mechanism-start.dat", p->closeup, PLOT_IMAGES / 2, error);
+  return status;
+}

@@ -1,0 +1,222 @@
+/* What figures keep of a run: evenly spaced samples of as many bodies and wheels as can be told apart. */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include "model.h"
+#include "plot.h"
+
+/* ---- The folder ---- */
+
+/* Makes a folder and those above it. */
+static int plots_folder (const char *folder, pw_error *error) {
+  char path[PLOT_PATH];
+  size_t n = strlen (folder);
+  if (n == 0 || n >= sizeof path - 32)
+    return pw_fail (error, PW_INPUT, "the folder \"%s\" for plots: no such name can be used", folder);
+  memcpy (path, folder, n + 1);
+  for (size_t i = 1; i <= n; i++) {
+    if (path[i] != '/' && path[i] != 0) continue;
+    char end = path[i];
+    path[i] = 0;
+    if (mkdir (path, 0777) != 0 && errno != EEXIST)
+      return pw_fail (error, PW_MACHINE, "cannot make the folder %s: %s", path, strerror (errno));
+    path[i] = end;
+  }
+  return PW_OK;
+}
+
+FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error) {
+  char path[PLOT_PATH];
+  snprintf (path, sizeof path, "%s/%s", p->folder, name);
+  FILE *file = fopen (path, "w");
+  if (file == NULL) pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  return file;
+}
+
+int pw_plot_finish (const pw_plots *p, const char *name, FILE *file, pw_error *error) {
+  int bad = ferror (file);
+  if (fclose (file) != 0 || bad)
+    return pw_fail (error, PW_MACHINE, "cannot write %s/%s: %s", p->folder, name,
+                    errno ? strerror (errno) : "the disk may be full");
+  return PW_OK;
+}
+
+/* ---- What is drawn ---- */
+
+/* Number i of `shown` evenly taken out of `all`. */
+static int plots_pick (int i, int shown, int all) {
+  return (int)((long long)i * all / shown);
+}
+
+static int plots_least (int a, int b) {
+  return a < b ? a : b;
+}
+
+static int plots_count_wheels (const pw_system *s, int *largest) {
+  int count = 0;
+  *largest = 0;
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    if (k->kind->contact == NULL) continue;
+    count += k->b.count;
+    if (k->b.count > *largest) *largest = k->b.count;
+  }
+  return count;
+}
+
+static void plots_choose_wheels (pw_plots *p, int all) {
+  for (int i = 0; i < p->wheels; i++) {
+    int n = plots_pick (i, p->wheels, all), k = 0;
+    while (p->s->slab[k].kind->contact == NULL || n >= p->s->slab[k].b.count) {
+      if (p->s->slab[k].kind->contact) n -= p->s->slab[k].b.count;
+      k++;
+    }
+    p->slab[i] = k;
+    p->element[i] = n;
+  }
+}
+
+/* Adds an attachment point unless the body has it already; its centre of mass is drawn anyway. */
+static void plots_add_point (pw_plot_body *shape, const double *at) {
+  if (shape->count == PLOT_POINTS || (at[0] == 0 && at[1] == 0)) return;
+  for (int i = 0; i < shape->count; i++)
+    if (shape->at[i][0] == at[0] && shape->at[i][1] == at[1]) return;
+  memcpy (shape->at[shape->count++], at, 2 * sizeof *at);
+}
+
+/* The points of elements' definitions that go with their bodies. */
+static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
+  pw_names shown;
+  if (pw_names_open (&shown, (size_t)p->bodies) != PW_OK) return pw_fail (error, PW_MACHINE, "plots: out of memory");
+  for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, pw_plot_body_name (p, i), i);
+  for (int i = 0; i < m->elements; i++) {
+    const pw_element *e = &m->element[i];
+    for (int n = 0; n < e->kind->bodies; n++) {
+      const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
+      const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);
+      int b = pw_names_find (&shown, body);
+      if (at && b >= 0) plots_add_point (&p->shape[b], at);
+      if (at && strcmp (body, "ground") == 0 && p->grounds < PLOT_SHOWN)
+        memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
+    }
+  }
+  pw_names_close (&shown);
+  return PW_OK;
+}
+
+/* ---- One allocation ---- */
+
+static void plots_layout (pw_layout *l, pw_plots **plots, const pw_plots *sizes, int contacts) {
+  size_t bodies = (size_t)sizes->bodies, wheels = (size_t)sizes->wheels;
+  pw_plots *p = pw_take (l, 1, sizeof *p), none;
+  if (p == NULL) p = &none;
+  *p = *sizes;
+  p->body = pw_take (l, bodies, sizeof *p->body);
+  p->slab = pw_take (l, wheels, sizeof *p->slab);
+  p->element = pw_take (l, wheels, sizeof *p->element);
+  p->shape = pw_take (l, bodies, sizeof *p->shape);
+  p->ground = pw_take (l, PLOT_SHOWN, sizeof *p->ground);
+  p->data = pw_take (l, (size_t)p->wanted * (size_t)p->width, sizeof *p->data);
+  p->pose = pw_take (l, (size_t)p->s->bodies + 1, sizeof *p->pose);
+  p->contact = pw_take (l, 3 * (size_t)contacts, sizeof *p->contact);
+  *plots = p == &none ? NULL : p;
+}
+
+static pw_plots *plots_allocate (const pw_plots *sizes, int contacts, pw_error *error) {
+  pw_layout l = { NULL, 0 };
+  pw_plots *p;
+  plots_layout (&l, &p, sizes, contacts);
+  l = (pw_layout){ calloc (1, l.used), 0 };
+  if (l.base == NULL) {
+    pw_fail (error, PW_MACHINE, "plots: out of memory");
+    return NULL;
+  }
+  plots_layout (&l, &p, sizes, contacts);
+  return p;
+}
+
+pw_plots *pw_plots_open (const char *folder, const pw_model *m, const pw_system *s, double t_end, pw_error *error) {
+  int contacts, all = plots_count_wheels (s, &contacts);
+  pw_plots sizes = { .folder = folder, .model = s->model, .s = s, .t_end = t_end };
+  sizes.bodies = plots_least (s->bodies, PLOT_SHOWN);
+  sizes.wheels = plots_least (all, PLOT_SHOWN);
+  sizes.width = PLOT_FIRST + 6 * sizes.bodies + 3 * sizes.wheels;
+  sizes.wanted = plots_least (PLOT_SAMPLES, PLOT_NUMBERS / sizes.width);
+  if (sizes.wanted < PLOT_FEW) sizes.wanted = PLOT_FEW;
+  sizes.wanted++; /* both ends */
+  if (plots_folder (folder, error) != PW_OK) return NULL;
+  FILE *probe = pw_plot_create (&sizes, "motion.dat", error);
+  if (probe == NULL) return NULL;
+  fclose (probe);
+  pw_plots *p = plots_allocate (&sizes, contacts, error);
+  if (p == NULL) return NULL;
+  for (int i = 0; i < p->bodies; i++) p->body[i] = plots_pick (i, p->bodies, s->bodies);
+  plots_choose_wheels (p, all);
+  if (plots_shapes (p, m, error) == PW_OK) return p;
+  free (p);
+  return NULL;
+}
+
+void pw_plots_close (pw_plots *p) {
+  free (p);
+}
+
+/* ---- Samples ---- */
+
+double pw_plots_next (const pw_plots *p) {
+  if (p->samples == p->wanted) return INFINITY;
+  return p->samples + 1 == p->wanted ? p->t_end : p->t_end * p->samples / (p->wanted - 1);
+}
+
+/* Contacts of the wheels, from poses of our own: the system belongs to the run. */
+static void plots_contacts (const pw_plots *p, const pw_sample *sample, double *out) {
+  const pw_system *s = p->s;
+  for (int b = 0; b < s->bodies; b++) {
+    const double *q = sample->q + 3 * b, *v = sample->v + 3 * b;
+    p->pose[b] = (pw_pose){ q[0], q[1], q[2], cos (q[2]), sin (q[2]), v[0], v[1], v[2] };
+  }
+  p->pose[s->bodies] = (pw_pose){ .cos = 1 };
+  int filled = -1;
+  for (int i = 0; i < p->wheels; i++, out += 3) {
+    const pw_slab *k = &s->slab[p->slab[i]];
+    if (p->slab[i] != filled) {
+      pw_batch batch = k->b;
+      batch.pose = p->pose;
+      batch.q = sample->q + k->own;
+      batch.v = sample->v + k->own;
+      k->kind->contact (&batch, p->contact);
+      filled = p->slab[i];
+    }
+    memcpy (out, p->contact + 3 * p->element[i], 3 * sizeof *out);
+  }
+}
+
+void pw_plots_add (pw_plots *p, const pw_sample *sample) {
+  if (p->samples == p->wanted) return;
+  int i = p->samples++;
+  double *to = pw_plot_sample (p, i);
+  to[PLOT_T] = sample->t;
+  to[PLOT_KINETIC] = sample->kinetic;
+  to[PLOT_POTENTIAL] = sample->potential;
+  to[PLOT_WORK] = sample->work;
+  to[PLOT_LOSS] = sample->loss;
+  to[PLOT_PROJECTION] = sample->projection;
+  to[PLOT_BALANCE] = sample->balance;
+  for (int b = 0; b < p->bodies; b++) {
+    double *motion = pw_plot_motion (p, i, b);
+    memcpy (motion, sample->q + 3 * p->body[b], 3 * sizeof *motion);
+    memcpy (motion + 3, sample->v + 3 * p->body[b], 3 * sizeof *motion);
+  }
+  if (p->wheels > 0) plots_contacts (p, sample, pw_plot_wheel (p, i, 0));
+}
+
+int pw_plots_draw (pw_plots *p, pw_error *error) {
+  if (p->samples < 2) {
+    fprintf (stderr, "pinwheel: the run is too short for figures: none are drawn in %s\n", p->folder);
+    return PW_OK;
+  }
+  int status = pw_plot_write_data (p, error);
+  if (status == PW_OK) status = pw_plot_write_scripts (p, error);
+  return status == PW_OK ? pw_plot_run (p, error) : status;
+}

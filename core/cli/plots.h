@@ -1,0 +1,28 @@
+/* Figures of a run, drawn by gnuplot: paths, velocities, energies and the mechanism along its way.
+ *
+ * The folder gets data files (*.dat), gnuplot scripts (*.gp) and what the scripts draw (*.svg, *.png).  A script can
+ * be edited and run again there: gnuplot FILE.gp. */
+#ifndef PW_PLOTS_H
+#define PW_PLOTS_H
+
+#include "pinwheel-solvers.h"
+
+typedef struct pw_plots pw_plots;
+
+/* Prepares figures of a run from 0 to t_end; the folder is made if need be.  The system must outlive them; the texts
+ * too.  Errors: PW_MACHINE if the folder cannot be written or memory is out. */
+pw_plots *pw_plots_open (const char *folder, const pw_model *m, const pw_system *s, double t_end, pw_error *error);
+
+/* When the next sample is wanted [s]; INFINITY when there are enough. */
+double pw_plots_next (const pw_plots *p);
+
+/* Takes a sample with the ledger. */
+void pw_plots_add (pw_plots *p, const pw_sample *sample);
+
+/* Writes data and scripts and runs gnuplot; a missing gnuplot is no error, but a notice on standard error.  Errors:
+ * PW_MACHINE if a file cannot be written or gnuplot fails. */
+int pw_plots_draw (pw_plots *p, pw_error *error);
+
+void pw_plots_close (pw_plots *p);
+
+#endif

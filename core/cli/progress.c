@@ -1,0 +1,64 @@
+/* The progress bar. */
+#include <math.h>
+#include <stdio.h>
+#include <time.h>
+#include <unistd.h>
+#include "progress.h"
+
+#define PROGRESS_FIRST 0.5 /* no bar before this [s]: a short run should not flash */
+#define PROGRESS_EVERY 0.1 /* between two drawings [s] */
+#define PROGRESS_WIDTH 30  /* characters of a full bar */
+
+static double progress_read (clockid_t id) {
+  struct timespec now;
+  clock_gettime (id, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+double pw_clock (void) {
+  return progress_read (CLOCK_MONOTONIC);
+}
+
+double pw_cpu_clock (void) {
+  return progress_read (CLOCK_PROCESS_CPUTIME_ID);
+}
+
+void pw_progress_start (pw_progress *p, const char *what, double t_end, int on) {
+  double now = pw_clock ();
+  *p = (pw_progress){ what, t_end, now, now + PROGRESS_FIRST, 0, on && isatty (STDERR_FILENO) };
+}
+
+/* "0:07", "12:30", "3:05:00"; "-" where nothing can be said. */
+static void progress_duration (double seconds, char *text, size_t size) {
+  if (!(seconds < 3600.0 * 1000)) {
+    snprintf (text, size, "-");
+    return;
+  }
+  int s = (int)(seconds + 0.5), hours = s / 3600;
+  if (hours > 0)
+    snprintf (text, size, "%d:%02d:%02d", hours, s / 60 % 60, s % 60);
+  else
+    snprintf (text, size, "%d:%02d", s / 60, s % 60);
+}
+
+void pw_progress_at (pw_progress *p, double t) {
+  if (!p->on) return;
+  double now = pw_clock ();
+  if (now < p->next) return;
+  p->next = now + PROGRESS_EVERY;
+  double part = fmin (fmax (t / p->t_end, 0), 1);
+  char left[24], bar[PROGRESS_WIDTH + 1];
+  progress_duration ((now - p->start) * (1 / part - 1), left, sizeof left);
+  int full = (int)(part * PROGRESS_WIDTH);
+  for (int i = 0; i < PROGRESS_WIDTH; i++) bar[i] = i < full ? '#' : '.';
+  bar[PROGRESS_WIDTH] = 0;
+  fprintf (stderr, "\r%.16s [%s] %3.0f %%  t = %.4g of %.4g s  %s to go\033[K", p->what, bar, 100 * part, t, p->t_end,
+           left);
+  fflush (stderr);
+  p->shown = 1;
+}
+
+void pw_progress_end (pw_progress *p) {
+  if (p->shown) fputs ("\r\033[K", stderr);
+  p->shown = 0;
+}

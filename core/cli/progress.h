@@ -1,0 +1,25 @@
+/* A progress bar with the time to go, on standard error and only if that is a terminal. */
+#ifndef PW_PROGRESS_H
+#define PW_PROGRESS_H
+
+typedef struct {
+  const char *what; /* shown in front */
+  double t_end;     /* the run goes from 0 to t_end [s] */
+  double start;     /* clock when it started [s] */
+  double next;      /* clock when it may be drawn again [s] */
+  int shown;        /* 1: there is a bar to erase */
+  int on;           /* 0: draws nothing */
+} pw_progress;
+
+/* A clock that only goes forward [s], and the processor time of the program [s]. */
+double pw_clock (void);
+double pw_cpu_clock (void);
+
+/* `on` 0 suppresses the bar, as does a standard error that is no terminal. */
+void pw_progress_start (pw_progress *p, const char *what, double t_end, int on);
+/* Draws the bar for the time t, at most ten times a second. */
+void pw_progress_at (pw_progress *p, double t);
+/* Erases the bar. */
+void pw_progress_end (pw_progress *p);
+
+#endif

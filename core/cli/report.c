@@ -1,0 +1,133 @@
+/* What a run says about itself. */
+#include <stdio.h>
+#include <string.h>
+#include "report.h"
+
+enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300 };
+
+static void report_more (FILE *f, int more, const char *hint) {
+  if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
+}
+
+/* ---- The start ---- */
+
+void pw_report_start (const pw_system *s, const pw_start_report *start) {
+  int n = pw_count_coordinates (s), listed = 0;
+  if (start == NULL || start->moved == 0) return;
+  fprintf (stderr, "pinwheel: the start did not satisfy the constraints; %d of its values %s moved%s:\n", start->moved,
+           start->moved == 1 ? "was" : "were",
+           start->freed ? ", given ones among them, since those cannot all be held" : "");
+  for (int i = 0; i < 2 * n && listed < REPORT_MOVED; i++) {
+    double from = i < n ? start->q_given[i] : start->v_given[i - n], to = i < n ? start->q[i] : start->v[i - n];
+    char name[REPORT_NAME], a[32], b[32];
+    if (from == to) continue;
+    fprintf (stderr, "  %s from %s to %s %s\n", pw_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
+             pw_format (b, to, 10), pw_state_unit (s, i));
+    listed++;
+  }
+  report_more (stderr, start->moved - listed, "");
+}
+
+/* ---- The end ---- */
+
+/* Characters in a UTF-8 text, for columns that line up. */
+static int report_length (const char *text) {
+  int n = 0;
+  for (; *text; text++) n += ((unsigned char)*text & 0xC0) != 0x80;
+  return n;
+}
+
+static void report_left (const char *text, int width) {
+  printf ("%s%*s", text, width > report_length (text) ? width - report_length (text) : 0, "");
+}
+
+static void report_number (double value, int digits, int width) {
+  char text[32];
+  printf ("%*s", width, pw_format (text, value, digits));
+}
+
+/* "frame" of "frame.x". */
+static void report_element (char *name) {
+  char *dot = strrchr (name, '.');
+  if (dot) *dot = 0;
+}
+
+static void report_bodies (const pw_system *s, const pw_sample *last) {
+  static const char *const heads[] = { "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
+  int bodies = pw_count_bodies (s), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES, width = 5;
+  char name[REPORT_NAME];
+  for (int b = 0; b < shown; b++) {
+    report_element (pw_state_name (s, 3 * b, name, sizeof name));
+    if (report_length (name) > width) width = report_length (name);
+  }
+  printf ("  ");
+  report_left ("body", width);
+  for (int k = 0; k < 6; k++) printf ("%15s", heads[k]);
+  printf ("\n");
+  for (int b = 0; b < shown; b++) {
+    report_element (pw_state_name (s, 3 * b, name, sizeof name));
+    printf ("  ");
+    report_left (name, width);
+    for (int k = 0; k < 6; k++) report_number (k < 3 ? last->q[3 * b + k] : last->v[3 * b + k - 3], 8, 15);
+    printf ("\n");
+  }
+  report_more (stdout, bodies - shown, ": -o FILE.csv writes them all");
+}
+
+/* Coordinates that elements own. */
+static void report_own (const pw_system *s, const pw_sample *last) {
+  int first = 3 * pw_count_bodies (s), n = pw_count_coordinates (s),
+      end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
+  char name[REPORT_NAME];
+  for (int j = first; j < end; j++) {
+    printf ("  %s", pw_state_name (s, j, name, sizeof name));
+    report_number (last->q[j], 8, 15);
+    printf (" %s,  %s", pw_state_unit (s, j), pw_state_name (s, n + j, name, sizeof name));
+    report_number (last->v[j], 8, 15);
+    printf (" %s\n", pw_state_unit (s, n + j));
+  }
+  report_more (stdout, n - end, "");
+}
+
+static void report_reactions (const pw_system *s, const pw_sample *last) {
+  int rows = pw_count_rows (s), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS, width = 8;
+  char name[REPORT_NAME];
+  for (int i = 0; i < shown; i++) {
+    int n = report_length (pw_reaction_name (s, i, name, sizeof name));
+    if (n > width) width = n;
+  }
+  if (rows > 0) printf ("\n  reaction\n");
+  for (int i = 0; i < shown; i++) {
+    printf ("  ");
+    report_left (pw_reaction_name (s, i, name, sizeof name), width);
+    report_number (0 - last->lambda[i], 8, 15);
+    printf (" %s\n", pw_reaction_unit (s, i));
+  }
+  report_more (stdout, rows - shown, ": -o FILE.csv writes them all");
+}
+
+static void report_energy (const pw_sample *last) {
+  const char *names[] = { "kinetic", "potential", "work", "dissipated", "projection", "balance" };
+  double values[] = { last->kinetic, last->potential, last->work, last->loss, last->projection, last->balance };
+  printf ("\n  energy\n");
+  for (int i = 0; i < 6; i++) {
+    printf ("  %-10s", names[i]);
+    report_number (values[i], 8, 17);
+    printf (" J\n");
+  }
+}
+
+void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,
+                    const pw_statistics *statistics) {
+  char t[32], a[32], b[32];
+  printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, pw_format (t, last->t, 8));
+  report_bodies (s, last);
+  report_own (s, last);
+  report_reactions (s, last);
+  if (energy) report_energy (last);
+  printf ("\n  worst scaled residuals: position %s, velocity %s\n", pw_format (a, statistics->position, 2),
+          pw_format (b, statistics->velocity, 2));
+  printf ("  %ld steps, %ld rejected, %ld right-hand sides, %s s of processor time\n", statistics->steps,
+          statistics->rejected, statistics->rhs, pw_format (a, summary->cpu, 3));
+  if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
+}

@@ -1,0 +1,284 @@
+/* pinwheel run: integrates a model and writes what became of it.
+ *
+ * Steps are taken in batches that end where a sample is due, so that between samples nothing but the method runs, and
+ * only the method is on the clock. */
+#include <math.h>
+#include <signal.h>
+#include <string.h>
+#include "cli.h"
+#include "plots.h"
+#include "progress.h"
+#include "report.h"
+
+#define RUN_SHORT 0.01 /* a batch that took less processor time [s] may be longer the next time */
+#define RUN_LONG 0.04  /* one that took more must be shorter: Ctrl-C and the progress bar wait for its end */
+enum { RUN_BATCH = 4096 };
+
+typedef struct {
+  /* as given */
+  const char *method, *t_end_text, *step_text, *rtol_text, *atol_text, *every_text;
+  const char *csv_path, *json_path, *plots_path;
+  const char **sets, **starts;
+  int energy;
+  /* as understood */
+  pw_cli_line line;
+  pw_cli_model m;
+  pw_settings settings;
+  double t_end, every; /* [s]; every 0: each accepted step is a row */
+  /* open */
+  pw_output *csv_output, *json_output;
+  pw_csv *csv;
+  pw_plots *plots;
+  pw_run *r;
+  pw_progress progress;
+  /* under way */
+  long row;   /* rows written */
+  long batch; /* steps to take before looking around */
+  double cpu; /* of the method [s] */
+} run;
+
+/* ---- Ctrl-C ---- */
+
+static volatile sig_atomic_t run_stop;
+
+static void run_on_signal (int number) {
+  (void)number;
+  run_stop = 1;
+}
+
+/* The first signal asks for a stop after the current step; a second one ends the program. */
+static void run_catch_signals (void) {
+  struct sigaction action;
+  memset (&action, 0, sizeof action);
+  action.sa_handler = run_on_signal;
+  action.sa_flags = (int)SA_RESETHAND;
+  sigemptyset (&action.sa_mask);
+  sigaction (SIGINT, &action, NULL);
+  sigaction (SIGTERM, &action, NULL);
+}
+
+static void run_release_signals (void) {
+  signal (SIGINT, SIG_DFL);
+  signal (SIGTERM, SIG_DFL);
+}
+
+/* ---- Before the run ---- */
+
+static int run_read (run *x, int argc, const char **argv, pw_error *error) {
+  const struct poptOption options[] = {
+    { "method", 'm', POPT_ARG_STRING, &x->method, 0, "Integrator and stabilisation, see: pinwheel list methods",
+      "METHOD" },
+    { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
+    { "step", 0, POPT_ARG_STRING, &x->step_text, 0, "Step of fixed-step methods [s]", "H" },
+    { "rtol", 0, POPT_ARG_STRING, &x->rtol_text, 0, "Relative tolerance of adaptive methods", "R" },
+    { "atol", 0, POPT_ARG_STRING, &x->atol_text, 0,
+      "Absolute tolerance of every state; by default rtol times its scale", "A" },
+    PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
+    { "every", 0, POPT_ARG_STRING, &x->every_text, 0,
+      "Time between two rows of the table [s]; by default a row per step", "DT" },
+    { "energy", 0, POPT_ARG_NONE, &x->energy, 0, "Keep account of energies, work and losses", NULL },
+    { "output", 'o', POPT_ARG_STRING, &x->csv_path, 0, "Write a table of samples; - is standard output", "FILE.csv" },
+    { "json", 0, POPT_ARG_STRING, &x->json_path, 0, "Write a summary; - is standard output", "FILE" },
+    { "plots", 0, POPT_ARG_STRING, &x->plots_path, 0, "Draw figures into a folder", "DIR" },
+    POPT_TABLEEND,
+  };
+  return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
+}
+
+/* Opens what will be written, so that nothing is computed in vain. */
+static int run_open_outputs (run *x, pw_error *error) {
+  if (x->csv_path && x->json_path && strcmp (x->csv_path, x->json_path) == 0)
+    return pw_fail (error, PW_INPUT, "-o and --json cannot both write to %s",
+                    strcmp (x->csv_path, "-") ? x->csv_path : "standard output (-)");
+  if (x->json_path && (x->json_output = pw_output_open (x->json_path, error)) == NULL) return error->status;
+  if (x->csv_path && (x->csv_output = pw_output_open (x->csv_path, error)) == NULL) return error->status;
+  return PW_OK;
+}
+
+/* Options over the model's wishes over Pinwheel's own. */
+static int run_settle (run *x, pw_error *error) {
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
+  if (x->method == NULL) x->method = d.method;
+  x->t_end = d.t_end;
+  x->settings.step = d.step;
+  x->settings.rtol = d.rtol;
+  int status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &x->t_end, error);
+  if (status == PW_OK) status = pw_cli_number ("--step", x->step_text, PW_POSITIVE, &x->settings.step, error);
+  if (status == PW_OK) status = pw_cli_number ("--rtol", x->rtol_text, PW_POSITIVE, &x->settings.rtol, error);
+  if (status == PW_OK) status = pw_cli_number ("--atol", x->atol_text, PW_POSITIVE, &x->settings.atol, error);
+  if (status == PW_OK) status = pw_cli_number ("--every", x->every_text, PW_POSITIVE, &x->every, error);
+  x->settings.span = x->t_end;
+  x->settings.ledger = x->energy || x->plots_path;
+  return status;
+}
+
+static int run_open (run *x, pw_error *error) {
+  int status = run_open_outputs (x, error);
+  if (status == PW_OK)
+    status =
+        pw_cli_open (&x->m, x->line.argument[0], (const char *const *)x->sets, (const char *const *)x->starts, error);
+  if (status == PW_OK) status = run_settle (x, error);
+  if (status != PW_OK) return status;
+  if (x->plots_path && (x->plots = pw_plots_open (x->plots_path, x->m.model, x->m.system, x->t_end, error)) == NULL)
+    return error->status;
+  x->r = pw_open (x->m.system, x->method, &x->settings, error);
+  if (x->r == NULL) return error->status;
+  pw_report_start (x->m.system, pw_run_start (x->r));
+  if (x->csv_output && (x->csv = pw_csv_open (x->m.system, x->energy, x->csv_output, error)) == NULL)
+    return error->status;
+  return PW_OK;
+}
+
+/* ---- The run ---- */
+
+/* When the next row is due; multiples are computed, not summed up, and the last one may be the end but for round-off. */
+static double run_next_row (const run *x) {
+  if (x->csv == NULL) return INFINITY;
+  if (x->every == 0) return 0;
+  double t = (double)x->row * x->every;
+  return fabs (t - x->t_end) <= 1e-9 * x->every ? x->t_end : t;
+}
+
+/* Writes the rows and keeps the samples that the last step has reached. */
+static int run_take_samples (run *x, pw_error *error) {
+  double now = pw_time (x->r);
+  pw_sample sample;
+  int status = PW_OK;
+  while (status == PW_OK && run_next_row (x) <= now) {
+    status = pw_at (x->r, x->every > 0 ? run_next_row (x) : now, &sample, error);
+    if (status == PW_OK) status = pw_csv_write (x->csv, x->m.system, &sample, error);
+    if (status != PW_OK) break;
+    x->row++;
+    if (x->every == 0) break;
+  }
+  while (status == PW_OK && x->plots && pw_plots_next (x->plots) <= now) {
+    status = pw_at (x->r, pw_plots_next (x->plots), &sample, error);
+    if (status == PW_OK) pw_plots_add (x->plots, &sample);
+  }
+  return status;
+}
+
+/* Steps until a sample is due, the batch is over, or it is time to stop. */
+static int run_batch (run *x, pw_error *error) {
+  double due = fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), x->t_end);
+  double start = pw_cpu_clock ();
+  int status;
+  long n = 0;
+  do {
+    status = pw_advance (x->r, x->t_end, error);
+  } while (status == PW_OK && ++n < x->batch && pw_time (x->r) < due && !run_stop);
+  double used = pw_cpu_clock () - start;
+  x->cpu += used;
+  if (used < RUN_SHORT && n == x->batch && x->batch < RUN_BATCH) x->batch *= 2;
+  if (used > RUN_LONG && x->batch > 1) x->batch /= 2;
+  return status;
+}
+
+static int run_steps (run *x, pw_error *error) {
+  int status = run_take_samples (x, error);
+  while (status == PW_OK && pw_time (x->r) < x->t_end && !run_stop) {
+    status = run_batch (x, error);
+    if (status == PW_OK) status = run_take_samples (x, error);
+    pw_progress_at (&x->progress, pw_time (x->r));
+  }
+  return status;
+}
+
+static int run_integrate (run *x, pw_error *error) {
+  int table_on_screen = x->csv_path && strcmp (x->csv_path, "-") == 0;
+  x->batch = 1;
+  run_catch_signals ();
+  pw_progress_start (&x->progress, pw_file_name (x->m.file), x->t_end, !table_on_screen);
+  int status = run_steps (x, error);
+  pw_progress_end (&x->progress);
+  run_release_signals ();
+  return status;
+}
+
+/* ---- After the run ---- */
+
+/* Completes the table, or says where what there is of it is kept; of a run that has not begun nothing is. */
+static void run_finish_table (run *x, int good, pw_error *error) {
+  char part[4200];
+  pw_csv_close (x->csv);
+  if (x->csv_output == NULL) return;
+  if (good)
+    pw_output_finish (x->csv_output, error);
+  else if (pw_output_abandon (x->csv_output, part, sizeof part) && x->row == 0)
+    remove (part);
+  else if (x->row > 0 && strcmp (x->csv_path, "-") != 0)
+    fprintf (stderr, "pinwheel: the table up to there is kept in %s\n", part);
+}
+
+/* What goes into the JSON summary, which is written however the run has ended. */
+static void run_write_json (run *x, const pw_summary *summary, const pw_sample *sample, pw_error *error) {
+  if (x->json_output == NULL) return;
+  pw_error *own = &(pw_error){ 0 };
+  const pw_statistics *statistics = x->r ? pw_run_statistics (x->r) : NULL;
+  if (pw_json_write (summary, x->m.system, sample, x->energy, statistics, x->json_output, own) == PW_OK)
+    pw_output_finish (x->json_output, own);
+  else
+    pw_output_abandon (x->json_output, (char[8]){ 0 }, 8);
+  if (own->status == PW_OK) return;
+  if (error->status != PW_OK)
+    fprintf (stderr, "pinwheel: %s\n", own->text); /* the run's own failure decides the exit status */
+  else
+    *error = *own;
+}
+
+static pw_summary run_summary (const run *x, const pw_error *error, char *reason, size_t size) {
+  static const char *const status[] = { "ok", "machine", "input", "start", "method" };
+  pw_summary summary = { .model = x->m.file ? pw_file_name (x->m.file) : x->line.argument[0],
+                         .method = x->method,
+                         .status = status[-error->status],
+                         .reason = error->text,
+                         .cpu = x->cpu };
+  if (error->status == PW_OK && run_stop) {
+    char t[32];
+    snprintf (reason, size, "interrupted at t = %s s", pw_format (t, pw_time (x->r), 6));
+    summary.status = "interrupted";
+    summary.reason = reason;
+  }
+  return summary;
+}
+
+/* Everything that follows the last step: table, summary, figures. */
+static int run_finish (run *x, pw_error *error) {
+  char reason[80] = "";
+  int interrupted = error->status == PW_OK && run_stop;
+  pw_sample sample, *last = NULL;
+  if (x->r && pw_at (x->r, pw_time (x->r), &sample, NULL) == PW_OK) last = &sample;
+  if (interrupted) fprintf (stderr, "pinwheel: %s\n", run_summary (x, error, reason, sizeof reason).reason);
+  run_finish_table (x, error->status == PW_OK && !interrupted, error);
+  pw_summary summary = run_summary (x, error, reason, sizeof reason);
+  if (last && x->csv_path == NULL && x->json_path == NULL)
+    pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
+  run_write_json (x, &summary, last, error);
+  if (x->plots && x->r && !interrupted) {
+    pw_error *own = &(pw_error){ 0 };
+    if (pw_plots_draw (x->plots, own) != PW_OK && error->status != PW_OK) fprintf (stderr, "pinwheel: %s\n", own->text);
+    if (error->status == PW_OK) *error = *own;
+  }
+  return interrupted && error->status == PW_OK ? PW_INTERRUPTED : pw_cli_end (error);
+}
+
+static void run_close (run *x) {
+  pw_plots_close (x->plots);
+  if (x->r) pw_close (x->r);
+  pw_cli_close_model (&x->m);
+  pw_cli_close (&x->line);
+}
+
+int pw_cli_run (int argc, const char **argv) {
+  run x = { .method = NULL };
+  pw_error error = { 0 };
+  int status = run_read (&x, argc, argv, &error);
+  if (status == PW_OK) {
+    status = run_open (&x, &error);
+    if (status == PW_OK) run_integrate (&x, &error);
+    status = run_finish (&x, &error);
+  } else
+    status = pw_cli_end (&error); /* 0 after help */
+  run_close (&x);
+  return status;
+}
