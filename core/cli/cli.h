@@ -31,13 +31,14 @@ int pw_cli_run (int argc, const char **argv);
 /* A command line that has been read; close it after the last use of its texts. */
 typedef struct {
   poptContext popt;
-  const char **argument; /* what is no option, ended by NULL */
-  int arguments;         /* how many */
+  struct poptOption table[3]; /* the command's options, and help */
+  const char **argument;      /* what is no option, ended by NULL */
+  int arguments;              /* how many */
 } pw_cli_line;
 
 /* Reads a command line.  `options` is popt's table without help, which is added here; take texts with
  * POPT_ARG_STRING, repeated ones with POPT_ARG_ARGV (a NULL-terminated list, or NULL if there were none), numbers as
- * texts and pass them to pw_cli_number.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says
+ * texts and pass them to pw_cli_number.  All of these variables are NULL at first, and closing frees them.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says
  * what is expected ("MODEL [OPTION...]").  PW_OK; 1 if help was asked for and has been printed; PW_INPUT for an unknown
  * option, with the nearest valid one, or one without its value.  Close the line in every case. */
 int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
@@ -70,9 +71,15 @@ int pw_cli_open (pw_cli_model *m, const char *name, const char *const *sets, con
                  pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
+/* A path, relative to the current directory if it lies below; it may be written to the buffer. */
+const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
+
 /* How to run a model by default: its own wishes, else 10 s of rk4+projection with steps of 1e-3 s.  rtol stays 0 where
  * the model does not say. */
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
+
+/* Shows M, J, gamma and all that stands beside them at time t of a run with the model's default method (matrices.c). */
+int pw_cli_matrices (const pw_cli_model *m, double t, pw_error *error);
 
 /* ---- The end ---- */
 

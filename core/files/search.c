@@ -1,7 +1,7 @@
 /* Where models are: the folders of PINWHEEL_MODELS, then those that belong to the running program and this library.
  *
- * Folders next to the program serve the build tree, those under ../lib and ../include an installed one; the library's
- * own place serves programs that are elsewhere, such as a user's own. */
+ * Folders next to the program, or one up from it (tests), serve the build tree; those under ../lib and ../include an
+ * installed one; the library's own place serves programs that are elsewhere, such as a user's own. */
 #define _GNU_SOURCE /* dladdr */
 #include <dirent.h>
 #include <dlfcn.h>
@@ -122,10 +122,11 @@ static int search_environment (pw_search *s, pw_error *error) {
 }
 
 static int search_beside (pw_search *s, int which, pw_error *error) {
-  static const char *const where[2][2] = { { "models", "../lib/pinwheel/models" }, { "models", "pinwheel/models" } };
+  static const char *const where[2][3] = { { "models", "../models", "../lib/pinwheel/models" },
+                                           { "models", "../models", "pinwheel/models" } };
   char *anchor = search_anchor (which);
   int status = PW_OK;
-  for (int i = 0; anchor && status == PW_OK && i < 2; i++) {
+  for (int i = 0; anchor && status == PW_OK && i < 3; i++) {
     char *folder = pw_join (anchor, where[which][i], "");
     status = folder ? search_folder (s, folder, error) : search_no_memory (error);
     free (folder);
@@ -156,10 +157,10 @@ void pw_search_close (pw_search *s) {
 /* ---- The header ---- */
 
 char *pw_search_include (void) {
-  static const char *const where[] = { "include", "../include/pinwheel" };
+  static const char *const where[] = { "include", "../include", "../include/pinwheel" };
   for (int which = 0; which < 2; which++) {
     char *anchor = search_anchor (which);
-    for (int i = 0; anchor && i < 2; i++) {
+    for (int i = 0; anchor && i < 3; i++) {
       char *folder = pw_join (anchor, where[i], ""), *header = folder ? pw_join (folder, "pinwheel.h", "") : NULL;
       int found = header && access (header, R_OK) == 0;
       free (header);

@@ -1,0 +1,100 @@
+/* pinwheel new: writes a small commented model to begin with. */
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+#include "cli.h"
+
+/* The model file after its first line. */
+static const char new_text[] =
+    " * Try:  pinwheel show ./%s.c\n"
+    " *       pinwheel run ./%s.c --set torque=0.5 -o %s.csv\n"
+    " *\n"
+    " * Units are SI, angles are radians, counter-clockwise. */\n"
+    "#include \"pinwheel.h\"\n"
+    "\n"
+    "/* The numbers of the model.  All of them are doubles, and can be changed with --set NAME=VALUE. */\n"
+    "typedef struct {\n"
+    "  double mass, load, hitch, bar, speed, torque, omega;\n"
+    "} numbers;\n"
+    "\n"
+    "/* Of each: default, unit, meaning, and which values make sense. */\n"
+    "static const pw_parameter parameters[] = {\n"
+    "  { PW_AT (numbers, mass), 2, \"kg\", \"mass of the car\", PW_POSITIVE },\n"
+    "  { PW_AT (numbers, load), 1, \"kg\", \"mass of the trailer\", PW_POSITIVE },\n"
+    "  { PW_AT (numbers, hitch), 0.4, \"m\", \"hitch behind the centre of mass of the car\", PW_NONNEGATIVE },\n"
+    "  { PW_AT (numbers, bar), 0.6, \"m\", \"hitch ahead of the centre of mass of the trailer\", PW_POSITIVE },\n"
+    "  { PW_AT (numbers, speed), 1, \"m/s\", \"speed of the car at the start\", PW_REAL },\n"
+    "  { PW_AT (numbers, torque), 0.2, \"N m\", \"amplitude of the torque in the hitch\", PW_REAL },\n"
+    "  { PW_AT (numbers, omega), PW_PI, \"rad/s\", \"angular frequency of that torque\", PW_REAL },\n"
+    "  { .name = NULL }, /* the end */\n"
+    "};\n"
+    "\n"
+    "/* Says what there is.  A body's frame sits at its centre of mass; points are given in that frame. */\n"
+    "static void build (pw_model *m, const void *given) {\n"
+    "  const numbers *p = given;\n"
+    "\n"
+    "  /* Two bodies, with where they are (x, y, phi) and how they move (vx, vy, omega) at the start. */\n"
+    "  pw_add_body (m, &(pw_body){ .name = \"car\", .mass = p->mass, .inertia = 0.1, .rate = { p->speed, 0, 0 } });\n"
+    "  pw_add_body (m, &(pw_body){ .name = \"trailer\",\n"
+    "                              .mass = p->load,\n"
+    "                              .inertia = 0.05,\n"
+    "                              .start = { -(p->hitch + p->bar), 0, 0 },\n"
+    "                              .rate = { p->speed, 0, 0 } });\n"
+    "\n"
+    "  /* A point of one body and a point of the other coincide.  \"ground\" may stand for one of the two. */\n"
+    "  pw_add_pin (m, &(pw_pin){ .name = \"H\", .body = { \"car\", \"trailer\" }, .at = { { -p->hitch, 0 }, { p->bar, "
+    "0 } } });\n"
+    "\n"
+    "  /* Knife edges: these points do not move sideways. */\n"
+    "  pw_add_wheel (m, &(pw_wheel){ .name = \"A\", .body = \"car\", .at = { 0, 0 } });\n"
+    "  pw_add_wheel (m, &(pw_wheel){ .name = \"C\", .body = \"trailer\", .at = { 0, 0 } });\n"
+    "\n"
+    "  /* torque cos (omega t) on the car, and its opposite on the trailer. */\n"
+    "  pw_add_torque (m, &(pw_torque){ .name = \"drive\",\n"
+    "                                  .body = { \"car\", \"trailer\" },\n"
+    "                                  .value = { PW_HARMONIC, .harmonic = { .amplitude = p->torque, .omega = p->omega "
+    "} } });\n"
+    "}\n"
+    "\n"
+    "/* How Pinwheel finds all this.  .run says what `pinwheel run` does without options. */\n"
+    "PW_MODEL (.about = \"a car and its trailer, wriggling\",\n"
+    "          .parameters = parameters,\n"
+    "          .parameters_size = sizeof (numbers),\n"
+    "          .run = { .t_end = 20, .step = 1e-3, .method = \"rk4+projection\" },\n"
+    "          .build = build);\n";
+
+/* "folder/my_car.c" gives "my_car"; PW_INPUT if a model could not be found under that name. */
+static int new_name (const char *path, char *name, size_t size, pw_error *error) {
+  const char *base = strrchr (path, '/');
+  base = base ? base + 1 : path;
+  size_t n = strspn (base, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
+  if (n == 0 || n >= size || base[0] == '-' || strcmp (base + n, ".c") != 0)
+    return pw_fail (error, PW_INPUT, "\"%s\": a model file's name is made of letters, digits, _ and -, and ends in .c",
+                    path);
+  snprintf (name, size, "%.*s", (int)n, base);
+  return PW_OK;
+}
+
+static int new_write (const char *path, pw_error *error) {
+  char name[100];
+  if (new_name (path, name, sizeof name, error) != PW_OK) return PW_INPUT;
+  FILE *f = fopen (path, "wx"); /* never over a file that is there */
+  if (f == NULL && errno == EEXIST)
+    return pw_fail (error, PW_INPUT, "%s is there already; it has been left as it is", path);
+  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  fprintf (f, "/* %s: a car and its trailer, held together by a pin, each on a knife edge.\n *\n", name);
+  fprintf (f, new_text, name, name, name);
+  int bad = ferror (f);
+  if (fclose (f) != 0 || bad) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  printf ("%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
+  return PW_OK;
+}
+
+int pw_cli_new (int argc, const char **argv) {
+  static const struct poptOption options[] = { POPT_TABLEEND };
+  pw_error error = { 0 };
+  pw_cli_line l;
+  if (pw_cli_read (&l, argc, argv, options, "NAME.c", 1, 1, &error) == PW_OK) new_write (l.argument[0], &error);
+  pw_cli_close (&l);
+  return pw_cli_end (&error);
+}

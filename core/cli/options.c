@@ -1,0 +1,158 @@
+/* What the commands share: command lines, models, errors. */
+#define _POSIX_C_SOURCE 200809L
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "cli.h"
+#include "util.h"
+
+/* ---- Command lines ---- */
+
+static const struct poptOption options_help[] = { { "help", '?', POPT_ARG_NONE, NULL, 'h', "Show this and stop", NULL },
+                                                  POPT_TABLEEND };
+
+static void options_nearest (const struct poptOption *o, pw_nearest *near) {
+  for (; o->longName || o->shortName || o->arg; o++)
+    if (o->longName) pw_nearest_try (near, o->longName);
+}
+
+static int options_unknown (const char *title, const char *bad, const struct poptOption *options, pw_error *error) {
+  char sought[100], best[100];
+  const char *name = bad + strspn (bad, "-");
+  snprintf (sought, sizeof sought, "%.*s", (int)strcspn (name, "="), name);
+  pw_nearest near = { .sought = sought };
+  options_nearest (options, &near);
+  pw_nearest_try (&near, "help");
+  snprintf (best, sizeof best, "--%s", near.best);
+  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; did you mean \"%s\"?", title, (int)strcspn (bad, "="),
+                  bad, best);
+}
+
+static int options_bad (const pw_cli_line *l, int why, const char *title, const struct poptOption *options,
+                        pw_error *error) {
+  const char *bad = poptBadOption (l->popt, POPT_BADOPTION_NOALIAS);
+  if (why == POPT_ERROR_BADOPT) return options_unknown (title, bad, options, error);
+  if (why == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", title, bad);
+  return pw_fail (error, PW_INPUT, "%s: option %s: %s", title, bad, poptStrerror (why));
+}
+
+static int options_count (const pw_cli_line *l, const char *title, const char *synopsis, int least, int most,
+                          pw_error *error) {
+  if (l->arguments < least) return pw_fail (error, PW_INPUT, "something is missing; write %s %s", title, synopsis);
+  if (l->arguments > most)
+    return pw_fail (error, PW_INPUT, "\"%s\" is too much; write %s %s", l->argument[most], title, synopsis);
+  return PW_OK;
+}
+
+int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
+                 int least, int most, pw_error *error) {
+  *l =
+      (pw_cli_line){ .table = { { NULL, 0, POPT_ARG_INCLUDE_TABLE, (void *)(size_t)options, 0, "Options:", NULL },
+                                { NULL, 0, POPT_ARG_INCLUDE_TABLE, (void *)(size_t)options_help, 0, "Help:", NULL } } };
+  l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
+  if (l->popt == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  poptSetOtherOptionHelp (l->popt, synopsis);
+  int got = poptGetNextOpt (l->popt);
+  while (got > 0 && got != 'h') got = poptGetNextOpt (l->popt);
+  if (got == 'h') {
+    poptPrintHelp (l->popt, stdout, 0);
+    return 1;
+  }
+  if (got < -1) return options_bad (l, got, argv[0], options, error);
+  l->argument = poptGetArgs (l->popt);
+  while (l->argument && l->argument[l->arguments]) l->arguments++;
+  return options_count (l, argv[0], synopsis, least, most, error);
+}
+
+/* popt hands out copies of texts, and lists of copies. */
+static void options_free (const struct poptOption *o) {
+  unsigned type = o->argInfo & POPT_ARG_MASK;
+  if (type == POPT_ARG_ARGV) {
+    char ***list = o->arg;
+    for (char **text = *list; text && *text; text++) free (*text);
+  }
+  if (type != POPT_ARG_ARGV && type != POPT_ARG_STRING) return;
+  void **variable = o->arg;
+  free (*variable);
+  *variable = NULL;
+}
+
+void pw_cli_close (pw_cli_line *l) {
+  const struct poptOption *o = l->table[0].arg;
+  for (; o && (o->longName || o->shortName || o->arg); o++) options_free (o);
+  poptFreeContext (l->popt);
+  *l = (pw_cli_line){ .popt = NULL };
+}
+
+int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error) {
+  if (text == NULL) return PW_OK;
+  double x;
+  if (pw_read_number (text, &x) != PW_OK) return pw_fail (error, PW_INPUT, "%s: \"%s\" is not a number", option, text);
+  const char *expected = pw_domain_check (domain, x);
+  if (*expected) return pw_fail (error, PW_INPUT, "%s %s: expected %s", option, text, expected);
+  *value = x;
+  return PW_OK;
+}
+
+/* ---- Models ---- */
+
+typedef int options_setter (pw_model *m, const char *name, double value, pw_error *error);
+
+/* Applies every "NAME=VALUE" of a list. */
+static int options_apply (pw_model *m, const char *option, const char *const *list, options_setter *set,
+                          pw_error *error) {
+  for (; list && *list; list++) {
+    char name[200];
+    double value;
+    const char *equals = strchr (*list, '=');
+    if (equals == NULL || equals == *list || (size_t)(equals - *list) >= sizeof name)
+      return pw_fail (error, PW_INPUT, "%s %s: expected NAME=VALUE", option, *list);
+    snprintf (name, sizeof name, "%.*s", (int)(equals - *list), *list);
+    if (pw_read_number (equals + 1, &value) != PW_OK)
+      return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, *list, equals + 1);
+    int status = set (m, name, value, error);
+    if (status != PW_OK) return status;
+  }
+  return PW_OK;
+}
+
+int pw_cli_open (pw_cli_model *m, const char *name, const char *const *sets, const char *const *starts,
+                 pw_error *error) {
+  *m = (pw_cli_model){ .file = NULL };
+  m->file = pw_file_open (name, error);
+  if (m->file) m->model = pw_file_model (m->file, error);
+  if (m->model && options_apply (m->model, "--set", sets, pw_set, error) == PW_OK &&
+      options_apply (m->model, "--start", starts, pw_set_start, error) == PW_OK && pw_build (m->model, error) == PW_OK)
+    m->system = pw_compile (m->model, error);
+  return m->system ? PW_OK : error->status;
+}
+
+void pw_cli_close_model (pw_cli_model *m) {
+  pw_free (m->system);
+  pw_model_free (m->model);
+  pw_file_close (m->file);
+  *m = (pw_cli_model){ .file = NULL };
+}
+
+const char *pw_cli_short_path (const char *path, char *buffer, size_t size) {
+  size_t n = getcwd (buffer, size) ? strlen (buffer) : 0;
+  return n > 1 && strncmp (path, buffer, n) == 0 && path[n] == '/' ? path + n + 1 : path;
+}
+
+pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {
+  pw_run_defaults d = table->run;
+  if (d.t_end == 0) d.t_end = 10;
+  if (d.step == 0) d.step = 1e-3;
+  if (d.method == NULL) d.method = "rk4+projection";
+  return d;
+}
+
+/* ---- The end ---- */
+
+int pw_cli_end (const pw_error *error) {
+  if (error->status == PW_OK) return 0;
+  fflush (stdout);
+  fprintf (stderr, "pinwheel: %s\n", error->text);
+  return -error->status;
+}

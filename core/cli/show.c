@@ -1,0 +1,158 @@
+/* pinwheel show: what a model is made of. */
+#include <stdio.h>
+#include <string.h>
+#include "cli.h"
+#include "model.h"
+#include "system.h"
+
+enum { SHOW_DIGITS = 6 };
+
+static void show_number (double value) {
+  char text[32];
+  fputs (pw_format (text, value, SHOW_DIGITS), stdout);
+}
+
+/* "(1, 2, 3)", padded to a column. */
+static void show_tuple (const double *value, int count, int width) {
+  char text[200] = "(", number[32];
+  for (int i = 0; i < count; i++) {
+    size_t used = strlen (text);
+    snprintf (text + used, sizeof text - used, "%s%s", i ? ", " : "", pw_format (number, value[i], SHOW_DIGITS));
+  }
+  printf ("%s)%*s", text, width > (int)strlen (text) ? width - (int)strlen (text) : 0, "");
+}
+
+/* ---- Bodies ---- */
+
+static void show_bodies (const pw_cli_model *m) {
+  const pw_system *s = m->system;
+  char mass[32], inertia[32];
+  printf ("\nBodies\n  %-12s %-10s %-18s %-26s %s\n", "", "mass [kg]", "inertia [kg m^2]",
+          "start (x, y [m], phi [rad])", "rate (vx, vy [m/s], omega [rad/s])");
+  for (int b = 0; b < s->bodies; b++) {
+    printf ("  %-12s %-10s %-18s ", s->body_name[b], pw_format (mass, s->mass[3 * b], SHOW_DIGITS),
+            pw_format (inertia, s->mass[3 * b + 2], SHOW_DIGITS));
+    show_tuple (s->q0 + 3 * b, 3, 26);
+    putchar (' ');
+    show_tuple (s->v0 + 3 * b, 3, 0);
+    putchar ('\n');
+  }
+}
+
+/* ---- Elements ---- */
+
+static void show_signal (const pw_signal *s) {
+  if (s->type == PW_FUNCTION) {
+    printf ("a function of time");
+    for (const char *const *r = s->function.reads; r && *r; r++) printf (", %s", *r);
+    return;
+  }
+  if (s->type == PW_CONSTANT) {
+    show_number (s->constant);
+    return;
+  }
+  if (s->harmonic.offset != 0) show_number (s->harmonic.offset), printf (" + ");
+  show_number (s->harmonic.amplitude);
+  printf (" cos (");
+  show_number (s->harmonic.omega);
+  printf (" t");
+  if (s->harmonic.phase != 0) printf (" + "), show_number (s->harmonic.phase);
+  printf (")");
+}
+
+static void show_value (const pw_field *f, const char *at) {
+  const void *p = at;
+  if (f->type == PW_NUMBER) show_number (*(const double *)p);
+  if (f->type == PW_POINT || f->type == PW_VECTOR) show_tuple (p, 2, 0);
+  if (f->type == PW_BODY) printf ("%s", *(const char *const *)p);
+  if (f->type == PW_SIGNAL) show_signal (p);
+  if (f->type == PW_CHOICE) printf ("%s", f->choices[*(const int *)p]);
+}
+
+static void show_element (const pw_element *e) {
+  static const size_t size[] = { sizeof (double),       2 * sizeof (double), 2 * sizeof (double),
+                                 sizeof (const char *), sizeof (pw_signal),  sizeof (int) };
+  printf ("  %s %s: ", e->kind->name, pw_element_name (e));
+  for (const pw_field *f = e->kind->fields; f->name; f++) {
+    printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
+    for (int i = 0; i < pw_field_count (f); i++) {
+      if (i) printf (", ");
+      show_value (f, (const char *)e->definition + f->offset + (size_t)i * size[f->type]);
+    }
+    if (f->unit) printf (" %s", f->unit);
+  }
+  putchar ('\n');
+}
+
+/* ---- Parameters and the rest ---- */
+
+static void show_parameters (const pw_model *m) {
+  static const char *const domain[] = { "", ">= 0", "> 0", "1, 2, ..." };
+  const pw_parameter *p = m->table->parameters;
+  if (p == NULL || p->name == NULL) return;
+  puts ("\nParameters, changed with --set NAME=VALUE");
+  for (; p->name; p++) {
+    double value;
+    char text[32], with_unit[64];
+    memcpy (&value, m->parameters + p->offset, sizeof value);
+    snprintf (with_unit, sizeof with_unit, "%s %s", pw_format (text, value, SHOW_DIGITS), p->unit ? p->unit : "");
+    printf ("  %-12s %-18s %-10s %s", p->name, with_unit, domain[p->domain], p->about ? p->about : "");
+    if (value != p->value) printf (" (default %s)", pw_format (text, p->value, SHOW_DIGITS));
+    putchar ('\n');
+  }
+}
+
+static void show_defaults (const pw_plugin_table *table) {
+  pw_run_defaults d = pw_cli_defaults (table);
+  printf ("\nRuns by default for ");
+  show_number (d.t_end);
+  printf (" s with %s, --step ", d.method);
+  show_number (d.step);
+  if (d.rtol != 0) printf (", --rtol "), show_number (d.rtol);
+  putchar ('\n');
+}
+
+static void show_sizes (const pw_system *s) {
+  printf ("\nSizes: %d bodies, %d coordinates, %d constraint rows (%d on positions, %d on velocities)\n", s->bodies,
+          s->coords, s->rows, s->holonomic, s->rows - s->holonomic);
+}
+
+static void show_model (const pw_cli_model *m) {
+  char folder[1000];
+  const pw_model *d = m->model;
+  printf ("%s: %s\n%s\n", d->name, d->table->about ? d->table->about : "",
+          pw_cli_short_path (pw_file_path (m->file), folder, sizeof folder));
+  show_bodies (m);
+  if (d->elements) puts ("\nElements");
+  for (int i = 0; i < d->elements; i++) show_element (&d->element[i]);
+  show_parameters (d);
+  show_defaults (d->table);
+  show_sizes (m->system);
+}
+
+int pw_cli_show (int argc, const char **argv) {
+  int matrices = 0;
+  const char **sets = NULL, **starts = NULL;
+  char *at = NULL;
+  double t = 0;
+  const struct poptOption options[] = {
+    { "matrices", 0, POPT_ARG_NONE, &matrices, 0, "Show M, J and gamma at the start instead", NULL },
+    { "at", 0, POPT_ARG_STRING, &at, 0, "The same at time T, after a run by the model's default method", "T" },
+    PW_CLI_MODEL_OPTIONS (&sets, &starts),
+    POPT_TABLEEND
+  };
+  pw_error error = { 0 };
+  pw_cli_line l;
+  pw_cli_model m = { .file = NULL };
+  if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
+      pw_cli_number ("--at", at, PW_NONNEGATIVE, &t, &error) == PW_OK &&
+      pw_cli_open (&m, l.argument[0], sets, starts, &error) == PW_OK) {
+    if (matrices || at)
+      pw_cli_matrices (&m, t, &error);
+    else
+      show_model (&m);
+  }
+  pw_cli_close_model (&m);
+  pw_cli_close (&l);
+  return pw_cli_end (&error);
+}
