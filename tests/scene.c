@@ -1,0 +1,41 @@
+#include <stdarg.h>
+#include "check.h"
+#include "scene.h"
+
+/* The model file itself, under another name than that of a plug-in's table. */
+#define pw_plugin scene_ezyroller
+#include "../models/ezyroller.c"
+
+static pw_model *scene_build (const pw_plugin_table *table, va_list sets) {
+  pw_error error = { 0 };
+  pw_model *m = pw_model_new (table == &scene_ezyroller ? "ezyroller" : "scene", table, &error);
+  check_ok (m ? PW_OK : error.status, &error);
+  for (const char *name = va_arg (sets, const char *); name; name = va_arg (sets, const char *))
+    check_ok (pw_set (m, name, va_arg (sets, double), &error), &error);
+  check_ok (pw_build (m, &error), &error);
+  return m;
+}
+
+pw_model *scene_model (const pw_plugin_table *table, ...) {
+  va_list sets;
+  va_start (sets, table);
+  pw_model *m = scene_build (table, sets);
+  va_end (sets);
+  return m;
+}
+
+pw_system *scene_compile (pw_model *m) {
+  pw_error error = { 0 };
+  pw_system *s = pw_compile (m, &error);
+  check_ok (s ? PW_OK : error.status, &error);
+  pw_model_free (m);
+  return s;
+}
+
+pw_system *scene_system (const pw_plugin_table *table, ...) {
+  va_list sets;
+  va_start (sets, table);
+  pw_model *m = scene_build (table, sets);
+  va_end (sets);
+  return scene_compile (m);
+}

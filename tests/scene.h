@@ -1,0 +1,20 @@
+/* Scenes the tests share. */
+#ifndef SCENE_H
+#define SCENE_H
+
+#include "pinwheel.h"
+
+/* The model of models/ezyroller.c. */
+extern const pw_plugin_table scene_ezyroller;
+
+/* A built model of a table, with parameters set: scene_model (&table, "m2", 0.1, "I2", 0.01, NULL).  Fails the test
+ * on any error. */
+pw_model *scene_model (const pw_plugin_table *table, ...);
+
+/* The same, compiled. */
+pw_system *scene_system (const pw_plugin_table *table, ...);
+
+/* Compiles a model and frees it. */
+pw_system *scene_compile (pw_model *m);
+
+#endif

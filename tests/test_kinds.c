@@ -1,0 +1,234 @@
+/* Every kind passes the self-test; and the self-test notices whatever is broken in a kind. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "probe.h"
+#include "selftest.h"
+#include "toys.h"
+
+enum { KINDS_SEEDS = 100, KINDS_FEW = 3 };
+
+static void kinds_run (const pw_kind *kind, int seeds, pw_selftest_report *report) {
+  pw_error error = { 0 };
+  *report = (pw_selftest_report){ 0 };
+  for (int seed = 1; seed <= seeds; seed++) check_ok (pw_selftest (kind, (unsigned)seed, report, &error), &error);
+}
+
+static void kinds_pass (const pw_kind *const *kinds) {
+  for (; *kinds; kinds++) {
+    pw_selftest_report report;
+    kinds_run (*kinds, KINDS_SEEDS, &report);
+    assert_true (report.checks >= 5);
+    for (int i = 0; i < report.checks; i++) {
+      const pw_selftest_check *c = &report.check[i];
+      char what[100];
+      snprintf (what, sizeof what, "%s %s", (*kinds)->name, c->name);
+      check_below (what, c->error, c->bound, c->reason);
+    }
+  }
+}
+
+static void test_built_in (void **state) {
+  (void)state;
+  kinds_pass (pw_kinds);
+}
+
+static void test_plug_in (void **state) {
+  (void)state;
+  kinds_pass (toy_kinds);
+}
+
+/* ---- Broken kinds ---- */
+
+static const struct {
+  const char *name;
+  size_t sweep;
+} kinds_sweeps[] = {
+#define KINDS_SWEEP(s) \
+  { #s, offsetof(pw_kind, s) }
+  KINDS_SWEEP (g),       KINDS_SWEEP (g_size),  KINDS_SWEEP (eta),     KINDS_SWEEP (J),       KINDS_SWEEP (gamma),
+  KINDS_SWEEP (force),   KINDS_SWEEP (force_u), KINDS_SWEEP (jw_q),    KINDS_SWEEP (jtl_q),   KINDS_SWEEP (eta_q),
+  KINDS_SWEEP (gamma_q), KINDS_SWEEP (gamma_v), KINDS_SWEEP (force_q), KINDS_SWEEP (force_v), KINDS_SWEEP (energy),
+  KINDS_SWEEP (power),   KINDS_SWEEP (loss),
+#undef KINDS_SWEEP
+};
+enum { KINDS_SWEEPS = sizeof kinds_sweeps / sizeof *kinds_sweeps };
+
+static pw_sweep **kinds_member (pw_kind *kind, size_t offset) {
+  return (pw_sweep **)(void *)((char *)kind + offset);
+}
+
+/* The sweep that kinds_multiplied stands in for, and by what it multiplies. */
+static pw_sweep *kinds_original;
+static double kinds_factor;
+
+/* Multiplies whatever the original writes; how much that is shows from what it leaves alone. */
+static void kinds_multiplied (const pw_batch *b, double *out) {
+  double values[PW_PROBE_OUT];
+  for (int i = 0; i < PW_PROBE_OUT; i++) values[i] = NAN;
+  kinds_original (b, values);
+  for (int i = 0; i < PW_PROBE_OUT && !isnan (values[i]); i++) out[i] = kinds_factor * values[i];
+}
+
+static void kinds_expect_caught (const pw_kind *kind, const char *sweep, const char *how) {
+  pw_selftest_report report;
+  kinds_run (kind, KINDS_FEW, &report);
+  if (report.failed > 0) return;
+  print_error ("the self-test did not notice: %s of %s %s\n", sweep, kind->name, how);
+  fail ();
+}
+
+/* Each sweep in turn: missing, with the wrong sign, wrong by one part in a hundred thousand. */
+static void kinds_break (const pw_kind *kind) {
+  for (int i = 0; i < KINDS_SWEEPS; i++) {
+    pw_kind broken = *kind;
+    pw_sweep **member = kinds_member (&broken, kinds_sweeps[i].sweep);
+    kinds_original = *member;
+    if (kinds_original == NULL) continue;
+    *member = NULL;
+    kinds_expect_caught (&broken, kinds_sweeps[i].name, "missing");
+    if (kinds_original == pw_by_differences) continue;
+    *member = kinds_multiplied;
+    kinds_factor = -1;
+    kinds_expect_caught (&broken, kinds_sweeps[i].name, "with the wrong sign");
+    if (strcmp (kinds_sweeps[i].name, "g_size") == 0) continue; /* it is free to be larger */
+    kinds_factor = 1 + 1e-5;
+    kinds_expect_caught (&broken, kinds_sweeps[i].name, "off by 1e-5");
+  }
+}
+
+static void test_broken (void **state) {
+  (void)state;
+  for (const pw_kind *const *k = pw_kinds; *k; k++) kinds_break (*k);
+  for (const pw_kind *const *k = toy_kinds; *k; k++) kinds_break (*k);
+}
+
+/* A sweep that looks at its first element only passes in a scene of one, and must not here. */
+static void kinds_first_only (const pw_batch *b, double *out) {
+  pw_batch one = *b;
+  one.count = 1;
+  for (int e = 0; e < b->count; e++) kinds_original (&one, out + e * 2 * b->cols);
+}
+
+static void kinds_short (const pw_batch *b, double *out) {
+  pw_batch fewer = *b;
+  fewer.count--;
+  kinds_original (&fewer, out);
+}
+
+static void kinds_long (const pw_batch *b, double *out) {
+  kinds_original (b, out);
+  out[b->count * 2 * b->cols] = 0;
+}
+
+static void test_sizes (void **state) {
+  static pw_sweep *const wrong[] = { kinds_first_only, kinds_short, kinds_long };
+  (void)state;
+  kinds_original = pw_kind_pin.J;
+  for (int i = 0; i < 3; i++) {
+    pw_kind broken = pw_kind_pin;
+    broken.J = wrong[i];
+    kinds_expect_caught (&broken, "J", "with the wrong size");
+  }
+}
+
+/* ---- Tables that do not hold together ---- */
+
+static void kinds_expect_fault (const pw_kind *kind, const char *fault) {
+  pw_selftest_report report;
+  kinds_run (kind, 1, &report);
+  assert_int_equal (report.failed, 1);
+  assert_string_equal (report.check[0].name, "table");
+  assert_string_equal (report.check[0].where, fault);
+}
+
+static const pw_field kinds_choice[] = { { .name = "mode", .offset = 8, .type = PW_CHOICE }, { .name = NULL } };
+static const pw_field kinds_typeless[] = { { .name = "mode", .offset = 8, .type = (pw_field_type)77 },
+                                           { .name = NULL } };
+
+static void test_faults (void **state) {
+  (void)state;
+#define KINDS_FAULT(member, value, text) \
+  do {                                   \
+    pw_kind broken = pw_kind_pin;        \
+    broken.member = value;               \
+    kinds_expect_fault (&broken, text);  \
+  } while (0)
+  KINDS_FAULT (name, NULL, "no name");
+  KINDS_FAULT (definition, 0, "the definition has no room for its name");
+  KINDS_FAULT (bodies, 5, "more bodies, own coordinates, rows or signals than an element may have");
+  KINDS_FAULT (bodies, 0, "neither a body nor a coordinate of its own");
+  KINDS_FAULT (level, PW_FORCE, "rows and level contradict each other");
+  KINDS_FAULT (reaction, NULL, "constraint rows without names of their reactions");
+  KINDS_FAULT (own, 1, "own coordinates without names");
+  KINDS_FAULT (prepare, NULL, "something to prepare, but no prepare function");
+  KINDS_FAULT (fields, NULL, "no table of fields");
+  KINDS_FAULT (fields, kinds_typeless, "a field's type does not exist");
+  KINDS_FAULT (definition, 16, "a field lies outside the definition");
+  KINDS_FAULT (fields, kinds_choice, "a choice without choices");
+  KINDS_FAULT (bodies, 3, "bodies is not the number of fields of type PW_BODY");
+  KINDS_FAULT (signals, 1, "signals is not the number of fields of type PW_SIGNAL");
+  KINDS_FAULT (J, pw_by_differences, "PW_BY_DIFFERENCES stands in another place than a second-order block's");
+  KINDS_FAULT (J, NULL, "constraint rows without J");
+  KINDS_FAULT (g, NULL, "holonomic rows without g");
+#undef KINDS_FAULT
+}
+
+/* ---- What the tables alone do not say ---- */
+
+/* A wheel's row is the speed of its contact point across its heading, the contact being the kind's own. */
+static void test_wheel_contact (void **state) {
+  (void)state;
+  for (uint64_t seed = 1; seed <= 20; seed++) {
+    pw_error error = { 0 };
+    pw_random random = { seed };
+    pw_system *s = pw_specimen (&pw_kind_wheel, &random, &error);
+    assert_non_null (s);
+    pw_probe x = { .kind = &pw_kind_wheel, .s = s, .k = s->slab, .elements = 3, .rows = 1, .cols = 3 };
+    double plus[9 + PW_PROBE_GUARD], minus[9], contact[9], speed[3];
+    pw_probe_aim (&x, &random);
+    pw_probe_place (&x, PW_PROBE_MOTION, PW_PROBE_H);
+    x.kind->contact (&x.k->b, plus);
+    pw_probe_place (&x, PW_PROBE_MOTION, -PW_PROBE_H);
+    x.kind->contact (&x.k->b, minus);
+    pw_probe_place (&x, PW_PROBE_MOTION, 0);
+    x.kind->contact (&x.k->b, contact);
+    x.kind->J (&x.k->b, x.k->J);
+    pw_mul_J (s, x.v, speed);
+    for (int e = 0; e < 3; e++) {
+      double vx = (plus[3 * e] - minus[3 * e]) / (2 * PW_PROBE_H),
+             vy = (plus[3 * e + 1] - minus[3 * e + 1]) / (2 * PW_PROBE_H);
+      double across = cos (contact[3 * e + 2]) * vy - sin (contact[3 * e + 2]) * vx;
+      check_close ("speed across the heading", speed[e], across, 10 * pw_probe_bound (),
+                   "central differences, terms up to 10");
+    }
+    pw_free (s);
+  }
+}
+
+/* A kind that refuses every definition its table allows says so. */
+static int kinds_refuse (const void *definition, const pw_body *const *bodies, void *element, double *own_mass,
+                         pw_error *error) {
+  (void)definition, (void)bodies, (void)element, (void)own_mass;
+  return pw_fail (error, PW_INPUT, "nothing suits me");
+}
+
+static void test_refused (void **state) {
+  (void)state;
+  pw_kind broken = pw_kind_pin;
+  broken.prepare = kinds_refuse;
+  pw_selftest_report report = { 0 };
+  pw_error error = { 0 };
+  assert_int_equal (pw_selftest (&broken, 1, &report, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model pin: pin e0: nothing suits me");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_built_in), cmocka_unit_test (test_plug_in), cmocka_unit_test (test_broken),
+    cmocka_unit_test (test_sizes),    cmocka_unit_test (test_faults),  cmocka_unit_test (test_wheel_contact),
+    cmocka_unit_test (test_refused),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

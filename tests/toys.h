@@ -1,0 +1,38 @@
+/* Kinds of the tests' own: they use what the built-in ones do not, and are what a plug-in's kind looks like. */
+#ifndef TOYS_H
+#define TOYS_H
+
+#include "pinwheel.h"
+
+/* A spring with a damper between a point of body 1 and a point of body 2: energy and loss. */
+typedef struct {
+  const char *name;
+  const char *body[2];
+  double at[2][2];  /* [m] */
+  double stiffness; /* [N/m] */
+  double length;    /* at rest [m] */
+  double damping;   /* [N s/m] */
+} toy_spring;
+
+/* The angle between two bodies follows a signal: a holonomic row that moves with time. */
+typedef struct {
+  const char *name;
+  const char *body[2];
+  pw_signal angle; /* phi1 - phi2 [rad] */
+} toy_drive;
+
+/* A wheel that rolls without slip and owns its spin angle. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];   /* contact point [m] */
+  double radius;  /* [m] */
+  double inertia; /* about its axle [kg m^2] */
+} toy_roller;
+
+extern const pw_kind toy_kind_spring, toy_kind_drive, toy_kind_roller;
+
+/* All of them, ended by NULL. */
+extern const pw_kind *const toy_kinds[];
+
+#endif
