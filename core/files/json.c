@@ -17,40 +17,53 @@ typedef struct {
 
 /* ---- Scalars ---- */
 
-/* Decodes one character of UTF-8; a byte that belongs to none becomes U+FFFD, the replacement character. */
-static unsigned json_decode (const unsigned char **text) {
+/* The bytes of the UTF-8 character at p; 0 if there is none. */
+static int json_character (const unsigned char *p) {
   static const unsigned least[] = { 0, 0x80, 0x800, 0x10000 };
-  const unsigned char *p = *text;
   int more = p[0] < 0x80 ? 0 : p[0] >> 5 == 6 ? 1 : p[0] >> 4 == 14 ? 2 : p[0] >> 3 == 30 ? 3 : -1;
-  *text = p + 1;
-  if (more < 0) return 0xFFFD;
+  if (more < 0) return 0;
   unsigned c = more ? p[0] & (0x3Fu >> more) : p[0];
   for (int i = 1; i <= more; i++) {
-    if (p[i] >> 6 != 2) return 0xFFFD;
+    if (p[i] >> 6 != 2) return 0;
     c = c << 6 | (p[i] & 0x3Fu);
   }
-  if (c < least[more] || c > 0x10FFFF || (c >= 0xD800 && c < 0xE000)) return 0xFFFD;
-  *text = p + more + 1;
-  return c;
+  return c < least[more] || c > 0x10FFFF || (c >= 0xD800 && c < 0xE000) ? 0 : more + 1;
 }
 
-/* A text as a quoted scalar of YAML, in which everything but plain ASCII is escaped; libfyaml turns that into JSON. */
-static struct fy_node *json_text (json *j, const char *text) {
-  const unsigned char *p = (const unsigned char *)text;
-  char *quoted = malloc (10 * strlen (text) + 3), *to = quoted;
-  if (quoted == NULL) return NULL;
-  *to++ = '"';
-  while (*p) {
-    unsigned c = json_decode (&p);
-    if (c >= ' ' && c < 0x7F && c != '"' && c != '\\')
-      *to++ = (char)c;
-    else
-      to += sprintf (to, c > 0xFFFF ? "\\U%08X" : "\\u%04X", c);
+/* A malloced copy in which bytes that are no UTF-8 have become U+FFFD, the replacement character. */
+static char *json_clean (const char *text) {
+  char *clean = malloc (3 * strlen (text) + 1), *to = clean;
+  if (clean == NULL) return NULL;
+  while (*text) {
+    int n = json_character ((const unsigned char *)text);
+    memcpy (to, n ? text : "\xEF\xBF\xBD", (size_t)(n ? n : 3));
+    to += n ? n : 3;
+    text += n ? n : 1;
   }
-  *to++ = '"';
-  struct fy_node *node = fy_node_build_from_string (j->document, quoted, (size_t)(to - quoted));
-  free (quoted);
-  return node;
+  *to = 0;
+  return clean;
+}
+
+static int json_literal (const char *text) {
+  size_t n = strlen (text);
+  return (n > 0 && strspn (text, "+-.0123456789eE") == n) || strcmp (text, "null") == 0 || strcmp (text, "true") == 0 ||
+         strcmp (text, "false") == 0;
+}
+
+/* libfyaml quotes and escapes a scalar unless it reads as a number, null, true or false: such a text goes in quoted. */
+static struct fy_node *json_text (json *j, const char *text) {
+  char *copy = json_clean (text);
+  if (copy == NULL) return NULL;
+  if (!json_literal (text)) {
+    struct fy_node *node = fy_node_create_scalar_copy (j->document, copy, FY_NT);
+    free (copy);
+    return node;
+  }
+  size_t size = strlen (copy) + 3;
+  char *quoted = malloc (size);
+  if (quoted) snprintf (quoted, size, "\"%s\"", copy);
+  free (copy);
+  return quoted ? fy_node_build_from_malloc_string (j->document, quoted, size - 1) : NULL; /* the document keeps it */
 }
 
 static struct fy_node *json_plain (json *j, const char *text) {
