@@ -16,6 +16,7 @@ extern "C" {
 #endif
 
 typedef struct pw_run pw_run;
+typedef struct pw_method_data pw_method_data; /* what an integrator keeps; each defines its own */
 
 /* An option of a method; a number, or one of some choices. */
 typedef struct {

@@ -1,0 +1,55 @@
+/* Accelerations and multipliers, with Baumgarte's terms if asked for.
+ *
+ *   J a = gamma - 2 alpha (J v - eta) - beta^2 g     for holonomic rows
+ *   J a = gamma - alpha (J v - eta)                  for nonholonomic ones
+ *
+ * (Baumgarte 1972, Stabilization of constraints and integrals of motion in dynamical systems.) */
+#include <math.h>
+#include "method.h"
+
+static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
+  pw_system *s = r->s;
+  double *jv = r->scratch + s->coords + 3 + s->rows, *other = jv + s->rows;
+  pw_mul_J (s, v, jv);
+  pw_sweep_eta (s, other);
+  for (int i = 0; i < s->rows; i++) gamma[i] -= (i < s->holonomic ? 2 : 1) * r->alpha * (jv[i] - other[i]);
+  pw_sweep_g (s, other);
+  for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * other[i];
+}
+
+void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda) {
+  double *f = r->scratch, *gamma = f + r->s->coords + 3;
+  pw_sweep_gamma (r->s, gamma);
+  if (r->alpha != 0 || r->beta != 0) dynamics_stabilise (r, v, gamma);
+  pw_sweep_force (r->s, f);
+  pw_saddle_solve (r->saddle, f, gamma, a, lambda);
+  r->statistics.rhs++;
+}
+
+int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
+  int status = pw_place (r->s, t, q, v);
+  if (status != PW_OK) return status;
+  pw_sweep_J (r->s);
+  status = pw_saddle_factor (r->saddle);
+  r->statistics.factorisations++;
+  if (status == PW_OK) pw_accelerate_placed (r, v, a, lambda);
+  return status;
+}
+
+int pw_fail_singular (pw_run *r, double t, pw_error *error) {
+  char element[120] = "the constraints";
+  int row;
+  pw_saddle_pivot (r->saddle, &row);
+  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: singular pose: %s says what other constraints say already", t, element);
+}
+
+void pw_note_residuals (pw_run *r) {
+  pw_residuals now;
+  pw_statistics *s = &r->statistics;
+  pw_sweep_residuals (r->s, &now);
+  if (!(now.position <= s->position)) s->position = now.position;
+  if (!(now.velocity <= s->velocity)) s->velocity = now.velocity;
+  if (!(now.g <= s->g)) s->g = now.g;
+  if (!(now.jv <= s->jv)) s->jv = now.jv;
+}

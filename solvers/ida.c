@@ -1,0 +1,2 @@
+#include "method.h"
+const pw_method pw_method_ida = { .name = "ida", .about = "", .adaptive = 1 };

@@ -1,0 +1,90 @@
+/* A run from inside: what the integrators share.  For solvers/ only. */
+#ifndef PW_METHOD_H
+#define PW_METHOD_H
+
+#include "pinwheel-solvers.h"
+#include "saddle.h"
+#include "system.h"
+
+enum { PW_MAX_OPTIONS = 12 };
+
+struct pw_run {
+  pw_system *s;
+  const pw_method *method;
+  int stabilisation;               /* index in method->stabilisations */
+  double option[PW_MAX_OPTIONS];   /* one per method->options */
+  pw_settings settings;
+  pw_saddle *saddle;               /* with the mass matrix and all rows: accelerations, impulses */
+  double alpha, beta;              /* Baumgarte's, used by pw_accelerate; 0: none */
+  double breakpoint;               /* first discontinuity of a signal after t */
+
+  /* the state reached: always with its accelerations and multipliers */
+  double t;
+  double *q, *v, *a;  /* coords + 3 each */
+  double *lambda;     /* rows */
+  double *ledger;     /* entries: work and losses up to t */
+  double *rate;       /* entries: their rates at t */
+  double projected;   /* energy added by projections up to t */
+
+  /* the state asked for by pw_at */
+  double t_at;
+  double *q_at, *v_at, *a_at, *lambda_at, *ledger_at;
+  double projected_at;
+
+  double energy0;     /* kinetic + potential at the start */
+  double *scratch;    /* 2 (coords + 3) + 3 rows */
+  double *q_given, *v_given;
+  pw_start_report start;
+  pw_statistics statistics;
+  pw_method_data *data; /* the integrator's own */
+  char *memory;
+};
+
+/* Value of an option by name; it must exist. */
+double pw_option_value (const pw_run *r, const char *name);
+/* 1 if the run's stabilisation has this name. */
+int pw_stabilised_by (const pw_run *r, const char *name);
+
+/* ---- Dynamics ---- */
+
+/* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the run has them; J stays swept and the saddle
+ * factorised.  PW_RETRY in a singular pose; PW_METHOD if a signal failed. */
+int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
+
+/* The same where J is swept and the saddle factorised at this pose, and the rates are placed. */
+void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda);
+
+/* Says which constraints an evaluation could not tell apart, and when. */
+int pw_fail_singular (pw_run *r, double t, pw_error *error);
+
+/* Takes the residuals of the state just accelerated into the statistics. */
+void pw_note_residuals (pw_run *r);
+
+/* ---- Projection ---- */
+
+typedef struct {
+  pw_saddle *position;  /* metric of the positions, holonomic rows */
+  pw_saddle *velocity;  /* all rows */
+  int own_velocity;     /* velocity is not the run's saddle */
+  double *scratch;      /* 3 rows + coords */
+  int iterations;       /* of the last position projection */
+} pw_projector;
+
+/* Position metric `weight_q` and velocity metric `weight_v` (NULL: the run's own saddle with the mass matrix).  The
+ * system must be placed at a typical pose with J swept. */
+int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error);
+void pw_projector_close (pw_projector *p);
+
+/* Gauss-Newton on g(q) = 0 to round-off: minimal changes in the metric.  Leaves the system placed at (t, q, v) with J
+ * swept.  PW_RETRY if it does not converge; *row then tells the worst constraint and *worst its residual. */
+int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst);
+
+/* One linear solve for J v = eta at the placed pose; the rates are placed.  PW_RETRY if singular. */
+int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
+
+/* ---- Start ---- */
+
+/* Makes r->q, r->v consistent at r->t and fills the report.  Errors: PW_START. */
+int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error);
+
+#endif

@@ -1,0 +1,148 @@
+/* The table of integrators, and method names: integrator[+stabilisation][:option=value]... */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "method.h"
+#include "methods.h"
+#include "util.h"
+
+#define PW_METHOD(m) extern const pw_method pw_method_##m;
+PW_METHODS
+#undef PW_METHOD
+
+const pw_method *const pw_methods[] = {
+#define PW_METHOD(m) &pw_method_##m,
+  PW_METHODS
+#undef PW_METHOD
+  NULL
+};
+
+/* One part of the name: up to a + or :. */
+static int methods_part (char *part, size_t size, const char **text, const char *whole, pw_error *error) {
+  size_t n = strcspn (*text, "+:");
+  if (n >= size) return pw_fail (error, PW_INPUT, "method \"%.80s\": a name is too long", whole);
+  memcpy (part, *text, n);
+  part[n] = 0;
+  *text += n;
+  return PW_OK;
+}
+
+static int methods_integrator (const char *name, const pw_method **method, pw_error *error) {
+  pw_nearest near = { .sought = name };
+  char hint[100];
+  for (int i = 0; pw_methods[i]; i++) {
+    pw_nearest_try (&near, pw_methods[i]->name);
+    if (strcmp (pw_methods[i]->name, name) == 0) {
+      *method = pw_methods[i];
+      return PW_OK;
+    }
+  }
+  return pw_fail (error, PW_INPUT, "there is no integrator \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+}
+
+static int methods_stabilisation (const pw_method *method, const char *name, int *stabilisation, pw_error *error) {
+  pw_nearest near = { .sought = name };
+  char hint[100];
+  for (int i = 0; method->stabilisations[i].name; i++) {
+    pw_nearest_try (&near, method->stabilisations[i].name);
+    if (strcmp (method->stabilisations[i].name, name) == 0) {
+      *stabilisation = i;
+      return PW_OK;
+    }
+  }
+  return pw_fail (error, PW_INPUT, "integrator %s has no stabilisation \"%s\"%s", method->name, name,
+                  pw_nearest_text (&near, hint, sizeof hint));
+}
+
+static int methods_choice (const pw_option *o, const char *text, double *value, pw_error *error) {
+  pw_nearest near = { .sought = text };
+  char hint[100];
+  for (int i = 0; o->choices[i]; i++) {
+    pw_nearest_try (&near, o->choices[i]);
+    if (strcmp (o->choices[i], text) == 0) {
+      *value = i;
+      return PW_OK;
+    }
+  }
+  return pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, text, pw_nearest_text (&near, hint, sizeof hint));
+}
+
+/* Decimal numbers without regard to the locale: digits, point, exponent. */
+static int methods_number (const pw_option *o, const char *text, double *value, pw_error *error) {
+  const char *p = text;
+  double sign = *p == '-' ? -1 : 1, number = 0;
+  int digits = 0, exponent = 0, sign_e = 1, e = 0;
+  if (*p == '-' || *p == '+') p++;
+  for (; *p >= '0' && *p <= '9'; p++, digits++) number = 10 * number + (*p - '0');
+  if (*p == '.')
+    for (p++; *p >= '0' && *p <= '9'; p++, digits++, exponent--) number = 10 * number + (*p - '0');
+  if (digits && (*p == 'e' || *p == 'E')) {
+    p++;
+    if (*p == '-' || *p == '+') sign_e = *p++ == '-' ? -1 : 1;
+    for (digits = 0; *p >= '0' && *p <= '9' && e < 1000; p++, digits++) e = 10 * e + (*p - '0');
+  }
+  exponent += sign_e * e;
+  for (; exponent > 0; exponent--) number *= 10;
+  double divide = 1;
+  for (; exponent < 0; exponent++) divide *= 10;
+  *value = sign * number / divide;
+  const char *expected = digits && *p == 0 ? pw_domain_check (o->domain, *value) : "a number";
+  return *expected ? pw_fail (error, PW_INPUT, "method option %s=%s: expected %s", o->name, text, expected) : PW_OK;
+}
+
+/* An option must exist for the integrator, and for this stabilisation. */
+static int methods_option (const pw_method *method, int stabilisation, char *part, double *values, pw_error *error) {
+  char hint[100], *equals = strchr (part, '=');
+  const char *with = method->stabilisations[stabilisation].name;
+  if (equals == NULL) return pw_fail (error, PW_INPUT, "method option \"%s\": expected NAME=VALUE", part);
+  *equals = 0;
+  pw_nearest near = { .sought = part };
+  for (int i = 0; method->options[i].name; i++) {
+    const pw_option *o = &method->options[i];
+    if (o->with && strcmp (o->with, with) != 0) continue;
+    pw_nearest_try (&near, o->name);
+    if (strcmp (o->name, part) == 0)
+      return o->choices ? methods_choice (o, equals + 1, values + i, error) : methods_number (o, equals + 1, values + i, error);
+  }
+  return pw_fail (error, PW_INPUT, "method %s+%s has no option \"%s\"%s", method->name, with, part, pw_nearest_text (&near, hint, sizeof hint));
+}
+
+int pw_parse_options (const char *text, const pw_method **method, int *stabilisation, double *values, pw_error *error) {
+  char part[80];
+  const char *whole = text;
+  *stabilisation = 0;
+  if (methods_part (part, sizeof part, &text, whole, error) != PW_OK || methods_integrator (part, method, error) != PW_OK) return PW_INPUT;
+  for (int i = 0; (*method)->options[i].name; i++) values[i] = (*method)->options[i].value;
+  if (*text == '+') {
+    text++;
+    if (methods_part (part, sizeof part, &text, whole, error) != PW_OK ||
+        methods_stabilisation (*method, part, stabilisation, error) != PW_OK)
+      return PW_INPUT;
+  }
+  while (*text == ':') {
+    text++;
+    size_t n = strcspn (text, ":");
+    if (n >= sizeof part) return pw_fail (error, PW_INPUT, "method \"%.80s\": an option is too long", whole);
+    memcpy (part, text, n);
+    part[n] = 0;
+    text += n;
+    if (methods_option (*method, *stabilisation, part, values, error) != PW_OK) return PW_INPUT;
+  }
+  if (*text) return pw_fail (error, PW_INPUT, "method \"%.80s\": expected INTEGRATOR+STABILISATION:OPTION=VALUE", whole);
+  return PW_OK;
+}
+
+int pw_parse_method (const char *text, const pw_method **method, int *stabilisation, pw_error *error) {
+  double values[PW_MAX_OPTIONS];
+  return pw_parse_options (text, method, stabilisation, values, error);
+}
+
+double pw_option_value (const pw_run *r, const char *name) {
+  int i = 0;
+  while (strcmp (r->method->options[i].name, name) != 0) i++;
+  return r->option[i];
+}
+
+int pw_stabilised_by (const pw_run *r, const char *name) {
+  return strcmp (r->method->stabilisations[r->stabilisation].name, name) == 0;
+}

@@ -1,0 +1,14 @@
+/* The list of integrators: the one line to add for a new file in solvers/. */
+#ifndef PW_METHODS_H
+#define PW_METHODS_H
+
+#include "pinwheel-solvers.h"
+
+#define PW_METHODS                                                                                                     \
+  PW_METHOD (rk4)                                                                                                      \
+  PW_METHOD (ida)
+
+/* pw_parse_method that keeps the options: values has room for PW_MAX_OPTIONS. */
+int pw_parse_options (const char *text, const pw_method **method, int *stabilisation, double *values, pw_error *error);
+
+#endif

@@ -1,0 +1,81 @@
+/* Coordinate projection: the nearest positions with g = 0, the nearest rates with J v = eta.
+ *
+ *   [ W G^T ] [ dq ]   [  0 ]          [ W J^T ] [ dv ]   [     0     ]
+ *   [ G  0  ] [ mu ] = [ -g ]          [ J  0  ] [ mu ] = [ eta - J v ]
+ *
+ * (Lubich 1991, Extrapolation integrators for constrained multibody systems; Eich 1993, Convergence results for a
+ * coordinate projection method applied to mechanical systems with algebraic constraints.) */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include "method.h"
+
+int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error) {
+  pw_system *s = r->s;
+  *p = (pw_projector){ .own_velocity = weight_v != NULL, .velocity = r->saddle };
+  p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
+  if (p->scratch == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  p->position = pw_saddle_open (s, weight_q, s->holonomic, NULL, error);
+  if (p->own_velocity) p->velocity = pw_saddle_open (s, weight_v, s->rows, NULL, error);
+  if (p->position && p->velocity) return PW_OK;
+  pw_projector_close (p);
+  return PW_MACHINE;
+}
+
+void pw_projector_close (pw_projector *p) {
+  pw_saddle_close (p->position);
+  if (p->own_velocity) pw_saddle_close (p->velocity);
+  free (p->scratch);
+  *p = (pw_projector){ 0 };
+}
+
+/* The worst scaled residual of g at the placed pose. */
+static double project_worst (pw_system *s, double *g, double *size, int *row) {
+  double worst = 0;
+  pw_sweep_g (s, g);
+  pw_sweep_g_size (s, size);
+  for (int i = 0; i < s->holonomic; i++) {
+    double scaled = fabs (g[i]) / size[i];
+    if (!(scaled <= worst)) worst = scaled, *row = i;
+  }
+  return worst;
+}
+
+int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {
+  const double good = 4 * DBL_EPSILON, enough = 64 * DBL_EPSILON; /* round-off of a row's few terms */
+  const int most = 30;
+  pw_system *s = r->s;
+  double *g = p->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
+  for (p->iterations = 0;; p->iterations++) {
+    int status = pw_place (s, t, q, v);
+    if (status != PW_OK) return status;
+    *row = -1;
+    *worst = project_worst (s, g, size, row);
+    int stalled = *worst > before / 4;
+    if (*worst <= good || (stalled && *worst <= enough)) break;
+    if (p->iterations >= most || !isfinite (*worst)) return PW_RETRY;
+    before = *worst;
+    pw_sweep_J (s);
+    r->statistics.factorisations++;
+    if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;
+    for (int i = 0; i < s->holonomic; i++) g[i] = -g[i];
+    pw_saddle_solve (p->position, NULL, g, dq, mu);
+    for (int j = 0; j < s->coords; j++) q[j] += dq[j];
+  }
+  pw_sweep_J (s);
+  return PW_OK;
+}
+
+int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
+  pw_system *s = r->s;
+  double *right = p->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
+  r->statistics.factorisations++;
+  if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
+  pw_mul_J (s, v, right);
+  pw_sweep_eta (s, eta);
+  for (int i = 0; i < s->rows; i++) right[i] = eta[i] - right[i];
+  pw_saddle_solve (p->velocity, NULL, right, dv, mu);
+  for (int j = 0; j < s->coords; j++) v[j] += dv[j];
+  pw_place_rates (s, v);
+  return PW_OK;
+}

@@ -1,0 +1,291 @@
+/* Explicit Runge-Kutta on q' = v, v' = a(t, q, v).
+ *
+ *   q_i = q + h sum_j A_ij v_j,   v_i = v + h sum_j A_ij a_j,   j < i;   new: with b in place of A
+ *
+ * The ledger's rates are carried through the same stages.  After each step the state may be projected; its
+ * accelerations are evaluated at once, as the first stage of the next step, so that a run always knows them. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "rk.h"
+#include "util.h"
+
+struct pw_method_data {
+  const pw_tableau *tableau;
+  int projects, held, every; /* projection; inputs held over the step; project each so many steps */
+  pw_projector projector;
+  double base;               /* time from which fixed steps are counted */
+  long count;                /* steps since then */
+  double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES]; /* rates, accelerations, ledger's rates of the stages */
+  double *q, *v;             /* a stage's state */
+  double *lambda;
+  /* the beginning of the last step, for looking back into it */
+  double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
+  char *memory;
+};
+
+static const char *const rk_metrics[] = { "mass", "identity", NULL };
+static const char *const rk_inputs[] = { "stage", "held", NULL };
+
+const pw_stabilisation pw_rk_stabilisations[] = {
+  { "none", "accelerations only: the constraints drift" },
+  { "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)" },
+  { "projection", "coordinate projection onto positions and rates after each step (Lubich 1991, Eich 1993)" },
+  { NULL, NULL },
+};
+
+const pw_option pw_rk_options[] = {
+  { .name = "inputs", .choices = rk_inputs, .about = "signals of forces at stage times, or held from the step's start (first order)" },
+  { .name = "alpha", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", .about = "damping of the residuals" },
+  { .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", .about = "stiffness of the position residuals" },
+  { .name = "metric", .with = "projection", .choices = rk_metrics, .about = "norm in which the correction is smallest: mass matrix, or identity (pseudo-inverse)" },
+  { .name = "every", .with = "projection", .value = 1, .domain = PW_COUNT, .unit = "steps", .about = "project after each so many steps" },
+  { .name = NULL },
+};
+
+/* ---- Opening ---- */
+
+static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
+  size_t n = (size_t)s->coords + 3, entries = (size_t)s->entries;
+  pw_layout l = { NULL, 0 };
+  for (int pass = 0; pass < 2; pass++) {
+    for (int i = 0; i < d->tableau->stages; i++) {
+      d->V[i] = pw_take (&l, n, sizeof (double));
+      d->A[i] = pw_take (&l, n, sizeof (double));
+      d->R[i] = pw_take (&l, entries, sizeof (double));
+    }
+    double **const state[] = { &d->q, &d->v, &d->q0, &d->v0, &d->a0 };
+    for (size_t i = 0; i < sizeof state / sizeof *state; i++) *state[i] = pw_take (&l, n, sizeof (double));
+    d->lambda = pw_take (&l, (size_t)s->rows, sizeof (double));
+    d->ledger0 = pw_take (&l, entries, sizeof (double));
+    d->rate0 = pw_take (&l, entries, sizeof (double));
+    if (pass == 1) break;
+    d->memory = calloc (1, l.used);
+    if (d->memory == NULL) return PW_MACHINE;
+    l = (pw_layout){ d->memory, 0 };
+  }
+  return PW_OK;
+}
+
+/* The identity metric weighs metres and radians alike, as the plain pseudo-inverse does. */
+static int rk_open_projector (pw_run *r, pw_error *error) {
+  pw_system *s = r->s;
+  if (pw_option_value (r, "metric") == 0) return pw_projector_open (&r->data->projector, r, s->metric, NULL, error);
+  double *one = malloc ((size_t)s->coords * sizeof *one);
+  if (one == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  for (int j = 0; j < s->coords; j++) one[j] = 1;
+  int status = pw_projector_open (&r->data->projector, r, one, one, error);
+  free (one);
+  return status;
+}
+
+int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
+  struct pw_method_data *d = r->data = calloc (1, sizeof *d);
+  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  d->tableau = tableau;
+  d->held = pw_option_value (r, "inputs") != 0;
+  d->projects = pw_stabilised_by (r, "projection");
+  d->every = (int)pw_option_value (r, "every");
+  if (pw_stabilised_by (r, "baumgarte")) {
+    r->alpha = pw_option_value (r, "alpha");
+    r->beta = pw_option_value (r, "beta");
+  }
+  if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  int status = d->projects ? rk_open_projector (r, error) : PW_OK;
+  return status == PW_OK ? pw_rk_restart (r, error) : status;
+}
+
+void pw_rk_close (pw_run *r) {
+  pw_projector_close (&r->data->projector);
+  free (r->data->memory);
+  free (r->data);
+}
+
+int pw_rk_restart (pw_run *r, pw_error *error) {
+  struct pw_method_data *d = r->data;
+  size_t bytes = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  (void)error;
+  d->base = d->t0 = r->t;
+  d->count = 0;
+  memcpy (d->q0, r->q, bytes);
+  memcpy (d->v0, r->v, bytes);
+  memcpy (d->a0, r->a, bytes);
+  memcpy (d->ledger0, r->ledger, entries);
+  memcpy (d->rate0, r->rate, entries);
+  d->projected0 = r->projected;
+  return PW_OK;
+}
+
+/* ---- A step ---- */
+
+/* out = y + h sum_j w_j K_j over the first so many stages. */
+static void rk_combine (double *out, const double *y, double *const *K, const double *w, int stages, double h, int n) {
+  int first = 0;
+  while (first < stages && w[first] == 0) first++;
+  if (first == stages) {
+    memcpy (out, y, (size_t)n * sizeof *out);
+    return;
+  }
+  const double f = h * w[first], *k = K[first];
+  for (int i = 0; i < n; i++) out[i] = y[i] + f * k[i];
+  for (int j = first + 1; j < stages; j++) {
+    if (w[j] == 0) continue;
+    const double g = h * w[j], *kj = K[j];
+    for (int i = 0; i < n; i++) out[i] += g * kj[i];
+  }
+}
+
+/* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Returns as pw_accelerate. */
+static int rk_stages (pw_run *r, double h) {
+  struct pw_method_data *d = r->data;
+  const pw_tableau *b = d->tableau;
+  pw_system *s = r->s;
+  const double *weights = b->A;
+  int n = s->coords;
+  memcpy (d->V[0], r->v, (size_t)n * sizeof (double));
+  memcpy (d->A[0], r->a, (size_t)n * sizeof (double));
+  memcpy (d->R[0], r->rate, (size_t)s->entries * sizeof (double));
+  if (d->held) pw_hold (s, 1);
+  int status = PW_OK;
+  for (int i = 1; i < b->stages && status == PW_OK; weights += i++) {
+    rk_combine (d->q, r->q, d->V, weights, i, h, n);
+    rk_combine (d->V[i], r->v, d->A, weights, i, h, n);
+    status = pw_accelerate (r, r->t + b->c[i] * h, d->q, d->V[i], d->A[i], d->lambda);
+    if (status == PW_OK && r->settings.ledger) pw_sweep_ledger (s, d->lambda, d->R[i]);
+  }
+  if (d->held) pw_hold (s, 0);
+  return status;
+}
+
+/* Projects (t, q, v); the energy this adds goes to the ledger. */
+static int rk_project (pw_run *r, double t, double *q, double *v, double *added) {
+  pw_system *s = r->s;
+  int row, status = PW_OK;
+  double worst, before = 0;
+  if (added) {
+    status = pw_place (s, t, q, v);
+    before = pw_kinetic (s, v) + pw_potential (s);
+  }
+  if (status == PW_OK) status = pw_project_positions (&r->data->projector, r, t, q, v, &row, &worst);
+  if (status == PW_OK) status = pw_project_velocities (&r->data->projector, r, v);
+  if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (s) - before;
+  return status;
+}
+
+/* Accelerations of a state that was just projected, or not. */
+static int rk_accelerate (pw_run *r, int projected, double t, const double *q, const double *v, double *a, double *lambda) {
+  if (!projected || r->data->projector.own_velocity) return pw_accelerate (r, t, q, v, a, lambda);
+  pw_accelerate_placed (r, v, a, lambda);
+  return PW_OK;
+}
+
+static int rk_finite (const pw_run *r, const double *q, const double *v) {
+  double sum = 0;
+  for (int j = 0; j < r->s->coords; j++) sum += q[j] * 0 + v[j] * 0;
+  return sum == 0;
+}
+
+/* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->A[0], d->lambda. */
+static int rk_step (pw_run *r, double h, double t1, int project, double *added) {
+  struct pw_method_data *d = r->data;
+  int n = r->s->coords, status = rk_stages (r, h);
+  if (status != PW_OK) return status;
+  rk_combine (d->q, r->q, d->V, d->tableau->b, d->tableau->stages, h, n);
+  rk_combine (d->v, r->v, d->A, d->tableau->b, d->tableau->stages, h, n);
+  if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
+  if (project) status = rk_project (r, t1, d->q, d->v, added);
+  return status == PW_OK ? rk_accelerate (r, project, t1, d->q, d->v, d->A[0], d->lambda) : status;
+}
+
+/* The step is good: it becomes the state reached. */
+static void rk_accept (pw_run *r, double h, double t1, double added) {
+  struct pw_method_data *d = r->data;
+  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries;
+  d->t0 = r->t;
+  memcpy (d->q0, r->q, n);
+  memcpy (d->v0, r->v, n);
+  memcpy (d->a0, r->a, n);
+  memcpy (r->q, d->q, n);
+  memcpy (r->v, d->v, n);
+  memcpy (r->a, d->A[0], n);
+  memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof (double));
+  r->t = t1;
+  if (r->settings.ledger) {
+    memcpy (d->ledger0, r->ledger, entries * sizeof (double));
+    memcpy (d->rate0, r->rate, entries * sizeof (double));
+    d->projected0 = r->projected;
+    rk_combine (r->ledger, d->ledger0, d->R, d->tableau->b, d->tableau->stages, h, (int)entries);
+    r->projected += added;
+    pw_sweep_ledger (r->s, r->lambda, r->rate);
+  }
+}
+
+/* The time of the next step's end: a multiple of the step from the base, t_end or a breakpoint, whichever is first. */
+static double rk_next_time (const pw_run *r, double t_end, int *whole) {
+  const struct pw_method_data *d = r->data;
+  double h = r->settings.step, t1 = d->base + (double)(d->count + 1) * h, stop = fmin (t_end, r->breakpoint);
+  *whole = t1 < stop + 1e-9 * h;
+  return t1 > stop - 1e-9 * h ? stop : t1;
+}
+
+static int rk_fail (pw_run *r, int status, double t, pw_error *error) {
+  int row;
+  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  if (pw_saddle_pivot (r->saddle, &row) < 1e-13) return pw_fail_singular (r, t, error);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: the %s", t, r->settings.step,
+                  rk_finite (r, r->data->q, r->data->v) ? "projection does not converge" : "state is no longer finite");
+}
+
+int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
+  struct pw_method_data *d = r->data;
+  int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
+  double t1 = rk_next_time (r, t_end, &whole), h = whole ? r->settings.step : t1 - r->t, added = 0;
+  int status = rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
+  if (status != PW_OK) return rk_fail (r, status, r->t, error);
+  rk_accept (r, h, t1, added);
+  r->statistics.steps++;
+  d->count++;
+  if (!whole) d->base = t1, d->count = 0;
+  return PW_OK;
+}
+
+/* ---- Looking into the last step ---- */
+
+/* Hermite interpolation on [t0, t0 + h] at t0 + x h: quintic in q (values, rates, accelerations), cubic in v. */
+static void rk_interpolate (const pw_run *r, double h, double x) {
+  const struct pw_method_data *d = r->data;
+  double y = 1 - x, x2 = x * x, y2 = y * y;
+  double a1 = x2 * (3 - 2 * x), b0 = h * x * y2, b1 = -h * x2 * y;
+  double A1 = x2 * x * (10 - 15 * x + 6 * x2), B0 = h * x * y2 * y * (1 + 3 * x), B1 = -h * x2 * x * y * (1 + 3 * y);
+  double C0 = h * h / 2 * x2 * y2 * y, C1 = h * h / 2 * x2 * x * y2;
+  for (int j = 0; j < r->s->coords; j++) {
+    r->q_at[j] = d->q0[j] + A1 * (r->q[j] - d->q0[j]) + B0 * d->v0[j] + B1 * r->v[j] + C0 * d->a0[j] + C1 * r->a[j];
+    r->v_at[j] = d->v0[j] + a1 * (r->v[j] - d->v0[j]) + b0 * d->a0[j] + b1 * r->a[j];
+  }
+  for (int i = 0; r->settings.ledger && i < r->s->entries; i++)
+    r->ledger_at[i] = d->ledger0[i] + a1 * (r->ledger[i] - d->ledger0[i]) + b0 * d->rate0[i] + b1 * r->rate[i];
+}
+
+int pw_rk_at (pw_run *r, double t, pw_error *error) {
+  struct pw_method_data *d = r->data;
+  size_t n = (size_t)r->s->coords * sizeof (double);
+  if (t > r->t || t < d->t0) return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, d->t0, r->t);
+  if (t == r->t) {
+    memcpy (r->q_at, r->q, n);
+    memcpy (r->v_at, r->v, n);
+    memcpy (r->a_at, r->a, n);
+    memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
+    memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
+    r->projected_at = r->projected;
+    if (pw_place (r->s, t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
+    return PW_OK;
+  }
+  pw_statistics keep = r->statistics;
+  double x = (t - d->t0) / (r->t - d->t0), added = 0;
+  rk_interpolate (r, r->t - d->t0, x);
+  r->projected_at = d->projected0 + x * (r->projected - d->projected0);
+  int status = d->projects ? rk_project (r, t, r->q_at, r->v_at, &added) : PW_OK;
+  if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
+  r->statistics = keep;
+  return status == PW_OK ? PW_OK : rk_fail (r, status, t, error);
+}

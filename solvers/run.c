@@ -1,0 +1,185 @@
+/* A run: opened on a consistent start, advanced step by step, looked into, closed. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "method.h"
+#include "methods.h"
+#include "util.h"
+
+static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, pw_error *error) {
+  const struct {
+    const char *name;
+    double value;
+  } field[] = { { "step", from->step }, { "rtol", from->rtol }, { "atol", from->atol }, { "span", from->span } };
+  for (size_t i = 0; i < sizeof field / sizeof *field; i++)
+    if (!isfinite (field[i].value) || field[i].value < 0)
+      return pw_fail (error, PW_INPUT, "setting %s = %g: expected a number > 0", field[i].name, field[i].value);
+  if (!isfinite (from->t)) return pw_fail (error, PW_INPUT, "setting t = %g: expected a finite number", from->t);
+  *to = *from;
+  if (to->step == 0) to->step = 1e-3;
+  if (to->rtol == 0) to->rtol = 1e-6;
+  if (to->span == 0) to->span = method->adaptive ? 1 : 1000 * to->step;
+  return PW_OK;
+}
+
+static int run_allocate (pw_run *r) {
+  const pw_system *s = r->s;
+  size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
+  const struct {
+    double **array;
+    size_t count;
+  } array[] = {
+    { &r->q, n },         { &r->v, n },        { &r->a, n },          { &r->lambda, rows },     { &r->ledger, entries },
+    { &r->rate, entries }, { &r->q_at, n },     { &r->v_at, n },       { &r->a_at, n },          { &r->lambda_at, rows },
+    { &r->ledger_at, entries }, { &r->scratch, 2 * n + 3 * rows }, { &r->q_given, n }, { &r->v_given, n },
+  };
+  pw_layout l = { NULL, 0 };
+  for (int pass = 0; pass < 2; pass++) {
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i].array = pw_take (&l, array[i].count, sizeof (double));
+    if (pass == 1) break;
+    r->memory = calloc (1, l.used + 1);
+    if (r->memory == NULL) return PW_MACHINE;
+    l = (pw_layout){ r->memory, 0 };
+  }
+  memcpy (r->q, s->q0, (size_t)s->coords * sizeof (double));
+  memcpy (r->v, s->v0, (size_t)s->coords * sizeof (double));
+  return PW_OK;
+}
+
+/* T: the fastest of what the scene starts with, and its span. */
+static double run_time_scale (const pw_run *r) {
+  const pw_system *s = r->s;
+  double fastest = 1 / r->settings.span;
+  for (int j = 0; j < s->coords; j++) {
+    double unit = j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1;
+    fastest = fmax (fastest, fmax (fabs (r->v[j]) / unit, sqrt (fabs (r->a[j]) / unit)));
+  }
+  return 1 / fastest;
+}
+
+/* Opens the saddle at the consistent start and evaluates the accelerations there. */
+static int run_first_evaluation (pw_run *r, pw_error *error) {
+  pw_system *s = r->s;
+  r->saddle = pw_saddle_open (s, s->mass, s->rows, NULL, error);
+  if (r->saddle == NULL) return PW_INPUT;
+  int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  if (status > 0) return pw_fail_singular (r, r->t, error);
+  return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+}
+
+/* The state is consistent: energies, ledger and statistics begin here. */
+static void run_begin (pw_run *r) {
+  pw_system *s = r->s;
+  r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
+  if (r->settings.ledger) pw_sweep_ledger (s, r->lambda, r->rate);
+  r->breakpoint = pw_next_breakpoint (s, r->t);
+  pw_note_residuals (r);
+}
+
+static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
+  pw_settings none = { 0 };
+  if (pw_parse_options (method, &r->method, &r->stabilisation, r->option, error) != PW_OK) return PW_INPUT;
+  int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
+  if (status == PW_OK && run_allocate (r) != PW_OK) status = pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (status != PW_OK) return status;
+  r->t = r->t_at = r->settings.t;
+  pw_hold (r->s, 0);
+  r->s->scale.time = r->settings.span;
+  status = pw_make_consistent (r, r->s->held, error);
+  if (status == PW_OK) status = run_first_evaluation (r, error);
+  if (status != PW_OK) return status;
+  r->s->scale.time = run_time_scale (r);
+  run_begin (r);
+  return r->method->open (r, error);
+}
+
+pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
+  pw_run *r = calloc (1, sizeof *r);
+  if (r == NULL) {
+    pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+    return NULL;
+  }
+  r->s = s;
+  if (run_open (r, method, settings, error) == PW_OK) return r;
+  pw_close (r);
+  return NULL;
+}
+
+void pw_close (pw_run *r) {
+  if (r == NULL) return;
+  if (r->data) r->method->close (r);
+  pw_saddle_close (r->saddle);
+  free (r->memory);
+  free (r);
+}
+
+int pw_advance (pw_run *r, double t_end, pw_error *error) {
+  if (!(r->t < t_end)) return PW_OK;
+  int status = r->method->advance (r, t_end, error);
+  if (status != PW_OK) return status;
+  pw_note_residuals (r);
+  if (r->t >= r->breakpoint) {
+    r->breakpoint = pw_next_breakpoint (r->s, r->t);
+    return r->method->restart (r, error);
+  }
+  return PW_OK;
+}
+
+int pw_advance_to (pw_run *r, double t, double t_end, pw_error *error) {
+  while (r->t < t && r->t < t_end) {
+    int status = pw_advance (r, t_end, error);
+    if (status != PW_OK) return status;
+  }
+  return PW_OK;
+}
+
+double pw_time (const pw_run *r) {
+  return r->t;
+}
+
+/* Energies and the ledger of the state in the sample arrays, which is placed. */
+static void run_account (pw_run *r, pw_sample *sample) {
+  pw_system *s = r->s;
+  sample->kinetic = pw_kinetic (s, r->v_at);
+  sample->potential = pw_potential (s);
+  if (!r->settings.ledger) return;
+  sample->ledger = r->ledger_at;
+  for (int i = 0; i < s->entries; i++) *(s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += r->ledger_at[i];
+  sample->projection = r->projected_at;
+  sample->balance = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss - sample->projection;
+}
+
+int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
+  pw_residuals now;
+  r->t_at = t;
+  int status = r->method->at (r, t, error);
+  if (status != PW_OK) return status;
+  *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
+  run_account (r, sample);
+  pw_sweep_residuals (r->s, &now);
+  sample->position = now.position;
+  sample->velocity = now.velocity;
+  return PW_OK;
+}
+
+int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
+  size_t bytes = (size_t)r->s->coords * sizeof (double);
+  if (q) memcpy (r->q, q, bytes);
+  if (v) memcpy (r->v, v, bytes);
+  int status = pw_make_consistent (r, NULL, error);
+  if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  if (status > 0) return pw_fail_singular (r, r->t, error);
+  return status == PW_OK ? r->method->restart (r, error) : status;
+}
+
+const pw_statistics *pw_run_statistics (const pw_run *r) {
+  return &r->statistics;
+}
+
+const pw_start_report *pw_run_start (const pw_run *r) {
+  return &r->start;
+}
+
+const pw_scale *pw_run_scale (const pw_run *r) {
+  return &r->s->scale;
+}

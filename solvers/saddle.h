@@ -1,0 +1,30 @@
+/* The saddle-point system  [ W J^T ; J 0 ] (a, lambda) = (f, gamma)  of a scene, with W diagonal.
+ *
+ * W is the mass matrix for accelerations and impulses, or a metric for projections.  An entry of W may be 0 (a
+ * coordinate without mass: eliminated through a constraint row matched to it) or INFINITY (held: it does not move).
+ * Coordinates with weight are condensed out exactly; the rows left are factorised as a sparse symmetric matrix whose
+ * order and pattern are laid out once.  Nothing is allocated after opening. */
+#ifndef PW_SADDLE_H
+#define PW_SADDLE_H
+
+#include "system.h"
+
+typedef struct pw_saddle pw_saddle;
+
+/* rows: the first so many rows of J take part (all, or the holonomic ones), of these those with active[i] != 0 if
+ * active is given; the system's J must be swept at a typical pose.  weight: coords, copied.
+ * Errors: PW_MACHINE; PW_INPUT if a coordinate without weight is determined by no row. */
+pw_saddle *pw_saddle_open (pw_system *s, const double *weight, int rows, const unsigned char *active, pw_error *error);
+void pw_saddle_close (pw_saddle *k);
+
+/* Factorises with the J last swept.  Returns PW_OK, or PW_RETRY if the matrix is singular to working precision. */
+int pw_saddle_factor (pw_saddle *k);
+
+/* Solves for a (coords) and lambda (rows; inactive ones get 0).  f may be NULL: zero.  a and f may be the same. */
+void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
+
+/* The smallest pivot of the last factorisation, as the sine of the angle between a row and those before it, and that
+ * row: small near a singular pose. */
+double pw_saddle_pivot (const pw_saddle *k, int *row);
+
+#endif

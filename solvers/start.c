@@ -1,0 +1,118 @@
+/* The consistent start: positions by Gauss-Newton, then rates by one linear solve.
+ *
+ * What the user gave is held; what was not given moves as little as possible in the metric; only if that fails is
+ * everything free.  A state that is consistent to round-off is left alone, to the bit. */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "method.h"
+
+/* Where an attempt stopped. */
+typedef struct {
+  int row;
+  int rates; /* 0: positions, 1: rates */
+  double off;
+} start_trouble;
+
+/* The metric, and INFINITY for what is held; true: the mass matrix, where massless rates are determined by the rows. */
+static void start_weights (const pw_system *s, const double *metric, const unsigned char *held, double *weight) {
+  for (int j = 0; j < s->coords; j++) weight[j] = held && held[j] ? INFINITY : metric[j];
+}
+
+static int start_positions (pw_projector *p, pw_run *r, double *q, const double *v, start_trouble *trouble) {
+  int row = -1;
+  double worst;
+  int status = pw_project_positions (p, r, r->t, q, v, &row, &worst);
+  if (status == PW_OK) return PW_OK;
+  pw_system *s = r->s;
+  if (pw_place (s, r->t, q, v) == PW_OK && row >= 0) {
+    pw_sweep_g (s, p->scratch);
+    *trouble = (start_trouble){ row, 0, fabs (p->scratch[row]) };
+  }
+  return status;
+}
+
+/* Repeats the linear solve once, which removes the round-off of a large first correction. */
+static int start_rates (pw_projector *p, pw_run *r, double *v, start_trouble *trouble) {
+  pw_residuals now;
+  for (int i = 0; i < 3; i++) {
+    pw_place_rates (r->s, v);
+    pw_sweep_residuals (r->s, &now);
+    if (now.velocity <= 4 * DBL_EPSILON) return PW_OK;
+    if (i == 2) break;
+    if (pw_project_velocities (p, r, v) != PW_OK) break;
+  }
+  if (now.velocity <= 64 * DBL_EPSILON) return PW_OK;
+  *trouble = (start_trouble){ now.row_velocity, 1, now.jv };
+  return PW_RETRY;
+}
+
+/* One attempt from the given state, with some of it held.  The velocity metric is the mass matrix where that
+ * determines everything, else the position metric. */
+static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *trouble, pw_error *error) {
+  pw_system *s = r->s;
+  size_t bytes = (size_t)s->coords * sizeof (double);
+  double *weight = malloc (2 * bytes);
+  if (weight == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  memcpy (r->q, r->q_given, bytes);
+  memcpy (r->v, r->v_given, bytes);
+  start_weights (s, s->metric, held, weight);
+  int status = pw_place (s, r->t, r->q, r->v);
+  pw_sweep_J (s);
+  for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
+    pw_projector p;
+    pw_error none = { 0 };
+    start_weights (s, choice == 0 ? s->mass : s->metric, held ? held + s->coords : NULL, weight + s->coords);
+    status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
+    if (status == PW_OK) {
+      status = start_positions (&p, r, r->q, r->v, trouble);
+      if (status == PW_OK) status = start_rates (&p, r, r->v, trouble);
+      pw_projector_close (&p);
+      if (status != PW_RETRY || !trouble->rates) break;
+    }
+    if (choice == 0) status = PW_OK;
+  }
+  free (weight);
+  return status;
+}
+
+static int start_fail (pw_run *r, const start_trouble *trouble, pw_error *error) {
+  char element[120];
+  if (trouble->row < 0) return pw_fail (error, PW_START, "model %s: the start cannot be made consistent", r->s->model);
+  pw_row_element (r->s, trouble->row, element, sizeof element);
+  return pw_fail (error, PW_START, "model %s: the start cannot be made consistent: %s is %s by %.6g %s", r->s->model, element,
+                  trouble->rates ? "violated" : "open", trouble->off, trouble->rates ? "m/s (or rad/s)" : "m (or rad)");
+}
+
+/* Fills the report; the state given is in q_given, the new one in q. */
+static void start_report (pw_run *r, int freed, const pw_residuals *before) {
+  pw_start_report *report = &r->start;
+  *report = (pw_start_report){ .q_given = r->q_given, .v_given = r->v_given, .q = r->q, .v = r->v, .freed = freed,
+                               .position = before->position, .velocity = before->velocity };
+  for (int j = 0; j < r->s->coords; j++) report->moved += (r->q[j] != r->q_given[j]) + (r->v[j] != r->v_given[j]);
+}
+
+int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
+  pw_system *s = r->s;
+  size_t bytes = (size_t)s->coords * sizeof (double);
+  pw_residuals before;
+  start_trouble trouble = { .row = -1 };
+  int any = 0, freed = 0;
+  memcpy (r->q_given, r->q, bytes);
+  memcpy (r->v_given, r->v, bytes);
+  int status = pw_place (s, r->t, r->q, r->v);
+  if (status != PW_OK) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  pw_sweep_J (s);
+  pw_sweep_residuals (s, &before);
+  for (int j = 0; held && j < 2 * s->coords; j++) any |= held[j];
+  if (before.position > 8 * DBL_EPSILON || before.velocity > 8 * DBL_EPSILON) {
+    status = start_attempt (r, any ? held : NULL, &trouble, error);
+    if (status == PW_RETRY && any) {
+      freed = 1;
+      status = start_attempt (r, NULL, &trouble, error);
+    }
+  }
+  start_report (r, freed, &before);
+  return status == PW_RETRY ? start_fail (r, &trouble, error) : status;
+}
