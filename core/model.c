@@ -51,6 +51,7 @@ int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
       const char *expected = pw_domain_check (p->domain, value);
       if (*expected)
         return pw_fail (error, PW_INPUT, "model %s: parameter %s = %.17g: expected %s", m->name, parameter, value, expected);
+      if (m->built) return pw_fail (error, PW_INPUT, "model %s: parameter %s: pw_set after pw_build", m->name, parameter);
       memcpy (m->parameters + p->offset, &value, sizeof value);
       return PW_OK;
     }
@@ -62,6 +63,7 @@ int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
 }
 
 int pw_build (pw_model *m, pw_error *error) {
+  if (m->built) return pw_fail (error, PW_INPUT, "model %s: pw_build for the second time", m->name);
   m->table->build (m, m->parameters);
   m->built = 1;
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);

@@ -1,0 +1,425 @@
+/* The description: what a model may say, and what it is told when it says something else.
+ *
+ * Every message of the core is provoked here, save "out of memory" (test_alloc.c) and "too large". */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "scene.h"
+#include "system.h"
+#include "toys.h"
+
+/* ---- A model with parameters of all domains ---- */
+
+typedef struct {
+  double length, mass, ratio, links;
+} description_parameters;
+
+static const pw_parameter description_list[] = {
+  { PW_AT (description_parameters, length), 2, "m", "any", PW_REAL },
+  { PW_AT (description_parameters, mass), 3, "kg", "of the frame", PW_POSITIVE },
+  { PW_AT (description_parameters, ratio), 0, "", "of something", PW_NONNEGATIVE },
+  { PW_AT (description_parameters, links), 1, "", "how many", PW_COUNT },
+  { .name = NULL },
+};
+
+static void description_build (pw_model *m, const void *parameters) {
+  const description_parameters *p = parameters;
+  if (p->links > 5) pw_refuse (m, "links = %g: at most %d", p->links, 5);
+  pw_add_body (
+      m,
+      &(pw_body){ .name = "frame", .mass = p->mass, .inertia = 1, .start = { p->length, 1, 2 }, .rate = { 3, 4, 5 } });
+  pw_add_body (m, &(pw_body){ .name = "steer", .mass = 1, .inertia = 1 });
+}
+
+static const pw_plugin_table description_table = {
+  .abi = PW_ABI,
+  .size = sizeof description_table,
+  .parameters = description_list,
+  .parameters_size = sizeof (description_parameters),
+  .build = description_build,
+};
+
+static void test_parameters (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&description_table, NULL);
+  assert_true (s->q0[0] == 2 && s->mass[0] == 3); /* the defaults */
+  pw_free (s);
+  s = scene_system (&description_table, "length", -7.5, "mass", 0.25, NULL);
+  assert_true (s->q0[0] == -7.5 && s->q0[1] == 1 && s->q0[2] == 2 && s->v0[0] == 3 && s->v0[1] == 4 && s->v0[2] == 5);
+  assert_true (s->mass[0] == 0.25 && s->mass[1] == 0.25 && s->mass[2] == 1);
+  pw_free (s);
+}
+
+static void description_not_set (const char *name, double value, const char *text) {
+  pw_error error = { 0 };
+  pw_model *m = pw_model_new ("cart", &description_table, &error);
+  assert_int_equal (pw_set (m, name, value, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, text);
+  pw_model_free (m);
+}
+
+static void test_bad_parameters (void **state) {
+  (void)state;
+  description_not_set ("lenght", 1, "model cart has no parameter \"lenght\"; did you mean \"length\"?");
+  description_not_set ("length", NAN, "model cart: parameter length = nan: expected a finite number");
+  description_not_set ("length", INFINITY, "model cart: parameter length = inf: expected a finite number");
+  description_not_set ("mass", 0, "model cart: parameter mass = 0: expected a number > 0");
+  description_not_set ("ratio", -1, "model cart: parameter ratio = -1: expected a number >= 0");
+  description_not_set ("links", 1.5, "model cart: parameter links = 1.5: expected a whole number >= 1");
+}
+
+static void test_no_parameters (void **state) {
+  (void)state;
+  pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = description_build };
+  pw_error error = { 0 };
+  pw_model *m = pw_model_new ("cart", &table, &error);
+  assert_int_equal (pw_set (m, "length", 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model cart has no parameter \"length\"");
+  pw_model_free (m);
+}
+
+static void test_refused (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_model *m = pw_model_new ("cart", &description_table, &error);
+  check_ok (pw_set (m, "links", 7, &error), &error);
+  assert_int_equal (pw_build (m, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model cart: links = 7: at most 5");
+  pw_model_free (m);
+}
+
+static void test_bad_tables (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_plugin_table table = description_table;
+  char text[200];
+  table.abi = PW_ABI + 6;
+  assert_null (pw_model_new ("cart", &table, &error));
+  snprintf (text, sizeof text,
+            "model cart was compiled for ABI %d of %zu bytes, this Pinwheel has ABI %d of %zu: compile it anew",
+            PW_ABI + 6, sizeof table, PW_ABI, sizeof table);
+  check_error (&error, PW_INPUT, text);
+  table = description_table;
+  table.build = NULL;
+  error.status = PW_OK;
+  assert_null (pw_model_new ("cart", &table, &error));
+  check_error (&error, PW_INPUT, "model cart has no build function");
+}
+
+static void test_order_of_calls (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_model *m = pw_model_new ("cart", &description_table, &error);
+  assert_null (pw_compile (m, &error));
+  check_error (&error, PW_INPUT, "model cart: pw_compile before pw_build");
+  error.status = PW_OK;
+  check_ok (pw_build (m, &error), &error);
+  assert_int_equal (pw_set (m, "length", 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model cart: parameter length: pw_set after pw_build");
+  error.status = PW_OK;
+  assert_int_equal (pw_build (m, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model cart: pw_build for the second time");
+  pw_model_free (m);
+}
+
+/* ---- What a model may not say ---- */
+
+static void description_refused (pw_model *m, const char *text) {
+  pw_error error = { 0 };
+  assert_null (pw_compile (m, &error));
+  check_error (&error, PW_INPUT, text);
+  pw_model_free (m);
+}
+
+/* Adds something to a good model, and expects a message. */
+#define BAD(text, ...)                                    \
+  do {                                                    \
+    pw_model *m = scene_model (&description_table, NULL); \
+    __VA_ARGS__;                                          \
+    description_refused (m, "model scene" text);          \
+  } while (0)
+#define BODY(...) pw_add_body (m, &(pw_body){ __VA_ARGS__ })
+#define PIN(...) pw_add_pin (m, &(pw_pin){ __VA_ARGS__ })
+#define WHEEL(...) pw_add_wheel (m, &(pw_wheel){ __VA_ARGS__ })
+#define TORQUE(...) pw_add_torque (m, &(pw_torque){ .body = { "frame", "steer" }, __VA_ARGS__ })
+
+static void test_bad_names (void **state) {
+  (void)state;
+  BAD (": a body has no name", BODY (.mass = 1));
+  BAD (": a body has no name", BODY (.name = ""));
+  BAD (": a pin has no name", PIN (.body = { "frame", "steer" }));
+  BAD (": body \"ground\": this name is reserved for the ground", BODY (.name = "ground"));
+  BAD (": wheel \"ground\": this name is reserved for the ground", WHEEL (.name = "ground", .body = "frame"));
+  BAD (": body \"rear axle\": a name is made of letters, digits, _ and -", BODY (.name = "rear axle"));
+  BAD (": body \"a.b\": a name is made of letters, digits, _ and -", BODY (.name = "a.b"));
+  BAD (": two bodies are named \"steer\"", BODY (.name = "steer"));
+  BAD (": a body and a wheel are both named \"frame\"", WHEEL (.name = "frame", .body = "frame"));
+  BAD (": two elements are named \"A\"", WHEEL (.name = "A", .body = "frame"); WHEEL (.name = "A", .body = "steer"));
+}
+
+static void test_bad_bodies (void **state) {
+  (void)state;
+  BAD (": body x: mass = -1: expected a number >= 0", BODY (.name = "x", .mass = -1));
+  BAD (": body x: mass = nan: expected a finite number", BODY (.name = "x", .mass = NAN));
+  BAD (": body x: inertia = -0.5: expected a number >= 0", BODY (.name = "x", .inertia = -0.5));
+  BAD (": body x: start x = inf: expected a finite number", BODY (.name = "x", .start = { INFINITY, 0, 0 }));
+  BAD (": body x: start y = inf: expected a finite number", BODY (.name = "x", .start = { 0, INFINITY, 0 }));
+  BAD (": body x: start phi = inf: expected a finite number", BODY (.name = "x", .start = { 0, 0, INFINITY }));
+  BAD (": body x: rate vx = nan: expected a finite number", BODY (.name = "x", .rate = { NAN, 0, 0 }));
+  BAD (": body x: rate vy = nan: expected a finite number", BODY (.name = "x", .rate = { 0, NAN, 0 }));
+  BAD (": body x: rate omega = nan: expected a finite number", BODY (.name = "x", .rate = { 0, 0, NAN }));
+}
+
+static void test_bad_references (void **state) {
+  (void)state;
+  BAD (": pin B: there is no body \"ster\"; did you mean \"steer\"?", PIN (.name = "B", .body = { "frame", "ster" }));
+  BAD (": pin B: there is no body \"Ground\"; did you mean \"ground\"?",
+       PIN (.name = "B", .body = { "frame", "Ground" }));
+  BAD (": pin B: a body is missing; the ground is written \"ground\"", PIN (.name = "B", .body = { "frame" }));
+  BAD (": wheel A: a body is missing; the ground is written \"ground\"", WHEEL (.name = "A", .body = ""));
+  BAD (": pin B: both of its bodies are \"frame\"", PIN (.name = "B", .body = { "frame", "frame" }));
+  BAD (": pin B: both of its bodies are \"ground\"", PIN (.name = "B", .body = { "ground", "ground" }));
+  BAD (": wheel A: the ground does not move, so it cannot carry one", WHEEL (.name = "A", .body = "ground"));
+}
+
+static void test_bad_numbers (void **state) {
+  (void)state;
+  BAD (": pin B: at = nan: expected a finite number",
+       PIN (.name = "B", .body = { "frame", "steer" }, .at = { { 0, 0 }, { 0, NAN } }));
+  BAD (": wheel A: heading = inf: expected a finite number", WHEEL (.name = "A", .body = "frame", .heading = INFINITY));
+  BAD (": roller A: radius = 0: expected a number > 0",
+       pw_add (m, &toy_kind_roller, &(toy_roller){ .name = "A", .body = "frame" }));
+  BAD (": spring k: a length of 2 is too long", /* the kind's own check */
+       pw_add (m, &toy_kind_spring, &(toy_spring){ .name = "k", .body = { "frame", "steer" }, .length = 2 }));
+}
+
+static void test_bad_signals (void **state) {
+  (void)state;
+  BAD (": torque T: value: expected finite numbers in the signal", TORQUE (.name = "T", .value = { .constant = NAN }));
+  BAD (": torque T: value: expected finite numbers in the signal",
+       TORQUE (.name = "T", .value = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = INFINITY } }));
+  BAD (": torque T: value: a function signal without eval", TORQUE (.name = "T", .value = { .type = PW_FUNCTION }));
+  BAD (": torque T: value: signal type 9 does not exist", TORQUE (.name = "T", .value = { .type = (pw_signal_type)9 }));
+}
+
+/* ---- Signals that read states ---- */
+
+static int description_eval (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t, (void)x, (void)gradient;
+  value[0] = 0;
+  return 0;
+}
+
+static const char *const description_reads[] = { "stear.phi", NULL };
+
+#define READER                                                                       \
+  {                                                                                  \
+    PW_FUNCTION, .function = {.eval = description_eval, .reads = description_reads } \
+  }
+
+static void test_bad_readers (void **state) {
+  (void)state;
+  BAD (": element T reads a state: model scene has no state \"stear.phi\"; did you mean \"steer.phi\"?",
+       TORQUE (.name = "T", .value = READER));
+  BAD (": drive D: angle: a constraint's signal may depend on time only",
+       pw_add (m, &toy_kind_drive, &(toy_drive){ .name = "D", .body = { "frame", "steer" }, .angle = READER }));
+}
+
+/* ---- Choices ---- */
+
+typedef struct {
+  const char *name;
+  const char *body;
+  int mode;
+} description_chooser;
+
+static const char *const description_modes[] = { "slow", "fast", NULL };
+static const pw_field description_fields[] = {
+  { PW_AT (description_chooser, body), PW_BODY, .about = "a body" },
+  { PW_AT (description_chooser, mode), PW_CHOICE, .choices = description_modes, .about = "a choice" },
+  { .name = NULL },
+};
+static const pw_kind description_kind = {
+  .name = "chooser", .definition = sizeof (description_chooser), .fields = description_fields, .bodies = 1
+};
+
+static void test_bad_choices (void **state) {
+  (void)state;
+  BAD (": chooser c: mode = 2: expected 0 to 1",
+       pw_add (m, &description_kind, &(description_chooser){ "c", "frame", 2 }));
+  BAD (": chooser c: mode = -1: expected 0 to 1",
+       pw_add (m, &description_kind, &(description_chooser){ "c", "frame", -1 }));
+}
+
+/* ---- Kinds and models that do not fit ---- */
+
+static void test_bad_kinds (void **state) {
+  (void)state;
+  pw_kind kind = description_kind;
+  kind.rows = 1; /* rows, but no constraint */
+  BAD (": kind chooser does not fit: at most 4 bodies, 4 own coordinates, 6 rows, 4 signals; rows if and only if it is "
+       "a constraint",
+       pw_add (m, &kind, &(description_chooser){ "c", "frame", 0 }));
+}
+
+static void description_nothing (pw_model *m, const void *parameters) {
+  (void)m, (void)parameters;
+}
+
+static void test_no_body (void **state) {
+  (void)state;
+  pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = description_nothing };
+  description_refused (scene_model (&table, NULL), "model scene has no body");
+}
+
+/* ---- From outside a build function ---- */
+
+static void description_no_signal (const char *element, const char *field, const char *text) {
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  assert_int_equal (pw_set_signal (m, element, field, &(pw_signal){ 0 }, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, text);
+  pw_model_free (m);
+}
+
+static void test_bad_set_signal (void **state) {
+  (void)state;
+  description_no_signal ("ridder", "value", "model ezyroller has no element \"ridder\"; did you mean \"rider\"?");
+  description_no_signal ("rider", "values",
+                         "model ezyroller: torque rider has no signal \"values\"; did you mean \"value\"?");
+  description_no_signal ("A", "value", "model ezyroller: wheel A has no signal \"value\"");
+}
+
+static void test_start (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_start (m, "frame.phi", 0.5, &error), &error);
+  check_ok (pw_set_start (m, "steer.vy", -2, &error), &error);
+  pw_system *s = scene_compile (m);
+  assert_true (s->q0[2] == 0.5 && s->v0[4] == -2 && s->held[2] && s->held[6 + 4]);
+  int held = 0;
+  for (int i = 0; i < 12; i++) held += s->held[i];
+  assert_int_equal (held, 2);
+  pw_free (s);
+}
+
+static void test_bad_start (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  assert_int_equal (pw_set_start (m, "frame.phi", NAN, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model ezyroller: start frame.phi = nan: expected a finite number");
+  error.status = PW_OK;
+  check_ok (pw_set_start (m, "frame.ph", 1, &error), &error);
+  description_refused (m, "model ezyroller has no state \"frame.ph\"; did you mean \"frame.phi\"?");
+}
+
+/* ---- Names and sizes of what is compiled ---- */
+
+static void test_query (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  char text[100];
+  assert_int_equal (pw_count_bodies (s), 2);
+  assert_int_equal (pw_count_coordinates (s), 6);
+  assert_int_equal (pw_count_rows (s), 4);
+  assert_int_equal (pw_count_holonomic (s), 2);
+  assert_int_equal (pw_count_ledger (s), 1);
+  assert_int_equal (pw_find_body (s, "steer"), 1);
+  assert_int_equal (pw_find_body (s, "ster"), -1);
+  static const char *const state_names[] = { "frame.x",     "frame.y",   "frame.phi", "steer.x",
+                                             "steer.y",     "steer.phi", "frame.vx",  "frame.vy",
+                                             "frame.omega", "steer.vx",  "steer.vy",  "steer.omega" };
+  static const char *const units[] = { "m", "m", "rad", "m", "m", "rad", "m/s", "m/s", "rad/s", "m/s", "m/s", "rad/s" };
+  for (int i = 0; i < 12; i++) {
+    assert_string_equal (pw_state_name (s, i, text, sizeof text), state_names[i]);
+    assert_string_equal (pw_state_unit (s, i), units[i]);
+    assert_int_equal (pw_find_state (s, state_names[i], NULL), i);
+  }
+  static const char *const reactions[] = { "B.Fx", "B.Fy", "A.N", "C.N" }, *const elements[] = { "pin B", "pin B",
+                                                                                                 "wheel A", "wheel C" };
+  for (int i = 0; i < 4; i++) {
+    assert_string_equal (pw_reaction_name (s, i, text, sizeof text), reactions[i]);
+    assert_string_equal (pw_reaction_unit (s, i), "N");
+    assert_string_equal (pw_row_element (s, i, text, sizeof text), elements[i]);
+  }
+  assert_string_equal (pw_ledger_name (s, 0, text, sizeof text), "rider.work");
+  pw_free (s);
+}
+
+static void description_no_state (const pw_system *s, const char *name, const char *text) {
+  pw_error error = { 0 };
+  assert_int_equal (pw_find_state (s, name, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, text);
+}
+
+static void test_bad_query (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  description_no_state (s, "steer.omga", "model ezyroller has no state \"steer.omga\"; did you mean \"steer.omega\"?");
+  description_no_state (s, "ster.phi", "model ezyroller has no state \"ster.phi\"; did you mean \"steer.phi\"?");
+  description_no_state (s, "phi", "model ezyroller has no state \"phi\"; did you mean \"frame.phi\"?");
+  pw_free (s);
+}
+
+/* Coordinates and losses of elements have names, too. */
+static void test_own_coordinates (void **state) {
+  (void)state;
+  pw_model *m = scene_model (&description_table, NULL);
+  pw_add (m, &toy_kind_roller,
+          &(toy_roller){ .name = "left", .body = "frame", .at = { 0, 1 }, .radius = 0.1, .inertia = 0.2 });
+  pw_add (m, &toy_kind_roller,
+          &(toy_roller){ .name = "right", .body = "frame", .at = { 0, -1 }, .radius = 0.1, .inertia = 0.3 });
+  pw_add (m, &toy_kind_spring,
+          &(toy_spring){ .name = "k", .body = { "frame", "steer" }, .at = { { 3, 4 }, { 0 } }, .length = 1 });
+  pw_error error = { 0 };
+  check_ok (pw_set_start (m, "right.spinrate", 7, &error), &error);
+  pw_system *s = scene_compile (m);
+  char text[100];
+  assert_int_equal (pw_count_coordinates (s), 8);
+  assert_true (s->mass[6] == 0.2 && s->mass[7] == 0.3 && s->v0[7] == 7);
+  assert_string_equal (pw_state_name (s, 6, text, sizeof text), "left.spin");
+  assert_string_equal (pw_state_name (s, 8 + 7, text, sizeof text), "right.spinrate");
+  assert_string_equal (pw_state_unit (s, 7), "rad");
+  assert_string_equal (pw_state_unit (s, 8 + 7), "rad/s");
+  assert_string_equal (pw_reaction_name (s, 3, text, sizeof text), "right.T");
+  assert_string_equal (pw_ledger_name (s, 0, text, sizeof text), "k.loss");
+  assert_true (s->scale.length == 5); /* the farthest attachment */
+  description_no_state (s, "left.spun", "model scene has no state \"left.spun\"; did you mean \"left.spin\"?");
+  pw_free (s);
+}
+
+/* The description may be changed after it has been handed over: the model keeps copies. */
+static void test_copies (void **state) {
+  (void)state;
+  char body[] = "cart", name[] = "W";
+  pw_model *m = scene_model (&description_table, NULL);
+  pw_add_body (m, &(pw_body){ .name = body });
+  pw_add_wheel (m, &(pw_wheel){ .name = name, .body = body });
+  memset (body, 'x', 4);
+  memset (name, 'x', 1);
+  pw_system *s = scene_compile (m);
+  char text[100];
+  assert_int_equal (pw_find_body (s, "cart"), 2);
+  assert_string_equal (pw_row_element (s, 0, text, sizeof text), "wheel W");
+  pw_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_parameters),      cmocka_unit_test (test_bad_parameters),
+    cmocka_unit_test (test_no_parameters),   cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_bad_tables),      cmocka_unit_test (test_order_of_calls),
+    cmocka_unit_test (test_bad_names),       cmocka_unit_test (test_bad_bodies),
+    cmocka_unit_test (test_bad_references),  cmocka_unit_test (test_bad_numbers),
+    cmocka_unit_test (test_bad_signals),     cmocka_unit_test (test_bad_readers),
+    cmocka_unit_test (test_bad_choices),     cmocka_unit_test (test_bad_kinds),
+    cmocka_unit_test (test_no_body),         cmocka_unit_test (test_bad_set_signal),
+    cmocka_unit_test (test_start),           cmocka_unit_test (test_bad_start),
+    cmocka_unit_test (test_query),           cmocka_unit_test (test_bad_query),
+    cmocka_unit_test (test_own_coordinates), cmocka_unit_test (test_copies),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

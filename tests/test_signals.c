@@ -1,0 +1,154 @@
+/* Signals: their values and derivatives, what they read, when they are evaluated. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "scene.h"
+#include "signal.h"
+#include "toys.h"
+
+static void test_constant (void **state) {
+  (void)state;
+  pw_source source = { .signal = { .constant = 2.5 } };
+  double u[3];
+  assert_int_equal (pw_signal_eval (&source, 7, 1, u), 0);
+  assert_true (u[0] == 2.5 && u[1] == 0 && u[2] == 0);
+  assert_true (isinf (pw_signal_breakpoint (&source.signal, 0)));
+}
+
+static void test_harmonic (void **state) {
+  (void)state;
+  double A = 1.7, w = 2.3, p = 0.4, c = -0.6, t = 1.1, u[3], only[3];
+  pw_source source = { .signal = { PW_HARMONIC, .harmonic = { .amplitude = A, .omega = w, .phase = p, .offset = c } } };
+  assert_int_equal (pw_signal_eval (&source, t, 1, u), 0);
+  double bound = 8 * CHECK_EPS * (A * w * w + fabs (c));
+  check_close ("value", u[0], c + A * cos (w * t + p), bound, "round-off: 8 eps of the largest term");
+  check_close ("rate", u[1], -A * w * sin (w * t + p), bound, "round-off: 8 eps of the largest term");
+  check_close ("acceleration", u[2], -A * w * w * cos (w * t + p), bound, "round-off: 8 eps of the largest term");
+  assert_int_equal (pw_signal_eval (&source, t, 0, only), 0);
+  assert_true (only[0] == u[0] && only[1] == 0 && only[2] == 0);
+}
+
+/* ---- A function that reads states ---- */
+
+typedef struct {
+  int calls, fails;
+  double t, x[2], breakpoint;
+} signals_context;
+
+/* u = t + 2 phi + 3 vx */
+static int signals_eval (void *context, double t, const double *x, double value[3], double *gradient) {
+  signals_context *c = context;
+  c->calls++;
+  c->t = t;
+  memcpy (c->x, x, sizeof c->x);
+  value[0] = t + 2 * x[0] + 3 * x[1];
+  if (gradient) gradient[0] = 2, gradient[1] = 3;
+  return c->fails;
+}
+
+/* The same without states. */
+static int signals_of_time (void *context, double t, const double *x, double value[3], double *gradient) {
+  signals_context *c = context;
+  (void)x, (void)gradient;
+  c->calls++;
+  value[0] = t * t, value[1] = 2 * t, value[2] = 2;
+  return c->fails;
+}
+
+static double signals_breakpoint (void *context, double t) {
+  const signals_context *c = context;
+  return t < c->breakpoint ? c->breakpoint : INFINITY;
+}
+
+/* The EzyRoller with another torque. */
+static pw_system *signals_scene (const pw_signal *torque) {
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", torque, &error), &error);
+  return scene_compile (m);
+}
+
+static void test_reads (void **state) {
+  (void)state;
+  static const char *const reads[] = { "steer.phi", "frame.vx", NULL };
+  signals_context c = { .breakpoint = 3 };
+  pw_signal torque = { PW_FUNCTION, .function = { signals_eval, &c, reads, signals_breakpoint } };
+  pw_system *s = signals_scene (&torque);
+  double q[6] = { 0, 0, 0.3, 0, 0, 0.7 }, v[6] = { 1.1, 0, 0, 0, 0, 0.9 }, f[9];
+  assert_int_equal (pw_place (s, 2, q, v), PW_OK);
+  assert_true (c.calls == 1 && c.t == 2 && c.x[0] == 0.7 && c.x[1] == 1.1);
+  pw_sweep_force (s, f);
+  assert_true (f[2] == 2 + 2 * 0.7 + 3 * 1.1 && f[5] == -f[2] && f[0] == 0);
+  q[5] = 0.8;
+  assert_int_equal (pw_place (s, 2, q, v), PW_OK);
+  assert_true (c.calls == 2 && c.x[0] == 0.8); /* another state at the same time */
+  assert_true (pw_next_breakpoint (s, 0) == 3 && isinf (pw_next_breakpoint (s, 3)));
+  c.fails = 1;
+  assert_int_equal (pw_place (s, 2.5, q, v), PW_METHOD);
+  pw_free (s);
+}
+
+/* Stages at the same time share the value of a signal of time alone; a held signal is not evaluated at all. */
+static void test_sharing_and_hold (void **state) {
+  (void)state;
+  signals_context c = { 0 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = signals_of_time, .context = &c } };
+  pw_system *s = signals_scene (&torque);
+  double q[6] = { 0 }, v[6] = { 0 }, f[9];
+  pw_place (s, 2, q, v);
+  pw_place (s, 2, q, v);
+  assert_int_equal (c.calls, 1);
+  pw_hold (s, 1);
+  pw_place (s, 3, q, v);
+  pw_sweep_force (s, f);
+  assert_true (c.calls == 1 && f[2] == 4);
+  pw_hold (s, 0);
+  pw_place (s, 3, q, v);
+  pw_sweep_force (s, f);
+  assert_true (c.calls == 2 && f[2] == 9);
+  c.fails = 1;
+  assert_int_equal (pw_place (s, 4, q, v), PW_METHOD);
+  pw_free (s);
+}
+
+/* ---- A constraint gets the derivatives, too ---- */
+
+static signals_context signals_driven;
+
+static void signals_build (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+  pw_add (
+      m, &toy_kind_drive,
+      &(toy_drive){ .name = "motor",
+                    .body = { "disc", "ground" },
+                    .angle = { PW_FUNCTION, .function = { .eval = signals_of_time, .context = &signals_driven } } });
+}
+
+static void test_drive (void **state) {
+  (void)state;
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = signals_build };
+  signals_driven = (signals_context){ 0 };
+  pw_system *s = scene_system (&table, NULL);
+  double q[3] = { 0, 0, 10 }, v[3] = { 0 }, y;
+  pw_place (s, 3, q, v);
+  pw_sweep_g (s, &y);
+  assert_true (y == 10 - 9);
+  pw_sweep_eta (s, &y);
+  assert_true (y == 6);
+  pw_sweep_gamma (s, &y);
+  assert_true (y == 2);
+  pw_hold (s, 1); /* holds forces only */
+  pw_place (s, 4, q, v);
+  pw_sweep_g (s, &y);
+  assert_true (y == 10 - 16);
+  pw_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_constant),         cmocka_unit_test (test_harmonic), cmocka_unit_test (test_reads),
+    cmocka_unit_test (test_sharing_and_hold), cmocka_unit_test (test_drive),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

@@ -1,0 +1,160 @@
+/* Name tables, arenas, layouts, nearest names, domains. */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "util.h"
+
+static void test_names (void **state) {
+  (void)state;
+  enum { COUNT = 1000 };
+  static char text[COUNT][16];
+  pw_names names;
+  assert_int_equal (pw_names_open (&names, COUNT), PW_OK);
+  assert_true (names.size >= 2 * COUNT && (names.size & (names.size - 1)) == 0);
+  for (int i = 0; i < COUNT; i++) {
+    snprintf (text[i], sizeof text[i], "body%d", i);
+    assert_int_equal (pw_names_find (&names, text[i]), -1);
+    assert_int_equal (pw_names_add (&names, text[i], i), -1);
+  }
+  for (int i = 0; i < COUNT; i++) {
+    char copy[16];
+    assert_int_equal (pw_names_find (&names, strcpy (copy, text[i])), i);
+  }
+  assert_int_equal (pw_names_add (&names, "body7", 99), 7); /* keeps what it has */
+  assert_int_equal (pw_names_find (&names, "body7"), 7);
+  assert_int_equal (pw_names_find (&names, ""), -1);
+  pw_names_close (&names);
+  assert_null (names.slot);
+}
+
+static void test_names_empty (void **state) {
+  (void)state;
+  pw_names names;
+  assert_int_equal (pw_names_open (&names, 0), PW_OK);
+  assert_int_equal (pw_names_find (&names, "x"), -1);
+  pw_names_close (&names);
+}
+
+/* Pieces are zeroed, aligned and apart, whether they fit into a chunk or are larger than one. */
+static void test_arena (void **state) {
+  (void)state;
+  static const size_t size[] = { 1, 7, 16, 100, 70000, 3, 65536, 65537, 0, 5 };
+  enum { PIECES = sizeof size / sizeof *size };
+  pw_arena arena = { NULL };
+  char *piece[PIECES];
+  for (int i = 0; i < PIECES; i++) {
+    piece[i] = pw_arena_take (&arena, size[i]);
+    assert_non_null (piece[i]);
+    assert_int_equal ((uintptr_t)piece[i] % sizeof (double), 0);
+    for (size_t b = 0; b < size[i]; b++) assert_int_equal (piece[i][b], 0);
+    memset (piece[i], i + 1, size[i]);
+  }
+  for (int i = 0; i < PIECES; i++)
+    for (size_t b = 0; b < size[i]; b++) assert_int_equal (piece[i][b], i + 1);
+  assert_string_equal (pw_arena_text (&arena, "steer"), "steer");
+  assert_string_equal (pw_arena_text (&arena, ""), "");
+  pw_arena_free (&arena);
+  assert_null (arena.chunk);
+}
+
+/* The same takes twice give the size and then the places. */
+static void test_layout (void **state) {
+  (void)state;
+  _Alignas(max_align_t) char room[256];
+  pw_layout size = { NULL, 0 }, place = { room, 0 };
+  assert_null (pw_take (&size, 3, 5));
+  assert_null (pw_take (&size, 0, 8));
+  assert_null (pw_take (&size, 2, sizeof (double)));
+  char *a = pw_take (&place, 3, 5), *b = pw_take (&place, 0, 8), *c = pw_take (&place, 2, sizeof (double));
+  assert_true (a == room && b >= a + 15 && c >= b && (uintptr_t)c % sizeof (double) == 0);
+  assert_true (place.used == size.used && c + 2 * sizeof (double) <= room + size.used);
+}
+
+/* ---- Nearest names ---- */
+
+static const char *store_nearest (const char *sought, const char *const *candidates) {
+  pw_nearest n = { .sought = sought };
+  for (; *candidates; candidates++) pw_nearest_try (&n, *candidates);
+  return n.best;
+}
+
+static void test_nearest (void **state) {
+  (void)state;
+  static const char *const names[] = { "frame", "steer", "ground", NULL }, *const none[] = { NULL };
+  assert_string_equal (store_nearest ("fraem", names), "frame");    /* two changes */
+  assert_string_equal (store_nearest ("ster", names), "steer");     /* one left out */
+  assert_string_equal (store_nearest ("grounds", names), "ground"); /* one too many */
+  assert_string_equal (store_nearest ("Steer", names), "steer");    /* one other */
+  assert_string_equal (store_nearest ("", names), "frame");         /* the first of equals */
+  assert_null (store_nearest ("x", none));
+  char text[40];
+  assert_string_equal (pw_nearest_text (&(pw_nearest){ .best = "steer" }, text, sizeof text),
+                       "; did you mean \"steer\"?");
+  assert_string_equal (pw_nearest_text (&(pw_nearest){ 0 }, text, sizeof text), "");
+}
+
+/* A candidate too long for the table of distances counts as far away, and does no harm. */
+static void test_nearest_long (void **state) {
+  (void)state;
+  char longer[300];
+  memset (longer, 'x', sizeof longer - 1);
+  longer[sizeof longer - 1] = 0;
+  const char *const names[] = { longer, "y", NULL };
+  assert_string_equal (store_nearest ("xxx", names), "y");
+  assert_string_equal (store_nearest (longer, (const char *const[]){ "y", "x", NULL }), "x");
+}
+
+/* ---- Errors and domains ---- */
+
+static void test_first_error_stays (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  assert_int_equal (pw_fail (&error, PW_INPUT, "first %d", 1), PW_INPUT);
+  assert_int_equal (pw_fail (&error, PW_MACHINE, "second"), PW_MACHINE);
+  check_error (&error, PW_INPUT, "first 1");
+  assert_int_equal (pw_fail (NULL, PW_START, "nobody listens"), PW_START);
+}
+
+static void test_long_error (void **state) {
+  (void)state;
+  char longer[1000];
+  memset (longer, 'x', sizeof longer - 1);
+  longer[sizeof longer - 1] = 0;
+  pw_error error = { 0 };
+  pw_fail (&error, PW_INPUT, "%s", longer);
+  assert_int_equal (strlen (error.text), sizeof error.text - 1);
+}
+
+static void test_domains (void **state) {
+  (void)state;
+  static const struct {
+    pw_domain domain;
+    double value;
+    const char *expected;
+  } tries[] = {
+    { PW_REAL, -1, "" },
+    { PW_REAL, NAN, "a finite number" },
+    { PW_POSITIVE, INFINITY, "a finite number" },
+    { PW_NONNEGATIVE, 0, "" },
+    { PW_NONNEGATIVE, -1e-300, "a number >= 0" },
+    { PW_POSITIVE, 1e-300, "" },
+    { PW_POSITIVE, 0, "a number > 0" },
+    { PW_COUNT, 1, "" },
+    { PW_COUNT, 0, "a whole number >= 1" },
+    { PW_COUNT, 2.5, "a whole number >= 1" },
+    { PW_COUNT, 1e10, "a whole number >= 1" },
+  };
+  for (size_t i = 0; i < sizeof tries / sizeof *tries; i++)
+    assert_string_equal (pw_domain_check (tries[i].domain, tries[i].value), tries[i].expected);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_names),      cmocka_unit_test (test_names_empty),       cmocka_unit_test (test_arena),
+    cmocka_unit_test (test_layout),     cmocka_unit_test (test_nearest),           cmocka_unit_test (test_nearest_long),
+    cmocka_unit_test (test_long_error), cmocka_unit_test (test_first_error_stays), cmocka_unit_test (test_domains),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
