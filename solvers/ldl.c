@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <math.h>
-#include <suitesparse/amd.h>
+#include <amd.h>
 #include "ldl.h"
 #include "util.h"
 

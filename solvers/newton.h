@@ -1,0 +1,37 @@
+/* The second-order blocks of a scene, put into a sparse matrix: what Newton matrices of implicit methods share. */
+#ifndef PW_NEWTON_H
+#define PW_NEWTON_H
+
+#include "system.h"
+#include "tape.h"
+
+/* Scratch for the blocks of one system. */
+typedef struct {
+  double *block; /* largest count x rows x cols of any slab */
+  double *w;     /* largest count x cols */
+} pw_newton;
+
+int pw_newton_open (pw_newton *n, const pw_system *s); /* PW_OK or PW_MACHINE */
+void pw_newton_close (pw_newton *n);
+
+/* Puts factor x block of every slab: rows from `row` on (constraint rows for blocks with as many rows, else
+ * coordinates; row_scale, if given, multiplies each), columns from `col` on.  w is the direction of jw_q (coords),
+ * lambda the multipliers of jtl_q (rows); `rows` limits the constraint rows that take part. */
+typedef struct {
+  int row, col, rows;
+  double factor;          /* of holonomic rows, and of coordinates */
+  double factor_nonholonomic;
+  const double *row_scale;
+  const double *w, *lambda;
+} pw_put;
+void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, const pw_put *put);
+
+/* Puts factor x J, or its transpose, with the J last swept. */
+void pw_newton_J (const pw_system *s, pw_tape *t, const pw_put *put);
+void pw_newton_JT (const pw_system *s, pw_tape *t, const pw_put *put);
+
+/* Puts -(force by signal) x (signal by the states it reads): rows from `row` on, q in columns from `col` on, v in
+ * columns from `col_v` on. */
+void pw_newton_readers (pw_newton *n, pw_system *s, pw_tape *t, int row, int col, int col_v);
+
+#endif

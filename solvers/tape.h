@@ -1,0 +1,39 @@
+/* A sparse matrix filled again and again by the same sequence of contributions: the sequence is recorded once, laid out
+ * in compressed columns, and from then on each contribution finds its place by its number. */
+#ifndef PW_TAPE_H
+#define PW_TAPE_H
+
+#include <stdint.h>
+#include "pinwheel.h"
+
+typedef struct {
+  int recording;
+  size_t count, room; /* contributions, and room for them while recording */
+  int *row, *col;     /* while recording */
+  size_t *place;      /* of each contribution in the values */
+  size_t next;        /* contribution to come */
+  double *value;      /* while filling */
+  int failed;         /* out of memory while recording */
+} pw_tape;
+
+void pw_tape_record (pw_tape *t);
+/* Ends the recording: colptr (n + 1) and rowind (nonzeros) are allocated with malloc for the caller.  PW_MACHINE. */
+int pw_tape_lay_out (pw_tape *t, int n, int64_t **colptr, int64_t **rowind);
+void pw_tape_close (pw_tape *t);
+
+/* Begins a filling of the values, which the caller has zeroed. */
+static inline void pw_tape_fill (pw_tape *t, double *value) {
+  t->next = 0;
+  t->value = value;
+}
+
+void pw_tape_note (pw_tape *t, int row, int col);
+
+static inline void pw_tape_put (pw_tape *t, int row, int col, double value) {
+  if (t->recording)
+    pw_tape_note (t, row, col);
+  else
+    t->value[t->place[t->next++]] += value;
+}
+
+#endif
