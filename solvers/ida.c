@@ -31,6 +31,7 @@ struct pw_method_data {
   double *scale;       /* D: coords */
   double *given;       /* scratch: 2 (coords + 3) + 2 rows */
   double stop;         /* the stop time IDA knows */
+  double begun;        /* time of the start or the last restart */
   char message[256];   /* the last one IDA sent */
 };
 
@@ -213,6 +214,19 @@ static int ida_work (pw_real t, N_Vector vy, N_Vector vyp, N_Vector rate, void *
   return 0;
 }
 
+/* The first step: an order 1 method's error, h^2 / T^2, at the tolerance. */
+static double ida_first_step (const ida_data *d) {
+  const pw_run *r = d->run;
+  return 0.5 * r->s->scale.time * sqrt (r->settings.rtol);
+}
+
+/* The coefficient c of the current step, 1 / h before there is one; not below 1 / T. */
+static double ida_leading (const ida_data *d) {
+  pw_real c = 0;
+  if (d->run->t == d->begun || IDAGetCurrentCj (d->ida, &c) != IDA_SUCCESS || c == 0) c = 1 / ida_first_step (d);
+  return fmax (c, 1 / d->run->s->scale.time);
+}
+
 /* Error weights: by unit for q and v; lambda and mu, which the error test does not see, by the scale of the forces and
  * rates.  In ggl a correction of lambda or mu is as large as one of v or q divided by the step, so the convergence
  * test sees them divided by c. */
@@ -222,9 +236,7 @@ static int ida_weights (N_Vector vy, N_Vector weights, void *user) {
   const pw_system *s = r->s;
   const pw_settings *set = &r->settings;
   const double *y = N_VGetArrayPointer (vy), L = s->scale.length, T = s->scale.time;
-  double *w = N_VGetArrayPointer (weights), c = 1 / T, force = 0;
-  pw_real now;
-  if (d->ggl && d->ida && IDAGetCurrentCj (d->ida, &now) == IDA_SUCCESS && now > c) c = now;
+  double *w = N_VGetArrayPointer (weights), c = d->ggl ? ida_leading (d) : 1 / T, force = 0;
   for (int j = 0; j < d->n; j++) {
     double unit = j < 3 * s->bodies && j % 3 < 2 ? L : 1;
     double atol = set->atol > 0 ? set->atol : set->rtol * unit, atol_v = set->atol > 0 ? set->atol : set->rtol * unit / T;
@@ -311,6 +323,7 @@ static int ida_open_solver (ida_data *d) {
   flag |= IDASetId (d->ida, d->id);
   flag |= IDASetSuppressAlg (d->ida, 1);
   flag |= IDASetMaxNumSteps (d->ida, -1);
+  flag |= IDASetInitStep (d->ida, ida_first_step (d));
   flag |= IDASetLinearSolver (d->ida, d->solver, d->matrix);
   flag |= IDASetJacFn (d->ida, ida_matrix);
   if (r->settings.ledger && r->s->entries > 0) {
@@ -334,6 +347,7 @@ static int ida_open (pw_run *r, pw_error *error) {
   d->holonomic = d->ggl ? r->s->holonomic : 0;
   d->size = 2 * d->n + d->rows + d->holonomic;
   d->stop = NAN;
+  d->begun = r->t;
   if (pw_newton_open (&d->newton, r->s) != PW_OK || ida_open_vectors (d) != PW_OK || ida_open_matrix (d) != PW_OK ||
       ida_open_solver (d) != PW_OK)
     return ida_no_memory (r, error);
@@ -432,6 +446,8 @@ static int ida_restart (pw_run *r, pw_error *error) {
   }
   ida_fill_vectors (d);
   d->stop = NAN;
+  d->begun = r->t;
+  IDASetInitStep (d->ida, ida_first_step (d));
   if (IDAReInit (d->ida, r->t, d->y, d->yp) == IDA_SUCCESS) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, d->message);
 }
