@@ -61,9 +61,9 @@ int main (void) {
                                      { "ida+baumgarte", 0, 1e-10 },
                                      { "ida+ggl", 0, 1e-10 } };
   printf ("EzyRoller, %d s from rest, steering assembly without mass\n\n", DEMO_SECONDS);
-  printf ("%-15s %-12s %8s %9s | %9s %9s | %9s %9s | %9s | %6s\n", "method", "", "steps", "rhs", "error", "error",
+  printf ("%-15s %-12s %8s %9s | %9s %9s | %9s %10s | %9s | %6s\n", "method", "", "steps", "rhs", "error", "error",
           "worst", "worst", "energy", "CPU");
-  printf ("%-15s %-12s %8s %9s | %9s %9s | %9s %9s | %9s | %6s\n", "", "", "", "", "10 s", "100 s", "|g| [m]",
+  printf ("%-15s %-12s %8s %9s | %9s %9s | %9s %10s | %9s | %6s\n", "", "", "", "", "10 s", "100 s", "|g| [m]",
           "|Jv| [m/s]", "gap [J]", "[s]");
   demo_result reference = demo_run (&(demo_case){ "rk4+projection", 2e-4, 0 });
   for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
