@@ -31,16 +31,18 @@ int pw_cli_run (int argc, const char **argv);
 /* A command line that has been read; close it after the last use of its texts. */
 typedef struct {
   poptContext popt;
-  struct poptOption table[3]; /* the command's options, and help */
-  const char **argument;      /* what is no option, ended by NULL */
-  int arguments;              /* how many */
+  struct poptOption *table; /* a copy of the command's options, and help */
+  void **text;              /* what popt allocated for each of them */
+  const char **argument;    /* what is no option, ended by NULL */
+  int arguments;            /* how many */
 } pw_cli_line;
 
 /* Reads a command line.  `options` is popt's table without help, which is added here; take texts with
  * POPT_ARG_STRING, repeated ones with POPT_ARG_ARGV (a NULL-terminated list, or NULL if there were none), numbers as
- * texts and pass them to pw_cli_number.  All of these variables are NULL at first, and closing frees them.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says
- * what is expected ("MODEL [OPTION...]").  PW_OK; 1 if help was asked for and has been printed; PW_INPUT for an unknown
- * option, with the nearest valid one, or one without its value.  Close the line in every case. */
+ * texts and pass them to pw_cli_number.  All of these variables are NULL at first, and what they were given is freed
+ * with the line.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says what is expected
+ * ("MODEL [OPTION...]").  PW_OK; 1 if help was asked for and has been printed; PW_INPUT for an unknown option, with the
+ * nearest valid one, or one without its value.  Close the line in every case. */
 int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
                  int least, int most, pw_error *error);
 void pw_cli_close (pw_cli_line *l);

@@ -1,5 +1,6 @@
 /* The program `pinwheel`: finds the command and hands over. */
 #define _POSIX_C_SOURCE 200809L
+#include <errno.h>
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
@@ -38,8 +39,11 @@ static int main_unknown (const char *word) {
   pw_error error = { 0 };
   pw_nearest near = { .sought = word };
   for (const pw_command *c = main_commands; c->name; c++) pw_nearest_try (&near, c->name);
+  for (const char *const *o = (const char *const[]){ "help", "--help", "--version", NULL }; *o; o++)
+    pw_nearest_try (&near, *o);
   char hint[100];
-  pw_fail (&error, PW_INPUT, "there is no command \"%s\"%s", word, pw_nearest_text (&near, hint, sizeof hint));
+  pw_fail (&error, PW_INPUT, "there is no %s \"%s\"%s", word[0] == '-' ? "option" : "command", word,
+           pw_nearest_text (&near, hint, sizeof hint));
   return pw_cli_end (&error);
 }
 
@@ -71,6 +75,6 @@ int main (int argc, char **argv) {
   int status = main_dispatch (argc, (const char **)argv);
   pw_error error = { 0 };
   if ((fflush (stdout) != 0 || ferror (stdout)) && status == 0)
-    pw_fail (&error, PW_MACHINE, "cannot write to standard output");
+    pw_fail (&error, PW_MACHINE, "cannot write to standard output: %s", strerror (errno));
   return status ? status : pw_cli_end (&error);
 }

@@ -9,32 +9,61 @@
 
 /* ---- Command lines ---- */
 
-static const struct poptOption options_help[] = { { "help", '?', POPT_ARG_NONE, NULL, 'h', "Show this and stop", NULL },
-                                                  POPT_TABLEEND };
+enum { OPTIONS_HELP = 1000 }; /* what popt returns for help; for the others 1, 2, ... */
 
-static void options_nearest (const struct poptOption *o, pw_nearest *near) {
-  for (; o->longName || o->shortName || o->arg; o++)
-    if (o->longName) pw_nearest_try (near, o->longName);
+static int options_is_end (const struct poptOption *o) {
+  return o->longName == NULL && o->shortName == 0 && o->arg == NULL;
 }
 
-static int options_unknown (const char *title, const char *bad, const struct poptOption *options, pw_error *error) {
+/* The command's options with help after them. */
+static struct poptOption *options_table (const struct poptOption *options, void ***text) {
+  static const struct poptOption help = { "help", '?', POPT_ARG_NONE, NULL, OPTIONS_HELP, "Show this and stop", NULL };
+  size_t n = 0;
+  while (!options_is_end (options + n)) n++;
+  struct poptOption *table = calloc (n + 2, sizeof *table);
+  *text = calloc (n + 2, sizeof **text);
+  if (table == NULL || *text == NULL) {
+    free (table);
+    return NULL;
+  }
+  memcpy (table, options, n * sizeof *table);
+  for (size_t i = 0; i < n; i++) table[i].val = (int)i + 1;
+  table[n] = help;
+  return table;
+}
+
+/* "show" of "pinwheel show" */
+static const char *options_command (const char *title) {
+  const char *space = strrchr (title, ' ');
+  return space ? space + 1 : title;
+}
+
+/* popt hands out copies of texts, and lists of copies: notes that of an option just read, to be freed whatever becomes
+ * of the variable.  Given once more, a text replaces the first, a list grows. */
+static void options_note (pw_cli_line *l, int i) {
+  unsigned type = l->table[i].argInfo & POPT_ARG_MASK;
+  void **variable = l->table[i].arg;
+  if (type == POPT_ARG_STRING) free (l->text[i]);
+  if (type == POPT_ARG_STRING || type == POPT_ARG_ARGV) l->text[i] = *variable;
+}
+
+static int options_unknown (const pw_cli_line *l, const char *command, const char *bad, pw_error *error) {
   char sought[100], best[100];
   const char *name = bad + strspn (bad, "-");
   snprintf (sought, sizeof sought, "%.*s", (int)strcspn (name, "="), name);
   pw_nearest near = { .sought = sought };
-  options_nearest (options, &near);
-  pw_nearest_try (&near, "help");
+  for (const struct poptOption *o = l->table; !options_is_end (o); o++)
+    if (o->longName) pw_nearest_try (&near, o->longName);
   snprintf (best, sizeof best, "--%s", near.best);
-  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; did you mean \"%s\"?", title, (int)strcspn (bad, "="),
+  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; did you mean \"%s\"?", command, (int)strcspn (bad, "="),
                   bad, best);
 }
 
-static int options_bad (const pw_cli_line *l, int why, const char *title, const struct poptOption *options,
-                        pw_error *error) {
+static int options_bad (const pw_cli_line *l, int why, const char *command, pw_error *error) {
   const char *bad = poptBadOption (l->popt, POPT_BADOPTION_NOALIAS);
-  if (why == POPT_ERROR_BADOPT) return options_unknown (title, bad, options, error);
-  if (why == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", title, bad);
-  return pw_fail (error, PW_INPUT, "%s: option %s: %s", title, bad, poptStrerror (why));
+  if (why == POPT_ERROR_BADOPT) return options_unknown (l, command, bad, error);
+  if (why == POPT_ERROR_NOARG) return pw_fail (error, PW_INPUT, "%s: option %s needs a value", command, bad);
+  return pw_fail (error, PW_INPUT, "%s: option %s: %s", command, bad, poptStrerror (why));
 }
 
 static int options_count (const pw_cli_line *l, const char *title, const char *synopsis, int least, int most,
@@ -47,41 +76,32 @@ static int options_count (const pw_cli_line *l, const char *title, const char *s
 
 int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
                  int least, int most, pw_error *error) {
-  *l =
-      (pw_cli_line){ .table = { { NULL, 0, POPT_ARG_INCLUDE_TABLE, (void *)(size_t)options, 0, "Options:", NULL },
-                                { NULL, 0, POPT_ARG_INCLUDE_TABLE, (void *)(size_t)options_help, 0, "Help:", NULL } } };
-  l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
+  *l = (pw_cli_line){ .popt = NULL };
+  l->table = options_table (options, &l->text);
+  if (l->table) l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
   if (l->popt == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   poptSetOtherOptionHelp (l->popt, synopsis);
   int got = poptGetNextOpt (l->popt);
-  while (got > 0 && got != 'h') got = poptGetNextOpt (l->popt);
-  if (got == 'h') {
+  for (; got > 0 && got != OPTIONS_HELP; got = poptGetNextOpt (l->popt)) options_note (l, got - 1);
+  if (got == OPTIONS_HELP) {
     poptPrintHelp (l->popt, stdout, 0);
     return 1;
   }
-  if (got < -1) return options_bad (l, got, argv[0], options, error);
+  if (got < -1) return options_bad (l, got, options_command (argv[0]), error);
   l->argument = poptGetArgs (l->popt);
   while (l->argument && l->argument[l->arguments]) l->arguments++;
   return options_count (l, argv[0], synopsis, least, most, error);
 }
 
-/* popt hands out copies of texts, and lists of copies. */
-static void options_free (const struct poptOption *o) {
-  unsigned type = o->argInfo & POPT_ARG_MASK;
-  if (type == POPT_ARG_ARGV) {
-    char ***list = o->arg;
-    for (char **text = *list; text && *text; text++) free (*text);
-  }
-  if (type != POPT_ARG_ARGV && type != POPT_ARG_STRING) return;
-  void **variable = o->arg;
-  free (*variable);
-  *variable = NULL;
-}
-
 void pw_cli_close (pw_cli_line *l) {
-  const struct poptOption *o = l->table[0].arg;
-  for (; o && (o->longName || o->shortName || o->arg); o++) options_free (o);
-  poptFreeContext (l->popt);
+  for (size_t i = 0; l->table && l->text && !options_is_end (l->table + i); i++) {
+    char **list = (l->table[i].argInfo & POPT_ARG_MASK) == POPT_ARG_ARGV ? l->text[i] : NULL;
+    for (; list && *list; list++) free (*list);
+    free (l->text[i]);
+  }
+  if (l->popt) poptFreeContext (l->popt);
+  free (l->text);
+  free (l->table);
   *l = (pw_cli_line){ .popt = NULL };
 }
 

@@ -78,19 +78,11 @@ static int build_spawn (const build_command *c, const sigset_t *before, pid_t *c
   return why;
 }
 
-/* Ctrl-C waits until the compiler, which gets it too, is gone: so the folder is removed in every case. */
-static int build_run (const build_command *c, const char *source, pw_error *error) {
-  sigset_t stop, before;
-  sigemptyset (&stop);
-  sigaddset (&stop, SIGINT);
-  sigaddset (&stop, SIGTERM);
-  sigaddset (&stop, SIGHUP);
-  pthread_sigmask (SIG_BLOCK, &stop, &before);
+static int build_run (const build_command *c, const char *source, const sigset_t *before, pw_error *error) {
   pid_t child;
-  int outcome = 0, why = build_spawn (c, &before, &child);
+  int outcome = 0, why = build_spawn (c, before, &child);
   while (why == 0 && waitpid (child, &outcome, 0) < 0)
     if (errno != EINTR) why = errno;
-  pthread_sigmask (SIG_SETMASK, &before, NULL);
   if (why != 0 || (WIFEXITED (outcome) && WEXITSTATUS (outcome) == 127))
     return pw_fail (
         error, PW_INPUT,
@@ -105,15 +97,16 @@ static int build_run (const build_command *c, const char *source, pw_error *erro
 
 static char *build_folder (pw_error *error) {
   const char *tmp = getenv ("TMPDIR");
-  char *folder = pw_join (tmp && *tmp ? tmp : "/tmp", "pinwheel-XXXXXX", "");
+  if (tmp == NULL || *tmp == 0) tmp = "/tmp";
+  char *folder = pw_join (tmp, "pinwheel-XXXXXX", "");
   if (folder && mkdtemp (folder)) return folder; /* mkdtemp gives mode 0700 */
-  pw_fail (error, PW_MACHINE, "cannot make a temporary folder %s: %s", folder ? folder : "", strerror (errno));
+  pw_fail (error, PW_MACHINE, "cannot make a temporary folder in %s: %s", tmp, strerror (errno));
   free (folder);
   return NULL;
 }
 
-/* The compiler in the folder, with everything it needs. */
-static int build_object (const char *path, const char *object, pw_error *error) {
+/* The compiler with everything it needs. */
+static int build_object (const char *path, const char *object, const sigset_t *before, pw_error *error) {
   build_command c = { .words = 0 };
   char *include = pw_search_include ();
   int status = PW_OK;
@@ -126,25 +119,36 @@ static int build_object (const char *path, const char *object, pw_error *error) 
     status = pw_fail (error, PW_MACHINE, "out of memory");
   if (status == PW_OK) {
     build_options (&c, include, path, object);
-    status = build_run (&c, path, error);
+    status = build_run (&c, path, before, error);
   }
   free (c.text);
   free (include);
   return status;
 }
 
-int pw_compile_file (const char *path, char **folder, char **object, pw_error *error) {
-  *object = NULL;
-  *folder = build_folder (error);
-  if (*folder == NULL) return PW_MACHINE;
-  *object = pw_join (*folder, "model.so", "");
-  if (*object == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-  return build_object (path, *object, error);
-}
-
-void pw_compile_remove (char *folder, char *object) {
+static int build_in_folder (const char *path, const sigset_t *before, pw_object_user *use, void *context,
+                            pw_error *error) {
+  char *folder = build_folder (error);
+  if (folder == NULL) return PW_MACHINE;
+  char *object = pw_join (folder, "model.so", "");
+  int status = object ? build_object (path, object, before, error) : pw_fail (error, PW_MACHINE, "out of memory");
+  if (status == PW_OK) status = use (context, object, error);
   if (object) unlink (object);
-  if (folder) rmdir (folder);
+  rmdir (folder);
   free (object);
   free (folder);
+  return status;
+}
+
+/* Ctrl-C, which the compiler gets too, waits until the folder is gone. */
+int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error) {
+  sigset_t stop, before;
+  sigemptyset (&stop);
+  sigaddset (&stop, SIGINT);
+  sigaddset (&stop, SIGTERM);
+  sigaddset (&stop, SIGHUP);
+  pthread_sigmask (SIG_BLOCK, &stop, &before);
+  int status = build_in_folder (path, &before, use, context, error);
+  pthread_sigmask (SIG_SETMASK, &before, NULL);
+  return status;
 }

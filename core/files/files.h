@@ -17,7 +17,7 @@ typedef struct {
   pw_arena arena;
   pw_found *found;
   int count, room;
-  char folders[400]; /* the folders that are there, ":/first:/second:", for messages */
+  char folders[400]; /* the folders that are there, "/first:/second", for messages */
 } pw_search;
 
 /* Looks into every folder of the search path.  Close in every case.  PW_OK or PW_MACHINE. */
@@ -35,12 +35,12 @@ int pw_ends_in (const char *name, const char *ending);
 
 /* ---- Model files in C (build.c) ---- */
 
-/* Compiles a C file to a shared object in a private temporary folder; *folder and *object are malloced, and stay NULL
- * if the folder could not be made.  PW_INPUT if it does not compile or there is no compiler; PW_MACHINE. */
-int pw_compile_file (const char *path, char **folder, char **object, pw_error *error);
+/* Uses a shared object; it may be deleted afterwards. */
+typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
-/* Removes and frees both; they may be NULL.  A loaded object stays usable. */
-void pw_compile_remove (char *folder, char *object);
+/* Compiles a C file in a private temporary folder, hands the object to `use` and removes both.  PW_INPUT if it does not
+ * compile or there is no compiler; PW_MACHINE; or what `use` returns. */
+int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error);
 
 /* ---- Outputs (output.c) ---- */
 

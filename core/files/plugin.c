@@ -49,21 +49,14 @@ static const char *plugin_reason (const char *object) {
   return strncmp (why, object, n) == 0 && strncmp (why + n, ": ", 2) == 0 ? why + n + 2 : why;
 }
 
-static int plugin_load (pw_file *f, const char *object, pw_error *error) {
+static int plugin_load (void *context, const char *object, pw_error *error) {
+  pw_file *f = context;
   f->handle = dlopen (object, RTLD_NOW | RTLD_LOCAL);
   if (f->handle == NULL) return pw_fail (error, PW_INPUT, "cannot load %s: %s", f->path, plugin_reason (object));
   f->table = dlsym (f->handle, "pw_plugin");
   if (f->table == NULL)
     return pw_fail (error, PW_INPUT, "%s is no Pinwheel model: a model file ends with PW_MODEL (...)", f->path);
   return plugin_check (f, error);
-}
-
-static int plugin_open_c (pw_file *f, pw_error *error) {
-  char *folder, *object;
-  int status = pw_compile_file (f->path, &folder, &object, error);
-  if (status == PW_OK) status = plugin_load (f, object, error);
-  pw_compile_remove (folder, object);
-  return status;
 }
 
 /* ---- Finding ---- */
@@ -88,7 +81,7 @@ static int plugin_open_path (pw_file *f, pw_error *error) {
   f->name = strdup (base);
   if (f->name == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   f->name[strlen (base) - strlen (plugin_endings[ending])] = 0;
-  return ending == PLUGIN_C ? plugin_open_c (f, error) : plugin_load (f, f->path, error);
+  return ending == PLUGIN_C ? pw_compile_file (f->path, plugin_load, f, error) : plugin_load (f, f->path, error);
 }
 
 static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
@@ -110,8 +103,8 @@ static int plugin_unknown (const pw_search *s, const char *name, pw_error *error
                       name, here);
   }
   if (s->count == 0)
-    return pw_fail (error, PW_INPUT, "there is no model \"%s\": no model at all in %s", name,
-                    *s->folders ? s->folders : "the folders of PINWHEEL_MODELS and next to the program");
+    return pw_fail (error, PW_INPUT, "there is no model \"%s\", nor any other in %s", name,
+                    *s->folders ? s->folders : "the folders of PINWHEEL_MODELS or next to the program");
   pw_nearest near = { .sought = name };
   for (int i = 0; i < s->count; i++) pw_nearest_try (&near, s->found[i].name);
   return pw_fail (error, PW_INPUT, "there is no model \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));

@@ -85,13 +85,12 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return status;
 }
 
-/* Notes a folder as ":/first:/second:"; 0 if it has been looked into before. */
+/* Notes a folder as "/first:/second"; 0 if it has been looked into before. */
 static int search_note (pw_search *s, const char *real) {
-  char entry[PATH_MAX + 3];
-  snprintf (entry, sizeof entry, ":%s:", real);
-  if (strstr (s->folders, entry)) return 0;
-  size_t used = strlen (s->folders);
-  snprintf (s->folders + used, sizeof s->folders - used, "%s", used ? entry + 1 : entry);
+  size_t n = strlen (real), used = strlen (s->folders);
+  for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
+    if (strcspn (p, ":") == n && strncmp (p, real, n) == 0) return 0;
+  snprintf (s->folders + used, sizeof s->folders - used, "%s%s", used ? ":" : "", real);
   return 1;
 }
 
