@@ -61,7 +61,7 @@ SLOWS     := $(SLOW:%.c=$(BUILD)/%)
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
-.PHONY: all everything demo test test-all layers san clang format format-check bench-quick \
+.PHONY: all everything demo test test-all layers san clang gcc format format-check bench-quick \
         deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -77,7 +77,7 @@ help:
 	@echo 'make test             the tests; test-all: the slow ones too'
 	@echo 'make bench-quick      what a run costs on this machine'
 	@echo 'make layers           proof of what depends on what'
-	@echo 'make san, make clang  the tests with ASan and UBSan; the build with clang -Werror'
+	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
 	@echo 'make install          to PREFIX (/usr/local) below DESTDIR; uninstall'
 	@echo 'make clean            remove $(BUILD)/'
@@ -200,13 +200,19 @@ bench-quick: all $(BUILD)/benchmarks/quick
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers
 
+# Further builds have folders of their own, deep enough that their programs do not find $(BUILD)/models as well.
+VARIANT := $(BUILD)/variant
+
 san:
-	@$(MAKE) --no-print-directory NO_DEPS=1 BUILD=$(BUILD)/san CFLAGS='-O1 -g' test \
+	@$(MAKE) --no-print-directory NO_DEPS=1 BUILD=$(VARIANT)/san CFLAGS='-O1 -g' test \
 	  SAN='-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer'
 san: $(FIRST)
 
 clang:
-	@$(MAKE) --no-print-directory CC=clang WERROR=1 BUILD=$(BUILD)/clang everything
+	@$(MAKE) --no-print-directory CC=clang WERROR=1 BUILD=$(VARIANT)/clang everything
+
+gcc:
+	@$(MAKE) --no-print-directory CC=gcc WERROR=1 BUILD=$(VARIANT)/gcc everything
 
 SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests benchmarks docs,$(d)/*.c $(d)/*.h))
 
