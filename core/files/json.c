@@ -1,7 +1,7 @@
 /* The summary of a run as JSON: numbers with 17 digits, null for what is not known or not finite.
  *
  * libfyaml emits it.  Numbers and null go in as plain scalars, texts and names through json_text, which makes them
- * scalars that stay texts whatever they look like. */
+ * scalars that stay texts whatever they look like; blanks around a text are lost. */
 #include <libfyaml.h>
 #include <math.h>
 #include <stdlib.h>

@@ -25,10 +25,10 @@ static void output_free (pw_output *o) {
   free (o);
 }
 
-static int output_fail (const pw_output *o, int why, pw_error *error) {
+static int output_fail (const pw_output *o, int why, int kept, pw_error *error) {
   const char *what = strcmp (o->path, "-") == 0 ? "standard output" : o->path;
   const char *reason = why ? strerror (why) : "a write failed";
-  if (o->part)
+  if (o->part && kept)
     return pw_fail (error, PW_MACHINE, "cannot write %s: %s; what was written is in %s", what, reason, o->part);
   return pw_fail (error, PW_MACHINE, "cannot write %s: %s", what, reason);
 }
@@ -79,7 +79,7 @@ int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error
   errno = 0;
   if (fwrite (text, 1, size, o->stream) == size && !ferror (o->stream)) return PW_OK;
   if (o->why == 0) o->why = errno;
-  return output_fail (o, o->why, error);
+  return output_fail (o, o->why, 0, error);
 }
 
 /* Empties the buffer and closes; standard output stays open.  Returns 0, or the reason as an errno, -1 if unknown. */
@@ -110,7 +110,7 @@ int pw_output_finish (pw_output *o, pw_error *error) {
   if (why == 0 && o->part && rename (o->part, o->real) != 0) why = errno;
   if (why != 0) {
     if (o->part) output_whole_lines (o->part);
-    status = output_fail (o, why > 0 ? why : 0, error);
+    status = output_fail (o, why > 0 ? why : 0, 1, error);
   }
   output_free (o);
   return status;
@@ -119,6 +119,7 @@ int pw_output_finish (pw_output *o, pw_error *error) {
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
   output_close (o);
   char *kept = NULL;
+  buffer[0] = 0;
   if (o->part) {
     output_whole_lines (o->part);
     snprintf (buffer, size, "%s", o->part);

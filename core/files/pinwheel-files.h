@@ -14,11 +14,16 @@ extern "C" {
 /* A model file that is open: a plug-in loaded, and its table. */
 typedef struct pw_file pw_file;
 
-/* Opens a model by name ("ezyroller": NAME.so on the search path: the folders of PINWHEEL_MODELS, then those next to
- * the library's program: build/models or lib/pinwheel/models) or by path (with a "/" or an ending: a .so is loaded, a
- * .c is compiled with $CC or cc in a private temporary folder, its messages passed through on standard error).
- * Nothing is loaded from the current directory unless named by path.  Errors, all PW_INPUT: not found (with the
- * nearest name), found twice (with both paths), does not compile, is not a Pinwheel plug-in, has another ABI. */
+/* Opens a model by name or by path.
+ *
+ * A name ("ezyroller") is looked for as NAME.so, NAME.yaml in the folders of the environment variable PINWHEEL_MODELS
+ * (separated by ":"), then in those that belong to the running program and this library: models/ next to it or one
+ * up, lib/pinwheel/models/ of the installation.  A path has a "/" or an ending: a .so is loaded, a .c compiled by $CC or cc
+ * in a private temporary folder, its messages passed through on standard error; .yaml is not read yet.  Nothing is taken
+ * from the current directory unless named by path.
+ *
+ * Errors: PW_INPUT for a model that is not found (with the nearest name), found twice (with both paths), does not
+ * compile, is no Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_MACHINE. */
 pw_file *pw_file_open (const char *model, pw_error *error);
 void pw_file_close (pw_file *f);
 
@@ -36,25 +41,29 @@ int pw_file_list (int (*each) (void *context, const char *name, const char *path
 /* "%.17g" (or fewer digits) with a decimal point; non-finite as nan, inf, -inf.  Returns the buffer. */
 char *pw_format (char buffer[32], double value, int digits);
 
-/* Reads a number that fills the whole text; PW_INPUT otherwise. */
+/* Reads a number that fills the whole text, nan and inf included; PW_INPUT otherwise, and *value stays. */
 int pw_read_number (const char *text, double *value);
 
 /* ---- Files that are whole or carry another name ---- */
 
-/* A file written as NAME.part and renamed when complete; "-" is standard output. */
+/* A file written as NAME.part and renamed when complete; "-" is standard output.  What exists and is no regular file
+ * (a pipe, a device) is written directly. */
 typedef struct pw_output pw_output;
 
 /* Errors: PW_MACHINE with the path and the reason. */
 pw_output *pw_output_open (const char *path, pw_error *error);
 FILE *pw_output_stream (pw_output *o);
-/* Completes: flushes, checks, renames.  PW_MACHINE if anything failed: NAME.part stays and the text names it. */
+/* Completes and frees: flushes, checks, renames.  PW_MACHINE if anything failed: NAME.part stays and the text names it. */
 int pw_output_finish (pw_output *o, pw_error *error);
-/* Gives up: NAME.part stays with whole lines; its path, or NULL for standard output, is written to the buffer. */
+/* Gives up and frees: NAME.part stays with whole lines.  Its path is written to the buffer, which is returned; NULL, and
+ * "" in the buffer, if there is no such file (standard output, a device). */
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
 
 /* ---- Tables ---- */
 
-/* A CSV of samples: one header line "t [s],frame.x [m],...", then a line per sample with 17 digits. */
+/* A CSV of samples: one header line "t [s],frame.x [m],...", then a line per sample with 17 digits: states, contact
+ * points, reactions (-lambda), scaled residuals, and energies if the run keeps a ledger.  Non-finite is nan.  Writing
+ * places the sample's state in the system.  Errors: PW_MACHINE; PW_METHOD if a signal of the model fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, pw_system *s, const pw_sample *sample, pw_error *error);
@@ -70,7 +79,7 @@ typedef struct {
   double cpu; /* [s], integration alone */
 } pw_summary;
 
-/* Writes the JSON summary.  s, sample and statistics may be NULL if the run did not get that far. */
+/* Writes the JSON summary: whatever is not known (model and method too may be NULL) or not finite is null. */
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error);
 
