@@ -43,8 +43,9 @@ static void show_bodies (const pw_cli_model *m) {
 
 static void show_signal (const pw_signal *s) {
   if (s->type == PW_FUNCTION) {
-    printf ("a function of time");
+    printf ("f (t");
     for (const char *const *r = s->function.reads; r && *r; r++) printf (", %s", *r);
+    printf (")");
     return;
   }
   if (s->type == PW_CONSTANT) {
