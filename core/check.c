@@ -10,7 +10,8 @@ static int check_name (const pw_model *m, const char *what, const char *name, pw
     return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, what);
   for (const char *c = name; *c; c++)
     if (!isalnum ((unsigned char)*c) && *c != '_' && *c != '-' && !(*c & 0x80))
-      return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name is made of letters, digits, _ and -", m->name, what, name);
+      return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name is made of letters, digits, _ and -", m->name, what,
+                      name);
   return PW_OK;
 }
 
@@ -21,67 +22,83 @@ static int check_body (const pw_model *m, const pw_body *b, pw_error *error) {
     double value;
     pw_domain domain;
   } field[] = {
-    { "mass", b->mass, PW_NONNEGATIVE }, { "inertia", b->inertia, PW_NONNEGATIVE },
-    { "start x", b->start[0], PW_REAL }, { "start y", b->start[1], PW_REAL }, { "start phi", b->start[2], PW_REAL },
-    { "rate vx", b->rate[0], PW_REAL },  { "rate vy", b->rate[1], PW_REAL },  { "rate omega", b->rate[2], PW_REAL },
+    { "mass", b->mass, PW_NONNEGATIVE }, { "inertia", b->inertia, PW_NONNEGATIVE }, { "start x", b->start[0], PW_REAL },
+    { "start y", b->start[1], PW_REAL }, { "start phi", b->start[2], PW_REAL },     { "rate vx", b->rate[0], PW_REAL },
+    { "rate vy", b->rate[1], PW_REAL },  { "rate omega", b->rate[2], PW_REAL },
   };
   for (size_t i = 0; i < sizeof field / sizeof *field; i++) {
     const char *expected = pw_domain_check (field[i].domain, field[i].value);
     if (*expected)
-      return pw_fail (error, PW_INPUT, "model %s: body %s: %s = %g: expected %s", m->name, b->name, field[i].name, field[i].value, expected);
+      return pw_fail (error, PW_INPUT, "model %s: body %s: %s = %g: expected %s", m->name, b->name, field[i].name,
+                      field[i].value, expected);
   }
   return PW_OK;
 }
 
-static int check_signal (const pw_model *m, const pw_element *e, const pw_field *f, const pw_signal *s, pw_error *error) {
+static int check_signal (const pw_model *m, const pw_element *e, const pw_field *f, const pw_signal *s,
+                         pw_error *error) {
   const char *kind = e->kind->name, *name = pw_element_name (e);
   int good = 1;
   if (s->type == PW_CONSTANT)
     good = isfinite (s->constant);
   else if (s->type == PW_HARMONIC)
-    good = isfinite (s->harmonic.amplitude) && isfinite (s->harmonic.omega) && isfinite (s->harmonic.phase) && isfinite (s->harmonic.offset);
+    good = isfinite (s->harmonic.amplitude) && isfinite (s->harmonic.omega) && isfinite (s->harmonic.phase) &&
+           isfinite (s->harmonic.offset);
   else if (s->type == PW_FUNCTION) {
-    if (s->function.eval == NULL) return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: a function signal without eval", m->name, kind, name, f->name);
-    if (s->function.reads && e->kind->level != PW_FORCE)
-      return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: a constraint's signal may depend on time only", m->name, kind, name, f->name);
+    if (s->function.eval == NULL)
+      return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: a function signal without eval", m->name, kind, name,
+                      f->name);
+    if (s->function.reads && !pw_kind_forced (e->kind))
+      return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: a constraint's signal may depend on time only", m->name,
+                      kind, name, f->name);
   } else
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: signal type %d does not exist", m->name, kind, name, f->name, (int)s->type);
-  if (!good) return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: expected finite numbers in the signal", m->name, kind, name, f->name);
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: signal type %d does not exist", m->name, kind, name, f->name,
+                    (int)s->type);
+  if (!good)
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: expected finite numbers in the signal", m->name, kind, name,
+                    f->name);
   return PW_OK;
 }
 
-static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *bodies, pw_error *error) {
+static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *bodies,
+                            pw_error *error) {
   const char *kind = e->kind->name, *name = pw_element_name (e);
   if (body == NULL || *body == 0)
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: a body is missing; the ground is written \"ground\"", m->name, kind, name);
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: a body is missing; the ground is written \"ground\"", m->name,
+                    kind, name);
   if (strcmp (body, "ground") == 0 || pw_names_find (bodies, body) >= 0) return PW_OK;
   pw_nearest near = { .sought = body };
   for (int i = 0; i < m->bodies; i++) pw_nearest_try (&near, m->body[i].name);
   pw_nearest_try (&near, "ground");
   char hint[100];
-  return pw_fail (error, PW_INPUT, "model %s: %s %s: there is no body \"%s\"%s", m->name, kind, name, body, pw_nearest_text (&near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "model %s: %s %s: there is no body \"%s\"%s", m->name, kind, name, body,
+                  pw_nearest_text (&near, hint, sizeof hint));
 }
 
 static int check_number (const pw_model *m, const pw_element *e, const pw_field *f, double value, pw_error *error) {
   const char *expected = pw_domain_check (f->type == PW_NUMBER ? f->domain : PW_REAL, value);
   if (*expected == 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: %s %s: %s = %g: expected %s", m->name, e->kind->name, pw_element_name (e), f->name, value, expected);
+  return pw_fail (error, PW_INPUT, "model %s: %s %s: %s = %g: expected %s", m->name, e->kind->name, pw_element_name (e),
+                  f->name, value, expected);
 }
 
 static int check_choice (const pw_model *m, const pw_element *e, const pw_field *f, int value, pw_error *error) {
   int choices = 0;
   while (f->choices[choices]) choices++;
   if (value >= 0 && value < choices) return PW_OK;
-  return pw_fail (error, PW_INPUT, "model %s: %s %s: %s = %d: expected 0 to %d", m->name, e->kind->name, pw_element_name (e), f->name, value, choices - 1);
+  return pw_fail (error, PW_INPUT, "model %s: %s %s: %s = %d: expected 0 to %d", m->name, e->kind->name,
+                  pw_element_name (e), f->name, value, choices - 1);
 }
 
-static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *bodies, pw_error *error) {
+static int check_field (const pw_model *m, const pw_element *e, const pw_field *f, const pw_names *bodies,
+                        pw_error *error) {
   const char *at = (const char *)e->definition + f->offset;
   for (int i = 0; i < pw_field_count (f); i++) {
     int status = PW_OK;
     if (f->type == PW_NUMBER) status = check_number (m, e, f, ((const double *)(const void *)at)[i], error);
     if (f->type == PW_POINT || f->type == PW_VECTOR)
-      for (int k = 0; k < 2 && status == PW_OK; k++) status = check_number (m, e, f, ((const double *)(const void *)at)[2 * i + k], error);
+      for (int k = 0; k < 2 && status == PW_OK; k++)
+        status = check_number (m, e, f, ((const double *)(const void *)at)[2 * i + k], error);
     if (f->type == PW_BODY) status = check_body_name (m, e, ((const char *const *)(const void *)at)[i], bodies, error);
     if (f->type == PW_SIGNAL) status = check_signal (m, e, f, (const pw_signal *)(const void *)at + i, error);
     if (f->type == PW_CHOICE) status = check_choice (m, e, f, ((const int *)(const void *)at)[i], error);
@@ -95,14 +112,16 @@ static int check_element (const pw_model *m, const pw_element *e, const pw_names
   for (const pw_field *f = e->kind->fields; f->name; f++)
     if (check_field (m, e, f, bodies, error) != PW_OK) return PW_INPUT;
   const char *first = NULL;
-  for (int i = 0; i < e->kind->bodies; i++) {
+  for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
     const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, i);
     if (first && strcmp (first, body) == 0)
-      return pw_fail (error, PW_INPUT, "model %s: %s %s: both of its bodies are \"%s\"", m->name, e->kind->name, pw_element_name (e), body);
+      return pw_fail (error, PW_INPUT, "model %s: %s %s: both of its bodies are \"%s\"", m->name, e->kind->name,
+                      pw_element_name (e), body);
     first = body;
   }
   if (e->kind->bodies == 1 && first && strcmp (first, "ground") == 0)
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: the ground does not move, so it cannot carry one", m->name, e->kind->name, pw_element_name (e));
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: the ground does not move, so it cannot carry one", m->name,
+                    e->kind->name, pw_element_name (e));
   return PW_OK;
 }
 

@@ -17,9 +17,9 @@ typedef struct {
   int *count;           /* elements of each */
   int *slab_of;         /* slab of each element */
   int kinds;
-  pw_system size;       /* its counts */
-  size_t text;          /* bytes of all names */
-  int reads;            /* states read by signals, in all */
+  pw_system size; /* its counts */
+  size_t text;    /* bytes of all names */
+  int reads;      /* states read by signals, in all */
 } compile;
 
 /* ---- Counting ---- */
@@ -28,7 +28,8 @@ static int compile_kind_limits (const pw_model *m, const pw_kind *k, pw_error *e
   if (k->bodies > PW_MAX_BODIES || k->own > PW_MAX_OWN || k->rows > PW_MAX_ROWS || k->signals > PW_MAX_SIGNALS ||
       (k->rows > 0) != (k->level != PW_FORCE))
     return pw_fail (error, PW_INPUT,
-                    "model %s: kind %s does not fit: at most %d bodies, %d own coordinates, %d rows, %d signals; rows if and only if "
+                    "model %s: kind %s does not fit: at most %d bodies, %d own coordinates, %d rows, %d signals; rows "
+                    "if and only if "
                     "it is a constraint",
                     m->name, k->name, PW_MAX_BODIES, PW_MAX_OWN, PW_MAX_ROWS, PW_MAX_SIGNALS);
   return PW_OK;
@@ -45,11 +46,20 @@ static int compile_names (compile *c, pw_error *error) {
     const char *name = pw_element_name (&m->element[i]);
     if (name == NULL) continue;
     if (pw_names_find (&c->body, name) >= 0)
-      return pw_fail (error, PW_INPUT, "model %s: a body and a %s are both named \"%s\"", m->name, m->element[i].kind->name, name);
+      return pw_fail (error, PW_INPUT, "model %s: a body and a %s are both named \"%s\"", m->name,
+                      m->element[i].kind->name, name);
     if (pw_names_add (&c->element, name, i) >= 0)
       return pw_fail (error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
   }
   return pw_check_model (m, &c->body, error);
+}
+
+/* How many elements of the system an element of the description stands for. */
+static int compile_copies (const pw_model *m, const pw_kind *kind) {
+  int massive = 0;
+  if (!kind->each_body) return 1;
+  for (int i = 0; i < m->bodies; i++) massive += m->body[i].mass > 0;
+  return massive;
 }
 
 /* Slabs: holonomic kinds in order of appearance, then nonholonomic ones, then forces. */
@@ -72,7 +82,7 @@ static int compile_kinds (compile *c, pw_error *error) {
         if (compile_kind_limits (m, kind, error) != PW_OK) return PW_INPUT;
         c->kind[c->kinds++] = kind;
       }
-      c->count[k]++;
+      c->count[k] += compile_copies (m, kind);
       c->slab_of[i] = k;
     }
   return PW_OK;
@@ -106,7 +116,7 @@ static int compile_count (compile *c, pw_error *error) {
     for (int u = 0; u < e->kind->signals; u++) {
       const pw_signal *signal = pw_field_at (e->kind, e->definition, PW_SIGNAL, u);
       if (signal->type != PW_FUNCTION || signal->function.reads == NULL) continue;
-      for (const char *const *r = signal->function.reads; *r; r++) c->reads++;
+      for (const char *const *r = signal->function.reads; *r; r++) c->reads += compile_copies (m, e->kind);
     }
   }
   return PW_OK;
@@ -116,7 +126,7 @@ static int compile_count (compile *c, pw_error *error) {
 
 typedef struct {
   char *text;
-  double *x;  /* of signals that read states */
+  double *x; /* of signals that read states */
   int *state;
 } compile_pools;
 
@@ -125,7 +135,8 @@ static void compile_layout_slab (const compile *c, pw_layout *l, pw_slab *k, int
   size_t n = (size_t)c->count[i], cols = (size_t)(3 * kind->bodies + kind->own);
   size_t block = cols > 3 ? cols : 3;
   void *element = pw_take (l, n, kind->element);
-  void *body = pw_take (l, n * (size_t)kind->bodies, sizeof (int)), *column = pw_take (l, n * (size_t)kind->bodies, sizeof (int));
+  void *body = pw_take (l, n * (size_t)kind->bodies, sizeof (int)),
+       *column = pw_take (l, n * (size_t)kind->bodies, sizeof (int));
   void *u = pw_take (l, n * (size_t)kind->signals * 3, sizeof (double));
   void *J = pw_take (l, n * (size_t)kind->rows * cols, sizeof (double));
   int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
@@ -146,6 +157,7 @@ static void compile_layout (const compile *c, pw_layout *l, pw_system **system, 
   s->body_name = pw_take (l, bodies, sizeof *s->body_name);
   s->mass = pw_take (l, coords, sizeof *s->mass);
   s->metric = pw_take (l, coords, sizeof *s->metric);
+  s->constant = pw_take (l, coords + 3, sizeof *s->constant);
   s->q0 = pw_take (l, coords, sizeof *s->q0);
   s->v0 = pw_take (l, coords, sizeof *s->v0);
   s->held = pw_take (l, 2 * coords, 1);
@@ -188,7 +200,8 @@ static int compile_source (const compile *c, pw_system *s, pw_source *source, co
   for (const char *const *r = signal->function.reads; *r; r++) {
     pw_error why = { 0 };
     int state = pw_find_state (s, *r, &why);
-    if (state < 0) return pw_fail (error, PW_INPUT, "model %s: element %s reads a state: %s", c->m->name, element, why.text);
+    if (state < 0)
+      return pw_fail (error, PW_INPUT, "model %s: element %s reads a state: %s", c->m->name, element, why.text);
     *pools->state++ = state;
     source->reads++;
   }
@@ -197,19 +210,18 @@ static int compile_source (const compile *c, pw_system *s, pw_source *source, co
   return PW_OK;
 }
 
-/* Puts element `e` of its slab where the kind will find it. */
-static int compile_element (const compile *c, pw_system *s, pw_slab *k, int e, const pw_element *from, compile_pools *pools,
+/* Puts element `e` of its slab where the kind will find it; `body` is the one an each_body kind acts on, or -1. */
+static int compile_element (const compile *c, pw_system *s, pw_slab *k, int e, const pw_element *from, int body,
                             pw_error *error) {
   static const pw_body ground = { .name = "ground" };
   const pw_kind *kind = k->kind;
   const pw_body *bodies[PW_MAX_BODIES];
-  int *body = (int *)(size_t)k->b.body + e * kind->bodies, *column = (int *)(size_t)k->column + e * kind->bodies;
-  k->name[e] = compile_text (pools, pw_element_name (from));
+  int *place = (int *)(size_t)k->b.body + e * kind->bodies, *column = (int *)(size_t)k->column + e * kind->bodies;
   for (int n = 0; n < kind->bodies; n++) {
-    const char *name = *(const char **)pw_field_at (kind, from->definition, PW_BODY, n);
-    int index = pw_names_find (&c->body, name);
+    int index =
+        body >= 0 ? body : pw_names_find (&c->body, *(const char **)pw_field_at (kind, from->definition, PW_BODY, n));
     bodies[n] = index < 0 ? &ground : &c->m->body[index];
-    body[n] = index < 0 ? s->bodies : index;
+    place[n] = index < 0 ? s->bodies : index;
     column[n] = index < 0 ? s->coords : 3 * index;
   }
   if (kind->prepare == NULL) return PW_OK;
@@ -218,6 +230,40 @@ static int compile_element (const compile *c, pw_system *s, pw_slab *k, int e, c
   char *element = (char *)(size_t)k->b.element + (size_t)e * kind->element;
   if (kind->prepare (from->definition, bodies, element, own_mass, &why) != PW_OK)
     return pw_fail (error, PW_INPUT, "model %s: %s %s: %s", c->m->name, kind->name, k->name[e], why.text);
+  return PW_OK;
+}
+
+/* Puts an element of the description, once or for every body with mass; *e counts the elements of the slab. */
+static int compile_put (const compile *c, pw_system *s, pw_slab *k, int *e, const pw_element *from,
+                        compile_pools *pools, pw_error *error) {
+  const char *name = compile_text (pools, pw_element_name (from));
+  if (!k->kind->each_body) {
+    k->name[*e] = name;
+    return compile_element (c, s, k, (*e)++, from, -1, error);
+  }
+  for (int b = 0; b < s->bodies; b++) {
+    if (!(c->m->body[b].mass > 0)) continue;
+    k->name[*e] = name;
+    if (compile_element (c, s, k, (*e)++, from, b, error) != PW_OK) return PW_INPUT;
+  }
+  return PW_OK;
+}
+
+/* After the elements, whose own coordinates a signal may read. */
+static int compile_signals (const compile *c, pw_system *s, compile_pools *pools, pw_error *error) {
+  int *next = c->count; /* from now on counts the elements seen of each slab */
+  memset (next, 0, (size_t)s->slabs * sizeof *next);
+  for (int n = 0; n < c->m->elements; n++) {
+    const pw_element *from = &c->m->element[n];
+    pw_slab *k = &s->slab[c->slab_of[n]];
+    for (int copy = compile_copies (c->m, k->kind); copy > 0; copy--) {
+      int e = next[c->slab_of[n]]++;
+      for (int u = 0; u < k->kind->signals; u++)
+        if (compile_source (c, s, &k->source[e * k->kind->signals + u],
+                            pw_field_at (k->kind, from->definition, PW_SIGNAL, u), pools, k->name[e], error) != PW_OK)
+          return PW_INPUT;
+    }
+  }
   return PW_OK;
 }
 
@@ -232,27 +278,17 @@ static int compile_slabs (const compile *c, pw_system *s, compile_pools *pools, 
     own += k->b.count * k->kind->own;
     int e = 0;
     for (int n = 0; n < c->m->elements; n++)
-      if (c->slab_of[n] == i && compile_element (c, s, k, e++, &c->m->element[n], pools, error) != PW_OK) return PW_INPUT;
+      if (c->slab_of[n] == i && compile_put (c, s, k, &e, &c->m->element[n], pools, error) != PW_OK) return PW_INPUT;
   }
-  int *next = c->count; /* now counts the elements whose signals are compiled; names are known, so states can be found */
-  memset (next, 0, (size_t)s->slabs * sizeof *next);
-  for (int n = 0; n < c->m->elements; n++) {
-    const pw_element *from = &c->m->element[n];
-    pw_slab *k = &s->slab[c->slab_of[n]];
-    int e = next[c->slab_of[n]]++;
-    for (int u = 0; u < k->kind->signals; u++)
-      if (compile_source (c, s, &k->source[e * k->kind->signals + u], pw_field_at (k->kind, from->definition, PW_SIGNAL, u), pools,
-                          k->name[e], error) != PW_OK)
-        return PW_INPUT;
-  }
-  return PW_OK;
+  return compile_signals (c, s, pools, error);
 }
 
 static void compile_entries (pw_system *s) {
   pw_entry *entry = s->entry;
   for (int i = 0; i < s->slabs; i++) {
     const pw_kind *k = s->slab[i].kind;
-    for (int e = 0; (k->power || (k->rows > 0 && k->eta)) && e < s->slab[i].b.count; e++) *entry++ = (pw_entry){ i, e, PW_WORK };
+    for (int e = 0; (k->power || (k->rows > 0 && k->eta)) && e < s->slab[i].b.count; e++)
+      *entry++ = (pw_entry){ i, e, PW_WORK };
     for (int e = 0; k->loss && e < s->slab[i].b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
   }
 }
@@ -275,7 +311,7 @@ static double compile_length (const compile *c) {
   double L = 0;
   for (int i = 0; i < m->elements; i++) {
     const pw_element *e = &m->element[i];
-    for (int n = 0; n < e->kind->bodies; n++) {
+    for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
       const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
       const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);
       if (at && strcmp (body, "ground") != 0) L = fmax (L, hypot (at[0], at[1]));
@@ -321,6 +357,7 @@ static int compile_fill (const compile *c, pw_system *s, compile_pools *pools, p
   compile_entries (s);
   s->scale = (pw_scale){ compile_length (c), 1 };
   compile_metric (s);
+  pw_sweep_constant (s);
   return PW_OK;
 }
 
@@ -330,7 +367,8 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
   pw_system *s = NULL;
   if (!m->built)
     pw_fail (error, PW_INPUT, "model %s: pw_compile before pw_build", m->name);
-  else if (compile_names (&c, error) == PW_OK && compile_kinds (&c, error) == PW_OK && compile_count (&c, error) == PW_OK)
+  else if (compile_names (&c, error) == PW_OK && compile_kinds (&c, error) == PW_OK &&
+           compile_count (&c, error) == PW_OK)
     s = compile_allocate (&c, &pools, error);
   if (s && compile_fill (&c, s, &pools, error) != PW_OK) {
     free (s);

@@ -35,24 +35,31 @@ void pw_sweep_gamma (pw_system *s, double *gamma) {
   evaluate_rows (s, offsetof (pw_kind, gamma), s->rows, gamma);
 }
 
-void pw_sweep_force (pw_system *s, double *f) {
-  memset (f, 0, (size_t)s->coords * sizeof *f);
-  for (int i = 0; i < s->slabs; i++) {
-    pw_slab *k = &s->slab[i];
-    if (k->kind->force == NULL) continue;
-    k->kind->force (&k->b, k->block);
-    int bodies = k->kind->bodies, own = k->kind->own;
-    const double *block = k->block;
-    for (int e = 0; e < k->b.count; e++) {
-      for (int n = 0; n < bodies; n++, block += 3) {
-        double *to = f + k->column[e * bodies + n];
-        to[0] += block[0];
-        to[1] += block[1];
-        to[2] += block[2];
-      }
-      for (int n = 0; n < own; n++) f[k->own + e * own + n] += *block++;
+static void evaluate_add_force (pw_slab *k, double *f) {
+  k->kind->force (&k->b, k->block);
+  int bodies = k->kind->bodies, own = k->kind->own;
+  const double *block = k->block;
+  for (int e = 0; e < k->b.count; e++) {
+    for (int n = 0; n < bodies; n++, block += 3) {
+      double *to = f + k->column[e * bodies + n];
+      to[0] += block[0];
+      to[1] += block[1];
+      to[2] += block[2];
     }
+    for (int n = 0; n < own; n++) f[k->own + e * own + n] += *block++;
   }
+}
+
+void pw_sweep_force (pw_system *s, double *f) {
+  memcpy (f, s->constant, (size_t)s->coords * sizeof *f);
+  for (int i = 0; i < s->slabs; i++)
+    if (s->slab[i].kind->force && !s->slab[i].kind->constant) evaluate_add_force (&s->slab[i], f);
+}
+
+void pw_sweep_constant (pw_system *s) {
+  memset (s->constant, 0, (size_t)s->coords * sizeof *s->constant);
+  for (int i = 0; i < s->slabs; i++)
+    if (s->slab[i].kind->force && s->slab[i].kind->constant) evaluate_add_force (&s->slab[i], s->constant);
 }
 
 /* Sum of one number per element over all kinds that have the sweep. */
@@ -96,7 +103,8 @@ void pw_sweep_ledger (pw_system *s, const double *lambda, double *rate) {
       continue;
     }
     rate[i] = 0; /* the constraint force -J^T lambda does the work -lambda . J v = -lambda . eta */
-    for (int r = 0, n = k->kind->rows; r < n; r++) rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
+    for (int r = 0, n = k->kind->rows; r < n; r++)
+      rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
   }
 }
 

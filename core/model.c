@@ -11,8 +11,9 @@ static int model_no_memory (pw_model *m) {
 
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error) {
   if (table->abi != PW_ABI || table->size != sizeof *table) {
-    pw_fail (error, PW_INPUT, "model %s was compiled for ABI %u of %zu bytes, this Pinwheel has ABI %u of %zu: compile it anew",
-             name, table->abi, table->size, (unsigned)PW_ABI, sizeof *table);
+    pw_fail (error, PW_INPUT,
+             "model %s was compiled for ABI %u of %zu bytes, this Pinwheel has ABI %u of %zu: compile it anew", name,
+             table->abi, table->size, (unsigned)PW_ABI, sizeof *table);
     return NULL;
   }
   if (table->build == NULL) {
@@ -50,8 +51,10 @@ int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
     if (strcmp (p->name, parameter) == 0) {
       const char *expected = pw_domain_check (p->domain, value);
       if (*expected)
-        return pw_fail (error, PW_INPUT, "model %s: parameter %s = %.17g: expected %s", m->name, parameter, value, expected);
-      if (m->built) return pw_fail (error, PW_INPUT, "model %s: parameter %s: pw_set after pw_build", m->name, parameter);
+        return pw_fail (error, PW_INPUT, "model %s: parameter %s = %.17g: expected %s", m->name, parameter, value,
+                        expected);
+      if (m->built)
+        return pw_fail (error, PW_INPUT, "model %s: parameter %s: pw_set after pw_build", m->name, parameter);
       memcpy (m->parameters + p->offset, &value, sizeof value);
       return PW_OK;
     }
@@ -114,7 +117,7 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   memcpy (copy, definition, kind->definition);
   const char **name = copy;
   *name = model_text (m, *name);
-  for (int i = 0; i < kind->bodies; i++) {
+  for (int i = 0; i < kind->bodies && !kind->each_body; i++) {
     const char **body = pw_field_at (kind, copy, PW_BODY, i);
     *body = model_text (m, *body);
   }
@@ -123,7 +126,8 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
 }
 
 void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k) {
-  static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double), sizeof (char *), sizeof (pw_signal), sizeof (int) };
+  static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double),
+                                 sizeof (char *), sizeof (pw_signal),  sizeof (int) };
   for (const pw_field *f = kind->fields; f->name; f++) {
     if (f->type != type) continue;
     if (k < pw_field_count (f)) return (char *)(size_t)definition + f->offset + (size_t)k * size[type];
@@ -158,7 +162,8 @@ int pw_set_signal (pw_model *m, const char *element, const char *field, const pw
 
 int pw_set_start (pw_model *m, const char *state, double value, pw_error *error) {
   const char *expected = pw_domain_check (PW_REAL, value);
-  if (*expected) return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);
+  if (*expected)
+    return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);
   if (model_grow (m, &m->given, m->givens, &m->given_room, sizeof *m->given) == PW_OK) {
     m->given[m->givens] = (pw_given){ model_text (m, state), value };
     if (m->given[m->givens].state) m->givens++;

@@ -39,6 +39,11 @@ int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
 /* The k-th field of a type in a kind, counting each of its `count`; address inside the definition. */
 void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);
 
+/* 1 if the kind's signals serve its force: they may read states, and inputs=held holds them. */
+static inline int pw_kind_forced (const pw_kind *kind) {
+  return kind->force_u != NULL;
+}
+
 /* How many a field stands for. */
 static inline int pw_field_count (const pw_field *f) {
   return f->count > 0 ? f->count : 1;

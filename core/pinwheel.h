@@ -58,8 +58,8 @@ typedef enum { PW_CONSTANT, PW_HARMONIC, PW_FUNCTION } pw_signal_type;
  * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
-  void *context;                                  /* passed to eval and breakpoint as it is */
-  const char *const *reads;                       /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
+  void *context;            /* passed to eval and breakpoint as it is */
+  const char *const *reads; /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
   double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
 } pw_function;
 
@@ -84,11 +84,11 @@ typedef struct pw_model pw_model;
 
 /* A rigid body.  Its frame sits at its centre of mass.  Massless bodies are allowed. */
 typedef struct {
-  const char *name;  /* unique among bodies and elements; "ground" is reserved */
-  double mass;       /* [kg], >= 0 */
-  double inertia;    /* about the centre of mass [kg m^2], >= 0 */
-  double start[3];   /* x, y [m], phi [rad] at the start */
-  double rate[3];    /* vx, vy [m/s], omega [rad/s] at the start */
+  const char *name; /* unique among bodies and elements; "ground" is reserved */
+  double mass;      /* [kg], >= 0 */
+  double inertia;   /* about the centre of mass [kg m^2], >= 0 */
+  double start[3];  /* x, y [m], phi [rad] at the start */
+  double rate[3];   /* vx, vy [m/s], omega [rad/s] at the start */
 } pw_body;
 
 /* The domain of a number. */
@@ -123,18 +123,18 @@ typedef struct pw_kind pw_kind;
 
 /* What a plug-in exports, under the name `pw_plugin`. */
 typedef struct {
-  unsigned abi;                     /* PW_ABI */
-  size_t size;                      /* sizeof (pw_plugin_table) */
-  const char *about;                /* one line: what the model is */
-  const pw_parameter *parameters;   /* ended by a NULL name; may be NULL */
-  size_t parameters_size;           /* bytes of the structure the parameters live in */
-  pw_run_defaults run;              /* how to run it by default */
+  unsigned abi;                                        /* PW_ABI */
+  size_t size;                                         /* sizeof (pw_plugin_table) */
+  const char *about;                                   /* one line: what the model is */
+  const pw_parameter *parameters;                      /* ended by a NULL name; may be NULL */
+  size_t parameters_size;                              /* bytes of the structure the parameters live in */
+  pw_run_defaults run;                                 /* how to run it by default */
   void (*build) (pw_model *m, const void *parameters); /* declares bodies and elements */
 } pw_plugin_table;
 
 /* Ends a model file:  PW_MODEL (.about = "...", .parameters = ..., .build = build) */
-#define PW_MODEL(...)                                                                                                  \
-  extern const pw_plugin_table pw_plugin;                                                                              \
+#define PW_MODEL(...)                     \
+  extern const pw_plugin_table pw_plugin; \
   const pw_plugin_table pw_plugin = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), __VA_ARGS__ }
 
 /* Adds a body.  The model keeps a copy, the name included.  Returns PW_OK or the first error of the model, which
@@ -173,9 +173,9 @@ typedef struct {
 } pw_torque;
 
 /* The list of kinds: the one line to add for a new file in core/kinds/. */
-#define PW_KINDS                                                                                                       \
-  PW_KIND (pin)                                                                                                        \
-  PW_KIND (wheel)                                                                                                      \
+#define PW_KINDS  \
+  PW_KIND (pin)   \
+  PW_KIND (wheel) \
   PW_KIND (torque)
 
 /* ---- What a kind provides ---- */
@@ -205,9 +205,9 @@ typedef struct {
 
 /* Where a body is and how it moves; the ground is a body at rest at the origin. */
 typedef struct {
-  double x, y, phi;       /* centre of mass [m], angle [rad] */
-  double cos, sin;        /* of phi */
-  double vx, vy, omega;   /* [m/s], [rad/s] */
+  double x, y, phi;     /* centre of mass [m], angle [rad] */
+  double cos, sin;      /* of phi */
+  double vx, vy, omega; /* [m/s], [rad/s] */
 } pw_pose;
 
 /* All elements of one kind in a scene, as its sweeps see them.  Element e has local coordinates: (x, y, phi) of each
@@ -233,24 +233,26 @@ pw_sweep pw_by_differences;
 #define PW_BY_DIFFERENCES pw_by_differences
 
 typedef enum {
-  PW_FORCE,        /* no rows */
-  PW_HOLONOMIC,    /* rows g (q, t) = 0 */
-  PW_NONHOLONOMIC  /* rows S (q, t) v = eta (t, q) */
+  PW_FORCE,       /* no rows */
+  PW_HOLONOMIC,   /* rows g (q, t) = 0 */
+  PW_NONHOLONOMIC /* rows S (q, t) v = eta (t, q) */
 } pw_level;
 
 /* An element kind: one const table in one file.  A NULL sweep means identically zero; the self-test verifies it.
  * Sizes are given per element. */
 struct pw_kind {
-  const char *name;           /* "pin" */
-  const char *about;          /* one line */
-  size_t definition;          /* bytes of the definition structure, whose first member is `const char *name` */
-  size_t element;             /* bytes of the prepared element */
-  const pw_field *fields;     /* ended by a NULL name; `name` itself is not listed */
-  int bodies;                 /* bodies an element touches: as many as its fields of type PW_BODY name */
-  int own;                    /* coordinates of its own */
-  int rows;                   /* constraint rows */
-  int signals;                /* signals, in the order of its fields */
-  pw_level level;             /* of its rows */
+  const char *name;              /* "pin" */
+  const char *about;             /* one line */
+  size_t definition;             /* bytes of the definition structure, whose first member is `const char *name` */
+  size_t element;                /* bytes of the prepared element */
+  const pw_field *fields;        /* ended by a NULL name; `name` itself is not listed */
+  int bodies;                    /* bodies an element touches: as many as its fields of type PW_BODY name */
+  int own;                       /* coordinates of its own */
+  int rows;                      /* constraint rows */
+  int signals;                   /* signals, in the order of its fields; they serve the force if there is a force_u */
+  int each_body;                 /* 1: no body is named; the element acts on every body that has mass */
+  int constant;                  /* 1: its force depends on nothing: evaluated once, when the scene is compiled */
+  pw_level level;                /* of its rows */
   const pw_quantity *reaction;   /* one per row: what -lambda is */
   const pw_quantity *coordinate; /* one per own coordinate */
 
@@ -280,10 +282,10 @@ struct pw_kind {
 };
 
 /* Every kind k of the list: its table pw_kind_k, and pw_add_k, which is pw_add with that table. */
-#define PW_KIND(k)                                                                                                     \
-  extern const pw_kind pw_kind_##k;                                                                                    \
-  static inline int pw_add_##k (pw_model *m, const pw_##k *definition) {                                               \
-    return pw_add (m, &pw_kind_##k, definition);                                                                       \
+#define PW_KIND(k)                                                       \
+  extern const pw_kind pw_kind_##k;                                      \
+  static inline int pw_add_##k (pw_model *m, const pw_##k *definition) { \
+    return pw_add (m, &pw_kind_##k, definition);                         \
   }
 PW_KINDS
 #undef PW_KIND

@@ -1,5 +1,6 @@
 /* Placing a state: the poses of all bodies, the signals of all elements. */
 #include <math.h>
+#include "model.h"
 #include "signal.h"
 
 static void place_positions (pw_system *s, const double *q) {
@@ -26,8 +27,9 @@ void pw_place_rates (pw_system *s, const double *v) {
 }
 
 /* Evaluates the signals of a slab; `readers` picks those that read states, else those of time alone. */
-static int place_slab_signals (const pw_system *s, pw_slab *k, double t, const double *q, const double *v, int readers) {
-  int derivatives = k->kind->level != PW_FORCE;
+static int place_slab_signals (const pw_system *s, pw_slab *k, double t, const double *q, const double *v,
+                               int readers) {
+  int derivatives = !pw_kind_forced (k->kind);
   for (int i = 0; i < k->b.count * k->kind->signals; i++) {
     pw_source *source = &k->source[i];
     if ((source->reads > 0) != readers) continue;
@@ -44,7 +46,7 @@ static int place_slab_signals (const pw_system *s, pw_slab *k, double t, const d
 static int place_signals (pw_system *s, double t, const double *q, const double *v) {
   if (t != s->t_signal) {
     for (int k = 0; k < s->slabs; k++) {
-      if (s->slab[k].kind->signals == 0 || (s->hold && s->slab[k].kind->level == PW_FORCE)) continue;
+      if (s->slab[k].kind->signals == 0 || (s->hold && pw_kind_forced (s->slab[k].kind))) continue;
       if (place_slab_signals (s, &s->slab[k], t, q, v, 0) != PW_OK) return PW_METHOD;
     }
     s->t_signal = t;

@@ -41,18 +41,18 @@ typedef struct {
 /* The state at one time.  The arrays belong to the run and hold until its next call. */
 typedef struct {
   double t;
-  const double *q, *v;   /* coordinates and rates: pw_count_coordinates each */
-  const double *a;       /* accelerations */
-  const double *lambda;  /* multipliers, M a + J^T lambda = f: pw_count_rows */
-  double position;       /* scaled residual of g = 0 here */
-  double velocity;       /* scaled residual of J v = eta here */
-  double kinetic;        /* [J] */
-  double potential;      /* [J] */
-  const double *ledger;  /* work or loss of each entry of the ledger [J]: pw_count_ledger; NULL if not kept */
-  double work;           /* fed in by active elements and drives since the start [J] */
-  double loss;           /* dissipated [J] */
-  double projection;     /* energy added by projections [J] */
-  double balance;        /* (kinetic + potential) - at the start - work + loss - projection [J] */
+  const double *q, *v;  /* coordinates and rates: pw_count_coordinates each */
+  const double *a;      /* accelerations */
+  const double *lambda; /* multipliers, M a + J^T lambda = f: pw_count_rows */
+  double position;      /* scaled residual of g = 0 here */
+  double velocity;      /* scaled residual of J v = eta here */
+  double kinetic;       /* [J] */
+  double potential;     /* [J] */
+  const double *ledger; /* work or loss of each entry of the ledger [J]: pw_count_ledger; NULL if not kept */
+  double work;          /* fed in by active elements and drives since the start [J] */
+  double loss;          /* dissipated [J] */
+  double projection;    /* energy added by projections [J] */
+  double balance;       /* (kinetic + potential) - at the start - work + loss - projection [J] */
 } pw_sample;
 
 /* Entries of the ledger: the name of entry i is "rider.work" or "damper.loss". */
@@ -63,7 +63,7 @@ char *pw_ledger_name (const pw_system *s, int entry, char *buffer, size_t size);
 typedef struct {
   const double *q_given, *v_given; /* the state as described */
   const double *q, *v;             /* the state the run starts from */
-  int moved;                       /* number of states that differ */
+  int moved;                       /* number of states that differ by more than round-off */
   int freed;                       /* 1: the values the user gave could not all be held */
   double position, velocity;       /* scaled residuals before */
 } pw_start_report;

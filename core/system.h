@@ -18,16 +18,16 @@ typedef struct {
 
 /* One kind in use: its batch, and where its rows and coordinates are. */
 typedef struct {
-  pw_batch b;         /* as the kind sees it */
+  pw_batch b; /* as the kind sees it */
   const pw_kind *kind;
-  int row;            /* global index of its first row */
-  int own;            /* global index of its first own coordinate */
-  const int *column;  /* count x bodies: first coordinate of each body; the ground's is s->coords */
-  double *J;          /* count x rows x cols */
-  double *block;      /* force kinds: count x cols scratch */
-  double *u;          /* count x signals x 3, as b.u */
-  pw_source *source;  /* count x signals */
-  const char **name;  /* count */
+  int row;           /* global index of its first row */
+  int own;           /* global index of its first own coordinate */
+  const int *column; /* count x bodies: first coordinate of each body; the ground's is s->coords */
+  double *J;         /* count x rows x cols */
+  double *block;     /* force kinds: count x cols scratch */
+  double *u;         /* count x signals x 3, as b.u */
+  pw_source *source; /* count x signals */
+  const char **name; /* count */
 } pw_slab;
 
 /* An account of work or loss. */
@@ -39,19 +39,20 @@ typedef struct {
 struct pw_system {
   const char *model;
   int bodies, coords, rows, holonomic, slabs, entries;
-  int readers;              /* function signals that read states */
-  int hold;                 /* 1: signals of forces keep their values (inputs=held) */
-  double t_signal;          /* the time the signals were last evaluated at; NaN: never */
+  int readers;     /* function signals that read states */
+  int hold;        /* 1: signals of forces keep their values (inputs=held) */
+  double t_signal; /* the time the signals were last evaluated at; NaN: never */
   pw_scale scale;
-  const char **body_name;   /* bodies */
-  double *mass;             /* coords: diagonal of M */
-  double *metric;           /* coords: M, and small weights where M is zero */
-  double *q0, *v0;          /* coords: the described start */
-  unsigned char *held;      /* 2 coords: given by the user, so held by the consistent start */
-  pw_pose *pose;            /* bodies + 1; the last is the ground */
-  pw_slab *slab;            /* slabs: holonomic kinds first, then nonholonomic ones, then forces */
-  double *scratch;          /* rows x 3 + coords + 3 */
-  pw_entry *entry;          /* entries */
+  const char **body_name; /* bodies */
+  double *mass;           /* coords: diagonal of M */
+  double *constant;       /* coords + 3: sum of the forces that never change */
+  double *metric;         /* coords: M, and small weights where M is zero */
+  double *q0, *v0;        /* coords: the described start */
+  unsigned char *held;    /* 2 coords: given by the user, so held by the consistent start */
+  pw_pose *pose;          /* bodies + 1; the last is the ground */
+  pw_slab *slab;          /* slabs: holonomic kinds first, then nonholonomic ones, then forces */
+  double *scratch;        /* rows x 3 + coords + 3 */
+  pw_entry *entry;        /* entries */
 };
 
 /* ---- Placing: poses and signals for one (t, q, v), on which all sweeps below work ---- */
@@ -65,12 +66,13 @@ void pw_hold (pw_system *s, int hold);
 
 /* ---- Sweeps; g and the like are `rows` long, f and w `coords` + 3 ---- */
 
-void pw_sweep_J (pw_system *s); /* fills every slab's J */
-void pw_sweep_g (pw_system *s, double *g); /* holonomic rows only */
+void pw_sweep_J (pw_system *s);                    /* fills every slab's J */
+void pw_sweep_g (pw_system *s, double *g);         /* holonomic rows only */
 void pw_sweep_g_size (pw_system *s, double *size); /* not below the length scale */
 void pw_sweep_eta (pw_system *s, double *eta);
 void pw_sweep_gamma (pw_system *s, double *gamma);
 void pw_sweep_force (pw_system *s, double *f);
+void pw_sweep_constant (pw_system *s); /* the part of f that never changes; done by pw_compile */
 double pw_potential (pw_system *s);
 double pw_kinetic (const pw_system *s, const double *v);
 /* Rates of the ledger's entries [W]; needs J, and lambda. */
@@ -100,7 +102,13 @@ double pw_next_breakpoint (const pw_system *s, double t);
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
 
 /* The most an element may have; plug-in kinds are checked against it. */
-enum { PW_MAX_BODIES = 4, PW_MAX_OWN = 4, PW_MAX_ROWS = 6, PW_MAX_SIGNALS = 4, PW_MAX_COLS = 3 * PW_MAX_BODIES + PW_MAX_OWN };
+enum {
+  PW_MAX_BODIES = 4,
+  PW_MAX_OWN = 4,
+  PW_MAX_ROWS = 6,
+  PW_MAX_SIGNALS = 4,
+  PW_MAX_COLS = 3 * PW_MAX_BODIES + PW_MAX_OWN
+};
 
 /* The kind's sweep for a block: NULL if identically zero, pw_by_differences if the core has to difference. */
 pw_sweep *pw_block_sweep (const pw_kind *kind, pw_block block);

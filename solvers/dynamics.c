@@ -41,7 +41,8 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
   int row;
   pw_saddle_pivot (r->saddle, &row);
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: singular pose: %s says what other constraints say already", t, element);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: singular pose: %s says what other constraints say already", t,
+                  element);
 }
 
 void pw_note_residuals (pw_run *r) {

@@ -28,11 +28,11 @@ struct pw_method_data {
   pw_tape tape;
   sunindextype *colptr, *rowind; /* the pattern */
   pw_newton newton;
-  double *scale;       /* D: coords */
-  double *given;       /* scratch: 2 (coords + 3) + 2 rows */
-  double stop;         /* the stop time IDA knows */
-  double begun;        /* time of the start or the last restart */
-  char message[256];   /* the last one IDA sent */
+  double *scale;     /* D: coords */
+  double *given;     /* scratch: 2 (coords + 3) + 2 rows */
+  double stop;       /* the stop time IDA knows */
+  double begun;      /* time of the start or the last restart */
+  char message[256]; /* the last one IDA sent */
 };
 
 typedef struct pw_method_data ida_data;
@@ -239,7 +239,8 @@ static int ida_weights (N_Vector vy, N_Vector weights, void *user) {
   double *w = N_VGetArrayPointer (weights), c = d->ggl ? ida_leading (d) : 1 / T, force = 0;
   for (int j = 0; j < d->n; j++) {
     double unit = j < 3 * s->bodies && j % 3 < 2 ? L : 1;
-    double atol = set->atol > 0 ? set->atol : set->rtol * unit, atol_v = set->atol > 0 ? set->atol : set->rtol * unit / T;
+    double atol = set->atol > 0 ? set->atol : set->rtol * unit,
+           atol_v = set->atol > 0 ? set->atol : set->rtol * unit / T;
     w[j] = 1 / (set->rtol * fabs (y[j]) + atol);
     w[d->n + j] = 1 / (set->rtol * fabs (y[d->n + j]) + atol_v);
     force = fmax (force, s->mass[j] * unit / (T * T) * (unit == 1 ? 1 / L : 1));
@@ -396,10 +397,10 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
 }
 
 static int ida_fail (ida_data *d, int flag, pw_error *error) {
-  const char *why = flag == IDA_ERR_FAIL  ? "the error test fails however small the step"
-                    : flag == IDA_CONV_FAIL  ? "Newton's iteration does not converge however small the step"
-                    : flag == IDA_LSETUP_FAIL ? "the Newton matrix is singular"
-                    : flag == IDA_RES_FAIL   ? "a signal failed"
+  const char *why = flag == IDA_ERR_FAIL       ? "the error test fails however small the step"
+                    : flag == IDA_CONV_FAIL    ? "Newton's iteration does not converge however small the step"
+                    : flag == IDA_LSETUP_FAIL  ? "the Newton matrix is singular"
+                    : flag == IDA_RES_FAIL     ? "a signal failed"
                     : flag == IDA_TOO_MUCH_ACC ? "the tolerance is beyond the accuracy of the machine"
                                                : d->message;
   ida_statistics (d);
@@ -434,7 +435,9 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
   }
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
   for (int i = 0; i < r->s->entries; i++) r->ledger_at[i] = work[i];
-  return ida_place (d, t, N_VGetArrayPointer (d->y)) == 0 ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  return ida_place (d, t, N_VGetArrayPointer (d->y)) == 0
+             ? PW_OK
+             : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
 }
 
 static int ida_restart (pw_run *r, pw_error *error) {
@@ -460,8 +463,18 @@ static const pw_stabilisation ida_stabilisations[] = {
 };
 
 static const pw_option ida_options[] = {
-  { .name = "alpha", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", .about = "damping of the residuals" },
-  { .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", .about = "stiffness of the position residuals" },
+  { .name = "alpha",
+    .with = "baumgarte",
+    .value = 10,
+    .domain = PW_NONNEGATIVE,
+    .unit = "1/s",
+    .about = "damping of the residuals" },
+  { .name = "beta",
+    .with = "baumgarte",
+    .value = 10,
+    .domain = PW_NONNEGATIVE,
+    .unit = "1/s",
+    .about = "stiffness of the position residuals" },
   { .name = NULL },
 };
 

@@ -13,18 +13,18 @@
 
 struct pw_ldl {
   int nodes, unknowns;
-  size_t count;      /* of values */
-  int *order;        /* node at each place in the order */
-  int *place;        /* place of each node */
-  int *size;         /* unknowns of the node at each place */
-  int *position;     /* first unknown of the node at each place */
-  size_t *diagonal;  /* nodes: where the diagonal block is; those below follow it */
-  int *first;        /* nodes + 1: range in `below` of each column */
-  int *below;        /* places of the rows of L, ascending in each column */
-  size_t *offset;    /* where each of these blocks is */
-  size_t *target;    /* for column j, for p descending, q = 0 .. p: where K_pq is */
-  double *value;     /* count */
-  double *was;       /* unknowns: the diagonal before the factorisation */
+  size_t count;     /* of values */
+  int *order;       /* node at each place in the order */
+  int *place;       /* place of each node */
+  int *size;        /* unknowns of the node at each place */
+  int *position;    /* first unknown of the node at each place */
+  size_t *diagonal; /* nodes: where the diagonal block is; those below follow it */
+  int *first;       /* nodes + 1: range in `below` of each column */
+  int *below;       /* places of the rows of L, ascending in each column */
+  size_t *offset;   /* where each of these blocks is */
+  size_t *target;   /* for column j, for p descending, q = 0 .. p: where K_pq is */
+  double *value;    /* count */
+  double *was;      /* unknowns: the diagonal before the factorisation */
   char *memory;
 };
 
@@ -81,7 +81,8 @@ static void ldl_lists_close (ldl_lists *l) {
 static int ldl_order (int nodes, long pairs, const int *pair, int *order) {
   ldl_lists graph = { NULL, NULL };
   int status = ldl_collect (nodes, pairs, pair, NULL, 0, &graph);
-  if (status == PW_OK && nodes > 0 && amd_order (nodes, graph.first, graph.list, order, NULL, NULL) < 0) status = PW_MACHINE;
+  if (status == PW_OK && nodes > 0 && amd_order (nodes, graph.first, graph.list, order, NULL, NULL) < 0)
+    status = PW_MACHINE;
   ldl_lists_close (&graph);
   return status;
 }
@@ -335,7 +336,9 @@ double pw_ldl_factor (pw_ldl *l, int *node) {
     double pivot = ldl_invert (l->value + l->diagonal[j], k, l->was + l->position[j]);
     if (!(pivot >= worst)) worst = pivot, *node = l->order[j];
     if (!(pivot > 0)) break;
-    target = k == 1 ? ldl_column (l, j, 1, target) : k == 2 ? ldl_column (l, j, 2, target) : ldl_column (l, j, 3, target);
+    target = k == 1   ? ldl_column (l, j, 1, target)
+             : k == 2 ? ldl_column (l, j, 2, target)
+                      : ldl_column (l, j, 3, target);
   }
   return worst;
 }

@@ -11,28 +11,28 @@ enum { PW_MAX_OPTIONS = 12 };
 struct pw_run {
   pw_system *s;
   const pw_method *method;
-  int stabilisation;               /* index in method->stabilisations */
-  double option[PW_MAX_OPTIONS];   /* one per method->options */
+  int stabilisation;             /* index in method->stabilisations */
+  double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
-  pw_saddle *saddle;               /* with the mass matrix and all rows: accelerations, impulses */
-  double alpha, beta;              /* Baumgarte's, used by pw_accelerate; 0: none */
-  double breakpoint;               /* first discontinuity of a signal after t */
+  pw_saddle *saddle;  /* with the mass matrix and all rows: accelerations, impulses */
+  double alpha, beta; /* Baumgarte's, used by pw_accelerate; 0: none */
+  double breakpoint;  /* first discontinuity of a signal after t */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;
-  double *q, *v, *a;  /* coords + 3 each */
-  double *lambda;     /* rows */
-  double *ledger;     /* entries: work and losses up to t */
-  double *rate;       /* entries: their rates at t */
-  double projected;   /* energy added by projections up to t */
+  double *q, *v, *a; /* coords + 3 each */
+  double *lambda;    /* rows */
+  double *ledger;    /* entries: work and losses up to t */
+  double *rate;      /* entries: their rates at t */
+  double projected;  /* energy added by projections up to t */
 
   /* the state asked for by pw_at */
   double t_at;
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at;
   double projected_at;
 
-  double energy0;     /* kinetic + potential at the start */
-  double *scratch;    /* 2 (coords + 3) + 3 rows */
+  double energy0;  /* kinetic + potential at the start */
+  double *scratch; /* 2 (coords + 3) + 3 rows */
   double *q_given, *v_given;
   pw_start_report start;
   pw_statistics statistics;
@@ -63,11 +63,11 @@ void pw_note_residuals (pw_run *r);
 /* ---- Projection ---- */
 
 typedef struct {
-  pw_saddle *position;  /* metric of the positions, holonomic rows */
-  pw_saddle *velocity;  /* all rows */
-  int own_velocity;     /* velocity is not the run's saddle */
-  double *scratch;      /* 3 rows + coords */
-  int iterations;       /* of the last position projection */
+  pw_saddle *position; /* metric of the positions, holonomic rows */
+  pw_saddle *velocity; /* all rows */
+  int own_velocity;    /* velocity is not the run's saddle */
+  double *scratch;     /* 3 rows + coords */
+  int iterations;      /* of the last position projection */
 } pw_projector;
 
 /* Position metric `weight_q` and velocity metric `weight_v` (NULL: the run's own saddle with the mass matrix).  The

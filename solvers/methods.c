@@ -14,7 +14,7 @@ const pw_method *const pw_methods[] = {
 #define PW_METHOD(m) &pw_method_##m,
   PW_METHODS
 #undef PW_METHOD
-  NULL
+      NULL
 };
 
 /* One part of the name: up to a + or :. */
@@ -64,7 +64,8 @@ static int methods_choice (const pw_option *o, const char *text, double *value, 
       return PW_OK;
     }
   }
-  return pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, text, pw_nearest_text (&near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "method option %s cannot be \"%s\"%s", o->name, text,
+                  pw_nearest_text (&near, hint, sizeof hint));
 }
 
 /* Decimal numbers without regard to the locale: digits, point, exponent. */
@@ -102,16 +103,20 @@ static int methods_option (const pw_method *method, int stabilisation, char *par
     if (o->with && strcmp (o->with, with) != 0) continue;
     pw_nearest_try (&near, o->name);
     if (strcmp (o->name, part) == 0)
-      return o->choices ? methods_choice (o, equals + 1, values + i, error) : methods_number (o, equals + 1, values + i, error);
+      return o->choices ? methods_choice (o, equals + 1, values + i, error)
+                        : methods_number (o, equals + 1, values + i, error);
   }
-  return pw_fail (error, PW_INPUT, "method %s+%s has no option \"%s\"%s", method->name, with, part, pw_nearest_text (&near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "method %s+%s has no option \"%s\"%s", method->name, with, part,
+                  pw_nearest_text (&near, hint, sizeof hint));
 }
 
 int pw_parse_options (const char *text, const pw_method **method, int *stabilisation, double *values, pw_error *error) {
   char part[80];
   const char *whole = text;
   *stabilisation = 0;
-  if (methods_part (part, sizeof part, &text, whole, error) != PW_OK || methods_integrator (part, method, error) != PW_OK) return PW_INPUT;
+  if (methods_part (part, sizeof part, &text, whole, error) != PW_OK ||
+      methods_integrator (part, method, error) != PW_OK)
+    return PW_INPUT;
   for (int i = 0; (*method)->options[i].name; i++) values[i] = (*method)->options[i].value;
   if (*text == '+') {
     text++;
@@ -128,7 +133,8 @@ int pw_parse_options (const char *text, const pw_method **method, int *stabilisa
     text += n;
     if (methods_option (*method, *stabilisation, part, values, error) != PW_OK) return PW_INPUT;
   }
-  if (*text) return pw_fail (error, PW_INPUT, "method \"%.80s\": expected INTEGRATOR+STABILISATION:OPTION=VALUE", whole);
+  if (*text)
+    return pw_fail (error, PW_INPUT, "method \"%.80s\": expected INTEGRATOR+STABILISATION:OPTION=VALUE", whole);
   return PW_OK;
 }
 

@@ -4,8 +4,8 @@
 
 #include "pinwheel-solvers.h"
 
-#define PW_METHODS                                                                                                     \
-  PW_METHOD (rk4)                                                                                                      \
+#define PW_METHODS \
+  PW_METHOD (rk4)  \
   PW_METHOD (ida)
 
 /* pw_parse_method that keeps the options: values has room for PW_MAX_OPTIONS. */

@@ -98,7 +98,8 @@ void pw_newton_readers (pw_newton *n, pw_system *s, pw_tape *t, int row, int col
           for (int c = 0; c < cols; c++) {
             int i = pw_global (k, e, c);
             if (i >= s->coords) continue;
-            pw_tape_put (t, row + i, to, t->recording ? 0 : -n->block[(e * cols + c) * signals + u] * source->x[source->reads + x]);
+            pw_tape_put (t, row + i, to,
+                         t->recording ? 0 : -n->block[(e * cols + c) * signals + u] * source->x[source->reads + x]);
           }
         }
       }

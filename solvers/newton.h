@@ -19,7 +19,7 @@ void pw_newton_close (pw_newton *n);
  * lambda the multipliers of jtl_q (rows); `rows` limits the constraint rows that take part. */
 typedef struct {
   int row, col, rows;
-  double factor;          /* of holonomic rows, and of coordinates */
+  double factor; /* of holonomic rows, and of coordinates */
   double factor_nonholonomic;
   const double *row_scale;
   const double *w, *lambda;

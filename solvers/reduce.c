@@ -124,7 +124,8 @@ static void reduce_fill_row (reduce_plan *p, pw_reduce *r, const pw_slab *k, int
   pw_reduce_piece *piece = c->piece + c->rows * PW_REDUCE_PIECES;
   for (int i = 0; i < PW_REDUCE_PIECES; i++) piece[i].width = 0;
   for (int i = 0; i < n; i++)
-    piece[i] = (pw_reduce_piece){ J + at[i], reduce_add_group (p->s, c, group[i]), reduce_group_width (p->s, group[i]) };
+    piece[i] =
+        (pw_reduce_piece){ J + at[i], reduce_add_group (p->s, c, group[i]), reduce_group_width (p->s, group[i]) };
   r->component_of_row[row] = component;
   c->row[c->rows++] = row;
 }
@@ -170,7 +171,8 @@ static int reduce_lay_out (pw_reduce *r, const reduce_plan *p) {
 static void reduce_copy (pw_component *c) {
   memset (c->Z, 0, (size_t)(c->rows * c->cols) * sizeof *c->Z);
   for (int i = 0; i < c->rows; i++)
-    for (const pw_reduce_piece *p = c->piece + i * PW_REDUCE_PIECES; p < c->piece + (i + 1) * PW_REDUCE_PIECES && p->width; p++)
+    for (const pw_reduce_piece *p = c->piece + i * PW_REDUCE_PIECES;
+         p < c->piece + (i + 1) * PW_REDUCE_PIECES && p->width; p++)
       for (int n = 0; n < p->width; n++) c->Z[i * c->cols + p->column + n] = p->J[n];
 }
 
@@ -278,8 +280,10 @@ static int reduce_check (pw_reduce *r, const reduce_plan *p, pw_error *error) {
       int used = 0;
       for (int q = 0; q < found; q++) used |= c->pivot[q] == n;
       if (c->light[n] && !used)
-        return pw_fail (error, PW_INPUT, "model %s: %s has no mass, and no constraint determines how it moves; give it mass, or constrain it",
-                        s->model, pw_state_name (s, c->global[n], name, sizeof name));
+        return pw_fail (
+            error, PW_INPUT,
+            "model %s: %s has no mass, and no constraint determines how it moves; give it mass, or constrain it",
+            s->model, pw_state_name (s, c->global[n], name, sizeof name));
     }
   }
   return PW_OK;
@@ -294,7 +298,8 @@ static int reduce_number (pw_reduce *r, reduce_plan *p, pw_error *error) {
   for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++)
     for (int e = 0; e < k->b.count; e++)
       for (int n = reduce_touched (s, k, e, group, at); n-- > 0;)
-        for (int i = 0; i < k->kind->rows; i++) seen[group[n]] |= (char)reduce_is_active (p, k->row + e * k->kind->rows + i);
+        for (int i = 0; i < k->kind->rows; i++)
+          seen[group[n]] |= (char)reduce_is_active (p, k->row + e * k->kind->rows + i);
   int status = PW_OK;
   for (int g = 0; g < p->groups && status == PW_OK; g++) {
     if (!reduce_light (p, g)) continue;
@@ -302,8 +307,10 @@ static int reduce_number (pw_reduce *r, reduce_plan *p, pw_error *error) {
     int j = reduce_group_first (s, g);
     while (p->weight[j] != 0) j++;
     if (!seen[g])
-      status = pw_fail (error, PW_INPUT, "model %s: %s has no mass, and no constraint determines how it moves; give it mass, or constrain it",
-                        s->model, pw_state_name (s, j, name, sizeof name));
+      status =
+          pw_fail (error, PW_INPUT,
+                   "model %s: %s has no mass, and no constraint determines how it moves; give it mass, or constrain it",
+                   s->model, pw_state_name (s, j, name, sizeof name));
     if (reduce_root (p, g) == g) p->member[g] = r->components++;
   }
   free (seen);
@@ -322,7 +329,8 @@ static int reduce_fill (pw_reduce *r, reduce_plan *p, pw_error *error) {
   return reduce_check (r, p, error);
 }
 
-int pw_reduce_open (pw_reduce *r, pw_system *s, const double *weight, int rows, const unsigned char *active, pw_error *error) {
+int pw_reduce_open (pw_reduce *r, pw_system *s, const double *weight, int rows, const unsigned char *active,
+                    pw_error *error) {
   int groups = reduce_groups (s), status = PW_MACHINE;
   *r = (pw_reduce){ 0 };
   reduce_plan p = { .s = s, .weight = weight, .active = active, .rows = rows, .groups = groups };

@@ -21,19 +21,19 @@ typedef struct {
 
 typedef struct {
   int rows, cols, pivots;
-  int groups;            /* bodies and own coordinates touched */
-  int *group;            /* first global coordinate of each */
-  int *group_column;     /* first local column of each */
-  int *row;              /* global row; the pivots first, in order */
-  int *pivot;            /* local column of each pivot */
-  int *global;           /* cols: global coordinate of a local column */
-  unsigned char *light;  /* cols: 1 for a coordinate without weight */
-  double *unit;          /* cols: length scale of an angle, 1 of a length */
+  int groups;             /* bodies and own coordinates touched */
+  int *group;             /* first global coordinate of each */
+  int *group_column;      /* first local column of each */
+  int *row;               /* global row; the pivots first, in order */
+  int *pivot;             /* local column of each pivot */
+  int *global;            /* cols: global coordinate of a local column */
+  unsigned char *light;   /* cols: 1 for a coordinate without weight */
+  double *unit;           /* cols: length scale of an angle, 1 of a length */
   pw_reduce_piece *piece; /* rows x PW_REDUCE_PIECES; width 0 ends a row's */
-  double *Z;             /* rows x cols: J~ */
-  double *factor;        /* rows x pivots: T^-1 */
-  double *gamma;         /* rows scratch */
-  double *lambda;        /* rows scratch: lambda~ */
+  double *Z;              /* rows x cols: J~ */
+  double *factor;         /* rows x pivots: T^-1 */
+  double *gamma;          /* rows scratch */
+  double *lambda;         /* rows scratch: lambda~ */
 } pw_component;
 
 enum { PW_REDUCE_PIECES = PW_MAX_BODIES + PW_MAX_OWN };
@@ -47,7 +47,8 @@ typedef struct {
 
 /* Finds the components and matches at the pose J was swept at.  Errors: PW_MACHINE, PW_INPUT (a coordinate that no
  * row determines, by name). */
-int pw_reduce_open (pw_reduce *r, pw_system *s, const double *weight, int rows, const unsigned char *active, pw_error *error);
+int pw_reduce_open (pw_reduce *r, pw_system *s, const double *weight, int rows, const unsigned char *active,
+                    pw_error *error);
 void pw_reduce_close (pw_reduce *r);
 
 /* Eliminates with the J last swept; matches anew if a pivot has become small.  Returns the smallest pivot squared,

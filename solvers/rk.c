@@ -14,10 +14,10 @@ struct pw_method_data {
   const pw_tableau *tableau;
   int projects, held, every; /* projection; inputs held over the step; project each so many steps */
   pw_projector projector;
-  double base;               /* time from which fixed steps are counted */
-  long count;                /* steps since then */
+  double base;                                                 /* time from which fixed steps are counted */
+  long count;                                                  /* steps since then */
   double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES]; /* rates, accelerations, ledger's rates of the stages */
-  double *q, *v;             /* a stage's state */
+  double *q, *v;                                               /* a stage's state */
   double *lambda;
   /* the beginning of the last step, for looking back into it */
   double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
@@ -35,11 +35,31 @@ const pw_stabilisation pw_rk_stabilisations[] = {
 };
 
 const pw_option pw_rk_options[] = {
-  { .name = "inputs", .choices = rk_inputs, .about = "signals of forces at stage times, or held from the step's start (first order)" },
-  { .name = "alpha", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", .about = "damping of the residuals" },
-  { .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", .about = "stiffness of the position residuals" },
-  { .name = "metric", .with = "projection", .choices = rk_metrics, .about = "norm in which the correction is smallest: mass matrix, or identity (pseudo-inverse)" },
-  { .name = "every", .with = "projection", .value = 1, .domain = PW_COUNT, .unit = "steps", .about = "project after each so many steps" },
+  { .name = "inputs",
+    .choices = rk_inputs,
+    .about = "signals of forces at stage times, or held from the step's start (first order)" },
+  { .name = "alpha",
+    .with = "baumgarte",
+    .value = 10,
+    .domain = PW_NONNEGATIVE,
+    .unit = "1/s",
+    .about = "damping of the residuals" },
+  { .name = "beta",
+    .with = "baumgarte",
+    .value = 10,
+    .domain = PW_NONNEGATIVE,
+    .unit = "1/s",
+    .about = "stiffness of the position residuals" },
+  { .name = "metric",
+    .with = "projection",
+    .choices = rk_metrics,
+    .about = "norm in which the correction is smallest: mass matrix, or identity (pseudo-inverse)" },
+  { .name = "every",
+    .with = "projection",
+    .value = 1,
+    .domain = PW_COUNT,
+    .unit = "steps",
+    .about = "project after each so many steps" },
   { .name = NULL },
 };
 
@@ -173,7 +193,8 @@ static int rk_project (pw_run *r, double t, double *q, double *v, double *added)
 }
 
 /* Accelerations of a state that was just projected, or not. */
-static int rk_accelerate (pw_run *r, int projected, double t, const double *q, const double *v, double *a, double *lambda) {
+static int rk_accelerate (pw_run *r, int projected, double t, const double *q, const double *v, double *a,
+                          double *lambda) {
   if (!projected || r->data->projector.own_velocity) return pw_accelerate (r, t, q, v, a, lambda);
   pw_accelerate_placed (r, v, a, lambda);
   return PW_OK;
@@ -269,7 +290,8 @@ static void rk_interpolate (const pw_run *r, double h, double x) {
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
   struct pw_method_data *d = r->data;
   size_t n = (size_t)r->s->coords * sizeof (double);
-  if (t > r->t || t < d->t0) return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, d->t0, r->t);
+  if (t > r->t || t < d->t0)
+    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, d->t0, r->t);
   if (t == r->t) {
     memcpy (r->q_at, r->q, n);
     memcpy (r->v_at, r->v, n);

@@ -29,13 +29,25 @@ static int run_allocate (pw_run *r) {
     double **array;
     size_t count;
   } array[] = {
-    { &r->q, n },         { &r->v, n },        { &r->a, n },          { &r->lambda, rows },     { &r->ledger, entries },
-    { &r->rate, entries }, { &r->q_at, n },     { &r->v_at, n },       { &r->a_at, n },          { &r->lambda_at, rows },
-    { &r->ledger_at, entries }, { &r->scratch, 2 * n + 3 * rows }, { &r->q_given, n }, { &r->v_given, n },
+    { &r->q, n },
+    { &r->v, n },
+    { &r->a, n },
+    { &r->lambda, rows },
+    { &r->ledger, entries },
+    { &r->rate, entries },
+    { &r->q_at, n },
+    { &r->v_at, n },
+    { &r->a_at, n },
+    { &r->lambda_at, rows },
+    { &r->ledger_at, entries },
+    { &r->scratch, 2 * n + 3 * rows },
+    { &r->q_given, n },
+    { &r->v_given, n },
   };
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
-    for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i].array = pw_take (&l, array[i].count, sizeof (double));
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+      *array[i].array = pw_take (&l, array[i].count, sizeof (double));
     if (pass == 1) break;
     r->memory = calloc (1, l.used + 1);
     if (r->memory == NULL) return PW_MACHINE;
@@ -80,7 +92,8 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   pw_settings none = { 0 };
   if (pw_parse_options (method, &r->method, &r->stabilisation, r->option, error) != PW_OK) return PW_INPUT;
   int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
-  if (status == PW_OK && run_allocate (r) != PW_OK) status = pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (status == PW_OK && run_allocate (r) != PW_OK)
+    status = pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   if (status != PW_OK) return status;
   r->t = r->t_at = r->settings.t;
   pw_hold (r->s, 0);
@@ -144,7 +157,8 @@ static void run_account (pw_run *r, pw_sample *sample) {
   sample->potential = pw_potential (s);
   if (!r->settings.ledger) return;
   sample->ledger = r->ledger_at;
-  for (int i = 0; i < s->entries; i++) *(s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += r->ledger_at[i];
+  for (int i = 0; i < s->entries; i++)
+    *(s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += r->ledger_at[i];
   sample->projection = r->projected_at;
   sample->balance = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss - sample->projection;
 }

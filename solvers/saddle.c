@@ -41,17 +41,17 @@ typedef struct {
 struct pw_saddle {
   pw_system *s;
   int nodes, rows, terms, unknowns;
-  double *inverse;     /* coords + 3: 1 / weight; 0 for held ones and those without weight; the ground's 0 */
-  double *force;       /* coords + 3 */
-  double *y;           /* unknowns */
-  saddle_node *node;   /* nodes + 1 */
+  double *inverse;   /* coords + 3: 1 / weight; 0 for held ones and those without weight; the ground's 0 */
+  double *force;     /* coords + 3 */
+  double *y;         /* unknowns */
+  saddle_node *node; /* nodes + 1 */
   saddle_piece *piece;
   saddle_term *term;
   pw_reduce reduce;
   pw_ldl *ldl;
-  double pivot;        /* squared, of the last factorisation */
+  double pivot; /* squared, of the last factorisation */
   int pivot_row;
-  double *zero;        /* coords: a force of nothing */
+  double *zero; /* coords: a force of nothing */
   char *memory;
 };
 
@@ -75,7 +75,8 @@ static void saddle_add_piece (const pw_saddle *k, saddle_list *l, const double *
 static void saddle_element_node (const pw_saddle *k, saddle_list *l, const pw_slab *b, int e, int r, int size) {
   const pw_kind *kind = b->kind;
   const double *J = b->J + (e * kind->rows + r) * b->b.cols;
-  if (l->node) l->node[l->nodes] = (saddle_node){ .size = size, .first = l->pieces, .row = b->row + e * kind->rows + r };
+  if (l->node)
+    l->node[l->nodes] = (saddle_node){ .size = size, .first = l->pieces, .row = b->row + e * kind->rows + r };
   l->nodes++;
   for (int n = 0; n < kind->bodies; n++) {
     int j = b->column[e * kind->bodies + n];
@@ -93,7 +94,8 @@ static void saddle_element_nodes (const pw_saddle *k, saddle_list *l, int rows, 
       int i = b->row + e * b->kind->rows, r = 0;
       while (r < b->kind->rows) {
         int size = 0;
-        while (r + size < b->kind->rows && size < PW_LDL_NODE && (active == NULL || active[i + r + size]) && k->reduce.component_of_row[i + r + size] < 0)
+        while (r + size < b->kind->rows && size < PW_LDL_NODE && (active == NULL || active[i + r + size]) &&
+               k->reduce.component_of_row[i + r + size] < 0)
           size++;
         if (size > 0) saddle_element_node (k, l, b, e, r, size);
         r += size > 0 ? size : 1;
@@ -107,10 +109,12 @@ static void saddle_component_nodes (const pw_saddle *k, saddle_list *l) {
     pw_component *c = &k->reduce.component[n];
     for (int i = c->pivots; i < c->rows; i++) {
       if (l->node)
-        l->node[l->nodes] = (saddle_node){ .size = 1, .first = l->pieces, .row = -1, .gamma = c->gamma + i, .lambda = c->lambda + i };
+        l->node[l->nodes] =
+            (saddle_node){ .size = 1, .first = l->pieces, .row = -1, .gamma = c->gamma + i, .lambda = c->lambda + i };
       l->nodes++;
       for (int g = 0; g < c->groups; g++)
-        saddle_add_piece (k, l, c->Z + i * c->cols + c->group_column[g], c->cols, c->group[g], c->group[g] < 3 * k->s->bodies ? 3 : 1);
+        saddle_add_piece (k, l, c->Z + i * c->cols + c->group_column[g], c->cols, c->group[g],
+                          c->group[g] < 3 * k->s->bodies ? 3 : 1);
     }
   }
 }
@@ -162,8 +166,13 @@ static long saddle_pairs (const pw_saddle *k, const saddle_meeting *m, int *pair
         int transposed;
         size_t at = pw_ldl_block (k->ldl, m->node[a], m->node[b], &transposed);
         const saddle_piece *A = &k->piece[transposed ? b : a], *B = &k->piece[transposed ? a : b];
-        terms[count] = (saddle_term){ .A = A->J, .B = B->J, .to = pw_ldl_values (k->ldl, &values) + at, .j = j,
-                                      .stride_a = A->stride, .stride_b = B->stride, .width = (signed char)A->width,
+        terms[count] = (saddle_term){ .A = A->J,
+                                      .B = B->J,
+                                      .to = pw_ldl_values (k->ldl, &values) + at,
+                                      .j = j,
+                                      .stride_a = A->stride,
+                                      .stride_b = B->stride,
+                                      .width = (signed char)A->width,
                                       .a = (signed char)k->node[m->node[transposed ? b : a]].size,
                                       .b = (signed char)k->node[m->node[transposed ? a : b]].size };
       }

@@ -81,16 +81,29 @@ static int start_fail (pw_run *r, const start_trouble *trouble, pw_error *error)
   char element[120];
   if (trouble->row < 0) return pw_fail (error, PW_START, "model %s: the start cannot be made consistent", r->s->model);
   pw_row_element (r->s, trouble->row, element, sizeof element);
-  return pw_fail (error, PW_START, "model %s: the start cannot be made consistent: %s is %s by %.6g %s", r->s->model, element,
-                  trouble->rates ? "violated" : "open", trouble->off, trouble->rates ? "m/s (or rad/s)" : "m (or rad)");
+  return pw_fail (error, PW_START, "model %s: the start cannot be made consistent: %s is %s by %.6g %s", r->s->model,
+                  element, trouble->rates ? "violated" : "open", trouble->off,
+                  trouble->rates ? "m/s (or rad/s)" : "m (or rad)");
+}
+
+int pw_start_moved (const pw_system *s, const pw_start_report *report, int state) {
+  int rate = state >= s->coords, j = rate ? state - s->coords : state;
+  double unit = (j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1) / (rate ? s->scale.time : 1);
+  double from = rate ? report->v_given[j] : report->q_given[j], to = rate ? report->v[j] : report->q[j];
+  return !(fabs (to - from) <= 16 * DBL_EPSILON * (fabs (to) + unit));
 }
 
 /* Fills the report; the state given is in q_given, the new one in q. */
 static void start_report (pw_run *r, int freed, const pw_residuals *before) {
   pw_start_report *report = &r->start;
-  *report = (pw_start_report){ .q_given = r->q_given, .v_given = r->v_given, .q = r->q, .v = r->v, .freed = freed,
-                               .position = before->position, .velocity = before->velocity };
-  for (int j = 0; j < r->s->coords; j++) report->moved += (r->q[j] != r->q_given[j]) + (r->v[j] != r->v_given[j]);
+  *report = (pw_start_report){ .q_given = r->q_given,
+                               .v_given = r->v_given,
+                               .q = r->q,
+                               .v = r->v,
+                               .freed = freed,
+                               .position = before->position,
+                               .velocity = before->velocity };
+  for (int j = 0; j < 2 * r->s->coords; j++) report->moved += pw_start_moved (r->s, report, j);
 }
 
 int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
