@@ -128,7 +128,8 @@ int pw_sweep_block (const pw_system *s, const pw_slab *k, pw_block block, double
   if (sweep != pw_by_differences)
     sweep (&k->b, out);
   else
-    for (int e = 0; e < k->b.count; e++) pw_difference (s, k, e, block, out + e * pw_block_rows (k->kind, block) * k->b.cols);
+    for (int e = 0; e < k->b.count; e++)
+      pw_difference (s, k, e, block, out + e * pw_block_rows (k->kind, block) * k->b.cols);
   return 1;
 }
 

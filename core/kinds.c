@@ -5,5 +5,5 @@ const pw_kind *const pw_kinds[] = {
 #define PW_KIND(k) &pw_kind_##k,
   PW_KINDS
 #undef PW_KIND
-  NULL
+      NULL
 };

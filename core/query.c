@@ -70,7 +70,8 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
   const char *dot = strrchr (name, '.');
   if (dot == NULL) return -1;
   int b = 0;
-  while (b < s->bodies && (strncmp (s->body_name[b], name, (size_t)(dot - name)) != 0 || s->body_name[b][dot - name])) b++;
+  while (b < s->bodies && (strncmp (s->body_name[b], name, (size_t)(dot - name)) != 0 || s->body_name[b][dot - name]))
+    b++;
   if (b == s->bodies) return -1;
   pw_nearest what = { .sought = dot + 1 };
   for (int i = 0; i < 6; i++) {
@@ -95,7 +96,8 @@ int pw_find_state (const pw_system *s, const char *name, pw_error *error) {
     pw_nearest_try (&near, pw_state_name (s, i, text, sizeof text));
     if (near.best == text) near.best = strcpy (best, text);
   }
-  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name, pw_nearest_text (&near, hint, sizeof hint));
+  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name,
+                  pw_nearest_text (&near, hint, sizeof hint));
 }
 
 /* The slab of a row, and the element and the row's number in it. */

@@ -36,7 +36,5 @@ static void build (pw_model *m, const void *parameter) {
 }
 
 PW_MODEL (.about = "two-segment ride-on that moves because its rider swings the steering hinge",
-          .parameters = parameters,
-          .parameters_size = sizeof (ezyroller),
-          .run = { .t_end = 100, .step = 1e-3, .method = "rk4+projection" },
-          .build = build);
+          .parameters = parameters, .parameters_size = sizeof (ezyroller),
+          .run = { .t_end = 100, .step = 1e-3, .method = "rk4+projection" }, .build = build);

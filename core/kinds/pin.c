@@ -25,9 +25,9 @@ static inline pin_arms pin_turn (const pin *p, const pw_pose *A, const pw_pose *
 }
 
 /* Names the parts of element e: its two poses and arms. */
-#define PIN_PARTS                                                                                                      \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]];                                      \
-  const pin_arms s = pin_turn ((const pin *)b->element + e, A, B);                                                     \
+#define PIN_PARTS                                                                 \
+  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
+  const pin_arms s = pin_turn ((const pin *)b->element + e, A, B);                \
   (void)A, (void)B, (void)s
 
 static int pin_prepare (const void *definition, const pw_body *const *bodies, void *element, double *own_mass,
@@ -113,7 +113,8 @@ static void pin_jtl_q (const pw_batch *b, double *out) {
 
 static const pw_field pin_fields[] = {
   { PW_AT (pw_pin, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies, or ground for one of them" },
-  { PW_AT (pw_pin, at), PW_POINT, .count = 2, .unit = "m", .required = 1, .about = "the common point in each body's frame" },
+  { PW_AT (pw_pin, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
+    .about = "the common point in each body's frame" },
   { .name = NULL },
 };
 

@@ -15,11 +15,13 @@ static void torque_force_u (const pw_batch *b, double *out) {
 }
 
 static void torque_power (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e] * (b->pose[b->body[2 * e]].omega - b->pose[b->body[2 * e + 1]].omega);
+  for (int e = 0; e < b->count; e++)
+    out[e] = b->u[3 * e] * (b->pose[b->body[2 * e]].omega - b->pose[b->body[2 * e + 1]].omega);
 }
 
 static const pw_field torque_fields[] = {
-  { PW_AT (pw_torque, body), PW_BODY, .count = 2, .required = 1, .about = "the body it acts on, and the one it reacts on; ground for one of them" },
+  { PW_AT (pw_torque, body), PW_BODY, .count = 2, .required = 1,
+    .about = "the body it acts on, and the one it reacts on; ground for one of them" },
   { PW_AT (pw_torque, value), PW_SIGNAL, .unit = "N m", .required = 1, .about = "torque on the first body" },
   { .name = NULL },
 };

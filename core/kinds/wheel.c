@@ -17,9 +17,9 @@ typedef struct {
 } wheel;
 
 /* Names the parts of element e: its pose and the direction (c, s) it rolls in. */
-#define WHEEL_PARTS                                                                                                    \
-  const wheel *k = (const wheel *)b->element + e;                                                                      \
-  const pw_pose *A = &b->pose[b->body[e]];                                                                             \
+#define WHEEL_PARTS                               \
+  const wheel *k = (const wheel *)b->element + e; \
+  const pw_pose *A = &b->pose[b->body[e]];        \
   double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin
 
 static int wheel_prepare (const void *definition, const pw_body *const *bodies, void *element, double *own_mass,
@@ -87,11 +87,13 @@ static void wheel_contact (const pw_batch *b, double *out) {
 static const pw_field wheel_fields[] = {
   { PW_AT (pw_wheel, body), PW_BODY, .required = 1, .about = "the body that carries the wheel" },
   { PW_AT (pw_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
-  { PW_AT (pw_wheel, heading), PW_NUMBER, .unit = "rad", .about = "rolling direction in the body's frame; 0: along its x" },
+  { PW_AT (pw_wheel, heading), PW_NUMBER, .unit = "rad",
+    .about = "rolling direction in the body's frame; 0: along its x" },
   { .name = NULL },
 };
 
-static const pw_quantity wheel_reaction[] = { { "N", "N", NULL, "lateral force on the body, to the left of the heading" } };
+static const pw_quantity wheel_reaction[] = { { "N", "N", NULL,
+                                                "lateral force on the body, to the left of the heading" } };
 
 const pw_kind pw_kind_wheel = {
   .name = "wheel",
