@@ -20,7 +20,7 @@ void pw_report_start (const pw_system *s, const pw_start_report *start) {
   for (int i = 0; i < 2 * n && listed < REPORT_MOVED; i++) {
     double from = i < n ? start->q_given[i] : start->v_given[i - n], to = i < n ? start->q[i] : start->v[i - n];
     char name[REPORT_NAME], a[32], b[32];
-    if (from == to) continue;
+    if (!pw_start_moved (s, start, i)) continue;
     fprintf (stderr, "  %s from %s to %s %s\n", pw_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
              pw_format (b, to, 10), pw_state_unit (s, i));
     listed++;
