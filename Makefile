@@ -220,7 +220,8 @@ format:
 	clang-format -i $(SOURCES)
 
 format-check:
-	@clang-format --dry-run -Werror $(SOURCES)
+	@bad=0; for f in $(SOURCES); do \
+	  clang-format "$$f" | cmp -s - "$$f" || { echo "not formatted: $$f"; bad=1; }; done; exit $$bad
 
 # ---- Installing ----
 
