@@ -6,8 +6,8 @@
 #include "specimen.h"
 
 enum {
-  PW_PROBE_COORDS = 3 * PW_SPECIMEN_BODIES + PW_SPECIMEN_ELEMENTS * PW_MAX_OWN,
-  PW_PROBE_OUT = PW_SPECIMEN_ELEMENTS * PW_MAX_COLS * PW_MAX_COLS,
+  PW_PROBE_COORDS = 3 * PW_SPECIMEN_BODIES + PW_SPECIMEN_BATCH * PW_MAX_OWN,
+  PW_PROBE_OUT = PW_SPECIMEN_BATCH * PW_MAX_COLS * PW_MAX_COLS,
   PW_PROBE_GUARD = 8,   /* numbers behind an array that have to stay what they are */
   PW_PROBE_MOTION = -1, /* moves, besides that of one coordinate */
   PW_PROBE_TIME = -2
@@ -23,7 +23,7 @@ typedef struct {
   int elements, rows, cols; /* rows and cols per element */
   double t, q[PW_PROBE_COORDS], v[PW_PROBE_COORDS], a[PW_PROBE_COORDS];
   double q_now[PW_PROBE_COORDS], v_now[PW_PROBE_COORDS]; /* as placed */
-  double w[PW_SPECIMEN_ELEMENTS * PW_MAX_COLS], lambda[PW_SPECIMEN_ELEMENTS * PW_MAX_ROWS];
+  double w[PW_SPECIMEN_BATCH * PW_MAX_COLS], lambda[PW_SPECIMEN_BATCH * PW_MAX_ROWS];
   double size; /* largest value of the function last differenced */
   pw_selftest_report *report;
 } pw_probe;

@@ -82,6 +82,18 @@ static void selftest_force_u (pw_probe *x) {
   pw_probe_compare (x, "force_u", "force_u = d force/du", x->cols * signals, 1, value, reference);
 }
 
+/* A force that calls itself constant is the same after all else has changed. */
+static void selftest_constant (pw_probe *x) {
+  double before[PW_PROBE_OUT + PW_PROBE_GUARD], after[PW_PROBE_OUT + PW_PROBE_GUARD];
+  int n = x->elements * x->cols, changed = 0;
+  selftest_force (x, before);
+  pw_probe_place (x, PW_PROBE_MOTION, 1);
+  selftest_force (x, after);
+  pw_probe_place (x, PW_PROBE_MOTION, 0);
+  for (int i = 0; i < n; i++) changed += before[i] != after[i];
+  pw_probe_note (x->report, "constant", "a constant force does not change", changed, 0, "exact", "");
+}
+
 /* ---- Second-order blocks ---- */
 
 static void selftest_block (pw_probe *x, pw_block block, const char *name, const char *about, double size) {
@@ -157,8 +169,7 @@ static int selftest_obey (pw_probe *x, int e) {
  * what it takes from its energy and from outside, less its losses. */
 static void selftest_power_of (pw_probe *x, int e) {
   double force[PW_PROBE_OUT + PW_PROBE_GUARD], drift[PW_PROBE_OUT], eta[PW_PROBE_OUT + PW_PROBE_GUARD];
-  double slope[PW_SPECIMEN_ELEMENTS], power[PW_SPECIMEN_ELEMENTS + PW_PROBE_GUARD],
-      loss[PW_SPECIMEN_ELEMENTS + PW_PROBE_GUARD];
+  double slope[PW_SPECIMEN_BATCH], power[PW_SPECIMEN_BATCH + PW_PROBE_GUARD], loss[PW_SPECIMEN_BATCH + PW_PROBE_GUARD];
   pw_probe_slope (x, selftest_energy, PW_PROBE_MOTION, x->elements, slope);
   selftest_force (x, force);
   pw_probe_sweep (x, x->kind->power, "power", x->elements, power);
@@ -194,11 +205,12 @@ static void selftest_power (pw_probe *x) {
 /* ---- */
 
 static void selftest_all (pw_probe *x) {
-  double out[3 * PW_SPECIMEN_ELEMENTS + PW_PROBE_GUARD];
+  double out[3 * PW_SPECIMEN_BATCH + PW_PROBE_GUARD];
   pw_probe_place (x, PW_PROBE_TIME, 0);
   if (x->kind->level == PW_HOLONOMIC) selftest_holonomic (x);
   if (x->rows > 0) selftest_gamma (x);
   if (x->kind->signals > 0) selftest_force_u (x);
+  if (x->kind->constant) selftest_constant (x);
   selftest_blocks (x);
   selftest_power (x);
   pw_probe_sweep (x, x->kind->contact, "contact", 3 * x->elements, out);

@@ -46,7 +46,9 @@ static const char *specimen_fields (const pw_kind *k) {
     if (f->type == PW_BODY) bodies += pw_field_count (f);
     if (f->type == PW_SIGNAL) signals += pw_field_count (f);
   }
-  if (bodies != k->bodies) return "bodies is not the number of fields of type PW_BODY";
+  if (k->each_body && (bodies > 0 || k->bodies != 1))
+    return "a kind that acts on each body has one body and names none";
+  if (!k->each_body && bodies != k->bodies) return "bodies is not the number of fields of type PW_BODY";
   if (signals != k->signals) return "signals is not the number of fields of type PW_SIGNAL";
   return "";
 }
@@ -56,6 +58,7 @@ static const char *specimen_sweeps (const pw_kind *k) {
                               k->force_u, k->energy, k->power, k->loss, k->contact };
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
     if (exact[i] == pw_by_differences) return "PW_BY_DIFFERENCES stands in another place than a second-order block's";
+  if (k->constant && (k->force == NULL || k->signals > 0)) return "a constant force that is none, or has signals";
   if (k->rows > 0 && k->J == NULL) return "constraint rows without J";
   if (k->level == PW_HOLONOMIC && k->g == NULL) return "holonomic rows without g";
   return "";
@@ -133,7 +136,7 @@ static void specimen_element (pw_model *m, const specimen *x, int e) {
   for (const pw_field *f = x->kind->fields; f->name; f++)
     for (int i = 0; i < pw_field_count (f); i++)
       specimen_value (x->random, f, definition + f->offset + (size_t)i * specimen_bytes (f->type));
-  for (int n = 0; n < x->kind->bodies; n++)
+  for (int n = 0; n < x->kind->bodies && !x->kind->each_body; n++)
     *(const char **)pw_field_at (x->kind, definition, PW_BODY, n) = specimen_body (x, e, n);
   pw_add (m, x->kind, definition);
 }
@@ -145,7 +148,7 @@ static void specimen_build (pw_model *m, const void *parameters) {
     pw_add_body (m, &(pw_body){ .name = name[b],
                                 .mass = pw_random_between (x->random, 0.5, 2),
                                 .inertia = pw_random_between (x->random, 0.1, 1) });
-  for (int e = 0; e < PW_SPECIMEN_ELEMENTS; e++) specimen_element (m, x, e);
+  for (int e = 0; e < (x->kind->each_body ? 1 : PW_SPECIMEN_ELEMENTS); e++) specimen_element (m, x, e);
 }
 
 static pw_system *specimen_try (const pw_kind *kind, pw_random *random, pw_error *error) {

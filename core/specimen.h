@@ -5,7 +5,11 @@
 #include <stdint.h>
 #include "system.h"
 
-enum { PW_SPECIMEN_BODIES = 4, PW_SPECIMEN_ELEMENTS = 3 };
+enum {
+  PW_SPECIMEN_BODIES = 4,
+  PW_SPECIMEN_ELEMENTS = 3,
+  PW_SPECIMEN_BATCH = 4 /* the most elements of the compiled scene: one on each body, or those described */
+};
 
 /* Random numbers, the same on every machine. */
 typedef struct {
@@ -17,7 +21,8 @@ double pw_random_between (pw_random *r, double low, double high);
 const char *pw_specimen_fault (const pw_kind *kind);
 
 /* Compiles a scene of bodies b0 to b3 and elements e0 to e2, defined at random inside the domains of the kind's field
- * table; e2 hangs on the ground with one of its bodies if it has several.  NULL and the error if the kind refuses every
+ * table; e2 hangs on the ground with one of its bodies if it has several.  A kind that acts on every body gets one
+ * element only.  NULL and the error if the kind refuses every
  * such definition, or memory is out. */
 pw_system *pw_specimen (const pw_kind *kind, pw_random *random, pw_error *error);
 

@@ -221,4 +221,53 @@ const pw_kind toy_kind_roller = {
   .gamma_v = PW_BY_DIFFERENCES,
 };
 
-const pw_kind *const toy_kinds[] = { &toy_kind_spring, &toy_kind_drive, &toy_kind_roller, NULL };
+/* ---- weight: f = m g, V = -m g . r ---- */
+
+typedef struct {
+  double f[2];
+} weight;
+
+static int weight_prepare (const void *definition, const pw_body *const *bodies, void *element, double *own_mass,
+                           pw_error *error) {
+  const toy_weight *d = definition;
+  *(weight *)element = (weight){ { bodies[0]->mass * d->g[0], bodies[0]->mass * d->g[1] } };
+  (void)own_mass, (void)error;
+  return PW_OK;
+}
+
+static void weight_force (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    const weight *p = (const weight *)b->element + e;
+    out[0] = p->f[0], out[1] = p->f[1], out[2] = 0;
+  }
+}
+
+static void weight_energy (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) {
+    const weight *p = (const weight *)b->element + e;
+    const pw_pose *A = &b->pose[b->body[e]];
+    out[e] = -p->f[0] * A->x - p->f[1] * A->y;
+  }
+}
+
+static const pw_field weight_fields[] = {
+  { PW_AT (toy_weight, g), PW_VECTOR, .unit = "m/s^2", .required = 1, .about = "acceleration of free fall" },
+  { .name = NULL },
+};
+
+const pw_kind toy_kind_weight = {
+  .name = "weight",
+  .about = "the weight of every body",
+  .definition = sizeof (toy_weight),
+  .element = sizeof (weight),
+  .fields = weight_fields,
+  .bodies = 1,
+  .each_body = 1,
+  .constant = 1,
+  .level = PW_FORCE,
+  .prepare = weight_prepare,
+  .force = weight_force,
+  .energy = weight_energy,
+};
+
+const pw_kind *const toy_kinds[] = { &toy_kind_spring, &toy_kind_drive, &toy_kind_roller, &toy_kind_weight, NULL };

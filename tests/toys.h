@@ -30,7 +30,13 @@ typedef struct {
   double inertia; /* about its axle [kg m^2] */
 } toy_roller;
 
-extern const pw_kind toy_kind_spring, toy_kind_drive, toy_kind_roller;
+/* A constant force on every body with mass: its mass times a vector. */
+typedef struct {
+  const char *name;
+  double g[2]; /* [m/s^2] */
+} toy_weight;
+
+extern const pw_kind toy_kind_spring, toy_kind_drive, toy_kind_roller, toy_kind_weight;
 
 /* All of them, ended by NULL. */
 extern const pw_kind *const toy_kinds[];

@@ -1,0 +1,50 @@
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "runs.h"
+
+pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings) {
+  pw_error error = { 0 };
+  pw_run *r = pw_open (s, method, settings, &error);
+  check_ok (r ? PW_OK : error.status, &error);
+  return r;
+}
+
+pw_sample runs_to (pw_run *r, double t) {
+  pw_error error = { 0 };
+  pw_sample sample;
+  check_ok (pw_advance_to (r, t, t, &error), &error);
+  check_ok (pw_at (r, t, &sample, &error), &error);
+  return sample;
+}
+
+void runs_state (pw_system *s, const char *method, const pw_settings *settings, double t, double *q, double *v,
+                 pw_statistics *statistics) {
+  pw_run *r = runs_open (s, method, settings);
+  pw_sample sample = runs_to (r, t);
+  memcpy (q, sample.q, (size_t)pw_count_coordinates (s) * sizeof *q);
+  memcpy (v, sample.v, (size_t)pw_count_coordinates (s) * sizeof *v);
+  if (statistics) *statistics = *pw_run_statistics (r);
+  pw_close (r);
+}
+
+int runs_reference (const char *path, int lines, int columns, double *table) {
+  char text[400];
+  int line = 0;
+  FILE *f = fopen (path, "r");
+  assert_non_null (f);
+  while (line < lines && fgets (text, sizeof text, f)) {
+    if (text[0] == '#') continue;
+    char *at = text;
+    for (int c = 0; c < columns; c++) {
+      char *end;
+      table[line * columns + c] = strtod (at, &end);
+      assert_true (end > at);
+      at = end;
+    }
+    line++;
+  }
+  fclose (f);
+  return line;
+}

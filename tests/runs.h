@@ -1,0 +1,20 @@
+/* Runs the tests share: whatever fails ends the test with the error. */
+#ifndef RUNS_H
+#define RUNS_H
+
+#include "pinwheel-solvers.h"
+
+pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings);
+
+/* Advances to t and looks at the state there. */
+pw_sample runs_to (pw_run *r, double t);
+
+/* The state at t after a run of its own: q and v, coordinates each; the statistics may be NULL. */
+void runs_state (pw_system *s, const char *method, const pw_settings *settings, double t, double *q, double *v,
+                 pw_statistics *statistics);
+
+/* One line of a reference table: the numbers after those of the caption, which begins with #.  Returns how many lines
+ * of `columns` numbers there are, at most `lines`. */
+int runs_reference (const char *path, int lines, int columns, double *table);
+
+#endif

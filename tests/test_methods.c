@@ -1,0 +1,312 @@
+/* Method names, options and settings: what is accepted, and what those are told that are not. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "method.h"
+#include "methods.h"
+#include "runs.h"
+#include "scene.h"
+#include "toys.h"
+#include "util.h"
+
+/* ---- The table ---- */
+
+static void test_table (void **state) {
+  (void)state;
+  for (int i = 0; pw_methods[i]; i++) {
+    const pw_method *m = pw_methods[i];
+    assert_true (m->name && m->about && m->open && m->advance && m->at && m->restart && m->close);
+    assert_true (m->stabilisations && m->stabilisations[0].name && m->options);
+    int options = 0;
+    for (const pw_option *o = m->options; o->name; o++, options++) {
+      assert_true (o->about && o->about[0]);
+      assert_string_equal (o->choices ? "" : pw_domain_check (o->domain, o->value), "");
+    }
+    assert_true (options <= PW_MAX_OPTIONS);
+    for (int k = 0; k < i; k++) assert_string_not_equal (m->name, pw_methods[k]->name);
+  }
+}
+
+/* Every integrator with every stabilisation opens and makes a step. */
+static void test_every_pair (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *t = pw_methods[i]->stabilisations; t->name; t++) {
+      char name[100];
+      snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, t->name);
+      pw_run *r = runs_open (s, name, NULL);
+      pw_sample now = runs_to (r, 0.01);
+      assert_true (now.t == 0.01 && pw_run_statistics (r)->steps > 0);
+      pw_close (r);
+    }
+  pw_free (s);
+}
+
+static void test_parse (void **state) {
+  (void)state;
+  const pw_method *m;
+  int stabilisation;
+  double value[PW_MAX_OPTIONS];
+  pw_error error = { 0 };
+  check_ok (pw_parse_method ("rk4", &m, &stabilisation, &error), &error);
+  assert_string_equal (m->name, "rk4");
+  assert_int_equal (stabilisation, 0);
+  check_ok (pw_parse_options ("rk4+baumgarte:alpha=2.5e1:beta=.5", &m, &stabilisation, value, &error), &error);
+  assert_string_equal (m->stabilisations[stabilisation].name, "baumgarte");
+  for (int i = 0; m->options[i].name; i++) {
+    if (strcmp (m->options[i].name, "alpha") == 0) assert_true (value[i] == 25);
+    if (strcmp (m->options[i].name, "beta") == 0) assert_true (value[i] == 0.5);
+    if (strcmp (m->options[i].name, "every") == 0) assert_true (value[i] == 1); /* a default */
+  }
+  check_ok (pw_parse_method ("rk4+projection:metric=identity:inputs=held:every=3", &m, &stabilisation, &error), &error);
+}
+
+static void methods_refused (const char *name, const char *text) {
+  const pw_method *m;
+  int stabilisation;
+  pw_error error = { 0 };
+  assert_int_equal (pw_parse_method (name, &m, &stabilisation, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, text);
+}
+
+static void test_refused (void **state) {
+  (void)state;
+  methods_refused ("rk5", "there is no integrator \"rk5\"; did you mean \"rk4\"?");
+  methods_refused ("idas+ggl", "there is no integrator \"idas\"; did you mean \"ida\"?");
+  methods_refused ("", "there is no integrator \"\"; did you mean \"rk4\"?");
+  methods_refused ("rk4+ggl", "integrator rk4 has no stabilisation \"ggl\"; did you mean \"none\"?");
+  methods_refused ("rk4+projektion",
+                   "integrator rk4 has no stabilisation \"projektion\"; did you mean \"projection\"?");
+  methods_refused ("ida+projection", "integrator ida has no stabilisation \"projection\"; did you mean \"none\"?");
+  methods_refused ("rk4+baumgarte:alfa=1", "method rk4+baumgarte has no option \"alfa\"; did you mean \"alpha\"?");
+  methods_refused ("rk4+none:alpha=1", "method rk4+none has no option \"alpha\"; did you mean \"inputs\"?");
+  methods_refused ("rk4+projection:metric=masses", "method option metric cannot be \"masses\"; did you mean \"mass\"?");
+  methods_refused ("rk4+projection:every", "method option \"every\": expected NAME=VALUE");
+  methods_refused ("rk4+projection:every=0", "method option every=0: expected a whole number >= 1");
+  methods_refused ("rk4+projection:every=2.5", "method option every=2.5: expected a whole number >= 1");
+  methods_refused ("rk4+baumgarte:alpha=-1", "method option alpha=-1: expected a number >= 0");
+  methods_refused ("rk4+baumgarte:alpha=", "method option alpha=: expected a number");
+  methods_refused ("rk4+baumgarte:alpha=1,5", "method option alpha=1,5: expected a number");
+  methods_refused ("rk4+baumgarte:alpha=1e", "method option alpha=1e: expected a number");
+  methods_refused ("rk4+baumgarte:alpha=1e999", "method option alpha=1e999: expected a finite number");
+  methods_refused ("rk4+none+ggl", "method \"rk4+none+ggl\": expected INTEGRATOR+STABILISATION:OPTION=VALUE");
+}
+
+static void test_long_names (void **state) {
+  (void)state;
+  char name[200] = "rk4+";
+  memset (name + 4, 'x', 150);
+  char text[400];
+  snprintf (text, sizeof text, "method \"%.80s\": a name is too long", name);
+  methods_refused (name, text);
+  strcpy (name, "rk4+none:");
+  memset (name + 9, 'x', 150);
+  snprintf (text, sizeof text, "method \"%.80s\": an option is too long", name);
+  methods_refused (name, text);
+}
+
+/* ---- Settings ---- */
+
+static void methods_bad_setting (const pw_settings *settings, const char *text) {
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  assert_null (pw_open (s, "rk4", settings, &error));
+  check_error (&error, PW_INPUT, text);
+  pw_free (s);
+}
+
+static void test_settings (void **state) {
+  (void)state;
+  methods_bad_setting (&(pw_settings){ .step = -1 }, "setting step = -1: expected a number > 0");
+  methods_bad_setting (&(pw_settings){ .step = NAN }, "setting step = nan: expected a number > 0");
+  methods_bad_setting (&(pw_settings){ .rtol = -1 }, "setting rtol = -1: expected a number > 0");
+  methods_bad_setting (&(pw_settings){ .atol = INFINITY }, "setting atol = inf: expected a number > 0");
+  methods_bad_setting (&(pw_settings){ .span = -2 }, "setting span = -2: expected a number > 0");
+  methods_bad_setting (&(pw_settings){ .t = NAN }, "setting t = nan: expected a finite number");
+}
+
+/* ---- Failures on the way ---- */
+
+typedef struct {
+  double until;
+} methods_fuse;
+
+static int methods_burns (void *context, double t, const double *x, double value[3], double *gradient) {
+  const methods_fuse *f = context;
+  (void)x, (void)gradient;
+  value[0] = 0.1;
+  return t > f->until;
+}
+
+static pw_system *methods_fused (methods_fuse *fuse) {
+  pw_error error = { 0 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = methods_burns, .context = fuse } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  return scene_compile (m);
+}
+
+/* A signal that fails stops the run; the error tells the time reached, which the run is still at. */
+static void test_signal_fails (void **state) {
+  static const char *const method[] = { "rk4+projection", "rk4+none", "ida+ggl", "ida+baumgarte" };
+  (void)state;
+  for (int i = 0; i < 4; i++) {
+    methods_fuse fuse = { 0.5 };
+    pw_error error = { 0 };
+    pw_system *s = methods_fused (&fuse);
+    pw_run *r = runs_open (s, method[i], NULL);
+    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
+    double t = pw_time (r);
+    assert_true (t > 0.3 && t <= 0.5);
+    assert_non_null (strstr (error.text, "a signal failed"));
+    assert_int_equal (strncmp (error.text, "t = ", 4), 0);
+    check_close ("time in the message", strtod (error.text + 4, NULL), t, 1e-5, "six digits");
+    pw_sample sample;
+    error.status = PW_OK;
+    check_ok (pw_at (r, t, &sample, &error), &error);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+static void test_signal_fails_at_once (void **state) {
+  (void)state;
+  methods_fuse fuse = { -1 };
+  pw_error error = { 0 };
+  pw_system *s = methods_fused (&fuse);
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (&error, PW_METHOD, "t = 0 s: a signal failed");
+  pw_free (s);
+}
+
+/* A spring too stiff for the step. */
+static void methods_stiff (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "a", "b" } });
+  pw_add (m, &toy_kind_spring,
+          &(toy_spring){
+              .name = "k", .body = { "a", "ground" }, .at = { { 0.1, 0.2 }, { 0 } }, .stiffness = 1e9, .length = 1 });
+}
+
+static void test_too_large_a_step (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = methods_stiff };
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.1 });
+  assert_int_equal (pw_advance_to (r, 100, 100, &error), PW_METHOD);
+  assert_non_null (strstr (error.text, "s: the step of 0.1 s is too large: the "));
+  assert_true (pw_time (r) < 100);
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- A body that nothing determines ---- */
+
+static void methods_loose (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "loose" });
+}
+
+static void test_massless (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = methods_loose };
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (
+      &error, PW_INPUT,
+      "model scene: loose.x has no mass, and no constraint determines how it moves; give it mass, or constrain it");
+  pw_free (s);
+}
+
+/* ---- Looking into a run ---- */
+
+static void test_outside (void **state) {
+  static const char *const method[] = { "rk4+projection", "ida+ggl" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    pw_sample sample;
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, method[i], NULL);
+    runs_to (r, 0.5);
+    assert_int_equal (pw_at (r, 0.1, &sample, &error), PW_INPUT);
+    assert_non_null (strstr (error.text, "lies outside the last step"));
+    error.status = PW_OK;
+    assert_int_equal (pw_at (r, 0.6, &sample, &error), PW_INPUT);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+/* A run does not pass t_end, and may be given a later one. */
+static void test_t_end (void **state) {
+  static const char *const method[] = { "rk4+projection", "ida+ggl" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.03 });
+    while (pw_time (r) < 0.1) check_ok (pw_advance (r, 0.1, &error), &error);
+    assert_true (pw_time (r) == 0.1);
+    check_ok (pw_advance (r, 0.1, &error), &error);
+    assert_true (pw_time (r) == 0.1);
+    runs_to (r, 0.25);
+    assert_true (pw_time (r) == 0.25);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+/* A restart from the state a run has reached goes on as if nothing had been; from another state it goes on from there. */
+static void test_restart (void **state) {
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "ida+ggl", "ida+baumgarte" };
+  (void)state;
+  for (int i = 0; i < 4; i++) {
+    pw_error error = { 0 };
+    double q[6], v[6];
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_settings settings = { .step = 1e-3, .rtol = 1e-9, .span = 2, .ledger = 1 };
+    runs_state (s, method[i], &settings, 2, q, v, NULL);
+    pw_run *r = runs_open (s, method[i], &settings);
+    runs_to (r, 1);
+    check_ok (pw_restart (r, NULL, NULL, &error), &error);
+    pw_sample now = runs_to (r, 2);
+    double bound = i < 2 ? 1e-12 : 1e-5;
+    for (int j = 0; j < 6; j++)
+      check_close (method[i], now.q[j], q[j], bound, i < 2 ? "a step of the same size: round-off" : "1e4 rtol");
+    check_close ("balance", now.balance, 0, i < 2 ? 1e-10 : 1e-5, "the ledger goes on");
+    double moved[6];
+    for (int j = 0; j < 6; j++) moved[j] = now.q[j] + (j % 3 == 0 ? 10 : 0); /* both bodies 10 m to the side */
+    check_ok (pw_restart (r, moved, NULL, &error), &error);
+    now = runs_to (r, 2.5);
+    assert_true (now.q[0] > 9);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_table),
+    cmocka_unit_test (test_every_pair),
+    cmocka_unit_test (test_parse),
+    cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_long_names),
+    cmocka_unit_test (test_settings),
+    cmocka_unit_test (test_signal_fails),
+    cmocka_unit_test (test_signal_fails_at_once),
+    cmocka_unit_test (test_too_large_a_step),
+    cmocka_unit_test (test_massless),
+    cmocka_unit_test (test_outside),
+    cmocka_unit_test (test_t_end),
+    cmocka_unit_test (test_restart),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

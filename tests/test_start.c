@@ -1,0 +1,230 @@
+/* The consistent start: what is given stays, what is consistent is left alone, what cannot be is named. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "model.h"
+#include "runs.h"
+#include "scene.h"
+#include "system.h"
+#include "toys.h"
+
+#define START_ROUND_OFF (64 * CHECK_EPS)
+static const char start_reason[] = "64 eps of the row's terms: round-off";
+
+/* Opens a run on the EzyRoller with start values, NULL-terminated names and values, and checks the constraints. */
+static pw_run *start_open (pw_system **system, const char *const *name, const double *value) {
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  for (int i = 0; name && name[i]; i++) check_ok (pw_set_start (m, name[i], value[i], &error), &error);
+  *system = scene_compile (m);
+  pw_run *r = runs_open (*system, "rk4", NULL);
+  pw_sample now = runs_to (r, 0);
+  check_below ("position", now.position, START_ROUND_OFF, start_reason);
+  check_below ("velocity", now.velocity, START_ROUND_OFF, start_reason);
+  return r;
+}
+
+static void start_close (pw_run *r, pw_system *s) {
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- Nothing to do ---- */
+
+static void test_no_harm (void **state) {
+  (void)state;
+  pw_system *s;
+  pw_run *r = start_open (&s, NULL, NULL);
+  const pw_start_report *start = pw_run_start (r);
+  assert_true (start->moved == 0 && start->freed == 0);
+  check_bits ("positions", start->q, s->q0, 6);
+  check_bits ("rates", start->v, s->v0, 6);
+  start_close (r, s);
+}
+
+/* A state on the way is as consistent as it can be: it is not touched, either. */
+static void test_no_harm_on_the_way (void **state) {
+  (void)state;
+  for (double t = 0.25; t <= 2; t += 0.25) {
+    double q[6], v[6];
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, "rk4+projection", NULL);
+    pw_sample now = runs_to (r, t);
+    memcpy (q, now.q, sizeof q);
+    memcpy (v, now.v, sizeof v);
+    check_ok (pw_restart (r, q, v, &error), &error);
+    assert_int_equal (pw_run_start (r)->moved, 0);
+    now = runs_to (r, t);
+    check_bits ("positions", now.q, q, 6);
+    check_bits ("rates", now.v, v, 6);
+    start_close (r, s);
+  }
+}
+
+/* ---- What is given stays ---- */
+
+static void test_held (void **state) {
+  (void)state;
+  static const char *const name[] = { "frame.phi", "steer.phi", "frame.vx", NULL };
+  static const double value[] = { 0.3, 2, 1.5 };
+  pw_system *s;
+  pw_run *r = start_open (&s, name, value);
+  const pw_start_report *start = pw_run_start (r);
+  assert_int_equal (start->freed, 0);
+  assert_true (start->q[2] == 0.3 && start->q[5] == 2 && start->v[0] == 1.5);
+  int moved = 0;
+  for (int j = 0; j < 6; j++) moved += (start->q[j] != start->q_given[j]) + (start->v[j] != start->v_given[j]);
+  assert_true (start->moved == moved && moved > 0);
+  assert_true (start->q_given[3] == 0.375 && start->v_given[0] == 1.5 && start->position > 0.01 &&
+               start->velocity > 0.01);
+  start_close (r, s);
+}
+
+/* Everything about the frame is given, though wheel A then has nothing left to move: its row holds as it is. */
+static void test_held_row (void **state) {
+  (void)state;
+  static const char *const name[] = { "frame.x",  "frame.y",     "frame.phi", "frame.vx",
+                                      "frame.vy", "frame.omega", "steer.phi", NULL };
+  static const double value[] = { 1, 2, 0, 1, 0.1, 0.2, PW_PI / 2 };
+  pw_system *s;
+  pw_run *r = start_open (&s, name, value);
+  const pw_start_report *start = pw_run_start (r);
+  assert_int_equal (start->freed, 0);
+  const double q[] = { 1, 2, 0, 1.5, 2.125, PW_PI / 2 }, v[] = { 1, 0.1, 0.2, 1, 0.2, 4 };
+  check_bits ("frame", start->q, q, 3);
+  check_bits ("frame", start->v, v, 3);
+  for (int j = 3; j < 6; j++) check_close ("steer", start->q[j], q[j], 8 * CHECK_EPS, "8 eps: round-off");
+  /* C does not move across its heading: vx2 = vx1 - d cos(phi2) w.. with phi2 = pi/2: vx_C = vx2 - c w2 = 0 */
+  check_close ("the steering turns", start->v[5], (start->v[3]) / 0.125, 64 * CHECK_EPS, "64 eps: round-off");
+  start_close (r, s);
+}
+
+/* Given values that contradict each other: all move, with a notice. */
+static void test_freed (void **state) {
+  (void)state;
+  static const char *const name[] = { "frame.x", "frame.y", "frame.phi", "steer.x", NULL };
+  static const double value[] = { 0, 0, 0, 3 };
+  pw_system *s;
+  pw_run *r = start_open (&s, name, value);
+  const pw_start_report *start = pw_run_start (r);
+  assert_true (start->freed == 1 && start->moved > 0);
+  start_close (r, s);
+}
+
+/* ---- The least change: M-orthogonal to all that the constraints allow ---- */
+
+static void start_massive (pw_model *m, const void *parameters) {
+  const double *rate = parameters;
+  pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { rate[0], 0.3, rate[1] } });
+  pw_add_body (
+      m,
+      &(pw_body){
+          .name = "steer", .mass = 0.4, .inertia = 0.02, .start = { 0.375, 0, PW_PI }, .rate = { 0.1, rate[1], 1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.125, 0 } } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "A", .body = "frame", .at = { -0.5, 0 } });
+}
+
+static void test_least_change (void **state) {
+  (void)state;
+  static const pw_parameter list[] = { { .name = "vx" },
+                                       { .name = "omega", .offset = sizeof (double) },
+                                       { .name = NULL } };
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof table,
+                                         .parameters = list,
+                                         .parameters_size = 2 * sizeof (double),
+                                         .build = start_massive };
+  double v[6][6], change[6][6];
+  pw_system *s = NULL;
+  for (int i = 0; i < 6; i++) {
+    pw_free (s);
+    s = scene_system (&table, "vx", 1.0 + i, "omega", 0.7 - i * i, NULL);
+    pw_run *r = runs_open (s, "rk4", NULL);
+    memcpy (v[i], pw_run_start (r)->v, sizeof v[i]);
+    for (int j = 0; j < 6; j++) change[i][j] = v[i][j] - s->v0[j];
+    pw_close (r);
+  }
+  for (int i = 1; i < 6; i++) { /* differences of consistent rates are what the constraints allow */
+    double sum = 0, size = 0;
+    for (int j = 0; j < 6; j++) {
+      sum += (v[i][j] - v[0][j]) * s->mass[j] * change[0][j];
+      size += fabs ((v[i][j] - v[0][j]) * s->mass[j] * change[0][j]);
+    }
+    check_close ("motion allowed . M . change", sum, 0, 64 * CHECK_EPS * (1 + size), "64 eps of the terms: round-off");
+  }
+  pw_free (s);
+}
+
+/* ---- A signal that moves a constraint ---- */
+
+static void start_driven (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+  pw_add (m, &toy_kind_drive,
+          &(toy_drive){ .name = "motor",
+                        .body = { "disc", "ground" },
+                        .angle = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 2, .phase = 1 } } });
+}
+
+static void test_drive (void **state) {
+  (void)state;
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = start_driven };
+  pw_system *s = scene_system (&table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .t = 3, .span = 1 });
+  const pw_start_report *start = pw_run_start (r);
+  check_close ("angle", start->q[2], 0.5 * cos (7), 4 * CHECK_EPS, "4 eps: round-off");
+  check_close ("rate", start->v[2], -sin (7), 4 * CHECK_EPS, "4 eps: round-off");
+  pw_sample now = runs_to (r, 4);
+  check_close ("angle", now.q[2], 0.5 * cos (9), 4 * CHECK_EPS, "projected: round-off");
+  start_close (r, s);
+}
+
+/* ---- What cannot be ---- */
+
+static void start_impossible (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 1, .start = { 1.5, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "left", .body = { "rod", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "right", .body = { "rod", "ground" }, .at = { { 0.5, 0 }, { 3, 0 } } });
+}
+
+/* Two motors turn one disc at different rates. */
+static void start_torn (pw_model *m, const void *parameters) {
+  (void)parameters;
+  start_driven (m, NULL);
+  m->body[0].start[2] = 0.5 * cos (1);
+  pw_add (m, &toy_kind_drive,
+          &(toy_drive){ .name = "other",
+                        .body = { "disc", "ground" },
+                        .angle = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 3, .phase = 1 } } });
+}
+
+static void start_refused (void (*build) (pw_model *, const void *), const char *text) {
+  const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = build };
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (&error, PW_START, text);
+  pw_free (s);
+}
+
+static void test_impossible (void **state) {
+  (void)state;
+  start_refused (start_impossible,
+                 "model scene: the start cannot be made consistent: pin left is open by 1 m (or rad)");
+  start_refused (
+      start_torn,
+      "model scene: the start cannot be made consistent: drive other is violated by 1.26221 m/s (or rad/s)");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_no_harm), cmocka_unit_test (test_no_harm_on_the_way),
+    cmocka_unit_test (test_held),    cmocka_unit_test (test_held_row),
+    cmocka_unit_test (test_freed),   cmocka_unit_test (test_least_change),
+    cmocka_unit_test (test_drive),   cmocka_unit_test (test_impossible),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
