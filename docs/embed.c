@@ -1,0 +1,46 @@
+/* Pinwheel inside a program of your own.  From the source tree, after `make`:
+ *     cc -std=c11 -Ibuild/include docs/embed.c -o embed -Lbuild -lpinwheel-files -lpinwheel -Wl,-rpath,$PWD/build -lm
+ * with an installed Pinwheel:
+ *     cc -std=c11 docs/embed.c -o embed $(pkg-config --cflags --libs pinwheel) -lm */
+#include <math.h>
+#include <stdio.h>
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+
+/* The rider swings and damps the hinge: M0 cos (pi t) - c (omega1 - omega2), with the two rates in x. */
+typedef struct {
+  double M0, c; /* [N m], [N m s] */
+} rider;
+
+static int rider_torque (void *context, double t, const double *x, double value[3], double *gradient) {
+  const rider *r = context;
+  value[0] = r->M0 * cos (PW_PI * t) - r->c * (x[0] - x[1]);
+  if (gradient) gradient[0] = -r->c, gradient[1] = r->c;
+  return 0;
+}
+
+int main (void) {
+  static const char *const reads[] = { "frame.omega", "steer.omega", NULL };
+  rider who = { 0.1, 0.002 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = rider_torque, .context = &who, .reads = reads } };
+  pw_error e = { 0 }; /* keeps the first failure; NULLs are passed on only until there is one */
+  pw_sample now;
+
+  pw_file *file = pw_file_open ("ezyroller", &e);
+  pw_model *model = file ? pw_file_model (file, &e) : NULL;
+  int ready = model && pw_set (model, "a", 0.6, &e) == PW_OK && pw_build (model, &e) == PW_OK &&
+              pw_set_signal (model, "rider", "value", &torque, &e) == PW_OK;
+  pw_system *system = ready ? pw_compile (model, &e) : NULL;
+  pw_run *run = system ? pw_open (system, "rk4+projection", &(pw_settings){ .step = 1e-3 }, &e) : NULL;
+
+  if (run && pw_advance_to (run, 10, 10, &e) == PW_OK && pw_at (run, 10, &now, &e) == PW_OK) {
+    const double *frame = now.q + 3 * pw_find_body (system, "frame");
+    printf ("frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t, frame[0], frame[1], frame[2]);
+  } else
+    fprintf (stderr, "embed: %s\n", e.text);
+  pw_close (run);
+  pw_free (system);
+  pw_model_free (model);
+  pw_file_close (file);
+  return -e.status;
+}
