@@ -13,8 +13,10 @@ enum {
   PLOT_NUMBERS = 8000000, /* kept in all, unless that is less than PLOT_FEW samples */
   PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be told apart */
   PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
+  PLOT_CURVES = 60,       /* bodies or wheels that get a curve, at most */
   PLOT_KEYED = 12,        /* curves that get a name each; more are coloured by number */
-  PLOT_IMAGES = 60,       /* pictures of the mechanism along its way */
+  PLOT_IMAGES = 60,       /* pictures of the mechanism along its way, at most */
+  PLOT_FEWEST = 8,        /* and at least */
   PLOT_PATH = 4096        /* longest path of a file, its end included */
 };
 
@@ -41,6 +43,7 @@ struct pw_plots {
   int width;           /* numbers per sample */
   int bodies, wheels;  /* drawn */
   int grounds;         /* points of the ground */
+  int all_wheels;      /* in the system */
   int closeup;         /* samples of the start that get a picture of their own; 0: none */
   int *body;           /* bodies: index in the system */
   int *slab, *element; /* wheels: where they are in the system */
@@ -62,22 +65,33 @@ static inline double *pw_plot_wheel (const pw_plots *p, int i, int wheel) {
   return pw_plot_sample (p, i) + PLOT_FIRST + 6 * p->bodies + 3 * wheel;
 }
 
-static inline const char *pw_plot_body_name (const pw_plots *p, int body) {
-  return p->s->body_name[p->body[body]];
+/* Number i of `shown` things taken evenly out of `all`. */
+static inline int pw_plot_pick (int i, int shown, int all) {
+  return (int)((long long)i * all / shown);
 }
-static inline const char *pw_plot_wheel_name (const pw_plots *p, int wheel) {
-  return p->s->slab[p->slab[wheel]].name[p->element[wheel]];
-}
+
+/* A family of curves, one per body or wheel; above a dozen they are coloured by number instead of named. */
+typedef struct {
+  const char *file;      /* a block for each: time, numbers, number in the model */
+  const char *what;      /* "body", for the colour bar */
+  int count, shown, all; /* curves, out of those kept, out of those there are */
+  int numbers;           /* kept of each */
+  const char *(*name) (const pw_plots *p, int shown);
+  double *(*at) (const pw_plots *p, int i, int shown); /* its numbers in sample i */
+} pw_curves;
+
+pw_curves pw_plot_bodies (const pw_plots *p);
+pw_curves pw_plot_wheels (const pw_plots *p);
 
 /* Opens a file of the folder for writing.  NULL and PW_MACHINE with path and reason if that fails. */
 FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error);
 /* Closes it.  PW_MACHINE if something could not be written. */
 int pw_plot_finish (const pw_plots *p, const char *name, FILE *file, pw_error *error);
 
-/* The smallest rectangle around all attachment points, centres and wheels of samples 0 ... n - 1, or around the paths
+/* The smallest rectangle around all attachment points, centres and wheels of samples 0 ... n - 1, or around their paths
  * of the wheels (of the centres, if there are no wheels). */
 pw_plot_box pw_plot_box_of (const pw_plots *p, int n);
-pw_plot_box pw_plot_box_of_paths (const pw_plots *p);
+pw_plot_box pw_plot_box_of_paths (const pw_plots *p, int n);
 
 /* Largest dimension of the mechanism at the start [m]. */
 double pw_plot_size (const pw_plots *p);

@@ -47,9 +47,9 @@ pw_plot_box pw_plot_box_of (const pw_plots *p, int n) {
   return box;
 }
 
-pw_plot_box pw_plot_box_of_paths (const pw_plots *p) {
+pw_plot_box pw_plot_box_of_paths (const pw_plots *p, int n) {
   pw_plot_box box = data_nothing;
-  for (int i = 0; i < p->samples; i++)
+  for (int i = 0; i < n; i++)
     if (p->wheels > 0)
       for (int w = 0; w < p->wheels; w++) data_extend (&box, pw_plot_wheel (p, i, w));
     else
@@ -83,36 +83,31 @@ static int data_closeup (const pw_plots *p) {
 
 /* ---- Files ---- */
 
-static int data_motion (const pw_plots *p, pw_error *error) {
-  static const char *const names[] = { "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
-  FILE *f = pw_plot_create (p, "motion.dat", error);
+/* One block per curve: time, what is kept of the body or wheel, its number in the model. */
+static int data_curves (const pw_plots *p, const char *name, const pw_curves *c, const char *columns, pw_error *error) {
+  FILE *f = pw_plot_create (p, name, error);
   if (f == NULL) return PW_MACHINE;
-  fputs ("# t [s]", f);
-  for (int b = 0; b < p->bodies; b++)
-    for (int k = 0; k < 6; k++) fprintf (f, ", %s.%s", pw_plot_body_name (p, b), names[k]);
-  for (int i = 0; i < p->samples; i++) {
-    data_number (f, pw_plot_sample (p, i)[PLOT_T], "\n");
-    for (int k = 0; k < 6 * p->bodies; k++) data_number (f, pw_plot_motion (p, i, 0)[k], " ");
+  for (int k = 0; k < c->count; k++) {
+    int shown = pw_plot_pick (k, c->count, c->shown);
+    fprintf (f, "%s# %s: %s, number\n", k ? "\n\n" : "", c->name (p, shown), columns);
+    for (int i = 0; i < p->samples; i++) {
+      const double *x = c->at (p, i, shown);
+      data_number (f, pw_plot_sample (p, i)[PLOT_T], "");
+      for (int j = 0; j < c->numbers; j++) data_number (f, x[j], " ");
+      fprintf (f, " %d\n", pw_plot_pick (shown, c->shown, c->all) + 1);
+    }
   }
-  fputs ("\n", f);
-  return pw_plot_finish (p, "motion.dat", f, error);
+  return pw_plot_finish (p, name, f, error);
+}
+
+static int data_motion (const pw_plots *p, pw_error *error) {
+  pw_curves c = pw_plot_bodies (p);
+  return data_curves (p, "motion.dat", &c, "t [s], x [m], y [m], phi [rad], vx [m/s], vy [m/s], omega [rad/s]", error);
 }
 
 static int data_wheels (const pw_plots *p, pw_error *error) {
-  if (p->wheels == 0) return PW_OK;
-  FILE *f = pw_plot_create (p, "wheels.dat", error);
-  if (f == NULL) return PW_MACHINE;
-  fputs ("# t [s]", f);
-  for (int w = 0; w < p->wheels; w++) {
-    const char *name = pw_plot_wheel_name (p, w);
-    fprintf (f, ", %s.x [m], %s.y [m], %s.heading [rad]", name, name, name);
-  }
-  for (int i = 0; i < p->samples; i++) {
-    data_number (f, pw_plot_sample (p, i)[PLOT_T], "\n");
-    for (int k = 0; k < 3 * p->wheels; k++) data_number (f, pw_plot_wheel (p, i, 0)[k], " ");
-  }
-  fputs ("\n", f);
-  return pw_plot_finish (p, "wheels.dat", f, error);
+  pw_curves c = pw_plot_wheels (p);
+  return c.count ? data_curves (p, "wheels.dat", &c, "t [s], x [m], y [m], heading [rad]", error) : PW_OK;
 }
 
 static int data_energy (const pw_plots *p, pw_error *error) {
@@ -155,19 +150,35 @@ static void data_wheel (FILE *f, const pw_plots *p, int i, int wheel, double hal
   fputs ("\n", f);
 }
 
-/* Three blocks, two blank lines apart: bodies, wheels, centres of mass.  `images` pictures out of the first n samples.
+/* Samples from one picture of the mechanism to the next, of the first n: as many as move the body that goes farthest by
+ * a third of the mechanism, within bounds. */
+static int data_stride (const pw_plots *p, int n) {
+  double farthest = 0;
+  for (int b = 0; b < p->bodies; b++) {
+    double way = 0;
+    for (int i = 1; i < n; i++) {
+      const double *from = pw_plot_motion (p, i - 1, b), *to = pw_plot_motion (p, i, b);
+      way += hypot (to[0] - from[0], to[1] - from[1]);
+    }
+    if (way > farthest) farthest = way;
+  }
+  double images = fmin (fmax (3 * farthest / (pw_plot_size (p)), PLOT_FEWEST), PLOT_IMAGES);
+  int stride = (int)((n - 1) / images);
+  return stride < 1 ? 1 : stride;
+}
+
+/* Three blocks, two blank lines apart: bodies, wheels, bodies that nothing is attached to.  Pictures out of the first n samples.
  * gnuplot counts blocks by their data, so an empty one gets a point that is not drawn. */
-static int data_mechanism (const pw_plots *p, const char *name, int n, int images, pw_error *error) {
+static int data_mechanism (const pw_plots *p, const char *name, int n, pw_error *error) {
   FILE *f = pw_plot_create (p, name, error);
   if (f == NULL) return PW_MACHINE;
-  if (images > n - 1) images = n - 1;
+  int stride = data_stride (p, n);
   double half = 0.06 * pw_plot_size (p);
   for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
-    static const char *const titles[] = { "bodies", "wheels", "centres of mass" };
+    static const char *const titles[] = { "bodies", "wheels", "bodies without attachments" };
     fprintf (f, "%s# %s: x [m], y [m], t [s]\n", block ? "\n\n" : "", titles[block]);
     if (!pw_plot_has (p, block)) fputs ("nan nan nan\n", f);
-    for (int k = 0; k <= images; k++) {
-      int i = (int)((long long)k * (n - 1) / images);
+    for (int i = 0; i < n; i += stride) {
       for (int b = 0; b < p->bodies && block == PLOT_BODIES; b++) data_body (f, p, i, b);
       for (int w = 0; w < p->wheels && block == PLOT_WHEELS; w++) data_wheel (f, p, i, w, half);
       for (int b = 0; b < p->bodies && block == PLOT_CENTRES; b++)
@@ -180,7 +191,7 @@ static int data_mechanism (const pw_plots *p, const char *name, int n, int image
 int pw_plot_has (const pw_plots *p, int block) {
   if (block == PLOT_WHEELS) return p->wheels > 0;
   int b = 0;
-  while (block == PLOT_BODIES && b < p->bodies && p->shape[b].count == 0) b++;
+  while (b < p->bodies && (p->shape[b].count == 0) != (block == PLOT_CENTRES)) b++;
   return b < p->bodies;
 }
 
@@ -203,8 +214,7 @@ int pw_plot_write_data (pw_plots *p, pw_error *error) {
   if (status == PW_OK) status = data_wheels (p, error);
   if (status == PW_OK) status = data_energy (p, error);
   if (status == PW_OK) status = data_ground (p, error);
-  if (status == PW_OK) status = data_mechanism (p, "mechanism.dat", p->samples, PLOT_IMAGES, error);
-  if (status == PW_OK && p->closeup > 0)
-    status = data_mechanism (p, "mechanism-start.dat", p->closeup, PLOT_IMAGES / 2, error);
+  if (status == PW_OK) status = data_mechanism (p, "mechanism.dat", p->samples, error);
+  if (status == PW_OK && p->closeup > 0) status = data_mechanism (p, "mechanism-start.dat", p->closeup, error);
   return status;
 }

@@ -46,11 +46,8 @@ static int gnuplot_absent (const pw_plots *p) {
 
 int pw_plot_run (const pw_plots *p, pw_error *error) {
   char cd[2 * PLOT_PATH];
-  static const char *const scripts[] = { "paths.gp",  "velocities.gp", "angular.gp",
-                                         "energy.gp", "mechanism.gp",  "mechanism-start.gp" };
-  enum { ALWAYS = 5, ALL = 6 };
-  const char *argv[4 + ALL + 1] = { "gnuplot", "-d", "-e", cd };
-  for (int i = 0; i < (p->closeup ? ALL : ALWAYS); i++) argv[4 + i] = scripts[i];
+  const char *const argv[] = { "gnuplot",    "-d",        "-e",           cd,  "paths.gp", "velocities.gp",
+                               "angular.gp", "energy.gp", "mechanism.gp", NULL };
   pid_t child;
   int status;
   if (!gnuplot_cd (p->folder, cd, sizeof cd)) return pw_fail (error, PW_INPUT, "%s: too long a name", p->folder);

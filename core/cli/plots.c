@@ -45,11 +45,6 @@ int pw_plot_finish (const pw_plots *p, const char *name, FILE *file, pw_error *e
 
 /* ---- What is drawn ---- */
 
-/* Number i of `shown` evenly taken out of `all`. */
-static int plots_pick (int i, int shown, int all) {
-  return (int)((long long)i * all / shown);
-}
-
 static int plots_least (int a, int b) {
   return a < b ? a : b;
 }
@@ -65,9 +60,9 @@ static int plots_count_wheels (const pw_system *s, int *largest) {
   return count;
 }
 
-static void plots_choose_wheels (pw_plots *p, int all) {
+static void plots_choose_wheels (pw_plots *p) {
   for (int i = 0; i < p->wheels; i++) {
-    int n = plots_pick (i, p->wheels, all), k = 0;
+    int n = pw_plot_pick (i, p->wheels, p->all_wheels), k = 0;
     while (p->s->slab[k].kind->contact == NULL || n >= p->s->slab[k].b.count) {
       if (p->s->slab[k].kind->contact) n -= p->s->slab[k].b.count;
       k++;
@@ -75,6 +70,14 @@ static void plots_choose_wheels (pw_plots *p, int all) {
     p->slab[i] = k;
     p->element[i] = n;
   }
+}
+
+static const char *plots_body_name (const pw_plots *p, int body) {
+  return p->s->body_name[p->body[body]];
+}
+
+static const char *plots_wheel_name (const pw_plots *p, int wheel) {
+  return p->s->slab[p->slab[wheel]].name[p->element[wheel]];
 }
 
 /* Adds an attachment point unless the body has it already; its centre of mass is drawn anyway. */
@@ -89,7 +92,7 @@ static void plots_add_point (pw_plot_body *shape, const double *at) {
 static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
   pw_names shown;
   if (pw_names_open (&shown, (size_t)p->bodies) != PW_OK) return pw_fail (error, PW_MACHINE, "plots: out of memory");
-  for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, pw_plot_body_name (p, i), i);
+  for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, plots_body_name (p, i), i);
   for (int i = 0; i < m->elements; i++) {
     const pw_element *e = &m->element[i];
     for (int n = 0; n < e->kind->bodies; n++) {
@@ -103,6 +106,16 @@ static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
   }
   pw_names_close (&shown);
   return PW_OK;
+}
+
+pw_curves pw_plot_bodies (const pw_plots *p) {
+  int count = plots_least (p->bodies, PLOT_CURVES);
+  return (pw_curves){ "motion.dat", "body", count, p->bodies, p->s->bodies, 6, plots_body_name, pw_plot_motion };
+}
+
+pw_curves pw_plot_wheels (const pw_plots *p) {
+  int count = plots_least (p->wheels, PLOT_CURVES);
+  return (pw_curves){ "wheels.dat", "wheel", count, p->wheels, p->all_wheels, 3, plots_wheel_name, pw_plot_wheel };
 }
 
 /* ---- One allocation ---- */
@@ -140,6 +153,7 @@ pw_plots *pw_plots_open (const char *folder, const pw_model *m, const pw_system 
   int contacts, all = plots_count_wheels (s, &contacts);
   pw_plots sizes = { .folder = folder, .model = s->model, .s = s, .t_end = t_end };
   sizes.bodies = plots_least (s->bodies, PLOT_SHOWN);
+  sizes.all_wheels = all;
   sizes.wheels = plots_least (all, PLOT_SHOWN);
   sizes.width = PLOT_FIRST + 6 * sizes.bodies + 3 * sizes.wheels;
   sizes.wanted = plots_least (PLOT_SAMPLES, PLOT_NUMBERS / sizes.width);
@@ -151,8 +165,8 @@ pw_plots *pw_plots_open (const char *folder, const pw_model *m, const pw_system 
   fclose (probe);
   pw_plots *p = plots_allocate (&sizes, contacts, error);
   if (p == NULL) return NULL;
-  for (int i = 0; i < p->bodies; i++) p->body[i] = plots_pick (i, p->bodies, s->bodies);
-  plots_choose_wheels (p, all);
+  for (int i = 0; i < p->bodies; i++) p->body[i] = pw_plot_pick (i, p->bodies, s->bodies);
+  plots_choose_wheels (p);
   if (plots_shapes (p, m, error) == PW_OK) return p;
   free (p);
   return NULL;
