@@ -57,7 +57,7 @@ static void verify_rows (verify *x, const pw_slab *k, const double *v, const dou
   y = verify_sweep (x, k, kind->g, n);
   for (int i = 0; i < n; i++) x->position[k->row + i] = y[i];
   y = verify_sweep (x, k, kind->g_size, n);
-  for (int i = 0; i < n; i++) x->position_size[k->row + i] = y[i];
+  for (int i = 0; i < n; i++) x->position_size[k->row + i] = fmax (y[i], x->s->scale.length);
 }
 
 static void verify_forces (verify *x, const pw_slab *k) {
@@ -113,7 +113,7 @@ static void verify_all (verify *x, const double *v, const double *a, const doubl
     if (s->slab[i].kind->force) verify_forces (x, &s->slab[i]);
   }
   verify_force_sizes (x);
-  verify_judge (s, s->holonomic, x->position, x->position_size, L, pw_reaction_name, 0, &result->position);
+  verify_judge (s, s->holonomic, x->position, x->position_size, 0, pw_reaction_name, 0, &result->position);
   verify_judge (s, s->rows, x->velocity, x->velocity_size, L / T, pw_reaction_name, 0, &result->velocity);
   verify_judge (s, s->rows, x->acceleration, x->acceleration_size, L / (T * T), pw_reaction_name, 0,
                 &result->acceleration);

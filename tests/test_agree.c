@@ -1,0 +1,326 @@
+/* Runs agree: one integrator with another, with and without the ledger, sampled or not, in other units; and each with
+ * the equations, which the verifier evaluates by itself. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+#include "toys.h"
+#include "verify.h"
+
+/* ---- Scenes: between them, all that a kind may have ---- */
+
+/* A cart on a rolling wheel with its own coordinate, tied to the ground by a damped spring, with an arm that swings as
+ * its motor says and a free pendulum at the arm's end. */
+static void agree_cart (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 2, .inertia = 0.3, .rate = { 0.5, 0, 0.4 } });
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 0.5, .inertia = 0.05, .start = { 0.8, 0, 0.3 } });
+  pw_add_body (m, &(pw_body){ .name = "bob", .mass = 0.3, .inertia = 0.01, .start = { 1.3, 0.1, -0.4 } });
+  pw_add (m, &toy_kind_roller,
+          &(toy_roller){ .name = "W", .body = "cart", .at = { -0.2, 0.1 }, .radius = 0.15, .inertia = 0.02 });
+  pw_add (m, &toy_kind_spring,
+          &(toy_spring){ .name = "tie",
+                         .body = { "ground", "cart" },
+                         .at = { { -1, 0.5 }, { 0.1, 0 } },
+                         .stiffness = 8,
+                         .length = 1,
+                         .damping = 0.3 });
+  pw_add (m, &toy_kind_drive,
+          &(toy_drive){ .name = "motor",
+                        .body = { "arm", "cart" },
+                        .angle = { PW_HARMONIC, .harmonic = { .amplitude = 0.6, .omega = 3, .phase = 0.5 } } });
+  pw_add (m, &toy_kind_weight, &(toy_weight){ .name = "slope", .g = { 0.3, -0.8 } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "cart", "arm" }, .at = { { 0.4, 0 }, { -0.4, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "Q", .body = { "arm", "bob" }, .at = { { 0.3, 0 }, { -0.2, 0 } } });
+}
+
+/* A torque that reads states: a steering that is sprung and damped. */
+static int agree_steering (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context;
+  value[0] = 0.1 * cos (PW_PI * t) + 0.02 * (x[1] - x[0] - PW_PI) + 0.01 * (x[3] - x[2]);
+  if (gradient) gradient[0] = -0.02, gradient[1] = 0.02, gradient[2] = -0.01, gradient[3] = 0.01;
+  return 0;
+}
+
+static const pw_plugin_table agree_table = { .abi = PW_ABI, .size = sizeof agree_table, .build = agree_cart };
+
+enum { AGREE_MASSLESS, AGREE_MASSIVE, AGREE_READER, AGREE_CART, AGREE_SCENES };
+static const char *const agree_names[] = { "massless", "massive", "reader", "cart" };
+
+static pw_system *agree_scene (int scene) {
+  static const char *const reads[] = { "frame.phi", "steer.phi", "frame.omega", "steer.omega", NULL };
+  pw_error error = { 0 };
+  if (scene == AGREE_CART) return scene_system (&agree_table, NULL);
+  if (scene == AGREE_MASSLESS) return scene_system (&scene_ezyroller, NULL);
+  pw_model *m = scene_model (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = agree_steering, .reads = reads } };
+  if (scene == AGREE_READER) check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  return scene_compile (m);
+}
+
+enum { AGREE_MOST = 10 };
+
+/* The scenes' fastest frequency is about 3/s: what a method of order 4 leaves after a few seconds. */
+static double agree_order_4 (double h) {
+  return pow (3 * h, 4);
+}
+static const char agree_reason[] = "(h omega)^4, omega = 3/s";
+
+/* ---- One integrator with another ---- */
+
+static const struct {
+  const char *name;
+  double factor; /* its error, in units of rtol */
+} agree_methods[] = { { "rk4+none", 0 },
+                      { "rk4+baumgarte", 0 },
+                      { "rk4+projection:metric=identity", 0 },
+                      { "rk4+projection:every=5", 0 },
+                      { "ida+ggl", 1e3 },
+                      { "ida+baumgarte", 1e3 },
+                      { "ida+none", 1e3 } };
+
+static void test_integrators (void **state) {
+  (void)state;
+  const double rtol = 1e-9;
+  for (int scene = 0; scene < AGREE_SCENES; scene++) {
+    double q[AGREE_MOST], v[AGREE_MOST], Q[AGREE_MOST], V[AGREE_MOST];
+    pw_system *s = agree_scene (scene);
+    runs_state (s, "rk4+projection", &(pw_settings){ .step = 5e-4, .span = 3 }, 3, q, v, NULL);
+    for (size_t i = 0; i < sizeof agree_methods / sizeof *agree_methods; i++) {
+      runs_state (s, agree_methods[i].name, &(pw_settings){ .step = 1e-3, .rtol = rtol, .span = 3 }, 3, Q, V, NULL);
+      double bound = agree_methods[i].factor > 0 ? agree_methods[i].factor * rtol : agree_order_4 (1e-3);
+      const char *reason = agree_methods[i].factor > 0 ? "1e3 rtol" : agree_reason;
+      for (int j = 0; j < pw_count_coordinates (s); j++) {
+        char what[100], name[60];
+        snprintf (what, sizeof what, "%s, %s, %s", agree_names[scene], agree_methods[i].name,
+                  pw_state_name (s, j, name, sizeof name));
+        check_close (what, Q[j], q[j], bound, reason);
+      }
+    }
+    pw_free (s);
+  }
+}
+
+/* ---- The ledger ---- */
+
+/* Every energy is accounted for, and keeping the account changes no bit of the run. */
+static void test_ledger (void **state) {
+  static const char *const method[] = { "rk4+projection", "rk4+none", "rk4+baumgarte", "ida+ggl", "ida+baumgarte" };
+  (void)state;
+  for (int scene = 0; scene < AGREE_SCENES; scene++)
+    for (int i = 0; i < 5; i++) {
+      pw_system *s = agree_scene (scene);
+      pw_settings with = { .step = 1e-3, .rtol = 1e-9, .span = 3, .ledger = 1 }, without = with;
+      without.ledger = 0;
+      pw_run *r = runs_open (s, method[i], &with);
+      pw_sample now = runs_to (r, 3);
+      char what[60];
+      snprintf (what, sizeof what, "balance of %s, %s", agree_names[scene], method[i]);
+      check_close (what, now.balance, 0, i < 3 ? agree_order_4 (1e-3) : 1e3 * with.rtol,
+                   i < 3 ? agree_reason : "1e3 rtol");
+      double work = 0, loss = 0;
+      for (int e = 0; e < pw_count_ledger (s); e++)
+        *(strstr (pw_ledger_name (s, e, what, sizeof what), ".work") ? &work : &loss) += now.ledger[e];
+      assert_true (now.kinetic > 0 && now.loss >= 0 && now.work == work && now.loss == loss);
+      double q[AGREE_MOST], v[AGREE_MOST];
+      pw_statistics cost = *pw_run_statistics (r), other;
+      memcpy (q, now.q, sizeof (double) * (size_t)pw_count_coordinates (s));
+      memcpy (v, now.v, sizeof (double) * (size_t)pw_count_coordinates (s));
+      pw_close (r);
+      double Q[AGREE_MOST], V[AGREE_MOST];
+      runs_state (s, method[i], &without, 3, Q, V, &other);
+      check_bits ("positions without a ledger", Q, q, pw_count_coordinates (s));
+      check_bits ("rates without a ledger", V, v, pw_count_coordinates (s));
+      assert_true (cost.steps == other.steps && cost.rejected == other.rejected && cost.rhs == other.rhs);
+      pw_free (s);
+    }
+}
+
+/* ---- Sampling ---- */
+
+/* Looking into the steps at any time changes no bit of the run; what is seen obeys the constraints as the run does. */
+static void test_sampling (void **state) {
+  static const char *const method[] = { "rk4+projection", "rk4+none", "ida+ggl", "ida+baumgarte" };
+  (void)state;
+  for (int scene = 0; scene < AGREE_SCENES; scene++)
+    for (int i = 0; i < 4; i++) {
+      pw_system *s = agree_scene (scene);
+      pw_settings settings = { .step = 1e-2, .rtol = 1e-7, .span = 2, .ledger = 1 };
+      double q[AGREE_MOST], v[AGREE_MOST];
+      pw_statistics plain;
+      pw_error error = { 0 };
+      pw_sample now;
+      runs_state (s, method[i], &settings, 2, q, v, &plain);
+      pw_run *r = runs_open (s, method[i], &settings);
+      for (int k = 0; k <= 300; k++) { /* 0.00671 s does not divide the step */
+        double t = 0.00671 * k < 2 ? 0.00671 * k : 2;
+        check_ok (pw_advance_to (r, t, 2, &error), &error);
+        check_ok (pw_at (r, t, &now, &error), &error);
+        assert_true (now.t == t);
+        if (i != 0 && i != 2) continue;
+        check_below ("position of a sample", now.position, i == 0 ? 16 * CHECK_EPS : 1e-6,
+                     i == 0 ? "projected: round-off" : "10 rtol");
+        check_below ("velocity of a sample", now.velocity, i == 0 ? 16 * CHECK_EPS : 1e-5,
+                     i == 0 ? "projected: round-off" : "100 rtol");
+      }
+      now = runs_to (r, 2);
+      check_bits ("positions", now.q, q, pw_count_coordinates (s));
+      check_bits ("rates", now.v, v, pw_count_coordinates (s));
+      assert_int_equal (pw_run_statistics (r)->steps, plain.steps);
+      assert_int_equal (pw_run_statistics (r)->rhs, plain.rhs);
+      pw_close (r);
+      pw_free (s);
+    }
+}
+
+/* Samples inside a step are as good as the steps. */
+static void test_dense (void **state) {
+  static const char *const method[] = { "rk4+projection", "ida+ggl" };
+  (void)state;
+  for (int scene = 0; scene < AGREE_SCENES; scene++)
+    for (int i = 0; i < 2; i++) {
+      pw_system *s = agree_scene (scene);
+      int n = pw_count_coordinates (s);
+      pw_run *fine = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-4, .span = 1 });
+      double q[10][AGREE_MOST], v[10][AGREE_MOST], t[10];
+      for (int k = 0; k < 10; k++) {
+        t[k] = 0.0957 * (k + 1);
+        pw_sample now = runs_to (fine, t[k]);
+        memcpy (q[k], now.q, (size_t)n * sizeof (double));
+        memcpy (v[k], now.v, (size_t)n * sizeof (double));
+      }
+      pw_close (fine);
+      pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .rtol = 1e-8, .span = 1 });
+      for (int k = 0; k < 10; k++) {
+        pw_error error = { 0 };
+        pw_sample now;
+        check_ok (pw_advance_to (r, t[k], 1, &error), &error);
+        check_ok (pw_at (r, t[k], &now, &error), &error);
+        double bound = i == 0 ? agree_order_4 (1e-2) : 1e3 * 1e-8;
+        for (int j = 0; j < n; j++) {
+          check_close ("position of a sample", now.q[j], q[k][j], bound, i == 0 ? agree_reason : "1e3 rtol");
+          check_close ("rate of a sample", now.v[j], v[k][j], 10 * bound, i == 0 ? "10 (h omega)^4" : "1e4 rtol");
+        }
+      }
+      pw_close (r);
+      pw_free (s);
+    }
+}
+
+/* ---- The verifier ---- */
+
+typedef struct {
+  const char *method;
+  double position, velocity, acceleration, force;
+  const char *reason;
+} agree_verdict;
+
+static void agree_verify (int scene, const agree_verdict *bound) {
+  pw_system *s = agree_scene (scene);
+  pw_run *r = runs_open (s, bound->method, &(pw_settings){ .step = 1e-3, .rtol = 1e-9, .span = 2 });
+  for (int k = 0; k <= 20; k++) {
+    pw_sample now = runs_to (r, 0.1 * k);
+    pw_verification v;
+    assert_int_equal (pw_verify (s, now.t, now.q, now.v, now.a, now.lambda, &v), PW_OK);
+    char what[120];
+    const struct {
+      const char *name;
+      const pw_verdict *verdict;
+      double bound;
+    } each[] = { { "g", &v.position, bound->position },
+                 { "J v", &v.velocity, bound->velocity },
+                 { "J a", &v.acceleration, bound->acceleration },
+                 { "M a", &v.force, bound->force } };
+    for (int i = 0; i < 4; i++) {
+      snprintf (what, sizeof what, "%s %s, %s at %s, t = %g", agree_names[scene], bound->method, each[i].name,
+                each[i].verdict->name, now.t);
+      check_below (what, each[i].verdict->scaled, each[i].bound, bound->reason);
+      assert_true (each[i].verdict->name[0] != 0);
+    }
+    check_close ("the run's own position residual", now.position, v.position.scaled, 8 * CHECK_EPS + 0.5 * now.position,
+                 "one formula");
+  }
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_verifier (void **state) {
+  static const agree_verdict bounds[] = {
+    { "rk4+projection", 16 * CHECK_EPS, 16 * CHECK_EPS, 64 * CHECK_EPS, 64 * CHECK_EPS,
+      "round-off of the projection and of one solve" },
+    { "rk4+none", 1e-10, 1e-10, 64 * CHECK_EPS, 64 * CHECK_EPS, "drift of order h^4; round-off of one solve" },
+    { "ida+ggl", 1e-8, 1e-8, 1e-4, 1e-4, "10 rtol; accelerations are one derivative up: 1e5 rtol" },
+  };
+  (void)state;
+  for (int scene = 0; scene < AGREE_SCENES; scene++)
+    for (int i = 0; i < 3; i++) agree_verify (scene, &bounds[i]);
+}
+
+/* The verifier notices: each of its four residuals, one number wrong at a time. */
+static void test_verifier_notices (void **state) {
+  (void)state;
+  pw_system *s = agree_scene (AGREE_CART);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
+  pw_sample now = runs_to (r, 0.5);
+  int n = pw_count_coordinates (s), rows = pw_count_rows (s);
+  double x[4][AGREE_MOST];
+  const double *given[] = { now.q, now.v, now.a, now.lambda };
+  for (int part = 0; part < 4; part++)
+    for (int j = 0; j < (part == 3 ? rows : n); j++) {
+      pw_verification v;
+      for (int k = 0; k < 4; k++) memcpy (x[k], given[k], (size_t)(k == 3 ? rows : n) * sizeof (double));
+      x[part][j] += 1e-6;
+      assert_int_equal (pw_verify (s, now.t, x[0], x[1], x[2], x[3], &v), PW_OK);
+      int noticed =
+          v.position.scaled > 1e-9 || v.velocity.scaled > 1e-9 || v.acceleration.scaled > 1e-9 || v.force.scaled > 1e-9;
+      assert_true (noticed || (part == 0 && j >= 3 * pw_count_bodies (s))); /* nothing depends on the spin angle */
+    }
+  x[0][0] = NAN;
+  pw_verification v;
+  assert_int_equal (pw_verify (s, now.t, x[0], now.v, now.a, now.lambda, &v), PW_OK);
+  assert_true (isinf (v.position.scaled) && v.position.name[0]);
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- Units ---- */
+
+/* The EzyRoller in units of 1/1024 m and 1/8 kg: every number is the same, with another exponent. */
+static void test_units (void **state) {
+  (void)state;
+  const double L = 1024, m = 8, I = L * L * m;
+  static const char *const method[] = { "rk4+projection", "rk4+none", "rk4+baumgarte", "ida+ggl", "ida+baumgarte" };
+  for (int massive = 0; massive < 2; massive++)
+    for (int i = 0; i < 5; i++) {
+      double m2 = 0.1 * massive, I2 = 0.01 * massive, q[6], v[6], Q[6], V[6];
+      pw_system *s = scene_system (&scene_ezyroller, "m2", m2, "I2", I2, NULL);
+      pw_system *S = scene_system (&scene_ezyroller, "a", 0.5 * L, "b", 0.5 * L, "c", 0.125 * L, "d", 0.125 * L, "m1",
+                                   m, "I1", 0.1 * I, "m2", m2 * m, "I2", I2 * I, "M0", 0.1 * I, NULL);
+      pw_settings settings = { .step = 1e-3, .rtol = 1e-8, .span = 2 };
+      pw_statistics cost, Cost;
+      runs_state (s, method[i], &settings, 2, q, v, &cost);
+      runs_state (S, method[i], &settings, 2, Q, V, &Cost);
+      for (int j = 0; j < 6; j++) Q[j] /= j % 3 < 2 ? L : 1, V[j] /= j % 3 < 2 ? L : 1;
+      if (i < 3) {
+        check_bits (method[i], Q, q, 6);
+        check_bits (method[i], V, v, 6);
+      }
+      for (int j = 0; j < 6; j++) check_close (method[i], Q[j], q[j], 1e-4, "1e4 rtol");
+      check_close ("steps", (double)Cost.steps, (double)cost.steps, 0.1 * (double)cost.steps, "the same to 10 %");
+      check_below ("scaled residual", Cost.position, 2 * cost.position + 64 * CHECK_EPS,
+                   "the same, whatever the units");
+      pw_free (s);
+      pw_free (S);
+    }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_integrators), cmocka_unit_test (test_ledger),   cmocka_unit_test (test_sampling),
+    cmocka_unit_test (test_dense),       cmocka_unit_test (test_verifier), cmocka_unit_test (test_verifier_notices),
+    cmocka_unit_test (test_units),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
