@@ -34,6 +34,24 @@ static double time_end (const pw_plots *p) {
   return pw_plot_sample (p, p->samples - 1)[PLOT_T];
 }
 
+/* The range of y is gnuplot's choice, but for a number (3: vx ... 5: omega) that is the same throughout, for which it
+ * has none. */
+static void time_span (const pw_script *s, const pw_plots *p, const pw_curves *c, int y) {
+  double least = INFINITY, most = -INFINITY;
+  for (int k = 0; k < c->count; k++)
+    for (int i = 0; i < p->samples; i++) {
+      double value = c->at (p, i, pw_plot_pick (k, c->count, c->shown))[y];
+      if (!isfinite (value)) continue;
+      least = fmin (least, value);
+      most = fmax (most, value);
+    }
+  double size = fmax (fabs (least), fabs (most));
+  if (most - least > 1e-9 * size)
+    fputs ("set yrange [*:*]\n", s->f);
+  else if (isfinite (size))
+    pw_script_range (s, "y", least - (size > 0 ? 0.1 * size : 1), most + (size > 0 ? 0.1 * size : 1));
+}
+
 int pw_plot_velocities (const pw_plots *p, pw_error *error) {
   pw_curves c = pw_plot_bodies (p);
   pw_script s = time_page (p, "velocities", &c, 2, TIME_PANEL, TIME_GAP);
@@ -43,9 +61,11 @@ int pw_plot_velocities (const pw_plots *p, pw_error *error) {
   pw_script_key (&s, p, &c);
   fputs ("set format x ''\nunset xlabel\nset ylabel 'vx [m/s]'\n", s.f);
   time_panel (&s, 0, TIME_PANEL, TIME_GAP);
+  time_span (&s, p, &c, 3);
   pw_script_draw (&s, p, &c, -1, 3, 1);
   fputs ("unset colorbox\nset format x\nset xlabel 't [s]'\nset ylabel 'vy [m/s]'\n", s.f);
   time_panel (&s, 1, TIME_PANEL, TIME_GAP);
+  time_span (&s, p, &c, 4);
   pw_script_draw (&s, p, &c, -1, 4, 0);
   return pw_script_end (&s, p, error);
 }
@@ -86,6 +106,7 @@ int pw_plot_angular (const pw_plots *p, pw_error *error) {
   fputs ("set xlabel 't [s]'\nset ylabel 'ω [rad/s]'\n", s.f);
   pw_script_range (&s, "x", 0, end);
   time_panel (&s, 0, panel, TIME_APART);
+  time_span (&s, p, &c, 5);
   pw_script_draw (&s, p, &c, -1, 5, 1);
   if (detail > 0) {
     pw_script_range (&s, "x", end * (1 - detail), end);
@@ -118,6 +139,13 @@ static void time_power_of_ten (FILE *f, int exponent) {
   fputs (" J", f);
 }
 
+/* Whether a number kept has more than one value, as gnuplot's choice of a range needs. */
+static int time_varies (const pw_plots *p, int number) {
+  for (int i = 1; i < p->samples; i++)
+    if (fabs (pw_plot_sample (p, i)[number] - pw_plot_sample (p, 0)[number]) > 0) return 1;
+  return 0;
+}
+
 /* How far the account is from closing, in a unit of its own. */
 static void time_balance (FILE *f, const pw_plots *p) {
   double largest = time_largest (p, PLOT_BALANCE);
@@ -128,7 +156,7 @@ static void time_balance (FILE *f, const pw_plots *p) {
     fputs ("J", f);
   else
     time_power_of_ten (f, exponent);
-  fprintf (f, "]'\nset yrange [%s]\n", largest > 0 ? "*:*" : "-1:1");
+  fprintf (f, "]'\nset yrange [%s]\n", time_varies (p, PLOT_BALANCE) ? "*:*" : "-1:1");
   fprintf (f, "plot 'energy.dat' using 1:($%d/1e%d) with lines lt 1 lw 1 notitle\n", PLOT_BALANCE + 1, exponent);
 }
 
@@ -139,7 +167,12 @@ int pw_plot_energy (const pw_plots *p, pw_error *error) {
   pw_script_range (&s, "x", 0, time_end (p));
   pw_script_begin (&s, p, "energy, work and their balance");
   pw_script_key (&s, p, &one);
-  fputs ("set format x ''\nunset xlabel\nset ylabel 'energy, work [J]'\nset yrange [*:*]\n", s.f);
+  fputs ("set format x ''\nunset xlabel\nset ylabel 'energy, work [J]'\n", s.f);
+  int flat = !time_varies (p, PLOT_KINETIC) && !time_varies (p, PLOT_POTENTIAL) && !time_varies (p, PLOT_WORK);
+  if (flat && time_largest (p, PLOT_KINETIC) == 0)
+    fputs ("set yrange [-1:1]\n", s.f);
+  else
+    fputs ("set yrange [*:*]\n", s.f);
   time_panel (&s, 0, TIME_PANEL, TIME_GAP);
   fputs ("plot 'energy.dat' using 1:2 with lines lw 5 dt 1 lc rgb '#ddaa33' title 'kinetic'", s.f);
   if (time_largest (p, PLOT_POTENTIAL) > 0)

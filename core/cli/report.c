@@ -127,7 +127,9 @@ void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_samp
   if (energy) report_energy (last);
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", pw_format (a, statistics->position, 2),
           pw_format (b, statistics->velocity, 2));
-  printf ("  %ld steps, %ld rejected, %ld right-hand sides, %s s of processor time\n", statistics->steps,
-          statistics->rejected, statistics->rhs, pw_format (a, summary->cpu, 3));
+  printf (
+      "  %ld steps, %ld rejected, %ld right-hand sides, %ld Jacobians, %ld factorisations, %s s of processor time\n",
+      statistics->steps, statistics->rejected, statistics->rhs, statistics->jacobians, statistics->factorisations,
+      pw_format (a, summary->cpu, 3));
   if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
 }
