@@ -160,10 +160,9 @@ typedef struct {
 
 static void condense_put_term (condense *c, int a, int b, void *context) {
   condense_filling *to = context;
-  struct pw_saddle *k = c->k;
-  int transposed, is_short = condense_is_short (c, a) && condense_is_short (c, b);
-  size_t at = pw_ldl_block (k->ldl, c->node_of[a], c->node_of[b], &transposed);
-  if (transposed) {
+  struct pw_saddle *k = c->k;  int is_short = condense_is_short (c, a) && condense_is_short (c, b);
+  pw_ldl_place at = pw_ldl_block (k->ldl, c->node_of[a], c->node_of[b]);
+  if (at.transposed) {
     int swap = a;
     a = b;
     b = swap;
@@ -171,9 +170,9 @@ static void condense_put_term (condense *c, int a, int b, void *context) {
   const condense_piece *A = &c->piece[a], *B = &c->piece[b];
   int *next = is_short ? &to->next[condense_shape (c, a, b)] : &to->wides;
   if (to->fill && is_short)
-    k->term[*next] = (pw_term){ condense_offset (c, A->J), condense_offset (c, B->J), (int)at, A->j, (short)A->step, (short)B->step };
+    k->term[*next] = (pw_term){ condense_offset (c, A->J), condense_offset (c, B->J), at.offset, A->j, (short)A->step, (short)B->step, at.step };
   if (to->fill && !is_short)
-    k->wide[*next] = (pw_wide_term){ A->J, B->J, (int)at, A->j, A->step, B->step, (signed char)c->node[c->node_of[a]].size,
+    k->wide[*next] = (pw_wide_term){ A->J, B->J, at.offset, A->j, A->step, B->step, at.step,  (signed char)c->node[c->node_of[a]].size,
                                      (signed char)c->node[c->node_of[b]].size, (signed char)A->width };
   ++*next;
 }

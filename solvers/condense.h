@@ -17,13 +17,12 @@ typedef enum { PW_TERM_D1, PW_TERM_D2, PW_TERM_11, PW_TERM_12, PW_TERM_21, PW_TE
 typedef struct {
   int A, B;             /* first row, first column */
   int to;               /* in the values of the factorisation */
-  int j;                /* coordinate */
-  short step_a, step_b; /* from row to row */
+  int j;                /* coordinate */  short step_a, step_b; /* from row to row */
+  int step_t;           /* from row to row of the block */
 } pw_term;
 
 typedef struct {
-  const double *A, *B;
-  int to, j, step_a, step_b;
+  const double *A, *B;  int to, j, step_a, step_b, step_t;
   signed char a, b, width; /* rows of A, rows of B, columns */
 } pw_wide_term;
 

@@ -9,12 +9,14 @@
 #include <math.h>
 #include <amd.h>
 #include "ldl.h"
+#include "ldl_small.h"
 #include "util.h"
 
 struct pw_ldl {
   int nodes, unknowns;
-  size_t count;     /* of values */
-  int *order;       /* node at each place in the order */
+  size_t count;     /* of values */  int small; /* 1: dense, unknowns x unknowns, in the same order */
+  int node_at[PW_LDL_SMALL]; /* small: the node of each unknown */
+  int *order;        /* node at each place in the order */
   int *place;       /* place of each node */
   int *size;        /* unknowns of the node at each place */
   int *position;    /* first unknown of the node at each place */
@@ -171,7 +173,7 @@ static int ldl_lay_out (pw_ldl *l, const int *size, const int *order, const ldl_
     unknowns += (size_t)k;
     values += (size_t)(k * k);
     for (int i = L->first[j]; i < L->first[j + 1]; i++) values += (size_t)(k * size[order[L->list[i]]]);
-  }
+  }  if (unknowns <= PW_LDL_SMALL) values = values > PW_LDL_SMALL * PW_LDL_SMALL ? values : PW_LDL_SMALL * PW_LDL_SMALL;
   pw_layout lay = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
     l->order = pw_take (&lay, n, sizeof (int));
@@ -199,8 +201,12 @@ static int ldl_lay_out (pw_ldl *l, const int *size, const int *order, const ldl_
     l->size[j] = size[order[j]];
     l->position[j] = l->unknowns;
     l->unknowns += l->size[j];
-  }
-  ldl_place_blocks (l);
+  }  ldl_place_blocks (l);
+  l->small = l->unknowns <= PW_LDL_SMALL;
+  if (!l->small) return PW_OK;
+  l->count = (size_t)(l->unknowns * l->unknowns);
+  for (int j = 0; j < l->nodes; j++)
+    for (int i = 0; i < l->size[j]; i++) l->node_at[l->position[j] + i] = l->order[j];
   return PW_OK;
 }
 
@@ -237,17 +243,26 @@ double *pw_ldl_values (pw_ldl *l, size_t *count) {
   return l->value;
 }
 
-size_t pw_ldl_block (const pw_ldl *l, int i, int j, int *transposed) {
-  int p = l->place[i], q = l->place[j];
-  *transposed = p < q;
-  return p < q ? ldl_find (l, q, p) : ldl_find (l, p, q);
+pw_ldl_place pw_ldl_block (const pw_ldl *l, int i, int j) {
+  int p = l->place[i], q = l->place[j], transposed = p < q;
+  if (transposed) {
+    int swap = p;
+    p = q;
+    q = swap;
+  }
+  if (l->small) return (pw_ldl_place){ l->position[p] * l->unknowns + l->position[q], l->unknowns, transposed };
+  return (pw_ldl_place){ (int)ldl_find (l, p, q), l->size[q], transposed };
 }
-
 int pw_ldl_position (const pw_ldl *l, int i) {
   return l->position[l->place[i]];
 }
 
 /* ---- Numbers ---- */
+
+/* The smaller one, or what is not a number. */
+static inline double ldl_least (double a, double b) {
+  return a < b || a != a ? a : b;
+}
 
 /* Inverts a diagonal block in place; the worst pivot relative to `was`, the diagonal before the factorisation. */
 static inline double ldl_invert (double *D, int k, const double *was) {
@@ -259,60 +274,73 @@ static inline double ldl_invert (double *D, int k, const double *was) {
   if (k == 2) {
     double a = D[0], b = D[2], c = D[3], determinant = a * c - b * b, f = 1 / determinant;
     D[0] = c * f, D[1] = D[2] = -b * f, D[3] = a * f;
-    return fmin (a / was[0], determinant / (a * was[1]));
+    return ldl_least (a / was[0], determinant / (a * was[1]));
   }
   double a = D[0], b = D[3], c = D[4], d = D[6], e = D[7], g = D[8];
   double A = c * g - e * e, B = d * e - b * g, C = b * e - c * d, minor = a * c - b * b;
   double determinant = a * A + b * B + d * C, f = 1 / determinant;
   D[0] = A * f, D[1] = D[3] = B * f, D[2] = D[6] = C * f;
   D[4] = (a * g - d * d) * f, D[5] = D[7] = (b * d - a * e) * f, D[8] = minor * f;
-  return fmin (fmin (a / was[0], minor / (a * was[1])), determinant / (minor * was[2]));
+  return ldl_least (ldl_least (a / was[0], minor / (a * was[1])), determinant / (minor * was[2]));
 }
+
+/* Sizes are constants where these are called, so that the loops vanish. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define LDL_UNROLL _Pragma ("GCC unroll 3")
+#else
+#define LDL_UNROLL
+#endif
 
 /* T -= L A^T: L ki x kj, A kq x kj, T ki x kq. */
 static inline void ldl_subtract (double *T, const double *L, const double *A, int ki, int kq, int kj) {
-  for (int i = 0; i < ki; i++)
-    for (int q = 0; q < kq; q++) {
-      double sum = 0;
-      for (int j = 0; j < kj; j++) sum += L[i * kj + j] * A[q * kj + j];
+  LDL_UNROLL for (int i = 0; i < ki; i++) {
+    LDL_UNROLL for (int q = 0; q < kq; q++) {
+      double sum = L[i * kj] * A[q * kj];
+      LDL_UNROLL for (int j = 1; j < kj; j++) sum += L[i * kj + j] * A[q * kj + j];
       T[i * kq + q] -= sum;
     }
+  }
 }
 
 /* L = A D^-1: A ki x kj. */
 static inline void ldl_scale (double *L, const double *A, const double *D, int ki, int kj) {
-  for (int i = 0; i < ki; i++)
-    for (int j = 0; j < kj; j++) {
-      double sum = 0;
-      for (int k = 0; k < kj; k++) sum += A[i * kj + k] * D[k * kj + j];
+  LDL_UNROLL for (int i = 0; i < ki; i++) {
+    LDL_UNROLL for (int j = 0; j < kj; j++) {
+      double sum = A[i * kj] * D[j];
+      LDL_UNROLL for (int k = 1; k < kj; k++) sum += A[i * kj + k] * D[k * kj + j];
       L[i * kj + j] = sum;
     }
+  }
 }
 
-/* All updates of a column of nodes of kj unknowns; compiled once for each kj so that the loops unroll. */
+/* One block row of a column: L_p = A_p D^-1 in place, after K_pq -= L_p A_q^T for all q <= p. */
+static inline const size_t *ldl_row (const pw_ldl *l, int first, int p, const double *D, int ki, int kj, const size_t *target) {
+  double *value = l->value, *A = value + l->offset[p], L[PW_LDL_NODE * PW_LDL_NODE];
+  ldl_scale (L, A, D, ki, kj);
+  for (int q = first; q <= p; q++) {
+    double *T = value + *target++;
+    const double *B = value + l->offset[q];
+    int kq = l->size[l->below[q]];
+    if (kq == 2)
+      ldl_subtract (T, L, B, ki, 2, kj);
+    else if (kq == 1)
+      ldl_subtract (T, L, B, ki, 1, kj);
+    else
+      ldl_subtract (T, L, B, ki, 3, kj);
+  }
+  LDL_UNROLL for (int i = 0; i < ki * kj; i++) A[i] = L[i];
+  return target;
+}
+
+/* All updates of a column of kj unknowns. */
 static inline const size_t *ldl_column (const pw_ldl *l, int j, int kj, const size_t *target) {
-  double *value = l->value, L[PW_LDL_NODE * PW_LDL_NODE];
-  const double *D = value + l->diagonal[j];
+  const double *D = l->value + l->diagonal[j];
   int first = l->first[j];
   for (int p = l->first[j + 1] - 1; p >= first; p--) {
     int ki = l->size[l->below[p]];
-    double *A = value + l->offset[p];
-    if (ki == 2)
-      ldl_scale (L, A, D, 2, kj);
-    else
-      ldl_scale (L, A, D, ki, kj);
-    for (int q = first; q <= p; q++) {
-      int kq = l->size[l->below[q]];
-      double *T = value + *target++;
-      const double *B = value + l->offset[q];
-      if (ki == 2 && kq == 2)
-        ldl_subtract (T, L, B, 2, 2, kj);
-      else if (ki == 1 && kq == 1)
-        ldl_subtract (T, L, B, 1, 1, kj);
-      else
-        ldl_subtract (T, L, B, ki, kq, kj);
-    }
-    for (int i = 0; i < ki * kj; i++) A[i] = L[i];
+    target = ki == 2   ? ldl_row (l, first, p, D, 2, kj, target)
+             : ki == 1 ? ldl_row (l, first, p, D, 1, kj, target)
+                       : ldl_row (l, first, p, D, 3, kj, target);
   }
   return target;
 }
@@ -326,11 +354,16 @@ static void ldl_keep_diagonal (pw_ldl *l) {
   }
 }
 
-double pw_ldl_factor (pw_ldl *l, int *node) {
-  double worst = INFINITY;
+double pw_ldl_factor (pw_ldl *l, int *node) {  double worst = INFINITY;
   const size_t *target = l->target;
+  if (l->small) {
+    int place;
+    worst = pw_ldl_small_factor (l->value, l->unknowns, &place);
+    *node = place >= 0 ? l->node_at[place] : -1;
+    return worst;
+  }
   ldl_keep_diagonal (l);
-  *node = -1;
+*node = -1;
   for (int j = 0; j < l->nodes; j++) {
     int k = l->size[j];
     double pivot = ldl_invert (l->value + l->diagonal[j], k, l->was + l->position[j]);
@@ -343,51 +376,76 @@ double pw_ldl_factor (pw_ldl *l, int *node) {
   return worst;
 }
 
-/* y_i -= L y_j, or x_j -= L^T x_i. */
+/* y_i -= L y_j for the blocks below, sizes as before. */
 static inline void ldl_forward (double *to, const double *L, const double *from, int ki, int kj) {
-  for (int i = 0; i < ki; i++)
-    for (int j = 0; j < kj; j++) to[i] -= L[i * kj + j] * from[j];
-}
-
-static inline void ldl_backward (double *to, const double *L, const double *from, int ki, int kj) {
-  for (int i = 0; i < ki; i++)
-    for (int j = 0; j < kj; j++) to[j] -= L[i * kj + j] * from[i];
-}
-
-static inline void ldl_diagonal (double *y, const double *D, int k) {
-  double z[PW_LDL_NODE];
-  for (int i = 0; i < k; i++) {
-    z[i] = 0;
-    for (int j = 0; j < k; j++) z[i] += D[i * k + j] * y[j];
+  LDL_UNROLL for (int i = 0; i < ki; i++) {
+    LDL_UNROLL for (int j = 0; j < kj; j++) to[i] -= L[i * kj + j] * from[j];
   }
-  for (int i = 0; i < k; i++) y[i] = z[i];
+}
+
+static inline void ldl_forward_column (const pw_ldl *l, double *y, int j, int kj) {
+  const double *from = y + l->position[j];
+  for (int p = l->first[j]; p < l->first[j + 1]; p++) {
+    int i = l->below[p], ki = l->size[i];
+    double *to = y + l->position[i];
+    const double *L = l->value + l->offset[p];
+    if (ki == 2)
+      ldl_forward (to, L, from, 2, kj);
+    else if (ki == 1)
+      ldl_forward (to, L, from, 1, kj);
+    else
+      ldl_forward (to, L, from, 3, kj);
+  }
+}
+
+/* x_j = D^-1 y_j - sum_i L_ij^T x_i */
+static inline void ldl_backward (double *sum, const double *L, const double *from, int ki, int kj) {
+  LDL_UNROLL for (int i = 0; i < ki; i++) {
+    LDL_UNROLL for (int j = 0; j < kj; j++) sum[j] -= L[i * kj + j] * from[i];
+  }
+}
+
+static inline void ldl_backward_column (const pw_ldl *l, double *y, int j, int kj) {
+  double *to = y + l->position[j], sum[PW_LDL_NODE];
+  const double *D = l->value + l->diagonal[j];
+  LDL_UNROLL for (int i = 0; i < kj; i++) {
+    sum[i] = D[i * kj] * to[0];
+    LDL_UNROLL for (int n = 1; n < kj; n++) sum[i] += D[i * kj + n] * to[n];
+  }
+  for (int p = l->first[j]; p < l->first[j + 1]; p++) {
+    int i = l->below[p], ki = l->size[i];
+    const double *from = y + l->position[i], *L = l->value + l->offset[p];
+    if (ki == 2)
+      ldl_backward (sum, L, from, 2, kj);
+    else if (ki == 1)
+      ldl_backward (sum, L, from, 1, kj);
+    else
+      ldl_backward (sum, L, from, 3, kj);
+  }
+  LDL_UNROLL for (int i = 0; i < kj; i++) to[i] = sum[i];
 }
 
 void pw_ldl_solve (const pw_ldl *l, double *y) {
-  for (int j = 0; j < l->nodes; j++) {
-    double *from = y + l->position[j];
-    int k = l->size[j];
-    for (int p = l->first[j]; p < l->first[j + 1]; p++) {
-      int i = l->below[p];
-      if (k == 2 && l->size[i] == 2)
-        ldl_forward (y + l->position[i], l->value + l->offset[p], from, 2, 2);
-      else
-        ldl_forward (y + l->position[i], l->value + l->offset[p], from, l->size[i], k);
-    }
+  if (l->small) {
+    pw_ldl_small_solve (l->value, l->unknowns, y);
+    return;
   }
-  for (int j = l->nodes - 1; j >= 0; j--) {
-    double *to = y + l->position[j];
+for (int j = 0; j < l->nodes; j++) {
     int k = l->size[j];
     if (k == 2)
-      ldl_diagonal (to, l->value + l->diagonal[j], 2);
+      ldl_forward_column (l, y, j, 2);
+    else if (k == 1)
+      ldl_forward_column (l, y, j, 1);
     else
-      ldl_diagonal (to, l->value + l->diagonal[j], k);
-    for (int p = l->first[j]; p < l->first[j + 1]; p++) {
-      int i = l->below[p];
-      if (k == 2 && l->size[i] == 2)
-        ldl_backward (to, l->value + l->offset[p], y + l->position[i], 2, 2);
-      else
-        ldl_backward (to, l->value + l->offset[p], y + l->position[i], l->size[i], k);
-    }
+      ldl_forward_column (l, y, j, 3);
+  }
+  for (int j = l->nodes - 1; j >= 0; j--) {
+    int k = l->size[j];
+    if (k == 2)
+      ldl_backward_column (l, y, j, 2);
+    else if (k == 1)
+      ldl_backward_column (l, y, j, 1);
+    else
+      ldl_backward_column (l, y, j, 3);
   }
 }

@@ -1,5 +1,5 @@
 /* Block LDL^T of a symmetric positive definite matrix whose pattern is fixed: nodes of 1 to 3 unknowns, ordered and
- * laid out once, factorised and solved many times without allocating. */
+ * laid out once, factorised and solved many times without allocating.  Small ones are dense. */
 #ifndef PW_LDL_H
 #define PW_LDL_H
 
@@ -15,11 +15,14 @@ typedef struct pw_ldl pw_ldl;
 pw_ldl *pw_ldl_open (int nodes, const int *size, long pairs, const int *pair, pw_error *error);
 void pw_ldl_close (pw_ldl *l);
 
-/* The values, to be zeroed and added into before each factorisation: the block of nodes i and j starts at the returned
- * offset, row-major, its rows being those of i, or of j when *transposed is set.  Both triangles of a diagonal block
- * are to be filled. */
+/* The values, to be zeroed and added into before each factorisation: the block of nodes i and j starts at `offset`, its
+ * rows, `step` apart, being those of i, or of j if it is transposed.  Of diagonal blocks only the lower triangle is
+ * read. */
+typedef struct {
+  int offset, step, transposed;
+} pw_ldl_place;
 double *pw_ldl_values (pw_ldl *l, size_t *count);
-size_t pw_ldl_block (const pw_ldl *l, int i, int j, int *transposed);
+pw_ldl_place pw_ldl_block (const pw_ldl *l, int i, int j);
 
 /* First position of node i in the right-hand side. */
 int pw_ldl_position (const pw_ldl *l, int i);

@@ -64,11 +64,10 @@ static void saddle_assemble_short (pw_saddle *k) {
   }
   SADDLE_EACH (PW_TERM_D2) {
     SADDLE_PARTS;
-    saddle_row a1 = saddle_scaled (A + t->step_a, w);
-    T[0] += saddle_dot (a, B);
-    T[2] += saddle_dot (a1, B);
-    T[3] += saddle_dot (a1, B + t->step_b);
-  }
+    saddle_row a1 = saddle_scaled (A + t->step_a, w);    T[0] += saddle_dot (a, B);
+    T[t->step_t] += saddle_dot (a1, B);
+    T[t->step_t + 1] += saddle_dot (a1, B + t->step_b);
+}
   SADDLE_EACH (PW_TERM_11) {
     SADDLE_PARTS;
     T[0] += saddle_dot (a, B);
@@ -79,18 +78,16 @@ static void saddle_assemble_short (pw_saddle *k) {
     T[1] += saddle_dot (a, B + t->step_b);
   }
   SADDLE_EACH (PW_TERM_21) {
-    SADDLE_PARTS;
-    T[0] += saddle_dot (a, B);
-    T[1] += saddle_dot (saddle_scaled (A + t->step_a, w), B);
-  }
+    SADDLE_PARTS;    T[0] += saddle_dot (a, B);
+    T[t->step_t] += saddle_dot (saddle_scaled (A + t->step_a, w), B);
+}
   SADDLE_EACH (PW_TERM_22) {
     SADDLE_PARTS;
     saddle_row a1 = saddle_scaled (A + t->step_a, w);
     T[0] += saddle_dot (a, B);
-    T[1] += saddle_dot (a, B + t->step_b);
-    T[2] += saddle_dot (a1, B);
-    T[3] += saddle_dot (a1, B + t->step_b);
-  }
+    T[1] += saddle_dot (a, B + t->step_b);    T[t->step_t] += saddle_dot (a1, B);
+    T[t->step_t + 1] += saddle_dot (a1, B + t->step_b);
+}
 }
 
 static void saddle_assemble_wide (pw_saddle *k) {
@@ -99,7 +96,7 @@ static void saddle_assemble_wide (pw_saddle *k) {
       for (int y = 0; y < t->b; y++) {
         double sum = 0;
         for (int n = 0; n < t->width; n++) sum += t->A[x * t->step_a + n] * k->inverse[t->j + n] * t->B[y * t->step_b + n];
-        k->value[t->to + x * t->b + y] += sum;
+        k->value[t->to + x * t->step_t + y] += sum;
       }
 }
 
@@ -185,11 +182,14 @@ static void saddle_scatter (pw_saddle *k, double *lambda) {
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
   int coords = k->s->coords;
   double *force = k->force, *z = k->z;
-  const double *inverse = k->inverse;
-  for (int j = 0; j < coords; j++) force[j] = f ? f[j] : 0;
-  if (k->reduce.components) pw_reduce_forward (&k->reduce, gamma, force);
-  for (int j = 0; j < coords; j++) z[j] = inverse[j] * force[j];
-  saddle_gather (k, gamma);
+  const double *inverse = k->inverse;  if (f && !k->reduce.components)
+    for (int j = 0; j < coords; j++) z[j] = inverse[j] * (force[j] = f[j]);
+  else {
+    for (int j = 0; j < coords; j++) force[j] = f ? f[j] : 0;
+    if (k->reduce.components) pw_reduce_forward (&k->reduce, gamma, force);
+    for (int j = 0; j < coords; j++) z[j] = inverse[j] * force[j];
+  }
+saddle_gather (k, gamma);
   pw_ldl_solve (k->ldl, k->y);
   saddle_scatter (k, lambda);
   for (int j = 0; j < coords; j++) a[j] = inverse[j] * force[j];
