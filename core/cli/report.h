@@ -3,7 +3,7 @@
 #define PW_REPORT_H
 
 #include "pinwheel-files.h"
-#include "run.h"
+#include "pinwheel-solvers.h"
 
 /* Says on standard error which states the consistent start has moved, if any. */
 void pw_report_start (const pw_system *s, const pw_start_report *start);
