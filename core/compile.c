@@ -226,10 +226,15 @@ static int compile_element (const compile *c, pw_system *s, pw_slab *k, int e, c
   }
   if (kind->prepare == NULL) return PW_OK;
   pw_error why = { 0 };
-  double *own_mass = s->mass + k->own + e * kind->own;
+  pw_own own[PW_MAX_OWN] = { { 0 } };
   char *element = (char *)(size_t)k->b.element + (size_t)e * kind->element;
-  if (kind->prepare (from->definition, bodies, element, own_mass, &why) != PW_OK)
+  if (kind->prepare (from->definition, bodies, element, own, &why) != PW_OK)
     return pw_fail (error, PW_INPUT, "model %s: %s %s: %s", c->m->name, kind->name, k->name[e], why.text);
+  for (int n = 0, j = k->own + e * kind->own; n < kind->own; n++, j++) {
+    s->mass[j] = own[n].mass;
+    s->q0[j] = own[n].start;
+    s->v0[j] = own[n].rate;
+  }
   return PW_OK;
 }
 

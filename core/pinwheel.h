@@ -172,10 +172,78 @@ typedef struct {
   pw_signal value;     /* [N m] */
 } pw_torque;
 
+/* Gravity: the same acceleration for every body that has mass, in any direction of the plane. */
+typedef struct {
+  const char *name;
+  double acceleration[2]; /* in the world, (0, -9.81) for a plane that stands upright [m/s^2] */
+} pw_gravity;
+
+/* Spring: pulls a point of body 1 and a point of body 2 together along their line, with a damper beside it. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];     /* the ends in each body's frame [m]; on the ground: in the world */
+  double stiffness;    /* [N/m], >= 0 */
+  double damping;      /* [N s/m], >= 0 */
+  double length;       /* free length [m], >= 0 */
+} pw_spring;
+
+/* Tyre: a wheel that gives way sideways; a lateral force grows with the slip instead of a row that forbids it. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];     /* contact point in the body's frame [m] */
+  double heading;   /* rolling direction in the body's frame [rad] */
+  double stiffness; /* cornering stiffness: lateral force per slip [N], > 0 */
+  double speed;     /* below about this rolling speed the slip is regularised [m/s], > 0 */
+  double load;      /* normal load that limits the force [N]; 0: linear, no limit */
+  double friction;  /* the limit is friction times load; > 0 if there is a load */
+} pw_tyre;
+
+/* Weld: body 2 is fixed to body 1.  Three holonomic rows. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];     /* the common point in each body's frame [m]; on the ground: in the world */
+  double angle;        /* of body 2 relative to body 1: phi2 - phi1 [rad] */
+} pw_weld;
+
+/* What a drive prescribes. */
+enum { PW_DRIVE_X, PW_DRIVE_Y, PW_DRIVE_ANGLE };
+
+/* Drive: where a point of body 1 is, seen from body 2, or how it is turned, follows a signal.  One holonomic row. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the driven body, and the one it is seen from; "ground" for one of them */
+  double at[2][2];     /* a point in each body's frame [m]; on the ground: in the world; without meaning for an angle */
+  int what;        /* PW_DRIVE_X, PW_DRIVE_Y: from point 2 to point 1 in body 2's frame; PW_DRIVE_ANGLE: phi1 - phi2 */
+  pw_signal value; /* with its first and second time derivative [m] or [rad] */
+} pw_drive;
+
+/* Rolling wheel: the contact point moves neither across the heading nor along it other than by rolling.  Two
+ * nonholonomic rows and a coordinate of its own, the spin angle, whose rate is positive rolling along the heading. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];     /* contact point in the body's frame [m] */
+  double heading;   /* rolling direction in the body's frame [rad] */
+  double radius;    /* [m], > 0 */
+  double inertia;   /* about its axle [kg m^2], >= 0; its mass belongs to the body */
+  double start;     /* spin angle at the start [rad] */
+  double rate;      /* its rate at the start [rad/s]; 0: as the body's start makes it roll */
+  pw_signal torque; /* on the wheel about its axle [N m]; what it reacts on is out of the plane */
+} pw_rolling_wheel;
+
 /* The list of kinds: the one line to add for a new file in core/kinds/. */
-#define PW_KINDS  \
-  PW_KIND (pin)   \
-  PW_KIND (wheel) \
+#define PW_KINDS          \
+  PW_KIND (pin)           \
+  PW_KIND (weld)          \
+  PW_KIND (drive)         \
+  PW_KIND (wheel)         \
+  PW_KIND (rolling_wheel) \
+  PW_KIND (tyre)          \
+  PW_KIND (spring)        \
+  PW_KIND (gravity)       \
   PW_KIND (torque)
 
 /* ---- What a kind provides ---- */
@@ -202,6 +270,13 @@ typedef struct {
   const char *rate;  /* own coordinates only: the name of its velocity */
   const char *about; /* sign and meaning */
 } pw_quantity;
+
+/* A coordinate an element owns, as its kind's prepare describes it. */
+typedef struct {
+  double mass; /* its entry of M [kg m^2], >= 0; an own coordinate may be massless if the element's rows determine it */
+  double start; /* its value at the start [rad] */
+  double rate;  /* its rate at the start [rad/s] */
+} pw_own;
 
 /* Where a body is and how it moves; the ground is a body at rest at the origin. */
 typedef struct {
@@ -256,10 +331,9 @@ struct pw_kind {
   const pw_quantity *reaction;   /* one per row: what -lambda is */
   const pw_quantity *coordinate; /* one per own coordinate */
 
-  /* Turns a checked definition into a prepared element; bodies are those it names, in order, the ground as a body
-   * without mass.  own_mass takes the inertia of each own coordinate.  Returns a status. */
-  int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, double *own_mass,
-                  pw_error *error);
+  /* Turns a checked definition into a prepared element; bodies are those it names or acts on, in order, the ground as
+   * a body without mass.  own takes mass and start of each own coordinate, zero so far.  Returns a status. */
+  int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_own *own, pw_error *error);
 
   pw_sweep *g;       /* rows: residual of holonomic rows */
   pw_sweep *g_size;  /* rows: sum of the absolute values of the terms of g, against which g is judged */

@@ -210,9 +210,9 @@ static void test_wheel_contact (void **state) {
 }
 
 /* A kind that refuses every definition its table allows says so. */
-static int kinds_refuse (const void *definition, const pw_body *const *bodies, void *element, double *own_mass,
+static int kinds_refuse (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
                          pw_error *error) {
-  (void)definition, (void)bodies, (void)element, (void)own_mass;
+  (void)definition, (void)bodies, (void)element, (void)own;
   return pw_fail (error, PW_INPUT, "nothing suits me");
 }
 

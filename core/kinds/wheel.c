@@ -22,12 +22,12 @@ typedef struct {
   const pw_pose *A = &b->pose[b->body[e]];        \
   double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin
 
-static int wheel_prepare (const void *definition, const pw_body *const *bodies, void *element, double *own_mass,
+static int wheel_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
                           pw_error *error) {
   const pw_wheel *d = definition;
   double c = cos (d->heading), s = sin (d->heading);
   *(wheel *)element = (wheel){ { d->at[0], d->at[1] }, c, s, d->at[0] * c + d->at[1] * s, d->heading };
-  (void)bodies, (void)own_mass, (void)error;
+  (void)bodies, (void)own, (void)error;
   return PW_OK;
 }
 
