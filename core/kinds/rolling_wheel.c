@@ -1,0 +1,179 @@
+/* rolling-wheel: a wheel of radius R that rolls without slip; its spin angle chi is a coordinate of its own.
+ *
+ *   n . v_P = 0,  e . v_P - R chi' = 0,  e = (cos, sin)(phi + psi), n = (-sin, cos)(phi + psi)    (2 nonholonomic rows)
+ *   S     = [ -s  c   l   0 ]      (c, s) = e; l and m are the components of the contact point's arm along e and n
+ *           [  c  s  -m  -R ]
+ *   gamma = ( w (c vx + s vy),  w (s vx - c vy) )                 so that S a = gamma
+ *   f     = u on chi, power = u chi'                              u: torque about the axle
+ *
+ * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
+ * On the body act -lambda(1) along n and -lambda(2) along e.  The axle is horizontal, so what u reacts on and the
+ * wheel's gyroscopic moments lie out of the plane. */
+#include <math.h>
+#include <string.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double at[2];        /* contact point in the body's frame [m] */
+  double cos, sin;     /* of the heading in the body */
+  double along, aside; /* components of the arm along the heading and to its left [m] */
+  double radius;       /* [m] */
+  double heading;      /* [rad] */
+} rolling;
+
+/* Names the parts of element e: its pose and the direction (c, s) it rolls in. */
+#define ROLLING_PARTS                                 \
+  const rolling *k = (const rolling *)b->element + e; \
+  const pw_pose *A = &b->pose[b->body[e]];            \
+  const double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin
+
+/* The spin rate with which it rolls as the body starts. */
+static double rolling_rate (const rolling *k, const pw_body *body) {
+  double angle = body->start[2] + k->heading;
+  return (cos (angle) * body->rate[0] + sin (angle) * body->rate[1] - k->aside * body->rate[2]) / k->radius;
+}
+
+static int rolling_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+                            pw_error *error) {
+  const pw_rolling_wheel *d = definition;
+  double c = cos (d->heading), s = sin (d->heading), along = d->at[0] * c + d->at[1] * s,
+         aside = d->at[1] * c - d->at[0] * s;
+  rolling *k = element;
+  *k = (rolling){ { d->at[0], d->at[1] }, c, s, along, aside, d->radius, d->heading };
+  own[0] = (pw_own){ d->inertia, d->start, d->rate != 0 ? d->rate : rolling_rate (k, bodies[0]) };
+  (void)error;
+  return PW_OK;
+}
+
+static void rolling_J (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 8) {
+    ROLLING_PARTS;
+    out[0] = -s, out[1] = c, out[2] = k->along, out[3] = 0;
+    out[4] = c, out[5] = s, out[6] = -k->aside, out[7] = -k->radius;
+  }
+}
+
+static void rolling_gamma (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 2) {
+    ROLLING_PARTS;
+    out[0] = A->omega * (c * A->vx + s * A->vy);
+    out[1] = A->omega * (s * A->vx - c * A->vy);
+    (void)k;
+  }
+}
+
+static void rolling_force (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = b->u[3 * e];
+}
+
+static void rolling_force_u (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 4) out[0] = out[1] = out[2] = 0, out[3] = 1;
+}
+
+static void rolling_power (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e] * b->v[e];
+}
+
+/* Fills the angle's column of a 2 x 4 block whose other columns are zero. */
+static inline void rolling_angle (double *out, double first, double second) {
+  memset (out, 0, 8 * sizeof *out);
+  out[2] = first, out[6] = second;
+}
+
+static void rolling_jw_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 8) {
+    ROLLING_PARTS;
+    double x = b->w[4 * e], y = b->w[4 * e + 1];
+    rolling_angle (out, -c * x - s * y, c * y - s * x);
+    (void)k;
+  }
+}
+
+static void rolling_jtl_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 16) {
+    ROLLING_PARTS;
+    const double *l = b->lambda + 2 * e;
+    memset (out, 0, 16 * sizeof *out);
+    out[2] = -c * l[0] - s * l[1], out[6] = c * l[1] - s * l[0];
+    (void)k;
+  }
+}
+
+static void rolling_gamma_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 8) {
+    ROLLING_PARTS;
+    rolling_angle (out, A->omega * (c * A->vy - s * A->vx), A->omega * (c * A->vx + s * A->vy));
+    (void)k;
+  }
+}
+
+static void rolling_gamma_v (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 8) {
+    ROLLING_PARTS;
+    out[0] = A->omega * c, out[1] = A->omega * s, out[2] = c * A->vx + s * A->vy, out[3] = 0;
+    out[4] = A->omega * s, out[5] = -A->omega * c, out[6] = s * A->vx - c * A->vy, out[7] = 0;
+    (void)k;
+  }
+}
+
+static void rolling_contact (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    const rolling *k = (const rolling *)b->element + e;
+    const pw_pose *A = &b->pose[b->body[e]];
+    out[0] = A->x + A->cos * k->at[0] - A->sin * k->at[1];
+    out[1] = A->y + A->sin * k->at[0] + A->cos * k->at[1];
+    out[2] = A->phi + k->heading;
+  }
+}
+
+static const pw_field rolling_fields[] = {
+  { PW_AT (pw_rolling_wheel, body), PW_BODY, .required = 1, .about = "the body that carries the wheel" },
+  { PW_AT (pw_rolling_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
+  { PW_AT (pw_rolling_wheel, heading), PW_NUMBER, .unit = "rad",
+    .about = "rolling direction in the body's frame; 0: along its x" },
+  { PW_AT (pw_rolling_wheel, radius), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE,
+    .about = "radius of the wheel" },
+  { PW_AT (pw_rolling_wheel, inertia), PW_NUMBER, .unit = "kg m^2", .domain = PW_NONNEGATIVE,
+    .about = "about its axle; the wheel's mass belongs to the body" },
+  { PW_AT (pw_rolling_wheel, start), PW_NUMBER, .unit = "rad", .about = "spin angle at the start" },
+  { PW_AT (pw_rolling_wheel, rate), PW_NUMBER, .unit = "rad/s",
+    .about = "spin rate at the start; 0: as the body's start makes it roll" },
+  { PW_AT (pw_rolling_wheel, torque), PW_SIGNAL, .unit = "N m",
+    .about = "on the wheel about its axle; positive drives along the heading" },
+  { .name = NULL },
+};
+
+static const pw_quantity rolling_reaction[] = {
+  { "N", "N", NULL, "lateral force on the body, to the left of the heading" },
+  { "T", "N", NULL, "traction: force on the body along the heading" },
+};
+
+static const pw_quantity rolling_coordinate[] = {
+  { "spin", "rad", "spin_rate", "angle about the axle; grows as the wheel rolls along its heading" },
+};
+
+const pw_kind pw_kind_rolling_wheel = {
+  .name = "rolling-wheel",
+  .about = "a wheel that rolls without slip, free or driven by a torque about its axle",
+  .definition = sizeof (pw_rolling_wheel),
+  .element = sizeof (rolling),
+  .fields = rolling_fields,
+  .bodies = 1,
+  .own = 1,
+  .rows = 2,
+  .signals = 1,
+  .level = PW_NONHOLONOMIC,
+  .reaction = rolling_reaction,
+  .coordinate = rolling_coordinate,
+  .prepare = rolling_prepare,
+  .J = rolling_J,
+  .gamma = rolling_gamma,
+  .force = rolling_force,
+  .force_u = rolling_force_u,
+  .jw_q = rolling_jw_q,
+  .jtl_q = rolling_jtl_q,
+  .gamma_q = rolling_gamma_q,
+  .gamma_v = rolling_gamma_v,
+  .power = rolling_power,
+  .contact = rolling_contact,
+};

@@ -1,0 +1,161 @@
+/* spring: pulls a point of body 1 and a point of body 2 together along their line, with a damper beside it.
+ *
+ *   d = r1 + R(phi1) s1 - r2 - R(phi2) s2,  l = |d|,  e = d / l
+ *   F = k (l - l0) e + c l' e                 pulls body 1 by -F at its point and body 2 by F
+ *   f = -D^T F,  D = dd/dq = [ 1 0 -Y1 | -1 0 Y2 ; 0 1 X1 | 0 -1 -X2 ],  (X, Y) = R(phi) s
+ *   V = k (l - l0)^2 / 2,  loss = c l'^2
+ *
+ * (Shabana 2001, Computational Dynamics, section 6.5.)
+ * Where l = 0 there is no direction: e = 0, so the force is zero there.  With l0 = 0 the spring's part k d is smooth
+ * and that is its limit; with l0 > 0 the ends should not meet. */
+#include <math.h>
+#include <string.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double s1[2], s2[2]; /* ends in the bodies' frames [m] */
+  double k, c, l0;     /* stiffness [N/m], damping [N s/m], free length [m] */
+} spring;
+
+/* One spring in its present state. */
+typedef struct {
+  double X1, Y1, X2, Y2; /* arms in world axes */
+  double d[2], rate[2];  /* from end 2 to end 1, and its velocity */
+  double e[2], l, il;    /* direction, length, 1 / length; direction and 1 / length are zero where the length is */
+  double speed;          /* l' */
+  double F[2];           /* pull */
+} spring_state;
+
+static inline spring_state spring_at (const spring *k, const pw_pose *A, const pw_pose *B) {
+  spring_state s = { .X1 = A->cos * k->s1[0] - A->sin * k->s1[1],
+                     .Y1 = A->sin * k->s1[0] + A->cos * k->s1[1],
+                     .X2 = B->cos * k->s2[0] - B->sin * k->s2[1],
+                     .Y2 = B->sin * k->s2[0] + B->cos * k->s2[1] };
+  s.d[0] = A->x + s.X1 - B->x - s.X2, s.d[1] = A->y + s.Y1 - B->y - s.Y2;
+  s.rate[0] = A->vx - A->omega * s.Y1 - B->vx + B->omega * s.Y2;
+  s.rate[1] = A->vy + A->omega * s.X1 - B->vy - B->omega * s.X2;
+  s.l = hypot (s.d[0], s.d[1]);
+  s.il = s.l > 0 ? 1 / s.l : 0;
+  s.e[0] = s.d[0] * s.il, s.e[1] = s.d[1] * s.il;
+  s.speed = s.e[0] * s.rate[0] + s.e[1] * s.rate[1];
+  double pull = k->k * (s.l - k->l0) + k->c * s.speed;
+  s.F[0] = pull * s.e[0], s.F[1] = pull * s.e[1];
+  return s;
+}
+
+#define SPRING_PARTS                                \
+  const spring *k = (const spring *)b->element + e; \
+  const spring_state s = spring_at (k, &b->pose[b->body[2 * e]], &b->pose[b->body[2 * e + 1]])
+
+static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+                           pw_error *error) {
+  const pw_spring *d = definition;
+  *(spring *)element = (spring){
+    { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->stiffness, d->damping, d->length,
+  };
+  (void)bodies, (void)own, (void)error;
+  return PW_OK;
+}
+
+static void spring_force (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    SPRING_PARTS;
+    (void)k;
+    out[0] = -s.F[0], out[1] = -s.F[1], out[2] = s.F[0] * s.Y1 - s.F[1] * s.X1;
+    out[3] = s.F[0], out[4] = s.F[1], out[5] = s.F[1] * s.X2 - s.F[0] * s.Y2;
+  }
+}
+
+/* out = -D^T K W, 6 x 6; K is dF/dd or dF/dd', W what d or d' changes by with each coordinate. */
+static void spring_product (double *out, const double D[2][6], const double K[2][2], const double W[2][6]) {
+  for (int j = 0; j < 6; j++) {
+    double x = K[0][0] * W[0][j] + K[0][1] * W[1][j], y = K[1][0] * W[0][j] + K[1][1] * W[1][j];
+    for (int i = 0; i < 6; i++) out[6 * i + j] = -D[0][i] * x - D[1][i] * y;
+  }
+}
+
+#define SPRING_D                    \
+  {                                 \
+    { 1, 0, -s.Y1, -1, 0, s.Y2 }, { \
+      0, 1, s.X1, 0, -1, -s.X2      \
+    }                               \
+  }
+
+/* dF/dd = (k (1 - l0/l) + c l'/l) (1 - e e^T) + k e e^T + (c/l) e (d' - l' e)^T */
+static void spring_slope (const spring *k, const spring_state *s, double K[2][2]) {
+  double across = s->l > 0 ? k->k * (1 - k->l0 * s->il) + k->c * s->speed * s->il : k->k;
+  for (int i = 0; i < 2; i++)
+    for (int j = 0; j < 2; j++)
+      K[i][j] = across * (i == j) + (k->k - across) * s->e[i] * s->e[j] +
+                k->c * s->il * s->e[i] * (s->rate[j] - s->speed * s->e[j]);
+}
+
+/* With the turning of the arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi = -w (X, Y). */
+static void spring_force_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 36) {
+    SPRING_PARTS;
+    double w1 = b->pose[b->body[2 * e]].omega, w2 = b->pose[b->body[2 * e + 1]].omega;
+    double K[2][2], turn[2] = { -w1 * (s.e[0] * s.X1 + s.e[1] * s.Y1), w2 * (s.e[0] * s.X2 + s.e[1] * s.Y2) };
+    const double D[2][6] = SPRING_D;
+    spring_slope (k, &s, K);
+    spring_product (out, D, (const double (*)[2])K, D);
+    for (int i = 0; i < 6; i++) {
+      double along = k->c * (D[0][i] * s.e[0] + D[1][i] * s.e[1]);
+      out[6 * i + 2] -= along * turn[0];
+      out[6 * i + 5] -= along * turn[1];
+    }
+    out[14] += s.F[0] * s.X1 + s.F[1] * s.Y1;
+    out[35] -= s.F[0] * s.X2 + s.F[1] * s.Y2;
+  }
+}
+
+static void spring_force_v (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 36) {
+    SPRING_PARTS;
+    const double D[2][6] = SPRING_D, c = k->c;
+    const double K[2][2] = { { c * s.e[0] * s.e[0], c * s.e[0] * s.e[1] },
+                             { c * s.e[1] * s.e[0], c * s.e[1] * s.e[1] } };
+    spring_product (out, D, K, D);
+  }
+}
+
+static void spring_energy (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) {
+    SPRING_PARTS;
+    out[e] = k->k * (s.l - k->l0) * (s.l - k->l0) / 2;
+  }
+}
+
+static void spring_loss (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) {
+    SPRING_PARTS;
+    out[e] = k->c * s.speed * s.speed;
+  }
+}
+
+static const pw_field spring_fields[] = {
+  { PW_AT (pw_spring, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies, or ground for one of them" },
+  { PW_AT (pw_spring, at), PW_POINT, .count = 2, .unit = "m", .required = 1, .about = "the ends in each body's frame" },
+  { PW_AT (pw_spring, stiffness), PW_NUMBER, .unit = "N/m", .required = 1, .domain = PW_NONNEGATIVE,
+    .about = "force per length" },
+  { PW_AT (pw_spring, damping), PW_NUMBER, .unit = "N s/m", .domain = PW_NONNEGATIVE,
+    .about = "force per speed, along the line" },
+  { PW_AT (pw_spring, length), PW_NUMBER, .unit = "m", .domain = PW_NONNEGATIVE, .about = "free length" },
+  { .name = NULL },
+};
+
+const pw_kind pw_kind_spring = {
+  .name = "spring",
+  .about = "a spring, with a damper beside it, between a point of one body and a point of another",
+  .definition = sizeof (pw_spring),
+  .element = sizeof (spring),
+  .fields = spring_fields,
+  .bodies = 2,
+  .level = PW_FORCE,
+  .prepare = spring_prepare,
+  .force = spring_force,
+  .force_q = spring_force_q,
+  .force_v = spring_force_v,
+  .energy = spring_energy,
+  .loss = spring_loss,
+};
