@@ -225,12 +225,12 @@ void pw_plots_add (pw_plots *p, const pw_sample *sample) {
   if (p->wheels > 0) plots_contacts (p, sample, pw_plot_wheel (p, i, 0));
 }
 
-int pw_plots_draw (pw_plots *p, pw_error *error) {
+int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   if (p->samples < 2) {
     fprintf (stderr, "pinwheel: the run is too short for figures: none are drawn in %s\n", p->folder);
     return PW_OK;
   }
   int status = pw_plot_write_data (p, error);
   if (status == PW_OK) status = pw_plot_write_scripts (p, error);
-  return status == PW_OK ? pw_plot_run (p, error) : status;
+  return status == PW_OK && draw ? pw_plot_run (p, error) : status;
 }

@@ -32,26 +32,28 @@ typedef struct {
   pw_run *r;
   pw_progress progress;
   /* under way */
-  long row;   /* rows written */
-  long batch; /* steps to take before looking around */
-  double cpu; /* of the method [s] */
+  long row;        /* rows written */
+  long batch;      /* steps to take before looking around */
+  double cpu;      /* of the method [s] */
+  char part[4200]; /* where an unfinished table is kept; "": there is none */
 } run;
 
 /* ---- Ctrl-C ---- */
 
-static volatile sig_atomic_t run_stop;
+static volatile sig_atomic_t run_stop; /* signals so far */
 
+/* The first signal asks for a stop after the current step.  Some senders signal a program and its group as well, so it
+ * is the third one that ends it, should that step never end. */
 static void run_on_signal (int number) {
-  (void)number;
-  run_stop = 1;
+  if (++run_stop < 3) return;
+  signal (number, SIG_DFL);
+  raise (number);
 }
 
-/* The first signal asks for a stop after the current step; a second one ends the program. */
 static void run_catch_signals (void) {
   struct sigaction action;
   memset (&action, 0, sizeof action);
   action.sa_handler = run_on_signal;
-  action.sa_flags = (int)SA_RESETHAND;
   sigemptyset (&action.sa_mask);
   sigaction (SIGINT, &action, NULL);
   sigaction (SIGTERM, &action, NULL);
@@ -197,17 +199,16 @@ static int run_integrate (run *x, pw_error *error) {
 
 /* ---- After the run ---- */
 
-/* Completes the table, or says where what there is of it is kept; of a run that has not begun nothing is. */
+/* Completes the table, or leaves what there is of it in NAME.part; of a run that has not begun nothing is left. */
 static void run_finish_table (run *x, int good, pw_error *error) {
-  char part[4200];
   pw_csv_close (x->csv);
   if (x->csv_output == NULL) return;
   if (good)
     pw_output_finish (x->csv_output, error);
-  else if (pw_output_abandon (x->csv_output, part, sizeof part) && x->row == 0)
-    remove (part);
-  else if (x->row > 0 && strcmp (x->csv_path, "-") != 0)
-    fprintf (stderr, "pinwheel: the table up to there is kept in %s\n", part);
+  else if (pw_output_abandon (x->csv_output, x->part, sizeof x->part) && x->row == 0) {
+    remove (x->part);
+    *x->part = 0;
+  }
 }
 
 /* What goes into the JSON summary, which is written however the run has ended. */
@@ -242,24 +243,33 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
   return summary;
 }
 
-/* Everything that follows the last step: table, summary, figures. */
+/* Figures; who has stopped the run does not wait for gnuplot. */
+static void run_draw (run *x, pw_error *error) {
+  pw_error *own = &(pw_error){ 0 };
+  if (x->plots == NULL || x->r == NULL) return;
+  pw_plots_finish (x->plots, !run_stop, own);
+  if (error->status == PW_OK)
+    *error = *own;
+  else if (own->status != PW_OK)
+    fprintf (stderr, "pinwheel: %s\n", own->text);
+}
+
+/* Everything that follows the last step: table, summary, figures, the last word. */
 static int run_finish (run *x, pw_error *error) {
   char reason[80] = "";
   int interrupted = error->status == PW_OK && run_stop;
   pw_sample sample, *last = NULL;
   if (x->r && pw_at (x->r, pw_time (x->r), &sample, NULL) == PW_OK) last = &sample;
-  if (interrupted) fprintf (stderr, "pinwheel: %s\n", run_summary (x, error, reason, sizeof reason).reason);
   run_finish_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
   run_write_json (x, &summary, last, error);
-  if (x->plots && x->r && !interrupted) {
-    pw_error *own = &(pw_error){ 0 };
-    if (pw_plots_draw (x->plots, own) != PW_OK && error->status != PW_OK) fprintf (stderr, "pinwheel: %s\n", own->text);
-    if (error->status == PW_OK) *error = *own;
-  }
-  return interrupted && error->status == PW_OK ? PW_INTERRUPTED : pw_cli_end (error);
+  run_draw (x, error);
+  if (interrupted) fprintf (stderr, "pinwheel: %s\n", reason);
+  int status = pw_cli_end (error);
+  if (*x->part) fprintf (stderr, "pinwheel: the table until then is kept in %s\n", x->part);
+  return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }
 
 static void run_close (run *x) {
