@@ -12,11 +12,11 @@ static void report_more (FILE *f, int more, const char *hint) {
 /* ---- The start ---- */
 
 void pw_report_start (const pw_system *s, const pw_start_report *start) {
-  int n = pw_count_coordinates (s), listed = 0;
-  if (start == NULL || start->moved == 0) return;
-  fprintf (stderr, "pinwheel: the start did not satisfy the constraints; %d of its values %s moved%s:\n", start->moved,
-           start->moved == 1 ? "was" : "were",
-           start->freed ? ", given ones among them, since those cannot all be held" : "");
+  int n = pw_count_coordinates (s), moved = 0, listed = 0;
+  for (int i = 0; i < 2 * n; i++) moved += pw_start_moved (s, start, i);
+  if (moved == 0) return;
+  fprintf (stderr, "pinwheel: the start did not satisfy the constraints; %d of its values %s moved%s:\n", moved,
+           moved == 1 ? "was" : "were", start->freed ? ", given ones among them, since those cannot all be held" : "");
   for (int i = 0; i < 2 * n && listed < REPORT_MOVED; i++) {
     double from = i < n ? start->q_given[i] : start->v_given[i - n], to = i < n ? start->q[i] : start->v[i - n];
     char name[REPORT_NAME], a[32], b[32];
@@ -25,7 +25,7 @@ void pw_report_start (const pw_system *s, const pw_start_report *start) {
              pw_format (b, to, 10), pw_state_unit (s, i));
     listed++;
   }
-  report_more (stderr, start->moved - listed, "");
+  report_more (stderr, moved - listed, "");
 }
 
 /* ---- The end ---- */
