@@ -5,7 +5,6 @@
 
 enum {
   PLANE_GAP = 76,  /* between panels side by side [px] */
-  PLANE_ROOM = 14, /* more between panels one above the other [px] */
   PLANE_TALL = 680 /* highest panel [px] */
 };
 
@@ -55,8 +54,7 @@ static void plane_pair (plane *g, pw_script *s) {
   s->top += SCRIPT_HEAD;
   if (plane_aspect (g->box[0], 0, 1) < 0.5) {
     double wide = s->width - s->left - s->right, first = wide * plane_aspect (g->box[0], 0.15, 0.5);
-    double y = s->top + first + s->bottom + SCRIPT_HEAD + PLANE_ROOM,
-           second = wide * plane_aspect (g->box[1], 0.25, 0.6);
+    double y = s->top + first + s->bottom + SCRIPT_HEAD, second = wide * plane_aspect (g->box[1], 0.25, 0.6);
     g->panel[0] = (pw_panel){ s->left, s->left + wide, s->top, s->top + first };
     g->panel[1] = (pw_panel){ s->left, s->left + wide, y, y + second };
     s->height = (int)(y + second) + s->bottom;

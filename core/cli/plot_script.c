@@ -73,7 +73,7 @@ void pw_script_begin (const pw_script *s, const pw_plots *p, const char *title) 
   fprintf (s->f,
            "do for [form in 'svg png'] {\n"
            "if (form eq 'svg') {\n"
-           "set terminal svg size %d,%d noenhanced font 'DejaVu Sans,Helvetica,sans-serif,14' background rgb 'white'\n"
+           "set terminal svg size %d,%d noenhanced font 'DejaVu Sans,Helvetica,sans-serif,13' background rgb 'white'\n"
            "} else {\n"
            "set terminal pngcairo size %d,%d noenhanced font 'Sans,10.5' background rgb 'white'\n"
            "}\n"
@@ -81,7 +81,7 @@ void pw_script_begin (const pw_script *s, const pw_plots *p, const char *title) 
            s->width, s->height, s->width, s->height, s->name);
   fputs ("set multiplot title '", s->f);
   script_text (s->f, p->model);
-  fprintf (s->f, ": %s' font ',%s'\n", title, "13");
+  fprintf (s->f, ": %s' font (form eq 'svg' ? ',16' : ',13')\n", title);
 }
 
 int pw_script_end (const pw_script *s, const pw_plots *p, pw_error *error) {
@@ -125,7 +125,7 @@ void pw_script_key (const pw_script *s, const pw_plots *p, const pw_curves *c) {
 void pw_script_bar (const pw_script *s, pw_panel panel, const char *label) {
   char y[32], h[32];
   fprintf (s->f, "set colorbox horizontal user origin graph 0,screen %s size graph 1,screen %s\nset cblabel '%s'\n",
-           pw_format (y, 1 - (panel.y1 + SCRIPT_BOTTOM + 12) / s->height, 4), pw_format (h, 12.0 / s->height, 4),
+           pw_format (y, 1 - (panel.y1 + SCRIPT_BOTTOM + 14) / s->height, 4), pw_format (h, 12.0 / s->height, 4),
            label);
 }
 

@@ -10,10 +10,10 @@ enum {
   SCRIPT_LEFT = 80,    /* margins [px] */
   SCRIPT_RIGHT = 28,
   SCRIPT_TOP = 42,
-  SCRIPT_BOTTOM = 58,
-  SCRIPT_HEAD = 28, /* room for a panel's own title */
+  SCRIPT_BOTTOM = 66,
+  SCRIPT_HEAD = 30, /* room for a panel's own title */
   SCRIPT_BAR = 100, /* room for a colour bar at the right */
-  SCRIPT_FOOT = 84  /* room for one below */
+  SCRIPT_FOOT = 94  /* room for one below */
 };
 
 /* A script being written: a picture and its margins [px]. */

@@ -6,7 +6,7 @@ enum {
   TIME_PANEL = 235, /* height of one of two panels [px] */
   TIME_ALONE = 340, /* of a single one */
   TIME_GAP = 16,    /* between panels that share their axis of time */
-  TIME_APART = 66,  /* between panels that do not */
+  TIME_APART = 72,  /* between panels that do not */
   TIME_MANY = 30,   /* turning points of a curve above which its end is drawn in detail */
   TIME_DETAIL = 12  /* turning points in the detail */
 };
