@@ -100,6 +100,7 @@ static int ldl_fill (int nodes, const ldl_lists *K, ldl_lists *L, size_t *target
   int status = mark && child && sibling && L->first && L->list ? PW_OK : PW_MACHINE;
   for (int j = 0; j < nodes && status == PW_OK; j++) mark[j] = child[j] = -1;
   *targets = 0;
+  if (status == PW_OK) L->first[0] = 0; /* also without any node */
   for (int j = 0; j < nodes && status == PW_OK; j++) {
     size_t most = (size_t)(K->first[j + 1] - K->first[j]);
     for (int c = child[j]; c >= 0; c = sibling[c]) most += (size_t)(L->first[c + 1] - L->first[c]);
