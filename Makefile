@@ -45,6 +45,7 @@ SLOW    := $(wildcard tests/slow_*.c)
 SHELLS  := $(wildcard tests/*.sh)
 SHARE   := $(filter-out $(QUICK) $(SLOW),$(wildcard tests/*.c)) # linked to every test
 BENCH   := $(wildcard benchmarks/*.c)
+ENGINE  := $(wildcard benchmarks/engine/*.c benchmarks/baseline/*.c)
 EMBED   := $(wildcard docs/*.c)
 
 HEADERS := core/pinwheel.h core/run.h solvers/pinwheel-solvers.h core/files/pinwheel-files.h
@@ -61,7 +62,7 @@ SLOWS     := $(SLOW:%.c=$(BUILD)/%)
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
-.PHONY: all everything demo test test-all layers san clang gcc format format-check bench-quick \
+.PHONY: all everything demo test test-all layers san clang gcc format format-check bench-quick bench-engine \
         deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -76,6 +77,7 @@ help:
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make test             the tests; test-all: the slow ones too'
 	@echo 'make bench-quick      what a run costs on this machine'
+	@echo 'make bench-engine     an evaluation, a step against programs written by hand; growth with size'
 	@echo 'make layers           proof of what depends on what'
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
@@ -87,7 +89,7 @@ help:
 
 # ---- Dependencies: whoever asks to see something run gets the libraries first ----
 
-ifneq ($(filter demo test test-all bench-quick san,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all bench-quick bench-engine san,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -105,6 +107,7 @@ $(BUILD)/obj/core/files/%.o: INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
+$(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
 
@@ -115,7 +118,7 @@ $(BUILD)/obj/%.o: %.c | $(FIRST)
 
 $(call obj,$(BENCH) $(EMBED)): | $(INCLUDES)
 
--include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(BENCH) $(EMBED)))
+-include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(BENCH) $(ENGINE) $(EMBED)))
 -include $(MODELS:%.c=$(BUILD)/obj/%.d)
 
 # ---- Libraries, headers, models, programs ----
@@ -164,7 +167,10 @@ $(PROGRAM): $(CLI_OBJ) $(LIB) $(FILES_LIB)
 $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 	@mkdir -p $(@D)
 	$(call say,LINK)
-	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN/..' -o $@ $< $(HOUSE_LIBS) -lm
+	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN/..' -o $@ $(filter %.o,$^) $(HOUSE_LIBS) $(EXTRA_LIBS) -lm
+
+$(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
+$(BUILD)/benchmarks/engine: EXTRA_LIBS := $(SOLVER_LIBS)
 
 # A test holds the libraries whole, so that the plug-ins it opens find them in it.
 $(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a)
@@ -197,6 +203,9 @@ demo: all $(BUILD)/benchmarks/demo
 bench-quick: all $(BUILD)/benchmarks/quick
 	@$(BUILD)/benchmarks/quick
 
+bench-engine: all $(BUILD)/benchmarks/engine
+	@$(BUILD)/benchmarks/engine
+
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers
 
@@ -214,7 +223,7 @@ clang:
 gcc:
 	@$(MAKE) --no-print-directory CC=gcc WERROR=1 BUILD=$(VARIANT)/gcc everything
 
-SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests benchmarks docs,$(d)/*.c $(d)/*.h))
+SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests benchmarks benchmarks/engine benchmarks/baseline docs,$(d)/*.c $(d)/*.h))
 
 format:
 	clang-format -i $(SOURCES)

@@ -1,0 +1,304 @@
+/* engine: how fast Pinwheel is against programs written by hand, and how its cost grows with the size of a scene.
+ *
+ *   engine                     every claim; writes benchmarks/results/engine-MACHINE.csv
+ *   engine KEY...              only these (rhs, chain-1000, growth, memory, ...); writes nothing
+ *   engine --count KEY SIDE    the work of one side alone, for callgrind
+ *
+ * Times are medians over interleaved pairs of batches; instructions are exact, per call. */
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include "engine/engine.h"
+
+enum { ENGINE_PAIRS = 21, ENGINE_SIZES = 5 };
+static const double engine_batch = 0.01; /* [s] */
+
+static engine_case engine_cases[] = {
+  { "rhs", "EzyRoller, one evaluation", "evaluation", 1.5, engine_open_rhs, engine_close_ezy, .calls = 640 },
+  { "rhs-massless", "EzyRoller, massless steering, one evaluation", "evaluation", 1.5, engine_open_rhs,
+    engine_close_ezy, .massless = 1, .calls = 640 },
+  { "rhs-light", "  massless (right) against massive (left), both Pinwheel", "evaluation", 1, engine_open_light,
+    engine_close_ezy, .calls = 640 },
+  { "rhs-minimal", "  against minimal coordinates by hand (no target)", "evaluation", 0, engine_open_minimal,
+    engine_close_ezy, .calls = 640 },
+  { "step", "EzyRoller, one step of rk4+projection", "step", 1.5, engine_open_step, engine_close_ezy, .calls = 1000 },
+  { "step-massless", "EzyRoller, massless steering, one step of rk4+projection", "step", 1.5, engine_open_step,
+    engine_close_ezy, .massless = 1, .calls = 1000 },
+  { "step-light", "  massless (right) against massive (left), both Pinwheel", "step", 1, engine_open_light_step,
+    engine_close_ezy, .calls = 1000 },
+  { "chain-10", "chain of 10, one evaluation, per body", "body", 1.6, engine_open_chain, engine_close_chain,
+    .links = 10, .calls = 10 },
+  { "chain-100", "chain of 100", "body", 1.6, engine_open_chain, engine_close_chain, .links = 100, .calls = 4 },
+  { "chain-1000", "chain of 1000", "body", 1.6, engine_open_chain, engine_close_chain, .links = 1000, .calls = 2 },
+  { "chain-10000", "chain of 10,000", "body", 1.6, engine_open_chain, engine_close_chain, .links = 10000 },
+  { "chain-100000", "chain of 100,000", "body", 1.6, engine_open_chain, engine_close_chain, .links = 100000 },
+  { "ida-6", "EzyRoller, massless, one step of ida+ggl, rtol 1e-6", "step", 1.15, engine_open_ida, engine_close_ida,
+    .rtol = 1e-6, .calls = 1 },
+  { "ida-10", "EzyRoller, massless, one step of ida+ggl, rtol 1e-10", "step", 1.15, engine_open_ida, engine_close_ida,
+    .rtol = 1e-10, .calls = 1 },
+  { .key = NULL },
+};
+
+/* ---- Reporting ---- */
+
+typedef struct {
+  FILE *csv;
+  const char *program;
+  char *const *only; /* keys, or NULL: everything */
+  int met, missed;
+} engine_report;
+
+static int engine_wanted (const engine_report *r, const char *key) {
+  if (r->only == NULL) return 1;
+  for (char *const *k = r->only; *k; k++)
+    if (strncmp (*k, key, strlen (*k)) == 0) return 1;
+  return 0;
+}
+
+/* A number, or nothing for 0. */
+static const char *engine_number (char *buffer, size_t size, double value, int digits) {
+  if (value == 0) return "";
+  snprintf (buffer, size, "%.*f", digits, value);
+  return buffer;
+}
+
+static const char *engine_verdict (engine_report *r, double value, double low, double high) {
+  if (high == 0) return "";
+  int met = value >= low && value <= high;
+  met ? r->met++ : r->missed++;
+  return met ? "met" : "MISSED";
+}
+
+static void engine_target (char *buffer, size_t size, double low, double high) {
+  if (high == 0)
+    buffer[0] = '\0';
+  else if (low > 0)
+    snprintf (buffer, size, "%g..%g", low, high);
+  else
+    snprintf (buffer, size, "<= %g", high);
+}
+
+/* One line of the table and of the file; a value of 0 is left out, high = 0: no target. */
+typedef struct {
+  const char *what, *unit;
+  double base, ours, ratio, base_count, our_count, low, high, difference;
+} engine_line;
+
+static void engine_put (engine_report *r, const engine_line *l) {
+  char t[7][40];
+  const char *verdict = engine_verdict (r, l->ratio, l->low, l->high);
+  const char *ratio = engine_number (t[6], sizeof t[6], l->ratio, 3);
+  engine_target (t[0], sizeof t[0], l->low, l->high);
+  printf ("%-58s %10s %10s %8s %10s %10s  %-10s %-6s %s\n", l->what, engine_number (t[1], sizeof t[1], l->base, 1),
+          engine_number (t[2], sizeof t[2], l->ours, 1), ratio, engine_number (t[3], sizeof t[3], l->base_count, 1),
+          engine_number (t[4], sizeof t[4], l->our_count, 1), t[0], verdict,
+          l->difference > 0 ? (snprintf (t[5], sizeof t[5], "agree to %.0e", l->difference), t[5]) : "");
+  fflush (stdout);
+  if (r->csv == NULL) return;
+  fprintf (r->csv, "\"%s\",%s,%s,%s,%s,%s,%s,%s,%s\n", l->what + strspn (l->what, " "), l->unit,
+           engine_number (t[1], sizeof t[1], l->base, 2), engine_number (t[2], sizeof t[2], l->ours, 2), ratio,
+           engine_number (t[3], sizeof t[3], l->base_count, 2), engine_number (t[4], sizeof t[4], l->our_count, 2),
+           t[0], verdict);
+}
+
+static void engine_title (const char *title) {
+  printf ("\n%s\n%-58s %10s %10s %8s %10s %10s  %-10s\n", title, "", "base", "Pinwheel", "ratio", "instr.", "instr.",
+          "target");
+}
+
+/* ---- Comparisons ---- */
+
+static timing_result engine_compare (engine_report *r, engine_case *c) {
+  c->open (c);
+  timing_result t = timing_compare (&c->base, &c->ours, ENGINE_PAIRS, engine_batch);
+  engine_line l = { c->what, c->unit, t.base, t.ours, t.ratio, .high = c->target, .difference = c->difference };
+  if (c->calls > 0) {
+    double calls = (double)c->calls * (c->links > 0 ? c->links : 1);
+    l.base_count =
+        engine_count (r->program, c->key, "base", c->base_function) / (c->base_steps ? (double)c->base_steps : calls);
+    l.our_count =
+        engine_count (r->program, c->key, "ours", c->our_function) / (c->our_steps ? (double)c->our_steps : calls);
+  }
+  engine_put (r, &l);
+  if (c->base_steps > 0)
+    printf ("  steps %ld and %ld, residuals %ld and %ld\n", c->base_steps, c->our_steps, c->base_residuals,
+            c->our_residuals);
+  c->close (c);
+  return t;
+}
+
+/* One sin and cos of the same angle: the unit in which machines differ less than in ns. */
+static long engine_pair (void *context, long n) {
+  double *angle = context, sum = 0;
+  for (long i = 0; i < n; i++) sum += sin (angle[i % 64]) + cos (angle[i % 64]);
+  angle[64] = sum; /* somebody could look */
+  return n;
+}
+
+static double engine_time_pair (void) {
+  double angle[65];
+  timing_work work = { engine_pair, angle };
+  for (int i = 0; i < 64; i++) angle[i] = 0.05 * i - 1.6;
+  return timing_alone (&work, ENGINE_PAIRS, engine_batch);
+}
+
+/* The hand-written programs themselves against what such programs are known to take, with 15 ns for a pair. */
+static void engine_units (engine_report *r, double pair, const char *what, double ns, double known) {
+  engine_put (r, &(engine_line){ what, "sin+cos pair", pair, ns, ns / pair, .high = 1.3 * known / 15 });
+}
+
+/* ---- Growth ---- */
+
+static double engine_slope (const int *size, const double *time, int from, int count) {
+  double n = count - from, sx = 0, sy = 0, sxx = 0, sxy = 0;
+  for (int i = from; i < count; i++) {
+    double x = log (size[i]), y = log (time[i]);
+    sx += x, sy += y, sxx += x * x, sxy += x * y;
+  }
+  return (n * sxy - sx * sy) / (n * sxx - sx * sx);
+}
+
+/* Flatness of cost per body and slope of cost against size, from the second size on. */
+static void engine_growth_lines (engine_report *r, const char *name, const int *size, const double *ns, int count,
+                                 int target) {
+  char what[2][80];
+  double least = ns[1], most = ns[1], time[ENGINE_SIZES];
+  for (int i = 1; i < count; i++) least = fmin (least, ns[i]), most = fmax (most, ns[i]);
+  for (int i = 0; i < count; i++) time[i] = ns[i] * size[i];
+  snprintf (what[0], sizeof what[0], "%s: most over least ns per body", name);
+  snprintf (what[1], sizeof what[1], "%s: slope of log time against log N", name);
+  engine_put (r, &(engine_line){ what[0], "ratio", least, most, most / least, .high = target ? 1.5 : 0 });
+  double slope = engine_slope (size, time, 1, count);
+  engine_put (r,
+              &(engine_line){ what[1], "slope", .ratio = slope, .low = target ? 0.95 : 0, .high = target ? 1.06 : 0 });
+}
+
+typedef struct {
+  const char *name;
+  pw_system *(*open) (int size);
+  int free, chain; /* bent as a free chain; a chain at all */
+  engine_task task;
+  int count, size[ENGINE_SIZES];
+  int target;
+} engine_growth;
+
+static void engine_grow (engine_report *r, const engine_growth *g) {
+  double ns[ENGINE_SIZES];
+  int bodies[ENGINE_SIZES];
+  for (int i = 0; i < g->count; i++) {
+    char what[80];
+    pw_system *s = g->open (g->size[i]);
+    double *q = malloc (2 * (size_t)(s->coords + 3) * sizeof *q), *v = q + s->coords + 3;
+    if (q == NULL) engine_die (g->name, "out of memory");
+    memcpy (q, s->q0, (size_t)s->coords * sizeof *q);
+    memset (v, 0, (size_t)s->coords * sizeof *v);
+    bodies[i] = s->bodies;
+    if (g->chain) engine_bend (s->bodies, g->free, q, v);
+    ns[i] = engine_cost (s, g->task, q, v);
+    free (q);
+    pw_free (s);
+    snprintf (what, sizeof what, "%s, %d bodies: ns per body", g->name, bodies[i]);
+    engine_put (r, &(engine_line){ what, "body", .ours = ns[i] });
+  }
+  engine_growth_lines (r, g->name, bodies, ns, g->count, g->target);
+}
+
+static void engine_grow_all (engine_report *r) {
+  static const engine_growth all[] = {
+    { "chain, projection", engine_chain, 0, 1, ENGINE_PROJECTION, 5, { 10, 100, 1000, 10000, 100000 }, 1 },
+    { "chain, step of ida+ggl", engine_chain, 0, 1, ENGINE_IDA, 4, { 10, 100, 1000, 10000 }, 1 },
+    { "snake, evaluation", engine_snake, 1, 1, ENGINE_EVALUATION, 4, { 10, 100, 1000, 10000 }, 1 },
+    { "grid, evaluation", engine_grid, 0, 0, ENGINE_EVALUATION, 4, { 2, 7, 22, 70 }, 0 },
+  };
+  for (size_t i = 0; i < sizeof all / sizeof *all; i++) engine_grow (r, &all[i]);
+}
+
+static void engine_memory_lines (engine_report *r) {
+  engine_memory m = engine_measure_memory (100000);
+  double sum = m.description + m.system + m.run, time = m.compile + m.open;
+  engine_put (r, &(engine_line){ "  description", "B/body", .ratio = m.description });
+  engine_put (r, &(engine_line){ "  system", "B/body", .ratio = m.system });
+  engine_put (r, &(engine_line){ "  run of rk4+projection", "B/body", .ratio = m.run });
+  engine_put (r, &(engine_line){ "memory per body, all of it", "B/body", .ratio = sum, .high = 2048 });
+  if (m.touched > 0)
+    engine_put (r, &(engine_line){ "  in pages an evaluation touches, state and result apart", "B/body",
+                                   .ratio = m.touched, .high = 400 });
+  engine_put (r, &(engine_line){ "  describing and compiling [s]", "s", .ratio = m.compile });
+  engine_put (r, &(engine_line){ "  opening a run [s]", "s", .ratio = m.open });
+  engine_put (r, &(engine_line){ "validation and ordering [s]", "s", .ratio = time, .high = 2 });
+}
+
+/* ---- The whole ---- */
+
+/* "amd-epyc-7763" */
+static void engine_machine (char *name, size_t size) {
+  char line[300] = "";
+  FILE *file = fopen ("/proc/cpuinfo", "r");
+  while (file && fgets (line, sizeof line, file) && strncmp (line, "model name", 10) != 0) line[0] = '\0';
+  if (file) fclose (file);
+  const char *text = strchr (line, ':') ? strchr (line, ':') + 2 : "unknown";
+  size_t n = 0;
+  for (; *text && n + 1 < size; text++)
+    if (isalnum ((unsigned char)*text))
+      name[n++] = (char)tolower ((unsigned char)*text);
+    else if (n > 0 && name[n - 1] != '-')
+      name[n++] = '-';
+  while (n > 0 && name[n - 1] == '-') n--;
+  name[n] = '\0';
+}
+
+static void engine_everything (engine_report *r) {
+  double chain_ns[ENGINE_SIZES], hand[3] = { 0 };
+  int chain_size[ENGINE_SIZES], chains = 0;
+  engine_title ("Against programs written by hand: ns per unit, instructions per unit");
+  for (engine_case *c = engine_cases; c->key; c++) {
+    if (!engine_wanted (r, c->key)) continue;
+    timing_result t = engine_compare (r, c);
+    if (strcmp (c->key, "rhs") == 0) hand[0] = t.base;
+    if (strcmp (c->key, "chain-1000") == 0) hand[1] = t.base;
+    if (strcmp (c->key, "ida-6") == 0) hand[2] = t.base;
+    if (c->links > 0) chain_size[chains] = c->links, chain_ns[chains++] = t.ours;
+  }
+  if (chains == ENGINE_SIZES) engine_growth_lines (r, "chain, evaluation", chain_size, chain_ns, chains, 1);
+  if (r->only == NULL) {
+    double pair = engine_time_pair ();
+    engine_title ("The hand-written programs, in units of one sin and cos (base)");
+    engine_units (r, pair, "EzyRoller, evaluation by hand", hand[0], 80);
+    engine_units (r, pair, "chain of 1000, evaluation by hand, per body", hand[1], 49);
+    engine_units (r, pair, "EzyRoller, IDA by hand, step", hand[2], 5000);
+  }
+  if (engine_wanted (r, "growth")) engine_title ("Growth with the size of the scene"), engine_grow_all (r);
+  if (engine_wanted (r, "memory")) engine_title ("Chain of 100,000 bodies"), engine_memory_lines (r);
+}
+
+static int engine_child (const char *key, const char *side) {
+  for (engine_case *c = engine_cases; c->key; c++)
+    if (strcmp (c->key, key) == 0) {
+      c->open (c);
+      engine_counted (strcmp (side, "base") == 0 ? &c->base : &c->ours, c->calls);
+      c->close (c);
+      return 0;
+    }
+  return 2;
+}
+
+int main (int argc, char **argv) {
+  char machine[100], path[160];
+  if (argc == 4 && strcmp (argv[1], "--count") == 0) return engine_child (argv[2], argv[3]);
+  engine_report r = { .program = argv[0], .only = argc > 1 ? argv + 1 : NULL };
+  engine_machine (machine, sizeof machine);
+  snprintf (path, sizeof path, "benchmarks/results/engine-%s.csv", machine);
+  if (r.only == NULL) {
+    mkdir ("benchmarks/results", 0777);
+    r.csv = fopen (path, "w");
+    if (r.csv == NULL) engine_die (path, "cannot be written");
+    fprintf (r.csv, "what,unit,base_ns,pinwheel_ns,ratio,base_instructions,pinwheel_instructions,target,verdict\n");
+  }
+  printf ("machine %s; medians of %d interleaved pairs of %g ms\n", machine, ENGINE_PAIRS, 1e3 * engine_batch);
+  engine_everything (&r);
+  printf ("\n%d targets met, %d missed\n", r.met, r.missed);
+  if (r.csv && fclose (r.csv) == 0) printf ("%s\n", path);
+  return 0;
+}
