@@ -214,9 +214,8 @@ static void test_impossible (void **state) {
   (void)state;
   start_refused (start_impossible,
                  "model scene: the start cannot be made consistent: pin left is open by 1 m (or rad)");
-  start_refused (
-      start_torn,
-      "model scene: the start cannot be made consistent: drive other is violated by 1.26221 m/s (or rad/s)");
+  start_refused (start_torn,
+                 "model scene: the start cannot be made consistent: drive other is violated by 1.26221 m/s (or rad/s)");
 }
 
 int main (void) {

@@ -1,0 +1,266 @@
+/* Every allocation is made to fail in turn: each is an error that says so, and nothing is left behind.
+ *
+ * Linked with --wrap for malloc, calloc, realloc and free: what Pinwheel allocates goes through here.  What the
+ * libraries below it allocate does not; they are asked to clean up all the same. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "check.h"
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+#include "runs.h"
+#include "scene.h"
+#include "selftest.h"
+#include "toys.h"
+#include "verify.h"
+
+void *__real_malloc (size_t size);
+void *__real_calloc (size_t count, size_t size);
+void *__real_realloc (void *old, size_t size);
+void __real_free (void *p);
+void *__wrap_malloc (size_t size);
+void *__wrap_calloc (size_t count, size_t size);
+void *__wrap_realloc (void *old, size_t size);
+void __wrap_free (void *p);
+
+/* ---- Allocations that are counted, remembered, and fail on demand ---- */
+
+enum { ALLOC_SLOTS = 1 << 14 };
+
+static struct {
+  long count;              /* allocations so far */
+  long fail;               /* the one that fails; 0: none */
+  int live;                /* not yet freed */
+  void *slot[ALLOC_SLOTS]; /* where they are */
+} alloc;
+
+static void **alloc_find (const void *p, const void *value) {
+  for (size_t i = (size_t)p / 16 % ALLOC_SLOTS, n = 0; n < ALLOC_SLOTS; n++, i = (i + 1) % ALLOC_SLOTS)
+    if (alloc.slot[i] == value) return &alloc.slot[i];
+  return NULL;
+}
+
+static void *alloc_keep (void *p) {
+  void **slot = alloc_find (p, NULL);
+  if (p == NULL || slot == NULL) return p;
+  *slot = p;
+  alloc.live++;
+  return p;
+}
+
+static void alloc_drop (void *p) {
+  void **slot = p ? alloc_find (p, p) : NULL;
+  if (slot == NULL) return; /* not ours: from a library */
+  *slot = NULL;
+  alloc.live--;
+}
+
+static int alloc_fails (void) {
+  return ++alloc.count == alloc.fail;
+}
+
+void *__wrap_malloc (size_t size) {
+  return alloc_fails () ? NULL : alloc_keep (__real_malloc (size));
+}
+
+void *__wrap_calloc (size_t count, size_t size) {
+  return alloc_fails () ? NULL : alloc_keep (__real_calloc (count, size));
+}
+
+void *__wrap_realloc (void *old, size_t size) {
+  if (alloc_fails ()) return NULL;
+  alloc_drop (old);
+  return alloc_keep (__real_realloc (old, size));
+}
+
+void __wrap_free (void *p) {
+  alloc_drop (p);
+  __real_free (p);
+}
+
+/* ---- Scenarios ---- */
+
+/* Does something as far as it gets, cleans up, and returns a status. */
+typedef int alloc_scenario (const char *what, pw_error *error);
+
+/* Runs a scenario with its first allocation failing, then with the second, ... until it gets through. */
+static void alloc_each (alloc_scenario *scenario, const char *what) {
+  for (long fail = 1;; fail++) {
+    pw_error error = { 0 };
+    alloc.count = 0;
+    alloc.fail = fail;
+    int status = scenario (what, &error);
+    alloc.fail = 0;
+    if (alloc.live != 0) print_error ("%s: %d left behind after allocation %ld failed\n", what, alloc.live, fail);
+    assert_int_equal (alloc.live, 0);
+    if (alloc.count < fail) {
+      check_ok (status, &error);
+      assert_true (fail > 1);
+      return;
+    }
+    if (status != PW_MACHINE || strstr (error.text, "out of memory") == NULL)
+      print_error ("%s: allocation %ld failed: status %d, \"%s\"\n", what, fail, status, error.text);
+    assert_int_equal (status, PW_MACHINE);
+    assert_int_equal (error.status, PW_MACHINE);
+    assert_non_null (strstr (error.text, "out of memory"));
+  }
+}
+
+/* The EzyRoller with toys on it, built from outside. */
+static int alloc_model (pw_model **m, pw_error *error) {
+  *m = pw_model_new ("ezyroller", &scene_ezyroller, error);
+  int status = *m ? pw_set (*m, "M0", 0.2, error) : error->status;
+  if (status == PW_OK) status = pw_build (*m, error);
+  if (status != PW_OK) return status;
+  pw_add (*m, &toy_kind_spring,
+          &(toy_spring){
+              .name = "k", .body = { "frame", "ground" }, .at = { { 1, 1 }, { 0 } }, .stiffness = 0.01, .length = 1 });
+  status = pw_set_start (*m, "frame.vx", 0.1, error);
+  if (status == PW_OK) status = pw_set_start (*m, "steer.phi", 3, error);
+  return status;
+}
+
+static int alloc_system (pw_system **s, pw_error *error) {
+  pw_model *m = NULL;
+  *s = NULL;
+  int status = alloc_model (&m, error);
+  if (status == PW_OK) {
+    *s = pw_compile (m, error);
+    status = *s ? PW_OK : error->status;
+  }
+  pw_model_free (m);
+  return status;
+}
+
+static int alloc_compile (const char *what, pw_error *error) {
+  (void)what;
+  pw_system *s;
+  int status = alloc_system (&s, error);
+  pw_free (s);
+  return status;
+}
+
+static int alloc_run (const char *method, pw_error *error) {
+  pw_system *s;
+  pw_sample sample;
+  int status = alloc_system (&s, error);
+  if (status != PW_OK) return status;
+  pw_run *r = pw_open (s, method, &(pw_settings){ .step = 1e-2, .rtol = 1e-4, .ledger = 1 }, error);
+  status = r ? pw_advance_to (r, 0.1, 0.1, error) : error->status;
+  if (status == PW_OK) status = pw_at (r, pw_time (r), &sample, error);
+  if (status == PW_OK) status = pw_restart (r, NULL, NULL, error);
+  if (status == PW_OK) status = pw_advance (r, 0.2, error);
+  pw_close (r);
+  pw_free (s);
+  return status;
+}
+
+static int alloc_selftest (const char *what, pw_error *error) {
+  (void)what;
+  pw_selftest_report report = { 0 };
+  return pw_selftest (&pw_kind_pin, 1, &report, error);
+}
+
+static int alloc_verify (const char *what, pw_error *error) {
+  (void)what;
+  pw_system *s;
+  pw_verification result;
+  static const double zero[6] = { 0 };
+  int status = alloc_system (&s, error);
+  if (status == PW_OK) {
+    status = pw_verify (s, 0, zero, zero, zero, zero, &result);
+    if (status != PW_OK) pw_fail (error, status, "out of memory");
+  }
+  pw_free (s);
+  return status;
+}
+
+static int alloc_files (const char *path, pw_error *error) {
+  pw_system *s;
+  pw_sample sample;
+  char part[200];
+  int status = alloc_system (&s, error);
+  if (status != PW_OK) return status;
+  pw_run *r = pw_open (s, "rk4", &(pw_settings){ .ledger = 1 }, error);
+  pw_output *table = r ? pw_output_open (path, error) : NULL;
+  pw_csv *csv = table ? pw_csv_open (s, 1, table, error) : NULL;
+  status = csv ? pw_at (r, 0, &sample, error) : error->status;
+  if (status == PW_OK) status = pw_csv_write (csv, s, &sample, error);
+  pw_csv_close (csv);
+  if (table && status == PW_OK)
+    status = pw_output_finish (table, error);
+  else if (table)
+    pw_output_abandon (table, part, sizeof part);
+  pw_close (r);
+  pw_free (s);
+  return status;
+}
+
+/* ---- Tests ---- */
+
+static void test_compile (void **state) {
+  (void)state;
+  alloc_each (alloc_compile, "model and compile");
+}
+
+static void test_runs (void **state) {
+  (void)state;
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *t = pw_methods[i]->stabilisations; t->name; t++) {
+      char name[100];
+      snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, t->name);
+      alloc_each (alloc_run, name);
+    }
+  alloc_each (alloc_run, "rk4+projection:metric=identity");
+}
+
+static void test_selftest (void **state) {
+  (void)state;
+  alloc_each (alloc_selftest, "self-test");
+}
+
+static void test_verify (void **state) {
+  (void)state;
+  alloc_each (alloc_verify, "verifier");
+}
+
+static void test_files (void **state) {
+  (void)state;
+  char path[] = "/tmp/pinwheel-alloc-XXXXXX", part[sizeof path + 10];
+  int fd = mkstemp (path);
+  assert_true (fd >= 0);
+  close (fd);
+  alloc_each (alloc_files, path);
+  snprintf (part, sizeof part, "%s.part", path);
+  unlink (path);
+  unlink (part);
+}
+
+/* A method allocates when it is opened, and not in a step. */
+static void test_steps (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *t = pw_methods[i]->stabilisations; t->name; t++) {
+      char name[100];
+      pw_system *s;
+      snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, t->name);
+      check_ok (alloc_system (&s, &error), &error);
+      pw_run *r = runs_open (s, name, &(pw_settings){ .step = 1e-2, .rtol = 1e-4, .ledger = 1 });
+      runs_to (r, 0.1);
+      long before = alloc.count;
+      runs_to (r, 2);
+      assert_int_equal (alloc.count, before);
+      pw_close (r);
+      pw_free (s);
+    }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_compile), cmocka_unit_test (test_runs),  cmocka_unit_test (test_selftest),
+    cmocka_unit_test (test_verify),  cmocka_unit_test (test_files), cmocka_unit_test (test_steps),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

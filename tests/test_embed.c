@@ -1,0 +1,75 @@
+/* docs/embed.c, the program that uses Pinwheel as a library, prints what a run of the same says here; and the layers
+ * of the house are what they should be.
+ *
+ * BUILD in the environment names the folder of what is built, build otherwise; run from the top folder. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+
+static const char *embed_build (void) {
+  const char *build = getenv ("BUILD");
+  return build ? build : "build";
+}
+
+/* Runs a command and keeps what it writes; returns its exit status. */
+static int embed_run (const char *command, char *text, size_t size) {
+  FILE *f = popen (command, "r");
+  assert_non_null (f);
+  size_t n = fread (text, 1, size - 1, f);
+  text[n] = 0;
+  int status = pclose (f);
+  return WIFEXITED (status) ? WEXITSTATUS (status) : -1;
+}
+
+/* The rider of docs/embed.c. */
+static int embed_torque (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context;
+  value[0] = 0.1 * cos (PW_PI * t) - 0.002 * (x[0] - x[1]);
+  if (gradient) gradient[0] = -0.002, gradient[1] = 0.002;
+  return 0;
+}
+
+static void test_embed (void **state) {
+  static const char *const reads[] = { "frame.omega", "steer.omega", NULL };
+  const pw_signal torque = { PW_FUNCTION, .function = { .eval = embed_torque, .reads = reads } };
+  pw_error error = { 0 };
+  char command[300], printed[300], expected[300];
+  (void)state;
+  snprintf (command, sizeof command, "'%s/docs/embed'", embed_build ());
+  assert_int_equal (embed_run (command, printed, sizeof printed), 0);
+  pw_model *m = scene_model (&scene_ezyroller, "a", 0.6, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
+  pw_sample now = runs_to (r, 10);
+  snprintf (expected, sizeof expected, "frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t, now.q[0],
+            now.q[1], now.q[2]);
+  assert_string_equal (printed, expected);
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_layers (void **state) {
+  (void)state;
+#if defined(__SANITIZE_ADDRESS__)
+  skip (); /* the libraries need the sanitizer's, too */
+#else
+  char command[300], text[8000];
+  snprintf (command, sizeof command, "BUILD='%s' sh .ci/layers 2>&1", embed_build ());
+  int status = embed_run (command, text, sizeof text);
+  if (status != 0) print_error ("%s", text);
+  assert_int_equal (status, 0);
+  assert_non_null (strstr (text, "ok     core refers to no symbol of solvers\n"));
+  assert_null (strstr (text, "FAILED"));
+#endif
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_embed), cmocka_unit_test (test_layers) };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
