@@ -1,0 +1,118 @@
+/* weld: two bodies move as one, a beam held by a wall, a start that is open. */
+#include <math.h>
+#include "check.h"
+#include "scene.h"
+#include "trial.h"
+
+/* ---- A sleigh in two parts and in one ---- */
+
+static const double weld_mass[2] = { 2, 0.5 }, weld_inertia[2] = { 0.3, 0.04 }, weld_apart[2] = { 0.7, 0.4 };
+
+/* What acts on the sleigh; the rear part's centre of mass is at (x, y) in the body's frame. */
+static void weld_equip (pw_model *m, const char *body, double x, double y) {
+  pw_add_wheel (m, &(pw_wheel){ .name = "blade", .body = body, .at = { x - 0.3, y }, .heading = 0.2 });
+  pw_add_torque (m, &(pw_torque){ .name = "rider",
+                                  .body = { body, "ground" },
+                                  .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.8, .omega = 2 } } });
+  pw_add_spring (
+      m, &(pw_spring){
+             .name = "rope", .body = { body, "ground" }, .at = { { x + 0.2, y + 0.1 }, { 2, 3 } }, .stiffness = 3 });
+  pw_add_gravity (m, &(pw_gravity){ .name = "slope", .acceleration = { 0.4, -0.9 } });
+}
+
+static void weld_two (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "rear", .mass = weld_mass[0], .inertia = weld_inertia[0] });
+  pw_add_body (m, &(pw_body){ .name = "front",
+                              .mass = weld_mass[1],
+                              .inertia = weld_inertia[1],
+                              .start = { weld_apart[0], weld_apart[1], 0.9 } });
+  double c = cos (0.9), s = sin (0.9), x = weld_apart[0] - 0.1, y = weld_apart[1] - 0.2;
+  pw_add_weld (m, &(pw_weld){ .name = "joint",
+                              .body = { "rear", "front" },
+                              .at = { { 0.1, 0.2 }, { -c * x - s * y, s * x - c * y } },
+                              .angle = 0.9 });
+  weld_equip (m, "rear", 0, 0);
+}
+
+/* The centre of mass of both is the share of the front's mass along the way to it. */
+static void weld_one (pw_model *m, const void *parameters) {
+  (void)parameters;
+  double mass = weld_mass[0] + weld_mass[1], share = weld_mass[1] / mass;
+  double x = share * weld_apart[0], y = share * weld_apart[1];
+  double steiner = weld_mass[0] * share *
+                   (weld_apart[0] * weld_apart[0] + weld_apart[1] * weld_apart[1]); /* reduced mass times d^2 */
+  pw_add_body (m, &(pw_body){ .name = "sleigh",
+                              .mass = mass,
+                              .inertia = weld_inertia[0] + weld_inertia[1] + steiner,
+                              .start = { x, y } });
+  weld_equip (m, "sleigh", -x, -y);
+}
+
+static const pw_plugin_table weld_two_table = TRIAL_TABLE (weld_two), weld_one_table = TRIAL_TABLE (weld_one);
+
+static void weld_compare (const char *method, double bound, const char *reason) {
+  const pw_settings settings = { .step = 1e-3, .rtol = 1e-10, .span = 3, .ledger = 1 };
+  pw_system *two = scene_system (&weld_two_table, NULL), *one = scene_system (&weld_one_table, NULL);
+  pw_run *r2 = runs_open (two, method, &settings), *r1 = runs_open (one, method, &settings);
+  pw_sample x2 = runs_to (r2, 3), x1 = runs_to (r1, 3);
+  double share = weld_mass[1] / (weld_mass[0] + weld_mass[1]);
+  check_close ("phi", x2.q[2], x1.q[2], bound, reason);
+  check_close ("angle between", x2.q[5] - x2.q[2], 0.9, bound, reason);
+  check_close ("x", (1 - share) * x2.q[0] + share * x2.q[3], x1.q[0], bound, reason);
+  check_close ("y", (1 - share) * x2.q[1] + share * x2.q[4], x1.q[1], bound, reason);
+  check_close ("kinetic", x2.kinetic, x1.kinetic, 10 * bound, reason);
+  check_close ("blade", trial_reaction (two, &x2, "blade.N"), trial_reaction (one, &x1, "blade.N"), 1e3 * bound,
+               reason);
+  check_close ("balance", x2.balance, 0, 1e3 * bound, reason);
+  pw_close (r1), pw_close (r2);
+  pw_free (one), pw_free (two);
+}
+
+static void test_one_body (void **state) {
+  (void)state;
+  weld_compare ("rk4+projection", 1e-12, "the same steps: round-off of 3000");
+  weld_compare ("ida+ggl", 1e-6, "1e4 rtol");
+  weld_compare ("ida+baumgarte", 1e-6, "1e4 rtol");
+}
+
+/* ---- A beam held by a wall ---- */
+
+static void weld_beam (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "beam", .mass = 4, .inertia = 1, .start = { 1, 5, 0 } });
+  pw_add_weld (m, &(pw_weld){ .name = "wall", .body = { "beam", "ground" }, .at = { { -1.5, 0 }, { 0, 5 } } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 2, -9.81 } });
+}
+
+/* It starts half a metre too far to the left, so the start has to close the weld. */
+static void test_beam (void **state) {
+  (void)state;
+  static const pw_plugin_table table = TRIAL_TABLE (weld_beam);
+  pw_system *s = scene_system (&table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01 });
+  assert_int_equal (pw_run_start (r)->moved, 1);
+  pw_sample x = runs_to (r, 1);
+  double bound = 1e4 * CHECK_EPS;
+  check_close ("x", x.q[0], 1.5, bound, "round-off of 100 steps");
+  check_close ("y", x.q[1], 5, bound, "round-off of 100 steps");
+  check_close ("Fx", trial_reaction (s, &x, "wall.Fx"), -4 * 2, 40 * bound, "weight");
+  check_close ("Fy", trial_reaction (s, &x, "wall.Fy"), 4 * 9.81, 40 * bound, "weight");
+  check_close ("M", trial_reaction (s, &x, "wall.M"), 4 * 9.81 * 1.5, 60 * bound, "weight times arm");
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_methods (void **state) {
+  (void)state;
+  trial (&weld_two_table, 3);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_one_body),
+    cmocka_unit_test (test_beam),
+    cmocka_unit_test (test_methods),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

@@ -1,0 +1,85 @@
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "scene.h"
+#include "system.h"
+#include "trial.h"
+#include "verify.h"
+
+enum { TRIAL_COORDS = 40 };
+
+double trial_state (const pw_system *s, const pw_sample *x, const char *name) {
+  pw_error error = { 0 };
+  int state = pw_find_state (s, name, &error);
+  check_ok (state < 0 ? PW_INPUT : PW_OK, &error);
+  return state < s->coords ? x->q[state] : x->v[state - s->coords];
+}
+
+double trial_reaction (const pw_system *s, const pw_sample *x, const char *name) {
+  char text[80];
+  for (int i = 0; i < s->rows; i++)
+    if (strcmp (pw_reaction_name (s, i, text, sizeof text), name) == 0) return -x->lambda[i];
+  fail_msg ("no reaction %s", name);
+  return NAN;
+}
+
+/* The sizes of what is compared. */
+typedef struct {
+  double state, energy;
+} trial_size;
+
+static trial_size trial_measure (const pw_system *s, const pw_sample *x) {
+  trial_size size = { 1, 1 };
+  for (int j = 0; j < s->coords; j++) size.state = fmax (size.state, fmax (fabs (x->q[j]), fabs (x->v[j])));
+  size.energy += fabs (x->kinetic) + fabs (x->potential) + fabs (x->work) + fabs (x->loss);
+  return size;
+}
+
+static void trial_verify (pw_system *s, const pw_sample *x, double bound, const char *reason) {
+  pw_verification v;
+  assert_int_equal (pw_verify (s, x->t, x->q, x->v, x->a, x->lambda, &v), PW_OK);
+  check_below ("verifier, position", v.position.scaled, bound, reason);
+  check_below ("verifier, velocity", v.velocity.scaled, bound, reason);
+  check_below ("verifier, acceleration", v.acceleration.scaled, bound, reason);
+  check_below ("verifier, force", v.force.scaled, bound, reason);
+}
+
+static void trial_compare (const pw_system *s, const char *method, const pw_sample *x, const double *reference,
+                           double bound, const char *reason) {
+  char what[120], name[60];
+  for (int i = 0; i < 2 * s->coords; i++) {
+    snprintf (what, sizeof what, "%s %s", method, pw_state_name (s, i, name, sizeof name));
+    check_close (what, i < s->coords ? x->q[i] : x->v[i - s->coords], reference[i], bound, reason);
+  }
+}
+
+static void trial_ida (pw_system *s, const char *method, double t_end, const double *reference, trial_size size) {
+  const double rtol = 1e-9;
+  char what[80];
+  pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .span = t_end, .ledger = 1 });
+  pw_sample x = runs_to (r, t_end);
+  const pw_statistics *cost = pw_run_statistics (r);
+  trial_compare (s, method, &x, reference, 1e3 * rtol * size.state, "1000 rtol");
+  check_below ("balance", fabs (x.balance), 1e3 * rtol * size.energy, "1000 rtol");
+  snprintf (what, sizeof what, "%s: rejected of %ld steps", method, cost->steps);
+  check_below (what, (double)cost->rejected, 5 + 0.05 * (double)cost->steps, "an exact Newton matrix");
+  pw_close (r);
+}
+
+void trial (const pw_plugin_table *table, double t_end) {
+  double reference[2 * TRIAL_COORDS];
+  pw_system *s = scene_system (table, NULL);
+  assert_true (s->coords <= TRIAL_COORDS);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = t_end, .ledger = 1 });
+  pw_sample x = runs_to (r, t_end);
+  trial_size size = trial_measure (s, &x);
+  memcpy (reference, x.q, (size_t)s->coords * sizeof *reference);
+  memcpy (reference + s->coords, x.v, (size_t)s->coords * sizeof *reference);
+  check_below ("balance", fabs (x.balance), 1e-9 * size.energy, "1000 h^4 at h = 1e-3");
+  trial_verify (s, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
+  pw_close (r);
+  trial_ida (s, "ida+ggl", t_end, reference, size);
+  trial_ida (s, "ida+baumgarte", t_end, reference, size);
+  pw_free (s);
+}

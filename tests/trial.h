@@ -1,0 +1,18 @@
+/* Trials of element kinds: what every one has to stand in a scene. */
+#ifndef TRIAL_H
+#define TRIAL_H
+
+#include "runs.h"
+
+/* Runs a scene to t_end by rk4+projection, ida+ggl and ida+baumgarte.  They agree, the ledger's balance closes, the
+ * final state obeys the equations as the independent verifier sees them, and Newton's iteration hardly ever fails. */
+void trial (const pw_plugin_table *table, double t_end);
+
+/* A state ("cart.x", "cart.vx") or a reaction ("motor.F") of a sample, by name. */
+double trial_state (const pw_system *s, const pw_sample *x, const char *name);
+double trial_reaction (const pw_system *s, const pw_sample *x, const char *name);
+
+#define TRIAL_TABLE(f) \
+  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = f }
+
+#endif
