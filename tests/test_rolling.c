@@ -1,0 +1,233 @@
+/* rolling-wheel: a driven wheel that turns freely, a robot with two driven wheels, a motor, starts. */
+#include <math.h>
+#include "check.h"
+#include "scene.h"
+#include "trial.h"
+
+/* ---- One driven wheel below the centre of mass: u = a t along the heading, phi = w t ---- */
+
+typedef struct {
+  double inertia;
+} rolling_parameters;
+
+static const pw_parameter rolling_list[] = {
+  { PW_AT (rolling_parameters, inertia), 0.03, "kg m^2", "of the wheel", PW_NONNEGATIVE },
+  { .name = NULL },
+};
+
+static const struct { double m, r, u, w, heading; } rolling_u = { 2, 0.15, 0.4, 0.9, 0.6 };
+
+static void rolling_unicycle (pw_model *m, const void *parameters) {
+  const rolling_parameters *p = parameters;
+  pw_add_body (m, &(pw_body){ .name = "body", .mass = rolling_u.m, .inertia = 0.1, .rate = { 0, 0, rolling_u.w } });
+  pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "wheel",
+                                                .body = "body",
+                                                .heading = rolling_u.heading,
+                                                .radius = rolling_u.r,
+                                                .inertia = p->inertia,
+                                                .start = 0.5,
+                                                .torque = { .constant = rolling_u.u } });
+}
+
+static const pw_plugin_table rolling_unicycle_table = { .abi = PW_ABI,
+                                                        .size = sizeof rolling_unicycle_table,
+                                                        .parameters = rolling_list,
+                                                        .parameters_size = sizeof (rolling_parameters),
+                                                        .build = rolling_unicycle };
+
+static void rolling_turn (const char *method, double inertia, double bound, const char *reason) {
+  const double t = 3, w = rolling_u.w, r = rolling_u.r;
+  double a = rolling_u.u * r / (rolling_u.m * r * r + inertia); /* along the heading */
+  double along = a * (t * sin (w * t) / w + (cos (w * t) - 1) / (w * w));
+  double aside = a * (sin (w * t) / (w * w) - t * cos (w * t) / w);
+  double c = cos (rolling_u.heading), s = sin (rolling_u.heading);
+  pw_system *system = scene_system (&rolling_unicycle_table, "inertia", inertia, NULL);
+  pw_run *run = runs_open (system, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 });
+  pw_sample x = runs_to (run, t);
+  check_close ("x", x.q[0], c * along - s * aside, bound, reason);
+  check_close ("y", x.q[1], s * along + c * aside, bound, reason);
+  check_close ("spin", trial_state (system, &x, "wheel.spin"), 0.5 + a * t * t / (2 * r), 10 * bound, reason);
+  check_close ("spin rate", trial_state (system, &x, "wheel.spin_rate"), a * t / r, 10 * bound, reason);
+  check_close ("lateral force", trial_reaction (system, &x, "wheel.N"), rolling_u.m * a * t * w, 100 * bound, reason);
+  check_close ("traction", trial_reaction (system, &x, "wheel.T"), rolling_u.m * a, 100 * bound, reason);
+  check_close ("work", x.work, rolling_u.u * a * t * t / (2 * r), 10 * bound, reason);
+  check_close ("balance", x.balance, 0, 10 * bound, reason);
+  pw_close (run);
+  pw_free (system);
+}
+
+static void test_unicycle (void **state) {
+  static const double inertia[] = { 0.03, 0 };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    rolling_turn ("rk4+projection", inertia[i], 1e-11, "10 h^4 at h = 1e-3");
+    rolling_turn ("rk4+baumgarte", inertia[i], 1e-11, "10 h^4 at h = 1e-3");
+    rolling_turn ("ida+ggl", inertia[i], 1e-6, "1e4 rtol");
+    rolling_turn ("ida+baumgarte", inertia[i], 1e-6, "1e4 rtol");
+  }
+}
+
+/* ---- A robot with two driven wheels on one axle, centre of mass between them: it runs along a circle ----
+ *
+ *   v = a t, phi = b t^2 / 2:  (m + 2 I / r^2) a = (u1 + u2) / r,  (J + 2 I c^2 / r^2) b = c (u2 - u1) / r
+ *
+ * The left wheel keeps the axle from sliding sideways; the right one sits in a massless hub that may slide along it. */
+
+static const struct { double m, J, I, r, c, u1, u2; } rolling_r = { 10, 0.4, 0.02, 0.1, 0.25, 0.5, 0.8 };
+
+static void rolling_robot (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "robot", .mass = rolling_r.m, .inertia = rolling_r.J });
+  pw_add_body (m, &(pw_body){ .name = "hub", .start = { 0, -rolling_r.c } });
+  pw_add_drive (m, &(pw_drive){ .name = "slot", .body = { "hub", "robot" }, .what = PW_DRIVE_X });
+  pw_add_drive (m, &(pw_drive){ .name = "key", .body = { "hub", "robot" }, .what = PW_DRIVE_ANGLE });
+  pw_rolling_wheel wheel = { .name = "left",
+                             .body = "robot",
+                             .at = { 0, rolling_r.c },
+                             .radius = rolling_r.r,
+                             .inertia = rolling_r.I,
+                             .torque = { .constant = rolling_r.u1 } };
+  pw_add_rolling_wheel (m, &wheel);
+  wheel.name = "right";
+  wheel.body = "hub";
+  wheel.at[1] = 0;
+  wheel.torque.constant = rolling_r.u2;
+  pw_add_rolling_wheel (m, &wheel);
+}
+
+static const pw_plugin_table rolling_robot_table = TRIAL_TABLE (rolling_robot);
+
+static void rolling_circle (const char *method, double bound, const char *reason) {
+  const double t = 2, m = rolling_r.m, I = rolling_r.I, r = rolling_r.r, c = rolling_r.c;
+  double a = (rolling_r.u1 + rolling_r.u2) / r / (m + 2 * I / (r * r));
+  double b = c * (rolling_r.u2 - rolling_r.u1) / r / (rolling_r.J + 2 * I * c * c / (r * r));
+  double phi = b * t * t / 2, way = a * t * t / 2;
+  pw_system *s = scene_system (&rolling_robot_table, NULL);
+  pw_run *run = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 });
+  pw_sample x = runs_to (run, t);
+  check_close ("phi", x.q[2], phi, bound, reason);
+  check_close ("x", x.q[0], a / b * sin (phi), bound, reason);
+  check_close ("y", x.q[1], a / b * (1 - cos (phi)), bound, reason);
+  check_close ("left", trial_state (s, &x, "left.spin"), (way - c * phi) / r, 10 * bound, reason);
+  check_close ("right", trial_state (s, &x, "right.spin"), (way + c * phi) / r, 10 * bound, reason);
+  check_close ("work", x.work, (rolling_r.u1 * (way - c * phi) + rolling_r.u2 * (way + c * phi)) / r, 10 * bound,
+               reason);
+  check_close ("lateral force", trial_reaction (s, &x, "left.N") + trial_reaction (s, &x, "right.N"), m * a * t * b * t,
+               1e3 * bound, reason);
+  check_close ("balance", x.balance, 0, 10 * bound, reason);
+  pw_close (run);
+  pw_free (s);
+}
+
+static void test_robot (void **state) {
+  (void)state;
+  rolling_circle ("rk4+projection", 1e-10, "100 h^4 at h = 1e-3");
+  rolling_circle ("ida+ggl", 1e-6, "1e4 rtol");
+  rolling_circle ("ida+baumgarte", 1e-6, "1e4 rtol");
+}
+
+/* ---- A motor whose torque k (w0 - w) falls with its speed: w = w0 (1 - exp (-k t / J)) ---- */
+
+static int rolling_motor (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = 0.05 * (20 - x[0]);
+  if (gradient) gradient[0] = -0.05;
+  return 0;
+}
+
+static void rolling_speed (const char *method, double bound, const char *reason) {
+  static const char *const reads[] = { "wheel.spin_rate", NULL };
+  pw_error error = { 0 };
+  pw_signal motor = { PW_FUNCTION, .function = { .eval = rolling_motor, .reads = reads } };
+  pw_model *m = scene_model (&rolling_unicycle_table, NULL);
+  check_ok (pw_set_signal (m, "wheel", "torque", &motor, &error), &error);
+  check_ok (pw_set_start (m, "body.omega", 0, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_run *run = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2 });
+  pw_sample x = runs_to (run, 2);
+  double J = rolling_u.m * rolling_u.r * rolling_u.r + 0.03;
+  check_close ("speed", trial_state (s, &x, "wheel.spin_rate"), 20 * (1 - exp (-0.05 * 2 / J)), bound, reason);
+  pw_close (run);
+  pw_free (s);
+}
+
+static void test_motor (void **state) {
+  (void)state;
+  rolling_speed ("rk4+projection", 1e-11, "(h k / J)^4 at h = 1e-3");
+  rolling_speed ("ida+ggl", 1e-6, "1e4 rtol");
+}
+
+/* ---- Starts ---- */
+
+static void rolling_coast (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "body",
+                              .mass = 1,
+                              .inertia = 0.1,
+                              .start = { 0, 0, PW_PI / 3 },
+                              .rate = { 2 * cos (PW_PI / 3) - 0.5 * 0.4 * cos (PW_PI / 3),
+                                        2 * sin (PW_PI / 3) - 0.5 * 0.4 * sin (PW_PI / 3), 0.5 } });
+  pw_add_rolling_wheel (
+      m, &(pw_rolling_wheel){ .name = "wheel", .body = "body", .at = { 0, -0.4 }, .radius = 0.2, .inertia = 0.05 });
+}
+
+/* A wheel that is not told how fast it spins rolls with its body, which then need not change its own motion. */
+static void test_start (void **state) {
+  (void)state;
+  static const pw_plugin_table table = TRIAL_TABLE (rolling_coast);
+  pw_system *s = scene_system (&table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  assert_int_equal (pw_run_start (r)->moved, 0);
+  check_close ("spin rate", pw_run_start (r)->v[3], 2 / 0.2, 64 * CHECK_EPS, "speed of the contact point / radius");
+  pw_close (r);
+  pw_free (s);
+}
+
+/* What is given from outside is held: the body follows its wheel. */
+static void test_given (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&rolling_unicycle_table, NULL);
+  check_ok (pw_set_start (m, "wheel.spin_rate", 4, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  assert_int_equal (pw_run_start (r)->freed, 0);
+  check_close ("vx", pw_run_start (r)->v[0], 4 * rolling_u.r * cos (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
+  check_close ("vy", pw_run_start (r)->v[1], 4 * rolling_u.r * sin (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- A bicycle without lean: the rear wheel is driven, the front one steers freely on a fork with trail ---- */
+
+static void rolling_bicycle (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "frame", .mass = 8, .inertia = 1.2, .rate = { 1, 0, 0 } });
+  pw_add_body (m,
+               &(pw_body){ .name = "fork", .mass = 1, .inertia = 0.02, .start = { 0.57, 0.03, 0.3 }, .rate = { 1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "head", .body = { "frame", "fork" }, .at = { { 0.6, 0.04 }, { 0.03, 0 } } });
+  pw_add_rolling_wheel (
+      m, &(pw_rolling_wheel){ .name = "rear",
+                              .body = "frame",
+                              .at = { -0.4, 0 },
+                              .radius = 0.3,
+                              .inertia = 0.1,
+                              .torque = { PW_HARMONIC, .harmonic = { .amplitude = 2, .omega = 1.5, .offset = 1 } } });
+  pw_add_rolling_wheel (
+      m, &(pw_rolling_wheel){ .name = "front", .body = "fork", .at = { -0.05, 0 }, .heading = 0.1, .radius = 0.25 });
+}
+
+static void test_methods (void **state) {
+  (void)state;
+  static const pw_plugin_table bicycle = TRIAL_TABLE (rolling_bicycle);
+  trial (&bicycle, 2);
+  trial (&rolling_robot_table, 2);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_unicycle), cmocka_unit_test (test_robot), cmocka_unit_test (test_motor),
+    cmocka_unit_test (test_start),    cmocka_unit_test (test_given), cmocka_unit_test (test_methods),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

@@ -1,0 +1,176 @@
+/* tyre: sliding sideways, the wheel as its limit, its load. */
+#include <math.h>
+#include "check.h"
+#include "scene.h"
+#include "trial.h"
+
+/* ---- A block that slides straight to the side ----
+ *
+ *   linear      m v' = -C v / v0:                      v = v(0) exp (-k t),  k = C / (m v0)
+ *   saturating  m v' = -mu N tanh (C v / (mu N v0)):   sinh (C v / (mu N v0)) decays with the same k */
+
+static const struct { double m, C, v0, v; } tyre_s = { 2, 3, 0.5, 0.7 };
+
+typedef struct {
+  double load, friction;
+} tyre_parameters;
+
+static const pw_parameter tyre_list[] = {
+  { PW_AT (tyre_parameters, load), 0, "N", "normal load", PW_NONNEGATIVE },
+  { PW_AT (tyre_parameters, friction), 0.4, "", "of the tyre", PW_NONNEGATIVE },
+  { .name = NULL },
+};
+
+static void tyre_slide (pw_model *m, const void *parameters) {
+  const tyre_parameters *p = parameters;
+  double c = cos (0.8), s = sin (0.8); /* the heading; it slides to its left */
+  pw_add_body (m,
+               &(pw_body){ .name = "block", .mass = tyre_s.m, .inertia = 1, .rate = { -tyre_s.v * s, tyre_s.v * c } });
+  pw_add_tyre (m, &(pw_tyre){ .name = "T",
+                              .body = "block",
+                              .heading = 0.8,
+                              .stiffness = tyre_s.C,
+                              .speed = tyre_s.v0,
+                              .load = p->load,
+                              .friction = p->friction });
+}
+
+static const pw_plugin_table tyre_slide_table = { .abi = PW_ABI,
+                                                  .size = sizeof tyre_slide_table,
+                                                  .parameters = tyre_list,
+                                                  .parameters_size = sizeof (tyre_parameters),
+                                                  .build = tyre_slide };
+
+static void tyre_stop (const char *method, double load, double bound, const char *reason) {
+  pw_system *s = scene_system (&tyre_slide_table, "load", load, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1, .ledger = 1 });
+  double k = tyre_s.C / (tyre_s.m * tyre_s.v0), scale = load > 0 ? 0.4 * load * tyre_s.v0 / tyre_s.C : 0;
+  for (int i = 1; i <= 5; i++) {
+    double t = 0.2 * i, v = tyre_s.v * exp (-k * t);
+    if (load > 0) v = scale * asinh (sinh (tyre_s.v / scale) * exp (-k * t));
+    pw_sample x = runs_to (r, t);
+    check_close ("speed", hypot (x.v[0], x.v[1]), v, bound, reason);
+    check_close ("loss", x.loss, tyre_s.m * (tyre_s.v * tyre_s.v - v * v) / 2, bound, reason);
+  }
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_slide (void **state) {
+  (void)state;
+  tyre_stop ("rk4", 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 3/s");
+  tyre_stop ("rk4", 5, 1e-10, "(h k)^4 at h = 1e-3 and k = 3/s");
+  tyre_stop ("ida", 0, 1e-7, "1e3 rtol");
+  tyre_stop ("ida", 5, 1e-7, "1e3 rtol");
+}
+
+/* ---- As the stiffness grows, the tyre becomes the wheel ---- */
+
+typedef struct {
+  double stiffness; /* 0: a wheel */
+} tyre_sleigh_parameters;
+
+static const pw_parameter tyre_sleigh_list[] = {
+  { PW_AT (tyre_sleigh_parameters, stiffness), 0, "N", "of the tyres; 0: wheels", PW_NONNEGATIVE },
+  { .name = NULL },
+};
+
+static void tyre_wheel (pw_model *m, const char *name, const char *body, double x, double stiffness) {
+  if (stiffness > 0)
+    pw_add_tyre (m, &(pw_tyre){ .name = name, .body = body, .at = { x, 0 }, .stiffness = stiffness, .speed = 0.2 });
+  else
+    pw_add_wheel (m, &(pw_wheel){ .name = name, .body = body, .at = { x, 0 } });
+}
+
+/* A vehicle of two segments, moved by swinging its hinge. */
+static void tyre_vehicle (pw_model *m, const void *parameters) {
+  const tyre_sleigh_parameters *p = parameters;
+  pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { 0.5 } });
+  pw_add_body (m, &(pw_body){ .name = "steer", .mass = 0.2, .inertia = 0.01, .start = { 0.6 }, .rate = { 0.5 } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.1, 0 } } });
+  tyre_wheel (m, "A", "frame", -0.5, p->stiffness);
+  tyre_wheel (m, "C", "steer", 0.1, p->stiffness);
+  pw_add_torque (m, &(pw_torque){ .name = "rider",
+                                  .body = { "frame", "steer" },
+                                  .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1, .omega = 3 } } });
+}
+
+static const pw_plugin_table tyre_vehicle_table = { .abi = PW_ABI,
+                                                    .size = sizeof tyre_vehicle_table,
+                                                    .parameters = tyre_sleigh_list,
+                                                    .parameters_size = sizeof (tyre_sleigh_parameters),
+                                                    .build = tyre_vehicle };
+
+static void test_limit (void **state) {
+  enum { STEPS = 5 };
+  (void)state;
+  double wheel[6], rate[6], q[6], v[6], distance[STEPS], stiffness = 100;
+  pw_settings settings = { .rtol = 1e-10, .span = 2 };
+  pw_system *s = scene_system (&tyre_vehicle_table, NULL);
+  runs_state (s, "ida+ggl", &settings, 2, wheel, rate, NULL);
+  pw_free (s);
+  for (int i = 0; i < STEPS; i++, stiffness *= sqrt (10)) {
+    s = scene_system (&tyre_vehicle_table, "stiffness", stiffness, NULL);
+    runs_state (s, "ida+ggl", &settings, 2, q, v, NULL);
+    distance[i] = 0;
+    for (int j = 0; j < 6; j++) distance[i] = fmax (distance[i], fabs (q[j] - wheel[j]));
+    pw_free (s);
+  }
+  check_close ("slope over two decades", log10 (distance[0] / distance[STEPS - 1]) / 2, 1, 0.02,
+               "1/C, and the next power of 1/C at the soft end");
+  check_close ("slope at the stiff end", 2 * log10 (distance[STEPS - 2] / distance[STEPS - 1]), 1, 0.005,
+               "1/C, and the next power of 1/C");
+}
+
+/* ---- Its load ---- */
+
+static void test_refused (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&tyre_slide_table, "load", 5.0, "friction", 0.0, NULL);
+  assert_null (pw_compile (m, &error));
+  check_error (&error, PW_INPUT,
+               "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
+  pw_model_free (m);
+}
+
+/* ---- A car that brakes away at the rear: both laws, a load that is reached, arms, headings ---- */
+
+static void tyre_car (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "car", .mass = 10, .inertia = 1.5, .rate = { 3, 0.4, 0.3 } });
+  pw_add_tyre (m, &(pw_tyre){ .name = "front",
+                              .body = "car",
+                              .at = { 0.5, 0.1 },
+                              .heading = 0.2,
+                              .stiffness = 80,
+                              .speed = 0.1,
+                              .load = 50,
+                              .friction = 0.4 });
+  pw_add_tyre (m, &(pw_tyre){ .name = "rear", .body = "car", .at = { -0.4, -0.1 }, .stiffness = 60, .speed = 0.1 });
+  pw_add_body (m, &(pw_body){ .name = "trailer", .mass = 2, .inertia = 0.1, .start = { -1.1 }, .rate = { 3 } });
+  pw_add_pin (m, &(pw_pin){ .name = "hitch", .body = { "car", "trailer" }, .at = { { -0.6, 0 }, { 0.5, 0 } } });
+  pw_add_tyre (m, &(pw_tyre){ .name = "axle",
+                              .body = "trailer",
+                              .at = { -0.2, 0 },
+                              .stiffness = 50,
+                              .speed = 0.1,
+                              .load = 20,
+                              .friction = 0.5 });
+}
+
+static void test_methods (void **state) {
+  (void)state;
+  static const pw_plugin_table car = TRIAL_TABLE (tyre_car);
+  trial (&car, 2);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_slide),
+    cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_methods),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
