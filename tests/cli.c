@@ -1,0 +1,120 @@
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include "check.h"
+#include "cli.h"
+
+/* ---- Running the program ---- */
+
+char cli_folder[] = "/tmp/pinwheel-cli-XXXXXX"; /* for whatever a test writes; @ in a command stands for it */
+char cli_out[200000], cli_err[20000];           /* what the last command wrote */
+
+static int cli_slurp (const char *path, char *text, size_t size) {
+  FILE *f = fopen (path, "r");
+  if (f == NULL) return 0;
+  size_t n = fread (text, 1, size - 1, f);
+  text[n] = 0;
+  fclose (f);
+  return 1;
+}
+
+const char *cli_file (const char *name) {
+  static char text[200000];
+  char path[300];
+  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
+  return cli_slurp (path, text, sizeof text) ? text : NULL;
+}
+
+void cli_expand (const char *from, char *to, size_t size) {
+  size_t n = 0;
+  for (; *from && n + sizeof cli_folder < size; from++)
+    if (*from == '@')
+      n += (size_t)snprintf (to + n, size - n, "%s", cli_folder);
+    else
+      to[n++] = *from;
+  to[n] = 0;
+}
+
+int cli_run (const char *command) {
+  char expanded[2000], whole[3000], path[300];
+  const char *program = getenv ("PINWHEEL");
+  cli_expand (command, expanded, sizeof expanded);
+  snprintf (whole, sizeof whole, "pinwheel () { '%s' \"$@\"; }\n{ %s\n} >%s/out 2>%s/err </dev/null",
+            program ? program : "build/pinwheel", expanded, cli_folder, cli_folder);
+  int status = system (whole);
+  snprintf (path, sizeof path, "%s/out", cli_folder);
+  assert_true (cli_slurp (path, cli_out, sizeof cli_out));
+  snprintf (path, sizeof path, "%s/err", cli_folder);
+  assert_true (cli_slurp (path, cli_err, sizeof cli_err));
+  return WIFEXITED (status) ? WEXITSTATUS (status) : -1;
+}
+
+void cli_good (const char *command) {
+  int status = cli_run (command);
+  if (status != 0 || cli_err[0]) print_error ("%s\nends with %d:\n%s", command, status, cli_err);
+  assert_int_equal (status, 0);
+  assert_string_equal (cli_err, "");
+}
+
+void cli_bad (const char *command, int status, const char *message) {
+  char text[1000], expanded[900];
+  cli_expand (message, expanded, sizeof expanded);
+  snprintf (text, sizeof text, "pinwheel: %s\n", expanded);
+  int got = cli_run (command);
+  if (got != status || strcmp (cli_err, text) != 0)
+    print_error ("%s\nends with %d:\n%sexpected %d:\n%s", command, got, cli_err, status, text);
+  assert_int_equal (got, status);
+  assert_string_equal (cli_err, text);
+}
+
+void cli_write (const char *name, const char *text) {
+  char path[300];
+  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
+  FILE *f = fopen (path, "w");
+  assert_non_null (f);
+  fputs (text, f);
+  assert_int_equal (fclose (f), 0);
+}
+
+/* ---- Reading summaries ---- */
+
+double cli_number (const char *json, ...) {
+  va_list keys;
+  va_start (keys, json);
+  for (const char *key = va_arg (keys, const char *); key; key = va_arg (keys, const char *)) {
+    char quoted[60];
+    snprintf (quoted, sizeof quoted, "\"%s\"", key);
+    json = strstr (json, quoted);
+    if (json == NULL) print_error ("no key %s\n", quoted);
+    assert_non_null (json);
+    json += strlen (quoted);
+    json += strspn (json, " \n:");
+  }
+  va_end (keys);
+  return strtod (json, NULL);
+}
+
+int cli_says (const char *json, const char *key, const char *value) {
+  char quoted[300];
+  snprintf (quoted, sizeof quoted, "\"%s\"", key);
+  json = strstr (json, quoted);
+  if (json == NULL) return 0;
+  json += strlen (quoted);
+  json += strspn (json, " \n:");
+  snprintf (quoted, sizeof quoted, "\"%s\"", value);
+  return strncmp (json, quoted, strlen (quoted)) == 0;
+}
+
+int cli_setup (void **state) {
+  (void)state;
+  return mkdtemp (cli_folder) ? 0 : -1;
+}
+
+int cli_teardown (void **state) {
+  char command[200];
+  (void)state;
+  snprintf (command, sizeof command, "rm -rf '%s'", cli_folder);
+  return system (command);
+}

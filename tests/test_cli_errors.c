@@ -1,0 +1,188 @@
+/* The program from outside: what it says about what is wrong, and with which status it ends. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "check.h"
+#include "cli.h"
+
+/* ---- Command lines that are wrong ---- */
+
+static void test_bad_lines (void **state) {
+  static const struct {
+    const char *line, *message;
+  } bad[] = {
+    { "frob", "there is no command \"frob\"; did you mean \"show\"?" },
+    { "--verbose", "there is no option \"--verbose\"; did you mean \"--version\"?" },
+    { "run", "something is missing; write pinwheel run MODEL [OPTION...]" },
+    { "run a b", "\"b\" is too much; write pinwheel run MODEL [OPTION...]" },
+    { "run ezyroler", "there is no model \"ezyroler\"; did you mean \"ezyroller\"?" },
+    { "run ezyroller --metod rk4", "run has no option \"--metod\"; did you mean \"--method\"?" },
+    { "run ezyroller --method", "run: option --method needs a value" },
+    { "run ezyroller --method rk5", "there is no integrator \"rk5\"; did you mean \"rk4\"?" },
+    { "run ezyroller --method rk4+projecton",
+      "integrator rk4 has no stabilisation \"projecton\"; did you mean \"projection\"?" },
+    { "run ezyroller --method rk4+projection:metrik=mass",
+      "method rk4+projection has no option \"metrik\"; did you mean \"metric\"?" },
+    { "run ezyroller --step 0", "--step 0: expected a number > 0" },
+    { "run ezyroller --step nan", "--step nan: expected a finite number" },
+    { "run ezyroller --step 1,5", "--step: \"1,5\" is not a number" },
+    { "run ezyroller --t-end -1", "--t-end -1: expected a number > 0" },
+    { "run ezyroller --rtol 0", "--rtol 0: expected a number > 0" },
+    { "run ezyroller --atol -1", "--atol -1: expected a number > 0" },
+    { "run ezyroller --every 0", "--every 0: expected a number > 0" },
+    { "run ezyroller --set aa=1", "model ezyroller has no parameter \"aa\"; did you mean \"a\"?" },
+    { "run ezyroller --set m1=-1", "model ezyroller: parameter m1 = -1: expected a number > 0" },
+    { "run ezyroller --set m1=nan", "model ezyroller: parameter m1 = nan: expected a finite number" },
+    { "run ezyroller --set m1", "--set m1: expected NAME=VALUE" },
+    { "run ezyroller --set m1=", "--set m1=: \"\" is not a number" },
+    { "run ezyroller --set =1", "--set =1: expected NAME=VALUE" },
+    { "run ezyroller --start frame.z=1", "model ezyroller has no state \"frame.z\"; did you mean \"frame.x\"?" },
+    { "run ezyroller --start fram.x=1", "model ezyroller has no state \"fram.x\"; did you mean \"frame.x\"?" },
+    { "run ezyroller --start frame.x=inf", "model ezyroller: start frame.x = inf: expected a finite number" },
+    { "run ezyroller -o - --json -", "-o and --json cannot both write to standard output (-)" },
+    { "run ezyroller -o ''", "the name of a file to write is empty" },
+    { "run @/nothere.c", "cannot open the model file @/nothere.c: No such file or directory" },
+    { "run @/", "@/ is not a file" },
+    { "show", "something is missing; write pinwheel show MODEL [OPTION...]" },
+    { "show ezyroler", "there is no model \"ezyroler\"; did you mean \"ezyroller\"?" },
+    { "show ezyroller --at -1", "--at -1: expected a number >= 0" },
+    { "list foo", "there is no list of \"foo\"; did you mean \"models\"?" },
+    { "list a b", "\"b\" is too much; write pinwheel list [models|methods|kinds]" },
+    { "new", "something is missing; write pinwheel new NAME.c" },
+    { "new foo.x", "\"foo.x\": a model file's name is made of letters, digits, _ and -, and ends in .c" },
+    { "new 'a b.c'", "\"a b.c\": a model file's name is made of letters, digits, _ and -, and ends in .c" },
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    char line[200];
+    snprintf (line, sizeof line, "pinwheel %s", bad[i].line);
+    cli_bad (line, 2, bad[i].message);
+    assert_string_equal (cli_out, "");
+  }
+}
+
+/* Whatever cannot be written is said before the run starts. */
+static void test_unwritable (void **state) {
+  (void)state;
+  cli_bad ("pinwheel run ezyroller --t-end 1e9 -o @/no/x.csv", 1, "cannot write @/no/x.csv: No such file or directory");
+  cli_bad ("pinwheel run ezyroller --t-end 1e9 -o @", 1, "cannot write @: Is a directory");
+  cli_bad ("pinwheel run ezyroller --t-end 1e9 --json @/no/x.json", 1,
+           "cannot write @/no/x.json: No such file or directory");
+  cli_bad ("pinwheel run ezyroller --t-end 1e9 --plots @/out/plots", 1,
+           "cannot make the folder @/out/plots: Not a directory");
+  cli_bad ("pinwheel new @/no/mine.c", 1, "cannot write @/no/mine.c: No such file or directory");
+}
+
+static void test_full_disk (void **state) {
+  (void)state;
+  if (access ("/dev/full", W_OK) != 0) skip ();
+  cli_bad ("pinwheel run ezyroller --t-end 10 -o /dev/full", 1, "cannot write /dev/full: No space left on device");
+  cli_bad ("pinwheel list >/dev/full", 1, "cannot write to standard output: No space left on device");
+}
+
+/* ---- Models that are wrong ---- */
+
+#define CLI_MODEL(body)                                                                          \
+  "#include \"pinwheel.h\"\nstatic void build (pw_model *m, const void *p) {\n  (void)p;\n" body \
+  "}\nPW_MODEL (.about = \"wrong\", .build = build);\n"
+
+static void test_bad_models (void **state) {
+  (void)state;
+  cli_write (
+      "torn.c",
+      CLI_MODEL ("  pw_add_body (m, &(pw_body){ .name = \"rod\", .mass = 1, .inertia = 1, .start = { 1.5, 0, 0 } });\n"
+                 "  pw_add_pin (m, &(pw_pin){ .name = \"left\", .body = { \"rod\", \"ground\" }, .at = { { -0.5, 0 }, "
+                 "{ 0, 0 } } });\n"
+                 "  pw_add_pin (m, &(pw_pin){ .name = \"right\", .body = { \"rod\", \"ground\" }, .at = { { 0.5, 0 }, "
+                 "{ 3, 0 } } });\n"));
+  cli_bad ("pinwheel run @/torn.c --json @/torn.json", 3,
+           "model torn: the start cannot be made consistent: pin left is open by 1 m (or rad)");
+  assert_true (cli_says (cli_file ("torn.json"), "status", "start"));
+
+  cli_write ("lost.c", CLI_MODEL ("  pw_add_wheel (m, &(pw_wheel){ .name = \"A\", .body = \"frame\" });\n  pw_add_body "
+                                  "(m, &(pw_body){ .name = \"fram\" });\n"));
+  cli_bad ("pinwheel run @/lost.c", 2, "model lost: wheel A: there is no body \"frame\"; did you mean \"fram\"?");
+
+  cli_write ("none.c", "int nothing;\n");
+  assert_int_equal (cli_run ("pinwheel run @/none.c"), 2);
+  assert_non_null (strstr (cli_err, "is no Pinwheel model: a model file ends with PW_MODEL (...)"));
+
+  cli_write ("broken.c", "#include \"pinwheel.h\"\nnonsense;;\n");
+  assert_int_equal (cli_run ("pinwheel run @/broken.c"), 2);
+  assert_non_null (strstr (cli_err, "broken.c:2:")); /* the compiler's own words */
+  assert_non_null (strstr (cli_err, "pinwheel: "));
+
+  cli_write ("text.so", "this is no shared object\n");
+  assert_int_equal (cli_run ("pinwheel run @/text.so"), 2);
+  assert_int_equal (strncmp (cli_err, "pinwheel: cannot load ", 22), 0);
+}
+
+/* A name that two files could answer is refused with both paths. */
+static void test_found_twice (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("mkdir -p @/one @/two && cp ${BUILD:-build}/models/ezyroller.so @/one/twin.so && cp "
+                             "@/one/twin.so @/two/twin.so"),
+                    0);
+  assert_int_equal (cli_run ("PINWHEEL_MODELS=@/one:@/two pinwheel run twin"), 2);
+  char one[300], two[300];
+  cli_expand ("@/one/twin.so", one, sizeof one);
+  cli_expand ("@/two/twin.so", two, sizeof two);
+  assert_non_null (strstr (cli_err, one));
+  assert_non_null (strstr (cli_err, two));
+  cli_good ("PINWHEEL_MODELS=@/one pinwheel run twin --t-end 0.1 --json -");
+  assert_true (cli_says (cli_out, "model", "twin"));
+}
+
+/* ---- Runs that end early ---- */
+
+/* A step with which the method fails: the time reached and the reason, the rows so far in NAME.part, status 4. */
+static void test_failing_step (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run ezyroller --step 0.5 --set M0=1e9 -o @/fail.csv --json @/fail.json"), 4);
+  assert_int_equal (strncmp (cli_err, "pinwheel: t = ", 14), 0);
+  assert_non_null (strstr (cli_err, "the step of 0.5 s is too large"));
+  assert_non_null (strstr (cli_err, "fail.csv.part"));
+  assert_null (cli_file ("fail.csv"));
+  const char *part = cli_file ("fail.csv.part");
+  assert_non_null (part);
+  assert_true (strncmp (part, "t [s],", 6) == 0 && part[strlen (part) - 1] == '\n');
+  const char *json = cli_file ("fail.json");
+  assert_true (cli_says (json, "status", "method"));
+}
+
+static void test_interrupted (void **state) {
+  (void)state;
+  if (cli_run ("timeout --preserve-status 5 true") != 0) skip ();
+  const char *program = getenv ("PINWHEEL");
+  char command[1000];
+  snprintf (
+      command, sizeof command,
+      "timeout --preserve-status -s INT 0.3 '%s' run ezyroller --t-end 1e9 --every 1 -o @/stop.csv --json @/stop.json",
+      program ? program : "build/pinwheel");
+  assert_int_equal (cli_run (command), 130);
+  assert_non_null (strstr (cli_err, "interrupted at t = "));
+  assert_non_null (strstr (cli_err, "stop.csv.part"));
+  assert_null (cli_file ("stop.csv"));
+  assert_true (cli_says (cli_file ("stop.json"), "status", "interrupted"));
+  const char *part = cli_file ("stop.csv.part");
+  assert_true (part && part[strlen (part) - 1] == '\n');
+}
+
+/* A start that had to move says what moved, on standard error, and goes on. */
+static void test_moved (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run ezyroller --start frame.phi=0.3 --t-end 0.01 --json -"), 0);
+  assert_non_null (strstr (cli_err, "steer.x from "));
+  assert_null (strstr (cli_err, "frame.phi"));
+  assert_true (cli_says (cli_out, "status", "ok"));
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_bad_lines),   cmocka_unit_test (test_unwritable),  cmocka_unit_test (test_full_disk),
+    cmocka_unit_test (test_bad_models),  cmocka_unit_test (test_found_twice), cmocka_unit_test (test_failing_step),
+    cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}

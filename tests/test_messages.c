@@ -1,0 +1,172 @@
+/* What a description may not say, and what it is told then: every message of the core about bodies, elements, fields,
+ * signals and kinds. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "scene.h"
+#include "toys.h"
+
+static void messages_build (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 1 });
+  pw_add_body (m, &(pw_body){ .name = "steer", .mass = 1, .inertia = 1 });
+}
+
+static const pw_plugin_table messages_table = { .abi = PW_ABI, .size = sizeof messages_table, .build = messages_build };
+
+/* ---- What a model may not say ---- */
+
+static void messages_refused (pw_model *m, const char *text) {
+  pw_error error = { 0 };
+  assert_null (pw_compile (m, &error));
+  check_error (&error, PW_INPUT, text);
+  pw_model_free (m);
+}
+
+/* Adds something to a good model, and expects a message. */
+#define BAD(text, ...)                                 \
+  do {                                                 \
+    pw_model *m = scene_model (&messages_table, NULL); \
+    __VA_ARGS__;                                       \
+    messages_refused (m, "model scene" text);          \
+  } while (0)
+#define BODY(...) pw_add_body (m, &(pw_body){ __VA_ARGS__ })
+#define PIN(...) pw_add_pin (m, &(pw_pin){ __VA_ARGS__ })
+#define WHEEL(...) pw_add_wheel (m, &(pw_wheel){ __VA_ARGS__ })
+#define TORQUE(...) pw_add_torque (m, &(pw_torque){ .body = { "frame", "steer" }, __VA_ARGS__ })
+
+static void test_bad_names (void **state) {
+  (void)state;
+  BAD (": a body has no name", BODY (.mass = 1));
+  BAD (": a body has no name", BODY (.name = ""));
+  BAD (": a pin has no name", PIN (.body = { "frame", "steer" }));
+  BAD (": body \"ground\": this name is reserved for the ground", BODY (.name = "ground"));
+  BAD (": wheel \"ground\": this name is reserved for the ground", WHEEL (.name = "ground", .body = "frame"));
+  BAD (": body \"rear axle\": a name is made of letters, digits, _ and -", BODY (.name = "rear axle"));
+  BAD (": body \"a.b\": a name is made of letters, digits, _ and -", BODY (.name = "a.b"));
+  BAD (": two bodies are named \"steer\"", BODY (.name = "steer"));
+  BAD (": a body and a wheel are both named \"frame\"", WHEEL (.name = "frame", .body = "frame"));
+  BAD (": two elements are named \"A\"", WHEEL (.name = "A", .body = "frame"); WHEEL (.name = "A", .body = "steer"));
+}
+
+static void test_bad_bodies (void **state) {
+  (void)state;
+  BAD (": body x: mass = -1: expected a number >= 0", BODY (.name = "x", .mass = -1));
+  BAD (": body x: mass = nan: expected a finite number", BODY (.name = "x", .mass = NAN));
+  BAD (": body x: inertia = -0.5: expected a number >= 0", BODY (.name = "x", .inertia = -0.5));
+  BAD (": body x: start x = inf: expected a finite number", BODY (.name = "x", .start = { INFINITY, 0, 0 }));
+  BAD (": body x: start y = inf: expected a finite number", BODY (.name = "x", .start = { 0, INFINITY, 0 }));
+  BAD (": body x: start phi = inf: expected a finite number", BODY (.name = "x", .start = { 0, 0, INFINITY }));
+  BAD (": body x: rate vx = nan: expected a finite number", BODY (.name = "x", .rate = { NAN, 0, 0 }));
+  BAD (": body x: rate vy = nan: expected a finite number", BODY (.name = "x", .rate = { 0, NAN, 0 }));
+  BAD (": body x: rate omega = nan: expected a finite number", BODY (.name = "x", .rate = { 0, 0, NAN }));
+}
+
+static void test_bad_references (void **state) {
+  (void)state;
+  BAD (": pin B: there is no body \"ster\"; did you mean \"steer\"?", PIN (.name = "B", .body = { "frame", "ster" }));
+  BAD (": pin B: there is no body \"Ground\"; did you mean \"ground\"?",
+       PIN (.name = "B", .body = { "frame", "Ground" }));
+  BAD (": pin B: a body is missing; the ground is written \"ground\"", PIN (.name = "B", .body = { "frame" }));
+  BAD (": wheel A: a body is missing; the ground is written \"ground\"", WHEEL (.name = "A", .body = ""));
+  BAD (": pin B: both of its bodies are \"frame\"", PIN (.name = "B", .body = { "frame", "frame" }));
+  BAD (": pin B: both of its bodies are \"ground\"", PIN (.name = "B", .body = { "ground", "ground" }));
+  BAD (": wheel A: the ground does not move, so it cannot carry one", WHEEL (.name = "A", .body = "ground"));
+}
+
+static void test_bad_numbers (void **state) {
+  (void)state;
+  BAD (": pin B: at = nan: expected a finite number",
+       PIN (.name = "B", .body = { "frame", "steer" }, .at = { { 0, 0 }, { 0, NAN } }));
+  BAD (": wheel A: heading = inf: expected a finite number", WHEEL (.name = "A", .body = "frame", .heading = INFINITY));
+  BAD (": roller A: radius = 0: expected a number > 0",
+       pw_add (m, &toy_kind_roller, &(toy_roller){ .name = "A", .body = "frame" }));
+  BAD (": spring k: a length of 2 is too long", /* the kind's own check */
+       pw_add (m, &toy_kind_spring, &(toy_spring){ .name = "k", .body = { "frame", "steer" }, .length = 2 }));
+}
+
+static void test_bad_signals (void **state) {
+  (void)state;
+  BAD (": torque T: value: expected finite numbers in the signal", TORQUE (.name = "T", .value = { .constant = NAN }));
+  BAD (": torque T: value: expected finite numbers in the signal",
+       TORQUE (.name = "T", .value = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = INFINITY } }));
+  BAD (": torque T: value: a function signal without eval", TORQUE (.name = "T", .value = { .type = PW_FUNCTION }));
+  BAD (": torque T: value: signal type 9 does not exist", TORQUE (.name = "T", .value = { .type = (pw_signal_type)9 }));
+}
+
+/* ---- Signals that read states ---- */
+
+static int messages_eval (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t, (void)x, (void)gradient;
+  value[0] = 0;
+  return 0;
+}
+
+static const char *const messages_reads[] = { "stear.phi", NULL };
+
+#define READER                                                                 \
+  {                                                                            \
+    PW_FUNCTION, .function = {.eval = messages_eval, .reads = messages_reads } \
+  }
+
+static void test_bad_readers (void **state) {
+  (void)state;
+  BAD (": element T reads a state: model scene has no state \"stear.phi\"; did you mean \"steer.phi\"?",
+       TORQUE (.name = "T", .value = READER));
+  BAD (": drive D: angle: a constraint's signal may depend on time only",
+       pw_add (m, &toy_kind_drive, &(toy_drive){ .name = "D", .body = { "frame", "steer" }, .angle = READER }));
+}
+
+/* ---- Choices ---- */
+
+typedef struct {
+  const char *name;
+  const char *body;
+  int mode;
+} messages_chooser;
+
+static const char *const messages_modes[] = { "slow", "fast", NULL };
+static const pw_field messages_fields[] = {
+  { PW_AT (messages_chooser, body), PW_BODY, .about = "a body" },
+  { PW_AT (messages_chooser, mode), PW_CHOICE, .choices = messages_modes, .about = "a choice" },
+  { .name = NULL },
+};
+static const pw_kind messages_kind = {
+  .name = "chooser", .definition = sizeof (messages_chooser), .fields = messages_fields, .bodies = 1
+};
+
+static void test_bad_choices (void **state) {
+  (void)state;
+  BAD (": chooser c: mode = 2: expected 0 to 1", pw_add (m, &messages_kind, &(messages_chooser){ "c", "frame", 2 }));
+  BAD (": chooser c: mode = -1: expected 0 to 1", pw_add (m, &messages_kind, &(messages_chooser){ "c", "frame", -1 }));
+}
+
+/* ---- Kinds and models that do not fit ---- */
+
+static void test_bad_kinds (void **state) {
+  (void)state;
+  pw_kind kind = messages_kind;
+  kind.rows = 1; /* rows, but no constraint */
+  BAD (": kind chooser does not fit: at most 4 bodies, 4 own coordinates, 6 rows, 4 signals; rows if and only if it is "
+       "a constraint",
+       pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
+}
+
+static void messages_nothing (pw_model *m, const void *parameters) {
+  (void)m, (void)parameters;
+}
+
+static void test_no_body (void **state) {
+  (void)state;
+  pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = messages_nothing };
+  messages_refused (scene_model (&table, NULL), "model scene has no body");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_bad_names),   cmocka_unit_test (test_bad_bodies),  cmocka_unit_test (test_bad_references),
+    cmocka_unit_test (test_bad_numbers), cmocka_unit_test (test_bad_signals), cmocka_unit_test (test_bad_readers),
+    cmocka_unit_test (test_bad_choices), cmocka_unit_test (test_bad_kinds),   cmocka_unit_test (test_no_body),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

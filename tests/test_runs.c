@@ -1,0 +1,228 @@
+/* Runs on the way: failures and what is left of them, scenes without rows, looking back, stopping, restarting. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+#include "toys.h"
+
+/* ---- Failures on the way ---- */
+
+typedef struct {
+  double until;
+} runs_fuse;
+
+static int runs_burns (void *context, double t, const double *x, double value[3], double *gradient) {
+  const runs_fuse *f = context;
+  (void)x, (void)gradient;
+  value[0] = 0.1;
+  return t > f->until;
+}
+
+static pw_system *runs_fused (runs_fuse *fuse) {
+  pw_error error = { 0 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = runs_burns, .context = fuse } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  return scene_compile (m);
+}
+
+/* A signal that fails stops the run; the error tells the time reached, which the run is still at. */
+static void test_signal_fails (void **state) {
+  static const char *const method[] = { "rk4+projection", "rk4+none", "ida+ggl", "ida+baumgarte" };
+  (void)state;
+  for (int i = 0; i < 4; i++) {
+    runs_fuse fuse = { 0.5 };
+    pw_error error = { 0 };
+    pw_system *s = runs_fused (&fuse);
+    pw_run *r = runs_open (s, method[i], NULL);
+    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
+    double t = pw_time (r);
+    assert_true (t > 0.3 && t <= 0.5);
+    assert_non_null (strstr (error.text, "a signal failed"));
+    assert_int_equal (strncmp (error.text, "t = ", 4), 0);
+    check_close ("time in the message", strtod (error.text + 4, NULL), t, 1e-5, "six digits");
+    pw_sample sample;
+    error.status = PW_OK;
+    check_ok (pw_at (r, t, &sample, &error), &error);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+static void test_signal_fails_at_once (void **state) {
+  (void)state;
+  runs_fuse fuse = { -1 };
+  pw_error error = { 0 };
+  pw_system *s = runs_fused (&fuse);
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (&error, PW_METHOD, "t = 0 s: a signal failed");
+  pw_free (s);
+}
+
+/* A spring too stiff for the step. */
+static void runs_stiff (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "a", "b" } });
+  pw_add (m, &toy_kind_spring,
+          &(toy_spring){
+              .name = "k", .body = { "a", "ground" }, .at = { { 0.1, 0.2 }, { 0 } }, .stiffness = 1e9, .length = 1 });
+}
+
+static void test_too_large_a_step (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_stiff };
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.1 });
+  assert_int_equal (pw_advance_to (r, 100, 100, &error), PW_METHOD);
+  assert_non_null (strstr (error.text, "s: the step of 0.1 s is too large: the "));
+  assert_true (pw_time (r) < 100);
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- A body that nothing determines ---- */
+
+static void runs_loose (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "loose" });
+}
+
+static void test_massless (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_loose };
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (
+      &error, PW_INPUT,
+      "model scene: loose.x has no mass, and no constraint determines how it moves; give it mass, or constrain it");
+  pw_free (s);
+}
+
+/* ---- Scenes without some sort of rows, or all ---- */
+
+static void runs_free (pw_model *m, const void *parameters) {
+  const double *with = parameters;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 2, .inertia = 0.5, .rate = { with[1] > 0 ? 0 : 3, 0, 0 } });
+  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "disc", "ground" }, .value = { .constant = 0.25 } });
+  if (with[0] > 0) pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "disc", "ground" } });
+  if (with[1] > 0) pw_add_wheel (m, &(pw_wheel){ .name = "W", .body = "disc" });
+}
+
+/* A constant torque turns a disc that is free, pinned at its centre, or on a wheel there: phi = (T/I) t^2 / 2. */
+static void test_few_rows (void **state) {
+  static const pw_parameter list[] = { { .name = "pin" },
+                                       { .name = "wheel", .offset = sizeof (double) },
+                                       { .name = NULL } };
+  static const pw_plugin_table table = {
+    .abi = PW_ABI, .size = sizeof table, .parameters = list, .parameters_size = 2 * sizeof (double), .build = runs_free
+  };
+  (void)state;
+  for (int with = 0; with < 4; with++) {
+    pw_system *s = scene_system (&table, "pin", with & 1 ? 1.0 : 0.0, "wheel", with & 2 ? 1.0 : 0.0, NULL);
+    for (int i = 0; pw_methods[i]; i++)
+      for (const pw_stabilisation *t = pw_methods[i]->stabilisations; with != 3 && t->name; t++) {
+        char name[100];
+        snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, t->name);
+        pw_run *r = runs_open (s, name, &(pw_settings){ .step = 1e-2, .rtol = 1e-8, .span = 2, .ledger = 1 });
+        pw_sample now = runs_to (r, 2);
+        double bound = pw_methods[i]->adaptive ? 1e3 * 1e-8 : 1000 * CHECK_EPS;
+        const char *reason = pw_methods[i]->adaptive ? "1e3 rtol" : "exact for a parabola: round-off over 200 steps";
+        check_close ("angle", now.q[2], 0.25 / 0.5 * 2 * 2 / 2, bound, reason);
+        check_close ("x", now.q[0], with == 0 ? 3 * 2 : 0, bound, reason);
+        check_close ("work", now.work, 0.25 * now.q[2], bound, reason);
+        pw_close (r);
+      }
+    pw_free (s);
+  }
+}
+
+/* ---- Looking into a run ---- */
+
+static void test_outside (void **state) {
+  static const char *const method[] = { "rk4+projection", "ida+ggl" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    pw_sample sample;
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, method[i], NULL);
+    runs_to (r, 0.5);
+    assert_int_equal (pw_at (r, 0.1, &sample, &error), PW_INPUT);
+    assert_non_null (strstr (error.text, "lies outside the last step"));
+    error.status = PW_OK;
+    assert_int_equal (pw_at (r, 0.6, &sample, &error), PW_INPUT);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+/* A run does not pass t_end, and may be given a later one. */
+static void test_t_end (void **state) {
+  static const char *const method[] = { "rk4+projection", "ida+ggl" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.03 });
+    while (pw_time (r) < 0.1) check_ok (pw_advance (r, 0.1, &error), &error);
+    assert_true (pw_time (r) == 0.1);
+    check_ok (pw_advance (r, 0.1, &error), &error);
+    assert_true (pw_time (r) == 0.1);
+    runs_to (r, 0.25);
+    assert_true (pw_time (r) == 0.25);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+/* A restart from the state a run has reached goes on as if nothing had been; from another state it goes on from there. */
+static void test_restart (void **state) {
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "ida+ggl", "ida+baumgarte" };
+  (void)state;
+  for (int i = 0; i < 4; i++) {
+    pw_error error = { 0 };
+    double q[6], v[6];
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_settings settings = { .step = 1e-3, .rtol = 1e-9, .span = 2, .ledger = 1 };
+    runs_state (s, method[i], &settings, 2, q, v, NULL);
+    pw_run *r = runs_open (s, method[i], &settings);
+    runs_to (r, 1);
+    pw_statistics before = *pw_run_statistics (r);
+    check_ok (pw_restart (r, NULL, NULL, &error), &error);
+    pw_sample now = runs_to (r, 2);
+    const pw_statistics *cost = pw_run_statistics (r); /* counts from the beginning of the run */
+    assert_true (cost->steps > before.steps && cost->rhs > before.rhs && cost->rejected >= before.rejected);
+    double bound = i < 2 ? 1e-12 : 1e-5;
+    for (int j = 0; j < 6; j++)
+      check_close (method[i], now.q[j], q[j], bound, i < 2 ? "a step of the same size: round-off" : "1e4 rtol");
+    check_close ("balance", now.balance, 0, i < 2 ? 1e-10 : 1e-5, "the ledger goes on");
+    double moved[6];
+    for (int j = 0; j < 6; j++) moved[j] = now.q[j] + (j % 3 == 0 ? 10 : 0); /* both bodies 10 m to the side */
+    check_ok (pw_restart (r, moved, NULL, &error), &error);
+    now = runs_to (r, 2.5);
+    assert_true (now.q[0] > 9);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_signal_fails),
+    cmocka_unit_test (test_signal_fails_at_once),
+    cmocka_unit_test (test_too_large_a_step),
+    cmocka_unit_test (test_massless),
+    cmocka_unit_test (test_few_rows),
+    cmocka_unit_test (test_outside),
+    cmocka_unit_test (test_t_end),
+    cmocka_unit_test (test_restart),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
