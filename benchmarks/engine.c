@@ -185,20 +185,19 @@ typedef struct {
 } engine_growth;
 
 static void engine_grow (engine_report *r, const engine_growth *g) {
+  engine_cost *cost[ENGINE_SIZES];
   double ns[ENGINE_SIZES];
   int bodies[ENGINE_SIZES];
   for (int i = 0; i < g->count; i++) {
-    char what[80];
     pw_system *s = g->open (g->size[i]);
-    double *q = malloc (2 * (size_t)(s->coords + 3) * sizeof *q), *v = q + s->coords + 3;
-    if (q == NULL) engine_die (g->name, "out of memory");
-    memcpy (q, s->q0, (size_t)s->coords * sizeof *q);
-    memset (v, 0, (size_t)s->coords * sizeof *v);
     bodies[i] = s->bodies;
-    if (g->chain) engine_bend (s->bodies, g->free, q, v);
-    ns[i] = engine_cost (s, g->task, q, v);
-    free (q);
-    pw_free (s);
+    cost[i] = engine_cost_open (s, g->task, g->chain, g->free);
+  }
+  for (int k = 0; k < (g->task == ENGINE_IDA ? 5 : ENGINE_PAIRS); k++)
+    for (int i = 0; i < g->count; i++) engine_cost_take (cost[i]);
+  for (int i = 0; i < g->count; i++) {
+    char what[80];
+    ns[i] = engine_cost_close (cost[i]);
     snprintf (what, sizeof what, "%s, %d bodies: ns per body", g->name, bodies[i]);
     engine_put (r, &(engine_line){ what, "body", .ours = ns[i] });
   }
@@ -207,6 +206,7 @@ static void engine_grow (engine_report *r, const engine_growth *g) {
 
 static void engine_grow_all (engine_report *r) {
   static const engine_growth all[] = {
+    { "chain, evaluation", engine_chain, 0, 1, ENGINE_EVALUATION, 5, { 10, 100, 1000, 10000, 100000 }, 1 },
     { "chain, projection", engine_chain, 0, 1, ENGINE_PROJECTION, 5, { 10, 100, 1000, 10000, 100000 }, 1 },
     { "chain, step of ida+ggl", engine_chain, 0, 1, ENGINE_IDA, 4, { 10, 100, 1000, 10000 }, 1 },
     { "snake, evaluation", engine_snake, 1, 1, ENGINE_EVALUATION, 4, { 10, 100, 1000, 10000 }, 1 },
@@ -250,8 +250,7 @@ static void engine_machine (char *name, size_t size) {
 }
 
 static void engine_everything (engine_report *r) {
-  double chain_ns[ENGINE_SIZES], hand[3] = { 0 };
-  int chain_size[ENGINE_SIZES], chains = 0;
+  double hand[3] = { 0 };
   engine_title ("Against programs written by hand: ns per unit, instructions per unit");
   for (engine_case *c = engine_cases; c->key; c++) {
     if (!engine_wanted (r, c->key)) continue;
@@ -259,9 +258,7 @@ static void engine_everything (engine_report *r) {
     if (strcmp (c->key, "rhs") == 0) hand[0] = t.base;
     if (strcmp (c->key, "chain-1000") == 0) hand[1] = t.base;
     if (strcmp (c->key, "ida-6") == 0) hand[2] = t.base;
-    if (c->links > 0) chain_size[chains] = c->links, chain_ns[chains++] = t.ours;
   }
-  if (chains == ENGINE_SIZES) engine_growth_lines (r, "chain, evaluation", chain_size, chain_ns, chains, 1);
   if (r->only == NULL) {
     double pair = engine_time_pair ();
     engine_title ("The hand-written programs, in units of one sin and cos (base)");

@@ -59,24 +59,26 @@ void engine_close_chain (engine_case *c) {
 
 /* ---- How cost grows ---- */
 
-typedef struct {
+struct engine_cost {
+  engine_task task;
   pw_system *system;
   pw_run *run;
   pw_projector projector;
-  const double *q, *v;
-  double *q1, *v1, *lambda;
-  int steps; /* IDA */
-} cost_data;
+  double *q, *v, *q1, *v1, *lambda;
+  long batch;
+  double ns[TIMING_PAIRS_MAX]; /* per body */
+  int batches;
+};
 
 static long cost_evaluation (void *context, long n) {
-  cost_data *d = context;
+  engine_cost *d = context;
   for (long i = 0; i < n; i++) pw_accelerate (d->run, 0, d->q, d->v, d->q1, d->lambda);
   return n * d->system->bodies;
 }
 
 /* From a state whose bodies are off by up to 1e-8: positions, then rates. */
 static long cost_projection (void *context, long n) {
-  cost_data *d = context;
+  engine_cost *d = context;
   for (long i = 0; i < n; i++) {
     int row;
     double worst;
@@ -91,42 +93,57 @@ static long cost_projection (void *context, long n) {
   return n * d->system->bodies;
 }
 
-/* The first steps of a run; opening is not part of it. */
-static double cost_ida (cost_data *d) {
-  double ns[3];
+/* The first steps of a run; opening it is not part of the time. */
+static double cost_ida (engine_cost *d) {
+  const int steps = 40;
   pw_error error = { 0 };
-  for (int i = 0; i < 3; i++) {
-    pw_run *r = engine_open (d->system, "ida+ggl", &(pw_settings){ .span = 1, .rtol = 1e-6 });
-    double start = timing_now ();
-    for (int k = 0; k < d->steps; k++)
-      if (pw_advance (r, 10, &error) != PW_OK) engine_die ("ida+ggl", error.text);
-    ns[i] = 1e9 * (timing_now () - start) / d->steps / d->system->bodies;
-    pw_close (r);
-  }
-  return timing_median (ns, 3);
-}
-
-static double cost_take (cost_data *d, engine_task task) {
-  if (task == ENGINE_IDA) return cost_ida (d);
-  pw_error error = { 0 };
-  timing_work w = { task == ENGINE_EVALUATION ? cost_evaluation : cost_projection, d };
-  d->run = engine_open (d->system, "rk4+none", &(pw_settings){ .step = 1e-3, .span = 1 });
-  if (task == ENGINE_PROJECTION && pw_projector_open (&d->projector, d->run, d->system->metric, NULL, &error) != PW_OK)
-    engine_die ("projection", error.text);
-  double ns = timing_alone (&w, 9, 0.01);
-  if (task == ENGINE_PROJECTION) pw_projector_close (&d->projector);
-  pw_close (d->run);
+  pw_run *r = engine_open (d->system, "ida+ggl", &(pw_settings){ .span = 1, .rtol = 1e-6 });
+  double start = timing_now ();
+  for (int k = 0; k < steps; k++)
+    if (pw_advance (r, 10, &error) != PW_OK) engine_die ("ida+ggl", error.text);
+  double ns = 1e9 * (timing_now () - start) / steps / d->system->bodies;
+  pw_close (r);
   return ns;
 }
 
-double engine_cost (pw_system *s, engine_task task, const double *q, const double *v) {
+static timing_work cost_work (engine_cost *d) {
+  return (timing_work){ d->task == ENGINE_EVALUATION ? cost_evaluation : cost_projection, d };
+}
+
+static void cost_open_run (engine_cost *d) {
+  pw_error error = { 0 };
+  d->run = engine_open (d->system, "rk4+none", &(pw_settings){ .step = 1e-3, .span = 1 });
+  if (d->task == ENGINE_PROJECTION &&
+      pw_projector_open (&d->projector, d->run, d->system->metric, NULL, &error) != PW_OK)
+    engine_die ("projection", error.text);
+  timing_work w = cost_work (d);
+  d->batch = timing_calibrate (&w, 0.01);
+}
+
+engine_cost *engine_cost_open (pw_system *s, engine_task task, int bent, int free) {
   size_t n = (size_t)s->coords + 3;
-  cost_data d = { .system = s, .q = q, .v = v, .steps = 40 };
-  d.q1 = malloc ((2 * n + (size_t)s->rows) * sizeof *d.q1);
-  if (d.q1 == NULL) engine_die ("engine", "out of memory");
-  d.v1 = d.q1 + n;
-  d.lambda = d.v1 + n;
-  double ns = cost_take (&d, task);
-  free (d.q1);
+  engine_cost *d = calloc (1, sizeof *d);
+  if (d) *d = (engine_cost){ .task = task, .system = s, .q = calloc (4 * n + (size_t)s->rows, sizeof *d->q) };
+  if (d == NULL || d->q == NULL) engine_die ("engine", "out of memory");
+  d->v = d->q + n, d->q1 = d->v + n, d->v1 = d->q1 + n, d->lambda = d->v1 + n;
+  memcpy (d->q, s->q0, (size_t)s->coords * sizeof *d->q);
+  if (bent) engine_bend (s->bodies, free, d->q, d->v);
+  if (task != ENGINE_IDA) cost_open_run (d);
+  return d;
+}
+
+void engine_cost_take (engine_cost *d) {
+  timing_work w = cost_work (d);
+  if (d->batches < TIMING_PAIRS_MAX)
+    d->ns[d->batches++] = d->task == ENGINE_IDA ? cost_ida (d) : timing_batch (&w, d->batch);
+}
+
+double engine_cost_close (engine_cost *d) {
+  double ns = timing_median (d->ns, d->batches);
+  if (d->task == ENGINE_PROJECTION) pw_projector_close (&d->projector);
+  if (d->run) pw_close (d->run);
+  pw_free (d->system);
+  free (d->q);
+  free (d);
   return ns;
 }

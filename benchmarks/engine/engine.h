@@ -62,9 +62,13 @@ void engine_close_ida (engine_case *c);
 
 /* ---- How cost grows with size ---- */
 
-/* Ours alone, per body: an evaluation, a projection, a step of ida+ggl. */
+/* Ours alone, per body: an evaluation, a projection, a step of ida+ggl.  All sizes are open at once, and take a batch
+ * each in turn, so that they see the same machine. */
 typedef enum { ENGINE_EVALUATION, ENGINE_PROJECTION, ENGINE_IDA } engine_task;
-double engine_cost (pw_system *s, engine_task task, const double *q, const double *v);
+typedef struct engine_cost engine_cost;
+engine_cost *engine_cost_open (pw_system *s, engine_task task, int bent, int free); /* the system becomes its own */
+void engine_cost_take (engine_cost *c);                                             /* one batch */
+double engine_cost_close (engine_cost *c);                                          /* the median, per body [ns] */
 
 /* ---- Instructions ---- */
 
