@@ -130,6 +130,11 @@ char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size) {
 
 char *pw_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
   const pw_entry *x = &s->entry[entry];
-  snprintf (buffer, size, "%s.%s", s->slab[x->slab].name[x->element], x->type == PW_WORK ? "work" : "loss");
+  const pw_slab *k = &s->slab[x->slab];
+  const char *what = x->type == PW_WORK ? "work" : "loss";
+  if (k->kind->each_body)
+    snprintf (buffer, size, "%s.%s.%s", k->name[x->element], s->body_name[k->b.body[x->element]], what);
+  else
+    snprintf (buffer, size, "%s.%s", k->name[x->element], what);
   return buffer;
 }

@@ -55,7 +55,8 @@ typedef struct {
   double balance;       /* (kinetic + potential) - at the start - work + loss - projection [J] */
 } pw_sample;
 
-/* Entries of the ledger: the name of entry i is "rider.work" or "damper.loss". */
+/* Entries of the ledger: the name of entry i is "rider.work" or "damper.loss"; "drag.frame.loss" of an element that
+ * acts on every body. */
 int pw_count_ledger (const pw_system *s);
 char *pw_ledger_name (const pw_system *s, int entry, char *buffer, size_t size);
 

@@ -92,17 +92,101 @@ static void test_pendulum (void **state) {
   pw_free (s);
 }
 
+/* ---- A kind of one's own that acts on every body: drag, f = -c v on each centre of mass ---- */
+
+typedef struct {
+  const char *name;
+  double c; /* [N s/m] */
+} gravity_drag;
+
+static int gravity_drag_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+                                 pw_error *error) {
+  *(double *)element = ((const gravity_drag *)definition)->c;
+  (void)bodies, (void)own, (void)error;
+  return PW_OK;
+}
+
+static void gravity_drag_force (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    const pw_pose *A = &b->pose[b->body[e]];
+    double c = ((const double *)b->element)[e];
+    out[0] = -c * A->vx, out[1] = -c * A->vy, out[2] = 0;
+  }
+}
+
+static void gravity_drag_force_v (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 9)
+    for (int i = 0; i < 9; i++) out[i] = i == 0 || i == 4 ? -((const double *)b->element)[e] : 0;
+}
+
+static void gravity_drag_loss (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) {
+    const pw_pose *A = &b->pose[b->body[e]];
+    out[e] = ((const double *)b->element)[e] * (A->vx * A->vx + A->vy * A->vy);
+  }
+}
+
+static const pw_field gravity_drag_fields[] = {
+  { PW_AT (gravity_drag, c), PW_NUMBER, .unit = "N s/m", .domain = PW_NONNEGATIVE, .about = "force per speed" },
+  { .name = NULL },
+};
+
+static const pw_kind gravity_kind_drag = {
+  .name = "drag",
+  .about = "slows down every body",
+  .definition = sizeof (gravity_drag),
+  .element = sizeof (double),
+  .fields = gravity_drag_fields,
+  .bodies = 1,
+  .each_body = 1,
+  .level = PW_FORCE,
+  .prepare = gravity_drag_prepare,
+  .force = gravity_drag_force,
+  .force_v = gravity_drag_force_v,
+  .loss = gravity_drag_loss,
+};
+
+static void gravity_rain (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "drop", .mass = 0.5, .inertia = 1, .rate = { 2, 3 } });
+  pw_add_body (m, &(pw_body){ .name = "hail", .mass = 2, .inertia = 1 });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+  pw_add (m, &gravity_kind_drag, &(gravity_drag){ .name = "air", .c = 0.8 });
+}
+
+static const pw_plugin_table gravity_rain_table = TRIAL_TABLE (gravity_rain);
+
+/* Each falls at its own pace, v = m g / c (exp (-c t / m) - 1) from rest, and has a line of its own in the ledger. */
+static void test_each_body (void **state) {
+  (void)state;
+  static const double mass[] = { 0.5, 2 }, up[] = { 3, 0 };
+  static const char *const entry[] = { "air.drop.loss", "air.hail.loss" };
+  pw_system *s = scene_system (&gravity_rain_table, NULL);
+  pw_run *r = runs_open (s, "rk4", &(pw_settings){ .step = 1e-3, .ledger = 1 });
+  pw_sample x = runs_to (r, 1);
+  assert_int_equal (pw_count_ledger (s), 2);
+  for (int i = 0; i < 2; i++) {
+    char name[60];
+    double end = -mass[i] * 9.81 / 0.8;
+    check_close ("vy", x.v[3 * i + 1], end + (up[i] - end) * exp (-0.8 / mass[i]), 1e-11, "10 (h c / m)^4");
+    assert_string_equal (pw_ledger_name (s, i, name, sizeof name), entry[i]);
+    assert_true (x.ledger[i] > 0);
+  }
+  check_close ("balance", x.balance, 0, 1e-9, "1000 (h c / m)^4");
+  pw_close (r);
+  pw_free (s);
+}
+
 static void test_methods (void **state) {
   (void)state;
   trial (&gravity_pendulum_table, 3);
+  trial (&gravity_rain_table, 1);
 }
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_fall),
-    cmocka_unit_test (test_incline),
-    cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_methods),
+    cmocka_unit_test (test_fall),      cmocka_unit_test (test_incline), cmocka_unit_test (test_pendulum),
+    cmocka_unit_test (test_each_body), cmocka_unit_test (test_methods),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -73,7 +73,7 @@ static void list_field (const pw_field *f) {
   else
     snprintf (type, sizeof type, "%s", list_types[f->type]);
   if (f->unit) snprintf (type + strlen (type), sizeof type - strlen (type), " [%s]", f->unit);
-  printf ("      %-10s %-16s %s; ", f->name, type, f->about);
+  printf ("      %-12s %-17s %s; ", f->name, type, f->about);
   list_default (f);
   static const char *const domain[] = { "", "; >= 0", "; > 0", "; a whole number >= 1" };
   if (f->type == PW_NUMBER) printf ("%s", domain[f->domain]);
@@ -85,15 +85,16 @@ static void list_kind (const pw_kind *k) {
   static const char *const level[] = { "no constraint", "position constraint", "velocity constraint" };
   printf ("  %s: %s\n    %s", k->name, k->about, level[k->level]);
   if (k->rows) printf (", %d row%s per element", k->rows, k->rows == 1 ? "" : "s");
+  if (k->each_body) printf (", acts on every body that has mass");
   puts ("\n    fields");
   for (const pw_field *f = k->fields; f->name; f++) list_field (f);
   if (k->rows) puts ("    reactions");
   for (int i = 0; i < k->rows; i++)
-    printf ("      %-10s %-16s %s\n", k->reaction[i].name, k->reaction[i].unit, k->reaction[i].about);
-  if (k->own) puts ("    coordinates of its own, and their rates");
+    printf ("      %-12s %-17s %s\n", k->reaction[i].name, k->reaction[i].unit, k->reaction[i].about);
+  if (k->own) puts ("    coordinates of its own");
   for (int i = 0; i < k->own; i++)
-    printf ("      %s, %-10s %-8s %s\n", k->coordinate[i].name, k->coordinate[i].rate, k->coordinate[i].unit,
-            k->coordinate[i].about);
+    printf ("      %-12s %-17s %s; its rate: %s\n", k->coordinate[i].name, k->coordinate[i].unit,
+            k->coordinate[i].about, k->coordinate[i].rate);
 }
 
 static int list_kinds (pw_error *error) {

@@ -150,8 +150,7 @@ static const pw_field drive_fields[] = {
   { PW_AT (pw_drive, at), PW_POINT, .count = 2, .unit = "m",
     .about = "a point in each body's frame; without meaning for an angle" },
   { PW_AT (pw_drive, what), PW_CHOICE, .required = 1, .choices = drive_what,
-    .about = "what is prescribed: a coordinate of the first point from the second one, in the second body's frame, or "
-             "the angle from the second body to the first" },
+    .about = "from the second point to the first in the second body's frame, or from body to body" },
   { PW_AT (pw_drive, value), PW_SIGNAL, .unit = "m or rad", .required = 1,
     .about = "its value over time, with two derivatives" },
   { .name = NULL },

@@ -149,7 +149,7 @@ static const pw_quantity rolling_reaction[] = {
 };
 
 static const pw_quantity rolling_coordinate[] = {
-  { "spin", "rad", "spin_rate", "angle about the axle; grows as the wheel rolls along its heading" },
+  { "spin", "rad", "spin_rate", "angle about the axle, growing along the heading" },
 };
 
 const pw_kind pw_kind_rolling_wheel = {
