@@ -163,6 +163,7 @@ static void compile_layout (const compile *c, pw_layout *l, pw_system **system, 
   s->held = pw_take (l, 2 * coords, 1);
   s->scratch = pw_take (l, 3 * rows + coords + 3, sizeof *s->scratch);
   s->entry = pw_take (l, (size_t)c->size.entries, sizeof *s->entry);
+  s->force = pw_take (l, (size_t)c->size.slabs, sizeof *s->force);
   for (int i = 0; i < c->kinds; i++) compile_layout_slab (c, l, s->slab + i, i);
   pools->x = pw_take (l, 2 * (size_t)c->reads, sizeof (double));
   pools->state = pw_take (l, (size_t)c->reads, sizeof (int));
@@ -362,6 +363,11 @@ static int compile_fill (const compile *c, pw_system *s, compile_pools *pools, p
   compile_entries (s);
   s->scale = (pw_scale){ compile_length (c), 1 };
   compile_metric (s);
+  for (int i = 0; i < s->slabs; i++) {
+    const pw_kind *kind = s->slab[i].kind;
+    s->constraints += kind->rows > 0;
+    if (kind->force && !kind->constant) s->force[s->forces++] = i;
+  }
   pw_sweep_constant (s);
   return PW_OK;
 }

@@ -3,18 +3,36 @@
 #include <string.h>
 #include "system.h"
 
+/* The slabs with rows come first. */
+#define EACH_CONSTRAINT(k, s) for (pw_slab *k = (s)->slab, *end = k + (s)->constraints; k < end; k++)
+
 void pw_sweep_J (pw_system *s) {
-  for (pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++) k->kind->J (&k->b, k->J);
+  EACH_CONSTRAINT (k, s) k->kind->J (&k->b, k->J);
+}
+
+void pw_sweep_J_gamma (pw_system *s, double *gamma) {
+  EACH_CONSTRAINT (k, s) {
+    if (k->kind->J_gamma) {
+      k->kind->J_gamma (&k->b, k->J, gamma + k->row);
+      continue;
+    }
+    k->kind->J (&k->b, k->J);
+    if (k->kind->gamma)
+      k->kind->gamma (&k->b, gamma + k->row);
+    else
+      memset (gamma + k->row, 0, (size_t)(k->b.count * k->kind->rows) * sizeof *gamma);
+  }
 }
 
 /* One array over rows, filled by the same sweep of every kind; a kind without it leaves zeros. */
 static void evaluate_rows (pw_system *s, size_t sweep, int rows, double *out) {
-  for (pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0 && k->row < rows; k++) {
+  EACH_CONSTRAINT (k, s) {
+    if (k->row >= rows) break;
     pw_sweep *f = *(pw_sweep *const *)(const void *)((const char *)k->kind + sweep);
     if (f)
       f (&k->b, out + k->row);
     else
-      memset (out + k->row, 0, (size_t)(k->b.count * k->kind->rows) * sizeof *out);
+      for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) out[i] = 0;
   }
 }
 
@@ -35,25 +53,33 @@ void pw_sweep_gamma (pw_system *s, double *gamma) {
   evaluate_rows (s, offsetof (pw_kind, gamma), s->rows, gamma);
 }
 
+static inline void evaluate_add (double *to, const double *force) {
+  to[0] += force[0];
+  to[1] += force[1];
+  to[2] += force[2];
+}
+
 static void evaluate_add_force (pw_slab *k, double *f) {
   k->kind->force (&k->b, k->block);
   int bodies = k->kind->bodies, own = k->kind->own;
   const double *block = k->block;
-  for (int e = 0; e < k->b.count; e++) {
-    for (int n = 0; n < bodies; n++, block += 3) {
-      double *to = f + k->column[e * bodies + n];
-      to[0] += block[0];
-      to[1] += block[1];
-      to[2] += block[2];
+  const int *column = k->column;
+  if (bodies == 2 && own == 0) {
+    for (int e = 0; e < k->b.count; e++, block += 6, column += 2) {
+      evaluate_add (f + column[0], block);
+      evaluate_add (f + column[1], block + 3);
     }
+    return;
+  }
+  for (int e = 0; e < k->b.count; e++) {
+    for (int n = 0; n < bodies; n++, block += 3) evaluate_add (f + *column++, block);
     for (int n = 0; n < own; n++) f[k->own + e * own + n] += *block++;
   }
 }
 
 void pw_sweep_force (pw_system *s, double *f) {
-  memcpy (f, s->constant, (size_t)s->coords * sizeof *f);
-  for (int i = 0; i < s->slabs; i++)
-    if (s->slab[i].kind->force && !s->slab[i].kind->constant) evaluate_add_force (&s->slab[i], f);
+  for (int j = 0; j < s->coords; j++) f[j] = s->constant[j];
+  for (int i = 0; i < s->forces; i++) evaluate_add_force (&s->slab[s->force[i]], f);
 }
 
 void pw_sweep_constant (pw_system *s) {
@@ -109,7 +135,7 @@ void pw_sweep_ledger (pw_system *s, const double *lambda, double *rate) {
 }
 
 void pw_mul_J (const pw_system *s, const double *w, double *out) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
     const double *J = k->J;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++) {
@@ -125,7 +151,7 @@ void pw_mul_J (const pw_system *s, const double *w, double *out) {
 }
 
 void pw_add_JT (const pw_system *s, const double *lambda, double *out) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
     const double *J = k->J;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++, lambda++) {
@@ -142,7 +168,7 @@ void pw_add_JT (const pw_system *s, const double *lambda, double *out) {
 
 /* (J v)_i and the sum of |J_ij v_j|, row by row, for the placed rates. */
 static void evaluate_speeds (const pw_system *s, double *jv, double *size) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
     const double *J = k->J;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++) {

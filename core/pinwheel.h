@@ -338,8 +338,8 @@ struct pw_kind {
   pw_sweep *g;       /* rows: residual of holonomic rows */
   pw_sweep *g_size;  /* rows: sum of the absolute values of the terms of g, against which g is judged */
   pw_sweep *eta;     /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
-  pw_sweep *J;       /* rows x cols */
-  pw_sweep *gamma;   /* rows: right-hand side of J a = gamma */
+  pw_sweep *J;       /* rows x cols */  pw_sweep *gamma;   /* rows: right-hand side of J a = gamma */
+  void (*J_gamma) (const pw_batch *b, double *J, double *gamma); /* both at once, where that is faster; may be NULL */
   pw_sweep *force;   /* cols: generalised force */
   pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
   pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch */

@@ -3,27 +3,36 @@
 #include "model.h"
 #include "signal.h"
 
-static void place_positions (pw_system *s, const double *q) {
-  for (int b = 0; b < s->bodies; b++) {
-    pw_pose *p = &s->pose[b];
-    double phi = q[3 * b + 2];
-    p->x = q[3 * b];
-    p->y = q[3 * b + 1];
-    p->phi = phi;
-    p->cos = cos (phi);
-    p->sin = sin (phi);
+/* Own coordinates are read where the caller has them. */
+static void place_own (pw_system *s, const double *q, const double *v) {
+  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    if (q) k->b.q = q + k->own;
+    k->b.v = v + k->own;
   }
-  for (int k = 0; k < s->slabs; k++) s->slab[k].b.q = q + s->slab[k].own;
 }
 
 void pw_place_rates (pw_system *s, const double *v) {
-  for (int b = 0; b < s->bodies; b++) {
-    pw_pose *p = &s->pose[b];
-    p->vx = v[3 * b];
-    p->vy = v[3 * b + 1];
-    p->omega = v[3 * b + 2];
+  for (pw_pose *p = s->pose, *end = p + s->bodies; p < end; p++, v += 3) {
+    p->vx = v[0];
+    p->vy = v[1];
+    p->omega = v[2];
   }
-  for (int k = 0; k < s->slabs; k++) s->slab[k].b.v = v + s->slab[k].own;
+  if (s->coords > 3 * s->bodies) place_own (s, NULL, v - 3 * s->bodies);
+}
+
+static void place_poses (pw_system *s, const double *q, const double *v) {
+  if (s->coords > 3 * s->bodies) place_own (s, q, v);
+  for (pw_pose *p = s->pose, *end = p + s->bodies; p < end; p++, q += 3, v += 3) {
+    double phi = q[2];
+    p->x = q[0];
+    p->y = q[1];
+    p->phi = phi;
+    p->cos = cos (phi);
+    p->sin = sin (phi);
+    p->vx = v[0];
+    p->vy = v[1];
+    p->omega = v[2];
+  }
 }
 
 /* Evaluates the signals of a slab; `readers` picks those that read states, else those of time alone. */
@@ -58,9 +67,8 @@ static int place_signals (pw_system *s, double t, const double *q, const double 
 }
 
 int pw_place (pw_system *s, double t, const double *q, const double *v) {
-  place_positions (s, q);
-  pw_place_rates (s, v);
-  return place_signals (s, t, q, v);
+  place_poses (s, q, v);
+  return t == s->t_signal && s->readers == 0 ? PW_OK : place_signals (s, t, q, v);
 }
 
 void pw_hold (pw_system *s, int hold) {

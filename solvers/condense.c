@@ -4,6 +4,8 @@
 #include "condense.h"
 #include "util.h"
 
+enum { CONDENSE_SMALL_COORDS = 36 }; /* beyond, rows rarely share a body and S is better kept sparse */
+
 /* Columns of a node. */
 typedef struct {
   const double *J;
@@ -25,6 +27,7 @@ typedef struct {
   int nodes, pieces;
   int *start, *list;   /* pieces by coordinate: list[start[j]] .. list[start[j + 1]] */
   long terms;
+  int panels;          /* of a small scene */
 } condense;
 
 /* ---- Nodes ---- */
@@ -188,8 +191,12 @@ static void condense_take (condense *c, pw_layout *l) {
   k->piece = pw_take (l, (size_t)k->pieces, sizeof *k->piece);
   k->wide_piece = pw_take (l, (size_t)k->wide_pieces, sizeof *k->wide_piece);
   k->extra = pw_take (l, (size_t)k->extras, sizeof *k->extra);
-  k->idle = pw_take (l, (size_t)k->idles, sizeof *k->idle);
-  k->row_of_node = pw_take (l, (size_t)c->nodes, sizeof *k->row_of_node);
+  k->idle = pw_take (l, (size_t)k->idles, sizeof *k->idle);  k->row_of_node = pw_take (l, (size_t)c->nodes, sizeof *k->row_of_node);
+  pw_small *small = pw_take (l, c->panels > 0, sizeof *small);
+  pw_panel *panel = pw_take (l, (size_t)c->panels, sizeof *panel);
+  if (l->base == NULL || c->panels == 0) return;
+  *small = (pw_small){ .n = k->unknowns, .panels = c->panels, .panel = panel, .inverse = k->inverse };
+  k->small = small;
 }
 
 static void condense_count (condense *c, int rows, const unsigned char *active, condense_filling *count) {
@@ -206,8 +213,10 @@ static void condense_count (condense *c, int rows, const unsigned char *active, 
   for (int n = 0; n < c->nodes; n++) {
     k->unknowns += c->node[n].size;
     k->extras += c->node[n].row < 0;
-  }
-  for (int i = 0; i < rows; i++) k->idles += active && !active[i];
+  }  for (int i = 0; i < rows; i++) k->idles += active && !active[i];
+  if (k->unknowns > PW_SMALL || k->s->coords > CONDENSE_SMALL_COORDS) return;
+  c->panels = k->s->bodies + k->s->coords - 3 * k->s->bodies;
+  k->first[PW_TERM_SHAPES] = k->wides = k->pieces = k->pieces1 = k->wide_pieces = 0;
 }
 
 static void condense_fill_pieces (condense *c) {
@@ -236,6 +245,33 @@ static void condense_fill_rows (condense *c, int rows, const unsigned char *acti
     if (active && !active[i]) k->idle[idle++] = i;
 }
 
+/* A row of a panel, in its place by position. */
+static void condense_panel_row (pw_panel *p, const double *J, int y) {
+  int i = p->rows++;
+  for (; i > 0 && p->y[i - 1] > y; i--) {
+    p->y[i] = p->y[i - 1];
+    p->J[i] = p->J[i - 1];
+  }
+  p->y[i] = y;
+  p->J[i] = J;
+}
+
+static void condense_fill_panels (condense *c) {
+  struct pw_saddle *k = c->k;
+  int bodies = k->s->bodies;
+  for (int n = 0; n < c->panels; n++) {
+    pw_panel *p = &k->small->panel[n];
+    int j = n < bodies ? 3 * n : n + 2 * bodies;
+    *p = (pw_panel){ .j = j, .width = n < bodies ? 3 : 1 };
+    for (int x = c->start[j]; x < c->start[j + 1]; x++) {
+      const condense_piece *piece = &c->piece[c->list[x]];
+      int node = c->node_of[c->list[x]];
+      for (int r = 0; r < c->node[node].size; r++) condense_panel_row (p, piece->J + r * piece->step, pw_ldl_position (k->ldl, node) + r);
+    }
+    p->shape = p->width == 3 && p->rows <= 4 ? p->rows : 0;
+  }
+}
+
 static int condense_lay_out (condense *c, int rows, const unsigned char *active) {
   struct pw_saddle *k = c->k;
   condense_filling count = { 0 }, fill = { .fill = 1 };
@@ -245,12 +281,15 @@ static int condense_lay_out (condense *c, int rows, const unsigned char *active)
   k->memory = malloc (l.used + 1);
   if (k->memory == NULL) return PW_MACHINE;
   l = (pw_layout){ k->memory, 0 };
-  condense_take (c, &l);
+  condense_take (c, &l);  condense_fill_rows (c, rows, active);
+  if (c->panels > 0) {
+    condense_fill_panels (c);
+    return PW_OK;
+  }
   memcpy (fill.next, k->first, sizeof fill.next);
   condense_each_pair (c, condense_put_term, &fill);
   condense_fill_pieces (c);
-  condense_fill_rows (c, rows, active);
-  return PW_OK;
+return PW_OK;
 }
 
 /* ---- */

@@ -8,7 +8,9 @@
 #define PW_CONDENSE_H
 
 #include "ldl.h"
+
 #include "reduce.h"
+#include "small.h"
 
 /* Rows of A, rows of B; D: a node with itself, where the lower triangle is enough. */
 typedef enum { PW_TERM_D1, PW_TERM_D2, PW_TERM_11, PW_TERM_12, PW_TERM_21, PW_TERM_22, PW_TERM_SHAPES } pw_term_shape;
@@ -64,7 +66,7 @@ struct pw_saddle {
   int wide_pieces;
   int *row_of;              /* unknowns: row, or -1 for an extra */
   pw_extra *extra;
-  int extras;
+  int extras;  pw_small *small;          /* a small scene: used instead of ldl, terms and pieces; else NULL */
   int *idle;                /* rows that take no part */
   int idles;
   int *row_of_node;         /* first row of a node, or -1 */

@@ -17,23 +17,28 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * other[i];
 }
 
-void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda) {
-  double *f = r->scratch, *gamma = f + r->s->coords + 3;
-  pw_sweep_gamma (r->s, gamma);
+/* Stabilises gamma and sums the forces at the placed pose. */
+static inline void dynamics_right (pw_run *r, const double *v, double *f, double *gamma) {
   if (r->alpha != 0 || r->beta != 0) dynamics_stabilise (r, v, gamma);
   pw_sweep_force (r->s, f);
-  pw_saddle_solve (r->saddle, f, gamma, a, lambda);
   r->statistics.rhs++;
 }
 
+void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda) {
+  double *f = r->scratch, *gamma = f + r->s->coords + 3;
+  pw_sweep_gamma (r->s, gamma);
+  dynamics_right (r, v, f, gamma);
+  pw_saddle_solve (r->saddle, f, gamma, a, lambda);
+}
+
 int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
+  double *f = r->scratch, *gamma = f + r->s->coords + 3;
   int status = pw_place (r->s, t, q, v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->s);
-  status = pw_saddle_factor (r->saddle);
+  pw_sweep_J_gamma (r->s, gamma);
+  dynamics_right (r, v, f, gamma);
   r->statistics.factorisations++;
-  if (status == PW_OK) pw_accelerate_placed (r, v, a, lambda);
-  return status;
+  return pw_saddle_factor_solve (r->saddle, f, gamma, a, lambda);
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {

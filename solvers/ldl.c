@@ -9,14 +9,11 @@
 #include <math.h>
 #include <amd.h>
 #include "ldl.h"
-#include "ldl_small.h"
 #include "util.h"
 
 struct pw_ldl {
   int nodes, unknowns;
-  size_t count;     /* of values */  int small; /* 1: dense, unknowns x unknowns, in the same order */
-  int node_at[PW_LDL_SMALL]; /* small: the node of each unknown */
-  int *order;        /* node at each place in the order */
+  size_t count;     /* of values */  int *order;        /* node at each place in the order */
   int *place;       /* place of each node */
   int *size;        /* unknowns of the node at each place */
   int *position;    /* first unknown of the node at each place */
@@ -174,8 +171,7 @@ static int ldl_lay_out (pw_ldl *l, const int *size, const int *order, const ldl_
     unknowns += (size_t)k;
     values += (size_t)(k * k);
     for (int i = L->first[j]; i < L->first[j + 1]; i++) values += (size_t)(k * size[order[L->list[i]]]);
-  }  if (unknowns <= PW_LDL_SMALL) values = values > PW_LDL_SMALL * PW_LDL_SMALL ? values : PW_LDL_SMALL * PW_LDL_SMALL;
-  pw_layout lay = { NULL, 0 };
+  }  pw_layout lay = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
     l->order = pw_take (&lay, n, sizeof (int));
     l->place = pw_take (&lay, n, sizeof (int));
@@ -203,11 +199,6 @@ static int ldl_lay_out (pw_ldl *l, const int *size, const int *order, const ldl_
     l->position[j] = l->unknowns;
     l->unknowns += l->size[j];
   }  ldl_place_blocks (l);
-  l->small = l->unknowns <= PW_LDL_SMALL;
-  if (!l->small) return PW_OK;
-  l->count = (size_t)(l->unknowns * l->unknowns);
-  for (int j = 0; j < l->nodes; j++)
-    for (int i = 0; i < l->size[j]; i++) l->node_at[l->position[j] + i] = l->order[j];
   return PW_OK;
 }
 
@@ -251,7 +242,6 @@ pw_ldl_place pw_ldl_block (const pw_ldl *l, int i, int j) {
     p = q;
     q = swap;
   }
-  if (l->small) return (pw_ldl_place){ l->position[p] * l->unknowns + l->position[q], l->unknowns, transposed };
   return (pw_ldl_place){ (int)ldl_find (l, p, q), l->size[q], transposed };
 }
 int pw_ldl_position (const pw_ldl *l, int i) {
@@ -357,12 +347,6 @@ static void ldl_keep_diagonal (pw_ldl *l) {
 
 double pw_ldl_factor (pw_ldl *l, int *node) {  double worst = INFINITY;
   const size_t *target = l->target;
-  if (l->small) {
-    int place;
-    worst = pw_ldl_small_factor (l->value, l->unknowns, &place);
-    *node = place >= 0 ? l->node_at[place] : -1;
-    return worst;
-  }
   ldl_keep_diagonal (l);
 *node = -1;
   for (int j = 0; j < l->nodes; j++) {
@@ -427,10 +411,6 @@ static inline void ldl_backward_column (const pw_ldl *l, double *y, int j, int k
 }
 
 void pw_ldl_solve (const pw_ldl *l, double *y) {
-  if (l->small) {
-    pw_ldl_small_solve (l->value, l->unknowns, y);
-    return;
-  }
 for (int j = 0; j < l->nodes; j++) {
     int k = l->size[j];
     if (k == 2)

@@ -1,5 +1,5 @@
 /* Block LDL^T of a symmetric positive definite matrix whose pattern is fixed: nodes of 1 to 3 unknowns, ordered and
- * laid out once, factorised and solved many times without allocating.  Small ones are dense. */
+ * laid out once, factorised and solved many times without allocating. */
 #ifndef PW_LDL_H
 #define PW_LDL_H
 

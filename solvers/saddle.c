@@ -100,20 +100,38 @@ static void saddle_assemble_wide (pw_saddle *k) {
       }
 }
 
-/* A row whose coordinates are all held, or all belong to the ground, leaves an empty diagonal: singular. */
-int pw_saddle_factor (pw_saddle *k) {
-  int node;
+/* Takes over the smallest pivot of the rows.  A row whose coordinates are all held, or all belong to the ground, leaves an empty
+ * diagonal: singular. */
+static int saddle_judge (pw_saddle *k, double pivot, int row) {
+  if (!(pivot >= k->pivot)) {
+    k->pivot = pivot;
+    k->pivot_row = row;
+  }
+  return k->pivot > 1e-28 ? PW_OK : PW_RETRY;
+}
+
+static int saddle_judge_small (pw_saddle *k) {
+  return saddle_judge (k, k->small->pivot, k->small->place < 0 ? -1 : k->row_of[k->small->place]);
+}
+
+/* Eliminates the coordinates without weight. */
+static inline void saddle_begin (pw_saddle *k) {
   k->pivot_row = -1;
   k->pivot = k->reduce.components ? pw_reduce_factor (&k->reduce) : INFINITY;
+}
+
+int pw_saddle_factor (pw_saddle *k) {
+  int node;
+  saddle_begin (k);
+  if (k->small) {
+    pw_small_factor (k->small);
+    return saddle_judge_small (k);
+  }
   for (size_t i = 0; i < k->values; i++) k->value[i] = 0;
   saddle_assemble_short (k);
   if (k->wides) saddle_assemble_wide (k);
   double pivot = pw_ldl_factor (k->ldl, &node);
-  if (!(pivot >= k->pivot)) {
-    k->pivot = pivot;
-    k->pivot_row = node >= 0 ? k->row_of_node[node] : -1;
-  }
-  return k->pivot > 1e-28 ? PW_OK : PW_RETRY;
+  return saddle_judge (k, pivot, node >= 0 ? k->row_of_node[node] : -1);
 }
 
 double pw_saddle_pivot (const pw_saddle *k, int *row) {
@@ -123,16 +141,23 @@ double pw_saddle_pivot (const pw_saddle *k, int *row) {
 
 /* ---- Solving ---- */
 
-/* y = J W^-1 f - gamma */
-static void saddle_gather (pw_saddle *k, const double *gamma) {
+/* y = -gamma, in the order of positions */
+static inline void saddle_right (pw_saddle *k, const double *gamma) {
   double *y = k->y;
-  const double *z = k->z;
-  if (k->extras) {
-    for (int i = 0; i < k->unknowns; i++)
-      if (k->row_of[i] >= 0) y[i] = -gamma[k->row_of[i]];
-    for (const pw_extra *x = k->extra; x < k->extra + k->extras; x++) y[x->y] = -*x->gamma;
-  } else
-    for (int i = 0; i < k->unknowns; i++) y[i] = -gamma[k->row_of[i]];
+  const int *row = k->row_of;
+  if (k->extras == 0) {
+    for (int i = 0; i < k->unknowns; i++) y[i] = -gamma[row[i]];
+    return;
+  }
+  for (int i = 0; i < k->unknowns; i++)
+    if (row[i] >= 0) y[i] = -gamma[row[i]];
+  for (const pw_extra *x = k->extra; x < k->extra + k->extras; x++) y[x->y] = -*x->gamma;
+}
+
+/* y += J W^-1 f */
+static void saddle_gather (pw_saddle *k, const double *force) {
+  double *y = k->y, *z = k->z;
+  for (int j = 0; j < k->s->coords; j++) z[j] = k->inverse[j] * force[j];
   const pw_piece *p = k->piece;
   for (; p < k->piece + k->pieces1; p++) {
     const double *J = k->base + p->J, *f = z + p->j;
@@ -148,10 +173,9 @@ static void saddle_gather (pw_saddle *k, const double *gamma) {
       for (int n = 0; n < w->width; n++) y[w->y + x] += w->J[x * w->step + n] * z[w->j + n];
 }
 
-/* f -= J^T lambda, and lambda out of y */
-static void saddle_scatter (pw_saddle *k, double *lambda) {
+/* f -= J^T y, a = W^-1 f */
+static void saddle_scatter (pw_saddle *k, double *force, double *a) {
   const double *y = k->y;
-  double *force = k->force;
   const pw_piece *p = k->piece;
   for (; p < k->piece + k->pieces1; p++) {
     const double *J = k->base + p->J, l = y[p->y];
@@ -170,28 +194,61 @@ static void saddle_scatter (pw_saddle *k, double *lambda) {
   for (const pw_wide_piece *w = k->wide_piece; w < k->wide_piece + k->wide_pieces; w++)
     for (int x = 0; x < w->size; x++)
       for (int n = 0; n < w->width; n++) force[w->j + n] -= w->J[x * w->step + n] * y[w->y + x];
-  if (k->extras) {
+  for (int j = 0; j < k->s->coords; j++) a[j] = k->inverse[j] * force[j];
+}
+
+/* lambda out of y */
+static inline void saddle_left (pw_saddle *k, double *lambda) {
+  const double *y = k->y;
+  const int *row = k->row_of;
+  if (k->extras == 0)
+    for (int i = 0; i < k->unknowns; i++) lambda[row[i]] = y[i];
+  else {
     for (int i = 0; i < k->unknowns; i++)
-      if (k->row_of[i] >= 0) lambda[k->row_of[i]] = y[i];
+      if (row[i] >= 0) lambda[row[i]] = y[i];
     for (const pw_extra *x = k->extra; x < k->extra + k->extras; x++) *x->lambda = y[x->y];
-  } else
-    for (int i = 0; i < k->unknowns; i++) lambda[k->row_of[i]] = y[i];
+  }
   for (int i = 0; i < k->idles; i++) lambda[k->idle[i]] = 0;
 }
 
-void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
-  int coords = k->s->coords;
-  double *force = k->force, *z = k->z;
-  const double *inverse = k->inverse;  if (f && !k->reduce.components)
-    for (int j = 0; j < coords; j++) z[j] = inverse[j] * (force[j] = f[j]);
-  else {
-    for (int j = 0; j < coords; j++) force[j] = f ? f[j] : 0;
-    if (k->reduce.components) pw_reduce_forward (&k->reduce, gamma, force);
-    for (int j = 0; j < coords; j++) z[j] = inverse[j] * force[j];
-  }
-saddle_gather (k, gamma);
-  pw_ldl_solve (k->ldl, k->y);
-  saddle_scatter (k, lambda);
-  for (int j = 0; j < coords; j++) a[j] = inverse[j] * force[j];
+/* The force to work on: a copy where it is going to be changed. */
+static inline const double *saddle_force (pw_saddle *k, const double *f, const double *gamma) {
+  if (k->small && k->reduce.components == 0) return f;
+  for (int j = 0; j < k->s->coords; j++) k->force[j] = f ? f[j] : 0;
+  if (k->reduce.components) pw_reduce_forward (&k->reduce, gamma, k->force);
+  return k->force;
+}
+
+static inline void saddle_finish (pw_saddle *k, double *a, double *lambda) {
+  saddle_left (k, lambda);
   if (k->reduce.components) pw_reduce_backward (&k->reduce, a, lambda);
+}
+
+void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
+  const double *force = saddle_force (k, f, gamma);
+  saddle_right (k, gamma);
+  if (k->small)
+    pw_small_solve (k->small, force, k->y, a);
+  else {
+    saddle_gather (k, force);
+    pw_ldl_solve (k->ldl, k->y);
+    saddle_scatter (k, k->force, a);
+  }
+  saddle_finish (k, a, lambda);
+}
+
+int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
+  int status;
+  if (k->small == NULL) {
+    status = pw_saddle_factor (k);
+    if (status == PW_OK) pw_saddle_solve (k, f, gamma, a, lambda);
+    return status;
+  }
+  saddle_begin (k);
+  const double *force = saddle_force (k, f, gamma);
+  saddle_right (k, gamma);
+  pw_small_both (k->small, force, k->y, a);
+  status = saddle_judge_small (k);
+  if (status == PW_OK) saddle_finish (k, a, lambda);
+  return status;
 }

@@ -23,6 +23,9 @@ int pw_saddle_factor (pw_saddle *k);
 /* Solves for a (coords) and lambda (rows; inactive ones get 0).  f may be NULL: zero.  a and f may be the same. */
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
+/* Both; in small scenes faster than one after the other. */
+int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
+
 /* The smallest pivot of the last factorisation, as the sine of the angle between a row and those before it, and that
  * row: small near a singular pose. */
 double pw_saddle_pivot (const pw_saddle *k, int *row);
