@@ -95,7 +95,7 @@ static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
   for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, plots_body_name (p, i), i);
   for (int i = 0; i < m->elements; i++) {
     const pw_element *e = &m->element[i];
-    for (int n = 0; n < e->kind->bodies; n++) {
+    for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
       const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
       const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);
       int b = pw_names_find (&shown, body);
