@@ -108,7 +108,7 @@ static void test_bad_models (void **state) {
   assert_int_equal (cli_run ("pinwheel run @/none.c"), 2);
   assert_non_null (strstr (cli_err, "is no Pinwheel model: a model file ends with PW_MODEL (...)"));
 
-  cli_write ("broken.c", "#include \"pinwheel.h\"\nnonsense;;\n");
+  cli_write ("broken.c", "#include \"pinwheel.h\"\nnonsense (;\n");
   assert_int_equal (cli_run ("pinwheel run @/broken.c"), 2);
   assert_non_null (strstr (cli_err, "broken.c:2:")); /* the compiler's own words */
   assert_non_null (strstr (cli_err, "pinwheel: "));
@@ -116,6 +116,60 @@ static void test_bad_models (void **state) {
   cli_write ("text.so", "this is no shared object\n");
   assert_int_equal (cli_run ("pinwheel run @/text.so"), 2);
   assert_int_equal (strncmp (cli_err, "pinwheel: cannot load ", 22), 0);
+}
+
+/* Tables that do not hold together are refused before they are used. */
+static void test_bad_tables (void **state) {
+  static const char model[] = "#include \"pinwheel.h\"\n"
+                              "typedef struct { double a; } numbers;\n"
+                              "static const pw_parameter list[] = { { PW_AT (numbers, a), VALUE, \"m\", \"a\", "
+                              "PW_POSITIVE }, { .name = NULL } };\n"
+                              "static void build (pw_model *m, const void *p) { (void)p; pw_add_body (m, &(pw_body){ "
+                              ".name = \"b\", .mass = 1, .inertia = 1 }); }\n"
+                              "static void (*const unused) (pw_model *, const void *) = build;\n"
+                              "const pw_plugin_table pw_plugin = { .abi = ABI, .size = sizeof (pw_plugin_table), "
+                              ".parameters = list, .parameters_size = SIZE, .build = BUILD };\n"
+                              "const void *pw_used (void);\nconst void *pw_used (void) { return &unused; }\n";
+  static const struct {
+    const char *defines, *message;
+  } bad[] = {
+    { "#define ABI 77\n#define VALUE 1\n#define SIZE sizeof (numbers)\n#define BUILD build\n",
+      "was compiled for another Pinwheel (ABI 77, this one has " },
+    { "#define ABI PW_ABI\n#define VALUE 1\n#define SIZE 4\n#define BUILD build\n",
+      ": parameter a lies outside the model's structure: set .parameters_size to its sizeof" },
+    { "#define ABI PW_ABI\n#define VALUE 0\n#define SIZE sizeof (numbers)\n#define BUILD build\n",
+      ": parameter a has the default 0: expected a number > 0" },
+    { "#define ABI PW_ABI\n#define VALUE 1\n#define SIZE sizeof (numbers)\n#define BUILD NULL\n",
+      " has no build function: PW_MODEL (...) at its end must set .build" },
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    char text[3000];
+    snprintf (text, sizeof text, "%s%s", bad[i].defines, model);
+    cli_write ("table.c", text);
+    assert_int_equal (cli_run ("pinwheel run @/table.c"), 2);
+    if (strstr (cli_err, bad[i].message) == NULL) print_error ("%s", cli_err);
+    assert_non_null (strstr (cli_err, bad[i].message));
+  }
+}
+
+/* Files that are no models, and compilers that are none. */
+static void test_bad_files (void **state) {
+  (void)state;
+  cli_write ("notes.txt", "nothing\n");
+  cli_bad ("pinwheel run @/notes.txt", 2, "@/notes.txt: a model file ends in .c, .so or .yaml");
+  cli_bad ("pinwheel run ''", 2, "a model's name or path is missing");
+  cli_write ("here.c", "nothing\n");
+  assert_int_equal (cli_run ("p=$(realpath ${PINWHEEL:-build/pinwheel}) && cd @ && $p run here"), 2);
+  assert_string_equal (
+      cli_err, "pinwheel: there is no model \"here\" on the search path; to use the file here, write ./here.c\n");
+  cli_write ("broken.c", "#include \"pinwheel.h\"\nnonsense (;\n");
+  assert_int_equal (cli_run ("CC=/no/compiler pinwheel run @/broken.c"), 2);
+  assert_non_null (strstr (cli_err, "cannot run the C compiler \"/no/compiler\""));
+  assert_int_equal (cli_run ("pinwheel run @/broken.c"), 2);
+  assert_non_null (strstr (cli_err, " does not compile; the messages of "));
+  assert_int_equal (cli_run ("TMPDIR=@/notes.txt pinwheel run @/broken.c"), 1);
+  assert_non_null (strstr (cli_err, "cannot make a temporary folder in "));
 }
 
 /* A name that two files could answer is refused with both paths. */
@@ -130,6 +184,7 @@ static void test_found_twice (void **state) {
   cli_expand ("@/two/twin.so", two, sizeof two);
   assert_non_null (strstr (cli_err, one));
   assert_non_null (strstr (cli_err, two));
+  assert_non_null (strstr (cli_err, "two files answer to the model \"twin\": "));
   cli_good ("PINWHEEL_MODELS=@/one pinwheel run twin --t-end 0.1 --json -");
   assert_true (cli_says (cli_out, "model", "twin"));
 }
@@ -180,9 +235,10 @@ static void test_moved (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_lines),   cmocka_unit_test (test_unwritable),  cmocka_unit_test (test_full_disk),
-    cmocka_unit_test (test_bad_models),  cmocka_unit_test (test_found_twice), cmocka_unit_test (test_failing_step),
-    cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),
+    cmocka_unit_test (test_bad_lines),   cmocka_unit_test (test_unwritable),   cmocka_unit_test (test_full_disk),
+    cmocka_unit_test (test_bad_models),  cmocka_unit_test (test_bad_tables),   cmocka_unit_test (test_bad_files),
+    cmocka_unit_test (test_found_twice), cmocka_unit_test (test_failing_step), cmocka_unit_test (test_interrupted),
+    cmocka_unit_test (test_moved),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -143,6 +143,25 @@ static void test_few_rows (void **state) {
   }
 }
 
+/* ---- Constraints that say the same twice ---- */
+
+static void runs_twice (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 2, .inertia = 0.5 });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "disc", "ground" } });
+  pw_add_pin (m, &(pw_pin){ .name = "Q", .body = { "ground", "disc" } });
+}
+
+static void test_twice (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_twice };
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (&error, PW_METHOD, "t = 0 s: singular pose: pin Q says what other constraints say already");
+  pw_free (s);
+}
+
 /* ---- Looking into a run ---- */
 
 static void test_outside (void **state) {
@@ -223,6 +242,7 @@ int main (void) {
     cmocka_unit_test (test_outside),
     cmocka_unit_test (test_t_end),
     cmocka_unit_test (test_restart),
+    cmocka_unit_test (test_twice),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
