@@ -139,6 +139,8 @@ static void reduce_lay_out_component (pw_layout *l, pw_component *c, int rows, i
   c->row = pw_take (l, n, sizeof (int));
   c->pivot = pw_take (l, m, sizeof (int));
   c->global = pw_take (l, m, sizeof (int));
+  c->heavy = pw_take (l, m, sizeof (int));
+  c->matched = pw_take (l, m, sizeof (double));
   c->light = pw_take (l, m, 1);
   c->unit = pw_take (l, m, sizeof (double));
   c->piece = pw_take (l, n * PW_REDUCE_PIECES, sizeof (pw_reduce_piece));
@@ -169,11 +171,15 @@ static int reduce_lay_out (pw_reduce *r, const reduce_plan *p) {
 
 /* Copies the rows of J into Z. */
 static void reduce_copy (pw_component *c) {
-  memset (c->Z, 0, (size_t)(c->rows * c->cols) * sizeof *c->Z);
-  for (int i = 0; i < c->rows; i++)
-    for (const pw_reduce_piece *p = c->piece + i * PW_REDUCE_PIECES;
-         p < c->piece + (i + 1) * PW_REDUCE_PIECES && p->width; p++)
-      for (int n = 0; n < p->width; n++) c->Z[i * c->cols + p->column + n] = p->J[n];
+  double *row = c->Z;
+  const pw_reduce_piece *piece = c->piece;
+  for (int n = 0; n < c->rows * c->cols; n++) row[n] = 0;
+  for (int i = 0; i < c->rows; i++, row += c->cols, piece += PW_REDUCE_PIECES)
+    for (const pw_reduce_piece *p = piece; p < piece + PW_REDUCE_PIECES && p->width; p++) {
+      double *to = row + p->column;
+      to[0] = p->J[0];
+      if (p->width == 3) to[1] = p->J[1], to[2] = p->J[2];
+    }
 }
 
 /* Subtracts the pivot row from row i so that its entry under the pivot vanishes. */
@@ -209,9 +215,10 @@ static void reduce_swap (pw_component *c, int a, int b) {
 }
 
 /* Gaussian elimination with complete pivoting over the light columns, angles in units of length, rows scaled by their
- * largest entry; leaves Z and the factors as reduce_run does.  Returns how many pivots were found. */
+ * largest entry; leaves Z and the factors as reduce_run would.  Returns how many pivots were found. */
 static int reduce_match (pw_component *c) {
   reduce_copy (c);
+  c->worst = INFINITY;
   for (int p = 0; p < c->pivots; p++) {
     int row = -1, column = -1;
     double best = 1e-12;
@@ -226,37 +233,31 @@ static int reduce_match (pw_component *c) {
     if (row < 0) return p;
     reduce_swap (c, p, row);
     c->pivot[p] = column;
+    c->matched[p] = fabs (c->Z[p * c->cols + column]);
+    c->worst = fmin (c->worst, best);
     for (int i = p + 1; i < c->rows; i++) reduce_eliminate (c, p, i);
   }
   return c->pivots;
 }
 
-/* Elimination with the pivots matched before; the smallest pivot squared relative to its row. */
-static double reduce_run (pw_component *c) {
-  double worst = INFINITY;
+/* Elimination with the pivots matched before; 0 if one of them has become too small, or is not a number. */
+static int reduce_run (pw_component *c) {
+  const double guard = 0.1;
   reduce_copy (c);
   for (int p = 0; p < c->pivots; p++) {
-    const double *row = c->Z + p * c->cols;
-    double most = 0, pivot = fabs (row[c->pivot[p]]) / c->unit[c->pivot[p]];
-    for (int n = 0; n < c->cols; n++) most = fmax (most, fabs (row[n]) / c->unit[n]);
-    double ratio = pivot / most;
-    if (!(ratio >= worst)) worst = ratio;
-    if (!(ratio > 0)) return 0;
+    if (!(fabs (c->Z[p * c->cols + c->pivot[p]]) >= guard * c->matched[p])) return 0;
     for (int i = p + 1; i < c->rows; i++) reduce_eliminate (c, p, i);
   }
-  return worst;
+  return 1;
 }
 
 double pw_reduce_factor (pw_reduce *r) {
-  const double guard = 0.01; /* below it another matching is tried: it can only be better */
   double worst = INFINITY;
-  for (int i = 0; i < r->components; i++) {
-    pw_component *c = &r->component[i];
-    double ratio = reduce_run (c);
-    if (ratio < guard) ratio = reduce_match (c) == c->pivots ? reduce_run (c) : 0;
-    worst = fmin (worst, ratio * ratio);
+  for (pw_component *c = r->component; c < r->component + r->components; c++) {
+    if (!reduce_run (c) && reduce_match (c) < c->pivots) return 0;
+    if (c->worst < worst) worst = c->worst;
   }
-  return worst;
+  return worst * worst;
 }
 
 /* ---- Opening ---- */
@@ -273,6 +274,7 @@ static int reduce_check (pw_reduce *r, const reduce_plan *p, pw_error *error) {
       c->unit[n] = angle ? s->scale.length : 1;
       c->light[n] = p->weight[j] == 0;
       c->pivots += c->light[n];
+      if (!c->light[n]) c->heavy[c->heavies++] = n;
     }
     int found = c->pivots <= c->rows ? reduce_match (c) : 0;
     if (found == c->pivots) continue;
@@ -374,8 +376,8 @@ void pw_reduce_forward (pw_reduce *r, const double *gamma, double *f) {
     }
     for (int p = 0; p < c->pivots; p++) {
       if (c->lambda[p] == 0) continue;
-      for (int i = 0; i < c->cols; i++)
-        if (!c->light[i]) f[c->global[i]] -= c->Z[p * c->cols + i] * c->lambda[p];
+      const double *row = c->Z + p * c->cols, l = c->lambda[p];
+      for (const int *h = c->heavy; h < c->heavy + c->heavies; h++) f[c->global[*h]] -= row[*h] * l;
     }
   }
 }

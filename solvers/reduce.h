@@ -24,8 +24,10 @@ typedef struct {
   int groups;             /* bodies and own coordinates touched */
   int *group;             /* first global coordinate of each */
   int *group_column;      /* first local column of each */
-  int *row;               /* global row; the pivots first, in order */
-  int *pivot;             /* local column of each pivot */
+  int *row;               /* global row; the pivots first, in order */  int *pivot;            /* local column of each pivot */
+  double *matched;       /* size of each pivot when it was matched */
+  double worst;          /* smallest pivot relative to its row when they were matched */
+  int heavies, *heavy;   /* local columns with weight */
   int *global;            /* cols: global coordinate of a local column */
   unsigned char *light;   /* cols: 1 for a coordinate without weight */
   double *unit;           /* cols: length scale of an angle, 1 of a length */
@@ -51,8 +53,8 @@ int pw_reduce_open (pw_reduce *r, pw_system *s, const double *weight, int rows, 
                     pw_error *error);
 void pw_reduce_close (pw_reduce *r);
 
-/* Eliminates with the J last swept; matches anew if a pivot has become small.  Returns the smallest pivot squared,
- * relative to its row; 0 if singular. */
+/* Eliminates with the J last swept; matches anew if a pivot has become much smaller than when it was matched.  Returns
+ * the smallest pivot squared, relative to its row, at the last matching; 0 if singular. */
 double pw_reduce_factor (pw_reduce *r);
 
 /* First half of a solve: gamma~ and lambda~ of the pivot rows are kept in the components, f -= J~_R^T lambda~_R for
