@@ -28,11 +28,12 @@ struct pw_method_data {
   pw_tape tape;
   sunindextype *colptr, *rowind; /* the pattern */
   pw_newton newton;
-  double *scale;     /* D: coords */
-  double *given;     /* scratch: 2 (coords + 3) + 2 rows */
-  double stop;       /* the stop time IDA knows */
-  double begun;      /* time of the start or the last restart */
-  char message[256]; /* the last one IDA sent */
+  double *scale;        /* D: coords */
+  double *given;        /* scratch: 2 (coords + 3) + 2 rows */
+  double stop;          /* the stop time IDA knows */
+  double begun;         /* time of the start or the last restart */
+  pw_statistics before; /* what was counted up to then: IDA counts from there */
+  char message[256];    /* the last one IDA sent */
 };
 
 typedef struct pw_method_data ida_data;
@@ -40,7 +41,7 @@ typedef struct pw_method_data ida_data;
 /* ---- Residual ---- */
 
 static int ida_place (ida_data *d, double t, const double *y) {
-  int status = pw_place (d->run->s, t, y, y + d->n);
+  int status = pw_place (d->run->s, pw_before_breakpoint (d->run, t), y, y + d->n);
   if (status == PW_OK) pw_sweep_J (d->run->s);
   return status == PW_OK ? 0 : -1;
 }
@@ -375,15 +376,20 @@ static void ida_close (pw_run *r) {
 /* ---- Advancing ---- */
 
 static void ida_statistics (ida_data *d) {
-  pw_statistics *s = &d->run->statistics;
+  pw_statistics *s = &d->run->statistics, now = { 0 };
+  const pw_statistics *before = &d->before;
   long tests = 0, newton = 0;
-  IDAGetNumSteps (d->ida, &s->steps);
+  IDAGetNumSteps (d->ida, &now.steps);
   IDAGetNumErrTestFails (d->ida, &tests);
   IDAGetNumNonlinSolvConvFails (d->ida, &newton);
-  IDAGetNumResEvals (d->ida, &s->rhs);
-  IDAGetNumJacEvals (d->ida, &s->jacobians);
-  IDAGetNumLinSolvSetups (d->ida, &s->factorisations);
-  s->rejected = tests + newton;
+  IDAGetNumResEvals (d->ida, &now.rhs);
+  IDAGetNumJacEvals (d->ida, &now.jacobians);
+  IDAGetNumLinSolvSetups (d->ida, &now.factorisations);
+  s->steps = before->steps + now.steps;
+  s->rejected = before->rejected + tests + newton;
+  s->rhs = before->rhs + now.rhs;
+  s->jacobians = before->jacobians + now.jacobians;
+  s->factorisations = before->factorisations + now.factorisations;
 }
 
 /* Reads (q, v, a, lambda) out of y and y'. */
@@ -428,7 +434,8 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
   double *work = N_VGetArrayPointer (d->work);
   if (r->statistics.steps == 0 || d->stop == INFINITY) {
     ida_fill_vectors (d);
-  } else if (IDAGetDky (d->ida, t, 1, d->yp) != IDA_SUCCESS || IDAGetDky (d->ida, t, 0, d->y) != IDA_SUCCESS) {
+  } else if (t > r->t || IDAGetDky (d->ida, t, 1, d->yp) != IDA_SUCCESS ||
+             IDAGetDky (d->ida, t, 0, d->y) != IDA_SUCCESS) {
     return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
   } else if (r->settings.ledger && r->s->entries > 0) {
     IDAGetQuadDky (d->ida, t, 0, d->work);
@@ -450,6 +457,7 @@ static int ida_restart (pw_run *r, pw_error *error) {
   ida_fill_vectors (d);
   d->stop = NAN;
   d->begun = r->t;
+  d->before = r->statistics;
   IDASetInitStep (d->ida, ida_first_step (d));
   if (IDAReInit (d->ida, r->t, d->y, d->yp) == IDA_SUCCESS) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, d->message);

@@ -2,6 +2,7 @@
 #ifndef PW_METHOD_H
 #define PW_METHOD_H
 
+#include <math.h>
 #include "pinwheel-solvers.h"
 #include "saddle.h"
 #include "system.h"
@@ -50,6 +51,11 @@ int pw_stabilised_by (const pw_run *r, const char *name);
 /* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the run has them; J stays swept and the saddle
  * factorised.  PW_RETRY in a singular pose; PW_METHOD if a signal failed. */
 int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
+
+/* A step that ends at a discontinuity sees what the signals are just before it. */
+static inline double pw_before_breakpoint (const pw_run *r, double t) {
+  return t < r->breakpoint ? t : nextafter (r->breakpoint, -INFINITY);
+}
 
 /* The same where J is swept and the saddle factorised at this pose, and the rates are placed. */
 void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda);

@@ -12,7 +12,7 @@
 
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error) {
   pw_system *s = r->s;
-  *p = (pw_projector){ .own_velocity = weight_v != NULL, .velocity = r->saddle };
+  *p = (pw_projector){ .own_velocity = weight_v != NULL, .velocity = weight_v ? NULL : r->saddle };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
   if (p->scratch == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   p->position = pw_saddle_open (s, weight_q, s->holonomic, NULL, error);

@@ -170,7 +170,7 @@ static int rk_stages (pw_run *r, double h) {
   for (int i = 1; i < b->stages && status == PW_OK; weights += i++) {
     rk_combine (d->q, r->q, d->V, weights, i, h, n);
     rk_combine (d->V[i], r->v, d->A, weights, i, h, n);
-    status = pw_accelerate (r, r->t + b->c[i] * h, d->q, d->V[i], d->A[i], d->lambda);
+    status = pw_accelerate (r, pw_before_breakpoint (r, r->t + b->c[i] * h), d->q, d->V[i], d->A[i], d->lambda);
     if (status == PW_OK && r->settings.ledger) pw_sweep_ledger (s, d->lambda, d->R[i]);
   }
   if (d->held) pw_hold (s, 0);

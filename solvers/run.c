@@ -126,16 +126,22 @@ void pw_close (pw_run *r) {
   free (r);
 }
 
+/* Behind a discontinuity the accelerations are others, and a method starts anew. */
+static int run_pass_breakpoint (pw_run *r, pw_error *error) {
+  r->breakpoint = pw_next_breakpoint (r->s, r->t);
+  int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  if (status > 0) return pw_fail_singular (r, r->t, error);
+  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (r->settings.ledger) pw_sweep_ledger (r->s, r->lambda, r->rate);
+  return r->method->restart (r, error);
+}
+
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (!(r->t < t_end)) return PW_OK;
   int status = r->method->advance (r, t_end, error);
   if (status != PW_OK) return status;
   pw_note_residuals (r);
-  if (r->t >= r->breakpoint) {
-    r->breakpoint = pw_next_breakpoint (r->s, r->t);
-    return r->method->restart (r, error);
-  }
-  return PW_OK;
+  return r->t >= r->breakpoint ? run_pass_breakpoint (r, error) : PW_OK;
 }
 
 int pw_advance_to (pw_run *r, double t, double t_end, pw_error *error) {

@@ -71,7 +71,8 @@ static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *t
       pw_projector_close (&p);
       if (status != PW_RETRY || !trouble->rates) break;
     }
-    if (choice == 0) status = PW_OK;
+    if (none.status == PW_MACHINE) status = pw_fail (error, PW_MACHINE, "%s", none.text);
+    if (choice == 0 && none.status != PW_MACHINE) status = PW_OK;
   }
   free (weight);
   return status;
