@@ -19,7 +19,7 @@ endif
 
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes
 STRICT := -std=c11 -fPIC -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)
-PW_CFLAGS = $(STRICT) -D_POSIX_C_SOURCE=200809L $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN)
+PW_CFLAGS = $(STRICT) $(THREADS) -D_POSIX_C_SOURCE=200809L $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN)
 
 # SuiteSparse has no pkg-config file; a folder that is not there does no harm.
 SUITESPARSE ?= /usr/include/suitesparse
@@ -30,6 +30,11 @@ SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lsundial
 FILES_LIBS  := -lfyaml -lmuparser -ldl -lm
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
 SHARED       = $(LINK) -shared -Wl,--no-undefined
+
+# Sweeps use every processor where the compiler has OpenMP; the libraries have no threads of their own.
+OPENMP = $(eval OPENMP := $$(shell mkdir -p $(BUILD) && \
+           echo 'int omp_get_max_threads (void); int main (void) { return !omp_get_max_threads (); }' | \
+           $(CC) $(SAN) -fopenmp -x c - -o $(BUILD)/openmp 2>/dev/null && echo -fopenmp))$(OPENMP)
 
 # ---- What there is: a file dropped into one of these folders is part of the build ----
 
@@ -105,6 +110,7 @@ $(BUILD)/obj/core/%.o:       INCLUDE := -iquote core
 $(BUILD)/obj/solvers/%.o:    INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/files/%.o: INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers
+$(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
@@ -162,7 +168,7 @@ HOUSE_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
 $(PROGRAM): $(CLI_OBJ) $(LIB) $(FILES_LIB)
 	$(call say,LINK)
-	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(HOUSE_LIBS) -lpopt -lm
+	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(HOUSE_LIBS) -lpopt -lm
 
 $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 	@mkdir -p $(@D)

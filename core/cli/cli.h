@@ -10,6 +10,10 @@
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
+#ifndef PW_VERSION
+#define PW_VERSION "0.1.0"
+#endif
+
 enum { PW_INTERRUPTED = 130 }; /* exit status after Ctrl-C */
 
 /* ---- Commands ---- */
@@ -25,6 +29,7 @@ int pw_cli_list (int argc, const char **argv);
 int pw_cli_show (int argc, const char **argv);
 int pw_cli_new (int argc, const char **argv);
 int pw_cli_run (int argc, const char **argv);
+int pw_cli_sweep (int argc, const char **argv);
 
 /* ---- Options ---- */
 
@@ -72,6 +77,11 @@ typedef struct {
 int pw_cli_open (pw_cli_model *m, const char *name, const char *const *sets, const char *const *starts,
                  pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
+
+/* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_set or pw_set_start; `option` ("--set") is for
+ * messages. */
+int pw_cli_apply (pw_model *m, const char *option, const char *const *list,
+                  int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
 
 /* A path, relative to the current directory if it lies below; it may be written to the buffer. */
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size);

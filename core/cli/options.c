@@ -117,11 +117,8 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 
 /* ---- Models ---- */
 
-typedef int options_setter (pw_model *m, const char *name, double value, pw_error *error);
-
-/* Applies every "NAME=VALUE" of a list. */
-static int options_apply (pw_model *m, const char *option, const char *const *list, options_setter *set,
-                          pw_error *error) {
+int pw_cli_apply (pw_model *m, const char *option, const char *const *list,
+                  int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error) {
   for (; list && *list; list++) {
     char name[200];
     double value;
@@ -142,8 +139,8 @@ int pw_cli_open (pw_cli_model *m, const char *name, const char *const *sets, con
   *m = (pw_cli_model){ .file = NULL };
   m->file = pw_file_open (name, error);
   if (m->file) m->model = pw_file_model (m->file, error);
-  if (m->model && options_apply (m->model, "--set", sets, pw_set, error) == PW_OK &&
-      options_apply (m->model, "--start", starts, pw_set_start, error) == PW_OK && pw_build (m->model, error) == PW_OK)
+  if (m->model && pw_cli_apply (m->model, "--set", sets, pw_set, error) == PW_OK &&
+      pw_cli_apply (m->model, "--start", starts, pw_set_start, error) == PW_OK && pw_build (m->model, error) == PW_OK)
     m->system = pw_compile (m->model, error);
   return m->system ? PW_OK : error->status;
 }

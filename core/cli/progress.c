@@ -1,6 +1,7 @@
 /* The progress bar. */
 #include <math.h>
 #include <stdio.h>
+#include <string.h>
 #include <time.h>
 #include <unistd.h>
 #include "progress.h"
@@ -25,7 +26,13 @@ double pw_cpu_clock (void) {
 
 void pw_progress_start (pw_progress *p, const char *what, double t_end, int on) {
   double now = pw_clock ();
-  *p = (pw_progress){ what, t_end, now, now + PROGRESS_FIRST, 0, on && isatty (STDERR_FILENO) };
+  *p = (pw_progress){ what, "s", 0, t_end, now, now + PROGRESS_FIRST, 0, on && isatty (STDERR_FILENO) };
+}
+
+void pw_progress_count (pw_progress *p, const char *what, const char *unit, double from, double count) {
+  pw_progress_start (p, what, count, 1);
+  p->unit = unit;
+  p->from = from;
 }
 
 /* "0:07", "12:30", "3:05:00"; "-" where nothing can be said. */
@@ -48,12 +55,13 @@ void pw_progress_at (pw_progress *p, double t) {
   p->next = now + PROGRESS_EVERY;
   double part = fmin (fmax (t / p->t_end, 0), 1);
   char left[24], bar[PROGRESS_WIDTH + 1];
-  progress_duration ((now - p->start) * (1 / part - 1), left, sizeof left);
+  progress_duration ((now - p->start) / (t - p->from) * (p->t_end - t), left, sizeof left);
   int full = (int)(part * PROGRESS_WIDTH);
   for (int i = 0; i < PROGRESS_WIDTH; i++) bar[i] = i < full ? '#' : '.';
   bar[PROGRESS_WIDTH] = 0;
-  fprintf (stderr, "\r%.16s [%s] %3.0f %%  t = %.4g of %.4g s  %s to go\033[K", p->what, bar, 100 * part, t, p->t_end,
-           left);
+  int timed = strcmp (p->unit, "s") == 0;
+  fprintf (stderr, "\r%.16s [%s] %3.0f %%  %s%.*g of %.*g %s  %s to go\033[K", p->what, bar, floor (100 * part),
+           timed ? "t = " : "", timed ? 4 : 9, t, timed ? 4 : 9, p->t_end, p->unit, left);
   fflush (stderr);
   p->shown = 1;
 }

@@ -4,7 +4,9 @@
 
 typedef struct {
   const char *what; /* shown in front */
-  double t_end;     /* the run goes from 0 to t_end [s] */
+  const char *unit; /* "s": it goes by time; else what is counted */
+  double from;      /* where it began, 0 unless it goes on with something */
+  double t_end;     /* where it ends: time [s] or count */
   double start;     /* clock when it started [s] */
   double next;      /* clock when it may be drawn again [s] */
   int shown;        /* 1: there is a bar to erase */
@@ -17,7 +19,9 @@ double pw_cpu_clock (void);
 
 /* `on` 0 suppresses the bar, as does a standard error that is no terminal. */
 void pw_progress_start (pw_progress *p, const char *what, double t_end, int on);
-/* Draws the bar for the time t, at most ten times a second. */
+/* The same for work that is counted in `unit` ("runs"): `from` of `count` are done already. */
+void pw_progress_count (pw_progress *p, const char *what, const char *unit, double from, double count);
+/* Draws the bar for the time or count t, at most ten times a second. */
 void pw_progress_at (pw_progress *p, double t);
 /* Erases the bar. */
 void pw_progress_end (pw_progress *p);

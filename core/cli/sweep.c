@@ -1,0 +1,274 @@
+/* pinwheel sweep: a table of runs, for all combinations of varied parameters and start values.
+ *
+ * Every run has a model, a system and a method of its own and depends on nothing but its row of the grid; rows are kept
+ * in a journal in the order in which they are finished, and put into the grid's order at the end.  So the table is
+ * the same for any number of threads, and for any number of times the sweep was stopped and started again. */
+#include <limits.h>
+#include <signal.h>
+#include <string.h>
+#ifdef _OPENMP
+#include <omp.h>
+#endif
+#include "progress.h"
+#include "sweep.h"
+
+typedef struct {
+  /* as given */
+  const char *method, *t_end_text, *step_text, *rtol_text, *atol_text;
+  const char *path, *part_text, *jobs_text;
+  const char **ranges, **sets, **starts;
+  int merge, cpu;
+  /* as understood */
+  pw_cli_line line;
+  pw_plan plan;
+  int jobs;
+  /* under way; one thread at a time */
+  pw_journal journal;
+  pw_progress progress;
+  pw_text scratch;
+  pw_error *error;
+} sweep;
+
+/* ---- Ctrl-C ---- */
+
+static volatile sig_atomic_t sweep_stop; /* signals so far, or 1 if the sweep cannot go on */
+
+/* As in a run, the third signal ends the program, should a step never end. */
+static void sweep_on_signal (int number) {
+  if (++sweep_stop < 3) return;
+  signal (number, SIG_DFL);
+  raise (number);
+}
+
+static void sweep_catch_signals (void) {
+  struct sigaction action;
+  memset (&action, 0, sizeof action);
+  action.sa_handler = sweep_on_signal;
+  sigemptyset (&action.sa_mask);
+  sigaction (SIGINT, &action, NULL);
+  sigaction (SIGTERM, &action, NULL);
+}
+
+/* ---- Before the sweep ---- */
+
+static int sweep_read (sweep *x, int argc, const char **argv, pw_error *error) {
+  const struct poptOption options[] = {
+    { "vary", 'v', POPT_ARG_ARGV, &x->ranges, 0,
+      "Vary a parameter, or a start value such as frame.vx; may be repeated, the last one varies fastest. "
+      "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,...",
+      "NAME=RANGE" },
+    { "output", 'o', POPT_ARG_STRING, &x->path, 0, "Where the table goes", "FILE.csv" },
+    { "method", 'm', POPT_ARG_STRING, &x->method, 0, "Integrator and stabilisation, see: pinwheel list methods",
+      "METHOD" },
+    { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
+    { "step", 0, POPT_ARG_STRING, &x->step_text, 0, "Step of fixed-step methods [s]", "H" },
+    { "rtol", 0, POPT_ARG_STRING, &x->rtol_text, 0, "Relative tolerance of adaptive methods", "R" },
+    { "atol", 0, POPT_ARG_STRING, &x->atol_text, 0,
+      "Absolute tolerance of every state; by default rtol times its scale", "A" },
+    PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
+    { "jobs", 'j', POPT_ARG_STRING, &x->jobs_text, 0, "Runs at a time; by default one per processor", "N" },
+    { "part", 0, POPT_ARG_STRING, &x->part_text, 0, "Do every N-th run, from the I-th on, for a later --merge", "I/N" },
+    { "merge", 0, POPT_ARG_NONE, &x->merge, 0, "Put the parts named instead of a model together", NULL },
+    { "cpu", 0, POPT_ARG_NONE, &x->cpu, 0, "Add each run's processor time; two such tables are never the same", NULL },
+    POPT_TABLEEND,
+  };
+  int merge = 0;
+  for (int i = 1; i < argc; i++) merge |= strcmp (argv[i], "--merge") == 0;
+  int status = pw_cli_read (&x->line, argc, argv, options, merge ? "--merge PART... -o FILE.csv" : "MODEL [OPTION...]",
+                            1, merge ? INT_MAX : 1, error);
+  if (status != PW_OK) return status;
+  if (x->path == NULL || *x->path == 0) return pw_fail (error, PW_INPUT, "nowhere to write the table: add -o FILE.csv");
+  if (strcmp (x->path, "-") == 0)
+    return pw_fail (error, PW_INPUT, "-o -: a sweep needs a file, next to which it keeps what it has done");
+  if (!merge && x->ranges == NULL)
+    return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,...");
+  return PW_OK;
+}
+
+/* Which option makes no sense with parts; NULL if none is there. */
+static const char *sweep_odd (const sweep *x) {
+  const struct {
+    const char *name;
+    const void *given;
+  } option[] = { { "--vary", x->ranges },    { "--method", x->method },     { "--t-end", x->t_end_text },
+                 { "--step", x->step_text }, { "--rtol", x->rtol_text },    { "--atol", x->atol_text },
+                 { "--set", x->sets },       { "--start", x->starts },      { "--jobs", x->jobs_text },
+                 { "--part", x->part_text }, { "--cpu", x->cpu ? x : NULL } };
+  for (size_t i = 0; i < sizeof option / sizeof *option; i++)
+    if (option[i].given) return option[i].name;
+  return NULL;
+}
+
+/* "I/N" */
+static int sweep_part (sweep *x, pw_error *error) {
+  char number[2][12] = { "", "" };
+  double value[2] = { 1, 1 };
+  const char *text = x->part_text, *slash = text ? strchr (text, '/') : NULL;
+  size_t n = slash ? (size_t)(slash - text) : 0;
+  int good = text == NULL;
+  if (slash && n < sizeof number[0] && strlen (slash + 1) < sizeof number[1]) {
+    memcpy (number[0], text, n);
+    strcpy (number[1], slash + 1);
+    good = 1;
+    for (int i = 0; i < 2; i++)
+      good &= pw_read_number (number[i], value + i) == PW_OK && !*pw_domain_check (PW_COUNT, value[i]);
+    good &= value[0] <= value[1] && value[1] <= 1e6;
+  }
+  if (!good)
+    return pw_fail (error, PW_INPUT, "--part %.60s: expected I/N, whole numbers with 1 <= I <= N <= 1000000", text);
+  x->plan.part = (int)value[0];
+  x->plan.parts = (int)value[1];
+  return PW_OK;
+}
+
+static int sweep_jobs (sweep *x, pw_error *error) {
+  double jobs = 1;
+#ifdef _OPENMP
+  jobs = omp_get_max_threads ();
+#endif
+  int status = pw_cli_number ("--jobs", x->jobs_text, PW_COUNT, &jobs, error);
+#ifndef _OPENMP
+  if (jobs > 1) fputs ("pinwheel: built without OpenMP: one run at a time\n", stderr);
+  jobs = 1;
+#endif
+  x->jobs = jobs < 10000 ? (int)jobs : 10000;
+  return status;
+}
+
+/* Options over the model's wishes over Pinwheel's own. */
+static int sweep_settle (sweep *x, pw_error *error) {
+  pw_plan *p = &x->plan;
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
+  p->model = x->line.argument[0];
+  p->method = x->method ? x->method : d.method;
+  p->sets = (const char *const *)x->sets;
+  p->starts = (const char *const *)x->starts;
+  p->t_end = d.t_end;
+  p->cpu = x->cpu;
+  p->settings = (pw_settings){ .step = d.step, .rtol = d.rtol };
+  int status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &p->t_end, error);
+  if (status == PW_OK) status = pw_cli_number ("--step", x->step_text, PW_POSITIVE, &p->settings.step, error);
+  if (status == PW_OK) status = pw_cli_number ("--rtol", x->rtol_text, PW_POSITIVE, &p->settings.rtol, error);
+  if (status == PW_OK) status = pw_cli_number ("--atol", x->atol_text, PW_POSITIVE, &p->settings.atol, error);
+  if (status == PW_OK) status = sweep_jobs (x, error);
+  p->settings.span = p->t_end;
+  return status == PW_OK ? sweep_part (x, error) : status;
+}
+
+static int sweep_open (sweep *x, pw_error *error) {
+  x->plan.file = pw_file_open (x->line.argument[0], error);
+  if (x->plan.file == NULL) return error->status;
+  int status = sweep_settle (x, error);
+  if (status == PW_OK) status = pw_plan_open (&x->plan, (const char *const *)x->ranges, error);
+  if (status == PW_OK && x->plan.parts > x->plan.grid.rows)
+    status = pw_fail (error, PW_INPUT, "--part %s: the grid has only %ld rows", x->part_text, x->plan.grid.rows);
+  if (status == PW_OK) status = pw_journal_open (&x->journal, &x->plan, x->path, error);
+  if (status != PW_OK) return status;
+  if (x->journal.done > 0)
+    fprintf (stderr, "pinwheel: going on with %s: %ld of %ld runs are done\n", x->journal.part, x->journal.done,
+             x->journal.rows);
+  return PW_OK;
+}
+
+/* ---- The sweep ---- */
+
+/* Keeps a row, or the first error, which stops the sweep. */
+static void sweep_keep (sweep *x, long k, int status, const pw_text *text, const pw_error *own) {
+  if (status == PW_MACHINE)
+    pw_fail (x->error, status, "%s", own->text);
+  else if (pw_journal_add (&x->journal, &x->plan, k, -status, text->at, &x->scratch, x->error) == PW_OK)
+    pw_progress_at (&x->progress, (double)x->journal.done);
+  if (x->error->status != PW_OK && sweep_stop == 0) sweep_stop = 1;
+}
+
+static void sweep_one (sweep *x, long k, pw_text *text) {
+  pw_error own = { 0 };
+  pw_text_clear (text);
+  int status = pw_sweep_row (&x->plan, pw_plan_row (&x->plan, k), &sweep_stop, text, &own);
+  if (status == PW_RETRY) return;
+#ifdef _OPENMP
+#pragma omp critical(sweep_rows)
+#endif
+  if (x->error->status == PW_OK) sweep_keep (x, k, status, text, &own);
+}
+
+static void sweep_all (sweep *x) {
+  long rows = x->journal.rows;
+  if (x->jobs > rows) x->jobs = (int)rows;
+#ifdef _OPENMP
+#pragma omp parallel num_threads(x->jobs)
+#endif
+  {
+    pw_text text = { .at = NULL };
+#ifdef _OPENMP
+#pragma omp for schedule(dynamic)
+#endif
+    for (long k = 0; k < rows; k++)
+      if (sweep_stop == 0 && x->journal.line[k] == 0) sweep_one (x, k, &text);
+    pw_text_free (&text);
+  }
+}
+
+static int sweep_run (sweep *x, pw_error *error) {
+  x->error = error;
+  sweep_catch_signals ();
+  pw_progress_count (&x->progress, pw_file_name (x->plan.file), "runs", (double)x->journal.done,
+                     (double)x->journal.rows);
+  sweep_all (x);
+  pw_progress_end (&x->progress);
+  return error->status;
+}
+
+/* ---- The end ---- */
+
+/* Failed runs are rows; only if there is nothing else the sweep has failed.  A part leaves that to the merge. */
+static int sweep_verdict (const pw_tally *tally, int is_part, pw_error *error) {
+  if (tally->failed == 0) return PW_OK;
+  if (tally->failed == tally->rows && !is_part)
+    return pw_fail (error, -tally->status, "all %ld runs failed, the first one: %s", tally->rows, tally->reason);
+  fprintf (stderr, "pinwheel: %ld of %ld runs failed, the first of them: %s\n", tally->failed, tally->rows,
+           tally->reason);
+  return PW_OK;
+}
+
+static int sweep_merge (sweep *x, pw_error *error) {
+  pw_tally tally;
+  const char *odd = sweep_odd (x);
+  if (odd) return pw_fail (error, PW_INPUT, "%s has no place beside --merge: the parts say what they are", odd);
+  int status = pw_table_merge (x->line.argument, x->line.arguments, x->path, &tally, error);
+  return status == PW_OK ? sweep_verdict (&tally, 0, error) : status;
+}
+
+static int sweep_finish (sweep *x, pw_error *error) {
+  pw_tally tally;
+  if (x->journal.done < x->journal.rows) {
+    fprintf (stderr, "pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command goes on from there\n",
+             x->journal.done, x->journal.rows, x->journal.part);
+    return PW_INTERRUPTED;
+  }
+  int status = pw_table_finish (&x->journal, &x->plan, &tally, error);
+  return status == PW_OK ? sweep_verdict (&tally, x->plan.parts > 1, error) : status;
+}
+
+static void sweep_close (sweep *x) {
+  pw_journal_close (&x->journal);
+  pw_plan_close (&x->plan);
+  pw_file_close (x->plan.file);
+  pw_text_free (&x->scratch);
+  pw_cli_close (&x->line);
+}
+
+int pw_cli_sweep (int argc, const char **argv) {
+  sweep x = { .journal.file = -1 };
+  pw_error error = { 0 };
+  int status = sweep_read (&x, argc, argv, &error);
+  if (status == PW_OK && x.merge)
+    status = sweep_merge (&x, &error);
+  else if (status == PW_OK) {
+    status = sweep_open (&x, &error);
+    if (status == PW_OK) status = sweep_run (&x, &error);
+    if (status == PW_OK) status = sweep_finish (&x, &error);
+  }
+  sweep_close (&x);
+  return status == PW_INTERRUPTED ? status : pw_cli_end (&error);
+}

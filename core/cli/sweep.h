@@ -1,0 +1,202 @@
+/* Sweeps from inside: a grid of runs, one row for each, and the files the rows go to.
+ *
+ * A grid's rows are numbered in the order of the table, the last varied quantity fastest.  A sweep computes all of
+ * them, or those of one part: part i of n has the rows i - 1, i - 1 + n, i - 1 + 2 n, ... */
+#ifndef PW_SWEEP_H
+#define PW_SWEEP_H
+
+#include <signal.h>
+#include <sys/types.h>
+#include "cli.h"
+#include "util.h"
+
+/* ---- Texts that grow (sweep_text.c) ---- */
+
+typedef struct {
+  char *at; /* ended by a 0, NULL at first */
+  size_t used, room;
+  int failed; /* out of memory: what was added since is lost */
+} pw_text;
+
+void pw_text_clear (pw_text *t);
+void pw_text_free (pw_text *t);
+void pw_text_add (pw_text *t, const char *text);
+void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count);
+/* "a,b": a number with 17 digits, or a text, after a comma unless it is the first of its line; not finite is nan. */
+void pw_text_number (pw_text *t, double value);
+void pw_text_cell (pw_text *t, const char *text);
+/* "NAME [UNIT]" as a cell; no unit if it is NULL or "". */
+void pw_text_name (pw_text *t, const char *name, const char *unit);
+/* A cell in quotes, on one line. */
+void pw_text_quoted (pw_text *t, const char *text);
+
+/* ---- The grid (sweep_grid.c) ---- */
+
+#define PW_GRID_ROWS 1e8 /* more are refused */
+
+/* One varied quantity. */
+typedef struct {
+  const char *name;
+  const char *range;                                    /* "lin:1:10:100", as written */
+  enum { PW_AXIS_LIST, PW_AXIS_LIN, PW_AXIS_LOG } type; /* how its values are spaced */
+  double first, last;                                   /* of PW_AXIS_LIN and PW_AXIS_LOG */
+  double *value;                                        /* PW_AXIS_LIST: count */
+  long count;
+  long stride;                   /* rows between two of its values */
+  const pw_parameter *parameter; /* NULL: it is the start value of a state */
+  const char *unit;
+} pw_axis;
+
+typedef struct {
+  pw_axis *axis;
+  int axes;
+  long rows;
+} pw_grid;
+
+/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT with the text that is wrong and what was expected, also for
+ * too many rows.  Free the grid in every case. */
+int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error);
+void pw_grid_free (pw_grid *g);
+double pw_axis_value (const pw_axis *a, long i);
+static inline double pw_grid_value (const pw_grid *g, int axis, long row) {
+  const pw_axis *a = g->axis + axis;
+  return pw_axis_value (a, row / a->stride % a->count);
+}
+
+/* ---- What all runs have in common (sweep_plan.c) ---- */
+
+typedef struct {
+  /* as the command line says; read only */
+  const char *model, *method;
+  const char *const *sets, *const *starts;
+  pw_settings settings;
+  double t_end; /* [s] */
+  int cpu;      /* 1: a column with each run's processor time */
+  int part, parts;
+  /* as found by pw_plan_open */
+  pw_file *file;
+  pw_grid grid;
+  struct pw_column {
+    const char *name, *unit;
+  } * column; /* columns: the states of all bodies and elements */
+  int columns, room;
+  pw_names index;      /* from a state's name to its column */
+  pw_arena arena;      /* names */
+  pw_text head;        /* the table's first line, without its end */
+  pw_text fingerprint; /* the first lines of a journal or part: all that decides what the rows are */
+} pw_plan;
+
+/* Matches the ranges ("NAME=RANGE") to the model, whose file is open in p->file and stays the caller's, and finds the
+ * columns by building scenes of the grid.  Errors: PW_INPUT for whatever does not fit; PW_MACHINE.  Close the plan in
+ * every case. */
+int pw_plan_open (pw_plan *p, const char *const *ranges, pw_error *error);
+void pw_plan_close (pw_plan *p);
+
+/* A row's model, built and compiled, m->file left NULL; close it in every case.  May be called by several threads at once. */
+int pw_plan_scene (const pw_plan *p, long row, pw_cli_model *m, pw_error *error);
+
+/* The i-th of a system's 2 pw_count_coordinates states in the order of a table: six of each body, then what elements
+ * own. */
+int pw_plan_state (const pw_system *s, int i);
+
+/* How many rows the plan's part has, and which in the grid its k-th one is. */
+static inline long pw_plan_rows (const pw_plan *p) {
+  return p->grid.rows / p->parts + (p->grid.rows % p->parts >= p->part);
+}
+static inline long pw_plan_row (const pw_plan *p, long k) {
+  return p->part - 1 + k * p->parts;
+}
+
+/* ---- The fingerprint (sweep_fingerprint.c) ---- */
+
+#define PW_SWEEP_MAGIC "pinwheel sweep 1\n"
+
+/* Fills p->fingerprint, when all else of the plan is there; the model is not built and has the parameters the command
+ * line sets. */
+int pw_fingerprint_make (pw_plan *p, const pw_model *m, pw_error *error);
+
+/* Where the rows begin after a fingerprint, or NULL if it is not whole. */
+const char *pw_fingerprint_end (const char *at, const char *end);
+/* The value of a key, its size in *size; NULL if there is none. */
+const char *pw_fingerprint_value (const char *at, const char *end, const char *key, size_t *size);
+/* Puts the first difference of two fingerprints into words, "step is 0.001 there and 0.002 here" with words "there" and
+ * "here"; the part does not count if `parts` is 0.  0 if they agree. */
+int pw_fingerprint_differ (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
+                           const char *words[2], char *text, size_t size);
+
+/* ---- One run (sweep_row.c) ---- */
+
+/* Does a run from start to end and appends its cells, without the line's end.  Returns the run's own status, a row all
+ * the same; PW_RETRY if *stop became non-zero on the way; PW_MACHINE with the error if it could not be done.  May be
+ * called by several threads at once. */
+int pw_sweep_row (const pw_plan *p, long row, const volatile sig_atomic_t *stop, pw_text *text, pw_error *error);
+
+/* ---- Lines of journals and parts (sweep_line.c) ----
+ *
+ *     pinwheel sweep 1              the fingerprint: lines "KEY = VALUE"
+ *     ...
+ *     part = 2/4
+ *     end
+ *     17 0 83c1f0a2 1.5,0.05,ok,... a row's number, its run's exit status, a check sum, its line of the table */
+
+typedef struct {
+  long row;
+  int status;       /* exit status of the run */
+  const char *text; /* the table's line, which ends with a newline */
+  size_t size;      /* its bytes, the newline included */
+  size_t bytes;     /* of the whole line */
+} pw_line;
+
+/* Appends a row's line; text without a newline. */
+void pw_line_add (pw_text *t, long row, int status, const char *text);
+/* Reads the line at `at`, before `end`; 0 if it is not whole or not sound. */
+int pw_line_read (const char *at, const char *end, pw_line *line);
+
+/* A file in memory, read only. */
+typedef struct {
+  const char *at, *end;
+} pw_map;
+int pw_map_open (pw_map *m, int file); /* PW_OK, or PW_MACHINE and errno */
+void pw_map_close (pw_map *m);
+
+/* ---- The journal (sweep_journal.c) ---- */
+
+/* Rows as they come, in a file next to the table, which a sweep that was stopped goes on from. */
+typedef struct {
+  char *path;  /* of the table, links followed */
+  char *part;  /* of the journal: path.part */
+  int file;    /* the journal's, locked; -1: not open */
+  int created; /* 1: by this process */
+  off_t *line; /* pw_plan_rows: where each row's line begins; 0: not there yet */
+  long rows, done;
+  off_t size;
+} pw_journal;
+
+/* Opens the journal of the table at `path`, or begins one.  Lines after the first that is not whole and sound are cut off.
+ * Errors: PW_MACHINE if it cannot be written, PW_INPUT if it belongs to another sweep or another process is at work. */
+int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error);
+/* Appends row k of the part; `text` is scratch.  One thread at a time.  PW_MACHINE: the journal keeps what it had. */
+int pw_journal_add (pw_journal *j, const pw_plan *p, long k, int status, const char *cells, pw_text *text,
+                    pw_error *error);
+/* Without a row so far, a journal that was created here is removed. */
+void pw_journal_close (pw_journal *j);
+
+/* ---- Tables and parts in the order of the grid (sweep_table.c) ---- */
+
+/* How the runs of a table ended. */
+typedef struct {
+  long rows, failed;
+  int status;       /* exit status of the first that failed */
+  char reason[300]; /* how it did, as its row says */
+} pw_tally;
+
+/* Writes the table of a complete journal, or its part, and removes the journal. */
+int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error);
+/* Writes the table at `path` from all parts of a sweep. */
+int pw_table_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error);
+
+/* The real path of a file to be written, for the caller to free.  NULL and PW_MACHINE for what is no regular file, or cannot
+ * be written. */
+char *pw_table_path (const char *path, pw_error *error);
+
+#endif

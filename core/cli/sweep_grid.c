@@ -1,0 +1,133 @@
+/* What is varied: lists and ranges, and their grid. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "sweep.h"
+
+/* ---- Ranges ---- */
+
+/* Reads the number before `end` in a text that goes on. */
+static int grid_number (const char *text, size_t size, double *value) {
+  char number[64];
+  if (size >= sizeof number) return PW_INPUT;
+  memcpy (number, text, size);
+  number[size] = 0;
+  return pw_read_number (number, value) == PW_OK && isfinite (*value) ? PW_OK : PW_INPUT;
+}
+
+/* "v1,v2,..." */
+static int grid_list (pw_axis *a, pw_error *error) {
+  a->count = 1;
+  for (const char *c = a->range; *c; c++) a->count += *c == ',';
+  a->value = calloc ((size_t)a->count, sizeof *a->value);
+  if (a->value == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  const char *c = a->range;
+  for (long i = 0; i < a->count; i++) {
+    size_t n = strcspn (c, ",");
+    if (grid_number (c, n, a->value + i) != PW_OK)
+      return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: \"%.*s\" is not a finite number", a->name, a->range,
+                      n < 100 ? (int)n : 100, c);
+    c += n + 1;
+  }
+  return PW_OK;
+}
+
+/* "A:B:N" after "lin:" or "log:" */
+static int grid_range (pw_axis *a, pw_error *error) {
+  double number[3] = { 0 };
+  const char *c = a->range + 4;
+  int read = 0, colons = 0;
+  for (const char *k = c; *k; k++) colons += *k == ':';
+  while (colons == 2 && read < 3) {
+    size_t n = strcspn (c, ":");
+    if (grid_number (c, n, number + read) != PW_OK) break;
+    c += n + 1;
+    read++;
+  }
+  if (read < 3)
+    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected %.3s:FIRST:LAST:COUNT, three numbers", a->name,
+                    a->range, a->range);
+  a->first = number[0];
+  a->last = number[1];
+  if (*pw_domain_check (PW_COUNT, number[2]))
+    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected a count that is a whole number >= 1", a->name,
+                    a->range);
+  if (number[2] > PW_GRID_ROWS)
+    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: too many values: at most 1e8 rows", a->name, a->range);
+  a->count = (long)number[2];
+  if (a->count == 1 && a->first != a->last)
+    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: a range with two different ends has at least 2 values",
+                    a->name, a->range);
+  if (a->type == PW_AXIS_LOG && !(a->first > 0 && a->last > 0))
+    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: the ends of a logarithmic range must be > 0", a->name,
+                    a->range);
+  return PW_OK;
+}
+
+static int grid_axis (pw_axis *a, char *text, pw_error *error) {
+  char *equals = strchr (text, '=');
+  if (equals == NULL || equals == text || equals[1] == 0)
+    return pw_fail (error, PW_INPUT, "--vary %.200s: expected NAME=lin:FIRST:LAST:COUNT, log:..., or a list v1,v2,...",
+                    text);
+  *equals = 0;
+  a->name = text;
+  a->range = equals + 1;
+  a->type = strncmp (a->range, "lin:", 4) == 0   ? PW_AXIS_LIN
+            : strncmp (a->range, "log:", 4) == 0 ? PW_AXIS_LOG
+                                                 : PW_AXIS_LIST;
+  if (a->type == PW_AXIS_LIST && strchr (a->range, ':'))
+    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: a range begins with lin: or log:", a->name, a->range);
+  return a->type == PW_AXIS_LIST ? grid_list (a, error) : grid_range (a, error);
+}
+
+/* The ends are exact, and so is what lies between wherever the numbers allow: lin:0:1:11 has 0.3 as its fourth value. */
+double pw_axis_value (const pw_axis *a, long i) {
+  if (a->type == PW_AXIS_LIST) return a->value[i];
+  double n = (double)(a->count - 1), k = (double)i;
+  if (i == 0 || a->first == a->last) return a->first;
+  if (i == a->count - 1) return a->last;
+  if (a->type == PW_AXIS_LIN) return (a->first * (n - k) + a->last * k) / n;
+  return pow (10, (log10 (a->first) * (n - k) + log10 (a->last) * k) / n);
+}
+
+/* ---- The grid ---- */
+
+/* The last varies fastest. */
+static int grid_count (pw_grid *g, pw_error *error) {
+  double rows = 1;
+  for (int i = 0; i < g->axes; i++) rows *= (double)g->axis[i].count;
+  if (rows > PW_GRID_ROWS)
+    return pw_fail (error, PW_INPUT, "the grid has %.15g rows: at most 1e8; take coarser ranges, or several sweeps",
+                    rows);
+  g->rows = 1;
+  for (int i = g->axes - 1; i >= 0; i--) {
+    g->axis[i].stride = g->rows;
+    g->rows *= g->axis[i].count;
+  }
+  return PW_OK;
+}
+
+int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error) {
+  int n = 0, status = PW_OK;
+  while (ranges && ranges[n]) n++;
+  *g = (pw_grid){ .axis = calloc ((size_t)n + 1, sizeof *g->axis) };
+  if (g->axis == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  for (; g->axes < n && status == PW_OK; g->axes++) {
+    char *text = strdup (ranges[g->axes]);
+    if (text == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+    g->axis[g->axes].name = text; /* freed with the grid, whatever comes */
+    status = grid_axis (g->axis + g->axes, text, error);
+    for (int i = 0; i < g->axes && status == PW_OK; i++)
+      if (strcmp (g->axis[i].name, text) == 0) status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", text);
+  }
+  return status == PW_OK ? grid_count (g, error) : status;
+}
+
+void pw_grid_free (pw_grid *g) {
+  for (int i = 0; i < g->axes; i++) {
+    free (g->axis[i].value);
+    free ((char *)(size_t)g->axis[i].name);
+  }
+  free (g->axis);
+  *g = (pw_grid){ .axis = NULL };
+}

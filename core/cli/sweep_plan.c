@@ -1,0 +1,178 @@
+/* What all runs of a sweep have in common: the model, the grid, the columns. */
+#include <stdlib.h>
+#include <string.h>
+#include "model.h"
+#include "sweep.h"
+
+enum { PLAN_TRIES = 1000 }; /* scenes that cannot be built before the grid is given up */
+
+/* ---- Scenes ---- */
+
+/* Sets what was asked for, then what is varied: parameters before the model is built, start values after. */
+static int plan_build (const pw_plan *p, long row, pw_model *m, pw_error *error) {
+  int status = pw_cli_apply (m, "--set", p->sets, pw_set, error);
+  for (int i = 0; i < p->grid.axes && status == PW_OK; i++)
+    if (p->grid.axis[i].parameter) status = pw_set (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
+  if (status == PW_OK) status = pw_cli_apply (m, "--start", p->starts, pw_set_start, error);
+  for (int i = 0; i < p->grid.axes && status == PW_OK; i++)
+    if (p->grid.axis[i].parameter == NULL)
+      status = pw_set_start (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
+  return status == PW_OK ? pw_build (m, error) : status;
+}
+
+int pw_plan_scene (const pw_plan *p, long row, pw_cli_model *m, pw_error *error) {
+  *m = (pw_cli_model){ .model = pw_file_model (p->file, error) };
+  if (m->model && plan_build (p, row, m->model, error) == PW_OK) m->system = pw_compile (m->model, error);
+  return m->system ? PW_OK : error->status;
+}
+
+/* ---- Axes ---- */
+
+/* 1 if a list of "NAME=VALUE" has this name. */
+static int plan_named (const char *const *list, const char *name) {
+  size_t n = strlen (name);
+  for (; list && *list; list++)
+    if (strncmp (*list, name, n) == 0 && (*list)[n] == '=') return 1;
+  return 0;
+}
+
+/* Every value of a parameter must lie in its domain; what is no parameter is a state, if it has a dot. */
+static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error) {
+  const pw_parameter *q = m->table->parameters;
+  while (q && q->name && strcmp (q->name, a->name) != 0) q++;
+  if (q && q->name) a->parameter = q, a->unit = q->unit;
+  const char *option = a->parameter ? "--set" : "--start";
+  if (plan_named (a->parameter ? p->sets : p->starts, a->name))
+    return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", a->name, option);
+  if (a->parameter == NULL && strchr (a->name, '.')) return PW_OK;
+  if (a->parameter == NULL) return pw_set (m, a->name, pw_axis_value (a, 0), error);
+  for (long i = 0; i < a->count; i++)
+    if (*pw_domain_check (q->domain, pw_axis_value (a, i))) return pw_set (m, a->name, pw_axis_value (a, i), error);
+  return PW_OK;
+}
+
+/* Finds the axes in a model that is not built, which has the parameters the command line sets. */
+static int plan_axes (pw_plan *p, pw_model *m, pw_error *error) {
+  int status = pw_cli_apply (m, "--set", p->sets, pw_set, error);
+  for (int i = 0; i < p->grid.axes && status == PW_OK; i++) status = plan_axis (p, p->grid.axis + i, m, error);
+  return status;
+}
+
+/* ---- Columns ---- */
+
+int pw_plan_state (const pw_system *s, int i) {
+  int n = pw_count_coordinates (s), bodies = pw_count_bodies (s), k = i - 6 * bodies;
+  if (k >= 0) return 3 * bodies + k / 2 + k % 2 * n;
+  return i % 6 < 3 ? i / 6 * 3 + i % 6 : n + i / 6 * 3 + i % 6 - 3;
+}
+
+/* The table of names must not get full. */
+static int plan_grow (pw_plan *p) {
+  if (p->columns < p->room) return PW_OK;
+  int room = p->room ? 2 * p->room : 64;
+  struct pw_column *more = realloc (p->column, (size_t)room * sizeof *more);
+  if (more == NULL) return PW_MACHINE;
+  p->column = more;
+  p->room = room;
+  pw_names_close (&p->index);
+  if (pw_names_open (&p->index, (size_t)room) != PW_OK) return PW_MACHINE;
+  for (int i = 0; i < p->columns; i++) pw_names_add (&p->index, p->column[i].name, i);
+  return PW_OK;
+}
+
+/* Adds the states of a scene that are not there yet, and the units of start values. */
+static int plan_columns_of (pw_plan *p, const pw_system *s, pw_error *error) {
+  char name[300];
+  for (int i = 0; i < 2 * pw_count_coordinates (s); i++) {
+    int state = pw_plan_state (s, i);
+    pw_state_name (s, state, name, sizeof name);
+    if (p->room && pw_names_find (&p->index, name) >= 0) continue;
+    const char *copy = pw_arena_text (&p->arena, name);
+    if (copy == NULL || plan_grow (p) != PW_OK) return pw_fail (error, PW_MACHINE, "out of memory");
+    p->column[p->columns] = (struct pw_column){ copy, pw_state_unit (s, state) };
+    pw_names_add (&p->index, copy, p->columns++);
+  }
+  for (pw_axis *a = p->grid.axis; a < p->grid.axis + p->grid.axes; a++) {
+    int state = a->parameter == NULL ? pw_find_state (s, a->name, NULL) : -1;
+    if (state >= 0) a->unit = pw_state_unit (s, state);
+  }
+  return PW_OK;
+}
+
+/* What a scan has seen. */
+typedef struct {
+  int built, refused;
+  pw_error first; /* why a scene could not be built */
+} plan_scan;
+
+static int plan_scan_row (pw_plan *p, long row, plan_scan *x, pw_error *error) {
+  pw_cli_model m;
+  pw_error own = { 0 };
+  int status = pw_plan_scene (p, row, &m, &own);
+  if (status == PW_OK) status = plan_columns_of (p, m.system, &own);
+  pw_cli_close_model (&m);
+  if (status == PW_OK)
+    x->built = 1;
+  else if (status == PW_MACHINE)
+    return pw_fail (error, status, "%s", own.text);
+  else if (x->refused++ == 0)
+    x->first = own;
+  return PW_OK;
+}
+
+/* Which bodies there are may depend on parameters that count something, so each value of these is built once, the others
+ * as in the first row, and the last row; apart from them one scene will do, if it can be built. */
+static int plan_columns (pw_plan *p, pw_error *error) {
+  plan_scan x = { .built = 0 };
+  int counts = 0, status = plan_scan_row (p, 0, &x, error);
+  for (const pw_axis *a = p->grid.axis; a < p->grid.axis + p->grid.axes; a++) {
+    int is_count = a->parameter && a->parameter->domain == PW_COUNT;
+    counts += is_count;
+    for (long i = 1; i < a->count && status == PW_OK && (is_count || !x.built) && x.refused < PLAN_TRIES; i++)
+      status = plan_scan_row (p, i * a->stride, &x, error);
+  }
+  if (status == PW_OK && counts) status = plan_scan_row (p, p->grid.rows - 1, &x, error);
+  if (status != PW_OK || x.built) return status;
+  return pw_fail (error, x.first.status, "%s", x.first.text);
+}
+
+static void plan_head (pw_plan *p) {
+  char name[300];
+  for (const pw_axis *a = p->grid.axis; a < p->grid.axis + p->grid.axes; a++) {
+    snprintf (name, sizeof name, "%s%s", a->parameter ? "" : "start.", a->name);
+    pw_text_name (&p->head, name, a->unit);
+  }
+  pw_text_cell (&p->head, "status");
+  pw_text_name (&p->head, "t", "s");
+  for (int i = 0; i < p->columns; i++) pw_text_name (&p->head, p->column[i].name, p->column[i].unit);
+  pw_text_name (&p->head, "kinetic", "J");
+  pw_text_add (&p->head, ",residual.position,residual.velocity,steps,rhs");
+  if (p->cpu) pw_text_name (&p->head, "cpu", "s");
+  pw_text_cell (&p->head, "reason");
+}
+
+/* ---- The plan ---- */
+
+int pw_plan_open (pw_plan *p, const char *const *ranges, pw_error *error) {
+  const pw_method *method;
+  int stabilisation, status = pw_parse_method (p->method, &method, &stabilisation, error);
+  if (status == PW_OK) status = pw_grid_read (&p->grid, ranges, error);
+  if (status != PW_OK) return status;
+  pw_model *m = pw_file_model (p->file, error);
+  if (m == NULL) return error->status;
+  status = plan_axes (p, m, error);
+  if (status == PW_OK) status = plan_columns (p, error);
+  if (status == PW_OK) plan_head (p);
+  if (status == PW_OK) status = pw_fingerprint_make (p, m, error);
+  pw_model_free (m);
+  return status;
+}
+
+void pw_plan_close (pw_plan *p) {
+  pw_grid_free (&p->grid);
+  pw_names_close (&p->index);
+  pw_arena_free (&p->arena);
+  pw_text_free (&p->head);
+  pw_text_free (&p->fingerprint);
+  free (p->column);
+}

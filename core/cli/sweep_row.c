@@ -1,0 +1,100 @@
+/* One run of a sweep, from the model to the cells of its row. */
+#define _POSIX_C_SOURCE 200809L
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "sweep.h"
+
+/* What is known of a run when it is over; a run that has not begun knows nothing. */
+typedef struct {
+  double t, kinetic, position, velocity, steps, rhs, cpu;
+  double *state; /* columns */
+} row_result;
+
+static double row_clock (void) {
+  struct timespec now;
+  clock_gettime (CLOCK_THREAD_CPUTIME_ID, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+/* States go to the columns of their names. */
+static int row_states (const pw_plan *p, const pw_system *s, const pw_sample *sample, double *state, pw_error *error) {
+  char name[300];
+  int n = pw_count_coordinates (s);
+  for (int i = 0; i < 2 * n; i++) {
+    int from = pw_plan_state (s, i);
+    int column = pw_names_find (&p->index, pw_state_name (s, from, name, sizeof name));
+    if (column < 0)
+      return pw_fail (error, PW_INPUT,
+                      "%s has no column: which bodies there are may only depend on parameters that are counts", name);
+    state[column] = from < n ? sample->q[from] : sample->v[from - n];
+  }
+  return PW_OK;
+}
+
+static int row_read (const pw_plan *p, const pw_system *s, pw_run *r, row_result *x, pw_error *error) {
+  pw_sample sample;
+  const pw_statistics *statistics = pw_run_statistics (r);
+  x->t = pw_time (r);
+  x->position = statistics->position;
+  x->velocity = statistics->velocity;
+  x->steps = (double)statistics->steps;
+  x->rhs = (double)statistics->rhs;
+  int status = pw_at (r, x->t, &sample, error);
+  if (status != PW_OK) return status;
+  x->kinetic = sample.kinetic;
+  return row_states (p, s, &sample, x->state, error);
+}
+
+/* The run itself; PW_RETRY if it was stopped.  A failure on the way does not hide how far it came. */
+static int row_run (const pw_plan *p, long row, const volatile sig_atomic_t *stop, row_result *x, pw_error *error) {
+  pw_cli_model m;
+  double start = row_clock ();
+  pw_run *r = NULL;
+  int status = pw_plan_scene (p, row, &m, error), stopped = 0;
+  if (status == PW_OK && (r = pw_open (m.system, p->method, &p->settings, error)) == NULL) status = error->status;
+  while (status == PW_OK && pw_time (r) < p->t_end && !stopped) {
+    status = pw_advance (r, p->t_end, error);
+    stopped = *stop != 0;
+  }
+  if (r) {
+    pw_error *own = &(pw_error){ 0 };
+    int read = row_read (p, m.system, r, x, status == PW_OK ? error : own);
+    if (status == PW_OK) status = read;
+    stopped = stopped && pw_time (r) < p->t_end;
+    pw_close (r);
+  }
+  pw_cli_close_model (&m);
+  x->cpu = row_clock () - start;
+  return stopped ? PW_RETRY : status > 0 ? pw_fail (error, PW_METHOD, "the method gave up") : status;
+}
+
+static void row_write (const pw_plan *p, long row, int status, const row_result *x, const char *reason, pw_text *t) {
+  static const char *const word[] = { "ok", "machine", "input", "start", "method" };
+  for (int i = 0; i < p->grid.axes; i++) pw_text_number (t, pw_grid_value (&p->grid, i, row));
+  pw_text_cell (t, word[-status]);
+  pw_text_number (t, x->t);
+  for (int i = 0; i < p->columns; i++) pw_text_number (t, x->state[i]);
+  pw_text_number (t, x->kinetic);
+  pw_text_number (t, x->position);
+  pw_text_number (t, x->velocity);
+  pw_text_number (t, x->steps);
+  pw_text_number (t, x->rhs);
+  if (p->cpu) pw_text_number (t, x->cpu);
+  pw_text_quoted (t, reason);
+}
+
+int pw_sweep_row (const pw_plan *p, long row, const volatile sig_atomic_t *stop, pw_text *text, pw_error *error) {
+  pw_error own = { 0 };
+  row_result x = { NAN, NAN, NAN, NAN, NAN, NAN, NAN, NULL };
+  x.state = malloc (((size_t)p->columns + 1) * sizeof *x.state);
+  if (x.state == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  for (int i = 0; i < p->columns; i++) x.state[i] = NAN;
+  int status = row_run (p, row, stop, &x, &own);
+  if (status == PW_MACHINE) pw_fail (error, status, "row %ld of the grid: %s", row + 1, own.text);
+  if (status != PW_RETRY && status != PW_MACHINE) row_write (p, row, status, &x, own.text, text);
+  free (x.state);
+  if (text->failed) return pw_fail (error, PW_MACHINE, "out of memory");
+  return status;
+}
