@@ -70,8 +70,8 @@ struct pw_saddle {
   int *idle;                /* rows that take no part */
   int idles;
   int *row_of_node;         /* first row of a node, or -1 */
-  double pivot;             /* squared, of the last factorisation */
-  int pivot_row;
+  double pivot;             /* squared, of the last factorisation */  int pivot_row;
+  double guard;             /* squared: the least that is good */
   char *memory;
 };
 

@@ -19,7 +19,10 @@
 struct pw_method_data {
   pw_run *run;
   int ggl;
-  int n, rows, holonomic, size; /* coordinates, rows, rows with mu, unknowns */
+  int n, rows, holonomic, size; /* coordinates, active rows, active rows with mu, unknowns */
+  int *map;                     /* all rows: number among the active ones, or -1; then the row of each active one */
+  const int *row;               /* rows: its number among all */
+  double *lambda, *mu;          /* all rows */
   SUNContext context;
   void *ida;
   N_Vector y, yp, id, work, work0;
@@ -46,17 +49,27 @@ static int ida_place (ida_data *d, double t, const double *y) {
   return status == PW_OK ? 0 : -1;
 }
 
+/* Multipliers of all rows from the unknowns, which hold those of the active rows. */
+static const double *ida_expand (const ida_data *d, const double *active, int count, double *all) {
+  if (d->map == NULL && count == d->rows) return active;
+  for (int i = 0; i < count; i++) all[d->map ? d->row[i] : i] = active[i];
+  return all;
+}
+
+/* From values of all rows those of the first so many active ones. */
+static void ida_compress (const ida_data *d, const double *all, int count, double *active) {
+  for (int i = 0; i < count; i++) active[i] = all[d->map ? d->row[i] : i];
+}
+
 /* q' - v + D G^T mu */
 static void ida_kinematics (ida_data *d, const double *y, const double *yp, double *out) {
   pw_system *s = d->run->s;
   int n = d->n;
   for (int j = 0; j < n; j++) out[j] = yp[j] - y[n + j];
   if (!d->ggl || d->holonomic == 0) return;
-  double *pull = d->given, *mu = pull + n + 3;
+  double *pull = d->given;
   memset (pull, 0, (size_t)n * sizeof *pull);
-  memset (mu, 0, (size_t)d->rows * sizeof *mu);
-  memcpy (mu, y + 2 * n + d->rows, (size_t)d->holonomic * sizeof *mu);
-  pw_add_JT (s, mu, pull);
+  pw_add_JT (s, ida_expand (d, y + 2 * n + d->rows, d->holonomic, d->mu), pull);
   for (int j = 0; j < n; j++) out[j] += d->scale[j] * pull[j];
 }
 
@@ -66,31 +79,37 @@ static void ida_momentum (ida_data *d, const double *y, const double *yp, double
   int n = d->n;
   double *pull = d->given, *f = pull + n + 3;
   memset (pull, 0, (size_t)n * sizeof *pull);
-  pw_add_JT (s, y + 2 * n, pull);
+  pw_add_JT (s, ida_expand (d, y + 2 * n, d->rows, d->lambda), pull);
   pw_sweep_force (s, f);
   for (int j = 0; j < n; j++) out[j] = s->mass[j] * yp[n + j] + pull[j] - f[j];
 }
 
-/* J v - eta and g, or J v' - gamma + 2 alpha (J v - eta) + beta^2 g */
-static void ida_constraints (ida_data *d, const double *y, const double *yp, double *out) {
+/* J v' - gamma + 2 alpha (J v - eta) + beta^2 g, all rows, onto J v - eta */
+static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *other) {
   pw_run *r = d->run;
   pw_system *s = r->s;
-  int n = d->n;
-  double *jv = d->given, *other = jv + d->rows;
-  pw_mul_J (s, y + n, jv);
-  pw_sweep_eta (s, other);
-  for (int i = 0; i < d->rows; i++) jv[i] -= other[i];
-  if (d->ggl) {
-    memcpy (out, jv, (size_t)d->rows * sizeof *out);
-    pw_sweep_g (s, out + d->rows);
-    return;
-  }
-  pw_mul_J (s, yp + n, out);
+  for (int i = 0; i < s->rows; i++) jv[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
+  pw_mul_J (s, yp + d->n, other);
+  for (int i = 0; i < s->rows; i++) jv[i] += other[i];
   pw_sweep_gamma (s, other);
-  for (int i = 0; i < d->rows; i++) out[i] += (i < s->holonomic ? 2 : 1) * r->alpha * jv[i] - other[i];
+  for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
   if (r->beta == 0) return;
   pw_sweep_g (s, other);
-  for (int i = 0; i < s->holonomic; i++) out[i] += r->beta * r->beta * other[i];
+  for (int i = 0; i < s->holonomic; i++) jv[i] += r->beta * r->beta * other[i];
+}
+
+/* J v - eta and g; or the stabilised accelerations */
+static void ida_constraints (ida_data *d, const double *y, const double *yp, double *out) {
+  pw_system *s = d->run->s;
+  double *jv = d->given, *other = jv + s->rows;
+  pw_mul_J (s, y + d->n, jv);
+  pw_sweep_eta (s, other);
+  for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
+  if (!d->ggl) ida_stabilised (d, yp, jv, other);
+  ida_compress (d, jv, d->rows, out);
+  if (!d->ggl) return;
+  pw_sweep_g (s, other);
+  ida_compress (d, other, d->holonomic, out + d->rows);
 }
 
 static int ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *user) {
@@ -115,7 +134,8 @@ static void ida_matrix_kinematics (ida_data *d, const double *y, double c) {
     pw_tape_put (&d->tape, j, n + j, -1);
   }
   if (!d->ggl) return;
-  pw_put put = { .col = 0, .rows = s->holonomic, .factor = 1, .row_scale = d->scale, .lambda = y + 2 * n + d->rows };
+  pw_put put = { .col = 0, .rows = s->holonomic, .factor = 1, .row_scale = d->scale, .map = d->map,
+                 .lambda = ida_expand (d, y + 2 * n + d->rows, d->holonomic, d->mu) };
   pw_newton_block (&d->newton, s, &d->tape, PW_JTL_Q, &put);
   put.col = 2 * n + d->rows;
   pw_newton_JT (s, &d->tape, &put);
@@ -125,7 +145,8 @@ static void ida_matrix_kinematics (ida_data *d, const double *y, double c) {
 static void ida_matrix_momentum (ida_data *d, const double *y, double c) {
   pw_system *s = d->run->s;
   int n = d->n;
-  pw_put put = { .row = n, .col = 0, .rows = d->rows, .factor = 1, .factor_nonholonomic = 1, .lambda = y + 2 * n };
+  pw_put put = { .row = n, .col = 0, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = d->map,
+                 .lambda = ida_expand (d, y + 2 * n, d->rows, d->lambda) };
   pw_newton_block (&d->newton, s, &d->tape, PW_JTL_Q, &put);
   put.factor = -1;
   pw_newton_block (&d->newton, s, &d->tape, PW_FORCE_Q, &put);
@@ -142,14 +163,14 @@ static void ida_matrix_momentum (ida_data *d, const double *y, double c) {
 static void ida_matrix_ggl (ida_data *d, const double *y) {
   pw_system *s = d->run->s;
   int n = d->n;
-  pw_put put = { .row = 2 * n, .col = 0, .rows = d->rows, .factor = 1, .factor_nonholonomic = 1, .w = y + n };
+  pw_put put = { .row = 2 * n, .col = 0, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = d->map, .w = y + n };
   pw_newton_block (&d->newton, s, &d->tape, PW_JW_Q, &put);
   put.factor = put.factor_nonholonomic = -1;
   pw_newton_block (&d->newton, s, &d->tape, PW_ETA_Q, &put);
   put.factor = put.factor_nonholonomic = 1;
   put.col = n;
   pw_newton_J (s, &d->tape, &put);
-  pw_newton_J (s, &d->tape, &(pw_put){ .row = 2 * n + d->rows, .col = 0, .rows = s->holonomic, .factor = 1 });
+  pw_newton_J (s, &d->tape, &(pw_put){ .row = 2 * n + d->rows, .col = 0, .rows = s->holonomic, .factor = 1, .map = d->map });
 }
 
 /* Rows of J v' = ...: (J v')_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G, (c + 2 alpha) J - gamma_v */
@@ -158,7 +179,7 @@ static void ida_matrix_accelerations (ida_data *d, const double *y, const double
   pw_system *s = r->s;
   int n = d->n;
   double alpha = r->alpha;
-  pw_put put = { .row = 2 * n, .col = 0, .rows = d->rows, .factor = 1, .factor_nonholonomic = 1, .w = yp + n };
+  pw_put put = { .row = 2 * n, .col = 0, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = d->map, .w = yp + n };
   pw_newton_block (&d->newton, s, &d->tape, PW_JW_Q, &put);
   put.w = y + n;
   put.factor = 2 * alpha, put.factor_nonholonomic = alpha;
@@ -171,7 +192,7 @@ static void ida_matrix_accelerations (ida_data *d, const double *y, const double
   pw_newton_block (&d->newton, s, &d->tape, PW_GAMMA_V, &put);
   put.factor = c + 2 * alpha, put.factor_nonholonomic = c + alpha;
   pw_newton_J (s, &d->tape, &put);
-  pw_newton_J (s, &d->tape, &(pw_put){ .row = 2 * n, .col = 0, .rows = s->holonomic, .factor = r->beta * r->beta });
+  pw_newton_J (s, &d->tape, &(pw_put){ .row = 2 * n, .col = 0, .rows = s->holonomic, .factor = r->beta * r->beta, .map = d->map });
 }
 
 static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, double c) {
@@ -211,7 +232,7 @@ static int ida_work (pw_real t, N_Vector vy, N_Vector vyp, N_Vector rate, void *
   const double *y = N_VGetArrayPointer (vy);
   (void)vyp;
   if (ida_place (d, t, y) != 0) return -1;
-  pw_sweep_ledger (d->run->s, y + 2 * d->n, N_VGetArrayPointer (rate));
+  pw_sweep_ledger (d->run->s, ida_expand (d, y + 2 * d->n, d->rows, d->lambda), N_VGetArrayPointer (rate));
   return 0;
 }
 
@@ -289,7 +310,7 @@ static void ida_fill_vectors (ida_data *d) {
   }
   memcpy (y, r->q, n * sizeof *y);
   memcpy (y + n, r->v, n * sizeof *y);
-  memcpy (y + 2 * n, r->lambda, (size_t)d->rows * sizeof *y);
+  ida_compress (d, r->lambda, d->rows, y + 2 * n);
   memcpy (yp, r->v, n * sizeof *y);
   memcpy (yp + n, r->a, n * sizeof *y);
 }
@@ -302,9 +323,11 @@ static int ida_open_vectors (ida_data *d) {
   d->id = N_VNew_Serial (d->size, d->context);
   d->work = N_VNew_Serial (s->entries + 1, d->context);
   d->work0 = N_VNew_Serial (s->entries + 1, d->context);
-  d->scale = malloc (((size_t)(3 * d->n + 6 + 2 * d->rows)) * sizeof *d->scale);
+  d->scale = calloc ((size_t)(3 * d->n + 6 + 4 * s->rows), sizeof *d->scale);
   if (!d->y || !d->yp || !d->id || !d->work || !d->work0 || !d->scale) return PW_MACHINE;
-  d->given = d->scale + d->n;
+  d->lambda = d->scale + d->n;
+  d->mu = d->lambda + s->rows;
+  d->given = d->mu + s->rows;
   for (int j = 0; j < d->n; j++)
     d->scale[j] = j < 3 * s->bodies && j % 3 < 2 ? 1 : 1 / (s->scale.length * s->scale.length);
   N_VConst (0, d->work);
@@ -335,6 +358,27 @@ static int ida_open_solver (ida_data *d) {
   return flag == 0 ? PW_OK : PW_MACHINE;
 }
 
+/* Only independent rows are shown to IDA. */
+static int ida_number_rows (ida_data *d) {
+  const pw_run *r = d->run;
+  const pw_system *s = r->s;
+  d->rows = s->rows;
+  d->holonomic = d->ggl ? s->holonomic : 0;
+  if (r->active == NULL) return PW_OK;
+  d->map = malloc ((size_t)(2 * s->rows) * sizeof *d->map);
+  if (d->map == NULL) return PW_MACHINE;
+  int *row = d->map + s->rows;
+  d->row = row;
+  d->rows = d->holonomic = 0;
+  for (int i = 0; i < s->rows; i++) {
+    d->map[i] = r->active[i] ? d->rows : -1;
+    if (!r->active[i]) continue;
+    d->holonomic += d->ggl && i < s->holonomic;
+    row[d->rows++] = i;
+  }
+  return PW_OK;
+}
+
 static int ida_open (pw_run *r, pw_error *error) {
   ida_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return ida_no_memory (r, error);
@@ -345,8 +389,7 @@ static int ida_open (pw_run *r, pw_error *error) {
     r->beta = pw_option_value (r, "beta");
   }
   d->n = r->s->coords;
-  d->rows = r->s->rows;
-  d->holonomic = d->ggl ? r->s->holonomic : 0;
+  if (ida_number_rows (d) != PW_OK) return ida_no_memory (r, error);
   d->size = 2 * d->n + d->rows + d->holonomic;
   d->stop = NAN;
   d->begun = r->t;
@@ -367,6 +410,7 @@ static void ida_close (pw_run *r) {
   if (d->context) SUNContext_Free (&d->context);
   pw_tape_close (&d->tape);
   pw_newton_close (&d->newton);
+  free (d->map);
   free (d->colptr);
   free (d->rowind);
   free (d->scale);
@@ -399,7 +443,8 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
   memcpy (q, y, n * sizeof *q);
   memcpy (v, y + n, n * sizeof *v);
   memcpy (a, yp + n, n * sizeof *a);
-  memcpy (lambda, y + 2 * n, (size_t)d->rows * sizeof *lambda);
+  for (int i = 0; d->map && i < d->run->s->rows; i++) lambda[i] = 0;
+  for (int i = 0; i < d->rows; i++) lambda[d->map ? d->row[i] : i] = y[2 * n + (size_t)i];
 }
 
 static int ida_fail (ida_data *d, int flag, pw_error *error) {

@@ -4,6 +4,7 @@
 
 #include <math.h>
 #include "pinwheel-solvers.h"
+#include "rank.h"
 #include "saddle.h"
 #include "system.h"
 
@@ -15,7 +16,12 @@ struct pw_run {
   int stabilisation;             /* index in method->stabilisations */
   double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
-  pw_saddle *saddle;  /* with the mass matrix and all rows: accelerations, impulses */
+  pw_saddle *saddle;  /* with the mass matrix and all rows: accelerations, impulses */  const unsigned char *active; /* rows: 0 for the redundant ones; NULL: there are none */
+  int redundant;               /* how many */
+  int *redundant_row;          /* which */
+  double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
+  char *rank_memory;
+  double guard;                /* an evaluation with a smaller pivot is too near a singular pose */
   double alpha, beta; /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;  /* first discontinuity of a signal after t */
 
@@ -66,6 +72,9 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error);
 /* Takes the residuals of the state just accelerated into the statistics. */
 void pw_note_residuals (pw_run *r);
 
+/* What the redundant rows follow from, at the pose J is swept and the saddle factorised at. */
+void pw_rank_coefficients (pw_run *r);
+
 /* ---- Projection ---- */
 
 typedef struct {
@@ -92,5 +101,7 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
 
 /* Makes r->q, r->v consistent at r->t and fills the report.  Errors: PW_START. */
 int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error);
+/* Counts what moved in the report, when the scales are known. */
+void pw_count_moved (pw_run *r);
 
 #endif

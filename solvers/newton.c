@@ -32,6 +32,11 @@ static void newton_gather (const pw_system *s, const pw_slab *k, const double *w
     }
 }
 
+/* Where a constraint row goes. */
+static inline int newton_row (const pw_put *put, int row) {
+  return put->map ? put->map[row] : row;
+}
+
 void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, const pw_put *put) {
   for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
     int rows = pw_block_rows (k->kind, block), cols = k->b.cols;
@@ -46,11 +51,11 @@ void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, co
     double factor = of_rows && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < rows; r++) {
-        int i = of_rows ? k->row + e * rows + r : pw_global (k, e, r);
-        double scaled = put->row_scale && i < s->coords ? factor * put->row_scale[i] : factor;
+        int i = of_rows ? newton_row (put, k->row + e * rows + r) : pw_global (k, e, r);
+        double scaled = put->row_scale && !of_rows && i < s->coords ? factor * put->row_scale[i] : factor;
         for (int c = 0; c < cols; c++, value++) {
           int j = pw_global (k, e, c);
-          if (j >= s->coords || (!of_rows && i >= s->coords)) continue;
+          if (j >= s->coords || i < 0 || (!of_rows && i >= s->coords)) continue;
           pw_tape_put (t, put->row + i, put->col + j, t->recording ? 0 : scaled * *value);
         }
       }
@@ -64,10 +69,10 @@ static void newton_J (const pw_system *s, pw_tape *t, const pw_put *put, int tra
     double factor = k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++) {
-        int i = k->row + e * k->kind->rows + r;
+        int i = newton_row (put, k->row + e * k->kind->rows + r);
         for (int c = 0; c < k->b.cols; c++, value++) {
           int j = pw_global (k, e, c);
-          if (j >= s->coords) continue;
+          if (j >= s->coords || i < 0) continue;
           if (transposed)
             pw_tape_put (t, put->row + j, put->col + i, factor * *value * (put->row_scale ? put->row_scale[j] : 1));
           else

@@ -76,6 +76,11 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error);
 
 void pw_close (pw_run *r);
 
+/* Redundant rows, and in words what one of them follows from, written to the buffer, which is returned.  Reactions are
+ * then not unique: samples give the smallest. */
+int pw_run_redundant (const pw_run *r);
+char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
+
 const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_start_report *pw_run_start (const pw_run *r);
 /* 1 if the consistent start moved this state (as pw_find_state numbers them) by more than round-off. */

@@ -15,8 +15,8 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
   *p = (pw_projector){ .own_velocity = weight_v != NULL, .velocity = weight_v ? NULL : r->saddle };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
   if (p->scratch == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  p->position = pw_saddle_open (s, weight_q, s->holonomic, NULL, error);
-  if (p->own_velocity) p->velocity = pw_saddle_open (s, weight_v, s->rows, NULL, error);
+  p->position = pw_saddle_open (s, weight_q, s->holonomic, r->active, error);
+  if (p->own_velocity) p->velocity = pw_saddle_open (s, weight_v, s->rows, r->active, error);
   if (p->position && p->velocity) return PW_OK;
   pw_projector_close (p);
   return PW_MACHINE;

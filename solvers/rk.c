@@ -16,6 +16,7 @@ struct pw_method_data {
   pw_projector projector;
   double base;                                                 /* time from which fixed steps are counted */
   long count;                                                  /* steps since then */
+  int split; /* 1: the last step ended inside one of them */
   double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES]; /* rates, accelerations, ledger's rates of the stages */
   double *q, *v;                                               /* a stage's state */
   double *lambda;
@@ -127,6 +128,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   (void)error;
   d->base = d->t0 = r->t;
   d->count = 0;
+  d->split = 0;
   memcpy (d->q0, r->q, bytes);
   memcpy (d->v0, r->v, bytes);
   memcpy (d->a0, r->a, bytes);
@@ -252,19 +254,38 @@ static double rk_next_time (const pw_run *r, double t_end, int *whole) {
 static int rk_fail (pw_run *r, int status, double t, pw_error *error) {
   int row;
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
-  if (pw_saddle_pivot (r->saddle, &row) < 1e-13) return pw_fail_singular (r, t, error);
+  if (pw_saddle_pivot (r->saddle, &row) <= r->guard) return pw_fail_singular (r, t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: the %s", t, r->settings.step,
                   rk_finite (r, r->data->q, r->data->v) ? "projection does not converge" : "state is no longer finite");
+}
+
+/* Tries the step to t1; if an evaluation lands near a singular pose, parts of it, of irregular sizes so that one of
+ * them misses the pose.  Leaves in *t1 the end of what succeeded. */
+static int rk_step_around (pw_run *r, double h, double *t1, int project, double *added) {
+  static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943 };
+  int row, status = rk_step (r, h, *t1, project, added);
+  for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
+    if (status != PW_RETRY || pw_saddle_pivot (r->saddle, &row) > r->guard) break;
+    double t = r->t + part[i] * h;
+    r->statistics.rejected++;
+    if (added) *added = 0;
+    status = rk_step (r, t - r->t, t, project, added);
+    if (status == PW_OK) *t1 = t;
+  }
+  return status;
 }
 
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
-  double t1 = rk_next_time (r, t_end, &whole), h = whole ? r->settings.step : t1 - r->t, added = 0;
-  int status = rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
+  double added = 0, end = rk_next_time (r, t_end, &whole), t1 = end;
+  double h = whole && !d->split ? r->settings.step : t1 - r->t;
+  int status = rk_step_around (r, h, &t1, project, r->settings.ledger ? &added : NULL);
   if (status != PW_OK) return rk_fail (r, status, r->t, error);
-  rk_accept (r, h, t1, added);
+  rk_accept (r, t1 == end ? h : t1 - r->t, t1, added);
   r->statistics.steps++;
+  d->split = t1 != end;
+  if (d->split) return PW_OK;
   d->count++;
   if (!whole) d->base = t1, d->count = 0;
   return PW_OK;
@@ -306,8 +327,10 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   double x = (t - d->t0) / (r->t - d->t0), added = 0;
   rk_interpolate (r, r->t - d->t0, x);
   r->projected_at = d->projected0 + x * (r->projected - d->projected0);
+  pw_saddle_set_guard (r->saddle, 0);
   int status = d->projects ? rk_project (r, t, r->q_at, r->v_at, &added) : PW_OK;
   if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
+  pw_saddle_set_guard (r->saddle, r->guard);
   r->statistics = keep;
   return status == PW_OK ? PW_OK : rk_fail (r, status, t, error);
 }

@@ -1,5 +1,6 @@
 /* A run: opened on a consistent start, advanced step by step, looked into, closed. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
@@ -69,14 +70,30 @@ static double run_time_scale (const pw_run *r) {
   return 1 / fastest;
 }
 
-/* Opens the saddle at the consistent start and evaluates the accelerations there. */
+static int run_open_saddle (pw_run *r, pw_error *error) {
+  pw_saddle_close (r->saddle);
+  r->saddle = pw_saddle_open (r->s, r->s->mass, r->s->rows, r->active, error);
+  return r->saddle ? PW_OK : PW_INPUT;
+}
+
+/* Opens the saddle at the consistent start and evaluates the accelerations there; if some rows hardly differ from
+ * others, an independent set is chosen first. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
-  pw_system *s = r->s;
-  r->saddle = pw_saddle_open (s, s->mass, s->rows, NULL, error);
-  if (r->saddle == NULL) return PW_INPUT;
-  int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  int row, status = run_open_saddle (r, error);
+  if (status != PW_OK) return status;
+  status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  if (status > 0 || pw_saddle_pivot (r->saddle, &row) < 1e-5) {
+    if ((double)r->s->rows * r->s->coords > PW_RANK_MOST) return pw_fail_singular (r, r->t, error);
+    int chosen = pw_rank_choose (r, error);
+    if (chosen == PW_OK && r->redundant) chosen = run_open_saddle (r, error);
+    if (chosen != PW_OK) return chosen;
+    status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  }
   if (status > 0) return pw_fail_singular (r, r->t, error);
-  return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  r->guard = fmin (1e-4, 0.01 * pw_saddle_pivot (r->saddle, &row));
+  pw_saddle_set_guard (r->saddle, r->guard);
+  return PW_OK;
 }
 
 /* The state is consistent: energies, ledger and statistics begin here. */
@@ -102,6 +119,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (status == PW_OK) status = run_first_evaluation (r, error);
   if (status != PW_OK) return status;
   r->s->scale.time = run_time_scale (r);
+  pw_count_moved (r);
   run_begin (r);
   return r->method->open (r, error);
 }
@@ -122,6 +140,7 @@ void pw_close (pw_run *r) {
   if (r == NULL) return;
   if (r->data) r->method->close (r);
   pw_saddle_close (r->saddle);
+  pw_rank_close (r);
   free (r->memory);
   free (r);
 }
@@ -136,11 +155,25 @@ static int run_pass_breakpoint (pw_run *r, pw_error *error) {
   return r->method->restart (r, error);
 }
 
+/* A stabilised method that lets go of its constraints is stopped: what follows would not be this mechanism. */
+#define PW_LOST 1e-2
+
+static int run_lost (pw_run *r, pw_error *error) {
+  pw_residuals now;
+  char element[120] = "a constraint";
+  pw_sweep_residuals (r->s, &now);
+  int row = now.position > PW_LOST ? now.row_position : now.row_velocity;
+  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the constraints are lost: %s is violated by %.3g in position and %.3g in rate (scaled)", r->t,
+                  element, now.position, now.velocity);
+}
+
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (!(r->t < t_end)) return PW_OK;
   int status = r->method->advance (r, t_end, error);
   if (status != PW_OK) return status;
   pw_note_residuals (r);
+  if (!(r->statistics.position <= PW_LOST && r->statistics.velocity <= PW_LOST) && r->stabilisation > 0) return run_lost (r, error);
   return r->t >= r->breakpoint ? run_pass_breakpoint (r, error) : PW_OK;
 }
 
@@ -175,6 +208,7 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   int status = r->method->at (r, t, error);
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
+  if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_share (r, r->lambda_at);
   run_account (r, sample);
   pw_sweep_residuals (r->s, &now);
   sample->position = now.position;
@@ -190,6 +224,34 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   if (status > 0) return pw_fail_singular (r, r->t, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
+}
+
+int pw_run_redundant (const pw_run *r) {
+  return r->redundant;
+}
+
+char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
+  pw_system *s = r->s;
+  char element[120], row_name[120];
+  int row = r->redundant_row[i];
+  size_t n = (size_t)snprintf (buffer, size, "%s (%s) follows from", pw_row_element (s, row, element, sizeof element),
+                               pw_reaction_name (s, row, row_name, sizeof row_name));
+  if (pw_place (s, r->t, r->q, r->v) != PW_OK) return buffer;
+  pw_sweep_J (s);
+  if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
+  pw_rank_coefficients (r);
+  const double *c = r->coefficient + i * s->rows;
+  int partners = 0;
+  for (int a = 0; a < s->rows && n + 1 < size; a++) {
+    if (fabs (c[a]) < 1e-8) continue;
+    if (partners++ == 6) {
+      snprintf (buffer + n, size - n, " and others");
+      break;
+    }
+    n += (size_t)snprintf (buffer + n, size - n, "%s %s (%s)", partners > 1 ? "," : "", pw_row_element (s, a, element, sizeof element),
+                           pw_reaction_name (s, a, row_name, sizeof row_name));
+  }
+  return buffer;
 }
 
 const pw_statistics *pw_run_statistics (const pw_run *r) {

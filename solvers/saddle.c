@@ -5,17 +5,22 @@
  * (Golub & Greif 2003, On solving block-structured indefinite linear systems.)  Rows that share no coordinate with
  * weight do not meet in S, so S has the pattern of the mechanism: a chain is block tridiagonal.  Coordinates without
  * weight are eliminated before, in reduce.c. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "saddle.h"
 #include "condense.h"
 
+/* A pivot is 1 minus the square of a cosine: of a dependent row round-off leaves some eps. */
+#define SADDLE_ROUND_OFF (200 * DBL_EPSILON)
+
 pw_saddle *pw_saddle_open (pw_system *s, const double *weight, int rows, const unsigned char *active, pw_error *error) {
   int status = PW_MACHINE;
   pw_saddle *k = calloc (1, sizeof *k);
   if (k) {
     k->s = s;
+    k->guard = SADDLE_ROUND_OFF;
     status = pw_reduce_open (&k->reduce, s, weight, rows, active, error);
     if (status == PW_OK) status = pw_condense (k, weight, rows, active, error);
   }
@@ -107,7 +112,7 @@ static int saddle_judge (pw_saddle *k, double pivot, int row) {
     k->pivot = pivot;
     k->pivot_row = row;
   }
-  return k->pivot > 1e-28 ? PW_OK : PW_RETRY;
+  return k->pivot > k->guard ? PW_OK : PW_RETRY;
 }
 
 static int saddle_judge_small (pw_saddle *k) {
@@ -132,6 +137,10 @@ int pw_saddle_factor (pw_saddle *k) {
   if (k->wides) saddle_assemble_wide (k);
   double pivot = pw_ldl_factor (k->ldl, &node);
   return saddle_judge (k, pivot, node >= 0 ? k->row_of_node[node] : -1);
+}
+
+void pw_saddle_set_guard (pw_saddle *k, double guard) {
+  k->guard = fmax (guard * guard, SADDLE_ROUND_OFF);
 }
 
 double pw_saddle_pivot (const pw_saddle *k, int *row) {

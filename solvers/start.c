@@ -4,6 +4,7 @@
  * everything free.  A state that is consistent to round-off is left alone, to the bit. */
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
@@ -94,6 +95,11 @@ int pw_start_moved (const pw_system *s, const pw_start_report *report, int state
   return !(fabs (to - from) <= 16 * DBL_EPSILON * (fabs (to) + unit));
 }
 
+void pw_count_moved (pw_run *r) {
+  r->start.moved = 0;
+  for (int j = 0; j < 2 * r->s->coords; j++) r->start.moved += pw_start_moved (r->s, &r->start, j);
+}
+
 /* Fills the report; the state given is in q_given, the new one in q. */
 static void start_report (pw_run *r, int freed, const pw_residuals *before) {
   pw_start_report *report = &r->start;
@@ -104,7 +110,48 @@ static void start_report (pw_run *r, int freed, const pw_residuals *before) {
                                .freed = freed,
                                .position = before->position,
                                .velocity = before->velocity };
-  for (int j = 0; j < 2 * r->s->coords; j++) report->moved += pw_start_moved (r->s, report, j);
+}
+
+/* Redundant rows make the plain attempt fail: it is repeated with an independent set, found where the state was given.
+ * Off the constraints redundant rows look independent, the more so the farther off: hence the tolerances. */
+static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *trouble, pw_error *error) {
+  static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
+  pw_system *s = r->s;
+  const unsigned char *before = r->active;
+  int status = start_attempt (r, held, trouble, error), rank = s->rows;
+  if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
+  unsigned char *active = malloc ((size_t)s->rows + 1);
+  if (active == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  for (size_t i = 0; i < sizeof tolerance / sizeof *tolerance && status == PW_RETRY; i++) {
+    if (pw_place (s, r->t, r->q_given, r->v_given) != PW_OK) break;
+    pw_sweep_J (s);
+    int now = pw_rank_select (s, tolerance[i], active);
+    if (now < 0 || now == rank) continue;
+    rank = now;
+    r->active = active;
+    status = start_attempt (r, held, trouble, error);
+    r->active = before;
+  }
+  free (active);
+  return status;
+}
+
+/* A start that was given rates and is left with none: the wheels lock it. */
+static int start_locked (pw_run *r, pw_error *error) {
+  pw_system *s = r->s;
+  double given = 0, left = 0;
+  char element[120], text[300] = "";
+  for (int j = 0; j < s->coords; j++) {
+    given += s->metric[j] * r->v_given[j] * r->v_given[j];
+    left += s->metric[j] * r->v[j] * r->v[j];
+  }
+  if (given == 0 || left > 1e-20 * given) return PW_OK;
+  for (int i = s->holonomic; i < s->rows && strlen (text) < 150; i++) {
+    size_t n = strlen (text);
+    snprintf (text + n, sizeof text - n, "%s%s", n ? ", " : "", pw_row_element (s, i, element, sizeof element));
+  }
+  return pw_fail (error, PW_START, "model %s: the given rates would have to be removed entirely: %s allow no motion here", s->model,
+                  *text ? text : "the constraints");
 }
 
 int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
@@ -121,12 +168,13 @@ int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
   pw_sweep_residuals (s, &before);
   for (int j = 0; held && j < 2 * s->coords; j++) any |= held[j];
   if (before.position > 8 * DBL_EPSILON || before.velocity > 8 * DBL_EPSILON) {
-    status = start_attempt (r, any ? held : NULL, &trouble, error);
+    status = start_ranked (r, any ? held : NULL, &trouble, error);
     if (status == PW_RETRY && any) {
       freed = 1;
-      status = start_attempt (r, NULL, &trouble, error);
+      status = start_ranked (r, NULL, &trouble, error);
     }
   }
   start_report (r, freed, &before);
+  if (status == PW_OK) status = start_locked (r, error);
   return status == PW_RETRY ? start_fail (r, &trouble, error) : status;
 }

@@ -1,0 +1,48 @@
+/* N four-bar linkages in a row: N + 1 vertical cranks of 1 m at x = 0 .. N, joined at their tops by N couplers of 1 m.
+ *
+ * All cranks stay parallel.  Whenever they are horizontal the linkage is in a singular pose: N constraint rows become
+ * dependent and the cranks could go separate ways; the physical motion passes straight through:
+ * theta'' = -(g / l) ((N + 1) / 2 + N) / ((N + 1) / 3 + N) cos theta.
+ * (Gonzalez, Dopico, Pastorino & Cuadrado 2006, Multibody System Dynamics 16; IFToMM benchmark A02.) */
+#include <stdio.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double N, m, l, g, speed;
+} four_bar;
+
+static const pw_parameter parameters[] = {
+  { PW_AT (four_bar, N), 2, "", "number of couplers", PW_COUNT },
+  { PW_AT (four_bar, m), 1, "kg", "mass of a bar, a uniform rod", PW_POSITIVE },
+  { PW_AT (four_bar, l), 1, "m", "length of a bar", PW_POSITIVE },
+  { PW_AT (four_bar, g), 9.81, "m/s^2", "gravity", PW_REAL },
+  { PW_AT (four_bar, speed), -1, "rad/s", "angular velocity of the cranks at the start", PW_REAL },
+  { .name = NULL },
+};
+
+static void build (pw_model *m, const void *parameter) {
+  const four_bar *p = parameter;
+  double l = p->l, inertia = p->m * l * l / 12, v = -p->speed * l;
+  char crank[24], before[24], coupler[24], pin[24];
+  for (int i = 0; i <= (int)p->N; i++) {
+    snprintf (crank, sizeof crank, "crank%d", i);
+    pw_add_body (m, &(pw_body){ .name = crank, .mass = p->m, .inertia = inertia, .start = { i * l, l / 2, PW_PI / 2 }, .rate = { v / 2, 0, p->speed } });
+    snprintf (pin, sizeof pin, "A%d", i);
+    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { crank, "ground" }, .at = { { -l / 2, 0 }, { i * l, 0 } } });
+    if (i == 0) continue;
+    snprintf (before, sizeof before, "crank%d", i - 1);
+    snprintf (coupler, sizeof coupler, "coupler%d", i);
+    pw_add_body (m, &(pw_body){ .name = coupler, .mass = p->m, .inertia = inertia, .start = { (i - 0.5) * l, l, 0 }, .rate = { v, 0, 0 } });
+    snprintf (pin, sizeof pin, "B%d", i);
+    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { before, coupler }, .at = { { l / 2, 0 }, { -l / 2, 0 } } });
+    snprintf (pin, sizeof pin, "C%d", i);
+    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { coupler, crank }, .at = { { l / 2, 0 }, { l / 2, 0 } } });
+  }
+  pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
+}
+
+PW_MODEL (.about = "N four-bar linkages in a row, which pass singular poses",
+          .parameters = parameters,
+          .parameters_size = sizeof (four_bar),
+          .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
+          .build = build);

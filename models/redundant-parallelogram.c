@@ -1,0 +1,45 @@
+/* Redundant parallelogram: three equal cranks carry one rigid coupler; two would do.
+ *
+ * Of the 12 constraint rows 11 are independent: which crank carries how much of the coupler along its length is not
+ * determined by rigid-body mechanics.  The motion is that of one angle theta of the cranks against the horizontal,
+ * theta'' = -(g / l) (3/2 + mc/m) / (1 + mc/m) cos theta.
+ * (After the IFToMM library of computational benchmark problems; Gonzalez et al. 2006.) */
+#include <math.h>
+#include <stdio.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double m, l, mc, g, theta;
+} parallelogram;
+
+static const pw_parameter parameters[] = {
+  { PW_AT (parallelogram, m), 1, "kg", "mass of a crank, a uniform rod", PW_POSITIVE },
+  { PW_AT (parallelogram, l), 1, "m", "length of a crank, and distance of their pivots", PW_POSITIVE },
+  { PW_AT (parallelogram, mc), 2, "kg", "mass of the coupler, a uniform rod", PW_POSITIVE },
+  { PW_AT (parallelogram, g), 9.81, "m/s^2", "gravity", PW_REAL },
+  { PW_AT (parallelogram, theta), -PW_PI / 4, "rad", "angle of the cranks at the start", PW_REAL },
+  { .name = NULL },
+};
+
+static void build (pw_model *m, const void *parameter) {
+  const parallelogram *p = parameter;
+  double c = p->l * cos (p->theta), s = p->l * sin (p->theta);
+  pw_add_body (m, &(pw_body){ .name = "coupler", .mass = p->mc, .inertia = p->mc * p->l * p->l / 3, .start = { p->l + c, s, 0 } });
+  for (int i = 0; i < 3; i++) {
+    char crank[16], pivot[16], joint[16];
+    double x = i * p->l;
+    snprintf (crank, sizeof crank, "crank%d", i + 1);
+    snprintf (pivot, sizeof pivot, "A%d", i + 1);
+    snprintf (joint, sizeof joint, "B%d", i + 1);
+    pw_add_body (m, &(pw_body){ .name = crank, .mass = p->m, .inertia = p->m * p->l * p->l / 12, .start = { x + c / 2, s / 2, p->theta } });
+    pw_add_pin (m, &(pw_pin){ .name = pivot, .body = { crank, "ground" }, .at = { { -p->l / 2, 0 }, { x, 0 } } });
+    pw_add_pin (m, &(pw_pin){ .name = joint, .body = { crank, "coupler" }, .at = { { p->l / 2, 0 }, { x - p->l, 0 } } });
+  }
+  pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
+}
+
+PW_MODEL (.about = "three cranks carry one coupler: one constraint row too many",
+          .parameters = parameters,
+          .parameters_size = sizeof (parallelogram),
+          .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
+          .build = build);

@@ -1,0 +1,53 @@
+/* Slider-crank: a crank on the ground, a rod, and a slider on the x axis.
+ *
+ * With equal lengths the slider passes over the crank's pivot, a singular pose in which the rod could turn with the crank
+ * instead.  For rods of mass m and length 1 and a slider of mass ms the angle theta of the crank follows from
+ * (5/12 + 9/4 sin^2 theta + 1/4 cos^2 theta) m theta'^2 / 2 + 4 ms sin^2 theta theta'^2 / 2 = constant without gravity.
+ * The slider is held on its axis by two drives that prescribe y and the angle to be 0. */
+#include <math.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double l1, l2, m1, m2, ms, theta, omega, g;
+} slider_crank;
+
+static const pw_parameter parameters[] = {
+  { PW_AT (slider_crank, l1), 1, "m", "length of the crank", PW_POSITIVE },
+  { PW_AT (slider_crank, l2), 1, "m", "length of the rod", PW_POSITIVE },
+  { PW_AT (slider_crank, m1), 1, "kg", "mass of the crank, a uniform rod", PW_POSITIVE },
+  { PW_AT (slider_crank, m2), 1, "kg", "mass of the rod, uniform", PW_POSITIVE },
+  { PW_AT (slider_crank, ms), 1, "kg", "mass of the slider", PW_NONNEGATIVE },
+  { PW_AT (slider_crank, theta), PW_PI / 4, "rad", "angle of the crank at the start", PW_REAL },
+  { PW_AT (slider_crank, omega), 2, "rad/s", "angular velocity of the crank at the start", PW_REAL },
+  { PW_AT (slider_crank, g), 0, "m/s^2", "gravity, down along y", PW_REAL },
+  { .name = NULL },
+};
+
+static void build (pw_model *m, const void *parameter) {
+  const slider_crank *p = parameter;
+  double c = cos (p->theta), s = sin (p->theta), w = p->omega;
+  if (p->l1 * fabs (s) > p->l2) {
+    pw_refuse (m, "l2 = %g: the rod does not reach the slider's axis at theta = %g", p->l2, p->theta);
+    return;
+  }
+  double beta = -asin (p->l1 * s / p->l2), rate = -p->l1 * c * w / (p->l2 * cos (beta));
+  double x = p->l1 * c + p->l2 * cos (beta), v = -p->l1 * s * w - p->l2 * sin (beta) * rate;
+  pw_add_body (m, &(pw_body){ .name = "crank", .mass = p->m1, .inertia = p->m1 * p->l1 * p->l1 / 12,
+                              .start = { p->l1 * c / 2, p->l1 * s / 2, p->theta }, .rate = { -p->l1 * s * w / 2, p->l1 * c * w / 2, w } });
+  pw_add_body (m, &(pw_body){ .name = "rod", .mass = p->m2, .inertia = p->m2 * p->l2 * p->l2 / 12,
+                              .start = { p->l1 * c + p->l2 * cos (beta) / 2, p->l1 * s / 2, beta },
+                              .rate = { -p->l1 * s * w - p->l2 * sin (beta) * rate / 2, p->l1 * c * w / 2, rate } });
+  pw_add_body (m, &(pw_body){ .name = "slider", .mass = p->ms, .start = { x, 0, 0 }, .rate = { v, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "crank", "ground" }, .at = { { -p->l1 / 2, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "crank", "rod" }, .at = { { p->l1 / 2, 0 }, { -p->l2 / 2, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "C", .body = { "rod", "slider" }, .at = { { p->l2 / 2, 0 } } });
+  pw_add_drive (m, &(pw_drive){ .name = "guide", .body = { "slider", "ground" }, .what = PW_DRIVE_Y });
+  pw_add_drive (m, &(pw_drive){ .name = "upright", .body = { "slider", "ground" }, .what = PW_DRIVE_ANGLE });
+  if (p->g != 0) pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
+}
+
+PW_MODEL (.about = "crank, rod and slider; with equal lengths it passes a singular pose",
+          .parameters = parameters,
+          .parameters_size = sizeof (slider_crank),
+          .run = { .t_end = 1, .step = 1e-3, .method = "rk4+projection" },
+          .build = build);

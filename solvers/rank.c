@@ -1,0 +1,255 @@
+/* Redundant rows: an independent set is chosen, the others are watched.
+ *
+ * A redundant row is J_i = sum_a c_ia J_a over active rows a.  Its coefficients come from the saddle point:
+ * with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum c_ia e_a span the multipliers that
+ * pull on nothing, so the least-norm ones are lambda + sum z_i n_i with z from a small least-squares problem.
+ *
+ * The rank is judged at consistent poses off the singular set: at the start and at two poses a short motion away.
+ * (Garcia de Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "method.h"
+#include "rank.h"
+
+/* ---- Gram-Schmidt ---- */
+
+/* Length of a unit of coordinate j. */
+static double rank_unit (const pw_system *s, int j) {
+  return j < 3 * s->bodies && j % 3 < 2 ? 1 : s->scale.length;
+}
+
+/* All rows of J, dense, in units of the scene and of length 1; empty rows stay 0. */
+static void rank_expand (const pw_system *s, double *rows) {
+  int n = s->coords;
+  memset (rows, 0, (size_t)s->rows * (size_t)n * sizeof *rows);
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
+    for (int e = 0; e < k->b.count; e++)
+      for (int r = 0; r < k->kind->rows; r++) {
+        double *row = rows + (size_t)(k->row + e * k->kind->rows + r) * (size_t)n, norm = 0;
+        const double *J = k->J + (e * k->kind->rows + r) * k->b.cols;
+        for (int c = 0; c < k->b.cols; c++) {
+          int j = pw_global (k, e, c);
+          if (j < n) row[j] += J[c] / rank_unit (s, j);
+        }
+        for (int j = 0; j < n; j++) norm += row[j] * row[j];
+        for (int j = 0; norm > 0 && j < n; j++) row[j] /= sqrt (norm);
+      }
+}
+
+/* Takes the kept rows' directions out of a row, twice (Giraud, Langou & Rozloznik 2005); its norm afterwards. */
+static double rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n) {
+  double norm = 0;
+  for (int pass = 0; pass < 2; pass++)
+    for (int k = 0; k < rank; k++) {
+      const double *other = rows + (size_t)kept[k] * (size_t)n;
+      double dot = 0;
+      for (int j = 0; j < n; j++) dot += row[j] * other[j];
+      for (int j = 0; j < n; j++) row[j] -= dot * other[j];
+    }
+  for (int j = 0; j < n; j++) norm += row[j] * row[j];
+  return sqrt (norm);
+}
+
+/* The kept rows become an orthonormal basis of the range of J^T, their numbers go to `kept`. */
+static int rank_basis (const pw_system *s, double tol, double *rows, int *kept, unsigned char *active) {
+  int rank = 0, n = s->coords;
+  rank_expand (s, rows);
+  for (int i = 0; i < s->rows; i++) {
+    double *row = rows + (size_t)i * (size_t)n, norm = rank_orthogonalise (row, rows, kept, rank, n);
+    active[i] = norm > tol;
+    if (!active[i]) continue;
+    for (int j = 0; j < n; j++) row[j] /= norm;
+    kept[rank++] = i;
+  }
+  return rank;
+}
+
+int pw_rank_select (const pw_system *s, double tol, unsigned char *active) {
+  double *rows = malloc (((size_t)s->rows * (size_t)s->coords + 1) * sizeof *rows);
+  int *kept = malloc (((size_t)s->rows + 1) * sizeof *kept), rank = PW_MACHINE;
+  if (rows && kept) rank = rank_basis (s, tol, rows, kept, active);
+  free (rows);
+  free (kept);
+  return rank;
+}
+
+/* ---- Choosing ---- */
+
+typedef struct {
+  double *rows, *q, *motion;
+  int *kept;
+  unsigned char *active, *best;
+  char *memory;
+} rank_search;
+
+static int rank_search_open (rank_search *x, const pw_system *s) {
+  size_t n = (size_t)s->coords, m = (size_t)s->rows;
+  x->memory = malloc ((m * n + 2 * n + 4) * sizeof (double) + m * sizeof (int) + 2 * m);
+  if (x->memory == NULL) return PW_MACHINE;
+  x->rows = (double *)(void *)x->memory;
+  x->q = x->rows + m * n;
+  x->motion = x->q + n;
+  x->kept = (int *)(void *)(x->motion + n + 4);
+  x->active = (unsigned char *)(x->kept + m);
+  x->best = x->active + m;
+  return PW_OK;
+}
+
+/* A direction that the rows allow, of size 1 in units of the scene: the given rates, or a fixed irregular one. */
+static void rank_direction (const pw_system *s, const rank_search *x, int rank, const double *v, int number) {
+  double most = 0;
+  for (int j = 0; j < s->coords; j++)
+    x->motion[j] = number == 0 ? v[j] * rank_unit (s, j) : sin (1.7 + 2.39996 * (j + 1) * number);
+  rank_orthogonalise (x->motion, x->rows, x->kept, rank, s->coords);
+  for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (x->motion[j]));
+  for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / rank_unit (s, j);
+}
+
+/* The rank a short motion away, with the rows that are independent there in x->active; 0 if there is no such pose. */
+static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
+  pw_system *s = r->s;
+  pw_projector p;
+  pw_error none = { 0 };
+  int row, away = 0;
+  double worst;
+  if (pw_place (s, r->t, r->q, r->v) != PW_OK) return 0;
+  pw_sweep_J (s);
+  rank_basis (s, 1e-7, x->rows, x->kept, x->active);
+  rank_direction (s, x, rank, r->v, number);
+  for (int j = 0; j < s->coords; j++) x->q[j] = r->q[j] + 0.03 * x->motion[j];
+  const unsigned char *before = r->active;
+  r->active = x->active;
+  if (pw_projector_open (&p, r, s->metric, s->metric, &none) == PW_OK) {
+    if (pw_project_positions (&p, r, r->t, x->q, r->v, &row, &worst) == PW_OK) away = rank_basis (s, 1e-7, x->rows, x->kept, x->active);
+    pw_projector_close (&p);
+  }
+  r->active = before;
+  return away;
+}
+
+/* The row's partners, for the notice. */
+static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
+  pw_system *s = r->s;
+  size_t m = (size_t)s->rows, k = (size_t)redundant;
+  r->rank_memory = malloc (m + k * sizeof (int) + 16 + (k * m + k * k + k + (size_t)s->coords + 3 + m) * sizeof (double));
+  if (r->rank_memory == NULL) return PW_MACHINE;
+  r->coefficient = (double *)(void *)r->rank_memory;
+  r->redundant_row = (int *)(void *)(r->coefficient + k * m + k * k + k + (size_t)s->coords + 3 + m);
+  unsigned char *mask = (unsigned char *)(r->redundant_row + k);
+  memcpy (mask, active, m);
+  r->active = mask;
+  for (int i = 0; i < s->rows; i++)
+    if (!active[i]) r->redundant_row[r->redundant++] = i;
+  return PW_OK;
+}
+
+int pw_rank_choose (pw_run *r, pw_error *error) {
+  pw_system *s = r->s;
+  rank_search x;
+  if (rank_search_open (&x, s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  int status = pw_place (s, r->t, r->q, r->v);
+  pw_sweep_J (s);
+  int rank = rank_basis (s, 1e-7, x.rows, x.kept, x.active), best = rank;
+  memcpy (x.best, x.active, (size_t)s->rows);
+  for (int number = 0; number < 3 && status == PW_OK; number++) {
+    int away = rank_nearby (r, &x, rank, number);
+    if (away <= best) continue;
+    best = away;
+    memcpy (x.best, x.active, (size_t)s->rows);
+  }
+  if (best > rank)
+    status = pw_fail (error, PW_START, "model %s: the start is a singular pose: %d constraint rows are independent there, %d nearby; start a little off it",
+                      s->model, rank, best);
+  else if (best < s->rows && rank_store (r, x.best, s->rows - best) != PW_OK)
+    status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  free (x.memory);
+  if (pw_place (s, r->t, r->q, r->v) == PW_OK) pw_sweep_J (s);
+  return status;
+}
+
+void pw_rank_close (pw_run *r) {
+  free (r->rank_memory);
+  r->rank_memory = NULL;
+  r->active = NULL;
+  r->redundant = 0;
+}
+
+/* ---- Sharing ---- */
+
+/* f = J_i^T */
+static void rank_row (const pw_system *s, int row, double *f) {
+  memset (f, 0, (size_t)s->coords * sizeof *f);
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
+    int n = row - k->row;
+    if (n < 0 || n >= k->b.count * k->kind->rows) continue;
+    for (int c = 0; c < k->b.cols; c++) {
+      int j = pw_global (k, n / k->kind->rows, c);
+      if (j < s->coords) f[j] += k->J[n * k->b.cols + c];
+    }
+  }
+}
+
+/* 1 for a force, L for a moment: a row without x and y columns. */
+static double rank_size (const pw_system *s, int row) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
+    int n = row - k->row;
+    if (n < 0 || n >= k->b.count * k->kind->rows) continue;
+    const double *J = k->J + n * k->b.cols;
+    for (int b = 0; b < k->kind->bodies; b++)
+      if (J[3 * b] != 0 || J[3 * b + 1] != 0) return 1;
+  }
+  return s->scale.length;
+}
+
+void pw_rank_coefficients (pw_run *r) {
+  pw_system *s = r->s;
+  int m = s->rows, k = r->redundant;
+  double *f = r->coefficient + k * m + k * k + k, *nothing = f + s->coords + 3;
+  memset (nothing, 0, (size_t)m * sizeof *nothing);
+  for (int i = 0; i < k; i++) {
+    rank_row (s, r->redundant_row[i], f);
+    pw_saddle_solve (r->saddle, f, nothing, f, r->coefficient + i * m);
+  }
+}
+
+/* Solves A x = b, symmetric positive definite k x k, in place (Cholesky). */
+static void rank_cholesky (double *A, double *b, int k) {
+  for (int i = 0; i < k; i++) {
+    for (int j = 0; j <= i; j++) {
+      double sum = A[i * k + j];
+      for (int n = 0; n < j; n++) sum -= A[i * k + n] * A[j * k + n];
+      A[i * k + j] = i == j ? sqrt (sum) : sum / A[j * k + j];
+    }
+    for (int n = 0; n < i; n++) b[i] -= A[i * k + n] * b[n];
+    b[i] /= A[i * k + i];
+  }
+  for (int i = k - 1; i >= 0; i--) {
+    for (int n = i + 1; n < k; n++) b[i] -= A[n * k + i] * b[n];
+    b[i] /= A[i * k + i];
+  }
+}
+
+void pw_rank_share (pw_run *r, double *lambda) {
+  pw_system *s = r->s;
+  int m = s->rows, k = r->redundant;
+  if (k == 0) return;
+  pw_rank_coefficients (r);
+  double *c = r->coefficient, *A = c + k * m, *z = A + k * k;
+  for (int i = 0; i < k; i++) { /* minimise sum ((lambda + N z) / size)^2, N = [e_i - c_i] */
+    z[i] = 0;
+    for (int j = 0; j <= i; j++) A[i * k + j] = 0;
+  }
+  for (int row = 0; row < m; row++) {
+    double size = rank_size (s, row), weight = 1 / (size * size);
+    for (int i = 0; i < k; i++) {
+      double n = (r->redundant_row[i] == row) - c[i * m + row];
+      z[i] -= weight * n * lambda[row];
+      for (int j = 0; j <= i; j++) A[i * k + j] += weight * n * ((r->redundant_row[j] == row) - c[j * m + row]);
+    }
+  }
+  rank_cholesky (A, z, k);
+  for (int row = 0; row < m; row++)
+    for (int i = 0; i < k; i++) lambda[row] += z[i] * ((r->redundant_row[i] == row) - c[i * m + row]);
+}

@@ -1,0 +1,27 @@
+/* Which constraint rows are independent, and what the others follow from. */
+#ifndef PW_RANK_H
+#define PW_RANK_H
+
+#include "system.h"
+
+struct pw_run;
+
+/* The largest rows x coordinates that is examined densely. */
+#define PW_RANK_MOST 4e7
+
+/* Rows kept in order by Gram-Schmidt on the swept J, lengths and angles in units of the scene: active[i] = 1 for a row
+ * whose part independent of those kept before exceeds tol of it.  Returns the rank, or PW_MACHINE. */
+int pw_rank_select (const pw_system *s, double tol, unsigned char *active);
+
+/* Chooses r->active for the run at its consistent start: rows dependent there and at two poses nearby.  Leaves it NULL
+ * if all rows are independent.  Errors: PW_MACHINE, PW_START (the start is a singular pose). */
+int pw_rank_choose (struct pw_run *r, pw_error *error);
+
+/* Multipliers of all rows from those of the active ones: the smallest (forces in units of 1, moments of L) with the same
+ * J^T lambda.  J must be swept and the run's saddle factorised at the pose. */
+void pw_rank_share (struct pw_run *r, double *lambda);
+
+/* Frees what pw_rank_choose allocated. */
+void pw_rank_close (struct pw_run *r);
+
+#endif
