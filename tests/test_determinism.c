@@ -1,0 +1,193 @@
+/* The same input gives the same bits: again, on a system used before, in any number of threads at once. */
+#include <pthread.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+
+/* ---- Runs: scenes and methods that between them use all there is ---- */
+
+static const struct {
+  const char *scene, *parameter;
+  double value, t_end;
+} same_scenes[] = {
+  { "models/ezyroller.c", NULL, 0, 1 },           { "models/ezyroller.c", "m2", 0.1, 1 },
+  { "tests/scenes/zoo.c", NULL, 0, 0.4 },         { "tests/scenes/chain.c", "links", 5, 0.4 },
+  { "tests/scenes/chain.c", "links", 150, 0.02 },
+};
+static const char *const same_methods[] = { "rk4+none",     "rk4+projection", "rk4+projection:metric=identity",
+                                            "ida+none",     "ida+ggl",        "rk4+projection:every=3",
+                                            "ida+baumgarte" };
+
+enum {
+  SAME_SCENES = sizeof same_scenes / sizeof *same_scenes,
+  SAME_METHODS = sizeof same_methods / sizeof *same_methods,
+  SAME_RUNS = SAME_SCENES * SAME_METHODS,
+  SAME_THREADS = 8
+};
+
+static pw_file *same_file[SAME_SCENES];
+
+static int same_setup (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  for (int i = 0; i < SAME_SCENES; i++)
+    if ((same_file[i] = pw_file_open (same_scenes[i].scene, &error)) == NULL) check_ok (error.status, &error);
+  return 0;
+}
+
+static int same_teardown (void **state) {
+  (void)state;
+  for (int i = 0; i < SAME_SCENES; i++) pw_file_close (same_file[i]);
+  return 0;
+}
+
+/* ---- Hashes: FNV-1a (Fowler, Noll, Vo) of all bits of a final state ---- */
+
+static uint64_t same_add (uint64_t h, const void *data, size_t size) {
+  const unsigned char *c = data;
+  for (size_t i = 0; i < size; i++) h = (h ^ c[i]) * 1099511628211u;
+  return h;
+}
+
+static uint64_t same_hash (pw_run *r, const pw_sample *x, int coordinates, int rows) {
+  size_t n = (size_t)coordinates * sizeof (double);
+  const pw_statistics *s = pw_run_statistics (r);
+  const long counts[] = { s->steps, s->rejected, s->rhs, s->jacobians, s->factorisations };
+  const double numbers[] = { x->t, x->kinetic, x->potential, x->work, x->loss, s->position, s->velocity, s->g, s->jv };
+  uint64_t h = same_add (14695981039346656037u, x->q, n);
+  h = same_add (same_add (h, x->v, n), x->a, n);
+  h = same_add (h, x->lambda, (size_t)rows * sizeof (double));
+  return same_add (same_add (h, counts, sizeof counts), numbers, sizeof numbers);
+}
+
+/* A compiled scene, or NULL; no check fails in here, since it runs in threads. */
+static pw_system *same_system (int scene, pw_error *error) {
+  pw_system *s = NULL;
+  pw_model *m = pw_file_model (same_file[scene], error);
+  if (m && same_scenes[scene].parameter) pw_set (m, same_scenes[scene].parameter, same_scenes[scene].value, error);
+  if (m && pw_build (m, error) == PW_OK) s = pw_compile (m, error);
+  pw_model_free (m);
+  return s;
+}
+
+/* The hash of a run on a system; 0 if it fails. */
+static uint64_t same_run_on (pw_system *s, int run, pw_error *error) {
+  double t = same_scenes[run / SAME_METHODS].t_end;
+  pw_settings settings = { .step = 1e-3, .rtol = 1e-6, .span = t, .ledger = 1 };
+  pw_run *r = pw_open (s, same_methods[run % SAME_METHODS], &settings, error);
+  pw_sample sample;
+  uint64_t h = 0;
+  if (r == NULL) return 0;
+  if (pw_advance_to (r, t, t, error) == PW_OK && pw_at (r, t, &sample, error) == PW_OK)
+    h = same_hash (r, &sample, pw_count_coordinates (s), pw_count_rows (s));
+  pw_close (r);
+  return h;
+}
+
+static uint64_t same_run (int run, pw_error *error) {
+  pw_system *s = same_system (run / SAME_METHODS, error);
+  uint64_t h = s ? same_run_on (s, run, error) : 0;
+  pw_free (s);
+  return h;
+}
+
+static const uint64_t *same_reference (void) {
+  static uint64_t hash[SAME_RUNS];
+  for (int i = 0; i < SAME_RUNS && hash[SAME_RUNS - 1] == 0; i++) {
+    pw_error error = { 0 };
+    hash[i] = same_run (i, &error);
+    check_ok (error.status, &error);
+  }
+  return hash;
+}
+
+static void same_expect (int run, uint64_t hash, const char *what) {
+  if (hash == same_reference ()[run]) return;
+  print_error ("%s, %s %g, %s: other bits than the first time\n", what, same_scenes[run / SAME_METHODS].scene,
+               same_scenes[run / SAME_METHODS].value, same_methods[run % SAME_METHODS]);
+  fail ();
+}
+
+/* ---- Tests ---- */
+
+/* Runs differ from each other, else the hashes say nothing. */
+static void test_hashes (void **state) {
+  (void)state;
+  const uint64_t *hash = same_reference ();
+  for (int i = 0; i < SAME_RUNS; i++)
+    for (int k = 0; k < i; k++) assert_true (hash[i] != hash[k]);
+}
+
+/* Backwards, on memory that is full of something. */
+static void test_again (void **state) {
+  (void)state;
+  for (int i = SAME_RUNS - 1; i >= 0; i--) {
+    pw_error error = { 0 };
+    void *used[20];
+    for (int k = 0; k < 20; k++)
+      if ((used[k] = malloc ((size_t)1 << k)) != NULL) memset (used[k], 0x5a + i, (size_t)1 << k);
+    for (int k = 0; k < 20; k++) free (used[k]);
+    same_expect (i, same_run (i, &error), "again");
+  }
+}
+
+/* What a run leaves in its system is no part of the next one. */
+static void test_used_system (void **state) {
+  (void)state;
+  for (int scene = 0; scene < SAME_SCENES; scene++) {
+    pw_error error = { 0 };
+    pw_system *s = same_system (scene, &error);
+    assert_non_null (s);
+    for (int i = 0; i < 2 * SAME_METHODS; i++) {
+      int run = scene * SAME_METHODS + (5 * i + 2) % SAME_METHODS;
+      same_expect (run, same_run_on (s, run, &error), "on a system used before");
+    }
+    pw_free (s);
+  }
+}
+
+typedef struct {
+  int first;
+  uint64_t hash[SAME_RUNS];
+} same_worker;
+
+static void *same_work (void *context) {
+  same_worker *w = context;
+  for (int i = 0; i < SAME_RUNS; i++) {
+    int run = (w->first + i) % SAME_RUNS;
+    pw_error error = { 0 };
+    w->hash[run] = same_run (run, &error);
+  }
+  return NULL;
+}
+
+static void test_threads (void **state) {
+  (void)state;
+  for (int threads = 2; threads <= SAME_THREADS; threads *= 2) {
+    same_worker *w = calloc ((size_t)threads, sizeof *w);
+    pthread_t id[SAME_THREADS];
+    assert_non_null (w);
+    for (int i = 0; i < threads; i++) {
+      w[i].first = i * (SAME_RUNS / threads / 2); /* neighbours at work on the same scenes */
+      assert_int_equal (pthread_create (&id[i], NULL, same_work, w + i), 0);
+    }
+    for (int i = 0; i < threads; i++) pthread_join (id[i], NULL);
+    for (int i = 0; i < threads; i++)
+      for (int run = 0; run < SAME_RUNS; run++) same_expect (run, w[i].hash[run], "in a thread");
+    free (w);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_hashes),
+    cmocka_unit_test (test_again),
+    cmocka_unit_test (test_used_system),
+    cmocka_unit_test (test_threads),
+  };
+  return cmocka_run_group_tests_name ("determinism", tests, same_setup, same_teardown);
+}
