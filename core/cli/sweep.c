@@ -241,6 +241,10 @@ static int sweep_merge (sweep *x, pw_error *error) {
 
 static int sweep_finish (sweep *x, pw_error *error) {
   pw_tally tally;
+  if (x->journal.done == 0) {
+    fputs ("pinwheel: interrupted before the first run was done\n", stderr);
+    return PW_INTERRUPTED;
+  }
   if (x->journal.done < x->journal.rows) {
     fprintf (stderr, "pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command goes on from there\n",
              x->journal.done, x->journal.rows, x->journal.part);
