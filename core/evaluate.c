@@ -59,27 +59,25 @@ static inline void evaluate_add (double *to, const double *force) {
   to[2] += force[2];
 }
 
-static void evaluate_add_force (pw_slab *k, double *f) {
+static inline void evaluate_add_force (const pw_slab *k, double *f) {
   k->kind->force (&k->b, k->block);
-  int bodies = k->kind->bodies, own = k->kind->own;
+  int own = k->kind->own;
   const double *block = k->block;
-  const int *column = k->column;
-  if (bodies == 2 && own == 0) {
-    for (int e = 0; e < k->b.count; e++, block += 6, column += 2) {
-      evaluate_add (f + column[0], block);
-      evaluate_add (f + column[1], block + 3);
-    }
+  const int *column = k->column, *end = column + k->b.count * k->kind->bodies;
+  if (own == 0) {
+    for (; column < end; block += 3) evaluate_add (f + *column++, block);
     return;
   }
   for (int e = 0; e < k->b.count; e++) {
-    for (int n = 0; n < bodies; n++, block += 3) evaluate_add (f + *column++, block);
+    for (int n = 0; n < k->kind->bodies; n++, block += 3) evaluate_add (f + *column++, block);
     for (int n = 0; n < own; n++) f[k->own + e * own + n] += *block++;
   }
 }
 
 void pw_sweep_force (pw_system *s, double *f) {
-  for (int j = 0; j < s->coords; j++) f[j] = s->constant[j];
-  for (int i = 0; i < s->forces; i++) evaluate_add_force (&s->slab[s->force[i]], f);
+  const double *constant = s->constant;
+  for (int j = 0; j < s->coords; j++) f[j] = constant[j];
+  for (const int *i = s->force, *end = i + s->forces; i < end; i++) evaluate_add_force (&s->slab[*i], f);
 }
 
 void pw_sweep_constant (pw_system *s) {

@@ -20,18 +20,19 @@ void pw_place_rates (pw_system *s, const double *v) {
   if (s->coords > 3 * s->bodies) place_own (s, NULL, v - 3 * s->bodies);
 }
 
-static void place_poses (pw_system *s, const double *q, const double *v) {
+static inline void place_poses (pw_system *s, const double *q, const double *v) {
   if (s->coords > 3 * s->bodies) place_own (s, q, v);
   for (pw_pose *p = s->pose, *end = p + s->bodies; p < end; p++, q += 3, v += 3) {
     double phi = q[2];
-    p->x = q[0];
-    p->y = q[1];
-    p->phi = phi;
-    p->cos = cos (phi);
-    p->sin = sin (phi);
-    p->vx = v[0];
-    p->vy = v[1];
-    p->omega = v[2];
+    *p = (pw_pose){ q[0], q[1], phi, cos (phi), sin (phi), v[0], v[1], v[2] };
+  }
+}
+
+/* The states a function reads. */
+static void place_reads (const pw_system *s, const pw_source *source, const double *q, const double *v) {
+  for (int r = 0; r < source->reads; r++) {
+    int j = source->state[r];
+    source->x[r] = j < s->coords ? q[j] : v[j - s->coords];
   }
 }
 
@@ -39,14 +40,11 @@ static void place_poses (pw_system *s, const double *q, const double *v) {
 static int place_slab_signals (const pw_system *s, pw_slab *k, double t, const double *q, const double *v,
                                int readers) {
   int derivatives = !pw_kind_forced (k->kind);
-  for (int i = 0; i < k->b.count * k->kind->signals; i++) {
-    pw_source *source = &k->source[i];
-    if ((source->reads > 0) != readers) continue;
-    for (int r = 0; r < source->reads; r++) {
-      int j = source->state[r];
-      source->x[r] = j < s->coords ? q[j] : v[j - s->coords];
-    }
-    if (pw_signal_eval (source, t, derivatives, k->u + 3 * i) != 0) return PW_METHOD;
+  double *u = k->u;
+  for (pw_source *i = k->source, *end = i + k->b.count * k->kind->signals; i < end; i++, u += 3) {
+    if ((i->reads > 0) != readers) continue;
+    if (readers) place_reads (s, i, q, v);
+    if (pw_signal_eval (i, t, derivatives, u) != 0) return PW_METHOD;
   }
   return PW_OK;
 }

@@ -2,22 +2,26 @@
 #include <math.h>
 #include "signal.h"
 
-/* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p) */
-static void signal_harmonic (const pw_signal *s, double t, int derivatives, double u[3]) {
-  double w = s->harmonic.omega, angle = w * t + s->harmonic.phase, c = s->harmonic.amplitude * cos (angle);
+/* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p); a force needs no sine */
+static void signal_harmonic (const pw_signal *s, double angle, double u[3]) {
+  double A = s->harmonic.amplitude, w = s->harmonic.omega, c = A * cos (angle);
   u[0] = s->harmonic.offset + c;
-  if (!derivatives) return;
-  u[1] = -s->harmonic.amplitude * w * sin (angle);
+  u[1] = -A * w * sin (angle);
   u[2] = -w * w * c;
 }
 
 int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]) {
   const pw_signal *s = &source->signal;
-  u[0] = u[1] = u[2] = 0;
-  if (s->type == PW_HARMONIC)
-    signal_harmonic (s, t, derivatives, u);
-  else if (s->type == PW_FUNCTION)
+  u[1] = u[2] = 0;
+  if (s->type == PW_HARMONIC && !derivatives) {
+    u[0] = s->harmonic.offset + s->harmonic.amplitude * cos (s->harmonic.omega * t + s->harmonic.phase);
+    return 0;
+  }
+  u[0] = 0;
+  if (s->type == PW_FUNCTION)
     return s->function.eval (s->function.context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
+  if (s->type == PW_HARMONIC)
+    signal_harmonic (s, s->harmonic.omega * t + s->harmonic.phase, u);
   else
     u[0] = s->constant;
   return 0;

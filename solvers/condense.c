@@ -28,6 +28,7 @@ typedef struct {
   int *start, *list;   /* pieces by coordinate: list[start[j]] .. list[start[j + 1]] */
   long terms;
   int panels;          /* of a small scene */
+  int place[PW_SMALL]; /* first position of each node in a small scene */
 } condense;
 
 /* ---- Nodes ---- */
@@ -184,7 +185,7 @@ static void condense_put_term (condense *c, int a, int b, void *context) {
 
 static void condense_take (condense *c, pw_layout *l) {
   struct pw_saddle *k = c->k;
-  k->y = pw_take (l, (size_t)k->unknowns, sizeof *k->y);
+  k->y = pw_take (l, (size_t)(k->unknowns + (c->panels > 0 ? k->s->rows + k->extras : 0)), sizeof *k->y);
   k->row_of = pw_take (l, (size_t)k->unknowns, sizeof *k->row_of);
   k->term = pw_take (l, (size_t)k->first[PW_TERM_SHAPES], sizeof *k->term);
   k->wide = pw_take (l, (size_t)k->wides, sizeof *k->wide);
@@ -195,7 +196,7 @@ static void condense_take (condense *c, pw_layout *l) {
   pw_small *small = pw_take (l, c->panels > 0, sizeof *small);
   pw_panel *panel = pw_take (l, (size_t)c->panels, sizeof *panel);
   if (l->base == NULL || c->panels == 0) return;
-  *small = (pw_small){ .n = k->unknowns, .panels = c->panels, .panel = panel, .inverse = k->inverse };
+  *small = (pw_small){ .n = k->unknowns, .panels = c->panels, .panel = panel, .inverse = k->inverse, .guard = k->guard };
   k->small = small;
 }
 
@@ -232,11 +233,16 @@ static void condense_fill_pieces (condense *c) {
   }
 }
 
+/* First position of a node on the right-hand side. */
+static int condense_position (const condense *c, int node) {
+  return c->panels > 0 ? c->place[node] : pw_ldl_position (c->k->ldl, node);
+}
+
 static void condense_fill_rows (condense *c, int rows, const unsigned char *active) {
   struct pw_saddle *k = c->k;
   int extra = 0, idle = 0;
   for (int n = 0; n < c->nodes; n++) {
-    int y = pw_ldl_position (k->ldl, n);
+    int y = condense_position (c, n);
     k->row_of_node[n] = c->node[n].row;
     for (int r = 0; r < c->node[n].size; r++) k->row_of[y + r] = c->node[n].row < 0 ? -1 : c->node[n].row + r;
     if (c->node[n].row < 0) k->extra[extra++] = (pw_extra){ y, c->node[n].gamma, c->node[n].lambda };
@@ -245,34 +251,46 @@ static void condense_fill_rows (condense *c, int rows, const unsigned char *acti
     if (active && !active[i]) k->idle[idle++] = i;
 }
 
-/* A row of a panel, in its place by position. */
-static void condense_panel_row (pw_panel *p, const double *J, int y) {
-  int i = p->rows++;
-  for (; i > 0 && p->y[i - 1] > y; i--) {
-    p->y[i] = p->y[i - 1];
-    p->J[i] = p->J[i - 1];
+/* Puts the nodes of a small scene in an order in which those of a panel are neighbours. */
+static void condense_order_small (condense *c) {
+  unsigned long long touched[PW_SMALL] = { 0 };
+  int order[PW_SMALL], y = 0, bodies = c->k->s->bodies;
+  for (int p = 0; p < c->pieces; p++) {
+    int j = c->piece[p].j;
+    touched[c->node_of[p]] |= 1ULL << (j < 3 * bodies ? j / 3 : j - 2 * bodies);
   }
-  p->y[i] = y;
-  p->J[i] = J;
+  pw_small_order (c->nodes, touched, order);
+  for (int i = 0; i < c->nodes; i++) {
+    c->place[order[i]] = y;
+    y += c->node[order[i]].size;
+  }
 }
 
-static void condense_fill_panels (condense *c) {
+/* Coordinates that are all without weight need no panel: their accelerations are found elsewhere. */
+static void condense_fill_panels (condense *c, const double *weight) {
   struct pw_saddle *k = c->k;
-  int bodies = k->s->bodies;
+  int bodies = k->s->bodies, count = 0;
   for (int n = 0; n < c->panels; n++) {
-    pw_panel *p = &k->small->panel[n];
-    int j = n < bodies ? 3 * n : n + 2 * bodies;
-    *p = (pw_panel){ .j = j, .width = n < bodies ? 3 : 1 };
+    int j = n < bodies ? 3 * n : n + 2 * bodies, width = n < bodies ? 3 : 1, heavy = 0;
+    for (int i = 0; i < width; i++) heavy |= weight[j + i] != 0;
+    if (!heavy) continue;
+    pw_panel *p = &k->small->panel[count++];
+    *p = (pw_panel){ .j = j, .width = width };
     for (int x = c->start[j]; x < c->start[j + 1]; x++) {
       const condense_piece *piece = &c->piece[c->list[x]];
       int node = c->node_of[c->list[x]];
-      for (int r = 0; r < c->node[node].size; r++) condense_panel_row (p, piece->J + r * piece->step, pw_ldl_position (k->ldl, node) + r);
+      pw_small_add_rows (p, condense_position (c, node), c->node[node].size, piece->J, piece->step);
     }
-    p->shape = p->width == 3 && p->rows <= 4 ? p->rows : 0;
   }
+  k->small->panels = count;
+  for (int n = 0; n < c->nodes; n++)
+    for (int r = 0; r < c->node[n].size && c->node[n].first == c->node[n + 1].first; r++)
+      k->small->start[c->place[n] + r] = 1;
+  for (int i = 0; i < k->unknowns; i++) k->small->row[i] = k->row_of[i];
+  for (int e = 0; e < k->extras; e++) k->small->row[k->extra[e].y] = k->s->rows + e;
 }
 
-static int condense_lay_out (condense *c, int rows, const unsigned char *active) {
+static int condense_lay_out (condense *c, const double *weight, int rows, const unsigned char *active) {
   struct pw_saddle *k = c->k;
   condense_filling count = { 0 }, fill = { .fill = 1 };
   condense_count (c, rows, active, &count);
@@ -281,9 +299,11 @@ static int condense_lay_out (condense *c, int rows, const unsigned char *active)
   k->memory = malloc (l.used + 1);
   if (k->memory == NULL) return PW_MACHINE;
   l = (pw_layout){ k->memory, 0 };
-  condense_take (c, &l);  condense_fill_rows (c, rows, active);
+  condense_take (c, &l);
+  if (c->panels > 0) condense_order_small (c);
+  condense_fill_rows (c, rows, active);
   if (c->panels > 0) {
-    condense_fill_panels (c);
+    condense_fill_panels (c, weight);
     return PW_OK;
   }
   memcpy (fill.next, k->first, sizeof fill.next);
@@ -318,7 +338,7 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
   int status = condense_allocate (&c, rows, active);
   if (status == PW_OK) status = condense_sort_pieces (&c);
   if (status == PW_OK) status = condense_pattern (&c, error);
-  if (status == PW_OK) status = condense_lay_out (&c, rows, active);
+  if (status == PW_OK) status = condense_lay_out (&c, weight, rows, active);
   free (c.node);
   free (c.piece);
   free (c.node_of);

@@ -5,6 +5,17 @@
 #include "reduce.h"
 #include "util.h"
 
+#if defined(__GNUC__) && !defined(__clang__)
+#define REDUCE_UNROLL _Pragma ("GCC unroll 8")
+#else
+#define REDUCE_UNROLL
+#endif
+#if defined(__GNUC__)
+#define REDUCE_INLINE static inline __attribute__ ((always_inline))
+#else
+#define REDUCE_INLINE static inline
+#endif
+
 /* ---- Components ---- */
 
 /* Union-find over bodies and own coordinates that have columns without weight. */
@@ -133,19 +144,22 @@ static void reduce_fill_row (reduce_plan *p, pw_reduce *r, const pw_slab *k, int
 /* ---- Layout ---- */
 
 static void reduce_lay_out_component (pw_layout *l, pw_component *c, int rows, int groups) {
-  size_t n = (size_t)rows, m = 3 * (size_t)groups;
+  size_t n = (size_t)rows, m = 3 * (size_t)groups, pivots = n < m ? n : m;
   c->group = pw_take (l, (size_t)groups, sizeof (int));
   c->group_column = pw_take (l, (size_t)groups, sizeof (int));
   c->row = pw_take (l, n, sizeof (int));
   c->pivot = pw_take (l, m, sizeof (int));
+  c->light = pw_take (l, m, sizeof (int));
   c->global = pw_take (l, m, sizeof (int));
-  c->heavy = pw_take (l, m, sizeof (int));
-  c->matched = pw_take (l, m, sizeof (double));
-  c->light = pw_take (l, m, 1);
+  c->least = pw_take (l, m, sizeof (double));
+  c->massless = pw_take (l, m, 1);
   c->unit = pw_take (l, m, sizeof (double));
   c->piece = pw_take (l, n * PW_REDUCE_PIECES, sizeof (pw_reduce_piece));
+  c->from = pw_take (l, n * pivots, sizeof (double *));
+  c->heavy = pw_take (l, n * PW_REDUCE_PIECES, sizeof (pw_reduce_heavy));
+  c->P = pw_take (l, pivots * pivots, sizeof (double));
+  c->Y = pw_take (l, n * pivots, sizeof (double));
   c->Z = pw_take (l, n * m, sizeof (double));
-  c->factor = pw_take (l, n * (n < m ? n : m), sizeof (double));
   c->gamma = pw_take (l, n, sizeof (double));
   c->lambda = pw_take (l, n, sizeof (double));
 }
@@ -183,11 +197,9 @@ static void reduce_copy (pw_component *c) {
 }
 
 /* Subtracts the pivot row from row i so that its entry under the pivot vanishes. */
-static inline void reduce_eliminate (pw_component *c, int p, int i) {
+static void reduce_eliminate (pw_component *c, int p, int i) {
   double *row = c->Z + i * c->cols, *pivot = c->Z + p * c->cols;
   double f = row[c->pivot[p]] / pivot[c->pivot[p]];
-  c->factor[i * c->pivots + p] = f;
-  if (f == 0) return;
   for (int n = 0; n < c->cols; n++) row[n] -= f * pivot[n];
   row[c->pivot[p]] = 0;
 }
@@ -207,16 +219,31 @@ static void reduce_swap (pw_component *c, int a, int b) {
     c->Z[a * c->cols + n] = c->Z[b * c->cols + n];
     c->Z[b * c->cols + n] = z;
   }
-  for (int n = 0; n < c->pivots; n++) {
-    double f = c->factor[a * c->pivots + n];
-    c->factor[a * c->pivots + n] = c->factor[b * c->pivots + n];
-    c->factor[b * c->pivots + n] = f;
+}
+
+/* Where the entries of P, K, H and Z are, for the matching found. */
+static void reduce_plan_copies (pw_component *c) {
+  static const double zero = 0;
+  c->heavies = 0;
+  for (int i = 0; i < c->rows; i++) {
+    const pw_reduce_piece *piece = c->piece + i * PW_REDUCE_PIECES;
+    for (int p = 0; p < c->pivots; p++) c->from[i * c->pivots + p] = &zero;
+    for (const pw_reduce_piece *x = piece; x < piece + PW_REDUCE_PIECES && x->width; x++) {
+      int heavy = 0;
+      for (int n = 0; n < x->width; n++) heavy |= !c->massless[x->column + n];
+      for (int p = 0; p < c->pivots; p++)
+        if (c->pivot[p] >= x->column && c->pivot[p] < x->column + x->width)
+          c->from[i * c->pivots + p] = x->J + c->pivot[p] - x->column;
+      if (heavy) c->heavy[c->heavies++] = (pw_reduce_heavy){ x->J, i, c->global[x->column], x->width, x->column };
+    }
+    if (i < c->pivots) c->heavies_h = c->heavies, c->light[i] = c->global[c->pivot[i]];
   }
 }
 
-/* Gaussian elimination with complete pivoting over the light columns, angles in units of length, rows scaled by their
- * largest entry; leaves Z and the factors as reduce_run would.  Returns how many pivots were found. */
+/* Gaussian elimination with complete pivoting over the massless columns, angles in units of length, rows scaled by
+ * their largest entry.  Returns how many pivots were found. */
 static int reduce_match (pw_component *c) {
+  const double guard = 0.1;
   reduce_copy (c);
   c->worst = INFINITY;
   for (int p = 0; p < c->pivots; p++) {
@@ -226,35 +253,95 @@ static int reduce_match (pw_component *c) {
       double most = 0;
       for (int n = 0; n < c->cols; n++) most = fmax (most, fabs (c->Z[i * c->cols + n]) / c->unit[n]);
       for (int n = 0; n < c->cols; n++) {
-        double scaled = c->light[n] ? fabs (c->Z[i * c->cols + n]) / c->unit[n] / most : 0;
+        double scaled = c->massless[n] ? fabs (c->Z[i * c->cols + n]) / c->unit[n] / most : 0;
         if (scaled > best) best = scaled, row = i, column = n;
       }
     }
     if (row < 0) return p;
     reduce_swap (c, p, row);
     c->pivot[p] = column;
-    c->matched[p] = fabs (c->Z[p * c->cols + column]);
+    c->least[p] = guard * fabs (c->Z[p * c->cols + column]);
     c->worst = fmin (c->worst, best);
     for (int i = p + 1; i < c->rows; i++) reduce_eliminate (c, p, i);
   }
+  reduce_plan_copies (c);
   return c->pivots;
 }
 
-/* Elimination with the pivots matched before; 0 if one of them has become too small, or is not a number. */
-static int reduce_run (pw_component *c) {
-  const double guard = 0.1;
-  reduce_copy (c);
-  for (int p = 0; p < c->pivots; p++) {
-    if (!(fabs (c->Z[p * c->cols + c->pivot[p]]) >= guard * c->matched[p])) return 0;
-    for (int i = p + 1; i < c->rows; i++) reduce_eliminate (c, p, i);
+/* ---- P = L U, the number of pivots a constant where it is usual ---- */
+
+/* Returns 0 if a pivot has become too small, or is not a number. */
+REDUCE_INLINE int reduce_lu_of (pw_component *c, int n) {
+  double *P = c->P;
+  int good = 1;
+  REDUCE_UNROLL for (int i = 0; i < n * n; i++) P[i] = *c->from[i];
+  REDUCE_UNROLL for (int p = 0; p < n; p++) {
+    double pivot = P[p * n + p], inverse = 1 / pivot;
+    good &= fabs (pivot) >= c->least[p];
+    P[p * n + p] = inverse;
+    REDUCE_UNROLL for (int i = p + 1; i < n; i++) {
+      double l = P[i * n + p] * inverse;
+      P[i * n + p] = l;
+      REDUCE_UNROLL for (int j = p + 1; j < n; j++) P[i * n + j] -= l * P[p * n + j];
+    }
   }
-  return 1;
+  return good;
+}
+
+/* x = P^-1 x */
+REDUCE_INLINE void reduce_solve_of (const double *P, double *x, int n) {
+  REDUCE_UNROLL for (int i = 1; i < n; i++) {
+    REDUCE_UNROLL for (int j = 0; j < i; j++) x[i] -= P[i * n + j] * x[j];
+  }
+  REDUCE_UNROLL for (int i = n - 1; i >= 0; i--) {
+    REDUCE_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[i * n + j] * x[j];
+    x[i] *= P[i * n + i];
+  }
+}
+
+/* x = P^-T x */
+REDUCE_INLINE void reduce_solve_transposed_of (const double *P, double *x, int n) {
+  REDUCE_UNROLL for (int i = 0; i < n; i++) {
+    REDUCE_UNROLL for (int j = 0; j < i; j++) x[i] -= P[j * n + i] * x[j];
+    x[i] *= P[i * n + i];
+  }
+  REDUCE_UNROLL for (int i = n - 2; i >= 0; i--) {
+    REDUCE_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[j * n + i] * x[j];
+  }
+}
+
+static int reduce_lu (pw_component *c) {
+  return c->pivots == 3 ? reduce_lu_of (c, 3) : reduce_lu_of (c, c->pivots);
+}
+
+static inline void reduce_solve (const pw_component *c, double *x) {
+  c->pivots == 3 ? reduce_solve_of (c->P, x, 3) : reduce_solve_of (c->P, x, c->pivots);
+}
+
+static inline void reduce_solve_transposed (const pw_component *c, double *x) {
+  c->pivots == 3 ? reduce_solve_transposed_of (c->P, x, 3) : reduce_solve_transposed_of (c->P, x, c->pivots);
+}
+
+/* Y and Z~ of the rows left over. */
+static void reduce_left_over (pw_component *c) {
+  const pw_reduce_heavy *h = c->heavy;
+  for (int i = c->pivots; i < c->rows; i++) {
+    double *Y = c->Y + i * c->pivots, *Z = c->Z + i * c->cols;
+    for (int p = 0; p < c->pivots; p++) Y[p] = *c->from[i * c->pivots + p];
+    reduce_solve_transposed (c, Y);
+    for (int n = 0; n < c->cols; n++) Z[n] = 0;
+    for (const pw_reduce_heavy *x = h + c->heavies_h; x < h + c->heavies; x++)
+      for (int n = 0; x->slot == i && n < x->width; n++) Z[x->column + n] = x->J[n];
+    for (const pw_reduce_heavy *x = h; x < h + c->heavies_h; x++)
+      for (int n = 0; n < x->width; n++) Z[x->column + n] -= Y[x->slot] * x->J[n];
+  }
 }
 
 double pw_reduce_factor (pw_reduce *r) {
   double worst = INFINITY;
   for (pw_component *c = r->component; c < r->component + r->components; c++) {
-    if (!reduce_run (c) && reduce_match (c) < c->pivots) return 0;
+    if (!reduce_lu (c) && (reduce_match (c) < c->pivots || !reduce_lu (c))) return 0;
+    if (c->rows > c->pivots) reduce_left_over (c);
     if (c->worst < worst) worst = c->worst;
   }
   return worst * worst;
@@ -272,16 +359,15 @@ static int reduce_check (pw_reduce *r, const reduce_plan *p, pw_error *error) {
     for (int n = 0; n < c->cols; n++) {
       int j = c->global[n], angle = j >= 3 * s->bodies || j % 3 == 2;
       c->unit[n] = angle ? s->scale.length : 1;
-      c->light[n] = p->weight[j] == 0;
-      c->pivots += c->light[n];
-      if (!c->light[n]) c->heavy[c->heavies++] = n;
+      c->massless[n] = p->weight[j] == 0;
+      c->pivots += c->massless[n];
     }
     int found = c->pivots <= c->rows ? reduce_match (c) : 0;
     if (found == c->pivots) continue;
     for (int n = 0; n < c->cols; n++) {
       int used = 0;
       for (int q = 0; q < found; q++) used |= c->pivot[q] == n;
-      if (c->light[n] && !used)
+      if (c->massless[n] && !used)
         return pw_fail (
             error, PW_INPUT,
             "model %s: %s has no mass, and no constraint determines how it moves; give it mass, or constrain it",
@@ -360,41 +446,37 @@ void pw_reduce_close (pw_reduce *r) {
 
 /* ---- Solving ---- */
 
+static inline void reduce_pull (const pw_reduce_heavy *h, double *f, double l) {
+  f += h->j;
+  f[0] -= h->J[0] * l;
+  if (h->width == 3) f[1] -= h->J[1] * l, f[2] -= h->J[2] * l;
+}
+
+static inline double reduce_row (const pw_reduce_heavy *h, const double *a) {
+  a += h->j;
+  return h->width == 3 ? h->J[0] * a[0] + h->J[1] * a[1] + h->J[2] * a[2] : h->J[0] * a[0];
+}
+
 void pw_reduce_forward (pw_reduce *r, const double *gamma, double *f) {
-  for (int n = 0; n < r->components; n++) {
-    pw_component *c = &r->component[n];
-    for (int i = 0; i < c->rows; i++) {
-      double sum = gamma[c->row[i]];
-      int before = i < c->pivots ? i : c->pivots;
-      for (int p = 0; p < before; p++) sum -= c->factor[i * c->pivots + p] * c->gamma[p];
-      c->gamma[i] = sum;
-    }
-    for (int p = 0; p < c->pivots; p++) {
-      double sum = f[c->global[c->pivot[p]]];
-      for (int i = 0; i < p; i++) sum -= c->Z[i * c->cols + c->pivot[p]] * c->lambda[i];
-      c->lambda[p] = sum / c->Z[p * c->cols + c->pivot[p]];
-    }
-    for (int p = 0; p < c->pivots; p++) {
-      if (c->lambda[p] == 0) continue;
-      const double *row = c->Z + p * c->cols, l = c->lambda[p];
-      for (const int *h = c->heavy; h < c->heavy + c->heavies; h++) f[c->global[*h]] -= row[*h] * l;
-    }
+  for (pw_component *c = r->component, *last = c + r->components; c < last; c++) {
+    double *mu = c->lambda;
+    for (int i = 0; i < c->rows; i++) c->gamma[i] = gamma[c->row[i]];
+    for (int i = c->pivots; i < c->rows; i++)
+      for (int p = 0; p < c->pivots; p++) c->gamma[i] -= c->Y[i * c->pivots + p] * c->gamma[p];
+    for (int p = 0; p < c->pivots; p++) mu[p] = f[c->light[p]];
+    reduce_solve_transposed (c, mu);
+    for (const pw_reduce_heavy *h = c->heavy, *end = h + c->heavies_h; h < end; h++) reduce_pull (h, f, mu[h->slot]);
   }
 }
 
 void pw_reduce_backward (pw_reduce *r, double *a, double *lambda) {
-  for (int n = 0; n < r->components; n++) {
-    pw_component *c = &r->component[n];
-    for (int i = 0; i < c->cols; i++)
-      if (c->light[i]) a[c->global[i]] = 0;
-    for (int p = c->pivots - 1; p >= 0; p--) {
-      const double *row = c->Z + p * c->cols;
-      double sum = c->gamma[p];
-      for (int i = 0; i < c->cols; i++) sum -= row[i] * a[c->global[i]];
-      a[c->global[c->pivot[p]]] = sum / row[c->pivot[p]];
-    }
-    for (int p = c->pivots - 1; p >= 0; p--)
-      for (int i = p + 1; i < c->rows; i++) c->lambda[p] -= c->factor[i * c->pivots + p] * c->lambda[i];
+  for (pw_component *c = r->component, *last = c + r->components; c < last; c++) {
+    double *x = c->gamma;
+    for (const pw_reduce_heavy *h = c->heavy, *end = h + c->heavies_h; h < end; h++) x[h->slot] -= reduce_row (h, a);
+    reduce_solve (c, x);
+    for (int p = 0; p < c->pivots; p++) a[c->light[p]] = x[p];
+    for (int i = c->pivots; i < c->rows; i++)
+      for (int p = 0; p < c->pivots; p++) c->lambda[p] -= c->Y[i * c->pivots + p] * c->lambda[i];
     for (int i = 0; i < c->rows; i++) lambda[c->row[i]] = c->lambda[i];
   }
 }

@@ -1,12 +1,14 @@
 /* Elimination of coordinates without weight: each is matched to a constraint row and substituted out of the others.
  *
  * The rows and coordinates concerned fall apart into components (a massless body and the joints around it).  Within
- * one, with the pivots (row p, column c_p) in order,
+ * one, the matched rows p are P in the coordinates without weight, square and regular, and H in the others, and the
+ * rows i left over K and Z.  With  P = L U  and  Y = K P^-1,
  *
- *     J~ = T J,  T unit lower triangular,  J~_{i c_p} = 0 for i > p,       lambda = T^T lambda~
+ *     mu = P^-T f_P,   f~ = f - H^T mu,   Z~ = Z - Y H,   gamma~_i = gamma_i - Y gamma_p
  *
- * so that f_c = sum_{p' <= p} J~_{p' c_p} lambda~_p' gives the multipliers of the pivot rows by forward substitution,
- * the other rows no longer see the massless coordinates, and J~_p a = gamma~_p gives these by back substitution. */
+ * make a system without these coordinates; from its solution follow
+ *
+ *     lambda_p = mu - Y^T lambda_i,       a_P = P^-1 (gamma_p - H a). */
 #ifndef PW_REDUCE_H
 #define PW_REDUCE_H
 
@@ -19,23 +21,35 @@ typedef struct {
   int width;
 } pw_reduce_piece;
 
+/* The same of a group with weight. */
+typedef struct {
+  const double *J;
+  int slot, j; /* which row; global coordinate */
+  int width, column;
+} pw_reduce_heavy;
+
 typedef struct {
   int rows, cols, pivots;
-  int groups;             /* bodies and own coordinates touched */
-  int *group;             /* first global coordinate of each */
-  int *group_column;      /* first local column of each */
-  int *row;               /* global row; the pivots first, in order */  int *pivot;            /* local column of each pivot */
-  double *matched;       /* size of each pivot when it was matched */
-  double worst;          /* smallest pivot relative to its row when they were matched */
-  int heavies, *heavy;   /* local columns with weight */
-  int *global;            /* cols: global coordinate of a local column */
-  unsigned char *light;   /* cols: 1 for a coordinate without weight */
-  double *unit;           /* cols: length scale of an angle, 1 of a length */
-  pw_reduce_piece *piece; /* rows x PW_REDUCE_PIECES; width 0 ends a row's */
-  double *Z;              /* rows x cols: J~ */
-  double *factor;         /* rows x pivots: T^-1 */
-  double *gamma;          /* rows scratch */
-  double *lambda;         /* rows scratch: lambda~ */
+  int groups;              /* bodies and own coordinates touched */
+  int *group;              /* first global coordinate of each */
+  int *group_column;       /* first local column of each */
+  int *row;                /* global row; the pivots first, in order */
+  int *pivot;              /* local column of each pivot */
+  int *light;              /* global coordinate of each pivot */
+  double *least;           /* how small each pivot may become before the rows are matched anew */
+  double worst;            /* smallest pivot relative to its row when they were matched */
+  int *global;             /* cols: global coordinate of a local column */
+  unsigned char *massless; /* cols: 1 for a coordinate without weight */
+  double *unit;            /* cols: length scale of an angle, 1 of a length */
+  pw_reduce_piece *piece;  /* rows x PW_REDUCE_PIECES; width 0 ends a row's */
+  const double **from;     /* rows x pivots: the entries of P and K in the slabs */
+  pw_reduce_heavy *heavy;  /* those of H, then those of Z */
+  int heavies, heavies_h;  /* all, and those of H */
+  double *P;               /* pivots x pivots: L below the diagonal, U above it, the inverse of U's diagonal on it */
+  double *Y;               /* rows x pivots; from row `pivots` on */
+  double *Z;               /* rows x cols: Z~ from row `pivots` on; scratch while matching */
+  double *gamma;           /* rows: of the pivots as given, then gamma~ */
+  double *lambda;          /* rows: mu of the pivots, then lambda of the others */
 } pw_component;
 
 enum { PW_REDUCE_PIECES = PW_MAX_BODIES + PW_MAX_OWN };
@@ -57,12 +71,11 @@ void pw_reduce_close (pw_reduce *r);
  * the smallest pivot squared, relative to its row, at the last matching; 0 if singular. */
 double pw_reduce_factor (pw_reduce *r);
 
-/* First half of a solve: gamma~ and lambda~ of the pivot rows are kept in the components, f -= J~_R^T lambda~_R for
- * the coordinates with weight. */
+/* First half of a solve: f becomes f~ at the coordinates with weight, gamma~ is kept in the components. */
 void pw_reduce_forward (pw_reduce *r, const double *gamma, double *f);
 
-/* Second half, when a of the coordinates with weight and lambda~ of the other rows are there: a of those without,
- * and lambda. */
+/* Second half, when a of the coordinates with weight and lambda of the rows left over are there: a of those without
+ * (0 where it is stored so far), and lambda of the matched rows. */
 void pw_reduce_backward (pw_reduce *r, double *a, double *lambda);
 
 #endif

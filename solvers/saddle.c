@@ -115,23 +115,19 @@ static int saddle_judge (pw_saddle *k, double pivot, int row) {
   return k->pivot > k->guard ? PW_OK : PW_RETRY;
 }
 
-static int saddle_judge_small (pw_saddle *k) {
-  return saddle_judge (k, k->small->pivot, k->small->place < 0 ? -1 : k->row_of[k->small->place]);
-}
-
 /* Eliminates the coordinates without weight. */
-static inline void saddle_begin (pw_saddle *k) {
+static inline int saddle_begin (pw_saddle *k) {
   k->pivot_row = -1;
-  k->pivot = k->reduce.components ? pw_reduce_factor (&k->reduce) : INFINITY;
+  k->pivot = INFINITY;
+  if (k->reduce.components == 0) return PW_OK;
+  k->pivot = pw_reduce_factor (&k->reduce);
+  return k->pivot > k->guard ? PW_OK : PW_RETRY;
 }
 
 int pw_saddle_factor (pw_saddle *k) {
   int node;
-  saddle_begin (k);
-  if (k->small) {
-    pw_small_factor (k->small);
-    return saddle_judge_small (k);
-  }
+  if (saddle_begin (k) != PW_OK) return PW_RETRY;
+  if (k->small) return pw_small_factor (k->small) ? PW_OK : PW_RETRY;
   for (size_t i = 0; i < k->values; i++) k->value[i] = 0;
   saddle_assemble_short (k);
   if (k->wides) saddle_assemble_wide (k);
@@ -141,11 +137,57 @@ int pw_saddle_factor (pw_saddle *k) {
 
 void pw_saddle_set_guard (pw_saddle *k, double guard) {
   k->guard = fmax (guard * guard, SADDLE_ROUND_OFF);
+  if (k->small) k->small->guard = k->guard;
 }
 
 double pw_saddle_pivot (const pw_saddle *k, int *row) {
+  int place;
+  double pivot = k->pivot, small = k->small && pivot > k->guard ? pw_small_pivot (k->small, &place) : INFINITY;
   *row = k->pivot_row;
-  return k->pivot > 0 ? sqrt (fmin (k->pivot, 1)) : 0;
+  if (!(small >= pivot)) {
+    pivot = small;
+    *row = place < 0 ? -1 : k->row_of[place];
+  }
+  return pivot > 0 ? sqrt (fmin (pivot, 1)) : 0;
+}
+
+/* ---- Small scenes ---- */
+
+/* Where rows of components take part, gamma and lambda are copies with these at the end; y is of no other use here. */
+static const double *saddle_small_gamma (pw_saddle *k, const double *gamma) {
+  int rows = k->s->rows;
+  if (k->extras == 0) return gamma;
+  for (int i = 0; i < k->rows; i++) k->y[i] = gamma[i];
+  for (int e = 0; e < k->extras; e++) k->y[rows + e] = *k->extra[e].gamma;
+  return k->y;
+}
+
+static inline void saddle_small_finish (pw_saddle *k, double *a, double *lambda) {
+  int rows = k->s->rows;
+  for (int e = 0; e < k->extras; e++) *k->extra[e].lambda = k->y[rows + e];
+  for (int i = 0; k->extras && i < k->unknowns; i++)
+    if (k->row_of[i] >= 0) lambda[k->row_of[i]] = k->y[k->row_of[i]];
+  for (int i = 0; i < k->idles; i++) lambda[k->idle[i]] = 0;
+  if (k->reduce.components) pw_reduce_backward (&k->reduce, a, lambda);
+}
+
+/* Solves, and factorises before that if `fresh`. */
+static inline int saddle_small (pw_saddle *k, int fresh, const double *f, const double *gamma, double *a,
+                                double *lambda) {
+  double *force = k->force, *l = k->extras ? k->y : lambda;
+  if (fresh && saddle_begin (k) != PW_OK) return PW_RETRY;
+  if (k->reduce.components) {
+    for (int j = 0; j < k->s->coords; j++) force[j] = f ? f[j] : 0;
+    pw_reduce_forward (&k->reduce, gamma, force);
+    f = force;
+  }
+  gamma = saddle_small_gamma (k, gamma);
+  if (!fresh)
+    pw_small_solve (k->small, f, gamma, a, l);
+  else if (!pw_small_both (k->small, f, gamma, a, l))
+    return PW_RETRY;
+  saddle_small_finish (k, a, lambda);
+  return PW_OK;
 }
 
 /* ---- Solving ---- */
@@ -220,44 +262,24 @@ static inline void saddle_left (pw_saddle *k, double *lambda) {
   for (int i = 0; i < k->idles; i++) lambda[k->idle[i]] = 0;
 }
 
-/* The force to work on: a copy where it is going to be changed. */
-static inline const double *saddle_force (pw_saddle *k, const double *f, const double *gamma) {
-  if (k->small && k->reduce.components == 0) return f;
+void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
+  if (k->small) {
+    saddle_small (k, 0, f, gamma, a, lambda);
+    return;
+  }
   for (int j = 0; j < k->s->coords; j++) k->force[j] = f ? f[j] : 0;
   if (k->reduce.components) pw_reduce_forward (&k->reduce, gamma, k->force);
-  return k->force;
-}
-
-static inline void saddle_finish (pw_saddle *k, double *a, double *lambda) {
+  saddle_right (k, gamma);
+  saddle_gather (k, k->force);
+  pw_ldl_solve (k->ldl, k->y);
+  saddle_scatter (k, k->force, a);
   saddle_left (k, lambda);
   if (k->reduce.components) pw_reduce_backward (&k->reduce, a, lambda);
 }
 
-void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
-  const double *force = saddle_force (k, f, gamma);
-  saddle_right (k, gamma);
-  if (k->small)
-    pw_small_solve (k->small, force, k->y, a);
-  else {
-    saddle_gather (k, force);
-    pw_ldl_solve (k->ldl, k->y);
-    saddle_scatter (k, k->force, a);
-  }
-  saddle_finish (k, a, lambda);
-}
-
 int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
-  int status;
-  if (k->small == NULL) {
-    status = pw_saddle_factor (k);
-    if (status == PW_OK) pw_saddle_solve (k, f, gamma, a, lambda);
-    return status;
-  }
-  saddle_begin (k);
-  const double *force = saddle_force (k, f, gamma);
-  saddle_right (k, gamma);
-  pw_small_both (k->small, force, k->y, a);
-  status = saddle_judge_small (k);
-  if (status == PW_OK) saddle_finish (k, a, lambda);
+  if (k->small) return saddle_small (k, 1, f, gamma, a, lambda);
+  int status = pw_saddle_factor (k);
+  if (status == PW_OK) pw_saddle_solve (k, f, gamma, a, lambda);
   return status;
 }

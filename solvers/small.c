@@ -1,10 +1,12 @@
 /* Small scenes; see small.h.
  *
- * Dense L D L^T by rows (Golub & Van Loan 2013, Matrix Computations, algorithm 4.1.1):
+ * Dense L D L^T by rows (Golub & Van Loan 2013, Matrix Computations, algorithm 4.1.1), two at a time:
  *
  *   c_ij = S_ij - sum_{k < j} c_ik L_jk,   L_ij = c_ij / d_j,   d_i = S_ii - sum_{k < i} c_ik L_ik
+ *   i, i + 1:  det = d_i s - c c,   1 / d_{i+1} = d_i / det,    c = c_{i+1 i},  s = S_{i+1 i+1} - sum_{k < i} ...
  *
- * The functions are written once for a constant size and compiled for each, so that their loops vanish. */
+ * so that the two divisions of a pair do not wait for each other.  The functions are written once for a constant size
+ * and compiled for each, so that their loops vanish. */
 #include "small.h"
 
 #if defined(__GNUC__) && !defined(__clang__)
@@ -18,6 +20,45 @@
 #define SMALL_INLINE static inline
 #endif
 
+/* ---- Planning ---- */
+
+static int small_bits (unsigned long long x) {
+  int n = 0;
+  for (; x; x &= x - 1) n++;
+  return n;
+}
+
+/* Next is always the node that begins fewest panels and shares most with those before it. */
+void pw_small_order (int nodes, const unsigned long long *touched, int *order) {
+  unsigned long long begun = 0;
+  unsigned done = 0;
+  for (int i = 0; i < nodes; i++) {
+    int best = -1, least = 0;
+    for (int n = 0; n < nodes; n++) {
+      int cost = small_bits (touched[n] & ~begun) - small_bits (touched[n] & begun);
+      if ((done >> n & 1) == 0 && (best < 0 || cost < least)) best = n, least = cost;
+    }
+    order[i] = best;
+    done |= 1U << best;
+    begun |= touched[best];
+  }
+}
+
+void pw_small_add_rows (pw_panel *p, int first, int rows, const double *J, int step) {
+  static const double zero[3] = { 0, 0, 0 };
+  const double *row[PW_SMALL];
+  int from = p->rows > 0 && p->first < first ? p->first : first;
+  int end = p->rows > 0 && p->first + p->rows > first + rows ? p->first + p->rows : first + rows;
+  for (int i = from; i < end; i++) {
+    row[i - from] = i >= p->first && i < p->first + p->rows ? p->J[i - p->first] : zero;
+    if (i >= first && i < first + rows) row[i - from] = J + (i - first) * step;
+  }
+  for (int i = from; i < end; i++) p->J[i - from] = row[i - from];
+  p->first = from;
+  p->rows = end - from;
+  p->shape = p->width == 3 && p->rows <= 4 ? p->rows : -1;
+}
+
 /* ---- Panels of 3 columns, the number of rows a constant ---- */
 
 SMALL_INLINE double small_dot (const double *a, const double *b) {
@@ -25,37 +66,44 @@ SMALL_INLINE double small_dot (const double *a, const double *b) {
 }
 
 /* S += J W^-1 J^T over one panel (S n x n, lower triangle), y += J W^-1 f; either may be left out. */
-SMALL_INLINE void small_add (const pw_panel *p, const double *inverse, const double *f, double *S, double *y, int n, int rows) {
+SMALL_INLINE void small_add (const pw_panel *p, const double *inverse, const double *f, double *S, double *y, int n,
+                             int rows) {
   const double *w = inverse + p->j;
-  double J[PW_SMALL][3];
-  int at[PW_SMALL];
+  double J[PW_SMALL][3], z[3];
   SMALL_UNROLL for (int r = 0; r < rows; r++) {
-    at[r] = p->y[r];
-    J[r][0] = p->J[r][0], J[r][1] = p->J[r][1], J[r][2] = p->J[r][2];
+    const double *from = p->J[r];
+    J[r][0] = from[0], J[r][1] = from[1], J[r][2] = from[2];
   }
   if (f) {
-    const double z[3] = { w[0] * f[p->j], w[1] * f[p->j + 1], w[2] * f[p->j + 2] };
-    SMALL_UNROLL for (int r = 0; r < rows; r++) y[at[r]] += small_dot (J[r], z);
+    z[0] = w[0] * f[p->j], z[1] = w[1] * f[p->j + 1], z[2] = w[2] * f[p->j + 2];
+    y += p->first;
+    SMALL_UNROLL for (int r = 0; r < rows; r++) y[r] += small_dot (J[r], z);
   }
-  SMALL_UNROLL for (int r = 0; S && r < rows; r++) {
+  if (S == 0) return;
+  S += p->first * (n + 1);
+  SMALL_UNROLL for (int r = 0; r < rows; r++) {
     const double B[3] = { J[r][0] * w[0], J[r][1] * w[1], J[r][2] * w[2] };
-    SMALL_UNROLL for (int q = 0; q <= r; q++) S[at[r] * n + at[q]] += small_dot (B, J[q]);
+    SMALL_UNROLL for (int q = 0; q <= r; q++) S[r * n + q] += small_dot (B, J[q]);
   }
 }
 
 /* a = W^-1 (f - J^T y) over one panel. */
-SMALL_INLINE void small_take (const pw_panel *p, const double *inverse, const double *f, const double *y, double *a, int rows) {
-  const int j = p->j;
-  double x0 = f ? f[j] : 0, x1 = f ? f[j + 1] : 0, x2 = f ? f[j + 2] : 0;
+SMALL_INLINE void small_take (const pw_panel *p, const double *inverse, const double *f, const double *y, double *a,
+                              int rows) {
+  const double *w = inverse + p->j;
+  double x0 = 0, x1 = 0, x2 = 0;
+  if (f) f += p->j, x0 = f[0], x1 = f[1], x2 = f[2];
+  a += p->j;
+  y += p->first;
   SMALL_UNROLL for (int r = 0; r < rows; r++) {
-    const double *J = p->J[r], l = y[p->y[r]];
+    const double *J = p->J[r], l = y[r];
     x0 -= J[0] * l;
     x1 -= J[1] * l;
     x2 -= J[2] * l;
   }
-  a[j] = inverse[j] * x0;
-  a[j + 1] = inverse[j + 1] * x1;
-  a[j + 2] = inverse[j + 2] * x2;
+  a[0] = w[0] * x0;
+  a[1] = w[1] * x1;
+  a[2] = w[2] * x2;
 }
 
 /* The same for any number of rows and columns. */
@@ -63,56 +111,85 @@ static void small_add_any (const pw_panel *p, const double *inverse, const doubl
   for (int r = 0; r < p->rows; r++)
     for (int c = 0; c < p->width; c++) {
       double scaled = p->J[r][c] * inverse[p->j + c];
-      if (f) y[p->y[r]] += scaled * f[p->j + c];
-      for (int q = 0; S && q <= r; q++) S[p->y[r] * n + p->y[q]] += scaled * p->J[q][c];
+      if (f) y[p->first + r] += scaled * f[p->j + c];
+      for (int q = 0; S && q <= r; q++) S[(p->first + r) * n + p->first + q] += scaled * p->J[q][c];
     }
 }
 
 static void small_take_any (const pw_panel *p, const double *inverse, const double *f, const double *y, double *a) {
   for (int c = 0; c < p->width; c++) {
     double sum = f ? f[p->j + c] : 0;
-    for (int r = 0; r < p->rows; r++) sum -= p->J[r][c] * y[p->y[r]];
+    for (int r = 0; r < p->rows; r++) sum -= p->J[r][c] * y[p->first + r];
     a[p->j + c] = inverse[p->j + c] * sum;
   }
 }
 
 /* Over all panels; the usual numbers of rows on a body are compiled apart. */
-#define SMALL_PANELS(k, call, any)                                                                                     \
-  for (const pw_panel *p = (k)->panel; p < (k)->panel + (k)->panels; p++) {                                            \
-    if (p->shape == 3)                                                                                                 \
-      call (3);                                                                                                        \
-    else if (p->shape == 2)                                                                                            \
-      call (2);                                                                                                        \
-    else if (p->shape == 1)                                                                                            \
-      call (1);                                                                                                        \
-    else if (p->shape == 4)                                                                                            \
-      call (4);                                                                                                        \
-    else                                                                                                               \
-      any;                                                                                                             \
+#define SMALL_PANELS(k, call, any)                                               \
+  for (const pw_panel *p = (k)->panel, *last = p + (k)->panels; p < last; p++) { \
+    if (p->shape == 3)                                                           \
+      call (3);                                                                  \
+    else if (p->shape == 2)                                                      \
+      call (2);                                                                  \
+    else if (p->shape == 1)                                                      \
+      call (1);                                                                  \
+    else if (p->shape == 4)                                                      \
+      call (4);                                                                  \
+    else                                                                         \
+      any;                                                                       \
   }
+
+SMALL_INLINE void small_gather (const pw_small *k, const double *f, double *S, double *y, int n) {
+  const double *inverse = k->inverse;
+#define SMALL_CALL(rows) small_add (p, inverse, f, S, y, n, rows)
+  SMALL_PANELS (k, SMALL_CALL, small_add_any (p, inverse, f, S, y, n))
+#undef SMALL_CALL
+}
+
+static void small_scatter (const pw_small *k, const double *f, const double *y, double *a) {
+  const double *inverse = k->inverse;
+#define SMALL_CALL(rows) small_take (p, inverse, f, y, a, rows)
+  SMALL_PANELS (k, SMALL_CALL, small_take_any (p, inverse, f, y, a))
+#undef SMALL_CALL
+}
 
 /* ---- L D L^T of constant size ---- */
 
-SMALL_INLINE void small_factor (pw_small *k, const double *S, int n) {
-  double c[PW_SMALL], worst = 2, *L = k->L;
-  k->place = -1;
-  SMALL_UNROLL for (int i = 0; i < n; i++) {
-    double was = S[i * n + i], d = was;
-    SMALL_UNROLL for (int j = 0; j < i; j++) {
-      double sum = S[i * n + j];
-      SMALL_UNROLL for (int m = 0; m < j; m++) sum -= c[m] * L[j * n + m];
-      c[j] = sum;
-    }
-    SMALL_UNROLL for (int j = 0; j < i; j++) {
-      double l = c[j] * L[j * n + j];
-      d -= c[j] * l;
-      L[i * n + j] = l;
-    }
-    if (!(d >= worst * was)) worst = d / was, k->place = i;
-    if (!(d > 0)) break;
-    L[i * n + i] = 1 / d;
+/* c = what is left of row i in the first m columns, L = its entries there; returns what is left in column m, which
+ * may be a further row's. */
+SMALL_INLINE void small_row (const double *S, double *L, double *c, int i, int m, int n) {
+  SMALL_UNROLL for (int j = 0; j < m; j++) {
+    double sum = S[i * n + j];
+    SMALL_UNROLL for (int k = 0; k < j; k++) sum -= c[k] * L[j * n + k];
+    c[j] = sum;
   }
-  k->pivot = worst;
+  SMALL_UNROLL for (int j = 0; j < m; j++) L[i * n + j] = c[j] * L[j * n + j];
+}
+
+SMALL_INLINE double small_left (double S, const double *L, const double *c, int m) {
+  SMALL_UNROLL for (int j = 0; j < m; j++) S -= c[j] * L[j];
+  return S;
+}
+
+/* Returns 0 if a pivot is not above the guard; what comes after it is then of no use. */
+SMALL_INLINE int small_factor (const double *S, double *L, double guard, int n) {
+  int good = 1;
+  SMALL_UNROLL for (int i = 0; i < n; i += 2) {
+    double c[PW_SMALL];
+    small_row (S, L, c, i, i, n);
+    double d = small_left (S[i * n + i], L + i * n, c, i);
+    L[i * n + i] = 1 / d;
+    good &= d > guard * S[i * n + i];
+    if (i + 1 == n) break;
+    int k = i + 1;
+    small_row (S, L, c, k, i, n);
+    double off = small_left (S[k * n + i], L + i * n, c, i), s = small_left (S[k * n + k], L + k * n, c, i);
+    double det = d * s - off * off;
+    L[k * n + i] = off * L[i * n + i];
+    L[k * n + k] = d / det;
+    good &= det > guard * (d * S[k * n + k]);
+  }
+  return good;
 }
 
 SMALL_INLINE void small_back (const double *L, double *y, int n) {
@@ -126,70 +203,104 @@ SMALL_INLINE void small_back (const double *L, double *y, int n) {
 }
 
 /* Assembly and factorisation, with the right-hand side if there is one. */
-SMALL_INLINE void small_assemble (pw_small *k, const double *f, double *y, int n) {
+SMALL_INLINE int small_assemble (pw_small *k, const double *f, double *y, double *L, int n) {
   double S[PW_SMALL * PW_SMALL];
-  const double *inverse = k->inverse;
   SMALL_UNROLL for (int i = 0; i < n; i++) {
-    SMALL_UNROLL for (int j = 0; j <= i; j++) S[i * n + j] = 0;
+    SMALL_UNROLL for (int j = 0; j < i; j++) S[i * n + j] = 0;
+    S[i * n + i] = k->start[i];
   }
-#define SMALL_CALL(rows) small_add (p, inverse, f, S, y, n, rows)
-  SMALL_PANELS (k, SMALL_CALL, small_add_any (p, inverse, f, S, y, n))
-#undef SMALL_CALL
-  small_factor (k, S, n);
+  small_gather (k, f, S, y, n);
+  int good = small_factor (S, L, k->guard, n);
+  SMALL_UNROLL for (int i = 0; i < n; i++) {
+    k->S[i] = S[i * n + i];
+    SMALL_UNROLL for (int j = 0; j <= i; j++) k->L[i * n + j] = L[i * n + j];
+  }
+  return good;
 }
 
-SMALL_INLINE void small_gather (const pw_small *k, const double *f, double *y, int n) {
-  const double *inverse = k->inverse;
-#define SMALL_CALL(rows) small_add (p, inverse, f, 0, y, n, rows)
-  if (f) SMALL_PANELS (k, SMALL_CALL, small_add_any (p, inverse, f, 0, y, n))
-#undef SMALL_CALL
+SMALL_INLINE void small_right (const pw_small *k, const double *gamma, double *y, int n) {
+  SMALL_UNROLL for (int i = 0; i < n; i++) y[i] = -gamma[k->row[i]];
 }
 
-static void small_scatter (const pw_small *k, const double *f, const double *y, double *a) {
-  const double *inverse = k->inverse;
-#define SMALL_CALL(rows) small_take (p, inverse, f, y, a, rows)
-  SMALL_PANELS (k, SMALL_CALL, small_take_any (p, inverse, f, y, a))
-#undef SMALL_CALL
+SMALL_INLINE void small_left_out (const pw_small *k, const double *y, double *lambda, int n) {
+  SMALL_UNROLL for (int i = 0; i < n; i++) lambda[k->row[i]] = y[i];
 }
 
 /* ---- For each size ---- */
 
+SMALL_INLINE int small_factor_of (pw_small *k, int n) {
+  double L[PW_SMALL * PW_SMALL];
+  return small_assemble (k, 0, 0, L, n);
+}
+
+SMALL_INLINE void small_solve_of (const pw_small *k, const double *f, const double *gamma, double *y, double *lambda,
+                                  int n) {
+  small_right (k, gamma, y, n);
+  if (f) small_gather (k, f, 0, y, n);
+  small_back (k->L, y, n);
+  small_left_out (k, y, lambda, n);
+}
+
+SMALL_INLINE int small_both_of (pw_small *k, const double *f, const double *gamma, double *y, double *lambda, int n) {
+  double L[PW_SMALL * PW_SMALL];
+  small_right (k, gamma, y, n);
+  if (!small_assemble (k, f, y, L, n)) return 0;
+  small_back (L, y, n);
+  small_left_out (k, y, lambda, n);
+  return 1;
+}
+
 #define SMALL_SIZES SMALL (1) SMALL (2) SMALL (3) SMALL (4) SMALL (5) SMALL (6) SMALL (7) SMALL (8)
 
-void pw_small_factor (pw_small *k) {
+int pw_small_factor (pw_small *k) {
   switch (k->n) {
-#define SMALL(n)                                                                                                       \
-  case n: small_assemble (k, 0, 0, n); break;
+#define SMALL(n) \
+  case n:        \
+    return small_factor_of (k, n);
     SMALL_SIZES
 #undef SMALL
-  default: k->pivot = 1, k->place = -1;
+  default:
+    return 1;
   }
 }
 
-void pw_small_solve (const pw_small *k, const double *f, double *y, double *a) {
+void pw_small_solve (const pw_small *k, const double *f, const double *gamma, double *a, double *lambda) {
+  double y[PW_SMALL];
   switch (k->n) {
-#define SMALL(n)                                                                                                       \
-  case n:                                                                                                              \
-    small_gather (k, f, y, n);                                                                                         \
-    small_back (k->L, y, n);                                                                                           \
+#define SMALL(n)                                \
+  case n:                                       \
+    small_solve_of (k, f, gamma, y, lambda, n); \
     break;
     SMALL_SIZES
 #undef SMALL
-  default: break;
+  default:
+    break;
   }
   small_scatter (k, f, y, a);
 }
 
-void pw_small_both (pw_small *k, const double *f, double *y, double *a) {
+int pw_small_both (pw_small *k, const double *f, const double *gamma, double *a, double *lambda) {
+  double y[PW_SMALL];
   switch (k->n) {
-#define SMALL(n)                                                                                                       \
-  case n:                                                                                                              \
-    small_assemble (k, f, y, n);                                                                                       \
-    if (k->pivot > 0) small_back (k->L, y, n);                                                                         \
+#define SMALL(n)                                              \
+  case n:                                                     \
+    if (!small_both_of (k, f, gamma, y, lambda, n)) return 0; \
     break;
     SMALL_SIZES
 #undef SMALL
-  default: k->pivot = 1, k->place = -1;
+  default:
+    break;
   }
   small_scatter (k, f, y, a);
+  return 1;
+}
+
+double pw_small_pivot (const pw_small *k, int *place) {
+  double worst = 1;
+  *place = -1;
+  for (int i = 0; i < k->n && worst > k->guard; i++) {
+    double pivot = 1 / (k->L[i * (k->n + 1)] * k->S[i]);
+    if (!(pivot >= worst)) worst = pivot, *place = i;
+  }
+  return worst;
 }

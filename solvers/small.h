@@ -1,35 +1,54 @@
 /* Small scenes: up to 8 rows.  The condensed matrix is dense, and everything between J, f, gamma and a, lambda is one
  * straight piece of code, compiled for each number of rows.
  *
- * A panel holds the rows that touch a body (or an own coordinate): what they do to each other through it. */
+ * A panel holds the rows that touch a body (or an own coordinate): what they do to each other through it.  Rows are put
+ * in an order in which those of a panel are neighbours; where that is not possible, the ones between read zeros. */
 #ifndef PW_SMALL_H
 #define PW_SMALL_H
 
 enum { PW_SMALL = 8 };
 
 typedef struct {
-  int j, width, rows;         /* first coordinate, columns, rows that touch them */
-  int shape;                  /* rows if there are 3 columns and at most 4 rows, else 0 */
-  int y[PW_SMALL];            /* position of each row, ascending */
-  const double *J[PW_SMALL];  /* each row, at these columns */
+  int j, width;              /* first coordinate, columns */
+  int first, rows;           /* first position, positions from there */
+  int shape;                 /* rows if there are 3 columns and at most 4 rows, else -1 */
+  const double *J[PW_SMALL]; /* each row, at these columns */
 } pw_panel;
 
 typedef struct {
   int n, panels;
-  pw_panel *panel;            /* one for every body and own coordinate */
-  const double *inverse;      /* diagonal of W^-1 */
+  pw_panel *panel;               /* one for every body and own coordinate with weight */
+  const double *inverse;         /* diagonal of W^-1 */
+  int row[PW_SMALL];             /* of gamma and lambda, at each position */
+  double start[PW_SMALL];        /* 1 for a row without panel, which stands for itself, else 0 */
   double L[PW_SMALL * PW_SMALL]; /* of L D L^T: L below the diagonal, D^-1 on it */
-  double pivot;               /* smallest pivot relative to the diagonal entry it came from */
-  int place;                  /* its position */
+  double S[PW_SMALL];            /* diagonal of S */
+  double guard;                  /* a pivot not above so much of its diagonal entry is taken for 0 */
 } pw_small;
 
-/* S = J W^-1 J^T = L D L^T; stops at a pivot that is not positive. */
-void pw_small_factor (pw_small *k);
+/* ---- Planning ---- */
 
-/* y, which holds -gamma, becomes lambda; a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
-void pw_small_solve (const pw_small *k, const double *f, double *y, double *a);
+/* An order of at most PW_SMALL nodes in which those that touch the same panel (a bit of `touched`) are near each
+ * other. */
+void pw_small_order (int nodes, const unsigned long long *touched, int *order);
 
-/* Both in one pass. */
-void pw_small_both (pw_small *k, const double *f, double *y, double *a);
+/* Adds rows to a panel, whose position `first` is the first one's: their first column is at J, the next row `step`
+ * further on. */
+void pw_small_add_rows (pw_panel *p, int first, int rows, const double *J, int step);
+
+/* ---- Factorising and solving ---- */
+
+/* S = J W^-1 J^T = L D L^T.  Returns 0 if a pivot is not above the guard: singular. */
+int pw_small_factor (pw_small *k);
+
+/* lambda, and a = W^-1 (f - J^T lambda).  f and a may be the same, gamma and lambda too; f NULL:
+ * zero. */
+void pw_small_solve (const pw_small *k, const double *f, const double *gamma, double *a, double *lambda);
+
+/* Both in one pass; a and lambda are left alone if it returns 0. */
+int pw_small_both (pw_small *k, const double *f, const double *gamma, double *a, double *lambda);
+
+/* The smallest pivot relative to the diagonal entry it came from, and its position. */
+double pw_small_pivot (const pw_small *k, int *place);
 
 #endif
