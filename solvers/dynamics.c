@@ -24,11 +24,31 @@ static inline void dynamics_right (pw_run *r, const double *v, double *f, double
   r->statistics.rhs++;
 }
 
+/* Iterative refinement (Wilkinson 1963): near a singular pose, with s the sine of the smallest angle between rows, the
+ * factorisation is good to eps / s^2 only, its residuals bring that to eps / s.  f and gamma are used up. */
+static void dynamics_refine (pw_run *r, double *f, double *gamma, double *a, double *lambda) {
+  pw_system *s = r->s;
+  double *da = s->scratch, *dl = da + s->coords + 3, *Ja = dl + s->rows;
+  for (int j = 0; j < s->coords; j++) da[j] = a[j];
+  for (int i = 0; i < s->rows; i++) dl[i] = lambda[i];
+  for (int pass = 0; pass < 3; pass++) {
+    for (int j = 0; j < s->coords; j++) f[j] -= s->mass[j] * da[j];
+    for (int i = 0; i < s->rows; i++) dl[i] = -dl[i];
+    pw_add_JT (s, dl, f);
+    pw_mul_J (s, da, Ja);
+    for (int i = 0; i < s->rows; i++) gamma[i] -= Ja[i];
+    pw_saddle_solve (r->saddle, f, gamma, da, dl);
+    for (int j = 0; j < s->coords; j++) a[j] += da[j];
+    for (int i = 0; i < s->rows; i++) lambda[i] += dl[i];
+  }
+}
+
 void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda) {
   double *f = r->scratch, *gamma = f + r->s->coords + 3;
   pw_sweep_gamma (r->s, gamma);
   dynamics_right (r, v, f, gamma);
   pw_saddle_solve (r->saddle, f, gamma, a, lambda);
+  if (pw_saddle_below (r->saddle, r->watch)) dynamics_refine (r, f, gamma, a, lambda);
 }
 
 int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
@@ -38,7 +58,11 @@ int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double
   pw_sweep_J_gamma (r->s, gamma);
   dynamics_right (r, v, f, gamma);
   r->statistics.factorisations++;
-  return pw_saddle_factor_solve (r->saddle, f, gamma, a, lambda);
+  status = pw_saddle_factor_solve (r->saddle, f, gamma, a, lambda);
+  if (!pw_saddle_below (r->saddle, r->watch)) return status;
+  r->near = 1;
+  if (status == PW_OK) dynamics_refine (r, f, gamma, a, lambda);
+  return status;
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {

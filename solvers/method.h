@@ -21,7 +21,8 @@ struct pw_run {
   int *redundant_row;          /* which */
   double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
   char *rank_memory;
-  double guard;                /* an evaluation with a smaller pivot is too near a singular pose */
+  double watch, guard;         /* an evaluation with a smaller pivot is near a singular pose; too near */
+  int near;                    /* 1 as soon as one was near */
   double alpha, beta; /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;  /* first discontinuity of a signal after t */
 

@@ -66,16 +66,21 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
   return PW_OK;
 }
 
-int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
-  pw_system *s = r->s;
+/* v += dv with J (v + dv) = eta. */
+static void project_once (pw_projector *p, pw_system *s, double *v) {
   double *right = p->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
-  r->statistics.factorisations++;
-  if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
   pw_mul_J (s, v, right);
   pw_sweep_eta (s, eta);
   for (int i = 0; i < s->rows; i++) right[i] = eta[i] - right[i];
   pw_saddle_solve (p->velocity, NULL, right, dv, mu);
   for (int j = 0; j < s->coords; j++) v[j] += dv[j];
-  pw_place_rates (s, v);
+}
+
+int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
+  r->statistics.factorisations++;
+  if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
+  project_once (p, r->s, v);
+  if (pw_saddle_below (p->velocity, r->watch)) project_once (p, r->s, v);
+  pw_place_rates (r->s, v);
   return PW_OK;
 }

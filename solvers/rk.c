@@ -254,38 +254,87 @@ static double rk_next_time (const pw_run *r, double t_end, int *whole) {
 static int rk_fail (pw_run *r, int status, double t, pw_error *error) {
   int row;
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
-  if (pw_saddle_pivot (r->saddle, &row) <= r->guard) return pw_fail_singular (r, t, error);
+  if (r->near || pw_saddle_pivot (r->saddle, &row) <= r->guard) return pw_fail_singular (r, t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: the %s", t, r->settings.step,
                   rk_finite (r, r->data->q, r->data->v) ? "projection does not converge" : "state is no longer finite");
 }
 
-/* Tries the step to t1; if an evaluation lands near a singular pose, parts of it, of irregular sizes so that one of
- * them misses the pose.  Leaves in *t1 the end of what succeeded. */
-static int rk_step_around (pw_run *r, double h, double *t1, int project, double *added) {
-  static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943 };
-  int row, status = rk_step (r, h, *t1, project, added);
-  for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
-    if (status != PW_RETRY || pw_saddle_pivot (r->saddle, &row) > r->guard) break;
-    double t = r->t + part[i] * h;
-    r->statistics.rejected++;
-    if (added) *added = 0;
-    status = rk_step (r, t - r->t, t, project, added);
-    if (status == PW_OK) *t1 = t;
-  }
+/* Back to the beginning of the step just accepted. */
+static void rk_revert (pw_run *r) {
+  struct pw_method_data *d = r->data;
+  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  r->t = d->t0;
+  memcpy (r->q, d->q0, n);
+  memcpy (r->v, d->v0, n);
+  pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  memcpy (r->a, d->a0, n);
+  memcpy (r->ledger, d->ledger0, entries);
+  memcpy (r->rate, d->rate0, entries);
+  r->projected = d->projected0;
+}
+
+/* The step to t1 in two parts; the state there is left in d->q, d->v, and if `keep` is set the first part is accepted. */
+static int rk_two_parts (pw_run *r, double t, double t1, int project, int keep) {
+  double added = 0, *to = r->settings.ledger ? &added : NULL;
+  int status = rk_step (r, t - r->t, t, project, to);
+  if (status != PW_OK) return status;
+  rk_accept (r, t - r->t, t, added);
+  if (keep) return PW_OK;
+  status = rk_step (r, t1 - t, t1, project, to);
+  rk_revert (r);
   return status;
+}
+
+/* How far the state in d->q, d->v is from the one in q_at, v_at, in units of the scene; takes its place. */
+static double rk_compare (pw_run *r) {
+  const pw_system *s = r->s;
+  const struct pw_method_data *d = r->data;
+  double most = 0;
+  for (int j = 0; j < s->coords; j++) {
+    double unit = j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1;
+    double off = fmax (fabs (d->q[j] - r->q_at[j]), s->scale.time * fabs (d->v[j] - r->v_at[j])) / unit;
+    if (!(off <= most)) most = off;
+    r->q_at[j] = d->q[j];
+    r->v_at[j] = d->v[j];
+  }
+  return most;
+}
+
+/* Near a singular pose an evaluation that lands on it spoils the step.  The step to t1 is taken in two parts of irregular
+ * sizes, in several ways, until two of them agree; then the first part of the latter is accepted, and ends at *t. */
+static int rk_step_around (pw_run *r, int status, double t1, int project, double *t) {
+  static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302 };
+  const double good = 1e-11, enough = 1e-7;
+  const int parts = sizeof part / sizeof *part;
+  double start = r->t, best = INFINITY;
+  int choice = 0, known = status == PW_OK;
+  if (known) rk_compare (r);
+  for (int i = 0; i < parts && best > good; i++) {
+    status = rk_two_parts (r, start + part[i] * (t1 - start), t1, project, 0);
+    r->statistics.rejected++;
+    if (status < 0) return status;
+    if (status != PW_OK) continue;
+    double off = rk_compare (r);
+    if (known && off < best) best = off, choice = i;
+    known = 1;
+  }
+  if (!(best <= enough)) return PW_RETRY;
+  *t = start + part[choice] * (t1 - start);
+  return rk_two_parts (r, *t, t1, project, 1);
 }
 
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
-  double added = 0, end = rk_next_time (r, t_end, &whole), t1 = end;
-  double h = whole && !d->split ? r->settings.step : t1 - r->t;
-  int status = rk_step_around (r, h, &t1, project, r->settings.ledger ? &added : NULL);
+  double added = 0, t1 = rk_next_time (r, t_end, &whole), h = whole && !d->split ? r->settings.step : t1 - r->t;
+  r->near = 0;
+  int status = rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
+  d->split = r->near && !d->split;
+  if (d->split) status = rk_step_around (r, status, t1, project, &t1);
   if (status != PW_OK) return rk_fail (r, status, r->t, error);
-  rk_accept (r, t1 == end ? h : t1 - r->t, t1, added);
   r->statistics.steps++;
-  d->split = t1 != end;
   if (d->split) return PW_OK;
+  rk_accept (r, h, t1, added);
   d->count++;
   if (!whole) d->base = t1, d->count = 0;
   return PW_OK;

@@ -91,7 +91,8 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   }
   if (status > 0) return pw_fail_singular (r, r->t, error);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  r->guard = fmin (1e-4, 0.01 * pw_saddle_pivot (r->saddle, &row));
+  r->watch = 0.02 * pw_saddle_pivot (r->saddle, &row);
+  r->guard = fmin (1e-6, r->watch);
   pw_saddle_set_guard (r->saddle, r->guard);
   return PW_OK;
 }

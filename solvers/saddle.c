@@ -135,6 +135,10 @@ int pw_saddle_factor (pw_saddle *k) {
   return saddle_judge (k, pivot, node >= 0 ? k->row_of_node[node] : -1);
 }
 
+int pw_saddle_below (const pw_saddle *k, double sine) {
+  return k->pivot < sine * sine;
+}
+
 void pw_saddle_set_guard (pw_saddle *k, double guard) {
   k->guard = fmax (guard * guard, SADDLE_ROUND_OFF);
   if (k->small) k->small->guard = k->guard;

@@ -30,6 +30,9 @@ void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double
 /* Both; in small scenes faster than one after the other. */
 int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
+/* 1 if the smallest pivot of the last factorisation is below this sine. */
+int pw_saddle_below (const pw_saddle *k, double sine);
+
 /* The smallest pivot of the last factorisation, as the sine of the angle between a row and those before it, and that
  * row: small near a singular pose. */
 double pw_saddle_pivot (const pw_saddle *k, int *row);
