@@ -13,6 +13,7 @@
 
 typedef struct {
   const char *path;
+  const char *journal; /* where all rows are, or NULL */
   char *temporary;
   FILE *stream;
 } table_file;
@@ -32,12 +33,16 @@ char *pw_table_path (const char *path, pw_error *error) {
 }
 
 static int table_fail (const table_file *f, int why, pw_error *error) {
-  return pw_fail (error, PW_MACHINE, "cannot write %s: %s", f->path, why ? strerror (why) : "a write failed");
+  const char *reason = why ? strerror (why) : "a write failed";
+  if (f->journal == NULL) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", f->path, reason);
+  return pw_fail (error, PW_MACHINE,
+                  "cannot write %.150s: %s; all rows are in %.150s, so the same command has only to sort them", f->path,
+                  reason, f->journal);
 }
 
-static int table_open (table_file *f, const char *path, pw_error *error) {
+static int table_open (table_file *f, const char *path, const char *journal, pw_error *error) {
   size_t size = strlen (path) + sizeof ".sorted";
-  *f = (table_file){ .path = path, .temporary = malloc (size) };
+  *f = (table_file){ .path = path, .journal = journal, .temporary = malloc (size) };
   if (f->temporary == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   snprintf (f->temporary, size, "%s.sorted", path);
   f->stream = fopen (f->temporary, "w");
@@ -103,7 +108,7 @@ int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error 
   *tally = (pw_tally){ .rows = 0 };
   if (pw_map_open (&map, j->file) != PW_OK)
     return pw_fail (error, PW_MACHINE, "cannot read %s: %s", j->part, strerror (errno));
-  int status = table_open (&f, j->path, error);
+  int status = table_open (&f, j->path, j->part, error);
   if (status == PW_OK) status = table_write (j, p, &map, f.stream, tally, error);
   status = table_close (&f, status, error);
   pw_map_close (&map);
@@ -211,7 +216,7 @@ int pw_table_merge (const char *const *parts, int count, const char *path, pw_ta
   }
   if (status == PW_OK) status = table_match (x, count, error);
   if (status == PW_OK) {
-    status = table_open (&f, real, error);
+    status = table_open (&f, real, NULL, error);
     if (status == PW_OK) status = table_weave (x, count, f.stream, tally, error);
     status = table_close (&f, status, error);
   }

@@ -1,0 +1,80 @@
+#!/bin/sh
+# Sweeps under fire: killed at random moments again and again, in one piece and in parts, by GNU parallel if it is there.
+# Run from the top folder; reads PINWHEEL, SEED (of the random moments).
+
+pinwheel=${PINWHEEL:-build/pinwheel}
+case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+bad=0
+seed=${SEED:-$$}
+echo "# SEED=$seed"
+
+# report NAME STATUS
+report () {
+  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
+}
+
+# random LOW HIGH: sets $random
+random () {
+  seed=$(((seed * 1103515245 + 12345) % 2147483648))
+  random=$(awk -v x=$seed -v a="$1" -v b="$2" 'BEGIN { print a + (b - a) * (x / 65536 % 1000) / 1000 }')
+}
+
+grid='ezyroller --vary omega=log:1:10:20 --vary a=0.4,0.5,0.6 --vary frame.omega=0,0.1 --t-end 8'
+
+"$pinwheel" sweep $grid --jobs 1 -o "$work/whole.csv" 2>"$work/err"
+report 'a sweep that is left alone' $?
+
+# until_done FILE OPTION...: starts it, kills it with the signal, starts it again; then lets it be.
+until_done () {
+  file=$1 kills=0
+  shift
+  while [ $kills -lt "$most" ]; do
+    "$pinwheel" sweep $grid "$@" -o "$file" 2>"$work/err" &
+    child=$!
+    random 0.02 0.4
+    sleep "$random"
+    kill -"$signal" $child 2>/dev/null
+    wait $child 2>/dev/null
+    [ ! -e "$file" ] || return 0
+    kills=$((kills + 1))
+  done
+  "$pinwheel" sweep $grid "$@" -o "$file" 2>"$work/err"
+}
+
+round=0 most=40
+for signal in KILL KILL KILL INT TERM KILL KILL; do
+  round=$((round + 1))
+  until_done "$work/killed.csv" --jobs $((1 + round % 3))
+  cmp "$work/killed.csv" "$work/whole.csv" && [ ! -e "$work/killed.csv.part" ]
+  report "round $round, stopped $kills times by $signal" $?
+  rm -f "$work"/killed.csv*
+done
+
+# The journal cut after random bytes, and grown again from there.
+"$pinwheel" sweep $grid --part 1/3 -o "$work/part.csv" 2>"$work/err"
+cp "$work/part.csv" "$work/good.csv"
+size=$(wc -c <"$work/good.csv") failed=0 i=0
+while [ $i -lt 40 ]; do
+  i=$((i + 1))
+  random 0 "$size"
+  head -c "${random%.*}" "$work/good.csv" >"$work/part.csv.part"
+  "$pinwheel" sweep $grid --part 1/3 -o "$work/part.csv" 2>"$work/err" && cmp "$work/part.csv" "$work/good.csv" || failed=1
+done
+report 'a journal cut after any byte' $failed
+
+signal=KILL most=5
+for i in 1 2 3 4; do until_done "$work/part$i.csv" --part $i/4; done
+"$pinwheel" sweep --merge "$work"/part[1-4].csv -o "$work/merged.csv" && cmp "$work/merged.csv" "$work/whole.csv"
+report 'four parts, each of them killed, merged' $?
+
+if command -v parallel >/dev/null; then
+  parallel -j 2 "$pinwheel" sweep $grid --jobs 1 --part {}/6 -o "$work/gnu-{}.csv" ::: $(seq 6) 2>"$work/err" </dev/null &&
+    "$pinwheel" sweep --merge "$work"/gnu-*.csv -o "$work/gnu.csv" && cmp "$work/gnu.csv" "$work/whole.csv"
+  report 'six parts by GNU parallel, merged' $?
+else
+  echo '# GNU parallel is not there: not tried'
+fi
+exit $bad
