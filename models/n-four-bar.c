@@ -26,13 +26,20 @@ static void build (pw_model *m, const void *parameter) {
   char crank[24], before[24], coupler[24], pin[24];
   for (int i = 0; i <= (int)p->N; i++) {
     snprintf (crank, sizeof crank, "crank%d", i);
-    pw_add_body (m, &(pw_body){ .name = crank, .mass = p->m, .inertia = inertia, .start = { i * l, l / 2, PW_PI / 2 }, .rate = { v / 2, 0, p->speed } });
+    pw_add_body (m, &(pw_body){ .name = crank,
+                                .mass = p->m,
+                                .inertia = inertia,
+                                .start = { i * l, l / 2, PW_PI / 2 },
+                                .rate = { v / 2, 0, p->speed } });
     snprintf (pin, sizeof pin, "A%d", i);
     pw_add_pin (m, &(pw_pin){ .name = pin, .body = { crank, "ground" }, .at = { { -l / 2, 0 }, { i * l, 0 } } });
     if (i == 0) continue;
     snprintf (before, sizeof before, "crank%d", i - 1);
     snprintf (coupler, sizeof coupler, "coupler%d", i);
-    pw_add_body (m, &(pw_body){ .name = coupler, .mass = p->m, .inertia = inertia, .start = { (i - 0.5) * l, l, 0 }, .rate = { v, 0, 0 } });
+    pw_add_body (
+        m,
+        &(pw_body){
+            .name = coupler, .mass = p->m, .inertia = inertia, .start = { (i - 0.5) * l, l, 0 }, .rate = { v, 0, 0 } });
     snprintf (pin, sizeof pin, "B%d", i);
     pw_add_pin (m, &(pw_pin){ .name = pin, .body = { before, coupler }, .at = { { l / 2, 0 }, { -l / 2, 0 } } });
     snprintf (pin, sizeof pin, "C%d", i);
@@ -41,8 +48,6 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-PW_MODEL (.about = "N four-bar linkages in a row, which pass singular poses",
-          .parameters = parameters,
-          .parameters_size = sizeof (four_bar),
-          .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
+PW_MODEL (.about = "N four-bar linkages in a row, which pass singular poses", .parameters = parameters,
+          .parameters_size = sizeof (four_bar), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
           .build = build);

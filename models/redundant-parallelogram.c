@@ -24,22 +24,26 @@ static const pw_parameter parameters[] = {
 static void build (pw_model *m, const void *parameter) {
   const parallelogram *p = parameter;
   double c = p->l * cos (p->theta), s = p->l * sin (p->theta);
-  pw_add_body (m, &(pw_body){ .name = "coupler", .mass = p->mc, .inertia = p->mc * p->l * p->l / 3, .start = { p->l + c, s, 0 } });
+  pw_add_body (
+      m,
+      &(pw_body){ .name = "coupler", .mass = p->mc, .inertia = p->mc * p->l * p->l / 3, .start = { p->l + c, s, 0 } });
   for (int i = 0; i < 3; i++) {
     char crank[16], pivot[16], joint[16];
     double x = i * p->l;
     snprintf (crank, sizeof crank, "crank%d", i + 1);
     snprintf (pivot, sizeof pivot, "A%d", i + 1);
     snprintf (joint, sizeof joint, "B%d", i + 1);
-    pw_add_body (m, &(pw_body){ .name = crank, .mass = p->m, .inertia = p->m * p->l * p->l / 12, .start = { x + c / 2, s / 2, p->theta } });
+    pw_add_body (m, &(pw_body){ .name = crank,
+                                .mass = p->m,
+                                .inertia = p->m * p->l * p->l / 12,
+                                .start = { x + c / 2, s / 2, p->theta } });
     pw_add_pin (m, &(pw_pin){ .name = pivot, .body = { crank, "ground" }, .at = { { -p->l / 2, 0 }, { x, 0 } } });
-    pw_add_pin (m, &(pw_pin){ .name = joint, .body = { crank, "coupler" }, .at = { { p->l / 2, 0 }, { x - p->l, 0 } } });
+    pw_add_pin (m,
+                &(pw_pin){ .name = joint, .body = { crank, "coupler" }, .at = { { p->l / 2, 0 }, { x - p->l, 0 } } });
   }
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-PW_MODEL (.about = "three cranks carry one coupler: one constraint row too many",
-          .parameters = parameters,
-          .parameters_size = sizeof (parallelogram),
-          .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
+PW_MODEL (.about = "three cranks carry one coupler: one constraint row too many", .parameters = parameters,
+          .parameters_size = sizeof (parallelogram), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
           .build = build);

@@ -32,9 +32,14 @@ static void build (pw_model *m, const void *parameter) {
   }
   double beta = -asin (p->l1 * s / p->l2), rate = -p->l1 * c * w / (p->l2 * cos (beta));
   double x = p->l1 * c + p->l2 * cos (beta), v = -p->l1 * s * w - p->l2 * sin (beta) * rate;
-  pw_add_body (m, &(pw_body){ .name = "crank", .mass = p->m1, .inertia = p->m1 * p->l1 * p->l1 / 12,
-                              .start = { p->l1 * c / 2, p->l1 * s / 2, p->theta }, .rate = { -p->l1 * s * w / 2, p->l1 * c * w / 2, w } });
-  pw_add_body (m, &(pw_body){ .name = "rod", .mass = p->m2, .inertia = p->m2 * p->l2 * p->l2 / 12,
+  pw_add_body (m, &(pw_body){ .name = "crank",
+                              .mass = p->m1,
+                              .inertia = p->m1 * p->l1 * p->l1 / 12,
+                              .start = { p->l1 * c / 2, p->l1 * s / 2, p->theta },
+                              .rate = { -p->l1 * s * w / 2, p->l1 * c * w / 2, w } });
+  pw_add_body (m, &(pw_body){ .name = "rod",
+                              .mass = p->m2,
+                              .inertia = p->m2 * p->l2 * p->l2 / 12,
                               .start = { p->l1 * c + p->l2 * cos (beta) / 2, p->l1 * s / 2, beta },
                               .rate = { -p->l1 * s * w - p->l2 * sin (beta) * rate / 2, p->l1 * c * w / 2, rate } });
   pw_add_body (m, &(pw_body){ .name = "slider", .mass = p->ms, .start = { x, 0, 0 }, .rate = { v, 0, 0 } });
@@ -46,8 +51,6 @@ static void build (pw_model *m, const void *parameter) {
   if (p->g != 0) pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-PW_MODEL (.about = "crank, rod and slider; with equal lengths it passes a singular pose",
-          .parameters = parameters,
-          .parameters_size = sizeof (slider_crank),
-          .run = { .t_end = 1, .step = 1e-3, .method = "rk4+projection" },
+PW_MODEL (.about = "crank, rod and slider; with equal lengths it passes a singular pose", .parameters = parameters,
+          .parameters_size = sizeof (slider_crank), .run = { .t_end = 1, .step = 1e-3, .method = "rk4+projection" },
           .build = build);

@@ -134,7 +134,11 @@ static void ida_matrix_kinematics (ida_data *d, const double *y, double c) {
     pw_tape_put (&d->tape, j, n + j, -1);
   }
   if (!d->ggl) return;
-  pw_put put = { .col = 0, .rows = s->holonomic, .factor = 1, .row_scale = d->scale, .map = d->map,
+  pw_put put = { .col = 0,
+                 .rows = s->holonomic,
+                 .factor = 1,
+                 .row_scale = d->scale,
+                 .map = d->map,
                  .lambda = ida_expand (d, y + 2 * n + d->rows, d->holonomic, d->mu) };
   pw_newton_block (&d->newton, s, &d->tape, PW_JTL_Q, &put);
   put.col = 2 * n + d->rows;
@@ -145,7 +149,12 @@ static void ida_matrix_kinematics (ida_data *d, const double *y, double c) {
 static void ida_matrix_momentum (ida_data *d, const double *y, double c) {
   pw_system *s = d->run->s;
   int n = d->n;
-  pw_put put = { .row = n, .col = 0, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = d->map,
+  pw_put put = { .row = n,
+                 .col = 0,
+                 .rows = s->rows,
+                 .factor = 1,
+                 .factor_nonholonomic = 1,
+                 .map = d->map,
                  .lambda = ida_expand (d, y + 2 * n, d->rows, d->lambda) };
   pw_newton_block (&d->newton, s, &d->tape, PW_JTL_Q, &put);
   put.factor = -1;
@@ -163,14 +172,17 @@ static void ida_matrix_momentum (ida_data *d, const double *y, double c) {
 static void ida_matrix_ggl (ida_data *d, const double *y) {
   pw_system *s = d->run->s;
   int n = d->n;
-  pw_put put = { .row = 2 * n, .col = 0, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = d->map, .w = y + n };
+  pw_put put = {
+    .row = 2 * n, .col = 0, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = d->map, .w = y + n
+  };
   pw_newton_block (&d->newton, s, &d->tape, PW_JW_Q, &put);
   put.factor = put.factor_nonholonomic = -1;
   pw_newton_block (&d->newton, s, &d->tape, PW_ETA_Q, &put);
   put.factor = put.factor_nonholonomic = 1;
   put.col = n;
   pw_newton_J (s, &d->tape, &put);
-  pw_newton_J (s, &d->tape, &(pw_put){ .row = 2 * n + d->rows, .col = 0, .rows = s->holonomic, .factor = 1, .map = d->map });
+  pw_newton_J (s, &d->tape,
+               &(pw_put){ .row = 2 * n + d->rows, .col = 0, .rows = s->holonomic, .factor = 1, .map = d->map });
 }
 
 /* Rows of J v' = ...: (J v')_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G, (c + 2 alpha) J - gamma_v */
@@ -179,7 +191,9 @@ static void ida_matrix_accelerations (ida_data *d, const double *y, const double
   pw_system *s = r->s;
   int n = d->n;
   double alpha = r->alpha;
-  pw_put put = { .row = 2 * n, .col = 0, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = d->map, .w = yp + n };
+  pw_put put = {
+    .row = 2 * n, .col = 0, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = d->map, .w = yp + n
+  };
   pw_newton_block (&d->newton, s, &d->tape, PW_JW_Q, &put);
   put.w = y + n;
   put.factor = 2 * alpha, put.factor_nonholonomic = alpha;
@@ -192,7 +206,8 @@ static void ida_matrix_accelerations (ida_data *d, const double *y, const double
   pw_newton_block (&d->newton, s, &d->tape, PW_GAMMA_V, &put);
   put.factor = c + 2 * alpha, put.factor_nonholonomic = c + alpha;
   pw_newton_J (s, &d->tape, &put);
-  pw_newton_J (s, &d->tape, &(pw_put){ .row = 2 * n, .col = 0, .rows = s->holonomic, .factor = r->beta * r->beta, .map = d->map });
+  pw_newton_J (s, &d->tape,
+               &(pw_put){ .row = 2 * n, .col = 0, .rows = s->holonomic, .factor = r->beta * r->beta, .map = d->map });
 }
 
 static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, double c) {

@@ -16,15 +16,16 @@ struct pw_run {
   int stabilisation;             /* index in method->stabilisations */
   double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
-  pw_saddle *saddle;  /* with the mass matrix and all rows: accelerations, impulses */  const unsigned char *active; /* rows: 0 for the redundant ones; NULL: there are none */
+  pw_saddle *saddle;           /* with the mass matrix and all rows: accelerations, impulses */
+  const unsigned char *active; /* rows: 0 for the redundant ones; NULL: there are none */
   int redundant;               /* how many */
   int *redundant_row;          /* which */
   double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
   char *rank_memory;
-  double watch, guard;         /* an evaluation with a smaller pivot is near a singular pose; too near */
-  int near;                    /* 1 as soon as one was near */
-  double alpha, beta; /* Baumgarte's, used by pw_accelerate; 0: none */
-  double breakpoint;  /* first discontinuity of a signal after t */
+  double watch, guard; /* an evaluation with a smaller pivot is near a singular pose; too near */
+  int near;            /* 1 as soon as one was near */
+  double alpha, beta;  /* Baumgarte's, used by pw_accelerate; 0: none */
+  double breakpoint;   /* first discontinuity of a signal after t */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;

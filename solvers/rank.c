@@ -122,7 +122,8 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   const unsigned char *before = r->active;
   r->active = x->active;
   if (pw_projector_open (&p, r, s->metric, s->metric, &none) == PW_OK) {
-    if (pw_project_positions (&p, r, r->t, x->q, r->v, &row, &worst) == PW_OK) away = rank_basis (s, 1e-7, x->rows, x->kept, x->active);
+    if (pw_project_positions (&p, r, r->t, x->q, r->v, &row, &worst) == PW_OK)
+      away = rank_basis (s, 1e-7, x->rows, x->kept, x->active);
     pw_projector_close (&p);
   }
   r->active = before;
@@ -133,7 +134,8 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
 static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
   pw_system *s = r->s;
   size_t m = (size_t)s->rows, k = (size_t)redundant;
-  r->rank_memory = malloc (m + k * sizeof (int) + 16 + (k * m + k * k + k + (size_t)s->coords + 3 + m) * sizeof (double));
+  r->rank_memory =
+      malloc (m + k * sizeof (int) + 16 + (k * m + k * k + k + (size_t)s->coords + 3 + m) * sizeof (double));
   if (r->rank_memory == NULL) return PW_MACHINE;
   r->coefficient = (double *)(void *)r->rank_memory;
   r->redundant_row = (int *)(void *)(r->coefficient + k * m + k * k + k + (size_t)s->coords + 3 + m);
@@ -160,7 +162,9 @@ int pw_rank_choose (pw_run *r, pw_error *error) {
     memcpy (x.best, x.active, (size_t)s->rows);
   }
   if (best > rank)
-    status = pw_fail (error, PW_START, "model %s: the start is a singular pose: %d constraint rows are independent there, %d nearby; start a little off it",
+    status = pw_fail (error, PW_START,
+                      "model %s: the start is a singular pose: %d constraint rows are independent there, %d nearby; "
+                      "start a little off it",
                       s->model, rank, best);
   else if (best < s->rows && rank_store (r, x.best, s->rows - best) != PW_OK)
     status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);

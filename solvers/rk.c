@@ -16,7 +16,7 @@ struct pw_method_data {
   pw_projector projector;
   double base;                                                 /* time from which fixed steps are counted */
   long count;                                                  /* steps since then */
-  int split; /* 1: the last step ended inside one of them */
+  int split;                                                   /* 1: the last step ended inside one of them */
   double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES]; /* rates, accelerations, ledger's rates of the stages */
   double *q, *v;                                               /* a stage's state */
   double *lambda;

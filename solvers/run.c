@@ -165,8 +165,9 @@ static int run_lost (pw_run *r, pw_error *error) {
   pw_sweep_residuals (r->s, &now);
   int row = now.position > PW_LOST ? now.row_position : now.row_velocity;
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the constraints are lost: %s is violated by %.3g in position and %.3g in rate (scaled)", r->t,
-                  element, now.position, now.velocity);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: the constraints are lost: %s is violated by %.3g in position and %.3g in rate (scaled)",
+                  r->t, element, now.position, now.velocity);
 }
 
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
@@ -174,7 +175,8 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   int status = r->method->advance (r, t_end, error);
   if (status != PW_OK) return status;
   pw_note_residuals (r);
-  if (!(r->statistics.position <= PW_LOST && r->statistics.velocity <= PW_LOST) && r->stabilisation > 0) return run_lost (r, error);
+  if (!(r->statistics.position <= PW_LOST && r->statistics.velocity <= PW_LOST) && r->stabilisation > 0)
+    return run_lost (r, error);
   return r->t >= r->breakpoint ? run_pass_breakpoint (r, error) : PW_OK;
 }
 
@@ -249,7 +251,8 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
       snprintf (buffer + n, size - n, " and others");
       break;
     }
-    n += (size_t)snprintf (buffer + n, size - n, "%s %s (%s)", partners > 1 ? "," : "", pw_row_element (s, a, element, sizeof element),
+    n += (size_t)snprintf (buffer + n, size - n, "%s %s (%s)", partners > 1 ? "," : "",
+                           pw_row_element (s, a, element, sizeof element),
                            pw_reaction_name (s, a, row_name, sizeof row_name));
   }
   return buffer;

@@ -129,7 +129,8 @@ static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *tr
     if (now < 0 || now == rank) continue;
     rank = now;
     r->active = active;
-    status = start_attempt (r, held, trouble, error);
+    start_trouble later = { .row = -1 };
+    status = start_attempt (r, held, &later, error);
     r->active = before;
   }
   free (active);
@@ -145,13 +146,14 @@ static int start_locked (pw_run *r, pw_error *error) {
     given += s->metric[j] * r->v_given[j] * r->v_given[j];
     left += s->metric[j] * r->v[j] * r->v[j];
   }
-  if (given == 0 || left > 1e-20 * given) return PW_OK;
+  if (s->rows == s->holonomic || given == 0 || left > 1e-20 * given) return PW_OK;
   for (int i = s->holonomic; i < s->rows && strlen (text) < 150; i++) {
     size_t n = strlen (text);
     snprintf (text + n, sizeof text - n, "%s%s", n ? ", " : "", pw_row_element (s, i, element, sizeof element));
   }
-  return pw_fail (error, PW_START, "model %s: the given rates would have to be removed entirely: %s allow no motion here", s->model,
-                  *text ? text : "the constraints");
+  return pw_fail (error, PW_START,
+                  "model %s: the given rates would have to be removed entirely: %s allow no such motion", s->model,
+                  text);
 }
 
 int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
