@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "system.h"
+#include "unroll.h"
 
 /* The slabs with rows come first. */
 #define EACH_CONSTRAINT(k, s) for (pw_slab *k = (s)->slab, *end = k + (s)->constraints; k < end; k++)
@@ -75,8 +76,7 @@ static inline void evaluate_add_force (const pw_slab *k, double *f) {
 }
 
 void pw_sweep_force (pw_system *s, double *f) {
-  const double *constant = s->constant;
-  for (int j = 0; j < s->coords; j++) f[j] = constant[j];
+  memcpy (f, s->constant, (size_t)s->coords * sizeof *f);
   for (const int *i = s->force, *end = i + s->forces; i < end; i++) evaluate_add_force (&s->slab[*i], f);
 }
 
@@ -132,19 +132,31 @@ void pw_sweep_ledger (pw_system *s, const double *lambda, double *rate) {
   }
 }
 
+/* out = J w for a slab; the numbers of bodies and of own coordinates are constants where it is inlined. */
+PW_INLINE void evaluate_mul (const pw_system *s, const pw_slab *k, const double *w, double *out, int bodies, int own) {
+  static const double ground[3] = { 0, 0, 0 };
+  const double *J = k->J, *x[PW_MAX_BODIES] = { 0 }, *y = w + k->own;
+  const int *column = k->column;
+  for (int e = 0; e < k->b.count; e++, column += bodies, y += own) {
+    PW_UNROLL for (int n = 0; n < bodies; n++) x[n] = column[n] < s->coords ? w + column[n] : ground;
+    for (int r = 0; r < k->kind->rows; r++) {
+      double sum = 0;
+      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) sum += J[0] * x[n][0] + J[1] * x[n][1] + J[2] * x[n][2];
+      for (int n = 0; n < own; n++) sum += *J++ * y[n];
+      *out++ = sum;
+    }
+  }
+}
+
 void pw_mul_J (const pw_system *s, const double *w, double *out) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
-    const double *J = k->J;
-    for (int e = 0; e < k->b.count; e++)
-      for (int r = 0; r < k->kind->rows; r++) {
-        double sum = 0;
-        for (int n = 0; n < k->kind->bodies; n++, J += 3) {
-          int j = k->column[e * k->kind->bodies + n];
-          if (j < s->coords) sum += J[0] * w[j] + J[1] * w[j + 1] + J[2] * w[j + 2];
-        }
-        for (int n = 0; n < k->kind->own; n++) sum += *J++ * w[k->own + e * k->kind->own + n];
-        *out++ = sum;
-      }
+  for (const pw_slab *k = s->slab, *end = k + s->constraints; k < end; k++) {
+    double *to = out + k->row;
+    if (k->kind->own == 0 && k->kind->bodies == 2)
+      evaluate_mul (s, k, w, to, 2, 0);
+    else if (k->kind->own == 0 && k->kind->bodies == 1)
+      evaluate_mul (s, k, w, to, 1, 0);
+    else
+      evaluate_mul (s, k, w, to, k->kind->bodies, k->kind->own);
   }
 }
 
@@ -164,27 +176,37 @@ void pw_add_JT (const pw_system *s, const double *lambda, double *out) {
   }
 }
 
-/* (J v)_i and the sum of |J_ij v_j|, row by row, for the placed rates. */
-static void evaluate_speeds (const pw_system *s, double *jv, double *size) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
-    const double *J = k->J;
-    for (int e = 0; e < k->b.count; e++)
-      for (int r = 0; r < k->kind->rows; r++) {
-        double sum = 0, sizes = 0;
-        for (int n = 0; n < k->kind->bodies; n++, J += 3) {
-          const pw_pose *p = &s->pose[k->b.body[e * k->kind->bodies + n]];
-          double x = J[0] * p->vx, y = J[1] * p->vy, w = J[2] * p->omega;
-          sum += x + y + w;
-          sizes += fabs (x) + fabs (y) + fabs (w);
-        }
-        for (int n = 0; n < k->kind->own; n++) {
-          double own = *J++ * k->b.v[e * k->kind->own + n];
-          sum += own;
-          sizes += fabs (own);
-        }
-        *jv++ = sum;
-        *size++ = sizes;
+/* (J v)_i and the sum of |J_ij v_j| for a slab and the placed rates, as evaluate_mul. */
+PW_INLINE void evaluate_speeds_of (const pw_slab *k, double *jv, double *size, int bodies, int own) {
+  const double *J = k->J, *y = k->b.v;
+  const int *body = k->b.body;
+  for (int e = 0; e < k->b.count; e++, body += bodies, y += own)
+    for (int r = 0; r < k->kind->rows; r++) {
+      double sum = 0, sizes = 0;
+      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
+        const pw_pose *p = &k->b.pose[body[n]];
+        double vx = J[0] * p->vx, vy = J[1] * p->vy, w = J[2] * p->omega;
+        sum += vx + vy + w;
+        sizes += fabs (vx) + fabs (vy) + fabs (w);
       }
+      for (int n = 0; n < own; n++) {
+        double spin = *J++ * y[n];
+        sum += spin;
+        sizes += fabs (spin);
+      }
+      *jv++ = sum;
+      *size++ = sizes;
+    }
+}
+
+static void evaluate_speeds (const pw_system *s, double *jv, double *size) {
+  for (const pw_slab *k = s->slab, *end = k + s->constraints; k < end; k++) {
+    if (k->kind->own == 0 && k->kind->bodies == 2)
+      evaluate_speeds_of (k, jv + k->row, size + k->row, 2, 0);
+    else if (k->kind->own == 0 && k->kind->bodies == 1)
+      evaluate_speeds_of (k, jv + k->row, size + k->row, 1, 0);
+    else
+      evaluate_speeds_of (k, jv + k->row, size + k->row, k->kind->bodies, k->kind->own);
   }
 }
 

@@ -196,8 +196,9 @@ static void condense_take (condense *c, pw_layout *l) {
   pw_small *small = pw_take (l, c->panels > 0, sizeof *small);
   pw_panel *panel = pw_take (l, (size_t)c->panels, sizeof *panel);
   if (l->base == NULL || c->panels == 0) return;
-  *small = (pw_small){ .n = k->unknowns, .panels = c->panels, .panel = panel, .inverse = k->inverse, .guard = k->guard };
+  *small = (pw_small){ .n = k->unknowns, .panel = panel, .end = panel, .inverse = k->inverse, .guard = k->guard };
   k->small = small;
+  k->plain = k->reduce.components == 0 && k->idles == 0 ? small : NULL;
 }
 
 static void condense_count (condense *c, int rows, const unsigned char *active, condense_filling *count) {
@@ -269,12 +270,12 @@ static void condense_order_small (condense *c) {
 /* Coordinates that are all without weight need no panel: their accelerations are found elsewhere. */
 static void condense_fill_panels (condense *c, const double *weight) {
   struct pw_saddle *k = c->k;
-  int bodies = k->s->bodies, count = 0;
+  int bodies = k->s->bodies;
   for (int n = 0; n < c->panels; n++) {
     int j = n < bodies ? 3 * n : n + 2 * bodies, width = n < bodies ? 3 : 1, heavy = 0;
     for (int i = 0; i < width; i++) heavy |= weight[j + i] != 0;
     if (!heavy) continue;
-    pw_panel *p = &k->small->panel[count++];
+    pw_panel *p = k->small->end++;
     *p = (pw_panel){ .j = j, .width = width };
     for (int x = c->start[j]; x < c->start[j + 1]; x++) {
       const condense_piece *piece = &c->piece[c->list[x]];
@@ -282,7 +283,6 @@ static void condense_fill_panels (condense *c, const double *weight) {
       pw_small_add_rows (p, condense_position (c, node), c->node[node].size, piece->J, piece->step);
     }
   }
-  k->small->panels = count;
   for (int n = 0; n < c->nodes; n++)
     for (int r = 0; r < c->node[n].size && c->node[n].first == c->node[n + 1].first; r++)
       k->small->start[c->place[n] + r] = 1;

@@ -67,6 +67,7 @@ struct pw_saddle {
   int *row_of;              /* unknowns: row, or -1 for an extra */
   pw_extra *extra;
   int extras;  pw_small *small;          /* a small scene: used instead of ldl, terms and pieces; else NULL */
+  pw_small *plain;          /* the same if that is all there is: no components, no idle rows; else NULL */
   int *idle;                /* rows that take no part */
   int idles;
   int *row_of_node;         /* first row of a node, or -1 */

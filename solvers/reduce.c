@@ -3,18 +3,8 @@
 #include <stdlib.h>
 #include <string.h>
 #include "reduce.h"
+#include "unroll.h"
 #include "util.h"
-
-#if defined(__GNUC__) && !defined(__clang__)
-#define REDUCE_UNROLL _Pragma ("GCC unroll 8")
-#else
-#define REDUCE_UNROLL
-#endif
-#if defined(__GNUC__)
-#define REDUCE_INLINE static inline __attribute__ ((always_inline))
-#else
-#define REDUCE_INLINE static inline
-#endif
 
 /* ---- Components ---- */
 
@@ -271,42 +261,42 @@ static int reduce_match (pw_component *c) {
 /* ---- P = L U, the number of pivots a constant where it is usual ---- */
 
 /* Returns 0 if a pivot has become too small, or is not a number. */
-REDUCE_INLINE int reduce_lu_of (pw_component *c, int n) {
+PW_INLINE int reduce_lu_of (pw_component *c, int n) {
   double *P = c->P;
   int good = 1;
-  REDUCE_UNROLL for (int i = 0; i < n * n; i++) P[i] = *c->from[i];
-  REDUCE_UNROLL for (int p = 0; p < n; p++) {
+  PW_UNROLL for (int i = 0; i < n * n; i++) P[i] = *c->from[i];
+  PW_UNROLL for (int p = 0; p < n; p++) {
     double pivot = P[p * n + p], inverse = 1 / pivot;
     good &= fabs (pivot) >= c->least[p];
     P[p * n + p] = inverse;
-    REDUCE_UNROLL for (int i = p + 1; i < n; i++) {
+    PW_UNROLL for (int i = p + 1; i < n; i++) {
       double l = P[i * n + p] * inverse;
       P[i * n + p] = l;
-      REDUCE_UNROLL for (int j = p + 1; j < n; j++) P[i * n + j] -= l * P[p * n + j];
+      PW_UNROLL for (int j = p + 1; j < n; j++) P[i * n + j] -= l * P[p * n + j];
     }
   }
   return good;
 }
 
 /* x = P^-1 x */
-REDUCE_INLINE void reduce_solve_of (const double *P, double *x, int n) {
-  REDUCE_UNROLL for (int i = 1; i < n; i++) {
-    REDUCE_UNROLL for (int j = 0; j < i; j++) x[i] -= P[i * n + j] * x[j];
+PW_INLINE void reduce_solve_of (const double *P, double *x, int n) {
+  PW_UNROLL for (int i = 1; i < n; i++) {
+    PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[i * n + j] * x[j];
   }
-  REDUCE_UNROLL for (int i = n - 1; i >= 0; i--) {
-    REDUCE_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[i * n + j] * x[j];
+  PW_UNROLL for (int i = n - 1; i >= 0; i--) {
+    PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[i * n + j] * x[j];
     x[i] *= P[i * n + i];
   }
 }
 
 /* x = P^-T x */
-REDUCE_INLINE void reduce_solve_transposed_of (const double *P, double *x, int n) {
-  REDUCE_UNROLL for (int i = 0; i < n; i++) {
-    REDUCE_UNROLL for (int j = 0; j < i; j++) x[i] -= P[j * n + i] * x[j];
+PW_INLINE void reduce_solve_transposed_of (const double *P, double *x, int n) {
+  PW_UNROLL for (int i = 0; i < n; i++) {
+    PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[j * n + i] * x[j];
     x[i] *= P[i * n + i];
   }
-  REDUCE_UNROLL for (int i = n - 2; i >= 0; i--) {
-    REDUCE_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[j * n + i] * x[j];
+  PW_UNROLL for (int i = n - 2; i >= 0; i--) {
+    PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[j * n + i] * x[j];
   }
 }
 

@@ -8,10 +8,18 @@
 #include <stdlib.h>
 #include <string.h>
 #include "rk.h"
+#include "unroll.h"
 #include "util.h"
+
+/* The weights of a row of the tableau that are not 0. */
+typedef struct {
+  int count, stage[PW_RK_STAGES];
+  double weight[PW_RK_STAGES];
+} rk_row;
 
 struct pw_method_data {
   const pw_tableau *tableau;
+  rk_row row[PW_RK_STAGES]; /* of the stages from 1 on; in the place of stage 0, which needs none, of the new state */
   int projects, held, every; /* projection; inputs held over the step; project each so many steps */
   pw_projector projector;
   double base;                                                 /* time from which fixed steps are counted */
@@ -66,6 +74,22 @@ const pw_option pw_rk_options[] = {
 
 /* ---- Opening ---- */
 
+static rk_row rk_list_row (const double *weight, int stages) {
+  rk_row row = { 0 };
+  for (int j = 0; j < stages; j++)
+    if (weight[j] != 0) {
+      row.stage[row.count] = j;
+      row.weight[row.count++] = weight[j];
+    }
+  return row;
+}
+
+static void rk_list_weights (struct pw_method_data *d) {
+  const double *A = d->tableau->A;
+  d->row[0] = rk_list_row (d->tableau->b, d->tableau->stages);
+  for (int i = 1; i < d->tableau->stages; A += i++) d->row[i] = rk_list_row (A, i);
+}
+
 static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
   size_t n = (size_t)s->coords + 3, entries = (size_t)s->entries;
   pw_layout l = { NULL, 0 };
@@ -104,6 +128,7 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   struct pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   d->tableau = tableau;
+  rk_list_weights (d);
   d->held = pw_option_value (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, "projection");
   d->every = (int)pw_option_value (r, "every");
@@ -140,21 +165,36 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
 
 /* ---- A step ---- */
 
-/* out = y + h sum_j w_j K_j over the first so many stages. */
-static void rk_combine (double *out, const double *y, double *const *K, const double *w, int stages, double h, int n) {
-  int first = 0;
-  while (first < stages && w[first] == 0) first++;
-  if (first == stages) {
-    memcpy (out, y, (size_t)n * sizeof *out);
-    return;
+/* out = y + h sum_j w_j K_j, two entries at a time; m, the number of weights, is a constant where it is inlined. */
+PW_INLINE void rk_sum (double *restrict out, const double *y, double *const *K, const rk_row *w, double h, int m,
+                       int n) {
+  const double *k[PW_RK_STAGES];
+  double f[PW_RK_STAGES];
+  int i = 0;
+  PW_UNROLL for (int j = 0; j < m; j++) k[j] = K[w->stage[j]], f[j] = h * w->weight[j];
+  for (; i + 1 < n; i += 2) {
+    double a = y[i], b = y[i + 1];
+    PW_UNROLL for (int j = 0; j < m; j++) {
+      a += f[j] * k[j][i];
+      b += f[j] * k[j][i + 1];
+    }
+    out[i] = a;
+    out[i + 1] = b;
   }
-  const double f = h * w[first], *k = K[first];
-  for (int i = 0; i < n; i++) out[i] = y[i] + f * k[i];
-  for (int j = first + 1; j < stages; j++) {
-    if (w[j] == 0) continue;
-    const double g = h * w[j], *kj = K[j];
-    for (int i = 0; i < n; i++) out[i] += g * kj[i];
+  for (; i < n; i++) {
+    double a = y[i];
+    PW_UNROLL for (int j = 0; j < m; j++) a += f[j] * k[j][i];
+    out[i] = a;
   }
+}
+
+static void rk_combine (double *out, const double *y, double *const *K, const rk_row *w, double h, int n) {
+  if (w->count == 1)
+    rk_sum (out, y, K, w, h, 1, n);
+  else if (w->count == 4)
+    rk_sum (out, y, K, w, h, 4, n);
+  else
+    rk_sum (out, y, K, w, h, w->count, n);
 }
 
 /* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Returns as pw_accelerate. */
@@ -162,16 +202,15 @@ static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
   pw_system *s = r->s;
-  const double *weights = b->A;
   int n = s->coords;
   memcpy (d->V[0], r->v, (size_t)n * sizeof (double));
   memcpy (d->A[0], r->a, (size_t)n * sizeof (double));
   memcpy (d->R[0], r->rate, (size_t)s->entries * sizeof (double));
   if (d->held) pw_hold (s, 1);
   int status = PW_OK;
-  for (int i = 1; i < b->stages && status == PW_OK; weights += i++) {
-    rk_combine (d->q, r->q, d->V, weights, i, h, n);
-    rk_combine (d->V[i], r->v, d->A, weights, i, h, n);
+  for (int i = 1; i < b->stages && status == PW_OK; i++) {
+    rk_combine (d->q, r->q, d->V, &d->row[i], h, n);
+    rk_combine (d->V[i], r->v, d->A, &d->row[i], h, n);
     status = pw_accelerate (r, pw_before_breakpoint (r, r->t + b->c[i] * h), d->q, d->V[i], d->A[i], d->lambda);
     if (status == PW_OK && r->settings.ledger) pw_sweep_ledger (s, d->lambda, d->R[i]);
   }
@@ -213,8 +252,8 @@ static int rk_step (pw_run *r, double h, double t1, int project, double *added) 
   struct pw_method_data *d = r->data;
   int n = r->s->coords, status = rk_stages (r, h);
   if (status != PW_OK) return status;
-  rk_combine (d->q, r->q, d->V, d->tableau->b, d->tableau->stages, h, n);
-  rk_combine (d->v, r->v, d->A, d->tableau->b, d->tableau->stages, h, n);
+  rk_combine (d->q, r->q, d->V, &d->row[0], h, n);
+  rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) status = rk_project (r, t1, d->q, d->v, added);
   return status == PW_OK ? rk_accelerate (r, project, t1, d->q, d->v, d->A[0], d->lambda) : status;
@@ -237,7 +276,7 @@ static void rk_accept (pw_run *r, double h, double t1, double added) {
     memcpy (d->ledger0, r->ledger, entries * sizeof (double));
     memcpy (d->rate0, r->rate, entries * sizeof (double));
     d->projected0 = r->projected;
-    rk_combine (r->ledger, d->ledger0, d->R, d->tableau->b, d->tableau->stages, h, (int)entries);
+    rk_combine (r->ledger, d->ledger0, d->R, &d->row[0], h, (int)entries);
     r->projected += added;
     pw_sweep_ledger (r->s, r->lambda, r->rate);
   }

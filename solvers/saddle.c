@@ -21,6 +21,8 @@ pw_saddle *pw_saddle_open (pw_system *s, const double *weight, int rows, const u
   if (k) {
     k->s = s;
     k->guard = SADDLE_ROUND_OFF;
+    k->pivot = INFINITY;
+    k->pivot_row = -1;
     status = pw_reduce_open (&k->reduce, s, weight, rows, active, error);
     if (status == PW_OK) status = pw_condense (k, weight, rows, active, error);
   }
@@ -136,7 +138,9 @@ int pw_saddle_factor (pw_saddle *k) {
 }
 
 int pw_saddle_below (const pw_saddle *k, double sine) {
-  return k->pivot < sine * sine;
+  int row;
+  if (k->small && !k->small->low && sine * sine <= PW_SMALL_WATCH) return k->pivot < sine * sine;
+  return pw_saddle_pivot (k, &row) < sine;
 }
 
 void pw_saddle_set_guard (pw_saddle *k, double guard) {
@@ -267,6 +271,10 @@ static inline void saddle_left (pw_saddle *k, double *lambda) {
 }
 
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
+  if (k->plain) {
+    pw_small_solve (k->plain, f, gamma, a, lambda);
+    return;
+  }
   if (k->small) {
     saddle_small (k, 0, f, gamma, a, lambda);
     return;
@@ -282,6 +290,7 @@ void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double
 }
 
 int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
+  if (k->plain) return pw_small_both (k->plain, f, gamma, a, lambda) ? PW_OK : PW_RETRY;
   if (k->small) return saddle_small (k, 1, f, gamma, a, lambda);
   int status = pw_saddle_factor (k);
   if (status == PW_OK) pw_saddle_solve (k, f, gamma, a, lambda);

@@ -8,17 +8,7 @@
  * so that the two divisions of a pair do not wait for each other.  The functions are written once for a constant size
  * and compiled for each, so that their loops vanish. */
 #include "small.h"
-
-#if defined(__GNUC__) && !defined(__clang__)
-#define SMALL_UNROLL _Pragma ("GCC unroll 8")
-#else
-#define SMALL_UNROLL
-#endif
-#if defined(__GNUC__)
-#define SMALL_INLINE static inline __attribute__ ((always_inline))
-#else
-#define SMALL_INLINE static inline
-#endif
+#include "unroll.h"
 
 /* ---- Planning ---- */
 
@@ -61,41 +51,41 @@ void pw_small_add_rows (pw_panel *p, int first, int rows, const double *J, int s
 
 /* ---- Panels of 3 columns, the number of rows a constant ---- */
 
-SMALL_INLINE double small_dot (const double *a, const double *b) {
+PW_INLINE double small_dot (const double *a, const double *b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /* S += J W^-1 J^T over one panel (S n x n, lower triangle), y += J W^-1 f; either may be left out. */
-SMALL_INLINE void small_add (const pw_panel *p, const double *inverse, const double *f, double *S, double *y, int n,
-                             int rows) {
+PW_INLINE void small_add (const pw_panel *p, const double *inverse, const double *f, double *S, double *y, int n,
+                          int rows) {
   const double *w = inverse + p->j;
   double J[PW_SMALL][3], z[3];
-  SMALL_UNROLL for (int r = 0; r < rows; r++) {
+  PW_UNROLL for (int r = 0; r < rows; r++) {
     const double *from = p->J[r];
     J[r][0] = from[0], J[r][1] = from[1], J[r][2] = from[2];
   }
   if (f) {
     z[0] = w[0] * f[p->j], z[1] = w[1] * f[p->j + 1], z[2] = w[2] * f[p->j + 2];
     y += p->first;
-    SMALL_UNROLL for (int r = 0; r < rows; r++) y[r] += small_dot (J[r], z);
+    PW_UNROLL for (int r = 0; r < rows; r++) y[r] += small_dot (J[r], z);
   }
   if (S == 0) return;
   S += p->first * (n + 1);
-  SMALL_UNROLL for (int r = 0; r < rows; r++) {
+  PW_UNROLL for (int r = 0; r < rows; r++) {
     const double B[3] = { J[r][0] * w[0], J[r][1] * w[1], J[r][2] * w[2] };
-    SMALL_UNROLL for (int q = 0; q <= r; q++) S[r * n + q] += small_dot (B, J[q]);
+    PW_UNROLL for (int q = 0; q <= r; q++) S[r * n + q] += small_dot (B, J[q]);
   }
 }
 
 /* a = W^-1 (f - J^T y) over one panel. */
-SMALL_INLINE void small_take (const pw_panel *p, const double *inverse, const double *f, const double *y, double *a,
-                              int rows) {
+PW_INLINE void small_take (const pw_panel *p, const double *inverse, const double *f, const double *y, double *a,
+                           int rows) {
   const double *w = inverse + p->j;
   double x0 = 0, x1 = 0, x2 = 0;
   if (f) f += p->j, x0 = f[0], x1 = f[1], x2 = f[2];
   a += p->j;
   y += p->first;
-  SMALL_UNROLL for (int r = 0; r < rows; r++) {
+  PW_UNROLL for (int r = 0; r < rows; r++) {
     const double *J = p->J[r], l = y[r];
     x0 -= J[0] * l;
     x1 -= J[1] * l;
@@ -125,21 +115,21 @@ static void small_take_any (const pw_panel *p, const double *inverse, const doub
 }
 
 /* Over all panels; the usual numbers of rows on a body are compiled apart. */
-#define SMALL_PANELS(k, call, any)                                               \
-  for (const pw_panel *p = (k)->panel, *last = p + (k)->panels; p < last; p++) { \
-    if (p->shape == 3)                                                           \
-      call (3);                                                                  \
-    else if (p->shape == 2)                                                      \
-      call (2);                                                                  \
-    else if (p->shape == 1)                                                      \
-      call (1);                                                                  \
-    else if (p->shape == 4)                                                      \
-      call (4);                                                                  \
-    else                                                                         \
-      any;                                                                       \
+#define SMALL_PANELS(k, call, any)                                      \
+  for (const pw_panel *p = (k)->panel, *end = (k)->end; p < end; p++) { \
+    if (p->shape == 3)                                                  \
+      call (3);                                                         \
+    else if (p->shape == 2)                                             \
+      call (2);                                                         \
+    else if (p->shape == 1)                                             \
+      call (1);                                                         \
+    else if (p->shape == 4)                                             \
+      call (4);                                                         \
+    else                                                                \
+      any;                                                              \
   }
 
-SMALL_INLINE void small_gather (const pw_small *k, const double *f, double *S, double *y, int n) {
+PW_INLINE void small_gather (const pw_small *k, const double *f, double *S, double *y, int n) {
   const double *inverse = k->inverse;
 #define SMALL_CALL(rows) small_add (p, inverse, f, S, y, n, rows)
   SMALL_PANELS (k, SMALL_CALL, small_add_any (p, inverse, f, S, y, n))
@@ -157,29 +147,29 @@ static void small_scatter (const pw_small *k, const double *f, const double *y, 
 
 /* c = what is left of row i in the first m columns, L = its entries there; returns what is left in column m, which
  * may be a further row's. */
-SMALL_INLINE void small_row (const double *S, double *L, double *c, int i, int m, int n) {
-  SMALL_UNROLL for (int j = 0; j < m; j++) {
+PW_INLINE void small_row (const double *S, double *L, double *c, int i, int m, int n) {
+  PW_UNROLL for (int j = 0; j < m; j++) {
     double sum = S[i * n + j];
-    SMALL_UNROLL for (int k = 0; k < j; k++) sum -= c[k] * L[j * n + k];
+    PW_UNROLL for (int k = 0; k < j; k++) sum -= c[k] * L[j * n + k];
     c[j] = sum;
   }
-  SMALL_UNROLL for (int j = 0; j < m; j++) L[i * n + j] = c[j] * L[j * n + j];
+  PW_UNROLL for (int j = 0; j < m; j++) L[i * n + j] = c[j] * L[j * n + j];
 }
 
-SMALL_INLINE double small_left (double S, const double *L, const double *c, int m) {
-  SMALL_UNROLL for (int j = 0; j < m; j++) S -= c[j] * L[j];
+PW_INLINE double small_left (double S, const double *L, const double *c, int m) {
+  PW_UNROLL for (int j = 0; j < m; j++) S -= c[j] * L[j];
   return S;
 }
 
-/* Returns 0 if a pivot is not above the guard; what comes after it is then of no use. */
-SMALL_INLINE int small_factor (const double *S, double *L, double guard, int n) {
+/* Returns 0 if a pivot is not above so much of its diagonal entry; if it is 0, what comes after it is of no use. */
+PW_INLINE int small_factor (const double *S, double *L, double least, int n) {
   int good = 1;
-  SMALL_UNROLL for (int i = 0; i < n; i += 2) {
+  PW_UNROLL for (int i = 0; i < n; i += 2) {
     double c[PW_SMALL];
     small_row (S, L, c, i, i, n);
     double d = small_left (S[i * n + i], L + i * n, c, i);
     L[i * n + i] = 1 / d;
-    good &= d > guard * S[i * n + i];
+    good &= d > least * S[i * n + i];
     if (i + 1 == n) break;
     int k = i + 1;
     small_row (S, L, c, k, i, n);
@@ -187,61 +177,77 @@ SMALL_INLINE int small_factor (const double *S, double *L, double guard, int n) 
     double det = d * s - off * off;
     L[k * n + i] = off * L[i * n + i];
     L[k * n + k] = d / det;
-    good &= det > guard * (d * S[k * n + k]);
+    good &= det > least * (d * S[k * n + k]);
   }
   return good;
 }
 
-SMALL_INLINE void small_back (const double *L, double *y, int n) {
-  SMALL_UNROLL for (int i = 1; i < n; i++) {
-    SMALL_UNROLL for (int j = 0; j < i; j++) y[i] -= L[i * n + j] * y[j];
+PW_INLINE void small_back (const double *L, double *y, int n) {
+  PW_UNROLL for (int i = 1; i < n; i++) {
+    PW_UNROLL for (int j = 0; j < i; j++) y[i] -= L[i * n + j] * y[j];
   }
-  SMALL_UNROLL for (int i = 0; i < n; i++) y[i] *= L[i * n + i];
-  SMALL_UNROLL for (int i = n - 1; i > 0; i--) {
-    SMALL_UNROLL for (int j = 0; j < i; j++) y[j] -= L[i * n + j] * y[i];
+  PW_UNROLL for (int i = 0; i < n; i++) y[i] *= L[i * n + i];
+  PW_UNROLL for (int i = n - 1; i > 0; i--) {
+    PW_UNROLL for (int j = 0; j < i; j++) y[j] -= L[i * n + j] * y[i];
   }
+}
+
+double pw_small_pivot (const pw_small *k, int *place) {
+  double worst = 1;
+  *place = -1;
+  for (int i = 0; i < k->n && worst > k->guard; i++) {
+    double pivot = 1 / (k->L[i * (k->n + 1)] * k->S[i]);
+    if (!(pivot >= worst)) worst = pivot, *place = i;
+  }
+  return worst;
+}
+
+/* A pivot is low: 1 if it is above the guard all the same. */
+static int small_judge (const pw_small *k) {
+  int place;
+  return pw_small_pivot (k, &place) > k->guard;
 }
 
 /* Assembly and factorisation, with the right-hand side if there is one. */
-SMALL_INLINE int small_assemble (pw_small *k, const double *f, double *y, double *L, int n) {
+PW_INLINE int small_assemble (pw_small *k, const double *f, double *y, double *L, int n) {
   double S[PW_SMALL * PW_SMALL];
-  SMALL_UNROLL for (int i = 0; i < n; i++) {
-    SMALL_UNROLL for (int j = 0; j < i; j++) S[i * n + j] = 0;
+  PW_UNROLL for (int i = 0; i < n; i++) {
+    PW_UNROLL for (int j = 0; j < i; j++) S[i * n + j] = 0;
     S[i * n + i] = k->start[i];
   }
   small_gather (k, f, S, y, n);
-  int good = small_factor (S, L, k->guard, n);
-  SMALL_UNROLL for (int i = 0; i < n; i++) {
+  k->low = !small_factor (S, L, PW_SMALL_WATCH, n);
+  PW_UNROLL for (int i = 0; i < n; i++) {
     k->S[i] = S[i * n + i];
-    SMALL_UNROLL for (int j = 0; j <= i; j++) k->L[i * n + j] = L[i * n + j];
+    PW_UNROLL for (int j = 0; j <= i; j++) k->L[i * n + j] = L[i * n + j];
   }
-  return good;
+  return !k->low || small_judge (k);
 }
 
-SMALL_INLINE void small_right (const pw_small *k, const double *gamma, double *y, int n) {
-  SMALL_UNROLL for (int i = 0; i < n; i++) y[i] = -gamma[k->row[i]];
+PW_INLINE void small_right (const pw_small *k, const double *gamma, double *y, int n) {
+  PW_UNROLL for (int i = 0; i < n; i++) y[i] = -gamma[k->row[i]];
 }
 
-SMALL_INLINE void small_left_out (const pw_small *k, const double *y, double *lambda, int n) {
-  SMALL_UNROLL for (int i = 0; i < n; i++) lambda[k->row[i]] = y[i];
+PW_INLINE void small_left_out (const pw_small *k, const double *y, double *lambda, int n) {
+  PW_UNROLL for (int i = 0; i < n; i++) lambda[k->row[i]] = y[i];
 }
 
 /* ---- For each size ---- */
 
-SMALL_INLINE int small_factor_of (pw_small *k, int n) {
+PW_INLINE int small_factor_of (pw_small *k, int n) {
   double L[PW_SMALL * PW_SMALL];
   return small_assemble (k, 0, 0, L, n);
 }
 
-SMALL_INLINE void small_solve_of (const pw_small *k, const double *f, const double *gamma, double *y, double *lambda,
-                                  int n) {
+PW_INLINE void small_solve_of (const pw_small *k, const double *f, const double *gamma, double *y, double *lambda,
+                               int n) {
   small_right (k, gamma, y, n);
   if (f) small_gather (k, f, 0, y, n);
   small_back (k->L, y, n);
   small_left_out (k, y, lambda, n);
 }
 
-SMALL_INLINE int small_both_of (pw_small *k, const double *f, const double *gamma, double *y, double *lambda, int n) {
+PW_INLINE int small_both_of (pw_small *k, const double *f, const double *gamma, double *y, double *lambda, int n) {
   double L[PW_SMALL * PW_SMALL];
   small_right (k, gamma, y, n);
   if (!small_assemble (k, f, y, L, n)) return 0;
@@ -293,14 +299,4 @@ int pw_small_both (pw_small *k, const double *f, const double *gamma, double *a,
   }
   small_scatter (k, f, y, a);
   return 1;
-}
-
-double pw_small_pivot (const pw_small *k, int *place) {
-  double worst = 1;
-  *place = -1;
-  for (int i = 0; i < k->n && worst > k->guard; i++) {
-    double pivot = 1 / (k->L[i * (k->n + 1)] * k->S[i]);
-    if (!(pivot >= worst)) worst = pivot, *place = i;
-  }
-  return worst;
 }

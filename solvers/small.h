@@ -7,6 +7,7 @@
 #define PW_SMALL_H
 
 enum { PW_SMALL = 8 };
+#define PW_SMALL_WATCH 0.01
 
 typedef struct {
   int j, width;              /* first coordinate, columns */
@@ -16,14 +17,15 @@ typedef struct {
 } pw_panel;
 
 typedef struct {
-  int n, panels;
-  pw_panel *panel;               /* one for every body and own coordinate with weight */
+  int n;
+  pw_panel *panel, *end;         /* one for every body and own coordinate with weight */
   const double *inverse;         /* diagonal of W^-1 */
   int row[PW_SMALL];             /* of gamma and lambda, at each position */
   double start[PW_SMALL];        /* 1 for a row without panel, which stands for itself, else 0 */
   double L[PW_SMALL * PW_SMALL]; /* of L D L^T: L below the diagonal, D^-1 on it */
   double S[PW_SMALL];            /* diagonal of S */
   double guard;                  /* a pivot not above so much of its diagonal entry is taken for 0 */
+  int low;                       /* 1: one was not above PW_SMALL_WATCH of it, so that it is worth asking */
 } pw_small;
 
 /* ---- Planning ---- */

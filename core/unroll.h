@@ -1,0 +1,19 @@
+/* Functions written once for a constant size and compiled for each, so that their loops vanish. */
+#ifndef PW_UNROLL_H
+#define PW_UNROLL_H
+
+/* Before a loop whose length, at most 8, is a constant once its function is inlined.  Clang needs no telling. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define PW_UNROLL _Pragma ("GCC unroll 8")
+#else
+#define PW_UNROLL
+#endif
+
+/* In the place of `static` of such a function. */
+#if defined(__GNUC__)
+#define PW_INLINE static inline __attribute__ ((always_inline))
+#else
+#define PW_INLINE static inline
+#endif
+
+#endif
