@@ -261,7 +261,7 @@ static int reduce_match (pw_component *c) {
 /* ---- P = L U, the number of pivots a constant where it is usual ---- */
 
 /* Returns 0 if a pivot has become too small, or is not a number. */
-PW_INLINE int reduce_lu_of (pw_component *c, int n) {
+PW_INLINE int reduce_lu (pw_component *c, int n) {
   double *P = c->P;
   int good = 1;
   PW_UNROLL for (int i = 0; i < n * n; i++) P[i] = *c->from[i];
@@ -279,7 +279,7 @@ PW_INLINE int reduce_lu_of (pw_component *c, int n) {
 }
 
 /* x = P^-1 x */
-PW_INLINE void reduce_solve_of (const double *P, double *x, int n) {
+PW_INLINE void reduce_solve (const double *P, double *x, int n) {
   PW_UNROLL for (int i = 1; i < n; i++) {
     PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[i * n + j] * x[j];
   }
@@ -290,7 +290,7 @@ PW_INLINE void reduce_solve_of (const double *P, double *x, int n) {
 }
 
 /* x = P^-T x */
-PW_INLINE void reduce_solve_transposed_of (const double *P, double *x, int n) {
+PW_INLINE void reduce_solve_transposed (const double *P, double *x, int n) {
   PW_UNROLL for (int i = 0; i < n; i++) {
     PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[j * n + i] * x[j];
     x[i] *= P[i * n + i];
@@ -300,25 +300,13 @@ PW_INLINE void reduce_solve_transposed_of (const double *P, double *x, int n) {
   }
 }
 
-static int reduce_lu (pw_component *c) {
-  return c->pivots == 3 ? reduce_lu_of (c, 3) : reduce_lu_of (c, c->pivots);
-}
-
-static inline void reduce_solve (const pw_component *c, double *x) {
-  c->pivots == 3 ? reduce_solve_of (c->P, x, 3) : reduce_solve_of (c->P, x, c->pivots);
-}
-
-static inline void reduce_solve_transposed (const pw_component *c, double *x) {
-  c->pivots == 3 ? reduce_solve_transposed_of (c->P, x, 3) : reduce_solve_transposed_of (c->P, x, c->pivots);
-}
-
 /* Y and Z~ of the rows left over. */
 static void reduce_left_over (pw_component *c) {
   const pw_reduce_heavy *h = c->heavy;
   for (int i = c->pivots; i < c->rows; i++) {
     double *Y = c->Y + i * c->pivots, *Z = c->Z + i * c->cols;
     for (int p = 0; p < c->pivots; p++) Y[p] = *c->from[i * c->pivots + p];
-    reduce_solve_transposed (c, Y);
+    reduce_solve_transposed (c->P, Y, c->pivots);
     for (int n = 0; n < c->cols; n++) Z[n] = 0;
     for (const pw_reduce_heavy *x = h + c->heavies_h; x < h + c->heavies; x++)
       for (int n = 0; x->slot == i && n < x->width; n++) Z[x->column + n] = x->J[n];
@@ -327,10 +315,14 @@ static void reduce_left_over (pw_component *c) {
   }
 }
 
+static inline int reduce_run (pw_component *c) {
+  return c->pivots == 3 ? reduce_lu (c, 3) : reduce_lu (c, c->pivots);
+}
+
 double pw_reduce_factor (pw_reduce *r) {
   double worst = INFINITY;
-  for (pw_component *c = r->component; c < r->component + r->components; c++) {
-    if (!reduce_lu (c) && (reduce_match (c) < c->pivots || !reduce_lu (c))) return 0;
+  for (pw_component *c = r->component, *last = c + r->components; c < last; c++) {
+    if (!reduce_run (c) && (reduce_match (c) < c->pivots || !reduce_run (c))) return 0;
     if (c->rows > c->pivots) reduce_left_over (c);
     if (c->worst < worst) worst = c->worst;
   }
@@ -436,37 +428,48 @@ void pw_reduce_close (pw_reduce *r) {
 
 /* ---- Solving ---- */
 
+/* f -= J^T l over one of H's runs. */
 static inline void reduce_pull (const pw_reduce_heavy *h, double *f, double l) {
   f += h->j;
   f[0] -= h->J[0] * l;
   if (h->width == 3) f[1] -= h->J[1] * l, f[2] -= h->J[2] * l;
 }
 
+/* J a over one. */
 static inline double reduce_row (const pw_reduce_heavy *h, const double *a) {
   a += h->j;
   return h->width == 3 ? h->J[0] * a[0] + h->J[1] * a[1] + h->J[2] * a[2] : h->J[0] * a[0];
 }
 
-void pw_reduce_forward (pw_reduce *r, const double *gamma, double *f) {
-  for (pw_component *c = r->component, *last = c + r->components; c < last; c++) {
-    double *mu = c->lambda;
-    for (int i = 0; i < c->rows; i++) c->gamma[i] = gamma[c->row[i]];
-    for (int i = c->pivots; i < c->rows; i++)
-      for (int p = 0; p < c->pivots; p++) c->gamma[i] -= c->Y[i * c->pivots + p] * c->gamma[p];
-    for (int p = 0; p < c->pivots; p++) mu[p] = f[c->light[p]];
-    reduce_solve_transposed (c, mu);
-    for (const pw_reduce_heavy *h = c->heavy, *end = h + c->heavies_h; h < end; h++) reduce_pull (h, f, mu[h->slot]);
+/* Of one component with n pivots. */
+PW_INLINE void reduce_forward (pw_component *c, const double *gamma, double *f, int n) {
+  double *mu = c->lambda;
+  PW_UNROLL for (int p = 0; p < n; p++) c->gamma[p] = gamma[c->row[p]], mu[p] = f[c->light[p]];
+  for (int i = n; i < c->rows; i++) {
+    c->gamma[i] = gamma[c->row[i]];
+    for (int p = 0; p < n; p++) c->gamma[i] -= c->Y[i * n + p] * c->gamma[p];
   }
+  reduce_solve_transposed (c->P, mu, n);
+  for (const pw_reduce_heavy *h = c->heavy, *end = h + c->heavies_h; h < end; h++) reduce_pull (h, f, mu[h->slot]);
+}
+
+PW_INLINE void reduce_backward (pw_component *c, double *a, double *lambda, int n) {
+  double *x = c->gamma;
+  for (const pw_reduce_heavy *h = c->heavy, *end = h + c->heavies_h; h < end; h++) x[h->slot] -= reduce_row (h, a);
+  reduce_solve (c->P, x, n);
+  for (int i = n; i < c->rows; i++) {
+    lambda[c->row[i]] = c->lambda[i];
+    for (int p = 0; p < n; p++) c->lambda[p] -= c->Y[i * n + p] * c->lambda[i];
+  }
+  PW_UNROLL for (int p = 0; p < n; p++) a[c->light[p]] = x[p], lambda[c->row[p]] = c->lambda[p];
+}
+
+void pw_reduce_forward (pw_reduce *r, const double *gamma, double *f) {
+  for (pw_component *c = r->component, *last = c + r->components; c < last; c++)
+    c->pivots == 3 ? reduce_forward (c, gamma, f, 3) : reduce_forward (c, gamma, f, c->pivots);
 }
 
 void pw_reduce_backward (pw_reduce *r, double *a, double *lambda) {
-  for (pw_component *c = r->component, *last = c + r->components; c < last; c++) {
-    double *x = c->gamma;
-    for (const pw_reduce_heavy *h = c->heavy, *end = h + c->heavies_h; h < end; h++) x[h->slot] -= reduce_row (h, a);
-    reduce_solve (c, x);
-    for (int p = 0; p < c->pivots; p++) a[c->light[p]] = x[p];
-    for (int i = c->pivots; i < c->rows; i++)
-      for (int p = 0; p < c->pivots; p++) c->lambda[p] -= c->Y[i * c->pivots + p] * c->lambda[i];
-    for (int i = 0; i < c->rows; i++) lambda[c->row[i]] = c->lambda[i];
-  }
+  for (pw_component *c = r->component, *last = c + r->components; c < last; c++)
+    c->pivots == 3 ? reduce_backward (c, a, lambda, 3) : reduce_backward (c, a, lambda, c->pivots);
 }

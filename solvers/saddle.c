@@ -185,7 +185,10 @@ static inline int saddle_small (pw_saddle *k, int fresh, const double *f, const 
   double *force = k->force, *l = k->extras ? k->y : lambda;
   if (fresh && saddle_begin (k) != PW_OK) return PW_RETRY;
   if (k->reduce.components) {
-    for (int j = 0; j < k->s->coords; j++) force[j] = f ? f[j] : 0;
+    if (f)
+      memcpy (force, f, (size_t)k->s->coords * sizeof *f);
+    else
+      memset (force, 0, (size_t)k->s->coords * sizeof *force);
     pw_reduce_forward (&k->reduce, gamma, force);
     f = force;
   }
