@@ -1,5 +1,8 @@
-/* Block LDL^T of a symmetric positive definite matrix whose pattern is fixed: nodes of 1 to 3 unknowns, ordered and
- * laid out once, factorised and solved many times without allocating. */
+/* The pattern of a block L D L^T factorisation of a symmetric matrix: nodes of 1 to 3 unknowns, ordered and laid out
+ * once.  The numbers are filled in and factorised by large.c.
+ *
+ * The values of a column follow one another: the lower triangle of the diagonal block by rows, what the entries on the
+ * diagonal were before anything was eliminated, then the blocks below, each by rows. */
 #ifndef PW_LDL_H
 #define PW_LDL_H
 
@@ -7,31 +10,46 @@
 
 enum { PW_LDL_NODE = 3 }; /* most unknowns in a node */
 
-typedef struct pw_ldl pw_ldl;
+/* Which code is made for a column, or for what meets at a body: PW_LINK as in a chain, where there is one row of 2 below
+ * a column of 2 unknowns, two nodes of 2 rows at a body; PW_SHORT where no node has more than 2; PW_ANY what is left. */
+typedef enum { PW_ANY, PW_SHORT, PW_LINK } pw_shape;
 
-/* nodes: how many; size: unknowns of each; pair: 2 x pairs node numbers with a block between them, each unordered pair
- * any number of times, the diagonal not needed.  Ordered by minimum degree (AMD: Amestoy, Davis & Duff 1996).
- * NULL with PW_MACHINE in the error if memory is out. */
-pw_ldl *pw_ldl_open (int nodes, const int *size, long pairs, const int *pair, pw_error *error);
+/* A node, in the order of elimination. */
+typedef struct {
+  int at;              /* its values */
+  int y;               /* its first unknown in the right-hand side */
+  int first;           /* its rows below: from here to `first` of the next column */
+  unsigned char size;  /* unknowns */
+  unsigned char shape; /* a pw_shape */
+} pw_column;
+
+typedef struct {
+  int nodes;
+  pw_column *column; /* nodes + 1: the last one ends the ranges */
+  int *below;        /* numbers of the columns that the rows below belong to, ascending in each column */
+  int *target;       /* for each column, for its rows p descending, q < p: where K_pq is */
+  double *value;
+  int values;
+  int *place; /* column of each node; until pw_ldl_settle */
+  char *memory;
+} pw_ldl;
+
+/* nodes: how many; size: unknowns of each; y: where they are in the right-hand side; pair: 2 x pairs node numbers with
+ * a block between them, each unordered pair any number of times, the diagonal not needed.  The order is that of the
+ * nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff 1996).
+ * NULL if memory is out or there are 2^31 values or more. */
+pw_ldl *pw_ldl_open (int nodes, const int *size, const int *y, long pairs, const int *pair);
 void pw_ldl_close (pw_ldl *l);
 
-/* The values, to be zeroed and added into before each factorisation: the block of nodes i and j starts at `offset`, its
- * rows, `step` apart, being those of i, or of j if it is transposed.  Of diagonal blocks only the lower triangle is
- * read. */
-typedef struct {
-  int offset, step, transposed;
-} pw_ldl_place;
-double *pw_ldl_values (pw_ldl *l, size_t *count);
-pw_ldl_place pw_ldl_block (const pw_ldl *l, int i, int j);
+/* Where the block of columns p > q is, rows those of p. */
+int pw_ldl_find (const pw_ldl *l, int p, int q);
 
-/* First position of node i in the right-hand side. */
-int pw_ldl_position (const pw_ldl *l, int i);
+/* Planning is over: `place` is freed. */
+void pw_ldl_settle (pw_ldl *l);
 
-/* Factorises in place.  Returns the smallest pivot relative to the diagonal entry it came from: the squared sine of
- * the angle between a row and those before it.  A value that is not positive means singular; then *node tells where. */
-double pw_ldl_factor (pw_ldl *l, int *node);
-
-/* Solves in place; y in the order of positions. */
-void pw_ldl_solve (const pw_ldl *l, double *y);
+/* Values of a diagonal block: its lower triangle, and what the diagonal was. */
+static inline int pw_ldl_triangle (int size) {
+  return size * (size + 1) / 2;
+}
 
 #endif
