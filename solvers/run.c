@@ -1,4 +1,5 @@
 /* A run: opened on a consistent start, advanced step by step, looked into, closed. */
+#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -6,6 +7,8 @@
 #include "method.h"
 #include "methods.h"
 #include "util.h"
+
+#define RUN_LEAST_RTOL (100 * DBL_EPSILON)
 
 static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, pw_error *error) {
   const struct {
@@ -15,6 +18,8 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
   for (size_t i = 0; i < sizeof field / sizeof *field; i++)
     if (!isfinite (field[i].value) || field[i].value < 0)
       return pw_fail (error, PW_INPUT, "setting %s = %g: expected a number > 0", field[i].name, field[i].value);
+  if (method->adaptive && from->rtol > 0 && from->rtol < RUN_LEAST_RTOL)
+    return pw_fail (error, PW_INPUT, "setting rtol = %g: round-off allows no less than %.2g", from->rtol, RUN_LEAST_RTOL);
   if (!isfinite (from->t)) return pw_fail (error, PW_INPUT, "setting t = %g: expected a finite number", from->t);
   *to = *from;
   if (to->step == 0) to->step = 1e-3;
