@@ -21,7 +21,7 @@ typedef struct {
   struct pw_name {
     const char *name;
     int value;
-  } *slot;
+  } * slot;
 } pw_names;
 int pw_names_open (pw_names *n, size_t entries); /* PW_OK or PW_MACHINE */
 void pw_names_close (pw_names *n);
