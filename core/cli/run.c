@@ -7,6 +7,7 @@
 #include <string.h>
 #include "cli.h"
 #include "plots.h"
+#include "profile.h"
 #include "progress.h"
 #include "report.h"
 
@@ -19,7 +20,7 @@ typedef struct {
   const char *method, *t_end_text, *step_text, *rtol_text, *atol_text, *every_text;
   const char *csv_path, *json_path, *plots_path;
   const char **sets, **starts;
-  int energy;
+  int energy, profile;
   /* as understood */
   pw_cli_line line;
   pw_cli_model m;
@@ -82,6 +83,7 @@ static int run_read (run *x, int argc, const char **argv, pw_error *error) {
     { "output", 'o', POPT_ARG_STRING, &x->csv_path, 0, "Write a table of samples; - is standard output", "FILE.csv" },
     { "json", 0, POPT_ARG_STRING, &x->json_path, 0, "Write a summary; - is standard output", "FILE" },
     { "plots", 0, POPT_ARG_STRING, &x->plots_path, 0, "Draw figures into a folder", "DIR" },
+    { "profile", 0, POPT_ARG_NONE, &x->profile, 0, "Measure at the end what each kind and each stage costs", NULL },
     POPT_TABLEEND,
   };
   return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
@@ -254,6 +256,11 @@ static void run_draw (run *x, pw_error *error) {
     fprintf (stderr, "pinwheel: %s\n", own->text);
 }
 
+/* 1: standard output is taken by a file. */
+static int run_prints_file (const run *x) {
+  return (x->csv_path && strcmp (x->csv_path, "-") == 0) || (x->json_path && strcmp (x->json_path, "-") == 0);
+}
+
 /* Everything that follows the last step: table, summary, figures, the last word. */
 static int run_finish (run *x, pw_error *error) {
   char reason[80] = "";
@@ -266,6 +273,8 @@ static int run_finish (run *x, pw_error *error) {
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
   run_write_json (x, &summary, last, error);
   run_draw (x, error);
+  if (x->profile && last && error->status == PW_OK && !interrupted)
+    pw_profile (x->r, last, x->cpu, run_prints_file (x) ? stderr : stdout, error);
   if (interrupted) fprintf (stderr, "pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
   if (*x->part) fprintf (stderr, "pinwheel: the table until then is kept in %s\n", x->part);
