@@ -19,7 +19,8 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
     if (!isfinite (field[i].value) || field[i].value < 0)
       return pw_fail (error, PW_INPUT, "setting %s = %g: expected a number > 0", field[i].name, field[i].value);
   if (method->adaptive && from->rtol > 0 && from->rtol < RUN_LEAST_RTOL)
-    return pw_fail (error, PW_INPUT, "setting rtol = %g: round-off allows no less than %.2g", from->rtol, RUN_LEAST_RTOL);
+    return pw_fail (error, PW_INPUT, "setting rtol = %g: round-off allows no less than %.2g", from->rtol,
+                    RUN_LEAST_RTOL);
   if (!isfinite (from->t)) return pw_fail (error, PW_INPUT, "setting t = %g: expected a finite number", from->t);
   *to = *from;
   if (to->step == 0) to->step = 1e-3;
@@ -81,6 +82,16 @@ static int run_open_saddle (pw_run *r, pw_error *error) {
   return r->saddle ? PW_OK : PW_INPUT;
 }
 
+/* What near a singular pose means: a small part of the pivot at a good one. */
+static void run_watch (pw_run *r) {
+  int row;
+  r->pivot = pw_saddle_pivot (r->saddle, &row);
+  r->reselect = 0.3 * r->pivot;
+  r->watch = 0.02 * r->pivot;
+  r->guard = fmin (1e-6, r->watch);
+  pw_saddle_set_guard (r->saddle, r->guard);
+}
+
 /* Opens the saddle at the consistent start and evaluates the accelerations there; if some rows hardly differ from
  * others, an independent set is chosen first. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
@@ -96,9 +107,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   }
   if (status > 0) return pw_fail_singular (r, r->t, error);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  r->watch = 0.02 * pw_saddle_pivot (r->saddle, &row);
-  r->guard = fmin (1e-6, r->watch);
-  pw_saddle_set_guard (r->saddle, r->guard);
+  run_watch (r);
   return PW_OK;
 }
 
@@ -166,20 +175,47 @@ static int run_pass_breakpoint (pw_run *r, pw_error *error) {
 
 static int run_lost (pw_run *r, pw_error *error) {
   pw_residuals now;
-  char element[120] = "a constraint";
+  char element[120] = "a constraint", cause[60] = "the constraints are lost";
   pw_sweep_residuals (r->s, &now);
   int row = now.position > PW_LOST ? now.row_position : now.row_velocity;
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
-  return pw_fail (error, PW_METHOD,
-                  "t = %.6g s: the constraints are lost: %s is violated by %.3g in position and %.3g in rate (scaled)",
-                  r->t, element, now.position, now.velocity);
+  if (!r->method->adaptive) snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)",
+                  r->t, cause, element, now.position, now.velocity);
+}
+
+/* The rows in use have become nearly dependent: if others are not, the method starts anew with them.  This waits for the
+ * next step, so that the last one can be looked into, and cannot depend on whether it was. */
+static int run_reselect (pw_run *r, pw_error *error) {
+  pw_sample sample;
+  r->reselect = r->pivot / 2;
+  int status = pw_at (r, r->t, &sample, error);
+  if (status != PW_OK) return status;
+  int other = pw_rank_reselect (r);
+  if (other < 0) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (other == 0) return PW_OK;
+  memcpy (r->ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
+  status = run_open_saddle (r, error);
+  if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  if (status > 0) return pw_fail_singular (r, r->t, error);
+  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  run_watch (r);
+  r->method->close (r);
+  r->data = NULL;
+  return r->method->open (r, error);
 }
 
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
+  int row;
   if (!(r->t < t_end)) return PW_OK;
-  int status = r->method->advance (r, t_end, error);
+  int status = r->redundant && r->pivot < r->reselect ? run_reselect (r, error) : PW_OK;
+  if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status != PW_OK) return status;
   pw_note_residuals (r);
+  if (r->redundant) {
+    pw_saddle_factor (r->saddle);
+    r->pivot = pw_saddle_pivot (r->saddle, &row);
+  }
   if (!(r->statistics.position <= PW_LOST && r->statistics.velocity <= PW_LOST) && r->stabilisation > 0)
     return run_lost (r, error);
   return r->t >= r->breakpoint ? run_pass_breakpoint (r, error) : PW_OK;
@@ -238,28 +274,66 @@ int pw_run_redundant (const pw_run *r) {
   return r->redundant;
 }
 
+/* Names a row's element behind what is in the buffer: "pin B" or, with its row, "pin B (B.Fx)"; the new length. */
+static size_t run_name_row (const pw_system *s, int row, int whole, char *buffer, size_t size, size_t n) {
+  char element[120], reaction[120];
+  if (n + 1 >= size) return n;
+  pw_row_element (s, row, element, sizeof element);
+  pw_reaction_name (s, row, reaction, sizeof reaction);
+  n += (size_t)(whole ? snprintf (buffer + n, size - n, "%s (%s)", element, reaction)
+                      : snprintf (buffer + n, size - n, "%s", element));
+  return n < size ? n : size - 1;
+}
+
+/* What two rows of equal reactions have in common: "lateral ", "" if there is no word for it. */
+static const char *run_word (const char *a, const char *b) {
+  static const char *const word[][2] = {
+    { "N", "lateral " }, { "T", "rolling " }, { "Fx", "x " }, { "Fy", "y " }, { "M", "angular " }
+  };
+  const char *x = strrchr (a, '.') + 1, *y = strrchr (b, '.') + 1;
+  for (size_t i = 0; i < sizeof word / sizeof *word; i++)
+    if (strcmp (x, word[i][0]) == 0 && strcmp (y, word[i][0]) == 0) return word[i][1];
+  return "";
+}
+
+/* "wheels left and right: the same lateral constraint" */
+static void run_say_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
+  char a[120], b[120], x[120], y[120];
+  pw_row_element (s, one, a, sizeof a);
+  pw_row_element (s, two, b, sizeof b);
+  const char *word = run_word (pw_reaction_name (s, one, x, sizeof x), pw_reaction_name (s, two, y, sizeof y));
+  size_t kind = strcspn (a, " ");
+  if (strcmp (a, b) == 0)
+    snprintf (buffer, size, "%s: %s and %s are the same constraint", a, x, y);
+  else if (kind == strcspn (b, " ") && strncmp (a, b, kind) == 0)
+    snprintf (buffer, size, "%.*ss%s and%s: the same %sconstraint", (int)kind, a, a + kind, b + kind, word);
+  else
+    snprintf (buffer, size, "%s and %s: the same %sconstraint", a, b, word);
+}
+
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
+  enum { MOST = 6 };
   pw_system *s = r->s;
-  char element[120], row_name[120];
-  int row = r->redundant_row[i];
-  size_t n = (size_t)snprintf (buffer, size, "%s (%s) follows from", pw_row_element (s, row, element, sizeof element),
-                               pw_reaction_name (s, row, row_name, sizeof row_name));
+  int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
+  size_t n = run_name_row (s, row, 1, buffer, size, 0);
   if (pw_place (s, r->t, r->q, r->v) != PW_OK) return buffer;
   pw_sweep_J (s);
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   pw_rank_coefficients (r);
   const double *c = r->coefficient + i * s->rows;
-  int partners = 0;
-  for (int a = 0; a < s->rows && n + 1 < size; a++) {
+  char element[120], before[120] = "";
+  for (int a = 0; a < s->rows; a++) {
     if (fabs (c[a]) < 1e-8) continue;
-    if (partners++ == 6) {
-      snprintf (buffer + n, size - n, " and others");
-      break;
-    }
-    n += (size_t)snprintf (buffer + n, size - n, "%s %s (%s)", partners > 1 ? "," : "",
-                           pw_row_element (s, a, element, sizeof element),
-                           pw_reaction_name (s, a, row_name, sizeof row_name));
+    partners++, last = a;
+    if (elements > MOST || strcmp (pw_row_element (s, a, element, sizeof element), before) == 0 || n + 1 >= size)
+      continue;
+    strcpy (before, element);
+    const char *glue = elements == MOST ? " and others" : elements > 0 ? ", " : " follows from ";
+    n += (size_t)snprintf (buffer + n, size - n, "%s", glue);
+    if (elements++ < MOST) n = run_name_row (s, a, 0, buffer, size, n);
   }
+  if (partners == 0 && n + 1 < size) snprintf (buffer + n, size - n, " constrains nothing here");
+  if (partners == 1) run_say_pair (s, last, row, buffer, size);
   return buffer;
 }
 
