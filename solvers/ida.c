@@ -347,6 +347,8 @@ static int ida_open_vectors (ida_data *d) {
     d->scale[j] = j < 3 * s->bodies && j % 3 < 2 ? 1 : 1 / (s->scale.length * s->scale.length);
   N_VConst (0, d->work);
   N_VConst (0, d->work0);
+  memcpy (N_VGetArrayPointer (d->work), d->run->ledger, (size_t)s->entries * sizeof (double));
+  memcpy (N_VGetArrayPointer (d->work0), d->run->ledger, (size_t)s->entries * sizeof (double));
   ida_fill_vectors (d);
   return PW_OK;
 }
@@ -408,6 +410,7 @@ static int ida_open (pw_run *r, pw_error *error) {
   d->size = 2 * d->n + d->rows + d->holonomic;
   d->stop = NAN;
   d->begun = r->t;
+  if (r->statistics.steps > 0) d->before = r->statistics;
   if (pw_newton_open (&d->newton, r->s) != PW_OK || ida_open_vectors (d) != PW_OK || ida_open_matrix (d) != PW_OK ||
       ida_open_solver (d) != PW_OK)
     return ida_no_memory (r, error);

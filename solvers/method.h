@@ -22,6 +22,7 @@ struct pw_run {
   int *redundant_row;          /* which */
   double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
   char *rank_memory;
+  double pivot, reselect;      /* the smallest one at the state reached; below this other rows are tried */
   double watch, guard; /* an evaluation with a smaller pivot is near a singular pose; too near */
   int near;            /* 1 as soon as one was near */
   double alpha, beta;  /* Baumgarte's, used by pw_accelerate; 0: none */

@@ -5,6 +5,7 @@
  * pull on nothing, so the least-norm ones are lambda + sum z_i n_i with z from a small least-squares problem.
  *
  * The rank is judged at consistent poses off the singular set: at the start and at two poses a short motion away.
+ * In motion a set may turn bad where another one is good: then it is chosen anew.
  * (Garcia de Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
 #include <float.h>
 #include <math.h>
@@ -52,22 +53,54 @@ static double rank_orthogonalise (double *row, const double *rows, const int *ke
   return sqrt (norm);
 }
 
-/* The kept rows become an orthonormal basis of the range of J^T, their numbers go to `kept`. */
-static int rank_basis (const pw_system *s, double tol, double *rows, int *kept, unsigned char *active) {
-  int rank = 0, n = s->coords;
-  rank_expand (s, rows);
-  for (int i = 0; i < s->rows; i++) {
-    double *row = rows + (size_t)i * (size_t)n, norm = rank_orthogonalise (row, rows, kept, rank, n);
-    active[i] = norm > tol;
-    if (!active[i]) continue;
-    for (int j = 0; j < n; j++) row[j] /= norm;
-    kept[rank++] = i;
+/* The next row to keep of rows first .. end - 1: the first one that has about the norm of the largest left. */
+static int rank_pivot (const double *norm, const unsigned char *active, int first, int end) {
+  double most = 0;
+  for (int i = first; i < end; i++)
+    if (!active[i]) most = fmax (most, norm[i]);
+  for (int i = first; i < end; i++)
+    if (!active[i] && norm[i] > 0 && norm[i] >= 0.9 * most) return i;
+  return -1;
+}
+
+/* Keeps independent rows among first .. end - 1 behind the `rank` ones kept so far; returns the new rank. */
+static int rank_keep (double tol, double *rows, double *norm, int *kept, unsigned char *active, int rank, int first,
+                      int end, int n) {
+  for (int i = first; i < end; i++) norm[i] = rank_orthogonalise (rows + (size_t)i * (size_t)n, rows, kept, rank, n);
+  for (int next = rank_pivot (norm, active, first, end); next >= 0; next = rank_pivot (norm, active, first, end)) {
+    double *row = rows + (size_t)next * (size_t)n;
+    norm[next] = rank_orthogonalise (row, rows, kept, rank, n);
+    if (!(norm[next] > tol)) {
+      norm[next] = 0;
+      continue;
+    }
+    for (int j = 0; j < n; j++) row[j] /= norm[next];
+    active[next] = 1;
+    kept[rank++] = next;
+    for (int i = first; i < end; i++)
+      if (!active[i] && norm[i] > 0)
+        norm[i] = rank_orthogonalise (rows + (size_t)i * (size_t)n, rows, kept + rank - 1, 1, n);
   }
   return rank;
 }
 
+/* The kept rows become an orthonormal basis of the range of J^T, their numbers go to `kept`.  Holonomic rows come first:
+ * a nonholonomic one must not take the place of a position. */
+static int rank_basis (const pw_system *s, double tol, double *rows, int *kept, unsigned char *active) {
+  double *norm = rows + (size_t)s->rows * (size_t)s->coords;
+  rank_expand (s, rows);
+  memset (active, 0, (size_t)s->rows);
+  int rank = rank_keep (tol, rows, norm, kept, active, 0, 0, s->holonomic, s->coords);
+  return rank_keep (tol, rows, norm, kept, active, rank, s->holonomic, s->rows, s->coords);
+}
+
+/* rows x (coords + 1): the rows, then their norms. */
+static size_t rank_room (const pw_system *s) {
+  return (size_t)s->rows * ((size_t)s->coords + 1);
+}
+
 int pw_rank_select (const pw_system *s, double tol, unsigned char *active) {
-  double *rows = malloc (((size_t)s->rows * (size_t)s->coords + 1) * sizeof *rows);
+  double *rows = malloc ((rank_room (s) + 1) * sizeof *rows);
   int *kept = malloc (((size_t)s->rows + 1) * sizeof *kept), rank = PW_MACHINE;
   if (rows && kept) rank = rank_basis (s, tol, rows, kept, active);
   free (rows);
@@ -86,10 +119,10 @@ typedef struct {
 
 static int rank_search_open (rank_search *x, const pw_system *s) {
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
-  x->memory = malloc ((m * n + 2 * n + 4) * sizeof (double) + m * sizeof (int) + 2 * m);
+  x->memory = malloc ((rank_room (s) + 2 * n + 4) * sizeof (double) + m * sizeof (int) + 2 * m);
   if (x->memory == NULL) return PW_MACHINE;
   x->rows = (double *)(void *)x->memory;
-  x->q = x->rows + m * n;
+  x->q = x->rows + rank_room (s);
   x->motion = x->q + n;
   x->kept = (int *)(void *)(x->motion + n + 4);
   x->active = (unsigned char *)(x->kept + m);
@@ -130,7 +163,15 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   return away;
 }
 
-/* The row's partners, for the notice. */
+/* The set and its complement become the run's. */
+static void rank_take (pw_run *r, unsigned char *mask, const unsigned char *active) {
+  memcpy (mask, active, (size_t)r->s->rows);
+  r->active = mask;
+  r->redundant = 0;
+  for (int i = 0; i < r->s->rows; i++)
+    if (!active[i]) r->redundant_row[r->redundant++] = i;
+}
+
 static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
   pw_system *s = r->s;
   size_t m = (size_t)s->rows, k = (size_t)redundant;
@@ -139,11 +180,7 @@ static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
   if (r->rank_memory == NULL) return PW_MACHINE;
   r->coefficient = (double *)(void *)r->rank_memory;
   r->redundant_row = (int *)(void *)(r->coefficient + k * m + k * k + k + (size_t)s->coords + 3 + m);
-  unsigned char *mask = (unsigned char *)(r->redundant_row + k);
-  memcpy (mask, active, m);
-  r->active = mask;
-  for (int i = 0; i < s->rows; i++)
-    if (!active[i]) r->redundant_row[r->redundant++] = i;
+  rank_take (r, (unsigned char *)(r->redundant_row + k), active);
   return PW_OK;
 }
 
@@ -171,6 +208,17 @@ int pw_rank_choose (pw_run *r, pw_error *error) {
   free (x.memory);
   if (pw_place (s, r->t, r->q, r->v) == PW_OK) pw_sweep_J (s);
   return status;
+}
+
+int pw_rank_reselect (pw_run *r) {
+  pw_system *s = r->s;
+  rank_search x;
+  if (rank_search_open (&x, s) != PW_OK) return PW_MACHINE;
+  int rank = rank_basis (s, 1e-7, x.rows, x.kept, x.active);
+  int other = rank == s->rows - r->redundant && memcmp (x.active, r->active, (size_t)s->rows) != 0;
+  if (other) rank_take (r, (unsigned char *)(r->redundant_row + r->redundant), x.active);
+  free (x.memory);
+  return other;
 }
 
 void pw_rank_close (pw_run *r) {

@@ -9,13 +9,18 @@ struct pw_run;
 /* The largest rows x coordinates that is examined densely. */
 #define PW_RANK_MOST 4e7
 
-/* Rows kept in order by Gram-Schmidt on the swept J, lengths and angles in units of the scene: active[i] = 1 for a row
- * whose part independent of those kept before exceeds tol of it.  Returns the rank, or PW_MACHINE. */
+/* Rows kept by Gram-Schmidt on the swept J, lengths and angles in units of the scene: active[i] = 1 for a row whose part
+ * independent of those kept before exceeds tol of it; holonomic rows first, of these the most independent ones, in
+ * order where they are about equal.  Returns the rank, or PW_MACHINE. */
 int pw_rank_select (const pw_system *s, double tol, unsigned char *active);
 
 /* Chooses r->active for the run at its consistent start: rows dependent there and at two poses nearby.  Leaves it NULL
  * if all rows are independent.  Errors: PW_MACHINE, PW_START (the start is a singular pose). */
 int pw_rank_choose (struct pw_run *r, pw_error *error);
+
+/* Chooses r->active anew at the pose J is swept at, if there is another set of the same rank: 1; 0 if there is none.  The
+ * run's saddle and method then still have the old one.  Errors: PW_MACHINE. */
+int pw_rank_reselect (struct pw_run *r);
 
 /* Multipliers of all rows from those of the active ones: the smallest (forces in units of 1, moments of L) with the same
  * J^T lambda.  J must be swept and the run's saddle factorised at the pose. */

@@ -321,12 +321,13 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   pw_rank_coefficients (r);
   const double *c = r->coefficient + i * s->rows;
-  char element[120], before[120] = "";
+  char element[120], own[120], before[120] = "";
+  pw_row_element (s, row, own, sizeof own);
   for (int a = 0; a < s->rows; a++) {
     if (fabs (c[a]) < 1e-8) continue;
     partners++, last = a;
-    if (elements > MOST || strcmp (pw_row_element (s, a, element, sizeof element), before) == 0 || n + 1 >= size)
-      continue;
+    pw_row_element (s, a, element, sizeof element);
+    if (elements > MOST || n + 1 >= size || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
     strcpy (before, element);
     const char *glue = elements == MOST ? " and others" : elements > 0 ? ", " : " follows from ";
     n += (size_t)snprintf (buffer + n, size - n, "%s", glue);

@@ -1,0 +1,334 @@
+/* Redundant rows: the motion is that of the same scene without them, the reactions are the smallest, and what follows
+ * from what is named. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "scene.h"
+#include "trial.h"
+
+#define pw_plugin redundant_parallelogram
+#include "../models/redundant-parallelogram.c"
+#undef pw_plugin
+
+enum { REDUNDANT_COORDS = 20 };
+
+static const char *const redundant_fixed[] = { "rk4+none", "rk4+baumgarte", "rk4+projection",
+                                               "rk4+projection:metric=identity", NULL };
+static const char *const redundant_adaptive[] = { "ida+none", "ida+baumgarte", "ida+ggl", NULL };
+
+/* How a scene ends, q then v, by states of the given names. */
+static void redundant_end (const pw_plugin_table *table, const char *method, double rtol, double t,
+                           const char *const *name, double *end, double step) {
+  pw_system *s = scene_system (table, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = rtol, .span = t });
+  pw_sample x = runs_to (r, t);
+  for (int i = 0; name[i]; i++) end[i] = trial_state (s, &x, name[i]);
+  pw_close (r);
+  pw_free (s);
+}
+
+static double redundant_off (const double *a, const double *b, int n) {
+  double most = 0;
+  for (int i = 0; i < n; i++) most = fmax (most, fabs (a[i] - b[i]));
+  return most;
+}
+
+/* A scene and its twin without redundant rows end alike, by every method: fixed steps to round-off, adaptive ones to 10
+ * times the twin's own error, which is what it differs from fixed steps.  Where other rows than the twin's are kept,
+ * methods that let them drift agree to that drift only: steps must be so small that it is below round-off. */
+static void redundant_twins (const pw_plugin_table *table, const pw_plugin_table *twin, double t, double step,
+                             const char *const *name) {
+  double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS], exact[REDUNDANT_COORDS];
+  const double rtol = 1e-8;
+  int n = 0;
+  while (name[n]) n++;
+  assert_true (n <= REDUNDANT_COORDS);
+  redundant_end (twin, "rk4+projection", rtol, t, name, exact, step);
+  for (int i = 0; redundant_fixed[i]; i++) {
+    redundant_end (table, redundant_fixed[i], rtol, t, name, a, step);
+    redundant_end (twin, redundant_fixed[i], rtol, t, name, b, step);
+    check_below (redundant_fixed[i], redundant_off (a, b, n), 1e-12, "twins in a fixed-step method");
+  }
+  for (int i = 0; redundant_adaptive[i]; i++) {
+    redundant_end (table, redundant_adaptive[i], rtol, t, name, a, step);
+    redundant_end (twin, redundant_adaptive[i], rtol, t, name, b, step);
+    check_below (redundant_adaptive[i], redundant_off (a, b, n), 10 * redundant_off (b, exact, n),
+                 "10 times the twin's own error");
+  }
+}
+
+/* What a run says about its redundant rows. */
+static void redundant_says (const pw_plugin_table *table, const char *const *text) {
+  char buffer[500];
+  int n = 0;
+  while (text[n]) n++;
+  pw_system *s = scene_system (table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  assert_int_equal (pw_run_redundant (r), n);
+  for (int i = 0; i < n; i++) assert_string_equal (pw_run_redundancy (r, i, buffer, sizeof buffer), text[i]);
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- Three cranks carry one coupler ---- */
+
+/* The third crank carries only across: along y the other two do.  Independent while the cranks are not horizontal. */
+static void redundant_slotted (pw_model *m, const void *parameter) {
+  (void)parameter;
+  double c = cos (-PW_PI / 4), s = sin (-PW_PI / 4);
+  pw_add_body (m, &(pw_body){ .name = "coupler", .mass = 2, .inertia = 2. / 3, .start = { 1 + c, s, 0 } });
+  for (int i = 0; i < 3; i++) {
+    static const char *const crank[] = { "crank1", "crank2", "crank3" }, *const A[] = { "A1", "A2", "A3" };
+    pw_add_body (
+        m, &(pw_body){ .name = crank[i], .mass = 1, .inertia = 1. / 12, .start = { i + c / 2, s / 2, -PW_PI / 4 } });
+    pw_add_pin (m, &(pw_pin){ .name = A[i], .body = { crank[i], "ground" }, .at = { { -0.5, 0 }, { i, 0 } } });
+  }
+  pw_add_pin (m, &(pw_pin){ .name = "B1", .body = { "crank1", "coupler" }, .at = { { 0.5, 0 }, { -1, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "B2", .body = { "crank2", "coupler" }, .at = { { 0.5, 0 }, { 0, 0 } } });
+  pw_add_drive (
+      m,
+      &(pw_drive){ .name = "B3", .body = { "crank3", "coupler" }, .at = { { 0.5, 0 }, { 1, 0 } }, .what = PW_DRIVE_X });
+  pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -9.81 } });
+}
+
+static const pw_plugin_table redundant_slotted_table = TRIAL_TABLE (redundant_slotted);
+
+static const char *const redundant_cranks[] = { "coupler.x",    "coupler.y",    "coupler.phi",
+                                                "crank1.phi",   "crank2.phi",   "crank3.phi",
+                                                "crank1.omega", "crank3.omega", NULL };
+
+static void test_parallelogram_twins (void **state) {
+  (void)state;
+  redundant_twins (&redundant_parallelogram, &redundant_slotted_table, 1, 1e-3, redundant_cranks);
+}
+
+static void redundant_swing (const char *method, double bound, const char *reason) {
+  pw_system *s = scene_system (&redundant_parallelogram, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1, .ledger = 1 });
+  pw_sample x = runs_to (r, 1);
+  static const char *const crank[] = { "crank1.phi", "crank2.phi", "crank3.phi" };
+  for (int i = 0; i < 3; i++) check_close (method, trial_state (s, &x, crank[i]), -2.351451216583941994, bound, reason);
+  check_close (method, trial_state (s, &x, "crank2.omega"), 0.2767502772591703, 10 * bound, reason);
+  check_close ("balance", x.balance, 0, 1e2 * bound, reason);
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_parallelogram_digits (void **state) {
+  (void)state;
+  for (int i = 0; redundant_fixed[i]; i++) redundant_swing (redundant_fixed[i], 1e-11, "10 h^4 at h = 1e-3");
+  for (int i = 0; redundant_adaptive[i]; i++) redundant_swing (redundant_adaptive[i], 1e-7, "1e3 rtol");
+}
+
+/* By symmetry the least reactions are equal shares; in IDA the smallest also of the approximate ones. */
+static void redundant_shares (const char *method, double bound, const char *reason) {
+  static const char *const name[] = { "B1.Fx", "B2.Fx", "B3.Fx", "B1.Fy", "B2.Fy", "B3.Fy" };
+  double share[6];
+  pw_system *s = scene_system (&redundant_parallelogram, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1 });
+  pw_sample x = runs_to (r, 0.7);
+  for (int i = 0; i < 6; i++) share[i] = trial_reaction (s, &x, name[i]);
+  for (int i = 1; i < 6; i++)
+    if (i != 3) check_close (name[i], share[i], share[i / 3 * 3], bound * hypot (share[0], share[3]), reason);
+  double ax = trial_state (s, &x, "coupler.phi"), ay = x.a[1] + 9.81;
+  check_close ("coupler's angle", ax, 0, bound, "the cranks are parallel");
+  check_close ("all three lift the coupler", -(share[3] + share[4] + share[5]), 2 * ay, 1e2 * bound, reason);
+  check_close ("and push it", -(share[0] + share[1] + share[2]), 2 * x.a[0], 1e2 * bound, reason);
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_shares (void **state) {
+  (void)state;
+  for (int i = 0; redundant_fixed[i]; i++) redundant_shares (redundant_fixed[i], 1e-11, "10 h^4 at h = 1e-3");
+  for (int i = 0; redundant_adaptive[i]; i++) redundant_shares (redundant_adaptive[i], 1e-6, "1e4 rtol");
+}
+
+/* ---- A tricycle: two wheels on one axle, a steered one in front ---- */
+
+static void redundant_tricycle (pw_model *m, int wheels) {
+  pw_add_body (m, &(pw_body){ .name = "frame", .mass = 8, .inertia = 1.2, .rate = { 1, 0, 0 } });
+  pw_add_body (m,
+               &(pw_body){ .name = "fork", .mass = 1, .inertia = 0.02, .start = { 0.57, 0.03, 0.3 }, .rate = { 1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "head", .body = { "frame", "fork" }, .at = { { 0.6, 0.04 }, { 0.03, 0 } } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "front", .body = "fork", .at = { -0.05, 0 }, .heading = 0.1 });
+  pw_add_wheel (m, &(pw_wheel){ .name = "rear_left", .body = "frame", .at = { -0.4, 0.3 } });
+  if (wheels > 1) pw_add_wheel (m, &(pw_wheel){ .name = "rear_right", .body = "frame", .at = { -0.4, -0.3 } });
+  pw_add_torque (m, &(pw_torque){ .name = "rider",
+                                  .body = { "frame", "fork" },
+                                  .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.3, .omega = 2 } } });
+}
+
+static void redundant_three (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_tricycle (m, 2);
+}
+
+static void redundant_two (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_tricycle (m, 1);
+}
+
+static const pw_plugin_table redundant_three_table = TRIAL_TABLE (redundant_three);
+static const pw_plugin_table redundant_two_table = TRIAL_TABLE (redundant_two);
+
+static void test_axle (void **state) {
+  (void)state;
+  static const char *const name[] = { "frame.x",     "frame.y", "frame.phi", "fork.phi",   "frame.vx", "frame.vy",
+                                      "frame.omega", "fork.vx", "fork.vy",   "fork.omega", NULL };
+  redundant_twins (&redundant_three_table, &redundant_two_table, 3, 1e-3, name);
+  trial (&redundant_three_table, 2);
+}
+
+/* Twin wheels carry half each of what one would. */
+static void test_axle_forces (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&redundant_three_table, NULL), *twin = scene_system (&redundant_two_table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", NULL), *one = runs_open (twin, "rk4+projection", NULL);
+  for (int i = 1; i <= 4; i++) {
+    pw_sample x = runs_to (r, 0.7 * i), y = runs_to (one, 0.7 * i);
+    double left = trial_reaction (s, &x, "rear_left.N"), right = trial_reaction (s, &x, "rear_right.N");
+    double whole = trial_reaction (twin, &y, "rear_left.N");
+    check_close ("the sum", left + right, whole, 1e-12 * (1 + fabs (whole)), "twins in a fixed-step method");
+    check_close ("the halves", left, right, 1e-12 * (1 + fabs (whole)), "the smallest reactions are equal ones");
+  }
+  pw_close (r);
+  pw_close (one);
+  pw_free (s);
+  pw_free (twin);
+}
+
+/* ---- Two bodies joined by a weld and two pins, hanging from the ground ---- */
+
+static void redundant_frame (pw_model *m, int pins) {
+  pw_add_body (m, &(pw_body){ .name = "left", .mass = 2, .inertia = 0.3, .start = { 0.5, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "right", .mass = 1, .inertia = 0.1, .start = { 1.3, 0.2, 0.4 } });
+  double c = cos (0.4), s = sin (0.4);
+  pw_add_pin (m, &(pw_pin){ .name = "hook", .body = { "left", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  /* the point (dx, dy) from the centre of `right`, in its own frame */
+#define REDUNDANT_SEEN(dx, dy) { c * (dx) + s * (dy), c * (dy)-s * (dx) }
+  pw_add_weld (m, &(pw_weld){ .name = "plate",
+                              .body = { "left", "right" },
+                              .at = { { 0.5, 0.1 }, REDUNDANT_SEEN (-0.3, -0.1) },
+                              .angle = 0.4 });
+  if (pins > 0)
+    pw_add_pin (m, &(pw_pin){ .name = "bolt1",
+                              .body = { "left", "right" },
+                              .at = { { 0.4, -0.2 }, REDUNDANT_SEEN (-0.4, -0.4) } });
+  if (pins > 1)
+    pw_add_pin (
+        m,
+        &(pw_pin){ .name = "bolt2", .body = { "left", "right" }, .at = { { 0.6, 0.3 }, REDUNDANT_SEEN (-0.2, 0.1) } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -9.81 } });
+}
+
+static void redundant_bolted (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_frame (m, 2);
+}
+
+static void redundant_welded (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_frame (m, 0);
+}
+
+static const pw_plugin_table redundant_bolted_table = TRIAL_TABLE (redundant_bolted);
+static const pw_plugin_table redundant_welded_table = TRIAL_TABLE (redundant_welded);
+
+static void test_frame (void **state) {
+  (void)state;
+  static const char *const name[] = {
+    "left.phi", "right.phi", "right.x", "right.y", "left.omega", "right.omega", NULL
+  };
+  redundant_twins (&redundant_bolted_table, &redundant_welded_table, 2, 2e-4, name);
+  trial (&redundant_bolted_table, 2);
+}
+
+/* ---- A robot: two driven wheels on one axle of one body, centre of mass between them ----
+ *
+ *   v = a t, phi = b t^2 / 2:  (m + 2 I / r^2) a = (u1 + u2) / r,  (J + 2 I c^2 / r^2) b = c (u2 - u1) / r */
+
+static const struct { double m, J, I, r, c, u1, u2; } redundant_r = { 10, 0.4, 0.02, 0.1, 0.25, 0.5, 0.8 };
+
+static void redundant_robot (pw_model *m, const void *parameter) {
+  (void)parameter;
+  pw_add_body (m, &(pw_body){ .name = "robot", .mass = redundant_r.m, .inertia = redundant_r.J });
+  for (int i = 0; i < 2; i++)
+    pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = i ? "right" : "left",
+                                                  .body = "robot",
+                                                  .at = { 0, i ? -redundant_r.c : redundant_r.c },
+                                                  .radius = redundant_r.r,
+                                                  .inertia = redundant_r.I,
+                                                  .torque = { .constant = i ? redundant_r.u2 : redundant_r.u1 } });
+}
+
+static const pw_plugin_table redundant_robot_table = TRIAL_TABLE (redundant_robot);
+
+static void redundant_circle (const char *method, double bound, const char *reason) {
+  const double t = 2, m = redundant_r.m, I = redundant_r.I, r = redundant_r.r, c = redundant_r.c;
+  double a = (redundant_r.u1 + redundant_r.u2) / r / (m + 2 * I / (r * r));
+  double b = c * (redundant_r.u2 - redundant_r.u1) / r / (redundant_r.J + 2 * I * c * c / (r * r));
+  double phi = b * t * t / 2, way = a * t * t / 2, side = m * a * t * b * t;
+  pw_system *s = scene_system (&redundant_robot_table, NULL);
+  pw_run *run = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 });
+  pw_sample x = runs_to (run, t);
+  check_close ("phi", x.q[2], phi, bound, reason);
+  check_close ("x", x.q[0], a / b * sin (phi), bound, reason);
+  check_close ("y", x.q[1], a / b * (1 - cos (phi)), bound, reason);
+  check_close ("left", trial_state (s, &x, "left.spin"), (way - c * phi) / r, 10 * bound, reason);
+  check_close ("right", trial_state (s, &x, "right.spin"), (way + c * phi) / r, 10 * bound, reason);
+  check_close ("left force", trial_reaction (s, &x, "left.N"), side / 2, 1e3 * bound, reason);
+  check_close ("right force", trial_reaction (s, &x, "right.N"), side / 2, 1e3 * bound, reason);
+  check_close ("balance", x.balance, 0, 10 * bound, reason);
+  pw_close (run);
+  pw_free (s);
+}
+
+static void test_robot (void **state) {
+  (void)state;
+  for (int i = 0; redundant_fixed[i]; i++) redundant_circle (redundant_fixed[i], 1e-10, "100 h^4 at h = 1e-3");
+  for (int i = 0; redundant_adaptive[i]; i++) redundant_circle (redundant_adaptive[i], 1e-6, "1e4 rtol");
+}
+
+/* ---- What is said ---- */
+
+static const char redundant_coupler[] = "pin B2 (B2.Fy) follows from pin A1, pin B1, pin A2, pin A3, pin B3";
+
+static void test_names (void **state) {
+  (void)state;
+  static const char *const axle[] = { "wheels rear_left and rear_right: the same lateral constraint", NULL };
+  static const char *const robot[] = { "rolling-wheels left and right: the same lateral constraint", NULL };
+  static const char *const none[] = { NULL };
+  redundant_says (&redundant_three_table, axle);
+  redundant_says (&redundant_robot_table, robot);
+  redundant_says (&redundant_two_table, none);
+}
+
+/* A row with many partners names their elements; a short buffer cuts the text. */
+static void test_partners (void **state) {
+  (void)state;
+  char text[500];
+  pw_system *s = scene_system (&redundant_parallelogram, NULL);
+  pw_run *r = runs_open (s, "ida+ggl", NULL);
+  assert_int_equal (pw_run_redundant (r), 1);
+  assert_string_equal (pw_run_redundancy (r, 0, text, sizeof text), redundant_coupler);
+  pw_run_redundancy (r, 0, text, 10);
+  assert_int_equal (strlen (text), 9);
+  pw_close (r);
+  pw_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_parallelogram_twins),
+    cmocka_unit_test (test_parallelogram_digits),
+    cmocka_unit_test (test_shares),
+    cmocka_unit_test (test_axle),
+    cmocka_unit_test (test_axle_forces),
+    cmocka_unit_test (test_frame),
+    cmocka_unit_test (test_robot),
+    cmocka_unit_test (test_names),
+    cmocka_unit_test (test_partners),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
