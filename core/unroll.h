@@ -16,4 +16,12 @@
 #define PW_INLINE static inline
 #endif
 
+/* At the top of a file that reads pairs of numbers which were stored one by one: read as one vector, they would have
+ * to wait until the stores are done. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define PW_ONE_BY_ONE _Pragma ("GCC optimize (\"no-tree-slp-vectorize\")")
+#else
+#define PW_ONE_BY_ONE
+#endif
+
 #endif

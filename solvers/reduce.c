@@ -6,6 +6,8 @@
 #include "unroll.h"
 #include "util.h"
 
+PW_ONE_BY_ONE
+
 /* ---- Components ---- */
 
 /* Union-find over bodies and own coordinates that have columns without weight. */

@@ -10,6 +10,8 @@
 #include "small.h"
 #include "unroll.h"
 
+PW_ONE_BY_ONE
+
 /* ---- Planning ---- */
 
 static int small_bits (unsigned long long x) {
