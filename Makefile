@@ -71,7 +71,7 @@ PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
 .PHONY: all everything demo test test-all layers san clang gcc format format-check bench-quick bench-engine \
-        deps install uninstall clean help
+        bench-effects basic deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -86,6 +86,7 @@ help:
 	@echo 'make test             the tests; test-all: the slow ones too'
 	@echo 'make bench-quick      what a run costs on this machine'
 	@echo 'make bench-engine     an evaluation, a step against programs written by hand; growth with size'
+	@echo 'make bench-effects    instructions of an evaluation, with one effect more at a time; what is not used costs none'
 	@echo 'make layers           proof of what depends on what'
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
@@ -97,7 +98,7 @@ help:
 
 # ---- Dependencies: whoever asks to see something run gets the libraries first ----
 
-ifneq ($(filter demo test test-all bench-quick bench-engine san,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all bench-quick bench-engine bench-effects san,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -116,7 +117,7 @@ $(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote 
 $(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
-$(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
+$(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/effects.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
 
@@ -180,6 +181,7 @@ $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 
 $(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
 $(BUILD)/benchmarks/engine: EXTRA_LIBS := $(SOLVER_LIBS)
+$(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
 
 # A test holds the libraries whole, so that the plug-ins it opens find them in it.
 $(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a)
@@ -215,6 +217,9 @@ bench-quick: all $(BUILD)/benchmarks/quick
 bench-engine: all $(BUILD)/benchmarks/engine
 	@$(BUILD)/benchmarks/engine
 
+bench-effects: all basic $(BUILD)/benchmarks/effects
+	@$(BUILD)/benchmarks/effects $(BASIC)
+
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers
 
@@ -231,6 +236,19 @@ clang:
 
 gcc:
 	@$(MAKE) --no-print-directory CC=gcc WERROR=1 BUILD=$(VARIANT)/gcc everything
+
+# A library with few kinds, of a copy of the sources whose list is shorter: what it does not have cannot cost anything.
+BASIC       := $(VARIANT)/basic
+BASIC_KINDS := pin wheel torque
+BASIC_COPY   = $(filter-out core/pinwheel.h core/kinds/%,$(wildcard core/*.[ch] solvers/*.[ch])) $(BASIC_KINDS:%=core/kinds/%.c)
+
+basic:
+	@mkdir -p $(BASIC)/source/core/kinds $(BASIC)/source/solvers
+	@find $(BASIC)/source -name '*.[ch]' ! -name pinwheel.h -delete
+	@for f in $(BASIC_COPY); do cp -p $$f $(BASIC)/source/$$f || exit 1; done
+	@sed $(foreach k,$(BASIC_KINDS),-e '/PW_KIND ($(k))/b') -e '/^ *PW_KIND (.*)/d' core/pinwheel.h >$(BASIC)/pinwheel.h
+	@cmp -s $(BASIC)/pinwheel.h $(BASIC)/source/core/pinwheel.h || cp $(BASIC)/pinwheel.h $(BASIC)/source/core
+	@$(MAKE) -s --no-print-directory -C $(BASIC)/source -f '$(CURDIR)/Makefile' NO_DEPS=1 BUILD=.. ../libpinwheel.so
 
 SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests benchmarks benchmarks/engine benchmarks/baseline docs,$(d)/*.c $(d)/*.h))
 

@@ -1,0 +1,269 @@
+/* effects: what an effect costs where it is used, and that it costs nothing where it is not.
+ *
+ *   effects [LIBRARY]     instructions per evaluation of the EzyRoller, exactly, by callgrind
+ *
+ * First the EzyRoller alone, with the libpinwheel this program is linked to and with the one in the folder LIBRARY, which
+ * has only the kinds the EzyRoller needs: the numbers are to be the same, else the exit status is 1.  Then with one effect
+ * more at a time.  Kinds are found by name, so that one program goes with either library. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "engine/engine.h"
+
+enum { EFFECTS_POOL = 64, EFFECTS_SPACING = 200, EFFECTS_ROUNDS = 10 };
+
+_Noreturn void engine_die (const char *what, const char *why) {
+  fprintf (stderr, "%s: %s\n", what, why);
+  exit (2);
+}
+
+/* ---- Scenes ---- */
+
+static void effects_add (pw_model *m, const char *kind, const void *definition) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    if (strcmp ((*k)->name, kind) == 0) {
+      pw_add (m, *k, definition);
+      return;
+    }
+  pw_refuse (m, "no kind %s in this library", kind);
+}
+
+static void effects_wheel (pw_model *m) {
+  effects_add (m, "wheel", &(pw_wheel){ .name = "A", .body = "frame", .at = { -0.5, 0 } });
+}
+
+static void effects_seat (pw_model *m) {
+  pw_add_body (m, &(pw_body){ .name = "seat", .mass = 0.2, .inertia = 0.01, .start = { 0.1, 0, 0 } });
+}
+
+static void effects_none (pw_model *m) {
+  effects_wheel (m);
+}
+
+static void effects_gravity (pw_model *m) {
+  effects_wheel (m);
+  effects_add (m, "gravity", &(pw_gravity){ .name = "slope", .acceleration = { 0.1, -0.05 } });
+}
+
+static void effects_torque (pw_model *m) {
+  effects_wheel (m);
+  effects_add (m, "torque",
+               &(pw_torque){ .name = "wind", .body = { "frame", "ground" }, .value = { .constant = 0.01 } });
+}
+
+static void effects_spring (pw_model *m) {
+  effects_wheel (m);
+  effects_add (m, "spring",
+               &(pw_spring){ .name = "return",
+                             .body = { "frame", "steer" },
+                             .at = { { 0.2, 0 }, { 0.1, 0 } },
+                             .stiffness = 5,
+                             .damping = 0.1,
+                             .length = 0.1 });
+}
+
+static void effects_tyre (pw_model *m) {
+  effects_wheel (m);
+  effects_add (m, "tyre",
+               &(pw_tyre){ .name = "side", .body = "frame", .at = { -0.3, 0 }, .stiffness = 1, .speed = 0.1 });
+}
+
+static void effects_drive (pw_model *m) {
+  effects_wheel (m);
+  effects_add (m, "drive",
+               &(pw_drive){ .name = "servo",
+                            .body = { "frame", "steer" },
+                            .what = PW_DRIVE_ANGLE,
+                            .value = { PW_HARMONIC, .harmonic = { 0.3, PW_PI, -PW_PI / 2, -PW_PI } } });
+}
+
+static void effects_rolling (pw_model *m) {
+  effects_add (m, "rolling-wheel",
+               &(pw_rolling_wheel){ .name = "A",
+                                    .body = "frame",
+                                    .at = { -0.5, 0 },
+                                    .radius = 0.1,
+                                    .inertia = 1e-3,
+                                    .torque = { .constant = 0.01 } });
+}
+
+static void effects_pinned (pw_model *m) {
+  effects_wheel (m);
+  effects_seat (m);
+  effects_add (m, "pin", &(pw_pin){ .name = "S", .body = { "frame", "seat" }, .at = { { 0, 0 }, { -0.1, 0 } } });
+}
+
+static void effects_welded (pw_model *m) {
+  effects_wheel (m);
+  effects_seat (m);
+  effects_add (m, "weld", &(pw_weld){ .name = "S", .body = { "frame", "seat" }, .at = { { 0, 0 }, { -0.1, 0 } } });
+}
+
+static const struct {
+  const char *key, *what;
+  void (*add) (pw_model *m);
+} effects_scene[] = {
+  { "none", "the EzyRoller alone", effects_none },
+  { "gravity", "gravity along a slope", effects_gravity },
+  { "torque", "a second torque, constant", effects_torque },
+  { "spring", "a spring with a damper", effects_spring },
+  { "tyre", "a tyre on the frame", effects_tyre },
+  { "drive", "a drive of the steering angle", effects_drive },
+  { "rolling-wheel", "a driven rolling-wheel in place of wheel A", effects_rolling },
+  { "pin", "a third body, pinned to the frame", effects_pinned },
+  { "weld", "a third body, welded to the frame", effects_welded },
+};
+enum { EFFECTS_SCENES = sizeof effects_scene / sizeof *effects_scene };
+
+typedef struct {
+  double scene, massless;
+} effects_parameters;
+
+static const pw_parameter effects_parameter[] = {
+  { PW_AT (effects_parameters, scene), 0, "", "which scene", PW_NONNEGATIVE },
+  { PW_AT (effects_parameters, massless), 0, "", "steering without mass", PW_NONNEGATIVE },
+  { .name = NULL },
+};
+
+static void effects_build (pw_model *m, const void *parameters) {
+  const effects_parameters *p = parameters;
+  double light = p->massless > 0 ? 0 : 1;
+  pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1 });
+  pw_add_body (
+      m, &(pw_body){ .name = "steer", .mass = 0.1 * light, .inertia = 0.01 * light, .start = { 0.375, 0, PW_PI } });
+  effects_add (m, "pin", &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.125, 0 } } });
+  effects_add (m, "wheel", &(pw_wheel){ .name = "C", .body = "steer", .at = { 0.125, 0 } });
+  effects_add (m, "torque",
+               &(pw_torque){ .name = "rider",
+                             .body = { "frame", "steer" },
+                             .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1, .omega = PW_PI } } });
+  effects_scene[(int)p->scene].add (m);
+}
+
+static const pw_plugin_table effects_table = { .abi = PW_ABI,
+                                               .size = sizeof (pw_plugin_table),
+                                               .about = "EzyRoller with effects",
+                                               .parameters = effects_parameter,
+                                               .parameters_size = sizeof (effects_parameters),
+                                               .build = effects_build };
+
+/* ---- Under callgrind ---- */
+
+typedef struct {
+  pw_run *run;
+  double t[EFFECTS_POOL], q[EFFECTS_POOL][12], v[EFFECTS_POOL][12], a[12], lambda[8];
+} effects_data;
+
+static long effects_evaluate (void *context, long n) {
+  effects_data *d = context;
+  for (long i = 0; i < n; i++) {
+    int k = (int)(i % EFFECTS_POOL);
+    pw_accelerate (d->run, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
+  }
+  return n;
+}
+
+/* Opens a scene. */
+static pw_run *effects_open (const char *key, int massless) {
+  pw_error e = { 0 };
+  int scene = 0;
+  while (scene < EFFECTS_SCENES - 1 && strcmp (effects_scene[scene].key, key) != 0) scene++;
+  pw_model *m = pw_model_new ("effects", &effects_table, &e);
+  if (m) pw_set (m, "scene", scene, &e), pw_set (m, "massless", massless, &e);
+  pw_system *s = m && pw_build (m, &e) == PW_OK ? pw_compile (m, &e) : NULL;
+  pw_run *r = s ? pw_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10 }, &e) : NULL;
+  if (r == NULL) engine_die (key, e.text);
+  pw_model_free (m);
+  return r;
+}
+
+static void effects_close (pw_run *r) {
+  pw_system *s = r->s;
+  pw_close (r);
+  pw_free (s);
+}
+
+/* States along the way of the EzyRoller alone, the same for all scenes, since a sine takes more instructions for one angle
+ * than for another; what else the scene has stays as it starts. */
+static void effects_fill (effects_data *d, int massless) {
+  pw_error e = { 0 };
+  pw_run *alone = effects_open ("none", massless);
+  for (int k = 0; k < EFFECTS_POOL; k++) {
+    for (int i = 0; i < EFFECTS_SPACING && e.status == PW_OK; i++) pw_advance (alone, 100, &e);
+    d->t[k] = alone->t;
+    memcpy (d->q[k], d->run->q, (size_t)d->run->s->coords * sizeof (double));
+    memcpy (d->v[k], d->run->v, (size_t)d->run->s->coords * sizeof (double));
+    memcpy (d->q[k], alone->q, (size_t)alone->s->coords * sizeof (double));
+    memcpy (d->v[k], alone->v, (size_t)alone->s->coords * sizeof (double));
+  }
+  if (e.status != PW_OK) engine_die ("the EzyRoller alone", e.text);
+  effects_close (alone);
+}
+
+/* Evaluates in the function that callgrind is told to watch. */
+static int effects_child (const char *key, const char *side) {
+  static effects_data d;
+  int massless = strcmp (side, "massless") == 0;
+  d.run = effects_open (key, massless);
+  effects_fill (&d, massless);
+  engine_counted (&(timing_work){ effects_evaluate, &d }, EFFECTS_ROUNDS * EFFECTS_POOL);
+  effects_close (d.run);
+  return 0;
+}
+
+static int effects_list_kinds (void) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++) printf (" %s", (*k)->name);
+  printf ("\n");
+  return 0;
+}
+
+/* ---- The table ---- */
+
+static const char *const effects_side[] = { "massive", "massless" };
+
+static double effects_count (const char *program, const char *key, int massless) {
+  double all = engine_count (program, key, effects_side[massless], "pw_accelerate");
+  if (all == 0) engine_die (key, "nothing was counted; is valgrind installed?");
+  return all / (EFFECTS_ROUNDS * EFFECTS_POOL);
+}
+
+static void effects_print (const char *what, const double count[2], const double base[2]) {
+  printf ("%-50s %10.2f %10.2f", what, count[0], count[1]);
+  if (base) printf (" %+10.2f %+10.2f", count[0] - base[0], count[1] - base[1]);
+  printf ("\n");
+  fflush (stdout);
+}
+
+/* A line for the EzyRoller alone with the library that is found now. */
+static void effects_library (const char *program, const char *name, double count[2]) {
+  char command[1000];
+  printf ("%s:", name);
+  fflush (stdout);
+  snprintf (command, sizeof command, "'%s' --kinds", program);
+  if (system (command) != 0) engine_die (name, "cannot be run");
+  for (int i = 0; i < 2; i++) count[i] = effects_count (program, "none", i);
+  effects_print ("  the EzyRoller alone", count, NULL);
+}
+
+int main (int argc, char **argv) {
+  double all[2], few[2];
+  int same = 1;
+  if (argc == 4 && strcmp (argv[1], "--count") == 0) return effects_child (argv[2], argv[3]);
+  if (argc == 2 && strcmp (argv[1], "--kinds") == 0) return effects_list_kinds ();
+  printf ("instructions per evaluation, steering with mass and without; difference to the EzyRoller alone\n\n");
+  effects_library (argv[0], "all kinds", all);
+  if (argc == 2) {
+    setenv ("LD_LIBRARY_PATH", argv[1], 1);
+    effects_library (argv[0], "few kinds", few);
+    unsetenv ("LD_LIBRARY_PATH");
+    same = all[0] == few[0] && all[1] == few[1];
+    printf ("%s to the instruction\n", same ? "the same" : "NOT the same");
+  }
+  printf ("\nwith one effect more\n");
+  for (int i = 1; i < EFFECTS_SCENES; i++) {
+    double count[2] = { effects_count (argv[0], effects_scene[i].key, 0),
+                        effects_count (argv[0], effects_scene[i].key, 1) };
+    effects_print (effects_scene[i].what, count, all);
+  }
+  return !same;
+}

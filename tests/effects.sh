@@ -1,0 +1,28 @@
+#!/bin/sh
+# An effect that is not used costs nothing: the EzyRoller takes the same instructions, to the last one, from a library with
+# all kinds as from one that has only those it needs.
+# Run from the top folder; reads BUILD.
+
+BUILD=${BUILD:-build}
+unset MAKEFLAGS MAKELEVEL MFLAGS
+command -v valgrind >/dev/null || { echo '# valgrind is not there: not tried'; exit 0; }
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+bad=0
+
+# report NAME STATUS
+report () {
+  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
+}
+
+make NO_DEPS=1 BUILD="$BUILD" bench-effects >"$work/log" 2>&1
+status=$?
+cat "$work/log"
+grep -qx 'all kinds:.* gravity.*' "$work/log" && grep -qx 'few kinds: pin wheel torque' "$work/log"
+report 'two libraries, one with all kinds and one with three' $?
+grep -qx 'the same to the instruction' "$work/log" && [ $status = 0 ]
+report 'kinds that are not used take no instruction' $?
+awk '/^with one effect more/ { after = 1; next } after && NF && $(NF - 3) > 0 { n++ } END { exit n != 8 }' "$work/log"
+report 'each effect is counted' $?
+exit $bad
