@@ -327,6 +327,7 @@ struct pw_kind {
   int signals;                   /* signals, in the order of its fields; they serve the force if there is a force_u */
   int each_body;                 /* 1: no body is named; the element acts on every body that has mass */
   int constant;                  /* 1: its force depends on nothing: evaluated once, when the scene is compiled */
+  int unit;                      /* 1: it has two rows, and a body's x and y columns are +1 or -1 times the unit matrix */
   pw_level level;                /* of its rows */
   const pw_quantity *reaction;   /* one per row: what -lambda is */
   const pw_quantity *coordinate; /* one per own coordinate */

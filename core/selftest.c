@@ -94,6 +94,20 @@ static void selftest_constant (pw_probe *x) {
   pw_probe_note (x->report, "constant", "a constant force does not change", changed, 0, "exact", "");
 }
 
+/* The x and y columns of a kind that says so are the unit matrix, or its opposite. */
+static void selftest_unit (pw_probe *x) {
+  double J[PW_PROBE_OUT + PW_PROBE_GUARD];
+  int others = x->rows != 2;
+  pw_probe_sweep (x, x->kind->J, "J", x->elements * x->rows * x->cols, J);
+  for (int e = 0; e < x->elements && others == 0; e++)
+    for (int n = 0; n < x->kind->bodies; n++) {
+      const double *first = J + 2 * e * x->cols + 3 * n, *second = first + x->cols;
+      others += fabs (first[0]) != 1 || first[1] != 0 || second[0] != 0 || second[1] != first[0];
+    }
+  pw_probe_note (x->report, "unit", "two rows, the columns of x and y are +1 or -1 times the unit matrix", others, 0,
+                 "exact", "");
+}
+
 /* ---- Second-order blocks ---- */
 
 static void selftest_block (pw_probe *x, pw_block block, const char *name, const char *about, double size) {
@@ -211,6 +225,7 @@ static void selftest_all (pw_probe *x) {
   if (x->rows > 0) selftest_gamma (x);
   if (x->kind->signals > 0) selftest_force_u (x);
   if (x->kind->constant) selftest_constant (x);
+  if (x->kind->unit) selftest_unit (x);
   selftest_blocks (x);
   selftest_power (x);
   pw_probe_sweep (x, x->kind->contact, "contact", 3 * x->elements, out);

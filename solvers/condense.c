@@ -8,12 +8,12 @@ enum { CONDENSE_SMALL_COORDS = 36 }; /* beyond, rows rarely share a body and S i
 
 /* ---- Nodes ---- */
 
-static void condense_add_piece (pw_plan *c, const double *J, int step, int j, int width) {
+static void condense_add_piece (pw_plan *c, const double *J, int step, int j, int width, int unit) {
   int weight = 0;
   for (int n = 0; n < width; n++) weight |= c->k->inverse[j + n] > 0;
   if (!weight) return;
   if (c->piece) {
-    c->piece[c->pieces] = (pw_plan_piece){ J, step, j, width };
+    c->piece[c->pieces] = (pw_plan_piece){ J, step, j, width, unit };
     c->node_of[c->pieces] = c->nodes;
   }
   c->pieces++;
@@ -26,10 +26,10 @@ static void condense_element (pw_plan *c, const pw_slab *b, int e, int r, int si
   if (c->node) c->node[c->nodes] = (pw_plan_node){ .size = size, .row = i, .y = i };
   for (int n = 0; n < kind->bodies; n++) {
     int j = b->column[e * kind->bodies + n];
-    if (j < c->k->s->coords) condense_add_piece (c, J + 3 * n, b->b.cols, j, 3);
+    if (j < c->k->s->coords) condense_add_piece (c, J + 3 * n, b->b.cols, j, 3, kind->unit && size == 2);
   }
   for (int n = 0; n < kind->own; n++)
-    condense_add_piece (c, J + 3 * kind->bodies + n, b->b.cols, b->own + e * kind->own + n, 1);
+    condense_add_piece (c, J + 3 * kind->bodies + n, b->b.cols, b->own + e * kind->own + n, 1, 0);
   c->nodes++;
 }
 
@@ -63,7 +63,7 @@ static void condense_components (pw_plan *c) {
         };
       for (int g = 0; g < p->groups; g++)
         condense_add_piece (c, p->Z + i * p->cols + p->group_column[g], p->cols, p->group[g],
-                            p->group[g] < 3 * c->k->s->bodies ? 3 : 1);
+                            p->group[g] < 3 * c->k->s->bodies ? 3 : 1, 0);
       c->nodes++;
     }
   }

@@ -45,6 +45,7 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
 typedef struct {
   const double *J;
   int step, j, width;
+  int unit; /* 1: two rows whose x and y columns are a multiple of the unit matrix */
 } pw_plan_piece;
 
 typedef struct {

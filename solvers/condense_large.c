@@ -42,7 +42,7 @@ static void condense_patch (condense_large *g, int j, pw_patch *p, int *piece, i
   const pw_plan *c = g->c;
   const pw_ldl *ldl = g->large->ldl;
   const int *list = c->list + c->start[j], *node = c->node_of;
-  int count = c->start[j + 1] - c->start[j], longest = 0, others = 0;
+  int count = c->start[j + 1] - c->start[j], longest = 0, units = 0;
   pw_piece *first = g->large->piece + *piece;
   *p = (pw_patch){ .j = j, .first = *piece, .block = *block, .width = (unsigned char)pw_plan_width (c, j) };
   p->column = pw_plan_column (c, ldl, j);
@@ -50,13 +50,14 @@ static void condense_patch (condense_large *g, int j, pw_patch *p, int *piece, i
   for (int a = 0; a < count; a++) {
     first[a] = condense_piece_at (g, list[a]);
     if (first[a].size > longest) longest = first[a].size;
-    others += first[a].other;
+    units += c->piece[list[a]].unit;
     for (int b = a + 1; b < count; b++)
       g->large->block[(*block)++] =
           condense_once (g, pw_ldl_find (ldl, ldl->place[node[list[b]]], ldl->place[node[list[a]]]));
   }
-  int is_short = p->width == 3 && longest <= 2, twice = count == 2 && first[0].size == 2 && first[1].size == 2;
-  p->shape = !is_short ? PW_ANY : twice && others == 0 ? PW_LINK : PW_SHORT;
+  int is_short = p->width == 3 && longest <= 2;
+  int link = is_short && count == 2 && units == 2 && c->k->inverse[j] == c->k->inverse[j + 1];
+  p->shape = link ? PW_LINK : is_short ? PW_SHORT : PW_ANY;
 }
 
 /* Elimination updates what the patches have to have stored by then. */

@@ -17,18 +17,21 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * other[i];
 }
 
-/* Stabilises gamma and sums the forces at the placed pose. */
-static inline void dynamics_right (pw_run *r, const double *v, double *f, double *gamma) {
+/* Stabilises gamma and sums the forces at the placed pose: in f, unless there are none but constant ones. */
+static inline const double *dynamics_right (pw_run *r, const double *v, double *f, double *gamma) {
   if (r->alpha != 0 || r->beta != 0) dynamics_stabilise (r, v, gamma);
+  if (r->s->forces == 0) return r->s->constant;
   pw_sweep_force (r->s, f);
-  r->statistics.rhs++;
+  return f;
 }
 
 /* Iterative refinement (Wilkinson 1963): near a singular pose, with s the sine of the smallest angle between rows, the
- * factorisation is good to eps / s^2 only, its residuals bring that to eps / s.  f and gamma are used up. */
-static void dynamics_refine (pw_run *r, double *f, double *gamma, double *a, double *lambda) {
+ * factorisation is good to eps / s^2 only, its residuals bring that to eps / s. */
+static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
   pw_system *s = r->s;
-  double *da = s->scratch, *dl = da + s->coords + 3, *Ja = dl + s->rows;
+  double *f = r->scratch, *gamma = f + s->coords + 3, *da = s->scratch, *dl = da + s->coords + 3, *Ja = dl + s->rows;
+  pw_sweep_gamma (s, gamma);
+  if (dynamics_right (r, v, f, gamma) != f) pw_sweep_force (s, f);
   for (int j = 0; j < s->coords; j++) da[j] = a[j];
   for (int i = 0; i < s->rows; i++) dl[i] = lambda[i];
   for (int pass = 0; pass < 3; pass++) {
@@ -43,25 +46,27 @@ static void dynamics_refine (pw_run *r, double *f, double *gamma, double *a, dou
   }
 }
 
+/* In both of these lambda holds gamma first. */
+
 void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda) {
-  double *f = r->scratch, *gamma = f + r->s->coords + 3;
-  pw_sweep_gamma (r->s, gamma);
-  dynamics_right (r, v, f, gamma);
-  pw_saddle_solve (r->saddle, f, gamma, a, lambda);
-  if (pw_saddle_below (r->saddle, r->watch)) dynamics_refine (r, f, gamma, a, lambda);
+  pw_sweep_gamma (r->s, lambda);
+  const double *f = dynamics_right (r, v, r->scratch, lambda);
+  r->statistics.rhs++;
+  pw_saddle_solve (r->saddle, f, lambda, a, lambda);
+  if (pw_saddle_below (r->saddle, r->watch)) dynamics_refine (r, v, a, lambda);
 }
 
 int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
-  double *f = r->scratch, *gamma = f + r->s->coords + 3;
   int status = pw_place (r->s, t, q, v);
   if (status != PW_OK) return status;
-  pw_sweep_J_gamma (r->s, gamma);
-  dynamics_right (r, v, f, gamma);
+  pw_sweep_J_gamma (r->s, lambda);
+  const double *f = dynamics_right (r, v, r->scratch, lambda);
+  r->statistics.rhs++;
   r->statistics.factorisations++;
-  status = pw_saddle_factor_solve (r->saddle, f, gamma, a, lambda);
+  status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);
   if (!pw_saddle_below (r->saddle, r->watch)) return status;
   r->near = 1;
-  if (status == PW_OK) dynamics_refine (r, f, gamma, a, lambda);
+  if (status == PW_OK) dynamics_refine (r, v, a, lambda);
   return status;
 }
 

@@ -9,7 +9,7 @@
  * Right-looking, every place known in advance (Duff, Erisman & Reid 2017, Direct Methods for Sparse Matrices, chapters
  * 5 and 12).  D^-1 is kept explicitly: a node has at most 3 unknowns.
  *
- * Nodes of 1 or 2 rows and the 3 columns of a body are written out; sizes are constants where these functions are
+ * The patches and columns of chains, and those of nodes of 1 or 2 rows and the 3 columns of a body, are written out; sizes are constants where these functions are
  * called, so that the tests vanish.  What else there is goes through loops, in the functions called ..._any. */
 #include <math.h>
 #include <string.h>
@@ -107,18 +107,44 @@ static inline void large_piece (int ka, const pw_large *l, const pw_patch *p, co
       large_block (ka, 1, value, *block, R, large_J (l, b), b->step);
 }
 
-/* The commonest patch, straight through: two pieces of 2 rows in the system's J. */
+/* ---- The patch of a chain ---- */
+
+/* Two rows of a body: the unit matrix times s, then the angle's column. */
+typedef struct {
+  double s, x, y;
+} large_arm;
+
+static inline large_arm large_read_arm (const pw_large *l, const pw_piece *p) {
+  const double *J = l->base[0] + p->J;
+  return (large_arm){ J[0], J[2], J[p->step + 2] };
+}
+
+/* D += m s^2 + i (x, y) (x, y)^T with 1/mass m and 1/inertia i. */
+static inline void large_arm_diagonal (double *value, int at, large_arm a, double m, double i) {
+  double *D = large_at (value, at), ix = i * a.x, mass = m * a.s * a.s;
+  double xx = mass + ix * a.x, yx = ix * a.y, yy = mass + i * a.y * a.y;
+  if (at >= 0) xx += D[0], yx += D[1], yy += D[2];
+  D[0] = D[3] = xx, D[1] = yx, D[2] = D[4] = yy;
+}
+
 static inline void large_link (const pw_large *l, const pw_patch *p, const double *f, double *y, int what) {
-  const pw_piece *a = l->piece + p->first, *b = a + 1;
-  const double *A = l->base[0] + a->J, *B = l->base[0] + b->J, *w = l->inverse + p->j;
-  double *value = l->ldl->value;
-  large_rows R = large_weigh_rows (2, A, a->step, w);
-  if (what & LARGE_RIGHT) large_gather (2, y + a->y, R, f + p->j);
-  if (what & LARGE_MATRIX) large_diagonal (2, value, a->D, R, A, a->step);
-  if (what & LARGE_MATRIX) large_block (2, 2, value, l->block[p->block], R, B, b->step);
-  R = large_weigh_rows (2, B, b->step, w);
-  if (what & LARGE_RIGHT) large_gather (2, y + b->y, R, f + p->j);
-  if (what & LARGE_MATRIX) large_diagonal (2, value, b->D, R, B, b->step);
+  const pw_piece *pa = l->piece + p->first, *pb = pa + 1;
+  const double m = l->inverse[p->j], i = l->inverse[p->j + 2];
+  const large_arm a = large_read_arm (l, pa), b = large_read_arm (l, pb);
+  if (what & LARGE_RIGHT) {
+    const double X = m * f[p->j], Y = m * f[p->j + 1], T = i * f[p->j + 2];
+    double *ya = y + pa->y, *yb = y + pb->y;
+    ya[0] += a.s * X + a.x * T, ya[1] += a.s * Y + a.y * T;
+    yb[0] += b.s * X + b.x * T, yb[1] += b.s * Y + b.y * T;
+  }
+  if (!(what & LARGE_MATRIX)) return;
+  double *value = l->ldl->value, mass = m * a.s * b.s, x = i * b.x, z = i * b.y;
+  const int at = l->block[p->block];
+  large_arm_diagonal (value, pa->D, a, m, i);
+  large_arm_diagonal (value, pb->D, b, m, i);
+  double *K = large_at (value, at), xx = mass + x * a.x, xy = x * a.y, yx = z * a.x, yy = mass + z * a.y;
+  if (at >= 0) xx += K[0], xy += K[1], yx += K[2], yy += K[3];
+  K[0] = xx, K[1] = xy, K[2] = yx, K[3] = yy;
 }
 
 /* ---- Any patch ---- */
@@ -249,16 +275,28 @@ static inline void large_row (int ki, const pw_large *l, const pw_column *c, int
 static inline const int *large_column (int kj, pw_large *l, const pw_column *c, const int *target, double *y) {
   double *D = l->ldl->value + c->at, *B = D + pw_ldl_triangle (kj) + kj, *A = l->ldl->value + c[1].at;
   large_square inverse = large_invert (kj, D, l, c->y);
-  if (c->shape == PW_LINK) {
-    large_row (2, l, c, c->first, B, B, inverse, target, y, kj);
-    return target;
-  }
   for (int p = c[1].first - 1; p >= c->first; target += p-- - c->first) {
     int ki = l->ldl->column[l->ldl->below[p]].size;
     A -= ki * kj;
     LARGE_SHORT (ki, large_row, l, c, p, A, B, inverse, target, y, kj);
   }
   return target;
+}
+
+/* The column of a chain: 2 unknowns, with one row of 2 below. */
+static inline void large_column_link (pw_large *l, const pw_column *c, double *y) {
+  double *value = l->ldl->value, *D = value + c->at, *K = D + 5;
+  const pw_column *row = l->ldl->column + l->ldl->below[c->first];
+  double *T = value + row->at;
+  const large_square inverse = large_invert (2, D, l, c->y), L = large_scale (2, 2, K, inverse);
+  large_subtract_diagonal (2, T, L, K, 2);
+  if (y) {
+    const double x = y[c->y], z = y[c->y + 1];
+    double *to = y + row->y;
+    to[0] -= L.xx * x + L.xy * z;
+    to[1] -= L.yx * x + L.yy * z;
+  }
+  K[0] = L.xx, K[1] = L.xy, K[2] = L.yx, K[3] = L.yy;
 }
 
 /* ---- Any column ---- */
@@ -332,7 +370,9 @@ static inline int large_down (pw_large *l, const double *f, double *y, int what)
   for (int j = 0; j < ldl->nodes; j++) {
     const pw_column *c = &ldl->column[j];
     for (; p < last && p->column <= j; p++) large_patch (l, p, f, y, what);
-    if (c->shape == PW_ANY)
+    if (c->shape == PW_LINK)
+      large_column_link (l, c, y);
+    else if (c->shape == PW_ANY)
       target = large_column_any (l, c, target, y);
     else
       target = LARGE_SHORT (c->size, large_column, l, c, target, y);
@@ -406,20 +446,25 @@ static inline large_three large_scatter (int size, large_three force, const doub
                         force.z - (J[2] * y[0] + K[2] * y[1]) };
 }
 
-/* Accelerations of a patch. */
+static inline void large_accelerate_link (const pw_large *l, const pw_patch *p, const double *f, const double *y,
+                                          double *a) {
+  const pw_piece *pu = l->piece + p->first, *pv = pu + 1;
+  const double *w = l->inverse + p->j, *yu = y + pu->y, *yv = y + pv->y;
+  const large_arm u = large_read_arm (l, pu), v = large_read_arm (l, pv);
+  double X = -(u.s * yu[0] + v.s * yv[0]), Y = -(u.s * yu[1] + v.s * yv[1]);
+  double T = -(u.x * yu[0] + u.y * yu[1] + v.x * yv[0] + v.y * yv[1]);
+  if (f) X += f[p->j], Y += f[p->j + 1], T += f[p->j + 2];
+  a += p->j;
+  a[0] = X * w[0], a[1] = Y * w[1], a[2] = T * w[2];
+}
+
 static inline void large_accelerate (const pw_large *l, const pw_patch *p, const double *f, const double *y,
                                      double *a) {
   const double *w = l->inverse + p->j;
   large_three force = { 0 };
-  const pw_piece *x = l->piece + p->first;
   if (f) force = (large_three){ f[p->j], f[p->j + 1], f[p->j + 2] };
-  if (p->shape == PW_LINK) {
-    force = large_scatter (2, force, l->base[0] + x->J, x->step, y + x->y);
-    x++;
-    force = large_scatter (2, force, l->base[0] + x->J, x->step, y + x->y);
-  } else
-    for (; x < l->piece + p[1].first; x++)
-      force = LARGE_SHORT (x->size, large_scatter, force, large_J (l, x), x->step, y + x->y);
+  for (const pw_piece *x = l->piece + p->first; x < l->piece + p[1].first; x++)
+    force = LARGE_SHORT (x->size, large_scatter, force, large_J (l, x), x->step, y + x->y);
   a += p->j;
   a[0] = force.x * w[0], a[1] = force.y * w[1], a[2] = force.z * w[2];
 }
@@ -442,7 +487,9 @@ static void large_up (const pw_large *l, const double *f, double *y, double *a) 
     else
       LARGE_SHORT (c->size, large_backward_column, l, c, y);
   for (const pw_patch *p = l->patch; p < l->patch + l->patches; p++)
-    if (p->shape == PW_ANY)
+    if (p->shape == PW_LINK)
+      large_accelerate_link (l, p, f, y, a);
+    else if (p->shape == PW_ANY)
       large_accelerate_any (l, p, f, y, a);
     else
       large_accelerate (l, p, f, y, a);

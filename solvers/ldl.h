@@ -11,7 +11,7 @@
 enum { PW_LDL_NODE = 3 }; /* most unknowns in a node */
 
 /* Which code is made for a column, or for what meets at a body: PW_LINK as in a chain, where there is one row of 2 below
- * a column of 2 unknowns, two nodes of 2 rows at a body; PW_SHORT where no node has more than 2; PW_ANY what is left. */
+ * a column of 2 unknowns, two pins at a body; PW_SHORT where no node has more than 2; PW_ANY what is left. */
 typedef enum { PW_ANY, PW_SHORT, PW_LINK } pw_shape;
 
 /* A node, in the order of elimination. */

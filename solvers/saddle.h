@@ -24,10 +24,11 @@ int pw_saddle_factor (pw_saddle *k);
  * dependent row. */
 void pw_saddle_set_guard (pw_saddle *k, double guard);
 
-/* Solves for a (coords) and lambda (rows; inactive ones get 0).  f may be NULL: zero.  a and f may be the same. */
+/* Solves for a (coords) and lambda (rows; inactive ones get 0).  f may be NULL: zero.  a and f may be
+ * the same, lambda and gamma too. */
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
-/* Both; in small scenes faster than one after the other. */
+/* Both, faster than one after the other; without PW_OK a and lambda are of no use. */
 int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
 /* 1 if the smallest pivot of the last factorisation is below this sine. */

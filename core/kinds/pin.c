@@ -147,6 +147,7 @@ const pw_kind pw_kind_pin = {
   .fields = pin_fields,
   .bodies = 2,
   .rows = 2,
+  .unit = 1,
   .level = PW_HOLONOMIC,
   .reaction = pin_reaction,
   .prepare = pin_prepare,
