@@ -7,33 +7,12 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "rk.h"
+#include "rk_state.h"
 #include "unroll.h"
 #include "util.h"
 
-/* The weights of a row of the tableau that are not 0. */
-typedef struct {
-  int count, stage[PW_RK_STAGES];
-  double weight[PW_RK_STAGES];
-} rk_row;
-
-struct pw_method_data {
-  const pw_tableau *tableau;
-  rk_row row[PW_RK_STAGES]; /* of the stages from 1 on; in the place of stage 0, which needs none, of the new state */
-  int projects, held, every; /* projection; inputs held over the step; project each so many steps */
-  pw_projector projector;
-  double base;                                                 /* time from which fixed steps are counted */
-  long count;                                                  /* steps since then */
-  int split;                                                   /* 1: the last step ended inside one of them */
-  double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES]; /* rates, accelerations, ledger's rates of the stages */
-  double *q, *v;                                               /* a stage's state */
-  double *lambda;
-  /* the beginning of the last step, for looking back into it */
-  double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
-  char *memory;
-};
-
 static const char *const rk_metrics[] = { "mass", "identity", NULL };
+static const char *const rk_steps[] = { "adaptive", "fixed", NULL };
 static const char *const rk_inputs[] = { "stage", "held", NULL };
 
 const pw_stabilisation pw_rk_stabilisations[] = {
@@ -44,6 +23,7 @@ const pw_stabilisation pw_rk_stabilisations[] = {
 };
 
 const pw_option pw_rk_options[] = {
+  { .name = "steps", .choices = rk_steps, .about = "steps that follow the tolerances, or of the given size" },
   { .name = "inputs",
     .choices = rk_inputs,
     .about = "signals of forces at stage times, or held from the step's start (first order)" },
@@ -74,8 +54,8 @@ const pw_option pw_rk_options[] = {
 
 /* ---- Opening ---- */
 
-static rk_row rk_list_row (const double *weight, int stages) {
-  rk_row row = { 0 };
+static pw_rk_row rk_list_row (const double *weight, int stages) {
+  pw_rk_row row = { 0 };
   for (int j = 0; j < stages; j++)
     if (weight[j] != 0) {
       row.stage[row.count] = j;
@@ -129,6 +109,7 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   d->tableau = tableau;
   rk_list_weights (d);
+  d->adaptive = tableau->e != NULL && pw_option_value (r, "steps") == 0;
   d->held = pw_option_value (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, "projection");
   d->every = (int)pw_option_value (r, "every");
@@ -154,6 +135,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   d->base = d->t0 = r->t;
   d->count = 0;
   d->split = 0;
+  if (d->adaptive) pw_rk_begin_adaptive (r);
   memcpy (d->q0, r->q, bytes);
   memcpy (d->v0, r->v, bytes);
   memcpy (d->a0, r->a, bytes);
@@ -166,7 +148,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
 /* ---- A step ---- */
 
 /* out = y + h sum_j w_j K_j, two entries at a time; m, the number of weights, is a constant where it is inlined. */
-PW_INLINE void rk_sum (double *restrict out, const double *y, double *const *K, const rk_row *w, double h, int m,
+PW_INLINE void rk_sum (double *restrict out, const double *y, double *const *K, const pw_rk_row *w, double h, int m,
                        int n) {
   const double *k[PW_RK_STAGES];
   double f[PW_RK_STAGES];
@@ -188,7 +170,7 @@ PW_INLINE void rk_sum (double *restrict out, const double *y, double *const *K, 
   }
 }
 
-static void rk_combine (double *out, const double *y, double *const *K, const rk_row *w, double h, int n) {
+void pw_rk_combine (double *out, const double *y, double *const *K, const pw_rk_row *w, double h, int n) {
   if (w->count == 1)
     rk_sum (out, y, K, w, h, 1, n);
   else if (w->count == 4)
@@ -209,8 +191,8 @@ static int rk_stages (pw_run *r, double h) {
   if (d->held) pw_hold (s, 1);
   int status = PW_OK;
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
-    rk_combine (d->q, r->q, d->V, &d->row[i], h, n);
-    rk_combine (d->V[i], r->v, d->A, &d->row[i], h, n);
+    pw_rk_combine (d->q, r->q, d->V, &d->row[i], h, n);
+    pw_rk_combine (d->V[i], r->v, d->A, &d->row[i], h, n);
     status = pw_accelerate (r, pw_before_breakpoint (r, r->t + b->c[i] * h), d->q, d->V[i], d->A[i], d->lambda);
     if (status == PW_OK && r->settings.ledger) pw_sweep_ledger (s, d->lambda, d->R[i]);
   }
@@ -248,19 +230,19 @@ static int rk_finite (const pw_run *r, const double *q, const double *v) {
 }
 
 /* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->A[0], d->lambda. */
-static int rk_step (pw_run *r, double h, double t1, int project, double *added) {
+int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   struct pw_method_data *d = r->data;
   int n = r->s->coords, status = rk_stages (r, h);
   if (status != PW_OK) return status;
-  rk_combine (d->q, r->q, d->V, &d->row[0], h, n);
-  rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
+  pw_rk_combine (d->q, r->q, d->V, &d->row[0], h, n);
+  pw_rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) status = rk_project (r, t1, d->q, d->v, added);
   return status == PW_OK ? rk_accelerate (r, project, t1, d->q, d->v, d->A[0], d->lambda) : status;
 }
 
 /* The step is good: it becomes the state reached. */
-static void rk_accept (pw_run *r, double h, double t1, double added) {
+void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   struct pw_method_data *d = r->data;
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries;
   d->t0 = r->t;
@@ -276,30 +258,21 @@ static void rk_accept (pw_run *r, double h, double t1, double added) {
     memcpy (d->ledger0, r->ledger, entries * sizeof (double));
     memcpy (d->rate0, r->rate, entries * sizeof (double));
     d->projected0 = r->projected;
-    rk_combine (r->ledger, d->ledger0, d->R, &d->row[0], h, (int)entries);
+    pw_rk_combine (r->ledger, d->ledger0, d->R, &d->row[0], h, (int)entries);
     r->projected += added;
     pw_sweep_ledger (r->s, r->lambda, r->rate);
   }
 }
 
-/* The time of the next step's end: a multiple of the step from the base, t_end or a breakpoint, whichever is first. */
-static double rk_next_time (const pw_run *r, double t_end, int *whole) {
-  const struct pw_method_data *d = r->data;
-  double h = r->settings.step, t1 = d->base + (double)(d->count + 1) * h, stop = fmin (t_end, r->breakpoint);
-  *whole = t1 < stop + 1e-9 * h;
-  return t1 > stop - 1e-9 * h ? stop : t1;
-}
-
-static int rk_fail (pw_run *r, int status, double t, pw_error *error) {
+int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   int row;
-  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
-  if (r->near || pw_saddle_pivot (r->saddle, &row) <= r->guard) return pw_fail_singular (r, t, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: the %s", t, r->settings.step,
+  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (r->near || pw_saddle_pivot (r->saddle, &row) <= r->guard) return pw_fail_singular (r, r->t, error);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: the %s", r->t, h,
                   rk_finite (r, r->data->q, r->data->v) ? "projection does not converge" : "state is no longer finite");
 }
 
-/* Back to the beginning of the step just accepted. */
-static void rk_revert (pw_run *r) {
+void pw_rk_revert (pw_run *r) {
   struct pw_method_data *d = r->data;
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
   r->t = d->t0;
@@ -312,113 +285,51 @@ static void rk_revert (pw_run *r) {
   r->projected = d->projected0;
 }
 
-/* The step to t1 in two parts; the state there is left in d->q, d->v, and if `keep` is set the first part is accepted. */
-static int rk_two_parts (pw_run *r, double t, double t1, int project, int keep) {
-  double added = 0, *to = r->settings.ledger ? &added : NULL;
-  int status = rk_step (r, t - r->t, t, project, to);
-  if (status != PW_OK) return status;
-  rk_accept (r, t - r->t, t, added);
-  if (keep) return PW_OK;
-  status = rk_step (r, t1 - t, t1, project, to);
-  rk_revert (r);
-  return status;
-}
-
-/* How far the state in d->q, d->v is from the one in q_at, v_at, in units of the scene; takes its place. */
-static double rk_compare (pw_run *r) {
-  const pw_system *s = r->s;
-  const struct pw_method_data *d = r->data;
-  double most = 0;
-  for (int j = 0; j < s->coords; j++) {
-    double unit = j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1;
-    double off = fmax (fabs (d->q[j] - r->q_at[j]), s->scale.time * fabs (d->v[j] - r->v_at[j])) / unit;
-    if (!(off <= most)) most = off;
-    r->q_at[j] = d->q[j];
-    r->v_at[j] = d->v[j];
-  }
-  return most;
-}
-
-/* Near a singular pose an evaluation that lands on it spoils the step.  The step to t1 is taken in two parts of irregular
- * sizes, in several ways, until two of them agree; then the first part of the latter is accepted, and ends at *t. */
-static int rk_step_around (pw_run *r, int status, double t1, int project, double *t) {
-  static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302 };
-  const double good = 1e-11, enough = 1e-7;
-  const int parts = sizeof part / sizeof *part;
-  double start = r->t, best = INFINITY;
-  int choice = 0, known = status == PW_OK;
-  if (known) rk_compare (r);
-  for (int i = 0; i < parts && best > good; i++) {
-    status = rk_two_parts (r, start + part[i] * (t1 - start), t1, project, 0);
-    r->statistics.rejected++;
-    if (status < 0) return status;
-    if (status != PW_OK) continue;
-    double off = rk_compare (r);
-    if (known && off < best) best = off, choice = i;
-    known = 1;
-  }
-  if (!(best <= enough)) return PW_RETRY;
-  *t = start + part[choice] * (t1 - start);
-  return rk_two_parts (r, *t, t1, project, 1);
-}
-
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
-  struct pw_method_data *d = r->data;
-  int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
-  double added = 0, t1 = rk_next_time (r, t_end, &whole), h = whole && !d->split ? r->settings.step : t1 - r->t;
-  r->near = 0;
-  int status = rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
-  d->split = r->near && !d->split;
-  if (d->split) status = rk_step_around (r, status, t1, project, &t1);
-  if (status != PW_OK) return rk_fail (r, status, r->t, error);
-  r->statistics.steps++;
-  if (d->split) return PW_OK;
-  rk_accept (r, h, t1, added);
-  d->count++;
-  if (!whole) d->base = t1, d->count = 0;
-  return PW_OK;
+  return r->data->adaptive ? pw_rk_advance_adaptive (r, t_end, error) : pw_rk_advance_fixed (r, t_end, error);
 }
 
 /* ---- Looking into the last step ---- */
 
-/* Hermite interpolation on [t0, t0 + h] at t0 + x h: quintic in q (values, rates, accelerations), cubic in v. */
-static void rk_interpolate (const pw_run *r, double h, double x) {
-  const struct pw_method_data *d = r->data;
-  double y = 1 - x, x2 = x * x, y2 = y * y;
-  double a1 = x2 * (3 - 2 * x), b0 = h * x * y2, b1 = -h * x2 * y;
-  double A1 = x2 * x * (10 - 15 * x + 6 * x2), B0 = h * x * y2 * y * (1 + 3 * x), B1 = -h * x2 * x * y * (1 + 3 * y);
-  double C0 = h * h / 2 * x2 * y2 * y, C1 = h * h / 2 * x2 * x * y2;
-  for (int j = 0; j < r->s->coords; j++) {
-    r->q_at[j] = d->q0[j] + A1 * (r->q[j] - d->q0[j]) + B0 * d->v0[j] + B1 * r->v[j] + C0 * d->a0[j] + C1 * r->a[j];
-    r->v_at[j] = d->v0[j] + a1 * (r->v[j] - d->v0[j]) + b0 * d->a0[j] + b1 * r->a[j];
-  }
-  for (int i = 0; r->settings.ledger && i < r->s->entries; i++)
-    r->ledger_at[i] = d->ledger0[i] + a1 * (r->ledger[i] - d->ledger0[i]) + b0 * d->rate0[i] + b1 * r->rate[i];
+static void rk_copy_reached (pw_run *r) {
+  size_t n = (size_t)r->s->coords * sizeof (double);
+  memcpy (r->q_at, r->q, n);
+  memcpy (r->v_at, r->v, n);
+  memcpy (r->a_at, r->a, n);
+  memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
+  r->projected_at = r->projected;
+  if (pw_place (r->s, r->t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
+}
+
+/* A step from the beginning of the last one to t, which is as accurate as the method; into the sample arrays. */
+static int rk_step_again (pw_run *r, double t) {
+  struct pw_method_data *d = r->data;
+  const pw_run reached = *r;
+  double added = 0, h = t - d->t0;
+  size_t n = (size_t)r->s->coords * sizeof (double);
+  r->t = d->t0, r->q = d->q0, r->v = d->v0, r->a = d->a0, r->rate = d->rate0;
+  pw_saddle_set_guard (r->saddle, 0);
+  int status = pw_rk_step (r, h, t, d->projects, r->settings.ledger ? &added : NULL);
+  pw_saddle_set_guard (r->saddle, r->guard);
+  *r = reached;
+  memcpy (r->q_at, d->q, n);
+  memcpy (r->v_at, d->v, n);
+  memcpy (r->a_at, d->A[0], n);
+  memcpy (r->lambda_at, d->lambda, (size_t)r->s->rows * sizeof (double));
+  if (r->settings.ledger) pw_rk_combine (r->ledger_at, d->ledger0, d->R, &d->row[0], h, r->s->entries);
+  r->projected_at = d->projected0 + added;
+  return status;
 }
 
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
   struct pw_method_data *d = r->data;
-  size_t n = (size_t)r->s->coords * sizeof (double);
   if (t > r->t || t < d->t0)
     return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, d->t0, r->t);
   if (t == r->t) {
-    memcpy (r->q_at, r->q, n);
-    memcpy (r->v_at, r->v, n);
-    memcpy (r->a_at, r->a, n);
-    memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
-    memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
-    r->projected_at = r->projected;
-    if (pw_place (r->s, t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
+    rk_copy_reached (r);
     return PW_OK;
   }
-  pw_statistics keep = r->statistics;
-  double x = (t - d->t0) / (r->t - d->t0), added = 0;
-  rk_interpolate (r, r->t - d->t0, x);
-  r->projected_at = d->projected0 + x * (r->projected - d->projected0);
-  pw_saddle_set_guard (r->saddle, 0);
-  int status = d->projects ? rk_project (r, t, r->q_at, r->v_at, &added) : PW_OK;
-  if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
-  pw_saddle_set_guard (r->saddle, r->guard);
-  r->statistics = keep;
-  return status == PW_OK ? PW_OK : rk_fail (r, status, t, error);
+  int status = rk_step_again (r, t);
+  return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - d->t0, error);
 }

@@ -10,6 +10,10 @@ enum { PW_RK_STAGES = 16 };
 typedef struct {
   int stages, order;
   const double *c, *A, *b;
+  const double *e;  /* stages + 1: of the error estimate, the last for the new state; NULL: none */
+  const double *e3; /* as e: of a second, cruder estimate, combined as in DOP853; NULL: none */
+  double exponent;  /* of the error in the step size: 1 / order of the estimate + 1 */
+  double memory;    /* of the error before, in the step size (Gustafsson 1991) */
 } pw_tableau;
 
 /* What a pw_method of this family puts in its table. */
@@ -19,6 +23,6 @@ int pw_rk_at (pw_run *r, double t, pw_error *error);
 int pw_rk_restart (pw_run *r, pw_error *error);
 void pw_rk_close (pw_run *r);
 extern const pw_stabilisation pw_rk_stabilisations[];
-extern const pw_option pw_rk_options[];
+extern const pw_option pw_rk_options[]; /* the first is for tableaus with an error estimate */
 
 #endif

@@ -1,0 +1,37 @@
+/* erk5: the pair of orders 5 and 4 of Dormand & Prince 1980 (Hairer, Norsett & Wanner 1993, table II.5.2).
+ *
+ * The pair's seventh stage is the derivative at the new state: it is taken behind the projection, as the first stage of
+ * the next step is. */
+#include "rk.h"
+
+static const double erk5_c[] = { 0, 1. / 5, 3. / 10, 4. / 5, 8. / 9, 1 };
+static const double erk5_A[] = {
+  1. / 5,
+  3. / 40, 9. / 40,
+  44. / 45, -56. / 15, 32. / 9,
+  19372. / 6561, -25360. / 2187, 64448. / 6561, -212. / 729,
+  9017. / 3168, -355. / 33, 46732. / 5247, 49. / 176, -5103. / 18656,
+};
+static const double erk5_b[] = { 35. / 384, 0, 500. / 1113, 125. / 192, -2187. / 6784, 11. / 84 };
+static const double erk5_e[] = { 71. / 57600, 0, -71. / 16695, 71. / 1920, -17253. / 339200, 22. / 525, -1. / 40 };
+static const pw_tableau erk5_tableau = {
+  .stages = 6, .order = 5, .c = erk5_c, .A = erk5_A, .b = erk5_b, .e = erk5_e, .exponent = 1. / 5, .memory = 0.04
+};
+
+static int erk5_open (pw_run *r, pw_error *error) {
+  return pw_rk_open (r, &erk5_tableau, error);
+}
+
+const pw_method pw_method_erk5 = {
+  .name = "erk5",
+  .about = "explicit Runge-Kutta of order 5(4), adaptive (Dormand & Prince 1980)",
+  .adaptive = 1,
+  .order = 5,
+  .stabilisations = pw_rk_stabilisations,
+  .options = pw_rk_options,
+  .open = erk5_open,
+  .advance = pw_rk_advance,
+  .at = pw_rk_at,
+  .restart = pw_rk_restart,
+  .close = pw_rk_close,
+};

@@ -1,0 +1,112 @@
+/* Runge-Kutta with steps that follow the tolerances.
+ *
+ *   h_new = 0.9 h err^-(k - 3 m / 4) err_before^m,  within a fifth and five times of h
+ *
+ * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
+ * error is that of positions and rates in units of the tolerances; after a projection only its part along the
+ * constraints counts (Eich 1993; Hindmarsh et al., CVODE).  It serves two estimates as DOP853 does. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "rk_state.h"
+
+void pw_rk_begin_adaptive (pw_run *r) {
+  struct pw_method_data *d = r->data;
+  d->h = 0.1 * r->s->scale.time * pow (r->settings.rtol, d->tableau->exponent);
+  d->before = 1e-4;
+}
+
+/* out = sum_j e_j K_j over the stages and the new state's derivative. */
+static void adapt_estimate (const pw_run *r, const double *e, const double *first, double *const *K, const double *last,
+                            double *out) {
+  int stages = r->data->tableau->stages;
+  for (int i = 0; i < r->s->coords; i++) {
+    double sum = e[0] * first[i] + e[stages] * last[i];
+    for (int j = 1; j < stages; j++) sum += e[j] * K[j][i];
+    out[i] = sum;
+  }
+}
+
+/* Takes from an error what the projection has removed: e += W^-1 J^T ..., J e = 0 for as many rows.  The saddle is
+ * factorised at the new state. */
+static void adapt_project (pw_run *r, double *e, int rows) {
+  pw_system *s = r->s;
+  double *right = r->scratch, *mu = right + s->rows, *de = mu + s->rows;
+  pw_mul_J (s, e, right);
+  for (int i = 0; i < s->rows; i++) right[i] = i < rows ? -right[i] : 0;
+  pw_saddle_solve (r->saddle, NULL, right, de, mu);
+  for (int j = 0; j < s->coords; j++) e[j] += de[j];
+}
+
+/* Mean square of positions' and rates' errors in units of the tolerances. */
+static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
+  const struct pw_method_data *d = r->data;
+  const pw_system *s = r->s;
+  const pw_settings *set = &r->settings;
+  double sum = 0;
+  for (int j = 0; j < s->coords; j++) {
+    double unit = j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1;
+    double atol = set->atol > 0 ? set->atol : set->rtol * unit;
+    double atol_v = set->atol > 0 ? set->atol : set->rtol * unit / s->scale.time;
+    double q = eq[j] / (atol + set->rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
+    double v = ev[j] / (atol_v + set->rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
+    sum += q * q + v * v;
+  }
+  return sum / (2 * s->coords);
+}
+
+static double adapt_one (pw_run *r, const double *e, int projected) {
+  struct pw_method_data *d = r->data;
+  double *eq = r->q_at, *ev = r->v_at;
+  adapt_estimate (r, e, r->v, d->V, d->v, eq);
+  adapt_estimate (r, e, r->a, d->A, d->A[0], ev);
+  if (projected) {
+    adapt_project (r, eq, r->s->holonomic);
+    adapt_project (r, ev, r->s->rows);
+  }
+  return adapt_norm (r, eq, ev);
+}
+
+/* The error of the step just computed; at most 1 is good. */
+static double adapt_error (pw_run *r, double h, int projected) {
+  const pw_tableau *b = r->data->tableau;
+  double e = adapt_one (r, b->e, projected);
+  if (b->e3 == NULL) return h * sqrt (e);
+  double e3 = adapt_one (r, b->e3, projected);
+  return e + e3 > 0 ? h * e / sqrt (e + 0.01 * e3) : 0;
+}
+
+/* 0.2 to 5 times the step. */
+static double adapt_factor (const struct pw_method_data *d, double error) {
+  const pw_tableau *b = d->tableau;
+  if (error == 0) return 5;
+  double f = 0.9 * pow (error, -(b->exponent - 0.75 * b->memory)) * pow (d->before, b->memory);
+  return fmin (5, fmax (0.2, f));
+}
+
+int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
+  struct pw_method_data *d = r->data;
+  double stop = fmin (t_end, r->breakpoint), most = 5;
+  int status = PW_RETRY, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
+  for (;;) {
+    double t1 = r->t + d->h, added = 0;
+    if (t1 > stop - 0.01 * d->h) t1 = stop;
+    double h = t1 - r->t;
+    if (!(h > 16 * DBL_EPSILON * fmax (fabs (r->t), fabs (stop - r->t) * 1e-6)))
+      return pw_rk_fail (r, status, h, error);
+    r->near = 0;
+    status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
+    if (status < 0) return pw_rk_fail (r, status, h, error);
+    double off = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
+    if (off <= 1) {
+      pw_rk_accept (r, h, t1, added);
+      d->h = fmin (most, adapt_factor (d, off)) * (t1 == stop ? fmax (h, fmin (d->h, 5 * h)) : h);
+      d->before = fmax (off, 1e-4);
+      r->statistics.steps++;
+      return PW_OK;
+    }
+    r->statistics.rejected++;
+    d->h = h * (isfinite (off) ? fmin (0.9, adapt_factor (d, off)) : 0.2);
+    most = 1; /* no growth right after a rejection */
+  }
+}

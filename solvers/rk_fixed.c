@@ -1,0 +1,79 @@
+/* Runge-Kutta with steps of the given size: multiples of it from the start, cut at t_end and at breakpoints, and split
+ * where one of them would land on a singular pose. */
+#include <math.h>
+#include "rk_state.h"
+
+/* The time of the next step's end: a multiple of the step from the base, t_end or a breakpoint, whichever is first. */
+static double fixed_next_time (const pw_run *r, double t_end, int *whole) {
+  const struct pw_method_data *d = r->data;
+  double h = r->settings.step, t1 = d->base + (double)(d->count + 1) * h, stop = fmin (t_end, r->breakpoint);
+  *whole = t1 < stop + 1e-9 * h;
+  return t1 > stop - 1e-9 * h ? stop : t1;
+}
+
+/* The step to t1 in two parts; the state there is left in d->q, d->v, and if `keep` is set the first part is accepted. */
+static int fixed_two_parts (pw_run *r, double t, double t1, int project, int keep) {
+  double added = 0, *to = r->settings.ledger ? &added : NULL;
+  int status = pw_rk_step (r, t - r->t, t, project, to);
+  if (status != PW_OK) return status;
+  pw_rk_accept (r, t - r->t, t, added);
+  if (keep) return PW_OK;
+  status = pw_rk_step (r, t1 - t, t1, project, to);
+  pw_rk_revert (r);
+  return status;
+}
+
+/* How far the state in d->q, d->v is from the one in q_at, v_at, in units of the scene; takes its place. */
+static double fixed_compare (pw_run *r) {
+  const pw_system *s = r->s;
+  const struct pw_method_data *d = r->data;
+  double most = 0;
+  for (int j = 0; j < s->coords; j++) {
+    double unit = j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1;
+    double off = fmax (fabs (d->q[j] - r->q_at[j]), s->scale.time * fabs (d->v[j] - r->v_at[j])) / unit;
+    if (!(off <= most)) most = off;
+    r->q_at[j] = d->q[j];
+    r->v_at[j] = d->v[j];
+  }
+  return most;
+}
+
+/* Near a singular pose an evaluation that lands on it spoils the step.  The step to t1 is taken in two parts of irregular
+ * sizes, in several ways, until two of them agree; then the first part of the latter is accepted, and ends at *t. */
+static int fixed_step_around (pw_run *r, int status, double t1, int project, double *t) {
+  static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302 };
+  const double good = 1e-11, enough = 1e-7;
+  const int parts = sizeof part / sizeof *part;
+  double start = r->t, best = INFINITY;
+  int choice = 0, known = status == PW_OK;
+  if (known) fixed_compare (r);
+  for (int i = 0; i < parts && best > good; i++) {
+    status = fixed_two_parts (r, start + part[i] * (t1 - start), t1, project, 0);
+    r->statistics.rejected++;
+    if (status < 0) return status;
+    if (status != PW_OK) continue;
+    double off = fixed_compare (r);
+    if (known && off < best) best = off, choice = i;
+    known = 1;
+  }
+  if (!(best <= enough)) return PW_RETRY;
+  *t = start + part[choice] * (t1 - start);
+  return fixed_two_parts (r, *t, t1, project, 1);
+}
+
+int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
+  struct pw_method_data *d = r->data;
+  int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
+  double added = 0, t1 = fixed_next_time (r, t_end, &whole), h = whole && !d->split ? r->settings.step : t1 - r->t;
+  r->near = 0;
+  int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
+  d->split = r->near && !d->split;
+  if (d->split) status = fixed_step_around (r, status, t1, project, &t1);
+  if (status != PW_OK) return pw_rk_fail (r, status, r->settings.step, error);
+  r->statistics.steps++;
+  if (d->split) return PW_OK;
+  pw_rk_accept (r, h, t1, added);
+  d->count++;
+  if (!whole) d->base = t1, d->count = 0;
+  return PW_OK;
+}

@@ -1,0 +1,55 @@
+/* What the parts of the Runge-Kutta driver share: stages and steps (rk.c), fixed steps (rk_fixed.c), steps that follow
+ * the tolerances (rk_adapt.c).  For these files only. */
+#ifndef PW_RK_STATE_H
+#define PW_RK_STATE_H
+
+#include "rk.h"
+
+/* The weights of a row of the tableau that are not 0. */
+typedef struct {
+  int count, stage[PW_RK_STAGES];
+  double weight[PW_RK_STAGES];
+} pw_rk_row;
+
+struct pw_method_data {
+  const pw_tableau *tableau;
+  pw_rk_row
+      row[PW_RK_STAGES];     /* of the stages from 1 on; in the place of stage 0, which needs none, of the new state */
+  int adaptive;              /* 1: steps follow the tolerances; 0: they are of the given size */
+  int projects, held, every; /* projection; inputs held over the step; project each so many steps */
+  pw_projector projector;
+  double base;                                                 /* time from which fixed steps are counted */
+  long count;                                                  /* steps since then */
+  int split;                                                   /* 1: the last step ended inside one of them */
+  double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES]; /* rates, accelerations, ledger's rates of the stages */
+  double *q, *v;                                               /* a stage's state */
+  double *lambda;
+  double h, before; /* adaptive: next step, error of the last one */
+  /* the beginning of the last step, for looking back into it */
+  double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
+  char *memory;
+};
+
+/* out = y + h sum_j w_j K_j */
+void pw_rk_combine (double *out, const double *y, double *const *K, const pw_rk_row *w, double h, int n);
+
+/* From the state reached to its successor at t1 = t + h, left in d->q, d->v, d->A[0], d->lambda; project: onto the
+ * constraints; added (NULL: not wanted) takes the energy this adds.  PW_RETRY: a smaller step may do. */
+int pw_rk_step (pw_run *r, double h, double t1, int project, double *added);
+
+/* That successor becomes the state reached. */
+void pw_rk_accept (pw_run *r, double h, double t1, double added);
+
+/* Back to the beginning of the step just accepted. */
+void pw_rk_revert (pw_run *r);
+
+/* Says why no step succeeds from the state reached. */
+int pw_rk_fail (pw_run *r, int status, double h, pw_error *error);
+
+int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error);
+int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error);
+
+/* The first step of an adaptive method. */
+void pw_rk_begin_adaptive (pw_run *r);
+
+#endif
