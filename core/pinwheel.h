@@ -234,17 +234,157 @@ typedef struct {
   pw_signal torque; /* on the wheel about its axle [N m]; what it reacts on is out of the plane */
 } pw_rolling_wheel;
 
+/* Slider: a point of body 1 stays on a line of body 2, and body 1 does not turn against body 2.  Two holonomic rows. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* what slides, and what it slides on; "ground" for one of them */
+  double at[2][2];     /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
+  double heading;      /* direction of the line in body 2's frame [rad] */
+  double angle;        /* of body 1 relative to body 2: phi1 - phi2 [rad] */
+} pw_slider;
+
+/* Slot: a point of body 1 stays on a line of body 2.  One holonomic row. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the one with the point, and the one with the line; "ground" for one of them */
+  double at[2][2];     /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
+  double heading;      /* direction of the line in body 2's frame [rad] */
+} pw_slot;
+
+/* Rod: a massless bar keeps a point of body 1 and a point of body 2 at a distance.  One holonomic row. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];     /* the ends in each body's frame [m]; on the ground: in the world */
+  double length;       /* [m], > 0 */
+} pw_rod;
+
+/* Where a gear takes its offset from. */
+enum { PW_GEAR_START, PW_GEAR_OFFSET };
+
+/* Gear: the angles of two bodies, seen from a third, the carrier, keep a ratio: phi1 - phi3 = ratio (phi2 - phi3) +
+ * offset.  One holonomic row. */
+typedef struct {
+  const char *name;
+  const char *body[3]; /* the two gears and their carrier; "ground" for one of them */
+  double ratio;        /* of their speeds on the carrier; negative: they turn against each other; not 0 */
+  int from;            /* PW_GEAR_START: the offset is that of the start as described; PW_GEAR_OFFSET: as given */
+  double offset;       /* [rad] */
+} pw_gear;
+
+/* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic row. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];      /* contact point in the body's frame [m] */
+  pw_signal heading; /* rolling direction in the body's frame, with its first time derivative [rad] */
+} pw_steered_wheel;
+
+/* Speed: the speed of a point along a direction fixed in its body follows a signal.  One nonholonomic row. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];    /* the point in the body's frame [m] */
+  double heading;  /* the direction in the body's frame [rad] */
+  pw_signal value; /* with its first time derivative [m/s] */
+} pw_speed;
+
+/* Pfaffian: any linear relation between the velocities of two bodies, both along the axes of body 1:
+ * a . (vx1, vy1, omega1) + b . (vx2, vy2, omega2) = value.  One nonholonomic row. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  double a[3];         /* of body 1's velocity, x and y along its own axes, and of its rate */
+  double b[3];         /* of body 2's velocity, x and y along body 1's axes, and of its rate */
+  pw_signal value;     /* with its first time derivative */
+} pw_pfaffian;
+
+/* Rotational spring: turns two bodies to an angle between them, with a damper beside it. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  double stiffness;    /* [N m/rad], >= 0 */
+  double damping;      /* [N m s/rad], >= 0 */
+  double angle;        /* free angle, of body 1 relative to body 2: phi1 - phi2 [rad] */
+} pw_rotational_spring;
+
+/* The axes along which a force is given. */
+enum { PW_AXES_WORLD, PW_AXES_BODY };
+
+/* Force: acts on a point of a body, from outside. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2]; /* where, in the body's frame [m] */
+  int axes;     /* PW_AXES_WORLD; PW_AXES_BODY: it turns with the body */
+  pw_signal fx; /* [N] */
+  pw_signal fy; /* [N] */
+} pw_force;
+
+/* Motor: turns body 1 against body 2 to an angle that follows a signal, as a spring and damper of limited torque. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* what it turns, and what it reacts on; "ground" for one of them */
+  double stiffness;    /* torque per error of the angle [N m/rad], >= 0 */
+  double damping;      /* torque per error of the rate [N m s/rad], >= 0 */
+  double limit;        /* the torque saturates here [N m]; 0: no limit */
+  pw_signal angle;     /* target of phi1 - phi2 [rad] */
+  pw_signal rate;      /* target of omega1 - omega2 [rad/s] */
+} pw_motor;
+
+/* Friction: a viscous and a Coulomb torque against the turning of body 1 on body 2, in a pin for instance. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  double viscous;      /* [N m s/rad], >= 0 */
+  double limit;        /* Coulomb torque [N m], >= 0 */
+  double speed;        /* below about this rate the Coulomb torque is smoothed [rad/s]; > 0 if there is a limit */
+} pw_friction;
+
+/* Drag: air, at rest, slows down a body's centre of mass and its turning. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double linear;            /* [N s/m], >= 0 */
+  double quadratic;         /* half density times area times coefficient [N s^2/m^2], >= 0 */
+  double turning;           /* [N m s/rad], >= 0 */
+  double turning_quadratic; /* [N m s^2/rad^2], >= 0 */
+} pw_drag;
+
+/* Rolling resistance: a force along a heading, against the motion of its point along it. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];   /* contact point in the body's frame [m] */
+  double heading; /* rolling direction in the body's frame [rad] */
+  double limit;   /* the force when it rolls: coefficient times normal load [N], >= 0 */
+  double speed;   /* below about this speed the force is smoothed [m/s], > 0 */
+} pw_rolling_resistance;
+
 /* The list of kinds: the one line to add for a new file in core/kinds/. */
-#define PW_KINDS          \
-  PW_KIND (pin)           \
-  PW_KIND (weld)          \
-  PW_KIND (drive)         \
-  PW_KIND (wheel)         \
-  PW_KIND (rolling_wheel) \
-  PW_KIND (tyre)          \
-  PW_KIND (spring)        \
-  PW_KIND (gravity)       \
-  PW_KIND (torque)
+#define PW_KINDS               \
+  PW_KIND (pin)                \
+  PW_KIND (weld)               \
+  PW_KIND (slider)             \
+  PW_KIND (slot)               \
+  PW_KIND (rod)                \
+  PW_KIND (gear)               \
+  PW_KIND (drive)              \
+  PW_KIND (wheel)              \
+  PW_KIND (rolling_wheel)      \
+  PW_KIND (steered_wheel)      \
+  PW_KIND (speed)              \
+  PW_KIND (pfaffian)           \
+  PW_KIND (tyre)               \
+  PW_KIND (rolling_resistance) \
+  PW_KIND (spring)             \
+  PW_KIND (rotational_spring)  \
+  PW_KIND (friction)           \
+  PW_KIND (drag)               \
+  PW_KIND (gravity)            \
+  PW_KIND (force)              \
+  PW_KIND (torque)             \
+  PW_KIND (motor)
 
 /* ---- What a kind provides ---- */
 
@@ -336,12 +476,13 @@ struct pw_kind {
    * a body without mass.  own takes mass and start of each own coordinate, zero so far.  Returns a status. */
   int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_own *own, pw_error *error);
 
-  pw_sweep *g;       /* rows: residual of holonomic rows */
-  pw_sweep *g_size;  /* rows: sum of the absolute values of the terms of g, against which g is judged */
-  pw_sweep *eta;     /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
-  pw_sweep *J;       /* rows x cols */  pw_sweep *gamma;   /* rows: right-hand side of J a = gamma */
+  pw_sweep *g;      /* rows: residual of holonomic rows */
+  pw_sweep *g_size; /* rows: sum of the absolute values of the terms of g, against which g is judged */
+  pw_sweep *eta;    /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
+  pw_sweep *J;      /* rows x cols */
+  pw_sweep *gamma;  /* rows: right-hand side of J a = gamma */
   void (*J_gamma) (const pw_batch *b, double *J, double *gamma); /* both at once, where that is faster; may be NULL */
-  pw_sweep *force;   /* cols: generalised force */
+  pw_sweep *force;                                               /* cols: generalised force */
   pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
   pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch */
   pw_sweep *jtl_q;   /* cols x cols: derivative of J^T lambda by q, lambda given in the batch */

@@ -1,0 +1,87 @@
+/* gear: the angles of two bodies, seen from a third, their carrier, keep a ratio i.
+ *
+ *   g = (phi1 - phi3) - i (phi2 - phi3) - c = 0                    (1 holonomic row, linear)
+ *   G = [ 0 0 1 | 0 0 -i | 0 0 i-1 ],  gamma = 0
+ *
+ * (Willis 1870, Principles of Mechanism.)  Two wheels of radii R1 and R2 that mesh outside have i = -R2 / R1, a wheel
+ * inside a ring i = R2 / R1.  Where the axles are is up to pins.
+ * On body 1 acts the moment -lambda, on body 2 i lambda, on the carrier (1 - i) lambda. */
+#include <math.h>
+#include <string.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double ratio;  /* i */
+  double offset; /* c [rad] */
+} gear;
+
+static int gear_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+                         pw_error *error) {
+  const pw_gear *d = definition;
+  double phi[3];
+  for (int n = 0; n < 3; n++) phi[n] = bodies[n]->start[2];
+  double start = phi[0] - phi[2] - d->ratio * (phi[1] - phi[2]);
+  *(gear *)element = (gear){ d->ratio, d->from == PW_GEAR_START ? start : d->offset };
+  (void)own;
+  if (d->ratio == 0) return pw_fail (error, PW_INPUT, "ratio = 0: expected another number, positive or negative");
+  return PW_OK;
+}
+
+#define GEAR_PARTS                                                                         \
+  const gear *k = (const gear *)b->element + e;                                            \
+  const double phi1 = b->pose[b->body[3 * e]].phi, phi2 = b->pose[b->body[3 * e + 1]].phi; \
+  const double phi3 = b->pose[b->body[3 * e + 2]].phi
+
+static void gear_g (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) {
+    GEAR_PARTS;
+    out[e] = phi1 - phi3 - k->ratio * (phi2 - phi3) - k->offset;
+  }
+}
+
+static void gear_g_size (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) {
+    GEAR_PARTS;
+    out[e] = fabs (phi1) + fabs (phi3) + fabs (k->ratio) * (fabs (phi2) + fabs (phi3)) + fabs (k->offset);
+  }
+}
+
+static void gear_J (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 9) {
+    const gear *k = (const gear *)b->element + e;
+    memset (out, 0, 9 * sizeof *out);
+    out[2] = 1, out[5] = -k->ratio, out[8] = k->ratio - 1;
+  }
+}
+
+static const char *const gear_from[] = { "start", "offset", NULL };
+
+static const pw_field gear_fields[] = {
+  { PW_AT (pw_gear, body), PW_BODY, .count = 3, .required = 1,
+    .about = "the two gears and their carrier; ground for one of them" },
+  { PW_AT (pw_gear, ratio), PW_NUMBER, .required = 1,
+    .about = "of the first's speed to the second's, both on the carrier; negative: they turn against each other" },
+  { PW_AT (pw_gear, from), PW_CHOICE, .choices = gear_from,
+    .about = "whether the offset is that of the described start, or given" },
+  { PW_AT (pw_gear, offset), PW_NUMBER, .unit = "rad",
+    .about = "of the first's angle from ratio times the second's, both on the carrier" },
+  { .name = NULL },
+};
+
+static const pw_quantity gear_reaction[] = { { "M", "N m", NULL, "moment on the first body" } };
+
+const pw_kind pw_kind_gear = {
+  .name = "gear",
+  .about = "the angles of two bodies, seen from a third, keep a ratio",
+  .definition = sizeof (pw_gear),
+  .element = sizeof (gear),
+  .fields = gear_fields,
+  .bodies = 3,
+  .rows = 1,
+  .level = PW_HOLONOMIC,
+  .reaction = gear_reaction,
+  .prepare = gear_prepare,
+  .g = gear_g,
+  .g_size = gear_g_size,
+  .J = gear_J,
+};

@@ -1,0 +1,96 @@
+/* A point of body 1 on a line of body 2: the row that slot and slider share.
+ *
+ *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic row)
+ *   G     = [ n  t.a | -n  -t.D ]             t: along the line, n: t turned by +90 degrees, a = R(phi1) s1
+ *   gamma = -v.H v = 2 w2 t.(r1' - r2') + w1 (w1 - 2 w2) n.a + w2^2 n.D             so that G a = gamma
+ *
+ * With dn/dphi2 = -t and dt/dphi2 = n, the entries of H = d2g/dq2 are -t and t over (r1, phi2) and (r2, phi2), -n.a
+ * over (phi1, phi1), n.a over (phi1, phi2) and -n.D over (phi2, phi2).
+ * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3.) */
+#ifndef PW_LINE_H
+#define PW_LINE_H
+
+#include <math.h>
+#include <string.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double s1[2]; /* the point in body 1's frame [m] */
+  double n[2];  /* normal of the line in body 2's frame */
+  double c;     /* where the line is along n [m] */
+} line;
+
+/* A line in its present place: directions in world axes, the arm a, the distance D, and their components. */
+typedef struct {
+  double nx, ny, tx, ty, X, Y, Dx, Dy;
+  double na, nD, ta, tD;
+} line_axes;
+
+static inline line line_make (const double at[2][2], double heading) {
+  line k = { { at[0][0], at[0][1] }, { -sin (heading), cos (heading) }, 0 };
+  k.c = k.n[0] * at[1][0] + k.n[1] * at[1][1];
+  return k;
+}
+
+static inline line_axes line_turn (const line *k, const pw_pose *A, const pw_pose *B) {
+  line_axes s = { .nx = B->cos * k->n[0] - B->sin * k->n[1], .ny = B->sin * k->n[0] + B->cos * k->n[1] };
+  s.tx = s.ny, s.ty = -s.nx;
+  s.X = A->cos * k->s1[0] - A->sin * k->s1[1], s.Y = A->sin * k->s1[0] + A->cos * k->s1[1];
+  s.Dx = A->x + s.X - B->x, s.Dy = A->y + s.Y - B->y;
+  s.na = s.nx * s.X + s.ny * s.Y, s.nD = s.nx * s.Dx + s.ny * s.Dy;
+  s.ta = s.tx * s.X + s.ty * s.Y, s.tD = s.tx * s.Dx + s.ty * s.Dy;
+  return s;
+}
+
+static inline double line_g (const line *k, const line_axes *s) {
+  return s->nD - k->c;
+}
+
+static inline double line_g_size (const line *k, const line_axes *s, const pw_pose *A, const pw_pose *B) {
+  return fabs (s->nx) * (fabs (A->x) + fabs (s->X) + fabs (B->x)) +
+         fabs (s->ny) * (fabs (A->y) + fabs (s->Y) + fabs (B->y)) + fabs (k->c);
+}
+
+static inline void line_J (const line_axes *s, double *out) {
+  out[0] = s->nx, out[1] = s->ny, out[2] = s->ta, out[3] = -s->nx, out[4] = -s->ny, out[5] = -s->tD;
+}
+
+static inline double line_gamma (const line_axes *s, const pw_pose *A, const pw_pose *B) {
+  double w1 = A->omega, w2 = B->omega, tV = s->tx * (A->vx - B->vx) + s->ty * (A->vy - B->vy);
+  return 2 * w2 * tV + w1 * (w1 - 2 * w2) * s->na + w2 * w2 * s->nD;
+}
+
+/* out = factor H w */
+static inline void line_curve (const line_axes *s, double factor, const double w[6], double *out) {
+  out[0] = -factor * s->tx * w[5];
+  out[1] = -factor * s->ty * w[5];
+  out[2] = factor * s->na * (w[5] - w[2]);
+  out[3] = -out[0];
+  out[4] = -out[1];
+  out[5] = factor * (s->na * w[2] - s->nD * w[5] - s->tx * (w[0] - w[3]) - s->ty * (w[1] - w[4]));
+}
+
+/* out = l H, 6 x 6 */
+static inline void line_jtl_q (const line_axes *s, double l, double *out) {
+  memset (out, 0, 36 * sizeof *out);
+  out[5] = out[30] = -l * s->tx, out[11] = out[31] = -l * s->ty;
+  out[23] = out[33] = l * s->tx, out[29] = out[34] = l * s->ty;
+  out[14] = -l * s->na, out[17] = out[32] = l * s->na, out[35] = -l * s->nD;
+}
+
+static inline void line_gamma_q (const line_axes *s, const pw_pose *A, const pw_pose *B, double *out) {
+  double w1 = A->omega, w2 = B->omega, nV = s->nx * (A->vx - B->vx) + s->ny * (A->vy - B->vy);
+  out[0] = w2 * w2 * s->nx;
+  out[1] = w2 * w2 * s->ny;
+  out[2] = (w1 - w2) * (w1 - w2) * s->ta;
+  out[3] = -out[0];
+  out[4] = -out[1];
+  out[5] = 2 * w2 * nV - w1 * (w1 - 2 * w2) * s->ta - w2 * w2 * s->tD;
+}
+
+static inline void line_gamma_v (const line_axes *s, const pw_pose *A, const pw_pose *B, double *out) {
+  const double v[6] = { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega };
+  line_curve (s, -2, v, out);
+}
+
+#endif

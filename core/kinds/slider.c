@@ -1,0 +1,126 @@
+/* slider: a prismatic joint; a point of body 1 stays on a line of body 2, and their angle stays what it is.
+ *
+ *   g     = ( n . (r1 + R(phi1) s1 - r2 - R(phi2) s2),  phi1 - phi2 - beta ) = 0      (2 holonomic rows)
+ *   gamma = ( as of line.h,  0 )                         n: normal of the line, to the left of its heading
+ *
+ * The first row's derivatives are in line.h.  On body 1 act the force -lambda(1) along n, at its point, and the moment
+ * -lambda(2); on body 2 the opposites. */
+#include "line.h"
+
+typedef struct {
+  line line;
+  double beta; /* phi1 - phi2 [rad] */
+} slider;
+
+#define SLIDER_PARTS                                                              \
+  const slider *k = (const slider *)b->element + e;                               \
+  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
+  const line_axes s = line_turn (&k->line, A, B)
+
+static int slider_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+                           pw_error *error) {
+  const pw_slider *d = definition;
+  *(slider *)element = (slider){ line_make (d->at, d->heading), d->angle };
+  (void)bodies, (void)own, (void)error;
+  return PW_OK;
+}
+
+static void slider_g (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 2) {
+    SLIDER_PARTS;
+    out[0] = line_g (&k->line, &s);
+    out[1] = A->phi - B->phi - k->beta;
+  }
+}
+
+static void slider_g_size (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 2) {
+    SLIDER_PARTS;
+    out[0] = line_g_size (&k->line, &s, A, B);
+    out[1] = fabs (A->phi) + fabs (B->phi) + fabs (k->beta);
+  }
+}
+
+static void slider_J (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 12) {
+    SLIDER_PARTS;
+    line_J (&s, out);
+    out[6] = out[7] = out[9] = out[10] = 0, out[8] = 1, out[11] = -1;
+  }
+}
+
+static void slider_gamma (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 2) {
+    SLIDER_PARTS;
+    out[0] = line_gamma (&s, A, B);
+    out[1] = 0;
+  }
+}
+
+static void slider_jw_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 12) {
+    SLIDER_PARTS;
+    line_curve (&s, 1, b->w + 6 * e, out);
+    memset (out + 6, 0, 6 * sizeof *out);
+  }
+}
+
+static void slider_jtl_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 36) {
+    SLIDER_PARTS;
+    line_jtl_q (&s, b->lambda[2 * e], out);
+  }
+}
+
+static void slider_gamma_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 12) {
+    SLIDER_PARTS;
+    line_gamma_q (&s, A, B, out);
+    memset (out + 6, 0, 6 * sizeof *out);
+  }
+}
+
+static void slider_gamma_v (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 12) {
+    SLIDER_PARTS;
+    line_gamma_v (&s, A, B, out);
+    memset (out + 6, 0, 6 * sizeof *out);
+  }
+}
+
+static const pw_field slider_fields[] = {
+  { PW_AT (pw_slider, body), PW_BODY, .count = 2, .required = 1,
+    .about = "what slides, and what it slides on; ground for one of them" },
+  { PW_AT (pw_slider, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
+    .about = "the point, and a point of the line, in each body's frame" },
+  { PW_AT (pw_slider, heading), PW_NUMBER, .unit = "rad",
+    .about = "direction of the line in the second body's frame; 0: along its x" },
+  { PW_AT (pw_slider, angle), PW_NUMBER, .unit = "rad", .about = "of the first body relative to the second" },
+  { .name = NULL },
+};
+
+static const pw_quantity slider_reaction[] = {
+  { "N", "N", NULL, "force on the first body at its point, to the left of the line's heading" },
+  { "M", "N m", NULL, "moment on the first body" },
+};
+
+const pw_kind pw_kind_slider = {
+  .name = "slider",
+  .about = "a body slides along a line of another and does not turn against it (prismatic joint)",
+  .definition = sizeof (pw_slider),
+  .element = sizeof (slider),
+  .fields = slider_fields,
+  .bodies = 2,
+  .rows = 2,
+  .level = PW_HOLONOMIC,
+  .reaction = slider_reaction,
+  .prepare = slider_prepare,
+  .g = slider_g,
+  .g_size = slider_g_size,
+  .J = slider_J,
+  .gamma = slider_gamma,
+  .jw_q = slider_jw_q,
+  .jtl_q = slider_jtl_q,
+  .gamma_q = slider_gamma_q,
+  .gamma_v = slider_gamma_v,
+};

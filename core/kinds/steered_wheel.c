@@ -1,0 +1,132 @@
+/* steered-wheel: a knife edge whose heading in the body is a signal u of time.
+ *
+ *   n . v_P = 0,  n = (-sin, cos)(phi + u)                        (1 nonholonomic row)
+ *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u; l and m: the arm of P along the heading and to its left
+ *   gamma = (w + u') (cos(theta) vx + sin(theta) vy) - u' m w     so that S a = gamma, with l' = u' m
+ *
+ * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
+ * The lateral force on the body, along n, is N = -lambda.  It acts at the point the wheel turns about, so that steering
+ * takes no moment and does no work. */
+#include <math.h>
+#include <string.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double at[2]; /* contact point in the body's frame [m] */
+} steered;
+
+/* A wheel in its present place. */
+typedef struct {
+  double c, s;         /* heading in the world */
+  double along, aside; /* l, m */
+  double turn, rate;   /* u' and w + u' */
+} steered_state;
+
+static inline steered_state steered_at (const steered *k, const pw_pose *A, const double *u) {
+  double c = cos (u[0]), s = sin (u[0]);
+  return (steered_state){ .c = A->cos * c - A->sin * s,
+                          .s = A->sin * c + A->cos * s,
+                          .along = k->at[0] * c + k->at[1] * s,
+                          .aside = k->at[1] * c - k->at[0] * s,
+                          .turn = u[1],
+                          .rate = A->omega + u[1] };
+}
+
+#define STEERED_PARTS                                 \
+  const steered *k = (const steered *)b->element + e; \
+  const pw_pose *A = &b->pose[b->body[e]];            \
+  const steered_state x = steered_at (k, A, b->u + 3 * e)
+
+static int steered_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+                            pw_error *error) {
+  const pw_steered_wheel *d = definition;
+  *(steered *)element = (steered){ { d->at[0], d->at[1] } };
+  (void)bodies, (void)own, (void)error;
+  return PW_OK;
+}
+
+static void steered_J (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    STEERED_PARTS;
+    out[0] = -x.s, out[1] = x.c, out[2] = x.along;
+  }
+}
+
+static void steered_gamma (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) {
+    STEERED_PARTS;
+    out[e] = x.rate * (x.c * A->vx + x.s * A->vy) - x.turn * x.aside * A->omega;
+  }
+}
+
+static void steered_jw_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    STEERED_PARTS;
+    out[0] = out[1] = 0, out[2] = -x.c * b->w[3 * e] - x.s * b->w[3 * e + 1];
+  }
+}
+
+static void steered_jtl_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 9) {
+    STEERED_PARTS;
+    memset (out, 0, 9 * sizeof *out);
+    out[2] = -x.c * b->lambda[e], out[5] = -x.s * b->lambda[e];
+  }
+}
+
+static void steered_gamma_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    STEERED_PARTS;
+    out[0] = out[1] = 0, out[2] = x.rate * (x.c * A->vy - x.s * A->vx);
+  }
+}
+
+static void steered_gamma_v (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    STEERED_PARTS;
+    out[0] = x.rate * x.c, out[1] = x.rate * x.s, out[2] = x.c * A->vx + x.s * A->vy - x.turn * x.aside;
+  }
+}
+
+static void steered_contact (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 3) {
+    const steered *k = (const steered *)b->element + e;
+    const pw_pose *A = &b->pose[b->body[e]];
+    out[0] = A->x + A->cos * k->at[0] - A->sin * k->at[1];
+    out[1] = A->y + A->sin * k->at[0] + A->cos * k->at[1];
+    out[2] = A->phi + b->u[3 * e];
+  }
+}
+
+static const pw_field steered_fields[] = {
+  { PW_AT (pw_steered_wheel, body), PW_BODY, .required = 1, .about = "the body that carries the wheel" },
+  { PW_AT (pw_steered_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
+  { PW_AT (pw_steered_wheel, heading), PW_SIGNAL, .unit = "rad", .required = 1,
+    .about = "rolling direction in the body's frame over time, with its derivative; 0: along its x" },
+  { .name = NULL },
+};
+
+static const pw_quantity steered_reaction[] = {
+  { "N", "N", NULL, "lateral force on the body, to the left of the heading" },
+};
+
+const pw_kind pw_kind_steered_wheel = {
+  .name = "steered-wheel",
+  .about = "a knife edge whose heading in the body follows a signal of time",
+  .definition = sizeof (pw_steered_wheel),
+  .element = sizeof (steered),
+  .fields = steered_fields,
+  .bodies = 1,
+  .rows = 1,
+  .signals = 1,
+  .level = PW_NONHOLONOMIC,
+  .reaction = steered_reaction,
+  .prepare = steered_prepare,
+  .J = steered_J,
+  .gamma = steered_gamma,
+  .jw_q = steered_jw_q,
+  .jtl_q = steered_jtl_q,
+  .gamma_q = steered_gamma_q,
+  .gamma_v = steered_gamma_v,
+  .contact = steered_contact,
+};
