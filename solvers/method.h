@@ -22,11 +22,11 @@ struct pw_run {
   int *redundant_row;          /* which */
   double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
   char *rank_memory;
-  double pivot, reselect;      /* the smallest one at the state reached; below this other rows are tried */
-  double watch, guard; /* an evaluation with a smaller pivot is near a singular pose; too near */
-  int near;            /* 1 as soon as one was near */
-  double alpha, beta;  /* Baumgarte's, used by pw_accelerate; 0: none */
-  double breakpoint;   /* first discontinuity of a signal after t */
+  double pivot, reselect; /* the smallest one at the state reached; below this other rows are tried */
+  double watch, guard;    /* an evaluation with a smaller pivot is near a singular pose; too near */
+  int near;               /* 1 as soon as one was near */
+  double alpha, beta;     /* Baumgarte's, used by pw_accelerate; 0: none */
+  double breakpoint;      /* first discontinuity of a signal after t */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;
@@ -81,11 +81,14 @@ void pw_rank_coefficients (pw_run *r);
 /* ---- Projection ---- */
 
 typedef struct {
-  pw_saddle *position; /* metric of the positions, holonomic rows */
-  pw_saddle *velocity; /* all rows */
-  int own_velocity;    /* velocity is not the run's saddle */
-  double *scratch;     /* 3 rows + coords */
-  int iterations;      /* of the last position projection */
+  pw_saddle *position;         /* metric of the positions, holonomic rows */
+  pw_saddle *velocity;         /* all rows */
+  int own_velocity;            /* velocity is not the run's saddle */
+  double *scratch;             /* 3 rows + coords */
+  int iterations;              /* of the last position projection */
+  const unsigned char *active; /* rows that are enforced; NULL: all */
+  int alone;                   /* 1: nobody asks what becomes of the others */
+  int against;                 /* a redundant row that the last position projection left open, or -1 */
 } pw_projector;
 
 /* Position metric `weight_q` and velocity metric `weight_v` (NULL: the run's own saddle with the mass matrix).  The

@@ -12,7 +12,9 @@
 
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error) {
   pw_system *s = r->s;
-  *p = (pw_projector){ .own_velocity = weight_v != NULL, .velocity = weight_v ? NULL : r->saddle };
+  *p = (pw_projector){
+    .own_velocity = weight_v != NULL, .velocity = weight_v ? NULL : r->saddle, .active = r->active, .against = -1
+  };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
   if (p->scratch == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   p->position = pw_saddle_open (s, weight_q, s->holonomic, r->active, error);
@@ -29,16 +31,29 @@ void pw_projector_close (pw_projector *p) {
   *p = (pw_projector){ 0 };
 }
 
-/* The worst scaled residual of g at the placed pose. */
-static double project_worst (pw_system *s, double *g, double *size, int *row) {
+/* The worst scaled residual of g at the placed pose, of the rows that are enforced. */
+static double project_worst (pw_system *s, const unsigned char *active, double *g, double *size, int *row) {
   double worst = 0;
   pw_sweep_g (s, g);
   pw_sweep_g_size (s, size);
   for (int i = 0; i < s->holonomic; i++) {
     double scaled = fabs (g[i]) / size[i];
-    if (!(scaled <= worst)) worst = scaled, *row = i;
+    if ((!active || active[i]) && !(scaled <= worst)) worst = scaled, *row = i;
   }
   return worst;
+}
+
+/* Redundant rows follow from the others but for round-off; a row that does not contradicts them.  It takes *row. */
+static int project_others (pw_projector *p, const pw_system *s, const double *g, const double *size, int *row) {
+  const double follows = 1e-9;
+  double most = follows;
+  p->against = -1;
+  if (p->active == NULL || p->alone) return PW_OK;
+  for (int i = 0; i < s->holonomic; i++)
+    if (!p->active[i] && fabs (g[i]) > most * size[i]) most = fabs (g[i]) / size[i], p->against = i;
+  if (p->against < 0) return PW_OK;
+  *row = p->against;
+  return PW_RETRY;
 }
 
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {
@@ -50,7 +65,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     int status = pw_place (s, t, q, v);
     if (status != PW_OK) return status;
     *row = -1;
-    *worst = project_worst (s, g, size, row);
+    *worst = project_worst (s, p->active, g, size, row);
     int stalled = *worst > before / 4;
     if (*worst <= good || (stalled && *worst <= enough)) break;
     if (p->iterations >= most || !isfinite (*worst)) return PW_RETRY;
@@ -63,7 +78,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   pw_sweep_J (s);
-  return PW_OK;
+  return project_others (p, s, g, size, row);
 }
 
 /* v += dv with J (v + dv) = eta. */

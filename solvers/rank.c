@@ -155,6 +155,7 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   const unsigned char *before = r->active;
   r->active = x->active;
   if (pw_projector_open (&p, r, s->metric, s->metric, &none) == PW_OK) {
+    p.alone = 1;
     if (pw_project_positions (&p, r, r->t, x->q, r->v, &row, &worst) == PW_OK)
       away = rank_basis (s, 1e-7, x->rows, x->kept, x->active);
     pw_projector_close (&p);
