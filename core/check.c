@@ -15,7 +15,7 @@ static int check_name (const pw_model *m, const char *what, const char *name, pw
   return PW_OK;
 }
 
-static int check_body (const pw_model *m, const pw_body *b, pw_error *error) {
+int pw_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
   if (check_name (m, "body", b->name, error) != PW_OK) return PW_INPUT;
   const struct {
     const char *name;
@@ -107,7 +107,7 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
   return PW_OK;
 }
 
-static int check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error) {
+int pw_check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error) {
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
   for (const pw_field *f = e->kind->fields; f->name; f++)
     if (check_field (m, e, f, bodies, error) != PW_OK) return PW_INPUT;
@@ -127,8 +127,8 @@ static int check_element (const pw_model *m, const pw_element *e, const pw_names
 
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error) {
   for (int i = 0; i < m->bodies; i++)
-    if (check_body (m, &m->body[i], error) != PW_OK) return PW_INPUT;
+    if (pw_check_body (m, &m->body[i], error) != PW_OK) return PW_INPUT;
   for (int i = 0; i < m->elements; i++)
-    if (check_element (m, &m->element[i], bodies, error) != PW_OK) return PW_INPUT;
+    if (pw_check_element (m, &m->element[i], bodies, error) != PW_OK) return PW_INPUT;
   return PW_OK;
 }

@@ -35,6 +35,8 @@ static inline const char *pw_element_name (const pw_element *e) {
 
 /* Checks every body and element against its field table: names, numbers, bodies' names, signals. */
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
+int pw_check_body (const pw_model *m, const pw_body *b, pw_error *error);
+int pw_check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error);
 
 /* The k-th field of a type in a kind, counting each of its `count`; address inside the definition. */
 void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);

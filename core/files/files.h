@@ -42,6 +42,20 @@ typedef int pw_object_user (void *context, const char *object, pw_error *error);
  * compile or there is no compiler; PW_MACHINE; or what `use` returns. */
 int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error);
 
+/* ---- Models in YAML (yaml.c) ---- */
+
+/* A text model in memory: a plug-in's table made of it.  `shown` is the path in messages.  PW_INPUT with the place of what
+ * is wrong; PW_MACHINE.  Bodies and elements are read when a model is built. */
+typedef struct pw_yaml pw_yaml;
+pw_yaml *pw_yaml_open (const char *path, const char *shown, pw_error *error);
+void pw_yaml_close (pw_yaml *y);
+const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
+
+/* ---- Texts (json.c) ---- */
+
+/* The bytes of the UTF-8 character at p, in a text ended by a NUL; 0 if there is none. */
+int pw_utf8_size (const unsigned char *p);
+
 /* ---- Outputs (output.c) ---- */
 
 /* Writes; PW_MACHINE with the reason if that fails, or a write before it has failed. */

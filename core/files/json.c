@@ -17,8 +17,7 @@ typedef struct {
 
 /* ---- Scalars ---- */
 
-/* The bytes of the UTF-8 character at p; 0 if there is none. */
-static int json_character (const unsigned char *p) {
+int pw_utf8_size (const unsigned char *p) {
   static const unsigned least[] = { 0, 0x80, 0x800, 0x10000 };
   int more = p[0] < 0x80 ? 0 : p[0] >> 5 == 6 ? 1 : p[0] >> 4 == 14 ? 2 : p[0] >> 3 == 30 ? 3 : -1;
   if (more < 0) return 0;
@@ -35,7 +34,7 @@ static char *json_clean (const char *text) {
   char *clean = malloc (3 * strlen (text) + 1), *to = clean;
   if (clean == NULL) return NULL;
   while (*text) {
-    int n = json_character ((const unsigned char *)text);
+    int n = pw_utf8_size ((const unsigned char *)text);
     memcpy (to, n ? text : "\xEF\xBF\xBD", (size_t)(n ? n : 3));
     to += n ? n : 3;
     text += n ? n : 1;

@@ -11,7 +11,7 @@ extern "C" {
 
 /* ---- Models ---- */
 
-/* A model file that is open: a plug-in loaded, and its table. */
+/* A model file that is open: a plug-in loaded or a text model read, and its table. */
 typedef struct pw_file pw_file;
 
 /* Opens a model by name or by path.
@@ -19,8 +19,8 @@ typedef struct pw_file pw_file;
  * A name ("ezyroller") is looked for as NAME.so, NAME.yaml in the folders of the environment variable PINWHEEL_MODELS
  * (separated by ":"), then in those that belong to the running program and this library: models/ next to it or one
  * up, lib/pinwheel/models/ of the installation.  A path has a "/" or an ending: a .so is loaded, a .c compiled by $CC or cc
- * in a private temporary folder, its messages passed through on standard error; .yaml is not read yet.  Nothing is taken
- * from the current directory unless named by path.
+ * in a private temporary folder, its messages passed through on standard error; a .yaml is read (docs/model-format.md).
+ * Nothing is taken from the current directory unless named by path.
  *
  * Errors: PW_INPUT for a model that is not found (with the nearest name), found twice (with both paths), does not
  * compile, is no Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_MACHINE. */

@@ -9,7 +9,8 @@
 
 struct pw_file {
   char *name, *path;
-  void *handle; /* of dlopen */
+  void *handle;  /* of dlopen, or */
+  pw_yaml *yaml; /* of a text model */
   const pw_plugin_table *table;
 };
 
@@ -70,17 +71,23 @@ static int plugin_ending (const char *name) {
   return i;
 }
 
-/* Opens the file at f->path, which exists. */
-static int plugin_open_path (pw_file *f, pw_error *error) {
+static int plugin_read (pw_file *f, const char *shown, pw_error *error) {
+  f->yaml = pw_yaml_open (f->path, shown, error);
+  if (f->yaml == NULL) return error->status;
+  f->table = pw_yaml_table (f->yaml);
+  return PW_OK;
+}
+
+/* Opens the file at f->path, which exists; `shown` is its path as the user knows it. */
+static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   const char *base = strrchr (f->path, '/');
   base = base ? base + 1 : f->path;
   int ending = plugin_ending (base);
   if (ending == PLUGIN_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
-  if (ending == PLUGIN_YAML)
-    return pw_fail (error, PW_INPUT, "%s: this Pinwheel cannot read models in YAML yet, only those in C", f->path);
   f->name = strdup (base);
   if (f->name == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   f->name[strlen (base) - strlen (plugin_endings[ending])] = 0;
+  if (ending == PLUGIN_YAML) return plugin_read (f, shown, error);
   return ending == PLUGIN_C ? pw_compile_file (f->path, plugin_load, f, error) : plugin_load (f, f->path, error);
 }
 
@@ -141,7 +148,7 @@ pw_file *pw_file_open (const char *model, pw_error *error) {
   }
   int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS;
   int status = by_path ? plugin_find_path (f, model, error) : plugin_find_name (f, model, error);
-  if (status == PW_OK) status = plugin_open_path (f, error);
+  if (status == PW_OK) status = plugin_open_path (f, by_path ? model : f->path, error);
   if (status == PW_OK) return f;
   pw_file_close (f);
   return NULL;
@@ -150,6 +157,7 @@ pw_file *pw_file_open (const char *model, pw_error *error) {
 void pw_file_close (pw_file *f) {
   if (f == NULL) return;
   if (f->handle) dlclose (f->handle);
+  pw_yaml_close (f->yaml);
   free (f->name);
   free (f->path);
   free (f);

@@ -1,0 +1,165 @@
+/* The head of a text model: version, line about it, run defaults, parameters.  They make a plug-in's table, so that
+ * whatever takes a model of compiled C takes a text model too; its build function reads bodies and elements. */
+#define _POSIX_C_SOURCE 200809L
+#include <stdlib.h>
+#include <string.h>
+#include "yaml.h"
+
+/* ---- Parameters ---- */
+
+/* A name that expressions can use and that nothing else has. */
+static int yaml_new_name (const pw_yaml *y, const pw_node *node, const char *what, pw_names *names, pw_error *error) {
+  const char *name;
+  if (pw_yaml_text (y, node, what, &name, error) != PW_OK) return error->status;
+  if (!pw_expression_is_name (name))
+    return pw_yaml_fail (y, node->at, error, "%s \"%.60s\": expected a letter, then letters, digits and _", what, name);
+  if (strcmp (name, "t") == 0 || pw_expression_is_taken (name))
+    return pw_yaml_fail (y, node->at, error, "%s \"%s\": this name is taken: %s", what, name,
+                         *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
+  if (pw_names_add (names, name, 0) >= 0) return pw_yaml_fail (y, node->at, error, "a second %s \"%s\"", what, name);
+  return PW_OK;
+}
+
+static int yaml_domain (const pw_yaml *y, const pw_node *domain, const pw_node *min, pw_domain *d, pw_error *error) {
+  static const char *const name[] = { "real", "nonnegative", "positive", "count" };
+  const char *text;
+  char hint[100];
+  *d = PW_REAL;
+  if (min && (min->type != PW_YAML_SCALAR || strcmp (min->text, "0") != 0 || domain))
+    return pw_yaml_fail (y, min->at, error, "min: expected 0, and no domain beside it");
+  if (min) *d = PW_NONNEGATIVE;
+  if (domain == NULL) return PW_OK;
+  if (pw_yaml_text (y, domain, "domain", &text, error) != PW_OK) return error->status;
+  pw_nearest near = { .sought = text };
+  for (int i = 0; i < 4; i++) {
+    pw_nearest_try (&near, name[i]);
+    if (strcmp (name[i], text) != 0) continue;
+    *d = (pw_domain)i;
+    return PW_OK;
+  }
+  return pw_yaml_fail (y, domain->at, error, "domain: expected real, nonnegative, positive or count%s",
+                       pw_nearest_text (&near, hint, sizeof hint));
+}
+
+static int yaml_parameter (const pw_yaml *y, const pw_node *node, pw_expression *x, pw_names *names, pw_parameter *p,
+                           pw_error *error) {
+  static const char *const key[] = { "name", "value", "unit", "about", "domain", "min", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  if (pw_yaml_keys (y, node, 0, key, "a parameter", v, error) != PW_OK) return error->status;
+  if (v[0] == NULL) return pw_yaml_fail (y, node->at, error, "a parameter needs a name");
+  if (yaml_new_name (y, v[0], "parameter", names, error) != PW_OK) return error->status;
+  p->name = v[0]->text;
+  p->unit = p->about = "";
+  char what[100];
+  snprintf (what, sizeof what, "parameter %s", p->name);
+  if (v[1] == NULL) return pw_yaml_fail (y, node->at, error, "%s needs a value, its default", what);
+  if (yaml_domain (y, v[4], v[5], &p->domain, error) != PW_OK ||
+      (v[2] && pw_yaml_text (y, v[2], "unit", &p->unit, error) != PW_OK) ||
+      (v[3] && pw_yaml_text (y, v[3], "about", &p->about, error) != PW_OK))
+    return error->status;
+  return pw_yaml_number (y, v[1], what, p->domain, x, &p->value, error);
+}
+
+static int yaml_parameters (pw_yaml *y, const pw_node *list, pw_expression *x, pw_names *names, pw_error *error) {
+  if (list && pw_yaml_list (y, list, "parameters", -1, error) != PW_OK) return error->status;
+  int count = list ? list->count : 0;
+  y->parameter = pw_arena_take (&y->arena, ((size_t)count + 1) * sizeof *y->parameter);
+  if (y->parameter == NULL) return pw_yaml_no_memory (y, error);
+  for (const pw_node *n = list ? list->first : NULL; n; n = n->next) {
+    pw_parameter *p = y->parameter + y->parameters;
+    if (yaml_parameter (y, n, x, names, p, error) != PW_OK) return error->status;
+    p->offset = (size_t)y->parameters++ * sizeof (double);
+  }
+  y->table.parameters = y->parameter;
+  y->table.parameters_size = (size_t)count * sizeof (double);
+  return PW_OK;
+}
+
+/* ---- The rest of the head ---- */
+
+static int yaml_run (pw_yaml *y, const pw_node *run, pw_expression *x, pw_error *error) {
+  static const char *const key[] = { "t_end", "step", "rtol", "method", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
+  if (pw_yaml_keys (y, run, 0, key, "run", v, error) != PW_OK) return error->status;
+  for (int i = 0; i < 3; i++)
+    if (v[i] && pw_yaml_number (y, v[i], key[i], PW_POSITIVE, x, number[i], error) != PW_OK) return error->status;
+  return v[3] ? pw_yaml_text (y, v[3], "method", &y->table.run.method, error) : PW_OK;
+}
+
+static int yaml_let_names (const pw_yaml *y, pw_names *names, pw_error *error) {
+  if (y->let && y->let->type != PW_YAML_MAP)
+    return pw_yaml_fail (y, y->let->at, error, "let: expected a map {NAME: NUMBER, ...}, found %s",
+                         pw_yaml_found (y->let));
+  for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next)
+    if (yaml_new_name (y, n, "name", names, error) != PW_OK) return error->status;
+  return PW_OK;
+}
+
+static int yaml_version (const pw_yaml *y, const pw_node *version, pw_error *error) {
+  if (version == NULL)
+    return pw_yaml_fail (y, y->root->at, error, "\"pinwheel: 1\" is missing, the version of the format");
+  if (version->type == PW_YAML_SCALAR && strcmp (version->text, "1") == 0) return PW_OK;
+  return pw_yaml_fail (y, version->at, error,
+                       "pinwheel: expected 1, the version of the format that this Pinwheel reads");
+}
+
+static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
+  static const char *const key[] = { "pinwheel", "about", "run", "parameters", "let", "bodies", "elements", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  pw_names names = { .size = 0 };
+  if (y->root == NULL) return pw_yaml_fail (y, 0, error, "the file is empty; a model begins with \"pinwheel: 1\"");
+  if (pw_yaml_keys (y, y->root, 0, key, "a model", v, error) != PW_OK || yaml_version (y, v[0], error) != PW_OK ||
+      (v[1] && pw_yaml_text (y, v[1], "about", &y->table.about, error) != PW_OK) ||
+      (v[2] && yaml_run (y, v[2], x, error) != PW_OK))
+    return error->status;
+  y->let = v[4];
+  y->bodies = v[5];
+  y->elements = v[6];
+  size_t count = (v[3] ? (size_t)v[3]->count : 0) + (v[4] ? (size_t)v[4]->count : 0);
+  int status = pw_names_open (&names, count) == PW_OK ? PW_OK : pw_yaml_no_memory (y, error);
+  if (status == PW_OK) status = yaml_parameters (y, v[3], x, &names, error);
+  if (status == PW_OK) status = yaml_let_names (y, &names, error);
+  pw_names_close (&names);
+  return status;
+}
+
+/* ---- The file ---- */
+
+static int yaml_read (pw_yaml *y, const char *path, pw_error *error) {
+  if (pw_yaml_read_source (y, path, error) != PW_OK || pw_yaml_read_tree (y, error) != PW_OK) return error->status;
+  pw_expression *x = pw_expression_open (0);
+  int status = x ? yaml_head (y, x, error) : pw_yaml_no_memory (y, error);
+  pw_expression_close (x);
+  return status;
+}
+
+pw_yaml *pw_yaml_open (const char *path, const char *shown, pw_error *error) {
+  pw_yaml *y = calloc (1, sizeof *y);
+  if (y) y->path = strdup (shown);
+  if (y == NULL || y->path == NULL) {
+    pw_fail (error, PW_MACHINE, "out of memory");
+    free (y);
+    return NULL;
+  }
+  y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = pw_yaml_build };
+  if (pw_yaml_open_functions (y) != PW_OK)
+    pw_yaml_no_memory (y, error);
+  else if (yaml_read (y, path, error) == PW_OK)
+    return y;
+  pw_yaml_close (y);
+  return NULL;
+}
+
+void pw_yaml_close (pw_yaml *y) {
+  if (y == NULL) return;
+  pw_yaml_free_functions (y);
+  pw_arena_free (&y->arena);
+  free (y->source);
+  free (y->path);
+  free (y);
+}
+
+const pw_plugin_table *pw_yaml_table (const pw_yaml *y) {
+  return &y->table;
+}

@@ -1,0 +1,118 @@
+/* Models as text: what the files yaml*.c share.
+ *
+ *   yaml_source.c  the text: reading it, refusing what is no text, messages with line, column and caret
+ *   yaml_tree.c    libfyaml's events become a tree of scalars, lists and maps
+ *   yaml_read.c    keys, numbers and names out of the tree
+ *   yaml.c         the head of a model: parameters and run defaults, which make a plug-in's table
+ *   yaml_build.c   bodies and elements, through the field tables of their kinds
+ *   yaml_signal.c  signals */
+#ifndef PW_YAML_H
+#define PW_YAML_H
+
+#include "expression.h"
+#include "files.h"
+#include "model.h"
+
+/* ---- The tree ---- */
+
+typedef enum { PW_YAML_SCALAR, PW_YAML_LIST, PW_YAML_MAP } pw_yaml_type;
+
+/* A scalar, a list of nodes, or a map, whose nodes alternate between keys and values. */
+typedef struct pw_node {
+  struct pw_node *next; /* in the list or map it is in */
+  union {
+    const char *text;      /* of a scalar */
+    struct pw_node *first; /* of a list or map */
+  };
+  unsigned at;        /* offset in the source, of the opening quote or bracket if there is one */
+  int count;          /* entries of a list, pairs of a map */
+  unsigned char type; /* pw_yaml_type */
+  unsigned char quoted;
+} pw_node;
+
+/* ---- A model file ---- */
+
+struct pw_yaml {
+  pw_plugin_table table; /* first: a model's table leads to its file */
+  char *path;            /* as messages show it */
+  char *source;          /* the text, ended by a NUL */
+  size_t size;
+  pw_arena arena; /* nodes and texts */
+  const pw_node *root;
+  const pw_node *bodies, *elements, *let; /* or NULL */
+  pw_parameter *parameter;                /* ended by a NULL name */
+  int parameters;
+  struct pw_yaml_functions *functions; /* signals that are expressions of time, until the file is closed */
+};
+
+/* ---- The text (yaml_source.c) ---- */
+
+/* Reads the file: y->source and size. */
+int pw_yaml_read_source (pw_yaml *y, const char *path, pw_error *error);
+
+/* Fails with "PATH:LINE:COLUMN: error: TEXT", the line of the source at an offset, and a caret below. */
+int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *format, ...)
+#ifdef __GNUC__
+    __attribute__ ((format (printf, 4, 5)))
+#endif
+    ;
+
+int pw_yaml_no_memory (const pw_yaml *y, pw_error *error);
+
+/* The line an offset is in, from 1. */
+int pw_yaml_line (const pw_yaml *y, size_t at);
+
+/* ---- The tree (yaml_tree.c) ---- */
+
+int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
+
+/* ---- Reading the tree (yaml_read.c) ---- */
+
+enum { PW_YAML_KEYS = 40 }; /* at most, in a map of fixed keys */
+
+/* Looks for known keys (ended by NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
+ * are passed over.  Whatever else is there, twice or empty is refused; `what` ("a body") is for messages. */
+int pw_yaml_keys (const pw_yaml *y, const pw_node *map, int skip, const char *const *key, const char *what,
+                  const pw_node **value, pw_error *error);
+
+/* "a list", "a map", "text" */
+const char *pw_yaml_found (const pw_node *node);
+
+/* Refuses what is not a list; `count` >= 0: of so many entries. */
+int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, pw_error *error);
+
+/* A scalar's text, not empty. */
+int pw_yaml_text (const pw_yaml *y, const pw_node *node, const char *what, const char **text, pw_error *error);
+
+/* A scalar as a number of a domain: an expression over what the evaluator knows. */
+int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, pw_expression *x,
+                    double *value, pw_error *error);
+
+/* Where an offset into a scalar's text is in the source. */
+size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
+
+/* ---- Building (yaml_build.c) ---- */
+
+/* What a build function works with. */
+typedef struct {
+  const pw_yaml *y;
+  pw_model *m;
+  const double *parameter; /* their values */
+  double *let;             /* values of what `let` defines */
+  int lets;                /* so far */
+  pw_expression *x;        /* an evaluator that knows both */
+  pw_names bodies;         /* names of bodies, to their index */
+  pw_names all;            /* names of bodies and elements, to the index in nodes */
+  const pw_node **node;    /* where each was named */
+  int named;
+} pw_yaml_builder;
+
+void pw_yaml_build (pw_model *m, const void *parameters);
+
+/* Reads a signal of a kind into a field (yaml_signal.c). */
+int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,
+                    pw_error *error);
+int pw_yaml_open_functions (pw_yaml *y);
+void pw_yaml_free_functions (pw_yaml *y);
+
+#endif

@@ -1,0 +1,255 @@
+/* Bodies and elements: fills the definition structures through the field tables of their kinds, and hands them to
+ * pw_add_body and pw_add as a build function in C does.  What a number, name or element may be is decided by the core,
+ * whose messages get a place here. */
+#include <stdlib.h>
+#include <string.h>
+#include "yaml.h"
+
+/* ---- Names ---- */
+
+/* Bodies and elements share their names. */
+static int build_name (pw_yaml_builder *b, const pw_node *node, const char *what, const char **name, pw_error *error) {
+  if (pw_yaml_text (b->y, node, what, name, error) != PW_OK) return error->status;
+  int before = pw_names_add (&b->all, *name, b->named);
+  if (before >= 0)
+    return pw_yaml_fail (b->y, node->at, error, "%s \"%.60s\": line %d has given this name already", what, *name,
+                         pw_yaml_line (b->y, b->node[before]->at));
+  b->node[b->named++] = node;
+  return PW_OK;
+}
+
+/* The core's message without its "model NAME: ", at a place. */
+static int build_refuse (const pw_yaml_builder *b, const pw_node *node, const pw_error *own, pw_error *error) {
+  char prefix[200];
+  int n = snprintf (prefix, sizeof prefix, "model %s: ", b->m->name);
+  const char *text = own->text;
+  if (n > 0 && strncmp (text, prefix, (size_t)n) == 0) text += n;
+  return own->status == PW_MACHINE ? pw_fail (error, own->status, "%s", own->text)
+                                   : pw_yaml_fail (b->y, node->at, error, "%s", text);
+}
+
+/* ---- Bodies ---- */
+
+static int build_triple (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const key[4],
+                         double value[3], pw_error *error) {
+  const pw_node *v[4];
+  char name[200];
+  if (node == NULL) return PW_OK;
+  if (pw_yaml_keys (b->y, node, 0, key, what, v, error) != PW_OK) return error->status;
+  for (int i = 0; i < 3; i++) {
+    snprintf (name, sizeof name, "%s: %s", what, key[i]);
+    if (v[i] && pw_yaml_number (b->y, v[i], name, PW_REAL, b->x, &value[i], error) != PW_OK) return error->status;
+  }
+  return PW_OK;
+}
+
+static int build_body (pw_yaml_builder *b, const pw_node *node, pw_error *error) {
+  static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
+  static const char *const start[] = { "x", "y", "phi", NULL }, *const rate[] = { "vx", "vy", "omega", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  pw_body body = { .mass = 0 };
+  char what[3][160];
+  if (pw_yaml_keys (b->y, node, 0, key, "a body", v, error) != PW_OK) return error->status;
+  if (v[0] == NULL) return pw_yaml_fail (b->y, node->at, error, "a body needs a name");
+  if (build_name (b, v[0], "body", &body.name, error) != PW_OK) return error->status;
+  for (int i = 0; i < 2; i++) {
+    snprintf (what[i], sizeof what[i], "body %.60s: %s", body.name, key[1 + i]);
+    if (v[1 + i] &&
+        pw_yaml_number (b->y, v[1 + i], what[i], PW_NONNEGATIVE, b->x, i ? &body.inertia : &body.mass, error) != PW_OK)
+      return error->status;
+  }
+  snprintf (what[0], sizeof what[0], "start of body %.60s", body.name);
+  snprintf (what[1], sizeof what[1], "rate of body %.60s", body.name);
+  if (build_triple (b, v[3], what[0], start, body.start, error) != PW_OK ||
+      build_triple (b, v[4], what[1], rate, body.rate, error) != PW_OK)
+    return error->status;
+  pw_error own = { 0 };
+  if (pw_check_body (b->m, &body, &own) != PW_OK) return build_refuse (b, v[0], &own, error);
+  pw_names_add (&b->bodies, body.name, b->m->bodies);
+  return pw_add_body (b->m, &body);
+}
+
+/* ---- Fields ---- */
+
+static int build_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error) {
+  if (pw_yaml_list (b->y, node, what, 2, error) != PW_OK ||
+      pw_yaml_number (b->y, node->first, what, PW_REAL, b->x, value, error) != PW_OK)
+    return error->status;
+  return pw_yaml_number (b->y, node->first->next, what, PW_REAL, b->x, value + 1, error);
+}
+
+static int build_body_name (pw_yaml_builder *b, const pw_node *node, const char *what, const char **name,
+                            pw_error *error) {
+  char hint[100];
+  if (pw_yaml_text (b->y, node, what, name, error) != PW_OK) return error->status;
+  if (strcmp (*name, "ground") == 0 || pw_names_find (&b->bodies, *name) >= 0) return PW_OK;
+  pw_nearest near = { .sought = *name };
+  for (int i = 0; i < b->m->bodies; i++) pw_nearest_try (&near, b->m->body[i].name);
+  pw_nearest_try (&near, "ground");
+  return pw_yaml_fail (b->y, node->at, error, "%s: there is no body \"%.60s\"%s", what, *name,
+                       pw_nearest_text (&near, hint, sizeof hint));
+}
+
+static int build_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices,
+                         int *value, pw_error *error) {
+  char hint[100];
+  const char *text;
+  if (pw_yaml_text (b->y, node, what, &text, error) != PW_OK) return error->status;
+  pw_nearest near = { .sought = text };
+  for (int i = 0; choices[i]; i++) {
+    pw_nearest_try (&near, choices[i]);
+    if (strcmp (choices[i], text) != 0) continue;
+    *value = i;
+    return PW_OK;
+  }
+  return pw_yaml_fail (b->y, node->at, error, "%s: there is no choice \"%.60s\"%s", what, text,
+                       pw_nearest_text (&near, hint, sizeof hint));
+}
+
+static int build_value (pw_yaml_builder *b, const pw_kind *kind, const pw_field *f, const pw_node *node,
+                        const char *what, void *at, pw_error *error) {
+  switch (f->type) {
+  case PW_NUMBER:
+    return pw_yaml_number (b->y, node, what, f->domain, b->x, at, error);
+  case PW_POINT:
+  case PW_VECTOR:
+    return build_pair (b, node, what, at, error);
+  case PW_BODY:
+    return build_body_name (b, node, what, at, error);
+  case PW_SIGNAL:
+    return pw_yaml_signal (b, kind, what, node, at, error);
+  case PW_CHOICE:
+    return build_choice (b, node, what, f->choices, at, error);
+  }
+  return pw_yaml_fail (b->y, node->at, error, "%s cannot be given in a text model", what);
+}
+
+static int build_field (pw_yaml_builder *b, const pw_kind *kind, const pw_field *f, const pw_node *node,
+                        const char *element, char *at, pw_error *error) {
+  static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double),
+                                 sizeof (char *), sizeof (pw_signal),  sizeof (int) };
+  char what[200];
+  int count = pw_field_count (f);
+  snprintf (what, sizeof what, "%s %.60s: %s", kind->name, element, f->name);
+  if (count == 1) return build_value (b, kind, f, node, what, at, error);
+  if (pw_yaml_list (b->y, node, what, count, error) != PW_OK) return error->status;
+  for (const pw_node *n = node->first; n; n = n->next, at += size[f->type])
+    if (build_value (b, kind, f, n, what, at, error) != PW_OK) return error->status;
+  return PW_OK;
+}
+
+/* ---- Elements ---- */
+
+static const pw_kind *build_kind (const pw_yaml_builder *b, const pw_node *node, pw_error *error) {
+  char hint[100];
+  const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
+  if (first == NULL || first->type != PW_YAML_SCALAR) {
+    pw_yaml_fail (b->y, node->at, error, "expected an element {KIND: NAME, ...}, found %s", pw_yaml_found (node));
+    return NULL;
+  }
+  pw_nearest near = { .sought = first->text };
+  for (const pw_kind *const *k = pw_kinds; *k; k++) {
+    if (strcmp ((*k)->name, first->text) == 0) return *k;
+    pw_nearest_try (&near, (*k)->name);
+  }
+  pw_yaml_fail (b->y, first->at, error, "an element begins with its kind, and there is no kind \"%.60s\"%s",
+                first->text, pw_nearest_text (&near, hint, sizeof hint));
+  return NULL;
+}
+
+static int build_fields (pw_yaml_builder *b, const pw_kind *kind, const pw_node *node, const char *name,
+                         char *definition, pw_error *error) {
+  const char *key[PW_YAML_KEYS + 1];
+  const pw_node *v[PW_YAML_KEYS + 1];
+  char what[100], text[160];
+  int n = 0;
+  for (const pw_field *f = kind->fields; f->name && n < PW_YAML_KEYS; f++) key[n++] = f->name;
+  key[n] = NULL;
+  snprintf (what, sizeof what, "a %s", kind->name);
+  if (pw_yaml_keys (b->y, node, 1, key, what, v, error) != PW_OK) return error->status;
+  for (int i = 0; i < n; i++) {
+    const pw_field *f = &kind->fields[i];
+    snprintf (text, sizeof text, "%s %.60s", kind->name, name);
+    if (v[i] == NULL && (f->required || f->type == PW_BODY))
+      return pw_yaml_fail (b->y, node->first->at, error, "%s needs \"%s\": %s", text, f->name,
+                           f->about ? f->about : "");
+    if (v[i] && build_field (b, kind, f, v[i], name, definition + f->offset, error) != PW_OK) return error->status;
+  }
+  return PW_OK;
+}
+
+static int build_element (pw_yaml_builder *b, const pw_node *node, char *definition, pw_error *error) {
+  const char *name;
+  pw_error own = { 0 };
+  const pw_kind *kind = build_kind (b, node, error);
+  if (kind == NULL || build_name (b, node->first->next, kind->name, &name, error) != PW_OK) return error->status;
+  memset (definition, 0, kind->definition);
+  memcpy (definition, &name, sizeof name);
+  if (build_fields (b, kind, node, name, definition, error) != PW_OK) return error->status;
+  pw_element e = { kind, definition };
+  if (pw_check_element (b->m, &e, &b->bodies, &own) != PW_OK) return build_refuse (b, node->first->next, &own, error);
+  return pw_add (b->m, kind, definition);
+}
+
+/* ---- The model ---- */
+
+static int build_all (pw_yaml_builder *b, char *definition, pw_error *error) {
+  const pw_yaml *y = b->y;
+  for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
+    if (build_body (b, n, error) != PW_OK) return error->status;
+  for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
+    if (build_element (b, n, definition, error) != PW_OK) return error->status;
+  return PW_OK;
+}
+
+/* What is defined once, from the parameters and what was defined before. */
+static int build_let (pw_yaml_builder *b, pw_error *error) {
+  char what[100];
+  for (const pw_node *n = b->y->let ? b->y->let->first : NULL; n; n = n->next->next) {
+    snprintf (what, sizeof what, "let %s", n->text);
+    if (pw_yaml_number (b->y, n->next, what, PW_REAL, b->x, &b->let[b->lets], error) != PW_OK) return error->status;
+    if (pw_expression_name (b->x, n->text, &b->let[b->lets]) != PW_OK) return pw_yaml_no_memory (b->y, error);
+    b->lets++;
+  }
+  return PW_OK;
+}
+
+static int build_names (pw_yaml_builder *b, const double *value, pw_error *error) {
+  const pw_yaml *y = b->y;
+  b->x = pw_expression_open (y->parameters + (y->let ? y->let->count : 0));
+  if (b->x == NULL) return pw_yaml_no_memory (y, error);
+  for (int i = 0; i < y->parameters; i++)
+    if (pw_expression_name (b->x, y->parameter[i].name, &value[i]) != PW_OK) return pw_yaml_no_memory (y, error);
+  return build_let (b, error);
+}
+
+static int build_open (pw_yaml_builder *b, char **definition, pw_error *error) {
+  const pw_yaml *y = b->y;
+  if ((y->bodies && pw_yaml_list (y, y->bodies, "bodies", -1, error) != PW_OK) ||
+      (y->elements && pw_yaml_list (y, y->elements, "elements", -1, error) != PW_OK))
+    return error->status;
+  size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0;
+  size_t all = bodies + (y->elements ? (size_t)y->elements->count : 0);
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    if ((*k)->definition > largest) largest = (*k)->definition;
+  *definition = malloc (largest);
+  b->node = malloc ((all + 1) * sizeof *b->node);
+  b->let = malloc (((y->let ? (size_t)y->let->count : 0) + 1) * sizeof *b->let);
+  if (*definition == NULL || b->node == NULL || b->let == NULL || pw_names_open (&b->bodies, bodies) != PW_OK ||
+      pw_names_open (&b->all, all) != PW_OK)
+    return pw_yaml_no_memory (y, error);
+  return PW_OK;
+}
+
+void pw_yaml_build (pw_model *m, const void *parameters) {
+  pw_yaml_builder b = { .y = (const pw_yaml *)(const void *)m->table, .m = m, .parameter = parameters };
+  char *definition = NULL;
+  if (build_open (&b, &definition, &m->error) == PW_OK && build_names (&b, parameters, &m->error) == PW_OK)
+    build_all (&b, definition, &m->error);
+  pw_expression_close (b.x);
+  pw_names_close (&b.bodies);
+  pw_names_close (&b.all);
+  free (b.node);
+  free (b.let);
+  free (definition);
+}

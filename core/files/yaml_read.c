@@ -1,0 +1,84 @@
+/* Keys, lists, texts and numbers out of the tree. */
+#include <string.h>
+#include "yaml.h"
+
+const char *pw_yaml_found (const pw_node *node) {
+  return node->type == PW_YAML_LIST ? "a list" : node->type == PW_YAML_MAP ? "a map" : "text";
+}
+
+static int read_empty (const pw_node *n) {
+  return n->type == PW_YAML_SCALAR && !n->quoted && *n->text == 0;
+}
+
+/* ---- Maps ---- */
+
+static int read_key (const pw_yaml *y, const pw_node *node, const char *const *key, const char *what,
+                     const pw_node **value, pw_error *error) {
+  char hint[100];
+  if (node->type != PW_YAML_SCALAR)
+    return pw_yaml_fail (y, node->at, error, "expected a key of %s, found %s", what, pw_yaml_found (node));
+  pw_nearest near = { .sought = node->text };
+  for (int i = 0; key[i]; i++) {
+    pw_nearest_try (&near, key[i]);
+    if (strcmp (key[i], node->text) != 0) continue;
+    if (value[i]) return pw_yaml_fail (y, node->at, error, "\"%s\" is there twice", key[i]);
+    if (read_empty (node->next)) return pw_yaml_fail (y, node->at, error, "\"%s\" has no value", key[i]);
+    value[i] = node->next;
+    return PW_OK;
+  }
+  return pw_yaml_fail (y, node->at, error, "%s has no \"%.60s\"%s", what, node->text,
+                       pw_nearest_text (&near, hint, sizeof hint));
+}
+
+int pw_yaml_keys (const pw_yaml *y, const pw_node *map, int skip, const char *const *key, const char *what,
+                  const pw_node **value, pw_error *error) {
+  if (map->type != PW_YAML_MAP)
+    return pw_yaml_fail (y, map->at, error, "expected a map {KEY: VALUE, ...} for %s, found %s", what,
+                         pw_yaml_found (map));
+  for (int i = 0; key[i]; i++) value[i] = NULL;
+  const pw_node *n = map->first;
+  while (n && skip-- > 0) n = n->next->next;
+  for (; n; n = n->next->next)
+    if (read_key (y, n, key, what, value, error) != PW_OK) return error->status;
+  return PW_OK;
+}
+
+int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, pw_error *error) {
+  if (node->type != PW_YAML_LIST && count >= 0)
+    return pw_yaml_fail (y, node->at, error, "%s: expected a list of %d, found %s", what, count, pw_yaml_found (node));
+  if (node->type != PW_YAML_LIST)
+    return pw_yaml_fail (y, node->at, error, "%s: expected a list, found %s", what, pw_yaml_found (node));
+  if (count >= 0 && node->count != count)
+    return pw_yaml_fail (y, node->at, error, "%s: expected a list of %d, found one of %d", what, count, node->count);
+  return PW_OK;
+}
+
+/* ---- Scalars ---- */
+
+int pw_yaml_text (const pw_yaml *y, const pw_node *node, const char *what, const char **text, pw_error *error) {
+  if (node->type != PW_YAML_SCALAR)
+    return pw_yaml_fail (y, node->at, error, "%s: expected text, found %s", what, pw_yaml_found (node));
+  if (*node->text == 0) return pw_yaml_fail (y, node->at, error, "%s: expected text, found none", what);
+  *text = node->text;
+  return PW_OK;
+}
+
+size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset) {
+  size_t at = node->at + (node->quoted != 0), n = strlen (node->text);
+  return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
+}
+
+int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, pw_expression *x,
+                    double *value, pw_error *error) {
+  pw_expression_trouble trouble;
+  if (node->type != PW_YAML_SCALAR)
+    return pw_yaml_fail (y, node->at, error, "%s: expected a number, found %s", what, pw_yaml_found (node));
+  if (!pw_expression_number (node->text, value)) {
+    if (pw_expression_set (x, node->text, &trouble) != PW_OK)
+      return pw_yaml_fail (y, pw_yaml_place (y, node, trouble.at), error, "%s: %s", what, trouble.text);
+    *value = pw_expression_value (x);
+  }
+  const char *expected = pw_domain_check (domain, *value);
+  if (*expected) return pw_yaml_fail (y, node->at, error, "%s = %g: expected %s", what, *value, expected);
+  return PW_OK;
+}

@@ -1,0 +1,264 @@
+/* Signals in text models.
+ *
+ *   3, "2 * M0"                                    a constant
+ *   {constant: 3}                                  the same
+ *   {harmonic: {amplitude, omega, phase, offset}}  offset + amplitude cos (omega t + phase)
+ *   "M0 * cos (omega * t)"                         an expression of the time t; of states, BODY.phi, for forces
+ *   {expression: .., rate: .., acceleration: ..}   the same for constraints, which need its derivatives by time
+ *
+ * An expression becomes a function signal with evaluators of its own, since a system may run in a thread of its own.  A
+ * system may outlive its model, so they are kept until the file is closed. */
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+#include "yaml.h"
+
+enum { SIGNAL_STATES = 16 };
+
+/* ---- Expressions of time ---- */
+
+typedef struct signal_function {
+  struct signal_function *next;
+  pw_expression *x[3];            /* value, rate, acceleration; NULL: not given */
+  double t;                       /* what the expressions see as t, */
+  double state[SIGNAL_STATES];    /* BODY.phi */
+  char *reads[SIGNAL_STATES + 1]; /* and the like */
+  int states;                     /* so many */
+  double value[];                 /* copies of the parameters, and of what `let` defines */
+} signal_function;
+
+/* All of a file. */
+struct pw_yaml_functions {
+  pthread_mutex_t lock;
+  signal_function *first;
+};
+
+static void signal_free (signal_function *f) {
+  for (int i = 0; f && i < 3; i++) pw_expression_close (f->x[i]);
+  for (int i = 0; f && i < f->states; i++) free (f->reads[i]);
+  free (f);
+}
+
+int pw_yaml_open_functions (pw_yaml *y) {
+  y->functions = calloc (1, sizeof *y->functions);
+  return y->functions && pthread_mutex_init (&y->functions->lock, NULL) == 0 ? PW_OK : PW_MACHINE;
+}
+
+void pw_yaml_free_functions (pw_yaml *y) {
+  if (y->functions == NULL) return;
+  for (signal_function *f = y->functions->first, *next; f; f = next) {
+    next = f->next;
+    signal_free (f);
+  }
+  pthread_mutex_destroy (&y->functions->lock);
+  free (y->functions);
+}
+
+static int signal_eval (void *context, double t, const double *x, double value[3], double *gradient) {
+  signal_function *f = context;
+  f->t = t;
+  for (int i = 0; i < f->states; i++) f->state[i] = x[i];
+  int good = 1;
+  for (int i = 0; i < 3; i++)
+    if (f->x[i]) good &= isfinite (value[i] = pw_expression_value (f->x[i])) != 0;
+  for (int i = 0; gradient && i < f->states; i++) {
+    double h = cbrt (2.2e-16) * fmax (1, fabs (x[i])); /* the truncation and round-off of central differences balance */
+    double up = f->state[i] = x[i] + h, down = x[i] - h;
+    double above = pw_expression_value (f->x[0]);
+    f->state[i] = down;
+    gradient[i] = (above - pw_expression_value (f->x[0])) / (up - down);
+    f->state[i] = x[i];
+  }
+  return good ? 0 : -1;
+}
+
+/* ---- Names in expressions ---- */
+
+static int signal_is_of_time (void *context, const char *name, size_t length, size_t at) {
+  (void)context;
+  (void)at;
+  return (length == 1 && *name == 't') || memchr (name, '.', length) != NULL;
+}
+
+typedef struct {
+  pw_yaml_builder *b;
+  signal_function *f;
+  const pw_node *node;
+  const char *what;
+  int forced;
+  pw_error *error;
+} signal_reader;
+
+static int signal_state_name (signal_reader *r, const char *name, size_t at) {
+  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega", NULL };
+  const pw_yaml *y = r->b->y;
+  char body[100], hint[100];
+  size_t n = strcspn (name, ".");
+  int i = 0;
+  snprintf (body, sizeof body, "%.*s", (int)n, name);
+  if (pw_names_find (&r->b->bodies, body) < 0) {
+    pw_nearest near = { .sought = body };
+    for (int k = 0; k < r->b->m->bodies; k++) pw_nearest_try (&near, r->b->m->body[k].name);
+    return pw_yaml_fail (y, pw_yaml_place (y, r->node, at), r->error, "%s: there is no body \"%s\"%s", r->what, body,
+                         pw_nearest_text (&near, hint, sizeof hint));
+  }
+  while (part[i] && strcmp (part[i], name + n + 1) != 0) i++;
+  if (part[i]) return PW_OK;
+  return pw_yaml_fail (y, pw_yaml_place (y, r->node, at + n + 1), r->error,
+                       "%s: a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"", r->what, name + n + 1);
+}
+
+/* Notes a state the expression reads. */
+static int signal_note (void *context, const char *name, size_t length, size_t at) {
+  signal_reader *r = context;
+  signal_function *f = r->f;
+  char text[100];
+  if (memchr (name, '.', length) == NULL) return PW_OK;
+  snprintf (text, sizeof text, "%.*s", (int)length, name);
+  for (int i = 0; i < f->states; i++)
+    if (strcmp (f->reads[i], text) == 0) return PW_OK;
+  if (!r->forced)
+    return pw_yaml_fail (r->b->y, pw_yaml_place (r->b->y, r->node, at), r->error,
+                         "%s: \"%s\": the signal of a constraint depends on the time t alone", r->what, text);
+  if (signal_state_name (r, text, at) != PW_OK) return r->error->status;
+  if (f->states == SIGNAL_STATES || length >= sizeof text)
+    return pw_yaml_fail (r->b->y, pw_yaml_place (r->b->y, r->node, at), r->error, "%s: more than %d states", r->what,
+                         SIGNAL_STATES);
+  f->reads[f->states] = strdup (text);
+  if (f->reads[f->states] == NULL) return pw_yaml_no_memory (r->b->y, r->error);
+  f->states++;
+  return PW_OK;
+}
+
+/* What an expression may name: the parameters, what `let` defines, the time, states. */
+static int signal_names (const pw_yaml_builder *b, signal_function *f, pw_expression *x) {
+  const pw_yaml *y = b->y;
+  int failed = 0, n = 0;
+  for (int i = 0; i < y->parameters; i++) failed |= pw_expression_name (x, y->parameter[i].name, &f->value[n++]);
+  for (const pw_node *node = y->let ? y->let->first : NULL; node; node = node->next->next)
+    failed |= pw_expression_name (x, node->text, &f->value[n++]);
+  failed |= pw_expression_name (x, "t", &f->t);
+  for (int i = 0; i < f->states; i++) failed |= pw_expression_name (x, f->reads[i], &f->state[i]);
+  return failed ? PW_MACHINE : PW_OK;
+}
+
+static int signal_expression (signal_reader *r, pw_expression **x) {
+  const pw_yaml *y = r->b->y;
+  const char *text;
+  pw_expression_trouble trouble;
+  if (pw_yaml_text (y, r->node, r->what, &text, r->error) != PW_OK ||
+      pw_expression_names (text, signal_note, r) != PW_OK)
+    return r->error->status;
+  *x = pw_expression_open (y->parameters + r->b->lets + 1 + r->f->states);
+  if (*x == NULL || signal_names (r->b, r->f, *x) != PW_OK) return pw_yaml_no_memory (y, r->error);
+  if (pw_expression_set (*x, text, &trouble) != PW_OK)
+    return pw_yaml_fail (y, pw_yaml_place (y, r->node, trouble.at), r->error, "%s: %s", r->what, trouble.text);
+  return PW_OK;
+}
+
+/* ---- Derivatives by time ---- */
+
+static double signal_at (signal_function *f, int i, double t) {
+  f->t = t;
+  return pw_expression_value (f->x[i]);
+}
+
+/* Compares a derivative with differences of what it should be the derivative of, at some times: a wrong formula is off
+ * by about its own size, Richardson's differences at h = 1/1024 s only by h^4 times a fifth derivative and eps / h. */
+static int signal_check (signal_reader *r, int i, const char *name) {
+  static const double time[] = { 0.3, 1.7, 4.1 };
+  const double h = 1.0 / 1024;
+  signal_function *f = r->f;
+  for (int k = 0; k < 3; k++) {
+    double t = time[k], given = signal_at (f, i, t);
+    double near = (signal_at (f, i - 1, t + h) - signal_at (f, i - 1, t - h)) / (2 * h);
+    double far = (signal_at (f, i - 1, t + 2 * h) - signal_at (f, i - 1, t - 2 * h)) / (4 * h);
+    double found = (4 * near - far) / 3, scale = fabs (found) + fabs (given) + fabs (signal_at (f, i - 1, t));
+    if (isfinite (given) && isfinite (found) && fabs (found - given) > 1e-3 * scale)
+      return pw_yaml_fail (r->b->y, r->node->at, r->error, "%s: the %s at t = %g s is %.6g, but differences give %.6g",
+                           r->what, name, t, given, found);
+  }
+  return PW_OK;
+}
+
+/* Reads value, rate and acceleration as far as the kind needs them. */
+static int signal_all (signal_reader *r, const pw_kind *kind, const pw_node *const v[3]) {
+  static const char *const key[] = { "expression", "rate", "acceleration" };
+  int needed = r->forced ? 1 : kind->level == PW_HOLONOMIC ? 3 : 2;
+  for (int i = 0; i < 3; i++) {
+    if (v[i] == NULL && i < needed)
+      return pw_yaml_fail (r->b->y, v[0]->at, r->error,
+                           "%s: a constraint needs the derivatives by time: write {expression: .., rate: ..%s}",
+                           r->what, needed > 2 ? ", acceleration: .." : "");
+    if (v[i] == NULL) continue;
+    r->node = v[i];
+    if (signal_expression (r, &r->f->x[i]) != PW_OK) return r->error->status;
+    if (i > 0 && r->f->x[i - 1] && !r->f->states && signal_check (r, i, key[i]) != PW_OK) return r->error->status;
+  }
+  return PW_OK;
+}
+
+static int signal_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
+                           pw_signal *signal, pw_error *error) {
+  size_t values = (size_t)b->y->parameters + (size_t)b->lets;
+  signal_function *f = calloc (1, sizeof *f + values * sizeof *f->value);
+  if (f == NULL) return pw_yaml_no_memory (b->y, error);
+  memcpy (f->value, b->parameter, (size_t)b->y->parameters * sizeof *f->value);
+  memcpy (f->value + b->y->parameters, b->let, (size_t)b->lets * sizeof *f->value);
+  signal_reader r = { b, f, NULL, what, pw_kind_forced (kind), error };
+  if (signal_all (&r, kind, v) != PW_OK) {
+    signal_free (f);
+    return error->status;
+  }
+  struct pw_yaml_functions *all = b->y->functions;
+  pthread_mutex_lock (&all->lock);
+  f->next = all->first;
+  all->first = f;
+  pthread_mutex_unlock (&all->lock);
+  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f } };
+  if (f->states) signal->function.reads = (const char *const *)f->reads;
+  return PW_OK;
+}
+
+/* ---- The forms of a signal ---- */
+
+static int signal_harmonic (pw_yaml_builder *b, const char *what, const pw_node *node, pw_signal *signal,
+                            pw_error *error) {
+  static const char *const key[] = { "amplitude", "omega", "phase", "offset", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  double *number[] = { &signal->harmonic.amplitude, &signal->harmonic.omega, &signal->harmonic.phase,
+                       &signal->harmonic.offset };
+  char text[240];
+  *signal = (pw_signal){ .type = PW_HARMONIC };
+  if (pw_yaml_keys (b->y, node, 0, key, "a harmonic signal", v, error) != PW_OK) return error->status;
+  for (int i = 0; i < 4; i++) {
+    snprintf (text, sizeof text, "%s: %s", what, key[i]);
+    if (v[i] == NULL && i < 2) return pw_yaml_fail (b->y, node->at, error, "%s is missing", text);
+    if (v[i] && pw_yaml_number (b->y, v[i], text, PW_REAL, b->x, number[i], error) != PW_OK) return error->status;
+  }
+  return PW_OK;
+}
+
+/* {TYPE: ..} */
+static int signal_map (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node,
+                       pw_signal *signal, pw_error *error) {
+  static const char *const key[] = { "constant", "harmonic", "expression", "rate", "acceleration", NULL };
+  const pw_node *v[sizeof key / sizeof *key];
+  if (pw_yaml_keys (b->y, node, 0, key, "a signal", v, error) != PW_OK) return error->status;
+  if ((v[0] != NULL) + (v[1] != NULL) + (v[2] != NULL) != 1)
+    return pw_yaml_fail (b->y, node->at, error, "%s: expected one of constant, harmonic, expression", what);
+  if (v[2] == NULL && (v[3] || v[4]))
+    return pw_yaml_fail (b->y, node->at, error, "%s: a rate or acceleration belongs to an expression", what);
+  if (v[0]) return pw_yaml_number (b->y, v[0], what, PW_REAL, b->x, &signal->constant, error);
+  return v[1] ? signal_harmonic (b, what, v[1], signal, error) : signal_of_time (b, kind, what, v + 2, signal, error);
+}
+
+int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,
+                    pw_error *error) {
+  const pw_node *const v[3] = { node, NULL, NULL };
+  if (node->type == PW_YAML_MAP) return signal_map (b, kind, what, node, signal, error);
+  if (node->type == PW_YAML_SCALAR && pw_expression_names (node->text, signal_is_of_time, NULL))
+    return signal_of_time (b, kind, what, v, signal, error);
+  return pw_yaml_number (b->y, node, what, PW_REAL, b->x, &signal->constant, error);
+}

@@ -1,0 +1,107 @@
+/* The text of a model file, and messages that point into it.
+ *
+ * libfyaml 0.7.12 must not see just anything: some lines that begin with % keep it busy for ever.  So the text is
+ * checked first: its size, UTF-8, no control characters, no such line. */
+#include <errno.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include "yaml.h"
+
+enum { SOURCE_LARGEST = 64 << 20, SOURCE_SHOWN = 90 }; /* bytes of a file; of a line in a message */
+
+/* ---- Messages ---- */
+
+int pw_yaml_line (const pw_yaml *y, size_t at) {
+  int line = 1;
+  for (const char *p = y->source; (p = memchr (p, '\n', (size_t)(y->source + at - p))) != NULL; p++) line++;
+  return line;
+}
+
+/* Characters, not bytes. */
+static int source_count (const char *from, const char *to) {
+  int n = 0;
+  for (; from < to; from++) n += (*from & 0xC0) != 0x80;
+  return n;
+}
+
+/* Long lines are shown around the caret, cut between characters. */
+static void source_window (const pw_yaml *y, size_t at, const char **begin, const char **from, const char **to) {
+  const char *here = y->source + at, *end = y->source + y->size;
+  *begin = here;
+  while (*begin > y->source && (*begin)[-1] != '\n') --*begin;
+  *from = here - *begin > SOURCE_SHOWN / 2 ? here - SOURCE_SHOWN / 2 : *begin;
+  while (*from < here && (**from & 0xC0) == 0x80) ++*from;
+  *to = *from;
+  while (*to < end && **to != '\n' && **to != '\r' && *to - *from < SOURCE_SHOWN) ++*to;
+  while (*to > here && (**to & 0xC0) == 0x80) --*to;
+}
+
+int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *format, ...) {
+  char text[220], shown[SOURCE_SHOWN + 1];
+  const char *begin, *from, *to;
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (text, sizeof text, format, arguments);
+  va_end (arguments);
+  if (at > y->size) at = y->size;
+  source_window (y, at, &begin, &from, &to);
+  snprintf (shown, sizeof shown, "%.*s", (int)(to - from), from);
+  for (char *c = shown; *c; c++)
+    if ((unsigned char)*c < ' ') *c = ' ';
+  size_t n = strlen (y->path);
+  return pw_fail (error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
+                  n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at), 1 + source_count (begin, y->source + at),
+                  text, shown, source_count (from, y->source + at), "");
+}
+
+int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
+  return pw_fail (error, PW_MACHINE, "%s: out of memory", y->path);
+}
+
+/* ---- What is no text ---- */
+
+static int source_check (const pw_yaml *y, pw_error *error) {
+  const unsigned char *begin = (const unsigned char *)y->source, *p = begin, *end = begin + y->size;
+  while (p < end) {
+    size_t at = (size_t)(p - begin);
+    int n = pw_utf8_size (p);
+    if (n == 0) return pw_yaml_fail (y, at, error, "byte %02X is no UTF-8; a model file is text in UTF-8", *p);
+    if ((*p < ' ' && *p != '\t' && *p != '\n' && !(*p == '\r' && p[1] == '\n')) || *p == 0x7F ||
+        (*p == 0xC2 && p[1] < 0xA0))
+      return pw_yaml_fail (y, at, error, "a control character, code %d, does not belong in a model file",
+                           n == 1 ? *p : p[1]);
+    if (*p == '%' && (at == 0 || p[-1] == '\n'))
+      return pw_yaml_fail (y, at, error, "a line of a model file must not begin with %%");
+    p += n;
+  }
+  return PW_OK;
+}
+
+/* ---- Reading ---- */
+
+static int source_slurp (pw_yaml *y, FILE *f, pw_error *error) {
+  size_t room = 1 << 16;
+  y->source = malloc (room + 1);
+  for (size_t n = 1; y->source && n > 0; y->size += n) {
+    if (y->size == room) {
+      char *more = realloc (y->source, (room *= 2) + 1);
+      if (more == NULL) return pw_yaml_no_memory (y, error);
+      y->source = more;
+    }
+    n = fread (y->source + y->size, 1, room - y->size, f);
+    y->source[y->size + n] = 0;
+    if (y->size + n > SOURCE_LARGEST)
+      return pw_fail (error, PW_INPUT, "%s: the file has more than 64 MB, the most a model in YAML may have", y->path);
+  }
+  if (y->source == NULL) return pw_yaml_no_memory (y, error);
+  return ferror (f) ? pw_fail (error, PW_INPUT, "cannot read %s: %s", y->path, strerror (errno)) : PW_OK;
+}
+
+int pw_yaml_read_source (pw_yaml *y, const char *path, pw_error *error) {
+  FILE *f = fopen (path, "rb");
+  if (f == NULL) return pw_fail (error, PW_INPUT, "cannot open the model file %s: %s", y->path, strerror (errno));
+  int status = source_slurp (y, f, error);
+  fclose (f);
+  return status == PW_OK ? source_check (y, error) : status;
+}
