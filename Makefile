@@ -240,7 +240,7 @@ gcc:
 # A library with few kinds, of a copy of the sources whose list is shorter: what it does not have cannot cost anything.
 BASIC       := $(VARIANT)/basic
 BASIC_KINDS := pin wheel torque
-BASIC_COPY   = $(filter-out core/pinwheel.h core/kinds/%,$(wildcard core/*.[ch] solvers/*.[ch])) $(BASIC_KINDS:%=core/kinds/%.c)
+BASIC_COPY   = $(filter-out core/pinwheel.h,$(wildcard core/*.[ch] core/kinds/*.h solvers/*.[ch])) $(BASIC_KINDS:%=core/kinds/%.c)
 
 basic:
 	@mkdir -p $(BASIC)/source/core/kinds $(BASIC)/source/solvers

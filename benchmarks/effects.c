@@ -245,6 +245,17 @@ static void effects_library (const char *program, const char *name, double count
   effects_print ("  the EzyRoller alone", count, NULL);
 }
 
+/* The EzyRoller alone with the library in a folder, which is looked for before any other. */
+static void effects_other_library (const char *program, const char *folder, double count[2]) {
+  const char *others = getenv ("LD_LIBRARY_PATH");
+  char path[8000], before[4000];
+  snprintf (before, sizeof before, "%s", others ? others : "");
+  snprintf (path, sizeof path, "%.3000s:%s", folder, before);
+  setenv ("LD_LIBRARY_PATH", path, 1);
+  effects_library (program, "few kinds", count);
+  others ? setenv ("LD_LIBRARY_PATH", before, 1) : unsetenv ("LD_LIBRARY_PATH");
+}
+
 int main (int argc, char **argv) {
   double all[2], few[2];
   int same = 1;
@@ -253,9 +264,7 @@ int main (int argc, char **argv) {
   printf ("instructions per evaluation, steering with mass and without; difference to the EzyRoller alone\n\n");
   effects_library (argv[0], "all kinds", all);
   if (argc == 2) {
-    setenv ("LD_LIBRARY_PATH", argv[1], 1);
-    effects_library (argv[0], "few kinds", few);
-    unsetenv ("LD_LIBRARY_PATH");
+    effects_other_library (argv[0], argv[1], few);
     same = all[0] == few[0] && all[1] == few[1];
     printf ("%s to the instruction\n", same ? "the same" : "NOT the same");
   }

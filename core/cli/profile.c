@@ -159,13 +159,13 @@ static double profile_time (profile *p, profile_work *work) {
 
 /* ---- Printing ---- */
 
-/* Three digits, in any locale; nothing for what is not there. */
+/* One decimal below 100, in any locale; nothing for what is not there. */
 static void profile_number (FILE *out, int there, double value, int width) {
   char text[40] = "";
   if (there && fabs (value) >= 99.95)
     snprintf (text, sizeof text, "%.0f", value);
   else if (there)
-    pw_format (text, round (10 * value) / 10, 3);
+    snprintf (text, sizeof text, "%d.%d", (int)round (10 * value) / 10, abs ((int)round (10 * value)) % 10);
   fprintf (out, "%*s", width, text);
 }
 
