@@ -75,8 +75,8 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error);
 /* Takes the residuals of the state just accelerated into the statistics. */
 void pw_note_residuals (pw_run *r);
 
-/* What the redundant rows follow from, at the pose J is swept and the saddle factorised at. */
-void pw_rank_coefficients (pw_run *r);
+/* What the i-th redundant row follows from, at the pose J is swept and the saddle factorised at. */
+void pw_rank_coefficients (pw_run *r, int i);
 
 /* ---- Projection ---- */
 

@@ -256,15 +256,13 @@ static double rank_size (const pw_system *s, int row) {
   return s->scale.length;
 }
 
-void pw_rank_coefficients (pw_run *r) {
+void pw_rank_coefficients (pw_run *r, int i) {
   pw_system *s = r->s;
   int m = s->rows, k = r->redundant;
   double *f = r->coefficient + k * m + k * k + k, *nothing = f + s->coords + 3;
   memset (nothing, 0, (size_t)m * sizeof *nothing);
-  for (int i = 0; i < k; i++) {
-    rank_row (s, r->redundant_row[i], f);
-    pw_saddle_solve (r->saddle, f, nothing, f, r->coefficient + i * m);
-  }
+  rank_row (s, r->redundant_row[i], f);
+  pw_saddle_solve (r->saddle, f, nothing, f, r->coefficient + i * m);
 }
 
 /* Solves A x = b, symmetric positive definite k x k, in place (Cholesky). */
@@ -288,7 +286,7 @@ void pw_rank_share (pw_run *r, double *lambda) {
   pw_system *s = r->s;
   int m = s->rows, k = r->redundant;
   if (k == 0) return;
-  pw_rank_coefficients (r);
+  for (int i = 0; i < k; i++) pw_rank_coefficients (r, i);
   double *c = r->coefficient, *A = c + k * m, *z = A + k * k;
   for (int i = 0; i < k; i++) { /* minimise sum ((lambda + N z) / size)^2, N = [e_i - c_i] */
     z[i] = 0;

@@ -322,7 +322,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   if (pw_place (s, r->t, r->q, r->v) != PW_OK) return buffer;
   pw_sweep_J (s);
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
-  pw_rank_coefficients (r);
+  pw_rank_coefficients (r, i);
   const double *c = r->coefficient + i * s->rows;
   char element[120], own[120], before[120] = "";
   pw_row_element (s, row, own, sizeof own);

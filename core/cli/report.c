@@ -1,9 +1,10 @@
 /* What a run says about itself. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "report.h"
 
-enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300 };
+enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300, REPORT_TEXT = 400 };
 
 static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
@@ -26,6 +27,29 @@ void pw_report_start (const pw_system *s, const pw_start_report *start) {
     listed++;
   }
   report_more (stderr, moved - listed, "");
+}
+
+/* ---- Redundant rows ---- */
+
+const char **pw_report_redundancies (pw_run *r) {
+  size_t n = (size_t)pw_run_redundant (r);
+  const char **text = n > 0 ? malloc ((n + 1) * sizeof *text + n * REPORT_TEXT) : NULL;
+  if (text == NULL) return NULL;
+  char *buffer = (char *)(text + n + 1);
+  for (size_t i = 0; i < n; i++) text[i] = pw_run_redundancy (r, (int)i, buffer + i * REPORT_TEXT, REPORT_TEXT);
+  text[n] = NULL;
+  return text;
+}
+
+void pw_report_redundant (const char *const *text) {
+  int n = 0, more = 0;
+  for (; text && *text; text++)
+    if (n++ < REPORT_MOVED)
+      fprintf (stderr, "pinwheel: redundant: %s\n", *text);
+    else
+      more++;
+  report_more (stderr, more, "");
+  if (n > 0) fprintf (stderr, "pinwheel: reactions of redundant constraints are not unique: the smallest are given\n");
 }
 
 /* ---- The end ---- */

@@ -8,6 +8,11 @@
 /* Says on standard error which states the consistent start has moved, if any. */
 void pw_report_start (const pw_system *s, const pw_start_report *start);
 
+/* Copies of what the run says about its redundant rows, ended by NULL, to be freed as one; NULL if there are none, or no
+ * memory.  pw_report_redundant says the first of them on standard error. */
+const char **pw_report_redundancies (pw_run *r);
+void pw_report_redundant (const char *const *text);
+
 /* A table for the eye on standard output: last state, reactions, residuals, energies, cost. */
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,
                     const pw_statistics *statistics);

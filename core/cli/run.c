@@ -4,6 +4,7 @@
  * only the method is on the clock. */
 #include <math.h>
 #include <signal.h>
+#include <stdlib.h>
 #include <string.h>
 #include "cli.h"
 #include "plots.h"
@@ -31,6 +32,7 @@ typedef struct {
   pw_csv *csv;
   pw_plots *plots;
   pw_run *r;
+  const char **redundant; /* what is said about each redundant row; NULL: there are none */
   pw_progress progress;
   /* under way */
   long row;        /* rows written */
@@ -128,6 +130,8 @@ static int run_open (run *x, pw_error *error) {
   x->r = pw_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
   pw_report_start (x->m.system, pw_run_start (x->r));
+  x->redundant = pw_report_redundancies (x->r);
+  pw_report_redundant (x->redundant);
   if (x->csv_output && (x->csv = pw_csv_open (x->m.system, x->energy, x->csv_output, error)) == NULL)
     return error->status;
   return PW_OK;
@@ -235,7 +239,8 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
                          .method = x->method,
                          .status = status[-error->status],
                          .reason = error->text,
-                         .cpu = x->cpu };
+                         .cpu = x->cpu,
+                         .redundant = x->redundant };
   if (error->status == PW_OK && run_stop) {
     char t[32];
     snprintf (reason, size, "interrupted at t = %s s", pw_format (t, pw_time (x->r), 6));
@@ -284,6 +289,7 @@ static int run_finish (run *x, pw_error *error) {
 static void run_close (run *x) {
   pw_plots_close (x->plots);
   if (x->r) pw_close (x->r);
+  free (x->redundant);
   pw_cli_close_model (&x->m);
   pw_cli_close (&x->line);
 }

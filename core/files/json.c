@@ -158,6 +158,18 @@ static void json_sample (json *j, struct fy_node *root, const pw_system *s, cons
     json_add_null (j, root, "energy");
 }
 
+/* A list of texts, empty if there are none. */
+static void json_redundant (json *j, struct fy_node *root, const char *const *text) {
+  struct fy_node *list = fy_node_create_sequence (j->document);
+  json_add (j, root, "redundant", list);
+  for (; text && *text && !j->failed; text++) {
+    struct fy_node *item = json_text (j, *text);
+    if (item && fy_node_sequence_append (list, item) == 0) continue;
+    fy_node_free (item);
+    j->failed = 1;
+  }
+}
+
 static void json_statistics (json *j, struct fy_node *root, const pw_statistics *n, double cpu) {
   if (n == NULL) {
     json_add_null (j, root, "residual");
@@ -203,6 +215,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   json_add_text (&j, root, "status", summary->status);
   json_add_text (&j, root, "reason", summary->reason);
   json_sample (&j, root, s, sample, ledger);
+  json_redundant (&j, root, summary->redundant);
   json_statistics (&j, root, statistics, summary->cpu);
   int status = json_emit (&j, o, error);
   fy_document_destroy (j.document);

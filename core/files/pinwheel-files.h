@@ -77,6 +77,7 @@ typedef struct {
   const char *status; /* "ok", "input", "start", "method", "machine", "interrupted" */
   const char *reason;
   double cpu; /* [s], integration alone */
+  const char *const *redundant; /* what is said about each redundant row, ended by NULL; may be NULL: none */
 } pw_summary;
 
 /* Writes the JSON summary: whatever is not known (model and method too may be NULL) or not finite is null. */
