@@ -114,9 +114,10 @@ int pw_check_element (const pw_model *m, const pw_element *e, const pw_names *bo
   const char *first = NULL;
   for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
     const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, i);
-    if (first && strcmp (first, body) == 0)
-      return pw_fail (error, PW_INPUT, "model %s: %s %s: both of its bodies are \"%s\"", m->name, e->kind->name,
-                      pw_element_name (e), body);
+    for (int n = 0; n < i; n++)
+      if (strcmp (*(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n), body) == 0)
+        return pw_fail (error, PW_INPUT, "model %s: %s %s: %s of its bodies are \"%s\"", m->name, e->kind->name,
+                        pw_element_name (e), e->kind->bodies > 2 ? "two" : "both", body);
     first = body;
   }
   if (e->kind->bodies == 1 && first && strcmp (first, "ground") == 0)

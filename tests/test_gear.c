@@ -1,0 +1,139 @@
+/* gear: a reduction, a planetary set, offsets, what is refused. */
+#include <math.h>
+#include "check.h"
+#include "scene.h"
+#include "trial.h"
+
+#define GEAR_CONSTANT(x) \
+  { PW_CONSTANT, .constant = x }
+
+typedef struct {
+  double ratio, from, offset, held; /* held 1: the ring stands still, else the carrier does */
+} gear_parameters;
+
+static const pw_parameter gear_list[] = {
+  { PW_AT (gear_parameters, ratio), -3, "", "of the speeds", PW_REAL },
+  { PW_AT (gear_parameters, from), 0, "", "where the offset comes from", PW_NONNEGATIVE },
+  { PW_AT (gear_parameters, offset), 0, "rad", "of the gear", PW_REAL },
+  { PW_AT (gear_parameters, held), 0, "", "1: the ring stands still, else the carrier", PW_NONNEGATIVE },
+  { .name = NULL },
+};
+
+static const double gear_I[2] = { 0.2, 1.1 }, gear_T = 0.7;
+
+/* Two bodies that turn on the ground, one driven.  The other is the second gear, or the carrier. */
+static void gear_build (pw_model *m, const void *parameters) {
+  const gear_parameters *p = parameters;
+  pw_add_body (m, &(pw_body){ .name = "in", .mass = 1, .inertia = gear_I[0], .start = { 0, 0, 0.4 } });
+  pw_add_body (m, &(pw_body){ .name = "out", .mass = 1, .inertia = gear_I[1], .start = { 2, 0, -0.3 } });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "in", "ground" } });
+  pw_add_pin (m, &(pw_pin){ .name = "Q", .body = { "out", "ground" }, .at = { { 0, 0 }, { 2, 0 } } });
+  pw_add_gear (m, &(pw_gear){ .name = "gear",
+                              .body = { "in", p->held > 0 ? "ground" : "out", p->held > 0 ? "out" : "ground" },
+                              .ratio = p->ratio,
+                              .from = (int)p->from,
+                              .offset = p->offset });
+  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "in", "ground" }, .value = GEAR_CONSTANT (gear_T) });
+}
+
+static const pw_plugin_table gear_table = { .abi = PW_ABI,
+                                            .size = sizeof gear_table,
+                                            .parameters = gear_list,
+                                            .parameters_size = sizeof (gear_parameters),
+                                            .build = gear_build };
+
+/* phi_in' = i phi_out':  (I_in + I_out / i^2) phi_in'' = T;  with the ring held phi_in' = (1 - i) phi_out' (Willis). */
+static void gear_turn (double ratio, double held) {
+  pw_system *s = scene_system (&gear_table, "ratio", ratio, "held", held, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2, .ledger = 1 });
+  const double bound = 1e5 * CHECK_EPS;
+  const char *reason = "RK4 is exact for parabolas: round-off of 200 steps";
+  double i = held > 0 ? 1 - ratio : ratio, a = gear_T / (gear_I[0] + gear_I[1] / (i * i));
+  check_below ("start", pw_run_start (r)->position, 16 * CHECK_EPS, "the start's own offset");
+  pw_sample x = runs_to (r, 2);
+  check_close ("in", x.q[2], 0.4 + 2 * a, bound, reason);
+  check_close ("out", x.q[5], -0.3 + 2 * a / i, bound, reason);
+  check_close ("rate", x.v[5], 2 * a / i, bound, reason);
+  check_close ("moment", trial_reaction (s, &x, "gear.M"), gear_I[0] * a - gear_T, bound, reason);
+  check_close ("work", x.work, gear_T * 2 * a, bound, reason);
+  check_close ("balance", x.balance, 0, bound, reason);
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_turn (void **state) {
+  (void)state;
+  gear_turn (-3, 0);
+  gear_turn (2.5, 0);
+  gear_turn (-3, 1);
+  gear_turn (2.5, 1);
+}
+
+/* A given offset moves the start; the consistent start moves both bodies. */
+static void test_offset (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&gear_table, "from", (double)PW_GEAR_OFFSET, "offset", 0.25, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2 });
+  const double *q = pw_run_start (r)->q;
+  check_close ("offset", q[2] + 3 * q[5], 0.25, 100 * CHECK_EPS, "the constraint");
+  check_close ("least change", gear_I[0] * (q[2] - 0.4), gear_I[1] * (q[5] + 0.3) / 3, 1e-9,
+               "the change is M^-1 G^T times a number");
+  pw_close (r);
+  pw_free (s);
+}
+
+static void gear_twice (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1 });
+  pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1 });
+  pw_add_gear (m, &(pw_gear){ .name = "gear", .body = { "a", "b", "a" }, .ratio = 2 });
+}
+
+static void test_refused (void **state) {
+  static const pw_plugin_table twice = TRIAL_TABLE (gear_twice);
+  (void)state;
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&gear_table, "ratio", 0.0, NULL);
+  assert_null (pw_compile (m, &error));
+  check_error (&error, PW_INPUT, "model scene: gear gear: ratio = 0: expected another number, positive or negative");
+  pw_model_free (m);
+  error = (pw_error){ 0 };
+  m = scene_model (&twice, NULL);
+  assert_null (pw_compile (m, &error));
+  check_error (&error, PW_INPUT, "model scene: gear gear: two of its bodies are \"a\"");
+  pw_model_free (m);
+}
+
+/* ---- By all methods: a sun, a planet on a carrier, a ring that gives way ---- */
+
+static void gear_planetary (pw_model *m, const void *parameters) {
+  const double sun = 0.3, planet = 0.2, ring = sun + 2 * planet, arm = sun + planet;
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "sun", .mass = 1, .inertia = 0.1 });
+  pw_add_body (m, &(pw_body){ .name = "ring", .mass = 2, .inertia = 0.6, .rate = { 0, 0, 0.5 } });
+  pw_add_body (m, &(pw_body){ .name = "carrier", .mass = 0.5, .inertia = 0.05 });
+  pw_add_body (m, &(pw_body){ .name = "planet", .mass = 0.4, .inertia = 0.01, .start = { arm } });
+  static const char *const name[] = { "sun", "ring", "carrier" }, *const pin[] = { "A", "B", "C" };
+  for (int i = 0; i < 3; i++) pw_add_pin (m, &(pw_pin){ .name = pin[i], .body = { name[i], "ground" } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "planet", "carrier" }, .at = { { 0, 0 }, { arm, 0 } } });
+  pw_add_gear (m, &(pw_gear){ .name = "inner", .body = { "sun", "planet", "carrier" }, .ratio = -planet / sun });
+  pw_add_gear (m, &(pw_gear){ .name = "outer", .body = { "ring", "planet", "carrier" }, .ratio = planet / ring });
+  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "sun", "ring" }, .value = GEAR_CONSTANT (0.3) });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+}
+
+static void test_methods (void **state) {
+  static const pw_plugin_table planetary = TRIAL_TABLE (gear_planetary);
+  (void)state;
+  trial (&planetary, 1.5);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_turn),
+    cmocka_unit_test (test_offset),
+    cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_methods),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
