@@ -59,7 +59,7 @@ static void condense_components (pw_plan *c) {
     for (int i = p->pivots; i < p->rows; i++) {
       if (c->node)
         c->node[c->nodes] = (pw_plan_node){
-          .size = 1, .row = -1, .y = c->k->s->rows + extra++, .gamma = p->gamma + i, .lambda = p->lambda + i
+          .size = 1, .row = PW_PLAN_EXTRA, .y = c->k->s->rows + extra++, .gamma = p->gamma + i, .lambda = p->lambda + i
         };
       for (int g = 0; g < p->groups; g++)
         condense_add_piece (c, p->Z + i * p->cols + p->group_column[g], p->cols, p->group[g],
@@ -94,30 +94,34 @@ static int condense_group (const pw_plan *c, int n) {
   return n < bodies ? 3 * n : n + 2 * bodies;
 }
 
-/* Pairs of nodes that meet in a group; only counted while `pair` is NULL. */
+static void condense_note_pair (pw_plan *c, int *pair, int a, int b) {
+  if (pair) pair[2 * c->pairs] = a, pair[2 * c->pairs + 1] = b;
+  c->pairs++;
+}
+
+/* Pairs of nodes that meet in a group, or with a kept body; only counted while `pair` is NULL. */
 static void condense_pairs (pw_plan *c, int *pair) {
   c->pairs = 0;
   for (int n = 0; n < c->groups; n++) {
-    int j = condense_group (c, n);
-    for (int x = c->start[j]; x < c->start[j + 1]; x++)
-      for (int y = c->start[j]; y < x; y++, c->pairs++) {
-        if (pair == NULL) continue;
-        pair[2 * c->pairs] = c->node_of[c->list[x]];
-        pair[2 * c->pairs + 1] = c->node_of[c->list[y]];
-      }
+    int j = condense_group (c, n), kept = pw_plan_kept (c, j);
+    for (int x = c->start[j]; x < c->start[j + 1]; x++) {
+      int a = c->node_of[c->list[x]];
+      if (kept >= 0) condense_note_pair (c, pair, a, kept);
+      for (int y = c->start[j]; y < x && kept < 0; y++) condense_note_pair (c, pair, a, c->node_of[c->list[y]]);
+    }
   }
 }
 
 static pw_ldl *condense_pattern (pw_plan *c) {
   condense_pairs (c, NULL);
   int *pair = malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair),
-      *size = malloc ((2 * (size_t)c->nodes + 1) * sizeof *size);
+      *size = malloc ((3 * (size_t)c->nodes + 1) * sizeof *size);
   pw_ldl *ldl = NULL;
   if (pair && size) {
-    int *y = size + c->nodes;
+    int *y = size + c->nodes, *rank = y + c->nodes;
     condense_pairs (c, pair);
-    for (int n = 0; n < c->nodes; n++) size[n] = c->node[n].size, y[n] = c->node[n].y;
-    ldl = pw_ldl_open (c->nodes, size, y, c->pairs, pair);
+    for (int n = 0; n < c->nodes; n++) size[n] = c->node[n].size, y[n] = c->node[n].y, rank[n] = c->node[n].rank;
+    ldl = pw_ldl_open (c->nodes, size, y, rank, c->pairs, pair);
   }
   free (pair);
   free (size);
@@ -165,11 +169,66 @@ static int condense_sort_groups (pw_plan *c, const pw_ldl *ldl) {
   return status;
 }
 
+/* ---- Kept bodies ---- */
+
+/* A body where more nodes meet is kept; its weights are to be finite. */
+enum { CONDENSE_MEET = 8 };
+
+static int condense_keeps (const pw_plan *c, int b) {
+  const double *w = c->k->inverse + 3 * b;
+  return c->start[3 * b + 1] - c->start[3 * b] > CONDENSE_MEET && w[0] > 0 && w[1] > 0 && w[2] > 0;
+}
+
+/* Rows that touch kept bodies only come after these. */
+static void condense_rank (pw_plan *c) {
+  for (int n = 0; n < c->nodes - c->keeps; n++) c->node[n].rank = 2;
+  for (int p = 0; p < c->pieces; p++)
+    if (pw_plan_kept (c, c->piece[p].j) < 0) c->node[c->node_of[p]].rank = 0;
+}
+
+/* Adds a node for every body that is kept. */
+static int condense_keep (pw_plan *c) {
+  int bodies = c->k->s->bodies;
+  c->kept = malloc (((size_t)bodies + 1) * sizeof *c->kept);
+  if (c->kept == NULL) return PW_MACHINE;
+  for (int b = 0; b < bodies; b++) c->kept[b] = condense_keeps (c, b) ? c->nodes + c->keeps++ : -1;
+  if (c->keeps == 0) return PW_OK;
+  pw_plan_node *node = realloc (c->node, (size_t)(c->nodes + c->keeps) * sizeof *node);
+  if (node == NULL) return PW_MACHINE;
+  c->node = node;
+  for (int h = 0; h < c->keeps; h++)
+    node[c->nodes++] =
+        (pw_plan_node){ .size = 3, .row = PW_PLAN_KEPT, .rank = 1, .y = c->k->s->rows + c->k->extras + 3 * h };
+  condense_rank (c);
+  return PW_OK;
+}
+
 static int condense_open_large (pw_plan *c) {
   pw_ldl *ldl = condense_pattern (c);
   if (ldl && condense_sort_groups (c, ldl) == PW_OK) return pw_condense_large (c, ldl);
   pw_ldl_close (ldl);
   return PW_MACHINE;
+}
+
+/* Before its kept bodies, a row may follow from others: two legs of a platform that stands on the ground.  Such rows, as
+ * the present pose shows them, come after the bodies. */
+static int condense_try_large (pw_plan *c) {
+  const double follows = 1e-10; /* squared sine */
+  for (int attempt = 0;; attempt++) {
+    int status = condense_open_large (c), n = 0;
+    pw_large *l = c->k->large;
+    if (status != PW_OK || c->keeps == 0 || attempt == 12) return status;
+    pw_large_factor (l);
+    if (l->pivot > follows || l->row < 0) return PW_OK;
+    while (n < c->nodes && !(l->row >= c->node[n].y && l->row < c->node[n].y + c->node[n].size)) n++;
+    if (n == c->nodes || c->node[n].rank != 0) return PW_OK;
+    c->node[n].rank = 2;
+    pw_large_close (l);
+    c->k->large = NULL;
+    free (c->group);
+    free (c->begun);
+    c->group = c->begun = NULL;
+  }
 }
 
 /* ---- A small scene ---- */
@@ -226,7 +285,7 @@ static void condense_open_small (const pw_plan *c, const double *weight, pw_pane
 static pw_panel *condense_take (const pw_plan *c, pw_layout *l, int is_small) {
   struct pw_saddle *k = c->k;
   k->force = pw_take (l, k->reduce.components ? (size_t)k->s->coords + 3 : 0, sizeof *k->force);
-  k->y = pw_take (l, k->extras ? (size_t)(k->s->rows + k->extras) : 0, sizeof *k->y);
+  k->y = pw_take (l, k->more ? (size_t)(k->s->rows + k->more) : 0, sizeof *k->y);
   k->extra = pw_take (l, (size_t)k->extras, sizeof *k->extra);
   k->idle = pw_take (l, (size_t)k->idles, sizeof *k->idle);
   k->small = is_small ? pw_take (l, 1, sizeof *k->small) : NULL;
@@ -238,7 +297,8 @@ static void condense_fill_rows (pw_plan *c, int rows, const unsigned char *activ
   struct pw_saddle *k = c->k;
   int extra = 0, idle = 0;
   for (int n = 0; n < c->nodes; n++)
-    if (c->node[n].row < 0) k->extra[extra++] = (pw_extra){ c->node[n].y, c->node[n].gamma, c->node[n].lambda };
+    if (c->node[n].row == PW_PLAN_EXTRA)
+      k->extra[extra++] = (pw_extra){ c->node[n].y, c->node[n].gamma, c->node[n].lambda };
   for (int i = 0; i < rows; i++)
     if (active && !active[i]) k->idle[idle++] = i;
 }
@@ -247,10 +307,12 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows, const u
   struct pw_saddle *k = c->k;
   for (int n = 0; n < c->nodes; n++) {
     k->unknowns += c->node[n].size;
-    k->extras += c->node[n].row < 0;
+    k->extras += c->node[n].row == PW_PLAN_EXTRA;
   }
   for (int i = 0; i < rows; i++) k->idles += active && !active[i];
   int is_small = k->unknowns <= PW_SMALL && k->s->coords <= CONDENSE_SMALL_COORDS;
+  if (!is_small && condense_keep (c) != PW_OK) return PW_MACHINE;
+  k->more = k->extras + 3 * c->keeps;
   pw_layout l = { NULL, 0 };
   condense_take (c, &l, is_small);
   k->memory = malloc (l.used + 1);
@@ -258,7 +320,7 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows, const u
   l = (pw_layout){ k->memory, 0 };
   pw_panel *panel = condense_take (c, &l, is_small);
   condense_fill_rows (c, rows, active);
-  if (!is_small) return condense_open_large (c);
+  if (!is_small) return condense_try_large (c);
   condense_open_small (c, weight, panel);
   return PW_OK;
 }
@@ -290,5 +352,6 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
   free (c.list);
   free (c.group);
   free (c.begun);
+  free (c.kept);
   return status;
 }

@@ -22,7 +22,8 @@ struct pw_saddle {
   pw_reduce reduce;
   double *inverse; /* coords + 3: 1 / weight; 0 for held ones and those without weight; the ground's 0 */
   double *force;   /* coords + 3: forces changed by `reduce` */
-  double *y;       /* s->rows, then extras: gamma and lambda where there are extras */
+  double *y;       /* s->rows and `more`: gamma and lambda where there are more unknowns than rows */
+  int more;        /* extras, and 3 for each kept body */
   pw_small *small; /* a small scene, */
   pw_small *plain; /* the same, if nothing is to be done before and after */
   pw_large *large; /* or a large one */
@@ -41,6 +42,8 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
 
 /* ---- Planning ---- */
 
+enum { PW_PLAN_EXTRA = -1, PW_PLAN_KEPT = -2 };
+
 /* Columns of a node. */
 typedef struct {
   const double *J;
@@ -49,7 +52,9 @@ typedef struct {
 } pw_plan_piece;
 
 typedef struct {
-  int size, row;          /* rows; the first global one, or -1: a row of a component */
+  int size;               /* rows */
+  int row;                /* the first global one; PW_PLAN_EXTRA: a row of a component; PW_PLAN_KEPT: a kept body */
+  int rank;               /* order of elimination */
   int y;                  /* in the right-hand side */
   double *gamma, *lambda; /* of a row of a component */
 } pw_plan_node;
@@ -65,7 +70,9 @@ typedef struct {
   int groups;        /* bodies, then own coordinates */
   int *group;        /* their first coordinates, in the order in which they are needed */
   int *begun;        /* the first column whose elimination changes a column */
-  long pairs;        /* of pieces in the same group */
+  int *kept;         /* bodies: the node of one that is kept, or -1 */
+  int keeps;
+  long pairs; /* of nodes that meet */
 } pw_plan;
 
 /* 3 columns of a body, 1 of an own coordinate. */
@@ -75,6 +82,11 @@ static inline int pw_plan_width (const pw_plan *c, int j) {
 
 /* The first column whose elimination changes what a group assembles: that has to be done by then. */
 int pw_plan_column (const pw_plan *c, const pw_ldl *ldl, int j);
+
+/* The node of a kept body, or -1. */
+static inline int pw_plan_kept (const pw_plan *c, int j) {
+  return j < 3 * c->k->s->bodies ? c->kept[j / 3] : -1;
+}
 
 /* Makes k->large; the pattern becomes its own.  Errors: PW_MACHINE. */
 int pw_condense_large (pw_plan *c, pw_ldl *ldl);

@@ -29,12 +29,28 @@ static pw_piece condense_piece_at (condense_large *g, int index) {
   const pw_plan_piece *x = &c->piece[index];
   const pw_plan_node *n = &c->node[c->node_of[index]];
   int D = g->large->ldl->column[g->large->ldl->place[c->node_of[index]]].at;
-  return (pw_piece){ .J = (int)(x->J - g->large->base[n->row < 0]),
+  return (pw_piece){ .J = (int)(x->J - g->large->base[n->row == PW_PLAN_EXTRA]),
                      .y = n->y,
                      .D = condense_once (g, D),
                      .step = (short)(n->size > 1 ? x->step : 0),
                      .size = (unsigned char)n->size,
-                     .other = n->row < 0 };
+                     .other = n->row == PW_PLAN_EXTRA };
+}
+
+/* Fills the patch of a kept body: the pieces of the rows, then its own. */
+static void condense_kept (condense_large *g, int kept, pw_patch *p, int *piece, int *block) {
+  const pw_plan *c = g->c;
+  const pw_ldl *ldl = g->large->ldl;
+  int own = ldl->place[kept];
+  for (int x = c->start[p->j]; x < c->start[p->j + 1]; x++) {
+    int place = ldl->place[c->node_of[c->list[x]]];
+    g->large->piece[(*piece)++] = condense_piece_at (g, c->list[x]);
+    g->large->block[(*block)++] =
+        condense_once (g, place < own ? pw_ldl_find (ldl, own, place) : pw_ldl_find (ldl, place, own));
+  }
+  g->large->piece[(*piece)++] =
+      (pw_piece){ .y = c->node[kept].y, .D = condense_once (g, ldl->column[own].at), .size = 3 };
+  p->shape = PW_KEPT;
 }
 
 /* Fills a patch; *piece and *block count. */
@@ -46,6 +62,10 @@ static void condense_patch (condense_large *g, int j, pw_patch *p, int *piece, i
   pw_piece *first = g->large->piece + *piece;
   *p = (pw_patch){ .j = j, .first = *piece, .block = *block, .width = (unsigned char)pw_plan_width (c, j) };
   p->column = pw_plan_column (c, ldl, j);
+  if (pw_plan_kept (c, j) >= 0) {
+    condense_kept (g, pw_plan_kept (c, j), p, piece, block);
+    return;
+  }
   *piece += count;
   for (int a = 0; a < count; a++) {
     first[a] = condense_piece_at (g, list[a]);
@@ -105,7 +125,7 @@ static int condense_fill_large (pw_plan *c, pw_large *l) {
 
 static void condense_take_large (const pw_plan *c, pw_layout *l, pw_large *large) {
   large->patch = pw_take (l, (size_t)c->groups + 1, sizeof *large->patch);
-  large->piece = pw_take (l, (size_t)c->pieces, sizeof *large->piece);
+  large->piece = pw_take (l, (size_t)(c->pieces + c->keeps), sizeof *large->piece);
   large->block = pw_take (l, (size_t)c->pairs, sizeof *large->block);
 }
 

@@ -177,9 +177,36 @@ static void large_piece_any (const pw_large *l, const pw_patch *p, const pw_piec
   }
 }
 
+/* A body that is kept: its mass, its columns of J, and what later rows would have on the diagonal if it were not. */
+static void large_keep (const pw_large *l, const pw_patch *p, const double *f, double *y, int what) {
+  const pw_piece *own = l->piece + p[1].first - 1;
+  const double *w = l->inverse + p->j;
+  const int *block = l->block + p->block;
+  for (int n = 0; n < 3 && (what & LARGE_RIGHT); n++) y[own->y + n] += f[p->j + n];
+  if (!(what & LARGE_MATRIX)) return;
+  double *value = l->ldl->value, *D = large_at (value, own->D);
+  for (int i = 0, at = 0; i < 3; i++)
+    for (int q = 0; q <= i; q++) D[at++] = q < i ? 0 : -1 / w[i];
+  for (int n = 0; n < 3; n++) D[6 + n] = -1 / w[n];
+  for (const pw_piece *a = l->piece + p->first; a < own; a++, block++) {
+    const double *A = large_J (l, a);
+    double *K = large_at (value, *block), *T = large_at (value, a->D), *was = T + pw_ldl_triangle (a->size);
+    int later = T > D;
+    for (int i = 0; i < a->size; i++)
+      for (int n = 0; n < 3; n++) K[later ? 3 * i + n : a->size * n + i] = A[i * a->step + n];
+    if (a->D < 0) memset (T, 0, (size_t)(pw_ldl_triangle (a->size) + a->size) * sizeof *T);
+    for (int i = 0; i < a->size && later; i++)
+      for (int n = 0; n < 3; n++) was[i] += A[i * a->step + n] * w[n] * A[i * a->step + n];
+  }
+}
+
 static inline void large_patch (const pw_large *l, const pw_patch *p, const double *f, double *y, int what) {
   if (p->shape == PW_LINK) {
     large_link (l, p, f, y, what);
+    return;
+  }
+  if (p->shape == PW_KEPT) {
+    large_keep (l, p, f, y, what);
     return;
   }
   const int *block = l->block + p->block;
@@ -315,9 +342,11 @@ static void large_invert_any (pw_large *l, const pw_column *c) {
   double a = D[0], b = D[1], c1 = D[2], d = D[3], e = D[4], g = D[5];
   double A = c1 * g - e * e, B = d * e - b * g, C = b * e - c1 * d, minor = a * c1 - b * b;
   double determinant = a * A + b * B + d * C, f = 1 / determinant;
-  large_judge (l, a, D[6], c->y);
-  large_judge (l, minor, a * D[7], c->y + 1);
-  large_judge (l, determinant, minor * D[8], c->y + 2);
+  if (D[6] > 0) { /* not a body: those are negative */
+    large_judge (l, a, D[6], c->y);
+    large_judge (l, minor, a * D[7], c->y + 1);
+    large_judge (l, determinant, minor * D[8], c->y + 2);
+  }
   D[0] = A * f, D[1] = B * f, D[2] = (a * g - d * d) * f, D[3] = C * f, D[4] = (b * d - a * e) * f, D[5] = minor * f;
 }
 
@@ -470,6 +499,8 @@ static inline void large_accelerate (const pw_large *l, const pw_patch *p, const
 }
 
 static void large_accelerate_any (const pw_large *l, const pw_patch *p, const double *f, const double *y, double *a) {
+  for (int n = 0; n < 3 && p->shape == PW_KEPT; n++) a[p->j + n] = -y[l->piece[p[1].first - 1].y + n];
+  if (p->shape == PW_KEPT) return;
   for (int n = 0; n < p->width; n++) {
     double force = f ? f[p->j + n] : 0;
     for (const pw_piece *x = l->piece + p->first; x < l->piece + p[1].first; x++)
@@ -489,7 +520,7 @@ static void large_up (const pw_large *l, const double *f, double *y, double *a) 
   for (const pw_patch *p = l->patch; p < l->patch + l->patches; p++)
     if (p->shape == PW_LINK)
       large_accelerate_link (l, p, f, y, a);
-    else if (p->shape == PW_ANY)
+    else if (p->shape != PW_SHORT)
       large_accelerate_any (l, p, f, y, a);
     else
       large_accelerate (l, p, f, y, a);

@@ -1,7 +1,16 @@
 /* Large scenes: the condensed matrix is sparse, assembled body by body and factorised column by column in one pass.
  *
  * A patch is what meets at a body (or an own coordinate): the pieces of the constraint rows that touch it, a piece being
- * the columns there of one node of the factorisation.  Any two pieces of a patch give a block of S = J W^-1 J^T. */
+ * the columns there of one node of the factorisation.  Any two pieces of a patch give a block of S = J W^-1 J^T.
+ *
+ * Where very many nodes meet at a body, S would become dense.  The body is kept instead: its accelerations a_k are
+ * unknowns too,
+ *
+ *     [ S    J_k ] [ lambda ]   [ J W^-1 f - gamma ]
+ *     [ J_k^T -M ] [ -a_k   ] = [ f_k              ]      with S of all other bodies,
+ *
+ * quasi-definite, so that L D L^T goes without pivoting (Vanderbei 1995), with the node of -a_k after its rows, and
+ * rows that touch nothing but kept bodies after that.  Its patch has the node itself as its last piece. */
 #ifndef PW_LARGE_H
 #define PW_LARGE_H
 

@@ -56,13 +56,34 @@ static void ldl_lists_close (ldl_lists *l) {
   l->first = l->list = NULL;
 }
 
-/* Minimum degree order of the nodes' graph. */
-static int ldl_order (int nodes, long pairs, const int *pair, int *order) {
+/* Puts higher ranks later, without changing the order otherwise; place: of each node. */
+static int ldl_sort_ranks (int nodes, const int *rank, int *order, int *place) {
+  int at = 0, *old = malloc (((size_t)nodes + 1) * sizeof *old);
+  if (old == NULL) return PW_MACHINE;
+  memcpy (old, order, (size_t)nodes * sizeof *old);
+  for (int r = 0; r < PW_LDL_RANKS; r++)
+    for (int j = 0; j < nodes; j++)
+      if (rank[old[j]] == r) order[place[old[j]] = at++] = old[j];
+  free (old);
+  return PW_OK;
+}
+
+/* Minimum degree order of the graph of the nodes of rank 0. */
+static int ldl_order (int nodes, const int *rank, long pairs, const int *pair, int *order) {
   ldl_lists graph = { NULL, NULL };
-  int status = ldl_collect (nodes, pairs, pair, NULL, 0, &graph);
+  int *inner = malloc ((size_t)(2 * pairs + 1) * sizeof *inner);
+  if (inner == NULL) return PW_MACHINE;
+  long inners = 0;
+  for (long i = 0; i < pairs; i++) {
+    if (rank[pair[2 * i]] > 0 || rank[pair[2 * i + 1]] > 0) continue;
+    inner[2 * inners] = pair[2 * i];
+    inner[2 * inners++ + 1] = pair[2 * i + 1];
+  }
+  int status = ldl_collect (nodes, inners, inner, NULL, 0, &graph);
   if (status == PW_OK && nodes > 0 && amd_order (nodes, graph.first, graph.list, order, NULL, NULL) < 0)
     status = PW_MACHINE;
   ldl_lists_close (&graph);
+  free (inner);
   return status;
 }
 
@@ -125,27 +146,38 @@ static int ldl_fill (int nodes, const ldl_lists *K, int most, ldl_lists *L) {
   return status;
 }
 
-/* Orders: numbers the columns in `place` and lists the rows of each. */
-static int ldl_plan (int nodes, long pairs, const int *pair, int *order, int *place, ldl_lists *L) {
-  ldl_lists K = { NULL, NULL }, natural = { NULL, NULL };
-  int status = ldl_order (nodes, pairs, pair, order);
-  for (int j = 0; j < nodes && status == PW_OK; j++) place[order[j]] = j;
+/* Orders by rank, else as it is or by minimum degree, and lists the rows of each column in L.  PW_RETRY if there are
+ * more than `most` blocks. */
+static int ldl_try (int nodes, const int *rank, long pairs, const int *pair, int most, int *order, int *place,
+                    ldl_lists *L) {
+  ldl_lists K = { NULL, NULL };
+  int status = ldl_sort_ranks (nodes, rank, order, place);
   if (status == PW_OK) status = ldl_collect (nodes, pairs, pair, place, 1, &K);
-  if (status == PW_OK) status = ldl_fill (nodes, &K, INT_MAX, L);
+  if (status == PW_OK) status = ldl_fill (nodes, &K, most, L);
   ldl_lists_close (&K);
-  if (status == PW_OK) status = ldl_collect (nodes, pairs, pair, NULL, 1, &K);
+  return status;
+}
+
+/* The better one of both orders. */
+static int ldl_plan (int nodes, const int *rank, long pairs, const int *pair, int *order, int *place, ldl_lists *L) {
+  ldl_lists natural = { NULL, NULL };
+  int *other = malloc ((2 * (size_t)nodes + 1) * sizeof *other);
+  int status = other ? ldl_order (nodes, rank, pairs, pair, order) : PW_MACHINE;
+  if (status == PW_OK) status = ldl_try (nodes, rank, pairs, pair, INT_MAX, order, place, L);
+  for (int j = 0; j < nodes && status == PW_OK; j++) other[j] = j;
   if (status == PW_OK) {
-    status = ldl_fill (nodes, &K, L->first[nodes], &natural);
+    status = ldl_try (nodes, rank, pairs, pair, L->first[nodes], other, other + nodes, &natural);
     if (status == PW_OK) {
-      for (int j = 0; j < nodes; j++) order[j] = place[j] = j;
-      ldl_lists_close (L);
+      ldl_lists worse = *L;
       *L = natural;
-      natural = (ldl_lists){ NULL, NULL };
-    }
-    if (status == PW_RETRY) status = PW_OK;
+      natural = worse;
+      memcpy (order, other, (size_t)nodes * sizeof *order);
+      memcpy (place, other + nodes, (size_t)nodes * sizeof *place);
+    } else if (status == PW_RETRY)
+      status = PW_OK;
   }
   ldl_lists_close (&natural);
-  ldl_lists_close (&K);
+  free (other);
   return status;
 }
 
@@ -231,12 +263,12 @@ static int ldl_lay_out (pw_ldl *l, const int *size, const int *y, const int *ord
   return l->value ? PW_OK : PW_MACHINE;
 }
 
-pw_ldl *pw_ldl_open (int nodes, const int *size, const int *y, long pairs, const int *pair) {
+pw_ldl *pw_ldl_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair) {
   pw_ldl *l = calloc (1, sizeof *l);
   int *order = malloc (((size_t)nodes + 1) * sizeof *order);
   ldl_lists L = { NULL, NULL };
   if (l) l->place = malloc (((size_t)nodes + 1) * sizeof *l->place);
-  int status = l && order && l->place ? ldl_plan (nodes, pairs, pair, order, l->place, &L) : PW_MACHINE;
+  int status = l && order && l->place ? ldl_plan (nodes, rank, pairs, pair, order, l->place, &L) : PW_MACHINE;
   if (status == PW_OK) {
     l->nodes = nodes;
     status = ldl_lay_out (l, size, y, order, &L);

@@ -8,11 +8,12 @@
 
 #include "pinwheel.h"
 
-enum { PW_LDL_NODE = 3 }; /* most unknowns in a node */
+enum { PW_LDL_NODE = 3, PW_LDL_RANKS = 3 }; /* most unknowns in a node; ranks */
 
 /* Which code is made for a column, or for what meets at a body: PW_LINK as in a chain, where there is one row of 2 below
- * a column of 2 unknowns, two pins at a body; PW_SHORT where no node has more than 2; PW_ANY what is left. */
-typedef enum { PW_ANY, PW_SHORT, PW_LINK } pw_shape;
+ * a column of 2 unknowns, two pins at a body; PW_SHORT where no node has more than 2; PW_KEPT where the body
+ * is an unknown itself; PW_ANY what is left. */
+typedef enum { PW_ANY, PW_SHORT, PW_LINK, PW_KEPT } pw_shape;
 
 /* A node, in the order of elimination. */
 typedef struct {
@@ -34,11 +35,12 @@ typedef struct {
   char *memory;
 } pw_ldl;
 
-/* nodes: how many; size: unknowns of each; y: where they are in the right-hand side; pair: 2 x pairs node numbers with
+/* nodes: how many; size: unknowns of each; y: where they are in the right-hand side; rank: those of a
+ * higher one come later; pair: 2 x pairs node numbers with
  * a block between them, each unordered pair any number of times, the diagonal not needed.  The order is that of the
  * nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff 1996).
  * NULL if memory is out or there are 2^31 values or more. */
-pw_ldl *pw_ldl_open (int nodes, const int *size, const int *y, long pairs, const int *pair);
+pw_ldl *pw_ldl_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair);
 void pw_ldl_close (pw_ldl *l);
 
 /* Where the block of columns p > q is, rows those of p. */

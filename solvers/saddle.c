@@ -93,16 +93,17 @@ double pw_saddle_pivot (const pw_saddle *k, int *row) {
 
 /* ---- Solving ---- */
 
-/* Where rows of components take part, gamma and lambda are copies with these at the end. */
+/* Where rows of components or kept bodies take part, gamma and lambda are copies with these at the end. */
 static inline const double *saddle_gamma (pw_saddle *k, const double *gamma) {
-  if (k->extras == 0) return gamma;
+  if (k->more == 0) return gamma;
   for (int i = 0; i < k->rows; i++) k->y[i] = gamma[i];
+  for (int i = k->s->rows; i < k->s->rows + k->more; i++) k->y[i] = 0;
   for (const pw_extra *x = k->extra; x < k->extra + k->extras; x++) k->y[x->y] = *x->gamma;
   return k->y;
 }
 
 static inline void saddle_finish (pw_saddle *k, double *a, double *lambda) {
-  for (int i = 0; k->extras && i < k->rows; i++) lambda[i] = k->y[i];
+  for (int i = 0; k->more && i < k->rows; i++) lambda[i] = k->y[i];
   for (const pw_extra *x = k->extra; x < k->extra + k->extras; x++) *x->lambda = k->y[x->y];
   for (int i = 0; i < k->idles; i++) lambda[k->idle[i]] = 0;
   if (k->reduce.components) pw_reduce_backward (&k->reduce, a, lambda);
@@ -112,7 +113,7 @@ static inline void saddle_finish (pw_saddle *k, double *a, double *lambda) {
 static inline int saddle_large (pw_saddle *k, int fresh, const double *f, const double *gamma, double *a,
                                 double *lambda) {
   for (int i = 0; i < k->rows; i++) lambda[i] = -gamma[i];
-  for (int i = k->s->rows; i < k->s->rows + k->extras; i++) lambda[i] = -gamma[i];
+  for (int i = k->s->rows; i < k->s->rows + k->more; i++) lambda[i] = -gamma[i];
   if (fresh)
     pw_large_both (k->large, f, lambda, a);
   else
@@ -123,7 +124,7 @@ static inline int saddle_large (pw_saddle *k, int fresh, const double *f, const 
 /* Solves, and factorises before that if `fresh`. */
 static inline int saddle_solve (pw_saddle *k, int fresh, const double *f, const double *gamma, double *a,
                                 double *lambda) {
-  double *force = k->force, *l = k->extras ? k->y : lambda;
+  double *force = k->force, *l = k->more ? k->y : lambda;
   if (fresh && saddle_begin (k) != PW_OK) return PW_RETRY;
   if (k->reduce.components) {
     if (f)
