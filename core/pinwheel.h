@@ -39,7 +39,8 @@ typedef enum {
 /* A caller-owned error: the first failure is kept, later ones do not overwrite it. */
 typedef struct {
   int status;     /* a pw_status; 0: no error so far */
-  char text[500]; /* one line without a full stop: what was found, what was expected, the nearest valid name */
+  char text[500]; /* one line without a full stop: what was found, what was expected, the nearest valid name; for a text
+                     model "FILE:LINE:COLUMN: error: " before it, and the line with a caret below as two further lines */
 } pw_error;
 
 /* Records a failure and returns its status.  A NULL error is allowed; an error already set stays. */

@@ -95,7 +95,8 @@ int pw_cli_matrices (const pw_cli_model *m, double t, pw_error *error);
 
 /* ---- The end ---- */
 
-/* Prints an error, if there is one, as "pinwheel: TEXT" on standard error; returns the exit status. */
+/* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, or as it is if it names a place in a file;
+ * returns the exit status. */
 int pw_cli_end (const pw_error *error);
 
 #endif

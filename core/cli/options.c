@@ -170,6 +170,7 @@ pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {
 int pw_cli_end (const pw_error *error) {
   if (error->status == PW_OK) return 0;
   fflush (stdout);
-  fprintf (stderr, "pinwheel: %s\n", error->text);
+  int placed = strstr (error->text, ": error: ") != NULL; /* as compilers say it, so that editors find the place */
+  fprintf (stderr, "%s%s\n", placed ? "" : "pinwheel: ", error->text);
   return -error->status;
 }

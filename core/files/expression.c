@@ -19,6 +19,10 @@ struct pw_expression {
   int names, room;
   const char **name;
   pw_names table;
+  struct {
+    const char *text; /* NULL: nothing is kept here */
+    double value;
+  } kept[256]; /* by a hash of the text */
 };
 
 /* ---- What there is ---- */
@@ -310,4 +314,17 @@ int pw_expression_set (pw_expression *x, const char *text, pw_expression_trouble
 
 double pw_expression_value (pw_expression *x) {
   return mupEval (x->parser);
+}
+
+int pw_expression_fixed (pw_expression *x, const char *text, double *value, pw_expression_trouble *trouble) {
+  unsigned h = 0;
+  for (const char *p = text; *p; p++) h = 31 * h + (unsigned char)*p;
+  h = (h ^ h >> 8 ^ h >> 16) & 255;
+  if (x->kept[h].text == NULL || strcmp (x->kept[h].text, text) != 0) {
+    if (pw_expression_set (x, text, trouble) != PW_OK) return PW_INPUT;
+    x->kept[h].text = text;
+    x->kept[h].value = pw_expression_value (x);
+  }
+  *value = x->kept[h].value;
+  return PW_OK;
 }

@@ -31,6 +31,10 @@ int pw_expression_set (pw_expression *x, const char *text, pw_expression_trouble
 /* The value of the expression taken last, which may be non-finite. */
 double pw_expression_value (pw_expression *x);
 
+/* The value of an expression over names whose values never change: a text that comes again is not evaluated again.  The
+ * text must stay. */
+int pw_expression_fixed (pw_expression *x, const char *text, double *value, pw_expression_trouble *trouble);
+
 /* Whether a text can be a name: a letter or _, then letters, digits and _; neither a function nor a constant. */
 int pw_expression_is_name (const char *text);
 /* Whether functions or constants have this name. */

@@ -88,6 +88,9 @@ int pw_yaml_text (const pw_yaml *y, const pw_node *node, const char *what, const
 int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, pw_expression *x,
                     double *value, pw_error *error);
 
+/* Whether an expression depends on the time t or a state, BODY.phi, and where (at may be NULL). */
+int pw_yaml_moves (const char *text, size_t *at);
+
 /* Where an offset into a scalar's text is in the source. */
 size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
 

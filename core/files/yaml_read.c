@@ -68,16 +68,33 @@ size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset) {
   return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
 }
 
+static int read_moves (void *context, const char *name, size_t length, size_t at) {
+  if ((length != 1 || *name != 't') && memchr (name, '.', length) == NULL) return 0;
+  if (context) *(size_t *)context = at;
+  return 1;
+}
+
+int pw_yaml_moves (const char *text, size_t *at) {
+  return pw_expression_names (text, read_moves, at);
+}
+
+/* Says why an expression is no number. */
+static int read_trouble (const pw_yaml *y, const pw_node *node, const char *what, const pw_expression_trouble *trouble,
+                         pw_error *error) {
+  size_t at;
+  if (pw_yaml_moves (node->text, &at) && at == trouble->at)
+    return pw_yaml_fail (y, pw_yaml_place (y, node, at), error,
+                         "%s: only the value of a signal may depend on the time t or on states", what);
+  return pw_yaml_fail (y, pw_yaml_place (y, node, trouble->at), error, "%s: %s", what, trouble->text);
+}
+
 int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, pw_expression *x,
                     double *value, pw_error *error) {
   pw_expression_trouble trouble;
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (y, node->at, error, "%s: expected a number, found %s", what, pw_yaml_found (node));
-  if (!pw_expression_number (node->text, value)) {
-    if (pw_expression_set (x, node->text, &trouble) != PW_OK)
-      return pw_yaml_fail (y, pw_yaml_place (y, node, trouble.at), error, "%s: %s", what, trouble.text);
-    *value = pw_expression_value (x);
-  }
+  if (!pw_expression_number (node->text, value) && pw_expression_fixed (x, node->text, value, &trouble) != PW_OK)
+    return read_trouble (y, node, what, &trouble, error);
   const char *expected = pw_domain_check (domain, *value);
   if (*expected) return pw_yaml_fail (y, node->at, error, "%s = %g: expected %s", what, *value, expected);
   return PW_OK;

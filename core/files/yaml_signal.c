@@ -75,12 +75,6 @@ static int signal_eval (void *context, double t, const double *x, double value[3
 
 /* ---- Names in expressions ---- */
 
-static int signal_is_of_time (void *context, const char *name, size_t length, size_t at) {
-  (void)context;
-  (void)at;
-  return (length == 1 && *name == 't') || memchr (name, '.', length) != NULL;
-}
-
 typedef struct {
   pw_yaml_builder *b;
   signal_function *f;
@@ -258,7 +252,7 @@ int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, c
                     pw_error *error) {
   const pw_node *const v[3] = { node, NULL, NULL };
   if (node->type == PW_YAML_MAP) return signal_map (b, kind, what, node, signal, error);
-  if (node->type == PW_YAML_SCALAR && pw_expression_names (node->text, signal_is_of_time, NULL))
+  if (node->type == PW_YAML_SCALAR && pw_yaml_moves (node->text, NULL))
     return signal_of_time (b, kind, what, v, signal, error);
   return pw_yaml_number (b->y, node, what, PW_REAL, b->x, &signal->constant, error);
 }

@@ -37,6 +37,15 @@ static void source_window (const pw_yaml *y, size_t at, const char **begin, cons
   while (*to > here && (**to & 0xC0) == 0x80) --*to;
 }
 
+/* What is no text is shown as ? and a blank. */
+static void source_clean (char *text) {
+  for (int n; *text; text += n) {
+    n = pw_utf8_size ((unsigned char *)text);
+    if (n == 0 || (unsigned char)*text < ' ') *text = n ? ' ' : '?';
+    if (n == 0) n = 1;
+  }
+}
+
 int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *format, ...) {
   char text[220], shown[SOURCE_SHOWN + 1];
   const char *begin, *from, *to;
@@ -47,8 +56,7 @@ int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *form
   if (at > y->size) at = y->size;
   source_window (y, at, &begin, &from, &to);
   snprintf (shown, sizeof shown, "%.*s", (int)(to - from), from);
-  for (char *c = shown; *c; c++)
-    if ((unsigned char)*c < ' ') *c = ' ';
+  source_clean (shown);
   size_t n = strlen (y->path);
   return pw_fail (error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
                   n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at), 1 + source_count (begin, y->source + at),

@@ -1,0 +1,133 @@
+/* Text models that are wrong: each file in tests/bad-models/ begins with a comment that says what it is told,
+ * "# LINE:COLUMN: TEXT"; a caret below its own line points to the column.  Run from the top folder. */
+#define _GNU_SOURCE /* mkstemps */
+#include <dirent.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "check.h"
+#include "pinwheel-files.h"
+
+#define BAD_FOLDER "tests/bad-models"
+
+/* Opens, builds and compiles as the program does. */
+static pw_error bad_open (const char *path) {
+  pw_error error = { 0 };
+  pw_file *f = pw_file_open (path, &error);
+  pw_model *m = f ? pw_file_model (f, &error) : NULL;
+  if (m && pw_build (m, &error) == PW_OK) pw_free (pw_compile (m, &error));
+  pw_model_free (m);
+  pw_file_close (f);
+  return error;
+}
+
+/* The caret's column, counted in characters, and that of the message agree as far as the line is shown from its
+ * beginning. */
+static void bad_caret (const char *path, const char *text, int column) {
+  const char *line = strchr (text, '\n'), *caret = line ? strchr (line + 1, '\n') : NULL;
+  assert_non_null (caret);
+  int at = (int)strlen (caret + 1) - 2;
+  assert_int_equal (caret[strlen (caret) - 1], '^');
+  if (column < 45 && at != column) print_error ("%s: the caret is below column %d\n", path, at);
+  if (column < 45) assert_int_equal (at, column);
+}
+
+/* Returns 1 if the file is told something else. */
+static int bad_file (const char *path) {
+  char first[600], expected[800];
+  FILE *f = fopen (path, "r");
+  assert_non_null (f);
+  assert_non_null (fgets (first, sizeof first, f));
+  fclose (f);
+  first[strcspn (first, "\n")] = 0;
+  pw_error error = bad_open (path);
+  int line = 0, column = 0, text = 0;
+  if (sscanf (first, "# %d:%d: %n", &line, &column, &text) != 2 || text == 0) {
+    print_error ("%s does not say what is expected\n", path);
+    return 1;
+  }
+  snprintf (expected, sizeof expected, "%s:%d:%d: error: %s\n", path, line, column, first + text);
+  if (error.status != PW_INPUT || strncmp (error.text, expected, strlen (expected)) != 0) {
+    print_error ("%s\nis told with status %d:\n%s\nexpected:\n%s", path, error.status, error.text, expected);
+    return 1;
+  }
+  bad_caret (path, error.text, column);
+  return 0;
+}
+
+static void test_bad_models (void **state) {
+  int files = 0, failed = 0;
+  struct dirent *entry;
+  DIR *d = opendir (BAD_FOLDER);
+  (void)state;
+  assert_non_null (d);
+  while ((entry = readdir (d)) != NULL) {
+    char path[300];
+    if (strstr (entry->d_name, ".yaml") == NULL) continue;
+    snprintf (path, sizeof path, BAD_FOLDER "/%s", entry->d_name);
+    failed += bad_file (path);
+    files++;
+  }
+  closedir (d);
+  assert_int_equal (failed, 0);
+  assert_true (files >= 30);
+}
+
+/* ---- Damage ---- */
+
+static char bad_path[] = "/tmp/pinwheel-bad-XXXXXX.yaml";
+
+static int bad_setup (void **state) {
+  (void)state;
+  int file = mkstemps (bad_path, 5);
+  return file < 0 ? -1 : close (file);
+}
+
+static int bad_teardown (void **state) {
+  (void)state;
+  return remove (bad_path);
+}
+
+static void bad_write (const char *text, size_t size) {
+  FILE *f = fopen (bad_path, "wb");
+  assert_non_null (f);
+  assert_int_equal (fwrite (text, 1, size, f), size);
+  assert_int_equal (fclose (f), 0);
+}
+
+/* A good model with one byte changed, or cut off somewhere, is read or refused with a text, never more. */
+static void test_damage (void **state) {
+  static const char byte[] = "{}[],:#&*!|>'\"%@ \n-t.=(1\xC3";
+  static char text[4000], copy[4000];
+  FILE *f = fopen ("tests/models/ezyroller.yaml", "rb");
+  (void)state;
+  assert_non_null (f);
+  size_t size = fread (text, 1, sizeof text, f);
+  fclose (f);
+  assert_true (size > 1000 && size < sizeof text);
+  for (size_t i = 0; i < 600; i++) {
+    size_t at = (i * 7919) % size;
+    memcpy (copy, text, size);
+    if (i % 6) copy[at] = byte[i % (sizeof byte - 1)];
+    bad_write (copy, i % 6 ? size : at);
+    pw_error error = bad_open (bad_path);
+    assert_true (error.status == PW_OK || (error.status == PW_INPUT && error.text[0]));
+  }
+}
+
+static void test_size (void **state) {
+  char expected[200];
+  (void)state;
+  bad_write ("pinwheel: 1\n", 12);
+  assert_int_equal (truncate (bad_path, (64L << 20) + 1), 0);
+  pw_error error = bad_open (bad_path);
+  snprintf (expected, sizeof expected, "%s: the file has more than 64 MB, the most a model in YAML may have", bad_path);
+  check_error (&error, PW_INPUT, expected);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_bad_models), cmocka_unit_test (test_damage),
+                                      cmocka_unit_test (test_size) };
+  return cmocka_run_group_tests (tests, bad_setup, bad_teardown);
+}
