@@ -177,14 +177,18 @@ static void slider_train (pw_model *m, const void *parameters) {
           .name = "S", .body = { "ram", "base" }, .at = { { 0.1, 0 }, { 0.2, 0.1 } }, .heading = 0.6, .angle = 0.3 });
   pw_add_slot (
       m, &(pw_slot){ .name = "T", .body = { "cam", "ram" }, .at = { { -0.2, 0.1 }, { 0.3, 0.1 } }, .heading = -0.4 });
-  pw_add_spring (m, &(pw_spring){ .name = "k", .body = { "base", "ram" }, .stiffness = 8, .damping = 0.2 });
-  pw_add_spring (m, &(pw_spring){ .name = "l", .body = { "cam", "ram" }, .stiffness = 6, .damping = 0.1 });
+  pw_add_spring (
+      m, &(pw_spring){
+             .name = "k", .body = { "base", "ram" }, .at = { { -1, 0 }, { 0, 0 } }, .stiffness = 8, .damping = 0.2 });
+  pw_add_spring (
+      m, &(pw_spring){
+             .name = "l", .body = { "cam", "ram" }, .at = { { 0, 0 }, { 0, 1 } }, .stiffness = 6, .damping = 0.1 });
 }
 
 static void test_methods (void **state) {
   static const pw_plugin_table train = TRIAL_TABLE (slider_train), yoke = TRIAL_TABLE (slider_yoke);
   (void)state;
-  trial (&train, 1);
+  trial (&train, 2);
   trial (&yoke, 2);
 }
 
