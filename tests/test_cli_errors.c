@@ -49,9 +49,9 @@ static void test_bad_lines (void **state) {
     { "show ezyroller --at -1", "--at -1: expected a number >= 0" },
     { "list foo", "there is no list of \"foo\"; did you mean \"models\"?" },
     { "list a b", "\"b\" is too much; write pinwheel list [models|methods|kinds]" },
-    { "new", "something is missing; write pinwheel new NAME.c" },
-    { "new foo.x", "\"foo.x\": a model file's name is made of letters, digits, _ and -, and ends in .c" },
-    { "new 'a b.c'", "\"a b.c\": a model file's name is made of letters, digits, _ and -, and ends in .c" },
+    { "new", "something is missing; write pinwheel new NAME.c|NAME.yaml" },
+    { "new foo.x", "\"foo.x\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml" },
+    { "new 'a b.c'", "\"a b.c\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml" },
   };
   (void)state;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {

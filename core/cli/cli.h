@@ -93,6 +93,10 @@ pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
 /* Shows M, J, gamma and all that stands beside them at time t of a run with the model's default method (matrices.c). */
 int pw_cli_matrices (const pw_cli_model *m, double t, pw_error *error);
 
+/* Writes a built model to standard output as text, with all numbers as they are (show_yaml.c).  PW_INPUT for what a text
+ * model cannot say: function signals, kinds of the model's own. */
+int pw_cli_yaml (const pw_cli_model *m, pw_error *error);
+
 /* ---- The end ---- */
 
 /* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, or as it is if it names a place in a file;

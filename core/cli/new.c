@@ -63,27 +63,79 @@ static const char new_text[] =
     "          .run = { .t_end = 20, .step = 1e-3, .method = \"rk4+projection\" },\n"
     "          .build = build);\n";
 
-/* "folder/my_car.c" gives "my_car"; PW_INPUT if a model could not be found under that name. */
-static int new_name (const char *path, char *name, size_t size, pw_error *error) {
+/* The same as text, after its first lines. */
+static const char new_yaml[] =
+    "# Units are SI, angles are radians, counter-clockwise.\n"
+    "pinwheel: 1 # the version of the format\n"
+    "about: a car and its trailer, wriggling\n"
+    "\n"
+    "# What `pinwheel run` does without options.\n"
+    "run: {t_end: 20, step: 1e-3, method: rk4+projection}\n"
+    "\n"
+    "# The numbers of the model.  They can be changed with --set NAME=VALUE.\n"
+    "parameters:\n"
+    "  - {name: mass, value: 2, unit: kg, domain: positive, about: mass of the car}\n"
+    "  - {name: load, value: 1, unit: kg, domain: positive, about: mass of the trailer}\n"
+    "  - {name: hitch, value: 0.4, unit: m, domain: nonnegative, about: hitch behind the centre of mass of the car}\n"
+    "  - {name: bar, value: 0.6, unit: m, domain: positive, about: hitch ahead of the centre of mass of the trailer}\n"
+    "  - {name: speed, value: 1, unit: m/s, about: speed of the car at the start}\n"
+    "  - {name: torque, value: 0.2, unit: N m, about: amplitude of the torque in the hitch}\n"
+    "  - {name: omega, value: pi, unit: rad/s, about: angular frequency of that torque}\n"
+    "\n"
+    "# A body's frame sits at its centre of mass.  start: x, y, phi; rate: vx, vy, omega; what is left out is 0.  Any "
+    "number\n"
+    "# may be an expression of the parameters.\n"
+    "bodies:\n"
+    "  - {name: car, mass: mass, inertia: 0.1, rate: {vx: speed}}\n"
+    "  - {name: trailer, mass: load, inertia: 0.05, start: {x: -(hitch + bar)}, rate: {vx: speed}}\n"
+    "\n"
+    "# Each begins with its kind and its name; `pinwheel list kinds` shows what there is.\n"
+    "elements:\n"
+    "  # A point of one body and a point of the other coincide.  ground may stand for one of the two.\n"
+    "  - {pin: H, body: [car, trailer], at: [[-hitch, 0], [bar, 0]]}\n"
+    "\n"
+    "  # Knife edges: these points do not move sideways.\n"
+    "  - {wheel: A, body: car, at: [0, 0]}\n"
+    "  - {wheel: C, body: trailer, at: [0, 0]}\n"
+    "\n"
+    "  # torque cos (omega t) on the car, and its opposite on the trailer.\n"
+    "  - {torque: drive, body: [car, trailer], value: {harmonic: {amplitude: torque, omega: omega}}}\n";
+
+/* "folder/my_car.c" gives "my_car" and ".c"; PW_INPUT if a model could not be found under that name. */
+static int new_name (const char *path, char *name, size_t size, const char **ending, pw_error *error) {
   const char *base = strrchr (path, '/');
   base = base ? base + 1 : path;
   size_t n = strspn (base, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-");
-  if (n == 0 || n >= size || base[0] == '-' || strcmp (base + n, ".c") != 0)
-    return pw_fail (error, PW_INPUT, "\"%s\": a model file's name is made of letters, digits, _ and -, and ends in .c",
-                    path);
+  *ending = base + n;
+  if (n == 0 || n >= size || base[0] == '-' || (strcmp (*ending, ".c") != 0 && strcmp (*ending, ".yaml") != 0))
+    return pw_fail (error, PW_INPUT,
+                    "\"%s\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml", path);
   snprintf (name, size, "%.*s", (int)n, base);
   return PW_OK;
 }
 
+static void new_print (FILE *f, const char *name, int yaml) {
+  const char *title = "a car and its trailer, held together by a pin, each on a knife edge";
+  if (yaml) {
+    fprintf (f, "# %s: %s.\n#\n", name, title);
+    fprintf (f, "# Try:  pinwheel show ./%s.yaml\n#       pinwheel run ./%s.yaml --set torque=0.5 -o %s.csv\n#\n", name,
+             name, name);
+    fputs (new_yaml, f);
+  } else {
+    fprintf (f, "/* %s: %s.\n *\n", name, title);
+    fprintf (f, new_text, name, name, name);
+  }
+}
+
 static int new_write (const char *path, pw_error *error) {
   char name[100];
-  if (new_name (path, name, sizeof name, error) != PW_OK) return PW_INPUT;
+  const char *ending;
+  if (new_name (path, name, sizeof name, &ending, error) != PW_OK) return PW_INPUT;
   FILE *f = fopen (path, "wx"); /* never over a file that is there */
   if (f == NULL && errno == EEXIST)
     return pw_fail (error, PW_INPUT, "%s is there already; it has been left as it is", path);
   if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
-  fprintf (f, "/* %s: a car and its trailer, held together by a pin, each on a knife edge.\n *\n", name);
-  fprintf (f, new_text, name, name, name);
+  new_print (f, name, ending[1] == 'y');
   int bad = ferror (f);
   if (fclose (f) != 0 || bad) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
   printf ("%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
@@ -94,7 +146,8 @@ int pw_cli_new (int argc, const char **argv) {
   static const struct poptOption options[] = { POPT_TABLEEND };
   pw_error error = { 0 };
   pw_cli_line l;
-  if (pw_cli_read (&l, argc, argv, options, "NAME.c", 1, 1, &error) == PW_OK) new_write (l.argument[0], &error);
+  if (pw_cli_read (&l, argc, argv, options, "NAME.c|NAME.yaml", 1, 1, &error) == PW_OK)
+    new_write (l.argument[0], &error);
   pw_cli_close (&l);
   return pw_cli_end (&error);
 }

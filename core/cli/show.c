@@ -132,13 +132,14 @@ static void show_model (const pw_cli_model *m) {
 }
 
 int pw_cli_show (int argc, const char **argv) {
-  int matrices = 0;
+  int matrices = 0, yaml = 0;
   const char **sets = NULL, **starts = NULL;
   char *at = NULL;
   double t = 0;
   const struct poptOption options[] = {
     { "matrices", 0, POPT_ARG_NONE, &matrices, 0, "Show M, J and gamma at the start instead", NULL },
     { "at", 0, POPT_ARG_STRING, &at, 0, "The same at time T, after a run by the model's default method", "T" },
+    { "yaml", 0, POPT_ARG_NONE, &yaml, 0, "Write it as a text model that runs to the same trajectory", NULL },
     PW_CLI_MODEL_OPTIONS (&sets, &starts),
     POPT_TABLEEND
   };
@@ -148,7 +149,9 @@ int pw_cli_show (int argc, const char **argv) {
   if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
       pw_cli_number ("--at", at, PW_NONNEGATIVE, &t, &error) == PW_OK &&
       pw_cli_open (&m, l.argument[0], sets, starts, &error) == PW_OK) {
-    if (matrices || at)
+    if (yaml)
+      pw_cli_yaml (&m, &error);
+    else if (matrices || at)
       pw_cli_matrices (&m, t, &error);
     else
       show_model (&m);

@@ -1,0 +1,175 @@
+/* pinwheel show --yaml: a model as text that runs to the same trajectory, to the bit.
+ *
+ * Numbers are written with 17 digits, and left out where they are what a model that does not say has: 0. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "cli.h"
+#include "model.h"
+
+static void yaml_number (double value) {
+  char text[32];
+  fputs (pw_format (text, value, 17), stdout);
+}
+
+/* Whether a number is what it is if nothing is said; -0 is not. */
+static int yaml_is_zero (double value) {
+  return value == 0 && !signbit (value);
+}
+
+/* Names are made of letters, digits, _ and -; one that begins with - might be taken for an entry of a list. */
+static void yaml_name (const char *name) {
+  printf (*name == '-' ? "\"%s\"" : "%s", name);
+}
+
+static void yaml_text (const char *text) {
+  putchar ('"');
+  for (; *text; text++)
+    if (*text == '"' || *text == '\\')
+      printf ("\\%c", *text);
+    else if ((unsigned char)*text < ' ')
+      printf ("\\x%02x", (unsigned)*text);
+    else
+      putchar (*text);
+  putchar ('"');
+}
+
+/* ---- Bodies ---- */
+
+static void yaml_triple (const char *what, const char *const name[3], const double value[3]) {
+  int written = 0;
+  for (int i = 0; i < 3; i++) {
+    if (yaml_is_zero (value[i])) continue;
+    if (written++ == 0) printf (", %s: {", what);
+    printf ("%s%s: ", written > 1 ? ", " : "", name[i]);
+    yaml_number (value[i]);
+  }
+  if (written) putchar ('}');
+}
+
+static void yaml_body (const pw_body *b) {
+  static const char *const start[] = { "x", "y", "phi" }, *const rate[] = { "vx", "vy", "omega" };
+  printf ("  - {name: "), yaml_name (b->name);
+  if (!yaml_is_zero (b->mass)) printf (", mass: "), yaml_number (b->mass);
+  if (!yaml_is_zero (b->inertia)) printf (", inertia: "), yaml_number (b->inertia);
+  yaml_triple ("start", start, b->start);
+  yaml_triple ("rate", rate, b->rate);
+  puts ("}");
+}
+
+/* ---- Elements ---- */
+
+static void yaml_pair (const double value[2]) {
+  putchar ('['), yaml_number (value[0]);
+  printf (", "), yaml_number (value[1]);
+  putchar (']');
+}
+
+static void yaml_signal (const pw_signal *s) {
+  if (s->type == PW_CONSTANT) {
+    yaml_number (s->constant);
+    return;
+  }
+  printf ("{harmonic: {amplitude: "), yaml_number (s->harmonic.amplitude);
+  printf (", omega: "), yaml_number (s->harmonic.omega);
+  if (!yaml_is_zero (s->harmonic.phase)) printf (", phase: "), yaml_number (s->harmonic.phase);
+  if (!yaml_is_zero (s->harmonic.offset)) printf (", offset: "), yaml_number (s->harmonic.offset);
+  printf ("}}");
+}
+
+static void yaml_value (const pw_field *f, const void *at) {
+  if (f->type == PW_NUMBER) yaml_number (*(const double *)at);
+  if (f->type == PW_POINT || f->type == PW_VECTOR) yaml_pair (at);
+  if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
+  if (f->type == PW_SIGNAL) yaml_signal (at);
+  if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
+}
+
+static size_t yaml_size (const pw_field *f) {
+  static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double),
+                                 sizeof (char *), sizeof (pw_signal),  sizeof (int) };
+  return size[f->type];
+}
+
+/* Optional fields that are all zero need no word. */
+static int yaml_is_default (const pw_field *f, const char *at) {
+  size_t size = yaml_size (f) * (size_t)pw_field_count (f);
+  if (f->required || f->type == PW_BODY) return 0;
+  for (size_t i = 0; i < size; i++)
+    if (at[i]) return 0;
+  return 1;
+}
+
+static void yaml_element (const pw_element *e) {
+  printf ("  - {%s: ", e->kind->name), yaml_name (pw_element_name (e));
+  for (const pw_field *f = e->kind->fields; f->name; f++) {
+    const char *at = (const char *)e->definition + f->offset;
+    int count = pw_field_count (f);
+    if (yaml_is_default (f, at)) continue;
+    printf (", %s: %s", f->name, count > 1 ? "[" : "");
+    for (int i = 0; i < count; i++, at += yaml_size (f)) {
+      if (i) printf (", ");
+      yaml_value (f, at);
+    }
+    if (count > 1) putchar (']');
+  }
+  puts ("}");
+}
+
+/* ---- What has no words ---- */
+
+static int yaml_is_built_in (const pw_kind *kind) {
+  const pw_kind *const *k = pw_kinds;
+  while (*k && *k != kind) k++;
+  return *k != NULL;
+}
+
+static int yaml_refuse (const pw_model *m, pw_error *error) {
+  for (const pw_element *e = m->element; e < m->element + m->elements; e++) {
+    const char *kind = e->kind->name, *name = pw_element_name (e);
+    if (!yaml_is_built_in (e->kind))
+      return pw_fail (error, PW_INPUT, "model %s cannot be written as text: %s %s is of a kind of the model's own",
+                      m->name, kind, name);
+    for (const pw_field *f = e->kind->fields; f->name; f++) {
+      const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
+      for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)
+        if (s[i].type != PW_CONSTANT && s[i].type != PW_HARMONIC)
+          return pw_fail (error, PW_INPUT,
+                          "model %s cannot be written as text: the signal \"%s\" of %s %s is a function", m->name,
+                          f->name, kind, name);
+    }
+  }
+  if (m->givens)
+    return pw_fail (error, PW_INPUT, "--yaml: start values of --start have no place in a text model; give them to run");
+  return PW_OK;
+}
+
+/* ---- The model ---- */
+
+static void yaml_run (const pw_run_defaults *run) {
+  const struct {
+    const char *name;
+    double value;
+  } number[] = { { "t_end", run->t_end }, { "step", run->step }, { "rtol", run->rtol } };
+  int written = 0;
+  for (int i = 0; i < 3; i++) {
+    if (number[i].value == 0) continue;
+    printf ("%s%s: ", written++ ? ", " : "run: {", number[i].name);
+    yaml_number (number[i].value);
+  }
+  if (run->method) printf ("%smethod: ", written++ ? ", " : "run: {"), yaml_text (run->method);
+  if (written) puts ("}");
+}
+
+int pw_cli_yaml (const pw_cli_model *x, pw_error *error) {
+  const pw_model *m = x->model;
+  if (yaml_refuse (m, error) != PW_OK) return error->status;
+  puts ("pinwheel: 1");
+  if (m->table->about && *m->table->about) printf ("about: "), yaml_text (m->table->about), putchar ('\n');
+  yaml_run (&m->table->run);
+  if (m->bodies) puts ("bodies:");
+  for (int i = 0; i < m->bodies; i++) yaml_body (&m->body[i]);
+  if (m->elements) puts ("elements:");
+  for (int i = 0; i < m->elements; i++) yaml_element (&m->element[i]);
+  return PW_OK;
+}
