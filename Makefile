@@ -193,6 +193,8 @@ $(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a 
 
 # These make every allocation fail in turn.
 $(BUILD)/tests/test_alloc: WRAP := -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=free
+# A part of SUNDIALS that Pinwheel does not use, to compare with.
+$(BUILD)/tests/test_arkode: WRAP := -Wl,--no-as-needed -lsundials_arkode -Wl,--as-needed
 
 # ---- Running things ----
 

@@ -84,25 +84,48 @@ static double adapt_factor (const struct pw_method_data *d, double error) {
   return fmin (5, fmax (0.2, f));
 }
 
+/* The step to t1.  Its error is that of the signals as they are before a discontinuity there: the one of the new state's
+ * derivative is no error of the step. */
+static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *off) {
+  struct pw_method_data *d = r->data;
+  r->near = 0;
+  int status = pw_rk_step (r, h, t1, project, added);
+  if (status == PW_OK && t1 >= r->breakpoint)
+    status = pw_accelerate (r, pw_before_breakpoint (r, t1), d->q, d->v, d->A[0], d->lambda);
+  *off = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
+  return status;
+}
+
+/* A step that was cut short says little about the next one, other than that it may be as large as it was to be. */
+static void adapt_accept (pw_run *r, double h, double t1, double added, double off, double most, int cut) {
+  struct pw_method_data *d = r->data;
+  double next = h * fmin (most, adapt_factor (d, off));
+  pw_rk_accept (r, h, t1, added);
+  d->h = cut ? fmax (next, d->h) : next;
+  if (!cut || h > 0.5 * d->h) d->before = fmax (off, 1e-4);
+  r->statistics.steps++;
+}
+
+static int adapt_fail (pw_run *r, int status, double h, pw_error *error) {
+  if (status != PW_OK) return pw_rk_fail (r, status, h, error);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances ask for a step below %.3g s", r->t, h);
+}
+
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most = 5;
-  int status = PW_RETRY, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
+  double least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * fabs (stop - r->t));
+  int status = PW_OK, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
   for (;;) {
-    double t1 = r->t + d->h, added = 0;
-    if (t1 > stop - 0.01 * d->h) t1 = stop;
+    double t1 = r->t + d->h, added = 0, off;
+    int cut = t1 > stop - 0.01 * d->h;
+    if (cut) t1 = stop;
     double h = t1 - r->t;
-    if (!(h > 16 * DBL_EPSILON * fmax (fabs (r->t), fabs (stop - r->t) * 1e-6)))
-      return pw_rk_fail (r, status, h, error);
-    r->near = 0;
-    status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
+    if (!cut && !(h > least)) return adapt_fail (r, status, h, error);
+    status = adapt_step (r, h, t1, project, r->settings.ledger ? &added : NULL, &off);
     if (status < 0) return pw_rk_fail (r, status, h, error);
-    double off = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
     if (off <= 1) {
-      pw_rk_accept (r, h, t1, added);
-      d->h = fmin (most, adapt_factor (d, off)) * (t1 == stop ? fmax (h, fmin (d->h, 5 * h)) : h);
-      d->before = fmax (off, 1e-4);
-      r->statistics.steps++;
+      adapt_accept (r, h, t1, added, off, most, cut);
       return PW_OK;
     }
     r->statistics.rejected++;

@@ -1,0 +1,336 @@
+/* erk5 and erk8: orders with fixed steps, errors that follow the tolerances, samples inside of steps, ends of steps at
+ * breakpoints, and how a run ends that cannot go on. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+
+enum { ADAPT_COLUMNS = 6 };
+
+/* The largest error of the EzyRoller's published states at 10 s. */
+static double adaptive_error (const char *method, pw_settings settings, pw_statistics *cost) {
+  double table[4 * ADAPT_COLUMNS], q[6], v[6];
+  assert_int_equal (runs_reference ("tests/reference/ezyroller.txt", 4, ADAPT_COLUMNS, table), 4);
+  const double *x = table + 3 * ADAPT_COLUMNS;
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  settings.span = 10;
+  runs_state (s, method, &settings, 10, q, v, cost);
+  pw_free (s);
+  return fmax (fmax (fabs (q[0] - x[1]), fabs (q[1] - x[2])), fmax (fabs (q[2] - x[3]), fabs (q[5] - x[4])));
+}
+
+/* ---- Orders ---- */
+
+static void adaptive_order (const char *integrator, int order, const double step[3], double band, const char *reason) {
+  static const char *const rest[] = { "none", "projection", "projection:metric=identity" };
+  for (int k = 0; k < 3; k++) {
+    char method[80], what[160];
+    double error[3];
+    snprintf (method, sizeof method, "%s+%s:steps=fixed", integrator, rest[k]);
+    for (int i = 0; i < 3; i++) error[i] = adaptive_error (method, (pw_settings){ .step = step[i] }, NULL);
+    check_below ("round-off in the last error", 10 / step[2] * CHECK_EPS, error[2],
+                 "one eps of each of 10 s / h steps");
+    for (int i = 0; i < 2; i++) {
+      snprintf (what, sizeof what, "slope of %s from h = %g to %g", method, step[i], step[i + 1]);
+      check_close (what, log2 (error[i] / error[i + 1]), order, band, reason);
+    }
+  }
+}
+
+static void test_orders (void **state) {
+  static const double step5[] = { 0.04, 0.02, 0.01 }, step8[] = { 0.2, 0.1, 0.05 };
+  (void)state;
+  adaptive_order ("erk5", 5, step5, 0.3, "order 5, and the next power of h");
+  adaptive_order ("erk8", 8, step8, 0.75, "order 8, and the next power of h: steps are large, or round-off shows");
+}
+
+/* ---- Tolerances ---- */
+
+static const char *const adaptive_methods[] = { "erk5+none", "erk5+projection", "erk5+projection:metric=identity",
+                                                "erk8+none", "erk8+projection", "erk8+projection:metric=identity" };
+enum { ADAPT_METHODS = sizeof adaptive_methods / sizeof *adaptive_methods };
+
+static void test_tolerances (void **state) {
+  (void)state;
+  for (int i = 0; i < ADAPT_METHODS; i++) {
+    double error[13];
+    long steps = 0;
+    for (int k = 4; k <= 12; k++) {
+      char what[100];
+      pw_statistics cost;
+      double rtol = pow (10, -k);
+      error[k] = adaptive_error (adaptive_methods[i], (pw_settings){ .rtol = rtol }, &cost);
+      snprintf (what, sizeof what, "%s, rtol %g, error at 10 s", adaptive_methods[i], rtol);
+      check_below (what, error[k], 100 * rtol, "100 rtol: errors of the steps grow with the motion's nearby ones");
+      if (k > 4) check_below (what, error[k], error[k - 1], "less than with ten times the tolerance");
+      assert_true (cost.steps > steps);
+      check_below ("rejected", (double)cost.rejected, (double)cost.steps / 3 + 5, "a third of the steps");
+      steps = cost.steps;
+      if (strstr (adaptive_methods[i], "projection")) {
+        check_below (what, cost.position, 16 * CHECK_EPS, "round-off of the projection");
+        check_below (what, cost.velocity, 16 * CHECK_EPS, "round-off of the projection");
+      }
+    }
+    check_close (adaptive_methods[i], log10 (error[5] / error[12]) / 7, 1, 0.15, "error in proportion to rtol");
+    check_below (adaptive_methods[i], error[12], 1e-11, "10 rtol at rtol = 1e-12");
+  }
+}
+
+/* The work grows by the root of the method's order, so the higher one is the cheaper, the more so the closer. */
+static void test_work (void **state) {
+  (void)state;
+  const double rtol[] = { 1e-6, 1e-9, 1e-12 };
+  double before = 1;
+  for (int i = 0; i < 3; i++) {
+    pw_statistics cost[2];
+    adaptive_error ("erk5+projection", (pw_settings){ .rtol = rtol[i] }, &cost[0]);
+    adaptive_error ("erk8+projection", (pw_settings){ .rtol = rtol[i] }, &cost[1]);
+    double ratio = (double)cost[1].rhs / (double)cost[0].rhs;
+    check_below ("evaluations of erk8 over those of erk5", ratio, before, "less than at the tolerance before");
+    before = ratio;
+  }
+}
+
+/* ---- Samples ---- */
+
+/* Takes a sample in two places of every step up to t_end if asked to; the state at t_end. */
+static void adaptive_sampled (const char *method, double rtol, int look, double *q, double *v, double *ledger,
+                              pw_statistics *cost) {
+  const double t_end = 3;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL), *S;
+  S = scene_system (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .span = t_end, .ledger = 1 });
+  pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = t_end });
+  for (double t0 = 0; pw_time (r) < t_end; t0 = pw_time (r)) {
+    pw_sample now;
+    check_ok (pw_advance (r, t_end, &error), &error);
+    for (int k = 0; look && k < 2; k++) {
+      double t = t0 + (k == 0 ? 0.37 : 0.9) * (pw_time (r) - t0);
+      check_ok (pw_at (r, t, &now, &error), &error);
+      pw_sample there = runs_to (exact, t);
+      for (int j = 0; j < 6; j++) {
+        check_close (method, now.q[j], there.q[j], 100 * rtol, "100 rtol, as at the ends of steps");
+        check_close (method, now.v[j], there.v[j], 100 * rtol, "100 rtol, as at the ends of steps");
+      }
+      check_close ("balance of a sample", now.balance, 0, 100 * rtol, "100 rtol");
+      if (strstr (method, "projection"))
+        check_below ("sample's residuals", now.position + now.velocity, 32 * CHECK_EPS, "round-off");
+    }
+  }
+  pw_sample now = runs_to (r, t_end);
+  memcpy (q, now.q, 6 * sizeof *q);
+  memcpy (v, now.v, 6 * sizeof *v);
+  memcpy (ledger, now.ledger, (size_t)pw_count_ledger (s) * sizeof *ledger);
+  *cost = *pw_run_statistics (r);
+  pw_close (r);
+  pw_close (exact);
+  pw_free (s);
+  pw_free (S);
+}
+
+static void test_samples (void **state) {
+  (void)state;
+  for (int i = 0; i < ADAPT_METHODS; i++)
+    for (int k = 5; k <= 10; k++) {
+      double q[2][6], v[2][6], ledger[2][4];
+      pw_statistics cost[2];
+      for (int look = 0; look < 2; look++)
+        adaptive_sampled (adaptive_methods[i], pow (10, -k), look, q[look], v[look], ledger[look], &cost[look]);
+      check_bits ("positions without samples", q[0], q[1], 6);
+      check_bits ("rates without samples", v[0], v[1], 6);
+      check_bits ("work without samples", ledger[0], ledger[1], 1);
+      assert_true (cost[0].steps == cost[1].steps && cost[0].rejected == cost[1].rejected);
+    }
+}
+
+/* A sample is, to the bit, what a run has that ends there: both make that last step. */
+static void test_samples_bits (void **state) {
+  static const char *const method[] = { "erk5+none", "erk5+projection" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    pw_settings settings = { .rtol = 1e-9, .span = 2 };
+    pw_system *s = scene_system (&scene_ezyroller, NULL), *S = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, method[i], &settings);
+    for (double t0 = 0; pw_time (r) < 2; t0 = pw_time (r)) {
+      double q[6], v[6], t;
+      pw_sample now;
+      check_ok (pw_advance (r, 2, &error), &error);
+      check_ok (pw_at (r, t = 0.4 * t0 + 0.6 * pw_time (r), &now, &error), &error);
+      runs_state (S, method[i], &settings, t, q, v, NULL);
+      check_bits ("positions of a run that ends there", now.q, q, 6);
+      check_bits ("rates of a run that ends there", now.v, v, 6);
+    }
+    assert_int_equal (pw_run_statistics (r)->rejected, 0); /* a run that ends there might not be told to retreat */
+    pw_close (r);
+    pw_free (s);
+    pw_free (S);
+  }
+}
+
+/* ---- Ends of steps ---- */
+
+/* A torque that is switched at 1/3 s. */
+static int adaptive_switched (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = t < 1. / 3 ? 0.1 : -0.2;
+  return 0;
+}
+
+static double adaptive_breakpoint (void *context, double t) {
+  (void)context;
+  return t < 1. / 3 ? 1. / 3 : INFINITY;
+}
+
+static pw_system *adaptive_switched_scene (void) {
+  pw_error error = { 0 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = adaptive_switched, .breakpoint = adaptive_breakpoint } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  return scene_compile (m);
+}
+
+/* One step ends where the torque is switched, and the switch costs no rejections. */
+static void test_breakpoint (void **state) {
+  (void)state;
+  const double rtol = 1e-8;
+  for (int i = 0; i < ADAPT_METHODS; i++) {
+    pw_error error = { 0 };
+    double q[6], v[6];
+    int before = 0, there = 0;
+    pw_system *s = adaptive_switched_scene (), *S = adaptive_switched_scene ();
+    runs_state (S, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, 1, q, v, NULL);
+    pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = rtol, .span = 1, .ledger = 1 });
+    while (pw_time (r) < 1) {
+      check_ok (pw_advance (r, 1, &error), &error);
+      there += pw_time (r) == 1. / 3;
+      before += pw_time (r) > 0.3 && pw_time (r) < 1. / 3;
+    }
+    assert_int_equal (there, 1);
+    check_below ("steps just before the switch", before, 2, "no approach in small steps");
+    check_below ("rejected", (double)pw_run_statistics (r)->rejected, 4, "hardly any");
+    pw_sample now = runs_to (r, 1);
+    for (int j = 0; j < 6; j++) {
+      check_close (adaptive_methods[i], now.q[j], q[j], 100 * rtol, "100 rtol");
+      check_close (adaptive_methods[i], now.v[j], v[j], 100 * rtol, "100 rtol");
+    }
+    check_close ("balance", now.balance, 0, 100 * rtol, "100 rtol");
+    pw_close (r);
+    pw_free (s);
+    pw_free (S);
+  }
+}
+
+/* An end within round-off of the time reached is reached, and the next step is as long as if it had not been. */
+static void test_short_end (void **state) {
+  (void)state;
+  for (int i = 0; i < ADAPT_METHODS; i++) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = 1e-8, .span = 2 });
+    runs_to (r, 0.3);
+    long steps = pw_run_statistics (r)->steps;
+    assert_true (0.1 * 3 > 0.3);
+    runs_to (r, 0.1 * 3);
+    assert_int_equal (pw_run_statistics (r)->steps, steps + 1);
+    check_ok (pw_advance (r, 2, &error), &error);
+    check_below ("half of a usual step of erk5", 0.03, pw_time (r) - 0.3, "steps go on as they were");
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+/* ---- Runs that cannot go on ---- */
+
+/* omega' = omega^2, omega = 1 / (1 - t). */
+static int adaptive_square (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t;
+  value[0] = x[0] * x[0];
+  if (gradient) gradient[0] = 2 * x[0];
+  return 0;
+}
+
+/* Not there any more after 0.7 s. */
+static int adaptive_failing (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = 1;
+  return t > 0.7;
+}
+
+static void adaptive_rotor (pw_model *m, pw_signal torque) {
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, 1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "ground", "rotor" } });
+  pw_add_torque (m, &(pw_torque){ .name = "motor", .body = { "rotor", "ground" }, .value = torque });
+}
+
+static void adaptive_exploding (pw_model *m, const void *parameters) {
+  static const char *const reads[] = { "rotor.omega", NULL };
+  (void)parameters;
+  adaptive_rotor (m, (pw_signal){ PW_FUNCTION, .function = { .eval = adaptive_square, .reads = reads } });
+}
+
+static void adaptive_ending (pw_model *m, const void *parameters) {
+  (void)parameters;
+  adaptive_rotor (m, (pw_signal){ PW_FUNCTION, .function = { .eval = adaptive_failing } });
+}
+
+static const pw_plugin_table adaptive_tables[] = {
+  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = adaptive_exploding },
+  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = adaptive_ending },
+};
+
+/* Fails with the time reached, at most `last`, where the state can still be looked at. */
+static void adaptive_stops (const char *method, const pw_plugin_table *table, double last, const char *cause) {
+  char text[60];
+  pw_error error = { 0 }, none = { 0 };
+  pw_system *s = scene_system (table, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = 1e-8, .span = 2 });
+  assert_int_equal (pw_advance_to (r, 2, 2, &error), PW_METHOD);
+  assert_int_equal (error.status, PW_METHOD);
+  snprintf (text, sizeof text, "t = %.6g s: ", pw_time (r));
+  assert_memory_equal (error.text, text, strlen (text));
+  assert_non_null (strstr (error.text, cause));
+  check_below ("time reached", pw_time (r), last, "no state behind the point where the motion ends");
+  pw_sample now;
+  check_ok (pw_at (r, pw_time (r), &now, &none), &none);
+  assert_true (isfinite (now.q[2]) && isfinite (now.v[2]));
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_stops (void **state) {
+  (void)state;
+  for (int i = 0; i < ADAPT_METHODS; i++) {
+    adaptive_stops (adaptive_methods[i], &adaptive_tables[0], 1 + 100 * 1e-8, "the tolerances ask for a step below ");
+    adaptive_stops (adaptive_methods[i], &adaptive_tables[1], 0.7, "a signal failed");
+  }
+}
+
+/* Tolerances that let everything pass: the run ends, with finite numbers or with a reason. */
+static void test_useless_tolerances (void **state) {
+  static const double rtol[] = { 1, 1e6 };
+  (void)state;
+  for (int i = 0; i < ADAPT_METHODS; i++)
+    for (int k = 0; k < 2; k++) {
+      pw_error error = { 0 };
+      pw_system *s = scene_system (&scene_ezyroller, NULL);
+      pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = rtol[k], .span = 10 });
+      int status = pw_advance_to (r, 10, 10, &error);
+      assert_true ((status == PW_OK && pw_time (r) == 10) || (status == PW_METHOD && pw_time (r) < 10));
+      if (status == PW_METHOD) assert_memory_equal (error.text, "t = ", 4);
+      pw_close (r);
+      pw_free (s);
+    }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_orders),    cmocka_unit_test (test_tolerances),   cmocka_unit_test (test_work),
+    cmocka_unit_test (test_samples),   cmocka_unit_test (test_samples_bits), cmocka_unit_test (test_breakpoint),
+    cmocka_unit_test (test_short_end), cmocka_unit_test (test_stops),        cmocka_unit_test (test_useless_tolerances),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

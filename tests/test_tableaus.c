@@ -1,0 +1,132 @@
+/* The order conditions of the Runge-Kutta tableaus (Hairer, Norsett & Wanner 1993, section II.2), to round-off:
+ *
+ *   sum_j A_ij = c_i,   sum_i b_i c_i^k = 1 / (k + 1),   sum_ij b_i c_i^l A_ij c_j^k = 1 / ((k + 1) (k + l + 2))
+ *
+ * for k < order, and for k + l + 2 <= order; and those of the error estimates, whose weights are differences. */
+#include <math.h>
+#include <stdio.h>
+#include "check.h"
+
+/* The methods' own files, under other names than those of the library. */
+#define pw_method_rk4 tableaus_rk4
+#define pw_method_erk5 tableaus_erk5
+#define pw_method_erk8 tableaus_erk8
+#include "../solvers/rk4.c"
+#include "../solvers/erk5.c"
+#include "../solvers/erk8.c"
+
+static const struct {
+  const char *name;
+  const pw_tableau *b;
+  int order_e, order_e3; /* of the methods that the estimates compare with */
+} tableaus[] = {
+  { "rk4", &rk4_tableau, 0, 0 },
+  { "erk5", &erk5_tableau, 4, 0 },
+  { "erk8", &erk8_tableau, 5, 3 },
+};
+enum { TABLEAUS = sizeof tableaus / sizeof *tableaus };
+
+static double tableaus_power (double c, int k) {
+  return k == 0 ? 1 : pow (c, k);
+}
+
+/* sum_j A_ij c_j^k of a stage, and in `size` what is summed up without signs. */
+static double tableaus_row (const pw_tableau *b, int i, int k, double *size) {
+  const double *A = b->A + i * (i - 1) / 2;
+  double sum = 0;
+  *size = 0;
+  for (int j = 0; j < i; j++) {
+    double term = A[j] * tableaus_power (b->c[j], k);
+    sum += term;
+    *size += fabs (term);
+  }
+  return sum;
+}
+
+static void tableaus_check (const char *name, const char *what, int l, int k, double value, double reference,
+                            double size) {
+  char text[100];
+  snprintf (text, sizeof text, "%s: %s, l = %d, k = %d", name, what, l, k);
+  check_close (text, value, reference, 4 * CHECK_EPS * (size + fabs (reference)), "4 eps of each term");
+}
+
+static void test_rows (void **state) {
+  (void)state;
+  for (int n = 0; n < TABLEAUS; n++)
+    for (int i = 0; i < tableaus[n].b->stages; i++) {
+      double size, sum = tableaus_row (tableaus[n].b, i, 0, &size);
+      tableaus_check (tableaus[n].name, "row of A", i, 0, sum, tableaus[n].b->c[i], size);
+    }
+}
+
+static void test_quadrature (void **state) {
+  (void)state;
+  for (int n = 0; n < TABLEAUS; n++) {
+    const pw_tableau *b = tableaus[n].b;
+    for (int k = 0; k < b->order; k++) {
+      double sum = 0, size = 0;
+      for (int i = 0; i < b->stages; i++) {
+        double term = b->b[i] * tableaus_power (b->c[i], k);
+        sum += term;
+        size += fabs (term);
+      }
+      tableaus_check (tableaus[n].name, "sum b c^k", 0, k, sum, 1. / (k + 1), size);
+    }
+  }
+}
+
+static void test_two_levels (void **state) {
+  (void)state;
+  for (int n = 0; n < TABLEAUS; n++) {
+    const pw_tableau *b = tableaus[n].b;
+    for (int k = 1; k + 2 <= b->order; k++)
+      for (int l = 0; k + l + 2 <= b->order; l++) {
+        double sum = 0, size = 0, part;
+        for (int i = 0; i < b->stages; i++) {
+          double weight = b->b[i] * tableaus_power (b->c[i], l);
+          sum += weight * tableaus_row (b, i, k, &part);
+          size += fabs (weight) * part;
+        }
+        tableaus_check (tableaus[n].name, "sum b c^l A c^k", l, k, sum, 1. / ((k + 1) * (k + l + 2)), size);
+      }
+  }
+}
+
+/* An estimate is zero for whatever both methods solve exactly, and not for the next power. */
+static void tableaus_estimate (const char *name, const pw_tableau *b, const double *e, int order) {
+  for (int k = 0; k <= order; k++) {
+    double sum = 0, size = 0;
+    for (int i = 0; i <= b->stages; i++) {
+      double term = e[i] * tableaus_power (i < b->stages ? b->c[i] : 1, k);
+      sum += term;
+      size += fabs (term);
+    }
+    if (k < order)
+      tableaus_check (name, "sum e c^k", 0, k, sum, 0, size);
+    else
+      check_below ("round-off", 1e6 * CHECK_EPS * size, fabs (sum), "the estimate sees the first error there is");
+  }
+}
+
+static void test_estimates (void **state) {
+  (void)state;
+  for (int n = 0; n < TABLEAUS; n++) {
+    const pw_tableau *b = tableaus[n].b;
+    assert_true ((b->e != NULL) == (tableaus[n].order_e > 0) && (b->e3 != NULL) == (tableaus[n].order_e3 > 0));
+    if (b->e) tableaus_estimate (tableaus[n].name, b, b->e, tableaus[n].order_e);
+    if (b->e3) tableaus_estimate (tableaus[n].name, b, b->e3, tableaus[n].order_e3);
+  }
+  assert_int_equal (tableaus_rk4.order, 4);
+  assert_int_equal (tableaus_erk5.order, erk5_tableau.order);
+  assert_int_equal (tableaus_erk8.order, erk8_tableau.order);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_rows),
+    cmocka_unit_test (test_quadrature),
+    cmocka_unit_test (test_two_levels),
+    cmocka_unit_test (test_estimates),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
