@@ -1,0 +1,225 @@
+/* Text models do what models in C do, to the bit: the EzyRoller both ways, parameters, what `let` defines, signals. */
+#define _GNU_SOURCE /* mkstemps */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "check.h"
+#include "model.h"
+#include "pinwheel-files.h"
+#include "runs.h"
+
+/* ---- Opening ---- */
+
+typedef struct {
+  pw_file *file;
+  pw_model *model;
+  pw_system *system;
+} text;
+
+static text text_open (const char *name, const char *parameter, double value) {
+  pw_error error = { 0 };
+  text x = { .file = pw_file_open (name, &error) };
+  check_ok (x.file ? PW_OK : error.status, &error);
+  x.model = pw_file_model (x.file, &error);
+  check_ok (x.model ? PW_OK : error.status, &error);
+  if (parameter) check_ok (pw_set (x.model, parameter, value, &error), &error);
+  check_ok (pw_build (x.model, &error), &error);
+  x.system = pw_compile (x.model, &error);
+  check_ok (x.system ? PW_OK : error.status, &error);
+  return x;
+}
+
+static void text_close (text *x) {
+  pw_free (x->system);
+  pw_model_free (x->model);
+  pw_file_close (x->file);
+}
+
+static char text_path[] = "/tmp/pinwheel-yaml-XXXXXX.yaml";
+
+/* A model from its text. */
+static text text_of (const char *source, const char *parameter, double value) {
+  FILE *f = fopen (text_path, "w");
+  assert_non_null (f);
+  fputs (source, f);
+  assert_int_equal (fclose (f), 0);
+  return text_open (text_path, parameter, value);
+}
+
+/* ---- The EzyRoller ---- */
+
+static void text_same (const char *parameter, double value, const char *method, double t) {
+  double state[2][12];
+  const char *name[] = { "ezyroller", "tests/models/ezyroller.yaml" };
+  for (int i = 0; i < 2; i++) {
+    text x = text_open (name[i], parameter, value);
+    runs_state (x.system, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8 }, t, state[i], state[i] + 6, NULL);
+    text_close (&x);
+  }
+  check_bits ("the EzyRoller as text", state[0], state[1], 12);
+}
+
+static void test_ezyroller (void **state) {
+  (void)state;
+  text_same (NULL, 0, "rk4+projection", 20);
+  text_same ("b", 0.7, "rk4+projection", 5);
+  text_same ("m2", 0.2, "ida+ggl", 5);
+}
+
+/* Parameters, run defaults and the line about it are those of the C file. */
+static void test_table (void **state) {
+  (void)state;
+  text c = text_open ("ezyroller", NULL, 0), y = text_open ("tests/models/ezyroller.yaml", NULL, 0);
+  const pw_plugin_table *a = pw_file_table (c.file), *b = pw_file_table (y.file);
+  assert_string_equal (a->about, b->about);
+  assert_string_equal (a->run.method, b->run.method);
+  check_bits ("t_end", &a->run.t_end, &b->run.t_end, 1);
+  check_bits ("step", &a->run.step, &b->run.step, 1);
+  const pw_parameter *p = a->parameters, *q = b->parameters;
+  for (; p->name; p++, q++) {
+    assert_string_equal (p->name, q->name);
+    assert_string_equal (p->unit, q->unit);
+    assert_string_equal (p->about, q->about);
+    assert_int_equal (p->domain, q->domain);
+    check_bits (p->name, &p->value, &q->value, 1);
+  }
+  assert_null (q->name);
+  assert_string_equal (pw_file_name (y.file), "ezyroller");
+  text_close (&c);
+  text_close (&y);
+}
+
+static void test_parameters (void **state) {
+  pw_error error = { 0 };
+  (void)state;
+  pw_file *f = pw_file_open ("tests/models/ezyroller.yaml", &error);
+  check_ok (f ? PW_OK : error.status, &error);
+  pw_model *m = pw_file_model (f, &error);
+  assert_int_equal (pw_set (m, "omga", 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model ezyroller has no parameter \"omga\"; did you mean \"omega\"?");
+  error.status = 0;
+  assert_int_equal (pw_set (m, "m1", 0, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model ezyroller: parameter m1 = 0: expected a number > 0");
+  pw_model_free (m);
+  pw_file_close (f);
+}
+
+/* ---- What is built ---- */
+
+static void test_let (void **state) {
+  static const char source[] = "pinwheel: 1\n"
+                               "parameters:\n  - {name: l, value: 2}\n"
+                               "let: {half: l/2, area: half^2*pi}\n"
+                               "bodies:\n  - {name: b, mass: area, start: {x: half, phi: 90*deg}}\n";
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    double l = i ? 6 : 2, half = l / 2, mass = half * half * PW_PI, phi = 90 * (PW_PI / 180);
+    text x = text_of (source, "l", l);
+    check_bits ("mass", &x.model->body[0].mass, &mass, 1);
+    check_bits ("x", &x.model->body[0].start[0], &half, 1);
+    check_bits ("phi", &x.model->body[0].start[2], &phi, 1);
+    text_close (&x);
+  }
+}
+
+#define TWO_BODIES                                             \
+  "pinwheel: 1\n"                                              \
+  "parameters: [{name: A, value: 0.1}, {name: w, value: 2}]\n" \
+  "let: {k: 2*A}\n"                                            \
+  "bodies: [{name: a, mass: 1, inertia: 0.1}, {name: b, mass: 2, inertia: 0.3, start: {x: 1}}]\n"
+
+static const pw_signal *text_signal (const text *x, int element) {
+  const pw_element *e = &x->model->element[element];
+  return pw_field_at (e->kind, e->definition, PW_SIGNAL, 0);
+}
+
+/* A torque as an expression of time is the harmonic one but for round-off. */
+static void test_time (void **state) {
+  static const char *const value[] = { "{harmonic: {amplitude: A, omega: w, phase: 0.5, offset: k}}",
+                                       "k + A*cos(w*t + 0.5)" };
+  double q[2][6], v[2][6];
+  char source[600];
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    snprintf (source, sizeof source, TWO_BODIES "elements:\n  - {torque: T, body: [a, b], value: %s}\n", value[i]);
+    text x = text_of (source, NULL, 0);
+    assert_int_equal (text_signal (&x, 0)->type, i ? PW_FUNCTION : PW_HARMONIC);
+    runs_state (x.system, "rk4", &(pw_settings){ .step = 1e-2 }, 3, q[i], v[i], NULL);
+    text_close (&x);
+  }
+  for (int j = 0; j < 6; j++)
+    check_close ("state", q[1][j], q[0][j], 1000 * CHECK_EPS * (1 + fabs (q[0][j])), "300 steps of round-off");
+}
+
+/* A torque that reads states: the derivative is what it should be, and the motion that of a spring. */
+static void test_states (void **state) {
+  text x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, ground], value: -w*a.phi - A*a.omega*a.phi^2}\n",
+                    NULL, 0);
+  const pw_function *f = &text_signal (&x, 0)->function;
+  double value[3] = { 0 }, gradient[2] = { 0 };
+  (void)state;
+  assert_string_equal (f->reads[0], "a.phi");
+  assert_string_equal (f->reads[1], "a.omega");
+  assert_null (f->reads[2]);
+  assert_int_equal (f->eval (f->context, 0, (double[]){ 1.5, -2 }, value, gradient), 0);
+  check_close ("value", value[0], -2 * 1.5 + 0.1 * 2 * 1.5 * 1.5, 8 * CHECK_EPS, "round-off");
+  double bound = 100 * pow (CHECK_EPS, 2.0 / 3); /* central differences */
+  check_close ("derivative by phi", gradient[0], -2 + 2 * 0.1 * 2 * 1.5, bound, "differences");
+  check_close ("derivative by omega", gradient[1], -0.1 * 1.5 * 1.5, bound, "differences");
+  text_close (&x);
+}
+
+/* The signal of a drive with its derivatives: value, rate and acceleration at a time; the context outlives the model. */
+static void test_drive (void **state) {
+  text x =
+      text_of (TWO_BODIES "elements:\n"
+                          "  - drive: D\n    body: [a, ground]\n    at: [[0, 0], [0, 0]]\n    what: angle\n"
+                          "    value: {expression: k*sin(w*t), rate: k*w*cos(w*t), acceleration: -k*w^2*sin(w*t)}\n",
+               "A", 0.3);
+  const pw_signal s = *text_signal (&x, 0);
+  double value[3];
+  (void)state;
+  pw_model_free (x.model);
+  x.model = NULL;
+  assert_int_equal (s.function.eval (s.function.context, 0.7, NULL, value, NULL), 0);
+  check_close ("value", value[0], 0.6 * sin (1.4), 8 * CHECK_EPS, "round-off");
+  check_close ("rate", value[1], 1.2 * cos (1.4), 8 * CHECK_EPS, "round-off");
+  check_close ("acceleration", value[2], -2.4 * sin (1.4), 16 * CHECK_EPS, "round-off");
+  double q[6], v[6];
+  runs_state (x.system, "rk4+projection", &(pw_settings){ .step = 1e-2 }, 1, q, v, NULL);
+  check_close ("the driven angle", q[2], 0.6 * sin (2), 100 * CHECK_EPS, "projected: round-off");
+  text_close (&x);
+}
+
+/* A signal without a value stops the run. */
+static void test_no_value (void **state) {
+  text x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, b], value: sqrt(1 - t)}\n", NULL, 0);
+  pw_error error = { 0 };
+  (void)state;
+  pw_run *r = runs_open (x.system, "rk4", &(pw_settings){ .step = 1e-2 });
+  assert_int_equal (pw_advance_to (r, 2, 2, &error), PW_METHOD);
+  pw_close (r);
+  text_close (&x);
+}
+
+static int text_setup (void **state) {
+  (void)state;
+  int file = mkstemps (text_path, 5);
+  return file < 0 ? -1 : close (file);
+}
+
+static int text_teardown (void **state) {
+  (void)state;
+  return remove (text_path);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_ezyroller), cmocka_unit_test (test_table),    cmocka_unit_test (test_parameters),
+    cmocka_unit_test (test_let),       cmocka_unit_test (test_time),     cmocka_unit_test (test_states),
+    cmocka_unit_test (test_drive),     cmocka_unit_test (test_no_value),
+  };
+  return cmocka_run_group_tests (tests, text_setup, text_teardown);
+}

@@ -1,0 +1,116 @@
+/* The program with text models: tables are those of models in C, byte by byte; every model survives being written as
+ * text and read again. */
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+#define TEXT "tests/models/ezyroller.yaml"
+
+static void test_same_tables (void **state) {
+  (void)state;
+  cli_good ("pinwheel run ezyroller -t 10 --energy -o @/c.csv >/dev/null && pinwheel run " TEXT
+            " -t 10 --energy -o @/text.csv >/dev/null && cmp @/c.csv @/text.csv");
+  assert_int_equal (cli_run ("pinwheel run ezyroller -t 5 -m ida+ggl --set a=0.4 --start frame.vx=1 -o @/c.csv && "
+                             "pinwheel run " TEXT " -t 5 -m ida+ggl --set a=0.4 --start frame.vx=1 -o @/text.csv && "
+                             "cmp @/c.csv @/text.csv"),
+                    0);
+}
+
+/* Each row builds the model anew, in threads. */
+static void test_same_sweeps (void **state) {
+  (void)state;
+  cli_good (
+      "pinwheel sweep ezyroller -t 1 --vary a=lin:0.3:0.7:9 --jobs 2 -o @/c.csv >/dev/null 2>&1 && pinwheel sweep " TEXT
+      " -t 1 --vary a=lin:0.3:0.7:9 --jobs 2 -o @/text.csv >/dev/null 2>&1 && cmp @/c.csv @/text.csv");
+}
+
+/* Every model on the search path: as text, and its run compared; those with function signals are refused by name. */
+static void test_round_trip (void **state) {
+  (void)state;
+  cli_good ("pinwheel list models >/dev/null");
+  assert_int_equal (
+      cli_run (
+          "for m in ${BUILD:-build}/models/*.so ${BUILD:-build}/models/*.yaml " TEXT "; do\n"
+          "  [ -f \"$m\" ] || continue\n"
+          "  if pinwheel show \"$m\" --yaml >@/again.yaml 2>@/why; then\n"
+          "    pinwheel run \"$m\" -t 0.2 -o @/once.csv >/dev/null 2>&1 || { echo \"bad: $m\"; exit 1; }\n"
+          "    pinwheel run @/again.yaml -t 0.2 -o @/again.csv >/dev/null 2>&1 || { echo \"bad: $m again\"; exit 1; }\n"
+          "    cmp @/once.csv @/again.csv || { echo \"bad: $m differs\"; exit 1; }\n"
+          "    echo \"same: $m\"\n"
+          "  else\n"
+          "    grep 'is a function$' @/why || { cat @/why; exit 1; }\n"
+          "  fi\n"
+          "done"),
+      0);
+  if (strstr (cli_out, "bad:")) print_error ("%s", cli_out);
+  assert_null (strstr (cli_out, "bad:"));
+  assert_non_null (strstr (cli_out, "same: "));
+}
+
+static const char cli_function[] = "pinwheel: 1\n"
+                                   "bodies: [{name: a, mass: 1, inertia: 1}]\n"
+                                   "elements: [{torque: T, body: [a, ground], value: sin(t)}]\n";
+
+static void test_no_text (void **state) {
+  (void)state;
+  cli_write ("f.yaml", cli_function);
+  cli_bad ("pinwheel show @/f.yaml --yaml", 2,
+           "model f cannot be written as text: the signal \"value\" of torque T is a function");
+  cli_bad ("pinwheel show ezyroller --yaml --start frame.vx=1", 2,
+           "--yaml: start values of --start have no place in a text model; give them to run");
+  cli_good ("pinwheel show @/f.yaml");
+  assert_non_null (strstr (cli_out, "torque T: body a, ground; value f (t) N m"));
+}
+
+static void test_names (void **state) {
+  (void)state;
+  cli_good ("mkdir @/models && cp " TEXT " @/models/roller.yaml && "
+            "PINWHEEL_MODELS=@/models pinwheel run roller -t 0.1 >/dev/null");
+  assert_int_equal (cli_run ("cp ${BUILD:-build}/models/ezyroller.so @/models/roller.so && "
+                             "PINWHEEL_MODELS=@/models pinwheel show roller"),
+                    2);
+  assert_non_null (strstr (cli_err, "two files answer to the model \"roller\": "));
+  assert_non_null (strstr (cli_err, "/models/roller.so and "));
+  assert_non_null (strstr (cli_err, "/models/roller.yaml; name one of them by its path\n"));
+}
+
+/* Nothing but Pinwheel's own message is printed, as compilers do. */
+static void test_message (void **state) {
+  char expected[500];
+  (void)state;
+  cli_write ("bad.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1/(k - k)}\n");
+  assert_int_equal (cli_run ("pinwheel run @/bad.yaml"), 2);
+  cli_expand ("@/bad.yaml:3:24: error: body a: mass: there is no \"k\"; did you mean \"e\"?\n"
+              "    - {name: a, mass: 1/(k - k)}\n"
+              "                         ^\n",
+              expected, sizeof expected);
+  assert_string_equal (cli_err, expected);
+  cli_write ("bad.yaml", "pinwheel: 1\nabout: [1, 2\n");
+  assert_int_equal (cli_run ("pinwheel show @/bad.yaml"), 2);
+  cli_expand ("@/bad.yaml:2:8: error: flow sequence without a closing bracket\n"
+              "  about: [1, 2\n"
+              "         ^\n",
+              expected, sizeof expected);
+  assert_string_equal (cli_err, expected);
+  assert_string_equal (cli_out, "");
+}
+
+/* `new` writes the same model both ways. */
+static void test_new (void **state) {
+  (void)state;
+  cli_good ("pinwheel new @/mine.yaml");
+  cli_good ("pinwheel new @/mine.c");
+  cli_bad ("pinwheel new @/mine.yaml", 2, "@/mine.yaml is there already; it has been left as it is");
+  cli_good ("pinwheel run @/mine.yaml --every 0.5 --set torque=0.5 -o @/text.csv >/dev/null && "
+            "pinwheel run @/mine.c --every 0.5 --set torque=0.5 -o @/c.csv >/dev/null && cmp @/c.csv @/text.csv");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_same_tables), cmocka_unit_test (test_same_sweeps), cmocka_unit_test (test_round_trip),
+    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_names),       cmocka_unit_test (test_message),
+    cmocka_unit_test (test_new),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
