@@ -12,6 +12,7 @@ static const pw_command main_commands[] = {
   { "show", "MODEL [OPTION...]", "what a model is made of, and its matrices", pw_cli_show },
   { "run", "MODEL [OPTION...]", "integrate a model; write a table, a summary, plots", pw_cli_run },
   { "sweep", "MODEL [OPTION...]", "a table of runs, for all combinations of varied parameters", pw_cli_sweep },
+  { "compare", "MODEL [OPTION...]", "what accuracy costs: many methods against the truth", pw_cli_compare },
   { "new", "NAME.c|NAME.yaml", "write a small commented model to begin with", pw_cli_new },
   { NULL, NULL, NULL, NULL },
 };
@@ -19,7 +20,7 @@ static const pw_command main_commands[] = {
 static int main_usage (void) {
   puts ("Pinwheel: planar multibody systems with pin joints and knife-edge wheels\n");
   for (const pw_command *c = main_commands; c->name; c++)
-    printf ("  pinwheel %-5s %-24s %s\n", c->name, c->synopsis, c->about);
+    printf ("  pinwheel %-7s %-24s %s\n", c->name, c->synopsis, c->about);
   puts ("\nMODEL is a name from `pinwheel list models`, or the path of a model file (./mine.c is compiled on the fly, "
         "./mine.yaml read).\n"
         "Folders named in PINWHEEL_MODELS, separated by \":\", are searched as well.\n"

@@ -17,6 +17,7 @@ enum {
   PLOT_KEYED = 12,        /* curves that get a name each; more are coloured by number */
   PLOT_IMAGES = 60,       /* pictures of the mechanism along its way, at most */
   PLOT_FEWEST = 8,        /* and at least */
+  PLOT_SCRIPTS = 8,       /* drawn at a time, at most */
   PLOT_PATH = 4096        /* longest path of a file, its end included */
 };
 
@@ -83,6 +84,9 @@ typedef struct {
 pw_curves pw_plot_bodies (const pw_plots *p);
 pw_curves pw_plot_wheels (const pw_plots *p);
 
+/* Makes a folder and those above it. */
+int pw_plot_folder (const char *folder, pw_error *error);
+
 /* Opens a file of the folder for writing.  NULL and PW_MACHINE with path and reason if that fails. */
 FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error);
 /* Closes it.  PW_MACHINE if something could not be written. */
@@ -106,5 +110,7 @@ int pw_plot_write_data (pw_plots *p, pw_error *error);
 int pw_plot_write_scripts (const pw_plots *p, pw_error *error);
 /* Runs gnuplot on them. */
 int pw_plot_run (const pw_plots *p, pw_error *error);
+/* Runs gnuplot in a folder on at most PLOT_SCRIPTS scripts, a list ended by NULL. */
+int pw_plot_gnuplot (const char *folder, const char *const *scripts, pw_error *error);
 
 #endif

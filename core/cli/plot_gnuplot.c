@@ -36,33 +36,38 @@ static int gnuplot_start (char *const *argv, pid_t *child) {
   return failed;
 }
 
-static int gnuplot_absent (const pw_plots *p) {
+static int gnuplot_absent (const char *folder) {
   fprintf (stderr,
            "pinwheel: gnuplot was not found, so no figures are drawn; data and scripts are in %s: gnuplot FILE.gp "
            "draws them there\n",
-           p->folder);
+           folder);
   return PW_OK;
 }
 
-int pw_plot_run (const pw_plots *p, pw_error *error) {
+int pw_plot_gnuplot (const char *folder, const char *const *scripts, pw_error *error) {
   char cd[2 * PLOT_PATH];
-  const char *const argv[] = { "gnuplot",    "-d",        "-e",           cd,  "paths.gp", "velocities.gp",
-                               "angular.gp", "energy.gp", "mechanism.gp", NULL };
+  const char *argv[4 + PLOT_SCRIPTS + 1] = { "gnuplot", "-d", "-e", cd };
   pid_t child;
   int status;
-  if (!gnuplot_cd (p->folder, cd, sizeof cd)) return pw_fail (error, PW_INPUT, "%s: too long a name", p->folder);
+  for (int i = 0; i < PLOT_SCRIPTS && scripts[i]; i++) argv[4 + i] = scripts[i];
+  if (!gnuplot_cd (folder, cd, sizeof cd)) return pw_fail (error, PW_INPUT, "%s: too long a name", folder);
   fflush (stderr);
   int failed = gnuplot_start ((char *const *)(size_t)argv, &child);
-  if (failed == ENOENT) return gnuplot_absent (p);
+  if (failed == ENOENT) return gnuplot_absent (folder);
   if (failed) return pw_fail (error, PW_MACHINE, "cannot run gnuplot: %s", strerror (failed));
   while (waitpid (child, &status, 0) < 0)
     if (errno != EINTR) return pw_fail (error, PW_MACHINE, "lost gnuplot: %s", strerror (errno));
-  if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (p);
+  if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (folder);
   if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
   if (WIFSIGNALED (status))
     return pw_fail (error, PW_MACHINE, "gnuplot was ended by signal %d; data and scripts are in %s", WTERMSIG (status),
-                    p->folder);
+                    folder);
   return pw_fail (error, PW_MACHINE,
                   "gnuplot failed with exit status %d; its message is above, data and scripts are in %s",
-                  WEXITSTATUS (status), p->folder);
+                  WEXITSTATUS (status), folder);
+}
+
+int pw_plot_run (const pw_plots *p, pw_error *error) {
+  static const char *const scripts[] = { "paths.gp", "velocities.gp", "angular.gp", "energy.gp", "mechanism.gp", NULL };
+  return pw_plot_gnuplot (p->folder, scripts, error);
 }

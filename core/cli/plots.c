@@ -9,8 +9,7 @@
 
 /* ---- The folder ---- */
 
-/* Makes a folder and those above it. */
-static int plots_folder (const char *folder, pw_error *error) {
+int pw_plot_folder (const char *folder, pw_error *error) {
   char path[PLOT_PATH];
   size_t n = strlen (folder);
   if (n == 0 || n >= sizeof path - 32)
@@ -159,7 +158,7 @@ pw_plots *pw_plots_open (const char *folder, const pw_model *m, const pw_system 
   sizes.wanted = plots_least (PLOT_SAMPLES, PLOT_NUMBERS / sizes.width);
   if (sizes.wanted < PLOT_FEW) sizes.wanted = PLOT_FEW;
   sizes.wanted++; /* both ends */
-  if (plots_folder (folder, error) != PW_OK) return NULL;
+  if (pw_plot_folder (folder, error) != PW_OK) return NULL;
   FILE *probe = pw_plot_create (&sizes, "motion.dat", error);
   if (probe == NULL) return NULL;
   fclose (probe);

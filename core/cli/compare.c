@@ -1,0 +1,209 @@
+/* pinwheel compare: what accuracy costs.  One model by several methods, each over a ladder of tolerances or steps,
+ * against the truth: a row for each rung, failures included. */
+#define _POSIX_C_SOURCE 200809L
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "compare.h"
+#include "plot.h"
+
+/* ---- Ctrl-C ---- */
+
+static volatile sig_atomic_t compare_stop; /* signals so far */
+
+/* As in a run, the third signal ends the program, should a step never end. */
+static void compare_on_signal (int number) {
+  if (++compare_stop < 3) return;
+  signal (number, SIG_DFL);
+  raise (number);
+}
+
+static void compare_catch_signals (void) {
+  struct sigaction action;
+  memset (&action, 0, sizeof action);
+  action.sa_handler = compare_on_signal;
+  sigemptyset (&action.sa_mask);
+  sigaction (SIGINT, &action, NULL);
+  sigaction (SIGTERM, &action, NULL);
+}
+
+static void compare_release_signals (void) {
+  signal (SIGINT, SIG_DFL);
+  signal (SIGTERM, SIG_DFL);
+}
+
+/* ---- Before it begins ---- */
+
+static int compare_read (pw_compare *x, int argc, const char **argv, pw_error *error) {
+  const struct poptOption options[] = {
+    { "methods", 'm', POPT_ARG_STRING, &x->methods_text, 0,
+      "Methods, separated by commas; all: every integrator with every stabilisation (default)", "A,B,...|all" },
+    { "rtol-ladder", 0, POPT_ARG_STRING, &x->rtol_text, 0,
+      "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)", "FROM:TO" },
+    { "step-ladder", 0, POPT_ARG_STRING, &x->step_text, 0, "Steps of the others [s], by halves (default 0.1:1e-4)",
+      "FROM:TO" },
+    { "limit", 0, POPT_ARG_STRING, &x->limit_text, 0,
+      "Processor time a single run may take [s]; what would take longer is not run (default 10)", "SECONDS" },
+    { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
+    PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
+    { "truth", 0, POPT_ARG_STRING, &x->truth_path, 0,
+      "Take errors against this table, with columns as run writes them, instead of a reference of its own",
+      "FILE.csv" },
+    { "output", 'o', POPT_ARG_STRING, &x->folder, 0, "Write tables and work-precision diagrams into a folder", "DIR" },
+    POPT_TABLEEND,
+  };
+  return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
+}
+
+/* The table is written as rows come, under the name it keeps if something stops it. */
+static int compare_open_csv (pw_compare *x, pw_error *error) {
+  char path[PLOT_PATH];
+  if (x->folder == NULL) return PW_OK;
+  int status = pw_plot_folder (x->folder, error);
+  if (status != PW_OK) return status;
+  snprintf (path, sizeof path, "%s/compare.csv.part", x->folder);
+  x->csv = fopen (path, "w");
+  return x->csv ? pw_compare_csv_head (x, error)
+                : pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+}
+
+static int compare_open (pw_compare *x, pw_error *error) {
+  int status =
+      pw_cli_open (&x->m, x->line.argument[0], (const char *const *)x->sets, (const char *const *)x->starts, error);
+  if (status != PW_OK) return status;
+  x->t_end = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
+  x->limit = 10;
+  status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &x->t_end, error);
+  if (status == PW_OK) status = pw_cli_number ("--limit", x->limit_text, PW_POSITIVE, &x->limit, error);
+  if (status == PW_OK) status = pw_compare_methods (x, error);
+  return status == PW_OK ? compare_open_csv (x, error) : status;
+}
+
+/* ---- Rows ---- */
+
+/* What the next rung will take, from those before: each halving doubles; what a decade costs more is learnt from the
+ * last one, or guessed for a method of order 5. */
+static double compare_predict (const pw_compare *x, int first, int adaptive) {
+  const pw_rung *last = &x->row[x->rows - 1];
+  if (x->rows == first || last->state == COMPARE_FAILED) return 0;
+  if (last->state != COMPARE_DONE) return INFINITY;
+  if (!adaptive) return 2 * last->cpu;
+  if (x->rows < first + 2 || last[-1].state != COMPARE_DONE) return 1.6 * last->cpu;
+  return fmax (last->cpu / last[-1].cpu, 1) * last->cpu;
+}
+
+static void compare_too_slow (const pw_compare *x, pw_rung *r, double predicted) {
+  char limit[32], about[60] = "";
+  for (int i = 0; i < COMPARE_ERRORS; i++) r->error[i] = NAN;
+  r->state = COMPARE_SLOW;
+  if (isfinite (predicted)) snprintf (about, sizeof about, ", about %.2g s", predicted);
+  snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", about, pw_format (limit, x->limit, 4));
+}
+
+/* The rungs of a method. */
+static int compare_ladder (pw_compare *x, const pw_contestant *method, pw_motion *scratch, pw_error *error) {
+  int first = x->rows, status = PW_OK;
+  double rung;
+  for (int k = 0; status == PW_OK && (rung = pw_compare_rung (&x->ladder[method->adaptive], method->adaptive, k)) > 0;
+       k++) {
+    pw_rung *r = &x->row[x->rows];
+    double predicted = compare_predict (x, first, method->adaptive);
+    *r = (pw_rung){ .method = method, .rung = rung };
+    if (predicted > x->limit)
+      compare_too_slow (x, r, predicted);
+    else
+      status = pw_compare_row (x, r, scratch, error);
+    if (status != PW_OK) break;
+    x->rows++;
+    pw_progress_end (&x->progress);
+    pw_compare_line (x, r, stdout);
+    fflush (stdout);
+    if (x->csv) status = pw_compare_csv_line (x, r, error);
+  }
+  return status;
+}
+
+static int compare_rows (pw_compare *x, pw_error *error) {
+  pw_motion scratch;
+  int status =
+      pw_motion_open (&scratch, x->m.system, x->truth.known ? x->truth.motion.samples : COMPARE_SAMPLES, error);
+  if (status != PW_OK) return status;
+  for (int k = 0; k < scratch.samples; k++)
+    scratch.t[k] = x->truth.known ? x->truth.motion.t[k] : x->t_end * (k + 1) / scratch.samples;
+  pw_compare_truth_line (x, stdout);
+  fputc ('\n', stdout);
+  pw_compare_head (x, stdout);
+  pw_progress_count (&x->progress, pw_file_name (x->m.file), "rows", 0, x->rungs);
+  for (int i = 0; status == PW_OK && i < x->methods; i++) status = compare_ladder (x, &x->method[i], &scratch, error);
+  pw_progress_end (&x->progress);
+  pw_motion_close (&scratch);
+  return status;
+}
+
+static int compare_run (pw_compare *x, pw_error *error) {
+  compare_catch_signals ();
+  int status = pw_truth_find (x, error);
+  if (status == PW_OK && x->folder) status = pw_compare_csv_truth (x, error);
+  if (status == PW_OK) status = compare_rows (x, error);
+  compare_release_signals ();
+  return status;
+}
+
+/* ---- After it ---- */
+
+/* A whole table loses its ending .part; diagrams are drawn of the rows there are. */
+static int compare_finish (pw_compare *x, int status, pw_error *error) {
+  char part[PLOT_PATH], whole[PLOT_PATH];
+  int bad = 0, stopped = status == PW_RETRY && compare_stop;
+  if (x->folder) {
+    snprintf (part, sizeof part, "%s/compare.csv.part", x->folder);
+    snprintf (whole, sizeof whole, "%s/compare.csv", x->folder);
+  }
+  if (x->csv) bad = fclose (x->csv) != 0;
+  x->csv = NULL;
+  if (stopped) {
+    fprintf (stderr, "pinwheel: interrupted; %d of %d rows are done%s%s\n", x->rows, x->rungs,
+             x->folder ? ", and kept in " : "", x->folder ? part : "");
+    return PW_INTERRUPTED;
+  }
+  if (status != PW_OK || x->folder == NULL) return status;
+  if (bad || rename (part, whole) != 0)
+    return pw_fail (error, PW_MACHINE, "cannot write %s: %s", whole, strerror (errno));
+  return pw_compare_plot (x, error);
+}
+
+/* A comparison in which nothing has worked is a failure. */
+static int compare_verdict (const pw_compare *x, pw_error *error) {
+  const pw_rung *failed = NULL;
+  for (int i = 0; i < x->rows; i++) {
+    if (x->row[i].state == COMPARE_DONE) return PW_OK;
+    if (x->row[i].state == COMPARE_FAILED) failed = &x->row[i];
+  }
+  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last of them: %s", failed->reason)
+                : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
+}
+
+static void compare_close (pw_compare *x) {
+  if (x->csv) fclose (x->csv);
+  pw_truth_close (&x->truth);
+  pw_cli_close_model (&x->m);
+  pw_cli_close (&x->line);
+  free (x->row);
+  free (x->method);
+  free (x->names);
+}
+
+int pw_cli_compare (int argc, const char **argv) {
+  pw_compare x = { .stop = &compare_stop };
+  pw_error error = { 0 };
+  int status = compare_read (&x, argc, argv, &error);
+  if (status == PW_OK) {
+    status = compare_open (&x, &error);
+    if (status == PW_OK) status = compare_run (&x, &error);
+    status = compare_finish (&x, status, &error);
+    if (status == PW_OK) status = compare_verdict (&x, &error);
+  }
+  compare_close (&x);
+  return status == PW_INTERRUPTED ? status : pw_cli_end (&error);
+}

@@ -1,0 +1,136 @@
+/* Comparisons from inside: one model by several methods, each over a ladder of tolerances or steps.
+ *
+ *   methods (compare_methods.c) -> truth (compare_truth.c) -> rows (compare_row.c) -> table, CSV, diagrams
+ *
+ * A motion is the state and the multipliers at the times of the comparison; an error is the distance of two motions. */
+#ifndef PW_COMPARE_H
+#define PW_COMPARE_H
+
+#include <signal.h>
+#include <stdio.h>
+#include "cli.h"
+#include "progress.h"
+
+enum { COMPARE_SAMPLES = 100, COMPARE_REPEATS = 5, COMPARE_PARTNERS = 3 };
+
+/* Errors: the largest of the coordinates and rates of a unit, at the end, then over all samples; of the multipliers
+ * relative to the largest one of the same unit. */
+enum { COMPARE_END, COMPARE_MOST = 4, COMPARE_LAMBDA = 8, COMPARE_ERRORS };
+enum { COMPARE_LENGTH, COMPARE_ANGLE, COMPARE_SPEED, COMPARE_RATE, COMPARE_UNITS };
+
+/* What happens at the times of the comparison.  NaN: not known. */
+typedef struct {
+  int samples, width; /* width: coordinates, rates, multipliers */
+  double *t;          /* samples [s] */
+  double *x;          /* samples x width */
+} pw_motion;
+
+typedef struct {
+  const char *name; /* "erk8+projection" */
+  int adaptive;     /* 1: its ladder is one of tolerances */
+} pw_contestant;
+
+typedef struct {
+  double from, to; /* from > to > 0 */
+} pw_ladder;
+
+typedef enum { COMPARE_DONE, COMPARE_FAILED, COMPARE_STOPPED, COMPARE_SLOW } pw_row_state;
+
+/* A rung of a method's ladder. */
+typedef struct {
+  const pw_contestant *method;
+  double rung;                  /* tolerance, or step [s] */
+  pw_row_state state;           /* stopped: at the limit; slow: not run */
+  double t;                     /* reached [s] */
+  double error[COMPARE_ERRORS]; /* NaN: not known; at the truth's uncertainty: no more than this */
+  unsigned below;               /* bit i: error i is no more than the truth's uncertainty */
+  double balance;               /* largest |energy balance| of the samples [J] */
+  pw_statistics statistics;     /* of a run without samples and ledger */
+  double cpu, spread;           /* of such runs: median; largest less smallest [s] */
+  int repeats;
+  char reason[500];
+} pw_rung;
+
+/* Against what errors are taken, and how far it can be trusted. */
+typedef struct {
+  pw_motion motion;
+  int known;                          /* 0: there is none */
+  double uncertainty[COMPARE_ERRORS]; /* 0 where nothing is compared */
+  double size[COMPARE_UNITS];         /* largest coordinate or rate */
+  char about[300];                    /* "erk8+projection, rtol 3e-14" or the file's name */
+  int partners;                       /* methods it was held against, and how far they are from it */
+  struct {
+    char about[100];
+    double error[COMPARE_ERRORS];
+  } partner[COMPARE_PARTNERS];
+} pw_truth;
+
+typedef struct {
+  /* as given */
+  const char *methods_text, *rtol_text, *step_text, *limit_text, *t_end_text, *truth_path, *folder;
+  const char **sets, **starts;
+  /* as understood */
+  pw_cli_line line;
+  pw_cli_model m;
+  char *names; /* the methods' */
+  pw_contestant *method;
+  int methods;
+  pw_ladder ladder[2]; /* of steps, of tolerances */
+  double t_end, limit; /* [s] */
+  /* under way */
+  pw_truth truth;
+  pw_rung *row;
+  int rows, rungs; /* done, and in all */
+  pw_progress progress;
+  const volatile sig_atomic_t *stop;
+  FILE *csv; /* NULL: none is wanted */
+} pw_compare;
+
+/* ---- compare_methods.c ---- */
+
+/* Reads the list of methods, "all" among them, and the ladders.  PW_INPUT with the nearest valid name. */
+int pw_compare_methods (pw_compare *x, pw_error *error);
+/* Rung i of a ladder, or 0 above its end; fixed steps are halved, tolerances go down by decades. */
+double pw_compare_rung (const pw_ladder *ladder, int adaptive, int i);
+
+/* ---- compare_motion.c ---- */
+
+int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error);
+void pw_motion_close (pw_motion *m);
+/* The errors of a motion, each the largest distance from the truth. */
+void pw_motion_distance (const pw_system *s, const pw_motion *truth, const pw_motion *m, double error[COMPARE_ERRORS]);
+/* Which kind of unit a state has. */
+int pw_motion_unit (const pw_system *s, int state);
+
+/* ---- compare_row.c ---- */
+
+/* One run of a method to the end, or the limit.  With a motion, its samples are taken and accounts are kept.  PW_RETRY:
+ * interrupted, or r->state is COMPARE_STOPPED. */
+int pw_compare_run (pw_compare *x, pw_rung *r, pw_motion *motion, pw_error *error);
+/* Fills a row: errors, then times.  PW_RETRY if interrupted; PW_MACHINE, PW_START; a method's failure is in the row. */
+int pw_compare_row (pw_compare *x, pw_rung *r, pw_motion *scratch, pw_error *error);
+
+/* ---- compare_truth.c, compare_file.c ---- */
+
+int pw_truth_find (pw_compare *x, pw_error *error);
+/* Reads a table of samples; sets t_end where it was not given. */
+int pw_truth_read (pw_compare *x, const char *path, pw_error *error);
+void pw_truth_close (pw_truth *t);
+
+/* ---- compare_table.c ---- */
+
+extern const char *const pw_compare_column[COMPARE_ERRORS]; /* names of the errors, "end.length" */
+void pw_compare_truth_line (const pw_compare *x, FILE *f);
+void pw_compare_head (const pw_compare *x, FILE *f);
+void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f);
+int pw_compare_csv_head (const pw_compare *x, pw_error *error);
+int pw_compare_csv_line (const pw_compare *x, const pw_rung *r, pw_error *error);
+/* How the truth was found, as DIR/truth.csv. */
+int pw_compare_csv_truth (const pw_compare *x, pw_error *error);
+
+/* ---- compare_plot.c ---- */
+
+/* Data, scripts and pictures, into the folder. */
+int pw_compare_plot (const pw_compare *x, pw_error *error);
+
+#endif

@@ -1,0 +1,163 @@
+/* The truth from a file: a table of samples with the columns of a run's; those that are missing are not compared. */
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/types.h>
+#include "compare.h"
+
+#define FILE_SAME 1e-9 /* of the end: times that differ by less are the same */
+
+typedef struct {
+  const char *path;
+  FILE *f;
+  char *line;
+  size_t room;
+  long number;  /* of the line */
+  int *place;   /* of each column after the first: in a motion, or -1 */
+  double *sign; /* reactions are -lambda */
+  int columns, known;
+} truth_file;
+
+/* ---- Lines ---- */
+
+static int file_line (truth_file *in) {
+  ssize_t n = getline (&in->line, &in->room, in->f);
+  if (n < 0) return 0;
+  while (n > 0 && (in->line[n - 1] == '\n' || in->line[n - 1] == '\r')) in->line[--n] = 0;
+  in->number++;
+  return n > 0 || file_line (in);
+}
+
+/* Cuts the next cell off. */
+static char *file_cell (char **rest) {
+  char *cell = *rest, *comma = strchr (cell, ',');
+  *rest = comma ? comma + 1 : cell + strlen (cell);
+  if (comma) *comma = 0;
+  return cell;
+}
+
+static int file_number (const truth_file *in, const char *cell, double *value, pw_error *error) {
+  if (pw_read_number (cell, value) == PW_OK) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--truth %s: line %ld: \"%.60s\" is not a number", in->path, in->number, cell);
+}
+
+/* ---- Columns ---- */
+
+/* "frame.x [m]" to its place in a motion, or -1. */
+static int file_place (const pw_system *s, const char *name, size_t n, double *sign) {
+  char known[300];
+  int states = 2 * pw_count_coordinates (s);
+  *sign = 1;
+  for (int i = 0; i < states; i++)
+    if (strlen (pw_state_name (s, i, known, sizeof known)) == n && memcmp (known, name, n) == 0) return i;
+  *sign = -1;
+  for (int i = 0; i < pw_count_rows (s); i++)
+    if (strlen (pw_reaction_name (s, i, known, sizeof known)) == n && memcmp (known, name, n) == 0) return states + i;
+  return -1;
+}
+
+static int file_columns (truth_file *in, const pw_system *s, pw_error *error) {
+  char example[300], *rest;
+  if (!file_line (in)) return pw_fail (error, PW_INPUT, "--truth %s: the file is empty", in->path);
+  for (const char *c = in->line; *c; c++) in->columns += *c == ',';
+  in->place = calloc ((size_t)in->columns + 1, sizeof *in->place);
+  in->sign = calloc ((size_t)in->columns + 1, sizeof *in->sign);
+  if (in->place == NULL || in->sign == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  rest = in->line;
+  const char *first = file_cell (&rest);
+  if (strcmp (first, "t") != 0 && strcmp (first, "t [s]") != 0)
+    return pw_fail (error, PW_INPUT, "--truth %s: the first column is \"%.60s\", expected \"t [s]\"", in->path, first);
+  for (int i = 0; i < in->columns; i++) {
+    const char *cell = file_cell (&rest), *unit = strstr (cell, " [");
+    in->place[i] = file_place (s, cell, unit ? (size_t)(unit - cell) : strlen (cell), &in->sign[i]);
+    in->known += in->place[i] >= 0 && in->place[i] < 2 * pw_count_coordinates (s);
+  }
+  if (in->known) return PW_OK;
+  return pw_fail (error, PW_INPUT, "--truth %s: no column is a state of this model, such as \"%s\"", in->path,
+                  pw_state_name (s, 0, example, sizeof example));
+}
+
+/* ---- Rows ---- */
+
+/* The next line's time; PW_RETRY at the end. */
+static int file_time (truth_file *in, char **rest, double *t, pw_error *error) {
+  if (!file_line (in)) return PW_RETRY;
+  *rest = in->line;
+  return file_number (in, file_cell (rest), t, error);
+}
+
+/* Rows after the start and up to the end; without an end, the last row's time is it. */
+static int file_count (truth_file *in, double *t_end, int *rows, pw_error *error) {
+  double t, last = 0, before = -INFINITY;
+  char *rest;
+  int status;
+  for (*rows = 0; (status = file_time (in, &rest, &t, error)) == PW_OK;) {
+    if (!(t > before))
+      return pw_fail (error, PW_INPUT, "--truth %s: line %ld: times must increase", in->path, in->number);
+    before = t;
+    if (t <= 0 || (*t_end > 0 && t > *t_end * (1 + FILE_SAME))) continue;
+    last = t;
+    ++*rows;
+  }
+  if (status != PW_RETRY) return status;
+  if (*t_end == 0) *t_end = last;
+  if (*rows > 0 && fabs (last - *t_end) <= FILE_SAME * *t_end) return PW_OK;
+  char end[32], reached[32];
+  return pw_fail (error, PW_INPUT, "--truth %s: no row at the end, t = %s s; the last one before it is at %s s",
+                  in->path, pw_format (end, *t_end, 9), pw_format (reached, last, 9));
+}
+
+static int file_row (truth_file *in, char *rest, double *x, int width, pw_error *error) {
+  for (int i = 0; i < width; i++) x[i] = NAN;
+  for (int i = 0; i < in->columns; i++) {
+    const char *cell = file_cell (&rest);
+    double value;
+    if (in->place[i] < 0) continue;
+    int status = file_number (in, cell, &value, error);
+    if (status != PW_OK) return status;
+    x[in->place[i]] = in->sign[i] * value;
+  }
+  return PW_OK;
+}
+
+/* Takes as many rows as there are samples, evenly, the last one among them. */
+static int file_rows (truth_file *in, int rows, double t_end, pw_motion *m, pw_error *error) {
+  char *rest;
+  double t;
+  for (int row = 0, k = 0; k < m->samples;) {
+    int status = file_time (in, &rest, &t, error);
+    if (status != PW_OK) return status;
+    if (t <= 0 || ++row < (int)((long long)rows * (k + 1) / m->samples)) continue;
+    m->t[k] = k + 1 < m->samples ? t : t_end;
+    status = file_row (in, rest, m->x + k++ * m->width, m->width, error);
+    if (status != PW_OK) return status;
+  }
+  return PW_OK;
+}
+
+static int file_read (truth_file *in, pw_compare *x, pw_error *error) {
+  int rows;
+  int status = file_columns (in, x->m.system, error);
+  double t_end = x->t_end_text ? x->t_end : 0;
+  if (status == PW_OK) status = file_count (in, &t_end, &rows, error);
+  if (status != PW_OK) return status;
+  x->t_end = t_end;
+  rewind (in->f);
+  in->number = 0;
+  file_line (in);
+  status = pw_motion_open (&x->truth.motion, x->m.system, rows < COMPARE_SAMPLES ? rows : COMPARE_SAMPLES, error);
+  return status == PW_OK ? file_rows (in, rows, t_end, &x->truth.motion, error) : status;
+}
+
+int pw_truth_read (pw_compare *x, const char *path, pw_error *error) {
+  truth_file in = { .path = path, .f = fopen (path, "r") };
+  if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, strerror (errno));
+  int status = file_read (&in, x, error);
+  snprintf (x->truth.about, sizeof x->truth.about, "%s", path);
+  fclose (in.f);
+  free (in.line);
+  free (in.place);
+  free (in.sign);
+  return status;
+}

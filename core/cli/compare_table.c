@@ -1,0 +1,171 @@
+/* Rows as lines of a table to read, and of a CSV. */
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+#include "compare.h"
+#include "sweep.h"
+
+const char *const pw_compare_column[COMPARE_ERRORS] = { "end.length",    "end.angle",      "end.speed",
+                                                        "end.rate",      "largest.length", "largest.angle",
+                                                        "largest.speed", "largest.rate",   "multiplier" };
+static const char *const table_unit[COMPARE_ERRORS] = { "m", "rad", "m/s", "rad/s", "m", "rad", "m/s", "rad/s", NULL };
+
+/* ---- To read ---- */
+
+/* "1.2e-11", "<1.2e-11", "-" where nothing is known. */
+static const char *table_number (double value, int below, char text[32]) {
+  if (isnan (value)) return "-";
+  snprintf (text, 32, "%s%.1e", below ? "<" : "", value);
+  return text;
+}
+
+static int table_width (const pw_compare *x) {
+  size_t width = 6;
+  for (int i = 0; i < x->methods; i++) {
+    size_t n = strlen (x->method[i].name);
+    if (n > width) width = n;
+  }
+  return (int)width;
+}
+
+void pw_compare_truth_line (const pw_compare *x, FILE *f) {
+  const pw_truth *t = &x->truth;
+  char a[32], b[32];
+  if (!t->known) {
+    fprintf (f, "no two methods reach the end together, so errors are not known; --truth FILE.csv would tell them\n");
+    return;
+  }
+  fprintf (f, "errors are taken against %s%s\n", t->about, x->truth_path ? ", as if it were exact" : "");
+  for (int i = 0; i < t->partners; i++)
+    fprintf (f, "  %s agrees with it to %s m, %s rad%s\n", t->partner[i].about,
+             table_number (t->partner[i].error[COMPARE_MOST + COMPARE_LENGTH], 0, a),
+             table_number (t->partner[i].error[COMPARE_MOST + COMPARE_ANGLE], 0, b),
+             i == 0 ? ": below that it cannot tell" : "");
+}
+
+void pw_compare_head (const pw_compare *x, FILE *f) {
+  int w = table_width (x);
+  fprintf (f, "%-*s %9s  %-18s  %-18s  %-17s  %-17s  %-35s  %s\n", w, "", "rtol", "error at the end", "largest error",
+           "residual of", "error of", "", "CPU time");
+  fprintf (f, "%-*s %9s  %8s  %8s  %8s  %8s  %8s %8s  %8s %8s  %8s %9s %7s %8s  %8s %6s\n", w, "method", "or step", "m",
+           "rad", "m", "rad", "position", "velocity", "multipl.", "energy J", "steps", "evaluat.", "Jacob.", "factor.",
+           "median s", "spread");
+}
+
+static void table_failure (const pw_rung *r, FILE *f) {
+  char t[32];
+  static const char *const what[] = { "", "failed", "stopped", "not run" };
+  fprintf (f, "  %s", what[r->state]);
+  if (r->state == COMPARE_FAILED) fprintf (f, " at t = %s s", pw_format (t, r->t, 4));
+  fprintf (f, ": %s\n", r->reason);
+}
+
+void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f) {
+  static const int shown[] = { COMPARE_END, COMPARE_END + 1, COMPARE_MOST, COMPARE_MOST + 1 };
+  char text[32], spread[32] = "-";
+  fprintf (f, "%-*s %9s", table_width (x), r->method->name, pw_format (text, r->rung, 4));
+  if (r->state != COMPARE_DONE) {
+    table_failure (r, f);
+    return;
+  }
+  for (int i = 0; i < 4; i++)
+    fprintf (f, "  %8s", table_number (r->error[shown[i]], (int)(r->below >> shown[i] & 1), text));
+  fprintf (f, "  %8s", table_number (r->statistics.position, 0, text));
+  fprintf (f, " %8s", table_number (r->statistics.velocity, 0, text));
+  fprintf (f, "  %8s", table_number (r->error[COMPARE_LAMBDA], (int)(r->below >> COMPARE_LAMBDA & 1), text));
+  fprintf (f, " %8s", table_number (r->balance, 0, text));
+  if (!isnan (r->spread)) snprintf (spread, sizeof spread, "%.0f %%", 100 * r->spread / r->cpu);
+  fprintf (f, "  %8ld %9ld %7ld %8ld  %8.2e %6s\n", r->statistics.steps, r->statistics.rhs, r->statistics.jacobians,
+           r->statistics.factorisations, r->cpu, spread);
+}
+
+/* ---- To compute with ---- */
+
+static int table_end (const pw_compare *x, pw_text *t, FILE *f, pw_error *error) {
+  int bad = t->failed;
+  pw_text_add (t, "\n");
+  bad |= t->failed;
+  if (!bad) bad = fputs (t->at, f) < 0 || fflush (f) != 0;
+  int out_of_memory = t->failed;
+  pw_text_free (t);
+  if (out_of_memory) return pw_fail (error, PW_MACHINE, "out of memory");
+  return bad ? pw_fail (error, PW_MACHINE, "cannot write into %s: %s", x->folder, strerror (errno)) : PW_OK;
+}
+
+static void table_names (pw_text *t) {
+  for (int i = 0; i < COMPARE_ERRORS; i++) pw_text_name (t, pw_compare_column[i], table_unit[i]);
+}
+
+int pw_compare_csv_head (const pw_compare *x, pw_error *error) {
+  pw_text t = { .at = NULL };
+  for (const char *const *c = (const char *const[]){ "method", "ladder", "rung", "status", NULL }; *c; c++)
+    pw_text_cell (&t, *c);
+  pw_text_name (&t, "t", "s");
+  table_names (&t);
+  pw_text_cell (&t, "below,residual.position,residual.velocity");
+  pw_text_name (&t, "balance", "J");
+  pw_text_cell (&t, "steps,rejected,rhs,jacobians,factorisations");
+  pw_text_name (&t, "cpu", "s");
+  pw_text_name (&t, "spread", "s");
+  pw_text_cell (&t, "repeats,reason");
+  return table_end (x, &t, x->csv, error);
+}
+
+/* The errors that are no more than the truth's uncertainty, by name. */
+static void table_below (pw_text *t, const pw_rung *r) {
+  pw_text_cell (t, "");
+  for (int i = 0, n = 0; i < COMPARE_ERRORS; i++) {
+    if (!(r->below >> i & 1)) continue;
+    if (n++) pw_text_add (t, " ");
+    pw_text_add (t, pw_compare_column[i]);
+  }
+}
+
+int pw_compare_csv_line (const pw_compare *x, const pw_rung *r, pw_error *error) {
+  static const char *const status[] = { "ok", "failed", "stopped", "not run" };
+  const pw_statistics *s = &r->statistics;
+  int run = r->state != COMPARE_SLOW;
+  pw_text t = { .at = NULL };
+  pw_text_cell (&t, r->method->name);
+  pw_text_cell (&t, r->method->adaptive ? "rtol" : "step");
+  pw_text_number (&t, r->rung);
+  pw_text_cell (&t, status[r->state]);
+  pw_text_number (&t, run ? r->t : NAN);
+  for (int i = 0; i < COMPARE_ERRORS; i++) pw_text_number (&t, r->error[i]);
+  table_below (&t, r);
+  const double rest[] = { s->position,
+                          s->velocity,
+                          r->balance,
+                          (double)s->steps,
+                          (double)s->rejected,
+                          (double)s->rhs,
+                          (double)s->jacobians,
+                          (double)s->factorisations,
+                          r->cpu,
+                          r->spread };
+  for (size_t i = 0; i < sizeof rest / sizeof *rest; i++) pw_text_number (&t, run ? rest[i] : NAN);
+  pw_text_number (&t, r->repeats);
+  pw_text_quoted (&t, r->reason);
+  return table_end (x, &t, x->csv, error);
+}
+
+int pw_compare_csv_truth (const pw_compare *x, pw_error *error) {
+  char path[4200];
+  snprintf (path, sizeof path, "%s/truth.csv", x->folder);
+  FILE *f = fopen (path, "w");
+  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  pw_text t = { .at = NULL };
+  pw_text_cell (&t, "truth,against");
+  table_names (&t);
+  int status = table_end (x, &t, f, error);
+  for (int i = -1; status == PW_OK && x->truth.known && i < x->truth.partners; i++) {
+    pw_text_quoted (&t, x->truth.about);
+    pw_text_quoted (&t, i < 0 ? "uncertainty" : x->truth.partner[i].about);
+    for (int k = 0; k < COMPARE_ERRORS; k++)
+      pw_text_number (&t, i < 0 ? x->truth.uncertainty[k] : x->truth.partner[i].error[k]);
+    status = table_end (x, &t, f, error);
+  }
+  if (fclose (f) != 0 && status == PW_OK)
+    return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  return status;
+}

@@ -1,0 +1,139 @@
+/* The truth, where none is given: methods that have little in common, each at its tightest.  Two of them that agree best
+ * are the truth, as far as they agree. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "compare.h"
+
+enum { TRUTH_CANDIDATES = COMPARE_PARTNERS + 1 };
+#define TRUTH_LOOSEST 1e-9 /* tolerances are loosened up to here if a method fails */
+#define TRUTH_PATIENCE 4   /* times the limit of a row */
+#define TRUTH_STEPS 1e5    /* of the method with fixed steps, at least */
+#define TRUTH_ROUND_OFF 8  /* eps of the largest number: nothing is known better */
+
+typedef struct {
+  pw_contestant method;
+  double rung;
+  int good;
+  pw_motion motion;
+} truth_candidate;
+
+/* ---- What is known about a motion ---- */
+
+/* Where columns are compared, agreement to the bit is no better than round-off. */
+static void truth_floor (const pw_compare *x, pw_truth *t) {
+  int n = pw_count_coordinates (x->m.system), loads = 0;
+  for (int k = 0; k < t->motion.samples; k++)
+    for (int j = 0; j < t->motion.width; j++) {
+      double value = fabs (t->motion.x[k * t->motion.width + j]);
+      if (isnan (value)) continue;
+      loads |= j >= 2 * n;
+      if (j < 2 * n) t->size[pw_motion_unit (x->m.system, j)] = fmax (t->size[pw_motion_unit (x->m.system, j)], value);
+    }
+  for (int i = 0; i < COMPARE_ERRORS; i++) {
+    double size = i < COMPARE_LAMBDA ? t->size[i % COMPARE_UNITS] : loads;
+    if (i < COMPARE_MOST) t->uncertainty[i] = t->uncertainty[i + COMPARE_MOST]; /* at the end it may be luck */
+    t->uncertainty[i] = fmax (t->uncertainty[i], TRUTH_ROUND_OFF * DBL_EPSILON * size);
+  }
+}
+
+/* ---- Candidates ---- */
+
+/* Runs one; a tolerance that proves too tight is loosened.  PW_RETRY: it has none to offer. */
+static int truth_run (pw_compare *x, truth_candidate *c, pw_error *error) {
+  double limit = x->limit;
+  int status = PW_RETRY;
+  x->limit *= TRUTH_PATIENCE;
+  for (; status != PW_OK && c->rung < (c->method.adaptive ? TRUTH_LOOSEST : INFINITY); c->rung *= 10) {
+    pw_rung r = { .method = &c->method, .rung = c->rung };
+    pw_error own = { 0 };
+    status = pw_compare_run (x, &r, &c->motion, &own);
+    if (status == PW_OK || *x->stop || r.state == COMPARE_STOPPED || !c->method.adaptive) break;
+    if (status == PW_MACHINE || status == PW_START) {
+      *error = own;
+      break;
+    }
+  }
+  x->limit = limit;
+  c->good = status == PW_OK;
+  return status == PW_MACHINE || status == PW_START ? status : *x->stop ? PW_RETRY : PW_OK;
+}
+
+/* How far two are apart, as a part of how large the motion is. */
+static double truth_apart (const pw_compare *x, const truth_candidate *a, const truth_candidate *b) {
+  double error[COMPARE_ERRORS], most = 0;
+  pw_truth t = { .motion = a->motion };
+  truth_floor (x, &t);
+  pw_motion_distance (x->m.system, &a->motion, &b->motion, error);
+  for (int i = 0; i < COMPARE_UNITS; i++) {
+    double part = error[COMPARE_MOST + i] / (t.size[i] > 0 ? t.size[i] : 1);
+    if (!(part <= most)) most = part;
+  }
+  return most;
+}
+
+static void truth_name (const truth_candidate *c, char *text, size_t size) {
+  char rung[32];
+  snprintf (text, size, "%s, %s %s%s", c->method.name, c->method.adaptive ? "rtol" : "step",
+            pw_format (rung, c->rung, 4), c->method.adaptive ? "" : " s");
+}
+
+/* The two that agree best; the first of them, which is the tighter one, is the truth. */
+static void truth_choose (pw_compare *x, truth_candidate *c) {
+  pw_truth *t = &x->truth;
+  int best = -1, with = -1;
+  double least = INFINITY;
+  for (int i = 0; i < TRUTH_CANDIDATES; i++)
+    for (int j = i + 1; j < TRUTH_CANDIDATES && c[i].good; j++) {
+      double apart = c[j].good ? truth_apart (x, &c[i], &c[j]) : NAN;
+      if (apart < least) least = apart, best = i, with = j;
+    }
+  if (best < 0) return;
+  t->known = 1;
+  truth_name (&c[best], t->about, sizeof t->about);
+  pw_motion_distance (x->m.system, &c[best].motion, &c[with].motion, t->uncertainty);
+  for (int i = 0; i < TRUTH_CANDIDATES; i++) {
+    int place = i == with ? 0 : t->partners + (t->partners == 0);
+    if (i == best || !c[i].good) continue;
+    truth_name (&c[i], t->partner[place].about, sizeof t->partner[place].about);
+    pw_motion_distance (x->m.system, &c[best].motion, &c[i].motion, t->partner[place].error);
+    t->partners = place + 1 > t->partners ? place + 1 : t->partners;
+  }
+  t->motion = c[best].motion;
+  c[best].motion = (pw_motion){ .samples = 0 };
+  truth_floor (x, t);
+}
+
+static int truth_make (pw_compare *x, pw_error *error) {
+  double step = fmin (x->ladder[0].to, x->t_end / TRUTH_STEPS);
+  truth_candidate c[TRUTH_CANDIDATES] = { { .method = { "erk8+projection", 1 }, .rung = 3e-14 },
+                                          { .method = { "rk4+projection", 0 }, .rung = step },
+                                          { .method = { "ida+ggl", 1 }, .rung = 1e-13 },
+                                          { .method = { "ida+baumgarte", 1 }, .rung = 1e-13 } };
+  int status = PW_OK;
+  pw_progress_count (&x->progress, "reference", "methods", 0, TRUTH_CANDIDATES);
+  for (int i = 0; status == PW_OK && i < TRUTH_CANDIDATES; i++, x->rows++) {
+    status = pw_motion_open (&c[i].motion, x->m.system, COMPARE_SAMPLES, error);
+    for (int k = 0; status == PW_OK && k < COMPARE_SAMPLES; k++)
+      c[i].motion.t[k] = k + 1 < COMPARE_SAMPLES ? x->t_end * (k + 1) / COMPARE_SAMPLES : x->t_end;
+    if (status == PW_OK) status = truth_run (x, &c[i], error);
+  }
+  pw_progress_end (&x->progress);
+  x->rows = 0;
+  if (status == PW_OK) truth_choose (x, c);
+  for (int i = 0; i < TRUTH_CANDIDATES; i++) pw_motion_close (&c[i].motion);
+  return status;
+}
+
+int pw_truth_find (pw_compare *x, pw_error *error) {
+  if (x->truth_path == NULL) return truth_make (x, error);
+  int status = pw_truth_read (x, x->truth_path, error);
+  if (status != PW_OK) return status;
+  x->truth.known = 1;
+  truth_floor (x, &x->truth);
+  return PW_OK;
+}
+
+void pw_truth_close (pw_truth *t) {
+  pw_motion_close (&t->motion);
+}
