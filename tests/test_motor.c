@@ -211,10 +211,41 @@ static void motor_arm (pw_model *m, const void *parameters) {
   pw_add_force (m, &(pw_force){ .name = "wind", .body = "lower", .at = { 0.1, 0.1 }, .fx = MOTOR_CONSTANT (0.3) });
 }
 
+/* Follows another body: its angle doubled, and its rate; a force that grows with its speed. */
+static int motor_follow (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)t;
+  value[0] = *(const double *)context * x[0];
+  if (gradient) gradient[0] = *(const double *)context;
+  return 0;
+}
+
+static void motor_leader (pw_model *m, const void *parameters) {
+  static const char *const angle[] = { "leader.phi", NULL }, *const rate[] = { "leader.omega", NULL };
+  static double twice = 2, brake = -0.3;
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "leader", .mass = 1, .inertia = 0.5, .rate = { 0, 0, 1 } });
+  pw_add_body (m, &(pw_body){ .name = "follower", .mass = 1, .inertia = 0.1, .start = { 1 }, .rate = { 0.5 } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "leader", "ground" } });
+  pw_add_motor (m, &(pw_motor){ .name = "M",
+                                .body = { "follower", "ground" },
+                                .stiffness = 8,
+                                .damping = 1,
+                                .limit = 3,
+                                .angle = { PW_FUNCTION, .function = { motor_follow, &twice, angle, NULL } },
+                                .rate = { PW_FUNCTION, .function = { motor_follow, &twice, rate, NULL } } });
+  pw_add_force (m, &(pw_force){ .name = "F",
+                                .body = "follower",
+                                .at = { 0.1, 0.2 },
+                                .axes = PW_AXES_BODY,
+                                .fy = { PW_FUNCTION, .function = { motor_follow, &brake, rate, NULL } } });
+  pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "leader", "ground" }, .stiffness = 2 });
+}
+
 static void test_methods (void **state) {
-  static const pw_plugin_table arm = TRIAL_TABLE (motor_arm);
+  static const pw_plugin_table arm = TRIAL_TABLE (motor_arm), leader = TRIAL_TABLE (motor_leader);
   (void)state;
   trial (&arm, 1.5);
+  trial (&leader, 1.5);
 }
 
 int main (void) {
