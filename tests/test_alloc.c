@@ -197,6 +197,18 @@ static int alloc_files (const char *path, pw_error *error) {
   return status;
 }
 
+static int alloc_text (const char *path, pw_error *error) {
+  pw_file *f = pw_file_open (path, error);
+  pw_model *m = f ? pw_file_model (f, error) : NULL;
+  int status = m ? pw_build (m, error) : error->status;
+  pw_system *s = status == PW_OK ? pw_compile (m, error) : NULL;
+  status = s ? PW_OK : error->status;
+  pw_free (s);
+  pw_model_free (m);
+  pw_file_close (f);
+  return status;
+}
+
 /* ---- Tests ---- */
 
 static void test_compile (void **state) {
@@ -237,6 +249,12 @@ static void test_files (void **state) {
   unlink (part);
 }
 
+static void test_texts (void **state) {
+  (void)state;
+  alloc_each (alloc_text, "tests/models/ezyroller.yaml");
+  alloc_each (alloc_text, "tests/models/arm.yaml");
+}
+
 /* A method allocates when it is opened, and not in a step. */
 static void test_steps (void **state) {
   (void)state;
@@ -260,7 +278,8 @@ static void test_steps (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_compile), cmocka_unit_test (test_runs),  cmocka_unit_test (test_selftest),
-    cmocka_unit_test (test_verify),  cmocka_unit_test (test_files), cmocka_unit_test (test_steps),
+    cmocka_unit_test (test_verify),  cmocka_unit_test (test_files), cmocka_unit_test (test_texts),
+    cmocka_unit_test (test_steps),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
