@@ -1,0 +1,63 @@
+/* n-trailer: a tractor on one axle pulls n trailers, each hitched on the axle before it, in a steady turn.
+ *
+ * With every centre of mass on its axle the radii follow R_i^2 = R_(i-1)^2 - L_i^2, all bodies turn at the same rate w, the
+ * hinges carry nothing and wheel i carries m_i w^2 R_i.
+ * (Laumond 1993, Controllability of a multibody mobile robot, for the vehicle.) */
+#include <math.h>
+#include <stdio.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double n, R, w, m0, I0, L, longer, m, ratio, rho;
+} trailers;
+
+static const pw_parameter parameters[] = {
+  { PW_AT (trailers, n), 2, "", "number of trailers", PW_COUNT },
+  { PW_AT (trailers, R), 2, "m", "radius the tractor turns on", PW_POSITIVE },
+  { PW_AT (trailers, w), 1, "rad/s", "rate of the turn", PW_REAL },
+  { PW_AT (trailers, m0), 1, "kg", "mass of the tractor", PW_POSITIVE },
+  { PW_AT (trailers, I0), 0.1, "kg m^2", "inertia of the tractor", PW_POSITIVE },
+  { PW_AT (trailers, L), 0.6, "m", "length of the first trailer, from hitch to axle", PW_POSITIVE },
+  { PW_AT (trailers, longer), 0.2, "m", "how much longer each further trailer is", PW_NONNEGATIVE },
+  { PW_AT (trailers, m), 2, "kg", "mass of the first trailer", PW_POSITIVE },
+  { PW_AT (trailers, ratio), 0.25, "", "mass of each further trailer over that of the one before", PW_POSITIVE },
+  { PW_AT (trailers, rho), 0.2, "m", "radius of gyration of the trailers", PW_POSITIVE },
+  { .name = NULL },
+};
+
+/* A body on its axle, on the circle of radius R about (0, R0), `angle` from the centre; it heads along the circle. */
+static void vehicle (pw_model *m, const trailers *p, const char *name, const char *axle, double R, double angle,
+                     double mass, double inertia) {
+  double c = cos (angle), s = sin (angle);
+  pw_add_body (m, &(pw_body){ .name = name,
+                              .mass = mass,
+                              .inertia = inertia,
+                              .start = { R * c, p->R + R * s, angle + PW_PI / 2 },
+                              .rate = { -p->w * R * s, p->w * R * c, p->w } });
+  pw_add_wheel (m, &(pw_wheel){ .name = axle, .body = name });
+}
+
+static void build (pw_model *m, const void *parameter) {
+  const trailers *p = parameter;
+  double R = p->R, angle = -PW_PI / 2, L = p->L, mass = p->m;
+  char name[24], axle[24], hitch[24], before[24] = "tractor";
+  vehicle (m, p, "tractor", "A0", R, angle, p->m0, p->I0);
+  for (int i = 1; i <= (int)p->n; i++, L += p->longer, mass *= p->ratio) {
+    if (L >= R) {
+      pw_refuse (m, "R = %g: trailer %d is too long to turn on this radius", p->R, i);
+      return;
+    }
+    R = sqrt (R * R - L * L);
+    angle -= atan2 (L, R);
+    snprintf (name, sizeof name, "trailer%d", i);
+    snprintf (axle, sizeof axle, "A%d", i);
+    snprintf (hitch, sizeof hitch, "H%d", i);
+    vehicle (m, p, name, axle, R, angle, mass, mass * p->rho * p->rho);
+    pw_add_pin (m, &(pw_pin){ .name = hitch, .body = { name, before }, .at = { { L, 0 } } });
+    snprintf (before, sizeof before, "trailer%d", i);
+  }
+}
+
+PW_MODEL (.about = "tractor with n trailers in a steady turn", .parameters = parameters,
+          .parameters_size = sizeof (trailers), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
+          .build = build);

@@ -1,0 +1,86 @@
+/* Theo Jansen's leg: a crank and seven links whose proportions make the foot walk.
+ *
+ * The lengths are those of the strandbeests, in hundredths of a metre at size 0.01: two triangles, b d e on the ground's pivot
+ * B and g h i with the foot, and the bars j, k, c and f.  The crank turns at constant speed about O.
+ * (Jansen 2007, The Great Pretender.) */
+#include <math.h>
+#include "pinwheel.h"
+
+typedef struct {
+  double size, density, omega;
+} leg;
+
+static const pw_parameter parameters[] = {
+  { PW_AT (leg, size), 0.01, "m", "unit of the lengths", PW_POSITIVE },
+  { PW_AT (leg, density), 0.5, "kg/m", "mass of the bars over their length", PW_POSITIVE },
+  { PW_AT (leg, omega), -PW_PI, "rad/s", "angular velocity of the crank", PW_REAL },
+  { .name = NULL },
+};
+
+/* Lengths in units of size. */
+static const double a = 38, b = 41.5, c = 39.3, d = 40.1, e = 55.8, f = 39.4, g = 36.7, h = 65.7, i = 49, j = 50,
+                    k = 61.9, l = 7.8, crank = 15;
+
+typedef struct {
+  double x, y;
+} point;
+
+/* The point at distances r from P and s from Q, to the left on the way from P to Q. */
+static point meet (point P, double r, point Q, double s) {
+  double x = Q.x - P.x, y = Q.y - P.y, D = x * x + y * y, u = (D + r * r - s * s) / (2 * D);
+  double v = sqrt (r * r / D - u * u);
+  return (point){ P.x + u * x - v * y, P.y + u * y + v * x };
+}
+
+static void bar (pw_model *m, const leg *p, const char *name, point P, point Q) {
+  double x = (Q.x - P.x) * p->size, y = (Q.y - P.y) * p->size, length = hypot (x, y), mass = p->density * length;
+  pw_add_body (m, &(pw_body){ .name = name,
+                              .mass = mass,
+                              .inertia = mass * length * length / 12,
+                              .start = { (P.x + Q.x) / 2 * p->size, (P.y + Q.y) / 2 * p->size, atan2 (y, x) } });
+}
+
+/* A plate of the mass of its rim, not turned at the start: its points are as far from its centre as in the world. */
+static void plate (pw_model *m, const leg *p, const char *name, point P, point Q, point R) {
+  double q = hypot (Q.x - P.x, Q.y - P.y) * p->size, r = hypot (R.x - Q.x, R.y - Q.y) * p->size,
+         s = hypot (P.x - R.x, P.y - R.y) * p->size, mass = p->density * (q + r + s);
+  pw_add_body (m, &(pw_body){ .name = name,
+                              .mass = mass,
+                              .inertia = mass * (q * q + r * r + s * s) / 36,
+                              .start = { (P.x + Q.x + R.x) / 3 * p->size, (P.y + Q.y + R.y) / 3 * p->size, 0 } });
+}
+
+static void build (pw_model *m, const void *parameter) {
+  const leg *p = parameter;
+  double u = p->size;
+  point O = { 0, 0 }, A = { crank, 0 }, B = { -a, -l };
+  point T = meet (B, b, A, j), K = meet (A, k, B, c), L = meet (B, d, T, e), M = meet (K, g, L, f),
+        F = meet (K, i, M, h);
+  point U = { (B.x + T.x + L.x) / 3, (B.y + T.y + L.y) / 3 }, V = { (K.x + M.x + F.x) / 3, (K.y + M.y + F.y) / 3 };
+  bar (m, p, "crank", O, A);
+  bar (m, p, "j", A, T);
+  bar (m, p, "k", A, K);
+  bar (m, p, "c", B, K);
+  bar (m, p, "f", L, M);
+  plate (m, p, "shoulder", B, T, L);
+  plate (m, p, "shin", K, M, F);
+#define PIN(Name, one, X1, Y1, two, X2, Y2) \
+  pw_add_pin (m, &(pw_pin){ .name = Name, .body = { one, two }, .at = { { (X1)*u, (Y1)*u }, { (X2)*u, (Y2)*u } } })
+  PIN ("O", "crank", -crank / 2, 0, "ground", 0, 0);
+  PIN ("B1", "shoulder", B.x - U.x, B.y - U.y, "ground", B.x, B.y);
+  PIN ("B2", "c", -c / 2, 0, "ground", B.x, B.y);
+  PIN ("A1", "crank", crank / 2, 0, "j", -j / 2, 0);
+  PIN ("A2", "crank", crank / 2, 0, "k", -k / 2, 0);
+  PIN ("T", "j", j / 2, 0, "shoulder", T.x - U.x, T.y - U.y);
+  PIN ("L", "f", -f / 2, 0, "shoulder", L.x - U.x, L.y - U.y);
+  PIN ("K1", "k", k / 2, 0, "c", c / 2, 0);
+  PIN ("K2", "c", c / 2, 0, "shin", K.x - V.x, K.y - V.y);
+  PIN ("M", "f", f / 2, 0, "shin", M.x - V.x, M.y - V.y);
+  pw_add_pfaffian (
+      m, &(pw_pfaffian){
+             .name = "motor", .body = { "crank", "ground" }, .a = { 0, 0, 1 }, .value = { .constant = p->omega } });
+}
+
+PW_MODEL (.about = "Theo Jansen's walking leg on a crank of constant speed", .parameters = parameters,
+          .parameters_size = sizeof (leg), .run = { .t_end = 4, .step = 1e-3, .method = "rk4+projection" },
+          .build = build);

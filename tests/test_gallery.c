@@ -1,0 +1,308 @@
+/* The models of the gallery against the truth each of them has. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include "check.h"
+#include "pinwheel-files.h"
+#include "scene.h"
+#include "trial.h"
+
+/* A model by name, with parameters set: gallery_open ("chain", "n", 3., NULL). */
+static pw_system *gallery_open (const char *model, ...) {
+  pw_error error = { 0 };
+  pw_file *f = pw_file_open (model, &error);
+  check_ok (f ? PW_OK : error.status, &error);
+  pw_model *m = pw_file_model (f, &error);
+  check_ok (m ? PW_OK : error.status, &error);
+  va_list list;
+  va_start (list, model);
+  for (const char *name; (name = va_arg (list, const char *)) != NULL;)
+    check_ok (pw_set (m, name, va_arg (list, double), &error), &error);
+  va_end (list);
+  check_ok (pw_build (m, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_file_close (f);
+  return s;
+}
+
+/* Runs with fixed steps to t. */
+static pw_run *gallery_run (pw_system *s, double step, double t) {
+  return runs_open (s, "rk4+projection", &(pw_settings){ .step = step, .span = t, .ledger = 1 });
+}
+
+static void gallery_close (pw_run *r, pw_system *s) {
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- Closed forms ---- */
+
+static void test_chaplygin_sleigh (void **state) {
+  (void)state;
+  pw_system *s = gallery_open ("chaplygin-sleigh", NULL);
+  pw_run *r = gallery_run (s, 1e-3, 20);
+  const double k2 = 0.5 + 0.25 * 0.25, A = sqrt (0.16 + k2 * 0.64), rate = 0.25 * A / k2, c = atanh (-0.4 / A);
+  for (double t = 2; t < 20; t += 2) {
+    pw_sample x = runs_to (r, t);
+    double z = rate * t + c, gd = atan (sinh (z)) - atan (sinh (c));
+    check_close ("theta", trial_state (s, &x, "sleigh.phi"), sqrt (k2) / 0.25 * gd, 1e-10, "100 h^4");
+    check_close ("w", trial_state (s, &x, "sleigh.omega"), A / sqrt (k2) / cosh (z), 1e-10, "100 h^4");
+  }
+  pw_sample x = runs_to (r, 20);
+  double phi = trial_state (s, &x, "sleigh.phi"), n = cos (phi), e = sin (phi);
+  double u = n * trial_state (s, &x, "sleigh.vx") + e * trial_state (s, &x, "sleigh.vy");
+  check_close ("theta", phi, 6.45795189339473933785, 1e-10, "100 h^4");
+  check_close ("u", u, 0.721096625581085413303, 1e-10, "100 h^4");
+  check_close ("x", trial_state (s, &x, "sleigh.x") - 0.25 * n, 8.013005665229505484, 1e-10, "100 h^4");
+  check_close ("y", trial_state (s, &x, "sleigh.y") - 0.25 * e, -2.351907635692708835, 1e-10, "100 h^4");
+  double w = trial_state (s, &x, "sleigh.omega");
+  check_close ("N", trial_reaction (s, &x, "blade.N"), 0.5 * u * w / k2, 1e-10, "m I u w / J");
+  gallery_close (r, s);
+}
+
+static void test_knife_edge_incline (void **state) {
+  (void)state;
+  pw_system *s = gallery_open ("knife-edge-incline", NULL);
+  pw_run *r = gallery_run (s, 1e-3, 10);
+  pw_sample x = runs_to (r, 10);
+  check_close ("x", trial_state (s, &x, "skate.x"), 0.7258393717013280771, 1e-10, "100 h^4");
+  check_close ("y", trial_state (s, &x, "skate.y"), 23.40550088629524659, 1e-10, "100 h^4");
+  check_close ("N", fabs (trial_reaction (s, &x, "edge.N")), 9.81 * fabs (sin (10.)), 1e-10, "100 h^4");
+  gallery_close (r, s);
+}
+
+static void test_pendulum (void **state) {
+  (void)state;
+  pw_system *s = gallery_open ("pendulum", NULL);
+  pw_run *r = gallery_run (s, 1e-3, 10);
+  pw_sample x = runs_to (r, 10);
+  check_close ("x", trial_state (s, &x, "bob.x"), 0.2750874625761168601, 1e-9, "1000 h^4: 10 s at 4 rad/s");
+  check_close ("y", trial_state (s, &x, "bob.y"), -0.9614192050991250643, 1e-9, "1000 h^4: 10 s at 4 rad/s");
+  gallery_close (r, s);
+}
+
+/* The steady turn of n trailers: nothing changes but the angle, to round-off and what it adds up to. */
+static void gallery_turn (int n, double longer, double ratio) {
+  char name[32];
+  pw_system *s = gallery_open ("n-trailer", "n", (double)n, "longer", longer, "ratio", ratio, NULL);
+  pw_run *r = gallery_run (s, 1e-3, 5);
+  pw_sample x = runs_to (r, 5);
+  double R2 = 4, L = 0.6, m = 1;
+  for (int i = 0; i <= n; i++) {
+    snprintf (name, sizeof name, i ? "trailer%d.x" : "tractor.x", i);
+    double X = trial_state (s, &x, name);
+    snprintf (name, sizeof name, i ? "trailer%d.y" : "tractor.y", i);
+    double Y = trial_state (s, &x, name);
+    check_close ("radius", hypot (X, Y - 2), sqrt (R2), 1e-11, "10 h^4 and round-off");
+    snprintf (name, sizeof name, "A%d.N", i);
+    check_close (name, trial_reaction (s, &x, name), m * sqrt (R2), 1e-10, "100 h^4 and round-off");
+    if (i > 0) {
+      snprintf (name, sizeof name, "H%d.Fx", i);
+      check_close (name, trial_reaction (s, &x, name), 0, 1e-10, "hinges carry nothing");
+      snprintf (name, sizeof name, "H%d.Fy", i);
+      check_close (name, trial_reaction (s, &x, name), 0, 1e-10, "hinges carry nothing");
+    }
+    R2 -= L * L;
+    L += longer;
+    m = i > 0 ? m * ratio : 2;
+  }
+  gallery_close (r, s);
+}
+
+static void test_n_trailer (void **state) {
+  (void)state;
+  gallery_turn (2, 0.2, 0.25);
+  gallery_turn (8, 0, 0.9);
+}
+
+/* ---- Energy ---- */
+
+/* What goes in is what is there: with `work` 0 energy is kept. */
+static void gallery_energy (pw_system *s, double step, double t, double bound, int driven) {
+  pw_run *r = gallery_run (s, step, t);
+  double start = runs_to (r, 0).kinetic;
+  pw_sample x = runs_to (r, t);
+  check_close ("balance", x.balance, 0, bound, "order h^4");
+  check_close ("kinetic and potential", x.kinetic + x.potential, start + x.work, bound, "order h^4");
+  if (driven)
+    assert_true (x.work > 0.1);
+  else
+    check_close ("work", x.work, 0, 64 * CHECK_EPS, "nothing works");
+  gallery_close (r, s);
+}
+
+static void test_chain (void **state) {
+  (void)state;
+  for (double n = 1; n <= 20; n *= 4) gallery_energy (gallery_open ("chain", "n", n, NULL), 2e-4, 1, n * 1e-7, 0);
+}
+
+static void test_snakeboard (void **state) {
+  (void)state;
+  gallery_energy (gallery_open ("snakeboard", NULL), 1e-3, 10, 1e-10, 1);
+  gallery_energy (gallery_open ("snakeboard", "swing", 0., "steer", 0., "trim", 0.4, "u0", 1.5, NULL), 1e-3, 10, 1e-10,
+                  0);
+}
+
+static void test_roller_racer (void **state) {
+  (void)state;
+  gallery_energy (gallery_open ("roller-racer", NULL), 1e-3, 5, 1e-7, 1);
+  gallery_energy (gallery_open ("roller-racer", "stiffness", 0., "damping", 0., "u0", 1., NULL), 1e-3, 5, 1e-7, 0);
+}
+
+/* ---- Mechanisms ---- */
+
+static void test_andrews_squeezer (void **state) {
+  static const char *const name[] = { "K1.phi", "K3.phi", "K5.phi", "K7.phi" };
+  static const double digits[] = { 15.8107711951537, 0.0408222401196458, 0.524409965879954, 1.04808074104194 };
+  (void)state;
+  pw_system *s = gallery_open ("andrews-squeezer", NULL);
+  pw_run *r = gallery_run (s, 2e-6, 0.03);
+  pw_sample x = runs_to (r, 0.03);
+  double beta = trial_state (s, &x, "K1.phi");
+  for (int i = 0; i < 4; i++)
+    check_close (name[i], trial_state (s, &x, name[i]), digits[i], 1e-10, "(h w)^4 at w = 1000 rad/s, 30 turned");
+  check_close ("Theta", trial_state (s, &x, "K2.phi") - beta, -15.7563710584118, 1e-10, "(h w)^4");
+  check_close ("Phi", trial_state (s, &x, "K4.phi") - digits[2], -0.534730116342080, 1e-10, "(h w)^4");
+  check_close ("Omega", trial_state (s, &x, "K6.phi") - digits[3], 0.534730116342080, 1e-10, "(h w)^4");
+  check_close ("work", x.work, 0.033 * (beta + 0.0617138900142764496), 1e-11, "torque times angle");
+  check_close ("balance", x.balance, 0, 1e-10, "(h w)^4 times 1 J");
+  gallery_close (r, s);
+}
+
+/* A point of a body in the world. */
+static void gallery_point (const pw_system *s, const pw_sample *x, const char *body, double along, double p[2]) {
+  char name[32];
+  snprintf (name, sizeof name, "%s.phi", body);
+  double phi = trial_state (s, x, name);
+  snprintf (name, sizeof name, "%s.x", body);
+  p[0] = trial_state (s, x, name) + along * cos (phi);
+  snprintf (name, sizeof name, "%s.y", body);
+  p[1] = trial_state (s, x, name) + along * sin (phi);
+}
+
+static void test_peaucellier (void **state) {
+  (void)state;
+  pw_system *s = gallery_open ("peaucellier", NULL);
+  pw_run *r = gallery_run (s, 1e-3, 2);
+  double low = 0, high = 0, P[2];
+  for (double t = 0.05; t < 2; t += 0.05) {
+    pw_sample x = runs_to (r, t);
+    gallery_point (s, &x, "PC", -0.25, P);
+    check_close ("x of P", P[0], 0.75 / 0.8, 64 * CHECK_EPS, "round-off of a projected state");
+    check_close ("y of P", P[1], 0.75 / 0.8 * tan (0.6 * cos (PW_PI * t)), 64 * CHECK_EPS, "round-off");
+    check_below ("closure", x.position, 16 * CHECK_EPS, "round-off");
+    low = fmin (low, P[1]), high = fmax (high, P[1]);
+  }
+  assert_true (high > 0.5 && low < -0.5);
+  gallery_close (r, s);
+}
+
+/* The loops stay closed, and after a turn the leg is where it was. */
+static void test_theo_jansen (void **state) {
+  (void)state;
+  pw_system *s = gallery_open ("theo-jansen", NULL);
+  pw_run *r = gallery_run (s, 1e-3, 2);
+  pw_sample x = runs_to (r, 0);
+  double foot = trial_state (s, &x, "shin.x"), shoulder = trial_state (s, &x, "shoulder.phi"), energy = x.kinetic;
+  for (double t = 0.1; t < 2; t += 0.1) check_below ("closure", runs_to (r, t).position, 16 * CHECK_EPS, "round-off");
+  x = runs_to (r, 2);
+  check_close ("crank", trial_state (s, &x, "crank.phi"), -2 * PW_PI, 1e-10, "100 h^4");
+  check_close ("shin", trial_state (s, &x, "shin.x"), foot, 1e-10, "100 h^4");
+  check_close ("shoulder", trial_state (s, &x, "shoulder.phi"), shoulder, 1e-10, "100 h^4");
+  check_close ("kinetic", x.kinetic, energy, 1e-10, "100 h^4");
+  check_close ("balance", x.balance, 0, 1e-10, "100 h^4");
+  gallery_close (r, s);
+}
+
+/* ---- Vehicles ---- */
+
+static void test_wheeled_snake (void **state) {
+  (void)state;
+  for (double n = 3; n <= 12; n += 3) gallery_energy (gallery_open ("wheeled-snake", "n", n, NULL), 5e-4, 4, 1e-7, 1);
+}
+
+/* The circle on which a point of a body goes: it starts at (x0, 0), along x, with the centre to its left. */
+static void gallery_circle (const pw_system *s, const pw_sample *x, const char *body, double along, double x0, double R,
+                            double bound, const char *reason) {
+  char name[32];
+  double P[2];
+  gallery_point (s, x, body, along, P);
+  snprintf (name, sizeof name, "%s.phi", body);
+  double phi = trial_state (s, x, name);
+  check_close ("centre, x", P[0] - R * sin (phi), x0, bound, reason);
+  check_close ("centre, y", P[1] + R * cos (phi), R, bound, reason);
+}
+
+static void test_car (void **state) {
+  (void)state;
+  pw_system *s = gallery_open ("car", NULL);
+  pw_run *r = gallery_run (s, 1e-3, 10);
+  assert_int_equal (pw_run_redundant (r), 2);
+  const double R = 2.6 / tan (0.3);
+  for (int t = 1; t <= 10; t++) {
+    pw_sample x = runs_to (r, t);
+    gallery_circle (s, &x, "car", -1.4, -1.4, R, 1e-10, "100 h^4");
+    check_close ("turned", trial_state (s, &x, "car.phi"), 5 / R * t, 1e-10, "100 h^4");
+  }
+  gallery_close (r, s);
+}
+
+/* The radius the middle of the rear axle ends on. */
+static double gallery_tyres (double stiffness) {
+  pw_system *s = gallery_open ("car-tyres", "stiffness", stiffness, NULL);
+  pw_run *r = gallery_run (s, 1e-3, 10);
+  pw_sample x = runs_to (r, 10);
+  double w = trial_state (s, &x, "car.omega"), phi = trial_state (s, &x, "car.phi");
+  double radius =
+      hypot (trial_state (s, &x, "car.vx") + 1.4 * w * sin (phi), trial_state (s, &x, "car.vy") - 1.4 * w * cos (phi)) /
+      w;
+  check_below ("dissipated", -x.loss, 0, "tyres that slip take energy");
+  gallery_close (r, s);
+  return radius;
+}
+
+static void test_car_tyres (void **state) {
+  (void)state;
+  const double R = 2.6 / tan (0.3);
+  double off[4], stiffness = 4e4;
+  for (int i = 0; i < 4; i++, stiffness *= 2) off[i] = gallery_tyres (stiffness) - R;
+  for (int i = 1; i < 4; i++) check_close ("order in 1 / C", log2 (off[i - 1] / off[i]), 1, 0.1, "first order");
+  check_close ("extrapolated", 2 * off[3] - off[2], 0, fabs (off[3]) / 20, "what is left is of second order");
+}
+
+static void test_differential_drive (void **state) {
+  (void)state;
+  pw_system *s = gallery_open ("differential-drive", NULL);
+  pw_run *r = gallery_run (s, 1e-3, 10);
+  assert_int_equal (pw_run_redundant (r), 1);
+  pw_sample x = { 0 };
+  for (int t = 1; t <= 10; t++) {
+    x = runs_to (r, t);
+    gallery_circle (s, &x, "robot", -0.05, 0, 0.15 * 1. / 0.2, 1e-11, "10 h^4");
+  }
+  check_close ("turned", trial_state (s, &x, "robot.phi"), 10 * 0.2 / 0.3, 1e-11, "10 h^4");
+  check_close ("left wheel", trial_state (s, &x, "left.spin"), 10 * 0.4 / 0.08, 1e-10, "100 h^4");
+  check_close ("right wheel", trial_state (s, &x, "right.spin"), 10 * 0.6 / 0.08, 1e-10, "100 h^4");
+  check_close ("balance", x.balance, 0, 1e-10, "100 h^4");
+  gallery_close (r, s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_chaplygin_sleigh),
+    cmocka_unit_test (test_knife_edge_incline),
+    cmocka_unit_test (test_pendulum),
+    cmocka_unit_test (test_n_trailer),
+    cmocka_unit_test (test_chain),
+    cmocka_unit_test (test_snakeboard),
+    cmocka_unit_test (test_roller_racer),
+    cmocka_unit_test (test_andrews_squeezer),
+    cmocka_unit_test (test_peaucellier),
+    cmocka_unit_test (test_theo_jansen),
+    cmocka_unit_test (test_wheeled_snake),
+    cmocka_unit_test (test_car),
+    cmocka_unit_test (test_car_tyres),
+    cmocka_unit_test (test_differential_drive),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
