@@ -164,7 +164,7 @@ static void compile_layout (const compile *c, pw_layout *l, pw_system **system, 
   s->scratch = pw_take (l, 3 * rows + coords + 3, sizeof *s->scratch);
   s->entry = pw_take (l, (size_t)c->size.entries, sizeof *s->entry);
   s->force = pw_take (l, (size_t)c->size.slabs, sizeof *s->force);
-  for (int i = 0; i < c->kinds; i++) compile_layout_slab (c, l, s->slab + i, i);
+  for (int i = 0; i < c->kinds; i++) compile_layout_slab (c, l, l->base ? s->slab + i : NULL, i);
   pools->x = pw_take (l, 2 * (size_t)c->reads, sizeof (double));
   pools->state = pw_take (l, (size_t)c->reads, sizeof (int));
   pools->text = pw_take (l, c->text, 1);
@@ -194,7 +194,13 @@ static void compile_bodies (const compile *c, pw_system *s, compile_pools *pools
 
 static int compile_source (const compile *c, pw_system *s, pw_source *source, const pw_signal *signal,
                            compile_pools *pools, const char *element, pw_error *error) {
-  source->signal = *signal;
+  if (signal->type == PW_FUNCTION && signal->function.open) {
+    void *own = signal->function.open (signal->function.context);
+    if (own == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", c->m->name);
+    source->signal = *signal;
+    source->signal.function.context = own;
+  } else
+    source->signal = *signal;
   if (signal->type != PW_FUNCTION || signal->function.reads == NULL) return PW_OK;
   source->state = pools->state;
   source->x = pools->x;
@@ -280,6 +286,8 @@ static int compile_slabs (const compile *c, pw_system *s, compile_pools *pools, 
     k->b.pose = s->pose;
     k->row = row;
     k->own = own;
+    k->b.q = s->q0 + own;
+    k->b.v = s->v0 + own;
     row += k->b.count * k->kind->rows;
     own += k->b.count * k->kind->own;
     int e = 0;
@@ -382,7 +390,7 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
            compile_count (&c, error) == PW_OK)
     s = compile_allocate (&c, &pools, error);
   if (s && compile_fill (&c, s, &pools, error) != PW_OK) {
-    free (s);
+    pw_free (s);
     s = NULL;
   }
   pw_names_close (&c.body);
@@ -393,6 +401,13 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
   return s;
 }
 
+/* Signals that have not been compiled are all zero. */
 void pw_free (pw_system *s) {
+  for (int k = 0; s && k < s->slabs; k++)
+    for (int i = 0; i < s->slab[k].b.count * s->slab[k].kind->signals; i++) {
+      const pw_signal *signal = &s->slab[k].source[i].signal;
+      if (signal->type == PW_FUNCTION && signal->function.open && signal->function.close)
+        signal->function.close (signal->function.context);
+    }
   free (s);
 }

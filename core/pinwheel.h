@@ -62,6 +62,9 @@ typedef struct {
   void *context;            /* passed to eval and breakpoint as it is */
   const char *const *reads; /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
   double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
+  void *(*open) (void *context);  /* each compiled system gets a context of its own, made from this one, or NULL without
+                                     memory; may be NULL: all systems, and their threads, share `context` */
+  void (*close) (void *context);  /* frees what open made, with the system; may be NULL */
 } pw_function;
 
 /* A signal; all zero is the constant 0. */

@@ -158,20 +158,22 @@ static void test_states (void **state) {
   text x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, ground], value: -w*a.phi - A*a.omega*a.phi^2}\n",
                     NULL, 0);
   const pw_function *f = &text_signal (&x, 0)->function;
+  void *own = f->open (f->context);
   double value[3] = { 0 }, gradient[2] = { 0 };
   (void)state;
   assert_string_equal (f->reads[0], "a.phi");
   assert_string_equal (f->reads[1], "a.omega");
   assert_null (f->reads[2]);
-  assert_int_equal (f->eval (f->context, 0, (double[]){ 1.5, -2 }, value, gradient), 0);
+  assert_int_equal (f->eval (own, 0, (double[]){ 1.5, -2 }, value, gradient), 0);
   check_close ("value", value[0], -2 * 1.5 + 0.1 * 2 * 1.5 * 1.5, 8 * CHECK_EPS, "round-off");
   double bound = 100 * pow (CHECK_EPS, 2.0 / 3); /* central differences */
   check_close ("derivative by phi", gradient[0], -2 + 2 * 0.1 * 2 * 1.5, bound, "differences");
   check_close ("derivative by omega", gradient[1], -0.1 * 1.5 * 1.5, bound, "differences");
+  f->close (own);
   text_close (&x);
 }
 
-/* The signal of a drive with its derivatives: value, rate and acceleration at a time; the context outlives the model. */
+/* The signal of a drive with its derivatives: value, rate and acceleration at a time; a system's context outlives the model. */
 static void test_drive (void **state) {
   text x =
       text_of (TWO_BODIES "elements:\n"
@@ -179,11 +181,13 @@ static void test_drive (void **state) {
                           "    value: {expression: k*sin(w*t), rate: k*w*cos(w*t), acceleration: -k*w^2*sin(w*t)}\n",
                "A", 0.3);
   const pw_signal s = *text_signal (&x, 0);
+  void *own = s.function.open (s.function.context);
   double value[3];
   (void)state;
   pw_model_free (x.model);
   x.model = NULL;
-  assert_int_equal (s.function.eval (s.function.context, 0.7, NULL, value, NULL), 0);
+  assert_int_equal (s.function.eval (own, 0.7, NULL, value, NULL), 0);
+  s.function.close (own);
   check_close ("value", value[0], 0.6 * sin (1.4), 8 * CHECK_EPS, "round-off");
   check_close ("rate", value[1], 1.2 * cos (1.4), 8 * CHECK_EPS, "round-off");
   check_close ("acceleration", value[2], -2.4 * sin (1.4), 16 * CHECK_EPS, "round-off");

@@ -143,17 +143,13 @@ pw_yaml *pw_yaml_open (const char *path, const char *shown, pw_error *error) {
     return NULL;
   }
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = pw_yaml_build };
-  if (pw_yaml_open_functions (y) != PW_OK)
-    pw_yaml_no_memory (y, error);
-  else if (yaml_read (y, path, error) == PW_OK)
-    return y;
+  if (yaml_read (y, path, error) == PW_OK) return y;
   pw_yaml_close (y);
   return NULL;
 }
 
 void pw_yaml_close (pw_yaml *y) {
   if (y == NULL) return;
-  pw_yaml_free_functions (y);
   pw_arena_free (&y->arena);
   free (y->source);
   free (y->path);

@@ -42,7 +42,6 @@ struct pw_yaml {
   const pw_node *bodies, *elements, *let; /* or NULL */
   pw_parameter *parameter;                /* ended by a NULL name */
   int parameters;
-  struct pw_yaml_functions *functions; /* signals that are expressions of time, until the file is closed */
 };
 
 /* ---- The text (yaml_source.c) ---- */
@@ -115,7 +114,5 @@ void pw_yaml_build (pw_model *m, const void *parameters);
 /* Reads a signal of a kind into a field (yaml_signal.c). */
 int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,
                     pw_error *error);
-int pw_yaml_open_functions (pw_yaml *y);
-void pw_yaml_free_functions (pw_yaml *y);
 
 #endif

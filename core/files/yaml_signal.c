@@ -6,10 +6,9 @@
  *   "M0 * cos (omega * t)"                         an expression of the time t; of states, BODY.phi, for forces
  *   {expression: .., rate: .., acceleration: ..}   the same for constraints, which need its derivatives by time
  *
- * An expression becomes a function signal with evaluators of its own, since a system may run in a thread of its own.  A
- * system may outlive its model, so they are kept until the file is closed. */
+ * An expression becomes a function signal.  Its context in the model is a recipe, from which each compiled system makes
+ * evaluators of its own, since it may run in a thread of its own and outlive the model. */
 #include <math.h>
-#include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
@@ -18,41 +17,67 @@ enum { SIGNAL_STATES = 16 };
 
 /* ---- Expressions of time ---- */
 
-typedef struct signal_function {
-  struct signal_function *next;
-  pw_expression *x[3];            /* value, rate, acceleration; NULL: not given */
-  double t;                       /* what the expressions see as t, */
-  double state[SIGNAL_STATES];    /* BODY.phi */
-  char *reads[SIGNAL_STATES + 1]; /* and the like */
-  int states;                     /* so many */
-  double value[];                 /* copies of the parameters, and of what `let` defines */
+/* As the model has it; all of it in the model's arena. */
+typedef struct {
+  const pw_yaml *y;
+  const char *text[3];                  /* value, rate, acceleration; NULL: not given */
+  const char *reads[SIGNAL_STATES + 1]; /* BODY.phi and the like */
+  int states;                           /* so many */
+  int values;                           /* parameters, and what `let` defines */
+  double value[];                       /* of them */
+} signal_recipe;
+
+/* As a system has it. */
+typedef struct {
+  pw_expression *x[3];         /* evaluators of the recipe's texts */
+  double t;                    /* what they see as t, */
+  double state[SIGNAL_STATES]; /* as BODY.phi */
+  int states;
+  double value[]; /* as parameters, and what `let` defines */
 } signal_function;
 
-/* All of a file. */
-struct pw_yaml_functions {
-  pthread_mutex_t lock;
-  signal_function *first;
-};
-
-static void signal_free (signal_function *f) {
+static void signal_close (void *context) {
+  signal_function *f = context;
   for (int i = 0; f && i < 3; i++) pw_expression_close (f->x[i]);
-  for (int i = 0; f && i < f->states; i++) free (f->reads[i]);
   free (f);
 }
 
-int pw_yaml_open_functions (pw_yaml *y) {
-  y->functions = calloc (1, sizeof *y->functions);
-  return y->functions && pthread_mutex_init (&y->functions->lock, NULL) == 0 ? PW_OK : PW_MACHINE;
+/* What an expression may name: the parameters, what `let` defines, the time, states. */
+static int signal_names (const signal_recipe *r, signal_function *f, pw_expression *x) {
+  int failed = 0, n = 0;
+  for (int i = 0; i < r->y->parameters; i++) failed |= pw_expression_name (x, r->y->parameter[i].name, &f->value[n++]);
+  for (const pw_node *node = r->y->let ? r->y->let->first : NULL; node; node = node->next->next)
+    failed |= pw_expression_name (x, node->text, &f->value[n++]);
+  failed |= pw_expression_name (x, "t", &f->t);
+  for (int i = 0; i < r->states; i++) failed |= pw_expression_name (x, r->reads[i], &f->state[i]);
+  return failed ? PW_MACHINE : PW_OK;
 }
 
-void pw_yaml_free_functions (pw_yaml *y) {
-  if (y->functions == NULL) return;
-  for (signal_function *f = y->functions->first, *next; f; f = next) {
-    next = f->next;
-    signal_free (f);
-  }
-  pthread_mutex_destroy (&y->functions->lock);
-  free (y->functions);
+/* Makes the evaluator of text i; PW_INPUT with the trouble, or PW_MACHINE. */
+static int signal_evaluator (const signal_recipe *r, signal_function *f, int i, pw_expression_trouble *trouble) {
+  f->x[i] = pw_expression_open (r->values + 1 + r->states);
+  if (f->x[i] == NULL || signal_names (r, f, f->x[i]) != PW_OK) return PW_MACHINE;
+  return pw_expression_set (f->x[i], r->text[i], trouble);
+}
+
+static signal_function *signal_empty (const signal_recipe *r) {
+  signal_function *f = calloc (1, sizeof *f + (size_t)r->values * sizeof *f->value);
+  if (f == NULL) return NULL;
+  f->states = r->states;
+  memcpy (f->value, r->value, (size_t)r->values * sizeof *f->value);
+  return f;
+}
+
+static void *signal_open (void *context) {
+  const signal_recipe *r = context;
+  signal_function *f = signal_empty (r);
+  pw_expression_trouble trouble;
+  for (int i = 0; f && i < 3; i++)
+    if (r->text[i] && signal_evaluator (r, f, i, &trouble) != PW_OK) {
+      signal_close (f);
+      return NULL;
+    }
+  return f;
 }
 
 static int signal_eval (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -77,7 +102,8 @@ static int signal_eval (void *context, double t, const double *x, double value[3
 
 typedef struct {
   pw_yaml_builder *b;
-  signal_function *f;
+  signal_recipe *recipe;
+  signal_function *f; /* to try it out */
   const pw_node *node;
   const char *what;
   int forced;
@@ -106,7 +132,7 @@ static int signal_state_name (signal_reader *r, const char *name, size_t at) {
 /* Notes a state the expression reads. */
 static int signal_note (void *context, const char *name, size_t length, size_t at) {
   signal_reader *r = context;
-  signal_function *f = r->f;
+  signal_recipe *f = r->recipe;
   char text[100];
   if (memchr (name, '.', length) == NULL) return PW_OK;
   snprintf (text, sizeof text, "%.*s", (int)length, name);
@@ -119,36 +145,22 @@ static int signal_note (void *context, const char *name, size_t length, size_t a
   if (f->states == SIGNAL_STATES || length >= sizeof text)
     return pw_yaml_fail (r->b->y, pw_yaml_place (r->b->y, r->node, at), r->error, "%s: more than %d states", r->what,
                          SIGNAL_STATES);
-  f->reads[f->states] = strdup (text);
+  f->reads[f->states] = pw_arena_text (&r->b->m->arena, text);
   if (f->reads[f->states] == NULL) return pw_yaml_no_memory (r->b->y, r->error);
   f->states++;
   return PW_OK;
 }
 
-/* What an expression may name: the parameters, what `let` defines, the time, states. */
-static int signal_names (const pw_yaml_builder *b, signal_function *f, pw_expression *x) {
-  const pw_yaml *y = b->y;
-  int failed = 0, n = 0;
-  for (int i = 0; i < y->parameters; i++) failed |= pw_expression_name (x, y->parameter[i].name, &f->value[n++]);
-  for (const pw_node *node = y->let ? y->let->first : NULL; node; node = node->next->next)
-    failed |= pw_expression_name (x, node->text, &f->value[n++]);
-  failed |= pw_expression_name (x, "t", &f->t);
-  for (int i = 0; i < f->states; i++) failed |= pw_expression_name (x, f->reads[i], &f->state[i]);
-  return failed ? PW_MACHINE : PW_OK;
-}
-
-static int signal_expression (signal_reader *r, pw_expression **x) {
+static int signal_expression (signal_reader *r, int i) {
   const pw_yaml *y = r->b->y;
-  const char *text;
   pw_expression_trouble trouble;
-  if (pw_yaml_text (y, r->node, r->what, &text, r->error) != PW_OK ||
-      pw_expression_names (text, signal_note, r) != PW_OK)
+  if (pw_yaml_text (y, r->node, r->what, &r->recipe->text[i], r->error) != PW_OK ||
+      pw_expression_names (r->node->text, signal_note, r) != PW_OK)
     return r->error->status;
-  *x = pw_expression_open (y->parameters + r->b->lets + 1 + r->f->states);
-  if (*x == NULL || signal_names (r->b, r->f, *x) != PW_OK) return pw_yaml_no_memory (y, r->error);
-  if (pw_expression_set (*x, text, &trouble) != PW_OK)
+  int status = signal_evaluator (r->recipe, r->f, i, &trouble);
+  if (status == PW_INPUT)
     return pw_yaml_fail (y, pw_yaml_place (y, r->node, trouble.at), r->error, "%s: %s", r->what, trouble.text);
-  return PW_OK;
+  return status == PW_OK ? PW_OK : pw_yaml_no_memory (y, r->error);
 }
 
 /* ---- Derivatives by time ---- */
@@ -187,32 +199,29 @@ static int signal_all (signal_reader *r, const pw_kind *kind, const pw_node *con
                            r->what, needed > 2 ? ", acceleration: .." : "");
     if (v[i] == NULL) continue;
     r->node = v[i];
-    if (signal_expression (r, &r->f->x[i]) != PW_OK) return r->error->status;
-    if (i > 0 && r->f->x[i - 1] && !r->f->states && signal_check (r, i, key[i]) != PW_OK) return r->error->status;
+    if (signal_expression (r, i) != PW_OK) return r->error->status;
+    if (i > 0 && r->f->x[i - 1] && !r->recipe->states && signal_check (r, i, key[i]) != PW_OK) return r->error->status;
   }
   return PW_OK;
 }
 
 static int signal_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
                            pw_signal *signal, pw_error *error) {
-  size_t values = (size_t)b->y->parameters + (size_t)b->lets;
-  signal_function *f = calloc (1, sizeof *f + values * sizeof *f->value);
-  if (f == NULL) return pw_yaml_no_memory (b->y, error);
-  memcpy (f->value, b->parameter, (size_t)b->y->parameters * sizeof *f->value);
-  memcpy (f->value + b->y->parameters, b->let, (size_t)b->lets * sizeof *f->value);
-  signal_reader r = { b, f, NULL, what, pw_kind_forced (kind), error };
-  if (signal_all (&r, kind, v) != PW_OK) {
-    signal_free (f);
-    return error->status;
-  }
-  struct pw_yaml_functions *all = b->y->functions;
-  pthread_mutex_lock (&all->lock);
-  f->next = all->first;
-  all->first = f;
-  pthread_mutex_unlock (&all->lock);
-  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = f } };
-  if (f->states) signal->function.reads = (const char *const *)f->reads;
-  return PW_OK;
+  int parameters = b->y->parameters, values = parameters + b->lets;
+  signal_recipe *r = pw_arena_take (&b->m->arena, sizeof *r + (size_t)values * sizeof *r->value);
+  if (r == NULL) return pw_yaml_no_memory (b->y, error);
+  r->y = b->y;
+  r->values = values;
+  memcpy (r->value, b->parameter, (size_t)parameters * sizeof *r->value);
+  memcpy (r->value + parameters, b->let, (size_t)b->lets * sizeof *r->value);
+  signal_reader reader = { b, r, signal_empty (r), NULL, what, pw_kind_forced (kind), error };
+  int status = reader.f ? signal_all (&reader, kind, v) : pw_yaml_no_memory (b->y, error);
+  signal_close (reader.f);
+  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = signal_eval, .context = r } };
+  signal->function.open = signal_open;
+  signal->function.close = signal_close;
+  if (r->states) signal->function.reads = r->reads;
+  return status;
 }
 
 /* ---- The forms of a signal ---- */
