@@ -489,7 +489,9 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   if (flag == IDA_TSTOP_RETURN) d->stop = NAN;
   ida_read (d, r->q, r->v, r->a, r->lambda);
   ida_statistics (d);
-  return ida_place (d, r->t, N_VGetArrayPointer (d->y)) == 0 ? PW_OK : ida_fail (d, IDA_RES_FAIL, error);
+  if (ida_place (d, r->t, N_VGetArrayPointer (d->y)) != 0) return ida_fail (d, IDA_RES_FAIL, error);
+  r->near = pw_saddle_factor (r->saddle) != PW_OK || pw_saddle_below (r->saddle, r->watch);
+  return PW_OK;
 }
 
 static int ida_at (pw_run *r, double t, pw_error *error) {

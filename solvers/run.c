@@ -111,9 +111,21 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
+/* The size of the accelerations, in units of L / T^2. */
+static double run_agitation (const pw_run *r) {
+  const pw_system *s = r->s;
+  double most = 1, per = s->scale.time * s->scale.time;
+  for (int j = 0; j < s->coords; j++) {
+    double size = fabs (r->a[j]) * per / (j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1);
+    if (!(size <= most)) most = size;
+  }
+  return most;
+}
+
 /* The state is consistent: energies, ledger and statistics begin here. */
 static void run_begin (pw_run *r) {
   pw_system *s = r->s;
+  r->calm = run_agitation (r);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
   if (r->settings.ledger) pw_sweep_ledger (s, r->lambda, r->rate);
   r->breakpoint = pw_next_breakpoint (s, r->t);
@@ -208,20 +220,35 @@ static int run_reselect (pw_run *r, pw_error *error) {
   return r->method->open (r, error);
 }
 
-int pw_advance (pw_run *r, double t_end, pw_error *error) {
-  int row;
-  if (!(r->t < t_end)) return PW_OK;
-  int status = r->redundant && r->pivot < r->reselect ? run_reselect (r, error) : PW_OK;
-  if (status == PW_OK) status = r->method->advance (r, t_end, error);
-  if (status != PW_OK) return status;
+/* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */
+static int run_outburst (pw_run *r, pw_error *error) {
+  const double outburst = 100;
+  double now = run_agitation (r);
+  if (r->near && !(now <= outburst * r->calm))
+    return pw_fail (error, PW_METHOD, "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
+                    now / r->calm);
+  if (!r->near) r->calm = fmax (r->calm, now);
+  return PW_OK;
+}
+
+static int run_judge (pw_run *r, pw_error *error) {
   pw_note_residuals (r);
-  if (r->redundant) {
-    pw_saddle_factor (r->saddle);
-    r->pivot = pw_saddle_pivot (r->saddle, &row);
-  }
   if (!(r->statistics.position <= PW_LOST && r->statistics.velocity <= PW_LOST) && r->stabilisation > 0)
     return run_lost (r, error);
-  return r->t >= r->breakpoint ? run_pass_breakpoint (r, error) : PW_OK;
+  return run_outburst (r, error);
+}
+
+int pw_advance (pw_run *r, double t_end, pw_error *error) {
+  int row, status = PW_OK;
+  if (!(r->t < t_end)) return PW_OK;
+  if (r->t >= r->breakpoint) status = run_pass_breakpoint (r, error);
+  if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
+  if (status == PW_OK) status = r->method->advance (r, t_end, error);
+  if (status == PW_OK) status = run_judge (r, error);
+  if (status != PW_OK || r->redundant == 0) return status;
+  pw_saddle_factor (r->saddle);
+  r->pivot = pw_saddle_pivot (r->saddle, &row);
+  return PW_OK;
 }
 
 int pw_advance_to (pw_run *r, double t, double t_end, pw_error *error) {
