@@ -84,15 +84,17 @@ static double adapt_factor (const struct pw_method_data *d, double error) {
   return fmin (5, fmax (0.2, f));
 }
 
-/* The step to t1.  Its error is that of the signals as they are before a discontinuity there: the one of the new state's
- * derivative is no error of the step. */
+/* The step to t1.  Where signals are discontinuous there its error is judged by the new state's derivative before that:
+ * the jump is no error of the step. */
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *off) {
   struct pw_method_data *d = r->data;
+  double before = pw_before_breakpoint (r, t1);
   r->near = 0;
   int status = pw_rk_step (r, h, t1, project, added);
-  if (status == PW_OK && t1 >= r->breakpoint)
-    status = pw_accelerate (r, pw_before_breakpoint (r, t1), d->q, d->v, d->A[0], d->lambda);
+  if (status == PW_OK && before < t1) status = pw_accelerate (r, before, d->q, d->v, d->A[0], d->lambda);
   *off = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
+  if (status == PW_OK && before < t1) status = pw_accelerate (r, t1, d->q, d->v, d->A[0], d->lambda);
+  if (status != PW_OK) *off = INFINITY;
   return status;
 }
 

@@ -224,6 +224,36 @@ static void test_breakpoint (void **state) {
   }
 }
 
+/* Samples go on over a step that ends there: it can be looked into. */
+static void test_samples_breakpoint (void **state) {
+  static const char *const method[] = { "erk5+none",       "erk5+projection", "erk8+none",
+                                        "erk8+projection", "rk4+projection",  "ida+ggl" };
+  (void)state;
+  for (int i = 0; i < 6; i++) {
+    pw_error error = { 0 };
+    pw_sample now;
+    const double rtol = 1e-8;
+    pw_system *s = adaptive_switched_scene (), *S = adaptive_switched_scene ();
+    pw_settings settings = { .rtol = rtol, .step = 0.005, .span = 1 };
+    pw_run *r = runs_open (s, method[i], &settings), *exact = runs_open (S, "rk4+projection", &(pw_settings){ 0 });
+    for (int k = 1; k <= 24; k++) {
+      double t = k / 24.;
+      check_ok (pw_advance_to (r, t, 1, &error), &error);
+      check_ok (pw_at (r, t, &now, &error), &error);
+      pw_sample there = runs_to (exact, t);
+      for (int j = 0; j < 6; j++)
+        check_close (method[i], now.q[j], there.q[j], 1e3 * rtol, "1e3 rtol; rk4 at its step");
+      if (k != 8) /* where they jump */
+        for (int j = 0; j < 6; j++)
+          check_close ("acceleration", now.a[j], there.a[j], 1e5 * rtol, "1e5 rtol: one derivative up");
+    }
+    pw_close (r);
+    pw_close (exact);
+    pw_free (s);
+    pw_free (S);
+  }
+}
+
 /* An end within round-off of the time reached is reached, and the next step is as long as if it had not been. */
 static void test_short_end (void **state) {
   (void)state;
@@ -328,9 +358,16 @@ static void test_useless_tolerances (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_orders),    cmocka_unit_test (test_tolerances),   cmocka_unit_test (test_work),
-    cmocka_unit_test (test_samples),   cmocka_unit_test (test_samples_bits), cmocka_unit_test (test_breakpoint),
-    cmocka_unit_test (test_short_end), cmocka_unit_test (test_stops),        cmocka_unit_test (test_useless_tolerances),
+    cmocka_unit_test (test_orders),
+    cmocka_unit_test (test_tolerances),
+    cmocka_unit_test (test_work),
+    cmocka_unit_test (test_samples),
+    cmocka_unit_test (test_samples_bits),
+    cmocka_unit_test (test_breakpoint),
+    cmocka_unit_test (test_samples_breakpoint),
+    cmocka_unit_test (test_short_end),
+    cmocka_unit_test (test_stops),
+    cmocka_unit_test (test_useless_tolerances),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
