@@ -41,6 +41,29 @@ static int yaml_domain (const pw_yaml *y, const pw_node *domain, const pw_node *
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 
+typedef struct {
+  const pw_names *names;
+  size_t at;
+} yaml_search;
+
+static int yaml_is_parameter (void *context, const char *name, size_t length, size_t at) {
+  yaml_search *s = context;
+  char text[64];
+  snprintf (text, sizeof text, "%.*s", (int)length, name);
+  s->at = at;
+  return length < sizeof text && pw_names_find (s->names, text) >= 0;
+}
+
+/* A default does not follow other parameters: --set would have to change it, too. */
+static int yaml_default (const pw_yaml *y, const pw_node *node, const char *what, pw_expression *x,
+                         const pw_names *names, pw_parameter *p, pw_error *error) {
+  yaml_search s = { names, 0 };
+  if (node->type == PW_YAML_SCALAR && pw_expression_names (node->text, yaml_is_parameter, &s))
+    return pw_yaml_fail (y, pw_yaml_place (y, node, s.at), error,
+                         "%s: a default is made of numbers; what follows from parameters belongs in let", what);
+  return pw_yaml_number (y, node, what, p->domain, x, &p->value, error);
+}
+
 static int yaml_parameter (const pw_yaml *y, const pw_node *node, pw_expression *x, pw_names *names, pw_parameter *p,
                            pw_error *error) {
   static const char *const key[] = { "name", "value", "unit", "about", "domain", "min", NULL };
@@ -57,7 +80,7 @@ static int yaml_parameter (const pw_yaml *y, const pw_node *node, pw_expression 
       (v[2] && pw_yaml_text (y, v[2], "unit", &p->unit, error) != PW_OK) ||
       (v[3] && pw_yaml_text (y, v[3], "about", &p->about, error) != PW_OK))
     return error->status;
-  return pw_yaml_number (y, v[1], what, p->domain, x, &p->value, error);
+  return yaml_default (y, v[1], what, x, names, p, error);
 }
 
 static int yaml_parameters (pw_yaml *y, const pw_node *list, pw_expression *x, pw_names *names, pw_error *error) {
