@@ -69,5 +69,5 @@ static void build (pw_model *m, const void *parameter) {
 }
 
 PW_MODEL (.about = "Peaucellier's inversor, which draws an exactly straight line", .parameters = parameters,
-          .parameters_size = sizeof (inversor), .run = { .t_end = 4, .step = 1e-3, .method = "rk4+projection" },
+          .parameters_size = sizeof (inversor), .run = { .t_end = 1, .step = 1e-3, .method = "rk4+projection" },
           .build = build);

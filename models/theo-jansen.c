@@ -7,13 +7,14 @@
 #include "pinwheel.h"
 
 typedef struct {
-  double size, density, omega;
+  double size, density, omega, load;
 } leg;
 
 static const pw_parameter parameters[] = {
   { PW_AT (leg, size), 0.01, "m", "unit of the lengths", PW_POSITIVE },
   { PW_AT (leg, density), 0.5, "kg/m", "mass of the bars over their length", PW_POSITIVE },
   { PW_AT (leg, omega), -PW_PI, "rad/s", "angular velocity of the crank", PW_REAL },
+  { PW_AT (leg, load), 0, "N", "force on the foot, up", PW_REAL },
   { .name = NULL },
 };
 
@@ -21,42 +22,65 @@ static const pw_parameter parameters[] = {
 static const double a = 38, b = 41.5, c = 39.3, d = 40.1, e = 55.8, f = 39.4, g = 36.7, h = 65.7, i = 49, j = 50,
                     k = 61.9, l = 7.8, crank = 15;
 
+/* A point and its velocity. */
 typedef struct {
-  double x, y;
+  double x, y, vx, vy;
 } point;
 
-/* The point at distances r from P and s from Q, to the left on the way from P to Q. */
+/* The point at distances r from P and s from Q, to the left on the way from P to Q; it moves so that it stays there. */
 static point meet (point P, double r, point Q, double s) {
-  double x = Q.x - P.x, y = Q.y - P.y, D = x * x + y * y, u = (D + r * r - s * s) / (2 * D);
-  double v = sqrt (r * r / D - u * u);
-  return (point){ P.x + u * x - v * y, P.y + u * y + v * x };
+  double x = Q.x - P.x, y = Q.y - P.y, D = x * x + y * y, along = (D + r * r - s * s) / (2 * D);
+  double aside = sqrt (r * r / D - along * along);
+  point X = { P.x + along * x - aside * y, P.y + along * y + aside * x, 0, 0 };
+  double px = X.x - P.x, py = X.y - P.y, qx = X.x - Q.x, qy = X.y - Q.y, area = px * qy - py * qx;
+  double vp = px * P.vx + py * P.vy, vq = qx * Q.vx + qy * Q.vy;
+  X.vx = (vp * qy - vq * py) / area;
+  X.vy = (vq * px - vp * qx) / area;
+  return X;
+}
+
+/* The rate at which the line from P to Q turns. */
+static double turn (point P, point Q) {
+  double x = Q.x - P.x, y = Q.y - P.y;
+  return (x * (Q.vy - P.vy) - y * (Q.vx - P.vx)) / (x * x + y * y);
+}
+
+static double distance (point P, point Q) {
+  return hypot (Q.x - P.x, Q.y - P.y);
 }
 
 static void bar (pw_model *m, const leg *p, const char *name, point P, point Q) {
-  double x = (Q.x - P.x) * p->size, y = (Q.y - P.y) * p->size, length = hypot (x, y), mass = p->density * length;
+  double length = distance (P, Q) * p->size, mass = p->density * length, half = p->size / 2;
   pw_add_body (m, &(pw_body){ .name = name,
                               .mass = mass,
                               .inertia = mass * length * length / 12,
-                              .start = { (P.x + Q.x) / 2 * p->size, (P.y + Q.y) / 2 * p->size, atan2 (y, x) } });
+                              .start = { (P.x + Q.x) * half, (P.y + Q.y) * half, atan2 (Q.y - P.y, Q.x - P.x) },
+                              .rate = { (P.vx + Q.vx) * half, (P.vy + Q.vy) * half, turn (P, Q) } });
+}
+
+static point centre (point P, point Q, point R) {
+  return (point){ (P.x + Q.x + R.x) / 3, (P.y + Q.y + R.y) / 3, (P.vx + Q.vx + R.vx) / 3, (P.vy + Q.vy + R.vy) / 3 };
 }
 
 /* A plate of the mass of its rim, not turned at the start: its points are as far from its centre as in the world. */
 static void plate (pw_model *m, const leg *p, const char *name, point P, point Q, point R) {
-  double q = hypot (Q.x - P.x, Q.y - P.y) * p->size, r = hypot (R.x - Q.x, R.y - Q.y) * p->size,
-         s = hypot (P.x - R.x, P.y - R.y) * p->size, mass = p->density * (q + r + s);
+  double q = distance (P, Q), r = distance (Q, R), s = distance (R, P), u = p->size;
+  double mass = p->density * (q + r + s) * u;
+  point C = centre (P, Q, R);
   pw_add_body (m, &(pw_body){ .name = name,
                               .mass = mass,
-                              .inertia = mass * (q * q + r * r + s * s) / 36,
-                              .start = { (P.x + Q.x + R.x) / 3 * p->size, (P.y + Q.y + R.y) / 3 * p->size, 0 } });
+                              .inertia = mass * (q * q + r * r + s * s) * u * u / 36,
+                              .start = { C.x * u, C.y * u, 0 },
+                              .rate = { C.vx * u, C.vy * u, turn (P, Q) } });
 }
 
 static void build (pw_model *m, const void *parameter) {
   const leg *p = parameter;
   double u = p->size;
-  point O = { 0, 0 }, A = { crank, 0 }, B = { -a, -l };
+  point O = { 0, 0, 0, 0 }, A = { crank, 0, 0, crank * p->omega }, B = { -a, -l, 0, 0 };
   point T = meet (B, b, A, j), K = meet (A, k, B, c), L = meet (B, d, T, e), M = meet (K, g, L, f),
         F = meet (K, i, M, h);
-  point U = { (B.x + T.x + L.x) / 3, (B.y + T.y + L.y) / 3 }, V = { (K.x + M.x + F.x) / 3, (K.y + M.y + F.y) / 3 };
+  point U = centre (B, T, L), V = centre (K, M, F);
   bar (m, p, "crank", O, A);
   bar (m, p, "j", A, T);
   bar (m, p, "k", A, K);
@@ -79,8 +103,12 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_pfaffian (
       m, &(pw_pfaffian){
              .name = "motor", .body = { "crank", "ground" }, .a = { 0, 0, 1 }, .value = { .constant = p->omega } });
+  pw_add_force (m, &(pw_force){ .name = "load",
+                                .body = "shin",
+                                .at = { (F.x - V.x) * u, (F.y - V.y) * u },
+                                .fy = { .constant = p->load } });
 }
 
 PW_MODEL (.about = "Theo Jansen's walking leg on a crank of constant speed", .parameters = parameters,
-          .parameters_size = sizeof (leg), .run = { .t_end = 4, .step = 1e-3, .method = "rk4+projection" },
+          .parameters_size = sizeof (leg), .run = { .t_end = 2, .step = 1e-3, .method = "rk4+projection" },
           .build = build);
