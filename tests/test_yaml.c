@@ -197,6 +197,25 @@ static void test_drive (void **state) {
   text_close (&x);
 }
 
+/* The derivatives are compared with differences, whether the signal is slow, fast, far from zero, or at rest. */
+static void test_derivatives (void **state) {
+  static const double scale[][3] = { { 1e-3, 2e-4, 0 }, { 1, 1, 0 }, { 0.1, 900, 1e6 }, { 1e4, 1e5, 3 }, { 0, 1, 0 } };
+  (void)state;
+  for (size_t i = 0; i < sizeof scale / sizeof *scale; i++) {
+    char source[800];
+    const double *s = scale[i];
+    snprintf (source, sizeof source,
+              TWO_BODIES "elements:\n"
+                         "  - drive: D\n    body: [a, ground]\n    at: [[0, 0], [0, 0]]\n    what: x\n    value:\n"
+                         "      expression: %g*sin(%g*t) + %g\n"
+                         "      rate: %g*%g*cos(%g*t)\n"
+                         "      acceleration: -%g*%g^2*sin(%g*t)\n",
+              s[0], s[1], s[2], s[0], s[1], s[1], s[0], s[1], s[1]);
+    text x = text_of (source, NULL, 0);
+    text_close (&x);
+  }
+}
+
 /* A signal without a value stops the run. */
 static void test_no_value (void **state) {
   text x = text_of (TWO_BODIES "elements:\n  - {torque: T, body: [a, b], value: sqrt(1 - t)}\n", NULL, 0);
@@ -221,9 +240,9 @@ static int text_teardown (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_ezyroller), cmocka_unit_test (test_table),    cmocka_unit_test (test_parameters),
-    cmocka_unit_test (test_let),       cmocka_unit_test (test_time),     cmocka_unit_test (test_states),
-    cmocka_unit_test (test_drive),     cmocka_unit_test (test_no_value),
+    cmocka_unit_test (test_ezyroller), cmocka_unit_test (test_table),       cmocka_unit_test (test_parameters),
+    cmocka_unit_test (test_let),       cmocka_unit_test (test_time),        cmocka_unit_test (test_states),
+    cmocka_unit_test (test_drive),     cmocka_unit_test (test_derivatives), cmocka_unit_test (test_no_value),
   };
   return cmocka_run_group_tests (tests, text_setup, text_teardown);
 }
