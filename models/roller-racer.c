@@ -30,9 +30,13 @@ static const pw_parameter parameters[] = {
 static void build (pw_model *m, const void *parameter) {
   const racer *p = parameter;
   double c = p->c * cos (p->delta), s = p->c * sin (p->delta);
+  double w = p->c != 0 ? -p->u0 * sin (p->delta) / p->c : 0; /* of the handlebar while the seat does not turn */
   pw_add_body (m, &(pw_body){ .name = "seat", .mass = p->m1, .inertia = p->I1, .rate = { p->u0, 0, 0 } });
-  pw_add_body (m,
-               &(pw_body){ .name = "handlebar", .mass = p->m2, .inertia = p->I2, .start = { p->b - c, -s, p->delta } });
+  pw_add_body (m, &(pw_body){ .name = "handlebar",
+                              .mass = p->m2,
+                              .inertia = p->I2,
+                              .start = { p->b - c, -s, p->delta },
+                              .rate = { p->u0 + w * s, -w * c, w } });
   pw_add_pin (m, &(pw_pin){ .name = "pivot", .body = { "seat", "handlebar" }, .at = { { p->b, 0 }, { p->c, 0 } } });
   pw_add_wheel (m, &(pw_wheel){ .name = "rear", .body = "seat", .at = { -p->a, 0 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "front", .body = "handlebar" });

@@ -25,11 +25,16 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* A truck with its axle and what turns it; the front one is at +l and turns as told, the rear one opposite. */
+/* A truck with its axle and what turns it, on a board that turns at w; the front one is at +l and turns as told, the rear
+ * one opposite. */
 static void truck (pw_model *m, const snakeboard *p, const char *name, const char *pivot, const char *axle,
-                   const char *drive, double side) {
+                   const char *drive, double side, double w) {
   double angle = side * (p->trim + p->steer);
-  pw_add_body (m, &(pw_body){ .name = name, .mass = p->mt, .inertia = p->It, .start = { side * p->l, 0, angle } });
+  pw_add_body (m, &(pw_body){ .name = name,
+                              .mass = p->mt,
+                              .inertia = p->It,
+                              .start = { side * p->l, 0, angle },
+                              .rate = { p->u0, side * p->l * w, w } });
   pw_add_pin (m, &(pw_pin){ .name = pivot, .body = { name, "board" }, .at = { { 0, 0 }, { side * p->l, 0 } } });
   pw_add_wheel (m, &(pw_wheel){ .name = axle, .body = name });
   pw_add_drive (m, &(pw_drive){ .name = drive,
@@ -42,16 +47,17 @@ static void truck (pw_model *m, const snakeboard *p, const char *name, const cha
 
 static void build (pw_model *m, const void *parameter) {
   const snakeboard *p = parameter;
-  double w = p->u0 * sin (p->trim + p->steer) / (p->l * cos (p->trim + p->steer));
+  double w = p->u0 * tan (p->trim + p->steer) / p->l; /* how fast the trucks let the board turn */
   pw_add_body (m, &(pw_body){ .name = "board", .mass = p->m, .inertia = p->I, .rate = { p->u0, 0, w } });
-  pw_add_body (m, &(pw_body){ .name = "rotor", .inertia = p->Ir, .start = { 0, 0, p->swing } });
+  pw_add_body (m,
+               &(pw_body){ .name = "rotor", .inertia = p->Ir, .start = { 0, 0, p->swing }, .rate = { p->u0, 0, w } });
   pw_add_pin (m, &(pw_pin){ .name = "bearing", .body = { "rotor", "board" } });
   pw_add_drive (m, &(pw_drive){ .name = "swing",
                                 .body = { "rotor", "board" },
                                 .what = PW_DRIVE_ANGLE,
                                 .value = { PW_HARMONIC, .harmonic = { .amplitude = p->swing, .omega = p->omega } } });
-  truck (m, p, "front", "F", "A", "steer-front", 1);
-  truck (m, p, "rear", "R", "B", "steer-rear", -1);
+  truck (m, p, "front", "F", "A", "steer-front", 1, w);
+  truck (m, p, "rear", "R", "B", "steer-rear", -1, w);
 }
 
 PW_MODEL (.about = "board that moves because its rider swings and steers", .parameters = parameters,

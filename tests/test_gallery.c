@@ -6,6 +6,7 @@
 #include "pinwheel-files.h"
 #include "scene.h"
 #include "trial.h"
+#include "verify.h"
 
 #define H4 1e-12    /* h^4, the order of the method, at h = 1 ms */
 #define HW4 1.6e-11 /* (h w)^4 at h = 2 us and a crank of w = 1000 rad/s */
@@ -291,6 +292,39 @@ static void test_differential_drive (void **state) {
   gallery_close (r, s);
 }
 
+/* ---- All of them ---- */
+
+/* A model runs as it says it wants to be run; its start, made consistent, is the one described. */
+static int gallery_default (void *context, const char *model, const char *path) {
+  pw_error error = { 0 };
+  pw_verification off;
+  (void)context;
+  print_message ("%s\n", model);
+  pw_file *f = pw_file_open (path, &error);
+  check_ok (f ? PW_OK : error.status, &error);
+  pw_run_defaults run = pw_file_table (f)->run;
+  pw_system *s = gallery_open (path, NULL);
+  pw_run *r = runs_open (s, run.method, &(pw_settings){ .step = run.step, .span = run.t_end, .ledger = 1 });
+  assert_int_equal (pw_run_start (r)->freed, 0);
+  check_below ("start, positions", pw_run_start (r)->position, 64 * CHECK_EPS, "described to round-off");
+  pw_sample x = runs_to (r, run.t_end);
+  double size = 1 + fabs (x.kinetic) + fabs (x.potential) + fabs (x.work) + fabs (x.loss);
+  check_below ("balance", fabs (x.balance) / size, 1e6 * H4, "h^4 times a rate");
+  assert_int_equal (pw_verify (s, x.t, x.q, x.v, x.a, x.lambda, &off), PW_OK);
+  check_below ("verifier, position", off.position.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
+  check_below ("verifier, velocity", off.velocity.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
+  check_below ("verifier, force", off.force.scaled, 1e4 * CHECK_EPS, "round-off of a projected state");
+  gallery_close (r, s);
+  pw_file_close (f);
+  return 0;
+}
+
+static void test_defaults (void **state) {
+  pw_error error = { 0 };
+  (void)state;
+  check_ok (pw_file_list (gallery_default, NULL, &error), &error);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_chaplygin_sleigh),
@@ -307,6 +341,7 @@ int main (void) {
     cmocka_unit_test (test_car),
     cmocka_unit_test (test_car_tyres),
     cmocka_unit_test (test_differential_drive),
+    cmocka_unit_test (test_defaults),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
