@@ -71,7 +71,7 @@ int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {
-  char element[120] = "the constraints";
+  char element[120] = "a constraint";
   int row;
   pw_saddle_pivot (r->saddle, &row);
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);

@@ -1,0 +1,67 @@
+#!/bin/sh
+# Tables and a figure of docs/benchmarks.md from a result of `make bench-engine`.
+#
+#   report.sh benchmarks/results/engine-MACHINE.csv docs/benchmarks.md docs/figures/engine-growth
+#
+# Replaces what stands between the lines <!-- engine --> and <!-- end --> of the page, and writes the figure as SVG and
+# PNG, if there is a gnuplot.
+set -eu
+csv=$1 page=$2 figure=$3
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+
+# Fields of a line of CSV, the first perhaps quoted, separated by tabs.
+split () {
+  awk 'NR > 1 { name = $0; rest = $0
+    if (/^"/) { name = substr ($0, 2); rest = name; sub (/".*/, "", name); sub (/^[^"]*",/, "", rest) }
+    else { sub (/,.*/, "", name); sub (/^[^,]*,/, "", rest) }
+    gsub (/,/, "\t", rest); print name "\t" rest }' "$csv"
+}
+
+split | awk -F '\t' '
+  function short(x) { return x == "" ? "" : sprintf(x >= 1000 ? "%.0f" : "%.4g", x) }
+  BEGIN { print "| what | per | by hand [ns] | Pinwheel [ns] | ratio | instructions by hand | Pinwheel | target | |"
+          print "|---|---|---|---|---|---|---|---|---|" }
+  $2 !~ /^(ratio|slope|B|s)$/ && $1 !~ /ns per body$/ {
+    printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", $1, $2, short($3), short($4), short($5), short($6), short($7), $8, $9 }
+' >"$work/table"
+{
+  echo
+  echo '| growth and memory | | target | |'
+  echo '|---|---|---|---|'
+  split | awk -F '\t' '$2 ~ /^(ratio|slope|s)$/ {
+    value = $5 != "" ? $5 : $4; printf "| %s | %s | %s | %s |\n", $1, value, $8, $9 }'
+} >>"$work/table"
+
+awk -v table="$work/table" '
+  /^<!-- end -->/ { skip = 0 }
+  !skip { print }
+  /^<!-- engine -->/ { skip = 1; print ""; while ((getline line < table) > 0) print line; print "" }
+' "$page" >"$work/page"
+cp "$work/page" "$page"
+
+for what in 'chain, evaluation' 'chain, projection' 'chain, step of ida+ggl' 'snake, evaluation' 'grid, evaluation'; do
+  split | awk -F '\t' -v what="$what, " 'index($1, what) == 1 && / bodies: ns per body/ {
+    n = substr($1, length(what) + 1); sub(/ .*/, "", n); print n, $4 }' >"$work/$what"
+done
+command -v gnuplot >/dev/null || { echo 'report.sh: no gnuplot, no figure' >&2; exit 0; }
+for type in svg png; do
+  case $type in svg) terminal='svg size 800,520 dynamic font "sans,13"' ;; *) terminal='pngcairo size 1000,650 font "sans,13"' ;; esac
+  gnuplot <<G
+set terminal $terminal
+set output '$figure.$type'
+set logscale xy
+set format x '10^{%T}'
+set xlabel 'bodies N'
+set ylabel 'time per body [ns]'
+set title 'Cost per body against the size of the scene'
+set key outside right top spacing 1.3
+set grid xtics ytics lc rgb '#dddddd' lt 1
+set xrange [7:150000]
+plot '$work/chain, evaluation' w lp lw 2 pt 7 lc rgb '#004488' t 'chain: one evaluation', \
+     '$work/chain, projection' w lp lw 2 pt 5 dt 2 lc rgb '#bb5566' t 'chain: one projection', \
+     '$work/chain, step of ida+ggl' w lp lw 2 pt 9 dt 4 lc rgb '#ddaa33' t 'chain: one step of ida+ggl', \
+     '$work/snake, evaluation' w lp lw 1 pt 6 dt 3 lc rgb '#228833' t 'wheeled snake: one evaluation', \
+     '$work/grid, evaluation' w lp lw 1 pt 4 dt 5 lc rgb '#666666' t 'grid of pinned bars: one evaluation'
+G
+done
