@@ -86,7 +86,7 @@ static int compare_open (pw_compare *x, pw_error *error) {
  * last one, or guessed for a method of order 5. */
 static double compare_predict (const pw_compare *x, int first, int adaptive) {
   const pw_rung *last = &x->row[x->rows - 1];
-  if (x->rows == first || last->state == COMPARE_FAILED) return 0;
+  if (x->rows == first || last->state == COMPARE_FAILED || last->state == COMPARE_REFUSED) return 0;
   if (last->state != COMPARE_DONE) return INFINITY;
   if (!adaptive) return 2 * last->cpu;
   if (x->rows < first + 2 || last[-1].state != COMPARE_DONE) return 1.6 * last->cpu;
@@ -162,6 +162,11 @@ static int compare_finish (pw_compare *x, int status, pw_error *error) {
   }
   if (x->csv) bad = fclose (x->csv) != 0;
   x->csv = NULL;
+  if (stopped && x->rows == 0) {
+    if (x->folder) remove (part);
+    fputs ("pinwheel: interrupted before the first row was done\n", stderr);
+    return PW_INTERRUPTED;
+  }
   if (stopped) {
     fprintf (stderr, "pinwheel: interrupted; %d of %d rows are done%s%s\n", x->rows, x->rungs,
              x->folder ? ", and kept in " : "", x->folder ? part : "");
@@ -178,7 +183,7 @@ static int compare_verdict (const pw_compare *x, pw_error *error) {
   const pw_rung *failed = NULL;
   for (int i = 0; i < x->rows; i++) {
     if (x->row[i].state == COMPARE_DONE) return PW_OK;
-    if (x->row[i].state == COMPARE_FAILED) failed = &x->row[i];
+    if (x->row[i].state == COMPARE_FAILED || x->row[i].state == COMPARE_REFUSED) failed = &x->row[i];
   }
   return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last of them: %s", failed->reason)
                 : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");

@@ -11,7 +11,7 @@
 #include "cli.h"
 #include "progress.h"
 
-enum { COMPARE_SAMPLES = 100, COMPARE_REPEATS = 5, COMPARE_PARTNERS = 3 };
+enum { COMPARE_SAMPLES = 100, COMPARE_REPEATS = 9, COMPARE_PARTNERS = 3 };
 
 /* Errors: the largest of the coordinates and rates of a unit, at the end, then over all samples; of the multipliers
  * relative to the largest one of the same unit. */
@@ -34,13 +34,13 @@ typedef struct {
   double from, to; /* from > to > 0 */
 } pw_ladder;
 
-typedef enum { COMPARE_DONE, COMPARE_FAILED, COMPARE_STOPPED, COMPARE_SLOW } pw_row_state;
+typedef enum { COMPARE_DONE, COMPARE_FAILED, COMPARE_REFUSED, COMPARE_STOPPED, COMPARE_SLOW } pw_row_state;
 
 /* A rung of a method's ladder. */
 typedef struct {
   const pw_contestant *method;
   double rung;                  /* tolerance, or step [s] */
-  pw_row_state state;           /* stopped: at the limit; slow: not run */
+  pw_row_state state;           /* refused: not begun; stopped: at the limit; slow: not run */
   double t;                     /* reached [s] */
   double error[COMPARE_ERRORS]; /* NaN: not known; at the truth's uncertainty: no more than this */
   unsigned below;               /* bit i: error i is no more than the truth's uncertainty */

@@ -47,6 +47,7 @@ static int methods_read (pw_compare *x, pw_error *error) {
   char *at = x->names;
   for (int all = 0;; text++) {
     size_t n = strcspn (text, ",");
+    if (n == 0) return pw_fail (error, PW_INPUT, "--methods \"%.80s\": a name is missing", x->methods_text);
     if (n == 3 && strncmp (text, "all", 3) == 0) {
       if (!all) at = methods_add_all (x, at);
       all = 1;
@@ -88,8 +89,15 @@ static int methods_ladder (const char *option, const char *text, pw_ladder *ladd
   return PW_OK;
 }
 
+/* Decades as one writes them: 1e-6, whatever the division of 1e-5 by 10 leaves behind the twelfth digit. */
+static double methods_rounded (double rung) {
+  char text[32];
+  pw_read_number (pw_format (text, rung, 12), &rung);
+  return rung;
+}
+
 double pw_compare_rung (const pw_ladder *ladder, int adaptive, int i) {
-  double rung = adaptive ? ladder->from / pow (10, i) : ldexp (ladder->from, -i);
+  double rung = adaptive ? methods_rounded (ladder->from / pow (10, i)) : ldexp (ladder->from, -i);
   return rung >= ladder->to * (1 - 1e-9) ? rung : 0;
 }
 

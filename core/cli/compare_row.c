@@ -6,7 +6,8 @@
 
 #define ROW_SHORT 0.005 /* a batch of steps that took less processor time [s] may be longer the next time */
 #define ROW_LONG 0.02
-#define ROW_ENOUGH 1.0 /* three repeats that took so long [s] tell enough */
+#define ROW_FEW 3      /* repeats at least, unless the limit forbids it */
+#define ROW_ENOUGH 0.5 /* more are made until they have taken so long [s] */
 
 /* ---- A run ---- */
 
@@ -33,7 +34,7 @@ static int row_samples (const pw_compare *x, pw_rung *r, pw_run *run, pw_motion 
 /* Steps in batches, so that clocks are read seldom. */
 static int row_steps (pw_compare *x, pw_rung *r, pw_run *run, pw_motion *m, pw_error *error) {
   int status = PW_OK, next = 0;
-  long batch = 1;
+  long batch = 8;
   while (status == PW_OK && pw_time (run) < x->t_end) {
     double due = m && next < m->samples ? m->t[next] : x->t_end, start = pw_cpu_clock ();
     long n = 0;
@@ -95,7 +96,7 @@ static int row_compare (const void *a, const void *b) {
 static int row_times (pw_compare *x, pw_rung *r, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;
-  while (n < COMPARE_REPEATS && !(n >= 3 && sum > ROW_ENOUGH) && sum <= x->limit) {
+  while (n < COMPARE_REPEATS && !(n >= ROW_FEW && sum > ROW_ENOUGH) && sum <= x->limit) {
     int status = pw_compare_run (x, r, NULL, error);
     if (status != PW_OK) return status;
     sum += cpu[n++] = r->cpu;
@@ -110,7 +111,7 @@ static int row_times (pw_compare *x, pw_rung *r, pw_error *error) {
 
 static void row_stopped (const pw_compare *x, pw_rung *r) {
   char limit[32], t[32];
-  snprintf (r->reason, sizeof r->reason, "too slow: stopped at t = %s s, at the limit of %s s", pw_format (t, r->t, 4),
+  snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", pw_format (t, r->t, 4),
             pw_format (limit, x->limit, 4));
 }
 
@@ -129,7 +130,7 @@ int pw_compare_row (pw_compare *x, pw_rung *r, pw_motion *scratch, pw_error *err
   }
   if (status == PW_RETRY && *x->stop) return PW_RETRY;
   if (status == PW_MACHINE || status == PW_START) return pw_fail (error, status, "%s", own.text);
-  r->state = COMPARE_FAILED;
+  r->state = status == PW_INPUT ? COMPARE_REFUSED : COMPARE_FAILED;
   snprintf (r->reason, sizeof r->reason, "%s", own.status ? own.text : "the method gave up");
   return PW_OK;
 }

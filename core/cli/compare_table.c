@@ -54,9 +54,10 @@ void pw_compare_head (const pw_compare *x, FILE *f) {
 
 static void table_failure (const pw_rung *r, FILE *f) {
   char t[32];
-  static const char *const what[] = { "", "failed", "stopped", "not run" };
+  static const char *const what[] = { "", "failed", "refused", "stopped", "not run" };
   fprintf (f, "  %s", what[r->state]);
-  if (r->state == COMPARE_FAILED) fprintf (f, " at t = %s s", pw_format (t, r->t, 4));
+  if (r->state == COMPARE_FAILED && strncmp (r->reason, "t = ", 4) != 0)
+    fprintf (f, " at t = %s s", pw_format (t, r->t, 4));
   fprintf (f, ": %s\n", r->reason);
 }
 
@@ -122,7 +123,7 @@ static void table_below (pw_text *t, const pw_rung *r) {
 }
 
 int pw_compare_csv_line (const pw_compare *x, const pw_rung *r, pw_error *error) {
-  static const char *const status[] = { "ok", "failed", "stopped", "not run" };
+  static const char *const status[] = { "ok", "failed", "refused", "stopped", "not run" };
   const pw_statistics *s = &r->statistics;
   int run = r->state != COMPARE_SLOW;
   pw_text t = { .at = NULL };

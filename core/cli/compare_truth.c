@@ -6,9 +6,10 @@
 #include "compare.h"
 
 enum { TRUTH_CANDIDATES = COMPARE_PARTNERS + 1 };
-#define TRUTH_LOOSEST 1e-9 /* tolerances are loosened up to here if a method fails */
-#define TRUTH_PATIENCE 4   /* times the limit of a row */
-#define TRUTH_STEPS 1e5    /* of the method with fixed steps, at least */
+#define TRUTH_LIMIT 10     /* processor time a candidate may take, at least [s] */
+#define TRUTH_LOOSEST 1e-9 /* tolerances are loosened up to here if a method fails, */
+#define TRUTH_FEWEST 1000  /* fixed steps up to the end over this, */
+#define TRUTH_STEPS 1e5    /* from the end over this, or the ladder's last one */
 #define TRUTH_ROUND_OFF 8  /* eps of the largest number: nothing is known better */
 
 typedef struct {
@@ -35,20 +36,22 @@ static void truth_floor (const pw_compare *x, pw_truth *t) {
     if (i < COMPARE_MOST) t->uncertainty[i] = t->uncertainty[i + COMPARE_MOST]; /* at the end it may be luck */
     t->uncertainty[i] = fmax (t->uncertainty[i], TRUTH_ROUND_OFF * DBL_EPSILON * size);
   }
+  if (t->uncertainty[COMPARE_LAMBDA] >= 1) t->uncertainty[COMPARE_LAMBDA] = 0; /* as large as they are: not known */
 }
 
 /* ---- Candidates ---- */
 
-/* Runs one; a tolerance that proves too tight is loosened.  PW_RETRY: it has none to offer. */
+/* Runs one; a tolerance or step that proves too small is made larger.  PW_RETRY: it has none to offer. */
 static int truth_run (pw_compare *x, truth_candidate *c, pw_error *error) {
   double limit = x->limit;
   int status = PW_RETRY;
-  x->limit *= TRUTH_PATIENCE;
-  for (; status != PW_OK && c->rung < (c->method.adaptive ? TRUTH_LOOSEST : INFINITY); c->rung *= 10) {
+  x->limit = fmax (x->limit, TRUTH_LIMIT);
+  double loosest = c->method.adaptive ? TRUTH_LOOSEST : x->t_end / TRUTH_FEWEST;
+  for (; status != PW_OK && c->rung <= loosest; c->rung *= 10) {
     pw_rung r = { .method = &c->method, .rung = c->rung };
     pw_error own = { 0 };
     status = pw_compare_run (x, &r, &c->motion, &own);
-    if (status == PW_OK || *x->stop || r.state == COMPARE_STOPPED || !c->method.adaptive) break;
+    if (status == PW_OK || *x->stop || r.state == COMPARE_STOPPED) break;
     if (status == PW_MACHINE || status == PW_START) {
       *error = own;
       break;

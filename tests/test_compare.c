@@ -1,0 +1,256 @@
+/* Comparisons from outside: rows and ladders, orders, truths made and read, limits, failures, files, bad input. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+/* Columns of compare.csv, from 0. */
+enum {
+  METHOD,
+  LADDER,
+  RUNG,
+  STATUS,
+  TIME,
+  END,
+  MOST = END + 4,
+  MULTIPLIER = END + 8,
+  BELOW,
+  POSITION,
+  VELOCITY,
+  BALANCE,
+  STEPS,
+  REJECTED,
+  RHS,
+  JACOBIANS,
+  FACTORISATIONS,
+  CPU,
+  SPREAD,
+  REPEATS,
+  REASON
+};
+
+#define SHORT "--t-end 2 --step-ladder 0.1:0.02 --rtol-ladder 1e-5:1e-7"
+
+/* The cell of a row, from 0, of compare.csv in a folder; no text in quotes comes before it. */
+static const char *compare_cell (const char *file, int row, int column) {
+  static char cell[600];
+  const char *at = cli_file (file);
+  assert_non_null (at);
+  for (int i = 0; i <= row; i++) {
+    at = strchr (at, '\n');
+    assert_non_null (at);
+    at++;
+  }
+  for (int i = 0; i < column; i++) at = strchr (at, ',') + 1;
+  snprintf (cell, sizeof cell, "%.*s", (int)strcspn (at, column == REASON ? "\n" : ",\n"), at);
+  return cell;
+}
+
+static double compare_number (const char *file, int row, int column) {
+  return strtod (compare_cell (file, row, column), NULL);
+}
+
+/* Rows come in the order of the methods, decades of tolerances, halves of steps. */
+static void test_rows (void **state) {
+  (void)state;
+  cli_good ("pinwheel compare ezyroller --methods rk4+projection,ida+ggl,erk5:steps=fixed " SHORT
+            " -o @/rows && cut -d, -f1-4 @/rows/compare.csv && ls @/rows");
+  const char *table = strstr (cli_out, "method,ladder");
+  assert_non_null (table);
+  assert_string_equal (table, "method,ladder,rung,status\n"
+                              "rk4+projection,step,0.10000000000000001,ok\n"
+                              "rk4+projection,step,0.050000000000000003,ok\n"
+                              "rk4+projection,step,0.025000000000000001,ok\n"
+                              "ida+ggl,rtol,1.0000000000000001e-05,ok\n"
+                              "ida+ggl,rtol,9.9999999999999995e-07,ok\n"
+                              "ida+ggl,rtol,9.9999999999999995e-08,ok\n"
+                              "erk5:steps=fixed,step,0.10000000000000001,ok\n"
+                              "erk5:steps=fixed,step,0.050000000000000003,ok\n"
+                              "erk5:steps=fixed,step,0.025000000000000001,ok\n"
+                              "compare.csv\ntruth.csv\nwork-precision-angles.gp\nwork-precision-angles.png\n"
+                              "work-precision-angles.svg\nwork-precision.dat\nwork-precision.gp\nwork-precision.png\n"
+                              "work-precision.svg\n");
+}
+
+/* Fixed-step methods converge at their order, against a truth that is better than all of them. */
+static void test_orders (void **state) {
+  (void)state;
+  cli_good ("pinwheel compare ezyroller --methods rk4+none,rk4+projection,erk5+projection:steps=fixed --t-end 2 "
+            "--step-ladder 0.1:0.02 -o @/order");
+  const double order[3] = { 4, 4, 5 };
+  for (int m = 0; m < 3; m++)
+    for (int column = MOST; column < MOST + 2; column++) {
+      double slope = log2 (compare_number ("order/compare.csv", 3 * m + 1, column) /
+                           compare_number ("order/compare.csv", 3 * m + 2, column));
+      check_below ("order less slope", order[m] - slope, 0.5, "steps that are not small");
+    }
+  for (int row = 0; row < 9; row++) {
+    assert_string_equal (compare_cell ("order/compare.csv", row, BELOW), "");
+    assert_true (compare_number ("order/compare.csv", row, MOST) >= compare_number ("order/compare.csv", row, END));
+    assert_true (compare_number ("order/compare.csv", row, BALANCE) > 0);
+    assert_true (compare_number ("order/compare.csv", row, REPEATS) >= 3);
+  }
+}
+
+/* What a row says about cost is what a run says: neither samples nor accounts are counted. */
+static void test_row_is_run (void **state) {
+  (void)state;
+  static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+baumgarte" };
+  for (int m = 0; m < 3; m++) {
+    char command[600];
+    snprintf (command, sizeof command,
+              "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 -o @/as-run "
+              ">@/table\npinwheel run ezyroller --method %s --t-end 2 --rtol 1e-6 --step 0.01 --json -",
+              method[m], method[m]);
+    cli_good (command);
+    const struct {
+      const char *group, *key;
+      int column;
+    } same[] = { { "statistics", "steps", STEPS },         { "statistics", "rhs", RHS },
+                 { "statistics", "jacobians", JACOBIANS }, { "statistics", "factorisations", FACTORISATIONS },
+                 { "residual", "position", POSITION },     { "residual", "velocity", VELOCITY } };
+    for (size_t i = 0; i < sizeof same / sizeof *same; i++)
+      assert_true (compare_number ("as-run/compare.csv", 0, same[i].column) ==
+                   cli_number (cli_out, same[i].group, same[i].key, NULL));
+  }
+}
+
+/* A run's own table as truth: the same method and rung has no error but round-off; another one has that between them. */
+static void test_truth (void **state) {
+  (void)state;
+  cli_good ("pinwheel run ezyroller --method rk4+projection --step 0.025 --t-end 2 --every 0.1 -o @/truth.csv >@/run &&"
+            " pinwheel compare ezyroller --methods rk4+projection --truth @/truth.csv --step-ladder 0.05:0.025 -o @/t");
+  assert_non_null (strstr (cli_out, "as if it were exact"));
+  assert_true (compare_number ("t/compare.csv", 0, TIME) == 2);
+  assert_true (compare_number ("t/compare.csv", 0, MOST) > 1e-8);
+  assert_true (compare_number ("t/compare.csv", 1, MOST) < 16 * CHECK_EPS);
+  assert_non_null (strstr (compare_cell ("t/compare.csv", 1, BELOW), "largest.length largest.angle"));
+  /* a table with some columns compares these alone */
+  cli_good (
+      "cut -d, -f1,4 @/truth.csv >@/few.csv && pinwheel compare ezyroller --methods rk4 --truth @/few.csv --t-end "
+      "1 --step-ladder 0.05 -o @/few");
+  assert_string_equal (compare_cell ("few/compare.csv", 0, END), "nan");
+  assert_true (compare_number ("few/compare.csv", 0, END + 1) > 0);
+  assert_string_equal (compare_cell ("few/compare.csv", 0, MULTIPLIER), "nan");
+}
+
+/* The truth of its own making agrees with digits computed in quadruple precision (tests/reference) as far as it claims. */
+static void test_own_truth (void **state) {
+  (void)state;
+  const double x[3] = { 0.122485077560987708, -0.0509563103339871023, -0.0717230785643341303 };
+  cli_good ("pinwheel compare ezyroller --methods rk4 --step-ladder 0.1 --t-end 2 -o @/own >@/table && "
+            "head -2 @/own/truth.csv | tail -1 | cut -d, -f4,5; "
+            "pinwheel run ezyroller --method erk8+projection --rtol 3e-14 --t-end 2 --json @/own.json >@/table");
+  assert_non_null (strstr (cli_file ("own/truth.csv"), "erk8+projection, rtol 3e-14"));
+  const char *at = strstr (cli_file ("own/truth.csv"), "\"uncertainty\",");
+  assert_non_null (at);
+  at += strlen ("\"uncertainty\",");
+  double length = strtod (at, NULL), angle = strtod (strchr (at, ',') + 1, NULL);
+  assert_true (length > 0 && length < 1e-11 && angle > 0 && angle < 1e-11);
+  const char *json = cli_file ("own.json"), *const key[3] = { "x", "y", "phi" };
+  for (int i = 0; i < 3; i++)
+    check_close (key[i], cli_number (json, "bodies", "frame", key[i], NULL), x[i], 4 * (i < 2 ? length : angle),
+                 "4 times the uncertainty stated");
+}
+
+/* All methods there are: each is a row, with a reason if it does not reach the end. */
+static void test_all (void **state) {
+  (void)state;
+  cli_good (
+      "pinwheel compare ezyroller --t-end 0.5 --step-ladder 0.01 --rtol-ladder 1e-6 -o @/all >@/table; pinwheel "
+      "list methods | grep -c '^    +'; tail -n +2 @/all/compare.csv | wc -l; grep -vc ',\"\"$' @/all/compare.csv "
+      "|| true");
+  int methods = 0, rows = 0;
+  assert_int_equal (sscanf (cli_out, "%d %d", &methods, &rows), 2);
+  assert_int_equal (methods, rows);
+}
+
+static void test_limit (void **state) {
+  (void)state;
+  int status =
+      cli_run ("pinwheel compare ezyroller --methods rk4 --t-end 2 --step-ladder 0.01:1e-5 --limit 1e-3 -o @/l");
+  assert_int_equal (status, 0);
+  assert_string_equal (compare_cell ("l/compare.csv", 0, STATUS), "ok");
+  assert_string_equal (compare_cell ("l/compare.csv", 9, STATUS), "not run");
+  assert_string_equal (compare_cell ("l/compare.csv", 9, REASON), "\"too slow; the limit is 0.001 s\"");
+  assert_string_equal (compare_cell ("l/compare.csv", 9, STEPS), "nan");
+}
+
+/* A failure keeps its row, its reason and the time reached; the others go on. */
+static void test_failure (void **state) {
+  (void)state;
+  cli_good ("pinwheel compare ezyroller --methods erk8+projection --t-end 1 --rtol-ladder 1e-14:1e-13 -o @/f");
+  assert_string_equal (compare_cell ("f/compare.csv", 0, STATUS), "ok");
+  assert_string_equal (compare_cell ("f/compare.csv", 1, STATUS), "refused");
+  assert_non_null (strstr (compare_cell ("f/compare.csv", 1, REASON), "round-off allows no less"));
+  cli_bad ("pinwheel compare ezyroller --methods erk8+projection --t-end 1 --rtol-ladder 1e-15 >@/out1", 4,
+           "no method has reached the end; the last of them: setting rtol = 1e-15: round-off allows no less than "
+           "2.2e-14");
+}
+
+/* Interrupted in the middle: rows done stay. */
+static void test_interrupt (void **state) {
+  (void)state;
+  int status =
+      cli_run ("pinwheel run ezyroller --t-end 100 --step 0.05 --every 10 -o @/long.csv "
+               ">@/table\n\"${PINWHEEL:-build/pinwheel}\" compare ezyroller --methods rk4 --t-end 100 --step-ladder "
+               "0.1:1e-5 --limit 100 -o @/i &\n"
+               "p=$!; while ! grep -q '^rk4' @/i/compare.csv.part 2>/dev/null; do sleep 0.05; done\n"
+               "kill -INT $p; wait $p; test $? = 130 && ls @/i");
+  assert_int_equal (status, 0);
+  assert_non_null (strstr (cli_out, "compare.csv.part\ntruth.csv\n"));
+  assert_non_null (strstr (cli_err, "rows are done, and kept in"));
+  assert_string_equal (compare_cell ("i/compare.csv.part", 0, STATUS), "ok");
+}
+
+static void test_bad (void **state) {
+  (void)state;
+  const struct {
+    const char *arguments, *message;
+  } bad[] = {
+    { "nosuch", "there is no model \"nosuch\"; did you mean \"ezyroller\"?" },
+    { "ezyroller --methods rk5", "there is no integrator \"rk5\"; did you mean \"rk4\"?" },
+    { "ezyroller --methods all,ida+gll", "integrator ida has no stabilisation \"gll\"; did you mean \"ggl\"?" },
+    { "ezyroller --methods rk4,", "--methods \"rk4,\": a name is missing" },
+    { "ezyroller --limt 3", "compare has no option \"--limt\"; did you mean \"--limit\"?" },
+    { "ezyroller --limit 0", "--limit 0: expected a number > 0" },
+    { "ezyroller --t-end nan", "--t-end nan: expected a finite number" },
+    { "ezyroller --rtol-ladder 1e-3:x", "--rtol-ladder: \"x\" is not a number" },
+    { "ezyroller --step-ladder 0:1", "--step-ladder 0: expected a number > 0" },
+    { "ezyroller --step-ladder 1:1e-40", "--step-ladder 1:1e-40: too long a ladder" },
+    { "ezyroller --set m=1", "model ezyroller has no parameter \"m\"; did you mean \"a\"?" },
+    { "ezyroller --truth @/none.csv", "--truth @/none.csv: cannot be read: No such file or directory" },
+    { "ezyroller --truth @/empty.csv", "--truth @/empty.csv: the file is empty" },
+    { "ezyroller --truth @/x.csv", "--truth @/x.csv: the first column is \"x\", expected \"t [s]\"" },
+    { "ezyroller --truth @/y.csv", "--truth @/y.csv: no column is a state of this model, such as \"frame.x\"" },
+    { "ezyroller --truth @/z.csv", "--truth @/z.csv: line 2: \"one\" is not a number" },
+    { "ezyroller --truth @/back.csv", "--truth @/back.csv: line 3: times must increase" },
+    { "ezyroller --truth @/short.csv --t-end 2",
+      "--truth @/short.csv: no row at the end, t = 2 s; the last one before it is at 1 s" },
+  };
+  cli_write ("empty.csv", "");
+  cli_write ("x.csv", "x,t\n0,0\n");
+  cli_write ("y.csv", "t,y\n0,0\n");
+  cli_write ("z.csv", "t,frame.x\n1,one\n");
+  cli_write ("back.csv", "t,frame.x\n1,0\n0.5,0\n");
+  cli_write ("short.csv", "t,frame.x\n1,0\n");
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    char command[300];
+    snprintf (command, sizeof command, "pinwheel compare %s", bad[i].arguments);
+    cli_bad (command, 2, bad[i].message);
+  }
+  cli_write ("file", "");
+  cli_bad ("pinwheel compare ezyroller -o @/file/x", 1, "cannot make the folder @/file/x: Not a directory");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_rows),  cmocka_unit_test (test_orders),    cmocka_unit_test (test_row_is_run),
+    cmocka_unit_test (test_truth), cmocka_unit_test (test_own_truth), cmocka_unit_test (test_all),
+    cmocka_unit_test (test_limit), cmocka_unit_test (test_failure),   cmocka_unit_test (test_interrupt),
+    cmocka_unit_test (test_bad),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
