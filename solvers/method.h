@@ -53,6 +53,8 @@ struct pw_run {
 
 /* Value of an option by name; it must exist. */
 double pw_option_value (const pw_run *r, const char *name);
+/* 1 if the run takes steps of the given size. */
+int pw_fixed_steps (const pw_run *r);
 /* 1 if the run's stabilisation has this name. */
 int pw_stabilised_by (const pw_run *r, const char *name);
 

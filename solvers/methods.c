@@ -149,6 +149,12 @@ double pw_option_value (const pw_run *r, const char *name) {
   return r->option[i];
 }
 
+int pw_fixed_steps (const pw_run *r) {
+  for (int i = 0; r->method->options[i].name; i++)
+    if (strcmp (r->method->options[i].name, "steps") == 0) return r->option[i] != 0;
+  return !r->method->adaptive;
+}
+
 int pw_stabilised_by (const pw_run *r, const char *name) {
   return strcmp (r->method->stabilisations[r->stabilisation].name, name) == 0;
 }

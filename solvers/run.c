@@ -193,7 +193,7 @@ static int run_lost (pw_run *r, pw_error *error) {
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
   if (row >= 0 && r->active && !r->active[row])
     snprintf (cause, sizeof cause, "constraints contradict each other");
-  else if (!r->method->adaptive)
+  else if (pw_fixed_steps (r))
     snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)",
                   r->t, cause, element, now.position, now.velocity);
