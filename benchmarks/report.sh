@@ -55,7 +55,7 @@ set format x '10^{%T}'
 set xlabel 'bodies N'
 set ylabel 'time per body [ns]'
 set title 'Cost per body against the size of the scene'
-set key below maxcols 2 spacing 1.3 width 2
+set key inside bottom right spacing 1.2
 set grid xtics ytics lc rgb '#dddddd' lt 1
 set xrange [7:150000]
 plot '$work/chain, evaluation' w lp lw 2 pt 7 lc rgb '#004488' t 'chain: one evaluation', \
