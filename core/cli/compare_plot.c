@@ -10,7 +10,7 @@ enum {
   PLOT_PANEL = 470, /* height of a panel [px] */
   PLOT_ROW = 22,    /* of a row of names */
   PLOT_LEFT = 84,
-  PLOT_GAP = 28 /* between the panels */
+  PLOT_GAP = 44 /* between the panels */
 };
 
 #define PLOT_DATA "work-precision.dat"
