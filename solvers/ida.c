@@ -241,13 +241,28 @@ static int ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector
 
 /* ---- The rest IDA asks for ---- */
 
+/* Multipliers of a placed state, J swept.  Those among the unknowns are good in ggl.  On the level of accelerations
+ * nothing but Newton's iteration holds them where the motion is prescribed, and they may wander off without harm to
+ * the motion: there they are computed anew.  Factorises the saddle in any case. */
+static int ida_multipliers (const ida_data *d, const double *v, double *a, double *lambda) {
+  pw_run *r = d->run;
+  int status = pw_saddle_factor (r->saddle);
+  if (status == PW_OK && !d->ggl) pw_accelerate_placed (r, v, a, lambda);
+  return status;
+}
+
 /* Rates of the ledger's entries. */
 static int ida_work (pw_real t, N_Vector vy, N_Vector vyp, N_Vector rate, void *user) {
   ida_data *d = user;
   const double *y = N_VGetArrayPointer (vy);
   (void)vyp;
+  const double *lambda = ida_expand (d, y + 2 * d->n, d->rows, d->lambda);
   if (ida_place (d, t, y) != 0) return -1;
-  pw_sweep_ledger (d->run->s, ida_expand (d, y + 2 * d->n, d->rows, d->lambda), N_VGetArrayPointer (rate));
+  if (!d->ggl) {
+    if (ida_multipliers (d, y + d->n, d->given, d->mu) < 0) return -1;
+    lambda = d->mu;
+  }
+  pw_sweep_ledger (d->run->s, lambda, N_VGetArrayPointer (rate));
   return 0;
 }
 
@@ -488,9 +503,11 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   r->t = flag == IDA_TSTOP_RETURN ? stop : t;
   if (flag == IDA_TSTOP_RETURN) d->stop = NAN;
   ida_read (d, r->q, r->v, r->a, r->lambda);
-  ida_statistics (d);
   if (ida_place (d, r->t, N_VGetArrayPointer (d->y)) != 0) return ida_fail (d, IDA_RES_FAIL, error);
-  r->near = pw_saddle_factor (r->saddle) != PW_OK || pw_saddle_below (r->saddle, r->watch);
+  int status = ida_multipliers (d, r->v, r->a_at, r->lambda);
+  if (status < 0) return ida_fail (d, IDA_RES_FAIL, error);
+  r->near = status != PW_OK || pw_saddle_below (r->saddle, r->watch);
+  ida_statistics (d);
   return PW_OK;
 }
 
@@ -507,9 +524,11 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
   }
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
   for (int i = 0; i < r->s->entries; i++) r->ledger_at[i] = work[i];
-  return ida_place (d, t, N_VGetArrayPointer (d->y)) == 0
-             ? PW_OK
-             : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  if (ida_place (d, t, N_VGetArrayPointer (d->y)) != 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  pw_statistics keep = r->statistics;
+  ida_multipliers (d, r->v_at, d->given, r->lambda_at);
+  r->statistics = keep;
+  return PW_OK;
 }
 
 static int ida_restart (pw_run *r, pw_error *error) {
