@@ -62,9 +62,9 @@ typedef struct {
   void *context;            /* passed to eval and breakpoint as it is */
   const char *const *reads; /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
   double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
-  void *(*open) (void *context);  /* each compiled system gets a context of its own, made from this one, or NULL without
+  void *(*open) (void *context); /* each compiled system gets a context of its own, made from this one, or NULL without
                                      memory; may be NULL: all systems, and their threads, share `context` */
-  void (*close) (void *context);  /* frees what open made, with the system; may be NULL */
+  void (*close) (void *context); /* frees what open made, with the system; may be NULL */
 } pw_function;
 
 /* A signal; all zero is the constant 0. */
@@ -460,20 +460,20 @@ typedef enum {
 /* An element kind: one const table in one file.  A NULL sweep means identically zero; the self-test verifies it.
  * Sizes are given per element. */
 struct pw_kind {
-  const char *name;              /* "pin" */
-  const char *about;             /* one line */
-  size_t definition;             /* bytes of the definition structure, whose first member is `const char *name` */
-  size_t element;                /* bytes of the prepared element */
-  const pw_field *fields;        /* ended by a NULL name; `name` itself is not listed */
-  int bodies;                    /* bodies an element touches: as many as its fields of type PW_BODY name */
-  int own;                       /* coordinates of its own */
-  int rows;                      /* constraint rows */
-  int signals;                   /* signals, in the order of its fields; they serve the force if there is a force_u */
-  int each_body;                 /* 1: no body is named; the element acts on every body that has mass */
-  int constant;                  /* 1: its force depends on nothing: evaluated once, when the scene is compiled */
-  int unit;                      /* 1: it has two rows, and a body's x and y columns are +1 or -1 times the unit matrix */
-  pw_level level;                /* of its rows */
-  const pw_quantity *reaction;   /* one per row: what -lambda is */
+  const char *name;            /* "pin" */
+  const char *about;           /* one line */
+  size_t definition;           /* bytes of the definition structure, whose first member is `const char *name` */
+  size_t element;              /* bytes of the prepared element */
+  const pw_field *fields;      /* ended by a NULL name; `name` itself is not listed */
+  int bodies;                  /* bodies an element touches: as many as its fields of type PW_BODY name */
+  int own;                     /* coordinates of its own */
+  int rows;                    /* constraint rows */
+  int signals;                 /* signals, in the order of its fields; they serve the force if there is a force_u */
+  int each_body;               /* 1: no body is named; the element acts on every body that has mass */
+  int constant;                /* 1: its force depends on nothing: evaluated once, when the scene is compiled */
+  int unit;                    /* 1: it has two rows, and a body's x and y columns are +1 or -1 times the unit matrix */
+  pw_level level;              /* of its rows */
+  const pw_quantity *reaction; /* one per row: what -lambda is */
   const pw_quantity *coordinate; /* one per own coordinate */
 
   /* Turns a checked definition into a prepared element; bodies are those it names or acts on, in order, the ground as

@@ -37,10 +37,11 @@ typedef struct {
 } pw_entry;
 
 struct pw_system {
-  const char *model;  int bodies, coords, rows, holonomic, slabs, entries;
-  int constraints;          /* slabs with rows */
-  int forces;               /* slabs with a force that is not constant */
-  int *force;               /* which */
+  const char *model;
+  int bodies, coords, rows, holonomic, slabs, entries;
+  int constraints; /* slabs with rows */
+  int forces;      /* slabs with a force that is not constant */
+  int *force;      /* which */
   int readers;     /* function signals that read states */
   int hold;        /* 1: signals of forces keep their values (inputs=held) */
   double t_signal; /* the time the signals were last evaluated at; NaN: never */
@@ -68,10 +69,10 @@ void pw_hold (pw_system *s, int hold);
 
 /* ---- Sweeps; g and the like are `rows` long, f and w `coords` + 3 ---- */
 
-void pw_sweep_J (pw_system *s); /* fills every slab's J */
+void pw_sweep_J (pw_system *s);                      /* fills every slab's J */
 void pw_sweep_J_gamma (pw_system *s, double *gamma); /* J and gamma at once */
-void pw_sweep_g (pw_system *s, double *g);         /* holonomic rows only */
-void pw_sweep_g_size (pw_system *s, double *size); /* not below the length scale */
+void pw_sweep_g (pw_system *s, double *g);           /* holonomic rows only */
+void pw_sweep_g_size (pw_system *s, double *size);   /* not below the length scale */
 void pw_sweep_eta (pw_system *s, double *eta);
 void pw_sweep_gamma (pw_system *s, double *gamma);
 void pw_sweep_force (pw_system *s, double *f);

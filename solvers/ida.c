@@ -524,7 +524,8 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
   }
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
   for (int i = 0; i < r->s->entries; i++) r->ledger_at[i] = work[i];
-  if (ida_place (d, t, N_VGetArrayPointer (d->y)) != 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  if (ida_place (d, t, N_VGetArrayPointer (d->y)) != 0)
+    return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
   pw_statistics keep = r->statistics;
   ida_multipliers (d, r->v_at, d->given, r->lambda_at);
   r->statistics = keep;

@@ -25,7 +25,7 @@ struct pw_run {
   double pivot, reselect; /* the smallest one at the state reached; below this other rows are tried */
   double watch, guard;    /* an evaluation with a smaller pivot is near a singular pose; too near */
   int near;               /* 1 as soon as one was near */
-  double calm;         /* the largest accelerations away from singular poses, in units of L / T^2 */
+  double calm;            /* the largest accelerations away from singular poses, in units of L / T^2 */
   double alpha, beta;     /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;      /* first discontinuity of a signal after t */
 

@@ -22,7 +22,7 @@ typedef struct {
   double factor; /* of holonomic rows, and of coordinates */
   double factor_nonholonomic;
   const double *row_scale;
-  const int *map;         /* rows: place of each constraint row, or -1: it is left out; NULL: as they are */
+  const int *map; /* rows: place of each constraint row, or -1: it is left out; NULL: as they are */
   const double *w, *lambda;
 } pw_put;
 void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, const pw_put *put);

@@ -225,7 +225,8 @@ static int run_outburst (pw_run *r, pw_error *error) {
   const double outburst = 100;
   double now = run_agitation (r);
   if (r->near && !(now <= outburst * r->calm))
-    return pw_fail (error, PW_METHOD, "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
                     now / r->calm);
   if (!r->near) r->calm = fmax (r->calm, now);
   return PW_OK;

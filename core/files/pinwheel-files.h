@@ -76,7 +76,7 @@ typedef struct {
   const char *model, *method;
   const char *status; /* "ok", "input", "start", "method", "machine", "interrupted" */
   const char *reason;
-  double cpu; /* [s], integration alone */
+  double cpu;                   /* [s], integration alone */
   const char *const *redundant; /* what is said about each redundant row, ended by NULL; may be NULL: none */
 } pw_summary;
 
