@@ -81,17 +81,29 @@ static void truth_name (const truth_candidate *c, char *text, size_t size) {
             pw_format (rung, c->rung, 4), c->method.adaptive ? "" : " s");
 }
 
-/* The two that agree best; the first of them, which is the tighter one, is the truth. */
+/* Whether two methods share their integrator. */
+static int truth_related (const truth_candidate *a, const truth_candidate *b) {
+  size_t n = strcspn (a->method.name, "+");
+  return strncmp (a->method.name, b->method.name, n + 1) == 0;
+}
+
+/* The two that agree best, and how well; INFINITY if there are no two. */
+static double truth_pair (const pw_compare *x, const truth_candidate *c, int related, int *best, int *with) {
+  double least = INFINITY;
+  for (int i = 0; i < TRUTH_CANDIDATES; i++)
+    for (int j = i + 1; j < TRUTH_CANDIDATES; j++) {
+      if (!c[i].good || !c[j].good || truth_related (&c[i], &c[j]) != related) continue;
+      double apart = truth_apart (x, &c[i], &c[j]);
+      if (apart < least) least = apart, *best = i, *with = j;
+    }
+  return least;
+}
+
+/* Two of one integrator are taken if there are no others; the first of the two is the truth. */
 static void truth_choose (pw_compare *x, truth_candidate *c) {
   pw_truth *t = &x->truth;
   int best = -1, with = -1;
-  double least = INFINITY;
-  for (int i = 0; i < TRUTH_CANDIDATES; i++)
-    for (int j = i + 1; j < TRUTH_CANDIDATES && c[i].good; j++) {
-      double apart = c[j].good ? truth_apart (x, &c[i], &c[j]) : NAN;
-      if (apart < least) least = apart, best = i, with = j;
-    }
-  if (best < 0) return;
+  if (isinf (truth_pair (x, c, 0, &best, &with)) && isinf (truth_pair (x, c, 1, &best, &with))) return;
   t->known = 1;
   truth_name (&c[best], t->about, sizeof t->about);
   pw_motion_distance (x->m.system, &c[best].motion, &c[with].motion, t->uncertainty);
