@@ -28,7 +28,7 @@ static void build (pw_model *m, const void *parameter) {
       m,
       &(pw_body){ .name = "coupler", .mass = p->mc, .inertia = p->mc * p->l * p->l / 3, .start = { p->l + c, s, 0 } });
   for (int i = 0; i < 3; i++) {
-    char crank[16], pivot[16], joint[16];
+    char crank[24], pivot[24], joint[24];
     double x = i * p->l;
     snprintf (crank, sizeof crank, "crank%d", i + 1);
     snprintf (pivot, sizeof pivot, "A%d", i + 1);
