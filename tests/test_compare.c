@@ -210,7 +210,7 @@ static void test_bad (void **state) {
   const struct {
     const char *arguments, *message;
   } bad[] = {
-    { "nosuch", "there is no model \"nosuch\"; did you mean \"ezyroller\"?" },
+    { "ezyrolle", "there is no model \"ezyrolle\"; did you mean \"ezyroller\"?" },
     { "ezyroller --methods rk5", "there is no integrator \"rk5\"; did you mean \"rk4\"?" },
     { "ezyroller --methods all,ida+gll", "integrator ida has no stabilisation \"gll\"; did you mean \"ggl\"?" },
     { "ezyroller --methods rk4,", "--methods \"rk4,\": a name is missing" },
