@@ -226,18 +226,21 @@ static void motor_leader (pw_model *m, const void *parameters) {
   pw_add_body (m, &(pw_body){ .name = "leader", .mass = 1, .inertia = 0.5, .rate = { 0, 0, 1 } });
   pw_add_body (m, &(pw_body){ .name = "follower", .mass = 1, .inertia = 0.1, .start = { 1 }, .rate = { 0.5 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "leader", "ground" } });
-  pw_add_motor (m, &(pw_motor){ .name = "M",
-                                .body = { "follower", "ground" },
-                                .stiffness = 8,
-                                .damping = 1,
-                                .limit = 3,
-                                .angle = { PW_FUNCTION, .function = { motor_follow, &twice, angle, NULL } },
-                                .rate = { PW_FUNCTION, .function = { motor_follow, &twice, rate, NULL } } });
-  pw_add_force (m, &(pw_force){ .name = "F",
-                                .body = "follower",
-                                .at = { 0.1, 0.2 },
-                                .axes = PW_AXES_BODY,
-                                .fy = { PW_FUNCTION, .function = { motor_follow, &brake, rate, NULL } } });
+  pw_add_motor (
+      m,
+      &(pw_motor){ .name = "M",
+                   .body = { "follower", "ground" },
+                   .stiffness = 8,
+                   .damping = 1,
+                   .limit = 3,
+                   .angle = { PW_FUNCTION, .function = { .eval = motor_follow, .context = &twice, .reads = angle } },
+                   .rate = { PW_FUNCTION, .function = { .eval = motor_follow, .context = &twice, .reads = rate } } });
+  pw_add_force (
+      m, &(pw_force){ .name = "F",
+                      .body = "follower",
+                      .at = { 0.1, 0.2 },
+                      .axes = PW_AXES_BODY,
+                      .fy = { PW_FUNCTION, .function = { .eval = motor_follow, .context = &brake, .reads = rate } } });
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "leader", "ground" }, .stiffness = 2 });
 }
 
