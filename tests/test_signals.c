@@ -72,7 +72,9 @@ static void test_reads (void **state) {
   (void)state;
   static const char *const reads[] = { "steer.phi", "frame.vx", NULL };
   signals_context c = { .breakpoint = 3 };
-  pw_signal torque = { PW_FUNCTION, .function = { signals_eval, &c, reads, signals_breakpoint } };
+  pw_signal torque = {
+    PW_FUNCTION, .function = { .eval = signals_eval, .context = &c, .reads = reads, .breakpoint = signals_breakpoint }
+  };
   pw_system *s = signals_scene (&torque);
   double q[6] = { 0, 0, 0.3, 0, 0, 0.7 }, v[6] = { 1.1, 0, 0, 0, 0, 0.9 }, f[9];
   assert_int_equal (pw_place (s, 2, q, v), PW_OK);
