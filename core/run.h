@@ -63,7 +63,7 @@ char *pw_ledger_name (const pw_system *s, int entry, char *buffer, size_t size);
 /* What the consistent start did. */
 typedef struct {
   const double *q_given, *v_given; /* the state as described */
-  const double *q, *v;             /* the state the run starts from */
+  const double *q, *v;             /* the state the run starts from, until it has advanced */
   int moved;                       /* number of states that differ by more than round-off */
   int freed;                       /* 1: the values the user gave could not all be held */
   double position, velocity;       /* scaled residuals before */

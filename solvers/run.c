@@ -82,6 +82,15 @@ static int run_open_saddle (pw_run *r, pw_error *error) {
   return r->saddle ? PW_OK : PW_INPUT;
 }
 
+/* Accelerations, multipliers and the ledger's rates of the state reached, anew; says why if that fails. */
+static int run_evaluate (pw_run *r, pw_error *error) {
+  int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  if (status > 0) return pw_fail_singular (r, r->t, error);
+  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (r->settings.ledger) pw_sweep_ledger (r->s, r->lambda, r->rate);
+  return PW_OK;
+}
+
 /* What near a singular pose means: a small part of the pivot at a good one. */
 static void run_watch (pw_run *r) {
   int row;
@@ -97,18 +106,15 @@ static void run_watch (pw_run *r) {
 static int run_first_evaluation (pw_run *r, pw_error *error) {
   int row, status = run_open_saddle (r, error);
   if (status != PW_OK) return status;
-  status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
-  if (status > 0 || pw_saddle_pivot (r->saddle, &row) < 1e-5) {
+  if (pw_saddle_factor (r->saddle) != PW_OK || pw_saddle_pivot (r->saddle, &row) < 1e-5) {
     if ((double)r->s->rows * r->s->coords > PW_RANK_MOST) return pw_fail_singular (r, r->t, error);
     int chosen = pw_rank_choose (r, error);
     if (chosen == PW_OK && r->redundant) chosen = run_open_saddle (r, error);
     if (chosen != PW_OK) return chosen;
-    status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   }
-  if (status > 0) return pw_fail_singular (r, r->t, error);
-  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  run_watch (r);
-  return PW_OK;
+  status = run_evaluate (r, error);
+  if (status == PW_OK) run_watch (r);
+  return status;
 }
 
 /* The size of the accelerations, in units of L / T^2. */
@@ -127,7 +133,6 @@ static void run_begin (pw_run *r) {
   pw_system *s = r->s;
   r->calm = run_agitation (r);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
-  if (r->settings.ledger) pw_sweep_ledger (s, r->lambda, r->rate);
   r->breakpoint = pw_next_breakpoint (s, r->t);
   pw_note_residuals (r);
 }
@@ -175,11 +180,8 @@ void pw_close (pw_run *r) {
 /* Behind a discontinuity the accelerations are others, and a method starts anew. */
 static int run_pass_breakpoint (pw_run *r, pw_error *error) {
   r->breakpoint = pw_next_breakpoint (r->s, r->t);
-  int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
-  if (status > 0) return pw_fail_singular (r, r->t, error);
-  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  if (r->settings.ledger) pw_sweep_ledger (r->s, r->lambda, r->rate);
-  return r->method->restart (r, error);
+  int status = run_evaluate (r, error);
+  return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
 /* A stabilised method that lets go of its constraints is stopped: what follows would not be this mechanism. */
@@ -211,9 +213,8 @@ static int run_reselect (pw_run *r, pw_error *error) {
   if (other == 0) return PW_OK;
   memcpy (r->ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
   status = run_open_saddle (r, error);
-  if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
-  if (status > 0) return pw_fail_singular (r, r->t, error);
-  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status == PW_OK) status = run_evaluate (r, error);
+  if (status != PW_OK) return status;
   run_watch (r);
   r->method->close (r);
   r->data = NULL;
@@ -296,8 +297,7 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (q) memcpy (r->q, q, bytes);
   if (v) memcpy (r->v, v, bytes);
   int status = pw_make_consistent (r, NULL, error);
-  if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
-  if (status > 0) return pw_fail_singular (r, r->t, error);
+  if (status == PW_OK) status = run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
