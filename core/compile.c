@@ -344,7 +344,7 @@ static void compile_metric (pw_system *s) {
     if (s->mass[3 * b] > 0) sum += s->mass[3 * b], massive++;
   double weight = massive ? 1e-6 * sum / massive : 1;
   for (int j = 0; j < s->coords; j++) {
-    int angle = j >= 3 * s->bodies || j % 3 == 2;
+    int angle = pw_is_angle (s, j);
     s->metric[j] = s->mass[j] > 0 ? s->mass[j] : angle ? weight * L2 : weight;
   }
 }

@@ -60,7 +60,7 @@ void pw_probe_aim (pw_probe *x, pw_random *r) {
   x->t = pw_random_between (r, 0.1, 3);
   for (int j = 0; j < x->s->coords; j++) {
     x->q[j] = pw_random_between (r, -0.5, 0.5);
-    if (j >= 3 * x->s->bodies || j % 3 == 2)
+    if (pw_is_angle (x->s, j))
       x->q[j] = pw_random_between (r, -3, 3);
     else
       x->q[j] += corner[j / 3][j % 3];

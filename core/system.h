@@ -58,6 +58,16 @@ struct pw_system {
   pw_entry *entry;        /* entries */
 };
 
+/* 1 for a coordinate that is an angle, 0 for a length; coordinates that elements own are angles. */
+static inline int pw_is_angle (const pw_system *s, int j) {
+  return j >= 3 * s->bodies || j % 3 == 2;
+}
+
+/* The scene's unit of a coordinate: L or 1 rad. */
+static inline double pw_unit (const pw_system *s, int j) {
+  return pw_is_angle (s, j) ? 1 : s->scale.length;
+}
+
 /* ---- Placing: poses and signals for one (t, q, v), on which all sweeps below work ---- */
 
 int pw_place (pw_system *s, double t, const double *q, const double *v);

@@ -70,20 +70,16 @@ static void verify_forces (verify *x, const pw_slab *k) {
 
 /* ---- Verdicts ---- */
 
-static int verify_angle (const pw_system *s, int j) {
-  return j >= 3 * s->bodies || j % 3 == 2;
-}
-
 /* Gives every coordinate the size of the largest force in the scene, or of the largest moment; L makes one comparable
  * with the other.  Without any force, that of a mass times L / T^2. */
 static void verify_force_sizes (verify *x) {
   const pw_system *s = x->s;
   double L = s->scale.length, T = s->scale.time, largest = 0;
   for (int j = 0; j < s->coords; j++) {
-    double unit = verify_angle (s, j) ? L : 1;
+    double unit = pw_is_angle (s, j) ? L : 1;
     largest = fmax (largest, fmax (x->force_size[j] / unit, s->mass[j] / (unit * unit) * L / (T * T)));
   }
-  for (int j = 0; j < s->coords; j++) x->force_size[j] = verify_angle (s, j) ? largest * L : largest;
+  for (int j = 0; j < s->coords; j++) x->force_size[j] = pw_is_angle (s, j) ? largest * L : largest;
 }
 
 typedef char *verify_name (const pw_system *s, int i, char *buffer, size_t size);

@@ -290,12 +290,9 @@ static int ida_weights (N_Vector vy, N_Vector weights, void *user) {
   const double *y = N_VGetArrayPointer (vy), L = s->scale.length, T = s->scale.time;
   double *w = N_VGetArrayPointer (weights), c = d->ggl ? ida_leading (d) : 1 / T, force = 0;
   for (int j = 0; j < d->n; j++) {
-    double unit = j < 3 * s->bodies && j % 3 < 2 ? L : 1;
-    double atol = set->atol > 0 ? set->atol : set->rtol * unit,
-           atol_v = set->atol > 0 ? set->atol : set->rtol * unit / T;
-    w[j] = 1 / (set->rtol * fabs (y[j]) + atol);
-    w[d->n + j] = 1 / (set->rtol * fabs (y[d->n + j]) + atol_v);
-    force = fmax (force, s->mass[j] * unit / (T * T) * (unit == 1 ? 1 / L : 1));
+    w[j] = 1 / (set->rtol * fabs (y[j]) + pw_atol (r, j));
+    w[d->n + j] = 1 / (set->rtol * fabs (y[d->n + j]) + pw_atol_rate (r, j));
+    force = fmax (force, s->mass[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
   }
   double relax = c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   for (int i = 0; i < d->rows; i++) w[2 * d->n + i] = 1 / (relax * set->rtol * (fabs (y[2 * d->n + i]) + force));
@@ -358,8 +355,7 @@ static int ida_open_vectors (ida_data *d) {
   d->lambda = d->scale + d->n;
   d->mu = d->lambda + s->rows;
   d->given = d->mu + s->rows;
-  for (int j = 0; j < d->n; j++)
-    d->scale[j] = j < 3 * s->bodies && j % 3 < 2 ? 1 : 1 / (s->scale.length * s->scale.length);
+  for (int j = 0; j < d->n; j++) d->scale[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   N_VConst (0, d->work);
   N_VConst (0, d->work0);
   memcpy (N_VGetArrayPointer (d->work), d->run->ledger, (size_t)s->entries * sizeof (double));
@@ -416,10 +412,7 @@ static int ida_open (pw_run *r, pw_error *error) {
   if (d == NULL) return ida_no_memory (r, error);
   d->run = r;
   d->ggl = pw_stabilised_by (r, "ggl");
-  if (pw_stabilised_by (r, "baumgarte")) {
-    r->alpha = pw_option_value (r, "alpha");
-    r->beta = pw_option_value (r, "beta");
-  }
+  pw_read_baumgarte (r);
   d->n = r->s->coords;
   if (ida_number_rows (d) != PW_OK) return ida_no_memory (r, error);
   d->size = 2 * d->n + d->rows + d->holonomic;
@@ -556,18 +549,7 @@ static const pw_stabilisation ida_stabilisations[] = {
 };
 
 static const pw_option ida_options[] = {
-  { .name = "alpha",
-    .with = "baumgarte",
-    .value = 10,
-    .domain = PW_NONNEGATIVE,
-    .unit = "1/s",
-    .about = "damping of the residuals" },
-  { .name = "beta",
-    .with = "baumgarte",
-    .value = 10,
-    .domain = PW_NONNEGATIVE,
-    .unit = "1/s",
-    .about = "stiffness of the position residuals" },
+  PW_BAUMGARTE_OPTIONS,
   { .name = NULL },
 };
 

@@ -53,10 +53,31 @@ struct pw_run {
 
 /* Value of an option by name; it must exist. */
 double pw_option_value (const pw_run *r, const char *name);
+/* Absolute tolerances of coordinate j and of its rate: the one the user gave, or rtol in units of the scene. */
+static inline double pw_atol (const pw_run *r, int j) {
+  return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j);
+}
+static inline double pw_atol_rate (const pw_run *r, int j) {
+  return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->s->scale.time;
+}
 /* 1 if the run takes steps of the given size. */
 int pw_fixed_steps (const pw_run *r);
 /* 1 if the run's stabilisation has this name. */
 int pw_stabilised_by (const pw_run *r, const char *name);
+
+/* Baumgarte's options, the same for all integrators that have them, and their way into r->alpha and r->beta. */
+#define PW_BAUMGARTE_OPTIONS                                                                   \
+  { .name = "alpha",                                                                           \
+    .with = "baumgarte",                                                                       \
+    .value = 10,                                                                               \
+    .domain = PW_NONNEGATIVE,                                                                  \
+    .unit = "1/s",                                                                             \
+    .about = "damping of the residuals" },                                                     \
+  {                                                                                            \
+    .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .unit = "1/s", \
+    .about = "stiffness of the position residuals"                                             \
+  }
+void pw_read_baumgarte (pw_run *r);
 
 /* ---- Dynamics ---- */
 

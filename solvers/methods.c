@@ -155,6 +155,12 @@ int pw_fixed_steps (const pw_run *r) {
   return !r->method->adaptive;
 }
 
+void pw_read_baumgarte (pw_run *r) {
+  if (!pw_stabilised_by (r, "baumgarte")) return;
+  r->alpha = pw_option_value (r, "alpha");
+  r->beta = pw_option_value (r, "beta");
+}
+
 int pw_stabilised_by (const pw_run *r, const char *name) {
   return strcmp (r->method->stabilisations[r->stabilisation].name, name) == 0;
 }

@@ -18,7 +18,7 @@
 
 /* Length of a unit of coordinate j. */
 static double rank_unit (const pw_system *s, int j) {
-  return j < 3 * s->bodies && j % 3 < 2 ? 1 : s->scale.length;
+  return pw_is_angle (s, j) ? s->scale.length : 1;
 }
 
 /* All rows of J, dense, in units of the scene and of length 1; empty rows stay 0. */

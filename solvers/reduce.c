@@ -341,7 +341,7 @@ static int reduce_check (pw_reduce *r, const reduce_plan *p, pw_error *error) {
     pw_component *c = &r->component[i];
     c->pivots = 0;
     for (int n = 0; n < c->cols; n++) {
-      int j = c->global[n], angle = j >= 3 * s->bodies || j % 3 == 2;
+      int j = c->global[n], angle = pw_is_angle (s, j);
       c->unit[n] = angle ? s->scale.length : 1;
       c->massless[n] = p->weight[j] == 0;
       c->pivots += c->massless[n];

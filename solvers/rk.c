@@ -27,18 +27,7 @@ const pw_option pw_rk_options[] = {
   { .name = "inputs",
     .choices = rk_inputs,
     .about = "signals of forces at stage times, or held from the step's start (first order)" },
-  { .name = "alpha",
-    .with = "baumgarte",
-    .value = 10,
-    .domain = PW_NONNEGATIVE,
-    .unit = "1/s",
-    .about = "damping of the residuals" },
-  { .name = "beta",
-    .with = "baumgarte",
-    .value = 10,
-    .domain = PW_NONNEGATIVE,
-    .unit = "1/s",
-    .about = "stiffness of the position residuals" },
+  PW_BAUMGARTE_OPTIONS,
   { .name = "metric",
     .with = "projection",
     .choices = rk_metrics,
@@ -113,10 +102,7 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->held = pw_option_value (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, "projection");
   d->every = (int)pw_option_value (r, "every");
-  if (pw_stabilised_by (r, "baumgarte")) {
-    r->alpha = pw_option_value (r, "alpha");
-    r->beta = pw_option_value (r, "beta");
-  }
+  pw_read_baumgarte (r);
   if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   int status = d->projects ? rk_open_projector (r, error) : PW_OK;
   return status == PW_OK ? pw_rk_restart (r, error) : status;

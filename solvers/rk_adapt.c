@@ -42,14 +42,10 @@ static void adapt_project (pw_run *r, double *e, int rows) {
 static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
   const struct pw_method_data *d = r->data;
   const pw_system *s = r->s;
-  const pw_settings *set = &r->settings;
-  double sum = 0;
+  double sum = 0, rtol = r->settings.rtol;
   for (int j = 0; j < s->coords; j++) {
-    double unit = j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1;
-    double atol = set->atol > 0 ? set->atol : set->rtol * unit;
-    double atol_v = set->atol > 0 ? set->atol : set->rtol * unit / s->scale.time;
-    double q = eq[j] / (atol + set->rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
-    double v = ev[j] / (atol_v + set->rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
+    double q = eq[j] / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
+    double v = ev[j] / (pw_atol_rate (r, j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
     sum += q * q + v * v;
   }
   return sum / (2 * s->coords);

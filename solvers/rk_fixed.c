@@ -29,7 +29,7 @@ static double fixed_compare (pw_run *r) {
   const struct pw_method_data *d = r->data;
   double most = 0;
   for (int j = 0; j < s->coords; j++) {
-    double unit = j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1;
+    double unit = pw_unit (s, j);
     double off = fmax (fabs (d->q[j] - r->q_at[j]), s->scale.time * fabs (d->v[j] - r->v_at[j])) / unit;
     if (!(off <= most)) most = off;
     r->q_at[j] = d->q[j];

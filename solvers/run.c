@@ -70,7 +70,7 @@ static double run_time_scale (const pw_run *r) {
   const pw_system *s = r->s;
   double fastest = 1 / r->settings.span;
   for (int j = 0; j < s->coords; j++) {
-    double unit = j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1;
+    double unit = pw_unit (s, j);
     fastest = fmax (fastest, fmax (fabs (r->v[j]) / unit, sqrt (fabs (r->a[j]) / unit)));
   }
   return 1 / fastest;
@@ -122,7 +122,7 @@ static double run_agitation (const pw_run *r) {
   const pw_system *s = r->s;
   double most = 1, per = s->scale.time * s->scale.time;
   for (int j = 0; j < s->coords; j++) {
-    double size = fabs (r->a[j]) * per / (j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1);
+    double size = fabs (r->a[j]) * per / pw_unit (s, j);
     if (!(size <= most)) most = size;
   }
   return most;

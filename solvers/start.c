@@ -90,7 +90,7 @@ static int start_fail (pw_run *r, const start_trouble *trouble, pw_error *error)
 
 int pw_start_moved (const pw_system *s, const pw_start_report *report, int state) {
   int rate = state >= s->coords, j = rate ? state - s->coords : state;
-  double unit = (j < 3 * s->bodies && j % 3 < 2 ? s->scale.length : 1) / (rate ? s->scale.time : 1);
+  double unit = pw_unit (s, j) / (rate ? s->scale.time : 1);
   double from = rate ? report->v_given[j] : report->q_given[j], to = rate ? report->v[j] : report->q[j];
   return !(fabs (to - from) <= 16 * DBL_EPSILON * (fabs (to) + unit));
 }
