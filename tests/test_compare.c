@@ -17,6 +17,7 @@ enum {
   MOST = END + 4,
   MULTIPLIER = END + 8,
   BELOW,
+  ORDER,
   POSITION,
   VELOCITY,
   BALANCE,
@@ -85,6 +86,9 @@ static void test_orders (void **state) {
       double slope = log2 (compare_number ("order/compare.csv", 3 * m + 1, column) /
                            compare_number ("order/compare.csv", 3 * m + 2, column));
       check_below ("order less slope", order[m] - slope, 0.5, "steps that are not small");
+      if (column == MOST)
+        check_close ("order", compare_number ("order/compare.csv", 3 * m + 2, ORDER), slope, 8 * CHECK_EPS,
+                     "round-off");
     }
   for (int row = 0; row < 9; row++) {
     assert_string_equal (compare_cell ("order/compare.csv", row, BELOW), "");
@@ -176,6 +180,12 @@ static void test_limit (void **state) {
   assert_string_equal (compare_cell ("l/compare.csv", 9, STATUS), "not run");
   assert_string_equal (compare_cell ("l/compare.csv", 9, REASON), "\"too slow; the limit is 0.1 s\"");
   assert_string_equal (compare_cell ("l/compare.csv", 9, STEPS), "nan");
+  status = cli_run ("pinwheel compare ezyroller --methods rk4 --t-end 2 --truth @/truth.csv --step-ladder 1e-7 --limit "
+                    "0.125 -o @/stop");
+  assert_int_equal (status, 4);
+  assert_string_equal (compare_cell ("stop/compare.csv", 0, STATUS), "stopped");
+  assert_non_null (
+      strstr (compare_cell ("stop/compare.csv", 0, REASON), "too slow: the limit of 0.125 s was reached at"));
 }
 
 /* A failure keeps its row, its reason and the time reached; the others go on. */

@@ -1,37 +1,12 @@
 /* pinwheel compare: what accuracy costs.  One model by several methods, each over a ladder of tolerances or steps,
  * against the truth: a row for each rung, failures included. */
-#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "compare.h"
 #include "plot.h"
-
-/* ---- Ctrl-C ---- */
-
-static volatile sig_atomic_t compare_stop; /* signals so far */
-
-/* As in a run, the third signal ends the program, should a step never end. */
-static void compare_on_signal (int number) {
-  if (++compare_stop < 3) return;
-  signal (number, SIG_DFL);
-  raise (number);
-}
-
-static void compare_catch_signals (void) {
-  struct sigaction action;
-  memset (&action, 0, sizeof action);
-  action.sa_handler = compare_on_signal;
-  sigemptyset (&action.sa_mask);
-  sigaction (SIGINT, &action, NULL);
-  sigaction (SIGTERM, &action, NULL);
-}
-
-static void compare_release_signals (void) {
-  signal (SIGINT, SIG_DFL);
-  signal (SIGTERM, SIG_DFL);
-}
+#include "stop.h"
 
 /* ---- Before it begins ---- */
 
@@ -115,6 +90,7 @@ static int compare_ladder (pw_compare *x, const pw_contestant *method, pw_motion
     else
       status = pw_compare_row (x, r, scratch, error);
     if (status != PW_OK) break;
+    r->order = x->rows > first ? pw_compare_order (r - 1, r) : NAN;
     x->rows++;
     pw_progress_end (&x->progress);
     pw_compare_line (x, r, stdout);
@@ -135,18 +111,19 @@ static int compare_rows (pw_compare *x, pw_error *error) {
   fputc ('\n', stdout);
   pw_compare_head (x, stdout);
   pw_progress_count (&x->progress, pw_file_name (x->m.file), "rows", 0, x->rungs);
-  for (int i = 0; status == PW_OK && i < x->methods; i++) status = compare_ladder (x, &x->method[i], &scratch, error);
+  for (int i = 0; status == PW_OK && i < x->list.count; i++)
+    status = compare_ladder (x, &x->list.method[i], &scratch, error);
   pw_progress_end (&x->progress);
   pw_motion_close (&scratch);
   return status;
 }
 
 static int compare_run (pw_compare *x, pw_error *error) {
-  compare_catch_signals ();
+  pw_stop_catch ();
   int status = pw_truth_find (x, error);
   if (status == PW_OK && x->folder) status = pw_compare_csv_truth (x, error);
   if (status == PW_OK) status = compare_rows (x, error);
-  compare_release_signals ();
+  pw_stop_release ();
   return status;
 }
 
@@ -155,7 +132,7 @@ static int compare_run (pw_compare *x, pw_error *error) {
 /* A whole table loses its ending .part; diagrams are drawn of the rows there are. */
 static int compare_finish (pw_compare *x, int status, pw_error *error) {
   char part[PLOT_PATH], whole[PLOT_PATH];
-  int bad = 0, stopped = status == PW_RETRY && compare_stop;
+  int bad = 0, stopped = status == PW_RETRY && pw_stop;
   if (x->folder) {
     snprintf (part, sizeof part, "%s/compare.csv.part", x->folder);
     snprintf (whole, sizeof whole, "%s/compare.csv", x->folder);
@@ -195,12 +172,11 @@ static void compare_close (pw_compare *x) {
   pw_cli_close_model (&x->m);
   pw_cli_close (&x->line);
   free (x->row);
-  free (x->method);
-  free (x->names);
+  pw_contestants_close (&x->list);
 }
 
 int pw_cli_compare (int argc, const char **argv) {
-  pw_compare x = { .stop = &compare_stop };
+  pw_compare x = { .rows = 0 };
   pw_error error = { 0 };
   int status = compare_read (&x, argc, argv, &error);
   if (status == PW_OK) {

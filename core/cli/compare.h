@@ -6,9 +6,9 @@
 #ifndef PW_COMPARE_H
 #define PW_COMPARE_H
 
-#include <signal.h>
 #include <stdio.h>
 #include "cli.h"
+#include "contestants.h"
 #include "progress.h"
 
 enum { COMPARE_SAMPLES = 100, COMPARE_REPEATS = 9, COMPARE_PARTNERS = 3 };
@@ -26,11 +26,6 @@ typedef struct {
 } pw_motion;
 
 typedef struct {
-  const char *name; /* "erk8+projection" */
-  int adaptive;     /* 1: its ladder is one of tolerances */
-} pw_contestant;
-
-typedef struct {
   double from, to; /* from > to > 0 */
 } pw_ladder;
 
@@ -44,9 +39,10 @@ typedef struct {
   double t;                     /* reached [s] */
   double error[COMPARE_ERRORS]; /* NaN: not known; at the truth's uncertainty: no more than this */
   unsigned below;               /* bit i: error i is no more than the truth's uncertainty */
-  double balance;               /* largest |energy balance| of the samples [J] */
-  pw_statistics statistics;     /* of a run without samples and ledger */
-  double cpu, spread;           /* of such runs: median; largest less smallest [s] */
+  double order;             /* observed: how fast the largest error falls with the number of steps; NaN: not known */
+  double balance;           /* largest |energy balance| of the samples [J] */
+  pw_statistics statistics; /* of a run without samples and ledger */
+  double cpu, spread;       /* of such runs: median; largest less smallest [s] */
   int repeats;
   char reason[500];
 } pw_rung;
@@ -72,9 +68,7 @@ typedef struct {
   /* as understood */
   pw_cli_line line;
   pw_cli_model m;
-  char *names; /* the methods' */
-  pw_contestant *method;
-  int methods;
+  pw_contestants list;
   pw_ladder ladder[2]; /* of steps, of tolerances */
   double t_end, limit; /* [s] */
   /* under way */
@@ -82,7 +76,6 @@ typedef struct {
   pw_rung *row;
   int rows, rungs; /* done, and in all */
   pw_progress progress;
-  const volatile sig_atomic_t *stop;
   FILE *csv; /* NULL: none is wanted */
 } pw_compare;
 
@@ -107,6 +100,9 @@ int pw_motion_unit (const pw_system *s, int state);
 /* One run of a method to the end, or the limit.  With a motion, its samples are taken and accounts are kept.  PW_RETRY:
  * interrupted, or r->state is COMPARE_STOPPED. */
 int pw_compare_run (pw_compare *x, pw_rung *r, pw_motion *motion, pw_error *error);
+/* The order observed between two rungs of a ladder: log (error before / error) over log (steps / steps before); NaN
+ * where an error is not known, or no better than the truth. */
+double pw_compare_order (const pw_rung *before, const pw_rung *r);
 /* Fills a row: errors, then times.  PW_RETRY if interrupted; PW_MACHINE, PW_START; a method's failure is in the row. */
 int pw_compare_row (pw_compare *x, pw_rung *r, pw_motion *scratch, pw_error *error);
 

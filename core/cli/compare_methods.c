@@ -4,68 +4,6 @@
 #include <string.h>
 #include "compare.h"
 
-/* ---- Methods ---- */
-
-/* Fixed steps by nature, or because the method's options say so. */
-static int methods_adaptive (const pw_method *integrator, const char *name) {
-  return integrator->adaptive && strstr (name, ":steps=fixed") == NULL;
-}
-
-static int methods_count_all (size_t *bytes) {
-  int count = 0;
-  for (int i = 0; pw_methods[i]; i++)
-    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; s->name; s++, count++)
-      *bytes += strlen (pw_methods[i]->name) + strlen (s->name) + 2;
-  return count;
-}
-
-/* A method is compared once, however often it is named. */
-static void methods_add (pw_compare *x, const char *name, const pw_method *integrator) {
-  for (int i = 0; i < x->methods; i++)
-    if (strcmp (x->method[i].name, name) == 0) return;
-  x->method[x->methods++] = (pw_contestant){ name, methods_adaptive (integrator, name) };
-}
-
-static char *methods_add_all (pw_compare *x, char *at) {
-  for (int i = 0; pw_methods[i]; i++)
-    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; s->name; s++) {
-      int n = sprintf (at, "%s+%s", pw_methods[i]->name, s->name);
-      methods_add (x, at, pw_methods[i]);
-      at += n + 1;
-    }
-  return at;
-}
-
-static int methods_read (pw_compare *x, pw_error *error) {
-  const char *text = x->methods_text ? x->methods_text : "all";
-  size_t bytes = strlen (text) + 1;
-  int most = methods_count_all (&bytes) + 1;
-  for (const char *c = text; *c; c++) most += *c == ',';
-  x->names = malloc (bytes);
-  x->method = calloc ((size_t)most, sizeof *x->method);
-  if (x->names == NULL || x->method == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-  char *at = x->names;
-  for (int all = 0;; text++) {
-    size_t n = strcspn (text, ",");
-    if (n == 0) return pw_fail (error, PW_INPUT, "--methods \"%.80s\": a name is missing", x->methods_text);
-    if (n == 3 && strncmp (text, "all", 3) == 0) {
-      if (!all) at = methods_add_all (x, at);
-      all = 1;
-    } else {
-      const pw_method *integrator;
-      int stabilisation;
-      memcpy (at, text, n);
-      at[n] = 0;
-      int status = pw_parse_method (at, &integrator, &stabilisation, error);
-      if (status != PW_OK) return status;
-      methods_add (x, at, integrator);
-      at += n + 1;
-    }
-    text += n;
-    if (*text == 0) return PW_OK;
-  }
-}
-
 /* ---- Ladders ---- */
 
 /* "FROM:TO", in either order, or a single rung. */
@@ -104,12 +42,13 @@ double pw_compare_rung (const pw_ladder *ladder, int adaptive, int i) {
 int pw_compare_methods (pw_compare *x, pw_error *error) {
   x->ladder[0] = (pw_ladder){ 0.1, 1e-4 };
   x->ladder[1] = (pw_ladder){ 1e-3, 1e-12 };
-  int status = methods_read (x, error);
+  int status = pw_contestants_read (&x->list, x->methods_text ? x->methods_text : "all", error);
   if (status == PW_OK) status = methods_ladder ("--step-ladder", x->step_text, &x->ladder[0], error);
   if (status == PW_OK) status = methods_ladder ("--rtol-ladder", x->rtol_text, &x->ladder[1], error);
   if (status != PW_OK) return status;
-  for (int i = 0; i < x->methods; i++)
-    for (int k = 0; pw_compare_rung (&x->ladder[x->method[i].adaptive], x->method[i].adaptive, k) > 0; k++) x->rungs++;
+  for (int i = 0; i < x->list.count; i++)
+    for (int k = 0; pw_compare_rung (&x->ladder[x->list.method[i].adaptive], x->list.method[i].adaptive, k) > 0; k++)
+      x->rungs++;
   x->row = calloc ((size_t)x->rungs + 1, sizeof *x->row);
   return x->row ? PW_OK : pw_fail (error, PW_MACHINE, "out of memory");
 }

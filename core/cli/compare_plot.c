@@ -1,6 +1,4 @@
-/* Work-precision diagrams: error against processor time and against right-hand sides, a line for each method.
- *
- * An integrator has a mark and a colour, a stabilisation a dash, so that lines can be told apart without colour. */
+/* Work-precision diagrams: error against processor time and against right-hand sides, a line for each method. */
 #include <math.h>
 #include <string.h>
 #include "compare.h"
@@ -26,51 +24,9 @@ typedef struct {
 
 /* ---- Lines ---- */
 
-static const char *plot_dash (const char *method) {
-  static const struct {
-    const char *name, *dash;
-  } known[] = { { "projection", "1" },        { "none", "(2,4)" },       { "baumgarte", "(14,6)" },
-                { "ggl", "(14,5,3,5)" },      { "nullspace", "(30,8)" }, { "index2", "(14,5,3,5,3,5)" },
-                { "si1", "(24,5,24,5,3,5)" }, { "index3", "(6,6)" },     { NULL, "(20,4,2,4,2,4,2,4)" } };
-  const pw_method *integrator;
-  int stabilisation, i = 0;
-  if (pw_parse_method (method, &integrator, &stabilisation, NULL) != PW_OK) return "1";
-  while (known[i].name && strcmp (known[i].name, integrator->stabilisations[stabilisation].name) != 0) i++;
-  return known[i].dash;
-}
-
-/* A method without its stabilisation: of "erk8+projection:every=2", "erk8:every=2". */
-static void plot_rest (const char *method, char *rest, size_t size) {
-  size_t n = strcspn (method, "+:"), m = method[n] == '+' ? strcspn (method + n, ":") : 0;
-  snprintf (rest, size, "%.*s%s", (int)n, method, method + n + m);
-}
-
-/* Numbers from 0 for what differs in more than the stabilisation, in order of appearance. */
-static int plot_number (const pw_compare *x, int method) {
-  char rest[200], other[200];
-  int numbers = 0;
-  plot_rest (x->method[method].name, rest, sizeof rest);
-  for (int i = 0; i < method; i++) {
-    int again = 0;
-    plot_rest (x->method[i].name, other, sizeof other);
-    if (strcmp (other, rest) == 0) return plot_number (x, i);
-    for (int j = 0; j < i && !again; j++) {
-      char earlier[200];
-      plot_rest (x->method[j].name, earlier, sizeof earlier);
-      again = strcmp (earlier, other) == 0;
-    }
-    numbers += !again;
-  }
-  return numbers;
-}
-
 static void plot_style (const pw_compare *x, int method, FILE *f) {
-  static const char *const colour[] = { "#004488", "#bb5566", "#997700", "#000000", "#228877", "#774499", "#777777" };
-  static const int mark[] = { 7, 4, 9, 12, 5, 6, 2, 8, 13, 1, 10, 3, 11 };
-  const int colours = sizeof colour / sizeof *colour, marks = sizeof mark / sizeof *mark;
-  int n = plot_number (x, method);
-  fprintf (f, "with linespoints lw 1.6 dt %s lc rgb '%s' pt %d ps 0.9", plot_dash (x->method[method].name),
-           colour[n % colours], mark[n % marks]);
+  fputs ("with linespoints lw 1.6 ps 0.9 ", f);
+  pw_contestants_style (&x->list, method, f);
 }
 
 /* ---- Data ---- */
@@ -81,7 +37,7 @@ static int plot_drawn (const pw_rung *r) {
 
 static int plot_count (const pw_compare *x, int method) {
   int count = 0;
-  for (int i = 0; i < x->rows; i++) count += x->row[i].method == &x->method[method] && plot_drawn (&x->row[i]);
+  for (int i = 0; i < x->rows; i++) count += x->row[i].method == &x->list.method[method] && plot_drawn (&x->row[i]);
   return count;
 }
 
@@ -90,12 +46,12 @@ static int plot_write_data (const pw_compare *x, const pw_plots *p, pw_error *er
   FILE *f = pw_plot_create (p, PLOT_DATA, error);
   if (f == NULL) return PW_MACHINE;
   fputs ("# rung, processor time [s], right-hand sides, largest error of lengths [m] and angles [rad]\n", f);
-  for (int i = 0, block = 0; i < x->methods; i++) {
+  for (int i = 0, block = 0; i < x->list.count; i++) {
     if (plot_count (x, i) == 0) continue;
-    fprintf (f, "%s# %s\n", block++ ? "\n\n" : "", x->method[i].name);
+    fprintf (f, "%s# %s\n", block++ ? "\n\n" : "", x->list.method[i].name);
     for (const pw_rung *r = x->row; r < x->row + x->rows; r++) {
       char number[32];
-      if (r->method != &x->method[i] || !plot_drawn (r)) continue;
+      if (r->method != &x->list.method[i] || !plot_drawn (r)) continue;
       fprintf (f, "%s ", pw_format (number, r->rung, 9));
       fprintf (f, "%s %ld", pw_format (number, r->cpu, 9), r->statistics.rhs);
       for (int k = 0; k < 2; k++) fprintf (f, " %s", pw_format (number, r->error[COMPARE_MOST + k], 9));
@@ -145,7 +101,7 @@ static void plot_axis (const pw_compare *x, const pw_script *s, int number) {
 /* ---- The figures ---- */
 
 static void plot_lines (const pw_compare *x, const pw_script *s, int x_number, int unit) {
-  for (int i = 0, block = 0; i < x->methods; i++) {
+  for (int i = 0, block = 0; i < x->list.count; i++) {
     if (plot_count (x, i) == 0) continue;
     fprintf (s->f, "%s'%s' index %d using %d:%d ", block ? ", \\\n  " : "plot ", PLOT_DATA, block, x_number,
              PLOT_ERROR + unit);
@@ -165,11 +121,11 @@ static void plot_key (const pw_compare *x, const pw_script *s, pw_panel panel, i
   pw_script_range (s, "x", 1, 10);
   pw_script_range (s, "y", 1, 10);
   pw_script_panel (s, panel);
-  for (int i = 0, some = 0; i < x->methods; i++) {
+  for (int i = 0, some = 0; i < x->list.count; i++) {
     if (plot_count (x, i) == 0) continue;
     fputs (some++ ? ", \\\n  NaN " : "plot NaN ", s->f);
     plot_style (x, i, s->f);
-    fprintf (s->f, " title '%s'", x->method[i].name);
+    fprintf (s->f, " title '%s'", x->list.method[i].name);
   }
   fputs ("\nset tics scale 0.6\nset format '1e%T'\nset border 31\nset grid back lt 1 lw 0.6 lc rgb '#dddddd'\n", s->f);
 }
@@ -178,10 +134,10 @@ static void plot_key (const pw_compare *x, const pw_script *s, pw_panel panel, i
 static int plot_names (const pw_compare *x, int *rows) {
   size_t longest = 0;
   int count = 0, columns;
-  for (int i = 0; i < x->methods; i++) {
+  for (int i = 0; i < x->list.count; i++) {
     if (plot_count (x, i) == 0) continue;
     count++;
-    if (strlen (x->method[i].name) > longest) longest = strlen (x->method[i].name);
+    if (strlen (x->list.method[i].name) > longest) longest = strlen (x->list.method[i].name);
   }
   columns = (SCRIPT_WIDER - PLOT_LEFT) / (76 + 8 * (int)longest);
   if (columns < 1) columns = 1;

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "compare.h"
+#include "stop.h"
 
 #define ROW_SHORT 0.005 /* a batch of steps that took less processor time [s] may be longer the next time */
 #define ROW_LONG 0.02
@@ -45,7 +46,7 @@ static int row_steps (pw_compare *x, pw_rung *r, pw_run *run, pw_motion *m, pw_e
     if (used < ROW_SHORT && n == batch && batch < 65536) batch *= 2;
     if (used > ROW_LONG && batch > 1) batch /= 2;
     pw_progress_at (&x->progress, x->rows + fmin (pw_time (run) / x->t_end, 1) / (COMPARE_REPEATS + 1));
-    if (*x->stop) return PW_RETRY;
+    if (pw_stop) return PW_RETRY;
     if (status == PW_OK && r->cpu > x->limit && pw_time (run) < x->t_end) {
       r->state = COMPARE_STOPPED;
       return PW_RETRY;
@@ -72,7 +73,7 @@ int pw_compare_run (pw_compare *x, pw_rung *r, pw_motion *motion, pw_error *erro
 
 static void row_unknown (pw_rung *r) {
   for (int i = 0; i < COMPARE_ERRORS; i++) r->error[i] = NAN;
-  r->balance = r->spread = NAN;
+  r->balance = r->spread = r->order = NAN;
 }
 
 /* An error below what the truth can tell is no more than that. */
@@ -86,6 +87,14 @@ static void row_errors (const pw_compare *x, pw_rung *r, const pw_motion *m) {
     r->error[i] = truth->uncertainty[i];
     r->below |= 1u << i;
   }
+}
+
+double pw_compare_order (const pw_rung *before, const pw_rung *r) {
+  int i = isnan (r->error[COMPARE_MOST]) ? COMPARE_MOST + COMPARE_ANGLE : COMPARE_MOST;
+  int known = before->state == COMPARE_DONE && r->state == COMPARE_DONE && !((before->below | r->below) >> i & 1);
+  double finer =
+      r->method->adaptive ? (double)r->statistics.steps / (double)before->statistics.steps : before->rung / r->rung;
+  return known && finer > 1 ? log (before->error[i] / r->error[i]) / log (finer) : NAN;
 }
 
 static int row_compare (const void *a, const void *b) {
@@ -111,8 +120,8 @@ static int row_times (pw_compare *x, pw_rung *r, pw_error *error) {
 
 static void row_stopped (const pw_compare *x, pw_rung *r) {
   char limit[32], t[32];
-  snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", pw_format (t, r->t, 4),
-            pw_format (limit, x->limit, 4));
+  snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s",
+            pw_format (limit, x->limit, 4), pw_format (t, r->t, 4));
 }
 
 int pw_compare_row (pw_compare *x, pw_rung *r, pw_motion *scratch, pw_error *error) {
@@ -128,7 +137,7 @@ int pw_compare_row (pw_compare *x, pw_rung *r, pw_motion *scratch, pw_error *err
     row_stopped (x, r);
     return PW_OK;
   }
-  if (status == PW_RETRY && *x->stop) return PW_RETRY;
+  if (status == PW_RETRY && pw_stop) return PW_RETRY;
   if (status == PW_MACHINE || status == PW_START) return pw_fail (error, status, "%s", own.text);
   r->state = status == PW_INPUT ? COMPARE_REFUSED : COMPARE_FAILED;
   snprintf (r->reason, sizeof r->reason, "%s", own.status ? own.text : "the method gave up");

@@ -21,8 +21,8 @@ static const char *table_number (double value, int below, char text[32]) {
 
 static int table_width (const pw_compare *x) {
   size_t width = 6;
-  for (int i = 0; i < x->methods; i++) {
-    size_t n = strlen (x->method[i].name);
+  for (int i = 0; i < x->list.count; i++) {
+    size_t n = strlen (x->list.method[i].name);
     if (n > width) width = n;
   }
   return (int)width;
@@ -45,11 +45,11 @@ void pw_compare_truth_line (const pw_compare *x, FILE *f) {
 
 void pw_compare_head (const pw_compare *x, FILE *f) {
   int w = table_width (x);
-  fprintf (f, "%-*s %9s  %-18s  %-18s  %-17s  %-17s  %-35s  %s\n", w, "", "rtol", "error at the end", "largest error",
-           "residual of", "error of", "", "CPU time");
-  fprintf (f, "%-*s %9s  %8s  %8s  %8s  %8s  %8s %8s  %8s %8s  %8s %9s %7s %8s  %8s %6s\n", w, "method", "or step", "m",
-           "rad", "m", "rad", "position", "velocity", "multipl.", "energy J", "steps", "evaluat.", "Jacob.", "factor.",
-           "median s", "spread");
+  fprintf (f, "%-*s %9s  %-18s  %-18s %5s  %-17s  %-17s  %-35s  %s\n", w, "", "rtol", "error at the end",
+           "largest error", "", "residual of", "error of", "", "CPU time");
+  fprintf (f, "%-*s %9s  %8s  %8s  %8s  %8s %5s  %8s %8s  %8s %8s  %8s %9s %7s %8s  %8s %6s\n", w, "method", "or step",
+           "m", "rad", "m", "rad", "order", "position", "velocity", "multipl.", "energy J", "steps", "evaluat.",
+           "Jacob.", "factor.", "median s", "spread");
 }
 
 static void table_failure (const pw_rung *r, FILE *f) {
@@ -71,6 +71,10 @@ void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f) {
   }
   for (int i = 0; i < 4; i++)
     fprintf (f, "  %8s", table_number (r->error[shown[i]], (int)(r->below >> shown[i] & 1), text));
+  if (isnan (r->order))
+    fprintf (f, " %5s", "-");
+  else
+    fprintf (f, " %5.1f", r->order);
   fprintf (f, "  %8s", table_number (r->statistics.position, 0, text));
   fprintf (f, " %8s", table_number (r->statistics.velocity, 0, text));
   fprintf (f, "  %8s", table_number (r->error[COMPARE_LAMBDA], (int)(r->below >> COMPARE_LAMBDA & 1), text));
@@ -103,7 +107,7 @@ int pw_compare_csv_head (const pw_compare *x, pw_error *error) {
     pw_text_cell (&t, *c);
   pw_text_name (&t, "t", "s");
   table_names (&t);
-  pw_text_cell (&t, "below,residual.position,residual.velocity");
+  pw_text_cell (&t, "below,order,residual.position,residual.velocity");
   pw_text_name (&t, "balance", "J");
   pw_text_cell (&t, "steps,rejected,rhs,jacobians,factorisations");
   pw_text_name (&t, "cpu", "s");
@@ -134,7 +138,8 @@ int pw_compare_csv_line (const pw_compare *x, const pw_rung *r, pw_error *error)
   pw_text_number (&t, run ? r->t : NAN);
   for (int i = 0; i < COMPARE_ERRORS; i++) pw_text_number (&t, r->error[i]);
   table_below (&t, r);
-  const double rest[] = { s->position,
+  const double rest[] = { r->order,
+                          s->position,
                           s->velocity,
                           r->balance,
                           (double)s->steps,

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 #include "compare.h"
+#include "stop.h"
 
 enum { TRUTH_CANDIDATES = COMPARE_PARTNERS + 1 };
 #define TRUTH_LIMIT 10     /* processor time a candidate may take, at least [s] */
@@ -51,7 +52,7 @@ static int truth_run (pw_compare *x, truth_candidate *c, pw_error *error) {
     pw_rung r = { .method = &c->method, .rung = c->rung };
     pw_error own = { 0 };
     status = pw_compare_run (x, &r, &c->motion, &own);
-    if (status == PW_OK || *x->stop || r.state == COMPARE_STOPPED) break;
+    if (status == PW_OK || pw_stop || r.state == COMPARE_STOPPED) break;
     if (status == PW_MACHINE || status == PW_START) {
       *error = own;
       break;
@@ -59,7 +60,7 @@ static int truth_run (pw_compare *x, truth_candidate *c, pw_error *error) {
   }
   x->limit = limit;
   c->good = status == PW_OK;
-  return status == PW_MACHINE || status == PW_START ? status : *x->stop ? PW_RETRY : PW_OK;
+  return status == PW_MACHINE || status == PW_START ? status : pw_stop ? PW_RETRY : PW_OK;
 }
 
 /* How far two are apart, as a part of how large the motion is. */

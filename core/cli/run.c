@@ -3,7 +3,6 @@
  * Steps are taken in batches that end where a sample is due, so that between samples nothing but the method runs, and
  * only the method is on the clock. */
 #include <math.h>
-#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
@@ -11,6 +10,7 @@
 #include "profile.h"
 #include "progress.h"
 #include "report.h"
+#include "stop.h"
 
 #define RUN_SHORT 0.01 /* a batch that took less processor time [s] may be longer the next time */
 #define RUN_LONG 0.04  /* one that took more must be shorter: Ctrl-C and the progress bar wait for its end */
@@ -40,32 +40,6 @@ typedef struct {
   double cpu;      /* of the method [s] */
   char part[4200]; /* where an unfinished table is kept; "": there is none */
 } run;
-
-/* ---- Ctrl-C ---- */
-
-static volatile sig_atomic_t run_stop; /* signals so far */
-
-/* The first signal asks for a stop after the current step.  Some senders signal a program and its group as well, so it
- * is the third one that ends it, should that step never end. */
-static void run_on_signal (int number) {
-  if (++run_stop < 3) return;
-  signal (number, SIG_DFL);
-  raise (number);
-}
-
-static void run_catch_signals (void) {
-  struct sigaction action;
-  memset (&action, 0, sizeof action);
-  action.sa_handler = run_on_signal;
-  sigemptyset (&action.sa_mask);
-  sigaction (SIGINT, &action, NULL);
-  sigaction (SIGTERM, &action, NULL);
-}
-
-static void run_release_signals (void) {
-  signal (SIGINT, SIG_DFL);
-  signal (SIGTERM, SIG_DFL);
-}
 
 /* ---- Before the run ---- */
 
@@ -174,7 +148,7 @@ static int run_batch (run *x, pw_error *error) {
   long n = 0;
   do {
     status = pw_advance (x->r, x->t_end, error);
-  } while (status == PW_OK && ++n < x->batch && pw_time (x->r) < due && !run_stop);
+  } while (status == PW_OK && ++n < x->batch && pw_time (x->r) < due && !pw_stop);
   double used = pw_cpu_clock () - start;
   x->cpu += used;
   if (used < RUN_SHORT && n == x->batch && x->batch < RUN_BATCH) x->batch *= 2;
@@ -184,7 +158,7 @@ static int run_batch (run *x, pw_error *error) {
 
 static int run_steps (run *x, pw_error *error) {
   int status = run_take_samples (x, error);
-  while (status == PW_OK && pw_time (x->r) < x->t_end && !run_stop) {
+  while (status == PW_OK && pw_time (x->r) < x->t_end && !pw_stop) {
     status = run_batch (x, error);
     if (status == PW_OK) status = run_take_samples (x, error);
     pw_progress_at (&x->progress, pw_time (x->r));
@@ -195,11 +169,11 @@ static int run_steps (run *x, pw_error *error) {
 static int run_integrate (run *x, pw_error *error) {
   int table_on_screen = x->csv_path && strcmp (x->csv_path, "-") == 0;
   x->batch = 1;
-  run_catch_signals ();
+  pw_stop_catch ();
   pw_progress_start (&x->progress, pw_file_name (x->m.file), x->t_end, !table_on_screen);
   int status = run_steps (x, error);
   pw_progress_end (&x->progress);
-  run_release_signals ();
+  pw_stop_release ();
   return status;
 }
 
@@ -241,7 +215,7 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
                          .reason = error->text,
                          .cpu = x->cpu,
                          .redundant = x->redundant };
-  if (error->status == PW_OK && run_stop) {
+  if (error->status == PW_OK && pw_stop) {
     char t[32];
     snprintf (reason, size, "interrupted at t = %s s", pw_format (t, pw_time (x->r), 6));
     summary.status = "interrupted";
@@ -254,7 +228,7 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
 static void run_draw (run *x, pw_error *error) {
   pw_error *own = &(pw_error){ 0 };
   if (x->plots == NULL || x->r == NULL) return;
-  pw_plots_finish (x->plots, !run_stop, own);
+  pw_plots_finish (x->plots, !pw_stop, own);
   if (error->status == PW_OK)
     *error = *own;
   else if (own->status != PW_OK)
@@ -269,7 +243,7 @@ static int run_prints_file (const run *x) {
 /* Everything that follows the last step: table, summary, figures, the last word. */
 static int run_finish (run *x, pw_error *error) {
   char reason[80] = "";
-  int interrupted = error->status == PW_OK && run_stop;
+  int interrupted = error->status == PW_OK && pw_stop;
   pw_sample sample, *last = NULL;
   if (x->r && pw_at (x->r, pw_time (x->r), &sample, NULL) == PW_OK) last = &sample;
   run_finish_table (x, error->status == PW_OK && !interrupted, error);

@@ -4,12 +4,12 @@
  * in a journal in the order in which they are finished, and put into the grid's order at the end.  So the table is
  * the same for any number of threads, and for any number of times the sweep was stopped and started again. */
 #include <limits.h>
-#include <signal.h>
 #include <string.h>
 #ifdef _OPENMP
 #include <omp.h>
 #endif
 #include "progress.h"
+#include "stop.h"
 #include "sweep.h"
 
 typedef struct {
@@ -28,26 +28,6 @@ typedef struct {
   pw_text scratch;
   pw_error *error;
 } sweep;
-
-/* ---- Ctrl-C ---- */
-
-static volatile sig_atomic_t sweep_stop; /* signals so far, or 1 if the sweep cannot go on */
-
-/* As in a run, the third signal ends the program, should a step never end. */
-static void sweep_on_signal (int number) {
-  if (++sweep_stop < 3) return;
-  signal (number, SIG_DFL);
-  raise (number);
-}
-
-static void sweep_catch_signals (void) {
-  struct sigaction action;
-  memset (&action, 0, sizeof action);
-  action.sa_handler = sweep_on_signal;
-  sigemptyset (&action.sa_mask);
-  sigaction (SIGINT, &action, NULL);
-  sigaction (SIGTERM, &action, NULL);
-}
 
 /* ---- Before the sweep ---- */
 
@@ -178,13 +158,13 @@ static void sweep_keep (sweep *x, long k, int status, const pw_text *text, const
     pw_fail (x->error, status, "%s", own->text);
   else if (pw_journal_add (&x->journal, &x->plan, k, -status, text->at, &x->scratch, x->error) == PW_OK)
     pw_progress_at (&x->progress, (double)x->journal.done);
-  if (x->error->status != PW_OK && sweep_stop == 0) sweep_stop = 1;
+  if (x->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
 }
 
 static void sweep_one (sweep *x, long k, pw_text *text) {
   pw_error own = { 0 };
   pw_text_clear (text);
-  int status = pw_sweep_row (&x->plan, pw_plan_row (&x->plan, k), &sweep_stop, text, &own);
+  int status = pw_sweep_row (&x->plan, pw_plan_row (&x->plan, k), &pw_stop, text, &own);
   if (status == PW_RETRY) return;
 #ifdef _OPENMP
 #pragma omp critical(sweep_rows)
@@ -204,14 +184,14 @@ static void sweep_all (sweep *x) {
 #pragma omp for schedule(dynamic)
 #endif
     for (long k = 0; k < rows; k++)
-      if (sweep_stop == 0 && x->journal.line[k] == 0) sweep_one (x, k, &text);
+      if (pw_stop == 0 && x->journal.line[k] == 0) sweep_one (x, k, &text);
     pw_text_free (&text);
   }
 }
 
 static int sweep_run (sweep *x, pw_error *error) {
   x->error = error;
-  sweep_catch_signals ();
+  pw_stop_catch ();
   pw_progress_count (&x->progress, pw_file_name (x->plan.file), "runs", (double)x->journal.done,
                      (double)x->journal.rows);
   sweep_all (x);

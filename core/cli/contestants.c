@@ -1,0 +1,125 @@
+/* Methods that are set side by side. */
+#include <stdlib.h>
+#include <string.h>
+#include "contestants.h"
+
+/* ---- Names ---- */
+
+/* Fixed steps by nature, or because the method's options say so. */
+static int contestants_adaptive (const pw_method *integrator, const char *name) {
+  return integrator->adaptive && strstr (name, ":steps=fixed") == NULL;
+}
+
+static int contestants_count_all (size_t *bytes) {
+  int count = 0;
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; s->name; s++, count++)
+      *bytes += strlen (pw_methods[i]->name) + strlen (s->name) + 2;
+  return count;
+}
+
+static void contestants_add (pw_contestants *c, const char *name, const pw_method *integrator) {
+  for (int i = 0; i < c->count; i++)
+    if (strcmp (c->method[i].name, name) == 0) return;
+  c->method[c->count++] = (pw_contestant){ name, contestants_adaptive (integrator, name) };
+}
+
+static char *contestants_add_all (pw_contestants *c, char *at) {
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; s->name; s++) {
+      int n = sprintf (at, "%s+%s", pw_methods[i]->name, s->name);
+      contestants_add (c, at, pw_methods[i]);
+      at += n + 1;
+    }
+  return at;
+}
+
+/* One name of n bytes, copied to `at`. */
+static int contestants_add_one (pw_contestants *c, char *at, const char *text, size_t n, pw_error *error) {
+  const pw_method *integrator;
+  int stabilisation;
+  memcpy (at, text, n);
+  at[n] = 0;
+  int status = pw_parse_method (at, &integrator, &stabilisation, error);
+  if (status == PW_OK) contestants_add (c, at, integrator);
+  return status;
+}
+
+int pw_contestants_read (pw_contestants *c, const char *text, pw_error *error) {
+  const char *whole = text;
+  size_t bytes = strlen (text) + 1;
+  int most = contestants_count_all (&bytes) + 1, status = PW_OK;
+  for (const char *p = text; *p; p++) most += *p == ',';
+  *c = (pw_contestants){ .names = malloc (bytes), .method = calloc ((size_t)most, sizeof *c->method) };
+  if (c->names == NULL || c->method == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  char *at = c->names;
+  for (int all = 0; status == PW_OK; text++) {
+    size_t n = strcspn (text, ",");
+    if (n == 0) return pw_fail (error, PW_INPUT, "--methods \"%.80s\": a name is missing", whole);
+    if (n == 3 && strncmp (text, "all", 3) == 0) {
+      if (!all) at = contestants_add_all (c, at);
+      all = 1;
+    } else {
+      status = contestants_add_one (c, at, text, n, error);
+      at += n + 1;
+    }
+    text += n;
+    if (*text == 0) break;
+  }
+  return status;
+}
+
+void pw_contestants_close (pw_contestants *c) {
+  free (c->method);
+  free (c->names);
+  *c = (pw_contestants){ .count = 0 };
+}
+
+/* ---- Looks ---- */
+
+static const char *contestants_dash (const char *method) {
+  static const struct {
+    const char *name, *dash;
+  } known[] = { { "projection", "1" },        { "none", "(2,4)" },       { "baumgarte", "(14,6)" },
+                { "ggl", "(14,5,3,5)" },      { "nullspace", "(30,8)" }, { "index2", "(14,5,3,5,3,5)" },
+                { "si1", "(24,5,24,5,3,5)" }, { "index3", "(6,6)" },     { NULL, "(20,4,2,4,2,4,2,4)" } };
+  const pw_method *integrator;
+  int stabilisation, i = 0;
+  if (pw_parse_method (method, &integrator, &stabilisation, NULL) != PW_OK) return "1";
+  while (known[i].name && strcmp (known[i].name, integrator->stabilisations[stabilisation].name) != 0) i++;
+  return known[i].dash;
+}
+
+/* A method without its stabilisation: of "erk8+projection:every=2", "erk8:every=2". */
+static void contestants_rest (const char *method, char *rest, size_t size) {
+  size_t n = strcspn (method, "+:"), m = method[n] == '+' ? strcspn (method + n, ":") : 0;
+  snprintf (rest, size, "%.*s%s", (int)n, method, method + n + m);
+}
+
+/* Numbers from 0 for what differs in more than the stabilisation, in order of appearance. */
+static int contestants_number (const pw_contestants *c, int method) {
+  char rest[200], other[200];
+  int numbers = 0;
+  contestants_rest (c->method[method].name, rest, sizeof rest);
+  for (int i = 0; i < method; i++) {
+    int again = 0;
+    contestants_rest (c->method[i].name, other, sizeof other);
+    if (strcmp (other, rest) == 0) return contestants_number (c, i);
+    for (int j = 0; j < i && !again; j++) {
+      char earlier[200];
+      contestants_rest (c->method[j].name, earlier, sizeof earlier);
+      again = strcmp (earlier, other) == 0;
+    }
+    numbers += !again;
+  }
+  return numbers;
+}
+
+void pw_contestants_style (const pw_contestants *c, int method, FILE *f) {
+  static const char *const colour[] = { "#004488", "#bb5566", "#997700", "#000000", "#228877", "#774499", "#777777" };
+  static const int mark[] = { 7, 4, 9, 12, 5, 6, 2, 8, 13, 1, 10, 3, 11 };
+  const int colours = sizeof colour / sizeof *colour, marks = sizeof mark / sizeof *mark;
+  int n = contestants_number (c, method);
+  fprintf (f, "dt %s lc rgb '%s' pt %d", contestants_dash (c->method[method].name), colour[n % colours],
+           mark[n % marks]);
+}

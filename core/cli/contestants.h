@@ -1,0 +1,28 @@
+/* Methods that are set side by side: their names, and how each looks in a figure. */
+#ifndef PW_CONTESTANTS_H
+#define PW_CONTESTANTS_H
+
+#include <stdio.h>
+#include "pinwheel-solvers.h"
+
+typedef struct {
+  const char *name; /* "erk8+projection" */
+  int adaptive;     /* 1: follows tolerances, 0: a step */
+} pw_contestant;
+
+typedef struct {
+  pw_contestant *method;
+  int count;
+  char *names; /* what the names point into */
+} pw_contestants;
+
+/* Reads --methods: names separated by commas, among which "all" stands for each integrator with each stabilisation.  A
+ * method is taken once, however often it is named.  PW_INPUT with the nearest valid name.  Close it in every case. */
+int pw_contestants_read (pw_contestants *c, const char *text, pw_error *error);
+void pw_contestants_close (pw_contestants *c);
+
+/* Writes a method's dash, colour and mark: "dt 1 lc rgb '#004488' pt 7".  An integrator has a mark and a colour, a
+ * stabilisation a dash, so that lines can be told apart without colour. */
+void pw_contestants_style (const pw_contestants *c, int method, FILE *f);
+
+#endif
