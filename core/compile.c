@@ -374,6 +374,7 @@ static int compile_fill (const compile *c, pw_system *s, compile_pools *pools, p
   for (int i = 0; i < s->slabs; i++) {
     const pw_kind *kind = s->slab[i].kind;
     s->constraints += kind->rows > 0;
+    s->moving += kind->eta != NULL;
     if (kind->force && !kind->constant) s->force[s->forces++] = i;
   }
   pw_sweep_constant (s);

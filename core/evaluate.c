@@ -210,22 +210,36 @@ static void evaluate_speeds (const pw_system *s, double *jv, double *size) {
   }
 }
 
-void pw_sweep_residuals (pw_system *s, pw_residuals *r) {
-  double *value = s->scratch, *size = value + s->rows, *eta = size + s->rows;
-  *r = (pw_residuals){ .row_position = -1, .row_velocity = -1 };
-  pw_sweep_g (s, value);
-  pw_sweep_g_size (s, size);
+void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
+                         pw_residuals *r) {
+  r->position = r->g = 0;
+  r->row_position = -1;
   for (int i = 0; i < s->holonomic; i++) {
-    double scaled = fabs (value[i]) / size[i];
-    if (!(fabs (value[i]) <= r->g)) r->g = fabs (value[i]);
+    if (enforced && !enforced[i]) continue;
+    double scaled = fabs (g[i]) / size[i];
+    if (!(fabs (g[i]) <= r->g)) r->g = fabs (g[i]);
     if (!(scaled <= r->position)) r->position = scaled, r->row_position = i;
   }
+}
+
+void pw_sweep_velocity_residual (pw_system *s, pw_residuals *r) {
+  double *value = s->scratch, *size = value + s->rows, *eta = size + s->rows, unit = s->scale.length / s->scale.time;
+  r->velocity = r->jv = 0;
+  r->row_velocity = -1;
   evaluate_speeds (s, value, size);
-  pw_sweep_eta (s, eta);
-  double unit = s->scale.length / s->scale.time;
+  if (s->moving) pw_sweep_eta (s, eta);
   for (int i = 0; i < s->rows; i++) {
-    double error = fabs (value[i] - eta[i]), scaled = error / (size[i] + fabs (eta[i]) + unit);
+    double wanted = s->moving ? eta[i] : 0, error = fabs (value[i] - wanted);
+    double scaled = error / (size[i] + fabs (wanted) + unit);
     if (!(error <= r->jv)) r->jv = error;
     if (!(scaled <= r->velocity)) r->velocity = scaled, r->row_velocity = i;
   }
+}
+
+void pw_sweep_residuals (pw_system *s, pw_residuals *r) {
+  double *value = s->scratch, *size = value + s->rows;
+  pw_sweep_g (s, value);
+  pw_sweep_g_size (s, size);
+  pw_judge_positions (s, value, size, NULL, r);
+  pw_sweep_velocity_residual (s, r);
 }

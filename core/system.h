@@ -43,6 +43,7 @@ struct pw_system {
   int forces;      /* slabs with a force that is not constant */
   int *force;      /* which */
   int readers;     /* function signals that read states */
+  int moving;      /* slabs with an eta: constraints that move */
   int hold;        /* 1: signals of forces keep their values (inputs=held) */
   double t_signal; /* the time the signals were last evaluated at; NaN: never */
   pw_scale scale;
@@ -108,6 +109,10 @@ typedef struct {
   int row_position, row_velocity; /* where */
 } pw_residuals;
 void pw_sweep_residuals (pw_system *s, pw_residuals *r);
+void pw_sweep_velocity_residual (pw_system *s, pw_residuals *r); /* only that of the rates */
+/* The worst of g, of the rows with enforced[i] != 0 if that is given, into the part of the positions. */
+void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
+                         pw_residuals *r);
 
 /* First discontinuity of any signal after t, or INFINITY. */
 double pw_next_breakpoint (const pw_system *s, double t);

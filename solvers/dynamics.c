@@ -82,7 +82,10 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
 void pw_note_residuals (pw_run *r) {
   pw_residuals now;
   pw_statistics *s = &r->statistics;
-  pw_sweep_residuals (r->s, &now);
+  if (isnan (r->position))
+    pw_sweep_residuals (r->s, &now);
+  else
+    pw_sweep_velocity_residual (r->s, &now), now.position = r->position, now.g = r->g;
   if (!(now.position <= s->position)) s->position = now.position;
   if (!(now.velocity <= s->velocity)) s->velocity = now.velocity;
   if (!(now.g <= s->g)) s->g = now.g;

@@ -28,18 +28,19 @@ struct pw_run {
   double calm;            /* the largest accelerations away from singular poses, in units of L / T^2 */
   double alpha, beta;     /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;      /* first discontinuity of a signal after t */
+  double position, g;     /* scaled and absolute residual, if the last projection told them; else NaN */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;
   double *q, *v, *a; /* coords + 3 each */
-  double *lambda;    /* rows */
+  double *lambda;    /* rows; one block, from q on */
   double *ledger;    /* entries: work and losses up to t */
   double *rate;      /* entries: their rates at t */
   double projected;  /* energy added by projections up to t */
 
   /* the state asked for by pw_at */
   double t_at;
-  double *q_at, *v_at, *a_at, *lambda_at, *ledger_at;
+  double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* the same block, from q_at on */
   double projected_at;
 
   double energy0;  /* kinetic + potential at the start */
@@ -96,7 +97,8 @@ void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda
 /* Says which constraints an evaluation could not tell apart, and when. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
-/* Takes the residuals of the state just accelerated into the statistics. */
+/* Takes the residuals of the state just accelerated into the statistics; those of its positions are not computed twice if
+ * a projection has left them. */
 void pw_note_residuals (pw_run *r);
 
 /* What the i-th redundant row follows from, at the pose J is swept and the saddle factorised at. */

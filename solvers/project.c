@@ -31,18 +31,6 @@ void pw_projector_close (pw_projector *p) {
   *p = (pw_projector){ 0 };
 }
 
-/* The worst scaled residual of g at the placed pose, of the rows that are enforced. */
-static double project_worst (pw_system *s, const unsigned char *active, double *g, double *size, int *row) {
-  double worst = 0;
-  pw_sweep_g (s, g);
-  pw_sweep_g_size (s, size);
-  for (int i = 0; i < s->holonomic; i++) {
-    double scaled = fabs (g[i]) / size[i];
-    if ((!active || active[i]) && !(scaled <= worst)) worst = scaled, *row = i;
-  }
-  return worst;
-}
-
 /* Redundant rows follow from the others but for round-off; a row that does not contradicts them.  It takes *row. */
 static int project_others (pw_projector *p, const pw_system *s, const double *g, const double *size, int *row) {
   const double follows = 1e-9;
@@ -58,14 +46,19 @@ static int project_others (pw_projector *p, const pw_system *s, const double *g,
 
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {
   const double good = 4 * DBL_EPSILON, enough = 64 * DBL_EPSILON; /* round-off of a row's few terms */
+  const double slight = 1e-6;                                     /* a correction that leaves the sizes as they are */
   const int most = 30;
   pw_system *s = r->s;
+  pw_residuals now = { 0 };
   double *g = p->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
   for (p->iterations = 0;; p->iterations++) {
     int status = pw_place (s, t, q, v);
     if (status != PW_OK) return status;
-    *row = -1;
-    *worst = project_worst (s, p->active, g, size, row);
+    pw_sweep_g (s, g);
+    if (!(before < slight)) pw_sweep_g_size (s, size);
+    pw_judge_positions (s, g, size, p->active, &now);
+    *row = now.row_position;
+    *worst = now.position;
     int stalled = *worst > before / 4;
     if (*worst <= good || (stalled && *worst <= enough)) break;
     if (p->iterations >= most || !isfinite (*worst)) return PW_RETRY;
@@ -78,24 +71,29 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   pw_sweep_J (s);
+  if (p->active == NULL) r->position = now.position, r->g = now.g;
   return project_others (p, s, g, size, row);
 }
 
 /* v += dv with J (v + dv) = eta. */
-static void project_once (pw_projector *p, pw_system *s, double *v) {
+static int project_once (pw_projector *p, pw_system *s, double *v, int fresh) {
   double *right = p->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
+  int status = PW_OK;
   pw_mul_J (s, v, right);
-  pw_sweep_eta (s, eta);
-  for (int i = 0; i < s->rows; i++) right[i] = eta[i] - right[i];
-  pw_saddle_solve (p->velocity, NULL, right, dv, mu);
-  for (int j = 0; j < s->coords; j++) v[j] += dv[j];
+  if (s->moving) pw_sweep_eta (s, eta);
+  for (int i = 0; i < s->rows; i++) right[i] = (s->moving ? eta[i] : 0) - right[i];
+  if (fresh)
+    status = pw_saddle_factor_solve (p->velocity, NULL, right, dv, mu);
+  else
+    pw_saddle_solve (p->velocity, NULL, right, dv, mu);
+  for (int j = 0; j < s->coords && status == PW_OK; j++) v[j] += dv[j];
+  return status;
 }
 
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   r->statistics.factorisations++;
-  if (pw_saddle_factor (p->velocity) != PW_OK) return PW_RETRY;
-  project_once (p, r->s, v);
-  if (pw_saddle_below (p->velocity, r->watch)) project_once (p, r->s, v);
+  if (project_once (p, r->s, v, 1) != PW_OK) return PW_RETRY;
+  if (pw_saddle_below (p->velocity, r->watch)) project_once (p, r->s, v, 0);
   pw_place_rates (r->s, v);
   return PW_OK;
 }

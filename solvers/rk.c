@@ -63,14 +63,15 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
   size_t n = (size_t)s->coords + 3, entries = (size_t)s->entries;
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
-    for (int i = 0; i < d->tableau->stages; i++) {
+    for (int i = 1; i < d->tableau->stages; i++) {
       d->V[i] = pw_take (&l, n, sizeof (double));
       d->A[i] = pw_take (&l, n, sizeof (double));
       d->R[i] = pw_take (&l, entries, sizeof (double));
     }
-    double **const state[] = { &d->q, &d->v, &d->q0, &d->v0, &d->a0 };
-    for (size_t i = 0; i < sizeof state / sizeof *state; i++) *state[i] = pw_take (&l, n, sizeof (double));
-    d->lambda = pw_take (&l, (size_t)s->rows, sizeof (double));
+    d->q = pw_take (&l, 3 * n + (size_t)s->rows, sizeof (double));
+    d->q0 = pw_take (&l, 3 * n, sizeof (double));
+    d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;
+    d->v0 = d->q0 + n, d->a0 = d->v0 + n;
     d->ledger0 = pw_take (&l, entries, sizeof (double));
     d->rate0 = pw_take (&l, entries, sizeof (double));
     if (pass == 1) break;
@@ -114,17 +115,20 @@ void pw_rk_close (pw_run *r) {
   free (r->data);
 }
 
+/* The state q, v, a as one block; with lambda behind it. */
+static inline size_t rk_block (const pw_run *r, int multipliers) {
+  return (3 * ((size_t)r->s->coords + 3) + (size_t)(multipliers ? r->s->rows : 0)) * sizeof (double);
+}
+
 int pw_rk_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
-  size_t bytes = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  size_t entries = (size_t)r->s->entries * sizeof (double);
   (void)error;
   d->base = d->t0 = r->t;
   d->count = 0;
   d->split = 0;
   if (d->adaptive) pw_rk_begin_adaptive (r);
-  memcpy (d->q0, r->q, bytes);
-  memcpy (d->v0, r->v, bytes);
-  memcpy (d->a0, r->a, bytes);
+  memcpy (d->q0, r->q, rk_block (r, 0));
   memcpy (d->ledger0, r->ledger, entries);
   memcpy (d->rate0, r->rate, entries);
   d->projected0 = r->projected;
@@ -171,9 +175,7 @@ static int rk_stages (pw_run *r, double h) {
   const pw_tableau *b = d->tableau;
   pw_system *s = r->s;
   int n = s->coords;
-  memcpy (d->V[0], r->v, (size_t)n * sizeof (double));
-  memcpy (d->A[0], r->a, (size_t)n * sizeof (double));
-  memcpy (d->R[0], r->rate, (size_t)s->entries * sizeof (double));
+  d->V[0] = r->v, d->A[0] = r->a, d->R[0] = r->rate;
   if (d->held) pw_hold (s, 1);
   int status = PW_OK;
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
@@ -216,7 +218,7 @@ static int rk_finite (const pw_run *r, const double *q, const double *v) {
   return 1;
 }
 
-/* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->A[0], d->lambda. */
+/* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->a, d->lambda. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   struct pw_method_data *d = r->data;
   int n = r->s->coords, status = rk_stages (r, h);
@@ -225,21 +227,16 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   pw_rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) status = rk_project (r, t1, d->q, d->v, added);
-  return status == PW_OK ? rk_accelerate (r, project, t1, d->q, d->v, d->A[0], d->lambda) : status;
+  return status == PW_OK ? rk_accelerate (r, project, t1, d->q, d->v, d->a, d->lambda) : status;
 }
 
 /* The step is good: it becomes the state reached. */
 void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   struct pw_method_data *d = r->data;
-  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries;
+  size_t entries = (size_t)r->s->entries;
   d->t0 = r->t;
-  memcpy (d->q0, r->q, n);
-  memcpy (d->v0, r->v, n);
-  memcpy (d->a0, r->a, n);
-  memcpy (r->q, d->q, n);
-  memcpy (r->v, d->v, n);
-  memcpy (r->a, d->A[0], n);
-  memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (d->q0, r->q, rk_block (r, 0));
+  memcpy (r->q, d->q, rk_block (r, 1));
   r->t = t1;
   if (r->settings.ledger) {
     memcpy (d->ledger0, r->ledger, entries * sizeof (double));
@@ -284,11 +281,7 @@ int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
 /* ---- Looking into the last step ---- */
 
 static void rk_copy_reached (pw_run *r) {
-  size_t n = (size_t)r->s->coords * sizeof (double);
-  memcpy (r->q_at, r->q, n);
-  memcpy (r->v_at, r->v, n);
-  memcpy (r->a_at, r->a, n);
-  memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (r->q_at, r->q, rk_block (r, 1));
   memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
   r->projected_at = r->projected;
   if (pw_place (r->s, r->t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
@@ -299,16 +292,12 @@ static int rk_step_again (pw_run *r, double t) {
   struct pw_method_data *d = r->data;
   const pw_run reached = *r;
   double added = 0, h = t - d->t0;
-  size_t n = (size_t)r->s->coords * sizeof (double);
   r->t = d->t0, r->q = d->q0, r->v = d->v0, r->a = d->a0, r->rate = d->rate0;
   pw_saddle_set_guard (r->saddle, 0);
   int status = pw_rk_step (r, h, t, d->projects, r->settings.ledger ? &added : NULL);
   pw_saddle_set_guard (r->saddle, r->guard);
   *r = reached;
-  memcpy (r->q_at, d->q, n);
-  memcpy (r->v_at, d->v, n);
-  memcpy (r->a_at, d->A[0], n);
-  memcpy (r->lambda_at, d->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (r->q_at, d->q, rk_block (r, 1));
   if (r->settings.ledger) pw_rk_combine (r->ledger_at, d->ledger0, d->R, &d->row[0], h, r->s->entries);
   r->projected_at = d->projected0 + added;
   return status;

@@ -55,7 +55,7 @@ static double adapt_one (pw_run *r, const double *e, int projected) {
   struct pw_method_data *d = r->data;
   double *eq = r->q_at, *ev = r->v_at;
   adapt_estimate (r, e, r->v, d->V, d->v, eq);
-  adapt_estimate (r, e, r->a, d->A, d->A[0], ev);
+  adapt_estimate (r, e, r->a, d->A, d->a, ev);
   if (projected) {
     adapt_project (r, eq, r->s->holonomic);
     adapt_project (r, ev, r->s->rows);
@@ -87,9 +87,9 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   double before = pw_before_breakpoint (r, t1);
   r->near = 0;
   int status = pw_rk_step (r, h, t1, project, added);
-  if (status == PW_OK && before < t1) status = pw_accelerate (r, before, d->q, d->v, d->A[0], d->lambda);
+  if (status == PW_OK && before < t1) status = pw_accelerate (r, before, d->q, d->v, d->a, d->lambda);
   *off = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
-  if (status == PW_OK && before < t1) status = pw_accelerate (r, t1, d->q, d->v, d->A[0], d->lambda);
+  if (status == PW_OK && before < t1) status = pw_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
   if (status != PW_OK) *off = INFINITY;
   return status;
 }

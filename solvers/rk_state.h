@@ -22,10 +22,9 @@ struct pw_method_data {
   long count;                                                  /* steps since then */
   int split;                                                   /* 1: the last step ended inside one of them */
   double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES]; /* rates, accelerations, ledger's rates of the stages */
-  double *q, *v;                                               /* a stage's state */
-  double *lambda;
-  double h, before; /* adaptive: next step, error of the last one */
-  /* the beginning of the last step, for looking back into it */
+  double *q, *v, *a, *lambda; /* a stage's state, then the new one: one block, as the run's */
+  double h, before;           /* adaptive: next step, error of the last one */
+  /* the beginning of the last step, for looking back into it: one block */
   double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
   char *memory;
 };
@@ -33,7 +32,7 @@ struct pw_method_data {
 /* out = y + h sum_j w_j K_j */
 void pw_rk_combine (double *out, const double *y, double *const *K, const pw_rk_row *w, double h, int n);
 
-/* From the state reached to its successor at t1 = t + h, left in d->q, d->v, d->A[0], d->lambda; project: onto the
+/* From the state reached to its successor at t1 = t + h, left in d->q, d->v, d->a, d->lambda; project: onto the
  * constraints; added (NULL: not wanted) takes the energy this adds.  PW_RETRY: a smaller step may do. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added);
 

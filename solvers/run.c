@@ -36,20 +36,8 @@ static int run_allocate (pw_run *r) {
     double **array;
     size_t count;
   } array[] = {
-    { &r->q, n },
-    { &r->v, n },
-    { &r->a, n },
-    { &r->lambda, rows },
-    { &r->ledger, entries },
-    { &r->rate, entries },
-    { &r->q_at, n },
-    { &r->v_at, n },
-    { &r->a_at, n },
-    { &r->lambda_at, rows },
-    { &r->ledger_at, entries },
-    { &r->scratch, 2 * n + 3 * rows },
-    { &r->q_given, n },
-    { &r->v_given, n },
+    { &r->q, 3 * n + rows },    { &r->ledger, entries },           { &r->rate, entries }, { &r->q_at, 3 * n + rows },
+    { &r->ledger_at, entries }, { &r->scratch, 2 * n + 3 * rows }, { &r->q_given, n },    { &r->v_given, n },
   };
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
@@ -60,6 +48,8 @@ static int run_allocate (pw_run *r) {
     if (r->memory == NULL) return PW_MACHINE;
     l = (pw_layout){ r->memory, 0 };
   }
+  r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
+  r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
   memcpy (r->q, s->q0, (size_t)s->coords * sizeof (double));
   memcpy (r->v, s->v0, (size_t)s->coords * sizeof (double));
   return PW_OK;
@@ -120,12 +110,18 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
 /* The size of the accelerations, in units of L / T^2. */
 static double run_agitation (const pw_run *r) {
   const pw_system *s = r->s;
-  double most = 1, per = s->scale.time * s->scale.time;
-  for (int j = 0; j < s->coords; j++) {
-    double size = fabs (r->a[j]) * per / pw_unit (s, j);
-    if (!(size <= most)) most = size;
+  const double *a = r->a, *own = a + 3 * s->bodies;
+  double linear = 0, angular = 0, per = s->scale.time * s->scale.time;
+  for (; a < own; a += 3) {
+    if (!(fabs (a[0]) <= linear)) linear = fabs (a[0]);
+    if (!(fabs (a[1]) <= linear)) linear = fabs (a[1]);
+    if (!(fabs (a[2]) <= angular)) angular = fabs (a[2]);
   }
-  return most;
+  for (; a < r->a + s->coords; a++)
+    if (!(fabs (*a) <= angular)) angular = fabs (*a);
+  double most = linear * (per / s->scale.length);
+  if (!(angular * per <= most)) most = angular * per;
+  return most <= 1 ? 1 : most;
 }
 
 /* The state is consistent: energies, ledger and statistics begin here. */
@@ -134,6 +130,7 @@ static void run_begin (pw_run *r) {
   r->calm = run_agitation (r);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
   r->breakpoint = pw_next_breakpoint (s, r->t);
+  r->position = NAN;
   pw_note_residuals (r);
 }
 
@@ -243,6 +240,7 @@ static int run_judge (pw_run *r, pw_error *error) {
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
   int row, status = PW_OK;
   if (!(r->t < t_end)) return PW_OK;
+  r->position = NAN;
   if (r->t >= r->breakpoint) status = run_pass_breakpoint (r, error);
   if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
