@@ -31,6 +31,7 @@ int pw_cli_new (int argc, const char **argv);
 int pw_cli_run (int argc, const char **argv);
 int pw_cli_sweep (int argc, const char **argv);
 int pw_cli_compare (int argc, const char **argv);
+int pw_cli_drift (int argc, const char **argv);
 
 /* ---- Options ---- */
 

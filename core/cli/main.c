@@ -13,6 +13,7 @@ static const pw_command main_commands[] = {
   { "run", "MODEL [OPTION...]", "integrate a model; write a table, a summary, plots", pw_cli_run },
   { "sweep", "MODEL [OPTION...]", "a table of runs, for all combinations of varied parameters", pw_cli_sweep },
   { "compare", "MODEL [OPTION...]", "what accuracy costs: many methods against the truth", pw_cli_compare },
+  { "drift", "MODEL [OPTION...]", "constraints and energy in a long run, by stabilisation", pw_cli_drift },
   { "new", "NAME.c|NAME.yaml", "write a small commented model to begin with", pw_cli_new },
   { NULL, NULL, NULL, NULL },
 };

@@ -61,7 +61,7 @@ void pw_progress_at (pw_progress *p, double t) {
   bar[PROGRESS_WIDTH] = 0;
   int timed = strcmp (p->unit, "s") == 0;
   fprintf (stderr, "\r%.16s [%s] %3.0f %%  %s%.*g of %.*g %s  %s to go\033[K", p->what, bar, floor (100 * part),
-           timed ? "t = " : "", timed ? 4 : 9, t, timed ? 4 : 9, p->t_end, p->unit, left);
+           timed ? "t = " : "", timed ? 4 : 9, timed ? t : floor (t), timed ? 4 : 9, p->t_end, p->unit, left);
   fflush (stderr);
   p->shown = 1;
 }

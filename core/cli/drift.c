@@ -1,0 +1,155 @@
+/* pinwheel drift: what a long run does to the constraints and the energy, under each stabilisation side by side, and how
+ * that depends on Baumgarte's alpha and beta and on the projection's metric and frequency. */
+#include <math.h>
+#include <string.h>
+#include "drift.h"
+#include "plot.h"
+#include "stop.h"
+
+/* ---- Before it begins ---- */
+
+static int drift_read (pw_drift *x, int argc, const char **argv, pw_error *error) {
+  const struct poptOption options[] = {
+    { "methods", 'm', POPT_ARG_STRING, &x->methods_text, 0,
+      "Methods side by side, separated by commas; all: every integrator with every stabilisation; default: those of "
+      "rk4, ida and galpha",
+      "A,B,...|all" },
+    { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
+    { "step", 0, POPT_ARG_STRING, &x->step_text, 0, "Step of fixed-step methods [s]", "H" },
+    { "rtol", 0, POPT_ARG_STRING, &x->rtol_text, 0, "Relative tolerance of adaptive methods", "R" },
+    PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
+    { "vary", 'v', POPT_ARG_ARGV, &x->vary, 0,
+      "Values of an option: alpha or beta [1/s] of baumgarte, every [steps] of projection; may be repeated. RANGE as "
+      "of "
+      "sweep: V1,V2,..., lin:FIRST:LAST:COUNT, log:...",
+      "OPTION=RANGE" },
+    { "only-methods", 0, POPT_ARG_NONE, &x->only_methods, 0, "Leave out how the drift depends on options", NULL },
+    { "output", 'o', POPT_ARG_STRING, &x->folder, 0, "Write tables and figures into a folder", "DIR" },
+    POPT_TABLEEND,
+  };
+  return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
+}
+
+/* Every stabilisation of an explicit integrator and of the implicit ones. */
+static void drift_usual (char *text, size_t size) {
+  static const char *const usual[] = { "rk4", "ida", "galpha" };
+  size_t n = 0;
+  *text = 0;
+  for (size_t k = 0; k < sizeof usual / sizeof *usual; k++)
+    for (int i = 0; pw_methods[i]; i++)
+      for (const pw_stabilisation *s = pw_methods[i]->stabilisations;
+           strcmp (pw_methods[i]->name, usual[k]) == 0 && s->name; s++)
+        n += (size_t)snprintf (text + n, size - n, "%s%s+%s", n ? "," : "", pw_methods[i]->name, s->name);
+}
+
+/* Options over the model's wishes over Pinwheel's own. */
+static int drift_settle (pw_drift *x, pw_error *error) {
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
+  char usual[1000];
+  x->t_end = d.t_end;
+  x->settings = (pw_settings){ .step = d.step, .rtol = d.rtol > 0 ? d.rtol : 1e-6, .ledger = 1 };
+  int status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &x->t_end, error);
+  if (status == PW_OK) status = pw_cli_number ("--step", x->step_text, PW_POSITIVE, &x->settings.step, error);
+  if (status == PW_OK) status = pw_cli_number ("--rtol", x->rtol_text, PW_POSITIVE, &x->settings.rtol, error);
+  x->settings.span = x->t_end;
+  drift_usual (usual, sizeof usual);
+  if (status == PW_OK) status = pw_contestants_read (&x->list, x->methods_text ? x->methods_text : usual, error);
+  return status == PW_OK ? pw_drift_rows (x, error) : status;
+}
+
+static int drift_open (pw_drift *x, pw_error *error) {
+  char path[PLOT_PATH + 16];
+  int status =
+      pw_cli_open (&x->m, x->line.argument[0], (const char *const *)x->sets, (const char *const *)x->starts, error);
+  if (status == PW_OK) status = drift_settle (x, error);
+  if (status != PW_OK || x->folder == NULL) return status;
+  status = pw_plot_folder (x->folder, error);
+  if (status != PW_OK) return status;
+  snprintf (path, sizeof path, "%s/drift.csv", x->folder);
+  x->csv = pw_output_open (path, error);
+  return x->csv ? pw_drift_csv_head (x, error) : error->status;
+}
+
+/* ---- Rows ---- */
+
+static void drift_title (const pw_drift *x) {
+  char t[32], h[32], rtol[32];
+  printf (
+      "%s, %s s, steps of %s s or rtol %s: the worst of all steps, the worst of the last %g %%, and how it grows\n\n",
+      pw_file_name (x->m.file), pw_format (t, x->t_end, 6), pw_format (h, x->settings.step, 6),
+      pw_format (rtol, x->settings.rtol, 6), 100.0 / DRIFT_PARTS);
+}
+
+static int drift_rows (pw_drift *x, pw_error *error) {
+  int status = PW_OK;
+  drift_title (x);
+  pw_progress_count (&x->progress, pw_file_name (x->m.file), "runs", 0, x->rows);
+  for (x->done = 0; x->done < x->rows; x->done++) {
+    pw_drift_row *r = &x->row[x->done];
+    status = pw_drift_run (x, r, error);
+    pw_progress_end (&x->progress);
+    if (status != PW_OK) return status;
+    if (x->done == 0 || r->group != r[-1].group) pw_drift_head (x, r->group, stdout);
+    pw_drift_line (x, r, stdout);
+    fflush (stdout);
+    if (x->csv) status = pw_drift_csv_line (x, r, error);
+    if (status != PW_OK) return status;
+  }
+  return PW_OK;
+}
+
+/* ---- After it ---- */
+
+static int drift_interrupted (pw_drift *x) {
+  char part[PLOT_PATH + 16] = "";
+  if (x->csv) pw_output_abandon (x->csv, part, sizeof part);
+  x->csv = NULL;
+  if (x->done == 0 && *part) remove (part);
+  fprintf (stderr, "pinwheel: interrupted; %d of %d runs are done%s%s\n", x->done, x->rows,
+           *part && x->done ? ", and kept in " : "", x->done ? part : "");
+  return PW_INTERRUPTED;
+}
+
+/* A whole table loses its ending .part; figures are drawn of it. */
+static int drift_finish (pw_drift *x, int status, pw_error *error) {
+  if (status == PW_RETRY && pw_stop) return drift_interrupted (x);
+  if (x->csv == NULL) return status;
+  pw_output *csv = x->csv;
+  x->csv = NULL;
+  if (status != PW_OK) {
+    char part[PLOT_PATH + 16];
+    if (pw_output_abandon (csv, part, sizeof part) && x->done == 0) remove (part);
+    return status;
+  }
+  status = pw_output_finish (csv, error);
+  if (status == PW_OK) status = pw_drift_csv_time (x, error);
+  return status == PW_OK ? pw_drift_plot (x, error) : status;
+}
+
+/* If no run has reached the end, that is a failure. */
+static int drift_verdict (const pw_drift *x, pw_error *error) {
+  for (int i = 0; i < x->rows; i++)
+    if (x->row[i].status == PW_OK) return PW_OK;
+  return pw_fail (error, PW_METHOD, "no method has reached the end; the last of them: %s", x->row[x->rows - 1].reason);
+}
+
+int pw_cli_drift (int argc, const char **argv) {
+  pw_drift x = { .rows = 0 };
+  pw_error error = { 0 };
+  int status = drift_read (&x, argc, argv, &error);
+  if (status == PW_OK) {
+    status = drift_open (&x, &error);
+    if (status == PW_OK) {
+      pw_stop_catch ();
+      status = drift_rows (&x, &error);
+      pw_stop_release ();
+    }
+    status = drift_finish (&x, status, &error);
+    if (status == PW_OK) status = drift_verdict (&x, &error);
+  }
+  pw_drift_free_rows (&x);
+  pw_contestants_close (&x.list);
+  pw_cli_close_model (&x.m);
+  pw_cli_close (&x.line);
+  return status == PW_INTERRUPTED ? status : pw_cli_end (&error);
+}
