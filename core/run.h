@@ -32,6 +32,7 @@ typedef struct {
   long rhs;            /* evaluations of the accelerations, or of the residual */
   long jacobians;      /* evaluations of an iteration matrix */
   long factorisations; /* of any matrix */
+  long restarts;       /* of a method with a memory, at checkpoints */
   double position;     /* worst scaled residual of g = 0 */
   double velocity;     /* worst scaled residual of J v = eta */
   double g;            /* worst |g| [m] or [rad] */
@@ -68,6 +69,22 @@ typedef struct {
   int freed;                       /* 1: the values the user gave could not all be held */
   double position, velocity;       /* scaled residuals before */
 } pw_start_report;
+
+/* ---- Saved states ---- */
+
+/* Bytes that a state is saved to, or loaded from; all zero at first. */
+typedef struct {
+  unsigned char *at;
+  size_t used; /* saved so far; taken so far when loading */
+  size_t size; /* room; all there is when loading */
+  int loading; /* 1: pw_carry takes bytes out */
+  int failed;  /* out of memory; when loading: more was asked for than there is */
+} pw_archive;
+
+/* Saves bytes, or loads them: one function that lists what a state consists of serves both ways. */
+void pw_carry (pw_archive *a, void *bytes, size_t count);
+void pw_archive_clear (pw_archive *a); /* back to the beginning */
+void pw_archive_free (pw_archive *a);
 
 #ifdef __cplusplus
 }

@@ -507,7 +507,7 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
 static int ida_at (pw_run *r, double t, pw_error *error) {
   ida_data *d = r->data;
   double *work = N_VGetArrayPointer (d->work);
-  if (r->statistics.steps == 0 || d->stop == INFINITY) {
+  if (t == d->begun) {
     ida_fill_vectors (d);
   } else if (t > r->t || IDAGetDky (d->ida, t, 1, d->yp) != IDA_SUCCESS ||
              IDAGetDky (d->ida, t, 0, d->y) != IDA_SUCCESS) {

@@ -80,6 +80,10 @@ int pw_stabilised_by (const pw_run *r, const char *name);
   }
 void pw_read_baumgarte (pw_run *r);
 
+/* Plans the linear algebra at the state reached, where J is swept, and opens the method there.  fresh: what a small pivot
+ * is follows from those here; else it stays what it was. */
+int pw_run_renew (pw_run *r, int fresh, pw_error *error);
+
 /* ---- Dynamics ---- */
 
 /* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the run has them; J stays swept and the saddle

@@ -45,6 +45,8 @@ typedef struct {
   int (*at) (pw_run *r, double t, pw_error *error); /* leaves the state in the run's sample arrays */
   int (*restart) (pw_run *r, pw_error *error);
   void (*close) (pw_run *r);
+  void (*carry) (pw_run *r, pw_archive *a); /* saves or loads what steps after a checkpoint need beyond the state: step
+                                               size, counts; NULL: the method starts anew at checkpoints */
 } pw_method;
 
 /* All integrators, ended by NULL. */
@@ -75,6 +77,18 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error);
 int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error);
 
 void pw_close (pw_run *r);
+
+/* ---- Checkpoints ---- */
+
+/* Saves the state reached, behind what the archive has already, and goes on from there as a run that is loaded from it:
+ * matrices are planned anew, and a method with a memory of earlier steps starts anew, which its statistics count.
+ * Samples of the last step must have been taken.  PW_RETRY near a singular pose, where nothing is done: try after the
+ * next step.  Errors: PW_MACHINE. */
+int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
+
+/* Brings a run that was opened alike (system, method, settings) and has not advanced to a saved state: from there it
+ * goes on, bit for bit, as the run that was saved.  Errors: PW_INPUT if the archive does not fit; PW_MACHINE. */
+int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 
 /* Redundant rows, and in words what one of them follows from, written to the buffer, which is returned.  Reactions are
  * then not unique: samples give the smallest. */

@@ -222,6 +222,16 @@ int pw_rank_reselect (pw_run *r) {
   return other;
 }
 
+void pw_rank_carry (pw_run *r, pw_archive *a) {
+  int found = 0, *row = r->redundant_row, most = r->redundant;
+  if (most == 0) return;
+  unsigned char *mask = (unsigned char *)(row + most);
+  pw_carry (a, mask, (size_t)r->s->rows);
+  for (int i = 0; i < r->s->rows; i++)
+    if (!mask[i] && found++ < most) row[found - 1] = i;
+  if (found != most) a->failed = 1;
+}
+
 void pw_rank_close (pw_run *r) {
   free (r->rank_memory);
   r->rank_memory = NULL;

@@ -2,6 +2,7 @@
 #ifndef PW_RANK_H
 #define PW_RANK_H
 
+#include "run.h"
 #include "system.h"
 
 struct pw_run;
@@ -21,6 +22,9 @@ int pw_rank_choose (struct pw_run *r, pw_error *error);
 /* Chooses r->active anew at the pose J is swept at, if there is another set of the same rank: 1; 0 if there is none.  The
  * run's saddle and method then still have the old one.  Errors: PW_MACHINE. */
 int pw_rank_reselect (struct pw_run *r);
+
+/* Saves or loads r->active, which has as many redundant rows as before.  Saddle and method then still have the old one. */
+void pw_rank_carry (struct pw_run *r, pw_archive *a);
 
 /* Multipliers of all rows from those of the active ones: the smallest (forces in units of 1, moments of L) with the same
  * J^T lambda.  J must be swept and the run's saddle factorised at the pose. */

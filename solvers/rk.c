@@ -135,6 +135,15 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
+void pw_rk_carry (pw_run *r, pw_archive *a) {
+  struct pw_method_data *d = r->data;
+  pw_carry (a, &d->base, sizeof d->base);
+  pw_carry (a, &d->count, sizeof d->count);
+  pw_carry (a, &d->split, sizeof d->split);
+  pw_carry (a, &d->h, sizeof d->h);
+  pw_carry (a, &d->before, sizeof d->before);
+}
+
 /* ---- A step ---- */
 
 /* out = y + h sum_j w_j K_j, two entries at a time; m, the number of weights, is a constant where it is inlined. */

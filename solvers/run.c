@@ -198,6 +198,19 @@ static int run_lost (pw_run *r, pw_error *error) {
                   r->t, cause, element, now.position, now.velocity);
 }
 
+int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
+  int status = run_open_saddle (r, error);
+  if (status == PW_OK) status = run_evaluate (r, error);
+  if (status != PW_OK) return status;
+  if (fresh)
+    run_watch (r);
+  else
+    pw_saddle_set_guard (r->saddle, r->guard);
+  r->method->close (r);
+  r->data = NULL;
+  return r->method->open (r, error);
+}
+
 /* The rows in use have become nearly dependent: if others are not, the method starts anew with them.  This waits for the
  * next step, so that the last one can be looked into, and cannot depend on whether it was. */
 static int run_reselect (pw_run *r, pw_error *error) {
@@ -209,13 +222,7 @@ static int run_reselect (pw_run *r, pw_error *error) {
   if (other < 0) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   if (other == 0) return PW_OK;
   memcpy (r->ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
-  status = run_open_saddle (r, error);
-  if (status == PW_OK) status = run_evaluate (r, error);
-  if (status != PW_OK) return status;
-  run_watch (r);
-  r->method->close (r);
-  r->data = NULL;
-  return r->method->open (r, error);
+  return pw_run_renew (r, 1, error);
 }
 
 /* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */

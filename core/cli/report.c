@@ -155,5 +155,6 @@ void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_samp
       "  %ld steps, %ld rejected, %ld right-hand sides, %ld Jacobians, %ld factorisations, %s s of processor time\n",
       statistics->steps, statistics->rejected, statistics->rhs, statistics->jacobians, statistics->factorisations,
       pw_format (a, summary->cpu, 3));
+  if (statistics->restarts > 0) printf ("  started anew at %ld checkpoints\n", statistics->restarts);
   if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
 }

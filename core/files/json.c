@@ -185,6 +185,7 @@ static void json_statistics (json *j, struct fy_node *root, const pw_statistics 
   json_add_number (j, statistics, "rhs", (double)n->rhs);
   json_add_number (j, statistics, "jacobians", (double)n->jacobians);
   json_add_number (j, statistics, "factorisations", (double)n->factorisations);
+  json_add_number (j, statistics, "restarts", (double)n->restarts);
   json_add_number (j, statistics, "cpu_s", cpu);
 }
 

@@ -1,0 +1,35 @@
+/* Bytes that a state is saved to and loaded from. */
+#include <stdlib.h>
+#include <string.h>
+#include "run.h"
+
+static int archive_grow (pw_archive *a, size_t count) {
+  if (a->used + count <= a->size) return 1;
+  size_t size = 2 * (a->used + count) + 1000;
+  unsigned char *more = realloc (a->at, size);
+  if (more == NULL) return 0;
+  a->at = more;
+  a->size = size;
+  return 1;
+}
+
+void pw_carry (pw_archive *a, void *bytes, size_t count) {
+  if (count == 0 || a->failed) return;
+  a->failed = a->loading ? a->size - a->used < count : !archive_grow (a, count);
+  if (a->failed) return;
+  if (a->loading)
+    memcpy (bytes, a->at + a->used, count);
+  else
+    memcpy (a->at + a->used, bytes, count);
+  a->used += count;
+}
+
+void pw_archive_clear (pw_archive *a) {
+  a->used = 0;
+  a->failed = 0;
+}
+
+void pw_archive_free (pw_archive *a) {
+  free (a->at);
+  *a = (pw_archive){ .at = NULL };
+}

@@ -1,0 +1,67 @@
+/* Checkpoints: the state of a run as bytes.
+ *
+ * Some of what a run has in memory depends on the way it came: which pivots its factorisations chose, the earlier
+ * values of a multistep formula.  That is not saved: the run that is saved and the one that is loaded both build it anew
+ * from the state reached, and so go on alike.  A method's `carry` adds what only it knows: step size, counts. */
+#include "method.h"
+
+/* 1 if the archive is of a run of these sizes. */
+static int checkpoint_sizes (pw_run *r, pw_archive *a) {
+  const int own[] = { r->s->coords, r->s->rows, r->s->entries, r->redundant };
+  enum { SIZES = sizeof own / sizeof *own };
+  int good = 1;
+  for (int i = 0; i < SIZES; i++) {
+    int size = own[i];
+    pw_carry (a, &size, sizeof size);
+    good &= size == own[i];
+  }
+  return good;
+}
+
+static void checkpoint_state (pw_run *r, pw_archive *a) {
+  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  double *const number[] = { &r->t,     &r->breakpoint, &r->projected, &r->calm,
+                             &r->pivot, &r->reselect,   &r->watch,     &r->guard };
+  for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_carry (a, number[i], sizeof (double));
+  pw_carry (a, r->q, n);
+  pw_carry (a, r->v, n);
+  pw_carry (a, r->ledger, entries);
+  pw_carry (a, &r->statistics, sizeof r->statistics);
+  pw_rank_carry (r, a);
+}
+
+/* From the state in the run, in either of them; `a` is loading and has the method's own next, if there is any. */
+static int checkpoint_go_on (pw_run *r, pw_archive *a, pw_error *error) {
+  if (pw_place (r->s, r->t, r->q, r->v) != PW_OK)
+    return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  pw_sweep_J (r->s);
+  r->near = 0;
+  if (r->method->carry == NULL) r->statistics.restarts++;
+  int status = pw_run_renew (r, 0, error);
+  if (status == PW_OK && r->method->carry) r->method->carry (r, a);
+  if (status == PW_OK && a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
+  return status;
+}
+
+int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
+  pw_sample sample;
+  if (r->near) return PW_RETRY;
+  int status = pw_at (r, r->t, &sample, error); /* brings the ledger up to date */
+  if (status != PW_OK) return status;
+  for (int i = 0; i < r->s->entries; i++) r->ledger[i] = r->ledger_at[i];
+  checkpoint_sizes (r, a);
+  checkpoint_state (r, a);
+  pw_archive own = { .used = a->used, .loading = 1 };
+  if (r->method->carry) r->method->carry (r, a);
+  if (a->failed) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  own.at = a->at;
+  own.size = a->used;
+  return checkpoint_go_on (r, &own, error);
+}
+
+int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
+  int good = checkpoint_sizes (r, a);
+  if (good) checkpoint_state (r, a);
+  if (!good || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
+  return checkpoint_go_on (r, a, error);
+}

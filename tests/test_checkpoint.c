@@ -1,0 +1,196 @@
+/* A run loaded from a checkpoint goes on, bit for bit, as the one that was saved: every method, every stabilisation. */
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "pinwheel-files.h"
+#include "runs.h"
+
+static const struct {
+  const char *scene, *parameter;
+  double value, t_end;
+} saved_scenes[] = {
+  { "models/ezyroller.c", NULL, 0, 1 },          { "models/ezyroller.c", "omega", 20, 1 },
+  { "tests/scenes/zoo.c", NULL, 0, 0.3 },        { "models/redundant-parallelogram.c", NULL, 0, 0.4 },
+  { "models/n-four-bar.c", NULL, 0, 0.4 },       { "tests/scenes/chain.c", "links", 30, 0.05 },
+  { "tests/models/ezyroller.yaml", NULL, 0, 1 },
+};
+
+enum { SAVED_SCENES = sizeof saved_scenes / sizeof *saved_scenes, SAVED_MOMENTS = 3, SAVED_MOST = 4000 };
+
+static pw_file *saved_file[SAVED_SCENES];
+
+static int saved_setup (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  for (int i = 0; i < SAVED_SCENES; i++)
+    if ((saved_file[i] = pw_file_open (saved_scenes[i].scene, &error)) == NULL) check_ok (error.status, &error);
+  return 0;
+}
+
+static int saved_teardown (void **state) {
+  (void)state;
+  for (int i = 0; i < SAVED_SCENES; i++) pw_file_close (saved_file[i]);
+  return 0;
+}
+
+static pw_system *saved_system (int scene) {
+  pw_error error = { 0 };
+  pw_model *m = pw_file_model (saved_file[scene], &error);
+  assert_non_null (m);
+  if (saved_scenes[scene].parameter)
+    check_ok (pw_set (m, saved_scenes[scene].parameter, saved_scenes[scene].value, &error), &error);
+  check_ok (pw_build (m, &error), &error);
+  pw_system *s = pw_compile (m, &error);
+  pw_model_free (m);
+  check_ok (error.status, &error);
+  return s;
+}
+
+static pw_run *saved_open (pw_system *s, int scene, const char *method) {
+  return runs_open (s, method,
+                    &(pw_settings){ .step = 1e-3, .rtol = 1e-6, .span = saved_scenes[scene].t_end, .ledger = 1 });
+}
+
+/* What a run ends with: every number and count. */
+typedef struct {
+  int size;
+  double number[SAVED_MOST];
+} saved_end;
+
+static void saved_keep (saved_end *e, const double *x, int n) {
+  assert_true (e->size + n <= SAVED_MOST);
+  memcpy (e->number + e->size, x, (size_t)n * sizeof *x);
+  e->size += n;
+}
+
+/* On to the end; at each of the moments still ahead the run is saved to an archive of the list. */
+static void saved_finish (pw_run *r, pw_system *s, int scene, pw_archive *archive, int moment, saved_end *e) {
+  pw_error error = { 0 };
+  double t_end = saved_scenes[scene].t_end;
+  while (pw_time (r) < t_end) {
+    double due = t_end * (moment + 1) / (SAVED_MOMENTS + 1);
+    check_ok (pw_advance (r, pw_time (r) < due ? due : t_end, &error), &error);
+    if (moment == SAVED_MOMENTS || pw_time (r) < due) continue;
+    int status = pw_run_save (r, &archive[moment], &error);
+    check_ok (status > 0 ? PW_OK : status, &error);
+    if (status == PW_OK) moment++;
+  }
+  assert_int_equal (moment, SAVED_MOMENTS);
+  pw_sample x = runs_to (r, t_end);
+  const pw_statistics *n = pw_run_statistics (r);
+  e->size = 0;
+  saved_keep (e, x.q, pw_count_coordinates (s));
+  saved_keep (e, x.v, pw_count_coordinates (s));
+  saved_keep (e, x.a, pw_count_coordinates (s));
+  saved_keep (e, x.lambda, pw_count_rows (s));
+  saved_keep (e, x.ledger, pw_count_ledger (s));
+  saved_keep (e, (double[]){ x.balance, x.projection, n->position, n->velocity, n->g, n->jv }, 6);
+  saved_keep (e,
+              (double[]){ (double)n->steps, (double)n->rejected, (double)n->rhs, (double)n->jacobians,
+                          (double)n->factorisations, (double)n->restarts },
+              6);
+}
+
+/* A method that carries its step size and counts takes the same steps as if it had not been saved. */
+static void saved_undisturbed (int scene, const char *method, const pw_method *integrator, const pw_statistics *n) {
+  double t_end = saved_scenes[scene].t_end;
+  if (integrator->carry == NULL) return;
+  pw_error error = { 0 };
+  pw_system *s = saved_system (scene);
+  pw_run *r = saved_open (s, scene, method);
+  for (int i = 1; i <= SAVED_MOMENTS + 1; i++)
+    check_ok (pw_advance_to (r, t_end, t_end * i / (SAVED_MOMENTS + 1), &error), &error);
+  const pw_statistics *plain = pw_run_statistics (r);
+  assert_int_equal (n->restarts, 0);
+  assert_int_equal (n->steps, plain->steps);
+  assert_int_equal (n->rejected, plain->rejected);
+  pw_close (r);
+  pw_free (s);
+}
+
+/* The run that is saved, then one loaded from each of its archives. */
+static void saved_compare (int scene, const char *method) {
+  pw_error error = { 0 };
+  pw_archive archive[SAVED_MOMENTS] = { { .at = NULL } };
+  static saved_end whole, part;
+  pw_system *s = saved_system (scene);
+  pw_run *r = saved_open (s, scene, method);
+  saved_finish (r, s, scene, archive, 0, &whole);
+  const pw_method *integrator;
+  int stabilisation;
+  check_ok (pw_parse_method (method, &integrator, &stabilisation, &error), &error);
+  if (integrator->carry == NULL) assert_int_equal (pw_run_statistics (r)->restarts, SAVED_MOMENTS);
+  saved_undisturbed (scene, method, integrator, pw_run_statistics (r));
+  pw_close (r);
+  for (int moment = 0; moment < SAVED_MOMENTS; moment++) {
+    pw_archive again[SAVED_MOMENTS] = { { .at = NULL } };
+    pw_archive from = { .at = archive[moment].at, .size = archive[moment].used, .loading = 1 };
+    r = saved_open (s, scene, method);
+    check_ok (pw_run_load (r, &from, &error), &error);
+    assert_true (from.used == from.size);
+    saved_finish (r, s, scene, again, moment + 1, &part);
+    if (part.size != whole.size || memcmp (part.number, whole.number, (size_t)whole.size * sizeof (double)) != 0)
+      print_error ("%s, %s, from %d of %d\n", saved_scenes[scene].scene, method, moment + 1, SAVED_MOMENTS);
+    assert_int_equal (part.size, whole.size);
+    assert_memory_equal (part.number, whole.number, (size_t)whole.size * sizeof (double));
+    pw_close (r);
+    for (int i = 0; i < SAVED_MOMENTS; i++) pw_archive_free (&again[i]);
+  }
+  for (int i = 0; i < SAVED_MOMENTS; i++) pw_archive_free (&archive[i]);
+  pw_free (s);
+}
+
+static void test_same (void **state) {
+  (void)state;
+  for (int scene = 0; scene < SAVED_SCENES; scene++)
+    for (int i = 0; pw_methods[i]; i++)
+      for (const pw_stabilisation *t = pw_methods[i]->stabilisations; t->name; t++) {
+        char name[100];
+        snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, t->name);
+        saved_compare (scene, name);
+      }
+}
+
+static void test_options (void **state) {
+  (void)state;
+  static const char *const method[] = { "rk4+projection:every=3", "rk4+projection:metric=identity", "rk4:inputs=held",
+                                        "erk5:steps=fixed", "erk8+baumgarte:alpha=3" };
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) saved_compare (1, method[i]);
+}
+
+/* Archives of other runs, and what is left of one cut anywhere, are refused. */
+static void test_other (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_archive archive = { .at = NULL };
+  pw_system *s = saved_system (0), *other = saved_system (2);
+  pw_run *r = saved_open (s, 0, "erk8+projection");
+  check_ok (pw_advance (r, 1, &error), &error);
+  check_ok (pw_run_save (r, &archive, &error), &error);
+  pw_close (r);
+  for (size_t size = 0; size < archive.used; size += 1 + archive.used / 50) {
+    pw_archive from = { .at = archive.at, .size = size, .loading = 1 };
+    error = (pw_error){ 0 };
+    r = saved_open (s, 0, "erk8+projection");
+    assert_int_equal (pw_run_load (r, &from, &error), PW_INPUT);
+    assert_string_equal (error.text, "the saved state is not of this run");
+    pw_close (r);
+  }
+  pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
+  error = (pw_error){ 0 };
+  r = saved_open (other, 2, "erk8+projection");
+  assert_int_equal (pw_run_load (r, &from, &error), PW_INPUT);
+  pw_close (r);
+  pw_archive_free (&archive);
+  pw_free (s);
+  pw_free (other);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_same),
+    cmocka_unit_test (test_options),
+    cmocka_unit_test (test_other),
+  };
+  return cmocka_run_group_tests (tests, saved_setup, saved_teardown);
+}
