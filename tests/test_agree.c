@@ -79,7 +79,9 @@ static const struct {
                       { "rk4+projection:every=5", 0 },
                       { "ida+ggl", 1e3 },
                       { "ida+baumgarte", 1e3 },
-                      { "ida+none", 1e3 } };
+                      { "ida+none", 1e3 },
+                      { "ida+index2", 1e3 },
+                      { "ida+si1", 1e3 } };
 
 static void test_integrators (void **state) {
   (void)state;
@@ -107,10 +109,11 @@ static void test_integrators (void **state) {
 
 /* Every energy is accounted for, and keeping the account changes no bit of the run. */
 static void test_ledger (void **state) {
-  static const char *const method[] = { "rk4+projection", "rk4+none", "rk4+baumgarte", "ida+ggl", "ida+baumgarte" };
+  static const char *const method[] = { "rk4+projection", "rk4+none",   "rk4+baumgarte", "ida+ggl",
+                                        "ida+baumgarte",  "ida+index2", "ida+si1" };
   (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 7; i++) {
       pw_system *s = agree_scene (scene);
       pw_settings with = { .step = 1e-3, .rtol = 1e-9, .span = 3, .ledger = 1 }, without = with;
       without.ledger = 0;

@@ -18,9 +18,9 @@ static const struct {
   { "tests/scenes/zoo.c", NULL, 0, 0.4 },         { "tests/scenes/chain.c", "links", 5, 0.4 },
   { "tests/scenes/chain.c", "links", 150, 0.02 },
 };
-static const char *const same_methods[] = { "rk4+none",     "rk4+projection", "rk4+projection:metric=identity",
-                                            "ida+none",     "ida+ggl",        "rk4+projection:every=3",
-                                            "ida+baumgarte" };
+static const char *const same_methods[] = { "rk4+none",      "rk4+projection", "rk4+projection:metric=identity",
+                                            "ida+none",      "ida+ggl",        "rk4+projection:every=3",
+                                            "ida+baumgarte", "ida+index2",     "ida+si1" };
 
 enum {
   SAME_SCENES = sizeof same_scenes / sizeof *same_scenes,

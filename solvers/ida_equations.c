@@ -1,0 +1,184 @@
+/* The equations of motion as F (t, y, y') = 0, for IDA; y = (q, v, lambda, mu).
+ *
+ *   none, baumgarte   q' = v,               M v' + J^T lambda = f,   J v' = gamma - 2 alpha (J v - eta) - beta^2 g
+ *   index2            q' = v,               M v' + J^T lambda = f,   J v = eta
+ *   ggl               q' = v - D G^T mu,    M v' + J^T lambda = f,   J v = eta,   g = 0
+ *   si1               q' = v - D G^T mu',   M v' + J^T lambda' = f,  J v = eta,   g = 0
+ *
+ * with D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
+ * Gear 1988).  In si1 the unknowns are the integrals of the multipliers, and called lambda and mu as well. */
+#include <assert.h>
+#include <string.h>
+#include "ida_state.h"
+
+pw_ida_form pw_ida_choose_form (const pw_run *r) {
+  int si1 = pw_stabilised_by (r, "si1"), ggl = pw_stabilised_by (r, "ggl"), index2 = pw_stabilised_by (r, "index2");
+  return (pw_ida_form){ .rates = si1 || ggl || index2, .positions = si1 || ggl, .impulses = si1 };
+}
+
+int pw_ida_place (ida_data *d, double t, const double *y) {
+  int status = pw_place (d->run->s, pw_before_breakpoint (d->run, t), y, y + d->n);
+  if (status == PW_OK) pw_sweep_J (d->run->s);
+  return status == PW_OK ? 0 : -1;
+}
+
+/* Multipliers of all rows, from the unknowns or their rates. */
+static const double *ida_lambda (ida_data *d, const double *y, const double *yp) {
+  return pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp), d->rows, d->tangent.lambda);
+}
+
+static const double *ida_mu (ida_data *d, const double *y, const double *yp) {
+  return pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp) + d->rows, d->positions, d->tangent.mu);
+}
+
+/* ---- Residual ---- */
+
+/* q' - v + D G^T mu */
+static void ida_kinematics (ida_data *d, const double *y, const double *yp, double *out) {
+  pw_system *s = d->run->s;
+  int n = d->n;
+  for (int j = 0; j < n; j++) out[j] = yp[j] - y[n + j];
+  if (d->positions == 0) return;
+  double *pull = d->given;
+  memset (pull, 0, (size_t)n * sizeof *pull);
+  pw_add_JT (s, ida_mu (d, y, yp), pull);
+  for (int j = 0; j < n; j++) out[j] += d->scale[j] * pull[j];
+}
+
+/* M v' + J^T lambda - f */
+static void ida_momentum (ida_data *d, const double *y, const double *yp, double *out) {
+  pw_system *s = d->run->s;
+  int n = d->n;
+  double *pull = d->given, *f = pull + n + 3;
+  memset (pull, 0, (size_t)n * sizeof *pull);
+  pw_add_JT (s, ida_lambda (d, y, yp), pull);
+  pw_sweep_force (s, f);
+  for (int j = 0; j < n; j++) out[j] = s->mass[j] * yp[n + j] + pull[j] - f[j];
+}
+
+/* J v' - gamma + 2 alpha (J v - eta) + beta^2 g, all rows, onto J v - eta */
+static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *other) {
+  pw_run *r = d->run;
+  pw_system *s = r->s;
+  for (int i = 0; i < s->rows; i++) jv[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
+  pw_mul_J (s, yp + d->n, other);
+  for (int i = 0; i < s->rows; i++) jv[i] += other[i];
+  pw_sweep_gamma (s, other);
+  for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
+  if (r->beta == 0) return;
+  pw_sweep_g (s, other);
+  for (int i = 0; i < s->holonomic; i++) jv[i] += r->beta * r->beta * other[i];
+}
+
+/* J v - eta and g; or the stabilised accelerations */
+static void ida_constraints (ida_data *d, const double *y, const double *yp, double *out) {
+  pw_system *s = d->run->s;
+  double *jv = d->given, *other = jv + s->rows;
+  pw_mul_J (s, y + d->n, jv);
+  pw_sweep_eta (s, other);
+  for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
+  if (!d->form.rates) ida_stabilised (d, yp, jv, other);
+  pw_tangent_compress (&d->tangent, jv, d->rows, out);
+  if (!d->form.positions) return;
+  pw_sweep_g (s, other);
+  pw_tangent_compress (&d->tangent, other, d->positions, out + d->rows);
+}
+
+int pw_ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *data) {
+  ida_data *d = data;
+  const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
+  double *f = N_VGetArrayPointer (out);
+  if (pw_ida_place (d, t, y) != 0) return -1;
+  ida_kinematics (d, y, yp, f);
+  ida_momentum (d, y, yp, f + d->n);
+  ida_constraints (d, y, yp, f + 2 * d->n);
+  return 0;
+}
+
+/* ---- Newton matrix ---- */
+
+/* Rows of q': c I + D (G^T mu)_q, -I, D G^T */
+static void ida_matrix_kinematics (ida_data *d, const double *mu, double c) {
+  pw_system *s = d->run->s;
+  pw_tangent *x = &d->tangent;
+  int n = d->n;
+  for (int j = 0; j < n; j++) {
+    pw_tape_put (&x->tape, j, j, c);
+    pw_tape_put (&x->tape, j, n + j, -1);
+  }
+  if (!d->form.positions) return;
+  pw_put put = { .rows = s->holonomic, .factor = 1, .row_scale = d->scale, .map = x->map, .lambda = mu };
+  pw_newton_block (&x->newton, s, &x->tape, PW_JTL_Q, &put);
+  put.col = 2 * n + d->rows;
+  if (d->form.impulses) put.factor = c;
+  pw_newton_JT (s, &x->tape, &put);
+}
+
+/* Rows of J v = eta and g = 0: (J v)_q - eta_q, J; G */
+static void ida_matrix_constraints (ida_data *d, const double *v) {
+  pw_system *s = d->run->s;
+  pw_tangent *x = &d->tangent;
+  int n = d->n;
+  pw_put put = { .row = 2 * n, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map, .w = v };
+  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  put.factor = put.factor_nonholonomic = -1;
+  pw_newton_block (&x->newton, s, &x->tape, PW_ETA_Q, &put);
+  put.factor = put.factor_nonholonomic = 1;
+  put.col = n;
+  pw_newton_J (s, &x->tape, &put);
+  if (!d->form.positions) return;
+  pw_newton_J (s, &x->tape, &(pw_put){ .row = 2 * n + d->rows, .rows = s->holonomic, .factor = 1, .map = x->map });
+}
+
+static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, double c) {
+  int n = d->n;
+  const pw_tangent_place to = { .momentum = n,
+                                .constraint = 2 * n,
+                                .q = 0,
+                                .v = n,
+                                .a = n,
+                                .lambda = 2 * n,
+                                .of_a = c,
+                                .of_lambda = d->form.impulses ? c : 1 };
+  ida_matrix_kinematics (d, ida_mu (d, y, yp), c);
+  pw_tangent_momentum (&d->tangent, &to, ida_lambda (d, y, yp));
+  if (d->form.rates)
+    ida_matrix_constraints (d, y + n);
+  else
+    pw_tangent_accelerations (&d->tangent, &to, y + n, yp + n);
+}
+
+/* IDA clears the pattern together with the values before each evaluation. */
+static void ida_matrix_pattern (const ida_data *d, SUNMatrix matrix) {
+  const pw_tangent *x = &d->tangent;
+  memcpy (SUNSparseMatrix_IndexPointers (matrix), x->colptr, ((size_t)d->size + 1) * sizeof *x->colptr);
+  memcpy (SUNSparseMatrix_IndexValues (matrix), x->rowind, (size_t)x->colptr[d->size] * sizeof *x->rowind);
+}
+
+int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix, void *data,
+                   N_Vector t1, N_Vector t2, N_Vector t3) {
+  ida_data *d = data;
+  const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
+  (void)residual, (void)t1, (void)t2, (void)t3;
+  if (pw_ida_place (d, t, y) != 0) return -1;
+  double *value = SUNSparseMatrix_Data (matrix);
+  ida_matrix_pattern (d, matrix);
+  memset (value, 0, (size_t)d->tangent.colptr[d->size] * sizeof *value);
+  pw_tape_fill (&d->tangent.tape, value);
+  ida_matrix_fill (d, y, yp, c);
+  return 0;
+}
+
+/* SUNDIALS' index type is 64 bits wide, as the tape's. */
+static_assert (sizeof (sunindextype) == sizeof (int64_t), "SUNDIALS with 64-bit indices is expected");
+
+int pw_ida_open_matrix (ida_data *d) {
+  pw_tangent *x = &d->tangent;
+  pw_tape_record (&x->tape);
+  ida_matrix_fill (d, N_VGetArrayPointer (d->y), N_VGetArrayPointer (d->yp), 1);
+  if (pw_tape_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
+  d->matrix = SUNSparseMatrix (d->size, d->size, x->colptr[d->size], CSC_MAT, d->context);
+  if (d->matrix == NULL) return PW_MACHINE;
+  ida_matrix_pattern (d, d->matrix);
+  return PW_OK;
+}

@@ -1,0 +1,104 @@
+/* Derivatives of the equations of motion; see tangent.h. */
+#include <stdlib.h>
+#include "tangent.h"
+
+static int tangent_number_rows (pw_tangent *x) {
+  const pw_run *r = x->run;
+  const pw_system *s = r->s;
+  x->rows = s->rows;
+  x->holonomic = s->holonomic;
+  if (r->active == NULL) return PW_OK;
+  x->map = malloc ((size_t)(2 * s->rows) * sizeof *x->map);
+  if (x->map == NULL) return PW_MACHINE;
+  int *row = x->map + s->rows;
+  x->row = row;
+  x->rows = x->holonomic = 0;
+  for (int i = 0; i < s->rows; i++) {
+    x->map[i] = r->active[i] ? x->rows : -1;
+    if (!r->active[i]) continue;
+    x->holonomic += i < s->holonomic;
+    row[x->rows++] = i;
+  }
+  return PW_OK;
+}
+
+int pw_tangent_open (pw_tangent *x, pw_run *r) {
+  *x = (pw_tangent){ .run = r };
+  x->lambda = calloc ((size_t)(2 * r->s->rows) + 1, sizeof *x->lambda);
+  if (x->lambda == NULL) return PW_MACHINE;
+  x->mu = x->lambda + r->s->rows;
+  int status = tangent_number_rows (x);
+  return status == PW_OK ? pw_newton_open (&x->newton, r->s) : status;
+}
+
+void pw_tangent_close (pw_tangent *x) {
+  pw_tape_close (&x->tape);
+  pw_newton_close (&x->newton);
+  free (x->map);
+  free (x->lambda);
+  free (x->colptr);
+  free (x->rowind);
+}
+
+const double *pw_tangent_expand (const pw_tangent *x, const double *used, int count, double *all) {
+  if (x->map == NULL && count == x->rows) return used;
+  for (int i = 0; i < count; i++) all[x->map ? x->row[i] : i] = used[i];
+  return all;
+}
+
+void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used) {
+  for (int i = 0; i < count; i++) used[i] = all[x->map ? x->row[i] : i];
+}
+
+/* (J^T lambda)_q - f_q, -f_v, M, J^T */
+void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const double *lambda) {
+  pw_system *s = x->run->s;
+  pw_put put = { .row = to->momentum,
+                 .col = to->q,
+                 .rows = s->rows,
+                 .factor = 1,
+                 .factor_nonholonomic = 1,
+                 .map = x->map,
+                 .lambda = lambda };
+  pw_newton_block (&x->newton, s, &x->tape, PW_JTL_Q, &put);
+  put.factor = -1;
+  pw_newton_block (&x->newton, s, &x->tape, PW_FORCE_Q, &put);
+  put.col = to->v;
+  pw_newton_block (&x->newton, s, &x->tape, PW_FORCE_V, &put);
+  pw_newton_readers (&x->newton, s, &x->tape, to->momentum, to->q, to->v);
+  for (int j = 0; j < s->coords; j++) pw_tape_put (&x->tape, to->momentum + j, to->a + j, to->of_a * s->mass[j]);
+  put.factor = put.factor_nonholonomic = to->of_lambda;
+  put.col = to->lambda;
+  pw_newton_JT (s, &x->tape, &put);
+}
+
+/* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G, 2 alpha J - gamma_v, J */
+void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_place *to, const double *v, const double *a) {
+  pw_run *r = x->run;
+  pw_system *s = r->s;
+  double alpha = r->alpha, with_v = to->a == to->v ? to->of_a : 0;
+  pw_put put = {
+    .row = to->constraint, .col = to->q, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map, .w = a
+  };
+  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  put.w = v;
+  put.factor = 2 * alpha, put.factor_nonholonomic = alpha;
+  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  put.factor = -2 * alpha, put.factor_nonholonomic = -alpha;
+  pw_newton_block (&x->newton, s, &x->tape, PW_ETA_Q, &put);
+  put.factor = put.factor_nonholonomic = -1;
+  pw_newton_block (&x->newton, s, &x->tape, PW_GAMMA_Q, &put);
+  put.col = to->v;
+  pw_newton_block (&x->newton, s, &x->tape, PW_GAMMA_V, &put);
+  put.factor = with_v + 2 * alpha, put.factor_nonholonomic = with_v + alpha;
+  pw_newton_J (s, &x->tape, &put);
+  put.col = to->q;
+  put.rows = s->holonomic;
+  put.factor = r->beta * r->beta;
+  pw_newton_J (s, &x->tape, &put);
+  if (to->a == to->v) return;
+  put.col = to->a;
+  put.rows = s->rows;
+  put.factor = put.factor_nonholonomic = to->of_a;
+  pw_newton_J (s, &x->tape, &put);
+}

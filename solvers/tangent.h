@@ -1,0 +1,41 @@
+/* The equations of motion in the rows in use, differentiated: what Newton matrices of implicit methods have in common.
+ *
+ *   momentum        M a + J^T lambda - f                                    by (q, v, a, lambda)
+ *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g            by (q, v, a) */
+#ifndef PW_TANGENT_H
+#define PW_TANGENT_H
+
+#include "method.h"
+#include "newton.h"
+
+typedef struct {
+  pw_run *run;
+  int rows, holonomic; /* in use */
+  int *map;            /* all rows: number among those in use, or -1; NULL: all are in use */
+  const int *row;      /* rows: its number among all */
+  double *lambda, *mu; /* all rows: values of the unknowns last looked at */
+  pw_newton newton;
+  pw_tape tape;
+  int64_t *colptr, *rowind; /* the pattern, in compressed columns */
+} pw_tangent;
+
+int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_MACHINE */
+void pw_tangent_close (pw_tangent *x);
+
+/* Values of all rows from those of the first `count` in use; `all` is there for them. */
+const double *pw_tangent_expand (const pw_tangent *x, const double *used, int count, double *all);
+/* From values of all rows those of the first `count` in use. */
+void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used);
+
+/* Where the parts go.  a may share its columns with v: its part comes times `of_a`, that of lambda times `of_lambda`. */
+typedef struct {
+  int momentum, constraint; /* first row of each */
+  int q, v, a, lambda;      /* first column of each */
+  double of_a, of_lambda;
+} pw_tangent_place;
+
+/* Puts these rows at the placed pose with J swept; lambda: all rows, v and a: coords. */
+void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const double *lambda);
+void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_place *to, const double *v, const double *a);
+
+#endif
