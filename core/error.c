@@ -33,16 +33,38 @@ static size_t error_distance (const char *a, const char *b) {
   return row[n];
 }
 
+/* A name is near if at most half of it would have to change, or one begins or ends with the other. */
+static int error_is_near (const char *a, size_t n, const char *b, size_t m, size_t distance) {
+  size_t longer = n > m ? n : m, shorter = n + m - longer;
+  return 2 * distance <= longer ||
+         (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
+}
+
+static void error_keep (pw_nearest *n, const char *candidate) {
+  size_t used = strlen (n->all), more = strlen (candidate);
+  n->crowded |= used + more + 3 > sizeof n->all;
+  if (n->crowded) return;
+  if (used) memcpy (n->all + used, ", ", 2), used += 2;
+  memcpy (n->all + used, candidate, more + 1);
+}
+
 void pw_nearest_try (pw_nearest *n, const char *candidate) {
+  size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
   size_t distance = error_distance (n->sought, candidate);
-  if (n->best && distance >= n->distance) return;
+  error_keep (n, candidate);
+  if (n->best && distance * n->length >= n->distance * length) return;
   n->best = candidate;
   n->distance = distance;
+  n->length = length;
+  n->near = error_is_near (n->sought, a, candidate, b, distance);
 }
 
 char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size) {
   buffer[0] = 0;
-  if (n->best) snprintf (buffer, size, "; did you mean \"%s\"?", n->best);
+  if (n->best && n->near)
+    snprintf (buffer, size, "; did you mean \"%s\"?", n->best);
+  else if (n->best && !n->crowded)
+    snprintf (buffer, size, "; valid %s %s", strchr (n->all, ',') ? "are" : "is", n->all);
   return buffer;
 }
 

@@ -79,6 +79,7 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
     pw_nearest_try (&what, query_names[i]);
   }
   snprintf (best, size, "%s.%s", s->body_name[b], what.best);
+  *near = what;
   near->best = best;
   return -1;
 }

@@ -5,14 +5,19 @@
 #include <stddef.h>
 #include "pinwheel.h"
 
-/* Keeps the valid name nearest to one that was not found; start with { .sought = name }. */
+/* Keeps the valid name nearest to one that was not found, as a share of the longer one's length; start with
+ * { .sought = name }. */
 typedef struct {
   const char *sought;
   const char *best;
-  size_t distance;
+  size_t distance, length; /* of the best from the name sought, and of the longer of the two */
+  int near;                /* 1: the best may well be what was meant */
+  int crowded;             /* 1: there are more than all holds */
+  char all[80];            /* the valid names, while there is room for them */
 } pw_nearest;
 void pw_nearest_try (pw_nearest *n, const char *candidate);
-/* ": did you mean \"steer\"?" or "", written to the buffer, which is returned. */
+/* "; did you mean \"steer\"?", "; valid are x, y, z" if none of a few is near, "" if none of many is, written to the buffer,
+ * which is returned. */
 char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size);
 
 /* Open-addressing table from names to numbers >= 0; it keeps the pointers, not copies. */

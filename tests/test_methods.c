@@ -62,25 +62,30 @@ static void test_parse (void **state) {
   check_ok (pw_parse_method ("rk4+projection:metric=identity:inputs=held:every=3", &m, &stabilisation, &error), &error);
 }
 
+/* The text may go on where it ends in "..." */
 static void methods_refused (const char *name, const char *text) {
   const pw_method *m;
   int stabilisation;
   pw_error error = { 0 };
   assert_int_equal (pw_parse_method (name, &m, &stabilisation, &error), PW_INPUT);
-  check_error (&error, PW_INPUT, text);
+  const char *open = strstr (text, "...");
+  if (open == NULL)
+    check_error (&error, PW_INPUT, text);
+  else
+    assert_memory_equal (error.text, text, (size_t)(open - text));
 }
 
 static void test_refused (void **state) {
   (void)state;
-  methods_refused ("rk5", "there is no integrator \"rk5\"; did you mean \"rk4\"?");
+  methods_refused ("rk5", "there is no integrator \"rk5\"; did you mean \"erk5\"?");
   methods_refused ("idas+ggl", "there is no integrator \"idas\"; did you mean \"ida\"?");
-  methods_refused ("", "there is no integrator \"\"; did you mean \"rk4\"?");
-  methods_refused ("rk4+ggl", "integrator rk4 has no stabilisation \"ggl\"; did you mean \"none\"?");
+  methods_refused ("", "there is no integrator \"\"; valid are rk4, ...");
+  methods_refused ("rk4+ggl", "integrator rk4 has no stabilisation \"ggl\"; valid are none, ...");
   methods_refused ("rk4+projektion",
                    "integrator rk4 has no stabilisation \"projektion\"; did you mean \"projection\"?");
-  methods_refused ("ida+projection", "integrator ida has no stabilisation \"projection\"; did you mean \"none\"?");
+  methods_refused ("ida+projection", "integrator ida has no stabilisation \"projection\"; valid are none, ...");
   methods_refused ("rk4+baumgarte:alfa=1", "method rk4+baumgarte has no option \"alfa\"; did you mean \"alpha\"?");
-  methods_refused ("rk4+none:alpha=1", "method rk4+none has no option \"alpha\"; did you mean \"inputs\"?");
+  methods_refused ("rk4+none:alpha=1", "method rk4+none has no option \"alpha\"; valid...");
   methods_refused ("rk4+projection:metric=masses", "method option metric cannot be \"masses\"; did you mean \"mass\"?");
   methods_refused ("rk4+projection:every", "method option \"every\": expected NAME=VALUE");
   methods_refused ("rk4+projection:every=0", "method option every=0: expected a whole number >= 1");

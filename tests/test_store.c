@@ -89,10 +89,32 @@ static void test_nearest (void **state) {
   assert_string_equal (store_nearest ("Steer", names), "steer");    /* one other */
   assert_string_equal (store_nearest ("", names), "frame");         /* the first of equals */
   assert_null (store_nearest ("x", none));
-  char text[40];
-  assert_string_equal (pw_nearest_text (&(pw_nearest){ .best = "steer" }, text, sizeof text),
-                       "; did you mean \"steer\"?");
-  assert_string_equal (pw_nearest_text (&(pw_nearest){ 0 }, text, sizeof text), "");
+  /* a change counts as a share of the name, so that short names are not preferred */
+  assert_string_equal (store_nearest ("stiff", (const char *const[]){ "at", "stiffness", NULL }), "stiffness");
+}
+
+static void store_hint (const char *sought, const char *const *candidates, const char *expected) {
+  char text[100];
+  pw_nearest n = { .sought = sought };
+  for (; *candidates; candidates++) pw_nearest_try (&n, *candidates);
+  assert_string_equal (pw_nearest_text (&n, text, sizeof text), expected);
+}
+
+/* What is not near is not proposed: a few valid names are all given, many not. */
+static void test_nearest_text (void **state) {
+  (void)state;
+  static const char *const names[] = { "frame", "steer", "ground", NULL };
+  static const char *const many[] = { "tractor",   "locomotive",  "dining-car",  "sleeping-car",
+                                      "couchette", "luggage-van", "snow-plough", NULL };
+  store_hint ("ster", names, "; did you mean \"steer\"?");
+  store_hint ("st", names, "; did you mean \"steer\"?");
+  store_hint ("rame.x", names, "; did you mean \"frame\"?");
+  store_hint ("wagon", names, "; valid are frame, steer, ground");
+  store_hint ("wagon", (const char *const[]){ "frame", NULL }, "; valid is frame");
+  store_hint ("pinnace", many, "");
+  store_hint ("ploughs", many, "");
+  store_hint ("plough", many, "; did you mean \"snow-plough\"?");
+  store_hint ("x", (const char *const[]){ NULL }, "");
 }
 
 /* A candidate too long for the table of distances counts as far away, and does no harm. */
@@ -102,7 +124,7 @@ static void test_nearest_long (void **state) {
   memset (longer, 'x', sizeof longer - 1);
   longer[sizeof longer - 1] = 0;
   const char *const names[] = { longer, "y", NULL };
-  assert_string_equal (store_nearest ("xxx", names), "y");
+  assert_string_equal (store_nearest ("xxy", names), "y");
   assert_string_equal (store_nearest (longer, (const char *const[]){ "y", "x", NULL }), "x");
 }
 
@@ -152,9 +174,16 @@ static void test_domains (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_names),      cmocka_unit_test (test_names_empty),       cmocka_unit_test (test_arena),
-    cmocka_unit_test (test_layout),     cmocka_unit_test (test_nearest),           cmocka_unit_test (test_nearest_long),
-    cmocka_unit_test (test_long_error), cmocka_unit_test (test_first_error_stays), cmocka_unit_test (test_domains),
+    cmocka_unit_test (test_names),
+    cmocka_unit_test (test_names_empty),
+    cmocka_unit_test (test_arena),
+    cmocka_unit_test (test_layout),
+    cmocka_unit_test (test_nearest),
+    cmocka_unit_test (test_nearest_text),
+    cmocka_unit_test (test_nearest_long),
+    cmocka_unit_test (test_long_error),
+    cmocka_unit_test (test_first_error_stays),
+    cmocka_unit_test (test_domains),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

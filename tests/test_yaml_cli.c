@@ -81,7 +81,7 @@ static void test_message (void **state) {
   (void)state;
   cli_write ("bad.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1/(k - k)}\n");
   assert_int_equal (cli_run ("pinwheel run @/bad.yaml"), 2);
-  cli_expand ("@/bad.yaml:3:24: error: body a: mass: there is no \"k\"; did you mean \"e\"?\n"
+  cli_expand ("@/bad.yaml:3:24: error: body a: mass: there is no \"k\"\n"
               "    - {name: a, mass: 1/(k - k)}\n"
               "                         ^\n",
               expected, sizeof expected);

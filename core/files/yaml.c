@@ -26,7 +26,8 @@ static int yaml_domain (const pw_yaml *y, const pw_node *domain, const pw_node *
   char hint[100];
   *d = PW_REAL;
   if (min && (min->type != PW_YAML_SCALAR || strcmp (min->text, "0") != 0 || domain))
-    return pw_yaml_fail (y, min->at, error, "min: expected 0, and no domain beside it");
+    return pw_yaml_fail (y, min->at, error,
+                         "min: only 0 can be written, without a domain; \"domain: positive\" means > 0");
   if (min) *d = PW_NONNEGATIVE;
   if (domain == NULL) return PW_OK;
   if (pw_yaml_text (y, domain, "domain", &text, error) != PW_OK) return error->status;
@@ -84,7 +85,7 @@ static int yaml_parameter (const pw_yaml *y, const pw_node *node, pw_expression 
 }
 
 static int yaml_parameters (pw_yaml *y, const pw_node *list, pw_expression *x, pw_names *names, pw_error *error) {
-  if (list && pw_yaml_list (y, list, "parameters", -1, error) != PW_OK) return error->status;
+  if (list && pw_yaml_list (y, list, "parameters", -1, "", error) != PW_OK) return error->status;
   int count = list ? list->count : 0;
   y->parameter = pw_arena_take (&y->arena, ((size_t)count + 1) * sizeof *y->parameter);
   if (y->parameter == NULL) return pw_yaml_no_memory (y, error);

@@ -77,8 +77,9 @@ int pw_yaml_keys (const pw_yaml *y, const pw_node *map, int skip, const char *co
 /* "a list", "a map", "text" */
 const char *pw_yaml_found (const pw_node *node);
 
-/* Refuses what is not a list; `count` >= 0: of so many entries. */
-int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, pw_error *error);
+/* Refuses what is not a list; `count` >= 0: of so many entries, `items` ("bodies"). */
+int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, const char *items,
+                  pw_error *error);
 
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_yaml *y, const pw_node *node, const char *what, const char **text, pw_error *error);

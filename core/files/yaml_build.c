@@ -72,7 +72,7 @@ static int build_body (pw_yaml_builder *b, const pw_node *node, pw_error *error)
 /* ---- Fields ---- */
 
 static int build_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error) {
-  if (pw_yaml_list (b->y, node, what, 2, error) != PW_OK ||
+  if (pw_yaml_list (b->y, node, what, 2, "numbers, [x, y]", error) != PW_OK ||
       pw_yaml_number (b->y, node->first, what, PW_REAL, b->x, value, error) != PW_OK)
     return error->status;
   return pw_yaml_number (b->y, node->first->next, what, PW_REAL, b->x, value + 1, error);
@@ -128,17 +128,25 @@ static int build_field (pw_yaml_builder *b, const pw_kind *kind, const pw_field 
                         const char *element, char *at, pw_error *error) {
   static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double),
                                  sizeof (char *), sizeof (pw_signal),  sizeof (int) };
+  static const char *const plural[] = { "numbers", "points, each [x, y],", "vectors, each [x, y],", "bodies", "signals",
+                                        "choices" };
   char what[200];
   int count = pw_field_count (f);
   snprintf (what, sizeof what, "%s %.60s: %s", kind->name, element, f->name);
   if (count == 1) return build_value (b, kind, f, node, what, at, error);
-  if (pw_yaml_list (b->y, node, what, count, error) != PW_OK) return error->status;
+  if (pw_yaml_list (b->y, node, what, count, plural[f->type], error) != PW_OK) return error->status;
   for (const pw_node *n = node->first; n; n = n->next, at += size[f->type])
     if (build_value (b, kind, f, n, what, at, error) != PW_OK) return error->status;
   return PW_OK;
 }
 
 /* ---- Elements ---- */
+
+/* Whether a word stands in a text. */
+static int build_says (const char *text, const char *word) {
+  const char *at = strlen (word) < 3 ? NULL : strstr (text, word);
+  return at != NULL && (at == text || strchr (" (", at[-1]));
+}
 
 static const pw_kind *build_kind (const pw_yaml_builder *b, const pw_node *node, pw_error *error) {
   char hint[100];
@@ -152,8 +160,10 @@ static const pw_kind *build_kind (const pw_yaml_builder *b, const pw_node *node,
     if (strcmp ((*k)->name, first->text) == 0) return *k;
     pw_nearest_try (&near, (*k)->name);
   }
+  for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
+    if (build_says ((*k)->about, first->text)) near.best = (*k)->name, near.near = 1;
   pw_yaml_fail (b->y, first->at, error, "an element begins with its kind, and there is no kind \"%.60s\"%s",
-                first->text, pw_nearest_text (&near, hint, sizeof hint));
+                first->text, near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");
   return NULL;
 }
 
@@ -225,8 +235,8 @@ static int build_names (pw_yaml_builder *b, const double *value, pw_error *error
 
 static int build_open (pw_yaml_builder *b, char **definition, pw_error *error) {
   const pw_yaml *y = b->y;
-  if ((y->bodies && pw_yaml_list (y, y->bodies, "bodies", -1, error) != PW_OK) ||
-      (y->elements && pw_yaml_list (y, y->elements, "elements", -1, error) != PW_OK))
+  if ((y->bodies && pw_yaml_list (y, y->bodies, "bodies", -1, "", error) != PW_OK) ||
+      (y->elements && pw_yaml_list (y, y->elements, "elements", -1, "", error) != PW_OK))
     return error->status;
   size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0;
   size_t all = bodies + (y->elements ? (size_t)y->elements->count : 0);

@@ -30,11 +30,21 @@ static int read_key (const pw_yaml *y, const pw_node *node, const char *const *k
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 
+/* "{x: .., y: ..}" */
+static void read_form (const char *const *key, char *text, size_t size) {
+  size_t used = 0;
+  for (int i = 0; key[i] && used < size; i++)
+    used += (size_t)snprintf (text + used, size - used, "%s%s: ..", i ? ", " : "{", key[i]);
+  if (used < size) snprintf (text + used, size - used, "}");
+}
+
 int pw_yaml_keys (const pw_yaml *y, const pw_node *map, int skip, const char *const *key, const char *what,
                   const pw_node **value, pw_error *error) {
-  if (map->type != PW_YAML_MAP)
-    return pw_yaml_fail (y, map->at, error, "expected a map {KEY: VALUE, ...} for %s, found %s", what,
-                         pw_yaml_found (map));
+  if (map->type != PW_YAML_MAP) {
+    char form[100];
+    read_form (key, form, sizeof form);
+    return pw_yaml_fail (y, map->at, error, "expected a map %s for %s, found %s", form, what, pw_yaml_found (map));
+  }
   for (int i = 0; key[i]; i++) value[i] = NULL;
   const pw_node *n = map->first;
   while (n && skip-- > 0) n = n->next->next;
@@ -43,13 +53,16 @@ int pw_yaml_keys (const pw_yaml *y, const pw_node *map, int skip, const char *co
   return PW_OK;
 }
 
-int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, pw_error *error) {
+int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, const char *items,
+                  pw_error *error) {
   if (node->type != PW_YAML_LIST && count >= 0)
-    return pw_yaml_fail (y, node->at, error, "%s: expected a list of %d, found %s", what, count, pw_yaml_found (node));
+    return pw_yaml_fail (y, node->at, error, "%s: expected a list of %d %s, found %s", what, count, items,
+                         pw_yaml_found (node));
   if (node->type != PW_YAML_LIST)
     return pw_yaml_fail (y, node->at, error, "%s: expected a list, found %s", what, pw_yaml_found (node));
   if (count >= 0 && node->count != count)
-    return pw_yaml_fail (y, node->at, error, "%s: expected a list of %d, found one of %d", what, count, node->count);
+    return pw_yaml_fail (y, node->at, error, "%s: expected a list of %d %s, found one of %d", what, count, items,
+                         node->count);
   return PW_OK;
 }
 

@@ -8,7 +8,7 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { SOURCE_LARGEST = 64 << 20, SOURCE_SHOWN = 90 }; /* bytes of a file; of a line in a message */
+enum { SOURCE_LARGEST = 64 << 20, SOURCE_SHOWN = 84 }; /* bytes of a file; of a line in a message */
 
 /* ---- Messages ---- */
 
@@ -47,7 +47,7 @@ static void source_clean (char *text) {
 }
 
 int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *format, ...) {
-  char text[220], shown[SOURCE_SHOWN + 1];
+  char text[220], shown[SOURCE_SHOWN + 4];
   const char *begin, *from, *to;
   va_list arguments;
   va_start (arguments, format);
@@ -55,12 +55,12 @@ int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *form
   va_end (arguments);
   if (at > y->size) at = y->size;
   source_window (y, at, &begin, &from, &to);
-  snprintf (shown, sizeof shown, "%.*s", (int)(to - from), from);
+  snprintf (shown, sizeof shown, "%s%.*s", from > begin ? "..." : "", (int)(to - from), from);
   source_clean (shown);
   size_t n = strlen (y->path);
   return pw_fail (error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
                   n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at), 1 + source_count (begin, y->source + at),
-                  text, shown, source_count (from, y->source + at), "");
+                  text, shown, source_count (from, y->source + at) + 3 * (from > begin), "");
 }
 
 int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {

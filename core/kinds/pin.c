@@ -141,7 +141,7 @@ static const pw_quantity pin_reaction[] = {
 
 const pw_kind pw_kind_pin = {
   .name = "pin",
-  .about = "a point of one body and a point of another coincide (revolute joint)",
+  .about = "a point of one body and a point of another coincide (revolute joint, hinge)",
   .definition = sizeof (pw_pin),
   .element = sizeof (pin),
   .fields = pin_fields,
