@@ -13,12 +13,15 @@
 
 static const char *const rk_metrics[] = { "mass", "identity", NULL };
 static const char *const rk_steps[] = { "adaptive", "fixed", NULL };
+static const char *const rk_positions[] = { "projected", "drift", NULL };
 static const char *const rk_inputs[] = { "stage", "held", NULL };
 
 const pw_stabilisation pw_rk_stabilisations[] = {
   { "none", "accelerations only: the constraints drift" },
   { "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)" },
   { "projection", "coordinate projection onto positions and rates after each step (Lubich 1991, Eich 1993)" },
+  { "nullspace", "minimal velocities in a basis of the null space of J: rates obey all rows at every stage "
+                 "(Kim & Vanderploeg 1986)" },
   { NULL, NULL },
 };
 
@@ -38,6 +41,10 @@ const pw_option pw_rk_options[] = {
     .domain = PW_COUNT,
     .unit = "steps",
     .about = "project after each so many steps" },
+  { .name = "positions",
+    .with = "nullspace",
+    .choices = rk_positions,
+    .about = "positions projected after each step, or left to drift at the order of the method" },
   { .name = NULL },
 };
 
@@ -85,7 +92,8 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
 /* The identity metric weighs metres and radians alike, as the plain pseudo-inverse does. */
 static int rk_open_projector (pw_run *r, pw_error *error) {
   pw_system *s = r->s;
-  if (pw_option_value (r, "metric") == 0) return pw_projector_open (&r->data->projector, r, s->metric, NULL, error);
+  if (!r->data->projects || pw_option_value (r, "metric") == 0)
+    return pw_projector_open (&r->data->projector, r, s->metric, NULL, error);
   double *one = malloc ((size_t)s->coords * sizeof *one);
   if (one == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   for (int j = 0; j < s->coords; j++) one[j] = 1;
@@ -102,15 +110,19 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->adaptive = tableau->e != NULL && pw_option_value (r, "steps") == 0;
   d->held = pw_option_value (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, "projection");
+  d->minimal = pw_stabilised_by (r, "nullspace");
+  d->closes = d->minimal && pw_option_value (r, "positions") == 0;
   d->every = (int)pw_option_value (r, "every");
   pw_read_baumgarte (r);
   if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  int status = d->projects ? rk_open_projector (r, error) : PW_OK;
+  int status = d->projects || d->closes ? rk_open_projector (r, error) : PW_OK;
+  if (status == PW_OK && d->minimal) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;
 }
 
 void pw_rk_close (pw_run *r) {
   pw_projector_close (&r->data->projector);
+  pw_nullspace_close (&r->data->nullspace);
   free (r->data->memory);
   free (r->data);
 }
@@ -190,7 +202,9 @@ static int rk_stages (pw_run *r, double h) {
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
     pw_rk_combine (d->q, r->q, d->V, &d->row[i], h, n);
     pw_rk_combine (d->V[i], r->v, d->A, &d->row[i], h, n);
-    status = pw_accelerate (r, pw_before_breakpoint (r, r->t + b->c[i] * h), d->q, d->V[i], d->A[i], d->lambda);
+    double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
+    if (d->minimal) status = pw_nullspace_rates (&d->nullspace, r, t, d->q, d->V[i]);
+    if (status == PW_OK) status = pw_accelerate (r, t, d->q, d->V[i], d->A[i], d->lambda);
     if (status == PW_OK && r->settings.ledger) pw_sweep_ledger (s, d->lambda, d->R[i]);
   }
   if (d->held) pw_hold (s, 0);
@@ -230,12 +244,15 @@ static int rk_finite (const pw_run *r, const double *q, const double *v) {
 /* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->a, d->lambda. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   struct pw_method_data *d = r->data;
-  int n = r->s->coords, status = rk_stages (r, h);
+  int n = r->s->coords, status = d->minimal ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
+  if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
   pw_rk_combine (d->q, r->q, d->V, &d->row[0], h, n);
   pw_rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) status = rk_project (r, t1, d->q, d->v, added);
+  if (d->minimal)
+    status = pw_nullspace_settle (&d->nullspace, d->closes ? &d->projector : NULL, r, t1, d->q, d->v, added);
   return status == PW_OK ? rk_accelerate (r, project, t1, d->q, d->v, d->a, d->lambda) : status;
 }
 
@@ -259,7 +276,7 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
 
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   int row, finite = rk_finite (r, r->data->q, r->data->v) && rk_finite (r, r->q, r->v);
-  int against = r->data->projects && finite ? r->data->projector.against : -1;
+  int against = (r->data->projects || r->data->closes) && finite ? r->data->projector.against : -1;
   char element[120];
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (against >= 0) /* a redundant row asks for what the others forbid */
@@ -267,7 +284,9 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
                     pw_row_element (r->s, against, element, sizeof element));
   if (finite && (r->near || pw_saddle_pivot (r->saddle, &row) <= r->guard)) return pw_fail_singular (r, r->t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: the %s", r->t, h,
-                  finite ? "projection does not converge" : "state is no longer finite");
+                  !finite            ? "state is no longer finite"
+                  : r->data->minimal ? "velocities' basis does not last"
+                                     : "projection does not converge");
 }
 
 void pw_rk_revert (pw_run *r) {

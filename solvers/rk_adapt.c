@@ -56,10 +56,8 @@ static double adapt_one (pw_run *r, const double *e, int projected) {
   double *eq = r->q_at, *ev = r->v_at;
   adapt_estimate (r, e, r->v, d->V, d->v, eq);
   adapt_estimate (r, e, r->a, d->A, d->a, ev);
-  if (projected) {
-    adapt_project (r, eq, r->s->holonomic);
-    adapt_project (r, ev, r->s->rows);
-  }
+  if (projected || d->closes) adapt_project (r, eq, r->s->holonomic);
+  if (projected || d->minimal) adapt_project (r, ev, r->s->rows);
   return adapt_norm (r, eq, ev);
 }
 

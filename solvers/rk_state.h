@@ -3,6 +3,7 @@
 #ifndef PW_RK_STATE_H
 #define PW_RK_STATE_H
 
+#include "nullspace.h"
 #include "rk.h"
 
 /* The weights of a row of the tableau that are not 0. */
@@ -17,7 +18,9 @@ struct pw_method_data {
       row[PW_RK_STAGES];     /* of the stages from 1 on; in the place of stage 0, which needs none, of the new state */
   int adaptive;              /* 1: steps follow the tolerances; 0: they are of the given size */
   int projects, held, every; /* projection; inputs held over the step; project each so many steps */
+  int minimal, closes;       /* nullspace: velocities are minimal; and positions are projected */
   pw_projector projector;
+  pw_nullspace nullspace;
   double base;                                                 /* time from which fixed steps are counted */
   long count;                                                  /* steps since then */
   int split;                                                   /* 1: the last step ended inside one of them */

@@ -84,6 +84,9 @@ static void test_refused (void **state) {
   methods_refused ("rk4+projektion",
                    "integrator rk4 has no stabilisation \"projektion\"; did you mean \"projection\"?");
   methods_refused ("ida+projection", "integrator ida has no stabilisation \"projection\"; valid are none, ...");
+  methods_refused ("rk4+nulspace", "integrator rk4 has no stabilisation \"nulspace\"; did you mean \"nullspace\"?");
+  methods_refused ("rk4+nullspace:positions=project",
+                   "method option positions cannot be \"project\"; did you mean \"projected\"?");
   methods_refused ("rk4+baumgarte:alfa=1", "method rk4+baumgarte has no option \"alfa\"; did you mean \"alpha\"?");
   methods_refused ("rk4+none:alpha=1", "method rk4+none has no option \"alpha\"; valid...");
   methods_refused ("rk4+projection:metric=masses", "method option metric cannot be \"masses\"; did you mean \"mass\"?");

@@ -1,0 +1,98 @@
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "ladder.h"
+#include "pinwheel-files.h"
+#include "scene.h"
+#include "system.h"
+
+static void ladder_arm (pw_model *m, const void *parameters) {
+  (void)parameters;
+  double x = cos (0.5), y = sin (0.5);
+  pw_add_body (m, &(pw_body){ .name = "upper", .mass = 2, .inertia = 0.2, .start = { 0.5 * x, 0.5 * y, 0.5 } });
+  pw_add_body (m, &(pw_body){ .name = "lower", .mass = 1, .inertia = 0.1, .start = { 0.5 + x, y, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "S", .body = { "upper", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "E", .body = { "lower", "upper" }, .at = { { -0.5, 0 }, { 0.5, 0 } } });
+  pw_add_drive (m,
+                &(pw_drive){ .name = "D",
+                             .what = PW_DRIVE_ANGLE,
+                             .body = { "upper", "ground" },
+                             .value = { PW_HARMONIC, .harmonic = { .offset = 0.1, .amplitude = 0.4, .omega = 3 } } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+}
+
+static void ladder_tractor (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "body", .mass = 3, .inertia = 0.5 });
+  pw_add_wheel (m, &(pw_wheel){ .name = "rear", .body = "body", .at = { -0.4, 0 } });
+  pw_add_steered_wheel (
+      m, &(pw_steered_wheel){ .name = "front",
+                              .body = "body",
+                              .at = { 0.6, 0 },
+                              .heading = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 2 } } });
+  pw_add_speed (m, &(pw_speed){ .name = "push",
+                                .body = "body",
+                                .value = { PW_HARMONIC, .harmonic = { .offset = 2, .amplitude = 1, .omega = 1 } } });
+}
+
+#define LADDER_TABLE(f) \
+  { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = f }
+
+pw_system *ladder_open (const char *model) {
+  static const pw_plugin_table arm = LADDER_TABLE (ladder_arm), tractor = LADDER_TABLE (ladder_tractor);
+  pw_error error = { 0 };
+  if (strcmp (model, "arm") == 0) return scene_system (&arm, NULL);
+  if (strcmp (model, "tractor") == 0) return scene_system (&tractor, NULL);
+  pw_file *f = pw_file_open (model, &error);
+  check_ok (f ? PW_OK : error.status, &error);
+  pw_model *m = pw_file_model (f, &error);
+  check_ok (m ? PW_OK : error.status, &error);
+  check_ok (pw_build (m, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_file_close (f);
+  return s;
+}
+
+ladder_error ladder_run (const char *model, const char *method, double step, double t) {
+  pw_system *s = ladder_open (model), *S = ladder_open (model);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .span = t, .ledger = 1 });
+  pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = t });
+  pw_sample x = runs_to (r, t), y = runs_to (exact, t);
+  ladder_error off = { .cost = *pw_run_statistics (r) };
+  double most = 0, T = S->scale.time;
+  for (int j = 0; j < s->coords; j++) {
+    off.q = fmax (off.q, fabs (x.q[j] - y.q[j]) / pw_unit (s, j));
+    off.v = fmax (off.v, fabs (x.v[j] - y.v[j]) / pw_unit (s, j) * T);
+  }
+  for (int i = 0; i < s->rows; i++) {
+    off.lambda = fmax (off.lambda, fabs (x.lambda[i] - y.lambda[i]));
+    most = fmax (most, fabs (y.lambda[i]));
+  }
+  off.lambda /= most;
+  pw_close (r);
+  pw_close (exact);
+  pw_free (s);
+  pw_free (S);
+  return off;
+}
+
+static void ladder_check (const char *model, const char *method, const char *of, double coarse, double fine, double h,
+                          int order, double band) {
+  char what[160];
+  snprintf (what, sizeof what, "%s, %s: order of %s at h = %g", model, method, of, h);
+  check_close (what, log2 (coarse / fine), order, band, "the order, and the next power of h");
+}
+
+void ladder_expect (const char *model, const char *method, double h, double t, int order, double band,
+                    ladder_depth depth) {
+  ladder_error e[3];
+  for (int i = 0; i < 3; i++) e[i] = ladder_run (model, method, ldexp (h, -i), t);
+  for (int i = 0; i < 2; i++) {
+    ladder_check (model, method, "positions", e[i].q, e[i + 1].q, ldexp (h, -i), order, band);
+    if (depth >= LADDER_V) ladder_check (model, method, "rates", e[i].v, e[i + 1].v, ldexp (h, -i), order, band);
+    if (depth >= LADDER_LAMBDA)
+      ladder_check (model, method, "multipliers", e[i].lambda, e[i + 1].lambda, ldexp (h, -i), order, band);
+  }
+}

@@ -1,0 +1,129 @@
+/* Minimal velocities: rows on the level of rates hold exactly, the order is the method's, and the basis is not felt. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "ladder.h"
+#include "scene.h"
+#include "system.h"
+
+#define DRIFT "nullspace:positions=drift"
+
+static void test_order (void **state) {
+  (void)state;
+  static const struct {
+    const char *model;
+    double h, t;
+    ladder_depth depth; /* without multipliers where the motion is prescribed, and with it they */
+  } scene[] = { { "ezyroller", 0.04, 4, LADDER_LAMBDA }, { "n-trailer", 0.04, 2, LADDER_LAMBDA },
+                { "pendulum", 0.02, 1, LADDER_LAMBDA },  { "n-four-bar", 0.01, 0.4, LADDER_LAMBDA },
+                { "arm", 0.01, 1, LADDER_LAMBDA },       { "tractor", 0.04, 2, LADDER_V } };
+  for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
+    ladder_expect (scene[i].model, "rk4+nullspace", scene[i].h, scene[i].t, 4, 0.35, scene[i].depth);
+    ladder_expect (scene[i].model, "rk4+" DRIFT, scene[i].h, scene[i].t, 4, 0.35, scene[i].depth);
+  }
+  ladder_expect ("ezyroller", "erk5+nullspace:steps=fixed", 0.04, 10, 5, 0.45, LADDER_Q);
+  ladder_expect ("ezyroller", "erk8+nullspace:steps=fixed", 0.2, 10, 8, 1, LADDER_Q);
+}
+
+/* Rates obey every row at round-off however large the step; positions drift at the order of the method, or not. */
+static void test_residuals (void **state) {
+  (void)state;
+  static const char *const model[] = {
+    "ezyroller", "n-trailer", "pendulum", "arm", "tractor", "redundant-parallelogram", "andrews-squeezer"
+  };
+  for (size_t i = 0; i < sizeof model / sizeof *model; i++) {
+    double h = strcmp (model[i], "andrews-squeezer") == 0 ? 1e-5 : 0.02, t = 10 * h;
+    ladder_error drift = ladder_run (model[i], "rk4+" DRIFT, h, t);
+    ladder_error closed = ladder_run (model[i], "rk4+nullspace", h, t);
+    check_below (model[i], drift.cost.velocity, 32 * CHECK_EPS, "round-off");
+    check_below (model[i], closed.cost.velocity, 32 * CHECK_EPS, "round-off");
+    check_below (model[i], closed.cost.position, 32 * CHECK_EPS, "round-off of the projection");
+  }
+  double coarse = ladder_run ("ezyroller", "rk4+" DRIFT, 0.02, 4).cost.position;
+  double fine = ladder_run ("ezyroller", "rk4+" DRIFT, 0.01, 4).cost.position;
+  check_close ("drift at h = 0.02 over that at h = 0.01", log2 (coarse / fine), 4, 0.2, "order 4");
+  assert_true (fine > 1e3 * CHECK_EPS);
+}
+
+static void test_tolerances (void **state) {
+  static const char *const method[] = { "erk5+nullspace", "erk8+nullspace", "erk5+" DRIFT, "erk8+" DRIFT };
+  (void)state;
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++)
+    for (int k = 5; k <= 11; k += 3) {
+      double rtol = pow (10, -k), q[2][6], v[2][6];
+      pw_system *s = ladder_open ("ezyroller");
+      runs_state (s, method[i], &(pw_settings){ .rtol = rtol, .span = 10 }, 10, q[0], v[0], NULL);
+      runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = 10 }, 10, q[1], v[1], NULL);
+      for (int j = 0; j < 6; j++) check_close (method[i], q[0][j], q[1][j], 100 * rtol, "100 rtol");
+      pw_free (s);
+    }
+}
+
+/* The work of drives and what the closing of positions adds are accounted for, and asking changes nothing. */
+static void test_ledger (void **state) {
+  (void)state;
+  double q[2][6], v[2][6];
+  for (int ledger = 0; ledger < 2; ledger++) {
+    pw_system *s = ladder_open ("arm");
+    pw_run *r = runs_open (s, "rk4+nullspace", &(pw_settings){ .step = 2e-3, .span = 1, .ledger = ledger });
+    pw_sample x = runs_to (r, 0.9991);
+    if (ledger) check_close ("balance", x.balance, 0, 40 * pow (2e-3 * 10, 4), "40 J (10/s h)^4");
+    check_below ("sample's residuals", x.position + x.velocity, 64 * CHECK_EPS, "round-off");
+    memcpy (q[ledger], x.q, sizeof q[0]);
+    memcpy (v[ledger], x.v, sizeof v[0]);
+    pw_close (r);
+    pw_free (s);
+  }
+  check_bits ("positions without ledger", q[0], q[1], 6);
+  check_bits ("rates without ledger", v[0], v[1], 6);
+}
+
+/* ---- What it refuses ---- */
+
+static void nullspace_chain (pw_model *m, const void *parameters) {
+  static char body[200][8], pin[200][8];
+  (void)parameters;
+  for (int i = 0; i < 129; i++) {
+    snprintf (body[i], sizeof body[i], "b%d", i);
+    snprintf (pin[i], sizeof pin[i], "p%d", i);
+    pw_add_body (m, &(pw_body){ .name = body[i], .mass = 1, .inertia = 0.1, .start = { i, 0, 0 } });
+    pw_add_pin (m, &(pw_pin){ .name = pin[i],
+                              .body = { i ? body[i - 1] : "ground", body[i] },
+                              .at = { { i ? 0.5 : -0.5, 0 }, { -0.5, 0 } } });
+  }
+}
+
+static void test_refused (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = nullspace_chain };
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  assert_null (pw_open (s, "erk5+nullspace", NULL, &error));
+  check_error (
+      &error, PW_INPUT,
+      "model scene: stabilisation nullspace works with dense matrices, for up to 256 constraint rows, and this "
+      "scene has 258; take erk5+projection");
+  pw_free (s);
+}
+
+/* A step over which the motion turns away from its basis: a reason, not a number. */
+static void test_large_step (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = ladder_open ("pendulum");
+  pw_run *r = runs_open (s, "rk4+nullspace", &(pw_settings){ .step = 3, .span = 100 });
+  int status = pw_advance_to (r, 100, 100, &error);
+  assert_int_equal (status, PW_METHOD);
+  assert_non_null (strstr (error.text, "the step of 3 s is too large"));
+  pw_close (r);
+  pw_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_order),  cmocka_unit_test (test_residuals), cmocka_unit_test (test_tolerances),
+    cmocka_unit_test (test_ledger), cmocka_unit_test (test_refused),   cmocka_unit_test (test_large_step),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
