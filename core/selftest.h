@@ -32,6 +32,11 @@ typedef struct {
  * allows, PW_MACHINE. */
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error);
 
+/* The same where a scene uses the kind: its derivatives along a random motion around the state q, v at time t, with the
+ * scene's own elements and signals.  The checks go into a report of their own.  Errors: PW_MACHINE. */
+int pw_selftest_scene (pw_system *s, const pw_kind *kind, double t, const double *q, const double *v, unsigned seed,
+                       pw_selftest_report *report, pw_error *error);
+
 #ifdef __cplusplus
 }
 #endif

@@ -95,6 +95,29 @@ int pw_run_load (pw_run *r, pw_archive *a, pw_error *error);
 int pw_run_redundant (const pw_run *r);
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
 
+/* ---- What a model is like at the state reached (linear.c) ---- */
+
+/* Mobility and linearisation.  Singular values are those of the independent rows of J, each row of length 1, angles in
+ * units of the length scale. */
+typedef struct {
+  int coordinates;
+  int positions;   /* degrees of freedom of configuration: coordinates less independent holonomic rows */
+  int velocities;  /* of velocity: coordinates less independent rows */
+  int rank;        /* of J */
+  double least;    /* smallest singular value; NaN: not computed, or no rows */
+  int unknowns;    /* of the linearisation: positions + velocities */
+  double *re, *im; /* its eigenvalues [1/s], the fastest first, of a conjugate pair that with im > 0; NULL: not computed */
+} pw_linear;
+
+/* Examines the state a run has reached.  With more coordinates than `most` only integers are filled: the rest takes time
+ * as their cube.  Close it in every case.  Errors: PW_MACHINE, PW_METHOD. */
+int pw_linearise (pw_run *r, int most, pw_linear *l, pw_error *error);
+void pw_linear_close (pw_linear *l);
+
+/* The largest step h with which the classical Runge-Kutta method damps x' = (re + i im) x, for all smaller steps too;
+ * INFINITY if the solution itself grows without turning, or rests. */
+double pw_rk4_limit (double re, double im);
+
 const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_start_report *pw_run_start (const pw_run *r);
 /* 1 if the consistent start moved this state (as pw_find_state numbers them) by more than round-off. */

@@ -16,27 +16,24 @@
 
 /* ---- Gram-Schmidt ---- */
 
-/* Length of a unit of coordinate j. */
-static double rank_unit (const pw_system *s, int j) {
+double pw_rank_unit (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? s->scale.length : 1;
 }
 
-/* All rows of J, dense, in units of the scene and of length 1; empty rows stay 0. */
-static void rank_expand (const pw_system *s, double *rows) {
+void pw_rank_rows (const pw_system *s, double *rows, double *norm) {
   int n = s->coords;
   memset (rows, 0, (size_t)s->rows * (size_t)n * sizeof *rows);
   for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
-    for (int e = 0; e < k->b.count; e++)
-      for (int r = 0; r < k->kind->rows; r++) {
-        double *row = rows + (size_t)(k->row + e * k->kind->rows + r) * (size_t)n, norm = 0;
-        const double *J = k->J + (e * k->kind->rows + r) * k->b.cols;
-        for (int c = 0; c < k->b.cols; c++) {
-          int j = pw_global (k, e, c);
-          if (j < n) row[j] += J[c] / rank_unit (s, j);
-        }
-        for (int j = 0; j < n; j++) norm += row[j] * row[j];
-        for (int j = 0; norm > 0 && j < n; j++) row[j] /= sqrt (norm);
+    for (int i = 0; i < k->b.count * k->kind->rows; i++) {
+      double *row = rows + (size_t)(k->row + i) * (size_t)n, square = 0;
+      for (int c = 0; c < k->b.cols; c++) {
+        int j = pw_global (k, i / k->kind->rows, c);
+        if (j < n) row[j] += k->J[i * k->b.cols + c] / pw_rank_unit (s, j);
       }
+      for (int j = 0; j < n; j++) square += row[j] * row[j];
+      for (int j = 0; square > 0 && j < n; j++) row[j] /= sqrt (square);
+      if (norm) norm[k->row + i] = sqrt (square);
+    }
 }
 
 /* Takes the kept rows' directions out of a row, twice (Giraud, Langou & Rozloznik 2005); its norm afterwards. */
@@ -88,7 +85,7 @@ static int rank_keep (double tol, double *rows, double *norm, int *kept, unsigne
  * a nonholonomic one must not take the place of a position. */
 static int rank_basis (const pw_system *s, double tol, double *rows, int *kept, unsigned char *active) {
   double *norm = rows + (size_t)s->rows * (size_t)s->coords;
-  rank_expand (s, rows);
+  pw_rank_rows (s, rows, NULL);
   memset (active, 0, (size_t)s->rows);
   int rank = rank_keep (tol, rows, norm, kept, active, 0, 0, s->holonomic, s->coords);
   return rank_keep (tol, rows, norm, kept, active, rank, s->holonomic, s->rows, s->coords);
@@ -134,10 +131,10 @@ static int rank_search_open (rank_search *x, const pw_system *s) {
 static void rank_direction (const pw_system *s, const rank_search *x, int rank, const double *v, int number) {
   double most = 0;
   for (int j = 0; j < s->coords; j++)
-    x->motion[j] = number == 0 ? v[j] * rank_unit (s, j) : sin (1.7 + 2.39996 * (j + 1) * number);
+    x->motion[j] = number == 0 ? v[j] * pw_rank_unit (s, j) : sin (1.7 + 2.39996 * (j + 1) * number);
   rank_orthogonalise (x->motion, x->rows, x->kept, rank, s->coords);
   for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (x->motion[j]));
-  for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / rank_unit (s, j);
+  for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / pw_rank_unit (s, j);
 }
 
 /* The rank a short motion away, with the rows that are independent there in x->active; 0 if there is no such pose. */

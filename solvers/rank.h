@@ -10,6 +10,13 @@ struct pw_run;
 /* The largest rows x coordinates that is examined densely. */
 #define PW_RANK_MOST 4e7
 
+/* All rows of the swept J, dense (rows x coords), lengths and angles in units of the scene and each of length 1; `norm`
+ * (rows, or NULL) takes what they were divided by; empty rows stay 0. */
+void pw_rank_rows (const pw_system *s, double *rows, double *norm);
+
+/* Length of a unit of coordinate j in them: they are the derivatives by q[j] times this. */
+double pw_rank_unit (const pw_system *s, int j);
+
 /* Rows kept by Gram-Schmidt on the swept J, lengths and angles in units of the scene: active[i] = 1 for a row whose part
  * independent of those kept before exceeds tol of it; holonomic rows first, of these the most independent ones, in
  * order where they are about equal.  Returns the rank, or PW_MACHINE. */

@@ -1,0 +1,313 @@
+/* The self-test of a kind where a scene uses it: with its own elements, signals and numbers, at its own pose.
+ *
+ * Everything moves at random around the pose, in units of the scene.  The kind's derivatives along that motion are compared
+ * with differences over steps from 2^-8 to 2^-20, of which the best counts for each entry: a right formula agrees with one
+ * of them whatever its own scale is, a wrong one is off by about its size with all. */
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "probe.h"
+
+#define SCENE_BOUND 1e-5
+static const char scene_reason[] = "1e-5 of the sum of all terms: the best of several differences";
+
+typedef enum { SCENE_Q, SCENE_V, SCENE_TIME, SCENE_MOTION } scene_move;
+
+typedef struct {
+  pw_system *s;
+  pw_slab *k;
+  double t, tau;                      /* the time, and how far it may move */
+  double *q, *v, *a, *dq, *dv, *w;    /* coords: the state and its motion; directions */
+  double *q_now, *v_now;              /* coords: as placed */
+  double *local, *lambda;             /* count x cols: w; count x rows */
+  double *J, *block;                  /* count x largest block */
+  double *plus, *minus, *slope;       /* count x cols, or rows */
+  double *value, *terms, *off, *size; /* the same: what is tested, the sum of its terms, the least error, round-off */
+  pw_selftest_report *report;
+  double *memory;
+} scene;
+
+typedef void scene_function (scene *x, double *out);
+
+/* ---- Moving ---- */
+
+static void scene_place (const scene *x, scene_move move, double h) {
+  double step = move == SCENE_MOTION ? h * x->tau : 0;
+  for (int j = 0; j < x->s->coords; j++) {
+    x->q_now[j] = x->q[j] + step * (x->v[j] + step * x->a[j] / 2) + (move == SCENE_Q ? h * x->dq[j] : 0);
+    x->v_now[j] = x->v[j] + step * x->a[j] + (move == SCENE_V ? h * x->dv[j] : 0);
+  }
+  pw_place (x->s, move >= SCENE_TIME ? x->t + h * x->tau : x->t, x->q_now, x->v_now);
+}
+
+/* ---- Products ---- */
+
+static double scene_local (const scene *x, const double *vector, int e, int c) {
+  int j = pw_global (x->k, e, c);
+  return j < x->s->coords ? vector[j] : 0;
+}
+
+/* out += factor x block x vector, element by element; terms, if given, += the absolute values of what is summed up. */
+static void scene_times (const scene *x, const double *block, int rows, const double *vector, double factor,
+                         double *out, double *terms) {
+  int cols = x->k->b.cols;
+  for (int i = 0; i < x->k->b.count * rows; i++)
+    for (int c = 0; c < cols; c++) {
+      double term = factor * block[i * cols + c] * scene_local (x, vector, i / rows, c);
+      out[i] += term;
+      if (terms) terms[i] += fabs (term);
+    }
+}
+
+static void scene_zero (double *out, int n) {
+  memset (out, 0, (size_t)n * sizeof *out);
+}
+
+static void scene_sweep (scene *x, pw_sweep *sweep, int rows, double *out) {
+  scene_zero (out, x->k->b.count * rows);
+  if (sweep) sweep (&x->k->b, out);
+}
+
+/* ---- Functions of the state ---- */
+
+static void scene_g (scene *x, double *out) {
+  scene_sweep (x, x->k->kind->g, x->k->kind->rows, out);
+}
+
+static void scene_eta (scene *x, double *out) {
+  scene_sweep (x, x->k->kind->eta, x->k->kind->rows, out);
+}
+
+static void scene_gamma (scene *x, double *out) {
+  scene_sweep (x, x->k->kind->gamma, x->k->kind->rows, out);
+}
+
+static void scene_force (scene *x, double *out) {
+  scene_sweep (x, x->k->kind->force, x->k->b.cols, out);
+}
+
+static void scene_J_times (scene *x, const double *vector, double *out) {
+  x->k->kind->J (&x->k->b, x->J);
+  scene_zero (out, x->k->b.count * x->k->kind->rows);
+  scene_times (x, x->J, x->k->kind->rows, vector, 1, out, NULL);
+}
+
+static void scene_Jw (scene *x, double *out) {
+  scene_J_times (x, x->w, out);
+}
+
+/* J v - eta */
+static void scene_drift (scene *x, double *out) {
+  int rows = x->k->kind->rows;
+  double *eta = x->block;
+  scene_J_times (x, x->v_now, out);
+  scene_eta (x, eta);
+  for (int i = 0; i < x->k->b.count * rows; i++) out[i] -= eta[i];
+}
+
+static void scene_JT_lambda (scene *x, double *out) {
+  int rows = x->k->kind->rows, cols = x->k->b.cols;
+  x->k->kind->J (&x->k->b, x->J);
+  scene_zero (out, x->k->b.count * cols);
+  for (int i = 0; i < x->k->b.count * rows; i++)
+    for (int c = 0; c < cols; c++) out[i / rows * cols + c] += x->J[i * cols + c] * x->lambda[i];
+}
+
+/* ---- Comparing ---- */
+
+/* The least error of each entry so far, with steps of size h. */
+static void scene_differences (scene *x, scene_function *f, scene_move move, int n, double h) {
+  static const double weight[] = { 4. / 3, -1. / 3 }; /* extrapolated (Richardson) */
+  scene_zero (x->slope, n);
+  for (int i = 0; i < 2; i++) {
+    double far = ldexp (h, i);
+    scene_place (x, move, far);
+    f (x, x->plus);
+    scene_place (x, move, -far);
+    f (x, x->minus);
+    for (int k = 0; k < n; k++) x->slope[k] += weight[i] * (x->plus[k] - x->minus[k]) / (2 * far);
+  }
+  for (int k = 0; k < n; k++) {
+    double noise = 256 * DBL_EPSILON * (fabs (x->plus[k]) + x->size[k]) / h;
+    double off = fmax (0, fabs (x->value[k] - x->slope[k]) - noise) / (x->terms[k] + fabs (x->slope[k]) + DBL_MIN);
+    if (!(off >= x->off[k])) x->off[k] = off;
+  }
+}
+
+/* Compares x->value, rows per element, with the slope of f; x->terms and x->size stand beside it. */
+static void scene_compare (scene *x, const char *name, const char *about, int rows, scene_function *f,
+                           scene_move move) {
+  int n = x->k->b.count * rows, at = 0;
+  char where[120] = "";
+  for (int k = 0; k < n; k++) x->off[k] = INFINITY;
+  for (int power = -8; power >= -20; power -= 4) scene_differences (x, f, move, n, ldexp (1, power));
+  scene_place (x, SCENE_Q, 0);
+  for (int k = 0; k < n; k++)
+    if (!(x->off[k] <= x->off[at])) at = k;
+  if (n > 0)
+    snprintf (where, sizeof where, "%s %s, row %d: %.9g for %.9g", x->k->kind->name, x->k->name[at / rows], at % rows,
+              x->value[at], x->slope[at]);
+  pw_probe_note (x->report, name, about, n > 0 ? x->off[at] : 0, SCENE_BOUND, scene_reason, where);
+}
+
+/* A new comparison: nothing in it yet. */
+static void scene_begin (scene *x) {
+  int n = x->k->b.count * (x->k->b.cols > x->k->kind->rows ? x->k->b.cols : x->k->kind->rows);
+  scene_zero (x->value, n);
+  scene_zero (x->terms, n);
+  scene_zero (x->size, n);
+}
+
+static void scene_holonomic (scene *x) {
+  int rows = x->k->kind->rows, n = x->k->b.count * rows;
+  scene_begin (x);
+  scene_sweep (x, x->k->kind->J, rows * x->k->b.cols, x->J);
+  scene_times (x, x->J, rows, x->dq, 1, x->value, x->terms);
+  scene_sweep (x, x->k->kind->g_size, rows, x->size);
+  scene_compare (x, "J", "J = dg/dq", rows, scene_g, SCENE_Q);
+  scene_begin (x);
+  scene_eta (x, x->value);
+  for (int i = 0; i < n; i++) x->value[i] *= -x->tau;
+  scene_compare (x, "eta", "eta = -dg/dt", rows, scene_g, SCENE_TIME);
+}
+
+static void scene_acceleration (scene *x) {
+  int rows = x->k->kind->rows, n = x->k->b.count * rows;
+  scene_begin (x);
+  scene_gamma (x, x->slope);
+  scene_sweep (x, x->k->kind->J, rows * x->k->b.cols, x->J);
+  scene_times (x, x->J, rows, x->a, x->tau, x->value, x->terms);
+  for (int i = 0; i < n; i++) x->value[i] -= x->tau * x->slope[i], x->terms[i] += fabs (x->tau * x->slope[i]);
+  scene_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", rows, scene_drift, SCENE_MOTION);
+}
+
+static void scene_block (scene *x, pw_block block, const char *name, const char *about, scene_function *f) {
+  int rows = pw_block_rows (x->k->kind, block);
+  scene_move move = block == PW_GAMMA_V || block == PW_FORCE_V ? SCENE_V : SCENE_Q;
+  scene_begin (x);
+  x->k->b.w = x->local;
+  x->k->b.lambda = x->lambda;
+  if (pw_sweep_block (x->s, x->k, block, x->block))
+    scene_times (x, x->block, rows, move == SCENE_V ? x->dv : x->dq, 1, x->value, x->terms);
+  scene_compare (x, name, about, rows, f, move);
+}
+
+/* Signals that read states: their gradients. */
+static void scene_value (scene *x, double *out) {
+  int n = x->k->b.count * x->k->kind->signals;
+  for (int i = 0; i < n; i++) out[i] = x->k->u[3 * i];
+}
+
+static void scene_gradients (scene *x, scene_move move) {
+  int signals = x->k->kind->signals, n = x->k->b.count * signals;
+  scene_begin (x);
+  for (int i = 0; i < n; i++) {
+    const pw_source *source = &x->k->source[i];
+    for (int k = 0; k < source->reads; k++) {
+      int j = source->state[k], rate = j >= x->s->coords;
+      if (rate != (move == SCENE_V)) continue;
+      double term = source->x[source->reads + k] * (rate ? x->dv[j - x->s->coords] : x->dq[j]);
+      x->value[i] += term, x->terms[i] += fabs (term);
+    }
+  }
+  scene_compare (x, "gradient", "gradient = d signal/d state", signals, scene_value, move);
+}
+
+static void scene_all (scene *x) {
+  const pw_kind *kind = x->k->kind;
+  scene_place (x, SCENE_Q, 0);
+  if (kind->level == PW_HOLONOMIC) scene_holonomic (x);
+  if (kind->rows > 0) {
+    scene_acceleration (x);
+    scene_block (x, PW_JW_Q, "jw_q", "jw_q = d(J w)/dq", scene_Jw);
+    scene_block (x, PW_JTL_Q, "jtl_q", "jtl_q = d(J^T lambda)/dq", scene_JT_lambda);
+    scene_block (x, PW_ETA_Q, "eta_q", "eta_q = d eta/dq", scene_eta);
+    scene_block (x, PW_GAMMA_Q, "gamma_q", "gamma_q = d gamma/dq", scene_gamma);
+    scene_block (x, PW_GAMMA_V, "gamma_v", "gamma_v = d gamma/dv", scene_gamma);
+  }
+  if (kind->force_u && x->s->readers) {
+    scene_gradients (x, SCENE_Q);
+    scene_gradients (x, SCENE_V);
+  }
+  pw_hold (x->s, 1); /* what signals make of the state is theirs */
+  scene_block (x, PW_FORCE_Q, "force_q", "force_q = d force/dq", scene_force);
+  scene_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", scene_force);
+  pw_hold (x->s, 0);
+}
+
+/* ---- The motion ---- */
+
+static void scene_aim (scene *x, const double *q, const double *v, pw_random *r) {
+  double T = x->s->scale.time > 0 ? x->s->scale.time : 1;
+  for (int j = 0; j < x->s->coords; j++) {
+    double unit = pw_unit (x->s, j);
+    x->q[j] = q[j];
+    x->v[j] = v[j] + unit / T * pw_random_between (r, -1, 1);
+    x->a[j] = unit / T / T * pw_random_between (r, -1, 1);
+    x->dq[j] = unit * pw_random_between (r, -1, 1);
+    x->dv[j] = unit / T * pw_random_between (r, -1, 1);
+    x->w[j] = unit * pw_random_between (r, -1, 1);
+  }
+  for (int i = 0; i < x->k->b.count * x->k->b.cols; i++)
+    x->local[i] = scene_local (x, x->w, i / x->k->b.cols, i % x->k->b.cols);
+  for (int i = 0; i < x->k->b.count * x->k->kind->rows; i++) x->lambda[i] = pw_random_between (r, -1, 1);
+  /* no signal breaks between the times tried */
+  x->tau = fmin (T, pw_next_breakpoint (x->s, x->t) - x->t) / 2;
+  x->t += x->tau;
+}
+
+static int scene_open (scene *x) {
+  size_t n = (size_t)x->s->coords, count = (size_t)x->k->b.count, cols = PW_MAX_COLS;
+  const struct {
+    double **array;
+    size_t count;
+  } array[] = {
+    { &x->q, n },
+    { &x->v, n },
+    { &x->a, n },
+    { &x->dq, n },
+    { &x->dv, n },
+    { &x->w, n },
+    { &x->q_now, n },
+    { &x->v_now, n },
+    { &x->local, count * cols },
+    { &x->lambda, count * cols },
+    { &x->J, count * cols * cols },
+    { &x->block, count * cols * cols },
+    { &x->plus, count * cols },
+    { &x->minus, count * cols },
+    { &x->slope, count * cols },
+    { &x->value, count * cols },
+    { &x->terms, count * cols },
+    { &x->off, count * cols },
+    { &x->size, count * cols },
+  };
+  size_t total = 1;
+  for (size_t i = 0; i < sizeof array / sizeof *array; i++) total += array[i].count;
+  x->memory = calloc (total, sizeof *x->memory);
+  if (x->memory == NULL) return PW_MACHINE;
+  double *at = x->memory;
+  for (size_t i = 0; i < sizeof array / sizeof *array; i++) {
+    *array[i].array = at;
+    at += array[i].count;
+  }
+  return PW_OK;
+}
+
+int pw_selftest_scene (pw_system *s, const pw_kind *kind, double t, const double *q, const double *v, unsigned seed,
+                       pw_selftest_report *report, pw_error *error) {
+  pw_random random = { seed };
+  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    if (k->kind != kind || k->b.count == 0) continue;
+    scene x = { .s = s, .k = k, .t = t, .report = report };
+    if (scene_open (&x) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+    pw_hold (s, 0);
+    scene_aim (&x, q, v, &random);
+    scene_all (&x);
+    k->b.w = k->b.lambda = NULL;
+    free (x.memory);
+  }
+  return PW_OK;
+}
