@@ -152,9 +152,15 @@ static void scene_compare (scene *x, const char *name, const char *about, int ro
   pw_probe_note (x->report, name, about, n > 0 ? x->off[at] : 0, SCENE_BOUND, scene_reason, where);
 }
 
+/* The most numbers of an element in any comparison. */
+static int scene_width (const scene *x) {
+  int width = x->k->b.cols > x->k->kind->rows ? x->k->b.cols : x->k->kind->rows;
+  return width > PW_MAX_SIGNALS ? width : PW_MAX_SIGNALS;
+}
+
 /* A new comparison: nothing in it yet. */
 static void scene_begin (scene *x) {
-  int n = x->k->b.count * (x->k->b.cols > x->k->kind->rows ? x->k->b.cols : x->k->kind->rows);
+  int n = x->k->b.count * scene_width (x);
   scene_zero (x->value, n);
   scene_zero (x->terms, n);
   scene_zero (x->size, n);
@@ -259,7 +265,7 @@ static void scene_aim (scene *x, const double *q, const double *v, pw_random *r)
 }
 
 static int scene_open (scene *x) {
-  size_t n = (size_t)x->s->coords, count = (size_t)x->k->b.count, cols = PW_MAX_COLS;
+  size_t n = (size_t)x->s->coords, count = (size_t)x->k->b.count, cols = (size_t)scene_width (x);
   const struct {
     double **array;
     size_t count;

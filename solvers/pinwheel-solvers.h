@@ -101,12 +101,13 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
  * units of the length scale. */
 typedef struct {
   int coordinates;
-  int positions;   /* degrees of freedom of configuration: coordinates less independent holonomic rows */
-  int velocities;  /* of velocity: coordinates less independent rows */
-  int rank;        /* of J */
-  double least;    /* smallest singular value; NaN: not computed, or no rows */
-  int unknowns;    /* of the linearisation: positions + velocities */
-  double *re, *im; /* its eigenvalues [1/s], the fastest first, of a conjugate pair that with im > 0; NULL: not computed */
+  int positions;  /* degrees of freedom of configuration: coordinates less independent holonomic rows */
+  int velocities; /* of velocity: coordinates less independent rows */
+  int rank;       /* of J */
+  double least;   /* smallest singular value; NaN: not computed, or no rows */
+  int unknowns;   /* of the linearisation: positions + velocities */
+  double *re,
+      *im; /* its eigenvalues [1/s], the fastest first, of a conjugate pair that with im > 0; NULL: not computed */
 } pw_linear;
 
 /* Examines the state a run has reached.  With more coordinates than `most` only integers are filled: the rest takes time

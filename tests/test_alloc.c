@@ -162,6 +162,24 @@ static int alloc_selftest (const char *what, pw_error *error) {
   return pw_selftest (&pw_kind_pin, 1, &report, error);
 }
 
+/* What `check` asks of a run. */
+static int alloc_check (const char *what, pw_error *error) {
+  pw_system *s;
+  pw_linear linear = { 0 };
+  pw_selftest_report report = { 0 };
+  (void)what;
+  int status = alloc_system (&s, error);
+  pw_run *r = status == PW_OK ? pw_open (s, "rk4+projection", NULL, error) : NULL;
+  if (status == PW_OK && r == NULL) status = error->status;
+  if (status == PW_OK) status = pw_linearise (r, 100, &linear, error);
+  if (status == PW_OK)
+    status = pw_selftest_scene (s, &pw_kind_pin, 0, pw_run_start (r)->q, pw_run_start (r)->v, 1, &report, error);
+  pw_linear_close (&linear);
+  pw_close (r);
+  pw_free (s);
+  return status;
+}
+
 static int alloc_verify (const char *what, pw_error *error) {
   (void)what;
   pw_system *s;
@@ -230,6 +248,7 @@ static void test_runs (void **state) {
 static void test_selftest (void **state) {
   (void)state;
   alloc_each (alloc_selftest, "self-test");
+  alloc_each (alloc_check, "check");
 }
 
 static void test_verify (void **state) {

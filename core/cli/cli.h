@@ -27,6 +27,7 @@ typedef struct {
 
 int pw_cli_list (int argc, const char **argv);
 int pw_cli_show (int argc, const char **argv);
+int pw_cli_check (int argc, const char **argv);
 int pw_cli_new (int argc, const char **argv);
 int pw_cli_run (int argc, const char **argv);
 int pw_cli_sweep (int argc, const char **argv);

@@ -10,6 +10,8 @@
 static const pw_command main_commands[] = {
   { "list", "[models|methods|kinds]", "what there is: models, methods of integration, kinds of element", pw_cli_list },
   { "show", "MODEL [OPTION...]", "what a model is made of, and its matrices", pw_cli_show },
+  { "check", "MODEL [OPTION...]", "mobility, redundant rows, start, derivatives, fast motions of a model",
+    pw_cli_check },
   { "run", "MODEL [OPTION...]", "integrate a model; write a table, a summary, plots", pw_cli_run },
   { "sweep", "MODEL [OPTION...]", "a table of runs, for all combinations of varied parameters", pw_cli_sweep },
   { "compare", "MODEL [OPTION...]", "what accuracy costs: many methods against the truth", pw_cli_compare },

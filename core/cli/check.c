@@ -1,0 +1,159 @@
+/* pinwheel check: is a model what it was meant to be?  Its mobility, redundant rows, massless bodies, consistent start, the
+ * derivatives of every kind in use, and how fast it lives at its start. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "report.h"
+#include "system.h"
+
+enum { CHECK_SEEDS = 5 };
+
+static void check_problem (pw_check *x, const char *format, ...)
+#ifdef __GNUC__
+    __attribute__ ((format (printf, 2, 3)))
+#endif
+    ;
+
+static void check_problem (pw_check *x, const char *format, ...) {
+  if (x->problems < (int)(sizeof x->problem / sizeof *x->problem)) {
+    va_list list;
+    va_start (list, format);
+    vsnprintf (x->problem[x->problems], sizeof *x->problem, format, list);
+    va_end (list);
+  }
+  x->problems++;
+}
+
+/* ---- The start ---- */
+
+/* Whatever method the model wants, what is checked is the model. */
+static void check_open (pw_check *x) {
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
+  pw_settings settings = { .span = d.t_end, .step = d.step };
+  x->step = d.step;
+  x->explicit_rk4 = strncmp (d.method, "rk4", 3) == 0;
+  x->r = pw_open (x->m.system, "rk4+projection", &settings, &x->start);
+  if (x->r == NULL)
+    check_problem (x, "%s", x->start.text);
+  else
+    x->redundant = pw_report_redundancies (x->r);
+}
+
+void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to) {
+  const pw_start_report *start = pw_run_start (x->r);
+  int n = x->m.system->coords;
+  pw_state_name (x->m.system, i, name, size);
+  *from = i < n ? start->q_given[i] : start->v_given[i - n];
+  *to = i < n ? start->q[i] : start->v[i - n];
+}
+
+/* ---- The kinds ---- */
+
+static void check_alone (pw_checked_kind *k) {
+  for (unsigned seed = 1; seed <= CHECK_SEEDS; seed++) {
+    pw_error error = { 0 };
+    if (pw_selftest (k->kind, seed, &k->alone, &error) == PW_OK) continue;
+    snprintf (k->untested, sizeof k->untested, "%s", error.text);
+    return;
+  }
+}
+
+static int check_first_failed (const pw_selftest_report *report) {
+  int i = 0;
+  while (i < report->checks && !report->check[i].failed) i++;
+  return i;
+}
+
+const pw_selftest_check *pw_check_fault (const pw_checked_kind *k, int *inside) {
+  const pw_selftest_report *report = k->alone.failed ? &k->alone : &k->inside;
+  *inside = report == &k->inside;
+  return report->failed ? &report->check[check_first_failed (report)] : NULL;
+}
+
+/* A table that does not hold together is not tried in the scene. */
+static int check_kinds (pw_check *x, pw_error *error) {
+  pw_system *s = x->m.system;
+  const double *q = x->r ? pw_run_start (x->r)->q : s->q0, *v = x->r ? pw_run_start (x->r)->v : s->v0;
+  int inside, status = PW_OK;
+  x->kind = calloc ((size_t)s->slabs + 1, sizeof *x->kind);
+  if (x->kind == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  for (; x->kinds < s->slabs && status == PW_OK; x->kinds++) {
+    pw_checked_kind *k = &x->kind[x->kinds];
+    k->kind = s->slab[x->kinds].kind;
+    k->count = s->slab[x->kinds].b.count;
+    check_alone (k);
+    if (k->alone.failed == 0 || strcmp (k->alone.check[check_first_failed (&k->alone)].name, "table") != 0)
+      status = pw_selftest_scene (s, k->kind, 0, q, v, 1, &k->inside, error);
+    const pw_selftest_check *fault = pw_check_fault (k, &inside);
+    if (fault) check_problem (x, "kind %s fails its self-test: %s (%s)", k->kind->name, fault->about, fault->where);
+  }
+  return status;
+}
+
+/* ---- Fast motions ---- */
+
+/* A zero eigenvalue of several chained states (a position, its rate, ...) comes out as a root of round-off. */
+int pw_check_moves (const pw_check *x) {
+  const pw_linear *l = &x->linear;
+  return l->re && l->unknowns > 0 && hypot (l->re[0], l->im[0]) > 1e-3 / pw_run_scale (x->r)->time;
+}
+
+static int check_linear (pw_check *x, pw_error *error) {
+  char step[32], limit[32];
+  x->limit = INFINITY;
+  if (x->r == NULL) return PW_OK;
+  int status = pw_linearise (x->r, CHECK_MOST, &x->linear, error);
+  if (status != PW_OK || !pw_check_moves (x)) return status;
+  for (int i = 0; i < x->linear.unknowns; i++)
+    x->limit = fmin (x->limit, pw_rk4_limit (x->linear.re[i], x->linear.im[i]));
+  if (x->explicit_rk4 && x->step > x->limit)
+    check_problem (x, "the model's step of %s s is too large for rk4, which is stable up to %s s",
+                   pw_format (step, x->step, 6), pw_format (limit, x->limit, 3));
+  return PW_OK;
+}
+
+/* ---- */
+
+static int check_model (pw_check *x, pw_error *error) {
+  check_open (x);
+  int status = check_linear (x, error);
+  return status == PW_OK ? check_kinds (x, error) : status;
+}
+
+/* What is wrong decides the exit status: a start that fails in its own way, else the model. */
+static void check_verdict (const pw_check *x, pw_error *error) {
+  if (x->problems == 0) return;
+  pw_fail (error, x->start.status ? x->start.status : PW_INPUT, "%s%s", x->problem[0],
+           x->problems > 1 ? "; and more, see above" : "");
+}
+
+static void check_close (pw_check *x) {
+  pw_linear_close (&x->linear);
+  if (x->r) pw_close (x->r);
+  free (x->redundant);
+  free (x->kind);
+  pw_cli_close_model (&x->m);
+}
+
+int pw_cli_check (int argc, const char **argv) {
+  char *json = NULL;
+  const char **sets = NULL, **starts = NULL;
+  const struct poptOption options[] = { { "json", 0, POPT_ARG_STRING, &json, 0,
+                                          "Write it as JSON; - is standard output, in place of the text", "FILE" },
+                                        PW_CLI_MODEL_OPTIONS (&sets, &starts),
+                                        POPT_TABLEEND };
+  pw_error error = { 0 };
+  pw_cli_line l;
+  pw_check x = { .r = NULL };
+  if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
+      pw_cli_open (&x.m, l.argument[0], sets, starts, &error) == PW_OK && check_model (&x, &error) == PW_OK) {
+    if (json == NULL || strcmp (json, "-") != 0) pw_check_text (&x);
+    if (json) pw_check_json (&x, json, &error);
+    check_verdict (&x, &error);
+  }
+  check_close (&x);
+  pw_cli_close (&l);
+  return pw_cli_end (&error);
+}

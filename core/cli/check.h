@@ -1,0 +1,42 @@
+/* What `pinwheel check` finds out about a model. */
+#ifndef PW_CHECK_H
+#define PW_CHECK_H
+
+#include "cli.h"
+#include "selftest.h"
+
+enum { CHECK_MOST = 400 /* coordinates: above it nothing is computed that takes time as their cube */ };
+
+/* The self-test of a kind in use. */
+typedef struct {
+  const pw_kind *kind;
+  int count;                        /* elements */
+  pw_selftest_report alone, inside; /* in scenes of its own; in this one */
+  char untested[500];               /* why there is no test alone; "": there is one */
+} pw_checked_kind;
+
+typedef struct {
+  pw_cli_model m;
+  pw_run *r;              /* NULL: it cannot start, for the reason in `start` */
+  pw_error start;         /* why */
+  pw_linear linear;       /* zero without a run */
+  const char **redundant; /* what is said about each redundant row, ended by NULL; or NULL */
+  pw_checked_kind *kind;  /* of the scene */
+  int kinds;
+  double step, limit; /* the model's step, and the largest that RK4 can take [s]; 0 and INFINITY: none */
+  int explicit_rk4;   /* 1: the model wants to be run by rk4 */
+  int problems;
+  char problem[8][700]; /* the first of them */
+} pw_check;
+
+/* What makes a kind fail, NULL if nothing; `inside` tells where. */
+const pw_selftest_check *pw_check_fault (const pw_checked_kind *k, int *inside);
+/* Whether anything is faster than a thousandth of the scene's own pace: slower eigenvalues may be 0 and round-off. */
+int pw_check_moves (const pw_check *x);
+/* A state the consistent start has moved: its name, and from where to where. */
+void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to);
+
+void pw_check_text (const pw_check *x);                                   /* check_text.c */
+int pw_check_json (const pw_check *x, const char *path, pw_error *error); /* check_json.c */
+
+#endif

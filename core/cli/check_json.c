@@ -1,0 +1,168 @@
+/* What `pinwheel check` found, as JSON: numbers with 17 digits, null for what is not known or not finite. */
+#include <math.h>
+#include "check.h"
+#include "system.h"
+
+static void json_text (FILE *f, const char *text) {
+  fputc ('"', f);
+  for (; *text; text++)
+    if (*text == '"' || *text == '\\')
+      fprintf (f, "\\%c", *text);
+    else if ((unsigned char)*text < ' ')
+      fprintf (f, "\\u%04x", (unsigned)*text);
+    else
+      fputc (*text, f);
+  fputc ('"', f);
+}
+
+static void json_number (FILE *f, double value) {
+  char text[32];
+  fputs (isfinite (value) ? pw_format (text, value, 17) : "null", f);
+}
+
+static void json_key (FILE *f, const char *key) {
+  fprintf (f, ", \"%s\": ", key);
+}
+
+static void json_member (FILE *f, const char *key, double value) {
+  json_key (f, key);
+  json_number (f, value);
+}
+
+/* ---- The parts ---- */
+
+static void json_texts (FILE *f, const char *const *text) {
+  fputc ('[', f);
+  for (const char *const *t = text; t && *t; t++) {
+    if (t > text) fputs (", ", f);
+    json_text (f, *t);
+  }
+  fputc (']', f);
+}
+
+static void json_mobility (FILE *f, const pw_check *x) {
+  const pw_system *s = x->m.system;
+  fprintf (f, ",\n  \"mobility\": {\"bodies\": %d, \"coordinates\": %d, \"rows\": %d, \"holonomic_rows\": %d",
+           s->bodies, s->coords, s->rows, s->holonomic);
+  json_member (f, "configuration", x->r ? (double)x->linear.positions : NAN);
+  json_member (f, "velocity", x->r ? (double)x->linear.velocities : NAN);
+  json_member (f, "rank", x->r ? (double)x->linear.rank : NAN);
+  json_member (f, "least_singular_value", x->r ? x->linear.least : NAN);
+  json_member (f, "length_scale", x->r ? pw_run_scale (x->r)->length : NAN);
+  fputs ("},\n  \"redundant\": ", f);
+  json_texts (f, x->redundant);
+}
+
+static void json_mass (FILE *f, const pw_check *x) {
+  const pw_system *s = x->m.system;
+  int listed = 0;
+  fputs (",\n  \"massless\": [", f);
+  for (int b = 0; b < s->bodies; b++) {
+    if (s->mass[3 * b] != 0 && s->mass[3 * b + 2] != 0) continue;
+    if (listed++) fputs (", ", f);
+    json_text (f, s->body_name[b]);
+  }
+  fputs ("],\n  \"saddle_point\": ", f);
+  if (x->r == NULL && x->start.status != PW_INPUT)
+    fputs ("null", f);
+  else
+    json_text (f, x->r ? "regular" : "singular");
+}
+
+static void json_start (FILE *f, const pw_check *x) {
+  char name[300];
+  int listed = 0;
+  fputs (",\n  \"start\": ", f);
+  if (x->r == NULL) {
+    fputs ("null", f);
+    return;
+  }
+  const pw_start_report *start = pw_run_start (x->r);
+  fprintf (f, "{\"moved\": %d, \"freed\": %s, \"changes\": [", start->moved, start->freed ? "true" : "false");
+  for (int i = 0; i < 2 * x->m.system->coords; i++) {
+    double from, to;
+    if (!pw_start_moved (x->m.system, start, i)) continue;
+    pw_check_state (x, i, name, sizeof name, &from, &to);
+    fprintf (f, "%s{\"state\": ", listed++ ? ", " : "");
+    json_text (f, name);
+    json_member (f, "from", from);
+    json_member (f, "to", to);
+    fputc ('}', f);
+  }
+  fputs ("]}", f);
+}
+
+static void json_failures (FILE *f, const pw_selftest_report *r, const char *where, int *listed) {
+  for (int i = 0; i < r->checks; i++) {
+    const pw_selftest_check *c = &r->check[i];
+    if (!c->failed) continue;
+    fprintf (f, "%s{\"check\": ", (*listed)++ ? ", " : "");
+    json_text (f, c->name);
+    json_key (f, "in");
+    json_text (f, where);
+    json_key (f, "expected");
+    json_text (f, c->about);
+    json_member (f, "error", c->error);
+    json_member (f, "bound", c->bound);
+    json_key (f, "where");
+    json_text (f, c->where);
+    fputc ('}', f);
+  }
+}
+
+static void json_kinds (FILE *f, const pw_check *x) {
+  fputs (",\n  \"kinds\": [", f);
+  for (const pw_checked_kind *k = x->kind; k < x->kind + x->kinds; k++) {
+    int listed = 0;
+    fprintf (f, "%s\n    {\"kind\": ", k > x->kind ? "," : "");
+    json_text (f, k->kind->name);
+    fprintf (f, ", \"elements\": %d, \"checks\": %d, \"failed\": [", k->count, k->alone.checks + k->inside.checks);
+    json_failures (f, &k->alone, "random scenes", &listed);
+    json_failures (f, &k->inside, "this model", &listed);
+    fputs ("]}", f);
+  }
+  fputs ("]", f);
+}
+
+static void json_linear (FILE *f, const pw_check *x) {
+  const pw_linear *l = &x->linear;
+  fputs (",\n  \"linearisation\": ", f);
+  if (l->re == NULL) {
+    fputs ("null", f);
+    return;
+  }
+  double size = l->unknowns > 0 ? hypot (l->re[0], l->im[0]) : 0;
+  fprintf (f, "{\"unknowns\": %d", l->unknowns);
+  json_member (f, "frequency_hz", l->unknowns > 0 ? l->im[0] / (2 * PW_PI) : 0);
+  json_member (f, "damping", pw_check_moves (x) ? -l->re[0] / size : NAN);
+  json_member (f, "rk4_step", x->limit);
+  fputs (",\n    \"eigenvalues\": [", f);
+  for (int i = 0; i < l->unknowns; i++) {
+    fputs (i ? ", [" : "[", f);
+    json_number (f, l->re[i]);
+    fputs (", ", f);
+    json_number (f, l->im[i]);
+    fputc (']', f);
+  }
+  fputs ("]}", f);
+}
+
+int pw_check_json (const pw_check *x, const char *path, pw_error *error) {
+  const char *problem[sizeof x->problem / sizeof *x->problem + 1] = { NULL };
+  for (int i = 0; i < x->problems && x->problem + i < x->problem + sizeof x->problem / sizeof *x->problem; i++)
+    problem[i] = x->problem[i];
+  pw_output *o = pw_output_open (path, error);
+  if (o == NULL) return error->status;
+  FILE *f = pw_output_stream (o);
+  fputs ("{\"schema\": 1, \"model\": ", f);
+  json_text (f, pw_file_name (x->m.file));
+  fprintf (f, ", \"status\": \"%s\",\n  \"problems\": ", x->problems ? "failed" : "ok");
+  json_texts (f, problem);
+  json_mobility (f, x);
+  json_mass (f, x);
+  json_start (f, x);
+  json_kinds (f, x);
+  json_linear (f, x);
+  fputs ("\n}\n", f);
+  return pw_output_finish (o, error);
+}

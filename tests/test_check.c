@@ -1,0 +1,186 @@
+/* pinwheel check: what it says of models whose mobility, vibrations and faults are known. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+#include "probe.h"
+#include "scene.h"
+#include "toys.h"
+
+static void check_shows (const char *text) {
+  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
+}
+
+static double check_number (const char *part, const char *key) {
+  return cli_number (cli_out, part, key, NULL);
+}
+
+static void test_ezyroller (void **state) {
+  (void)state;
+  cli_good ("pinwheel check ezyroller");
+  check_shows ("degrees of freedom, configuration  4\n");
+  check_shows ("degrees of freedom, velocity       2\n");
+  check_shows ("    steer has neither mass nor inertia\n  saddle-point matrix                regular\n");
+  check_shows ("  consistent as described\n");
+  check_shows ("  wheel (2 elements)                 good");
+  check_shows ("  eigenvalues                        all 0");
+  check_shows ("\nNothing is wrong\n");
+}
+
+/* Hanging, a compound pendulum: w^2 = m g l / (I + m l^2). */
+static void test_pendulum (void **state) {
+  (void)state;
+  cli_good ("pinwheel check pendulum --set theta=-1.5707963267948966 --set I=0.5 --set m=2 --set l=0.7 --json -");
+  double w = sqrt (2 * 9.81 * 0.7 / (0.5 + 2 * 0.49));
+  check_close ("frequency", check_number ("linearisation", "frequency_hz"), w / (2 * PW_PI), 1e-12, "1e4 eps");
+  check_close ("step", check_number ("linearisation", "rk4_step"), sqrt (8) / w, 1e-5, "1e-12 in |R|");
+  check_close ("velocity", check_number ("mobility", "velocity"), 1, 0, "exact");
+}
+
+static void test_spring (void **state) {
+  (void)state;
+  cli_write ("spring.yaml", "pinwheel: 1\nrun: {step: 1}\n"
+                            "bodies:\n  - {name: block, mass: 1.5, inertia: 0.1, start: {x: 0.8}}\n"
+                            "elements:\n  - {slider: rail, body: [block, ground], at: [[0, 0], [0, 0]], heading: 0}\n"
+                            "  - {spring: s, body: [block, ground], at: [[0, 0], [0, 0]], stiffness: 60, damping: 2.4, "
+                            "length: 0.8}\n");
+  cli_bad ("pinwheel check @/spring.yaml --json @/spring.json", 2,
+           "the model's step of 1 s is too large for rk4, which is stable up to 0.468 s");
+  check_shows ("-0.8 +- 6.2738 i 1/s");
+  check_shows ("0.12649 of critical");
+  check_close ("frequency", cli_number (cli_file ("spring.json"), "linearisation", "frequency_hz", NULL),
+               sqrt (60 / 1.5 - 0.64) / (2 * PW_PI), 1e-12, "1e4 eps");
+  check_close ("damping", cli_number (cli_file ("spring.json"), "linearisation", "damping", NULL),
+               0.8 / sqrt (60 / 1.5), 1e-12, "1e4 eps");
+}
+
+static void test_redundant (void **state) {
+  (void)state;
+  cli_good ("pinwheel check car");
+  check_shows ("constraint rows                    4 (0 on positions, 4 on velocities)");
+  check_shows ("rank of J                          2\n");
+  check_shows ("    wheels rear-left and rear-right: the same lateral constraint\n");
+}
+
+static void test_start (void **state) {
+  (void)state;
+  cli_good ("pinwheel check ezyroller --start frame.vy=0.5");
+  check_shows ("Start\n  ");
+  check_shows (" moved");
+  check_shows ("frame.omega ");
+  check_shows (", by ");
+}
+
+static void test_singular (void **state) {
+  (void)state;
+  cli_write ("loose.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n  - {name: ghost}\n"
+                           "elements:\n  - {pin: A, body: [a, ghost], at: [[1, 0], [0, 0]]}\n");
+  assert_int_equal (cli_run ("pinwheel check @/loose.yaml"), 2);
+  check_shows ("saddle-point matrix                singular; see below");
+  check_shows ("  FAILED: model loose: ");
+  assert_non_null (strstr (cli_err, "ghost.x has no mass"));
+  assert_int_equal (cli_run ("pinwheel check @/loose.yaml --json -"), 2);
+  assert_non_null (strstr (cli_out, "\"saddle_point\": \"singular\""));
+  assert_true (cli_says (cli_out, "status", "failed"));
+}
+
+/* A plug-in's own kind whose force is not the gradient of its energy, and whose force_q is missing. */
+static void test_broken_kind (void **state) {
+  (void)state;
+  cli_write ("broken.c",
+             "#include \"pinwheel.h\"\n"
+             "typedef struct { const char *name, *body; double k; } well;\n"
+             "static const pw_field fields[] = {\n"
+             "  { .name = \"body\", .offset = offsetof (well, body), .type = PW_BODY, .required = 1 },\n"
+             "  { .name = \"k\", .offset = offsetof (well, k), .type = PW_NUMBER },\n"
+             "  { .name = NULL } };\n"
+             "static void force (const pw_batch *b, double *f) {\n"
+             "  for (int e = 0; e < b->count; e++, f += 3) {\n"
+             "    const pw_pose *p = b->pose + b->body[e];\n"
+             "    f[0] = -2 * p->x, f[1] = 0, f[2] = 0;\n"
+             "  }\n"
+             "}\n"
+             "static const pw_kind kind = { .name = \"well\", .about = \"pulls\", .definition = sizeof (well),\n"
+             "  .fields = fields, .bodies = 1, .force = force, .loss = NULL };\n"
+             "static void build (pw_model *m, const void *p) {\n"
+             "  (void)p;\n"
+             "  pw_add_body (m, &(pw_body){ .name = \"ball\", .mass = 1, .inertia = 1 });\n"
+             "  pw_add (m, &kind, &(well){ .name = \"pit\", .body = \"ball\", .k = 2 });\n"
+             "}\n"
+             "PW_MODEL (.about = \"broken\", .build = build);\n");
+  assert_int_equal (cli_run ("pinwheel check @/broken.c"), 2);
+  check_shows ("  well (1 element)                   FAILED");
+  check_shows ("at random: force_q = d force/dq does not hold");
+  check_shows ("in this model: force_q = d force/dq does not hold");
+  check_shows ("\n1 problem\n");
+  assert_non_null (strstr (cli_err, "pinwheel: kind well fails its self-test: force_q = d force/dq"));
+}
+
+static void test_large (void **state) {
+  (void)state;
+  cli_good ("pinwheel check chain --set n=200");
+  check_shows ("not computed: 600 coordinates, the limit is 400");
+  check_shows ("rank of J                          400\n");
+}
+
+static void test_bad_options (void **state) {
+  (void)state;
+  cli_bad ("pinwheel check", 2, "something is missing; write pinwheel check MODEL [OPTION...]");
+  cli_bad ("pinwheel check ezyroller --jsn x", 2, "check has no option \"--jsn\"; did you mean \"--json\"?");
+}
+
+/* ---- The self-test in a scene notices whatever is broken in a kind ---- */
+
+static const pw_kind *check_original;
+
+static void check_half (const pw_batch *b, double *out) {
+  check_original->gamma (b, out);
+  for (int i = 0; i < b->count * check_original->rows; i++) out[i] /= 2;
+}
+
+static void check_scene_expect (const pw_kind *kind, const char *what) {
+  pw_error error = { 0 };
+  pw_selftest_report report = { 0 };
+  pw_random random = { 5 };
+  pw_system *s = pw_specimen (kind, &random, &error);
+  assert_non_null (s);
+  double q[PW_PROBE_COORDS], v[PW_PROBE_COORDS];
+  for (int j = 0; j < s->coords; j++) q[j] = sin (1. + 3 * j), v[j] = 0;
+  check_ok (pw_selftest_scene (s, kind, 0, q, v, 7, &report, &error), &error);
+  for (int i = 0; i < report.checks; i++)
+    if (report.check[i].failed != (what != NULL && strcmp (report.check[i].name, what) == 0))
+      fail_msg ("%s: %s is %g, %s", kind->name, report.check[i].name, report.check[i].error, report.check[i].where);
+  assert_int_equal (report.failed, what != NULL);
+  pw_free (s);
+}
+
+static void test_scene (void **state) {
+  (void)state;
+  for (const pw_kind *const *k = pw_kinds; *k; k++) check_scene_expect (*k, NULL);
+  for (const pw_kind *const *k = toy_kinds; *k; k++) check_scene_expect (*k, NULL);
+  check_original = &pw_kind_pin;
+  pw_kind halved = pw_kind_pin;
+  halved.gamma = check_half;
+  halved.gamma_q = halved.gamma_v = pw_by_differences;
+  check_scene_expect (&halved, "gamma");
+  halved = pw_kind_pin;
+  halved.jw_q = NULL;
+  check_scene_expect (&halved, "jw_q");
+  halved = pw_kind_pin;
+  halved.jtl_q = NULL;
+  check_scene_expect (&halved, "jtl_q");
+  halved = pw_kind_spring;
+  halved.force_v = NULL;
+  check_scene_expect (&halved, "force_v");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_ezyroller),   cmocka_unit_test (test_pendulum), cmocka_unit_test (test_spring),
+    cmocka_unit_test (test_redundant),   cmocka_unit_test (test_start),    cmocka_unit_test (test_singular),
+    cmocka_unit_test (test_broken_kind), cmocka_unit_test (test_large),    cmocka_unit_test (test_bad_options),
+    cmocka_unit_test (test_scene),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
