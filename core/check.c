@@ -1,8 +1,8 @@
 /* Checks a description against the field tables, before anything is compiled. */
 #include <ctype.h>
 #include <string.h>
-#include <math.h>
 #include "model.h"
+#include "signal.h"
 
 static int check_name (const pw_model *m, const char *what, const char *name, pw_error *error) {
   if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s has no name", m->name, what);
@@ -37,27 +37,11 @@ int pw_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
 
 static int check_signal (const pw_model *m, const pw_element *e, const pw_field *f, const pw_signal *s,
                          pw_error *error) {
-  const char *kind = e->kind->name, *name = pw_element_name (e);
-  int good = 1;
-  if (s->type == PW_CONSTANT)
-    good = isfinite (s->constant);
-  else if (s->type == PW_HARMONIC)
-    good = isfinite (s->harmonic.amplitude) && isfinite (s->harmonic.omega) && isfinite (s->harmonic.phase) &&
-           isfinite (s->harmonic.offset);
-  else if (s->type == PW_FUNCTION) {
-    if (s->function.eval == NULL)
-      return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: a function signal without eval", m->name, kind, name,
-                      f->name);
-    if (s->function.reads && !pw_kind_forced (e->kind))
-      return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: a constraint's signal may depend on time only", m->name,
-                      kind, name, f->name);
-  } else
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: signal type %d does not exist", m->name, kind, name, f->name,
-                    (int)s->type);
-  if (!good)
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: expected finite numbers in the signal", m->name, kind, name,
-                    f->name);
-  return PW_OK;
+  char fault[300];
+  int point;
+  if (*pw_signal_fault (s, e->kind, &point, fault, sizeof fault) == 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: %s", m->name, e->kind->name, pw_element_name (e), f->name,
+                  fault);
 }
 
 static int check_body_name (const pw_model *m, const pw_element *e, const char *body, const pw_names *bodies,

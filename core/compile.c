@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "model.h"
-#include "system.h"
+#include "signal.h"
 
 /* What is known before the allocation. */
 typedef struct {
@@ -20,6 +20,7 @@ typedef struct {
   pw_system size; /* its counts */
   size_t text;    /* bytes of all names */
   int reads;      /* states read by signals, in all */
+  size_t points;  /* of tables, in all */
 } compile;
 
 /* ---- Counting ---- */
@@ -115,6 +116,7 @@ static int compile_count (compile *c, pw_error *error) {
     c->text += strlen (pw_element_name (e)) + 1;
     for (int u = 0; u < e->kind->signals; u++) {
       const pw_signal *signal = pw_field_at (e->kind, e->definition, PW_SIGNAL, u);
+      if (signal->type == PW_TABLE) c->points += (size_t)signal->table.count * (size_t)compile_copies (m, e->kind);
       if (signal->type != PW_FUNCTION || signal->function.reads == NULL) continue;
       for (const char *const *r = signal->function.reads; *r; r++) c->reads += compile_copies (m, e->kind);
     }
@@ -127,6 +129,7 @@ static int compile_count (compile *c, pw_error *error) {
 typedef struct {
   char *text;
   double *x; /* of signals that read states */
+  double *table;
   int *state;
 } compile_pools;
 
@@ -166,6 +169,7 @@ static void compile_layout (const compile *c, pw_layout *l, pw_system **system, 
   s->force = pw_take (l, (size_t)c->size.slabs, sizeof *s->force);
   for (int i = 0; i < c->kinds; i++) compile_layout_slab (c, l, l->base ? s->slab + i : NULL, i);
   pools->x = pw_take (l, 2 * (size_t)c->reads, sizeof (double));
+  pools->table = pw_take (l, 4 * c->points, sizeof (double));
   pools->state = pw_take (l, (size_t)c->reads, sizeof (int));
   pools->text = pw_take (l, c->text, 1);
   *system = s;
@@ -192,19 +196,24 @@ static void compile_bodies (const compile *c, pw_system *s, compile_pools *pools
   s->pose[s->bodies] = (pw_pose){ .cos = 1 };
 }
 
-static int compile_source (const compile *c, pw_system *s, pw_source *source, const pw_signal *signal,
-                           compile_pools *pools, const char *element, pw_error *error) {
-  if (signal->type == PW_FUNCTION && signal->function.open) {
-    void *own = signal->function.open (signal->function.context);
-    if (own == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", c->m->name);
-    source->signal = *signal;
-    source->signal.function.context = own;
-  } else
-    source->signal = *signal;
-  if (signal->type != PW_FUNCTION || signal->function.reads == NULL) return PW_OK;
+/* The points of a table, and what is between them. */
+static void compile_table (pw_source *source, compile_pools *pools) {
+  pw_signal *s = &source->signal;
+  size_t n = (size_t)s->table.count;
+  double *t = memcpy (pools->table, s->table.t, n * sizeof *t), *value = t + n;
+  s->table.value = memcpy (value, s->table.value, n * sizeof *value);
+  s->table.t = t;
+  source->spline = value + n;
+  pools->table += 4 * n;
+  pw_table_spline (s, source->spline);
+}
+
+/* The states a function reads. */
+static int compile_reads (const compile *c, pw_system *s, pw_source *source, const char *const *reads,
+                          compile_pools *pools, const char *element, pw_error *error) {
   source->state = pools->state;
   source->x = pools->x;
-  for (const char *const *r = signal->function.reads; *r; r++) {
+  for (const char *const *r = reads; *r; r++) {
     pw_error why = { 0 };
     int state = pw_find_state (s, *r, &why);
     if (state < 0)
@@ -215,6 +224,20 @@ static int compile_source (const compile *c, pw_system *s, pw_source *source, co
   pools->x += 2 * source->reads;
   s->readers += source->reads > 0;
   return PW_OK;
+}
+
+static int compile_source (const compile *c, pw_system *s, pw_source *source, const pw_signal *signal,
+                           compile_pools *pools, const char *element, pw_error *error) {
+  if (signal->type == PW_FUNCTION && signal->function.open) {
+    void *own = signal->function.open (signal->function.context);
+    if (own == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", c->m->name);
+    source->signal = *signal;
+    source->signal.function.context = own;
+  } else
+    source->signal = *signal;
+  if (signal->type == PW_TABLE) compile_table (source, pools);
+  if (signal->type != PW_FUNCTION || signal->function.reads == NULL) return PW_OK;
+  return compile_reads (c, s, source, signal->function.reads, pools, element, error);
 }
 
 /* Puts element `e` of its slab where the kind will find it; `body` is the one an each_body kind acts on, or -1. */

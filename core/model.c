@@ -108,6 +108,22 @@ int pw_add_body (pw_model *m, const pw_body *body) {
   return m->error.status;
 }
 
+static const double *model_numbers (pw_model *m, const double *from, int count) {
+  double *copy = pw_arena_take (&m->arena, (size_t)count * sizeof *copy);
+  if (copy == NULL) {
+    model_no_memory (m);
+    return NULL;
+  }
+  return memcpy (copy, from, (size_t)count * sizeof *copy);
+}
+
+/* A table's points become the model's own; what is no table is left for pw_check_element to say. */
+static void model_table (pw_model *m, pw_signal *s) {
+  if (s == NULL || s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
+  s->table.t = model_numbers (m, s->table.t, s->table.count);
+  s->table.value = model_numbers (m, s->table.value, s->table.count);
+}
+
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (m->error.status != PW_OK ||
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
@@ -121,6 +137,7 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
     const char **body = pw_field_at (kind, copy, PW_BODY, i);
     *body = model_text (m, *body);
   }
+  for (int i = 0; i < kind->signals; i++) model_table (m, pw_field_at (kind, copy, PW_SIGNAL, i));
   m->element[m->elements++] = (pw_element){ kind, copy };
   return m->error.status;
 }
@@ -150,8 +167,9 @@ int pw_set_signal (pw_model *m, const char *element, const char *field, const pw
       if (f->type != PW_SIGNAL) continue;
       pw_nearest_try (&fields, f->name);
       if (strcmp (f->name, field) != 0) continue;
-      memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
-      return PW_OK;
+      void *at = memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
+      model_table (m, at);
+      return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
     }
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
                     pw_nearest_text (&fields, hint, sizeof hint));

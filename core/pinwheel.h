@@ -52,7 +52,11 @@ int pw_fail (pw_error *error, int status, const char *format, ...)
 
 /* ---- Signals: what a torque, drive or heading does over time ---- */
 
-typedef enum { PW_CONSTANT, PW_HARMONIC, PW_FUNCTION } pw_signal_type;
+typedef enum { PW_CONSTANT, PW_HARMONIC, PW_FUNCTION, PW_RAMP, PW_SMOOTH_STEP, PW_PULSE, PW_TABLE } pw_signal_type;
+
+/* How a table goes from point to point, and how a cubic one begins and ends. */
+enum { PW_LINEAR, PW_CUBIC };
+enum { PW_ENDS_FREE, PW_ENDS_REST };
 
 /* A signal computed by the caller.  `eval` stores the value and, if the signal serves a constraint, its first and
  * second time derivative in value[0..2]; x holds the states named in `reads`, in that order, and gradient (NULL
@@ -79,6 +83,25 @@ typedef struct {
       double offset;    /* unit of the signal */
     } harmonic;         /* PW_HARMONIC: offset + amplitude cos (omega t + phase) */
     pw_function function;
+    struct {
+      double from, to; /* before and behind; unit of the signal */
+      double start;    /* [s] */
+      double duration; /* [s], > 0 */
+    } ramp;            /* PW_RAMP: along a straight line; PW_SMOOTH_STEP: with continuous rate and acceleration */
+    struct {
+      double height; /* while it lasts; unit of the signal */
+      double start;  /* [s] */
+      double width;  /* how long it lasts [s]; 0: for ever */
+      double period; /* from one pulse to the next [s], > width; 0: there is one */
+      double offset; /* at all times, below the height; unit of the signal */
+    } pulse;         /* PW_PULSE: offset + height from start to start + width, and each period again */
+    struct {
+      const double *t;     /* times of its points, increasing [s]; pw_add and pw_set_signal copy the points */
+      const double *value; /* at these times; unit of the signal; the first and the last are held outside */
+      int count;           /* of points: at least 2, of a cubic table with free ends 4 */
+      int interpolation;   /* PW_LINEAR, PW_CUBIC: a spline with continuous rate and acceleration */
+      int ends;            /* PW_ENDS_FREE: of a spline as its points ask for (not a knot); PW_ENDS_REST: at rate 0 */
+    } table;               /* PW_TABLE */
   };
 } pw_signal;
 

@@ -1,4 +1,4 @@
-/* Evaluation of signals. */
+/* Evaluation of signals, and what they are made of. */
 #ifndef PW_SIGNAL_H
 #define PW_SIGNAL_H
 
@@ -8,7 +8,31 @@
  * reads are in source->x.  Returns what the user's function returned: non-zero stops the run. */
 int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]);
 
-/* First discontinuity after t, or INFINITY. */
+/* First time after t at which the signal jumps or its rate or acceleration does, or INFINITY. */
 double pw_signal_breakpoint (const pw_signal *s, double t);
+
+/* ---- Tables (table.c) ---- */
+
+/* Fills 2 count numbers: the spline of a table that has been checked. */
+void pw_table_spline (const pw_signal *s, double *spline);
+void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);
+double pw_table_breakpoint (const pw_signal *s, double t);
+
+/* ---- Forms (signal_form.c) ---- */
+
+/* A signal made of numbers: serves checks, text models, `show` and `list signals`. */
+typedef struct {
+  const char *name; /* "ramp", as written in a model file */
+  pw_signal_type type;
+  const char *about;
+  const pw_field *fields; /* numbers and choices, their offsets those in pw_signal; ended by a NULL name */
+} pw_signal_form;
+
+extern const pw_signal_form pw_signal_forms[]; /* ended by a NULL name; constants and functions have none */
+const pw_signal_form *pw_signal_form_of (const pw_signal *s);
+
+/* Says what is wrong with a signal of a kind; "" if nothing is.  *point becomes the point of a table that is meant, or -1.
+ * Returns the buffer. */
+char *pw_signal_fault (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
 
 #endif

@@ -14,6 +14,7 @@ typedef struct {
   int reads;        /* how many states a function signal reads */
   const int *state; /* their indices: coordinate j, or coordinates + j for a rate */
   double *x;        /* reads: their values, then reads: the gradient */
+  double *spline;   /* of a table: rate, then acceleration at each of its points (table.c) */
 } pw_source;
 
 /* One kind in use: its batch, and where its rows and coordinates are. */

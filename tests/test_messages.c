@@ -87,8 +87,8 @@ static void test_bad_numbers (void **state) {
 
 static void test_bad_signals (void **state) {
   (void)state;
-  BAD (": torque T: value: expected finite numbers in the signal", TORQUE (.name = "T", .value = { .constant = NAN }));
-  BAD (": torque T: value: expected finite numbers in the signal",
+  BAD (": torque T: value: nan: expected a finite number", TORQUE (.name = "T", .value = { .constant = NAN }));
+  BAD (": torque T: value: omega = inf: expected a finite number",
        TORQUE (.name = "T", .value = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = INFINITY } }));
   BAD (": torque T: value: a function signal without eval", TORQUE (.name = "T", .value = { .type = PW_FUNCTION }));
   BAD (": torque T: value: signal type 9 does not exist", TORQUE (.name = "T", .value = { .type = (pw_signal_type)9 }));

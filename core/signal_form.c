@@ -1,0 +1,149 @@
+/* The forms of a signal: the numbers each is made of, and what may be wrong with them. */
+#include <math.h>
+#include <stdio.h>
+#include "model.h"
+#include "signal.h"
+
+#define FORM_AT(form, member) .name = #member, .offset = offsetof (pw_signal, form.member)
+
+static const pw_field form_harmonic[] = {
+  { FORM_AT (harmonic, amplitude), PW_NUMBER, .required = 1, .about = "amplitude" },
+  { FORM_AT (harmonic, omega), PW_NUMBER, .unit = "rad/s", .required = 1, .about = "angular frequency" },
+  { FORM_AT (harmonic, phase), PW_NUMBER, .unit = "rad", .about = "phase at t = 0" },
+  { FORM_AT (harmonic, offset), PW_NUMBER, .about = "what it oscillates about" },
+  { .name = NULL },
+};
+
+static const pw_field form_ramp[] = {
+  { FORM_AT (ramp, from), PW_NUMBER, .about = "value up to the start" },
+  { FORM_AT (ramp, to), PW_NUMBER, .required = 1, .about = "value behind it" },
+  { FORM_AT (ramp, start), PW_NUMBER, .unit = "s", .about = "time at which it begins" },
+  { FORM_AT (ramp, duration), PW_NUMBER, .unit = "s", .required = 1, .domain = PW_POSITIVE,
+    .about = "how long it takes" },
+  { .name = NULL },
+};
+
+static const pw_field form_pulse[] = {
+  { FORM_AT (pulse, height), PW_NUMBER, .required = 1, .about = "of the pulse, above the offset" },
+  { FORM_AT (pulse, start), PW_NUMBER, .unit = "s", .about = "time at which the first one begins" },
+  { FORM_AT (pulse, width), PW_NUMBER, .unit = "s", .domain = PW_NONNEGATIVE,
+    .about = "how long it lasts; 0: for ever" },
+  { FORM_AT (pulse, period), PW_NUMBER, .unit = "s", .domain = PW_NONNEGATIVE,
+    .about = "from one pulse to the next; 0: there is one" },
+  { FORM_AT (pulse, offset), PW_NUMBER, .about = "value without a pulse" },
+  { .name = NULL },
+};
+
+static const char *const form_interpolation[] = { "linear", "cubic", NULL }, *const form_ends[] = { "free", "rest",
+                                                                                                    NULL };
+
+static const pw_field form_table[] = {
+  { FORM_AT (table, interpolation), PW_CHOICE, .choices = form_interpolation, .about = "between the points" },
+  { FORM_AT (table, ends), PW_CHOICE, .choices = form_ends,
+    .about = "of a cubic table: as its points ask for, or with rate 0" },
+  { .name = NULL },
+};
+
+const pw_signal_form pw_signal_forms[] = {
+  { "harmonic", PW_HARMONIC, "offset + amplitude cos (omega t + phase)", form_harmonic },
+  { "ramp", PW_RAMP, "from one value to another along a straight line", form_ramp },
+  { "smooth-step", PW_SMOOTH_STEP, "from one value to another with continuous rate and acceleration", form_ramp },
+  { "pulse", PW_PULSE, "a jump up and back down, once or each period", form_pulse },
+  { "table", PW_TABLE, "through points (time, value); the first and the last value are held outside", form_table },
+  { .name = NULL },
+};
+
+const pw_signal_form *pw_signal_form_of (const pw_signal *s) {
+  const pw_signal_form *f = pw_signal_forms;
+  while (f->name && f->type != s->type) f++;
+  return f->name ? f : NULL;
+}
+
+/* ---- Faults; each writes what is wrong, or leaves the text empty ---- */
+
+static void form_numbers (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
+  for (const pw_field *f = form->fields; f->name && !*text; f++) {
+    const void *at = (const char *)s + f->offset;
+    const char *expected = f->type == PW_NUMBER ? pw_domain_check (f->domain, *(const double *)at) : "";
+    int choice = f->type == PW_CHOICE ? *(const int *)at : 0;
+    if (*expected) snprintf (text, size, "%s = %g: expected %s", f->name, *(const double *)at, expected);
+    if (choice < 0 || choice > 1) snprintf (text, size, "%s = %d: expected 0 or 1", f->name, choice);
+  }
+}
+
+static void form_pulses (const pw_signal *s, char *text, size_t size) {
+  double width = s->pulse.width, period = s->pulse.period;
+  if (period > 0 && !(width > 0 && width < period))
+    snprintf (text, size, "a pulse each %g s: expected a width > 0 and < %g s, found %g s", period, period, width);
+}
+
+static void form_points (const pw_signal *s, int *point, char *text, size_t size) {
+  const double *t = s->table.t;
+  int cubic = s->table.interpolation == PW_CUBIC, least = cubic && s->table.ends == PW_ENDS_FREE ? 4 : 2;
+  if (s->table.count < least || t == NULL || s->table.value == NULL) {
+    int count = t && s->table.value ? s->table.count : 0;
+    snprintf (text, size, "a %s table%s needs at least %d points, found %d", form_interpolation[cubic],
+              least == 4 ? " with free ends" : "", least, count);
+    return;
+  }
+  for (int i = 0; i < s->table.count && !*text; i++) {
+    *point = i;
+    if (!isfinite (t[i]) || !isfinite (s->table.value[i]))
+      snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t[i], s->table.value[i]);
+    else if (i > 0 && !(t[i] > t[i - 1]))
+      snprintf (text, size, "point %d is at t = %.9g s, after one at %.9g s: expected increasing times", i + 1, t[i],
+                t[i - 1]);
+  }
+  if (!*text) *point = -1;
+}
+
+/* How many time derivatives of a signal are continuous, at most those that matter; -1: it jumps. */
+static int form_smoothness (const pw_signal *s, const char **what) {
+  *what = "";
+  if (s->type == PW_PULSE) return *what = "a pulse", -1;
+  if (s->type == PW_RAMP) return *what = "a ramp", 0;
+  if (s->type != PW_TABLE) return 2;
+  if (s->table.interpolation == PW_LINEAR) return *what = "a linear table", 0;
+  if (s->table.ends == PW_ENDS_FREE) return *what = "a cubic table with free ends", 0;
+  return 1;
+}
+
+/* Positions that are prescribed must not have kinks, nor rates jumps: that takes an infinite force. */
+static void form_level (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
+  const char *what;
+  int smoothness = form_smoothness (s, &what);
+  if (pw_kind_forced (kind)) return;
+  if (kind->level == PW_HOLONOMIC && smoothness < 1)
+    snprintf (text, size,
+              "%s has %s, and a prescribed position must not: use a smooth-step, a cubic table with ends at rest, a "
+              "harmonic",
+              what, smoothness < 0 ? "jumps" : "kinks");
+  else if (smoothness < 0)
+    snprintf (text, size, "%s jumps, and the signal of a velocity constraint must not: use a ramp or smooth-step",
+              what);
+}
+
+static void form_function (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
+  if (s->function.eval == NULL)
+    snprintf (text, size, "a function signal without eval");
+  else if (s->function.reads && !pw_kind_forced (kind))
+    snprintf (text, size, "a constraint's signal may depend on time only");
+}
+
+char *pw_signal_fault (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size) {
+  const pw_signal_form *form = pw_signal_form_of (s);
+  *buffer = 0;
+  *point = -1;
+  if (s->type == PW_FUNCTION)
+    form_function (s, kind, buffer, size);
+  else if (s->type == PW_CONSTANT && !isfinite (s->constant))
+    snprintf (buffer, size, "%g: expected a finite number", s->constant);
+  else if (form)
+    form_numbers (s, form, buffer, size);
+  else if (s->type != PW_CONSTANT)
+    snprintf (buffer, size, "signal type %d does not exist", (int)s->type);
+  if (!*buffer && s->type == PW_PULSE) form_pulses (s, buffer, size);
+  if (!*buffer && s->type == PW_TABLE) form_points (s, point, buffer, size);
+  if (!*buffer) form_level (s, kind, buffer, size);
+  return buffer;
+}

@@ -1,0 +1,92 @@
+/* Tables: signals through given points (t_i, y_i).
+ *
+ *   u = y_i + b_i s + M_i s^2 / 2 + (M_j - M_i) s^3 / (6 h),   s = t - t_i,  j = i + 1,  h = t_j - t_i
+ *
+ * between two points; the first and the last value are held outside.  Of a cubic table the accelerations M_i make the
+ * rate continuous, too (de Boor 2001, A Practical Guide to Splines, chapter IV):
+ *
+ *   h_k M_k + 2 (h_k + h_i) M_i + h_i M_j = 6 ((y_j - y_i) / h_i - (y_i - y_k) / h_k),   k = i - 1
+ *
+ * With free ends the first two pieces are one cubic, and so are the last two ("not a knot"); with ends at rest b is 0
+ * at both.  A linear table has M = 0. */
+#include <math.h>
+#include <string.h>
+#include "signal.h"
+
+/* Row i of the equations for M: the coefficients of its neighbour before, of itself, of that behind, and the right side. */
+static void table_row (const double *t, const double *y, int n, int ends, int i, double row[4]) {
+  double before = i > 0 ? t[i] - t[i - 1] : 0, behind = i < n - 1 ? t[i + 1] - t[i] : 0;
+  double from = i > 0 ? (y[i] - y[i - 1]) / before : 0, to = i < n - 1 ? (y[i + 1] - y[i]) / behind : 0;
+  row[0] = before;
+  row[1] = 2 * (before + behind);
+  row[2] = behind;
+  row[3] = 6 * (to - from);
+  if (ends == PW_ENDS_REST) return;
+  if (i == 1) row[1] += before + before * (before / behind), row[2] -= before * (before / behind);
+  if (i == n - 2) row[1] += behind + behind * (behind / before), row[0] -= behind * (behind / before);
+}
+
+/* The M of a free end, on one line with the next two. */
+static double table_end (double t0, double t1, double t2, double M1, double M2) {
+  return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
+}
+
+/* M by elimination; the rows are diagonally dominant.  `up` is scratch. */
+static void table_accelerations (const double *t, const double *y, int n, int ends, double *M, double *up) {
+  int first = ends == PW_ENDS_REST ? 0 : 1, last = n - 1 - first;
+  double row[4];
+  for (int i = first; i <= last; i++) {
+    table_row (t, y, n, ends, i, row);
+    double pivot = row[1] - (i > first ? row[0] * up[i - 1] : 0);
+    up[i] = row[2] / pivot;
+    M[i] = (row[3] - (i > first ? row[0] * M[i - 1] : 0)) / pivot;
+  }
+  for (int i = last - 1; i >= first; i--) M[i] -= up[i] * M[i + 1];
+  if (ends == PW_ENDS_REST) return;
+  M[0] = table_end (t[0], t[1], t[2], M[1], M[2]);
+  M[n - 1] = table_end (t[n - 1], t[n - 2], t[n - 3], M[n - 2], M[n - 3]);
+}
+
+void pw_table_spline (const pw_signal *s, double *spline) {
+  const double *t = s->table.t, *y = s->table.value;
+  int n = s->table.count;
+  double *b = spline, *M = spline + n;
+  memset (spline, 0, 2 * (size_t)n * sizeof *spline);
+  if (s->table.interpolation == PW_CUBIC) table_accelerations (t, y, n, s->table.ends, M, b);
+  for (int i = 0; i < n - 1; i++) {
+    double h = t[i + 1] - t[i];
+    b[i] = (y[i + 1] - y[i]) / h - h * (2 * M[i] + M[i + 1]) / 6;
+  }
+}
+
+/* How many points are not after t. */
+static int table_passed (const pw_signal *s, double t) {
+  int low = 0, high = s->table.count;
+  while (low < high) {
+    int middle = low + (high - low) / 2;
+    if (s->table.t[middle] <= t)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]) {
+  int n = s->table.count, passed = table_passed (s, t), i = passed - 1;
+  u[0] = s->table.value[i < 0 ? 0 : i];
+  u[1] = u[2] = 0;
+  if (passed == 0 || passed == n) return;
+  double x = t - s->table.t[i], b = spline[i], M = spline[n + i];
+  double jerk = (spline[n + i + 1] - M) / (s->table.t[i + 1] - s->table.t[i]);
+  u[0] += x * (b + x * (M / 2 + x * (jerk / 6)));
+  u[1] = b + x * (M + x * (jerk / 2));
+  u[2] = M + x * jerk;
+}
+
+/* A linear table has a kink at each point; a cubic one is smooth enough but for its ends. */
+double pw_table_breakpoint (const pw_signal *s, double t) {
+  int n = s->table.count, next = table_passed (s, t);
+  if (next == n) return INFINITY;
+  return s->table.t[next > 0 && s->table.interpolation == PW_CUBIC ? n - 1 : next];
+}

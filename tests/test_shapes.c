@@ -1,0 +1,398 @@
+/* The built-in signals: ramps, smooth steps, pulses and tables; their derivatives, where steps end, what may use them. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+#include "signal.h"
+#include "trial.h"
+
+/* ---- Shapes ---- */
+
+enum { SHAPES_POINTS = 6 };
+
+static const double shapes_t[] = { 0.4, 1.1, 1.5, 2.6, 3, 4.2 }, shapes_y[] = { -1, 0.5, 0.7, -0.3, 0.2, 0.9 };
+
+#define TABLE(how, at)                                                                                               \
+  {                                                                                                                  \
+    PW_TABLE, .table = {.t = shapes_t, .value = shapes_y, .count = SHAPES_POINTS, .interpolation = how, .ends = at } \
+  }
+
+static const pw_signal shapes_ramp = { PW_RAMP, .ramp = { 0.3, -1.2, 0.7, 1.9 } };
+static const pw_signal shapes_smooth = { PW_SMOOTH_STEP, .ramp = { 0.3, -1.2, 0.7, 1.9 } };
+static const pw_signal shapes_pulse = { PW_PULSE, .pulse = { 2, 0.7, 0.3, 0, -0.5 } };
+static const pw_signal shapes_pulses = { PW_PULSE, .pulse = { 2, 0.7, 0.3, 1.1, -0.5 } };
+static const pw_signal shapes_for_ever = { PW_PULSE, .pulse = { .height = 2, .start = 0.7 } };
+static const pw_signal shapes_linear = TABLE (PW_LINEAR, PW_ENDS_FREE);
+static const pw_signal shapes_free = TABLE (PW_CUBIC, PW_ENDS_FREE);
+static const pw_signal shapes_rest = TABLE (PW_CUBIC, PW_ENDS_REST);
+
+/* As a system has it. */
+static pw_source shapes_source (const pw_signal *s) {
+  static double spline[2 * SHAPES_POINTS];
+  pw_source source = { .signal = *s, .spline = spline };
+  if (s->type == PW_TABLE) pw_table_spline (s, spline);
+  return source;
+}
+
+static void shapes_at (const pw_source *source, double t, double u[3]) {
+  assert_int_equal (pw_signal_eval (source, t, 1, u), 0);
+}
+
+/* Between breakpoints rate and acceleration are derivatives of the value. */
+static void shapes_derivatives (const pw_signal *s) {
+  const double h = 1e-4;
+  pw_source source = shapes_source (s);
+  for (double t = 0.033; t < 5; t += 0.1) {
+    double u[3], up[3], down[3];
+    if (pw_signal_breakpoint (s, t - 2 * h) < t + 2 * h) continue;
+    shapes_at (&source, t, u);
+    shapes_at (&source, t + h, up);
+    shapes_at (&source, t - h, down);
+    check_close ("rate", u[1], (up[0] - down[0]) / (2 * h), 1e-6,
+                 "central differences: h^2 third derivative, at most 30");
+    check_close ("acceleration", u[2], (up[1] - down[1]) / (2 * h), 1e-6, "the same");
+  }
+}
+
+/* Behind the breakpoints it is what it is there, and just before them what it was: `smooth` derivatives agree. */
+static void shapes_breaks (const pw_signal *s, int count, int smooth) {
+  pw_source source = shapes_source (s);
+  double t = 0, u[3], before[3], after[3];
+  for (int i = 0; i < count; i++) {
+    double next = pw_signal_breakpoint (s, t);
+    assert_true (next > t && isfinite (next));
+    int jumps = 0;
+    shapes_at (&source, next, u);
+    shapes_at (&source, nextafter (next, -INFINITY), before);
+    shapes_at (&source, nextafter (next, INFINITY), after);
+    for (int k = 0; k < 3; k++) {
+      check_close ("just behind", after[k], u[k], 1e-13, "continuous from the right");
+      if (k <= smooth) check_close ("just before", before[k], u[k], 1e-13, "so many derivatives are continuous");
+      jumps |= fabs (before[k] - u[k]) > 1e-6;
+    }
+    assert_true (jumps || smooth == 2);
+    t = next;
+  }
+  if (s->pulse.period == 0 || s->type != PW_PULSE) assert_true (isinf (pw_signal_breakpoint (s, t)));
+}
+
+static void test_forms (void **state) {
+  static const struct {
+    const pw_signal *s;
+    int breaks, smooth;
+  } shape[] = {
+    { &shapes_ramp, 2, 0 },     { &shapes_smooth, 2, 2 },    { &shapes_pulse, 2, -1 },
+    { &shapes_pulses, 30, -1 }, { &shapes_for_ever, 1, -1 }, { &shapes_linear, SHAPES_POINTS, 0 },
+    { &shapes_free, 2, 0 },     { &shapes_rest, 2, 1 },
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof shape / sizeof *shape; i++) {
+    shapes_derivatives (shape[i].s);
+    shapes_breaks (shape[i].s, shape[i].breaks, shape[i].smooth);
+  }
+}
+
+static void shapes_is (const pw_signal *s, double t, double value) {
+  pw_source source = shapes_source (s);
+  double u[3];
+  shapes_at (&source, t, u);
+  check_close ("value", u[0], value, 8 * DBL_EPSILON, "round-off");
+}
+
+static void test_values (void **state) {
+  (void)state;
+  shapes_is (&shapes_ramp, -9, 0.3);
+  shapes_is (&shapes_ramp, 0.7 + 1.9 / 4, 0.3 - 1.5 / 4);
+  shapes_is (&shapes_ramp, 1e9, -1.2);
+  shapes_is (&shapes_smooth, 0.7, 0.3);
+  shapes_is (&shapes_smooth, 0.7 + 1.9 / 4, 0.3 - 1.5 * (10. / 64 - 15. / 256 + 6. / 1024));
+  shapes_is (&shapes_smooth, 2.7, -1.2);
+  shapes_is (&shapes_pulse, 0.6, -0.5);
+  shapes_is (&shapes_pulse, 0.8, 1.5);
+  shapes_is (&shapes_pulse, 1.9, -0.5);
+  shapes_is (&shapes_pulses, 0.8 + 7 * 1.1, 1.5);
+  shapes_is (&shapes_pulses, 1.1 + 7 * 1.1, -0.5);
+  shapes_is (&shapes_for_ever, 1e9, 2);
+  shapes_is (&shapes_linear, 0, -1);
+  shapes_is (&shapes_linear, 1.3, 0.6);
+  shapes_is (&shapes_linear, 9, 0.9);
+  for (int i = 0; i < SHAPES_POINTS; i++) {
+    shapes_is (&shapes_free, shapes_t[i], shapes_y[i]);
+    shapes_is (&shapes_rest, shapes_t[i], shapes_y[i]);
+  }
+}
+
+/* However the quotient of times is rounded, a pulse begins exactly where a step was told to end. */
+static void test_many_pulses (void **state) {
+  pw_signal s = { PW_PULSE, .pulse = { .height = 1, .start = 0.1, .width = 0.05, .period = 0.1 } };
+  pw_source source = { .signal = s };
+  double t = 0, u[3];
+  (void)state;
+  for (int i = 0; i < 20000; i++) {
+    t = pw_signal_breakpoint (&s, t);
+    shapes_at (&source, t, u);
+    assert_true (u[0] == (i % 2 == 0));
+    shapes_at (&source, nextafter (t, 0), u);
+    assert_true (u[0] == (i % 2 == 1));
+  }
+  check_close ("the last one", t, 0.1 + 9999 * 0.1 + 0.05, 4 * DBL_EPSILON * 1000, "no sum of periods: round-off");
+}
+
+/* ---- Splines ---- */
+
+/* A spline with free ends through points of a cubic is that cubic. */
+static void test_cubic (void **state) {
+  double y[SHAPES_POINTS], u[3];
+  pw_signal s = shapes_free;
+  (void)state;
+  for (int n = 4; n <= SHAPES_POINTS; n++) {
+    for (int i = 0; i < n; i++) y[i] = 1 + shapes_t[i] * (-2 + shapes_t[i] * (0.5 + 0.3 * shapes_t[i]));
+    s.table.value = y;
+    s.table.count = n;
+    pw_source source = shapes_source (&s);
+    for (double t = shapes_t[0]; t < shapes_t[n - 1]; t += 0.07) {
+      shapes_at (&source, t, u);
+      check_close ("value", u[0], 1 + t * (-2 + t * (0.5 + 0.3 * t)), 1e-13, "round-off of a few operations");
+      check_close ("acceleration", u[2], 1 + 1.8 * t, 1e-12, "the same, over h^2");
+    }
+  }
+}
+
+/* Of two points at rest it is 3 x^2 - 2 x^3, and rates at the ends are 0. */
+static void test_rest (void **state) {
+  static const double t[] = { 1, 3 }, y[] = { 2, 7 };
+  pw_signal s = { PW_TABLE, .table = { t, y, 2, PW_CUBIC, PW_ENDS_REST } };
+  pw_source source = shapes_source (&s);
+  double u[3];
+  (void)state;
+  for (double x = 0; x < 1; x += 0.1) {
+    shapes_at (&source, 1 + 2 * x, u);
+    check_close ("value", u[0], 2 + 5 * x * x * (3 - 2 * x), 1e-14, "round-off");
+  }
+  source = shapes_source (&shapes_rest);
+  shapes_at (&source, shapes_t[0], u);
+  check_close ("rate at the first point", u[1], 0, 1e-14, "round-off");
+  shapes_at (&source, nextafter (shapes_t[SHAPES_POINTS - 1], 0), u);
+  check_close ("rate at the last point", u[1], 0, 1e-13, "round-off");
+}
+
+/* ---- In a run: the EzyRoller driven by a torque ---- */
+
+static pw_system *shapes_scene (const pw_signal *torque) {
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", torque, &error), &error);
+  return scene_compile (m);
+}
+
+static void shapes_run (const pw_signal *torque, const char *method, const pw_settings *settings, double *q,
+                        pw_statistics *cost) {
+  double v[6];
+  pw_system *s = shapes_scene (torque);
+  runs_state (s, method, settings, 4, q, v, cost);
+  pw_free (s);
+}
+
+static double shapes_error (const pw_signal *torque, const char *method, double step, const double *exact) {
+  double q[6], worst = 0;
+  shapes_run (torque, method, &(pw_settings){ .step = step, .rtol = step, .span = 4 }, q, NULL);
+  for (int j = 0; j < 6; j++) worst = fmax (worst, fabs (q[j] - exact[j]));
+  return worst;
+}
+
+static double shapes_wave_t[21], shapes_wave_y[21];
+
+/* Scaled to torques; what the scene is driven by at most is 0.3 N m. */
+static pw_signal shapes_torque (int i) {
+  static const double little_t[] = { 0.31, 1.07, 1.9, 3.3 }, little_y[] = { 0, 0.2, -0.2, 0.1 };
+  for (int k = 0; k < 21; k++) shapes_wave_t[k] = 0.21 * k, shapes_wave_y[k] = 0.2 * sin (2 * shapes_wave_t[k]);
+  const pw_signal torque[] = {
+    { PW_RAMP, .ramp = { 0, 0.2, 1 / 3., 1.77 } },
+    { PW_PULSE, .pulse = { 0.2, 1 / 3., 0.41, 1.13, -0.1 } },
+    { PW_TABLE, .table = { little_t, little_y, 4, PW_LINEAR, 0 } },
+    { PW_SMOOTH_STEP, .ramp = { 0, 0.2, 1 / 3., 1.77 } },
+    { PW_TABLE, .table = { little_t, little_y, 4, PW_CUBIC, PW_ENDS_FREE } },
+    { PW_TABLE, .table = { shapes_wave_t, shapes_wave_y, 20, PW_CUBIC, PW_ENDS_REST } },
+  };
+  return torque[i];
+}
+
+enum { SHAPES_TORQUES = 6 };
+
+/* No kink or jump lies on the grid of the steps, and the order is 4 all the same. */
+static void test_order (void **state) {
+  (void)state;
+  for (int i = 0; i < SHAPES_TORQUES; i++) {
+    double exact[6], error[3];
+    pw_signal torque = shapes_torque (i);
+    shapes_run (&torque, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 }, exact, NULL);
+    for (int k = 0; k < 3; k++) error[k] = shapes_error (&torque, "rk4+projection", 0.04 / (1 << k), exact);
+    for (int k = 0; k < 2; k++)
+      check_below ("error over that of twice the step", error[k + 1] / error[k], 1 / 9.,
+                   "order 4 has 1/16, a step over a kink 1/4, over a jump 1/2");
+  }
+}
+
+static void test_held (void **state) {
+  (void)state;
+  for (int i = 0; i < SHAPES_TORQUES; i++) {
+    double exact[6];
+    pw_signal torque = shapes_torque (i);
+    shapes_run (&torque, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 }, exact, NULL);
+    double coarse = shapes_error (&torque, "rk4+projection:inputs=held", 2e-3, exact);
+    double fine = shapes_error (&torque, "rk4+projection:inputs=held", 1e-3, exact);
+    if (i != 1) check_close ("error over that of half the step", coarse / fine, 2, 0.2, "held: order 1");
+    if (i == 1) check_below ("error of held pulses", fine, 1e-8, "constant between their ends: nothing is lost");
+  }
+}
+
+static void test_tolerances (void **state) {
+  static const char *const method[] = { "erk5+projection", "erk8+projection", "ida+ggl", "ida+baumgarte" };
+  (void)state;
+  for (int i = 0; i < SHAPES_TORQUES; i++) {
+    double exact[6];
+    pw_signal torque = shapes_torque (i);
+    shapes_run (&torque, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 }, exact, NULL);
+    for (int k = 0; k < 4; k++) {
+      double factor = k < 2 ? 1e3 : 1e4;
+      check_below (method[k], shapes_error (&torque, method[k], 1e-8, exact), factor * 1e-8,
+                   "1e3 rtol, of multistep methods 1e4");
+    }
+  }
+}
+
+/* The model and the system have copies of a table's points. */
+static void test_copies (void **state) {
+  double t[] = { 0, 1, 2, 3 }, y[] = { 0, 0.1, 0.2, 0.1 }, q[2][6], v[6];
+  pw_signal torque = { PW_TABLE, .table = { t, y, 4, PW_CUBIC, 0 } };
+  pw_error error = { 0 };
+  (void)state;
+  shapes_run (&torque, "rk4", &(pw_settings){ .step = 0.01 }, q[0], NULL);
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  memset (t, 0, sizeof t);
+  memset (y, 0, sizeof y);
+  pw_system *s = scene_compile (m);
+  runs_state (s, "rk4", &(pw_settings){ .step = 0.01 }, 4, q[1], v, NULL);
+  check_bits ("states", q[0], q[1], 6);
+  pw_free (s);
+}
+
+/* ---- What may use which ---- */
+
+/* A car that is steered along a ramp and a table, keeps a speed along a table, tows a trailer by a motor whose target is
+ * a train of pulses, and carries a wheel turned by smooth steps. */
+static void shapes_car (pw_model *m, const void *parameters) {
+  static const double t[] = { 0.15, 0.8, 1.3 }, y[] = { 1, 1.6, 1.2 };
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "car", .mass = 3, .inertia = 0.4, .rate = { 1 } });
+  pw_add_body (m, &(pw_body){ .name = "trailer", .mass = 1, .inertia = 0.1, .start = { -1.2 }, .rate = { 1 } });
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 0.2, .inertia = 0.05 });
+  pw_add_body (m, &(pw_body){ .name = "boom", .mass = 0.3, .inertia = 0.02, .start = { 0.2 } });
+  pw_add_pin (m, &(pw_pin){ .name = "H", .body = { "car", "trailer" }, .at = { { -0.6 }, { 0.6 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "D", .body = { "car", "disc" } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "car", "boom" }, .at = { { 0 }, { -0.2 } } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "rear", .body = "car", .at = { -0.3 } });
+  pw_add_steered_wheel (
+      m, &(pw_steered_wheel){
+             .name = "front", .body = "car", .at = { 0.4 }, .heading = { PW_RAMP, .ramp = { 0, 0.4, 0.21, 0.5 } } });
+  pw_add_speed (m, &(pw_speed){ .name = "engine",
+                                .body = "car",
+                                .at = { -0.3 },
+                                .value = { PW_TABLE, .table = { t, y, 3, PW_LINEAR, 0 } } });
+  pw_add_motor (m, &(pw_motor){ .name = "tow",
+                                .body = { "trailer", "car" },
+                                .stiffness = 3,
+                                .damping = 0.5,
+                                .angle = { PW_PULSE, .pulse = { 0.3, 0.13, 0.2, 0.7, -0.1 } } });
+  pw_add_drive (m, &(pw_drive){ .name = "turn",
+                                .body = { "disc", "car" },
+                                .what = PW_DRIVE_ANGLE,
+                                .value = { PW_SMOOTH_STEP, .ramp = { 0, 2, 0.17, 0.9 } } });
+  pw_add_drive (m, &(pw_drive){ .name = "swing",
+                                .body = { "boom", "car" },
+                                .what = PW_DRIVE_ANGLE,
+                                .value = { PW_TABLE, .table = { t, y, 3, PW_CUBIC, PW_ENDS_REST } } });
+}
+
+static void test_methods (void **state) {
+  static const pw_plugin_table car = TRIAL_TABLE (shapes_car);
+  (void)state;
+  trial (&car, 2);
+}
+
+enum { SHAPES_FORCE, SHAPES_VELOCITY, SHAPES_POSITION };
+
+static void shapes_refused (int of, pw_signal value, const char *text) {
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  if (of == SHAPES_FORCE) pw_add_torque (m, &(pw_torque){ .name = "X", .body = { "frame", "ground" }, .value = value });
+  if (of == SHAPES_VELOCITY)
+    pw_add_steered_wheel (m, &(pw_steered_wheel){ .name = "X", .body = "frame", .heading = value });
+  if (of == SHAPES_POSITION)
+    pw_add_drive (m, &(pw_drive){ .name = "X", .body = { "frame", "ground" }, .what = PW_DRIVE_ANGLE, .value = value });
+  assert_null (pw_compile (m, &error));
+  check_error (&error, PW_INPUT, text);
+  pw_model_free (m);
+}
+
+#define SHAPES_KINKS(what)                                                                                       \
+  "model ezyroller: drive X: value: " what " has kinks, and a prescribed position must not: use a smooth-step, " \
+  "a cubic table with ends at rest, a harmonic"
+
+static void test_refused (void **state) {
+  (void)state;
+  shapes_refused (SHAPES_POSITION, shapes_ramp, SHAPES_KINKS ("a ramp"));
+  shapes_refused (SHAPES_POSITION, shapes_linear, SHAPES_KINKS ("a linear table"));
+  shapes_refused (SHAPES_POSITION, shapes_free, SHAPES_KINKS ("a cubic table with free ends"));
+  shapes_refused (SHAPES_POSITION, shapes_pulse,
+                  "model ezyroller: drive X: value: a pulse has jumps, and a prescribed position must not: use a "
+                  "smooth-step, a cubic table with ends at rest, a harmonic");
+  shapes_refused (
+      SHAPES_VELOCITY, shapes_pulse,
+      "model ezyroller: steered-wheel X: heading: a pulse jumps, and the signal of a velocity constraint must "
+      "not: use a ramp or smooth-step");
+}
+
+static pw_signal shapes_points (const double *t, const double *y, int count, int interpolation) {
+  return (pw_signal){ PW_TABLE, .table = { t, y, count, interpolation, 0 } };
+}
+
+static void test_faults (void **state) {
+  static const double t[] = { 0, 1, 1, 2 }, y[] = { 0, 1, NAN, 2 };
+  (void)state;
+#define FAULT "model ezyroller: torque X: value: "
+  shapes_refused (SHAPES_FORCE, shapes_points (t, t, 4, PW_LINEAR),
+                  FAULT "point 3 is at t = 1 s, after one at 1 s: expected increasing times");
+  shapes_refused (SHAPES_FORCE, shapes_points (shapes_y, t, 4, PW_CUBIC),
+                  FAULT "point 4 is at t = -0.3 s, after one at 0.7 s: expected increasing times");
+  shapes_refused (SHAPES_FORCE, shapes_points (shapes_t, y, 4, PW_LINEAR),
+                  FAULT "point 3 is (1.5, nan): expected finite numbers");
+  shapes_refused (SHAPES_FORCE, shapes_points (t, t, 1, PW_LINEAR),
+                  FAULT "a linear table needs at least 2 points, found 1");
+  shapes_refused (SHAPES_FORCE, shapes_points (NULL, t, 3, PW_LINEAR),
+                  FAULT "a linear table needs at least 2 points, found 0");
+  shapes_refused (SHAPES_FORCE, shapes_points (t, t, -7, PW_LINEAR),
+                  FAULT "a linear table needs at least 2 points, found -7");
+  shapes_refused (SHAPES_FORCE, shapes_points (t, t, 3, PW_CUBIC),
+                  FAULT "a cubic table with free ends needs at least 4 points, found 3");
+  shapes_refused (SHAPES_FORCE, shapes_points (t, t, 3, 7), FAULT "interpolation = 7: expected 0 or 1");
+  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_RAMP, .ramp = { .to = 1 } },
+                  FAULT "duration = 0: expected a number > 0");
+  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_PULSE, .pulse = { .height = 1, .width = -1 } },
+                  FAULT "width = -1: expected a number >= 0");
+  shapes_refused (SHAPES_FORCE, (pw_signal){ PW_PULSE, .pulse = { .height = 1, .width = 2, .period = 2 } },
+                  FAULT "a pulse each 2 s: expected a width > 0 and < 2 s, found 2 s");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_forms),   cmocka_unit_test (test_values),     cmocka_unit_test (test_many_pulses),
+    cmocka_unit_test (test_cubic),   cmocka_unit_test (test_rest),       cmocka_unit_test (test_order),
+    cmocka_unit_test (test_held),    cmocka_unit_test (test_tolerances), cmocka_unit_test (test_copies),
+    cmocka_unit_test (test_methods), cmocka_unit_test (test_refused),    cmocka_unit_test (test_faults),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
