@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "cli.h"
+#include "signal.h"
 #include "util.h"
 
 /* ---- Models ---- */
@@ -104,13 +105,34 @@ static int list_kinds (pw_error *error) {
   return PW_OK;
 }
 
+/* ---- Signals ---- */
+
+static void list_points (void) {
+  puts ("      points       list              [[TIME, VALUE], ...]; in a text model, or\n"
+        "      file         text              a CSV file in the model's folder, and\n"
+        "      columns      2 x text          its columns of times and values, names or numbers; default [1, 2]");
+}
+
+static int list_signals (pw_error *error) {
+  (void)error;
+  puts ("Signals: a number, an expression of time (in C a function), or one of");
+  for (const pw_signal_form *s = pw_signal_forms; s->name; s++) {
+    printf ("  %s: %s\n", s->name, s->about);
+    for (const pw_field *f = s->fields; f->name; f++) list_field (f);
+    if (s->type == PW_TABLE) list_points ();
+  }
+  return PW_OK;
+}
+
 /* ---- */
 
 static int list_what (const char *what, pw_error *error) {
   static const struct {
     const char *name;
     int (*list) (pw_error *error);
-  } part[] = { { "models", list_models }, { "methods", list_methods }, { "kinds", list_kinds } };
+  } part[] = {
+    { "models", list_models }, { "methods", list_methods }, { "kinds", list_kinds }, { "signals", list_signals }
+  };
   pw_nearest near = { .sought = what ? what : "" };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
     if (what == NULL && i > 0) putchar ('\n');
@@ -128,7 +150,7 @@ int pw_cli_list (int argc, const char **argv) {
   static const struct poptOption options[] = { POPT_TABLEEND };
   pw_error error = { 0 };
   pw_cli_line l;
-  if (pw_cli_read (&l, argc, argv, options, "[models|methods|kinds]", 0, 1, &error) == PW_OK)
+  if (pw_cli_read (&l, argc, argv, options, "[models|methods|kinds|signals]", 0, 1, &error) == PW_OK)
     list_what (l.arguments ? l.argument[0] : NULL, &error);
   pw_cli_close (&l);
   return pw_cli_end (&error);

@@ -3,7 +3,7 @@
 #include <string.h>
 #include "cli.h"
 #include "model.h"
-#include "system.h"
+#include "signal.h"
 
 enum { SHOW_DIGITS = 6 };
 
@@ -41,17 +41,7 @@ static void show_bodies (const pw_cli_model *m) {
 
 /* ---- Elements ---- */
 
-static void show_signal (const pw_signal *s) {
-  if (s->type == PW_FUNCTION) {
-    printf ("f (t");
-    for (const char *const *r = s->function.reads; r && *r; r++) printf (", %s", *r);
-    printf (")");
-    return;
-  }
-  if (s->type == PW_CONSTANT) {
-    show_number (s->constant);
-    return;
-  }
+static void show_harmonic (const pw_signal *s) {
   if (s->harmonic.offset != 0) show_number (s->harmonic.offset), printf (" + ");
   show_number (s->harmonic.amplitude);
   printf (" cos (");
@@ -59,6 +49,38 @@ static void show_signal (const pw_signal *s) {
   printf (" t");
   if (s->harmonic.phase != 0) printf (" + "), show_number (s->harmonic.phase);
   printf (")");
+}
+
+static void show_function (const pw_signal *s) {
+  printf ("f (t");
+  for (const char *const *r = s->function.reads; r && *r; r++) printf (", %s", *r);
+  printf (")");
+}
+
+/* ramp (from 0, to 1, start 2, duration 3) */
+static void show_form (const pw_signal *s) {
+  const pw_signal_form *form = pw_signal_form_of (s);
+  printf ("%s (", form->name);
+  for (const pw_field *f = form->fields; f->name; f++) {
+    const void *at = (const char *)s + f->offset;
+    printf ("%s%s ", f == form->fields ? "" : ", ", f->name);
+    if (f->type == PW_NUMBER) show_number (*(const double *)at);
+    if (f->type == PW_CHOICE) printf ("%s", f->choices[*(const int *)at]);
+  }
+  if (s->type == PW_TABLE) {
+    printf (", %d points from ", s->table.count), show_number (s->table.t[0]);
+    printf (" to "), show_number (s->table.t[s->table.count - 1]), printf (" s");
+  }
+  printf (")");
+}
+
+static void show_signal (const pw_signal *s) {
+  if (s->type == PW_CONSTANT)
+    show_number (s->constant);
+  else if (s->type == PW_FUNCTION)
+    show_function (s);
+  else
+    (s->type == PW_HARMONIC ? show_harmonic : show_form) (s);
 }
 
 static void show_value (const pw_field *f, const char *at) {

@@ -6,6 +6,7 @@
 #include <string.h>
 #include "cli.h"
 #include "model.h"
+#include "signal.h"
 
 static void yaml_number (double value) {
   char text[32];
@@ -65,16 +66,35 @@ static void yaml_pair (const double value[2]) {
   putchar (']');
 }
 
+static int yaml_form_is_default (const pw_field *f, const void *at) {
+  if (f->required) return 0;
+  return f->type == PW_CHOICE ? *(const int *)at == 0 : yaml_is_zero (*(const double *)at);
+}
+
+/* {ramp: {to: 1, duration: 2}} */
 static void yaml_signal (const pw_signal *s) {
-  if (s->type == PW_CONSTANT) {
+  const pw_signal_form *form = pw_signal_form_of (s);
+  const char *glue = "";
+  if (form == NULL) {
     yaml_number (s->constant);
     return;
   }
-  printf ("{harmonic: {amplitude: "), yaml_number (s->harmonic.amplitude);
-  printf (", omega: "), yaml_number (s->harmonic.omega);
-  if (!yaml_is_zero (s->harmonic.phase)) printf (", phase: "), yaml_number (s->harmonic.phase);
-  if (!yaml_is_zero (s->harmonic.offset)) printf (", offset: "), yaml_number (s->harmonic.offset);
-  printf ("}}");
+  printf ("{%s: {", form->name);
+  for (const pw_field *f = form->fields; f->name; f++) {
+    const void *at = (const char *)s + f->offset;
+    if (yaml_form_is_default (f, at)) continue;
+    printf ("%s%s: ", glue, f->name), glue = ", ";
+    if (f->type == PW_CHOICE)
+      fputs (f->choices[*(const int *)at], stdout);
+    else
+      yaml_number (*(const double *)at);
+  }
+  if (s->type == PW_TABLE) printf ("%spoints: [", glue);
+  for (int i = 0; s->type == PW_TABLE && i < s->table.count; i++) {
+    if (i) printf (", ");
+    yaml_pair ((const double[]){ s->table.t[i], s->table.value[i] });
+  }
+  printf (s->type == PW_TABLE ? "]}}" : "}}");
 }
 
 static void yaml_value (const pw_field *f, const void *at) {
@@ -133,7 +153,7 @@ static int yaml_refuse (const pw_model *m, pw_error *error) {
     for (const pw_field *f = e->kind->fields; f->name; f++) {
       const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
       for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)
-        if (s[i].type != PW_CONSTANT && s[i].type != PW_HARMONIC)
+        if (s[i].type == PW_FUNCTION)
           return pw_fail (error, PW_INPUT,
                           "model %s cannot be written as text: the signal \"%s\" of %s %s is a function", m->name,
                           f->name, kind, name);

@@ -6,6 +6,7 @@
 #define PW_SWEEP_H
 
 #include <signal.h>
+#include <stdint.h>
 #include <sys/types.h>
 #include "cli.h"
 #include "util.h"
@@ -82,6 +83,7 @@ typedef struct {
   int columns, room;
   pw_names index;      /* from a state's name to its column */
   pw_arena arena;      /* names */
+  uint64_t tables;     /* a hash of the points of all tables of scenes built so far; 0: there are none */
   pw_text head;        /* the table's first line, without its end */
   pw_text fingerprint; /* the first lines of a journal or part: all that decides what the rows are */
 } pw_plan;
@@ -110,6 +112,9 @@ static inline long pw_plan_row (const pw_plan *p, long k) {
 /* ---- The fingerprint (sweep_fingerprint.c) ---- */
 
 #define PW_SWEEP_MAGIC "pinwheel sweep 1\n"
+
+/* Takes the tables of a built scene, which may come from files, into p->tables. */
+void pw_fingerprint_tables (pw_plan *p, const pw_model *m);
 
 /* Fills p->fingerprint, when all else of the plan is there; the model is not built and has the parameters the command
  * line sets. */

@@ -22,17 +22,39 @@ static void print_number (pw_plan *p, const char *key, const char *of, double va
   print_line (p, key, of, pw_format (number, value, 17));
 }
 
-/* The model's name and a hash of its file: FNV-1a (Fowler, Noll, Vo). */
+/* FNV-1a (Fowler, Noll, Vo). */
+static uint64_t print_hash (uint64_t h, const void *bytes, size_t n) {
+  for (const unsigned char *c = bytes; n-- > 0; c++) h = (h ^ *c) * 1099511628211u;
+  return h;
+}
+
+static const uint64_t print_empty = 14695981039346656037u;
+
+/* The model's name and a hash of its file. */
 static int print_model (pw_plan *p, pw_error *error) {
-  char text[200];
-  uint64_t h = 14695981039346656037u;
+  char text[200], block[4096];
+  uint64_t h = print_empty;
   FILE *f = fopen (pw_file_path (p->file), "rb");
   if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", pw_file_path (p->file), strerror (errno));
-  for (int c = fgetc (f); c != EOF; c = fgetc (f)) h = (h ^ (unsigned char)c) * 1099511628211u;
+  for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = print_hash (h, block, n);
   fclose (f);
   snprintf (text, sizeof text, "%.150s, contents %016llx", pw_file_name (p->file), (unsigned long long)h);
   print_line (p, "model", NULL, text);
+  if (p->tables == 0) return PW_OK;
+  snprintf (text, sizeof text, "contents %016llx", (unsigned long long)p->tables);
+  print_line (p, "tables", NULL, text);
   return PW_OK;
+}
+
+void pw_fingerprint_tables (pw_plan *p, const pw_model *m) {
+  for (const pw_element *e = m->element; e < m->element + m->elements; e++)
+    for (int i = 0; i < e->kind->signals; i++) {
+      const pw_signal *s = pw_field_at (e->kind, e->definition, PW_SIGNAL, i);
+      if (s->type != PW_TABLE) continue;
+      size_t bytes = (size_t)s->table.count * sizeof (double);
+      p->tables =
+          print_hash (print_hash (p->tables ? p->tables : print_empty, s->table.t, bytes), s->table.value, bytes);
+    }
 }
 
 /* Parameters that are not varied, as they are after --set. */

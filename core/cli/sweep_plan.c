@@ -109,6 +109,7 @@ static int plan_scan_row (pw_plan *p, long row, plan_scan *x, pw_error *error) {
   pw_cli_model m;
   pw_error own = { 0 };
   int status = pw_plan_scene (p, row, &m, &own);
+  if (status == PW_OK) pw_fingerprint_tables (p, m.model);
   if (status == PW_OK) status = plan_columns_of (p, m.system, &own);
   pw_cli_close_model (&m);
   if (status == PW_OK)

@@ -158,12 +158,19 @@ static int yaml_read (pw_yaml *y, const char *path, pw_error *error) {
   return status;
 }
 
+/* The folder of "/model.yaml" is "". */
+static int yaml_paths (pw_yaml *y, const char *path, const char *shown) {
+  const char *slash = strrchr (path, '/');
+  y->path = strdup (shown);
+  y->folder = slash ? strndup (path, (size_t)(slash - path)) : strdup (".");
+  return y->path && y->folder ? PW_OK : PW_MACHINE;
+}
+
 pw_yaml *pw_yaml_open (const char *path, const char *shown, pw_error *error) {
   pw_yaml *y = calloc (1, sizeof *y);
-  if (y) y->path = strdup (shown);
-  if (y == NULL || y->path == NULL) {
+  if (y == NULL || yaml_paths (y, path, shown) != PW_OK) {
     pw_fail (error, PW_MACHINE, "out of memory");
-    free (y);
+    pw_yaml_close (y);
     return NULL;
   }
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = pw_yaml_build };
@@ -177,6 +184,7 @@ void pw_yaml_close (pw_yaml *y) {
   pw_arena_free (&y->arena);
   free (y->source);
   free (y->path);
+  free (y->folder);
   free (y);
 }
 

@@ -5,7 +5,8 @@
  *   yaml_read.c    keys, numbers and names out of the tree
  *   yaml.c         the head of a model: parameters and run defaults, which make a plug-in's table
  *   yaml_build.c   bodies and elements, through the field tables of their kinds
- *   yaml_signal.c  signals */
+ *   yaml_signal.c  signals
+ *   yaml_table.c   points of tables, in the model or in a file */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -35,6 +36,7 @@ typedef struct pw_node {
 struct pw_yaml {
   pw_plugin_table table; /* first: a model's table leads to its file */
   char *path;            /* as messages show it */
+  char *folder;          /* it is in, links resolved */
   char *source;          /* the text, ended by a NUL */
   size_t size;
   pw_arena arena; /* nodes and texts */
@@ -111,6 +113,15 @@ typedef struct {
 } pw_yaml_builder;
 
 void pw_yaml_build (pw_model *m, const void *parameters);
+
+/* [x, y], and one of some words. */
+int pw_yaml_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error);
+int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices, int *value,
+                    pw_error *error);
+
+/* The points of a table (yaml_table.c): the values of `points`, `file` and `columns`, NULL where not given. */
+int pw_yaml_points (pw_yaml_builder *b, const char *what, const pw_node *node, const pw_node *const v[3], pw_signal *s,
+                    pw_error *error);
 
 /* Reads a signal of a kind into a field (yaml_signal.c). */
 int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,

@@ -71,7 +71,7 @@ static int build_body (pw_yaml_builder *b, const pw_node *node, pw_error *error)
 
 /* ---- Fields ---- */
 
-static int build_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error) {
+int pw_yaml_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error) {
   if (pw_yaml_list (b->y, node, what, 2, "numbers, [x, y]", error) != PW_OK ||
       pw_yaml_number (b->y, node->first, what, PW_REAL, b->x, value, error) != PW_OK)
     return error->status;
@@ -90,8 +90,8 @@ static int build_body_name (pw_yaml_builder *b, const pw_node *node, const char 
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 
-static int build_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices,
-                         int *value, pw_error *error) {
+int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices, int *value,
+                    pw_error *error) {
   char hint[100];
   const char *text;
   if (pw_yaml_text (b->y, node, what, &text, error) != PW_OK) return error->status;
@@ -113,13 +113,13 @@ static int build_value (pw_yaml_builder *b, const pw_kind *kind, const pw_field 
     return pw_yaml_number (b->y, node, what, f->domain, b->x, at, error);
   case PW_POINT:
   case PW_VECTOR:
-    return build_pair (b, node, what, at, error);
+    return pw_yaml_pair (b, node, what, at, error);
   case PW_BODY:
     return build_body_name (b, node, what, at, error);
   case PW_SIGNAL:
     return pw_yaml_signal (b, kind, what, node, at, error);
   case PW_CHOICE:
-    return build_choice (b, node, what, f->choices, at, error);
+    return pw_yaml_choice (b, node, what, f->choices, at, error);
   }
   return pw_yaml_fail (b->y, node->at, error, "%s cannot be given in a text model", what);
 }

@@ -86,30 +86,10 @@ static int source_check (const pw_yaml *y, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- Reading ---- */
-
-static int source_slurp (pw_yaml *y, FILE *f, pw_error *error) {
-  size_t room = 1 << 16;
-  y->source = malloc (room + 1);
-  for (size_t n = 1; y->source && n > 0; y->size += n) {
-    if (y->size == room) {
-      char *more = realloc (y->source, (room *= 2) + 1);
-      if (more == NULL) return pw_yaml_no_memory (y, error);
-      y->source = more;
-    }
-    n = fread (y->source + y->size, 1, room - y->size, f);
-    y->source[y->size + n] = 0;
-    if (y->size + n > SOURCE_LARGEST)
-      return pw_fail (error, PW_INPUT, "%s: the file has more than 64 MB, the most a model in YAML may have", y->path);
-  }
-  if (y->source == NULL) return pw_yaml_no_memory (y, error);
-  return ferror (f) ? pw_fail (error, PW_INPUT, "cannot read %s: %s", y->path, strerror (errno)) : PW_OK;
-}
-
 int pw_yaml_read_source (pw_yaml *y, const char *path, pw_error *error) {
   FILE *f = fopen (path, "rb");
   if (f == NULL) return pw_fail (error, PW_INPUT, "cannot open the model file %s: %s", y->path, strerror (errno));
-  int status = source_slurp (y, f, error);
+  int status = pw_slurp (f, SOURCE_LARGEST, y->path, "the most a model in YAML may have", &y->source, &y->size, error);
   fclose (f);
   return status == PW_OK ? source_check (y, error) : status;
 }

@@ -1,0 +1,169 @@
+/* Two columns of a table of numbers in a CSV file.
+ *
+ * Lines of cells, separated by whichever of , ; and tab the first line has; a line without any number before the others
+ * names the columns, "NAME" or "NAME [unit]".  Empty lines and lines that begin with # are passed over. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include "files.h"
+
+enum { COLUMNS_LARGEST = 64 << 20, COLUMNS_MOST = 1000000 }; /* bytes; lines of numbers */
+
+typedef struct {
+  const char *shown; /* path for messages */
+  char *rest;        /* of the text */
+  int line;          /* number of the one last read */
+  int cells;         /* in each line */
+  char separator;
+  pw_error *error;
+} columns;
+
+static int columns_fail (const columns *c, const char *format, ...) {
+  char text[300];
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (text, sizeof text, format, arguments);
+  va_end (arguments);
+  return pw_fail (c->error, PW_INPUT, "%.80s:%d: %s", c->shown, c->line, text);
+}
+
+/* ---- Lines and cells ---- */
+
+/* The next line that is neither empty nor a comment, or NULL. */
+static char *columns_line (columns *c) {
+  while (*c->rest) {
+    char *line = c->rest, *end = line + strcspn (line, "\n");
+    c->rest = *end ? end + 1 : end;
+    c->line++;
+    while (end > line && strchr (" \t\r", end[-1]) && !(c->separator == '\t' && end[-1] == '\t')) end--;
+    *end = 0;
+    if (*line && *line != '#') return line;
+  }
+  return NULL;
+}
+
+static int columns_count (const columns *c, const char *line) {
+  int n = 1;
+  for (; *line; line++) n += *line == c->separator;
+  return n;
+}
+
+/* Cuts cell i (from 0) off into the buffer, without blanks and quotes around it. */
+static const char *columns_cell (const columns *c, const char *line, int i, char *buffer, size_t size) {
+  while (i-- > 0) line = strchr (line, c->separator) + 1;
+  const char stop[] = { c->separator, 0 }, *end = line + strcspn (line, stop);
+  while (line < end && *line == ' ') line++;
+  while (line < end && end[-1] == ' ') end--;
+  if (end - line > 1 && *line == '"' && end[-1] == '"') line++, end--;
+  snprintf (buffer, size, "%.*s", (int)(end - line < 1000 ? end - line : 1000), line);
+  return buffer;
+}
+
+static int columns_names (const columns *c, const char *line) {
+  char cell[100];
+  double value;
+  for (int i = 0; i < c->cells; i++)
+    if (pw_read_number (columns_cell (c, line, i, cell, sizeof cell), &value) == PW_OK) return 0;
+  return 1;
+}
+
+/* ---- Which columns ---- */
+
+/* Whether a cell of the first line is the column asked for, with or without its unit. */
+static int columns_is (const char *cell, const char *name) {
+  size_t n = strlen (name);
+  return strncmp (cell, name, n) == 0 && (cell[n] == 0 || strncmp (cell + n, " [", 2) == 0);
+}
+
+/* The column of a name in the first line, or of a number. */
+static int columns_find (const columns *c, const char *first, int named, const char *name, int *place) {
+  char cell[100], best[100] = "", hint[200];
+  pw_nearest near = { .sought = name };
+  char *end;
+  long number = strtol (name, &end, 10);
+  if (*end == 0 && number >= 1 && number <= c->cells) return *place = (int)number - 1, PW_OK;
+  if (*end == 0)
+    return columns_fail (c, "there is no column %.20s: the line has %d cell%s", name, c->cells,
+                         c->cells == 1 ? "" : "s");
+  *place = -1;
+  for (int i = 0; named && i < c->cells; i++) {
+    int here = columns_is (columns_cell (c, first, i, cell, sizeof cell), name);
+    char *unit = strstr (cell, " [");
+    if (unit) *unit = 0;
+    pw_nearest_try (&near, cell);
+    if (near.best == cell) near.best = strcpy (best, cell);
+    if (!here) continue;
+    if (*place >= 0) return columns_fail (c, "columns %d and %d are both named \"%.60s\"", *place + 1, i + 1, name);
+    *place = i;
+  }
+  if (*place >= 0) return PW_OK;
+  if (!named) return columns_fail (c, "there are no names of columns before the numbers, so no \"%.60s\"", name);
+  return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+}
+
+/* ---- Numbers ---- */
+
+static int columns_numbers (const columns *c, const char *line, const int place[2], double value[2]) {
+  char cell[100];
+  for (int k = 0; k < 2; k++) {
+    columns_cell (c, line, place[k], cell, sizeof cell);
+    if (pw_read_number (cell, &value[k]) != PW_OK || !isfinite (value[k]))
+      return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", place[k] + 1, cell);
+  }
+  return PW_OK;
+}
+
+static int columns_rows (columns *c, char *line, const int place[2], double *value[2], int *count) {
+  for (; line; line = columns_line (c)) {
+    double x[2];
+    int cells = columns_count (c, line);
+    if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
+    if (columns_numbers (c, line, place, x) != PW_OK) return PW_INPUT;
+    if (*count > 0 && !(x[0] > value[0][*count - 1]))
+      return columns_fail (c, "%.9g comes after %.9g: expected increasing times", x[0], value[0][*count - 1]);
+    value[0][*count] = x[0];
+    value[1][(*count)++] = x[1];
+  }
+  return PW_OK;
+}
+
+/* So many lines there are at most. */
+static size_t columns_lines (const char *text) {
+  size_t n = 1;
+  while ((text = strchr (text, '\n')) != NULL) text++, n++;
+  return n;
+}
+
+static int columns_all (columns *c, const char *const column[2], pw_arena *arena, double *value[2], int *count) {
+  int place[2];
+  size_t lines = columns_lines (c->rest);
+  char *line = columns_line (c);
+  if (line == NULL) return columns_fail (c, "the file is empty");
+  if (lines > COLUMNS_MOST) return columns_fail (c, "more than %d lines", COLUMNS_MOST);
+  c->separator = strchr (line, ',') ? ',' : strchr (line, ';') ? ';' : '\t';
+  c->cells = columns_count (c, line);
+  int named = columns_names (c, line);
+  for (int k = 0; k < 2; k++) {
+    if (columns_find (c, line, named, column[k], &place[k]) != PW_OK) return PW_INPUT;
+    value[k] = pw_arena_take (arena, lines * sizeof (double));
+    if (value[k] == NULL) return pw_fail (c->error, PW_MACHINE, "%s: out of memory", c->shown);
+  }
+  return columns_rows (c, named ? columns_line (c) : line, place, value, count);
+}
+
+int pw_columns_read (FILE *f, const char *shown, const char *const column[2], pw_arena *arena, double *value[2],
+                     int *count, pw_error *error) {
+  static const char mark[] = "\xEF\xBB\xBF"; /* of UTF-8, which some programs write first */
+  char *text;
+  size_t size;
+  *count = 0;
+  int status = pw_slurp (f, COLUMNS_LARGEST, shown, "the most a table may have", &text, &size, error);
+  columns c = { .shown = shown, .rest = text, .error = error };
+  if (status == PW_OK && strlen (text) != size)
+    status = pw_fail (error, PW_INPUT, "%.80s: a table is text, and this has a byte 0", shown);
+  if (status == PW_OK && strncmp (text, mark, 3) == 0) c.rest += 3;
+  if (status == PW_OK) status = columns_all (&c, column, arena, value, count);
+  free (text);
+  return status;
+}

@@ -1,0 +1,24 @@
+/* A file's text as a whole. */
+#include <errno.h>
+#include <stdlib.h>
+#include <string.h>
+#include "files.h"
+
+int pw_slurp (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error) {
+  size_t room = 1 << 16;
+  *size = 0;
+  *text = malloc (room + 1);
+  for (size_t n = 1; *text && n > 0; *size += n) {
+    if (*size == room) {
+      char *more = realloc (*text, (room *= 2) + 1);
+      if (more == NULL) return pw_fail (error, PW_MACHINE, "%s: out of memory", path);
+      *text = more;
+    }
+    n = fread (*text + *size, 1, room - *size, f);
+    (*text)[*size + n] = 0;
+    if (*size + n > most)
+      return pw_fail (error, PW_INPUT, "%s: the file has more than %g MB, %s", path, (double)(most >> 10) / 1024, what);
+  }
+  if (*text == NULL) return pw_fail (error, PW_MACHINE, "%s: out of memory", path);
+  return ferror (f) ? pw_fail (error, PW_INPUT, "cannot read %s: %s", path, strerror (errno)) : PW_OK;
+}

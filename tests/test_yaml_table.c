@@ -1,0 +1,154 @@
+/* Tables of text models that lie in files: what is read, in which forms, and from where. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "check.h"
+#include "model.h"
+#include "pinwheel-files.h"
+
+static char table_folder[] = "/tmp/pinwheel-table-XXXXXX", table_path[200];
+
+/* A path in the folder. */
+static const char *table_in (const char *name) {
+  snprintf (table_path, sizeof table_path, "%s/%s", table_folder, name);
+  return table_path;
+}
+
+static void table_write (const char *name, const char *text, size_t size) {
+  FILE *f = fopen (table_in (name), "wb");
+  assert_non_null (f);
+  assert_int_equal (fwrite (text, 1, size, f), size);
+  assert_int_equal (fclose (f), 0);
+}
+
+/* Builds a model in the subfolder "model" whose torque is this table; what it becomes goes to *table. */
+static pw_error table_build (const char *table, pw_signal *signal, double point[2][3]) {
+  char text[400];
+  pw_error error = { 0 };
+  snprintf (text, sizeof text,
+            "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+            "elements: [{torque: T, body: [a, ground], value: {table: %s}}]\n",
+            table);
+  table_write ("model/m.yaml", text, strlen (text));
+  pw_file *f = pw_file_open (table_in ("model/m.yaml"), &error);
+  pw_model *m = f ? pw_file_model (f, &error) : NULL;
+  if (m && pw_build (m, &error) == PW_OK) {
+    *signal = ((const pw_torque *)m->element[0].definition)->value;
+    for (int i = 0; i < 3 && i < signal->table.count; i++)
+      point[0][i] = signal->table.t[i], point[1][i] = signal->table.value[i];
+    pw_free (pw_compile (m, &error));
+  }
+  pw_model_free (m);
+  pw_file_close (f);
+  return error;
+}
+
+/* Whatever the form, these are its points: (0, 1), (0.5, -2), (2, 3e-1). */
+static void table_good (const char *csv, const char *table) {
+  pw_signal s = { 0 };
+  double point[2][3];
+  table_write ("model/data.csv", csv, strlen (csv));
+  pw_error error = table_build (table, &s, point);
+  check_ok (error.status, &error);
+  assert_true (s.type == PW_TABLE && s.table.count == 3);
+  assert_true (point[0][0] == 0 && point[0][1] == 0.5 && point[0][2] == 2);
+  assert_true (point[1][0] == 1 && point[1][1] == -2 && point[1][2] == 0.3);
+}
+
+static void test_forms (void **state) {
+  (void)state;
+  table_good ("", "{points: [[0, 1], [1/2, -2], [2, 0.3]]}");
+  table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: data.csv}");
+  table_good ("0,1\n0.5,-2\n2,3e-1", "{file: ./data.csv, columns: [1, 2]}");
+  table_good ("0;1\r\n0.5;-2\r\n2;3e-1\r\n", "{file: data.csv}");
+  table_good ("a\tt\tb\n1\t0\t\n-2\t0.5\t\n3e-1\t2\t\n", "{file: data.csv, columns: [t, a]}");
+  table_good ("\xEF\xBB\xBF# by hand\n\nt [s], \"M [N m]\" ,t2\n 0 , 1,5\n#\n0.5,-2,5\n\n2,3e-1,5\n",
+              "{file: data.csv, columns: [t, M]}");
+  table_good ("x,t [s],M [N m]\n9,0,1\n9,0.5,-2\n9,2,3e-1\n", "{file: data.csv, columns: [2, \"M [N m]\"]}");
+}
+
+static void table_bad (const char *table, const char *text) {
+  pw_signal s;
+  double point[2][3];
+  pw_error error = table_build (table, &s, point);
+  assert_int_equal (error.status, PW_INPUT);
+  if (strstr (error.text, text) == NULL) print_error ("told:\n%s\nexpected:\n%s\n", error.text, text);
+  assert_non_null (strstr (error.text, text));
+}
+
+static void test_contents (void **state) {
+  (void)state;
+  table_write ("model/nul.csv", "0,1\n1,\0002\n", 9);
+  table_bad ("{file: nul.csv}", "value: nul.csv: a table is text, and this has a byte 0\n");
+  table_write ("model/twice.csv", "t,u,u [m]\n0,1,2\n1,2,3\n", 22);
+  table_bad ("{file: twice.csv, columns: [t, u]}", "value: twice.csv:1: columns 2 and 3 are both named \"u\"\n");
+  table_write ("model/comma.csv", "t;u\n0;1,5\n", 10);
+  table_bad ("{file: comma.csv}", "value: comma.csv:2: column 2: expected a finite number, found \"1,5\"");
+}
+
+/* Nothing outside the model's folder is read, however it is named. */
+static void test_places (void **state) {
+  char outside[200];
+  (void)state;
+  table_write ("data.csv", "0,1\n1,2\n", 8);
+  snprintf (outside, sizeof outside, "{file: %s/data.csv}", table_folder);
+#define OWN "a table lies in the model's own folder, so its path is relative and has no \"..\""
+#define LINK "it is a link that leads out of the model's folder"
+  table_bad (outside, OWN);
+  table_bad ("{file: ../data.csv}", OWN);
+  table_bad ("{file: sub/../../data.csv}", OWN);
+  table_bad ("{file: ..}", OWN);
+  assert_int_equal (symlink ("../data.csv", table_in ("model/link.csv")), 0);
+  table_bad ("{file: link.csv}", LINK);
+  assert_int_equal (symlink ("..", table_in ("model/up")), 0);
+  table_bad ("{file: up/data.csv}", LINK);
+  assert_int_equal (mkdir (table_in ("model-b"), 0700), 0); /* its name begins like that of the model's folder */
+  table_write ("model-b/data.csv", "0,1\n1,2\n", 8);
+  assert_int_equal (symlink ("../model-b/data.csv", table_in ("model/b.csv")), 0);
+  table_bad ("{file: b.csv}", LINK);
+  assert_int_equal (mkfifo (table_in ("model/pipe.csv"), 0600), 0);
+  table_bad ("{file: pipe.csv}", "it is not a file");
+  table_bad ("{file: sub}", "it is not a file");
+  table_bad ("{file: none.csv}", "cannot read \"none.csv\": No such file or directory");
+  assert_int_equal (symlink ("data.csv", table_in ("model/good.csv")), 0);
+  assert_int_equal (symlink ("../data.csv", table_in ("model/sub/good.csv")), 0);
+  table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: good.csv}");
+  table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: sub/good.csv}");
+  table_good ("0,1\n0.5,-2\n2,3e-1\n", "{file: sub/..data.csv}");
+}
+
+static void test_limits (void **state) {
+  char message[200];
+  (void)state;
+  table_write ("model/large.csv", "0,1\n", 4);
+  assert_int_equal (truncate (table_in ("model/large.csv"), (64L << 20) + 1), 0);
+  table_bad ("{file: large.csv}", "large.csv: the file has more than 64 MB, the most a table may have");
+  FILE *f = fopen (table_in ("model/long.csv"), "w");
+  assert_non_null (f);
+  for (int i = 0; i < 1000001; i++) fputs ("1\n", f);
+  assert_int_equal (fclose (f), 0);
+  snprintf (message, sizeof message, "long.csv:1: more than %d lines", 1000000);
+  table_bad ("{file: long.csv}", message);
+}
+
+static int table_setup (void **state) {
+  (void)state;
+  if (mkdtemp (table_folder) == NULL || mkdir (table_in ("model"), 0700) != 0) return -1;
+  return mkdir (table_in ("model/sub"), 0700) == 0 ? symlink ("../data.csv", table_in ("model/sub/..data.csv")) : -1;
+}
+
+static int table_teardown (void **state) {
+  char command[100];
+  (void)state;
+  snprintf (command, sizeof command, "rm -r %s", table_folder);
+  return system (command);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms), cmocka_unit_test (test_contents),
+                                      cmocka_unit_test (test_places), cmocka_unit_test (test_limits) };
+  return cmocka_run_group_tests (tests, table_setup, table_teardown);
+}
