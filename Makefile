@@ -54,6 +54,7 @@ SHELLS  := $(wildcard tests/*.sh)
 SHARE   := $(filter-out $(QUICK) $(SLOW),$(wildcard tests/*.c)) # linked to every test
 BENCH   := $(wildcard benchmarks/*.c)
 ENGINE  := $(wildcard benchmarks/engine/*.c benchmarks/baseline/*.c)
+HARD    := $(wildcard benchmarks/hard/*.c)
 EMBED   := $(wildcard docs/*.c)
 
 HEADERS := core/pinwheel.h core/run.h solvers/pinwheel-solvers.h core/files/pinwheel-files.h
@@ -71,7 +72,7 @@ PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
 .PHONY: all everything demo test test-all layers san clang gcc format format-check bench-quick bench-engine \
-        bench-effects basic deps install uninstall clean help
+        bench-effects hard basic deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -87,6 +88,7 @@ help:
 	@echo 'make bench-quick      what a run costs on this machine'
 	@echo 'make bench-engine     an evaluation, a step against programs written by hand; growth with size'
 	@echo 'make bench-effects    instructions of an evaluation, with one effect more at a time; what is not used costs none'
+	@echo 'make hard             every method on every hard case, against the expected verdicts; writes docs/hard-cases.md'
 	@echo 'make layers           proof of what depends on what'
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
@@ -98,7 +100,7 @@ help:
 
 # ---- Dependencies: whoever asks to see something run gets the libraries first ----
 
-ifneq ($(filter demo test test-all bench-quick bench-engine bench-effects san,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all bench-quick bench-engine bench-effects hard san,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -118,6 +120,7 @@ $(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/effects.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
+$(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -iquote core -I$(BUILD)/include
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
 
@@ -126,9 +129,9 @@ $(BUILD)/obj/%.o: %.c | $(FIRST)
 	$(call say,CC)
 	$(Q)$(CC) $(PW_CFLAGS) -MMD -MP -c $< -o $@
 
-$(call obj,$(BENCH) $(EMBED)): | $(INCLUDES)
+$(call obj,$(BENCH) $(HARD) $(EMBED)): | $(INCLUDES)
 
--include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(BENCH) $(ENGINE) $(EMBED)))
+-include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(BENCH) $(ENGINE) $(HARD) $(EMBED)))
 -include $(MODELS:%.c=$(BUILD)/obj/%.d)
 
 # ---- Libraries, headers, models, programs ----
@@ -182,6 +185,8 @@ $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 $(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
 $(BUILD)/benchmarks/engine: EXTRA_LIBS := $(SOLVER_LIBS)
 $(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
+$(BUILD)/benchmarks/hard: $(call obj,$(HARD))
+$(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml
 
 # A test holds the libraries whole, so that the plug-ins it opens find them in it.
 $(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a)
@@ -222,6 +227,9 @@ bench-engine: all $(BUILD)/benchmarks/engine
 bench-effects: all basic $(BUILD)/benchmarks/effects
 	@$(BUILD)/benchmarks/effects $(BASIC)
 
+hard: all $(BUILD)/benchmarks/hard
+	@$(BUILD)/benchmarks/hard -o docs/hard-cases.md benchmarks/hard
+
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers
 
@@ -252,7 +260,7 @@ basic:
 	@cmp -s $(BASIC)/pinwheel.h $(BASIC)/source/core/pinwheel.h || cp $(BASIC)/pinwheel.h $(BASIC)/source/core
 	@$(MAKE) -s --no-print-directory -C $(BASIC)/source -f '$(CURDIR)/Makefile' NO_DEPS=1 BUILD=.. ../libpinwheel.so
 
-SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests benchmarks benchmarks/engine benchmarks/baseline docs,$(d)/*.c $(d)/*.h))
+SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests benchmarks benchmarks/engine benchmarks/baseline benchmarks/hard docs,$(d)/*.c $(d)/*.h))
 
 format:
 	clang-format -i $(SOURCES)

@@ -1,0 +1,132 @@
+/* One cell: a case by a method, run to its end, measured, judged. */
+#include <fnmatch.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include "hard.h"
+#include "verify.h"
+
+enum { RUN_SAMPLES = 50 };
+
+typedef struct {
+  pw_file *file;
+  pw_model *model;
+  pw_system *system;
+  pw_run *run;
+} run_cell;
+
+/* ---- Opening ---- */
+
+static int run_open (const hard_case *c, const char *method, run_cell *x, pw_error *error) {
+  const pw_settings settings = { .span = c->t_end, .step = c->step, .rtol = c->rtol, .ledger = 1 };
+  x->file = pw_file_open (c->model, error);
+  x->model = x->file ? pw_file_model (x->file, error) : NULL;
+  for (int i = 0; x->model && i < c->sets; i++) pw_set (x->model, c->set[i].name, c->set[i].value, error);
+  if (x->model && error->status == PW_OK) pw_build (x->model, error);
+  for (int i = 0; error->status == PW_OK && i < c->starts; i++)
+    pw_set_start (x->model, c->start[i].name, c->start[i].value, error);
+  if (error->status == PW_OK) x->system = pw_compile (x->model, error);
+  if (x->system) x->run = pw_open (x->system, method, &settings, error);
+  return error->status;
+}
+
+static void run_close (run_cell *x) {
+  if (x->run) pw_close (x->run);
+  pw_free (x->system);
+  pw_model_free (x->model);
+  if (x->file) pw_file_close (x->file);
+}
+
+/* ---- Measuring ---- */
+
+/* NaN counts as the worst there is. */
+static double run_worst (double a, double b) {
+  return isnan (a) || isnan (b) ? INFINITY : fmax (a, b);
+}
+
+/* The scene's unit of a state, from the unit it is printed with. */
+static double run_unit (const run_cell *x, const char *name) {
+  const pw_scale *scale = pw_run_scale (x->run);
+  int i = pw_find_state (x->system, name, NULL);
+  const char *unit = pw_state_unit (x->system, i);
+  return (strncmp (unit, "rad", 3) == 0 ? 1 : scale->length) / (i < pw_count_coordinates (x->system) ? 1 : scale->time);
+}
+
+static double run_error (const hard_case *c, const run_cell *x, const pw_sample *sample) {
+  double worst = 0;
+  int n = pw_count_coordinates (x->system);
+  for (int i = 0; i < c->truths; i++) {
+    int state = pw_find_state (x->system, c->truth[i].name, NULL);
+    if (state < 0) return INFINITY;
+    double value = state < n ? sample->q[state] : sample->v[state - n];
+    double size = fmax (fabs (c->truth[i].value), run_unit (x, c->truth[i].name));
+    worst = run_worst (worst, fabs (value - c->truth[i].value) / size);
+  }
+  return worst;
+}
+
+static double run_equations (const run_cell *x, const pw_sample *sample) {
+  pw_verification v;
+  int status = pw_verify (x->system, sample->t, sample->q, sample->v, sample->a, sample->lambda, &v);
+  return status == PW_OK ? run_worst (v.acceleration.scaled, v.force.scaled) : INFINITY;
+}
+
+/* Advances from sample to sample. */
+static int run_through (const hard_case *c, const run_cell *x, hard_result *r, pw_error *error) {
+  double balance = 0, energy = 0;
+  pw_sample sample = { .t = 0 };
+  for (int i = 1; i <= RUN_SAMPLES; i++) {
+    double t = i == RUN_SAMPLES ? c->t_end : c->t_end * i / RUN_SAMPLES;
+    if (pw_advance_to (x->run, t, c->t_end, error) != PW_OK || pw_at (x->run, t, &sample, error) != PW_OK)
+      return error->status;
+    balance = run_worst (balance, fabs (sample.balance));
+    energy = run_worst (energy, fmax (sample.kinetic, fmax (fabs (sample.work), sample.loss)));
+  }
+  const pw_statistics *s = pw_run_statistics (x->run);
+  r->measure[HARD_ERROR] = run_error (c, x, &sample);
+  r->measure[HARD_BALANCE] = balance == 0 ? 0 : balance / energy;
+  r->measure[HARD_RESIDUAL] = run_worst (s->position, s->velocity);
+  r->measure[HARD_EQUATIONS] = run_equations (x, &sample);
+  return PW_OK;
+}
+
+void hard_run (const hard_case *c, const char *method, hard_result *r) {
+  pw_error error = { 0 };
+  run_cell x = { .file = NULL };
+  *r = (hard_result){ .t = 0 };
+  for (int k = 0; k < HARD_MEASURES; k++) r->measure[k] = NAN;
+  r->status = run_open (c, method, &x, &error);
+  if (r->status == PW_OK) r->status = run_through (c, &x, r, &error);
+  if (x.run) r->t = pw_time (x.run);
+  r->cpu = (double)clock () / CLOCKS_PER_SEC;
+  memcpy (r->reason, error.text, sizeof r->reason);
+  run_close (&x);
+}
+
+/* ---- Judging ---- */
+
+hard_verdict hard_judge (const hard_case *c, const hard_result *r) {
+  hard_verdict worst = HARD_PASS;
+  if (r->status != PW_OK) return *r->reason && r->status < PW_MACHINE ? HARD_REFUSE : HARD_WRONG;
+  if (r->t < c->t_end) return HARD_WRONG;
+  for (int k = 0; k < HARD_MEASURES; k++) {
+    const double *bound = c->bound[k], value = r->measure[k];
+    if (bound[1] == 0 && bound[0] == 0) continue;
+    hard_verdict now = value <= bound[0] ? HARD_PASS : value <= bound[1] ? HARD_LIMITED : HARD_WRONG;
+    if (now < worst) worst = now;
+  }
+  return worst;
+}
+
+const hard_expectation *hard_expected (const hard_case *c, const char *method) {
+  for (int i = c->expectations - 1; i >= 0; i--)
+    if (fnmatch (c->expect[i].pattern, method, 0) == 0) return &c->expect[i];
+  fprintf (stderr, "%s: nothing is expected of %s\n", c->name, method);
+  exit (2);
+}
+
+int hard_as_expected (const hard_expectation *e, const hard_result *r) {
+  if (!(e->verdict >> r->verdict & 1)) return 0;
+  return r->verdict != HARD_REFUSE || strstr (r->reason, e->reason) != NULL;
+}
