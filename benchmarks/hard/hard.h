@@ -53,6 +53,8 @@ typedef struct {
   int sets, starts, truths;
   double t_end, step, rtol;       /* [s]; step of fixed-step methods [s]; rtol of adaptive ones */
   double seconds;                 /* processor time a cell may take [s] */
+  char stops[80];                 /* "": it runs; else the truth is that it must stop, with this in the message */
+  double stop_time[2];            /* by then: pass, limited [s] */
   double bound[HARD_MEASURES][2]; /* pass, limited; 0, 0: not judged */
   hard_expectation expect[HARD_EXPECTATIONS];
   int expectations;

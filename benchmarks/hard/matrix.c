@@ -57,7 +57,8 @@ static void matrix_page_head (const hard_matrix *m, FILE *out) {
       "Made by `make hard` from the cases in `benchmarks/hard/cases`: %d cases, each by all %d methods at the same\n"
       "step (methods of fixed step) or relative tolerance (all others).\n\n"
       "| | verdict | means | cells |\n|---|---|---|---|\n"
-      "| P | pass | all that is measured lies within the case's first bounds | %d of %d |\n"
+      "| P | pass | all that is measured lies within the case's first bounds; where the truth is that no motion "
+      "exists: stopped for that reason | %d of %d |\n"
       "| l | limited | bounded and stable, less accurate: within the second bounds; measured values below | %d |\n"
       "| R | refused | stopped, with its reason and the time reached | %d |\n"
       "| s | slow | stopped by the limit of processor time | %d |\n",
@@ -123,7 +124,7 @@ static void matrix_page_cell (const hard_matrix *m, int i, int k, FILE *out) {
   if (r == NULL || r->verdict == HARD_PASS) return;
   fprintf (out, "| `%s` | %s | ", m->method[k], hard_verdict_name[r->verdict]);
   if (r->verdict == HARD_LIMITED || r->verdict == HARD_WRONG) matrix_page_measures (&m->cases[i], r, out);
-  if (r->verdict == HARD_REFUSE) fputs (r->reason, out);
+  if (r->status != PW_OK) fputs (r->reason, out);
   fprintf (out, " | %s |\n", hard_expected (&m->cases[i], m->method[k])->why);
 }
 
@@ -137,6 +138,8 @@ static void matrix_page_case (const hard_matrix *m, int i, FILE *out) {
   fprintf (out, "; %g s, step %g s, rtol %g.", c->t_end, c->step, c->rtol);
   if (*c->source) fprintf (out, " Truth: %s.", c->source);
   fputs (" Bounds:", out);
+  if (*c->stops)
+    fprintf (out, " it must stop and name \"%s\", by %g / %g s", c->stops, c->stop_time[0], c->stop_time[1]);
   for (int k = 0; k < HARD_MEASURES; k++)
     if (c->bound[k][1] > 0) fprintf (out, " %s %g / %g", hard_measure_name[k], c->bound[k][0], c->bound[k][1]);
   fputs (".\n", out);

@@ -109,6 +109,13 @@ static void read_expectations (const read_place *at, struct fy_node *list, hard_
   if (c->expectations == 0) read_fail (at, "nothing is expected", "");
 }
 
+/* [MESSAGE, PASS, LIMITED] */
+static void read_stop (const read_place *at, struct fy_node *list, hard_case *c) {
+  if (list == NULL) return;
+  read_copy (at, c->stops, sizeof c->stops, read_scalar (at, fy_node_sequence_get_by_index (list, 0)));
+  for (int i = 0; i < 2; i++) c->stop_time[i] = read_number (at, fy_node_sequence_get_by_index (list, i + 1));
+}
+
 static void read_text (const read_place *at, struct fy_node *map, const char *key, char *to, size_t size) {
   const char *text = read_scalar (at, fy_node_mapping_lookup_by_string (map, key, FY_NT));
   if (text) read_copy (at, to, size, text);
@@ -139,6 +146,7 @@ static void read_case (read_place *at, struct fy_node *n, const char *group, con
   c->starts = read_values (at, fy_node_mapping_lookup_by_string (n, "start", FY_NT), c->start);
   c->truths = read_values (at, fy_node_mapping_lookup_by_string (n, "truth", FY_NT), c->truth);
   read_bounds (at, fy_node_mapping_lookup_by_string (n, "bounds", FY_NT), c);
+  read_stop (at, fy_node_mapping_lookup_by_string (n, "stops", FY_NT), c);
   read_expectations (at, fy_node_mapping_lookup_by_string (n, "expect", FY_NT), c);
 }
 

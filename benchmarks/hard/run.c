@@ -108,6 +108,9 @@ void hard_run (const hard_case *c, const char *method, hard_result *r) {
 
 hard_verdict hard_judge (const hard_case *c, const hard_result *r) {
   hard_verdict worst = HARD_PASS;
+  if (*c->stops && r->status != PW_OK && strstr (r->reason, c->stops))
+    return r->t <= c->stop_time[0] ? HARD_PASS : r->t <= c->stop_time[1] ? HARD_LIMITED : HARD_WRONG;
+  if (*c->stops && r->status == PW_OK) return HARD_WRONG;
   if (r->status != PW_OK) return *r->reason && r->status < PW_MACHINE ? HARD_REFUSE : HARD_WRONG;
   if (r->t < c->t_end) return HARD_WRONG;
   for (int k = 0; k < HARD_MEASURES; k++) {
