@@ -168,8 +168,10 @@ $(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
 	$(Q)$(CC) $(STRICT) $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed -shared \
 	  -MMD -MP -MF $(BUILD)/obj/models/$*.d -o $@ $< -lm
 
+# A link: $(BUILD)/pinwheel finds models/, too, and a file that is reached twice counts once.  Nor may a model be found as the
+# C it was before.
 $(BUILD)/models/%.yaml: models/%.yaml
-	@mkdir -p $(@D) && cp $< $@
+	@mkdir -p $(@D) && rm -f $(@:.yaml=.so) && ln -sf $(abspath $<) $@
 
 HOUSE_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
