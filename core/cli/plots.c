@@ -224,6 +224,15 @@ void pw_plots_add (pw_plots *p, const pw_sample *sample) {
   if (p->wheels > 0) plots_contacts (p, sample, pw_plot_wheel (p, i, 0));
 }
 
+void pw_plots_carry (pw_plots *p, pw_archive *a) {
+  int samples = p->samples;
+  pw_carry (a, &samples, sizeof samples);
+  if (samples < 0 || samples > p->wanted) a->failed = 1;
+  if (a->failed) return;
+  p->samples = samples;
+  pw_carry (a, p->data, (size_t)samples * (size_t)p->width * sizeof *p->data);
+}
+
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   if (p->samples < 2) {
     fprintf (stderr, "pinwheel: the run is too short for figures: none are drawn in %s\n", p->folder);

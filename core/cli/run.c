@@ -5,41 +5,16 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "cli.h"
-#include "plots.h"
 #include "profile.h"
-#include "progress.h"
 #include "report.h"
+#include "running.h"
 #include "stop.h"
 
 #define RUN_SHORT 0.01 /* a batch that took less processor time [s] may be longer the next time */
 #define RUN_LONG 0.04  /* one that took more must be shorter: Ctrl-C and the progress bar wait for its end */
 enum { RUN_BATCH = 4096 };
 
-typedef struct {
-  /* as given */
-  const char *method, *t_end_text, *step_text, *rtol_text, *atol_text, *every_text;
-  const char *csv_path, *json_path, *plots_path;
-  const char **sets, **starts;
-  int energy, profile;
-  /* as understood */
-  pw_cli_line line;
-  pw_cli_model m;
-  pw_settings settings;
-  double t_end, every; /* [s]; every 0: each accepted step is a row */
-  /* open */
-  pw_output *csv_output, *json_output;
-  pw_csv *csv;
-  pw_plots *plots;
-  pw_run *r;
-  const char **redundant; /* what is said about each redundant row; NULL: there are none */
-  pw_progress progress;
-  /* under way */
-  long row;        /* rows written */
-  long batch;      /* steps to take before looking around */
-  double cpu;      /* of the method [s] */
-  char part[4200]; /* where an unfinished table is kept; "": there is none */
-} run;
+typedef pw_running run;
 
 /* ---- Before the run ---- */
 
@@ -60,6 +35,7 @@ static int run_read (run *x, int argc, const char **argv, pw_error *error) {
     { "json", 0, POPT_ARG_STRING, &x->json_path, 0, "Write a summary; - is standard output", "FILE" },
     { "plots", 0, POPT_ARG_STRING, &x->plots_path, 0, "Draw figures into a folder", "DIR" },
     { "profile", 0, POPT_ARG_NONE, &x->profile, 0, "Measure at the end what each kind and each stage costs", NULL },
+    PW_CHECKPOINT_OPTIONS (&x->check),
     POPT_TABLEEND,
   };
   return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
@@ -71,8 +47,8 @@ static int run_open_outputs (run *x, pw_error *error) {
     return pw_fail (error, PW_INPUT, "-o and --json cannot both write to %s",
                     strcmp (x->csv_path, "-") ? x->csv_path : "standard output (-)");
   if (x->json_path && (x->json_output = pw_output_open (x->json_path, error)) == NULL) return error->status;
-  if (x->csv_path && (x->csv_output = pw_output_open (x->csv_path, error)) == NULL) return error->status;
-  return PW_OK;
+  if (x->csv_path == NULL || x->check.resume) return PW_OK; /* what is resumed is opened when it is known to be that */
+  return (x->csv_output = pw_output_open (x->csv_path, error)) ? PW_OK : error->status;
 }
 
 /* Options over the model's wishes over Pinwheel's own. */
@@ -98,6 +74,7 @@ static int run_open (run *x, pw_error *error) {
     status =
         pw_cli_open (&x->m, x->line.argument[0], (const char *const *)x->sets, (const char *const *)x->starts, error);
   if (status == PW_OK) status = run_settle (x, error);
+  if (status == PW_OK) status = pw_running_prepare (x, error);
   if (status != PW_OK) return status;
   if (x->plots_path && (x->plots = pw_plots_open (x->plots_path, x->m.model, x->m.system, x->t_end, error)) == NULL)
     return error->status;
@@ -108,7 +85,7 @@ static int run_open (run *x, pw_error *error) {
   pw_report_redundant (x->redundant);
   if (x->csv_output && (x->csv = pw_csv_open (x->m.system, x->energy, x->csv_output, error)) == NULL)
     return error->status;
-  return PW_OK;
+  return pw_running_resume (x, error);
 }
 
 /* ---- The run ---- */
@@ -142,7 +119,8 @@ static int run_take_samples (run *x, pw_error *error) {
 
 /* Steps until a sample is due, the batch is over, or it is time to stop. */
 static int run_batch (run *x, pw_error *error) {
-  double due = fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), x->t_end);
+  double due =
+      fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), fmin (x->check.due, x->t_end));
   double start = pw_cpu_clock ();
   int status;
   long n = 0;
@@ -157,10 +135,11 @@ static int run_batch (run *x, pw_error *error) {
 }
 
 static int run_steps (run *x, pw_error *error) {
-  int status = run_take_samples (x, error);
+  int status = x->check.resume ? PW_OK : run_take_samples (x, error); /* a checkpoint has its samples */
   while (status == PW_OK && pw_time (x->r) < x->t_end && !pw_stop) {
     status = run_batch (x, error);
     if (status == PW_OK) status = run_take_samples (x, error);
+    if (status == PW_OK && pw_time (x->r) >= x->check.due) status = pw_running_save (x, error);
     pw_progress_at (&x->progress, pw_time (x->r));
   }
   return status;
@@ -171,6 +150,7 @@ static int run_integrate (run *x, pw_error *error) {
   x->batch = 1;
   pw_stop_catch ();
   pw_progress_start (&x->progress, pw_file_name (x->m.file), x->t_end, !table_on_screen);
+  x->progress.from = pw_time (x->r);
   int status = run_steps (x, error);
   pw_progress_end (&x->progress);
   pw_stop_release ();
@@ -185,7 +165,7 @@ static void run_finish_table (run *x, int good, pw_error *error) {
   if (x->csv_output == NULL) return;
   if (good)
     pw_output_finish (x->csv_output, error);
-  else if (pw_output_abandon (x->csv_output, x->part, sizeof x->part) && x->row == 0) {
+  else if (pw_output_abandon (x->csv_output, x->part, sizeof x->part) && x->row == 0 && !x->check.resume) {
     remove (x->part);
     *x->part = 0;
   }
@@ -257,10 +237,12 @@ static int run_finish (run *x, pw_error *error) {
   if (interrupted) fprintf (stderr, "pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
   if (*x->part) fprintf (stderr, "pinwheel: the table until then is kept in %s\n", x->part);
+  pw_running_hint (x, interrupted || error->status == PW_MACHINE);
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }
 
 static void run_close (run *x) {
+  pw_checkpoints_close (&x->check);
   pw_plots_close (x->plots);
   if (x->r) pw_close (x->r);
   free (x->redundant);

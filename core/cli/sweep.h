@@ -9,27 +9,8 @@
 #include <stdint.h>
 #include <sys/types.h>
 #include "cli.h"
+#include "fingerprint.h"
 #include "util.h"
-
-/* ---- Texts that grow (sweep_text.c) ---- */
-
-typedef struct {
-  char *at; /* ended by a 0, NULL at first */
-  size_t used, room;
-  int failed; /* out of memory: what was added since is lost */
-} pw_text;
-
-void pw_text_clear (pw_text *t);
-void pw_text_free (pw_text *t);
-void pw_text_add (pw_text *t, const char *text);
-void pw_text_add_bytes (pw_text *t, const char *bytes, size_t count);
-/* "a,b": a number with 17 digits, or a text, after a comma unless it is the first of its line; not finite is nan. */
-void pw_text_number (pw_text *t, double value);
-void pw_text_cell (pw_text *t, const char *text);
-/* "NAME [UNIT]" as a cell; no unit if it is NULL or "". */
-void pw_text_name (pw_text *t, const char *name, const char *unit);
-/* A cell in quotes, on one line. */
-void pw_text_quoted (pw_text *t, const char *text);
 
 /* ---- The grid (sweep_grid.c) ---- */
 
@@ -119,15 +100,6 @@ void pw_fingerprint_tables (pw_plan *p, const pw_model *m);
 /* Fills p->fingerprint, when all else of the plan is there; the model is not built and has the parameters the command
  * line sets. */
 int pw_fingerprint_make (pw_plan *p, const pw_model *m, pw_error *error);
-
-/* Where the rows begin after a fingerprint, or NULL if it is not whole. */
-const char *pw_fingerprint_end (const char *at, const char *end);
-/* The value of a key, its size in *size; NULL if there is none. */
-const char *pw_fingerprint_value (const char *at, const char *end, const char *key, size_t *size);
-/* Puts the first difference of two fingerprints into words, "step is 0.001 there and 0.002 here" with words "there" and
- * "here"; the part does not count if `parts` is 0.  0 if they agree. */
-int pw_fingerprint_differ (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
-                           const char *words[2], char *text, size_t size);
 
 /* ---- One run (sweep_row.c) ---- */
 

@@ -1,60 +1,11 @@
 /* The fingerprint of a sweep: lines "KEY = VALUE" with all that decides what its rows are.  A journal and the parts of a
  * sweep begin with it, so that rows of different sweeps are never mixed. */
-#include <errno.h>
-#include <stdint.h>
 #include <string.h>
 #include "model.h"
 #include "sweep.h"
 
-/* ---- Making ---- */
-
-static void print_line (pw_plan *p, const char *key, const char *of, const char *value) {
-  pw_text *t = &p->fingerprint;
-  pw_text_add (t, key);
-  if (of) pw_text_add (t, " "), pw_text_add (t, of);
-  pw_text_add (t, " = ");
-  pw_text_add (t, value);
-  pw_text_add (t, "\n");
-}
-
-static void print_number (pw_plan *p, const char *key, const char *of, double value) {
-  char number[32];
-  print_line (p, key, of, pw_format (number, value, 17));
-}
-
-/* FNV-1a (Fowler, Noll, Vo). */
-static uint64_t print_hash (uint64_t h, const void *bytes, size_t n) {
-  for (const unsigned char *c = bytes; n-- > 0; c++) h = (h ^ *c) * 1099511628211u;
-  return h;
-}
-
-static const uint64_t print_empty = 14695981039346656037u;
-
-/* The model's name and a hash of its file. */
-static int print_model (pw_plan *p, pw_error *error) {
-  char text[200], block[4096];
-  uint64_t h = print_empty;
-  FILE *f = fopen (pw_file_path (p->file), "rb");
-  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", pw_file_path (p->file), strerror (errno));
-  for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = print_hash (h, block, n);
-  fclose (f);
-  snprintf (text, sizeof text, "%.150s, contents %016llx", pw_file_name (p->file), (unsigned long long)h);
-  print_line (p, "model", NULL, text);
-  if (p->tables == 0) return PW_OK;
-  snprintf (text, sizeof text, "contents %016llx", (unsigned long long)p->tables);
-  print_line (p, "tables", NULL, text);
-  return PW_OK;
-}
-
 void pw_fingerprint_tables (pw_plan *p, const pw_model *m) {
-  for (const pw_element *e = m->element; e < m->element + m->elements; e++)
-    for (int i = 0; i < e->kind->signals; i++) {
-      const pw_signal *s = pw_field_at (e->kind, e->definition, PW_SIGNAL, i);
-      if (s->type != PW_TABLE) continue;
-      size_t bytes = (size_t)s->table.count * sizeof (double);
-      p->tables =
-          print_hash (print_hash (p->tables ? p->tables : print_empty, s->table.t, bytes), s->table.value, bytes);
-    }
+  p->tables = pw_check_tables (p->tables, m);
 }
 
 /* Parameters that are not varied, as they are after --set. */
@@ -64,104 +15,39 @@ static void print_parameters (pw_plan *p, const pw_model *m) {
     double value;
     for (int i = 0; i < p->grid.axes; i++) varied |= p->grid.axis[i].parameter == q;
     memcpy (&value, m->parameters + q->offset, sizeof value);
-    if (!varied) print_number (p, "parameter", q->name, value);
+    if (!varied) pw_print_number (&p->fingerprint, "parameter", q->name, value);
   }
 }
 
 static void print_grid (pw_plan *p) {
-  for (const char *const *s = p->starts; s && *s; s++) {
-    char name[200];
-    snprintf (name, sizeof name, "%.*s", (int)strcspn (*s, "="), *s);
-    print_line (p, "start", name, *s + strcspn (*s, "=") + 1);
-  }
+  pw_print_starts (&p->fingerprint, p->starts);
   pw_text order = { .at = NULL };
   for (int i = 0; i < p->grid.axes; i++) {
-    print_line (p, "vary", p->grid.axis[i].name, p->grid.axis[i].range);
+    pw_print_line (&p->fingerprint, "vary", p->grid.axis[i].name, p->grid.axis[i].range);
     pw_text_cell (&order, p->grid.axis[i].name);
   }
   p->fingerprint.failed |= order.failed;
-  print_line (p, "order", NULL, order.at ? order.at : "");
+  pw_print_line (&p->fingerprint, "order", NULL, order.at ? order.at : "");
   pw_text_free (&order);
 }
 
 int pw_fingerprint_make (pw_plan *p, const pw_model *m, pw_error *error) {
   char part[60];
   pw_text_add (&p->fingerprint, PW_SWEEP_MAGIC);
-  print_line (p, "version", NULL, PW_VERSION);
-  if (print_model (p, error) != PW_OK) return error->status;
-  print_line (p, "method", NULL, p->method);
-  print_number (p, "t-end", NULL, p->t_end);
-  print_number (p, "step", NULL, p->settings.step);
-  print_number (p, "rtol", NULL, p->settings.rtol);
-  print_number (p, "atol", NULL, p->settings.atol);
+  pw_print_line (&p->fingerprint, "version", NULL, PW_VERSION);
+  if (pw_print_model (&p->fingerprint, p->file, p->tables, error) != PW_OK) return error->status;
+  pw_print_line (&p->fingerprint, "method", NULL, p->method);
+  pw_print_number (&p->fingerprint, "t-end", NULL, p->t_end);
+  pw_print_number (&p->fingerprint, "step", NULL, p->settings.step);
+  pw_print_number (&p->fingerprint, "rtol", NULL, p->settings.rtol);
+  pw_print_number (&p->fingerprint, "atol", NULL, p->settings.atol);
   print_parameters (p, m);
   print_grid (p);
-  print_number (p, "rows", NULL, (double)p->grid.rows);
-  print_line (p, "columns", NULL, p->head.at ? p->head.at : "");
+  pw_print_number (&p->fingerprint, "rows", NULL, (double)p->grid.rows);
+  pw_print_line (&p->fingerprint, "columns", NULL, p->head.at ? p->head.at : "");
   snprintf (part, sizeof part, "%d/%d", p->part, p->parts);
-  print_line (p, "part", NULL, part);
+  pw_print_line (&p->fingerprint, "part", NULL, part);
   pw_text_add (&p->fingerprint, "end\n");
   if (p->fingerprint.failed || p->head.failed) return pw_fail (error, PW_MACHINE, "out of memory");
   return PW_OK;
-}
-
-/* ---- Reading ---- */
-
-static const char print_last[] = "end\n";
-
-/* The next line, or NULL at the end or if it is not whole. */
-static const char *print_next (const char *at, const char *end) {
-  const char *newline = at < end ? memchr (at, '\n', (size_t)(end - at)) : NULL;
-  return newline ? newline + 1 : NULL;
-}
-
-const char *pw_fingerprint_end (const char *at, const char *end) {
-  size_t n = strlen (PW_SWEEP_MAGIC), last = sizeof print_last - 1;
-  if ((size_t)(end - at) < n || memcmp (at, PW_SWEEP_MAGIC, n) != 0) return NULL;
-  for (const char *next; (next = print_next (at, end)) != NULL; at = next)
-    if ((size_t)(next - at) == last && memcmp (at, print_last, last) == 0) return next;
-  return NULL;
-}
-
-/* The key's size in a line; 0 if the line has none. */
-static size_t print_key (const char *line, const char *next) {
-  for (const char *c = line; c + 3 < next; c++)
-    if (memcmp (c, " = ", 3) == 0) return (size_t)(c - line);
-  return 0;
-}
-
-static const char *print_find (const char *at, const char *end, const char *key, size_t key_size, size_t *size) {
-  for (const char *next; (next = print_next (at, end)) != NULL; at = next)
-    if (print_key (at, next) == key_size && memcmp (at, key, key_size) == 0) {
-      *size = (size_t)(next - at) - key_size - 4;
-      return at + key_size + 3;
-    }
-  return NULL;
-}
-
-const char *pw_fingerprint_value (const char *at, const char *end, const char *key, size_t *size) {
-  return print_find (at, end, key, strlen (key), size);
-}
-
-/* Looks for the first line of `a` that is not in `b`. */
-static int print_missing (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
-                          const char *words[2], char *text, size_t size) {
-  for (const char *next; (next = print_next (a, a_end)) != NULL; a = next) {
-    size_t n = print_key (a, next), value = (size_t)(next - a) - n - 4, other;
-    if (n == 0 || (!parts && n == 4 && memcmp (a, "part", 4) == 0)) continue;
-    const char *found = print_find (b, b_end, a, n, &other);
-    if (found && other == value && memcmp (found, a + n + 3, value) == 0) continue;
-    int shown = value < 120 ? (int)value : 120, seen = found && other < 120 ? (int)other : found ? 120 : 0;
-    snprintf (text, size, "%.*s is %.*s %s and %.*s %s", (int)n, a, shown, a + n + 3, words[0], found ? seen : 7,
-              found ? found : "not set", words[1]);
-    return 1;
-  }
-  return 0;
-}
-
-int pw_fingerprint_differ (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
-                           const char *words[2], char *text, size_t size) {
-  const char *turned[2] = { words[1], words[0] };
-  return print_missing (a, a_end, b, b_end, parts, words, text, size) ||
-         print_missing (b, b_end, a, a_end, parts, turned, text, size);
 }

@@ -64,7 +64,7 @@ static int journal_read (pw_journal *j, const pw_plan *p, const pw_map *map, pw_
   static const char *words[2] = { "there", "here" };
   char what[400];
   size_t size = (size_t)(map->end - map->at), magic = strlen (PW_SWEEP_MAGIC);
-  const char *rows = pw_fingerprint_end (map->at, map->end), *own = p->fingerprint.at;
+  const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->at, map->end), *own = p->fingerprint.at;
   j->size = 0;
   if (rows == NULL) { /* a beginning of a fingerprint has no rows to lose */
     if (memcmp (map->at, PW_SWEEP_MAGIC, size < magic ? size : magic) == 0) return PW_OK;

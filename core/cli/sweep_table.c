@@ -143,7 +143,7 @@ static int table_open_part (table_part *x, const char *path, pw_error *error) {
   int status = pw_map_open (&x->map, file), why = errno;
   close (file);
   if (status != PW_OK) return pw_fail (error, PW_INPUT, "cannot read the part %s: %s", path, strerror (why));
-  x->rows = x->at = pw_fingerprint_end (x->map.at, x->map.end);
+  x->rows = x->at = pw_fingerprint_end (PW_SWEEP_MAGIC, x->map.at, x->map.end);
   if (x->rows) x->part = (int)table_value (x, "part", &rest);
   if (rest && *rest == '/') x->parts = (int)strtol (rest + 1, NULL, 10);
   if (x->parts < 1 || x->part < 1 || x->part > x->parts)

@@ -110,7 +110,7 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
   }
   c->output = o;
   c->ledger = ledger;
-  if (csv_header (c, s, error) == PW_OK) return c;
+  if (pw_output_continued (o) || csv_header (c, s, error) == PW_OK) return c;
   pw_csv_close (c);
   return NULL;
 }

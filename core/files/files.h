@@ -71,4 +71,14 @@ int pw_utf8_size (const unsigned char *p);
 /* Writes; PW_MACHINE with the reason if that fails, or a write before it has failed. */
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
 
+/* Brings to the disk what was written; for a regular file.  PW_MACHINE. */
+int pw_output_sync (pw_output *o, pw_error *error);
+
+/* Whether there is something before what is written. */
+int pw_output_continued (const pw_output *o);
+
+/* FNV-1a (Fowler, Noll, Vo) of bytes, after those it was begun with; begin with PW_CHECK. */
+#define PW_CHECK 14695981039346656037u
+unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size_t count);
+
 #endif

@@ -58,6 +58,45 @@ int pw_output_finish (pw_output *o, pw_error *error);
 /* Gives up and frees: NAME.part stays with whole lines.  Its path is written to the buffer, which is returned; NULL, and
  * "" in the buffer, if there is no such file (standard output, a device). */
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
+/* Gives up and frees, and removes NAME.part. */
+void pw_output_discard (pw_output *o);
+
+/* How far a file has come, for another process to go on from. */
+typedef struct {
+  unsigned long long length, check; /* bytes; a check sum of the last of them */
+} pw_mark;
+
+/* Brings all that was written to the disk.  Errors: PW_MACHINE; PW_INPUT for what is no regular file. */
+int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error);
+/* Opens NAME.part once more and cuts off what was written after the mark.  A table goes on without a header.  PW_INPUT if it
+ * is not there or not what was marked; PW_MACHINE. */
+pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error);
+
+/* ---- Checkpoints ----
+ *
+ *     pinwheel checkpoint 1      lines "KEY = VALUE": what run it is of
+ *     ...
+ *     end
+ *     state = 812 bytes, check sum 0123456789abcdef
+ *
+ * and the state, bytes as in memory. */
+
+#define PW_CHECKPOINT_MAGIC "pinwheel checkpoint 1\n"
+
+/* Writes a checkpoint under another name, brings it to the disk and renames it: there is always a whole one.  The head
+ * begins with PW_CHECKPOINT_MAGIC and ends with "end\n".  Errors: PW_MACHINE. */
+int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error);
+
+/* One that was read: text up to `state`, which is ready to be loaded. */
+typedef struct {
+  char *text;
+  const char *head_end; /* after "end\n" */
+  pw_archive state;     /* its bytes belong to the text */
+} pw_checkpoint;
+
+/* PW_INPUT if it is no checkpoint, of another version, cut off or damaged; PW_MACHINE.  Free it in every case. */
+int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error);
+void pw_checkpoint_free (pw_checkpoint *c);
 
 /* ---- Tables ---- */
 

@@ -2,7 +2,8 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "sweep.h"
+#include "pinwheel-files.h"
+#include "text.h"
 
 void pw_text_clear (pw_text *t) {
   t->used = 0;

@@ -1,0 +1,50 @@
+/* Checkpoints of pinwheel run: when they are due, what run they are of, the last one read. */
+#ifndef PW_CHECKPOINTS_H
+#define PW_CHECKPOINTS_H
+
+#include "cli.h"
+#include "text.h"
+
+typedef struct {
+  /* as given; NULL: not */
+  const char *path, *every_text, *resume;
+  /* as understood */
+  double every;       /* simulated time between two [s] */
+  double due;         /* when the next one is to be saved [s]; INFINITY: never */
+  double saved;       /* time of the last one [s]; 0: there is none */
+  pw_text head;       /* of the files */
+  pw_archive state;   /* of the next one */
+  pw_checkpoint from; /* what is resumed */
+} pw_checkpoints;
+
+/* Table entries for popt: the address of a pw_checkpoints, all zero. */
+#define PW_CHECKPOINT_OPTIONS(c)                                                                                    \
+  { "checkpoint", 0, POPT_ARG_STRING, &(c)->path, 0, "Save the state now and then, so that the run can be resumed", \
+    "FILE" },                                                                                                       \
+      { "checkpoint-every",                                                                                         \
+        0,                                                                                                          \
+        POPT_ARG_STRING,                                                                                            \
+        &(c)->every_text,                                                                                           \
+        0,                                                                                                          \
+        "Simulated time between two checkpoints [s]; by default a tenth of the run",                                \
+        "T" },                                                                                                      \
+  {                                                                                                                 \
+    "resume", 0, POPT_ARG_STRING, &(c)->resume, 0, "Go on from a checkpoint of the same command, and save to it",   \
+        "FILE"                                                                                                      \
+  }
+
+/* Reads the file to be resumed, if there is one, and the options; `every` stays 0 without checkpoints. */
+int pw_checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error);
+void pw_checkpoints_close (pw_checkpoints *c);
+
+/* Completes the head, to which the caller has added lines with all that decides what is computed, and refuses a file of
+ * another run. */
+int pw_checkpoints_match (pw_checkpoints *c, pw_error *error);
+
+/* The first multiple of the interval after t is due next. */
+void pw_checkpoints_pass (pw_checkpoints *c, double t);
+
+/* Writes c->state, of time t, to the file. */
+int pw_checkpoints_write (pw_checkpoints *c, double t, pw_error *error);
+
+#endif

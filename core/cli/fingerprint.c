@@ -1,0 +1,126 @@
+/* Fingerprints: lines "KEY = VALUE" with all that decides what a run or a sweep computes.  A file that is to be continued
+ * begins with one, so that results of different runs are never mixed. */
+#include <errno.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include "fingerprint.h"
+#include "model.h"
+
+/* ---- Making ---- */
+
+void pw_print_line (pw_text *t, const char *key, const char *of, const char *value) {
+  pw_text_add (t, key);
+  if (of) pw_text_add (t, " "), pw_text_add (t, of);
+  pw_text_add (t, " = ");
+  pw_text_add (t, value);
+  pw_text_add (t, "\n");
+}
+
+void pw_print_number (pw_text *t, const char *key, const char *of, double value) {
+  char number[32];
+  pw_print_line (t, key, of, pw_format (number, value, 17));
+}
+
+/* FNV-1a (Fowler, Noll, Vo). */
+static uint64_t print_hash (uint64_t h, const void *bytes, size_t n) {
+  for (const unsigned char *c = bytes; n-- > 0; c++) h = (h ^ *c) * 1099511628211u;
+  return h;
+}
+
+static const uint64_t print_empty = 14695981039346656037u;
+
+int pw_print_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error) {
+  char text[200], block[4096];
+  uint64_t h = print_empty;
+  FILE *f = fopen (pw_file_path (file), "rb");
+  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", pw_file_path (file), strerror (errno));
+  for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = print_hash (h, block, n);
+  fclose (f);
+  snprintf (text, sizeof text, "%.150s, contents %016llx", pw_file_name (file), (unsigned long long)h);
+  pw_print_line (t, "model", NULL, text);
+  if (tables == 0) return PW_OK;
+  snprintf (text, sizeof text, "contents %016llx", (unsigned long long)tables);
+  pw_print_line (t, "tables", NULL, text);
+  return PW_OK;
+}
+
+uint64_t pw_check_tables (uint64_t sum, const pw_model *m) {
+  for (const pw_element *e = m->element; e < m->element + m->elements; e++)
+    for (int i = 0; i < e->kind->signals; i++) {
+      const pw_signal *s = pw_field_at (e->kind, e->definition, PW_SIGNAL, i);
+      if (s->type != PW_TABLE) continue;
+      size_t bytes = (size_t)s->table.count * sizeof (double);
+      sum = print_hash (print_hash (sum ? sum : print_empty, s->table.t, bytes), s->table.value, bytes);
+    }
+  return sum;
+}
+
+void pw_print_starts (pw_text *t, const char *const *starts) {
+  for (; starts && *starts; starts++) {
+    char name[200];
+    snprintf (name, sizeof name, "%.*s", (int)strcspn (*starts, "="), *starts);
+    pw_print_line (t, "start", name, *starts + strcspn (*starts, "=") + 1);
+  }
+}
+
+/* ---- Reading ---- */
+
+static const char print_last[] = "end\n";
+
+/* The next line, or NULL at the end or if it is not whole. */
+static const char *print_next (const char *at, const char *end) {
+  const char *newline = at < end ? memchr (at, '\n', (size_t)(end - at)) : NULL;
+  return newline ? newline + 1 : NULL;
+}
+
+const char *pw_fingerprint_end (const char *magic, const char *at, const char *end) {
+  size_t n = strlen (magic), last = sizeof print_last - 1;
+  if ((size_t)(end - at) < n || memcmp (at, magic, n) != 0) return NULL;
+  for (const char *next; (next = print_next (at, end)) != NULL; at = next)
+    if ((size_t)(next - at) == last && memcmp (at, print_last, last) == 0) return next;
+  return NULL;
+}
+
+/* The key's size in a line; 0 if the line has none. */
+static size_t print_key (const char *line, const char *next) {
+  for (const char *c = line; c + 3 < next; c++)
+    if (memcmp (c, " = ", 3) == 0) return (size_t)(c - line);
+  return 0;
+}
+
+static const char *print_find (const char *at, const char *end, const char *key, size_t key_size, size_t *size) {
+  for (const char *next; (next = print_next (at, end)) != NULL; at = next)
+    if (print_key (at, next) == key_size && memcmp (at, key, key_size) == 0) {
+      *size = (size_t)(next - at) - key_size - 4;
+      return at + key_size + 3;
+    }
+  return NULL;
+}
+
+const char *pw_fingerprint_value (const char *at, const char *end, const char *key, size_t *size) {
+  return print_find (at, end, key, strlen (key), size);
+}
+
+/* Looks for the first line of `a` that is not in `b`. */
+static int print_missing (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
+                          const char *words[2], char *text, size_t size) {
+  for (const char *next; (next = print_next (a, a_end)) != NULL; a = next) {
+    size_t n = print_key (a, next), value = (size_t)(next - a) - n - 4, other;
+    if (n == 0 || (!parts && n == 4 && memcmp (a, "part", 4) == 0)) continue;
+    const char *found = print_find (b, b_end, a, n, &other);
+    if (found && other == value && memcmp (found, a + n + 3, value) == 0) continue;
+    int shown = value < 120 ? (int)value : 120, seen = found && other < 120 ? (int)other : found ? 120 : 0;
+    snprintf (text, size, "%.*s is %.*s %s and %.*s %s", (int)n, a, shown, a + n + 3, words[0], found ? seen : 7,
+              found ? found : "not set", words[1]);
+    return 1;
+  }
+  return 0;
+}
+
+int pw_fingerprint_differ (const char *a, const char *a_end, const char *b, const char *b_end, int parts,
+                           const char *words[2], char *text, size_t size) {
+  const char *turned[2] = { words[1], words[0] };
+  return print_missing (a, a_end, b, b_end, parts, words, text, size) ||
+         print_missing (b, b_end, a, a_end, parts, turned, text, size);
+}

@@ -1,0 +1,93 @@
+/* Checkpoints of a run: what they consist of, and going on from one.
+ *
+ * A checkpoint is saved after the step that reaches a multiple of the interval, when the step's rows are written.  Its
+ * table is brought to the disk first, so that a resumed run finds at least what the checkpoint counts on. */
+#include <stdio.h>
+#include <string.h>
+#include "fingerprint.h"
+#include "model.h"
+#include "running.h"
+
+/* All that decides what is computed and written. */
+static int running_print (pw_running *x, pw_error *error) {
+  pw_text *t = &x->check.head;
+  const pw_model *m = x->m.model;
+  pw_print_line (t, "version", NULL, PW_VERSION);
+  if (pw_print_model (t, x->m.file, pw_check_tables (0, m), error) != PW_OK) return error->status;
+  pw_print_line (t, "method", NULL, x->method);
+  pw_print_number (t, "t-end", NULL, x->t_end);
+  pw_print_number (t, "step", NULL, x->settings.step);
+  pw_print_number (t, "rtol", NULL, x->settings.rtol);
+  pw_print_number (t, "atol", NULL, x->settings.atol);
+  for (const pw_parameter *q = m->table->parameters; q && q->name; q++) {
+    double value;
+    memcpy (&value, m->parameters + q->offset, sizeof value);
+    pw_print_number (t, "parameter", q->name, value);
+  }
+  pw_print_starts (t, (const char *const *)x->starts);
+  pw_print_line (t, "table", NULL, x->csv_path ? "written" : "not written");
+  pw_print_number (t, "every", NULL, x->every);
+  pw_print_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
+  pw_print_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
+  return PW_OK;
+}
+
+int pw_running_prepare (pw_running *x, pw_error *error) {
+  pw_checkpoints *c = &x->check;
+  int status = pw_checkpoints_open (c, x->t_end, error);
+  if (status != PW_OK || c->path == NULL) return status;
+  if (x->csv_path && strcmp (x->csv_path, "-") == 0)
+    return pw_fail (error, PW_INPUT,
+                    "--checkpoint: a table on standard output cannot be continued; write it to a file");
+  pw_output *probe = pw_output_open (c->path, error); /* nothing should be computed in vain */
+  if (probe == NULL) return error->status;
+  pw_output_discard (probe);
+  status = running_print (x, error);
+  if (status == PW_OK) status = pw_checkpoints_match (c, error);
+  if (status != PW_OK || x->csv_path == NULL) return status;
+  pw_mark mark = { 0 };
+  if (c->resume == NULL) return pw_output_mark (x->csv_output, &mark, error); /* it must be one that can be continued */
+  pw_carry (&c->from.state, &mark, sizeof mark);
+  x->csv_output = pw_output_continue (x->csv_path, &mark, error);
+  return x->csv_output ? PW_OK : error->status;
+}
+
+/* What the program adds to the state of the run. */
+static void running_carry (pw_running *x, pw_archive *a) {
+  pw_carry (a, &x->row, sizeof x->row);
+  pw_carry (a, &x->cpu, sizeof x->cpu);
+  if (x->plots) pw_plots_carry (x->plots, a);
+}
+
+int pw_running_resume (pw_running *x, pw_error *error) {
+  pw_checkpoints *c = &x->check;
+  char t[32];
+  if (c->resume) {
+    running_carry (x, &c->from.state);
+    if (pw_run_load (x->r, &c->from.state, error) != PW_OK) return error->status;
+    fprintf (stderr, "pinwheel: resumed at t = %s s\n", pw_format (t, pw_time (x->r), 6));
+  }
+  pw_checkpoints_pass (c, pw_time (x->r));
+  return PW_OK;
+}
+
+int pw_running_save (pw_running *x, pw_error *error) {
+  pw_checkpoints *c = &x->check;
+  double t = pw_time (x->r);
+  pw_mark mark = { 0 };
+  if (t >= x->t_end) return PW_OK;
+  if (x->csv_output && pw_output_mark (x->csv_output, &mark, error) != PW_OK) return error->status;
+  pw_archive_clear (&c->state);
+  if (x->csv_output) pw_carry (&c->state, &mark, sizeof mark);
+  running_carry (x, &c->state);
+  int status = pw_run_save (x->r, &c->state, error);
+  if (status != PW_OK) return status > 0 ? PW_OK : status;
+  pw_checkpoints_pass (c, t);
+  return pw_checkpoints_write (c, t, error);
+}
+
+void pw_running_hint (const pw_running *x, int stopped) {
+  char t[32];
+  if (stopped && x->check.saved > 0)
+    fprintf (stderr, "pinwheel: --resume %s goes on from t = %s s\n", x->check.path, pw_format (t, x->check.saved, 6));
+}

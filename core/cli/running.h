@@ -1,0 +1,44 @@
+/* A run of pinwheel run, and its checkpoints (running.c). */
+#ifndef PW_RUNNING_H
+#define PW_RUNNING_H
+
+#include "checkpoints.h"
+#include "plots.h"
+#include "progress.h"
+
+typedef struct {
+  /* as given */
+  const char *method, *t_end_text, *step_text, *rtol_text, *atol_text, *every_text;
+  const char *csv_path, *json_path, *plots_path;
+  const char **sets, **starts;
+  int energy, profile;
+  pw_checkpoints check;
+  /* as understood */
+  pw_cli_line line;
+  pw_cli_model m;
+  pw_settings settings;
+  double t_end, every; /* [s]; every 0: each accepted step is a row */
+  /* open */
+  pw_output *csv_output, *json_output;
+  pw_csv *csv;
+  pw_plots *plots;
+  pw_run *r;
+  const char **redundant; /* what is said about each redundant row; NULL: there are none */
+  pw_progress progress;
+  /* under way */
+  long row;        /* rows written */
+  long batch;      /* steps to take before looking around */
+  double cpu;      /* of the method [s] */
+  char part[4200]; /* where an unfinished table is kept; "": there is none */
+} pw_running;
+
+/* Before anything is written: reads the checkpoint that is resumed, makes sure it is of this run, and opens its table. */
+int pw_running_prepare (pw_running *x, pw_error *error);
+/* When all is open: brings the run to the checkpoint's state, if one is resumed. */
+int pw_running_resume (pw_running *x, pw_error *error);
+/* A checkpoint is due: saves one, unless the pose is near a singular one; then it stays due. */
+int pw_running_save (pw_running *x, pw_error *error);
+/* After a run that was stopped from outside: says where it can go on from. */
+void pw_running_hint (const pw_running *x, int stopped);
+
+#endif

@@ -1,0 +1,66 @@
+#!/bin/sh
+# Runs killed by SIGKILL at random moments and resumed, again and again: table and summary are those of a run that was left
+# alone, byte for byte, for every method and for scenes with what a state can hold.
+# Run from the top folder; reads PINWHEEL, SEED (of the random moments).
+
+pinwheel=${PINWHEEL:-build/pinwheel}
+case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+bad=0
+seed=${SEED:-$$}
+echo "# SEED=$seed"
+
+# report NAME STATUS
+report () {
+  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
+}
+
+# random LOW HIGH: sets $random
+random () {
+  seed=$(((seed * 1103515245 + 12345) % 2147483648))
+  random=$(awk -v x=$seed -v a="$1" -v b="$2" 'BEGIN { print a + (b - a) * (x / 65536 % 1000) / 1000 }')
+}
+
+# killed MODEL OPTION...: once left alone, once killed until it gets through
+killed () {
+  rm -f "$work"/*
+  "$pinwheel" run "$@" -o "$work/whole.csv" --json "$work/whole.json" --checkpoint "$work/whole.ck" 2>"$work/err" || {
+    cat "$work/err"
+    return 1
+  }
+  kills=0
+  until [ -e "$work/done" ]; do
+    resume=
+    [ ! -e "$work/killed.ck" ] || resume=--resume
+    "$pinwheel" run "$@" -o "$work/killed.csv" --json "$work/killed.json" --checkpoint "$work/killed.ck" \
+      $resume ${resume:+"$work/killed.ck"} 2>"$work/err" &
+    child=$!
+    random 0.02 0.3
+    [ $kills -ge 30 ] || { sleep "$random"; kill -KILL $child 2>/dev/null; }
+    wait $child 2>/dev/null
+    case $? in
+    0) : >"$work/done" ;;
+    137) kills=$((kills + 1)) ;;
+    *) cat "$work/err"; return 1 ;;
+    esac
+  done
+  for f in whole killed; do grep -v '"cpu_s"' "$work/$f.json" >"$work/$f"; done
+  cmp "$work/whole.csv" "$work/killed.csv" && cmp "$work/whole" "$work/killed"
+}
+
+methods=$("$pinwheel" list methods | awk '/^  [a-z]/ { name = $1 } /^    \+/ { print name $1 }')
+for method in $methods; do
+  killed ezyroller --t-end 60 --every 0.005 --energy --method "$method" --checkpoint-every 0.7
+  report "$method, killed $kills times" $?
+done
+killed ezyroller --t-end 40 --step 1e-4 --every 0.01 --checkpoint-every 3
+report "massless bodies, many steps, killed $kills times" $?
+killed redundant-parallelogram --t-end 60 --every 0.005 --energy --checkpoint-every 0.9
+report "redundant rows, killed $kills times" $?
+killed n-four-bar --t-end 20 --step 1e-3 --every 0.01 --checkpoint-every 0.3
+report "singular poses, killed $kills times" $?
+killed chain --set n=200 --t-end 2 --every 0.01 --checkpoint-every 0.05
+report "a large scene, killed $kills times" $?
+exit $bad

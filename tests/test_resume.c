@@ -1,0 +1,158 @@
+/* pinwheel run --checkpoint, --resume: a run that is killed and resumed writes the same bytes; a file that does not belong
+ * to the run, or is not whole, is refused. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+#define RESUME_RUN "run ezyroller --t-end 30 --energy --every 0.01 --checkpoint-every 0.5 "
+#define RESUME_PROGRAM "${PINWHEEL:-build/pinwheel} "
+
+/* Kills the run again and again until it gets through: with SIGKILL, after so many seconds. */
+static void resume_killed (const char *method) {
+  char command[2000];
+  snprintf (command, sizeof command,
+            "pinwheel " RESUME_RUN "-m %s -o @/whole.csv --json @/whole.json --checkpoint @/whole.ck", method);
+  cli_good (command);
+  snprintf (command, sizeof command,
+            "rm -f @/killed.*; kills=0\n"
+            "for wait in 0.03 0.05 0.08 0.12 0.2 60; do\n"
+            "  resume=; [ ! -e @/killed.ck ] || resume='--resume @/killed.ck'\n"
+            "  " RESUME_PROGRAM RESUME_RUN
+            "-m %s -o @/killed.csv --json @/killed.json --checkpoint @/killed.ck $resume &\n"
+            "  if [ $wait = 60 ]; then wait $!; else sleep $wait; kill -9 $! && kills=$((kills + 1)); wait $!; fi\n"
+            "  [ ! -e @/killed.csv ] || break\n"
+            "done 2>/dev/null; [ $kills -gt 0 ] && echo killed",
+            method);
+  cli_run (command);
+  if (strcmp (cli_out, "killed\n") != 0) print_error ("%s: never killed\n%s", method, cli_err);
+  assert_string_equal (cli_out, "killed\n");
+  cli_good ("cmp @/whole.csv @/killed.csv && for f in whole killed; do grep -v cpu_s @/$f.json >@/$f; done && "
+            "cmp @/whole @/killed && test ! -e @/killed.csv.part");
+}
+
+static void test_killed (void **state) {
+  (void)state;
+  resume_killed ("rk4+projection");
+  resume_killed ("erk8+projection --rtol 1e-12");
+  resume_killed ("ida+ggl");
+}
+
+/* Saving disturbs no step of a one-step method; the summary counts the restarts of a multistep one. */
+static void test_restarts (void **state) {
+  (void)state;
+  cli_good ("pinwheel " RESUME_RUN "-m rk4 --json @/a.json --checkpoint @/a.ck");
+  assert_true (cli_number (cli_file ("a.json"), "restarts", NULL) == 0);
+  assert_true (cli_number (cli_file ("a.json"), "steps", NULL) == 30000);
+  cli_good ("pinwheel " RESUME_RUN "-m ida+ggl --json @/a.json --checkpoint @/a.ck");
+  assert_true (cli_number (cli_file ("a.json"), "restarts", NULL) == 59);
+  cli_good (
+      "pinwheel run ezyroller --t-end 30 -m ida+ggl --checkpoint @/a.ck | grep -q 'started anew at 9 checkpoints'");
+}
+
+/* After Ctrl-C: what there is to go on from, and that it does. */
+static void test_interrupted (void **state) {
+  (void)state;
+  cli_run ("rm -f @/a.*; " RESUME_PROGRAM RESUME_RUN "-m rk4 --step 1e-5 -o @/a.csv --checkpoint @/a.ck & "
+           "while [ ! -e @/a.ck ]; do sleep 0.02; done; kill -INT $!; wait $!; echo $?");
+  assert_string_equal (cli_out, "130\n");
+  assert_non_null (strstr (cli_err, "a.csv.part\n"));
+  assert_non_null (strstr (cli_err, "/a.ck goes on from t = "));
+}
+
+/* ---- What is refused ---- */
+
+#define RESUME_SHORT "run ezyroller --t-end 2 --checkpoint-every 0.5 -o @/b.csv "
+
+/* A checkpoint of a run that was stopped, with its table. */
+static void resume_prepare (void) {
+  cli_good ("rm -f @/b.*; pinwheel " RESUME_SHORT "--checkpoint @/b.ck; mv @/b.csv @/b.csv.part; cp @/b.ck @/good.ck");
+}
+
+static void resume_bad (const char *change, const char *option, const char *message) {
+  char command[1500];
+  resume_prepare ();
+  snprintf (command, sizeof command, "%s; pinwheel " RESUME_SHORT "%s --resume @/b.ck", change, option);
+  cli_bad (command, 2, message);
+  cli_good ("test -s @/b.csv.part");
+}
+
+static void test_other_run (void **state) {
+  (void)state;
+#define OTHER "the checkpoint @/b.ck belongs to another run: "
+  resume_bad (":", "--set a=0.6", OTHER "parameter a is 0.5 there and 0.59999999999999998 here");
+  resume_bad (":", "--step 2e-3", OTHER "step is 0.001 there and 0.002 here");
+  resume_bad (":", "-m rk4+baumgarte", OTHER "method is rk4+projection there and rk4+baumgarte here");
+  resume_bad (":", "-t 3", OTHER "t-end is 2 there and 3 here");
+  resume_bad (":", "--checkpoint-every 1", OTHER "checkpoint-every is 0.5 there and 1 here");
+  resume_bad (":", "--start frame.vx=1", OTHER "start frame.vx is 1 here and not set there");
+  resume_bad (":", "--energy", OTHER "energy is not kept there and kept here");
+  resume_prepare ();
+  cli_run ("pinwheel run pendulum --t-end 2 --checkpoint-every 0.5 -o @/b.csv --resume @/b.ck");
+  assert_non_null (strstr (cli_err, "b.ck belongs to another run: model is ezyroller, contents "));
+}
+
+static void test_other_file (void **state) {
+  (void)state;
+  resume_bad ("rm @/b.ck", "", "cannot read the checkpoint @/b.ck: No such file or directory");
+  resume_bad ("echo hello >@/b.ck", "", "@/b.ck is no checkpoint of Pinwheel");
+  resume_bad (": >@/b.ck", "", "@/b.ck is no checkpoint of Pinwheel");
+  resume_bad ("rm @/b.ck; mkdir @/b.ck", "", "cannot read the checkpoint @/b.ck");
+  cli_good ("rmdir @/b.ck");
+  resume_bad ("sed 1s/1/7/ @/good.ck >@/b.ck", "", "@/b.ck is a checkpoint of format 7; this Pinwheel reads format 1");
+  resume_bad ("printf x >>@/b.ck", "", "the checkpoint @/b.ck is damaged: its check sum is wrong");
+  resume_bad ("rm @/b.csv.part; echo >@/b.csv.part", "",
+              "cannot continue @/b.csv: @/b.csv.part is not the table that the checkpoint belongs to");
+  resume_bad ("sed -i '$s/1/2/' @/b.csv.part; sed -i '1500s/1/2/' @/b.csv.part", "",
+              "cannot continue @/b.csv: @/b.csv.part is not the table that the checkpoint belongs to");
+}
+
+/* Cut anywhere, or with any one bit changed, it is refused. */
+static void test_damaged (void **state) {
+  static char text[20000], other[20000];
+  char path[300];
+  (void)state;
+  resume_prepare ();
+  snprintf (path, sizeof path, "%s/good.ck", cli_folder);
+  FILE *f = fopen (path, "rb");
+  assert_non_null (f);
+  size_t size = fread (text, 1, sizeof text, f);
+  fclose (f);
+  for (int i = 0; i < 40; i++) {
+    size_t at = size * (size_t)i / 40, length = i % 2 ? at : size;
+    memcpy (other, text, size);
+    other[at] = (char)(other[at] ^ (1 << i % 8));
+    snprintf (path, sizeof path, "%s/b.ck", cli_folder);
+    f = fopen (path, "wb");
+    assert_non_null (f);
+    fwrite (other, 1, length, f);
+    assert_int_equal (fclose (f), 0);
+    int status = cli_run ("pinwheel " RESUME_SHORT "--resume @/b.ck");
+    if (status != 2) print_error ("byte %zu, %zu bytes: status %d, %s", at, length, status, cli_err);
+    assert_int_equal (status, 2);
+    assert_non_null (strstr (cli_err, "checkpoint"));
+  }
+}
+
+static void test_options (void **state) {
+  (void)state;
+  cli_bad ("pinwheel run ezyroller --checkpoint-every 1", 2,
+           "--checkpoint-every 1: --checkpoint FILE is needed to save to");
+  cli_bad ("pinwheel run ezyroller --checkpoint @/c.ck --checkpoint-every -1", 2,
+           "--checkpoint-every -1: expected a number > 0");
+  cli_bad ("pinwheel run ezyroller --checkpoint @/c.ck -o -", 2,
+           "--checkpoint: a table on standard output cannot be continued; write it to a file");
+  cli_bad ("pinwheel run ezyroller --checkpoint @/c.ck -o /dev/null", 2,
+           "/dev/null cannot be continued: it is no regular file");
+  cli_bad ("pinwheel run ezyroller --checkpoint @/none/c.ck", 1, "cannot write @/none/c.ck: No such file or directory");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_killed),    cmocka_unit_test (test_restarts),   cmocka_unit_test (test_interrupted),
+    cmocka_unit_test (test_other_run), cmocka_unit_test (test_other_file), cmocka_unit_test (test_damaged),
+    cmocka_unit_test (test_options),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
