@@ -96,11 +96,12 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
     }
 }
 
-/* A step in units of the scene, made exactly representable. */
+/* A step in units of the scene, made exactly representable: where truncation, h^2 / unit^2, and the round-off of x, eps x / h,
+ * are about the same. */
 static double blocks_step (const pw_system *s, const pw_kind *kind, int c, int rates, double x) {
   double unit = c < 3 * kind->bodies && c % 3 < 2 ? s->scale.length : 1;
   if (rates) unit /= s->scale.time;
-  volatile double moved = x + cbrt (2.3e-16) * fmax (unit, fabs (x));
+  volatile double moved = x + unit * cbrt (2.3e-16 * fmax (1, fabs (x) / unit));
   return moved - x;
 }
 

@@ -368,6 +368,18 @@ typedef struct {
   double speed;        /* below about this rate the Coulomb torque is smoothed [rad/s]; > 0 if there is a limit */
 } pw_friction;
 
+/* Sliding friction: a viscous and a Coulomb force against the motion of a point of body 1 along a line of body 2, in a
+ * slider or slot for instance. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* what slides, and what it slides on; "ground" for one of them */
+  double at[2][2];     /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
+  double heading;      /* direction of the line in body 2's frame [rad] */
+  double viscous;      /* [N s/m], >= 0 */
+  double limit;        /* Coulomb force [N], >= 0 */
+  double speed;        /* below about this speed the Coulomb force is smoothed [m/s]; > 0 if there is a limit */
+} pw_sliding_friction;
+
 /* Drag: air, at rest, slows down a body's centre of mass and its turning. */
 typedef struct {
   const char *name;
@@ -407,6 +419,7 @@ typedef struct {
   PW_KIND (spring)             \
   PW_KIND (rotational_spring)  \
   PW_KIND (friction)           \
+  PW_KIND (sliding_friction)   \
   PW_KIND (drag)               \
   PW_KIND (gravity)            \
   PW_KIND (force)              \

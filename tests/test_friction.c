@@ -76,6 +76,54 @@ static void test_discs (void **state) {
   friction_rub ("ida+ggl", 0, 0.3, 1e-6, "1e4 rtol");
 }
 
+/* ---- A block that slides on a beam, both of them free ---- */
+
+static const struct { double m[2], v, psi, w0; } friction_b = { { 0.7, 2.1 }, 1.8, 0.4, 0.3 };
+
+static void friction_beam (pw_model *m, const void *parameters) {
+  const friction_parameters *p = parameters;
+  double c = cos (friction_b.psi), s = sin (friction_b.psi);
+  pw_add_body (m, &(pw_body){ .name = "block",
+                              .mass = friction_b.m[0],
+                              .inertia = 0.02,
+                              .start = { 0, 0, 0.3 },
+                              .rate = { friction_b.v * c, friction_b.v * s } });
+  pw_add_body (m, &(pw_body){ .name = "beam", .mass = friction_b.m[1], .inertia = 0.5 });
+  pw_add_slider (m, &(pw_slider){ .name = "S", .body = { "block", "beam" }, .heading = friction_b.psi, .angle = 0.3 });
+  pw_add_sliding_friction (m, &(pw_sliding_friction){ .name = "rub",
+                                                      .body = { "block", "beam" },
+                                                      .heading = friction_b.psi,
+                                                      .viscous = p->viscous,
+                                                      .limit = p->limit,
+                                                      .speed = p->speed });
+}
+
+/* Through both centres of mass nothing turns; the speed of one along the other runs down as of their reduced mass. */
+static void friction_slide (const char *method, double viscous, double limit, double bound, const char *reason) {
+  static const pw_plugin_table table = FRICTION_TABLE (friction_beam);
+  pw_system *s = scene_system (&table, "viscous", viscous, "limit", limit, "speed", friction_b.w0, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2, .ledger = 1 });
+  double M = friction_b.m[0] * friction_b.m[1] / (friction_b.m[0] + friction_b.m[1]);
+  for (int i = 1; i <= 4; i++) {
+    double t = 0.5 * i, w = friction_b.v * exp (-viscous * t / M);
+    if (limit > 0) w = friction_coulomb (friction_b.v, t, M, limit, friction_b.w0);
+    pw_sample x = runs_to (r, t);
+    check_close ("speed along x", x.v[0] - x.v[3], w * cos (friction_b.psi), bound, reason);
+    check_close ("speed along y", x.v[1] - x.v[4], w * sin (friction_b.psi), bound, reason);
+    check_close ("loss", x.loss, M * (friction_b.v * friction_b.v - w * w) / 2, 10 * bound, reason);
+    check_close ("balance", x.balance, 0, 10 * bound, reason);
+  }
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_slide (void **state) {
+  (void)state;
+  friction_slide ("rk4+projection", 0.5, 0, 1e-10, "(h k)^4 at h = 1e-3 and k = 1/s");
+  friction_slide ("rk4+projection", 0, 0.6, 1e-10, "(h k)^4 at h = 1e-3 and k = 4/s");
+  friction_slide ("ida+ggl", 0, 0.6, 1e-6, "1e4 rtol");
+}
+
 static void test_refused (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -195,6 +243,16 @@ static void friction_car (pw_model *m, const void *parameters) {
   pw_add_rolling_resistance (
       m, &(pw_rolling_resistance){
              .name = "R", .body = "trailer", .at = { -0.1, 0.2 }, .heading = 0.1, .limit = 0.6, .speed = 0.5 });
+  pw_add_body (m, &(pw_body){ .name = "load", .mass = 0.4, .inertia = 0.01, .start = { 0, 0.2 }, .rate = { 2, 1 } });
+  pw_add_slot (
+      m, &(pw_slot){ .name = "rail", .body = { "load", "car" }, .at = { { 0.05, 0 }, { 0.05, 0.2 } }, .heading = 1.2 });
+  pw_add_sliding_friction (m, &(pw_sliding_friction){ .name = "brake",
+                                                      .body = { "load", "car" },
+                                                      .at = { { 0.05, 0 }, { 0.05, 0.2 } },
+                                                      .heading = 1.2,
+                                                      .viscous = 0.3,
+                                                      .limit = 0.2,
+                                                      .speed = 0.3 });
   pw_add_rolling_resistance (
       m, &(pw_rolling_resistance){ .name = "F", .body = "car", .at = { 0.4, -0.2 }, .limit = 0.5, .speed = 0.3 });
 }
@@ -207,8 +265,8 @@ static void test_methods (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_discs), cmocka_unit_test (test_refused), cmocka_unit_test (test_flight),
-    cmocka_unit_test (test_coast), cmocka_unit_test (test_methods),
+    cmocka_unit_test (test_discs),  cmocka_unit_test (test_slide), cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_flight), cmocka_unit_test (test_coast), cmocka_unit_test (test_methods),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

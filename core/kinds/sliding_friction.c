@@ -1,0 +1,96 @@
+/* sliding-friction: a force against the motion of a point of body 1 along a line of body 2, as in a slider or slot.
+ *
+ *   s = e . (r1 + R(phi1) s1 - r2) - c,  E = ds/dq,  w = E . v          e: unit vector along the line
+ *   f = -F E,  loss = F w >= 0                                          F(w) as in coulomb.h
+ *   df/dq = -dF/dw E (H v)^T - F H,  df/dv = -dF/dw E E^T,  H = d2s/dq2
+ *
+ * E and H are those of line.h for a line across this one, whose normal is e: s is the distance from it. */
+#include "coulomb.h"
+#include "line.h"
+
+typedef struct {
+  line across;
+  coulomb law;
+} sliding;
+
+/* Names the parts of element e: itself, its two poses, axes, E and w. */
+#define SLIDING_PARTS                                                             \
+  const sliding *k = (const sliding *)b->element + e;                             \
+  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
+  const line_axes s = line_turn (&k->across, A, B);                               \
+  const double v[6] = { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega };         \
+  double E[6], w = 0;                                                             \
+  line_J (&s, E);                                                                 \
+  for (int i = 0; i < 6; i++) w += E[i] * v[i]
+
+static int sliding_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+                            pw_error *error) {
+  const pw_sliding_friction *d = definition;
+  sliding *k = element;
+  k->across = line_make (d->at, d->heading - PW_PI / 2);
+  (void)bodies, (void)own;
+  return coulomb_make (d->viscous, d->limit, d->speed, &k->law, error);
+}
+
+static void sliding_force (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    SLIDING_PARTS;
+    double F = coulomb_force (&k->law, w);
+    for (int i = 0; i < 6; i++) out[i] = -F * E[i];
+  }
+}
+
+static void sliding_force_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 36) {
+    SLIDING_PARTS;
+    double slope = coulomb_slope (&k->law, w), Hv[6];
+    line_jtl_q (&s, -coulomb_force (&k->law, w), out);
+    line_curve (&s, 1, v, Hv);
+    for (int i = 0; i < 36; i++) out[i] -= slope * E[i / 6] * Hv[i % 6];
+  }
+}
+
+static void sliding_force_v (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 36) {
+    SLIDING_PARTS;
+    double slope = coulomb_slope (&k->law, w);
+    for (int i = 0; i < 36; i++) out[i] = -slope * E[i / 6] * E[i % 6];
+  }
+}
+
+static void sliding_loss (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++) {
+    SLIDING_PARTS;
+    out[e] = coulomb_force (&k->law, w) * w;
+  }
+}
+
+static const pw_field sliding_fields[] = {
+  { PW_AT (pw_sliding_friction, body), PW_BODY, .count = 2, .required = 1,
+    .about = "what slides, and what it slides on; ground for one of them" },
+  { PW_AT (pw_sliding_friction, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
+    .about = "the point, and a point of the line, in each body's frame" },
+  { PW_AT (pw_sliding_friction, heading), PW_NUMBER, .unit = "rad",
+    .about = "direction of the line in the second body's frame; 0: along its x" },
+  { PW_AT (pw_sliding_friction, viscous), PW_NUMBER, .unit = "N s/m", .domain = PW_NONNEGATIVE,
+    .about = "force per speed" },
+  { PW_AT (pw_sliding_friction, limit), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE, .about = "Coulomb force" },
+  { PW_AT (pw_sliding_friction, speed), PW_NUMBER, .unit = "m/s", .domain = PW_NONNEGATIVE,
+    .about = "below about this speed the Coulomb force is smoothed; needed with a limit" },
+  { .name = NULL },
+};
+
+const pw_kind pw_kind_sliding_friction = {
+  .name = "sliding-friction",
+  .about = "a viscous and a Coulomb force against the motion of a point along a line of another body",
+  .definition = sizeof (pw_sliding_friction),
+  .element = sizeof (sliding),
+  .fields = sliding_fields,
+  .bodies = 2,
+  .level = PW_FORCE,
+  .prepare = sliding_prepare,
+  .force = sliding_force,
+  .force_q = sliding_force_q,
+  .force_v = sliding_force_v,
+  .loss = sliding_loss,
+};
