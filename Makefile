@@ -116,6 +116,8 @@ $(BUILD)/obj/core/%.o:       INCLUDE := -iquote core
 $(BUILD)/obj/solvers/%.o:    INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/files/%.o: INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers
+$(call obj,core/cli/animate_page.c): INCLUDE += -iquote $(BUILD)/obj/core/cli
+$(call obj,core/cli/animate_page.c): $(BUILD)/obj/core/cli/animate.inc
 $(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
@@ -133,6 +135,11 @@ $(call obj,$(BENCH) $(HARD) $(EMBED)): | $(INCLUDES)
 
 -include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(BENCH) $(ENGINE) $(HARD) $(EMBED)))
 -include $(MODELS:%.c=$(BUILD)/obj/%.d)
+
+# The page of an animation becomes part of the program: its lines as C strings.
+$(BUILD)/obj/%.inc: %.html
+	@mkdir -p $(@D)
+	@sed -e 's/\\/&&/g' -e 's/"/\\"/g' -e 's/.*/"&\\n",/' $< >$@
 
 # ---- Libraries, headers, models, programs ----
 

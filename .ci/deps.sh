@@ -1,7 +1,8 @@
 #!/bin/sh
 # Checks what Pinwheel needs and installs only what is missing, with the system's package manager.
 #
-#   deps.sh [fresh] [style]     fresh: do not trust the last result; style: clang and clang-format too
+#   deps.sh [fresh] [style] [browser]     fresh: do not trust the last result; style: clang and clang-format too;
+#                                         browser: one that can run without a screen, for the tests of animations
 #
 # Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
 
@@ -13,6 +14,7 @@ for word; do
   case $word in
   fresh) fresh=1 ;;
   style) needs="$needs clang clang-format" ;;
+  browser) needs="$needs chromium" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
   esac
 done
@@ -94,7 +96,7 @@ look () {
   for n in $needs; do
     case $n in
     cc) links || missing="$missing $n" ;;
-    gnuplot | clang | clang-format) command -v "$n" >/dev/null || missing="$missing $n" ;;
+    gnuplot | clang | clang-format | chromium) command -v "$n" >/dev/null || missing="$missing $n" ;;
     *) libraries="$libraries $n" ;;
     esac
   done
@@ -110,7 +112,7 @@ package_of () {
   apt-sundials) echo libsundials-dev ;;
   apt-suitesparse) echo libsuitesparse-dev ;;
   apt-gnuplot) echo gnuplot-nox ;;
-  apt-clang | apt-clang-format) echo "$1" ;;
+  apt-clang | apt-clang-format | apt-chromium) echo "$1" ;;
   apt-libfyaml) echo libfyaml-dev ;;
   apt-*) echo "lib$1-dev" ;;
 
@@ -121,6 +123,7 @@ package_of () {
   dnf-gnuplot) echo gnuplot ;;
   dnf-clang) echo clang ;;
   dnf-clang-format) echo clang-tools-extra ;;
+  dnf-chromium) echo chromium ;;
   dnf-*) echo "$1-devel" ;;
 
   pacman-cc) echo gcc ;;

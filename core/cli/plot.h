@@ -22,7 +22,7 @@ enum {
 };
 
 /* What is kept of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each
- * wheel drawn. */
+ * wheel drawn, then the force of each link. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
 
 /* Attachment points of a body, in its frame [m]. */
@@ -30,6 +30,17 @@ typedef struct {
   int count;
   double at[PLOT_POINTS][2];
 } pw_plot_body;
+
+/* An element with points: what it connects, and on which of its ends the force is shown. */
+typedef struct {
+  int slab, element;
+  int ends; /* 1 or 2 */
+  struct {
+    int body;     /* among those drawn, -1: the ground */
+    double at[2]; /* [m] */
+  } end[2];
+  int force, column; /* end, and the first column of its body */
+} pw_plot_link;
 
 /* A rectangle [m]. */
 typedef struct {
@@ -43,6 +54,7 @@ struct pw_plots {
   int samples, wanted; /* taken so far, and in all */
   int width;           /* numbers per sample */
   int bodies, wheels;  /* drawn */
+  int links;           /* elements whose forces are kept */
   int grounds;         /* points of the ground */
   int all_wheels;      /* in the system */
   int closeup;         /* samples of the start that get a picture of their own; 0: none */
@@ -53,6 +65,8 @@ struct pw_plots {
   double *data;        /* wanted x width */
   pw_pose *pose;       /* of every body, and the ground */
   double *contact;     /* scratch: what the largest batch of wheels fills */
+  pw_plot_link *link;  /* links */
+  double *block;       /* scratch: generalised forces of the largest batch */
 };
 
 /* Sample i, and the parts of one. */
@@ -64,6 +78,10 @@ static inline double *pw_plot_motion (const pw_plots *p, int i, int body) {
 }
 static inline double *pw_plot_wheel (const pw_plots *p, int i, int wheel) {
   return pw_plot_sample (p, i) + PLOT_FIRST + 6 * p->bodies + 3 * wheel;
+}
+
+static inline double *pw_plot_force (const pw_plots *p, int i, int link) {
+  return pw_plot_sample (p, i) + PLOT_FIRST + 6 * p->bodies + 3 * p->wheels + 2 * link;
 }
 
 /* Number i of `shown` things taken evenly out of `all`. */
@@ -83,6 +101,16 @@ typedef struct {
 
 pw_curves pw_plot_bodies (const pw_plots *p);
 pw_curves pw_plot_wheels (const pw_plots *p);
+
+const char *pw_plot_body_name (const pw_plots *p, int body);
+const char *pw_plot_wheel_name (const pw_plots *p, int wheel);
+/* The body a wheel belongs to, among those drawn; -1: the ground, -2: none of them. */
+int pw_plot_body_of_wheel (const pw_plots *p, int wheel);
+
+/* Finds elements with points of the bodies drawn, at most as many as there is room for. */
+void pw_plot_find_links (pw_plots *p, const pw_model *m);
+/* Their forces [N], x and y each, of a sample the system is placed at with J swept. */
+void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 
 /* Makes a folder and those above it. */
 int pw_plot_folder (const char *folder, pw_error *error);
@@ -104,13 +132,18 @@ double pw_plot_size (const pw_plots *p);
 enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
 int pw_plot_has (const pw_plots *p, int block);
 
+/* Writes every `stride`-th sample of the mechanism as PLOT_CENTRES + 1 blocks of its own, and the paths. */
+int pw_plot_write_frames (const pw_plots *p, const char *name, int stride, pw_error *error);
 /* Writes the data files; sets p->closeup. */
 int pw_plot_write_data (pw_plots *p, pw_error *error);
 /* Writes the scripts. */
 int pw_plot_write_scripts (const pw_plots *p, pw_error *error);
 /* Runs gnuplot on them. */
 int pw_plot_run (const pw_plots *p, pw_error *error);
-/* Runs gnuplot in a folder on at most PLOT_SCRIPTS scripts, a list ended by NULL. */
+/* Runs gnuplot in a folder on at most PLOT_SCRIPTS scripts, a list ended by NULL; says on standard error if there is
+ * none, or leaves that to the caller, and puts what gnuplot says into a file unless `messages` is NULL. */
 int pw_plot_gnuplot (const char *folder, const char *const *scripts, pw_error *error);
+int pw_plot_try_gnuplot (const char *folder, const char *const *scripts, const char *messages, int *absent,
+                         pw_error *error);
 
 #endif

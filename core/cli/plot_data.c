@@ -120,6 +120,19 @@ static int data_energy (const pw_plots *p, pw_error *error) {
   return pw_plot_finish (p, "energy.dat", f, error);
 }
 
+static int data_ground (const pw_plots *p, pw_error *error) {
+  if (p->grounds == 0) return PW_OK;
+  FILE *f = pw_plot_create (p, "ground.dat", error);
+  if (f == NULL) return PW_MACHINE;
+  fputs ("# points of the ground: x [m], y [m]\n", f);
+  for (int g = 0; g < p->grounds; g++) {
+    data_number (f, p->ground[g][0], "");
+    data_number (f, p->ground[g][1], " ");
+    fputs ("\n", f);
+  }
+  return pw_plot_finish (p, "ground.dat", f, error);
+}
+
 /* ---- The mechanism: lines of "x y t", blank lines between pieces ---- */
 
 static void data_vertex (FILE *f, const double *point, double t) {
@@ -167,25 +180,53 @@ static int data_stride (const pw_plots *p, int n) {
   return stride < 1 ? 1 : stride;
 }
 
-/* Three blocks, two blank lines apart: bodies, wheels, bodies that nothing is attached to.  Pictures out of the first n samples.
- * gnuplot counts blocks by their data, so an empty one gets a point that is not drawn. */
+/* The beginning of a block, two blank lines after the one before.  gnuplot counts blocks by their data, so an empty one gets
+ * a point that is not drawn. */
+static void data_begin_block (FILE *f, const pw_plots *p, int block, int first) {
+  static const char *const titles[] = { "bodies", "wheels", "bodies without attachments" };
+  fprintf (f, "%s# %s: x [m], y [m], t [s]\n", first ? "" : "\n\n", titles[block]);
+  if (!pw_plot_has (p, block)) fputs ("nan nan nan\n", f);
+}
+
+/* What a block shows of sample i. */
+static void data_block (FILE *f, const pw_plots *p, int i, int block, double half) {
+  for (int b = 0; b < p->bodies && block == PLOT_BODIES; b++) data_body (f, p, i, b);
+  for (int w = 0; w < p->wheels && block == PLOT_WHEELS; w++) data_wheel (f, p, i, w, half);
+  for (int b = 0; b < p->bodies && block == PLOT_CENTRES; b++)
+    data_vertex (f, pw_plot_motion (p, i, b), pw_plot_sample (p, i)[PLOT_T]);
+}
+
+/* Half of a wheel as it is drawn. */
+static double data_half_wheel (const pw_plots *p) {
+  return 0.06 * pw_plot_size (p);
+}
+
+/* Three blocks: bodies, wheels, bodies that nothing is attached to.  Pictures out of the first n samples. */
 static int data_mechanism (const pw_plots *p, const char *name, int n, pw_error *error) {
   FILE *f = pw_plot_create (p, name, error);
   if (f == NULL) return PW_MACHINE;
   int stride = data_stride (p, n);
-  double half = 0.06 * pw_plot_size (p);
+  double half = data_half_wheel (p);
   for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
-    static const char *const titles[] = { "bodies", "wheels", "bodies without attachments" };
-    fprintf (f, "%s# %s: x [m], y [m], t [s]\n", block ? "\n\n" : "", titles[block]);
-    if (!pw_plot_has (p, block)) fputs ("nan nan nan\n", f);
-    for (int i = 0; i < n; i += stride) {
-      for (int b = 0; b < p->bodies && block == PLOT_BODIES; b++) data_body (f, p, i, b);
-      for (int w = 0; w < p->wheels && block == PLOT_WHEELS; w++) data_wheel (f, p, i, w, half);
-      for (int b = 0; b < p->bodies && block == PLOT_CENTRES; b++)
-        data_vertex (f, pw_plot_motion (p, i, b), pw_plot_sample (p, i)[PLOT_T]);
-    }
+    data_begin_block (f, p, block, block == PLOT_BODIES);
+    for (int i = 0; i < n; i += stride) data_block (f, p, i, block, half);
   }
   return pw_plot_finish (p, name, f, error);
+}
+
+int pw_plot_write_frames (const pw_plots *p, const char *name, int stride, pw_error *error) {
+  FILE *f = pw_plot_create (p, name, error);
+  if (f == NULL) return PW_MACHINE;
+  double half = data_half_wheel (p);
+  for (int i = 0; i < p->samples; i += stride)
+    for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
+      data_begin_block (f, p, block, i == 0 && block == PLOT_BODIES);
+      data_block (f, p, i, block, half);
+    }
+  int status = pw_plot_finish (p, name, f, error);
+  if (status == PW_OK) status = data_motion (p, error);
+  if (status == PW_OK) status = data_wheels (p, error);
+  return status == PW_OK ? data_ground (p, error) : status;
 }
 
 int pw_plot_has (const pw_plots *p, int block) {
@@ -193,19 +234,6 @@ int pw_plot_has (const pw_plots *p, int block) {
   int b = 0;
   while (b < p->bodies && (p->shape[b].count == 0) != (block == PLOT_CENTRES)) b++;
   return b < p->bodies;
-}
-
-static int data_ground (const pw_plots *p, pw_error *error) {
-  if (p->grounds == 0) return PW_OK;
-  FILE *f = pw_plot_create (p, "ground.dat", error);
-  if (f == NULL) return PW_MACHINE;
-  fputs ("# points of the ground: x [m], y [m]\n", f);
-  for (int g = 0; g < p->grounds; g++) {
-    data_number (f, p->ground[g][0], "");
-    data_number (f, p->ground[g][1], " ");
-    fputs ("\n", f);
-  }
-  return pw_plot_finish (p, "ground.dat", f, error);
 }
 
 int pw_plot_write_data (pw_plots *p, pw_error *error) {

@@ -71,11 +71,11 @@ static void plots_choose_wheels (pw_plots *p) {
   }
 }
 
-static const char *plots_body_name (const pw_plots *p, int body) {
+const char *pw_plot_body_name (const pw_plots *p, int body) {
   return p->s->body_name[p->body[body]];
 }
 
-static const char *plots_wheel_name (const pw_plots *p, int wheel) {
+const char *pw_plot_wheel_name (const pw_plots *p, int wheel) {
   return p->s->slab[p->slab[wheel]].name[p->element[wheel]];
 }
 
@@ -91,7 +91,7 @@ static void plots_add_point (pw_plot_body *shape, const double *at) {
 static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
   pw_names shown;
   if (pw_names_open (&shown, (size_t)p->bodies) != PW_OK) return pw_fail (error, PW_MACHINE, "plots: out of memory");
-  for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, plots_body_name (p, i), i);
+  for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, pw_plot_body_name (p, i), i);
   for (int i = 0; i < m->elements; i++) {
     const pw_element *e = &m->element[i];
     for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
@@ -109,15 +109,24 @@ static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
 
 pw_curves pw_plot_bodies (const pw_plots *p) {
   int count = plots_least (p->bodies, PLOT_CURVES);
-  return (pw_curves){ "motion.dat", "body", count, p->bodies, p->s->bodies, 6, plots_body_name, pw_plot_motion };
+  return (pw_curves){ "motion.dat", "body", count, p->bodies, p->s->bodies, 6, pw_plot_body_name, pw_plot_motion };
 }
 
 pw_curves pw_plot_wheels (const pw_plots *p) {
   int count = plots_least (p->wheels, PLOT_CURVES);
-  return (pw_curves){ "wheels.dat", "wheel", count, p->wheels, p->all_wheels, 3, plots_wheel_name, pw_plot_wheel };
+  return (pw_curves){ "wheels.dat", "wheel", count, p->wheels, p->all_wheels, 3, pw_plot_wheel_name, pw_plot_wheel };
 }
 
 /* ---- One allocation ---- */
+
+/* Numbers that the forces of the largest batch fill. */
+static size_t plots_largest_force (const pw_system *s) {
+  size_t largest = 0;
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++)
+    if (k->kind->force && (size_t)k->b.count * (size_t)k->b.cols > largest)
+      largest = (size_t)k->b.count * (size_t)k->b.cols;
+  return largest;
+}
 
 static void plots_layout (pw_layout *l, pw_plots **plots, const pw_plots *sizes, int contacts) {
   size_t bodies = (size_t)sizes->bodies, wheels = (size_t)sizes->wheels;
@@ -132,6 +141,8 @@ static void plots_layout (pw_layout *l, pw_plots **plots, const pw_plots *sizes,
   p->data = pw_take (l, (size_t)p->wanted * (size_t)p->width, sizeof *p->data);
   p->pose = pw_take (l, (size_t)p->s->bodies + 1, sizeof *p->pose);
   p->contact = pw_take (l, 3 * (size_t)contacts, sizeof *p->contact);
+  p->link = pw_take (l, (size_t)p->links, sizeof *p->link);
+  p->block = pw_take (l, p->links ? plots_largest_force (p->s) : 0, sizeof *p->block);
   *plots = p == &none ? NULL : p;
 }
 
@@ -148,24 +159,32 @@ static pw_plots *plots_allocate (const pw_plots *sizes, int contacts, pw_error *
   return p;
 }
 
-pw_plots *pw_plots_open (const char *folder, const pw_model *m, const pw_system *s, double t_end, pw_error *error) {
+/* A folder that cannot be written is better known before the run. */
+static int plots_try_folder (const pw_plots *p, pw_error *error) {
+  if (pw_plot_folder (p->folder, error) != PW_OK) return error->status;
+  FILE *probe = pw_plot_create (p, "motion.dat", error);
+  if (probe) fclose (probe);
+  return probe ? PW_OK : PW_MACHINE;
+}
+
+pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
+                         pw_error *error) {
   int contacts, all = plots_count_wheels (s, &contacts);
   pw_plots sizes = { .folder = folder, .model = s->model, .s = s, .t_end = t_end };
   sizes.bodies = plots_least (s->bodies, PLOT_SHOWN);
   sizes.all_wheels = all;
   sizes.wheels = plots_least (all, PLOT_SHOWN);
-  sizes.width = PLOT_FIRST + 6 * sizes.bodies + 3 * sizes.wheels;
+  sizes.links = forces ? plots_least (m->elements, PLOT_SHOWN) : 0;
+  sizes.width = PLOT_FIRST + 6 * sizes.bodies + 3 * sizes.wheels + 2 * sizes.links;
   sizes.wanted = plots_least (PLOT_SAMPLES, PLOT_NUMBERS / sizes.width);
   if (sizes.wanted < PLOT_FEW) sizes.wanted = PLOT_FEW;
   sizes.wanted++; /* both ends */
-  if (pw_plot_folder (folder, error) != PW_OK) return NULL;
-  FILE *probe = pw_plot_create (&sizes, "motion.dat", error);
-  if (probe == NULL) return NULL;
-  fclose (probe);
+  if (folder && plots_try_folder (&sizes, error) != PW_OK) return NULL;
   pw_plots *p = plots_allocate (&sizes, contacts, error);
   if (p == NULL) return NULL;
   for (int i = 0; i < p->bodies; i++) p->body[i] = pw_plot_pick (i, p->bodies, s->bodies);
   plots_choose_wheels (p);
+  pw_plot_find_links (p, m);
   if (plots_shapes (p, m, error) == PW_OK) return p;
   free (p);
   return NULL;
@@ -222,6 +241,7 @@ void pw_plots_add (pw_plots *p, const pw_sample *sample) {
     memcpy (motion + 3, sample->v + 3 * p->body[b], 3 * sizeof *motion);
   }
   if (p->wheels > 0) plots_contacts (p, sample, pw_plot_wheel (p, i, 0));
+  if (p->links > 0) pw_plot_forces (p, sample, pw_plot_force (p, i, 0));
 }
 
 void pw_plots_carry (pw_plots *p, pw_archive *a) {
@@ -234,6 +254,7 @@ void pw_plots_carry (pw_plots *p, pw_archive *a) {
 }
 
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
+  if (p->folder == NULL) return PW_OK;
   if (p->samples < 2) {
     fprintf (stderr, "pinwheel: the run is too short for figures: none are drawn in %s\n", p->folder);
     return PW_OK;

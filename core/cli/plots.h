@@ -1,6 +1,7 @@
-/* Figures of a run, drawn by gnuplot: paths, velocities, energies and the mechanism along its way.
+/* What figures and animations keep of a run, and the figures: paths, velocities, energies and the mechanism along its
+ * way, drawn by gnuplot; animations are in animate.h.
  *
- * The folder gets data files (*.dat), gnuplot scripts (*.gp) and what the scripts draw (*.svg, *.png).  A script can
+ * The folder of figures gets data files (*.dat), gnuplot scripts (*.gp) and what the scripts draw (*.svg, *.png).  A script can
  * be edited and run again there: gnuplot FILE.gp. */
 #ifndef PW_PLOTS_H
 #define PW_PLOTS_H
@@ -9,20 +10,22 @@
 
 typedef struct pw_plots pw_plots;
 
-/* Prepares figures of a run from 0 to t_end; the folder is made if need be.  The system must outlive them; the texts
- * too.  Errors: PW_MACHINE if the folder cannot be written or memory is out. */
-pw_plots *pw_plots_open (const char *folder, const pw_model *m, const pw_system *s, double t_end, pw_error *error);
+/* Prepares figures of a run from 0 to t_end: the folder is made if need be; NULL: there will be none.  With `forces`,
+ * those of elements with points are kept as well.  The system must outlive them; the texts too.  Errors: PW_MACHINE if
+ * the folder cannot be written or memory is out. */
+pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
+                         pw_error *error);
 
 /* When the next sample is wanted [s]; INFINITY when there are enough. */
 double pw_plots_next (const pw_plots *p);
 
-/* Takes a sample with the ledger. */
+/* Takes a sample with the ledger, at which the system is placed with J swept (as pw_at leaves it). */
 void pw_plots_add (pw_plots *p, const pw_sample *sample);
 
 /* Saves or loads the samples taken so far. */
 void pw_plots_carry (pw_plots *p, pw_archive *a);
 
-/* Writes data and scripts and, if `draw`, runs gnuplot; a missing gnuplot is no error, but a notice on standard error.
+/* Without a folder, nothing.  Writes data and scripts and, if `draw`, runs gnuplot; a missing gnuplot is no error, but a notice on standard error.
  * Errors: PW_MACHINE if a file cannot be written or gnuplot fails. */
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error);
 

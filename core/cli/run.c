@@ -5,6 +5,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "animate.h"
 #include "profile.h"
 #include "report.h"
 #include "running.h"
@@ -34,6 +35,8 @@ static int run_read (run *x, int argc, const char **argv, pw_error *error) {
     { "output", 'o', POPT_ARG_STRING, &x->csv_path, 0, "Write a table of samples; - is standard output", "FILE.csv" },
     { "json", 0, POPT_ARG_STRING, &x->json_path, 0, "Write a summary; - is standard output", "FILE" },
     { "plots", 0, POPT_ARG_STRING, &x->plots_path, 0, "Draw figures into a folder", "DIR" },
+    { "animate", 0, POPT_ARG_STRING, &x->animate_path, 0, "Write the motion as a page for a browser, or as a picture",
+      "FILE.html|FILE.gif" },
     { "profile", 0, POPT_ARG_NONE, &x->profile, 0, "Measure at the end what each kind and each stage costs", NULL },
     PW_CHECKPOINT_OPTIONS (&x->check),
     POPT_TABLEEND,
@@ -43,6 +46,7 @@ static int run_read (run *x, int argc, const char **argv, pw_error *error) {
 
 /* Opens what will be written, so that nothing is computed in vain. */
 static int run_open_outputs (run *x, pw_error *error) {
+  if (x->animate_path && pw_animation_check (x->animate_path, error) != PW_OK) return error->status;
   if (x->csv_path && x->json_path && strcmp (x->csv_path, x->json_path) == 0)
     return pw_fail (error, PW_INPUT, "-o and --json cannot both write to %s",
                     strcmp (x->csv_path, "-") ? x->csv_path : "standard output (-)");
@@ -64,7 +68,7 @@ static int run_settle (run *x, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--atol", x->atol_text, PW_POSITIVE, &x->settings.atol, error);
   if (status == PW_OK) status = pw_cli_number ("--every", x->every_text, PW_POSITIVE, &x->every, error);
   x->settings.span = x->t_end;
-  x->settings.ledger = x->energy || x->plots_path;
+  x->settings.ledger = x->energy || x->plots_path || x->animate_path;
   return status;
 }
 
@@ -76,7 +80,9 @@ static int run_open (run *x, pw_error *error) {
   if (status == PW_OK) status = run_settle (x, error);
   if (status == PW_OK) status = pw_running_prepare (x, error);
   if (status != PW_OK) return status;
-  if (x->plots_path && (x->plots = pw_plots_open (x->plots_path, x->m.model, x->m.system, x->t_end, error)) == NULL)
+  if ((x->plots_path || x->animate_path) &&
+      (x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error)) ==
+          NULL)
     return error->status;
   x->r = pw_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
@@ -204,11 +210,12 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
   return summary;
 }
 
-/* Figures; who has stopped the run does not wait for gnuplot. */
-static void run_draw (run *x, pw_error *error) {
+/* Figures and animation; who has stopped the run does not wait for gnuplot. */
+static void run_draw (run *x, const char *reason, pw_error *error) {
   pw_error *own = &(pw_error){ 0 };
   if (x->plots == NULL || x->r == NULL) return;
-  pw_plots_finish (x->plots, !pw_stop, own);
+  int status = pw_plots_finish (x->plots, !pw_stop, own);
+  if (status == PW_OK && x->animate_path) pw_animate (x->plots, x->animate_path, x->method, reason, own);
   if (error->status == PW_OK)
     *error = *own;
   else if (own->status != PW_OK)
@@ -231,7 +238,7 @@ static int run_finish (run *x, pw_error *error) {
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
   run_write_json (x, &summary, last, error);
-  run_draw (x, error);
+  run_draw (x, summary.reason, error);
   if (x->profile && last && error->status == PW_OK && !interrupted)
     pw_profile (x->r, last, x->cpu, run_prints_file (x) ? stderr : stdout, error);
   if (interrupted) fprintf (stderr, "pinwheel: %s\n", reason);

@@ -29,6 +29,7 @@ static int running_print (pw_running *x, pw_error *error) {
   pw_print_number (t, "every", NULL, x->every);
   pw_print_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
   pw_print_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
+  pw_print_line (t, "animation", NULL, x->animate_path ? "written" : "not written");
   return PW_OK;
 }
 

@@ -9,7 +9,7 @@
 typedef struct {
   /* as given */
   const char *method, *t_end_text, *step_text, *rtol_text, *atol_text, *every_text;
-  const char *csv_path, *json_path, *plots_path;
+  const char *csv_path, *json_path, *plots_path, *animate_path;
   const char **sets, **starts;
   int energy, profile;
   pw_checkpoints check;

@@ -1,0 +1,70 @@
+/* What tests/animate.sh puts at the end of an animation: it uses the page as a person would and writes down what it
+ * finds as the text of an element "verdict", "ok" if all is well. */
+(async () => {
+  const failures = [], root = document.documentElement.dataset, time = () => Number(root.time);
+  const expect = (what, good) => { if (!good) failures.push(what); };
+  const press = (key, more) => document.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true, ...more }));
+  const wait = ms => new Promise(done => setTimeout(done, ms));
+  const copy = document.createElement("canvas").getContext("2d", { willReadFrequently: true });
+  const drawn = () => {
+    const canvas = document.getElementById("scene");
+    copy.canvas.width = canvas.width;
+    copy.canvas.height = canvas.height;
+    copy.drawImage(canvas, 0, 0);
+    const data = copy.getImageData(0, 0, canvas.width, canvas.height).data;
+    let sum = 0;
+    for (let i = 0; i < data.length; i += 4) sum = (sum * 31 + data[i] + 7 * data[i + 1] + 13 * data[i + 2] + data[i + 3]) % 1000003;
+    return sum;
+  };
+  try {
+    const end = Number(document.getElementById("scrub").max), first = drawn();
+    expect("is ready", root.ready === "true");
+    expect("begins at the start", time() === 0);
+    document.getElementById("play").click();
+    expect("plays", root.playing === "true");
+    await wait(700);
+    const played = time();
+    expect("moves on while it plays", played > 0);
+    expect("draws something else", drawn() !== first);
+    press(" ");
+    expect("pauses", root.playing === "false");
+    await wait(300);
+    expect("stands still", time() === played);
+    const scrub = document.getElementById("scrub");
+    scrub.value = end / 2;
+    scrub.dispatchEvent(new Event("input"));
+    expect("scrubs", Math.abs(time() - end / 2) <= end / 1000);
+    const half = time(), middle = drawn();
+    press("ArrowRight");
+    expect("steps forward", time() > half);
+    press("ArrowLeft");
+    expect("steps back", Math.abs(time() - half) < 1e-9 * end && drawn() === middle);
+    press("End");
+    expect("goes to the end", time() === end);
+    press("Home");
+    expect("goes to the start", time() === 0 && drawn() === first);
+    const speed = document.getElementById("speed"), before = speed.selectedIndex;
+    press("ArrowUp");
+    expect("gets faster", speed.selectedIndex === before + 1);
+    press("+");
+    expect("zooms", drawn() !== first);
+    press("f");
+    expect("fits again", drawn() === first);
+    document.getElementById("traces").click();
+    expect("hides the traces", drawn() !== first);
+    document.getElementById("traces").click();
+    const curves = document.getElementById("curves"), box = curves.getBoundingClientRect();
+    curves.dispatchEvent(new PointerEvent("pointermove", { clientX: box.left + box.width / 2, clientY: box.top + 5, buttons: 1 }));
+    expect("scrubs in the curves", time() > 0.4 * end && time() < 0.6 * end);
+    const which = document.getElementById("which");
+    for (let i = 0; i < which.options.length; i++) {
+      which.selectedIndex = i;
+      which.dispatchEvent(new Event("change"));
+    }
+    expect("has curves", which.options.length >= 6);
+  } catch (e) { failures.push(String(e)); }
+  const verdict = document.createElement("pre");
+  verdict.id = "verdict";
+  verdict.textContent = failures.length ? "fails: " + failures.join("; ") : "ok";
+  document.body.append(verdict);
+})();

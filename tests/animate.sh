@@ -1,0 +1,65 @@
+#!/bin/sh
+# Animations: whole files of the right kind; in a browser without a screen, if there is one, the page loads, plays and
+# scrubs as tests/animate.js asks, without a message on its console.  Reads PINWHEEL, BROWSER.
+
+pinwheel=${PINWHEEL:-build/pinwheel}
+here=$(cd "$(dirname "$0")" && pwd)
+work=$(mktemp -d) || exit 1
+trap 'rm -rf "$work"' EXIT
+trap 'exit 130' INT TERM
+bad=0
+
+# report NAME STATUS
+report () {
+  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
+}
+
+browser=$BROWSER
+for b in chromium chromium-browser google-chrome; do
+  [ -n "$browser" ] || ! command -v $b >/dev/null || browser=$b
+done
+
+# browse PAGE: what becomes of it after some seconds, in $work/dom; messages in $work/console
+browse () {
+  timeout 120 "$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$work/profile" --window-size=1000,760 \
+    --virtual-time-budget=20000 --enable-logging=stderr --v=0 --dump-dom "file://$1" >"$work/dom" 2>"$work/messages"
+  grep ':CONSOLE' "$work/messages" >"$work/console"
+}
+
+for model in ezyroller andrews-squeezer wheeled-snake pendulum car-tyres; do
+  page=$work/$model.html
+  "$pinwheel" run $model --animate "$page" >/dev/null 2>"$work/err"
+  report "$model: the page is written" $?
+  tail -n 1 "$page" | grep -q '</html>' && ! grep -Eq '(src|href)=|https?://|@import|\bNaN\b' "$page"
+  report "$model: it is whole and asks for nothing else" $?
+  [ -n "$browser" ] || { echo "# skipped: no browser was found to show it"; continue; }
+  { sed '$d' "$page" | sed '$d'; echo '<script>'; cat "$here/animate.js"; echo '</script></body></html>'; } >"$work/use.html"
+  browse "$work/use.html"
+  grep -q '<pre id="verdict">ok</pre>' "$work/dom"
+  good=$?
+  report "$model: plays, scrubs, zooms" $good
+  [ $good = 0 ] || grep -ao '<pre id="verdict">[^<]*' "$work/dom"
+  [ ! -s "$work/console" ]
+  report "$model: nothing on the console" $?
+  cat "$work/console"
+done
+
+# gif NAME OPTION...: a picture of this size that moves
+gif () {
+  "$pinwheel" run "$@" --animate "$work/x.gif" >/dev/null 2>"$work/err" &&
+    [ "$(head -c 6 "$work/x.gif")" = GIF89a ] && grep -aq NETSCAPE2.0 "$work/x.gif" && [ ! -s "$work/err" ]
+}
+if command -v gnuplot >/dev/null; then
+  gif ezyroller --t-end 5
+  report 'a GIF that moves' $?
+fi
+PATH=$work/nothing "$(command -v "$pinwheel")" run ezyroller --t-end 1 --animate "$work/none.gif" >/dev/null 2>"$work/err"
+status=$?
+[ $status = 1 ] && grep -q 'gnuplot was not found' "$work/err" && [ ! -e "$work/none.gif" ]
+report 'without gnuplot it says so' $?
+
+"$pinwheel" run ezyroller --animate "$work/x.mp4" >/dev/null 2>"$work/err"
+[ $? = 2 ] && grep -q 'expected a name that ends in .html or .gif' "$work/err"
+report 'another ending is refused' $?
+
+exit $bad

@@ -1,0 +1,107 @@
+/* The data in an animation's page: the run's own, and harmless whatever things are called. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+/* A page written in the folder, whole; to be freed. */
+static char *animate_page (const char *name) {
+  char path[4200];
+  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
+  FILE *f = fopen (path, "rb");
+  assert_non_null (f);
+  char *page = calloc (1, 4000000);
+  assert_non_null (page);
+  assert_in_range (fread (page, 1, 3999999, f), 1000, 3999998);
+  fclose (f);
+  assert_non_null (strstr (page, "</html>"));
+  return page;
+}
+
+/* Where the numbers of an array of the page begin. */
+static const char *animate_array (const char *page, const char *key) {
+  char mark[32];
+  snprintf (mark, sizeof mark, "\n%s:[", key);
+  const char *at = strstr (page, mark);
+  assert_non_null (at);
+  return at + strlen (mark);
+}
+
+/* The first and the last of the numbers, and how many there are. */
+static int animate_numbers (const char *page, const char *key, double *first, double *last) {
+  const char *at = animate_array (page, key), *stop = strchr (at, ']');
+  int n = 0;
+  assert_non_null (stop);
+  while (at < stop) {
+    char *end;
+    *last = strtod (at, &end);
+    if (end == at) break;
+    if (n++ == 0) *first = *last;
+    at = end + strspn (end, ",\n");
+  }
+  return n;
+}
+
+/* The end of the motion is that of the summary; every sample has two bodies of six numbers. */
+static void test_motion (void **state) {
+  double first, last, omega;
+  (void)state;
+  cli_good ("pinwheel run ezyroller --t-end 3 --animate @/run.html --json -");
+  omega = cli_number (cli_out, "bodies", "steer", "omega", NULL);
+  char *page = animate_page ("run.html");
+  int samples = animate_numbers (page, "t", &first, &last);
+  assert_true (samples > 1000 && first >= 0 && first <= 0);
+  check_close ("last time", last, 3, 1e-9, "ten digits");
+  assert_int_equal (animate_numbers (page, "motion", &first, &last), 12 * samples);
+  check_close ("steer.omega", last, omega, 1e-8, "nine digits");
+  assert_int_equal (animate_numbers (page, "contact", &first, &last), 6 * samples);
+  assert_null (cli_file ("run.html.part"));
+  free (page);
+}
+
+/* The pin B and the wheels A and C have points; C carries M / (c + d), here at t = 0. */
+static void test_forces (void **state) {
+  double first, last;
+  (void)state;
+  cli_good ("pinwheel run ezyroller --t-end 1 --animate @/run.html");
+  char *page = animate_page ("run.html");
+  assert_non_null (strstr (page, "{name:\"B\",kind:\"pin\",force:0,ends:[{body:0"));
+  assert_non_null (strstr (page, "{name:\"A\",kind:\"wheel\",force:0,ends:[{body:0"));
+  animate_numbers (page, "force", &first, &last);
+  const char *row = animate_array (page, "force");
+  double f[6];
+  assert_int_equal (sscanf (row + 1, "%lf,%lf,%lf,%lf,%lf,%lf", &f[0], &f[1], &f[2], &f[3], &f[4], &f[5]), 6);
+  check_close ("size of C", f[5] * f[5] + f[4] * f[4], 0.4 * 0.4, 1e-5, "M0 / (c + d) = 0.1 / 0.25, six digits");
+  check_close ("sum on the steering", f[1], f[5], 1e-5, "a massless body: the pin's force on the frame is the wheel's");
+  free (page);
+}
+
+static void test_names (void **state) {
+  (void)state;
+  cli_good ("cp tests/models/arm.yaml '@/a<b>&.yaml'");
+  cli_good (
+      "pinwheel run '@/a<b>&.yaml' --t-end 0.1 --animate @/odd.html 2>/dev/null"); /* a notice: its start was moved */
+  char *page = animate_page ("odd.html");
+  assert_non_null (strstr (page, "model:\"a\\u003cb\\u003e\\u0026\""));
+  assert_null (strstr (page, "a<b>"));
+  free (page);
+}
+
+static void test_refusals (void **state) {
+  (void)state;
+  cli_bad ("pinwheel run ezyroller --animate @/x.avi", 2,
+           "--animate @/x.avi: expected a name that ends in .html or .gif");
+  cli_bad ("pinwheel run ezyroller --t-end 1 --animate @/no/folder.html >/dev/null", 1,
+           "cannot write @/no/folder.html: No such file or directory");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_motion),
+    cmocka_unit_test (test_forces),
+    cmocka_unit_test (test_names),
+    cmocka_unit_test (test_refusals),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
