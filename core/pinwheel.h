@@ -510,7 +510,8 @@ struct pw_kind {
   int unit;                    /* 1: it has two rows, and a body's x and y columns are +1 or -1 times the unit matrix */
   pw_level level;              /* of its rows */
   const pw_quantity *reaction; /* one per row: what -lambda is */
-  const pw_quantity *coordinate; /* one per own coordinate */
+  const pw_quantity *coordinate;                               /* one per own coordinate */
+  const char *(*reaction_unit) (const void *element, int row); /* where it depends on the element; may be NULL */
 
   /* Turns a checked definition into a prepared element; bodies are those it names or acts on, in order, the ground as
    * a body without mass.  own takes mass and start of each own coordinate, zero so far.  Returns a status. */

@@ -119,7 +119,9 @@ char *pw_reaction_name (const pw_system *s, int row, char *buffer, size_t size) 
 
 const char *pw_reaction_unit (const pw_system *s, int row) {
   int e, n;
-  return query_row (s, row, &e, &n)->kind->reaction[n].unit;
+  const pw_slab *k = query_row (s, row, &e, &n);
+  if (k->kind->reaction_unit == NULL) return k->kind->reaction[n].unit;
+  return k->kind->reaction_unit ((const char *)k->b.element + (size_t)e * k->kind->element, n);
 }
 
 char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size) {

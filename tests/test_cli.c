@@ -131,6 +131,38 @@ static void test_list (void **state) {
   assert_null (strstr (cli_out, "ezyroller"));
   cli_good ("pinwheel list kinds");
   assert_non_null (strstr (cli_out, "a knife edge"));
+  assert_null (strstr (cli_out, "required"));
+  cli_good ("pinwheel list kinds rolling-wheel drive");
+  static const char *const told[] = { "- {rolling-wheel: NAME, body: BODY, at: [X, Y], radius: NUMBER}",
+                                      "  radius   number [m]       required (> 0)  radius of the wheel",
+                                      "  inertia  number [kg m^2]  0 (>= 0)        about its axle",
+                                      "states such as BODY.phi",
+                                      "  spin  rad  spin_rate  ",
+                                      "- {drive: NAME, body: [BODY, BODY], what: x, value: SIGNAL}",
+                                      "required: x | y | angle",
+                                      "{expression: .., rate: .., acceleration: ..} of t" };
+  for (size_t i = 0; i < sizeof told / sizeof *told; i++) assert_non_null (strstr (cli_out, told[i]));
+}
+
+/* All kinds: no line is too long, and whatever stands below each other begins in one column. */
+static void test_list_columns (void **state) {
+  (void)state;
+  cli_good ("pinwheel list kinds all");
+  int column = 0, rows = 0;
+  for (char *line = strtok (cli_out, "\n"); line; line = strtok (NULL, "\n")) {
+    assert_true (strlen (line) <= 120);
+    if (strncmp (line, "      ", 6) != 0 || line[6] == ' ') {
+      column = line[4] == ' ' ? column : 0;
+      continue;
+    }
+    const char *type = strstr (line + 6, "  ");
+    assert_non_null (type);
+    type += strspn (type, " ");
+    if (column == 0) column = (int)(type - line);
+    assert_int_equal (type - line, column);
+    rows++;
+  }
+  assert_true (rows > 100);
 }
 
 static void test_show (void **state) {
@@ -181,6 +213,7 @@ int main (void) {
     cmocka_unit_test (test_every),
     cmocka_unit_test (test_locale),
     cmocka_unit_test (test_list),
+    cmocka_unit_test (test_list_columns),
     cmocka_unit_test (test_show),
     cmocka_unit_test (test_help),
     cmocka_unit_test (test_new),

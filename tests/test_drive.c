@@ -1,5 +1,6 @@
 /* drive: a pendulum whose pivot is shaken, a bead moved along a turning rod, a flywheel, starts. */
 #include <math.h>
+#include <string.h>
 #include "check.h"
 #include "scene.h"
 #include "trial.h"
@@ -165,6 +166,11 @@ static void test_flywheel (void **state) {
   const char *reason = "(h w)^4 at h = 1e-3 and w = 2/s";
   check_close ("flywheel", x.q[2], angle * 0.6 / 0.8, bound, reason);
   check_close ("platform", x.q[5], -angle * 0.2 / 0.8, bound, reason);
+  for (int row = 0; row < pw_count_rows (s); row++) {
+    char name[40];
+    int moment = strcmp (pw_reaction_name (s, row, name, sizeof name), "motor.F") == 0;
+    assert_string_equal (pw_reaction_unit (s, row), moment ? "N m" : "N");
+  }
   check_close ("moment", trial_reaction (s, &x, "motor.F"), 0.2 * 12 * cos (2.6) * 0.6 / 0.8, bound, reason);
   check_close ("work", x.work, x.kinetic, bound, reason);
   pw_close (r);

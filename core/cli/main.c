@@ -8,7 +8,7 @@
 #include "util.h"
 
 static const pw_command main_commands[] = {
-  { "list", "[models|methods|kinds|signals]",
+  { "list", "[models|methods|kinds [NAME...]|signals]",
     "what there is: models, methods of integration, kinds of element, signals", pw_cli_list },
   { "show", "MODEL [OPTION...]", "what a model is made of, and its matrices", pw_cli_show },
   { "check", "MODEL [OPTION...]", "mobility, redundant rows, start, derivatives, fast motions of a model",

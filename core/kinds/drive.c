@@ -161,6 +161,11 @@ static const pw_quantity drive_reaction[] = {
     "force on the first body at its point, along what is prescribed; moment on it for an angle" },
 };
 
+static const char *drive_unit (const void *element, int row) {
+  (void)row;
+  return ((const drive *)element)->turn != 0 ? "N m" : "N";
+}
+
 const pw_kind pw_kind_drive = {
   .name = "drive",
   .about = "a relative coordinate or angle of two bodies follows a signal of time",
@@ -172,6 +177,7 @@ const pw_kind pw_kind_drive = {
   .signals = 1,
   .level = PW_HOLONOMIC,
   .reaction = drive_reaction,
+  .reaction_unit = drive_unit,
   .prepare = drive_prepare,
   .g = drive_g,
   .g_size = drive_g_size,
