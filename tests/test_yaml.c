@@ -173,6 +173,27 @@ static void test_states (void **state) {
   text_close (&x);
 }
 
+/* A cart on a wheel whose spin pulls it back, by a force that is written before the wheel and by a torque of its own:
+ * (I + m r^2) spin'' = -(r 0.54 + 0.054) spin. */
+static void test_own_states (void **state) {
+  static const char *const method[] = { "rk4+projection", "ida+ggl" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    double q[4], v[4], bound = i == 0 ? 1e-10 : 1e-6;
+    const char *reason = i == 0 ? "(h k)^4 at h = 1e-3 and k = 3/s" : "1e4 rtol";
+    text x = text_of ("pinwheel: 1\nbodies: [{name: cart, mass: 1, inertia: 1, rate: {vx: 0.2}}]\nelements:\n"
+                      "  - {force: F, body: cart, fx: -0.54*W.spin}\n"
+                      "  - {rolling-wheel: W, body: cart, at: [0, 0], radius: 0.1, inertia: 0.002,\n"
+                      "     torque: -0.05*W.spin - 0.004*W.spin - 0*W.spin_rate}\n",
+                      NULL, 0);
+    runs_state (x.system, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2 }, 2, q, v, NULL);
+    check_close ("spin", q[3], 2 / 3. * sin (3 * 2), bound, reason);
+    check_close ("its rate", v[3], 2 * cos (3 * 2), bound, reason);
+    check_close ("x", q[0], 0.1 * q[3], bound, reason);
+    text_close (&x);
+  }
+}
+
 /* The signal of a drive with its derivatives: value, rate and acceleration at a time; a system's context outlives the model. */
 static void test_drive (void **state) {
   text x =
@@ -240,9 +261,10 @@ static int text_teardown (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_ezyroller), cmocka_unit_test (test_table),       cmocka_unit_test (test_parameters),
-    cmocka_unit_test (test_let),       cmocka_unit_test (test_time),        cmocka_unit_test (test_states),
-    cmocka_unit_test (test_drive),     cmocka_unit_test (test_derivatives), cmocka_unit_test (test_no_value),
+    cmocka_unit_test (test_ezyroller),  cmocka_unit_test (test_table), cmocka_unit_test (test_parameters),
+    cmocka_unit_test (test_let),        cmocka_unit_test (test_time),  cmocka_unit_test (test_states),
+    cmocka_unit_test (test_own_states), cmocka_unit_test (test_drive), cmocka_unit_test (test_derivatives),
+    cmocka_unit_test (test_no_value),
   };
   return cmocka_run_group_tests (tests, text_setup, text_teardown);
 }

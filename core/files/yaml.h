@@ -6,6 +6,7 @@
  *   yaml.c         the head of a model: parameters and run defaults, which make a plug-in's table
  *   yaml_build.c   bodies and elements, through the field tables of their kinds
  *   yaml_signal.c  signals
+ *   yaml_state.c   states that expressions name
  *   yaml_table.c   points of tables, in the model or in a file */
 #ifndef PW_YAML_H
 #define PW_YAML_H
@@ -108,6 +109,7 @@ typedef struct {
   pw_expression *x;        /* an evaluator that knows both */
   pw_names bodies;         /* names of bodies, to their index */
   pw_names all;            /* names of bodies and elements, to the index in nodes */
+  pw_names elements;       /* once an expression asks for them: names of all elements, to the index of their kinds */
   const pw_node **node;    /* where each was named */
   int named;
 } pw_yaml_builder;
@@ -122,6 +124,15 @@ int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, c
 /* The points of a table (yaml_table.c): the values of `points`, `file` and `columns`, NULL where not given. */
 int pw_yaml_points (pw_yaml_builder *b, const char *what, const pw_node *node, const pw_node *const v[3], pw_signal *s,
                     pw_error *error);
+
+/* What is being read, for messages. */
+typedef struct {
+  const pw_node *node;
+  const char *what; /* "torque T: value" */
+} pw_yaml_reading;
+
+/* Checks a name with a dot, at an offset of the text read, to be that of a state (yaml_state.c). */
+int pw_yaml_state (pw_yaml_builder *b, const pw_yaml_reading *r, const char *name, size_t at, pw_error *error);
 
 /* Reads a signal of a kind into a field (yaml_signal.c). */
 int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,

@@ -259,6 +259,7 @@ void pw_yaml_build (pw_model *m, const void *parameters) {
   pw_expression_close (b.x);
   pw_names_close (&b.bodies);
   pw_names_close (&b.all);
+  pw_names_close (&b.elements);
   free (b.node);
   free (b.let);
   free (definition);

@@ -112,25 +112,6 @@ typedef struct {
   pw_error *error;
 } signal_reader;
 
-static int signal_state_name (signal_reader *r, const char *name, size_t at) {
-  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega", NULL };
-  const pw_yaml *y = r->b->y;
-  char body[100], hint[100];
-  size_t n = strcspn (name, ".");
-  int i = 0;
-  snprintf (body, sizeof body, "%.*s", (int)n, name);
-  if (pw_names_find (&r->b->bodies, body) < 0) {
-    pw_nearest near = { .sought = body };
-    for (int k = 0; k < r->b->m->bodies; k++) pw_nearest_try (&near, r->b->m->body[k].name);
-    return pw_yaml_fail (y, pw_yaml_place (y, r->node, at), r->error, "%s: there is no body \"%s\"%s", r->what, body,
-                         pw_nearest_text (&near, hint, sizeof hint));
-  }
-  while (part[i] && strcmp (part[i], name + n + 1) != 0) i++;
-  if (part[i]) return PW_OK;
-  return pw_yaml_fail (y, pw_yaml_place (y, r->node, at + n + 1), r->error,
-                       "%s: a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"", r->what, name + n + 1);
-}
-
 /* Notes a state the expression reads. */
 static int signal_note (void *context, const char *name, size_t length, size_t at) {
   signal_reader *r = context;
@@ -143,7 +124,8 @@ static int signal_note (void *context, const char *name, size_t length, size_t a
   if (!r->forced)
     return pw_yaml_fail (r->b->y, pw_yaml_place (r->b->y, r->node, at), r->error,
                          "%s: \"%s\": the signal of a constraint depends on the time t alone", r->what, text);
-  if (signal_state_name (r, text, at) != PW_OK) return r->error->status;
+  if (pw_yaml_state (r->b, &(pw_yaml_reading){ r->node, r->what }, text, at, r->error) != PW_OK)
+    return r->error->status;
   if (f->states == SIGNAL_STATES || length >= sizeof text)
     return pw_yaml_fail (r->b->y, pw_yaml_place (r->b->y, r->node, at), r->error, "%s: more than %d states", r->what,
                          SIGNAL_STATES);
