@@ -121,7 +121,7 @@ $(call obj,core/cli/animate_page.c): $(BUILD)/obj/core/cli/animate.inc
 $(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
-$(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/effects.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
+$(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/eighth.o $(BUILD)/obj/benchmarks/effects.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
 $(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -iquote core -I$(BUILD)/include
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
@@ -193,6 +193,7 @@ $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 
 $(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
 $(BUILD)/benchmarks/engine: EXTRA_LIBS := $(SOLVER_LIBS)
+$(BUILD)/benchmarks/eighth: $(call obj,$(addprefix benchmarks/,baseline/ezyroller.c baseline/runge_kutta.c engine/scenes.c))
 $(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
 $(BUILD)/benchmarks/hard: $(call obj,$(HARD))
 $(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml

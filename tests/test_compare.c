@@ -105,7 +105,8 @@ static void test_row_is_run (void **state) {
   for (int m = 0; m < 3; m++) {
     char command[600];
     snprintf (command, sizeof command,
-              "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 -o @/as-run "
+              "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 --repeats 2 -o "
+              "@/as-run "
               ">@/table\npinwheel run ezyroller --method %s --t-end 2 --rtol 1e-6 --step 0.01 --json -",
               method[m], method[m]);
     cli_good (command);
@@ -115,6 +116,7 @@ static void test_row_is_run (void **state) {
     } same[] = { { "statistics", "steps", STEPS },         { "statistics", "rhs", RHS },
                  { "statistics", "jacobians", JACOBIANS }, { "statistics", "factorisations", FACTORISATIONS },
                  { "residual", "position", POSITION },     { "residual", "velocity", VELOCITY } };
+    assert_true (compare_number ("as-run/compare.csv", 0, REPEATS) == 2);
     for (size_t i = 0; i < sizeof same / sizeof *same; i++)
       assert_true (compare_number ("as-run/compare.csv", 0, same[i].column) ==
                    cli_number (cli_out, same[i].group, same[i].key, NULL));
@@ -226,6 +228,8 @@ static void test_bad (void **state) {
     { "ezyroller --methods rk4,", "--methods \"rk4,\": a name is missing" },
     { "ezyroller --limt 3", "compare has no option \"--limt\"; did you mean \"--limit\"?" },
     { "ezyroller --limit 0", "--limit 0: expected a number > 0" },
+    { "ezyroller --repeats 0.5", "--repeats 0.5: expected a whole number >= 1" },
+    { "ezyroller --repeats 100", "--repeats 100: at most 99" },
     { "ezyroller --t-end nan", "--t-end nan: expected a finite number" },
     { "ezyroller --rtol-ladder 1e-3:x", "--rtol-ladder: \"x\" is not a number" },
     { "ezyroller --step-ladder 0:1", "--step-ladder 0: expected a number > 0" },

@@ -41,6 +41,22 @@ void ezy_massless (const ezy *e, double t, const double *q, const double *v, dou
 void ezy_massive_step (const ezy *e, double h, ezy_state *s);
 void ezy_massless_step (const ezy *e, double h, ezy_state *s);
 
+/* Makes a state consistent, positions first, with its accelerations; q and v are scratch afterwards. */
+void ezy_project (const ezy *e, double t, double q[6], double v[6], ezy_state *s);
+
+/* A step of any explicit Runge-Kutta method: stages by `rate`, then `project` as ezy_project does.  c and b have
+ * `stages` entries, A the rows below its diagonal, one after the other. */
+typedef struct {
+  int stages;
+  const double *c, *A, *b;
+} ezy_tableau;
+typedef struct {
+  void (*rate) (void *context, double t, const double *q, const double *v, double *a, double *lambda);
+  void (*project) (void *context, double t, double *q, double *v, ezy_state *s);
+  void *context;
+} ezy_dynamics;
+void ezy_step (const ezy_tableau *b, const ezy_dynamics *d, double t1, ezy_state *s);
+
 /* Minimal coordinates (A.x, A.y, phi1, phi2, speed u of A along the frame, phi1'): their rates, for any mass. */
 void ezy_minimal (const ezy *e, double t, const double y[6], double rate[6]);
 

@@ -208,15 +208,15 @@ static inline double ezy_stages (const ezy *e, ezy_rhs *rhs, double h, const ezy
 }
 
 /* One factorisation serves the rates and the accelerations. */
-void ezy_massive_step (const ezy *e, double h, ezy_state *s) {
-  double r[4], mu[4], pull[6], q[6], v[6], T = ezy_stages (e, ezy_massive_by, h, s, q, v);
+static inline void ezy_massive_end (const ezy *e, double t, double T, double *q, double *v, ezy_state *s) {
+  double r[4], mu[4], pull[6];
   ezy_pose x = ezy_close_hinge (e, q);
   ezy_factor f = ezy_factorise (e, &x);
   ezy_rows (&e->p, &x, v, r);
   ezy_solve (e, &f, r, mu);
   ezy_pull (&e->p, &x, mu, pull);
-  s->t += h;
-  memcpy (s->q, q, sizeof q);
+  s->t = t;
+  memcpy (s->q, q, sizeof s->q);
   s->v[0] = v[0] - e->i1 * pull[0];
   s->v[1] = v[1] - e->i1 * pull[1];
   s->v[2] = v[2] - e->k1 * pull[2];
@@ -227,13 +227,12 @@ void ezy_massive_step (const ezy *e, double h, ezy_state *s) {
 }
 
 /* Body 1 changes only by wheel A's impulse; body 2's rates follow from body 1's. */
-void ezy_massless_step (const ezy *e, double h, ezy_state *s) {
+static inline void ezy_massless_end (const ezy *e, double t, double T, double *q, double *v, ezy_state *s) {
   const ezy_model *p = &e->p;
-  double q[6], v[6], T = ezy_stages (e, ezy_massless_by, h, s, q, v);
   ezy_pose x = ezy_close_hinge (e, q);
   double mu = e->SA * (x.c1 * v[1] - x.s1 * v[0] - p->a * v[2]);
-  s->t += h;
-  memcpy (s->q, q, sizeof q);
+  s->t = t;
+  memcpy (s->q, q, sizeof s->q);
   s->v[0] = v[0] + e->i1 * x.s1 * mu;
   s->v[1] = v[1] - e->i1 * x.c1 * mu;
   s->v[2] = v[2] + e->k1 * p->a * mu;
@@ -242,6 +241,20 @@ void ezy_massless_step (const ezy *e, double h, ezy_state *s) {
   s->v[3] = Bx - p->d * x.s2 * s->v[5];
   s->v[4] = By + p->d * x.c2 * s->v[5];
   ezy_massless_solve (e, &x, T, s->v, s->a, s->lambda);
+}
+
+void ezy_massive_step (const ezy *e, double h, ezy_state *s) {
+  double q[6], v[6], T = ezy_stages (e, ezy_massive_by, h, s, q, v);
+  ezy_massive_end (e, s->t + h, T, q, v, s);
+}
+
+void ezy_massless_step (const ezy *e, double h, ezy_state *s) {
+  double q[6], v[6], T = ezy_stages (e, ezy_massless_by, h, s, q, v);
+  ezy_massless_end (e, s->t + h, T, q, v, s);
+}
+
+void ezy_project (const ezy *e, double t, double q[6], double v[6], ezy_state *s) {
+  (e->p.m2 > 0 ? ezy_massive_end : ezy_massless_end) (e, t, ezy_torque (e, t), q, v, s);
 }
 
 void ezy_start (const ezy *e, ezy_state *s) {

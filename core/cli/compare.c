@@ -20,6 +20,10 @@ static int compare_read (pw_compare *x, int argc, const char **argv, pw_error *e
       "FROM:TO" },
     { "limit", 0, POPT_ARG_STRING, &x->limit_text, 0,
       "Processor time a single run may take [s]; what would take longer is not run (default 10)", "SECONDS" },
+    { "repeats", 0, POPT_ARG_STRING, &x->repeats_text, 0,
+      "Runs of each rung on the clock, of which the median counts, at most 99 (default 9); half a second of them is "
+      "enough",
+      "N" },
     { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
     PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
     { "truth", 0, POPT_ARG_STRING, &x->truth_path, 0,
@@ -49,8 +53,12 @@ static int compare_open (pw_compare *x, pw_error *error) {
   if (status != PW_OK) return status;
   x->t_end = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
   x->limit = 10;
+  x->repeats = 9;
   status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &x->t_end, error);
   if (status == PW_OK) status = pw_cli_number ("--limit", x->limit_text, PW_POSITIVE, &x->limit, error);
+  if (status == PW_OK) status = pw_cli_number ("--repeats", x->repeats_text, PW_COUNT, &x->repeats, error);
+  if (status == PW_OK && x->repeats > COMPARE_REPEATS)
+    return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", x->repeats_text, COMPARE_REPEATS);
   if (status == PW_OK) status = pw_compare_methods (x, error);
   return status == PW_OK ? compare_open_csv (x, error) : status;
 }

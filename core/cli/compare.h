@@ -11,7 +11,7 @@
 #include "contestants.h"
 #include "progress.h"
 
-enum { COMPARE_SAMPLES = 100, COMPARE_REPEATS = 9, COMPARE_PARTNERS = 3 };
+enum { COMPARE_SAMPLES = 100, COMPARE_REPEATS = 99, COMPARE_PARTNERS = 3 };
 
 /* Errors: the largest of the coordinates and rates of a unit, at the end, then over all samples; of the multipliers
  * relative to the largest one of the same unit. */
@@ -63,7 +63,7 @@ typedef struct {
 
 typedef struct {
   /* as given */
-  const char *methods_text, *rtol_text, *step_text, *limit_text, *t_end_text, *truth_path, *folder;
+  const char *methods_text, *rtol_text, *step_text, *limit_text, *repeats_text, *t_end_text, *truth_path, *folder;
   const char **sets, **starts;
   /* as understood */
   pw_cli_line line;
@@ -71,6 +71,7 @@ typedef struct {
   pw_contestants list;
   pw_ladder ladder[2]; /* of steps, of tolerances */
   double t_end, limit; /* [s] */
+  double repeats;      /* of a run on the clock, at most */
   /* under way */
   pw_truth truth;
   pw_rung *row;
@@ -101,7 +102,7 @@ int pw_motion_unit (const pw_system *s, int state);
  * interrupted, or r->state is COMPARE_STOPPED. */
 int pw_compare_run (pw_compare *x, pw_rung *r, pw_motion *motion, pw_error *error);
 /* The order observed between two rungs of a ladder: log (error before / error) over log (steps / steps before); NaN
- * where an error is not known, or no better than the truth. */
+ * where an error is not known or no better than the truth, and where the steps are much the same. */
 double pw_compare_order (const pw_rung *before, const pw_rung *r);
 /* Fills a row: errors, then times.  PW_RETRY if interrupted; PW_MACHINE, PW_START; a method's failure is in the row. */
 int pw_compare_row (pw_compare *x, pw_rung *r, pw_motion *scratch, pw_error *error);

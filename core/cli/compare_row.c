@@ -8,6 +8,7 @@
 #define ROW_SHORT 0.005 /* a batch of steps that took less processor time [s] may be longer the next time */
 #define ROW_LONG 0.02
 #define ROW_FEW 3      /* repeats at least, unless the limit forbids it */
+#define ROW_FINER 1.2  /* times as many steps tell an order */
 #define ROW_ENOUGH 0.5 /* more are made until they have taken so long [s] */
 
 /* ---- A run ---- */
@@ -45,7 +46,7 @@ static int row_steps (pw_compare *x, pw_rung *r, pw_run *run, pw_motion *m, pw_e
     if (status == PW_OK) status = row_samples (x, r, run, m, &next, error);
     if (used < ROW_SHORT && n == batch && batch < 65536) batch *= 2;
     if (used > ROW_LONG && batch > 1) batch /= 2;
-    pw_progress_at (&x->progress, x->rows + fmin (pw_time (run) / x->t_end, 1) / (COMPARE_REPEATS + 1));
+    pw_progress_at (&x->progress, x->rows + fmin (pw_time (run) / x->t_end, 1) / (x->repeats + 1));
     if (pw_stop) return PW_RETRY;
     if (status == PW_OK && r->cpu > x->limit && pw_time (run) < x->t_end) {
       r->state = COMPARE_STOPPED;
@@ -94,7 +95,7 @@ double pw_compare_order (const pw_rung *before, const pw_rung *r) {
   int known = before->state == COMPARE_DONE && r->state == COMPARE_DONE && !((before->below | r->below) >> i & 1);
   double finer =
       r->method->adaptive ? (double)r->statistics.steps / (double)before->statistics.steps : before->rung / r->rung;
-  return known && finer > 1 ? log (before->error[i] / r->error[i]) / log (finer) : NAN;
+  return known && finer > ROW_FINER ? log (before->error[i] / r->error[i]) / log (finer) : NAN;
 }
 
 static int row_compare (const void *a, const void *b) {
@@ -105,11 +106,11 @@ static int row_compare (const void *a, const void *b) {
 static int row_times (pw_compare *x, pw_rung *r, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;
-  while (n < COMPARE_REPEATS && !(n >= ROW_FEW && sum > ROW_ENOUGH) && sum <= x->limit) {
+  while (n < x->repeats && !(n >= ROW_FEW && sum > ROW_ENOUGH) && sum <= x->limit) {
     int status = pw_compare_run (x, r, NULL, error);
     if (status != PW_OK) return status;
     sum += cpu[n++] = r->cpu;
-    pw_progress_at (&x->progress, x->rows + (n + 1.0) / (COMPARE_REPEATS + 1));
+    pw_progress_at (&x->progress, x->rows + (n + 1.0) / (x->repeats + 1));
   }
   qsort (cpu, (size_t)n, sizeof *cpu, row_compare);
   r->repeats = n;
