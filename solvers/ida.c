@@ -35,16 +35,10 @@ static int ida_work (pw_real t, N_Vector vy, N_Vector vyp, N_Vector rate, void *
   return 0;
 }
 
-/* The first step: an order 1 method's error, h^2 / T^2, at the tolerance. */
-static double ida_first_step (const ida_data *d) {
-  const pw_run *r = d->run;
-  return 0.5 * r->s->scale.time * sqrt (r->settings.rtol);
-}
-
 /* The coefficient c of the current step, 1 / h before there is one; not below 1 / T. */
 static double ida_leading (const ida_data *d) {
   pw_real c = 0;
-  if (d->run->t == d->begun || IDAGetCurrentCj (d->ida, &c) != IDA_SUCCESS || c == 0) c = 1 / ida_first_step (d);
+  if (d->run->t == d->begun || IDAGetCurrentCj (d->ida, &c) != IDA_SUCCESS || c == 0) c = 1 / pw_first_step (d->run);
   return fmax (c, 1 / d->run->s->scale.time);
 }
 
@@ -80,12 +74,6 @@ static int ida_weights (N_Vector vy, N_Vector weights, void *user) {
   }
   ida_weigh_multipliers (d, y, force, w);
   return 0;
-}
-
-static void ida_message (int code, const char *module, const char *function, char *text, void *user) {
-  ida_data *d = user;
-  (void)code, (void)module, (void)function;
-  snprintf (d->message, sizeof d->message, "%s", text);
 }
 
 /* ---- Opening ---- */
@@ -135,14 +123,14 @@ static int ida_open_solver (ida_data *d) {
   d->solver = SUNLinSol_KLU (d->y, d->matrix, d->context);
   d->ida = IDACreate (d->context);
   if (d->ida == NULL || d->solver == NULL) return PW_MACHINE;
-  flag |= IDASetErrHandlerFn (d->ida, ida_message, d);
+  flag |= IDASetErrHandlerFn (d->ida, pw_sun_message, &d->said);
   flag |= IDASetUserData (d->ida, d);
   flag |= IDAInit (d->ida, pw_ida_residual, r->t, d->y, d->yp);
   flag |= IDAWFtolerances (d->ida, ida_weights);
   flag |= IDASetId (d->ida, d->id);
   flag |= IDASetSuppressAlg (d->ida, 1);
   flag |= IDASetMaxNumSteps (d->ida, -1);
-  flag |= IDASetInitStep (d->ida, ida_first_step (d));
+  flag |= IDASetInitStep (d->ida, pw_first_step (d->run));
   flag |= IDASetLinearSolver (d->ida, d->solver, d->matrix);
   flag |= IDASetJacFn (d->ida, pw_ida_matrix);
   if (r->settings.ledger && r->s->entries > 0) {
@@ -222,7 +210,7 @@ static int ida_fail (ida_data *d, int flag, pw_error *error) {
                     : flag == IDA_LSETUP_FAIL  ? "the Newton matrix is singular"
                     : flag == IDA_RES_FAIL     ? "a signal failed"
                     : flag == IDA_TOO_MUCH_ACC ? "the tolerance is beyond the accuracy of the machine"
-                                               : d->message;
+                                               : d->said.text;
   ida_statistics (d);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", d->run->t, why, d->run->settings.rtol);
 }
@@ -279,9 +267,9 @@ static int ida_restart (pw_run *r, pw_error *error) {
   d->stop = NAN;
   d->begun = r->t;
   d->before = r->statistics;
-  IDASetInitStep (d->ida, ida_first_step (d));
+  IDASetInitStep (d->ida, pw_first_step (d->run));
   if (IDAReInit (d->ida, r->t, d->y, d->yp) == IDA_SUCCESS) return PW_OK;
-  return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, d->message);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, d->said.text);
 }
 
 static const pw_stabilisation ida_stabilisations[] = {

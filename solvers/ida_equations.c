@@ -7,7 +7,6 @@
  *
  * with D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
  * Gear 1988).  In si1 the unknowns are the integrals of the multipliers, and called lambda and mu as well. */
-#include <assert.h>
 #include <string.h>
 #include "ida_state.h"
 
@@ -148,37 +147,23 @@ static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, dou
     pw_tangent_accelerations (&d->tangent, &to, y + n, yp + n);
 }
 
-/* IDA clears the pattern together with the values before each evaluation. */
-static void ida_matrix_pattern (const ida_data *d, SUNMatrix matrix) {
-  const pw_tangent *x = &d->tangent;
-  memcpy (SUNSparseMatrix_IndexPointers (matrix), x->colptr, ((size_t)d->size + 1) * sizeof *x->colptr);
-  memcpy (SUNSparseMatrix_IndexValues (matrix), x->rowind, (size_t)x->colptr[d->size] * sizeof *x->rowind);
-}
-
 int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix, void *data,
                    N_Vector t1, N_Vector t2, N_Vector t3) {
   ida_data *d = data;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
   (void)residual, (void)t1, (void)t2, (void)t3;
   if (pw_ida_place (d, t, y) != 0) return -1;
-  double *value = SUNSparseMatrix_Data (matrix);
-  ida_matrix_pattern (d, matrix);
-  memset (value, 0, (size_t)d->tangent.colptr[d->size] * sizeof *value);
-  pw_tape_fill (&d->tangent.tape, value);
+  pw_sun_clear (matrix, d->tangent.colptr, d->tangent.rowind);
+  pw_tape_fill (&d->tangent.tape, SUNSparseMatrix_Data (matrix));
   ida_matrix_fill (d, y, yp, c);
   return 0;
 }
-
-/* SUNDIALS' index type is 64 bits wide, as the tape's. */
-static_assert (sizeof (sunindextype) == sizeof (int64_t), "SUNDIALS with 64-bit indices is expected");
 
 int pw_ida_open_matrix (ida_data *d) {
   pw_tangent *x = &d->tangent;
   pw_tape_record (&x->tape);
   ida_matrix_fill (d, N_VGetArrayPointer (d->y), N_VGetArrayPointer (d->yp), 1);
   if (pw_tape_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
-  d->matrix = SUNSparseMatrix (d->size, d->size, x->colptr[d->size], CSC_MAT, d->context);
-  if (d->matrix == NULL) return PW_MACHINE;
-  ida_matrix_pattern (d, d->matrix);
-  return PW_OK;
+  d->matrix = pw_sun_matrix (d->size, x->colptr, x->rowind, d->context);
+  return d->matrix ? PW_OK : PW_MACHINE;
 }

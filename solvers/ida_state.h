@@ -28,7 +28,7 @@ struct pw_method_data {
   double stop;          /* the stop time IDA knows */
   double begun;         /* time of the start or the last restart */
   pw_statistics before; /* what was counted up to then: IDA counts from there */
-  char message[256];    /* the last one IDA sent */
+  pw_sun_said said;
 };
 
 typedef struct pw_method_data ida_data;

@@ -66,6 +66,12 @@ int pw_fixed_steps (const pw_run *r);
 /* 1 if the run's stabilisation has this name. */
 int pw_stabilised_by (const pw_run *r, const char *name);
 
+/* Stabilisations of methods that integrate the accelerations. */
+#define PW_ACCELERATION_STABILISATIONS                                               \
+  { "none", "accelerations only: the constraints drift" }, {                         \
+    "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)" \
+  }
+
 /* Baumgarte's options, the same for all integrators that have them, and their way into r->alpha and r->beta. */
 #define PW_BAUMGARTE_OPTIONS                                                                   \
   { .name = "alpha",                                                                           \
@@ -79,6 +85,23 @@ int pw_stabilised_by (const pw_run *r, const char *name);
     .about = "stiffness of the position residuals"                                             \
   }
 void pw_read_baumgarte (pw_run *r);
+
+/* Those of the projection, read by pw_projector_open_asked, but for `every`. */
+#define PW_PROJECTION_OPTIONS                                                                         \
+  { .name = "metric",                                                                                 \
+    .with = "projection",                                                                             \
+    .choices = pw_metrics,                                                                            \
+    .about = "norm in which the correction is smallest: mass matrix, or identity (pseudo-inverse)" }, \
+  {                                                                                                   \
+    .name = "every", .with = "projection", .value = 1, .domain = PW_COUNT, .unit = "steps",           \
+    .about = "project after each so many steps"                                                       \
+  }
+extern const char *const pw_metrics[];
+
+/* A first step for methods that begin with order 1: its error, h^2 / T^2, is at the tolerance. */
+static inline double pw_first_step (const pw_run *r) {
+  return 0.5 * r->s->scale.time * sqrt (r->settings.rtol);
+}
 
 /* Plans the linear algebra at the state reached, where J is swept, and opens the method there.  fresh: what a small pivot
  * is follows from those here; else it stays what it was. */
@@ -124,6 +147,8 @@ typedef struct {
 /* Position metric `weight_q` and velocity metric `weight_v` (NULL: the run's own saddle with the mass matrix).  The
  * system must be placed at a typical pose with J swept. */
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error);
+/* The same with the metric that the method's options ask for. */
+int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error);
 void pw_projector_close (pw_projector *p);
 
 /* Gauss-Newton on g(q) = 0 to round-off: minimal changes in the metric.  Leaves the system placed at (t, q, v) with J
@@ -132,6 +157,10 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
 
 /* One linear solve for J v = eta at the placed pose; the rates are placed.  PW_RETRY if singular. */
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
+
+/* Takes from an error of positions or rates what a projection onto the first so many rows removes.  The run's saddle is
+ * factorised at the placed pose. */
+void pw_project_error (pw_run *r, double *e, int rows);
 
 /* ---- Start ---- */
 

@@ -43,6 +43,9 @@ static int methods_integrator (const char *name, const pw_method **method, pw_er
 static int methods_stabilisation (const pw_method *method, const char *name, int *stabilisation, pw_error *error) {
   pw_nearest near = { .sought = name };
   char hint[100];
+  for (const pw_stabilisation *s = method->refused; s && s->name; s++)
+    if (strcmp (s->name, name) == 0)
+      return pw_fail (error, PW_INPUT, "integrator %s has no %s: %s", method->name, name, s->about);
   for (int i = 0; method->stabilisations[i].name; i++) {
     pw_nearest_try (&near, method->stabilisations[i].name);
     if (strcmp (method->stabilisations[i].name, name) == 0) {

@@ -4,10 +4,12 @@
 
 #include "pinwheel-solvers.h"
 
-#define PW_METHODS \
-  PW_METHOD (rk4)  \
-  PW_METHOD (erk5) \
-  PW_METHOD (erk8) \
+#define PW_METHODS  \
+  PW_METHOD (rk4)   \
+  PW_METHOD (erk5)  \
+  PW_METHOD (erk8)  \
+  PW_METHOD (adams) \
+  PW_METHOD (bdf)   \
   PW_METHOD (ida)
 
 /* pw_parse_method that keeps the options: values has room for PW_MAX_OPTIONS. */

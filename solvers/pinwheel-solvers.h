@@ -40,6 +40,7 @@ typedef struct {
   int order;                              /* of convergence, of fixed-step methods; 0: variable */
   const pw_stabilisation *stabilisations; /* ended by a NULL name; the first one is taken if none is named */
   const pw_option *options;               /* ended by a NULL name */
+  const pw_stabilisation *refused;        /* those it cannot have, each with the reason; ended likewise, or NULL */
   int (*open) (pw_run *r, pw_error *error);
   int (*advance) (pw_run *r, double t_end, pw_error *error);
   int (*at) (pw_run *r, double t, pw_error *error); /* leaves the state in the run's sample arrays */

@@ -24,6 +24,20 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
   return PW_MACHINE;
 }
 
+const char *const pw_metrics[] = { "mass", "identity", NULL };
+
+/* The identity metric weighs metres and radians alike, as the plain pseudo-inverse does. */
+int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error) {
+  pw_system *s = r->s;
+  if (pw_option_value (r, "metric") == 0) return pw_projector_open (p, r, s->metric, NULL, error);
+  double *one = malloc ((size_t)s->coords * sizeof *one);
+  if (one == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  for (int j = 0; j < s->coords; j++) one[j] = 1;
+  int status = pw_projector_open (p, r, one, one, error);
+  free (one);
+  return status;
+}
+
 void pw_projector_close (pw_projector *p) {
   pw_saddle_close (p->position);
   if (p->own_velocity) pw_saddle_close (p->velocity);
@@ -96,4 +110,14 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   if (pw_saddle_below (p->velocity, r->watch)) project_once (p, r->s, v, 0);
   pw_place_rates (r->s, v);
   return PW_OK;
+}
+
+/* e += W^-1 J^T ..., J e = 0 */
+void pw_project_error (pw_run *r, double *e, int rows) {
+  pw_system *s = r->s;
+  double *right = r->scratch, *mu = right + s->rows, *de = mu + s->rows;
+  pw_mul_J (s, e, right);
+  for (int i = 0; i < s->rows; i++) right[i] = i < rows ? -right[i] : 0;
+  pw_saddle_solve (r->saddle, NULL, right, de, mu);
+  for (int j = 0; j < s->coords; j++) e[j] += de[j];
 }

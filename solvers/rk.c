@@ -11,7 +11,6 @@
 #include "unroll.h"
 #include "util.h"
 
-static const char *const rk_metrics[] = { "mass", "identity", NULL };
 static const char *const rk_steps[] = { "adaptive", "fixed", NULL };
 static const char *const rk_positions[] = { "projected", "drift", NULL };
 static const char *const rk_inputs[] = { "stage", "held", NULL };
@@ -31,16 +30,7 @@ const pw_option pw_rk_options[] = {
     .choices = rk_inputs,
     .about = "signals of forces at stage times, or held from the step's start (first order)" },
   PW_BAUMGARTE_OPTIONS,
-  { .name = "metric",
-    .with = "projection",
-    .choices = rk_metrics,
-    .about = "norm in which the correction is smallest: mass matrix, or identity (pseudo-inverse)" },
-  { .name = "every",
-    .with = "projection",
-    .value = 1,
-    .domain = PW_COUNT,
-    .unit = "steps",
-    .about = "project after each so many steps" },
+  PW_PROJECTION_OPTIONS,
   { .name = "positions",
     .with = "nullspace",
     .choices = rk_positions,
@@ -89,19 +79,6 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
   return PW_OK;
 }
 
-/* The identity metric weighs metres and radians alike, as the plain pseudo-inverse does. */
-static int rk_open_projector (pw_run *r, pw_error *error) {
-  pw_system *s = r->s;
-  if (!r->data->projects || pw_option_value (r, "metric") == 0)
-    return pw_projector_open (&r->data->projector, r, s->metric, NULL, error);
-  double *one = malloc ((size_t)s->coords * sizeof *one);
-  if (one == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  for (int j = 0; j < s->coords; j++) one[j] = 1;
-  int status = pw_projector_open (&r->data->projector, r, one, one, error);
-  free (one);
-  return status;
-}
-
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   struct pw_method_data *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
@@ -115,7 +92,7 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->every = (int)pw_option_value (r, "every");
   pw_read_baumgarte (r);
   if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  int status = d->projects || d->closes ? rk_open_projector (r, error) : PW_OK;
+  int status = d->projects || d->closes ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
   if (status == PW_OK && d->minimal) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;
 }

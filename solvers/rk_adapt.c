@@ -27,17 +27,6 @@ static void adapt_estimate (const pw_run *r, const double *e, const double *firs
   }
 }
 
-/* Takes from an error what the projection has removed: e += W^-1 J^T ..., J e = 0 for as many rows.  The saddle is
- * factorised at the new state. */
-static void adapt_project (pw_run *r, double *e, int rows) {
-  pw_system *s = r->s;
-  double *right = r->scratch, *mu = right + s->rows, *de = mu + s->rows;
-  pw_mul_J (s, e, right);
-  for (int i = 0; i < s->rows; i++) right[i] = i < rows ? -right[i] : 0;
-  pw_saddle_solve (r->saddle, NULL, right, de, mu);
-  for (int j = 0; j < s->coords; j++) e[j] += de[j];
-}
-
 /* Mean square of positions' and rates' errors in units of the tolerances. */
 static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
   const struct pw_method_data *d = r->data;
@@ -56,8 +45,8 @@ static double adapt_one (pw_run *r, const double *e, int projected) {
   double *eq = r->q_at, *ev = r->v_at;
   adapt_estimate (r, e, r->v, d->V, d->v, eq);
   adapt_estimate (r, e, r->a, d->A, d->a, ev);
-  if (projected || d->closes) adapt_project (r, eq, r->s->holonomic);
-  if (projected || d->minimal) adapt_project (r, ev, r->s->rows);
+  if (projected || d->closes) pw_project_error (r, eq, r->s->holonomic);
+  if (projected || d->minimal) pw_project_error (r, ev, r->s->rows);
   return adapt_norm (r, eq, ev);
 }
 

@@ -3,6 +3,7 @@
 #ifndef PW_SUNDIALS_H
 #define PW_SUNDIALS_H
 
+#include <stdint.h>
 #include <sundials/sundials_config.h>
 #include <sundials/sundials_types.h>
 #include <sundials/sundials_context.h>
@@ -17,5 +18,16 @@ typedef sunrealtype pw_real;
 #define PW_SUN_NO_COMM NULL
 typedef realtype pw_real;
 #endif
+
+/* The last message of an integrator, instead of its printing. */
+typedef struct {
+  char text[256];
+} pw_sun_said;
+void pw_sun_message (int code, const char *module, const char *function, char *text, void *said);
+
+/* A square sparse matrix of this pattern in compressed columns, all 0; NULL: out of memory. */
+SUNMatrix pw_sun_matrix (int size, const int64_t *colptr, const int64_t *rowind, SUNContext context);
+/* All values 0, and the pattern anew: SUNDIALS clears it together with the values. */
+void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind);
 
 #endif

@@ -20,7 +20,8 @@ static const struct {
 };
 static const char *const same_methods[] = { "rk4+none",      "rk4+projection", "rk4+projection:metric=identity",
                                             "ida+none",      "ida+ggl",        "rk4+projection:every=3",
-                                            "ida+baumgarte", "ida+index2",     "ida+si1" };
+                                            "ida+baumgarte", "ida+index2",     "ida+si1",
+                                            "adams+none",    "bdf+projection" };
 
 enum {
   SAME_SCENES = sizeof same_scenes / sizeof *same_scenes,

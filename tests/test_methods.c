@@ -87,6 +87,10 @@ static void test_refused (void **state) {
   methods_refused ("rk4+nulspace", "integrator rk4 has no stabilisation \"nulspace\"; did you mean \"nullspace\"?");
   methods_refused ("rk4+nullspace:positions=project",
                    "method option positions cannot be \"project\"; did you mean \"projected\"?");
+  methods_refused ("adams+projection",
+                   "integrator adams has no projection: CVODES projects with bdf only, and restarts behind each "
+                   "projection would leave order 1; take bdf+projection or erk8+projection");
+  methods_refused ("adams+projektion", "integrator adams has no stabilisation \"projektion\"; valid are none, ...");
   methods_refused ("rk4+baumgarte:alfa=1", "method rk4+baumgarte has no option \"alfa\"; did you mean \"alpha\"?");
   methods_refused ("rk4+none:alpha=1", "method rk4+none has no option \"alpha\"; valid...");
   methods_refused ("rk4+projection:metric=masses", "method option metric cannot be \"masses\"; did you mean \"mass\"?");

@@ -14,7 +14,10 @@ enum { REDUNDANT_COORDS = 20 };
 
 static const char *const redundant_fixed[] = { "rk4+none", "rk4+baumgarte", "rk4+projection",
                                                "rk4+projection:metric=identity", NULL };
-static const char *const redundant_adaptive[] = { "ida+none", "ida+baumgarte", "ida+ggl", NULL };
+static const char *const redundant_adaptive[] = {
+  "ida+none",        "ida+baumgarte", "ida+ggl",       "ida+index2",     "ida+si1", "adams+none",
+  "adams+baumgarte", "bdf+none",      "bdf+baumgarte", "bdf+projection", NULL
+};
 
 /* How a scene ends, q then v, by states of the given names. */
 static void redundant_end (const pw_plugin_table *table, const char *method, double rtol, double t,

@@ -206,9 +206,10 @@ static void test_t_end (void **state) {
 
 /* A restart from the state a run has reached goes on as if nothing had been; from another state it goes on from there. */
 static void test_restart (void **state) {
-  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "ida+ggl", "ida+baumgarte" };
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",       "ida+baumgarte",
+                                        "ida+si1",        "adams+baumgarte", "bdf+baumgarte", "bdf+projection" };
   (void)state;
-  for (int i = 0; i < 4; i++) {
+  for (int i = 0; i < 8; i++) {
     pw_error error = { 0 };
     double q[6], v[6];
     pw_system *s = scene_system (&scene_ezyroller, NULL);

@@ -165,8 +165,12 @@ static const pw_plugin_table singular_cart_table = { .abi = PW_ABI,
 
 /* It stays where it is, to the bit, whatever pushes it. */
 static void test_locked (void **state) {
-  static const char *const method[] = { "rk4+none", "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
-                                        "ida+none", "ida+baumgarte", "ida+ggl" };
+  static const char *const method[] = {
+    "rk4+none",      "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
+    "ida+none",      "ida+baumgarte", "ida+ggl",        "ida+index2",
+    "ida+si1",       "adams+none",    "bdf+none",       "bdf+baumgarte",
+    "bdf+projection"
+  };
   (void)state;
   for (int wheels = 3; wheels <= 4; wheels++)
     for (size_t i = 0; i < sizeof method / sizeof *method; i++) {

@@ -46,6 +46,7 @@ static void list_method (const pw_method *m) {
           m->about);
   for (const pw_stabilisation *s = m->stabilisations; s && s->name; s++)
     printf ("    +%-12s %s%s\n", s->name, s->about, s == m->stabilisations ? " (if none is named)" : "");
+  for (const pw_stabilisation *s = m->refused; s && s->name; s++) printf ("    no %s: %s\n", s->name, s->about);
   for (const pw_option *o = m->options; o && o->name; o++) list_option (o);
 }
 

@@ -1,0 +1,308 @@
+/* BDF and Adams by CVODES; see multistep.h. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cvodes/cvodes.h>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+#include "multistep_state.h"
+
+/* ---- What CVODES asks for ---- */
+
+int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
+  pw_run *r = d->run;
+  int status = pw_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
+  return status == PW_OK ? 0 : status > 0 ? 1 : -1;
+}
+
+static int multistep_rates (pw_real t, N_Vector vy, N_Vector rates, void *data) {
+  multistep_data *d = data;
+  const double *y = N_VGetArrayPointer (vy);
+  double *out = N_VGetArrayPointer (rates);
+  size_t bytes = (size_t)d->n * sizeof *out;
+  int flag = pw_multistep_accelerate (d, t, y);
+  memcpy (out, y + d->n, bytes);
+  memcpy (out + d->n, d->a, bytes);
+  return flag;
+}
+
+/* Rates of the ledger's entries: no part of the run's cost. */
+static int multistep_work (pw_real t, N_Vector y, N_Vector rate, void *data) {
+  multistep_data *d = data;
+  pw_statistics keep = d->run->statistics;
+  int flag = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
+  d->run->statistics = keep;
+  if (flag == 0) pw_sweep_ledger (d->run->s, d->lambda, N_VGetArrayPointer (rate));
+  return flag;
+}
+
+/* Error weights, by unit. */
+static int multistep_weights (N_Vector vy, N_Vector weights, void *data) {
+  const multistep_data *d = data;
+  const pw_run *r = d->run;
+  const double *y = N_VGetArrayPointer (vy), rtol = r->settings.rtol;
+  double *w = N_VGetArrayPointer (weights);
+  for (int j = 0; j < d->n; j++) {
+    w[j] = 1 / (rtol * fabs (y[j]) + pw_atol (r, j));
+    w[d->n + j] = 1 / (rtol * fabs (y[d->n + j]) + pw_atol_rate (r, j));
+  }
+  return 0;
+}
+
+/* ---- Projection ---- */
+
+int pw_multistep_project (multistep_data *d, double t, double *q, double *v) {
+  pw_run *r = d->run;
+  pw_system *s = r->s;
+  int row, status = pw_place (s, t, q, v);
+  if (status != PW_OK) return status;
+  double worst, before = r->settings.ledger ? pw_kinetic (s, v) + pw_potential (s) : 0;
+  status = pw_project_positions (&d->projector, r, t, q, v, &row, &worst);
+  if (status == PW_OK) status = pw_project_velocities (&d->projector, r, v);
+  if (status == PW_OK && r->settings.ledger) d->added = pw_kinetic (s, v) + pw_potential (s) - before;
+  return status;
+}
+
+/* Of the error only the part along the constraints counts (Eich 1993). */
+static int multistep_project_error (multistep_data *d, double *e) {
+  pw_run *r = d->run;
+  if (d->projector.own_velocity && pw_saddle_factor (r->saddle) != PW_OK) return PW_RETRY;
+  pw_project_error (r, e, r->s->holonomic);
+  pw_project_error (r, e + d->n, r->s->rows);
+  return PW_OK;
+}
+
+int pw_multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real enough, N_Vector error, void *data) {
+  multistep_data *d = data;
+  const double *y = N_VGetArrayPointer (vy);
+  double *out = N_VGetArrayPointer (change);
+  size_t bytes = (size_t)d->n * sizeof *y;
+  (void)enough; /* to round-off, whatever the tolerance */
+  memcpy (d->q, y, bytes);
+  memcpy (d->v, y + d->n, bytes);
+  int status = pw_multistep_project (d, t, d->q, d->v);
+  for (int j = 0; j < d->n; j++) {
+    out[j] = d->q[j] - y[j];
+    out[d->n + j] = d->v[j] - y[d->n + j];
+  }
+  if (status == PW_OK && error) status = multistep_project_error (d, N_VGetArrayPointer (error));
+  return status == PW_OK ? 0 : status > 0 ? 1 : -1;
+}
+
+/* ---- Opening ---- */
+
+static void multistep_fill (multistep_data *d) {
+  const pw_run *r = d->run;
+  size_t bytes = (size_t)d->n * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  double *y = N_VGetArrayPointer (d->y);
+  memcpy (y, r->q, bytes);
+  memcpy (y + d->n, r->v, bytes);
+  memcpy (N_VGetArrayPointer (d->work0), r->ledger, entries);
+  d->stop = NAN;
+  d->begun = r->t;
+  d->steps = r->statistics.steps;
+  d->rejected = r->statistics.rejected;
+}
+
+static int multistep_open_arrays (multistep_data *d) {
+  const pw_run *r = d->run;
+  const pw_system *s = r->s;
+  size_t n = (size_t)d->n + 3;
+  if (SUNContext_Create (PW_SUN_NO_COMM, &d->context) != 0) return PW_MACHINE;
+  d->y = N_VNew_Serial (2 * d->n, d->context);
+  d->work = N_VNew_Serial (s->entries + 1, d->context);
+  d->work0 = N_VNew_Serial (s->entries + 1, d->context);
+  d->q = calloc (3 * n + (size_t)s->rows, sizeof *d->q);
+  if (!d->y || !d->work || !d->work0 || !d->q) return PW_MACHINE;
+  d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;
+  memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
+  memcpy (d->a, r->a, (size_t)d->n * sizeof *d->a);
+  memcpy (d->lambda, r->lambda, (size_t)s->rows * sizeof *d->lambda);
+  N_VConst (0, d->work);
+  N_VConst (0, d->work0);
+  multistep_fill (d);
+  return PW_OK;
+}
+
+static int multistep_open_iteration (multistep_data *d, int formula) {
+  if (formula == CV_BDF) return pw_multistep_open_newton (d);
+  d->iteration = SUNNonlinSol_FixedPoint (d->y, 0, d->context);
+  if (d->iteration == NULL) return PW_MACHINE;
+  return CVodeSetNonlinearSolver (d->cvode, d->iteration) == CV_SUCCESS ? PW_OK : PW_MACHINE;
+}
+
+static int multistep_open_solver (multistep_data *d, int formula) {
+  pw_run *r = d->run;
+  int flag = 0;
+  d->cvode = CVodeCreate (formula, d->context);
+  if (d->cvode == NULL) return PW_MACHINE;
+  flag |= CVodeSetErrHandlerFn (d->cvode, pw_sun_message, &d->said);
+  flag |= CVodeSetUserData (d->cvode, d);
+  flag |= CVodeInit (d->cvode, multistep_rates, r->t, d->y);
+  flag |= CVodeWFtolerances (d->cvode, multistep_weights);
+  flag |= CVodeSetMaxNumSteps (d->cvode, -1);
+  flag |= CVodeSetInitStep (d->cvode, pw_first_step (r));
+  if (d->projects) {
+    flag |= CVodeSetProjFn (d->cvode, pw_multistep_correct);
+    flag |= CVodeSetProjFrequency (d->cvode, (long)pw_option_value (r, "every"));
+  }
+  if (r->settings.ledger && r->s->entries > 0) {
+    flag |= CVodeQuadInit (d->cvode, multistep_work, d->work0);
+    flag |= CVodeSetQuadErrCon (d->cvode, 0);
+  }
+  return flag == 0 ? multistep_open_iteration (d, formula) : PW_MACHINE;
+}
+
+int pw_multistep_open (pw_run *r, int formula, pw_error *error) {
+  multistep_data *d = r->data = calloc (1, sizeof *d);
+  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  d->run = r;
+  d->n = r->s->coords;
+  d->projects = pw_stabilised_by (r, "projection");
+  pw_read_baumgarte (r);
+  int status = d->projects ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
+  if (status != PW_OK) return status;
+  if (multistep_open_arrays (d) == PW_OK && multistep_open_solver (d, formula) == PW_OK) return PW_OK;
+  return pw_fail (error, PW_MACHINE, "model %s: out of memory in %s", r->s->model, r->method->name);
+}
+
+void pw_multistep_close (pw_run *r) {
+  multistep_data *d = r->data;
+  if (d->cvode) CVodeFree (&d->cvode);
+  if (d->iteration) SUNNonlinSolFree (d->iteration);
+  pw_multistep_close_newton (d);
+  N_Vector const vector[] = { d->y, d->work, d->work0 };
+  for (size_t i = 0; i < sizeof vector / sizeof *vector; i++)
+    if (vector[i]) N_VDestroy (vector[i]);
+  if (d->context) SUNContext_Free (&d->context);
+  if (d->projects) pw_projector_close (&d->projector);
+  free (d->q);
+  free (d);
+}
+
+/* ---- Advancing ---- */
+
+static void multistep_count (multistep_data *d) {
+  pw_statistics *s = &d->run->statistics;
+  long steps = 0, tests = 0, iterations = 0, projections = 0;
+  CVodeGetNumSteps (d->cvode, &steps);
+  CVodeGetNumErrTestFails (d->cvode, &tests);
+  CVodeGetNumNonlinSolvConvFails (d->cvode, &iterations);
+  if (d->projects) CVodeGetNumProjFails (d->cvode, &projections);
+  s->steps = d->steps + steps;
+  s->rejected = d->rejected + tests + iterations + projections;
+}
+
+static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
+  pw_run *r = d->run;
+  char element[120];
+  int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
+  multistep_count (d);
+  if (flag == CV_REPTD_PROJFUNC_ERR && d->projector.against >= 0)
+    return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
+                    pw_row_element (r->s, d->projector.against, element, sizeof element));
+  if (singular || r->near) return pw_fail_singular (r, r->t, error);
+  const char *why = flag == CV_ERR_FAILURE          ? "the error test fails however small the step"
+                    : flag == CV_CONV_FAILURE       ? "the iteration does not converge however small the step"
+                    : flag == CV_LSETUP_FAIL        ? "the Newton matrix is singular"
+                    : flag == CV_RHSFUNC_FAIL       ? "a signal failed"
+                    : flag == CV_QRHSFUNC_FAIL      ? "a signal failed"
+                    : flag == CV_PROJFUNC_FAIL      ? "a signal failed"
+                    : flag == CV_REPTD_PROJFUNC_ERR ? "the projection does not converge however small the step"
+                    : flag == CV_TOO_MUCH_ACC       ? "the tolerance is beyond the accuracy of the machine"
+                                                    : d->said.text;
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", r->t, why, r->settings.rtol);
+}
+
+/* The state reached, out of y: with its accelerations, and the ledger. */
+static int multistep_reach (multistep_data *d, double t, pw_error *error) {
+  pw_run *r = d->run;
+  const double *y = N_VGetArrayPointer (d->y);
+  double work;
+  memcpy (r->q, y, (size_t)d->n * sizeof *y);
+  memcpy (r->v, y + d->n, (size_t)d->n * sizeof *y);
+  r->t = t;
+  r->position = NAN;
+  int status = pw_accelerate (r, pw_before_breakpoint (r, t), r->q, r->v, r->a, r->lambda);
+  if (status > 0) return pw_fail_singular (r, t, error);
+  if (status < 0) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
+  if (r->settings.ledger && r->s->entries > 0) {
+    CVodeGetQuad (d->cvode, &work, d->work);
+    memcpy (r->ledger, N_VGetArrayPointer (d->work), (size_t)r->s->entries * sizeof (double));
+  }
+  r->projected += d->added;
+  return PW_OK;
+}
+
+int pw_multistep_advance (pw_run *r, double t_end, pw_error *error) {
+  multistep_data *d = r->data;
+  double stop = fmin (t_end, r->breakpoint), t = r->t;
+  if (stop != d->stop) {
+    CVodeSetStopTime (d->cvode, stop);
+    d->stop = stop;
+  }
+  r->near = 0;
+  d->added = 0;
+  int flag = CVode (d->cvode, stop, d->y, &t, CV_ONE_STEP);
+  if (flag < 0) return multistep_fail (d, flag, error);
+  if (flag == CV_TSTOP_RETURN) d->stop = NAN;
+  multistep_count (d);
+  return multistep_reach (d, flag == CV_TSTOP_RETURN ? stop : t, error);
+}
+
+/* ---- Looking into the last step ---- */
+
+static void multistep_copy_reached (pw_run *r) {
+  size_t bytes = (size_t)r->s->coords * sizeof (double);
+  memcpy (r->q_at, r->q, bytes);
+  memcpy (r->v_at, r->v, bytes);
+  memcpy (r->a_at, r->a, bytes);
+  memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
+  r->projected_at = r->projected;
+  if (pw_place (r->s, r->t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
+}
+
+/* Of the polynomial's value at t, projected where the method projects, the rest of the sample. */
+static int multistep_complete (multistep_data *d, double t) {
+  pw_run *r = d->run;
+  int status = PW_OK;
+  pw_statistics keep = r->statistics;
+  d->added = 0;
+  pw_saddle_set_guard (r->saddle, 0);
+  if (d->projects) status = pw_multistep_project (d, t, r->q_at, r->v_at);
+  if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
+  pw_saddle_set_guard (r->saddle, r->guard);
+  r->projected_at = r->projected + d->added;
+  r->statistics = keep;
+  return status;
+}
+
+int pw_multistep_at (pw_run *r, double t, pw_error *error) {
+  multistep_data *d = r->data;
+  if (t == r->t) {
+    multistep_copy_reached (r);
+    return PW_OK;
+  }
+  if (!(t < r->t) || CVodeGetDky (d->cvode, t, 0, d->y) != CV_SUCCESS)
+    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
+  const double *y = N_VGetArrayPointer (d->y);
+  memcpy (r->q_at, y, (size_t)d->n * sizeof *y);
+  memcpy (r->v_at, y + d->n, (size_t)d->n * sizeof *y);
+  if (r->settings.ledger && r->s->entries > 0) {
+    CVodeGetQuadDky (d->cvode, t, 0, d->work);
+    memcpy (r->ledger_at, N_VGetArrayPointer (d->work), (size_t)r->s->entries * sizeof *y);
+  }
+  int status = multistep_complete (d, t);
+  if (status > 0) return pw_fail_singular (r, t, error);
+  return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+}
+
+int pw_multistep_restart (pw_run *r, pw_error *error) {
+  multistep_data *d = r->data;
+  multistep_fill (d);
+  int flag = CVodeReInit (d->cvode, r->t, d->y);
+  flag |= CVodeSetInitStep (d->cvode, pw_first_step (r));
+  if (r->settings.ledger && r->s->entries > 0) flag |= CVodeQuadReInit (d->cvode, d->work0);
+  if (flag == CV_SUCCESS) return PW_OK;
+  return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, d->said.text);
+}

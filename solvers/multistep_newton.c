@@ -1,0 +1,158 @@
+/* Newton's iteration for BDF: (I - gamma df/dy) x = b without forming the dense df/dy.
+ *
+ * The equations of motion differentiated are  T (dq, dv, da, dlambda) = 0,  sparse (tangent.c).  With
+ *
+ *   x_q = b_q + gamma x_v,   x_v = b_v + gamma da
+ *
+ * only da and dlambda are unknown, in a matrix like that of the accelerations:
+ *
+ *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
+ *
+ * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU analyses the matrix once, refactors
+ * it, and pivots anew where its reciprocal condition has sunk. */
+#include <stdlib.h>
+#include <string.h>
+#include <cvodes/cvodes.h>
+#include "multistep_state.h"
+
+/* Columns of T: q, v, a, lambda. */
+static void newton_fill (multistep_data *d) {
+  int n = d->n;
+  const pw_tangent_place to = {
+    .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .of_a = 1, .of_lambda = 1
+  };
+  pw_tangent_momentum (&d->newton.tangent, &to, d->lambda);
+  pw_tangent_accelerations (&d->newton.tangent, &to, d->v, d->a);
+}
+
+/* The matrix from T. */
+static void newton_combine (pw_multistep_newton *w, int n) {
+  const pw_tangent *x = &w->tangent;
+  const double power[] = { w->gamma * w->gamma, w->gamma, 1 };
+  for (int c = 0; c < 3 * n + x->rows; c++) {
+    int part = c < 2 * n ? c / n : 2, to = c < 2 * n ? c % n : c - 2 * n;
+    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++)
+      pw_tape_put (&w->tape, (int)x->rowind[i], to, w->value ? power[part] * w->value[i] : 0);
+  }
+}
+
+/* Asked for by CVODES: T, unless the one there will do, and the matrix with gamma. */
+static int newton_set_up (pw_real t, N_Vector y, N_Vector rates, SUNMatrix matrix, booleantype good, booleantype *fresh,
+                          pw_real gamma, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
+  multistep_data *d = data;
+  pw_multistep_newton *w = &d->newton;
+  const pw_tangent *x = &w->tangent;
+  (void)rates, (void)t1, (void)t2, (void)t3;
+  *fresh = !good;
+  if (!good) {
+    int columns = 3 * d->n + x->rows, status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
+    if (status != 0) return status;
+    memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
+    memset (w->value, 0, (size_t)x->colptr[columns] * sizeof *w->value);
+    pw_tape_fill (&w->tangent.tape, w->value);
+    newton_fill (d);
+    d->run->statistics.jacobians++;
+  }
+  w->gamma = gamma;
+  pw_sun_clear (matrix, w->colptr, w->rowind);
+  pw_tape_fill (&w->tape, SUNSparseMatrix_Data (matrix));
+  newton_combine (w, d->n);
+  return 0;
+}
+
+/* ---- The linear solver that CVODES sees ---- */
+
+static SUNLinearSolver_Type newton_type (SUNLinearSolver solver) {
+  (void)solver;
+  return SUNLINEARSOLVER_DIRECT;
+}
+
+static int newton_factorise (SUNLinearSolver solver, SUNMatrix matrix) {
+  multistep_data *d = solver->content;
+  d->run->statistics.factorisations++;
+  return SUNLinSolSetup (d->newton.klu, matrix);
+}
+
+/* right = - T_q (b_q + gamma b_v) - T_v b_v */
+static void newton_right (const multistep_data *d, const double *b, double *right) {
+  const pw_multistep_newton *w = &d->newton;
+  const pw_tangent *x = &w->tangent;
+  int n = d->n;
+  memset (right, 0, (size_t)(n + x->rows) * sizeof *right);
+  for (int c = 0; c < 2 * n; c++) {
+    double by = c < n ? b[c] + w->gamma * b[n + c] : b[c];
+    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) right[x->rowind[i]] -= w->value[i] * by;
+  }
+}
+
+static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, pw_real tolerance) {
+  multistep_data *d = solver->content;
+  pw_multistep_newton *w = &d->newton;
+  const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);
+  double *x = N_VGetArrayPointer (vx);
+  int n = d->n;
+  newton_right (d, b, N_VGetArrayPointer (w->right));
+  int flag = SUNLinSolSolve (w->klu, matrix, w->change, w->right, tolerance);
+  if (flag != SUNLS_SUCCESS) return flag;
+  for (int j = 0; j < n; j++) {
+    x[n + j] = b[n + j] + w->gamma * da[j];
+    x[j] = b[j] + w->gamma * x[n + j];
+  }
+  return SUNLS_SUCCESS;
+}
+
+/* ---- Opening ---- */
+
+/* The patterns of T and of the matrix, each by recording one filling. */
+static int newton_lay_out (multistep_data *d) {
+  pw_multistep_newton *w = &d->newton;
+  pw_tangent *x = &w->tangent;
+  int columns = 3 * d->n + x->rows, size = d->n + x->rows;
+  pw_tape_record (&x->tape);
+  newton_fill (d);
+  if (pw_tape_lay_out (&x->tape, columns, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
+  pw_tape_record (&w->tape);
+  newton_combine (w, d->n);
+  if (pw_tape_lay_out (&w->tape, size, &w->colptr, &w->rowind) != PW_OK) return PW_MACHINE;
+  w->value = calloc ((size_t)x->colptr[columns] + 1, sizeof *w->value);
+  return w->value ? PW_OK : PW_MACHINE;
+}
+
+static int newton_open_solver (multistep_data *d) {
+  pw_multistep_newton *w = &d->newton;
+  w->solver = SUNLinSolNewEmpty (d->context);
+  if (w->solver == NULL) return PW_MACHINE;
+  w->solver->content = d;
+  w->solver->ops->gettype = newton_type;
+  w->solver->ops->setup = newton_factorise;
+  w->solver->ops->solve = newton_solve;
+  int flag = CVodeSetLinearSolver (d->cvode, w->solver, w->matrix);
+  flag |= CVodeSetLinSysFn (d->cvode, newton_set_up);
+  return flag == 0 ? PW_OK : PW_MACHINE;
+}
+
+int pw_multistep_open_newton (multistep_data *d) {
+  pw_multistep_newton *w = &d->newton;
+  if (pw_tangent_open (&w->tangent, d->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_MACHINE;
+  int size = d->n + w->tangent.rows;
+  w->right = N_VNew_Serial (size, d->context);
+  w->change = N_VNew_Serial (size, d->context);
+  w->matrix = pw_sun_matrix (size, w->colptr, w->rowind, d->context);
+  if (!w->right || !w->change || !w->matrix) return PW_MACHINE;
+  w->klu = SUNLinSol_KLU (w->right, w->matrix, d->context);
+  return w->klu ? newton_open_solver (d) : PW_MACHINE;
+}
+
+void pw_multistep_close_newton (multistep_data *d) {
+  pw_multistep_newton *w = &d->newton;
+  if (w->solver) SUNLinSolFreeEmpty (w->solver);
+  if (w->klu) SUNLinSolFree (w->klu);
+  if (w->matrix) SUNMatDestroy (w->matrix);
+  if (w->right) N_VDestroy (w->right);
+  if (w->change) N_VDestroy (w->change);
+  pw_tape_close (&w->tape);
+  pw_tangent_close (&w->tangent);
+  free (w->value);
+  free (w->colptr);
+  free (w->rowind);
+}

@@ -1,0 +1,28 @@
+/* What the integrators of SUNDIALS share; see sundials.h. */
+#include <assert.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include "sundials.h"
+
+/* SUNDIALS' index type is 64 bits wide, as the tape's. */
+static_assert (sizeof (sunindextype) == sizeof (int64_t), "SUNDIALS with 64-bit indices is expected");
+
+void pw_sun_message (int code, const char *module, const char *function, char *text, void *said) {
+  pw_sun_said *s = said;
+  (void)code, (void)module, (void)function;
+  snprintf (s->text, sizeof s->text, "%s", text);
+}
+
+void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind) {
+  size_t size = (size_t)SUNSparseMatrix_Columns (matrix), nonzeros = (size_t)colptr[size];
+  memcpy (SUNSparseMatrix_IndexPointers (matrix), colptr, (size + 1) * sizeof *colptr);
+  memcpy (SUNSparseMatrix_IndexValues (matrix), rowind, nonzeros * sizeof *rowind);
+  memset (SUNSparseMatrix_Data (matrix), 0, nonzeros * sizeof (double));
+}
+
+SUNMatrix pw_sun_matrix (int size, const int64_t *colptr, const int64_t *rowind, SUNContext context) {
+  SUNMatrix matrix = SUNSparseMatrix (size, size, colptr[size], CSC_MAT, context);
+  if (matrix) pw_sun_clear (matrix, colptr, rowind);
+  return matrix;
+}
