@@ -63,6 +63,16 @@ static void test_no_text (void **state) {
   assert_non_null (strstr (cli_out, "torque T: body a, ground; value f (t) N m"));
 }
 
+static void test_max_file (void **state) {
+  (void)state;
+  cli_good ("{ cat " TEXT "; yes '# nothing' | head -c 300000; } >@/long.yaml");
+  cli_bad ("pinwheel show @/long.yaml --max-file 0.25", 2,
+           "@/long.yaml: the file has more than 0.25 MB, the most a model may have unless --max-file says more");
+  cli_good ("pinwheel show @/long.yaml --max-file 0.5 >/dev/null");
+  cli_bad ("pinwheel run @/long.yaml --max-file 1e4", 2, "--max-file 1e4: expected at most 2000 MB");
+  cli_bad ("pinwheel sweep @/long.yaml --max-file x --vary a=1,2 -o @/x.csv", 2, "--max-file: \"x\" is not a number");
+}
+
 static void test_names (void **state) {
   (void)state;
   cli_good ("mkdir @/models && cp " TEXT " @/models/roller.yaml && "
@@ -109,8 +119,8 @@ static void test_new (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_same_tables), cmocka_unit_test (test_same_sweeps), cmocka_unit_test (test_round_trip),
-    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_names),       cmocka_unit_test (test_message),
-    cmocka_unit_test (test_new),
+    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_max_file),    cmocka_unit_test (test_names),
+    cmocka_unit_test (test_message),     cmocka_unit_test (test_new),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -148,7 +148,7 @@ int pw_cli_check (int argc, const char **argv) {
   pw_cli_line l;
   pw_check x = { .r = NULL };
   if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
-      pw_cli_open (&x.m, l.argument[0], sets, starts, &error) == PW_OK && check_model (&x, &error) == PW_OK) {
+      pw_cli_open (&x.m, &l, sets, starts, &error) == PW_OK && check_model (&x, &error) == PW_OK) {
     if (json == NULL || strcmp (json, "-") != 0) pw_check_text (&x);
     if (json) pw_check_json (&x, json, &error);
     check_verdict (&x, &error);

@@ -43,9 +43,10 @@ typedef struct {
   void **text;              /* what popt allocated for each of them */
   const char **argument;    /* what is no option, ended by NULL */
   int arguments;            /* how many */
+  char *max_file;           /* of commands with --set: what --max-file was given, or NULL */
 } pw_cli_line;
 
-/* Reads a command line.  `options` is popt's table without help, which is added here; take texts with
+/* Reads a command line.  `options` is popt's table without help, which is added here, as --max-file is to --set; take texts with
  * POPT_ARG_STRING, repeated ones with POPT_ARG_ARGV (a NULL-terminated list, or NULL if there were none), numbers as
  * texts and pass them to pw_cli_number.  All of these variables are NULL at first, and what they were given is freed
  * with the line.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says what is expected
@@ -75,9 +76,12 @@ typedef struct {
   pw_system *system;
 } pw_cli_model;
 
-/* Opens a model by name or path, sets "PARAM=VALUE" and "STATE=VALUE" (NULL-terminated lists, or NULL), builds and
+/* Opens the model file that a command line's first argument names, by name or path. */
+pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error);
+
+/* Opens the model of a command line, sets "PARAM=VALUE" and "STATE=VALUE" (NULL-terminated lists, or NULL), builds and
  * compiles it.  Returns a status; close the model in every case. */
-int pw_cli_open (pw_cli_model *m, const char *name, const char *const *sets, const char *const *starts,
+int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, const char *const *sets, const char *const *starts,
                  pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 

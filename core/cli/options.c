@@ -15,21 +15,27 @@ static int options_is_end (const struct poptOption *o) {
   return o->longName == NULL && o->shortName == 0 && o->arg == NULL;
 }
 
-/* The command's options with help after them. */
-static struct poptOption *options_table (const struct poptOption *options, void ***text) {
-  static const struct poptOption help = { "help", '?', POPT_ARG_NONE, NULL, OPTIONS_HELP, "Show this and stop", NULL };
+static int options_has (const struct poptOption *o, const char *name) {
+  while (!options_is_end (o) && (o->longName == NULL || strcmp (o->longName, name) != 0)) o++;
+  return !options_is_end (o);
+}
+
+/* The command's options, what every command that opens a model has, and help. */
+static int options_table (pw_cli_line *l, const struct poptOption *options) {
+  const struct poptOption help = { "help", '?', POPT_ARG_NONE, NULL, OPTIONS_HELP, "Show this and stop", NULL };
+  const struct poptOption size = { "max-file",   0, POPT_ARG_STRING,
+                                   &l->max_file, 0, "Read model files of up to so many MB; by default 64",
+                                   "MB" };
   size_t n = 0;
   while (!options_is_end (options + n)) n++;
-  struct poptOption *table = calloc (n + 2, sizeof *table);
-  *text = calloc (n + 2, sizeof **text);
-  if (table == NULL || *text == NULL) {
-    free (table);
-    return NULL;
-  }
-  memcpy (table, options, n * sizeof *table);
-  for (size_t i = 0; i < n; i++) table[i].val = (int)i + 1;
-  table[n] = help;
-  return table;
+  l->table = calloc (n + 3, sizeof *l->table);
+  l->text = calloc (n + 3, sizeof *l->text);
+  if (l->table == NULL || l->text == NULL) return PW_MACHINE;
+  memcpy (l->table, options, n * sizeof *l->table);
+  if (options_has (options, "set")) l->table[n++] = size;
+  for (size_t i = 0; i < n; i++) l->table[i].val = (int)i + 1;
+  l->table[n] = help;
+  return PW_OK;
 }
 
 /* "show" of "pinwheel show" */
@@ -77,8 +83,7 @@ static int options_count (const pw_cli_line *l, const char *title, const char *s
 int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
                  int least, int most, pw_error *error) {
   *l = (pw_cli_line){ .popt = NULL };
-  l->table = options_table (options, &l->text);
-  if (l->table) l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
+  if (options_table (l, options) == PW_OK) l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
   if (l->popt == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   poptSetOtherOptionHelp (l->popt, synopsis);
   int got = poptGetNextOpt (l->popt);
@@ -134,10 +139,19 @@ int pw_cli_apply (pw_model *m, const char *option, const char *const *list,
   return PW_OK;
 }
 
-int pw_cli_open (pw_cli_model *m, const char *name, const char *const *sets, const char *const *starts,
+pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error) {
+  const double most = PW_FILE_MOST >> 20;
+  double size = PW_FILE_LARGEST >> 20;
+  if (pw_cli_number ("--max-file", l->max_file, PW_POSITIVE, &size, error) != PW_OK) return NULL;
+  if (size <= most) return pw_file_open_limited (l->argument[0], (size_t)(size * (1 << 20)), error);
+  pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", l->max_file, most);
+  return NULL;
+}
+
+int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, const char *const *sets, const char *const *starts,
                  pw_error *error) {
   *m = (pw_cli_model){ .file = NULL };
-  m->file = pw_file_open (name, error);
+  m->file = pw_cli_file (l, error);
   if (m->file) m->model = pw_file_model (m->file, error);
   if (m->model && pw_cli_apply (m->model, "--set", sets, pw_set, error) == PW_OK &&
       pw_cli_apply (m->model, "--start", starts, pw_set_start, error) == PW_OK && pw_build (m->model, error) == PW_OK)

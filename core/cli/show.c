@@ -170,7 +170,7 @@ int pw_cli_show (int argc, const char **argv) {
   pw_cli_model m = { .file = NULL };
   if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
       pw_cli_number ("--at", at, PW_NONNEGATIVE, &t, &error) == PW_OK &&
-      pw_cli_open (&m, l.argument[0], sets, starts, &error) == PW_OK) {
+      pw_cli_open (&m, &l, sets, starts, &error) == PW_OK) {
     if (yaml)
       pw_cli_yaml (&m, &error);
     else if (matrices || at)

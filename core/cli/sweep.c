@@ -136,7 +136,7 @@ static int sweep_settle (sweep *x, pw_error *error) {
 }
 
 static int sweep_open (sweep *x, pw_error *error) {
-  x->plan.file = pw_file_open (x->line.argument[0], error);
+  x->plan.file = pw_cli_file (&x->line, error);
   if (x->plan.file == NULL) return error->status;
   int status = sweep_settle (x, error);
   if (status == PW_OK) status = pw_plan_open (&x->plan, (const char *const *)x->ranges, error);

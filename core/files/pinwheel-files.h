@@ -25,6 +25,12 @@ typedef struct pw_file pw_file;
  * Errors: PW_INPUT for a model that is not found (with the nearest name), found twice (with both paths), does not
  * compile, is no Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_MACHINE. */
 pw_file *pw_file_open (const char *model, pw_error *error);
+
+/* The same with another limit in bytes than PW_FILE_LARGEST for a model in YAML, up to PW_FILE_MOST.  Reading one takes
+ * about 10 times its size in memory. */
+#define PW_FILE_LARGEST (64u << 20)
+#define PW_FILE_MOST (2000u << 20)
+pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *error);
 void pw_file_close (pw_file *f);
 
 /* A new model from the file, parameters at their defaults, not yet built.  The file must outlive it. */

@@ -11,6 +11,7 @@ struct pw_file {
   char *name, *path;
   void *handle;  /* of dlopen, or */
   pw_yaml *yaml; /* of a text model */
+  size_t largest;
   const pw_plugin_table *table;
 };
 
@@ -72,7 +73,7 @@ static int plugin_ending (const char *name) {
 }
 
 static int plugin_read (pw_file *f, const char *shown, pw_error *error) {
-  f->yaml = pw_yaml_open (f->path, shown, error);
+  f->yaml = pw_yaml_open (f->path, shown, f->largest, error);
   if (f->yaml == NULL) return error->status;
   f->table = pw_yaml_table (f->yaml);
   return PW_OK;
@@ -137,6 +138,10 @@ static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
 }
 
 pw_file *pw_file_open (const char *model, pw_error *error) {
+  return pw_file_open_limited (model, PW_FILE_LARGEST, error);
+}
+
+pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *error) {
   if (model == NULL || *model == 0) {
     pw_fail (error, PW_INPUT, "a model's name or path is missing");
     return NULL;
@@ -146,6 +151,7 @@ pw_file *pw_file_open (const char *model, pw_error *error) {
     pw_fail (error, PW_MACHINE, "out of memory");
     return NULL;
   }
+  f->largest = largest < PW_FILE_MOST ? largest : PW_FILE_MOST;
   int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS;
   int status = by_path ? plugin_find_path (f, model, error) : plugin_find_name (f, model, error);
   if (status == PW_OK) status = plugin_open_path (f, by_path ? model : f->path, error);

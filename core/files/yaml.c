@@ -150,8 +150,9 @@ static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
 
 /* ---- The file ---- */
 
-static int yaml_read (pw_yaml *y, const char *path, pw_error *error) {
-  if (pw_yaml_read_source (y, path, error) != PW_OK || pw_yaml_read_tree (y, error) != PW_OK) return error->status;
+static int yaml_read (pw_yaml *y, const char *path, size_t largest, pw_error *error) {
+  if (pw_yaml_read_source (y, path, largest, error) != PW_OK || pw_yaml_read_tree (y, error) != PW_OK)
+    return error->status;
   pw_expression *x = pw_expression_open (0);
   int status = x ? yaml_head (y, x, error) : pw_yaml_no_memory (y, error);
   pw_expression_close (x);
@@ -166,7 +167,7 @@ static int yaml_paths (pw_yaml *y, const char *path, const char *shown) {
   return y->path && y->folder ? PW_OK : PW_MACHINE;
 }
 
-pw_yaml *pw_yaml_open (const char *path, const char *shown, pw_error *error) {
+pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_error *error) {
   pw_yaml *y = calloc (1, sizeof *y);
   if (y == NULL || yaml_paths (y, path, shown) != PW_OK) {
     pw_fail (error, PW_MACHINE, "out of memory");
@@ -174,7 +175,7 @@ pw_yaml *pw_yaml_open (const char *path, const char *shown, pw_error *error) {
     return NULL;
   }
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = pw_yaml_build };
-  if (yaml_read (y, path, error) == PW_OK) return y;
+  if (yaml_read (y, path, largest, error) == PW_OK) return y;
   pw_yaml_close (y);
   return NULL;
 }

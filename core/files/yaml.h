@@ -49,8 +49,8 @@ struct pw_yaml {
 
 /* ---- The text (yaml_source.c) ---- */
 
-/* Reads the file: y->source and size. */
-int pw_yaml_read_source (pw_yaml *y, const char *path, pw_error *error);
+/* Reads the file of at most so many bytes: y->source and size. */
+int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error *error);
 
 /* Fails with "PATH:LINE:COLUMN: error: TEXT", the line of the source at an offset, and a caret below. */
 int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *format, ...)
