@@ -222,13 +222,14 @@ void pw_judge_positions (const pw_system *s, const double *g, const double *size
   }
 }
 
-void pw_sweep_velocity_residual (pw_system *s, pw_residuals *r) {
+void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
   double *value = s->scratch, *size = value + s->rows, *eta = size + s->rows, unit = s->scale.length / s->scale.time;
   r->velocity = r->jv = 0;
   r->row_velocity = -1;
   evaluate_speeds (s, value, size);
   if (s->moving) pw_sweep_eta (s, eta);
   for (int i = 0; i < s->rows; i++) {
+    if (enforced && !enforced[i]) continue;
     double wanted = s->moving ? eta[i] : 0, error = fabs (value[i] - wanted);
     double scaled = error / (size[i] + fabs (wanted) + unit);
     if (!(error <= r->jv)) r->jv = error;
@@ -236,10 +237,10 @@ void pw_sweep_velocity_residual (pw_system *s, pw_residuals *r) {
   }
 }
 
-void pw_sweep_residuals (pw_system *s, pw_residuals *r) {
+void pw_sweep_residuals (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
   double *value = s->scratch, *size = value + s->rows;
   pw_sweep_g (s, value);
   pw_sweep_g_size (s, size);
-  pw_judge_positions (s, value, size, NULL, r);
-  pw_sweep_velocity_residual (s, r);
+  pw_judge_positions (s, value, size, enforced, r);
+  pw_sweep_velocity_residual (s, enforced, r);
 }

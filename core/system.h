@@ -109,9 +109,10 @@ typedef struct {
   double position, velocity, g, jv;
   int row_position, row_velocity; /* where */
 } pw_residuals;
-void pw_sweep_residuals (pw_system *s, pw_residuals *r);
-void pw_sweep_velocity_residual (pw_system *s, pw_residuals *r); /* only that of the rates */
-/* The worst of g, of the rows with enforced[i] != 0 if that is given, into the part of the positions. */
+/* Of the rows with enforced[i] != 0, if that is given. */
+void pw_sweep_residuals (pw_system *s, const unsigned char *enforced, pw_residuals *r);
+void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r); /* only the rates' */
+/* The worst of g into the part of the positions. */
 void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                          pw_residuals *r);
 

@@ -83,9 +83,9 @@ void pw_note_residuals (pw_run *r) {
   pw_residuals now;
   pw_statistics *s = &r->statistics;
   if (isnan (r->position))
-    pw_sweep_residuals (r->s, &now);
+    pw_sweep_residuals (r->s, NULL, &now);
   else
-    pw_sweep_velocity_residual (r->s, &now), now.position = r->position, now.g = r->g;
+    pw_sweep_velocity_residual (r->s, NULL, &now), now.position = r->position, now.g = r->g;
   if (!(now.position <= s->position)) s->position = now.position;
   if (!(now.velocity <= s->velocity)) s->velocity = now.velocity;
   if (!(now.g <= s->g)) s->g = now.g;

@@ -251,15 +251,23 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   }
 }
 
+/* 1 if the state reached is near a singular pose; what stages of too large a step see says nothing. */
+static int rk_reached_singular (pw_run *r) {
+  int row;
+  r->near = 0;
+  pw_accelerate (r, r->t, r->q, r->v, r->data->a, r->data->lambda);
+  return r->near || pw_saddle_pivot (r->saddle, &row) <= r->guard;
+}
+
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
-  int row, finite = rk_finite (r, r->data->q, r->data->v) && rk_finite (r, r->q, r->v);
+  int finite = rk_finite (r, r->data->q, r->data->v) && rk_finite (r, r->q, r->v);
   int against = (r->data->projects || r->data->closes) && finite ? r->data->projector.against : -1;
   char element[120];
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (against >= 0) /* a redundant row asks for what the others forbid */
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
                     pw_row_element (r->s, against, element, sizeof element));
-  if (finite && (r->near || pw_saddle_pivot (r->saddle, &row) <= r->guard)) return pw_fail_singular (r, r->t, error);
+  if (finite && rk_reached_singular (r)) return pw_fail_singular (r, r->t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: the %s", r->t, h,
                   !finite            ? "state is no longer finite"
                   : r->data->minimal ? "velocities' basis does not last"

@@ -3,8 +3,13 @@
  *   h_new = 0.9 h err^-(k - 3 m / 4) err_before^m,  within a fifth and five times of h
  *
  * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
- * error is that of positions and rates in units of the tolerances; after a projection only its part along the
- * constraints counts (Eich 1993; Hindmarsh et al., CVODE).  It serves two estimates as DOP853 does. */
+ * error e is that of positions and rates in units of the tolerances.  Of what a projection takes away from it, e', only
+ * the part along the constraints is left (Eich 1993; Hindmarsh et al., CVODE) and a little of the whole:
+ *
+ *   e = sqrt (e'^2 + rtol^(1/2) e_before^2)      so that the displacement, e_before rtol, is at most rtol^(3/4)
+ *
+ * The displacement acts along the constraints by its square, through their curvature; without a limit the steps of a
+ * motion that is mostly prescribed would grow until that counts.  It serves two estimates as DOP853 does. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -45,9 +50,11 @@ static double adapt_one (pw_run *r, const double *e, int projected) {
   double *eq = r->q_at, *ev = r->v_at;
   adapt_estimate (r, e, r->v, d->V, d->v, eq);
   adapt_estimate (r, e, r->a, d->A, d->a, ev);
+  if (!projected && !d->minimal) return adapt_norm (r, eq, ev);
+  double before = adapt_norm (r, eq, ev);
   if (projected || d->closes) pw_project_error (r, eq, r->s->holonomic);
-  if (projected || d->minimal) pw_project_error (r, ev, r->s->rows);
-  return adapt_norm (r, eq, ev);
+  pw_project_error (r, ev, r->s->rows);
+  return adapt_norm (r, eq, ev) + sqrt (r->settings.rtol) * before;
 }
 
 /* The error of the step just computed; at most 1 is good. */

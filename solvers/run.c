@@ -181,14 +181,16 @@ static int run_pass_breakpoint (pw_run *r, pw_error *error) {
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
-/* A stabilised method that lets go of its constraints is stopped: what follows would not be this mechanism. */
-#define PW_LOST 1e-2
+/* A method that lets go of its constraints is stopped: what follows would not be this mechanism.  Without stabilisation
+ * some drift is what was asked for. */
+#define RUN_LOST 1e-2
+#define RUN_LOST_UNSTABILISED 0.1
 
 static int run_lost (pw_run *r, pw_error *error) {
   pw_residuals now;
   char element[120] = "a constraint", cause[60] = "the constraints are lost";
-  pw_sweep_residuals (r->s, &now);
-  int row = now.position > PW_LOST ? now.row_position : now.row_velocity;
+  pw_sweep_residuals (r->s, NULL, &now);
+  int row = now.position > now.velocity ? now.row_position : now.row_velocity;
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
   if (row >= 0 && r->active && !r->active[row])
     snprintf (cause, sizeof cause, "constraints contradict each other");
@@ -237,10 +239,25 @@ static int run_outburst (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
+/* 1 if a redundant row is violated by more than the others, from which it follows, can explain: it contradicts them. */
+static int run_contradicts (pw_run *r) {
+  const double round_off = 1e-9, magnified = 1e4;
+  pw_residuals all, enforced;
+  pw_sweep_residuals (r->s, NULL, &all);
+  if (all.position <= round_off && all.velocity <= round_off) return 0;
+  pw_sweep_residuals (r->s, r->active, &enforced);
+  double explained = round_off + magnified * fmax (enforced.position, enforced.velocity);
+  return all.position > explained || all.velocity > explained;
+}
+
 static int run_judge (pw_run *r, pw_error *error) {
+  const pw_statistics *s = &r->statistics;
   pw_note_residuals (r);
-  if (!(r->statistics.position <= PW_LOST && r->statistics.velocity <= PW_LOST) && r->stabilisation > 0)
-    return run_lost (r, error);
+  if (!(s->position <= RUN_LOST && s->velocity <= RUN_LOST)) {
+    double lost = pw_stabilised_by (r, "none") ? RUN_LOST_UNSTABILISED : RUN_LOST;
+    if (!(s->position <= lost && s->velocity <= lost)) return run_lost (r, error);
+  }
+  if (r->redundant && run_contradicts (r)) return run_lost (r, error);
   return run_outburst (r, error);
 }
 
@@ -291,7 +308,7 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
   if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_share (r, r->lambda_at);
   run_account (r, sample);
-  pw_sweep_residuals (r->s, &now);
+  pw_sweep_residuals (r->s, NULL, &now);
   sample->position = now.position;
   sample->velocity = now.velocity;
   return PW_OK;

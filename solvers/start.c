@@ -1,7 +1,7 @@
 /* The consistent start: positions by Gauss-Newton, then rates by one linear solve.
  *
- * What the user gave is held; what was not given moves as little as possible in the metric; only if that fails is
- * everything free.  A state that is consistent to round-off is left alone, to the bit. */
+ * What the user gave is held, and if it can be, so are the positions of whatever has mass; what was not given moves as
+ * little as possible in the metric.  Only if that fails are the given positions free too, and then everything.  A state that is consistent to round-off is left alone, to the bit. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -39,7 +39,7 @@ static int start_rates (pw_projector *p, pw_run *r, double *v, start_trouble *tr
   pw_residuals now;
   for (int i = 0; i < 3; i++) {
     pw_place_rates (r->s, v);
-    pw_sweep_residuals (r->s, &now);
+    pw_sweep_residuals (r->s, NULL, &now);
     if (now.velocity <= 4 * DBL_EPSILON) return PW_OK;
     if (i == 2) break;
     if (pw_project_velocities (p, r, v) != PW_OK) break;
@@ -156,26 +156,54 @@ static int start_locked (pw_run *r, pw_error *error) {
                   text);
 }
 
+/* What is held, in the order tried. */
+typedef enum { START_MASS, START_GIVEN, START_RATES, START_NOTHING, START_WAYS } start_way;
+
+/* The mask of a way; 0 if there is nothing new to try. */
+static int start_mask (const pw_system *s, const unsigned char *held, start_way way, unsigned char *mask) {
+  int n = s->coords, light = 0, heavy = 0, positions = 0, rates = 0;
+  for (int j = 0; j < n; j++) {
+    int given = held && held[j], keep = way == START_MASS && s->mass[j] > 0 && !given;
+    mask[j] = (unsigned char)(way <= START_GIVEN && (given || keep));
+    mask[n + j] = held && way <= START_RATES ? held[n + j] : 0;
+    light += s->mass[j] == 0 && !given, heavy += keep;
+    positions += given, rates += held && held[n + j];
+  }
+  return way == START_MASS    ? light > 0 && heavy > 0
+         : way == START_GIVEN ? positions + rates > 0
+         : way == START_RATES ? positions > 0 && rates > 0
+                              : 1;
+}
+
+static int start_ways (pw_run *r, const unsigned char *held, start_trouble *trouble, int *freed, pw_error *error) {
+  pw_system *s = r->s;
+  unsigned char *mask = malloc (2 * (size_t)s->coords + 1);
+  if (mask == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  int status = PW_RETRY;
+  for (int way = 0; way < START_WAYS && status == PW_RETRY; way++) {
+    int given = start_mask (s, held, START_GIVEN, mask);
+    if (!start_mask (s, held, (start_way)way, mask)) continue;
+    *freed = way > START_GIVEN && given;
+    status = start_ranked (r, mask, trouble, error);
+  }
+  free (mask);
+  return status;
+}
+
 int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
   pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   pw_residuals before;
   start_trouble trouble = { .row = -1 };
-  int any = 0, freed = 0;
+  int freed = 0;
   memcpy (r->q_given, r->q, bytes);
   memcpy (r->v_given, r->v, bytes);
   int status = pw_place (s, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   pw_sweep_J (s);
-  pw_sweep_residuals (s, &before);
-  for (int j = 0; held && j < 2 * s->coords; j++) any |= held[j];
-  if (before.position > 8 * DBL_EPSILON || before.velocity > 8 * DBL_EPSILON) {
-    status = start_ranked (r, any ? held : NULL, &trouble, error);
-    if (status == PW_RETRY && any) {
-      freed = 1;
-      status = start_ranked (r, NULL, &trouble, error);
-    }
-  }
+  pw_sweep_residuals (s, NULL, &before);
+  if (before.position > 8 * DBL_EPSILON || before.velocity > 8 * DBL_EPSILON)
+    status = start_ways (r, held, &trouble, &freed, error);
   start_report (r, freed, &before);
   if (status == PW_OK) status = start_locked (r, error);
   return status == PW_RETRY ? start_fail (r, &trouble, error) : status;
