@@ -38,16 +38,17 @@ static double fixed_compare (pw_run *r) {
   return most;
 }
 
-/* Near a singular pose an evaluation that lands on it spoils the step.  The step to t1 is taken in two parts of irregular
- * sizes, in several ways, until two of them agree; then the first part of the latter is accepted, and ends at *t. */
-static int fixed_step_around (pw_run *r, int status, double t1, int project, double *t) {
-  static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302 };
+/* The step to t1 in two parts of irregular sizes, in several ways, until two of them agree; then the first part of the
+ * latter is accepted, and ends at *t, behind `least`. */
+static int fixed_in_parts (pw_run *r, int status, double t1, int project, double least, double *t) {
+  static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
   const double good = 1e-11, enough = 1e-7;
   const int parts = sizeof part / sizeof *part;
   double start = r->t, best = INFINITY;
   int choice = 0, known = status == PW_OK;
   if (known) fixed_compare (r);
   for (int i = 0; i < parts && best > good; i++) {
+    if (start + part[i] * (t1 - start) <= least) continue;
     status = fixed_two_parts (r, start + part[i] * (t1 - start), t1, project, 0);
     r->statistics.rejected++;
     if (status < 0) return status;
@@ -61,6 +62,17 @@ static int fixed_step_around (pw_run *r, int status, double t1, int project, dou
   return fixed_two_parts (r, *t, t1, project, 1);
 }
 
+/* Near a singular pose an evaluation that lands on it spoils the step.  It is taken in two parts; where it is its end that
+ * lands there, what is divided is a longer step, up to `stop`, of which the first part passes t1. */
+static int fixed_step_around (pw_run *r, int status, double t1, double stop, int project, double *t) {
+  static const double beyond[] = { 0.62, 2.62, 7.62 };
+  const int lengths = sizeof beyond / sizeof *beyond;
+  status = fixed_in_parts (r, status, t1, project, r->t, t);
+  for (int i = 0; i < lengths && status == PW_RETRY && t1 < stop; i++)
+    status = fixed_in_parts (r, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, t);
+  return status;
+}
+
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
@@ -68,10 +80,14 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   r->near = 0;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
   d->split = r->near && !d->split;
-  if (d->split) status = fixed_step_around (r, status, t1, project, &t1);
+  double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
+  if (d->split) status = fixed_step_around (r, status, t1, stop, project, &t);
   if (status != PW_OK) return pw_rk_fail (r, status, r->settings.step, error);
   r->statistics.steps++;
-  if (d->split) return PW_OK;
+  if (d->split) {
+    if (t > t1) d->count = (long)floor ((t - d->base) / r->settings.step);
+    return PW_OK;
+  }
   pw_rk_accept (r, h, t1, added);
   d->count++;
   if (!whole) d->base = t1, d->count = 0;

@@ -101,6 +101,34 @@ static void test_held_row (void **state) {
   start_close (r, s);
 }
 
+/* The steering assembly, which has no mass, turns on the hinge: the frame stays where it is, to the bit. */
+static void test_mass_stays (void **state) {
+  (void)state;
+  static const char *const name[] = { "steer.phi", NULL };
+  static const double value[] = { 2 };
+  pw_system *s;
+  pw_run *r = start_open (&s, name, value);
+  const pw_start_report *start = pw_run_start (r);
+  const double frame[3] = { 0 };
+  assert_int_equal (start->freed, 0);
+  check_bits ("frame", start->q, frame, 3);
+  assert_true (start->q[5] == 2 && start->moved == 2);
+  start_close (r, s);
+}
+
+/* Positions that cannot all be held do not free the rates. */
+static void test_rates_stay (void **state) {
+  (void)state;
+  static const char *const name[] = { "frame.x", "steer.x", "steer.vy", NULL };
+  static const double value[] = { 0, 5.375, 5 };
+  pw_system *s;
+  pw_run *r = start_open (&s, name, value);
+  const pw_start_report *start = pw_run_start (r);
+  assert_int_equal (start->freed, 1);
+  assert_true (start->v[4] == 5 && start->q[3] < 1);
+  start_close (r, s);
+}
+
 /* Given values that contradict each other: all move, with a notice. */
 static void test_freed (void **state) {
   (void)state;
@@ -220,10 +248,11 @@ static void test_impossible (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_no_harm), cmocka_unit_test (test_no_harm_on_the_way),
-    cmocka_unit_test (test_held),    cmocka_unit_test (test_held_row),
-    cmocka_unit_test (test_freed),   cmocka_unit_test (test_least_change),
-    cmocka_unit_test (test_drive),   cmocka_unit_test (test_impossible),
+    cmocka_unit_test (test_no_harm),    cmocka_unit_test (test_no_harm_on_the_way),
+    cmocka_unit_test (test_held),       cmocka_unit_test (test_held_row),
+    cmocka_unit_test (test_freed),      cmocka_unit_test (test_mass_stays),
+    cmocka_unit_test (test_rates_stay), cmocka_unit_test (test_least_change),
+    cmocka_unit_test (test_drive),      cmocka_unit_test (test_impossible),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
