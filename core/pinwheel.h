@@ -69,6 +69,7 @@ typedef struct {
   void *(*open) (void *context); /* each compiled system gets a context of its own, made from this one, or NULL without
                                      memory; may be NULL: all systems, and their threads, share `context` */
   void (*close) (void *context); /* frees what open made, with the system; may be NULL */
+  int differenced;               /* 1: gradient is made of differences; `show` says so */
 } pw_function;
 
 /* A signal; all zero is the constant 0. */
@@ -602,6 +603,10 @@ const char *pw_reaction_unit (const pw_system *s, int row);
 
 /* The kind and name of a row's element ("wheel C"), as pw_state_name. */
 char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size);
+
+/* Second-order blocks that are PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as pw_state_name. */
+int pw_count_differences (const pw_system *s);
+char *pw_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 
 #ifdef __cplusplus
 }

@@ -29,6 +29,16 @@ void pw_report_start (const pw_system *s, const pw_start_report *start) {
   report_more (stderr, moved - listed, "");
 }
 
+/* ---- Derivatives without a formula ---- */
+
+void pw_report_differences (const pw_system *s) {
+  int n = pw_count_differences (s);
+  char name[REPORT_NAME];
+  for (int i = 0; i < n && i < REPORT_MOVED; i++)
+    fprintf (stderr, "pinwheel: derivatives by differences: %s\n", pw_difference_name (s, i, name, sizeof name));
+  report_more (stderr, n - REPORT_MOVED, "");
+}
+
 /* ---- Redundant rows ---- */
 
 const char **pw_report_redundancies (pw_run *r) {

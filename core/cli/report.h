@@ -8,6 +8,9 @@
 /* Says on standard error which states the consistent start has moved, if any. */
 void pw_report_start (const pw_system *s, const pw_start_report *start);
 
+/* Says on standard error which second-order blocks are differenced, for want of a formula, if any. */
+void pw_report_differences (const pw_system *s);
+
 /* Copies of what the run says about its redundant rows, ended by NULL, to be freed as one; NULL if there are none, or no
  * memory.  pw_report_redundant says the first of them on standard error. */
 const char **pw_report_redundancies (pw_run *r);

@@ -86,6 +86,7 @@ static int run_open (run *x, pw_error *error) {
     return error->status;
   x->r = pw_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
+  pw_report_differences (x->m.system);
   pw_report_start (x->m.system, pw_run_start (x->r));
   x->redundant = pw_report_redundancies (x->r);
   pw_report_redundant (x->redundant);

@@ -158,17 +158,34 @@ static void json_sample (json *j, struct fy_node *root, const pw_system *s, cons
     json_add_null (j, root, "energy");
 }
 
-/* A list of texts, empty if there are none. */
-static void json_redundant (json *j, struct fy_node *root, const char *const *text) {
+/* ---- Lists of texts, empty if there are none ---- */
+
+static struct fy_node *json_add_list (json *j, struct fy_node *object, const char *key) {
   struct fy_node *list = fy_node_create_sequence (j->document);
-  json_add (j, root, "redundant", list);
-  for (; text && *text && !j->failed; text++) {
-    struct fy_node *item = json_text (j, *text);
-    if (item && fy_node_sequence_append (list, item) == 0) continue;
-    fy_node_free (item);
-    j->failed = 1;
-  }
+  json_add (j, object, key, list);
+  return j->failed ? NULL : list;
 }
+
+static void json_append (json *j, struct fy_node *list, const char *text) {
+  struct fy_node *item = json_text (j, text);
+  if (item && fy_node_sequence_append (list, item) == 0) return;
+  fy_node_free (item);
+  j->failed = 1;
+}
+
+static void json_redundant (json *j, struct fy_node *root, const char *const *text) {
+  struct fy_node *list = json_add_list (j, root, "redundant");
+  for (; text && *text && !j->failed; text++) json_append (j, list, *text);
+}
+
+static void json_differences (json *j, struct fy_node *root, const pw_system *s) {
+  char name[300];
+  struct fy_node *list = json_add_list (j, root, "differences");
+  for (int i = 0, n = s ? pw_count_differences (s) : 0; i < n && !j->failed; i++)
+    json_append (j, list, pw_difference_name (s, i, name, sizeof name));
+}
+
+/* ---- The cost ---- */
 
 static void json_statistics (json *j, struct fy_node *root, const pw_statistics *n, double cpu) {
   if (n == NULL) {
@@ -217,6 +234,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   json_add_text (&j, root, "reason", summary->reason);
   json_sample (&j, root, s, sample, ledger);
   json_redundant (&j, root, summary->redundant);
+  json_differences (&j, root, s);
   json_statistics (&j, root, statistics, summary->cpu);
   int status = json_emit (&j, o, error);
   fy_document_destroy (j.document);

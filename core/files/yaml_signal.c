@@ -214,6 +214,7 @@ static int signal_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *
   signal->function.open = signal_open;
   signal->function.close = signal_close;
   if (r->states) signal->function.reads = r->reads;
+  signal->function.differenced = r->states > 0;
   return status;
 }
 

@@ -1,0 +1,177 @@
+/* Kinds of a plug-in's own, as models/elliptic-wire.c has them: its truth, every method, the program, the self-test. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+#include "pinwheel-files.h"
+#include "scene.h"
+#include "selftest.h"
+#include "system.h"
+#include "trial.h"
+
+#define OWN_NOTICE "pinwheel: derivatives by differences: force_q of kind attraction\n"
+
+static const double own_e = 0.6, own_b = 0.8; /* eccentricity and short semi-axis; the long one is 1, and so is mu */
+
+/* A system of the model, whose file has to stay open. */
+typedef struct {
+  pw_file *file;
+  pw_system *s;
+} own;
+
+static own own_open (double factor) {
+  pw_error error = { 0 };
+  own x = { .file = pw_file_open ("elliptic-wire", &error) };
+  check_ok (x.file ? PW_OK : error.status, &error);
+  pw_model *m = pw_file_model (x.file, &error);
+  check_ok (m ? pw_set (m, "factor", factor, &error) : error.status, &error);
+  check_ok (pw_build (m, &error), &error);
+  x.s = scene_compile (m);
+  return x;
+}
+
+static void own_close (own *x) {
+  pw_free (x->s);
+  pw_file_close (x->file);
+}
+
+/* ---- The truth ---- */
+
+/* Where a planet is t after its perihelion: Kepler's equation E - e sin E = t, by Newton's method. */
+static void own_planet (double t, double p[2]) {
+  double E = t;
+  for (int i = 0; i < 50; i++) E -= (E - own_e * sin (E) - t) / (1 - own_e * cos (E));
+  p[0] = cos (E) - own_e;
+  p[1] = own_b * sin (E);
+}
+
+/* As fast as a planet, the bead is where a planet is, and the wire carries nothing. */
+static void test_planet (void **state) {
+  (void)state;
+  own x = own_open (1);
+  pw_run *r = runs_open (x.s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
+  for (int t = 1; t <= 10; t++) {
+    double p[2];
+    pw_sample now = runs_to (r, t);
+    own_planet (t, p);
+    check_close ("x", trial_state (x.s, &now, "bead.x"), p[0], 5e-9,
+                 "t (h w)^4 at h = 1 ms and w = 5/s, at perihelion");
+    check_close ("y", trial_state (x.s, &now, "bead.y"), p[1], 5e-9,
+                 "t (h w)^4 at h = 1 ms and w = 5/s, at perihelion");
+    check_close ("N", trial_reaction (x.s, &now, "orbit.N"), 0, 5e-9, "(h w)^4 times the attraction");
+    check_close ("balance", now.balance, 0, 5e-9, "(h w)^4");
+  }
+  pw_close (r);
+  own_close (&x);
+}
+
+/* Faster, it presses on the wire with m (v^2 - v_K^2) / rho, and v^2 - v_K^2 = (1.2^2 - 1) 4 everywhere. */
+static void test_faster (void **state) {
+  (void)state;
+  own x = own_open (1.2);
+  pw_run *r = runs_open (x.s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
+  for (int t = 1; t <= 10; t++) {
+    pw_sample now = runs_to (r, t);
+    double X = trial_state (x.s, &now, "bead.x") + own_e, Y = trial_state (x.s, &now, "bead.y");
+    double s = hypot (X, Y / (own_b * own_b)), rho = own_b * own_b * s * s * s;
+    check_close ("force", -s * trial_reaction (x.s, &now, "orbit.N"), (1.2 * 1.2 - 1) * 4 / rho, 1e-7,
+                 "t (h w)^4 times the force at perihelion");
+  }
+  pw_close (r);
+  own_close (&x);
+}
+
+/* ---- Every method ---- */
+
+static void test_methods (void **state) {
+  (void)state;
+  double p[2];
+  own_planet (2, p);
+  for (const pw_method *const *m = pw_methods; *m; m++)
+    for (const pw_stabilisation *st = (*m)->stabilisations; st && st->name; st++) {
+      char method[60];
+      own x = own_open (1);
+      snprintf (method, sizeof method, "%s+%s", (*m)->name, st->name);
+      pw_run *r = runs_open (x.s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });
+      pw_sample now = runs_to (r, 2);
+      double off = hypot (trial_state (x.s, &now, "bead.x") - p[0], trial_state (x.s, &now, "bead.y") - p[1]);
+      check_below (method, off, 1e-4, "(h w)^2 for the methods of lowest order, 1e4 rtol for the others");
+      pw_close (r);
+      own_close (&x);
+    }
+}
+
+/* ---- The program ---- */
+
+/* One notice, with whatever method. */
+static void test_notice (void **state) {
+  static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl" };
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    char line[200];
+    snprintf (line, sizeof line, "pinwheel run elliptic-wire --t-end 0.5 -m %s --json @/wire.json", method[i]);
+    assert_int_equal (cli_run (line), 0);
+    assert_string_equal (cli_err, OWN_NOTICE);
+    assert_non_null (strstr (cli_file ("wire.json"), "\"force_q of kind attraction\""));
+  }
+  cli_good ("pinwheel run ezyroller --t-end 0.1 --json @/none.json");
+  assert_non_null (strstr (cli_file ("none.json"), "\"differences\": []"));
+}
+
+static void test_show (void **state) {
+  (void)state;
+  cli_good ("pinwheel show elliptic-wire");
+  assert_non_null (strstr (cli_out, "attraction sun: body bead, ground; strength 1 N m^2"));
+  assert_non_null (strstr (cli_out, "Derivatives by differences"));
+  assert_non_null (strstr (cli_out, "  force_q of kind attraction\n"));
+  cli_good ("pinwheel show elliptic-wire --matrices");
+  assert_non_null (strstr (cli_out, "orbit.N [N]"));
+  cli_bad ("pinwheel show elliptic-wire --yaml", 2,
+           "model elliptic-wire cannot be written as text: attraction sun is of a kind of the model's own");
+  cli_bad ("pinwheel run elliptic-wire --set e=1", 2,
+           "model elliptic-wire: e = 1: an ellipse has an eccentricity below 1");
+  cli_good ("pinwheel show ezyroller");
+  assert_null (strstr (cli_out, "by differences"));
+}
+
+/* A force that is an expression of states has no formula for its derivatives either. */
+static void test_expression (void **state) {
+  (void)state;
+  cli_write ("follow.yaml", "pinwheel: 1\nbodies:\n  - {name: arm, mass: 1, inertia: 1}\nelements:\n"
+                            "  - {torque: T, body: [arm, ground], value: -3*arm.phi}\n"
+                            "  - {torque: U, body: [arm, ground], value: sin(t)}\n");
+  cli_good ("pinwheel show @/follow.yaml");
+  assert_non_null (strstr (cli_out, "  torque T: value, by the states it reads\n"));
+  assert_null (strstr (cli_out, "  torque U: value, by"));
+}
+
+/* ---- The self-test ---- */
+
+static void test_selftest (void **state) {
+  (void)state;
+  own x = own_open (1);
+  assert_int_equal (x.s->slabs, 2);
+  for (int i = 0; i < 2; i++) {
+    const pw_kind *kind = x.s->slab[i].kind;
+    pw_selftest_report report = { 0 };
+    pw_error error = { 0 };
+    for (unsigned seed = 1; seed <= 100; seed++) check_ok (pw_selftest (kind, seed, &report, &error), &error);
+    assert_true (report.checks >= 5);
+    for (int c = 0; c < report.checks; c++)
+      check_below (report.check[c].name, report.check[c].error, report.check[c].bound, report.check[c].reason);
+  }
+  own_close (&x);
+  cli_good ("pinwheel check elliptic-wire");
+  assert_non_null (strstr (cli_out, "wire (1 element)"));
+  assert_non_null (strstr (cli_out, "attraction (1 element)"));
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_planet),   cmocka_unit_test (test_faster), cmocka_unit_test (test_methods),
+    cmocka_unit_test (test_notice),   cmocka_unit_test (test_show),   cmocka_unit_test (test_expression),
+    cmocka_unit_test (test_selftest),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
