@@ -2,7 +2,7 @@
  *
  * A command is one file with one function, which gets the command line after the word "pinwheel" (argv[0] is
  * "pinwheel run", for messages) and returns the exit status: 0 good, 1 machine, 2 input, 3 start, 4 method, 130
- * interrupted.  It keeps a pw_error, and ends with `return pw_cli_end (&error)`, the one place that prints an error. */
+ * interrupted, 141 closed pipe.  It keeps a pw_error, and ends with `return pw_cli_end (&error)`, the one place that prints an error. */
 #ifndef PW_CLI_H
 #define PW_CLI_H
 
@@ -14,7 +14,7 @@
 #define PW_VERSION "0.1.0"
 #endif
 
-enum { PW_INTERRUPTED = 130 }; /* exit status after Ctrl-C */
+enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 }; /* exit statuses after Ctrl-C, and when nobody reads the output */
 
 /* ---- Commands ---- */
 

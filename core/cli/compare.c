@@ -1,6 +1,5 @@
 /* pinwheel compare: what accuracy costs.  One model by several methods, each over a ladder of tolerances or steps,
  * against the truth: a row for each rung, failures included. */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -41,10 +40,9 @@ static int compare_open_csv (pw_compare *x, pw_error *error) {
   if (x->folder == NULL) return PW_OK;
   int status = pw_plot_folder (x->folder, error);
   if (status != PW_OK) return status;
-  snprintf (path, sizeof path, "%s/compare.csv.part", x->folder);
-  x->csv = fopen (path, "w");
-  return x->csv ? pw_compare_csv_head (x, error)
-                : pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  snprintf (path, sizeof path, "%s/compare.csv", x->folder);
+  x->csv = pw_output_open (path, error);
+  return x->csv ? pw_compare_csv_head (x, error) : error->status;
 }
 
 static int compare_open (pw_compare *x, pw_error *error) {
@@ -137,30 +135,38 @@ static int compare_run (pw_compare *x, pw_error *error) {
 
 /* ---- After it ---- */
 
-/* A whole table loses its ending .part; diagrams are drawn of the rows there are. */
-static int compare_finish (pw_compare *x, int status, pw_error *error) {
-  char part[PLOT_PATH], whole[PLOT_PATH];
-  int bad = 0, stopped = status == PW_RETRY && pw_stop;
-  if (x->folder) {
-    snprintf (part, sizeof part, "%s/compare.csv.part", x->folder);
-    snprintf (whole, sizeof whole, "%s/compare.csv", x->folder);
+/* What there is of a table that is not whole keeps its ending .part; without a row it is removed. */
+static void compare_keep_part (pw_compare *x, char *part, size_t size) {
+  if (x->csv && pw_output_abandon (x->csv, part, size) && x->rows == 0) {
+    remove (part);
+    *part = 0;
   }
-  if (x->csv) bad = fclose (x->csv) != 0;
   x->csv = NULL;
-  if (stopped && x->rows == 0) {
-    if (x->folder) remove (part);
+}
+
+static int compare_interrupted (pw_compare *x) {
+  char part[PLOT_PATH + 16] = "";
+  compare_keep_part (x, part, sizeof part);
+  if (x->rows == 0)
     fputs ("pinwheel: interrupted before the first row was done\n", stderr);
-    return PW_INTERRUPTED;
-  }
-  if (stopped) {
+  else
     fprintf (stderr, "pinwheel: interrupted; %d of %d rows are done%s%s\n", x->rows, x->rungs,
-             x->folder ? ", and kept in " : "", x->folder ? part : "");
-    return PW_INTERRUPTED;
+             *part ? ", and kept in " : "", part);
+  return PW_INTERRUPTED;
+}
+
+/* Diagrams are drawn of the rows there are. */
+static int compare_finish (pw_compare *x, int status, pw_error *error) {
+  if (status == PW_RETRY && pw_stop) return compare_interrupted (x);
+  if (x->csv == NULL) return status;
+  if (status != PW_OK) {
+    compare_keep_part (x, (char[PLOT_PATH + 16]){ 0 }, PLOT_PATH + 16);
+    return status;
   }
-  if (status != PW_OK || x->folder == NULL) return status;
-  if (bad || rename (part, whole) != 0)
-    return pw_fail (error, PW_MACHINE, "cannot write %s: %s", whole, strerror (errno));
-  return pw_compare_plot (x, error);
+  pw_output *csv = x->csv;
+  x->csv = NULL;
+  status = pw_output_finish (csv, error);
+  return status == PW_OK ? pw_compare_plot (x, error) : status;
 }
 
 /* A comparison in which nothing has worked is a failure. */
@@ -175,7 +181,6 @@ static int compare_verdict (const pw_compare *x, pw_error *error) {
 }
 
 static void compare_close (pw_compare *x) {
-  if (x->csv) fclose (x->csv);
   pw_truth_close (&x->truth);
   pw_cli_close_model (&x->m);
   pw_cli_close (&x->line);

@@ -77,7 +77,7 @@ typedef struct {
   pw_rung *row;
   int rows, rungs; /* done, and in all */
   pw_progress progress;
-  FILE *csv; /* NULL: none is wanted */
+  pw_output *csv; /* NULL: none is wanted */
 } pw_compare;
 
 /* ---- compare_methods.c ---- */

@@ -113,7 +113,7 @@ int pw_compare_csv_head (const pw_compare *x, pw_error *error) {
   pw_text_name (&t, "cpu", "s");
   pw_text_name (&t, "spread", "s");
   pw_text_cell (&t, "repeats,reason");
-  return table_end (x, &t, x->csv, error);
+  return table_end (x, &t, pw_output_stream (x->csv), error);
 }
 
 /* The errors that are no more than the truth's uncertainty, by name. */
@@ -152,14 +152,15 @@ int pw_compare_csv_line (const pw_compare *x, const pw_rung *r, pw_error *error)
   for (size_t i = 0; i < sizeof rest / sizeof *rest; i++) pw_text_number (&t, run ? rest[i] : NAN);
   pw_text_number (&t, r->repeats);
   pw_text_quoted (&t, r->reason);
-  return table_end (x, &t, x->csv, error);
+  return table_end (x, &t, pw_output_stream (x->csv), error);
 }
 
 int pw_compare_csv_truth (const pw_compare *x, pw_error *error) {
   char path[4200];
   snprintf (path, sizeof path, "%s/truth.csv", x->folder);
-  FILE *f = fopen (path, "w");
-  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  pw_output *o = pw_output_open (path, error);
+  if (o == NULL) return error->status;
+  FILE *f = pw_output_stream (o);
   pw_text t = { .at = NULL };
   pw_text_cell (&t, "truth,against");
   table_names (&t);
@@ -171,7 +172,7 @@ int pw_compare_csv_truth (const pw_compare *x, pw_error *error) {
       pw_text_number (&t, i < 0 ? x->truth.uncertainty[k] : x->truth.partner[i].error[k]);
     status = table_end (x, &t, f, error);
   }
-  if (fclose (f) != 0 && status == PW_OK)
-    return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  if (status == PW_OK) return pw_output_finish (o, error);
+  pw_output_discard (o);
   return status;
 }

@@ -73,7 +73,9 @@ static int main_dispatch (int argc, const char **argv) {
 }
 
 int main (int argc, char **argv) {
-  signal (SIGPIPE, SIG_IGN); /* a closed pipe is a failed write, and reported as one */
+  signal (SIGPIPE,
+          SIG_IGN); /* a closed pipe, and a file that may not grow, is a failed write: what is open is tidied up */
+  signal (SIGXFSZ, SIG_IGN);
   int status = main_dispatch (argc, (const char **)argv);
   pw_error error = { 0 };
   if ((fflush (stdout) != 0 || ferror (stdout)) && status == 0)

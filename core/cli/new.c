@@ -137,8 +137,13 @@ static int new_write (const char *path, pw_error *error) {
     return pw_fail (error, PW_INPUT, "%s is there already; it has been left as it is", path);
   if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
   new_print (f, name, ending[1] == 'y');
-  int bad = ferror (f);
-  if (fclose (f) != 0 || bad) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  errno = 0;
+  int bad = fflush (f) != 0 || ferror (f), why = errno;
+  if (fclose (f) != 0 && !bad) bad = 1, why = errno;
+  if (bad) {
+    remove (path);
+    return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (why));
+  }
   printf ("%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
   return PW_OK;
 }

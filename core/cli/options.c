@@ -1,5 +1,6 @@
 /* What the commands share: command lines, models, errors. */
 #define _POSIX_C_SOURCE 200809L
+#include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -181,8 +182,15 @@ pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {
 
 /* ---- The end ---- */
 
+/* 1 if standard output is a pipe that nobody reads any more: `pinwheel ... | head`. */
+static int options_nobody_reads (void) {
+  struct pollfd out = { .fd = STDOUT_FILENO, .events = POLLOUT };
+  return poll (&out, 1, 0) == 1 && out.revents & POLLERR;
+}
+
 int pw_cli_end (const pw_error *error) {
   if (error->status == PW_OK) return 0;
+  if (error->status == PW_MACHINE && options_nobody_reads ()) return PW_CLOSED_PIPE; /* they know */
   fflush (stdout);
   int placed = strstr (error->text, ": error: ") != NULL; /* as compilers say it, so that editors find the place */
   fprintf (stderr, "%s%s\n", placed ? "" : "pinwheel: ", error->text);

@@ -115,9 +115,12 @@ void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 /* Makes a folder and those above it. */
 int pw_plot_folder (const char *folder, pw_error *error);
 
-/* Opens a file of the folder for writing.  NULL and PW_MACHINE with path and reason if that fails. */
+/* Whether the run has ended early, and in words up to where: "incomplete: up to t = 3.2 s of 10 s". */
+int pw_plot_incomplete (const pw_plots *p, char *text, size_t size);
+
+/* Opens a file of the folder for writing, as NAME.part.  NULL and PW_MACHINE with path and reason if that fails. */
 FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error);
-/* Closes it.  PW_MACHINE if something could not be written. */
+/* Closes it and gives it its name.  PW_MACHINE if something could not be written; then there is none. */
 int pw_plot_finish (const pw_plots *p, const char *name, FILE *file, pw_error *error);
 
 /* The smallest rectangle around all attachment points, centres and wheels of samples 0 ... n - 1, or around their paths

@@ -38,6 +38,17 @@ static int gnuplot_start (char *const *argv, const char *messages, pid_t *child)
   return failed;
 }
 
+/* No figure of an earlier run, nor half of one, is left beside the data. */
+static void gnuplot_remove_figures (const char *folder, const char *const *scripts) {
+  static const char *const ending[] = { "svg", "png" };
+  char path[2 * PLOT_PATH];
+  for (int i = 0; i < PLOT_SCRIPTS && scripts[i]; i++)
+    for (size_t k = 0; k < sizeof ending / sizeof *ending; k++) {
+      snprintf (path, sizeof path, "%s/%.*s.%s", folder, (int)strcspn (scripts[i], "."), scripts[i], ending[k]);
+      remove (path);
+    }
+}
+
 static int gnuplot_absent (int *absent) {
   *absent = 1;
   return PW_OK;
@@ -52,6 +63,7 @@ int pw_plot_try_gnuplot (const char *folder, const char *const *scripts, const c
   for (int i = 0; i < PLOT_SCRIPTS && scripts[i]; i++) argv[4 + i] = scripts[i];
   if (!gnuplot_cd (folder, cd, sizeof cd)) return pw_fail (error, PW_INPUT, "%s: too long a name", folder);
   fflush (stderr);
+  gnuplot_remove_figures (folder, scripts);
   int failed = gnuplot_start ((char *const *)(size_t)argv, messages, &child);
   *absent = 0;
   if (failed == ENOENT) return gnuplot_absent (absent);
@@ -60,6 +72,7 @@ int pw_plot_try_gnuplot (const char *folder, const char *const *scripts, const c
     if (errno != EINTR) return pw_fail (error, PW_MACHINE, "lost gnuplot: %s", strerror (errno));
   if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (absent);
   if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
+  gnuplot_remove_figures (folder, scripts);
   if (WIFSIGNALED (status))
     return pw_fail (error, PW_MACHINE, "gnuplot was ended by signal %d; data and scripts are in %s", WTERMSIG (status),
                     folder);

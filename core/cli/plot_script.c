@@ -81,7 +81,9 @@ void pw_script_begin (const pw_script *s, const pw_plots *p, const char *title) 
            s->width, s->height, s->width, s->height, s->name);
   fputs ("set multiplot title '", s->f);
   script_text (s->f, p->model);
-  fprintf (s->f, ": %s' font (form eq 'svg' ? ',16' : ',13')\n", title);
+  char early[80] = "";
+  int incomplete = pw_plot_incomplete (p, early, sizeof early);
+  fprintf (s->f, ": %s%s%s' font (form eq 'svg' ? ',16' : ',13')\n", title, incomplete ? ", " : "", early);
 }
 
 int pw_script_end (const pw_script *s, const pw_plots *p, pw_error *error) {

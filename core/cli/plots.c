@@ -26,20 +26,34 @@ int pw_plot_folder (const char *folder, pw_error *error) {
   return PW_OK;
 }
 
+int pw_plot_incomplete (const pw_plots *p, char *text, size_t size) {
+  char t[32], end[32];
+  if (p->samples >= p->wanted || p->samples == 0) return 0;
+  snprintf (text, size, "incomplete: up to t = %s s of %s s",
+            pw_format (t, pw_plot_sample (p, p->samples - 1)[PLOT_T], 4), pw_format (end, p->t_end, 4));
+  return 1;
+}
+
 FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error) {
-  char path[PLOT_PATH];
-  snprintf (path, sizeof path, "%s/%s", p->folder, name);
+  char path[PLOT_PATH + 8], text[80];
+  snprintf (path, sizeof path, "%s/%s.part", p->folder, name);
   FILE *file = fopen (path, "w");
   if (file == NULL) pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  if (file && strstr (name, ".dat") && pw_plot_incomplete (p, text, sizeof text)) fprintf (file, "# %s\n", text);
   return file;
 }
 
 int pw_plot_finish (const pw_plots *p, const char *name, FILE *file, pw_error *error) {
-  int bad = ferror (file);
-  if (fclose (file) != 0 || bad)
-    return pw_fail (error, PW_MACHINE, "cannot write %s/%s: %s", p->folder, name,
-                    errno ? strerror (errno) : "the disk may be full");
-  return PW_OK;
+  char part[PLOT_PATH + 8], whole[PLOT_PATH];
+  snprintf (part, sizeof part, "%s/%s.part", p->folder, name);
+  snprintf (whole, sizeof whole, "%s/%s", p->folder, name);
+  errno = 0;
+  int bad = fflush (file) != 0 || ferror (file), why = errno;
+  if (fclose (file) != 0 && !bad) bad = 1, why = errno;
+  if (!bad && rename (part, whole) != 0) bad = 1, why = errno;
+  if (!bad) return PW_OK;
+  remove (part);
+  return pw_fail (error, PW_MACHINE, "cannot write %s: %s", whole, why ? strerror (why) : "the disk may be full");
 }
 
 /* ---- What is drawn ---- */
@@ -162,9 +176,13 @@ static pw_plots *plots_allocate (const pw_plots *sizes, int contacts, pw_error *
 /* A folder that cannot be written is better known before the run. */
 static int plots_try_folder (const pw_plots *p, pw_error *error) {
   if (pw_plot_folder (p->folder, error) != PW_OK) return error->status;
+  char path[PLOT_PATH + 8];
   FILE *probe = pw_plot_create (p, "motion.dat", error);
-  if (probe) fclose (probe);
-  return probe ? PW_OK : PW_MACHINE;
+  if (probe == NULL) return PW_MACHINE;
+  fclose (probe);
+  snprintf (path, sizeof path, "%s/motion.dat.part", p->folder);
+  remove (path);
+  return PW_OK;
 }
 
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,

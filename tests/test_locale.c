@@ -1,0 +1,67 @@
+/* A program that uses the libraries may live in a locale with a decimal comma: models are read and tables and summaries
+ * written as in any other.  The locale is made here, by localedef, if the system has what it takes. */
+#include <locale.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+
+/* Opens a model, runs it and writes a table and a summary, NAME.csv and NAME.json. */
+static void locale_write (const char *model, const char *name) {
+  pw_error error = { 0 };
+  pw_sample sample;
+  char path[400];
+  pw_file *f = pw_file_open (model, &error);
+  check_ok (error.status, &error);
+  pw_model *m = pw_file_model (f, &error);
+  check_ok (pw_build (m, &error), &error);
+  pw_system *s = pw_compile (m, &error);
+  check_ok (error.status, &error);
+  pw_run *r = pw_open (s, "rk4+baumgarte:alpha=2.5:beta=.5", &(pw_settings){ .step = 1e-2, .ledger = 1 }, &error);
+  check_ok (error.status, &error);
+  snprintf (path, sizeof path, "%s/%s.csv", cli_folder, name);
+  pw_output *o = pw_output_open (path, &error);
+  pw_csv *csv = pw_csv_open (s, 1, o, &error);
+  check_ok (error.status, &error);
+  for (int i = 1; i <= 5; i++) {
+    check_ok (pw_advance_to (r, 0.05 * i, 1, &error), &error);
+    check_ok (pw_at (r, 0.05 * i, &sample, &error), &error);
+    check_ok (pw_csv_write (csv, s, &sample, &error), &error);
+  }
+  pw_csv_close (csv);
+  check_ok (pw_output_finish (o, &error), &error);
+  snprintf (path, sizeof path, "%s/%s.json", cli_folder, name);
+  o = pw_output_open (path, &error);
+  pw_summary summary = { .model = "x", .method = "y", .status = "ok", .reason = "", .cpu = 0.25 };
+  check_ok (pw_json_write (&summary, s, &sample, 1, pw_run_statistics (r), o, &error), &error);
+  check_ok (pw_output_finish (o, &error), &error);
+  pw_close (r);
+  pw_free (s);
+  pw_model_free (m);
+  pw_file_close (f);
+}
+
+static void test_comma (void **state) {
+  (void)state;
+  static const char *const model[] = { "tests/models/arm.yaml", "tests/models/ezyroller.yaml", "models/chain.c" };
+  if (cli_run ("localedef -i de_DE -f UTF-8 @/de_DE.UTF-8") != 0) skip ();
+  for (size_t i = 0; i < sizeof model / sizeof *model; i++) {
+    char text[100];
+    locale_write (model[i], "plain");
+    setenv ("LOCPATH", cli_folder, 1);
+    if (setlocale (LC_ALL, "de_DE.UTF-8") == NULL) skip ();
+    snprintf (text, sizeof text, "%.1f", 0.5);
+    assert_string_equal (text, "0,5"); /* the comma is there */
+    locale_write (model[i], "comma");
+    setlocale (LC_ALL, "C");
+    cli_good ("cmp @/plain.csv @/comma.csv && cmp @/plain.json @/comma.json && test -s @/plain.csv");
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_comma) };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
