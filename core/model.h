@@ -14,6 +14,18 @@ typedef struct {
   double value;
 } pw_given;
 
+/* What a text model knows about its motion: expressions of the time for some states, and the values of names in them. */
+typedef struct {
+  int states;                 /* 0: nothing */
+  const char **state, **text; /* states: "bob.phi", and its expression */
+  int names;
+  const char **name;                               /* names */
+  double *value;                                   /* names */
+  double (*eval) (void *context, int i, double t); /* the value of expression i */
+  void *context;
+  void (*close) (void *context);
+} pw_truth_text;
+
 struct pw_model {
   const char *name;
   const pw_plugin_table *table;
@@ -25,6 +37,7 @@ struct pw_model {
   int elements, element_room;
   pw_given *given;
   int givens, given_room;
+  pw_truth_text truth;
   int built;
   pw_error error; /* the first one */
 };

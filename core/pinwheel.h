@@ -158,6 +158,11 @@ typedef struct {
   size_t parameters_size;                              /* bytes of the structure the parameters live in */
   pw_run_defaults run;                                 /* how to run it by default */
   void (*build) (pw_model *m, const void *parameters); /* declares bodies and elements */
+
+  /* The motion from the described start, where it is known; may be NULL.  Stores what is known at time t of the
+   * coordinates, three for each body in the order they were added, then those that elements own, and of their rates; all
+   * of them are NaN, not known, before. */
+  void (*truth) (const void *parameters, double t, double *q, double *v);
 } pw_plugin_table;
 
 /* Ends a model file:  PW_MODEL (.about = "...", .parameters = ..., .build = build) */
@@ -579,6 +584,12 @@ typedef struct pw_system pw_system;
 /* Checks and compiles a built model.  NULL with the error filled if it cannot be. */
 pw_system *pw_compile (const pw_model *m, pw_error *error);
 void pw_free (pw_system *s);
+
+/* 1 if a built model knows its motion (see pw_plugin_table), and what it knows at time t: q and v have as many entries as
+ * the system compiled from it has coordinates; what is not known is NaN.  It holds for the described start, not for values
+ * of pw_set_start.  Errors: PW_INPUT for a state the system does not have. */
+int pw_has_truth (const pw_model *m);
+int pw_true_state (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error);
 
 /* Sizes: bodies, coordinates (q and v have as many entries each), constraint rows, of which the first are holonomic. */
 int pw_count_bodies (const pw_system *s);

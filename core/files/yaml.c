@@ -129,7 +129,7 @@ static int yaml_version (const pw_yaml *y, const pw_node *version, pw_error *err
 }
 
 static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
-  static const char *const key[] = { "pinwheel", "about", "run", "parameters", "let", "bodies", "elements", NULL };
+  static const char *const key[] = { "pinwheel", "about", "run", "parameters", "let", "bodies", "elements", "truth", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   pw_names names = { .size = 0 };
   if (y->root == NULL) return pw_yaml_fail (y, 0, error, "the file is empty; a model begins with \"pinwheel: 1\"");
@@ -140,6 +140,7 @@ static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
   y->let = v[4];
   y->bodies = v[5];
   y->elements = v[6];
+  y->truth = v[7];
   size_t count = (v[3] ? (size_t)v[3]->count : 0) + (v[4] ? (size_t)v[4]->count : 0);
   int status = pw_names_open (&names, count) == PW_OK ? PW_OK : pw_yaml_no_memory (y, error);
   if (status == PW_OK) status = yaml_parameters (y, v[3], x, &names, error);

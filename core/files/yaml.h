@@ -7,7 +7,8 @@
  *   yaml_build.c   bodies and elements, through the field tables of their kinds
  *   yaml_signal.c  signals
  *   yaml_state.c   states that expressions name
- *   yaml_table.c   points of tables, in the model or in a file */
+ *   yaml_table.c   points of tables, in the model or in a file
+ *   yaml_truth.c   what is known about the motion */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -42,8 +43,8 @@ struct pw_yaml {
   size_t size;
   pw_arena arena; /* nodes and texts */
   const pw_node *root;
-  const pw_node *bodies, *elements, *let; /* or NULL */
-  pw_parameter *parameter;                /* ended by a NULL name */
+  const pw_node *bodies, *elements, *let, *truth; /* or NULL */
+  pw_parameter *parameter;                        /* ended by a NULL name */
   int parameters;
 };
 
@@ -137,5 +138,8 @@ int pw_yaml_state (pw_yaml_builder *b, const pw_yaml_reading *r, const char *nam
 /* Reads a signal of a kind into a field (yaml_signal.c). */
 int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,
                     pw_error *error);
+
+/* Reads what the model knows about its motion, when its bodies and elements are there (yaml_truth.c). */
+int pw_yaml_truth (pw_yaml_builder *b, pw_error *error);
 
 #endif

@@ -209,7 +209,7 @@ static int build_all (pw_yaml_builder *b, char *definition, pw_error *error) {
     if (build_body (b, n, error) != PW_OK) return error->status;
   for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
     if (build_element (b, n, definition, error) != PW_OK) return error->status;
-  return PW_OK;
+  return pw_yaml_truth (b, error);
 }
 
 /* What is defined once, from the parameters and what was defined before. */
