@@ -49,6 +49,27 @@ void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *
   *to = i < n ? start->q[i] : start->v[i - n];
 }
 
+/* What the model says it knows about its motion must hold at the start. */
+static int check_truth (pw_check *x, int started, pw_error *error) {
+  int n = x->m.system->coords;
+  if (x->r == NULL || started || !pw_has_truth (x->m.model)) return PW_OK;
+  double *truth = malloc (2 * (size_t)n * sizeof *truth);
+  if (truth == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  int status = pw_true_state (x->m.model, x->m.system, 0, truth, truth + n, error);
+  for (int i = 0; i < 2 * n && status == PW_OK; i++) {
+    char name[300], a[32], b[32];
+    double from, to;
+    if (isnan (truth[i])) continue;
+    x->known++;
+    pw_check_state (x, i, name, sizeof name, &from, &to);
+    if (!(fabs (truth[i] - to) <= 1e-9 * (1 + fabs (to))))
+      check_problem (x, "the model's truth does not hold at the start: %s is %s, not %s", name, pw_format (a, to, 9),
+                     pw_format (b, truth[i], 9));
+  }
+  free (truth);
+  return status;
+}
+
 /* ---- The kinds ---- */
 
 static void check_alone (pw_checked_kind *k) {
@@ -116,9 +137,10 @@ static int check_linear (pw_check *x, pw_error *error) {
 
 /* ---- */
 
-static int check_model (pw_check *x, pw_error *error) {
+static int check_model (pw_check *x, int started, pw_error *error) {
   check_open (x);
-  int status = check_linear (x, error);
+  int status = check_truth (x, started, error);
+  if (status == PW_OK) status = check_linear (x, error);
   return status == PW_OK ? check_kinds (x, error) : status;
 }
 
@@ -148,7 +170,7 @@ int pw_cli_check (int argc, const char **argv) {
   pw_cli_line l;
   pw_check x = { .r = NULL };
   if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
-      pw_cli_open (&x.m, &l, sets, starts, &error) == PW_OK && check_model (&x, &error) == PW_OK) {
+      pw_cli_open (&x.m, &l, sets, starts, &error) == PW_OK && check_model (&x, starts != NULL, &error) == PW_OK) {
     if (json == NULL || strcmp (json, "-") != 0) pw_check_text (&x);
     if (json) pw_check_json (&x, json, &error);
     check_verdict (&x, &error);

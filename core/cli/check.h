@@ -23,6 +23,7 @@ typedef struct {
   const char **redundant; /* what is said about each redundant row, ended by NULL; or NULL */
   pw_checked_kind *kind;  /* of the scene */
   int kinds;
+  int known;          /* states whose motion the model knows, compared with the start */
   double step, limit; /* the model's step, and the largest that RK4 can take [s]; 0 and INFINITY: none */
   int explicit_rk4;   /* 1: the model wants to be run by rk4 */
   int problems;

@@ -26,7 +26,8 @@ static int compare_read (pw_compare *x, int argc, const char **argv, pw_error *e
     { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
     PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
     { "truth", 0, POPT_ARG_STRING, &x->truth_path, 0,
-      "Take errors against this table, with columns as run writes them, instead of a reference of its own",
+      "Take errors against this table, with columns as run writes them, instead of the model's own truth or one made "
+      "by methods",
       "FILE.csv" },
     { "output", 'o', POPT_ARG_STRING, &x->folder, 0, "Write tables and work-precision diagrams into a folder", "DIR" },
     POPT_TABLEEND,
@@ -76,7 +77,7 @@ static double compare_predict (const pw_compare *x, int first, int adaptive) {
 
 static void compare_too_slow (const pw_compare *x, pw_rung *r, double predicted) {
   char limit[32], about[60] = "";
-  for (int i = 0; i < COMPARE_ERRORS; i++) r->error[i] = NAN;
+  for (int i = 0; i < MOTION_ERRORS; i++) r->error[i] = NAN;
   r->state = COMPARE_SLOW;
   if (isfinite (predicted)) snprintf (about, sizeof about, ", about %.2g s", predicted);
   snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", about, pw_format (limit, x->limit, 4));
@@ -108,11 +109,10 @@ static int compare_ladder (pw_compare *x, const pw_contestant *method, pw_motion
 
 static int compare_rows (pw_compare *x, pw_error *error) {
   pw_motion scratch;
-  int status =
-      pw_motion_open (&scratch, x->m.system, x->truth.known ? x->truth.motion.samples : COMPARE_SAMPLES, error);
+  int status = pw_motion_open (&scratch, x->m.system, x->truth.known ? x->truth.motion.samples : MOTION_SAMPLES, error);
   if (status != PW_OK) return status;
-  for (int k = 0; k < scratch.samples; k++)
-    scratch.t[k] = x->truth.known ? x->truth.motion.t[k] : x->t_end * (k + 1) / scratch.samples;
+  pw_motion_times (&scratch, x->t_end);
+  for (int k = 0; x->truth.known && k < scratch.samples; k++) scratch.t[k] = x->truth.motion.t[k];
   pw_compare_truth_line (x, stdout);
   fputc ('\n', stdout);
   pw_compare_head (x, stdout);

@@ -2,28 +2,17 @@
  *
  *   methods (compare_methods.c) -> truth (compare_truth.c) -> rows (compare_row.c) -> table, CSV, diagrams
  *
- * A motion is the state and the multipliers at the times of the comparison; an error is the distance of two motions. */
+ * An error is the distance of two motions (motion.h). */
 #ifndef PW_COMPARE_H
 #define PW_COMPARE_H
 
 #include <stdio.h>
 #include "cli.h"
 #include "contestants.h"
+#include "motion.h"
 #include "progress.h"
 
-enum { COMPARE_SAMPLES = 100, COMPARE_REPEATS = 99, COMPARE_PARTNERS = 3 };
-
-/* Errors: the largest of the coordinates and rates of a unit, at the end, then over all samples; of the multipliers
- * relative to the largest one of the same unit. */
-enum { COMPARE_END, COMPARE_MOST = 4, COMPARE_LAMBDA = 8, COMPARE_ERRORS };
-enum { COMPARE_LENGTH, COMPARE_ANGLE, COMPARE_SPEED, COMPARE_RATE, COMPARE_UNITS };
-
-/* What happens at the times of the comparison.  NaN: not known. */
-typedef struct {
-  int samples, width; /* width: coordinates, rates, multipliers */
-  double *t;          /* samples [s] */
-  double *x;          /* samples x width */
-} pw_motion;
+enum { COMPARE_REPEATS = 99, COMPARE_PARTNERS = 3 };
 
 typedef struct {
   double from, to; /* from > to > 0 */
@@ -34,15 +23,15 @@ typedef enum { COMPARE_DONE, COMPARE_FAILED, COMPARE_REFUSED, COMPARE_STOPPED, C
 /* A rung of a method's ladder. */
 typedef struct {
   const pw_contestant *method;
-  double rung;                  /* tolerance, or step [s] */
-  pw_row_state state;           /* refused: not begun; stopped: at the limit; slow: not run */
-  double t;                     /* reached [s] */
-  double error[COMPARE_ERRORS]; /* NaN: not known; at the truth's uncertainty: no more than this */
-  unsigned below;               /* bit i: error i is no more than the truth's uncertainty */
-  double order;             /* observed: how fast the largest error falls with the number of steps; NaN: not known */
-  double balance;           /* largest |energy balance| of the samples [J] */
-  pw_statistics statistics; /* of a run without samples and ledger */
-  double cpu, spread;       /* of such runs: median; largest less smallest [s] */
+  double rung;                 /* tolerance, or step [s] */
+  pw_row_state state;          /* refused: not begun; stopped: at the limit; slow: not run */
+  double t;                    /* reached [s] */
+  double error[MOTION_ERRORS]; /* NaN: not known; at the truth's uncertainty: no more than this */
+  unsigned below;              /* bit i: error i is no more than the truth's uncertainty */
+  double order;                /* observed: how fast the largest error falls with the number of steps; NaN: not known */
+  double balance;              /* largest |energy balance| of the samples [J] */
+  pw_statistics statistics;    /* of a run without samples and ledger */
+  double cpu, spread;          /* of such runs: median; largest less smallest [s] */
   int repeats;
   char reason[500];
 } pw_rung;
@@ -50,14 +39,14 @@ typedef struct {
 /* Against what errors are taken, and how far it can be trusted. */
 typedef struct {
   pw_motion motion;
-  int known;                          /* 0: there is none */
-  double uncertainty[COMPARE_ERRORS]; /* 0 where nothing is compared */
-  double size[COMPARE_UNITS];         /* largest coordinate or rate */
-  char about[300];                    /* "erk8+projection, rtol 3e-14" or the file's name */
-  int partners;                       /* methods it was held against, and how far they are from it */
+  int known;                         /* 0: there is none */
+  double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
+  double size[MOTION_UNITS];         /* largest coordinate or rate */
+  char about[300];                   /* "erk8+projection, rtol 3e-14" or the file's name */
+  int partners;                      /* methods it was held against, and how far they are from it */
   struct {
     char about[100];
-    double error[COMPARE_ERRORS];
+    double error[MOTION_ERRORS];
   } partner[COMPARE_PARTNERS];
 } pw_truth;
 
@@ -87,15 +76,6 @@ int pw_compare_methods (pw_compare *x, pw_error *error);
 /* Rung i of a ladder, or 0 above its end; fixed steps are halved, tolerances go down by decades. */
 double pw_compare_rung (const pw_ladder *ladder, int adaptive, int i);
 
-/* ---- compare_motion.c ---- */
-
-int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error);
-void pw_motion_close (pw_motion *m);
-/* The errors of a motion, each the largest distance from the truth. */
-void pw_motion_distance (const pw_system *s, const pw_motion *truth, const pw_motion *m, double error[COMPARE_ERRORS]);
-/* Which kind of unit a state has. */
-int pw_motion_unit (const pw_system *s, int state);
-
 /* ---- compare_row.c ---- */
 
 /* One run of a method to the end, or the limit.  With a motion, its samples are taken and accounts are kept.  PW_RETRY:
@@ -107,16 +87,16 @@ double pw_compare_order (const pw_rung *before, const pw_rung *r);
 /* Fills a row: errors, then times.  PW_RETRY if interrupted; PW_MACHINE, PW_START; a method's failure is in the row. */
 int pw_compare_row (pw_compare *x, pw_rung *r, pw_motion *scratch, pw_error *error);
 
-/* ---- compare_truth.c, compare_file.c ---- */
+/* ---- compare_truth.c ---- */
 
+/* The truth of a table, of the model itself, or made by methods; a table's end is that of the comparison where none was
+ * given. */
 int pw_truth_find (pw_compare *x, pw_error *error);
-/* Reads a table of samples; sets t_end where it was not given. */
-int pw_truth_read (pw_compare *x, const char *path, pw_error *error);
 void pw_truth_close (pw_truth *t);
 
 /* ---- compare_table.c ---- */
 
-extern const char *const pw_compare_column[COMPARE_ERRORS]; /* names of the errors, "end.length" */
+extern const char *const pw_compare_column[MOTION_ERRORS]; /* names of the errors, "end.length" */
 void pw_compare_truth_line (const pw_compare *x, FILE *f);
 void pw_compare_head (const pw_compare *x, FILE *f);
 void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f);

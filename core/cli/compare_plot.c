@@ -54,7 +54,7 @@ static int plot_write_data (const pw_compare *x, const pw_plots *p, pw_error *er
       if (r->method != &x->list.method[i] || !plot_drawn (r)) continue;
       fprintf (f, "%s ", pw_format (number, r->rung, 9));
       fprintf (f, "%s %ld", pw_format (number, r->cpu, 9), r->statistics.rhs);
-      for (int k = 0; k < 2; k++) fprintf (f, " %s", pw_format (number, r->error[COMPARE_MOST + k], 9));
+      for (int k = 0; k < 2; k++) fprintf (f, " %s", pw_format (number, r->error[MOTION_MOST + k], 9));
       fputc ('\n', f);
     }
   }
@@ -70,7 +70,7 @@ static void plot_span (const pw_compare *x, int number, int unit, double *least,
     if (!plot_drawn (r)) continue;
     double value = number == PLOT_CPU   ? r->cpu
                    : number == PLOT_RHS ? (double)r->statistics.rhs
-                                        : r->error[COMPARE_MOST + unit];
+                                        : r->error[MOTION_MOST + unit];
     if (!(value > 0) || !isfinite (value)) continue;
     *least = fmin (*least, value);
     *most = fmax (*most, value);
@@ -79,7 +79,7 @@ static void plot_span (const pw_compare *x, int number, int unit, double *least,
 
 /* Errors from the truth's uncertainty to the size of the motion, beyond which a method has simply lost its way. */
 static void plot_errors (const pw_compare *x, const pw_script *s, int unit) {
-  double least, most, floor = x->truth.uncertainty[COMPARE_MOST + unit];
+  double least, most, floor = x->truth.uncertainty[MOTION_MOST + unit];
   plot_span (x, PLOT_ERROR, unit, &least, &most);
   most = fmin (3 * most, fmax (10 * least, x->truth.size[unit]));
   pw_script_range (s, "y", least / 4, most);
@@ -171,8 +171,8 @@ static int plot_one (const pw_compare *x, const pw_plots *p, const plot_figure *
 
 int pw_compare_plot (const pw_compare *x, pw_error *error) {
   static const plot_figure figure[] = {
-    { "work-precision", "what accuracy costs", "largest error of a coordinate [m]", COMPARE_LENGTH },
-    { "work-precision-angles", "what accuracy of angles costs", "largest error of an angle [rad]", COMPARE_ANGLE },
+    { "work-precision", "what accuracy costs", "largest error of a coordinate [m]", MOTION_LENGTH },
+    { "work-precision-angles", "what accuracy of angles costs", "largest error of an angle [rad]", MOTION_ANGLE },
   };
   const pw_plots p = { .folder = x->folder, .model = pw_file_name (x->m.file) };
   const char *script[3] = { NULL };

@@ -13,20 +13,13 @@
 
 /* ---- A run ---- */
 
-static void row_take (const pw_system *s, const pw_sample *from, double *to) {
-  size_t n = (size_t)pw_count_coordinates (s), rows = (size_t)pw_count_rows (s);
-  memcpy (to, from->q, n * sizeof *to);
-  memcpy (to + n, from->v, n * sizeof *to);
-  if (rows) memcpy (to + 2 * n, from->lambda, rows * sizeof *to);
-}
-
 /* Takes the samples that the last step has reached. */
 static int row_samples (const pw_compare *x, pw_rung *r, pw_run *run, pw_motion *m, int *next, pw_error *error) {
   pw_sample sample;
   while (m && *next < m->samples && m->t[*next] <= pw_time (run)) {
     int status = pw_at (run, m->t[*next], &sample, error);
     if (status != PW_OK) return status;
-    row_take (x->m.system, &sample, m->x + *next * m->width);
+    pw_motion_take (m, x->m.system, *next, &sample);
     r->balance = fmax (r->balance, fabs (sample.balance));
     ++*next;
   }
@@ -73,7 +66,7 @@ int pw_compare_run (pw_compare *x, pw_rung *r, pw_motion *motion, pw_error *erro
 /* ---- A row ---- */
 
 static void row_unknown (pw_rung *r) {
-  for (int i = 0; i < COMPARE_ERRORS; i++) r->error[i] = NAN;
+  for (int i = 0; i < MOTION_ERRORS; i++) r->error[i] = NAN;
   r->balance = r->spread = r->order = NAN;
 }
 
@@ -82,7 +75,7 @@ static void row_errors (const pw_compare *x, pw_rung *r, const pw_motion *m) {
   const pw_truth *truth = &x->truth;
   if (!truth->known) return;
   pw_motion_distance (x->m.system, &truth->motion, m, r->error);
-  for (int i = 0; i < COMPARE_ERRORS; i++) {
+  for (int i = 0; i < MOTION_ERRORS; i++) {
     if (truth->uncertainty[i] == 0) r->error[i] = NAN;
     if (!(r->error[i] <= truth->uncertainty[i])) continue;
     r->error[i] = truth->uncertainty[i];
@@ -91,7 +84,7 @@ static void row_errors (const pw_compare *x, pw_rung *r, const pw_motion *m) {
 }
 
 double pw_compare_order (const pw_rung *before, const pw_rung *r) {
-  int i = isnan (r->error[COMPARE_MOST]) ? COMPARE_MOST + COMPARE_ANGLE : COMPARE_MOST;
+  int i = isnan (r->error[MOTION_MOST]) ? MOTION_MOST + MOTION_ANGLE : MOTION_MOST;
   int known = before->state == COMPARE_DONE && r->state == COMPARE_DONE && !((before->below | r->below) >> i & 1);
   double finer =
       r->method->adaptive ? (double)r->statistics.steps / (double)before->statistics.steps : before->rung / r->rung;

@@ -5,10 +5,10 @@
 #include "compare.h"
 #include "sweep.h"
 
-const char *const pw_compare_column[COMPARE_ERRORS] = { "end.length",    "end.angle",      "end.speed",
-                                                        "end.rate",      "largest.length", "largest.angle",
-                                                        "largest.speed", "largest.rate",   "multiplier" };
-static const char *const table_unit[COMPARE_ERRORS] = { "m", "rad", "m/s", "rad/s", "m", "rad", "m/s", "rad/s", NULL };
+const char *const pw_compare_column[MOTION_ERRORS] = { "end.length",    "end.angle",      "end.speed",
+                                                       "end.rate",      "largest.length", "largest.angle",
+                                                       "largest.speed", "largest.rate",   "multiplier" };
+static const char *const table_unit[MOTION_ERRORS] = { "m", "rad", "m/s", "rad/s", "m", "rad", "m/s", "rad/s", NULL };
 
 /* ---- To read ---- */
 
@@ -38,8 +38,8 @@ void pw_compare_truth_line (const pw_compare *x, FILE *f) {
   fprintf (f, "errors are taken against %s%s\n", t->about, x->truth_path ? ", as if it were exact" : "");
   for (int i = 0; i < t->partners; i++)
     fprintf (f, "  %s agrees with it to %s m, %s rad%s\n", t->partner[i].about,
-             table_number (t->partner[i].error[COMPARE_MOST + COMPARE_LENGTH], 0, a),
-             table_number (t->partner[i].error[COMPARE_MOST + COMPARE_ANGLE], 0, b),
+             table_number (t->partner[i].error[MOTION_MOST + MOTION_LENGTH], 0, a),
+             table_number (t->partner[i].error[MOTION_MOST + MOTION_ANGLE], 0, b),
              i == 0 ? ": below that it cannot tell" : "");
 }
 
@@ -62,7 +62,7 @@ static void table_failure (const pw_rung *r, FILE *f) {
 }
 
 void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f) {
-  static const int shown[] = { COMPARE_END, COMPARE_END + 1, COMPARE_MOST, COMPARE_MOST + 1 };
+  static const int shown[] = { MOTION_END, MOTION_END + 1, MOTION_MOST, MOTION_MOST + 1 };
   char text[32], spread[32] = "-";
   fprintf (f, "%-*s %9s", table_width (x), r->method->name, pw_format (text, r->rung, 4));
   if (r->state != COMPARE_DONE) {
@@ -77,7 +77,7 @@ void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f) {
     fprintf (f, " %5.1f", r->order);
   fprintf (f, "  %8s", table_number (r->statistics.position, 0, text));
   fprintf (f, " %8s", table_number (r->statistics.velocity, 0, text));
-  fprintf (f, "  %8s", table_number (r->error[COMPARE_LAMBDA], (int)(r->below >> COMPARE_LAMBDA & 1), text));
+  fprintf (f, "  %8s", table_number (r->error[MOTION_LAMBDA], (int)(r->below >> MOTION_LAMBDA & 1), text));
   fprintf (f, " %8s", table_number (r->balance, 0, text));
   if (!isnan (r->spread)) snprintf (spread, sizeof spread, "%.0f %%", 100 * r->spread / r->cpu);
   fprintf (f, "  %8ld %9ld %7ld %8ld  %8.2e %6s\n", r->statistics.steps, r->statistics.rhs, r->statistics.jacobians,
@@ -98,7 +98,7 @@ static int table_end (const pw_compare *x, pw_text *t, FILE *f, pw_error *error)
 }
 
 static void table_names (pw_text *t) {
-  for (int i = 0; i < COMPARE_ERRORS; i++) pw_text_name (t, pw_compare_column[i], table_unit[i]);
+  for (int i = 0; i < MOTION_ERRORS; i++) pw_text_name (t, pw_compare_column[i], table_unit[i]);
 }
 
 int pw_compare_csv_head (const pw_compare *x, pw_error *error) {
@@ -119,7 +119,7 @@ int pw_compare_csv_head (const pw_compare *x, pw_error *error) {
 /* The errors that are no more than the truth's uncertainty, by name. */
 static void table_below (pw_text *t, const pw_rung *r) {
   pw_text_cell (t, "");
-  for (int i = 0, n = 0; i < COMPARE_ERRORS; i++) {
+  for (int i = 0, n = 0; i < MOTION_ERRORS; i++) {
     if (!(r->below >> i & 1)) continue;
     if (n++) pw_text_add (t, " ");
     pw_text_add (t, pw_compare_column[i]);
@@ -136,7 +136,7 @@ int pw_compare_csv_line (const pw_compare *x, const pw_rung *r, pw_error *error)
   pw_text_number (&t, r->rung);
   pw_text_cell (&t, status[r->state]);
   pw_text_number (&t, run ? r->t : NAN);
-  for (int i = 0; i < COMPARE_ERRORS; i++) pw_text_number (&t, r->error[i]);
+  for (int i = 0; i < MOTION_ERRORS; i++) pw_text_number (&t, r->error[i]);
   table_below (&t, r);
   const double rest[] = { r->order,
                           s->position,
@@ -168,7 +168,7 @@ int pw_compare_csv_truth (const pw_compare *x, pw_error *error) {
   for (int i = -1; status == PW_OK && x->truth.known && i < x->truth.partners; i++) {
     pw_text_quoted (&t, x->truth.about);
     pw_text_quoted (&t, i < 0 ? "uncertainty" : x->truth.partner[i].about);
-    for (int k = 0; k < COMPARE_ERRORS; k++)
+    for (int k = 0; k < MOTION_ERRORS; k++)
       pw_text_number (&t, i < 0 ? x->truth.uncertainty[k] : x->truth.partner[i].error[k]);
     status = table_end (x, &t, f, error);
   }

@@ -1,5 +1,5 @@
-/* The truth, where none is given: methods that have little in common, each at its tightest.  Two of them that agree best
- * are the truth, as far as they agree. */
+/* The truth: a table's, the model's own, or where there is neither that of methods that have little in common, each at its
+ * tightest.  Two of them that agree best are the truth, as far as they agree. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -32,12 +32,12 @@ static void truth_floor (const pw_compare *x, pw_truth *t) {
       loads |= j >= 2 * n;
       if (j < 2 * n) t->size[pw_motion_unit (x->m.system, j)] = fmax (t->size[pw_motion_unit (x->m.system, j)], value);
     }
-  for (int i = 0; i < COMPARE_ERRORS; i++) {
-    double size = i < COMPARE_LAMBDA ? t->size[i % COMPARE_UNITS] : loads;
-    if (i < COMPARE_MOST) t->uncertainty[i] = t->uncertainty[i + COMPARE_MOST]; /* at the end it may be luck */
+  for (int i = 0; i < MOTION_ERRORS; i++) {
+    double size = i < MOTION_LAMBDA ? t->size[i % MOTION_UNITS] : loads;
+    if (i < MOTION_MOST) t->uncertainty[i] = t->uncertainty[i + MOTION_MOST]; /* at the end it may be luck */
     t->uncertainty[i] = fmax (t->uncertainty[i], TRUTH_ROUND_OFF * DBL_EPSILON * size);
   }
-  if (t->uncertainty[COMPARE_LAMBDA] >= 1) t->uncertainty[COMPARE_LAMBDA] = 0; /* as large as they are: not known */
+  if (t->uncertainty[MOTION_LAMBDA] >= 1) t->uncertainty[MOTION_LAMBDA] = 0; /* as large as they are: not known */
 }
 
 /* ---- Candidates ---- */
@@ -65,12 +65,12 @@ static int truth_run (pw_compare *x, truth_candidate *c, pw_error *error) {
 
 /* How far two are apart, as a part of how large the motion is. */
 static double truth_apart (const pw_compare *x, const truth_candidate *a, const truth_candidate *b) {
-  double error[COMPARE_ERRORS], most = 0;
+  double error[MOTION_ERRORS], most = 0;
   pw_truth t = { .motion = a->motion };
   truth_floor (x, &t);
   pw_motion_distance (x->m.system, &a->motion, &b->motion, error);
-  for (int i = 0; i < COMPARE_UNITS; i++) {
-    double part = error[COMPARE_MOST + i] / (t.size[i] > 0 ? t.size[i] : 1);
+  for (int i = 0; i < MOTION_UNITS; i++) {
+    double part = error[MOTION_MOST + i] / (t.size[i] > 0 ? t.size[i] : 1);
     if (!(part <= most)) most = part;
   }
   return most;
@@ -129,10 +129,11 @@ static int truth_make (pw_compare *x, pw_error *error) {
   int status = PW_OK;
   pw_progress_count (&x->progress, "reference", "methods", 0, TRUTH_CANDIDATES);
   for (int i = 0; status == PW_OK && i < TRUTH_CANDIDATES; i++, x->rows++) {
-    status = pw_motion_open (&c[i].motion, x->m.system, COMPARE_SAMPLES, error);
-    for (int k = 0; status == PW_OK && k < COMPARE_SAMPLES; k++)
-      c[i].motion.t[k] = k + 1 < COMPARE_SAMPLES ? x->t_end * (k + 1) / COMPARE_SAMPLES : x->t_end;
-    if (status == PW_OK) status = truth_run (x, &c[i], error);
+    status = pw_motion_open (&c[i].motion, x->m.system, MOTION_SAMPLES, error);
+    if (status == PW_OK) {
+      pw_motion_times (&c[i].motion, x->t_end);
+      status = truth_run (x, &c[i], error);
+    }
   }
   pw_progress_end (&x->progress);
   x->rows = 0;
@@ -141,9 +142,25 @@ static int truth_make (pw_compare *x, pw_error *error) {
   return status;
 }
 
+/* A table's end is that of the comparison, if there is no other. */
+static int truth_table (pw_compare *x, pw_error *error) {
+  double t_end = x->t_end_text ? x->t_end : 0;
+  int status = pw_motion_read (&x->truth.motion, x->m.system, x->truth_path, &t_end, 1, error);
+  if (status == PW_OK) x->t_end = t_end;
+  snprintf (x->truth.about, sizeof x->truth.about, "%s", x->truth_path);
+  return status;
+}
+
+/* What the model knows holds for the start it describes. */
+static int truth_of_model (pw_compare *x, pw_error *error) {
+  snprintf (x->truth.about, sizeof x->truth.about, "the model's own truth");
+  return pw_motion_truth (&x->truth.motion, x->m.model, x->m.system, x->t_end, error);
+}
+
 int pw_truth_find (pw_compare *x, pw_error *error) {
-  if (x->truth_path == NULL) return truth_make (x, error);
-  int status = pw_truth_read (x, x->truth_path, error);
+  int own = x->truth_path == NULL && pw_has_truth (x->m.model) && x->starts == NULL;
+  if (x->truth_path == NULL && !own) return truth_make (x, error);
+  int status = own ? truth_of_model (x, error) : truth_table (x, error);
   if (status != PW_OK) return status;
   x->truth.known = 1;
   truth_floor (x, &x->truth);

@@ -30,16 +30,22 @@ static uint64_t print_hash (uint64_t h, const void *bytes, size_t n) {
 
 static const uint64_t print_empty = 14695981039346656037u;
 
-int pw_print_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error) {
+int pw_print_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error) {
   char text[200], block[4096];
   uint64_t h = print_empty;
-  FILE *f = fopen (pw_file_path (file), "rb");
-  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", pw_file_path (file), strerror (errno));
+  FILE *f = fopen (path, "rb");
+  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", path, strerror (errno));
   for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = print_hash (h, block, n);
   fclose (f);
-  snprintf (text, sizeof text, "%.150s, contents %016llx", pw_file_name (file), (unsigned long long)h);
-  pw_print_line (t, "model", NULL, text);
-  if (tables == 0) return PW_OK;
+  snprintf (text, sizeof text, "%.150s, contents %016llx", name, (unsigned long long)h);
+  pw_print_line (t, key, NULL, text);
+  return PW_OK;
+}
+
+int pw_print_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error) {
+  char text[200];
+  int status = pw_print_file (t, "model", pw_file_name (file), pw_file_path (file), error);
+  if (status != PW_OK || tables == 0) return status;
   snprintf (text, sizeof text, "contents %016llx", (unsigned long long)tables);
   pw_print_line (t, "tables", NULL, text);
   return PW_OK;

@@ -11,6 +11,8 @@
 /* "KEY OF = VALUE"; OF may be NULL. */
 void pw_print_line (pw_text *t, const char *key, const char *of, const char *value);
 void pw_print_number (pw_text *t, const char *key, const char *of, double value);
+/* A file's name and a check sum of what is in it.  PW_MACHINE if it cannot be read. */
+int pw_print_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error);
 /* The model's name and check sums of its file and, if not 0, of its tables.  PW_MACHINE if the file cannot be read. */
 int pw_print_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *error);
 /* A check sum of the tables in a model's signals, after those it was begun with; begin with 0. */

@@ -1,4 +1,5 @@
 /* What a run says about itself. */
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -151,6 +152,26 @@ static void report_energy (const pw_sample *last) {
   }
 }
 
+static void report_truth (const pw_truth_error *e) {
+  static const char *const name[] = { "length", "angle", "speed", "rate" }, *const unit[] = { "m", "rad", "m/s",
+                                                                                              "rad/s" };
+  char t[32];
+  if (e == NULL) return;
+  printf ("\n  error against the truth of %s, at %d time%s\n  %10s%17s %s s%17s\n", e->source, e->samples,
+          e->samples == 1 ? "" : "s", "", "at", pw_format (t, e->t, 6), "largest");
+  for (int i = 0; i < 4; i++) {
+    if (isnan (e->end[i]) && isnan (e->most[i])) continue;
+    printf ("  %-10s", name[i]);
+    report_number (e->end[i], 3, 17);
+    report_number (e->most[i], 3, 17);
+    printf (" %s\n", unit[i]);
+  }
+  if (isnan (e->reactions)) return;
+  printf ("  %-10s%17s", "reactions", "");
+  report_number (e->reactions, 3, 17);
+  printf (" of the largest\n");
+}
+
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,
                     const pw_statistics *statistics) {
   char t[32], a[32], b[32];
@@ -159,6 +180,7 @@ void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_samp
   report_own (s, last);
   report_reactions (s, last);
   if (energy) report_energy (last);
+  report_truth (summary->truth);
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", pw_format (a, statistics->position, 2),
           pw_format (b, statistics->velocity, 2));
   printf (

@@ -37,6 +37,8 @@ static int run_read (run *x, int argc, const char **argv, pw_error *error) {
     { "plots", 0, POPT_ARG_STRING, &x->plots_path, 0, "Draw figures into a folder", "DIR" },
     { "animate", 0, POPT_ARG_STRING, &x->animate_path, 0, "Write the motion as a page for a browser, or as a picture",
       "FILE.html|FILE.gif" },
+    { "truth", 0, POPT_ARG_STRING, &x->truth_path, 0,
+      "Take errors against this table, with columns as run writes them, instead of the model's own truth", "FILE.csv" },
     { "profile", 0, POPT_ARG_NONE, &x->profile, 0, "Measure at the end what each kind and each stage costs", NULL },
     PW_CHECKPOINT_OPTIONS (&x->check),
     POPT_TABLEEND,
@@ -84,6 +86,8 @@ static int run_open (run *x, pw_error *error) {
       (x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error)) ==
           NULL)
     return error->status;
+  status = pw_watch_open (&x->watch, &x->m, x->truth_path, x->starts != NULL, x->t_end, error);
+  if (status != PW_OK) return status;
   x->r = pw_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
   pw_report_differences (x->m.system);
@@ -121,6 +125,10 @@ static int run_take_samples (run *x, pw_error *error) {
     status = pw_at (x->r, pw_plots_next (x->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (x->plots, &sample);
   }
+  while (status == PW_OK && pw_watch_next (&x->watch) <= now) {
+    status = pw_at (x->r, pw_watch_next (&x->watch), &sample, error);
+    if (status == PW_OK) pw_watch_take (&x->watch, x->m.system, &sample);
+  }
   return status;
 }
 
@@ -128,6 +136,7 @@ static int run_take_samples (run *x, pw_error *error) {
 static int run_batch (run *x, pw_error *error) {
   double due =
       fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), fmin (x->check.due, x->t_end));
+  due = fmin (due, pw_watch_next (&x->watch));
   double start = pw_cpu_clock ();
   int status;
   long n = 0;
@@ -236,6 +245,7 @@ static int run_finish (run *x, pw_error *error) {
   if (x->r && pw_at (x->r, pw_time (x->r), &sample, NULL) == PW_OK) last = &sample;
   run_finish_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
+  if (x->r) summary.truth = pw_watch_errors (&x->watch, x->m.system);
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
   run_write_json (x, &summary, last, error);
@@ -252,6 +262,7 @@ static int run_finish (run *x, pw_error *error) {
 static void run_close (run *x) {
   pw_checkpoints_close (&x->check);
   pw_plots_close (x->plots);
+  pw_watch_close (&x->watch);
   if (x->r) pw_close (x->r);
   free (x->redundant);
   pw_cli_close_model (&x->m);

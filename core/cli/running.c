@@ -30,6 +30,8 @@ static int running_print (pw_running *x, pw_error *error) {
   pw_print_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
   pw_print_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
   pw_print_line (t, "animation", NULL, x->animate_path ? "written" : "not written");
+  if (x->truth_path) return pw_print_file (t, "truth", x->truth_path, x->truth_path, error);
+  pw_print_line (t, "truth", NULL, "the model's");
   return PW_OK;
 }
 
@@ -58,6 +60,7 @@ static void running_carry (pw_running *x, pw_archive *a) {
   pw_carry (a, &x->row, sizeof x->row);
   pw_carry (a, &x->cpu, sizeof x->cpu);
   if (x->plots) pw_plots_carry (x->plots, a);
+  pw_watch_carry (&x->watch, a);
 }
 
 int pw_running_resume (pw_running *x, pw_error *error) {

@@ -5,11 +5,12 @@
 #include "checkpoints.h"
 #include "plots.h"
 #include "progress.h"
+#include "watch.h"
 
 typedef struct {
   /* as given */
   const char *method, *t_end_text, *step_text, *rtol_text, *atol_text, *every_text;
-  const char *csv_path, *json_path, *plots_path, *animate_path;
+  const char *csv_path, *json_path, *plots_path, *animate_path, *truth_path;
   const char **sets, **starts;
   int energy, profile;
   pw_checkpoints check;
@@ -22,6 +23,7 @@ typedef struct {
   pw_output *csv_output, *json_output;
   pw_csv *csv;
   pw_plots *plots;
+  pw_watch watch;
   pw_run *r;
   const char **redundant; /* what is said about each redundant row; NULL: there are none */
   pw_progress progress;

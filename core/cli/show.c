@@ -1,5 +1,7 @@
 /* pinwheel show: what a model is made of. */
+#include <math.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "cli.h"
 #include "model.h"
@@ -164,6 +166,22 @@ static void show_sizes (const pw_system *s) {
           s->coords, s->rows, s->holonomic, s->rows - s->holonomic);
 }
 
+/* The states whose motion the model knows. */
+static void show_truth (const pw_cli_model *m) {
+  enum { MOST = 12 };
+  int n = m->system->coords, known = 0;
+  char name[300];
+  double *x = pw_has_truth (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
+  if (x && pw_true_state (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
+    for (int i = 0; i < 2 * n; i++)
+      if (!isnan (x[i]) && ++known <= MOST)
+        printf ("%s%s",
+                known > 1 ? ", " : "\nKnows its motion (truth): ", pw_state_name (m->system, i, name, sizeof name));
+  if (known > MOST) printf (", and %d more", known - MOST);
+  if (known) putchar ('\n');
+  free (x);
+}
+
 static void show_model (const pw_cli_model *m) {
   char folder[1000];
   const pw_model *d = m->model;
@@ -175,6 +193,7 @@ static void show_model (const pw_cli_model *m) {
   show_differences (m);
   show_parameters (d);
   show_defaults (d->table);
+  show_truth (m);
   show_sizes (m->system);
 }
 

@@ -181,6 +181,17 @@ static void yaml_run (const pw_run_defaults *run) {
   if (written) puts ("}");
 }
 
+/* The expressions of a truth keep their names, whose values stand under `let`; a function in C has no words. */
+static void yaml_truth (const pw_model *m) {
+  const pw_truth_text *t = &m->truth;
+  if (m->table->truth) puts ("# The model knows its motion (truth) by a function in C, which is left out.");
+  if (t->states && t->names) puts ("let:");
+  for (int i = 0; t->states && i < t->names; i++)
+    printf ("  %s: ", t->name[i]), yaml_number (t->value[i]), putchar ('\n');
+  if (t->states) puts ("truth:");
+  for (int i = 0; i < t->states; i++) printf ("  %s: ", t->state[i]), yaml_text (t->text[i]), putchar ('\n');
+}
+
 int pw_cli_yaml (const pw_cli_model *x, pw_error *error) {
   const pw_model *m = x->model;
   if (yaml_refuse (m, error) != PW_OK) return error->status;
@@ -191,5 +202,6 @@ int pw_cli_yaml (const pw_cli_model *x, pw_error *error) {
   for (int i = 0; i < m->bodies; i++) yaml_body (&m->body[i]);
   if (m->elements) puts ("elements:");
   for (int i = 0; i < m->elements; i++) yaml_element (&m->element[i]);
+  yaml_truth (m);
   return PW_OK;
 }

@@ -185,7 +185,27 @@ static void json_differences (json *j, struct fy_node *root, const pw_system *s)
     json_append (j, list, pw_difference_name (s, i, name, sizeof name));
 }
 
-/* ---- The cost ---- */
+/* ---- Errors and cost ---- */
+
+static void json_truth_errors (json *j, struct fy_node *truth, const char *key, const double error[4]) {
+  static const char *const names[] = { "length", "angle", "speed", "rate" };
+  struct fy_node *object = json_add_object (j, truth, key);
+  for (int i = 0; i < 4 && !j->failed; i++) json_add_number (j, object, names[i], error[i]);
+}
+
+static void json_truth (json *j, struct fy_node *root, const pw_truth_error *e) {
+  if (e == NULL) {
+    json_add_null (j, root, "truth");
+    return;
+  }
+  struct fy_node *truth = json_add_object (j, root, "truth");
+  json_add_text (j, truth, "source", e->source);
+  json_add_number (j, truth, "samples", e->samples);
+  json_add_number (j, truth, "t", e->t);
+  json_truth_errors (j, truth, "end", e->end);
+  json_truth_errors (j, truth, "largest", e->most);
+  json_add_number (j, truth, "reactions", e->reactions);
+}
 
 static void json_statistics (json *j, struct fy_node *root, const pw_statistics *n, double cpu) {
   if (n == NULL) {
@@ -235,6 +255,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   json_sample (&j, root, s, sample, ledger);
   json_redundant (&j, root, summary->redundant);
   json_differences (&j, root, s);
+  json_truth (&j, root, summary->truth);
   json_statistics (&j, root, statistics, summary->cpu);
   int status = json_emit (&j, o, error);
   fy_document_destroy (j.document);

@@ -116,6 +116,15 @@ void pw_csv_close (pw_csv *c);
 
 /* ---- Summaries ---- */
 
+/* How far a run was from the truth: the largest coordinate and rate of lengths, angles, speeds [m/s] and angular rates; of
+ * reactions relative to the largest one of the same unit.  NaN: not known. */
+typedef struct {
+  const char *source; /* "the model", or the path of a table */
+  int samples;        /* compared */
+  double t;           /* of the last one [s] */
+  double end[4], most[4], reactions;
+} pw_truth_error;
+
 /* What a run was and how it ended; `reason` is "" when the status is ok. */
 typedef struct {
   const char *model, *method;
@@ -123,6 +132,7 @@ typedef struct {
   const char *reason;
   double cpu;                   /* [s], integration alone */
   const char *const *redundant; /* what is said about each redundant row, ended by NULL; may be NULL: none */
+  const pw_truth_error *truth;  /* NULL: there is none to compare with */
 } pw_summary;
 
 /* Writes the JSON summary: whatever is not known (model and method too may be NULL) or not finite is null. */

@@ -129,7 +129,8 @@ static int yaml_version (const pw_yaml *y, const pw_node *version, pw_error *err
 }
 
 static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
-  static const char *const key[] = { "pinwheel", "about", "run", "parameters", "let", "bodies", "elements", "truth", NULL };
+  static const char *const key[] = { "pinwheel", "about",    "run",   "parameters", "let",
+                                     "bodies",   "elements", "truth", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   pw_names names = { .size = 0 };
   if (y->root == NULL) return pw_yaml_fail (y, 0, error, "the file is empty; a model begins with \"pinwheel: 1\"");

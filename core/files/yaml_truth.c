@@ -22,39 +22,6 @@ static double truth_eval (void *context, int i, double t) {
   return pw_expression_value (e->x[i]);
 }
 
-/* ---- States ---- */
-
-static const char *const truth_part[] = { "x", "y", "phi", "vx", "vy", "omega", NULL };
-
-/* Compares a name with "OWNER.PART", and notes it as a suggestion; `best` keeps the nearest one. */
-static int truth_is (const char *name, const char *owner, const char *part, pw_nearest *near, char *best, size_t size) {
-  char text[200];
-  snprintf (text, sizeof text, "%s.%s", owner, part);
-  pw_nearest_try (near, text);
-  if (near->best == text) {
-    snprintf (best, size, "%s", text);
-    near->best = best;
-  }
-  return strcmp (name, text) == 0;
-}
-
-/* A state of a body, or of an element that owns coordinates. */
-static int truth_state (const pw_yaml_builder *b, const pw_node *node, pw_error *error) {
-  char best[200], hint[240];
-  const pw_model *m = b->m;
-  pw_nearest near = { .sought = node->text };
-  for (int i = 0; i < m->bodies; i++)
-    for (const char *const *part = truth_part; *part; part++)
-      if (truth_is (node->text, m->body[i].name, *part, &near, best, sizeof best)) return PW_OK;
-  for (const pw_element *e = m->element; e < m->element + m->elements; e++)
-    for (int k = 0; k < e->kind->own; k++)
-      if (truth_is (node->text, pw_element_name (e), e->kind->coordinate[k].name, &near, best, sizeof best) ||
-          truth_is (node->text, pw_element_name (e), e->kind->coordinate[k].rate, &near, best, sizeof best))
-        return PW_OK;
-  return pw_yaml_fail (b->y, node->at, error, "truth: there is no state \"%.60s\"%s", node->text,
-                       pw_nearest_text (&near, hint, sizeof hint));
-}
-
 /* ---- Expressions ---- */
 
 static int truth_expression (const pw_yaml_builder *b, const pw_node *node, const char *state, truth_evaluators *e,
@@ -99,7 +66,10 @@ static int truth_names (pw_yaml_builder *b, pw_truth_text *t, pw_error *error) {
 static int truth_entries (pw_yaml_builder *b, pw_truth_text *t, pw_names *seen, pw_error *error) {
   truth_evaluators *e = t->context;
   for (const pw_node *n = b->y->truth->first; n; n = n->next->next) {
-    if (truth_state (b, n, error) != PW_OK) return error->status;
+    if (strchr (n->text, '.') == NULL)
+      return pw_yaml_fail (b->y, n->at, error, "truth: expected a state such as BODY.phi, found \"%.60s\"", n->text);
+    const pw_yaml_reading reading = { .node = n, .what = "truth" };
+    if (pw_yaml_state (b, &reading, n->text, 0, error) != PW_OK) return error->status;
     if (pw_names_add (seen, n->text, 0) >= 0)
       return pw_yaml_fail (b->y, n->at, error, "truth: a second \"%s\"", n->text);
     if (truth_expression (b, n->next, n->text, e, error) != PW_OK) return error->status;

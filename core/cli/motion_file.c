@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/types.h>
-#include "compare.h"
+#include "motion.h"
 
 #define FILE_SAME 1e-9 /* of the end: times that differ by less are the same */
 
@@ -88,7 +88,7 @@ static int file_time (truth_file *in, char **rest, double *t, pw_error *error) {
 }
 
 /* Rows after the start and up to the end; without an end, the last row's time is it. */
-static int file_count (truth_file *in, double *t_end, int *rows, pw_error *error) {
+static int file_count (truth_file *in, double *t_end, int whole, int *rows, pw_error *error) {
   double t, last = 0, before = -INFINITY;
   char *rest;
   int status;
@@ -102,8 +102,11 @@ static int file_count (truth_file *in, double *t_end, int *rows, pw_error *error
   }
   if (status != PW_RETRY) return status;
   if (*t_end == 0) *t_end = last;
-  if (*rows > 0 && fabs (last - *t_end) <= FILE_SAME * *t_end) return PW_OK;
   char end[32], reached[32];
+  if (*rows == 0 && !whole)
+    return pw_fail (error, PW_INPUT, "--truth %s: no row between the start and the end, t = %s s", in->path,
+                    pw_format (end, *t_end, 9));
+  if (*rows > 0 && (!whole || fabs (last - *t_end) <= FILE_SAME * *t_end)) return PW_OK;
   return pw_fail (error, PW_INPUT, "--truth %s: no row at the end, t = %s s; the last one before it is at %s s",
                   in->path, pw_format (end, *t_end, 9), pw_format (reached, last, 9));
 }
@@ -121,7 +124,8 @@ static int file_row (truth_file *in, char *rest, double *x, int width, pw_error 
   return PW_OK;
 }
 
-/* Takes as many rows as there are samples, evenly, the last one among them. */
+/* Takes as many rows as there are samples, evenly, the last one among them; times that are the end but for round-off are
+ * it. */
 static int file_rows (truth_file *in, int rows, double t_end, pw_motion *m, pw_error *error) {
   char *rest;
   double t;
@@ -129,32 +133,29 @@ static int file_rows (truth_file *in, int rows, double t_end, pw_motion *m, pw_e
     int status = file_time (in, &rest, &t, error);
     if (status != PW_OK) return status;
     if (t <= 0 || ++row < (int)((long long)rows * (k + 1) / m->samples)) continue;
-    m->t[k] = k + 1 < m->samples ? t : t_end;
+    m->t[k] = fabs (t - t_end) <= FILE_SAME * t_end ? t_end : t;
     status = file_row (in, rest, m->x + k++ * m->width, m->width, error);
     if (status != PW_OK) return status;
   }
   return PW_OK;
 }
 
-static int file_read (truth_file *in, pw_compare *x, pw_error *error) {
+static int file_read (truth_file *in, pw_motion *m, const pw_system *s, double *t_end, int whole, pw_error *error) {
   int rows;
-  int status = file_columns (in, x->m.system, error);
-  double t_end = x->t_end_text ? x->t_end : 0;
-  if (status == PW_OK) status = file_count (in, &t_end, &rows, error);
+  int status = file_columns (in, s, error);
+  if (status == PW_OK) status = file_count (in, t_end, whole, &rows, error);
   if (status != PW_OK) return status;
-  x->t_end = t_end;
   rewind (in->f);
   in->number = 0;
   file_line (in);
-  status = pw_motion_open (&x->truth.motion, x->m.system, rows < COMPARE_SAMPLES ? rows : COMPARE_SAMPLES, error);
-  return status == PW_OK ? file_rows (in, rows, t_end, &x->truth.motion, error) : status;
+  status = pw_motion_open (m, s, rows < MOTION_SAMPLES ? rows : MOTION_SAMPLES, error);
+  return status == PW_OK ? file_rows (in, rows, *t_end, m, error) : status;
 }
 
-int pw_truth_read (pw_compare *x, const char *path, pw_error *error) {
+int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error) {
   truth_file in = { .path = path, .f = fopen (path, "r") };
   if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, strerror (errno));
-  int status = file_read (&in, x, error);
-  snprintf (x->truth.about, sizeof x->truth.about, "%s", path);
+  int status = file_read (&in, m, s, t_end, whole, error);
   fclose (in.f);
   free (in.line);
   free (in.place);

@@ -1,0 +1,157 @@
+/* What models know about their motion: in C, in text, in tables; what run, compare, show and check make of it. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+/* A damped oscillator, in text; `TRUTH` is put at its end. */
+static const char truth_text[] = "pinwheel: 1\nrun: {t_end: 5, step: 0.01}\n"
+                                 "parameters:\n  - {name: k, value: 60}\n  - {name: c, value: 2.4}\n"
+                                 "  - {name: a, value: 0.3}\n"
+                                 "let:\n  d: c/3\n  w: sqrt(k/1.5 - d^2)\n"
+                                 "bodies:\n  - {name: block, mass: 1.5, inertia: 0.1, start: {x: 0.8 + a}}\n"
+                                 "elements:\n  - {slider: rail, body: [block, ground], at: [[0, 0], [0, 0]]}\n"
+                                 "  - {spring: s, body: [block, ground], at: [[0, 0], [0, 0]], stiffness: k, "
+                                 "damping: c, length: 0.8}\n"
+                                 "truth:\n  block.x: 0.8 + a*exp(-d*t)*(cos(w*t) + d/w*sin(w*t))\n";
+
+/* The same free particle twice: the second one's rate is not known. */
+static const char truth_c[] =
+    "#include \"pinwheel.h\"\n"
+    "typedef struct { double u; } particle;\n"
+    "static const pw_parameter parameters[] = { { PW_AT (particle, u), 2, \"m/s\", \"speed\", PW_REAL },\n"
+    "  { .name = NULL } };\n"
+    "static void build (pw_model *m, const void *parameter) {\n"
+    "  const particle *p = parameter;\n"
+    "  pw_add_body (m, &(pw_body){ .name = \"one\", .mass = 1, .inertia = 1, .rate = { p->u, 0, 1 } });\n"
+    "  pw_add_body (m, &(pw_body){ .name = \"two\", .mass = 1, .inertia = 1, .rate = { p->u } });\n"
+    "}\n"
+    "static void truth (const void *parameter, double t, double *q, double *v) {\n"
+    "  const particle *p = parameter;\n"
+    "  q[0] = p->u * t, q[2] = t, v[0] = p->u;\n"
+    "  q[3] = p->u * t + OFF;\n"
+    "}\n"
+    "PW_MODEL (.about = \"particles\", .parameters = parameters, .parameters_size = sizeof (particle),\n"
+    "          .run = { .t_end = 1, .step = 0.1 }, .build = build, .truth = truth);\n";
+
+static void truth_write_c (const char *off) {
+  char text[3000];
+  const char *at = strstr (truth_c, "OFF");
+  snprintf (text, sizeof text, "%.*s%s%s", (int)(at - truth_c), truth_c, off, at + 3);
+  cli_write ("particles.c", text);
+}
+
+static double truth_error (const char *when, const char *what) {
+  return cli_number (cli_out, "truth", when, what, NULL);
+}
+
+static void truth_shows (const char *text) {
+  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
+}
+
+/* Order 4: ten times smaller steps, ten thousand times smaller errors; parameters are followed. */
+static void test_text (void **state) {
+  double coarse;
+  (void)state;
+  cli_write ("block.yaml", truth_text);
+  cli_good ("pinwheel run @/block.yaml --set a=0.5 --set k=45 --json -");
+  assert_true (cli_says (cli_out, "source", "the model"));
+  check_close ("samples", cli_number (cli_out, "truth", "samples", NULL), 100, 0, "as in compare");
+  coarse = truth_error ("largest", "length");
+  check_below ("coarse", coarse, 1e-6, "(h w)^4");
+  assert_true (coarse > 1e-9 && truth_error ("end", "length") < coarse);
+  assert_non_null (strstr (strstr (cli_out, "\"largest\""), "\"speed\": null"));
+  cli_good ("pinwheel run @/block.yaml --set a=0.5 --set k=45 --step 0.001 --json -");
+  check_close ("order", log10 (coarse / truth_error ("largest", "length")), 4, 0.1, "order 4 in h");
+  cli_good ("pinwheel run @/block.yaml");
+  truth_shows ("error against the truth of the model, at 100 times\n");
+  truth_shows ("  length ");
+  cli_good ("pinwheel show @/block.yaml");
+  truth_shows ("\nKnows its motion (truth): block.x\n");
+}
+
+/* Errors do not change the run: table and end are the same to the bit. */
+static void test_does_no_harm (void **state) {
+  (void)state;
+  cli_write ("block.yaml", truth_text);
+  cli_good ("grep -v -e truth: -e 'block.x:' @/block.yaml >@/plain.yaml && "
+            "pinwheel run @/block.yaml --step 0.007 -o @/a.csv && pinwheel run @/plain.yaml --step 0.007 -o @/b.csv && "
+            "cmp @/a.csv @/b.csv");
+  cli_good ("pinwheel run @/plain.yaml --json -");
+  truth_shows ("\"truth\": null");
+}
+
+static void test_compare (void **state) {
+  (void)state;
+  cli_write ("block.yaml", truth_text);
+  cli_good ("pinwheel compare @/block.yaml --methods rk4,erk5 --step-ladder 0.1:0.02 --rtol-ladder 1e-4:1e-5");
+  truth_shows ("errors are taken against the model's own truth\n");
+  cli_good ("pinwheel compare @/block.yaml --methods rk4 --step-ladder 0.1:0.05 --start block.x=1.2 --t-end 1");
+  assert_null (strstr (cli_out, "the model's own truth"));
+}
+
+static void test_round_trip (void **state) {
+  (void)state;
+  cli_write ("block.yaml", truth_text);
+  cli_good ("pinwheel show @/block.yaml --set a=0.5 --yaml >@/again.yaml && "
+            "pinwheel run @/block.yaml --set a=0.5 --json @/a.json && pinwheel run @/again.yaml --json @/b.json && "
+            "sed -n '/\"truth\"/,/reactions/p' @/a.json >@/a && sed -n '/\"truth\"/,/reactions/p' @/b.json >@/b && "
+            "grep -q largest @/a && cmp @/a @/b");
+  truth_write_c ("0");
+  cli_good ("pinwheel show @/particles.c --yaml");
+  truth_shows ("# The model knows its motion (truth) by a function in C, which is left out.\n");
+}
+
+static void test_function (void **state) {
+  (void)state;
+  truth_write_c ("0");
+  cli_good ("pinwheel run @/particles.c --set u=3 --json - && pinwheel show @/particles.c");
+  check_below ("length", truth_error ("largest", "length"), 1e-14, "round-off");
+  check_below ("angle", truth_error ("largest", "angle"), 1e-14, "round-off");
+  truth_shows ("Knows its motion (truth): one.x, one.phi, two.x, one.vx\n");
+  cli_good ("pinwheel check @/particles.c");
+  truth_shows ("  compared with the truth of the model, which knows 4 states\n");
+  truth_write_c ("0.25");
+  cli_good ("pinwheel run @/particles.c --json -");
+  check_close ("a wrong truth", truth_error ("end", "length"), 0.25, 1e-12, "round-off");
+  cli_bad ("pinwheel check @/particles.c", 2, "the model's truth does not hold at the start: two.x is 0, not 0.25");
+}
+
+static void test_started_elsewhere (void **state) {
+  (void)state;
+  truth_write_c ("0");
+  assert_int_equal (cli_run ("pinwheel run @/particles.c --start one.x=5 --json -"), 0);
+  truth_shows ("\"truth\": null");
+  assert_non_null (strstr (cli_err, "with --start no errors are taken"));
+}
+
+/* A table: its times are the samples, those after the end are left out, columns it does not have are not compared. */
+static void test_table (void **state) {
+  (void)state;
+  truth_write_c ("0");
+  cli_write ("table.csv", "t [s],one.x [m],two.phi [rad],nothing\n0,0,0,0\n0.25,0.5,0,0\n0.5,1.125,0,0\n0.75,1.5,0,0\n"
+                          "3,6,0,0\n");
+  cli_good ("pinwheel run @/particles.c --truth @/table.csv --json -");
+  check_close ("samples", cli_number (cli_out, "truth", "samples", NULL), 3, 0, "exact");
+  check_close ("last", cli_number (cli_out, "truth", "t", NULL), 0.75, 0, "exact");
+  check_close ("largest", truth_error ("largest", "length"), 0.125, 1e-14, "round-off");
+  check_close ("end", truth_error ("end", "length"), 0, 1e-14, "round-off");
+  check_close ("angle", truth_error ("largest", "angle"), 0, 0, "exact");
+  cli_good ("pinwheel run @/particles.c --truth @/table.csv");
+  truth_shows ("table.csv, at 3 times\n");
+  cli_write ("late.csv", "t,one.x\n3,6\n");
+  cli_bad ("pinwheel run @/particles.c --truth @/late.csv", 2,
+           "--truth @/late.csv: no row between the start and the end, t = 1 s");
+  cli_bad ("pinwheel run @/particles.c --truth @/none.csv", 2,
+           "--truth @/none.csv: cannot be read: No such file or directory");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_text),       cmocka_unit_test (test_does_no_harm), cmocka_unit_test (test_compare),
+    cmocka_unit_test (test_round_trip), cmocka_unit_test (test_function),     cmocka_unit_test (test_started_elsewhere),
+    cmocka_unit_test (test_table),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
