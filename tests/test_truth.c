@@ -82,6 +82,17 @@ static void test_does_no_harm (void **state) {
   truth_shows ("\"truth\": null");
 }
 
+/* A resumed run knows the samples before its checkpoint. */
+static void test_resume (void **state) {
+  (void)state;
+  cli_write ("block.yaml", truth_text);
+  assert_int_equal (cli_run ("pinwheel run @/block.yaml --checkpoint @/a.ck --checkpoint-every 2 --json @/a.json && "
+                             "pinwheel run @/block.yaml --resume @/a.ck --checkpoint-every 2 --json @/b.json && "
+                             "grep -v cpu_s @/a.json >@/a && grep -v cpu_s @/b.json >@/b && cmp @/a @/b && cat @/b"),
+                    0);
+  check_close ("samples", cli_number (cli_out, "truth", "samples", NULL), 100, 0, "all of them");
+}
+
 static void test_compare (void **state) {
   (void)state;
   cli_write ("block.yaml", truth_text);
@@ -151,7 +162,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_text),       cmocka_unit_test (test_does_no_harm), cmocka_unit_test (test_compare),
     cmocka_unit_test (test_round_trip), cmocka_unit_test (test_function),     cmocka_unit_test (test_started_elsewhere),
-    cmocka_unit_test (test_table),
+    cmocka_unit_test (test_table),      cmocka_unit_test (test_resume),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
