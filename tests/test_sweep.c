@@ -279,6 +279,22 @@ static void test_bad_parts (void **state) {
 
 /* ---- Bad input: said before anything is computed ---- */
 
+/* A table in a file is as much of the model as the model's own file. */
+static void test_changed_table (void **state) {
+  (void)state;
+  cli_write ("table.yaml", "pinwheel: 1\nparameters: [{name: I, value: 1, domain: positive}]\n"
+                           "bodies: [{name: a, mass: 1, inertia: I}]\n"
+                           "elements: [{torque: T, body: [a, ground], value: {table: {file: table.csv}}}]\n");
+  sweep_shell ("GRID='--vary I=1,2 --t-end 1'\n"
+               "printf '0,0\\n1,1\\n' >@/table.csv; pinwheel sweep @/table.yaml $GRID --part 1/2 -o @/t1.csv\n"
+               "printf '0,0\\n1,2\\n' >@/table.csv; pinwheel sweep @/table.yaml $GRID --part 2/2 -o @/t2.csv");
+  cli_run ("pinwheel sweep --merge @/t1.csv @/t2.csv -o @/t.csv");
+  assert_non_null (strstr (cli_err, "tables is contents "));
+  sweep_shell ("printf '0,0\\n1,1\\n' >@/table.csv\n"
+               "pinwheel sweep @/table.yaml --vary I=1,2 --t-end 1 --part 2/2 -o @/t3.csv && "
+               "pinwheel sweep --merge @/t1.csv @/t3.csv -o @/t.csv");
+}
+
 static void test_bad_input (void **state) {
   (void)state;
   static const struct {
@@ -332,15 +348,16 @@ static void test_bad_input (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),       cmocka_unit_test (test_ranges),
-    cmocka_unit_test (test_row_is_run),  cmocka_unit_test (test_start_values),
-    cmocka_unit_test (test_counts),      cmocka_unit_test (test_cpu),
-    cmocka_unit_test (test_failures),    cmocka_unit_test (test_all_fail),
-    cmocka_unit_test (test_fails_late),  cmocka_unit_test (test_jobs),
-    cmocka_unit_test (test_cut_journal), cmocka_unit_test (test_odd_journal),
-    cmocka_unit_test (test_kills),       cmocka_unit_test (test_journal_of_another),
-    cmocka_unit_test (test_lock),        cmocka_unit_test (test_parts),
-    cmocka_unit_test (test_bad_parts),   cmocka_unit_test (test_bad_input),
+    cmocka_unit_test (test_order),         cmocka_unit_test (test_ranges),
+    cmocka_unit_test (test_row_is_run),    cmocka_unit_test (test_start_values),
+    cmocka_unit_test (test_counts),        cmocka_unit_test (test_cpu),
+    cmocka_unit_test (test_failures),      cmocka_unit_test (test_all_fail),
+    cmocka_unit_test (test_fails_late),    cmocka_unit_test (test_jobs),
+    cmocka_unit_test (test_cut_journal),   cmocka_unit_test (test_odd_journal),
+    cmocka_unit_test (test_kills),         cmocka_unit_test (test_journal_of_another),
+    cmocka_unit_test (test_lock),          cmocka_unit_test (test_parts),
+    cmocka_unit_test (test_bad_parts),     cmocka_unit_test (test_bad_input),
+    cmocka_unit_test (test_changed_table),
   };
   return cmocka_run_group_tests_name ("sweeps", tests, cli_setup, cli_teardown);
 }

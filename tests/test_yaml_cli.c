@@ -48,6 +48,16 @@ static void test_round_trip (void **state) {
   assert_non_null (strstr (cli_out, "same: "));
 }
 
+/* Every signal, tables from a file among them, by a fixed and an adaptive method. */
+static void test_round_trip_signals (void **state) {
+  (void)state;
+  cli_good (
+      "pinwheel show tests/models/signals.yaml --yaml >@/signals.yaml && ! grep file: @/signals.yaml && "
+      "for m in rk4+projection ida+ggl; do pinwheel run tests/models/signals.yaml -m $m -o @/once.csv >/dev/null 2>&1 "
+      "&& "
+      "pinwheel run @/signals.yaml -m $m -o @/again.csv >/dev/null 2>&1 && cmp @/once.csv @/again.csv || exit 1; done");
+}
+
 static const char cli_function[] = "pinwheel: 1\n"
                                    "bodies: [{name: a, mass: 1, inertia: 1}]\n"
                                    "elements: [{torque: T, body: [a, ground], value: sin(t)}]\n";
@@ -118,9 +128,11 @@ static void test_new (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_same_tables), cmocka_unit_test (test_same_sweeps), cmocka_unit_test (test_round_trip),
-    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_max_file),    cmocka_unit_test (test_names),
-    cmocka_unit_test (test_message),     cmocka_unit_test (test_new),
+    cmocka_unit_test (test_same_tables), cmocka_unit_test (test_same_sweeps),
+    cmocka_unit_test (test_round_trip),  cmocka_unit_test (test_round_trip_signals),
+    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_max_file),
+    cmocka_unit_test (test_names),       cmocka_unit_test (test_message),
+    cmocka_unit_test (test_new),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

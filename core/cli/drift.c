@@ -59,8 +59,7 @@ static int drift_settle (pw_drift *x, pw_error *error) {
 
 static int drift_open (pw_drift *x, pw_error *error) {
   char path[PLOT_PATH + 16];
-  int status =
-      pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
+  int status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
   if (status == PW_OK) status = drift_settle (x, error);
   if (status != PW_OK || x->folder == NULL) return status;
   status = pw_plot_folder (x->folder, error);
