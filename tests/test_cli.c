@@ -178,6 +178,16 @@ static void test_show (void **state) {
   assert_non_null (strstr (cli_out, "0.5"));
 }
 
+/* gnuplot runs in a locale that knows all characters of the scripts, whatever the user's is. */
+static void test_gnuplot_locale (void **state) {
+  (void)state;
+  cli_write ("gnuplot", "#!/bin/sh\necho \"$LC_ALL\"\n");
+  assert_int_equal (cli_run ("chmod +x @/gnuplot; PATH=\"@:$PATH\"; export LC_ALL=C; "
+                             "pinwheel run ezyroller --t-end 0.1 --plots @/figures"),
+                    0);
+  assert_string_equal (cli_err, "C.UTF-8\n");
+}
+
 static void test_help (void **state) {
   static const char *const command[] = { "list", "show", "run", "new" };
   (void)state;
@@ -215,6 +225,7 @@ int main (void) {
     cmocka_unit_test (test_list),
     cmocka_unit_test (test_list_columns),
     cmocka_unit_test (test_show),
+    cmocka_unit_test (test_gnuplot_locale),
     cmocka_unit_test (test_help),
     cmocka_unit_test (test_new),
   };

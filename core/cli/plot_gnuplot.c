@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <spawn.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -24,17 +25,34 @@ static int gnuplot_cd (const char *folder, char *text, size_t size) {
   return *folder == 0;
 }
 
+/* The environment, but in a locale that has all characters the scripts use.  A malloced list, or NULL. */
+static char **gnuplot_environment (void) {
+  static char locale[] = "LC_ALL=C.UTF-8";
+  size_t n = 0, kept = 0;
+  while (environ[n]) n++;
+  char **list = malloc ((n + 2) * sizeof *list);
+  for (size_t i = 0; list && i < n; i++)
+    if (strncmp (environ[i], "LC_ALL=", 7) != 0) list[kept++] = environ[i];
+  if (list) list[kept] = locale, list[kept + 1] = NULL;
+  return list;
+}
+
 /* Starts it with nothing to read and its output among our messages, or with all it says in a file.  An errno value. */
 static int gnuplot_start (char *const *argv, const char *messages, pid_t *child) {
   posix_spawn_file_actions_t actions;
-  int failed = posix_spawn_file_actions_init (&actions);
-  if (failed) return failed;
+  char **environment = gnuplot_environment ();
+  int failed = environment ? posix_spawn_file_actions_init (&actions) : ENOMEM;
+  if (failed) {
+    free (environment);
+    return failed;
+  }
   failed = posix_spawn_file_actions_addopen (&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   if (!failed && messages)
     failed = posix_spawn_file_actions_addopen (&actions, STDERR_FILENO, messages, O_WRONLY | O_CREAT | O_TRUNC, 0666);
   if (!failed) failed = posix_spawn_file_actions_adddup2 (&actions, STDERR_FILENO, STDOUT_FILENO);
-  if (!failed) failed = posix_spawnp (child, argv[0], &actions, NULL, argv, environ);
+  if (!failed) failed = posix_spawnp (child, argv[0], &actions, NULL, argv, environment);
   posix_spawn_file_actions_destroy (&actions);
+  free (environment);
   return failed;
 }
 

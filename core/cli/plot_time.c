@@ -34,8 +34,8 @@ static double time_end (const pw_plots *p) {
   return pw_plot_sample (p, p->samples - 1)[PLOT_T];
 }
 
-/* The range of y is gnuplot's choice, but for a number (3: vx ... 5: omega) that is the same throughout, for which it
- * has none. */
+/* The range of y is gnuplot's choice, but for a number (3: vx ... 5: omega) that is the same throughout, or nearly, for
+ * which it has none. */
 static void time_span (const pw_script *s, const pw_plots *p, const pw_curves *c, int y) {
   double least = INFINITY, most = -INFINITY;
   for (int k = 0; k < c->count; k++)
@@ -46,7 +46,7 @@ static void time_span (const pw_script *s, const pw_plots *p, const pw_curves *c
       most = fmax (most, value);
     }
   double size = fmax (fabs (least), fabs (most));
-  if (most - least > 1e-9 * size)
+  if (most - least > 1e-6 * size)
     fputs ("set yrange [*:*]\n", s->f);
   else if (isfinite (size))
     pw_script_range (s, "y", least - (size > 0 ? 0.1 * size : 1), most + (size > 0 ? 0.1 * size : 1));
@@ -70,14 +70,16 @@ int pw_plot_velocities (const pw_plots *p, pw_error *error) {
   return pw_script_end (&s, p, error);
 }
 
-/* How often the liveliest angular velocity turns. */
+/* How often the liveliest angular velocity turns; round-off does not count. */
 static int time_turns (const pw_plots *p) {
   int most = 0;
   for (int b = 0; b < p->bodies; b++) {
+    double largest = 0;
+    for (int i = 0; i < p->samples; i++) largest = fmax (largest, fabs (pw_plot_motion (p, i, b)[5]));
     int turns = 0, before = 0;
     for (int i = 1; i < p->samples; i++) {
       double change = pw_plot_motion (p, i, b)[5] - pw_plot_motion (p, i - 1, b)[5];
-      int now = (change > 0) - (change < 0);
+      int now = (change > 1e-6 * largest) - (change < -1e-6 * largest);
       turns += now * before < 0;
       if (now) before = now;
     }

@@ -231,7 +231,8 @@ static int expression_read (const pw_expression *x, const char *text, pw_express
     size_t name = expression_name_size (text + at), number = expression_number_size (text + at);
     n = name ? name : number;
     if (n && (before == 'f' || before == '0' || before == ')'))
-      return expression_wrong (trouble, at, "an operator is missing before \"%s\"%s", (char[2]){ text[at], 0 }, "");
+      return expression_wrong (trouble, at, "an operator such as * is missing before \"%s\"%s",
+                               (char[2]){ text[at], 0 }, "");
     if (name)
       status = expression_read_name (x, text, at, n, trouble);
     else if (!number)
