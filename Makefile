@@ -1,7 +1,8 @@
 # Pinwheel.  `make help` says what there is; everything built goes to $(BUILD).
 
-VERSION := 0.1.0
-ABI     := 0
+# Written once, in the header.  The libraries' soname follows the ABI of plug-ins.
+VERSION := $(shell sed -n 's/^\#define PW_VERSION "\(.*\)".*/\1/p' core/pinwheel.h)
+ABI     := $(shell sed -n 's/^\#define PW_ABI \([0-9]*\).*/\1/p' core/pinwheel.h)
 
 BUILD  ?= build
 PREFIX ?= /usr/local
@@ -71,7 +72,7 @@ SLOWS     := $(SLOW:%.c=$(BUILD)/%)
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
-.PHONY: all everything demo test test-all layers san clang gcc format format-check bench-quick bench-engine \
+.PHONY: all everything demo test test-all layers san cov clang gcc format format-check bench-quick bench-engine \
         bench-effects hard basic deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -91,6 +92,7 @@ help:
 	@echo 'make hard             every method on every hard case, against the expected verdicts; writes docs/hard-cases.md'
 	@echo 'make layers           proof of what depends on what'
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
+	@echo 'make cov              lines that the tests run, and those they do not'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
 	@echo 'make install          to PREFIX (/usr/local) below DESTDIR; uninstall'
 	@echo 'make clean            remove $(BUILD)/'
@@ -100,7 +102,7 @@ help:
 
 # ---- Dependencies: whoever asks to see something run gets the libraries first ----
 
-ifneq ($(filter demo test test-all bench-quick bench-engine bench-effects hard san,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all bench-quick bench-engine bench-effects hard san cov,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -251,6 +253,13 @@ san:
 	  SAN='-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer'
 san: $(FIRST)
 
+# Lines of core/ and solvers/ that tests run; the old counts go first.
+cov:
+	@mkdir -p $(VARIANT)/cov && find $(VARIANT)/cov -name '*.gcda' -delete
+	@$(MAKE) --no-print-directory NO_DEPS=1 CC=gcc BUILD=$(VARIANT)/cov CFLAGS='-O1 -g' SAN='--coverage -fprofile-update=atomic' test
+	@sh .ci/coverage $(VARIANT)/cov 95
+cov: $(FIRST)
+
 clang:
 	@$(MAKE) --no-print-directory CC=clang WERROR=1 BUILD=$(VARIANT)/clang everything
 
@@ -282,22 +291,40 @@ format-check:
 # ---- Installing ----
 
 D := $(DESTDIR)$(PREFIX)
+MAN := docs/pinwheel.1 docs/pinwheel-model.5
+
+define PKGCONFIG
+prefix=$(PREFIX)
+includedir=$${prefix}/include/pinwheel
+libdir=$${prefix}/lib
+modelsdir=$${libdir}/pinwheel/models
+
+Name: pinwheel
+Description: planar multibody systems with pin joints and knife-edge wheels
+Version: $(VERSION)
+Cflags: -I$${includedir}
+Libs: -L$${libdir} -lpinwheel-files -lpinwheel
+Libs.private: $(FILES_LIBS) $(SOLVER_LIBS)
+endef
+export PKGCONFIG
 
 install: all
-	install -d $(D)/bin $(D)/lib/pinwheel/models $(D)/lib/pkgconfig $(D)/include/pinwheel
+	install -d $(D)/bin $(D)/lib/pinwheel/models $(D)/lib/pkgconfig $(D)/include/pinwheel $(D)/share/man/man1 $(D)/share/man/man5
 	install $(PROGRAM) $(D)/bin
 	for l in libpinwheel libpinwheel-files; do \
 	  install $(BUILD)/$$l.so.$(ABI) $(D)/lib && ln -sf $$l.so.$(ABI) $(D)/lib/$$l.so && \
 	  install -m 644 $(BUILD)/$$l.a $(D)/lib || exit 1; done
 	install -m 644 $(HEADERS) $(D)/include/pinwheel
 	install -m 644 $(PLUGINS) $(D)/lib/pinwheel/models
-	printf '%s\n' 'prefix=$(PREFIX)' 'Name: pinwheel' 'Description: planar multibody systems' 'Version: $(VERSION)' \
-	  'Cflags: -I$${prefix}/include/pinwheel' 'Libs: -L$${prefix}/lib -lpinwheel-files -lpinwheel' \
-	  'Libs.private: $(FILES_LIBS) $(SOLVER_LIBS)' > $(D)/lib/pkgconfig/pinwheel.pc
+	for m in $(MAN); do install -m 644 $$m $(D)/share/man/man$${m##*.} || exit 1; done
+	echo "$$PKGCONFIG" >$(D)/lib/pkgconfig/pinwheel.pc
 
+# What install put there, and the folders of its own; what somebody else put into these stays.
 uninstall:
 	rm -f $(D)/bin/pinwheel $(D)/lib/libpinwheel.* $(D)/lib/libpinwheel-files.* $(D)/lib/pkgconfig/pinwheel.pc
-	rm -rf $(D)/include/pinwheel $(D)/lib/pinwheel
+	rm -f $(addprefix $(D)/include/pinwheel/,$(notdir $(HEADERS))) $(addprefix $(D)/lib/pinwheel/models/,$(notdir $(PLUGINS)))
+	for m in $(notdir $(MAN)); do rm -f $(D)/share/man/man$${m##*.}/$$m; done
+	rmdir $(D)/include/pinwheel $(D)/lib/pinwheel/models $(D)/lib/pinwheel 2>/dev/null || true
 
 clean:
 	rm -rf $(BUILD)

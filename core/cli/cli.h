@@ -10,10 +10,6 @@
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
-#ifndef PW_VERSION
-#define PW_VERSION "0.1.0"
-#endif
-
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 }; /* exit statuses after Ctrl-C, and when nobody reads the output */
 
 /* ---- Commands ---- */
