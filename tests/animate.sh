@@ -50,8 +50,10 @@ gif () {
     [ "$(head -c 6 "$work/x.gif")" = GIF89a ] && grep -aq NETSCAPE2.0 "$work/x.gif" && [ ! -s "$work/err" ]
 }
 if command -v gnuplot >/dev/null; then
-  gif ezyroller --t-end 5
+  gif pendulum --t-end 1
   report 'a GIF that moves' $?
+  gif ezyroller
+  report 'a GIF that follows' $?
 fi
 PATH=$work/nothing "$(command -v "$pinwheel")" run ezyroller --t-end 1 --animate "$work/none.gif" >/dev/null 2>"$work/err"
 status=$?

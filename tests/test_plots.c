@@ -1,0 +1,92 @@
+/* Figures: what is drawn of which model, with gnuplot and without. */
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+/* 1 if a file of the folder is there and has something in it. */
+static int plots_has (const char *name) {
+  const char *text = cli_file (name);
+  return text && *text;
+}
+
+/* Draws all there is of a model, without a word from gnuplot. */
+static void plots_draw (const char *model) {
+  static const char *const figures[] = { "paths", "velocities", "angular", "energy", "mechanism" };
+  char command[200], name[80];
+  snprintf (command, sizeof command, "pinwheel run %s --plots @/drawn", model);
+  cli_good (command);
+  for (size_t i = 0; i < sizeof figures / sizeof *figures; i++) {
+    snprintf (name, sizeof name, "drawn/%s.svg", figures[i]);
+    const char *svg = cli_file (name);
+    assert_non_null (svg);
+    assert_non_null (strstr (svg, "<svg"));
+    snprintf (name, sizeof name, "drawn/%s.png", figures[i]);
+    assert_true (plots_has (name));
+  }
+}
+
+static void test_drawn (void **state) {
+  (void)state;
+  plots_draw ("ezyroller --t-end 40"); /* goes far: a picture of the beginning too */
+}
+
+/* The data and scripts of a model without gnuplot. */
+static void plots_write (const char *model) {
+  char command[300];
+  snprintf (command, sizeof command, "PATH=/none pinwheel run %s --plots @/written >/dev/null", model);
+  assert_int_equal (cli_run (command), 0);
+  assert_true (plots_has ("written/mechanism.gp") && plots_has ("written/energy.gp"));
+}
+
+static void test_written (void **state) {
+  (void)state;
+  plots_write ("pendulum --t-end 3");                 /* without wheels */
+  plots_write ("wheeled-snake --set n=16 --t-end 1"); /* coloured by number */
+  plots_write ("chain --set n=80 --t-end 0.05");
+  plots_write (
+      "chaplygin-sleigh --start sleigh.vx=0 --start sleigh.vy=0 --start sleigh.omega=0 --t-end 1"); /* at rest */
+}
+
+static void test_data (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("PATH=/none pinwheel run ezyroller --t-end 20 --plots @/data >/dev/null"), 0);
+  assert_non_null (strstr (cli_err, "gnuplot was not found, so no figures are drawn; data and scripts are in"));
+  assert_true (plots_has ("data/motion.dat") && plots_has ("data/wheels.dat") && plots_has ("data/energy.dat"));
+  assert_true (plots_has ("data/mechanism.dat") && plots_has ("data/mechanism.gp") && plots_has ("data/paths.gp"));
+  assert_null (cli_file ("data/paths.svg"));
+}
+
+static void test_ground (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("PATH=/none pinwheel run andrews-squeezer --plots @/squeezer >/dev/null"), 0);
+  assert_true (plots_has ("squeezer/ground.dat"));
+  assert_null (cli_file ("squeezer/wheels.dat"));
+}
+
+static void test_picture_in_motion (void **state) {
+  (void)state;
+  cli_good ("pinwheel run pendulum --t-end 0.01 --step 1e-3 --animate @/short.gif");
+  const char *gif = cli_file ("short.gif");
+  assert_non_null (gif);
+  assert_int_equal (strncmp (gif, "GIF89a", 6), 0);
+  cli_bad ("PATH=/none pinwheel run ezyroller --t-end 1 --animate @/none.gif >/dev/null", 1,
+           "gnuplot was not found: @/none.gif is not drawn; a .html needs none");
+  assert_null (cli_file ("none.gif"));
+}
+
+static void test_refusals (void **state) {
+  (void)state;
+  cli_write ("file", "in the way");
+  cli_bad ("pinwheel run ezyroller --t-end 1 --plots @/file >/dev/null", 1,
+           "cannot write @/file/motion.dat: Not a directory");
+  cli_bad ("pinwheel run ezyroller --t-end 1 --plots ''", 2, "the folder \"\" for plots: no such name can be used");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_drawn),  cmocka_unit_test (test_written),           cmocka_unit_test (test_data),
+    cmocka_unit_test (test_ground), cmocka_unit_test (test_picture_in_motion), cmocka_unit_test (test_refusals),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
