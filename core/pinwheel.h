@@ -125,7 +125,8 @@ typedef enum {
   PW_REAL,        /* any finite number */
   PW_NONNEGATIVE, /* >= 0 */
   PW_POSITIVE,    /* > 0 */
-  PW_COUNT        /* a whole number >= 1 */
+  PW_COUNT,       /* a whole number >= 1 */
+  PW_FRACTION     /* from 0 to 1 */
 } pw_domain;
 
 /* A named parameter of a model; it lives as a double at `offset` in the model's own parameter structure. */

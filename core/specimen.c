@@ -89,6 +89,7 @@ typedef struct {
 
 static double specimen_number (pw_random *r, pw_domain domain) {
   if (domain == PW_COUNT) return floor (pw_random_between (r, 1, 6));
+  if (domain == PW_FRACTION) return pw_random_between (r, 0, 1);
   if (domain == PW_NONNEGATIVE && pw_random_between (r, 0, 1) < 0.2) return 0;
   double size = pw_random_between (r, 0.3, 1.5);
   return domain == PW_REAL && pw_random_between (r, 0, 1) < 0.5 ? -size : size;

@@ -5,6 +5,7 @@
  *
  * (Baumgarte 1972, Stabilization of constraints and integrals of motion in dynamical systems.) */
 #include <math.h>
+#include <string.h>
 #include "method.h"
 
 static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
@@ -68,6 +69,17 @@ int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double
   r->near = 1;
   if (status == PW_OK) dynamics_refine (r, v, a, lambda);
   return status;
+}
+
+void pw_show_reached (pw_run *r) {
+  size_t n = (size_t)r->s->coords * sizeof (double);
+  memcpy (r->q_at, r->q, n);
+  memcpy (r->v_at, r->v, n);
+  memcpy (r->a_at, r->a, n);
+  memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
+  r->projected_at = r->projected;
+  if (pw_place (r->s, r->t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
 }
 
 int pw_fail_singular (pw_run *r, double t, pw_error *error) {

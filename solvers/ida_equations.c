@@ -96,39 +96,6 @@ int pw_ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *d
 
 /* ---- Newton matrix ---- */
 
-/* Rows of q': c I + D (G^T mu)_q, -I, D G^T */
-static void ida_matrix_kinematics (ida_data *d, const double *mu, double c) {
-  pw_system *s = d->run->s;
-  pw_tangent *x = &d->tangent;
-  int n = d->n;
-  for (int j = 0; j < n; j++) {
-    pw_tape_put (&x->tape, j, j, c);
-    pw_tape_put (&x->tape, j, n + j, -1);
-  }
-  if (!d->form.positions) return;
-  pw_put put = { .rows = s->holonomic, .factor = 1, .row_scale = d->scale, .map = x->map, .lambda = mu };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JTL_Q, &put);
-  put.col = 2 * n + d->rows;
-  if (d->form.impulses) put.factor = c;
-  pw_newton_JT (s, &x->tape, &put);
-}
-
-/* Rows of J v = eta and g = 0: (J v)_q - eta_q, J; G */
-static void ida_matrix_constraints (ida_data *d, const double *v) {
-  pw_system *s = d->run->s;
-  pw_tangent *x = &d->tangent;
-  int n = d->n;
-  pw_put put = { .row = 2 * n, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map, .w = v };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
-  put.factor = put.factor_nonholonomic = -1;
-  pw_newton_block (&x->newton, s, &x->tape, PW_ETA_Q, &put);
-  put.factor = put.factor_nonholonomic = 1;
-  put.col = n;
-  pw_newton_J (s, &x->tape, &put);
-  if (!d->form.positions) return;
-  pw_newton_J (s, &x->tape, &(pw_put){ .row = 2 * n + d->rows, .rows = s->holonomic, .factor = 1, .map = x->map });
-}
-
 static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, double c) {
   int n = d->n;
   const pw_tangent_place to = { .momentum = n,
@@ -137,14 +104,17 @@ static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, dou
                                 .v = n,
                                 .a = n,
                                 .lambda = 2 * n,
+                                .mu = 2 * n + d->rows,
+                                .of_q = c,
                                 .of_a = c,
                                 .of_lambda = d->form.impulses ? c : 1 };
-  ida_matrix_kinematics (d, ida_mu (d, y, yp), c);
+  pw_tangent_kinematics (&d->tangent, &to, d->form.positions ? ida_mu (d, y, yp) : NULL, d->scale);
   pw_tangent_momentum (&d->tangent, &to, ida_lambda (d, y, yp));
   if (d->form.rates)
-    ida_matrix_constraints (d, y + n);
+    pw_tangent_rates (&d->tangent, &to, y + n, 1);
   else
     pw_tangent_accelerations (&d->tangent, &to, y + n, yp + n);
+  if (d->form.positions) pw_tangent_positions (&d->tangent, &to, 2 * n + d->rows);
 }
 
 int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix, void *data,

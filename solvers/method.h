@@ -63,6 +63,13 @@ static inline double pw_atol_rate (const pw_run *r, int j) {
 }
 /* 1 if the run takes steps of the given size. */
 int pw_fixed_steps (const pw_run *r);
+/* The end of the next step of the given size, `count` of which were taken since the time `base`: a multiple of the size,
+ * t_end or a breakpoint, whichever is first; *whole: the first. */
+static inline double pw_step_end (const pw_run *r, double base, long count, double t_end, int *whole) {
+  double h = r->settings.step, t1 = base + (double)(count + 1) * h, stop = fmin (t_end, r->breakpoint);
+  *whole = t1 < stop + 1e-9 * h;
+  return t1 > stop - 1e-9 * h ? stop : t1;
+}
 /* 1 if the run's stabilisation has this name. */
 int pw_stabilised_by (const pw_run *r, const char *name);
 
@@ -120,6 +127,9 @@ static inline double pw_before_breakpoint (const pw_run *r, double t) {
 
 /* The same where J is swept and the saddle factorised at this pose, and the rates are placed. */
 void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda);
+
+/* The state reached, into the sample arrays; the system is placed there, J swept. */
+void pw_show_reached (pw_run *r);
 
 /* Says which constraints an evaluation could not tell apart, and when. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);

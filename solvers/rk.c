@@ -293,13 +293,6 @@ int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
 
 /* ---- Looking into the last step ---- */
 
-static void rk_copy_reached (pw_run *r) {
-  memcpy (r->q_at, r->q, rk_block (r, 1));
-  memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
-  r->projected_at = r->projected;
-  if (pw_place (r->s, r->t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
-}
-
 /* A step from the beginning of the last one to t, which is as accurate as the method; into the sample arrays. */
 static int rk_step_again (pw_run *r, double t) {
   struct pw_method_data *d = r->data;
@@ -321,7 +314,7 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
   if (t > r->t || t < d->t0)
     return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, d->t0, r->t);
   if (t == r->t) {
-    rk_copy_reached (r);
+    pw_show_reached (r);
     return PW_OK;
   }
   int status = rk_step_again (r, t);

@@ -3,14 +3,6 @@
 #include <math.h>
 #include "rk_state.h"
 
-/* The time of the next step's end: a multiple of the step from the base, t_end or a breakpoint, whichever is first. */
-static double fixed_next_time (const pw_run *r, double t_end, int *whole) {
-  const struct pw_method_data *d = r->data;
-  double h = r->settings.step, t1 = d->base + (double)(d->count + 1) * h, stop = fmin (t_end, r->breakpoint);
-  *whole = t1 < stop + 1e-9 * h;
-  return t1 > stop - 1e-9 * h ? stop : t1;
-}
-
 /* The step to t1 in two parts; the state there is left in d->q, d->v, and if `keep` is set the first part is accepted. */
 static int fixed_two_parts (pw_run *r, double t, double t1, int project, int keep) {
   double added = 0, *to = r->settings.ledger ? &added : NULL;
@@ -76,7 +68,8 @@ static int fixed_step_around (pw_run *r, int status, double t1, double stop, int
 int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
-  double added = 0, t1 = fixed_next_time (r, t_end, &whole), h = whole && !d->split ? r->settings.step : t1 - r->t;
+  double added = 0, t1 = pw_step_end (r, d->base, d->count, t_end, &whole),
+         h = whole && !d->split ? r->settings.step : t1 - r->t;
   r->near = 0;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
   d->split = r->near && !d->split;

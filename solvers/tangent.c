@@ -50,6 +50,45 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
   for (int i = 0; i < count; i++) used[i] = all[x->map ? x->row[i] : i];
 }
 
+/* of_q I + D (G^T mu)_q, -I, D G^T */
+void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_place *to, const double *mu, const double *D) {
+  pw_system *s = x->run->s;
+  for (int j = 0; j < s->coords; j++) {
+    pw_tape_put (&x->tape, j, to->q + j, to->of_q);
+    pw_tape_put (&x->tape, j, to->v + j, -1);
+  }
+  if (mu == NULL) return;
+  pw_put put = { .col = to->q, .rows = s->holonomic, .factor = 1, .row_scale = D, .map = x->map, .lambda = mu };
+  pw_newton_block (&x->newton, s, &x->tape, PW_JTL_Q, &put);
+  put.col = to->mu;
+  put.factor = to->of_lambda;
+  pw_newton_JT (s, &x->tape, &put);
+}
+
+/* (J v)_q - eta_q, J */
+void pw_tangent_rates (pw_tangent *x, const pw_tangent_place *to, const double *v, double of_holonomic) {
+  pw_system *s = x->run->s;
+  pw_put put = { .row = to->constraint,
+                 .col = to->q,
+                 .rows = s->rows,
+                 .factor = of_holonomic,
+                 .factor_nonholonomic = 1,
+                 .map = x->map,
+                 .w = v };
+  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  put.factor = -of_holonomic, put.factor_nonholonomic = -1;
+  pw_newton_block (&x->newton, s, &x->tape, PW_ETA_Q, &put);
+  put.factor = of_holonomic, put.factor_nonholonomic = 1;
+  put.col = to->v;
+  pw_newton_J (s, &x->tape, &put);
+}
+
+/* G */
+void pw_tangent_positions (pw_tangent *x, const pw_tangent_place *to, int row) {
+  pw_system *s = x->run->s;
+  pw_newton_J (s, &x->tape, &(pw_put){ .row = row, .col = to->q, .rows = s->holonomic, .factor = 1, .map = x->map });
+}
+
 /* (J^T lambda)_q - f_q, -f_v, M, J^T */
 void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const double *lambda) {
   pw_system *s = x->run->s;

@@ -1,6 +1,9 @@
 /* The equations of motion in the rows in use, differentiated: what Newton matrices of implicit methods have in common.
  *
+ *   kinematics      q' - v + D G^T mu                                       by (q, v, mu)
  *   momentum        M a + J^T lambda - f                                    by (q, v, a, lambda)
+ *   rates           J v - eta                                               by (q, v)
+ *   positions       g                                                       by q
  *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g            by (q, v, a) */
 #ifndef PW_TANGENT_H
 #define PW_TANGENT_H
@@ -27,15 +30,20 @@ const double *pw_tangent_expand (const pw_tangent *x, const double *used, int co
 /* From values of all rows those of the first `count` in use. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used);
 
-/* Where the parts go.  a may share its columns with v: its part comes times `of_a`, that of lambda times `of_lambda`. */
+/* Where the parts go.  a may share its columns with v: its part comes times `of_a`, that of q' times `of_q` in those of q,
+ * that of lambda and mu times `of_lambda`. */
 typedef struct {
-  int momentum, constraint; /* first row of each */
-  int q, v, a, lambda;      /* first column of each */
-  double of_a, of_lambda;
+  int momentum, constraint; /* first row of each; that of the kinematics is 0 */
+  int q, v, a, lambda, mu;  /* first column of each */
+  double of_q, of_a, of_lambda;
 } pw_tangent_place;
 
-/* Puts these rows at the placed pose with J swept; lambda: all rows, v and a: coords. */
+/* Puts these rows at the placed pose with J swept; lambda and mu (NULL: there are none): all rows, D, v and a: coords. */
 void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const double *lambda);
+void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_place *to, const double *mu, const double *D);
 void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_place *to, const double *v, const double *a);
+/* Holonomic rows times a factor: 0 leaves their place to the positions, which begin at a row of their choice. */
+void pw_tangent_rates (pw_tangent *x, const pw_tangent_place *to, const double *v, double of_holonomic);
+void pw_tangent_positions (pw_tangent *x, const pw_tangent_place *to, int row);
 
 #endif

@@ -167,6 +167,10 @@ static void test_domains (void **state) {
     { PW_COUNT, 0, "a whole number >= 1" },
     { PW_COUNT, 2.5, "a whole number >= 1" },
     { PW_COUNT, 1e10, "a whole number >= 1" },
+    { PW_FRACTION, 0, "" },
+    { PW_FRACTION, 1, "" },
+    { PW_FRACTION, 1.001, "a number from 0 to 1" },
+    { PW_FRACTION, -1, "a number from 0 to 1" },
   };
   for (size_t i = 0; i < sizeof tries / sizeof *tries; i++)
     assert_string_equal (pw_domain_check (tries[i].domain, tries[i].value), tries[i].expected);

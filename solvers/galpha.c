@@ -1,0 +1,277 @@
+/* galpha: the generalised-alpha method (Chung & Hulbert 1993) for constrained systems, fixed step (Arnold & Brüls 2007,
+ * Convergence of the generalized-alpha scheme for constrained mechanical systems).  From t_n to t_n+1 = t_n + h
+ *
+ *   (1 - alpha_m) w' + alpha_m w = (1 - alpha_f) a' + alpha_f a          ' : at t_n+1
+ *   v' = v + h ((1 - gamma) w + gamma w')
+ *   q' = q + h v + h^2 ((1/2 - beta) w + beta w') - (h beta / gamma) D G^T mu
+ *   M a' + J^T lambda' = f
+ *
+ *   index3    g = 0,              S v' = b   (nonholonomic rows),   mu = 0
+ *   ggl       g = 0,              J v' = eta                        stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
+ *
+ * w, the acceleration-like variable, belongs to the time t + shift h, shift = alpha_m - alpha_f, up to h^2; D as in ida.
+ * The coefficients follow from the spectral radius rho at infinite frequency.
+ *
+ * To be of order 2 from the first step on w starts as a + shift h a-dot; and in index3, where g = 0 asks the rates for
+ * an error C h^2 G a-dot with C = 1/6 - beta - shift/2, v starts with that error: without it multipliers begin with an error of
+ * order h (Arnold, Brüls & Cardona 2015, Error analysis of generalized-alpha Lie group time integration methods for
+ * constrained mechanical systems).  A step of another size begins anew.
+ *
+ * Newton's equations are scaled by powers of the step, so that their condition does not depend on it (Bottasso, Bauchau
+ * & Cardona 2007, Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of
+ * index three differential algebraic equations). */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "galpha_state.h"
+#include "util.h"
+
+/* ---- Opening ---- */
+
+static int galpha_allocate (galpha *d, const pw_system *s) {
+  size_t n = (size_t)s->coords + 3, size = (size_t)d->size, rows = (size_t)s->rows, entries = (size_t)s->entries;
+  const struct {
+    double **array;
+    size_t count;
+  } array[] = {
+    { &d->v, n },     { &d->a, n },      { &d->w, n },          { &d->q1, n },          { &d->v1, n },
+    { &d->a1, n },    { &d->w1, n },     { &d->lambda1, rows }, { &d->mu1, rows },      { &d->q0, n },
+    { &d->v0, n },    { &d->a0, n },     { &d->lambda0, rows }, { &d->rate0, entries }, { &d->ledger0, entries },
+    { &d->z, size },  { &d->row, size }, { &d->column, size },  { &d->pull, n },        { &d->f, n },
+    { &d->jv, rows }, { &d->eta, rows }, { &d->D, n }
+  };
+  pw_layout l = { NULL, 0 };
+  for (int pass = 0; pass < 2; pass++) {
+    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
+      *array[i].array = pw_take (&l, array[i].count, sizeof (double));
+    if (pass == 1) break;
+    d->memory = calloc (1, l.used + 1);
+    if (d->memory == NULL) return PW_MACHINE;
+    l = (pw_layout){ d->memory, 0 };
+  }
+  for (int j = 0; j < s->coords; j++) d->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
+  return PW_OK;
+}
+
+/* Order 2 with the least damping of low frequencies for a given rho. */
+static void galpha_coefficients (galpha *d, double rho) {
+  d->alpha_m = (2 * rho - 1) / (rho + 1);
+  d->alpha_f = rho / (rho + 1);
+  d->gamma = 0.5 + d->alpha_f - d->alpha_m;
+  d->beta = 0.25 * (d->gamma + 0.5) * (d->gamma + 0.5);
+}
+
+static int galpha_restart (pw_run *r, pw_error *error) {
+  galpha *d = r->data;
+  (void)error;
+  d->base = d->t0 = r->t;
+  d->count = 0;
+  d->h = 0;
+  return PW_OK;
+}
+
+static int galpha_open (pw_run *r, pw_error *error) {
+  galpha *d = r->data = calloc (1, sizeof *d);
+  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  d->ggl = pw_stabilised_by (r, "ggl");
+  galpha_coefficients (d, pw_option_value (r, "rho"));
+  int status = pw_tangent_open (&d->tangent, r);
+  d->n = r->s->coords;
+  d->rows = d->tangent.rows;
+  d->positions = d->ggl ? d->tangent.holonomic : 0;
+  d->size = 2 * d->n + d->rows + d->positions;
+  if (status == PW_OK) status = galpha_allocate (d, r->s);
+  if (status == PW_OK) status = pw_galpha_open_matrix (r);
+  if (status != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  status = pw_projector_open (&d->projector, r, r->s->metric, NULL, error);
+  return status == PW_OK ? galpha_restart (r, error) : status;
+}
+
+static void galpha_close (pw_run *r) {
+  galpha *d = r->data;
+  pw_projector_close (&d->projector);
+  pw_sparse_close (&d->sparse);
+  pw_tangent_close (&d->tangent);
+  free (d->value);
+  free (d->memory);
+  free (d);
+}
+
+/* ---- Beginning ---- */
+
+/* a-dot at the state reached, into `jerk`: a difference over a part of the step, short enough not to leave the time scale
+ * of stiff forces, long enough for round-off. */
+static int galpha_jerk (pw_run *r, double h, double *jerk) {
+  galpha *d = r->data;
+  double s = 1e-3 * h;
+  for (int j = 0; j < d->n; j++) {
+    d->q1[j] = r->q[j] + s * (d->v[j] + 0.5 * s * d->a[j]);
+    d->v1[j] = d->v[j] + s * d->a[j];
+  }
+  int status = pw_accelerate (r, pw_before_breakpoint (r, r->t + s), d->q1, d->v1, jerk, d->eta);
+  for (int j = 0; j < d->n; j++) jerk[j] = (jerk[j] - d->a[j]) / s;
+  return status;
+}
+
+/* The part of C h^2 a-dot that the holonomic rows forbid, least in the mass matrix, onto the rates. */
+static int galpha_displace (pw_run *r, double h, const double *jerk) {
+  galpha *d = r->data;
+  pw_system *s = r->s;
+  double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->v1;
+  int status = pw_place (s, r->t, r->q, d->v);
+  if (status != PW_OK) return status;
+  pw_sweep_J (s);
+  pw_mul_J (s, jerk, d->jv);
+  for (int i = 0; i < s->rows; i++) d->jv[i] *= i < s->holonomic ? C * h * h : 0;
+  status = pw_saddle_factor (r->saddle);
+  if (status != PW_OK) return status;
+  pw_saddle_solve (r->saddle, NULL, d->jv, dv, d->eta);
+  for (int j = 0; j < d->n; j++) d->v[j] += dv[j];
+  return PW_OK;
+}
+
+/* A step of size h is to be the first of its size: what it goes on from. */
+static int galpha_begin (pw_run *r, double h) {
+  galpha *d = r->data;
+  double *jerk = d->w1;
+  int status = PW_OK;
+  memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
+  if (!d->ggl && d->h > 0) { /* rates have the error that goes with the size before */
+    status = pw_place (r->s, r->t, r->q, d->v);
+    if (status == PW_OK) pw_sweep_J (r->s);
+    if (status == PW_OK) status = pw_project_velocities (&d->projector, r, d->v);
+  }
+  if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, d->v, d->a, d->eta);
+  if (status == PW_OK) status = galpha_jerk (r, h, jerk);
+  if (status != PW_OK) return status;
+  for (int j = 0; j < d->n; j++) d->w[j] = d->a[j] + (d->alpha_m - d->alpha_f) * h * jerk[j];
+  return d->ggl || r->s->holonomic == 0 ? PW_OK : galpha_displace (r, h, jerk);
+}
+
+/* ---- Advancing ---- */
+
+static void galpha_keep (pw_run *r) {
+  galpha *d = r->data;
+  size_t n = (size_t)d->n * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  d->t0 = r->t;
+  memcpy (d->q0, r->q, n);
+  memcpy (d->v0, r->v, n);
+  memcpy (d->a0, r->a, n);
+  memcpy (d->lambda0, r->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (d->ledger0, r->ledger, entries);
+  memcpy (d->rate0, r->rate, entries);
+}
+
+/* The successor becomes the state reached. */
+static void galpha_accept (pw_run *r, double h, double t1) {
+  galpha *d = r->data;
+  size_t n = (size_t)d->n * sizeof (double);
+  galpha_keep (r);
+  memcpy (r->q, d->q1, n);
+  memcpy (r->v, d->v1, n);
+  memcpy (r->a, d->a1, n);
+  memcpy (d->v, d->v1, n);
+  memcpy (d->a, d->a1, n);
+  memcpy (d->w, d->w1, n);
+  for (int i = 0; i < r->s->rows; i++) {
+    int used = d->tangent.map ? d->tangent.map[i] : i;
+    r->lambda[i] = used < 0 ? 0 : d->lambda1[used];
+  }
+  r->t = t1;
+  d->h = h;
+  if (!r->settings.ledger) return;
+  pw_sweep_ledger (r->s, r->lambda, r->rate);
+  for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * h * (d->rate0[i] + r->rate[i]);
+}
+
+static int galpha_fail (pw_run *r, int status, double h, pw_error *error) {
+  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (r->near) return pw_fail_singular (r, r->t, error);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t,
+                  status == PW_INPUT ? "the Newton matrix is singular" : "Newton's iteration does not converge", h);
+}
+
+static int galpha_advance (pw_run *r, double t_end, pw_error *error) {
+  galpha *d = r->data;
+  int whole, status = PW_OK;
+  double t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
+  r->near = 0;
+  if (h != d->h) status = galpha_begin (r, h);
+  if (status == PW_OK) status = pw_galpha_solve (r, h, t1);
+  if (status != PW_OK) return galpha_fail (r, status, h, error);
+  galpha_accept (r, h, t1);
+  r->statistics.steps++;
+  d->count++;
+  if (!whole) d->base = t1, d->count = 0;
+  r->near = pw_saddle_factor (r->saddle) != PW_OK || pw_saddle_below (r->saddle, r->watch);
+  return PW_OK;
+}
+
+/* ---- Looking into the last step ---- */
+
+/* Cubic Hermite interpolation of y with slopes s between 0 and 1, the step h wide. */
+static double galpha_hermite (double x, double h, double y0, double s0, double y1, double s1) {
+  double up = x * x * (3 - 2 * x);
+  return y0 + up * (y1 - y0) + h * x * (1 - x) * ((1 - x) * s0 - x * s1);
+}
+
+/* Positions and rates of order 4, put onto the constraints that the form has; multipliers and accelerations, of which
+ * the ends are good to h^2, and the ledger's rates, linearly. */
+static int galpha_inside (pw_run *r, double t) {
+  galpha *d = r->data;
+  pw_system *s = r->s;
+  double h = r->t - d->t0, x = (t - d->t0) / h, worst;
+  int row;
+  for (int j = 0; j < d->n; j++) {
+    r->q_at[j] = galpha_hermite (x, h, d->q0[j], d->v0[j], r->q[j], r->v[j]);
+    r->v_at[j] = galpha_hermite (x, h, d->v0[j], d->a0[j], r->v[j], r->a[j]);
+    r->a_at[j] = (1 - x) * d->a0[j] + x * r->a[j];
+  }
+  for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * d->lambda0[i] + x * r->lambda[i];
+  for (int i = 0; i < s->entries; i++)
+    r->ledger_at[i] = d->ledger0[i] + h * x * (d->rate0[i] + 0.5 * x * (r->rate[i] - d->rate0[i]));
+  int status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at, &row, &worst);
+  return status == PW_OK && d->ggl ? pw_project_velocities (&d->projector, r, r->v_at) : status;
+}
+
+static int galpha_at (pw_run *r, double t, pw_error *error) {
+  galpha *d = r->data;
+  if (t > r->t || t < d->t0)
+    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, d->t0, r->t);
+  if (t == r->t) {
+    pw_show_reached (r);
+    return PW_OK;
+  }
+  pw_statistics keep = r->statistics;
+  int status = galpha_inside (r, t);
+  r->statistics = keep;
+  return status == PW_OK ? PW_OK : galpha_fail (r, status, r->t - d->t0, error);
+}
+
+static const pw_stabilisation galpha_stabilisations[] = {
+  { "index3", "positions enforced, and the rates of nonholonomic rows (Arnold & Brüls 2007)" },
+  { "ggl", "stabilised index 2: positions and rates both enforced (Gear, Gupta & Leimkuhler 1985)" },
+  { NULL, NULL },
+};
+
+static const pw_option galpha_options[] = {
+  { .name = "rho",
+    .value = 0.8,
+    .domain = PW_FRACTION,
+    .about = "spectral radius at infinite frequency: 1 damps nothing, 0 removes what the step cannot follow" },
+  { .name = NULL },
+};
+
+const pw_method pw_method_galpha = {
+  .name = "galpha",
+  .about = "generalised-alpha method of order 2, implicit, fixed step (Chung & Hulbert 1993, Arnold & Brüls 2007)",
+  .order = 2,
+  .stabilisations = galpha_stabilisations,
+  .options = galpha_options,
+  .open = galpha_open,
+  .advance = galpha_advance,
+  .at = galpha_at,
+  .restart = galpha_restart,
+  .close = galpha_close,
+};

@@ -1,0 +1,200 @@
+/* The equations of a step of galpha, solved by Newton's iteration.  Unknown are q', v', lambda', mu; w' and a' follow from
+ * v'.  With c = gamma / (h beta) and e = (1 - alpha_m) / ((1 - alpha_f) h gamma):
+ *
+ *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w') + D G^T mu = 0          dw' = dv' / (h gamma)
+ *   M a' + J^T lambda' - f = 0                                                 da' = e dv'
+ *   J v' - eta = 0,  g = 0
+ *
+ * so its matrix is that of ida with c and e in the places of dF/dy' coefficients.  Corrections of v', lambda', mu are in
+ * units of c, c e m, c and rows divided by c, c e m, c, with m a mass: all of it is then of the same size for every h. */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "galpha_state.h"
+
+static int galpha_place (pw_run *r, double t1) {
+  galpha *d = r->data;
+  int status = pw_place (r->s, pw_before_breakpoint (r, t1), d->q1, d->v1);
+  if (status == PW_OK) pw_sweep_J (r->s);
+  return status;
+}
+
+static const double *galpha_lambda (galpha *d) {
+  return pw_tangent_expand (&d->tangent, d->lambda1, d->rows, d->tangent.lambda);
+}
+
+static const double *galpha_mu (galpha *d) {
+  return d->ggl ? pw_tangent_expand (&d->tangent, d->mu1, d->positions, d->tangent.mu) : NULL;
+}
+
+/* ---- Residual ---- */
+
+static void galpha_kinematics (pw_run *r, double h, double *out) {
+  galpha *d = r->data;
+  double c = d->gamma / (h * d->beta);
+  const double *mu = galpha_mu (d);
+  memset (d->pull, 0, (size_t)d->n * sizeof *d->pull);
+  if (mu) pw_add_JT (r->s, mu, d->pull);
+  for (int j = 0; j < d->n; j++) {
+    double dq = h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
+    out[j] = c * (d->q1[j] - r->q[j] - dq) + d->D[j] * d->pull[j];
+  }
+}
+
+static void galpha_momentum (pw_run *r, double *out) {
+  galpha *d = r->data;
+  memset (d->pull, 0, (size_t)d->n * sizeof *d->pull);
+  pw_add_JT (r->s, galpha_lambda (d), d->pull);
+  pw_sweep_force (r->s, d->f);
+  for (int j = 0; j < d->n; j++) out[j] = r->s->mass[j] * d->a1[j] + d->pull[j] - d->f[j];
+}
+
+/* J v - eta of all rows, and g behind it; or g in the place of the holonomic ones. */
+static void galpha_constraints (pw_run *r, double *out) {
+  galpha *d = r->data;
+  pw_system *s = r->s;
+  pw_mul_J (s, d->v1, d->jv);
+  pw_sweep_eta (s, d->eta);
+  for (int i = 0; i < s->rows; i++) d->jv[i] -= d->eta[i];
+  if (d->ggl) pw_tangent_compress (&d->tangent, d->jv, d->rows, out);
+  pw_sweep_g (s, d->ggl ? d->eta : d->jv);
+  if (d->ggl)
+    pw_tangent_compress (&d->tangent, d->eta, d->positions, out + d->rows);
+  else
+    pw_tangent_compress (&d->tangent, d->jv, d->rows, out);
+}
+
+static int galpha_residual (pw_run *r, double h, double t1) {
+  galpha *d = r->data;
+  int status = galpha_place (r, t1);
+  if (status != PW_OK) return status;
+  galpha_kinematics (r, h, d->z);
+  galpha_momentum (r, d->z + d->n);
+  galpha_constraints (r, d->z + 2 * d->n);
+  r->statistics.rhs++;
+  return PW_OK;
+}
+
+/* ---- Matrix ---- */
+
+static void galpha_fill (pw_run *r, double h) {
+  galpha *d = r->data;
+  int n = d->n;
+  const pw_tangent_place to = { .momentum = n,
+                                .constraint = 2 * n,
+                                .v = n,
+                                .a = n,
+                                .lambda = 2 * n,
+                                .mu = 2 * n + d->rows,
+                                .of_q = d->gamma / (h * d->beta),
+                                .of_a = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma),
+                                .of_lambda = 1 };
+  pw_tangent_kinematics (&d->tangent, &to, galpha_mu (d), d->D);
+  pw_tangent_momentum (&d->tangent, &to, galpha_lambda (d));
+  pw_tangent_rates (&d->tangent, &to, d->v1, d->ggl);
+  pw_tangent_positions (&d->tangent, &to, d->ggl ? 2 * n + d->rows : 2 * n);
+}
+
+int pw_galpha_open_matrix (pw_run *r) {
+  galpha *d = r->data;
+  pw_tangent *x = &d->tangent;
+  pw_tape_record (&x->tape);
+  galpha_fill (r, 1);
+  if (pw_tape_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
+  d->value = malloc ((size_t)x->colptr[d->size] * sizeof *d->value);
+  return d->value ? pw_sparse_open (&d->sparse, d->size, x->colptr, x->rowind) : PW_MACHINE;
+}
+
+/* Scales of the rows and columns for a step of size h. */
+static void galpha_scale (const pw_run *r, double h) {
+  galpha *d = r->data;
+  int n = d->n, holonomic = d->ggl ? 0 : d->tangent.holonomic;
+  double c = d->gamma / (h * d->beta), e = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma), mass = 0;
+  for (int j = 0; j < n; j++) mass = fmax (mass, r->s->mass[j]);
+  if (mass == 0) mass = 1;
+  for (int j = 0; j < n; j++) {
+    d->row[j] = 1 / c, d->column[j] = 1;
+    d->row[n + j] = 1 / (c * e * mass), d->column[n + j] = c;
+  }
+  for (int i = 2 * n; i < 2 * n + d->rows; i++)
+    d->row[i] = i - 2 * n < holonomic ? 1 : 1 / c, d->column[i] = c * e * mass;
+  for (int i = 2 * n + d->rows; i < d->size; i++) d->row[i] = 1, d->column[i] = c;
+}
+
+static int galpha_factor (pw_run *r, double h) {
+  galpha *d = r->data;
+  const pw_tangent *x = &d->tangent;
+  memset (d->value, 0, (size_t)x->colptr[d->size] * sizeof *d->value);
+  pw_tape_fill (&d->tangent.tape, d->value);
+  galpha_fill (r, h);
+  for (int c = 0; c < d->size; c++)
+    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) d->value[i] *= d->row[x->rowind[i]] * d->column[c];
+  r->statistics.jacobians++;
+  r->statistics.factorisations++;
+  return pw_sparse_factor (&d->sparse, d->value) == PW_OK ? PW_OK : PW_INPUT;
+}
+
+/* ---- Iteration ---- */
+
+/* The successor as if the accelerations did not change. */
+static void galpha_predict (pw_run *r, double h) {
+  galpha *d = r->data;
+  for (int j = 0; j < d->n; j++) {
+    d->a1[j] = d->a[j];
+    d->w1[j] = (d->a[j] - d->alpha_m * d->w[j]) / (1 - d->alpha_m);
+    d->v1[j] = d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
+    d->q1[j] = r->q[j] + h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
+  }
+  pw_tangent_compress (&d->tangent, r->lambda, d->rows, d->lambda1);
+  memset (d->mu1, 0, (size_t)r->s->rows * sizeof *d->mu1);
+}
+
+/* Solves for the correction and applies it.  Its size is that of q and h v, in units of the scene; *floor takes what
+ * round-off makes of them. */
+static double galpha_correct (pw_run *r, double h, double *floor) {
+  galpha *d = r->data;
+  int n = d->n;
+  double most = 0, large = 1, e = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
+  for (int i = 0; i < d->size; i++) d->z[i] *= -d->row[i];
+  pw_sparse_solve (&d->sparse, d->z);
+  for (int j = 0; j < n; j++) {
+    double unit = pw_unit (r->s, j), size = fmax (fabs (d->z[j]), fabs (d->z[n + j])) / unit;
+    if (!(size <= most)) most = size;
+    d->z[n + j] *= d->column[n + j];
+    d->q1[j] += d->z[j];
+    d->w1[j] += d->z[n + j] / (h * d->gamma);
+    d->a1[j] += e * d->z[n + j];
+    d->v1[j] = d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
+    large = fmax (large, fmax (fabs (d->q1[j]), h * fabs (d->v1[j])) / unit);
+  }
+  for (int i = 0; i < d->rows; i++) d->lambda1[i] += d->column[2 * n + i] * d->z[2 * n + i];
+  for (int i = 0; i < d->positions; i++) d->mu1[i] += d->column[2 * n + d->rows + i] * d->z[2 * n + d->rows + i];
+  *floor = 4 * DBL_EPSILON * large;
+  return most;
+}
+
+/* The matrix is evaluated at the prediction, and again where corrections do not shrink well.  What is left at the end is to
+ * be small against the method's error in multipliers, h^2 of them, and those are a correction over h^2. */
+int pw_galpha_solve (pw_run *r, double h, double t1) {
+  const int most = 20;
+  galpha *d = r->data;
+  double before = INFINITY, floor, good = fmin (1e-9, 1e-3 * pow (h / r->s->scale.time, 4)), rate = 1;
+  if (h != d->h) galpha_scale (r, h);
+  galpha_predict (r, h);
+  for (int i = 0, fresh = 1; i < most; i++) {
+    int status = galpha_residual (r, h, t1);
+    if (status == PW_OK && fresh) status = galpha_factor (r, h);
+    if (status != PW_OK) return status;
+    double size = galpha_correct (r, h, &floor), enough = fmax (good, floor);
+    if (!isfinite (size)) return PW_RETRY;
+    if (i > 0) rate = size / before;
+    int stalled = rate > 0.25 && size <= 32 * floor;
+    if (size <= enough || stalled || (rate < 1 && size * rate / (1 - rate) <= enough)) return galpha_place (r, t1);
+    if (rate > 2 && i > 3) return PW_RETRY;
+    fresh = i > 0 && rate > 0.02;
+    if (fresh) pw_sparse_forget (&d->sparse);
+    before = size;
+  }
+  return PW_RETRY;
+}

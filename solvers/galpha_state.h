@@ -1,0 +1,40 @@
+/* What a step of galpha (galpha.c) and the equations solved in it (galpha_newton.c) share.  For these files only. */
+#ifndef PW_GALPHA_STATE_H
+#define PW_GALPHA_STATE_H
+
+#include "method.h"
+#include "sparse.h"
+#include "tangent.h"
+
+struct pw_method_data {
+  int ggl;                      /* stabilised index 2, else index 3 */
+  int n, rows, positions, size; /* coordinates, rows in use, of these those with mu, unknowns */
+  double alpha_m, alpha_f, beta, gamma;
+  double h;                                  /* size of the last step; 0: the next one begins anew */
+  double base;                               /* time from which steps are counted */
+  long count;                                /* steps since then */
+  double t0;                                 /* the beginning of the last step */
+  double *D;                                 /* coords: 1 for lengths, 1/L^2 for angles */
+  double *v, *a, *w;                         /* rates, accelerations and w that the next step goes on from */
+  double *q1, *v1, *a1, *w1, *lambda1, *mu1; /* the successor; lambda, mu: rows in use */
+  double *q0, *v0, *a0, *lambda0;            /* at t0, for looking back; lambda: all rows */
+  double *ledger0, *rate0;
+  double *z, *row, *column;    /* size: residual, then correction; scales of the matrix */
+  double *pull, *f, *jv, *eta; /* scratch: coords + 3, coords + 3, all rows, all rows */
+  double *value;               /* of the matrix */
+  pw_tangent tangent;
+  pw_sparse sparse;
+  pw_projector projector;
+  char *memory;
+};
+
+typedef struct pw_method_data galpha;
+
+/* Records the pattern and makes room for the matrix.  PW_OK or PW_MACHINE. */
+int pw_galpha_open_matrix (pw_run *r);
+
+/* The successor at t1 = t + h, with its accelerations and multipliers; the system is left placed there, J swept.  PW_RETRY
+ * if Newton's iteration does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed. */
+int pw_galpha_solve (pw_run *r, double h, double t1);
+
+#endif
