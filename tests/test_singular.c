@@ -77,10 +77,10 @@ static void test_steps_on_it (void **state) {
 }
 
 static void test_slider_crank (void **state) {
-  static const char *const method[] = { "rk4+projection", "rk4+projection:metric=identity", "rk4+none",
-                                        "rk4+baumgarte" };
+  static const char *const method[] = { "rk4+projection", "rk4+projection:metric=identity", "rk4+none", "rk4+baumgarte",
+                                        "rk4+nullspace" };
   (void)state;
-  for (int i = 0; i < 4; i++) {
+  for (int i = 0; i < 5; i++) {
     pw_system *s = singular_open ("slider-crank", NULL, 0);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-3, .span = 1, .ledger = 1 });
     pw_sample x = runs_to (r, 1);
@@ -186,10 +186,10 @@ static const pw_plugin_table singular_cart_table = { .abi = PW_ABI,
 /* It stays where it is, to the bit, whatever pushes it. */
 static void test_locked (void **state) {
   static const char *const method[] = {
-    "rk4+none",      "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
-    "ida+none",      "ida+baumgarte", "ida+ggl",        "ida+index2",
-    "ida+si1",       "adams+none",    "bdf+none",       "bdf+baumgarte",
-    "bdf+projection"
+    "rk4+none",       "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
+    "ida+none",       "ida+baumgarte", "ida+ggl",        "ida+index2",
+    "ida+si1",        "adams+none",    "bdf+none",       "bdf+baumgarte",
+    "bdf+projection", "rk4+nullspace", "galpha+index3",  "galpha+ggl"
   };
   (void)state;
   for (int wheels = 3; wheels <= 4; wheels++)
@@ -251,9 +251,10 @@ static void singular_steered (pw_model *m, const void *parameters) {
 /* A locking that arises on the way stops the run and names a wheel. */
 static void test_locks_in_motion (void **state) {
   static const pw_plugin_table table = TRIAL_TABLE (singular_steered);
-  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "rk4+none", "ida+baumgarte", "ida+ggl" };
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "rk4+none",      "ida+baumgarte",
+                                        "ida+ggl",        "rk4+nullspace", "galpha+index3", "galpha+ggl" };
   (void)state;
-  for (int i = 0; i < 5; i++) {
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&table, NULL);
     pw_run *r = pw_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 1 }, &error);
@@ -322,9 +323,10 @@ static const pw_plugin_table singular_drives_table = { .abi = PW_ABI,
                                                        .build = singular_drives };
 
 static void test_drives (void **state) {
-  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "ida+ggl", "ida+baumgarte" };
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "ida+ggl",   "ida+baumgarte",
+                                        "rk4+nullspace",  "galpha+index3", "galpha+ggl" };
   (void)state;
-  for (int i = 0; i < 4; i++) {
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&singular_drives_table, "offset", 0.1, NULL);
     assert_null (pw_open (s, method[i], NULL, &error));
