@@ -3,117 +3,36 @@
 #include "signal.h"
 
 /* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p); a force needs no sine */
-static void signal_harmonic (const pw_signal *s, double angle, int derivatives, double u[3]) {
+static void signal_harmonic (const pw_signal *s, double angle, double u[3]) {
   double A = s->harmonic.amplitude, w = s->harmonic.omega, c = A * cos (angle);
   u[0] = s->harmonic.offset + c;
-  if (!derivatives) return;
   u[1] = -A * w * sin (angle);
   u[2] = -w * w * c;
 }
 
-/* from + (to - from) x, x = (t - start) / duration */
-static void signal_ramp (const pw_signal *s, double x, double u[3]) {
-  double rise = s->ramp.to - s->ramp.from;
-  u[0] = s->ramp.from + rise * x;
-  u[1] = rise / s->ramp.duration;
+static int signal_function (const pw_source *source, double t, double u[3]) {
+  const pw_function *f = &source->signal.function;
+  return f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
 }
 
-/* from + (to - from) (10 x^3 - 15 x^4 + 6 x^5): rate and acceleration begin and end with 0
- * (Flash & Hogan 1985, Journal of Neuroscience 5, 1688-1703). */
-static void signal_smooth_step (const pw_signal *s, double x, double u[3]) {
-  double rise = s->ramp.to - s->ramp.from, T = s->ramp.duration;
-  u[0] = s->ramp.from + rise * (x * x * x * (10 + x * (6 * x - 15)));
-  u[1] = rise * (30 * x * x * (1 - x) * (1 - x)) / T;
-  u[2] = rise * (60 * x * (1 - x) * (1 - 2 * x)) / (T * T);
-}
-
-/* Ramps and smooth steps rest before and behind. */
-static void signal_rise (const pw_signal *s, double t, double u[3]) {
-  if (t < s->ramp.start)
-    u[0] = s->ramp.from;
-  else if (t >= s->ramp.start + s->ramp.duration)
-    u[0] = s->ramp.to;
-  else
-    (s->type == PW_RAMP ? signal_ramp : signal_smooth_step) (s, (t - s->ramp.start) / s->ramp.duration, u);
-}
-
-static double signal_rise_breakpoint (const pw_signal *s, double t) {
-  double end = s->ramp.start + s->ramp.duration;
-  return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
-}
-
-/* The beginnings of the pulse that t belongs to and of the one behind it; t is not before the first. */
-static void signal_pulses (const pw_signal *s, double t, double *here, double *next) {
-  double start = s->pulse.start, period = s->pulse.period;
-  *here = start;
-  *next = INFINITY;
-  if (period == 0) return;
-  double k = floor ((t - start) / period);
-  if (start + k * period > t) k--; /* the quotient was rounded */
-  if (start + (k + 1) * period <= t) k++;
-  *here = start + k * period;
-  *next = start + (k + 1) * period;
-}
-
-static double signal_pulse_end (const pw_signal *s, double here) {
-  return s->pulse.width > 0 ? here + s->pulse.width : INFINITY;
-}
-
-static void signal_pulse (const pw_signal *s, double t, double u[3]) {
-  double here, next;
-  u[0] = s->pulse.offset;
-  if (t < s->pulse.start) return;
-  signal_pulses (s, t, &here, &next);
-  if (t < signal_pulse_end (s, here)) u[0] += s->pulse.height;
-}
-
-static double signal_pulse_breakpoint (const pw_signal *s, double t) {
-  double here, next;
-  if (t < s->pulse.start) return s->pulse.start;
-  signal_pulses (s, t, &here, &next);
-  double end = signal_pulse_end (s, here);
-  return t < end ? end : next > t ? next : INFINITY; /* late enough, times no longer tell pulses apart */
-}
-
-/* The rarer ones; u is all zero. */
-static void signal_shape (const pw_source *source, double t, double u[3]) {
-  const pw_signal *s = &source->signal;
-  if (s->type == PW_PULSE)
-    signal_pulse (s, t, u);
-  else if (s->type == PW_TABLE)
-    pw_table_eval (s, source->spline, t, u);
-  else
-    signal_rise (s, t, u);
-}
-
+/* What most scenes have comes first. */
 int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]) {
   const pw_signal *s = &source->signal;
-  u[0] = u[1] = u[2] = 0;
-  if (s->type == PW_FUNCTION)
-    return s->function.eval (s->function.context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
+  u[1] = u[2] = 0;
+  if (s->type == PW_HARMONIC && !derivatives) {
+    u[0] = s->harmonic.offset + s->harmonic.amplitude * cos (s->harmonic.omega * t + s->harmonic.phase);
+    return 0;
+  }
+  u[0] = 0;
+  if (s->type > PW_HARMONIC) return (s->type == PW_FUNCTION ? signal_function : pw_shape_eval) (source, t, u);
   if (s->type == PW_HARMONIC)
-    signal_harmonic (s, s->harmonic.omega * t + s->harmonic.phase, derivatives, u);
-  else if (s->type == PW_CONSTANT)
-    u[0] = s->constant;
+    signal_harmonic (s, s->harmonic.omega * t + s->harmonic.phase, u);
   else
-    signal_shape (source, t, u);
+    u[0] = s->constant;
   return 0;
 }
 
 double pw_signal_breakpoint (const pw_signal *s, double t) {
-  switch (s->type) {
-  case PW_FUNCTION:
-    return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
-  case PW_RAMP:
-  case PW_SMOOTH_STEP:
-    return signal_rise_breakpoint (s, t);
-  case PW_PULSE:
-    return signal_pulse_breakpoint (s, t);
-  case PW_TABLE:
-    return pw_table_breakpoint (s, t);
-  case PW_CONSTANT:
-  case PW_HARMONIC:
-    break;
-  }
-  return INFINITY;
+  if (s->type != PW_FUNCTION) return pw_shape_breakpoint (s, t);
+  return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
 }

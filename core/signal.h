@@ -11,6 +11,12 @@ int pw_signal_eval (const pw_source *source, double t, int derivatives, double u
 /* First time after t at which the signal jumps or its rate or acceleration does, or INFINITY. */
 double pw_signal_breakpoint (const pw_signal *s, double t);
 
+/* ---- Ramps, smooth steps, pulses, and tables (shape.c) ---- */
+
+/* u is all zero before.  Returns 0. */
+int pw_shape_eval (const pw_source *source, double t, double u[3]);
+double pw_shape_breakpoint (const pw_signal *s, double t);
+
 /* ---- Tables (table.c) ---- */
 
 /* Fills 2 count numbers: the spline of a table that has been checked. */
