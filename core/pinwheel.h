@@ -183,6 +183,11 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 /* Lets a build function refuse what it was given ("links: at most 1000").  Returns the status. */
 int pw_refuse (pw_model *m, const char *format, ...);
 
+/* Jacobi's amplitude am (u | m) and the complete elliptic integral K (m), m = k^2 <= 1 (NaN above): sn = sin (am).  A
+ * pendulum let go at an angle A from its lowest point is at 2 asin (k sn (K - w t)), k = sin (A / 2). */
+double pw_jacobi_am (double u, double m);
+double pw_elliptic_K (double m);
+
 /* ---- The element kinds ---- */
 
 /* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic rows. */

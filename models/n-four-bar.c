@@ -4,6 +4,7 @@
  * dependent and the cranks could go separate ways; the physical motion passes straight through:
  * theta'' = -(g / l) ((N + 1) / 2 + N) / ((N + 1) / 3 + N) cos theta.
  * (Gonzalez, Dopico, Pastorino & Cuadrado 2006, Multibody System Dynamics 16; IFToMM benchmark A02.) */
+#include <math.h>
 #include <stdio.h>
 #include "pinwheel.h"
 
@@ -48,6 +49,22 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
+/* A pendulum that goes over the top: with psi = theta + pi / 2 from the lowest point and W its rate there,
+ * psi = 2 am (K + W t / 2 | m), m = 4 kappa / W^2. */
+static void truth (const void *parameter, double t, double *q, double *v) {
+  const four_bar *p = parameter;
+  double kappa = p->g / p->l * ((p->N + 1) / 2 + p->N) / ((p->N + 1) / 3 + p->N);
+  double W = copysign (sqrt (p->speed * p->speed + 4 * kappa), p->speed), m = 4 * kappa / (W * W);
+  double half = pw_jacobi_am (pw_elliptic_K (m) + W * t / 2, m), theta = 2 * half - PW_PI / 2;
+  double rate = W * sqrt (1 - m * sin (half) * sin (half)), x = p->l * cos (theta), y = p->l * sin (theta);
+  for (int i = 0; i <= 2 * (int)p->N; i++, q += 3, v += 3) { /* crank0, then crank and coupler in turn */
+    int coupler = i > 0 && i % 2 == 0;
+    double part = coupler ? 1 : 0.5;
+    q[0] = p->l * (coupler ? i / 2 - 0.5 : (i + 1) / 2) + part * x, q[1] = part * y, q[2] = coupler ? 0 : theta;
+    v[0] = -part * y * rate, v[1] = part * x * rate, v[2] = coupler ? 0 : rate;
+  }
+}
+
 PW_MODEL (.about = "N four-bar linkages in a row, which pass singular poses", .parameters = parameters,
           .parameters_size = sizeof (four_bar), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
-          .build = build);
+          .build = build, .truth = truth);

@@ -58,6 +58,22 @@ static void build (pw_model *m, const void *parameter) {
   }
 }
 
+/* All go round the centre, (0, R). */
+static void truth (const void *parameter, double t, double *q, double *v) {
+  const trailers *p = parameter;
+  double R = p->R, angle = -PW_PI / 2, L = p->L;
+  for (int i = 0; i <= (int)p->n; i++, q += 3, v += 3) {
+    if (i > 0) {
+      R = sqrt (R * R - L * L);
+      angle -= atan2 (L, R);
+      L += p->longer;
+    }
+    double now = angle + p->w * t;
+    q[0] = R * cos (now), q[1] = p->R + R * sin (now), q[2] = now + PW_PI / 2;
+    v[0] = -p->w * R * sin (now), v[1] = p->w * R * cos (now), v[2] = p->w;
+  }
+}
+
 PW_MODEL (.about = "tractor with n trailers in a steady turn", .parameters = parameters,
           .parameters_size = sizeof (trailers), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
-          .build = build);
+          .build = build, .truth = truth);

@@ -33,25 +33,38 @@ static void pin (pw_model *m, const char *name, const char *one, double x1, cons
   pw_add_pin (m, &(pw_pin){ .name = name, .body = { one, two }, .at = { { x1, 0 }, { x2, 0 } } });
 }
 
+/* The joints with the crank at an angle: A, O on the ground, B on the crank, C and D on the arms, P draws the line. */
+typedef struct {
+  double A[2], O[2], B[2], C[2], D[2], P[2];
+} joints;
+
+static joints place (const inversor *p, double angle) {
+  double half = angle / 2, c = cos (half), s = sin (half);
+  /* Along OB from O: to the middle of the rhombus, and from there to C, D. */
+  double OB = 2 * p->a * c, OP = (p->L * p->L - p->s * p->s) / OB, mid = (OB + OP) / 2,
+         aside = sqrt (p->L * p->L - mid * mid);
+  return (joints){ .A = { p->a, 0 },
+                   .B = { OB * c, OB * s },
+                   .C = { mid * c - aside * s, mid * s + aside * c },
+                   .D = { mid * c + aside * s, mid * s - aside * c },
+                   .P = { OP * c, OP * s } };
+}
+
 static void build (pw_model *m, const void *parameter) {
   const inversor *p = parameter;
-  double half = p->swing / 2, OB = 2 * p->a * cos (half);
+  double OB = 2 * p->a * cos (p->swing / 2), L = p->L / 2, r = p->s / 2;
   if (OB <= fabs (p->L - p->s) || 2 * p->a >= p->L + p->s) {
     pw_refuse (m, "swing = %g: arms and rhombus do not reach the crank there", p->swing);
     return;
   }
-  /* Along OB from O: to the middle of the rhombus, and from there to C, D. */
-  double OP = (p->L * p->L - p->s * p->s) / OB, mid = (OB + OP) / 2, aside = sqrt (p->L * p->L - mid * mid);
-  double c = cos (half), s = sin (half), L = p->L / 2, r = p->s / 2;
-  const double O[2] = { 0, 0 }, A[2] = { p->a, 0 }, B[2] = { OB * c, OB * s }, P[2] = { OP * c, OP * s },
-               C[2] = { mid * c - aside * s, mid * s + aside * c }, D[2] = { mid * c + aside * s, mid * s - aside * c };
-  bar (m, p, "crank", A, B);
-  bar (m, p, "OC", O, C);
-  bar (m, p, "OD", O, D);
-  bar (m, p, "BC", B, C);
-  bar (m, p, "BD", B, D);
-  bar (m, p, "PC", P, C);
-  bar (m, p, "PD", P, D);
+  joints j = place (p, p->swing);
+  bar (m, p, "crank", j.A, j.B);
+  bar (m, p, "OC", j.O, j.C);
+  bar (m, p, "OD", j.O, j.D);
+  bar (m, p, "BC", j.B, j.C);
+  bar (m, p, "BD", j.B, j.D);
+  bar (m, p, "PC", j.P, j.C);
+  bar (m, p, "PD", j.P, j.D);
   pin (m, "A", "crank", -p->a / 2, "ground", p->a);
   pin (m, "O1", "OC", -L, "ground", 0);
   pin (m, "O2", "OD", -L, "ground", 0);
@@ -68,6 +81,25 @@ static void build (pw_model *m, const void *parameter) {
                                 .value = { PW_HARMONIC, .harmonic = { .amplitude = p->swing, .omega = p->omega } } });
 }
 
+/* Where a bar is; its angle is the one near that of its start. */
+static void known (const double from[2], const double to[2], const double from0[2], const double to0[2], double *q) {
+  double start = atan2 (to0[1] - from0[1], to0[0] - from0[0]), now = atan2 (to[1] - from[1], to[0] - from[0]);
+  q[0] = (from[0] + to[0]) / 2, q[1] = (from[1] + to[1]) / 2, q[2] = start + remainder (now - start, 2 * PW_PI);
+}
+
+static void truth (const void *parameter, double t, double *q, double *v) {
+  const inversor *p = parameter;
+  joints j = place (p, p->swing * cos (p->omega * t)), j0 = place (p, p->swing);
+  (void)v;
+  known (j.A, j.B, j0.A, j0.B, q);
+  known (j.O, j.C, j0.O, j0.C, q + 3);
+  known (j.O, j.D, j0.O, j0.D, q + 6);
+  known (j.B, j.C, j0.B, j0.C, q + 9);
+  known (j.B, j.D, j0.B, j0.D, q + 12);
+  known (j.P, j.C, j0.P, j0.C, q + 15);
+  known (j.P, j.D, j0.P, j0.D, q + 18);
+}
+
 PW_MODEL (.about = "Peaucellier's inversor, which draws an exactly straight line", .parameters = parameters,
           .parameters_size = sizeof (inversor), .run = { .t_end = 1, .step = 1e-3, .method = "rk4+projection" },
-          .build = build);
+          .build = build, .truth = truth);

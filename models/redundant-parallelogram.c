@@ -44,6 +44,21 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
+/* A pendulum let go at psi = theta + pi / 2 from the lowest point: sin (psi / 2) = k sn (K - w t), k = sin (psi0 / 2). */
+static void truth (const void *parameter, double t, double *q, double *v) {
+  const parallelogram *p = parameter;
+  double k = sin (p->theta / 2 + PW_PI / 4), w = sqrt (p->g * (1.5 * p->m + p->mc) / (p->l * (p->m + p->mc)));
+  double am = pw_jacobi_am (pw_elliptic_K (k * k) - w * t, k * k);
+  double theta = 2 * asin (k * sin (am)) - PW_PI / 2, rate = -2 * k * w * cos (am);
+  double x = p->l * cos (theta), y = p->l * sin (theta);
+  if (fabs (p->theta + PW_PI / 2) >= PW_PI) return; /* another turn of the cranks */
+  for (int i = 0; i < 4; i++, q += 3, v += 3) {     /* the coupler, then the cranks */
+    double part = i == 0 ? 1 : 0.5;
+    q[0] = p->l * (i == 0 ? 1 : i - 1) + part * x, q[1] = part * y, q[2] = i == 0 ? 0 : theta;
+    v[0] = -part * y * rate, v[1] = part * x * rate, v[2] = i == 0 ? 0 : rate;
+  }
+}
+
 PW_MODEL (.about = "three cranks carry one coupler: one constraint row too many", .parameters = parameters,
           .parameters_size = sizeof (parallelogram), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
-          .build = build);
+          .build = build, .truth = truth);

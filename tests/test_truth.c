@@ -158,11 +158,66 @@ static void test_table (void **state) {
            "--truth @/none.csv: cannot be read: No such file or directory");
 }
 
+/* Models of the gallery, with parameters of their own as well: what they know is what they do, to the method's order. */
+static void test_gallery (void **state) {
+  static const struct {
+    const char *model;
+    double bound;
+    const char *reason;
+  } trial[] = {
+    { "chaplygin-sleigh", 1e-10, "100 h^4" },
+    { "chaplygin-sleigh --set a=-0.3 --set w0=-1.1 --set u0=0.2 --set m=2 --set I=0.7", 1e-10, "100 h^4" },
+    { "knife-edge-incline --set w=1.7 --set alpha=0.4", 1e-10, "100 h^4" },
+    { "pendulum --set theta=-0.3 --set I=0.2 --set l=0.8 --set m=1.5", 1e-9, "1000 h^4: 4 rad/s" },
+    { "differential-drive --set ahead=0.1 --set right=0.2 --set track=0.4 --set radius=0.1", 1e-10, "100 h^4" },
+    { "car --set steer=-0.2 --set b=1.1 --set u0=3", 1e-10, "100 h^4" },
+    { "n-trailer --set n=4 --set R=3 --set w=-0.8 --set longer=0.1", 1e-10, "100 h^4" },
+    { "n-four-bar --set speed=2 --set N=3 --set l=1.2", 1e-8, "1e4 h^4: 6 rad/s, singular poses" },
+    { "redundant-parallelogram --set theta=0.4 --set mc=1 --set l=0.7", 1e-9, "1000 h^4: 6 rad/s" },
+    { "peaucellier --set swing=0.7 --set omega=2 --set a=0.35", 1e-12, "prescribed: round-off" },
+  };
+  char command[300];
+  (void)state;
+  for (size_t i = 0; i < sizeof trial / sizeof *trial; i++) {
+    snprintf (command, sizeof command, "pinwheel check %s >@/check && pinwheel run %s -t 2 --json - 2>@/said",
+              trial[i].model, trial[i].model);
+    cli_good (command);
+    double length = truth_error ("largest", "length"), angle = truth_error ("largest", "angle");
+    check_below (trial[i].model, fmax (length, angle), trial[i].bound, trial[i].reason);
+    check_close ("samples", cli_number (cli_out, "truth", "samples", NULL), 100, 0, "all of them");
+  }
+}
+
+/* Jacobi's functions: am' = dn, digits of K (1/2) (Abramowitz & Stegun 1964, table 17.1), limits. */
+static void test_elliptic (void **state) {
+  (void)state;
+  check_close ("K (0)", pw_elliptic_K (0), PW_PI / 2, 4 * CHECK_EPS, "round-off");
+  check_close ("K (1/2)", pw_elliptic_K (0.5), 1.854074677301371918, 4 * CHECK_EPS, "round-off");
+  assert_true (isinf (pw_elliptic_K (1)) && isnan (pw_elliptic_K (1.5)) && isnan (pw_jacobi_am (1, 1.5)));
+  for (double m = -1.5; m < 1; m += 0.4) {
+    double K = pw_elliptic_K (m), u = 0.7, h = 1e-5;
+    check_close ("am (K)", pw_jacobi_am (K, m), PW_PI / 2, 64 * CHECK_EPS, "round-off");
+    check_close ("am (5 K)", pw_jacobi_am (5 * K, m), 5 * PW_PI / 2, 64 * CHECK_EPS, "round-off");
+    double s = sin (pw_jacobi_am (u, m)), slope = (pw_jacobi_am (u + h, m) - pw_jacobi_am (u - h, m)) / (2 * h);
+    check_close ("am'", slope, sqrt (1 - m * s * s), 1e-9, "differences: h^2");
+  }
+  check_close ("m = 1", pw_jacobi_am (0.7, 1), pw_jacobi_am (0.7, 1 - 1e-12), 1e-11, "continuous");
+}
+
+/* Digits at one time: Andrews' squeezer against the table in tests/reference (Hairer & Wanner 1996, section VII.7). */
+static void test_digits (void **state) {
+  (void)state;
+  cli_good ("pinwheel run andrews-squeezer --truth tests/reference/andrews-squeezer.csv --json -");
+  check_close ("samples", cli_number (cli_out, "truth", "samples", NULL), 1, 0, "one row");
+  check_below ("angles", truth_error ("end", "angle"), 1e-6, "100 (h w)^4 at h = 10 us and w = 1000 rad/s");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_text),       cmocka_unit_test (test_does_no_harm), cmocka_unit_test (test_compare),
     cmocka_unit_test (test_round_trip), cmocka_unit_test (test_function),     cmocka_unit_test (test_started_elsewhere),
-    cmocka_unit_test (test_table),      cmocka_unit_test (test_resume),
+    cmocka_unit_test (test_table),      cmocka_unit_test (test_resume),       cmocka_unit_test (test_gallery),
+    cmocka_unit_test (test_elliptic),   cmocka_unit_test (test_digits),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -47,8 +47,7 @@ static int compare_open_csv (pw_compare *x, pw_error *error) {
 }
 
 static int compare_open (pw_compare *x, pw_error *error) {
-  int status =
-      pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
+  int status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
   if (status != PW_OK) return status;
   x->t_end = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
   x->limit = 10;

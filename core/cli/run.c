@@ -77,8 +77,7 @@ static int run_settle (run *x, pw_error *error) {
 static int run_open (run *x, pw_error *error) {
   int status = run_open_outputs (x, error);
   if (status == PW_OK)
-    status =
-        pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
+    status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
   if (status == PW_OK) status = run_settle (x, error);
   if (status == PW_OK) status = pw_running_prepare (x, error);
   if (status != PW_OK) return status;

@@ -10,6 +10,7 @@
 #include <string.h>
 #include <muParserDLL.h>
 #include "expression.h"
+#include "pinwheel.h"
 #include "files.h"
 
 enum { EXPRESSION_LONGEST = 4000 }; /* muParser stops at 5000 */
@@ -75,6 +76,8 @@ static const struct {
   { "sign", expression_sign, NULL, NULL },
   { "atan2", NULL, atan2, NULL },
   { "hypot", NULL, hypot, NULL },
+  { "jacobi_am", NULL, pw_jacobi_am, NULL },
+  { "elliptic_K", pw_elliptic_K, NULL, NULL },
   { "mod", NULL, expression_mod, NULL },
   { "min", NULL, NULL, expression_min },
   { "max", NULL, NULL, expression_max },

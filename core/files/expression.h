@@ -2,6 +2,7 @@
  *
  *   operators   + - * / ^, < <= > >= == !=, && ||, CONDITION ? THEN : ELSE, parentheses
  *   functions   sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 sqrt abs sign floor ceil round hypot mod min max
+ *               jacobi_am (u, m), elliptic_K (m)
  *   constants   pi, e, deg = pi / 180
  *
  * An evaluator belongs to one thread at a time. */

@@ -1,0 +1,41 @@
+/* Jacobi's elliptic functions, by which pendulums swing, through the arithmetic-geometric mean of 1 and sqrt (1 - m):
+ *
+ *     a' = (a + b) / 2,   b' = sqrt (a b),   c' = (a - b) / 2,       K (m) = pi / (2 a)  in the limit,
+ *
+ * and am (u) from 2^N a u by descending  2 phi = phi' + asin (c' sin phi' / a').
+ * (Abramowitz & Stegun 1964, sections 16.4 and 17.6.) */
+#include <float.h>
+#include <math.h>
+#include "pinwheel.h"
+
+enum { ELLIPTIC_STEPS = 12 }; /* more than any m < 1 needs */
+
+/* The mean in a, c[i] / a[i] of the steps in `ratio`; how many there were. */
+static int elliptic_mean (double m, double *a, double ratio[ELLIPTIC_STEPS]) {
+  double b = sqrt (1 - m);
+  int n = 0;
+  *a = 1;
+  while (n < ELLIPTIC_STEPS && fabs (*a - b) > 4 * DBL_EPSILON * *a) {
+    double mean = (*a + b) / 2;
+    ratio[n++] = (*a - b) / 2 / mean;
+    b = sqrt (*a * b);
+    *a = mean;
+  }
+  return n;
+}
+
+double pw_elliptic_K (double m) {
+  double a, ratio[ELLIPTIC_STEPS];
+  if (!(m < 1)) return m == 1 ? INFINITY : NAN;
+  elliptic_mean (m, &a, ratio);
+  return PW_PI / (2 * a);
+}
+
+double pw_jacobi_am (double u, double m) {
+  double a, ratio[ELLIPTIC_STEPS];
+  if (!(m < 1)) return m == 1 ? 2 * atan (tanh (u / 2)) : NAN;
+  int n = elliptic_mean (m, &a, ratio);
+  double phi = ldexp (a * u, n);
+  while (n-- > 0) phi = (phi + asin (ratio[n] * sin (phi))) / 2;
+  return phi;
+}
