@@ -72,7 +72,7 @@ SLOWS     := $(SLOW:%.c=$(BUILD)/%)
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
-.PHONY: all everything demo test test-all layers san cov clang gcc format format-check bench-quick bench-engine \
+.PHONY: all everything demo test test-all layers san cov clang gcc format format-check bench bench-quick bench-engine \
         bench-effects hard basic deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -86,6 +86,7 @@ help:
 	@echo 'make deps             install the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make test             the tests; test-all: the slow ones too'
+	@echo 'make bench            everything that is measured, about ten minutes; goes on where it was stopped'
 	@echo 'make bench-quick      what a run costs on this machine'
 	@echo 'make bench-engine     an evaluation, a step against programs written by hand; growth with size'
 	@echo 'make bench-effects    instructions of an evaluation, with one effect more at a time; what is not used costs none'
@@ -102,7 +103,7 @@ help:
 
 # ---- Dependencies: whoever asks to see something run gets the libraries first ----
 
-ifneq ($(filter demo test test-all bench-quick bench-engine bench-effects hard san cov,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all bench bench-quick bench-engine bench-effects hard san cov,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -229,6 +230,9 @@ demo: all $(BUILD)/benchmarks/demo
 	@$(PROGRAM) run ezyroller --energy --every 0.02 -o $(BUILD)/demo/ezyroller.csv --json $(BUILD)/demo/ezyroller.json \
 	  --plots $(BUILD)/demo
 	@echo 'figures and data: $(BUILD)/demo/'
+
+bench: all basic $(addprefix $(BUILD)/benchmarks/,eighth engine effects)
+	@sh benchmarks/suite.sh $(BUILD)
 
 bench-quick: all $(BUILD)/benchmarks/quick
 	@$(BUILD)/benchmarks/quick

@@ -282,20 +282,21 @@ static int engine_child (const char *key, const char *side) {
 }
 
 int main (int argc, char **argv) {
-  char machine[100], path[160];
+  char machine[100], path[160], part[170];
   if (argc == 4 && strcmp (argv[1], "--count") == 0) return engine_child (argv[2], argv[3]);
   engine_report r = { .program = argv[0], .only = argc > 1 ? argv + 1 : NULL };
   engine_machine (machine, sizeof machine);
   snprintf (path, sizeof path, "benchmarks/results/engine-%s.csv", machine);
+  snprintf (part, sizeof part, "%s.part", path);
   if (r.only == NULL) {
     mkdir ("benchmarks/results", 0777);
-    r.csv = fopen (path, "w");
-    if (r.csv == NULL) engine_die (path, "cannot be written");
+    r.csv = fopen (part, "w");
+    if (r.csv == NULL) engine_die (part, "cannot be written");
     fprintf (r.csv, "what,unit,base_ns,pinwheel_ns,ratio,base_instructions,pinwheel_instructions,target,verdict\n");
   }
   printf ("machine %s; medians of %d interleaved pairs of %g ms\n", machine, ENGINE_PAIRS, 1e3 * engine_batch);
   engine_everything (&r);
   printf ("\n%d targets met, %d missed\n", r.met, r.missed);
-  if (r.csv && fclose (r.csv) == 0) printf ("%s\n", path);
+  if (r.csv && fclose (r.csv) == 0 && rename (part, path) == 0) printf ("%s\n", path);
   return 0;
 }

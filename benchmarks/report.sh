@@ -1,67 +1,53 @@
 #!/bin/sh
-# Tables and a figure of docs/benchmarks.md from a result of `make bench-engine`.
+# Tables and figures of docs/benchmarks.md from the results of `make bench`, or of its parts.
 #
-#   report.sh benchmarks/results/engine-MACHINE.csv docs/benchmarks.md docs/figures/engine-growth
+#   report.sh MACHINE       reads benchmarks/results/*-MACHINE.csv
 #
-# Replaces what stands between the lines <!-- engine --> and <!-- end --> of the page, and writes the figure as SVG and
-# PNG, if there is a gnuplot.
+# Replaces what stands between the lines <!-- PART --> and <!-- end --> of the page, for each part that has a result, and
+# draws the figures as SVG and PNG, if there is a gnuplot.
 set -eu
-csv=$1 page=$2 figure=$3
+machine=$1 results=benchmarks/results page=docs/benchmarks.md figures=docs/figures
+export LC_ALL=C
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
-# Fields of a line of CSV, the first perhaps quoted, separated by tabs.
-split () {
-  awk 'NR > 1 { name = $0; rest = $0
-    if (/^"/) { name = substr ($0, 2); rest = name; sub (/".*/, "", name); sub (/^[^"]*",/, "", rest) }
-    else { sub (/,.*/, "", name); sub (/^[^,]*,/, "", rest) }
-    gsub (/,/, "\t", rest); print name "\t" rest }' "$csv"
+# Methods that are shown; the CSV has all of them.
+shown='rk4+projection erk5+projection erk8+projection adams+none bdf+projection ida+baumgarte ida+ggl galpha+index3'
+
+# section PART: puts standard input into the page.
+section () {
+  cat >"$work/section"
+  awk -v part="<!-- $1 -->" -v file="$work/section" '
+    /^<!-- end -->/ { skip = 0 }
+    !skip { print }
+    $0 == part { skip = 1; print ""; while ((getline line < file) > 0) print line; print "" }
+  ' "$page" >"$work/page"
+  cp "$work/page" "$page"
 }
 
-split | awk -F '\t' '
-  function short(x) { return x == "" ? "" : sprintf(x >= 1000 ? "%.0f" : "%.4g", x) }
-  BEGIN { print "| what | per | by hand [ns] | Pinwheel [ns] | ratio | instructions by hand | Pinwheel | target | |"
-          print "|---|---|---|---|---|---|---|---|---|" }
-  $2 !~ /^(ratio|slope|B|s)$/ && $1 !~ /ns per body$/ {
-    printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", $1, $2, short($3), short($4), short($5), short($6), short($7), $8, $9 }
-' >"$work/table"
-{
-  echo
-  echo '| growth and memory | | target | |'
-  echo '|---|---|---|---|'
-  split | awk -F '\t' '$2 ~ /^(ratio|slope|s)$/ {
-    value = $5 != "" ? $5 : $4; printf "| %s | %s | %s | %s |\n", $1, value, $8, $9 }'
-} >>"$work/table"
+# draw NAME WIDTH HEIGHT: a gnuplot script from standard input, as SVG and PNG.
+draw () {
+  cat >"$work/script"
+  command -v gnuplot >/dev/null || { echo 'report.sh: no gnuplot, no figures' >&2; return 0; }
+  for type in svg png; do
+    if [ $type = svg ]; then terminal="svg size $2,$3 dynamic noenhanced font 'DejaVu Sans,Helvetica,sans-serif,12' background rgb 'white'"
+    else terminal="pngcairo size $2,$3 noenhanced font 'Sans,9.5' background rgb 'white'"; fi
+    { echo "set encoding utf8"; echo "set terminal $terminal"; echo "set output '$figures/$1.$type'"; cat "$work/script"; } | LC_ALL= LC_CTYPE=C.UTF-8 LC_NUMERIC=C gnuplot
+  done
+}
 
-awk -v table="$work/table" '
-  /^<!-- end -->/ { skip = 0 }
-  !skip { print }
-  /^<!-- engine -->/ { skip = 1; print ""; while ((getline line < table) > 0) print line; print "" }
-' "$page" >"$work/page"
-cp "$work/page" "$page"
+# Colour, mark and dash of a method's line: told apart in black and white too.
+style () {
+  case $1 in
+  rk4+*) echo "lc rgb '#004488' pt 7 dt 1" ;;
+  erk5+*) echo "lc rgb '#bb5566' pt 4 dt 1" ;;
+  erk8+*) echo "lc rgb '#997700' pt 9 dt 1" ;;
+  adams+*) echo "lc rgb '#228877' pt 6 dt (8,4)" ;;
+  bdf+*) echo "lc rgb '#228877' pt 13 dt (8,4)" ;;
+  ida+ggl) echo "lc rgb '#000000' pt 12 dt (14,5,3,5)" ;;
+  ida+*) echo "lc rgb '#000000' pt 5 dt (3,4)" ;;
+  *) echo "lc rgb '#774499' pt 2 dt (14,5)" ;;
+  esac
+}
 
-for what in 'chain, evaluation' 'chain, projection' 'chain, step of ida+ggl' 'snake, evaluation' 'grid, evaluation'; do
-  split | awk -F '\t' -v what="$what, " 'index($1, what) == 1 && / bodies: ns per body/ {
-    n = substr($1, length(what) + 1); sub(/ .*/, "", n); print n, $4 }' >"$work/$what"
-done
-command -v gnuplot >/dev/null || { echo 'report.sh: no gnuplot, no figure' >&2; exit 0; }
-for type in svg png; do
-  case $type in svg) terminal='svg size 800,520 dynamic font "sans,13"' ;; *) terminal='pngcairo size 1000,650 font "sans,13"' ;; esac
-  gnuplot <<G
-set terminal $terminal
-set output '$figure.$type'
-set logscale xy
-set format x '10^{%T}'
-set xlabel 'bodies N'
-set ylabel 'time per body [ns]'
-set title 'Cost per body against the size of the scene'
-set key inside bottom right spacing 1.2
-set grid xtics ytics lc rgb '#dddddd' lt 1
-set xrange [7:150000]
-plot '$work/chain, evaluation' w lp lw 2 pt 7 lc rgb '#004488' t 'chain: one evaluation', \
-     '$work/chain, projection' w lp lw 2 pt 5 dt 2 lc rgb '#bb5566' t 'chain: one projection', \
-     '$work/chain, step of ida+ggl' w lp lw 2 pt 9 dt 4 lc rgb '#ddaa33' t 'chain: one step of ida+ggl', \
-     '$work/snake, evaluation' w lp lw 1 pt 6 dt 3 lc rgb '#228833' t 'wheeled snake: one evaluation', \
-     '$work/grid, evaluation' w lp lw 1 pt 4 dt 5 lc rgb '#666666' t 'grid of pinned bars: one evaluation'
-G
-done
+for part in work parts engine; do . "benchmarks/report/$part.sh"; done

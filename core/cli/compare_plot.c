@@ -26,7 +26,7 @@ typedef struct {
 
 static void plot_style (const pw_compare *x, int method, FILE *f) {
   fputs ("with linespoints lw 1.6 ps 0.9 ", f);
-  pw_contestants_style (&x->list, method, f);
+  pw_contestants_style (&x->list, method, 0, f);
 }
 
 /* ---- Data ---- */

@@ -115,11 +115,11 @@ static int contestants_number (const pw_contestants *c, int method) {
   return numbers;
 }
 
-void pw_contestants_style (const pw_contestants *c, int method, FILE *f) {
+void pw_contestants_style (const pw_contestants *c, int method, int own, FILE *f) {
   static const char *const colour[] = { "#004488", "#bb5566", "#997700", "#000000", "#228877", "#774499", "#777777" };
   static const int mark[] = { 7, 4, 9, 12, 5, 6, 2, 8, 13, 1, 10, 3, 11 };
   const int colours = sizeof colour / sizeof *colour, marks = sizeof mark / sizeof *mark;
   int n = contestants_number (c, method);
   fprintf (f, "dt %s lc rgb '%s' pt %d", contestants_dash (c->method[method].name), colour[n % colours],
-           mark[n % marks]);
+           mark[(own ? method : n) % marks]);
 }

@@ -101,7 +101,7 @@ static void plot_line (const pw_drift *x, const plot_figure *figure, int line, i
   char text[32];
   if (figure->group == DRIFT_METHODS) {
     fputs ("with linespoints lw 1.6 ps 0.8 ", f);
-    pw_contestants_style (&x->list, line, f);
+    pw_contestants_style (&x->list, line, 1, f);
     fprintf (f, " pi %d ", 17 + 3 * (line % 5));
   } else
     fprintf (f, "with linespoints lw 1.6 ps 0.9 dt %s lc rgb '%s' pt %d ", dash[line % 4], colour[line % 4],

@@ -1,0 +1,50 @@
+# The part of report.sh about the engine.
+
+# Fields of a line of CSV, the first perhaps quoted, separated by tabs.
+split () {
+  awk 'NR > 1 { name = $0; rest = $0
+    if (/^"/) { name = substr ($0, 2); rest = name; sub (/".*/, "", name); sub (/^[^"]*",/, "", rest) }
+    else { sub (/,.*/, "", name); sub (/^[^,]*,/, "", rest) }
+    gsub (/,/, "\t", rest); print name "\t" rest }' "$results/engine-$machine.csv"
+}
+
+engine_tables () {
+  split | awk -F '\t' '
+    function short(x) { return x == "" ? "" : sprintf(x >= 1000 ? "%.0f" : "%.4g", x) }
+    BEGIN { print "| what | per | by hand [ns] | Pinwheel [ns] | ratio | instructions by hand | Pinwheel | target | |"
+            print "|---|---|---|---|---|---|---|---|---|" }
+    $2 !~ /^(ratio|slope|B|s)$/ && $1 !~ /ns per body$/ {
+      printf "| %s | %s | %s | %s | %s | %s | %s | %s | %s |\n", $1, $2, short($3), short($4), short($5), short($6), short($7), $8, $9 }'
+  echo
+  echo '| growth and memory | | target | |'
+  echo '|---|---|---|---|'
+  split | awk -F '\t' '$2 ~ /^(ratio|slope|s)$/ {
+    value = $5 != "" ? $5 : $4; printf "| %s | %s | %s | %s |\n", $1, value, $8, $9 }'
+}
+
+engine_figure () {
+  for what in 'chain, evaluation' 'chain, projection' 'chain, step of ida+ggl' 'snake, evaluation' 'grid, evaluation'; do
+    split | awk -F '\t' -v what="$what, " 'index($1, what) == 1 && / bodies: ns per body/ {
+      n = substr($1, length(what) + 1); sub(/ .*/, "", n); print n, $4 }' >"$work/$what"
+  done
+  draw engine-growth 800 520 <<G
+set logscale xy
+set format x '1e%T'
+set xlabel 'bodies N'
+set ylabel 'time per body [ns]'
+set title 'Cost per body against the size of the scene'
+set key inside bottom right spacing 1.2
+set grid xtics ytics lc rgb '#dddddd' lt 1
+set xrange [7:150000]
+plot '$work/chain, evaluation' w lp lw 2 pt 7 lc rgb '#004488' t 'chain: one evaluation', \
+     '$work/chain, projection' w lp lw 2 pt 5 dt 2 lc rgb '#bb5566' t 'chain: one projection', \
+     '$work/chain, step of ida+ggl' w lp lw 2 pt 9 dt 4 lc rgb '#ddaa33' t 'chain: one step of ida+ggl', \
+     '$work/snake, evaluation' w lp lw 1 pt 6 dt 3 lc rgb '#228833' t 'wheeled snake: one evaluation', \
+     '$work/grid, evaluation' w lp lw 1 pt 4 dt 5 lc rgb '#666666' t 'grid of pinned bars: one evaluation'
+G
+}
+
+if [ -f "$results/engine-$machine.csv" ]; then
+  engine_tables | section engine
+  engine_figure
+fi

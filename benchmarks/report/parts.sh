@@ -1,0 +1,62 @@
+# The parts of report.sh about the program by hand, the original algorithm, drift and effects.
+
+# ---- Against an 8th-order program by hand ----
+
+csv8=$results/eighth-$machine.csv
+if [ -f "$csv8" ]; then
+  awk -F, '
+    BEGIN { print "| steering | program | 1e-6 m [ms] | erk8+projection takes | 1e-9 m [ms] | erk8+projection takes |"; print "|---|---|---|---|---|---|" }
+    NR > 1 { if (!(($1, $2) in seen)) { seen[$1, $2] = 1; order[++n] = $1 SUBSEP $2 } }
+    $3 == "line" { time[$1, $2, $5 < 1e-7] = 1e3 * $6 }
+    END { for (i = 1; i <= n; i++) { split (order[i], p, SUBSEP); printf "| %s | %s |", p[1], p[2]
+        for (k = 0; k < 2; k++) { t = time[p[1], p[2], k]
+          if (t > 0) printf " %.3g | %.2g times that |", t, time[p[1], "erk8+projection", k] / t; else printf " never | |" }
+        print "" } }' "$csv8" | section eighth
+fi
+
+# ---- The original algorithm ----
+
+csvo=$results/original-$machine.csv
+if [ -f "$csvo" ] && [ -f "$csv" ]; then
+  awk -F, '
+    FNR == 1 { next }
+    NR == FNR { gap[$1] = $2 - $3; if (gap[$1] < 0) gap[$1] = -gap[$1]; next }
+    $1 == "original" && $5 == "ok" { h = $4 + 0; e[h, $2 ~ /held/] = $9; o[h, $2 ~ /held/] = $13; b[h, $2 ~ /held/] = $16; cpu[h, $2 ~ /held/] = $21; if (!(h in seen)) { seen[h] = 1; order[++n] = h } }
+    END { print "| step [s] | torque held: error [m] | order | work by rectangles: gap [J] | torque at stage times: error [m] | order | work as a state: gap [J] |"; print "|---|---|---|---|---|---|---|"
+      for (i = 1; i <= n; i++) { h = order[i]; g = ""; for (k in gap) if (k / h > 0.999 && k / h < 1.001) g = sprintf ("%.2g", gap[k])
+        printf "| %g | %.2g | %s | %s | %.2g | %s | %.2g |\n", h, e[h, 1], o[h, 1] == "nan" ? "" : sprintf ("%.2f", o[h, 1]), g, e[h, 0], o[h, 0] == "nan" ? "" : sprintf ("%.2f", o[h, 0]), b[h, 0] } }
+  ' "$csvo" "$csv" | section original
+  for m in rk4+projection:metric=identity:inputs=held rk4+projection; do
+    awk -F, -v m="$m" '$1 == "original" && $2 == m && $5 == "ok" { print $4, $9, $21 }' "$csv" >"$work/$m"
+  done
+  awk -F, 'NR > 1 { g = $2 - $3; print $1, g < 0 ? -g : g }' "$csvo" >"$work/gap"
+  awk -F, '$1 == "original" && $2 == "rk4+projection" && $5 == "ok" { print $4, $16 }' "$csv" >"$work/balance"
+  draw bench-original 1000 430 <<G
+set multiplot layout 1,2 margins screen 0.08,0.98,0.14,0.80 spacing screen 0.1
+set border lw 0.8 lc rgb '#404040'; set tics nomirror out scale 0.6; set grid lt 1 lw 0.6 lc rgb '#dddddd'
+set logscale xy; set format '1e%T'; set xlabel 'step [s]'; set key outside top center horizontal maxcols 1 samplen 4
+set ylabel 'largest error of a length over 100 s [m]'
+plot '$work/rk4+projection:metric=identity:inputs=held' using 1:2 with linespoints lw 1.6 pt 4 dt (14,6) lc rgb '#bb5566' title 'torque held over a step, as originally', \
+     '$work/rk4+projection' using 1:2 with linespoints lw 1.6 pt 7 lc rgb '#004488' title 'torque at stage times'
+set ylabel 'work against kinetic energy [J]'
+plot '$work/gap' with linespoints lw 1.6 pt 4 dt (14,6) lc rgb '#bb5566' title 'work by rectangles, as originally', \
+     '$work/balance' with linespoints lw 1.6 pt 7 lc rgb '#004488' title 'work as a state of the integration'
+unset multiplot
+G
+fi
+
+# ---- Drift ----
+
+csvd=$results/drift-$machine.csv
+if [ -f "$csvd" ]; then
+  awk -F, '
+    function power(x) { return x == "nan" ? "" : sprintf ("t^%.1f", x < 0.05 ? 0 : x) }
+    BEGIN { print "| method | position | grows | velocity | grows | balance [J] | grows |"; print "|---|---|---|---|---|---|---|" }
+    NR > 1 && $6 == "ok" && ($1 == "methods" || $2 ~ /alpha=(1|10|100):beta=(1|10|100)$/ || $2 ~ /metric=mass:every=(2|10|100)$/) {
+      printf "| `%s` | %.1e | %s | %.1e | %s | %.1e | %s |\n", $2, $8, power($10), $11, power($13), $14, power($16) }' "$csvd" | section drift
+fi
+
+# ---- Effects ----
+
+text=$results/effects-$machine.txt
+if [ -f "$text" ]; then { echo '```'; cat "$text"; echo '```'; } | section effects; fi

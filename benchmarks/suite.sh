@@ -1,0 +1,146 @@
+#!/bin/sh
+# The whole suite, about ten minutes: `make bench`.
+#
+#   suite.sh BUILD          reads BUILD/pinwheel and BUILD/benchmarks, works in BUILD/bench, writes benchmarks/results
+#
+# What has been done since the program was built is not done again, so a suite that was stopped goes on where it was;
+# remove BUILD/bench to start anew.  Results are one CSV per part and machine; benchmarks/report.sh makes the tables and
+# figures of docs/benchmarks.md out of them.
+set -eu
+build=$1
+program=$build/pinwheel work=$build/bench results=benchmarks/results
+machine=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -1 | tr 'A-Z' 'a-z' | sed 's/[^a-z0-9]\{1,\}/-/g; s/^-//; s/-$//')
+machine=${machine:-unknown}
+mkdir -p "$work" "$results"
+PINWHEEL_MODELS=benchmarks/scenes${PINWHEEL_MODELS:+:$PINWHEEL_MODELS}
+export PINWHEEL_MODELS LC_ALL=C
+
+# Scenes of the work-precision part: name and options.  Step ladders begin where the method is of some use.
+scenes='ezyroller --step-ladder 0.1:4e-4
+chaplygin-sleigh --step-ladder 0.1:4e-4
+knife-edge-incline --step-ladder 0.1:4e-4
+snakeboard --step-ladder 0.1:4e-4
+n-trailer --set n=3 --step-ladder 0.1:4e-4
+pendulum --step-ladder 0.05:1e-4
+n-four-bar --step-ladder 0.02:1e-4
+andrews-squeezer --step-ladder 1e-4:5e-7
+chain --set n=100 --t-end 0.2 --step-ladder 0.01:3e-4 --rtol-ladder 1e-3:1e-9
+stiff-tyres --step-ladder 1e-3:1e-5 --rtol-ladder 1e-3:1e-9 --limit 0.5
+stiff-steering --step-ladder 1e-3:1e-5 --rtol-ladder 1e-3:1e-9 --limit 0.5
+stiff-bushings --step-ladder 1e-3:1e-5 --rtol-ladder 1e-3:1e-9 --limit 0.5'
+
+# ---- Steps ----
+
+count=$(printf '%s\n' "$scenes" | wc -l)
+total=$((count + 5)) number=0 begun=$(date +%s)
+
+# step NAME COMMAND...: runs it in the folder BUILD/bench/NAME, unless that is done; its words go to a log there.
+step () {
+  name=$1
+  shift
+  number=$((number + 1))
+  if [ -f "$work/$name/done" ] && [ "$work/$name/done" -nt "$program" ]; then
+    printf '[%2d/%d] %-20s done before\n' $number "$total" "$name"
+    return
+  fi
+  rm -rf "$work/$name"
+  mkdir -p "$work/$name"
+  printf '[%2d/%d] %-20s ' $number "$total" "$name"
+  from=$(date +%s)
+  if "$@" >"$work/$name/log" 2>"$work/$name/errors"; then
+    touch "$work/$name/done"
+    printf '%4d s, %d s in all\n' $(($(date +%s) - from)) $(($(date +%s) - begun))
+  else
+    status=$?
+    [ $status = 130 ] && { echo 'interrupted; make bench goes on from here'; exit 130; }
+    echo "FAILED, status $status: $(tail -1 "$work/$name/errors")"
+    failed="$failed $name"
+  fi
+}
+failed=
+
+scene () {
+  "$program" compare --methods all --limit 0.3 --repeats 3 -o "$work/$1" "$@"
+}
+
+# The original program held the torque over each step, projected with the pseudo-inverse, and added up its work by
+# rectangles: the sum is made here, from a table with a row per step.
+original () {
+  "$program" compare ezyroller --methods rk4+projection:metric=identity:inputs=held,rk4+projection \
+    --step-ladder 0.1:2e-4 --repeats 3 -o "$work/original"
+  echo 'step,kinetic,rectangles' >"$work/original/work.csv"
+  for h in 0.1 0.05 0.025 0.0125 0.00625 0.003125 0.0015625; do
+    "$program" run ezyroller --method rk4+projection:metric=identity:inputs=held --step $h --energy -o - |
+      awk -F, -v h=$h '
+        NR == 1 { for (i = 1; i <= NF; i++) { if ($i == "frame.omega [rad/s]") a = i; if ($i == "steer.omega [rad/s]") b = i; if ($i == "kinetic [J]") k = i } next }
+        NR > 2 { work += torque * rate * ($1 - t) }
+        { t = $1; torque = 0.1 * cos (3.141592653589793 * t); rate = $a - $b; kinetic = $k }
+        END { printf "%s,%.9g,%.9g\n", h, kinetic, work }' >>"$work/original/work.csv"
+  done
+}
+
+drift () {
+  "$program" drift pendulum --t-end 100 --step 0.01 -o "$work/drift"
+}
+
+eighth () {
+  "$build/benchmarks/eighth" "$work/eighth/eighth.csv"
+}
+
+engine () {
+  "$build/benchmarks/engine"
+}
+
+effects () {
+  "$build/benchmarks/effects" "$build/variant/basic"
+}
+
+# ---- Results ----
+
+# The columns that matter, in four digits; the reason is the last one and may hold commas.
+gather () {
+  printf 'scene,method,ladder,rung,status,t,end_length,end_angle,largest_length,largest_angle,multiplier,below,order,position,velocity,balance,steps,rhs,jacobians,factorisations,cpu,spread,reason\n'
+  { printf '%s\n' "$scenes"; echo original; } | while read -r name options; do
+    [ -f "$work/$name/done" ] || continue
+    awk -F, -v scene="$name" '
+      function short(x) { return x == "nan" || x == "" ? x : sprintf ("%.4g", x) }
+      NR == 1 { for (i = 1; i <= NF; i++) { name = $i; sub (/ \[.*/, "", name); at[name] = i }; next }
+      { reason = $0; for (i = 1; i < NF && i < at["reason"]; i++) sub (/^[^,]*,/, "", reason)
+        printf "%s,%s,%s,%s,%s", scene, $1, $2, short($3), $4
+        n = split ("t end.length end.angle largest.length largest.angle multiplier", c, " ")
+        for (i = 1; i <= n; i++) printf ",%s", short($at[c[i]])
+        printf ",%s", $at["below"]
+        n = split ("order residual.position residual.velocity balance steps rhs jacobians factorisations cpu spread", c, " ")
+        for (i = 1; i <= n; i++) printf ",%s", (c[i] ~ /^[srjf]/ && c[i] !~ /\./ && c[i] != "spread" ? $at[c[i]] : short($at[c[i]]))
+        printf ",%s\n", reason }' "$work/$name/compare.csv"
+  done
+}
+
+truths () {
+  echo 'scene,truth,against,largest_length,largest_angle'
+  printf '%s\n' "$scenes" | while read -r name options; do
+    [ -f "$work/$name/done" ] || continue
+    awk -v scene="$name" 'NR > 1 && /"uncertainty"/ { text = $0; split (text, part, "\""); split (text, cell, "\",\"uncertainty\","); split (cell[2], v, ","); printf "%s,\"%s\",uncertainty,%.2g,%.2g\n", scene, part[2], v[5], v[6] }' "$work/$name/truth.csv"
+  done
+}
+
+echo "machine $machine; results go to $results/*-$machine.csv"
+printf '%s\n' "$scenes" >"$work/scenes"
+while read -r name options; do
+  # shellcheck disable=SC2086
+  step "$name" scene "$name" $options
+done <"$work/scenes"
+step original original
+step drift drift
+step eighth eighth
+step engine engine
+step effects effects
+
+gather >"$results/work-precision-$machine.csv"
+truths >"$results/truth-$machine.csv"
+[ -f "$work/original/done" ] && cp "$work/original/work.csv" "$results/original-$machine.csv"
+[ -f "$work/drift/done" ] && cp "$work/drift/drift.csv" "$results/drift-$machine.csv"
+[ -f "$work/eighth/done" ] && cp "$work/eighth/eighth.csv" "$results/eighth-$machine.csv"
+[ -f "$work/effects/done" ] && cp "$work/effects/log" "$results/effects-$machine.txt"
+echo "$(($(date +%s) - begun)) s; tables and figures: sh benchmarks/report.sh $machine"
+[ -z "$failed" ] || { echo "failed:$failed"; exit 1; }
