@@ -56,8 +56,12 @@ pw_system *ladder_open (const char *model) {
 }
 
 ladder_error ladder_run (const char *model, const char *method, double step, double t) {
+  return ladder_solve (model, method, &(pw_settings){ .step = step, .span = t, .ledger = 1 }, t);
+}
+
+ladder_error ladder_solve (const char *model, const char *method, const pw_settings *settings, double t) {
   pw_system *s = ladder_open (model), *S = ladder_open (model);
-  pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .span = t, .ledger = 1 });
+  pw_run *r = runs_open (s, method, settings);
   pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = t });
   pw_sample x = runs_to (r, t), y = runs_to (exact, t);
   ladder_error off = { .cost = *pw_run_statistics (r) };

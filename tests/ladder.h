@@ -1,4 +1,4 @@
-/* Errors of fixed-step methods over halvings of the step, against erk8+projection at its tightest. */
+/* Errors of methods over halvings of the step, or of any settings, against erk8+projection at its tightest. */
 #ifndef LADDER_H
 #define LADDER_H
 
@@ -14,6 +14,7 @@ typedef struct {
   pw_statistics cost;
 } ladder_error;
 
+ladder_error ladder_solve (const char *model, const char *method, const pw_settings *settings, double t);
 ladder_error ladder_run (const char *model, const char *method, double step, double t);
 
 /* Errors of positions, and as asked for of more, fall by 2^order, times or over 2^band, from each of three steps h, h/2,

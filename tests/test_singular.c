@@ -252,7 +252,9 @@ static void singular_steered (pw_model *m, const void *parameters) {
 static void test_locks_in_motion (void **state) {
   static const pw_plugin_table table = TRIAL_TABLE (singular_steered);
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "rk4+none",      "ida+baumgarte",
-                                        "ida+ggl",        "rk4+nullspace", "galpha+index3", "galpha+ggl" };
+                                        "ida+ggl",        "rk4+nullspace", "galpha+index3", "galpha+ggl",
+                                        "adams+none",     "ida+si1",       "ida+index2",    "adams+baumgarte",
+                                        "bdf+baumgarte",  "bdf+projection" };
   (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
@@ -323,8 +325,9 @@ static const pw_plugin_table singular_drives_table = { .abi = PW_ABI,
                                                        .build = singular_drives };
 
 static void test_drives (void **state) {
-  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "ida+ggl",   "ida+baumgarte",
-                                        "rk4+nullspace",  "galpha+index3", "galpha+ggl" };
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",  "ida+ggl",    "ida+baumgarte",
+                                        "rk4+nullspace",  "galpha+index3",  "galpha+ggl", "ida+si1",
+                                        "bdf+projection", "adams+baumgarte" };
   (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };

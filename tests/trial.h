@@ -4,7 +4,7 @@
 
 #include "runs.h"
 
-/* Runs a scene to t_end by rk4+projection, ida+ggl and ida+baumgarte.  They agree, the ledger's balance closes, the
+/* Runs a scene to t_end by rk4+projection and implicit methods.  They agree, the ledger's balance closes, the
  * final state obeys the equations as the independent verifier sees them, and Newton's iteration hardly ever fails. */
 void trial (const pw_plugin_table *table, double t_end);
 

@@ -1,0 +1,162 @@
+/* The multistep methods of SUNDIALS: tolerances are kept, multipliers too, the work grows as their orders say, stiff
+ * scenes are theirs. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "ladder.h"
+#include "scene.h"
+#include "system.h"
+
+static const struct {
+  const char *model;
+  double t;
+} multi_scenes[] = { { "ezyroller", 5 },           { "pendulum", 1 }, { "n-four-bar", 0.4 },
+                     { "andrews-squeezer", 0.01 }, { "arm", 1 },      { "tractor", 2 } };
+
+static const char *const multi_methods[] = { "ida+index2",      "ida+si1",  "ida+ggl",       "adams+none",
+                                             "adams+baumgarte", "bdf+none", "bdf+baumgarte", "bdf+projection" };
+
+enum { SCENES = sizeof multi_scenes / sizeof *multi_scenes, METHODS = sizeof multi_methods / sizeof *multi_methods };
+
+static ladder_error multi_error (int scene, const char *method, double rtol) {
+  double t = multi_scenes[scene].t;
+  return ladder_solve (multi_scenes[scene].model, method, &(pw_settings){ .rtol = rtol, .span = t }, t);
+}
+
+/* Errors are in proportion to the tolerance, whatever the constraints. */
+static void test_tolerances (void **state) {
+  (void)state;
+  for (int i = 0; i < SCENES; i++)
+    for (int m = 0; m < METHODS; m++) {
+      ladder_error e[2];
+      for (int k = 0; k < 2; k++) {
+        double rtol = k ? 1e-10 : 1e-6;
+        char what[100];
+        e[k] = multi_error (i, multi_methods[m], rtol);
+        snprintf (what, sizeof what, "%s, %s, rtol %g: positions", multi_scenes[i].model, multi_methods[m], rtol);
+        check_below (what, e[k].q, 3e3 * rtol, "3000 rtol: the errors of some hundred steps, and what they grow to");
+        snprintf (what, sizeof what, "%s, %s, rtol %g: rates", multi_scenes[i].model, multi_methods[m], rtol);
+        check_below (what, e[k].v, 3e3 * rtol, "3000 rtol");
+      }
+      check_below (multi_methods[m], e[1].q, e[0].q / 100, "four decades of tolerance give two of error at the least");
+    }
+}
+
+/* Steps grow as rtol^(-1/(order + 1)): those of Adams, of orders to 12, more slowly than those of BDF, of orders to 5. */
+static void test_orders (void **state) {
+  (void)state;
+  static const struct {
+    const char *method;
+    double slowest, fastest; /* orders that this is like */
+  } of[] = {
+    { "bdf+projection", 3.5, 6.5 }, { "ida+si1", 3.5, 6.5 }, { "ida+index2", 3.5, 6.5 }, { "adams+none", 6, 12 }
+  };
+  for (size_t m = 0; m < sizeof of / sizeof *of; m++) {
+    ladder_error loose = multi_error (0, of[m].method, 1e-7), tight = multi_error (0, of[m].method, 1e-12);
+    double decades = log10 ((double)tight.cost.steps / (double)loose.cost.steps), order = 5 / decades - 1;
+    check_below (of[m].method, of[m].slowest, order, "a high order");
+    check_below (of[m].method, order, of[m].fastest, "its highest order, and a bit for the change of orders");
+  }
+}
+
+/* What each form holds: index2 the rates, ggl and si1 the positions too, at the tolerance; a projection to round-off. */
+static void test_residuals (void **state) {
+  (void)state;
+  const double rtol = 1e-8;
+  for (int i = 0; i < SCENES; i++) {
+    const char *model = multi_scenes[i].model;
+    pw_statistics two = multi_error (i, "ida+index2", rtol).cost, one = multi_error (i, "ida+si1", rtol).cost;
+    pw_statistics bdf = multi_error (i, "bdf+projection", rtol).cost;
+    check_below (model, fmax (two.velocity, one.velocity), 100 * rtol, "100 rtol");
+    check_below (model, one.position, 10 * rtol, "10 rtol");
+    check_below (model, two.position, 1e3 * rtol, "a drift of 1000 rtol");
+    check_below (model, fmax (bdf.position, bdf.velocity), 32 * CHECK_EPS, "round-off of the projection");
+  }
+  check_below ("si1", 5 * multi_error (0, "ida+si1", rtol).cost.position,
+               multi_error (0, "ida+index2", rtol).cost.position, "index2 lets positions drift");
+}
+
+/* The multipliers of si1 are rates of unknowns, and as good as those that are unknowns themselves. */
+static void test_multipliers (void **state) {
+  (void)state;
+  double ratio = 0;
+  int count = 0;
+  for (int i = 0; i < SCENES - 1; i++) /* prescribed motion: not those of the tractor */
+    for (int k = 6; k <= 10; k += 2, count++) {
+      double rtol = pow (10, -k), si1 = multi_error (i, "ida+si1", rtol).lambda;
+      ratio += log (si1 / multi_error (i, "ida+ggl", rtol).lambda);
+      check_below (multi_scenes[i].model, si1, 1e4 * rtol, "1e4 rtol, of the largest multiplier");
+    }
+  check_below ("multipliers of si1 over those of ggl", exp (ratio / count), 2, "on the average no worse than twice");
+}
+
+/* ---- Stiff scenes ---- */
+
+/* The EzyRoller with a steering so stiff that it creeps back at 20/s and a wrong rate dies out at about 1e4/s. */
+static pw_system *multi_steering (void) {
+  pw_model *m = scene_model (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
+  pw_add_rotational_spring (
+      m, &(pw_rotational_spring){
+             .name = "column", .body = { "steer", "frame" }, .stiffness = 1e4, .damping = 500, .angle = PW_PI });
+  return scene_compile (m);
+}
+
+static pw_statistics multi_cost (pw_system *s, const char *method, double t, double *q) {
+  double v[20];
+  pw_statistics cost;
+  runs_state (s, method, &(pw_settings){ .rtol = 1e-6, .span = t }, t, q, v, &cost);
+  return cost;
+}
+
+/* Explicit methods have to resolve what has long died out; these step over it, to the same end. */
+static void test_stiff (void **state) {
+  static const char *const method[] = { "ida+ggl",  "ida+si1",       "ida+index2",
+                                        "bdf+none", "bdf+baumgarte", "bdf+projection" };
+  (void)state;
+  double exact[20], q[20];
+  pw_system *s = multi_steering ();
+  pw_statistics by_hand = multi_cost (s, "erk8+projection", 2, exact);
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+    pw_statistics cost = multi_cost (s, method[i], 2, q);
+    check_below (method[i], 10 * (double)cost.steps, (double)by_hand.steps, "ten times fewer steps");
+    for (int j = 0; j < pw_count_coordinates (s); j++) check_close (method[i], q[j], exact[j], 1e-3, "1000 rtol");
+  }
+  pw_free (s);
+}
+
+/* A matrix serves many steps; the functional iteration has none. */
+static void test_cost (void **state) {
+  (void)state;
+  pw_statistics bdf = multi_error (0, "bdf+projection", 1e-8).cost, adams = multi_error (0, "adams+none", 1e-8).cost;
+  check_below ("matrices", (double)bdf.jacobians, 0.1 * (double)bdf.steps, "one in ten steps");
+  check_below ("evaluations a step", (double)bdf.rhs, 2.5 * (double)bdf.steps,
+               "an exact matrix: 1.1 iterations, 1 more");
+  check_below ("evaluations a step", (double)adams.rhs, 3.5 * (double)adams.steps, "2 iterations, 1 more");
+  assert_int_equal (adams.jacobians, 0);
+}
+
+/* ---- Options ---- */
+
+static void test_options (void **state) {
+  (void)state;
+  double all = multi_error (1, "bdf+projection", 1e-8).cost.position;
+  double some = multi_error (1, "bdf+projection:every=7", 1e-8).cost.position;
+  check_below ("position residual, every step", all, 32 * CHECK_EPS, "round-off");
+  check_below ("position residual, each 7 steps", 100 * CHECK_EPS, some, "drift between projections");
+  double soft = multi_error (1, "bdf+baumgarte:alpha=1:beta=1", 1e-8).cost.position;
+  double hard = multi_error (1, "bdf+baumgarte:alpha=30:beta=30", 1e-8).cost.position;
+  check_below ("position residual with alpha = 30", 5 * hard, soft, "the stronger feedback leaves less");
+  ladder_error identity = multi_error (0, "bdf+projection:metric=identity", 1e-8);
+  check_below ("identity metric", identity.q, 3e-5, "3000 rtol");
+  check_below ("identity metric", identity.cost.position, 32 * CHECK_EPS, "round-off");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_tolerances),  cmocka_unit_test (test_orders), cmocka_unit_test (test_residuals),
+    cmocka_unit_test (test_multipliers), cmocka_unit_test (test_stiff),  cmocka_unit_test (test_cost),
+    cmocka_unit_test (test_options),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
