@@ -1,0 +1,178 @@
+/* Random mechanisms, tried: energy is accounted for, the constraints hold, the independent verifier agrees, and neither
+ * where one looks from, nor the order of the description, nor the method matters. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "mechanism.h"
+#include "runs.h"
+#include "verify.h"
+
+#define TRY_SPAN 0.5   /* [s]: short enough for a chaotic motion to remember where it started */
+#define TRY_RTOL 1e-10 /* of erk8, the method the others are compared with */
+
+/* Where a run has come to. */
+typedef struct {
+  int status;
+  double balance, energy; /* worst balance, largest energy [J] */
+  double q[64], v[64];
+  pw_statistics statistics;
+  pw_verification verification;
+  pw_error error;
+} try_end;
+
+typedef struct {
+  unsigned seed;
+  unsigned tried, refused, failed;
+} try_count;
+
+static void try_measure (pw_system *s, pw_run *r, try_end *end) {
+  size_t bytes = (size_t)pw_count_coordinates (s) * sizeof (double);
+  pw_sample x;
+  for (int i = 1; i <= 10 && end->status == PW_OK; i++) {
+    double t = TRY_SPAN * i / 10;
+    end->status = pw_advance_to (r, t, TRY_SPAN, &end->error);
+    if (end->status == PW_OK) end->status = pw_at (r, t, &x, &end->error);
+    if (end->status != PW_OK) return;
+    end->balance = fmax (end->balance, fabs (x.balance));
+    end->energy = fmax (end->energy, fmax (x.kinetic, fmax (fabs (x.work), x.loss)));
+  }
+  memcpy (end->q, x.q, bytes);
+  memcpy (end->v, x.v, bytes);
+  end->statistics = *pw_run_statistics (r);
+  end->status = pw_verify (s, x.t, x.q, x.v, x.a, x.lambda, &end->verification);
+}
+
+static void try_run (pw_system *s, const char *method, double rtol, try_end *end) {
+  *end = (try_end){ .status = PW_INPUT };
+  assert_true (s == NULL || pw_count_coordinates (s) <= (int)(sizeof end->q / sizeof *end->q));
+  pw_run *r =
+      s ? pw_open (s, method, &(pw_settings){ .rtol = rtol, .span = TRY_SPAN, .ledger = 1 }, &end->error) : NULL;
+  end->status = r ? PW_OK : end->error.status;
+  if (r == NULL) return;
+  try_measure (s, r, end);
+  pw_close (r);
+}
+
+/* Says what is wrong with a seed, unless it is not more than the bound. */
+static void try_bound (try_count *n, const char *what, double value, double bound) {
+  if (value <= bound) return;
+  print_message ("seed %u: %s %.3g, at most %.3g\n", n->seed, what, value, bound);
+  n->failed++;
+}
+
+/* ---- The same from elsewhere ---- */
+
+/* How far a state is from another, which is seen in some way. */
+static double try_distance (pw_system *a, const try_end *x, pw_system *b, const try_end *y, const mechanism *m,
+                            const mechanism_view *view) {
+  double worst = 0;
+  char name[100];
+  for (int i = 0; i < m->bodies; i++) {
+    pw_body now = { .mass = 1 };
+    int ja = 3 * pw_find_body (a, m->body[i].name), jb = 3 * pw_find_body (b, m->body[i].name);
+    memcpy (now.start, x->q + ja, sizeof now.start);
+    memcpy (now.rate, x->v + ja, sizeof now.rate);
+    mechanism_see (view, &now);
+    for (int k = 0; k < 3; k++)
+      worst = fmax (worst, fmax (fabs (now.start[k] - y->q[jb + k]), fabs (now.rate[k] - y->v[jb + k])));
+  }
+  for (int j = 3 * m->bodies; j < pw_count_coordinates (a); j++) {
+    int other = pw_find_state (b, pw_state_name (a, j, name, sizeof name), NULL);
+    worst = fmax (worst, fabs (x->q[j] - y->q[other]));
+  }
+  return worst;
+}
+
+/* Rates give the size of a mechanism's motion: its errors grow with them. */
+static double try_size (pw_system *s, const try_end *x) {
+  double size = 1;
+  for (int j = 0; j < pw_count_coordinates (s); j++) size = fmax (size, fabs (x->v[j]));
+  return size;
+}
+
+static void try_views (try_count *n, const mechanism *m, pw_system *s, const try_end *x) {
+  static const struct {
+    const char *name;
+    mechanism_view view;
+  } views[] = { { "moved", { .x = 3, .y = -2 } },
+                { "turned", { .angle = 0.7 } },
+                { "mirrored", { .mirror = 1 } },
+                { "backwards", { .backwards = 1 } } };
+  for (size_t i = 0; i < sizeof views / sizeof *views; i++) {
+    try_end y;
+    pw_error error = { 0 };
+    pw_system *other = mechanism_compile (m, &views[i].view, &error);
+    try_run (other, "erk8+projection", TRY_RTOL, &y);
+    if (y.status == PW_OK) {
+      try_bound (n, views[i].name, try_distance (s, x, other, &y, m, &views[i].view), 1e4 * TRY_RTOL * try_size (s, x));
+    } else {
+      print_message ("seed %u, %s: %s\n", n->seed, views[i].name, y.error.text);
+      n->failed++;
+    }
+    pw_free (other);
+  }
+}
+
+/* ---- By another method ---- */
+
+/* The methods that hold the constraints take turns. */
+static void try_method (unsigned turn, char *name, size_t size) {
+  for (;;)
+    for (int i = 0; pw_methods[i]; i++)
+      for (const pw_stabilisation *k = pw_methods[i]->stabilisations; k->name; k++)
+        if (strcmp (k->name, "none") != 0 && turn-- == 0) {
+          snprintf (name, size, "%s+%s", pw_methods[i]->name, k->name);
+          return;
+        }
+}
+
+static void try_other (try_count *n, const mechanism *m, pw_system *s, const try_end *x) {
+  static const mechanism_view same = { .mirror = 0 };
+  char method[60], what[100];
+  try_end y;
+  try_method (n->seed, method, sizeof method);
+  try_run (s, method, 1e-8, &y);
+  snprintf (what, sizeof what, "%s is off by", method);
+  if (y.status == PW_OK)
+    try_bound (n, what, try_distance (s, x, s, &y, m, &same), 1e-4 * try_size (s, x));
+  else
+    print_message ("seed %u, %s: %s\n", n->seed, method, y.error.text);
+}
+
+/* ---- All of it ---- */
+
+static void try_seed (try_count *n) {
+  static const mechanism_view as_it_is = { .mirror = 0 };
+  mechanism m;
+  try_end x;
+  pw_error error = { 0 };
+  mechanism_make (n->seed, &m);
+  pw_system *s = mechanism_compile (&m, &as_it_is, &error);
+  if (s == NULL) fail_msg ("seed %u: %s", n->seed, error.text);
+  try_run (s, "erk8+projection", TRY_RTOL, &x);
+  n->tried++;
+  if (x.status == PW_OK) {
+    try_bound (n, "position residual", x.statistics.position, 128 * CHECK_EPS);
+    try_bound (n, "velocity residual", x.statistics.velocity, 1e-11);
+    try_bound (n, "balance", x.balance, 1e4 * TRY_RTOL * fmax (x.energy, 1e-3));
+    try_bound (n, "verifier's position", x.verification.position.scaled, 128 * CHECK_EPS);
+    try_bound (n, "verifier's velocity", x.verification.velocity.scaled, 1e-10);
+    try_bound (n, "verifier's acceleration", x.verification.acceleration.scaled, 1e-9);
+    try_bound (n, "verifier's force", x.verification.force.scaled, 1e-9);
+    try_views (n, &m, s, &x);
+    try_other (n, &m, s, &x);
+  } else {
+    print_message ("seed %u: %s\n", n->seed, x.error.text);
+    n->refused++;
+  }
+  pw_free (s);
+}
+
+void mechanism_try (unsigned first, unsigned count) {
+  try_count n = { .seed = first };
+  for (; n.seed < first + count; n.seed++) try_seed (&n);
+  print_message ("%u mechanisms, %u refused\n", n.tried, n.refused);
+  assert_int_equal (n.failed, 0);
+  check_below ("refused", n.refused, 0.05 * n.tried, "what is put together at random may contradict itself");
+}

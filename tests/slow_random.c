@@ -1,0 +1,13 @@
+/* A thousand random mechanisms. */
+#include "check.h"
+#include "mechanism.h"
+
+static void test_random (void **state) {
+  (void)state;
+  mechanism_try (1, 1000);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_random) };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

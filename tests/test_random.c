@@ -1,0 +1,13 @@
+/* Some random mechanisms; slow_random has a thousand. */
+#include "check.h"
+#include "mechanism.h"
+
+static void test_random (void **state) {
+  (void)state;
+  mechanism_try (1, 40);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_random) };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
