@@ -235,6 +235,8 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   return PW_OK;
 }
 
+/* Accelerations and multipliers of a sample are those that go with its state, rather than the last iterate's: IDA's error
+ * test does not see them.  In a singular pose those of IDA stay. */
 static int ida_at (pw_run *r, double t, pw_error *error) {
   ida_data *d = r->data;
   double *work = N_VGetArrayPointer (d->work);
@@ -251,7 +253,7 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
   if (pw_ida_place (d, t, N_VGetArrayPointer (d->y)) != 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
   pw_statistics keep = r->statistics;
-  ida_multipliers (d, r->v_at, d->given, r->lambda_at);
+  if (pw_saddle_factor (r->saddle) == PW_OK) pw_accelerate_placed (r, r->v_at, r->a_at, r->lambda_at);
   r->statistics = keep;
   return PW_OK;
 }

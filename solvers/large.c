@@ -15,7 +15,7 @@
 /* ---- Elimination of columns of 1 or 2 unknowns with such rows below ---- */
 
 /* The smallest pivot relative to its diagonal entry, without dividing as long as it stays the smallest; what is not a
- * number is taken for smaller. */
+ * number is taken for smaller.  `was` is positive, or else a pivot below 0 could make up for the one before it. */
 static inline void large_judge (pw_large *l, double pivot, double was, int y) {
   if (pivot >= l->pivot * was) return;
   l->pivot = pivot / was;
@@ -36,7 +36,7 @@ static inline large_square large_invert (int k, double *D, pw_large *l, int y) {
   }
   double a = D[0], b = D[1], c = D[2], minor = a * c - b * b, f = 1 / minor;
   large_judge (l, a, D[3], y);
-  large_judge (l, minor, a * D[4], y + 1);
+  large_judge (l, minor, fabs (a) * D[4], y + 1);
   D[0] = c * f, D[1] = -b * f, D[2] = a * f;
   return (large_square){ D[0], D[1], D[1], D[2] };
 }
@@ -124,8 +124,8 @@ static void large_invert_any (pw_large *l, const pw_column *c) {
   double determinant = a * A + b * B + d * C, f = 1 / determinant;
   if (D[6] > 0) { /* not a body: those are negative */
     large_judge (l, a, D[6], c->y);
-    large_judge (l, minor, a * D[7], c->y + 1);
-    large_judge (l, determinant, minor * D[8], c->y + 2);
+    large_judge (l, minor, fabs (a) * D[7], c->y + 1);
+    large_judge (l, determinant, fabs (minor) * D[8], c->y + 2);
   }
   D[0] = A * f, D[1] = B * f, D[2] = (a * g - d * d) * f, D[3] = C * f, D[4] = (b * d - a * e) * f, D[5] = minor * f;
 }

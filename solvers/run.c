@@ -91,13 +91,20 @@ static void run_watch (pw_run *r) {
   pw_saddle_set_guard (r->saddle, r->guard);
 }
 
+/* Of a dependent row round-off leaves a pivot of 1e-8, and of 1e-5 behind others that hardly differ among themselves: as
+ * large a one is looked into by a means that can tell, if the scene is small enough for it. */
+#define RUN_DEPENDENT 1e-5
+#define RUN_SUSPECT 1e-3
+
 /* Opens the saddle at the consistent start and evaluates the accelerations there; if some rows hardly differ from
  * others, an independent set is chosen first. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
   int row, status = run_open_saddle (r, error);
   if (status != PW_OK) return status;
-  if (pw_saddle_factor (r->saddle) != PW_OK || pw_saddle_pivot (r->saddle, &row) < 1e-5) {
-    if ((double)r->s->rows * r->s->coords > PW_RANK_MOST) return pw_fail_singular (r, r->t, error);
+  double pivot = pw_saddle_factor (r->saddle) == PW_OK ? pw_saddle_pivot (r->saddle, &row) : 0;
+  int large = (double)r->s->rows * r->s->coords > PW_RANK_MOST;
+  if (pivot < (large ? RUN_DEPENDENT : RUN_SUSPECT)) {
+    if (large) return pw_fail_singular (r, r->t, error);
     int chosen = pw_rank_choose (r, error);
     if (chosen == PW_OK && r->redundant) chosen = run_open_saddle (r, error);
     if (chosen != PW_OK) return chosen;

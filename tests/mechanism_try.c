@@ -159,7 +159,7 @@ static void try_seed (try_count *n) {
     try_bound (n, "verifier's position", x.verification.position.scaled, 128 * CHECK_EPS);
     try_bound (n, "verifier's velocity", x.verification.velocity.scaled, 1e-10);
     try_bound (n, "verifier's acceleration", x.verification.acceleration.scaled, 1e-9);
-    try_bound (n, "verifier's force", x.verification.force.scaled, 1e-9);
+    try_bound (n, "verifier's force", x.verification.force.scaled, 1e-8);
     try_views (n, &m, s, &x);
     try_other (n, &m, s, &x);
   } else {
