@@ -142,6 +142,13 @@ static void try_other (try_count *n, const mechanism *m, pw_system *s, const try
 
 /* ---- All of it ---- */
 
+/* 1 if something is driven, which the rest may forbid. */
+static int try_prescribed (const mechanism *m) {
+  for (int i = 0; i < m->elements; i++)
+    if (m->element[i].kind == &pw_kind_drive || m->element[i].kind == &pw_kind_speed) return 1;
+  return 0;
+}
+
 static void try_seed (try_count *n) {
   static const mechanism_view as_it_is = { .mirror = 0 };
   mechanism m;
@@ -165,6 +172,7 @@ static void try_seed (try_count *n) {
   } else {
     print_message ("seed %u: %s\n", n->seed, x.error.text);
     n->refused++;
+    if (x.status == PW_START && !try_prescribed (&m)) n->failed++; /* it could always be at rest */
   }
   pw_free (s);
 }
