@@ -99,16 +99,15 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
 /* ---- What a model is like at the state reached (linear.c) ---- */
 
 /* Mobility and linearisation.  Singular values are those of the independent rows of J, each row of length 1, angles in
- * units of the length scale. */
+ * units of the length scale.  Eigenvalues: the fastest first, of a conjugate pair that with im > 0. */
 typedef struct {
   int coordinates;
-  int positions;  /* degrees of freedom of configuration: coordinates less independent holonomic rows */
-  int velocities; /* of velocity: coordinates less independent rows */
-  int rank;       /* of J */
-  double least;   /* smallest singular value; NaN: not computed, or no rows */
-  int unknowns;   /* of the linearisation: positions + velocities */
-  double *re,
-      *im; /* its eigenvalues [1/s], the fastest first, of a conjugate pair that with im > 0; NULL: not computed */
+  int positions;   /* degrees of freedom of configuration: coordinates less independent holonomic rows */
+  int velocities;  /* of velocity: coordinates less independent rows */
+  int rank;        /* of J */
+  double least;    /* smallest singular value; NaN: not computed, or no rows */
+  int unknowns;    /* of the linearisation: positions + velocities */
+  double *re, *im; /* its eigenvalues [1/s]; NULL: not computed */
 } pw_linear;
 
 /* Examines the state a run has reached.  With more coordinates than `most` only integers are filled: the rest takes time

@@ -133,7 +133,7 @@ static void json_linear (FILE *f, const pw_check *x) {
   }
   double size = l->unknowns > 0 ? hypot (l->re[0], l->im[0]) : 0;
   fprintf (f, "{\"unknowns\": %d", l->unknowns);
-  json_member (f, "frequency_hz", l->unknowns > 0 ? l->im[0] / (2 * PW_PI) : 0);
+  json_member (f, "frequency_hz", pw_check_moves (x) ? l->im[0] / (2 * PW_PI) : 0);
   json_member (f, "damping", pw_check_moves (x) ? -l->re[0] / size : NAN);
   json_member (f, "rk4_step", x->limit);
   fputs (",\n    \"eigenvalues\": [", f);
