@@ -72,14 +72,19 @@ SLOWS     := $(SLOW:%.c=$(BUILD)/%)
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
-.PHONY: all everything demo test test-all layers san cov clang gcc format format-check bench bench-quick bench-engine \
+# Targets of fuzzing; with replay.c they are programs that take files.
+FUZZ_SHARE := tests/fuzz/fuzz.c $(if $(FUZZING),,tests/fuzz/replay.c)
+FUZZ       := $(filter-out tests/fuzz/fuzz.c tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
+FUZZERS    := $(FUZZ:tests/fuzz/%.c=$(BUILD)/fuzz/%)
+
+.PHONY: all everything demo test test-all layers san fuzz fuzzers cov clang gcc format format-check bench bench-quick bench-engine \
         bench-effects hard basic deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
 
 all: $(LIB) $(FILES_LIB) $(LIB:.so=.a) $(FILES_LIB:.so=.a) $(INCLUDES) $(PLUGINS) $(PROGRAM)
 
-everything: all $(TESTS) $(SLOWS) $(PROGRAMS)
+everything: all $(TESTS) $(SLOWS) $(PROGRAMS) $(FUZZERS)
 
 help:
 	@echo 'make                  the libraries, the program and the models, into $(BUILD)/'
@@ -93,6 +98,7 @@ help:
 	@echo 'make hard             every method on every hard case, against the expected verdicts; writes docs/hard-cases.md'
 	@echo 'make layers           proof of what depends on what'
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
+	@echo 'make fuzz TIME=60     models, expressions, tables, checkpoints, command lines from a fuzzer, so many seconds each'
 	@echo 'make cov              lines that the tests run, and those they do not'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
 	@echo 'make install          to PREFIX (/usr/local) below DESTDIR; uninstall'
@@ -103,7 +109,7 @@ help:
 
 # ---- Dependencies: whoever asks to see something run gets the libraries first ----
 
-ifneq ($(filter demo test test-all bench bench-quick bench-engine bench-effects hard san cov,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all bench bench-quick bench-engine bench-effects hard san cov fuzz,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -123,6 +129,7 @@ $(call obj,core/cli/animate_page.c): INCLUDE += -iquote $(BUILD)/obj/core/cli
 $(call obj,core/cli/animate_page.c): $(BUILD)/obj/core/cli/animate.inc
 $(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
+$(BUILD)/obj/tests/fuzz/%.o: INCLUDE := -iquote core -iquote core/files -iquote core/cli -iquote solvers -iquote tests/fuzz
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/eighth.o $(BUILD)/obj/benchmarks/effects.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
 $(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -iquote core -I$(BUILD)/include
@@ -136,7 +143,7 @@ $(BUILD)/obj/%.o: %.c | $(FIRST)
 
 $(call obj,$(BENCH) $(HARD) $(EMBED)): | $(INCLUDES)
 
--include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(BENCH) $(ENGINE) $(HARD) $(EMBED)))
+-include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(FUZZ) $(FUZZ_SHARE) $(BENCH) $(ENGINE) $(HARD) $(EMBED)))
 -include $(MODELS:%.c=$(BUILD)/obj/%.d)
 
 # The page of an animation becomes part of the program: its lines as C strings.
@@ -214,6 +221,13 @@ $(BUILD)/tests/test_alloc: WRAP := -Wl,--wrap=malloc,--wrap=calloc,--wrap=reallo
 # A part of SUNDIALS that Pinwheel does not use, to compare with.
 $(BUILD)/tests/test_arkode: WRAP := -Wl,--no-as-needed -lsundials_arkode -Wl,--as-needed
 
+# A target has the program's commands but not its main.
+$(FUZZERS): $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(call obj,$(FUZZ_SHARE)) $(filter-out %/main.o,$(CLI_OBJ)) $(FILES_LIB:.so=.a) $(LIB:.so=.a)
+	@mkdir -p $(@D)
+	$(call say,LINK)
+	$(Q)$(LINK) $(THREADS) $(OPENMP) -rdynamic -o $@ $(filter %.o,$^) -Wl,--whole-archive $(filter %.a,$^) -Wl,--no-whole-archive \
+	  $(FILES_LIBS) $(SOLVER_LIBS) -lpopt
+
 # ---- Running things ----
 
 RUN_TESTS = PINWHEEL=$(PROGRAM) BUILD=$(BUILD) sh .ci/run-tests
@@ -257,6 +271,24 @@ san:
 	  SAN='-fsanitize=address,undefined -fno-sanitize-recover=undefined -fno-omit-frame-pointer'
 san: $(FIRST)
 
+# clang's libFuzzer, TIME seconds for each target; what it finds new and interesting goes to the corpus, what breaks a target
+# into $(VARIANT)/fuzz/found.
+TIME ?= 60
+fuzz:
+	@$(MAKE) --no-print-directory NO_DEPS=1 CC=clang FUZZING=1 BUILD=$(VARIANT)/fuzz CFLAGS='-O1 -g' \
+	  SAN='-fsanitize=address,undefined,fuzzer-no-link -fno-sanitize-recover=undefined' fuzzers
+	@mkdir -p $(VARIANT)/fuzz/found
+	@for t in $(notdir $(FUZZERS)); do echo "$$t: $(TIME) s"; mkdir -p $(VARIANT)/fuzz/corpus/$$t; \
+	  TMPDIR=$$([ -d /dev/shm ] && echo /dev/shm || echo /tmp) $(VARIANT)/fuzz/fuzz/$$t -max_total_time=$(TIME) -timeout=25 \
+	    -rss_limit_mb=4000 -max_len=4096 -dict=tests/fuzz/words.dict -print_final_stats=1 -verbosity=0 \
+	    -artifact_prefix=$(VARIANT)/fuzz/found/$$t- $(VARIANT)/fuzz/corpus/$$t tests/fuzz/corpus/$$t \
+	    $$([ $$t = model ] && echo models tests/models tests/bad-models) 2>$(VARIANT)/fuzz/$$t.log || \
+	    { tail -n 40 $(VARIANT)/fuzz/$$t.log; exit 1; }; grep -h 'number_of_executed' $(VARIANT)/fuzz/$$t.log; done
+fuzz: $(FIRST)
+
+fuzzers: LDFLAGS += -fsanitize=fuzzer
+fuzzers: $(FUZZERS)
+
 # Lines of core/ and solvers/ that tests run; the old counts go first.
 cov:
 	@mkdir -p $(VARIANT)/cov && find $(VARIANT)/cov -name '*.gcda' -delete
@@ -283,7 +315,7 @@ basic:
 	@cmp -s $(BASIC)/pinwheel.h $(BASIC)/source/core/pinwheel.h || cp $(BASIC)/pinwheel.h $(BASIC)/source/core
 	@$(MAKE) -s --no-print-directory -C $(BASIC)/source -f '$(CURDIR)/Makefile' NO_DEPS=1 BUILD=.. ../libpinwheel.so
 
-SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests benchmarks benchmarks/engine benchmarks/baseline benchmarks/hard docs,$(d)/*.c $(d)/*.h))
+SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests tests/fuzz benchmarks benchmarks/engine benchmarks/baseline benchmarks/hard docs,$(d)/*.c $(d)/*.h))
 
 format:
 	clang-format -i $(SOURCES)

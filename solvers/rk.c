@@ -67,8 +67,6 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
     }
     d->q = pw_take (&l, 3 * n + (size_t)s->rows, sizeof (double));
     d->q0 = pw_take (&l, 3 * n, sizeof (double));
-    d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;
-    d->v0 = d->q0 + n, d->a0 = d->v0 + n;
     d->ledger0 = pw_take (&l, entries, sizeof (double));
     d->rate0 = pw_take (&l, entries, sizeof (double));
     if (pass == 1) break;
@@ -76,6 +74,8 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
     if (d->memory == NULL) return PW_MACHINE;
     l = (pw_layout){ d->memory, 0 };
   }
+  d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;
+  d->v0 = d->q0 + n, d->a0 = d->v0 + n;
   return PW_OK;
 }
 

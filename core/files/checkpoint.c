@@ -8,7 +8,7 @@
 #include <unistd.h>
 #include "files.h"
 
-static const char checkpoint_last[] = "end\n";
+#define CHECKPOINT_LAST "end\n"
 
 /* ---- Writing ---- */
 
@@ -82,7 +82,7 @@ static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw
   unsigned long long check = 0;
   int n = 0;
   const char *end = strstr (c->text, "\nend\n");
-  c->head_end = end ? end + 1 + sizeof checkpoint_last - 1 : NULL;
+  c->head_end = end ? end + 1 + sizeof CHECKPOINT_LAST - 1 : NULL;
   if (end == NULL || sscanf (c->head_end, "state = %zu bytes, check sum %16llx%n", &bytes, &check, &n) != 2 ||
       c->head_end[n] != '\n')
     return pw_fail (error, PW_INPUT, "the checkpoint %s is cut off or damaged", path);
