@@ -12,8 +12,10 @@
 
 enum { REDUNDANT_COORDS = 20 };
 
-static const char *const redundant_fixed[] = { "rk4+none", "rk4+baumgarte", "rk4+projection",
-                                               "rk4+projection:metric=identity", NULL };
+static const char *const redundant_fixed[] = { "rk4+none",       "rk4+baumgarte",
+                                               "rk4+projection", "rk4+projection:metric=identity",
+                                               "rk4+nullspace",  NULL };
+static const char *const redundant_second[] = { "galpha+index3", "galpha+ggl", NULL }; /* of order 2 */
 static const char *const redundant_adaptive[] = {
   "ida+none",        "ida+baumgarte", "ida+ggl",       "ida+index2",     "ida+si1", "adams+none",
   "adams+baumgarte", "bdf+none",      "bdf+baumgarte", "bdf+projection", NULL
@@ -51,6 +53,12 @@ static void redundant_twins (const pw_plugin_table *table, const pw_plugin_table
     redundant_end (table, redundant_fixed[i], rtol, t, name, a, step);
     redundant_end (twin, redundant_fixed[i], rtol, t, name, b, step);
     check_below (redundant_fixed[i], redundant_off (a, b, n), 1e-12, "twins in a fixed-step method");
+  }
+  for (int i = 0; redundant_second[i]; i++) {
+    redundant_end (table, redundant_second[i], rtol, t, name, a, step);
+    redundant_end (twin, redundant_second[i], rtol, t, name, b, step);
+    check_below (redundant_second[i], redundant_off (a, b, n), redundant_off (b, exact, n),
+                 "the twin's own error: ggl weighs angles by the scene's length");
   }
   for (int i = 0; redundant_adaptive[i]; i++) {
     redundant_end (table, redundant_adaptive[i], rtol, t, name, a, step);
@@ -120,6 +128,7 @@ static void redundant_swing (const char *method, double bound, const char *reaso
 static void test_parallelogram_digits (void **state) {
   (void)state;
   for (int i = 0; redundant_fixed[i]; i++) redundant_swing (redundant_fixed[i], 1e-11, "10 h^4 at h = 1e-3");
+  for (int i = 0; redundant_second[i]; i++) redundant_swing (redundant_second[i], 1e-5, "10 h^2 at h = 1e-3");
   for (int i = 0; redundant_adaptive[i]; i++) redundant_swing (redundant_adaptive[i], 1e-7, "1e3 rtol");
 }
 
@@ -144,6 +153,7 @@ static void redundant_shares (const char *method, double bound, const char *reas
 static void test_shares (void **state) {
   (void)state;
   for (int i = 0; redundant_fixed[i]; i++) redundant_shares (redundant_fixed[i], 1e-11, "10 h^4 at h = 1e-3");
+  for (int i = 0; redundant_second[i]; i++) redundant_shares (redundant_second[i], 1e-5, "10 h^2 at h = 1e-3");
   for (int i = 0; redundant_adaptive[i]; i++) redundant_shares (redundant_adaptive[i], 1e-6, "1e4 rtol");
 }
 
@@ -290,6 +300,7 @@ static void redundant_circle (const char *method, double bound, const char *reas
 static void test_robot (void **state) {
   (void)state;
   for (int i = 0; redundant_fixed[i]; i++) redundant_circle (redundant_fixed[i], 1e-10, "100 h^4 at h = 1e-3");
+  for (int i = 0; redundant_second[i]; i++) redundant_circle (redundant_second[i], 1e-4, "100 h^2 at h = 1e-3");
   for (int i = 0; redundant_adaptive[i]; i++) redundant_circle (redundant_adaptive[i], 1e-6, "1e4 rtol");
 }
 
