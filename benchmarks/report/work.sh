@@ -16,12 +16,13 @@ work_table () {
       printf "|---|"; for (i = 1; i <= m; i++) printf "---|"; print "" }
     NR == 1 || $1 == "original" { next }
     !($1 in seen) { seen[$1] = ++scenes; scene[scenes] = $1 }
-    $5 == "ok" && $9 != "nan" {
-      for (k = 1; k <= 3; k++) if ($9 <= target[k]) {
+    { error = $9 == "nan" ? $10 : $9; if ($9 == "nan" && $10 != "nan") angles[$1] = 1 }
+    $5 == "ok" && error != "nan" {
+      for (k = 1; k <= 3; k++) if (error + 0 <= target[k]) {
         key = $1 SUBSEP $2 SUBSEP k
         if (!(key in best) || $21 < best[key]) best[key] = $21 } }
     END { for (s = 1; s <= scenes; s++) {
-        printf "| %s |", scene[s]
+        printf "| %s%s |", scene[s], scene[s] in angles ? " (rad)" : ""
         for (k = 1; k <= 3; k++) { least[k] = -1
           for (i = 1; i <= m; i++) { key = scene[s] SUBSEP method[i] SUBSEP k
             if (key in best && (least[k] < 0 || best[key] < least[k])) least[k] = best[key] } }
@@ -67,12 +68,13 @@ work_figure () {
       column=$((i % 3)) row=$((i / 3)) i=$((i + 1)) last=$((n - i < 3))
       echo "set lmargin at screen $(awk "BEGIN { print 0.07 + 0.318 * $column }"); set rmargin at screen $(awk "BEGIN { print 0.34 + 0.318 * $column }")"
       echo "set tmargin at screen $(awk "BEGIN { print 1 - (92 + 235 * $row) / $height }"); set bmargin at screen $(awk "BEGIN { print 1 - (92 + 178 + 235 * $row) / $height }")"
-      echo "set title '$scene' offset 0,-0.7"
-      [ $column = 0 ] && echo "set ylabel 'largest error [m]' offset 0.8,0" || echo 'unset ylabel'
+      unit=$(awk -F, -v s="$scene" '$1 == s && $5 == "ok" { print $9 == "nan" ? " [rad]" : " [m]"; exit }' "$csv")
+      echo "set title '$scene$unit' offset 0,-0.7"
+      [ $column = 0 ] && echo "set ylabel 'largest error' offset 0.8,0" || echo 'unset ylabel'
       [ $last = 1 ] && echo "set xlabel 'processor time [s]' offset 0,0.4" || echo 'unset xlabel'
       plot=
       for m in $(present); do
-        awk -F, -v s="$scene" -v m="$m" '$1 == s && $2 == m && $5 == "ok" && $9 > 0 && $9 < 10 { print $21, $9 }' "$csv" >"$work/$scene $m"
+        awk -F, -v s="$scene" -v m="$m" '{ e = $9 == "nan" ? $10 : $9 } $1 == s && $2 == m && $5 == "ok" && e > 0 && e < 10 { print $21, e }' "$csv" >"$work/$scene $m"
         [ -s "$work/$scene $m" ] && plot="$plot${plot:+, }'$work/$scene $m' with linespoints lw 1.4 ps 0.6 $(style "$m")"
       done
       awk '{ if (!n++) { a = b = $1; c = d = $2 } if ($1 < a) a = $1; if ($1 > b) b = $1; if ($2 < c) c = $2; if ($2 > d) d = $2 }

@@ -1,0 +1,37 @@
+/* The benchmark suite from outside: its stiff scenes are what they are said to be, and its scripts can be read. */
+#include <stdio.h>
+#include "check.h"
+#include "cli.h"
+
+/* Evaluations of a run of a stiff scene to the end. */
+static double bench_evaluations (const char *scene, const char *method, const char *rtol) {
+  char command[300];
+  snprintf (command, sizeof command,
+            "pinwheel run ./benchmarks/scenes/stiff-%s.yaml --method %s --rtol %s --t-end 1 --json -", scene, method,
+            rtol);
+  cli_good (command);
+  return cli_number (cli_out, "statistics", "rhs", NULL);
+}
+
+/* Stability decides on an explicit method's steps, whatever the tolerance; an implicit one takes far fewer. */
+static void test_stiff (void **state) {
+  (void)state;
+  static const char *const scene[] = { "tyres", "steering", "bushings" };
+  for (int i = 0; i < 3; i++) {
+    double loose = bench_evaluations (scene[i], "erk5+projection", "1e-3"),
+           tight = bench_evaluations (scene[i], "erk5+projection", "1e-5"),
+           implicit = bench_evaluations (scene[i], "ida+ggl", "1e-5");
+    check_below ("evaluations at 1e-5 over 1e-3", tight / loose, 1.2, "accuracy alone would ask for 2.5 times as many");
+    check_below ("implicit over explicit", implicit / tight, 0.02, "ten times less time, at five times the cost each");
+  }
+}
+
+static void test_scripts (void **state) {
+  (void)state;
+  cli_good ("for f in benchmarks/*.sh benchmarks/report/*.sh; do sh -n $f || exit 1; done");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_stiff), cmocka_unit_test (test_scripts) };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
