@@ -70,7 +70,7 @@ static void test_steps_on_it (void **state) {
       before = x.kinetic + x.potential;
     }
     check_below ("balance", most, 1e-8 * before, "kept over the passes, of the energy there is");
-    assert_true (pw_run_statistics (r)->steps < 1.01 * t / steps[i].step);
+    assert_true ((double)pw_run_statistics (r)->steps < 1.01 * t / steps[i].step);
     pw_close (r);
     pw_free (s);
   }
