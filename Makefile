@@ -218,6 +218,8 @@ $(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a 
 
 # These make every allocation fail in turn.
 $(BUILD)/tests/test_alloc: WRAP := -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=free
+# This every call of the libraries below.
+$(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/test_faults.c)
 # A part of SUNDIALS that Pinwheel does not use, to compare with.
 $(BUILD)/tests/test_arkode: WRAP := -Wl,--no-as-needed -lsundials_arkode -Wl,--as-needed
 

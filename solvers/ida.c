@@ -123,19 +123,19 @@ static int ida_open_solver (ida_data *d) {
   d->solver = SUNLinSol_KLU (d->y, d->matrix, d->context);
   d->ida = IDACreate (d->context);
   if (d->ida == NULL || d->solver == NULL) return PW_MACHINE;
-  flag |= IDASetErrHandlerFn (d->ida, pw_sun_message, &d->said);
-  flag |= IDASetUserData (d->ida, d);
-  flag |= IDAInit (d->ida, pw_ida_residual, r->t, d->y, d->yp);
-  flag |= IDAWFtolerances (d->ida, ida_weights);
-  flag |= IDASetId (d->ida, d->id);
-  flag |= IDASetSuppressAlg (d->ida, 1);
-  flag |= IDASetMaxNumSteps (d->ida, -1);
-  flag |= IDASetInitStep (d->ida, pw_first_step (d->run));
-  flag |= IDASetLinearSolver (d->ida, d->solver, d->matrix);
-  flag |= IDASetJacFn (d->ida, pw_ida_matrix);
+  if (flag == IDA_SUCCESS) flag = IDASetErrHandlerFn (d->ida, pw_sun_message, &d->said);
+  if (flag == IDA_SUCCESS) flag = IDASetUserData (d->ida, d);
+  if (flag == IDA_SUCCESS) flag = IDAInit (d->ida, pw_ida_residual, r->t, d->y, d->yp);
+  if (flag == IDA_SUCCESS) flag = IDAWFtolerances (d->ida, ida_weights);
+  if (flag == IDA_SUCCESS) flag = IDASetId (d->ida, d->id);
+  if (flag == IDA_SUCCESS) flag = IDASetSuppressAlg (d->ida, 1);
+  if (flag == IDA_SUCCESS) flag = IDASetMaxNumSteps (d->ida, -1);
+  if (flag == IDA_SUCCESS) flag = IDASetInitStep (d->ida, pw_first_step (d->run));
+  if (flag == IDA_SUCCESS) flag = IDASetLinearSolver (d->ida, d->solver, d->matrix);
+  if (flag == IDA_SUCCESS) flag = IDASetJacFn (d->ida, pw_ida_matrix);
   if (r->settings.ledger && r->s->entries > 0) {
-    flag |= IDAQuadInit (d->ida, ida_work, d->work0);
-    flag |= IDASetQuadErrCon (d->ida, 0);
+    if (flag == IDA_SUCCESS) flag = IDAQuadInit (d->ida, ida_work, d->work0);
+    if (flag == IDA_SUCCESS) flag = IDASetQuadErrCon (d->ida, 0);
   }
   return flag == 0 ? PW_OK : PW_MACHINE;
 }
@@ -210,7 +210,7 @@ static int ida_fail (ida_data *d, int flag, pw_error *error) {
                     : flag == IDA_LSETUP_FAIL  ? "the Newton matrix is singular"
                     : flag == IDA_RES_FAIL     ? "a signal failed"
                     : flag == IDA_TOO_MUCH_ACC ? "the tolerance is beyond the accuracy of the machine"
-                                               : d->said.text;
+                                               : pw_sun_reason (&d->said, flag);
   ida_statistics (d);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", d->run->t, why, d->run->settings.rtol);
 }
@@ -218,11 +218,9 @@ static int ida_fail (ida_data *d, int flag, pw_error *error) {
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   ida_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
-  if (stop != d->stop) {
-    IDASetStopTime (d->ida, stop);
-    d->stop = stop;
-  }
-  int flag = IDASolve (d->ida, stop, &t, d->y, d->yp, IDA_ONE_STEP);
+  int flag = stop != d->stop ? IDASetStopTime (d->ida, stop) : IDA_SUCCESS;
+  d->stop = stop;
+  if (flag >= 0) flag = IDASolve (d->ida, stop, &t, d->y, d->yp, IDA_ONE_STEP);
   if (flag < 0) return ida_fail (d, flag, error);
   r->t = flag == IDA_TSTOP_RETURN ? stop : t;
   if (flag == IDA_TSTOP_RETURN) d->stop = NAN;
@@ -239,15 +237,19 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
  * test does not see them.  In a singular pose those of IDA stay. */
 static int ida_at (pw_run *r, double t, pw_error *error) {
   ida_data *d = r->data;
-  double *work = N_VGetArrayPointer (d->work);
-  if (t == d->begun) {
+  const double *work = N_VGetArrayPointer (d->work);
+  int flag = IDA_SUCCESS;
+  if (t > r->t) flag = IDA_BAD_T;
+  if (t == d->begun)
     ida_fill_vectors (d);
-  } else if (t > r->t || IDAGetDky (d->ida, t, 1, d->yp) != IDA_SUCCESS ||
-             IDAGetDky (d->ida, t, 0, d->y) != IDA_SUCCESS) {
-    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
-  } else if (r->settings.ledger && r->s->entries > 0) {
-    IDAGetQuadDky (d->ida, t, 0, d->work);
+  else if (flag == IDA_SUCCESS) {
+    flag = IDAGetDky (d->ida, t, 1, d->yp);
+    if (flag == IDA_SUCCESS) flag = IDAGetDky (d->ida, t, 0, d->y);
+    if (flag == IDA_SUCCESS && r->settings.ledger && r->s->entries > 0) flag = IDAGetQuadDky (d->ida, t, 0, d->work);
   }
+  if (flag == IDA_BAD_T)
+    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
+  if (flag != IDA_SUCCESS) return ida_fail (d, flag, error);
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
   for (int i = 0; i < r->s->entries; i++) r->ledger_at[i] = work[i];
   if (pw_ida_place (d, t, N_VGetArrayPointer (d->y)) != 0)
@@ -260,18 +262,21 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
 
 static int ida_restart (pw_run *r, pw_error *error) {
   ida_data *d = r->data;
+  int flag = IDA_SUCCESS;
   if (r->settings.ledger && r->s->entries > 0) {
-    double t;
-    IDAGetQuad (d->ida, &t, d->work0);
-    IDAQuadReInit (d->ida, d->work0);
+    double t, *work0 = N_VGetArrayPointer (d->work0);
+    flag = IDAGetQuad (d->ida, &t, d->work0);
+    memcpy (N_VGetArrayPointer (d->work), work0, (size_t)r->s->entries * sizeof *work0);
+    if (flag == IDA_SUCCESS) flag = IDAQuadReInit (d->ida, d->work0);
   }
   ida_fill_vectors (d);
   d->stop = NAN;
   d->begun = r->t;
   d->before = r->statistics;
-  IDASetInitStep (d->ida, pw_first_step (d->run));
-  if (IDAReInit (d->ida, r->t, d->y, d->yp) == IDA_SUCCESS) return PW_OK;
-  return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, d->said.text);
+  if (flag == IDA_SUCCESS) flag = IDASetInitStep (d->ida, pw_first_step (d->run));
+  if (flag == IDA_SUCCESS) flag = IDAReInit (d->ida, r->t, d->y, d->yp);
+  if (flag == IDA_SUCCESS) return PW_OK;
+  return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, pw_sun_reason (&d->said, flag));
 }
 
 static const pw_stabilisation ida_stabilisations[] = {

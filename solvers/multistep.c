@@ -135,19 +135,19 @@ static int multistep_open_solver (multistep_data *d, int formula) {
   int flag = 0;
   d->cvode = CVodeCreate (formula, d->context);
   if (d->cvode == NULL) return PW_MACHINE;
-  flag |= CVodeSetErrHandlerFn (d->cvode, pw_sun_message, &d->said);
-  flag |= CVodeSetUserData (d->cvode, d);
-  flag |= CVodeInit (d->cvode, multistep_rates, r->t, d->y);
-  flag |= CVodeWFtolerances (d->cvode, multistep_weights);
-  flag |= CVodeSetMaxNumSteps (d->cvode, -1);
-  flag |= CVodeSetInitStep (d->cvode, pw_first_step (r));
+  if (flag == CV_SUCCESS) flag = CVodeSetErrHandlerFn (d->cvode, pw_sun_message, &d->said);
+  if (flag == CV_SUCCESS) flag = CVodeSetUserData (d->cvode, d);
+  if (flag == CV_SUCCESS) flag = CVodeInit (d->cvode, multistep_rates, r->t, d->y);
+  if (flag == CV_SUCCESS) flag = CVodeWFtolerances (d->cvode, multistep_weights);
+  if (flag == CV_SUCCESS) flag = CVodeSetMaxNumSteps (d->cvode, -1);
+  if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
   if (d->projects) {
-    flag |= CVodeSetProjFn (d->cvode, pw_multistep_correct);
-    flag |= CVodeSetProjFrequency (d->cvode, (long)pw_option_value (r, "every"));
+    if (flag == CV_SUCCESS) flag = CVodeSetProjFn (d->cvode, pw_multistep_correct);
+    if (flag == CV_SUCCESS) flag = CVodeSetProjFrequency (d->cvode, (long)pw_option_value (r, "every"));
   }
   if (r->settings.ledger && r->s->entries > 0) {
-    flag |= CVodeQuadInit (d->cvode, multistep_work, d->work0);
-    flag |= CVodeSetQuadErrCon (d->cvode, 0);
+    if (flag == CV_SUCCESS) flag = CVodeQuadInit (d->cvode, multistep_work, d->work0);
+    if (flag == CV_SUCCESS) flag = CVodeSetQuadErrCon (d->cvode, 0);
   }
   return flag == 0 ? multistep_open_iteration (d, formula) : PW_MACHINE;
 }
@@ -209,7 +209,7 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
                     : flag == CV_PROJFUNC_FAIL      ? "a signal failed"
                     : flag == CV_REPTD_PROJFUNC_ERR ? "the projection does not converge however small the step"
                     : flag == CV_TOO_MUCH_ACC       ? "the tolerance is beyond the accuracy of the machine"
-                                                    : d->said.text;
+                                                    : pw_sun_reason (&d->said, flag);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", r->t, why, r->settings.rtol);
 }
 
@@ -226,7 +226,8 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   if (status > 0) return pw_fail_singular (r, t, error);
   if (status < 0) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   if (r->settings.ledger && r->s->entries > 0) {
-    CVodeGetQuad (d->cvode, &work, d->work);
+    int flag = CVodeGetQuad (d->cvode, &work, d->work);
+    if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
     memcpy (r->ledger, N_VGetArrayPointer (d->work), (size_t)r->s->entries * sizeof (double));
   }
   r->projected += d->added;
@@ -236,13 +237,11 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
 int pw_multistep_advance (pw_run *r, double t_end, pw_error *error) {
   multistep_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
-  if (stop != d->stop) {
-    CVodeSetStopTime (d->cvode, stop);
-    d->stop = stop;
-  }
+  int flag = stop != d->stop ? CVodeSetStopTime (d->cvode, stop) : CV_SUCCESS;
+  d->stop = stop;
   r->near = 0;
   d->added = 0;
-  int flag = CVode (d->cvode, stop, d->y, &t, CV_ONE_STEP);
+  if (flag >= 0) flag = CVode (d->cvode, stop, d->y, &t, CV_ONE_STEP);
   if (flag < 0) return multistep_fail (d, flag, error);
   if (flag == CV_TSTOP_RETURN) d->stop = NAN;
   multistep_count (d);
@@ -283,15 +282,16 @@ int pw_multistep_at (pw_run *r, double t, pw_error *error) {
     multistep_copy_reached (r);
     return PW_OK;
   }
-  if (!(t < r->t) || CVodeGetDky (d->cvode, t, 0, d->y) != CV_SUCCESS)
+  int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->y) : CV_BAD_T;
+  if (flag == CV_BAD_T)
     return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
+  if (flag == CV_SUCCESS && r->settings.ledger && r->s->entries > 0) flag = CVodeGetQuadDky (d->cvode, t, 0, d->work);
+  if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
   const double *y = N_VGetArrayPointer (d->y);
   memcpy (r->q_at, y, (size_t)d->n * sizeof *y);
   memcpy (r->v_at, y + d->n, (size_t)d->n * sizeof *y);
-  if (r->settings.ledger && r->s->entries > 0) {
-    CVodeGetQuadDky (d->cvode, t, 0, d->work);
+  if (r->settings.ledger && r->s->entries > 0)
     memcpy (r->ledger_at, N_VGetArrayPointer (d->work), (size_t)r->s->entries * sizeof *y);
-  }
   int status = multistep_complete (d, t);
   if (status > 0) return pw_fail_singular (r, t, error);
   return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
@@ -301,8 +301,8 @@ int pw_multistep_restart (pw_run *r, pw_error *error) {
   multistep_data *d = r->data;
   multistep_fill (d);
   int flag = CVodeReInit (d->cvode, r->t, d->y);
-  flag |= CVodeSetInitStep (d->cvode, pw_first_step (r));
-  if (r->settings.ledger && r->s->entries > 0) flag |= CVodeQuadReInit (d->cvode, d->work0);
+  if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
+  if (flag == CV_SUCCESS && r->settings.ledger && r->s->entries > 0) flag = CVodeQuadReInit (d->cvode, d->work0);
   if (flag == CV_SUCCESS) return PW_OK;
-  return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, d->said.text);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, pw_sun_reason (&d->said, flag));
 }

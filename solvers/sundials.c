@@ -14,6 +14,11 @@ void pw_sun_message (int code, const char *module, const char *function, char *t
   snprintf (s->text, sizeof s->text, "%s", text);
 }
 
+const char *pw_sun_reason (pw_sun_said *said, int flag) {
+  if (*said->text == 0) snprintf (said->text, sizeof said->text, "SUNDIALS fails with the flag %d", flag);
+  return said->text;
+}
+
 void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind) {
   size_t size = (size_t)SUNSparseMatrix_Columns (matrix), nonzeros = (size_t)colptr[size];
   memcpy (SUNSparseMatrix_IndexPointers (matrix), colptr, (size + 1) * sizeof *colptr);

@@ -24,6 +24,8 @@ typedef struct {
   char text[256];
 } pw_sun_said;
 void pw_sun_message (int code, const char *module, const char *function, char *text, void *said);
+/* That message, or the flag in words if there was none. */
+const char *pw_sun_reason (pw_sun_said *said, int flag);
 
 /* A square sparse matrix of this pattern in compressed columns, all 0; NULL: out of memory. */
 SUNMatrix pw_sun_matrix (int size, const int64_t *colptr, const int64_t *rowind, SUNContext context);

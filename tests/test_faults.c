@@ -1,0 +1,180 @@
+/* Every call of SUNDIALS and AMD is made to fail in turn: each is an error in words, nothing is printed, and (make san)
+ * nothing is left behind.  Linked with --wrap for the functions listed here; the Makefile reads the list. */
+#include <amd.h>
+#include <cvodes/cvodes.h>
+#include <idas/idas.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include <nvector/nvector_serial.h>
+#include <sunlinsol/sunlinsol_klu.h>
+#include <sunmatrix/sunmatrix_sparse.h>
+#include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+#include "check.h"
+#include "pinwheel-solvers.h"
+#include "runs.h"
+#include "scene.h"
+
+#define pw_plugin faults_chain
+#include "../models/chain.c"
+#undef pw_plugin
+
+static struct {
+  long count;       /* calls so far */
+  long fail;        /* the one that fails; 0: none */
+  const char *name; /* of that */
+} fault;
+
+static int fault_here (const char *name) {
+  if (++fault.count != fault.fail) return 0;
+  fault.name = name;
+  return 1;
+}
+
+/* A function that returns an address, and one that returns a flag; it is not called when it is to fail. */
+#define FAULT_ADDRESS(type, name, parameters, arguments)        \
+  type __real_##name parameters;                                \
+  type __wrap_##name parameters;                                \
+  type __wrap_##name parameters {                               \
+    return fault_here (#name) ? NULL : __real_##name arguments; \
+  }
+#define FAULT_FLAG(flag, name, parameters, arguments)           \
+  int __real_##name parameters;                                 \
+  int __wrap_##name parameters;                                 \
+  int __wrap_##name parameters {                                \
+    return fault_here (#name) ? flag : __real_##name arguments; \
+  }
+
+/* clang-format off: one line each, for the Makefile */
+FAULT_FLAG (-1, SUNContext_Create, (void *comm, SUNContext *c), (comm, c))
+FAULT_ADDRESS (N_Vector, N_VNew_Serial, (sunindextype n, SUNContext c), (n, c))
+FAULT_ADDRESS (SUNMatrix, SUNSparseMatrix, (sunindextype m, sunindextype n, sunindextype nnz, int type, SUNContext c),
+               (m, n, nnz, type, c))
+FAULT_ADDRESS (SUNLinearSolver, SUNLinSol_KLU, (N_Vector y, SUNMatrix a, SUNContext c), (y, a, c))
+FAULT_ADDRESS (SUNLinearSolver, SUNLinSolNewEmpty, (SUNContext c), (c))
+FAULT_ADDRESS (SUNNonlinearSolver, SUNNonlinSol_FixedPoint, (N_Vector y, int m, SUNContext c), (y, m, c))
+FAULT_FLAG (SUNLS_PACKAGE_FAIL_UNREC, SUNLinSolSetup, (SUNLinearSolver s, SUNMatrix a), (s, a))
+FAULT_FLAG (SUNLS_PACKAGE_FAIL_UNREC, SUNLinSolSolve,
+            (SUNLinearSolver s, SUNMatrix a, N_Vector x, N_Vector b, realtype tol), (s, a, x, b, tol))
+FAULT_ADDRESS (void *, IDACreate, (SUNContext c), (c))
+FAULT_FLAG (IDA_MEM_FAIL, IDAInit, (void *m, IDAResFn f, realtype t, N_Vector y, N_Vector yp), (m, f, t, y, yp))
+FAULT_FLAG (IDA_MEM_FAIL, IDAReInit, (void *m, realtype t, N_Vector y, N_Vector yp), (m, t, y, yp))
+FAULT_FLAG (IDA_MEM_FAIL, IDAWFtolerances, (void *m, IDAEwtFn f), (m, f))
+FAULT_FLAG (IDA_MEM_FAIL, IDASetId, (void *m, N_Vector id), (m, id))
+FAULT_FLAG (IDA_MEM_FAIL, IDASetLinearSolver, (void *m, SUNLinearSolver s, SUNMatrix a), (m, s, a))
+FAULT_FLAG (IDA_MEM_FAIL, IDAQuadInit, (void *m, IDAQuadRhsFn f, N_Vector y), (m, f, y))
+FAULT_FLAG (IDA_MEM_FAIL, IDAQuadReInit, (void *m, N_Vector y), (m, y))
+FAULT_FLAG (IDA_ILL_INPUT, IDASetInitStep, (void *m, realtype h), (m, h))
+FAULT_FLAG (IDA_ILL_INPUT, IDASetStopTime, (void *m, realtype t), (m, t))
+FAULT_FLAG (IDA_LSOLVE_FAIL, IDASolve, (void *m, realtype end, realtype *t, N_Vector y, N_Vector yp, int task),
+            (m, end, t, y, yp, task))
+FAULT_FLAG (IDA_BAD_DKY, IDAGetDky, (void *m, realtype t, int k, N_Vector y), (m, t, k, y))
+FAULT_FLAG (IDA_BAD_DKY, IDAGetQuadDky, (void *m, realtype t, int k, N_Vector y), (m, t, k, y))
+FAULT_FLAG (IDA_NO_QUAD, IDAGetQuad, (void *m, realtype *t, N_Vector y), (m, t, y))
+FAULT_ADDRESS (void *, CVodeCreate, (int lmm, SUNContext c), (lmm, c))
+FAULT_FLAG (CV_MEM_FAIL, CVodeInit, (void *m, CVRhsFn f, realtype t, N_Vector y), (m, f, t, y))
+FAULT_FLAG (CV_MEM_FAIL, CVodeReInit, (void *m, realtype t, N_Vector y), (m, t, y))
+FAULT_FLAG (CV_MEM_FAIL, CVodeWFtolerances, (void *m, CVEwtFn f), (m, f))
+FAULT_FLAG (CV_MEM_FAIL, CVodeSetLinearSolver, (void *m, SUNLinearSolver s, SUNMatrix a), (m, s, a))
+FAULT_FLAG (CV_MEM_FAIL, CVodeSetNonlinearSolver, (void *m, SUNNonlinearSolver s), (m, s))
+FAULT_FLAG (CV_MEM_FAIL, CVodeQuadInit, (void *m, CVQuadRhsFn f, N_Vector y), (m, f, y))
+FAULT_FLAG (CV_MEM_FAIL, CVodeQuadReInit, (void *m, N_Vector y), (m, y))
+FAULT_FLAG (CV_ILL_INPUT, CVodeSetInitStep, (void *m, realtype h), (m, h))
+FAULT_FLAG (CV_ILL_INPUT, CVodeSetStopTime, (void *m, realtype t), (m, t))
+FAULT_FLAG (CV_LSOLVE_FAIL, CVode, (void *m, realtype end, N_Vector y, realtype *t, int task), (m, end, y, t, task))
+FAULT_FLAG (CV_BAD_DKY, CVodeGetDky, (void *m, realtype t, int k, N_Vector y), (m, t, k, y))
+FAULT_FLAG (CV_BAD_DKY, CVodeGetQuadDky, (void *m, realtype t, int k, N_Vector y), (m, t, k, y))
+FAULT_FLAG (CV_NO_QUAD, CVodeGetQuad, (void *m, realtype *t, N_Vector y), (m, t, y))
+FAULT_FLAG (AMD_OUT_OF_MEMORY, amd_order, (int n, const int p[], const int i[], int q[], double c[], double info[]),
+            (n, p, i, q, c, info))
+/* clang-format on */
+
+/* A run with samples inside steps, a checkpoint, a restart and a discontinuity, as far as it gets. */
+static int fault_run (pw_system *s, const char *method, pw_error *error) {
+  pw_sample sample;
+  pw_archive archive = { .at = NULL };
+  pw_run *r = pw_open (s, method, &(pw_settings){ .step = 0.02, .rtol = 1e-3, .ledger = 1 }, error);
+  int status = r ? pw_advance_to (r, 0.1, 0.1, error) : error->status;
+  if (status == PW_OK) status = pw_advance (r, 0.2, error);
+  if (status == PW_OK) status = pw_at (r, 0.5 * (0.1 + pw_time (r)), &sample, error);
+  if (status == PW_OK) status = pw_run_save (r, &archive, error);
+  if (status == PW_OK) status = pw_advance (r, 0.3, error);
+  if (status == PW_OK) status = pw_restart (r, NULL, NULL, error);
+  if (status == PW_OK) status = pw_advance (r, 0.4, error);
+  if (status == PW_OK) status = pw_at (r, pw_time (r), &sample, error);
+  pw_archive_free (&archive);
+  pw_close (r);
+  return status;
+}
+
+/* Calls whose failure the integrators may repair by themselves, with a smaller step. */
+static int fault_may_pass (void) {
+  return strcmp (fault.name, "SUNLinSolSetup") == 0 || strcmp (fault.name, "SUNLinSolSolve") == 0;
+}
+
+/* The same while standard output and error go to a file; returns its size in *said. */
+static int fault_run_quietly (pw_system *s, const char *method, long *said, pw_error *error) {
+  FILE *file = tmpfile ();
+  assert_non_null (file);
+  fflush (NULL);
+  int out = dup (1), err = dup (2);
+  dup2 (fileno (file), 1);
+  dup2 (fileno (file), 2);
+  int status = fault_run (s, method, error);
+  fflush (NULL);
+  dup2 (out, 1);
+  dup2 (err, 2);
+  close (out);
+  close (err);
+  *said = lseek (fileno (file), 0, SEEK_END);
+  fclose (file);
+  return status;
+}
+
+static void fault_each (pw_system *s, const char *method) {
+  long said;
+  for (fault.fail = 1;; fault.fail++) {
+    pw_error error = { 0 };
+    fault.count = 0;
+    int status = fault_run_quietly (s, method, &said, &error);
+    assert_int_equal (said, 0);
+    if (fault.count < fault.fail) {
+      check_ok (status, &error);
+      break;
+    }
+    int good = (status == PW_MACHINE || status == PW_METHOD) && error.status == status && strlen (error.text) > 10 &&
+               strstr (error.text, "s:  ") == NULL;
+    if (status == PW_OK) good = fault_may_pass ();
+    if (!good)
+      print_error ("%s: call %ld, %s: status %d, \"%s\"\n", method, fault.fail, fault.name, status, error.text);
+    assert_true (good);
+  }
+  fault.fail = 0;
+}
+
+static void test_faults (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *t = pw_methods[i]->stabilisations; t->name; t++) {
+      char name[100];
+      snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, t->name);
+      fault_each (s, name);
+    }
+  pw_free (s);
+}
+
+/* A scene large enough for its rows to be ordered. */
+static void test_ordering (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&faults_chain, "n", 20.0, NULL);
+  fault_each (s, "rk4+projection");
+  assert_true (fault.name && strcmp (fault.name, "amd_order") == 0);
+  pw_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_faults), cmocka_unit_test (test_ordering) };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
