@@ -69,7 +69,7 @@ static double run_time_scale (const pw_run *r) {
 static int run_open_saddle (pw_run *r, pw_error *error) {
   pw_saddle_close (r->saddle);
   r->saddle = pw_saddle_open (r->s, r->s->mass, r->s->rows, r->active, error);
-  return r->saddle ? PW_OK : PW_INPUT;
+  return r->saddle ? PW_OK : error ? error->status : PW_MACHINE;
 }
 
 /* Accelerations, multipliers and the ledger's rates of the state reached, anew; says why if that fails. */
