@@ -77,7 +77,7 @@ FUZZ_SHARE := tests/fuzz/fuzz.c $(if $(FUZZING),,tests/fuzz/replay.c)
 FUZZ       := $(filter-out tests/fuzz/fuzz.c tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 FUZZERS    := $(FUZZ:tests/fuzz/%.c=$(BUILD)/fuzz/%)
 
-.PHONY: all everything demo test test-all layers san fuzz fuzzers cov clang gcc format format-check bench bench-quick bench-engine \
+.PHONY: all everything demo test test-all layers san tsan valgrind fuzz fuzzers cov clang gcc format format-check bench bench-quick bench-engine \
         bench-effects hard basic deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -100,6 +100,7 @@ help:
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
 	@echo 'make fuzz TIME=60     models, expressions, tables, checkpoints, command lines from a fuzzer, so many seconds each'
 	@echo 'make cov              lines that the tests run, and those they do not'
+	@echo 'make tsan             runs in many threads with ThreadSanitizer; valgrind: some tests with memcheck'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
 	@echo 'make install          to PREFIX (/usr/local) below DESTDIR; uninstall'
 	@echo 'make clean            remove $(BUILD)/'
@@ -297,6 +298,22 @@ cov:
 	@$(MAKE) --no-print-directory NO_DEPS=1 CC=gcc BUILD=$(VARIANT)/cov CFLAGS='-O1 -g' SAN='--coverage -fprofile-update=atomic' test-all || echo 'some tests fail in this build, layers among them'
 	@sh .ci/coverage $(VARIANT)/cov 95
 cov: $(FIRST)
+
+# Many systems in many threads at once.
+tsan:
+	@$(MAKE) --no-print-directory NO_DEPS=1 BUILD=$(VARIANT)/tsan CFLAGS='-O1 -g' SAN=-fsanitize=thread \
+	  all $(THREADED:%=$(VARIANT)/tsan/tests/%)
+	@BUILD=$(VARIANT)/tsan PINWHEEL=$(VARIANT)/tsan/pinwheel sh .ci/run-tests $(THREADED:%=$(VARIANT)/tsan/tests/%)
+
+THREADED := test_determinism
+
+# Tests that between them go everywhere, and not too often.
+MEMCHECK := checkpoint description faults gear locale messages redundant store yaml
+valgrind: all $(MEMCHECK:%=$(BUILD)/tests/test_%)
+	@RUNNER='valgrind -q --error-exitcode=99 --leak-check=full --errors-for-leak-kinds=definite' $(RUN_TESTS) \
+	  $(MEMCHECK:%=$(BUILD)/tests/test_%)
+
+tsan valgrind: $(FIRST)
 
 clang:
 	@$(MAKE) --no-print-directory CC=clang WERROR=1 BUILD=$(VARIANT)/clang everything
