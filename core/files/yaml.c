@@ -138,6 +138,10 @@ static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
       (v[1] && pw_yaml_text (y, v[1], "about", &y->table.about, error) != PW_OK) ||
       (v[2] && yaml_run (y, v[2], x, error) != PW_OK))
     return error->status;
+  for (int i = 3; key[i]; i++)
+    if (v[i] && v[i]->count > PW_YAML_ITEMS)
+      return pw_yaml_fail (y, v[i]->at, error, "%s: %d entries; a model may have %d", key[i], v[i]->count,
+                           PW_YAML_ITEMS);
   y->let = v[4];
   y->bodies = v[5];
   y->elements = v[6];

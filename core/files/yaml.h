@@ -113,7 +113,15 @@ typedef struct {
   pw_names elements;       /* once an expression asks for them: names of all elements, to the index of their kinds */
   const pw_node **node;    /* where each was named */
   int named;
+  double points;     /* of tables, so far */
+  double evaluators; /* of signals by expressions, so far, each by its size */
 } pw_yaml_builder;
+
+/* What one model may have in memory, so that a small file cannot ask for all there is; each is about 1 GB. */
+enum { PW_YAML_ITEMS = 1000000 };   /* bodies, elements, parameters or definitions, of each */
+enum { PW_YAML_POINTS = 20000000 }; /* of all tables */
+enum { PW_YAML_WORDS = 5000000 };   /* names that all signals by expressions know, parameters and definitions */
+enum { PW_YAML_EVALUATOR = 60 };    /* an evaluator without a name is as large as so many names */
 
 void pw_yaml_build (pw_model *m, const void *parameters);
 

@@ -201,6 +201,13 @@ static int signal_all (signal_reader *r, const pw_kind *kind, const pw_node *con
 static int signal_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
                            pw_signal *signal, pw_error *error) {
   int parameters = b->y->parameters, values = parameters + b->lets;
+  for (int i = 0; i < 3; i++) b->evaluators += v[i] ? PW_YAML_EVALUATOR + values : 0;
+  if (b->evaluators > PW_YAML_WORDS)
+    return pw_yaml_fail (
+        b->y, v[0]->at, error,
+        "%s: the signals by expressions up to here, each of which knows %d parameters and definitions, "
+        "need more memory than a model may have",
+        what, values);
   signal_recipe *r = pw_arena_take (&b->m->arena, sizeof *r + (size_t)values * sizeof *r->value);
   if (r == NULL) return pw_yaml_no_memory (b->y, error);
   r->y = b->y;

@@ -96,8 +96,8 @@ static int table_file (pw_yaml_builder *b, const char *what, const pw_node *node
   return status == PW_OK ? PW_OK : pw_yaml_no_memory (b->y, error);
 }
 
-int pw_yaml_points (pw_yaml_builder *b, const char *what, const pw_node *node, const pw_node *const v[3], pw_signal *s,
-                    pw_error *error) {
+static int table_read (pw_yaml_builder *b, const char *what, const pw_node *node, const pw_node *const v[3],
+                       pw_signal *s, pw_error *error) {
   const char *column[2] = { "1", "2" };
   if ((v[0] != NULL) + (v[1] != NULL) != 1)
     return pw_yaml_fail (b->y, node->at, error, "%s: a table has either points or a file", what);
@@ -105,4 +105,14 @@ int pw_yaml_points (pw_yaml_builder *b, const char *what, const pw_node *node, c
   if (v[0]) return table_list (b, what, v[0], s, error);
   if (table_columns (b, v[2], what, column, error) != PW_OK) return error->status;
   return table_file (b, what, v[1], column, s, error);
+}
+
+/* Many tables may be read from one file. */
+int pw_yaml_points (pw_yaml_builder *b, const char *what, const pw_node *node, const pw_node *const v[3], pw_signal *s,
+                    pw_error *error) {
+  int status = table_read (b, what, node, v, s, error);
+  if (status == PW_OK) b->points += s->table.count;
+  if (status != PW_OK || b->points <= PW_YAML_POINTS) return status;
+  return pw_yaml_fail (b->y, node->at, error, "%s: the tables up to here have more than %d points, the most of a model",
+                       what, PW_YAML_POINTS);
 }
