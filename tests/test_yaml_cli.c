@@ -25,7 +25,8 @@ static void test_same_sweeps (void **state) {
       " -t 1 --vary a=lin:0.3:0.7:9 --jobs 2 -o @/text.csv >/dev/null 2>&1 && cmp @/c.csv @/text.csv");
 }
 
-/* Every model on the search path: as text, and its run compared; those with function signals are refused by name. */
+/* Every model on the search path: as text, and its run compared; what text cannot say is
+ * refused by name. */
 static void test_round_trip (void **state) {
   (void)state;
   cli_good ("pinwheel list models >/dev/null");
