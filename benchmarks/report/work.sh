@@ -52,7 +52,7 @@ failure_table () {
 truth_table () {
   echo '| scene | errors are against | which is known to [m] | [rad] |'
   echo '|---|---|---|---|'
-  awk -F'"' 'NR > 1 { split ($1, a, ","); split ($3, b, ","); printf "| %s | %s | %s | %s |\n", a[1], $2, b[3], b[4] }' "$results/truth-$machine.csv"
+  awk -F'"' 'NR > 1 { split ($1, a, ","); split ($3, b, ","); printf "| %s | %s | %s | %s |\n", a[1], $2, (b[3] > 0 ? b[3] : "not compared"), (b[4] > 0 ? b[4] : "not compared") }' "$results/truth-$machine.csv"
 }
 
 # One panel per scene, four rows of three.
