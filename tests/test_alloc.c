@@ -149,6 +149,9 @@ static int alloc_run (const char *method, pw_error *error) {
   pw_run *r = pw_open (s, method, &(pw_settings){ .step = 1e-2, .rtol = 1e-4, .ledger = 1 }, error);
   status = r ? pw_advance_to (r, 0.1, 0.1, error) : error->status;
   if (status == PW_OK) status = pw_at (r, pw_time (r), &sample, error);
+  pw_archive archive = { .at = NULL };
+  if (status == PW_OK) status = pw_run_save (r, &archive, error);
+  pw_archive_free (&archive);
   if (status == PW_OK) status = pw_restart (r, NULL, NULL, error);
   if (status == PW_OK) status = pw_advance (r, 0.2, error);
   pw_close (r);
