@@ -38,7 +38,7 @@ FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error) {
   char path[PLOT_PATH + 8], text[80];
   snprintf (path, sizeof path, "%s/%s.part", p->folder, name);
   FILE *file = fopen (path, "w");
-  if (file == NULL) pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  if (file == NULL) pw_fail (error, PW_MACHINE, "cannot write %s/%s: %s", p->folder, name, strerror (errno));
   if (file && strstr (name, ".dat") && pw_plot_incomplete (p, text, sizeof text)) fprintf (file, "# %s\n", text);
   return file;
 }
