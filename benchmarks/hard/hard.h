@@ -39,10 +39,10 @@ typedef struct {
 
 /* A verdict for all methods whose name fits a pattern, in the order written: the last one that fits counts. */
 typedef struct {
-  char pattern[48];
-  int verdict;     /* bits: 1 << hard_verdict, more than one where the outcome is a matter of luck */
-  char why[200];   /* in words, for what is no pass */
-  char reason[80]; /* of a refusal: what its message must contain */
+  char pattern[400]; /* or several, with blanks between them */
+  int verdict;       /* bits: 1 << hard_verdict, more than one where the outcome is a matter of luck */
+  char why[200];     /* in words, for what is no pass */
+  char reason[80];   /* of a refusal: what its message must contain */
 } hard_expectation;
 
 /* A case: a model, a time span, a truth or invariant, and what is expected of each method. */
