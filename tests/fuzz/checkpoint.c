@@ -22,11 +22,12 @@ static void checkpoint_load (const uint8_t *data, size_t size, const char *metho
 }
 
 int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
-  static const char *const methods[] = { "rk4+projection", "erk8+projection", "ida+ggl" };
+  static const char *const methods[] = { "rk4+projection", "erk8+projection", "ida+ggl",
+                                         "bdf+projection", "galpha+ggl",      "adams" };
   pw_error error = { 0 };
   pw_checkpoint c;
   if (size < 1) return 0;
-  const char *method = methods[data[0] % 3];
+  const char *method = methods[data[0] % 6];
   if (pw_checkpoint_read (fuzz_file (data + 1, size - 1, ".ck"), &c, &error) == PW_OK)
     checkpoint_load (c.state.at, c.state.size, method);
   pw_checkpoint_free (&c);

@@ -9,21 +9,23 @@
 #include "system.h"
 
 /* A few steps: what a description can do to the solvers. */
-static void model_run (pw_system *s) {
+static void model_run (pw_system *s, const char *method) {
   pw_error error = { 0 };
   pw_settings settings = { .step = 1e-3, .span = 1e-2, .ledger = 1 };
-  pw_run *r = s->coords <= 60 && s->rows <= 60 ? pw_open (s, "rk4+projection", &settings, &error) : NULL;
+  pw_run *r = s->coords <= 60 && s->rows <= 60 ? pw_open (s, method, &settings, &error) : NULL;
   for (int i = 0; r && i < 3 && error.status == PW_OK; i++) pw_advance (r, 1, &error);
   if (r) pw_close (r);
 }
 
 int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
+  static const char *const methods[] = { "rk4+projection", "ida+ggl", "erk5+nullspace", "galpha+ggl",
+                                         "bdf+projection" };
   pw_error error = { 0 };
   pw_file *file = pw_file_open (fuzz_file (data, size, ".yaml"), &error);
   pw_model *m = file ? pw_file_model (file, &error) : NULL;
   pw_system *s = m && pw_build (m, &error) == PW_OK ? pw_compile (m, &error) : NULL;
   if (s == NULL && error.status >= 0) abort (); /* what fails says so */
-  if (s) model_run (s);
+  if (s) model_run (s, methods[size % 5]);
   pw_free (s);
   pw_model_free (m);
   pw_file_close (file);
