@@ -41,10 +41,10 @@ static int table_climbs (const char *name) {
 /* The file's own path if it lies below the folder, links resolved; malloced. */
 static char *table_below (const char *folder, const char *name, const char **why) {
   char *joined = pw_join (folder, name, ""), *path = joined ? realpath (joined, NULL) : NULL;
-  size_t n = strlen (folder);
+  size_t n = strcmp (folder, "/") == 0 ? 0 : strlen (folder);
   *why = joined == NULL ? "out of memory" : strerror (errno);
   free (joined);
-  if (path == NULL || (strncmp (path, folder, n) == 0 && path[n] == '/')) return path;
+  if (path == NULL || (strncmp (path, folder, n) == 0 && (path[n] == '/' || path[n] == 0))) return path;
   *why = "it is a link that leads out of the model's folder";
   free (path);
   return NULL;
