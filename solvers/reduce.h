@@ -67,6 +67,10 @@ int pw_reduce_open (pw_reduce *r, pw_system *s, const double *weight, int rows, 
                     pw_error *error);
 void pw_reduce_close (pw_reduce *r);
 
+/* Matches a component's massless coordinates to rows at the J last swept, with complete pivoting over their columns.
+ * Returns how many pivots were found.  For reduce_open.c alone. */
+int pw_reduce_match (pw_component *c);
+
 /* Eliminates with the J last swept; matches anew if a pivot has become much smaller than when it was matched.  Returns
  * the smallest pivot squared, relative to its row, at the last matching; 0 if singular. */
 double pw_reduce_factor (pw_reduce *r);
