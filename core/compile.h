@@ -1,0 +1,37 @@
+/* From the description to the compiled system: what pw_compile counts before the allocation, and what it fills behind
+ * it.  For compile.c and compile_fill.c only. */
+#ifndef PW_COMPILE_H
+#define PW_COMPILE_H
+
+#include "model.h"
+#include "system.h"
+
+/* What is known before the allocation. */
+typedef struct {
+  const pw_model *m;
+  pw_names body, element;
+  const pw_kind **kind; /* kinds in use, in the order of the slabs */
+  int *count;           /* elements of each */
+  int *slab_of;         /* slab of each element */
+  int kinds;
+  pw_system size; /* its counts */
+  size_t text;    /* bytes of all names */
+  int reads;      /* states read by signals, in all */
+  size_t points;  /* of tables, in all */
+} pw_compilation;
+
+/* Arrays that the elements share: where each goes on. */
+typedef struct {
+  char *text;
+  double *x; /* of signals that read states */
+  double *table;
+  int *state;
+} pw_pools;
+
+/* How many elements of the system an element of the description stands for. */
+int pw_compile_copies (const pw_model *m, const pw_kind *kind);
+
+/* Fills a system that has been laid out.  Errors: PW_MACHINE, PW_INPUT. */
+int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error);
+
+#endif

@@ -1,0 +1,219 @@
+/* Fills a system that has been laid out: bodies, elements, signals, the ledger's entries, scales. */
+#include <math.h>
+#include <string.h>
+#include "compile.h"
+#include "signal.h"
+
+static const char *compile_text (pw_pools *pools, const char *text) {
+  char *copy = strcpy (pools->text, text);
+  pools->text += strlen (text) + 1;
+  return copy;
+}
+
+static void compile_bodies (const pw_compilation *c, pw_system *s, pw_pools *pools) {
+  s->model = compile_text (pools, c->m->name);
+  for (int i = 0; i < s->bodies; i++) {
+    const pw_body *b = &c->m->body[i];
+    s->body_name[i] = compile_text (pools, b->name);
+    s->mass[3 * i] = s->mass[3 * i + 1] = b->mass;
+    s->mass[3 * i + 2] = b->inertia;
+    memcpy (s->q0 + 3 * i, b->start, sizeof b->start);
+    memcpy (s->v0 + 3 * i, b->rate, sizeof b->rate);
+  }
+  s->pose[s->bodies] = (pw_pose){ .cos = 1 };
+}
+
+/* The points of a table, and what is between them. */
+static void compile_table (pw_source *source, pw_pools *pools) {
+  pw_signal *s = &source->signal;
+  size_t n = (size_t)s->table.count;
+  double *t = memcpy (pools->table, s->table.t, n * sizeof *t), *value = t + n;
+  s->table.value = memcpy (value, s->table.value, n * sizeof *value);
+  s->table.t = t;
+  source->spline = value + n;
+  pools->table += 4 * n;
+  pw_table_spline (s, source->spline);
+}
+
+/* The states a function reads. */
+static int compile_reads (const pw_compilation *c, pw_system *s, pw_source *source, const char *const *reads,
+                          pw_pools *pools, const char *element, pw_error *error) {
+  source->state = pools->state;
+  source->x = pools->x;
+  for (const char *const *r = reads; *r; r++) {
+    pw_error why = { 0 };
+    int state = pw_find_state (s, *r, &why);
+    if (state < 0)
+      return pw_fail (error, PW_INPUT, "model %s: element %s reads a state: %s", c->m->name, element, why.text);
+    *pools->state++ = state;
+    source->reads++;
+  }
+  pools->x += 2 * source->reads;
+  s->readers += source->reads > 0;
+  return PW_OK;
+}
+
+static int compile_source (const pw_compilation *c, pw_system *s, pw_source *source, const pw_signal *signal,
+                           pw_pools *pools, const char *element, pw_error *error) {
+  if (signal->type == PW_FUNCTION && signal->function.open) {
+    void *own = signal->function.open (signal->function.context);
+    if (own == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", c->m->name);
+    source->signal = *signal;
+    source->signal.function.context = own;
+  } else
+    source->signal = *signal;
+  if (signal->type == PW_TABLE) compile_table (source, pools);
+  if (signal->type != PW_FUNCTION || signal->function.reads == NULL) return PW_OK;
+  return compile_reads (c, s, source, signal->function.reads, pools, element, error);
+}
+
+/* Puts element `e` of its slab where the kind will find it; `body` is the one an each_body kind acts on, or -1. */
+static int compile_element (const pw_compilation *c, pw_system *s, pw_slab *k, int e, const pw_element *from, int body,
+                            pw_error *error) {
+  static const pw_body ground = { .name = "ground" };
+  const pw_kind *kind = k->kind;
+  const pw_body *bodies[PW_MAX_BODIES];
+  int *place = (int *)(size_t)k->b.body + e * kind->bodies, *column = (int *)(size_t)k->column + e * kind->bodies;
+  for (int n = 0; n < kind->bodies; n++) {
+    int index =
+        body >= 0 ? body : pw_names_find (&c->body, *(const char **)pw_field_at (kind, from->definition, PW_BODY, n));
+    bodies[n] = index < 0 ? &ground : &c->m->body[index];
+    place[n] = index < 0 ? s->bodies : index;
+    column[n] = index < 0 ? s->coords : 3 * index;
+  }
+  if (kind->prepare == NULL) return PW_OK;
+  pw_error why = { 0 };
+  pw_own own[PW_MAX_OWN] = { { 0 } };
+  char *element = (char *)(size_t)k->b.element + (size_t)e * kind->element;
+  if (kind->prepare (from->definition, bodies, element, own, &why) != PW_OK)
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: %s", c->m->name, kind->name, k->name[e], why.text);
+  for (int n = 0, j = k->own + e * kind->own; n < kind->own; n++, j++) {
+    s->mass[j] = own[n].mass;
+    s->q0[j] = own[n].start;
+    s->v0[j] = own[n].rate;
+  }
+  return PW_OK;
+}
+
+/* Puts an element of the description, once or for every body with mass; *e counts the elements of the slab. */
+static int compile_put (const pw_compilation *c, pw_system *s, pw_slab *k, int *e, const pw_element *from,
+                        pw_pools *pools, pw_error *error) {
+  const char *name = compile_text (pools, pw_element_name (from));
+  if (!k->kind->each_body) {
+    k->name[*e] = name;
+    return compile_element (c, s, k, (*e)++, from, -1, error);
+  }
+  for (int b = 0; b < s->bodies; b++) {
+    if (!(c->m->body[b].mass > 0)) continue;
+    k->name[*e] = name;
+    if (compile_element (c, s, k, (*e)++, from, b, error) != PW_OK) return PW_INPUT;
+  }
+  return PW_OK;
+}
+
+/* After the elements, whose own coordinates a signal may read. */
+static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
+  int *next = c->count; /* from now on counts the elements seen of each slab */
+  memset (next, 0, (size_t)s->slabs * sizeof *next);
+  for (int n = 0; n < c->m->elements; n++) {
+    const pw_element *from = &c->m->element[n];
+    pw_slab *k = &s->slab[c->slab_of[n]];
+    for (int copy = pw_compile_copies (c->m, k->kind); copy > 0; copy--) {
+      int e = next[c->slab_of[n]]++;
+      for (int u = 0; u < k->kind->signals; u++)
+        if (compile_source (c, s, &k->source[e * k->kind->signals + u],
+                            pw_field_at (k->kind, from->definition, PW_SIGNAL, u), pools, k->name[e], error) != PW_OK)
+          return PW_INPUT;
+    }
+  }
+  return PW_OK;
+}
+
+static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
+  int row = 0, own = 3 * s->bodies;
+  for (int i = 0; i < s->slabs; i++) {
+    pw_slab *k = &s->slab[i];
+    k->b.pose = s->pose;
+    k->row = row;
+    k->own = own;
+    k->b.q = s->q0 + own;
+    k->b.v = s->v0 + own;
+    row += k->b.count * k->kind->rows;
+    own += k->b.count * k->kind->own;
+    int e = 0;
+    for (int n = 0; n < c->m->elements; n++)
+      if (c->slab_of[n] == i && compile_put (c, s, k, &e, &c->m->element[n], pools, error) != PW_OK) return PW_INPUT;
+  }
+  return compile_signals (c, s, pools, error);
+}
+
+static void compile_entries (pw_system *s) {
+  pw_entry *entry = s->entry;
+  for (int i = 0; i < s->slabs; i++) {
+    const pw_kind *k = s->slab[i].kind;
+    for (int e = 0; (k->power || (k->rows > 0 && k->eta)) && e < s->slab[i].b.count; e++)
+      *entry++ = (pw_entry){ i, e, PW_WORK };
+    for (int e = 0; k->loss && e < s->slab[i].b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
+  }
+}
+
+/* The values given from outside, which the consistent start holds. */
+static int compile_given (const pw_compilation *c, pw_system *s, pw_error *error) {
+  for (int i = 0; i < c->m->givens; i++) {
+    int state = pw_find_state (s, c->m->given[i].state, error);
+    if (state < 0) return PW_INPUT;
+    s->held[state] = 1;
+    *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = c->m->given[i].value;
+  }
+  return PW_OK;
+}
+
+/* ---- Scales ---- */
+
+static double compile_length (const pw_compilation *c) {
+  const pw_model *m = c->m;
+  double L = 0;
+  for (int i = 0; i < m->elements; i++) {
+    const pw_element *e = &m->element[i];
+    for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
+      const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
+      const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);
+      if (at && strcmp (body, "ground") != 0) L = fmax (L, hypot (at[0], at[1]));
+    }
+  }
+  for (int i = 0; i < m->bodies && L == 0; i++)
+    if (m->body[i].mass > 0) L = sqrt (m->body[i].inertia / m->body[i].mass);
+  return L > 0 ? L : 1;
+}
+
+/* M, and where it is zero 1e-6 of the mean mass, times L^2 for angles; without any mass 1 and L^2. */
+static void compile_metric (pw_system *s) {
+  double sum = 0, L2 = s->scale.length * s->scale.length;
+  int massive = 0;
+  for (int b = 0; b < s->bodies; b++)
+    if (s->mass[3 * b] > 0) sum += s->mass[3 * b], massive++;
+  double weight = massive ? 1e-6 * sum / massive : 1;
+  for (int j = 0; j < s->coords; j++) {
+    int angle = pw_is_angle (s, j);
+    s->metric[j] = s->mass[j] > 0 ? s->mass[j] : angle ? weight * L2 : weight;
+  }
+}
+
+/* ---- */
+
+int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
+  s->t_signal = NAN;
+  compile_bodies (c, s, pools);
+  if (compile_slabs (c, s, pools, error) != PW_OK || compile_given (c, s, error) != PW_OK) return PW_INPUT;
+  compile_entries (s);
+  s->scale = (pw_scale){ compile_length (c), 1 };
+  compile_metric (s);
+  for (int i = 0; i < s->slabs; i++) {
+    const pw_kind *kind = s->slab[i].kind;
+    s->constraints += kind->rows > 0;
+    s->moving += kind->eta != NULL;
+    if (kind->force && !kind->constant) s->force[s->forces++] = i;
+  }
+  pw_sweep_constant (s);
+  return PW_OK;
+}
