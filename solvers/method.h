@@ -114,6 +114,12 @@ static inline double pw_first_step (const pw_run *r) {
  * is follows from those here; else it stays what it was. */
 int pw_run_renew (pw_run *r, int fresh, pw_error *error);
 
+/* The size of the accelerations at the state reached, in units of L / T^2; at least 1 (judge.c). */
+double pw_run_agitation (const pw_run *r);
+/* Looks at the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
+ * another branch. */
+int pw_run_judge (pw_run *r, pw_error *error);
+
 /* ---- Dynamics ---- */
 
 /* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the run has them; J stays swept and the saddle

@@ -1,7 +1,6 @@
 /* A run: opened on a consistent start, advanced step by step, looked into, closed. */
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
@@ -114,27 +113,10 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* The size of the accelerations, in units of L / T^2. */
-static double run_agitation (const pw_run *r) {
-  const pw_system *s = r->s;
-  const double *a = r->a, *own = a + 3 * s->bodies;
-  double linear = 0, angular = 0, per = s->scale.time * s->scale.time;
-  for (; a < own; a += 3) {
-    if (!(fabs (a[0]) <= linear)) linear = fabs (a[0]);
-    if (!(fabs (a[1]) <= linear)) linear = fabs (a[1]);
-    if (!(fabs (a[2]) <= angular)) angular = fabs (a[2]);
-  }
-  for (; a < r->a + s->coords; a++)
-    if (!(fabs (*a) <= angular)) angular = fabs (*a);
-  double most = linear * (per / s->scale.length);
-  if (!(angular * per <= most)) most = angular * per;
-  return most <= 1 ? 1 : most;
-}
-
 /* The state is consistent: energies, ledger and statistics begin here. */
 static void run_begin (pw_run *r) {
   pw_system *s = r->s;
-  r->calm = run_agitation (r);
+  r->calm = pw_run_agitation (r);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
   r->breakpoint = pw_next_breakpoint (s, r->t);
   r->position = NAN;
@@ -188,25 +170,6 @@ static int run_pass_breakpoint (pw_run *r, pw_error *error) {
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
-/* A method that lets go of its constraints is stopped: what follows would not be this mechanism.  Without stabilisation
- * some drift is what was asked for. */
-#define RUN_LOST 1e-2
-#define RUN_LOST_UNSTABILISED 0.1
-
-static int run_lost (pw_run *r, pw_error *error) {
-  pw_residuals now;
-  char element[120] = "a constraint", cause[60] = "the constraints are lost";
-  pw_sweep_residuals (r->s, NULL, &now);
-  int row = now.position > now.velocity ? now.row_position : now.row_velocity;
-  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
-  if (row >= 0 && r->active && !r->active[row])
-    snprintf (cause, sizeof cause, "constraints contradict each other");
-  else if (pw_fixed_steps (r))
-    snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)",
-                  r->t, cause, element, now.position, now.velocity);
-}
-
 int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   int status = run_open_saddle (r, error);
   if (status == PW_OK) status = run_evaluate (r, error);
@@ -234,40 +197,6 @@ static int run_reselect (pw_run *r, pw_error *error) {
   return pw_run_renew (r, 1, error);
 }
 
-/* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */
-static int run_outburst (pw_run *r, pw_error *error) {
-  const double outburst = 100;
-  double now = run_agitation (r);
-  if (r->near && !(now <= outburst * r->calm))
-    return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
-                    now / r->calm);
-  if (!r->near) r->calm = fmax (r->calm, now);
-  return PW_OK;
-}
-
-/* 1 if a redundant row is violated by more than the others, from which it follows, can explain: it contradicts them. */
-static int run_contradicts (pw_run *r) {
-  const double round_off = 1e-9, magnified = 1e4;
-  pw_residuals all, enforced;
-  pw_sweep_residuals (r->s, NULL, &all);
-  if (all.position <= round_off && all.velocity <= round_off) return 0;
-  pw_sweep_residuals (r->s, r->active, &enforced);
-  double explained = round_off + magnified * fmax (enforced.position, enforced.velocity);
-  return all.position > explained || all.velocity > explained;
-}
-
-static int run_judge (pw_run *r, pw_error *error) {
-  const pw_statistics *s = &r->statistics;
-  pw_note_residuals (r);
-  if (!(s->position <= RUN_LOST && s->velocity <= RUN_LOST)) {
-    double lost = pw_stabilised_by (r, "none") ? RUN_LOST_UNSTABILISED : RUN_LOST;
-    if (!(s->position <= lost && s->velocity <= lost)) return run_lost (r, error);
-  }
-  if (r->redundant && run_contradicts (r)) return run_lost (r, error);
-  return run_outburst (r, error);
-}
-
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
   int row, status = PW_OK;
   if (!(r->t < t_end)) return PW_OK;
@@ -275,7 +204,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (r->t >= r->breakpoint) status = run_pass_breakpoint (r, error);
   if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
-  if (status == PW_OK) status = run_judge (r, error);
+  if (status == PW_OK) status = pw_run_judge (r, error);
   if (status != PW_OK || r->redundant == 0) return status;
   pw_saddle_factor (r->saddle);
   r->pivot = pw_saddle_pivot (r->saddle, &row);
@@ -332,70 +261,6 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
 
 int pw_run_redundant (const pw_run *r) {
   return r->redundant;
-}
-
-/* Names a row's element behind what is in the buffer: "pin B" or, with its row, "pin B (B.Fx)"; the new length. */
-static size_t run_name_row (const pw_system *s, int row, int whole, char *buffer, size_t size, size_t n) {
-  char element[120], reaction[120];
-  if (n + 1 >= size) return n;
-  pw_row_element (s, row, element, sizeof element);
-  pw_reaction_name (s, row, reaction, sizeof reaction);
-  n += (size_t)(whole ? snprintf (buffer + n, size - n, "%s (%s)", element, reaction)
-                      : snprintf (buffer + n, size - n, "%s", element));
-  return n < size ? n : size - 1;
-}
-
-/* What two rows of equal reactions have in common: "lateral ", "" if there is no word for it. */
-static const char *run_word (const char *a, const char *b) {
-  static const char *const word[][2] = {
-    { "N", "lateral " }, { "T", "rolling " }, { "Fx", "x " }, { "Fy", "y " }, { "M", "angular " }
-  };
-  const char *x = strrchr (a, '.') + 1, *y = strrchr (b, '.') + 1;
-  for (size_t i = 0; i < sizeof word / sizeof *word; i++)
-    if (strcmp (x, word[i][0]) == 0 && strcmp (y, word[i][0]) == 0) return word[i][1];
-  return "";
-}
-
-/* "wheels left and right: the same lateral constraint" */
-static void run_say_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
-  char a[120], b[120], x[120], y[120];
-  pw_row_element (s, one, a, sizeof a);
-  pw_row_element (s, two, b, sizeof b);
-  const char *word = run_word (pw_reaction_name (s, one, x, sizeof x), pw_reaction_name (s, two, y, sizeof y));
-  size_t kind = strcspn (a, " ");
-  if (strcmp (a, b) == 0)
-    snprintf (buffer, size, "%s: %s and %s are the same constraint", a, x, y);
-  else if (kind == strcspn (b, " ") && strncmp (a, b, kind) == 0)
-    snprintf (buffer, size, "%.*ss%s and%s: the same %sconstraint", (int)kind, a, a + kind, b + kind, word);
-  else
-    snprintf (buffer, size, "%s and %s: the same %sconstraint", a, b, word);
-}
-
-char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
-  enum { MOST = 6 };
-  pw_system *s = r->s;
-  int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
-  size_t n = run_name_row (s, row, 1, buffer, size, 0);
-  if (pw_place (s, r->t, r->q, r->v) != PW_OK) return buffer;
-  pw_sweep_J (s);
-  if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
-  pw_rank_coefficients (r, i);
-  const double *c = r->coefficient + i * s->rows;
-  char element[120], own[120], before[120] = "";
-  pw_row_element (s, row, own, sizeof own);
-  for (int a = 0; a < s->rows; a++) {
-    if (fabs (c[a]) < 1e-8) continue;
-    partners++, last = a;
-    pw_row_element (s, a, element, sizeof element);
-    if (elements > MOST || n + 1 >= size || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
-    strcpy (before, element);
-    const char *glue = elements == MOST ? " and others" : elements > 0 ? ", " : " follows from ";
-    n += (size_t)snprintf (buffer + n, size - n, "%s", glue);
-    if (elements++ < MOST) n = run_name_row (s, a, 0, buffer, size, n);
-  }
-  if (partners == 0 && n + 1 < size) snprintf (buffer + n, size - n, " constrains nothing here");
-  if (partners == 1) run_say_pair (s, last, row, buffer, size);
-  return buffer;
 }
 
 const pw_statistics *pw_run_statistics (const pw_run *r) {

@@ -1,0 +1,73 @@
+/* Whether what a method has reached is still this mechanism's motion: constraints that are lost or contradict each other,
+ * a jump to another branch at a singular pose. */
+#include <stdio.h>
+#include "method.h"
+
+double pw_run_agitation (const pw_run *r) {
+  const pw_system *s = r->s;
+  const double *a = r->a, *own = a + 3 * s->bodies;
+  double linear = 0, angular = 0, per = s->scale.time * s->scale.time;
+  for (; a < own; a += 3) {
+    if (!(fabs (a[0]) <= linear)) linear = fabs (a[0]);
+    if (!(fabs (a[1]) <= linear)) linear = fabs (a[1]);
+    if (!(fabs (a[2]) <= angular)) angular = fabs (a[2]);
+  }
+  for (; a < r->a + s->coords; a++)
+    if (!(fabs (*a) <= angular)) angular = fabs (*a);
+  double most = linear * (per / s->scale.length);
+  if (!(angular * per <= most)) most = angular * per;
+  return most <= 1 ? 1 : most;
+}
+
+/* A method that lets go of its constraints is stopped: what follows would not be this mechanism.  Without stabilisation
+ * some drift is what was asked for. */
+#define JUDGE_LOST 1e-2
+#define JUDGE_LOST_UNSTABILISED 0.1
+
+static int judge_lost (pw_run *r, pw_error *error) {
+  pw_residuals now;
+  char element[120] = "a constraint", cause[60] = "the constraints are lost";
+  pw_sweep_residuals (r->s, NULL, &now);
+  int row = now.position > now.velocity ? now.row_position : now.row_velocity;
+  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
+  if (row >= 0 && r->active && !r->active[row])
+    snprintf (cause, sizeof cause, "constraints contradict each other");
+  else if (pw_fixed_steps (r))
+    snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)",
+                  r->t, cause, element, now.position, now.velocity);
+}
+
+/* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */
+static int judge_outburst (pw_run *r, pw_error *error) {
+  const double outburst = 100;
+  double now = pw_run_agitation (r);
+  if (r->near && !(now <= outburst * r->calm))
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
+                    now / r->calm);
+  if (!r->near) r->calm = fmax (r->calm, now);
+  return PW_OK;
+}
+
+/* 1 if a redundant row is violated by more than the others, from which it follows, can explain: it contradicts them. */
+static int judge_contradicts (pw_run *r) {
+  const double round_off = 1e-9, magnified = 1e4;
+  pw_residuals all, enforced;
+  pw_sweep_residuals (r->s, NULL, &all);
+  if (all.position <= round_off && all.velocity <= round_off) return 0;
+  pw_sweep_residuals (r->s, r->active, &enforced);
+  double explained = round_off + magnified * fmax (enforced.position, enforced.velocity);
+  return all.position > explained || all.velocity > explained;
+}
+
+int pw_run_judge (pw_run *r, pw_error *error) {
+  const pw_statistics *s = &r->statistics;
+  pw_note_residuals (r);
+  if (!(s->position <= JUDGE_LOST && s->velocity <= JUDGE_LOST)) {
+    double lost = pw_stabilised_by (r, "none") ? JUDGE_LOST_UNSTABILISED : JUDGE_LOST;
+    if (!(s->position <= lost && s->velocity <= lost)) return judge_lost (r, error);
+  }
+  if (r->redundant && judge_contradicts (r)) return judge_lost (r, error);
+  return judge_outburst (r, error);
+}
