@@ -88,12 +88,6 @@ static int condense_sort_pieces (pw_plan *c) {
 
 /* ---- Patches ---- */
 
-/* Bodies, then own coordinates. */
-static int condense_group (const pw_plan *c, int n) {
-  int bodies = c->k->s->bodies;
-  return n < bodies ? 3 * n : n + 2 * bodies;
-}
-
 static void condense_note_pair (pw_plan *c, int *pair, int a, int b) {
   if (pair) pair[2 * c->pairs] = a, pair[2 * c->pairs + 1] = b;
   c->pairs++;
@@ -103,7 +97,7 @@ static void condense_note_pair (pw_plan *c, int *pair, int a, int b) {
 static void condense_pairs (pw_plan *c, int *pair) {
   c->pairs = 0;
   for (int n = 0; n < c->groups; n++) {
-    int j = condense_group (c, n), kept = pw_plan_kept (c, j);
+    int j = pw_plan_group (c, n), kept = pw_plan_kept (c, j);
     for (int x = c->start[j]; x < c->start[j + 1]; x++) {
       int a = c->node_of[c->list[x]];
       if (kept >= 0) condense_note_pair (c, pair, a, kept);
@@ -159,12 +153,12 @@ static int condense_sort_groups (pw_plan *c, const pw_ldl *ldl) {
     for (int i = ldl->column[j].first; i < ldl->column[j + 1].first; i++) c->begun[ldl->below[i]] = j;
   }
   for (int n = 0; n < c->groups && status == PW_OK; n++) {
-    condense_sort_group (c, ldl->place, condense_group (c, n));
-    next[pw_plan_column (c, ldl, condense_group (c, n)) + 2]++;
+    condense_sort_group (c, ldl->place, pw_plan_group (c, n));
+    next[pw_plan_column (c, ldl, pw_plan_group (c, n)) + 2]++;
   }
   for (int p = 0; p <= nodes && status == PW_OK; p++) next[p + 2] += next[p + 1];
   for (int n = 0; n < c->groups && status == PW_OK; n++)
-    c->group[next[pw_plan_column (c, ldl, condense_group (c, n)) + 1]++] = condense_group (c, n);
+    c->group[next[pw_plan_column (c, ldl, pw_plan_group (c, n)) + 1]++] = pw_plan_group (c, n);
   free (next);
   return status;
 }
@@ -231,55 +225,6 @@ static int condense_try_large (pw_plan *c) {
   }
 }
 
-/* ---- A small scene ---- */
-
-/* Puts the nodes in an order in which those of a panel are neighbours. */
-static void condense_order_small (const pw_plan *c, int *place) {
-  unsigned long long touched[PW_SMALL] = { 0 };
-  int order[PW_SMALL], y = 0, bodies = c->k->s->bodies;
-  for (int p = 0; p < c->pieces; p++) {
-    int j = c->piece[p].j;
-    touched[c->node_of[p]] |= 1ULL << (j < 3 * bodies ? j / 3 : j - 2 * bodies);
-  }
-  pw_small_order (c->nodes, touched, order);
-  for (int i = 0; i < c->nodes; i++) {
-    place[order[i]] = y;
-    y += c->node[order[i]].size;
-  }
-}
-
-/* Coordinates that are all without weight need no panel: their accelerations are found elsewhere. */
-static void condense_fill_panels (const pw_plan *c, const double *weight, const int *place) {
-  for (int n = 0; n < c->groups; n++) {
-    int j = condense_group (c, n), width = pw_plan_width (c, j), heavy = 0;
-    for (int i = 0; i < width; i++) heavy |= weight[j + i] != 0;
-    if (!heavy) continue;
-    pw_panel *p = c->k->small->end++;
-    *p = (pw_panel){ .j = j, .width = width };
-    for (int x = c->start[j]; x < c->start[j + 1]; x++) {
-      const pw_plan_piece *piece = &c->piece[c->list[x]];
-      int node = c->node_of[c->list[x]];
-      pw_small_add_rows (p, place[node], c->node[node].size, piece->J, piece->step);
-    }
-  }
-}
-
-static void condense_open_small (const pw_plan *c, const double *weight, pw_panel *panel) {
-  struct pw_saddle *k = c->k;
-  pw_small *small = k->small;
-  int place[PW_SMALL], touched[PW_SMALL] = { 0 };
-  *small = (pw_small){ .n = k->unknowns, .panel = panel, .end = panel, .inverse = k->inverse, .guard = k->guard };
-  condense_order_small (c, place);
-  condense_fill_panels (c, weight, place);
-  k->plain = k->reduce.components == 0 && k->idles == 0 ? small : NULL;
-  for (int p = 0; p < c->pieces; p++) touched[c->node_of[p]] = 1;
-  for (int n = 0; n < c->nodes; n++)
-    for (int r = 0; r < c->node[n].size; r++) {
-      small->start[place[n] + r] = !touched[n];
-      small->row[place[n] + r] = c->node[n].y + r;
-    }
-}
-
 /* ---- */
 
 static pw_panel *condense_take (const pw_plan *c, pw_layout *l, int is_small) {
@@ -321,7 +266,7 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows, const u
   pw_panel *panel = condense_take (c, &l, is_small);
   condense_fill_rows (c, rows, active);
   if (!is_small) return condense_try_large (c);
-  condense_open_small (c, weight, panel);
+  pw_condense_small (c, weight, panel);
   return PW_OK;
 }
 

@@ -1,4 +1,4 @@
-/* How a scene's rows are condensed: what saddle.c executes and condense.c plans.  For these two files only.
+/* How a scene's rows are condensed: what saddle.c executes and condense.c plans.  For saddle.c and condense*.c only.
  *
  * Rows are grouped into nodes, runs of up to 3 rows of one element; the columns of a node fall into pieces, one for each
  * body or own coordinate with weight.  Two pieces in the same columns make a block of S = J W^-1 J^T.  Small scenes
@@ -75,6 +75,12 @@ typedef struct {
   long pairs; /* of nodes that meet */
 } pw_plan;
 
+/* The first coordinate of a group: bodies, then own coordinates. */
+static inline int pw_plan_group (const pw_plan *c, int n) {
+  int bodies = c->k->s->bodies;
+  return n < bodies ? 3 * n : n + 2 * bodies;
+}
+
 /* 3 columns of a body, 1 of an own coordinate. */
 static inline int pw_plan_width (const pw_plan *c, int j) {
   return j < 3 * c->k->s->bodies ? 3 : 1;
@@ -87,6 +93,9 @@ int pw_plan_column (const pw_plan *c, const pw_ldl *ldl, int j);
 static inline int pw_plan_kept (const pw_plan *c, int j) {
   return j < 3 * c->k->s->bodies ? c->kept[j / 3] : -1;
 }
+
+/* Fills k->small, with room for c->groups panels. */
+void pw_condense_small (const pw_plan *c, const double *weight, pw_panel *panel);
 
 /* Makes k->large; the pattern becomes its own.  Errors: PW_MACHINE. */
 int pw_condense_large (pw_plan *c, pw_ldl *ldl);
