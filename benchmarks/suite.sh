@@ -140,6 +140,7 @@ gather >"$results/work-precision-$machine.csv"
 truths >"$results/truth-$machine.csv"
 [ -f "$work/original/done" ] && cp "$work/original/work.csv" "$results/original-$machine.csv"
 [ -f "$work/drift/done" ] && cp "$work/drift/drift.csv" "$results/drift-$machine.csv"
+[ -f "$work/drift/drift.png" ] && cp "$work/drift/drift.png" docs/figures/bench-drift.png
 [ -f "$work/eighth/done" ] && cp "$work/eighth/eighth.csv" "$results/eighth-$machine.csv"
 [ -f "$work/effects/done" ] && cp "$work/effects/log" "$results/effects-$machine.txt"
 echo "$(($(date +%s) - begun)) s; tables and figures: sh benchmarks/report.sh $machine"
