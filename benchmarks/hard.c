@@ -22,7 +22,7 @@ typedef struct {
   const char *folder, *only_case, *only_method, *page;
   int slots, verbose;
   hard_case *cases;
-  int count, methods;
+  int count, methods, done; /* cases, methods, cells that have come to an end */
   char method[HARD_METHODS][48];
   hard_result *result;
 } hard;
@@ -128,6 +128,7 @@ static void hard_finish (hard *x, hard_child *child, int status) {
     r->verdict = hard_judge (c, r);
   close (child->from);
   child->pid = 0;
+  if (isatty (STDERR_FILENO)) fprintf (stderr, "\r%d of %d\r", ++x->done, x->count * x->methods);
   hard_tell (x, child->cell);
 }
 
