@@ -122,13 +122,20 @@ static void test_list (void **state) {
   (void)state;
   cli_good ("pinwheel list");
   static const char *const expected[] = { "ezyroller", "rk4", "ida",   "projection", "ggl",    "baumgarte",
-                                          "metric",    "pin", "wheel", "torque",     "heading" };
+                                          "galpha",    "pin", "wheel", "torque",     "heading" };
   for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) assert_non_null (strstr (cli_out, expected[i]));
   cli_good ("pinwheel list models");
   assert_non_null (strstr (cli_out, "ezyroller"));
   assert_null (strstr (cli_out, "baumgarte"));
   cli_good ("pinwheel list methods");
   assert_null (strstr (cli_out, "ezyroller"));
+  assert_null (strstr (cli_out, "metric"));
+  cli_good ("pinwheel list methods rk4 bdf");
+  assert_non_null (strstr (cli_out, "    :metric=mass|identity  (default mass; with projection)\n"));
+  assert_non_null (strstr (cli_out, "  bdf  (chooses its steps; --rtol, --atol)\n"));
+  assert_null (strstr (cli_out, "galpha"));
+  cli_good ("pinwheel list methods all");
+  assert_non_null (strstr (cli_out, "    :rho=NUMBER  (default 0.8)\n"));
   cli_good ("pinwheel list kinds");
   assert_non_null (strstr (cli_out, "a knife edge"));
   assert_null (strstr (cli_out, "required"));

@@ -7,24 +7,33 @@
 
 /* ---- Models ---- */
 
+static int list_width (void *context, const char *name, const char *path) {
+  int *width = context, n = (int)strlen (name);
+  (void)path;
+  if (*width < n) *width = n;
+  return 0;
+}
+
 /* A file that cannot be opened is listed with the reason: the list is where one looks for it. */
 static int list_model (void *context, const char *name, const char *path) {
   char folder[1000];
   pw_error error = { 0 };
   pw_file *f = pw_file_open (path, &error);
   const char *about = f ? pw_file_table (f)->about : error.text;
-  printf ("  %-16s %s\n  %-16s %s\n", name, about ? about : "", "", pw_cli_short_path (path, folder, sizeof folder));
+  const int width = *(const int *)context;
+  printf ("  %-*s  %s\n  %-*s  %s\n", width, name, about ? about : "", width, "",
+          pw_cli_short_path (path, folder, sizeof folder));
   pw_file_close (f);
-  *(int *)context += 1;
   return 0;
 }
 
 static int list_models (int names, const char **name, pw_error *error) {
-  int count = 0;
+  int width = 0;
   (void)names, (void)name;
   puts ("Models");
-  int status = pw_file_list (list_model, &count, error);
-  if (status == PW_OK && count == 0)
+  int status = pw_file_list (list_width, &width, error);
+  if (status == PW_OK) status = pw_file_list (list_model, &width, error);
+  if (status == PW_OK && width == 0)
     puts ("  none found; folders named in the environment variable PINWHEEL_MODELS are searched");
   return status;
 }
@@ -41,19 +50,34 @@ static void list_option (const pw_option *o) {
   printf (")\n        %s\n", o->about);
 }
 
-static void list_method (const pw_method *m) {
+static void list_method (const pw_method *m, int options) {
   printf ("  %s  (%s)\n      %s\n", m->name, m->adaptive ? "chooses its steps; --rtol, --atol" : "fixed steps; --step",
           m->about);
   for (const pw_stabilisation *s = m->stabilisations; s && s->name; s++)
     printf ("    +%-12s %s%s\n", s->name, s->about, s == m->stabilisations ? " (if none is named)" : "");
   for (const pw_stabilisation *s = m->refused; s && s->name; s++) printf ("    no %s: %s\n", s->name, s->about);
-  for (const pw_option *o = m->options; o && o->name; o++) list_option (o);
+  for (const pw_option *o = m->options; options && o && o->name; o++) list_option (o);
+}
+
+static int list_method_named (const char *name, pw_error *error) {
+  char hint[100];
+  pw_nearest near = { .sought = name };
+  int all = strcmp (name, "all") == 0;
+  for (const pw_method *const *m = pw_methods; *m; m++) {
+    if (all || strcmp ((*m)->name, name) == 0) list_method (*m, 1);
+    if (strcmp ((*m)->name, name) == 0) return PW_OK;
+    pw_nearest_try (&near, (*m)->name);
+  }
+  if (all) return PW_OK;
+  return pw_fail (error, PW_INPUT, "there is no integrator \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
 }
 
 static int list_methods (int names, const char **name, pw_error *error) {
-  (void)names, (void)name, (void)error;
+  for (int i = 0; i < names && error->status == PW_OK; i++) list_method_named (name[i], error);
+  if (names) return error->status;
   puts ("Methods, written INTEGRATOR[+STABILISATION][:OPTION=VALUE]...");
-  for (const pw_method *const *m = pw_methods; *m; m++) list_method (*m);
+  for (const pw_method *const *m = pw_methods; *m; m++) list_method (*m, 0);
+  puts ("`pinwheel list methods NAME...` tells their options, `pinwheel list methods all` those of all");
   return PW_OK;
 }
 
@@ -65,7 +89,7 @@ static int list_what (int words, const char **word, pw_error *error) {
     int (*list) (int names, const char **name, pw_error *error);
     int named; /* 1: some of it can be named */
   } part[] = { { "models", list_models, 0 },
-               { "methods", list_methods, 0 },
+               { "methods", list_methods, 1 },
                { "kinds", pw_list_kinds, 1 },
                { "signals", pw_list_signals, 0 } };
   pw_nearest near = { .sought = words ? word[0] : "" };
@@ -87,7 +111,8 @@ int pw_cli_list (int argc, const char **argv) {
   static const struct poptOption options[] = { POPT_TABLEEND };
   pw_error error = { 0 };
   pw_cli_line l;
-  if (pw_cli_read (&l, argc, argv, options, "[models|methods|kinds [NAME...]|signals]", 0, argc, &error) == PW_OK)
+  if (pw_cli_read (&l, argc, argv, options, "[models | methods [NAME...] | kinds [NAME...] | signals]", 0, argc,
+                   &error) == PW_OK)
     list_what (l.arguments, l.argument, &error);
   pw_cli_close (&l);
   return pw_cli_end (&error);

@@ -8,12 +8,12 @@
 #include "util.h"
 
 static const pw_command main_commands[] = {
-  { "list", "[models|methods|kinds [NAME...]|signals]",
-    "what there is: models, methods of integration, kinds of element, signals", pw_cli_list },
+  { "list", "[WHAT [NAME...]]", "what there is: models, methods of integration, kinds of element, signals",
+    pw_cli_list },
   { "show", "MODEL [OPTION...]", "what a model is made of, and its matrices", pw_cli_show },
   { "check", "MODEL [OPTION...]", "mobility, redundant rows, start, derivatives, fast motions of a model",
     pw_cli_check },
-  { "run", "MODEL [OPTION...]", "integrate a model; write a table, a summary, plots", pw_cli_run },
+  { "run", "MODEL [OPTION...]", "integrate a model; write a table, a summary, figures, an animation", pw_cli_run },
   { "sweep", "MODEL [OPTION...]", "a table of runs, for all combinations of varied parameters", pw_cli_sweep },
   { "compare", "MODEL [OPTION...]", "what accuracy costs: many methods against the truth", pw_cli_compare },
   { "drift", "MODEL [OPTION...]", "constraints and energy in a long run, by stabilisation", pw_cli_drift },
@@ -25,8 +25,8 @@ static int main_usage (void) {
   puts ("Pinwheel: planar multibody systems with pin joints and knife-edge wheels\n");
   for (const pw_command *c = main_commands; c->name; c++)
     printf ("  pinwheel %-7s %-24s %s\n", c->name, c->synopsis, c->about);
-  puts ("\nMODEL is a name from `pinwheel list models`, or the path of a model file (./mine.c is compiled on the fly, "
-        "./mine.yaml read).\n"
+  puts ("\nMODEL is a name from `pinwheel list models`, or the path of a model file: ./mine.yaml is read, ./mine.c\n"
+        "compiled on the fly.  WHAT is models, methods, kinds or signals.\n"
         "Folders named in PINWHEEL_MODELS, separated by \":\", are searched as well.\n"
         "`pinwheel COMMAND --help` shows a command's options; `pinwheel --version` the version.");
   return 0;

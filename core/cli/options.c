@@ -55,15 +55,17 @@ static void options_note (pw_cli_line *l, int i) {
 }
 
 static int options_unknown (const pw_cli_line *l, const char *command, const char *bad, pw_error *error) {
-  char sought[100], best[100];
+  char sought[100], hint[120];
   const char *name = bad + strspn (bad, "-");
   snprintf (sought, sizeof sought, "%.*s", (int)strcspn (name, "="), name);
   pw_nearest near = { .sought = sought };
   for (const struct poptOption *o = l->table; !options_is_end (o); o++)
     if (o->longName) pw_nearest_try (&near, o->longName);
-  snprintf (best, sizeof best, "--%s", near.best);
-  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; did you mean \"%s\"?", command, (int)strcspn (bad, "="),
-                  bad, best);
+  if (near.near)
+    snprintf (hint, sizeof hint, "did you mean \"--%s\"?", near.best);
+  else
+    snprintf (hint, sizeof hint, "see pinwheel %s --help", command);
+  return pw_fail (error, PW_INPUT, "%s has no option \"%.*s\"; %s", command, (int)strcspn (bad, "="), bad, hint);
 }
 
 static int options_bad (const pw_cli_line *l, int why, const char *command, pw_error *error) {

@@ -1,6 +1,7 @@
 /* The head of a text model: version, line about it, run defaults, parameters.  They make a plug-in's table, so that
  * whatever takes a model of compiled C takes a text model too; its build function reads bodies and elements. */
 #define _POSIX_C_SOURCE 200809L
+#include <ctype.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
@@ -42,6 +43,26 @@ static int yaml_domain (const pw_yaml *y, const pw_node *domain, const pw_node *
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 
+/* 40 with the unit deg would be 40 rad. */
+static int yaml_unit (const pw_yaml *y, const pw_node *node, const pw_node *value, const char **unit, pw_error *error) {
+  static const struct {
+    const char *name, *rad;
+  } other[] = { { "degrees", "deg" }, { "degree", "deg" },    { "deg", "deg" },
+                { "°", "deg" },       { "grad", "(pi/200)" }, { "gon", "(pi/200)" } };
+  if (pw_yaml_text (y, node, "unit", unit, error) != PW_OK) return error->status;
+  for (size_t i = 0; i < sizeof other / sizeof *other; i++) {
+    const char *at = strstr (*unit, other[i].name), *behind = at ? at + strlen (other[i].name) : NULL;
+    int number = value->type == PW_YAML_SCALAR && pw_expression_number (value->text, &(double){ 0 });
+    if (at == NULL || (at > *unit && isalpha ((unsigned char)at[-1])) || isalpha ((unsigned char)*behind)) continue;
+    return pw_yaml_fail (y, node->at, error,
+                         "unit: angles are in radians, and no unit converts a value; write \"value: %.30s%c%s, unit: "
+                         "%.*srad%.30s\"",
+                         number ? value->text : "(..)", at > *unit && at[-1] == '/' ? '/' : '*', other[i].rad,
+                         (int)(at - *unit), *unit, behind);
+  }
+  return PW_OK;
+}
+
 typedef struct {
   const pw_names *names;
   size_t at;
@@ -78,7 +99,7 @@ static int yaml_parameter (const pw_yaml *y, const pw_node *node, pw_expression 
   snprintf (what, sizeof what, "parameter %s", p->name);
   if (v[1] == NULL) return pw_yaml_fail (y, node->at, error, "%s needs a value, its default", what);
   if (yaml_domain (y, v[4], v[5], &p->domain, error) != PW_OK ||
-      (v[2] && pw_yaml_text (y, v[2], "unit", &p->unit, error) != PW_OK) ||
+      (v[2] && yaml_unit (y, v[2], v[1], &p->unit, error) != PW_OK) ||
       (v[3] && pw_yaml_text (y, v[3], "about", &p->about, error) != PW_OK))
     return error->status;
   return yaml_default (y, v[1], what, x, names, p, error);
