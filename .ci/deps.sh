@@ -36,10 +36,11 @@ source_of () {
   sundials) cat <<'C' ;;
 #include <idas/idas.h>
 #include <cvodes/cvodes.h>
+#include <arkode/arkode_erkstep.h>
 #include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_klu.h>
 #include <sunmatrix/sunmatrix_sparse.h>
-int try_sundials (void) { return SUNContext_Create && IDAInit && CVodeInit && N_VNew_Serial && SUNLinSol_KLU && SUNSparseMatrix; }
+int try_sundials (void) { return SUNContext_Create && IDAInit && CVodeInit && ERKStepCreate && N_VNew_Serial && SUNLinSol_KLU && SUNSparseMatrix; }
 C
   suitesparse) cat <<'C' ;;
 #include <klu.h>
@@ -71,7 +72,7 @@ C
 
 libs_of () {
   case $1 in
-  sundials) echo -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lsundials_sunlinsolklu -lsundials_sunmatrixsparse ;;
+  sundials) echo -lsundials_idas -lsundials_cvodes -lsundials_arkode -lsundials_nvecserial -lsundials_sunlinsolklu -lsundials_sunmatrixsparse ;;
   suitesparse) echo -lklu -lamd ;;
   libfyaml) echo -lfyaml ;;
   *) echo "-l$1" ;;
