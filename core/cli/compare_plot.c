@@ -87,7 +87,7 @@ static void plot_errors (const pw_compare *x, const pw_script *s, int unit) {
   char y[32];
   fprintf (s->f,
            "set object 1 rectangle from graph 0,graph 0 to graph 1,first %s behind fc rgb '#e8e8e8' fs noborder\n"
-           "set label 1 'the reference cannot tell' at graph 0.02,first %s offset 0,-0.6 textcolor rgb '#555555'\n",
+           "set label 1 'the truth cannot tell' at graph 0.02,first %s offset 0,-0.6 textcolor rgb '#555555'\n",
            pw_format (y, floor, 9), y);
 }
 

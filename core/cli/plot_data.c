@@ -67,9 +67,10 @@ double pw_plot_size (const pw_plots *p) {
 }
 
 /* A mechanism that goes far is small in the picture of its whole way: the beginning, as far as it fits a picture a few
- * times its size, then gets one of its own. */
+ * times its size, then gets one of its own.  A mere point has no size. */
 static int data_closeup (const pw_plots *p) {
   double size = pw_plot_size (p);
+  if (p->wheels == 0 && !pw_plot_has (p, PLOT_BODIES)) return 0;
   if (data_diagonal (pw_plot_box_of (p, p->samples)) < 10 * size) return 0;
   pw_plot_box box = data_nothing;
   int n = 0;
