@@ -70,6 +70,10 @@ static void test_start (void **state) {
   check_shows (" moved");
   check_shows ("frame.omega ");
   check_shows (", by ");
+  cli_good ("pinwheel check ezyroller --start frame.vy=0.5 --json -");
+  check_shows ("\"changes\": [{\"state\": \"");
+  double moved = check_number ("start", "moved"), omega = check_number ("frame.omega", "to");
+  assert_true (moved >= 1 && omega != 0);
 }
 
 static void test_singular (void **state) {
@@ -115,6 +119,33 @@ static void test_broken_kind (void **state) {
   check_shows ("in this model: force_q = d force/dq does not hold");
   check_shows ("\n1 problem\n");
   assert_non_null (strstr (cli_err, "pinwheel: kind well fails its self-test: force_q = d force/dq"));
+  assert_int_equal (cli_run ("pinwheel check @/broken.c --json -"), 2);
+  check_shows ("{\"check\": \"force_q\", \"in\": \"random scenes\", \"expected\": \"force_q = d force/dq\"");
+  check_shows ("{\"check\": \"force_q\", \"in\": \"this model\"");
+  check_shows ("\"status\": \"failed\"");
+}
+
+/* The derivatives of a signal that reads states: the function's own, wrong by a factor. */
+static void test_broken_gradient (void **state) {
+  (void)state;
+  cli_write ("gradient.c", "#include \"pinwheel.h\"\n"
+                           "static const char *const reads[] = { \"a.phi\", \"a.omega\", NULL };\n"
+                           "static int pull (void *c, double t, const double *x, double *u, double *gradient) {\n"
+                           "  (void)c, (void)t;\n"
+                           "  u[0] = -4 * x[0] - x[1], u[1] = u[2] = 0;\n"
+                           "  if (gradient) gradient[0] = -4, gradient[1] = WRONG;\n"
+                           "  return 0;\n"
+                           "}\n"
+                           "static void build (pw_model *m, const void *p) {\n"
+                           "  (void)p;\n"
+                           "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1 });\n"
+                           "  pw_add_torque (m, &(pw_torque){ .name = \"T\", .body = { \"a\", \"ground\" },\n"
+                           "    .value = { PW_FUNCTION, .function = { .eval = pull, .reads = reads } } });\n"
+                           "}\n"
+                           "PW_MODEL (.about = \"a signal that reads states\", .build = build);\n");
+  cli_good ("sed 's/WRONG/-1/' @/gradient.c >@/right.c && pinwheel check @/right.c");
+  assert_int_equal (cli_run ("sed 's/WRONG/-1.1/' @/gradient.c >@/wrong.c && pinwheel check @/wrong.c"), 2);
+  check_shows ("in this model: gradient = d signal/d state does not hold");
 }
 
 static void test_large (void **state) {
@@ -177,10 +208,10 @@ static void test_scene (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_ezyroller),   cmocka_unit_test (test_pendulum), cmocka_unit_test (test_spring),
-    cmocka_unit_test (test_redundant),   cmocka_unit_test (test_start),    cmocka_unit_test (test_singular),
-    cmocka_unit_test (test_broken_kind), cmocka_unit_test (test_large),    cmocka_unit_test (test_bad_options),
-    cmocka_unit_test (test_scene),
+    cmocka_unit_test (test_ezyroller),   cmocka_unit_test (test_pendulum),        cmocka_unit_test (test_spring),
+    cmocka_unit_test (test_redundant),   cmocka_unit_test (test_start),           cmocka_unit_test (test_singular),
+    cmocka_unit_test (test_broken_kind), cmocka_unit_test (test_broken_gradient), cmocka_unit_test (test_large),
+    cmocka_unit_test (test_bad_options), cmocka_unit_test (test_scene),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
