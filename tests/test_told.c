@@ -1,0 +1,124 @@
+/* What the program tells of models that are rare: with coordinates of their own, without constraints, with any signal, with
+ * names and texts that JSON and YAML would take for something else, and of runs that hardly begin. */
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+static void told_shows (const char *text) {
+  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
+}
+
+/* The wheels' spin angles and the energies, after 0.5 s of given rates. */
+static void test_roller (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --energy"), 0);
+  told_shows ("\n  left.spin            2.5 rad,  left.spin_rate              5 rad/s\n");
+  told_shows ("\n  right.spin           3.75 rad,  right.spin_rate            7.5 rad/s\n");
+  told_shows ("\n  energy\n  kinetic ");
+  told_shows ("\n  dissipated                0 J\n");
+  assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --json @/roller.json"), 0);
+  check_close ("spin", cli_number (cli_file ("roller.json"), "elements", "right", "spin", NULL), 3.75, 1e-12,
+               "4096 eps");
+}
+
+/* Reactions have a truth of their own. */
+static void test_reactions (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.5 -o @/truth.csv >@/log && "
+                             "pinwheel run pendulum --t-end 0.5 --step 2e-3 --truth @/truth.csv"),
+                    0);
+  told_shows ("\n  reactions ");
+  told_shows (" of the largest\n");
+}
+
+static void test_signals (void **state) {
+  (void)state;
+  cli_good ("pinwheel show tests/models/signals.yaml");
+  told_shows ("heading ramp (from 0.1, to -0.2, start 0.333333, duration 0.7) rad\n");
+  told_shows ("value table (interpolation linear, ends free, 4 points from 0 to 3.14159 s) m/s\n");
+  told_shows ("value pulse (height 0.142857, start 0.1, width 0.2, period 0.7, offset -0.01) N m\n");
+  told_shows ("fx 0.2 cos (3 t + 0.1) N; fy 0.1 N\n");
+  told_shows ("rate smooth-step (from 0.3, to 0, start 0, duration 2) rad/s\n");
+}
+
+/* A free body whose turning is driven by its own rate, 2 1/s: it grows, and no step of RK4 is too large for that. */
+static void test_unbound (void **state) {
+  (void)state;
+  cli_write ("free.yaml", "pinwheel: 1\nabout: \"says \\\"so\\\", \\\\ and a\\ttab\"\nbodies:\n"
+                          "  - {name: a, mass: 1, inertia: 1}\nelements:\n"
+                          "  - {torque: T, body: [a, ground], value: 2*a.omega}\n");
+  cli_good ("pinwheel show @/free.yaml --matrices");
+  told_shows ("\nThe model has no constraints: no J, no gamma\n");
+  cli_good ("pinwheel check @/free.yaml");
+  told_shows ("  fastest eigenvalue                 2 1/s\n");
+  told_shows ("  it grows by e in                   0.5 s\n");
+  told_shows ("  RK4 is stable                      with any step: what is fast here grows\n");
+  cli_good ("sed '/elements/,$d' @/free.yaml >@/alone.yaml && pinwheel show @/alone.yaml --yaml");
+  told_shows ("about: \"says \\\"so\\\", \\\\ and a\\x09tab\"\n");
+  cli_good ("pinwheel show @/alone.yaml --yaml >@/again.yaml && pinwheel show @/again.yaml");
+  told_shows ("again: says \"so\", \\ and a\ttab\n");
+}
+
+/* Texts that are null, true or a number without their quotes. */
+static void test_literals (void **state) {
+  static const char *const name[] = { "null", "true", "1e3" };
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    char text[200];
+    snprintf (text, sizeof text,
+              "cp models/pendulum.yaml @/%s.yaml && pinwheel run @/%s.yaml -t 0.01 --json @/it.json >@/log", name[i],
+              name[i]);
+    cli_good (text);
+    assert_true (cli_says (cli_file ("it.json"), "model", name[i]));
+  }
+}
+
+/* A run that ends before its first step has nothing to draw, and leaves nothing. */
+static void test_nothing (void **state) {
+  (void)state;
+  cli_write ("ends.c", "#include \"pinwheel.h\"\n"
+                       "static int end (void *c, double t, const double *x, double *u, double *g) {\n"
+                       "  (void)c, (void)x, (void)g;\n"
+                       "  u[0] = u[1] = u[2] = 0;\n"
+                       "  return t > 0;\n"
+                       "}\n"
+                       "static void build (pw_model *m, const void *p) {\n  (void)p;\n"
+                       "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1 });\n"
+                       "  pw_add_torque (m, &(pw_torque){ .name = \"T\", .body = { \"a\", \"ground\" },\n"
+                       "    .value = { PW_FUNCTION, .function = { .eval = end } } });\n"
+                       "}\n"
+                       "PW_MODEL (.about = \"ends\", .build = build);\n");
+  assert_int_equal (cli_run ("pinwheel run @/ends.c --plots @/none --animate @/none.html"), 4);
+  assert_non_null (strstr (cli_err, ": the run is too short for figures: none are drawn in "));
+  assert_non_null (strstr (cli_err, "pinwheel: the run is too short for an animation: "));
+  assert_null (cli_file ("none.html"));
+}
+
+/* Figures of a run that was resumed are those of one that was not. */
+static void test_figures_resumed (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("PATH=/none pinwheel run ezyroller -t 1 --plots @/whole --checkpoint @/whole.ck\n"
+                             "PATH=/none pinwheel run ezyroller -t 1 --plots @/parts --checkpoint @/parts.ck\n"
+                             "PATH=/none pinwheel run ezyroller -t 1 --plots @/parts --resume @/parts.ck\n"
+                             "cmp @/whole/motion.dat @/parts/motion.dat"),
+                    0);
+  assert_non_null (strstr (cli_err, "pinwheel: resumed at t = 0.9 s\n"));
+}
+
+/* Ladders that are none. */
+static void test_ladder (void **state) {
+  (void)state;
+  cli_bad (
+      "pinwheel compare pendulum --methods rk4 --step-ladder 0.0000000000000000000000000000000000000000000000001:1", 2,
+      "--step-ladder 0.0000000000000000000000000000000000000000000000001:1: expected FROM:TO");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_roller),          cmocka_unit_test (test_reactions), cmocka_unit_test (test_signals),
+    cmocka_unit_test (test_unbound),         cmocka_unit_test (test_literals),  cmocka_unit_test (test_nothing),
+    cmocka_unit_test (test_figures_resumed), cmocka_unit_test (test_ladder),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
