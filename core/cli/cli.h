@@ -63,6 +63,30 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
         "STATE=VALUE"                                                                                       \
   }
 
+/* How to run, as options say it; NULL: as the model wishes. */
+typedef struct {
+  const char *method, *t_end, *step, *rtol, *atol;
+} pw_cli_wishes;
+
+/* Entries of popt's table for a pw_cli_wishes: for commands that choose the methods themselves, and for those that run
+ * one method. */
+#define PW_CLI_STEP_OPTIONS(w)                                                                \
+  { "t-end", 't', POPT_ARG_STRING, &(w)->t_end, 0, "Time to run to [s]", "T" },               \
+      { "step", 0, POPT_ARG_STRING, &(w)->step, 0, "Step of fixed-step methods [s]", "H" }, { \
+    "rtol", 0, POPT_ARG_STRING, &(w)->rtol, 0, "Relative tolerance of adaptive methods", "R"  \
+  }
+#define PW_CLI_RUN_OPTIONS(w)                                                                                        \
+  { "method", 'm', POPT_ARG_STRING, &(w)->method, 0, "Integrator and stabilisation, see: pinwheel list methods",     \
+    "METHOD" },                                                                                                      \
+      PW_CLI_STEP_OPTIONS (w), {                                                                                     \
+    "atol", 0, POPT_ARG_STRING, &(w)->atol, 0, "Absolute tolerance of every state; by default rtol times its scale", \
+        "A"                                                                                                          \
+  }
+
+/* Options over a model's wishes: t_end and the settings, but for the ledger. */
+int pw_cli_settle (const pw_cli_wishes *w, const pw_run_defaults *model, double *t_end, pw_settings *settings,
+                   pw_error *error);
+
 /* ---- Models ---- */
 
 /* A model opened, built and compiled. */

@@ -14,9 +14,7 @@ static int drift_read (pw_drift *x, int argc, const char **argv, pw_error *error
       "Methods side by side, separated by commas; all: every integrator with every stabilisation; default: those of "
       "rk4, ida and galpha",
       "A,B,...|all" },
-    { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
-    { "step", 0, POPT_ARG_STRING, &x->step_text, 0, "Step of fixed-step methods [s]", "H" },
-    { "rtol", 0, POPT_ARG_STRING, &x->rtol_text, 0, "Relative tolerance of adaptive methods", "R" },
+    PW_CLI_STEP_OPTIONS (&x->wishes),
     PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
     { "vary", 'v', POPT_ARG_ARGV, &x->vary, 0,
       "Values of an option: alpha or beta [1/s] of baumgarte, every [steps] of projection; may be repeated. RANGE as "
@@ -42,16 +40,12 @@ static void drift_usual (char *text, size_t size) {
         n += (size_t)snprintf (text + n, size - n, "%s%s+%s", n ? "," : "", pw_methods[i]->name, s->name);
 }
 
-/* Options over the model's wishes over Pinwheel's own. */
 static int drift_settle (pw_drift *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   char usual[1000];
-  x->t_end = d.t_end;
-  x->settings = (pw_settings){ .step = d.step, .rtol = d.rtol > 0 ? d.rtol : 1e-6, .ledger = 1 };
-  int status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &x->t_end, error);
-  if (status == PW_OK) status = pw_cli_number ("--step", x->step_text, PW_POSITIVE, &x->settings.step, error);
-  if (status == PW_OK) status = pw_cli_number ("--rtol", x->rtol_text, PW_POSITIVE, &x->settings.rtol, error);
-  x->settings.span = x->t_end;
+  if (d.rtol == 0) d.rtol = 1e-6;
+  int status = pw_cli_settle (&x->wishes, &d, &x->t_end, &x->settings, error);
+  x->settings.ledger = 1;
   drift_usual (usual, sizeof usual);
   if (status == PW_OK) status = pw_contestants_read (&x->list, x->methods_text ? x->methods_text : usual, error);
   return status == PW_OK ? pw_drift_rows (x, error) : status;

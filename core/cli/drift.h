@@ -38,7 +38,8 @@ typedef struct {
 
 typedef struct {
   /* as given */
-  const char *methods_text, *t_end_text, *step_text, *rtol_text, *folder;
+  pw_cli_wishes wishes;
+  const char *methods_text, *folder;
   const char **vary, **sets, **starts;
   int only_methods;
   /* as understood */

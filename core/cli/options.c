@@ -182,6 +182,18 @@ pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {
   return d;
 }
 
+int pw_cli_settle (const pw_cli_wishes *w, const pw_run_defaults *model, double *t_end, pw_settings *settings,
+                   pw_error *error) {
+  *t_end = model->t_end;
+  *settings = (pw_settings){ .step = model->step, .rtol = model->rtol };
+  int status = pw_cli_number ("--t-end", w->t_end, PW_POSITIVE, t_end, error);
+  if (status == PW_OK) status = pw_cli_number ("--step", w->step, PW_POSITIVE, &settings->step, error);
+  if (status == PW_OK) status = pw_cli_number ("--rtol", w->rtol, PW_POSITIVE, &settings->rtol, error);
+  if (status == PW_OK) status = pw_cli_number ("--atol", w->atol, PW_POSITIVE, &settings->atol, error);
+  settings->span = *t_end;
+  return status;
+}
+
 /* ---- The end ---- */
 
 /* 1 if standard output is a pipe that nobody reads any more: `pinwheel ... | head`. */

@@ -21,13 +21,7 @@ typedef pw_running run;
 
 static int run_read (run *x, int argc, const char **argv, pw_error *error) {
   const struct poptOption options[] = {
-    { "method", 'm', POPT_ARG_STRING, &x->method, 0, "Integrator and stabilisation, see: pinwheel list methods",
-      "METHOD" },
-    { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
-    { "step", 0, POPT_ARG_STRING, &x->step_text, 0, "Step of fixed-step methods [s]", "H" },
-    { "rtol", 0, POPT_ARG_STRING, &x->rtol_text, 0, "Relative tolerance of adaptive methods", "R" },
-    { "atol", 0, POPT_ARG_STRING, &x->atol_text, 0,
-      "Absolute tolerance of every state; by default rtol times its scale", "A" },
+    PW_CLI_RUN_OPTIONS (&x->wishes),
     PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
     { "every", 0, POPT_ARG_STRING, &x->every_text, 0,
       "Time between two rows of the table [s]; by default a row per step", "DT" },
@@ -57,19 +51,11 @@ static int run_open_outputs (run *x, pw_error *error) {
   return (x->csv_output = pw_output_open (x->csv_path, error)) ? PW_OK : error->status;
 }
 
-/* Options over the model's wishes over Pinwheel's own. */
 static int run_settle (run *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
-  if (x->method == NULL) x->method = d.method;
-  x->t_end = d.t_end;
-  x->settings.step = d.step;
-  x->settings.rtol = d.rtol;
-  int status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &x->t_end, error);
-  if (status == PW_OK) status = pw_cli_number ("--step", x->step_text, PW_POSITIVE, &x->settings.step, error);
-  if (status == PW_OK) status = pw_cli_number ("--rtol", x->rtol_text, PW_POSITIVE, &x->settings.rtol, error);
-  if (status == PW_OK) status = pw_cli_number ("--atol", x->atol_text, PW_POSITIVE, &x->settings.atol, error);
+  int status = pw_cli_settle (&x->wishes, &d, &x->t_end, &x->settings, error);
   if (status == PW_OK) status = pw_cli_number ("--every", x->every_text, PW_POSITIVE, &x->every, error);
-  x->settings.span = x->t_end;
+  x->method = x->wishes.method ? x->wishes.method : d.method;
   x->settings.ledger = x->energy || x->plots_path || x->animate_path;
   return status;
 }

@@ -9,7 +9,8 @@
 
 typedef struct {
   /* as given */
-  const char *method, *t_end_text, *step_text, *rtol_text, *atol_text, *every_text;
+  pw_cli_wishes wishes;
+  const char *every_text;
   const char *csv_path, *json_path, *plots_path, *animate_path, *truth_path;
   const char **sets, **starts;
   int energy, profile;
@@ -17,6 +18,7 @@ typedef struct {
   /* as understood */
   pw_cli_line line;
   pw_cli_model m;
+  const char *method;
   pw_settings settings;
   double t_end, every; /* [s]; every 0: each accepted step is a row */
   /* open */

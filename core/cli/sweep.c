@@ -14,7 +14,7 @@
 
 typedef struct {
   /* as given */
-  const char *method, *t_end_text, *step_text, *rtol_text, *atol_text;
+  pw_cli_wishes wishes;
   const char *path, *part_text, *jobs_text;
   const char **ranges, **sets, **starts;
   int merge, cpu;
@@ -38,13 +38,7 @@ static int sweep_read (sweep *x, int argc, const char **argv, pw_error *error) {
       "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,...",
       "NAME=RANGE" },
     { "output", 'o', POPT_ARG_STRING, &x->path, 0, "Where the table goes", "FILE.csv" },
-    { "method", 'm', POPT_ARG_STRING, &x->method, 0, "Integrator and stabilisation, see: pinwheel list methods",
-      "METHOD" },
-    { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
-    { "step", 0, POPT_ARG_STRING, &x->step_text, 0, "Step of fixed-step methods [s]", "H" },
-    { "rtol", 0, POPT_ARG_STRING, &x->rtol_text, 0, "Relative tolerance of adaptive methods", "R" },
-    { "atol", 0, POPT_ARG_STRING, &x->atol_text, 0,
-      "Absolute tolerance of every state; by default rtol times its scale", "A" },
+    PW_CLI_RUN_OPTIONS (&x->wishes),
     PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
     { "jobs", 'j', POPT_ARG_STRING, &x->jobs_text, 0, "Runs at a time; by default one per processor", "N" },
     { "part", 0, POPT_ARG_STRING, &x->part_text, 0, "Do every N-th run, from the I-th on, for a later --merge", "I/N" },
@@ -70,10 +64,10 @@ static const char *sweep_odd (const sweep *x) {
   const struct {
     const char *name;
     const void *given;
-  } option[] = { { "--vary", x->ranges },    { "--method", x->method },     { "--t-end", x->t_end_text },
-                 { "--step", x->step_text }, { "--rtol", x->rtol_text },    { "--atol", x->atol_text },
-                 { "--set", x->sets },       { "--start", x->starts },      { "--jobs", x->jobs_text },
-                 { "--part", x->part_text }, { "--cpu", x->cpu ? x : NULL } };
+  } option[] = { { "--vary", x->ranges },      { "--method", x->wishes.method }, { "--t-end", x->wishes.t_end },
+                 { "--step", x->wishes.step }, { "--rtol", x->wishes.rtol },     { "--atol", x->wishes.atol },
+                 { "--set", x->sets },         { "--start", x->starts },         { "--jobs", x->jobs_text },
+                 { "--part", x->part_text },   { "--cpu", x->cpu ? x : NULL } };
   for (size_t i = 0; i < sizeof option / sizeof *option; i++)
     if (option[i].given) return option[i].name;
   return NULL;
@@ -115,23 +109,16 @@ static int sweep_jobs (sweep *x, pw_error *error) {
   return status;
 }
 
-/* Options over the model's wishes over Pinwheel's own. */
 static int sweep_settle (sweep *x, pw_error *error) {
   pw_plan *p = &x->plan;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
   p->model = x->line.argument[0];
-  p->method = x->method ? x->method : d.method;
+  p->method = x->wishes.method ? x->wishes.method : d.method;
   p->sets = (const char *const *)x->sets;
   p->starts = (const char *const *)x->starts;
-  p->t_end = d.t_end;
   p->cpu = x->cpu;
-  p->settings = (pw_settings){ .step = d.step, .rtol = d.rtol };
-  int status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &p->t_end, error);
-  if (status == PW_OK) status = pw_cli_number ("--step", x->step_text, PW_POSITIVE, &p->settings.step, error);
-  if (status == PW_OK) status = pw_cli_number ("--rtol", x->rtol_text, PW_POSITIVE, &p->settings.rtol, error);
-  if (status == PW_OK) status = pw_cli_number ("--atol", x->atol_text, PW_POSITIVE, &p->settings.atol, error);
+  int status = pw_cli_settle (&x->wishes, &d, &p->t_end, &p->settings, error);
   if (status == PW_OK) status = sweep_jobs (x, error);
-  p->settings.span = p->t_end;
   return status == PW_OK ? sweep_part (x, error) : status;
 }
 
