@@ -11,7 +11,7 @@
  * wheel's gyroscopic moments lie out of the plane. */
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "contact.h"
 
 typedef struct {
   double at[2];        /* contact point in the body's frame [m] */
@@ -119,10 +119,7 @@ static void rolling_gamma_v (const pw_batch *b, double *out) {
 static void rolling_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const rolling *k = (const rolling *)b->element + e;
-    const pw_pose *A = &b->pose[b->body[e]];
-    out[0] = A->x + A->cos * k->at[0] - A->sin * k->at[1];
-    out[1] = A->y + A->sin * k->at[0] + A->cos * k->at[1];
-    out[2] = A->phi + k->heading;
+    contact_place (&b->pose[b->body[e]], k->at, k->heading, out);
   }
 }
 

@@ -9,7 +9,7 @@
  * takes no moment and does no work. */
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "contact.h"
 
 typedef struct {
   double at[2]; /* contact point in the body's frame [m] */
@@ -91,10 +91,7 @@ static void steered_gamma_v (const pw_batch *b, double *out) {
 static void steered_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const steered *k = (const steered *)b->element + e;
-    const pw_pose *A = &b->pose[b->body[e]];
-    out[0] = A->x + A->cos * k->at[0] - A->sin * k->at[1];
-    out[1] = A->y + A->sin * k->at[0] + A->cos * k->at[1];
-    out[2] = A->phi + b->u[3 * e];
+    contact_place (&b->pose[b->body[e]], k->at, b->u[3 * e], out);
   }
 }
 

@@ -10,7 +10,7 @@
  * slip smooth at rest.)  As C grows, v_n = -F R / C vanishes like 1/C: the tyre becomes the knife edge. */
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "contact.h"
 
 typedef struct {
   double at[2];        /* contact point in the body's frame [m] */
@@ -101,10 +101,7 @@ static void tyre_loss (const pw_batch *b, double *out) {
 static void tyre_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const tyre *k = (const tyre *)b->element + e;
-    const pw_pose *A = &b->pose[b->body[e]];
-    out[0] = A->x + A->cos * k->at[0] - A->sin * k->at[1];
-    out[1] = A->y + A->sin * k->at[0] + A->cos * k->at[1];
-    out[2] = A->phi + k->heading;
+    contact_place (&b->pose[b->body[e]], k->at, k->heading, out);
   }
 }
 

@@ -7,7 +7,7 @@
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
  * The lateral force on the body, along n, is N = -lambda. */
 #include <math.h>
-#include "pinwheel.h"
+#include "contact.h"
 
 typedef struct {
   double at[2];    /* contact point in the body's frame [m] */
@@ -84,11 +84,8 @@ static void wheel_gamma_v (const pw_batch *b, double *out) {
 
 static void wheel_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
-    WHEEL_PARTS;
-    out[0] = A->x + A->cos * k->at[0] - A->sin * k->at[1];
-    out[1] = A->y + A->sin * k->at[0] + A->cos * k->at[1];
-    out[2] = A->phi + k->heading;
-    (void)c, (void)s;
+    const wheel *k = (const wheel *)b->element + e;
+    contact_place (&b->pose[b->body[e]], k->at, k->heading, out);
   }
 }
 
