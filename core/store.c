@@ -89,3 +89,11 @@ void *pw_take (pw_layout *l, size_t count, size_t size) {
   l->used += store_round (count * size);
   return p;
 }
+
+char *pw_take_arrays (const pw_array *array, size_t arrays) {
+  pw_layout l = { NULL, 0 };
+  for (size_t i = 0; i < arrays; i++) pw_take (&l, array[i].count, sizeof (double));
+  l = (pw_layout){ calloc (1, l.used + 1), 0 };
+  for (size_t i = 0; i < arrays && l.base; i++) *array[i].at = pw_take (&l, array[i].count, sizeof (double));
+  return l.base;
+}

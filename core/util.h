@@ -48,6 +48,14 @@ typedef struct {
 } pw_layout;
 void *pw_take (pw_layout *l, size_t count, size_t size);
 
+/* An array of numbers: where its address goes, and how many. */
+typedef struct {
+  double **at;
+  size_t count;
+} pw_array;
+/* Lays out arrays in one allocation, which is zeroed and returned; NULL if there is no memory. */
+char *pw_take_arrays (const pw_array *array, size_t arrays);
+
 /* "" if a value lies in the domain, else what was expected (">= 0"). */
 const char *pw_domain_check (pw_domain domain, double value);
 

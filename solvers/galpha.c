@@ -31,25 +31,15 @@
 
 static int galpha_allocate (galpha *d, const pw_system *s) {
   size_t n = (size_t)s->coords + 3, size = (size_t)d->size, rows = (size_t)s->rows, entries = (size_t)s->entries;
-  const struct {
-    double **array;
-    size_t count;
-  } array[] = {
+  const pw_array array[] = {
     { &d->v, n },     { &d->a, n },      { &d->w, n },          { &d->q1, n },          { &d->v1, n },
     { &d->a1, n },    { &d->w1, n },     { &d->lambda1, rows }, { &d->mu1, rows },      { &d->q0, n },
     { &d->v0, n },    { &d->a0, n },     { &d->lambda0, rows }, { &d->rate0, entries }, { &d->ledger0, entries },
     { &d->z, size },  { &d->row, size }, { &d->column, size },  { &d->pull, n },        { &d->f, n },
     { &d->jv, rows }, { &d->eta, rows }, { &d->D, n }
   };
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
-    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
-      *array[i].array = pw_take (&l, array[i].count, sizeof (double));
-    if (pass == 1) break;
-    d->memory = calloc (1, l.used + 1);
-    if (d->memory == NULL) return PW_MACHINE;
-    l = (pw_layout){ d->memory, 0 };
-  }
+  d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  if (d->memory == NULL) return PW_MACHINE;
   for (int j = 0; j < s->coords; j++) d->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   return PW_OK;
 }

@@ -23,6 +23,7 @@
 #include "eigen.h"
 #include "method.h"
 #include "newton.h"
+#include "util.h"
 
 typedef struct {
   pw_run *r;
@@ -226,10 +227,7 @@ static void linear_unknown (linear *x, int c) {
 
 static int linear_open (linear *x, int all) {
   size_t n = (size_t)x->n, m = (size_t)x->m, size = n - (size_t)x->holonomic + n - (size_t)x->rank;
-  const struct {
-    double **array;
-    size_t count;
-  } array[] = {
+  const pw_array array[] = {
     { &x->a, n + 3 },
     { &x->lambda, m },
     { &x->norm, m },
@@ -243,16 +241,8 @@ static int linear_open (linear *x, int all) {
     { &x->da, n + 3 },
     { &x->c, m },
   };
-  size_t total = 1;
-  for (size_t i = 0; all && i < sizeof array / sizeof *array; i++) total += array[i].count;
-  x->memory = calloc (1, total * sizeof (double));
-  if (x->memory == NULL) return PW_MACHINE;
-  double *at = (double *)(void *)x->memory;
-  for (size_t i = 0; all && i < sizeof array / sizeof *array; i++) {
-    *array[i].array = at;
-    at += array[i].count;
-  }
-  return PW_OK;
+  x->memory = pw_take_arrays (array, all ? sizeof array / sizeof *array : 0);
+  return x->memory ? PW_OK : PW_MACHINE;
 }
 
 static void linear_close (linear *x) {

@@ -31,22 +31,12 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
 static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
-  const struct {
-    double **array;
-    size_t count;
-  } array[] = {
+  const pw_array array[] = {
     { &r->q, 3 * n + rows },    { &r->ledger, entries },           { &r->rate, entries }, { &r->q_at, 3 * n + rows },
     { &r->ledger_at, entries }, { &r->scratch, 2 * n + 3 * rows }, { &r->q_given, n },    { &r->v_given, n },
   };
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
-    for (size_t i = 0; i < sizeof array / sizeof *array; i++)
-      *array[i].array = pw_take (&l, array[i].count, sizeof (double));
-    if (pass == 1) break;
-    r->memory = calloc (1, l.used + 1);
-    if (r->memory == NULL) return PW_MACHINE;
-    l = (pw_layout){ r->memory, 0 };
-  }
+  r->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  if (r->memory == NULL) return PW_MACHINE;
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
   memcpy (r->q, s->q0, (size_t)s->coords * sizeof (double));

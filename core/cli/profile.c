@@ -289,18 +289,11 @@ static void profile_print (profile *p, double cpu, FILE *out) {
 
 static int profile_allocate (profile *p, pw_error *error) {
   size_t n = (size_t)p->s->coords + 3, rows = (size_t)p->s->rows;
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
-    double **const state[] = { &p->q, &p->v, &p->far, &p->a, &p->f, &p->y };
-    double **const row[] = { &p->gamma, &p->eta, &p->jv, &p->lambda };
-    for (size_t i = 0; i < sizeof state / sizeof *state; i++) *state[i] = pw_take (&l, n, sizeof (double));
-    for (size_t i = 0; i < sizeof row / sizeof *row; i++) *row[i] = pw_take (&l, rows, sizeof (double));
-    if (pass == 1) break;
-    p->memory = calloc (1, l.used);
-    if (p->memory == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-    l = (pw_layout){ p->memory, 0 };
-  }
-  return PW_OK;
+  const pw_array array[] = { { &p->q, n },     { &p->v, n },        { &p->far, n },      { &p->a, n },
+                             { &p->f, n },     { &p->y, n },        { &p->gamma, rows }, { &p->eta, rows },
+                             { &p->jv, rows }, { &p->lambda, rows } };
+  p->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  return p->memory ? PW_OK : pw_fail (error, PW_MACHINE, "out of memory");
 }
 
 /* The projector of a method that projects, in its metric. */
