@@ -1,5 +1,4 @@
 /* Rows as lines of a table to read, and of a CSV. */
-#include <errno.h>
 #include <math.h>
 #include <string.h>
 #include "compare.h"
@@ -86,17 +85,6 @@ void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f) {
 
 /* ---- To compute with ---- */
 
-static int table_end (const pw_compare *x, pw_text *t, FILE *f, pw_error *error) {
-  int bad = t->failed;
-  pw_text_add (t, "\n");
-  bad |= t->failed;
-  if (!bad) bad = fputs (t->at, f) < 0 || fflush (f) != 0;
-  int out_of_memory = t->failed;
-  pw_text_free (t);
-  if (out_of_memory) return pw_fail (error, PW_MACHINE, "out of memory");
-  return bad ? pw_fail (error, PW_MACHINE, "cannot write into %s: %s", x->folder, strerror (errno)) : PW_OK;
-}
-
 static void table_names (pw_text *t) {
   for (int i = 0; i < MOTION_ERRORS; i++) pw_text_name (t, pw_compare_column[i], table_unit[i]);
 }
@@ -113,7 +101,7 @@ int pw_compare_csv_head (const pw_compare *x, pw_error *error) {
   pw_text_name (&t, "cpu", "s");
   pw_text_name (&t, "spread", "s");
   pw_text_cell (&t, "repeats,reason");
-  return table_end (x, &t, pw_output_stream (x->csv), error);
+  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
 }
 
 /* The errors that are no more than the truth's uncertainty, by name. */
@@ -152,7 +140,7 @@ int pw_compare_csv_line (const pw_compare *x, const pw_rung *r, pw_error *error)
   for (size_t i = 0; i < sizeof rest / sizeof *rest; i++) pw_text_number (&t, run ? rest[i] : NAN);
   pw_text_number (&t, r->repeats);
   pw_text_quoted (&t, r->reason);
-  return table_end (x, &t, pw_output_stream (x->csv), error);
+  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
 }
 
 int pw_compare_csv_truth (const pw_compare *x, pw_error *error) {
@@ -164,13 +152,13 @@ int pw_compare_csv_truth (const pw_compare *x, pw_error *error) {
   pw_text t = { .at = NULL };
   pw_text_cell (&t, "truth,against");
   table_names (&t);
-  int status = table_end (x, &t, f, error);
+  int status = pw_text_line (&t, f, x->folder, error);
   for (int i = -1; status == PW_OK && x->truth.known && i < x->truth.partners; i++) {
     pw_text_quoted (&t, x->truth.about);
     pw_text_quoted (&t, i < 0 ? "uncertainty" : x->truth.partner[i].about);
     for (int k = 0; k < MOTION_ERRORS; k++)
       pw_text_number (&t, i < 0 ? x->truth.uncertainty[k] : x->truth.partner[i].error[k]);
-    status = table_end (x, &t, f, error);
+    status = pw_text_line (&t, f, x->folder, error);
   }
   if (status == PW_OK) return pw_output_finish (o, error);
   pw_output_discard (o);

@@ -1,5 +1,4 @@
 /* Rows as lines of a table to read, and of a CSV. */
-#include <errno.h>
 #include <math.h>
 #include <string.h>
 #include "drift.h"
@@ -51,14 +50,6 @@ void pw_drift_line (const pw_drift *x, const pw_drift_row *r, FILE *f) {
 /* ---- To compute with ---- */
 
 /* Writes a line and empties it. */
-static int table_end (pw_text *t, FILE *f, pw_error *error) {
-  pw_text_add (t, "\n");
-  int failed = t->failed, bad = !failed && (fputs (t->at, f) < 0 || fflush (f) != 0);
-  pw_text_free (t);
-  if (failed) return pw_fail (error, PW_MACHINE, "out of memory");
-  return bad ? pw_fail (error, PW_MACHINE, "cannot write the table: %s", strerror (errno)) : PW_OK;
-}
-
 int pw_drift_csv_head (const pw_drift *x, pw_error *error) {
   pw_text t = { .at = NULL };
   pw_text_cell (&t, "group,method,alpha [1/s],beta [1/s],every [steps],status,t [s]");
@@ -71,7 +62,7 @@ int pw_drift_csv_head (const pw_drift *x, pw_error *error) {
     }
   }
   pw_text_cell (&t, "steps,rejected,rhs,jacobians,factorisations,reason");
-  return table_end (&t, pw_output_stream (x->csv), error);
+  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
 }
 
 int pw_drift_csv_line (const pw_drift *x, const pw_drift_row *r, pw_error *error) {
@@ -92,21 +83,21 @@ int pw_drift_csv_line (const pw_drift *x, const pw_drift_row *r, pw_error *error
   }
   for (size_t i = 0; i < sizeof count / sizeof *count; i++) pw_text_number (&t, (double)count[i]);
   pw_text_quoted (&t, r->reason);
-  return table_end (&t, pw_output_stream (x->csv), error);
+  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
 }
 
 static int table_times (const pw_drift *x, FILE *f, pw_error *error) {
   int status = PW_OK;
   pw_text t = { .at = NULL };
   pw_text_cell (&t, "method,t [s],position,velocity,balance [J]");
-  status = table_end (&t, f, error);
+  status = pw_text_line (&t, f, x->folder, error);
   for (const pw_drift_row *r = x->row; r < x->row + x->rows; r++)
     for (int k = 0; status == PW_OK && r->part && k < DRIFT_PARTS; k++) {
       if (isnan (r->part[k][DRIFT_VELOCITY])) continue;
       pw_text_cell (&t, r->method);
       pw_text_number (&t, x->t_end * (k + 1) / DRIFT_PARTS);
       for (int i = 0; i < DRIFT_QUANTITIES; i++) pw_text_number (&t, r->part[k][i]);
-      status = table_end (&t, f, error);
+      status = pw_text_line (&t, f, x->folder, error);
     }
   return status;
 }

@@ -1,4 +1,5 @@
 /* Texts that grow, and the cells of a table's line. */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -66,4 +67,12 @@ void pw_text_quoted (pw_text *t, const char *text) {
     pw_text_add_bytes (t, *text == '\n' || *text == '\r' ? " " : text, 1);
   }
   pw_text_add (t, "\"");
+}
+
+int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error) {
+  pw_text_add (t, "\n");
+  int failed = t->failed, bad = !failed && (fputs (t->at, f) < 0 || fflush (f) != 0);
+  pw_text_free (t);
+  if (failed) return pw_fail (error, PW_MACHINE, "out of memory");
+  return bad ? pw_fail (error, PW_MACHINE, "cannot write into %s: %s", folder, strerror (errno)) : PW_OK;
 }

@@ -2,7 +2,8 @@
 #ifndef PW_TEXT_H
 #define PW_TEXT_H
 
-#include <stddef.h>
+#include <stdio.h>
+#include "pinwheel.h"
 
 typedef struct {
   char *at; /* ended by a 0, NULL at first */
@@ -21,5 +22,7 @@ void pw_text_cell (pw_text *t, const char *text);
 void pw_text_name (pw_text *t, const char *name, const char *unit);
 /* A cell in quotes, on one line. */
 void pw_text_quoted (pw_text *t, const char *text);
+/* Ends the line, writes it to a file of the folder, and frees it.  PW_OK or PW_MACHINE. */
+int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
 
 #endif
