@@ -50,7 +50,8 @@ static int multistep_weights (N_Vector vy, N_Vector weights, void *data) {
 
 /* ---- Projection ---- */
 
-int pw_multistep_project (multistep_data *d, double t, double *q, double *v) {
+/* Projects (t, q, v), and takes note of the energy this adds if there is a ledger.  Returns as pw_project_positions. */
+static int multistep_project (multistep_data *d, double t, double *q, double *v) {
   pw_run *r = d->run;
   pw_system *s = r->s;
   int row, status = pw_place (s, t, q, v);
@@ -71,7 +72,8 @@ static int multistep_project_error (multistep_data *d, double *e) {
   return PW_OK;
 }
 
-int pw_multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real enough, N_Vector error, void *data) {
+/* The projection as CVODES calls it. */
+static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real enough, N_Vector error, void *data) {
   multistep_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (change);
@@ -79,7 +81,7 @@ int pw_multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real enoug
   (void)enough; /* to round-off, whatever the tolerance */
   memcpy (d->q, y, bytes);
   memcpy (d->v, y + d->n, bytes);
-  int status = pw_multistep_project (d, t, d->q, d->v);
+  int status = multistep_project (d, t, d->q, d->v);
   for (int j = 0; j < d->n; j++) {
     out[j] = d->q[j] - y[j];
     out[d->n + j] = d->v[j] - y[d->n + j];
@@ -142,7 +144,7 @@ static int multistep_open_solver (multistep_data *d, int formula) {
   if (flag == CV_SUCCESS) flag = CVodeSetMaxNumSteps (d->cvode, -1);
   if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
   if (d->projects) {
-    if (flag == CV_SUCCESS) flag = CVodeSetProjFn (d->cvode, pw_multistep_correct);
+    if (flag == CV_SUCCESS) flag = CVodeSetProjFn (d->cvode, multistep_correct);
     if (flag == CV_SUCCESS) flag = CVodeSetProjFrequency (d->cvode, (long)pw_option_value (r, "every"));
   }
   if (r->settings.ledger && r->s->entries > 0) {
@@ -250,17 +252,6 @@ int pw_multistep_advance (pw_run *r, double t_end, pw_error *error) {
 
 /* ---- Looking into the last step ---- */
 
-static void multistep_copy_reached (pw_run *r) {
-  size_t bytes = (size_t)r->s->coords * sizeof (double);
-  memcpy (r->q_at, r->q, bytes);
-  memcpy (r->v_at, r->v, bytes);
-  memcpy (r->a_at, r->a, bytes);
-  memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
-  memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
-  r->projected_at = r->projected;
-  if (pw_place (r->s, r->t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
-}
-
 /* Of the polynomial's value at t, projected where the method projects, the rest of the sample. */
 static int multistep_complete (multistep_data *d, double t) {
   pw_run *r = d->run;
@@ -268,7 +259,7 @@ static int multistep_complete (multistep_data *d, double t) {
   pw_statistics keep = r->statistics;
   d->added = 0;
   pw_saddle_set_guard (r->saddle, 0);
-  if (d->projects) status = pw_multistep_project (d, t, r->q_at, r->v_at);
+  if (d->projects) status = multistep_project (d, t, r->q_at, r->v_at);
   if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
   pw_saddle_set_guard (r->saddle, r->guard);
   r->projected_at = r->projected + d->added;
@@ -279,7 +270,7 @@ static int multistep_complete (multistep_data *d, double t) {
 int pw_multistep_at (pw_run *r, double t, pw_error *error) {
   multistep_data *d = r->data;
   if (t == r->t) {
-    multistep_copy_reached (r);
+    pw_show_reached (r);
     return PW_OK;
   }
   int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->y) : CV_BAD_T;

@@ -41,12 +41,6 @@ typedef struct pw_method_data multistep_data;
 /* Accelerations of an unknown y, into d->a and d->lambda: 0; above: a smaller step may do; below: a signal failed. */
 int pw_multistep_accelerate (multistep_data *d, double t, const double *y);
 
-/* Projects (t, q, v), and takes note of the energy this adds if there is a ledger.  Returns as pw_project_positions. */
-int pw_multistep_project (multistep_data *d, double t, double *q, double *v);
-
-/* The projection as CVODES calls it. */
-int pw_multistep_correct (pw_real t, N_Vector y, N_Vector change, pw_real enough, N_Vector error, void *data);
-
 /* Opens the Newton matrix and tells CVODES of it.  PW_OK or PW_MACHINE. */
 int pw_multistep_open_newton (multistep_data *d);
 void pw_multistep_close_newton (multistep_data *d);

@@ -158,7 +158,8 @@ PW_INLINE void rk_sum (double *restrict out, const double *y, double *const *K, 
   }
 }
 
-void pw_rk_combine (double *out, const double *y, double *const *K, const pw_rk_row *w, double h, int n) {
+/* out = y + h sum_j w_j K_j */
+static void rk_combine (double *out, const double *y, double *const *K, const pw_rk_row *w, double h, int n) {
   if (w->count == 1)
     rk_sum (out, y, K, w, h, 1, n);
   else if (w->count == 4)
@@ -177,8 +178,8 @@ static int rk_stages (pw_run *r, double h) {
   if (d->held) pw_hold (s, 1);
   int status = PW_OK;
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
-    pw_rk_combine (d->q, r->q, d->V, &d->row[i], h, n);
-    pw_rk_combine (d->V[i], r->v, d->A, &d->row[i], h, n);
+    rk_combine (d->q, r->q, d->V, &d->row[i], h, n);
+    rk_combine (d->V[i], r->v, d->A, &d->row[i], h, n);
     double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
     if (d->minimal) status = pw_nullspace_rates (&d->nullspace, r, t, d->q, d->V[i]);
     if (status == PW_OK) status = pw_accelerate (r, t, d->q, d->V[i], d->A[i], d->lambda);
@@ -224,8 +225,8 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   int n = r->s->coords, status = d->minimal ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
-  pw_rk_combine (d->q, r->q, d->V, &d->row[0], h, n);
-  pw_rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
+  rk_combine (d->q, r->q, d->V, &d->row[0], h, n);
+  rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) status = rk_project (r, t1, d->q, d->v, added);
   if (d->minimal)
@@ -245,7 +246,7 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
     memcpy (d->ledger0, r->ledger, entries * sizeof (double));
     memcpy (d->rate0, r->rate, entries * sizeof (double));
     d->projected0 = r->projected;
-    pw_rk_combine (r->ledger, d->ledger0, d->R, &d->row[0], h, (int)entries);
+    rk_combine (r->ledger, d->ledger0, d->R, &d->row[0], h, (int)entries);
     r->projected += added;
     pw_sweep_ledger (r->s, r->lambda, r->rate);
   }
@@ -304,7 +305,7 @@ static int rk_step_again (pw_run *r, double t) {
   pw_saddle_set_guard (r->saddle, r->guard);
   *r = reached;
   memcpy (r->q_at, d->q, rk_block (r, 1));
-  if (r->settings.ledger) pw_rk_combine (r->ledger_at, d->ledger0, d->R, &d->row[0], h, r->s->entries);
+  if (r->settings.ledger) rk_combine (r->ledger_at, d->ledger0, d->R, &d->row[0], h, r->s->entries);
   r->projected_at = d->projected0 + added;
   return status;
 }

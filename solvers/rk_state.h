@@ -32,9 +32,6 @@ struct pw_method_data {
   char *memory;
 };
 
-/* out = y + h sum_j w_j K_j */
-void pw_rk_combine (double *out, const double *y, double *const *K, const pw_rk_row *w, double h, int n);
-
 /* From the state reached to its successor at t1 = t + h, left in d->q, d->v, d->a, d->lambda; project: onto the
  * constraints; added (NULL: not wanted) takes the energy this adds.  PW_RETRY: a smaller step may do. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added);

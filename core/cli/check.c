@@ -87,7 +87,8 @@ static int check_first_failed (const pw_selftest_report *report) {
   return i;
 }
 
-const pw_selftest_check *pw_check_fault (const pw_checked_kind *k, int *inside) {
+/* What makes a kind fail, NULL if nothing; `inside` tells where. */
+static const pw_selftest_check *check_fault (const pw_checked_kind *k, int *inside) {
   const pw_selftest_report *report = k->alone.failed ? &k->alone : &k->inside;
   *inside = report == &k->inside;
   return report->failed ? &report->check[check_first_failed (report)] : NULL;
@@ -107,7 +108,7 @@ static int check_kinds (pw_check *x, pw_error *error) {
     check_alone (k);
     if (k->alone.failed == 0 || strcmp (k->alone.check[check_first_failed (&k->alone)].name, "table") != 0)
       status = pw_selftest_scene (s, k->kind, 0, q, v, 1, &k->inside, error);
-    const pw_selftest_check *fault = pw_check_fault (k, &inside);
+    const pw_selftest_check *fault = check_fault (k, &inside);
     if (fault) check_problem (x, "kind %s fails its self-test: %s (%s)", k->kind->name, fault->about, fault->where);
   }
   return status;

@@ -30,8 +30,6 @@ typedef struct {
   char problem[8][700]; /* the first of them */
 } pw_check;
 
-/* What makes a kind fail, NULL if nothing; `inside` tells where. */
-const pw_selftest_check *pw_check_fault (const pw_checked_kind *k, int *inside);
 /* Whether anything is faster than a thousandth of the scene's own pace: slower eigenvalues may be 0 and round-off. */
 int pw_check_moves (const pw_check *x);
 /* A state the consistent start has moved: its name, and from where to where. */

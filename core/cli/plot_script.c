@@ -95,7 +95,8 @@ int pw_script_end (const pw_script *s, const pw_plots *p, pw_error *error) {
 
 /* ---- Families of curves ---- */
 
-int pw_script_columns (const pw_plots *p, const pw_curves *c) {
+/* Names that fit side by side. */
+static int script_columns (const pw_plots *p, const pw_curves *c) {
   size_t longest = 0;
   for (int i = 0; i < c->count; i++) {
     size_t n = strlen (c->name (p, i));
@@ -108,7 +109,7 @@ int pw_script_columns (const pw_plots *p, const pw_curves *c) {
 
 int pw_script_names (const pw_plots *p, const pw_curves *c) {
   if (pw_script_numbered (c)) return 0;
-  int columns = pw_script_columns (p, c);
+  int columns = script_columns (p, c);
   return SCRIPT_LINE * ((c->count + columns - 1) / columns);
 }
 
@@ -121,7 +122,7 @@ void pw_script_key (const pw_script *s, const pw_plots *p, const pw_curves *c) {
              c->all, c->what);
   else
     fprintf (s->f, "set key at screen 0.5,screen %s center top horizontal maxcols %d samplen 3.5\n",
-             pw_format (y, 1 - (double)(SCRIPT_TOP - 8) / s->height, 4), pw_script_columns (p, c));
+             pw_format (y, 1 - (double)(SCRIPT_TOP - 8) / s->height, 4), script_columns (p, c));
 }
 
 void pw_script_bar (const pw_script *s, pw_panel panel, const char *label) {

@@ -32,8 +32,7 @@ static inline int pw_script_numbered (const pw_curves *c) {
   return c->count > PLOT_KEYED;
 }
 
-/* Names that fit side by side, and room for their rows at the top of a page. */
-int pw_script_columns (const pw_plots *p, const pw_curves *c);
+/* Room for the rows of names at the top of a page. */
 int pw_script_names (const pw_plots *p, const pw_curves *c);
 
 /* Opens NAME.gp and writes what comes before the drawing; NULL s->f and PW_MACHINE if that fails. */

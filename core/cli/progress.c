@@ -16,7 +16,8 @@ static double progress_read (clockid_t id) {
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-double pw_clock (void) {
+/* A clock that only goes forward [s]. */
+static double progress_clock (void) {
   return progress_read (CLOCK_MONOTONIC);
 }
 
@@ -25,7 +26,7 @@ double pw_cpu_clock (void) {
 }
 
 void pw_progress_start (pw_progress *p, const char *what, double t_end, int on) {
-  double now = pw_clock ();
+  double now = progress_clock ();
   *p = (pw_progress){ what, "s", 0, t_end, now, now + PROGRESS_FIRST, 0, on && isatty (STDERR_FILENO) };
 }
 
@@ -50,7 +51,7 @@ static void progress_duration (double seconds, char *text, size_t size) {
 
 void pw_progress_at (pw_progress *p, double t) {
   if (!p->on) return;
-  double now = pw_clock ();
+  double now = progress_clock ();
   if (now < p->next) return;
   p->next = now + PROGRESS_EVERY;
   double part = fmin (fmax (t / p->t_end, 0), 1);

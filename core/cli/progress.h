@@ -13,8 +13,7 @@ typedef struct {
   int on;           /* 0: draws nothing */
 } pw_progress;
 
-/* A clock that only goes forward [s], and the processor time of the program [s]. */
-double pw_clock (void);
+/* The processor time of the program [s]. */
 double pw_cpu_clock (void);
 
 /* `on` 0 suppresses the bar, as does a standard error that is no terminal. */
