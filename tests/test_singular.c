@@ -153,6 +153,55 @@ static void test_flat_start (void **state) {
   }
 }
 
+/* ---- Put into one ---- */
+
+typedef struct {
+  double angle;
+} singular_angle;
+
+static const pw_parameter singular_angle_list[] = {
+  { PW_AT (singular_angle, angle), 1, "rad", "of the cranks", PW_REAL },
+  { .name = NULL },
+};
+
+/* A parallelogram of bars 1 m long. */
+static void singular_rhombus (pw_model *m, const void *parameter) {
+  const singular_angle *p = parameter;
+  double c = cos (p->angle), n = sin (p->angle);
+  pw_add_body (m, &(pw_body){ .name = "left", .mass = 1, .inertia = 0.1, .start = { 0.5 * c, 0.5 * n, p->angle } });
+  pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 0.1, .start = { 0.5 + c, n, 0 } });
+  pw_add_body (m,
+               &(pw_body){ .name = "right", .mass = 1, .inertia = 0.1, .start = { 1 + 0.5 * c, 0.5 * n, p->angle } });
+  pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "left", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "left", "rod" }, .at = { { 0.5, 0 }, { -0.5, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "C", .body = { "rod", "right" }, .at = { { 0.5, 0 }, { 0.5, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "D", .body = { "right", "ground" }, .at = { { -0.5, 0 }, { 1, 0 } } });
+}
+
+/* A run that is put into a singular pose says so, with the name of a pin. */
+static void test_restarted_in (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof (pw_plugin_table),
+                                         .parameters = singular_angle_list,
+                                         .parameters_size = sizeof (singular_angle),
+                                         .build = singular_rhombus };
+  static const double flat[9] = { 0.5, 0, 0, 1.5, 0, 0, 1.5, 0, 0 }, rest[9] = { 0 };
+  static const char *const method[] = { "rk4+projection", "galpha+ggl", "bdf+projection" };
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    pw_error error = { 0 };
+    char pin = 0;
+    pw_system *s = scene_system (&table, NULL);
+    pw_run *r = runs_open (s, method[i], NULL);
+    assert_int_equal (pw_restart (r, flat, rest, &error), PW_METHOD);
+    assert_int_equal (
+        sscanf (error.text, "t = 0 s: singular pose: pin %c says what other constraints say already", &pin), 1);
+    assert_true (pin >= 'A' && pin <= 'D');
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
 /* ---- Wheels that lock a body ---- */
 
 typedef struct {
@@ -351,10 +400,10 @@ static void test_drives (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_four_bar),        cmocka_unit_test (test_slider_crank), cmocka_unit_test (test_ida),
-    cmocka_unit_test (test_flat_start),      cmocka_unit_test (test_locked),       cmocka_unit_test (test_locked_start),
-    cmocka_unit_test (test_locks_in_motion), cmocka_unit_test (test_gap),          cmocka_unit_test (test_drives),
-    cmocka_unit_test (test_steps_on_it),
+    cmocka_unit_test (test_four_bar),     cmocka_unit_test (test_slider_crank),    cmocka_unit_test (test_ida),
+    cmocka_unit_test (test_flat_start),   cmocka_unit_test (test_restarted_in),    cmocka_unit_test (test_locked),
+    cmocka_unit_test (test_locked_start), cmocka_unit_test (test_locks_in_motion), cmocka_unit_test (test_gap),
+    cmocka_unit_test (test_drives),       cmocka_unit_test (test_steps_on_it),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
