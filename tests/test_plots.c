@@ -48,6 +48,35 @@ static void test_written (void **state) {
       "chaplygin-sleigh --start sleigh.vx=0 --start sleigh.vy=0 --start sleigh.omega=0 --t-end 1"); /* at rest */
 }
 
+/* Figures that need a layout of their own. */
+static void test_layouts (void **state) {
+  (void)state;
+  cli_write (
+      "sled.yaml",
+      "pinwheel: 1\nbodies:\n  - {name: sled, mass: 1, inertia: 1, rate: {vx: 20}}\n"
+      "  - {name: \"a-dog-with-a-name-that-is-so-long-that-no-key-of-a-figure-has-room-for-all-of-it\", mass: 1, "
+      "inertia: 1, start: {x: 1}, rate: {vx: 20}}\nelements:\n"
+      "  - {wheel: left, body: sled, at: [0, 0.5]}\n"
+      "  - {drag: air, body: sled, linear: 0.01}\n");
+  plots_write ("@/sled.yaml --t-end 10"); /* far and straight, losing energy */
+  assert_non_null (strstr (cli_file ("written/paths.gp"), "set title 'whole run'"));
+  assert_non_null (strstr (cli_file ("written/paths.gp"), "set title 'the first "));
+  assert_non_null (strstr (cli_file ("written/energy.gp"), "title 'dissipated'"));
+}
+
+/* What gnuplot says when it fails is passed on; a folder for its files that cannot be made is named. */
+static void test_gif_fails (void **state) {
+  (void)state;
+  cli_good ("mkdir @/bin && printf '#!/bin/sh\\necho no such colour >&2; exit 3\\n' >@/bin/gnuplot && chmod +x "
+            "@/bin/gnuplot");
+  assert_int_equal (cli_run ("PATH=@/bin pinwheel run pendulum -t 0.1 --animate @/fails.gif >@/log"), 1);
+  assert_non_null (strstr (cli_err, "no such colour\n"));
+  assert_non_null (strstr (cli_err, "pinwheel: gnuplot failed with exit status 3"));
+  assert_null (cli_file ("fails.gif"));
+  cli_bad ("TMPDIR=/none pinwheel run pendulum -t 0.1 --animate @/fails.gif >@/log", 1,
+           "cannot make a folder in /none: No such file or directory");
+}
+
 static void test_data (void **state) {
   (void)state;
   assert_int_equal (cli_run ("PATH=/none pinwheel run ezyroller --t-end 20 --plots @/data >/dev/null"), 0);
@@ -85,8 +114,14 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_drawn),  cmocka_unit_test (test_written),           cmocka_unit_test (test_data),
-    cmocka_unit_test (test_ground), cmocka_unit_test (test_picture_in_motion), cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_drawn),
+    cmocka_unit_test (test_written),
+    cmocka_unit_test (test_data),
+    cmocka_unit_test (test_ground),
+    cmocka_unit_test (test_layouts),
+    cmocka_unit_test (test_gif_fails),
+    cmocka_unit_test (test_picture_in_motion),
+    cmocka_unit_test (test_refusals),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -106,6 +106,73 @@ static void test_figures_resumed (void **state) {
   assert_non_null (strstr (cli_err, "pinwheel: resumed at t = 0.9 s\n"));
 }
 
+/* More rows that say the same than are listed. */
+static void test_many_redundant (void **state) {
+  char text[2000] = "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\nelements:\n";
+  size_t n = strlen (text);
+  (void)state;
+  for (int i = 0; i < 12; i++)
+    n += (size_t)snprintf (text + n, sizeof text - n, "  - {wheel: w%d, body: a, at: [0, %d]}\n", i, i);
+  snprintf (text + n, sizeof text - n,
+            "  - {rod: R, body: [a, ground], at: [[0, 0], [3, 4]], length: 5}\n"
+            "  - {rod: Q, body: [a, ground], at: [[0, 0], [3, 4]], length: 5}\n");
+  cli_write ("wheels.yaml", text);
+  assert_int_equal (cli_run ("pinwheel run @/wheels.yaml -t 0.1"), 0);
+  assert_non_null (strstr (cli_err, "pinwheel: redundant: rods R and Q: the same constraint\n"));
+  assert_non_null (strstr (cli_err, "  and 4 more"));
+}
+
+/* What contradicts itself has no start, and check knows nothing further. */
+static void test_contradiction (void **state) {
+  (void)state;
+  cli_write ("two.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\nelements:\n"
+                         "  - {pin: P, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
+                         "  - {pin: Q, body: [a, ground], at: [[0, 0], [1, 0]]}\n");
+  assert_int_equal (cli_run ("pinwheel check @/two.yaml --json -"), 3);
+  told_shows ("\"saddle_point\": null");
+  told_shows ("\"start\": null");
+  told_shows ("\"linearisation\": null");
+}
+
+/* A program alone, without models or headers around it. */
+static void test_alone (void **state) {
+  (void)state;
+  cli_good ("mkdir @/bin && cp \"${PINWHEEL:-build/pinwheel}\" ${BUILD:-build}/libpinwheel*.so.* @/bin");
+  cli_good ("PINWHEEL_MODELS= @/bin/pinwheel list");
+  told_shows ("  none found; folders named in the environment variable PINWHEEL_MODELS are searched\n");
+  assert_int_equal (cli_run ("PINWHEEL_MODELS= @/bin/pinwheel run pendulum"), 2);
+  assert_non_null (strstr (cli_err, "pinwheel: there is no model \"pendulum\", nor any other in the folders of "));
+  assert_int_equal (cli_run ("pinwheel new @/own.c >@/log && @/bin/pinwheel run @/own.c"), 2);
+  assert_non_null (strstr (cli_err, ": pinwheel.h is neither in \"include\" next to the program nor in "));
+}
+
+/* A table of a sweep has the same columns in every row. */
+static void test_columns (void **state) {
+  (void)state;
+  cli_write ("some.c",
+             "#include \"pinwheel.h\"\n"
+             "typedef struct { double size; } some;\n"
+             "static const pw_parameter list[] = {\n"
+             "  { PW_AT (some, size), 1, \"m\", \"size\", PW_POSITIVE }, { .name = NULL } };\n"
+             "static void build (pw_model *m, const void *parameters) {\n"
+             "  const some *p = parameters;\n"
+             "  pw_add_body (m, &(pw_body){ .name = p->size > 1 ? \"big\" : \"small\", .mass = 1, .inertia = 1 });\n"
+             "}\n"
+             "PW_MODEL (.about = \"some\", .parameters = list, .parameters_size = sizeof (some), .build = build);\n");
+  assert_int_equal (cli_run ("pinwheel sweep @/some.c -t 0.1 --vary size=1,2 -o @/some.csv"), 0);
+  assert_non_null (strstr (cli_err,
+                           "pinwheel: 1 of 2 runs failed, the first of them: big.x has no column: which bodies "
+                           "there are may only depend on parameters that are counts"));
+  assert_non_null (strstr (cli_file ("some.csv"), "\n2,input,"));
+}
+
+/* What a run costs, in the metric it projects in. */
+static void test_profile_metric (void **state) {
+  (void)state;
+  cli_good ("pinwheel run ezyroller -t 0.1 -m rk4+projection:metric=identity --profile");
+  told_shows ("project");
+}
+
 /* Ladders that are none. */
 static void test_ladder (void **state) {
   (void)state;
@@ -118,7 +185,9 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_roller),          cmocka_unit_test (test_reactions), cmocka_unit_test (test_signals),
     cmocka_unit_test (test_unbound),         cmocka_unit_test (test_literals),  cmocka_unit_test (test_nothing),
-    cmocka_unit_test (test_figures_resumed), cmocka_unit_test (test_ladder),
+    cmocka_unit_test (test_figures_resumed), cmocka_unit_test (test_ladder),    cmocka_unit_test (test_many_redundant),
+    cmocka_unit_test (test_contradiction),   cmocka_unit_test (test_alone),     cmocka_unit_test (test_columns),
+    cmocka_unit_test (test_profile_metric),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
