@@ -155,10 +155,11 @@ static void report_energy (const pw_sample *last) {
 static void report_truth (const pw_truth_error *e) {
   static const char *const name[] = { "length", "angle", "speed", "rate" }, *const unit[] = { "m", "rad", "m/s",
                                                                                               "rad/s" };
-  char t[32];
+  char t[32], at[40];
   if (e == NULL) return;
-  printf ("\n  error against the truth of %s, at %d time%s\n  %10s%17s %s s%17s\n", e->source, e->samples,
-          e->samples == 1 ? "" : "s", "", "at", pw_format (t, e->t, 6), "largest");
+  snprintf (at, sizeof at, "at %s s", pw_format (t, e->t, 6));
+  printf ("\n  error against the truth of %s, at %d time%s\n  %27s%17s\n", e->source, e->samples,
+          e->samples == 1 ? "" : "s", at, "largest");
   for (int i = 0; i < 4; i++) {
     if (isnan (e->end[i]) && isnan (e->most[i])) continue;
     printf ("  %-10s", name[i]);
