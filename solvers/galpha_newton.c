@@ -132,7 +132,8 @@ static int galpha_factor (pw_run *r, double h) {
     for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) d->value[i] *= d->row[x->rowind[i]] * d->column[c];
   r->statistics.jacobians++;
   r->statistics.factorisations++;
-  return pw_sparse_factor (&d->sparse, d->value) == PW_OK ? PW_OK : PW_INPUT;
+  int status = pw_sparse_factor (&d->sparse, d->value);
+  return status > 0 ? PW_INPUT : status;
 }
 
 /* ---- Iteration ---- */
@@ -150,17 +151,18 @@ static void galpha_predict (pw_run *r, double h) {
   memset (d->mu1, 0, (size_t)r->s->rows * sizeof *d->mu1);
 }
 
-/* Solves for the correction and applies it.  Its size is that of q and h v, in units of the scene; *floor takes what
- * round-off makes of them. */
-static double galpha_correct (pw_run *r, double h, double *floor) {
+/* Solves for the correction and applies it.  *most takes its size, that of q and h v in units of the scene; *floor what
+ * round-off makes of them.  PW_OK or PW_MACHINE. */
+static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
   galpha *d = r->data;
   int n = d->n;
-  double most = 0, large = 1, e = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
+  double large = 1, e = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
   for (int i = 0; i < d->size; i++) d->z[i] *= -d->row[i];
-  pw_sparse_solve (&d->sparse, d->z);
+  if (pw_sparse_solve (&d->sparse, d->z) != PW_OK) return PW_MACHINE;
+  *most = 0;
   for (int j = 0; j < n; j++) {
     double unit = pw_unit (r->s, j), size = fmax (fabs (d->z[j]), fabs (d->z[n + j])) / unit;
-    if (!(size <= most)) most = size;
+    if (!(size <= *most)) *most = size;
     d->z[n + j] *= d->column[n + j];
     d->q1[j] += d->z[j];
     d->w1[j] += d->z[n + j] / (h * d->gamma);
@@ -171,7 +173,7 @@ static double galpha_correct (pw_run *r, double h, double *floor) {
   for (int i = 0; i < d->rows; i++) d->lambda1[i] += d->column[2 * n + i] * d->z[2 * n + i];
   for (int i = 0; i < d->positions; i++) d->mu1[i] += d->column[2 * n + d->rows + i] * d->z[2 * n + d->rows + i];
   *floor = 4 * DBL_EPSILON * large;
-  return most;
+  return PW_OK;
 }
 
 /* The matrix is evaluated at the prediction, and again where corrections do not shrink well.  What is left at the end is to
@@ -179,14 +181,15 @@ static double galpha_correct (pw_run *r, double h, double *floor) {
 int pw_galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20;
   galpha *d = r->data;
-  double before = INFINITY, floor, good = fmin (1e-9, 1e-3 * pow (h / r->s->scale.time, 4)), rate = 1;
+  double before = INFINITY, size, floor, good = fmin (1e-9, 1e-3 * pow (h / r->s->scale.time, 4)), rate = 1;
   if (h != d->h) galpha_scale (r, h);
   galpha_predict (r, h);
   for (int i = 0, fresh = 1; i < most; i++) {
     int status = galpha_residual (r, h, t1);
     if (status == PW_OK && fresh) status = galpha_factor (r, h);
+    if (status == PW_OK) status = galpha_correct (r, h, &size, &floor);
     if (status != PW_OK) return status;
-    double size = galpha_correct (r, h, &floor), enough = fmax (good, floor);
+    double enough = fmax (good, floor);
     if (!isfinite (size)) return PW_RETRY;
     if (i > 0) rate = size / before;
     int stalled = rate > 0.25 && size <= 32 * floor;

@@ -26,7 +26,7 @@ static inline void pw_sparse_forget (pw_sparse *k) {
   if (k->factors) klu_l_free_numeric (&k->factors, &k->common);
 }
 
-/* x = A^-1 x */
-void pw_sparse_solve (pw_sparse *k, double *x);
+/* x = A^-1 x.  PW_OK or PW_MACHINE. */
+int pw_sparse_solve (pw_sparse *k, double *x);
 
 #endif
