@@ -213,12 +213,18 @@ $(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml
 $(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a)
 	@mkdir -p $(@D)
 	$(call say,LINK)
-	$(Q)$(LINK) $(WRAP) -rdynamic -o $@ $< $(BUILD)/libtests.a \
+	$(Q)$(LINK) $(WRAP) -rdynamic -o $@ $(filter %.o,$^) $(BUILD)/libtests.a \
 	  -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive \
 	  $(FILES_LIBS) $(SOLVER_LIBS) -lcmocka -lpopt
 
-# These make every allocation fail in turn.
-$(BUILD)/tests/test_alloc: WRAP := -Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=free
+# These make every allocation fail in turn, and the second, which has the program's commands, what it asks of files.
+comma := ,
+ALLOC_WRAP := malloc calloc realloc strdup free
+FILES_WRAP := fopen fclose fflush fwrite fread fseek fseeko ftell getline rename ftruncate fsync pwrite mkdir realpath opendir \
+              $(addprefix posix_spawn,p _file_actions_init _file_actions_addopen _file_actions_adddup2)
+$(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
+$(BUILD)/tests/test_cli_faults: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
+$(BUILD)/tests/test_cli_faults: $(filter-out %/main.o,$(CLI_OBJ))
 # This every call of the libraries below.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/test_faults.c)
 # A part of SUNDIALS that Pinwheel does not use, to compare with.

@@ -144,9 +144,14 @@ pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, 
   return NULL;
 }
 
+static void run_drop_method (pw_run *r) {
+  if (r->data) r->method->close (r);
+  r->data = NULL;
+}
+
 void pw_close (pw_run *r) {
   if (r == NULL) return;
-  if (r->data) r->method->close (r);
+  run_drop_method (r);
   pw_saddle_close (r->saddle);
   pw_rank_close (r);
   free (r->memory);
@@ -163,14 +168,22 @@ static int run_pass_breakpoint (pw_run *r, pw_error *error) {
 int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   int status = run_open_saddle (r, error);
   if (status == PW_OK) status = run_evaluate (r, error);
-  if (status != PW_OK) return status;
-  if (fresh)
+  if (status != PW_OK && status != PW_MACHINE) return status;
+  if (status == PW_OK && fresh)
     run_watch (r);
-  else
+  else if (status == PW_OK)
     pw_saddle_set_guard (r->saddle, r->guard);
-  r->method->close (r);
-  r->data = NULL;
-  return r->method->open (r, error);
+  run_drop_method (r);
+  if (status == PW_OK) status = r->method->open (r, error);
+  if (status != PW_OK) run_drop_method (r);
+  return status;
+}
+
+/* Without its method, which memory did not suffice for, a run can only be closed. */
+static int run_is_lost (const pw_run *r, pw_error *error) {
+  if (r->data) return 0;
+  pw_fail (error, PW_MACHINE, "model %s: the run was given up at t = %.6g s for lack of memory", r->s->model, r->t);
+  return 1;
 }
 
 /* The rows in use have become nearly dependent: if others are not, the method starts anew with them.  This waits for the
@@ -190,6 +203,7 @@ static int run_reselect (pw_run *r, pw_error *error) {
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
   int row, status = PW_OK;
   if (!(r->t < t_end)) return PW_OK;
+  if (run_is_lost (r, error)) return PW_MACHINE;
   r->position = NAN;
   if (r->t >= r->breakpoint) status = run_pass_breakpoint (r, error);
   if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
@@ -228,6 +242,7 @@ static void run_account (pw_run *r, pw_sample *sample) {
 
 int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   pw_residuals now;
+  if (run_is_lost (r, error)) return PW_MACHINE;
   r->t_at = t;
   int status = r->method->at (r, t, error);
   if (status != PW_OK) return status;
@@ -242,6 +257,7 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
 
 int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   size_t bytes = (size_t)r->s->coords * sizeof (double);
+  if (run_is_lost (r, error)) return PW_MACHINE;
   if (q) memcpy (r->q, q, bytes);
   if (v) memcpy (r->v, v, bytes);
   int status = pw_make_consistent (r, NULL, error);

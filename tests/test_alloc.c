@@ -1,11 +1,11 @@
 /* Every allocation is made to fail in turn: each is an error that says so, and nothing is left behind.
  *
- * Linked with --wrap for malloc, calloc, realloc and free: what Pinwheel allocates goes through here.  What the
- * libraries below it allocate does not; they are asked to clean up all the same. */
+ * What the libraries below Pinwheel allocate does not fail here; they are asked to clean up all the same. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
+#include "alloc.h"
 #include "check.h"
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
@@ -14,70 +14,6 @@
 #include "selftest.h"
 #include "toys.h"
 #include "verify.h"
-
-void *__real_malloc (size_t size);
-void *__real_calloc (size_t count, size_t size);
-void *__real_realloc (void *old, size_t size);
-void __real_free (void *p);
-void *__wrap_malloc (size_t size);
-void *__wrap_calloc (size_t count, size_t size);
-void *__wrap_realloc (void *old, size_t size);
-void __wrap_free (void *p);
-
-/* ---- Allocations that are counted, remembered, and fail on demand ---- */
-
-enum { ALLOC_SLOTS = 1 << 14 };
-
-static struct {
-  long count;              /* allocations so far */
-  long fail;               /* the one that fails; 0: none */
-  int live;                /* not yet freed */
-  void *slot[ALLOC_SLOTS]; /* where they are */
-} alloc;
-
-static void **alloc_find (const void *p, const void *value) {
-  for (size_t i = (size_t)p / 16 % ALLOC_SLOTS, n = 0; n < ALLOC_SLOTS; n++, i = (i + 1) % ALLOC_SLOTS)
-    if (alloc.slot[i] == value) return &alloc.slot[i];
-  return NULL;
-}
-
-static void *alloc_keep (void *p) {
-  void **slot = alloc_find (p, NULL);
-  if (p == NULL || slot == NULL) return p;
-  *slot = p;
-  alloc.live++;
-  return p;
-}
-
-static void alloc_drop (void *p) {
-  void **slot = p ? alloc_find (p, p) : NULL;
-  if (slot == NULL) return; /* not ours: from a library */
-  *slot = NULL;
-  alloc.live--;
-}
-
-static int alloc_fails (void) {
-  return ++alloc.count == alloc.fail;
-}
-
-void *__wrap_malloc (size_t size) {
-  return alloc_fails () ? NULL : alloc_keep (__real_malloc (size));
-}
-
-void *__wrap_calloc (size_t count, size_t size) {
-  return alloc_fails () ? NULL : alloc_keep (__real_calloc (count, size));
-}
-
-void *__wrap_realloc (void *old, size_t size) {
-  if (alloc_fails ()) return NULL;
-  alloc_drop (old);
-  return alloc_keep (__real_realloc (old, size));
-}
-
-void __wrap_free (void *p) {
-  alloc_drop (p);
-  __real_free (p);
-}
 
 /* ---- Scenarios ---- */
 

@@ -108,6 +108,14 @@ static void test_other_file (void **state) {
               "cannot continue @/b.csv: @/b.csv.part is not the table that the checkpoint belongs to");
 }
 
+/* A run that cannot be resumed leaves the summary of the one before it. */
+static void test_summary (void **state) {
+  (void)state;
+  resume_bad ("echo old >@/b.json; echo hello >@/b.ck", "--json @/b.json", "@/b.ck is no checkpoint of Pinwheel");
+  assert_string_equal (cli_file ("b.json"), "old\n");
+  cli_good ("test ! -e @/b.json.part");
+}
+
 /* Cut anywhere, or with any one bit changed, it is refused. */
 static void test_damaged (void **state) {
   static char text[20000], other[20000];
@@ -152,7 +160,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_killed),    cmocka_unit_test (test_restarts),   cmocka_unit_test (test_interrupted),
     cmocka_unit_test (test_other_run), cmocka_unit_test (test_other_file), cmocka_unit_test (test_damaged),
-    cmocka_unit_test (test_options),
+    cmocka_unit_test (test_options),   cmocka_unit_test (test_summary),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

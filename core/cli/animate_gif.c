@@ -81,7 +81,10 @@ static int gif_copy (const pw_plots *p, const char *path, pw_error *error) {
   if (from == NULL) return pw_fail (error, PW_MACHINE, "gnuplot has drawn no animation: %s", strerror (errno));
   pw_output *o = pw_output_open (path, error);
   for (size_t n = 0; o && (n = fread (block, 1, sizeof block, from)) > 0;) fwrite (block, 1, n, pw_output_stream (o));
+  int why = ferror (from) ? errno : 0;
   fclose (from);
+  if (o && why) pw_output_discard (o);
+  if (o && why) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", drawn, strerror (why));
   return o ? pw_output_finish (o, error) : error->status;
 }
 

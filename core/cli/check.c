@@ -72,13 +72,16 @@ static int check_truth (pw_check *x, int started, pw_error *error) {
 
 /* ---- The kinds ---- */
 
-static void check_alone (pw_checked_kind *k) {
-  for (unsigned seed = 1; seed <= CHECK_SEEDS; seed++) {
-    pw_error error = { 0 };
-    if (pw_selftest (k->kind, seed, &k->alone, &error) == PW_OK) continue;
-    snprintf (k->untested, sizeof k->untested, "%s", error.text);
-    return;
+/* A kind that no scene can be made for stays untested, and says why. */
+static int check_alone (pw_checked_kind *k, pw_error *error) {
+  int status = PW_OK;
+  for (unsigned seed = 1; status == PW_OK && seed <= CHECK_SEEDS; seed++) {
+    pw_error own = { 0 };
+    status = pw_selftest (k->kind, seed, &k->alone, &own);
+    if (status == PW_MACHINE) return pw_fail (error, status, "%s", own.text);
+    if (status != PW_OK) snprintf (k->untested, sizeof k->untested, "%s", own.text);
   }
+  return PW_OK;
 }
 
 static int check_first_failed (const pw_selftest_report *report) {
@@ -105,7 +108,8 @@ static int check_kinds (pw_check *x, pw_error *error) {
     pw_checked_kind *k = &x->kind[x->kinds];
     k->kind = s->slab[x->kinds].kind;
     k->count = s->slab[x->kinds].b.count;
-    check_alone (k);
+    status = check_alone (k, error);
+    if (status != PW_OK) break;
     if (k->alone.failed == 0 || strcmp (k->alone.check[check_first_failed (&k->alone)].name, "table") != 0)
       status = pw_selftest_scene (s, k->kind, 0, q, v, 1, &k->inside, error);
     const pw_selftest_check *fault = check_fault (k, &inside);

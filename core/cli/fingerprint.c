@@ -36,7 +36,9 @@ int pw_print_file (pw_text *t, const char *key, const char *name, const char *pa
   FILE *f = fopen (path, "rb");
   if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", path, strerror (errno));
   for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = print_hash (h, block, n);
+  int why = ferror (f) ? errno : 0;
   fclose (f);
+  if (why) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", path, strerror (why));
   snprintf (text, sizeof text, "%.150s, contents %016llx", name, (unsigned long long)h);
   pw_print_line (t, key, NULL, text);
   return PW_OK;

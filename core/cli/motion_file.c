@@ -14,6 +14,7 @@ typedef struct {
   char *line;
   size_t room;
   long number;  /* of the line */
+  int failed;   /* errno of a line that could not be read */
   int *place;   /* of each column after the first: in a motion, or -1 */
   double *sign; /* reactions are -lambda */
   int columns, known;
@@ -23,6 +24,7 @@ typedef struct {
 
 static int file_line (truth_file *in) {
   ssize_t n = getline (&in->line, &in->room, in->f);
+  if (n < 0 && !feof (in->f)) in->failed = errno;
   if (n < 0) return 0;
   while (n > 0 && (in->line[n - 1] == '\n' || in->line[n - 1] == '\r')) in->line[--n] = 0;
   in->number++;
@@ -156,6 +158,7 @@ int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *
   truth_file in = { .path = path, .f = fopen (path, "r") };
   if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, strerror (errno));
   int status = file_read (&in, m, s, t_end, whole, error);
+  if (in.failed) status = pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, strerror (in.failed));
   fclose (in.f);
   free (in.line);
   free (in.place);

@@ -172,9 +172,14 @@ static void run_finish_table (run *x, int good, pw_error *error) {
   }
 }
 
-/* What goes into the JSON summary, which is written however the run has ended. */
+/* The JSON summary, which is written however the run has ended.  A run that could not be resumed leaves the one before it
+ * as it is. */
 static void run_write_json (run *x, const pw_summary *summary, const pw_sample *sample, pw_error *error) {
   if (x->json_output == NULL) return;
+  if (x->check.resume && !x->resumed) {
+    pw_output_discard (x->json_output);
+    return;
+  }
   pw_error *own = &(pw_error){ 0 };
   const pw_statistics *statistics = x->r ? pw_run_statistics (x->r) : NULL;
   if (pw_json_write (summary, x->m.system, sample, x->energy, statistics, x->json_output, own) == PW_OK)

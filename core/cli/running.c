@@ -69,6 +69,7 @@ int pw_running_resume (pw_running *x, pw_error *error) {
   if (c->resume) {
     running_carry (x, &c->from.state);
     if (pw_run_load (x->r, &c->from.state, error) != PW_OK) return error->status;
+    x->resumed = 1;
     fprintf (stderr, "pinwheel: resumed at t = %s s\n", pw_format (t, pw_time (x->r), 6));
   }
   pw_checkpoints_pass (c, pw_time (x->r));

@@ -31,6 +31,7 @@ typedef struct {
   pw_progress progress;
   /* under way */
   long row;        /* rows written */
+  int resumed;     /* 1: the state of the checkpoint has been taken over */
   long batch;      /* steps to take before looking around */
   double cpu;      /* of the method [s] */
   char part[4200]; /* where an unfinished table is kept; "": there is none */

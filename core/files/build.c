@@ -83,6 +83,8 @@ static int build_run (const build_command *c, const char *source, const sigset_t
   int outcome = 0, why = build_spawn (c, before, &child);
   while (why == 0 && waitpid (child, &outcome, 0) < 0)
     if (errno != EINTR) why = errno;
+  if (why != 0 && why != ENOENT && why != EACCES)
+    return pw_fail (error, PW_MACHINE, "cannot run the C compiler \"%s\": %s", c->word[0], strerror (why));
   if (why != 0 || (WIFEXITED (outcome) && WEXITSTATUS (outcome) == 127))
     return pw_fail (
         error, PW_INPUT,
@@ -108,14 +110,14 @@ static char *build_folder (pw_error *error) {
 /* The compiler with everything it needs. */
 static int build_object (const char *path, const char *object, const sigset_t *before, pw_error *error) {
   build_command c = { .words = 0 };
-  char *include = pw_search_include ();
-  int status = PW_OK;
-  if (include == NULL)
+  char *include;
+  int status = pw_search_include (&include, error);
+  if (status == PW_OK && include == NULL)
     status = pw_fail (error, PW_INPUT,
                       "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
                       "\"../include/pinwheel\"",
                       path);
-  else if (build_compiler (&c) != PW_OK)
+  else if (status == PW_OK && build_compiler (&c) != PW_OK)
     status = pw_fail (error, PW_MACHINE, "out of memory");
   if (status == PW_OK) {
     build_options (&c, include, path, object);

@@ -14,16 +14,13 @@
 
 /* The folder knows of the new name only when it is on the disk itself; some file systems refuse that, and need it not. */
 static void checkpoint_sync_folder (const char *path) {
+  char folder[4200] = ".";
   const char *slash = strrchr (path, '/');
-  char *folder = slash ? strdup (path) : strdup (".");
-  if (folder == NULL) return;
-  if (slash) folder[slash == path ? 1 : slash - path] = 0;
+  if (slash) snprintf (folder, sizeof folder, "%.*s", slash == path ? 1 : (int)(slash - path), path);
   int fd = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd >= 0) {
-    (void)fsync (fd);
-    close (fd);
-  }
-  free (folder);
+  if (fd < 0) return;
+  (void)fsync (fd);
+  close (fd);
 }
 
 static unsigned long long checkpoint_check (const char *head, size_t head_size, const void *state, size_t size) {

@@ -24,8 +24,8 @@ typedef struct {
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* The folder with pinwheel.h that belongs to this library, malloced; NULL if there is none. */
-char *pw_search_include (void);
+/* The folder with pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_MACHINE. */
+int pw_search_include (char **include, pw_error *error);
 
 /* folder + "/" + name + ending, malloced; NULL without memory. */
 char *pw_join (const char *folder, const char *name, const char *ending);

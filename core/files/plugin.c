@@ -95,7 +95,9 @@ static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
 static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
   struct stat info;
   f->path = realpath (path, NULL);
-  if (f->path == NULL) return pw_fail (error, PW_INPUT, "cannot open the model file %s: %s", path, strerror (errno));
+  if (f->path == NULL)
+    return pw_fail (error, errno == ENOMEM ? PW_MACHINE : PW_INPUT, "cannot open the model file %s: %s", path,
+                    strerror (errno));
   if (stat (f->path, &info) == 0 && !S_ISREG (info.st_mode)) return pw_fail (error, PW_INPUT, "%s is not a file", path);
   return PW_OK;
 }

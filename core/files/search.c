@@ -5,6 +5,7 @@
 #define _GNU_SOURCE /* dladdr */
 #include <dirent.h>
 #include <dlfcn.h>
+#include <errno.h>
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,29 +25,32 @@ int pw_ends_in (const char *name, const char *ending) {
   return n > e && strcmp (name + n - e, ending) == 0;
 }
 
+static int search_no_memory (pw_error *error) {
+  return pw_fail (error, PW_MACHINE, "out of memory while looking for models");
+}
+
 /* The folder of the running program (0) or of this library (1), malloced; NULL if unknown. */
-static char *search_anchor (int which) {
+static int search_anchor (int which, char **folder, pw_error *error) {
   char path[PATH_MAX];
+  *folder = NULL;
   if (which == 0) {
     ssize_t n = readlink ("/proc/self/exe", path, sizeof path - 1);
-    if (n <= 0) return NULL;
+    if (n <= 0) return PW_OK;
     path[n] = 0;
   } else {
     static const char here = 0; /* an address inside this library */
     Dl_info info;
-    if (dladdr (&here, &info) == 0 || info.dli_fname == NULL || realpath (info.dli_fname, path) == NULL) return NULL;
+    if (dladdr (&here, &info) == 0 || info.dli_fname == NULL) return PW_OK;
+    if (realpath (info.dli_fname, path) == NULL) return errno == ENOMEM ? search_no_memory (error) : PW_OK;
   }
   char *slash = strrchr (path, '/');
-  if (slash == NULL) return NULL;
+  if (slash == NULL) return PW_OK;
   *slash = 0;
-  return strdup (path);
+  *folder = strdup (path);
+  return *folder ? PW_OK : search_no_memory (error);
 }
 
 /* ---- Model files ---- */
-
-static int search_no_memory (pw_error *error) {
-  return pw_fail (error, PW_MACHINE, "out of memory while looking for models");
-}
 
 /* Keeps one model file; the same file reached twice counts once. */
 static int search_keep (pw_search *s, const char *name, size_t length, const char *path, pw_error *error) {
@@ -77,7 +81,7 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   if (path == NULL) return search_no_memory (error);
   char *real = realpath (path, NULL);
   struct stat info;
-  int status = PW_OK;
+  int status = real || errno != ENOMEM ? PW_OK : search_no_memory (error);
   if (real && stat (real, &info) == 0 && S_ISREG (info.st_mode))
     status = search_keep (s, entry, strlen (entry) - strlen (ending), real, error);
   free (real);
@@ -94,12 +98,15 @@ static int search_note (pw_search *s, const char *real) {
   return 1;
 }
 
-/* A folder that is not there is passed over, as in PATH. */
+/* A folder that is not there or closed to us is passed over, as in PATH; one that the machine fails to open is not. */
 static int search_folder (pw_search *s, const char *folder, pw_error *error) {
   char *real = realpath (folder, NULL);
+  if (real == NULL && errno == ENOMEM) return search_no_memory (error);
   int fresh = real && search_note (s, real);
   free (real);
   DIR *dir = fresh ? opendir (folder) : NULL;
+  if (fresh && dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
+    return pw_fail (error, PW_MACHINE, "cannot look into the folder %s: %s", folder, strerror (errno));
   if (dir == NULL) return PW_OK;
   int status = PW_OK;
   struct dirent *entry;
@@ -123,8 +130,8 @@ static int search_environment (pw_search *s, pw_error *error) {
 static int search_beside (pw_search *s, int which, pw_error *error) {
   static const char *const where[2][3] = { { "models", "../models", "../lib/pinwheel/models" },
                                            { "models", "../models", "pinwheel/models" } };
-  char *anchor = search_anchor (which);
-  int status = PW_OK;
+  char *anchor;
+  int status = search_anchor (which, &anchor, error);
   for (int i = 0; anchor && status == PW_OK && i < 3; i++) {
     char *folder = pw_join (anchor, where[which][i], "");
     status = folder ? search_folder (s, folder, error) : search_no_memory (error);
@@ -155,21 +162,28 @@ void pw_search_close (pw_search *s) {
 
 /* ---- The header ---- */
 
-char *pw_search_include (void) {
+/* Looks into one folder: *include stays if it has no header. */
+static int search_header (const char *anchor, const char *where, char **include, pw_error *error) {
+  char *folder = pw_join (anchor, where, ""), *header = folder ? pw_join (folder, "pinwheel.h", "") : NULL;
+  int status = header ? PW_OK : search_no_memory (error);
+  if (header && access (header, R_OK) == 0)
+    *include = folder;
+  else
+    free (folder);
+  free (header);
+  return status;
+}
+
+int pw_search_include (char **include, pw_error *error) {
   static const char *const where[] = { "include", "../include", "../include/pinwheel" };
-  for (int which = 0; which < 2; which++) {
-    char *anchor = search_anchor (which);
-    for (int i = 0; anchor && i < 3; i++) {
-      char *folder = pw_join (anchor, where[i], ""), *header = folder ? pw_join (folder, "pinwheel.h", "") : NULL;
-      int found = header && access (header, R_OK) == 0;
-      free (header);
-      if (found) {
-        free (anchor);
-        return folder;
-      }
-      free (folder);
-    }
+  int status = PW_OK;
+  *include = NULL;
+  for (int which = 0; which < 2 && status == PW_OK && *include == NULL; which++) {
+    char *anchor;
+    status = search_anchor (which, &anchor, error);
+    for (int i = 0; anchor && i < 3 && status == PW_OK && *include == NULL; i++)
+      status = search_header (anchor, where[i], include, error);
     free (anchor);
   }
-  return NULL;
+  return status;
 }
