@@ -66,6 +66,22 @@ static void test_bad_lines (void **state) {
   }
 }
 
+/* A tolerance that the method does not follow, a step it does not take; who gives both is not told. */
+static void test_useless_options (void **state) {
+  static const char step[] = "pinwheel: --step has no effect: erk5+projection chooses its steps by --rtol, --atol\n",
+                    rtol[] = "pinwheel: --rtol has no effect: rk4+none takes steps of --step\n",
+                    atol[] = "pinwheel: --atol has no effect: erk8+none:steps=fixed takes steps of --step\n";
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.1 --method erk5+projection --step 0.1"), 0);
+  assert_string_equal (cli_err, step);
+  assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.1 --method rk4+none --rtol 1e-9"), 0);
+  assert_string_equal (cli_err, rtol);
+  assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.1 --method erk8+none:steps=fixed --atol 1e-9"), 0);
+  assert_string_equal (cli_err, atol);
+  cli_good ("pinwheel run pendulum --t-end 0.1 --method rk4+none --rtol 1e-9 --step 0.01");
+  cli_good ("pinwheel run pendulum --t-end 0.1 --method ida+ggl --rtol 1e-6 --step 0.01");
+}
+
 /* Whatever cannot be written is said before the run starts. */
 static void test_unwritable (void **state) {
   (void)state;
@@ -239,10 +255,10 @@ static void test_moved (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_lines),   cmocka_unit_test (test_unwritable),   cmocka_unit_test (test_full_disk),
-    cmocka_unit_test (test_bad_models),  cmocka_unit_test (test_bad_tables),   cmocka_unit_test (test_bad_files),
-    cmocka_unit_test (test_found_twice), cmocka_unit_test (test_failing_step), cmocka_unit_test (test_interrupted),
-    cmocka_unit_test (test_moved),
+    cmocka_unit_test (test_bad_lines),   cmocka_unit_test (test_useless_options), cmocka_unit_test (test_unwritable),
+    cmocka_unit_test (test_full_disk),   cmocka_unit_test (test_bad_models),      cmocka_unit_test (test_bad_tables),
+    cmocka_unit_test (test_bad_files),   cmocka_unit_test (test_found_twice),     cmocka_unit_test (test_failing_step),
+    cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

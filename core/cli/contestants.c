@@ -5,8 +5,7 @@
 
 /* ---- Names ---- */
 
-/* Fixed steps by nature, or because the method's options say so. */
-static int contestants_adaptive (const pw_method *integrator, const char *name) {
+int pw_contestant_adaptive (const pw_method *integrator, const char *name) {
   return integrator->adaptive && strstr (name, ":steps=fixed") == NULL;
 }
 
@@ -21,7 +20,7 @@ static int contestants_count_all (size_t *bytes) {
 static void contestants_add (pw_contestants *c, const char *name, const pw_method *integrator) {
   for (int i = 0; i < c->count; i++)
     if (strcmp (c->method[i].name, name) == 0) return;
-  c->method[c->count++] = (pw_contestant){ name, contestants_adaptive (integrator, name) };
+  c->method[c->count++] = (pw_contestant){ name, pw_contestant_adaptive (integrator, name) };
 }
 
 static char *contestants_add_all (pw_contestants *c, char *at) {

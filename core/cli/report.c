@@ -3,12 +3,26 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "contestants.h"
 #include "report.h"
 
 enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300, REPORT_TEXT = 400 };
 
 static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
+}
+
+/* ---- Options ---- */
+
+void pw_report_unused (const char *method, const pw_cli_wishes *w) {
+  const pw_method *integrator;
+  int stabilisation;
+  if (pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
+  int adaptive = pw_contestant_adaptive (integrator, method);
+  if (adaptive && w->step && !w->rtol && !w->atol)
+    fprintf (stderr, "pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
+  if (!adaptive && (w->rtol || w->atol) && !w->step)
+    fprintf (stderr, "pinwheel: --%s has no effect: %s takes steps of --step\n", w->rtol ? "rtol" : "atol", method);
 }
 
 /* ---- The start ---- */

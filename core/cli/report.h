@@ -2,8 +2,13 @@
 #ifndef PW_REPORT_H
 #define PW_REPORT_H
 
+#include "cli.h"
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
+
+/* Says on standard error that a tolerance was given to a method of fixed steps, or a step to one that follows tolerances.  Who
+ * gives both, as scripts do, is not told. */
+void pw_report_unused (const char *method, const pw_cli_wishes *w);
 
 /* Says on standard error which states the consistent start has moved, if any. */
 void pw_report_start (const pw_system *s, const pw_start_report *start);
