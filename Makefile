@@ -209,13 +209,16 @@ $(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
 $(BUILD)/benchmarks/hard: $(call obj,$(HARD))
 $(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml
 
-# A test holds the libraries whole, so that the plug-ins it opens find them in it.
-$(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a)
+# A test holds the libraries whole, so that the plug-ins it opens find them in it; these and the program are to be of the
+# same sources when it runs.
+$(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a) | $(PROGRAM) $(PLUGINS) $(INCLUDES)
 	@mkdir -p $(@D)
 	$(call say,LINK)
 	$(Q)$(LINK) $(WRAP) -rdynamic -o $@ $(filter %.o,$^) $(BUILD)/libtests.a \
 	  -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive \
 	  $(FILES_LIBS) $(SOLVER_LIBS) -lcmocka -lpopt
+
+$(BUILD)/tests/test_embed: | $(BUILD)/docs/embed
 
 # These make every allocation fail in turn, and the second, which has the program's commands, what it asks of files.
 comma := ,
