@@ -21,7 +21,7 @@ extern "C" {
 #endif
 
 #define PW_VERSION "0.1.0"
-#define PW_ABI 1 /* raised whenever a plug-in compiled against an older header could be misread */
+#define PW_ABI 1 /* raised, once 0.1.0 is out, when a plug-in compiled against an older header could be misread */
 #define PW_PI 3.14159265358979323846
 
 /* ---- Status and errors ---- */
