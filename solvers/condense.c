@@ -1,6 +1,5 @@
 /* Planning of the condensed matrix; see condense.h. */
 #include <stdlib.h>
-#include <string.h>
 #include "condense.h"
 #include "util.h"
 

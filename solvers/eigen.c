@@ -5,7 +5,6 @@
  * (Golub & Van Loan 2013, Matrix Computations, sections 7.4, 7.5 and 8.6.3; balancing: Parlett & Reinsch 1969.) */
 #include <float.h>
 #include <math.h>
-#include <stdlib.h>
 #include "eigen.h"
 #include "pinwheel.h"
 

@@ -20,8 +20,6 @@
  * Newton's equations are scaled by powers of the step, so that their condition does not depend on it (Bottasso, Bauchau
  * & Cardona 2007, Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of
  * index three differential algebraic equations). */
-#include <float.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "galpha_state.h"

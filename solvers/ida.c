@@ -12,8 +12,8 @@
 /* ---- What IDA asks for besides ---- */
 
 /* Multipliers of a placed state, J swept.  Those of IDA are good where J v = eta is solved.  On the level of
- * accelerations nothing but Newton's iteration holds them where the motion is prescribed, and they may wander off without harm to
- * the motion: there they are computed anew.  Factorises the saddle in any case. */
+ * accelerations nothing but Newton's iteration holds them where the motion is prescribed, and they may wander off
+ * without harm to the motion: there they are computed anew.  Factorises the saddle in any case. */
 static int ida_multipliers (const ida_data *d, const double *v, double *a, double *lambda) {
   pw_run *r = d->run;
   int status = pw_saddle_factor (r->saddle);

@@ -1,6 +1,4 @@
 /* The table of integrators, and method names: integrator[+stabilisation][:option=value]... */
-#include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include "method.h"
 #include "methods.h"

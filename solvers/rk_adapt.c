@@ -12,7 +12,6 @@
  * motion that is mostly prescribed would grow until that counts.  It serves two estimates as DOP853 does. */
 #include <float.h>
 #include <math.h>
-#include <string.h>
 #include "rk_state.h"
 
 void pw_rk_begin_adaptive (pw_run *r) {

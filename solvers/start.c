@@ -1,7 +1,8 @@
 /* The consistent start: positions by Gauss-Newton, then rates by one linear solve.
  *
  * What the user gave is held, and if it can be, so are the positions of whatever has mass; what was not given moves as
- * little as possible in the metric.  Only if that fails are the given positions free too, and then everything.  A state that is consistent to round-off is left alone, to the bit. */
+ * little as possible in the metric.  Only if that fails are the given positions free too, and then everything.  A
+ * state that is consistent to round-off is left alone, to the bit. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>

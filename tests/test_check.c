@@ -1,6 +1,5 @@
 /* pinwheel check: what it says of models whose mobility, vibrations and faults are known. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 #include "check.h"
 #include "cli.h"

@@ -1,7 +1,6 @@
 /* The same input gives the same bits: again, on a system used before, in any number of threads at once. */
 #include <pthread.h>
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"

@@ -5,7 +5,6 @@
 #include <idas/idas.h>
 #include <klu.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include <nvector/nvector_serial.h>

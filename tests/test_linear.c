@@ -1,6 +1,5 @@
 /* Eigenvalues, singular values, and the linearisation of scenes whose vibrations are known. */
 #include <math.h>
-#include <string.h>
 #include "../solvers/eigen.h"
 #include "check.h"
 #include "runs.h"

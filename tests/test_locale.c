@@ -3,7 +3,6 @@
 #include <locale.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include "check.h"
 #include "cli.h"
 #include "pinwheel-files.h"

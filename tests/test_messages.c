@@ -1,7 +1,6 @@
 /* What a description may not say, and what it is told then: every message of the core about bodies, elements, fields,
  * signals and kinds. */
 #include <math.h>
-#include <string.h>
 #include "check.h"
 #include "scene.h"
 #include "toys.h"

@@ -2,7 +2,6 @@
  * scenes are theirs. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 #include "check.h"
 #include "ladder.h"
 #include "scene.h"

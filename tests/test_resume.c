@@ -1,7 +1,6 @@
 /* pinwheel run --checkpoint, --resume: a run that is killed and resumed writes the same bytes; a file that does not belong
  * to the run, or is not whole, is refused. */
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include "check.h"
 #include "cli.h"

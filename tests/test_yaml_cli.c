@@ -1,6 +1,5 @@
 /* The program with text models: tables are those of models in C, byte by byte; every model survives being written as
  * text and read again. */
-#include <stdio.h>
 #include <string.h>
 #include "check.h"
 #include "cli.h"

@@ -1,5 +1,4 @@
 /* Tables of text models that lie in files: what is read, in which forms, and from where. */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

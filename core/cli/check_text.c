@@ -1,6 +1,5 @@
 /* What `pinwheel check` found, for the eye. */
 #include <math.h>
-#include <string.h>
 #include "check.h"
 #include "system.h"
 

@@ -1,6 +1,5 @@
 /* Checkpoints of pinwheel run. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
 #include "checkpoints.h"
 #include "fingerprint.h"

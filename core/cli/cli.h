@@ -2,7 +2,8 @@
  *
  * A command is one file with one function, which gets the command line after the word "pinwheel" (argv[0] is
  * "pinwheel run", for messages) and returns the exit status: 0 good, 1 machine, 2 input, 3 start, 4 method, 130
- * interrupted, 141 closed pipe.  It keeps a pw_error, and ends with `return pw_cli_end (&error)`, the one place that prints an error. */
+ * interrupted, 141 closed pipe.  It keeps a pw_error, and ends with `return pw_cli_end (&error)`, the one place
+ * that prints an error. */
 #ifndef PW_CLI_H
 #define PW_CLI_H
 
@@ -42,12 +43,12 @@ typedef struct {
   char *max_file;           /* of commands with --set: what --max-file was given, or NULL */
 } pw_cli_line;
 
-/* Reads a command line.  `options` is popt's table without help, which is added here, as --max-file is to --set; take texts with
- * POPT_ARG_STRING, repeated ones with POPT_ARG_ARGV (a NULL-terminated list, or NULL if there were none), numbers as
- * texts and pass them to pw_cli_number.  All of these variables are NULL at first, and what they were given is freed
- * with the line.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says what is expected
- * ("MODEL [OPTION...]").  PW_OK; 1 if help was asked for and has been printed; PW_INPUT for an unknown option, with the
- * nearest valid one, or one without its value.  Close the line in every case. */
+/* Reads a command line.  `options` is popt's table without help, which is added here, as --max-file is to --set;
+ * take texts with POPT_ARG_STRING, repeated ones with POPT_ARG_ARGV (a NULL-terminated list, or NULL if there were
+ * none), numbers as texts and pass them to pw_cli_number.  All of these variables are NULL at first, and what they
+ * were given is freed with the line.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says
+ * what is expected ("MODEL [OPTION...]").  PW_OK; 1 if help was asked for and has been printed; PW_INPUT for an
+ * unknown option, with the nearest valid one, or one without its value.  Close the line in every case. */
 int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
                  int least, int most, pw_error *error);
 void pw_cli_close (pw_cli_line *l);

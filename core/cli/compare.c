@@ -2,7 +2,6 @@
  * against the truth: a row for each rung, failures included. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "compare.h"
 #include "plot.h"
 #include "stop.h"

@@ -1,7 +1,6 @@
 /* One rung: a run that is looked into and keeps accounts, then runs of the method alone on the clock. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "compare.h"
 #include "stop.h"
 

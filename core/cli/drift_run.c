@@ -1,6 +1,5 @@
 /* One run, looked at after every accepted step: between steps a projected method shows nothing of what it corrects. */
 #include <math.h>
-#include <string.h>
 #include "drift.h"
 #include "stop.h"
 

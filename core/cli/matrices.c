@@ -1,8 +1,6 @@
 /* pinwheel show --matrices: the equations  M a + J^T lambda = f,  J a = gamma  in numbers. */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 #include "cli.h"
 #include "system.h"
 

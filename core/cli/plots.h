@@ -25,8 +25,8 @@ void pw_plots_add (pw_plots *p, const pw_sample *sample);
 /* Saves or loads the samples taken so far. */
 void pw_plots_carry (pw_plots *p, pw_archive *a);
 
-/* Without a folder, nothing.  Writes data and scripts and, if `draw`, runs gnuplot; a missing gnuplot is no error, but a notice on standard error.
- * Errors: PW_MACHINE if a file cannot be written or gnuplot fails. */
+/* Without a folder, nothing.  Writes data and scripts and, if `draw`, runs gnuplot; a missing gnuplot is no error,
+ * but a notice on standard error.  Errors: PW_MACHINE if a file cannot be written or gnuplot fails. */
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error);
 
 void pw_plots_close (pw_plots *p);

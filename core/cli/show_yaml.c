@@ -3,7 +3,6 @@
  * Numbers are written with 17 digits, and left out where they are what a model that does not say has: 0. */
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 #include "cli.h"
 #include "model.h"
 #include "signal.h"

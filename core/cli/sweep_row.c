@@ -2,7 +2,6 @@
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include <time.h>
 #include "sweep.h"
 

@@ -44,8 +44,9 @@ int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_er
 
 /* ---- Models in YAML (yaml.c) ---- */
 
-/* A text model in memory: a plug-in's table made of it.  `shown` is the path in messages, `largest` the bytes it may have.  PW_INPUT with the place of what
- * is wrong; PW_MACHINE.  Bodies and elements are read when a model is built. */
+/* A text model in memory: a plug-in's table made of it.  `shown` is the path in messages, `largest` the bytes it
+ * may have.  PW_INPUT with the place of what is wrong; PW_MACHINE.  Bodies and elements are read when a model is
+ * built. */
 typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_error *error);
 void pw_yaml_close (pw_yaml *y);

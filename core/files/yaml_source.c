@@ -4,7 +4,6 @@
  * checked first: its size, UTF-8, no control characters, no such line. */
 #include <errno.h>
 #include <stdarg.h>
-#include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
 

@@ -8,7 +8,6 @@
  * 2 L: near the constraint g is the distance less L, and no square root is taken.)
  * On body 1 acts the force -lambda along d / L, away from body 2; on body 2 the opposite. */
 #include <math.h>
-#include <string.h>
 #include "pinwheel.h"
 
 typedef struct {

@@ -9,7 +9,6 @@
  * Where l = 0 there is no direction: e = 0, so the force is zero there.  With l0 = 0 the spring's part k d is smooth
  * and that is its limit; with l0 > 0 the ends should not meet. */
 #include <math.h>
-#include <string.h>
 #include "pinwheel.h"
 
 typedef struct {
