@@ -74,25 +74,63 @@ static void test_literals (void **state) {
   }
 }
 
+/* A model whose signal fails at times between two. */
+static void told_write_gap (void) {
+  cli_write ("gap.c",
+             "#include \"pinwheel.h\"\n"
+             "typedef struct { double from, to; } gap;\n"
+             "static const pw_parameter list[] = {\n"
+             "  { PW_AT (gap, from), 0, \"s\", \"begin\", PW_REAL },\n"
+             "  { PW_AT (gap, to), 1e9, \"s\", \"end\", PW_REAL }, { .name = NULL } };\n"
+             "static int eval (void *c, double t, const double *x, double *u, double *g) {\n"
+             "  const gap *p = c;\n  (void)x, (void)g;\n"
+             "  u[0] = u[1] = u[2] = 0;\n"
+             "  return t > p->from && t < p->to;\n"
+             "}\n"
+             "static void build (pw_model *m, const void *p) {\n"
+             "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1, .rate = { 1, 0, 0 } });\n"
+             "  pw_add_torque (m, &(pw_torque){ .name = \"T\", .body = { \"a\", \"ground\" },\n"
+             "    .value = { PW_FUNCTION, .function = { .eval = eval, .context = (void *)(size_t)p } } });\n"
+             "}\n"
+             "PW_MODEL (.about = \"fails\", .parameters = list, .parameters_size = sizeof (gap), .build = build);\n");
+}
+
 /* A run that ends before its first step has nothing to draw, and leaves nothing. */
 static void test_nothing (void **state) {
   (void)state;
-  cli_write ("ends.c", "#include \"pinwheel.h\"\n"
-                       "static int end (void *c, double t, const double *x, double *u, double *g) {\n"
-                       "  (void)c, (void)x, (void)g;\n"
-                       "  u[0] = u[1] = u[2] = 0;\n"
-                       "  return t > 0;\n"
-                       "}\n"
-                       "static void build (pw_model *m, const void *p) {\n  (void)p;\n"
-                       "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1 });\n"
-                       "  pw_add_torque (m, &(pw_torque){ .name = \"T\", .body = { \"a\", \"ground\" },\n"
-                       "    .value = { PW_FUNCTION, .function = { .eval = end } } });\n"
-                       "}\n"
-                       "PW_MODEL (.about = \"ends\", .build = build);\n");
-  assert_int_equal (cli_run ("pinwheel run @/ends.c --plots @/none --animate @/none.html"), 4);
+  told_write_gap ();
+  assert_int_equal (cli_run ("pinwheel run @/gap.c --plots @/none --animate @/none.html"), 4);
   assert_non_null (strstr (cli_err, ": the run is too short for figures: none are drawn in "));
   assert_non_null (strstr (cli_err, "pinwheel: the run is too short for an animation: "));
   assert_null (cli_file ("none.html"));
+}
+
+/* Where more than one thing fails, each is told; the run's own failure decides. */
+static void test_failures (void **state) {
+  (void)state;
+  told_write_gap ();
+  assert_int_equal (cli_run ("pinwheel run @/gap.c --json /dev/full"), 4);
+  assert_non_null (strstr (cli_err, "pinwheel: cannot write /dev/full: No space left on device\n"));
+  assert_non_null (strstr (cli_err, ": a signal"));
+  cli_bad ("mkdir -p @/p/motion.dat.part; pinwheel run @/gap.c --set from=0.05 --plots @/p", 1,
+           "cannot write @/p/motion.dat: Is a directory"); /* before anything is computed in vain */
+  assert_int_equal (cli_run ("pinwheel show @/gap.c --set from=0.03 --set to=0.04 --matrices --at 0.035"), 4);
+  assert_non_null (strstr (cli_err, "a signal"));
+}
+
+/* A table of a sweep that cannot be put in order: all its rows are kept, and the next start has only to sort them. */
+static void test_sorted (void **state) {
+  (void)state;
+  const char *sweep = "pinwheel sweep pendulum -t 0.1 --vary m=1,2 -o @/sorted.csv >@/log";
+  char text[200];
+  snprintf (text, sizeof text, "mkdir @/sorted.csv.sorted; %s", sweep);
+  assert_int_equal (cli_run (text), 1);
+  assert_non_null (strstr (cli_err, "so the same command has only to sort them\n"));
+  assert_null (cli_file ("sorted.csv"));
+  assert_non_null (cli_file ("sorted.csv.part"));
+  snprintf (text, sizeof text, "rmdir @/sorted.csv.sorted; %s; wc -l <@/sorted.csv", sweep);
+  assert_int_equal (cli_run (text), 0);
+  assert_string_equal (cli_out, "3\n");
 }
 
 /* Figures of a run that was resumed are those of one that was not. */
@@ -166,13 +204,6 @@ static void test_columns (void **state) {
   assert_non_null (strstr (cli_file ("some.csv"), "\n2,input,"));
 }
 
-/* What a run costs, in the metric it projects in. */
-static void test_profile_metric (void **state) {
-  (void)state;
-  cli_good ("pinwheel run ezyroller -t 0.1 -m rk4+projection:metric=identity --profile");
-  told_shows ("project");
-}
-
 /* Ladders that are none. */
 static void test_ladder (void **state) {
   (void)state;
@@ -183,11 +214,11 @@ static void test_ladder (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_roller),          cmocka_unit_test (test_reactions), cmocka_unit_test (test_signals),
-    cmocka_unit_test (test_unbound),         cmocka_unit_test (test_literals),  cmocka_unit_test (test_nothing),
-    cmocka_unit_test (test_figures_resumed), cmocka_unit_test (test_ladder),    cmocka_unit_test (test_many_redundant),
-    cmocka_unit_test (test_contradiction),   cmocka_unit_test (test_alone),     cmocka_unit_test (test_columns),
-    cmocka_unit_test (test_profile_metric),
+    cmocka_unit_test (test_roller),   cmocka_unit_test (test_reactions),      cmocka_unit_test (test_signals),
+    cmocka_unit_test (test_unbound),  cmocka_unit_test (test_literals),       cmocka_unit_test (test_nothing),
+    cmocka_unit_test (test_failures), cmocka_unit_test (test_sorted),         cmocka_unit_test (test_figures_resumed),
+    cmocka_unit_test (test_ladder),   cmocka_unit_test (test_many_redundant), cmocka_unit_test (test_contradiction),
+    cmocka_unit_test (test_alone),    cmocka_unit_test (test_columns),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
