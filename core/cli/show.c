@@ -162,8 +162,9 @@ static void show_defaults (const pw_plugin_table *table) {
 }
 
 static void show_sizes (const pw_system *s) {
-  printf ("\nSizes: %d bodies, %d coordinates, %d constraint rows (%d on positions, %d on velocities)\n", s->bodies,
-          s->coords, s->rows, s->holonomic, s->rows - s->holonomic);
+  printf ("\nSizes: %d %s, %d coordinates, %d constraint row%s (%d on positions, %d on velocities)\n", s->bodies,
+          s->bodies == 1 ? "body" : "bodies", s->coords, s->rows, s->rows == 1 ? "" : "s", s->holonomic,
+          s->rows - s->holonomic);
 }
 
 /* The states whose motion the model knows. */
