@@ -1,9 +1,8 @@
-/* The built-in signals: ramps, smooth steps, pulses and tables; their derivatives, where steps end, what may use them. */
+/* The built-in signals: ramps, smooth steps, pulses and tables; their derivatives, their jumps and kinks, what may use
+ * them. */
 #include <float.h>
 #include <math.h>
-#include <string.h>
 #include "check.h"
-#include "runs.h"
 #include "scene.h"
 #include "signal.h"
 #include "trial.h"
@@ -178,133 +177,6 @@ static void test_rest (void **state) {
   check_close ("rate at the last point", u[1], 0, 1e-13, "round-off");
 }
 
-/* ---- In a run: the EzyRoller driven by a torque ---- */
-
-static pw_system *shapes_scene (const pw_signal *torque) {
-  pw_error error = { 0 };
-  pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", torque, &error), &error);
-  return scene_compile (m);
-}
-
-static void shapes_run (const pw_signal *torque, const char *method, const pw_settings *settings, double *q,
-                        pw_statistics *cost) {
-  double v[6];
-  pw_system *s = shapes_scene (torque);
-  runs_state (s, method, settings, 4, q, v, cost);
-  pw_free (s);
-}
-
-static double shapes_error (const pw_signal *torque, const char *method, double step, const double *exact) {
-  double q[6], worst = 0;
-  shapes_run (torque, method, &(pw_settings){ .step = step, .rtol = step, .span = 4 }, q, NULL);
-  for (int j = 0; j < 6; j++) worst = fmax (worst, fabs (q[j] - exact[j]));
-  return worst;
-}
-
-static double shapes_wave_t[21], shapes_wave_y[21];
-
-/* Scaled to torques; what the scene is driven by at most is 0.3 N m. */
-static pw_signal shapes_torque (int i) {
-  static const double little_t[] = { 0.31, 1.07, 1.9, 3.3 }, little_y[] = { 0, 0.2, -0.2, 0.1 };
-  for (int k = 0; k < 21; k++) shapes_wave_t[k] = 0.21 * k, shapes_wave_y[k] = 0.2 * sin (2 * shapes_wave_t[k]);
-  const pw_signal torque[] = {
-    { PW_RAMP, .ramp = { 0, 0.2, 1 / 3., 1.77 } },
-    { PW_PULSE, .pulse = { 0.2, 1 / 3., 0.41, 1.13, -0.1 } },
-    { PW_TABLE, .table = { little_t, little_y, 4, PW_LINEAR, 0 } },
-    { PW_SMOOTH_STEP, .ramp = { 0, 0.2, 1 / 3., 1.77 } },
-    { PW_TABLE, .table = { little_t, little_y, 4, PW_CUBIC, PW_ENDS_FREE } },
-    { PW_TABLE, .table = { shapes_wave_t, shapes_wave_y, 20, PW_CUBIC, PW_ENDS_REST } },
-  };
-  return torque[i];
-}
-
-enum { SHAPES_TORQUES = 6 };
-
-/* No kink or jump lies on the grid of the steps, and the order is 4 all the same. */
-static void test_order (void **state) {
-  (void)state;
-  for (int i = 0; i < SHAPES_TORQUES; i++) {
-    double exact[6], error[3];
-    pw_signal torque = shapes_torque (i);
-    shapes_run (&torque, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 }, exact, NULL);
-    for (int k = 0; k < 3; k++) error[k] = shapes_error (&torque, "rk4+projection", 0.04 / (1 << k), exact);
-    for (int k = 0; k < 2; k++)
-      check_below ("error over that of twice the step", error[k + 1] / error[k], 1 / 9.,
-                   "order 4 has 1/16, a step over a kink 1/4, over a jump 1/2");
-  }
-}
-
-static void test_held (void **state) {
-  (void)state;
-  for (int i = 0; i < SHAPES_TORQUES; i++) {
-    double exact[6];
-    pw_signal torque = shapes_torque (i);
-    shapes_run (&torque, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 }, exact, NULL);
-    double coarse = shapes_error (&torque, "rk4+projection:inputs=held", 2e-3, exact);
-    double fine = shapes_error (&torque, "rk4+projection:inputs=held", 1e-3, exact);
-    if (i != 1) check_close ("error over that of half the step", coarse / fine, 2, 0.2, "held: order 1");
-    if (i == 1) check_below ("error of held pulses", fine, 1e-8, "constant between their ends: nothing is lost");
-  }
-}
-
-static void test_tolerances (void **state) {
-  static const char *const method[] = { "erk5+projection", "erk8+projection", "ida+ggl", "ida+baumgarte" };
-  (void)state;
-  for (int i = 0; i < SHAPES_TORQUES; i++) {
-    double exact[6];
-    pw_signal torque = shapes_torque (i);
-    shapes_run (&torque, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 4 }, exact, NULL);
-    for (int k = 0; k < 4; k++) {
-      double factor = k < 2 ? 100 : 1000;
-      check_below (method[k], shapes_error (&torque, method[k], 1e-8, exact), factor * 1e-8,
-                   "100 rtol, of multistep methods 1000");
-    }
-  }
-}
-
-static void shapes_disc (pw_model *m, const void *parameters) {
-  (void)parameters;
-  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 2 });
-  pw_add_torque (m, &(pw_torque){ .name = "push", .body = { "disc", "ground" } });
-}
-
-static const pw_plugin_table shapes_disc_table = TRIAL_TABLE (shapes_disc);
-
-/* However long nothing has happened and however short it is, a pulse is not stepped over. */
-static void test_short_pulse (void **state) {
-  static const char *const method[] = { "erk5", "erk8", "rk4", "ida" };
-  pw_signal force = { PW_PULSE, .pulse = { .height = 1000, .start = 70. / 3, .width = 1e-3 } };
-  (void)state;
-  for (int i = 0; i < 4; i++) {
-    double q[3], v[3];
-    pw_error error = { 0 };
-    pw_model *m = scene_model (&shapes_disc_table, NULL);
-    check_ok (pw_set_signal (m, "push", "value", &force, &error), &error);
-    pw_system *s = scene_compile (m);
-    runs_state (s, method[i], &(pw_settings){ .rtol = 1e-6, .step = 0.7, .span = 40 }, 40, q, v, NULL);
-    check_close (method[i], v[2], 0.5, 1e-9, "torque times time over inertia: round-off of times");
-    pw_free (s);
-  }
-}
-
-/* The model and the system have copies of a table's points. */
-static void test_copies (void **state) {
-  double t[] = { 0, 1, 2, 3 }, y[] = { 0, 0.1, 0.2, 0.1 }, q[2][6], v[6];
-  pw_signal torque = { PW_TABLE, .table = { t, y, 4, PW_CUBIC, 0 } };
-  pw_error error = { 0 };
-  (void)state;
-  shapes_run (&torque, "rk4", &(pw_settings){ .step = 0.01 }, q[0], NULL);
-  pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
-  memset (t, 0, sizeof t);
-  memset (y, 0, sizeof y);
-  pw_system *s = scene_compile (m);
-  runs_state (s, "rk4", &(pw_settings){ .step = 0.01 }, 4, q[1], v, NULL);
-  check_bits ("states", q[0], q[1], 6);
-  pw_free (s);
-}
-
 /* ---- What may use which ---- */
 
 /* A car that is steered along a ramp and a table, keeps a speed along a table, tows a trailer by a motor whose target is
@@ -414,11 +286,9 @@ static void test_faults (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_forms),  cmocka_unit_test (test_values),     cmocka_unit_test (test_many_pulses),
-    cmocka_unit_test (test_cubic),  cmocka_unit_test (test_rest),       cmocka_unit_test (test_order),
-    cmocka_unit_test (test_held),   cmocka_unit_test (test_tolerances), cmocka_unit_test (test_short_pulse),
-    cmocka_unit_test (test_copies), cmocka_unit_test (test_methods),    cmocka_unit_test (test_refused),
-    cmocka_unit_test (test_faults),
+    cmocka_unit_test (test_forms),   cmocka_unit_test (test_values), cmocka_unit_test (test_many_pulses),
+    cmocka_unit_test (test_cubic),   cmocka_unit_test (test_rest),   cmocka_unit_test (test_methods),
+    cmocka_unit_test (test_refused), cmocka_unit_test (test_faults),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
