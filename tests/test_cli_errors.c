@@ -253,12 +253,27 @@ static void test_moved (void **state) {
   assert_true (cli_says (cli_out, "status", "ok"));
 }
 
+/* What the integrators say when they give up is in our message, not beside it. */
+static void test_one_voice (void **state) {
+  (void)state;
+  static const char *const method[] = { "ida+ggl", "bdf+projection", "adams+baumgarte" };
+  cli_write ("root.yaml", "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+                          "elements:\n  - {torque: m, body: [a, ground], value: sqrt(0.1-t)}\n");
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+    char text[200];
+    snprintf (text, sizeof text, "pinwheel run @/root.yaml -t 1 -m %s", method[i]);
+    assert_int_equal (cli_run (text), 4);
+    assert_true (strncmp (cli_err, "pinwheel: t = 0.", 16) == 0);
+    assert_true (strchr (cli_err, '\n')[1] == 0);
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_bad_lines),   cmocka_unit_test (test_useless_options), cmocka_unit_test (test_unwritable),
     cmocka_unit_test (test_full_disk),   cmocka_unit_test (test_bad_models),      cmocka_unit_test (test_bad_tables),
     cmocka_unit_test (test_bad_files),   cmocka_unit_test (test_found_twice),     cmocka_unit_test (test_failing_step),
-    cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),
+    cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),           cmocka_unit_test (test_one_voice),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
