@@ -28,14 +28,12 @@
 /* ---- Opening ---- */
 
 static int galpha_allocate (galpha *d, const pw_system *s) {
-  size_t n = (size_t)s->coords + 3, size = (size_t)d->size, rows = (size_t)s->rows, entries = (size_t)s->entries;
-  const pw_array array[] = {
-    { &d->v, n },     { &d->a, n },      { &d->w, n },          { &d->q1, n },          { &d->v1, n },
-    { &d->a1, n },    { &d->w1, n },     { &d->lambda1, rows }, { &d->mu1, rows },      { &d->q0, n },
-    { &d->v0, n },    { &d->a0, n },     { &d->lambda0, rows }, { &d->rate0, entries }, { &d->ledger0, entries },
-    { &d->z, size },  { &d->row, size }, { &d->column, size },  { &d->pull, n },        { &d->f, n },
-    { &d->jv, rows }, { &d->eta, rows }, { &d->D, n }
-  };
+  size_t n = (size_t)s->coords + 3, size = (size_t)d->size, rows = (size_t)s->rows;
+  const pw_array array[] = { { &d->v, n },      { &d->a, n },    { &d->w, n },      { &d->q1, n },
+                             { &d->v1, n },     { &d->a1, n },   { &d->w1, n },     { &d->lambda1, rows },
+                             { &d->mu1, rows }, { &d->z, size }, { &d->row, size }, { &d->column, size },
+                             { &d->pull, n },   { &d->f, n },    { &d->jv, rows },  { &d->eta, rows },
+                             { &d->D, n } };
   d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
   if (d->memory == NULL) return PW_MACHINE;
   for (int j = 0; j < s->coords; j++) d->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
@@ -53,7 +51,7 @@ static void galpha_coefficients (galpha *d, double rho) {
 static int galpha_restart (pw_run *r, pw_error *error) {
   galpha *d = r->data;
   (void)error;
-  d->base = d->t0 = r->t;
+  d->base = d->last.t0 = r->t;
   d->count = 0;
   d->h = 0;
   return PW_OK;
@@ -72,13 +70,13 @@ static int galpha_open (pw_run *r, pw_error *error) {
   if (status == PW_OK) status = galpha_allocate (d, r->s);
   if (status == PW_OK) status = pw_galpha_open_matrix (r);
   if (status != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  status = pw_projector_open (&d->projector, r, r->s->metric, NULL, error);
+  status = pw_between_open (&d->last, r, d->ggl, error);
   return status == PW_OK ? galpha_restart (r, error) : status;
 }
 
 static void galpha_close (pw_run *r) {
   galpha *d = r->data;
-  pw_projector_close (&d->projector);
+  pw_between_close (&d->last);
   pw_sparse_close (&d->sparse);
   pw_tangent_close (&d->tangent);
   free (d->value);
@@ -128,7 +126,7 @@ static int galpha_begin (pw_run *r, double h) {
   if (!d->ggl && d->h > 0) { /* rates have the error that goes with the size before */
     status = pw_place (r->s, r->t, r->q, d->v);
     if (status == PW_OK) pw_sweep_J (r->s);
-    if (status == PW_OK) status = pw_project_velocities (&d->projector, r, d->v);
+    if (status == PW_OK) status = pw_project_velocities (&d->last.projector, r, d->v);
   }
   if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, d->v, d->a, d->eta);
   if (status == PW_OK) status = galpha_jerk (r, h, jerk);
@@ -139,23 +137,11 @@ static int galpha_begin (pw_run *r, double h) {
 
 /* ---- Advancing ---- */
 
-static void galpha_keep (pw_run *r) {
-  galpha *d = r->data;
-  size_t n = (size_t)d->n * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
-  d->t0 = r->t;
-  memcpy (d->q0, r->q, n);
-  memcpy (d->v0, r->v, n);
-  memcpy (d->a0, r->a, n);
-  memcpy (d->lambda0, r->lambda, (size_t)r->s->rows * sizeof (double));
-  memcpy (d->ledger0, r->ledger, entries);
-  memcpy (d->rate0, r->rate, entries);
-}
-
 /* The successor becomes the state reached. */
 static void galpha_accept (pw_run *r, double h, double t1) {
   galpha *d = r->data;
   size_t n = (size_t)d->n * sizeof (double);
-  galpha_keep (r);
+  pw_between_keep (&d->last, r);
   memcpy (r->q, d->q1, n);
   memcpy (r->v, d->v1, n);
   memcpy (r->a, d->a1, n);
@@ -168,9 +154,7 @@ static void galpha_accept (pw_run *r, double h, double t1) {
   }
   r->t = t1;
   d->h = h;
-  if (!r->settings.ledger) return;
-  pw_sweep_ledger (r->s, r->lambda, r->rate);
-  for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * h * (d->rate0[i] + r->rate[i]);
+  pw_between_count (&d->last, r);
 }
 
 static int galpha_fail (pw_run *r, int status, double h, pw_error *error) {
@@ -197,45 +181,8 @@ static int galpha_advance (pw_run *r, double t_end, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- Looking into the last step ---- */
-
-/* Cubic Hermite interpolation of y with slopes s between 0 and 1, the step h wide. */
-static double galpha_hermite (double x, double h, double y0, double s0, double y1, double s1) {
-  double up = x * x * (3 - 2 * x);
-  return y0 + up * (y1 - y0) + h * x * (1 - x) * ((1 - x) * s0 - x * s1);
-}
-
-/* Positions and rates of order 4, put onto the constraints that the form has; multipliers and accelerations, of which
- * the ends are good to h^2, and the ledger's rates, linearly. */
-static int galpha_inside (pw_run *r, double t) {
-  galpha *d = r->data;
-  pw_system *s = r->s;
-  double h = r->t - d->t0, x = (t - d->t0) / h, worst;
-  int row;
-  for (int j = 0; j < d->n; j++) {
-    r->q_at[j] = galpha_hermite (x, h, d->q0[j], d->v0[j], r->q[j], r->v[j]);
-    r->v_at[j] = galpha_hermite (x, h, d->v0[j], d->a0[j], r->v[j], r->a[j]);
-    r->a_at[j] = (1 - x) * d->a0[j] + x * r->a[j];
-  }
-  for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * d->lambda0[i] + x * r->lambda[i];
-  for (int i = 0; i < s->entries; i++)
-    r->ledger_at[i] = d->ledger0[i] + h * x * (d->rate0[i] + 0.5 * x * (r->rate[i] - d->rate0[i]));
-  int status = pw_project_positions (&d->projector, r, t, r->q_at, r->v_at, &row, &worst);
-  return status == PW_OK && d->ggl ? pw_project_velocities (&d->projector, r, r->v_at) : status;
-}
-
 static int galpha_at (pw_run *r, double t, pw_error *error) {
-  galpha *d = r->data;
-  if (t > r->t || t < d->t0)
-    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, d->t0, r->t);
-  if (t == r->t) {
-    pw_show_reached (r);
-    return PW_OK;
-  }
-  pw_statistics keep = r->statistics;
-  int status = galpha_inside (r, t);
-  r->statistics = keep;
-  return status == PW_OK ? PW_OK : galpha_fail (r, status, r->t - d->t0, error);
+  return pw_between_at (&r->data->last, r, t, error);
 }
 
 static const pw_stabilisation galpha_stabilisations[] = {

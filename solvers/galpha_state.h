@@ -2,6 +2,7 @@
 #ifndef PW_GALPHA_STATE_H
 #define PW_GALPHA_STATE_H
 
+#include "between.h"
 #include "method.h"
 #include "sparse.h"
 #include "tangent.h"
@@ -13,18 +14,15 @@ struct pw_method_data {
   double h;                                  /* size of the last step; 0: the next one begins anew */
   double base;                               /* time from which steps are counted */
   long count;                                /* steps since then */
-  double t0;                                 /* the beginning of the last step */
   double *D;                                 /* coords: 1 for lengths, 1/L^2 for angles */
   double *v, *a, *w;                         /* rates, accelerations and w that the next step goes on from */
   double *q1, *v1, *a1, *w1, *lambda1, *mu1; /* the successor; lambda, mu: rows in use */
-  double *q0, *v0, *a0, *lambda0;            /* at t0, for looking back; lambda: all rows */
-  double *ledger0, *rate0;
-  double *z, *row, *column;    /* size: residual, then correction; scales of the matrix */
-  double *pull, *f, *jv, *eta; /* scratch: coords + 3, coords + 3, all rows, all rows */
-  double *value;               /* of the matrix */
+  double *z, *row, *column;                  /* size: residual, then correction; scales of the matrix */
+  double *pull, *f, *jv, *eta;               /* scratch: coords + 3, coords + 3, all rows, all rows */
+  double *value;                             /* of the matrix */
   pw_tangent tangent;
   pw_sparse sparse;
-  pw_projector projector;
+  pw_between last;
   char *memory;
 };
 

@@ -4,14 +4,15 @@
 
 #include "pinwheel-solvers.h"
 
-#define PW_METHODS  \
-  PW_METHOD (rk4)   \
-  PW_METHOD (erk5)  \
-  PW_METHOD (erk8)  \
-  PW_METHOD (adams) \
-  PW_METHOD (bdf)   \
-  PW_METHOD (ida)   \
-  PW_METHOD (galpha)
+#define PW_METHODS   \
+  PW_METHOD (rk4)    \
+  PW_METHOD (erk5)   \
+  PW_METHOD (erk8)   \
+  PW_METHOD (adams)  \
+  PW_METHOD (bdf)    \
+  PW_METHOD (ida)    \
+  PW_METHOD (galpha) \
+  PW_METHOD (leapfrog)
 
 /* pw_parse_method that keeps the options: values has room for PW_MAX_OPTIONS. */
 int pw_parse_options (const char *text, const pw_method **method, int *stabilisation, double *values, pw_error *error);

@@ -1,0 +1,81 @@
+/* Between the ends of a step: positions and rates by cubic Hermite interpolation, of order 4, put onto the constraints
+ * that the method has; multipliers and accelerations, of which the ends are good to h^2, and the ledger's rates, linearly. */
+#include <stdlib.h>
+#include <string.h>
+#include "between.h"
+
+int pw_between_open (pw_between *b, pw_run *r, int rates, pw_error *error) {
+  size_t n = (size_t)r->s->coords, rows = (size_t)r->s->rows, entries = (size_t)r->s->entries;
+  *b = (pw_between){ .t0 = r->t, .rates = rates };
+  b->q0 = malloc ((3 * n + rows + 2 * entries + 1) * sizeof *b->q0);
+  if (b->q0 == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  b->v0 = b->q0 + n;
+  b->a0 = b->v0 + n;
+  b->lambda0 = b->a0 + n;
+  b->ledger0 = b->lambda0 + rows;
+  b->rate0 = b->ledger0 + entries;
+  return pw_projector_open (&b->projector, r, r->s->metric, NULL, error);
+}
+
+void pw_between_close (pw_between *b) {
+  pw_projector_close (&b->projector);
+  free (b->q0);
+}
+
+void pw_between_keep (pw_between *b, const pw_run *r) {
+  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  b->t0 = r->t;
+  memcpy (b->q0, r->q, n);
+  memcpy (b->v0, r->v, n);
+  memcpy (b->a0, r->a, n);
+  memcpy (b->lambda0, r->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (b->ledger0, r->ledger, entries);
+  memcpy (b->rate0, r->rate, entries);
+}
+
+void pw_between_count (pw_between *b, pw_run *r) {
+  if (!r->settings.ledger) return;
+  pw_sweep_ledger (r->s, r->lambda, r->rate);
+  for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->t0) * (b->rate0[i] + r->rate[i]);
+}
+
+/* Cubic Hermite interpolation of y with slopes s between 0 and 1, the step h wide. */
+static double between_hermite (double x, double h, double y0, double s0, double y1, double s1) {
+  double up = x * x * (3 - 2 * x);
+  return y0 + up * (y1 - y0) + h * x * (1 - x) * ((1 - x) * s0 - x * s1);
+}
+
+static int between_inside (pw_between *b, pw_run *r, double t) {
+  pw_system *s = r->s;
+  double h = r->t - b->t0, x = (t - b->t0) / h, worst;
+  int row;
+  for (int j = 0; j < s->coords; j++) {
+    r->q_at[j] = between_hermite (x, h, b->q0[j], b->v0[j], r->q[j], r->v[j]);
+    r->v_at[j] = between_hermite (x, h, b->v0[j], b->a0[j], r->v[j], r->a[j]);
+    r->a_at[j] = (1 - x) * b->a0[j] + x * r->a[j];
+  }
+  for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * b->lambda0[i] + x * r->lambda[i];
+  for (int i = 0; i < s->entries; i++)
+    r->ledger_at[i] = b->ledger0[i] + h * x * (b->rate0[i] + 0.5 * x * (r->rate[i] - b->rate0[i]));
+  int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at, &row, &worst);
+  return status == PW_OK && b->rates ? pw_project_velocities (&b->projector, r, r->v_at) : status;
+}
+
+int pw_between_at (pw_between *b, pw_run *r, double t, pw_error *error) {
+  if (t > r->t || t < b->t0)
+    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, b->t0, r->t);
+  if (t == r->t) {
+    pw_show_reached (r);
+    return PW_OK;
+  }
+  pw_statistics keep = r->statistics;
+  int status = between_inside (b, r, t);
+  r->statistics = keep;
+  if (status == PW_OK) return PW_OK;
+  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  if (r->near) return pw_fail_singular (r, t, error);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: no state near the one between steps meets the constraints; "
+                  "the step of %.6g s may be too large",
+                  t, r->t - b->t0);
+}

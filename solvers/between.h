@@ -1,0 +1,27 @@
+/* The last step of a method that keeps both of its ends: what it was between them. */
+#ifndef PW_BETWEEN_H
+#define PW_BETWEEN_H
+
+#include "method.h"
+
+typedef struct {
+  double t0;                                        /* the beginning of the last step */
+  double *q0, *v0, *a0, *lambda0, *ledger0, *rate0; /* the state there; lambda: all rows */
+  int rates;                                        /* 1: the method has J v = eta */
+  pw_projector projector;
+} pw_between;
+
+/* rates: what it says above.  Errors: PW_MACHINE. */
+int pw_between_open (pw_between *b, pw_run *r, int rates, pw_error *error);
+void pw_between_close (pw_between *b);
+
+/* The state reached is now the beginning of a step. */
+void pw_between_keep (pw_between *b, const pw_run *r);
+
+/* The ledger goes on to the end of the step, where the state is placed and r->lambda known: trapezoidal rule. */
+void pw_between_count (pw_between *b, pw_run *r);
+
+/* The state at t into the run's sample arrays, placed there with J swept: a method's `at`. */
+int pw_between_at (pw_between *b, pw_run *r, double t, pw_error *error);
+
+#endif
