@@ -115,7 +115,7 @@ static void leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
   p->size = 0, p->large = 1;
   for (int j = 0; j < s->coords; j++) {
     d->v1[j] += d->dv[j];
-    leapfrog_measure (p, d->dv[j], d->v1[j], pw_unit (s, j) / s->scale.time);
+    leapfrog_measure (p, d->dv[j], d->u[j], pw_unit (s, j) / s->scale.time);
   }
 }
 

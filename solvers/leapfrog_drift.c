@@ -131,7 +131,7 @@ static void drift_correct (pw_run *r, double h, leapfrog_progress *p) {
   p->size = 0, p->large = 1;
   for (int j = 0; j < n; j++) {
     d->u[j] += d->z[j];
-    leapfrog_measure (p, h * d->z[j], d->q1[j], pw_unit (r->s, j));
+    leapfrog_measure (p, h * d->z[j], r->q[j], pw_unit (r->s, j));
   }
   drift_move (r, h);
 }

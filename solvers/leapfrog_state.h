@@ -24,14 +24,15 @@ typedef struct pw_method_data leapfrog;
 
 /* How an iteration fares, from the sizes of its corrections. */
 typedef struct {
-  double size;   /* of the last one, the largest of its coordinates, each over its own */
+  double size;   /* of the last one, the largest of its coordinates, each over what it was before */
   double large;  /* the largest coordinate, in units of the scene: round-off of one may show in another */
   double before; /* size of the one before */
   double rate;   /* of the last to the one before */
   int done;      /* corrections before the last one */
 } leapfrog_progress;
 
-/* Takes the correction of one coordinate into the sizes, which are 0 and 1 at first. */
+/* Takes the correction of one coordinate into the sizes, which are 0 and 1 at first; its value does not iterate, so that
+ * divergence shows. */
 static inline void leapfrog_measure (leapfrog_progress *p, double correction, double value, double unit) {
   double size = fabs (correction) / (fabs (value) + unit);
   if (!(size <= p->size)) p->size = size;

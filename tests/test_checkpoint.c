@@ -153,9 +153,10 @@ static void test_same (void **state) {
 
 static void test_options (void **state) {
   (void)state;
-  static const char *const method[] = { "rk4+projection:every=3", "rk4+projection:metric=identity", "rk4:inputs=held",
-                                        "erk5:steps=fixed",       "erk8+baumgarte:alpha=3",         "rk4+nullspace",
-                                        "galpha+ggl:rho=0.5" };
+  static const char *const method[] = { "rk4+projection:every=3", "rk4+projection:metric=identity",
+                                        "rk4:inputs=held",        "erk5:steps=fixed",
+                                        "erk8+baumgarte:alpha=3", "rk4+nullspace",
+                                        "galpha+ggl:rho=0.5",     "leapfrog" };
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) saved_compare (1, method[i]);
 }
 

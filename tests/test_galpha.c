@@ -134,13 +134,13 @@ static void test_large_steps (void **state) {
   galpha_stops ("pendulum", "galpha+index3", 1, "the step of 1 s is too large: pin pivot is violated");
 }
 
-/* ---- Samples ---- */
+/* ---- Samples, as leapfrog has them too ---- */
 
 /* Inside of steps: as accurate as at their ends, on the constraints; the ledger closes, and asking changes nothing. */
 static void test_samples (void **state) {
-  static const char *const method[] = { "galpha+index3", "galpha+ggl" };
+  static const char *const method[] = { "galpha+index3", "galpha+ggl", "leapfrog" };
   (void)state;
-  for (int i = 0; i < 2; i++) {
+  for (int i = 0; i < 3; i++) {
     double off[2] = { 0 }, force[2] = { 0 }, balance[2] = { 0 }, q[2][6];
     for (int k = 0; k < 2; k++) {
       double h = k ? 0.0025 : 0.01;
@@ -203,11 +203,11 @@ static void galpha_switched_run (const char *method, pw_settings settings, doubl
 }
 
 static void test_breakpoint (void **state) {
-  static const char *const method[] = { "galpha+index3", "galpha+ggl" };
+  static const char *const method[] = { "galpha+index3", "galpha+ggl", "leapfrog" };
   (void)state;
   double x[12], l[4];
   galpha_switched_run ("erk8+projection", (pw_settings){ .rtol = 1e-12, .span = 1 }, x, l);
-  for (int i = 0; i < 2; i++) {
+  for (int i = 0; i < 3; i++) {
     double off[2] = { 0 }, force[2] = { 0 };
     for (int k = 0; k < 2; k++) {
       double y[12], m[4];

@@ -94,6 +94,8 @@ static void test_refused (void **state) {
   methods_refused ("galpha+index2", "integrator galpha has no stabilisation \"index2\"; did you mean \"index3\"?");
   methods_refused ("galpha+ggl:ro=1", "method galpha+ggl has no option \"ro\"; did you mean \"rho\"?");
   methods_refused ("galpha:rho=1.5", "method option rho=1.5: expected a number from 0 to 1");
+  methods_refused ("leapfrog+projection", "integrator leapfrog has no stabilisation \"projection\"; valid...");
+  methods_refused ("leapfog", "there is no integrator \"leapfog\"; did you mean \"leapfrog\"?");
   methods_refused ("rk4+baumgarte:alfa=1", "method rk4+baumgarte has no option \"alfa\"; did you mean \"alpha\"?");
   methods_refused ("rk4+none:alpha=1", "method rk4+none has no option \"alpha\"; valid...");
   methods_refused ("rk4+projection:metric=masses", "method option metric cannot be \"masses\"; did you mean \"mass\"?");

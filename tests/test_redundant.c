@@ -15,7 +15,7 @@ enum { REDUNDANT_COORDS = 20 };
 static const char *const redundant_fixed[] = { "rk4+none",       "rk4+baumgarte",
                                                "rk4+projection", "rk4+projection:metric=identity",
                                                "rk4+nullspace",  NULL };
-static const char *const redundant_second[] = { "galpha+index3", "galpha+ggl", NULL }; /* of order 2 */
+static const char *const redundant_second[] = { "galpha+index3", "galpha+ggl", "leapfrog", NULL }; /* of order 2 */
 static const char *const redundant_adaptive[] = {
   "ida+none",        "ida+baumgarte", "ida+ggl",       "ida+index2",     "ida+si1", "adams+none",
   "adams+baumgarte", "bdf+none",      "bdf+baumgarte", "bdf+projection", NULL

@@ -238,7 +238,8 @@ static void test_locked (void **state) {
     "rk4+none",       "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
     "ida+none",       "ida+baumgarte", "ida+ggl",        "ida+index2",
     "ida+si1",        "adams+none",    "bdf+none",       "bdf+baumgarte",
-    "bdf+projection", "rk4+nullspace", "galpha+index3",  "galpha+ggl"
+    "bdf+projection", "rk4+nullspace", "galpha+index3",  "galpha+ggl",
+    "leapfrog"
   };
   (void)state;
   for (int wheels = 3; wheels <= 4; wheels++)
@@ -300,10 +301,10 @@ static void singular_steered (pw_model *m, const void *parameters) {
 /* A locking that arises on the way stops the run and names a wheel. */
 static void test_locks_in_motion (void **state) {
   static const pw_plugin_table table = TRIAL_TABLE (singular_steered);
-  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "rk4+none",      "ida+baumgarte",
-                                        "ida+ggl",        "rk4+nullspace", "galpha+index3", "galpha+ggl",
-                                        "adams+none",     "ida+si1",       "ida+index2",    "adams+baumgarte",
-                                        "bdf+baumgarte",  "bdf+projection" };
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",  "rk4+none",      "ida+baumgarte",
+                                        "ida+ggl",        "rk4+nullspace",  "galpha+index3", "galpha+ggl",
+                                        "adams+none",     "ida+si1",        "ida+index2",    "adams+baumgarte",
+                                        "bdf+baumgarte",  "bdf+projection", "leapfrog" };
   (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
@@ -374,9 +375,9 @@ static const pw_plugin_table singular_drives_table = { .abi = PW_ABI,
                                                        .build = singular_drives };
 
 static void test_drives (void **state) {
-  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",  "ida+ggl",    "ida+baumgarte",
-                                        "rk4+nullspace",  "galpha+index3",  "galpha+ggl", "ida+si1",
-                                        "bdf+projection", "adams+baumgarte" };
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",    "ida+baumgarte",
+                                        "rk4+nullspace",  "galpha+index3",   "galpha+ggl", "ida+si1",
+                                        "bdf+projection", "adams+baumgarte", "leapfrog" };
   (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
