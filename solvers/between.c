@@ -3,23 +3,22 @@
 #include <stdlib.h>
 #include <string.h>
 #include "between.h"
+#include "util.h"
 
 int pw_between_open (pw_between *b, pw_run *r, int rates, pw_error *error) {
   size_t n = (size_t)r->s->coords, rows = (size_t)r->s->rows, entries = (size_t)r->s->entries;
   *b = (pw_between){ .t0 = r->t, .rates = rates };
-  b->q0 = malloc ((3 * n + rows + 2 * entries + 1) * sizeof *b->q0);
-  if (b->q0 == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  b->v0 = b->q0 + n;
-  b->a0 = b->v0 + n;
-  b->lambda0 = b->a0 + n;
-  b->ledger0 = b->lambda0 + rows;
-  b->rate0 = b->ledger0 + entries;
+  const pw_array array[] = {
+    { &b->q0, n }, { &b->v0, n }, { &b->a0, n }, { &b->lambda0, rows }, { &b->ledger0, entries }, { &b->rate0, entries }
+  };
+  b->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  if (b->memory == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   return pw_projector_open (&b->projector, r, r->s->metric, NULL, error);
 }
 
 void pw_between_close (pw_between *b) {
   pw_projector_close (&b->projector);
-  free (b->q0);
+  free (b->memory);
 }
 
 void pw_between_keep (pw_between *b, const pw_run *r) {

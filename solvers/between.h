@@ -9,6 +9,7 @@ typedef struct {
   double *q0, *v0, *a0, *lambda0, *ledger0, *rate0; /* the state there; lambda: all rows */
   int rates;                                        /* 1: the method has J v = eta */
   pw_projector projector;
+  char *memory;
 } pw_between;
 
 /* rates: what it says above.  Errors: PW_MACHINE. */

@@ -20,6 +20,9 @@
 #include <stdlib.h>
 #include <string.h>
 #include "leapfrog_state.h"
+#include "util.h"
+
+enum { LEAPFROG_MOST = 100 }; /* substitutions for forces of the rates */
 
 /* ---- Opening ---- */
 
@@ -33,15 +36,12 @@ static int leapfrog_restart (pw_run *r, pw_error *error) {
 
 static int leapfrog_allocate (leapfrog *d, const pw_system *s) {
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows;
-  double **array[] = { &d->q1, &d->v1, &d->middle, &d->dv, &d->f };
-  d->u = calloc (7 * n + 4 * rows, sizeof *d->u);
-  if (d->u == NULL) return PW_MACHINE;
-  for (size_t i = 0; i < sizeof array / sizeof *array; i++) *array[i] = d->u + (i + 1) * n;
-  d->off = d->f + n;
-  d->mu = d->off + rows;
-  d->eta = d->mu + rows;
-  d->z = d->eta + rows;
-  return PW_OK;
+  const pw_array array[] = {
+    { &d->u, n }, { &d->q1, n },     { &d->v1, n },    { &d->middle, n }, { &d->dv, n },
+    { &d->f, n }, { &d->off, rows }, { &d->mu, rows }, { &d->eta, rows }, { &d->z, n + rows }
+  };
+  d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  return d->memory ? PW_OK : PW_MACHINE;
 }
 
 static int leapfrog_open (pw_run *r, pw_error *error) {
@@ -60,7 +60,7 @@ static void leapfrog_close (pw_run *r) {
   pw_sparse_close (&d->sparse);
   pw_tangent_close (&d->tangent);
   free (d->value);
-  free (d->u);
+  free (d->memory);
   free (d);
 }
 
@@ -70,9 +70,7 @@ static void leapfrog_carry (pw_run *r, pw_archive *a) {
   pw_carry (a, &d->count, sizeof d->count);
 }
 
-enum { LEAPFROG_MOST = 100 }; /* substitutions */
-
-/* ---- Second half: v' ---- */
+/* ---- Iterations ---- */
 
 int pw_leapfrog_judge (leapfrog_progress *p) {
   const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON; /* by light bodies, or short ones */
@@ -85,6 +83,8 @@ int pw_leapfrog_judge (leapfrog_progress *p) {
   p->done++;
   return 0;
 }
+
+/* ---- Second half: v' ---- */
 
 /* Places the system at (t, q, v), factorises the saddle there and takes note of a singular pose. */
 static int leapfrog_factor (pw_run *r, double t, const double *q, const double *v) {
@@ -151,6 +151,7 @@ static void leapfrog_accept (pw_run *r, double t1) {
 
 /* Where the iteration fails, the pose that the step begins with may be the reason. */
 static int leapfrog_fail (pw_run *r, int status, double h, pw_error *error) {
+  if (status == PW_MACHINE) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   if (status == PW_RETRY && !r->near) leapfrog_factor (r, r->t, r->q, r->v);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (r->near) return pw_fail_singular (r, r->t, error);

@@ -18,6 +18,7 @@ struct pw_method_data {
   pw_tangent tangent;
   pw_sparse sparse;
   pw_between last;
+  char *memory;
 };
 
 typedef struct pw_method_data leapfrog;
