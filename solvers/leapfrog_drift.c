@@ -121,19 +121,20 @@ static int drift_rows (pw_run *r, double h, double t1) {
 }
 
 /* One correction of u, measured in positions. */
-static void drift_correct (pw_run *r, double h, leapfrog_progress *p) {
+static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
   int n = r->s->coords;
   memset (d->z, 0, (size_t)n * sizeof *d->z);
   for (int i = 0; i < r->s->rows; i++) d->off[i] = -d->off[i];
   pw_tangent_compress (&d->tangent, d->off, d->tangent.rows, d->z + n);
-  pw_sparse_solve (&d->sparse, d->z);
+  if (pw_sparse_solve (&d->sparse, d->z) != PW_OK) return PW_MACHINE;
   p->size = 0, p->large = 1;
   for (int j = 0; j < n; j++) {
     d->u[j] += d->z[j];
     leapfrog_measure (p, h * d->z[j], r->q[j], pw_unit (r->s, j));
   }
   drift_move (r, h);
+  return PW_OK;
 }
 
 /* The matrix is evaluated at the prediction, and again where corrections do not shrink well. */
@@ -145,8 +146,8 @@ int pw_leapfrog_drift (pw_run *r, double h, double t1) {
   for (int i = 0, good = r->s->rows == 0; !good; i++) {
     int fresh = i == 0 || (i > 1 && p.rate > 0.02), status = fresh ? drift_factor (r, h, t1) : PW_OK;
     if (status == PW_OK) status = drift_rows (r, h, t1);
+    if (status == PW_OK) status = drift_correct (r, h, &p);
     if (status != PW_OK) return status;
-    drift_correct (r, h, &p);
     good = i < DRIFT_MOST ? pw_leapfrog_judge (&p) : -1;
     if (good < 0) return PW_RETRY;
   }
