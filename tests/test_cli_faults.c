@@ -24,7 +24,10 @@ static struct {
   long fail;        /* the one that fails; 0: none */
   const char *name; /* of that */
   int reading;      /* 1: it was to read, and what cannot be read is wrong input */
+  int synced;       /* 1: the file opened last has been brought to the disk */
 } call;
+
+static int faults_bad; /* calls after whose failure something was not as it should be */
 
 static int call_fails (const char *name, int reading) {
   if (call.fail == 0 || ++call.count != call.fail) return 0;
@@ -42,7 +45,6 @@ static int call_fails (const char *name, int reading) {
     return call_fails (#name, why == EIO) ? (errno = why, failed) : __real_##name arguments; \
   }
 
-CALL (-1, EROFS, int, rename, (const char *from, const char *to), (from, to))
 CALL (-1, ENOSPC, int, ftruncate, (int fd, off_t size), (fd, size))
 CALL (-1, ENOSPC, ssize_t, pwrite, (int fd, const void *p, size_t size, off_t at), (fd, p, size, at))
 CALL (-1, EROFS, int, mkdir, (const char *path, mode_t mode), (path, mode))
@@ -73,6 +75,7 @@ static int call_is_written (FILE *f) {
 FILE *__real_fopen (const char *path, const char *mode);
 FILE *__wrap_fopen (const char *path, const char *mode);
 FILE *__wrap_fopen (const char *path, const char *mode) {
+  if (*mode == 'w') call.synced = 0;
   if (!call_fails ("fopen", *mode == 'r')) return __real_fopen (path, mode);
   errno = EMFILE;
   return NULL;
@@ -130,11 +133,23 @@ ssize_t __wrap_getline (char **line, size_t *room, FILE *f) {
   return -1;
 }
 
+/* A checkpoint is on the disk before it takes the place of the one before it. */
+int __real_rename (const char *from, const char *to);
+int __wrap_rename (const char *from, const char *to);
+int __wrap_rename (const char *from, const char *to) {
+  size_t n = strlen (to);
+  if (!call.synced && n > 3 && strcmp (to + n - 3, ".ck") == 0) faults_bad++;
+  if (!call_fails ("rename", 0)) return __real_rename (from, to);
+  errno = EROFS;
+  return -1;
+}
+
 /* A folder need not take it. */
 int __real_fsync (int fd);
 int __wrap_fsync (int fd);
 int __wrap_fsync (int fd) {
   struct stat info;
+  call.synced = 1;
   if ((fstat (fd, &info) == 0 && S_ISDIR (info.st_mode)) || !call_fails ("fsync", 0)) return __real_fsync (fd);
   errno = EIO;
   return -1;
@@ -231,8 +246,6 @@ static void faults_prepare (void) {
 }
 
 /* ---- Commands ---- */
-
-static int faults_bad; /* calls after whose failure something was not as it should be */
 
 typedef int faults_function (int argc, const char **argv);
 
