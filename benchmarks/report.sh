@@ -25,15 +25,12 @@ section () {
   cp "$work/page" "$page"
 }
 
-# draw NAME WIDTH HEIGHT: a gnuplot script from standard input, as SVG and PNG.
+# draw NAME WIDTH HEIGHT: a gnuplot script from standard input, as PNG.
 draw () {
   cat >"$work/script"
   command -v gnuplot >/dev/null || { echo 'report.sh: no gnuplot, no figures' >&2; return 0; }
-  for type in svg png; do
-    if [ $type = svg ]; then terminal="svg size $2,$3 dynamic noenhanced font 'DejaVu Sans,Helvetica,sans-serif,12' background rgb 'white'"
-    else terminal="pngcairo size $2,$3 noenhanced font 'Sans,9.5' background rgb 'white'"; fi
-    { echo "set encoding utf8"; echo "set terminal $terminal"; echo "set output '$figures/$1.$type'"; cat "$work/script"; } | LC_ALL= LC_CTYPE=C.UTF-8 LC_NUMERIC=C gnuplot
-  done
+  { echo "set encoding utf8"; echo "set terminal pngcairo size $2,$3 noenhanced font 'Sans,9.5' background rgb 'white'"
+    echo "set output '$figures/$1.png'"; cat "$work/script"; } | LC_ALL= LC_CTYPE=C.UTF-8 LC_NUMERIC=C gnuplot
 }
 
 # Colour, mark and dash of a method's line: told apart in black and white too.
