@@ -91,7 +91,7 @@ help:
 	@echo 'make deps             install the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make test             the tests; test-all: the slow ones too'
-	@echo 'make bench            everything that is measured, about ten minutes; goes on where it was stopped'
+	@echo 'make bench            everything that is measured, about seven minutes; goes on where it was stopped'
 	@echo 'make bench-quick      what a run costs on this machine'
 	@echo 'make bench-engine     an evaluation, a step against programs written by hand; growth with size'
 	@echo 'make bench-effects    instructions of an evaluation, with one effect more at a time; what is not used costs none'
@@ -110,7 +110,7 @@ help:
 
 # ---- Dependencies: whoever asks to see something run gets the libraries first ----
 
-ifneq ($(filter demo test test-all bench bench-quick bench-engine bench-effects hard san cov fuzz,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif

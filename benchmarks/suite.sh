@@ -1,5 +1,5 @@
 #!/bin/sh
-# The whole suite, about ten minutes: `make bench`.
+# The whole suite, about seven minutes: `make bench`.
 #
 #   suite.sh BUILD          reads BUILD/pinwheel and BUILD/benchmarks, works in BUILD/bench, writes benchmarks/results
 #
