@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 #include "check.h"
 #include "model.h"
@@ -247,6 +248,18 @@ static void test_no_value (void **state) {
   text_close (&x);
 }
 
+/* A value over fifty lines is one expression. */
+static void test_lines (void **state) {
+  char source[2000] = TWO_BODIES "elements:\n  - torque: T\n    body: [a, b]\n    value:\n      1";
+  double q[6], v[6];
+  for (int i = 1; i < 50; i++) strcat (source, "\n      + 1");
+  text x = text_of (source, NULL, 0);
+  (void)state;
+  runs_state (x.system, "rk4", &(pw_settings){ .step = 1e-2 }, 1, q, v, NULL);
+  check_close ("angular velocity", v[2], 500, 1e-10, "50 N m on 0.1 kg m^2 for a second");
+  text_close (&x);
+}
+
 static int text_setup (void **state) {
   (void)state;
   int file = mkstemps (text_path, 5);
@@ -263,7 +276,7 @@ int main (void) {
     cmocka_unit_test (test_ezyroller),  cmocka_unit_test (test_table), cmocka_unit_test (test_parameters),
     cmocka_unit_test (test_let),        cmocka_unit_test (test_time),  cmocka_unit_test (test_states),
     cmocka_unit_test (test_own_states), cmocka_unit_test (test_drive), cmocka_unit_test (test_derivatives),
-    cmocka_unit_test (test_no_value),
+    cmocka_unit_test (test_no_value),   cmocka_unit_test (test_lines),
   };
   return cmocka_run_group_tests (tests, text_setup, text_teardown);
 }

@@ -10,6 +10,7 @@ typedef struct {
   pw_yaml *y;
   struct fy_parser *parser;
   struct fy_diag *diag;
+  struct fy_token_iter *text; /* through the pieces of a scalar */
   pw_node *open[TREE_DEPTH];  /* lists and maps that have begun */
   pw_node **tail[TREE_DEPTH]; /* where the next node of each goes */
   int depth;
@@ -42,19 +43,35 @@ static pw_node *tree_add (tree *x, pw_yaml_type type, unsigned at, pw_error *err
   return n;
 }
 
+/* Puts the pieces of a scalar one after the other, if there is room for them; their size, or -1.  (fy_token_get_text
+ * would do, but libfyaml 0.7.12 loses 4 KB with every text of more than some ten pieces: escapes, lines.) */
+static long tree_text (tree *x, struct fy_token *token, char *to) {
+  const struct fy_iter_chunk *piece = NULL;
+  long size = 0;
+  int error = 0;
+  if (token == NULL) return 0;
+  fy_token_iter_start (token, x->text);
+  while ((piece = fy_token_iter_chunk_next (x->text, piece, &error)) != NULL) {
+    if (to) memcpy (to + size, piece->str, piece->len);
+    size += (long)piece->len;
+  }
+  fy_token_iter_finish (x->text);
+  return error ? -1 : size;
+}
+
 static int tree_scalar (tree *x, struct fy_event *e, pw_error *error) {
   struct fy_token *token = e->scalar.value;
-  size_t size = 0;
-  const char *text = token ? fy_token_get_text (token, &size) : "";
   int quoted = token && (fy_token_scalar_style (token) == FYSS_SINGLE_QUOTED ||
                          fy_token_scalar_style (token) == FYSS_DOUBLE_QUOTED);
   unsigned at = tree_place (x, e);
+  long size = tree_text (x, token, NULL);
   pw_node *n = tree_add (x, PW_YAML_SCALAR, at - (quoted && at > 0), error);
-  char *copy = n ? pw_arena_take (&x->y->arena, size + 1) : NULL;
-  if (text == NULL || copy == NULL) return pw_yaml_no_memory (x->y, error);
-  if (memchr (text, 0, size)) return pw_yaml_fail (x->y, n->at, error, "a text must not contain the character 0");
-  memcpy (copy, text, size);
-  n->text = copy;
+  char *text = n && size >= 0 ? pw_arena_take (&x->y->arena, (size_t)size + 1) : NULL;
+  if (text == NULL || tree_text (x, token, text) != size) return pw_yaml_no_memory (x->y, error);
+  if (memchr (text, 0, (size_t)size))
+    return pw_yaml_fail (x->y, n->at, error, "a text must not contain the character 0");
+  text[size] = 0;
+  n->text = text;
   n->quoted = quoted || (token && fy_token_scalar_style (token) != FYSS_PLAIN);
   return PW_OK;
 }
@@ -157,10 +174,12 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   struct fy_parse_cfg how = { .flags = FYPCF_ALLOW_DUPLICATE_KEYS, .diag = x.diag };
   x.parser = fy_parser_create (&how);
   int status = PW_OK;
-  if (x.parser == NULL || fy_parser_set_string (x.parser, y->source, y->size) != 0)
+  x.text = fy_token_iter_create (NULL);
+  if (x.parser == NULL || x.text == NULL || fy_parser_set_string (x.parser, y->source, y->size) != 0)
     status = pw_yaml_no_memory (y, error);
   else
     status = tree_parse (&x, error);
+  fy_token_iter_destroy (x.text);
   if (x.parser) fy_parser_destroy (x.parser);
   fy_diag_destroy (x.diag);
   return status;
