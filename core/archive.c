@@ -1,4 +1,5 @@
 /* Bytes that a state is saved to and loaded from. */
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include "run.h"
@@ -22,6 +23,11 @@ void pw_carry (pw_archive *a, void *bytes, size_t count) {
   else
     memcpy (a->at + a->used, bytes, count);
   a->used += count;
+}
+
+void pw_carry_count (pw_archive *a, long *count) {
+  pw_carry (a, count, sizeof *count);
+  if (a->loading && (*count < 0 || *count > LONG_MAX / 2)) a->failed = 1;
 }
 
 void pw_archive_clear (pw_archive *a) {

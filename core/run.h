@@ -83,7 +83,8 @@ typedef struct {
 
 /* Saves bytes, or loads them: one function that lists what a state consists of serves both ways. */
 void pw_carry (pw_archive *a, void *bytes, size_t count);
-void pw_archive_clear (pw_archive *a); /* back to the beginning */
+void pw_carry_count (pw_archive *a, long *count); /* fails for what no count can be, or none that goes on */
+void pw_archive_clear (pw_archive *a);            /* back to the beginning */
 void pw_archive_free (pw_archive *a);
 
 #ifdef __cplusplus

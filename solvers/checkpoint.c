@@ -3,6 +3,7 @@
  * Some of what a run has in memory depends on the way it came: which pivots its factorisations chose, the earlier
  * values of a multistep formula.  That is not saved: the run that is saved and the one that is loaded both build it anew
  * from the state reached, and so go on alike.  A method's `carry` adds what only it knows: step size, counts. */
+#include <math.h>
 #include "method.h"
 
 /* 1 if the archive is of a run of these sizes. */
@@ -18,6 +19,13 @@ static int checkpoint_sizes (pw_run *r, pw_archive *a) {
   return good;
 }
 
+static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
+  long *const count[] = { &s->steps, &s->rejected, &s->rhs, &s->jacobians, &s->factorisations, &s->restarts };
+  double *const worst[] = { &s->position, &s->velocity, &s->g, &s->jv };
+  for (size_t i = 0; i < sizeof count / sizeof *count; i++) pw_carry_count (a, count[i]);
+  for (size_t i = 0; i < sizeof worst / sizeof *worst; i++) pw_carry (a, worst[i], sizeof (double));
+}
+
 static void checkpoint_state (pw_run *r, pw_archive *a) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
   double *const number[] = { &r->t,     &r->breakpoint, &r->projected, &r->calm,
@@ -26,8 +34,9 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_carry (a, r->q, n);
   pw_carry (a, r->v, n);
   pw_carry (a, r->ledger, entries);
-  pw_carry (a, &r->statistics, sizeof r->statistics);
+  checkpoint_statistics (&r->statistics, a);
   pw_rank_carry (r, a);
+  if (!isfinite (r->t)) a->failed = 1;
 }
 
 /* From the state in the run, in either of them; `a` is loading and has the method's own next, if there is any. */

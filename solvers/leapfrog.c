@@ -67,7 +67,7 @@ static void leapfrog_close (pw_run *r) {
 static void leapfrog_carry (pw_run *r, pw_archive *a) {
   leapfrog *d = r->data;
   pw_carry (a, &d->base, sizeof d->base);
-  pw_carry (a, &d->count, sizeof d->count);
+  pw_carry_count (a, &d->count);
 }
 
 /* ---- Iterations ---- */

@@ -127,7 +127,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
 void pw_rk_carry (pw_run *r, pw_archive *a) {
   struct pw_method_data *d = r->data;
   pw_carry (a, &d->base, sizeof d->base);
-  pw_carry (a, &d->count, sizeof d->count);
+  pw_carry_count (a, &d->count);
   pw_carry (a, &d->split, sizeof d->split);
   pw_carry (a, &d->h, sizeof d->h);
   pw_carry (a, &d->before, sizeof d->before);

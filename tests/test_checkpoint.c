@@ -1,4 +1,5 @@
 /* A run loaded from a checkpoint goes on, bit for bit, as the one that was saved: every method, every stabilisation. */
+#include <limits.h>
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
@@ -160,6 +161,36 @@ static void test_options (void **state) {
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) saved_compare (1, method[i]);
 }
 
+/* Counts from which none can go on, wherever in the state they stand, are refused or of no harm. */
+static void test_counts (void **state) {
+  (void)state;
+  static const char *const method[] = { "rk4+projection", "leapfrog", "ida+ggl" };
+  for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
+    pw_error error = { 0 };
+    pw_archive archive = { .at = NULL };
+    pw_system *s = saved_system (0);
+    pw_run *r = saved_open (s, 0, method[m]);
+    check_ok (pw_advance (r, 1, &error), &error);
+    check_ok (pw_run_save (r, &archive, &error), &error);
+    pw_statistics done = *pw_run_statistics (r);
+    pw_close (r);
+    int refused = 0;
+    for (size_t at = 0; at + sizeof (long) <= archive.used; at++) {
+      if (memcmp (archive.at + at, &done.steps, sizeof done.steps) != 0) continue;
+      memcpy (archive.at + at, &(long){ LONG_MAX }, sizeof (long));
+      pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
+      r = saved_open (s, 0, method[m]);
+      error = (pw_error){ 0 };
+      refused += pw_run_load (r, &from, &error) == PW_INPUT;
+      pw_close (r);
+      memcpy (archive.at + at, &done.steps, sizeof done.steps);
+    }
+    assert_true (refused > 0);
+    pw_archive_free (&archive);
+    pw_free (s);
+  }
+}
+
 /* Archives of other runs, and what is left of one cut anywhere, are refused. */
 static void test_other (void **state) {
   (void)state;
@@ -193,6 +224,7 @@ int main (void) {
     cmocka_unit_test (test_same),
     cmocka_unit_test (test_options),
     cmocka_unit_test (test_other),
+    cmocka_unit_test (test_counts),
   };
   return cmocka_run_group_tests (tests, saved_setup, saved_teardown);
 }
