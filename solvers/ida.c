@@ -100,11 +100,11 @@ static void ida_fill_vectors (ida_data *d) {
 static int ida_open_vectors (ida_data *d) {
   const pw_system *s = d->run->s;
   if (SUNContext_Create (PW_SUN_NO_COMM, &d->context) != 0) return PW_MACHINE;
-  d->y = N_VNew_Serial (d->size, d->context);
-  d->yp = N_VNew_Serial (d->size, d->context);
-  d->id = N_VNew_Serial (d->size, d->context);
-  d->work = N_VNew_Serial (s->entries + 1, d->context);
-  d->work0 = N_VNew_Serial (s->entries + 1, d->context);
+  d->y = pw_sun_vector (d->size, d->context);
+  d->yp = pw_sun_vector (d->size, d->context);
+  d->id = pw_sun_vector (d->size, d->context);
+  d->work = pw_sun_vector (s->entries + 1, d->context);
+  d->work0 = pw_sun_vector (s->entries + 1, d->context);
   d->scale = calloc ((size_t)(3 * d->n + 6 + 2 * s->rows), sizeof *d->scale);
   if (!d->y || !d->yp || !d->id || !d->work || !d->work0 || !d->scale) return PW_MACHINE;
   d->given = d->scale + d->n;

@@ -110,9 +110,9 @@ static int multistep_open_arrays (multistep_data *d) {
   const pw_system *s = r->s;
   size_t n = (size_t)d->n + 3;
   if (SUNContext_Create (PW_SUN_NO_COMM, &d->context) != 0) return PW_MACHINE;
-  d->y = N_VNew_Serial (2 * d->n, d->context);
-  d->work = N_VNew_Serial (s->entries + 1, d->context);
-  d->work0 = N_VNew_Serial (s->entries + 1, d->context);
+  d->y = pw_sun_vector (2 * d->n, d->context);
+  d->work = pw_sun_vector (s->entries + 1, d->context);
+  d->work0 = pw_sun_vector (s->entries + 1, d->context);
   d->q = calloc (3 * n + (size_t)s->rows, sizeof *d->q);
   if (!d->y || !d->work || !d->work0 || !d->q) return PW_MACHINE;
   d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;

@@ -135,8 +135,8 @@ int pw_multistep_open_newton (multistep_data *d) {
   pw_multistep_newton *w = &d->newton;
   if (pw_tangent_open (&w->tangent, d->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_MACHINE;
   int size = d->n + w->tangent.rows;
-  w->right = N_VNew_Serial (size, d->context);
-  w->change = N_VNew_Serial (size, d->context);
+  w->right = pw_sun_vector (size, d->context);
+  w->change = pw_sun_vector (size, d->context);
   w->matrix = pw_sun_matrix (size, w->colptr, w->rowind, d->context);
   if (!w->right || !w->change || !w->matrix) return PW_MACHINE;
   w->klu = SUNLinSol_KLU (w->right, w->matrix, d->context);

@@ -27,6 +27,9 @@ void pw_sun_message (int code, const char *module, const char *function, char *t
 /* That message, or the flag in words if there was none. */
 const char *pw_sun_reason (pw_sun_said *said, int flag);
 
+/* A vector whose operations, and those of its clones, are ours (vectors.c); NULL: out of memory. */
+N_Vector pw_sun_vector (sunindextype length, SUNContext context);
+
 /* A square sparse matrix of this pattern in compressed columns, all 0; NULL: out of memory. */
 SUNMatrix pw_sun_matrix (int size, const int64_t *colptr, const int64_t *rowind, SUNContext context);
 /* All values 0, and the pattern anew: SUNDIALS clears it together with the values. */

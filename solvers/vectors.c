@@ -1,0 +1,120 @@
+/* Vectors for SUNDIALS: its serial ones, with the operations that its integrators spend their time in written anew.  A
+ * step of high order adds dozens of vectors of a dozen entries, through calls that a distribution may have built for
+ * debugging; here they are straight loops, and several sums go in one call where the integrators ask for that.
+ *
+ * Sums of two are the same numbers, to the bit, whatever the factors; norms are summed by twos. */
+#include <math.h>
+#include "sundials.h"
+#include "unroll.h"
+
+/* z = a x + b y; all four are read before one is written, so z may be x or y. */
+PW_INLINE void vectors_sum (sunindextype n, double a, const double *x, double b, const double *y, double *z) {
+  sunindextype i = 0;
+  for (; i + 3 < n; i += 4) {
+    double z0 = a * x[i] + b * y[i], z1 = a * x[i + 1] + b * y[i + 1];
+    double z2 = a * x[i + 2] + b * y[i + 2], z3 = a * x[i + 3] + b * y[i + 3];
+    z[i] = z0, z[i + 1] = z1, z[i + 2] = z2, z[i + 3] = z3;
+  }
+  for (; i < n; i++) z[i] = a * x[i] + b * y[i];
+}
+
+/* A constant factor of 1 vanishes where the sum is inlined. */
+static void vectors_sum_by (sunindextype n, double a, const double *x, double b, const double *y, double *z) {
+  if (a == 1 && b == 1)
+    vectors_sum (n, 1, x, 1, y, z);
+  else if (b == 1)
+    vectors_sum (n, a, x, 1, y, z);
+  else if (a == 1)
+    vectors_sum (n, 1, x, b, y, z);
+  else
+    vectors_sum (n, a, x, b, y, z);
+}
+
+static void vectors_linear_sum (pw_real a, N_Vector x, pw_real b, N_Vector y, N_Vector z) {
+  vectors_sum_by (NV_LENGTH_S (z), a, NV_DATA_S (x), b, NV_DATA_S (y), NV_DATA_S (z));
+}
+
+static void vectors_scale (pw_real c, N_Vector vx, N_Vector vz) {
+  sunindextype i = 0, n = NV_LENGTH_S (vz);
+  const double *x = NV_DATA_S (vx);
+  double *z = NV_DATA_S (vz);
+  for (; i + 1 < n; i += 2) {
+    double z0 = c * x[i], z1 = c * x[i + 1];
+    z[i] = z0, z[i + 1] = z1;
+  }
+  for (; i < n; i++) z[i] = c * x[i];
+}
+
+static void vectors_const (pw_real c, N_Vector vz) {
+  double *z = NV_DATA_S (vz);
+  for (sunindextype i = 0, n = NV_LENGTH_S (vz); i < n; i++) z[i] = c;
+}
+
+/* z = sum_k c_k x_k */
+static int vectors_combine (int count, pw_real *c, N_Vector *x, N_Vector z) {
+  if (count == 1)
+    vectors_scale (c[0], x[0], z);
+  else
+    vectors_linear_sum (c[0], x[0], c[1], x[1], z);
+  for (int k = 2; k < count; k++) vectors_linear_sum (c[k], x[k], 1, z, z);
+  return 0;
+}
+
+/* z_k = a_k x + y_k */
+static int vectors_add_to (int count, pw_real *a, N_Vector x, N_Vector *y, N_Vector *z) {
+  for (int k = 0; k < count; k++) vectors_linear_sum (a[k], x, 1, y[k], z[k]);
+  return 0;
+}
+
+static int vectors_scale_each (int count, pw_real *c, N_Vector *x, N_Vector *z) {
+  for (int k = 0; k < count; k++) vectors_scale (c[k], x[k], z[k]);
+  return 0;
+}
+
+/* ---- Norms ---- */
+
+/* The sum of (x_i w_i)^2, of those with id_i > 0 if there is an id. */
+PW_INLINE double vectors_squares (N_Vector vx, N_Vector vw, const double *id) {
+  sunindextype i = 0, n = NV_LENGTH_S (vx);
+  const double *x = NV_DATA_S (vx), *w = NV_DATA_S (vw);
+  double even = 0, odd = 0;
+  for (; i + 1 < n; i += 2) {
+    double p = x[i] * w[i], q = x[i + 1] * w[i + 1];
+    if (id == NULL || id[i] > 0) even += p * p;
+    if (id == NULL || id[i + 1] > 0) odd += q * q;
+  }
+  if (i < n && (id == NULL || id[i] > 0)) even += x[i] * w[i] * (x[i] * w[i]);
+  return even + odd;
+}
+
+static pw_real vectors_sum_squares (N_Vector x, N_Vector w) {
+  return vectors_squares (x, w, NULL);
+}
+
+static pw_real vectors_sum_squares_of (N_Vector x, N_Vector w, N_Vector id) {
+  return vectors_squares (x, w, NV_DATA_S (id));
+}
+
+static pw_real vectors_norm (N_Vector x, N_Vector w) {
+  return sqrt (vectors_squares (x, w, NULL) / (double)NV_LENGTH_S (x));
+}
+
+static pw_real vectors_norm_of (N_Vector x, N_Vector w, N_Vector id) {
+  return sqrt (vectors_squares (x, w, NV_DATA_S (id)) / (double)NV_LENGTH_S (x));
+}
+
+N_Vector pw_sun_vector (sunindextype length, SUNContext context) {
+  N_Vector v = N_VNew_Serial (length, context);
+  if (v == NULL) return NULL;
+  v->ops->nvlinearsum = vectors_linear_sum;
+  v->ops->nvscale = vectors_scale;
+  v->ops->nvconst = vectors_const;
+  v->ops->nvlinearcombination = vectors_combine;
+  v->ops->nvscaleaddmulti = vectors_add_to;
+  v->ops->nvscalevectorarray = vectors_scale_each;
+  v->ops->nvwrmsnorm = vectors_norm;
+  v->ops->nvwrmsnormmask = vectors_norm_of;
+  v->ops->nvwsqrsumlocal = vectors_sum_squares;
+  v->ops->nvwsqrsummasklocal = vectors_sum_squares_of;
+  return v;
+}
