@@ -132,7 +132,7 @@ $(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := -iquote core -iquote core/files -iquote core/cli -iquote solvers -iquote tests/fuzz
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
-$(BUILD)/obj/benchmarks/engine.o $(BUILD)/obj/benchmarks/eighth.o $(BUILD)/obj/benchmarks/effects.o $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
+$(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,eighth.o effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
 $(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -iquote core -I$(BUILD)/include
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
@@ -203,8 +203,10 @@ $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 	$(Q)$(LINK) -Wl,-rpath,'$$ORIGIN/..' -o $@ $(filter %.o,$^) $(HOUSE_LIBS) $(EXTRA_LIBS) -lm
 
 $(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
-$(BUILD)/benchmarks/engine: EXTRA_LIBS := $(SOLVER_LIBS)
+$(BUILD)/benchmarks/engine $(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
 $(BUILD)/benchmarks/eighth: $(call obj,$(addprefix benchmarks/,baseline/ezyroller.c baseline/runge_kutta.c engine/scenes.c))
+$(BUILD)/benchmarks/peers: $(call obj,$(wildcard benchmarks/baseline/*.c) $(addprefix benchmarks/engine/,scenes.c count.c ladder.c))
+$(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
 $(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
 $(BUILD)/benchmarks/hard: $(call obj,$(HARD))
 $(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml

@@ -88,4 +88,18 @@ int ezy_ida_step (ezy_ida *d);
 /* Steps and residuals so far, and the positions. */
 void ezy_ida_look (const ezy_ida *d, long *steps, long *residuals, double q[6]);
 
+/* ---- The EzyRoller, massive, by CVODES: Adams, or BDF with projection ---- */
+
+typedef struct ezy_cvode ezy_cvode;
+
+/* From rest at t = 0; rtol = atol for all states.  NULL if SUNDIALS refuses. */
+ezy_cvode *ezy_cvode_open (const ezy_model *model, int adams, double rtol, double t_end);
+void ezy_cvode_close (ezy_cvode *d);
+
+/* One step towards t_end.  Returns 1 when t_end is reached, 0 before, < 0 on failure. */
+int ezy_cvode_step (ezy_cvode *d);
+
+/* Steps and evaluations so far, and the positions. */
+void ezy_cvode_look (const ezy_cvode *d, long *steps, long *evaluations, double q[6]);
+
 #endif
