@@ -141,7 +141,7 @@ int pw_plan_column (const pw_plan *c, const pw_ldl *ldl, int j) {
   return column;
 }
 
-/* The groups in the order in which they are needed, those without a piece last. */
+/* The groups that are in no chain in the order in which they are needed, those without a piece last. */
 static int condense_sort_groups (pw_plan *c, const pw_ldl *ldl) {
   int nodes = ldl->nodes, *next = calloc ((size_t)nodes + 3, sizeof *next);
   c->begun = malloc (((size_t)nodes + 1) * sizeof *c->begun);
@@ -151,13 +151,11 @@ static int condense_sort_groups (pw_plan *c, const pw_ldl *ldl) {
     c->begun[j] = j;
     for (int i = ldl->column[j].first; i < ldl->column[j + 1].first; i++) c->begun[ldl->below[i]] = j;
   }
-  for (int n = 0; n < c->groups && status == PW_OK; n++) {
-    condense_sort_group (c, ldl->place, pw_plan_group (c, n));
-    next[pw_plan_column (c, ldl, pw_plan_group (c, n)) + 2]++;
-  }
+  for (int n = 0; n < c->groups && status == PW_OK; n++)
+    if (!c->is_linked[n]) next[pw_plan_column (c, ldl, pw_plan_group (c, n)) + 2]++;
   for (int p = 0; p <= nodes && status == PW_OK; p++) next[p + 2] += next[p + 1];
   for (int n = 0; n < c->groups && status == PW_OK; n++)
-    c->group[next[pw_plan_column (c, ldl, pw_plan_group (c, n)) + 1]++] = pw_plan_group (c, n);
+    if (!c->is_linked[n]) c->group[next[pw_plan_column (c, ldl, pw_plan_group (c, n)) + 1]++] = pw_plan_group (c, n);
   free (next);
   return status;
 }
@@ -198,9 +196,23 @@ static int condense_keep (pw_plan *c) {
 
 static int condense_open_large (pw_plan *c) {
   pw_ldl *ldl = condense_pattern (c);
-  if (ldl && condense_sort_groups (c, ldl) == PW_OK) return pw_condense_large (c, ldl);
+  for (int n = 0; ldl && n < c->groups; n++) condense_sort_group (c, ldl->place, pw_plan_group (c, n));
+  int status = ldl ? pw_condense_chains (c, ldl) : PW_MACHINE;
+  if (status == PW_OK) status = pw_ldl_lay_out (ldl);
+  if (status == PW_OK) status = condense_sort_groups (c, ldl);
+  if (status == PW_OK) return pw_condense_large (c, ldl);
   pw_ldl_close (ldl);
-  return PW_MACHINE;
+  return status;
+}
+
+static void condense_forget (pw_plan *c) {
+  free (c->group);
+  free (c->begun);
+  free (c->chain);
+  free (c->is_linked);
+  c->group = c->begun = NULL;
+  c->chain = NULL;
+  c->is_linked = NULL;
 }
 
 /* Before its kept bodies, a row may follow from others: two legs of a platform that stands on the ground.  Such rows, as
@@ -218,9 +230,7 @@ static int condense_try_large (pw_plan *c) {
     c->node[n].rank = 2;
     pw_large_close (l);
     c->k->large = NULL;
-    free (c->group);
-    free (c->begun);
-    c->group = c->begun = NULL;
+    condense_forget (c);
   }
 }
 
@@ -294,8 +304,7 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
   free (c.node_of);
   free (c.start);
   free (c.list);
-  free (c.group);
-  free (c.begun);
   free (c.kept);
+  condense_forget (&c);
   return status;
 }

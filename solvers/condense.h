@@ -68,11 +68,14 @@ typedef struct {
   int nodes, pieces;
   int *start, *list; /* pieces by coordinate: list[start[j]] .. list[start[j + 1]] */
   int groups;        /* bodies, then own coordinates */
-  int *group;        /* their first coordinates, in the order in which they are needed */
+  int *group;        /* those in no chain: their first coordinates, in the order in which they are needed */
   int *begun;        /* the first column whose elimination changes a column */
   int *kept;         /* bodies: the node of one that is kept, or -1 */
   int keeps;
-  long pairs; /* of nodes that meet */
+  pw_chain *chain;
+  int chains, linked;       /* of these; bodies in them */
+  unsigned char *is_linked; /* groups: 1 for a body in a chain */
+  long pairs;               /* of nodes that meet */
 } pw_plan;
 
 /* The first coordinate of a group: bodies, then own coordinates. */
@@ -93,6 +96,10 @@ int pw_plan_column (const pw_plan *c, const pw_ldl *ldl, int j);
 static inline int pw_plan_kept (const pw_plan *c, int j) {
   return j < 3 * c->k->s->bodies ? c->kept[j / 3] : -1;
 }
+
+/* Finds the chains, and marks their inner columns; the pieces of each group are in the order of their columns.  PW_OK or
+ * PW_MACHINE. */
+int pw_condense_chains (pw_plan *c, pw_ldl *ldl);
 
 /* Fills k->small, with room for c->groups panels. */
 void pw_condense_small (const pw_plan *c, const double *weight, pw_panel *panel);

@@ -80,6 +80,13 @@ static void condense_patch (condense_large *g, int j, pw_patch *p, int *piece, i
   p->shape = link ? PW_LINK : is_short ? PW_SHORT : PW_ANY;
 }
 
+/* Nothing is stored for a chain but what its ends share with the rest. */
+static void condense_chain (condense_large *g, pw_chain *x) {
+  const pw_column *first = &g->large->ldl->column[x->column], *last = first + x->bodies;
+  x->first = g->seen[first->at] == CONDENSE_UNSEEN ? ~first->at : first->at;
+  x->last = condense_once (g, last->at);
+}
+
 /* Elimination updates what the patches have to have stored by then. */
 static const int *condense_eliminate (condense_large *g, const pw_column *c, const int *target) {
   const pw_ldl *l = g->large->ldl;
@@ -108,12 +115,19 @@ static void condense_gaps (condense_large *g) {
 static int condense_fill_large (pw_plan *c, pw_large *l) {
   condense_large g = { c, l, calloc ((size_t)l->ldl->values + 1, 1) };
   const int *target = l->ldl->target;
+  pw_chain *chain = l->chain;
   int piece = 0, block = 0, n = 0;
   if (g.seen == NULL) return PW_MACHINE;
-  for (int j = 0; j <= l->ldl->nodes; j++) {
-    for (; n < c->groups && (j == l->ldl->nodes || pw_plan_column (c, l->ldl, c->group[n]) <= j); n++)
+  for (int j = 0; j <= l->ldl->nodes;) {
+    for (; n < l->patches && (j == l->ldl->nodes || pw_plan_column (c, l->ldl, c->group[n]) <= j); n++)
       condense_patch (&g, c->group[n], &l->patch[n], &piece, &block);
+    if (chain->column == j) {
+      condense_chain (&g, chain);
+      j += chain++->bodies;
+      continue;
+    }
     if (j < l->ldl->nodes) target = condense_eliminate (&g, &l->ldl->column[j], target);
+    j++;
   }
   l->patch[n] = (pw_patch){ .first = piece, .block = block, .column = l->ldl->nodes };
   condense_gaps (&g);
@@ -124,9 +138,11 @@ static int condense_fill_large (pw_plan *c, pw_large *l) {
 }
 
 static void condense_take_large (const pw_plan *c, pw_layout *l, pw_large *large) {
-  large->patch = pw_take (l, (size_t)c->groups + 1, sizeof *large->patch);
-  large->piece = pw_take (l, (size_t)(c->pieces + c->keeps), sizeof *large->piece);
-  large->block = pw_take (l, (size_t)c->pairs, sizeof *large->block);
+  large->patch = pw_take (l, (size_t)large->patches + 1, sizeof *large->patch);
+  large->piece = pw_take (l, (size_t)(c->pieces - 2 * c->linked + c->keeps), sizeof *large->piece);
+  large->block = pw_take (l, (size_t)(c->pairs - c->linked), sizeof *large->block);
+  large->chain = pw_take (l, (size_t)c->chains + 1, sizeof *large->chain);
+  large->keep = pw_take (l, 3 * (size_t)c->linked, sizeof *large->keep);
 }
 
 int pw_condense_large (pw_plan *c, pw_ldl *ldl) {
@@ -135,7 +151,9 @@ int pw_condense_large (pw_plan *c, pw_ldl *ldl) {
     pw_ldl_close (ldl);
     return PW_MACHINE;
   }
-  *l = (pw_large){ .ldl = ldl, .inverse = c->k->inverse, .patches = c->groups };
+  *l = (pw_large){ .ldl = ldl, .inverse = c->k->inverse };
+  l->patches = c->groups - c->linked;
+  l->chains = c->chains;
   l->base[0] = (const double *)(const void *)c->k->s;
   l->base[1] = (const double *)(const void *)c->k->reduce.memory;
   pw_layout lay = { NULL, 0 };
@@ -144,6 +162,8 @@ int pw_condense_large (pw_plan *c, pw_ldl *ldl) {
   if (l->memory == NULL) return PW_MACHINE;
   lay = (pw_layout){ l->memory, 0 };
   condense_take_large (c, &lay, l);
+  memcpy (l->chain, c->chain, (size_t)c->chains * sizeof *l->chain);
+  l->chain[l->chains] = (pw_chain){ .column = ldl->nodes + 1 };
   int status = condense_fill_large (c, l);
   pw_ldl_settle (ldl);
   return status;

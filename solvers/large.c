@@ -1,54 +1,16 @@
 /* Numbers of a large scene; see large.h.
  *
  *   for each column j in order:
- *     for the patches needed from here on:  K_ab += J_a W^-1 J_b^T,   y_a += J_a W^-1 f
+ *     for the patches needed from here on:  K_ab += J_a W^-1 J_b^T,   y_a -= J_a W^-1 f
  *     D = K_jj,  L_pj = K_pj D^-1,  K_pq -= L_pj K_qj^T  for all p >= q below j,   y_p -= L_pj y_j
- *   for each column j backwards:   y_j = D^-1 y_j - sum_p L_pj^T y_p
+ *   for each column j backwards:   y_j = -D^-1 y_j - sum_p L_pj^T y_p
  *   for each patch:                a = W^-1 (f - sum_a J_a^T y_a)
  *
  * Right-looking, every place known in advance (Duff, Erisman & Reid 2017, Direct Methods for Sparse Matrices, chapters
  * 5 and 12).  D^-1 is kept explicitly: a node has at most 3 unknowns. */
-#include <math.h>
-#include <string.h>
 #include "large_parts.h"
 
 /* ---- Elimination of columns of 1 or 2 unknowns with such rows below ---- */
-
-/* The smallest pivot relative to its diagonal entry, without dividing as long as it stays the smallest; what is not a
- * number is taken for smaller.  `was` is positive, or else a pivot below 0 could make up for the one before it. */
-static inline void large_judge (pw_large *l, double pivot, double was, int y) {
-  if (pivot >= l->pivot * was) return;
-  l->pivot = pivot / was;
-  l->row = y;
-}
-
-/* A block of up to 2 x 2. */
-typedef struct {
-  double xx, xy, yx, yy;
-} large_square;
-
-/* Inverts a diagonal block in place. */
-static inline large_square large_invert (int k, double *D, pw_large *l, int y) {
-  if (k == 1) {
-    large_judge (l, D[0], D[1], y);
-    D[0] = 1 / D[0];
-    return (large_square){ .xx = D[0] };
-  }
-  double a = D[0], b = D[1], c = D[2], minor = a * c - b * b, f = 1 / minor;
-  large_judge (l, a, D[3], y);
-  large_judge (l, minor, fabs (a) * D[4], y + 1);
-  D[0] = c * f, D[1] = -b * f, D[2] = a * f;
-  return (large_square){ D[0], D[1], D[1], D[2] };
-}
-
-/* L = A D^-1: A ki x kj. */
-static inline large_square large_scale (int ki, int kj, const double *A, large_square D) {
-  large_square L = { .xx = A[0] * D.xx };
-  if (kj == 2) L.xx += A[1] * D.yx, L.xy = A[0] * D.xy + A[1] * D.yy;
-  if (ki == 2) L.yx = A[kj] * D.xx;
-  if (ki == 2 && kj == 2) L.yx += A[3] * D.yx, L.yy = A[2] * D.xy + A[3] * D.yy;
-  return L;
-}
 
 /* T -= L A^T: L ki x kj, A kq x kj. */
 static inline void large_subtract (int kq, double *T, large_square L, const double *A, int ki, int kj) {
@@ -56,12 +18,6 @@ static inline void large_subtract (int kq, double *T, large_square L, const doub
   if (kq == 2) T[1] -= large_dot_pair (kj, L.xx, L.xy, A + kj);
   if (ki == 2) T[kq] -= large_dot_pair (kj, L.yx, L.yy, A);
   if (ki == 2 && kq == 2) T[3] -= large_dot_pair (kj, L.yx, L.yy, A + kj);
-}
-
-/* The same for a diagonal block, of which there is the lower triangle. */
-static inline void large_subtract_diagonal (int ki, double *D, large_square L, const double *A, int kj) {
-  D[0] -= large_dot_pair (kj, L.xx, L.xy, A);
-  if (ki == 2) D[1] -= large_dot_pair (kj, L.yx, L.yy, A), D[2] -= large_dot_pair (kj, L.yx, L.yy, A + kj);
 }
 
 /* Row p of a column c: its updates, then L in place of K.  A: its block; B: the column's first block. */
@@ -93,22 +49,6 @@ static inline const int *large_column (int kj, pw_large *l, const pw_column *c, 
     LARGE_SHORT (ki, large_row, l, c, p, A, B, inverse, target, y, kj);
   }
   return target;
-}
-
-/* The column of a chain: 2 unknowns, with one row of 2 below. */
-static inline void large_column_link (pw_large *l, const pw_column *c, double *y) {
-  double *value = l->ldl->value, *D = value + c->at, *K = D + 5;
-  const pw_column *row = l->ldl->column + l->ldl->below[c->first];
-  double *T = value + row->at;
-  const large_square inverse = large_invert (2, D, l, c->y), L = large_scale (2, 2, K, inverse);
-  large_subtract_diagonal (2, T, L, K, 2);
-  if (y) {
-    const double x = y[c->y], z = y[c->y + 1];
-    double *to = y + row->y;
-    to[0] -= L.xx * x + L.xy * z;
-    to[1] -= L.yx * x + L.yy * z;
-  }
-  K[0] = L.xx, K[1] = L.xy, K[2] = L.yx, K[3] = L.yy;
 }
 
 /* ---- Any column ---- */
@@ -165,20 +105,25 @@ static const int *large_column_any (pw_large *l, const pw_column *c, const int *
 static inline int large_down (pw_large *l, const double *f, double *y, int what) {
   const pw_ldl *ldl = l->ldl;
   const pw_patch *p = l->patch, *last = p + l->patches;
+  const pw_chain *chain = l->chain;
   const int *target = ldl->target;
   l->pivot = INFINITY;
   l->row = -1;
   for (const pw_gap *g = l->gap; g < l->gap + l->gaps; g++)
     memset (ldl->value + g->at, 0, (size_t)g->count * sizeof (double));
-  for (int j = 0; j < ldl->nodes; j++) {
+  for (int j = 0; j < ldl->nodes;) {
     const pw_column *c = &ldl->column[j];
     for (; p < last && p->column <= j; p++) large_patch (l, p, f, y, what);
-    if (c->shape == PW_LINK)
-      large_column_link (l, c, y);
-    else if (c->shape == PW_ANY)
-      target = large_column_any (l, c, target, y);
-    else
-      target = LARGE_SHORT (c->size, large_column, l, c, target, y);
+    if (chain->column == j) {
+      pw_large_chain_down (l, chain, f, y);
+      j += chain++->bodies;
+    } else {
+      if (c->shape == PW_ANY)
+        target = large_column_any (l, c, target, y);
+      else
+        target = LARGE_SHORT (c->size, large_column, l, c, target, y);
+      j++;
+    }
     if (!(l->pivot > 0)) return 0;
   }
   return 1;

@@ -14,6 +14,7 @@
 #ifndef PW_LARGE_H
 #define PW_LARGE_H
 
+#include "chain.h"
 #include "ldl.h"
 
 typedef struct {
@@ -47,7 +48,9 @@ typedef struct {
   pw_piece *piece;
   int *block; /* where K_ba is in the values; the complement if it is stored, not added */
   pw_gap *gap;
-  int patches, gaps;
+  pw_chain *chain; /* chains + 1: the last one begins nowhere; their bodies are in no patch */
+  double *keep;    /* of the chains' columns: D^-1, lower triangles */
+  int patches, gaps, chains;
   double pivot; /* smallest pivot of the last factorisation, relative to the diagonal entry it came from */
   int row;      /* its position in the right-hand side */
   char *memory;
@@ -56,7 +59,7 @@ typedef struct {
 /* S = J W^-1 J^T = L D L^T; stops at a pivot that is not positive. */
 void pw_large_factor (pw_large *l);
 
-/* y, which holds -gamma, becomes lambda; a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
+/* y, which holds gamma, becomes lambda; a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
 void pw_large_solve (const pw_large *l, const double *f, double *y, double *a);
 
 /* Both in one pass. */

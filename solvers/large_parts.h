@@ -1,12 +1,13 @@
 /* What the numbers of a large scene consist of: the parts of large.c (down) and large_solve.c (up), inline in both; see
  * large.h.
  *
- * The patches and columns of chains, and those of nodes of 1 or 2 rows and the 3 columns of a body, are written out;
+ * The patches of two pins, and patches and columns of nodes of 1 or 2 rows and the 3 columns of a body, are written out;
  * sizes are constants where these functions are called, so that the tests vanish.  What else there is goes through
  * loops, in the functions called ..._any. */
 #ifndef PW_LARGE_PARTS_H
 #define PW_LARGE_PARTS_H
 
+#include <math.h>
 #include <string.h>
 #include "large.h"
 
@@ -50,8 +51,8 @@ static inline large_rows large_weigh_rows (int size, const double *A, int step, 
 }
 
 static inline void large_gather (int size, double *y, large_rows a, const double *f) {
-  y[0] += large_dot (a.first, f);
-  if (size == 2) y[1] += large_dot (a.second, f);
+  y[0] -= large_dot (a.first, f);
+  if (size == 2) y[1] -= large_dot (a.second, f);
 }
 
 /* The diagonal block of a piece, and once more its diagonal; stored where `at` is a complement, else added. */
@@ -102,16 +103,23 @@ static inline void large_piece (int ka, const pw_large *l, const pw_patch *p, co
       large_block (ka, 1, value, *block, R, large_J (l, b), b->step);
 }
 
-/* ---- The patch of a chain ---- */
+/* ---- The patch of two pins ---- */
 
 /* Two rows of a body: the unit matrix times s, then the angle's column. */
 typedef struct {
   double s, x, y;
 } large_arm;
 
-static inline large_arm large_read_arm (const pw_large *l, const pw_piece *p) {
-  const double *J = l->base[0] + p->J;
-  return (large_arm){ J[0], J[2], J[p->step + 2] };
+static inline large_arm large_read_arm (const double *J, ptrdiff_t step) {
+  return (large_arm){ J[0], J[2], J[step + 2] };
+}
+
+/* y -= J W^-1 f at both arms. */
+static inline void large_gather_arms (double *ya, double *yb, large_arm a, large_arm b, const double *f, double m,
+                                      double i) {
+  const double X = m * f[0], Y = m * f[1], T = i * f[2];
+  ya[0] -= a.s * X + a.x * T, ya[1] -= a.s * Y + a.y * T;
+  yb[0] -= b.s * X + b.x * T, yb[1] -= b.s * Y + b.y * T;
 }
 
 /* D += m s^2 + i (x, y) (x, y)^T with 1/mass m and 1/inertia i. */
@@ -125,13 +133,8 @@ static inline void large_arm_diagonal (double *value, int at, large_arm a, doubl
 static inline void large_link (const pw_large *l, const pw_patch *p, const double *f, double *y, int what) {
   const pw_piece *pa = l->piece + p->first, *pb = pa + 1;
   const double m = l->inverse[p->j], i = l->inverse[p->j + 2];
-  const large_arm a = large_read_arm (l, pa), b = large_read_arm (l, pb);
-  if (what & LARGE_RIGHT) {
-    const double X = m * f[p->j], Y = m * f[p->j + 1], T = i * f[p->j + 2];
-    double *ya = y + pa->y, *yb = y + pb->y;
-    ya[0] += a.s * X + a.x * T, ya[1] += a.s * Y + a.y * T;
-    yb[0] += b.s * X + b.x * T, yb[1] += b.s * Y + b.y * T;
-  }
+  const large_arm a = large_read_arm (large_J (l, pa), pa->step), b = large_read_arm (large_J (l, pb), pb->step);
+  if (what & LARGE_RIGHT) large_gather_arms (y + pa->y, y + pb->y, a, b, f + p->j, m, i);
   if (!(what & LARGE_MATRIX)) return;
   double *value = l->ldl->value, mass = m * a.s * b.s, x = i * b.x, z = i * b.y;
   const int at = l->block[p->block];
@@ -151,7 +154,7 @@ static inline void large_piece_any (const pw_large *l, const pw_patch *p, const 
   for (int i = 0; i < a->size; i++)
     for (int n = 0; n < p->width; n++) R[3 * i + n] = A[i * a->step + n] * w[n];
   for (int i = 0; i < a->size && (what & LARGE_RIGHT); i++)
-    for (int n = 0; n < p->width; n++) y[a->y + i] += R[3 * i + n] * f[p->j + n];
+    for (int n = 0; n < p->width; n++) y[a->y + i] -= R[3 * i + n] * f[p->j + n];
   if (!(what & LARGE_MATRIX)) return;
   double *T = large_at (value, a->D), *was = T + pw_ldl_triangle (a->size);
   for (int i = 0; i < a->size; was[i] = T[-1], i++)
@@ -177,7 +180,7 @@ static inline void large_keep (const pw_large *l, const pw_patch *p, const doubl
   const pw_piece *own = l->piece + p[1].first - 1;
   const double *w = l->inverse + p->j;
   const int *block = l->block + p->block;
-  for (int n = 0; n < 3 && (what & LARGE_RIGHT); n++) y[own->y + n] += f[p->j + n];
+  for (int n = 0; n < 3 && (what & LARGE_RIGHT); n++) y[own->y + n] -= f[p->j + n];
   if (!(what & LARGE_MATRIX)) return;
   double *value = l->ldl->value, *D = large_at (value, own->D);
   for (int i = 0, at = 0; i < 3; i++)
@@ -212,11 +215,55 @@ static inline void large_patch (const pw_large *l, const pw_patch *p, const doub
       LARGE_SHORT (a->size, large_piece, l, p, a, block, f, y, what);
 }
 
-/* ---- Pieces of a solution ---- */
+/* ---- Pieces of an elimination ---- */
+
+/* The smallest pivot relative to its diagonal entry, without dividing as long as it stays the smallest; what is not a
+ * number is taken for smaller.  `was` is positive, or else a pivot below 0 could make up for the one before it. */
+static inline void large_judge (pw_large *l, double pivot, double was, int y) {
+  if (pivot >= l->pivot * was) return;
+  l->pivot = pivot / was;
+  l->row = y;
+}
+
+/* A block of up to 2 x 2. */
+typedef struct {
+  double xx, xy, yx, yy;
+} large_square;
+
+/* Inverts a diagonal block in place. */
+static inline large_square large_invert (int k, double *D, pw_large *l, int y) {
+  if (k == 1) {
+    large_judge (l, D[0], D[1], y);
+    D[0] = 1 / D[0];
+    return (large_square){ .xx = D[0] };
+  }
+  double a = D[0], b = D[1], c = D[2], minor = a * c - b * b, f = 1 / minor;
+  large_judge (l, a, D[3], y);
+  large_judge (l, minor, fabs (a) * D[4], y + 1);
+  D[0] = c * f, D[1] = -b * f, D[2] = a * f;
+  return (large_square){ D[0], D[1], D[1], D[2] };
+}
+
+/* L = A D^-1: A ki x kj. */
+static inline large_square large_scale (int ki, int kj, const double *A, large_square D) {
+  large_square L = { .xx = A[0] * D.xx };
+  if (kj == 2) L.xx += A[1] * D.yx, L.xy = A[0] * D.xy + A[1] * D.yy;
+  if (ki == 2) L.yx = A[kj] * D.xx;
+  if (ki == 2 && kj == 2) L.yx += A[3] * D.yx, L.yy = A[2] * D.xy + A[3] * D.yy;
+  return L;
+}
 
 static inline double large_dot_pair (int kj, double x, double y, const double *A) {
   return kj == 2 ? x * A[0] + y * A[1] : x * A[0];
 }
+
+/* D -= L A^T, of a diagonal block, of which there is the lower triangle: L ki x kj, A ki x kj. */
+static inline void large_subtract_diagonal (int ki, double *D, large_square L, const double *A, int kj) {
+  D[0] -= large_dot_pair (kj, L.xx, L.xy, A);
+  if (ki == 2) D[1] -= large_dot_pair (kj, L.yx, L.yy, A), D[2] -= large_dot_pair (kj, L.yx, L.yy, A + kj);
+}
+
+/* ---- Pieces of a solution ---- */
 
 /* y_p -= L y_j */
 static inline void large_forward (int ki, double *to, const double *L, const double *from, int kj) {
@@ -235,7 +282,15 @@ static inline double large_entry (const double *D, int i, int j) {
   return i < j ? D[j * (j + 1) / 2 + i] : D[i * (i + 1) / 2 + j];
 }
 
-/* The second half of a solve, when y has gone down: the rest of the solution, then the accelerations. */
+/* The second half of a solve, when y has gone down: the rest of the solution, and the accelerations. */
 void pw_large_up (const pw_large *l, const double *f, double *y, double *a);
+
+/* ---- Chains: what patches and columns do elsewhere, for all of its bodies; y or f may be NULL ---- */
+
+/* Assembly and elimination; stops at a pivot that is not positive. */
+void pw_large_chain_down (pw_large *l, const pw_chain *c, const double *f, double *y);
+/* The right-hand side alone. */
+void pw_large_chain_forward (const pw_large *l, const pw_chain *c, const double *f, double *y);
+void pw_large_chain_up (const pw_large *l, const pw_chain *c, const double *f, double *y, double *a);
 
 #endif

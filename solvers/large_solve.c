@@ -6,10 +6,7 @@ static void large_forward_column (const pw_large *l, const pw_column *c, double 
   const double *L = l->ldl->value + c->at + pw_ldl_triangle (c->size) + c->size;
   for (int p = c->first; p < c[1].first; p++) {
     const pw_column *row = column + l->ldl->below[p];
-    if (c->shape == PW_LINK)
-      large_forward (2, y + row->y, L, y + c->y, 2);
-    else
-      large_forward_any (row->size, y + row->y, L, y + c->y, c->size);
+    large_forward_any (row->size, y + row->y, L, y + c->y, c->size);
     L += row->size * c->size;
   }
 }
@@ -23,16 +20,13 @@ static inline void large_backward (int ki, double *sum, const double *L, const d
 static inline void large_backward_column (int kj, const pw_large *l, const pw_column *c, double *y) {
   const pw_column *column = l->ldl->column;
   const double *D = l->ldl->value + c->at, *L = D + pw_ldl_triangle (kj) + kj;
-  double *to = y + c->y, sum[2] = { D[0] * to[0], 0 };
-  if (kj == 2) sum[0] += D[1] * to[1], sum[1] = D[1] * to[0] + D[2] * to[1];
-  if (c->shape == PW_LINK)
-    large_backward (2, sum, L, y + column[l->ldl->below[c->first]].y, kj);
-  else
-    for (int p = c->first; p < c[1].first; p++) {
-      const pw_column *row = column + l->ldl->below[p];
-      LARGE_SHORT (row->size, large_backward, sum, L, y + row->y, kj);
-      L += row->size * kj;
-    }
+  double *to = y + c->y, sum[2] = { -D[0] * to[0], 0 };
+  if (kj == 2) sum[0] -= D[1] * to[1], sum[1] = -D[1] * to[0] - D[2] * to[1];
+  for (int p = c->first; p < c[1].first; p++) {
+    const pw_column *row = column + l->ldl->below[p];
+    LARGE_SHORT (row->size, large_backward, sum, L, y + row->y, kj);
+    L += row->size * kj;
+  }
   to[0] = sum[0];
   if (kj == 2) to[1] = sum[1];
 }
@@ -43,7 +37,7 @@ static void large_backward_any (const pw_large *l, const pw_column *c, double *y
   const double *D = l->ldl->value + c->at, *L = D + pw_ldl_triangle (kj) + kj;
   double *to = y + c->y, sum[PW_LDL_NODE] = { 0 };
   for (int i = 0; i < kj; i++)
-    for (int n = 0; n < kj; n++) sum[i] += large_entry (D, i, n) * to[n];
+    for (int n = 0; n < kj; n++) sum[i] -= large_entry (D, i, n) * to[n];
   for (int p = c->first; p < c[1].first; p++) {
     const pw_column *row = column + l->ldl->below[p];
     for (int i = 0; i < row->size; i++)
@@ -64,7 +58,7 @@ static inline void large_accelerate_link (const pw_large *l, const pw_patch *p, 
                                           double *a) {
   const pw_piece *pu = l->piece + p->first, *pv = pu + 1;
   const double *w = l->inverse + p->j, *yu = y + pu->y, *yv = y + pv->y;
-  const large_arm u = large_read_arm (l, pu), v = large_read_arm (l, pv);
+  const large_arm u = large_read_arm (large_J (l, pu), pu->step), v = large_read_arm (large_J (l, pv), pv->step);
   double X = -(u.s * yu[0] + v.s * yv[0]), Y = -(u.s * yu[1] + v.s * yv[1]);
   double T = -(u.x * yu[0] + u.y * yu[1] + v.x * yv[0] + v.y * yv[1]);
   if (f) X += f[p->j], Y += f[p->j + 1], T += f[p->j + 2];
@@ -94,26 +88,46 @@ static void large_accelerate_any (const pw_large *l, const pw_patch *p, const do
   }
 }
 
+static inline void large_backward_node (const pw_large *l, const pw_column *c, double *y) {
+  if (c->shape == PW_ANY)
+    large_backward_any (l, c, y);
+  else
+    LARGE_SHORT (c->size, large_backward_column, l, c, y);
+}
+
+static inline void large_accelerate_patch (const pw_large *l, const pw_patch *p, const double *f, const double *y,
+                                           double *a) {
+  if (p->shape == PW_LINK)
+    large_accelerate_link (l, p, f, y, a);
+  else if (p->shape != PW_SHORT)
+    large_accelerate_any (l, p, f, y, a);
+  else
+    large_accelerate (l, p, f, y, a);
+}
+
+/* The nodes of a patch come behind the column before which it was assembled. */
 void pw_large_up (const pw_large *l, const double *f, double *y, double *a) {
-  const pw_ldl *ldl = l->ldl;
-  for (const pw_column *c = ldl->column + ldl->nodes; c-- > ldl->column;)
-    if (c->shape == PW_ANY)
-      large_backward_any (l, c, y);
-    else
-      LARGE_SHORT (c->size, large_backward_column, l, c, y);
-  for (const pw_patch *p = l->patch; p < l->patch + l->patches; p++)
-    if (p->shape == PW_LINK)
-      large_accelerate_link (l, p, f, y, a);
-    else if (p->shape != PW_SHORT)
-      large_accelerate_any (l, p, f, y, a);
-    else
-      large_accelerate (l, p, f, y, a);
+  const pw_patch *p = l->patch + l->patches;
+  const pw_chain *chain = l->chain + l->chains;
+  for (int j = l->ldl->nodes; j > 0;) {
+    if (chain > l->chain && chain[-1].column + chain[-1].bodies == j) {
+      pw_large_chain_up (l, --chain, f, y, a);
+      j = chain->column;
+    } else
+      large_backward_node (l, &l->ldl->column[--j], y);
+    while (p > l->patch && p[-1].column >= j) large_accelerate_patch (l, --p, f, y, a);
+  }
+  while (p > l->patch) large_accelerate_patch (l, --p, f, y, a);
 }
 
 void pw_large_solve (const pw_large *l, const double *f, double *y, double *a) {
-  const pw_ldl *ldl = l->ldl;
-  if (f)
-    for (const pw_patch *p = l->patch; p < l->patch + l->patches; p++) large_patch (l, p, f, y, LARGE_RIGHT);
-  for (const pw_column *c = ldl->column; c < ldl->column + ldl->nodes; c++) large_forward_column (l, c, y);
+  const pw_chain *chain = l->chain;
+  for (const pw_patch *p = l->patch; f && p < l->patch + l->patches; p++) large_patch (l, p, f, y, LARGE_RIGHT);
+  for (int j = 0; j < l->ldl->nodes;)
+    if (chain->column == j) {
+      pw_large_chain_forward (l, chain, f, y);
+      j += chain++->bodies;
+    } else
+      large_forward_column (l, &l->ldl->column[j++], y);
   pw_large_up (l, f, y, a);
 }

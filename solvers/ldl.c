@@ -190,13 +190,13 @@ int pw_ldl_find (const pw_ldl *l, int p, int q) {
   return at;
 }
 
-/* Where the blocks are; the list of targets is only counted while it is NULL.  Returns PW_MACHINE if there are too
- * many values. */
+/* Where the blocks are.  Returns PW_MACHINE if there are too many values. */
 static int ldl_place_columns (pw_ldl *l) {
   size_t at = 0;
   for (int j = 0; j < l->nodes; j++) {
     pw_column *c = &l->column[j];
     c->at = (int)at;
+    if (c->shape == PW_LINK) continue;
     at += (size_t)(pw_ldl_triangle (c->size) + c->size);
     int longest = c->size;
     for (int i = c->first; i < c[1].first; i++) {
@@ -205,8 +205,7 @@ static int ldl_place_columns (pw_ldl *l) {
       if (size > longest) longest = size;
     }
     if (at > INT_MAX) return PW_MACHINE;
-    int single = c->size == 2 && c[1].first == c->first + 1 && l->column[l->below[c->first]].size == 2;
-    c->shape = single ? PW_LINK : longest <= 2 ? PW_SHORT : PW_ANY;
+    c->shape = longest <= 2 ? PW_SHORT : PW_ANY;
   }
   l->column[l->nodes].at = l->values = (int)at;
   return PW_OK;
@@ -241,7 +240,7 @@ static void ldl_place_targets (pw_ldl *l) {
   }
 }
 
-static int ldl_lay_out (pw_ldl *l, const int *size, const int *y, const int *order, const ldl_lists *L) {
+static int ldl_take (pw_ldl *l, const int *size, const int *y, const int *order, const ldl_lists *L) {
   size_t n = (size_t)l->nodes, below = (size_t)L->first[l->nodes], targets = ldl_count_targets (l->nodes, L);
   pw_layout lay = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
@@ -257,6 +256,10 @@ static int ldl_lay_out (pw_ldl *l, const int *size, const int *y, const int *ord
   for (int j = 0; j < l->nodes; j++)
     l->column[j] = (pw_column){ .y = y[order[j]], .first = L->first[j], .size = (unsigned char)size[order[j]] };
   l->column[l->nodes] = (pw_column){ .first = L->first[l->nodes] };
+  return PW_OK;
+}
+
+int pw_ldl_lay_out (pw_ldl *l) {
   if (ldl_place_columns (l) != PW_OK) return PW_MACHINE;
   ldl_place_targets (l);
   l->value = malloc (((size_t)l->values + 1) * sizeof *l->value);
@@ -271,7 +274,7 @@ pw_ldl *pw_ldl_open (int nodes, const int *size, const int *y, const int *rank, 
   int status = l && order && l->place ? ldl_plan (nodes, rank, pairs, pair, order, l->place, &L) : PW_MACHINE;
   if (status == PW_OK) {
     l->nodes = nodes;
-    status = ldl_lay_out (l, size, y, order, &L);
+    status = ldl_take (l, size, y, order, &L);
   }
   ldl_lists_close (&L);
   free (order);

@@ -10,9 +10,9 @@
 
 enum { PW_LDL_NODE = 3, PW_LDL_RANKS = 3 }; /* most unknowns in a node; ranks */
 
-/* Which code is made for a column, or for what meets at a body: PW_LINK as in a chain, where there is one row of 2 below
- * a column of 2 unknowns, two pins at a body; PW_SHORT where no node has more than 2; PW_KEPT where the body
- * is an unknown itself; PW_ANY what is left. */
+/* Which code is made for a column, or for what meets at a body: PW_LINK for a column within a chain (chain.h), and for
+ * two pins at a body; PW_SHORT where no node has more than 2; PW_KEPT where the body is an unknown itself; PW_ANY what is
+ * left. */
 typedef enum { PW_ANY, PW_SHORT, PW_LINK, PW_KEPT } pw_shape;
 
 /* A node, in the order of elimination. */
@@ -39,9 +39,13 @@ typedef struct {
  * higher one come later; pair: 2 x pairs node numbers with
  * a block between them, each unordered pair any number of times, the diagonal not needed.  The order is that of the
  * nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff 1996).
- * NULL if memory is out or there are 2^31 values or more. */
+ * NULL if memory is out. */
 pw_ldl *pw_ldl_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair);
 void pw_ldl_close (pw_ldl *l);
+
+/* Lays out the values; columns of shape PW_LINK get none, the others their shape.  PW_OK, or PW_MACHINE if memory is out or
+ * there are 2^31 values or more. */
+int pw_ldl_lay_out (pw_ldl *l);
 
 /* Where the block of columns p > q is, rows those of p. */
 int pw_ldl_find (const pw_ldl *l, int p, int q);

@@ -109,11 +109,10 @@ static inline void saddle_finish (pw_saddle *k, double *a, double *lambda) {
   if (k->reduce.components) pw_reduce_backward (&k->reduce, a, lambda);
 }
 
-/* The large scene's part; lambda serves as its right-hand side -gamma. */
+/* The large scene's part; lambda serves as its right-hand side. */
 static inline int saddle_large (pw_saddle *k, int fresh, const double *f, const double *gamma, double *a,
                                 double *lambda) {
-  for (int i = 0; i < k->rows; i++) lambda[i] = -gamma[i];
-  for (int i = k->s->rows; i < k->s->rows + k->more; i++) lambda[i] = -gamma[i];
+  if (lambda != gamma) memcpy (lambda, gamma, (size_t)k->rows * sizeof *lambda);
   if (fresh)
     pw_large_both (k->large, f, lambda, a);
   else
