@@ -23,11 +23,11 @@ static void condense_fill_panels (const pw_plan *c, const double *weight, const 
     for (int i = 0; i < width; i++) heavy |= weight[j + i] != 0;
     if (!heavy) continue;
     pw_panel *p = c->k->small->end++;
-    *p = (pw_panel){ .j = j, .width = width };
+    *p = (pw_panel){ .w = c->k->inverse + j, .j = j, .width = width };
     for (int x = c->start[j]; x < c->start[j + 1]; x++) {
       const pw_plan_piece *piece = &c->piece[c->list[x]];
       int node = c->node_of[c->list[x]];
-      pw_small_add_rows (p, place[node], c->node[node].size, piece->J, piece->step);
+      pw_small_add_rows (c->k->small, p, place[node], c->node[node].size, piece->J, piece->step, piece->unit);
     }
   }
 }
@@ -36,7 +36,7 @@ void pw_condense_small (const pw_plan *c, const double *weight, pw_panel *panel)
   struct pw_saddle *k = c->k;
   pw_small *small = k->small;
   int place[PW_SMALL], touched[PW_SMALL] = { 0 };
-  *small = (pw_small){ .n = k->unknowns, .panel = panel, .end = panel, .inverse = k->inverse, .guard = k->guard };
+  *small = (pw_small){ .n = k->unknowns, .panel = panel, .end = panel, .guard = k->guard };
   condense_order_small (c, place);
   condense_fill_panels (c, weight, place);
   k->plain = k->reduce.components == 0 && k->idles == 0 ? small : NULL;

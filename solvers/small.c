@@ -36,61 +36,111 @@ void pw_small_order (int nodes, const unsigned long long *touched, int *order) {
   }
 }
 
-void pw_small_add_rows (pw_panel *p, int first, int rows, const double *J, int step) {
+/* ---- Shapes of panels ---- */
+
+/* An octal digit for each row tells which of the body's columns it has: 7 all three; 5 x and the angle, 6 y and the angle:
+ * the two rows of a unit matrix and an angle.  These are compiled apart: first what has most zeros. */
+#define SMALL_SHAPES                      \
+  SMALL_SHAPE (0756) /* a wheel, a pin */ \
+  SMALL_SHAPE (0567)                      \
+  SMALL_SHAPE (056)                       \
+  SMALL_SHAPE (07)                        \
+  SMALL_SHAPE (05656)                     \
+  SMALL_SHAPE (056756)                    \
+  SMALL_SHAPE (077)                       \
+  SMALL_SHAPE (0777)                      \
+  SMALL_SHAPE (07777)
+
+PW_INLINE int small_rows (unsigned shape) {
+  return shape < 010 ? 1 : shape < 0100 ? 2 : shape < 01000 ? 3 : shape < 010000 ? 4 : 5;
+}
+
+/* The columns of row r of a shape, as bits. */
+PW_INLINE unsigned small_columns (unsigned shape, int r) {
+  return shape >> 3 * (small_rows (shape) - 1 - r) & 7;
+}
+
+/* 1 if a panel's rows have no columns that those of the shape do not have. */
+static int small_fits (const pw_panel *p, unsigned shape) {
+  if (p->rows != small_rows (shape)) return 0;
+  for (int r = 0; r < p->rows; r++)
+    if (p->columns[r] & ~small_columns (shape, r)) return 0;
+  return 1;
+}
+
+static unsigned small_shape (const pw_panel *p) {
+#define SMALL_SHAPE(shape) \
+  if (p->width == 3 && small_fits (p, shape)) return shape;
+  SMALL_SHAPES
+#undef SMALL_SHAPE
+  return 0;
+}
+
+void pw_small_add_rows (pw_small *k, pw_panel *p, int first, int rows, const double *J, int step, int unit) {
   static const double zero[3] = { 0, 0, 0 };
-  const double *row[PW_SMALL];
-  int from = p->rows > 0 && p->first < first ? p->first : first;
-  int end = p->rows > 0 && p->first + p->rows > first + rows ? p->first + p->rows : first + rows;
+  pw_panel was = *p;
+  int from = was.rows > 0 && was.first < first ? was.first : first;
+  int end = was.rows > 0 && was.first + was.rows > first + rows ? was.first + was.rows : first + rows;
   for (int i = from; i < end; i++) {
-    row[i - from] = i >= p->first && i < p->first + p->rows ? p->J[i - p->first] : zero;
-    if (i >= first && i < first + rows) row[i - from] = J + (i - first) * step;
+    int old = i - was.first, new = i - first;
+    if (new >= 0 && new < rows) {
+      p->J[i - from] = J + new *step;
+      p->columns[i - from] = !unit ? 7 : new == 0 ? 5 : 6;
+    } else {
+      p->J[i - from] = old >= 0 && old < was.rows ? was.J[old] : zero;
+      p->columns[i - from] = old >= 0 && old < was.rows ? was.columns[old] : 0;
+    }
   }
-  for (int i = from; i < end; i++) p->J[i - from] = row[i - from];
   p->first = from;
   p->rows = end - from;
-  p->shape = p->width == 3 && p->rows <= 4 ? p->rows : -1;
+  p->shape = small_shape (p);
+  p->S = k->S + from * (k->n + 1);
+  p->y = k->y + from;
 }
 
-/* ---- Panels of 3 columns, the number of rows a constant ---- */
+/* ---- Panels of 3 columns, the shape a constant ---- */
 
-PW_INLINE double small_dot (const double *a, const double *b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+/* Over the columns that both rows have. */
+PW_INLINE double small_dot (const double *a, const double *b, unsigned columns) {
+  return columns == 7   ? a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+         : columns == 5 ? a[0] * b[0] + a[2] * b[2]
+         : columns == 6 ? a[1] * b[1] + a[2] * b[2]
+                        : a[2] * b[2];
 }
 
-/* S += J W^-1 J^T over one panel (S n x n, lower triangle), y += J W^-1 f; either may be left out. */
-PW_INLINE void small_add (const pw_panel *p, const double *inverse, const double *f, double *S, double *y, int n,
-                          int rows) {
-  const double *w = inverse + p->j;
-  double J[PW_SMALL][3], z[3];
+/* S += J W^-1 J^T over one panel (in S of n columns its lower triangle) unless n = 0; y += J W^-1 f unless there is no f. */
+PW_INLINE void small_add (const pw_panel *p, const double *f, int n, unsigned shape) {
+  const int rows = small_rows (shape);
+  const double *w = p->w;
+  double J[PW_SMALL][3], z[3], *S = p->S, *y = p->y;
   PW_UNROLL for (int r = 0; r < rows; r++) {
     const double *from = p->J[r];
     J[r][0] = from[0], J[r][1] = from[1], J[r][2] = from[2];
   }
   if (f) {
-    z[0] = w[0] * f[p->j], z[1] = w[1] * f[p->j + 1], z[2] = w[2] * f[p->j + 2];
-    y += p->first;
-    PW_UNROLL for (int r = 0; r < rows; r++) y[r] += small_dot (J[r], z);
+    f += p->j;
+    z[0] = w[0] * f[0], z[1] = w[1] * f[1], z[2] = w[2] * f[2];
+    PW_UNROLL for (int r = 0; r < rows; r++) y[r] += small_dot (J[r], z, small_columns (shape, r));
   }
-  if (S == 0) return;
-  S += p->first * (n + 1);
-  PW_UNROLL for (int r = 0; r < rows; r++) {
+  PW_UNROLL for (int r = 0; r < rows && n > 0; r++) {
     const double B[3] = { J[r][0] * w[0], J[r][1] * w[1], J[r][2] * w[2] };
-    PW_UNROLL for (int q = 0; q <= r; q++) S[r * n + q] += small_dot (B, J[q]);
+    PW_UNROLL for (int q = 0; q <= r; q++) {
+      S[r * n + q] += small_dot (B, J[q], small_columns (shape, r) & small_columns (shape, q));
+    }
   }
 }
 
 /* a = W^-1 (f - J^T y) over one panel. */
-PW_INLINE void small_take (const pw_panel *p, const double *inverse, const double *f, const double *y, double *a,
-                           int rows) {
-  const double *w = inverse + p->j;
+PW_INLINE void small_take (const pw_panel *p, const double *f, double *a, unsigned shape) {
+  const int rows = small_rows (shape);
+  const double *w = p->w, *y = p->y;
   double x0 = 0, x1 = 0, x2 = 0;
   if (f) f += p->j, x0 = f[0], x1 = f[1], x2 = f[2];
   a += p->j;
-  y += p->first;
   PW_UNROLL for (int r = 0; r < rows; r++) {
     const double *J = p->J[r], l = y[r];
-    x0 -= J[0] * l;
-    x1 -= J[1] * l;
+    if (small_columns (shape, r) & 1) x0 -= J[0] * l;
+    if (small_columns (shape, r) & 2) x1 -= J[1] * l;
     x2 -= J[2] * l;
   }
   a[0] = w[0] * x0;
@@ -99,50 +149,51 @@ PW_INLINE void small_take (const pw_panel *p, const double *inverse, const doubl
 }
 
 /* The same for any number of rows and columns. */
-static void small_add_any (const pw_panel *p, const double *inverse, const double *f, double *S, double *y, int n) {
+static void small_add_any (const pw_panel *p, const double *f, int n) {
   for (int r = 0; r < p->rows; r++)
     for (int c = 0; c < p->width; c++) {
-      double scaled = p->J[r][c] * inverse[p->j + c];
-      if (f) y[p->first + r] += scaled * f[p->j + c];
-      for (int q = 0; S && q <= r; q++) S[(p->first + r) * n + p->first + q] += scaled * p->J[q][c];
+      double scaled = p->J[r][c] * p->w[c];
+      if (f) p->y[r] += scaled * f[p->j + c];
+      for (int q = 0; n > 0 && q <= r; q++) p->S[r * n + q] += scaled * p->J[q][c];
     }
 }
 
-static void small_take_any (const pw_panel *p, const double *inverse, const double *f, const double *y, double *a) {
+static void small_take_any (const pw_panel *p, const double *f, double *a) {
   for (int c = 0; c < p->width; c++) {
     double sum = f ? f[p->j + c] : 0;
-    for (int r = 0; r < p->rows; r++) sum -= p->J[r][c] * y[p->first + r];
-    a[p->j + c] = inverse[p->j + c] * sum;
+    for (int r = 0; r < p->rows; r++) sum -= p->J[r][c] * p->y[r];
+    a[p->j + c] = p->w[c] * sum;
   }
 }
 
-/* Over all panels; the usual numbers of rows on a body are compiled apart. */
-#define SMALL_PANELS(k, call, any)                                      \
-  for (const pw_panel *p = (k)->panel, *end = (k)->end; p < end; p++) { \
-    if (p->shape == 3)                                                  \
-      call (3);                                                         \
-    else if (p->shape == 2)                                             \
-      call (2);                                                         \
-    else if (p->shape == 1)                                             \
-      call (1);                                                         \
-    else if (p->shape == 4)                                             \
-      call (4);                                                         \
-    else                                                                \
-      any;                                                              \
-  }
-
-PW_INLINE void small_gather (const pw_small *k, const double *f, double *S, double *y, int n) {
-  const double *inverse = k->inverse;
-#define SMALL_CALL(rows) small_add (p, inverse, f, S, y, n, rows)
-  SMALL_PANELS (k, SMALL_CALL, small_add_any (p, inverse, f, S, y, n))
-#undef SMALL_CALL
+PW_INLINE void small_gather (const pw_small *k, const double *f, int n) {
+  for (const pw_panel *p = k->panel, *end = k->end; p < end; p++) switch (p->shape) {
+#define SMALL_SHAPE(shape)                                             \
+  case shape:                                                          \
+    if (n == 0 || small_rows (shape) <= n) small_add (p, f, n, shape); \
+    break;
+      SMALL_SHAPES
+#undef SMALL_SHAPE
+    default:
+      small_add_any (p, f, n);
+    }
 }
 
-static void small_scatter (const pw_small *k, const double *f, const double *y, double *a) {
-  const double *inverse = k->inverse;
-#define SMALL_CALL(rows) small_take (p, inverse, f, y, a, rows)
-  SMALL_PANELS (k, SMALL_CALL, small_take_any (p, inverse, f, y, a))
-#undef SMALL_CALL
+static void small_gather_right (const pw_small *k, const double *f) {
+  small_gather (k, f, 0);
+}
+
+static void small_scatter (const pw_small *k, const double *f, double *a) {
+  for (const pw_panel *p = k->panel, *end = k->end; p < end; p++) switch (p->shape) {
+#define SMALL_SHAPE(shape)       \
+  case shape:                    \
+    small_take (p, f, a, shape); \
+    break;
+      SMALL_SHAPES
+#undef SMALL_SHAPE
+    default:
+      small_take_any (p, f, a);
+    }
 }
 
 /* ---- L D L^T of constant size ---- */
@@ -198,7 +249,7 @@ double pw_small_pivot (const pw_small *k, int *place) {
   double worst = 1;
   *place = -1;
   for (int i = 0; i < k->n && worst > k->guard; i++) {
-    double pivot = 1 / (k->L[i * (k->n + 1)] * k->S[i]);
+    double pivot = 1 / (k->L[i * (k->n + 1)] * k->S[i * (k->n + 1)]);
     if (!(pivot >= worst)) worst = pivot, *place = i;
   }
   return worst;
@@ -210,51 +261,48 @@ static int small_judge (const pw_small *k) {
   return pw_small_pivot (k, &place) > k->guard;
 }
 
-/* Assembly and factorisation, with the right-hand side if there is one. */
-PW_INLINE int small_assemble (pw_small *k, const double *f, double *y, double *L, int n) {
-  double S[PW_SMALL * PW_SMALL];
+/* Assembly and factorisation, with the right-hand side if there is one; L is kept. */
+PW_INLINE int small_assemble (pw_small *k, const double *f, double *L, int n) {
   PW_UNROLL for (int i = 0; i < n; i++) {
-    PW_UNROLL for (int j = 0; j < i; j++) S[i * n + j] = 0;
-    S[i * n + i] = k->start[i];
+    PW_UNROLL for (int j = 0; j < i; j++) k->S[i * n + j] = 0;
+    k->S[i * n + i] = k->start[i];
   }
-  small_gather (k, f, S, y, n);
-  k->low = !small_factor (S, L, PW_SMALL_WATCH, n);
+  small_gather (k, f, n);
+  k->low = !small_factor (k->S, L, PW_SMALL_WATCH, n);
   PW_UNROLL for (int i = 0; i < n; i++) {
-    k->S[i] = S[i * n + i];
     PW_UNROLL for (int j = 0; j <= i; j++) k->L[i * n + j] = L[i * n + j];
   }
   return !k->low || small_judge (k);
 }
 
-PW_INLINE void small_right (const pw_small *k, const double *gamma, double *y, int n) {
-  PW_UNROLL for (int i = 0; i < n; i++) y[i] = -gamma[k->row[i]];
+PW_INLINE void small_right (pw_small *k, const double *gamma, int n) {
+  PW_UNROLL for (int i = 0; i < n; i++) k->y[i] = -gamma[k->row[i]];
 }
 
-PW_INLINE void small_left_out (const pw_small *k, const double *y, double *lambda, int n) {
-  PW_UNROLL for (int i = 0; i < n; i++) lambda[k->row[i]] = y[i];
+PW_INLINE void small_left_out (const pw_small *k, double *lambda, int n) {
+  PW_UNROLL for (int i = 0; i < n; i++) lambda[k->row[i]] = k->y[i];
 }
 
 /* ---- For each size ---- */
 
 PW_INLINE int small_factor_of (pw_small *k, int n) {
   double L[PW_SMALL * PW_SMALL];
-  return small_assemble (k, 0, 0, L, n);
+  return small_assemble (k, 0, L, n);
 }
 
-PW_INLINE void small_solve_of (const pw_small *k, const double *f, const double *gamma, double *y, double *lambda,
-                               int n) {
-  small_right (k, gamma, y, n);
-  if (f) small_gather (k, f, 0, y, n);
-  small_back (k->L, y, n);
-  small_left_out (k, y, lambda, n);
+PW_INLINE void small_solve_of (pw_small *k, const double *f, const double *gamma, double *lambda, int n) {
+  small_right (k, gamma, n);
+  if (f) small_gather_right (k, f);
+  small_back (k->L, k->y, n);
+  small_left_out (k, lambda, n);
 }
 
-PW_INLINE int small_both_of (pw_small *k, const double *f, const double *gamma, double *y, double *lambda, int n) {
+PW_INLINE int small_both_of (pw_small *k, const double *f, const double *gamma, double *lambda, int n) {
   double L[PW_SMALL * PW_SMALL];
-  small_right (k, gamma, y, n);
-  if (!small_assemble (k, f, y, L, n)) return 0;
-  small_back (L, y, n);
-  small_left_out (k, y, lambda, n);
+  small_right (k, gamma, n);
+  if (!small_assemble (k, f, L, n)) return 0;
+  small_back (L, k->y, n);
+  small_left_out (k, lambda, n);
   return 1;
 }
 
@@ -272,33 +320,31 @@ int pw_small_factor (pw_small *k) {
   }
 }
 
-void pw_small_solve (const pw_small *k, const double *f, const double *gamma, double *a, double *lambda) {
-  double y[PW_SMALL];
+void pw_small_solve (pw_small *k, const double *f, const double *gamma, double *a, double *lambda) {
   switch (k->n) {
-#define SMALL(n)                                \
-  case n:                                       \
-    small_solve_of (k, f, gamma, y, lambda, n); \
+#define SMALL(n)                             \
+  case n:                                    \
+    small_solve_of (k, f, gamma, lambda, n); \
     break;
     SMALL_SIZES
 #undef SMALL
   default:
     break;
   }
-  small_scatter (k, f, y, a);
+  small_scatter (k, f, a);
 }
 
 int pw_small_both (pw_small *k, const double *f, const double *gamma, double *a, double *lambda) {
-  double y[PW_SMALL];
   switch (k->n) {
-#define SMALL(n)                                              \
-  case n:                                                     \
-    if (!small_both_of (k, f, gamma, y, lambda, n)) return 0; \
+#define SMALL(n)                                           \
+  case n:                                                  \
+    if (!small_both_of (k, f, gamma, lambda, n)) return 0; \
     break;
     SMALL_SIZES
 #undef SMALL
   default:
     break;
   }
-  small_scatter (k, f, y, a);
+  small_scatter (k, f, a);
   return 1;
 }

@@ -10,20 +10,23 @@ enum { PW_SMALL = 8 };
 #define PW_SMALL_WATCH 0.01
 
 typedef struct {
-  int j, width;              /* first coordinate, columns */
-  int first, rows;           /* first position, positions from there */
-  int shape;                 /* rows if there are 3 columns and at most 4 rows, else -1 */
-  const double *J[PW_SMALL]; /* each row, at these columns */
+  const double *w;            /* diagonal of W^-1 in its columns */
+  double *S, *y;              /* in those of all, the entries of its first row */
+  int j, width;               /* first coordinate, columns */
+  int first, rows;            /* first position, positions from there */
+  unsigned shape;             /* which columns its rows have, where that is compiled apart (small.c); else 0 */
+  unsigned columns[PW_SMALL]; /* of each row, as bits */
+  const double *J[PW_SMALL];  /* each row, at these columns */
 } pw_panel;
 
 typedef struct {
   int n;
   pw_panel *panel, *end;         /* one for every body and own coordinate with weight */
-  const double *inverse;         /* diagonal of W^-1 */
   int row[PW_SMALL];             /* of gamma and lambda, at each position */
   double start[PW_SMALL];        /* 1 for a row without panel, which stands for itself, else 0 */
+  double S[PW_SMALL * PW_SMALL]; /* n x n, its lower triangle */
   double L[PW_SMALL * PW_SMALL]; /* of L D L^T: L below the diagonal, D^-1 on it */
-  double S[PW_SMALL];            /* diagonal of S */
+  double y[PW_SMALL];            /* right-hand side, then lambda, at each position */
   double guard;                  /* a pivot not above so much of its diagonal entry is taken for 0 */
   int low;                       /* 1: one was not above PW_SMALL_WATCH of it, so that it is worth asking */
 } pw_small;
@@ -35,8 +38,8 @@ typedef struct {
 void pw_small_order (int nodes, const unsigned long long *touched, int *order);
 
 /* Adds rows to a panel, whose position `first` is the first one's: their first column is at J, the next row `step`
- * further on. */
-void pw_small_add_rows (pw_panel *p, int first, int rows, const double *J, int step);
+ * further on.  unit: they are two, and their x and y columns a multiple of the unit matrix. */
+void pw_small_add_rows (pw_small *k, pw_panel *p, int first, int rows, const double *J, int step, int unit);
 
 /* ---- Factorising and solving ---- */
 
@@ -45,7 +48,7 @@ int pw_small_factor (pw_small *k);
 
 /* lambda, and a = W^-1 (f - J^T lambda).  f and a may be the same, gamma and lambda too; f NULL:
  * zero. */
-void pw_small_solve (const pw_small *k, const double *f, const double *gamma, double *a, double *lambda);
+void pw_small_solve (pw_small *k, const double *f, const double *gamma, double *a, double *lambda);
 
 /* Both in one pass; a and lambda are left alone if it returns 0. */
 int pw_small_both (pw_small *k, const double *f, const double *gamma, double *a, double *lambda);
