@@ -175,6 +175,7 @@ static double compile_length (const pw_compilation *c) {
   double L = 0;
   for (int i = 0; i < m->elements; i++) {
     const pw_element *e = &m->element[i];
+    if (!pw_kind_acts (e->kind)) continue;
     for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
       const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
       const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);

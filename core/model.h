@@ -59,6 +59,11 @@ static inline int pw_kind_forced (const pw_kind *kind) {
   return kind->force_u != NULL;
 }
 
+/* Whether it takes part in the motion; a marker does not. */
+static inline int pw_kind_acts (const pw_kind *kind) {
+  return kind->rows > 0 || kind->own > 0 || kind->force != NULL;
+}
+
 /* How many a field stands for. */
 static inline int pw_field_count (const pw_field *f) {
   return f->count > 0 ? f->count : 1;

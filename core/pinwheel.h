@@ -413,6 +413,13 @@ typedef struct {
   double speed;   /* below about this speed the force is smoothed [m/s], > 0 */
 } pw_rolling_resistance;
 
+/* Marker: a point of a body, followed in tables, figures and animations.  It has no effect. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2]; /* the point in the body's frame [m] */
+} pw_marker;
+
 /* The list of kinds: the one line to add for a new file in core/kinds/. */
 #define PW_KINDS               \
   PW_KIND (pin)                \
@@ -437,7 +444,8 @@ typedef struct {
   PW_KIND (gravity)            \
   PW_KIND (force)              \
   PW_KIND (torque)             \
-  PW_KIND (motor)
+  PW_KIND (motor)              \
+  PW_KIND (marker)
 
 /* ---- What a kind provides ---- */
 

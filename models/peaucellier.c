@@ -75,6 +75,7 @@ static void build (pw_model *m, const void *parameter) {
   pin (m, "D1", "OD", L, "BD", r);
   pin (m, "D2", "OD", L, "PD", r);
   pin (m, "P", "PC", -r, "PD", -r);
+  pw_add_marker (m, &(pw_marker){ .name = "pencil", .body = "PC", .at = { -r, 0 } });
   pw_add_drive (m, &(pw_drive){ .name = "swing",
                                 .body = { "crank", "ground" },
                                 .what = PW_DRIVE_ANGLE,

@@ -107,6 +107,7 @@ static void build (pw_model *m, const void *parameter) {
                                 .body = "shin",
                                 .at = { (F.x - V.x) * u, (F.y - V.y) * u },
                                 .fy = { .constant = p->load } });
+  pw_add_marker (m, &(pw_marker){ .name = "foot", .body = "shin", .at = { (F.x - V.x) * u, (F.y - V.y) * u } });
 }
 
 PW_MODEL (.about = "Theo Jansen's walking leg on a crank of constant speed", .parameters = parameters,

@@ -67,7 +67,7 @@ static void page_wheels (FILE *f, const pw_plots *p) {
   for (int w = 0; w < p->wheels; w++) {
     fputs (w ? ",\n{name:" : "\n{name:", f);
     page_text (f, pw_plot_wheel_name (p, w));
-    fprintf (f, ",body:%d}", pw_plot_body_of_wheel (p, w));
+    fprintf (f, ",body:%d,rolls:%d}", pw_plot_body_of_wheel (p, w), pw_plot_rolls (p, w));
   }
   fputs ("],\n", f);
 }

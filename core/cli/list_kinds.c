@@ -10,16 +10,19 @@
 
 static void kinds_overview (void) {
   static const struct {
+    int acts;
     pw_level level;
     const char *name;
-  } part[] = { { PW_HOLONOMIC, "constraints on positions" },
-               { PW_NONHOLONOMIC, "constraints on velocities" },
-               { PW_FORCE, "forces" } };
+  } part[] = { { 1, PW_HOLONOMIC, "constraints on positions" },
+               { 1, PW_NONHOLONOMIC, "constraints on velocities" },
+               { 1, PW_FORCE, "forces" },
+               { 0, PW_FORCE, "without effect" } };
   puts ("Kinds of element");
   for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
     printf ("  %s\n", part[i].name);
     for (const pw_kind *const *k = pw_kinds; *k; k++)
-      if ((*k)->level == part[i].level) printf ("    %-18s  %s\n", (*k)->name, (*k)->about);
+      if ((*k)->level == part[i].level && pw_kind_acts (*k) == part[i].acts)
+        printf ("    %-18s  %s\n", (*k)->name, (*k)->about);
   }
   puts ("`pinwheel list kinds NAME...` tells their fields, `pinwheel list kinds all` those of all");
 }
@@ -64,7 +67,7 @@ static void kinds_quantities (pw_list_rows *rows, const char *title, const pw_qu
 static void kinds_show (const pw_kind *k) {
   static const char *const level[] = { "force", "constraint on positions", "constraint on velocities" };
   pw_list_rows rows = { .rows = 0 };
-  printf ("%s: %s\n    %s", k->name, k->about, level[k->level]);
+  printf ("%s: %s\n    %s", k->name, k->about, pw_kind_acts (k) ? level[k->level] : "without effect");
   if (k->rows) printf (", %d row%s per element", k->rows, k->rows == 1 ? "" : "s");
   puts (k->each_body ? ", acts on every body that has mass" : "");
   kinds_example (k);

@@ -53,7 +53,7 @@ struct pw_plots {
   double t_end;
   int samples, wanted; /* taken so far, and in all */
   int width;           /* numbers per sample */
-  int bodies, wheels;  /* drawn */
+  int bodies, wheels;  /* drawn; markers are among the wheels */
   int links;           /* elements whose forces are kept */
   int grounds;         /* points of the ground */
   int all_wheels;      /* in the system */
@@ -104,6 +104,10 @@ pw_curves pw_plot_wheels (const pw_plots *p);
 
 const char *pw_plot_body_name (const pw_plots *p, int body);
 const char *pw_plot_wheel_name (const pw_plots *p, int wheel);
+/* Whether it is a wheel; a marker is kept among them. */
+int pw_plot_rolls (const pw_plots *p, int wheel);
+/* "paths of the wheels and markers", or what else figures and animations follow. */
+const char *pw_plot_followed (const pw_plots *p);
 /* The body a wheel belongs to, among those drawn; -1: the ground, -2: none of them. */
 int pw_plot_body_of_wheel (const pw_plots *p, int wheel);
 

@@ -158,6 +158,7 @@ static void data_body (FILE *f, const pw_plots *p, int i, int body) {
 
 static void data_wheel (FILE *f, const pw_plots *p, int i, int wheel, double half) {
   const double *contact = pw_plot_wheel (p, i, wheel), t = pw_plot_sample (p, i)[PLOT_T];
+  if (!pw_plot_rolls (p, wheel)) return;
   double c = half * cos (contact[2]), s = half * sin (contact[2]);
   data_vertex (f, (double[]){ contact[0] - c, contact[1] - s }, t);
   data_vertex (f, (double[]){ contact[0] + c, contact[1] + s }, t);
@@ -231,8 +232,9 @@ int pw_plot_write_frames (const pw_plots *p, const char *name, int stride, pw_er
 }
 
 int pw_plot_has (const pw_plots *p, int block) {
-  if (block == PLOT_WHEELS) return p->wheels > 0;
-  int b = 0;
+  int b = 0, w = 0;
+  while (w < p->wheels && !pw_plot_rolls (p, w)) w++;
+  if (block == PLOT_WHEELS) return w < p->wheels;
   while (b < p->bodies && (p->shape[b].count == 0) != (block == PLOT_CENTRES)) b++;
   return b < p->bodies;
 }

@@ -106,7 +106,7 @@ int pw_plot_paths (const pw_plots *p, pw_error *error) {
   if (pw_script_numbered (&c)) s.right = SCRIPT_BAR;
   plane g = plane_lay_out (p, &s, pw_plot_box_of_paths);
   if (pw_script_open (&s, p, error) != PW_OK) return PW_MACHINE;
-  pw_script_begin (&s, p, p->wheels > 0 ? "paths of the wheels" : "paths of the centres of mass");
+  pw_script_begin (&s, p, pw_plot_followed (p));
   fputs ("set xlabel 'x [m]'\nset ylabel 'y [m]'\nunset xzeroaxis\n", s.f);
   for (int i = 0; i < g.count; i++) {
     if (i == 0) pw_script_key (&s, p, &c);
@@ -129,6 +129,14 @@ static void plane_images (FILE *f, const pw_plots *p, const char *file) {
   }
 }
 
+/* The whole path of each marker, over the images. */
+static void plane_traces (FILE *f, const pw_plots *p) {
+  pw_curves c = pw_plot_wheels (p);
+  for (int k = 0; k < c.count; k++)
+    if (!pw_plot_rolls (p, pw_plot_pick (k, c.count, c.shown)))
+      fprintf (f, ", \\\n  '%s' index %d using 2:3 with lines lw 1.6 dt 1 lc rgb 'black'", c.file, k);
+}
+
 int pw_plot_mechanism (const pw_plots *p, pw_error *error) {
   static const char *const files[] = { "mechanism.dat", "mechanism-start.dat" };
   pw_script s = plane_page ("mechanism");
@@ -142,6 +150,7 @@ int pw_plot_mechanism (const pw_plots *p, pw_error *error) {
     pw_script_range (&s, "cb", 0, pw_plot_sample (p, g.samples[i] - 1)[PLOT_T]);
     pw_script_bar (&s, g.panel[i], "t [s]");
     plane_images (s.f, p, files[i]);
+    plane_traces (s.f, p);
     if (p->grounds > 0) fputs (", \\\n  'ground.dat' using 1:2 with points pt 9 ps 1.2 lc rgb 'black'", s.f);
     fputs ("\n", s.f);
   }

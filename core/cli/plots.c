@@ -93,6 +93,19 @@ const char *pw_plot_wheel_name (const pw_plots *p, int wheel) {
   return p->s->slab[p->slab[wheel]].name[p->element[wheel]];
 }
 
+int pw_plot_rolls (const pw_plots *p, int wheel) {
+  return pw_kind_acts (p->s->slab[p->slab[wheel]].kind);
+}
+
+const char *pw_plot_followed (const pw_plots *p) {
+  int rolling = 0;
+  for (int w = 0; w < p->wheels; w++) rolling += pw_plot_rolls (p, w);
+  return p->wheels == 0         ? "paths of the centres of mass"
+         : rolling == p->wheels ? "paths of the wheels"
+         : rolling > 0          ? "paths of the wheels and markers"
+                                : "paths of the markers";
+}
+
 /* Adds an attachment point unless the body has it already; its centre of mass is drawn anyway. */
 static void plots_add_point (pw_plot_body *shape, const double *at) {
   if (shape->count == PLOT_POINTS || (at[0] == 0 && at[1] == 0)) return;
