@@ -100,6 +100,7 @@ static void multistep_fill (multistep_data *d) {
   memcpy (y + d->n, r->v, bytes);
   memcpy (N_VGetArrayPointer (d->work0), r->ledger, entries);
   d->stop = NAN;
+  d->settled = 1;
   d->begun = r->t;
   d->steps = r->statistics.steps;
   d->rejected = r->statistics.rejected;
@@ -215,18 +216,22 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", r->t, why, r->settings.rtol);
 }
 
-/* The state reached, out of y: with its accelerations, and the ledger. */
+/* The state reached, out of y, and the ledger.  Its accelerations are those of the last iterate until they are asked for
+ * (multistep_settle): one evaluation in three. */
 static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   pw_run *r = d->run;
   const double *y = N_VGetArrayPointer (d->y);
   double work;
   memcpy (r->q, y, (size_t)d->n * sizeof *y);
   memcpy (r->v, y + d->n, (size_t)d->n * sizeof *y);
+  memcpy (r->a, d->a, (size_t)d->n * sizeof *y);
+  memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *y);
   r->t = t;
   r->position = NAN;
-  int status = pw_accelerate (r, pw_before_breakpoint (r, t), r->q, r->v, r->a, r->lambda);
-  if (status > 0) return pw_fail_singular (r, t, error);
-  if (status < 0) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
+  d->settled = 0;
+  if (pw_place (r->s, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
+    return multistep_fail (d, CV_RHSFUNC_FAIL, error);
+  pw_sweep_J (r->s);
   if (r->settings.ledger && r->s->entries > 0) {
     int flag = CVodeGetQuad (d->cvode, &work, d->work);
     if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
@@ -252,6 +257,21 @@ int pw_multistep_advance (pw_run *r, double t_end, pw_error *error) {
 
 /* ---- Looking into the last step ---- */
 
+/* Accelerations and multipliers of the state reached; no part of the run's cost. */
+static int multistep_settle (multistep_data *d) {
+  pw_run *r = d->run;
+  if (d->settled) return PW_OK;
+  pw_statistics keep = r->statistics;
+  int near = r->near;
+  pw_saddle_set_guard (r->saddle, 0);
+  int status = pw_accelerate (r, pw_before_breakpoint (r, r->t), r->q, r->v, r->a, r->lambda);
+  pw_saddle_set_guard (r->saddle, r->guard);
+  r->statistics = keep;
+  r->near = near;
+  d->settled = status == PW_OK;
+  return status;
+}
+
 /* Of the polynomial's value at t, projected where the method projects, the rest of the sample. */
 static int multistep_complete (multistep_data *d, double t) {
   pw_run *r = d->run;
@@ -267,11 +287,17 @@ static int multistep_complete (multistep_data *d, double t) {
   return status;
 }
 
+static int multistep_at_fails (pw_run *r, int status, double t, pw_error *error) {
+  if (status > 0) return pw_fail_singular (r, t, error);
+  return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+}
+
 int pw_multistep_at (pw_run *r, double t, pw_error *error) {
   multistep_data *d = r->data;
   if (t == r->t) {
-    pw_show_reached (r);
-    return PW_OK;
+    int status = multistep_settle (d);
+    if (status == PW_OK) pw_show_reached (r);
+    return multistep_at_fails (r, status, t, error);
   }
   int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->y) : CV_BAD_T;
   if (flag == CV_BAD_T)
@@ -283,9 +309,7 @@ int pw_multistep_at (pw_run *r, double t, pw_error *error) {
   memcpy (r->v_at, y + d->n, (size_t)d->n * sizeof *y);
   if (r->settings.ledger && r->s->entries > 0)
     memcpy (r->ledger_at, N_VGetArrayPointer (d->work), (size_t)r->s->entries * sizeof *y);
-  int status = multistep_complete (d, t);
-  if (status > 0) return pw_fail_singular (r, t, error);
-  return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  return multistep_at_fails (r, multistep_complete (d, t), t, error);
 }
 
 int pw_multistep_restart (pw_run *r, pw_error *error) {
