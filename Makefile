@@ -222,14 +222,16 @@ $(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a 
 
 $(BUILD)/tests/test_embed: | $(BUILD)/docs/embed
 
-# These make every allocation fail in turn, and the second, which has the program's commands, what it asks of files.
+# These make every allocation fail in turn; those that have the program's commands, what it asks of files and what the
+# libraries below it allocate.
 comma := ,
 ALLOC_WRAP := malloc calloc realloc strdup free
 FILES_WRAP := fopen fclose fflush fwrite fread fseek fseeko ftell getline rename ftruncate fsync pwrite mkdir realpath opendir \
               $(addprefix posix_spawn,p _file_actions_init _file_actions_addopen _file_actions_adddup2)
 $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
-$(BUILD)/tests/test_cli_faults: $(filter-out %/main.o,$(CLI_OBJ))
+$(BUILD)/tests/test_memory: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
+$(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory: $(filter-out %/main.o,$(CLI_OBJ))
 # This every call of the libraries below.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/test_faults.c)
 # A part of SUNDIALS that Pinwheel does not use, to compare with.

@@ -1,0 +1,138 @@
+#define _XOPEN_SOURCE 700
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <spawn.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include "calls.h"
+#include "check.h"
+
+struct call_state call;
+
+static int call_fails (const char *name, int reading) {
+  if (call.fail == 0 || ++call.count != call.fail) return 0;
+  call.name = name;
+  call.reading = reading;
+  return 1;
+}
+
+#define CALL(failed, why, type, name, parameters, arguments)                                 \
+  type __real_##name parameters;                                                             \
+  type __wrap_##name parameters;                                                             \
+  type __wrap_##name parameters {                                                            \
+    return call_fails (#name, why == EIO) ? (errno = why, failed) : __real_##name arguments; \
+  }
+
+CALL (-1, ENOSPC, int, ftruncate, (int fd, off_t size), (fd, size))
+CALL (-1, ENOSPC, ssize_t, pwrite, (int fd, const void *p, size_t size, off_t at), (fd, p, size, at))
+CALL (-1, EROFS, int, mkdir, (const char *path, mode_t mode), (path, mode))
+CALL (EMFILE, EMFILE, int, posix_spawn_file_actions_init, (posix_spawn_file_actions_t * a), (a))
+CALL (EMFILE, EMFILE, int, posix_spawn_file_actions_addopen,
+      (posix_spawn_file_actions_t * a, int fd, const char *path, int flags, mode_t mode), (a, fd, path, flags, mode))
+CALL (EMFILE, EMFILE, int, posix_spawn_file_actions_adddup2, (posix_spawn_file_actions_t * a, int from, int to),
+      (a, from, to))
+CALL (EAGAIN, EAGAIN, int, posix_spawnp,
+      (pid_t * child, const char *file, const posix_spawn_file_actions_t *actions, const posix_spawnattr_t *with,
+       char *const argv[], char *const environment[]),
+      (child, file, actions, with, argv, environment))
+CALL (NULL, ENOMEM, char *, realpath, (const char *path, char *where), (path, where))
+CALL (NULL, EMFILE, DIR *, opendir, (const char *path), (path))
+CALL (-1, EIO, int, fseek, (FILE * f, long at, int from), (f, at, from))
+CALL (-1, EIO, long, ftell, (FILE * f), (f))
+CALL (-1, EIO, int, fseeko, (FILE * f, off_t at, int from), (f, at, from))
+
+static int call_is (FILE *f, int mode) {
+  return (fcntl (fileno (f), F_GETFL) & O_ACCMODE) == mode;
+}
+
+/* A file with something in it: closing an empty one brings nothing to the disk. */
+static int call_is_written (FILE *f) {
+  return f != stdout && f != stderr && !call_is (f, O_RDONLY) && ftello (f) > 0;
+}
+
+FILE *__real_fopen (const char *path, const char *mode);
+FILE *__wrap_fopen (const char *path, const char *mode);
+FILE *__wrap_fopen (const char *path, const char *mode) {
+  if (*mode == 'w') call.synced = 0;
+  if (!call_fails ("fopen", *mode == 'r')) return __real_fopen (path, mode);
+  errno = EMFILE;
+  return NULL;
+}
+
+int __real_fclose (FILE *f);
+int __wrap_fclose (FILE *f);
+int __wrap_fclose (FILE *f) {
+  int fails = call_is_written (f) && call_fails ("fclose", 0), status = __real_fclose (f);
+  if (fails) errno = EDQUOT;
+  return fails ? EOF : status;
+}
+
+int __real_fflush (FILE *f);
+int __wrap_fflush (FILE *f);
+int __wrap_fflush (FILE *f) {
+  if (f == NULL || !call_is_written (f) || !call_fails ("fflush", 0)) return __real_fflush (f);
+  errno = ENOSPC;
+  return EOF;
+}
+
+/* From here on the disk is full. */
+size_t __real_fwrite (const void *p, size_t size, size_t count, FILE *f);
+size_t __wrap_fwrite (const void *p, size_t size, size_t count, FILE *f);
+size_t __wrap_fwrite (const void *p, size_t size, size_t count, FILE *f) {
+  if (f == stdout || f == stderr || !call_fails ("fwrite", 0)) return __real_fwrite (p, size, count, f);
+  int full = open ("/dev/full", O_WRONLY);
+  assert_true (full >= 0 && dup2 (full, fileno (f)) >= 0);
+  close (full);
+  __real_fwrite (p, size, count, f);
+  __real_fflush (f);
+  errno = ENOSPC;
+  return 0;
+}
+
+/* A stream that is only read remembers the failure if it is written to. */
+static void call_spoil (FILE *f) {
+  if (call_is (f, O_RDONLY)) fputc (' ', f);
+  errno = EIO;
+}
+
+size_t __real_fread (void *p, size_t size, size_t count, FILE *f);
+size_t __wrap_fread (void *p, size_t size, size_t count, FILE *f);
+size_t __wrap_fread (void *p, size_t size, size_t count, FILE *f) {
+  if (!call_fails ("fread", 1)) return __real_fread (p, size, count, f);
+  call_spoil (f);
+  return 0;
+}
+
+ssize_t __real_getline (char **line, size_t *room, FILE *f);
+ssize_t __wrap_getline (char **line, size_t *room, FILE *f);
+ssize_t __wrap_getline (char **line, size_t *room, FILE *f) {
+  if (!call_fails ("getline", 1)) return __real_getline (line, room, f);
+  call_spoil (f);
+  return -1;
+}
+
+/* A checkpoint is on the disk before it takes the place of the one before it. */
+int __real_rename (const char *from, const char *to);
+int __wrap_rename (const char *from, const char *to);
+int __wrap_rename (const char *from, const char *to) {
+  size_t n = strlen (to);
+  if (!call.synced && n > 3 && strcmp (to + n - 3, ".ck") == 0) call.unsynced++;
+  if (!call_fails ("rename", 0)) return __real_rename (from, to);
+  errno = EROFS;
+  return -1;
+}
+
+/* A folder need not take it. */
+int __real_fsync (int fd);
+int __wrap_fsync (int fd);
+int __wrap_fsync (int fd) {
+  struct stat info;
+  call.synced = 1;
+  if ((fstat (fd, &info) == 0 && S_ISDIR (info.st_mode)) || !call_fails ("fsync", 0)) return __real_fsync (fd);
+  errno = EIO;
+  return -1;
+}

@@ -1,0 +1,176 @@
+#define _XOPEN_SOURCE 700
+#include <dirent.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "check.h"
+#include "cli.h"
+#include "faults.h"
+#include "pinwheel-files.h"
+#include "cli/cli.h"
+#include "cli/stop.h"
+
+/* ---- Files ---- */
+
+static size_t faults_slurp (const char *folder, const char *name, char *text, size_t room) {
+  char path[600];
+  snprintf (path, sizeof path, "%s/%s", folder, name);
+  FILE *f = fopen (path, "rb");
+  if (f == NULL) return room; /* as no file has it */
+  size_t size = fread (text, 1, room - 1, f);
+  text[size] = 0;
+  fclose (f);
+  return size;
+}
+
+static int faults_ends (const char *text, const char *end) {
+  size_t n = strlen (text), m = strlen (end);
+  return n >= m && strcmp (text + n - m, end) == 0;
+}
+
+static int faults_lines (const char *text) {
+  int n = 0;
+  while ((text = strchr (text, '\n')) != NULL) text++, n++;
+  return n;
+}
+
+static int faults_whole (const char *o, const char *whole, const char *name) {
+  static char text[1 << 20], same[1 << 20];
+  char path[600];
+  pw_checkpoint c;
+  size_t size = faults_slurp (o, name, text, sizeof text);
+  if (faults_ends (name, ".part")) return 1;
+  if (faults_ends (name, ".json")) return faults_ends (text, "\n}\n");
+  if (faults_ends (name, ".html")) return faults_ends (text, "</html>\n");
+  if (faults_ends (name, ".dat") && strncmp (text, "# incomplete: ", 14) == 0) return 1;
+  if (!faults_ends (name, ".ck"))
+    return faults_slurp (whole, name, same, sizeof same) > 0 && faults_lines (text) == faults_lines (same) &&
+           text[size - 1] == '\n';
+  snprintf (path, sizeof path, "%s/%s", o, name);
+  int status = pw_checkpoint_read (path, &c, &(pw_error){ 0 });
+  pw_checkpoint_free (&c);
+  return status == PW_OK;
+}
+
+const char *faults_broken (void) {
+  static char name[300];
+  char o[300], whole[300];
+  const char *broken = NULL;
+  snprintf (o, sizeof o, "%s/o", cli_folder);
+  snprintf (whole, sizeof whole, "%s/whole", cli_folder);
+  DIR *d = opendir (o);
+  for (const struct dirent *e; d && (e = readdir (d)) != NULL;) {
+    if (*e->d_name == '.' || broken) continue;
+    if (faults_whole (o, whole, e->d_name)) continue;
+    snprintf (name, sizeof name, "%s", e->d_name);
+    broken = name;
+  }
+  if (d) closedir (d);
+  return broken;
+}
+
+static void faults_empty (const char *folder) {
+  char path[600];
+  DIR *d = opendir (folder);
+  for (const struct dirent *e; d && (e = readdir (d)) != NULL;) {
+    if (*e->d_name == '.') continue;
+    snprintf (path, sizeof path, "%s/%s", folder, e->d_name);
+    remove (path);
+  }
+  if (d) closedir (d);
+}
+
+void faults_prepare (void) {
+  static char text[1 << 20];
+  char o[300], start[300], path[600];
+  snprintf (o, sizeof o, "%s/o", cli_folder);
+  snprintf (start, sizeof start, "%s/start", cli_folder);
+  faults_empty (o);
+  DIR *d = opendir (start);
+  for (const struct dirent *e; d && (e = readdir (d)) != NULL;) {
+    if (*e->d_name == '.') continue;
+    size_t size = faults_slurp (start, e->d_name, text, sizeof text);
+    snprintf (path, sizeof path, "%s/%s", o, e->d_name);
+    FILE *f = fopen (path, "wb");
+    assert_true (f && fwrite (text, 1, size, f) == size && fclose (f) == 0);
+  }
+  if (d) closedir (d);
+}
+
+/* ---- Commands ---- */
+
+typedef int faults_function (int argc, const char **argv);
+
+static faults_function *faults_command (const char *name) {
+  static const struct {
+    const char *name;
+    faults_function *function;
+  } each[] = { { "run", pw_cli_run },     { "sweep", pw_cli_sweep }, { "compare", pw_cli_compare },
+               { "drift", pw_cli_drift }, { "new", pw_cli_new },     { "show", pw_cli_show },
+               { "check", pw_cli_check }, { "list", pw_cli_list } };
+  for (size_t i = 0; i < sizeof each / sizeof *each; i++)
+    if (strcmp (name, each[i].name) == 0) return each[i].function;
+  return NULL;
+}
+
+/* Sends what goes to a descriptor into a file of the folder; returns another one for where it went before. */
+static int faults_redirect (int fd, const char *name) {
+  char path[300];
+  snprintf (path, sizeof path, "%s/%s", cli_folder, name);
+  int before = dup (fd), file = open (path, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+  dup2 (file, fd);
+  close (file);
+  return before;
+}
+
+static void faults_restore (int before, int fd) {
+  dup2 (before, fd);
+  close (before);
+}
+
+int faults_run (const char *command) {
+  char text[1000], *rest;
+  const char *argv[40];
+  int argc = 0;
+  cli_expand (command, text, sizeof text);
+  for (char *w = strtok_r (text, " ", &rest); w; w = strtok_r (NULL, " ", &rest)) argv[argc++] = w;
+  argv[argc] = NULL;
+  fflush (NULL);
+  int out = faults_redirect (1, "printed"), err = faults_redirect (2, "log");
+  pw_stop = 0;
+  int status = faults_command (argv[0]) (argc, argv);
+  fflush (NULL);
+  faults_restore (out, 1);
+  faults_restore (err, 2);
+  return status;
+}
+
+void faults_begin (const char *start, const char *command) {
+  char text[1500];
+  snprintf (text, sizeof text, "rm -rf @/o @/start; mkdir -p @/o @/start; %s; rm -rf @/whole", start);
+  cli_good (text);
+  faults_prepare ();
+  int status = faults_run (command);
+  if (status != 0) print_error ("%s: %s", command, cli_file ("log"));
+  assert_int_equal (status, 0);
+  cli_good ("cp -r @/o @/whole");
+}
+
+int faults_setup (void **state) {
+  static const char gnuplot[] = "#!/bin/sh\nf=${3#cd ?}\necho frames >\"${f%?}/animation.gif\"\n",
+                    compiler[] = "#!/bin/sh\nwhile [ \"$1\" != -o ]; do shift; done\n/bin/cp \"$MODEL\" \"$2\"\n";
+  char text[400];
+  const char *build = getenv ("BUILD");
+  if (cli_setup (state) != 0) return -1;
+  cli_write ("gnuplot", gnuplot);
+  cli_write ("cc", compiler);
+  cli_run ("chmod +x @/gnuplot @/cc");
+  cli_expand ("@/cc", text, sizeof text);
+  setenv ("CC", text, 1);
+  snprintf (text, sizeof text, "%s/models/ezyroller.so", build ? build : "build");
+  setenv ("MODEL", text, 1);
+  snprintf (text, sizeof text, "%s:%s", cli_folder, getenv ("PATH"));
+  return setenv ("PATH", text, 1);
+}
