@@ -230,8 +230,8 @@ FILES_WRAP := fopen fclose fflush fwrite fread fseek fseeko ftell getline rename
               $(addprefix posix_spawn,p _file_actions_init _file_actions_addopen _file_actions_adddup2)
 $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
-$(BUILD)/tests/test_memory: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
-$(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory: $(filter-out %/main.o,$(CLI_OBJ))
+$(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
+$(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
 # This every call of the libraries below.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/test_faults.c)
 # A part of SUNDIALS that Pinwheel does not use, to compare with.

@@ -56,6 +56,10 @@ typedef struct {
 /* Lays out arrays in one allocation, which is zeroed and returned; NULL if there is no memory. */
 char *pw_take_arrays (const pw_array *array, size_t arrays);
 
+/* PW_OK if there are so many bytes to be had at this moment, else PW_MACHINE.  Asked before calls of libraries that crash
+ * when they are refused memory. */
+int pw_reserve (size_t bytes);
+
 /* "" if a value lies in the domain, else what was expected (">= 0"). */
 const char *pw_domain_check (pw_domain domain, double value);
 

@@ -99,7 +99,7 @@ static void ida_fill_vectors (ida_data *d) {
 
 static int ida_open_vectors (ida_data *d) {
   const pw_system *s = d->run->s;
-  if (SUNContext_Create (PW_SUN_NO_COMM, &d->context) != 0) return PW_MACHINE;
+  if (pw_sun_open (&d->context, d->size) != PW_OK) return PW_MACHINE;
   d->y = pw_sun_vector (d->size, d->context);
   d->yp = pw_sun_vector (d->size, d->context);
   d->id = pw_sun_vector (d->size, d->context);
@@ -212,6 +212,7 @@ static int ida_fail (ida_data *d, int flag, pw_error *error) {
                     : flag == IDA_TOO_MUCH_ACC ? "the tolerance is beyond the accuracy of the machine"
                                                : pw_sun_reason (&d->said, flag);
   ida_statistics (d);
+  if (flag == IDA_LSETUP_FAIL && pw_sun_lacks_memory (d->solver)) return ida_no_memory (d->run, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", d->run->t, why, d->run->settings.rtol);
 }
 

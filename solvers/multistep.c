@@ -106,11 +106,15 @@ static void multistep_fill (multistep_data *d) {
   d->rejected = r->statistics.rejected;
 }
 
+static int multistep_no_memory (const pw_run *r, pw_error *error) {
+  return pw_fail (error, PW_MACHINE, "model %s: out of memory in %s", r->s->model, r->method->name);
+}
+
 static int multistep_open_arrays (multistep_data *d) {
   const pw_run *r = d->run;
   const pw_system *s = r->s;
   size_t n = (size_t)d->n + 3;
-  if (SUNContext_Create (PW_SUN_NO_COMM, &d->context) != 0) return PW_MACHINE;
+  if (pw_sun_open (&d->context, 2 * d->n) != PW_OK) return PW_MACHINE;
   d->y = pw_sun_vector (2 * d->n, d->context);
   d->work = pw_sun_vector (s->entries + 1, d->context);
   d->work0 = pw_sun_vector (s->entries + 1, d->context);
@@ -165,7 +169,7 @@ int pw_multistep_open (pw_run *r, int formula, pw_error *error) {
   int status = d->projects ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;
   if (multistep_open_arrays (d) == PW_OK && multistep_open_solver (d, formula) == PW_OK) return PW_OK;
-  return pw_fail (error, PW_MACHINE, "model %s: out of memory in %s", r->s->model, r->method->name);
+  return multistep_no_memory (r, error);
 }
 
 void pw_multistep_close (pw_run *r) {
@@ -203,6 +207,7 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
   if (flag == CV_REPTD_PROJFUNC_ERR && d->projector.against >= 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
                     pw_row_element (r->s, d->projector.against, element, sizeof element));
+  if (flag == CV_LSETUP_FAIL && pw_sun_lacks_memory (d->newton.klu)) return multistep_no_memory (r, error);
   if (singular || r->near) return pw_fail_singular (r, r->t, error);
   const char *why = flag == CV_ERR_FAILURE          ? "the error test fails however small the step"
                     : flag == CV_CONV_FAILURE       ? "the iteration does not converge however small the step"

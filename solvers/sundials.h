@@ -19,6 +19,9 @@ typedef sunrealtype pw_real;
 typedef realtype pw_real;
 #endif
 
+/* A context for an integrator of so many unknowns.  PW_OK or PW_MACHINE. */
+int pw_sun_open (SUNContext *context, int unknowns);
+
 /* The last message of an integrator, instead of its printing. */
 typedef struct {
   char text[256];
@@ -29,6 +32,9 @@ const char *pw_sun_reason (pw_sun_said *said, int flag);
 
 /* A vector whose operations, and those of its clones, are ours (vectors.c); NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
+
+/* Whether KLU was refused memory by the last factorisation. */
+int pw_sun_lacks_memory (SUNLinearSolver klu);
 
 /* A square sparse matrix of this pattern in compressed columns, all 0; NULL: out of memory. */
 SUNMatrix pw_sun_matrix (int size, const int64_t *colptr, const int64_t *rowind, SUNContext context);

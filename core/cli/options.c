@@ -1,5 +1,6 @@
 /* What the commands share: command lines, models, errors. */
 #define _POSIX_C_SOURCE 200809L
+#include <errno.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -83,14 +84,21 @@ static int options_count (const pw_cli_line *l, const char *title, const char *s
   return PW_OK;
 }
 
+/* popt leaves out what it had no memory for, and says nothing. */
+static int options_complete (pw_error *error) {
+  return errno == ENOMEM ? pw_fail (error, PW_MACHINE, "out of memory") : PW_OK;
+}
+
 int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
                  int least, int most, pw_error *error) {
   *l = (pw_cli_line){ .popt = NULL };
+  errno = 0;
   if (options_table (l, options) == PW_OK) l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
   if (l->popt == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   poptSetOtherOptionHelp (l->popt, synopsis);
   int got = poptGetNextOpt (l->popt);
   for (; got > 0 && got != OPTIONS_HELP; got = poptGetNextOpt (l->popt)) options_note (l, got - 1);
+  if (options_complete (error) != PW_OK) return PW_MACHINE;
   if (got == OPTIONS_HELP) {
     poptPrintHelp (l->popt, stdout, 0);
     return 1;

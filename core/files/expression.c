@@ -4,6 +4,7 @@
  * go through a buffer all threads share.  So an expression is first read word by word here, where every name is looked
  * up and whatever is not arithmetic is refused; what is left to muParser is syntax, of which it tells the place. */
 #include <ctype.h>
+#include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -253,9 +254,17 @@ static int expression_read (const pw_expression *x, const char *text, pw_express
 
 /* ---- muParser ---- */
 
+/* muParser throws when it is refused memory, and not only where C is spared of it: it is called when there is enough.
+ * What it catches itself becomes an error of some kind, or none. */
+enum { EXPRESSION_RESERVE = 1 << 16, EXPRESSION_RESERVE_NAME = 1 << 12, EXPRESSION_RESERVE_BYTE = 1 << 10 };
+
 pw_expression *pw_expression_open (int names) {
   pw_expression *x = calloc (1, sizeof *x);
-  if (x == NULL) return NULL;
+  if (x == NULL || pw_reserve (EXPRESSION_RESERVE) != PW_OK) {
+    free (x);
+    return NULL;
+  }
+  errno = 0;
   x->room = names;
   x->name = calloc ((size_t)names + 1, sizeof *x->name);
   x->parser = mupCreate (muBASETYPE_FLOAT);
@@ -274,7 +283,9 @@ pw_expression *pw_expression_open (int names) {
     if (expression_function[i].two) mupDefineFun2 (x->parser, name, expression_function[i].two, 1);
     if (expression_function[i].many) mupDefineMultFun (x->parser, name, expression_function[i].many, 1);
   }
-  return x;
+  if (errno != ENOMEM) return x;
+  pw_expression_close (x);
+  return NULL;
 }
 
 void pw_expression_close (pw_expression *x) {
@@ -286,11 +297,12 @@ void pw_expression_close (pw_expression *x) {
 }
 
 int pw_expression_name (pw_expression *x, const char *name, const double *value) {
-  if (x->names == x->room) return PW_MACHINE;
+  if (x->names == x->room || pw_reserve (EXPRESSION_RESERVE_NAME) != PW_OK) return PW_MACHINE;
+  errno = 0;
   x->name[x->names] = name;
   pw_names_add (&x->table, name, x->names++);
   mupDefineVar (x->parser, name, (double *)(size_t)value);
-  int failed = mupError (x->parser);
+  int failed = mupError (x->parser) || errno == ENOMEM;
   mupErrorReset (x->parser);
   return failed ? PW_MACHINE : PW_OK;
 }
@@ -310,9 +322,12 @@ int pw_expression_set (pw_expression *x, const char *text, pw_expression_trouble
   if (strlen (text) > EXPRESSION_LONGEST)
     return expression_wrong (trouble, 0, "an expression of more than 4000 characters%s%s", "", "");
   if (expression_read (x, text, trouble) != PW_OK) return PW_INPUT;
+  if (pw_reserve (EXPRESSION_RESERVE + EXPRESSION_RESERVE_BYTE * strlen (text)) != PW_OK) return PW_MACHINE;
+  errno = 0;
   mupErrorReset (x->parser);
   mupSetExpr (x->parser, text);
   if (!mupError (x->parser)) mupEval (x->parser);
+  if (errno == ENOMEM) return PW_MACHINE;
   return mupError (x->parser) ? expression_stopped (x, text, trouble) : PW_OK;
 }
 
@@ -325,7 +340,8 @@ int pw_expression_fixed (pw_expression *x, const char *text, double *value, pw_e
   for (const char *p = text; *p; p++) h = 31 * h + (unsigned char)*p;
   h = (h ^ h >> 8 ^ h >> 16) & 255;
   if (x->kept[h].text == NULL || strcmp (x->kept[h].text, text) != 0) {
-    if (pw_expression_set (x, text, trouble) != PW_OK) return PW_INPUT;
+    int status = pw_expression_set (x, text, trouble);
+    if (status != PW_OK) return status;
     x->kept[h].text = text;
     x->kept[h].value = pw_expression_value (x);
   }

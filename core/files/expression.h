@@ -33,7 +33,7 @@ int pw_expression_set (pw_expression *x, const char *text, pw_expression_trouble
 double pw_expression_value (pw_expression *x);
 
 /* The value of an expression over names whose values never change: a text that comes again is not evaluated again.  The
- * text must stay. */
+ * text must stay.  Returns as pw_expression_set. */
 int pw_expression_fixed (pw_expression *x, const char *text, double *value, pw_expression_trouble *trouble);
 
 /* Whether a text can be a name: a letter or _, then letters, digits and _; neither a function nor a constant. */

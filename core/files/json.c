@@ -2,6 +2,7 @@
  *
  * libfyaml emits it.  Numbers and null go in as plain scalars, texts and names through json_text, which makes them
  * scalars that stay texts whatever they look like; blanks around a text are lost. */
+#include <errno.h>
 #include <libfyaml.h>
 #include <math.h>
 #include <stdlib.h>
@@ -231,6 +232,10 @@ static void json_statistics (json *j, struct fy_node *root, const pw_statistics 
 static int json_emit (json *j, pw_output *o, pw_error *error) {
   enum fy_emitter_cfg_flags as_json = FYECF_MODE_JSON | FYECF_WIDTH_INF | FYECF_INDENT_2;
   char *text = j->failed ? NULL : fy_emit_document_to_string (j->document, as_json);
+  if (errno == ENOMEM) { /* libfyaml leaves out what it had no memory for */
+    free (text);
+    text = NULL;
+  }
   if (text == NULL) return pw_fail (error, PW_MACHINE, "out of memory while writing the summary");
   int status = pw_output_text (o, text, strlen (text), error);
   free (text);
@@ -241,6 +246,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
                    const pw_statistics *statistics, pw_output *o, pw_error *error) {
   /* Names are unique already, and libfyaml's own check is quadratic. */
   const struct fy_parse_cfg configuration = { .flags = FYPCF_QUIET | FYPCF_ALLOW_DUPLICATE_KEYS };
+  errno = 0;
   json j = { .document = fy_document_create (&configuration) };
   struct fy_node *root = j.document ? fy_node_create_mapping (j.document) : NULL;
   if (root == NULL || fy_document_set_root (j.document, root) != 0) {

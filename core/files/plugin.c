@@ -53,7 +53,10 @@ static const char *plugin_reason (const char *object) {
 
 static int plugin_load (void *context, const char *object, pw_error *error) {
   pw_file *f = context;
+  errno = 0;
   f->handle = dlopen (object, RTLD_NOW | RTLD_LOCAL);
+  if (f->handle == NULL && errno == ENOMEM)
+    return pw_fail (error, PW_MACHINE, "cannot load %s: out of memory", f->path);
   if (f->handle == NULL) return pw_fail (error, PW_INPUT, "cannot load %s: %s", f->path, plugin_reason (object));
   f->table = dlsym (f->handle, "pw_plugin");
   if (f->table == NULL)

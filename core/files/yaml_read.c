@@ -106,8 +106,9 @@ int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_
   pw_expression_trouble trouble;
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (y, node->at, error, "%s: expected a number, found %s", what, pw_yaml_found (node));
-  if (!pw_expression_number (node->text, value) && pw_expression_fixed (x, node->text, value, &trouble) != PW_OK)
-    return read_trouble (y, node, what, &trouble, error);
+  int status = pw_expression_number (node->text, value) ? PW_OK : pw_expression_fixed (x, node->text, value, &trouble);
+  if (status == PW_MACHINE) return pw_yaml_no_memory (y, error);
+  if (status != PW_OK) return read_trouble (y, node, what, &trouble, error);
   const char *expected = pw_domain_check (domain, *value);
   if (*expected) return pw_yaml_fail (y, node->at, error, "%s = %g: expected %s", what, *value, expected);
   return PW_OK;

@@ -86,7 +86,9 @@ static int table_file (pw_yaml_builder *b, const char *what, const pw_node *node
   double *value[2];
   pw_error own = { 0 };
   if (pw_yaml_text (b->y, node, what, &name, error) != PW_OK) return error->status;
+  errno = 0;
   FILE *f = table_open (b->y, name, &why);
+  if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (b->y, error);
   if (f == NULL) return pw_yaml_fail (b->y, node->at, error, "%s: cannot read \"%.60s\": %s", what, name, why);
   int status = pw_columns_read (f, name, column, &b->m->arena, value, &s->table.count, &own);
   fclose (f);

@@ -1,5 +1,6 @@
 /* libfyaml's events become a tree of ours: a third of the memory of its own, without its search for duplicate keys,
  * which takes quadratic time, and with whatever a model file must not contain refused where it stands. */
+#include <errno.h>
 #include <libfyaml.h>
 #include <string.h>
 #include "yaml.h"
@@ -163,11 +164,17 @@ static int tree_parse (tree *x, pw_error *error) {
   return status == PW_OK && fy_parser_get_stream_error (x->parser) ? tree_syntax (x, error) : status;
 }
 
+/* libfyaml without memory calls a text faulty, or takes a part for the whole; it crashes where it begins. */
+enum { TREE_RESERVE = 1 << 16 };
+
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
+  pw_error wrong = { 0 };
   struct fy_diag_cfg quiet;
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
   tree x = { .y = y };
+  if (pw_reserve (TREE_RESERVE) != PW_OK) return pw_yaml_no_memory (y, error);
+  errno = 0;
   x.diag = fy_diag_create (&quiet);
   if (x.diag == NULL) return pw_yaml_no_memory (y, error);
   fy_diag_set_collect_errors (x.diag, true); /* nothing is printed */
@@ -178,7 +185,9 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   if (x.parser == NULL || x.text == NULL || fy_parser_set_string (x.parser, y->source, y->size) != 0)
     status = pw_yaml_no_memory (y, error);
   else
-    status = tree_parse (&x, error);
+    status = tree_parse (&x, &wrong);
+  if (errno == ENOMEM) status = pw_yaml_no_memory (y, error);
+  if (status != PW_OK) pw_fail (error, status, "%s", wrong.text);
   fy_token_iter_destroy (x.text);
   if (x.parser) fy_parser_destroy (x.parser);
   fy_diag_destroy (x.diag);
