@@ -91,7 +91,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
                   element);
 }
 
-void pw_note_residuals (pw_run *r) {
+pw_residuals pw_note_residuals (pw_run *r) {
   pw_residuals now;
   pw_statistics *s = &r->statistics;
   if (isnan (r->position))
@@ -102,4 +102,5 @@ void pw_note_residuals (pw_run *r) {
   if (!(now.velocity <= s->velocity)) s->velocity = now.velocity;
   if (!(now.g <= s->g)) s->g = now.g;
   if (!(now.jv <= s->jv)) s->jv = now.jv;
+  return now;
 }

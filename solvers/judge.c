@@ -16,7 +16,7 @@ double pw_run_agitation (const pw_run *r) {
     if (!(fabs (*a) <= angular)) angular = fabs (*a);
   double most = linear * (per / s->scale.length);
   if (!(angular * per <= most)) most = angular * per;
-  return most <= 1 ? 1 : most;
+  return most;
 }
 
 /* A method that lets go of its constraints is stopped: what follows would not be this mechanism.  Without stabilisation
@@ -38,15 +38,55 @@ static int judge_lost (pw_run *r, pw_error *error) {
                   r->t, cause, element, now.position, now.velocity);
 }
 
+/* What the constraints are off by, in units of the scene. */
+static double judge_off (const pw_run *r, const pw_residuals *now) {
+  return fmax (now->position, now->g / r->s->scale.length);
+}
+
+/* 1 if constraints off by so much may decide on the branch: if the sine s of the smallest angle between their rows, smaller
+ * than it is elsewhere, is not much larger than the root of that.
+ *
+ * Where two branches of a motion cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|.  Those that
+ * are off by d are x y = d: branches that do not cross but turn into each other, where s^2 is about 2 d.  A method
+ * that follows these constraints as they have become follows the turn, however small its steps. */
+static int judge_blurred (pw_run *r, double off, double part) {
+  const double elsewhere = 30 * r->watch; /* 0.6 of a good one */
+  double sine = fmin (sqrt (off / part), elsewhere);
+  int row;
+  if (!(sine > r->guard) || !pw_saddle_below (r->saddle, sine)) return 0;
+  return pw_saddle_pivot (r->saddle, &row) < sine && row < r->s->holonomic;
+}
+
+/* Such a turn rounds off the corner, the more so the more the constraints are off: its accelerations are no outburst. */
+static int judge_turn (pw_run *r, const pw_residuals *residuals, double now, pw_error *error) {
+  const double turn = 3, least = 0.1, lost = 0.02, far = 1e-2, nothing = 0.1;
+  double off = judge_off (r, residuals), before = fmax (r->before, least);
+  if (!(now <= turn * before) && judge_blurred (r, off, lost))
+    return pw_fail (
+        error, PW_METHOD,
+        "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) lead to another branch, with "
+        "%.3g times the accelerations of before; methods with projection pass",
+        r->t, residuals->position, now / before);
+  if (!(off <= far) && judge_blurred (r, off, nothing))
+    return pw_fail (
+        error, PW_METHOD,
+        "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) tell no branch from another; "
+        "methods with projection pass",
+        r->t, residuals->position);
+  return PW_OK;
+}
+
 /* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */
-static int judge_outburst (pw_run *r, pw_error *error) {
-  const double outburst = 100;
+static int judge_outburst (pw_run *r, const pw_residuals *residuals, pw_error *error) {
+  const double outburst = 100, blurred = 0.01;
   double now = pw_run_agitation (r);
   if (r->near && !(now <= outburst * r->calm))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
                     now / r->calm);
-  if (!r->near) r->calm = fmax (r->calm, now);
+  if (r->near || judge_blurred (r, judge_off (r, residuals), blurred)) return judge_turn (r, residuals, now, error);
+  r->calm = fmax (r->calm, now);
+  r->before = now;
   return PW_OK;
 }
 
@@ -63,11 +103,11 @@ static int judge_contradicts (pw_run *r) {
 
 int pw_run_judge (pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
-  pw_note_residuals (r);
+  const pw_residuals now = pw_note_residuals (r);
   if (!(s->position <= JUDGE_LOST && s->velocity <= JUDGE_LOST)) {
     double lost = pw_stabilised_by (r, "none") ? JUDGE_LOST_UNSTABILISED : JUDGE_LOST;
     if (!(s->position <= lost && s->velocity <= lost)) return judge_lost (r, error);
   }
   if (r->redundant && judge_contradicts (r)) return judge_lost (r, error);
-  return judge_outburst (r, error);
+  return judge_outburst (r, &now, error);
 }

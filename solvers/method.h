@@ -25,7 +25,8 @@ struct pw_run {
   double pivot, reselect; /* the smallest one at the state reached; below this other rows are tried */
   double watch, guard;    /* an evaluation with a smaller pivot is near a singular pose; too near */
   int near;               /* 1 as soon as one was near */
-  double calm;            /* the largest accelerations away from singular poses, in units of L / T^2 */
+  double calm;            /* the largest accelerations away from singular poses, in units of L / T^2; at least 1 */
+  double before;          /* those of the last state away from them */
   double alpha, beta;     /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;      /* first discontinuity of a signal after t */
   double position, g;     /* scaled and absolute residual, if the last projection told them; else NaN */
@@ -114,7 +115,7 @@ static inline double pw_first_step (const pw_run *r) {
  * is follows from those here; else it stays what it was. */
 int pw_run_renew (pw_run *r, int fresh, pw_error *error);
 
-/* The size of the accelerations at the state reached, in units of L / T^2; at least 1 (judge.c). */
+/* The size of the accelerations at the state reached, in units of L / T^2 (judge.c). */
 double pw_run_agitation (const pw_run *r);
 /* Looks at the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
  * another branch. */
@@ -142,7 +143,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Takes the residuals of the state just accelerated into the statistics; those of its positions are not computed twice if
  * a projection has left them. */
-void pw_note_residuals (pw_run *r);
+pw_residuals pw_note_residuals (pw_run *r);
 
 /* What the i-th redundant row follows from, at the pose J is swept and the saddle factorised at. */
 void pw_rank_coefficients (pw_run *r, int i);

@@ -106,11 +106,12 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
 /* The state is consistent: energies, ledger and statistics begin here. */
 static void run_begin (pw_run *r) {
   pw_system *s = r->s;
-  r->calm = pw_run_agitation (r);
+  r->before = pw_run_agitation (r);
+  r->calm = fmax (1, r->before);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
   r->breakpoint = pw_next_breakpoint (s, r->t);
   r->position = NAN;
-  pw_note_residuals (r);
+  (void)pw_note_residuals (r);
 }
 
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {

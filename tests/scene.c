@@ -1,5 +1,6 @@
 #include <stdarg.h>
 #include "check.h"
+#include "pinwheel-files.h"
 #include "scene.h"
 
 /* The model file itself, under another name than that of a plug-in's table. */
@@ -38,4 +39,17 @@ pw_system *scene_system (const pw_plugin_table *table, ...) {
   pw_model *m = scene_build (table, sets);
   va_end (sets);
   return scene_compile (m);
+}
+
+pw_system *scene_named (const char *model, const char *parameter, double value) {
+  pw_error error = { 0 };
+  pw_file *f = pw_file_open (model, &error);
+  check_ok (f ? PW_OK : error.status, &error);
+  pw_model *m = pw_file_model (f, &error);
+  check_ok (m ? PW_OK : error.status, &error);
+  if (parameter) check_ok (pw_set (m, parameter, value, &error), &error);
+  check_ok (pw_build (m, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_file_close (f);
+  return s;
 }

@@ -14,6 +14,9 @@ pw_model *scene_model (const pw_plugin_table *table, ...);
 /* The same, compiled. */
 pw_system *scene_system (const pw_plugin_table *table, ...);
 
+/* A model by its file's name, with one parameter set (NULL: none). */
+pw_system *scene_named (const char *model, const char *parameter, double value);
+
 /* Compiles a model and frees it. */
 pw_system *scene_compile (pw_model *m);
 

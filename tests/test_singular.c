@@ -3,30 +3,16 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
-#include "pinwheel-files.h"
 #include "scene.h"
 #include "trial.h"
+#include "turns.h"
 
 /* ---- Through singular poses ---- */
-
-/* A model file by name, with one parameter set (NULL: none). */
-static pw_system *singular_open (const char *model, const char *parameter, double value) {
-  pw_error error = { 0 };
-  pw_file *f = pw_file_open (model, &error);
-  check_ok (f ? PW_OK : error.status, &error);
-  pw_model *m = pw_file_model (f, &error);
-  check_ok (m ? PW_OK : error.status, &error);
-  if (parameter) check_ok (pw_set (m, parameter, value, &error), &error);
-  check_ok (pw_build (m, &error), &error);
-  pw_system *s = scene_compile (m);
-  pw_file_close (f);
-  return s;
-}
 
 /* Two four-bar linkages: all cranks pass through the horizontal ten times in 10 s. */
 static void test_four_bar (void **state) {
   (void)state;
-  pw_system *s = singular_open ("n-four-bar", NULL, 0);
+  pw_system *s = scene_named ("n-four-bar", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10, .ledger = 1 });
   int passes = 0;
   double energy = 0, balance = 0, start = NAN, before = 1;
@@ -62,7 +48,7 @@ static void test_steps_on_it (void **state) {
   (void)state;
   for (size_t i = 0; i < sizeof steps / sizeof *steps; i++) {
     double t = steps[i].t, most = 0, before = NAN;
-    pw_system *s = singular_open ("n-four-bar", "N", steps[i].cranks);
+    pw_system *s = scene_named ("n-four-bar", "N", steps[i].cranks);
     pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = steps[i].step, .span = t, .ledger = 1 });
     for (int k = 1; k <= 10; k++) {
       pw_sample x = runs_to (r, t * k / 10);
@@ -81,7 +67,7 @@ static void test_slider_crank (void **state) {
                                         "rk4+nullspace" };
   (void)state;
   for (int i = 0; i < 5; i++) {
-    pw_system *s = singular_open ("slider-crank", NULL, 0);
+    pw_system *s = scene_named ("slider-crank", NULL, 0);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-3, .span = 1, .ledger = 1 });
     pw_sample x = runs_to (r, 1);
     check_close (method[i], trial_state (s, &x, "crank.phi"), 2.428234829106999646, 1e-9, "published digits");
@@ -97,7 +83,7 @@ static void singular_or_told (const char *model, const char *method, double rtol
   pw_error error = { 0 };
   pw_sample x;
   char what[80];
-  pw_system *s = singular_open (model, NULL, 0);
+  pw_system *s = scene_named (model, NULL, 0);
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .span = t });
   int status = pw_advance_to (r, t, t, &error);
   snprintf (what, sizeof what, "%s, rtol %g", model, rtol);
@@ -112,6 +98,22 @@ static void singular_or_told (const char *model, const char *method, double rtol
   }
   pw_close (r);
   pw_free (s);
+}
+
+/* All of these ended with status ok on another branch before drifted constraints were watched. */
+static void test_turned (void **state) {
+  static const struct {
+    const char *method;
+    double cranks, rtol;
+  } turns[] = {
+    { "bdf+none", 1, 1e-5 },      { "bdf+none", 2, 1e-5 },   { "bdf+none", 1, 1e-7 },  { "bdf+baumgarte", 1, 3e-5 },
+    { "bdf+baumgarte", 2, 1e-5 }, { "adams+none", 2, 1e-5 }, { "ida+none", 1, 1e-5 },  { "ida+baumgarte", 1, 3e-4 },
+    { "ida+index2", 1, 1e-4 },    { "erk8+none", 1, 1e-5 },  { "erk8+none", 2, 3e-5 }, { "erk5+none", 1, 3e-4 },
+  };
+  int told = 0, count = sizeof turns / sizeof *turns;
+  (void)state;
+  for (int i = 0; i < count; i++) told += turns_try (turns[i].method, turns[i].rtol, "n-four-bar", turns[i].cranks);
+  assert_true (2 * told > count);
 }
 
 static void test_ida (void **state) {
@@ -404,7 +406,7 @@ int main (void) {
     cmocka_unit_test (test_four_bar),     cmocka_unit_test (test_slider_crank),    cmocka_unit_test (test_ida),
     cmocka_unit_test (test_flat_start),   cmocka_unit_test (test_restarted_in),    cmocka_unit_test (test_locked),
     cmocka_unit_test (test_locked_start), cmocka_unit_test (test_locks_in_motion), cmocka_unit_test (test_gap),
-    cmocka_unit_test (test_drives),       cmocka_unit_test (test_steps_on_it),
+    cmocka_unit_test (test_drives),       cmocka_unit_test (test_steps_on_it),     cmocka_unit_test (test_turned),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
