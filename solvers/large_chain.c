@@ -12,6 +12,12 @@ static inline large_three chain_part (large_arm a, double m, double i) {
   return (large_three){ m + x * a.x, x * a.y, m + y * a.y };
 }
 
+/* K, rows of the second pin b, columns of the first a. */
+static inline large_square chain_coupling (large_arm a, large_arm b, double m, double i) {
+  const double mass = m * a.s * b.s, x = i * b.x, y = i * b.y;
+  return (large_square){ mass + x * a.x, x * a.y, y * a.x, mass + y * a.y };
+}
+
 /* The first block as the rest of the matrix leaves it. */
 static inline void chain_begin (const double *value, int at, double *D) {
   for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = at < 0 ? 0 : value[at + n];
@@ -37,8 +43,9 @@ void pw_large_chain_down (pw_large *l, const pw_chain *c, const double *f, doubl
   chain_begin (l->ldl->value, c->first, D);
   for (int n = 0; n < c->bodies; n++, A += next_J, B += next_J, w += next_j, j += next_j, row += next_y, keep += 3) {
     const large_arm a = large_read_arm (A, step), b = large_read_arm (B, step);
-    const double m = w[0], i = w[2], mass = m * a.s * b.s, x = i * b.x, z = i * b.y;
-    const double K[] = { mass + x * a.x, x * a.y, z * a.x, mass + z * a.y };
+    const double m = w[0], i = w[2];
+    const large_square coupling = chain_coupling (a, b, m, i);
+    const double K[] = { coupling.xx, coupling.xy, coupling.yx, coupling.yy };
     const large_three P = chain_part (a, m, i), Q = chain_part (b, m, i);
     D[0] += P.x, D[1] += P.y, D[2] += P.z, D[3] += P.x, D[4] += P.z;
     const large_square inverse = large_invert (2, D, l, (int)row), L = large_scale (2, 2, K, inverse);
@@ -73,17 +80,18 @@ void pw_large_chain_forward (const pw_large *l, const pw_chain *c, const double 
 /* From the last pin to the first, each with the body behind it. */
 void pw_large_chain_up (const pw_large *l, const pw_chain *c, const double *f, double *y, double *a) {
   const ptrdiff_t next_J = c->next_J, next_j = c->next_j, next_y = c->next_y, step = c->step;
-  const double *J = l->base[0];
+  const double *J = l->base[0], *last = y + c->y + c->bodies * next_y;
+  double x = last[0], z = last[1]; /* y of the pin behind */
   for (ptrdiff_t n = c->bodies; n-- > 0;) {
     const ptrdiff_t j = c->j + n * next_j;
     const large_arm u = large_read_arm (J + c->A + n * next_J, step), v = large_read_arm (J + c->B + n * next_J, step);
     const double m = l->inverse[j], i = l->inverse[j + 2], *keep = l->keep + c->keep + 3 * n;
-    double *yu = y + c->y + n * next_y, *yv = yu + next_y;
-    double X = v.s * yv[0], Y = v.s * yv[1], T = v.x * yv[0] + v.y * yv[1];
-    const double turn = i * T, push = m * u.s, x = yu[0] + push * X + turn * u.x, z = yu[1] + push * Y + turn * u.y;
-    yu[0] = -(keep[0] * x + keep[1] * z);
-    yu[1] = -(keep[1] * x + keep[2] * z);
-    X += u.s * yu[0], Y += u.s * yu[1], T += u.x * yu[0] + u.y * yu[1];
+    const large_square K = chain_coupling (u, v, m, i);
+    double *own = y + c->y + n * next_y, X = v.s * x, Y = v.s * z, T = v.x * x + v.y * z;
+    const double right = own[0] + (K.xx * x + K.yx * z), up = own[1] + (K.xy * x + K.yy * z);
+    own[0] = x = -(keep[0] * right + keep[1] * up);
+    own[1] = z = -(keep[1] * right + keep[2] * up);
+    X += u.s * x, Y += u.s * z, T += u.x * x + u.y * z;
     if (f)
       a[j] = m * (f[j] - X), a[j + 1] = m * (f[j + 1] - Y), a[j + 2] = i * (f[j + 2] - T);
     else
