@@ -4,6 +4,20 @@
 #include "model.h"
 #include "signal.h"
 
+int pw_check_parameters (const char *what, const char *name, const pw_plugin_table *table, pw_error *error) {
+  for (const pw_parameter *p = table->parameters; p && p->name; p++) {
+    const char *expected = pw_domain_check (p->domain, p->value);
+    if (p->offset + sizeof (double) > table->parameters_size)
+      return pw_fail (error, PW_INPUT,
+                      "%s%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof", what,
+                      name, p->name);
+    if (*expected)
+      return pw_fail (error, PW_INPUT, "%s%s: parameter %s has the default %g: expected %s", what, name, p->name,
+                      p->value, expected);
+  }
+  return PW_OK;
+}
+
 static int check_name (const pw_model *m, const char *what, const char *name, pw_error *error) {
   if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s has no name", m->name, what);
   if (strcmp (name, "ground") == 0)

@@ -9,17 +9,6 @@
 
 /* ---- Counting ---- */
 
-static int compile_kind_limits (const pw_model *m, const pw_kind *k, pw_error *error) {
-  if (k->bodies > PW_MAX_BODIES || k->own > PW_MAX_OWN || k->rows > PW_MAX_ROWS || k->signals > PW_MAX_SIGNALS ||
-      (k->rows > 0) != (k->level != PW_FORCE))
-    return pw_fail (error, PW_INPUT,
-                    "model %s: kind %s does not fit: at most %d bodies, %d own coordinates, %d rows, %d signals; rows "
-                    "if and only if "
-                    "it is a constraint",
-                    m->name, k->name, PW_MAX_BODIES, PW_MAX_OWN, PW_MAX_ROWS, PW_MAX_SIGNALS);
-  return PW_OK;
-}
-
 static int compile_names (pw_compilation *c, pw_error *error) {
   const pw_model *m = c->m;
   if (pw_names_open (&c->body, (size_t)m->bodies) != PW_OK || pw_names_open (&c->element, (size_t)m->elements) != PW_OK)
@@ -62,14 +51,13 @@ static int compile_kinds (pw_compilation *c, pw_error *error) {
       if (kind->level != order[l]) continue;
       int k = 0;
       while (k < c->kinds && c->kind[k] != kind) k++;
-      if (k == c->kinds) {
-        if (compile_kind_limits (m, kind, error) != PW_OK) return PW_INPUT;
-        c->kind[c->kinds++] = kind;
-      }
+      if (k == c->kinds) c->kind[c->kinds++] = kind;
       c->count[k] += pw_compile_copies (m, kind);
       c->slab_of[i] = k;
+      if (c->room < kind->element + PW_COMPILE_GUARD) c->room = kind->element + PW_COMPILE_GUARD;
     }
-  return PW_OK;
+  c->prepared = malloc (c->room + 1);
+  return c->prepared ? PW_OK : pw_fail (error, PW_MACHINE, "model %s: out of memory", m->name);
 }
 
 static int compile_accounts (const pw_kind *k) {
@@ -172,6 +160,8 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
   pw_system *s = NULL;
   if (!m->built)
     pw_fail (error, PW_INPUT, "model %s: pw_compile before pw_build", m->name);
+  else if (m->error.status != PW_OK) /* of what was added behind pw_build */
+    pw_fail (error, m->error.status, "%s", m->error.text);
   else if (compile_names (&c, error) == PW_OK && compile_kinds (&c, error) == PW_OK &&
            compile_count (&c, error) == PW_OK)
     s = compile_allocate (&c, &pools, error);
@@ -184,6 +174,7 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
   free (c.kind);
   free (c.count);
   free (c.slab_of);
+  free (c.prepared);
   return s;
 }
 

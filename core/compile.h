@@ -14,11 +14,16 @@ typedef struct {
   int *count;           /* elements of each */
   int *slab_of;         /* slab of each element */
   int kinds;
-  pw_system size; /* its counts */
-  size_t text;    /* bytes of all names */
-  int reads;      /* states read by signals, in all */
-  size_t points;  /* of tables, in all */
+  pw_system size;          /* its counts */
+  size_t text;             /* bytes of all names */
+  int reads;               /* states read by signals, in all */
+  size_t points;           /* of tables, in all */
+  size_t room;             /* bytes of the largest element, and the guard behind it */
+  unsigned char *prepared; /* so many: where an element is prepared */
 } pw_compilation;
+
+/* Bytes behind an element that prepare must leave alone. */
+enum { PW_COMPILE_GUARD = 64, PW_COMPILE_MARK = 0xa5 };
 
 /* Arrays that the elements share: where each goes on. */
 typedef struct {

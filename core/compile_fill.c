@@ -67,6 +67,24 @@ static int compile_source (const pw_compilation *c, pw_system *s, pw_source *sou
   return compile_reads (c, s, source, signal->function.reads, pools, element, error);
 }
 
+/* Prepares an element beside the system, to see that it stays within its size, and puts it in. */
+static int compile_prepare (const pw_compilation *c, pw_slab *k, int e, const pw_element *from,
+                            const pw_body *const *bodies, pw_own *own, pw_error *error) {
+  const pw_kind *kind = k->kind;
+  size_t size = kind->element;
+  pw_error why = { 0 };
+  memset (c->prepared, 0, size);
+  memset (c->prepared + size, PW_COMPILE_MARK, PW_COMPILE_GUARD);
+  if (kind->prepare (from->definition, bodies, c->prepared, own, &why) != PW_OK)
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: %s", c->m->name, kind->name, k->name[e], why.text);
+  for (int i = 0; i < PW_COMPILE_GUARD; i++)
+    if (c->prepared[size + (size_t)i] != PW_COMPILE_MARK)
+      return pw_fail (error, PW_INPUT, "model %s: kind %s: prepare writes more than the %zu bytes of .element",
+                      c->m->name, kind->name, size);
+  memcpy ((char *)(size_t)k->b.element + (size_t)e * size, c->prepared, size);
+  return PW_OK;
+}
+
 /* Puts element `e` of its slab where the kind will find it; `body` is the one an each_body kind acts on, or -1. */
 static int compile_element (const pw_compilation *c, pw_system *s, pw_slab *k, int e, const pw_element *from, int body,
                             pw_error *error) {
@@ -82,11 +100,8 @@ static int compile_element (const pw_compilation *c, pw_system *s, pw_slab *k, i
     column[n] = index < 0 ? s->coords : 3 * index;
   }
   if (kind->prepare == NULL) return PW_OK;
-  pw_error why = { 0 };
   pw_own own[PW_MAX_OWN] = { { 0 } };
-  char *element = (char *)(size_t)k->b.element + (size_t)e * kind->element;
-  if (kind->prepare (from->definition, bodies, element, own, &why) != PW_OK)
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: %s", c->m->name, kind->name, k->name[e], why.text);
+  if (compile_prepare (c, k, e, from, bodies, own, error) != PW_OK) return PW_INPUT;
   for (int n = 0, j = k->own + e * kind->own; n < kind->own; n++, j++) {
     s->mass[j] = own[n].mass;
     s->q0[j] = own[n].start;

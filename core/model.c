@@ -10,6 +10,10 @@ static int model_no_memory (pw_model *m) {
 }
 
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error) {
+  if (name == NULL || table == NULL) {
+    pw_fail (error, PW_INPUT, "a model has no %s", name ? "table" : "name");
+    return NULL;
+  }
   if (table->abi != PW_ABI || table->size != sizeof *table) {
     pw_fail (error, PW_INPUT,
              "model %s was compiled for ABI %u of %zu bytes, this Pinwheel has ABI %u of %zu: compile it anew", name,
@@ -20,6 +24,7 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
     pw_fail (error, PW_INPUT, "model %s has no build function", name);
     return NULL;
   }
+  if (pw_check_parameters ("model ", name, table, error) != PW_OK) return NULL;
   pw_model *m = calloc (1, sizeof *m);
   if (m) {
     m->table = table;
@@ -47,6 +52,7 @@ void pw_model_free (pw_model *m) {
 }
 
 int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
+  if (parameter == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a parameter is missing", m->name);
   pw_nearest near = { .sought = parameter };
   for (const pw_parameter *p = m->table->parameters; p && p->name; p++) {
     if (strcmp (p->name, parameter) == 0) {
@@ -125,8 +131,18 @@ static void model_table (pw_model *m, pw_signal *s) {
   s->table.value = model_numbers (m, s->table.value, s->table.count);
 }
 
+/* Looks at a kind's table when its first element is added, or nearly so. */
+static int model_kind (pw_model *m, const pw_kind *kind) {
+  if (m->elements > 0 && m->element[m->elements - 1].kind == kind) return PW_OK;
+  char buffer[200];
+  const char *fault = kind ? pw_kind_fault (kind, buffer, sizeof buffer) : "there is none";
+  if (*fault == 0) return PW_OK;
+  return pw_fail (&m->error, PW_INPUT, "model %s: kind %s: %s", m->name,
+                  kind && kind->name && *kind->name ? kind->name : "(unnamed)", fault);
+}
+
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
-  if (m->error.status != PW_OK ||
+  if (m->error.status != PW_OK || model_kind (m, kind) != PW_OK ||
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
   void *copy = pw_arena_take (&m->arena, kind->definition);
@@ -155,6 +171,11 @@ void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type ty
 }
 
 int pw_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error) {
+  if (element == NULL || field == NULL || signal == NULL)
+    return pw_fail (error, PW_INPUT, "model %s: %s is missing", m->name,
+                    element == NULL ? "the name of an element"
+                    : field == NULL ? "the name of a field"
+                                    : "a signal");
   pw_nearest near = { .sought = element };
   char hint[100];
   for (int i = 0; i < m->elements; i++) {
@@ -180,6 +201,7 @@ int pw_set_signal (pw_model *m, const char *element, const char *field, const pw
 }
 
 int pw_set_start (pw_model *m, const char *state, double value, pw_error *error) {
+  if (state == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", m->name);
   const char *expected = pw_domain_check (PW_REAL, value);
   if (*expected)
     return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);

@@ -64,6 +64,13 @@ static inline int pw_kind_acts (const pw_kind *kind) {
   return kind->rows > 0 || kind->own > 0 || kind->force != NULL;
 }
 
+/* "" if the table of a kind holds together, else what is wrong with it, perhaps in the buffer.  Anything else may crash on
+ * one that does not. */
+const char *pw_kind_fault (const pw_kind *kind, char *buffer, size_t size);
+
+/* Bytes of one value of a field; 0: there is no such type. */
+size_t pw_field_bytes (pw_field_type type);
+
 /* How many a field stands for. */
 static inline int pw_field_count (const pw_field *f) {
   return f->count > 0 ? f->count : 1;

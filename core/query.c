@@ -28,7 +28,7 @@ int pw_count_ledger (const pw_system *s) {
 }
 
 int pw_find_body (const pw_system *s, const char *name) {
-  for (int b = 0; b < s->bodies; b++)
+  for (int b = 0; name && b < s->bodies; b++)
     if (strcmp (s->body_name[b], name) == 0) return b;
   return -1;
 }
@@ -86,6 +86,7 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
 
 int pw_find_state (const pw_system *s, const char *name, pw_error *error) {
   char best[120], text[120], hint[160];
+  if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", s->model);
   pw_nearest near = { .sought = name };
   int state = query_body_state (s, name, &near, best, sizeof best);
   if (state >= 0) return state;

@@ -16,69 +16,6 @@ double pw_random_between (pw_random *r, double low, double high) {
   return low + (high - low) * ldexp ((double)(specimen_next (r) >> 11), -53);
 }
 
-/* ---- Does the table hold together? ---- */
-
-static size_t specimen_bytes (pw_field_type type) {
-  switch (type) {
-  case PW_NUMBER:
-    return sizeof (double);
-  case PW_POINT:
-  case PW_VECTOR:
-    return 2 * sizeof (double);
-  case PW_BODY:
-    return sizeof (char *);
-  case PW_SIGNAL:
-    return sizeof (pw_signal);
-  case PW_CHOICE:
-    return sizeof (int);
-  }
-  return 0;
-}
-
-static const char *specimen_fields (const pw_kind *k) {
-  int bodies = 0, signals = 0;
-  if (k->fields == NULL) return "no table of fields";
-  for (const pw_field *f = k->fields; f->name; f++) {
-    size_t bytes = specimen_bytes (f->type) * (size_t)pw_field_count (f);
-    if (bytes == 0) return "a field's type does not exist";
-    if (f->offset < sizeof (char *) || f->offset + bytes > k->definition) return "a field lies outside the definition";
-    if (f->type == PW_CHOICE && (f->choices == NULL || f->choices[0] == NULL)) return "a choice without choices";
-    if (f->type == PW_BODY) bodies += pw_field_count (f);
-    if (f->type == PW_SIGNAL) signals += pw_field_count (f);
-  }
-  if (k->each_body && (bodies > 0 || k->bodies != 1))
-    return "a kind that acts on each body has one body and names none";
-  if (!k->each_body && bodies != k->bodies) return "bodies is not the number of fields of type PW_BODY";
-  if (signals != k->signals) return "signals is not the number of fields of type PW_SIGNAL";
-  return "";
-}
-
-static const char *specimen_sweeps (const pw_kind *k) {
-  pw_sweep *const exact[] = { k->g,       k->g_size, k->eta,   k->J,    k->gamma,  k->force,
-                              k->force_u, k->energy, k->power, k->loss, k->contact };
-  for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
-    if (exact[i] == pw_by_differences) return "PW_BY_DIFFERENCES stands in another place than a second-order block's";
-  if (k->constant && (k->force == NULL || k->signals > 0)) return "a constant force that is none, or has signals";
-  if (k->rows > 0 && k->J == NULL) return "constraint rows without J";
-  if (k->level == PW_HOLONOMIC && k->g == NULL) return "holonomic rows without g";
-  return "";
-}
-
-const char *pw_specimen_fault (const pw_kind *k) {
-  if (k->name == NULL || *k->name == 0) return "no name";
-  if (k->definition < sizeof (char *)) return "the definition has no room for its name";
-  if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->own < 0 || k->own > PW_MAX_OWN || k->rows < 0 ||
-      k->rows > PW_MAX_ROWS || k->signals < 0 || k->signals > PW_MAX_SIGNALS)
-    return "more bodies, own coordinates, rows or signals than an element may have";
-  if (k->bodies + k->own == 0) return "neither a body nor a coordinate of its own";
-  if ((k->rows > 0) != (k->level != PW_FORCE)) return "rows and level contradict each other";
-  if (k->rows > 0 && k->reaction == NULL) return "constraint rows without names of their reactions";
-  if (k->own > 0 && k->coordinate == NULL) return "own coordinates without names";
-  if ((k->own > 0 || k->element > 0) && k->prepare == NULL) return "something to prepare, but no prepare function";
-  const char *fault = specimen_fields (k);
-  return *fault ? fault : specimen_sweeps (k);
-}
-
 /* ---- Random definitions ---- */
 
 /* What the build function is handed. */
@@ -137,7 +74,7 @@ static void specimen_element (pw_model *m, const specimen *x, int e) {
   *(const char **)(void *)definition = name[e];
   for (const pw_field *f = x->kind->fields; f->name; f++)
     for (int i = 0; i < pw_field_count (f); i++)
-      specimen_value (x->random, f, definition + f->offset + (size_t)i * specimen_bytes (f->type));
+      specimen_value (x->random, f, definition + f->offset + (size_t)i * pw_field_bytes (f->type));
   for (int n = 0; n < x->kind->bodies && !x->kind->each_body; n++)
     *(const char **)pw_field_at (x->kind, definition, PW_BODY, n) = specimen_body (x, e, n);
   pw_add (m, x->kind, definition);

@@ -17,9 +17,6 @@ typedef struct {
 } pw_random;
 double pw_random_between (pw_random *r, double low, double high);
 
-/* "" if the table holds together, else what is wrong with it.  Anything else may crash on a table that does not. */
-const char *pw_specimen_fault (const pw_kind *kind);
-
 /* Compiles a scene of bodies b0 to b3 and elements e0 to e2, defined at random inside the domains of the kind's field
  * table; e2 hangs on the ground with one of its bodies if it has several.  A kind that acts on every body gets one
  * element only.  NULL and the error if the kind refuses every

@@ -60,6 +60,9 @@ char *pw_take_arrays (const pw_array *array, size_t arrays);
  * when they are refused memory. */
 int pw_reserve (size_t bytes);
 
+/* Parameters lie inside their structure and start with a value that makes sense; messages begin with `what` and `name`. */
+int pw_check_parameters (const char *what, const char *name, const pw_plugin_table *table, pw_error *error);
+
 /* "" if a value lies in the domain, else what was expected (">= 0"). */
 const char *pw_domain_check (pw_domain domain, double value);
 

@@ -115,6 +115,7 @@ int pw_parse_options (const char *text, const pw_method **method, int *stabilisa
   char part[80];
   const char *whole = text;
   *stabilisation = 0;
+  if (text == NULL) return pw_fail (error, PW_INPUT, "the name of a method is missing");
   if (methods_part (part, sizeof part, &text, whole, error) != PW_OK ||
       methods_integrator (part, method, error) != PW_OK)
     return PW_INPUT;

@@ -74,7 +74,8 @@ double pw_time (const pw_run *r);
 int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
 /* Starts anew from a state at the time reached, after the caller has changed something.  The state is made consistent
- * first.  q and v may be NULL: they stay. */
+ * first.  q and v may be NULL: they stay.  A ledger goes on; what the change does to the energy is left out of its balance.
+ * Errors: PW_INPUT for a value that is not finite, PW_START, PW_METHOD: the run stays where it was; PW_MACHINE. */
 int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error);
 
 void pw_close (pw_run *r);

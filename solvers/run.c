@@ -203,6 +203,7 @@ static int run_reselect (pw_run *r, pw_error *error) {
 
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
   int row, status = PW_OK;
+  if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
   if (run_is_lost (r, error)) return PW_MACHINE;
   r->position = NAN;
@@ -244,6 +245,7 @@ static void run_account (pw_run *r, pw_sample *sample) {
 int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   pw_residuals now;
   if (run_is_lost (r, error)) return PW_MACHINE;
+  if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
   r->t_at = t;
   int status = r->method->at (r, t, error);
   if (status != PW_OK) return status;
@@ -256,14 +258,55 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   return PW_OK;
 }
 
+/* ---- Another state ---- */
+
+static int run_check_state (const pw_run *r, const double *x, int rates, pw_error *error) {
+  char name[120];
+  for (int j = 0, n = r->s->coords; x && j < n; j++)
+    if (!isfinite (x[j]))
+      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number", r->s->model,
+                      pw_state_name (r->s, j + rates * n, name, sizeof name), x[j]);
+  return PW_OK;
+}
+
+/* Takes values over, which may be those of a sample; the old ones go where samples are. */
+static void run_exchange (double *x, double *kept, const double *other, int n) {
+  for (int j = 0; j < n; j++) {
+    double old = x[j];
+    if (other) x[j] = other[j];
+    kept[j] = old;
+  }
+}
+
+static int run_energy (pw_run *r, double *energy, pw_error *error) {
+  if (!r->settings.ledger) return PW_OK;
+  if (pw_place (r->s, r->t, r->q, r->v) != PW_OK)
+    return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  *energy = pw_kinetic (r->s, r->v) + pw_potential (r->s);
+  return PW_OK;
+}
+
+/* What the caller changes of the energy is not the method's: it counts as energy at the start. */
 int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
-  size_t bytes = (size_t)r->s->coords * sizeof (double);
+  int n = r->s->coords;
+  double before = 0, after = 0;
   if (run_is_lost (r, error)) return PW_MACHINE;
-  if (q) memcpy (r->q, q, bytes);
-  if (v) memcpy (r->v, v, bytes);
-  int status = pw_make_consistent (r, NULL, error);
+  if (run_check_state (r, q, 0, error) != PW_OK || run_check_state (r, v, 1, error) != PW_OK) return PW_INPUT;
+  int status = run_energy (r, &before, error);
+  if (status != PW_OK) return status;
+  run_exchange (r->q, r->q_at, q, n);
+  run_exchange (r->v, r->v_at, v, n);
+  status = pw_make_consistent (r, NULL, error);
   if (status == PW_OK) status = run_evaluate (r, error);
-  return status == PW_OK ? r->method->restart (r, error) : status;
+  if (status == PW_OK) status = run_energy (r, &after, error);
+  if (status == PW_OK) {
+    r->energy0 += after - before;
+    return r->method->restart (r, error);
+  }
+  memcpy (r->q, r->q_at, (size_t)n * sizeof (double));
+  memcpy (r->v, r->v_at, (size_t)n * sizeof (double));
+  run_evaluate (r, NULL);
+  return status;
 }
 
 int pw_run_redundant (const pw_run *r) {

@@ -158,16 +158,17 @@ static void test_faults (void **state) {
   } while (0)
   KINDS_FAULT (name, NULL, "no name");
   KINDS_FAULT (definition, 0, "the definition has no room for its name");
-  KINDS_FAULT (bodies, 5, "more bodies, own coordinates, rows or signals than an element may have");
+  KINDS_FAULT (bodies, 5, "at most 4 bodies, 4 own coordinates, 6 rows and 4 signals");
   KINDS_FAULT (bodies, 0, "neither a body nor a coordinate of its own");
   KINDS_FAULT (level, PW_FORCE, "rows and level contradict each other");
   KINDS_FAULT (reaction, NULL, "constraint rows without names of their reactions");
   KINDS_FAULT (own, 1, "own coordinates without names");
   KINDS_FAULT (prepare, NULL, "something to prepare, but no prepare function");
   KINDS_FAULT (fields, NULL, "no table of fields");
-  KINDS_FAULT (fields, kinds_typeless, "a field's type does not exist");
-  KINDS_FAULT (definition, 16, "a field lies outside the definition");
-  KINDS_FAULT (fields, kinds_choice, "a choice without choices");
+  KINDS_FAULT (fields, kinds_typeless, "field mode: its type does not exist");
+  KINDS_FAULT (definition, 16,
+               "field body: it lies outside the definition: is .definition its sizeof, its first member the name?");
+  KINDS_FAULT (fields, kinds_choice, "field mode: a choice without choices");
   KINDS_FAULT (bodies, 3, "bodies is not the number of fields of type PW_BODY");
   KINDS_FAULT (signals, 1, "signals is not the number of fields of type PW_SIGNAL");
   KINDS_FAULT (each_body, 1, "a kind that acts on each body has one body and names none");
@@ -175,6 +176,7 @@ static void test_faults (void **state) {
   KINDS_FAULT (J, pw_by_differences, "PW_BY_DIFFERENCES stands in another place than a second-order block's");
   KINDS_FAULT (J, NULL, "constraint rows without J");
   KINDS_FAULT (g, NULL, "holonomic rows without g");
+  KINDS_FAULT (level, PW_NONHOLONOMIC, "g, but no holonomic rows");
 #undef KINDS_FAULT
 }
 

@@ -1,6 +1,7 @@
 /* What a description may not say, and what it is told then: every message of the core about bodies, elements, fields,
  * signals and kinds. */
 #include <math.h>
+#include <string.h>
 #include "check.h"
 #include "scene.h"
 #include "toys.h"
@@ -146,9 +147,66 @@ static void test_bad_kinds (void **state) {
   (void)state;
   pw_kind kind = messages_kind;
   kind.rows = 1; /* rows, but no constraint */
-  BAD (": kind chooser does not fit: at most 4 bodies, 4 own coordinates, 6 rows, 4 signals; rows if and only if it is "
-       "a constraint",
+  BAD (": kind chooser: rows and level contradict each other",
        pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
+  kind = messages_kind;
+  kind.fields = NULL;
+  BAD (": kind chooser: no table of fields", pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
+  kind.name = NULL;
+  BAD (": kind (unnamed): no name", pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
+  BAD (": kind (unnamed): there is none", pw_add (m, NULL, &(messages_chooser){ "c", "frame", 0 }));
+}
+
+/* Writes as much as its definition has, whatever room there is. */
+static int messages_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+                             pw_error *error) {
+  (void)bodies, (void)own, (void)error;
+  memcpy (element, definition, sizeof (messages_chooser));
+  return PW_OK;
+}
+
+static void test_bad_prepare (void **state) {
+  (void)state;
+  pw_kind kind = messages_kind;
+  kind.prepare = messages_prepare;
+  kind.element = sizeof (messages_chooser) - 8;
+  BAD (": kind chooser: prepare writes more than the 16 bytes of .element",
+       pw_add (m, &kind, &(messages_chooser){ "c", "frame", 1 }));
+}
+
+/* Names that are missing are no names, and no crash. */
+static void test_missing_names (void **state) {
+  (void)state;
+  pw_model *m = scene_model (&messages_table, NULL);
+  const pw_signal nothing = { 0 };
+  pw_error error = { 0 };
+  assert_int_equal (pw_set (m, NULL, 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model scene: the name of a parameter is missing");
+  error = (pw_error){ 0 };
+  assert_int_equal (pw_set_start (m, NULL, 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model scene: the name of a state is missing");
+  error = (pw_error){ 0 };
+  assert_int_equal (pw_set_signal (m, NULL, "value", &nothing, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model scene: the name of an element is missing");
+  pw_system *s = scene_compile (m);
+  error = (pw_error){ 0 };
+  assert_int_equal (pw_find_state (s, NULL, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model scene: the name of a state is missing");
+  assert_int_equal (pw_find_body (s, NULL), -1);
+  pw_free (s);
+}
+
+static const pw_parameter messages_outside[] = { { "a", 8, 1, "m", "a length", PW_REAL }, { .name = NULL } };
+
+static void test_bad_parameters (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_plugin_table table = messages_table;
+  table.parameters = messages_outside;
+  table.parameters_size = 8;
+  assert_null (pw_model_new ("scene", &table, &error));
+  check_error (&error, PW_INPUT,
+               "model scene: parameter a lies outside the model's structure: set .parameters_size to its sizeof");
 }
 
 static void messages_nothing (pw_model *m, const void *parameters) {
@@ -163,9 +221,10 @@ static void test_no_body (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_bad_names),   cmocka_unit_test (test_bad_bodies),  cmocka_unit_test (test_bad_references),
-    cmocka_unit_test (test_bad_numbers), cmocka_unit_test (test_bad_signals), cmocka_unit_test (test_bad_readers),
-    cmocka_unit_test (test_bad_choices), cmocka_unit_test (test_bad_kinds),   cmocka_unit_test (test_no_body),
+    cmocka_unit_test (test_bad_names),   cmocka_unit_test (test_bad_bodies),    cmocka_unit_test (test_bad_references),
+    cmocka_unit_test (test_bad_numbers), cmocka_unit_test (test_bad_signals),   cmocka_unit_test (test_bad_readers),
+    cmocka_unit_test (test_bad_choices), cmocka_unit_test (test_bad_kinds),     cmocka_unit_test (test_no_body),
+    cmocka_unit_test (test_bad_prepare), cmocka_unit_test (test_missing_names), cmocka_unit_test (test_bad_parameters),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -253,9 +253,54 @@ static void test_restart_slower (void **state) {
   pw_free (s);
 }
 
+/* A restart that is refused leaves the run where it was, to the bit. */
+static void test_restart_refused (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, NULL), *same = scene_system (&scene_ezyroller, NULL);
+  pw_settings settings = { .step = 1e-3, .span = 2, .ledger = 1 };
+  pw_run *r = runs_open (s, "rk4+projection", &settings), *left = runs_open (same, "rk4+projection", &settings);
+  pw_sample now = runs_to (r, 1);
+  runs_to (left, 1);
+  pw_error error = { 0 };
+  double q[6];
+  memcpy (q, now.q, sizeof q);
+  q[4] = NAN;
+  assert_int_equal (pw_restart (r, q, NULL, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model ezyroller: restart with steer.y = nan: expected a finite number");
+  assert_int_equal (pw_advance (r, NAN, NULL), PW_INPUT);
+  assert_int_equal (pw_at (r, NAN, &now, NULL), PW_INPUT);
+  now = runs_to (r, 2);
+  pw_sample other = runs_to (left, 2);
+  for (int i = 0; i < 6; i++)
+    check_close ("positions", now.q[i], other.q[i], 1e-13, "round-off of a factorisation anew");
+  check_close ("balance", now.balance, other.balance, 1e-13, "round-off");
+  pw_close (r), pw_close (left);
+  pw_free (s), pw_free (same);
+}
+
+/* A kick is the caller's: the balance tells the method's error only, before and behind it. */
+static void test_restart_kick (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  double v[6];
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2, .ledger = 1 });
+  pw_sample now = runs_to (r, 1);
+  double kinetic = now.kinetic;
+  for (int j = 0; j < 6; j++) v[j] = 3 * now.v[j];
+  check_ok (pw_restart (r, NULL, v, &error), &error);
+  check_ok (pw_at (r, 1, &now, &error), &error);
+  check_close ("kick", now.kinetic, 9 * kinetic, 1e-14, "round-off");
+  check_close ("balance", now.balance, 0, 1e-10, "(h w)^4");
+  pw_close (r);
+  pw_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_signal_fails),
+    cmocka_unit_test (test_restart_refused),
+    cmocka_unit_test (test_restart_kick),
     cmocka_unit_test (test_signal_fails_at_once),
     cmocka_unit_test (test_too_large_a_step),
     cmocka_unit_test (test_massless),

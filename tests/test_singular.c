@@ -180,7 +180,7 @@ static void singular_rhombus (pw_model *m, const void *parameter) {
   pw_add_pin (m, &(pw_pin){ .name = "D", .body = { "right", "ground" }, .at = { { -0.5, 0 }, { 1, 0 } } });
 }
 
-/* A run that is put into a singular pose says so, with the name of a pin. */
+/* A run that is put into a singular pose says so, with the name of a pin, and goes on from where it was. */
 static void test_restarted_in (void **state) {
   static const pw_plugin_table table = { .abi = PW_ABI,
                                          .size = sizeof (pw_plugin_table),
@@ -199,6 +199,8 @@ static void test_restarted_in (void **state) {
     assert_int_equal (
         sscanf (error.text, "t = 0 s: singular pose: pin %c says what other constraints say already", &pin), 1);
     assert_true (pin >= 'A' && pin <= 'D');
+    pw_sample now = runs_to (r, 0.01);
+    for (int j = 0; j < 9; j++) check_close ("it has hardly moved", now.q[j], s->q0[j], 0.1, "from rest, in 10 ms");
     pw_close (r);
     pw_free (s);
   }

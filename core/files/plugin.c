@@ -17,22 +17,6 @@ struct pw_file {
 
 /* ---- Loading ---- */
 
-/* Parameters must lie inside their structure and start with a value that makes sense. */
-static int plugin_parameters (const pw_file *f, pw_error *error) {
-  const pw_plugin_table *t = f->table;
-  for (const pw_parameter *p = t->parameters; p && p->name; p++) {
-    const char *expected = pw_domain_check (p->domain, p->value);
-    if (p->offset + sizeof (double) > t->parameters_size)
-      return pw_fail (error, PW_INPUT,
-                      "%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof",
-                      f->path, p->name);
-    if (*expected)
-      return pw_fail (error, PW_INPUT, "%s: parameter %s has the default %g: expected %s", f->path, p->name, p->value,
-                      expected);
-  }
-  return PW_OK;
-}
-
 static int plugin_check (const pw_file *f, pw_error *error) {
   const pw_plugin_table *t = f->table;
   if (t->abi != PW_ABI || t->size != sizeof *t)
@@ -40,7 +24,7 @@ static int plugin_check (const pw_file *f, pw_error *error) {
                     f->path, t->abi, (unsigned)PW_ABI);
   if (t->build == NULL)
     return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", f->path);
-  return plugin_parameters (f, error);
+  return pw_check_parameters ("", f->path, t, error);
 }
 
 /* dlerror repeats the path in front of its reason. */

@@ -1,0 +1,92 @@
+/* Does the table of a kind hold together?  Asked before anything of it is used, so that a slip in a plug-in is told by
+ * name instead of crashing the program. */
+#include <stdio.h>
+#include "model.h"
+#include "system.h"
+
+size_t pw_field_bytes (pw_field_type type) {
+  switch (type) {
+  case PW_NUMBER:
+    return sizeof (double);
+  case PW_POINT:
+  case PW_VECTOR:
+    return 2 * sizeof (double);
+  case PW_BODY:
+    return sizeof (char *);
+  case PW_SIGNAL:
+    return sizeof (pw_signal);
+  case PW_CHOICE:
+    return sizeof (int);
+  }
+  return 0;
+}
+
+/* What is wrong with one field, or "". */
+static const char *fault_field (const pw_kind *k, const pw_field *f) {
+  size_t bytes = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
+  if (bytes == 0) return "its type does not exist";
+  if (f->offset < sizeof (char *) || f->offset + bytes > k->definition)
+    return "it lies outside the definition: is .definition its sizeof, its first member the name?";
+  if (f->type == PW_CHOICE && (f->choices == NULL || f->choices[0] == NULL)) return "a choice without choices";
+  return "";
+}
+
+static const char *fault_fields (const pw_kind *k, char *buffer, size_t size) {
+  int bodies = 0, signals = 0;
+  if (k->fields == NULL) return "no table of fields";
+  for (const pw_field *f = k->fields; f->name; f++) {
+    const char *fault = fault_field (k, f);
+    if (*fault) {
+      snprintf (buffer, size, "field %s: %s", f->name, fault);
+      return buffer;
+    }
+    if (f->type == PW_BODY) bodies += pw_field_count (f);
+    if (f->type == PW_SIGNAL) signals += pw_field_count (f);
+  }
+  if (k->each_body && (bodies > 0 || k->bodies != 1))
+    return "a kind that acts on each body has one body and names none";
+  if (!k->each_body && bodies != k->bodies) return "bodies is not the number of fields of type PW_BODY";
+  if (signals != k->signals) return "signals is not the number of fields of type PW_SIGNAL";
+  return "";
+}
+
+static const char *fault_sweeps (const pw_kind *k) {
+  pw_sweep *const exact[] = { k->g,       k->g_size, k->eta,   k->J,    k->gamma,  k->force,
+                              k->force_u, k->energy, k->power, k->loss, k->contact };
+  for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
+    if (exact[i] == pw_by_differences) return "PW_BY_DIFFERENCES stands in another place than a second-order block's";
+  if (k->constant && (k->force == NULL || k->signals > 0)) return "a constant force that is none, or has signals";
+  if (k->rows > 0 && k->J == NULL) return "constraint rows without J";
+  if (k->level == PW_HOLONOMIC && k->g == NULL) return "holonomic rows without g";
+  if (k->level != PW_HOLONOMIC && k->g) return "g, but no holonomic rows";
+  return "";
+}
+
+static const char *fault_names (const pw_kind *k) {
+  for (int i = 0; i < k->rows; i++)
+    if (k->reaction == NULL || k->reaction[i].name == NULL || k->reaction[i].unit == NULL)
+      return "constraint rows without names of their reactions";
+  for (int i = 0; i < k->own; i++)
+    if (k->coordinate == NULL || k->coordinate[i].name == NULL || k->coordinate[i].rate == NULL ||
+        k->coordinate[i].unit == NULL)
+      return "own coordinates without names";
+  return "";
+}
+
+const char *pw_kind_fault (const pw_kind *k, char *buffer, size_t size) {
+  if (k->name == NULL || *k->name == 0) return "no name";
+  if (k->definition < sizeof (char *)) return "the definition has no room for its name";
+  if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->own < 0 || k->own > PW_MAX_OWN || k->rows < 0 ||
+      k->rows > PW_MAX_ROWS || k->signals < 0 || k->signals > PW_MAX_SIGNALS) {
+    snprintf (buffer, size, "at most %d bodies, %d own coordinates, %d rows and %d signals", PW_MAX_BODIES, PW_MAX_OWN,
+              PW_MAX_ROWS, PW_MAX_SIGNALS);
+    return buffer;
+  }
+  if (k->bodies + k->own == 0) return "neither a body nor a coordinate of its own";
+  if (k->level < PW_FORCE || k->level > PW_NONHOLONOMIC || (k->rows > 0) != (k->level != PW_FORCE))
+    return "rows and level contradict each other";
+  if ((k->own > 0 || k->element > 0) && k->prepare == NULL) return "something to prepare, but no prepare function";
+  const char *fault = fault_names (k);
+  if (*fault == 0) fault = fault_fields (k, buffer, size);
+  return *fault ? fault : fault_sweeps (k);
+}
