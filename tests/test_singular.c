@@ -195,12 +195,14 @@ static void test_restarted_in (void **state) {
     char pin = 0;
     pw_system *s = scene_system (&table, NULL);
     pw_run *r = runs_open (s, method[i], NULL);
+    double start[9];
+    memcpy (start, pw_run_start (r)->q, sizeof start);
     assert_int_equal (pw_restart (r, flat, rest, &error), PW_METHOD);
     assert_int_equal (
         sscanf (error.text, "t = 0 s: singular pose: pin %c says what other constraints say already", &pin), 1);
     assert_true (pin >= 'A' && pin <= 'D');
     pw_sample now = runs_to (r, 0.01);
-    for (int j = 0; j < 9; j++) check_close ("it has hardly moved", now.q[j], s->q0[j], 0.1, "from rest, in 10 ms");
+    for (int j = 0; j < 9; j++) check_close ("it has hardly moved", now.q[j], start[j], 0.1, "from rest, in 10 ms");
     pw_close (r);
     pw_free (s);
   }
