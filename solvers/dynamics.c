@@ -47,7 +47,7 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
   }
 }
 
-/* In both of these lambda holds gamma first. */
+/* In all of these lambda holds gamma first. */
 
 void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda) {
   pw_sweep_gamma (r->s, lambda);
@@ -57,17 +57,28 @@ void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda
   if (pw_saddle_below (r->saddle, r->watch)) dynamics_refine (r, v, a, lambda);
 }
 
-int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
-  int status = pw_place (r->s, t, q, v);
-  if (status != PW_OK) return status;
-  pw_sweep_J_gamma (r->s, lambda);
+/* Factorises and solves; *near: 1 if a pivot is low. */
+static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
   const double *f = dynamics_right (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
-  status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);
-  if (!pw_saddle_below (r->saddle, r->watch)) return status;
-  r->near = 1;
-  if (status == PW_OK) dynamics_refine (r, v, a, lambda);
+  int status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);
+  *near = pw_saddle_below (r->saddle, r->watch);
+  if (*near && status == PW_OK) dynamics_refine (r, v, a, lambda);
+  return status;
+}
+
+int pw_accelerate_swept (pw_run *r, const double *v, double *a, double *lambda) {
+  int near;
+  return dynamics_solve (r, v, a, lambda, &near);
+}
+
+int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
+  int near, status = pw_place (r->s, t, q, v);
+  if (status != PW_OK) return status;
+  pw_sweep_J_gamma (r->s, lambda);
+  status = dynamics_solve (r, v, a, lambda, &near);
+  if (near) r->near = 1;
   return status;
 }
 

@@ -135,6 +135,9 @@ static inline double pw_before_breakpoint (const pw_run *r, double t) {
 /* The same where J is swept and the saddle factorised at this pose, and the rates are placed. */
 void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda);
 
+/* The same where J is swept and the rates are placed, but the saddle is not factorised; gamma is in lambda. */
+int pw_accelerate_swept (pw_run *r, const double *v, double *a, double *lambda);
+
 /* The state reached, into the sample arrays; the system is placed there, J swept. */
 void pw_show_reached (pw_run *r);
 

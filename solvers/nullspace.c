@@ -12,27 +12,56 @@
  * The next step has a basis of its own; v, and with it the motion, is the same in both.
  * (Kim & Vanderploeg 1986, QR decomposition for state space representation of constrained mechanical dynamic systems: a
  * basis held while it is good; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of
- * mechanical system dynamics.) */
+ * mechanical system dynamics.)
+ *
+ * J is swept over panels, the rows that touch a body or an own coordinate.  At the step's start K is symmetric and positive
+ * definite, so that its factorisation needs no pivoting; it is done without while no pivot is small, else anew with it. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "nullspace.h"
+#include "unroll.h"
 #include "util.h"
 
 /* ---- Opening ---- */
 
+/* The next piece of row `row` at the coordinates from j on; while there are no panels yet, they are counted. */
+static void nullspace_add (pw_nullspace *b, const pw_system *s, int j, int row, const double *J) {
+  if (j >= s->coords || row < 0) return;
+  int n = j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies;
+  if (J)
+    b->piece[b->panel[n + 1].first++] = (pw_nullspace_piece){ .row = row, .J = J };
+  else
+    b->panel[n + 2].first++;
+}
+
+/* Counts the pieces of every panel, one place further on, or fills them in. */
+static void nullspace_list (pw_nullspace *b, const pw_system *s, int fill) {
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
+    for (int e = 0; e < k->b.count; e++)
+      for (int i = 0, n = e * k->kind->rows; i < k->kind->rows; i++, n++) {
+        const double *J = k->J + n * k->b.cols;
+        int row = b->place[k->row + n], bodies = k->kind->bodies, own = k->kind->own;
+        for (int c = 0; c < bodies; c++) nullspace_add (b, s, k->column[e * bodies + c], row, fill ? J + 3 * c : NULL);
+        for (int c = 0; c < own; c++) nullspace_add (b, s, k->own + e * own + c, row, fill ? J + 3 * bodies + c : NULL);
+      }
+}
+
 static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
-  size_t m = (size_t)b->rows, all = (size_t)s->rows;
+  size_t m = (size_t)b->rows, all = (size_t)s->rows, panels = (size_t)b->panels + 2, pieces = 0;
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
+    pieces += (size_t)(k->b.count * k->kind->rows * (k->kind->bodies + k->kind->own));
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
     b->place = pw_take (&l, all, sizeof (int));
     b->pivot = pw_take (&l, m, sizeof (int));
-    b->reference = pw_take (&l, (size_t)s->coords * m, sizeof (double));
+    b->panel = pw_take (&l, panels, sizeof *b->panel);
+    b->piece = pw_take (&l, pieces, sizeof *b->piece);
     b->K = pw_take (&l, m * m, sizeof (double));
     b->scale = pw_take (&l, m, sizeof (double));
     b->mu = pw_take (&l, m, sizeof (double));
-    b->jv = pw_take (&l, all, sizeof (double));
     b->eta = pw_take (&l, all, sizeof (double));
+    b->v = pw_take (&l, (size_t)s->coords + 3, sizeof (double));
     if (pass == 1) break;
     b->memory = calloc (1, l.used + 1);
     if (b->memory == NULL) return PW_MACHINE;
@@ -41,9 +70,20 @@ static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
   return PW_OK;
 }
 
+/* Panel n has the pieces from its `first` to the next one's. */
+static void nullspace_plan (pw_nullspace *b, const pw_system *s) {
+  nullspace_list (b, s, 0);
+  for (int n = 0; n <= b->panels; n++) b->panel[n + 1].first += b->panel[n].first;
+  nullspace_list (b, s, 1);
+  for (int n = 0; n < b->panels; n++) {
+    b->panel[n].j = n < s->bodies ? 3 * n : n + 2 * s->bodies;
+    b->panel[n].width = n < s->bodies ? 3 : 1;
+  }
+}
+
 int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  *b = (pw_nullspace){ .rows = s->rows - r->redundant };
+  *b = (pw_nullspace){ .rows = s->rows - r->redundant, .panels = s->coords - 2 * s->bodies };
   if (b->rows > PW_NULLSPACE_MOST)
     return pw_fail (error, PW_INPUT,
                     "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "
@@ -51,6 +91,7 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
   if (nullspace_allocate (b, s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   for (int i = 0, n = 0; i < s->rows; i++) b->place[i] = r->active && !r->active[i] ? -1 : n++;
+  nullspace_plan (b, s);
   return PW_OK;
 }
 
@@ -59,36 +100,74 @@ void pw_nullspace_close (pw_nullspace *b) {
   *b = (pw_nullspace){ 0 };
 }
 
-/* ---- K ---- */
+/* ---- K mu = eta - J w ---- */
 
-/* The entries of J last swept, of the active rows. */
-typedef void nullspace_visit (pw_nullspace *b, const pw_system *s, int row, int j, double value);
+PW_INLINE double nullspace_dot (const double *x, const double *y, int width) {
+  return width == 1 ? x[0] * y[0] : x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+}
 
-static inline void nullspace_each (pw_nullspace *b, const pw_system *s, nullspace_visit *visit) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
-    const double *J = k->J;
-    for (int e = 0; e < k->b.count; e++)
-      for (int i = 0; i < k->kind->rows; i++) {
-        int row = b->place[k->row + e * k->kind->rows + i];
-        for (int c = 0; c < k->b.cols; c++, J++) {
-          int j = pw_global (k, e, c);
-          if (row >= 0 && j < s->coords && *J != 0) visit (b, s, row, j, *J);
-        }
-      }
+/* K += J W^-1 J0^T, mu -= J w over a panel; its width is a constant where this is inlined. */
+PW_INLINE void nullspace_gather (pw_nullspace *b, const pw_nullspace_panel *p, const double *w, int width) {
+  const pw_nullspace_piece *from = b->piece + p->first, *end = b->piece + p[1].first;
+  for (const pw_nullspace_piece *x = from; x < end; x++) {
+    double J[3] = { x->J[0], width > 1 ? x->J[1] : 0, width > 1 ? x->J[2] : 0 }, *K = b->K + x->row * b->rows;
+    for (const pw_nullspace_piece *y = from; y < end; y++) K[y->row] += nullspace_dot (J, y->reference, width);
+    b->mu[x->row] -= nullspace_dot (J, w + p->j, width);
   }
 }
 
-static inline void nullspace_refer (pw_nullspace *b, const pw_system *s, int row, int j, double value) {
-  double unit = pw_is_angle (s, j) ? s->scale.length : 1;
-  b->reference[j * b->rows + row] += value / (unit * unit);
+/* K and the right-hand side, the latter in mu. */
+static void nullspace_assemble (pw_nullspace *b, pw_system *s, const double *w) {
+  int m = b->rows;
+  memset (b->K, 0, (size_t)m * (size_t)m * sizeof *b->K);
+  memset (b->mu, 0, (size_t)m * sizeof *b->mu);
+  if (s->moving) {
+    pw_sweep_eta (s, b->eta);
+    for (int i = 0; i < s->rows; i++)
+      if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i];
+  }
+  for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
+    if (p->width == 3)
+      nullspace_gather (b, p, w, 3);
+    else
+      nullspace_gather (b, p, w, 1);
 }
 
-static inline void nullspace_multiply (pw_nullspace *b, const pw_system *s, int row, int j, double value) {
-  const double *from = b->reference + j * b->rows;
-  double *to = b->K + row * b->rows;
-  (void)s;
-  for (int i = 0; i < b->rows; i++) to[i] += value * from[i];
+/* K = L U and mu = K^-1 mu without pivoting, m a constant where it is inlined.  Returns 0 where a pivot has lost more than
+ * so much of its diagonal entry. */
+PW_INLINE int nullspace_eliminate (double *K, double *mu, int m) {
+  const double least = 0.01;
+  PW_UNROLL for (int p = 0; p < m; p++) {
+    double diagonal = K[p * m + p];
+    PW_UNROLL for (int i = 0; i < p; i++) {
+      double f = K[p * m + i] * K[i * m + i];
+      PW_UNROLL for (int j = i + 1; j < m; j++) K[p * m + j] -= f * K[i * m + j];
+      mu[p] -= f * mu[i];
+    }
+    if (!(K[p * m + p] > least * diagonal)) return 0;
+    K[p * m + p] = 1 / K[p * m + p];
+  }
+  PW_UNROLL for (int i = m - 1; i >= 0; i--) {
+    PW_UNROLL for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
+    mu[i] *= K[i * m + i];
+  }
+  return 1;
 }
+
+static int nullspace_quick (pw_nullspace *b) {
+  switch (b->rows) {
+#define QUICK(m) \
+  case m:        \
+    return nullspace_eliminate (b->K, b->mu, m);
+    QUICK (1)
+    QUICK (2)
+    QUICK (3) QUICK (4) QUICK (5) QUICK (6)
+#undef QUICK
+        default : return nullspace_eliminate (b->K, b->mu, b->rows);
+  }
+}
+
+/* ---- The same with pivoting ---- */
 
 static void nullspace_swap (pw_nullspace *b, int p, int q) {
   int m = b->rows;
@@ -144,40 +223,68 @@ static void nullspace_solve (pw_nullspace *b) {
 /* ---- A step ---- */
 
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
+  const pw_system *s = r->s;
+  double angle = 1 / (s->scale.length * s->scale.length);
   int status = pw_place (r->s, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   pw_sweep_J (r->s);
-  memset (b->reference, 0, (size_t)r->s->coords * (size_t)b->rows * sizeof *b->reference);
-  nullspace_each (b, r->s, nullspace_refer);
+  for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
+    for (pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
+      for (int c = 0; c < p->width; c++) x->reference[c] = x->J[c] * (c == p->width - 1 ? angle : 1);
   return PW_OK;
 }
 
-int pw_nullspace_rates (pw_nullspace *b, pw_run *r, double t, const double *q, double *v) {
-  pw_system *s = r->s;
-  int m = b->rows, status = pw_place (s, t, q, v);
-  if (status != PW_OK) return status;
-  pw_sweep_J (s);
-  pw_mul_J (s, v, b->jv);
-  pw_sweep_eta (s, b->eta);
-  for (int i = 0; i < s->rows; i++)
-    if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i] - b->jv[i];
-  memset (b->K, 0, (size_t)m * (size_t)m * sizeof *b->K);
-  nullspace_each (b, s, nullspace_multiply);
+/* mu; PW_RETRY if K is singular. */
+static int nullspace_multipliers (pw_nullspace *b, pw_system *s, const double *w) {
+  nullspace_assemble (b, s, w);
+  if (nullspace_quick (b)) return PW_OK;
+  nullspace_assemble (b, s, w);
   if (nullspace_factor (b) != PW_OK) return PW_RETRY;
   nullspace_solve (b);
-  for (int j = 0; j < s->coords; j++)
-    for (int i = 0; i < m; i++) v[j] += b->reference[j * m + i] * b->mu[i];
+  return PW_OK;
+}
+
+/* The rates at the placed pose, J swept. */
+static int nullspace_correct (pw_nullspace *b, pw_system *s, double *v) {
+  if (nullspace_multipliers (b, s, v) != PW_OK) return PW_RETRY;
+  for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
+    for (const pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
+      for (int c = 0; c < p->width; c++) v[p->j + c] += x->reference[c] * b->mu[x->row];
   pw_place_rates (s, v);
   return PW_OK;
 }
 
+int pw_nullspace_rates (pw_nullspace *b, pw_run *r, double t, const double *q, double *v) {
+  int status = pw_place (r->s, t, q, v);
+  if (status != PW_OK) return status;
+  pw_sweep_J (r->s);
+  return nullspace_correct (b, r->s, v);
+}
+
+int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda) {
+  pw_sweep_gamma (r->s, lambda);
+  int status = pw_accelerate_swept (r, v, a, lambda);
+  if (pw_saddle_below (r->saddle, r->watch)) r->near = 1;
+  return status;
+}
+
+/* The energy at (t, q) with the minimal velocities that w has. */
+static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double *q, const double *w, double *energy) {
+  pw_system *s = r->s;
+  memcpy (b->v, w, (size_t)s->coords * sizeof *w);
+  int status = pw_nullspace_rates (b, r, t, q, b->v);
+  if (status == PW_OK) *energy = pw_kinetic (s, b->v) + pw_potential (s);
+  return status;
+}
+
 int pw_nullspace_settle (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added) {
   pw_system *s = r->s;
-  int row, status = pw_nullspace_rates (b, r, t, q, v);
-  if (status != PW_OK || p == NULL || s->holonomic == 0) return status;
-  double worst, before = added ? pw_kinetic (s, v) + pw_potential (s) : 0;
-  status = pw_project_positions (p, r, t, q, v, &row, &worst);
-  if (status == PW_OK) status = pw_nullspace_rates (b, r, t, q, v);
+  int row, status = PW_OK;
+  double worst, before = 0;
+  if (p == NULL || s->holonomic == 0) return pw_nullspace_rates (b, r, t, q, v);
+  if (added) status = nullspace_energy (b, r, t, q, v, &before);
+  if (status == PW_OK) status = pw_project_positions (p, r, t, q, v, &row, &worst);
+  if (status == PW_OK) status = nullspace_correct (b, s, v);
   if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (s) - before;
   return status;
 }

@@ -6,13 +6,28 @@
 
 enum { PW_NULLSPACE_MOST = 256 }; /* rows: they are solved densely */
 
+/* A row's entries at a body, or at an own coordinate. */
 typedef struct {
-  int rows;          /* active ones */
-  int *place;        /* all rows: number among the active ones, or -1 */
-  double *reference; /* coords x rows: W^-1 J0^T */
+  int row;             /* among the active ones */
+  const double *J;     /* as last swept */
+  double reference[3]; /* of W^-1 J0^T */
+} pw_nullspace_piece;
+
+typedef struct {
+  int j, width; /* first coordinate, how many */
+  int first;    /* its first piece; behind its last one is the next panel's first */
+} pw_nullspace_panel;
+
+typedef struct {
+  int rows;                  /* active ones */
+  int *place;                /* all rows: number among the active ones, or -1 */
+  int panels;                /* bodies and own coordinates */
+  pw_nullspace_panel *panel; /* panels + 2 */
+  pw_nullspace_piece *piece;
   double *K, *scale; /* rows x rows: J W^-1 J0^T, factorised in place; rows: the largest entry of each */
   double *mu;        /* rows */
-  double *jv, *eta;  /* all rows */
+  double *eta;       /* all rows */
+  double *v;         /* coords + 3: scratch */
   int *pivot;        /* rows */
   char *memory;
 } pw_nullspace;
@@ -28,7 +43,10 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r);
  * PW_RETRY where the step has gone too far for its basis, or the pose is singular. */
 int pw_nullspace_rates (pw_nullspace *b, pw_run *r, double t, const double *q, double *v);
 
-/* The same at the end of a step, onto the positions that g = 0 asks for if there is a projector; added (NULL: not
+/* Accelerations and multipliers where the rates have just been made so.  Returns as pw_accelerate. */
+int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda);
+
+/* The rates at the end of a step, onto the positions that g = 0 asks for if there is a projector; added (NULL: not
  * wanted) takes the energy that adds. */
 int pw_nullspace_settle (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added);
 

@@ -168,6 +168,14 @@ static void rk_combine (double *out, const double *y, double *const *K, const pw
     rk_sum (out, y, K, w, h, w->count, n);
 }
 
+/* Accelerations of a stage at the positions d->q. */
+static inline int rk_stage (pw_run *r, double t, double *v, double *a) {
+  struct pw_method_data *d = r->data;
+  if (!d->minimal) return pw_accelerate (r, t, d->q, v, a, d->lambda);
+  int status = pw_nullspace_rates (&d->nullspace, r, t, d->q, v);
+  return status == PW_OK ? pw_nullspace_accelerate (r, v, a, d->lambda) : status;
+}
+
 /* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Returns as pw_accelerate. */
 static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
@@ -181,8 +189,7 @@ static int rk_stages (pw_run *r, double h) {
     rk_combine (d->q, r->q, d->V, &d->row[i], h, n);
     rk_combine (d->V[i], r->v, d->A, &d->row[i], h, n);
     double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
-    if (d->minimal) status = pw_nullspace_rates (&d->nullspace, r, t, d->q, d->V[i]);
-    if (status == PW_OK) status = pw_accelerate (r, t, d->q, d->V[i], d->A[i], d->lambda);
+    status = rk_stage (r, t, d->V[i], d->A[i]);
     if (status == PW_OK && r->settings.ledger) pw_sweep_ledger (s, d->lambda, d->R[i]);
   }
   if (d->held) pw_hold (s, 0);
@@ -229,8 +236,10 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) status = rk_project (r, t1, d->q, d->v, added);
-  if (d->minimal)
+  if (d->minimal) {
     status = pw_nullspace_settle (&d->nullspace, d->closes ? &d->projector : NULL, r, t1, d->q, d->v, added);
+    return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
+  }
   return status == PW_OK ? rk_accelerate (r, project, t1, d->q, d->v, d->a, d->lambda) : status;
 }
 
