@@ -37,14 +37,15 @@ static void place_reads (const pw_system *s, const pw_source *source, const doub
 }
 
 /* Evaluates the signals of a slab; `readers` picks those that read states, else those of time alone. */
-static int place_slab_signals (const pw_system *s, pw_slab *k, double t, const double *q, const double *v,
-                               int readers) {
+static int place_slab_signals (pw_system *s, pw_slab *k, double t, const double *q, const double *v, int readers) {
   int derivatives = !pw_kind_forced (k->kind);
   double *u = k->u;
   for (pw_source *i = k->source, *end = i + k->b.count * k->kind->signals; i < end; i++, u += 3) {
     if ((i->reads > 0) != readers) continue;
     if (readers) place_reads (s, i, q, v);
-    if (pw_signal_eval (i, t, derivatives, u) != 0) return PW_METHOD;
+    if (pw_signal_eval (i, t, derivatives, u) == 0) continue;
+    s->failed = i;
+    return PW_METHOD;
   }
   return PW_OK;
 }

@@ -1,6 +1,7 @@
 /* Names and sizes of a compiled system. */
 #include <stdio.h>
 #include <string.h>
+#include "model.h"
 #include "system.h"
 #include "util.h"
 
@@ -129,6 +130,23 @@ char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
   const pw_slab *k = query_row (s, row, &e, &n);
   snprintf (buffer, size, "%s %s", k->kind->name, k->name[e]);
+  return buffer;
+}
+
+char *pw_failed_signal (const pw_system *s, char *buffer, size_t size) {
+  buffer[0] = 0;
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    int signals = k->kind->signals;
+    if (s->failed == NULL || s->failed < k->source || s->failed >= k->source + k->b.count * signals) continue;
+    int i = (int)(s->failed - k->source), n = i % signals;
+    const pw_field *f = k->kind->fields;
+    for (; f->name; f++) {
+      if (f->type != PW_SIGNAL) continue;
+      if (n < pw_field_count (f)) break;
+      n -= pw_field_count (f);
+    }
+    snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[i / signals], f->name ? f->name : "signal");
+  }
   return buffer;
 }
 

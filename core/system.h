@@ -40,13 +40,14 @@ typedef struct {
 struct pw_system {
   const char *model;
   int bodies, coords, rows, holonomic, slabs, entries;
-  int constraints; /* slabs with rows */
-  int forces;      /* slabs with a force that is not constant */
-  int *force;      /* which */
-  int readers;     /* function signals that read states */
-  int moving;      /* slabs with an eta: constraints that move */
-  int hold;        /* 1: signals of forces keep their values (inputs=held) */
-  double t_signal; /* the time the signals were last evaluated at; NaN: never */
+  int constraints;         /* slabs with rows */
+  int forces;              /* slabs with a force that is not constant */
+  int *force;              /* which */
+  int readers;             /* function signals that read states */
+  int moving;              /* slabs with an eta: constraints that move */
+  int hold;                /* 1: signals of forces keep their values (inputs=held) */
+  double t_signal;         /* the time the signals were last evaluated at; NaN: never */
+  const pw_source *failed; /* the signal that has failed last; NULL: none */
   pw_scale scale;
   const char **body_name; /* bodies */
   double *mass;           /* coords: diagonal of M */
@@ -59,6 +60,9 @@ struct pw_system {
   double *scratch;        /* rows x 3 + coords + 3 */
   pw_entry *entry;        /* entries */
 };
+
+/* The signal that has failed last, "torque T: value", or "".  Returns the buffer. */
+char *pw_failed_signal (const pw_system *s, char *buffer, size_t size);
 
 /* 1 for a coordinate that is an angle, 0 for a length; coordinates that elements own are angles. */
 static inline int pw_is_angle (const pw_system *s, int j) {

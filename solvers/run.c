@@ -1,6 +1,7 @@
 /* A run: opened on a consistent start, advanced step by step, looked into, closed. */
 #include <float.h>
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
@@ -53,6 +54,16 @@ static double run_time_scale (const pw_run *r) {
     fastest = fmax (fastest, fmax (fabs (r->v[j]) / unit, sqrt (fabs (r->a[j]) / unit)));
   }
   return 1 / fastest;
+}
+
+/* Methods say that a signal failed; this adds which one. */
+static int run_blame (const pw_run *r, int status, pw_error *error) {
+  char signal[160];
+  if (status == PW_OK || error == NULL || strstr (error->text, "a signal failed") == NULL) return status;
+  size_t n = strlen (error->text);
+  if (*pw_failed_signal (r->s, signal, sizeof signal))
+    snprintf (error->text + n, sizeof error->text - n, ": %s is not a finite number", signal);
+  return status;
 }
 
 static int run_open_saddle (pw_run *r, pw_error *error) {
@@ -140,7 +151,7 @@ pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, 
     return NULL;
   }
   r->s = s;
-  if (run_open (r, method, settings, error) == PW_OK) return r;
+  if (run_blame (r, run_open (r, method, settings, error), error) == PW_OK) return r;
   pw_close (r);
   return NULL;
 }
@@ -211,7 +222,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_OK) status = pw_run_judge (r, error);
-  if (status != PW_OK || r->redundant == 0) return status;
+  if (status != PW_OK || r->redundant == 0) return run_blame (r, status, error);
   pw_saddle_factor (r->saddle);
   r->pivot = pw_saddle_pivot (r->saddle, &row);
   return PW_OK;

@@ -84,9 +84,10 @@ static int start_fail (pw_run *r, const start_trouble *trouble, pw_error *error)
   char element[120];
   if (trouble->row < 0) return pw_fail (error, PW_START, "model %s: the start cannot be made consistent", r->s->model);
   pw_row_element (r->s, trouble->row, element, sizeof element);
-  return pw_fail (error, PW_START, "model %s: the start cannot be made consistent: %s is %s by %.6g %s", r->s->model,
-                  element, trouble->rates ? "violated" : "open", trouble->off,
-                  trouble->rates ? "m/s (or rad/s)" : "m (or rad)");
+  int angle = strcmp (pw_reaction_unit (r->s, trouble->row), "N m") == 0;
+  return pw_fail (error, PW_START, "model %s: the start cannot be made consistent: %s is %s by %.6g %s%s", r->s->model,
+                  element, trouble->rates ? "violated" : "open", trouble->off, angle ? "rad" : "m",
+                  trouble->rates ? "/s" : "; if it can close, begin nearer to where it does");
 }
 
 int pw_start_moved (const pw_system *s, const pw_start_report *report, int state) {

@@ -37,6 +37,25 @@ static void test_summary (void **state) {
                "M / (c + d) at t = 10 s");
 }
 
+/* Numbers may be expressions, as in text models. */
+static void test_numbers (void **state) {
+  (void)state;
+  cli_good ("pinwheel run pendulum --set l=3/2 --t-end pi/10 --json -");
+  check_close ("t", cli_number (cli_out, "t", NULL), 0.31415926535897932, CHECK_EPS, "pi / 10");
+  cli_good ("pinwheel sweep knife-edge-incline --vary skate.phi=0,30*deg --t-end 0.01 -o @/turned.csv");
+  assert_non_null (strstr (cli_file ("turned.csv"), "\n0.52359877559829882,"));
+}
+
+/* A step across the motion is said to be one; one that is the whole run, of something slow, is not. */
+static void test_long_step (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run pendulum --step 0.4 --t-end 4"), 0);
+  assert_non_null (strstr (cli_err, "pinwheel: a step of 0.4 s is long for a motion that changes within 0.3"));
+  cli_good ("pinwheel run pendulum --step 0.1 --t-end 1");
+  cli_good ("pinwheel run pendulum --step 5 --t-end 0.1");
+  cli_good ("pinwheel run pendulum --method erk5 --t-end 10");
+}
+
 static void test_no_energy (void **state) {
   (void)state;
   cli_good ("pinwheel run ezyroller --t-end 0.1 --json @/summary.json");
@@ -223,6 +242,8 @@ static void test_new (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_summary),
+    cmocka_unit_test (test_numbers),
+    cmocka_unit_test (test_long_step),
     cmocka_unit_test (test_no_energy),
     cmocka_unit_test (test_defaults),
     cmocka_unit_test (test_table),

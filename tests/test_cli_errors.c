@@ -14,6 +14,7 @@ static void test_bad_lines (void **state) {
   } bad[] = {
     { "shew", "there is no command \"shew\"; did you mean \"show\"?" },
     { "--verbose", "there is no option \"--verbose\"; did you mean \"--version\"?" },
+    { "./car.yaml", "\"./car.yaml\" is no command; to run a model write pinwheel run ./car.yaml" },
     { "run", "something is missing; write pinwheel run MODEL [OPTION...]" },
     { "run a b", "\"b\" is too much; write pinwheel run MODEL [OPTION...]" },
     { "run ezyroler", "there is no model \"ezyroler\"; did you mean \"ezyroller\"?" },
@@ -117,7 +118,8 @@ static void test_bad_models (void **state) {
                  "  pw_add_pin (m, &(pw_pin){ .name = \"right\", .body = { \"rod\", \"ground\" }, .at = { { 0.5, 0 }, "
                  "{ 3, 0 } } });\n"));
   cli_bad ("pinwheel run @/torn.c --json @/torn.json", 3,
-           "model torn: the start cannot be made consistent: pin left is open by 1 m (or rad)");
+           "model torn: the start cannot be made consistent: pin left is open by 1 m; if it can close, begin nearer to "
+           "where it does");
   assert_true (cli_says (cli_file ("torn.json"), "status", "start"));
 
   cli_write ("lost.c", CLI_MODEL ("  pw_add_wheel (m, &(pw_wheel){ .name = \"A\", .body = \"frame\" });\n  pw_add_body "
@@ -215,7 +217,7 @@ static void test_found_twice (void **state) {
 static void test_failing_step (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel run ezyroller --step 0.5 --set M0=1e9 -o @/fail.csv --json @/fail.json"), 4);
-  assert_int_equal (strncmp (cli_err, "pinwheel: t = ", 14), 0);
+  assert_non_null (strstr (cli_err, "\npinwheel: t = "));
   assert_non_null (strstr (cli_err, "the step of 0.5 s is too large"));
   assert_non_null (strstr (cli_err, "fail.csv.part"));
   assert_null (cli_file ("fail.csv"));

@@ -124,7 +124,8 @@ void pw_cli_close (pw_cli_line *l) {
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error) {
   if (text == NULL) return PW_OK;
   double x;
-  if (pw_read_number (text, &x) != PW_OK) return pw_fail (error, PW_INPUT, "%s: \"%s\" is not a number", option, text);
+  if (pw_read_expression (text, &x) != PW_OK)
+    return pw_fail (error, PW_INPUT, "%s: \"%s\" is not a number", option, text);
   const char *expected = pw_domain_check (domain, x);
   if (*expected) return pw_fail (error, PW_INPUT, "%s %s: expected %s", option, text, expected);
   *value = x;
@@ -142,7 +143,7 @@ int pw_cli_apply (pw_model *m, const char *option, const char *const *list,
     if (equals == NULL || equals == *list || (size_t)(equals - *list) >= sizeof name)
       return pw_fail (error, PW_INPUT, "%s %s: expected NAME=VALUE", option, *list);
     snprintf (name, sizeof name, "%.*s", (int)(equals - *list), *list);
-    if (pw_read_number (equals + 1, &value) != PW_OK)
+    if (pw_read_expression (equals + 1, &value) != PW_OK)
       return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, *list, equals + 1);
     int status = set (m, name, value, error);
     if (status != PW_OK) return status;

@@ -25,6 +25,20 @@ void pw_report_unused (const char *method, const pw_cli_wishes *w) {
     fprintf (stderr, "pinwheel: --%s has no effect: %s takes steps of --step\n", w->rtol ? "rtol" : "atol", method);
 }
 
+void pw_report_step (const pw_run *r, const char *method, double step) {
+  char h[32], pace[32];
+  const pw_method *integrator;
+  int stabilisation;
+  double T = pw_run_scale (r)->time;
+  if (!(step > T) || pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK ||
+      pw_contestant_adaptive (integrator, method))
+    return;
+  fprintf (stderr,
+           "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
+           "compare with shorter ones\n",
+           pw_format (h, step, 3), pw_format (pace, T, 2));
+}
+
 /* ---- The start ---- */
 
 void pw_report_start (const pw_system *s, const pw_start_report *start) {

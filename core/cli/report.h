@@ -10,6 +10,9 @@
  * gives both, as scripts do, is not told. */
 void pw_report_unused (const char *method, const pw_cli_wishes *w);
 
+/* Says on standard error that a fixed step is longer than what moves at the start takes to change. */
+void pw_report_step (const pw_run *r, const char *method, double step);
+
 /* Says on standard error which states the consistent start has moved, if any. */
 void pw_report_start (const pw_system *s, const pw_start_report *start);
 

@@ -12,7 +12,7 @@ static int grid_number (const char *text, size_t size, double *value) {
   if (size >= sizeof number) return PW_INPUT;
   memcpy (number, text, size);
   number[size] = 0;
-  return pw_read_number (number, value) == PW_OK && isfinite (*value) ? PW_OK : PW_INPUT;
+  return pw_read_expression (number, value) == PW_OK && isfinite (*value) ? PW_OK : PW_INPUT;
 }
 
 /* "v1,v2,..." */

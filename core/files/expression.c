@@ -12,6 +12,7 @@
 #include <muParserDLL.h>
 #include "expression.h"
 #include "pinwheel.h"
+#include "pinwheel-files.h"
 #include "files.h"
 
 enum { EXPRESSION_LONGEST = 4000 }; /* muParser stops at 5000 */
@@ -214,6 +215,8 @@ static int expression_read_sign (expression_groups *g, const char *text, size_t 
       return expression_wrong (trouble, at, "a comma belongs between the arguments of a function%s%s", "", "");
   } else if (next == '=' && strchr ("<>=!", c))
     *n = 2;
+  else if (c == '*' && next == '*')
+    return expression_wrong (trouble, at, "a power is written with ^%s%s", "", "");
   else if (c == '=')
     return expression_wrong (trouble, at, "\"=\" would assign; equality is written ==%s%s", "", "");
   else if ((c == '&' || c == '|') && next == c)
@@ -234,7 +237,8 @@ static int expression_read (const pw_expression *x, const char *text, pw_express
     if (n) continue;
     size_t name = expression_name_size (text + at), number = expression_number_size (text + at);
     n = name ? name : number;
-    if (n && (before == 'f' || before == '0' || before == ')'))
+    int factor = n || (text[at] == '(' && before != 'f');
+    if (factor && (before == 'f' || before == '0' || before == ')'))
       return expression_wrong (trouble, at, "an operator such as * is missing before \"%s\"%s",
                                (char[2]){ text[at], 0 }, "");
     if (name)
@@ -347,4 +351,14 @@ int pw_expression_fixed (pw_expression *x, const char *text, double *value, pw_e
   }
   *value = x->kept[h].value;
   return PW_OK;
+}
+
+int pw_read_expression (const char *text, double *value) {
+  pw_expression_trouble trouble;
+  if (pw_read_number (text, value) == PW_OK) return PW_OK;
+  pw_expression *x = pw_expression_open (0);
+  int status = x ? pw_expression_set (x, text, &trouble) : PW_MACHINE;
+  if (status == PW_OK) *value = pw_expression_value (x);
+  pw_expression_close (x);
+  return status;
 }

@@ -50,6 +50,9 @@ char *pw_format (char buffer[32], double value, int digits);
 /* Reads a number that fills the whole text, nan and inf included; PW_INPUT otherwise, and *value stays. */
 int pw_read_number (const char *text, double *value);
 
+/* The same, and expressions of numbers as in text models: "30*deg", "2*pi/3". */
+int pw_read_expression (const char *text, double *value);
+
 /* ---- Files that are whole or carry another name ---- */
 
 /* A file written as NAME.part and renamed when complete; "-" is standard output.  What exists and is no regular file

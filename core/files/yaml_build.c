@@ -148,6 +148,17 @@ static int build_says (const char *text, const char *word) {
   return at != NULL && (at == text || strchr (" (", at[-1]));
 }
 
+/* The kind that stands further back in an element, as a key or as {kind: wheel, ...}; NULL if there is none. */
+static const char *build_later_kind (const pw_node *first) {
+  for (const pw_node *n = first; n; n = n->next->next) {
+    int named = n->type == PW_YAML_SCALAR && (strcmp (n->text, "kind") == 0 || strcmp (n->text, "type") == 0);
+    const pw_node *said = named ? n->next : n;
+    for (const pw_kind *const *k = pw_kinds; *k && said->type == PW_YAML_SCALAR; k++)
+      if (strcmp ((*k)->name, said->text) == 0) return (*k)->name;
+  }
+  return NULL;
+}
+
 static const pw_kind *build_kind (const pw_yaml_builder *b, const pw_node *node, pw_error *error) {
   char hint[100];
   const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
@@ -159,6 +170,11 @@ static const pw_kind *build_kind (const pw_yaml_builder *b, const pw_node *node,
   for (const pw_kind *const *k = pw_kinds; *k; k++) {
     if (strcmp ((*k)->name, first->text) == 0) return *k;
     pw_nearest_try (&near, (*k)->name);
+  }
+  const char *kind = build_later_kind (first);
+  if (kind) {
+    pw_yaml_fail (b->y, first->at, error, "an element begins with its kind: write {%s: NAME, ...}", kind);
+    return NULL;
   }
   for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
     if (build_says ((*k)->about, first->text)) near.best = (*k)->name, near.near = 1;

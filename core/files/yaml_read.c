@@ -12,9 +12,21 @@ static int read_empty (const pw_node *n) {
 
 /* ---- Maps ---- */
 
+/* A key that is more than a name: what may have been meant, or "". */
+static const char *read_slip (const char *text, const char *const *key) {
+  for (int i = 0; key[i]; i++) {
+    size_t n = strlen (key[i]);
+    if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
+    if (strncmp (text, key[i], n) == 0 && text[n] == ' ') return "; a colon goes after the key";
+  }
+  if (strspn (text, "0123456789") == strlen (text)) return "; decimals are written with a point";
+  if (strpbrk (text, "()*/^")) return "; an expression with commas goes between double quotes";
+  return "";
+}
+
 static int read_key (const pw_yaml *y, const pw_node *node, const char *const *key, const char *what,
                      const pw_node **value, pw_error *error) {
-  char hint[100];
+  char hint[120];
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (y, node->at, error, "expected a key of %s, found %s", what, pw_yaml_found (node));
   pw_nearest near = { .sought = node->text };
@@ -26,8 +38,9 @@ static int read_key (const pw_yaml *y, const pw_node *node, const char *const *k
     value[i] = node->next;
     return PW_OK;
   }
+  const char *slip = read_slip (node->text, key);
   return pw_yaml_fail (y, node->at, error, "%s has no \"%.60s\"%s", what, node->text,
-                       pw_nearest_text (&near, hint, sizeof hint));
+                       *slip ? slip : pw_nearest_text (&near, hint, sizeof hint));
 }
 
 /* "{x: .., y: ..}" */

@@ -300,7 +300,8 @@ static int signal_map (pw_yaml_builder *b, const pw_kind *kind, const char *what
     if (v[i] && i >= SIGNAL_FORMS) form = i;
   }
   if (given != 1)
-    return pw_yaml_fail (b->y, node->at, error, "%s: expected one of %s", what, signal_list (key, list, sizeof list));
+    return pw_yaml_fail (b->y, node->at, error, "%s: expected one of %s; found %s", what,
+                         signal_list (key, list, sizeof list), given ? "several" : "none");
   if (!v[SIGNAL_EXPRESSION] && (v[SIGNAL_RATE] || v[SIGNAL_ACCELERATION]))
     return pw_yaml_fail (b->y, node->at, error, "%s: a rate or acceleration belongs to an expression", what);
   if (v[SIGNAL_CONSTANT])
