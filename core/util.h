@@ -13,7 +13,7 @@ typedef struct {
   size_t distance, length; /* of the best from the name sought, and of the longer of the two */
   int near;                /* 1: the best may well be what was meant */
   int crowded;             /* 1: there are more than all holds */
-  char all[100];           /* the valid names, while there is room for them */
+  char all[88];            /* the valid names, while there is room for them */
 } pw_nearest;
 void pw_nearest_try (pw_nearest *n, const char *candidate);
 /* "; did you mean \"steer\"?", "; valid are x, y, z" if none of a few is near, "" if none of many is, written to the buffer,

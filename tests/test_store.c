@@ -104,8 +104,9 @@ static void store_hint (const char *sought, const char *const *candidates, const
 static void test_nearest_text (void **state) {
   (void)state;
   static const char *const names[] = { "frame", "steer", "ground", NULL };
-  static const char *const many[] = { "tractor",   "locomotive",  "dining-car",  "sleeping-car",
-                                      "couchette", "luggage-van", "snow-plough", NULL };
+  static const char *const many[] = { "tractor",      "locomotive", "dining-car",
+                                      "sleeping-car", "couchette",  "luggage-van",
+                                      "snow-plough",  "tender",     NULL };
   store_hint ("ster", names, "; did you mean \"steer\"?");
   store_hint ("st", names, "; did you mean \"steer\"?");
   store_hint ("rame.x", names, "; did you mean \"frame\"?");

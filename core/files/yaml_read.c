@@ -26,7 +26,7 @@ static const char *read_slip (const char *text, const char *const *key) {
 
 static int read_key (const pw_yaml *y, const pw_node *node, const char *const *key, const char *what,
                      const pw_node **value, pw_error *error) {
-  char hint[120];
+  char hint[100];
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (y, node->at, error, "expected a key of %s, found %s", what, pw_yaml_found (node));
   pw_nearest near = { .sought = node->text };
