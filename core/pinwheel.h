@@ -61,7 +61,8 @@ enum { PW_ENDS_FREE, PW_ENDS_REST };
 
 /* A signal computed by the caller.  `eval` stores the value and, if the signal serves a constraint, its first and
  * second time derivative in value[0..2]; x holds the states named in `reads`, in that order, and gradient (NULL
- * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run. */
+ * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run.  For the same t and x it must give the
+ * same values, but for changes between steps that pw_restart follows (a torque that a controller of yours sets anew). */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint as it is */

@@ -297,7 +297,8 @@ static int run_energy (pw_run *r, double *energy, pw_error *error) {
   return PW_OK;
 }
 
-/* What the caller changes of the energy is not the method's: it counts as energy at the start. */
+/* What the caller changes of the energy is not the method's: it counts as energy at the start.  Functions of the caller's
+ * may give other values, and other breakpoints, than before. */
 int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   int n = r->s->coords;
   double before = 0, after = 0;
@@ -305,6 +306,8 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (run_check_state (r, q, 0, error) != PW_OK || run_check_state (r, v, 1, error) != PW_OK) return PW_INPUT;
   int status = run_energy (r, &before, error);
   if (status != PW_OK) return status;
+  r->s->t_signal = NAN;
+  r->breakpoint = pw_next_breakpoint (r->s, r->t);
   run_exchange (r->q, r->q_at, q, n);
   run_exchange (r->v, r->v_at, v, n);
   status = pw_make_consistent (r, NULL, error);

@@ -296,11 +296,51 @@ static void test_restart_kick (void **state) {
   pw_free (s);
 }
 
+/* ---- A torque that the caller sets anew between steps, as a controller does ---- */
+
+static int runs_held (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)t, (void)x, (void)gradient;
+  value[0] = *(double *)context;
+  return 0;
+}
+
+static double runs_controlled (const char *method, double step) {
+  pw_error error = { 0 };
+  double u = 0;
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = runs_held, .context = &u } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-12, .span = 2 });
+  for (int k = 0; k < 20; k++) {
+    u = 0.1 * cos (0.4 * k);
+    check_ok (pw_restart (r, NULL, NULL, &error), &error);
+    check_ok (pw_advance_to (r, 0.1 * (k + 1), 0.1 * (k + 1), &error), &error);
+  }
+  double phi = runs_to (r, pw_time (r)).q[2];
+  pw_close (r);
+  pw_free (s);
+  return phi;
+}
+
+/* Behind a restart a function's new value counts at once: the method keeps its order. */
+static void test_restart_controlled (void **state) {
+  static const char *const method[] = { "rk4+projection", "galpha+ggl", "leapfrog" };
+  static const double order[] = { 4, 2, 2 };
+  (void)state;
+  double truth = runs_controlled ("erk8+projection", 0);
+  for (int i = 0; i < 3; i++) {
+    double coarse = runs_controlled (method[i], 0.02) - truth, fine = runs_controlled (method[i], 0.01) - truth;
+    check_close (method[i], log2 (coarse / fine), order[i], 0.3, "order over one halving");
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_signal_fails),
     cmocka_unit_test (test_restart_refused),
     cmocka_unit_test (test_restart_kick),
+    cmocka_unit_test (test_restart_controlled),
     cmocka_unit_test (test_signal_fails_at_once),
     cmocka_unit_test (test_too_large_a_step),
     cmocka_unit_test (test_massless),
