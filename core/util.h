@@ -20,6 +20,17 @@ void pw_nearest_try (pw_nearest *n, const char *candidate);
  * which is returned. */
 char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size);
 
+/* ---- Texts (characters.c); they end with a 0 ---- */
+
+/* The bytes of the UTF-8 character that a text begins with; 0 if it begins with none. */
+int pw_utf8_size (const char *text);
+/* The code of the control character that a text begins with, line ends and tabs excepted; 0 if it begins with none. */
+int pw_control (const char *text);
+/* 1 if a text is UTF-8 without control characters. */
+int pw_is_text (const char *text);
+/* Makes it so: what is not becomes question marks. */
+void pw_make_text (char *text);
+
 /* Open-addressing table from names to numbers >= 0; it keeps the pointers, not copies. */
 typedef struct {
   size_t size; /* a power of two */

@@ -2,16 +2,20 @@
 #include <math.h>
 #include "check.h"
 #include "system.h"
+#include "util.h"
 
+/* Bytes that are no UTF-8 become U+FFFD, the replacement character. */
 static void json_text (FILE *f, const char *text) {
   fputc ('"', f);
-  for (; *text; text++)
+  for (int n; *text; text += n ? n : 1) {
+    n = pw_utf8_size (text);
     if (*text == '"' || *text == '\\')
       fprintf (f, "\\%c", *text);
     else if ((unsigned char)*text < ' ')
       fprintf (f, "\\u%04x", (unsigned)*text);
     else
-      fputc (*text, f);
+      fwrite (n ? text : "\xEF\xBF\xBD", 1, (size_t)(n ? n : 3), f);
+  }
   fputc ('"', f);
 }
 

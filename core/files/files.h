@@ -59,13 +59,10 @@ const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
 int pw_columns_read (FILE *f, const char *shown, const char *const column[2], pw_arena *arena, double *value[2],
                      int *count, pw_error *error);
 
-/* ---- Texts (slurp.c, json.c) ---- */
+/* ---- Texts (slurp.c) ---- */
 
 /* Reads the rest of a file of at most so many bytes into *text, malloced and ended by a NUL; free it in every case. */
 int pw_slurp (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error);
-
-/* The bytes of the UTF-8 character at p, in a text ended by a NUL; 0 if there is none. */
-int pw_utf8_size (const unsigned char *p);
 
 /* ---- Outputs (output.c) ---- */
 

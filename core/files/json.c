@@ -18,24 +18,12 @@ typedef struct {
 
 /* ---- Scalars ---- */
 
-int pw_utf8_size (const unsigned char *p) {
-  static const unsigned least[] = { 0, 0x80, 0x800, 0x10000 };
-  int more = p[0] < 0x80 ? 0 : p[0] >> 5 == 6 ? 1 : p[0] >> 4 == 14 ? 2 : p[0] >> 3 == 30 ? 3 : -1;
-  if (more < 0) return 0;
-  unsigned c = more ? p[0] & (0x3Fu >> more) : p[0];
-  for (int i = 1; i <= more; i++) {
-    if (p[i] >> 6 != 2) return 0;
-    c = c << 6 | (p[i] & 0x3Fu);
-  }
-  return c < least[more] || c > 0x10FFFF || (c >= 0xD800 && c < 0xE000) ? 0 : more + 1;
-}
-
 /* A malloced copy in which bytes that are no UTF-8 have become U+FFFD, the replacement character. */
 static char *json_clean (const char *text) {
   char *clean = malloc (3 * strlen (text) + 1), *to = clean;
   if (clean == NULL) return NULL;
   while (*text) {
-    int n = pw_utf8_size ((const unsigned char *)text);
+    int n = pw_utf8_size (text);
     memcpy (to, n ? text : "\xEF\xBF\xBD", (size_t)(n ? n : 3));
     to += n ? n : 3;
     text += n ? n : 1;

@@ -17,6 +17,19 @@ struct pw_file {
 
 /* ---- Loading ---- */
 
+/* What is shown of a model does not touch the terminal, and is UTF-8 in summaries. */
+static int plugin_texts (const pw_file *f, pw_error *error) {
+  const pw_plugin_table *t = f->table;
+  if (t->about && !pw_is_text (t->about))
+    return pw_fail (error, PW_INPUT, "%s: .about is no text: expected UTF-8 without control characters", f->path);
+  for (const pw_parameter *p = t->parameters; p && p->name; p++)
+    if (!pw_is_text (p->name) || (p->unit && !pw_is_text (p->unit)) || (p->about && !pw_is_text (p->about)))
+      return pw_fail (error, PW_INPUT,
+                      "%s: name, unit or meaning of parameter %s is no text: expected UTF-8 without control characters",
+                      f->path, p->name);
+  return PW_OK;
+}
+
 static int plugin_check (const pw_file *f, pw_error *error) {
   const pw_plugin_table *t = f->table;
   if (t->abi != PW_ABI || t->size != sizeof *t)
@@ -24,7 +37,7 @@ static int plugin_check (const pw_file *f, pw_error *error) {
                     f->path, t->abi, (unsigned)PW_ABI);
   if (t->build == NULL)
     return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", f->path);
-  return pw_check_parameters ("", f->path, t, error);
+  return plugin_texts (f, error) == PW_OK ? pw_check_parameters ("", f->path, t, error) : error->status;
 }
 
 /* dlerror repeats the path in front of its reason. */
@@ -72,6 +85,8 @@ static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   base = base ? base + 1 : f->path;
   int ending = plugin_ending (base);
   if (ending == PLUGIN_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
+  if (!pw_is_text (base))
+    return pw_fail (error, PW_INPUT, "%s: the name of a model file is UTF-8 without control characters", f->path);
   f->name = strdup (base);
   if (f->name == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   f->name[strlen (base) - strlen (plugin_endings[ending])] = 0;

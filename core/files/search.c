@@ -76,7 +76,7 @@ static int search_keep (pw_search *s, const char *name, size_t length, const cha
 
 static int search_entry (pw_search *s, const char *folder, const char *entry, pw_error *error) {
   const char *ending = pw_ends_in (entry, ".so") ? ".so" : pw_ends_in (entry, ".yaml") ? ".yaml" : NULL;
-  if (ending == NULL || entry[0] == '.') return PW_OK;
+  if (ending == NULL || entry[0] == '.' || !pw_is_text (entry)) return PW_OK;
   char *path = pw_join (folder, entry, "");
   if (path == NULL) return search_no_memory (error);
   char *real = realpath (path, NULL);

@@ -39,7 +39,7 @@ static void source_window (const pw_yaml *y, size_t at, const char **begin, cons
 /* What is no text is shown as ? and a blank. */
 static void source_clean (char *text) {
   for (int n; *text; text += n) {
-    n = pw_utf8_size ((unsigned char *)text);
+    n = pw_utf8_size (text);
     if (n == 0 || (unsigned char)*text < ' ') *text = n ? ' ' : '?';
     if (n == 0) n = 1;
   }
@@ -69,15 +69,15 @@ int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
 /* ---- What is no text ---- */
 
 static int source_check (const pw_yaml *y, pw_error *error) {
-  const unsigned char *begin = (const unsigned char *)y->source, *p = begin, *end = begin + y->size;
+  const char *begin = y->source, *p = begin, *end = begin + y->size;
   while (p < end) {
     size_t at = (size_t)(p - begin);
     int n = pw_utf8_size (p);
-    if (n == 0) return pw_yaml_fail (y, at, error, "byte %02X is no UTF-8; a model file is text in UTF-8", *p);
-    if ((*p < ' ' && *p != '\t' && *p != '\n' && !(*p == '\r' && p[1] == '\n')) || *p == 0x7F ||
-        (*p == 0xC2 && p[1] < 0xA0))
+    if (n == 0)
+      return pw_yaml_fail (y, at, error, "byte %02X is no UTF-8; a model file is text in UTF-8", (unsigned char)*p);
+    if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
       return pw_yaml_fail (y, at, error, "a control character, code %d, does not belong in a model file",
-                           n == 1 ? *p : p[1]);
+                           pw_control (p));
     if (*p == '%' && (at == 0 || p[-1] == '\n'))
       return pw_yaml_fail (y, at, error, "a line of a model file must not begin with %%");
     p += n;

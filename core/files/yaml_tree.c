@@ -72,6 +72,10 @@ static int tree_scalar (tree *x, struct fy_event *e, pw_error *error) {
   if (memchr (text, 0, (size_t)size))
     return pw_yaml_fail (x->y, n->at, error, "a text must not contain the character 0");
   text[size] = 0;
+  for (const char *p = text; *p; p++) /* escapes can make them */
+    if (pw_control (p))
+      return pw_yaml_fail (x->y, n->at, error, "a text must not contain the control character of code %d",
+                           pw_control (p));
   n->text = text;
   n->quoted = quoted || (token && fy_token_scalar_style (token) != FYSS_PLAIN);
   return PW_OK;
@@ -135,7 +139,7 @@ static int tree_take (tree *x, struct fy_event *e, pw_error *error) {
 static size_t tree_offset (const pw_yaml *y, int line, int column) {
   const char *p = y->source, *end = p + y->size;
   for (; line > 1 && p < end; p++) line -= *p == '\n';
-  for (; column > 1 && p < end && *p != '\n'; column--) p += pw_utf8_size ((const unsigned char *)p);
+  for (; column > 1 && p < end && *p != '\n'; column--) p += pw_utf8_size (p);
   return (size_t)(p - y->source);
 }
 

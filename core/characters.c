@@ -1,0 +1,37 @@
+/* Characters of texts that come from outside: UTF-8, and none that move a terminal's cursor or colour its lines. */
+#include <string.h>
+#include "util.h"
+
+int pw_utf8_size (const char *text) {
+  static const unsigned least[] = { 0, 0x80, 0x800, 0x10000 };
+  const unsigned char *p = (const unsigned char *)text;
+  int more = p[0] < 0x80 ? 0 : p[0] >> 5 == 6 ? 1 : p[0] >> 4 == 14 ? 2 : p[0] >> 3 == 30 ? 3 : -1;
+  if (more < 0) return 0;
+  unsigned c = more ? p[0] & (0x3Fu >> more) : p[0];
+  for (int i = 1; i <= more; i++) {
+    if (p[i] >> 6 != 2) return 0;
+    c = c << 6 | (p[i] & 0x3Fu);
+  }
+  return c < least[more] || c > 0x10FFFF || (c >= 0xD800 && c < 0xE000) ? 0 : more + 1;
+}
+
+int pw_control (const char *text) {
+  const unsigned char *p = (const unsigned char *)text;
+  if (p[0] == '\n' || p[0] == '\t') return 0;
+  return p[0] < ' ' || p[0] == 0x7F ? p[0] : p[0] == 0xC2 && p[1] >= 0x80 && p[1] < 0xA0 ? p[1] : 0;
+}
+
+int pw_is_text (const char *text) {
+  for (int n; *text; text += n)
+    if ((n = pw_utf8_size (text)) == 0 || pw_control (text)) return 0;
+  return 1;
+}
+
+void pw_make_text (char *text) {
+  for (int n; *text; text += n) {
+    n = pw_utf8_size (text);
+    int bad = n == 0 || pw_control (text);
+    if (n == 0) n = 1;
+    if (bad) memset (text, '?', (size_t)n);
+  }
+}

@@ -1,0 +1,109 @@
+/* Texts from outside that are none: they reach neither the terminal nor a summary as they are. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+#include "pinwheel-files.h"
+#include "util.h"
+
+/* Characters of one to four bytes with their neighbours that are too long, too high, surrogates, or cut off. */
+static void test_characters (void **state) {
+  static const struct {
+    const char *text;
+    int size;
+  } each[] = {
+    { "a", 1 },
+    { "\x7f", 1 },
+    { "\x80", 0 },
+    { "\xC2\x80", 2 },
+    { "\xC1\xBF", 0 }, /* could be shorter */
+    { "\xC3", 0 },
+    { "\xE2\x82\xAC", 3 },
+    { "\xE0\x9F\xBF", 0 },
+    { "\xED\xA0\x80", 0 }, /* a surrogate */
+    { "\xE2\x82", 0 },
+    { "\xF0\x9F\x9B\xB4", 4 },
+    { "\xF0\x8F\xBF\xBF", 0 },
+    { "\xF4\x90\x80\x80", 0 }, /* beyond U+10FFFF */
+    { "\xFF", 0 },
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof each / sizeof *each; i++) assert_int_equal (pw_utf8_size (each[i].text), each[i].size);
+}
+
+static void test_controls (void **state) {
+  char text[] = "a\033[31m\n\tb\377\177\302\233\303\266";
+  (void)state;
+  assert_int_equal (pw_is_text ("a line\n\tand another: \303\266"), 1);
+  assert_int_equal (pw_is_text (text), 0);
+  pw_make_text (text);
+  assert_string_equal (text, "a?[31m\n\tb????\303\266");
+  assert_int_equal (pw_is_text (text), 1);
+}
+
+/* A message repeats what was found. */
+static void test_message (void **state) {
+  pw_error error = { 0 };
+  (void)state;
+  pw_fail (&error, PW_INPUT, "there is no \"%s\"", "\033]0;title\007\xff");
+  check_error (&error, PW_INPUT, "there is no \"?]0;title??\"");
+}
+
+/* Escaped where JSON can, replaced where it cannot. */
+static void test_summary (void **state) {
+  pw_error error = { 0 };
+  pw_summary summary = { .model = "a\033\xff\"\\\n", .method = "1", .status = "ok", .reason = "\xC3" };
+  char path[300];
+  (void)state;
+  cli_expand ("@/a.json", path, sizeof path);
+  pw_output *o = pw_output_open (path, &error);
+  check_ok (pw_json_write (&summary, NULL, NULL, 0, NULL, o, &error), &error);
+  check_ok (pw_output_finish (o, &error), &error);
+  const char *text = cli_file ("a.json");
+  assert_non_null (strstr (text, "\"model\": \"a\\u001B\xEF\xBF\xBD\\\"\\\\\\n\""));
+  assert_non_null (strstr (text, "\"method\": \"1\""));
+  assert_non_null (strstr (text, "\"reason\": \"\xEF\xBF\xBD\""));
+}
+
+/* A model in C whose table says so about itself, its parameter and its body. */
+static void texts_model (const char *about, const char *unit, const char *body, const char *message) {
+  char text[700];
+  snprintf (text, sizeof text,
+            "#include <pinwheel.h>\n"
+            "typedef struct { double a; } P;\n"
+            "static const pw_parameter p[] = { { PW_AT (P, a), .unit = \"%s\" }, { .name = NULL } };\n"
+            "static void build (pw_model *m, const void *p) {\n"
+            "  (void)p;\n"
+            "  pw_add_body (m, &(pw_body){ .name = \"%s\", .mass = 1, .inertia = 1 });\n"
+            "}\n"
+            "PW_MODEL (.about = \"%s\", .parameters = p, .parameters_size = sizeof (P), .build = build);\n",
+            unit, body, about);
+  cli_write ("own.c", text);
+  cli_bad ("pinwheel show @/own.c", 2, message);
+}
+
+static void test_model (void **state) {
+  (void)state;
+  texts_model ("\\033[31m", "m", "a", "@/own.c: .about is no text: expected UTF-8 without control characters");
+  texts_model ("good", "\\377", "a",
+               "@/own.c: name, unit or meaning of parameter a is no text: expected UTF-8 without control characters");
+  texts_model ("good", "m", "a\\033[31m", "model own: body \"a?[31m\": a name is made of letters, digits, _ and -");
+}
+
+static void test_file_name (void **state) {
+  (void)state;
+  cli_good ("cp tests/models/arm.yaml \"$(printf '@/a\\033[31m.yaml')\"");
+  cli_bad ("pinwheel show \"$(printf '@/a\\033[31m.yaml')\"", 2,
+           "@/a?[31m.yaml: the name of a model file is UTF-8 without control characters");
+  cli_good ("PINWHEEL_MODELS=@ pinwheel list models | tr -d '\\n' | LC_ALL=C tr -d ' -~' | wc -c");
+  assert_string_equal (cli_out, "0\n");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_characters), cmocka_unit_test (test_controls), cmocka_unit_test (test_message),
+    cmocka_unit_test (test_summary),    cmocka_unit_test (test_model),    cmocka_unit_test (test_file_name),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
