@@ -5,6 +5,7 @@
 #include "compare.h"
 #include "plot.h"
 #include "stop.h"
+#include "text.h"
 
 /* ---- Before it begins ---- */
 
@@ -133,18 +134,9 @@ static int compare_run (pw_compare *x, pw_error *error) {
 
 /* ---- After it ---- */
 
-/* What there is of a table that is not whole keeps its ending .part; without a row it is removed. */
-static void compare_keep_part (pw_compare *x, char *part, size_t size) {
-  if (x->csv && pw_output_abandon (x->csv, part, size) && x->rows == 0) {
-    remove (part);
-    *part = 0;
-  }
-  x->csv = NULL;
-}
-
 static int compare_interrupted (pw_compare *x) {
   char part[PLOT_PATH + 16] = "";
-  compare_keep_part (x, part, sizeof part);
+  if (x->csv) pw_text_abandon (x->csv, x->rows, part, sizeof part);
   if (x->rows == 0)
     fputs ("pinwheel: interrupted before the first row was done\n", stderr);
   else
@@ -158,7 +150,7 @@ static int compare_finish (pw_compare *x, int status, pw_error *error) {
   if (status == PW_RETRY && pw_stop) return compare_interrupted (x);
   if (x->csv == NULL) return status;
   if (status != PW_OK) {
-    compare_keep_part (x, (char[PLOT_PATH + 16]){ 0 }, PLOT_PATH + 16);
+    pw_text_abandon (x->csv, x->rows, (char[PLOT_PATH + 16]){ 0 }, PLOT_PATH + 16);
     return status;
   }
   pw_output *csv = x->csv;

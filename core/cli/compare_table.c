@@ -160,7 +160,5 @@ int pw_compare_csv_truth (const pw_compare *x, pw_error *error) {
       pw_text_number (&t, i < 0 ? x->truth.uncertainty[k] : x->truth.partner[i].error[k]);
     status = pw_text_line (&t, f, x->folder, error);
   }
-  if (status == PW_OK) return pw_output_finish (o, error);
-  pw_output_discard (o);
-  return status;
+  return pw_text_end (o, status, error);
 }

@@ -5,6 +5,7 @@
 #include "drift.h"
 #include "plot.h"
 #include "stop.h"
+#include "text.h"
 
 /* ---- Before it begins ---- */
 
@@ -95,11 +96,9 @@ static int drift_rows (pw_drift *x, pw_error *error) {
 
 static int drift_interrupted (pw_drift *x) {
   char part[PLOT_PATH + 16] = "";
-  if (x->csv) pw_output_abandon (x->csv, part, sizeof part);
-  x->csv = NULL;
-  if (x->done == 0 && *part) remove (part);
+  if (x->csv) pw_text_abandon (x->csv, x->done, part, sizeof part);
   fprintf (stderr, "pinwheel: interrupted; %d of %d runs are done%s%s\n", x->done, x->rows,
-           *part && x->done ? ", and kept in " : "", x->done ? part : "");
+           *part ? ", and kept in " : "", part);
   return PW_INTERRUPTED;
 }
 
@@ -110,8 +109,7 @@ static int drift_finish (pw_drift *x, int status, pw_error *error) {
   pw_output *csv = x->csv;
   x->csv = NULL;
   if (status != PW_OK) {
-    char part[PLOT_PATH + 16];
-    if (pw_output_abandon (csv, part, sizeof part) && x->done == 0) remove (part);
+    pw_text_abandon (csv, x->done, (char[PLOT_PATH + 16]){ 0 }, PLOT_PATH + 16);
     return status;
   }
   status = pw_output_finish (csv, error);

@@ -107,8 +107,5 @@ int pw_drift_csv_time (const pw_drift *x, pw_error *error) {
   snprintf (path, sizeof path, "%s/drift-time.csv", x->folder);
   pw_output *o = pw_output_open (path, error);
   if (o == NULL) return error->status;
-  int status = table_times (x, pw_output_stream (o), error);
-  if (status == PW_OK) return pw_output_finish (o, error);
-  pw_output_abandon (o, path, sizeof path);
-  return status;
+  return pw_text_end (o, table_times (x, pw_output_stream (o), error), error);
 }

@@ -168,10 +168,8 @@ static void run_finish_table (run *x, int good, pw_error *error) {
   if (x->csv_output == NULL) return;
   if (good)
     pw_output_finish (x->csv_output, error);
-  else if (pw_output_abandon (x->csv_output, x->part, sizeof x->part) && x->row == 0 && !x->check.resume) {
-    remove (x->part);
-    *x->part = 0;
-  }
+  else
+    pw_text_abandon (x->csv_output, x->check.resume ? 1 : x->row, x->part, sizeof x->part);
 }
 
 /* The JSON summary, which is written however the run has ended.  A run that could not be resumed leaves the one before it

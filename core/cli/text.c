@@ -76,3 +76,16 @@ int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error) {
   if (failed) return pw_fail (error, PW_MACHINE, "out of memory");
   return bad ? pw_fail (error, PW_MACHINE, "cannot write into %s: %s", folder, strerror (errno)) : PW_OK;
 }
+
+void pw_text_abandon (pw_output *o, long rows, char *part, size_t size) {
+  if (pw_output_abandon (o, part, size) == NULL || rows > 0) return;
+  remove (part);
+  *part = 0;
+}
+
+int pw_text_end (pw_output *o, int status, pw_error *error) {
+  char part[8];
+  if (status == PW_OK) return pw_output_finish (o, error);
+  pw_output_abandon (o, part, sizeof part);
+  return status;
+}

@@ -3,7 +3,7 @@
 #define PW_TEXT_H
 
 #include <stdio.h>
-#include "pinwheel.h"
+#include "pinwheel-files.h"
 
 typedef struct {
   char *at; /* ended by a 0, NULL at first */
@@ -24,5 +24,11 @@ void pw_text_name (pw_text *t, const char *name, const char *unit);
 void pw_text_quoted (pw_text *t, const char *text);
 /* Ends the line, writes it to a file of the folder, and frees it.  PW_OK or PW_MACHINE. */
 int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
+
+/* Ends a table that is not whole: what there is of it stays, as NAME.part, whose path goes to the buffer; without a row there
+ * is nothing to keep, and the path is "". */
+void pw_text_abandon (pw_output *o, long rows, char *part, size_t size);
+/* Ends a table that was written in one go, with the status of that: whole, or else NAME.part.  Returns a status. */
+int pw_text_end (pw_output *o, int status, pw_error *error);
 
 #endif

@@ -1,0 +1,217 @@
+/* The layout of what a plug-in and Pinwheel hand to each other, written down for one number of the ABI: who changes it
+ * raises PW_ABI (once 0.1.0 is out) and writes down the new one here, so that a plug-in compiled before is refused. */
+#include <assert.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+
+#if PW_ABI == 1 && defined __LP64__
+
+#define LAYOUT(type, bytes) static_assert (sizeof (type) == bytes, #type " has changed: see the top of this file")
+#define LAYOUT_AT(type, member, at) \
+  static_assert (offsetof (type, member) == at, #type " has changed: see the top of this file")
+#define LAYOUT_VALUE(constant, value) \
+  static_assert (constant == value, #constant " has changed: see the top of this file")
+
+LAYOUT (pw_error, 504);
+LAYOUT (pw_function, 56);
+LAYOUT (pw_signal, 64);
+LAYOUT (pw_body, 72);
+LAYOUT (pw_parameter, 48);
+LAYOUT (pw_run_defaults, 32);
+LAYOUT (pw_plugin_table, 88);
+LAYOUT (pw_field, 56);
+LAYOUT (pw_quantity, 32);
+LAYOUT (pw_own, 24);
+LAYOUT (pw_pose, 64);
+LAYOUT (pw_batch, 72);
+LAYOUT (pw_kind, 256);
+
+LAYOUT_AT (pw_error, text, 4);
+LAYOUT_AT (pw_signal, constant, 8);
+LAYOUT_AT (pw_function, context, 8);
+LAYOUT_AT (pw_function, reads, 16);
+LAYOUT_AT (pw_function, breakpoint, 24);
+LAYOUT_AT (pw_function, open, 32);
+LAYOUT_AT (pw_function, close, 40);
+LAYOUT_AT (pw_function, differenced, 48);
+LAYOUT_AT (pw_body, mass, 8);
+LAYOUT_AT (pw_body, inertia, 16);
+LAYOUT_AT (pw_body, start, 24);
+LAYOUT_AT (pw_body, rate, 48);
+LAYOUT_AT (pw_parameter, offset, 8);
+LAYOUT_AT (pw_parameter, value, 16);
+LAYOUT_AT (pw_parameter, unit, 24);
+LAYOUT_AT (pw_parameter, about, 32);
+LAYOUT_AT (pw_parameter, domain, 40);
+LAYOUT_AT (pw_run_defaults, step, 8);
+LAYOUT_AT (pw_run_defaults, rtol, 16);
+LAYOUT_AT (pw_run_defaults, method, 24);
+LAYOUT_AT (pw_plugin_table, size, 8);
+LAYOUT_AT (pw_plugin_table, about, 16);
+LAYOUT_AT (pw_plugin_table, parameters, 24);
+LAYOUT_AT (pw_plugin_table, parameters_size, 32);
+LAYOUT_AT (pw_plugin_table, run, 40);
+LAYOUT_AT (pw_plugin_table, build, 72);
+LAYOUT_AT (pw_plugin_table, truth, 80);
+LAYOUT_AT (pw_field, offset, 8);
+LAYOUT_AT (pw_field, type, 16);
+LAYOUT_AT (pw_field, count, 20);
+LAYOUT_AT (pw_field, unit, 24);
+LAYOUT_AT (pw_field, required, 32);
+LAYOUT_AT (pw_field, domain, 36);
+LAYOUT_AT (pw_field, choices, 40);
+LAYOUT_AT (pw_field, about, 48);
+LAYOUT_AT (pw_quantity, unit, 8);
+LAYOUT_AT (pw_quantity, rate, 16);
+LAYOUT_AT (pw_quantity, about, 24);
+LAYOUT_AT (pw_own, start, 8);
+LAYOUT_AT (pw_own, rate, 16);
+LAYOUT_AT (pw_pose, phi, 16);
+LAYOUT_AT (pw_pose, cos, 24);
+LAYOUT_AT (pw_pose, sin, 32);
+LAYOUT_AT (pw_pose, vx, 40);
+LAYOUT_AT (pw_pose, omega, 56);
+LAYOUT_AT (pw_batch, cols, 4);
+LAYOUT_AT (pw_batch, element, 8);
+LAYOUT_AT (pw_batch, body, 16);
+LAYOUT_AT (pw_batch, pose, 24);
+LAYOUT_AT (pw_batch, q, 32);
+LAYOUT_AT (pw_batch, v, 40);
+LAYOUT_AT (pw_batch, u, 48);
+LAYOUT_AT (pw_batch, w, 56);
+LAYOUT_AT (pw_batch, lambda, 64);
+LAYOUT_AT (pw_kind, about, 8);
+LAYOUT_AT (pw_kind, definition, 16);
+LAYOUT_AT (pw_kind, element, 24);
+LAYOUT_AT (pw_kind, fields, 32);
+LAYOUT_AT (pw_kind, bodies, 40);
+LAYOUT_AT (pw_kind, own, 44);
+LAYOUT_AT (pw_kind, rows, 48);
+LAYOUT_AT (pw_kind, signals, 52);
+LAYOUT_AT (pw_kind, each_body, 56);
+LAYOUT_AT (pw_kind, constant, 60);
+LAYOUT_AT (pw_kind, unit, 64);
+LAYOUT_AT (pw_kind, level, 68);
+LAYOUT_AT (pw_kind, reaction, 72);
+LAYOUT_AT (pw_kind, coordinate, 80);
+LAYOUT_AT (pw_kind, reaction_unit, 88);
+LAYOUT_AT (pw_kind, prepare, 96);
+LAYOUT_AT (pw_kind, g, 104);
+LAYOUT_AT (pw_kind, g_size, 112);
+LAYOUT_AT (pw_kind, eta, 120);
+LAYOUT_AT (pw_kind, J, 128);
+LAYOUT_AT (pw_kind, gamma, 136);
+LAYOUT_AT (pw_kind, J_gamma, 144);
+LAYOUT_AT (pw_kind, force, 152);
+LAYOUT_AT (pw_kind, force_u, 160);
+LAYOUT_AT (pw_kind, jw_q, 168);
+LAYOUT_AT (pw_kind, jtl_q, 176);
+LAYOUT_AT (pw_kind, eta_q, 184);
+LAYOUT_AT (pw_kind, gamma_q, 192);
+LAYOUT_AT (pw_kind, gamma_v, 200);
+LAYOUT_AT (pw_kind, force_q, 208);
+LAYOUT_AT (pw_kind, force_v, 216);
+LAYOUT_AT (pw_kind, energy, 224);
+LAYOUT_AT (pw_kind, power, 232);
+LAYOUT_AT (pw_kind, loss, 240);
+LAYOUT_AT (pw_kind, contact, 248);
+
+LAYOUT_VALUE (PW_CONSTANT, 0);
+LAYOUT_VALUE (PW_HARMONIC, 1);
+LAYOUT_VALUE (PW_FUNCTION, 2);
+LAYOUT_VALUE (PW_RAMP, 3);
+LAYOUT_VALUE (PW_SMOOTH_STEP, 4);
+LAYOUT_VALUE (PW_PULSE, 5);
+LAYOUT_VALUE (PW_TABLE, 6);
+LAYOUT_VALUE (PW_LINEAR, 0);
+LAYOUT_VALUE (PW_CUBIC, 1);
+LAYOUT_VALUE (PW_ENDS_FREE, 0);
+LAYOUT_VALUE (PW_ENDS_REST, 1);
+LAYOUT_VALUE (PW_REAL, 0);
+LAYOUT_VALUE (PW_NONNEGATIVE, 1);
+LAYOUT_VALUE (PW_POSITIVE, 2);
+LAYOUT_VALUE (PW_COUNT, 3);
+LAYOUT_VALUE (PW_FRACTION, 4);
+LAYOUT_VALUE (PW_NUMBER, 0);
+LAYOUT_VALUE (PW_POINT, 1);
+LAYOUT_VALUE (PW_VECTOR, 2);
+LAYOUT_VALUE (PW_BODY, 3);
+LAYOUT_VALUE (PW_SIGNAL, 4);
+LAYOUT_VALUE (PW_CHOICE, 5);
+LAYOUT_VALUE (PW_FORCE, 0);
+LAYOUT_VALUE (PW_HOLONOMIC, 1);
+LAYOUT_VALUE (PW_NONHOLONOMIC, 2);
+LAYOUT_VALUE (PW_OK, 0);
+LAYOUT_VALUE (PW_RETRY, 1);
+LAYOUT_VALUE (PW_MACHINE, -1);
+LAYOUT_VALUE (PW_INPUT, -2);
+LAYOUT_VALUE (PW_START, -3);
+LAYOUT_VALUE (PW_METHOD, -4);
+
+/* FNV-1a (Fowler, Noll, Vo) of what a definition is made of. */
+static unsigned long layout_add (unsigned long sum, const void *bytes, size_t count) {
+  const unsigned char *c = bytes;
+  for (size_t i = 0; i < count; i++) sum = (sum ^ c[i]) * 1099511628211u;
+  return sum;
+}
+
+static unsigned long layout_of (const pw_kind *k) {
+  unsigned long sum = layout_add (14695981039346656037u, &k->definition, sizeof k->definition);
+  for (const pw_field *f = k->fields; f->name; f++) {
+    sum = layout_add (sum, f->name, strlen (f->name));
+    sum = layout_add (sum, &f->offset, sizeof f->offset);
+    sum = layout_add (sum, &f->type, sizeof f->type);
+    sum = layout_add (sum, &f->count, sizeof f->count);
+    for (const char *const *c = f->choices; c && *c; c++) sum = layout_add (sum, *c, strlen (*c) + 1);
+  }
+  return sum;
+}
+
+/* A kind that is new is written down too; it does not change the number. */
+static void test_definitions (void **state) {
+  static const struct {
+    const char *kind;
+    unsigned long layout;
+  } known[] = {
+    { "pin", 0x2e992ed58a0ca1ea },           { "weld", 0x96d837462e580df9 },
+    { "slider", 0x72bb16fc630c9167 },        { "slot", 0x3a0f550a70778644 },
+    { "rod", 0xa1a350acfa57b8de },           { "gear", 0xf8074be7c4f42d05 },
+    { "drive", 0x7d987f91b3a3b54e },         { "wheel", 0xdea3eb50a3ca258c },
+    { "rolling-wheel", 0x144a31a69816bde4 }, { "steered-wheel", 0x2c413b6b8f9c87f0 },
+    { "speed", 0xc6449f5523558de9 },         { "pfaffian", 0x4cb2d7f5922ebd32 },
+    { "tyre", 0xa42b832e02a24eda },          { "rolling-resistance", 0x267227c53db66752 },
+    { "spring", 0x80a9821575f7667f },        { "rotational-spring", 0x3c20ed7f38c90acc },
+    { "friction", 0xebebc50a8771ab1e },      { "sliding-friction", 0x4722a2a44a1119a6 },
+    { "drag", 0x79bea784c473bb98 },          { "gravity", 0xed353e1dda5787ff },
+    { "force", 0xbc29b0bbfe5b6a71 },         { "torque", 0xc52ae040b1e51021 },
+    { "motor", 0x4b2d8f0773cca89 },          { "marker", 0xa45ad3f1c6e75b4a },
+  };
+  (void)state;
+  int bad = 0;
+  for (const pw_kind *const *k = pw_kinds; *k; k++) {
+    size_t i = 0;
+    while (i < sizeof known / sizeof *known && strcmp (known[i].kind, (*k)->name) != 0) i++;
+    if (i < sizeof known / sizeof *known && known[i].layout == layout_of (*k)) continue;
+    print_error ("{ \"%s\", 0x%lx },\n", (*k)->name, layout_of (*k));
+    bad++;
+  }
+  if (bad)
+    print_error ("definitions that have changed, or are new: raise PW_ABI for the former, and write them down\n");
+  assert_int_equal (bad, 0);
+}
+
+#else
+
+static void test_definitions (void **state) {
+  (void)state;
+  print_message ("nothing is written down for ABI %d of this machine\n", PW_ABI);
+  skip ();
+}
+
+#endif
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_definitions) };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
