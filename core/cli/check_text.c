@@ -93,7 +93,7 @@ static void text_start (const pw_check *x) {
     listed++;
   }
   text_more (start->moved - listed);
-  if (x->known) printf ("  compared with the truth of the model, which knows %d states\n", x->known);
+  if (x->known) printf ("  compared with the truth of the model, which knows %d state%s\n", x->known, x->known == 1 ? "" : "s");
 }
 
 /* ---- Kinds ---- */
