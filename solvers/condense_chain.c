@@ -2,10 +2,11 @@
 #include <stdlib.h>
 #include "condense.h"
 
-/* The bodies between a column and the next one: none, one, or more. */
+/* What is between a column and the next one: how much adds to their block of the matrix, bodies and columns eliminated
+ * before, and a body that is alone in that, if it can be in a chain. */
 typedef struct {
-  int bodies;
-  pw_chain link; /* of one body, if it can be in a chain */
+  int sources;
+  pw_chain link;
 } chain_between;
 
 /* A body that links a column to the next one, which alone is below it; returns the column, or -1. */
@@ -45,17 +46,34 @@ static void chain_join (pw_plan *c, pw_ldl *ldl, const chain_between *between, c
   c->chains = c->linked = 0;
   for (int p = 0; p < ldl->nodes;) {
     const chain_between *b = &between[p++];
-    if (b->bodies != 1) continue;
+    if (b->sources != 1 || b->link.bodies == 0) continue;
     pw_chain *chain = &c->chain[c->chains++];
     *chain = b->link;
     chain->keep = 3 * c->linked;
     c->is_linked[b->link.j / 3] = 1;
-    for (; p < ldl->nodes && between[p].bodies == 1 && meet[p] == 2; p++) {
+    for (; p < ldl->nodes && between[p].sources == 1 && meet[p] == 2; p++) {
+      if (between[p].link.bodies == 0) break;
       if (!chain_add (chain, &between[p - 1].link, &between[p].link)) break;
       c->is_linked[between[p].link.j / 3] = 1;
       ldl->column[p].shape = PW_LINK;
     }
     c->linked += chain->bodies;
+  }
+}
+
+/* Counts what columns eliminated earlier leave between a column and the next one: both are below them. */
+static void chain_fill (const pw_ldl *ldl, chain_between *between) {
+  for (int p = 0; p < ldl->nodes; p++)
+    for (int i = ldl->column[p].first + 1; i < ldl->column[p + 1].first; i++)
+      if (ldl->below[i] == ldl->below[i - 1] + 1) between[ldl->below[i - 1]].sources++;
+}
+
+/* Counts a body; its pieces are in the order of their columns. */
+static void chain_count (const pw_plan *c, const pw_ldl *ldl, int body, chain_between *between) {
+  int j = pw_plan_group (c, body);
+  for (int x = c->start[j] + 1; x < c->start[j + 1]; x++) {
+    int column = ldl->place[c->node_of[c->list[x - 1]]];
+    if (ldl->place[c->node_of[c->list[x]]] == column + 1) between[column].sources++;
   }
 }
 
@@ -70,10 +88,10 @@ int pw_condense_chains (pw_plan *c, pw_ldl *ldl) {
   for (int body = 0; body < c->k->s->bodies && status == PW_OK; body++) {
     pw_chain link;
     int column = chain_link (c, ldl, body, &link);
-    if (column < 0) continue;
-    between[column].bodies++;
-    between[column].link = link;
+    if (column >= 0) between[column].link = link;
+    chain_count (c, ldl, body, between);
   }
+  if (status == PW_OK) chain_fill (ldl, between);
   if (status == PW_OK) chain_join (c, ldl, between, meet);
   free (between);
   free (meet);
