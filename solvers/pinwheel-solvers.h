@@ -73,6 +73,11 @@ double pw_time (const pw_run *r);
 /* The state at a time inside the last accepted step, its end included. */
 int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
+/* How much energy a sample has too much or too little, absolutely, relative to the largest of its kinetic energy, work and
+ * loss and of what the scene has at L / T.  Without a ledger it is known only of scenes that have no entries for one, where
+ * what projections add counts too; else NaN. */
+double pw_unbalanced (const pw_run *r, const pw_sample *sample);
+
 /* Starts anew from a state at the time reached, after the caller has changed something.  The state is made consistent
  * first.  q and v may be NULL: they stay.  A ledger goes on; what the change does to the energy is left out of its balance.
  * Errors: PW_INPUT for a value that is not finite, PW_START, PW_METHOD: the run stays where it was; PW_MACHINE. */

@@ -75,6 +75,21 @@ static void test_defaults (void **state) {
   assert_true (cli_says (cli_out, "method", "rk4+projection")); /* the model's own */
 }
 
+/* Energy that comes from nowhere is told, of a closed scene even without --energy; of others it is not known then. */
+static void test_unbalanced (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run n-four-bar --method galpha+ggl --step 0.1 --json -"), 0);
+  double part = cli_number (cli_out, "unbalanced", NULL);
+  assert_true (part > 0.05 && part < 0.5);
+  assert_non_null (strstr (cli_err, "pinwheel: the energy does not balance: 14 % of it is unaccounted for"));
+  cli_good ("pinwheel run n-four-bar --json -");
+  check_below ("unbalanced", cli_number (cli_out, "unbalanced", NULL), 1e-9, "kept over ten passes");
+  cli_good ("pinwheel run ezyroller --t-end 1 --energy --json -");
+  check_below ("unbalanced", cli_number (cli_out, "unbalanced", NULL), 1e-12, "the method's order");
+  cli_good ("pinwheel run ezyroller --t-end 1 --json -");
+  assert_non_null (strstr (cli_out, "\"unbalanced\": null"));
+}
+
 /* ---- Tables ---- */
 
 static int cli_lines (const char *text) {
@@ -245,6 +260,7 @@ int main (void) {
     cmocka_unit_test (test_numbers),
     cmocka_unit_test (test_long_step),
     cmocka_unit_test (test_no_energy),
+    cmocka_unit_test (test_unbalanced),
     cmocka_unit_test (test_defaults),
     cmocka_unit_test (test_table),
     cmocka_unit_test (test_table_on_stdout),

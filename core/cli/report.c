@@ -201,6 +201,15 @@ static void report_truth (const pw_truth_error *e) {
   printf (" of the largest\n");
 }
 
+void pw_report_unbalanced (double part) {
+  char percent[32];
+  if (!(part > 0.01)) return;
+  fprintf (stderr,
+           "pinwheel: the energy does not balance: %s %% of it is unaccounted for; a smaller step or tolerance, or "
+           "another method, follows the motion better\n",
+           pw_format (percent, 100 * part, 2));
+}
+
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,
                     const pw_statistics *statistics) {
   char t[32], a[32], b[32];

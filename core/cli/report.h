@@ -24,6 +24,9 @@ void pw_report_differences (const pw_system *s);
 const char **pw_report_redundancies (pw_run *r);
 void pw_report_redundant (const char *const *text);
 
+/* Says on standard error that a part of the energy is unaccounted for, if it is more than 1 %. */
+void pw_report_unbalanced (double part);
+
 /* A table for the eye on standard output: last state, reactions, residuals, energies, cost. */
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,
                     const pw_statistics *statistics);

@@ -200,6 +200,7 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
                          .status = status[-error->status],
                          .reason = error->text,
                          .cpu = x->cpu,
+                         .unbalanced = NAN,
                          .redundant = x->redundant };
   if (error->status == PW_OK && pw_stop) {
     char t[32];
@@ -236,8 +237,10 @@ static int run_finish (run *x, pw_error *error) {
   run_finish_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
   if (x->r) summary.truth = pw_watch_errors (&x->watch, x->m.system);
+  if (last) summary.unbalanced = pw_unbalanced (x->r, last);
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
+  if (error->status == PW_OK) pw_report_unbalanced (summary.unbalanced);
   run_write_json (x, &summary, last, error);
   run_draw (x, summary.reason, error);
   if (x->profile && last && error->status == PW_OK && !interrupted)

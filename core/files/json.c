@@ -247,6 +247,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   json_add_text (&j, root, "status", summary->status);
   json_add_text (&j, root, "reason", summary->reason);
   json_sample (&j, root, s, sample, ledger);
+  json_add_number (&j, root, "unbalanced", summary->unbalanced);
   json_redundant (&j, root, summary->redundant);
   json_differences (&j, root, s);
   json_truth (&j, root, summary->truth);
