@@ -64,7 +64,7 @@ static int judge_turn (pw_run *r, const pw_residuals *residuals, double now, pw_
   if (!(now <= turn * before) && judge_blurred (r, off, lost))
     return pw_fail (
         error, PW_METHOD,
-        "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) lead to another branch, with "
+        "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) may lead to another branch, with "
         "%.3g times the accelerations of before; methods with projection pass",
         r->t, residuals->position, now / before);
   if (!(off <= far) && judge_blurred (r, off, nothing))
