@@ -73,6 +73,7 @@ static int compile_count (pw_compilation *c, pw_error *error) {
     rows += (double)c->count[k] * c->kind[k]->rows;
     if (c->kind[k]->level == PW_HOLONOMIC) c->size.holonomic += c->count[k] * c->kind[k]->rows;
     entries += (double)c->count[k] * compile_accounts (c->kind[k]);
+    c->size.sources += c->count[k] * c->kind[k]->signals;
   }
   if (coords > INT_MAX / 64 || rows > INT_MAX / 64) return pw_fail (error, PW_INPUT, "model %s is too large", m->name);
   c->size.bodies = m->bodies;
@@ -108,9 +109,9 @@ static void compile_layout_slab (const pw_compilation *c, pw_layout *l, pw_slab 
   void *J = pw_take (l, n * (size_t)kind->rows * cols, sizeof (double));
   int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
   void *space = pw_take (l, scratch ? n * block : 0, sizeof (double));
-  void *source = pw_take (l, n * (size_t)kind->signals, sizeof (pw_source)), *name = pw_take (l, n, sizeof (char *));
+  void *name = pw_take (l, n, sizeof (char *));
   if (l->base == NULL) return;
-  *k = (pw_slab){ .kind = kind, .column = column, .J = J, .block = space, .u = u, .source = source, .name = name };
+  *k = (pw_slab){ .kind = kind, .column = column, .J = J, .block = space, .u = u, .name = name };
   k->b = (pw_batch){ .count = c->count[i], .cols = (int)cols, .element = element, .body = body, .u = u };
 }
 
@@ -121,6 +122,7 @@ static void compile_layout (const pw_compilation *c, pw_layout *l, pw_system **s
   *s = c->size;
   s->slab = pw_take (l, (size_t)c->size.slabs + 1, sizeof *s->slab);
   s->pose = pw_take (l, bodies + 1, sizeof *s->pose);
+  s->source = pw_take (l, (size_t)c->size.sources, sizeof *s->source);
   s->body_name = pw_take (l, bodies, sizeof *s->body_name);
   s->mass = pw_take (l, coords, sizeof *s->mass);
   s->metric = pw_take (l, coords, sizeof *s->metric);
@@ -180,11 +182,10 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
 
 /* Signals that have not been compiled are all zero. */
 void pw_free (pw_system *s) {
-  for (int k = 0; s && k < s->slabs; k++)
-    for (int i = 0; i < s->slab[k].b.count * s->slab[k].kind->signals; i++) {
-      const pw_signal *signal = &s->slab[k].source[i].signal;
-      if (signal->type == PW_FUNCTION && signal->function.open && signal->function.close)
-        signal->function.close (signal->function.context);
-    }
+  for (int i = 0; s && i < s->sources; i++) {
+    const pw_signal *signal = &s->source[i].signal;
+    if (signal->type == PW_FUNCTION && signal->function.open && signal->function.close)
+      signal->function.close (signal->function.context);
+  }
   free (s);
 }

@@ -135,10 +135,13 @@ static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *poo
     pw_slab *k = &s->slab[c->slab_of[n]];
     for (int copy = pw_compile_copies (c->m, k->kind); copy > 0; copy--) {
       int e = next[c->slab_of[n]]++;
-      for (int u = 0; u < k->kind->signals; u++)
-        if (compile_source (c, s, &k->source[e * k->kind->signals + u],
-                            pw_field_at (k->kind, from->definition, PW_SIGNAL, u), pools, k->name[e], error) != PW_OK)
+      for (int u = 0; u < k->kind->signals; u++) {
+        int i = e * k->kind->signals + u;
+        k->source[i] = (pw_source){ .u = k->u + 3 * i, .forced = pw_kind_forced (k->kind) };
+        if (compile_source (c, s, &k->source[i], pw_field_at (k->kind, from->definition, PW_SIGNAL, u), pools,
+                            k->name[e], error) != PW_OK)
           return PW_INPUT;
+      }
     }
   }
   return PW_OK;
@@ -146,15 +149,18 @@ static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *poo
 
 static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
   int row = 0, own = 3 * s->bodies;
+  pw_source *source = s->source;
   for (int i = 0; i < s->slabs; i++) {
     pw_slab *k = &s->slab[i];
     k->b.pose = s->pose;
     k->row = row;
     k->own = own;
+    k->source = source;
     k->b.q = s->q0 + own;
     k->b.v = s->v0 + own;
     row += k->b.count * k->kind->rows;
     own += k->b.count * k->kind->own;
+    source += k->b.count * k->kind->signals;
     int e = 0;
     for (int n = 0; n < c->m->elements; n++)
       if (c->slab_of[n] == i && compile_put (c, s, k, &e, &c->m->element[n], pools, error) != PW_OK) return PW_INPUT;

@@ -36,14 +36,12 @@ static void place_reads (const pw_system *s, const pw_source *source, const doub
   }
 }
 
-/* Evaluates the signals of a slab; `readers` picks those that read states, else those of time alone. */
-static int place_slab_signals (pw_system *s, pw_slab *k, double t, const double *q, const double *v, int readers) {
-  int derivatives = !pw_kind_forced (k->kind);
-  double *u = k->u;
-  for (pw_source *i = k->source, *end = i + k->b.count * k->kind->signals; i < end; i++, u += 3) {
-    if ((i->reads > 0) != readers) continue;
+/* Evaluates the signals that read states, or those of time alone. */
+static int place_sources (pw_system *s, int readers, double t, const double *q, const double *v) {
+  for (pw_source *i = s->source, *end = i + s->sources; i < end; i++) {
+    if ((i->reads > 0) != readers || (s->hold && i->forced)) continue;
     if (readers) place_reads (s, i, q, v);
-    if (pw_signal_eval (i, t, derivatives, u) == 0) continue;
+    if (pw_signal_eval (i, t, !i->forced, i->u) == 0) continue;
     s->failed = i;
     return PW_METHOD;
   }
@@ -52,17 +50,9 @@ static int place_slab_signals (pw_system *s, pw_slab *k, double t, const double 
 
 /* Signals of time alone are evaluated once per time: stages at the same time share them. */
 static int place_signals (pw_system *s, double t, const double *q, const double *v) {
-  if (t != s->t_signal) {
-    for (int k = 0; k < s->slabs; k++) {
-      if (s->slab[k].kind->signals == 0 || (s->hold && pw_kind_forced (s->slab[k].kind))) continue;
-      if (place_slab_signals (s, &s->slab[k], t, q, v, 0) != PW_OK) return PW_METHOD;
-    }
-    s->t_signal = t;
-  }
-  if (s->readers == 0 || s->hold) return PW_OK;
-  for (int k = 0; k < s->slabs; k++)
-    if (place_slab_signals (s, &s->slab[k], t, q, v, 1) != PW_OK) return PW_METHOD;
-  return PW_OK;
+  if (t != s->t_signal && place_sources (s, 0, t, q, v) != PW_OK) return PW_METHOD;
+  s->t_signal = t;
+  return s->readers > 0 ? place_sources (s, 1, t, q, v) : PW_OK;
 }
 
 int pw_place (pw_system *s, double t, const double *q, const double *v) {
@@ -77,8 +67,6 @@ void pw_hold (pw_system *s, int hold) {
 
 double pw_next_breakpoint (const pw_system *s, double t) {
   double next = INFINITY;
-  for (int k = 0; k < s->slabs; k++)
-    for (int i = 0; i < s->slab[k].b.count * s->slab[k].kind->signals; i++)
-      next = fmin (next, pw_signal_breakpoint (&s->slab[k].source[i].signal, t));
+  for (int i = 0; i < s->sources; i++) next = fmin (next, pw_signal_breakpoint (&s->source[i].signal, t));
   return next;
 }

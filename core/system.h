@@ -15,6 +15,8 @@ typedef struct {
   const int *state; /* their indices: coordinate j, or coordinates + j for a rate */
   double *x;        /* reads: their values, then reads: the gradient */
   double *spline;   /* of a table: rate, then acceleration at each of its points (table.c) */
+  double *u;        /* 3: where its values go */
+  int forced;       /* 1: it serves a force, which needs no derivatives */
 } pw_source;
 
 /* One kind in use: its batch, and where its rows and coordinates are. */
@@ -27,7 +29,7 @@ typedef struct {
   double *J;         /* count x rows x cols */
   double *block;     /* force kinds: count x cols scratch */
   double *u;         /* count x signals x 3, as b.u */
-  pw_source *source; /* count x signals */
+  pw_source *source; /* count x signals, among the system's */
   const char **name; /* count */
 } pw_slab;
 
@@ -43,6 +45,7 @@ struct pw_system {
   int constraints;         /* slabs with rows */
   int forces;              /* slabs with a force that is not constant */
   int *force;              /* which */
+  int sources;             /* signals */
   int readers;             /* function signals that read states */
   int moving;              /* slabs with an eta: constraints that move */
   int hold;                /* 1: signals of forces keep their values (inputs=held) */
@@ -57,6 +60,7 @@ struct pw_system {
   unsigned char *held;    /* 2 coords: given by the user, so held by the consistent start */
   pw_pose *pose;          /* bodies + 1; the last is the ground */
   pw_slab *slab;          /* slabs: holonomic kinds first, then nonholonomic ones, then forces */
+  pw_source *source;      /* sources: slab by slab */
   double *scratch;        /* rows x 3 + coords + 3 */
   pw_entry *entry;        /* entries */
 };
