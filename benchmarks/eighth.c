@@ -82,13 +82,9 @@ static void eighth_our_rate (void *context, double t, const double *q, const dou
 
 static void eighth_our_project (void *context, double t, double *q, double *v, ezy_state *to) {
   eighth_scene *s = context;
-  int row;
-  double worst;
   eighth_copy (s->q, q);
   eighth_copy (s->v, v);
-  pw_project_positions (&s->projector, s->run, t, s->q, s->v, &row, &worst);
-  pw_project_velocities (&s->projector, s->run, s->v);
-  pw_accelerate_placed (s->run, s->v, s->a, to->lambda);
+  pw_project_state (&s->projector, s->run, t, s->q, s->v, s->a, to->lambda);
   to->t = t;
   eighth_copy (to->q, s->q);
   eighth_copy (to->v, s->v);

@@ -237,10 +237,14 @@ void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw
   }
 }
 
-void pw_sweep_residuals (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
+void pw_sweep_position_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
   double *value = s->scratch, *size = value + s->rows;
   pw_sweep_g (s, value);
   pw_sweep_g_size (s, size);
   pw_judge_positions (s, value, size, enforced, r);
+}
+
+void pw_sweep_residuals (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
+  pw_sweep_position_residual (s, enforced, r);
   pw_sweep_velocity_residual (s, enforced, r);
 }

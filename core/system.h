@@ -119,6 +119,7 @@ typedef struct {
 } pw_residuals;
 /* Of the rows with enforced[i] != 0, if that is given. */
 void pw_sweep_residuals (pw_system *s, const unsigned char *enforced, pw_residuals *r);
+void pw_sweep_position_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r); /* only the positions' */
 void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r); /* only the rates' */
 /* The worst of g into the part of the positions. */
 void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,

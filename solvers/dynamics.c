@@ -103,12 +103,10 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
 }
 
 pw_residuals pw_note_residuals (pw_run *r) {
-  pw_residuals now;
+  pw_residuals now = r->known;
   pw_statistics *s = &r->statistics;
-  if (isnan (r->position))
-    pw_sweep_residuals (r->s, NULL, &now);
-  else
-    pw_sweep_velocity_residual (r->s, NULL, &now), now.position = r->position, now.g = r->g;
+  if (isnan (now.position)) pw_sweep_position_residual (r->s, NULL, &now);
+  if (isnan (now.velocity)) pw_sweep_velocity_residual (r->s, NULL, &now);
   if (!(now.position <= s->position)) s->position = now.position;
   if (!(now.velocity <= s->velocity)) s->velocity = now.velocity;
   if (!(now.g <= s->g)) s->g = now.g;

@@ -29,7 +29,7 @@ struct pw_run {
   double before;          /* those of the last state away from them */
   double alpha, beta;     /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;      /* first discontinuity of a signal after t */
-  double position, g;     /* scaled and absolute residual, if the last projection told them; else NaN */
+  pw_residuals known;     /* those that the last projection told; NaN: it did not */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;
@@ -144,9 +144,12 @@ void pw_show_reached (pw_run *r);
 /* Says which constraints an evaluation could not tell apart, and when. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
-/* Takes the residuals of the state just accelerated into the statistics; those of its positions are not computed twice if
- * a projection has left them. */
+/* Takes the residuals of the state just accelerated into the statistics; those that a projection knows are not computed
+ * twice. */
 pw_residuals pw_note_residuals (pw_run *r);
+static inline void pw_forget_residuals (pw_run *r) {
+  r->known.position = r->known.velocity = NAN;
+}
 
 /* What the i-th redundant row follows from, at the pose J is swept and the saddle factorised at. */
 void pw_rank_coefficients (pw_run *r, int i);
@@ -177,6 +180,10 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
 
 /* One linear solve for J v = eta at the placed pose; the rates are placed.  PW_RETRY if singular. */
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
+
+/* Both, and then accelerations and multipliers of the state reached, with the run's saddle factorised there.  Rates that obey
+ * J v = eta to round-off may be left as they are. */
+int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda);
 
 /* Takes from an error of positions or rates what a projection onto the first so many rows removes.  The run's saddle is
  * factorised at the placed pose. */

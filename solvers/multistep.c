@@ -232,7 +232,7 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   memcpy (r->a, d->a, (size_t)d->n * sizeof *y);
   memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *y);
   r->t = t;
-  r->position = NAN;
+  pw_forget_residuals (r);
   d->settled = 0;
   if (pw_place (r->s, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);

@@ -45,6 +45,10 @@ void pw_projector_close (pw_projector *p) {
   *p = (pw_projector){ 0 };
 }
 
+/* Scaled residuals: round-off of a row's few terms, and where it may end. */
+#define PROJECT_GOOD (4 * DBL_EPSILON)
+#define PROJECT_ENOUGH (64 * DBL_EPSILON)
+
 /* Redundant rows follow from the others but for round-off; a row that does not contradicts them.  It takes *row. */
 static int project_others (pw_projector *p, const pw_system *s, const double *g, const double *size, int *row) {
   const double follows = 1e-9;
@@ -58,9 +62,10 @@ static int project_others (pw_projector *p, const pw_system *s, const double *g,
   return PW_RETRY;
 }
 
-int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {
-  const double good = 4 * DBL_EPSILON, enough = 64 * DBL_EPSILON; /* round-off of a row's few terms */
-  const double slight = 1e-6;                                     /* a correction that leaves the sizes as they are */
+/* As pw_project_positions, but for J. */
+static int project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row,
+                              double *worst) {
+  const double slight = 1e-6; /* a correction that leaves the sizes as they are */
   const int most = 30;
   pw_system *s = r->s;
   pw_residuals now = { 0 };
@@ -74,7 +79,7 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     *row = now.row_position;
     *worst = now.position;
     int stalled = *worst > before / 4;
-    if (*worst <= good || (stalled && *worst <= enough)) break;
+    if (*worst <= PROJECT_GOOD || (stalled && *worst <= PROJECT_ENOUGH)) break;
     if (p->iterations >= most || !isfinite (*worst)) return PW_RETRY;
     before = *worst;
     pw_sweep_J (s);
@@ -84,9 +89,14 @@ int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const
     pw_saddle_solve (p->position, NULL, g, dq, mu);
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
-  pw_sweep_J (s);
-  if (p->active == NULL) r->position = now.position, r->g = now.g;
+  if (p->active == NULL) r->known.position = now.position, r->known.g = now.g;
   return project_others (p, s, g, size, row);
+}
+
+int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {
+  int status = project_positions (p, r, t, q, v, row, worst);
+  if (status == PW_OK) pw_sweep_J (r->s);
+  return status;
 }
 
 /* v += dv with J (v + dv) = eta. */
@@ -110,6 +120,34 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   if (pw_saddle_below (p->velocity, r->watch)) project_once (p, r->s, v, 0);
   pw_place_rates (r->s, v);
   return PW_OK;
+}
+
+/* 1 if the placed rates need no correction, with J swept: they obey J v = eta to round-off.  Near a singular pose that does
+ * not say enough, and nor does it of redundant rows. */
+static int project_is_good (const pw_projector *p, pw_run *r) {
+  r->known.velocity = NAN;
+  if (p->own_velocity || p->active || r->near) return 0;
+  pw_residuals now;
+  pw_sweep_velocity_residual (r->s, NULL, &now);
+  if (!(now.velocity <= PROJECT_GOOD)) return 0;
+  r->known.velocity = now.velocity, r->known.jv = now.jv;
+  return 1;
+}
+
+int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
+  double worst;
+  int row, status = project_positions (p, r, t, q, v, &row, &worst);
+  if (status != PW_OK) return status;
+  pw_sweep_J_gamma (r->s, lambda);
+  if (project_is_good (p, r)) return pw_accelerate_swept (r, v, a, lambda);
+  status = pw_project_velocities (p, r, v);
+  if (status != PW_OK) return status;
+  if (!p->own_velocity) {
+    pw_accelerate_placed (r, v, a, lambda);
+    return PW_OK;
+  }
+  pw_sweep_gamma (r->s, lambda);
+  return pw_accelerate_swept (r, v, a, lambda);
 }
 
 /* e += W^-1 J^T ..., J e = 0 */

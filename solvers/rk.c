@@ -196,27 +196,19 @@ static int rk_stages (pw_run *r, double h) {
   return status;
 }
 
-/* Projects (t, q, v); the energy this adds goes to the ledger. */
-static int rk_project (pw_run *r, double t, double *q, double *v, double *added) {
+/* Projects the new state, and evaluates its accelerations; the energy this adds goes to the ledger. */
+static int rk_project (pw_run *r, double t, double *added) {
+  struct pw_method_data *d = r->data;
   pw_system *s = r->s;
-  int row, status = PW_OK;
-  double worst, before = 0;
+  int status = PW_OK;
+  double before = 0;
   if (added) {
-    status = pw_place (s, t, q, v);
-    before = pw_kinetic (s, v) + pw_potential (s);
+    status = pw_place (s, t, d->q, d->v);
+    before = pw_kinetic (s, d->v) + pw_potential (s);
   }
-  if (status == PW_OK) status = pw_project_positions (&r->data->projector, r, t, q, v, &row, &worst);
-  if (status == PW_OK) status = pw_project_velocities (&r->data->projector, r, v);
-  if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (s) - before;
+  if (status == PW_OK) status = pw_project_state (&d->projector, r, t, d->q, d->v, d->a, d->lambda);
+  if (status == PW_OK && added) *added += pw_kinetic (s, d->v) + pw_potential (s) - before;
   return status;
-}
-
-/* Accelerations of a state that was just projected, or not. */
-static int rk_accelerate (pw_run *r, int projected, double t, const double *q, const double *v, double *a,
-                          double *lambda) {
-  if (!projected || r->data->projector.own_velocity) return pw_accelerate (r, t, q, v, a, lambda);
-  pw_accelerate_placed (r, v, a, lambda);
-  return PW_OK;
 }
 
 /* 1 if nothing is so large that its square would not be a number. */
@@ -235,12 +227,10 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   rk_combine (d->q, r->q, d->V, &d->row[0], h, n);
   rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
-  if (project) status = rk_project (r, t1, d->q, d->v, added);
-  if (d->minimal) {
-    status = pw_nullspace_settle (&d->nullspace, d->closes ? &d->projector : NULL, r, t1, d->q, d->v, added);
-    return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
-  }
-  return status == PW_OK ? rk_accelerate (r, project, t1, d->q, d->v, d->a, d->lambda) : status;
+  if (project) return rk_project (r, t1, added);
+  if (!d->minimal) return pw_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
+  status = pw_nullspace_settle (&d->nullspace, d->closes ? &d->projector : NULL, r, t1, d->q, d->v, added);
+  return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
 /* The step is good: it becomes the state reached. */

@@ -121,7 +121,7 @@ static void run_begin (pw_run *r) {
   r->calm = fmax (1, r->before);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
   r->breakpoint = pw_next_breakpoint (s, r->t);
-  r->position = NAN;
+  pw_forget_residuals (r);
   (void)pw_note_residuals (r);
 }
 
@@ -217,7 +217,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
   if (run_is_lost (r, error)) return PW_MACHINE;
-  r->position = NAN;
+  pw_forget_residuals (r);
   if (r->t >= r->breakpoint) status = run_pass_breakpoint (r, error);
   if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);

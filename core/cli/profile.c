@@ -108,18 +108,10 @@ static void profile_evaluation (profile *p, long n) {
 /* A projection from p->from, and the evaluation after it, which finds J and its factors there. */
 static void profile_project (profile *p, long n) {
   size_t bytes = (size_t)p->s->coords * sizeof (double);
-  double worst;
-  int row;
   for (; n > 0; n--) {
-    double t = n % 2 ? p->t : p->before;
     memcpy (p->f, p->from, bytes);
     memcpy (p->y, p->v, bytes);
-    pw_project_positions (&p->projector, p->r, t, p->f, p->y, &row, &worst);
-    pw_project_velocities (&p->projector, p->r, p->y);
-    if (p->projector.own_velocity)
-      pw_accelerate (p->r, t, p->f, p->y, p->a, p->lambda);
-    else
-      pw_accelerate_placed (p->r, p->y, p->a, p->lambda);
+    pw_project_state (&p->projector, p->r, n % 2 ? p->t : p->before, p->f, p->y, p->a, p->lambda);
   }
 }
 
