@@ -64,6 +64,25 @@ static void test_layouts (void **state) {
   assert_non_null (strstr (cli_file ("written/energy.gp"), "title 'dissipated'"));
 }
 
+/* A plate is its convex outline, with a line to what is attached inside; what lies on a line is one. */
+static void test_outline (void **state) {
+  (void)state;
+  cli_write ("plate.yaml", "pinwheel: 1\nbodies:\n  - {name: plate, mass: 1, inertia: 1, rate: {vx: 1}}\n"
+                           "  - {name: bar, mass: 1, inertia: 1, start: {x: 9}}\nelements:\n"
+                           "  - {marker: a, body: plate, at: [1, 1]}\n  - {marker: b, body: plate, at: [-1, -1]}\n"
+                           "  - {marker: c, body: plate, at: [0.5, 0.2]}\n  - {marker: d, body: plate, at: [-1, 1]}\n"
+                           "  - {marker: e, body: plate, at: [1, -1]}\n  - {marker: f, body: bar, at: [2, 1]}\n"
+                           "  - {marker: g, body: bar, at: [-2, -1]}\n  - {marker: h, body: bar, at: [1, 0.5]}\n");
+  plots_write ("@/plate.yaml --t-end 1 --animate @/plate.html");
+  const char *data = cli_file ("written/mechanism.dat");
+  const char *drawn = "-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n-1 -1 0\n\n0 0 0\n0.5 0.2 0\n\n"
+                      "11 1 0\n9 0 0\n7 -1 0\n9 0 0\n10 0.5 0\n\n";
+  assert_int_equal (strncmp (strchr (data, '\n') + 1, drawn, strlen (drawn)), 0);
+  const char *page = cli_file ("plate.html");
+  assert_non_null (strstr (page, "spokes:[[0.5,0.2]],outline:[[-1,-1],[1,-1],[1,1],[-1,1]]}"));
+  assert_non_null (strstr (page, "outline:[]}"));
+}
+
 /* What gnuplot says when it fails is passed on; a folder for its files that cannot be made is named. */
 static void test_gif_fails (void **state) {
   (void)state;
@@ -114,14 +133,9 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_drawn),
-    cmocka_unit_test (test_written),
-    cmocka_unit_test (test_data),
-    cmocka_unit_test (test_ground),
-    cmocka_unit_test (test_layouts),
-    cmocka_unit_test (test_gif_fails),
-    cmocka_unit_test (test_picture_in_motion),
-    cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_drawn),     cmocka_unit_test (test_written),           cmocka_unit_test (test_data),
+    cmocka_unit_test (test_ground),    cmocka_unit_test (test_layouts),           cmocka_unit_test (test_outline),
+    cmocka_unit_test (test_gif_fails), cmocka_unit_test (test_picture_in_motion), cmocka_unit_test (test_refusals),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

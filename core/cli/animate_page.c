@@ -55,6 +55,11 @@ static void page_bodies (FILE *f, const pw_plots *p) {
     page_text (f, pw_plot_body_name (p, b));
     fputs (",at:[", f);
     for (int k = 0; k < p->shape[b].count; k++) page_point (f, p->shape[b].at[k], k ? "," : "");
+    fputs ("],spokes:[", f);
+    for (int k = 0, n = 0; k < p->shape[b].count; k++)
+      if (pw_plot_inside (&p->shape[b], k)) page_point (f, p->shape[b].at[k], n++ ? "," : "");
+    fputs ("],outline:[", f);
+    for (int k = 0; k < p->shape[b].corners; k++) page_point (f, p->shape[b].corner[k], k ? "," : "");
     fputs ("]}", f);
   }
   fputs ("],\nground:[", f);

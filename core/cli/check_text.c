@@ -93,7 +93,8 @@ static void text_start (const pw_check *x) {
     listed++;
   }
   text_more (start->moved - listed);
-  if (x->known) printf ("  compared with the truth of the model, which knows %d state%s\n", x->known, x->known == 1 ? "" : "s");
+  if (x->known)
+    printf ("  compared with the truth of the model, which knows %d state%s\n", x->known, x->known == 1 ? "" : "s");
 }
 
 /* ---- Kinds ---- */

@@ -25,11 +25,18 @@ enum {
  * wheel drawn, then the force of each link. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
 
-/* Attachment points of a body, in its frame [m]. */
+/* Attachment points of a body, in its frame [m], and the convex outline of them and its centre of mass,
+ * counter-clockwise; none if they lie on a line. */
 typedef struct {
-  int count;
+  int count, corners;
   double at[PLOT_POINTS][2];
+  double corner[PLOT_POINTS + 1][2];
 } pw_plot_body;
+
+/* Fills the outline (plot_outline.c). */
+void pw_plot_outline (pw_plot_body *shape);
+/* 1 if attachment point k is no corner of it. */
+int pw_plot_inside (const pw_plot_body *shape, int k);
 
 /* An element with points: what it connects, and on which of its ends the force is shown. */
 typedef struct {

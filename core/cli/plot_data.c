@@ -143,10 +143,8 @@ static void data_vertex (FILE *f, const double *point, double t) {
   fputs ("\n", f);
 }
 
-/* A body: from each attachment point to the centre of mass and on to the next one. */
-static void data_body (FILE *f, const pw_plots *p, int i, int body) {
-  const double *motion = pw_plot_motion (p, i, body), t = pw_plot_sample (p, i)[PLOT_T];
-  const pw_plot_body *shape = &p->shape[body];
+/* A body that is a line: from each attachment point to the centre of mass and on to the next one. */
+static void data_line (FILE *f, const pw_plot_body *shape, const double *motion, double t) {
   for (int k = 0; k < shape->count; k++) {
     double point[2];
     data_point (motion, shape->at[k], point);
@@ -154,6 +152,29 @@ static void data_body (FILE *f, const pw_plots *p, int i, int body) {
     data_vertex (f, k == 0 ? motion : point, t);
   }
   if (shape->count > 0) fputs ("\n", f);
+}
+
+/* A body that is a plate: its outline, and lines from the centre of mass to attachment points inside. */
+static void data_plate (FILE *f, const pw_plot_body *shape, const double *motion, double t) {
+  double point[2];
+  for (int k = 0; k <= shape->corners; k++) {
+    data_point (motion, shape->corner[k % shape->corners], point);
+    data_vertex (f, point, t);
+  }
+  fputs ("\n", f);
+  for (int k = 0; k < shape->count; k++) {
+    if (!pw_plot_inside (shape, k)) continue;
+    data_point (motion, shape->at[k], point);
+    data_vertex (f, motion, t);
+    data_vertex (f, point, t);
+    fputs ("\n", f);
+  }
+}
+
+static void data_body (FILE *f, const pw_plots *p, int i, int body) {
+  const double *motion = pw_plot_motion (p, i, body), t = pw_plot_sample (p, i)[PLOT_T];
+  const pw_plot_body *shape = &p->shape[body];
+  (shape->corners ? data_plate : data_line) (f, shape, motion, t);
 }
 
 static void data_wheel (FILE *f, const pw_plots *p, int i, int wheel, double half) {

@@ -130,6 +130,7 @@ static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
         memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
     }
   }
+  for (int b = 0; b < p->bodies; b++) pw_plot_outline (&p->shape[b]);
   pw_names_close (&shown);
   return PW_OK;
 }
