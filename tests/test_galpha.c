@@ -250,12 +250,45 @@ static void test_damping (void **state) {
   pw_free (s);
 }
 
+/* ---- A vibration a thousand times too fast for the step ---- */
+
+static void galpha_fast (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1, .start = { 0, 0, 1e-3 } });
+  pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "arm", "ground" }, .stiffness = 1e10 });
+}
+
+/* It never grows beyond what it starts with, and rho is what each step leaves of it in the end. */
+static void test_no_overshoot (void **state) {
+  static const char *const method[] = { "galpha+ggl:rho=0.3", "galpha+ggl:rho=0.5", "galpha+index3:rho=0.8",
+                                        "galpha+ggl:rho=1" };
+  static const double rho[] = { 0.3, 0.5, 0.8, 1 };
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = galpha_fast };
+  (void)state;
+  for (int i = 0; i < 4; i++) {
+    pw_system *s = scene_system (&table, NULL);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .span = 1 });
+    double before = 0, most = 0;
+    for (int k = 1; k <= 60; k++) {
+      double phi = fabs (runs_to (r, 0.01 * k).q[2]);
+      most = fmax (most, phi);
+      if (k == 40) before = phi;
+      if (k == 60 && rho[i] < 0.8)
+        check_close ("left by a step", pow (phi / before, 1. / 20), rho[i], 0.05 * rho[i],
+                     "a double root: a power of k besides");
+    }
+    check_below (method[i], most, 1e-3 * (1 + 1e-9), "as it starts");
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),     cmocka_unit_test (test_start),       cmocka_unit_test (test_cut),
-    cmocka_unit_test (test_residuals), cmocka_unit_test (test_small_steps), cmocka_unit_test (test_large_steps),
-    cmocka_unit_test (test_condition), cmocka_unit_test (test_samples),     cmocka_unit_test (test_breakpoint),
-    cmocka_unit_test (test_damping),
+    cmocka_unit_test (test_order),        cmocka_unit_test (test_start),       cmocka_unit_test (test_cut),
+    cmocka_unit_test (test_residuals),    cmocka_unit_test (test_small_steps), cmocka_unit_test (test_large_steps),
+    cmocka_unit_test (test_condition),    cmocka_unit_test (test_samples),     cmocka_unit_test (test_breakpoint),
+    cmocka_unit_test (test_no_overshoot), cmocka_unit_test (test_damping),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
