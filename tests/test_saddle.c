@@ -1,0 +1,208 @@
+/* Solutions of the saddle-point system obey it, whatever path they take: with mass and with the metric of projections, all
+ * rows and those on positions alone, factorised apart or at once, with forces and without.
+ *
+ *   W a + J^T lambda = f,   J a = gamma */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include "check.h"
+#include "mechanism.h"
+#include "method.h"
+#include "runs.h"
+#include "scene.h"
+
+typedef struct {
+  pw_run *run;
+  const double *weight;
+  int rows;
+  unsigned random;
+} trial;
+
+/* Numbers in [-1, 1], the same on every machine. */
+static double saddle_number (unsigned *random) {
+  *random = *random * 1664525U + 1013904223U;
+  return (double)(*random >> 8) / 8388608.0 - 1;
+}
+
+/* The error of the second equation relative to what its terms are, that of the first likewise. */
+static double saddle_error (const trial *x, const double *f, const double *gamma, const double *a,
+                            const double *lambda) {
+  const pw_system *s = x->run->s;
+  double most = 0, size = 0, *left = calloc ((size_t)(s->coords + 3 + s->rows), sizeof *left);
+  double *Ja = left + s->coords + 3;
+  pw_add_JT (s, lambda, left);
+  for (int j = 0; j < s->coords; j++) size = fmax (size, fabs (left[j]) + fabs (x->weight[j] * a[j]));
+  for (int j = 0; j < s->coords; j++)
+    most = fmax (most, fabs (left[j] + x->weight[j] * a[j] - (f ? f[j] : 0)) / (1 + size));
+  pw_mul_J (s, a, Ja);
+  size = 0;
+  for (int i = 0; i < x->rows; i++) size = fmax (size, fabs (gamma[i]));
+  for (int j = 0; j < s->coords; j++) size = fmax (size, fabs (a[j]));
+  for (int i = 0; i < x->rows; i++)
+    if (x->run->active == NULL || x->run->active[i]) most = fmax (most, fabs (Ja[i] - gamma[i]) / size);
+  free (left);
+  return most;
+}
+
+/* Solves in each way; the rows that take no part get no multiplier. */
+static double saddle_solve (trial *x) {
+  const pw_system *s = x->run->s;
+  size_t coords = (size_t)s->coords + 3, rows = (size_t)s->rows;
+  double *f = calloc (3 * coords + 3 * rows + 1, sizeof *f), *a = f + coords, *gamma = a + coords;
+  double *lambda = gamma + rows, worst = 0;
+  pw_error error = { 0 };
+  pw_saddle *k = pw_saddle_open (x->run->s, x->weight, x->rows, x->run->active, &error);
+  check_ok (k ? PW_OK : error.status, &error);
+  for (int way = 0; way < 4; way++) {
+    const double *force = way & 1 ? f : NULL;
+    for (int j = 0; j < s->coords; j++) f[j] = saddle_number (&x->random);
+    for (int i = 0; i < s->rows; i++) gamma[i] = saddle_number (&x->random), lambda[i] = 0;
+    if (way & 2) {
+      assert_int_equal (pw_saddle_factor (k), PW_OK);
+      pw_saddle_solve (k, force, gamma, a, lambda);
+    } else
+      assert_int_equal (pw_saddle_factor_solve (k, force, gamma, a, lambda), PW_OK);
+    worst = fmax (worst, saddle_error (x, force, gamma, a, lambda));
+  }
+  pw_saddle_close (k);
+  free (f);
+  return worst;
+}
+
+/* All saddle-point systems of a scene at its start, and some way into the motion; -1 if it cannot start. */
+static double saddle_scene (pw_system *s, double t_end) {
+  pw_error error = { 0 };
+  pw_run *r = pw_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
+  double worst = r ? 0 : -1;
+  for (int moment = 0; r && moment < 2; moment++) {
+    if (moment > 0) check_ok (pw_advance_to (r, t_end, t_end, &error), &error);
+    assert_int_equal (pw_place (s, r->t, r->q, r->v), PW_OK);
+    pw_sweep_J (s);
+    for (int which = 0; which < 4; which++) {
+      trial x = { .run = r, .weight = which & 1 ? s->metric : s->mass, .random = (unsigned)(7 * which + moment) };
+      x.rows = which & 2 ? s->holonomic : s->rows;
+      int massless = 0;
+      for (int j = 0; j < s->coords; j++) massless |= x.weight[j] == 0;
+      if (massless && x.rows < s->rows) continue; /* not determined by these rows */
+      worst = fmax (worst, saddle_solve (&x));
+    }
+  }
+  if (r) pw_close (r);
+  pw_free (s);
+  return worst;
+}
+
+static void test_models (void **state) {
+  static const struct {
+    const char *model, *parameter;
+    double value;
+  } scene[] = {
+    { "theo-jansen", NULL, 0 },  { "peaucellier", NULL, 0 },        { "andrews-squeezer", NULL, 0 },
+    { "n-four-bar", "N", 2 },    { "n-four-bar", "N", 12 },         { "chain", "n", 30 },
+    { "wheeled-snake", "n", 3 }, { "wheeled-snake", "n", 20 },      { "n-trailer", "n", 4 },
+    { "ezyroller", NULL, 0 },    { "ezyroller", "m2", 0.1 },        { "car", NULL, 0 },
+    { "snakeboard", NULL, 0 },   { "differential-drive", NULL, 0 }, { "redundant-parallelogram", NULL, 0 }
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
+    double e = saddle_scene (scene_named (scene[i].model, scene[i].parameter, scene[i].value), 0.02);
+    assert_true (e >= 0);
+    check_below (scene[i].model, e, 1e7 * CHECK_EPS, "round-off, weights over a range of 1e6");
+  }
+}
+
+/* ---- Linkages: trees of pinned bars, some of them closed to loops, some on the ground ---- */
+
+enum { LINKAGE_MOST = 40 };
+
+typedef struct {
+  double seed;
+} linkage;
+
+/* A pin at a point of the world between two bars that have been placed, or a bar and the ground (-1). */
+static void linkage_pin (pw_model *m, const double (*at)[3], int number, int a, int b, double x, double y) {
+  char name[3][16];
+  pw_pin pin = { .name = name[2], .body = { name[0], name[1] } };
+  snprintf (name[2], sizeof name[2], "p%d", number);
+  for (int side = 0; side < 2; side++) {
+    int i = side ? b : a;
+    snprintf (name[side], sizeof name[side], i < 0 ? "ground" : "b%d", i);
+    double dx = i < 0 ? x : x - at[i][0], dy = i < 0 ? y : y - at[i][1];
+    double c = i < 0 ? 1 : cos (at[i][2]), n = i < 0 ? 0 : sin (at[i][2]);
+    pin.at[side][0] = c * dx + n * dy, pin.at[side][1] = c * dy - n * dx;
+  }
+  pw_add_pin (m, &pin);
+}
+
+/* Most bars hang from the end of the one before, so that there are chains. */
+static void linkage_build (pw_model *m, const void *parameters) {
+  unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
+  double at[LINKAGE_MOST][3] = { { 0 } };
+  int n = 6 + (int)((LINKAGE_MOST - 6) * fabs (saddle_number (&random))), loops = n / 5;
+  for (int i = 0; i < n; i++) {
+    int from = saddle_number (&random) < 0.6 ? i - 1 : (int)(i * fabs (saddle_number (&random)));
+    double x = 0, y = 0;
+    if (i > 0) x = at[from][0] + 0.5 * cos (at[from][2]), y = at[from][1] + 0.5 * sin (at[from][2]);
+    at[i][2] = 3 * saddle_number (&random);
+    at[i][0] = x + 0.5 * cos (at[i][2]), at[i][1] = y + 0.5 * sin (at[i][2]);
+    char name[12];
+    snprintf (name, sizeof name, "b%d", i);
+    pw_add_body (
+        m, &(pw_body){ .name = name, .mass = 1 + 0.1 * i, .inertia = 0.1, .start = { at[i][0], at[i][1], at[i][2] } });
+    linkage_pin (m, (const double (*)[3])at, i, i > 0 ? from : -1, i, x, y);
+  }
+  while (loops-- > 0) {
+    int a = (int)(n * fabs (saddle_number (&random))), b = (int)(n * fabs (saddle_number (&random)));
+    double x = 2 * saddle_number (&random), y = 2 * saddle_number (&random);
+    if (a == b) b = -1;
+    linkage_pin (m, (const double (*)[3])at, n + loops, a, b, x, y);
+  }
+}
+
+static const pw_parameter linkage_list[] = {
+  { PW_AT (linkage, seed), .domain = PW_NONNEGATIVE, .about = "which one" },
+  { .name = NULL },
+};
+
+static const pw_plugin_table linkage_table = { .abi = PW_ABI,
+                                               .size = sizeof (pw_plugin_table),
+                                               .parameters = linkage_list,
+                                               .parameters_size = sizeof (linkage),
+                                               .build = linkage_build };
+
+static void test_linkages (void **state) {
+  (void)state;
+  for (int seed = 1; seed <= 200; seed++) {
+    double e = saddle_scene (scene_system (&linkage_table, "seed", (double)seed, NULL), 0);
+    assert_true (e >= 0);
+    check_below ("a linkage", e, 1e6 * CHECK_EPS, "round-off, rows nearly dependent");
+  }
+}
+
+static void test_random (void **state) {
+  int tried = 0;
+  double worst = 0;
+  (void)state;
+  for (unsigned seed = 1; seed <= 200; seed++) {
+    mechanism x;
+    pw_error error = { 0 };
+    mechanism_make (seed, &x);
+    pw_system *s = mechanism_compile (&x, &(mechanism_view){ 0 }, &error);
+    if (s == NULL) continue;
+    double e = saddle_scene (s, 0);
+    worst = fmax (worst, e);
+    tried += e >= 0;
+  }
+  assert_true (tried > 150);
+  check_below ("random mechanisms", worst, 1e9 * CHECK_EPS,
+               "round-off, weights over a range of 1e6, rows nearly dependent");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_models),
+    cmocka_unit_test (test_linkages),
+    cmocka_unit_test (test_random),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
