@@ -56,6 +56,26 @@ static void test_long_step (void **state) {
   cli_good ("pinwheel run pendulum --method erk5 --t-end 10");
 }
 
+/* Degrees where radians belong are noticed. */
+static void test_degrees (void **state) {
+  static const char model[] = "pinwheel: 1\nbodies:\n  - {name: skate, mass: 1, inertia: 1, start: {phi: %s}}\n"
+                              "elements:\n  - {wheel: W, body: skate, at: [0, 0], heading: %s}\n"
+                              "  - {steered-wheel: S, body: skate, at: [1, 0], heading: %s}\n";
+  char text[400];
+  (void)state;
+  snprintf (text, sizeof text, model, "2*pi", "-90*deg", "pi/4");
+  cli_write ("skate.yaml", text);
+  cli_good ("pinwheel run @/skate.yaml --t-end 0.01");
+  snprintf (text, sizeof text, model, "30", "-90", "45");
+  cli_write ("skate.yaml", text);
+  assert_int_equal (cli_run ("pinwheel check @/skate.yaml"), 0);
+  assert_non_null (strstr (cli_err, "pinwheel: body skate: start phi = 30 rad is more than a turn"));
+  assert_non_null (strstr (cli_err,
+                           "pinwheel: wheel W: heading = -90 rad is more than a turn and ends at -116.6 degrees; "
+                           "degrees are written -90*deg\n"));
+  assert_non_null (strstr (cli_err, "pinwheel: steered-wheel S: heading = 45 rad is more than a turn"));
+}
+
 static void test_no_energy (void **state) {
   (void)state;
   cli_good ("pinwheel run ezyroller --t-end 0.1 --json @/summary.json");
@@ -256,22 +276,12 @@ static void test_new (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_summary),
-    cmocka_unit_test (test_numbers),
-    cmocka_unit_test (test_long_step),
-    cmocka_unit_test (test_no_energy),
-    cmocka_unit_test (test_unbalanced),
-    cmocka_unit_test (test_defaults),
-    cmocka_unit_test (test_table),
-    cmocka_unit_test (test_table_on_stdout),
-    cmocka_unit_test (test_every),
-    cmocka_unit_test (test_locale),
-    cmocka_unit_test (test_list),
-    cmocka_unit_test (test_list_columns),
-    cmocka_unit_test (test_show),
-    cmocka_unit_test (test_gnuplot_locale),
-    cmocka_unit_test (test_help),
-    cmocka_unit_test (test_new),
+    cmocka_unit_test (test_summary),      cmocka_unit_test (test_numbers),   cmocka_unit_test (test_long_step),
+    cmocka_unit_test (test_degrees),      cmocka_unit_test (test_no_energy), cmocka_unit_test (test_unbalanced),
+    cmocka_unit_test (test_defaults),     cmocka_unit_test (test_table),     cmocka_unit_test (test_table_on_stdout),
+    cmocka_unit_test (test_every),        cmocka_unit_test (test_locale),    cmocka_unit_test (test_list),
+    cmocka_unit_test (test_list_columns), cmocka_unit_test (test_show),      cmocka_unit_test (test_gnuplot_locale),
+    cmocka_unit_test (test_help),         cmocka_unit_test (test_new),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -143,6 +143,7 @@ static int check_linear (pw_check *x, pw_error *error) {
 /* ---- */
 
 static int check_model (pw_check *x, int started, pw_error *error) {
+  pw_report_angles (x->m.model);
   check_open (x);
   int status = check_truth (x, started, error);
   if (status == PW_OK) status = check_linear (x, error);

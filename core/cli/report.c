@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "contestants.h"
+#include "model.h"
 #include "report.h"
 
 enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300, REPORT_TEXT = 400 };
@@ -37,6 +38,33 @@ void pw_report_step (const pw_run *r, const char *method, double step) {
            "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
            "compare with shorter ones\n",
            pw_format (h, step, 3), pw_format (pace, T, 2));
+}
+
+/* ---- Angles ---- */
+
+static void report_angle (const char *kind, const char *name, const char *what, double angle) {
+  char value[32], degrees[32];
+  if (!(fabs (angle) > 2 * PW_PI)) return;
+  pw_format (value, angle, 6);
+  pw_format (degrees, fmod (angle * 180 / PW_PI, 360), 4);
+  fprintf (stderr,
+           "pinwheel: %s %s: %s = %s rad is more than a turn and ends at %s degrees; degrees are written %s*deg\n",
+           kind, name, what, value, degrees, value);
+}
+
+void pw_report_angles (const pw_model *m) {
+  for (int i = 0; i < m->bodies; i++) report_angle ("body", m->body[i].name, "start phi", m->body[i].start[2]);
+  for (int i = 0; i < m->elements; i++) {
+    const pw_element *e = &m->element[i];
+    for (const pw_field *f = e->kind->fields; f->name; f++) {
+      const void *at = (const char *)e->definition + f->offset;
+      if (strcmp (f->name, "heading") != 0) continue;
+      const pw_signal *signal = f->type == PW_SIGNAL ? at : NULL;
+      if (signal && signal->type != PW_CONSTANT) continue;
+      if (signal || f->type == PW_NUMBER)
+        report_angle (e->kind->name, pw_element_name (e), f->name, signal ? signal->constant : *(const double *)at);
+    }
+  }
 }
 
 /* ---- The start ---- */
