@@ -60,9 +60,14 @@ static int between_inside (pw_between *b, pw_run *r, double t) {
   return status == PW_OK && b->rates ? pw_project_velocities (&b->projector, r, r->v_at) : status;
 }
 
+int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {
+  if (isnan (t0))
+    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
+  return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, t0, r->t);
+}
+
 int pw_between_at (pw_between *b, pw_run *r, double t, pw_error *error) {
-  if (t > r->t || t < b->t0)
-    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, b->t0, r->t);
+  if (t > r->t || t < b->t0) return pw_fail_outside (r, b->t0, t, error);
   if (t == r->t) {
     pw_show_reached (r);
     return PW_OK;

@@ -22,6 +22,9 @@ void pw_between_keep (pw_between *b, const pw_run *r);
 /* The ledger goes on to the end of the step, where the state is placed and r->lambda known: trapezoidal rule. */
 void pw_between_count (pw_between *b, pw_run *r);
 
+/* Says that t is not inside the last step, which begins at t0 (NaN: where is not known).  PW_INPUT. */
+int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error);
+
 /* The state at t into the run's sample arrays, placed there with J swept: a method's `at`. */
 int pw_between_at (pw_between *b, pw_run *r, double t, pw_error *error);
 

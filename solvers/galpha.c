@@ -35,8 +35,8 @@ static int galpha_allocate (galpha *d, const pw_system *s) {
                              { &d->mu1, rows }, { &d->z, size }, { &d->row, size }, { &d->column, size },
                              { &d->pull, n },   { &d->f, n },    { &d->jv, rows },  { &d->eta, rows },
                              { &d->D, n } };
-  d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (d->memory == NULL) return PW_MACHINE;
+  d->work.memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  if (d->work.memory == NULL) return PW_MACHINE;
   for (int j = 0; j < s->coords; j++) d->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   return PW_OK;
 }
@@ -52,7 +52,7 @@ static void galpha_coefficients (galpha *d, double rho) {
 static int galpha_restart (pw_run *r, pw_error *error) {
   galpha *d = r->data;
   (void)error;
-  d->base = d->last.t0 = r->t;
+  d->base = d->work.last.t0 = r->t;
   d->count = 0;
   d->h = 0;
   return PW_OK;
@@ -63,26 +63,21 @@ static int galpha_open (pw_run *r, pw_error *error) {
   if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   d->ggl = pw_stabilised_by (r, "ggl");
   galpha_coefficients (d, pw_option_value (r, "rho"));
-  int status = pw_tangent_open (&d->tangent, r);
+  int status = pw_tangent_open (&d->work.tangent, r);
   d->n = r->s->coords;
-  d->rows = d->tangent.rows;
-  d->positions = d->ggl ? d->tangent.holonomic : 0;
+  d->rows = d->work.tangent.rows;
+  d->positions = d->ggl ? d->work.tangent.holonomic : 0;
   d->size = 2 * d->n + d->rows + d->positions;
   if (status == PW_OK) status = galpha_allocate (d, r->s);
   if (status == PW_OK) status = pw_galpha_open_matrix (r);
   if (status != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  status = pw_between_open (&d->last, r, d->ggl, error);
+  status = pw_between_open (&d->work.last, r, d->ggl, error);
   return status == PW_OK ? galpha_restart (r, error) : status;
 }
 
 static void galpha_close (pw_run *r) {
-  galpha *d = r->data;
-  pw_between_close (&d->last);
-  pw_sparse_close (&d->sparse);
-  pw_tangent_close (&d->tangent);
-  free (d->value);
-  free (d->memory);
-  free (d);
+  pw_implicit_close (&r->data->work);
+  free (r->data);
 }
 
 /* ---- Beginning ---- */
@@ -148,7 +143,7 @@ static int galpha_begin (pw_run *r, double h) {
   if (!d->ggl && d->h > 0) { /* rates have the error that goes with the size before */
     status = pw_place (r->s, r->t, r->q, d->v);
     if (status == PW_OK) pw_sweep_J (r->s);
-    if (status == PW_OK) status = pw_project_velocities (&d->last.projector, r, d->v);
+    if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
   }
   if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, d->v, d->a, d->eta);
   if (status == PW_OK) status = galpha_jerk (r, h, jerk);
@@ -164,7 +159,7 @@ static int galpha_begin (pw_run *r, double h) {
 static void galpha_accept (pw_run *r, double h, double t1) {
   galpha *d = r->data;
   size_t n = (size_t)d->n * sizeof (double);
-  pw_between_keep (&d->last, r);
+  pw_between_keep (&d->work.last, r);
   memcpy (r->q, d->q1, n);
   memcpy (r->v, d->v1, n);
   memcpy (r->a, d->a1, n);
@@ -172,12 +167,12 @@ static void galpha_accept (pw_run *r, double h, double t1) {
   memcpy (d->a, d->a1, n);
   memcpy (d->w, d->w1, n);
   for (int i = 0; i < r->s->rows; i++) {
-    int used = d->tangent.map ? d->tangent.map[i] : i;
+    int used = d->work.tangent.map ? d->work.tangent.map[i] : i;
     r->lambda[i] = used < 0 ? 0 : d->lambda1[used];
   }
   r->t = t1;
   d->h = h;
-  pw_between_count (&d->last, r);
+  pw_between_count (&d->work.last, r);
 }
 
 static int galpha_fail (pw_run *r, int status, double h, pw_error *error) {
@@ -205,7 +200,7 @@ static int galpha_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 static int galpha_at (pw_run *r, double t, pw_error *error) {
-  return pw_between_at (&r->data->last, r, t, error);
+  return pw_between_at (&r->data->work.last, r, t, error);
 }
 
 static const pw_stabilisation galpha_stabilisations[] = {

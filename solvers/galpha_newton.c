@@ -21,11 +21,11 @@ static int galpha_place (pw_run *r, double t1) {
 }
 
 static const double *galpha_lambda (galpha *d) {
-  return pw_tangent_expand (&d->tangent, d->lambda1, d->rows, d->tangent.lambda);
+  return pw_tangent_expand (&d->work.tangent, d->lambda1, d->rows, d->work.tangent.lambda);
 }
 
 static const double *galpha_mu (galpha *d) {
-  return d->ggl ? pw_tangent_expand (&d->tangent, d->mu1, d->positions, d->tangent.mu) : NULL;
+  return d->ggl ? pw_tangent_expand (&d->work.tangent, d->mu1, d->positions, d->work.tangent.mu) : NULL;
 }
 
 /* ---- Residual ---- */
@@ -57,12 +57,12 @@ static void galpha_constraints (pw_run *r, double *out) {
   pw_mul_J (s, d->v1, d->jv);
   pw_sweep_eta (s, d->eta);
   for (int i = 0; i < s->rows; i++) d->jv[i] -= d->eta[i];
-  if (d->ggl) pw_tangent_compress (&d->tangent, d->jv, d->rows, out);
+  if (d->ggl) pw_tangent_compress (&d->work.tangent, d->jv, d->rows, out);
   pw_sweep_g (s, d->ggl ? d->eta : d->jv);
   if (d->ggl)
-    pw_tangent_compress (&d->tangent, d->eta, d->positions, out + d->rows);
+    pw_tangent_compress (&d->work.tangent, d->eta, d->positions, out + d->rows);
   else
-    pw_tangent_compress (&d->tangent, d->jv, d->rows, out);
+    pw_tangent_compress (&d->work.tangent, d->jv, d->rows, out);
 }
 
 static int galpha_residual (pw_run *r, double h, double t1) {
@@ -90,26 +90,23 @@ static void galpha_fill (pw_run *r, double h) {
                                 .of_q = d->gamma / (h * d->beta),
                                 .of_a = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma),
                                 .of_lambda = 1 };
-  pw_tangent_kinematics (&d->tangent, &to, galpha_mu (d), d->D);
-  pw_tangent_momentum (&d->tangent, &to, galpha_lambda (d));
-  pw_tangent_rates (&d->tangent, &to, d->v1, d->ggl);
-  pw_tangent_positions (&d->tangent, &to, d->ggl ? 2 * n + d->rows : 2 * n);
+  pw_tangent_kinematics (&d->work.tangent, &to, galpha_mu (d), d->D);
+  pw_tangent_momentum (&d->work.tangent, &to, galpha_lambda (d));
+  pw_tangent_rates (&d->work.tangent, &to, d->v1, d->ggl);
+  pw_tangent_positions (&d->work.tangent, &to, d->ggl ? 2 * n + d->rows : 2 * n);
 }
 
 int pw_galpha_open_matrix (pw_run *r) {
   galpha *d = r->data;
-  pw_tangent *x = &d->tangent;
-  pw_tape_record (&x->tape);
+  pw_tape_record (&d->work.tangent.tape);
   galpha_fill (r, 1);
-  if (pw_tape_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
-  d->value = malloc ((size_t)x->colptr[d->size] * sizeof *d->value);
-  return d->value ? pw_sparse_open (&d->sparse, d->size, x->colptr, x->rowind) : PW_MACHINE;
+  return pw_implicit_lay_out (&d->work, d->size);
 }
 
 /* Scales of the rows and columns for a step of size h. */
 static void galpha_scale (const pw_run *r, double h) {
   galpha *d = r->data;
-  int n = d->n, holonomic = d->ggl ? 0 : d->tangent.holonomic;
+  int n = d->n, holonomic = d->ggl ? 0 : d->work.tangent.holonomic;
   double c = d->gamma / (h * d->beta), e = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma), mass = 0;
   for (int j = 0; j < n; j++) mass = fmax (mass, r->s->mass[j]);
   if (mass == 0) mass = 1;
@@ -124,15 +121,15 @@ static void galpha_scale (const pw_run *r, double h) {
 
 static int galpha_factor (pw_run *r, double h) {
   galpha *d = r->data;
-  const pw_tangent *x = &d->tangent;
-  memset (d->value, 0, (size_t)x->colptr[d->size] * sizeof *d->value);
-  pw_tape_fill (&d->tangent.tape, d->value);
+  const pw_tangent *x = &d->work.tangent;
+  memset (d->work.value, 0, (size_t)x->colptr[d->size] * sizeof *d->work.value);
+  pw_tape_fill (&d->work.tangent.tape, d->work.value);
   galpha_fill (r, h);
   for (int c = 0; c < d->size; c++)
-    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) d->value[i] *= d->row[x->rowind[i]] * d->column[c];
+    for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) d->work.value[i] *= d->row[x->rowind[i]] * d->column[c];
   r->statistics.jacobians++;
   r->statistics.factorisations++;
-  int status = pw_sparse_factor (&d->sparse, d->value);
+  int status = pw_sparse_factor (&d->work.sparse, d->work.value);
   return status > 0 ? PW_INPUT : status;
 }
 
@@ -147,7 +144,7 @@ static void galpha_predict (pw_run *r, double h) {
     d->v1[j] = d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
     d->q1[j] = r->q[j] + h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
   }
-  pw_tangent_compress (&d->tangent, r->lambda, d->rows, d->lambda1);
+  pw_tangent_compress (&d->work.tangent, r->lambda, d->rows, d->lambda1);
   memset (d->mu1, 0, (size_t)r->s->rows * sizeof *d->mu1);
 }
 
@@ -158,7 +155,7 @@ static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
   int n = d->n;
   double large = 1, e = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
   for (int i = 0; i < d->size; i++) d->z[i] *= -d->row[i];
-  if (pw_sparse_solve (&d->sparse, d->z) != PW_OK) return PW_MACHINE;
+  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_MACHINE;
   *most = 0;
   for (int j = 0; j < n; j++) {
     double unit = pw_unit (r->s, j), size = fmax (fabs (d->z[j]), fabs (d->z[n + j])) / unit;
@@ -196,7 +193,7 @@ int pw_galpha_solve (pw_run *r, double h, double t1) {
     if (size <= enough || stalled || (rate < 1 && size * rate / (1 - rate) <= enough)) return galpha_place (r, t1);
     if (rate > 2 && i > 3) return PW_RETRY;
     fresh = i > 0 && rate > 0.02;
-    if (fresh) pw_sparse_forget (&d->sparse);
+    if (fresh) pw_sparse_forget (&d->work.sparse);
     before = size;
   }
   return PW_RETRY;

@@ -2,10 +2,8 @@
 #ifndef PW_GALPHA_STATE_H
 #define PW_GALPHA_STATE_H
 
-#include "between.h"
+#include "implicit.h"
 #include "method.h"
-#include "sparse.h"
-#include "tangent.h"
 
 struct pw_method_data {
   int ggl;                      /* stabilised index 2, else index 3 */
@@ -19,11 +17,7 @@ struct pw_method_data {
   double *q1, *v1, *a1, *w1, *lambda1, *mu1; /* the successor; lambda, mu: rows in use */
   double *z, *row, *column;                  /* size: residual, then correction; scales of the matrix */
   double *pull, *f, *jv, *eta;               /* scratch: coords + 3, coords + 3, all rows, all rows */
-  double *value;                             /* of the matrix */
-  pw_tangent tangent;
-  pw_sparse sparse;
-  pw_between last;
-  char *memory;
+  pw_implicit work;
 };
 
 typedef struct pw_method_data galpha;

@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <idas/idas.h>
+#include "between.h"
 #include "ida_state.h"
 
 /* ---- What IDA asks for besides ---- */
@@ -248,8 +249,7 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
     if (flag == IDA_SUCCESS) flag = IDAGetDky (d->ida, t, 0, d->y);
     if (flag == IDA_SUCCESS && r->settings.ledger && r->s->entries > 0) flag = IDAGetQuadDky (d->ida, t, 0, d->work);
   }
-  if (flag == IDA_BAD_T)
-    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
+  if (flag == IDA_BAD_T) return pw_fail_outside (r, NAN, t, error);
   if (flag != IDA_SUCCESS) return ida_fail (d, flag, error);
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
   for (int i = 0; i < r->s->entries; i++) r->ledger_at[i] = work[i];

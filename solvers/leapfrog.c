@@ -29,7 +29,7 @@ enum { LEAPFROG_MOST = 100 }; /* substitutions for forces of the rates */
 static int leapfrog_restart (pw_run *r, pw_error *error) {
   leapfrog *d = r->data;
   (void)error;
-  d->base = d->last.t0 = r->t;
+  d->base = d->work.last.t0 = r->t;
   d->count = 0;
   return PW_OK;
 }
@@ -40,28 +40,23 @@ static int leapfrog_allocate (leapfrog *d, const pw_system *s) {
     { &d->u, n }, { &d->q1, n },     { &d->v1, n },    { &d->middle, n }, { &d->dv, n },
     { &d->f, n }, { &d->off, rows }, { &d->mu, rows }, { &d->eta, rows }, { &d->z, n + rows }
   };
-  d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  return d->memory ? PW_OK : PW_MACHINE;
+  d->work.memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  return d->work.memory ? PW_OK : PW_MACHINE;
 }
 
 static int leapfrog_open (pw_run *r, pw_error *error) {
   leapfrog *d = r->data = calloc (1, sizeof *d);
   int status = d ? leapfrog_allocate (d, r->s) : PW_MACHINE;
-  if (status == PW_OK) status = pw_tangent_open (&d->tangent, r);
+  if (status == PW_OK) status = pw_tangent_open (&d->work.tangent, r);
   if (status == PW_OK) status = pw_leapfrog_open_matrix (r);
   if (status != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  status = pw_between_open (&d->last, r, 1, error);
+  status = pw_between_open (&d->work.last, r, 1, error);
   return status == PW_OK ? leapfrog_restart (r, error) : status;
 }
 
 static void leapfrog_close (pw_run *r) {
-  leapfrog *d = r->data;
-  pw_between_close (&d->last);
-  pw_sparse_close (&d->sparse);
-  pw_tangent_close (&d->tangent);
-  free (d->value);
-  free (d->memory);
-  free (d);
+  pw_implicit_close (&r->data->work);
+  free (r->data);
 }
 
 static void leapfrog_carry (pw_run *r, pw_archive *a) {
@@ -140,12 +135,12 @@ static int leapfrog_finish (pw_run *r, double h, double t1) {
 static void leapfrog_accept (pw_run *r, double t1) {
   leapfrog *d = r->data;
   size_t n = (size_t)r->s->coords * sizeof (double);
-  pw_between_keep (&d->last, r);
+  pw_between_keep (&d->work.last, r);
   memcpy (r->q, d->q1, n);
   memcpy (r->v, d->v1, n);
   pw_accelerate_placed (r, r->v, r->a, r->lambda);
   r->t = t1;
-  pw_between_count (&d->last, r);
+  pw_between_count (&d->work.last, r);
   r->statistics.steps++;
 }
 
@@ -174,7 +169,7 @@ static int leapfrog_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 static int leapfrog_at (pw_run *r, double t, pw_error *error) {
-  return pw_between_at (&r->data->last, r, t, error);
+  return pw_between_at (&r->data->work.last, r, t, error);
 }
 
 static const pw_stabilisation leapfrog_stabilisations[] = {

@@ -39,7 +39,7 @@ static void drift_move (pw_run *r, double h) {
 
 /* M and J^T of the beginning, where the system is placed. */
 static void drift_put_momentum (pw_run *r) {
-  pw_tangent *x = &r->data->tangent;
+  pw_tangent *x = &r->data->work.tangent;
   pw_system *s = r->s;
   for (int j = 0; j < s->coords; j++) pw_tape_put (&x->tape, j, j, s->mass[j]);
   pw_newton_JT (s, &x->tape,
@@ -48,7 +48,7 @@ static void drift_put_momentum (pw_run *r) {
 
 /* S + h/2 ((S u)_q - b_q) of the middle, where the system is placed. */
 static void drift_put_middle (pw_run *r, double h) {
-  pw_tangent *x = &r->data->tangent;
+  pw_tangent *x = &r->data->work.tangent;
   pw_system *s = r->s;
   pw_put put = { .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u };
   pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
@@ -60,28 +60,24 @@ static void drift_put_middle (pw_run *r, double h) {
 
 /* G of the end, where the system is placed. */
 static void drift_put_end (pw_run *r) {
-  pw_tangent *x = &r->data->tangent;
+  pw_tangent *x = &r->data->work.tangent;
   pw_newton_J (r->s, &x->tape, &(pw_put){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
 }
 
 int pw_leapfrog_open_matrix (pw_run *r) {
   leapfrog *d = r->data;
-  pw_tangent *x = &d->tangent;
-  int size = r->s->coords + x->rows;
-  pw_tape_record (&x->tape);
+  pw_tape_record (&d->work.tangent.tape);
   drift_put_momentum (r);
   drift_put_middle (r, 1);
   drift_put_end (r);
-  if (pw_tape_lay_out (&x->tape, size, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
-  d->value = malloc (((size_t)x->colptr[size] + 1) * sizeof *d->value);
-  return d->value ? pw_sparse_open (&d->sparse, size, x->colptr, x->rowind) : PW_MACHINE;
+  return pw_implicit_lay_out (&d->work, r->s->coords + d->work.tangent.rows);
 }
 
 static int drift_factor (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
-  pw_tangent *x = &d->tangent;
-  memset (d->value, 0, (size_t)x->colptr[r->s->coords + x->rows] * sizeof *d->value);
-  pw_tape_fill (&x->tape, d->value);
+  pw_tangent *x = &d->work.tangent;
+  memset (d->work.value, 0, (size_t)x->colptr[r->s->coords + x->rows] * sizeof *d->work.value);
+  pw_tape_fill (&x->tape, d->work.value);
   int status = drift_place (r, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   drift_put_momentum (r);
@@ -93,7 +89,7 @@ static int drift_factor (pw_run *r, double h, double t1) {
   drift_put_end (r);
   r->statistics.jacobians++;
   r->statistics.factorisations++;
-  return pw_sparse_factor (&d->sparse, d->value);
+  return pw_sparse_factor (&d->work.sparse, d->work.value);
 }
 
 /* ---- Iteration ---- */
@@ -126,8 +122,8 @@ static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
   int n = r->s->coords;
   memset (d->z, 0, (size_t)n * sizeof *d->z);
   for (int i = 0; i < r->s->rows; i++) d->off[i] = -d->off[i];
-  pw_tangent_compress (&d->tangent, d->off, d->tangent.rows, d->z + n);
-  if (pw_sparse_solve (&d->sparse, d->z) != PW_OK) return PW_MACHINE;
+  pw_tangent_compress (&d->work.tangent, d->off, d->work.tangent.rows, d->z + n);
+  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_MACHINE;
   p->size = 0, p->large = 1;
   for (int j = 0; j < n; j++) {
     d->u[j] += d->z[j];

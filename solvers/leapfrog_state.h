@@ -2,10 +2,8 @@
 #ifndef PW_LEAPFROG_STATE_H
 #define PW_LEAPFROG_STATE_H
 
-#include "between.h"
+#include "implicit.h"
 #include "method.h"
-#include "sparse.h"
-#include "tangent.h"
 
 struct pw_method_data {
   double base;             /* time from which steps are counted */
@@ -14,11 +12,7 @@ struct pw_method_data {
   double *middle, *dv, *f; /* mean of positions, a correction of rates, forces */
   double *off, *mu, *eta;  /* all rows: what is left of them, multipliers of a correction, right-hand side */
   double *z;               /* coords and rows in use: a correction of u and its multipliers */
-  double *value;           /* of Newton's matrix */
-  pw_tangent tangent;
-  pw_sparse sparse;
-  pw_between last;
-  char *memory;
+  pw_implicit work;
 };
 
 typedef struct pw_method_data leapfrog;

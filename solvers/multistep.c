@@ -4,6 +4,7 @@
 #include <string.h>
 #include <cvodes/cvodes.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+#include "between.h"
 #include "multistep_state.h"
 
 /* ---- What CVODES asks for ---- */
@@ -305,8 +306,7 @@ int pw_multistep_at (pw_run *r, double t, pw_error *error) {
     return multistep_at_fails (r, status, t, error);
   }
   int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->y) : CV_BAD_T;
-  if (flag == CV_BAD_T)
-    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, which ends at %.17g s", t, r->t);
+  if (flag == CV_BAD_T) return pw_fail_outside (r, NAN, t, error);
   if (flag == CV_SUCCESS && r->settings.ledger && r->s->entries > 0) flag = CVodeGetQuadDky (d->cvode, t, 0, d->work);
   if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
   const double *y = N_VGetArrayPointer (d->y);

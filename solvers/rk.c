@@ -7,6 +7,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "between.h"
 #include "rk_state.h"
 #include "unroll.h"
 #include "util.h"
@@ -311,8 +312,7 @@ static int rk_step_again (pw_run *r, double t) {
 
 int pw_rk_at (pw_run *r, double t, pw_error *error) {
   struct pw_method_data *d = r->data;
-  if (t > r->t || t < d->t0)
-    return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, d->t0, r->t);
+  if (t > r->t || t < d->t0) return pw_fail_outside (r, d->t0, t, error);
   if (t == r->t) {
     pw_show_reached (r);
     return PW_OK;

@@ -2,17 +2,8 @@
 # Animations: whole files of the right kind; in a browser without a screen, if there is one, the page loads, plays and
 # scrubs as tests/animate.js asks, without a message on its console.  Reads PINWHEEL, BROWSER.
 
-pinwheel=${PINWHEEL:-build/pinwheel}
+. "$(dirname "$0")/report.sh"
 here=$(cd "$(dirname "$0")" && pwd)
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-bad=0
-
-# report NAME STATUS
-report () {
-  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
-}
 
 browser=$BROWSER
 for b in chromium chromium-browser google-chrome; do

@@ -3,25 +3,8 @@
 # alone, byte for byte, for every method and for scenes with what a state can hold.
 # Run from the top folder; reads PINWHEEL, SEED (of the random moments).
 
-pinwheel=${PINWHEEL:-build/pinwheel}
-case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-bad=0
-seed=${SEED:-$$}
+. "$(dirname "$0")/report.sh"
 echo "# SEED=$seed"
-
-# report NAME STATUS
-report () {
-  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
-}
-
-# random LOW HIGH: sets $random
-random () {
-  seed=$(((seed * 1103515245 + 12345) % 2147483648))
-  random=$(awk -v x=$seed -v a="$1" -v b="$2" 'BEGIN { print a + (b - a) * (x / 65536 % 1000) / 1000 }')
-}
 
 # killed MODEL OPTION...: once left alone, once killed until it gets through
 killed () {

@@ -1,20 +1,14 @@
 #!/bin/sh
 # What fuzzing began with and has found, through each target once more.  Reads BUILD.
 
-build=${BUILD:-build} bad=0
-log=$(mktemp) || exit 1
-trap 'rm -f "$log"' EXIT
-for target in "$build"/fuzz/*; do
+. "$(dirname "$0")/report.sh"
+
+for target in "${BUILD:-build}"/fuzz/*; do
   name=$(basename "$target")
   case $name in *.*) continue ;; esac
   more=
   [ "$name" != model ] || more='models tests/models tests/bad-models'
-  if timeout 300 "$target" "tests/fuzz/corpus/$name" $more >"$log" 2>&1; then
-    echo "ok $name: $(tail -n 1 "$log")"
-  else
-    echo "not ok $name"
-    tail -n 20 "$log"
-    bad=1
-  fi
+  timeout 300 "$target" "tests/fuzz/corpus/$name" $more >"$work/log" 2>&1
+  report "$name: $(tail -n 1 "$work/log")" $?
 done
 exit $bad

@@ -5,16 +5,8 @@
 
 BUILD=${BUILD:-build}
 builds=$BUILD/variant/bits
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
+. "$(dirname "$0")/report.sh"
 unset MAKEFLAGS MAKELEVEL MFLAGS CFLAGS CPPFLAGS LDFLAGS
-bad=0
-
-# report NAME STATUS
-report () {
-  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
-}
 
 # build NAME CC CFLAGS: the program and the scenes of the tests
 build () {

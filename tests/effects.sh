@@ -6,15 +6,7 @@
 BUILD=${BUILD:-build}
 unset MAKEFLAGS MAKELEVEL MFLAGS
 command -v valgrind >/dev/null || { echo '# valgrind is not there: not tried'; exit 0; }
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-bad=0
-
-# report NAME STATUS
-report () {
-  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
-}
+. "$(dirname "$0")/report.sh"
 
 make NO_DEPS=1 BUILD="$BUILD" bench-effects >"$work/log" 2>&1
 status=$?

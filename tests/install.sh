@@ -3,15 +3,7 @@
 # program that embeds the libraries through pkg-config; uninstall leaves nothing.  Reads BUILD, CC.
 
 build=${BUILD:-build} cc=${CC:-cc}
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-bad=0
-
-# report NAME STATUS
-report () {
-  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; cat "$work/log"; bad=1; fi
-}
+. "$(dirname "$0")/report.sh"
 
 destination=$work/root prefix=/opt/pinwheel
 top=$destination$prefix

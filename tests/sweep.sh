@@ -2,25 +2,8 @@
 # Sweeps under fire: killed at random moments again and again, in one piece and in parts, by GNU parallel if it is there.
 # Run from the top folder; reads PINWHEEL, SEED (of the random moments).
 
-pinwheel=${PINWHEEL:-build/pinwheel}
-case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-bad=0
-seed=${SEED:-$$}
+. "$(dirname "$0")/report.sh"
 echo "# SEED=$seed"
-
-# report NAME STATUS
-report () {
-  if [ "$2" = 0 ]; then echo "ok $1"; else echo "not ok $1"; bad=1; fi
-}
-
-# random LOW HIGH: sets $random
-random () {
-  seed=$(((seed * 1103515245 + 12345) % 2147483648))
-  random=$(awk -v x=$seed -v a="$1" -v b="$2" 'BEGIN { print a + (b - a) * (x / 65536 % 1000) / 1000 }')
-}
 
 grid='ezyroller --vary omega=log:1:10:20 --vary a=0.4,0.5,0.6 --vary frame.omega=0,0.1 --t-end 8'
 

@@ -98,8 +98,8 @@ static double galpha_condition (const char *model, const char *method, double h)
   pw_system *s = ladder_open (model);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = h, .span = 1 });
   runs_to (r, 3 * h);
-  pw_sparse *k = &r->data->sparse;
-  klu_l_condest (k->colptr, r->data->value, k->order, k->factors, &k->common);
+  pw_sparse *k = &r->data->work.sparse;
+  klu_l_condest (k->colptr, r->data->work.value, k->order, k->factors, &k->common);
   double condition = k->common.condest;
   pw_close (r);
   pw_free (s);

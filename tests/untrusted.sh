@@ -3,12 +3,7 @@
 # an error in words, in little time and memory (2 GB of addresses are all they get).
 # Run from the top folder; reads PINWHEEL.
 
-pinwheel=${PINWHEEL:-build/pinwheel}
-case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac
-work=$(mktemp -d) || exit 1
-trap 'rm -rf "$work"' EXIT
-trap 'exit 130' INT TERM
-bad=0
+. "$(dirname "$0")/report.sh"
 mkdir "$work/in" && cd "$work/in" || exit 1
 
 # refused NAME TEXT: standard input is a model after its first line; it is refused with the text in the message.

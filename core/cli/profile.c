@@ -14,7 +14,7 @@
 #include "util.h"
 
 enum { PROFILE_BATCHES = 5, PROFILE_PIECES = 6 };
-#define PROFILE_BATCH 0.02     /* least processor time of a batch [s] */
+#define PROFILE_BATCH 0.005    /* least processor time of a batch [s] */
 #define PROFILE_DISTANCE 1e-10 /* off the constraints, before a projection, in units of the length scale */
 
 typedef struct {

@@ -1,0 +1,211 @@
+/* Wheels that lock hold still; what contradicts itself is named. */
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "scene.h"
+#include "trial.h"
+
+/* ---- Wheels that lock a body ---- */
+
+typedef struct {
+  double wheels, speed, torque;
+} locked_cart;
+
+static const pw_parameter locked_cart_list[] = {
+  { PW_AT (locked_cart, wheels), 3, "", "wheels, no two of which roll alike", PW_COUNT },
+  { PW_AT (locked_cart, speed), 0, "m/s", "at the start", PW_REAL },
+  { PW_AT (locked_cart, torque), 2, "N m", "on the body", PW_REAL },
+  { .name = NULL },
+};
+
+static void locked_locked (pw_model *m, const void *parameter) {
+  static const char *const name[] = { "front", "left", "right", "rear" };
+  static const double at[][3] = { { 0.5, 0, 0.3 }, { 0, 0.4, -0.2 }, { 0, -0.4, 0.1 }, { -0.5, 0.1, 0.7 } };
+  const locked_cart *p = parameter;
+  pw_add_body (
+      m, &(pw_body){ .name = "cart", .mass = 3, .inertia = 0.2, .start = { 1, 2, 0.3 }, .rate = { p->speed, 0, 0 } });
+  for (int i = 0; i < (int)p->wheels; i++)
+    pw_add_wheel (m, &(pw_wheel){ .name = name[i], .body = "cart", .at = { at[i][0], at[i][1] }, .heading = at[i][2] });
+  pw_add_torque (m, &(pw_torque){ .name = "push", .body = { "cart", "ground" }, .value = { .constant = p->torque } });
+}
+
+static const pw_plugin_table locked_cart_table = { .abi = PW_ABI,
+                                                   .size = sizeof (pw_plugin_table),
+                                                   .parameters = locked_cart_list,
+                                                   .parameters_size = sizeof (locked_cart),
+                                                   .build = locked_locked };
+
+/* It stays where it is, to the bit, whatever pushes it. */
+static void test_locked (void **state) {
+  static const char *const method[] = {
+    "rk4+none",       "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
+    "ida+none",       "ida+baumgarte", "ida+ggl",        "ida+index2",
+    "ida+si1",        "adams+none",    "bdf+none",       "bdf+baumgarte",
+    "bdf+projection", "rk4+nullspace", "galpha+index3",  "galpha+ggl",
+    "leapfrog"
+  };
+  (void)state;
+  for (int wheels = 3; wheels <= 4; wheels++)
+    for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+      pw_system *s = scene_system (&locked_cart_table, "wheels", (double)wheels, NULL);
+      pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .rtol = 1e-8, .span = 2 });
+      assert_int_equal (pw_run_redundant (r), wheels - 3);
+      pw_sample x = runs_to (r, 2);
+      const double q[] = { 1, 2, 0.3 };
+      for (int j = 0; j < 3; j++) {
+        check_close (method[i], x.q[j], q[j], 16 * CHECK_EPS, "at rest");
+        check_close (method[i], x.v[j], 0, 16 * CHECK_EPS, "at rest");
+      }
+      pw_close (r);
+      pw_free (s);
+    }
+}
+
+static void test_locked_start (void **state) {
+  (void)state;
+  for (int wheels = 3; wheels <= 4; wheels++) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&locked_cart_table, "wheels", (double)wheels, "speed", 1.5, NULL);
+    assert_null (pw_open (s, "rk4+projection", NULL, &error));
+    check_error (&error, PW_START,
+                 wheels == 3
+                     ? "model scene: the given rates would have to be removed entirely: wheel front, wheel left, "
+                       "wheel right allow no such motion"
+                     : "model scene: the given rates would have to be removed entirely: wheel front, wheel left, "
+                       "wheel right, wheel rear allow no such motion");
+    pw_free (s);
+  }
+}
+
+/* Three axles that meet in one point at the start, until the third wheel is steered away. */
+static int locked_steer (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = 0.5 * t * t;
+  value[1] = t;
+  value[2] = 1;
+  return 0;
+}
+
+static void locked_steered (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 3, .inertia = 0.2, .rate = { 1, 0, 0 } });
+  pw_add_body (m,
+               &(pw_body){ .name = "fork", .mass = 0.2, .inertia = 0.01, .start = { 0.5, 0, 0 }, .rate = { 1, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "head", .body = { "cart", "fork" }, .at = { { 0.5, 0 } } });
+  pw_add_drive (m, &(pw_drive){ .name = "steering",
+                                .body = { "fork", "cart" },
+                                .what = PW_DRIVE_ANGLE,
+                                .value = { PW_FUNCTION, .function = { .eval = locked_steer } } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "middle", .body = "cart" });
+  pw_add_wheel (m, &(pw_wheel){ .name = "rear", .body = "cart", .at = { -0.5, 0 } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "front", .body = "fork" });
+}
+
+/* A locking that arises on the way stops the run and names a wheel. */
+static void test_locks_in_motion (void **state) {
+  static const pw_plugin_table table = TRIAL_TABLE (locked_steered);
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",  "rk4+none",      "ida+baumgarte",
+                                        "ida+ggl",        "rk4+nullspace",  "galpha+index3", "galpha+ggl",
+                                        "adams+none",     "ida+si1",        "ida+index2",    "adams+baumgarte",
+                                        "bdf+baumgarte",  "bdf+projection", "leapfrog" };
+  (void)state;
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&table, NULL);
+    pw_run *r = pw_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 1 }, &error);
+    int status = r ? pw_advance_to (r, 1, 1, &error) : error.status;
+    print_message ("%s: %s\n", method[i], error.text);
+    assert_true (status == PW_METHOD || status == PW_START);
+    assert_non_null (strstr (error.text, "wheel "));
+    /* the heading is t^2 / 2: within 20 steps of 1e-3 s, or when it is above what the tolerance leaves of the others */
+    if (r) check_below ("time", pw_time (r), 0.05, "told at once");
+    if (r) pw_close (r);
+    pw_free (s);
+  }
+}
+
+/* ---- What contradicts itself ---- */
+
+/* Two bodies hang from pivots 10 m apart, and are to be welded at their ends, 1 m from each. */
+static void locked_gap (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "left", .mass = 1, .inertia = 0.1, .start = { 0.5, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "right", .mass = 1, .inertia = 0.1, .start = { 9.5, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "left", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "right", "ground" }, .at = { { 0.5, 0 }, { 10, 0 } } });
+  pw_add_weld (m, &(pw_weld){ .name = "joint", .body = { "left", "right" }, .at = { { 0.5, 0 }, { -0.5, 0 } } });
+}
+
+static void test_gap (void **state) {
+  static const pw_plugin_table table = TRIAL_TABLE (locked_gap);
+  (void)state;
+  pw_error error = { 0 };
+  double open = 0;
+  pw_system *s = scene_system (&table, NULL);
+  assert_null (pw_open (s, "rk4+projection", NULL, &error));
+  print_message ("%s\n", error.text);
+  assert_int_equal (error.status, PW_START);
+  const char *by = strstr (error.text, " is open by ");
+  assert_non_null (by);
+  assert_true (sscanf (by, " is open by %lf", &open) == 1 && open > 1 && open < 10);
+  pw_free (s);
+}
+
+typedef struct {
+  double offset;
+} locked_offset;
+
+static const pw_parameter locked_offset_list[] = {
+  { PW_AT (locked_offset, offset), 0, "rad", "of the second drive at the start", PW_REAL },
+  { .name = NULL },
+};
+
+/* Two drives turn one body; the second one would like another angle. */
+static void locked_drives (pw_model *m, const void *parameter) {
+  const locked_offset *p = parameter;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 0.1 });
+  pw_add_pin (m, &(pw_pin){ .name = "hub", .body = { "disc", "ground" } });
+  pw_add_drive (m, &(pw_drive){ .name = "one", .body = { "disc", "ground" }, .what = PW_DRIVE_ANGLE });
+  pw_signal other = { .constant = p->offset };
+  if (p->offset == 0) other = (pw_signal){ PW_FUNCTION, .function = { .eval = locked_steer } };
+  pw_add_drive (m, &(pw_drive){ .name = "two", .body = { "disc", "ground" }, .what = PW_DRIVE_ANGLE, .value = other });
+}
+
+static const pw_plugin_table locked_drives_table = { .abi = PW_ABI,
+                                                     .size = sizeof (pw_plugin_table),
+                                                     .parameters = locked_offset_list,
+                                                     .parameters_size = sizeof (locked_offset),
+                                                     .build = locked_drives };
+
+static void test_drives (void **state) {
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",    "ida+baumgarte",
+                                        "rk4+nullspace",  "galpha+index3",   "galpha+ggl", "ida+si1",
+                                        "bdf+projection", "adams+baumgarte", "leapfrog" };
+  (void)state;
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&locked_drives_table, "offset", 0.1, NULL);
+    assert_null (pw_open (s, method[i], NULL, &error));
+    print_message ("%s\n", error.text);
+    assert_int_equal (error.status, PW_START);
+    assert_non_null (strstr (error.text, "drive "));
+    pw_free (s);
+    error = (pw_error){ 0 };
+    s = scene_system (&locked_drives_table, NULL);
+    pw_run *r = pw_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-6, .span = 1 }, &error);
+    int status = r ? pw_advance_to (r, 1, 1, &error) : error.status;
+    print_message ("%s\n", error.text);
+    assert_true (status == PW_METHOD || status == PW_START);
+    assert_non_null (strstr (error.text, "drive "));
+    if (r) pw_close (r);
+    pw_free (s);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_locked), cmocka_unit_test (test_locked_start), cmocka_unit_test (test_locks_in_motion),
+    cmocka_unit_test (test_gap),    cmocka_unit_test (test_drives),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
