@@ -161,7 +161,9 @@ static int nullspace_quick (pw_nullspace *b) {
     return nullspace_eliminate (b->K, b->mu, m);
     QUICK (1)
     QUICK (2)
-    QUICK (3) QUICK (4) QUICK (5) QUICK (6)
+    QUICK (3)
+    QUICK (4)
+    QUICK (5) QUICK (6)
 #undef QUICK
         default : return nullspace_eliminate (b->K, b->mu, b->rows);
   }

@@ -55,6 +55,8 @@ static void rk_list_weights (struct pw_method_data *d) {
   const double *A = d->tableau->A;
   d->row[0] = rk_list_row (d->tableau->b, d->tableau->stages);
   for (int i = 1; i < d->tableau->stages; A += i++) d->row[i] = rk_list_row (A, i);
+  if (d->tableau->e) d->estimate[0] = rk_list_row (d->tableau->e, d->tableau->stages + 1);
+  if (d->tableau->e3) d->estimate[1] = rk_list_row (d->tableau->e3, d->tableau->stages + 1);
 }
 
 static int rk_allocate (struct pw_method_data *d, const pw_system *s) {

@@ -20,15 +20,21 @@ void pw_rk_begin_adaptive (pw_run *r) {
   d->before = 1e-4;
 }
 
-/* out = sum_j e_j K_j over the stages and the new state's derivative. */
-static void adapt_estimate (const pw_run *r, const double *e, const double *first, double *const *K, const double *last,
-                            double *out) {
-  int stages = r->data->tableau->stages;
-  for (int i = 0; i < r->s->coords; i++) {
-    double sum = e[0] * first[i] + e[stages] * last[i];
-    for (int j = 1; j < stages; j++) sum += e[j] * K[j][i];
-    out[i] = sum;
+/* out = sum_j w_j K_j, two entries at a time. */
+static void adapt_estimate (const pw_rk_row *w, double *const *K, int n, double *out) {
+  int i = 0;
+  for (; i + 1 < n; i += 2) {
+    double even = 0, odd = 0;
+    for (int j = 0; j < w->count; j++) {
+      const double *k = K[w->stage[j]];
+      even += w->weight[j] * k[i];
+      odd += w->weight[j] * k[i + 1];
+    }
+    out[i] = even, out[i + 1] = odd;
   }
+  if (i == n) return;
+  out[i] = 0;
+  for (int j = 0; j < w->count; j++) out[i] += w->weight[j] * K[w->stage[j]][i];
 }
 
 /* Mean square of positions' and rates' errors in units of the tolerances. */
@@ -44,11 +50,11 @@ static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
   return sum / (2 * s->coords);
 }
 
-static double adapt_one (pw_run *r, const double *e, int projected) {
+static double adapt_one (pw_run *r, const pw_rk_row *e, int projected) {
   struct pw_method_data *d = r->data;
   double *eq = r->q_at, *ev = r->v_at;
-  adapt_estimate (r, e, r->v, d->V, d->v, eq);
-  adapt_estimate (r, e, r->a, d->A, d->a, ev);
+  adapt_estimate (e, d->V, r->s->coords, eq);
+  adapt_estimate (e, d->A, r->s->coords, ev);
   if (!projected && !d->minimal) return adapt_norm (r, eq, ev);
   double before = adapt_norm (r, eq, ev);
   if (projected || d->closes) pw_project_error (r, eq, r->s->holonomic);
@@ -58,10 +64,12 @@ static double adapt_one (pw_run *r, const double *e, int projected) {
 
 /* The error of the step just computed; at most 1 is good. */
 static double adapt_error (pw_run *r, double h, int projected) {
-  const pw_tableau *b = r->data->tableau;
-  double e = adapt_one (r, b->e, projected);
+  struct pw_method_data *d = r->data;
+  const pw_tableau *b = d->tableau;
+  d->V[b->stages] = d->v, d->A[b->stages] = d->a;
+  double e = adapt_one (r, &d->estimate[0], projected);
   if (b->e3 == NULL) return h * sqrt (e);
-  double e3 = adapt_one (r, b->e3, projected);
+  double e3 = adapt_one (r, &d->estimate[1], projected);
   return e + e3 > 0 ? h * e / sqrt (e + 0.01 * e3) : 0;
 }
 

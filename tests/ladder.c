@@ -61,7 +61,7 @@ ladder_error ladder_run (const char *model, const char *method, double step, dou
 ladder_error ladder_solve (const char *model, const char *method, const pw_settings *settings, double t) {
   pw_system *s = ladder_open (model), *S = ladder_open (model);
   pw_run *r = runs_open (s, method, settings);
-  pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = t });
+  pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 3e-14, .span = t });
   pw_sample x = runs_to (r, t), y = runs_to (exact, t);
   ladder_error off = { .cost = *pw_run_statistics (r) };
   double most = 0, T = S->scale.time;
