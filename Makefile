@@ -204,8 +204,8 @@ $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 
 $(BUILD)/benchmarks/engine: $(call obj,$(ENGINE))
 $(BUILD)/benchmarks/engine $(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
-$(BUILD)/benchmarks/eighth: $(call obj,$(addprefix benchmarks/,baseline/ezyroller.c baseline/runge_kutta.c engine/scenes.c))
-$(BUILD)/benchmarks/peers: $(call obj,$(wildcard benchmarks/baseline/*.c) $(addprefix benchmarks/engine/,scenes.c count.c ladder.c))
+$(BUILD)/benchmarks/eighth: $(call obj,$(addprefix benchmarks/,baseline/ezyroller.c baseline/runge_kutta.c engine/scenes.c engine/ladder.c))
+$(BUILD)/benchmarks/peers: $(call obj,$(wildcard benchmarks/baseline/*.c) $(addprefix benchmarks/engine/,scenes.c count.c ladder.c by_hand.c))
 $(BUILD)/benchmarks/peers: EXTRA_LIBS := $(SOLVER_LIBS) -lsundials_sunlinsoldense -lsundials_sunmatrixdense
 $(BUILD)/benchmarks/effects: $(call obj,benchmarks/engine/count.c)
 $(BUILD)/benchmarks/hard: $(call obj,$(HARD))
@@ -261,7 +261,7 @@ demo: all $(BUILD)/benchmarks/demo
 	  --plots $(BUILD)/demo
 	@echo 'figures and data: $(BUILD)/demo/'
 
-bench: all basic $(addprefix $(BUILD)/benchmarks/,eighth engine effects)
+bench: all basic $(addprefix $(BUILD)/benchmarks/,eighth peers engine effects)
 	@sh benchmarks/suite.sh $(BUILD)
 
 bench-quick: all $(BUILD)/benchmarks/quick

@@ -11,18 +11,15 @@
 #include <stdlib.h>
 #include <string.h>
 #include "engine/engine.h"
+#include "engine/ladder.h"
 
 #define pw_method_erk8 eighth_unused
 #include "erk8.c"
 #undef pw_method_erk8
 
-enum { EIGHTH_SECONDS = 100, EIGHTH_ROUNDS = 7, EIGHTH_RUNGS = 24, EIGHTH_WAYS = 4, EIGHTH_TARGETS = 2 };
+enum { EIGHTH_SECONDS = 100, EIGHTH_ROUNDS = 7, EIGHTH_WAYS = 4, EIGHTH_TARGETS = 2 };
 static const double eighth_target[EIGHTH_TARGETS] = { 1e-6, 1e-9 }; /* [m] */
 static const ezy_tableau eighth_tableau = { 12, erk8_c, erk8_A, erk8_b };
-
-typedef struct {
-  double rung, error, cpu[EIGHTH_ROUNDS]; /* step [s] or tolerance; [m]; [s] */
-} eighth_point;
 
 typedef struct {
   ezy hand;
@@ -32,15 +29,6 @@ typedef struct {
   double q[9], v[9], a[9]; /* as long as Pinwheel's own */
   double truth[6];
 } eighth_scene;
-
-/* One way to go down a ladder: from `first`, by `factor`. */
-typedef struct {
-  const char *name, *method;
-  double first, factor;
-  int count;
-  void (*run) (eighth_scene *s, const char *method, double rung, double q[6]);
-  eighth_point point[EIGHTH_RUNGS];
-} eighth_way;
 
 /* ---- By hand ---- */
 
@@ -53,17 +41,19 @@ static void eighth_project (void *context, double t, double *q, double *v, ezy_s
   ezy_project (context, t, q, v, s);
 }
 
-static void eighth_drive (const eighth_scene *s, const ezy_dynamics *d, double h, double q[6]) {
+static double eighth_drive (const eighth_scene *s, const ezy_dynamics *d, double h, double *q) {
   ezy_state state;
   ezy_start (&s->hand, &state);
   long steps = lround (EIGHTH_SECONDS / h);
   for (long i = 1; i <= steps; i++) ezy_step (&eighth_tableau, d, EIGHTH_SECONDS * (double)i / (double)steps, &state);
   memcpy (q, state.q, sizeof state.q);
+  return 12.0 * (double)steps + 1;
 }
 
-static void eighth_by_hand (eighth_scene *s, const char *method, double h, double q[6]) {
-  (void)method;
-  eighth_drive (s, &(ezy_dynamics){ eighth_rate, eighth_project, &s->hand }, h, q);
+static double eighth_by_hand (void *scene, const ladder *way, double h, double *q) {
+  eighth_scene *s = scene;
+  (void)way;
+  return eighth_drive (s, &(ezy_dynamics){ eighth_rate, eighth_project, &s->hand }, h, q);
 }
 
 /* ---- The same on Pinwheel's right-hand side ---- */
@@ -91,14 +81,17 @@ static void eighth_our_project (void *context, double t, double *q, double *v, e
   eighth_copy (to->a, s->a);
 }
 
-static void eighth_same_rhs (eighth_scene *s, const char *method, double h, double q[6]) {
-  (void)method;
-  eighth_drive (s, &(ezy_dynamics){ eighth_our_rate, eighth_our_project, s }, h, q);
+static double eighth_same_rhs (void *scene, const ladder *way, double h, double *q) {
+  eighth_scene *s = scene;
+  (void)way;
+  return eighth_drive (s, &(ezy_dynamics){ eighth_our_rate, eighth_our_project, s }, h, q);
 }
 
 /* ---- Pinwheel ---- */
 
-static void eighth_ours (eighth_scene *s, const char *method, double rtol, double q[6]) {
+static double eighth_ours (void *scene, const ladder *way, double rtol, double *q) {
+  eighth_scene *s = scene;
+  const char *method = way->method;
   pw_error error = { 0 };
   pw_sample sample;
   pw_run *r = engine_open (s->system, method, &(pw_settings){ .rtol = rtol, .span = EIGHTH_SECONDS });
@@ -106,7 +99,9 @@ static void eighth_ours (eighth_scene *s, const char *method, double rtol, doubl
     if (pw_advance (r, EIGHTH_SECONDS, &error) != PW_OK) engine_die (method, error.text);
   if (pw_at (r, EIGHTH_SECONDS, &sample, &error) != PW_OK) engine_die (method, error.text);
   eighth_copy (q, sample.q);
+  double evaluations = (double)pw_run_statistics (r)->rhs;
   pw_close (r);
+  return evaluations;
 }
 
 /* ---- Scenes ---- */
@@ -132,51 +127,28 @@ static void eighth_close (eighth_scene *s) {
 
 /* ---- Measuring ---- */
 
-static void eighth_measure (eighth_scene *s, eighth_way *w, int round, int rung) {
-  static const int length[] = { 0, 1, 3, 4 };
-  eighth_point *p = &w->point[rung];
-  double q[6], start = timing_now ();
-  p->rung = w->first * pow (w->factor, rung);
-  w->run (s, w->method, p->rung, q);
-  p->cpu[round] = timing_now () - start;
-  p->error = 0;
-  for (int i = 0; i < 4; i++) p->error = fmax (p->error, fabs (q[length[i]] - s->truth[length[i]]));
-}
-
-/* The time at which the line through the points within a factor 100 of the target has its error; 0: it is not reached. */
-static double eighth_time (const eighth_way *w, double target) {
-  double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, least = INFINITY;
-  for (const eighth_point *p = w->point; p < w->point + w->count; p++) {
-    double x = log (p->error / target), y = log (p->cpu[EIGHTH_ROUNDS / 2]);
-    least = fmin (least, p->error);
-    if (!(fabs (x) < log (100))) continue;
-    n++, sx += x, sy += y, sxx += x * x, sxy += x * y;
-  }
-  double slope = (n * sxy - sx * sy) / (n * sxx - sx * sx);
-  return n < 2 || least > target ? 0 : exp ((sy - slope * sx) / n);
-}
-
-static void eighth_put (const char *scene, const eighth_way *w, FILE *csv) {
-  for (const eighth_point *p = w->point; p < w->point + w->count; p++)
+static void eighth_put (const char *scene, const ladder *w, FILE *csv) {
+  for (const ladder_point *p = w->point; p < w->point + w->count; p++)
     fprintf (csv, "%s,%s,point,%.9g,%.9g,%.9g\n", scene, w->name, p->rung, p->error, p->cpu[EIGHTH_ROUNDS / 2]);
   for (int j = 0; j < EIGHTH_TARGETS; j++)
-    if (eighth_time (w, eighth_target[j]) > 0)
-      fprintf (csv, "%s,%s,line,nan,%.9g,%.9g\n", scene, w->name, eighth_target[j], eighth_time (w, eighth_target[j]));
+    if (ladder_time (w, eighth_target[j], EIGHTH_ROUNDS) > 0)
+      fprintf (csv, "%s,%s,line,nan,%.9g,%.9g\n", scene, w->name, eighth_target[j],
+               ladder_time (w, eighth_target[j], EIGHTH_ROUNDS));
 }
 
-static void eighth_print (const eighth_way *w, const eighth_way *ours) {
+static void eighth_print (const ladder *w, const ladder *ours) {
   printf ("  %-40s", w->name);
   for (int j = 0; j < EIGHTH_TARGETS; j++) {
-    double time = eighth_time (w, eighth_target[j]);
+    double time = ladder_time (w, eighth_target[j], EIGHTH_ROUNDS);
     if (time > 0)
-      printf ("  %8.3f (%6.3f)", 1e3 * time, eighth_time (ours, eighth_target[j]) / time);
+      printf ("  %8.3f (%6.3f)", 1e3 * time, ladder_time (ours, eighth_target[j], EIGHTH_ROUNDS) / time);
     else
       printf ("  %8s  %6s ", "never", "");
   }
   putchar ('\n');
 }
 
-static eighth_way eighth_ways[EIGHTH_WAYS] = {
+static ladder eighth_ways[EIGHTH_WAYS] = {
   { .name = "by hand", .first = 0.5, .factor = 0.8, .count = 14, .run = eighth_by_hand },
   { .name = "by hand on Pinwheel's right-hand side", .first = 0.5, .factor = 0.8, .count = 14, .run = eighth_same_rhs },
   { .name = "erk8+projection",
@@ -190,17 +162,17 @@ static eighth_way eighth_ways[EIGHTH_WAYS] = {
 
 static void eighth_case (int massless, FILE *csv) {
   const char *scene = massless ? "massless" : "massive";
-  eighth_way *way = eighth_ways;
+  ladder *way = eighth_ways;
   eighth_scene s;
+  double q[6];
   eighth_open (&s, massless);
   for (int round = 0; round < EIGHTH_ROUNDS; round++)
     for (int i = 0; i < EIGHTH_WAYS; i++)
-      for (int k = 0; k < way[i].count; k++) eighth_measure (&s, &way[i], round, k);
+      for (int k = 0; k < way[i].count; k++) ladder_take (&way[i], &s, s.truth, 6, q, round, k);
   printf ("\nsteering %s: processor time [ms] for an error of the lengths after %d s\n"
           "(in brackets how many times that erk8+projection takes)\n  %-40s  %-17s  %s\n",
           scene, EIGHTH_SECONDS, "", "   1e-6 m", "   1e-9 m");
-  for (int i = 0; i < EIGHTH_WAYS; i++)
-    for (int k = 0; k < way[i].count; k++) timing_median (way[i].point[k].cpu, EIGHTH_ROUNDS);
+  for (int i = 0; i < EIGHTH_WAYS; i++) ladder_sort (&way[i], EIGHTH_ROUNDS);
   for (int i = 0; i < EIGHTH_WAYS; i++) {
     eighth_print (&way[i], &way[2]);
     if (csv) eighth_put (scene, &way[i], csv);

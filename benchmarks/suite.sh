@@ -32,7 +32,7 @@ stiff-bushings --step-ladder 1e-3:1e-5 --rtol-ladder 1e-3:1e-9 --limit 0.5'
 # ---- Steps ----
 
 count=$(printf '%s\n' "$scenes" | wc -l)
-total=$((count + 5)) number=0 begun=$(date +%s)
+total=$((count + 6)) number=0 begun=$(date +%s)
 
 # step NAME COMMAND...: runs it in the folder BUILD/bench/NAME, unless that is done; its words go to a log there.
 step () {
@@ -87,6 +87,10 @@ eighth () {
   "$build/benchmarks/eighth" "$work/eighth/eighth.csv"
 }
 
+peers () {
+  "$build/benchmarks/peers" "$work/peers/peers.csv"
+}
+
 engine () {
   "$build/benchmarks/engine"
 }
@@ -133,6 +137,7 @@ done <"$work/scenes"
 step original original
 step drift drift
 step eighth eighth
+step peers peers
 step engine engine
 step effects effects
 
@@ -142,6 +147,7 @@ truths >"$results/truth-$machine.csv"
 [ -f "$work/drift/done" ] && cp "$work/drift/drift.csv" "$results/drift-$machine.csv"
 [ -f "$work/drift/drift.png" ] && cp "$work/drift/drift.png" docs/figures/bench-drift.png
 [ -f "$work/eighth/done" ] && cp "$work/eighth/eighth.csv" "$results/eighth-$machine.csv"
+[ -f "$work/peers/done" ] && cp "$work/peers/peers.csv" "$results/peers-$machine.csv"
 [ -f "$work/effects/done" ] && cp "$work/effects/log" "$results/effects-$machine.txt"
 echo "$(($(date +%s) - begun)) s; tables and figures: sh benchmarks/report.sh $machine"
 [ -z "$failed" ] || { echo "failed:$failed"; exit 1; }

@@ -59,6 +59,7 @@ static int cvode_open (ezy_cvode *d, int adams, double rtol) {
   flag |= CVodeInit (d->cvode, cvode_rates, 0, d->y);
   flag |= CVodeSStolerances (d->cvode, rtol, rtol);
   flag |= CVodeSetMaxNumSteps (d->cvode, -1);
+  flag |= CVodeSetMaxHnilWarns (d->cvode, -1);
   flag |= CVodeSetStopTime (d->cvode, d->t_end);
   if (adams) {
     d->iteration = SUNNonlinSol_FixedPoint (d->y, 0, d->context);

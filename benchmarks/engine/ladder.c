@@ -5,15 +5,15 @@ double ladder_rung (const ladder *l, int i) {
   return l->first * pow (l->factor, i);
 }
 
-void ladder_take (ladder *l, void *scene, const double *truth, int round, int rung) {
-  static const int length[] = { 0, 1, 3, 4 };
+void ladder_take (ladder *l, void *scene, const double *truth, int n, double *q, int round, int rung) {
   ladder_point *p = &l->point[rung];
-  double q[6], start = timing_now ();
+  double start = timing_now ();
   p->rung = ladder_rung (l, rung);
   p->evaluations = l->run (scene, l, p->rung, q);
   p->cpu[round] = timing_now () - start;
   p->error = 0;
-  for (int i = 0; i < 4; i++) p->error = fmax (p->error, fabs (q[length[i]] - truth[length[i]]));
+  for (int j = 0; j < n; j++)
+    if (j % 3 < 2) p->error = isnan (q[j]) ? NAN : fmax (p->error, fabs (q[j] - truth[j]));
 }
 
 void ladder_sort (ladder *l, int rounds) {
@@ -25,7 +25,7 @@ static double ladder_line (const ladder *l, const double *value, double error) {
   double n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, least = INFINITY;
   for (int k = 0; k < l->count; k++) {
     double x = log (l->point[k].error / error), y = log (value[k]);
-    least = fmin (least, l->point[k].error);
+    least = fmin (least, l->point[k].error); /* a run that failed has none */
     if (!(fabs (x) < log (100))) continue;
     n++, sx += x, sy += y, sxx += x * x, sxy += x * y;
   }

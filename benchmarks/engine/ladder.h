@@ -3,7 +3,6 @@
 #ifndef LADDER_H
 #define LADDER_H
 
-#include <stdio.h>
 #include "timing.h"
 
 enum { LADDER_ROUNDS = 7, LADDER_RUNGS = 24 };
@@ -19,16 +18,16 @@ struct ladder {
   const char *name, *method;
   double first, factor;
   int count;
-  /* Runs to the end, q taking the positions there; returns the evaluations. */
-  double (*run) (void *scene, const ladder *way, double rung, double q[6]);
+  /* Runs to the end, q taking the positions there (NaN: it fails); returns the evaluations. */
+  double (*run) (void *scene, const ladder *way, double rung, double *q);
   const char *function; /* what callgrind counts, if asked */
   ladder_point point[LADDER_RUNGS];
 };
 
 double ladder_rung (const ladder *l, int i);
 
-/* Takes one point: error of the lengths against truth. */
-void ladder_take (ladder *l, void *scene, const double *truth, int round, int rung);
+/* Takes one point; the error is that of the lengths among n coordinates, with room for them in q. */
+void ladder_take (ladder *l, void *scene, const double *truth, int n, double *q, int round, int rung);
 
 /* Sorts the times of so many rounds; the median is then in the middle. */
 void ladder_sort (ladder *l, int rounds);

@@ -60,3 +60,17 @@ fi
 
 text=$results/effects-$machine.txt
 if [ -f "$text" ]; then { echo '```'; cat "$text"; echo '```'; } | section effects; fi
+
+# ---- Against programs by hand of the same kind ----
+
+csvp=$results/peers-$machine.csv
+if [ -f "$csvp" ]; then
+  awk -F'"' '
+    function ratio(x) { return x > 0 ? sprintf ("%.2f", x) : "" }
+    BEGIN { print "| method | by hand | error [m] | by hand [ms] | Pinwheel [ms] | ratio | evaluations by hand | Pinwheel | instructions of each by hand | Pinwheel | ratio of instructions | target [ms] |"
+            print "|---|---|---|---|---|---|---|---|---|---|---|---|" }
+    NR > 1 { split ($1, m, ","); split ($3, v, ",") # error, times, evaluations, instructions, target
+      for (i = 3; i <= 6; i++) if (v[i] == 0) v[i] = ""
+      printf "| `%s` | %s | %s | %s | %s | %s |", m[1], $2, v[2], v[3], v[4], ratio(v[3] ? v[4] / v[3] : 0)
+      printf " %s | %s | %s | %s | %s | %s |\n", v[5], v[6], v[7], v[8], ratio(v[5] * v[7] > 0 ? v[6] * v[8] / (v[5] * v[7]) : 0), v[9] > 0 ? v[9] : "" }' "$csvp" | section peers
+fi
