@@ -119,7 +119,8 @@ typedef struct {
 } pw_residuals;
 /* Of the rows with enforced[i] != 0, if that is given. */
 void pw_sweep_residuals (pw_system *s, const unsigned char *enforced, pw_residuals *r);
-void pw_sweep_position_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r); /* only the positions' */
+void pw_sweep_position_residual (pw_system *s, const unsigned char *enforced,
+                                 pw_residuals *r); /* only the positions' */
 void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r); /* only the rates' */
 /* The worst of g into the part of the positions. */
 void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
@@ -127,6 +128,10 @@ void pw_judge_positions (const pw_system *s, const double *g, const double *size
 
 /* First discontinuity of any signal after t, or INFINITY. */
 double pw_next_breakpoint (const pw_system *s, double t);
+
+/* 1 if an element's force, J or gamma is not finite at the state in place, and which: "force of attraction sun", written to
+ * the buffer. */
+int pw_find_wild (pw_system *s, char *buffer, size_t size);
 
 /* Second-order blocks: what the exact Newton matrices of implicit methods need besides M, J and J^T. */
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;

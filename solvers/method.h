@@ -29,6 +29,7 @@ struct pw_run {
   double before;          /* those of the last state away from them */
   double alpha, beta;     /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;      /* first discontinuity of a signal after t */
+  int stuck;              /* steps in a row that were as good as none */
   pw_residuals known;     /* those that the last projection told; NaN: it did not */
 
   /* the state reached: always with its accelerations and multipliers */

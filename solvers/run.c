@@ -125,6 +125,17 @@ static void run_begin (pw_run *r) {
   (void)pw_note_residuals (r);
 }
 
+/* Accelerations that are not finite at the start are a kind's or a signal's fault, and told as such. */
+static int run_check_finite (pw_run *r, pw_error *error) {
+  char element[200];
+  double sum = 0;
+  for (int j = 0; j < r->s->coords; j++) sum += fabs (r->a[j]);
+  for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
+  if (isfinite (sum) || pw_place (r->s, r->t, r->q, r->v) != PW_OK || !pw_find_wild (r->s, element, sizeof element))
+    return PW_OK;
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
+}
+
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
   pw_settings none = { 0 };
   if (pw_parse_options (method, &r->method, &r->stabilisation, r->option, error) != PW_OK) return PW_INPUT;
@@ -137,6 +148,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->s->scale.time = r->settings.span;
   status = pw_make_consistent (r, r->s->held, error);
   if (status == PW_OK) status = run_first_evaluation (r, error);
+  if (status == PW_OK) status = run_check_finite (r, error);
   if (status != PW_OK) return status;
   r->s->scale.time = run_time_scale (r);
   pw_count_moved (r);
@@ -212,7 +224,20 @@ static int run_reselect (pw_run *r, pw_error *error) {
   return pw_run_renew (r, 1, error);
 }
 
+/* Libraries take steps below the round-off of time for ever where an evaluation fails just ahead. */
+static int run_check_progress (pw_run *r, double before, pw_error *error) {
+  const int patience = 1000;
+  r->stuck = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stuck + 1;
+  if (r->stuck < patience) return PW_OK;
+  return pw_fail (
+      error, PW_METHOD,
+      "t = %.6g s: no step gets any further, however small: what comes next cannot be evaluated, or not within "
+      "the tolerances",
+      r->t);
+}
+
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
+  double before = r->t;
   int row, status = PW_OK;
   if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
@@ -222,6 +247,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_OK) status = pw_run_judge (r, error);
+  if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK || r->redundant == 0) return run_blame (r, status, error);
   pw_saddle_factor (r->saddle);
   r->pivot = pw_saddle_pivot (r->saddle, &row);

@@ -296,6 +296,49 @@ static void test_restart_kick (void **state) {
   pw_free (s);
 }
 
+/* ---- A torque that is no number from some time on ---- */
+
+static int runs_wild (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)x, (void)gradient;
+  value[0] = t < *(double *)context ? 0.1 : NAN;
+  return 0;
+}
+
+static pw_system *runs_wild_system (double *from) {
+  pw_error error = { 0 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = runs_wild, .context = from } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  return scene_compile (m);
+}
+
+/* Every method stops in front of it; none takes smaller and smaller steps for ever. */
+static void test_wild (void **state) {
+  static const char *const method[] = { "rk4+projection", "erk5+projection", "erk8",       "adams",   "bdf+projection",
+                                        "ida+ggl",        "ida+baumgarte",   "galpha+ggl", "leapfrog" };
+  (void)state;
+  double from = 0.5;
+  for (int i = 0; i < 9; i++) {
+    pw_error error = { 0 };
+    pw_system *s = runs_wild_system (&from);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .span = 1 });
+    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
+    assert_true (pw_time (r) > 0.4 && pw_time (r) <= 0.51);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+static void test_wild_start (void **state) {
+  (void)state;
+  double from = 0;
+  pw_error error = { 0 };
+  pw_system *s = runs_wild_system (&from);
+  assert_null (pw_open (s, "erk8+projection", NULL, &error));
+  check_error (&error, PW_METHOD, "t = 0 s: force of torque rider is not finite");
+  pw_free (s);
+}
+
 /* ---- A torque that the caller sets anew between steps, as a controller does ---- */
 
 static int runs_held (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -340,6 +383,8 @@ int main (void) {
     cmocka_unit_test (test_signal_fails),
     cmocka_unit_test (test_restart_refused),
     cmocka_unit_test (test_restart_kick),
+    cmocka_unit_test (test_wild),
+    cmocka_unit_test (test_wild_start),
     cmocka_unit_test (test_restart_controlled),
     cmocka_unit_test (test_signal_fails_at_once),
     cmocka_unit_test (test_too_large_a_step),

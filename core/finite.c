@@ -1,0 +1,34 @@
+/* Whose numbers are not finite: for a message that names the element instead of the step. */
+#include <math.h>
+#include <stdio.h>
+#include "system.h"
+
+/* The first element among whose `each` numbers one is not finite, or -1. */
+static int finite_first (const double *x, int count, int each) {
+  for (int i = 0; i < count * each; i++)
+    if (!isfinite (x[i])) return i / each;
+  return -1;
+}
+
+int pw_find_wild (pw_system *s, char *buffer, size_t size) {
+  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    const char *what = "force";
+    int e = -1, rows = k->kind->rows, n = k->b.count;
+    if (k->kind->force) {
+      k->kind->force (&k->b, k->block);
+      e = finite_first (k->block, n, k->b.cols);
+    }
+    if (e < 0 && rows > 0) {
+      k->kind->J (&k->b, k->J);
+      what = "J", e = finite_first (k->J, n, rows * k->b.cols);
+    }
+    if (e < 0 && rows > 0 && k->kind->gamma) {
+      k->kind->gamma (&k->b, s->scratch + k->row);
+      what = "gamma", e = finite_first (s->scratch + k->row, n, rows);
+    }
+    if (e < 0) continue;
+    snprintf (buffer, size, "%s of %s %s", what, k->kind->name, k->name[e]);
+    return 1;
+  }
+  return 0;
+}
