@@ -212,29 +212,35 @@ static void evaluate_speeds (const pw_system *s, double *jv, double *size) {
 
 void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                          pw_residuals *r) {
-  r->position = r->g = 0;
+  double worst = 0, most = 0;
   r->row_position = -1;
   for (int i = 0; i < s->holonomic; i++) {
     if (enforced && !enforced[i]) continue;
-    double scaled = fabs (g[i]) / size[i];
-    if (!(fabs (g[i]) <= r->g)) r->g = fabs (g[i]);
-    if (!(scaled <= r->position)) r->position = scaled, r->row_position = i;
+    double error = fabs (g[i]), scaled = error / size[i];
+    if (!(error <= most)) most = error;
+    if (!(scaled <= worst)) worst = scaled, r->row_position = i;
   }
+  r->position = worst;
+  r->g = most;
 }
 
 void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
   double *value = s->scratch, *size = value + s->rows, *eta = size + s->rows, unit = s->scale.length / s->scale.time;
-  r->velocity = r->jv = 0;
+  double worst = 0, most = 0;
   r->row_velocity = -1;
   evaluate_speeds (s, value, size);
-  if (s->moving) pw_sweep_eta (s, eta);
+  if (s->moving) {
+    pw_sweep_eta (s, eta);
+    for (int i = 0; i < s->rows; i++) value[i] -= eta[i], size[i] += fabs (eta[i]);
+  }
   for (int i = 0; i < s->rows; i++) {
     if (enforced && !enforced[i]) continue;
-    double wanted = s->moving ? eta[i] : 0, error = fabs (value[i] - wanted);
-    double scaled = error / (size[i] + fabs (wanted) + unit);
-    if (!(error <= r->jv)) r->jv = error;
-    if (!(scaled <= r->velocity)) r->velocity = scaled, r->row_velocity = i;
+    double error = fabs (value[i]), scaled = error / (size[i] + unit);
+    if (!(error <= most)) most = error;
+    if (!(scaled <= worst)) worst = scaled, r->row_velocity = i;
   }
+  r->velocity = worst;
+  r->jv = most;
 }
 
 void pw_sweep_position_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r) {

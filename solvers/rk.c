@@ -138,37 +138,58 @@ void pw_rk_carry (pw_run *r, pw_archive *a) {
 
 /* ---- A step ---- */
 
-/* out = y + h sum_j w_j K_j, two entries at a time; m, the number of weights, is a constant where it is inlined. */
-PW_INLINE void rk_sum (double *restrict out, const double *y, double *const *K, const pw_rk_row *w, double h, int m,
-                       int n) {
-  const double *k[PW_RK_STAGES];
-  double f[PW_RK_STAGES];
-  int i = 0;
-  PW_UNROLL for (int j = 0; j < m; j++) k[j] = K[w->stage[j]], f[j] = h * w->weight[j];
-  for (; i + 1 < n; i += 2) {
-    double a = y[i], b = y[i + 1];
-    PW_UNROLL for (int j = 0; j < m; j++) {
-      a += f[j] * k[j][i];
-      b += f[j] * k[j][i + 1];
-    }
-    out[i] = a;
-    out[i + 1] = b;
+/* Entry i of y + sum_j f_j k_j, and the one behind it; m, the number of weights, is a constant where this is inlined. */
+PW_INLINE void rk_two (double *restrict out, const double *y, double *const *k, const double *f, int m, int i) {
+  double a = y[i], b = y[i + 1];
+  PW_UNROLL for (int j = 0; j < m; j++) {
+    a += f[j] * k[j][i];
+    b += f[j] * k[j][i + 1];
   }
-  for (; i < n; i++) {
-    double a = y[i];
-    PW_UNROLL for (int j = 0; j < m; j++) a += f[j] * k[j][i];
-    out[i] = a;
+  out[i] = a;
+  out[i + 1] = b;
+}
+
+PW_INLINE void rk_one (double *out, const double *y, double *const *k, const double *f, int m, int i) {
+  double a = y[i];
+  PW_UNROLL for (int j = 0; j < m; j++) a += f[j] * k[j][i];
+  out[i] = a;
+}
+
+PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h, int m) {
+  const struct pw_method_data *d = r->data;
+  const double *q0 = r->q, *v0 = r->v;
+  double *V[PW_RK_STAGES], *A[PW_RK_STAGES], f[PW_RK_STAGES];
+  int n = r->s->coords, i = 0;
+  PW_UNROLL for (int j = 0; j < m; j++) V[j] = d->V[w->stage[j]], A[j] = d->A[w->stage[j]], f[j] = h * w->weight[j];
+  for (; i + 1 < n; i += 2) {
+    rk_two (q, q0, V, f, m, i);
+    rk_two (v, v0, A, f, m, i);
+  }
+  if (i < n) {
+    rk_one (q, q0, V, f, m, i);
+    rk_one (v, v0, A, f, m, i);
   }
 }
 
-/* out = y + h sum_j w_j K_j */
-static void rk_combine (double *out, const double *y, double *const *K, const pw_rk_row *w, double h, int n) {
+/* The state reached + h sum_j w_j (V_j, A_j). */
+static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h) {
   if (w->count == 1)
-    rk_sum (out, y, K, w, h, 1, n);
+    rk_combine_by (r, q, v, w, h, 1);
   else if (w->count == 4)
-    rk_sum (out, y, K, w, h, 4, n);
+    rk_combine_by (r, q, v, w, h, 4);
   else
-    rk_sum (out, y, K, w, h, w->count, n);
+    rk_combine_by (r, q, v, w, h, w->count);
+}
+
+/* out = y + h sum_j b_j R_j of the ledger's entries */
+static void rk_combine_ledger (const pw_run *r, double *out, const double *y, double h) {
+  const struct pw_method_data *d = r->data;
+  const pw_rk_row *w = &d->row[0];
+  for (int i = 0; i < r->s->entries; i++) {
+    double sum = y[i];
+    for (int j = 0; j < w->count; j++) sum += h * w->weight[j] * d->R[w->stage[j]][i];
+    out[i] = sum;
+  }
 }
 
 /* Accelerations of a stage at the positions d->q. */
@@ -184,13 +205,11 @@ static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
   pw_system *s = r->s;
-  int n = s->coords;
   d->V[0] = r->v, d->A[0] = r->a, d->R[0] = r->rate;
   if (d->held) pw_hold (s, 1);
   int status = PW_OK;
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
-    rk_combine (d->q, r->q, d->V, &d->row[i], h, n);
-    rk_combine (d->V[i], r->v, d->A, &d->row[i], h, n);
+    rk_combine (r, d->q, d->V[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
     status = rk_stage (r, t, d->V[i], d->A[i]);
     if (status == PW_OK && r->settings.ledger) pw_sweep_ledger (s, d->lambda, d->R[i]);
@@ -224,11 +243,10 @@ static int rk_finite (const pw_run *r, const double *q, const double *v) {
 /* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->a, d->lambda. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   struct pw_method_data *d = r->data;
-  int n = r->s->coords, status = d->minimal ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
+  int status = d->minimal ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
-  rk_combine (d->q, r->q, d->V, &d->row[0], h, n);
-  rk_combine (d->v, r->v, d->A, &d->row[0], h, n);
+  rk_combine (r, d->q, d->v, &d->row[0], h);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) return rk_project (r, t1, added);
   if (!d->minimal) return pw_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
@@ -248,7 +266,7 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
     memcpy (d->ledger0, r->ledger, entries * sizeof (double));
     memcpy (d->rate0, r->rate, entries * sizeof (double));
     d->projected0 = r->projected;
-    rk_combine (r->ledger, d->ledger0, d->R, &d->row[0], h, (int)entries);
+    rk_combine_ledger (r, r->ledger, d->ledger0, h);
     r->projected += added;
     pw_sweep_ledger (r->s, r->lambda, r->rate);
   }
@@ -309,7 +327,7 @@ static int rk_step_again (pw_run *r, double t) {
   pw_saddle_set_guard (r->saddle, r->guard);
   *r = reached;
   memcpy (r->q_at, d->q, rk_block (r, 1));
-  if (r->settings.ledger) rk_combine (r->ledger_at, d->ledger0, d->R, &d->row[0], h, r->s->entries);
+  if (r->settings.ledger) rk_combine_ledger (r, r->ledger_at, d->ledger0, h);
   r->projected_at = d->projected0 + added;
   return status;
 }
