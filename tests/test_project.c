@@ -1,0 +1,65 @@
+/* A projected state and its accelerations: what is consistent stays as it is, what is not is moved, and the accelerations
+ * are those of the state that comes out. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "method.h"
+#include "runs.h"
+#include "scene.h"
+
+enum { PROJECT_MOST = 24 };
+
+/* The state after a third of a second with one rate off by so much, projected. */
+static void project_try (const char *model, const char *parameter, double value, const char *method, double off) {
+  pw_system *s = scene_named (model, parameter, value);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3 });
+  pw_sample x = runs_to (r, 0.3);
+  pw_error error = { 0 };
+  pw_projector p;
+  pw_residuals now;
+  int n = pw_count_coordinates (s), rows = pw_count_rows (s);
+  double q[PROJECT_MOST], v[PROJECT_MOST], a[PROJECT_MOST], other[PROJECT_MOST], lambda[PROJECT_MOST], mu[PROJECT_MOST],
+      most = 1;
+  assert_true (n + 3 <= PROJECT_MOST && rows <= PROJECT_MOST);
+  memcpy (q, x.q, (size_t)n * sizeof *q);
+  memcpy (v, x.v, (size_t)n * sizeof *v);
+  check_ok (pw_projector_open_asked (&p, r, &error), &error);
+  v[1] += off;
+  assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
+  pw_sweep_residuals (s, NULL, &now);
+  check_below (model, now.position, 4 * CHECK_EPS, "round-off");
+  check_below (model, now.velocity, 4 * CHECK_EPS, "round-off");
+  check_bits ("positions", q, x.q, n);
+  if (off == 0) {
+    check_bits ("rates", v, x.v, n);
+    check_close ("what is known", r->known.velocity, now.velocity, 0, "the same sweep");
+  } else
+    assert_true (fabs (v[1] - x.v[1]) < fabs (off) && isnan (r->known.velocity));
+  assert_int_equal (pw_accelerate (r, x.t, q, v, other, mu), PW_OK);
+  for (int j = 0; j < n; j++) most = fmax (most, fabs (other[j]));
+  for (int j = 0; j < n; j++) check_close (model, a[j], other[j], 256 * CHECK_EPS * most, "round-off, condition");
+  for (int i = 0; i < rows; i++) check_close (model, lambda[i], mu[i], 256 * CHECK_EPS * most, "round-off, condition");
+  pw_projector_close (&p);
+  pw_close (r);
+  pw_free (s);
+}
+
+static void test_consistent (void **state) {
+  (void)state;
+  project_try ("ezyroller", NULL, 0, "rk4+projection", 0);
+  project_try ("ezyroller", "m2", 0.1, "rk4+projection", 0);
+  project_try ("n-trailer", NULL, 0, "rk4+projection", 0);
+}
+
+static void test_off (void **state) {
+  (void)state;
+  project_try ("ezyroller", NULL, 0, "rk4+projection", 1e-3);
+  project_try ("ezyroller", "m2", 0.1, "rk4+projection", 1e-3);
+  project_try ("ezyroller", NULL, 0, "rk4+projection:metric=identity", 1e-3);
+  project_try ("n-trailer", NULL, 0, "rk4+projection", 1e-3);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_consistent), cmocka_unit_test (test_off) };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
