@@ -37,6 +37,15 @@ static inline int newton_row (const pw_put *put, int row) {
   return put->map ? put->map[row] : row;
 }
 
+/* Two rows +-r1 +-r2 + ... = 0 that have the unit matrix in a body's x and y columns are functions of angles beyond that. */
+static int newton_turns (const pw_kind *kind) {
+  return kind->unit && kind->level == PW_HOLONOMIC;
+}
+
+static inline int newton_is_length (const pw_kind *kind, int c) {
+  return c < 3 * kind->bodies && c % 3 != 2;
+}
+
 void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, const pw_put *put) {
   for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
     int rows = pw_block_rows (k->kind, block), cols = k->b.cols;
@@ -49,13 +58,19 @@ void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, co
     if (!t->recording) pw_sweep_block (s, k, block, n->block);
     const double *value = n->block;
     double factor = of_rows && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
+    int angles = k->kind->rows > 0 && newton_turns (k->kind);
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < rows; r++) {
+        if (angles && !of_rows && newton_is_length (k->kind, r)) {
+          value += cols;
+          continue;
+        }
         int i = of_rows ? newton_row (put, k->row + e * rows + r) : pw_global (k, e, r);
         double scaled = put->row_scale && !of_rows && i < s->coords ? factor * put->row_scale[i] : factor;
         for (int c = 0; c < cols; c++, value++) {
           int j = pw_global (k, e, c);
           if (j >= s->coords || i < 0 || (!of_rows && i >= s->coords)) continue;
+          if (angles && newton_is_length (k->kind, c)) continue;
           pw_tape_put (t, put->row + i, put->col + j, t->recording ? 0 : scaled * *value);
         }
       }
@@ -67,12 +82,13 @@ static void newton_J (const pw_system *s, pw_tape *t, const pw_put *put, int tra
   for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0 && k->row < put->rows; k++) {
     const double *value = k->J;
     double factor = k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
+    int turns = newton_turns (k->kind);
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++) {
         int i = newton_row (put, k->row + e * k->kind->rows + r);
         for (int c = 0; c < k->b.cols; c++, value++) {
           int j = pw_global (k, e, c);
-          if (j >= s->coords || i < 0) continue;
+          if (j >= s->coords || i < 0 || (turns && c % 3 == 1 - r)) continue;
           if (transposed)
             pw_tape_put (t, put->row + j, put->col + i, factor * *value * (put->row_scale ? put->row_scale[j] : 1));
           else
