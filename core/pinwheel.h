@@ -628,6 +628,10 @@ const char *pw_state_unit (const pw_system *s, int state);
 char *pw_reaction_name (const pw_system *s, int row, char *buffer, size_t size);
 const char *pw_reaction_unit (const pw_system *s, int row);
 
+/* The row whose reaction has this name: its value is -lambda[row] of a sample.  PW_INPUT and the error, with the nearest
+ * name, if there is none. */
+int pw_find_reaction (const pw_system *s, const char *name, pw_error *error);
+
 /* The kind and name of a row's element ("wheel C"), as pw_state_name. */
 char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size);
 

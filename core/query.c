@@ -126,6 +126,20 @@ const char *pw_reaction_unit (const pw_system *s, int row) {
   return k->kind->reaction_unit ((const char *)k->b.element + (size_t)e * k->kind->element, n);
 }
 
+int pw_find_reaction (const pw_system *s, const char *name, pw_error *error) {
+  if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a reaction is missing", s->model);
+  char best[120], text[120], hint[160];
+  pw_nearest near = { .sought = name };
+  for (int i = 0; i < s->rows; i++)
+    if (strcmp (pw_reaction_name (s, i, text, sizeof text), name) == 0) return i;
+  for (int i = 0; i < s->rows; i++) {
+    pw_nearest_try (&near, pw_reaction_name (s, i, text, sizeof text));
+    if (near.best == text) near.best = strcpy (best, text);
+  }
+  return pw_fail (error, PW_INPUT, "model %s has no reaction \"%s\"%s", s->model, name,
+                  pw_nearest_text (&near, hint, sizeof hint));
+}
+
 char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
   const pw_slab *k = query_row (s, row, &e, &n);

@@ -265,6 +265,22 @@ static void test_copies (void **state) {
   pw_free (s);
 }
 
+/* Reactions are found by the names they have in tables. */
+static void test_find_reaction (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  char name[40];
+  for (int row = 0; row < pw_count_rows (s); row++)
+    assert_int_equal (pw_find_reaction (s, pw_reaction_name (s, row, name, sizeof name), NULL), row);
+  pw_error error = { 0 };
+  assert_int_equal (pw_find_reaction (s, "B.Fz", &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model ezyroller has no reaction \"B.Fz\"; did you mean \"B.Fx\"?");
+  error = (pw_error){ 0 };
+  assert_int_equal (pw_find_reaction (s, NULL, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model ezyroller: the name of a reaction is missing");
+  pw_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_parameters),     cmocka_unit_test (test_bad_parameters),
@@ -273,7 +289,7 @@ int main (void) {
     cmocka_unit_test (test_bad_set_signal), cmocka_unit_test (test_start),
     cmocka_unit_test (test_bad_start),      cmocka_unit_test (test_query),
     cmocka_unit_test (test_bad_query),      cmocka_unit_test (test_own_coordinates),
-    cmocka_unit_test (test_copies),
+    cmocka_unit_test (test_find_reaction),  cmocka_unit_test (test_copies),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
