@@ -58,10 +58,13 @@ void pw_cli_close (pw_cli_line *l);
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
 
 /* Entries of popt's table for --set and --start: two addresses of `const char **`, NULL at first. */
-#define PW_CLI_MODEL_OPTIONS(sets, starts)                                                                  \
-  { "set", 0, POPT_ARG_ARGV, (sets), 0, "Set a parameter of the model; may be repeated", "PARAM=VALUE" }, { \
-    "start", 0, POPT_ARG_ARGV, (starts), 0, "Set a start value, BODY.x|y|phi|vx|vy|omega; may be repeated", \
-        "STATE=VALUE"                                                                                       \
+#define PW_CLI_MODEL_OPTIONS(sets, starts)                                                                         \
+  { "set",        0, POPT_ARG_ARGV,                                                                                \
+    (sets),       0, "Set a parameter of the model, to a number or an expression such as 30*deg; may be repeated", \
+    "PARAM=VALUE" },                                                                                               \
+  {                                                                                                                \
+    "start", 0, POPT_ARG_ARGV, (starts), 0, "Set a start value, BODY.x|y|phi|vx|vy|omega; may be repeated",        \
+        "STATE=VALUE"                                                                                              \
   }
 
 /* How to run, as options say it; NULL: as the model wishes. */

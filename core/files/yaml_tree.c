@@ -143,6 +143,27 @@ static size_t tree_offset (const pw_yaml *y, int line, int column) {
   return (size_t)(p - y->source);
 }
 
+/* What newcomers to YAML do wrong, by the line and by what libfyaml says of it; "" if that does not tell. */
+static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) {
+  static const struct {
+    const char *message, *hint;
+  } known[] = { { "missing comma", "; or a } or ] before it" },
+                { "nested block mapping", "; a text with \": \" in it goes between double quotes" },
+                { "multiline plain key", "; the keys of a map begin in the same column" },
+                { "indendation", "; what belongs together begins in the same column" },
+                { "indented", "; what belongs together begins in the same column" } };
+  size_t begin = at < y->size ? at : y->size, size;
+  while (begin > 0 && y->source[begin - 1] != '\n') begin--;
+  begin += strspn (y->source + begin, " ");
+  size = strcspn (y->source + begin, "\n");
+  const char *line = y->source + begin, *slashes = strstr (line, " //");
+  if (size > 1 && line[0] == '-' && strchr ("- 0123456789.", line[1]) == NULL) return "; a space goes after the -";
+  if (slashes && slashes < line + size) return "; a comment begins with #";
+  for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+    if (strstr (message, known[i].message)) return known[i].hint;
+  return "";
+}
+
 /* What ends too early is told where it begins. */
 static int tree_syntax (const tree *x, pw_error *error) {
   void *first = NULL;
@@ -155,7 +176,8 @@ static int tree_syntax (const tree *x, pw_error *error) {
     size_t begin = x->open[x->depth - 1]->at;
     if (source[begin] == '[' || source[begin] == '{') at = begin;
   }
-  return pw_yaml_fail (x->y, at, error, "%s", e->msg ? e->msg : "this is no YAML");
+  const char *message = e->msg ? e->msg : "this is no YAML";
+  return pw_yaml_fail (x->y, at, error, "%s%s", message, tree_hint (x->y, at, message));
 }
 
 static int tree_parse (tree *x, pw_error *error) {
