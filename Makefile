@@ -20,9 +20,10 @@ endif
 
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes
 STRICT := -std=c11 -fPIC -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)
+ONE_BY_ONE := -fno-tree-slp-vectorize
 # gcc 12.2 fuses multiplications and additions when it vectorises straight code, -ffp-contract=off or not, for processors
 # that can: results would depend on the build.  The default processor of x86-64 cannot.
-STRICT += $(if $(findstring -m,$(CFLAGS)),-fno-tree-slp-vectorize)
+STRICT += $(if $(findstring -m,$(CFLAGS)),$(ONE_BY_ONE))
 PW_CFLAGS = $(STRICT) $(THREADS) -D_POSIX_C_SOURCE=200809L $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN)
 
 # SuiteSparse has no pkg-config file; a folder that is not there does no harm.
@@ -123,6 +124,8 @@ deps:
 # ---- Objects; each folder sees only what it may include (-iquote: core/signal.h is not <signal.h>) ----
 
 $(BUILD)/obj/core/%.o:       INCLUDE := -iquote core
+# Numbers that a kind stores as a pair would be computed twice or be waited for.
+$(BUILD)/obj/core/kinds/%.o: STRICT += $(ONE_BY_ONE)
 $(BUILD)/obj/solvers/%.o:    INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/files/%.o: INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers

@@ -9,9 +9,6 @@
  * The force on body 1 is -lambda in world axes, on body 2 its opposite. */
 #include <math.h>
 #include "pinwheel.h"
-#include "unroll.h"
-
-PW_ONE_BY_ONE
 
 typedef struct {
   double s1[2], s2[2]; /* arms in the bodies' frames [m] */
