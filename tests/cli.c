@@ -68,6 +68,15 @@ void cli_bad (const char *command, int status, const char *message) {
   assert_string_equal (cli_err, text);
 }
 
+void cli_bad_each (const char *command, const cli_wrong *each, size_t count) {
+  for (size_t i = 0; i < count; i++) {
+    char text[400];
+    snprintf (text, sizeof text, "pinwheel %s %s", command, each[i].arguments);
+    cli_bad (text, 2, each[i].message);
+    assert_string_equal (cli_out, "");
+  }
+}
+
 void cli_write (const char *name, const char *text) {
   char path[300];
   snprintf (path, sizeof path, "%s/%s", cli_folder, name);

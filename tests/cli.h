@@ -22,6 +22,12 @@ void cli_good (const char *command);
 /* Runs a command that should end with a status and one line on standard error: "pinwheel: MESSAGE". */
 void cli_bad (const char *command, int status, const char *message);
 
+/* Runs `pinwheel COMMAND ARGUMENTS` for each; all are wrong input, and nothing is on standard output. */
+typedef struct {
+  const char *arguments, *message;
+} cli_wrong;
+void cli_bad_each (const char *command, const cli_wrong *each, size_t count);
+
 /* Replaces every @ by the folder. */
 void cli_expand (const char *from, char *to, size_t size);
 

@@ -9,9 +9,7 @@
 /* ---- Command lines that are wrong ---- */
 
 static void test_bad_lines (void **state) {
-  static const struct {
-    const char *line, *message;
-  } bad[] = {
+  static const cli_wrong bad[] = {
     { "shew", "there is no command \"shew\"; did you mean \"show\"?" },
     { "--verbose", "there is no option \"--verbose\"; did you mean \"--version\"?" },
     { "./car.yaml", "\"./car.yaml\" is no command; to run a model write pinwheel run ./car.yaml" },
@@ -59,12 +57,7 @@ static void test_bad_lines (void **state) {
     { "new 'a b.c'", "\"a b.c\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml" },
   };
   (void)state;
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    char line[200];
-    snprintf (line, sizeof line, "pinwheel %s", bad[i].line);
-    cli_bad (line, 2, bad[i].message);
-    assert_string_equal (cli_out, "");
-  }
+  cli_bad_each ("", bad, sizeof bad / sizeof *bad);
 }
 
 /* A tolerance that the method does not follow, a step it does not take; who gives both is not told. */

@@ -220,9 +220,7 @@ static void test_interrupt (void **state) {
 
 static void test_bad (void **state) {
   (void)state;
-  const struct {
-    const char *arguments, *message;
-  } bad[] = {
+  const cli_wrong bad[] = {
     { "ezyrolle", "there is no model \"ezyrolle\"; did you mean \"ezyroller\"?" },
     { "ezyroller --methods rk5", "there is no integrator \"rk5\"; did you mean \"erk5\"?" },
     { "ezyroller --methods all,ida+gll", "integrator ida has no stabilisation \"gll\"; did you mean \"ggl\"?" },
@@ -251,11 +249,7 @@ static void test_bad (void **state) {
   cli_write ("z.csv", "t,frame.x\n1,one\n");
   cli_write ("back.csv", "t,frame.x\n1,0\n0.5,0\n");
   cli_write ("short.csv", "t,frame.x\n1,0\n");
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    char command[300];
-    snprintf (command, sizeof command, "pinwheel compare %s", bad[i].arguments);
-    cli_bad (command, 2, bad[i].message);
-  }
+  cli_bad_each ("compare", bad, sizeof bad / sizeof *bad);
   cli_write ("file", "");
   cli_bad ("pinwheel compare ezyroller -o @/file/x", 1, "cannot make the folder @/file/x: Not a directory");
 }

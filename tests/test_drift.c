@@ -147,9 +147,7 @@ static void test_interrupt (void **state) {
 
 static void test_bad (void **state) {
   (void)state;
-  const struct {
-    const char *arguments, *message;
-  } bad[] = {
+  const cli_wrong bad[] = {
     { "ezyrolle", "there is no model \"ezyrolle\"; did you mean \"ezyroller\"?" },
     { "ezyroller --methods rk4+nome", "integrator rk4 has no stabilisation \"nome\"; did you mean \"none\"?" },
     { "ezyroller --step 0", "--step 0: expected a number > 0" },
@@ -159,11 +157,7 @@ static void test_bad (void **state) {
     { "ezyroller --methods rk4 --vary alpha=lin:1:1e6:100000", "400015 runs are too many; vary less" },
     { "ezyroller --stp 3", "drift has no option \"--stp\"; did you mean \"--step\"?" },
   };
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    char command[300];
-    snprintf (command, sizeof command, "pinwheel drift %s", bad[i].arguments);
-    cli_bad (command, 2, bad[i].message);
-  }
+  cli_bad_each ("drift", bad, sizeof bad / sizeof *bad);
   int status =
       cli_run ("pinwheel drift ezyroller --t-end 2 --step 0.02 --methods rk4+baumgarte:alpha=1000 --only-methods");
   assert_int_equal (status, 4);
