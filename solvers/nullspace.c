@@ -154,18 +154,17 @@ PW_INLINE int nullspace_eliminate (double *K, double *mu, int m) {
   return 1;
 }
 
+#define NULLSPACE_SIZES QUICK (1) QUICK (2) QUICK (3) QUICK (4) QUICK (5) QUICK (6)
+
 static int nullspace_quick (pw_nullspace *b) {
   switch (b->rows) {
 #define QUICK(m) \
   case m:        \
     return nullspace_eliminate (b->K, b->mu, m);
-    QUICK (1)
-    QUICK (2)
-    QUICK (3)
-    QUICK (4)
-    QUICK (5) QUICK (6)
+    NULLSPACE_SIZES
 #undef QUICK
-        default : return nullspace_eliminate (b->K, b->mu, b->rows);
+  default:
+    return nullspace_eliminate (b->K, b->mu, b->rows);
   }
 }
 
