@@ -72,5 +72,5 @@ if [ -f "$csvp" ]; then
     NR > 1 { split ($1, m, ","); split ($3, v, ",") # error, times, evaluations, instructions, target
       for (i = 3; i <= 6; i++) if (v[i] == 0) v[i] = ""
       printf "| `%s` | %s | %s | %s | %s | %s |", m[1], $2, v[2], v[3], v[4], ratio(v[3] ? v[4] / v[3] : 0)
-      printf " %s | %s | %s | %s | %s | %s |\n", v[5], v[6], v[7], v[8], ratio(v[5] * v[7] > 0 ? v[6] * v[8] / (v[5] * v[7]) : 0), v[9] > 0 ? v[9] : "" }' "$csvp" | section peers
+      printf " %s | %s | %s | %s | %s | %s |\n", v[5], v[6], v[7], v[8], ratio(v[5] * v[7] > 0 ? v[6] * v[8] / (v[5] * v[7]) : 0), v[9] == 0 ? "" : v[9] }' "$csvp" | section peers
 fi
