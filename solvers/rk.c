@@ -7,7 +7,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "between.h"
 #include "rk_state.h"
 #include "unroll.h"
 #include "util.h"
@@ -72,6 +71,9 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
     d->q0 = pw_take (&l, 3 * n, sizeof (double));
     d->ledger0 = pw_take (&l, entries, sizeof (double));
     d->rate0 = pw_take (&l, entries, sizeof (double));
+    d->middle = pw_take (&l, 3 * n, sizeof (double));
+    d->ledger_middle = pw_take (&l, entries, sizeof (double));
+    d->rate_middle = pw_take (&l, entries, sizeof (double));
     if (pass == 1) break;
     d->memory = calloc (1, l.used);
     if (d->memory == NULL) return PW_MACHINE;
@@ -107,11 +109,6 @@ void pw_rk_close (pw_run *r) {
   free (r->data);
 }
 
-/* The state q, v, a as one block; with lambda behind it. */
-static inline size_t rk_block (const pw_run *r, int multipliers) {
-  return (3 * ((size_t)r->s->coords + 3) + (size_t)(multipliers ? r->s->rows : 0)) * sizeof (double);
-}
-
 int pw_rk_restart (pw_run *r, pw_error *error) {
   struct pw_method_data *d = r->data;
   size_t entries = (size_t)r->s->entries * sizeof (double);
@@ -120,7 +117,7 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   d->count = 0;
   d->split = 0;
   if (d->adaptive) pw_rk_begin_adaptive (r);
-  memcpy (d->q0, r->q, rk_block (r, 0));
+  memcpy (d->q0, r->q, pw_rk_block (r, 0));
   memcpy (d->ledger0, r->ledger, entries);
   memcpy (d->rate0, r->rate, entries);
   d->projected0 = r->projected;
@@ -181,8 +178,7 @@ static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *
     rk_combine_by (r, q, v, w, h, w->count);
 }
 
-/* out = y + h sum_j b_j R_j of the ledger's entries */
-static void rk_combine_ledger (const pw_run *r, double *out, const double *y, double h) {
+void pw_rk_ledger (const pw_run *r, double *out, const double *y, double h) {
   const struct pw_method_data *d = r->data;
   const pw_rk_row *w = &d->row[0];
   for (int i = 0; i < r->s->entries; i++) {
@@ -259,14 +255,14 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   struct pw_method_data *d = r->data;
   size_t entries = (size_t)r->s->entries;
   d->t0 = r->t;
-  memcpy (d->q0, r->q, rk_block (r, 0));
-  memcpy (r->q, d->q, rk_block (r, 1));
+  memcpy (d->q0, r->q, pw_rk_block (r, 0));
+  memcpy (r->q, d->q, pw_rk_block (r, 1));
   r->t = t1;
   if (r->settings.ledger) {
     memcpy (d->ledger0, r->ledger, entries * sizeof (double));
     memcpy (d->rate0, r->rate, entries * sizeof (double));
     d->projected0 = r->projected;
-    rk_combine_ledger (r, r->ledger, d->ledger0, h);
+    pw_rk_ledger (r, r->ledger, d->ledger0, h);
     r->projected += added;
     pw_sweep_ledger (r->s, r->lambda, r->rate);
   }
@@ -278,6 +274,17 @@ static int rk_reached_singular (pw_run *r) {
   r->near = 0;
   pw_accelerate (r, r->t, r->q, r->v, r->data->a, r->data->lambda);
   return r->near || pw_saddle_pivot (r->saddle, &row) <= r->guard;
+}
+
+double pw_rk_distance (const pw_run *r) {
+  const pw_system *s = r->s;
+  const struct pw_method_data *d = r->data;
+  double most = 0;
+  for (int j = 0; j < s->coords; j++) {
+    double off = fmax (fabs (d->q[j] - r->q_at[j]), s->scale.time * fabs (d->v[j] - r->v_at[j])) / pw_unit (s, j);
+    if (!(off <= most)) most = off;
+  }
+  return most;
 }
 
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
@@ -312,33 +319,4 @@ void pw_rk_revert (pw_run *r) {
 
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
   return r->data->adaptive ? pw_rk_advance_adaptive (r, t_end, error) : pw_rk_advance_fixed (r, t_end, error);
-}
-
-/* ---- Looking into the last step ---- */
-
-/* A step from the beginning of the last one to t, which is as accurate as the method; into the sample arrays. */
-static int rk_step_again (pw_run *r, double t) {
-  struct pw_method_data *d = r->data;
-  const pw_run reached = *r;
-  double added = 0, h = t - d->t0;
-  r->t = d->t0, r->q = d->q0, r->v = d->v0, r->a = d->a0, r->rate = d->rate0;
-  pw_saddle_set_guard (r->saddle, 0);
-  int status = pw_rk_step (r, h, t, d->projects, r->settings.ledger ? &added : NULL);
-  pw_saddle_set_guard (r->saddle, r->guard);
-  *r = reached;
-  memcpy (r->q_at, d->q, rk_block (r, 1));
-  if (r->settings.ledger) rk_combine_ledger (r, r->ledger_at, d->ledger0, h);
-  r->projected_at = d->projected0 + added;
-  return status;
-}
-
-int pw_rk_at (pw_run *r, double t, pw_error *error) {
-  struct pw_method_data *d = r->data;
-  if (t > r->t || t < d->t0) return pw_fail_outside (r, d->t0, t, error);
-  if (t == r->t) {
-    pw_show_reached (r);
-    return PW_OK;
-  }
-  int status = rk_step_again (r, t);
-  return status == PW_OK ? PW_OK : pw_rk_fail (r, status, t - d->t0, error);
 }

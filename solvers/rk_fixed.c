@@ -1,6 +1,7 @@
 /* Runge-Kutta with steps of the given size: multiples of it from the start, cut at t_end and at breakpoints, and split
  * where one of them would land on a singular pose. */
 #include <math.h>
+#include <string.h>
 #include "rk_state.h"
 
 /* The step to t1 in two parts; the state there is left in d->q, d->v, and if `keep` is set the first part is accepted. */
@@ -15,18 +16,11 @@ static int fixed_two_parts (pw_run *r, double t, double t1, int project, int kee
   return status;
 }
 
-/* How far the state in d->q, d->v is from the one in q_at, v_at, in units of the scene; takes its place. */
+/* How far the state in d->q, d->v is from the one in q_at, v_at, whose place it takes. */
 static double fixed_compare (pw_run *r) {
-  const pw_system *s = r->s;
   const struct pw_method_data *d = r->data;
-  double most = 0;
-  for (int j = 0; j < s->coords; j++) {
-    double unit = pw_unit (s, j);
-    double off = fmax (fabs (d->q[j] - r->q_at[j]), s->scale.time * fabs (d->v[j] - r->v_at[j])) / unit;
-    if (!(off <= most)) most = off;
-    r->q_at[j] = d->q[j];
-    r->v_at[j] = d->v[j];
-  }
+  double most = pw_rk_distance (r);
+  memcpy (r->q_at, d->q, pw_rk_block (r, 1));
   return most;
 }
 

@@ -30,6 +30,7 @@ struct pw_method_data {
   double h, before;           /* adaptive: next step, error of the last one */
   /* the beginning of the last step, for looking back into it: one block */
   double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
+  double *middle, *ledger_middle, *rate_middle; /* a state on the way from there to a sample: q, v, a in one block */
   char *memory;
 };
 
@@ -42,6 +43,17 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added);
 
 /* Back to the beginning of the step just accepted. */
 void pw_rk_revert (pw_run *r);
+
+/* The state q, v, a as one block, as the run's own; with lambda behind it.  Its size in bytes. */
+static inline size_t pw_rk_block (const pw_run *r, int multipliers) {
+  return (3 * ((size_t)r->s->coords + 3) + (size_t)(multipliers ? r->s->rows : 0)) * sizeof (double);
+}
+
+/* out = y + h sum_j b_j R_j of the ledger's entries, after a step */
+void pw_rk_ledger (const pw_run *r, double *out, const double *y, double h);
+
+/* How far the state in d->q, d->v is from the one in q_at, v_at, in units of the scene. */
+double pw_rk_distance (const pw_run *r);
 
 /* Says why no step succeeds from the state reached. */
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error);

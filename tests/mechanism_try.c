@@ -91,6 +91,7 @@ static double try_size (pw_system *s, const try_end *x) {
   return size;
 }
 
+/* Steps fall elsewhere; what is sharper than they are, a tyre that changes its direction, they may see differently. */
 static void try_views (try_count *n, const mechanism *m, pw_system *s, const try_end *x) {
   static const struct {
     const char *name;
@@ -105,7 +106,7 @@ static void try_views (try_count *n, const mechanism *m, pw_system *s, const try
     pw_system *other = mechanism_compile (m, &views[i].view, &error);
     try_run (other, "erk8+projection", TRY_RTOL, &y);
     if (y.status == PW_OK) {
-      try_bound (n, views[i].name, try_distance (s, x, other, &y, m, &views[i].view), 1e4 * TRY_RTOL * try_size (s, x));
+      try_bound (n, views[i].name, try_distance (s, x, other, &y, m, &views[i].view), 3e4 * TRY_RTOL * try_size (s, x));
     } else {
       print_message ("seed %u, %s: %s\n", n->seed, views[i].name, y.error.text);
       n->failed++;
