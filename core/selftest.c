@@ -147,6 +147,24 @@ static void selftest_blocks (pw_probe *x) {
   selftest_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", sf);
 }
 
+/* Near rest, where squares of speeds are 0 and their inverses infinite, all is finite still. */
+static void selftest_rest (pw_probe *x) {
+  static const pw_block blocks[] = { PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V };
+  double out[PW_PROBE_OUT + PW_PROBE_GUARD], v[PW_PROBE_COORDS];
+  memcpy (v, x->v, sizeof v);
+  for (int j = 0; j < x->s->coords; j++) x->v[j] *= 1e-310;
+  pw_probe_place (x, PW_PROBE_TIME, 0);
+  pw_probe_sweep (x, x->kind->gamma, "gamma near rest", x->elements * x->rows, out);
+  pw_probe_sweep (x, x->kind->force, "force near rest", x->elements * x->cols, out);
+  pw_probe_sweep (x, x->kind->loss, "loss near rest", x->elements, out);
+  for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
+    pw_sweep *sweep = pw_block_sweep (x->kind, blocks[i]);
+    int n = x->elements * pw_block_rows (x->kind, blocks[i]) * x->cols;
+    if (sweep != pw_by_differences) pw_probe_sweep (x, sweep, "a derivative near rest", n, out);
+  }
+  memcpy (x->v, v, sizeof v);
+}
+
 /* ---- Energy ---- */
 
 /* Changes v so that element e has J v = eta, by the least norm; returns 0 if its rows depend on each other. */
@@ -229,6 +247,7 @@ static void selftest_all (pw_probe *x) {
   if (x->kind->constant) selftest_constant (x);
   if (x->kind->unit) selftest_unit (x);
   selftest_blocks (x);
+  selftest_rest (x);
   selftest_power (x);
   pw_probe_sweep (x, x->kind->contact, "contact", 3 * x->elements, out);
 }

@@ -126,6 +126,31 @@ static void test_meeting (void **state) {
   pw_free (s);
 }
 
+/* ---- A bead that a damped spring of free length 0 brings to rest: at last numbers have no inverse ---- */
+
+static void spring_settling (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "bead", .mass = 1, .inertia = 1, .start = { 3e-308, 4e-308 } });
+  pw_add_spring (m, &(pw_spring){ .name = "S", .body = { "bead", "ground" }, .stiffness = 5, .damping = 2 });
+}
+
+static void test_settling (void **state) {
+  (void)state;
+  static const pw_plugin_table table = TRIAL_TABLE (spring_settling);
+  pw_system *s = scene_system (&table, NULL);
+  double out[36];
+  for (double size = 1; size > 1e-17; size /= 10) {
+    const double q[3] = { 3e-308 * size, 4e-308 * size, 0 }, v[3] = { -1e-308 * size, 0, 0 };
+    assert_int_equal (pw_place (s, 0, q, v), PW_OK);
+    pw_sweep *const sweep[] = { pw_kind_spring.force_q, pw_kind_spring.force_v };
+    for (int i = 0; i < 2; i++) {
+      sweep[i](&s->slab[0].b, out);
+      for (int j = 0; j < 36; j++) check_below ("derivative", fabs (out[j]), 20, "stiffness and damping are 5 and 2");
+    }
+  }
+  pw_free (s);
+}
+
 /* ---- Three bodies, tied together, to each other's arms and to the ground ---- */
 
 static void spring_web (pw_model *m, const void *parameters) {
@@ -156,10 +181,8 @@ static void test_methods (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_oscillator),
-    cmocka_unit_test (test_ellipse),
-    cmocka_unit_test (test_meeting),
-    cmocka_unit_test (test_methods),
+    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_ellipse), cmocka_unit_test (test_meeting),
+    cmocka_unit_test (test_settling),   cmocka_unit_test (test_methods),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -40,11 +40,11 @@ static void drag_force (const pw_batch *b, double *out) {
 static void drag_force_v (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 9) {
     DRAG_PARTS;
-    double f = v > 0 ? k->c2 / v : 0;
+    double x = v > 0 ? A->vx / v : 0, y = v > 0 ? A->vy / v : 0; /* its direction; 1 / v may be infinite */
     memset (out, 0, 9 * sizeof *out);
-    out[0] = -c - f * A->vx * A->vx;
-    out[1] = out[3] = -f * A->vx * A->vy;
-    out[4] = -c - f * A->vy * A->vy;
+    out[0] = -c - k->c2 * A->vx * x;
+    out[1] = out[3] = -k->c2 * A->vx * y;
+    out[4] = -c - k->c2 * A->vy * y;
     out[8] = -d - k->d2 * fabs (A->omega);
   }
 }

@@ -6,8 +6,8 @@
  *   V = k (l - l0)^2 / 2,  loss = c l'^2
  *
  * (Shabana 2001, Computational Dynamics, section 6.5.)
- * Where l = 0 there is no direction: e = 0, so the force is zero there.  With l0 = 0 the spring's part k d is smooth
- * and that is its limit; with l0 > 0 the ends should not meet. */
+ * Where l = 0, or too small for its inverse, there is no direction: e = 0, so the force is zero there.  With l0 = 0 the
+ * spring's part k d is smooth and that is its limit; with l0 > 0 the ends should not meet. */
 #include <math.h>
 #include "pinwheel.h"
 
@@ -34,7 +34,7 @@ static inline spring_state spring_at (const spring *k, const pw_pose *A, const p
   s.rate[0] = A->vx - A->omega * s.Y1 - B->vx + B->omega * s.Y2;
   s.rate[1] = A->vy + A->omega * s.X1 - B->vy - B->omega * s.X2;
   s.l = hypot (s.d[0], s.d[1]);
-  s.il = s.l > 0 ? 1 / s.l : 0;
+  s.il = s.l > 1e-150 ? 1 / s.l : 0;
   s.e[0] = s.d[0] * s.il, s.e[1] = s.d[1] * s.il;
   s.speed = s.e[0] * s.rate[0] + s.e[1] * s.rate[1];
   double pull = k->k * (s.l - k->l0) + k->c * s.speed;
@@ -82,7 +82,7 @@ static void spring_product (double *out, const double D[2][6], const double K[2]
 
 /* dF/dd = (k (1 - l0/l) + c l'/l) (1 - e e^T) + k e e^T + (c/l) e (d' - l' e)^T */
 static void spring_slope (const spring *k, const spring_state *s, double K[2][2]) {
-  double across = s->l > 0 ? k->k * (1 - k->l0 * s->il) + k->c * s->speed * s->il : k->k;
+  double across = s->il > 0 ? k->k * (1 - k->l0 * s->il) + k->c * s->speed * s->il : k->k;
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++)
       K[i][j] = across * (i == j) + (k->k - across) * s->e[i] * s->e[j] +
