@@ -56,6 +56,7 @@ static void rk_list_weights (struct pw_method_data *d) {
   for (int i = 1; i < d->tableau->stages; A += i++) d->row[i] = rk_list_row (A, i);
   if (d->tableau->e) d->estimate[0] = rk_list_row (d->tableau->e, d->tableau->stages + 1);
   if (d->tableau->e3) d->estimate[1] = rk_list_row (d->tableau->e3, d->tableau->stages + 1);
+  if (d->tableau->e6) d->estimate[2] = rk_list_row (d->tableau->e6, d->tableau->stages + 1);
 }
 
 static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
@@ -69,6 +70,7 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
     }
     d->q = pw_take (&l, 3 * n + (size_t)s->rows, sizeof (double));
     d->q0 = pw_take (&l, 3 * n, sizeof (double));
+    d->weight = pw_take (&l, 2 * n, sizeof (double));
     d->ledger0 = pw_take (&l, entries, sizeof (double));
     d->rate0 = pw_take (&l, entries, sizeof (double));
     d->middle = pw_take (&l, 3 * n, sizeof (double));

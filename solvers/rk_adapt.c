@@ -9,7 +9,14 @@
  *   e = sqrt (e'^2 + rtol^(1/2) e_before^2)      so that the displacement, e_before rtol, is at most rtol^(3/4)
  *
  * The displacement acts along the constraints by its square, through their curvature; without a limit the steps of a
- * motion that is mostly prescribed would grow until that counts.  It serves two estimates as DOP853 does. */
+ * motion that is mostly prescribed would grow until that counts.
+ *
+ * Where there are estimates of three orders, e5 is sharpened by e3 as in DOP853, and e6 watches over both:
+ *
+ *   max (e5^2 / sqrt (e5^2 + e3^2 / 100), e6^3 / (e6^2 + e5^2))      of h^8 and h^9 while the motion is smooth
+ *
+ * Where a damped motion is at the limit of stability, e5 may be blind to it and e3 is large for other reasons: then e5
+ * may be many times the tolerances, or nothing, and the motion be wrong. */
 #include <float.h>
 #include <math.h>
 #include "rk_state.h"
@@ -37,29 +44,55 @@ static void adapt_estimate (const pw_rk_row *w, double *const *K, int n, double 
   for (int j = 0; j < w->count; j++) out[i] += w->weight[j] * K[w->stage[j]][i];
 }
 
+/* One over the tolerances of positions and rates, of a step from the state reached to the new one. */
+static void adapt_weigh (const pw_run *r) {
+  const struct pw_method_data *d = r->data;
+  double *w = d->weight, rtol = r->settings.rtol;
+  for (int j = 0; j < r->s->coords; j++) {
+    *w++ = 1 / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
+    *w++ = 1 / (pw_atol_rate (r, j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
+  }
+}
+
 /* Mean square of positions' and rates' errors in units of the tolerances. */
 static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
-  const struct pw_method_data *d = r->data;
-  const pw_system *s = r->s;
-  double sum = 0, rtol = r->settings.rtol;
-  for (int j = 0; j < s->coords; j++) {
-    double q = eq[j] / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
-    double v = ev[j] / (pw_atol_rate (r, j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
+  const double *w = r->data->weight;
+  int coords = r->s->coords;
+  double sum = 0;
+  for (int j = 0; j < coords; j++, w += 2) {
+    double q = eq[j] * w[0], v = ev[j] * w[1];
     sum += q * q + v * v;
   }
-  return sum / (2 * s->coords);
+  return sum / (2 * coords);
+}
+
+/* The error of an estimate: what it is, and what of it a projection leaves. */
+static double adapt_whole (pw_run *r, const pw_rk_row *e) {
+  struct pw_method_data *d = r->data;
+  adapt_estimate (e, d->V, r->s->coords, r->q_at);
+  adapt_estimate (e, d->A, r->s->coords, r->v_at);
+  return adapt_norm (r, r->q_at, r->v_at);
+}
+
+static double adapt_left (pw_run *r, double whole, int projected) {
+  struct pw_method_data *d = r->data;
+  if (!projected && !d->minimal) return whole;
+  if (projected || d->closes) pw_project_error (r, r->q_at, r->s->holonomic);
+  pw_project_error (r, r->v_at, r->s->rows);
+  return adapt_norm (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
 }
 
 static double adapt_one (pw_run *r, const pw_rk_row *e, int projected) {
-  struct pw_method_data *d = r->data;
-  double *eq = r->q_at, *ev = r->v_at;
-  adapt_estimate (e, d->V, r->s->coords, eq);
-  adapt_estimate (e, d->A, r->s->coords, ev);
-  if (!projected && !d->minimal) return adapt_norm (r, eq, ev);
-  double before = adapt_norm (r, eq, ev);
-  if (projected || d->closes) pw_project_error (r, eq, r->s->holonomic);
-  pw_project_error (r, ev, r->s->rows);
-  return adapt_norm (r, eq, ev) + sqrt (r->settings.rtol) * before;
+  return adapt_left (r, adapt_whole (r, e), projected);
+}
+
+/* Mean squares of three estimates, the errors at the head of this file. */
+static double adapt_sharpen (double e5, double e3) {
+  return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
+}
+
+static double adapt_watch (double e6, double e5) {
+  return e6 == 0 ? 0 : e6 * sqrt (e6) / (e6 + e5);
 }
 
 /* The error of the step just computed; at most 1 is good. */
@@ -67,10 +100,13 @@ static double adapt_error (pw_run *r, double h, int projected) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
   d->V[b->stages] = d->v, d->A[b->stages] = d->a;
+  adapt_weigh (r);
   double e = adapt_one (r, &d->estimate[0], projected);
   if (b->e3 == NULL) return h * sqrt (e);
-  double e3 = adapt_one (r, &d->estimate[1], projected);
-  return e + e3 > 0 ? h * e / sqrt (e + 0.01 * e3) : 0;
+  double off = adapt_sharpen (e, adapt_one (r, &d->estimate[1], projected));
+  double e6 = adapt_whole (r, &d->estimate[2]);
+  if (adapt_watch (e6, e) > off) off = fmax (off, adapt_watch (adapt_left (r, e6, projected), e));
+  return h * off;
 }
 
 /* 0.2 to 5 times the step. */

@@ -16,7 +16,7 @@ struct pw_method_data {
   const pw_tableau *tableau;
   pw_rk_row
       row[PW_RK_STAGES];     /* of the stages from 1 on; in the place of stage 0, which needs none, of the new state */
-  pw_rk_row estimate[2];     /* of the error estimates; behind the stages' derivatives is the new state's */
+  pw_rk_row estimate[3];     /* of the error estimates; behind the stages' derivatives is the new state's */
   int adaptive;              /* 1: steps follow the tolerances; 0: they are of the given size */
   int projects, held, every; /* projection; inputs held over the step; project each so many steps */
   int minimal, closes;       /* nullspace: velocities are minimal; and positions are projected */
@@ -28,6 +28,7 @@ struct pw_method_data {
   double *V[PW_RK_STAGES], *A[PW_RK_STAGES], *R[PW_RK_STAGES]; /* rates, accelerations, ledger's rates of the stages */
   double *q, *v, *a, *lambda; /* a stage's state, then the new one: one block, as the run's */
   double h, before;           /* adaptive: next step, error of the last one */
+  double *weight;             /* adaptive: one over the tolerances of each position and its rate */
   /* the beginning of the last step, for looking back into it: one block */
   double t0, *q0, *v0, *a0, *ledger0, *rate0, projected0;
   double *middle, *ledger_middle, *rate_middle; /* a state on the way from there to a sample: q, v, a in one block */
