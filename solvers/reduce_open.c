@@ -121,9 +121,11 @@ static void reduce_fill_row (reduce_plan *p, pw_reduce *r, const pw_slab *k, int
   const double *J = k->J + (row - k->row) * k->b.cols;
   pw_reduce_piece *piece = c->piece + c->rows * PW_REDUCE_PIECES;
   for (int i = 0; i < PW_REDUCE_PIECES; i++) piece[i].width = 0;
-  for (int i = 0; i < n; i++)
-    piece[i] =
-        (pw_reduce_piece){ J + at[i], reduce_add_group (p->s, c, group[i]), reduce_group_width (p->s, group[i]) };
+  for (int i = 0; i < n; i++) {
+    int width = reduce_group_width (p->s, group[i]), unit = k->kind->unit && width == 3;
+    piece[i] = (pw_reduce_piece){ J + at[i], reduce_add_group (p->s, c, group[i]), width,
+                                  unit ? 1 + (row - k->row) % k->kind->rows : 0 };
+  }
   r->component_of_row[row] = component;
   c->row[c->rows++] = row;
 }
@@ -139,11 +141,14 @@ static void reduce_lay_out_component (pw_layout *l, pw_component *c, int rows, i
   c->light = pw_take (l, m, sizeof (int));
   c->global = pw_take (l, m, sizeof (int));
   c->least = pw_take (l, m, sizeof (double));
+  c->scale = pw_take (l, m, sizeof (double));
   c->massless = pw_take (l, m, 1);
   c->unit = pw_take (l, m, sizeof (double));
   c->piece = pw_take (l, n * PW_REDUCE_PIECES, sizeof (pw_reduce_piece));
   c->from = pw_take (l, n * pivots, sizeof (double *));
   c->heavy = pw_take (l, n * PW_REDUCE_PIECES, sizeof (pw_reduce_heavy));
+  c->single = pw_take (l, n * PW_REDUCE_PIECES, sizeof (pw_reduce_heavy));
+  c->pair = pw_take (l, n, sizeof (pw_reduce_pair));
   c->P = pw_take (l, pivots * pivots, sizeof (double));
   c->Y = pw_take (l, n * pivots, sizeof (double));
   c->Z = pw_take (l, n * m, sizeof (double));
@@ -229,6 +234,7 @@ static int reduce_fill (pw_reduce *r, reduce_plan *p, pw_error *error) {
   if (status != PW_OK || r->components == 0) return status;
   r->component = calloc ((size_t)r->components, sizeof *r->component);
   if (r->component == NULL) return PW_MACHINE;
+  r->end = r->component + r->components;
   reduce_each_row (p, r, reduce_count_row);
   if (reduce_lay_out (r, p) != PW_OK) return PW_MACHINE;
   reduce_each_row (p, r, reduce_fill_row);

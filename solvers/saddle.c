@@ -11,6 +11,7 @@
 #include <string.h>
 #include "saddle.h"
 #include "condense.h"
+#include "unroll.h"
 
 /* A pivot is 1 minus the square of a cosine: of a dependent row round-off leaves some eps. */
 #define SADDLE_ROUND_OFF (200 * DBL_EPSILON)
@@ -53,17 +54,17 @@ static inline int saddle_judge_large (pw_saddle *k) {
   return k->pivot > k->guard ? PW_OK : PW_RETRY;
 }
 
-/* Eliminates the coordinates without weight. */
-static inline int saddle_begin (pw_saddle *k) {
+/* Eliminates the coordinates without weight, if `fresh`, and from f and gamma, if given. */
+static inline int saddle_begin (pw_saddle *k, int fresh, const double *gamma, double *f) {
+  double pivot = k->reduce.components ? pw_reduce_forward (&k->reduce, fresh, gamma, f) : INFINITY;
+  if (!fresh) return PW_OK;
   k->pivot_row = -1;
-  k->pivot = INFINITY;
-  if (k->reduce.components == 0) return PW_OK;
-  k->pivot = pw_reduce_factor (&k->reduce);
+  k->pivot = pivot;
   return k->pivot > k->guard ? PW_OK : PW_RETRY;
 }
 
 int pw_saddle_factor (pw_saddle *k) {
-  if (saddle_begin (k) != PW_OK) return PW_RETRY;
+  if (saddle_begin (k, 1, NULL, NULL) != PW_OK) return PW_RETRY;
   if (k->small) return pw_small_factor (k->small) ? PW_OK : PW_RETRY;
   pw_large_factor (k->large);
   return saddle_judge_large (k);
@@ -83,7 +84,7 @@ void pw_saddle_set_guard (pw_saddle *k, double guard) {
 double pw_saddle_pivot (const pw_saddle *k, int *row) {
   int place;
   double pivot = k->pivot, small = k->small && pivot > k->guard ? pw_small_pivot (k->small, &place) : INFINITY;
-  *row = k->pivot_row;
+  *row = k->pivot_row < 0 && k->reduce.components ? pw_reduce_weakest (&k->reduce) : k->pivot_row;
   if (!(small >= pivot)) {
     pivot = small;
     *row = place < 0 || k->small->row[place] >= k->s->rows ? -1 : k->small->row[place];
@@ -93,20 +94,18 @@ double pw_saddle_pivot (const pw_saddle *k, int *row) {
 
 /* ---- Solving ---- */
 
-/* Where rows of components or kept bodies take part, gamma and lambda are copies with these at the end. */
-static inline const double *saddle_gamma (pw_saddle *k, const double *gamma) {
-  if (k->more == 0) return gamma;
+/* Where there are more unknowns than rows, those of components or of kept bodies, gamma and lambda are copies with these
+ * at the end. */
+static inline const double *saddle_more (pw_saddle *k, const double *gamma) {
   for (int i = 0; i < k->rows; i++) k->y[i] = gamma[i];
   for (int i = k->s->rows; i < k->s->rows + k->more; i++) k->y[i] = 0;
   for (const pw_extra *x = k->extra; x < k->extra + k->extras; x++) k->y[x->y] = *x->gamma;
   return k->y;
 }
 
-static inline void saddle_finish (pw_saddle *k, double *a, double *lambda) {
-  for (int i = 0; k->more && i < k->rows; i++) lambda[i] = k->y[i];
+static inline void saddle_take_more (pw_saddle *k, double *lambda) {
+  for (int i = 0; i < k->rows; i++) lambda[i] = k->y[i];
   for (const pw_extra *x = k->extra; x < k->extra + k->extras; x++) *x->lambda = k->y[x->y];
-  for (int i = 0; i < k->idles; i++) lambda[k->idle[i]] = 0;
-  if (k->reduce.components) pw_reduce_backward (&k->reduce, a, lambda);
 }
 
 /* The large scene's part; lambda serves as its right-hand side. */
@@ -120,39 +119,46 @@ static inline int saddle_large (pw_saddle *k, int fresh, const double *f, const 
   return fresh ? saddle_judge_large (k) : PW_OK;
 }
 
-/* Solves, and factorises before that if `fresh`. */
-static inline int saddle_solve (pw_saddle *k, int fresh, const double *f, const double *gamma, double *a,
-                                double *lambda) {
-  double *force = k->force, *l = k->more ? k->y : lambda;
-  if (fresh && saddle_begin (k) != PW_OK) return PW_RETRY;
+/* Solves, and factorises before that if `fresh`; more: there are more unknowns than rows. */
+PW_INLINE int saddle_solve (pw_saddle *k, int fresh, int more, const double *f, const double *gamma, double *a,
+                            double *lambda) {
+  double *force = k->force, *l = more ? k->y : lambda;
+  int status = PW_OK;
   if (k->reduce.components) {
     if (f)
       memcpy (force, f, (size_t)k->s->coords * sizeof *f);
     else
       memset (force, 0, (size_t)k->s->coords * sizeof *force);
-    pw_reduce_forward (&k->reduce, gamma, force);
     f = force;
   }
-  gamma = saddle_gamma (k, gamma);
-  int status = PW_OK;
+  if (saddle_begin (k, fresh, gamma, force) != PW_OK) return PW_RETRY;
+  if (more) gamma = saddle_more (k, gamma);
   if (k->small == NULL)
     status = saddle_large (k, fresh, f, gamma, a, l);
   else if (!fresh)
     pw_small_solve (k->small, f, gamma, a, l);
   else if (!pw_small_both (k->small, f, gamma, a, l))
     status = PW_RETRY;
-  if (status == PW_OK) saddle_finish (k, a, lambda);
-  return status;
+  if (status != PW_OK) return status;
+  if (more) saddle_take_more (k, lambda);
+  for (int i = 0; i < k->idles; i++) lambda[k->idle[i]] = 0;
+  if (k->reduce.components) pw_reduce_backward (&k->reduce, a, lambda);
+  return PW_OK;
+}
+
+static int saddle_any (pw_saddle *k, int fresh, const double *f, const double *gamma, double *a, double *lambda) {
+  if (k->more) return saddle_solve (k, fresh, 1, f, gamma, a, lambda);
+  return fresh ? saddle_solve (k, 1, 0, f, gamma, a, lambda) : saddle_solve (k, 0, 0, f, gamma, a, lambda);
 }
 
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
   if (k->plain)
     pw_small_solve (k->plain, f, gamma, a, lambda);
   else
-    (void)saddle_solve (k, 0, f, gamma, a, lambda);
+    (void)saddle_any (k, 0, f, gamma, a, lambda);
 }
 
 int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
   if (k->plain) return pw_small_both (k->plain, f, gamma, a, lambda) ? PW_OK : PW_RETRY;
-  return saddle_solve (k, 1, f, gamma, a, lambda);
+  return saddle_any (k, 1, f, gamma, a, lambda);
 }

@@ -167,16 +167,16 @@ static void small_take_any (const pw_panel *p, const double *f, double *a) {
 }
 
 PW_INLINE void small_gather (const pw_small *k, const double *f, int n) {
-  for (const pw_panel *p = k->panel, *end = k->end; p < end; p++) switch (p->shape) {
-#define SMALL_SHAPE(shape)                                             \
-  case shape:                                                          \
-    if (n == 0 || small_rows (shape) <= n) small_add (p, f, n, shape); \
-    break;
-      SMALL_SHAPES
+  for (const pw_panel *p = k->panel, *end = k->end; p < end; p++) {
+#define SMALL_SHAPE(x)                                    \
+  if ((n == 0 || small_rows (x) <= n) && p->shape == x) { \
+    small_add (p, f, n, x);                               \
+    continue;                                             \
+  }
+    SMALL_SHAPES
 #undef SMALL_SHAPE
-    default:
-      small_add_any (p, f, n);
-    }
+    small_add_any (p, f, n);
+  }
 }
 
 static void small_gather_right (const pw_small *k, const double *f) {
@@ -184,16 +184,16 @@ static void small_gather_right (const pw_small *k, const double *f) {
 }
 
 static void small_scatter (const pw_small *k, const double *f, double *a) {
-  for (const pw_panel *p = k->panel, *end = k->end; p < end; p++) switch (p->shape) {
-#define SMALL_SHAPE(shape)       \
-  case shape:                    \
-    small_take (p, f, a, shape); \
-    break;
-      SMALL_SHAPES
+  for (const pw_panel *p = k->panel, *end = k->end; p < end; p++) {
+#define SMALL_SHAPE(x)       \
+  if (p->shape == x) {       \
+    small_take (p, f, a, x); \
+    continue;                \
+  }
+    SMALL_SHAPES
 #undef SMALL_SHAPE
-    default:
-      small_take_any (p, f, a);
-    }
+    small_take_any (p, f, a);
+  }
 }
 
 /* ---- L D L^T of constant size ---- */

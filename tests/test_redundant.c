@@ -257,6 +257,52 @@ static void test_frame (void **state) {
   trial (&redundant_bolted_table, 2);
 }
 
+/* ---- A bracket without mass, bolted twice to a hull that turns, and pulled by a load ----
+ *
+ * One row of the bolts follows from the others, which one changes as the hull turns: where the bolts lie above each other
+ * their x rows are the same.  A weld holds the bracket alike. */
+
+static void redundant_tow (pw_model *m, int bolts) {
+  pw_add_body (m,
+               &(pw_body){ .name = "hull", .mass = 1, .inertia = 0.1, .start = { 0, 0, 0.3 }, .rate = { 0.3, 0, 1 } });
+  pw_add_body (m, &(pw_body){ .name = "load", .mass = 2, .inertia = 0.2, .start = { 3, 0, 0 }, .rate = { 0, 0.2, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "bracket", .start = { 0, 0, 1 }, .rate = { 0.3, 0, 1 } });
+  const double at[2][2] = { { 0.37, 0.23 }, { 1.51, -0.77 } }, c = cos (0.7), s = sin (0.7);
+  for (int i = 0; i < bolts; i++)
+    pw_add_pin (
+        m, &(pw_pin){ .name = i ? "second" : "first",
+                      .body = { "hull", "bracket" },
+                      .at = { { at[i][0] * c - at[i][1] * s, at[i][0] * s + at[i][1] * c }, { at[i][0], at[i][1] } } });
+  if (bolts == 0) pw_add_weld (m, &(pw_weld){ .name = "weld", .body = { "hull", "bracket" }, .angle = 0.7 });
+  pw_add_spring (
+      m, &(pw_spring){
+             .name = "rope", .body = { "bracket", "load" }, .at = { { 0.2, 0 } }, .stiffness = 10, .length = 2 });
+}
+
+static void redundant_towed (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_tow (m, 2);
+}
+
+static void redundant_towed_plainly (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_tow (m, 0);
+}
+
+static const pw_plugin_table redundant_towed_table = TRIAL_TABLE (redundant_towed);
+static const pw_plugin_table redundant_towed_plainly_table = TRIAL_TABLE (redundant_towed_plainly);
+
+static void test_bracket (void **state) {
+  (void)state;
+  static const char *const name[] = { "hull.x", "hull.phi", "load.x", "load.y", "bracket.phi", "hull.omega", NULL };
+  double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
+  redundant_twins (&redundant_towed_table, &redundant_towed_plainly_table, 1, 2e-4, name); /* past one change of rows */
+  trial (&redundant_towed_table, 1);
+  redundant_end (&redundant_towed_table, "rk4+projection", 0, 5, name, a, 1e-3);
+  redundant_end (&redundant_towed_plainly_table, "rk4+projection", 0, 5, name, b, 1e-3);
+  check_below ("past many changes", redundant_off (a, b, 6), 1e-10, "round-off of 5 s, magnified by the motion");
+}
+
 /* ---- A robot: two driven wheels on one axle of one body, centre of mass between them ----
  *
  *   v = a t, phi = b t^2 / 2:  (m + 2 I / r^2) a = (u1 + u2) / r,  (J + 2 I c^2 / r^2) b = c (u2 - u1) / r */
@@ -340,6 +386,7 @@ int main (void) {
     cmocka_unit_test (test_axle),
     cmocka_unit_test (test_axle_forces),
     cmocka_unit_test (test_frame),
+    cmocka_unit_test (test_bracket),
     cmocka_unit_test (test_robot),
     cmocka_unit_test (test_names),
     cmocka_unit_test (test_partners),
