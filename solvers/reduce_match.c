@@ -115,6 +115,14 @@ static void reduce_measure (pw_component *c) {
   }
 }
 
+/* The p-th pivot and those behind it were not found: rows have been swapped, but what is planned is for their places of
+ * before.  Until they are matched again no pivot is large enough, and these are the smallest. */
+static int reduce_unmatched (pw_component *c, int p) {
+  for (int i = 0; i < c->pivots; i++) c->least[i] = NAN;
+  for (int i = p; i < c->pivots; i++) c->scale[i] = 0;
+  return p;
+}
+
 /* Gaussian elimination; angles in units of length, rows scaled by the largest entry they had: what is left of a dependent
  * row is small. */
 int pw_reduce_match (pw_component *c) {
@@ -129,7 +137,7 @@ int pw_reduce_match (pw_component *c) {
         double scaled = c->massless[n] ? fabs (c->Z[i * c->cols + n]) / c->unit[n] / c->gamma[i] : 0;
         if (scaled > best) best = scaled, row = i, column = n;
       }
-    if (row < 0) return p;
+    if (row < 0) return reduce_unmatched (c, p);
     reduce_swap (c, p, row);
     c->pivot[p] = column;
     c->scale[p] = best / fabs (c->Z[p * c->cols + column]);

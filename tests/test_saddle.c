@@ -1,5 +1,6 @@
 /* Solutions of the saddle-point system obey it, whatever path they take: with mass and with the metric of projections, all
- * rows and those on positions alone, factorised apart or at once, with forces and without.
+ * rows and those on positions alone, factorised apart or at once, with forces and without, and behind poses where they
+ * cannot be factorised.
  *
  *   W a + J^T lambda = f,   J a = gamma */
 #include <math.h>
@@ -44,6 +45,22 @@ static double saddle_error (const trial *x, const double *f, const double *gamma
   return most;
 }
 
+/* Factorises at a pose of which some angles are no numbers, as a step that is far too large leaves it, and comes back. */
+static void saddle_spoil (trial *x, pw_saddle *k, unsigned *random) {
+  pw_run *r = x->run;
+  size_t coords = (size_t)r->s->coords;
+  double *q = malloc (coords * sizeof *q);
+  for (size_t j = 0; j < coords; j++) q[j] = r->q[j] + saddle_number (random);
+  for (size_t j = 2; j < 3 * (size_t)r->s->bodies; j += 3)
+    if (saddle_number (random) > 0.3) q[j] = NAN;
+  assert_int_equal (pw_place (r->s, r->t, q, r->v), PW_OK);
+  pw_sweep_J (r->s);
+  pw_saddle_factor (k);
+  assert_int_equal (pw_place (r->s, r->t, r->q, r->v), PW_OK);
+  pw_sweep_J (r->s);
+  free (q);
+}
+
 /* Solves in each way; the rows that take no part get no multiplier. */
 static double saddle_solve (trial *x) {
   const pw_system *s = x->run->s;
@@ -55,6 +72,7 @@ static double saddle_solve (trial *x) {
   check_ok (k ? PW_OK : error.status, &error);
   for (int way = 0; way < 4; way++) {
     const double *force = way & 1 ? f : NULL;
+    if (way > 0) saddle_spoil (x, k, &x->random);
     for (int j = 0; j < s->coords; j++) f[j] = saddle_number (&x->random);
     for (int i = 0; i < s->rows; i++) gamma[i] = saddle_number (&x->random), lambda[i] = 0;
     if (way & 2) {
