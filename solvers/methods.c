@@ -92,8 +92,9 @@ static int methods_number (const pw_option *o, const char *text, double *value, 
   return *expected ? pw_fail (error, PW_INPUT, "method option %s=%s: expected %s", o->name, text, expected) : PW_OK;
 }
 
-/* An option must exist for the integrator, and for this stabilisation. */
-static int methods_option (const pw_method *method, int stabilisation, char *part, double *values, pw_error *error) {
+/* An option must exist for the integrator, and for this stabilisation; `given` has a bit for each there was. */
+static int methods_option (const pw_method *method, int stabilisation, char *part, double *values, unsigned *given,
+                           pw_error *error) {
   char hint[100], *equals = strchr (part, '=');
   const char *with = method->stabilisations[stabilisation].name;
   if (equals == NULL) return pw_fail (error, PW_INPUT, "method option \"%s\": expected NAME=VALUE", part);
@@ -103,9 +104,11 @@ static int methods_option (const pw_method *method, int stabilisation, char *par
     const pw_option *o = &method->options[i];
     if (o->with && strcmp (o->with, with) != 0) continue;
     pw_nearest_try (&near, o->name);
-    if (strcmp (o->name, part) == 0)
-      return o->choices ? methods_choice (o, equals + 1, values + i, error)
-                        : methods_number (o, equals + 1, values + i, error);
+    if (strcmp (o->name, part) != 0) continue;
+    if (*given & 1U << i) return pw_fail (error, PW_INPUT, "method option %s is given twice", part);
+    *given |= 1U << i;
+    return o->choices ? methods_choice (o, equals + 1, values + i, error)
+                      : methods_number (o, equals + 1, values + i, error);
   }
   return pw_fail (error, PW_INPUT, "method %s+%s has no option \"%s\"%s", method->name, with, part,
                   pw_nearest_text (&near, hint, sizeof hint));
@@ -113,6 +116,7 @@ static int methods_option (const pw_method *method, int stabilisation, char *par
 
 int pw_parse_options (const char *text, const pw_method **method, int *stabilisation, double *values, pw_error *error) {
   char part[80];
+  unsigned given = 0;
   const char *whole = text;
   *stabilisation = 0;
   if (text == NULL) return pw_fail (error, PW_INPUT, "the name of a method is missing");
@@ -133,7 +137,7 @@ int pw_parse_options (const char *text, const pw_method **method, int *stabilisa
     memcpy (part, text, n);
     part[n] = 0;
     text += n;
-    if (methods_option (*method, *stabilisation, part, values, error) != PW_OK) return PW_INPUT;
+    if (methods_option (*method, *stabilisation, part, values, &given, error) != PW_OK) return PW_INPUT;
   }
   if (*text)
     return pw_fail (error, PW_INPUT, "method \"%.80s\": expected INTEGRATOR+STABILISATION:OPTION=VALUE", whole);

@@ -21,6 +21,8 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
   if (method->adaptive && from->rtol > 0 && from->rtol < RUN_LEAST_RTOL)
     return pw_fail (error, PW_INPUT, "setting rtol = %g: round-off allows no less than %.2g", from->rtol,
                     RUN_LEAST_RTOL);
+  if (method->adaptive && from->rtol >= 1)
+    return pw_fail (error, PW_INPUT, "setting rtol = %g: expected a part of each state, less than 1", from->rtol);
   if (!isfinite (from->t)) return pw_fail (error, PW_INPUT, "setting t = %g: expected a finite number", from->t);
   *to = *from;
   if (to->step == 0) to->step = 1e-3;
