@@ -318,7 +318,6 @@ static void run_exchange (double *x, double *kept, const double *other, int n) {
 }
 
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
-  if (!r->settings.ledger) return PW_OK;
   if (pw_place (r->s, r->t, r->q, r->v) != PW_OK)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   *energy = pw_kinetic (r->s, r->v) + pw_potential (r->s);

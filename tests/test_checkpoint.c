@@ -161,6 +161,29 @@ static void test_options (void **state) {
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) saved_compare (1, method[i]);
 }
 
+/* What a kick has done to the energy is known behind a checkpoint, too. */
+static void test_kicked (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_archive archive = { .at = NULL };
+  double v[6];
+  pw_system *s = saved_system (0);
+  pw_run *r = saved_open (s, 0, "rk4+projection");
+  pw_sample now = runs_to (r, 0.5);
+  for (int j = 0; j < 6; j++) v[j] = 3 * now.v[j];
+  check_ok (pw_restart (r, NULL, v, &error), &error);
+  check_ok (pw_run_save (r, &archive, &error), &error);
+  double balance = runs_to (r, 1).balance;
+  pw_close (r);
+  r = saved_open (s, 0, "rk4+projection");
+  pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
+  check_ok (pw_run_load (r, &from, &error), &error);
+  check_close ("balance", runs_to (r, 1).balance, balance, 0, "to the bit");
+  pw_close (r);
+  pw_archive_free (&archive);
+  pw_free (s);
+}
+
 /* Counts from which none can go on, wherever in the state they stand, are refused or of no harm. */
 static void test_counts (void **state) {
   (void)state;
@@ -221,10 +244,8 @@ static void test_other (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_same),
-    cmocka_unit_test (test_options),
-    cmocka_unit_test (test_other),
-    cmocka_unit_test (test_counts),
+    cmocka_unit_test (test_same),   cmocka_unit_test (test_options), cmocka_unit_test (test_other),
+    cmocka_unit_test (test_kicked), cmocka_unit_test (test_counts),
   };
   return cmocka_run_group_tests (tests, saved_setup, saved_teardown);
 }

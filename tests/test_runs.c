@@ -296,6 +296,24 @@ static void test_restart_kick (void **state) {
   pw_free (s);
 }
 
+/* Nor is it taken for the method's where nothing but the energy itself is known. */
+static void test_restart_kick_unkept (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  double v[30];
+  pw_system *s = scene_named ("n-four-bar", "N", 2);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
+  pw_sample now = runs_to (r, 0.1);
+  assert_int_equal (pw_count_ledger (s), 0);
+  assert_true (pw_count_coordinates (s) <= 30);
+  for (int j = 0; j < pw_count_coordinates (s); j++) v[j] = 3 * now.v[j];
+  check_ok (pw_restart (r, NULL, v, &error), &error);
+  now = runs_to (r, 0.2);
+  check_below ("energy", pw_unbalanced (r, &now), 1e-5, "(h w)^4 at w = 50 / s");
+  pw_close (r);
+  pw_free (s);
+}
+
 /* ---- A torque that is no number from some time on ---- */
 
 static int runs_wild (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -383,6 +401,7 @@ int main (void) {
     cmocka_unit_test (test_signal_fails),
     cmocka_unit_test (test_restart_refused),
     cmocka_unit_test (test_restart_kick),
+    cmocka_unit_test (test_restart_kick_unkept),
     cmocka_unit_test (test_wild),
     cmocka_unit_test (test_wild_start),
     cmocka_unit_test (test_restart_controlled),
