@@ -50,8 +50,11 @@ static int place_sources (pw_system *s, int readers, double t, const double *q, 
 
 /* Signals of time alone are evaluated once per time: stages at the same time share them. */
 static int place_signals (pw_system *s, double t, const double *q, const double *v) {
-  if (t != s->t_signal && place_sources (s, 0, t, q, v) != PW_OK) return PW_METHOD;
-  s->t_signal = t;
+  if (t != s->t_signal) {
+    s->t_signal = NAN; /* if one fails, others have changed */
+    if (place_sources (s, 0, t, q, v) != PW_OK) return PW_METHOD;
+    s->t_signal = t;
+  }
   return s->readers > 0 ? place_sources (s, 1, t, q, v) : PW_OK;
 }
 

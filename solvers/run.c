@@ -58,13 +58,13 @@ static double run_time_scale (const pw_run *r) {
   return 1 / fastest;
 }
 
-/* Methods say that a signal failed; this adds which one. */
+/* Where a signal failed in the step tried last, this adds which one, whatever the method makes of it. */
 static int run_blame (const pw_run *r, int status, pw_error *error) {
   char signal[160];
-  if (status == PW_OK || error == NULL || strstr (error->text, "a signal failed") == NULL) return status;
+  if (status == PW_OK || error == NULL || *pw_failed_signal (r->s, signal, sizeof signal) == 0) return status;
   size_t n = strlen (error->text);
-  if (*pw_failed_signal (r->s, signal, sizeof signal))
-    snprintf (error->text + n, sizeof error->text - n, ": %s is not a finite number", signal);
+  const char *glue = strstr (error->text, "a signal failed") ? ":" : "; ahead";
+  snprintf (error->text + n, sizeof error->text - n, "%s %s is not a finite number", glue, signal);
   return status;
 }
 
@@ -245,6 +245,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (!(r->t < t_end)) return PW_OK;
   if (run_is_lost (r, error)) return PW_MACHINE;
   pw_forget_residuals (r);
+  r->s->failed = NULL;
   if (r->t >= r->breakpoint) status = run_pass_breakpoint (r, error);
   if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);

@@ -110,6 +110,10 @@ static void test_sharing_and_hold (void **state) {
   assert_true (c.calls == 2 && f[2] == 9);
   c.fails = 1;
   assert_int_equal (pw_place (s, 4, q, v), PW_METHOD);
+  c.fails = 0;
+  assert_int_equal (pw_place (s, 3, q, v), PW_OK); /* a failure in between leaves no value behind */
+  pw_sweep_force (s, f);
+  assert_true (f[2] == 9);
   pw_free (s);
 }
 
