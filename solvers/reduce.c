@@ -69,13 +69,17 @@ static double reduce_add_run (pw_component *c, const pw_reduce_heavy *x, int i, 
   return square;
 }
 
-/* Y and Z~ of the rows left over.  What should be nothing is round-off, of any direction: only its size tells. */
+/* Y and Z~ of the rows left over.  What should be nothing is round-off, of any direction: only its size tells, beside
+ * Z, Y H, and K times the motion of the coordinates without weight: of a row that has no weight, Y H may be round-off. */
 static void reduce_left_over (pw_component *c) {
   const pw_reduce_heavy *h = c->heavy;
   c->left = 1;
   for (int i = c->pivots; i < c->rows; i++) {
     double *Y = c->Y + i * c->pivots, *Z = c->Z + i * c->cols, all = 0, left = 0;
-    for (int p = 0; p < c->pivots; p++) Y[p] = *c->from[i * c->pivots + p];
+    for (int p = 0; p < c->pivots; p++) {
+      Y[p] = *c->from[i * c->pivots + p];
+      all += Y[p] * Y[p] * c->reach[p] * c->reach[p];
+    }
     reduce_solve_transposed (c->P, Y, c->pivots, 0);
     for (int n = 0; n < c->cols; n++) Z[n] = 0;
     for (const pw_reduce_heavy *x = h + c->heavies_h; x < h + c->heavies; x++)

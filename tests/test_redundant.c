@@ -303,6 +303,52 @@ static void test_bracket (void **state) {
   check_below ("past many changes", redundant_off (a, b, 6), 1e-10, "round-off of 5 s, magnified by the motion");
 }
 
+/* ---- A cart on two casters, their forks without mass, with two wheels on each axle ----
+ *
+ * The rows of the second wheels touch no mass: what the elimination leaves of them is nothing but round-off. */
+
+static void redundant_casters (pw_model *m, int wheels) {
+  static const char *const fork[] = { "fork1", "fork2" }, *const head[] = { "A1", "A2" };
+  static const char *const wheel[][2] = { { "left1", "right1" }, { "left2", "right2" } };
+  static const double heading[] = { 0.23, -0.3 };
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 0.5, .inertia = 0.3, .rate = { 0.9, 0.1, 0.2 } });
+  for (int i = 0; i < 2; i++) {
+    const double x = 0.7, y = i ? 0.4 : -0.4, c = cos (heading[i]), s = sin (heading[i]);
+    pw_add_body (m, &(pw_body){ .name = fork[i], .start = { x, y, i ? 0.1 : -0.2 } });
+    pw_add_pin (m, &(pw_pin){ .name = head[i], .body = { "cart", fork[i] }, .at = { { x, y } } });
+    for (int n = 0; n < wheels; n++)
+      pw_add_wheel (m, &(pw_wheel){ .name = wheel[i][n],
+                                    .body = fork[i],
+                                    .at = { -0.37 * c - 0.35 * n * s, -0.37 * s + 0.35 * n * c },
+                                    .heading = heading[i] });
+  }
+  pw_add_torque (m, &(pw_torque){ .name = "swing",
+                                  .body = { "cart", "fork1" },
+                                  .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1, .omega = 2 } } });
+}
+
+static void redundant_four_wheels (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_casters (m, 2);
+}
+
+static void redundant_two_wheels (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_casters (m, 1);
+}
+
+static const pw_plugin_table redundant_four_wheels_table = TRIAL_TABLE (redundant_four_wheels);
+static const pw_plugin_table redundant_two_wheels_table = TRIAL_TABLE (redundant_two_wheels);
+
+static void test_casters (void **state) {
+  (void)state;
+  static const char *const name[] = { "cart.x", "cart.y", "cart.phi", "fork1.phi", "fork2.phi", "cart.omega", NULL };
+  static const char *const wheels[] = { "wheels left1 and right1: the same lateral constraint",
+                                        "wheels left2 and right2: the same lateral constraint", NULL };
+  redundant_says (&redundant_four_wheels_table, wheels);
+  redundant_twins (&redundant_four_wheels_table, &redundant_two_wheels_table, 1, 1e-3, name);
+}
+
 /* ---- A robot: two driven wheels on one axle of one body, centre of mass between them ----
  *
  *   v = a t, phi = b t^2 / 2:  (m + 2 I / r^2) a = (u1 + u2) / r,  (J + 2 I c^2 / r^2) b = c (u2 - u1) / r */
@@ -387,6 +433,7 @@ int main (void) {
     cmocka_unit_test (test_axle_forces),
     cmocka_unit_test (test_frame),
     cmocka_unit_test (test_bracket),
+    cmocka_unit_test (test_casters),
     cmocka_unit_test (test_robot),
     cmocka_unit_test (test_names),
     cmocka_unit_test (test_partners),
