@@ -50,7 +50,8 @@ void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, co
   for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
     int rows = pw_block_rows (k->kind, block), cols = k->b.cols;
     int of_rows = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
-    if ((of_rows || block == PW_JTL_Q) && (k->kind->rows == 0 || k->row >= put->rows)) continue;
+    int constraint = of_rows || block == PW_JTL_Q;
+    if (constraint && (k->kind->rows == 0 || k->row >= put->rows)) continue;
     if (pw_block_sweep (k->kind, block) == NULL) continue;
     if (put->w) newton_gather (s, k, put->w, n->w);
     k->b.w = n->w;
@@ -58,7 +59,7 @@ void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, co
     if (!t->recording) pw_sweep_block (s, k, block, n->block);
     const double *value = n->block;
     double factor = of_rows && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
-    int angles = k->kind->rows > 0 && newton_turns (k->kind);
+    int angles = constraint && newton_turns (k->kind);
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < rows; r++) {
         if (angles && !of_rows && newton_is_length (k->kind, r)) {
@@ -88,7 +89,7 @@ static void newton_J (const pw_system *s, pw_tape *t, const pw_put *put, int tra
         int i = newton_row (put, k->row + e * k->kind->rows + r);
         for (int c = 0; c < k->b.cols; c++, value++) {
           int j = pw_global (k, e, c);
-          if (j >= s->coords || i < 0 || (turns && c % 3 == 1 - r)) continue;
+          if (j >= s->coords || i < 0 || (turns && newton_is_length (k->kind, c) && c % 3 == 1 - r)) continue;
           if (transposed)
             pw_tape_put (t, put->row + j, put->col + i, factor * *value * (put->row_scale ? put->row_scale[j] : 1));
           else

@@ -102,6 +102,107 @@ static void test_methods (void **state) {
     }
 }
 
+/* ---- Two rows with the unit matrix, a coordinate of the element's own and a force: a guide ----
+ *
+ *   g = r - (1, 2) u = 0,   force -k x along x,   so that 6 u'' = -k u with unit mass and inertia */
+
+typedef struct {
+  const char *name;
+  const char *body;
+} guide;
+
+enum { GUIDE_STIFFNESS = 600, GUIDE_RATE = 10 };
+
+static int guide_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *u,
+                          pw_error *error) {
+  (void)definition, (void)bodies, (void)element, (void)error;
+  u[0] = (pw_own){ .mass = 1, .start = 0.1 };
+  return PW_OK;
+}
+
+static void guide_g (const pw_batch *b, double *out) {
+  const pw_pose *A = &b->pose[b->body[0]];
+  out[0] = A->x - b->q[0], out[1] = A->y - 2 * b->q[0];
+}
+
+static void guide_g_size (const pw_batch *b, double *out) {
+  const pw_pose *A = &b->pose[b->body[0]];
+  out[0] = fabs (A->x) + fabs (b->q[0]), out[1] = fabs (A->y) + 2 * fabs (b->q[0]);
+}
+
+static void guide_J (const pw_batch *b, double *out) {
+  static const double J[] = { 1, 0, 0, -1, 0, 1, 0, -2 };
+  (void)b;
+  memcpy (out, J, sizeof J);
+}
+
+static void guide_force (const pw_batch *b, double *out) {
+  out[0] = -GUIDE_STIFFNESS * b->pose[b->body[0]].x;
+  out[1] = out[2] = out[3] = 0;
+}
+
+static void guide_force_q (const pw_batch *b, double *out) {
+  (void)b;
+  memset (out, 0, 16 * sizeof *out);
+  out[0] = -GUIDE_STIFFNESS;
+}
+
+static const pw_field guide_fields[] = {
+  { PW_AT (guide, body), PW_BODY, .required = 1, .about = "the body that is guided" },
+  { .name = NULL },
+};
+
+static const pw_quantity guide_reaction[] = { { "Fx", "N", NULL, "force on the body" },
+                                              { "Fy", "N", NULL, "force on the body" } };
+static const pw_quantity guide_coordinate[] = { { "u", "rad", "urate", "along the guide" } };
+
+static const pw_kind guide_kind = {
+  .name = "guide",
+  .about = "the centre of mass of a body stays on a line, along which an own coordinate counts",
+  .definition = sizeof (guide),
+  .element = 1,
+  .fields = guide_fields,
+  .bodies = 1,
+  .own = 1,
+  .rows = 2,
+  .unit = 1,
+  .level = PW_HOLONOMIC,
+  .reaction = guide_reaction,
+  .coordinate = guide_coordinate,
+  .prepare = guide_prepare,
+  .g = guide_g,
+  .g_size = guide_g_size,
+  .J = guide_J,
+  .force = guide_force,
+  .force_q = guide_force_q,
+};
+
+static void guide_build (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "bead", .mass = 1, .inertia = 1, .start = { 0.1, 0.2, 0 } });
+  pw_add (m, &guide_kind, &(guide){ .name = "line", .body = "bead" });
+}
+
+static const pw_plugin_table guide_table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = guide_build };
+
+/* Methods with Newton's iteration have its matrix whole: hardly a step is taken again. */
+static void test_guide (void **state) {
+  (void)state;
+  for (const pw_method *const *m = pw_methods; *m; m++)
+    for (const pw_stabilisation *st = (*m)->stabilisations; st && st->name; st++) {
+      char method[60];
+      pw_system *s = scene_system (&guide_table, NULL);
+      snprintf (method, sizeof method, "%s+%s", (*m)->name, st->name);
+      pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });
+      pw_sample now = runs_to (r, 2);
+      const pw_statistics *n = pw_run_statistics (r);
+      assert_true (n->rejected <= 5 && n->steps <= 2000 && n->jacobians <= n->steps);
+      check_close (method, now.q[3], 0.1 * cos (GUIDE_RATE * 2.0), 1e-4, "t h^2 w^3, 1e4 rtol");
+      pw_close (r);
+      pw_free (s);
+    }
+}
+
 /* ---- The program ---- */
 
 /* One notice, with whatever method. */
@@ -169,9 +270,9 @@ static void test_selftest (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_planet),   cmocka_unit_test (test_faster), cmocka_unit_test (test_methods),
-    cmocka_unit_test (test_notice),   cmocka_unit_test (test_show),   cmocka_unit_test (test_expression),
-    cmocka_unit_test (test_selftest),
+    cmocka_unit_test (test_planet), cmocka_unit_test (test_faster),   cmocka_unit_test (test_methods),
+    cmocka_unit_test (test_notice), cmocka_unit_test (test_show),     cmocka_unit_test (test_expression),
+    cmocka_unit_test (test_guide),  cmocka_unit_test (test_selftest),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
