@@ -70,15 +70,16 @@ static double reduce_add_run (pw_component *c, const pw_reduce_heavy *x, int i, 
 }
 
 /* Y and Z~ of the rows left over.  What should be nothing is round-off, of any direction: only its size tells, beside
- * Z, Y H, and K times the motion of the coordinates without weight: of a row that has no weight, Y H may be round-off. */
+ * Z, Y H, and K: of a row that touches no weight Y H may be round-off, too. */
 static void reduce_left_over (pw_component *c) {
   const pw_reduce_heavy *h = c->heavy;
   c->left = 1;
   for (int i = c->pivots; i < c->rows; i++) {
     double *Y = c->Y + i * c->pivots, *Z = c->Z + i * c->cols, all = 0, left = 0;
     for (int p = 0; p < c->pivots; p++) {
+      double scaled = *c->from[i * c->pivots + p] / c->unit[c->pivot[p]];
       Y[p] = *c->from[i * c->pivots + p];
-      all += Y[p] * Y[p] * c->reach[p] * c->reach[p];
+      all += scaled * scaled;
     }
     reduce_solve_transposed (c->P, Y, c->pivots, 0);
     for (int n = 0; n < c->cols; n++) Z[n] = 0;

@@ -52,7 +52,6 @@ typedef struct {
   int *global;             /* cols: global coordinate of a local column */
   unsigned char *massless; /* cols: 1 for a coordinate without weight */
   double *unit;            /* cols: length scale of an angle, 1 of a length */
-  double *reach;           /* how far each pivot's coordinate moves with those that have weight, when matched */
   pw_reduce_piece *piece;  /* rows x PW_REDUCE_PIECES; width 0 ends a row's */
   const double **from;     /* rows x pivots: the entries of P and K in the slabs */
   pw_reduce_heavy *heavy;  /* those of H, then those of Z */

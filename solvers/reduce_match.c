@@ -123,25 +123,6 @@ static int reduce_unmatched (pw_component *c, int p) {
   return p;
 }
 
-/* Back substitution: the pivot rows become P^-1 H, of which `reach` takes the size, lengths of angles alike. */
-static void reduce_reach (pw_component *c) {
-  for (int p = c->pivots - 1; p >= 0; p--) {
-    double *row = c->Z + p * c->cols, square = 0;
-    for (int q = p + 1; q < c->pivots; q++) {
-      const double *other = c->Z + q * c->cols;
-      double f = row[c->pivot[q]];
-      for (int n = 0; n < c->cols; n++)
-        if (!c->massless[n]) row[n] -= f * other[n];
-    }
-    for (int n = 0; n < c->cols; n++) {
-      if (c->massless[n]) continue;
-      row[n] /= row[c->pivot[p]];
-      square += row[n] * row[n] / (c->unit[n] * c->unit[n]);
-    }
-    c->reach[p] = sqrt (square);
-  }
-}
-
 /* Gaussian elimination; angles in units of length, rows scaled by the largest entry they had: what is left of a dependent
  * row is small. */
 int pw_reduce_match (pw_component *c) {
@@ -164,6 +145,5 @@ int pw_reduce_match (pw_component *c) {
     for (int i = p + 1; i < c->rows; i++) reduce_eliminate (c, p, i);
   }
   reduce_plan_copies (c);
-  reduce_reach (c);
   return c->pivots;
 }

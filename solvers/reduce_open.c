@@ -144,7 +144,6 @@ static void reduce_lay_out_component (pw_layout *l, pw_component *c, int rows, i
   c->scale = pw_take (l, m, sizeof (double));
   c->massless = pw_take (l, m, 1);
   c->unit = pw_take (l, m, sizeof (double));
-  c->reach = pw_take (l, m, sizeof (double));
   c->piece = pw_take (l, n * PW_REDUCE_PIECES, sizeof (pw_reduce_piece));
   c->from = pw_take (l, n * pivots, sizeof (double *));
   c->heavy = pw_take (l, n * PW_REDUCE_PIECES, sizeof (pw_reduce_heavy));
