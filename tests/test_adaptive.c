@@ -93,6 +93,59 @@ static void test_work (void **state) {
   }
 }
 
+/* ---- Where stability sets the steps ----
+ *
+ * One body follows a force through a stiff damper, m v' = k (cos w t - v), another swings on a spring that asks for steps
+ * near the damper's limit of stability, 6.4 / k:  v = (k^2 cos w t + k w sin w t) / (k^2 + w^2) */
+
+enum { ADAPTIVE_DAMPING = 400, ADAPTIVE_DRIVE = 2 };
+
+typedef struct {
+  double swing; /* [rad/s] */
+} adaptive_edge;
+
+static void adaptive_build_edge (pw_model *m, const void *parameters) {
+  const double k = ADAPTIVE_DAMPING, w = ADAPTIVE_DRIVE, swing = ((const adaptive_edge *)parameters)->swing;
+  pw_add_body (m, &(pw_body){ .name = "led", .mass = 1, .inertia = 1, .rate = { k * k / (k * k + w * w) } });
+  pw_add_body (m, &(pw_body){ .name = "swung", .mass = 1, .inertia = 1, .start = { 1 } });
+  pw_add_drag (m, &(pw_drag){ .name = "oil", .body = "led", .linear = k });
+  pw_add_force (
+      m,
+      &(pw_force){ .name = "lead", .body = "led", .fx = { PW_HARMONIC, .harmonic = { .amplitude = k, .omega = w } } });
+  pw_add_spring (m, &(pw_spring){ .name = "spring", .body = { "swung", "ground" }, .stiffness = swing * swing });
+}
+
+static const pw_parameter adaptive_edge_list[] = {
+  { PW_AT (adaptive_edge, swing), 20, "rad/s", "of the spring", PW_POSITIVE },
+  { .name = NULL },
+};
+
+static void test_edge (void **state) {
+  (void)state;
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof table,
+                                         .parameters = adaptive_edge_list,
+                                         .parameters_size = sizeof (adaptive_edge),
+                                         .build = adaptive_build_edge };
+  const double k = ADAPTIVE_DAMPING, w = ADAPTIVE_DRIVE, t_end = 5;
+  for (double swing = 10; swing < 25; swing += 1) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&table, "swing", swing, NULL);
+    pw_run *r = runs_open (s, "erk8+none", &(pw_settings){ .rtol = 1e-10, .span = t_end });
+    double worst = 0;
+    while (pw_time (r) < t_end) {
+      pw_sample x;
+      check_ok (pw_advance (r, t_end, &error), &error);
+      check_ok (pw_at (r, pw_time (r), &x, &error), &error);
+      double v = (k * k * cos (w * x.t) + k * w * sin (w * x.t)) / (k * k + w * w);
+      worst = fmax (worst, fabs (x.v[0] - v));
+    }
+    check_below ("rate", worst, 1e-7, "1e3 rtol: the largest growth of an error that one estimate lets pass");
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
 /* ---- Samples ---- */
 
 /* Takes a sample in two places of every step up to t_end if asked to; the state at t_end. */
@@ -361,6 +414,7 @@ int main (void) {
     cmocka_unit_test (test_orders),
     cmocka_unit_test (test_tolerances),
     cmocka_unit_test (test_work),
+    cmocka_unit_test (test_edge),
     cmocka_unit_test (test_samples),
     cmocka_unit_test (test_samples_bits),
     cmocka_unit_test (test_breakpoint),
