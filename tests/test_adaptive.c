@@ -394,13 +394,13 @@ static void test_stops (void **state) {
 
 /* Tolerances that let everything pass: the run ends, with finite numbers or with a reason. */
 static void test_useless_tolerances (void **state) {
-  static const double rtol[] = { 1, 1e6 };
+  static const double atol[] = { 0, 1e6 };
   (void)state;
   for (int i = 0; i < ADAPT_METHODS; i++)
     for (int k = 0; k < 2; k++) {
       pw_error error = { 0 };
       pw_system *s = scene_system (&scene_ezyroller, NULL);
-      pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = rtol[k], .span = 10 });
+      pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = 0.9, .atol = atol[k], .span = 10 });
       int status = pw_advance_to (r, 10, 10, &error);
       assert_true ((status == PW_OK && pw_time (r) == 10) || (status == PW_METHOD && pw_time (r) < 10));
       if (status == PW_METHOD) assert_memory_equal (error.text, "t = ", 4);
