@@ -173,6 +173,7 @@ static void test_faults (void **state) {
   KINDS_FAULT (signals, 1, "signals is not the number of fields of type PW_SIGNAL");
   KINDS_FAULT (each_body, 1, "a kind that acts on each body has one body and names none");
   KINDS_FAULT (constant, 1, "a constant force that is none, or has signals");
+  KINDS_FAULT (rows, 1, "the columns of a unit matrix, but not two rows");
   KINDS_FAULT (J, pw_by_differences, "PW_BY_DIFFERENCES stands in another place than a second-order block's");
   KINDS_FAULT (J, NULL, "constraint rows without J");
   KINDS_FAULT (g, NULL, "holonomic rows without g");
