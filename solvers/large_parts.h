@@ -218,9 +218,10 @@ static inline void large_patch (const pw_large *l, const pw_patch *p, const doub
 /* ---- Pieces of an elimination ---- */
 
 /* The smallest pivot relative to its diagonal entry, without dividing as long as it stays the smallest; what is not a
- * number is taken for smaller.  `was` is positive, or else a pivot below 0 could make up for the one before it. */
+ * number is taken for smaller, and so is 0 out of 0.  `was` is not negative, or else a pivot below 0 could make up for the
+ * one before it. */
 static inline void large_judge (pw_large *l, double pivot, double was, int y) {
-  if (pivot >= l->pivot * was) return;
+  if (pivot > l->pivot * was) return;
   l->pivot = pivot / was;
   l->row = y;
 }

@@ -57,14 +57,16 @@ static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *t
   size_t bytes = (size_t)s->coords * sizeof (double);
   double *weight = malloc (2 * bytes);
   if (weight == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  memcpy (r->q, r->q_given, bytes);
-  memcpy (r->v, r->v_given, bytes);
   start_weights (s, s->metric, held, weight);
-  int status = pw_place (s, r->t, r->q, r->v);
-  pw_sweep_J (s);
+  int status = PW_OK;
   for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
     pw_projector p;
     pw_error none = { 0 };
+    memcpy (r->q, r->q_given, bytes);
+    memcpy (r->v, r->v_given, bytes);
+    status = pw_place (s, r->t, r->q, r->v);
+    if (status != PW_OK) break;
+    pw_sweep_J (s);
     start_weights (s, choice == 0 ? s->mass : s->metric, held ? held + s->coords : NULL, weight + s->coords);
     status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
     if (status == PW_OK) {

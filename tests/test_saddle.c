@@ -6,6 +6,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include "check.h"
 #include "mechanism.h"
 #include "method.h"
@@ -244,6 +245,28 @@ static void test_light (void **state) {
   }
 }
 
+/* A pin between two bodies that are both held has nothing to give way: that is singular, wherever it is in the order. */
+static void test_held (void **state) {
+  enum { LINKS = 12 };
+  (void)state;
+  for (int body = 0; body + 1 < LINKS; body++) {
+    double weight[3 * LINKS + 3], a[3 * LINKS + 3], lambda[2 * LINKS], gamma[2 * LINKS] = { 1 };
+    pw_error error = { 0 };
+    pw_system *s = scene_named ("chain", "n", LINKS);
+    assert_true (s->coords == 3 * LINKS && s->rows <= 2 * LINKS);
+    memcpy (weight, s->mass, 3 * LINKS * sizeof *weight);
+    for (int j = 3 * body; j < 3 * body + 6; j++) weight[j] = INFINITY;
+    assert_int_equal (pw_place (s, 0, s->q0, s->v0), PW_OK);
+    pw_sweep_J (s);
+    pw_saddle *x = pw_saddle_open (s, weight, s->rows, NULL, &error);
+    check_ok (x ? PW_OK : error.status, &error);
+    assert_int_equal (pw_saddle_factor (x), PW_RETRY);
+    assert_int_equal (pw_saddle_factor_solve (x, NULL, gamma, a, lambda), PW_RETRY);
+    pw_saddle_close (x);
+    pw_free (s);
+  }
+}
+
 static void test_random (void **state) {
   int tried = 0;
   double worst = 0;
@@ -265,10 +288,8 @@ static void test_random (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_models),
-    cmocka_unit_test (test_linkages),
-    cmocka_unit_test (test_light),
-    cmocka_unit_test (test_random),
+    cmocka_unit_test (test_models), cmocka_unit_test (test_linkages), cmocka_unit_test (test_light),
+    cmocka_unit_test (test_held),   cmocka_unit_test (test_random),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

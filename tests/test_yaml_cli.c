@@ -126,13 +126,21 @@ static void test_new (void **state) {
             "pinwheel run @/mine.c --every 0.5 --set torque=0.5 -o @/c.csv >/dev/null && cmp @/c.csv @/text.csv");
 }
 
+/* Rows between rates that are all held are no way to begin: what is held is let go, the scene starts and runs. */
+static void test_held (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run tests/scenes/held-welds.yaml -t 0.5 --json @/held.json"), 0);
+  const char *json = cli_file ("held.json");
+  assert_true (cli_says (json, "status", "ok"));
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_same_tables), cmocka_unit_test (test_same_sweeps),
     cmocka_unit_test (test_round_trip),  cmocka_unit_test (test_round_trip_signals),
     cmocka_unit_test (test_no_text),     cmocka_unit_test (test_max_file),
     cmocka_unit_test (test_names),       cmocka_unit_test (test_message),
-    cmocka_unit_test (test_new),
+    cmocka_unit_test (test_new),         cmocka_unit_test (test_held),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
