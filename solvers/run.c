@@ -140,6 +140,7 @@ static int run_check_finite (pw_run *r, pw_error *error) {
 
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
   pw_settings none = { 0 };
+  r->s->failed = NULL;
   if (pw_parse_options (method, &r->method, &r->stabilisation, r->option, error) != PW_OK) return PW_INPUT;
   int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
   if (status == PW_OK && run_allocate (r) != PW_OK)

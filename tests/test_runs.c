@@ -48,6 +48,8 @@ static void test_signal_fails (void **state) {
     error.status = PW_OK;
     check_ok (pw_at (r, t, &sample, &error), &error);
     pw_close (r);
+    assert_null (pw_open (s, "rk5", NULL, &error)); /* another run of the system has nothing to do with it */
+    assert_null (strstr (error.text, "finite"));
     pw_free (s);
   }
 }
