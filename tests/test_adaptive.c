@@ -140,7 +140,7 @@ static void test_edge (void **state) {
       double v = (k * k * cos (w * x.t) + k * w * sin (w * x.t)) / (k * k + w * w);
       worst = fmax (worst, fabs (x.v[0] - v));
     }
-    check_below ("rate", worst, 1e-7, "1e3 rtol: the largest growth of an error that one estimate lets pass");
+    check_below ("rate", worst, 1e-7, "1e3 rtol, twice the largest; with the two estimates of DOP853 alone it is 5e-7");
     pw_close (r);
     pw_free (s);
   }
@@ -400,9 +400,9 @@ static void test_useless_tolerances (void **state) {
     for (int k = 0; k < 2; k++) {
       pw_error error = { 0 };
       pw_system *s = scene_system (&scene_ezyroller, NULL);
-      pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = 0.9, .atol = atol[k], .span = 10 });
+      pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = 0.5, .atol = atol[k], .span = 10 });
       int status = pw_advance_to (r, 10, 10, &error);
-      assert_true ((status == PW_OK && pw_time (r) == 10) || (status == PW_METHOD && pw_time (r) <= 10));
+      assert_true ((status == PW_OK && pw_time (r) == 10) || (status == PW_METHOD && pw_time (r) < 10));
       if (status == PW_METHOD) assert_memory_equal (error.text, "t = ", 4);
       pw_close (r);
       pw_free (s);
