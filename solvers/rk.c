@@ -137,8 +137,8 @@ void pw_rk_carry (pw_run *r, pw_archive *a) {
 
 /* ---- A step ---- */
 
-/* Entry i of y + sum_j f_j k_j, and the one behind it; m, the number of weights, is a constant where this is inlined. */
-PW_INLINE void rk_two (double *restrict out, const double *y, double *const *k, const double *f, int m, int i) {
+/* Entries i and i + 1 of y + sum_j f_j k_j. */
+PW_INLINE void rk_two (double *restrict out, const double *y, double *const *k, const double *f, int m, long i) {
   double a = y[i], b = y[i + 1];
   PW_UNROLL for (int j = 0; j < m; j++) {
     a += f[j] * k[j][i];
@@ -148,36 +148,30 @@ PW_INLINE void rk_two (double *restrict out, const double *y, double *const *k, 
   out[i + 1] = b;
 }
 
-PW_INLINE void rk_one (double *out, const double *y, double *const *k, const double *f, int m, int i) {
-  double a = y[i];
-  PW_UNROLL for (int j = 0; j < m; j++) a += f[j] * k[j][i];
-  out[i] = a;
-}
-
+/* The state reached + h sum_j w_j (V_j, A_j); there is room for an entry behind the last.  m, the number of weights, is a
+ * constant where this is inlined. */
 PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h, int m) {
   const struct pw_method_data *d = r->data;
   const double *q0 = r->q, *v0 = r->v;
   double *V[PW_RK_STAGES], *A[PW_RK_STAGES], f[PW_RK_STAGES];
-  int n = r->s->coords, i = 0;
   PW_UNROLL for (int j = 0; j < m; j++) V[j] = d->V[w->stage[j]], A[j] = d->A[w->stage[j]], f[j] = h * w->weight[j];
-  for (; i + 1 < n; i += 2) {
+  for (long i = 0, n = r->s->coords; i < n; i += 2) {
     rk_two (q, q0, V, f, m, i);
     rk_two (v, v0, A, f, m, i);
   }
-  if (i < n) {
-    rk_one (q, q0, V, f, m, i);
-    rk_one (v, v0, A, f, m, i);
-  }
 }
 
-/* The state reached + h sum_j w_j (V_j, A_j). */
+PW_APART void rk_combine_any (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h) {
+  rk_combine_by (r, q, v, w, h, w->count);
+}
+
 static void rk_combine (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h) {
   if (w->count == 1)
     rk_combine_by (r, q, v, w, h, 1);
   else if (w->count == 4)
     rk_combine_by (r, q, v, w, h, 4);
   else
-    rk_combine_by (r, q, v, w, h, w->count);
+    rk_combine_any (r, q, v, w, h);
 }
 
 void pw_rk_ledger (const pw_run *r, double *out, const double *y, double h) {
@@ -233,9 +227,9 @@ static int rk_project (pw_run *r, double t, double *added) {
 
 /* 1 if nothing is so large that its square would not be a number. */
 static int rk_finite (const pw_run *r, const double *q, const double *v) {
-  for (int j = 0; j < r->s->coords; j++)
-    if (!(fabs (q[j]) < 1e150 && fabs (v[j]) < 1e150)) return 0;
-  return 1;
+  double sum = 0;
+  for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
+  return sum < 1e300;
 }
 
 /* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->a, d->lambda. */
