@@ -68,8 +68,14 @@ void pw_hold (pw_system *s, int hold) {
   s->t_signal = NAN;
 }
 
-double pw_next_breakpoint (const pw_system *s, double t) {
+double pw_next_breakpoint (pw_system *s, double t) {
   double next = INFINITY;
-  for (int i = 0; i < s->sources; i++) next = fmin (next, pw_signal_breakpoint (&s->source[i].signal, t));
+  for (const pw_source *i = s->source, *end = i + s->sources; i < end; i++) {
+    double own = pw_signal_breakpoint (&i->signal, t);
+    if (own < next) next = own;
+    if (own > t) continue;
+    s->failed = i;
+    return NAN;
+  }
   return next;
 }

@@ -10,9 +10,12 @@ static void signal_harmonic (const pw_signal *s, double angle, double u[3]) {
   u[2] = -w * w * c;
 }
 
-static int signal_function (const pw_source *source, double t, double u[3]) {
+/* What is not a number has failed, too. */
+static int signal_function (const pw_source *source, double t, int derivatives, double u[3]) {
   const pw_function *f = &source->signal.function;
-  return f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
+  int status = f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
+  if (status != 0) return status;
+  return !isfinite (u[0]) || (derivatives && !(isfinite (u[1]) && isfinite (u[2])));
 }
 
 /* What most scenes have comes first. */
@@ -24,7 +27,8 @@ int pw_signal_eval (const pw_source *source, double t, int derivatives, double u
     return 0;
   }
   u[0] = 0;
-  if (s->type > PW_HARMONIC) return (s->type == PW_FUNCTION ? signal_function : pw_shape_eval) (source, t, u);
+  if (s->type == PW_FUNCTION) return signal_function (source, t, derivatives, u);
+  if (s->type > PW_HARMONIC) return pw_shape_eval (source, t, u);
   if (s->type == PW_HARMONIC)
     signal_harmonic (s, s->harmonic.omega * t + s->harmonic.phase, u);
   else

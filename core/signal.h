@@ -5,7 +5,8 @@
 #include "system.h"
 
 /* Value, rate and acceleration at time t (the last two only if derivatives are asked for); the states a function
- * reads are in source->x.  Returns what the user's function returned: non-zero stops the run. */
+ * reads are in source->x.  Returns what the user's function returned, or not 0 if its values are not finite: that stops the
+ * run. */
 int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]);
 
 /* First time after t at which the signal jumps or its rate or acceleration does, or INFINITY. */

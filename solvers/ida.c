@@ -2,6 +2,7 @@
  *
  * The Newton matrix is exact and sparse, factorised by KLU.  lambda and mu are kept out of the error test, and only
  * they: rates of massless coordinates are in it.  In si1 all are in it. */
+#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <stdio.h>
@@ -217,9 +218,21 @@ static int ida_fail (ida_data *d, int flag, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", d->run->t, why, d->run->settings.rtol);
 }
 
+static int ida_restart (pw_run *r, pw_error *error);
+
+/* IDA does not begin where it is to stop within the round-off of time.  Nothing moves there. */
+static int ida_skip (pw_run *r, double stop, pw_error *error) {
+  r->t = stop;
+  r->statistics.steps++;
+  if (pw_ida_place (r->data, stop, N_VGetArrayPointer (r->data->y)) != 0)
+    return ida_fail (r->data, IDA_RES_FAIL, error);
+  return ida_restart (r, error);
+}
+
 static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   ida_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), t = r->t;
+  if (t == d->begun && stop - t <= 8 * DBL_EPSILON * fabs (t)) return ida_skip (r, stop, error);
   int flag = stop != d->stop ? IDASetStopTime (d->ida, stop) : IDA_SUCCESS;
   d->stop = stop;
   if (flag >= 0) flag = IDASolve (d->ida, stop, &t, d->y, d->yp, IDA_ONE_STEP);
@@ -242,7 +255,7 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
   const double *work = N_VGetArrayPointer (d->work);
   int flag = IDA_SUCCESS;
   if (t > r->t) flag = IDA_BAD_T;
-  if (t == d->begun)
+  if (t == d->begun && t == r->t)
     ida_fill_vectors (d);
   else if (flag == IDA_SUCCESS) {
     flag = IDAGetDky (d->ida, t, 1, d->yp);

@@ -192,14 +192,21 @@ static inline int rk_stage (pw_run *r, double t, double *v, double *a) {
   return status == PW_OK ? pw_nullspace_accelerate (r, v, a, d->lambda) : status;
 }
 
+/* Signals of forces keep the values of the step's beginning, wherever the system was placed last: by a sample, or a step
+ * that was rejected. */
+static int rk_hold (pw_run *r) {
+  int status = pw_place (r->s, r->t, r->q, r->v);
+  pw_hold (r->s, status == PW_OK);
+  return status;
+}
+
 /* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Returns as pw_accelerate. */
 static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
   pw_system *s = r->s;
   d->V[0] = r->v, d->A[0] = r->a, d->R[0] = r->rate;
-  if (d->held) pw_hold (s, 1);
-  int status = PW_OK;
+  int status = d->held ? rk_hold (r) : PW_OK;
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
     rk_combine (r, d->q, d->V[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + b->c[i] * h);

@@ -149,7 +149,7 @@ static int adapt_fail (pw_run *r, int status, double h, pw_error *error) {
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most = 5;
-  double least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * fabs (stop - r->t));
+  double least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->s->scale.time);
   int status = PW_OK, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
   for (;;) {
     double t1 = r->t + d->h, added = 0, off;

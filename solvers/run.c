@@ -116,15 +116,29 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   return status;
 }
 
+/* Finds the next discontinuity behind the state reached. */
+static int run_look_ahead (pw_run *r, pw_error *error) {
+  char signal[160];
+  double next = pw_next_breakpoint (r->s, r->t);
+  if (!isnan (next)) {
+    r->breakpoint = next;
+    return PW_OK;
+  }
+  pw_failed_signal (r->s, signal, sizeof signal);
+  r->s->failed = NULL;
+  return pw_fail (error, PW_METHOD, "t = %.17g s: %s: its breakpoint function tells a time that is not later", r->t,
+                  signal);
+}
+
 /* The state is consistent: energies, ledger and statistics begin here. */
-static void run_begin (pw_run *r) {
+static int run_begin (pw_run *r, pw_error *error) {
   pw_system *s = r->s;
   r->before = pw_run_agitation (r);
   r->calm = fmax (1, r->before);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
-  r->breakpoint = pw_next_breakpoint (s, r->t);
   pw_forget_residuals (r);
   (void)pw_note_residuals (r);
+  return run_look_ahead (r, error);
 }
 
 /* Accelerations that are not finite at the start are a kind's or a signal's fault, and told as such. */
@@ -155,8 +169,8 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (status != PW_OK) return status;
   r->s->scale.time = run_time_scale (r);
   pw_count_moved (r);
-  run_begin (r);
-  return r->method->open (r, error);
+  status = run_begin (r, error);
+  return status == PW_OK ? r->method->open (r, error) : status;
 }
 
 pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
@@ -187,8 +201,8 @@ void pw_close (pw_run *r) {
 
 /* Behind a discontinuity the accelerations are others, and a method starts anew. */
 static int run_pass_breakpoint (pw_run *r, pw_error *error) {
-  r->breakpoint = pw_next_breakpoint (r->s, r->t);
-  int status = run_evaluate (r, error);
+  int status = run_look_ahead (r, error);
+  if (status == PW_OK) status = run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
@@ -334,9 +348,9 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (run_is_lost (r, error)) return PW_MACHINE;
   if (run_check_state (r, q, 0, error) != PW_OK || run_check_state (r, v, 1, error) != PW_OK) return PW_INPUT;
   int status = run_energy (r, &before, error);
+  if (status == PW_OK) status = run_look_ahead (r, error);
   if (status != PW_OK) return status;
   r->s->t_signal = NAN;
-  r->breakpoint = pw_next_breakpoint (r->s, r->t);
   run_exchange (r->q, r->q_at, q, n);
   run_exchange (r->v, r->v_at, v, n);
   status = pw_make_consistent (r, NULL, error);

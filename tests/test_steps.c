@@ -1,0 +1,242 @@
+/* Where steps begin and end, by every method: looks into a step, its beginning, ends an infinite time away or hardly behind
+ * it, discontinuities that follow each other at once, and those a function of the caller's does not tell well. */
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+#include "trial.h"
+
+enum { STEPS_NAME = 80 };
+
+/* Every integrator with every stabilisation, and where inputs can be held, with these: the i-th one's name, or NULL. */
+static const char *steps_method (int i, char name[STEPS_NAME]) {
+  for (int m = 0; pw_methods[m]; m++)
+    for (const pw_stabilisation *x = pw_methods[m]->stabilisations; x->name; x++)
+      for (int held = 0; held < 2; held++) {
+        snprintf (name, STEPS_NAME, "%s+%s%s", pw_methods[m]->name, x->name, held ? ":inputs=held" : "");
+        const pw_method *method;
+        int number;
+        if ((!held || pw_parse_method (name, &method, &number, NULL) == PW_OK) && i-- == 0) return name;
+      }
+  return NULL;
+}
+
+/* A pendulum that starts hanging; its torque is as given. */
+static pw_signal steps_torque[2];
+
+static void steps_build (pw_model *m, const void *parameters) {
+  static const char *const name[] = { "T", "U" };
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "bob", .mass = 1, .inertia = 0.1, .start = { 0, -1, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "ground", "bob" }, .at = { { 0, 0 }, { 0, 1 } } });
+  for (int i = 0; i < 2; i++)
+    pw_add_torque (m, &(pw_torque){ .name = name[i], .body = { "bob", "ground" }, .value = steps_torque[i] });
+}
+
+static const pw_plugin_table steps_table = TRIAL_TABLE (steps_build);
+
+static pw_system *steps_open (pw_signal one, pw_signal two) {
+  steps_torque[0] = one, steps_torque[1] = two;
+  return scene_system (&steps_table, NULL);
+}
+
+static const pw_signal steps_swing = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = 30 } };
+
+/* ---- Looks ---- */
+
+static void steps_run (pw_system *s, const char *method, int looks, double q[3], double v[3]) {
+  pw_error error = { 0 };
+  pw_sample sample;
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 0.01, .rtol = 1e-4 });
+  while (pw_time (r) < 0.3) {
+    double before = pw_time (r);
+    check_ok (pw_advance (r, 0.3, &error), &error);
+    for (int i = 1; i <= looks; i++)
+      check_ok (pw_at (r, before + (pw_time (r) - before) * i / (looks + 1), &sample, &error), &error);
+  }
+  sample = runs_to (r, 0.3);
+  memcpy (q, sample.q, 3 * sizeof *q);
+  memcpy (v, sample.v, 3 * sizeof *v);
+  pw_close (r);
+}
+
+/* However often a run is looked into, it stays the same. */
+static void test_looks (void **state) {
+  char name[STEPS_NAME];
+  (void)state;
+  pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
+  for (int i = 0; steps_method (i, name); i++) {
+    double q[3], v[3], q_seen[3], v_seen[3];
+    steps_run (s, name, 0, q, v);
+    steps_run (s, name, 2, q_seen, v_seen);
+    check_bits ("positions", q_seen, q, 3);
+    check_bits ("rates", v_seen, v, 3);
+  }
+  pw_free (s);
+}
+
+/* Held signals have within a step the values of its beginning, which a look may have gone behind: the angle of the step
+ * itself is T t^2 / (2 I), T of its beginning. */
+static void test_held_inside (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_sample sample;
+  pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
+  pw_run *r = runs_open (s, "rk4+projection:inputs=held", &(pw_settings){ .step = 0.01 });
+  check_ok (pw_advance (r, 1, &error), &error);
+  for (int i = 3; i > 0; i--) {
+    double t = 0.0025 * i;
+    check_ok (pw_at (r, t, &sample, &error), &error);
+    check_close ("angle", sample.q[2], t * t / 2 / 1.1, 1e-12, "64 eps");
+  }
+  pw_close (r);
+  pw_free (s);
+}
+
+/* The beginning of a step is inside it. */
+static void test_beginning (void **state) {
+  char name[STEPS_NAME];
+  (void)state;
+  pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
+  for (int i = 0; steps_method (i, name); i++) {
+    pw_error error = { 0 };
+    pw_sample sample;
+    pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01 });
+    check_ok (pw_advance (r, 1, &error), &error);
+    assert_true (pw_time (r) > 0);
+    check_ok (pw_at (r, 0, &sample, &error), &error);
+    check_close ("angle", sample.q[2], 0, 16 * DBL_EPSILON, "the start, projected");
+    check_close ("rate", sample.v[2], 0, 16 * DBL_EPSILON, "the start, projected");
+    pw_close (r);
+  }
+  pw_free (s);
+}
+
+/* ---- Ends ---- */
+
+/* A run without an end takes the steps of one whose end is far. */
+static void test_endless (void **state) {
+  char name[STEPS_NAME];
+  (void)state;
+  pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
+  for (int i = 0; steps_method (i, name); i++) {
+    double t[2];
+    for (int endless = 0; endless < 2; endless++) {
+      pw_error error = { 0 };
+      pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01, .rtol = 1e-10 });
+      for (int k = 0; k < 3; k++) check_ok (pw_advance (r, endless ? INFINITY : 1e3, &error), &error);
+      t[endless] = pw_time (r);
+      pw_close (r);
+    }
+    check_close (name, t[1], t[0], 0, "the same steps");
+  }
+  pw_free (s);
+}
+
+/* Two pulses begin at times that differ by the last digit, and the run ends by as little behind them, or later. */
+static void test_hardly_apart (void **state) {
+  char name[STEPS_NAME];
+  (void)state;
+  const double one = 0.3, two = 0.1 + 0.2;
+  assert_true (two > one);
+  pw_system *s = steps_open ((pw_signal){ PW_PULSE, .pulse = { .height = 1, .start = one } },
+                             (pw_signal){ PW_PULSE, .pulse = { .height = 1, .start = two } });
+  for (int i = 0; steps_method (i, name); i++) {
+    pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01, .rtol = 1e-6, .ledger = 1 });
+    check_close ("angle", runs_to (r, nextafter (two, 1)).q[2], 0, 16 * DBL_EPSILON, "nothing has happened yet");
+    check_close ("angle", runs_to (r, 1).q[2], 2 / 1.1 * 0.7 * 0.7 / 2, 1e-4, "100 rtol; leapfrog, galpha: h^2");
+    assert_true (pw_time (r) == 1);
+    pw_close (r);
+  }
+  pw_free (s);
+}
+
+/* ---- Functions of the caller's ---- */
+
+static int steps_breaks (void *context, double t, const double *x, double value[3], double *gradient) {
+  const double *until = context;
+  (void)x, (void)gradient;
+  value[0] = t < *until ? 1 : NAN;
+  return 0;
+}
+
+/* What a function gives that is not a number ends the run by name, and is in no sample. */
+static void test_not_a_number (void **state) {
+  char name[STEPS_NAME];
+  double until = 0.25;
+  (void)state;
+  pw_system *s = steps_open ((pw_signal){ PW_FUNCTION, .function = { .eval = steps_breaks, .context = &until } },
+                             (pw_signal){ 0 });
+  for (int i = 0; steps_method (i, name); i++) {
+    pw_error error = { 0 };
+    pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01 });
+    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
+    assert_true (pw_time (r) > 0.1 && pw_time (r) <= until);
+    assert_non_null (strstr (error.text, "torque T: value is not a finite number"));
+    pw_close (r);
+  }
+  until = -1;
+  pw_error error = { 0 };
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (&error, PW_METHOD, "t = 0 s: a signal failed: torque T: value is not a finite number");
+  pw_free (s);
+}
+
+/* Where a function tells the next breakpoint from. */
+typedef struct {
+  double from, told;
+} steps_wrong;
+
+static int steps_still (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)t, (void)x, (void)gradient;
+  value[0] = 1;
+  return 0;
+}
+
+static double steps_told (void *context, double t) {
+  const steps_wrong *w = context;
+  return t < w->from ? w->from : w->told;
+}
+
+/* A breakpoint that does not lie behind the time it is asked for would let the run stand still, or go back. */
+static void test_breakpoints_told (void **state) {
+  static const double told[] = { 0.125, 0, -INFINITY, NAN };
+  steps_wrong wrong;
+  (void)state;
+  pw_system *s = steps_open (
+      (pw_signal){ PW_FUNCTION, .function = { .eval = steps_still, .breakpoint = steps_told, .context = &wrong } },
+      (pw_signal){ 0 });
+  for (int i = 0; i < 4; i++) {
+    pw_error error = { 0 };
+    wrong = (steps_wrong){ 0.125, told[i] };
+    pw_run *r = runs_open (s, "rk4", NULL);
+    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
+    check_error (&error, PW_METHOD,
+                 "t = 0.125 s: torque T: value: its breakpoint function tells a time that is not later");
+    wrong = (steps_wrong){ 0, told[i] };
+    error = (pw_error){ 0 };
+    assert_int_equal (pw_restart (r, NULL, NULL, &error), PW_METHOD);
+    pw_close (r);
+    error = (pw_error){ 0 };
+    if (told[i] > 0) continue;
+    assert_null (pw_open (s, "rk4", NULL, &error));
+    check_error (&error, PW_METHOD, "t = 0 s: torque T: value: its breakpoint function tells a time that is not later");
+  }
+  pw_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_looks),
+    cmocka_unit_test (test_held_inside),
+    cmocka_unit_test (test_beginning),
+    cmocka_unit_test (test_endless),
+    cmocka_unit_test (test_hardly_apart),
+    cmocka_unit_test (test_not_a_number),
+    cmocka_unit_test (test_breakpoints_told),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
