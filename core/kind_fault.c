@@ -1,6 +1,7 @@
 /* Does the table of a kind hold together?  Asked before anything of it is used, so that a slip in a plug-in is told by
  * name instead of crashing the program. */
 #include <stdio.h>
+#include <string.h>
 #include "model.h"
 #include "system.h"
 
@@ -63,19 +64,28 @@ static const char *fault_sweeps (const pw_kind *k) {
   return "";
 }
 
+static int fault_is_long (const char *name) {
+  return strlen (name) > PW_NAME_MOST;
+}
+
 static const char *fault_names (const pw_kind *k) {
   for (int i = 0; i < k->rows; i++)
     if (k->reaction == NULL || k->reaction[i].name == NULL || k->reaction[i].unit == NULL)
       return "constraint rows without names of their reactions";
+    else if (fault_is_long (k->reaction[i].name))
+      return "a reaction's name of more than 50 bytes";
   for (int i = 0; i < k->own; i++)
     if (k->coordinate == NULL || k->coordinate[i].name == NULL || k->coordinate[i].rate == NULL ||
         k->coordinate[i].unit == NULL)
       return "own coordinates without names";
+    else if (fault_is_long (k->coordinate[i].name) || fault_is_long (k->coordinate[i].rate))
+      return "an own coordinate's name of more than 50 bytes";
   return "";
 }
 
 const char *pw_kind_fault (const pw_kind *k, char *buffer, size_t size) {
   if (k->name == NULL || *k->name == 0) return "no name";
+  if (fault_is_long (k->name)) return "a name of more than 50 bytes";
   if (k->definition < sizeof (char *)) return "the definition has no room for its name";
   if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->own < 0 || k->own > PW_MAX_OWN || k->rows < 0 ||
       k->rows > PW_MAX_ROWS || k->signals < 0 || k->signals > PW_MAX_SIGNALS) {

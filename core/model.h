@@ -42,6 +42,9 @@ struct pw_model {
   pw_error error; /* the first one */
 };
 
+/* The most bytes in a name: "KIND ELEMENT" and "ELEMENT.REACTION" are to fit the 120 of a buffer. */
+enum { PW_NAME_MOST = 50 };
+
 static inline const char *pw_element_name (const pw_element *e) {
   return *(const char *const *)e->definition;
 }

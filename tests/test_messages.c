@@ -35,6 +35,8 @@ static void messages_refused (pw_model *m, const char *text) {
 #define WHEEL(...) pw_add_wheel (m, &(pw_wheel){ __VA_ARGS__ })
 #define TORQUE(...) pw_add_torque (m, &(pw_torque){ .body = { "frame", "steer" }, __VA_ARGS__ })
 
+#define MESSAGES_50 "a-name-of-fifty-bytes-that-is-longer-than-it-shoul"
+
 static void test_bad_names (void **state) {
   (void)state;
   BAD (": a body has no name", BODY (.mass = 1));
@@ -44,6 +46,9 @@ static void test_bad_names (void **state) {
   BAD (": wheel \"ground\": this name is reserved for the ground", WHEEL (.name = "ground", .body = "frame"));
   BAD (": body \"rear axle\": a name is made of letters, digits, _ and -", BODY (.name = "rear axle"));
   BAD (": body \"a.b\": a name is made of letters, digits, _ and -", BODY (.name = "a.b"));
+  BAD (": body \"" MESSAGES_50 "...\": a name has at most 50 bytes, this one 51", BODY (.name = MESSAGES_50 "x"));
+  BAD (": wheel \"" MESSAGES_50 "...\": a name has at most 50 bytes, this one 150",
+       WHEEL (.name = MESSAGES_50 MESSAGES_50 MESSAGES_50, .body = "frame"));
   BAD (": two bodies are named \"steer\"", BODY (.name = "steer"));
   BAD (": a body and a wheel are both named \"frame\"", WHEEL (.name = "frame", .body = "frame"));
   BAD (": two elements are named \"A\"", WHEEL (.name = "A", .body = "frame"); WHEEL (.name = "A", .body = "steer"));
