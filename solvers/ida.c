@@ -62,19 +62,27 @@ static void ida_weigh_multipliers (const ida_data *d, const double *y, double fo
   for (int i = 2 * d->n + d->rows; i < d->size; i++) w[i] = 1 / mu;
 }
 
+/* The scale of forces: that of the masses, else that of the multipliers; 1 where nothing has mass and nothing pulls. */
+static double ida_force (const pw_run *r) {
+  const pw_system *s = r->s;
+  double L = s->scale.length, T = s->scale.time, force = 0;
+  for (int j = 0; j < s->coords; j++) force = fmax (force, s->mass[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
+  if (force > 0) return force;
+  for (int i = 0; i < s->rows; i++) force = fmax (force, fabs (r->lambda[i]));
+  return force > 0 ? force : 1;
+}
+
 /* Error weights: by unit for q and v. */
 static int ida_weights (N_Vector vy, N_Vector weights, void *user) {
   ida_data *d = user;
   const pw_run *r = d->run;
-  const pw_system *s = r->s;
-  const double *y = N_VGetArrayPointer (vy), L = s->scale.length, T = s->scale.time, rtol = r->settings.rtol;
-  double *w = N_VGetArrayPointer (weights), force = 0;
+  const double *y = N_VGetArrayPointer (vy), rtol = r->settings.rtol;
+  double *w = N_VGetArrayPointer (weights);
   for (int j = 0; j < d->n; j++) {
     w[j] = 1 / (rtol * fabs (y[j]) + pw_atol (r, j));
     w[d->n + j] = 1 / (rtol * fabs (y[d->n + j]) + pw_atol_rate (r, j));
-    force = fmax (force, s->mass[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
   }
-  ida_weigh_multipliers (d, y, force, w);
+  ida_weigh_multipliers (d, y, ida_force (r), w);
   return 0;
 }
 

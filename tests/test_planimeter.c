@@ -1,5 +1,6 @@
 /* The hatchet planimeter of the gallery: what a knife edge behind a point makes of the point's way round a circle. */
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "check.h"
@@ -46,11 +47,30 @@ static void test_drawn_behind (void **state) {
   check_close ("radius", hypot (x, y), 0.6, 100 * H4, "0.65, 0.25 and 0.6: a right angle");
 }
 
+/* Where the drives lead the rod does not depend on its mass: without any nothing pulls, and all reactions are 0. */
+static void test_without_mass (void **state) {
+  (void)state;
+  static const char *const method[] = { "rk4+projection", "erk8+nullspace", "adams+none", "bdf+projection",
+                                        "ida+none",       "ida+baumgarte",  "ida+index2", "ida+ggl",
+                                        "ida+si1",        "galpha+ggl",     "leapfrog" };
+  for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
+    int fixed = strchr ("rgl", method[i][0]) != NULL;
+    char command[200];
+    snprintf (command, sizeof command, "pinwheel run hatchet-planimeter --set m=0 --t-end 2 --method %s --%s --json -",
+              method[i], fixed ? "step=1e-3" : "rtol=1e-8");
+    cli_good (command);
+    check_close (method[i], cli_number (cli_out, "truth", "largest", "angle", NULL), 0, fixed ? 100 * 1e-6 : 1e4 * 1e-8,
+                 "100 h^2, or 1e4 rtol");
+    check_close (method[i], cli_number (cli_out, "reactions", "hatchet.N", NULL), 0, 1e-15, "no mass, no force");
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_comes_back),
     cmocka_unit_test (test_area),
     cmocka_unit_test (test_drawn_behind),
+    cmocka_unit_test (test_without_mass),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
