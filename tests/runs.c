@@ -11,6 +11,16 @@ pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings
   return r;
 }
 
+const pw_method *runs_method (int i, char name[40]) {
+  for (const pw_method *const *m = pw_methods; *m; m++)
+    for (const pw_stabilisation *s = (*m)->stabilisations; s->name; s++)
+      if (i-- == 0) {
+        snprintf (name, 40, "%s+%s", (*m)->name, s->name);
+        return *m;
+      }
+  return NULL;
+}
+
 pw_sample runs_to (pw_run *r, double t) {
   pw_error error = { 0 };
   pw_sample sample;

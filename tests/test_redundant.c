@@ -349,53 +349,6 @@ static void test_casters (void **state) {
   redundant_twins (&redundant_four_wheels_table, &redundant_two_wheels_table, 1, 1e-3, name);
 }
 
-/* ---- A robot: two driven wheels on one axle of one body, centre of mass between them ----
- *
- *   v = a t, phi = b t^2 / 2:  (m + 2 I / r^2) a = (u1 + u2) / r,  (J + 2 I c^2 / r^2) b = c (u2 - u1) / r */
-
-static const struct { double m, J, I, r, c, u1, u2; } redundant_r = { 10, 0.4, 0.02, 0.1, 0.25, 0.5, 0.8 };
-
-static void redundant_robot (pw_model *m, const void *parameter) {
-  (void)parameter;
-  pw_add_body (m, &(pw_body){ .name = "robot", .mass = redundant_r.m, .inertia = redundant_r.J });
-  for (int i = 0; i < 2; i++)
-    pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = i ? "right" : "left",
-                                                  .body = "robot",
-                                                  .at = { 0, i ? -redundant_r.c : redundant_r.c },
-                                                  .radius = redundant_r.r,
-                                                  .inertia = redundant_r.I,
-                                                  .torque = { .constant = i ? redundant_r.u2 : redundant_r.u1 } });
-}
-
-static const pw_plugin_table redundant_robot_table = TRIAL_TABLE (redundant_robot);
-
-static void redundant_circle (const char *method, double bound, const char *reason) {
-  const double t = 2, m = redundant_r.m, I = redundant_r.I, r = redundant_r.r, c = redundant_r.c;
-  double a = (redundant_r.u1 + redundant_r.u2) / r / (m + 2 * I / (r * r));
-  double b = c * (redundant_r.u2 - redundant_r.u1) / r / (redundant_r.J + 2 * I * c * c / (r * r));
-  double phi = b * t * t / 2, way = a * t * t / 2, side = m * a * t * b * t;
-  pw_system *s = scene_system (&redundant_robot_table, NULL);
-  pw_run *run = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 });
-  pw_sample x = runs_to (run, t);
-  check_close ("phi", x.q[2], phi, bound, reason);
-  check_close ("x", x.q[0], a / b * sin (phi), bound, reason);
-  check_close ("y", x.q[1], a / b * (1 - cos (phi)), bound, reason);
-  check_close ("left", trial_state (s, &x, "left.spin"), (way - c * phi) / r, 10 * bound, reason);
-  check_close ("right", trial_state (s, &x, "right.spin"), (way + c * phi) / r, 10 * bound, reason);
-  check_close ("left force", trial_reaction (s, &x, "left.N"), side / 2, 1e3 * bound, reason);
-  check_close ("right force", trial_reaction (s, &x, "right.N"), side / 2, 1e3 * bound, reason);
-  check_close ("balance", x.balance, 0, 10 * bound, reason);
-  pw_close (run);
-  pw_free (s);
-}
-
-static void test_robot (void **state) {
-  (void)state;
-  for (int i = 0; redundant_fixed[i]; i++) redundant_circle (redundant_fixed[i], 1e-10, "100 h^4 at h = 1e-3");
-  for (int i = 0; redundant_second[i]; i++) redundant_circle (redundant_second[i], 1e-4, "100 h^2 at h = 1e-3");
-  for (int i = 0; redundant_adaptive[i]; i++) redundant_circle (redundant_adaptive[i], 1e-6, "1e4 rtol");
-}
-
 /* ---- What is said ---- */
 
 static const char redundant_coupler[] = "pin B2 (B2.Fy) follows from pin A1, pin B1, pin A2, pin A3, pin B3";
@@ -403,10 +356,8 @@ static const char redundant_coupler[] = "pin B2 (B2.Fy) follows from pin A1, pin
 static void test_names (void **state) {
   (void)state;
   static const char *const axle[] = { "wheels rear_left and rear_right: the same lateral constraint", NULL };
-  static const char *const robot[] = { "rolling-wheels left and right: the same lateral constraint", NULL };
   static const char *const none[] = { NULL };
   redundant_says (&redundant_three_table, axle);
-  redundant_says (&redundant_robot_table, robot);
   redundant_says (&redundant_two_table, none);
 }
 
@@ -434,7 +385,6 @@ int main (void) {
     cmocka_unit_test (test_frame),
     cmocka_unit_test (test_bracket),
     cmocka_unit_test (test_casters),
-    cmocka_unit_test (test_robot),
     cmocka_unit_test (test_names),
     cmocka_unit_test (test_partners),
   };

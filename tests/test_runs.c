@@ -1,4 +1,4 @@
-/* Runs on the way: failures and what is left of them, scenes without rows, looking back, stopping, restarting. */
+/* Runs on the way: failures and what is left of them, scenes without rows, looking back, stopping. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -126,21 +126,20 @@ static void test_few_rows (void **state) {
     .abi = PW_ABI, .size = sizeof table, .parameters = list, .parameters_size = 2 * sizeof (double), .build = runs_free
   };
   (void)state;
-  for (int with = 0; with < 4; with++) {
+  for (int with = 0; with < 3; with++) {
     pw_system *s = scene_system (&table, "pin", with & 1 ? 1.0 : 0.0, "wheel", with & 2 ? 1.0 : 0.0, NULL);
-    for (int i = 0; pw_methods[i]; i++)
-      for (const pw_stabilisation *t = pw_methods[i]->stabilisations; with != 3 && t->name; t++) {
-        char name[100];
-        snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, t->name);
-        pw_run *r = runs_open (s, name, &(pw_settings){ .step = 1e-2, .rtol = 1e-8, .span = 2, .ledger = 1 });
-        pw_sample now = runs_to (r, 2);
-        double bound = pw_methods[i]->adaptive ? 1e3 * 1e-8 : 1000 * CHECK_EPS;
-        const char *reason = pw_methods[i]->adaptive ? "1e3 rtol" : "exact for a parabola: round-off over 200 steps";
-        check_close ("angle", now.q[2], 0.25 / 0.5 * 2 * 2 / 2, bound, reason);
-        check_close ("x", now.q[0], with == 0 ? 3 * 2 : 0, bound, reason);
-        check_close ("work", now.work, 0.25 * now.q[2], bound, reason);
-        pw_close (r);
-      }
+    const pw_method *m;
+    char name[40];
+    for (int i = 0; (m = runs_method (i, name)) != NULL; i++) {
+      pw_run *r = runs_open (s, name, &(pw_settings){ .step = 1e-2, .rtol = 1e-8, .span = 2, .ledger = 1 });
+      pw_sample now = runs_to (r, 2);
+      double bound = m->adaptive ? 1e3 * 1e-8 : 1000 * CHECK_EPS;
+      const char *reason = m->adaptive ? "1e3 rtol" : "exact for a parabola: round-off over 200 steps";
+      check_close ("angle", now.q[2], 0.25 / 0.5 * 2 * 2 / 2, bound, reason);
+      check_close ("x", now.q[0], with == 0 ? 3 * 2 : 0, bound, reason);
+      check_close ("work", now.work, 0.25 * now.q[2], bound, reason);
+      pw_close (r);
+    }
     pw_free (s);
   }
 }
@@ -206,116 +205,6 @@ static void test_t_end (void **state) {
   }
 }
 
-/* A restart from the state a run has reached goes on as if nothing had been; from another state it goes on from there. */
-static void test_restart (void **state) {
-  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",       "ida+baumgarte",
-                                        "ida+si1",        "adams+baumgarte", "bdf+baumgarte", "bdf+projection" };
-  (void)state;
-  for (int i = 0; i < 8; i++) {
-    pw_error error = { 0 };
-    double q[6], v[6];
-    pw_system *s = scene_system (&scene_ezyroller, NULL);
-    pw_settings settings = { .step = 1e-3, .rtol = 1e-9, .span = 2, .ledger = 1 };
-    runs_state (s, method[i], &settings, 2, q, v, NULL);
-    pw_run *r = runs_open (s, method[i], &settings);
-    runs_to (r, 1);
-    pw_statistics before = *pw_run_statistics (r);
-    check_ok (pw_restart (r, NULL, NULL, &error), &error);
-    pw_sample now = runs_to (r, 2);
-    const pw_statistics *cost = pw_run_statistics (r); /* counts from the beginning of the run */
-    assert_true (cost->steps > before.steps && cost->rhs > before.rhs && cost->rejected >= before.rejected);
-    double bound = i < 2 ? 1e-12 : 1e-5;
-    for (int j = 0; j < 6; j++)
-      check_close (method[i], now.q[j], q[j], bound, i < 2 ? "a step of the same size: round-off" : "1e4 rtol");
-    check_close ("balance", now.balance, 0, i < 2 ? 1e-10 : 1e-5, "the ledger goes on");
-    double moved[6];
-    for (int j = 0; j < 6; j++) moved[j] = now.q[j] + (j % 3 == 0 ? 10 : 0); /* both bodies 10 m to the side */
-    check_ok (pw_restart (r, moved, NULL, &error), &error);
-    now = runs_to (r, 2.5);
-    assert_true (now.q[0] > 9);
-    pw_close (r);
-    pw_free (s);
-  }
-}
-
-/* Rates changed from outside change the power: the first step behind must count with the new one. */
-static void test_restart_slower (void **state) {
-  (void)state;
-  pw_error error = { 0 };
-  double v[6];
-  pw_system *s = scene_system (&scene_ezyroller, NULL);
-  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2, .ledger = 1 });
-  pw_sample before = runs_to (r, 2);
-  double work = before.work, left = before.kinetic / 4;
-  for (int j = 0; j < 6; j++) v[j] = before.v[j] / 2;
-  check_ok (pw_restart (r, NULL, v, &error), &error);
-  pw_sample now = runs_to (r, 2.001);
-  check_close ("work of a step", now.work - work, now.kinetic - left, 1e-13, "the method's error in one step, h^5");
-  pw_close (r);
-  pw_free (s);
-}
-
-/* A restart that is refused leaves the run where it was, to the bit. */
-static void test_restart_refused (void **state) {
-  (void)state;
-  pw_system *s = scene_system (&scene_ezyroller, NULL), *same = scene_system (&scene_ezyroller, NULL);
-  pw_settings settings = { .step = 1e-3, .span = 2, .ledger = 1 };
-  pw_run *r = runs_open (s, "rk4+projection", &settings), *left = runs_open (same, "rk4+projection", &settings);
-  pw_sample now = runs_to (r, 1);
-  runs_to (left, 1);
-  pw_error error = { 0 };
-  double q[6];
-  memcpy (q, now.q, sizeof q);
-  q[4] = NAN;
-  assert_int_equal (pw_restart (r, q, NULL, &error), PW_INPUT);
-  check_error (&error, PW_INPUT, "model ezyroller: restart with steer.y = nan: expected a finite number");
-  assert_int_equal (pw_advance (r, NAN, NULL), PW_INPUT);
-  assert_int_equal (pw_at (r, NAN, &now, NULL), PW_INPUT);
-  now = runs_to (r, 2);
-  pw_sample other = runs_to (left, 2);
-  for (int i = 0; i < 6; i++)
-    check_close ("positions", now.q[i], other.q[i], 1e-13, "round-off of a factorisation anew");
-  check_close ("balance", now.balance, other.balance, 1e-13, "round-off");
-  pw_close (r), pw_close (left);
-  pw_free (s), pw_free (same);
-}
-
-/* A kick is the caller's: the balance tells the method's error only, before and behind it. */
-static void test_restart_kick (void **state) {
-  (void)state;
-  pw_error error = { 0 };
-  double v[6];
-  pw_system *s = scene_system (&scene_ezyroller, NULL);
-  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2, .ledger = 1 });
-  pw_sample now = runs_to (r, 1);
-  double kinetic = now.kinetic;
-  for (int j = 0; j < 6; j++) v[j] = 3 * now.v[j];
-  check_ok (pw_restart (r, NULL, v, &error), &error);
-  check_ok (pw_at (r, 1, &now, &error), &error);
-  check_close ("kick", now.kinetic, 9 * kinetic, 1e-14, "round-off");
-  check_close ("balance", now.balance, 0, 1e-10, "(h w)^4");
-  pw_close (r);
-  pw_free (s);
-}
-
-/* Nor is it taken for the method's where nothing but the energy itself is known. */
-static void test_restart_kick_unkept (void **state) {
-  (void)state;
-  pw_error error = { 0 };
-  double v[30];
-  pw_system *s = scene_named ("n-four-bar", "N", 2);
-  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
-  pw_sample now = runs_to (r, 0.1);
-  assert_int_equal (pw_count_ledger (s), 0);
-  assert_true (pw_count_coordinates (s) <= 30);
-  for (int j = 0; j < pw_count_coordinates (s); j++) v[j] = 3 * now.v[j];
-  check_ok (pw_restart (r, NULL, v, &error), &error);
-  now = runs_to (r, 0.2);
-  check_below ("energy", pw_unbalanced (r, &now), 1e-5, "(h w)^4 at w = 50 / s");
-  pw_close (r);
-  pw_free (s);
-}
-
 /* ---- A torque that is no number from some time on ---- */
 
 static int runs_wild (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -366,62 +255,17 @@ static void test_wild_start (void **state) {
   pw_free (s);
 }
 
-/* ---- A torque that the caller sets anew between steps, as a controller does ---- */
-
-static int runs_held (void *context, double t, const double *x, double value[3], double *gradient) {
-  (void)t, (void)x, (void)gradient;
-  value[0] = *(double *)context;
-  return 0;
-}
-
-static double runs_controlled (const char *method, double step) {
-  pw_error error = { 0 };
-  double u = 0;
-  pw_signal torque = { PW_FUNCTION, .function = { .eval = runs_held, .context = &u } };
-  pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
-  pw_system *s = scene_compile (m);
-  pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-12, .span = 2 });
-  for (int k = 0; k < 20; k++) {
-    u = 0.1 * cos (0.4 * k);
-    check_ok (pw_restart (r, NULL, NULL, &error), &error);
-    check_ok (pw_advance_to (r, 0.1 * (k + 1), 0.1 * (k + 1), &error), &error);
-  }
-  double phi = runs_to (r, pw_time (r)).q[2];
-  pw_close (r);
-  pw_free (s);
-  return phi;
-}
-
-/* Behind a restart a function's new value counts at once: the method keeps its order. */
-static void test_restart_controlled (void **state) {
-  static const char *const method[] = { "rk4+projection", "galpha+ggl", "leapfrog" };
-  static const double order[] = { 4, 2, 2 };
-  (void)state;
-  double truth = runs_controlled ("erk8+projection", 0);
-  for (int i = 0; i < 3; i++) {
-    double coarse = runs_controlled (method[i], 0.02) - truth, fine = runs_controlled (method[i], 0.01) - truth;
-    check_close (method[i], log2 (coarse / fine), order[i], 0.3, "order over one halving");
-  }
-}
-
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_signal_fails),
-    cmocka_unit_test (test_restart_refused),
-    cmocka_unit_test (test_restart_kick),
-    cmocka_unit_test (test_restart_kick_unkept),
     cmocka_unit_test (test_wild),
     cmocka_unit_test (test_wild_start),
-    cmocka_unit_test (test_restart_controlled),
     cmocka_unit_test (test_signal_fails_at_once),
     cmocka_unit_test (test_too_large_a_step),
     cmocka_unit_test (test_massless),
     cmocka_unit_test (test_few_rows),
     cmocka_unit_test (test_outside),
     cmocka_unit_test (test_t_end),
-    cmocka_unit_test (test_restart),
-    cmocka_unit_test (test_restart_slower),
     cmocka_unit_test (test_twice),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

@@ -1,0 +1,163 @@
+/* Restarts: a run goes on from where it was, or from a state and with signals that the caller has changed. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+
+/* A restart from the state a run has reached goes on as if nothing had been; from another state it goes on from there. */
+static void test_onwards (void **state) {
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",       "ida+baumgarte",
+                                        "ida+si1",        "adams+baumgarte", "bdf+baumgarte", "bdf+projection" };
+  (void)state;
+  for (int i = 0; i < 8; i++) {
+    pw_error error = { 0 };
+    double q[6], v[6];
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_settings settings = { .step = 1e-3, .rtol = 1e-9, .span = 2, .ledger = 1 };
+    runs_state (s, method[i], &settings, 2, q, v, NULL);
+    pw_run *r = runs_open (s, method[i], &settings);
+    runs_to (r, 1);
+    pw_statistics before = *pw_run_statistics (r);
+    check_ok (pw_restart (r, NULL, NULL, &error), &error);
+    pw_sample now = runs_to (r, 2);
+    const pw_statistics *cost = pw_run_statistics (r); /* counts from the beginning of the run */
+    assert_true (cost->steps > before.steps && cost->rhs > before.rhs && cost->rejected >= before.rejected);
+    double bound = i < 2 ? 1e-12 : 1e-5;
+    for (int j = 0; j < 6; j++)
+      check_close (method[i], now.q[j], q[j], bound, i < 2 ? "a step of the same size: round-off" : "1e4 rtol");
+    check_close ("balance", now.balance, 0, i < 2 ? 1e-10 : 1e-5, "the ledger goes on");
+    double moved[6];
+    for (int j = 0; j < 6; j++) moved[j] = now.q[j] + (j % 3 == 0 ? 10 : 0); /* both bodies 10 m to the side */
+    check_ok (pw_restart (r, moved, NULL, &error), &error);
+    now = runs_to (r, 2.5);
+    assert_true (now.q[0] > 9);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+/* Rates changed from outside change the power: the first step behind must count with the new one. */
+static void test_slower (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  double v[6];
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2, .ledger = 1 });
+  pw_sample before = runs_to (r, 2);
+  double work = before.work, left = before.kinetic / 4;
+  for (int j = 0; j < 6; j++) v[j] = before.v[j] / 2;
+  check_ok (pw_restart (r, NULL, v, &error), &error);
+  pw_sample now = runs_to (r, 2.001);
+  check_close ("work of a step", now.work - work, now.kinetic - left, 1e-13, "the method's error in one step, h^5");
+  pw_close (r);
+  pw_free (s);
+}
+
+/* A restart that is refused leaves the run where it was, to the bit. */
+static void test_refused (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, NULL), *same = scene_system (&scene_ezyroller, NULL);
+  pw_settings settings = { .step = 1e-3, .span = 2, .ledger = 1 };
+  pw_run *r = runs_open (s, "rk4+projection", &settings), *left = runs_open (same, "rk4+projection", &settings);
+  pw_sample now = runs_to (r, 1);
+  runs_to (left, 1);
+  pw_error error = { 0 };
+  double q[6];
+  memcpy (q, now.q, sizeof q);
+  q[4] = NAN;
+  assert_int_equal (pw_restart (r, q, NULL, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model ezyroller: restart with steer.y = nan: expected a finite number");
+  assert_int_equal (pw_advance (r, NAN, NULL), PW_INPUT);
+  assert_int_equal (pw_at (r, NAN, &now, NULL), PW_INPUT);
+  now = runs_to (r, 2);
+  pw_sample other = runs_to (left, 2);
+  for (int i = 0; i < 6; i++)
+    check_close ("positions", now.q[i], other.q[i], 1e-13, "round-off of a factorisation anew");
+  check_close ("balance", now.balance, other.balance, 1e-13, "round-off");
+  pw_close (r), pw_close (left);
+  pw_free (s), pw_free (same);
+}
+
+/* A kick is the caller's: the balance tells the method's error only, before and behind it. */
+static void test_kick (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  double v[6];
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 2, .ledger = 1 });
+  pw_sample now = runs_to (r, 1);
+  double kinetic = now.kinetic;
+  for (int j = 0; j < 6; j++) v[j] = 3 * now.v[j];
+  check_ok (pw_restart (r, NULL, v, &error), &error);
+  check_ok (pw_at (r, 1, &now, &error), &error);
+  check_close ("kick", now.kinetic, 9 * kinetic, 1e-14, "round-off");
+  check_close ("balance", now.balance, 0, 1e-10, "(h w)^4");
+  pw_close (r);
+  pw_free (s);
+}
+
+/* Nor is it taken for the method's where nothing but the energy itself is known. */
+static void test_kick_unkept (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  double v[30];
+  pw_system *s = scene_named ("n-four-bar", "N", 2);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
+  pw_sample now = runs_to (r, 0.1);
+  assert_int_equal (pw_count_ledger (s), 0);
+  assert_true (pw_count_coordinates (s) <= 30);
+  for (int j = 0; j < pw_count_coordinates (s); j++) v[j] = 3 * now.v[j];
+  check_ok (pw_restart (r, NULL, v, &error), &error);
+  now = runs_to (r, 0.2);
+  check_below ("energy", pw_unbalanced (r, &now), 1e-5, "(h w)^4 at w = 50 / s");
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- A torque that the caller sets anew between steps, as a controller does ---- */
+
+static int restart_held (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)t, (void)x, (void)gradient;
+  value[0] = *(double *)context;
+  return 0;
+}
+
+static double restart_controlled (const char *method, double step) {
+  pw_error error = { 0 };
+  double u = 0;
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = restart_held, .context = &u } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-12, .span = 2 });
+  for (int k = 0; k < 20; k++) {
+    u = 0.1 * cos (0.4 * k);
+    check_ok (pw_restart (r, NULL, NULL, &error), &error);
+    check_ok (pw_advance_to (r, 0.1 * (k + 1), 0.1 * (k + 1), &error), &error);
+  }
+  double phi = runs_to (r, pw_time (r)).q[2];
+  pw_close (r);
+  pw_free (s);
+  return phi;
+}
+
+/* Behind a restart a function's new value counts at once: the method keeps its order. */
+static void test_controlled (void **state) {
+  static const char *const method[] = { "rk4+projection", "galpha+ggl", "leapfrog" };
+  static const double order[] = { 4, 2, 2 };
+  (void)state;
+  double truth = restart_controlled ("erk8+projection", 0);
+  for (int i = 0; i < 3; i++) {
+    double coarse = restart_controlled (method[i], 0.02) - truth, fine = restart_controlled (method[i], 0.01) - truth;
+    check_close (method[i], log2 (coarse / fine), order[i], 0.3, "order over one halving");
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_onwards), cmocka_unit_test (test_slower),      cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_kick),    cmocka_unit_test (test_kick_unkept), cmocka_unit_test (test_controlled),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
