@@ -123,21 +123,18 @@ static void try_views (try_count *n, const mechanism *m, pw_system *s, const try
 /* ---- By another method ---- */
 
 /* The methods that hold the constraints take turns, those of order 2 with steps ten times finer.  Returns the order. */
-static int try_method (unsigned turn, char *name, size_t size) {
+static int try_method (unsigned turn, char name[40]) {
+  const pw_method *m;
   for (;;)
-    for (int i = 0; pw_methods[i]; i++)
-      for (const pw_stabilisation *k = pw_methods[i]->stabilisations; k->name; k++)
-        if (strcmp (k->name, "none") != 0 && turn-- == 0) {
-          snprintf (name, size, "%s+%s", pw_methods[i]->name, k->name);
-          return pw_methods[i]->order;
-        }
+    for (int i = 0; (m = runs_method (i, name)) != NULL; i++)
+      if (strstr (name, "+none") == NULL && turn-- == 0) return m->order;
 }
 
 static void try_other (try_count *n, const mechanism *m, pw_system *s, const try_end *x) {
   static const mechanism_view same = { .mirror = 0 };
-  char method[60], what[100];
+  char method[40], what[100];
   try_end y;
-  int order = try_method (n->seed, method, sizeof method);
+  int order = try_method (n->seed, method);
   try_run (s, method, 1e-9, order == 2 ? 1e-4 : 1e-3, &y);
   snprintf (what, sizeof what, "%s is off by", method);
   if (y.status == PW_OK)

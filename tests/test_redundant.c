@@ -1,7 +1,6 @@
 /* Redundant rows: the motion is that of the same scene without them, the reactions are the smallest, and what follows
  * from what is named. */
 #include <math.h>
-#include <string.h>
 #include "check.h"
 #include "scene.h"
 #include "trial.h"
@@ -111,50 +110,6 @@ static const char *const redundant_cranks[] = { "coupler.x",    "coupler.y",    
 static void test_parallelogram_twins (void **state) {
   (void)state;
   redundant_twins (&redundant_parallelogram, &redundant_slotted_table, 1, 1e-3, redundant_cranks);
-}
-
-static void redundant_swing (const char *method, double bound, const char *reason) {
-  pw_system *s = scene_system (&redundant_parallelogram, NULL);
-  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1, .ledger = 1 });
-  pw_sample x = runs_to (r, 1);
-  static const char *const crank[] = { "crank1.phi", "crank2.phi", "crank3.phi" };
-  for (int i = 0; i < 3; i++) check_close (method, trial_state (s, &x, crank[i]), -2.351451216583941994, bound, reason);
-  check_close (method, trial_state (s, &x, "crank2.omega"), 0.2767502772591703, 10 * bound, reason);
-  check_close ("balance", x.balance, 0, 1e2 * bound, reason);
-  pw_close (r);
-  pw_free (s);
-}
-
-static void test_parallelogram_digits (void **state) {
-  (void)state;
-  for (int i = 0; redundant_fixed[i]; i++) redundant_swing (redundant_fixed[i], 1e-11, "10 h^4 at h = 1e-3");
-  for (int i = 0; redundant_second[i]; i++) redundant_swing (redundant_second[i], 1e-5, "10 h^2 at h = 1e-3");
-  for (int i = 0; redundant_adaptive[i]; i++) redundant_swing (redundant_adaptive[i], 1e-7, "1e3 rtol");
-}
-
-/* By symmetry the least reactions are equal shares; in IDA the smallest also of the approximate ones. */
-static void redundant_shares (const char *method, double bound, const char *reason) {
-  static const char *const name[] = { "B1.Fx", "B2.Fx", "B3.Fx", "B1.Fy", "B2.Fy", "B3.Fy" };
-  double share[6];
-  pw_system *s = scene_system (&redundant_parallelogram, NULL);
-  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1 });
-  pw_sample x = runs_to (r, 0.7);
-  for (int i = 0; i < 6; i++) share[i] = trial_reaction (s, &x, name[i]);
-  for (int i = 1; i < 6; i++)
-    if (i != 3) check_close (name[i], share[i], share[i / 3 * 3], bound * hypot (share[0], share[3]), reason);
-  double ax = trial_state (s, &x, "coupler.phi"), ay = x.a[1] + 9.81;
-  check_close ("coupler's angle", ax, 0, bound, "the cranks are parallel");
-  check_close ("all three lift the coupler", -(share[3] + share[4] + share[5]), 2 * ay, 1e2 * bound, reason);
-  check_close ("and push it", -(share[0] + share[1] + share[2]), 2 * x.a[0], 1e2 * bound, reason);
-  pw_close (r);
-  pw_free (s);
-}
-
-static void test_shares (void **state) {
-  (void)state;
-  for (int i = 0; redundant_fixed[i]; i++) redundant_shares (redundant_fixed[i], 1e-11, "10 h^4 at h = 1e-3");
-  for (int i = 0; redundant_second[i]; i++) redundant_shares (redundant_second[i], 1e-5, "10 h^2 at h = 1e-3");
-  for (int i = 0; redundant_adaptive[i]; i++) redundant_shares (redundant_adaptive[i], 1e-6, "1e4 rtol");
 }
 
 /* ---- A tricycle: two wheels on one axle, a steered one in front ---- */
@@ -351,8 +306,6 @@ static void test_casters (void **state) {
 
 /* ---- What is said ---- */
 
-static const char redundant_coupler[] = "pin B2 (B2.Fy) follows from pin A1, pin B1, pin A2, pin A3, pin B3";
-
 static void test_names (void **state) {
   (void)state;
   static const char *const axle[] = { "wheels rear_left and rear_right: the same lateral constraint", NULL };
@@ -361,32 +314,15 @@ static void test_names (void **state) {
   redundant_says (&redundant_two_table, none);
 }
 
-/* A row with many partners names their elements; a short buffer cuts the text. */
-static void test_partners (void **state) {
-  (void)state;
-  char text[500];
-  pw_system *s = scene_system (&redundant_parallelogram, NULL);
-  pw_run *r = runs_open (s, "ida+ggl", NULL);
-  assert_int_equal (pw_run_redundant (r), 1);
-  assert_string_equal (pw_run_redundancy (r, 0, text, sizeof text), redundant_coupler);
-  pw_run_redundancy (r, 0, text, 10);
-  assert_int_equal (strlen (text), 9);
-  pw_close (r);
-  pw_free (s);
-}
-
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_parallelogram_twins),
-    cmocka_unit_test (test_parallelogram_digits),
-    cmocka_unit_test (test_shares),
     cmocka_unit_test (test_axle),
     cmocka_unit_test (test_axle_forces),
     cmocka_unit_test (test_frame),
     cmocka_unit_test (test_bracket),
     cmocka_unit_test (test_casters),
     cmocka_unit_test (test_names),
-    cmocka_unit_test (test_partners),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

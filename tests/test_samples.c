@@ -1,0 +1,198 @@
+/* Samples inside the steps of erk5 and erk8, and where steps end: at breakpoints, and where they are asked to. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+
+static const char *const samples_methods[] = { "erk5+none", "erk5+projection", "erk5+projection:metric=identity",
+                                               "erk8+none", "erk8+projection", "erk8+projection:metric=identity" };
+enum { SAMPLES_METHODS = sizeof samples_methods / sizeof *samples_methods };
+
+/* ---- Samples ---- */
+
+/* Takes a sample in two places of every step up to t_end if asked to; the state at t_end. */
+static void samples_state (const char *method, double rtol, int look, double *q, double *v, double *ledger,
+                           pw_statistics *cost) {
+  const double t_end = 3;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL), *S;
+  S = scene_system (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .span = t_end, .ledger = 1 });
+  pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = t_end });
+  for (double t0 = 0; pw_time (r) < t_end; t0 = pw_time (r)) {
+    pw_sample now;
+    check_ok (pw_advance (r, t_end, &error), &error);
+    for (int k = 0; look && k < 2; k++) {
+      double t = t0 + (k == 0 ? 0.37 : 0.9) * (pw_time (r) - t0);
+      check_ok (pw_at (r, t, &now, &error), &error);
+      pw_sample there = runs_to (exact, t);
+      for (int j = 0; j < 6; j++) {
+        check_close (method, now.q[j], there.q[j], 100 * rtol, "100 rtol, as at the ends of steps");
+        check_close (method, now.v[j], there.v[j], 100 * rtol, "100 rtol, as at the ends of steps");
+      }
+      check_close ("balance of a sample", now.balance, 0, 100 * rtol, "100 rtol");
+      if (strstr (method, "projection"))
+        check_below ("sample's residuals", now.position + now.velocity, 32 * CHECK_EPS, "round-off");
+    }
+  }
+  pw_sample now = runs_to (r, t_end);
+  memcpy (q, now.q, 6 * sizeof *q);
+  memcpy (v, now.v, 6 * sizeof *v);
+  memcpy (ledger, now.ledger, (size_t)pw_count_ledger (s) * sizeof *ledger);
+  *cost = *pw_run_statistics (r);
+  pw_close (r);
+  pw_close (exact);
+  pw_free (s);
+  pw_free (S);
+}
+
+static void test_samples (void **state) {
+  (void)state;
+  for (int i = 0; i < SAMPLES_METHODS; i++)
+    for (int k = 5; k <= 10; k++) {
+      double q[2][6], v[2][6], ledger[2][4];
+      pw_statistics cost[2];
+      for (int look = 0; look < 2; look++)
+        samples_state (samples_methods[i], pow (10, -k), look, q[look], v[look], ledger[look], &cost[look]);
+      check_bits ("positions without samples", q[0], q[1], 6);
+      check_bits ("rates without samples", v[0], v[1], 6);
+      check_bits ("work without samples", ledger[0], ledger[1], 1);
+      assert_true (cost[0].steps == cost[1].steps && cost[0].rejected == cost[1].rejected);
+    }
+}
+
+/* A sample is, to the bit, what a run has that ends there: both make that last step. */
+static void test_bits (void **state) {
+  static const char *const method[] = { "erk5+none", "erk5+projection" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    pw_settings settings = { .rtol = 1e-9, .span = 2 };
+    pw_system *s = scene_system (&scene_ezyroller, NULL), *S = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, method[i], &settings);
+    for (double t0 = 0; pw_time (r) < 2; t0 = pw_time (r)) {
+      double q[6], v[6], t;
+      pw_sample now;
+      check_ok (pw_advance (r, 2, &error), &error);
+      check_ok (pw_at (r, t = 0.4 * t0 + 0.6 * pw_time (r), &now, &error), &error);
+      runs_state (S, method[i], &settings, t, q, v, NULL);
+      check_bits ("positions of a run that ends there", now.q, q, 6);
+      check_bits ("rates of a run that ends there", now.v, v, 6);
+    }
+    assert_int_equal (pw_run_statistics (r)->rejected, 0); /* a run that ends there might not be told to retreat */
+    pw_close (r);
+    pw_free (s);
+    pw_free (S);
+  }
+}
+
+/* ---- Ends of steps ---- */
+
+/* A torque that is switched at 1/3 s. */
+static int samples_switched (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = t < 1. / 3 ? 0.1 : -0.2;
+  return 0;
+}
+
+static double samples_breakpoint (void *context, double t) {
+  (void)context;
+  return t < 1. / 3 ? 1. / 3 : INFINITY;
+}
+
+static pw_system *samples_switched_scene (void) {
+  pw_error error = { 0 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = samples_switched, .breakpoint = samples_breakpoint } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  return scene_compile (m);
+}
+
+/* One step ends where the torque is switched, and the switch costs no rejections. */
+static void test_breakpoint (void **state) {
+  (void)state;
+  const double rtol = 1e-8;
+  for (int i = 0; i < SAMPLES_METHODS; i++) {
+    pw_error error = { 0 };
+    double q[6], v[6];
+    int before = 0, there = 0;
+    pw_system *s = samples_switched_scene (), *S = samples_switched_scene ();
+    runs_state (S, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, 1, q, v, NULL);
+    pw_run *r = runs_open (s, samples_methods[i], &(pw_settings){ .rtol = rtol, .span = 1, .ledger = 1 });
+    while (pw_time (r) < 1) {
+      check_ok (pw_advance (r, 1, &error), &error);
+      there += pw_time (r) == 1. / 3;
+      before += pw_time (r) > 0.3 && pw_time (r) < 1. / 3;
+    }
+    assert_int_equal (there, 1);
+    check_below ("steps just before the switch", before, 2, "no approach in small steps");
+    check_below ("rejected", (double)pw_run_statistics (r)->rejected, 4, "hardly any");
+    pw_sample now = runs_to (r, 1);
+    for (int j = 0; j < 6; j++) {
+      check_close (samples_methods[i], now.q[j], q[j], 100 * rtol, "100 rtol");
+      check_close (samples_methods[i], now.v[j], v[j], 100 * rtol, "100 rtol");
+    }
+    check_close ("balance", now.balance, 0, 100 * rtol, "100 rtol");
+    pw_close (r);
+    pw_free (s);
+    pw_free (S);
+  }
+}
+
+/* Samples go on over a step that ends there: it can be looked into. */
+static void test_across (void **state) {
+  static const char *const method[] = { "erk5+none",       "erk5+projection", "erk8+none",
+                                        "erk8+projection", "rk4+projection",  "ida+ggl" };
+  (void)state;
+  for (int i = 0; i < 6; i++) {
+    pw_error error = { 0 };
+    pw_sample now;
+    const double rtol = 1e-8;
+    pw_system *s = samples_switched_scene (), *S = samples_switched_scene ();
+    pw_settings settings = { .rtol = rtol, .step = 0.005, .span = 1 };
+    pw_run *r = runs_open (s, method[i], &settings), *exact = runs_open (S, "rk4+projection", &(pw_settings){ 0 });
+    for (int k = 1; k <= 24; k++) {
+      double t = k / 24.;
+      check_ok (pw_advance_to (r, t, 1, &error), &error);
+      check_ok (pw_at (r, t, &now, &error), &error);
+      pw_sample there = runs_to (exact, t);
+      for (int j = 0; j < 6; j++)
+        check_close (method[i], now.q[j], there.q[j], 1e3 * rtol, "1e3 rtol; rk4 at its step");
+      if (k != 8) /* where they jump */
+        for (int j = 0; j < 6; j++)
+          check_close ("acceleration", now.a[j], there.a[j], 1e5 * rtol, "1e5 rtol: one derivative up");
+    }
+    pw_close (r);
+    pw_close (exact);
+    pw_free (s);
+    pw_free (S);
+  }
+}
+
+/* An end within round-off of the time reached is reached, and the next step is as long as if it had not been. */
+static void test_short_end (void **state) {
+  (void)state;
+  for (int i = 0; i < SAMPLES_METHODS; i++) {
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, samples_methods[i], &(pw_settings){ .rtol = 1e-8, .span = 2 });
+    runs_to (r, 0.3);
+    long steps = pw_run_statistics (r)->steps;
+    assert_true (0.1 * 3 > 0.3);
+    runs_to (r, 0.1 * 3);
+    assert_int_equal (pw_run_statistics (r)->steps, steps + 1);
+    check_ok (pw_advance (r, 2, &error), &error);
+    check_below ("half of a usual step of erk5", 0.03, pw_time (r) - 0.3, "steps go on as they were");
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_samples), cmocka_unit_test (test_bits),      cmocka_unit_test (test_breakpoint),
+    cmocka_unit_test (test_across),  cmocka_unit_test (test_short_end),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
