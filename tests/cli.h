@@ -19,6 +19,9 @@ int cli_run (const char *command);
 /* Runs a command that should succeed and say nothing on standard error. */
 void cli_good (const char *command);
 
+/* Runs a command that should succeed, whatever it says. */
+void cli_shell (const char *command);
+
 /* Runs a command that should end with a status and one line on standard error: "pinwheel: MESSAGE". */
 void cli_bad (const char *command, int status, const char *message);
 

@@ -1,4 +1,4 @@
-/* Sweeps from outside: the grid, rows and runs, failures, journals cut anywhere, kills, parts, bad input. */
+/* Sweeps from outside: the grid, rows and runs, failures, bad input. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -7,13 +7,6 @@
 #include "cli.h"
 
 #define GRID "--vary omega=lin:1:4:4 --vary M0=0.05,0.1,0.2 --t-end 0.05"
-
-/* A shell command that must succeed, whatever it says. */
-static void sweep_shell (const char *command) {
-  int status = cli_run (command);
-  if (status != 0) print_error ("%s\nends with %d:\n%s%s", command, status, cli_out, cli_err);
-  assert_int_equal (status, 0);
-}
 
 /* ---- The grid and its rows ---- */
 
@@ -58,7 +51,7 @@ static void test_row_is_run (void **state) {
               "sed -n '1p;4p' @/row.csv | cut -d, -f4-16 >@/a\n sed -n '1p;$p' @/run.csv | cut -d, -f1-13 >@/b\n"
               "cmp @/a @/b && pinwheel run ezyroller --set omega=3 --start frame.omega=0.1 $o --json - 2>/dev/null",
               method[i]);
-    sweep_shell (command);
+    cli_shell (command);
     const char *row = cli_file ("row.csv");
     for (int line = 0; line < 3; line++) row = strchr (row, '\n') + 1;
     for (int comma = 0; comma < 17; comma++) row = strchr (row, ',') + 1;
@@ -74,16 +67,16 @@ static void test_row_is_run (void **state) {
 /* Start values have a column of their own name, apart from the final state's. */
 static void test_start_values (void **state) {
   (void)state;
-  sweep_shell ("pinwheel sweep ezyroller --vary frame.vx=0,1 --t-end 0.01 -o @/start.csv && head -1 @/start.csv | cut "
-               "-d, -f1-5");
+  cli_shell ("pinwheel sweep ezyroller --vary frame.vx=0,1 --t-end 0.01 -o @/start.csv && head -1 @/start.csv | cut "
+             "-d, -f1-5");
   assert_string_equal (cli_out, "start.frame.vx [m/s],status,t [s],frame.x [m],frame.y [m]\n");
 }
 
 /* Bodies may come and go with a count; where there is none there is no number. */
 static void test_counts (void **state) {
   (void)state;
-  sweep_shell ("pinwheel sweep tests/scenes/chain.c --vary links=2,1,3 --t-end 0.01 -o @/count.csv\n"
-               "head -1 @/count.csv | tr , '\\n' | grep -c link; cut -d, -f1,2,15,16,21 @/count.csv");
+  cli_shell ("pinwheel sweep tests/scenes/chain.c --vary links=2,1,3 --t-end 0.01 -o @/count.csv\n"
+             "head -1 @/count.csv | tr , '\\n' | grep -c link; cut -d, -f1,2,15,16,21 @/count.csv");
   const char *expected = "19\nlinks,status,link2.omega [rad/s],link3.x [m],link3.omega [rad/s]\n2,ok,";
   assert_int_equal (strncmp (cli_out, expected, strlen (expected)), 0);
   assert_non_null (strstr (cli_out, ",nan,nan\n1,ok,nan,nan,nan\n3,ok,"));
@@ -91,7 +84,7 @@ static void test_counts (void **state) {
 
 static void test_cpu (void **state) {
   (void)state;
-  sweep_shell ("pinwheel sweep ezyroller " GRID " --cpu -o @/cpu.csv && head -1 @/cpu.csv | grep -o 'rhs,.*'");
+  cli_shell ("pinwheel sweep ezyroller " GRID " --cpu -o @/cpu.csv && head -1 @/cpu.csv | grep -o 'rhs,.*'");
   assert_string_equal (cli_out, "rhs,cpu [s],reason\n");
 }
 
@@ -135,171 +128,11 @@ static void test_fails_late (void **state) {
   assert_true (strtod (cli_out + 7, NULL) < 0.05);
 }
 
-/* ---- The same table whatever happens ---- */
-
-static void test_jobs (void **state) {
-  (void)state;
-  sweep_shell ("for m in rk4+projection ida+ggl ida+baumgarte; do for j in 1 2 3 7; do\n"
-               "  pinwheel sweep ezyroller " GRID " -m $m -j $j -o @/jobs.csv && cksum <@/jobs.csv || exit 1\n"
-               "done | sort -u | wc -l; done");
-  assert_string_equal (cli_out, "1\n1\n1\n");
-}
-
-/* A journal cut after any byte, as a kill may leave it: the part is a complete journal with another name. */
-static void test_cut_journal (void **state) {
-  (void)state;
-  sweep_shell ("s='pinwheel sweep ezyroller " GRID " --part 1/2 -o @/cut.csv'; $s || exit 1\n"
-               "cp @/cut.csv @/whole; size=$(wc -c <@/whole); n=0\n"
-               "while [ $n -le $size ]; do\n"
-               "  head -c $n @/whole >@/cut.csv.part; $s 2>/dev/null || exit 1\n"
-               "  cmp @/cut.csv @/whole || exit 1\n"
-               "  [ ! -e @/cut.csv.part ] || exit 1\n"
-               "  n=$((n + 61)); done");
-}
-
-/* Rows in another order, a row twice, a damaged one, a forgotten half-sorted table. */
-static void test_odd_journal (void **state) {
-  (void)state;
-  sweep_shell ("s='pinwheel sweep ezyroller " GRID " --part 2/2 -o @/odd.csv'; $s || exit 1\n"
-               "cp @/odd.csv @/whole; head=$(grep -n '^end$' @/whole | cut -d: -f1)\n"
-               "front () { head -$head @/whole; }; rows () { tail -n +$((head + 1)) @/whole; }\n"
-               "try () { $s || exit 1; cmp @/odd.csv @/whole || exit 1; }\n"
-               "{ front; rows | sort -r; } >@/odd.csv.part; try\n"
-               "{ front; rows | head -2; rows; } >@/odd.csv.part; try\n"
-               "{ front; rows | sed '3s/ok,0/ok,1/'; } >@/odd.csv.part; try\n"
-               "{ front; rows | head -3; printf 'zzz'; } >@/odd.csv.part; echo x >@/odd.csv.sorted; try\n");
-  const char *expected = ": 6 of 6 runs are done\n";
-  assert_non_null (strstr (cli_err, expected));
-  assert_non_null (strstr (strstr (cli_err, expected) + 1, ": 2 of 6 runs are done\n"));
-}
-
-/* Ctrl-C, and kills at odd moments, until it is through. */
-static void test_kills (void **state) {
-  (void)state;
-  const char *sweep = "p=\"${PINWHEEL:-build/pinwheel}\"\n"
-                      "s='sweep ezyroller --vary omega=lin:1:4:10 --vary M0=0.05,0.1,0.2,0.3 --t-end 4'\n";
-  char command[1500];
-  snprintf (
-      command, sizeof command,
-      "%s\"$p\" $s -j 1 -o @/whole.csv || exit 1\n"
-      "\"$p\" $s -o @/kill.csv &\n"
-      "until grep -q '^[0-9]' @/kill.csv.part 2>/dev/null; do sleep 0.01; done; kill -INT $!; kill -TERM $!; wait $!; "
-      "echo $?; ls @/kill.csv*",
-      sweep);
-  sweep_shell (command);
-  char expected[200];
-  cli_expand ("130\n@/kill.csv.part\n", expected, sizeof expected);
-  assert_string_equal (cli_out, expected);
-  assert_non_null (strstr (cli_err, "; the same command goes on from there\n"));
-  snprintf (
-      command, sizeof command,
-      "%si=3; while [ $i -lt 60 ]; do i=$((i + 1))\n"
-      "\"$p\" $s -o @/kill.csv 2>/dev/null & sleep $(printf 0.%%02d $i)\n"
-      "kill -KILL $! 2>/dev/null; wait $! 2>/dev/null && break\n"
-      "done; [ -e @/kill.csv ] || \"$p\" $s -o @/kill.csv; cmp @/kill.csv @/whole.csv && [ ! -e @/kill.csv.part ]",
-      sweep);
-  sweep_shell (command);
-}
-
-static void test_journal_of_another (void **state) {
-  (void)state;
-  sweep_shell ("pinwheel sweep ezyroller " GRID " --part 1/2 -o @/other.csv && mv @/other.csv @/other.csv.part");
-  const char *last = "; finish that one with its own command, or remove the file";
-  char text[600];
-#define OTHER(options, what)                                                                   \
-  snprintf (text, sizeof text, "@/other.csv.part belongs to another sweep: %s%s", what, last); \
-  cli_bad ("pinwheel sweep ezyroller " options " -o @/other.csv", 2, text)
-  OTHER (GRID, "part is 1/2 there and 1/1 here");
-  OTHER (GRID " --part 1/2 --step 0.002", "step is 0.001 there and 0.002 here");
-  OTHER (GRID " --part 1/2 --set a=0.75", "parameter a is 0.5 there and 0.75 here");
-  OTHER (GRID " --part 1/2 --start frame.x=1", "start frame.x is 1 here and not set there");
-  OTHER (GRID " --part 1/2 -m ida+ggl", "method is rk4+projection there and ida+ggl here");
-  OTHER ("--vary omega=lin:1:4:4 --vary M0=0.05,0.1,0.3 --t-end 0.05 --part 1/2",
-         "vary M0 is 0.05,0.1,0.2 there and 0.05,0.1,0.3 here");
-  OTHER ("--vary M0=0.05,0.1,0.2 --vary omega=lin:1:4:4 --t-end 0.05 --part 1/2",
-         "order is omega,M0 there and M0,omega here");
-#undef OTHER
-  cli_write ("mine.csv.part", "t [s],x [m]\n0,1\n");
-  cli_bad ("pinwheel sweep ezyroller " GRID " -o @/mine.csv", 2,
-           "@/mine.csv.part is there already and is no journal of a sweep: remove it if it is not needed");
-  assert_string_equal (cli_file ("mine.csv.part"), "t [s],x [m]\n0,1\n");
-}
-
-static void test_lock (void **state) {
-  (void)state;
-  sweep_shell (
-      "\"${PINWHEEL:-build/pinwheel}\" sweep ezyroller --vary omega=lin:1:4:400 --t-end 50 -o @/lock.csv & first=$!\n"
-      "while [ ! -s @/lock.csv.part ]; do sleep 0.02; done\n"
-      "pinwheel sweep ezyroller --vary omega=lin:1:4:400 --t-end 50 -o @/lock.csv; echo $?; kill -KILL $first");
-  assert_string_equal (cli_out, "2\n");
-  char expected[200];
-  cli_expand ("pinwheel: another process is at work on @/lock.csv.part\n", expected, sizeof expected);
-  assert_non_null (strstr (cli_err, expected));
-}
-
-/* ---- Parts ---- */
-
-static void test_parts (void **state) {
-  (void)state;
-  sweep_shell ("pinwheel sweep ezyroller " GRID " -o @/one.csv || exit 1\n"
-               "for n in 1 4 5 12; do rm -f @/part*; i=1; while [ $i -le $n ]; do\n"
-               "  pinwheel sweep ezyroller " GRID " --part $i/$n -o @/part$i.csv || exit 1; i=$((i + 1)); done\n"
-               "  [ $n = 1 ] || pinwheel sweep --merge @/part*.csv -o @/part1.csv.all || exit 1\n"
-               "  [ $n = 1 ] || cmp @/part1.csv.all @/one.csv || exit 1\n"
-               "done");
-}
-
-static void test_bad_parts (void **state) {
-  (void)state;
-  sweep_shell ("for i in 1 2 3; do pinwheel sweep ezyroller " GRID " --part $i/3 -o @/p$i.csv || exit 1; done\n"
-               "pinwheel sweep ezyroller " GRID " --step 2e-3 --part 2/3 -o @/q2.csv\n"
-               "pinwheel sweep ezyroller " GRID
-               " --part 2/4 -o @/r2.csv; cp @/p2.csv @/copy.csv; head -n -1 @/p3.csv >@/short.csv");
-  cli_bad ("pinwheel sweep --merge @/p1.csv @/p3.csv -o @/m.csv", 2, "part 2 of 3 is missing");
-  cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv -o @/m.csv", 2, "part 3 of 3 is missing");
-  cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv @/copy.csv -o @/m.csv", 2,
-           "@/p2.csv and @/copy.csv are both part 2 of 3");
-  cli_bad ("pinwheel sweep --merge @/p1.csv @/q2.csv @/p3.csv -o @/m.csv", 2,
-           "@/p1.csv and @/q2.csv are parts of different sweeps: step is 0.001 in the first and 0.002 in the second");
-  cli_bad ("pinwheel sweep --merge @/p1.csv @/r2.csv @/p3.csv -o @/m.csv", 2,
-           "@/p1.csv is one of 3 parts, @/r2.csv one of 4");
-  cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv @/short.csv -o @/m.csv", 2,
-           "@/short.csv is not complete: row 12 is missing; finish that part first");
-  cli_bad ("pinwheel sweep --merge @/p1.csv @/none.csv -o @/m.csv", 2,
-           "cannot open the part @/none.csv: No such file or directory");
-  cli_bad ("pinwheel sweep --merge Makefile -o @/m.csv", 2,
-           "Makefile is no part of a sweep: parts are written by --part I/N");
-  cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv @/p3.csv -o @/p2.csv", 2,
-           "@/p2.csv is a part and would be written over");
-  cli_bad ("pinwheel sweep --merge @/p1.csv -o @/m.csv --jobs 2", 2,
-           "--jobs has no place beside --merge: the parts say what they are");
-  cli_good ("ls @ | grep -c '^m.csv' || true");
-  assert_string_equal (cli_out, "0\n");
-}
-
 /* ---- Bad input: said before anything is computed ---- */
-
-/* A table in a file is as much of the model as the model's own file. */
-static void test_changed_table (void **state) {
-  (void)state;
-  cli_write ("table.yaml", "pinwheel: 1\nparameters: [{name: I, value: 1, domain: positive}]\n"
-                           "bodies: [{name: a, mass: 1, inertia: I}]\n"
-                           "elements: [{torque: T, body: [a, ground], value: {table: {file: table.csv}}}]\n");
-  sweep_shell ("GRID='--vary I=1,2 --t-end 1'\n"
-               "printf '0,0\\n1,1\\n' >@/table.csv; pinwheel sweep @/table.yaml $GRID --part 1/2 -o @/t1.csv\n"
-               "printf '0,0\\n1,2\\n' >@/table.csv; pinwheel sweep @/table.yaml $GRID --part 2/2 -o @/t2.csv");
-  cli_run ("pinwheel sweep --merge @/t1.csv @/t2.csv -o @/t.csv");
-  assert_non_null (strstr (cli_err, "tables is contents "));
-  sweep_shell ("printf '0,0\\n1,1\\n' >@/table.csv\n"
-               "pinwheel sweep @/table.yaml --vary I=1,2 --t-end 1 --part 2/2 -o @/t3.csv && "
-               "pinwheel sweep --merge @/t1.csv @/t3.csv -o @/t.csv");
-}
 
 static void test_bad_input (void **state) {
   (void)state;
-  static const struct {
-    const char *options, *message;
-  } bad[] = {
+  static const cli_wrong bad[] = {
     { "", "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,..." },
     { "--vary omga=1,2", "model ezyroller has no parameter \"omga\"; did you mean \"omega\"?" },
     { "--vary frame.vz=1,2", "model ezyroller has no state \"frame.vz\"; did you mean \"frame.vx\"?" },
@@ -330,11 +163,7 @@ static void test_bad_input (void **state) {
     { "--vary omega=1,2 --step 0", "--step 0: expected a number > 0" },
     { "--vary omega=1,2 --stp 1", "sweep has no option \"--stp\"; did you mean \"--step\"?" },
   };
-  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    char command[300];
-    snprintf (command, sizeof command, "pinwheel sweep ezyroller %s -o @/bad.csv", bad[i].options);
-    cli_bad (command, 2, bad[i].message);
-  }
+  cli_bad_each ("sweep ezyroller -o @/bad.csv", bad, sizeof bad / sizeof *bad);
   cli_bad ("pinwheel sweep ezyroller " GRID, 2, "nowhere to write the table: add -o FILE.csv");
   cli_bad ("pinwheel sweep ezyroller " GRID " -o -", 2,
            "-o -: a sweep needs a file, next to which it keeps what it has done");
@@ -348,16 +177,11 @@ static void test_bad_input (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),         cmocka_unit_test (test_ranges),
-    cmocka_unit_test (test_row_is_run),    cmocka_unit_test (test_start_values),
-    cmocka_unit_test (test_counts),        cmocka_unit_test (test_cpu),
-    cmocka_unit_test (test_failures),      cmocka_unit_test (test_all_fail),
-    cmocka_unit_test (test_fails_late),    cmocka_unit_test (test_jobs),
-    cmocka_unit_test (test_cut_journal),   cmocka_unit_test (test_odd_journal),
-    cmocka_unit_test (test_kills),         cmocka_unit_test (test_journal_of_another),
-    cmocka_unit_test (test_lock),          cmocka_unit_test (test_parts),
-    cmocka_unit_test (test_bad_parts),     cmocka_unit_test (test_bad_input),
-    cmocka_unit_test (test_changed_table),
+    cmocka_unit_test (test_order),        cmocka_unit_test (test_ranges),   cmocka_unit_test (test_row_is_run),
+    cmocka_unit_test (test_start_values), cmocka_unit_test (test_counts),   cmocka_unit_test (test_cpu),
+    cmocka_unit_test (test_failures),     cmocka_unit_test (test_all_fail), cmocka_unit_test (test_fails_late),
+    cmocka_unit_test (test_bad_input),
+
   };
   return cmocka_run_group_tests_name ("sweeps", tests, cli_setup, cli_teardown);
 }
