@@ -43,7 +43,7 @@ void pw_sweep_g (pw_system *s, double *g) {
 
 void pw_sweep_g_size (pw_system *s, double *size) {
   evaluate_rows (s, offsetof (pw_kind, g_size), s->holonomic, size);
-  for (int i = 0; i < s->holonomic; i++) size[i] = fmax (size[i], s->scale.length);
+  for (int i = 0; i < s->holonomic; i++) size[i] = pw_larger (size[i], s->scale.length);
 }
 
 void pw_sweep_eta (pw_system *s, double *eta) {
@@ -176,71 +176,75 @@ void pw_add_JT (const pw_system *s, const double *lambda, double *out) {
   }
 }
 
-/* (J v)_i and the sum of |J_ij v_j| for a slab and the placed rates, as evaluate_mul. */
-PW_INLINE void evaluate_speeds_of (const pw_slab *k, double *jv, double *size, int bodies, int own) {
-  const double *J = k->J, *y = k->b.v;
-  const int *body = k->b.body;
-  for (int e = 0; e < k->b.count; e++, body += bodies, y += own)
-    for (int r = 0; r < k->kind->rows; r++) {
-      double sum = 0, sizes = 0;
-      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
-        const pw_pose *p = &k->b.pose[body[n]];
-        double vx = J[0] * p->vx, vy = J[1] * p->vy, w = J[2] * p->omega;
-        sum += vx + vy + w;
-        sizes += fabs (vx) + fabs (vy) + fabs (w);
-      }
-      for (int n = 0; n < own; n++) {
-        double spin = *J++ * y[n];
-        sum += spin;
-        sizes += fabs (spin);
-      }
-      *jv++ = sum;
-      *size++ = sizes;
-    }
-}
+/* The worst row so far: its residual, which row it is, and its residual's share in the sum of its terms. */
+typedef struct {
+  double most, scaled;
+  int row;
+} evaluate_worst;
 
-static void evaluate_speeds (const pw_system *s, double *jv, double *size) {
-  for (const pw_slab *k = s->slab, *end = k + s->constraints; k < end; k++) {
-    if (k->kind->own == 0 && k->kind->bodies == 2)
-      evaluate_speeds_of (k, jv + k->row, size + k->row, 2, 0);
-    else if (k->kind->own == 0 && k->kind->bodies == 1)
-      evaluate_speeds_of (k, jv + k->row, size + k->row, 1, 0);
-    else
-      evaluate_speeds_of (k, jv + k->row, size + k->row, k->kind->bodies, k->kind->own);
-  }
+static inline evaluate_worst evaluate_judge (evaluate_worst worst, int row, double residual, double size) {
+  double error = fabs (residual), scaled = error / size;
+  worst.most = pw_larger (worst.most, error);
+  if (!(scaled <= worst.scaled)) worst.scaled = scaled, worst.row = row;
+  return worst;
 }
 
 void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                          pw_residuals *r) {
-  double worst = 0, most = 0;
-  r->row_position = -1;
-  for (int i = 0; i < s->holonomic; i++) {
-    if (enforced && !enforced[i]) continue;
-    double error = fabs (g[i]), scaled = error / size[i];
-    if (!(error <= most)) most = error;
-    if (!(scaled <= worst)) worst = scaled, r->row_position = i;
-  }
-  r->position = worst;
-  r->g = most;
+  evaluate_worst worst = { .row = -1 };
+  for (int i = 0; i < s->holonomic; i++)
+    if (enforced == NULL || enforced[i]) worst = evaluate_judge (worst, i, g[i], size[i]);
+  r->position = worst.scaled;
+  r->g = worst.most;
+  r->row_position = worst.row;
+}
+
+/* Judges J v - eta of a slab at the placed rates, as evaluate_mul; eta NULL: zero. */
+PW_INLINE evaluate_worst evaluate_speeds_of (const pw_slab *k, const double *eta, const unsigned char *enforced,
+                                             double unit, evaluate_worst worst, int bodies, int own) {
+  const double *J = k->J, *y = k->b.v;
+  const int *body = k->b.body;
+  int i = k->row;
+  for (int e = 0; e < k->b.count; e++, body += bodies, y += own)
+    for (int r = 0; r < k->kind->rows; r++, i++) {
+      double sum = 0, size = 0;
+      PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
+        const pw_pose *p = &k->b.pose[body[n]];
+        double vx = J[0] * p->vx, vy = J[1] * p->vy, w = J[2] * p->omega;
+        sum += vx + vy + w;
+        size += fabs (vx) + fabs (vy) + fabs (w);
+      }
+      for (int n = 0; n < own; n++) {
+        double spin = *J++ * y[n];
+        sum += spin;
+        size += fabs (spin);
+      }
+      if (eta) sum -= eta[i], size += fabs (eta[i]);
+      if (enforced == NULL || enforced[i]) worst = evaluate_judge (worst, i, sum, size + unit);
+    }
+  return worst;
+}
+
+PW_APART evaluate_worst evaluate_speeds_of_any (const pw_slab *k, const double *eta, const unsigned char *enforced,
+                                                double unit, evaluate_worst worst) {
+  return evaluate_speeds_of (k, eta, enforced, unit, worst, k->kind->bodies, k->kind->own);
 }
 
 void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
-  double *value = s->scratch, *size = value + s->rows, *eta = size + s->rows, unit = s->scale.length / s->scale.time;
-  double worst = 0, most = 0;
-  r->row_velocity = -1;
-  evaluate_speeds (s, value, size);
-  if (s->moving) {
-    pw_sweep_eta (s, eta);
-    for (int i = 0; i < s->rows; i++) value[i] -= eta[i], size[i] += fabs (eta[i]);
+  double *eta = s->moving ? s->scratch : NULL, unit = s->scale.length / s->scale.time;
+  evaluate_worst worst = { .row = -1 };
+  if (eta) pw_sweep_eta (s, eta);
+  EACH_CONSTRAINT (k, s) {
+    if (k->kind->own == 0 && k->kind->bodies == 2)
+      worst = evaluate_speeds_of (k, eta, enforced, unit, worst, 2, 0);
+    else if (k->kind->own == 0 && k->kind->bodies == 1)
+      worst = evaluate_speeds_of (k, eta, enforced, unit, worst, 1, 0);
+    else
+      worst = evaluate_speeds_of_any (k, eta, enforced, unit, worst);
   }
-  for (int i = 0; i < s->rows; i++) {
-    if (enforced && !enforced[i]) continue;
-    double error = fabs (value[i]), scaled = error / (size[i] + unit);
-    if (!(error <= most)) most = error;
-    if (!(scaled <= worst)) worst = scaled, r->row_velocity = i;
-  }
-  r->velocity = worst;
-  r->jv = most;
+  r->velocity = worst.scaled;
+  r->jv = worst.most;
+  r->row_velocity = worst.row;
 }
 
 void pw_sweep_position_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r) {

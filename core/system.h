@@ -78,6 +78,11 @@ static inline double pw_unit (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? 1 : s->scale.length;
 }
 
+/* The larger of two numbers, at the price of a comparison; the second if one is none. */
+static inline double pw_larger (double a, double b) {
+  return a > b ? a : b;
+}
+
 /* ---- Placing: poses and signals for one (t, q, v), on which all sweeps below work ---- */
 
 int pw_place (pw_system *s, double t, const double *q, const double *v);

@@ -107,9 +107,9 @@ pw_residuals pw_note_residuals (pw_run *r) {
   pw_statistics *s = &r->statistics;
   if (isnan (now.position)) pw_sweep_position_residual (r->s, NULL, &now);
   if (isnan (now.velocity)) pw_sweep_velocity_residual (r->s, NULL, &now);
-  if (!(now.position <= s->position)) s->position = now.position;
-  if (!(now.velocity <= s->velocity)) s->velocity = now.velocity;
-  if (!(now.g <= s->g)) s->g = now.g;
-  if (!(now.jv <= s->jv)) s->jv = now.jv;
+  s->position = pw_larger (s->position, now.position);
+  s->velocity = pw_larger (s->velocity, now.velocity);
+  s->g = pw_larger (s->g, now.g);
+  s->jv = pw_larger (s->jv, now.jv);
   return now;
 }

@@ -8,15 +8,12 @@ double pw_run_agitation (const pw_run *r) {
   const double *a = r->a, *own = a + 3 * s->bodies;
   double linear = 0, angular = 0, per = s->scale.time * s->scale.time;
   for (; a < own; a += 3) {
-    if (!(fabs (a[0]) <= linear)) linear = fabs (a[0]);
-    if (!(fabs (a[1]) <= linear)) linear = fabs (a[1]);
-    if (!(fabs (a[2]) <= angular)) angular = fabs (a[2]);
+    linear = pw_larger (linear, fabs (a[0]));
+    linear = pw_larger (linear, fabs (a[1]));
+    angular = pw_larger (angular, fabs (a[2]));
   }
-  for (; a < r->a + s->coords; a++)
-    if (!(fabs (*a) <= angular)) angular = fabs (*a);
-  double most = linear * (per / s->scale.length);
-  if (!(angular * per <= most)) most = angular * per;
-  return most;
+  for (; a < r->a + s->coords; a++) angular = pw_larger (angular, fabs (*a));
+  return pw_larger (linear * (per / s->scale.length), angular * per);
 }
 
 /* A method that lets go of its constraints is stopped: what follows would not be this mechanism.  Without stabilisation
@@ -40,7 +37,7 @@ static int judge_lost (pw_run *r, pw_error *error) {
 
 /* What the constraints are off by, in units of the scene. */
 static double judge_off (const pw_run *r, const pw_residuals *now) {
-  return fmax (now->position, now->g / r->s->scale.length);
+  return pw_larger (now->position, now->g / r->s->scale.length);
 }
 
 /* 1 if constraints off by so much may decide on the branch: if the sine s of the smallest angle between their rows, smaller
@@ -85,7 +82,7 @@ static int judge_outburst (pw_run *r, const pw_residuals *residuals, pw_error *e
                     "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
                     now / r->calm);
   if (r->near || judge_blurred (r, judge_off (r, residuals), blurred)) return judge_turn (r, residuals, now, error);
-  r->calm = fmax (r->calm, now);
+  r->calm = pw_larger (now, r->calm);
   r->before = now;
   return PW_OK;
 }
