@@ -54,25 +54,31 @@ void pw_sweep_gamma (pw_system *s, double *gamma) {
   evaluate_rows (s, offsetof (pw_kind, gamma), s->rows, gamma);
 }
 
-static inline void evaluate_add (double *to, const double *force) {
+static inline const double *evaluate_add (double *to, const double *force) {
   to[0] += force[0];
   to[1] += force[1];
   to[2] += force[2];
+  return force + 3;
+}
+
+PW_APART void evaluate_add_own (const pw_slab *k, double *f) {
+  const int own = k->kind->own, *column = k->column;
+  const double *block = k->block;
+  for (int e = 0; e < k->b.count; e++) {
+    for (int n = 0; n < k->kind->bodies; n++) block = evaluate_add (f + *column++, block);
+    for (int n = 0; n < own; n++) f[k->own + e * own + n] += *block++;
+  }
 }
 
 static inline void evaluate_add_force (const pw_slab *k, double *f) {
   k->kind->force (&k->b, k->block);
-  int own = k->kind->own;
-  const double *block = k->block;
-  const int *column = k->column, *end = column + k->b.count * k->kind->bodies;
-  if (own == 0) {
-    for (; column < end; block += 3) evaluate_add (f + *column++, block);
+  if (k->kind->own > 0) {
+    evaluate_add_own (k, f);
     return;
   }
-  for (int e = 0; e < k->b.count; e++) {
-    for (int n = 0; n < k->kind->bodies; n++, block += 3) evaluate_add (f + *column++, block);
-    for (int n = 0; n < own; n++) f[k->own + e * own + n] += *block++;
-  }
+  const double *block = k->block;
+  for (const int *column = k->column, *end = column + k->b.count * k->kind->bodies; column < end; column++)
+    block = evaluate_add (f + *column, block);
 }
 
 void pw_sweep_force (pw_system *s, double *f) {
