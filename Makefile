@@ -19,7 +19,8 @@ endif
 # ---- How to compile and link ----
 
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes
-STRICT := -std=c11 -fPIC -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)
+# -fno-plt: calls between the files of a library are calls, not calls of jumps.
+STRICT := -std=c11 -fPIC -fno-plt -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)
 ONE_BY_ONE := -fno-tree-slp-vectorize
 # gcc 12.2 fuses multiplications and additions when it vectorises straight code, -ffp-contract=off or not, for processors
 # that can: results would depend on the build.  The default processor of x86-64 cannot.
