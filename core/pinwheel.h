@@ -61,8 +61,9 @@ enum { PW_ENDS_FREE, PW_ENDS_REST };
 
 /* A signal computed by the caller.  `eval` stores the value and, if the signal serves a constraint, its first and
  * second time derivative in value[0..2]; x holds the states named in `reads`, in that order, and gradient (NULL
- * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run.  For the same t and x it must give the
- * same values, but for changes between steps that pw_restart follows (a torque that a controller of yours sets anew). */
+ * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run.  For the same t
+ * and x it must give the same values, but for changes between steps that pw_restart follows (a torque that a controller
+ * of yours sets anew). */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint as it is */
@@ -189,7 +190,7 @@ int pw_refuse (pw_model *m, const char *format, ...);
 double pw_jacobi_am (double u, double m);
 double pw_elliptic_K (double m);
 
-/* ---- The element kinds ---- */
+/* ---- The element kinds: constraints on positions, on velocities, forces, and what has no effect ---- */
 
 /* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic rows. */
 typedef struct {
@@ -198,49 +199,6 @@ typedef struct {
   double at[2][2];     /* the point in each body's frame [m]; on the ground: in the world */
 } pw_pin;
 
-/* Wheel: a knife edge; the point does not move across the heading.  One nonholonomic row. */
-typedef struct {
-  const char *name;
-  const char *body;
-  double at[2];   /* contact point in the body's frame [m] */
-  double heading; /* rolling direction in the body's frame [rad] */
-} pw_wheel;
-
-/* Torque: acts on body 1, and its opposite on body 2. */
-typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  pw_signal value;     /* [N m] */
-} pw_torque;
-
-/* Gravity: the same acceleration for every body that has mass, in any direction of the plane. */
-typedef struct {
-  const char *name;
-  double acceleration[2]; /* in the world, (0, -9.81) for a plane that stands upright [m/s^2] */
-} pw_gravity;
-
-/* Spring: pulls a point of body 1 and a point of body 2 together along their line, with a damper beside it. */
-typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double at[2][2];     /* the ends in each body's frame [m]; on the ground: in the world */
-  double stiffness;    /* [N/m], >= 0 */
-  double damping;      /* [N s/m], >= 0 */
-  double length;       /* free length [m], >= 0 */
-} pw_spring;
-
-/* Tyre: a wheel that gives way sideways; a lateral force grows with the slip instead of a row that forbids it. */
-typedef struct {
-  const char *name;
-  const char *body;
-  double at[2];     /* contact point in the body's frame [m] */
-  double heading;   /* rolling direction in the body's frame [rad] */
-  double stiffness; /* cornering stiffness: lateral force per slip [N], > 0 */
-  double speed;     /* below about this rolling speed the slip is regularised [m/s], > 0 */
-  double load;      /* normal load that limits the force [N]; 0: linear, no limit */
-  double friction;  /* the limit is friction times load; > 0 if there is a load */
-} pw_tyre;
-
 /* Weld: body 2 is fixed to body 1.  Three holonomic rows. */
 typedef struct {
   const char *name;
@@ -248,32 +206,6 @@ typedef struct {
   double at[2][2];     /* the common point in each body's frame [m]; on the ground: in the world */
   double angle;        /* of body 2 relative to body 1: phi2 - phi1 [rad] */
 } pw_weld;
-
-/* What a drive prescribes. */
-enum { PW_DRIVE_X, PW_DRIVE_Y, PW_DRIVE_ANGLE };
-
-/* Drive: where a point of body 1 is, seen from body 2, or how it is turned, follows a signal.  One holonomic row. */
-typedef struct {
-  const char *name;
-  const char *body[2]; /* the driven body, and the one it is seen from; "ground" for one of them */
-  double at[2][2];     /* a point in each body's frame [m]; on the ground: in the world; without meaning for an angle */
-  int what;        /* PW_DRIVE_X, PW_DRIVE_Y: from point 2 to point 1 in body 2's frame; PW_DRIVE_ANGLE: phi1 - phi2 */
-  pw_signal value; /* with its first and second time derivative [m] or [rad] */
-} pw_drive;
-
-/* Rolling wheel: the contact point moves neither across the heading nor along it other than by rolling.  Two
- * nonholonomic rows and a coordinate of its own, the spin angle, whose rate is positive rolling along the heading. */
-typedef struct {
-  const char *name;
-  const char *body;
-  double at[2];     /* contact point in the body's frame [m] */
-  double heading;   /* rolling direction in the body's frame [rad] */
-  double radius;    /* [m], > 0 */
-  double inertia;   /* about its axle [kg m^2], >= 0; its mass belongs to the body */
-  double start;     /* spin angle at the start [rad] */
-  double rate;      /* its rate at the start [rad/s]; 0: as the body's start makes it roll */
-  pw_signal torque; /* on the wheel about its axle [N m]; what it reacts on is out of the plane */
-} pw_rolling_wheel;
 
 /* Slider: a point of body 1 stays on a line of body 2, and body 1 does not turn against body 2.  Two holonomic rows. */
 typedef struct {
@@ -313,6 +245,40 @@ typedef struct {
   double offset;       /* [rad] */
 } pw_gear;
 
+/* What a drive prescribes. */
+enum { PW_DRIVE_X, PW_DRIVE_Y, PW_DRIVE_ANGLE };
+
+/* Drive: where a point of body 1 is, seen from body 2, or how it is turned, follows a signal.  One holonomic row. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the driven body, and the one it is seen from; "ground" for one of them */
+  double at[2][2];     /* a point in each body's frame [m]; on the ground: in the world; without meaning for an angle */
+  int what;        /* PW_DRIVE_X, PW_DRIVE_Y: from point 2 to point 1 in body 2's frame; PW_DRIVE_ANGLE: phi1 - phi2 */
+  pw_signal value; /* with its first and second time derivative [m] or [rad] */
+} pw_drive;
+
+/* Wheel: a knife edge; the point does not move across the heading.  One nonholonomic row. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];   /* contact point in the body's frame [m] */
+  double heading; /* rolling direction in the body's frame [rad] */
+} pw_wheel;
+
+/* Rolling wheel: the contact point moves neither across the heading nor along it other than by rolling.  Two
+ * nonholonomic rows and a coordinate of its own, the spin angle, whose rate is positive rolling along the heading. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];     /* contact point in the body's frame [m] */
+  double heading;   /* rolling direction in the body's frame [rad] */
+  double radius;    /* [m], > 0 */
+  double inertia;   /* about its axle [kg m^2], >= 0; its mass belongs to the body */
+  double start;     /* spin angle at the start [rad] */
+  double rate;      /* its rate at the start [rad/s]; 0: as the body's start makes it roll */
+  pw_signal torque; /* on the wheel about its axle [N m]; what it reacts on is out of the plane */
+} pw_rolling_wheel;
+
 /* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic row. */
 typedef struct {
   const char *name;
@@ -340,6 +306,38 @@ typedef struct {
   pw_signal value;     /* with its first time derivative */
 } pw_pfaffian;
 
+/* Tyre: a wheel that gives way sideways; a lateral force grows with the slip instead of a row that forbids it. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];     /* contact point in the body's frame [m] */
+  double heading;   /* rolling direction in the body's frame [rad] */
+  double stiffness; /* cornering stiffness: lateral force per slip [N], > 0 */
+  double speed;     /* below about this rolling speed the slip is regularised [m/s], > 0 */
+  double load;      /* normal load that limits the force [N]; 0: linear, no limit */
+  double friction;  /* the limit is friction times load; > 0 if there is a load */
+} pw_tyre;
+
+/* Rolling resistance: a force along a heading, against the motion of its point along it. */
+typedef struct {
+  const char *name;
+  const char *body;
+  double at[2];   /* contact point in the body's frame [m] */
+  double heading; /* rolling direction in the body's frame [rad] */
+  double limit;   /* the force when it rolls: coefficient times normal load [N], >= 0 */
+  double speed;   /* below about this speed the force is smoothed [m/s], > 0 */
+} pw_rolling_resistance;
+
+/* Spring: pulls a point of body 1 and a point of body 2 together along their line, with a damper beside it. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];     /* the ends in each body's frame [m]; on the ground: in the world */
+  double stiffness;    /* [N/m], >= 0 */
+  double damping;      /* [N s/m], >= 0 */
+  double length;       /* free length [m], >= 0 */
+} pw_spring;
+
 /* Rotational spring: turns two bodies to an angle between them, with a damper beside it. */
 typedef struct {
   const char *name;
@@ -348,30 +346,6 @@ typedef struct {
   double damping;      /* [N m s/rad], >= 0 */
   double angle;        /* free angle, of body 1 relative to body 2: phi1 - phi2 [rad] */
 } pw_rotational_spring;
-
-/* The axes along which a force is given. */
-enum { PW_AXES_WORLD, PW_AXES_BODY };
-
-/* Force: acts on a point of a body, from outside. */
-typedef struct {
-  const char *name;
-  const char *body;
-  double at[2]; /* where, in the body's frame [m] */
-  int axes;     /* PW_AXES_WORLD; PW_AXES_BODY: it turns with the body */
-  pw_signal fx; /* [N] */
-  pw_signal fy; /* [N] */
-} pw_force;
-
-/* Motor: turns body 1 against body 2 to an angle that follows a signal, as a spring and damper of limited torque. */
-typedef struct {
-  const char *name;
-  const char *body[2]; /* what it turns, and what it reacts on; "ground" for one of them */
-  double stiffness;    /* torque per error of the angle [N m/rad], >= 0 */
-  double damping;      /* torque per error of the rate [N m s/rad], >= 0 */
-  double limit;        /* the torque saturates here [N m]; 0: no limit */
-  pw_signal angle;     /* target of phi1 - phi2 [rad] */
-  pw_signal rate;      /* target of omega1 - omega2 [rad/s] */
-} pw_motor;
 
 /* Friction: a viscous and a Coulomb torque against the turning of body 1 on body 2, in a pin for instance. */
 typedef struct {
@@ -404,15 +378,42 @@ typedef struct {
   double turning_quadratic; /* [N m s^2/rad^2], >= 0 */
 } pw_drag;
 
-/* Rolling resistance: a force along a heading, against the motion of its point along it. */
+/* Gravity: the same acceleration for every body that has mass, in any direction of the plane. */
+typedef struct {
+  const char *name;
+  double acceleration[2]; /* in the world, (0, -9.81) for a plane that stands upright [m/s^2] */
+} pw_gravity;
+
+/* The axes along which a force is given. */
+enum { PW_AXES_WORLD, PW_AXES_BODY };
+
+/* Force: acts on a point of a body, from outside. */
 typedef struct {
   const char *name;
   const char *body;
-  double at[2];   /* contact point in the body's frame [m] */
-  double heading; /* rolling direction in the body's frame [rad] */
-  double limit;   /* the force when it rolls: coefficient times normal load [N], >= 0 */
-  double speed;   /* below about this speed the force is smoothed [m/s], > 0 */
-} pw_rolling_resistance;
+  double at[2]; /* where, in the body's frame [m] */
+  int axes;     /* PW_AXES_WORLD; PW_AXES_BODY: it turns with the body */
+  pw_signal fx; /* [N] */
+  pw_signal fy; /* [N] */
+} pw_force;
+
+/* Torque: acts on body 1, and its opposite on body 2. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* the two bodies, or "ground" for one of them */
+  pw_signal value;     /* [N m] */
+} pw_torque;
+
+/* Motor: turns body 1 against body 2 to an angle that follows a signal, as a spring and damper of limited torque. */
+typedef struct {
+  const char *name;
+  const char *body[2]; /* what it turns, and what it reacts on; "ground" for one of them */
+  double stiffness;    /* torque per error of the angle [N m/rad], >= 0 */
+  double damping;      /* torque per error of the rate [N m s/rad], >= 0 */
+  double limit;        /* the torque saturates here [N m]; 0: no limit */
+  pw_signal angle;     /* target of phi1 - phi2 [rad] */
+  pw_signal rate;      /* target of omega1 - omega2 [rad/s] */
+} pw_motor;
 
 /* Marker: a point of a body, followed in tables, figures and animations.  It has no effect. */
 typedef struct {
@@ -585,10 +586,12 @@ int pw_set (pw_model *m, const char *parameter, double value, pw_error *error);
 /* Runs the model's build function.  Errors: whatever an added body or element is wrong about. */
 int pw_build (pw_model *m, pw_error *error);
 
-/* Replaces a signal of a built model: pw_set_signal (m, "rider", "value", &signal, e). */
+/* Replaces a signal of a built model: pw_set_signal (m, "rider", "value", &signal, e).  Errors: PW_INPUT for an element or
+ * field that does not exist, with the nearest name; whether the field can take the signal is pw_compile's to tell. */
 int pw_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
 
-/* Gives a start value, "frame.vx" or "wheel.spin", which the consistent start then holds. */
+/* Gives a start value, "frame.vx" or "wheel.spin", which the consistent start then holds.  Errors: PW_INPUT for a value that
+ * is not finite; whether there is such a state is pw_compile's to tell. */
 int pw_set_start (pw_model *m, const char *state, double value, pw_error *error);
 
 /* ---- The compiled system ---- */
