@@ -215,20 +215,32 @@ static void condense_forget (pw_plan *c) {
   c->is_linked = NULL;
 }
 
+/* The first node before the kept bodies with a pivot of nearly nothing, or -1. */
+static int condense_find_dependent (const pw_plan *c) {
+  const double follows = 1e-8; /* squared sine */
+  pw_large *l = c->k->large;
+  l->least = follows;
+  pw_large_factor (l);
+  l->least = 0;
+  if (l->pivot > follows || l->row < 0) return -1;
+  for (int n = 0; n < c->nodes; n++)
+    if (c->node[n].rank == 0 && l->row >= c->node[n].y && l->row < c->node[n].y + c->node[n].size) return n;
+  return -1;
+}
+
 /* Before its kept bodies, a row may follow from others: two legs of a platform that stands on the ground.  Such rows, as
- * the present pose shows them, come after the bodies. */
+ * the present pose shows them, come after the bodies, one by one; if they are many, all rows that touch these bodies do,
+ * for what is left touches none. */
 static int condense_try_large (pw_plan *c) {
-  const double follows = 1e-10; /* squared sine */
+  const int most = 12;
   for (int attempt = 0;; attempt++) {
-    int status = condense_open_large (c), n = 0;
-    pw_large *l = c->k->large;
-    if (status != PW_OK || c->keeps == 0 || attempt == 12) return status;
-    pw_large_factor (l);
-    if (l->pivot > follows || l->row < 0) return PW_OK;
-    while (n < c->nodes && !(l->row >= c->node[n].y && l->row < c->node[n].y + c->node[n].size)) n++;
-    if (n == c->nodes || c->node[n].rank != 0) return PW_OK;
+    int status = condense_open_large (c), n = -1;
+    if (status == PW_OK && c->keeps > 0 && attempt <= most) n = condense_find_dependent (c);
+    if (n < 0) return status;
     c->node[n].rank = 2;
-    pw_large_close (l);
+    for (int p = 0; p < c->pieces && attempt == most; p++)
+      if (pw_plan_kept (c, c->piece[p].j) >= 0) c->node[c->node_of[p]].rank = 2;
+    pw_large_close (c->k->large);
     c->k->large = NULL;
     condense_forget (c);
   }

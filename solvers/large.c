@@ -101,7 +101,7 @@ static const int *large_column_any (pw_large *l, const pw_column *c, const int *
 
 /* ---- Down ---- */
 
-/* Assembly, elimination and, if there is a right-hand side y, that of y.  Returns 0 at a pivot that is not positive. */
+/* Assembly, elimination and, if there is a right-hand side y, that of y.  Returns 0 at a pivot that is too small. */
 static inline int large_down (pw_large *l, const double *f, double *y, int what) {
   const pw_ldl *ldl = l->ldl;
   const pw_patch *p = l->patch, *last = p + l->patches;
@@ -124,7 +124,7 @@ static inline int large_down (pw_large *l, const double *f, double *y, int what)
         target = LARGE_SHORT (c->size, large_column, l, c, target, y);
       j++;
     }
-    if (!(l->pivot > 0)) return 0;
+    if (!(l->pivot > l->least)) return 0;
   }
   return 1;
 }

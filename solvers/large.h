@@ -53,10 +53,11 @@ typedef struct {
   int patches, gaps, chains;
   double pivot; /* smallest pivot of the last factorisation, relative to the diagonal entry it came from */
   int row;      /* its position in the right-hand side */
+  double least; /* a factorisation ends at the first pivot that is not larger: 0, but while it is planned */
   char *memory;
 } pw_large;
 
-/* S = J W^-1 J^T = L D L^T; stops at a pivot that is not positive. */
+/* S = J W^-1 J^T = L D L^T; stops at a pivot that is not larger than `least`. */
 void pw_large_factor (pw_large *l);
 
 /* y, which holds gamma, becomes lambda; a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */

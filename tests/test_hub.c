@@ -80,6 +80,52 @@ static void hub_platform (pw_model *m, const void *parameters) {
   pw_add_force (m, &(pw_force){ .name = "push", .body = "hub", .at = { 0.1, 0.4 }, .fx = { .constant = 2 } });
 }
 
+/* Joins two bodies that are not turned at a point of the world. */
+static void hub_join (double at[2][2], const double *one, const double *two, double x, double y) {
+  at[0][0] = x - one[0], at[0][1] = y - one[1];
+  at[1][0] = x - two[0], at[1][1] = y - two[1];
+}
+
+/* A frame whose parts are joined to it and to each other.  With the frame held, as it is where they are eliminated before
+ * it, several of their rows follow from others. */
+static void hub_frame (pw_model *m, const void *parameters) {
+  const double hub[] = { 1.33, 0.32 }, rail[] = { 1.07, 1.8 }, bar[] = { 1.99, 1.23 }, tail[] = { 0.87, -0.78 };
+  const double side[] = { 0.57, 1.86 }, world[] = { 0, 0 };
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "side", .mass = 0.7, .inertia = 0.21, .start = { side[0], side[1] } });
+  pw_add_body (m, &(pw_body){ .name = "hub", .mass = 2, .inertia = 0.44, .start = { hub[0], hub[1] } });
+  pw_add_body (m, &(pw_body){ .name = "rail", .mass = 2.2, .inertia = 0.5, .start = { rail[0], rail[1] } });
+  pw_add_body (m, &(pw_body){ .name = "bar", .mass = 2.3, .inertia = 0.26, .start = { bar[0], bar[1] } });
+  pw_add_body (m, &(pw_body){ .name = "point", .mass = 0.5, .start = { hub[0], hub[1] } });
+  pw_add_body (m, &(pw_body){ .name = "tail", .mass = 2, .inertia = 0.49, .start = { tail[0], tail[1] } });
+  pw_slider slider = { .name = "slider", .body = { "rail", "bar" }, .heading = 1.37 };
+  hub_join (slider.at, rail, bar, 1.15, 1.25);
+  pw_add_slider (m, &slider);
+  pw_rod rod = { .name = "rod", .body = { "hub", "ground" }, .length = hypot (0.37, 1.37) };
+  hub_join (rod.at, hub, world, 1.7, 0.87);
+  rod.at[1][0] += 0.37, rod.at[1][1] += 1.37;
+  pw_add_rod (m, &rod);
+  pw_pin joint[] = { { .name = "joint1", .body = { "bar", "point" } },
+                     { .name = "joint2", .body = { "side", "hub" } } };
+  hub_join (joint[0].at, bar, hub, 2.07, 1.87);
+  hub_join (joint[1].at, side, hub, 0.65, 1.83);
+  pw_weld weld[] = { { .name = "weld1", .body = { "hub", "point" } }, { .name = "weld2", .body = { "side", "bar" } } };
+  hub_join (weld[0].at, hub, hub, 1.2, 0.2);
+  hub_join (weld[1].at, side, bar, 0.34, 1.56);
+  for (int i = 0; i < 2; i++) pw_add_pin (m, &joint[i]), pw_add_weld (m, &weld[i]);
+  pw_add_gear (m, &(pw_gear){ .name = "gear", .body = { "point", "hub", "ground" }, .ratio = 1 });
+  pw_slot slot = { .name = "slot", .body = { "tail", "point" }, .heading = 2.5 };
+  hub_join (slot.at, tail, hub, 0.74, -0.31);
+  pw_add_slot (m, &slot);
+  pw_add_rolling_wheel (
+      m, &(pw_rolling_wheel){
+             .name = "wheel", .body = "bar", .at = { 0.1, -0.17 }, .heading = 2, .radius = 0.2, .inertia = 0.04 });
+  pw_add_pfaffian (
+      m, &(pw_pfaffian){
+             .name = "link", .body = { "bar", "hub" }, .a = { -0.35, -0.67, 0.26 }, .b = { -0.47, 0.63, 0.41 } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 1.6, -4.1 } });
+}
+
 static const pw_parameter hub_list[] = {
   { PW_AT (hub_parameters, place), .domain = PW_NONNEGATIVE, .about = "arms before the hub" },
   { .name = NULL },
@@ -133,11 +179,19 @@ static void test_platform (void **state) {
   hub_everywhere (&table);
 }
 
+static void test_frame (void **state) {
+  static const pw_plugin_table table = HUB_TABLE (hub_frame);
+  double hub[6];
+  (void)state;
+  hub_run (&table, 0, hub);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_carousel),
     cmocka_unit_test (test_table),
     cmocka_unit_test (test_platform),
+    cmocka_unit_test (test_frame),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
