@@ -22,15 +22,15 @@ struct pw_run {
   int *redundant_row;          /* which */
   double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
   char *rank_memory;
-  double pivot, reselect; /* the smallest one at the state reached; below this other rows are tried */
-  double watch, guard;    /* an evaluation with a smaller pivot is near a singular pose; too near */
-  int near;               /* 1 as soon as one was near */
-  double calm;            /* the largest accelerations away from singular poses, in units of L / T^2; at least 1 */
-  double before;          /* those of the last state away from them */
-  double alpha, beta;     /* Baumgarte's, used by pw_accelerate; 0: none */
-  double breakpoint;      /* first discontinuity of a signal after t */
-  int stuck;              /* steps in a row that were as good as none */
-  pw_residuals known;     /* those that the last projection told; NaN: it did not */
+  double grip, reselect; /* of the active rows at the state reached (rank.h); below this others are tried */
+  double watch, guard;   /* an evaluation with a smaller pivot is near a singular pose; too near */
+  int near;              /* 1 as soon as one was near */
+  double calm;           /* the largest accelerations away from singular poses, in units of L / T^2; at least 1 */
+  double before;         /* those of the last state away from them */
+  double alpha, beta;    /* Baumgarte's, used by pw_accelerate; 0: none */
+  double breakpoint;     /* first discontinuity of a signal after t */
+  int stuck;             /* steps in a row that were as good as none */
+  pw_residuals known;    /* those that the last projection told; NaN: it did not */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;

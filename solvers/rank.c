@@ -60,11 +60,12 @@ static int rank_pivot (const double *norm, const unsigned char *active, int firs
   return -1;
 }
 
-/* Keeps independent rows among first .. end - 1 behind the `rank` ones kept so far; returns the new rank. */
-static int rank_keep (double tol, double *rows, double *norm, int *kept, unsigned char *active, int rank, int first,
-                      int end, int n) {
+/* Keeps independent rows among first .. end - 1 behind the `rank` ones kept so far, until there are `most`; returns the new
+ * rank. */
+static int rank_keep (double tol, int most, double *rows, double *norm, int *kept, unsigned char *active, int rank,
+                      int first, int end, int n) {
   for (int i = first; i < end; i++) norm[i] = rank_orthogonalise (rows + (size_t)i * (size_t)n, rows, kept, rank, n);
-  for (int next = rank_pivot (norm, active, first, end); next >= 0; next = rank_pivot (norm, active, first, end)) {
+  for (int next; rank < most && (next = rank_pivot (norm, active, first, end)) >= 0;) {
     double *row = rows + (size_t)next * (size_t)n;
     norm[next] = rank_orthogonalise (row, rows, kept, rank, n);
     if (!(norm[next] > tol)) {
@@ -82,13 +83,18 @@ static int rank_keep (double tol, double *rows, double *norm, int *kept, unsigne
 }
 
 /* The kept rows become an orthonormal basis of the range of J^T, their numbers go to `kept`.  Holonomic rows come first:
- * a nonholonomic one must not take the place of a position. */
-static int rank_basis (const pw_system *s, double tol, double *rows, int *kept, unsigned char *active) {
+ * a nonholonomic one must not take the place of a position.  At most so many of them, and so many in all. */
+static int rank_basis_of (const pw_system *s, double tol, int holonomic, int all, double *rows, int *kept,
+                          unsigned char *active) {
   double *norm = rows + (size_t)s->rows * (size_t)s->coords;
   pw_rank_rows (s, rows, NULL);
   memset (active, 0, (size_t)s->rows);
-  int rank = rank_keep (tol, rows, norm, kept, active, 0, 0, s->holonomic, s->coords);
-  return rank_keep (tol, rows, norm, kept, active, rank, s->holonomic, s->rows, s->coords);
+  int rank = rank_keep (tol, holonomic, rows, norm, kept, active, 0, 0, s->holonomic, s->coords);
+  return rank_keep (tol, all, rows, norm, kept, active, rank, s->holonomic, s->rows, s->coords);
+}
+
+static int rank_basis (const pw_system *s, double tol, double *rows, int *kept, unsigned char *active) {
+  return rank_basis_of (s, tol, s->rows, s->rows, rows, kept, active);
 }
 
 /* rows x (coords + 1): the rows, then their norms. */
@@ -208,12 +214,15 @@ int pw_rank_choose (pw_run *r, pw_error *error) {
   return status;
 }
 
+/* Constraints that have drifted are less dependent than they should be: as many rows are kept as before. */
 int pw_rank_reselect (pw_run *r) {
   pw_system *s = r->s;
   rank_search x;
+  int holonomic = 0, all = s->rows - r->redundant;
   if (rank_search_open (&x, s) != PW_OK) return PW_MACHINE;
-  int rank = rank_basis (s, 1e-7, x.rows, x.kept, x.active);
-  int other = rank == s->rows - r->redundant && memcmp (x.active, r->active, (size_t)s->rows) != 0;
+  for (int i = 0; i < s->holonomic; i++) holonomic += r->active[i];
+  int rank = rank_basis_of (s, 1e-7, holonomic, all, x.rows, x.kept, x.active);
+  int other = rank == all && memcmp (x.active, r->active, (size_t)s->rows) != 0;
   if (other) rank_take (r, (unsigned char *)(r->redundant_row + r->redundant), x.active);
   free (x.memory);
   return other;
@@ -270,6 +279,45 @@ void pw_rank_coefficients (pw_run *r, int i) {
   memset (nothing, 0, (size_t)m * sizeof *nothing);
   rank_row (s, r->redundant_row[i], f);
   pw_saddle_solve (r->saddle, f, nothing, f, r->coefficient + i * m);
+}
+
+static double rank_length (const pw_system *s, const pw_slab *k, int n) {
+  double square = 0;
+  for (int c = 0; c < k->b.cols; c++) {
+    int j = pw_global (k, n / k->kind->rows, c);
+    double x = j < s->coords ? k->J[n * k->b.cols + c] / pw_rank_unit (s, j) : 0;
+    square += x * x;
+  }
+  return sqrt (square);
+}
+
+/* f += weight J_i^T, rows of length 1. */
+static void rank_add_row (const pw_system *s, const pw_slab *k, int n, double weight, double *f) {
+  double length = rank_length (s, k, n);
+  for (int c = 0; c < k->b.cols && length > 0; c++) {
+    int j = pw_global (k, n / k->kind->rows, c);
+    if (j < s->coords) f[j] += weight / length * k->J[n * k->b.cols + c];
+  }
+}
+
+/* A sum of the redundant rows, irregular so that nothing cancels, takes one solve however many they are. */
+double pw_rank_grip (pw_run *r) {
+  pw_system *s = r->s;
+  int m = s->rows, k = r->redundant;
+  double *c = r->coefficient, *f = c + k * m + k * k + k, *nothing = f + s->coords + 3, most = 0;
+  memset (f, 0, (size_t)(s->coords + 3 + m) * sizeof *f);
+  for (const pw_slab *b = s->slab; b < s->slab + s->constraints; b++)
+    for (int n = 0; n < b->b.count * b->kind->rows; n++) {
+      double x = sin (2.39996 * (b->row + n + 1));
+      if (!r->active[b->row + n]) rank_add_row (s, b, n, (x + copysign (1, x)) / 2, f);
+    }
+  pw_saddle_solve (r->saddle, f, nothing, f, c);
+  for (const pw_slab *b = s->slab; b < s->slab + s->constraints; b++)
+    for (int n = 0; n < b->b.count * b->kind->rows; n++) {
+      double part = r->active[b->row + n] ? fabs (c[b->row + n]) * rank_length (s, b, n) : 0;
+      if (!(part <= most)) most = part;
+    }
+  return most > 0 ? 1 / most : INFINITY;
 }
 
 /* Solves A x = b, symmetric positive definite k x k, in place (Cholesky). */

@@ -30,6 +30,11 @@ int pw_rank_choose (struct pw_run *r, pw_error *error);
  * run's saddle and method then still have the old one.  Errors: PW_MACHINE. */
 int pw_rank_reselect (struct pw_run *r);
 
+/* How well the active rows hold the others: 1 over the largest coefficient of one of them, rows of length 1, in an irregular
+ * sum of the redundant ones.  What the active rows are off by, the others are off by that over this.  J must be swept and the
+ * run's saddle factorised at the pose. */
+double pw_rank_grip (struct pw_run *r);
+
 /* Saves or loads r->active, which has as many redundant rows as before.  Saddle and method then still have the old one. */
 void pw_rank_carry (struct pw_run *r, pw_archive *a);
 

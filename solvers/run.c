@@ -86,11 +86,12 @@ static int run_evaluate (pw_run *r, pw_error *error) {
 /* What near a singular pose means: a small part of the pivot at a good one. */
 static void run_watch (pw_run *r) {
   int row;
-  r->pivot = pw_saddle_pivot (r->saddle, &row);
-  r->reselect = 0.3 * r->pivot;
-  r->watch = 0.02 * r->pivot;
+  r->watch = 0.02 * pw_saddle_pivot (r->saddle, &row);
   r->guard = fmin (1e-6, r->watch);
   pw_saddle_set_guard (r->saddle, r->guard);
+  if (r->redundant == 0) return;
+  r->grip = pw_rank_grip (r);
+  r->reselect = fmin (0.6 * r->grip, 0.7);
 }
 
 /* Of a dependent row round-off leaves a pivot of 1e-8, and of 1e-5 behind others that hardly differ among themselves: as
@@ -231,7 +232,7 @@ static int run_is_lost (const pw_run *r, pw_error *error) {
  * next step, so that the last one can be looked into, and cannot depend on whether it was. */
 static int run_reselect (pw_run *r, pw_error *error) {
   pw_sample sample;
-  r->reselect = r->pivot / 2;
+  r->reselect = r->grip / 2;
   int status = pw_at (r, r->t, &sample, error);
   if (status != PW_OK) return status;
   int other = pw_rank_reselect (r);
@@ -255,20 +256,19 @@ static int run_check_progress (pw_run *r, double before, pw_error *error) {
 
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
   double before = r->t;
-  int row, status = PW_OK;
+  int status = PW_OK;
   if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
   if (run_is_lost (r, error)) return PW_MACHINE;
   pw_forget_residuals (r);
   r->s->failed = NULL;
   if (r->t >= r->breakpoint) status = run_pass_breakpoint (r, error);
-  if (status == PW_OK && r->redundant && r->pivot < r->reselect) status = run_reselect (r, error);
+  if (status == PW_OK && r->redundant && r->grip < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_OK) status = pw_run_judge (r, error);
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK || r->redundant == 0) return run_blame (r, status, error);
-  pw_saddle_factor (r->saddle);
-  r->pivot = pw_saddle_pivot (r->saddle, &row);
+  r->grip = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_grip (r) : 0;
   return PW_OK;
 }
 
