@@ -96,7 +96,6 @@ void pw_truth_close (pw_truth *t);
 
 /* ---- compare_table.c ---- */
 
-extern const char *const pw_compare_column[MOTION_ERRORS]; /* names of the errors, "end.length" */
 void pw_compare_truth_line (const pw_compare *x, FILE *f);
 void pw_compare_head (const pw_compare *x, FILE *f);
 void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f);

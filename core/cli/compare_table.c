@@ -4,9 +4,9 @@
 #include "compare.h"
 #include "sweep.h"
 
-const char *const pw_compare_column[MOTION_ERRORS] = { "end.length",    "end.angle",      "end.speed",
-                                                       "end.rate",      "largest.length", "largest.angle",
-                                                       "largest.speed", "largest.rate",   "multiplier" };
+static const char *const table_column[MOTION_ERRORS] = { "end.length",    "end.angle",      "end.speed",
+                                                         "end.rate",      "largest.length", "largest.angle",
+                                                         "largest.speed", "largest.rate",   "multiplier" };
 static const char *const table_unit[MOTION_ERRORS] = { "m", "rad", "m/s", "rad/s", "m", "rad", "m/s", "rad/s", NULL };
 
 /* ---- To read ---- */
@@ -86,7 +86,7 @@ void pw_compare_line (const pw_compare *x, const pw_rung *r, FILE *f) {
 /* ---- To compute with ---- */
 
 static void table_names (pw_text *t) {
-  for (int i = 0; i < MOTION_ERRORS; i++) pw_text_name (t, pw_compare_column[i], table_unit[i]);
+  for (int i = 0; i < MOTION_ERRORS; i++) pw_text_name (t, table_column[i], table_unit[i]);
 }
 
 int pw_compare_csv_head (const pw_compare *x, pw_error *error) {
@@ -110,7 +110,7 @@ static void table_below (pw_text *t, const pw_rung *r) {
   for (int i = 0, n = 0; i < MOTION_ERRORS; i++) {
     if (!(r->below >> i & 1)) continue;
     if (n++) pw_text_add (t, " ");
-    pw_text_add (t, pw_compare_column[i]);
+    pw_text_add (t, table_column[i]);
   }
 }
 

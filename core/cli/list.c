@@ -2,7 +2,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "list.h"
-#include "signal.h"
 #include "util.h"
 
 /* ---- Models ---- */
