@@ -89,7 +89,7 @@ all: $(LIB) $(FILES_LIB) $(LIB:.so=.a) $(FILES_LIB:.so=.a) $(INCLUDES) $(PLUGINS
 everything: all $(TESTS) $(SLOWS) $(PROGRAMS) $(FUZZERS)
 
 help:
-	@echo 'make                  the libraries, the program and the models, into $(BUILD)/'
+	@echo 'make                  the libraries, the program and the models, into $(BUILD)/; everything: tests and benchmarks too'
 	@echo 'make deps             install the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make test             the tests; test-all: the slow ones too'
