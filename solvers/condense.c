@@ -32,16 +32,27 @@ static void condense_element (pw_plan *c, const pw_slab *b, int e, int r, int si
   c->nodes++;
 }
 
+/* How many rows of an element make a node.  A coordinate without mass has a small weight in the metric of positions; then a
+ * block is badly conditioned, and of 3 rows its explicit inverse is not good enough. */
+static int condense_longest (const pw_plan *c, const pw_slab *b, int e) {
+  for (int n = 0; n < b->kind->bodies; n++) {
+    int j = b->column[e * b->kind->bodies + n];
+    for (int i = j; i < j + 3 && j < c->k->s->coords; i++)
+      if (c->k->s->mass[i] == 0 && c->k->inverse[i] > 0) return 2;
+  }
+  return PW_LDL_NODE;
+}
+
 /* Runs of active rows of elements without massless coordinates around. */
 static void condense_elements (pw_plan *c, int rows, const unsigned char *active) {
   const pw_system *s = c->k->s;
   const int *component = c->k->reduce.component_of_row;
   for (const pw_slab *b = s->slab; b < s->slab + s->slabs && b->kind->rows > 0 && b->row < rows; b++)
     for (int e = 0; e < b->b.count; e++) {
-      int i = b->row + e * b->kind->rows, r = 0;
+      int i = b->row + e * b->kind->rows, r = 0, longest = condense_longest (c, b, e);
       while (r < b->kind->rows) {
         int size = 0;
-        while (r + size < b->kind->rows && size < PW_LDL_NODE && (active == NULL || active[i + r + size]) &&
+        while (r + size < b->kind->rows && size < longest && (active == NULL || active[i + r + size]) &&
                component[i + r + size] < 0)
           size++;
         if (size > 0) condense_element (c, b, e, r, size);

@@ -76,6 +76,65 @@ static void test_one_body (void **state) {
   weld_compare ("ida+baumgarte", 1e-6, "1e4 rtol");
 }
 
+/* ---- Points with mass but no inertia, welded one to the next, swing as one body ---- */
+
+enum { WELD_POINTS = 12 };
+
+static double weld_point_x (int i) {
+  return 0.4 * i + 0.05 * sin (3. * i);
+}
+
+static double weld_point_y (int i) {
+  return 0.23 * cos (2. * i);
+}
+
+static void weld_string (pw_model *m, const void *parameters) {
+  static const char *const name[WELD_POINTS] = { "p0", "p1", "p2", "p3", "p4",  "p5",
+                                                 "p6", "p7", "p8", "p9", "p10", "p11" };
+  static const char *const joint[WELD_POINTS] = { "w0", "w1", "w2", "w3", "w4",  "w5",
+                                                  "w6", "w7", "w8", "w9", "w10", "w11" };
+  (void)parameters;
+  for (int i = 0; i < WELD_POINTS; i++) {
+    const double x = weld_point_x (i), y = weld_point_y (i);
+    pw_add_body (m, &(pw_body){ .name = name[i], .mass = 1, .start = { x, y } });
+    if (i == 0) pw_add_pin (m, &(pw_pin){ .name = "hook", .body = { name[0], "ground" }, .at = { { -x, -y } } });
+    if (i == 0) continue;
+    const double X = weld_point_x (i - 1), Y = weld_point_y (i - 1);
+    pw_add_weld (m, &(pw_weld){ .name = joint[i],
+                                .body = { name[i - 1], name[i] },
+                                .at = { { 0.2 * i - X, 0.1 - Y }, { 0.2 * i - x, 0.1 - y } } });
+  }
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+}
+
+static void weld_pendulum (pw_model *m, const void *parameters) {
+  double x = 0, y = 0, inertia = 0;
+  (void)parameters;
+  for (int i = 0; i < WELD_POINTS; i++) x += weld_point_x (i) / WELD_POINTS, y += weld_point_y (i) / WELD_POINTS;
+  for (int i = 0; i < WELD_POINTS; i++)
+    inertia += (weld_point_x (i) - x) * (weld_point_x (i) - x) + (weld_point_y (i) - y) * (weld_point_y (i) - y);
+  pw_add_body (m, &(pw_body){ .name = "rod", .mass = WELD_POINTS, .inertia = inertia, .start = { x, y } });
+  pw_add_pin (m, &(pw_pin){ .name = "hook", .body = { "rod", "ground" }, .at = { { -x, -y } } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+}
+
+static void test_points (void **state) {
+  static const pw_plugin_table points = TRIAL_TABLE (weld_string), one = TRIAL_TABLE (weld_pendulum);
+  static const char *const method[] = { "rk4+projection", "rk4+nullspace", "leapfrog", "galpha+ggl" };
+  (void)state;
+  for (int i = 0; i < 4; i++) {
+    pw_system *s = scene_system (&points, NULL), *t = scene_system (&one, NULL);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 2e-3, .span = 1 });
+    pw_run *twin = runs_open (t, method[i], &(pw_settings){ .step = 2e-3, .span = 1 });
+    pw_sample x = runs_to (r, 1), y = runs_to (twin, 1);
+    double bound = i < 2 ? 1e-11 : 3e-5;
+    check_close (method[i], trial_state (s, &x, "p11.phi"), y.q[2], bound,
+                 i < 2 ? "the same steps: round-off" : "100 h^2/12 of its frequency of about 1/s");
+    pw_close (r), pw_close (twin);
+    pw_free (s), pw_free (t);
+  }
+}
+
 /* ---- A beam held by a wall ---- */
 
 static void weld_beam (pw_model *m, const void *parameters) {
@@ -111,6 +170,7 @@ static void test_methods (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_one_body),
+    cmocka_unit_test (test_points),
     cmocka_unit_test (test_beam),
     cmocka_unit_test (test_methods),
   };
