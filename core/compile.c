@@ -160,6 +160,7 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
   pw_compilation c = { .m = m };
   pw_pools pools;
   pw_system *s = NULL;
+  if (pw_require (m, "a model", error) != PW_OK) return NULL;
   if (!m->built)
     pw_fail (error, PW_INPUT, "model %s: pw_compile before pw_build", m->name);
   else if (m->error.status != PW_OK) /* of what was added behind pw_build */

@@ -16,6 +16,10 @@ int pw_fail (pw_error *error, int status, const char *format, ...) {
   return status;
 }
 
+int pw_require (const void *object, const char *what, pw_error *error) {
+  return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", what);
+}
+
 /* Edit distance (Levenshtein 1966), by one row; names longer than the row count as far away. */
 static size_t error_distance (const char *a, const char *b) {
   size_t row[64], n = strlen (b);

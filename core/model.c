@@ -52,6 +52,7 @@ void pw_model_free (pw_model *m) {
 }
 
 int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (parameter == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a parameter is missing", m->name);
   pw_nearest near = { .sought = parameter };
   for (const pw_parameter *p = m->table->parameters; p && p->name; p++) {
@@ -73,6 +74,7 @@ int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
 }
 
 int pw_build (pw_model *m, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (m->built) return pw_fail (error, PW_INPUT, "model %s: pw_build for the second time", m->name);
   m->table->build (m, m->parameters);
   m->built = 1;
@@ -107,6 +109,7 @@ static const char *model_text (pw_model *m, const char *text) {
 }
 
 int pw_add_body (pw_model *m, const pw_body *body) {
+  if (body == NULL) return pw_refuse (m, "pw_add_body without a body");
   if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
     return m->error.status;
   pw_body *b = &m->body[m->bodies++];
@@ -145,6 +148,7 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (m->error.status != PW_OK || model_kind (m, kind) != PW_OK ||
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
+  if (definition == NULL) return pw_refuse (m, "pw_add of kind %s without a definition", kind->name);
   void *copy = pw_arena_take (&m->arena, kind->definition);
   if (copy == NULL) return model_no_memory (m);
   memcpy (copy, definition, kind->definition);
@@ -171,6 +175,7 @@ void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type ty
 }
 
 int pw_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (element == NULL || field == NULL || signal == NULL)
     return pw_fail (error, PW_INPUT, "model %s: %s is missing", m->name,
                     element == NULL ? "the name of an element"
@@ -201,6 +206,7 @@ int pw_set_signal (pw_model *m, const char *element, const char *field, const pw
 }
 
 int pw_set_start (pw_model *m, const char *state, double value, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (state == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", m->name);
   const char *expected = pw_domain_check (PW_REAL, value);
   if (*expected)

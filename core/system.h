@@ -50,6 +50,7 @@ struct pw_system {
   int moving;              /* slabs with an eta: constraints that move */
   int hold;                /* 1: signals of forces keep their values (inputs=held) */
   double t_signal;         /* the time the signals were last evaluated at; NaN: never */
+  int taken;               /* 1: a run works on it */
   const pw_source *failed; /* the signal that has failed last; NULL: none */
   pw_scale scale;
   const char **body_name; /* bodies */

@@ -5,6 +5,9 @@
 #include <stddef.h>
 #include "pinwheel.h"
 
+/* Refuses NULL in the place of "a system", left by an earlier call whose error the caller need not have looked at. */
+int pw_require (const void *object, const char *what, pw_error *error);
+
 /* Keeps the valid name nearest to one that was not found, as a share of the longer one's length; start with
  * { .sought = name }. */
 typedef struct {

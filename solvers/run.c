@@ -174,13 +174,23 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   return status == PW_OK ? r->method->open (r, error) : status;
 }
 
-pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
-  pw_run *r = calloc (1, sizeof *r);
-  if (r == NULL) {
+/* A run that has the system to itself: two would move the poses under each other's feet. */
+static pw_run *run_take (pw_system *s, pw_error *error) {
+  pw_run *r = NULL;
+  if (pw_require (s, "a system", error) != PW_OK) return NULL;
+  if (s->taken)
+    pw_fail (error, PW_INPUT, "model %s: a run is open on this system already: close that, or compile the model again",
+             s->model);
+  else if ((r = calloc (1, sizeof *r)) == NULL)
     pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-    return NULL;
-  }
-  r->s = s;
+  else
+    s->taken = 1, r->s = s;
+  return r;
+}
+
+pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
+  pw_run *r = run_take (s, error);
+  if (r == NULL) return NULL;
   if (run_blame (r, run_open (r, method, settings, error), error) == PW_OK) return r;
   pw_close (r);
   return NULL;
@@ -196,6 +206,7 @@ void pw_close (pw_run *r) {
   run_drop_method (r);
   pw_saddle_close (r->saddle);
   pw_rank_close (r);
+  r->s->taken = 0;
   free (r->memory);
   free (r);
 }
@@ -255,8 +266,9 @@ static int run_check_progress (pw_run *r, double before, pw_error *error) {
 }
 
 int pw_advance (pw_run *r, double t_end, pw_error *error) {
+  int status = pw_require (r, "a run", error);
+  if (status != PW_OK) return status;
   double before = r->t;
-  int status = PW_OK;
   if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
   if (run_is_lost (r, error)) return PW_MACHINE;
@@ -273,6 +285,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 int pw_advance_to (pw_run *r, double t, double t_end, pw_error *error) {
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   while (r->t < t && r->t < t_end) {
     int status = pw_advance (r, t_end, error);
     if (status != PW_OK) return status;
@@ -299,6 +312,7 @@ static void run_account (pw_run *r, pw_sample *sample) {
 
 int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   pw_residuals now;
+  if (pw_require (r, "a run", error) != PW_OK || pw_require (sample, "a sample", error) != PW_OK) return PW_INPUT;
   if (run_is_lost (r, error)) return PW_MACHINE;
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
   r->t_at = t;
@@ -343,6 +357,7 @@ static int run_energy (pw_run *r, double *energy, pw_error *error) {
 /* What the caller changes of the energy is not the method's: it counts as energy at the start.  Functions of the caller's
  * may give other values, and other breakpoints, than before. */
 int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   int n = r->s->coords;
   double before = 0, after = 0;
   if (run_is_lost (r, error)) return PW_MACHINE;

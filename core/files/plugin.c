@@ -176,7 +176,7 @@ void pw_file_close (pw_file *f) {
 /* ---- An open file ---- */
 
 pw_model *pw_file_model (const pw_file *f, pw_error *error) {
-  return pw_model_new (f->name, f->table, error);
+  return pw_require (f, "a model file", error) == PW_OK ? pw_model_new (f->name, f->table, error) : NULL;
 }
 
 const pw_plugin_table *pw_file_table (const pw_file *f) {
