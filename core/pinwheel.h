@@ -37,7 +37,8 @@ typedef enum {
   PW_METHOD = -4   /* the method failed on the way */
 } pw_status;
 
-/* A caller-owned error: the first failure is kept, later ones do not overwrite it. */
+/* A caller-owned error, all zero at first: the first failure is kept, later ones do not overwrite it.  NULL in the place of
+ * a file, model, system or run is one: what a call could not give may be passed on to the next. */
 typedef struct {
   int status;     /* a pw_status; 0: no error so far */
   char text[500]; /* one line without a full stop: what was found, what was expected, the nearest valid name; for a text
@@ -66,7 +67,7 @@ enum { PW_ENDS_FREE, PW_ENDS_REST };
  * of yours sets anew). */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
-  void *context;            /* passed to eval and breakpoint as it is */
+  void *context; /* passed to eval and breakpoint as it is; must outlive the systems, or what open makes of it does */
   const char *const *reads; /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
   double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
   void *(*open) (void *context); /* each compiled system gets a context of its own, made from this one, or NULL without
@@ -153,7 +154,7 @@ typedef struct {
 
 typedef struct pw_kind pw_kind;
 
-/* What a plug-in exports, under the name `pw_plugin`. */
+/* What a plug-in exports, under the name `pw_plugin`.  The parameters handed to its functions live as long as the model. */
 typedef struct {
   unsigned abi;                                        /* PW_ABI */
   size_t size;                                         /* sizeof (pw_plugin_table) */

@@ -23,17 +23,20 @@ int main (void) {
   static const char *const reads[] = { "frame.omega", "steer.omega", NULL };
   rider who = { 0.1, 0.002 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = rider_torque, .context = &who, .reads = reads } };
-  pw_error e = { 0 }; /* keeps the first failure; NULLs are passed on only until there is one */
+  pw_error e = { 0 }; /* keeps the first failure; what then is NULL is refused by the calls behind it */
   pw_sample now;
 
   pw_file *file = pw_file_open ("ezyroller", &e);
-  pw_model *model = file ? pw_file_model (file, &e) : NULL;
-  int ready = model && pw_set (model, "a", 0.6, &e) == PW_OK && pw_build (model, &e) == PW_OK &&
-              pw_set_signal (model, "rider", "value", &torque, &e) == PW_OK;
-  pw_system *system = ready ? pw_compile (model, &e) : NULL;
-  pw_run *run = system ? pw_open (system, "rk4+projection", &(pw_settings){ .step = 1e-3 }, &e) : NULL;
+  pw_model *model = pw_file_model (file, &e);
+  pw_set (model, "a", 0.6, &e);
+  pw_build (model, &e);
+  pw_set_signal (model, "rider", "value", &torque, &e);
+  pw_system *system = pw_compile (model, &e);
+  pw_run *run = pw_open (system, "rk4+projection", &(pw_settings){ .step = 1e-3 }, &e);
+  pw_advance_to (run, 10, 10, &e);
+  pw_at (run, 10, &now, &e);
 
-  if (run && pw_advance_to (run, 10, 10, &e) == PW_OK && pw_at (run, 10, &now, &e) == PW_OK) {
+  if (e.status == PW_OK) {
     const double *frame = now.q + 3 * pw_find_body (system, "frame");
     printf ("frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t, frame[0], frame[1], frame[2]);
   } else

@@ -54,8 +54,8 @@ typedef struct {
 extern const pw_method *const pw_methods[];
 
 /* Makes the start of the system consistent and opens a method on it.  The system must outlive the run, and belongs
- * to it meanwhile.  Errors: PW_INPUT for a method, option or setting that does not exist or fit, with the nearest
- * valid name; PW_START for a start that cannot be made consistent; PW_MACHINE. */
+ * to it until pw_close.  Errors: PW_INPUT for a system that has a run already, or a method, option or setting that does
+ * not exist or fit, with the nearest valid name; PW_START for a start that cannot be made consistent; PW_MACHINE. */
 pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* Checks a method's name and options without a system; fills the integrator and the stabilisation's number. */
@@ -64,7 +64,7 @@ int pw_parse_method (const char *method, const pw_method **integrator, int *stab
 /* One accepted step that does not pass t_end.  Errors: PW_METHOD with the time reached and the reason. */
 int pw_advance (pw_run *r, double t_end, pw_error *error);
 
-/* Steps until t is reached or passed by a step that pw_at can look back into.  Returns as pw_advance. */
+/* Steps until t is reached or passed by a step that pw_at can look back into, or t_end is reached.  Returns as pw_advance. */
 int pw_advance_to (pw_run *r, double t, double t_end, pw_error *error);
 
 /* The time reached. */

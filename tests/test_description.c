@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
+#include "pinwheel-files.h"
 #include "scene.h"
 #include "system.h"
 #include "toys.h"
@@ -122,6 +123,46 @@ static void test_order_of_calls (void **state) {
   assert_int_equal (pw_build (m, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model cart: pw_build for the second time");
   pw_model_free (m);
+}
+
+/* What an earlier call could not give is passed on as NULL, and refused wherever it goes. */
+static void test_missing (void **state) {
+  (void)state;
+  pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
+  assert_int_equal (pw_set (NULL, "length", 1, &e[0]), PW_INPUT);
+  assert_int_equal (pw_build (NULL, &e[1]), PW_INPUT);
+  assert_int_equal (pw_set_signal (NULL, "motor", "value", &(pw_signal){ 0 }, &e[2]), PW_INPUT);
+  assert_int_equal (pw_set_start (NULL, "cart.x", 1, &e[3]), PW_INPUT);
+  assert_null (pw_compile (NULL, &e[4]));
+  for (int i = 0; i < 5; i++) check_error (&e[i], PW_INPUT, "a model is missing");
+  assert_null (pw_file_model (NULL, &e[5]));
+  check_error (&e[5], PW_INPUT, "a model file is missing");
+}
+
+static void description_add_nothing (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, NULL);
+}
+
+static void description_add_nameless (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_pin (m, NULL);
+}
+
+static void test_missing_definitions (void **state) {
+  (void)state;
+  static void (*const build[]) (pw_model * m, const void *parameters) = { description_add_nothing,
+                                                                          description_add_nameless };
+  static const char *const text[] = { "model cart: pw_add_body without a body",
+                                      "model cart: pw_add of kind pin without a definition" };
+  for (int i = 0; i < 2; i++) {
+    pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = build[i] };
+    pw_error error = { 0 };
+    pw_model *m = pw_model_new ("cart", &table, &error);
+    assert_int_equal (pw_build (m, &error), PW_INPUT);
+    check_error (&error, PW_INPUT, text[i]);
+    pw_model_free (m);
+  }
 }
 
 static void description_refused (pw_model *m, const char *text) {
@@ -290,6 +331,7 @@ int main (void) {
     cmocka_unit_test (test_bad_start),      cmocka_unit_test (test_query),
     cmocka_unit_test (test_bad_query),      cmocka_unit_test (test_own_coordinates),
     cmocka_unit_test (test_find_reaction),  cmocka_unit_test (test_copies),
+    cmocka_unit_test (test_missing),        cmocka_unit_test (test_missing_definitions),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -51,13 +51,11 @@ static void test_written (void **state) {
 /* Figures that need a layout of their own. */
 static void test_layouts (void **state) {
   (void)state;
-  cli_write (
-      "sled.yaml",
-      "pinwheel: 1\nbodies:\n  - {name: sled, mass: 1, inertia: 1, rate: {vx: 20}}\n"
-      "  - {name: \"a-dog-with-a-name-that-is-so-long-that-no-key-of-a-figure-has-room-for-all-of-it\", mass: 1, "
-      "inertia: 1, start: {x: 1}, rate: {vx: 20}}\nelements:\n"
-      "  - {wheel: left, body: sled, at: [0, 0.5]}\n"
-      "  - {drag: air, body: sled, linear: 0.01}\n");
+  cli_write ("sled.yaml", "pinwheel: 1\nbodies:\n  - {name: sled, mass: 1, inertia: 1, rate: {vx: 20}}\n"
+                          "  - {name: \"a-dog-whose-name-is-as-long-as-the-longest-may-be-\", mass: 1, "
+                          "inertia: 1, start: {x: 1}, rate: {vx: 20}}\nelements:\n"
+                          "  - {wheel: left, body: sled, at: [0, 0.5]}\n"
+                          "  - {drag: air, body: sled, linear: 0.01}\n");
   plots_write ("@/sled.yaml --t-end 10"); /* far and straight, losing energy */
   assert_non_null (strstr (cli_file ("written/paths.gp"), "set title 'whole run'"));
   assert_non_null (strstr (cli_file ("written/paths.gp"), "set title 'the first "));

@@ -166,6 +166,42 @@ static void test_twice (void **state) {
   pw_free (s);
 }
 
+/* ---- One run at a time ---- */
+
+/* A second run would move the system under the first one: it is refused until that is closed. */
+static void test_taken (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  assert_null (pw_open (s, "no-such-method", NULL, NULL)); /* leaves the system free */
+  pw_run *r = runs_open (s, "rk4", NULL);
+  assert_null (pw_open (s, "ida+ggl", NULL, &error));
+  check_error (&error, PW_INPUT,
+               "model ezyroller: a run is open on this system already: close that, or compile the model again");
+  pw_close (r);
+  pw_close (runs_open (s, "ida+ggl", NULL));
+  pw_free (s);
+}
+
+static void test_missing (void **state) {
+  (void)state;
+  pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
+  pw_sample sample;
+  assert_null (pw_open (NULL, "rk4", NULL, &e[0]));
+  check_error (&e[0], PW_INPUT, "a system is missing");
+  assert_int_equal (pw_advance (NULL, 1, &e[1]), PW_INPUT);
+  assert_int_equal (pw_advance_to (NULL, 1, 1, &e[2]), PW_INPUT);
+  assert_int_equal (pw_at (NULL, 1, &sample, &e[3]), PW_INPUT);
+  assert_int_equal (pw_restart (NULL, NULL, NULL, &e[4]), PW_INPUT);
+  for (int i = 1; i < 5; i++) check_error (&e[i], PW_INPUT, "a run is missing");
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  pw_run *r = runs_open (s, "rk4", NULL);
+  assert_int_equal (pw_at (r, 0, NULL, &e[5]), PW_INPUT);
+  check_error (&e[5], PW_INPUT, "a sample is missing");
+  pw_close (r);
+  pw_free (s);
+}
+
 /* ---- Looking into a run ---- */
 
 static void test_outside (void **state) {
@@ -267,6 +303,8 @@ int main (void) {
     cmocka_unit_test (test_outside),
     cmocka_unit_test (test_t_end),
     cmocka_unit_test (test_twice),
+    cmocka_unit_test (test_taken),
+    cmocka_unit_test (test_missing),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
