@@ -43,37 +43,50 @@ static int condense_longest (const pw_plan *c, const pw_slab *b, int e) {
   return PW_LDL_NODE;
 }
 
-/* Runs of active rows of elements without massless coordinates around. */
+/* 1 for a row that stands for itself: not left out, not a component's, and not one that only held coordinates enter, which
+ * says nothing of the others. */
+static int condense_takes_part (const pw_plan *c, const pw_slab *b, int e, int r, const unsigned char *active) {
+  const double *J = b->J + (e * b->kind->rows + r) * b->b.cols, *inverse = c->k->inverse;
+  int i = b->row + e * b->kind->rows + r, held = 0;
+  if ((active && !active[i]) || c->k->reduce.component_of_row[i] >= 0) return 0;
+  for (int n = 0; n < b->b.cols; n++) {
+    int j = pw_global (b, e, n);
+    if (j < c->k->s->coords && inverse[j] > 0 && J[n] != 0) return 1;
+    held |= j < c->k->s->coords && inverse[j] == 0;
+  }
+  return !held;
+}
+
+/* Runs of such rows of an element. */
 static void condense_elements (pw_plan *c, int rows, const unsigned char *active) {
   const pw_system *s = c->k->s;
-  const int *component = c->k->reduce.component_of_row;
   for (const pw_slab *b = s->slab; b < s->slab + s->slabs && b->kind->rows > 0 && b->row < rows; b++)
     for (int e = 0; e < b->b.count; e++) {
-      int i = b->row + e * b->kind->rows, r = 0, longest = condense_longest (c, b, e);
+      int longest = condense_longest (c, b, e), r = 0;
       while (r < b->kind->rows) {
         int size = 0;
-        while (r + size < b->kind->rows && size < longest && (active == NULL || active[i + r + size]) &&
-               component[i + r + size] < 0)
-          size++;
+        while (r + size < b->kind->rows && size < longest && condense_takes_part (c, b, e, r + size, active)) size++;
         if (size > 0) condense_element (c, b, e, r, size);
         r += size > 0 ? size : 1;
       }
     }
 }
 
-/* The rows of a component that are not pivots. */
+/* The rows of a component that are not pivots; a multiplier of one that touches nothing stays 0. */
 static void condense_components (pw_plan *c) {
   int extra = 0;
   for (int n = 0; n < c->k->reduce.components; n++) {
     pw_component *p = &c->k->reduce.component[n];
     for (int i = p->pivots; i < p->rows; i++) {
+      int pieces = c->pieces;
+      for (int g = 0; g < p->groups; g++)
+        condense_add_piece (c, p->Z + i * p->cols + p->group_column[g], p->cols, p->group[g],
+                            p->group[g] < 3 * c->k->s->bodies ? 3 : 1, 0);
+      if (c->pieces == pieces) continue;
       if (c->node)
         c->node[c->nodes] = (pw_plan_node){
           .size = 1, .row = PW_PLAN_EXTRA, .y = c->k->s->rows + extra++, .gamma = p->gamma + i, .lambda = p->lambda + i
         };
-      for (int g = 0; g < p->groups; g++)
-        condense_add_piece (c, p->Z + i * p->cols + p->group_column[g], p->cols, p->group[g],
-                            p->group[g] < 3 * c->k->s->bodies ? 3 : 1, 0);
       c->nodes++;
     }
   }
@@ -269,24 +282,28 @@ static pw_panel *condense_take (const pw_plan *c, pw_layout *l, int is_small) {
   return is_small ? pw_take (l, (size_t)c->groups, sizeof (pw_panel)) : NULL;
 }
 
-/* The rows that are not simply rows of the right-hand side. */
-static void condense_fill_rows (pw_plan *c, int rows, const unsigned char *active) {
+/* The rows that are not simply rows of the right-hand side; nodes come in the order of their rows. */
+static void condense_fill_rows (pw_plan *c, int rows) {
   struct pw_saddle *k = c->k;
-  int extra = 0, idle = 0;
-  for (int n = 0; n < c->nodes; n++)
+  int extra = 0, idle = 0, n = 0;
+  for (int i = 0; i < rows; i++) {
+    while (n < c->nodes && c->node[n].row >= 0 && c->node[n].row + c->node[n].size <= i) n++;
+    int own = n < c->nodes && c->node[n].row >= 0 && c->node[n].row <= i;
+    if (!own && k->reduce.component_of_row[i] < 0) k->idle[idle++] = i;
+  }
+  for (n = 0; n < c->nodes; n++)
     if (c->node[n].row == PW_PLAN_EXTRA)
       k->extra[extra++] = (pw_extra){ c->node[n].y, c->node[n].gamma, c->node[n].lambda };
-  for (int i = 0; i < rows; i++)
-    if (active && !active[i]) k->idle[idle++] = i;
 }
 
-static int condense_lay_out (pw_plan *c, const double *weight, int rows, const unsigned char *active) {
+static int condense_lay_out (pw_plan *c, const double *weight, int rows) {
   struct pw_saddle *k = c->k;
   for (int n = 0; n < c->nodes; n++) {
     k->unknowns += c->node[n].size;
     k->extras += c->node[n].row == PW_PLAN_EXTRA;
   }
-  for (int i = 0; i < rows; i++) k->idles += active && !active[i];
+  for (int i = 0; i < rows; i++) k->idles += k->reduce.component_of_row[i] < 0;
+  k->idles -= k->unknowns - k->extras;
   int is_small = k->unknowns <= PW_SMALL && k->s->coords <= CONDENSE_SMALL_COORDS;
   if (!is_small && condense_keep (c) != PW_OK) return PW_MACHINE;
   k->more = k->extras + 3 * c->keeps;
@@ -296,7 +313,7 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows, const u
   if (k->memory == NULL) return PW_MACHINE;
   l = (pw_layout){ k->memory, 0 };
   pw_panel *panel = condense_take (c, &l, is_small);
-  condense_fill_rows (c, rows, active);
+  condense_fill_rows (c, rows);
   if (!is_small) return condense_try_large (c);
   pw_condense_small (c, weight, panel);
   return PW_OK;
@@ -321,7 +338,7 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
   for (int j = 0; j < k->s->coords; j++) k->inverse[j] = weight[j] > 0 ? 1 / weight[j] : 0;
   int status = condense_allocate (&c, rows, active);
   if (status == PW_OK) status = condense_sort_pieces (&c);
-  if (status == PW_OK) status = condense_lay_out (&c, weight, rows, active);
+  if (status == PW_OK) status = condense_lay_out (&c, weight, rows);
   free (c.node);
   free (c.piece);
   free (c.node_of);

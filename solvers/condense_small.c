@@ -35,15 +35,11 @@ static void condense_fill_panels (const pw_plan *c, const double *weight, const 
 void pw_condense_small (const pw_plan *c, const double *weight, pw_panel *panel) {
   struct pw_saddle *k = c->k;
   pw_small *small = k->small;
-  int place[PW_SMALL], touched[PW_SMALL] = { 0 };
+  int place[PW_SMALL];
   *small = (pw_small){ .n = k->unknowns, .panel = panel, .end = panel, .guard = k->guard };
   condense_order_small (c, place);
   condense_fill_panels (c, weight, place);
   k->plain = k->reduce.components == 0 && k->idles == 0 ? small : NULL;
-  for (int p = 0; p < c->pieces; p++) touched[c->node_of[p]] = 1;
   for (int n = 0; n < c->nodes; n++)
-    for (int r = 0; r < c->node[n].size; r++) {
-      small->start[place[n] + r] = !touched[n];
-      small->row[place[n] + r] = c->node[n].y + r;
-    }
+    for (int r = 0; r < c->node[n].size; r++) small->row[place[n] + r] = c->node[n].y + r;
 }

@@ -44,8 +44,7 @@ void pw_saddle_close (pw_saddle *k) {
 
 /* ---- Factorising ---- */
 
-/* Takes over the smallest pivot of the rows.  A row whose coordinates are all held, or all belong to the ground, leaves
- * an empty diagonal: singular. */
+/* Takes over the smallest pivot of the rows. */
 static inline int saddle_judge_large (pw_saddle *k) {
   if (!(k->large->pivot >= k->pivot)) {
     k->pivot = k->large->pivot;

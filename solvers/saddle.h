@@ -1,7 +1,8 @@
 /* The saddle-point system  [ W J^T ; J 0 ] (a, lambda) = (f, gamma)  of a scene, with W diagonal.
  *
  * W is the mass matrix for accelerations and impulses, or a metric for projections.  An entry of W may be 0 (a
- * coordinate without mass: eliminated through a constraint row matched to it) or INFINITY (held: it does not move).
+ * coordinate without mass: eliminated through a constraint row matched to it) or INFINITY (held: it does not move; a row that
+ * only held ones enter takes no part, its multiplier is 0).
  * Coordinates with weight are condensed out exactly; the rows left are factorised as a sparse symmetric matrix whose
  * order and pattern are laid out once.  Nothing is allocated after opening. */
 #ifndef PW_SADDLE_H

@@ -264,8 +264,7 @@ static int small_judge (const pw_small *k) {
 /* Assembly and factorisation, with the right-hand side if there is one; L is kept. */
 PW_INLINE int small_assemble (pw_small *k, const double *f, double *L, int n) {
   PW_UNROLL for (int i = 0; i < n; i++) {
-    PW_UNROLL for (int j = 0; j < i; j++) k->S[i * n + j] = 0;
-    k->S[i * n + i] = k->start[i];
+    PW_UNROLL for (int j = 0; j <= i; j++) k->S[i * n + j] = 0;
   }
   small_gather (k, f, n);
   k->low = !small_factor (k->S, L, PW_SMALL_WATCH, n);

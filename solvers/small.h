@@ -23,7 +23,6 @@ typedef struct {
   int n;
   pw_panel *panel, *end;         /* one for every body and own coordinate with weight */
   int row[PW_SMALL];             /* of gamma and lambda, at each position */
-  double start[PW_SMALL];        /* 1 for a row without panel, which stands for itself, else 0 */
   double S[PW_SMALL * PW_SMALL]; /* n x n, its lower triangle */
   double L[PW_SMALL * PW_SMALL]; /* of L D L^T: L below the diagonal, D^-1 on it */
   double y[PW_SMALL];            /* right-hand side, then lambda, at each position */
