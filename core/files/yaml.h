@@ -6,6 +6,7 @@
  *   yaml.c         the head of a model: parameters and run defaults, which make a plug-in's table
  *   yaml_build.c   bodies and elements, through the field tables of their kinds
  *   yaml_signal.c  signals
+ *   yaml_time.c    signals by expressions of time
  *   yaml_state.c   states that expressions name
  *   yaml_table.c   points of tables, in the model or in a file
  *   yaml_truth.c   what is known about the motion */
@@ -142,6 +143,10 @@ typedef struct {
 
 /* Checks a name with a dot, at an offset of the text read, to be that of a state (yaml_state.c). */
 int pw_yaml_state (pw_yaml_builder *b, const pw_yaml_reading *r, const char *name, size_t at, pw_error *error);
+
+/* Makes a signal of up to three expressions of time: value, rate, acceleration; NULL: not given (yaml_time.c). */
+int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
+                     pw_signal *signal, pw_error *error);
 
 /* Reads a signal of a kind into a field (yaml_signal.c). */
 int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,
