@@ -234,7 +234,7 @@ int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_
     const pw_kind *kind = s->slab[i].kind;
     s->constraints += kind->rows > 0;
     s->moving += kind->eta != NULL;
-    if (kind->force && !kind->constant) s->force[s->forces++] = i;
+    if (kind->force && !kind->constant) s->force[s->forces++] = &s->slab[i];
   }
   pw_sweep_constant (s);
   return PW_OK;

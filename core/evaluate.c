@@ -83,7 +83,7 @@ static inline void evaluate_add_force (const pw_slab *k, double *f) {
 
 void pw_sweep_force (pw_system *s, double *f) {
   memcpy (f, s->constant, (size_t)s->coords * sizeof *f);
-  for (const int *i = s->force, *end = i + s->forces; i < end; i++) evaluate_add_force (&s->slab[*i], f);
+  for (pw_slab **k = s->force, **end = k + s->forces; k < end; k++) evaluate_add_force (*k, f);
 }
 
 void pw_sweep_constant (pw_system *s) {

@@ -44,7 +44,7 @@ struct pw_system {
   int bodies, coords, rows, holonomic, slabs, entries;
   int constraints;         /* slabs with rows */
   int forces;              /* slabs with a force that is not constant */
-  int *force;              /* which */
+  pw_slab **force;         /* which */
   int sources;             /* signals */
   int readers;             /* function signals that read states */
   int moving;              /* slabs with an eta: constraints that move */

@@ -20,7 +20,7 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
 
 /* Stabilises gamma and sums the forces at the placed pose: in f, unless there are none but constant ones. */
 static inline const double *dynamics_right (pw_run *r, const double *v, double *f, double *gamma) {
-  if (r->alpha != 0 || r->beta != 0) dynamics_stabilise (r, v, gamma);
+  if (r->alpha + r->beta > 0) dynamics_stabilise (r, v, gamma);
   if (r->s->forces == 0) return r->s->constant;
   pw_sweep_force (r->s, f);
   return f;
@@ -102,14 +102,13 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
                   element);
 }
 
-pw_residuals pw_note_residuals (pw_run *r) {
-  pw_residuals now = r->known;
+void pw_note_residuals (pw_run *r) {
+  pw_residuals *now = &r->known;
   pw_statistics *s = &r->statistics;
-  if (isnan (now.position)) pw_sweep_position_residual (r->s, NULL, &now);
-  if (isnan (now.velocity)) pw_sweep_velocity_residual (r->s, NULL, &now);
-  s->position = pw_larger (s->position, now.position);
-  s->velocity = pw_larger (s->velocity, now.velocity);
-  s->g = pw_larger (s->g, now.g);
-  s->jv = pw_larger (s->jv, now.jv);
-  return now;
+  if (isnan (now->position)) pw_sweep_position_residual (r->s, NULL, now);
+  if (isnan (now->velocity)) pw_sweep_velocity_residual (r->s, NULL, now);
+  s->position = pw_larger (s->position, now->position);
+  s->velocity = pw_larger (s->velocity, now->velocity);
+  s->g = pw_larger (s->g, now->g);
+  s->jv = pw_larger (s->jv, now->jv);
 }

@@ -36,8 +36,8 @@ static int judge_lost (pw_run *r, pw_error *error) {
 }
 
 /* What the constraints are off by, in units of the scene. */
-static double judge_off (const pw_run *r, const pw_residuals *now) {
-  return pw_larger (now->position, now->g / r->s->scale.length);
+static double judge_off (const pw_run *r) {
+  return pw_larger (r->known.position, r->known.g / r->s->scale.length);
 }
 
 /* 1 if constraints off by so much may decide on the branch: if the sine s of the smallest angle between their rows, smaller
@@ -55,33 +55,33 @@ static int judge_blurred (pw_run *r, double off, double part) {
 }
 
 /* Such a turn rounds off the corner, the more so the more the constraints are off: its accelerations are no outburst. */
-static int judge_turn (pw_run *r, const pw_residuals *residuals, double now, pw_error *error) {
+static int judge_turn (pw_run *r, double now, pw_error *error) {
   const double turn = 3, least = 0.1, lost = 0.02, far = 1e-2, nothing = 0.1;
-  double off = judge_off (r, residuals), before = fmax (r->before, least);
+  double off = judge_off (r), before = fmax (r->before, least);
   if (!(now <= turn * before) && judge_blurred (r, off, lost))
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) may lead to another branch, with "
         "%.3g times the accelerations of before; methods with projection pass",
-        r->t, residuals->position, now / before);
+        r->t, r->known.position, now / before);
   if (!(off <= far) && judge_blurred (r, off, nothing))
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) tell no branch from another; "
         "methods with projection pass",
-        r->t, residuals->position);
+        r->t, r->known.position);
   return PW_OK;
 }
 
 /* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */
-static int judge_outburst (pw_run *r, const pw_residuals *residuals, pw_error *error) {
+static int judge_outburst (pw_run *r, pw_error *error) {
   const double outburst = 100, blurred = 0.01;
   double now = pw_run_agitation (r);
   if (r->near && !(now <= outburst * r->calm))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
                     now / r->calm);
-  if (r->near || judge_blurred (r, judge_off (r, residuals), blurred)) return judge_turn (r, residuals, now, error);
+  if (r->near || judge_blurred (r, judge_off (r), blurred)) return judge_turn (r, now, error);
   r->calm = pw_larger (now, r->calm);
   r->before = now;
   return PW_OK;
@@ -100,13 +100,13 @@ static int judge_contradicts (pw_run *r) {
 
 int pw_run_judge (pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
-  const pw_residuals now = pw_note_residuals (r);
+  pw_note_residuals (r);
   if (!(s->position <= JUDGE_LOST && s->velocity <= JUDGE_LOST)) {
     double lost = pw_stabilised_by (r, "none") ? JUDGE_LOST_UNSTABILISED : JUDGE_LOST;
     if (!(s->position <= lost && s->velocity <= lost)) return judge_lost (r, error);
   }
   if (r->redundant && judge_contradicts (r)) return judge_lost (r, error);
-  return judge_outburst (r, &now, error);
+  return judge_outburst (r, error);
 }
 
 double pw_unbalanced (const pw_run *r, const pw_sample *sample) {

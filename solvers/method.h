@@ -30,7 +30,7 @@ struct pw_run {
   double alpha, beta;    /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;     /* first discontinuity of a signal after t */
   int stuck;             /* steps in a row that were as good as none */
-  pw_residuals known;    /* those that the last projection told; NaN: it did not */
+  pw_residuals known;    /* of the state reached; NaN: not yet judged, nor told by a projection */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;
@@ -68,7 +68,8 @@ int pw_fixed_steps (const pw_run *r);
 /* The end of the next step of the given size, `count` of which were taken since the time `base`: a multiple of the size,
  * t_end or a breakpoint, whichever is first; *whole: the first. */
 static inline double pw_step_end (const pw_run *r, double base, long count, double t_end, int *whole) {
-  double h = r->settings.step, t1 = base + (double)(count + 1) * h, stop = fmin (t_end, r->breakpoint);
+  double h = r->settings.step, t1 = base + (double)(count + 1) * h,
+         stop = t_end < r->breakpoint ? t_end : r->breakpoint;
   *whole = t1 < stop + 1e-9 * h;
   return t1 > stop - 1e-9 * h ? stop : t1;
 }
@@ -145,9 +146,9 @@ void pw_show_reached (pw_run *r);
 /* Says which constraints an evaluation could not tell apart, and when. */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
-/* Takes the residuals of the state just accelerated into the statistics; those that a projection knows are not computed
- * twice. */
-pw_residuals pw_note_residuals (pw_run *r);
+/* Takes the residuals of the state just accelerated into r->known and the statistics; those that a projection knows are not
+ * computed twice. */
+void pw_note_residuals (pw_run *r);
 static inline void pw_forget_residuals (pw_run *r) {
   r->known.position = r->known.velocity = NAN;
 }

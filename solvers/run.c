@@ -138,7 +138,7 @@ static int run_begin (pw_run *r, pw_error *error) {
   r->calm = fmax (1, r->before);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
   pw_forget_residuals (r);
-  (void)pw_note_residuals (r);
+  pw_note_residuals (r);
   return run_look_ahead (r, error);
 }
 
@@ -279,7 +279,8 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_OK) status = pw_run_judge (r, error);
   if (status == PW_OK) status = run_check_progress (r, before, error);
-  if (status != PW_OK || r->redundant == 0) return run_blame (r, status, error);
+  if (status != PW_OK) return run_blame (r, status, error);
+  if (r->redundant == 0) return PW_OK;
   r->grip = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_grip (r) : 0;
   return PW_OK;
 }

@@ -278,8 +278,12 @@ PW_INLINE void small_right (pw_small *k, const double *gamma, int n) {
   PW_UNROLL for (int i = 0; i < n; i++) k->y[i] = -gamma[k->row[i]];
 }
 
-PW_INLINE void small_left_out (const pw_small *k, double *lambda, int n) {
-  PW_UNROLL for (int i = 0; i < n; i++) lambda[k->row[i]] = k->y[i];
+/* From the right-hand side in k->y: lambda, which stays there too. */
+PW_INLINE void small_lambda (pw_small *k, const double *L, double *lambda, int n) {
+  double y[PW_SMALL];
+  PW_UNROLL for (int i = 0; i < n; i++) y[i] = k->y[i];
+  small_back (L, y, n);
+  PW_UNROLL for (int i = 0; i < n; i++) k->y[i] = lambda[k->row[i]] = y[i];
 }
 
 /* ---- For each size ---- */
@@ -292,16 +296,14 @@ PW_INLINE int small_factor_of (pw_small *k, int n) {
 PW_INLINE void small_solve_of (pw_small *k, const double *f, const double *gamma, double *lambda, int n) {
   small_right (k, gamma, n);
   if (f) small_gather_right (k, f);
-  small_back (k->L, k->y, n);
-  small_left_out (k, lambda, n);
+  small_lambda (k, k->L, lambda, n);
 }
 
 PW_INLINE int small_both_of (pw_small *k, const double *f, const double *gamma, double *lambda, int n) {
   double L[PW_SMALL * PW_SMALL];
   small_right (k, gamma, n);
   if (!small_assemble (k, f, L, n)) return 0;
-  small_back (L, k->y, n);
-  small_left_out (k, lambda, n);
+  small_lambda (k, L, lambda, n);
   return 1;
 }
 
