@@ -182,7 +182,8 @@ void pw_add_JT (const pw_system *s, const double *lambda, double *out) {
   }
 }
 
-/* The worst row so far: its residual, which row it is, and its residual's share in the sum of its terms. */
+/* The worst row so far: its residual's share in the sum of its terms, and which row it is.  Nothing is worse than what is
+ * not a number. */
 typedef struct {
   double most, scaled;
   int row;
@@ -191,7 +192,7 @@ typedef struct {
 static inline evaluate_worst evaluate_judge (evaluate_worst worst, int row, double residual, double size) {
   double error = fabs (residual), scaled = error / size;
   worst.most = pw_larger (worst.most, error);
-  if (!(scaled <= worst.scaled)) worst.scaled = scaled, worst.row = row;
+  if (!(scaled <= worst.scaled) && !isnan (worst.scaled)) worst.scaled = scaled, worst.row = row;
   return worst;
 }
 

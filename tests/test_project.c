@@ -59,7 +59,26 @@ static void test_off (void **state) {
   project_try ("n-trailer", NULL, 0, "rk4+projection", 1e-3);
 }
 
+/* A residual that is not a number is the worst of all, whichever row's it is. */
+static void test_wild_residual (void **state) {
+  (void)state;
+  double size[PROJECT_MOST];
+  pw_system *s = scene_named ("n-four-bar", NULL, 0);
+  assert_in_range (s->holonomic, 3, PROJECT_MOST);
+  for (int i = 0; i < s->holonomic; i++) size[i] = 1;
+  for (int wild = 0; wild < 3; wild++) {
+    double g[PROJECT_MOST] = { 1e-3, 2e-3, 3e-3 };
+    pw_residuals now;
+    g[wild] = NAN;
+    pw_judge_positions (s, g, size, NULL, &now);
+    assert_true (isnan (now.position));
+    assert_int_equal (now.row_position, wild);
+  }
+  pw_free (s);
+}
+
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_consistent), cmocka_unit_test (test_off) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_consistent), cmocka_unit_test (test_off),
+                                      cmocka_unit_test (test_wild_residual) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
