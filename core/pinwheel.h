@@ -76,37 +76,49 @@ typedef struct {
   int differenced;               /* 1: gradient is made of differences; `show` says so */
 } pw_function;
 
+/* offset + amplitude cos (omega t + phase) */
+typedef struct {
+  double amplitude; /* unit of the signal */
+  double omega;     /* angular frequency [rad/s] */
+  double phase;     /* [rad] */
+  double offset;    /* unit of the signal */
+} pw_harmonic;
+
+/* From one value to another. */
+typedef struct {
+  double from, to; /* before and behind; unit of the signal */
+  double start;    /* [s] */
+  double duration; /* [s], > 0 */
+} pw_ramp;
+
+/* offset + height from start to start + width, and each period again. */
+typedef struct {
+  double height; /* while it lasts; unit of the signal */
+  double start;  /* [s] */
+  double width;  /* how long it lasts [s]; 0: for ever */
+  double period; /* from one pulse to the next [s], > width; 0: there is one */
+  double offset; /* at all times, below the height; unit of the signal */
+} pw_pulse;
+
+/* Through points. */
+typedef struct {
+  const double *t;     /* times of its points, increasing [s]; pw_add and pw_set_signal copy the points */
+  const double *value; /* at these times; unit of the signal; the first and the last are held outside */
+  int count;           /* of points: at least 2, of a cubic table with free ends 4 */
+  int interpolation;   /* PW_LINEAR, PW_CUBIC: a spline with continuous rate and acceleration */
+  int ends;            /* PW_ENDS_FREE: of a spline as its points ask for (not a knot); PW_ENDS_REST: at rate 0 */
+} pw_points;
+
 /* A signal; all zero is the constant 0. */
 typedef struct {
   pw_signal_type type; /* which member of the union holds */
   union {
-    double constant; /* PW_CONSTANT: the value */
-    struct {
-      double amplitude; /* unit of the signal */
-      double omega;     /* angular frequency [rad/s] */
-      double phase;     /* [rad] */
-      double offset;    /* unit of the signal */
-    } harmonic;         /* PW_HARMONIC: offset + amplitude cos (omega t + phase) */
-    pw_function function;
-    struct {
-      double from, to; /* before and behind; unit of the signal */
-      double start;    /* [s] */
-      double duration; /* [s], > 0 */
-    } ramp;            /* PW_RAMP: along a straight line; PW_SMOOTH_STEP: with continuous rate and acceleration */
-    struct {
-      double height; /* while it lasts; unit of the signal */
-      double start;  /* [s] */
-      double width;  /* how long it lasts [s]; 0: for ever */
-      double period; /* from one pulse to the next [s], > width; 0: there is one */
-      double offset; /* at all times, below the height; unit of the signal */
-    } pulse;         /* PW_PULSE: offset + height from start to start + width, and each period again */
-    struct {
-      const double *t;     /* times of its points, increasing [s]; pw_add and pw_set_signal copy the points */
-      const double *value; /* at these times; unit of the signal; the first and the last are held outside */
-      int count;           /* of points: at least 2, of a cubic table with free ends 4 */
-      int interpolation;   /* PW_LINEAR, PW_CUBIC: a spline with continuous rate and acceleration */
-      int ends;            /* PW_ENDS_FREE: of a spline as its points ask for (not a knot); PW_ENDS_REST: at rate 0 */
-    } table;               /* PW_TABLE */
+    double constant;      /* PW_CONSTANT: the value */
+    pw_harmonic harmonic; /* PW_HARMONIC */
+    pw_function function; /* PW_FUNCTION */
+    pw_ramp ramp;         /* PW_RAMP: along a straight line; PW_SMOOTH_STEP: with continuous rate and acceleration */
+    pw_pulse pulse;       /* PW_PULSE */
+    pw_points table;      /* PW_TABLE */
   };
 } pw_signal;
 

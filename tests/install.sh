@@ -51,6 +51,28 @@ else
   report 'a program that embeds it' $?
 fi
 
+if command -v c++ >/dev/null; then
+  cat >"$work/plus.cc" <<'EOF'
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+int main () {
+  pw_error e = {};
+  pw_settings settings = {};
+  pw_file *file = pw_file_open ("pendulum", &e);
+  pw_model *model = pw_file_model (file, &e);
+  pw_build (model, &e);
+  pw_system *system = pw_compile (model, &e);
+  pw_run *run = pw_open (system, "ida+ggl", &settings, &e);
+  pw_advance_to (run, 1, 1, &e);
+  pw_close (run), pw_free (system), pw_model_free (model), pw_file_close (file);
+  return -e.status;
+}
+EOF
+  c++ -std=c++11 -Wall -Wextra -Wpedantic -Werror -I"$top/include/pinwheel" "$work/plus.cc" -o "$work/plus" -L"$top/lib" \
+    -lpinwheel-files -lpinwheel -Wl,-rpath,"$top/lib" >"$work/log" 2>&1 && (cd "$work" && ./plus) >"$work/log" 2>&1
+  report 'and one in C++' $?
+fi
+
 # Every option of run, every command and every key of a model stands in its page.
 missing=
 for word in $("$top/bin/pinwheel" run --help | sed -n 's/^ .*--\([a-z-]*\).*/\1/p'); do
