@@ -1,5 +1,5 @@
 /* Minimal velocities: u = B^T W v, with the columns of B a basis of ker J0, J0 the constraint matrix at the step's start,
- * held over the step; W = 1 for lengths, L^2 for angles.  Integrated are
+ * held over the step; W the metric of positions: the mass matrix, and small weights where there is no mass.  Integrated are
  *
  *   q' = v(t, q, u),    u' = B^T W a(t, q, v),      v:  J(t, q) v = eta,  B^T W v = u
  *
@@ -9,7 +9,8 @@
  *
  *   v = w + W^-1 J0^T mu,    K mu = eta - J w,    K = J W^-1 J0^T
  *
- * The next step has a basis of its own; v, and with it the motion, is the same in both.
+ * The next step has a basis of its own; v, and with it the motion, is the same in both.  With this W a body in two welded parts
+ * moves like one, to round-off, and what is without mass follows what has some.
  * (Kim & Vanderploeg 1986, QR decomposition for state space representation of constrained mechanical dynamic systems: a
  * basis held while it is good; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of
  * mechanical system dynamics.)
@@ -59,6 +60,7 @@ static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
     b->piece = pw_take (&l, pieces, sizeof *b->piece);
     b->K = pw_take (&l, m * m, sizeof (double));
     b->scale = pw_take (&l, m, sizeof (double));
+    b->inverse = pw_take (&l, (size_t)s->coords, sizeof (double));
     b->mu = pw_take (&l, m, sizeof (double));
     b->eta = pw_take (&l, all, sizeof (double));
     b->v = pw_take (&l, (size_t)s->coords + 3, sizeof (double));
@@ -92,6 +94,7 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
   if (nullspace_allocate (b, s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   for (int i = 0, n = 0; i < s->rows; i++) b->place[i] = r->active && !r->active[i] ? -1 : n++;
   nullspace_plan (b, s);
+  for (int j = 0; j < s->coords; j++) b->inverse[j] = 1 / s->metric[j];
   return PW_OK;
 }
 
@@ -224,14 +227,12 @@ static void nullspace_solve (pw_nullspace *b) {
 /* ---- A step ---- */
 
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
-  const pw_system *s = r->s;
-  double angle = 1 / (s->scale.length * s->scale.length);
   int status = pw_place (r->s, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   pw_sweep_J (r->s);
   for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
     for (pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
-      for (int c = 0; c < p->width; c++) x->reference[c] = x->J[c] * (c == p->width - 1 ? angle : 1);
+      for (int c = 0; c < p->width; c++) x->reference[c] = x->J[c] * b->inverse[p->j + c];
   return PW_OK;
 }
 

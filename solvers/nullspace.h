@@ -25,6 +25,7 @@ typedef struct {
   pw_nullspace_panel *panel; /* panels + 2 */
   pw_nullspace_piece *piece;
   double *K, *scale; /* rows x rows: J W^-1 J0^T, factorised in place; rows: the largest entry of each */
+  double *inverse;   /* coords: of W */
   double *mu;        /* rows */
   double *eta;       /* all rows */
   double *v;         /* coords + 3: scratch */
