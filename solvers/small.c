@@ -148,22 +148,45 @@ PW_INLINE void small_take (const pw_panel *p, const double *f, double *a, unsign
   a[2] = w[2] * x2;
 }
 
-/* The same for any number of rows and columns. */
-static void small_add_any (const pw_panel *p, const double *f, int n) {
-  for (int r = 0; r < p->rows; r++)
-    for (int c = 0; c < p->width; c++) {
-      double scaled = p->J[r][c] * p->w[c];
-      if (f) p->y[r] += scaled * f[p->j + c];
-      for (int q = 0; n > 0 && q <= r; q++) p->S[r * n + q] += scaled * p->J[q][c];
+/* The same for any number of rows; the number of columns is a constant where these are inlined. */
+PW_INLINE void small_add_any (const pw_panel *p, const double *f, int n, int width) {
+  const double *w = p->w;
+  double *S = p->S, *y = p->y;
+  for (int r = 0; r < p->rows; r++, S += n) {
+    double B[3], sum = 0;
+    PW_UNROLL for (int c = 0; c < width; c++) B[c] = p->J[r][c] * w[c];
+    PW_UNROLL for (int c = 0; f && c < width; c++) sum += B[c] * f[p->j + c];
+    if (f) y[r] += sum;
+    for (int q = 0; n > 0 && q <= r; q++) {
+      const double *J = p->J[q];
+      double dot = 0;
+      PW_UNROLL for (int c = 0; c < width; c++) dot += B[c] * J[c];
+      S[q] += dot;
     }
+  }
 }
 
-static void small_take_any (const pw_panel *p, const double *f, double *a) {
-  for (int c = 0; c < p->width; c++) {
-    double sum = f ? f[p->j + c] : 0;
-    for (int r = 0; r < p->rows; r++) sum -= p->J[r][c] * p->y[r];
-    a[p->j + c] = p->w[c] * sum;
+PW_INLINE void small_take_any (const pw_panel *p, const double *f, double *a, int width) {
+  double sum[3];
+  PW_UNROLL for (int c = 0; c < width; c++) sum[c] = f ? f[p->j + c] : 0;
+  for (int r = 0; r < p->rows; r++) {
+    PW_UNROLL for (int c = 0; c < width; c++) sum[c] -= p->J[r][c] * p->y[r];
   }
+  PW_UNROLL for (int c = 0; c < width; c++) a[p->j + c] = p->w[c] * sum[c];
+}
+
+static void small_add_other (const pw_panel *p, const double *f, int n) {
+  if (p->width == 3)
+    small_add_any (p, f, n, 3);
+  else
+    small_add_any (p, f, n, 1);
+}
+
+static void small_take_other (const pw_panel *p, const double *f, double *a) {
+  if (p->width == 3)
+    small_take_any (p, f, a, 3);
+  else
+    small_take_any (p, f, a, 1);
 }
 
 PW_INLINE void small_gather (const pw_small *k, const double *f, int n) {
@@ -175,7 +198,7 @@ PW_INLINE void small_gather (const pw_small *k, const double *f, int n) {
   }
     SMALL_SHAPES
 #undef SMALL_SHAPE
-    small_add_any (p, f, n);
+    small_add_other (p, f, n);
   }
 }
 
@@ -192,7 +215,7 @@ static void small_scatter (const pw_small *k, const double *f, double *a) {
   }
     SMALL_SHAPES
 #undef SMALL_SHAPE
-    small_take_any (p, f, a);
+    small_take_other (p, f, a);
   }
 }
 
