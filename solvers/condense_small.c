@@ -1,5 +1,6 @@
 /* Planning of a small scene: the order of its rows, and a panel for each body or own coordinate; see condense.h. */
 #include "condense.h"
+#include "skyline.h"
 
 /* Puts the nodes in an order in which those of a panel are neighbours. */
 static void condense_order_small (const pw_plan *c, int *place) {
@@ -29,6 +30,7 @@ static void condense_fill_panels (const pw_plan *c, const double *weight, const 
       int node = c->node_of[c->list[x]];
       pw_small_add_rows (c->k->small, p, place[node], c->node[node].size, piece->J, piece->step, piece->unit);
     }
+    pw_small_close_panel (p);
   }
 }
 
@@ -39,6 +41,11 @@ void pw_condense_small (const pw_plan *c, const double *weight, pw_panel *panel)
   *small = (pw_small){ .n = k->unknowns, .panel = panel, .end = panel, .guard = k->guard };
   condense_order_small (c, place);
   condense_fill_panels (c, weight, place);
+  for (int i = 0; i < small->n; i++) small->begin[i] = i;
+  for (const pw_panel *p = small->panel; p < small->end; p++)
+    for (int r = 0; r < p->rows; r++)
+      if (p->first < small->begin[p->first + p->at[r]]) small->begin[p->first + p->at[r]] = p->first;
+  pw_skyline_open (small->begin, small->n);
   k->plain = k->reduce.components == 0 && k->idles == 0 ? small : NULL;
   for (int n = 0; n < c->nodes; n++)
     for (int r = 0; r < c->node[n].size; r++) small->row[place[n] + r] = c->node[n].y + r;

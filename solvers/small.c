@@ -7,6 +7,7 @@
  *
  * so that the two divisions of a pair do not wait for each other.  The functions are written once for a constant size
  * and compiled for each, so that their loops vanish. */
+#include "skyline.h"
 #include "small.h"
 #include "unroll.h"
 
@@ -85,7 +86,7 @@ void pw_small_add_rows (pw_small *k, pw_panel *p, int first, int rows, const dou
     int old = i - was.first, new = i - first;
     if (new >= 0 && new < rows) {
       p->J[i - from] = J + new *step;
-      p->columns[i - from] = !unit ? 7 : new == 0 ? 5 : 6;
+      p->columns[i - from] = (unsigned char)(!unit ? 7 : new == 0 ? 5 : 6);
     } else {
       p->J[i - from] = old >= 0 && old < was.rows ? was.J[old] : zero;
       p->columns[i - from] = old >= 0 && old < was.rows ? was.columns[old] : 0;
@@ -93,9 +94,21 @@ void pw_small_add_rows (pw_small *k, pw_panel *p, int first, int rows, const dou
   }
   p->first = from;
   p->rows = end - from;
-  p->shape = small_shape (p);
   p->S = k->S + from * (k->n + 1);
   p->y = k->y + from;
+}
+
+void pw_small_close_panel (pw_panel *p) {
+  int rows = 0;
+  p->shape = small_shape (p);
+  for (int r = 0; r < p->rows; r++) {
+    if (p->columns[r] == 0 && p->shape == 0) continue;
+    p->J[rows] = p->J[r];
+    p->columns[rows] = p->columns[r];
+    p->at[rows++] = (unsigned char)r;
+  }
+  p->gaps = rows < p->rows;
+  p->rows = rows;
 }
 
 /* ---- Panels of 3 columns, the shape a constant ---- */
@@ -148,45 +161,50 @@ PW_INLINE void small_take (const pw_panel *p, const double *f, double *a, unsign
   a[2] = w[2] * x2;
 }
 
-/* The same for any number of rows; the number of columns is a constant where these are inlined. */
-PW_INLINE void small_add_any (const pw_panel *p, const double *f, int n, int width) {
+/* The same for any rows; whether there are gaps and the number of columns are constants where these are inlined. */
+PW_INLINE void small_add_any (const pw_panel *p, const double *f, int n, int gaps, int width) {
   const double *w = p->w;
-  double *S = p->S, *y = p->y;
-  for (int r = 0; r < p->rows; r++, S += n) {
-    double B[3], sum = 0;
+  for (int r = 0; r < p->rows; r++) {
+    int i = gaps ? p->at[r] : r;
+    double B[3], sum = 0, *S = p->S + i * n;
     PW_UNROLL for (int c = 0; c < width; c++) B[c] = p->J[r][c] * w[c];
     PW_UNROLL for (int c = 0; f && c < width; c++) sum += B[c] * f[p->j + c];
-    if (f) y[r] += sum;
+    if (f) p->y[i] += sum;
     for (int q = 0; n > 0 && q <= r; q++) {
       const double *J = p->J[q];
       double dot = 0;
       PW_UNROLL for (int c = 0; c < width; c++) dot += B[c] * J[c];
-      S[q] += dot;
+      S[gaps ? p->at[q] : q] += dot;
     }
   }
 }
 
-PW_INLINE void small_take_any (const pw_panel *p, const double *f, double *a, int width) {
+PW_INLINE void small_take_any (const pw_panel *p, const double *f, double *a, int gaps, int width) {
   double sum[3];
   PW_UNROLL for (int c = 0; c < width; c++) sum[c] = f ? f[p->j + c] : 0;
   for (int r = 0; r < p->rows; r++) {
-    PW_UNROLL for (int c = 0; c < width; c++) sum[c] -= p->J[r][c] * p->y[r];
+    double y = p->y[gaps ? p->at[r] : r];
+    PW_UNROLL for (int c = 0; c < width; c++) sum[c] -= p->J[r][c] * y;
   }
   PW_UNROLL for (int c = 0; c < width; c++) a[p->j + c] = p->w[c] * sum[c];
 }
 
 static void small_add_other (const pw_panel *p, const double *f, int n) {
-  if (p->width == 3)
-    small_add_any (p, f, n, 3);
+  if (p->width == 1)
+    small_add_any (p, f, n, 1, 1);
+  else if (p->gaps)
+    small_add_any (p, f, n, 1, 3);
   else
-    small_add_any (p, f, n, 1);
+    small_add_any (p, f, n, 0, 3);
 }
 
 static void small_take_other (const pw_panel *p, const double *f, double *a) {
-  if (p->width == 3)
-    small_take_any (p, f, a, 3);
+  if (p->width == 1)
+    small_take_any (p, f, a, 1, 1);
+  else if (p->gaps)
+    small_take_any (p, f, a, 1, 3);
   else
-    small_take_any (p, f, a, 1);
+    small_take_any (p, f, a, 0, 3);
 }
 
 PW_INLINE void small_gather (const pw_small *k, const double *f, int n) {
@@ -330,6 +348,31 @@ PW_INLINE int small_both_of (pw_small *k, const double *f, const double *gamma, 
   return 1;
 }
 
+/* The same for any number of rows, within the skyline of S. */
+static int small_assemble_any (pw_small *k, const double *f) {
+  int n = k->n;
+  for (int i = 0; i < n; i++)
+    for (int j = k->begin[i]; j <= i; j++) k->S[i * n + j] = 0;
+  small_gather (k, f, n);
+  k->low = !pw_skyline_factor (k->S, k->L, k->begin, PW_SMALL_WATCH, n);
+  return !k->low || small_judge (k);
+}
+
+static void small_solve_any (pw_small *k, const double *f, const double *gamma, double *lambda) {
+  small_right (k, gamma, k->n);
+  if (f) small_gather_right (k, f);
+  pw_skyline_solve (k->L, k->begin, k->y, k->n);
+  small_left_out (k, lambda, k->n);
+}
+
+static int small_both_any (pw_small *k, const double *f, const double *gamma, double *lambda) {
+  small_right (k, gamma, k->n);
+  if (!small_assemble_any (k, f)) return 0;
+  pw_skyline_solve (k->L, k->begin, k->y, k->n);
+  small_left_out (k, lambda, k->n);
+  return 1;
+}
+
 #define SMALL_SIZES SMALL (1) SMALL (2) SMALL (3) SMALL (4) SMALL (5) SMALL (6) SMALL (7) SMALL (8)
 
 int pw_small_factor (pw_small *k) {
@@ -340,7 +383,7 @@ int pw_small_factor (pw_small *k) {
     SMALL_SIZES
 #undef SMALL
   default:
-    return 1;
+    return small_assemble_any (k, 0);
   }
 }
 
@@ -353,7 +396,7 @@ void pw_small_solve (pw_small *k, const double *f, const double *gamma, double *
     SMALL_SIZES
 #undef SMALL
   default:
-    break;
+    small_solve_any (k, f, gamma, lambda);
   }
   small_scatter (k, f, a);
 }
@@ -367,7 +410,7 @@ int pw_small_both (pw_small *k, const double *f, const double *gamma, double *a,
     SMALL_SIZES
 #undef SMALL
   default:
-    break;
+    if (!small_both_any (k, f, gamma, lambda)) return 0;
   }
   small_scatter (k, f, a);
   return 1;

@@ -1,12 +1,13 @@
-/* Small scenes: up to 8 rows.  The condensed matrix is dense, and everything between J, f, gamma and a, lambda is one
- * straight piece of code, compiled for each number of rows.
+/* Small scenes.  The condensed matrix is dense, and up to 8 rows everything between J, f, gamma and a, lambda is one
+ * straight piece of code, compiled for each number of rows; with more, rows are factorised from their first entry on.
  *
  * A panel holds the rows that touch a body (or an own coordinate): what they do to each other through it.  Rows are put
- * in an order in which those of a panel are neighbours; where that is not possible, the ones between read zeros. */
+ * in an order in which those of a panel are neighbours; where that is not possible, the ones between read zeros or are
+ * left out. */
 #ifndef PW_SMALL_H
 #define PW_SMALL_H
 
-enum { PW_SMALL = 8 };
+enum { PW_SMALL = 24 };
 #define PW_SMALL_WATCH 0.01
 
 typedef struct {
@@ -14,15 +15,18 @@ typedef struct {
   double *S, *y;              /* in those of all, the entries of its first row */
   int j, width;               /* first coordinate, columns */
   int first, rows;            /* first position, positions from there */
+  int gaps;                   /* 1: not all of them are neighbours */
   unsigned shape;             /* which columns its rows have, where that is compiled apart (small.c); else 0 */
-  unsigned columns[PW_SMALL]; /* of each row, as bits */
-  const double *J[PW_SMALL];  /* each row, at these columns */
+  unsigned char columns[PW_SMALL]; /* of each row, as bits */
+  unsigned char at[PW_SMALL];      /* how far behind the first each row is, if there are gaps */
+  const double *J[PW_SMALL];       /* each row, at these columns */
 } pw_panel;
 
 typedef struct {
   int n;
   pw_panel *panel, *end;         /* one for every body and own coordinate with weight */
   int row[PW_SMALL];             /* of gamma and lambda, at each position */
+  int begin[PW_SMALL];           /* the first column of each row of S that is not zero */
   double S[PW_SMALL * PW_SMALL]; /* n x n, its lower triangle */
   double L[PW_SMALL * PW_SMALL]; /* of L D L^T: L below the diagonal, D^-1 on it */
   double y[PW_SMALL];            /* right-hand side, then lambda, at each position */
@@ -39,6 +43,9 @@ void pw_small_order (int nodes, const unsigned long long *touched, int *order);
 /* Adds rows to a panel, whose position `first` is the first one's: their first column is at J, the next row `step`
  * further on.  unit: they are two, and their x and y columns a multiple of the unit matrix. */
 void pw_small_add_rows (pw_small *k, pw_panel *p, int first, int rows, const double *J, int step, int unit);
+
+/* After the last rows. */
+void pw_small_close_panel (pw_panel *p);
 
 /* ---- Factorising and solving ---- */
 

@@ -244,7 +244,7 @@ static void test_linkages (void **state) {
 
 /* ---- Rows without anything to give way ---- */
 
-enum { SADDLE_LINKS = 12, SADDLE_COORDS = 3 * SADDLE_LINKS };
+enum { SADDLE_LINKS = 26, SADDLE_COORDS = 3 * SADDLE_LINKS };
 
 /* Rods instead of the chain's pins. */
 static void saddle_rods (pw_model *m, const void *parameters) {
