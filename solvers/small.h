@@ -11,12 +11,12 @@ enum { PW_SMALL = 24 };
 #define PW_SMALL_WATCH 0.01
 
 typedef struct {
-  const double *w;            /* diagonal of W^-1 in its columns */
-  double *S, *y;              /* in those of all, the entries of its first row */
-  int j, width;               /* first coordinate, columns */
-  int first, rows;            /* first position, positions from there */
-  int gaps;                   /* 1: not all of them are neighbours */
-  unsigned shape;             /* which columns its rows have, where that is compiled apart (small.c); else 0 */
+  const double *w;                 /* diagonal of W^-1 in its columns */
+  double *S, *y;                   /* in those of all, the entries of its first row */
+  int j, width;                    /* first coordinate, columns */
+  int first, rows;                 /* first position, positions from there */
+  int gaps;                        /* 1: not all of them are neighbours */
+  unsigned shape;                  /* which columns its rows have, where that is compiled apart (small.c); else 0 */
   unsigned char columns[PW_SMALL]; /* of each row, as bits */
   unsigned char at[PW_SMALL];      /* how far behind the first each row is, if there are gaps */
   const double *J[PW_SMALL];       /* each row, at these columns */
