@@ -304,7 +304,7 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows) {
   }
   for (int i = 0; i < rows; i++) k->idles += k->reduce.component_of_row[i] < 0;
   k->idles -= k->unknowns - k->extras;
-  int is_small = k->unknowns <= PW_SMALL && k->s->coords <= CONDENSE_SMALL_COORDS;
+  int is_small = k->unknowns <= PW_SMALL_MOST && k->s->coords <= CONDENSE_SMALL_COORDS;
   if (!is_small && condense_keep (c) != PW_OK) return PW_MACHINE;
   k->more = k->extras + 3 * c->keeps;
   pw_layout l = { NULL, 0 };

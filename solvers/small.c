@@ -358,18 +358,21 @@ static int small_assemble_any (pw_small *k, const double *f) {
   return !k->low || small_judge (k);
 }
 
+static void small_lambda_any (pw_small *k, double *lambda) {
+  pw_skyline_solve (k->L, k->begin, k->y, k->n);
+  for (int i = 0; i < k->n; i++) lambda[k->row[i]] = k->y[i];
+}
+
 static void small_solve_any (pw_small *k, const double *f, const double *gamma, double *lambda) {
   small_right (k, gamma, k->n);
   if (f) small_gather_right (k, f);
-  pw_skyline_solve (k->L, k->begin, k->y, k->n);
-  small_left_out (k, lambda, k->n);
+  small_lambda_any (k, lambda);
 }
 
 static int small_both_any (pw_small *k, const double *f, const double *gamma, double *lambda) {
   small_right (k, gamma, k->n);
   if (!small_assemble_any (k, f)) return 0;
-  pw_skyline_solve (k->L, k->begin, k->y, k->n);
-  small_left_out (k, lambda, k->n);
+  small_lambda_any (k, lambda);
   return 1;
 }
 

@@ -8,6 +8,12 @@
 #define PW_SMALL_H
 
 enum { PW_SMALL = 24 };
+
+/* The most rows of a small scene; with 0, for tests, all are large ones. */
+#ifndef PW_SMALL_MOST
+#define PW_SMALL_MOST PW_SMALL
+#endif
+
 #define PW_SMALL_WATCH 0.01
 
 typedef struct {
