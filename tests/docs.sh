@@ -1,0 +1,50 @@
+#!/bin/sh
+# What the manual and the other pages show is what the program prints: each block that begins with "$ build/pinwheel" is run,
+# and its lines are found in the output, in their order.  Numbers agree to 1 %, or both are below 1e-6 in size, or the line is
+# about what is the machine's alone: times, and what a drifting method does at a singular pose.
+# Run from the top folder; reads PINWHEEL.
+
+. "$(dirname "$0")/report.sh"
+
+# blocks FILE: for each, a line "# COMMAND" and the lines that are shown below it.
+blocks () {
+  awk '/^    \$ build\/pinwheel / { shown = 1; print "# " substr ($0, 22); next }
+       NF && !/^    / { shown = 0 }
+       shown && NF { print substr ($0, 5) }' "$1"
+}
+
+# The lines of standard input that are not in the file, from the first that is missing on.
+missing () {
+  awk -v file="$1" '
+    function bare(word) { gsub (/[(),:;"]/, "", word); return word }
+    function close_to(a, b, d) {
+      d = a - b; if (d < 0) d = -d; if (a < 0) a = -a; if (b < 0) b = -b
+      return d <= 0.01 * a || (a < 1e-6 && b < 1e-6) }
+    function like(a, b, n, i, x, y, free) {
+      free = a ~ /cpu_s|processor time|[0-9] %|lost at a singular pose|\[ns\]|took/
+      n = split (a, x); if (split (b, y) != n) return 0
+      for (i = 1; i <= n; i++) {
+        x[i] = bare(x[i]); y[i] = bare(y[i])
+        if (x[i] == y[i]) continue
+        if (x[i] !~ /^[-+]?[0-9.]+(e[-+]?[0-9]+)?$/ || y[i] !~ /^[-+]?[0-9.]+(e[-+]?[0-9]+)?$/) return 0
+        if (!free && !close_to(x[i] + 0, y[i] + 0)) return 0 }
+      return 1 }
+    BEGIN { while ((getline line < file) > 0) out[++lines] = line }
+    $1 == "..." { next }
+    { for (at++; at <= lines && !like($0, out[at]); at++);
+      if (at > lines) { print "not printed: " $0; exit } }'
+}
+
+for page in README.md docs/*.md; do
+  [ -z "$(blocks "$page")" ] && continue
+  blocks "$page" >"$work/page"
+  grep -n '^# ' "$work/page" | while IFS=: read -r at command; do
+    command=${command#\# }
+    (cd "$work" && eval "\"$pinwheel\" $command" >out 2>&1 </dev/null)
+    sed -n "$((at + 1)),\${/^# /q;p}" "$work/page" | missing "$work/out" >"$work/log"
+    [ ! -s "$work/log" ]
+    report "$page: pinwheel $command" $?
+    [ $bad = 0 ] || : >"$work/bad"
+  done
+done
+[ ! -e "$work/bad" ]
