@@ -158,8 +158,8 @@ static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
   if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_MACHINE;
   *most = 0;
   for (int j = 0; j < n; j++) {
-    double unit = pw_unit (r->s, j), size = fmax (fabs (d->z[j]), fabs (d->z[n + j])) / unit;
-    if (!(size <= *most)) *most = size;
+    double unit = pw_unit (r->s, j), size = pw_largest (fabs (d->z[j]), fabs (d->z[n + j])) / unit;
+    *most = pw_largest (*most, size);
     d->z[n + j] *= d->column[n + j];
     d->q1[j] += d->z[j];
     d->w1[j] += d->z[n + j] / (h * d->gamma);

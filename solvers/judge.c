@@ -8,12 +8,12 @@ double pw_run_agitation (const pw_run *r) {
   const double *a = r->a, *own = a + 3 * s->bodies;
   double linear = 0, angular = 0, per = s->scale.time * s->scale.time;
   for (; a < own; a += 3) {
-    linear = pw_larger (linear, fabs (a[0]));
-    linear = pw_larger (linear, fabs (a[1]));
-    angular = pw_larger (angular, fabs (a[2]));
+    linear = pw_largest (linear, fabs (a[0]));
+    linear = pw_largest (linear, fabs (a[1]));
+    angular = pw_largest (angular, fabs (a[2]));
   }
-  for (; a < r->a + s->coords; a++) angular = pw_larger (angular, fabs (*a));
-  return pw_larger (linear * (per / s->scale.length), angular * per);
+  for (; a < r->a + s->coords; a++) angular = pw_largest (angular, fabs (*a));
+  return pw_largest (linear * (per / s->scale.length), angular * per);
 }
 
 /* A method that lets go of its constraints is stopped: what follows would not be this mechanism.  Without stabilisation

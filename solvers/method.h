@@ -117,6 +117,11 @@ static inline double pw_first_step (const pw_run *r) {
  * is follows from those here; else it stays what it was. */
 int pw_run_renew (pw_run *r, int fresh, pw_error *error);
 
+/* The largest of the sizes so far and another one; no number once one of them is none. */
+static inline double pw_largest (double most, double x) {
+  return x > most || isnan (x) ? x : most;
+}
+
 /* The size of the accelerations at the state reached, in units of L / T^2 (judge.c). */
 double pw_run_agitation (const pw_run *r);
 /* Looks at the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to

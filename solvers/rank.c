@@ -313,11 +313,9 @@ double pw_rank_grip (pw_run *r) {
     }
   pw_saddle_solve (r->saddle, f, nothing, f, c);
   for (const pw_slab *b = s->slab; b < s->slab + s->constraints; b++)
-    for (int n = 0; n < b->b.count * b->kind->rows; n++) {
-      double part = r->active[b->row + n] ? fabs (c[b->row + n]) * rank_length (s, b, n) : 0;
-      if (!(part <= most)) most = part;
-    }
-  return most > 0 ? 1 / most : INFINITY;
+    for (int n = 0; n < b->b.count * b->kind->rows; n++)
+      if (r->active[b->row + n]) most = pw_largest (most, fabs (c[b->row + n]) * rank_length (s, b, n));
+  return isnan (most) ? 0 : 1 / most;
 }
 
 /* Solves A x = b, symmetric positive definite k x k, in place (Cholesky). */

@@ -284,8 +284,8 @@ double pw_rk_distance (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   double most = 0;
   for (int j = 0; j < s->coords; j++) {
-    double off = fmax (fabs (d->q[j] - r->q_at[j]), s->scale.time * fabs (d->v[j] - r->v_at[j])) / pw_unit (s, j);
-    if (!(off <= most)) most = off;
+    double q = fabs (d->q[j] - r->q_at[j]), v = s->scale.time * fabs (d->v[j] - r->v_at[j]);
+    most = pw_largest (most, pw_largest (q, v) / pw_unit (s, j));
   }
   return most;
 }

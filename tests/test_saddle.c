@@ -10,6 +10,7 @@
 #include "check.h"
 #include "mechanism.h"
 #include "method.h"
+#include "rk_state.h"
 #include "runs.h"
 #include "scene.h"
 #include "small.h"
@@ -336,10 +337,33 @@ static void test_random (void **state) {
                "round-off, weights over a range of 1e6, rows nearly dependent");
 }
 
+/* A size that is not a number is not forgotten over those behind it. */
+static void test_not_a_number (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_named ("theo-jansen", NULL, 0);
+  pw_run *r = pw_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
+  check_ok (r ? PW_OK : error.status, &error);
+  for (int j = 0; j < s->coords; j++) {
+    double a = r->a[j];
+    r->a[j] = NAN;
+    assert_true (isnan (pw_run_agitation (r)));
+    r->a[j] = a;
+    r->data->q[j] = NAN;
+    assert_true (isnan (pw_rk_distance (r)));
+    r->data->q[j] = 0, r->data->v[j] = NAN;
+    assert_true (isnan (pw_rk_distance (r)));
+    r->data->v[j] = 0;
+  }
+  assert_true (isfinite (pw_run_agitation (r)) && isfinite (pw_rk_distance (r)));
+  pw_close (r);
+  pw_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_models), cmocka_unit_test (test_linkages), cmocka_unit_test (test_held),
-    cmocka_unit_test (test_empty),  cmocka_unit_test (test_random),
+    cmocka_unit_test (test_empty),  cmocka_unit_test (test_random),   cmocka_unit_test (test_not_a_number),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
