@@ -8,7 +8,7 @@
 enum { MOTION_SAMPLES = 100 };
 
 /* Errors: the largest of the coordinates and rates of a unit, at the end, then over all samples; of the multipliers
- * relative to the largest one of the same unit. */
+ * relative to the largest one of the same unit, but for samples at which a signal makes them jump. */
 enum { MOTION_END, MOTION_MOST = 4, MOTION_LAMBDA = 8, MOTION_ERRORS };
 enum { MOTION_LENGTH, MOTION_ANGLE, MOTION_SPEED, MOTION_RATE, MOTION_UNITS };
 
