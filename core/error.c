@@ -38,11 +38,21 @@ static size_t error_distance (const char *a, const char *b) {
   return row[n];
 }
 
-/* A name is near if at most half of it would have to change, or one begins or ends with the other. */
+/* A name is near if less than half of it would have to change, up to half of a short one, or one begins or ends with the other. */
 static int error_is_near (const char *a, size_t n, const char *b, size_t m, size_t distance) {
   size_t longer = n > m ? n : m, shorter = n + m - longer;
-  return 2 * distance <= longer ||
+  return 2 * distance < longer + (distance <= 2) ||
          (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
+}
+
+static int error_lower (char c) {
+  return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
+}
+
+/* Whether two names differ in capitals alone. */
+static int error_same (const char *a, const char *b) {
+  while (*a && error_lower (*a) == error_lower (*b)) a++, b++;
+  return *a == *b;
 }
 
 static void error_keep (pw_nearest *n, const char *candidate) {
@@ -55,7 +65,7 @@ static void error_keep (pw_nearest *n, const char *candidate) {
 
 void pw_nearest_try (pw_nearest *n, const char *candidate) {
   size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
-  size_t distance = error_distance (n->sought, candidate);
+  size_t distance = error_same (n->sought, candidate) ? 0 : error_distance (n->sought, candidate);
   error_keep (n, candidate);
   if (n->best && distance * n->length >= n->distance * length) return;
   n->best = candidate;

@@ -109,7 +109,9 @@ static void test_nearest_text (void **state) {
                                       "snow-plough",  "tender",     NULL };
   store_hint ("ster", names, "; did you mean \"steer\"?");
   store_hint ("st", names, "; did you mean \"steer\"?");
-  store_hint ("rame.x", names, "; did you mean \"frame\"?");
+  store_hint ("rame.", names, "; did you mean \"frame\"?");
+  store_hint ("GROUND", names, "; did you mean \"ground\"?");
+  store_hint ("front", names, "; valid are frame, steer, ground");
   store_hint ("wagon", names, "; valid are frame, steer, ground");
   store_hint ("wagon", (const char *const[]){ "frame", NULL }, "; valid is frame");
   store_hint ("pinnace", many, "");
