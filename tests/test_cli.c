@@ -87,6 +87,17 @@ static void test_no_energy (void **state) {
   assert_null (cli_file ("summary.json.part"));
 }
 
+/* Spin angles and rates stand below each other, whatever their wheels' names. */
+static void test_own_columns (void **state) {
+  (void)state;
+  cli_good ("pinwheel run differential-drive --t-end 0.1 2>/dev/null"); /* its wheels are on one axle */
+  const char *left = strstr (cli_out, "\n  left.spin"), *right = strstr (cli_out, "\n  right.spin");
+  assert_true (left != NULL && right != NULL);
+  assert_int_equal (strstr (left, " rad ") - left, strstr (right, " rad ") - right);
+  assert_int_equal (strstr (left, "left.spin_rate") - left, strstr (right, "right.spin_rate") - right);
+  assert_int_equal (strstr (left, " rad/s") - left, strstr (right, " rad/s") - right);
+}
+
 static void test_defaults (void **state) {
   (void)state;
   cli_good (
@@ -276,12 +287,15 @@ static void test_new (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_summary),      cmocka_unit_test (test_numbers),   cmocka_unit_test (test_long_step),
-    cmocka_unit_test (test_degrees),      cmocka_unit_test (test_no_energy), cmocka_unit_test (test_unbalanced),
-    cmocka_unit_test (test_defaults),     cmocka_unit_test (test_table),     cmocka_unit_test (test_table_on_stdout),
-    cmocka_unit_test (test_every),        cmocka_unit_test (test_locale),    cmocka_unit_test (test_list),
-    cmocka_unit_test (test_list_columns), cmocka_unit_test (test_show),      cmocka_unit_test (test_gnuplot_locale),
-    cmocka_unit_test (test_help),         cmocka_unit_test (test_new),
+    cmocka_unit_test (test_summary),     cmocka_unit_test (test_numbers),
+    cmocka_unit_test (test_long_step),   cmocka_unit_test (test_degrees),
+    cmocka_unit_test (test_no_energy),   cmocka_unit_test (test_unbalanced),
+    cmocka_unit_test (test_own_columns), cmocka_unit_test (test_defaults),
+    cmocka_unit_test (test_table),       cmocka_unit_test (test_table_on_stdout),
+    cmocka_unit_test (test_every),       cmocka_unit_test (test_locale),
+    cmocka_unit_test (test_list),        cmocka_unit_test (test_list_columns),
+    cmocka_unit_test (test_show),        cmocka_unit_test (test_gnuplot_locale),
+    cmocka_unit_test (test_help),        cmocka_unit_test (test_new),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

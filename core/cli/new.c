@@ -7,7 +7,7 @@
 /* The model file after its first line. */
 static const char new_text[] =
     " * Try:  pinwheel show ./%s.c\n"
-    " *       pinwheel run ./%s.c --set torque=0.5 -o %s.csv\n"
+    " *       pinwheel run ./%s.c --set torque=0.15 -o %s.csv\n"
     " *\n"
     " * Units are SI, angles are radians, counter-clockwise. */\n"
     "#include \"pinwheel.h\"\n"
@@ -24,8 +24,8 @@ static const char new_text[] =
     "  { PW_AT (numbers, hitch), 0.4, \"m\", \"hitch behind the centre of mass of the car\", PW_NONNEGATIVE },\n"
     "  { PW_AT (numbers, bar), 0.6, \"m\", \"hitch ahead of the centre of mass of the trailer\", PW_POSITIVE },\n"
     "  { PW_AT (numbers, speed), 1, \"m/s\", \"speed of the car at the start\", PW_REAL },\n"
-    "  { PW_AT (numbers, torque), 0.2, \"N m\", \"amplitude of the torque in the hitch\", PW_REAL },\n"
-    "  { PW_AT (numbers, omega), PW_PI, \"rad/s\", \"angular frequency of that torque\", PW_REAL },\n"
+    "  { PW_AT (numbers, torque), 0.1, \"N m\", \"amplitude of the torque in the hitch\", PW_REAL },\n"
+    "  { PW_AT (numbers, omega), 2 * PW_PI, \"rad/s\", \"angular frequency of that torque\", PW_REAL },\n"
     "  { .name = NULL }, /* the end */\n"
     "};\n"
     "\n"
@@ -79,8 +79,8 @@ static const char new_yaml[] =
     "  - {name: hitch, value: 0.4, unit: m, domain: nonnegative, about: hitch behind the centre of mass of the car}\n"
     "  - {name: bar, value: 0.6, unit: m, domain: positive, about: hitch ahead of the centre of mass of the trailer}\n"
     "  - {name: speed, value: 1, unit: m/s, about: speed of the car at the start}\n"
-    "  - {name: torque, value: 0.2, unit: N m, about: amplitude of the torque in the hitch}\n"
-    "  - {name: omega, value: pi, unit: rad/s, about: angular frequency of that torque}\n"
+    "  - {name: torque, value: 0.1, unit: N m, about: amplitude of the torque in the hitch}\n"
+    "  - {name: omega, value: 2*pi, unit: rad/s, about: angular frequency of that torque}\n"
     "\n"
     "# A body's frame sits at its centre of mass.  start: x, y, phi; rate: vx, vy, omega; what is left out is 0.  Any "
     "number\n"
@@ -119,7 +119,7 @@ static void new_print (FILE *f, const char *name, int yaml) {
   const char *title = "a car and its trailer, held together by a pin, each on a knife edge";
   if (yaml) {
     fprintf (f, "# %s: %s.\n#\n", name, title);
-    fprintf (f, "# Try:  pinwheel show ./%s.yaml\n#       pinwheel run ./%s.yaml --set torque=0.5 -o %s.csv\n#\n", name,
+    fprintf (f, "# Try:  pinwheel show ./%s.yaml\n#       pinwheel run ./%s.yaml --set torque=0.15 -o %s.csv\n#\n", name,
              name, name);
     fputs (new_yaml, f);
   } else {

@@ -48,6 +48,7 @@ static const char script_look[] =
     "set border lw 0.8 lc rgb '#404040'\n"
     "set tics nomirror out scale 0.6\n"
     "set grid lt 1 lw 0.6 lc rgb '#dddddd'\n"
+    "set ylabel offset 0.7,0\n"
     "set offsets 0,0,graph 0.04,graph 0.04\n"
     "set xzeroaxis lt 1 lw 0.8 lc rgb '#999999'\n"
     "# dark blue, red, yellow, grey: apart for colour-blind readers and in greyscale; dashes help\n"

@@ -7,7 +7,7 @@
 enum {
   SCRIPT_WIDTH = 900,  /* of a picture [px] */
   SCRIPT_WIDER = 1000, /* of one with panels side by side */
-  SCRIPT_LEFT = 80,    /* margins [px] */
+  SCRIPT_LEFT = 96,    /* margins [px] */
   SCRIPT_RIGHT = 28,
   SCRIPT_TOP = 42,
   SCRIPT_BOTTOM = 66,

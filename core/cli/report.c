@@ -170,10 +170,21 @@ static void report_own (const pw_system *s, const pw_sample *last) {
   int first = 3 * pw_count_bodies (s), n = pw_count_coordinates (s),
       end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
   char name[REPORT_NAME];
+  int width = 0, unit = 0; /* of a rate's name and a coordinate's unit, the widest */
   for (int j = first; j < end; j++) {
-    printf ("  %s", pw_state_name (s, j, name, sizeof name));
+    int long_name = report_length (pw_state_name (s, n + j, name, sizeof name)),
+        long_unit = report_length (pw_state_unit (s, j));
+    width = long_name > width ? long_name : width;
+    unit = long_unit > unit ? long_unit : unit;
+  }
+  for (int j = first; j < end; j++) {
+    printf ("  ");
+    report_left (pw_state_name (s, j, name, sizeof name), width);
     report_number (last->q[j], 8, 15);
-    printf (" %s,  %s", pw_state_unit (s, j), pw_state_name (s, n + j, name, sizeof name));
+    printf (" ");
+    report_left (pw_state_unit (s, j), unit);
+    printf ("   ");
+    report_left (pw_state_name (s, n + j, name, sizeof name), width);
     report_number (last->v[j], 8, 15);
     printf (" %s\n", pw_state_unit (s, n + j));
   }
