@@ -558,8 +558,10 @@ struct pw_kind {
   pw_sweep *eta;    /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
   pw_sweep *J;      /* rows x cols */
   pw_sweep *gamma;  /* rows: right-hand side of J a = gamma */
-  void (*J_gamma) (const pw_batch *b, double *J, double *gamma); /* both at once, where that is faster; may be NULL */
-  pw_sweep *force;                                               /* cols: generalised force */
+  /* Both at once, where that is faster; may be NULL.  J holds what `J` left there at another state: what never changes
+   * need not be written again. */
+  void (*J_gamma) (const pw_batch *b, double *J, double *gamma);
+  pw_sweep *force;   /* cols: generalised force */
   pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
   pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch */
   pw_sweep *jtl_q;   /* cols x cols: derivative of J^T lambda by q, lambda given in the batch */

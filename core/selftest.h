@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 
-enum { PW_SELFTEST_CHECKS = 20 };
+enum { PW_SELFTEST_CHECKS = 24 };
 
 /* One comparison: the worst of all elements, entries and seeds. */
 typedef struct {

@@ -134,6 +134,42 @@ static void test_sizes (void **state) {
   }
 }
 
+/* Both at once: one entry off, one not written, one too many. */
+static void kinds_both_off (const pw_batch *b, double *J, double *gamma) {
+  pw_kind_pin.J_gamma (b, J, gamma);
+  gamma[2 * b->count - 1] *= 1 + 1e-5;
+}
+
+static void kinds_both_stale (const pw_batch *b, double *J, double *gamma) {
+  double before = J[2];
+  pw_kind_pin.J_gamma (b, J, gamma);
+  J[2] = before;
+}
+
+static void kinds_both_short (const pw_batch *b, double *J, double *gamma) {
+  pw_batch fewer = *b;
+  fewer.count--;
+  pw_kind_pin.J_gamma (&fewer, J, gamma);
+}
+
+static void kinds_both_long (const pw_batch *b, double *J, double *gamma) {
+  pw_kind_pin.J_gamma (b, J, gamma);
+  gamma[2 * b->count] = 0;
+}
+
+static void test_both (void **state) {
+  pw_kind broken = pw_kind_pin;
+  (void)state;
+  broken.J_gamma = kinds_both_off;
+  kinds_expect_caught (&broken, "J_gamma", "off by 1e-5");
+  broken.J_gamma = kinds_both_stale;
+  kinds_expect_caught (&broken, "J_gamma", "with an entry of another state");
+  broken.J_gamma = kinds_both_short;
+  kinds_expect_caught (&broken, "J_gamma", "with an element left out");
+  broken.J_gamma = kinds_both_long;
+  kinds_expect_caught (&broken, "J_gamma", "with an entry too many");
+}
+
 /* ---- Tables that do not hold together ---- */
 
 static void kinds_expect_fault (const pw_kind *kind, const char *fault) {
@@ -232,9 +268,9 @@ static void test_refused (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_built_in), cmocka_unit_test (test_plug_in), cmocka_unit_test (test_broken),
-    cmocka_unit_test (test_sizes),    cmocka_unit_test (test_faults),  cmocka_unit_test (test_wheel_contact),
-    cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_built_in),      cmocka_unit_test (test_plug_in), cmocka_unit_test (test_broken),
+    cmocka_unit_test (test_sizes),         cmocka_unit_test (test_both),    cmocka_unit_test (test_faults),
+    cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

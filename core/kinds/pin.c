@@ -54,9 +54,10 @@ static void pin_g_size (const pw_batch *b, double *out) {
   }
 }
 
+/* The columns of both angles; the others never change. */
 static inline void pin_row_J (pin_arms s, double *out) {
-  out[0] = 1, out[1] = 0, out[2] = -s.Y1, out[3] = -1, out[4] = 0, out[5] = s.Y2;
-  out[6] = 0, out[7] = 1, out[8] = s.X1, out[9] = 0, out[10] = -1, out[11] = -s.X2;
+  out[2] = -s.Y1, out[5] = s.Y2;
+  out[8] = s.X1, out[11] = -s.X2;
 }
 
 static inline void pin_row_gamma (pin_arms s, const pw_pose *A, const pw_pose *B, double *out) {
@@ -66,9 +67,11 @@ static inline void pin_row_gamma (pin_arms s, const pw_pose *A, const pw_pose *B
 }
 
 static void pin_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
+  for (int e = 0; e < b->count; e++, out += 12) {
     PIN_PARTS;
-    pin_row_J (s, out + 12 * e);
+    out[0] = 1, out[1] = 0, out[3] = -1, out[4] = 0;
+    out[6] = 0, out[7] = 1, out[9] = 0, out[10] = -1;
+    pin_row_J (s, out);
   }
 }
 

@@ -48,7 +48,7 @@ static void wheel_gamma (const pw_batch *b, double *out) {
 static void wheel_J_gamma (const pw_batch *b, double *J, double *gamma) {
   for (int e = 0; e < b->count; e++, J += 3) {
     WHEEL_PARTS;
-    J[0] = -s, J[1] = c, J[2] = k->arm;
+    J[0] = -s, J[1] = c; /* J[2], the arm, never changes */
     gamma[e] = A->omega * (c * A->vx + s * A->vy);
   }
 }
