@@ -131,11 +131,16 @@ static int run_look_ahead (pw_run *r, pw_error *error) {
                   signal);
 }
 
+/* The accelerations of this state are what those to come are held against. */
+static void run_calm (pw_run *r) {
+  r->before = pw_run_agitation (r);
+  r->calm = fmax (1, r->before);
+}
+
 /* The state is consistent: energies, ledger and statistics begin here. */
 static int run_begin (pw_run *r, pw_error *error) {
   pw_system *s = r->s;
-  r->before = pw_run_agitation (r);
-  r->calm = fmax (1, r->before);
+  run_calm (r);
   r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
   pw_forget_residuals (r);
   pw_note_residuals (r);
@@ -369,10 +374,12 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   r->s->t_signal = NAN;
   run_exchange (r->q, r->q_at, q, n);
   run_exchange (r->v, r->v_at, v, n);
+  r->near = 0;
   status = pw_make_consistent (r, NULL, error);
   if (status == PW_OK) status = run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
+    if (!r->near) run_calm (r); /* near a singular pose they tell nothing */
     r->energy0 += after - before;
     return r->method->restart (r, error);
   }
