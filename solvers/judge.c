@@ -95,7 +95,7 @@ static int judge_contradicts (pw_run *r) {
   if (all.position <= round_off && all.velocity <= round_off) return 0;
   pw_sweep_residuals (r->s, r->active, &enforced);
   double explained = round_off + magnified * fmax (enforced.position, enforced.velocity);
-  return all.position > explained || all.velocity > explained;
+  return !(all.position <= explained && all.velocity <= explained);
 }
 
 int pw_run_judge (pw_run *r, pw_error *error) {

@@ -55,8 +55,10 @@ static int project_others (pw_projector *p, const pw_system *s, const double *g,
   double most = follows;
   p->against = -1;
   if (p->active == NULL || p->alone) return PW_OK;
-  for (int i = 0; i < s->holonomic; i++)
-    if (!p->active[i] && fabs (g[i]) > most * size[i]) most = fabs (g[i]) / size[i], p->against = i;
+  for (int i = 0; i < s->holonomic; i++) {
+    double off = p->active[i] ? 0 : fabs (g[i]) / size[i];
+    if (off > most || isnan (off)) most = off, p->against = i;
+  }
   if (p->against < 0) return PW_OK;
   *row = p->against;
   return PW_RETRY;

@@ -206,7 +206,7 @@ int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
   if (status != PW_OK) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   pw_sweep_J (s);
   pw_sweep_residuals (s, NULL, &before);
-  if (before.position > 8 * DBL_EPSILON || before.velocity > 8 * DBL_EPSILON)
+  if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
     status = start_ways (r, held, &trouble, &freed, error);
   start_report (r, freed, &before);
   if (status == PW_OK) status = start_locked (r, error);
