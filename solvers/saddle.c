@@ -81,10 +81,12 @@ void pw_saddle_set_guard (pw_saddle *k, double guard) {
 }
 
 double pw_saddle_pivot (const pw_saddle *k, int *row) {
-  int place;
-  double pivot = k->pivot, small = k->small && pivot > k->guard ? pw_small_pivot (k->small, &place) : INFINITY;
+  double pivot = k->pivot;
   *row = k->pivot_row < 0 && k->reduce.components ? pw_reduce_weakest (&k->reduce) : k->pivot_row;
-  if (!(small >= pivot)) {
+  if (k->small && pivot > k->guard) {
+    int place;
+    double small = pw_small_pivot (k->small, &place);
+    if (small >= pivot) return sqrt (fmin (pivot, 1));
     pivot = small;
     *row = place < 0 || k->small->row[place] >= k->s->rows ? -1 : k->small->row[place];
   }
