@@ -44,7 +44,7 @@ static double ida_leading (const ida_data *d) {
   return fmax (c, 1 / d->run->s->scale.time);
 }
 
-/* Error weights of the multipliers: by the scale of the forces and rates.
+/* Error weights of the multipliers: by the scale of the forces and rates, times L for moments and what goes with angles.
  *
  * Where they are unknowns the error test does not see them, and a correction of them is as large as one of v or q
  * divided by the step: if J v = eta is solved, the convergence test sees them divided by c.  Where they are rates, it
@@ -57,9 +57,9 @@ static void ida_weigh_multipliers (const ida_data *d, const double *y, double fo
   double relax = impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   for (int i = 0; i < d->rows; i++) {
     double lambda = impulses ? r->lambda[d->tangent.map ? d->tangent.row[i] : i] : y[2 * d->n + i];
-    w[2 * d->n + i] = 1 / (relax * set->rtol * (fabs (lambda) + force));
+    w[2 * d->n + i] = 1 / (relax * set->rtol * (fabs (lambda) + force * d->lever[i]));
   }
-  for (int i = 2 * d->n + d->rows; i < d->size; i++) w[i] = 1 / mu;
+  for (int i = 0, first = 2 * d->n + d->rows; first + i < d->size; i++) w[first + i] = 1 / (mu * d->lever[i]);
 }
 
 /* The scale of forces: that of the masses, else that of the multipliers; 1 where nothing has mass and nothing pulls. */
@@ -115,9 +115,11 @@ static int ida_open_vectors (ida_data *d) {
   d->id = pw_sun_vector (d->size, d->context);
   d->work = pw_sun_vector (s->entries + 1, d->context);
   d->work0 = pw_sun_vector (s->entries + 1, d->context);
-  d->scale = calloc ((size_t)(3 * d->n + 6 + 2 * s->rows), sizeof *d->scale);
+  d->scale = calloc ((size_t)(3 * d->n + 6 + 3 * s->rows), sizeof *d->scale);
   if (!d->y || !d->yp || !d->id || !d->work || !d->work0 || !d->scale) return PW_MACHINE;
   d->given = d->scale + d->n;
+  d->lever = d->given + 2 * d->n + 6 + 2 * s->rows;
+  for (int i = 0; i < d->rows; i++) d->lever[i] = pw_rank_size (s, d->tangent.map ? d->tangent.row[i] : i);
   for (int j = 0; j < d->n; j++) d->scale[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   N_VConst (0, d->work);
   N_VConst (0, d->work0);

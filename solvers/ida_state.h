@@ -25,6 +25,7 @@ struct pw_method_data {
   SUNLinearSolver solver;
   double *scale;        /* D: coords */
   double *given;        /* scratch: 2 (coords + 3) + 2 rows */
+  double *lever;        /* rows: 1 for a force, L for a moment */
   double stop;          /* the stop time IDA knows */
   double begun;         /* time of the start or the last restart */
   pw_statistics before; /* what was counted up to then: IDA counts from there */

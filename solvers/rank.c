@@ -260,8 +260,7 @@ static void rank_row (const pw_system *s, int row, double *f) {
   }
 }
 
-/* 1 for a force, L for a moment: a row without x and y columns. */
-static double rank_size (const pw_system *s, int row) {
+double pw_rank_size (const pw_system *s, int row) {
   for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
     int n = row - k->row;
     if (n < 0 || n >= k->b.count * k->kind->rows) continue;
@@ -346,7 +345,7 @@ void pw_rank_share (pw_run *r, double *lambda) {
     for (int j = 0; j <= i; j++) A[i * k + j] = 0;
   }
   for (int row = 0; row < m; row++) {
-    double size = rank_size (s, row), weight = 1 / (size * size);
+    double size = pw_rank_size (s, row), weight = 1 / (size * size);
     for (int i = 0; i < k; i++) {
       double n = (r->redundant_row[i] == row) - c[i * m + row];
       z[i] -= weight * n * lambda[row];

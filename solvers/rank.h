@@ -38,6 +38,9 @@ double pw_rank_grip (struct pw_run *r);
 /* Saves or loads r->active, which has as many redundant rows as before.  Saddle and method then still have the old one. */
 void pw_rank_carry (struct pw_run *r, pw_archive *a);
 
+/* The unit of a row's multiplier, as J is swept: 1 of a force, L of a moment, which a row without x and y columns has. */
+double pw_rank_size (const pw_system *s, int row);
+
 /* Multipliers of all rows from those of the active ones: the smallest (forces in units of 1, moments of L) with the same
  * J^T lambda.  J must be swept and the run's saddle factorised at the pose. */
 void pw_rank_share (struct pw_run *r, double *lambda);

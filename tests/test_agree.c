@@ -327,11 +327,46 @@ static void test_units (void **state) {
     }
 }
 
+/* The same with moments among the multipliers: two welded bodies swing, one of them a point, in units of 1/1024 m. */
+static double agree_length;
+
+static void agree_swing (pw_model *m, const void *parameters) {
+  const double L = agree_length;
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 0.1 * L * L, .start = { 0.5 * L } });
+  pw_add_body (m, &(pw_body){ .name = "tip", .mass = 0.5, .start = { L, 0.2 * L } });
+  pw_add_pin (m, &(pw_pin){ .name = "pin", .body = { "arm", "ground" }, .at = { { -0.5 * L } } });
+  pw_add_weld (m, &(pw_weld){ .name = "weld", .body = { "arm", "tip" }, .at = { { 0.5 * L }, { 0, -0.2 * L } } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 * L } });
+}
+
+static void test_units_of_moments (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = agree_swing };
+  static const char *const method[] = { "ida+si1", "ida+ggl", "ida+baumgarte" };
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    pw_settings settings = { .rtol = 1e-8, .span = 1 };
+    double q[6], v[6], Q[6], V[6];
+    pw_statistics cost, Cost;
+    agree_length = 1;
+    pw_system *s = scene_system (&table, NULL);
+    agree_length = 1024;
+    pw_system *S = scene_system (&table, NULL);
+    runs_state (s, method[i], &settings, 1, q, v, &cost);
+    runs_state (S, method[i], &settings, 1, Q, V, &Cost);
+    check_close ("angle", Q[2], q[2], 1e-4, "1e4 rtol");
+    check_close ("steps", (double)Cost.steps, (double)cost.steps, 0.1 * (double)cost.steps, "the same to 10 %");
+    pw_free (s);
+    pw_free (S);
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_integrators), cmocka_unit_test (test_ledger),   cmocka_unit_test (test_sampling),
-    cmocka_unit_test (test_dense),       cmocka_unit_test (test_verifier), cmocka_unit_test (test_verifier_notices),
-    cmocka_unit_test (test_units),
+    cmocka_unit_test (test_integrators), cmocka_unit_test (test_ledger),
+    cmocka_unit_test (test_sampling),    cmocka_unit_test (test_dense),
+    cmocka_unit_test (test_verifier),    cmocka_unit_test (test_verifier_notices),
+    cmocka_unit_test (test_units),       cmocka_unit_test (test_units_of_moments),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
