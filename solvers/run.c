@@ -147,15 +147,23 @@ static int run_begin (pw_run *r, pw_error *error) {
   return run_look_ahead (r, error);
 }
 
-/* Accelerations that are not finite at the start are a kind's or a signal's fault, and told as such. */
+/* Accelerations that are not finite at the start are a kind's or a signal's fault, and told as such; or a mass's, which is
+ * too small for its force. */
 static int run_check_finite (pw_run *r, pw_error *error) {
   char element[200];
   double sum = 0;
-  for (int j = 0; j < r->s->coords; j++) sum += fabs (r->a[j]);
+  int wild = -1;
+  for (int j = 0; j < r->s->coords; j++) {
+    sum += fabs (r->a[j]);
+    if (wild < 0 && !isfinite (r->a[j])) wild = j;
+  }
   for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
-  if (isfinite (sum) || pw_place (r->s, r->t, r->q, r->v) != PW_OK || !pw_find_wild (r->s, element, sizeof element))
-    return PW_OK;
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
+  if (isfinite (sum) || pw_place (r->s, r->t, r->q, r->v) != PW_OK) return PW_OK;
+  if (pw_find_wild (r->s, element, sizeof element))
+    return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
+  if (wild < 0) return PW_OK;
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the acceleration of %s is not finite", r->t,
+                  pw_state_name (r->s, wild, element, sizeof element));
 }
 
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {

@@ -145,7 +145,7 @@ static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *tr
 static int start_locked (pw_run *r, pw_error *error) {
   pw_system *s = r->s;
   double given = 0, left = 0;
-  char element[120], text[300] = "";
+  char element[120], before[120] = "", text[300] = "";
   for (int j = 0; j < s->coords; j++) {
     given += s->metric[j] * r->v_given[j] * r->v_given[j];
     left += s->metric[j] * r->v[j] * r->v[j];
@@ -153,7 +153,8 @@ static int start_locked (pw_run *r, pw_error *error) {
   if (s->rows == s->holonomic || given == 0 || left > 1e-20 * given) return PW_OK;
   for (int i = s->holonomic; i < s->rows && strlen (text) < 150; i++) {
     size_t n = strlen (text);
-    snprintf (text + n, sizeof text - n, "%s%s", n ? ", " : "", pw_row_element (s, i, element, sizeof element));
+    if (strcmp (pw_row_element (s, i, element, sizeof element), before) != 0)
+      snprintf (text + n, sizeof text - n, "%s%s", n ? ", " : "", strcpy (before, element));
   }
   return pw_fail (error, PW_START,
                   "model %s: the given rates would have to be removed entirely: %s allow no such motion", s->model,

@@ -77,6 +77,25 @@ static void test_locked_start (void **state) {
   }
 }
 
+/* A body at rest whose wheel, without inertia, is to turn: its two rows are one element. */
+static void locked_spin (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 1, .inertia = 1 });
+  pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "wheel", .body = "cart", .radius = 1, .rate = 1 });
+}
+
+static void test_locked_spin (void **state) {
+  static const pw_plugin_table table = TRIAL_TABLE (locked_spin);
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (
+      &error, PW_START,
+      "model scene: the given rates would have to be removed entirely: rolling-wheel wheel allow no such motion");
+  pw_free (s);
+}
+
 /* Three axles that meet in one point at the start, until the third wheel is steered away. */
 static int locked_steer (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)x, (void)gradient;
@@ -204,8 +223,8 @@ static void test_drives (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_locked), cmocka_unit_test (test_locked_start), cmocka_unit_test (test_locks_in_motion),
-    cmocka_unit_test (test_gap),    cmocka_unit_test (test_drives),
+    cmocka_unit_test (test_locked),          cmocka_unit_test (test_locked_start), cmocka_unit_test (test_locked_spin),
+    cmocka_unit_test (test_locks_in_motion), cmocka_unit_test (test_gap),          cmocka_unit_test (test_drives),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -281,6 +281,24 @@ static void runs_strong (pw_model *m, const void *parameters) {
   pw_add_spring (m, &(pw_spring){ .name = "k", .body = { "a", "ground" }, .stiffness = 1e308 });
 }
 
+/* A mass too small for a force. */
+static void runs_weak (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1 });
+  pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1e-309 });
+  pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "b", "ground" }, .value = { .constant = 1 } });
+}
+
+static void test_weak_start (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_weak };
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (&table, NULL);
+  assert_null (pw_open (s, "rk4", NULL, &error));
+  check_error (&error, PW_METHOD, "t = 0 s: the acceleration of b.phi is not finite");
+  pw_free (s);
+}
+
 static void test_wild_start (void **state) {
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = runs_strong };
   (void)state;
@@ -296,6 +314,7 @@ int main (void) {
     cmocka_unit_test (test_signal_fails),
     cmocka_unit_test (test_wild),
     cmocka_unit_test (test_wild_start),
+    cmocka_unit_test (test_weak_start),
     cmocka_unit_test (test_signal_fails_at_once),
     cmocka_unit_test (test_too_large_a_step),
     cmocka_unit_test (test_massless),
