@@ -120,6 +120,10 @@ static void test_bad_models (void **state) {
 
   cli_write ("lost.c", CLI_MODEL ("  pw_add_wheel (m, &(pw_wheel){ .name = \"A\", .body = \"frame\" });\n  pw_add_body "
                                   "(m, &(pw_body){ .name = \"fram\" });\n"));
+  cli_write ("wish.yaml", "pinwheel: 1\nrun: {method: rk4+projektion}\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n");
+  cli_bad ("pinwheel run @/wish.yaml", 2,
+           "model wish: the method it asks for: integrator rk4 has no stabilisation \"projektion\"; did you mean "
+           "\"projection\"?");
   cli_bad ("pinwheel run @/lost.c", 2, "model lost: wheel A: there is no body \"frame\"; did you mean \"fram\"?");
 
   cli_write ("none.c", "int nothing;\n");

@@ -119,8 +119,8 @@ static void new_print (FILE *f, const char *name, int yaml) {
   const char *title = "a car and its trailer, held together by a pin, each on a knife edge";
   if (yaml) {
     fprintf (f, "# %s: %s.\n#\n", name, title);
-    fprintf (f, "# Try:  pinwheel show ./%s.yaml\n#       pinwheel run ./%s.yaml --set torque=0.15 -o %s.csv\n#\n", name,
-             name, name);
+    fprintf (f, "# Try:  pinwheel show ./%s.yaml\n#       pinwheel run ./%s.yaml --set torque=0.15 -o %s.csv\n#\n",
+             name, name, name);
     fputs (new_yaml, f);
   } else {
     fprintf (f, "/* %s: %s.\n *\n", name, title);

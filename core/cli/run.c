@@ -51,11 +51,22 @@ static int run_open_outputs (run *x, pw_error *error) {
   return (x->csv_output = pw_output_open (x->csv_path, error)) ? PW_OK : error->status;
 }
 
+/* A method nobody has typed is told to be the model's. */
+static int run_own_method (const run *x, pw_error *error) {
+  const pw_method *method;
+  int stabilisation;
+  pw_error why = { 0 };
+  int status = pw_parse_method (x->method, &method, &stabilisation, &why);
+  if (status == PW_OK) return PW_OK;
+  return pw_fail (error, status, "model %s: the method it asks for: %s", pw_file_name (x->m.file), why.text);
+}
+
 static int run_settle (run *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   int status = pw_cli_settle (&x->wishes, &d, &x->t_end, &x->settings, error);
   if (status == PW_OK) status = pw_cli_number ("--every", x->every_text, PW_POSITIVE, &x->every, error);
   x->method = x->wishes.method ? x->wishes.method : d.method;
+  if (status == PW_OK && x->wishes.method == NULL) status = run_own_method (x, error);
   x->settings.ledger = x->energy || x->plots_path || x->animate_path;
   return status;
 }

@@ -17,6 +17,7 @@ static int read_unknown (const pw_expression_scope *x, const char *name, size_t 
   for (int i = 0; i < x->names; i++) pw_nearest_try (&near, x->name[i]);
   for (const pw_expression_constant *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
   for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
+  if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, a name in some expressions only */
   return pw_expression_wrong (trouble, at, "there is no \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
 }
 
