@@ -13,8 +13,8 @@ static void told_shows (const char *text) {
 static void test_roller (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --energy"), 0);
-  told_shows ("\n  left.spin            2.5 rad,  left.spin_rate              5 rad/s\n");
-  told_shows ("\n  right.spin           3.75 rad,  right.spin_rate            7.5 rad/s\n");
+  told_shows ("\n  left.spin                  2.5 rad   left.spin_rate               5 rad/s\n");
+  told_shows ("\n  right.spin                3.75 rad   right.spin_rate            7.5 rad/s\n");
   told_shows ("\n  energy\n  kinetic ");
   told_shows ("\n  dissipated                0 J\n");
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --json @/roller.json"), 0);
