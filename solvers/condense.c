@@ -296,6 +296,25 @@ static void condense_fill_rows (pw_plan *c, int rows) {
       k->extra[extra++] = (pw_extra){ c->node[n].y, c->node[n].gamma, c->node[n].lambda };
 }
 
+/* 1 if most nodes are pins between bodies that are held by two pins alone: chains take less in the way of large scenes. */
+static int condense_is_chain (const pw_plan *c) {
+  unsigned char links[PW_SMALL] = { 0 };
+  int inner = 0;
+  for (int n = 0; n < c->k->s->bodies; n++) {
+    const int *list = c->list + c->start[3 * n];
+    if (c->start[3 * n + 1] - c->start[3 * n] != 2 || !c->piece[list[0]].unit || !c->piece[list[1]].unit) continue;
+    for (int x = 0; x < 2; x++) inner += links[c->node_of[list[x]]]++;
+  }
+  return 2 * inner > c->nodes;
+}
+
+/* The condensed matrix is kept dense where few rows meet often. */
+static int condense_is_small (const pw_plan *c) {
+  const struct pw_saddle *k = c->k;
+  if (k->unknowns > PW_SMALL_MOST || k->s->coords > CONDENSE_SMALL_COORDS) return 0;
+  return k->unknowns <= PW_SMALL_UNROLLED || !condense_is_chain (c);
+}
+
 static int condense_lay_out (pw_plan *c, const double *weight, int rows) {
   struct pw_saddle *k = c->k;
   for (int n = 0; n < c->nodes; n++) {
@@ -304,7 +323,7 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows) {
   }
   for (int i = 0; i < rows; i++) k->idles += k->reduce.component_of_row[i] < 0;
   k->idles -= k->unknowns - k->extras;
-  int is_small = k->unknowns <= PW_SMALL_MOST && k->s->coords <= CONDENSE_SMALL_COORDS;
+  int is_small = condense_is_small (c);
   if (!is_small && condense_keep (c) != PW_OK) return PW_MACHINE;
   k->more = k->extras + 3 * c->keeps;
   pw_layout l = { NULL, 0 };

@@ -301,10 +301,11 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   if (finite && rk_reached_singular (r)) return pw_fail_singular (r, r->t, error);
   if (!finite && h < 1e-12 * fabs (r->t))
     return pw_fail (error, PW_METHOD, "t = %.6g s: the state is not finite behind it, however small the step", r->t);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: the %s", r->t, h,
-                  !finite            ? "state is no longer finite"
-                  : r->data->minimal ? "velocities' basis does not last"
-                                     : "projection does not converge");
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", r->t, h,
+                  !finite             ? "the state is no longer finite"
+                  : r->data->minimal  ? "the velocities' basis does not last"
+                  : r->data->projects ? "the projection does not converge"
+                                      : "a stage of it lands in a singular pose");
 }
 
 void pw_rk_revert (pw_run *r) {

@@ -7,7 +7,7 @@
 #ifndef PW_SMALL_H
 #define PW_SMALL_H
 
-enum { PW_SMALL = 24 };
+enum { PW_SMALL = 24, PW_SMALL_UNROLLED = 8 }; /* rows; up to the latter in straight code */
 
 /* The most rows of a small scene; with 0, for tests, all are large ones. */
 #ifndef PW_SMALL_MOST
