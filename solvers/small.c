@@ -9,107 +9,10 @@
  * and compiled for each, so that their loops vanish. */
 #include "skyline.h"
 #include "small.h"
+#include "small_shapes.h"
 #include "unroll.h"
 
 PW_ONE_BY_ONE
-
-/* ---- Planning ---- */
-
-static int small_bits (unsigned long long x) {
-  int n = 0;
-  for (; x; x &= x - 1) n++;
-  return n;
-}
-
-/* Next is always the node that begins fewest panels and shares most with those before it. */
-void pw_small_order (int nodes, const unsigned long long *touched, int *order) {
-  unsigned long long begun = 0;
-  unsigned done = 0;
-  for (int i = 0; i < nodes; i++) {
-    int best = -1, least = 0;
-    for (int n = 0; n < nodes; n++) {
-      int cost = small_bits (touched[n] & ~begun) - small_bits (touched[n] & begun);
-      if ((done >> n & 1) == 0 && (best < 0 || cost < least)) best = n, least = cost;
-    }
-    order[i] = best;
-    done |= 1U << best;
-    begun |= touched[best];
-  }
-}
-
-/* ---- Shapes of panels ---- */
-
-/* An octal digit for each row tells which of the body's columns it has: 7 all three; 5 x and the angle, 6 y and the angle:
- * the two rows of a unit matrix and an angle.  These are compiled apart: first what has most zeros. */
-#define SMALL_SHAPES                      \
-  SMALL_SHAPE (0756) /* a wheel, a pin */ \
-  SMALL_SHAPE (0567)                      \
-  SMALL_SHAPE (056)                       \
-  SMALL_SHAPE (07)                        \
-  SMALL_SHAPE (05656)                     \
-  SMALL_SHAPE (056756)                    \
-  SMALL_SHAPE (077)                       \
-  SMALL_SHAPE (0777)                      \
-  SMALL_SHAPE (07777)
-
-PW_INLINE int small_rows (unsigned shape) {
-  return shape < 010 ? 1 : shape < 0100 ? 2 : shape < 01000 ? 3 : shape < 010000 ? 4 : 5;
-}
-
-/* The columns of row r of a shape, as bits. */
-PW_INLINE unsigned small_columns (unsigned shape, int r) {
-  return shape >> 3 * (small_rows (shape) - 1 - r) & 7;
-}
-
-/* 1 if a panel's rows have no columns that those of the shape do not have. */
-static int small_fits (const pw_panel *p, unsigned shape) {
-  if (p->rows != small_rows (shape)) return 0;
-  for (int r = 0; r < p->rows; r++)
-    if (p->columns[r] & ~small_columns (shape, r)) return 0;
-  return 1;
-}
-
-static unsigned small_shape (const pw_panel *p) {
-#define SMALL_SHAPE(shape) \
-  if (p->width == 3 && small_fits (p, shape)) return shape;
-  SMALL_SHAPES
-#undef SMALL_SHAPE
-  return 0;
-}
-
-void pw_small_add_rows (pw_small *k, pw_panel *p, int first, int rows, const double *J, int step, int unit) {
-  static const double zero[3] = { 0, 0, 0 };
-  pw_panel was = *p;
-  int from = was.rows > 0 && was.first < first ? was.first : first;
-  int end = was.rows > 0 && was.first + was.rows > first + rows ? was.first + was.rows : first + rows;
-  for (int i = from; i < end; i++) {
-    int old = i - was.first, new = i - first;
-    if (new >= 0 && new < rows) {
-      p->J[i - from] = J + new *step;
-      p->columns[i - from] = (unsigned char)(!unit ? 7 : new == 0 ? 5 : 6);
-    } else {
-      p->J[i - from] = old >= 0 && old < was.rows ? was.J[old] : zero;
-      p->columns[i - from] = old >= 0 && old < was.rows ? was.columns[old] : 0;
-    }
-  }
-  p->first = from;
-  p->rows = end - from;
-  p->S = k->S + from * (k->n + 1);
-  p->y = k->y + from;
-}
-
-void pw_small_close_panel (pw_panel *p) {
-  int rows = 0;
-  p->shape = small_shape (p);
-  for (int r = 0; r < p->rows; r++) {
-    if (p->columns[r] == 0 && p->shape == 0) continue;
-    p->J[rows] = p->J[r];
-    p->columns[rows] = p->columns[r];
-    p->at[rows++] = (unsigned char)r;
-  }
-  p->gaps = rows < p->rows;
-  p->rows = rows;
-}
 
 /* ---- Panels of 3 columns, the shape a constant ---- */
 

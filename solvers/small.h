@@ -40,19 +40,6 @@ typedef struct {
   int low;                       /* 1: one was not above PW_SMALL_WATCH of it, so that it is worth asking */
 } pw_small;
 
-/* ---- Planning ---- */
-
-/* An order of at most PW_SMALL nodes in which those that touch the same panel (a bit of `touched`) are near each
- * other. */
-void pw_small_order (int nodes, const unsigned long long *touched, int *order);
-
-/* Adds rows to a panel, whose position `first` is the first one's: their first column is at J, the next row `step`
- * further on.  unit: they are two, and their x and y columns a multiple of the unit matrix. */
-void pw_small_add_rows (pw_small *k, pw_panel *p, int first, int rows, const double *J, int step, int unit);
-
-/* After the last rows. */
-void pw_small_close_panel (pw_panel *p);
-
 /* ---- Factorising and solving ---- */
 
 /* S = J W^-1 J^T = L D L^T.  Returns 0 if a pivot is not above the guard: singular. */
