@@ -1,65 +1,13 @@
-/* A run: opened on a consistent start, advanced step by step, looked into, closed. */
+/* A run: advanced step by step, looked into, put into another state, closed. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "method.h"
-#include "methods.h"
+#include "run_parts.h"
 #include "util.h"
 
-#define RUN_LEAST_RTOL (100 * DBL_EPSILON)
-
-static int run_settings (pw_settings *to, const pw_settings *from, const pw_method *method, pw_error *error) {
-  const struct {
-    const char *name;
-    double value;
-  } field[] = { { "step", from->step }, { "rtol", from->rtol }, { "atol", from->atol }, { "span", from->span } };
-  for (size_t i = 0; i < sizeof field / sizeof *field; i++)
-    if (!isfinite (field[i].value) || field[i].value < 0)
-      return pw_fail (error, PW_INPUT, "setting %s = %g: expected a number > 0", field[i].name, field[i].value);
-  if (method->adaptive && from->rtol > 0 && from->rtol < RUN_LEAST_RTOL)
-    return pw_fail (error, PW_INPUT, "setting rtol = %g: round-off allows no less than %.2g", from->rtol,
-                    RUN_LEAST_RTOL);
-  if (method->adaptive && from->rtol >= 1)
-    return pw_fail (error, PW_INPUT, "setting rtol = %g: expected a part of each state, less than 1", from->rtol);
-  if (!isfinite (from->t)) return pw_fail (error, PW_INPUT, "setting t = %g: expected a finite number", from->t);
-  *to = *from;
-  if (to->step == 0) to->step = 1e-3;
-  if (to->rtol == 0) to->rtol = 1e-6;
-  if (to->span == 0) to->span = method->adaptive ? 1 : 1000 * to->step;
-  return PW_OK;
-}
-
-static int run_allocate (pw_run *r) {
-  const pw_system *s = r->s;
-  size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
-  const pw_array array[] = {
-    { &r->q, 3 * n + rows },    { &r->ledger, entries },           { &r->rate, entries }, { &r->q_at, 3 * n + rows },
-    { &r->ledger_at, entries }, { &r->scratch, 2 * n + 3 * rows }, { &r->q_given, n },    { &r->v_given, n },
-  };
-  r->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (r->memory == NULL) return PW_MACHINE;
-  r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
-  r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
-  memcpy (r->q, s->q0, (size_t)s->coords * sizeof (double));
-  memcpy (r->v, s->v0, (size_t)s->coords * sizeof (double));
-  return PW_OK;
-}
-
-/* T: the fastest of what the scene starts with, and its span. */
-static double run_time_scale (const pw_run *r) {
-  const pw_system *s = r->s;
-  double fastest = 1 / r->settings.span;
-  for (int j = 0; j < s->coords; j++) {
-    double unit = pw_unit (s, j);
-    fastest = fmax (fastest, fmax (fabs (r->v[j]) / unit, sqrt (fabs (r->a[j]) / unit)));
-  }
-  return 1 / fastest;
-}
-
-/* Where a signal failed in the step tried last, this adds which one, whatever the method makes of it. */
-static int run_blame (const pw_run *r, int status, pw_error *error) {
+int pw_run_blame (const pw_run *r, int status, pw_error *error) {
   char signal[160];
   if (status == PW_OK || error == NULL || *pw_failed_signal (r->s, signal, sizeof signal) == 0) return status;
   size_t n = strlen (error->text);
@@ -68,14 +16,13 @@ static int run_blame (const pw_run *r, int status, pw_error *error) {
   return status;
 }
 
-static int run_open_saddle (pw_run *r, pw_error *error) {
+int pw_run_open_saddle (pw_run *r, pw_error *error) {
   pw_saddle_close (r->saddle);
   r->saddle = pw_saddle_open (r->s, r->s->mass, r->s->rows, r->active, error);
   return r->saddle ? PW_OK : error ? error->status : PW_MACHINE;
 }
 
-/* Accelerations, multipliers and the ledger's rates of the state reached, anew; says why if that fails. */
-static int run_evaluate (pw_run *r, pw_error *error) {
+int pw_run_evaluate (pw_run *r, pw_error *error) {
   int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   if (status > 0) return pw_fail_singular (r, r->t, error);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
@@ -83,8 +30,7 @@ static int run_evaluate (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-/* What near a singular pose means: a small part of the pivot at a good one. */
-static void run_watch (pw_run *r) {
+void pw_run_watch (pw_run *r) {
   int row;
   r->watch = 0.02 * pw_saddle_pivot (r->saddle, &row);
   r->guard = fmin (1e-6, r->watch);
@@ -94,31 +40,7 @@ static void run_watch (pw_run *r) {
   r->reselect = fmin (0.6 * r->grip, 0.7);
 }
 
-/* Of a dependent row round-off leaves a pivot of 1e-8, and of 1e-5 behind others that hardly differ among themselves: as
- * large a one is looked into by a means that can tell, if the scene is small enough for it. */
-#define RUN_DEPENDENT 1e-5
-#define RUN_SUSPECT 1e-3
-
-/* Opens the saddle at the consistent start and evaluates the accelerations there; if some rows hardly differ from
- * others, an independent set is chosen first. */
-static int run_first_evaluation (pw_run *r, pw_error *error) {
-  int row, status = run_open_saddle (r, error);
-  if (status != PW_OK) return status;
-  double pivot = pw_saddle_factor (r->saddle) == PW_OK ? pw_saddle_pivot (r->saddle, &row) : 0;
-  int large = (double)r->s->rows * r->s->coords > PW_RANK_MOST;
-  if (pivot < (large ? RUN_DEPENDENT : RUN_SUSPECT)) {
-    if (large) return pw_fail_singular (r, r->t, error);
-    int chosen = pw_rank_choose (r, error);
-    if (chosen == PW_OK && r->redundant) chosen = run_open_saddle (r, error);
-    if (chosen != PW_OK) return chosen;
-  }
-  status = run_evaluate (r, error);
-  if (status == PW_OK) run_watch (r);
-  return status;
-}
-
-/* Finds the next discontinuity behind the state reached. */
-static int run_look_ahead (pw_run *r, pw_error *error) {
+int pw_run_look_ahead (pw_run *r, pw_error *error) {
   char signal[160];
   double next = pw_next_breakpoint (r->s, r->t);
   if (!isnan (next)) {
@@ -131,82 +53,9 @@ static int run_look_ahead (pw_run *r, pw_error *error) {
                   signal);
 }
 
-/* The accelerations of this state are what those to come are held against. */
-static void run_calm (pw_run *r) {
+void pw_run_calm (pw_run *r) {
   r->before = pw_run_agitation (r);
   r->calm = fmax (1, r->before);
-}
-
-/* The state is consistent: energies, ledger and statistics begin here. */
-static int run_begin (pw_run *r, pw_error *error) {
-  pw_system *s = r->s;
-  run_calm (r);
-  r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
-  pw_forget_residuals (r);
-  pw_note_residuals (r);
-  return run_look_ahead (r, error);
-}
-
-/* Accelerations that are not finite at the start are a kind's or a signal's fault, and told as such; or a mass's, which is
- * too small for its force. */
-static int run_check_finite (pw_run *r, pw_error *error) {
-  char element[200];
-  double sum = 0;
-  int wild = -1;
-  for (int j = 0; j < r->s->coords; j++) {
-    sum += fabs (r->a[j]);
-    if (wild < 0 && !isfinite (r->a[j])) wild = j;
-  }
-  for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
-  if (isfinite (sum) || pw_place (r->s, r->t, r->q, r->v) != PW_OK) return PW_OK;
-  if (pw_find_wild (r->s, element, sizeof element))
-    return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
-  if (wild < 0) return PW_OK;
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the acceleration of %s is not finite", r->t,
-                  pw_state_name (r->s, wild, element, sizeof element));
-}
-
-static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
-  pw_settings none = { 0 };
-  r->s->failed = NULL;
-  if (pw_parse_options (method, &r->method, &r->stabilisation, r->option, error) != PW_OK) return PW_INPUT;
-  int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
-  if (status == PW_OK && run_allocate (r) != PW_OK)
-    status = pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  if (status != PW_OK) return status;
-  r->t = r->t_at = r->settings.t;
-  pw_hold (r->s, 0);
-  r->s->scale.time = r->settings.span;
-  status = pw_make_consistent (r, r->s->held, error);
-  if (status == PW_OK) status = run_first_evaluation (r, error);
-  if (status == PW_OK) status = run_check_finite (r, error);
-  if (status != PW_OK) return status;
-  r->s->scale.time = run_time_scale (r);
-  pw_count_moved (r);
-  status = run_begin (r, error);
-  return status == PW_OK ? r->method->open (r, error) : status;
-}
-
-/* A run that has the system to itself: two would move the poses under each other's feet. */
-static pw_run *run_take (pw_system *s, pw_error *error) {
-  pw_run *r = NULL;
-  if (pw_require (s, "a system", error) != PW_OK) return NULL;
-  if (s->taken)
-    pw_fail (error, PW_INPUT, "model %s: a run is open on this system already: close that, or compile the model again",
-             s->model);
-  else if ((r = calloc (1, sizeof *r)) == NULL)
-    pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  else
-    s->taken = 1, r->s = s;
-  return r;
-}
-
-pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
-  pw_run *r = run_take (s, error);
-  if (r == NULL) return NULL;
-  if (run_blame (r, run_open (r, method, settings, error), error) == PW_OK) return r;
-  pw_close (r);
-  return NULL;
 }
 
 static void run_drop_method (pw_run *r) {
@@ -226,17 +75,17 @@ void pw_close (pw_run *r) {
 
 /* Behind a discontinuity the accelerations are others, and a method starts anew. */
 static int run_pass_breakpoint (pw_run *r, pw_error *error) {
-  int status = run_look_ahead (r, error);
-  if (status == PW_OK) status = run_evaluate (r, error);
+  int status = pw_run_look_ahead (r, error);
+  if (status == PW_OK) status = pw_run_evaluate (r, error);
   return status == PW_OK ? r->method->restart (r, error) : status;
 }
 
 int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
-  int status = run_open_saddle (r, error);
-  if (status == PW_OK) status = run_evaluate (r, error);
+  int status = pw_run_open_saddle (r, error);
+  if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status != PW_OK && status != PW_MACHINE) return status;
   if (status == PW_OK && fresh)
-    run_watch (r);
+    pw_run_watch (r);
   else if (status == PW_OK)
     pw_saddle_set_guard (r->saddle, r->guard);
   run_drop_method (r);
@@ -292,7 +141,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_OK) status = pw_run_judge (r, error);
   if (status == PW_OK) status = run_check_progress (r, before, error);
-  if (status != PW_OK) return run_blame (r, status, error);
+  if (status != PW_OK) return pw_run_blame (r, status, error);
   if (r->redundant == 0) return PW_OK;
   r->grip = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_grip (r) : 0;
   return PW_OK;
@@ -377,23 +226,23 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (run_is_lost (r, error)) return PW_MACHINE;
   if (run_check_state (r, q, 0, error) != PW_OK || run_check_state (r, v, 1, error) != PW_OK) return PW_INPUT;
   int status = run_energy (r, &before, error);
-  if (status == PW_OK) status = run_look_ahead (r, error);
+  if (status == PW_OK) status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
   r->s->t_signal = NAN;
   run_exchange (r->q, r->q_at, q, n);
   run_exchange (r->v, r->v_at, v, n);
   r->near = 0;
   status = pw_make_consistent (r, NULL, error);
-  if (status == PW_OK) status = run_evaluate (r, error);
+  if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
-    if (!r->near) run_calm (r); /* near a singular pose they tell nothing */
+    if (!r->near) pw_run_calm (r); /* near a singular pose they tell nothing */
     r->energy0 += after - before;
     return r->method->restart (r, error);
   }
   memcpy (r->q, r->q_at, (size_t)n * sizeof (double));
   memcpy (r->v, r->v_at, (size_t)n * sizeof (double));
-  run_evaluate (r, NULL);
+  pw_run_evaluate (r, NULL);
   return status;
 }
 
