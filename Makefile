@@ -193,7 +193,7 @@ $(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
 # A link: $(BUILD)/pinwheel finds models/, too, and a file that is reached twice counts once.  Nor may a model be found as the
 # C it was before.
 $(BUILD)/models/%.yaml: models/%.yaml
-	@mkdir -p $(@D) && rm -f $(@:.yaml=.so) && ln -sf $(abspath $<) $@
+	@mkdir -p $(@D) && rm -f $(@:.yaml=.so) && ln -sf "$(CURDIR)/$<" $@
 
 HOUSE_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
@@ -362,8 +362,12 @@ format-check:
 
 # ---- Installing ----
 
-D := $(DESTDIR)$(PREFIX)
-MAN := docs/pinwheel.1 docs/pinwheel-model.5
+# Paths may contain spaces: they are quoted everywhere, and never elements of a list.
+D    := $(DESTDIR)$(PREFIX)
+MAN  := docs/pinwheel.1 docs/pinwheel-model.5
+DOCS := README.md $(wildcard docs/*.md) docs/CITATION.cff
+FIGURES  := $(wildcard docs/figures/*)
+EXAMPLES := docs/embed.c $(wildcard models/*.c) core/kinds/torque.c core/kinds/wheel.c core/kinds/rolling_wheel.c
 
 define PKGCONFIG
 prefix=$(PREFIX)
@@ -374,29 +378,38 @@ modelsdir=$${libdir}/pinwheel/models
 Name: pinwheel
 Description: planar multibody systems with pin joints and knife-edge wheels
 Version: $(VERSION)
-Cflags: -I$${includedir}
-Libs: -L$${libdir} -lpinwheel-files -lpinwheel
+Cflags: -I"$${includedir}"
+Libs: -L"$${libdir}" -lpinwheel-files -lpinwheel
 Libs.private: $(FILES_LIBS) $(SOLVER_LIBS)
 endef
 export PKGCONFIG
 
-install: all
-	install -d $(D)/bin $(D)/lib/pinwheel/models $(D)/lib/pkgconfig $(D)/include/pinwheel $(D)/share/man/man1 $(D)/share/man/man5
-	install $(PROGRAM) $(D)/bin
-	for l in libpinwheel libpinwheel-files; do \
-	  install $(BUILD)/$$l.so.$(ABI) $(D)/lib && ln -sf $$l.so.$(ABI) $(D)/lib/$$l.so && \
-	  install -m 644 $(BUILD)/$$l.a $(D)/lib || exit 1; done
-	install -m 644 $(HEADERS) $(D)/include/pinwheel
-	install -m 644 $(PLUGINS) $(D)/lib/pinwheel/models
-	for m in $(MAN); do install -m 644 $$m $(D)/share/man/man$${m##*.} || exit 1; done
-	echo "$$PKGCONFIG" >$(D)/lib/pkgconfig/pinwheel.pc
+share := share/doc/pinwheel
 
-# What install put there, and the folders of its own; what somebody else put into these stays.
+install: all
+	install -d "$(D)/bin" "$(D)/lib/pinwheel/models" "$(D)/lib/pkgconfig" "$(D)/include/pinwheel" "$(D)/share/man/man1" \
+	  "$(D)/share/man/man5" "$(D)/$(share)/docs/figures" "$(D)/$(share)/examples"
+	install $(PROGRAM) "$(D)/bin"
+	for l in libpinwheel libpinwheel-files; do \
+	  install $(BUILD)/$$l.so.$(ABI) "$(D)/lib" && ln -sf $$l.so.$(ABI) "$(D)/lib/$$l.so" && \
+	  install -m 644 $(BUILD)/$$l.a "$(D)/lib" || exit 1; done
+	install -m 644 $(HEADERS) "$(D)/include/pinwheel"
+	install -m 644 $(PLUGINS) "$(D)/lib/pinwheel/models"
+	for m in $(MAN); do install -m 644 $$m "$(D)/share/man/man$${m##*.}" || exit 1; done
+	echo "$$PKGCONFIG" >"$(D)/lib/pkgconfig/pinwheel.pc"
+	install -m 644 README.md "$(D)/$(share)"
+	install -m 644 $(filter docs/%,$(DOCS)) "$(D)/$(share)/docs"
+	install -m 644 $(FIGURES) "$(D)/$(share)/docs/figures"
+	install -m 644 $(EXAMPLES) "$(D)/$(share)/examples"
+
+# Removes what install put there and the directories that only Pinwheel uses, if they are empty.
 uninstall:
-	rm -f $(D)/bin/pinwheel $(D)/lib/libpinwheel.* $(D)/lib/libpinwheel-files.* $(D)/lib/pkgconfig/pinwheel.pc
-	rm -f $(addprefix $(D)/include/pinwheel/,$(notdir $(HEADERS))) $(addprefix $(D)/lib/pinwheel/models/,$(notdir $(PLUGINS)))
-	for m in $(notdir $(MAN)); do rm -f $(D)/share/man/man$${m##*.}/$$m; done
-	rmdir $(D)/include/pinwheel $(D)/lib/pinwheel/models $(D)/lib/pinwheel 2>/dev/null || true
+	[ ! -d "$(D)" ] || { cd "$(D)" && rm -f bin/pinwheel lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc \
+	  $(addprefix include/pinwheel/,$(notdir $(HEADERS))) $(addprefix lib/pinwheel/models/,$(notdir $(PLUGINS))) \
+	  $(foreach m,$(MAN),share/man/man$(subst .,,$(suffix $(m)))/$(notdir $(m))) \
+	  $(addprefix $(share)/,$(DOCS) $(FIGURES)) $(addprefix $(share)/examples/,$(notdir $(EXAMPLES))) && \
+	  { rmdir include/pinwheel lib/pinwheel/models lib/pinwheel $(share)/docs/figures $(share)/docs $(share)/examples \
+	    $(share) 2>/dev/null || true; }; }
 
 clean:
 	rm -rf $(BUILD)

@@ -1,7 +1,9 @@
 /* Pinwheel inside a program of your own.  From the source tree, after `make`:
  *     cc -std=c11 -Ibuild/include docs/embed.c -o embed -Lbuild -lpinwheel-files -lpinwheel -Wl,-rpath,$PWD/build -lm
  * with an installed Pinwheel:
- *     cc -std=c11 docs/embed.c -o embed $(pkg-config --cflags --libs pinwheel) -lm */
+ *     cc -std=c11 embed.c -o embed $(pkg-config --cflags --libs pinwheel) -lm
+ * and, if its prefix is a private one, with PKG_CONFIG_PATH=PREFIX/lib/pkgconfig in the environment and at the end
+ *     -Wl,-rpath,"$(pkg-config --variable=libdir pinwheel)" */
 #include <math.h>
 #include <stdio.h>
 #include "pinwheel-files.h"

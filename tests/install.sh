@@ -5,11 +5,14 @@
 build=${BUILD:-build} cc=${CC:-cc}
 . "$(dirname "$0")/report.sh"
 
-destination=$work/root prefix=/opt/pinwheel
+# The paths contain spaces; "my" is what a list of words would make of "my pinwheel".
+destination="$work/a root" prefix='/opt/my pinwheel'
 top=$destination$prefix
-install="make -s --no-print-directory NO_DEPS=1 BUILD=$build DESTDIR=$destination PREFIX=$prefix"
+install () { make -s --no-print-directory NO_DEPS=1 BUILD="$build" DESTDIR="$destination" PREFIX="$prefix" "$1"; }
+mkdir -p "$destination/opt/my" "$top/lib"
+touch "$destination/opt/my/other" "$top/lib/other"
 
-$install install >"$work/log" 2>&1
+install install >"$work/log" 2>&1
 report 'install' $?
 
 # What is there is found without the build: from another folder, with the search path empty.
@@ -37,11 +40,12 @@ report 'a model as text' $?
 cd - >/dev/null || exit 1
 if command -v pkg-config >/dev/null; then
   export PKG_CONFIG_PATH="$top/lib/pkgconfig"
-  flags=$(pkg-config --define-variable=prefix="$top" --cflags --libs pinwheel 2>"$work/log")
-  report 'pkg-config knows it' $?
-  $cc -std=c11 docs/embed.c -o "$work/embed" $flags -Wl,-rpath,"$top/lib" -lm >"$work/log" 2>&1 &&
-    (cd "$work" && ./embed) >"$work/log" 2>&1
-  report 'a program that embeds it' $?
+  cp "$top/share/doc/pinwheel/examples/embed.c" "$work"
+  # The recipe as the file has it, for a prefix that is where pkg-config says.
+  sed -i "s|^prefix=.*|prefix=$top|" "$top/lib/pkgconfig/pinwheel.pc"
+  (cd "$work" && eval "$cc -std=c11 embed.c -o embed $(pkg-config --cflags --libs pinwheel) -lm \
+    -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./embed) >"$work/log" 2>&1
+  report 'a program that embeds it, by the recipe in embed.c' $?
   [ "$(pkg-config --modversion pinwheel)" = "$("$top/bin/pinwheel" --version | cut -d' ' -f2)" ] &&
     grep -q "^version: $(pkg-config --modversion pinwheel)\$" docs/CITATION.cff
   report 'one version everywhere' $?
@@ -92,9 +96,16 @@ if command -v mandoc >/dev/null; then
   report 'the pages are well formed' $?
 fi
 
-$install uninstall >"$work/log" 2>&1
-find "$destination" ! -type d >"$work/log"
-[ ! -s "$work/log" ]
-report 'uninstall leaves nothing' $?
+"$top/bin/pinwheel" check "$top/share/doc/pinwheel/examples/elliptic-wire.c" >"$work/log" 2>&1
+report 'an installed example with element types of its own' $?
+
+install uninstall >"$work/log" 2>&1
+find "$destination" ! -type d | LC_ALL=C sort >"$work/log"
+[ "$(cat "$work/log")" = "$top/lib/other
+$destination/opt/my/other" ] && [ ! -e "$top/share/doc/pinwheel" ] && [ ! -e "$top/include/pinwheel" ]
+report 'uninstall leaves nothing and removes nothing else' $?
+
+install uninstall >"$work/log" 2>&1 && rm -rf "$destination" && install uninstall >"$work/log" 2>&1
+report 'uninstalling twice' $?
 
 exit $bad
