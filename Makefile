@@ -79,7 +79,7 @@ FUZZ_SHARE := tests/fuzz/fuzz.c $(if $(FUZZING),,tests/fuzz/replay.c)
 FUZZ       := $(filter-out tests/fuzz/fuzz.c tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 FUZZERS    := $(FUZZ:tests/fuzz/%.c=$(BUILD)/fuzz/%)
 
-.PHONY: all everything demo test test-all layers san tsan valgrind fuzz fuzzers cov clang gcc format format-check bench bench-quick bench-engine \
+.PHONY: all everything demo test test-all layers san tsan valgrind fuzz fuzzers mutants cov clang gcc format format-check bench bench-quick bench-engine \
         bench-effects hard basic deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -101,6 +101,7 @@ help:
 	@echo 'make layers           proof of what depends on what'
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
 	@echo 'make fuzz TIME=60     models, expressions, tables, checkpoints, command lines from a fuzzer, so many seconds each'
+	@echo 'make mutants TIME=7200   one small change at a time to the sources; lists those that no test notices; resumes'
 	@echo 'make cov              lines that the tests run, and those they do not'
 	@echo 'make tsan             runs in many threads with ThreadSanitizer; valgrind: some tests with memcheck'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
@@ -112,7 +113,7 @@ help:
 
 # ---- Dependencies: whoever asks to see something run gets the libraries first ----
 
-ifneq ($(filter demo test test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz,$(MAKECMDGOALS)),)
+ifneq ($(filter demo test test-all layers bench bench-quick bench-engine bench-effects hard san cov fuzz mutants,$(MAKECMDGOALS)),)
 ifndef NO_DEPS
 FIRST := deps
 endif
@@ -308,6 +309,11 @@ fuzz: $(FIRST)
 
 fuzzers: LDFLAGS += -fsanitize=fuzzer
 fuzzers: $(FUZZERS)
+
+# Not part of `make test`; TIME as for fuzzing.
+mutants: $(FIRST)
+	@mkdir -p $(VARIANT)/mutants
+	@python3 tests/mutants/run.py $(if $(filter command line,$(origin TIME)),--time $(TIME)) $(if $(ONLY),--only '$(ONLY)') $(VARIANT)/mutants
 
 # Lines of core/ and solvers/ that tests run; the old counts go first.
 cov:

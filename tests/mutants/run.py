@@ -1,0 +1,194 @@
+#!/usr/bin/env python3
+"""Mutation testing: applies one mutation at a time to a copy of the sources, builds, runs tests and lists the survivors.
+
+    run.py [--time SECONDS] [--only WORD] BUILD
+
+The file `list` beside this one has a line for each mutation:
+
+    FUNCTION | EXPRESSION => REPLACEMENT | TEST...
+    FUNCTION | EXPRESSION => REPLACEMENT | equivalent: REASON
+
+FUNCTION is the name of a function, table or macro of core/, solvers/ or models/; EXPRESSION must occur in it exactly once
+(white space is ignored).  A mutation that does not apply is an error.  The TESTs named run first; if they all pass, every
+quick test runs.  Mutants that are equivalent to the original for the stated reason are listed but not run.
+
+Verdicts are kept in BUILD/results while the sources stay the same, so an interrupted run continues.  The exit status is 0
+if no mutant survived, 1 if one did or does not apply, 3 if the time was not sufficient for all.
+"""
+import argparse, hashlib, os, re, shutil, subprocess, sys, time
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+TOP = os.path.dirname(os.path.dirname(HERE))
+ROOTS = ("core/", "solvers/", "models/")
+TEST_LIMIT = 240  # seconds for a test program; the slowest takes about 20 without a mutation
+
+
+def sources():
+    out = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=TOP, capture_output=True, text=True, check=True)
+    return [f for f in out.stdout.splitlines() if os.path.isfile(os.path.join(TOP, f))]
+
+
+def definitions(text):
+    """(name-bearing header, start, end) of each definition at file level and of each macro."""
+    lines, start, header = text.splitlines(keepends=True), None, ""
+    position = 0
+    macro = None
+    for line in lines:
+        end = position + len(line)
+        if macro is not None or line.startswith("#define"):
+            if macro is None:
+                macro = position
+            if not line.rstrip().endswith("\\"):
+                yield text[macro:end].split("(")[0].replace("#define", ""), macro, end
+                macro = None
+        elif start is None and re.match(r"[A-Za-z_]", line):
+            start = position
+            if ";" in line and "{" not in line:
+                yield line, start, end
+                start = None
+        if start is not None and (line.startswith("}") or ("{" in line and "}" in line and text.startswith(line, start))):
+            yield text[start:end].split("{")[0], start, end
+            start = None
+        elif start is not None and macro is None and "{" not in text[start:end] and line.rstrip().endswith(";"):
+            start = None
+        position = end
+
+
+def pattern(expression):
+    return re.compile(r"\s*".join(re.escape(word) for word in re.findall(r"\w+|[^\w\s]", expression)))
+
+
+def apply(mutation, files):
+    """(file, mutated text), or an explanation why the mutation does not apply."""
+    name, found = re.compile(r"(?<!\w)" + re.escape(mutation["function"]) + r"(?!\w)(?=\s*[(\[=]|\s*$)"), []
+    places = 0
+    for path, text in files.items():
+        if mutation["function"] not in text:
+            continue
+        for header, start, end in definitions(text):
+            if name.search(header.strip()):
+                places += 1
+                for m in pattern(mutation["expression"]).finditer(text, start, end):
+                    found.append((path, text[:m.start()] + mutation["replacement"] + text[m.end():]))
+    if not places:
+        return None, "there is no such function"
+    if len(found) != 1:
+        return None, f"the expression occurs {len(found)} times, expected once"
+    return found[0], ""
+
+
+def read_list(path):
+    with open(path) as f:
+        for number, line in enumerate(f, 1):
+            line = line.strip()
+            if not line or line.startswith("#"):
+                continue
+            parts = [p.strip() for p in line.split(" | ")]
+            if len(parts) != 3 or " => " not in parts[1] + " ":
+                sys.exit(f"{path}:{number}: expected FUNCTION | EXPRESSION => REPLACEMENT | TEST...")
+            old, new = (parts[1] + " ").split(" => ", 1)
+            yield {"line": number, "text": line, "function": parts[0], "expression": old.strip(), "replacement": new.strip(),
+                   "equivalent": parts[2][11:].strip() if parts[2].startswith("equivalent:") else "",
+                   "tests": [] if parts[2].startswith("equivalent:") else parts[2].split()}
+
+
+class Copy:
+    """The copy of the tree that is mutated, and its build."""
+
+    def __init__(self, build, names):
+        self.top = os.path.join(build, "source")
+        for name in names:
+            there = os.path.join(self.top, name)
+            here = os.path.join(TOP, name)
+            if not os.path.exists(there) or open(there, "rb").read() != open(here, "rb").read():
+                os.makedirs(os.path.dirname(there), exist_ok=True)
+                shutil.copyfile(here, there)
+                shutil.copymode(here, there)
+        self.names = names
+
+    def make(self, *targets):
+        return subprocess.run(["make", "-s", "NO_DEPS=1", "BUILD=build", *targets], cwd=self.top, text=True,
+                              stdin=subprocess.DEVNULL, capture_output=True)
+
+    def test(self, tests):
+        """The name of the first test that fails, "" if all pass."""
+        for test in tests:
+            script = test.endswith(".sh")
+            target = f"tests/{test}" if script else f"build/tests/{test}"
+            made = self.make("all", *([] if script else [target]))
+            if made.returncode:
+                return "the compiler" if "error:" in made.stderr else "make: " + made.stderr.strip()[-200:]
+            env = dict(os.environ, BUILD="build", PINWHEEL="build/pinwheel", LIMIT=str(TEST_LIMIT))
+            run = subprocess.run(["sh", ".ci/run-tests", target], cwd=self.top, env=env, stdin=subprocess.DEVNULL,
+                                 capture_output=True, text=True)
+            if run.returncode:
+                return test
+        return ""
+
+    def write(self, name, text):
+        with open(os.path.join(self.top, name), "w") as f:
+            f.write(text)
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--time", type=float, default=7200, help="stop after this many seconds")
+    options.add_argument("--only", default="", help="mutations whose line contains this")
+    options.add_argument("--apply", action="store_true", help="only check that every mutation applies")
+    options.add_argument("build")
+    options = options.parse_args()
+    os.makedirs(options.build, exist_ok=True)
+    mutations = list(read_list(os.path.join(HERE, "list")))
+    names = sources()
+    files = {n: open(os.path.join(TOP, n)).read() for n in names if n.startswith(ROOTS) and n.endswith((".c", ".h"))}
+    wrong = 0
+    for m in mutations:
+        m["applied"], why = apply(m, files)
+        if m["applied"] is None:
+            print(f"tests/mutants/list:{m['line']}: {m['text']}: does not apply: {why}")
+            wrong += 1
+    if options.apply or wrong:
+        print(f"{len(mutations)} mutations, {wrong} do not apply")
+        return 1 if wrong else 0
+
+    digest = hashlib.sha256()
+    for n in names:
+        if not n.startswith(("docs/", "tests/mutants/")):
+            digest.update(n.encode() + open(os.path.join(TOP, n), "rb").read())
+    state, path, verdicts = digest.hexdigest()[:16], os.path.join(options.build, "results"), {}
+    if os.path.exists(path):
+        for line in open(path):
+            key, text, verdict = line.rstrip("\n").split("\t")
+            if key == state:
+                verdicts[text] = verdict
+    quick = sorted(os.path.basename(n)[:-2] for n in names if re.fullmatch(r"tests/test_\w+\.c", n))
+
+    copy, begin, left, survivors = Copy(options.build, names), time.time(), 0, 0
+    todo = [m for m in mutations if options.only in m["text"]]
+    needed = sorted({t for m in todo for t in m["tests"]})
+    failed = copy.test(needed) if any(m["text"] not in verdicts for m in todo if not m["equivalent"]) else ""
+    if failed:
+        sys.exit(f"without any mutation: {failed} fails")
+    for i, m in enumerate(todo):
+        if m["equivalent"]:
+            print(f"equivalent  {m['text']}")
+            continue
+        if m["text"] not in verdicts:
+            if time.time() - begin > options.time:
+                left += 1
+                continue
+            name, text = m["applied"]
+            copy.write(name, text)
+            verdicts[m["text"]] = copy.test(m["tests"]) or copy.test([q for q in quick if q not in m["tests"]])
+            copy.write(name, files[name])
+            with open(path, "a") as f:
+                f.write(f"{state}\t{m['text']}\t{verdicts[m['text']]}\n")
+        by = verdicts[m["text"]]
+        survivors += by == ""
+        print(f"{'detected' if by else 'SURVIVED'}    {m['text']}" + (f"    by {by}" if by else ""), flush=True)
+    print(f"{len(todo) - survivors - left} passed, {survivors} failed" + (f", {left} skipped" if left else ""))
+    return 1 if survivors else 3 if left else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
