@@ -1,8 +1,9 @@
 #!/bin/sh
 # Checks what Pinwheel needs and installs only what is missing, with the system's package manager.
 #
-#   deps.sh [fresh] [style] [browser]     fresh: do not trust the last result; style: clang and clang-format too;
-#                                         browser: one that can run without a screen, for the tests of animations
+#   deps.sh [fresh] [style] [browser] [slurm]     fresh: do not trust the last result; style: clang and clang-format too;
+#                                               browser: one that can run without a screen, for the tests of animations;
+#                                               slurm: for tests/slurm.sh
 #
 # Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
 
@@ -15,6 +16,7 @@ for word; do
   fresh) fresh=1 ;;
   style) needs="$needs clang clang-format" ;;
   browser) needs="$needs chromium" ;;
+  slurm) needs="$needs slurmctld munged" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
   esac
 done
@@ -98,6 +100,7 @@ look () {
     case $n in
     cc) links || missing="$missing $n" ;;
     gnuplot | clang | clang-format | chromium) command -v "$n" >/dev/null || missing="$missing $n" ;;
+    slurmctld | munged) [ -x "/usr/sbin/$n" ] || missing="$missing $n" ;;
     *) libraries="$libraries $n" ;;
     esac
   done
@@ -115,6 +118,8 @@ package_of () {
   apt-gnuplot) echo gnuplot-nox ;;
   apt-clang | apt-clang-format | apt-chromium) echo "$1" ;;
   apt-libfyaml) echo libfyaml-dev ;;
+  apt-slurmctld) echo slurm-wlm ;;
+  apt-munged) echo munge ;;
   apt-*) echo "lib$1-dev" ;;
 
   # unverified from here on
