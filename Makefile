@@ -131,8 +131,8 @@ $(BUILD)/obj/core/kinds/%.o: STRICT += $(ONE_BY_ONE)
 $(BUILD)/obj/solvers/%.o:    INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/files/%.o: INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers
-$(call obj,core/cli/animate_page.c): INCLUDE += -iquote $(BUILD)/obj/core/cli
-$(call obj,core/cli/animate_page.c): $(BUILD)/obj/core/cli/animate.inc
+$(call obj,core/cli/animate.c): INCLUDE += -iquote $(BUILD)/obj/core/cli
+$(call obj,core/cli/animate.c): $(BUILD)/obj/core/cli/animate.inc
 $(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := -iquote core -iquote core/files -iquote core/cli -iquote solvers -iquote tests/fuzz

@@ -39,24 +39,8 @@ for model in ezyroller andrews-squeezer wheeled-snake pendulum car-tyres; do
   cat "$work/console"
 done
 
-# gif NAME OPTION...: a picture of this size that moves
-gif () {
-  "$pinwheel" run "$@" --animate "$work/x.gif" >/dev/null 2>"$work/err" &&
-    [ "$(head -c 6 "$work/x.gif")" = GIF89a ] && grep -aq NETSCAPE2.0 "$work/x.gif" && [ ! -s "$work/err" ]
-}
-if command -v gnuplot >/dev/null; then
-  gif pendulum --t-end 1
-  report 'a GIF that moves' $?
-  gif ezyroller
-  report 'a GIF that follows' $?
-fi
-PATH=$work/nothing "$(command -v "$pinwheel")" run ezyroller --t-end 1 --animate "$work/none.gif" >/dev/null 2>"$work/err"
-status=$?
-[ $status = 1 ] && grep -q 'gnuplot was not found' "$work/err" && [ ! -e "$work/none.gif" ]
-report 'without gnuplot it says so' $?
-
 "$pinwheel" run ezyroller --animate "$work/x.mp4" >/dev/null 2>"$work/err"
-[ $? = 2 ] && grep -q 'expected a name that ends in .html or .gif' "$work/err"
+[ $? = 2 ] && grep -q 'expected a name that ends in .html' "$work/err"
 report 'another ending is refused' $?
 
 exit $bad

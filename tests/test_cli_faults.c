@@ -82,7 +82,6 @@ static void test_plots (void **state) {
   (void)state;
   faults_most = 30;
   faults_from (":", "run pendulum --t-end 0.01 --plots @/o --animate @/o/a.html");
-  faults_from (":", "run pendulum --t-end 0.01 --step 0.01 --animate @/o/a.gif");
 }
 
 static void test_sweep (void **state) {

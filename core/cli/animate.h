@@ -1,14 +1,14 @@
-/* Animations of a run: a page for a browser that needs nothing else, or a picture in motion. */
+/* Animation of a run: a page for a browser that needs nothing else. */
 #ifndef PW_ANIMATE_H
 #define PW_ANIMATE_H
 
 #include "plots.h"
 
-/* Whether a file of this name can be written: PW_INPUT unless it ends in .html or .gif. */
+/* Whether a file of this name can be written: PW_INPUT unless it ends in .html. */
 int pw_animation_check (const char *path, pw_error *error);
 
-/* Writes what was kept of a run, with forces; `reason` says why it did not reach its end, else "".  A .gif is drawn by
- * gnuplot.  Errors: PW_MACHINE if the file cannot be written, or gnuplot is missing or fails. */
-int pw_animate (pw_plots *p, const char *path, const char *method, const char *reason, pw_error *error);
+/* Writes what was kept of a run, with forces; `reason` says why it did not reach its end, else "".  Errors: PW_MACHINE if
+ * the file cannot be written. */
+int pw_animate (const pw_plots *p, const char *path, const char *method, const char *reason, pw_error *error);
 
 #endif

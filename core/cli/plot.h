@@ -146,8 +146,6 @@ double pw_plot_size (const pw_plots *p);
 enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
 int pw_plot_has (const pw_plots *p, int block);
 
-/* Writes every `stride`-th sample of the mechanism as PLOT_CENTRES + 1 blocks of its own, and the paths. */
-int pw_plot_write_frames (const pw_plots *p, const char *name, int stride, pw_error *error);
 /* Writes the data files; sets p->closeup. */
 int pw_plot_write_data (pw_plots *p, pw_error *error);
 /* Writes the scripts. */
@@ -155,9 +153,7 @@ int pw_plot_write_scripts (const pw_plots *p, pw_error *error);
 /* Runs gnuplot on them. */
 int pw_plot_run (const pw_plots *p, pw_error *error);
 /* Runs gnuplot in a folder on at most PLOT_SCRIPTS scripts, a list ended by NULL; says on standard error if there is
- * none, or leaves that to the caller, and puts what gnuplot says into a file unless `messages` is NULL. */
+ * none. */
 int pw_plot_gnuplot (const char *folder, const char *const *scripts, pw_error *error);
-int pw_plot_try_gnuplot (const char *folder, const char *const *scripts, const char *messages, int *absent,
-                         pw_error *error);
 
 #endif

@@ -237,21 +237,6 @@ static int data_mechanism (const pw_plots *p, const char *name, int n, pw_error 
   return pw_plot_finish (p, name, f, error);
 }
 
-int pw_plot_write_frames (const pw_plots *p, const char *name, int stride, pw_error *error) {
-  FILE *f = pw_plot_create (p, name, error);
-  if (f == NULL) return PW_MACHINE;
-  double half = data_half_wheel (p);
-  for (int i = 0; i < p->samples; i += stride)
-    for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
-      data_begin_block (f, p, block, i == 0 && block == PLOT_BODIES);
-      data_block (f, p, i, block, half);
-    }
-  int status = pw_plot_finish (p, name, f, error);
-  if (status == PW_OK) status = data_motion (p, error);
-  if (status == PW_OK) status = data_wheels (p, error);
-  return status == PW_OK ? data_ground (p, error) : status;
-}
-
 int pw_plot_has (const pw_plots *p, int block) {
   int b = 0, w = 0;
   while (w < p->wheels && !pw_plot_rolls (p, w)) w++;

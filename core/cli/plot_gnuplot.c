@@ -37,8 +37,8 @@ static char **gnuplot_environment (void) {
   return list;
 }
 
-/* Starts it with nothing to read and its output among our messages, or with all it says in a file.  An errno value. */
-static int gnuplot_start (char *const *argv, const char *messages, pid_t *child) {
+/* Starts it with nothing to read and its output among our messages.  An errno value. */
+static int gnuplot_start (char *const *argv, pid_t *child) {
   posix_spawn_file_actions_t actions;
   char **environment = gnuplot_environment ();
   int failed = environment ? posix_spawn_file_actions_init (&actions) : ENOMEM;
@@ -47,8 +47,6 @@ static int gnuplot_start (char *const *argv, const char *messages, pid_t *child)
     return failed;
   }
   failed = posix_spawn_file_actions_addopen (&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  if (!failed && messages)
-    failed = posix_spawn_file_actions_addopen (&actions, STDERR_FILENO, messages, O_WRONLY | O_CREAT | O_TRUNC, 0666);
   if (!failed) failed = posix_spawn_file_actions_adddup2 (&actions, STDERR_FILENO, STDOUT_FILENO);
   if (!failed) failed = posix_spawnp (child, argv[0], &actions, NULL, argv, environment);
   posix_spawn_file_actions_destroy (&actions);
@@ -67,13 +65,15 @@ static void gnuplot_remove_figures (const char *folder, const char *const *scrip
     }
 }
 
-static int gnuplot_absent (int *absent) {
-  *absent = 1;
+static int gnuplot_absent (const char *folder) {
+  fprintf (stderr,
+           "pinwheel: gnuplot was not found, so no figures are drawn; data and scripts are in %s: gnuplot FILE.gp "
+           "draws them there\n",
+           folder);
   return PW_OK;
 }
 
-int pw_plot_try_gnuplot (const char *folder, const char *const *scripts, const char *messages, int *absent,
-                         pw_error *error) {
+int pw_plot_gnuplot (const char *folder, const char *const *scripts, pw_error *error) {
   char cd[2 * PLOT_PATH];
   const char *argv[4 + PLOT_SCRIPTS + 1] = { "gnuplot", "-d", "-e", cd };
   pid_t child;
@@ -82,13 +82,12 @@ int pw_plot_try_gnuplot (const char *folder, const char *const *scripts, const c
   if (!gnuplot_cd (folder, cd, sizeof cd)) return pw_fail (error, PW_INPUT, "%s: too long a name", folder);
   fflush (stderr);
   gnuplot_remove_figures (folder, scripts);
-  int failed = gnuplot_start ((char *const *)(size_t)argv, messages, &child);
-  *absent = 0;
-  if (failed == ENOENT) return gnuplot_absent (absent);
+  int failed = gnuplot_start ((char *const *)(size_t)argv, &child);
+  if (failed == ENOENT) return gnuplot_absent (folder);
   if (failed) return pw_fail (error, PW_MACHINE, "cannot run gnuplot: %s", strerror (failed));
   while (waitpid (child, &status, 0) < 0)
     if (errno != EINTR) return pw_fail (error, PW_MACHINE, "lost gnuplot: %s", strerror (errno));
-  if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (absent);
+  if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (folder);
   if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
   gnuplot_remove_figures (folder, scripts);
   if (WIFSIGNALED (status))
@@ -97,16 +96,6 @@ int pw_plot_try_gnuplot (const char *folder, const char *const *scripts, const c
   return pw_fail (error, PW_MACHINE,
                   "gnuplot failed with exit status %d; its message is above, data and scripts are in %s",
                   WEXITSTATUS (status), folder);
-}
-
-int pw_plot_gnuplot (const char *folder, const char *const *scripts, pw_error *error) {
-  int absent, status = pw_plot_try_gnuplot (folder, scripts, NULL, &absent, error);
-  if (status == PW_OK && absent)
-    fprintf (stderr,
-             "pinwheel: gnuplot was not found, so no figures are drawn; data and scripts are in %s: gnuplot FILE.gp "
-             "draws them there\n",
-             folder);
-  return status;
 }
 
 int pw_plot_run (const pw_plots *p, pw_error *error) {

@@ -30,7 +30,7 @@ static int run_read (run *x, int argc, const char **argv, pw_error *error) {
     { "json", 0, POPT_ARG_STRING, &x->json_path, 0, "Write a summary; - is standard output", "FILE" },
     { "plots", 0, POPT_ARG_STRING, &x->plots_path, 0, "Draw figures into a folder", "DIR" },
     { "animate", 0, POPT_ARG_STRING, &x->animate_path, 0, "Write the motion as a page for a browser, or as a picture",
-      "FILE.html|FILE.gif" },
+      "FILE.html" },
     { "truth", 0, POPT_ARG_STRING, &x->truth_path, 0,
       "Take errors against this table, with columns as run writes them, instead of the model's own truth", "FILE.csv" },
     { "profile", 0, POPT_ARG_NONE, &x->profile, 0, "Measure at the end what each kind and each stage costs", NULL },
