@@ -12,8 +12,7 @@
 
 /* ---- Preparation ---- */
 
-/* Scales row i by 1 / f and column i by f, a power of 2, until both are about as large. */
-static void eigen_balance (int n, double *A) {
+void pw_eigen_balance (int n, double *A) {
   for (int changed = 1, pass = 0; changed && pass < 100; pass++) {
     changed = 0;
     for (int i = 0; i < n; i++) {
@@ -142,28 +141,12 @@ static int eigen_iterate (int n, double *A, double *re, double *im) {
 
 /* ---- The end ---- */
 
-/* Fastest first; conjugate pairs stay together. */
-static void eigen_sort (int n, double *re, double *im) {
-  for (int i = 1; i < n; i++) {
-    double x = re[i], y = im[i], size = hypot (x, y);
-    int k = i;
-    for (; k > 0; k--) {
-      double other = hypot (re[k - 1], im[k - 1]);
-      if (other > size || (other == size && !(re[k - 1] == x && im[k - 1] < y))) break;
-      re[k] = re[k - 1], im[k] = im[k - 1];
-    }
-    re[k] = x, im[k] = y;
-  }
-}
-
 int pw_eigenvalues (int n, double *A, double *re, double *im) {
   for (size_t i = 0; i < (size_t)n * (size_t)n; i++)
     if (!isfinite (A[i])) return PW_RETRY;
-  eigen_balance (n, A);
+  pw_eigen_balance (n, A);
   eigen_hessenberg (n, A, re);
-  int status = eigen_iterate (n, A, re, im);
-  if (status == PW_OK) eigen_sort (n, re, im);
-  return status;
+  return eigen_iterate (n, A, re, im);
 }
 
 void pw_singular_values (int n, int m, double *vector, double *sigma) {

@@ -2,8 +2,11 @@
 #ifndef PW_EIGEN_H
 #define PW_EIGEN_H
 
-/* The n eigenvalues re + i im of a real n x n matrix A (row-major, destroyed), fastest (largest) first; of a conjugate
- * pair the one with im > 0 comes first.  PW_OK, or PW_RETRY if the iteration does not converge or A is not finite. */
+/* Scales row i by 1 / f and column i by f, a power of 2, until both are about as large; the eigenvalues stay. */
+void pw_eigen_balance (int n, double *A);
+
+/* The n eigenvalues re + i im of a real n x n matrix A (row-major, destroyed), conjugate pairs side by side, that with im > 0
+ * first.  PW_OK, or PW_RETRY if the iteration does not converge or A is not finite. */
 int pw_eigenvalues (int n, double *A, double *re, double *im);
 
 /* The singular values of n vectors of length m, one behind the other (destroyed), in no order. */

@@ -104,16 +104,34 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size);
 
 /* ---- What a model is like at the state reached (linear.c) ---- */
 
+/* Whether the eigenvalues of a linearisation are the exponents of disturbances: only if the linearised equations stay the
+ * same along the motion, seen from a frame that moves with it. */
+typedef enum {
+  PW_STEADY,
+  PW_ACCELERATED, /* no: there are accelerations in the frame */
+  PW_CHANGING     /* no: the equations depend on time, or change along the motion, within the run's span */
+} pw_steadiness;
+
 /* Mobility and linearisation.  Singular values are those of the independent rows of J, each row of length 1, angles in
- * units of the length scale.  Eigenvalues: the fastest first, of a conjugate pair that with im > 0. */
+ * units of the length scale.  A variation of the state by its minimal coordinates x, seen from a frame that moves with the
+ * motion, obeys x' = A x. */
 typedef struct {
   int coordinates;
-  int positions;   /* degrees of freedom of configuration: coordinates less independent holonomic rows */
-  int velocities;  /* of velocity: coordinates less independent rows */
-  int rank;        /* of J */
-  double least;    /* smallest singular value; NaN: not computed, or no rows */
-  int unknowns;    /* of the linearisation: positions + velocities */
-  double *re, *im; /* its eigenvalues [1/s]; NULL: not computed */
+  int positions;  /* degrees of freedom of configuration: coordinates less independent holonomic rows */
+  int velocities; /* of velocity: coordinates less independent rows */
+  int rank;       /* of J */
+  double least;   /* smallest singular value; NaN: not computed, or no rows */
+  int unknowns;   /* of the linearisation: positions + velocities */
+  double
+      *A; /* unknowns x unknowns, by rows [1/s], coordinates of positions first; NULL: not computed, nor what follows */
+  double *re,
+      *im; /* its eigenvalues [1/s], the one that grows most first, of a conjugate pair that with im > 0; what round-off
+                      hides is 0 */
+  unsigned char *rigid; /* unknowns: 1 for those of displacements of the whole, which change nothing */
+  int symmetries;       /* how many: of the directions x, y, phi */
+  pw_steadiness steady;
+  double twist[3];     /* of the frame [m/s, m/s, rad/s] */
+  double acceleration; /* the largest seen from it; angles in units of the length scale [m/s^2] */
 } pw_linear;
 
 /* Examines the state a run has reached.  With more coordinates than `most` only integers are filled: the rest takes time

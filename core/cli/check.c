@@ -10,20 +10,18 @@
 
 enum { CHECK_SEEDS = 5 };
 
-static void check_problem (pw_check *x, const char *format, ...)
+static void check_add (pw_check_list *l, const char *format, ...)
 #ifdef __GNUC__
     __attribute__ ((format (printf, 2, 3)))
 #endif
     ;
 
-static void check_problem (pw_check *x, const char *format, ...) {
-  if (x->problems < (int)(sizeof x->problem / sizeof *x->problem)) {
-    va_list list;
-    va_start (list, format);
-    vsnprintf (x->problem[x->problems], sizeof *x->problem, format, list);
-    va_end (list);
-  }
-  x->problems++;
+static void check_add (pw_check_list *l, const char *format, ...) {
+  va_list list;
+  va_start (list, format);
+  if (l->count++ < (int)(sizeof l->text / sizeof *l->text))
+    vsnprintf (l->text[l->count - 1], sizeof *l->text, format, list);
+  va_end (list);
 }
 
 /* ---- The start ---- */
@@ -36,7 +34,7 @@ static void check_open (pw_check *x) {
   x->explicit_rk4 = strncmp (d.method, "rk4", 3) == 0;
   x->r = pw_open (x->m.system, "rk4+projection", &settings, &x->start);
   if (x->r == NULL)
-    check_problem (x, "%s", x->start.text);
+    check_add (&x->problem, "%s", x->start.text);
   else
     x->redundant = pw_report_redundancies (x->r);
 }
@@ -47,6 +45,21 @@ void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *
   pw_state_name (x->m.system, i, name, size);
   *from = i < n ? start->q_given[i] : start->v_given[i - n];
   *to = i < n ? start->q[i] : start->v[i - n];
+}
+
+/* Initial values that the model specifies and the start has changed.  A value of 0 counts only if it is held: else it may
+ * have been left out. */
+static void check_given (pw_check *x) {
+  const pw_system *s = x->m.system;
+  for (int i = 0; x->r && i < 2 * s->coords; i++) {
+    char name[300], a[32], b[32];
+    double from, to;
+    if (!pw_start_moved (s, pw_run_start (x->r), i)) continue;
+    pw_check_state (x, i, name, sizeof name, &from, &to);
+    if (s->held[i] || from != 0)
+      check_add (&x->finding, "the model specifies %s = %s %s, but the constraints require %s %s", name,
+                 pw_format (a, from, 10), pw_state_unit (s, i), pw_format (b, to, 10), pw_state_unit (s, i));
+  }
 }
 
 /* What the model says it knows about its motion must hold at the start. */
@@ -63,8 +76,8 @@ static int check_truth (pw_check *x, int started, pw_error *error) {
     x->known++;
     pw_check_state (x, i, name, sizeof name, &from, &to);
     if (!(fabs (truth[i] - to) <= 1e-9 * (1 + fabs (to))))
-      check_problem (x, "the model's truth does not hold at the start: %s is %s, not %s", name, pw_format (a, to, 9),
-                     pw_format (b, truth[i], 9));
+      check_add (&x->problem, "the model's truth does not hold at the start: %s is %s, not %s", name,
+                 pw_format (a, to, 9), pw_format (b, truth[i], 9));
   }
   free (truth);
   return status;
@@ -113,31 +126,46 @@ static int check_kinds (pw_check *x, pw_error *error) {
     if (k->alone.failed == 0 || strcmp (k->alone.check[check_first_failed (&k->alone)].name, "table") != 0)
       status = pw_selftest_scene (s, k->kind, 0, q, v, 1, &k->inside, error);
     const pw_selftest_check *fault = check_fault (k, &inside);
-    if (fault) check_problem (x, "kind %s fails its self-test: %s (%s)", k->kind->name, fault->about, fault->where);
+    if (fault)
+      check_add (&x->problem, "kind %s fails its self-test: %s (%s)", k->kind->name, fault->about, fault->where);
   }
   return status;
 }
 
-/* ---- Fast motions ---- */
+/* ---- Linearisation ---- */
 
-/* A zero eigenvalue of several chained states (a position, its rate, ...) comes out as a root of round-off. */
-int pw_check_moves (const pw_check *x) {
+static void check_fastest (pw_check *x) {
   const pw_linear *l = &x->linear;
-  return l->re && l->unknowns > 0 && hypot (l->re[0], l->im[0]) > 1e-3 / pw_run_scale (x->r)->time;
+  double most = 0;
+  for (int i = 0; i < l->unknowns; i++) {
+    if (l->rigid[i]) continue;
+    x->limit = fmin (x->limit, pw_rk4_limit (l->re[i], l->im[i]));
+    if (hypot (l->re[i], l->im[i]) <= most * (1 + 1e-12)) continue;
+    most = hypot (l->re[i], l->im[i]);
+    x->fastest = i;
+  }
 }
 
 static int check_linear (pw_check *x, pw_error *error) {
-  char step[32], limit[32];
+  char a[32], b[32];
   x->limit = INFINITY;
+  x->fastest = -1;
   if (x->r == NULL) return PW_OK;
   int status = pw_linearise (x->r, CHECK_MOST, &x->linear, error);
-  if (status != PW_OK || !pw_check_moves (x)) return status;
-  for (int i = 0; i < x->linear.unknowns; i++)
-    x->limit = fmin (x->limit, pw_rk4_limit (x->linear.re[i], x->linear.im[i]));
+  if (status != PW_OK || x->linear.A == NULL) return status;
+  check_fastest (x);
   if (x->explicit_rk4 && x->step > x->limit)
-    check_problem (x, "the model's step of %s s is too large for rk4, which is stable up to %s s",
-                   pw_format (step, x->step, 6), pw_format (limit, x->limit, 3));
+    check_add (&x->problem, "the model's step of %s s is too large for rk4, which is stable up to %s s",
+               pw_format (a, x->step, 6), pw_format (b, x->limit, 3));
+  if (pw_check_doubling (x) < INFINITY)
+    check_add (&x->finding, "the motion is unstable: a disturbance doubles in %s s",
+               pw_format (a, pw_check_doubling (x), CHECK_DIGITS));
   return PW_OK;
+}
+
+double pw_check_doubling (const pw_check *x) {
+  const pw_linear *l = &x->linear;
+  return l->A && l->steady == PW_STEADY && l->unknowns > 0 && l->re[0] > 0 ? log (2) / l->re[0] : INFINITY;
 }
 
 /* ---- */
@@ -145,6 +173,7 @@ static int check_linear (pw_check *x, pw_error *error) {
 static int check_model (pw_check *x, int started, pw_error *error) {
   pw_report_angles (x->m.model);
   check_open (x);
+  check_given (x);
   int status = check_truth (x, started, error);
   if (status == PW_OK) status = check_linear (x, error);
   return status == PW_OK ? check_kinds (x, error) : status;
@@ -152,9 +181,9 @@ static int check_model (pw_check *x, int started, pw_error *error) {
 
 /* What is wrong decides the exit status: a start that fails in its own way, else the model. */
 static void check_verdict (const pw_check *x, pw_error *error) {
-  if (x->problems == 0) return;
-  pw_fail (error, x->start.status ? x->start.status : PW_INPUT, "%s%s", x->problem[0],
-           x->problems > 1 ? "; and more, see above" : "");
+  if (x->problem.count == 0) return;
+  pw_fail (error, x->start.status ? x->start.status : PW_INPUT, "%s%s", x->problem.text[0],
+           x->problem.count > 1 ? "; and more, see above" : "");
 }
 
 static void check_close (pw_check *x) {

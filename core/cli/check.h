@@ -5,7 +5,10 @@
 #include "cli.h"
 #include "selftest.h"
 
-enum { CHECK_MOST = 400 /* coordinates: above it nothing is computed that takes time as their cube */ };
+enum {
+  CHECK_MOST = 400 /* coordinates: above it nothing is computed that takes time as their cube */,
+  CHECK_DIGITS = 5
+};
 
 /* The self-test of a kind in use. */
 typedef struct {
@@ -15,6 +18,17 @@ typedef struct {
   char untested[500];               /* why there is no test alone; "": there is one */
 } pw_checked_kind;
 
+/* The first of some messages, and how many there are. */
+typedef struct {
+  int count;
+  char text[8][700];
+} pw_check_list;
+static inline int pw_check_listed (const pw_check_list *l) {
+  int most = (int)(sizeof l->text / sizeof *l->text);
+  return l->count < most ? l->count : most;
+}
+
+/* Problems make the model fail; findings do not: it can be run, but may not be what was meant. */
 typedef struct {
   pw_cli_model m;
   pw_run *r;              /* NULL: it cannot start, for the reason in `start` */
@@ -26,12 +40,12 @@ typedef struct {
   int known;          /* states whose motion the model knows, compared with the start */
   double step, limit; /* the model's step, and the largest that RK4 can take [s]; 0 and INFINITY: none */
   int explicit_rk4;   /* 1: the model wants to be run by rk4 */
-  int problems;
-  char problem[8][700]; /* the first of them */
+  int fastest;        /* the eigenvalue of largest modulus, displacements of the whole left out; -1: all are 0 */
+  pw_check_list problem, finding;
 } pw_check;
 
-/* Whether anything is faster than a thousandth of the scene's own pace: slower eigenvalues may be 0 and round-off. */
-int pw_check_moves (const pw_check *x);
+/* In what time the fastest growing disturbance of a steady motion doubles [s]; INFINITY: none grows, or that is not known. */
+double pw_check_doubling (const pw_check *x);
 /* A state the consistent start has moved: its name, and from where to where. */
 void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to);
 

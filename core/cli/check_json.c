@@ -35,6 +35,15 @@ static void json_member (FILE *f, const char *key, double value) {
 
 /* ---- The parts ---- */
 
+static void json_list (FILE *f, const pw_check_list *l) {
+  fputc ('[', f);
+  for (int i = 0; i < pw_check_listed (l); i++) {
+    if (i > 0) fputs (", ", f);
+    json_text (f, l->text[i]);
+  }
+  fputc (']', f);
+}
+
 static void json_texts (FILE *f, const char *const *text) {
   fputc ('[', f);
   for (const char *const *t = text; t && *t; t++) {
@@ -129,16 +138,21 @@ static void json_kinds (FILE *f, const pw_check *x) {
 }
 
 static void json_linear (FILE *f, const pw_check *x) {
+  static const char *const steady[] = { "steady", "accelerated", "changing" };
   const pw_linear *l = &x->linear;
   fputs (",\n  \"linearisation\": ", f);
-  if (l->re == NULL) {
+  if (l->A == NULL) {
     fputs ("null", f);
     return;
   }
-  double size = l->unknowns > 0 ? hypot (l->re[0], l->im[0]) : 0;
-  fprintf (f, "{\"unknowns\": %d", l->unknowns);
-  json_member (f, "frequency_hz", pw_check_moves (x) ? l->im[0] / (2 * PW_PI) : 0);
-  json_member (f, "damping", pw_check_moves (x) ? -l->re[0] / size : NAN);
+  double re = x->fastest < 0 ? 0 : l->re[x->fastest], im = x->fastest < 0 ? 0 : l->im[x->fastest];
+  fprintf (f, "{\"unknowns\": %d, \"motion\": \"%s\"", l->unknowns, steady[l->steady]);
+  json_member (f, "acceleration", l->acceleration);
+  json_member (f, "turn_rate", l->twist[2]);
+  json_member (f, "symmetries", l->symmetries);
+  json_member (f, "doubling_time", pw_check_doubling (x));
+  json_member (f, "frequency_hz", fabs (im) / (2 * PW_PI));
+  json_member (f, "damping", x->fastest < 0 ? NAN : re != 0 ? -re / hypot (re, im) : 0);
   json_member (f, "rk4_step", x->limit);
   fputs (",\n    \"eigenvalues\": [", f);
   for (int i = 0; i < l->unknowns; i++) {
@@ -152,16 +166,15 @@ static void json_linear (FILE *f, const pw_check *x) {
 }
 
 int pw_check_json (const pw_check *x, const char *path, pw_error *error) {
-  const char *problem[sizeof x->problem / sizeof *x->problem + 1] = { NULL };
-  for (int i = 0; i < x->problems && x->problem + i < x->problem + sizeof x->problem / sizeof *x->problem; i++)
-    problem[i] = x->problem[i];
   pw_output *o = pw_output_open (path, error);
   if (o == NULL) return error->status;
   FILE *f = pw_output_stream (o);
   fputs ("{\"schema\": 1, \"model\": ", f);
   json_text (f, pw_file_name (x->m.file));
-  fprintf (f, ", \"status\": \"%s\",\n  \"problems\": ", x->problems ? "failed" : "ok");
-  json_texts (f, problem);
+  fprintf (f, ", \"status\": \"%s\",\n  \"problems\": ", x->problem.count ? "failed" : "ok");
+  json_list (f, &x->problem);
+  fputs (",\n  \"findings\": ", f);
+  json_list (f, &x->finding);
   json_mobility (f, x);
   json_mass (f, x);
   json_start (f, x);

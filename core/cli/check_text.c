@@ -1,9 +1,10 @@
 /* What `pinwheel check` found, for the eye. */
 #include <math.h>
+#include <string.h>
 #include "check.h"
 #include "system.h"
 
-enum { CHECK_LISTED = 8, CHECK_DIGITS = 5 };
+enum { CHECK_LISTED = 8, CHECK_EIGENVALUES = 60 };
 
 static void text_line (const char *what, const char *value) {
   printf ("  %-34s %s\n", what, value);
@@ -123,20 +124,84 @@ static void text_kinds (const pw_check *x) {
   }
 }
 
-/* ---- Fast motions ---- */
+/* ---- Linearisation ---- */
+
+/* An eigenvalue, or a conjugate pair. */
+static char *text_eigenvalue (const pw_linear *l, int i, char *buffer, size_t size) {
+  char re[32], im[32];
+  snprintf (buffer, size, l->im[i] != 0 ? "%s +- %s i 1/s" : "%s 1/s", pw_format (re, l->re[i], CHECK_DIGITS),
+            pw_format (im, fabs (l->im[i]), CHECK_DIGITS));
+  return buffer;
+}
+
+/* How many eigenvalues from i on are the same. */
+static int text_same (const pw_linear *l, int i) {
+  int k = i;
+  while (k < l->unknowns && l->re[k] == l->re[i] && fabs (l->im[k]) == fabs (l->im[i]) && l->rigid[k] == l->rigid[i])
+    k++;
+  return k - i;
+}
+
+static void text_eigenvalues (const pw_linear *l) {
+  char text[200];
+  for (int i = 0, lines = 0, same; i < l->unknowns; i += same, lines++) {
+    if (lines == CHECK_EIGENVALUES) {
+      text_more (l->unknowns - i);
+      return;
+    }
+    same = text_same (l, i);
+    text_eigenvalue (l, i, text, sizeof text);
+    size_t n = strlen (text);
+    int times = l->im[i] != 0 ? same / 2 : same;
+    if (times > 1) n += (size_t)snprintf (text + n, sizeof text - n, ", %d times", times);
+    if (l->rigid[i]) snprintf (text + n, sizeof text - n, ": displacement of the whole");
+    text_line (i == 0 ? "eigenvalues, rightmost first" : "", text);
+  }
+}
+
+static void text_frame (const pw_linear *l) {
+  char text[300], a[32];
+  if (l->twist[2] != 0) {
+    snprintf (text, sizeof text, "turns at %s rad/s", pw_format (a, l->twist[2], CHECK_DIGITS));
+    text_line ("co-moving frame", text);
+  }
+  if (l->steady == PW_STEADY) return;
+  if (l->steady == PW_ACCELERATED)
+    snprintf (text, sizeof text, "not steady: accelerations of %s m/s^2 in the co-moving frame",
+              pw_format (a, l->acceleration, 3));
+  else
+    snprintf (text, sizeof text, "not steady: its equations change with time or along the motion");
+  text_line ("motion", text);
+  text_line ("", "the eigenvalues are not stability exponents");
+}
+
+static void text_stability (const pw_check *x) {
+  char text[100], a[32];
+  const pw_linear *l = &x->linear;
+  double slowest = -INFINITY;
+  if (l->steady != PW_STEADY) return;
+  for (int i = 0; i < l->unknowns; i++)
+    if (!l->rigid[i]) slowest = fmax (slowest, l->re[i]);
+  if (slowest > 0)
+    snprintf (text, sizeof text, "unstable, doubles in %s s", pw_format (a, pw_check_doubling (x), CHECK_DIGITS));
+  else if (slowest < 0)
+    snprintf (text, sizeof text, "stable, the slowest disturbance halves in %s s",
+              pw_format (a, log (2) / -slowest, CHECK_DIGITS));
+  else
+    snprintf (text, sizeof text, "neutral: no disturbance grows exponentially, not all decay");
+  text_line ("stability", text);
+}
 
 static void text_fastest (const pw_check *x) {
   char text[300], a[32], b[32];
-  double re = x->linear.re[0], im = x->linear.im[0], size = hypot (re, im);
-  snprintf (text, sizeof text, im != 0 ? "%s +- %s i 1/s" : "%s 1/s", pw_format (a, re, CHECK_DIGITS),
-            pw_format (b, im, CHECK_DIGITS));
-  text_line ("fastest eigenvalue", text);
+  const pw_linear *l = &x->linear;
+  double re = l->re[x->fastest], im = fabs (l->im[x->fastest]), size = hypot (re, im);
+  text_line ("fastest eigenvalue", text_eigenvalue (l, x->fastest, text, sizeof text));
   if (im != 0) {
     snprintf (text, sizeof text, "%s Hz, undamped it would be %s Hz", pw_format (a, im / (2 * PW_PI), CHECK_DIGITS),
               pw_format (b, size / (2 * PW_PI), CHECK_DIGITS));
     text_line ("its frequency", text);
-    snprintf (text, sizeof text, "%s of critical",
-              pw_format (a, fabs (re) > 1e-9 * size ? -re / size : 0, CHECK_DIGITS));
+    snprintf (text, sizeof text, "%s of critical", pw_format (a, re != 0 ? -re / size : 0, CHECK_DIGITS));
     text_line ("its damping", text);
   } else {
     snprintf (text, sizeof text, "%s s", pw_format (a, 1 / size, CHECK_DIGITS));
@@ -156,17 +221,27 @@ static void text_limit (const pw_check *x) {
 
 static void text_linear (const pw_check *x) {
   char text[100];
+  const pw_linear *l = &x->linear;
   if (x->r == NULL) return;
   puts ("\nLinearised at the start");
-  text_count ("unknowns", x->linear.unknowns);
-  snprintf (text, sizeof text, "not computed: %d coordinates, the limit is %d", x->linear.coordinates, CHECK_MOST);
-  if (x->linear.re == NULL)
-    text_line ("eigenvalues", text);
-  else if (!pw_check_moves (x))
+  text_count ("unknowns", l->unknowns);
+  snprintf (text, sizeof text, "not computed: %d coordinates, the limit is %d", l->coordinates, CHECK_MOST);
+  if (l->A == NULL) text_line ("eigenvalues", text);
+  if (l->A == NULL) return;
+  text_frame (l);
+  if (x->fastest < 0 && l->twist[2] == 0)
     text_line ("eigenvalues", "all 0: nothing vibrates, grows or decays");
-  if (!pw_check_moves (x)) return;
+  else
+    text_eigenvalues (l);
+  text_stability (x);
+  if (x->fastest < 0) return;
   text_fastest (x);
   text_limit (x);
+}
+
+static void text_list (const pw_check_list *l, const char *what) {
+  if (l->count > 0) printf ("\n%d %s%s\n", l->count, what, l->count == 1 ? "" : "s");
+  for (int i = 0; i < pw_check_listed (l); i++) printf ("  %s\n", l->text[i]);
 }
 
 void pw_check_text (const pw_check *x) {
@@ -177,10 +252,7 @@ void pw_check_text (const pw_check *x) {
   text_start (x);
   text_kinds (x);
   text_linear (x);
-  if (x->problems == 0)
-    puts ("\nNothing is wrong");
-  else
-    printf ("\n%d problem%s\n", x->problems, x->problems == 1 ? "" : "s");
-  for (int i = 0; i < x->problems && i < (int)(sizeof x->problem / sizeof *x->problem); i++)
-    printf ("  %s\n", x->problem[i]);
+  if (x->problem.count + x->finding.count == 0) puts ("\nNothing is wrong");
+  text_list (&x->problem, "problem");
+  text_list (&x->finding, "finding");
 }

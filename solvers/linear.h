@@ -1,0 +1,67 @@
+/* A linearisation in progress; for linear*.c only.  Index names: n coordinates, m constraint equations; a variation of the
+ * state is x = (dq, dv), and has `size` minimal coordinates: first those of positions, then those of velocities. */
+#ifndef PW_LINEAR_H
+#define PW_LINEAR_H
+
+#include "method.h"
+#include "newton.h"
+
+/* The co-moving frame: that of a reference body, at rest or with its twist. */
+typedef struct {
+  double origin[2];    /* of the frame [m] */
+  double twist[3];     /* velocity of the origin, angular velocity [m/s, rad/s] */
+  double residual;     /* largest acceleration in the frame, in units of the scene */
+  double acceleration; /* the same in m/s^2, angles times L */
+} pw_linear_frame;
+
+typedef struct {
+  pw_run *r;
+  int n, m;
+  int holonomic, rank; /* independent constraint equations, those of positions first */
+  int positions, velocities, size;
+  int *row; /* rank: which equations they are */
+  pw_linear_frame frame;
+  double *a, *lambda; /* n + 3, m: at the state last evaluated */
+  double *norm;       /* m: lengths of the rows of J in units of the scene */
+  double *R;          /* rank x rank: J^T = Q R, column after column; first the rows themselves, n long each */
+  double *Q;          /* n x n, column after column */
+  double *A;          /* size x size, by rows */
+  double *S;          /* 3 x size: symmetry directions in minimal coordinates */
+  double *x;          /* 2 n: a variation */
+  double *y;          /* n + 2 m: all derivatives times it: -F, gamma - J a, J v - eta */
+  double *da;         /* n + 3: the accelerations that follow */
+  double *z, *c;      /* n + m + 3, m: scratch */
+  double *residual;   /* 3 x (2 m + n): what displacements of the whole violate */
+  double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the state reached */
+  double *there;                 /* 2 n: a state later on */
+  pw_newton newton;
+  pw_tape tape;
+  int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as y */
+  double *value;
+  char *memory;
+} pw_linearisation;
+
+/* Accelerations and derivatives at a state, where the system stays.  Returns as pw_accelerate. */
+int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
+/* y and da from the variation x. */
+void pw_linear_vary (pw_linearisation *x);
+/* x = the variation along minimal coordinate c. */
+void pw_linear_tangent (pw_linearisation *x, int c);
+/* The minimal coordinates of a variation, `stride` apart. */
+void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const double *dv, int stride, double *out);
+/* out += W in: (x, y) of each body times w, turned by 90 degrees. */
+void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out);
+
+/* ---- linear_frame.c ---- */
+
+/* Chooses the frame in which the accelerations of the state evaluated are smallest. */
+void pw_linear_choose_frame (pw_linearisation *x);
+/* How many of the displacements of the whole (x, y, phi) change nothing to first order; they go to S. */
+int pw_linear_symmetries (pw_linearisation *x);
+/* Transforms B, as A, by reflections that take the first k vectors of S to the first k unit vectors.  Returns 1 if they span
+ * an invariant subspace: the lower left block is then 0. */
+int pw_linear_split (pw_linearisation *x, int k, double *B);
+/* Whether A stays the same along the motion; see pw_linear.  The state reached is evaluated again at the end. */
+pw_steadiness pw_linear_steady (pw_linearisation *x);
+
+#endif

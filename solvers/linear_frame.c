@@ -1,0 +1,264 @@
+/* The co-moving frame of a linearisation; the symmetries of the whole; whether the motion is steady.
+ *
+ * A frame with the origin r, the velocity u and the angular velocity w sees a body at rest if its velocity is
+ * u + w (-(y - r_y), x - r_x) and its acceleration W v = w (-v_y, v_x, 0).  A relative motion of constant velocity d is steady as
+ * well where it changes nothing: the spin of a balanced rotor, bodies that drift apart.  If the frame turns, d turns with it
+ * unless it is an angle's, so that W d counts as an acceleration. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "linear.h"
+
+/* Residuals are dimensionless; accelerations in units of L / T^2, angles times L.
+ *
+ * LINEAR_STEADY: below it the linearisation changes by that share within the scene's time scale T, less than initial values of
+ * 6 digits are known to.  LINEAR_EXACT: round-off of accelerations, over which a turning frame must not be chosen.
+ * LINEAR_SYMMETRIC: round-off of derivatives of moderate size, and its growth with them. */
+static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13, LINEAR_SYMMETRIC = 1e-9;
+
+static double linear_unit (const pw_linearisation *x) {
+  const pw_scale *s = &x->r->s->scale;
+  return s->length / (s->time * s->time);
+}
+
+/* ---- The frame ---- */
+
+/* The largest |a - W v|, and |W d| of what moves relative to the frame. */
+static double linear_residual (const pw_linearisation *x, const pw_linear_frame *f) {
+  const double *q = x->r->q, *v = x->r->v, *a = x->a, w = f->twist[2];
+  double most = 0;
+  for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
+    double dx = v[j] - f->twist[0] + w * (q[j + 1] - f->origin[1]);
+    double dy = v[j + 1] - f->twist[1] - w * (q[j] - f->origin[0]);
+    most = pw_largest (most, hypot (a[j] + w * v[j + 1], a[j + 1] - w * v[j]));
+    most = pw_largest (most, fabs (w) * hypot (dx, dy));
+    most = pw_largest (most, fabs (a[j + 2]) * x->r->s->scale.length);
+  }
+  for (int j = 3 * x->r->s->bodies; j < x->n; j++) most = pw_largest (most, fabs (a[j]) * x->r->s->scale.length);
+  return most;
+}
+
+/* At rest, or with the twist of the body b. */
+static pw_linear_frame linear_try (const pw_linearisation *x, int b, int turning) {
+  const double *q = x->r->q + 3 * b, *v = x->r->v + 3 * b;
+  pw_linear_frame f = { .origin = { q[0], q[1] }, .twist = { v[0], v[1], turning ? v[2] : 0 } };
+  f.acceleration = linear_residual (x, &f);
+  f.residual = f.acceleration / linear_unit (x);
+  return f;
+}
+
+void pw_linear_choose_frame (pw_linearisation *x) {
+  if (x->r->s->bodies == 0) return;
+  x->frame = linear_try (x, 0, 0);
+  for (int b = 0; b < x->r->s->bodies && x->frame.residual > LINEAR_EXACT; b++) {
+    pw_linear_frame f = linear_try (x, b, 1);
+    if (f.residual < x->frame.residual / 2) x->frame = f;
+  }
+}
+
+/* ---- Symmetries ---- */
+
+static double linear_norm (const double *x, int n) {
+  double square = 0;
+  for (int i = 0; i < n; i++) square += x[i] * x[i];
+  return sqrt (square);
+}
+
+/* x = the variation by a displacement of the whole along x, along y, or around the frame's origin, by L or 1 rad. */
+static void linear_displace (pw_linearisation *x, int k) {
+  pw_system *s = x->r->s;
+  const double *q = x->r->q, *v = x->r->v;
+  memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
+  for (int j = 0; j < 3 * s->bodies; j += 3) {
+    if (k < 2) {
+      x->x[j + k] = s->scale.length;
+      continue;
+    }
+    x->x[j] = x->frame.origin[1] - q[j + 1];
+    x->x[j + 1] = q[j] - x->frame.origin[0];
+    x->x[j + 2] = 1;
+  }
+  if (k == 2) pw_linear_turn (x, 1, v, x->x + x->n);
+}
+
+/* What the variation x violates of G dq = 0 and J dv + B dq = 0, scaled; y is that of x, J swept. */
+static double *linear_violation (pw_linearisation *x, double *out) {
+  const pw_system *s = x->r->s;
+  pw_mul_J (s, x->x, x->c);
+  for (int k = 0; k < x->holonomic; k++) *out++ = x->c[x->row[k]] / x->norm[x->row[k]] / s->scale.length;
+  pw_mul_J (s, x->x + x->n, x->c);
+  for (int k = 0; k < x->rank; k++) {
+    int i = x->row[k];
+    *out++ = (x->c[i] + x->y[x->n + x->m + i]) / x->norm[i] * s->scale.time / s->scale.length;
+  }
+  return out;
+}
+
+/* Everything that a displacement of the whole changes. */
+static void linear_change (pw_linearisation *x, int k, double *out) {
+  const double *dq = x->x, *dv = x->x + x->n;
+  linear_displace (x, k);
+  pw_linear_vary (x);
+  pw_linear_coordinates (x, dq, dv, 1, x->S + k * x->size);
+  out = linear_violation (x, out);
+  if (k == 2) pw_linear_turn (x, -1, x->a, x->da);
+  for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_rank_unit (x->r->s, j) / linear_unit (x);
+}
+
+/* Round-off grows with the derivatives of the accelerations. */
+static double linear_tolerance (const pw_linearisation *x) {
+  double most = 0, T = x->r->s->scale.time;
+  for (int i = x->positions; i < x->size; i++)
+    for (int k = 0; k < x->size; k++) most = pw_largest (most, fabs (x->A[i * x->size + k]) * T);
+  return LINEAR_SYMMETRIC + 1e-4 * LINEAR_SYMMETRIC * most;
+}
+
+static void linear_subtract (double *from, double factor, const double *what, int n) {
+  for (int i = 0; i < n; i++) from[i] -= factor * what[i];
+}
+
+/* Gram-Schmidt on the changes takes out the directions that change something, the most first; the same combinations of S
+ * stay. */
+int pw_linear_symmetries (pw_linearisation *x) {
+  int length = x->holonomic + x->rank + x->n, left = x->r->s->bodies > 0 ? 3 : 0;
+  double tolerance = linear_tolerance (x);
+  for (int k = 0; k < left; k++) linear_change (x, k, x->residual + k * length);
+  while (left > 0) {
+    int pivot = 0;
+    for (int k = 1; k < left; k++)
+      if (!(linear_norm (x->residual + k * length, length) <= linear_norm (x->residual + pivot * length, length)))
+        pivot = k;
+    double *r = x->residual + pivot * length, *S = x->S + pivot * x->size, norm = linear_norm (r, length);
+    if (norm <= tolerance) break;
+    left--;
+    for (int k = 0; k <= left; k++) {
+      double *other = x->residual + k * length, dot = 0;
+      if (k == pivot) continue;
+      for (int i = 0; i < length; i++) dot += r[i] * other[i];
+      linear_subtract (other, dot / (norm * norm), r, length);
+      linear_subtract (x->S + k * x->size, dot / (norm * norm), S, x->size);
+    }
+    memmove (r, x->residual + left * length, (size_t)length * sizeof *r);
+    memmove (S, x->S + left * x->size, (size_t)x->size * sizeof *S);
+  }
+  return left;
+}
+
+/* B = H B H, H = I - beta h h^T. */
+static void linear_reflect_both (double *B, const double *h, double beta, int n) {
+  for (int i = 0; i < n; i++) {
+    double dot = 0;
+    for (int k = 0; k < n; k++) dot += B[i * n + k] * h[k];
+    linear_subtract (B + i * n, beta * dot, h, n);
+  }
+  for (int k = 0; k < n; k++) {
+    double dot = 0;
+    for (int i = 0; i < n; i++) dot += B[i * n + k] * h[i];
+    for (int i = 0; i < n; i++) B[i * n + k] -= beta * dot * h[i];
+  }
+}
+
+int pw_linear_split (pw_linearisation *x, int k, double *B) {
+  int n = x->size;
+  double most = linear_norm (B, n * n), off = 0;
+  for (int c = 0; c < k; c++) {
+    double *h = x->S + c * n, norm = linear_norm (h + c, n - c), beta;
+    memset (h, 0, (size_t)c * sizeof *h);
+    h[c] += h[c] < 0 ? -norm : norm;
+    beta = 1 / (norm * fabs (h[c]));
+    if (!isfinite (beta)) return 0;
+    linear_reflect_both (B, h, beta, n);
+    for (int o = c + 1; o < k; o++) {
+      double dot = 0;
+      for (int i = c; i < n; i++) dot += h[i] * x->S[o * n + i];
+      linear_subtract (x->S + o * n, beta * dot, h, n);
+    }
+  }
+  for (int i = k; i < n; i++)
+    for (int c = 0; c < k; c++) off = pw_largest (off, fabs (B[i * n + c]));
+  return off <= LINEAR_SYMMETRIC * most;
+}
+
+/* ---- Steadiness ---- */
+
+/* A vector of all coordinates, turned by an angle with the frame. */
+static void linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out) {
+  double c = cos (angle), s = sin (angle);
+  memcpy (out, in, (size_t)x->n * sizeof *out);
+  for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
+    out[j] = c * in[j] - s * in[j + 1];
+    out[j + 1] = s * in[j] + c * in[j + 1];
+  }
+}
+
+/* Where a steady motion is after a time: turned with the frame about its origin, which has moved along an arc.  Angles,
+ * internal coordinates, and everything if the frame does not turn, go on at their own velocity. */
+static void linear_later (const pw_linearisation *x, double time, double *q, double *v) {
+  const pw_linear_frame *f = &x->frame;
+  double w = f->twist[2], c = cos (w * time), s = sin (w * time);
+  linear_rotate (x, w * time, x->r->v, v);
+  for (int j = 0; j < x->n; j++) q[j] = x->r->q[j] + time * x->r->v[j];
+  for (int j = 0; w != 0 && j < 3 * x->r->s->bodies; j += 3) {
+    double dx = x->r->q[j] - f->origin[0], dy = x->r->q[j + 1] - f->origin[1];
+    q[j] = f->origin[0] + c * dx - s * dy + (s * f->twist[0] - (1 - c) * f->twist[1]) / w;
+    q[j + 1] = f->origin[1] + s * dx + c * dy + ((1 - c) * f->twist[0] + s * f->twist[1]) / w;
+  }
+}
+
+/* Whether two vectors of accelerations agree as far as round-off and the steadiness allow. */
+static int linear_agree (const pw_linearisation *x, const double *a, const double *b) {
+  double off = 0, most = linear_unit (x);
+  for (int j = 0; j < x->n; j++) {
+    double unit = pw_rank_unit (x->r->s, j);
+    off = pw_largest (off, fabs (a[j] - b[j]) * unit);
+    most = fmax (most, fabs (b[j]) * unit);
+  }
+  return off <= LINEAR_STEADY * most;
+}
+
+/* Whether the equations and their linearisation are the same, but turned, after a time. */
+static int linear_same (pw_linearisation *x, double time) {
+  pw_system *s = x->r->s;
+  double angle = x->frame.twist[2] * time, *q = x->there, *v = q + x->n, *expected = x->z;
+  pw_residuals now;
+  linear_later (x, time, q, v);
+  if (pw_linear_evaluate (x, x->r->t + time, q, v) != PW_OK) return 0;
+  pw_sweep_residuals (s, x->r->active, &now);
+  if (!(now.position <= LINEAR_STEADY && now.velocity <= LINEAR_STEADY)) return 0;
+  linear_rotate (x, angle, x->a0, expected);
+  if (!linear_agree (x, x->a, expected)) return 0;
+  linear_rotate (x, angle, x->along, x->x);
+  linear_rotate (x, angle, x->along + x->n, x->x + x->n);
+  pw_linear_vary (x);
+  double *end = linear_violation (x, x->residual);
+  for (double *i = x->residual; i < end; i++)
+    if (!(fabs (*i) <= LINEAR_STEADY)) return 0;
+  linear_rotate (x, angle, x->response, expected);
+  return linear_agree (x, x->da, expected);
+}
+
+/* A variation in which every minimal coordinate has its part, and what follows from it. */
+static void linear_probe (pw_linearisation *x) {
+  memset (x->along, 0, 2 * (size_t)x->n * sizeof *x->along);
+  for (int c = 0; c < x->size; c++) {
+    double weight = x->r->s->scale.length * sin (1.7 + 2.39996 * (c + 1));
+    pw_linear_tangent (x, c);
+    linear_subtract (x->along, -weight, x->x, 2 * x->n);
+  }
+  memcpy (x->x, x->along, 2 * (size_t)x->n * sizeof *x->x);
+  pw_linear_vary (x);
+  memcpy (x->response, x->da, (size_t)x->n * sizeof *x->da);
+  memcpy (x->a0, x->a, (size_t)x->n * sizeof *x->a);
+}
+
+pw_steadiness pw_linear_steady (pw_linearisation *x) {
+  static const double share[] = { 0.0123, 0.31, 0.77, 1 };
+  pw_run *r = x->r;
+  double span = r->settings.span > 0 ? r->settings.span : r->s->scale.time;
+  if (!(x->frame.residual <= LINEAR_STEADY)) return PW_ACCELERATED;
+  if (!(pw_next_breakpoint (r->s, r->t) > r->t + span)) return PW_CHANGING;
+  linear_probe (x);
+  int same = linear_same (x, 0.137 * fmin (r->s->scale.time, span));
+  for (size_t i = 0; same && i < sizeof share / sizeof *share; i++) same = linear_same (x, share[i] * span);
+  return pw_linear_evaluate (x, r->t, r->q, r->v) == PW_OK && same ? PW_STEADY : PW_CHANGING;
+}
