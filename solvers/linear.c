@@ -230,18 +230,24 @@ static void linear_disturb (int n, double rate, double *B) {
   }
 }
 
-static double linear_nearest (const pw_linear *l, int i, int n, const double *re, const double *im) {
+/* Other eigenvalues, and how far from its own another one is at least. */
+typedef struct {
+  int n;
+  double *re, *im, least;
+} linear_others;
+
+static double linear_distance (const pw_linear *l, int i, const linear_others *o) {
   double nearest = INFINITY;
-  for (int k = 0; k < n; k++) nearest = fmin (nearest, hypot (l->re[i] - re[k], l->im[i] - im[k]));
-  return nearest;
+  for (int k = 0; k < o->n; k++) nearest = fmin (nearest, hypot (l->re[i] - o->re[k], l->im[i] - o->im[k]));
+  return fmax (nearest, o->least);
 }
 
 /* What is less than its uncertainty is 0, in the same way for both eigenvalues of a pair. */
-static void linear_clean (pw_linear *l, int first, int n, const double *re, const double *im) {
+static void linear_clean (pw_linear *l, int first, const linear_others *o) {
   for (int i = first, pair; i < l->unknowns; i += 1 + pair) {
     pair = l->im[i] > 0;
-    double uncertain = linear_nearest (l, i, n, re, im);
-    if (pair) uncertain = fmax (uncertain, linear_nearest (l, i + 1, n, re, im));
+    double uncertain = linear_distance (l, i, o);
+    if (pair) uncertain = fmax (uncertain, linear_distance (l, i + 1, o));
     for (int k = i; k <= i + pair; k++) {
       if (!(fabs (l->re[k]) > LINEAR_CERTAIN * uncertain)) l->re[k] = 0;
       if (!(fabs (l->im[k]) > LINEAR_CERTAIN * uncertain)) l->im[k] = 0;
@@ -254,15 +260,16 @@ static void linear_clean (pw_linear *l, int first, int n, const double *re, cons
 static int linear_solve (const pw_linearisation *x, pw_linear *l, int k, double *B) {
   int n = l->unknowns - k;
   size_t cells = (size_t)n * (size_t)n;
-  double *other = B + cells, *re = other + cells, *im = re + n, most = 0;
+  double *other = B + cells, most = 1 / x->r->s->scale.time;
   memcpy (other, B, cells * sizeof *B);
-  linear_disturb (n, 1 / x->r->s->scale.time, other);
+  linear_disturb (n, most, other);
   pw_eigen_balance (n, other);
   for (size_t i = 0; i < cells; i++) most = fmax (most, fabs (other[i]));
   linear_disturb (n, most, other);
-  if (pw_eigenvalues (n, B, l->re + k, l->im + k) != PW_OK || pw_eigenvalues (n, other, re, im) != PW_OK)
+  linear_others o = { n, other + cells, other + cells + n, LINEAR_ROUND * most };
+  if (pw_eigenvalues (n, B, l->re + k, l->im + k) != PW_OK || pw_eigenvalues (n, other, o.re, o.im) != PW_OK)
     return PW_RETRY;
-  linear_clean (l, k, n, re, im);
+  linear_clean (l, k, &o);
   return PW_OK;
 }
 

@@ -31,8 +31,9 @@ static void test_known_eigenvalues (void **state) {
   linear_turned (7, A);
   assert_int_equal (pw_eigenvalues (7, A, re, im), PW_OK);
   for (int i = 0; i < 7; i++) {
-    check_close ("re", re[i], known[i][0], 100 * CHECK_EPS * 7, "100 eps of the largest");
-    check_close ("im", im[i], known[i][1], 100 * CHECK_EPS * 7, "100 eps of the largest");
+    double nearest = INFINITY;
+    for (int k = 0; k < 7; k++) nearest = fmin (nearest, hypot (re[k] - known[i][0], im[k] - known[i][1]));
+    check_below ("nearest", nearest, 100 * CHECK_EPS * 7, "100 eps of the largest");
   }
 }
 
@@ -48,7 +49,6 @@ static void test_random_eigenvalues (void **state) {
   assert_int_equal (pw_eigenvalues (N, B, re, im), PW_OK);
   for (int i = 0; i < N; i++) {
     sum += re[i], squares += re[i] * re[i] - im[i] * im[i];
-    if (i > 0) check_below ("order", hypot (re[i], im[i]), hypot (re[i - 1], im[i - 1]) * (1 + CHECK_EPS), "eps");
     if (im[i] > 0) check_close ("pair", im[i + 1], -im[i], 0, "exact");
   }
   check_close ("trace", sum, trace, 100 * N * CHECK_EPS * size, "100 N eps");
@@ -81,6 +81,7 @@ static pw_linear linear_of (const pw_plugin_table *table) {
   pw_system *s = scene_system (table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   check_ok (pw_linearise (r, 100, &l, &error), &error);
+  for (int i = 1; i < l.unknowns; i++) assert_true (l.re[i] <= l.re[i - 1]);
   pw_close (r);
   pw_free (s);
   return l;
@@ -126,9 +127,9 @@ static void test_oscillator (void **state) {
   pw_linear l = linear_of (&table);
   assert_int_equal (l.unknowns, 6);
   assert_true (isnan (l.least));
-  linear_expect (&l, 0, -0.8, sqrt (60 / 1.5 - 0.64));
-  linear_expect (&l, 1, -0.8, -sqrt (60 / 1.5 - 0.64));
-  linear_expect (&l, 2, 0, 0);
+  linear_expect (&l, 4, -0.8, sqrt (60 / 1.5 - 0.64));
+  linear_expect (&l, 5, -0.8, -sqrt (60 / 1.5 - 0.64));
+  for (int i = 0; i < 4; i++) linear_expect (&l, i, 0, 0);
   pw_linear_close (&l);
 }
 
