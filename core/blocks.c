@@ -96,11 +96,16 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
     }
 }
 
+/* The scene's unit of a local column, or of its velocity. */
+static double blocks_unit (const pw_system *s, const pw_kind *kind, int c, int rates) {
+  double unit = c < 3 * kind->bodies && c % 3 < 2 ? s->scale.length : 1;
+  return rates ? unit / s->scale.time : unit;
+}
+
 /* A step in units of the scene, made exactly representable: where truncation, h^2 / unit^2, and the round-off of x, eps x / h,
  * are about the same. */
 static double blocks_step (const pw_system *s, const pw_kind *kind, int c, int rates, double x) {
-  double unit = c < 3 * kind->bodies && c % 3 < 2 ? s->scale.length : 1;
-  if (rates) unit /= s->scale.time;
+  double unit = blocks_unit (s, kind, c, rates);
   volatile double moved = x + unit * cbrt (2.3e-16 * fmax (1, fabs (x) / unit));
   return moved - x;
 }
@@ -121,6 +126,24 @@ void pw_difference (const pw_system *s, const pw_slab *k, int e, pw_block block,
     int ground = c < 3 * kind->bodies && k->column[e * kind->bodies + c / 3] >= s->coords;
     for (int r = 0; r < rows; r++) out[r * cols + c] = ground ? 0 : (plus[r] - minus[r]) / (2 * h);
   }
+}
+
+/* Differences of a function that does not depend on a variable are round-off of its value over the step: 4e-11. */
+#define BLOCKS_ZERO 1e-6
+
+int pw_block_missing (const pw_system *s, const pw_slab *k, int e, pw_block block) {
+  double value[PW_MAX_COLS], slope[PW_MAX_COLS * PW_MAX_COLS], most = 0;
+  const pw_kind *kind = k->kind;
+  int rows = pw_block_rows (kind, block), cols = k->b.cols;
+  blocks_single one;
+  if (pw_block_sweep (kind, block) || blocks_member (kind, blocks_table[block].below) == NULL) return 0;
+  blocks_isolate (k, e, &one);
+  blocks_value (kind, block, &one, value);
+  for (int r = 0; r < rows; r++) most = fmax (most, fabs (value[r]));
+  pw_difference (s, k, e, block, slope);
+  for (int i = 0; i < rows * cols; i++)
+    if (fabs (slope[i]) * blocks_unit (s, kind, i % cols, blocks_table[block].rates) > BLOCKS_ZERO * most) return 1;
+  return 0;
 }
 
 int pw_sweep_block (const pw_system *s, const pw_slab *k, pw_block block, double *out) {

@@ -1,6 +1,8 @@
-/* Tells which second-order blocks of a scene are differenced because their kind has no formula for them. */
+/* Which second-order blocks of a scene are differenced because their kind has no formula for them; which are missing. */
+#include <math.h>
 #include <stdio.h>
-#include "system.h"
+#include <stdlib.h>
+#include "specimen.h"
 
 static const char *const differences_name[PW_BLOCKS] = {
   [PW_JW_Q] = "jw_q",       [PW_JTL_Q] = "jtl_q",     [PW_ETA_Q] = "eta_q",     [PW_GAMMA_Q] = "gamma_q",
@@ -35,4 +37,62 @@ char *pw_difference_name (const pw_system *s, int i, char *buffer, size_t size) 
   else
     snprintf (buffer, size, "%s", "");
   return buffer;
+}
+
+/* ---- Missing ones ---- */
+
+static int differences_built_in (const pw_kind *kind) {
+  int i = 0;
+  while (pw_kinds[i] && pw_kinds[i] != kind) i++;
+  return pw_kinds[i] != NULL;
+}
+
+/* Elements of the slab that are looked at: the first, the last, one between. */
+static int differences_missing (pw_system *s, pw_slab *k, char *buffer, size_t size) {
+  const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
+  for (int b = 0; b < PW_BLOCKS; b++)
+    for (int i = 0; i < 3 && k->b.count > 0; i++) {
+      if (!pw_block_missing (s, k, element[i], (pw_block)b)) continue;
+      snprintf (buffer, size, "%s of element type %s", differences_name[b], k->kind->name);
+      return 1;
+    }
+  return 0;
+}
+
+static void differences_random (pw_random *random, double *x, int n) {
+  for (int i = 0; i < n; i++) x[i] = pw_random_between (random, -1, 1);
+}
+
+/* Directions, multipliers and signals of a slab are random. */
+static int differences_look (pw_system *s, pw_slab *k, pw_random *random, char *buffer, size_t size) {
+  int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
+  double *w = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *w);
+  if (w == NULL) return PW_MACHINE;
+  differences_random (random, w, cols + rows);
+  differences_random (random, k->u, 3 * k->b.count * k->kind->signals);
+  k->b.w = w, k->b.lambda = w + cols;
+  int found = differences_missing (s, k, buffer, size);
+  k->b.w = k->b.lambda = NULL;
+  free (w);
+  return found;
+}
+
+int pw_find_missing (pw_system *s, double t, const double *q, const double *v, char *buffer, size_t size) {
+  pw_random random = { 1 };
+  int own = 0, found = 0;
+  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) own += !differences_built_in (k->kind);
+  if (own == 0) return 0;
+  double *state = malloc ((2 * (size_t)s->coords + 1) * sizeof *state);
+  if (state == NULL) return PW_MACHINE;
+  for (int i = 0; i < 2 * s->coords; i++) {
+    int rate = i >= s->coords, j = rate ? i - s->coords : i;
+    double unit = pw_unit (s, j) / (rate ? s->scale.time : 1);
+    state[i] = (rate ? v[j] : q[j]) + 0.1 * unit * pw_random_between (&random, -1, 1);
+  }
+  pw_place (s, t, state, state + s->coords);
+  for (pw_slab *k = s->slab; found == 0 && k < s->slab + s->slabs; k++)
+    if (!differences_built_in (k->kind)) found = differences_look (s, k, &random, buffer, size);
+  free (state);
+  pw_hold (s, s->hold); /* signals are evaluated anew */
+  return found;
 }

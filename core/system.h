@@ -161,6 +161,15 @@ int pw_block_rows (const pw_kind *kind, pw_block block);
  * function below where the kind asks for it.  Returns 0 and leaves out alone where the block is identically zero. */
 int pw_sweep_block (const pw_system *s, const pw_slab *k, pw_block block, double *out);
 
+/* 1 if the kind leaves the block of element e out as identically zero, but by differences it is not; poses, w and lambda are
+ * placed. */
+int pw_block_missing (const pw_system *s, const pw_slab *k, int e, pw_block block);
+
+/* Looks for such a block near the state q, v at time t, in a few elements of each kind that is not built in (these pass the
+ * self-test).  1 and its name ("force_q of element type well"), written to the buffer; 0 if there is none; PW_MACHINE.
+ * The state has to be placed again afterwards. */
+int pw_find_missing (pw_system *s, double t, const double *q, const double *v, char *buffer, size_t size);
+
 /* The same block of element e by central differences, whatever the kind provides; for the self-test as well. */
 void pw_difference (const pw_system *s, const pw_slab *k, int e, pw_block block, double *out);
 

@@ -27,6 +27,7 @@ struct pw_run {
   int near;              /* 1 as soon as one was near */
   double calm;           /* the largest accelerations away from singular poses, in units of L / T^2; at least 1 */
   double before;         /* those of the last state away from them */
+  int differentiates;    /* 1: the method uses the derivatives of the equations (tangent.h) */
   double alpha, beta;    /* Baumgarte's, used by pw_accelerate; 0: none */
   double breakpoint;     /* first discontinuity of a signal after t */
   int stuck;             /* steps in a row that were as good as none */

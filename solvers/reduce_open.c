@@ -177,9 +177,10 @@ static int reduce_lay_out (pw_reduce *r, const reduce_plan *p) {
 
 static int reduce_undetermined (const pw_system *s, int j, pw_error *error) {
   char name[120];
+  const char *lacking = pw_is_angle (s, j) ? "inertia" : "mass";
   return pw_fail (error, PW_INPUT,
-                  "model %s: %s has no mass, and no constraint determines how it moves; give it mass, or constrain it",
-                  s->model, pw_state_name (s, j, name, sizeof name));
+                  "model %s: %s has no %s, and no constraint determines how it moves; give it %s, or constrain it",
+                  s->model, pw_state_name (s, j, name, sizeof name), lacking, lacking);
 }
 
 /* Marks the light columns and says which of them no row determines. */

@@ -109,6 +109,20 @@ static int run_check_finite (pw_run *r, pw_error *error) {
                   pw_state_name (r->s, wild, element, sizeof element));
 }
 
+/* A method that uses derivatives would run with a wrong matrix where an element type leaves one out. */
+static int run_check_derivatives (pw_run *r, const char *method, pw_error *error) {
+  char block[200];
+  if (!r->differentiates) return PW_OK;
+  int found = pw_find_missing (r->s, r->t, r->q, r->v, block, sizeof block);
+  if (found == PW_MACHINE) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (found == 0)
+    return pw_place (r->s, r->t, r->q, r->v) == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "a signal failed");
+  return pw_fail (
+      error, PW_INPUT,
+      "model %s: %s is left out, but it is not zero, and %s needs it: add it, or PW_BY_DIFFERENCES in its place",
+      r->s->model, block, method);
+}
+
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
   pw_settings none = { 0 };
   r->s->failed = NULL;
@@ -127,7 +141,8 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->s->scale.time = run_time_scale (r);
   pw_count_moved (r);
   status = run_begin (r, error);
-  return status == PW_OK ? r->method->open (r, error) : status;
+  if (status == PW_OK) status = r->method->open (r, error);
+  return status == PW_OK ? run_check_derivatives (r, method, error) : status;
 }
 
 /* A run that has the system to itself: two would move the poses under each other's feet. */

@@ -24,6 +24,7 @@ static int tangent_number_rows (pw_tangent *x) {
 
 int pw_tangent_open (pw_tangent *x, pw_run *r) {
   *x = (pw_tangent){ .run = r };
+  r->differentiates = 1;
   x->lambda = calloc ((size_t)(2 * r->s->rows) + 1, sizeof *x->lambda);
   if (x->lambda == NULL) return PW_MACHINE;
   x->mu = x->lambda + r->s->rows;

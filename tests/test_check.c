@@ -1,5 +1,6 @@
 /* pinwheel check: what it says of models whose mobility, vibrations and faults are known. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include "check.h"
 #include "cli.h"
@@ -122,6 +123,17 @@ static void test_broken_kind (void **state) {
   check_shows ("{\"check\": \"force_q\", \"in\": \"random scenes\", \"expected\": \"force_q = d force/dq\"");
   check_shows ("{\"check\": \"force_q\", \"in\": \"this model\"");
   check_shows ("\"status\": \"failed\"");
+  static const char *const implicit[] = { "ida+ggl", "bdf", "galpha+ggl", "leapfrog" };
+  char command[100], message[300];
+  for (size_t i = 0; i < sizeof implicit / sizeof *implicit; i++) {
+    snprintf (command, sizeof command, "pinwheel run @/broken.c --method %s --t-end 0.1", implicit[i]);
+    snprintf (message, sizeof message,
+              "model broken: force_q of element type well is left out, but it is not zero, and %s needs it: add it, or "
+              "PW_BY_DIFFERENCES in its place",
+              implicit[i]);
+    cli_bad (command, 2, message);
+  }
+  cli_shell ("pinwheel run @/broken.c --method rk4 --t-end 0.1");
 }
 
 /* The derivatives of a signal that reads states: the function's own, wrong by a factor. */

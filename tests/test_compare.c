@@ -97,7 +97,17 @@ static void test_orders (void **state) {
     assert_true (compare_number ("order/compare.csv", row, MOST) >= compare_number ("order/compare.csv", row, END));
     assert_true (compare_number ("order/compare.csv", row, BALANCE) > 0);
     assert_true (compare_number ("order/compare.csv", row, REPEATS) == 3);
+    if (row % 3 < 2) assert_string_equal (compare_cell ("order/compare.csv", row, ORDER), "nan");
   }
+}
+
+/* Outside the asymptotic range, here next to the reference's uncertainty, levels disagree and no order is given. */
+static void test_no_order (void **state) {
+  (void)state;
+  cli_good ("pinwheel compare ezyroller --methods erk5+projection:steps=fixed --t-end 2 --step-ladder 0.05:0.0125 "
+            "--repeats 3 -o @/round");
+  assert_string_equal (compare_cell ("round/compare.csv", 2, BELOW), "");
+  for (int row = 0; row < 3; row++) assert_string_equal (compare_cell ("round/compare.csv", row, ORDER), "nan");
 }
 
 /* What a row says about cost is what a run says: neither samples nor accounts are counted. */
@@ -274,10 +284,10 @@ static int compare_setup (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_rows),      cmocka_unit_test (test_orders),    cmocka_unit_test (test_row_is_run),
-    cmocka_unit_test (test_truth),     cmocka_unit_test (test_own_truth), cmocka_unit_test (test_jump),
-    cmocka_unit_test (test_all),       cmocka_unit_test (test_limit),     cmocka_unit_test (test_failure),
-    cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_rows),       cmocka_unit_test (test_orders),    cmocka_unit_test (test_no_order),
+    cmocka_unit_test (test_row_is_run), cmocka_unit_test (test_truth),     cmocka_unit_test (test_own_truth),
+    cmocka_unit_test (test_jump),       cmocka_unit_test (test_all),       cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_failure),    cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad),
   };
   return cmocka_run_group_tests (tests, compare_setup, cli_teardown);
 }

@@ -96,7 +96,7 @@ static int compare_ladder (pw_compare *x, const pw_contestant *method, pw_motion
     else
       status = pw_compare_row (x, r, scratch, error);
     if (status != PW_OK) break;
-    r->order = x->rows > first ? pw_compare_order (r - 1, r) : NAN;
+    r->order = pw_compare_order (x, r, x->rows - first);
     x->rows++;
     pw_progress_end (&x->progress);
     pw_compare_line (x, r, stdout);

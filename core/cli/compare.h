@@ -81,9 +81,9 @@ double pw_compare_rung (const pw_ladder *ladder, int adaptive, int i);
 /* One run of a method to the end, or the limit.  With a motion, its samples are taken and accounts are kept.  PW_RETRY:
  * interrupted, or r->state is COMPARE_STOPPED. */
 int pw_compare_run (pw_compare *x, pw_rung *r, pw_motion *motion, pw_error *error);
-/* The order observed between two rungs of a ladder: log (error before / error) over log (steps / steps before); NaN
- * where an error is not known or no better than the truth, and where the steps are much the same. */
-double pw_compare_order (const pw_rung *before, const pw_rung *r);
+/* The observed order of convergence at a tolerance level with `before` levels of its method before it: only in the asymptotic
+ * range, where the last two orders agree and errors are well above the reference's uncertainty; else NaN. */
+double pw_compare_order (const pw_compare *x, const pw_rung *r, int before);
 /* Fills a row: errors, then times.  PW_RETRY if interrupted; PW_MACHINE, PW_START; a method's failure is in the row. */
 int pw_compare_row (pw_compare *x, pw_rung *r, pw_motion *scratch, pw_error *error);
 

@@ -8,6 +8,8 @@
 #define ROW_LONG 0.02
 #define ROW_FEW 3      /* repeats at least, unless the limit forbids it */
 #define ROW_FINER 1.2  /* times as many steps tell an order */
+#define ROW_CLEAR 10   /* times the reference's uncertainty: halved steps then tell an order to log2 1.1 = 0.14 */
+#define ROW_AGREE 0.1  /* of an order: by no more than that the last two differ in the asymptotic range */
 #define ROW_ENOUGH 0.5 /* more are made until they have taken so long [s] */
 
 /* ---- A run ---- */
@@ -82,12 +84,21 @@ static void row_errors (const pw_compare *x, pw_rung *r, const pw_motion *m) {
   }
 }
 
-double pw_compare_order (const pw_rung *before, const pw_rung *r) {
+/* log (error before / error) over log (steps / steps before); NaN where an error is not known or may be the reference's by more
+ * than a tenth, and where the steps are much the same. */
+static double row_order (const pw_compare *x, const pw_rung *r) {
+  const pw_rung *before = r - 1;
   int i = isnan (r->error[MOTION_MOST]) ? MOTION_MOST + MOTION_ANGLE : MOTION_MOST;
-  int known = before->state == COMPARE_DONE && r->state == COMPARE_DONE && !((before->below | r->below) >> i & 1);
+  int known =
+      before->state == COMPARE_DONE && r->state == COMPARE_DONE && r->error[i] > ROW_CLEAR * x->truth.uncertainty[i];
   double finer =
       r->method->adaptive ? (double)r->statistics.steps / (double)before->statistics.steps : before->rung / r->rung;
   return known && finer > ROW_FINER ? log (before->error[i] / r->error[i]) / log (finer) : NAN;
+}
+
+double pw_compare_order (const pw_compare *x, const pw_rung *r, int before) {
+  double order = before >= 2 ? row_order (x, r) : NAN, last = before >= 2 ? row_order (x, r - 1) : NAN;
+  return order > 0 && fabs (order - last) <= ROW_AGREE * order ? order : NAN;
 }
 
 static int row_compare (const void *a, const void *b) {
