@@ -8,6 +8,8 @@
 #include "eigen.h"
 #include "pinwheel.h"
 
+enum { EIGEN_PATIENCE = 6 /* steps; most blocks take 2 to 4 */ };
+
 #define A(i, j) A[(size_t)(i) * (size_t)n + (size_t)(j)]
 
 /* ---- Preparation ---- */
@@ -88,12 +90,13 @@ static void eigen_step (int n, double *A, int low, int high, double s, double p)
   }
 }
 
-/* The first row of the last block that does not fall apart: the entry left of it is negligible. */
-static int eigen_block (int n, double *A, int high) {
+/* The first row of the last block that does not fall apart: the entry left of it is negligible beside its neighbours, or below
+ * `least`. */
+static int eigen_block (int n, double *A, int high, double least) {
   int low = high;
   for (; low > 0; low--) {
     double size = fabs (A (low, low)) + fabs (A (low - 1, low - 1));
-    if (fabs (A (low, low - 1)) <= DBL_EPSILON * size || fabs (A (low, low - 1)) < DBL_MIN) break;
+    if (fabs (A (low, low - 1)) <= DBL_EPSILON * size || fabs (A (low, low - 1)) < least) break;
   }
   if (low > 0) A (low, low - 1) = 0;
   return low;
@@ -116,10 +119,14 @@ static void eigen_pair (int n, const double *A, int i, double *re, double *im) {
   im[i] = im[i + 1] = 0;
 }
 
-/* Shifts are the eigenvalues of the last two rows; now and then others, should those go round in circles. */
+/* Shifts are the eigenvalues of the last two rows; after 10 and 20 steps others, as in EISPACK, should those go round in
+ * circles.  Round-off of the largest entry can keep one beside small neighbours from becoming negligible: after some steps it
+ * decides. */
 static int eigen_iterate (int n, double *A, double *re, double *im) {
+  double most = 0;
+  for (size_t i = 0; i < (size_t)n * (size_t)n; i++) most = fmax (most, fabs (A[i]));
   for (int high = n - 1, tries = 0; high >= 0;) {
-    int low = eigen_block (n, A, high);
+    int low = eigen_block (n, A, high, tries > EIGEN_PATIENCE ? 8 * DBL_EPSILON * most : DBL_MIN);
     if (low == high) re[high] = A (high, high), im[high] = 0;
     if (low == high - 1) eigen_pair (n, A, low, re, im);
     if (low >= high - 1) {
@@ -129,7 +136,7 @@ static int eigen_iterate (int n, double *A, double *re, double *im) {
     }
     double s = A (high, high) + A (high - 1, high - 1);
     double p = A (high, high) * A (high - 1, high - 1) - A (high, high - 1) * A (high - 1, high);
-    if (++tries % 10 == 0) {
+    if (++tries == 10 || tries == 20) {
       double size = fabs (A (high, high - 1)) + fabs (A (high - 1, high - 2));
       s = 1.5 * size, p = size * size;
     }

@@ -230,33 +230,44 @@ static void linear_disturb (int n, double rate, double *B) {
   }
 }
 
-/* Other eigenvalues, and how far from its own another one is at least. */
-typedef struct {
-  int n;
-  double *re, *im, least;
-} linear_others;
+static int linear_ascending (const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
 
-static double linear_distance (const pw_linear *l, int i, const linear_others *o) {
-  double nearest = INFINITY;
-  for (int k = 0; k < o->n; k++) nearest = fmin (nearest, hypot (l->re[i] - o->re[k], l->im[i] - o->im[k]));
-  return fmax (nearest, o->least);
+/* How far each eigenvalue moves: to the nearest one of the disturbed matrix, and in modulus to the one of its rank there, for
+ * among many defective ones the nearest says little; `least` in any case.  The moduli of the disturbed ones replace them. */
+static void linear_shift (int n, const double *re, const double *im, double *re2, const double *im2, double least,
+                          double *shift) {
+  for (int i = 0; i < n; i++) {
+    shift[i] = INFINITY;
+    for (int k = 0; k < n; k++) shift[i] = fmin (shift[i], hypot (re[i] - re2[k], im[i] - im2[k]));
+    shift[i] = fmax (shift[i], least);
+  }
+  for (int k = 0; k < n; k++) re2[k] = hypot (re2[k], im2[k]);
+  qsort (re2, (size_t)n, sizeof *re2, linear_ascending);
+  for (int i = 0; i < n; i++) {
+    double size = hypot (re[i], im[i]);
+    int rank = 0;
+    for (int k = 0; k < n; k++) rank += hypot (re[k], im[k]) < size || (hypot (re[k], im[k]) == size && k < i);
+    shift[i] = fmax (shift[i], fabs (size - re2[rank]));
+  }
 }
 
 /* What is less than its uncertainty is 0, in the same way for both eigenvalues of a pair. */
-static void linear_clean (pw_linear *l, int first, const linear_others *o) {
-  for (int i = first, pair; i < l->unknowns; i += 1 + pair) {
-    pair = l->im[i] > 0;
-    double uncertain = linear_distance (l, i, o);
-    if (pair) uncertain = fmax (uncertain, linear_distance (l, i + 1, o));
+static void linear_clean (int n, double *re, double *im, const double *shift) {
+  for (int i = 0, pair; i < n; i += 1 + pair) {
+    pair = im[i] > 0;
+    double uncertain = LINEAR_CERTAIN * fmax (shift[i], shift[i + pair]);
     for (int k = i; k <= i + pair; k++) {
-      if (!(fabs (l->re[k]) > LINEAR_CERTAIN * uncertain)) l->re[k] = 0;
-      if (!(fabs (l->im[k]) > LINEAR_CERTAIN * uncertain)) l->im[k] = 0;
+      if (!(fabs (re[k]) > uncertain)) re[k] = 0;
+      if (!(fabs (im[k]) > uncertain)) im[k] = 0;
     }
   }
 }
 
 /* The eigenvalues that follow the first k, of B, and those of the same matrix with errors, which tell how far they are
- * certain.  Behind B there is room for as much again and two vectors. */
+ * certain.  Behind B there is room for as much again and three vectors. */
 static int linear_solve (const pw_linearisation *x, pw_linear *l, int k, double *B) {
   int n = l->unknowns - k;
   size_t cells = (size_t)n * (size_t)n;
@@ -266,10 +277,11 @@ static int linear_solve (const pw_linearisation *x, pw_linear *l, int k, double 
   pw_eigen_balance (n, other);
   for (size_t i = 0; i < cells; i++) most = fmax (most, fabs (other[i]));
   linear_disturb (n, most, other);
-  linear_others o = { n, other + cells, other + cells + n, LINEAR_ROUND * most };
-  if (pw_eigenvalues (n, B, l->re + k, l->im + k) != PW_OK || pw_eigenvalues (n, other, o.re, o.im) != PW_OK)
+  double *re = other + cells, *im = re + n, *shift = im + n;
+  if (pw_eigenvalues (n, B, l->re + k, l->im + k) != PW_OK || pw_eigenvalues (n, other, re, im) != PW_OK)
     return PW_RETRY;
-  linear_clean (l, k, &o);
+  linear_shift (n, l->re + k, l->im + k, re, im, LINEAR_ROUND * most, shift);
+  linear_clean (n, l->re + k, l->im + k, shift);
   return PW_OK;
 }
 
@@ -278,7 +290,7 @@ static int linear_solve (const pw_linearisation *x, pw_linear *l, int k, double 
 static int linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
   int n = l->unknowns, k = l->symmetries;
   size_t cells = (size_t)n * (size_t)n;
-  double *B = malloc ((2 * cells + 2 * (size_t)n + 1) * sizeof *B);
+  double *B = malloc ((2 * cells + 3 * (size_t)n + 1) * sizeof *B);
   if (B == NULL) return PW_MACHINE;
   memcpy (B, x->A, cells * sizeof *B);
   if (!pw_linear_split (x, k, B)) {

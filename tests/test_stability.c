@@ -377,11 +377,18 @@ static void test_finding (void **state) {
   stability_shows ("\nNothing is wrong\n");
 }
 
+/* Hundreds of defective zeros, which round-off spreads over a circle: the QR algorithm converges, and they are 0. */
+static void test_many_zeros (void **state) {
+  (void)state;
+  cli_good ("pinwheel check chain --set n=130");
+  stability_shows ("  eigenvalues                        all 0: nothing vibrates, grows or decays\n");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_trailers), cmocka_unit_test (test_defective), cmocka_unit_test (test_sleigh),
     cmocka_unit_test (test_car),      cmocka_unit_test (test_scenes),    cmocka_unit_test (test_disturbed),
-    cmocka_unit_test (test_text),     cmocka_unit_test (test_finding),
+    cmocka_unit_test (test_text),     cmocka_unit_test (test_finding),   cmocka_unit_test (test_many_zeros),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }
