@@ -216,12 +216,22 @@ static int stability_reader (void *context, double t, const double *x, double va
   return 0;
 }
 
+/* The same, of a stiffness that changes with time: at phi = 0 no acceleration tells (Mathieu's equation). */
+static int stability_mathieu (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context;
+  value[0] = -(2 + sin (t)) * x[0];
+  if (gradient) gradient[0] = -(2 + sin (t));
+  return 0;
+}
+
 static const char *const stability_reads[] = { "body.phi", NULL };
 static const pw_signal stability_torques[] = {
   { PW_CONSTANT, { 0 } },
   { PW_HARMONIC, .harmonic = { 1, 3, -PW_PI / 2, 0 } },
   { PW_SMOOTH_STEP, .ramp = { .from = 0, .to = 1, .start = 3, .duration = 1 } },
   { PW_FUNCTION, .function = { .eval = stability_reader, .reads = stability_reads } },
+  { PW_FUNCTION, .function = { .eval = stability_mathieu, .reads = stability_reads } },
+  { PW_PULSE, .pulse = { .height = 100, .start = 7.0003, .width = 0.01 } },
 };
 
 static void stability_scene (pw_model *m, const void *parameters) {
@@ -266,6 +276,8 @@ static void test_scenes (void **state) {
     { .torque = 1, .phi = 0.3, .v = 2, .steady = PW_CHANGING, .symmetries = 3 },
     { .torque = 2, .phi = 0.3, .v = 2, .steady = PW_CHANGING, .symmetries = 3 },
     { .pinned = 1, .torque = 3, .phi = 0, .steady = PW_STEADY, .square = -2 / J },
+    { .pinned = 1, .torque = 4, .phi = 0, .steady = PW_CHANGING, .square = -2 / J },
+    { .torque = 5, .phi = 0.3, .v = 2, .steady = PW_CHANGING, .symmetries = 3 },
     { .torque = 3, .phi = 0, .v = 1, .steady = PW_STEADY, .symmetries = 2, .square = -1 },
   };
   (void)state;

@@ -179,9 +179,9 @@ static void text_stability (const pw_check *x) {
   char text[100], a[32];
   const pw_linear *l = &x->linear;
   double slowest = -INFINITY;
-  if (l->steady != PW_STEADY) return;
   for (int i = 0; i < l->unknowns; i++)
     if (!l->rigid[i]) slowest = fmax (slowest, l->re[i]);
+  if (l->steady != PW_STEADY || isinf (slowest)) return;
   if (slowest > 0)
     snprintf (text, sizeof text, "unstable, doubles in %s s", pw_format (a, pw_check_doubling (x), CHECK_DIGITS));
   else if (slowest < 0)
