@@ -272,14 +272,14 @@ static int condense_try_large (pw_plan *c) {
 
 /* ---- */
 
-static pw_panel *condense_take (const pw_plan *c, pw_layout *l, int is_small) {
+static pw_body_block *condense_take (const pw_plan *c, pw_layout *l, int is_small) {
   struct pw_saddle *k = c->k;
   k->force = pw_take (l, k->reduce.components ? (size_t)k->s->coords + 3 : 0, sizeof *k->force);
   k->y = pw_take (l, k->more ? (size_t)(k->s->rows + k->more) : 0, sizeof *k->y);
   k->extra = pw_take (l, (size_t)k->extras, sizeof *k->extra);
   k->idle = pw_take (l, (size_t)k->idles, sizeof *k->idle);
   k->small = is_small ? pw_take (l, 1, sizeof *k->small) : NULL;
-  return is_small ? pw_take (l, (size_t)c->groups, sizeof (pw_panel)) : NULL;
+  return is_small ? pw_take (l, (size_t)c->groups, sizeof (pw_body_block)) : NULL;
 }
 
 /* The rows that are not simply rows of the right-hand side; nodes come in the order of their rows. */
@@ -331,10 +331,10 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows) {
   k->memory = malloc (l.used + 1);
   if (k->memory == NULL) return PW_MACHINE;
   l = (pw_layout){ k->memory, 0 };
-  pw_panel *panel = condense_take (c, &l, is_small);
+  pw_body_block *block = condense_take (c, &l, is_small);
   condense_fill_rows (c, rows);
   if (!is_small) return condense_try_large (c);
-  pw_condense_small (c, weight, panel);
+  pw_condense_small (c, weight, block);
   return PW_OK;
 }
 

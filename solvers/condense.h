@@ -101,8 +101,8 @@ static inline int pw_plan_kept (const pw_plan *c, int j) {
  * PW_MACHINE. */
 int pw_condense_chains (pw_plan *c, pw_ldl *ldl);
 
-/* Fills k->small, with room for c->groups panels. */
-void pw_condense_small (const pw_plan *c, const double *weight, pw_panel *panel);
+/* Fills k->small, with room for c->groups blocks. */
+void pw_condense_small (const pw_plan *c, const double *weight, pw_body_block *block);
 
 /* Makes k->large; the pattern becomes its own.  Errors: PW_MACHINE. */
 int pw_condense_large (pw_plan *c, pw_ldl *ldl);

@@ -1,7 +1,6 @@
-/* Planning of a small scene: the order of its rows, and a panel for each body or own coordinate; see condense.h. */
+/* Planning of a scene of few constraint equations: a block for each body and internal coordinate; see condense.h. */
 #include "condense.h"
 #include "skyline.h"
-#include "small_shapes.h"
 
 /* ---- Order ---- */
 
@@ -11,8 +10,8 @@ static int condense_bits (unsigned long long x) {
   return n;
 }
 
-/* An order of the nodes in which those that touch the same panel (a bit of `touched`) are near each other: next is always
- * the one that begins fewest panels and shares most with those before it. */
+/* An order of the nodes in which those that touch the same body (a bit of `touched`) are near each other: next is always
+ * the one that adds fewest bodies and shares most with those before it. */
 static void condense_sort_nodes (int nodes, const unsigned long long *touched, int *order) {
   unsigned long long begun = 0;
   unsigned done = 0;
@@ -28,8 +27,8 @@ static void condense_sort_nodes (int nodes, const unsigned long long *touched, i
   }
 }
 
-/* Puts the nodes in an order in which those of a panel are neighbours. */
-static void condense_order_small (const pw_plan *c, int *place) {
+/* Positions of the nodes, those of one body near each other. */
+static void condense_order (const pw_plan *c, int *place) {
   unsigned long long touched[PW_SMALL] = { 0 };
   int order[PW_SMALL], y = 0, bodies = c->k->s->bodies;
   for (int p = 0; p < c->pieces; p++) {
@@ -43,90 +42,52 @@ static void condense_order_small (const pw_plan *c, int *place) {
   }
 }
 
-/* ---- Panels ---- */
+/* ---- Blocks ---- */
 
-/* 1 if a panel's rows have no columns that those of the shape do not have. */
-static int condense_fits (const pw_panel *p, unsigned shape) {
-  if (p->rows != small_rows (shape)) return 0;
-  for (int r = 0; r < p->rows; r++)
-    if (p->columns[r] & ~small_columns (shape, r)) return 0;
-  return 1;
+/* Adds an equation, keeping positions ascending. */
+static void condense_add_row (pw_body_block *b, int position, const double *J) {
+  int r = b->rows++;
+  for (; r > 0 && b->at[r - 1] > position; r--) b->at[r] = b->at[r - 1], b->J[r] = b->J[r - 1];
+  b->at[r] = position;
+  b->J[r] = J;
 }
 
-static unsigned condense_shape (const pw_panel *p) {
-#define SMALL_SHAPE(shape) \
-  if (p->width == 3 && condense_fits (p, shape)) return shape;
-  SMALL_SHAPES
-#undef SMALL_SHAPE
-  return 0;
-}
-
-/* Adds rows to a panel, whose position `first` is the first one's: their first column is at J, the next row `step`
- * further on.  unit: they are two, and their x and y columns a multiple of the unit matrix. */
-static void condense_add_rows (pw_small *k, pw_panel *p, int first, int rows, const double *J, int step, int unit) {
-  static const double zero[3] = { 0, 0, 0 };
-  pw_panel was = *p;
-  int from = was.rows > 0 && was.first < first ? was.first : first;
-  int end = was.rows > 0 && was.first + was.rows > first + rows ? was.first + was.rows : first + rows;
-  for (int i = from; i < end; i++) {
-    int old = i - was.first, new = i - first;
-    if (new >= 0 && new < rows) {
-      p->J[i - from] = J + new *step;
-      p->columns[i - from] = (unsigned char)(!unit ? 7 : new == 0 ? 5 : 6);
-    } else {
-      p->J[i - from] = old >= 0 && old < was.rows ? was.J[old] : zero;
-      p->columns[i - from] = old >= 0 && old < was.rows ? was.columns[old] : 0;
-    }
+static void condense_fill_block (const pw_plan *c, pw_body_block *b, const int *place) {
+  for (int x = c->start[b->j]; x < c->start[b->j + 1]; x++) {
+    const pw_plan_piece *piece = &c->piece[c->list[x]];
+    int node = c->node_of[c->list[x]];
+    for (int r = 0; r < c->node[node].size; r++) condense_add_row (b, place[node] + r, piece->J + r * piece->step);
   }
-  p->first = from;
-  p->rows = end - from;
-  p->S = k->S + from * (k->n + 1);
-  p->y = k->y + from;
 }
 
-/* After the last rows. */
-static void condense_close_panel (pw_panel *p) {
-  int rows = 0;
-  p->shape = condense_shape (p);
-  for (int r = 0; r < p->rows; r++) {
-    if (p->columns[r] == 0 && p->shape == 0) continue;
-    p->J[rows] = p->J[r];
-    p->columns[rows] = p->columns[r];
-    p->at[rows++] = (unsigned char)r;
-  }
-  p->gaps = rows < p->rows;
-  p->rows = rows;
-}
-
-/* Coordinates that are all without weight need no panel: their accelerations are found elsewhere. */
-static void condense_fill_panels (const pw_plan *c, const double *weight, const int *place) {
+/* Coordinates that are all without weight need no block: their accelerations are found elsewhere. */
+static void condense_fill_blocks (const pw_plan *c, const double *weight, const int *place) {
+  pw_small *small = c->k->small;
   for (int n = 0; n < c->groups; n++) {
-    int j = pw_plan_group (c, n), width = pw_plan_width (c, j), heavy = 0;
-    for (int i = 0; i < width; i++) heavy |= weight[j + i] != 0;
-    if (!heavy) continue;
-    pw_panel *p = c->k->small->end++;
-    *p = (pw_panel){ .w = c->k->inverse + j, .j = j, .width = width };
-    for (int x = c->start[j]; x < c->start[j + 1]; x++) {
-      const pw_plan_piece *piece = &c->piece[c->list[x]];
-      int node = c->node_of[c->list[x]];
-      condense_add_rows (c->k->small, p, place[node], c->node[node].size, piece->J, piece->step, piece->unit);
-    }
-    condense_close_panel (p);
+    int j = pw_plan_group (c, n), width = pw_plan_width (c, j), has_weight = 0;
+    for (int i = 0; i < width; i++) has_weight |= weight[j + i] != 0;
+    if (!has_weight) continue;
+    *small->end = (pw_body_block){ .w = c->k->inverse + j, .j = j, .width = width };
+    condense_fill_block (c, small->end++, place);
   }
 }
 
-void pw_condense_small (const pw_plan *c, const double *weight, pw_panel *panel) {
+static void condense_skyline (pw_small *small) {
+  for (int i = 0; i < small->n; i++) small->begin[i] = i;
+  for (const pw_body_block *b = small->block; b < small->end; b++)
+    for (int r = 0; r < b->rows; r++)
+      if (b->at[0] < small->begin[b->at[r]]) small->begin[b->at[r]] = b->at[0];
+  pw_skyline_open (small->begin, small->n);
+}
+
+void pw_condense_small (const pw_plan *c, const double *weight, pw_body_block *block) {
   struct pw_saddle *k = c->k;
   pw_small *small = k->small;
   int place[PW_SMALL];
-  *small = (pw_small){ .n = k->unknowns, .panel = panel, .end = panel, .guard = k->guard };
-  condense_order_small (c, place);
-  condense_fill_panels (c, weight, place);
-  for (int i = 0; i < small->n; i++) small->begin[i] = i;
-  for (const pw_panel *p = small->panel; p < small->end; p++)
-    for (int r = 0; r < p->rows; r++)
-      if (p->first < small->begin[p->first + p->at[r]]) small->begin[p->first + p->at[r]] = p->first;
-  pw_skyline_open (small->begin, small->n);
+  *small = (pw_small){ .n = k->unknowns, .block = block, .end = block, .guard = k->guard };
+  condense_order (c, place);
+  condense_fill_blocks (c, weight, place);
+  condense_skyline (small);
   k->plain = k->reduce.components == 0 && k->idles == 0 ? small : NULL;
   for (int n = 0; n < c->nodes; n++)
     for (int r = 0; r < c->node[n].size; r++) small->row[place[n] + r] = c->node[n].y + r;

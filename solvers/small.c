@@ -1,146 +1,89 @@
-/* Small scenes; see small.h.
+/* Scenes of few constraint equations; see small.h.
  *
  * Dense L D L^T by rows (Golub & Van Loan 2013, Matrix Computations, algorithm 4.1.1), two at a time:
  *
  *   c_ij = S_ij - sum_{k < j} c_ik L_jk,   L_ij = c_ij / d_j,   d_i = S_ii - sum_{k < i} c_ik L_ik
  *   i, i + 1:  det = d_i s - c c,   1 / d_{i+1} = d_i / det,    c = c_{i+1 i},  s = S_{i+1 i+1} - sum_{k < i} ...
  *
- * so that the two divisions of a pair do not wait for each other.  The functions are written once for a constant size
- * and compiled for each, so that their loops vanish. */
+ * so that the two divisions of a pair do not wait for each other.  The functions are written once and compiled for each
+ * constant size, so that their loops vanish. */
 #include "skyline.h"
 #include "small.h"
-#include "small_shapes.h"
 #include "unroll.h"
 
 PW_ONE_BY_ONE
 
-/* ---- Panels of 3 columns, the shape a constant ---- */
+/* ---- Body blocks; their width is a constant where these are inlined ---- */
 
-/* Over the columns that both rows have. */
-PW_INLINE double small_dot (const double *a, const double *b, unsigned columns) {
-  return columns == 7   ? a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-         : columns == 5 ? a[0] * b[0] + a[2] * b[2]
-         : columns == 6 ? a[1] * b[1] + a[2] * b[2]
-                        : a[2] * b[2];
-}
-
-/* S += J W^-1 J^T over one panel (in S of n columns its lower triangle) unless n = 0; y += J W^-1 f unless there is no f. */
-PW_INLINE void small_add (const pw_panel *p, const double *f, int n, unsigned shape) {
-  const int rows = small_rows (shape);
-  const double *w = p->w;
-  double J[PW_SMALL][3], z[3], *S = p->S, *y = p->y;
-  PW_UNROLL for (int r = 0; r < rows; r++) {
-    const double *from = p->J[r];
-    J[r][0] = from[0], J[r][1] = from[1], J[r][2] = from[2];
-  }
-  if (f) {
-    f += p->j;
-    z[0] = w[0] * f[0], z[1] = w[1] * f[1], z[2] = w[2] * f[2];
-    PW_UNROLL for (int r = 0; r < rows; r++) y[r] += small_dot (J[r], z, small_columns (shape, r));
-  }
-  PW_UNROLL for (int r = 0; r < rows && n > 0; r++) {
-    const double B[3] = { J[r][0] * w[0], J[r][1] * w[1], J[r][2] * w[2] };
-    PW_UNROLL for (int q = 0; q <= r; q++) {
-      S[r * n + q] += small_dot (B, J[q], small_columns (shape, r) & small_columns (shape, q));
-    }
-  }
-}
-
-/* a = W^-1 (f - J^T y) over one panel. */
-PW_INLINE void small_take (const pw_panel *p, const double *f, double *a, unsigned shape) {
-  const int rows = small_rows (shape);
-  const double *w = p->w, *y = p->y;
-  double x0 = 0, x1 = 0, x2 = 0;
-  if (f) f += p->j, x0 = f[0], x1 = f[1], x2 = f[2];
-  a += p->j;
-  PW_UNROLL for (int r = 0; r < rows; r++) {
-    const double *J = p->J[r], l = y[r];
-    if (small_columns (shape, r) & 1) x0 -= J[0] * l;
-    if (small_columns (shape, r) & 2) x1 -= J[1] * l;
-    x2 -= J[2] * l;
-  }
-  a[0] = w[0] * x0;
-  a[1] = w[1] * x1;
-  a[2] = w[2] * x2;
-}
-
-/* The same for any rows; whether there are gaps and the number of columns are constants where these are inlined. */
-PW_INLINE void small_add_any (const pw_panel *p, const double *f, int n, int gaps, int width) {
-  const double *w = p->w;
+/* S += J W^-1 J^T over one block (in S of n columns its lower triangle); y += J W^-1 f unless there is no f. */
+PW_INLINE void small_add (const pw_body_block *p, const double *f, double *S, double *y, int n, int width) {
   for (int r = 0; r < p->rows; r++) {
-    int i = gaps ? p->at[r] : r;
-    double B[3], sum = 0, *S = p->S + i * n;
-    PW_UNROLL for (int c = 0; c < width; c++) B[c] = p->J[r][c] * w[c];
-    PW_UNROLL for (int c = 0; f && c < width; c++) sum += B[c] * f[p->j + c];
-    if (f) p->y[i] += sum;
-    for (int q = 0; n > 0 && q <= r; q++) {
-      const double *J = p->J[q];
+    const double *J = p->J[r];
+    double B[3], *Si = S + p->at[r] * n;
+    PW_UNROLL for (int c = 0; c < width; c++) B[c] = J[c] * p->w[c];
+    if (f) {
+      double sum = 0;
+      PW_UNROLL for (int c = 0; c < width; c++) sum += B[c] * f[p->j + c];
+      y[p->at[r]] += sum;
+    }
+    for (int q = 0; q <= r; q++) {
       double dot = 0;
-      PW_UNROLL for (int c = 0; c < width; c++) dot += B[c] * J[c];
-      S[gaps ? p->at[q] : q] += dot;
+      PW_UNROLL for (int c = 0; c < width; c++) dot += B[c] * p->J[q][c];
+      Si[p->at[q]] += dot;
     }
   }
 }
 
-PW_INLINE void small_take_any (const pw_panel *p, const double *f, double *a, int gaps, int width) {
+/* y += J W^-1 f over one block. */
+PW_INLINE void small_add_right (const pw_body_block *p, const double *f, double *y, int width) {
+  double z[3];
+  PW_UNROLL for (int c = 0; c < width; c++) z[c] = p->w[c] * f[p->j + c];
+  for (int r = 0; r < p->rows; r++) {
+    double sum = 0;
+    PW_UNROLL for (int c = 0; c < width; c++) sum += p->J[r][c] * z[c];
+    y[p->at[r]] += sum;
+  }
+}
+
+/* a = W^-1 (f - J^T y) over one block. */
+PW_INLINE void small_accelerate (const pw_body_block *p, const double *f, const double *y, double *a, int width) {
   double sum[3];
   PW_UNROLL for (int c = 0; c < width; c++) sum[c] = f ? f[p->j + c] : 0;
   for (int r = 0; r < p->rows; r++) {
-    double y = p->y[gaps ? p->at[r] : r];
-    PW_UNROLL for (int c = 0; c < width; c++) sum[c] -= p->J[r][c] * y;
+    double l = y[p->at[r]];
+    PW_UNROLL for (int c = 0; c < width; c++) sum[c] -= p->J[r][c] * l;
   }
   PW_UNROLL for (int c = 0; c < width; c++) a[p->j + c] = p->w[c] * sum[c];
 }
 
-static void small_add_other (const pw_panel *p, const double *f, int n) {
-  if (p->width == 1)
-    small_add_any (p, f, n, 1, 1);
-  else if (p->gaps)
-    small_add_any (p, f, n, 1, 3);
-  else
-    small_add_any (p, f, n, 0, 3);
-}
-
-static void small_take_other (const pw_panel *p, const double *f, double *a) {
-  if (p->width == 1)
-    small_take_any (p, f, a, 1, 1);
-  else if (p->gaps)
-    small_take_any (p, f, a, 1, 3);
-  else
-    small_take_any (p, f, a, 0, 3);
-}
-
-PW_INLINE void small_gather (const pw_small *k, const double *f, int n) {
-  for (const pw_panel *p = k->panel, *end = k->end; p < end; p++) {
-#define SMALL_SHAPE(x)                                    \
-  if ((n == 0 || small_rows (x) <= n) && p->shape == x) { \
-    small_add (p, f, n, x);                               \
-    continue;                                             \
-  }
-    SMALL_SHAPES
-#undef SMALL_SHAPE
-    small_add_other (p, f, n);
+PW_INLINE void small_gather (pw_small *k, const double *f, int n) {
+  for (const pw_body_block *p = k->block; p < k->end; p++) {
+    if (p->width == 3)
+      small_add (p, f, k->S, k->y, n, 3);
+    else
+      small_add (p, f, k->S, k->y, n, 1);
   }
 }
 
-static void small_gather_right (const pw_small *k, const double *f) {
-  small_gather (k, f, 0);
+static void small_gather_right (pw_small *k, const double *f) {
+  for (const pw_body_block *p = k->block; p < k->end; p++) {
+    if (p->width == 3)
+      small_add_right (p, f, k->y, 3);
+    else
+      small_add_right (p, f, k->y, 1);
+  }
 }
 
 static void small_scatter (const pw_small *k, const double *f, double *a) {
-  for (const pw_panel *p = k->panel, *end = k->end; p < end; p++) {
-#define SMALL_SHAPE(x)       \
-  if (p->shape == x) {       \
-    small_take (p, f, a, x); \
-    continue;                \
-  }
-    SMALL_SHAPES
-#undef SMALL_SHAPE
-    small_take_other (p, f, a);
+  for (const pw_body_block *p = k->block; p < k->end; p++) {
+    if (p->width == 3)
+      small_accelerate (p, f, k->y, a, 3);
+    else
+      small_accelerate (p, f, k->y, a, 1);
   }
 }
 
-/* ---- L D L^T of constant size ---- */
+/* ---- L D L^T ---- */
 
 /* c = what is left of row i in the first m columns, L = its entries there; returns what is left in column m, which
  * may be a further row's. */

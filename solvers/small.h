@@ -1,43 +1,37 @@
-/* Small scenes.  The condensed matrix is dense, and up to 8 rows everything between J, f, gamma and a, lambda is one
- * straight piece of code, compiled for each number of rows; with more, rows are factorised from their first entry on.
- *
- * A panel holds the rows that touch a body (or an own coordinate): what they do to each other through it.  Rows are put
- * in an order in which those of a panel are neighbours; where that is not possible, the ones between read zeros or are
- * left out. */
+/* Scenes of few constraint equations: the condensed matrix S = J W^-1 J^T is dense.  Up to PW_SMALL_UNROLLED equations
+ * everything between J, f, gamma and a, lambda is one straight piece of code, compiled for each number of equations; beyond
+ * that, equations are factorised from their first entry on (skyline.h). */
 #ifndef PW_SMALL_H
 #define PW_SMALL_H
 
-enum { PW_SMALL = 24, PW_SMALL_UNROLLED = 8 }; /* rows; up to the latter in straight code */
+enum { PW_SMALL = 24, PW_SMALL_UNROLLED = 8 }; /* equations; up to the latter in straight code */
 
-/* The most rows of a small scene; with 0, for tests, all are large ones. */
+/* The most equations of a small scene; tests set it to 0 so that all scenes take the sparse path. */
 #ifndef PW_SMALL_MOST
 #define PW_SMALL_MOST PW_SMALL
 #endif
 
 #define PW_SMALL_WATCH 0.01
 
+/* The constraint equations that touch a body, or an internal coordinate. */
 typedef struct {
-  const double *w;                 /* diagonal of W^-1 in its columns */
-  double *S, *y;                   /* in those of all, the entries of its first row */
-  int j, width;                    /* first coordinate, columns */
-  int first, rows;                 /* first position, positions from there */
-  int gaps;                        /* 1: not all of them are neighbours */
-  unsigned shape;                  /* which columns its rows have, where that is compiled apart (small.c); else 0 */
-  unsigned char columns[PW_SMALL]; /* of each row, as bits */
-  unsigned char at[PW_SMALL];      /* how far behind the first each row is, if there are gaps */
-  const double *J[PW_SMALL];       /* each row, at these columns */
-} pw_panel;
+  const double *w;           /* diagonal of W^-1 in its columns */
+  int j, width;              /* first coordinate; 3 columns of a body, 1 of an internal coordinate */
+  int rows;                  /* equations */
+  int at[PW_SMALL];          /* rows: their positions in S, ascending */
+  const double *J[PW_SMALL]; /* rows: each equation's entries in these columns */
+} pw_body_block;
 
 typedef struct {
   int n;
-  pw_panel *panel, *end;         /* one for every body and own coordinate with weight */
+  pw_body_block *block, *end;    /* one for each body and internal coordinate with weight */
   int row[PW_SMALL];             /* of gamma and lambda, at each position */
-  int begin[PW_SMALL];           /* the first column of each row of S that is not zero */
+  int begin[PW_SMALL];           /* the skyline: the first column of each row of S */
   double S[PW_SMALL * PW_SMALL]; /* n x n, its lower triangle */
   double L[PW_SMALL * PW_SMALL]; /* of L D L^T: L below the diagonal, D^-1 on it */
   double y[PW_SMALL];            /* right-hand side, then lambda, at each position */
-  double guard;                  /* a pivot not above so much of its diagonal entry is taken for 0 */
-  int low;                       /* 1: one was not above PW_SMALL_WATCH of it, so that it is worth asking */
+  double guard;                  /* a pivot of at most this part of its diagonal entry counts as 0 */
+  int low; /* 1: a pivot was at most PW_SMALL_WATCH of it, so that pw_small_pivot is worth its time */
 } pw_small;
 
 /* ---- Factorising and solving ---- */
