@@ -90,8 +90,7 @@ static void test_names (void **state) {
 
 static void test_refusals (void **state) {
   (void)state;
-  cli_bad ("pinwheel run ezyroller --animate @/x.avi", 2,
-           "--animate @/x.avi: expected a name that ends in .html");
+  cli_bad ("pinwheel run ezyroller --animate @/x.avi", 2, "--animate @/x.avi: expected a name that ends in .html");
   cli_bad ("pinwheel run ezyroller --t-end 1 --animate @/no/folder.html >/dev/null", 1,
            "cannot write @/no/folder.html: No such file or directory");
 }
