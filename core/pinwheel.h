@@ -26,11 +26,12 @@ extern "C" {
 
 /* ---- Status and errors ---- */
 
-/* What a function returns: 0 good, > 0 the caller may retry with a smaller step, < 0 stop.  The negative of a
+/* What a function returns: 0 good, > 0 not done but may be tried again, < 0 stop.  The negative of a
  * negative status is the exit status of the program. */
 typedef enum {
   PW_OK = 0,       /* good */
   PW_RETRY = 1,    /* not usable, a smaller step may be */
+  PW_STOPPED = 2,  /* a run was asked to stop by pw_settings.stop: it is where it was, and can go on */
   PW_MACHINE = -1, /* out of memory, a file cannot be written */
   PW_INPUT = -2,   /* the description or an option is wrong */
   PW_START = -3,   /* the start cannot be made consistent */

@@ -9,6 +9,8 @@
 extern "C" {
 #endif
 
+#define PW_MAX_STEPS 10000000 /* attempted steps of a run by an adaptive method, if nothing is said */
+
 /* How to integrate; zeros leave the defaults. */
 typedef struct {
   double t;    /* start time [s] */
@@ -17,6 +19,12 @@ typedef struct {
   double rtol; /* adaptive methods: relative tolerance; default 1e-6 */
   double atol; /* absolute tolerance of every state; default rtol x (L, 1 rad, L/T, 1/T), see pw_scale */
   int ledger;  /* 1: keep account of work, losses and the energy balance */
+
+  /* What ends a run that would take too long. */
+  long max_steps; /* adaptive methods: attempted steps, rejected ones included; default PW_MAX_STEPS */
+  int (*stop) (void *context); /* asked before each attempted step, before each evaluation of adams, bdf and ida, and before a
+                                  sample inside a step; not 0: the call returns PW_STOPPED at once.  May be NULL */
+  void *stop_context;          /* passed to stop */
 } pw_settings;
 
 /* The scales of a scene, from its description and start: everything judged absolutely is judged against them. */

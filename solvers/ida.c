@@ -223,6 +223,7 @@ static int ida_fail (ida_data *d, int flag, pw_error *error) {
                     : flag == IDA_RES_FAIL     ? "a signal failed"
                     : flag == IDA_TOO_MUCH_ACC ? "the tolerance is beyond the accuracy of the machine"
                                                : pw_sun_reason (&d->said, flag);
+  if (d->run->stopped) return d->run->interrupted = 1, PW_STOPPED;
   ida_statistics (d);
   if (flag == IDA_LSETUP_FAIL && pw_sun_lacks_memory (d->solver)) return ida_no_memory (d->run, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", d->run->t, why, d->run->settings.rtol);

@@ -46,6 +46,11 @@ struct pw_run {
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* the same block, from q_at on */
   double projected_at;
 
+  int stopped;           /* 1: settings.stop has asked for it */
+  int interrupted;       /* 1: inside a step of SUNDIALS, which has to start anew */
+  double marked, mark;   /* time since the start at which speeds were looked at, doubled each time [s]; the largest there */
+  double earlier, speed; /* the same of the time before */
+
   double energy0;  /* kinetic + potential at the start */
   double *scratch; /* 2 (coords + 3) + 3 rows */
   double *q_given, *v_given;
@@ -128,6 +133,20 @@ double pw_run_agitation (const pw_run *r);
 /* Looks at the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
  * another branch. */
 int pw_run_judge (pw_run *r, pw_error *error);
+
+/* ---- Limits (limits.c) ---- */
+
+/* 1 if the caller asks the run to stop. */
+static inline int pw_run_asked (pw_run *r) {
+  if (r->settings.stop && r->settings.stop (r->settings.stop_context)) r->stopped = 1;
+  return r->stopped;
+}
+
+/* Before each attempted step: PW_OK; PW_STOPPED if the caller asks for it; PW_METHOD after too many. */
+int pw_run_attempt (pw_run *r, pw_error *error);
+
+/* After each step: PW_METHOD if it has led so far away that numbers no longer resolve the scene; marks speeds. */
+int pw_run_resolve (pw_run *r, pw_error *error);
 
 /* ---- Dynamics ---- */
 

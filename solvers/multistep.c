@@ -24,6 +24,7 @@ static int multistep_rates (pw_real t, N_Vector vy, N_Vector rates, void *data) 
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (rates);
   size_t bytes = (size_t)d->n * sizeof *out;
+  if (pw_run_asked (d->run)) return -1;
   int flag = pw_multistep_accelerate (d, t, y);
   memcpy (out, y + d->n, bytes);
   memcpy (out + d->n, d->a, bytes);
@@ -208,6 +209,7 @@ static void multistep_count (multistep_data *d) {
 static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
   pw_run *r = d->run;
   char element[120];
+  if (d->run->stopped) return d->run->interrupted = 1, PW_STOPPED;
   int singular = flag == CV_FIRST_RHSFUNC_ERR || flag == CV_REPTD_RHSFUNC_ERR || flag == CV_UNREC_RHSFUNC_ERR;
   multistep_count (d);
   if (flag == CV_REPTD_PROJFUNC_ERR && d->projector.against >= 0)

@@ -62,7 +62,8 @@ pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, 
 /* Checks a method's name and options without a system; fills the integrator and the stabilisation's number. */
 int pw_parse_method (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);
 
-/* One accepted step that does not pass t_end.  Errors: PW_METHOD with the time reached and the reason. */
+/* One accepted step that does not pass t_end.  PW_STOPPED, without an error, if settings.stop has asked for it: the run stays
+ * where it was, and the next call goes on.  Errors: PW_METHOD with the time reached and the reason, such as max_steps. */
 int pw_advance (pw_run *r, double t_end, pw_error *error);
 
 /* Steps until t is reached or passed by a step that pw_at can look back into, or t_end is reached.  Returns as pw_advance. */
@@ -71,13 +72,18 @@ int pw_advance_to (pw_run *r, double t, double t_end, pw_error *error);
 /* The time reached. */
 double pw_time (const pw_run *r);
 
-/* The state at a time inside the last accepted step, its end included. */
+/* The state at a time inside the last accepted step, its end included.  PW_STOPPED as pw_advance, but never at the end: the
+ * state reached is there however a run has stopped; after a stop it may be all there is. */
 int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
 /* How much energy a sample has too much or too little, absolutely, relative to the largest of its kinetic energy, work and
  * loss and of what the scene has at L / T.  Without a ledger it is known only of scenes that have no entries for one, where
  * what projections add counts too; else NaN. */
 double pw_unbalanced (const pw_run *r, const pw_sample *sample);
+
+/* How many times faster than L/T (lengths) or 1/T (angles), the scale of the scene at its start, the fastest coordinate has
+ * become, if that is more than 1e3 and it grows on; else 0.  *state: which rate; *power: of the time, with which it grows. */
+double pw_run_growth (const pw_run *r, int *state, double *power);
 
 /* Starts anew from a state at the time reached, after the caller has changed something.  The state is made consistent
  * first.  q and v may be NULL: they stay.  A ledger goes on; what the change does to the energy is left out of its balance.

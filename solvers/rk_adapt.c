@@ -157,6 +157,7 @@ int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
     if (cut) t1 = stop;
     double h = t1 - r->t;
     if (!cut && !(h > least)) return adapt_fail (r, status, h, error);
+    if (most < 5 && (status = pw_run_attempt (r, error)) != PW_OK) return status;
     status = adapt_step (r, h, t1, project, r->settings.ledger ? &added : NULL, &off);
     if (status < 0) return pw_rk_fail (r, status, h, error);
     if (off <= 1) {

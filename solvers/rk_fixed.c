@@ -35,6 +35,7 @@ static int fixed_in_parts (pw_run *r, int status, double t1, int project, double
   if (known) fixed_compare (r);
   for (int i = 0; i < parts && best > good; i++) {
     if (start + part[i] * (t1 - start) <= least) continue;
+    if (pw_run_asked (r)) return PW_STOPPED;
     status = fixed_two_parts (r, start + part[i] * (t1 - start), t1, project, 0);
     r->statistics.rejected++;
     if (status < 0) return status;
@@ -64,11 +65,16 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   int whole, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
   double added = 0, t1 = pw_step_end (r, d->base, d->count, t_end, &whole),
          h = whole && !d->split ? r->settings.step : t1 - r->t;
+  const int split = d->split;
   r->near = 0;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
   d->split = r->near && !d->split;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
   if (d->split) status = fixed_step_around (r, status, t1, stop, project, &t);
+  if (r->stopped) {
+    d->split = split;
+    return PW_STOPPED;
+  }
   if (status != PW_OK) return pw_rk_fail (r, status, r->settings.step, error);
   r->statistics.steps++;
   if (d->split) {

@@ -134,12 +134,18 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
   if (run_is_lost (r, error)) return PW_MACHINE;
+  r->stopped = 0;
+  status = pw_run_attempt (r, error);
+  if (status != PW_OK) return status;
   pw_forget_residuals (r);
   r->s->failed = NULL;
-  if (r->t >= r->breakpoint) status = run_pass_breakpoint (r, error);
+  if (r->t >= r->breakpoint || r->interrupted) status = run_pass_breakpoint (r, error);
+  r->interrupted = 0;
   if (status == PW_OK && r->redundant && r->grip < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
+  if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_judge (r, error);
+  if (status == PW_OK) status = pw_run_resolve (r, error);
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK) return pw_run_blame (r, status, error);
   if (r->redundant == 0) return PW_OK;
@@ -178,6 +184,8 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK || pw_require (sample, "a sample", error) != PW_OK) return PW_INPUT;
   if (run_is_lost (r, error)) return PW_MACHINE;
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
+  r->stopped = 0;
+  if (t < r->t && pw_run_asked (r)) return PW_STOPPED;
   r->t_at = t;
   int status = r->method->at (r, t, error);
   if (status != PW_OK) return status;

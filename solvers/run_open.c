@@ -23,9 +23,12 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
   if (method->adaptive && from->rtol >= 1)
     return pw_fail (error, PW_INPUT, "setting rtol = %g: expected a part of each state, less than 1", from->rtol);
   if (!isfinite (from->t)) return pw_fail (error, PW_INPUT, "setting t = %g: expected a finite number", from->t);
+  if (from->max_steps < 0)
+    return pw_fail (error, PW_INPUT, "setting max_steps = %ld: expected a number > 0", from->max_steps);
   *to = *from;
   if (to->step == 0) to->step = 1e-3;
   if (to->rtol == 0) to->rtol = 1e-6;
+  if (to->max_steps == 0) to->max_steps = PW_MAX_STEPS;
   if (to->span == 0) to->span = method->adaptive ? 1 : 1000 * to->step;
   return PW_OK;
 }

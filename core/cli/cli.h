@@ -69,15 +69,18 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 
 /* How to run, as options say it; NULL: as the model wishes. */
 typedef struct {
-  const char *method, *t_end, *step, *rtol, *atol;
+  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit;
 } pw_cli_wishes;
 
 /* Entries of popt's table for a pw_cli_wishes: for commands that choose the methods themselves, and for those that run
  * one method. */
-#define PW_CLI_STEP_OPTIONS(w)                                                                \
-  { "t-end", 't', POPT_ARG_STRING, &(w)->t_end, 0, "Time to run to [s]", "T" },               \
-      { "step", 0, POPT_ARG_STRING, &(w)->step, 0, "Step of fixed-step methods [s]", "H" }, { \
-    "rtol", 0, POPT_ARG_STRING, &(w)->rtol, 0, "Relative tolerance of adaptive methods", "R"  \
+#define PW_CLI_STEP_OPTIONS(w)                                                                                           \
+  { "t-end", 't', POPT_ARG_STRING, &(w)->t_end, 0, "Time to run to [s]", "T" },                                          \
+      { "step", 0, POPT_ARG_STRING, &(w)->step, 0, "Step of fixed-step methods [s]", "H" },                              \
+      { "rtol", 0, POPT_ARG_STRING, &(w)->rtol, 0, "Relative tolerance of adaptive methods", "R" },                      \
+      { "max-steps", 0, POPT_ARG_STRING, &(w)->max_steps, 0, "Attempted steps of adaptive methods (default 1e7)", "N" }, \
+  {                                                                                                                      \
+    "limit", 0, POPT_ARG_STRING, &(w)->limit, 0, "Processor time of a single run [s]; by default any", "SECONDS"         \
   }
 #define PW_CLI_RUN_OPTIONS(w)                                                                                        \
   { "method", 'm', POPT_ARG_STRING, &(w)->method, 0, "Integrator and stabilisation, see: pinwheel list methods",     \

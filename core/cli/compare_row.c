@@ -41,7 +41,7 @@ static int row_steps (pw_compare *x, pw_rung *r, pw_run *run, pw_motion *m, pw_e
     if (used < ROW_SHORT && n == batch && batch < 65536) batch *= 2;
     if (used > ROW_LONG && batch > 1) batch /= 2;
     pw_progress_at (&x->progress, x->rows + fmin (pw_time (run) / x->t_end, 1) / (x->repeats + 1));
-    if (pw_stop) return PW_RETRY;
+    if (status == PW_STOPPED) return PW_RETRY;
     if (status == PW_OK && r->cpu > x->limit && pw_time (run) < x->t_end) {
       r->state = COMPARE_STOPPED;
       return PW_RETRY;
@@ -51,7 +51,8 @@ static int row_steps (pw_compare *x, pw_rung *r, pw_run *run, pw_motion *m, pw_e
 }
 
 int pw_compare_run (pw_compare *x, pw_rung *r, pw_motion *motion, pw_error *error) {
-  pw_settings settings = { .span = x->t_end, .ledger = motion != NULL };
+  pw_limit any = { .most = INFINITY };
+  pw_settings settings = { .span = x->t_end, .ledger = motion != NULL, .stop = pw_limit_over, .stop_context = &any };
   *(r->method->adaptive ? &settings.rtol : &settings.step) = r->rung;
   r->cpu = 0;
   pw_run *run = pw_open (x->m.system, r->method->name, &settings, error);

@@ -46,6 +46,9 @@ static int drift_settle (pw_drift *x, pw_error *error) {
   char usual[1000];
   if (d.rtol == 0) d.rtol = 1e-6;
   int status = pw_cli_settle (&x->wishes, &d, &x->t_end, &x->settings, error);
+  if (status == PW_OK) status = pw_limit_read (&x->limit, x->wishes.limit, error);
+  x->settings.stop = pw_limit_over;
+  x->settings.stop_context = &x->limit;
   x->settings.ledger = 1;
   drift_usual (usual, sizeof usual);
   if (status == PW_OK) status = pw_contestants_read (&x->list, x->methods_text ? x->methods_text : usual, error);

@@ -9,6 +9,7 @@
 #include "cli.h"
 #include "contestants.h"
 #include "progress.h"
+#include "stop.h"
 #include "sweep.h"
 
 enum { DRIFT_PARTS = 200 }; /* of a run: each has a point in the figures */
@@ -48,6 +49,7 @@ typedef struct {
   pw_contestants list;
   pw_grid alpha, beta, every; /* one axis each */
   pw_settings settings;
+  pw_limit limit;
   double t_end; /* [s] */
   /* under way */
   pw_drift_row *row;

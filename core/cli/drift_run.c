@@ -42,11 +42,11 @@ static int run_look (const pw_drift *x, pw_drift_row *r, pw_run *run, pw_error *
 static int run_steps (pw_drift *x, pw_drift_row *r, pw_run *run, pw_error *error) {
   int status = PW_OK;
   while (status == PW_OK && pw_time (run) < x->t_end) {
-    for (int n = 0; status == PW_OK && n < RUN_STEPS && pw_time (run) < x->t_end && !pw_stop; n++) {
+    for (int n = 0; status == PW_OK && n < RUN_STEPS && pw_time (run) < x->t_end; n++) {
       status = pw_advance (run, x->t_end, error);
       if (status == PW_OK) status = run_look (x, r, run, error);
     }
-    if (pw_stop) return PW_RETRY;
+    if (status == PW_STOPPED) return pw_limit_fail (&x->limit, pw_time (run), error);
     pw_progress_at (&x->progress, x->done + fmin (pw_time (run) / x->t_end, 1));
   }
   return status;
@@ -56,6 +56,7 @@ int pw_drift_run (pw_drift *x, pw_drift_row *r, pw_error *error) {
   pw_error own = { 0 };
   run_begin (r);
   r->t = 0;
+  pw_limit_start (&x->limit);
   pw_run *run = pw_open (x->m.system, r->method, &x->settings, &own);
   r->status = run ? run_steps (x, r, run, &own) : own.status;
   if (run) {

@@ -1,6 +1,7 @@
 /* What the commands share: command lines, models, errors. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
+#include <limits.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -195,10 +196,13 @@ int pw_cli_settle (const pw_cli_wishes *w, const pw_run_defaults *model, double 
                    pw_error *error) {
   *t_end = model->t_end;
   *settings = (pw_settings){ .step = model->step, .rtol = model->rtol };
+  double most = PW_MAX_STEPS;
   int status = pw_cli_number ("--t-end", w->t_end, PW_POSITIVE, t_end, error);
   if (status == PW_OK) status = pw_cli_number ("--step", w->step, PW_POSITIVE, &settings->step, error);
   if (status == PW_OK) status = pw_cli_number ("--rtol", w->rtol, PW_POSITIVE, &settings->rtol, error);
   if (status == PW_OK) status = pw_cli_number ("--atol", w->atol, PW_POSITIVE, &settings->atol, error);
+  if (status == PW_OK) status = pw_cli_number ("--max-steps", w->max_steps, PW_COUNT, &most, error);
+  settings->max_steps = most < 9e18 ? (long)most : LONG_MAX;
   settings->span = *t_end;
   return status;
 }

@@ -1,4 +1,4 @@
-/* The progress bar. */
+/* The progress bar, and the lines in its place. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,6 +8,7 @@
 
 #define PROGRESS_FIRST 0.5 /* no bar before this [s]: a short run should not flash */
 #define PROGRESS_EVERY 0.1 /* between two drawings [s] */
+#define PROGRESS_LINES 60  /* between two lines [s] */
 #define PROGRESS_WIDTH 30  /* characters of a full bar */
 
 static double progress_read (clockid_t id) {
@@ -27,7 +28,9 @@ double pw_cpu_clock (void) {
 
 void pw_progress_start (pw_progress *p, const char *what, double t_end, int on) {
   double now = progress_clock ();
-  *p = (pw_progress){ what, "s", 0, t_end, now, now + PROGRESS_FIRST, 0, on && isatty (STDERR_FILENO) };
+  int lines = !isatty (STDERR_FILENO);
+  *p =
+      (pw_progress){ what, "s", 0, t_end, now, now + (lines ? PROGRESS_LINES : PROGRESS_FIRST), 0, on || lines, lines };
 }
 
 void pw_progress_count (pw_progress *p, const char *what, const char *unit, double from, double count) {
@@ -53,7 +56,7 @@ void pw_progress_at (pw_progress *p, double t) {
   if (!p->on) return;
   double now = progress_clock ();
   if (now < p->next) return;
-  p->next = now + PROGRESS_EVERY;
+  p->next = now + (p->lines ? PROGRESS_LINES : PROGRESS_EVERY);
   double part = fmin (fmax (t / p->t_end, 0), 1);
   char left[24], bar[PROGRESS_WIDTH + 1];
   progress_duration ((now - p->start) / (t - p->from) * (p->t_end - t), left, sizeof left);
@@ -61,10 +64,14 @@ void pw_progress_at (pw_progress *p, double t) {
   for (int i = 0; i < PROGRESS_WIDTH; i++) bar[i] = i < full ? '#' : '.';
   bar[PROGRESS_WIDTH] = 0;
   int timed = strcmp (p->unit, "s") == 0;
-  fprintf (stderr, "\r%.16s [%s] %3.0f %%  %s%.*g of %.*g %s  %s to go\033[K", p->what, bar, floor (100 * part),
-           timed ? "t = " : "", timed ? 4 : 9, timed ? t : floor (t), timed ? 4 : 9, p->t_end, p->unit, left);
+  if (p->lines)
+    fprintf (stderr, "pinwheel: %s: ", p->what);
+  else
+    fprintf (stderr, "\r%.16s [%s] ", p->what, bar);
+  fprintf (stderr, "%*.0f %%  %s%.*g of %.*g %s  %s to go%s", p->lines ? 0 : 3, floor (100 * part), timed ? "t = " : "",
+           timed ? 4 : 9, timed ? t : floor (t), timed ? 4 : 9, p->t_end, p->unit, left, p->lines ? "\n" : "\033[K");
   fflush (stderr);
-  p->shown = 1;
+  p->shown = !p->lines;
 }
 
 void pw_progress_end (pw_progress *p) {

@@ -1,4 +1,4 @@
-/* A progress bar with the time to go, on standard error and only if that is a terminal. */
+/* How far a long run is, and the time to go, on standard error: a bar if that is a terminal, else a line a minute. */
 #ifndef PW_PROGRESS_H
 #define PW_PROGRESS_H
 
@@ -8,19 +8,20 @@ typedef struct {
   double from;      /* where it began, 0 unless it goes on with something */
   double t_end;     /* where it ends: time [s] or count */
   double start;     /* clock when it started [s] */
-  double next;      /* clock when it may be drawn again [s] */
+  double next;      /* clock when it may be drawn or written again [s] */
   int shown;        /* 1: there is a bar to erase */
   int on;           /* 0: draws nothing */
+  int lines;        /* 1: no terminal: lines in place of the bar */
 } pw_progress;
 
 /* The processor time of the program [s]. */
 double pw_cpu_clock (void);
 
-/* `on` 0 suppresses the bar, as does a standard error that is no terminal. */
+/* `on` 0 suppresses the bar, but not the lines. */
 void pw_progress_start (pw_progress *p, const char *what, double t_end, int on);
 /* The same for work that is counted in `unit` ("runs"): `from` of `count` are done already. */
 void pw_progress_count (pw_progress *p, const char *what, const char *unit, double from, double count);
-/* Draws the bar for the time or count t, at most ten times a second. */
+/* Draws the bar for the time or count t, at most ten times a second, or writes a line. */
 void pw_progress_at (pw_progress *p, double t);
 /* Erases the bar. */
 void pw_progress_end (pw_progress *p);

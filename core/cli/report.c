@@ -22,6 +22,8 @@ void pw_report_unused (const char *method, const pw_cli_wishes *w) {
   int adaptive = pw_contestant_adaptive (integrator, method);
   if (adaptive && w->step && !w->rtol && !w->atol)
     fprintf (stderr, "pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
+  if (!adaptive && w->max_steps)
+    fprintf (stderr, "pinwheel: --max-steps has no effect: %s takes as many steps of --step as there are\n", method);
   if (!adaptive && (w->rtol || w->atol) && !w->step)
     fprintf (stderr, "pinwheel: --%s has no effect: %s takes steps of --step\n", w->rtol ? "rtol" : "atol", method);
 }
@@ -238,6 +240,17 @@ static void report_truth (const pw_truth_error *e) {
   printf ("  %-10s%17s", "reactions", "");
   report_number (e->reactions, 3, 17);
   printf (" of the largest\n");
+}
+
+void pw_report_growth (const pw_system *s, const pw_run *r) {
+  int state;
+  double power, growth = pw_run_growth (r, &state, &power);
+  char name[REPORT_NAME], times[32], grows[32];
+  if (growth == 0) return;
+  fprintf (stderr,
+           "pinwheel: the motion grows without bound: %s has become %s times the scene's own speed and grows as t^%s; "
+           "nothing opposes what drives it\n",
+           pw_state_name (s, state, name, sizeof name), pw_format (times, growth, 2), pw_format (grows, power, 2));
 }
 
 void pw_report_unbalanced (double part) {

@@ -27,6 +27,9 @@ void pw_report_differences (const pw_system *s);
 const char **pw_report_redundancies (pw_run *r);
 void pw_report_redundant (const char *const *text);
 
+/* Says on standard error that speeds have grown out of all proportion, and still grow. */
+void pw_report_growth (const pw_system *s, const pw_run *r);
+
 /* Says on standard error that a part of the energy is unaccounted for, if it is more than 1 %. */
 void pw_report_unbalanced (double part);
 

@@ -64,6 +64,9 @@ static int run_own_method (const run *x, pw_error *error) {
 static int run_settle (run *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   int status = pw_cli_settle (&x->wishes, &d, &x->t_end, &x->settings, error);
+  if (status == PW_OK) status = pw_limit_read (&x->limit, x->wishes.limit, error);
+  x->settings.stop = pw_limit_over;
+  x->settings.stop_context = &x->limit;
   if (status == PW_OK) status = pw_cli_number ("--every", x->every_text, PW_POSITIVE, &x->every, error);
   x->method = x->wishes.method ? x->wishes.method : d.method;
   if (status == PW_OK && x->wishes.method == NULL) status = run_own_method (x, error);
@@ -84,6 +87,7 @@ static int run_open (run *x, pw_error *error) {
     return error->status;
   status = pw_watch_open (&x->watch, &x->m, x->truth_path, x->starts != NULL, x->t_end, error);
   if (status != PW_OK) return status;
+  pw_limit_start (&x->limit);
   x->r = pw_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
   pw_report_angles (x->m.model);
@@ -118,6 +122,7 @@ static int run_take_samples (run *x, pw_error *error) {
     if (status == PW_OK) status = pw_csv_write (x->csv, x->m.system, &sample, error);
     if (status != PW_OK) break;
     x->row++;
+    pw_progress_at (&x->progress, sample.t);
     if (x->every == 0) break;
   }
   while (status == PW_OK && x->plots && pw_plots_next (x->plots) <= now) {
@@ -169,6 +174,9 @@ static int run_integrate (run *x, pw_error *error) {
   int status = run_steps (x, error);
   pw_progress_end (&x->progress);
   pw_stop_release ();
+  if (status == PW_STOPPED) status = pw_limit_fail (&x->limit, pw_time (x->r), error);
+  const pw_statistics *s = pw_run_statistics (x->r);
+  x->limited = status == PW_METHOD && (pw_limit_over (&x->limit) || s->steps + s->rejected >= x->settings.max_steps);
   return status;
 }
 
@@ -253,6 +261,7 @@ static int run_finish (run *x, pw_error *error) {
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
   if (error->status == PW_OK) pw_report_unbalanced (summary.unbalanced);
+  if (error->status == PW_OK && x->r) pw_report_growth (x->m.system, x->r);
   run_write_json (x, &summary, last, error);
   run_draw (x, summary.reason, error);
   if (x->profile && last && error->status == PW_OK && !interrupted)
@@ -260,7 +269,7 @@ static int run_finish (run *x, pw_error *error) {
   if (interrupted) fprintf (stderr, "pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
   if (*x->part) fprintf (stderr, "pinwheel: the table until then is kept in %s\n", x->part);
-  pw_running_hint (x, interrupted || error->status == PW_MACHINE);
+  pw_running_hint (x, interrupted || x->limited || error->status == PW_MACHINE);
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }
 

@@ -5,6 +5,7 @@
 #include "checkpoints.h"
 #include "plots.h"
 #include "progress.h"
+#include "stop.h"
 #include "watch.h"
 
 typedef struct {
@@ -20,6 +21,7 @@ typedef struct {
   pw_cli_model m;
   const char *method;
   pw_settings settings;
+  pw_limit limit;
   double t_end, every; /* [s]; every 0: each accepted step is a row */
   /* open */
   pw_output *csv_output, *json_output;
@@ -31,6 +33,7 @@ typedef struct {
   pw_progress progress;
   /* under way */
   long row;        /* rows written */
+  int limited;     /* 1: --limit or --max-steps has ended it */
   int resumed;     /* 1: the state of the checkpoint has been taken over */
   long batch;      /* steps to take before looking around */
   double cpu;      /* of the method [s] */
@@ -43,7 +46,7 @@ int pw_running_prepare (pw_running *x, pw_error *error);
 int pw_running_resume (pw_running *x, pw_error *error);
 /* A checkpoint is due: saves one, unless the pose is near a singular one; then it stays due. */
 int pw_running_save (pw_running *x, pw_error *error);
-/* After a run that was stopped from outside: says where it can go on from. */
+/* After a run that was stopped from outside or by a limit: says where it can go on from. */
 void pw_running_hint (const pw_running *x, int stopped);
 
 #endif

@@ -1,7 +1,15 @@
 /* Requests to stop. */
-#define _POSIX_C_SOURCE 200809L
+#define _DEFAULT_SOURCE /* clocks of Linux */
+#include <math.h>
 #include <string.h>
+#include <time.h>
 #include "stop.h"
+
+#ifdef CLOCK_MONOTONIC_COARSE
+#define STOP_CHEAP CLOCK_MONOTONIC_COARSE
+#else
+#define STOP_CHEAP CLOCK_MONOTONIC
+#endif
 
 volatile sig_atomic_t pw_stop;
 
@@ -23,4 +31,39 @@ void pw_stop_catch (void) {
 void pw_stop_release (void) {
   signal (SIGINT, SIG_DFL);
   signal (SIGTERM, SIG_DFL);
+}
+
+/* ---- Limits ---- */
+
+static double stop_clock (clockid_t id) {
+  struct timespec now;
+  clock_gettime (id, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+int pw_limit_read (pw_limit *l, const char *text, pw_error *error) {
+  *l = (pw_limit){ .most = INFINITY };
+  return pw_cli_number ("--limit", text, PW_POSITIVE, &l->most, error);
+}
+
+void pw_limit_start (pw_limit *l) {
+  l->start = stop_clock (CLOCK_THREAD_CPUTIME_ID);
+}
+
+/* The thread's clock takes a system call, so it is asked only when a coarse one has moved: some 250 times a second. */
+int pw_limit_over (void *limit) {
+  pw_limit *l = limit;
+  if (pw_stop) return 1;
+  if (isinf (l->most)) return 0;
+  double now = stop_clock (STOP_CHEAP);
+  if (now == l->looked) return 0;
+  l->looked = now;
+  return stop_clock (CLOCK_THREAD_CPUTIME_ID) - l->start > l->most;
+}
+
+int pw_limit_fail (const pw_limit *l, double t, pw_error *error) {
+  char limit[32], reached[32];
+  if (pw_stop) return PW_RETRY;
+  return pw_fail (error, PW_METHOD, "t = %s s: the limit of %s s of processor time is reached (--limit)",
+                  pw_format (reached, t, 6), pw_format (limit, l->most, 6));
 }

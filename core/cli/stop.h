@@ -3,6 +3,7 @@
 #define PW_STOP_H
 
 #include <signal.h>
+#include "cli.h"
 
 extern volatile sig_atomic_t pw_stop; /* requests so far */
 
@@ -11,5 +12,20 @@ extern volatile sig_atomic_t pw_stop; /* requests so far */
 void pw_stop_catch (void);
 /* From here on they end the program again. */
 void pw_stop_release (void);
+
+/* The end that a run is asked to come to from outside: by signals, or by the processor time that its thread may take. */
+typedef struct {
+  double most;   /* [s]; INFINITY: any */
+  double start;  /* of the thread's clock [s] */
+  double looked; /* at a clock that costs less */
+} pw_limit;
+
+/* Reads --limit; pw_limit_start is due where the run begins. */
+int pw_limit_read (pw_limit *l, const char *text, pw_error *error);
+void pw_limit_start (pw_limit *l);
+/* Has it run out, or was the program signalled?  For pw_settings.stop; the context is the limit. */
+int pw_limit_over (void *limit);
+/* What a run that was stopped (PW_STOPPED) at time t ends with: PW_RETRY after a signal; else PW_METHOD, with the limit. */
+int pw_limit_fail (const pw_limit *l, double t, pw_error *error);
 
 #endif

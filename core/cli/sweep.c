@@ -64,10 +64,13 @@ static const char *sweep_odd (const sweep *x) {
   const struct {
     const char *name;
     const void *given;
-  } option[] = { { "--vary", x->ranges },      { "--method", x->wishes.method }, { "--t-end", x->wishes.t_end },
-                 { "--step", x->wishes.step }, { "--rtol", x->wishes.rtol },     { "--atol", x->wishes.atol },
-                 { "--set", x->sets },         { "--start", x->starts },         { "--jobs", x->jobs_text },
-                 { "--part", x->part_text },   { "--cpu", x->cpu ? x : NULL } };
+  } option[] = { { "--vary", x->ranges },        { "--method", x->wishes.method },
+                 { "--t-end", x->wishes.t_end }, { "--step", x->wishes.step },
+                 { "--rtol", x->wishes.rtol },   { "--atol", x->wishes.atol },
+                 { "--limit", x->wishes.limit }, { "--max-steps", x->wishes.max_steps },
+                 { "--set", x->sets },           { "--start", x->starts },
+                 { "--jobs", x->jobs_text },     { "--part", x->part_text },
+                 { "--cpu", x->cpu ? x : NULL } };
   for (size_t i = 0; i < sizeof option / sizeof *option; i++)
     if (option[i].given) return option[i].name;
   return NULL;
@@ -117,7 +120,10 @@ static int sweep_settle (sweep *x, pw_error *error) {
   p->sets = (const char *const *)x->sets;
   p->starts = (const char *const *)x->starts;
   p->cpu = x->cpu;
+  pw_limit limit;
   int status = pw_cli_settle (&x->wishes, &d, &p->t_end, &p->settings, error);
+  if (status == PW_OK) status = pw_limit_read (&limit, x->wishes.limit, error);
+  p->limit = limit.most;
   if (status == PW_OK) status = sweep_jobs (x, error);
   return status == PW_OK ? sweep_part (x, error) : status;
 }
@@ -151,7 +157,7 @@ static void sweep_keep (sweep *x, long k, int status, const pw_text *text, const
 static void sweep_one (sweep *x, long k, pw_text *text) {
   pw_error own = { 0 };
   pw_text_clear (text);
-  int status = pw_sweep_row (&x->plan, pw_plan_row (&x->plan, k), &pw_stop, text, &own);
+  int status = pw_sweep_row (&x->plan, pw_plan_row (&x->plan, k), text, &own);
   if (status == PW_RETRY) return;
 #ifdef _OPENMP
 #pragma omp critical(sweep_rows)
@@ -183,6 +189,7 @@ static int sweep_run (sweep *x, pw_error *error) {
                      (double)x->journal.rows);
   sweep_all (x);
   pw_progress_end (&x->progress);
+  pw_stop_release (); /* what follows can be killed and done again */
   return error->status;
 }
 

@@ -5,7 +5,6 @@
 #ifndef PW_SWEEP_H
 #define PW_SWEEP_H
 
-#include <signal.h>
 #include <stdint.h>
 #include <sys/types.h>
 #include "cli.h"
@@ -53,6 +52,7 @@ typedef struct {
   const char *const *sets, *const *starts;
   pw_settings settings;
   double t_end; /* [s] */
+  double limit; /* of each run's processor time [s]; INFINITY: none */
   int cpu;      /* 1: a column with each run's processor time */
   int part, parts;
   /* as found by pw_plan_open */
@@ -104,9 +104,9 @@ int pw_fingerprint_make (pw_plan *p, const pw_model *m, pw_error *error);
 /* ---- One run (sweep_row.c) ---- */
 
 /* Does a run from start to end and appends its cells, without the line's end.  Returns the run's own status, a row all
- * the same; PW_RETRY if *stop became non-zero on the way; PW_MACHINE with the error if it could not be done.  May be
+ * the same; PW_RETRY if pw_stop became non-zero on the way; PW_MACHINE with the error if it could not be done.  May be
  * called by several threads at once. */
-int pw_sweep_row (const pw_plan *p, long row, const volatile sig_atomic_t *stop, pw_text *text, pw_error *error);
+int pw_sweep_row (const pw_plan *p, long row, pw_text *text, pw_error *error);
 
 /* ---- Lines of journals and parts (sweep_line.c) ----
  *

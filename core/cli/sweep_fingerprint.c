@@ -1,5 +1,6 @@
 /* The fingerprint of a sweep: lines "KEY = VALUE" with all that decides what its rows are.  A journal and the parts of a
  * sweep begin with it, so that rows of different sweeps are never mixed. */
+#include <math.h>
 #include <string.h>
 #include "model.h"
 #include "sweep.h"
@@ -41,6 +42,9 @@ int pw_fingerprint_make (pw_plan *p, const pw_model *m, pw_error *error) {
   pw_print_number (&p->fingerprint, "step", NULL, p->settings.step);
   pw_print_number (&p->fingerprint, "rtol", NULL, p->settings.rtol);
   pw_print_number (&p->fingerprint, "atol", NULL, p->settings.atol);
+  if (p->settings.max_steps != PW_MAX_STEPS)
+    pw_print_number (&p->fingerprint, "max-steps", NULL, (double)p->settings.max_steps);
+  if (isfinite (p->limit)) pw_print_number (&p->fingerprint, "limit", NULL, p->limit);
   print_parameters (p, m);
   print_grid (p);
   pw_print_number (&p->fingerprint, "rows", NULL, (double)p->grid.rows);

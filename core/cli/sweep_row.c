@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <time.h>
+#include "stop.h"
 #include "sweep.h"
 
 /* What is known of a run when it is over; a run that has not begun knows nothing. */
@@ -47,26 +48,28 @@ static int row_read (const pw_plan *p, const pw_system *s, pw_run *r, row_result
 }
 
 /* The run itself; PW_RETRY if it was stopped.  A failure on the way does not hide how far it came. */
-static int row_run (const pw_plan *p, long row, const volatile sig_atomic_t *stop, row_result *x, pw_error *error) {
+static int row_run (const pw_plan *p, long row, row_result *x, pw_error *error) {
   pw_cli_model m;
+  pw_limit limit = { .most = p->limit };
+  pw_settings settings = p->settings;
+  settings.stop = pw_limit_over;
+  settings.stop_context = &limit;
+  pw_limit_start (&limit);
   double start = row_clock ();
   pw_run *r = NULL;
-  int status = pw_plan_scene (p, row, &m, error), stopped = 0;
-  if (status == PW_OK && (r = pw_open (m.system, p->method, &p->settings, error)) == NULL) status = error->status;
-  while (status == PW_OK && pw_time (r) < p->t_end && !stopped) {
-    status = pw_advance (r, p->t_end, error);
-    stopped = *stop != 0;
-  }
+  int status = pw_plan_scene (p, row, &m, error);
+  if (status == PW_OK && (r = pw_open (m.system, p->method, &settings, error)) == NULL) status = error->status;
+  while (status == PW_OK && pw_time (r) < p->t_end) status = pw_advance (r, p->t_end, error);
+  if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_time (r), error);
   if (r) {
     pw_error *own = &(pw_error){ 0 };
     int read = row_read (p, m.system, r, x, status == PW_OK ? error : own);
     if (status == PW_OK) status = read;
-    stopped = stopped && pw_time (r) < p->t_end;
     pw_close (r);
   }
   pw_cli_close_model (&m);
   x->cpu = row_clock () - start;
-  return stopped ? PW_RETRY : status > 0 ? pw_fail (error, PW_METHOD, "the method gave up") : status;
+  return status > 0 && pw_stop == 0 ? pw_fail (error, PW_METHOD, "the method gave up") : status;
 }
 
 static void row_write (const pw_plan *p, long row, int status, const row_result *x, const char *reason, pw_text *t) {
@@ -84,13 +87,13 @@ static void row_write (const pw_plan *p, long row, int status, const row_result 
   pw_text_quoted (t, reason);
 }
 
-int pw_sweep_row (const pw_plan *p, long row, const volatile sig_atomic_t *stop, pw_text *text, pw_error *error) {
+int pw_sweep_row (const pw_plan *p, long row, pw_text *text, pw_error *error) {
   pw_error own = { 0 };
   row_result x = { NAN, NAN, NAN, NAN, NAN, NAN, NAN, NULL };
   x.state = malloc (((size_t)p->columns + 1) * sizeof *x.state);
   if (x.state == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   for (int i = 0; i < p->columns; i++) x.state[i] = NAN;
-  int status = row_run (p, row, stop, &x, &own);
+  int status = row_run (p, row, &x, &own);
   if (status == PW_MACHINE) pw_fail (error, status, "row %ld of the grid: %s", row + 1, own.text);
   if (status != PW_RETRY && status != PW_MACHINE) row_write (p, row, status, &x, own.text, text);
   free (x.state);

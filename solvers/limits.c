@@ -1,0 +1,75 @@
+/* What ends a run that would not end by itself: the caller's wish, the number of attempted steps, a state so far away that
+ * numbers no longer resolve the scene.  And speeds that grow on and on, which are reported.
+ *
+ * With the unit u of a coordinate (L, or 1 rad) and the round-off eps, q is known to eps |q|.  From eps |q| = 0.01 u on,
+ * round-off alone violates a constraint by what counts as lost (1e-2, scaled), and turns a force or a heading by as much.
+ *
+ * A constant torque or force that nothing opposes takes a scene from rest to the speed N u/T in the time N T, T being the time
+ * scale of its accelerations at the start: an angle of N^2/2.  N = 1e3, some 80,000 turns, that still grows is reported.  It is
+ * no failure, for it may be meant; but steps follow the turns, so that their number grows with the square of the time. */
+#include <float.h>
+#include <stdio.h>
+#include "method.h"
+
+#define LIMITS_RESOLVED 1e-2 /* of the unit: eps |q| beyond which a run fails */
+#define LIMITS_FAST 1e3      /* in u / T: speeds beyond which growth is reported */
+#define LIMITS_GROWS 0.25    /* power of time from which on it is growth */
+
+/* The largest rate at the state reached, in units of the scene; *state: which. */
+static double limits_speed (const pw_run *r, int *state) {
+  const pw_system *s = r->s;
+  double most = 0;
+  *state = s->coords;
+  for (int j = 0; j < s->coords; j++) {
+    double speed = fabs (r->v[j]) * s->scale.time / pw_unit (s, j);
+    if (speed > most) most = speed, *state = s->coords + j;
+  }
+  return most;
+}
+
+double pw_run_growth (const pw_run *r, int *state, double *power) {
+  double now = limits_speed (r, state), span = r->t - r->settings.t;
+  *power = r->earlier > 0 && r->speed > 0 ? log (now / r->speed) / log (span / r->earlier) : 0;
+  return now > LIMITS_FAST && *power > LIMITS_GROWS ? now : 0;
+}
+
+/* Speeds at times that double: the one before the last mark is at most half of the run ago. */
+static void limits_mark (pw_run *r) {
+  int state;
+  double span = r->t - r->settings.t;
+  if (span < 2 * r->marked) return;
+  r->earlier = r->marked, r->speed = r->mark;
+  r->marked = span, r->mark = limits_speed (r, &state);
+}
+
+int pw_run_attempt (pw_run *r, pw_error *error) {
+  const pw_statistics *s = &r->statistics;
+  char name[120], grows[240] = "";
+  int state;
+  double power;
+  if (pw_run_asked (r)) return PW_STOPPED;
+  if (s->steps + s->rejected < r->settings.max_steps || pw_fixed_steps (r)) return PW_OK;
+  double growth = pw_run_growth (r, &state, &power);
+  if (growth > 0)
+    snprintf (grows, sizeof grows,
+              "; the motion grows without bound: %s = %.3g %s, %.2g times the scene's own speed, as t^%.1f",
+              pw_state_name (r->s, state, name, sizeof name), r->v[state - r->s->coords], pw_state_unit (r->s, state),
+              growth, power);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: the limit max-steps is reached: %ld attempted steps, %ld of them rejected%s", r->t,
+                  s->steps + s->rejected, s->rejected, grows);
+}
+
+int pw_run_resolve (pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  char name[120];
+  limits_mark (r);
+  for (int j = 0; j < s->coords; j++)
+    if (fabs (r->q[j]) * DBL_EPSILON > LIMITS_RESOLVED * pw_unit (s, j))
+      return pw_fail (
+          error, PW_METHOD,
+          "t = %.6g s: the motion has grown beyond what numbers resolve: %s = %.3g %s is known to %.2g %s only", r->t,
+          pw_state_name (s, j, name, sizeof name), r->q[j], pw_state_unit (s, j), fabs (r->q[j]) * DBL_EPSILON,
+          pw_state_unit (s, j));
+  return PW_OK;
+}
