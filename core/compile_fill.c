@@ -10,6 +10,12 @@ static const char *compile_text (pw_pools *pools, const char *text) {
   return copy;
 }
 
+/* Where the initial value of a body's state (0 to 5) is from; a 0 of one that does not say is `perhaps`. */
+static unsigned char compile_origin (const pw_body *b, double value, int state, unsigned char perhaps) {
+  if (b->specified) return b->specified >> state & 1 ? PW_SPECIFIED : 0;
+  return value != 0 ? PW_SPECIFIED : perhaps;
+}
+
 static void compile_bodies (const pw_compilation *c, pw_system *s, pw_pools *pools) {
   s->model = compile_text (pools, c->m->name);
   for (int i = 0; i < s->bodies; i++) {
@@ -19,6 +25,10 @@ static void compile_bodies (const pw_compilation *c, pw_system *s, pw_pools *poo
     s->mass[3 * i + 2] = b->inertia;
     memcpy (s->q0 + 3 * i, b->start, sizeof b->start);
     memcpy (s->v0 + 3 * i, b->rate, sizeof b->rate);
+    for (int k = 0; k < 3; k++) {
+      s->held[3 * i + k] = compile_origin (b, b->start[k], k, PW_PERHAPS);
+      s->held[s->coords + 3 * i + k] = compile_origin (b, b->rate[k], 3 + k, 0);
+    }
   }
   s->pose[s->bodies] = (pw_pose){ .cos = 1 };
 }
@@ -28,7 +38,9 @@ static void compile_table (pw_source *source, pw_pools *pools) {
   pw_signal *s = &source->signal;
   size_t n = (size_t)s->table.count;
   double *t = memcpy (pools->table, s->table.t, n * sizeof *t), *value = t + n;
-  s->table.value = memcpy (value, s->table.value, n * sizeof *value);
+  for (size_t i = 0; i < n; i++) value[i] = pw_table_value (s, (int)i);
+  s->table.value = value;
+  s->table.scale = s->table.offset = 0;
   s->table.t = t;
   source->spline = value + n;
   pools->table += 4 * n;
@@ -106,6 +118,8 @@ static int compile_element (const pw_compilation *c, pw_system *s, pw_slab *k, i
     s->mass[j] = own[n].mass;
     s->q0[j] = own[n].start;
     s->v0[j] = own[n].rate;
+    s->held[j] = own[n].specified[0] ? PW_SPECIFIED : 0;
+    s->held[s->coords + j] = own[n].specified[1] ? PW_SPECIFIED : 0;
   }
   return PW_OK;
 }
@@ -178,12 +192,12 @@ static void compile_entries (pw_system *s) {
   }
 }
 
-/* The values given from outside, which the consistent start holds. */
+/* The values given from outside. */
 static int compile_given (const pw_compilation *c, pw_system *s, pw_error *error) {
   for (int i = 0; i < c->m->givens; i++) {
     int state = pw_find_state (s, c->m->given[i].state, error);
     if (state < 0) return PW_INPUT;
-    s->held[state] = 1;
+    s->held[state] |= PW_GIVEN;
     *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = c->m->given[i].value;
   }
   return PW_OK;

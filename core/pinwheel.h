@@ -104,10 +104,12 @@ typedef struct {
 /* Through points. */
 typedef struct {
   const double *t;     /* times of its points, increasing [s]; pw_add and pw_set_signal copy the points */
-  const double *value; /* at these times; unit of the signal; the first and the last are held outside */
+  const double *value; /* at these times; the first and the last are held outside */
   int count;           /* of points: at least 2, of a cubic table with free ends 4 */
   int interpolation;   /* PW_LINEAR, PW_CUBIC: a spline with continuous rate and acceleration */
   int ends;            /* PW_ENDS_FREE: of a spline as its points ask for (not a knot); PW_ENDS_REST: at rate 0 */
+  double scale;        /* the signal is offset + scale value; 0: 1 */
+  double offset;       /* unit of the signal */
 } pw_points;
 
 /* A signal; all zero is the constant 0. */
@@ -134,7 +136,19 @@ typedef struct {
   double inertia;   /* about the centre of mass [kg m^2], >= 0 */
   double start[3];  /* x, y [m], phi [rad] at the start */
   double rate[3];   /* vx, vy [m/s], omega [rad/s] at the start */
+  unsigned specified; /* bits of PW_SPECIFIES_X, ...: these initial values, and no others; 0: those that are not 0 */
 } pw_body;
+
+/* Which initial values a body specifies; others give way where the constraints ask for it.  NOTHING: none of them. */
+enum {
+  PW_SPECIFIES_X = 1,
+  PW_SPECIFIES_Y = 2,
+  PW_SPECIFIES_PHI = 4,
+  PW_SPECIFIES_VX = 8,
+  PW_SPECIFIES_VY = 16,
+  PW_SPECIFIES_OMEGA = 32,
+  PW_SPECIFIES_NOTHING = 64
+};
 
 /* The domain of a number. */
 typedef enum {
@@ -491,8 +505,9 @@ typedef struct {
 /* A coordinate an element owns, as its kind's prepare describes it. */
 typedef struct {
   double mass; /* its entry of M [kg m^2], >= 0; an own coordinate may be massless if the element's rows determine it */
-  double start; /* its value at the start [rad] */
-  double rate;  /* its rate at the start [rad/s] */
+  double start;     /* its value at the start [rad] */
+  double rate;      /* its rate at the start [rad/s] */
+  int specified[2]; /* 1: start, rate are what the definition says, not a consequence of something else */
 } pw_own;
 
 /* Where a body is and how it moves; the ground is a body at rest at the origin. */

@@ -22,9 +22,10 @@ typedef struct {
 
   /* What ends a run that would take too long. */
   long max_steps; /* adaptive methods: attempted steps, rejected ones included; default PW_MAX_STEPS */
-  int (*stop) (void *context); /* asked before each attempted step, before each evaluation of adams, bdf and ida, and before a
+  int (*stop) (
+      void *context); /* asked before each attempted step, before each evaluation of adams, bdf and ida, and before a
                                   sample inside a step; not 0: the call returns PW_STOPPED at once.  May be NULL */
-  void *stop_context;          /* passed to stop */
+  void *stop_context; /* passed to stop */
 } pw_settings;
 
 /* The scales of a scene, from its description and start: everything judged absolutely is judged against them. */
@@ -75,6 +76,7 @@ typedef struct {
   const double *q, *v;             /* the state the run starts from, until it has advanced */
   int moved;                       /* number of states that differ by more than round-off */
   int freed;                       /* 1: the values the user gave could not all be held */
+  int changed;                     /* of the states moved, those that the model specifies */
   double position, velocity;       /* scaled residuals before */
 } pw_start_report;
 

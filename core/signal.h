@@ -20,6 +20,12 @@ double pw_shape_breakpoint (const pw_signal *s, double t);
 
 /* ---- Tables (table.c) ---- */
 
+/* The signal at a point. */
+static inline double pw_table_value (const pw_signal *s, int i) {
+  double scale = s->table.scale == 0 ? 1 : s->table.scale;
+  return s->table.offset + scale * s->table.value[i];
+}
+
 /* Fills 2 count numbers: the spline of a table that has been checked. */
 void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);

@@ -41,6 +41,8 @@ static const pw_field form_table[] = {
   { FORM_AT (table, interpolation), PW_CHOICE, .choices = form_interpolation, .about = "between the points" },
   { FORM_AT (table, ends), PW_CHOICE, .choices = form_ends,
     .about = "of a cubic table: as its points ask for, or with rate 0" },
+  { FORM_AT (table, scale), PW_NUMBER, .about = "factor of the values; left out: 1" },
+  { FORM_AT (table, offset), PW_NUMBER, .about = "what is added to the values times the factor" },
   { .name = NULL },
 };
 
@@ -90,6 +92,9 @@ static void form_points (const pw_signal *s, int *point, char *text, size_t size
     *point = i;
     if (!isfinite (t[i]) || !isfinite (s->table.value[i]))
       snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t[i], s->table.value[i]);
+    else if (!isfinite (pw_table_value (s, i)))
+      snprintf (text, size, "point %d: %g times %g, and %g added: expected a finite number", i + 1, s->table.value[i],
+                s->table.scale, s->table.offset);
     else if (i > 0 && !(t[i] > t[i - 1]))
       snprintf (text, size, "point %d is at t = %.9g s, after one at %.9g s: expected increasing times", i + 1, t[i],
                 t[i - 1]);

@@ -58,13 +58,17 @@ struct pw_system {
   double *constant;       /* coords + 3: sum of the forces that never change */
   double *metric;         /* coords: M, and small weights where M is zero */
   double *q0, *v0;        /* coords: the described start */
-  unsigned char *held;    /* 2 coords: given by the user, so held by the consistent start */
+  unsigned char *held;    /* 2 coords: where initial values are from: PW_GIVEN, ... */
   pw_pose *pose;          /* bodies + 1; the last is the ground */
   pw_slab *slab;          /* slabs: holonomic kinds first, then nonholonomic ones, then forces */
   pw_source *source;      /* sources: slab by slab */
   double *scratch;        /* rows x 3 + coords + 3 */
   pw_entry *entry;        /* entries */
 };
+
+/* Where an initial value is from: given by the user, who has the last word; specified by the model; or a position 0 of a model
+ * that does not say whether it is meant.  0: left out. */
+enum { PW_GIVEN = 1, PW_SPECIFIED = 2, PW_PERHAPS = 4 };
 
 /* The signal that has failed last, "torque T: value", or "".  Returns the buffer. */
 char *pw_failed_signal (const pw_system *s, char *buffer, size_t size);

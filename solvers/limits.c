@@ -64,12 +64,17 @@ int pw_run_resolve (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   char name[120];
   limits_mark (r);
-  for (int j = 0; j < s->coords; j++)
-    if (fabs (r->q[j]) * DBL_EPSILON > LIMITS_RESOLVED * pw_unit (s, j))
-      return pw_fail (
-          error, PW_METHOD,
-          "t = %.6g s: the motion has grown beyond what numbers resolve: %s = %.3g %s is known to %.2g %s only", r->t,
-          pw_state_name (s, j, name, sizeof name), r->q[j], pw_state_unit (s, j), fabs (r->q[j]) * DBL_EPSILON,
-          pw_state_unit (s, j));
+  for (int j = 0; j < s->coords; j++) {
+    double known = fabs (r->q[j]) * DBL_EPSILON;
+    if (!(known > LIMITS_RESOLVED * pw_unit (s, j))) continue;
+    if (pw_fixed_steps (r) && fabs (r->v[j]) * r->settings.step > 0.1 * fabs (r->q[j])) /* within a few steps */
+      return pw_fail (error, PW_METHOD,
+                      "t = %.6g s: the step of %.6g s is too large: the state grows beyond all bounds", r->t,
+                      r->settings.step);
+    pw_state_name (s, j, name, sizeof name);
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: the motion has grown beyond what numbers resolve: %s = %.3g %s, known to %.2g only",
+                    r->t, name, r->q[j], pw_state_unit (s, j), known);
+  }
   return PW_OK;
 }

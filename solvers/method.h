@@ -46,9 +46,10 @@ struct pw_run {
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* the same block, from q_at on */
   double projected_at;
 
-  int stopped;           /* 1: settings.stop has asked for it */
-  int interrupted;       /* 1: inside a step of SUNDIALS, which has to start anew */
-  double marked, mark;   /* time since the start at which speeds were looked at, doubled each time [s]; the largest there */
+  int stopped;     /* 1: settings.stop has asked for it */
+  int interrupted; /* 1: inside a step of SUNDIALS, which has to start anew */
+  double marked,
+      mark; /* time since the start at which speeds were looked at, doubled each time [s]; the largest there */
   double earlier, speed; /* the same of the time before */
 
   double energy0;  /* kinetic + potential at the start */

@@ -154,6 +154,8 @@ const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_start_report *pw_run_start (const pw_run *r);
 /* 1 if the consistent start moved this state (as pw_find_state numbers them) by more than round-off. */
 int pw_start_moved (const pw_system *s, const pw_start_report *report, int state);
+/* 1 if the model specifies the initial value of this state, or the user gave it; 0 if it was left out. */
+int pw_start_specified (const pw_system *s, int state);
 const pw_scale *pw_run_scale (const pw_run *r);
 
 #ifdef __cplusplus

@@ -1,8 +1,9 @@
 /* The consistent start: positions by Gauss-Newton, then rates by one linear solve.
  *
- * What the user gave is held, and if it can be, so are the positions of whatever has mass; what was not given moves as
- * little as possible in the metric.  Only if that fails are the given positions free too, and then everything.  A
- * state that is consistent to round-off is left alone, to the bit. */
+ * What the user gave is prescribed, and so is what the model specifies and, if it can be, the position of whatever has mass;
+ * the rest moves as little as possible in the metric.  If that fails, first the rates that the model specifies are free, then
+ * its positions, then the given positions, and then everything.  A state that is consistent to round-off is left alone, to
+ * the bit. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -100,8 +101,16 @@ int pw_start_moved (const pw_system *s, const pw_start_report *report, int state
 }
 
 void pw_count_moved (pw_run *r) {
-  r->start.moved = 0;
-  for (int j = 0; j < 2 * r->s->coords; j++) r->start.moved += pw_start_moved (r->s, &r->start, j);
+  r->start.moved = r->start.changed = 0;
+  for (int j = 0; j < 2 * r->s->coords; j++) {
+    if (!pw_start_moved (r->s, &r->start, j)) continue;
+    r->start.moved++;
+    r->start.changed += (r->s->held[j] & (PW_GIVEN | PW_SPECIFIED)) == PW_SPECIFIED;
+  }
+}
+
+int pw_start_specified (const pw_system *s, int state) {
+  return (s->held[state] & (PW_GIVEN | PW_SPECIFIED)) != 0;
 }
 
 /* Fills the report; the state given is in q_given, the new one in q. */
@@ -161,36 +170,69 @@ static int start_locked (pw_run *r, pw_error *error) {
                   text);
 }
 
-/* What is held, in the order tried. */
-typedef enum { START_MASS, START_GIVEN, START_RATES, START_NOTHING, START_WAYS } start_way;
+/* What is prescribed, in the order tried: positions and rates by where they are from, and the positions of whatever has mass.
+ * Where positions fail, the rates are not tried. */
+static const struct start_way {
+  unsigned char q, v;
+  enum { START_FREE, START_MASS, START_MASS_PERHAPS } mass; /* the last: where some of them may be meant or not */
+} start_ways[] = {
+  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, START_MASS },
+  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN, START_MASS },
+  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, START_MASS_PERHAPS },
+  { PW_GIVEN, PW_GIVEN, START_MASS_PERHAPS },
+  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, START_FREE },
+  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN, START_FREE },
+  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, START_MASS },
+  { PW_GIVEN, PW_GIVEN, START_MASS },
+  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, START_FREE },
+  { PW_GIVEN, PW_GIVEN, START_FREE },
+  { 0, PW_GIVEN | PW_SPECIFIED, START_FREE },
+  { 0, PW_GIVEN, START_FREE },
+  { 0, 0, START_FREE },
+};
 
-/* The mask of a way; 0 if there is nothing new to try. */
-static int start_mask (const pw_system *s, const unsigned char *held, start_way way, unsigned char *mask) {
-  int n = s->coords, light = 0, heavy = 0, positions = 0, rates = 0;
+/* The mask of a way; 0 if it makes no sense here. */
+static int start_mask (const pw_system *s, const unsigned char *held, const struct start_way *way,
+                       unsigned char *mask) {
+  int n = s->coords, light = 0, heavy = 0, perhaps = 0;
   for (int j = 0; j < n; j++) {
-    int given = held && held[j], keep = way == START_MASS && s->mass[j] > 0 && !given;
-    mask[j] = (unsigned char)(way <= START_GIVEN && (given || keep));
-    mask[n + j] = held && way <= START_RATES ? held[n + j] : 0;
-    light += s->mass[j] == 0 && !given, heavy += keep;
-    positions += given, rates += held && held[n + j];
+    int q = held ? held[j] : 0, v = held ? held[n + j] : 0, keep = way->mass && s->mass[j] > 0 && !(q & way->q);
+    mask[j] = (q & way->q) != 0 || keep;
+    mask[n + j] = (v & way->v) != 0;
+    light += s->mass[j] == 0 && !mask[j], heavy += keep, perhaps += keep && q & PW_PERHAPS;
   }
-  return way == START_MASS    ? light > 0 && heavy > 0
-         : way == START_GIVEN ? positions + rates > 0
-         : way == START_RATES ? positions > 0 && rates > 0
-                              : 1;
+  return !way->mass || (light > 0 && heavy > 0 && (way->mass == START_MASS || perhaps > 0));
 }
 
-static int start_ways (pw_run *r, const unsigned char *held, start_trouble *trouble, int *freed, pw_error *error) {
+/* 1 if some of what the user gave is not in the mask. */
+static int start_freed (const pw_system *s, const unsigned char *held, const unsigned char *mask) {
+  int freed = 0;
+  for (int j = 0; held && j < 2 * s->coords; j++) freed |= held[j] & PW_GIVEN && !mask[j];
+  return freed;
+}
+
+/* Redundant rows of larger scenes (rows times coordinates) are not looked for on behalf of what the model specifies: sketches
+ * of linkages, of which all is specified, fail there as a rule. */
+#define START_SMALL 1e5
+
+static int start_try (pw_run *r, const unsigned char *held, start_trouble *trouble, int *freed, pw_error *error) {
+  const int ways = sizeof start_ways / sizeof *start_ways;
   pw_system *s = r->s;
-  unsigned char *mask = malloc (2 * (size_t)s->coords + 1);
+  size_t n = (size_t)s->coords;
+  unsigned char *mask = malloc (4 * n + 1), *last = mask + 2 * n;
   if (mask == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  int status = PW_RETRY;
-  for (int way = 0; way < START_WAYS && status == PW_RETRY; way++) {
-    int given = start_mask (s, held, START_GIVEN, mask);
-    if (!start_mask (s, held, (start_way)way, mask)) continue;
-    *freed = way > START_GIVEN && given;
-    status = start_ranked (r, mask, trouble, error);
+  int status = PW_RETRY, small = (double)s->rows * s->coords < START_SMALL, before = -1, rates = 0;
+  for (const struct start_way *way = start_ways; way < start_ways + ways && status == PW_RETRY; way++) {
+    if (!start_mask (s, held, way, mask)) continue;
+    int ranked = small || !((way->q | way->v) & PW_SPECIFIED);
+    if (ranked == before && memcmp (mask, last, rates ? 2 * n : n) == 0) continue;
+    start_trouble now = { .row = -1 };
+    status = (ranked ? start_ranked : start_attempt) (r, mask, &now, error);
+    memcpy (last, mask, 2 * n);
+    before = ranked, rates = now.rates;
+    if (now.row >= 0) *trouble = now;
   }
+  *freed = start_freed (s, held, mask);
   free (mask);
   return status;
 }
@@ -208,7 +250,7 @@ int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
   pw_sweep_J (s);
   pw_sweep_residuals (s, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
-    status = start_ways (r, held, &trouble, &freed, error);
+    status = start_try (r, held, &trouble, &freed, error);
   start_report (r, freed, &before);
   if (status == PW_OK) status = start_locked (r, error);
   return status == PW_RETRY ? start_fail (r, &trouble, error) : status;

@@ -77,10 +77,13 @@ static void test_locked_start (void **state) {
   }
 }
 
-/* A body at rest whose wheel, without inertia, is to turn: its two rows are one element. */
+/* A body that is to be at rest while its wheel, without inertia, is to turn: its two rows are one element. */
 static void locked_spin (pw_model *m, const void *parameters) {
   (void)parameters;
-  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 1, .inertia = 1 });
+  pw_add_body (m, &(pw_body){ .name = "cart",
+                              .mass = 1,
+                              .inertia = 1,
+                              .specified = PW_SPECIFIES_VX | PW_SPECIFIES_VY | PW_SPECIFIES_OMEGA });
   pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "wheel", .body = "cart", .radius = 1, .rate = 1 });
 }
 

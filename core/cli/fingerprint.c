@@ -60,6 +60,8 @@ uint64_t pw_check_tables (uint64_t sum, const pw_model *m) {
       if (s->type != PW_TABLE) continue;
       size_t bytes = (size_t)s->table.count * sizeof (double);
       sum = print_hash (print_hash (sum ? sum : print_empty, s->table.t, bytes), s->table.value, bytes);
+      const double line[2] = { s->table.scale, s->table.offset };
+      if (line[0] != 0 || line[1] != 0) sum = print_hash (sum, line, sizeof line);
     }
   return sum;
 }

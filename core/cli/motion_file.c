@@ -13,10 +13,11 @@ typedef struct {
   FILE *f;
   char *line;
   size_t room;
-  long number;  /* of the line */
-  int failed;   /* errno of a line that could not be read */
-  int *place;   /* of each column after the first: in a motion, or -1 */
-  double *sign; /* reactions are -lambda */
+  long number;   /* of the line */
+  int failed;    /* errno of a line that could not be read */
+  int *place;    /* of each column after the first: in a motion, or -1 */
+  double *sign;  /* reactions are -lambda; times what its unit is in SI units */
+  double second; /* the same of the time */
   int columns, known;
 } truth_file;
 
@@ -60,7 +61,8 @@ static int file_place (const pw_system *s, const char *name, size_t n, double *s
 }
 
 static int file_columns (truth_file *in, const pw_system *s, pw_error *error) {
-  char example[300], *rest;
+  char example[300], unit[260], *rest;
+  int n = pw_count_coordinates (s);
   if (!file_line (in)) return pw_fail (error, PW_INPUT, "--truth %s: the file is empty", in->path);
   for (const char *c = in->line; *c; c++) in->columns += *c == ',';
   in->place = calloc ((size_t)in->columns + 1, sizeof *in->place);
@@ -68,12 +70,21 @@ static int file_columns (truth_file *in, const pw_system *s, pw_error *error) {
   if (in->place == NULL || in->sign == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
   rest = in->line;
   const char *first = file_cell (&rest);
-  if (strcmp (first, "t") != 0 && strcmp (first, "t [s]") != 0)
+  if (pw_unit_split (first, unit, sizeof unit) != 1 || *first != 't')
     return pw_fail (error, PW_INPUT, "--truth %s: the first column is \"%.60s\", expected \"t [s]\"", in->path, first);
+  if (pw_unit_check (first, "s", &in->second, unit, sizeof unit) != PW_OK)
+    return pw_fail (error, PW_INPUT, "--truth %s: %s", in->path, unit);
   for (int i = 0; i < in->columns; i++) {
-    const char *cell = file_cell (&rest), *unit = strstr (cell, " [");
-    in->place[i] = file_place (s, cell, unit ? (size_t)(unit - cell) : strlen (cell), &in->sign[i]);
-    in->known += in->place[i] >= 0 && in->place[i] < 2 * pw_count_coordinates (s);
+    const char *cell = file_cell (&rest);
+    double factor = 1;
+    in->place[i] = file_place (s, cell, pw_unit_split (cell, unit, sizeof unit), &in->sign[i]);
+    in->known += in->place[i] >= 0 && in->place[i] < 2 * n;
+    const char *wanted = in->place[i] < 0       ? NULL
+                         : in->place[i] < 2 * n ? pw_state_unit (s, in->place[i])
+                                                : pw_reaction_unit (s, in->place[i] - 2 * n);
+    if (in->place[i] >= 0 && pw_unit_check (cell, wanted, &factor, unit, sizeof unit) != PW_OK)
+      return pw_fail (error, PW_INPUT, "--truth %s: %s", in->path, unit);
+    in->sign[i] *= factor;
   }
   if (in->known) return PW_OK;
   return pw_fail (error, PW_INPUT, "--truth %s: no column is a state of this model, such as \"%s\"", in->path,
@@ -86,7 +97,9 @@ static int file_columns (truth_file *in, const pw_system *s, pw_error *error) {
 static int file_time (truth_file *in, char **rest, double *t, pw_error *error) {
   if (!file_line (in)) return PW_RETRY;
   *rest = in->line;
-  return file_number (in, file_cell (rest), t, error);
+  int status = file_number (in, file_cell (rest), t, error);
+  if (status == PW_OK) *t *= in->second;
+  return status;
 }
 
 /* Rows after the start and up to the end; without an end, the last row's time is it. */

@@ -72,17 +72,20 @@ void pw_report_angles (const pw_model *m) {
 /* ---- The start ---- */
 
 void pw_report_start (const pw_system *s, const pw_start_report *start) {
-  int n = pw_count_coordinates (s), moved = 0, listed = 0;
-  for (int i = 0; i < 2 * n; i++) moved += pw_start_moved (s, start, i);
+  int n = pw_count_coordinates (s), moved = start->moved, listed = 0;
+  char changed[80] = "";
   if (moved == 0) return;
-  fprintf (stderr, "pinwheel: the start did not satisfy the constraints; %d of its values %s moved%s:\n", moved,
-           moved == 1 ? "was" : "were", start->freed ? ", given ones among them, since those cannot all be held" : "");
+  if (start->changed) snprintf (changed, sizeof changed, ", %d of them specified by the model", start->changed);
+  fprintf (stderr, "pinwheel: the start did not satisfy the constraints; %d of its values %s moved%s%s:\n", moved,
+           moved == 1 ? "was" : "were", start->freed ? ", given ones among them, since those cannot all be held" : "",
+           changed);
   for (int i = 0; i < 2 * n && listed < REPORT_MOVED; i++) {
     double from = i < n ? start->q_given[i] : start->v_given[i - n], to = i < n ? start->q[i] : start->v[i - n];
     char name[REPORT_NAME], a[32], b[32];
     if (!pw_start_moved (s, start, i)) continue;
-    fprintf (stderr, "  %s from %s to %s %s\n", pw_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
-             pw_format (b, to, 10), pw_state_unit (s, i));
+    fprintf (stderr, "  %s from %s to %s %s%s\n", pw_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
+             pw_format (b, to, 10), pw_state_unit (s, i),
+             start->changed && pw_start_specified (s, i) ? " (specified)" : "");
     listed++;
   }
   report_more (stderr, moved - listed, "");

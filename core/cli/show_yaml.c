@@ -36,10 +36,10 @@ static void yaml_text (const char *text) {
 
 /* ---- Bodies ---- */
 
-static void yaml_triple (const char *what, const char *const name[3], const double value[3]) {
+static void yaml_triple (const char *what, const char *const name[3], const double value[3], unsigned specified) {
   int written = 0;
   for (int i = 0; i < 3; i++) {
-    if (yaml_is_zero (value[i])) continue;
+    if (yaml_is_zero (value[i]) && !(specified >> i & 1)) continue;
     if (written++ == 0) printf (", %s: {", what);
     printf ("%s%s: ", written > 1 ? ", " : "", name[i]);
     yaml_number (value[i]);
@@ -52,8 +52,8 @@ static void yaml_body (const pw_body *b) {
   printf ("  - {name: "), yaml_name (b->name);
   if (!yaml_is_zero (b->mass)) printf (", mass: "), yaml_number (b->mass);
   if (!yaml_is_zero (b->inertia)) printf (", inertia: "), yaml_number (b->inertia);
-  yaml_triple ("start", start, b->start);
-  yaml_triple ("rate", rate, b->rate);
+  yaml_triple ("start", start, b->start, b->specified);
+  yaml_triple ("rate", rate, b->rate, b->specified >> 3);
   puts ("}");
 }
 

@@ -1,7 +1,7 @@
 /* Two columns of a table of numbers in a CSV file.
  *
  * Lines of cells, separated by whichever of , ; and tab the first line has; a line without any number before the others
- * names the columns, "NAME" or "NAME [unit]".  Empty lines and lines that begin with # are passed over. */
+ * names the columns, "NAME" or "NAME [unit]"; a unit that is not the one wanted converts the column.  Empty lines and lines that begin with # are passed over. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -72,13 +72,14 @@ static int columns_names (const columns *c, const char *line) {
 
 /* Whether a cell of the first line is the column asked for, with or without its unit. */
 static int columns_is (const char *cell, const char *name) {
+  char unit[100];
   size_t n = strlen (name);
-  return strncmp (cell, name, n) == 0 && (cell[n] == 0 || strncmp (cell + n, " [", 2) == 0);
+  return strcmp (cell, name) == 0 || (pw_unit_split (cell, unit, sizeof unit) == n && strncmp (cell, name, n) == 0);
 }
 
 /* The column of a name in the first line, or of a number. */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *place) {
-  char cell[100], best[100] = "", hint[200];
+  char cell[100], unit[100], best[100] = "", hint[200];
   pw_nearest near = { .sought = name };
   char *end;
   long number = strtol (name, &end, 10);
@@ -89,8 +90,7 @@ static int columns_find (const columns *c, const char *first, int named, const c
   *place = -1;
   for (int i = 0; named && i < c->cells; i++) {
     int here = columns_is (columns_cell (c, first, i, cell, sizeof cell), name);
-    char *unit = strstr (cell, " [");
-    if (unit) *unit = 0;
+    cell[pw_unit_split (cell, unit, sizeof unit)] = 0;
     pw_nearest_try (&near, cell);
     if (near.best == cell) near.best = strcpy (best, cell);
     if (!here) continue;
@@ -104,28 +104,43 @@ static int columns_find (const columns *c, const char *first, int named, const c
 
 /* ---- Numbers ---- */
 
-static int columns_numbers (const columns *c, const char *line, const int place[2], double value[2]) {
+static int columns_numbers (const columns *c, const char *line, const int place[2], const double factor[2],
+                            double value[2]) {
   char cell[100];
   for (int k = 0; k < 2; k++) {
     columns_cell (c, line, place[k], cell, sizeof cell);
     if (pw_read_number (cell, &value[k]) != PW_OK || !isfinite (value[k]))
       return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", place[k] + 1, cell);
+    value[k] *= factor[k];
   }
   return PW_OK;
 }
 
-static int columns_rows (columns *c, char *line, const int place[2], double *value[2], int *count) {
+static int columns_rows (columns *c, char *line, const int place[2], const double factor[2], double *value[2],
+                         int *count) {
   for (; line; line = columns_line (c)) {
     double x[2];
     int cells = columns_count (c, line);
     if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
-    if (columns_numbers (c, line, place, x) != PW_OK) return PW_INPUT;
+    if (columns_numbers (c, line, place, factor, x) != PW_OK) return PW_INPUT;
     if (*count > 0 && !(x[0] > value[0][*count - 1]))
       return columns_fail (c, "%.9g comes after %.9g: expected increasing times", x[0], value[0][*count - 1]);
     value[0][*count] = x[0];
     value[1][(*count)++] = x[1];
   }
   return PW_OK;
+}
+
+/* Finds a column, and what to multiply it by. */
+static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit, int *place,
+                         double *factor) {
+  char cell[100], why[260];
+  *factor = 1;
+  if (columns_find (c, first, named, name, place) != PW_OK) return PW_INPUT;
+  if (!named ||
+      pw_unit_check (columns_cell (c, first, *place, cell, sizeof cell), unit, factor, why, sizeof why) == PW_OK)
+    return PW_OK;
+  return columns_fail (c, "%s", why);
 }
 
 /* So many lines there are at most. */
@@ -135,8 +150,10 @@ static size_t columns_lines (const char *text) {
   return n;
 }
 
-static int columns_all (columns *c, const char *const column[2], pw_arena *arena, double *value[2], int *count) {
+static int columns_all (columns *c, const char *const column[2], const char *const unit[2], pw_arena *arena,
+                        double *value[2], int *count) {
   int place[2];
+  double factor[2];
   size_t lines = columns_lines (c->rest);
   char *line = columns_line (c);
   if (line == NULL) return columns_fail (c, "the file is empty");
@@ -145,15 +162,15 @@ static int columns_all (columns *c, const char *const column[2], pw_arena *arena
   c->cells = columns_count (c, line);
   int named = columns_names (c, line);
   for (int k = 0; k < 2; k++) {
-    if (columns_find (c, line, named, column[k], &place[k]) != PW_OK) return PW_INPUT;
+    if (columns_open (c, line, named, column[k], unit[k], &place[k], &factor[k]) != PW_OK) return PW_INPUT;
     value[k] = pw_arena_take (arena, lines * sizeof (double));
     if (value[k] == NULL) return pw_fail (c->error, PW_MACHINE, "%s: out of memory", c->shown);
   }
-  return columns_rows (c, named ? columns_line (c) : line, place, value, count);
+  return columns_rows (c, named ? columns_line (c) : line, place, factor, value, count);
 }
 
-int pw_columns_read (FILE *f, const char *shown, const char *const column[2], pw_arena *arena, double *value[2],
-                     int *count, pw_error *error) {
+int pw_columns_read (FILE *f, const char *shown, const char *const column[2], const char *const unit[2],
+                     pw_arena *arena, double *value[2], int *count, pw_error *error) {
   static const char mark[] = "\xEF\xBB\xBF"; /* of UTF-8, which some programs write first */
   char *text;
   size_t size;
@@ -163,7 +180,7 @@ int pw_columns_read (FILE *f, const char *shown, const char *const column[2], pw
   if (status == PW_OK && strlen (text) != size)
     status = pw_fail (error, PW_INPUT, "%.80s: a table is text, and this has a byte 0", shown);
   if (status == PW_OK && strncmp (text, mark, 3) == 0) c.rest += 3;
-  if (status == PW_OK) status = columns_all (&c, column, arena, value, count);
+  if (status == PW_OK) status = columns_all (&c, column, unit, arena, value, count);
   free (text);
   return status;
 }

@@ -55,9 +55,19 @@ const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
 /* ---- Tables of numbers (columns.c) ---- */
 
 /* Reads two columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first column
- * is increasing.  PW_INPUT with "SHOWN:LINE: what is wrong", PW_MACHINE. */
-int pw_columns_read (FILE *f, const char *shown, const char *const column[2], pw_arena *arena, double *value[2],
-                     int *count, pw_error *error);
+ * is increasing.  `unit` is the one each shall have (NULL: any), to which it is converted if the header names another.
+ * PW_INPUT with "SHOWN:LINE: what is wrong", PW_MACHINE. */
+int pw_columns_read (FILE *f, const char *shown, const char *const column[2], const char *const unit[2],
+                     pw_arena *arena, double *value[2], int *count, pw_error *error);
+
+/* ---- Units (units.c) ---- */
+
+/* A unit that is known: "mm" is "1e-3" of "m".  The first four are those that all others are made of. */
+typedef struct {
+  const char *name, *factor, *si; /* the factor an expression; "1": it is a unit of the SI */
+} pw_unit_name;
+
+extern const pw_unit_name pw_unit_names[]; /* ended by a NULL name */
 
 /* ---- Texts (slurp.c) ---- */
 

@@ -53,6 +53,19 @@ int pw_read_number (const char *text, double *value);
 /* The same, and expressions of numbers as in text models: "30*deg", "2*pi/3". */
 int pw_read_expression (const char *text, double *value);
 
+/* ---- Units in the headers of tables, "NAME [UNIT]" (units.c) ---- */
+
+/* What one of a unit is in SI units; PW_INPUT if it is not known, PW_RETRY if it does not measure what `wanted` (NULL:
+ * anything) does. */
+int pw_unit_factor (const char *unit, const char *wanted, double *factor);
+
+/* The bytes of the name in a header's cell; its unit goes to the buffer: what is between brackets at its end, or a known unit
+ * between parentheses; "" if there is none, or it is - or 1. */
+size_t pw_unit_split (const char *cell, char *unit, size_t size);
+
+/* The factor of a column by its header's cell, 1 without a unit.  PW_INPUT with what is wrong, column and unit named. */
+int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
+
 /* ---- Files that are whole or carry another name ---- */
 
 /* A file written as NAME.part and renamed when complete; "-" is standard output.  What exists and is no regular file

@@ -45,24 +45,18 @@ static int yaml_domain (const pw_yaml *y, const pw_node *domain, const pw_node *
 
 /* 40 with the unit deg would be 40 rad, 400 with the unit mm 400 m. */
 static int yaml_unit (const pw_yaml *y, const pw_node *node, const pw_node *value, const char **unit, pw_error *error) {
-  static const struct {
-    const char *name, *factor, *si;
-  } other[] = { { "degrees", "deg", "rad" },   { "degree", "deg", "rad" },    { "deg", "deg", "rad" },
-                { "°", "deg", "rad" },         { "grad", "(pi/200)", "rad" }, { "gon", "(pi/200)", "rad" },
-                { "rpm", "(pi/30)", "rad/s" }, { "km/h", "(1/3.6)", "m/s" },  { "mm", "1e-3", "m" },
-                { "cm", "1e-2", "m" },         { "km", "1e3", "m" },          { "ms", "1e-3", "s" },
-                { "min", "60", "s" },          { "kN", "1e3", "N" } };
   if (pw_yaml_text (y, node, "unit", unit, error) != PW_OK) return error->status;
-  for (size_t i = 0; i < sizeof other / sizeof *other; i++) {
-    const char *at = strstr (*unit, other[i].name), *behind = at ? at + strlen (other[i].name) : NULL;
+  for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
+    const char *at = strcmp (other->factor, "1") ? strstr (*unit, other->name) : NULL,
+               *behind = at ? at + strlen (other->name) : NULL;
     int number = value->type == PW_YAML_SCALAR && pw_expression_number (value->text, &(double){ 0 });
     if (at == NULL || (at > *unit && isalpha ((unsigned char)at[-1])) || isalpha ((unsigned char)*behind)) continue;
     return pw_yaml_fail (
         y, node->at, error,
         "unit: numbers are in SI units, angles in radians, and no unit converts a value; write \"value: "
         "%.30s%c%s%.2s, unit: %.*s%s%.30s\"",
-        number ? value->text : "(..)", at > *unit && at[-1] == '/' ? '/' : '*', other[i].factor,
-        *behind == '^' ? behind : "", (int)(at - *unit), *unit, other[i].si, behind);
+        number ? value->text : "(..)", at > *unit && at[-1] == '/' ? '/' : '*', other->factor,
+        *behind == '^' ? behind : "", (int)(at - *unit), *unit, other->si, behind);
   }
   return PW_OK;
 }

@@ -113,6 +113,8 @@ typedef struct {
   pw_names all;            /* names of bodies and elements, to the index in nodes */
   pw_names elements;       /* once an expression asks for them: names of all elements, to the index of their kinds */
   const pw_node **node;    /* where each was named */
+  const pw_field *field;   /* the one that is read, and the definition it is of, with all fields before it */
+  const char *definition;
   int named;
   double points;     /* of tables, so far */
   double evaluators; /* of signals by expressions, so far, each by its size */

@@ -31,7 +31,7 @@ static int build_refuse (const pw_yaml_builder *b, const pw_node *node, const pw
 /* ---- Bodies ---- */
 
 static int build_triple (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const key[4],
-                         double value[3], pw_error *error) {
+                         double value[3], unsigned *specified, int first, pw_error *error) {
   const pw_node *v[4];
   char name[200];
   if (node == NULL) return PW_OK;
@@ -39,6 +39,7 @@ static int build_triple (pw_yaml_builder *b, const pw_node *node, const char *wh
   for (int i = 0; i < 3; i++) {
     snprintf (name, sizeof name, "%s: %s", what, key[i]);
     if (v[i] && pw_yaml_number (b->y, v[i], name, PW_REAL, b->x, &value[i], error) != PW_OK) return error->status;
+    if (v[i]) *specified |= 1u << (first + i);
   }
   return PW_OK;
 }
@@ -47,7 +48,7 @@ static int build_body (pw_yaml_builder *b, const pw_node *node, pw_error *error)
   static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
   static const char *const start[] = { "x", "y", "phi", NULL }, *const rate[] = { "vx", "vy", "omega", NULL };
   const pw_node *v[sizeof key / sizeof *key];
-  pw_body body = { .mass = 0 };
+  pw_body body = { .specified = PW_SPECIFIES_NOTHING };
   char what[3][160];
   if (pw_yaml_keys (b->y, node, 0, key, "a body", v, error) != PW_OK) return error->status;
   if (v[0] == NULL) return pw_yaml_fail (b->y, node->at, error, "a body needs a name");
@@ -60,8 +61,8 @@ static int build_body (pw_yaml_builder *b, const pw_node *node, pw_error *error)
   }
   snprintf (what[0], sizeof what[0], "start of body %.60s", body.name);
   snprintf (what[1], sizeof what[1], "rate of body %.60s", body.name);
-  if (build_triple (b, v[3], what[0], start, body.start, error) != PW_OK ||
-      build_triple (b, v[4], what[1], rate, body.rate, error) != PW_OK)
+  if (build_triple (b, v[3], what[0], start, body.start, &body.specified, 0, error) != PW_OK ||
+      build_triple (b, v[4], what[1], rate, body.rate, &body.specified, 3, error) != PW_OK)
     return error->status;
   pw_error own = { 0 };
   if (pw_check_body (b->m, &body, &own) != PW_OK) return build_refuse (b, v[0], &own, error);
@@ -199,6 +200,7 @@ static int build_fields (pw_yaml_builder *b, const pw_kind *kind, const pw_node 
     if (v[i] == NULL && (f->required || f->type == PW_BODY))
       return pw_yaml_fail (b->y, node->first->at, error, "%s needs \"%s\": %s", text, f->name,
                            f->about ? f->about : "");
+    b->field = f, b->definition = definition;
     if (v[i] && build_field (b, kind, f, v[i], name, definition + f->offset, error) != PW_OK) return error->status;
   }
   return PW_OK;

@@ -7,6 +7,7 @@
  *   {expression: .., rate: .., acceleration: ..}   the same for constraints, which need its derivatives by time
  */
 #include <stdio.h>
+#include <string.h>
 #include "signal.h"
 #include "yaml.h"
 
@@ -54,6 +55,12 @@ static int signal_form (pw_yaml_builder *b, const pw_kind *kind, const pw_signal
   if (pw_yaml_keys (b->y, node, 0, key, about, v, error) != PW_OK ||
       signal_fields (b, form, what, node, v, signal, error) != PW_OK)
     return error->status;
+  if (form->type == PW_TABLE) {
+    int scale = 0;
+    while (strcmp (key[scale], "scale") != 0) scale++;
+    if (v[scale] && signal->table.scale == 0)
+      return pw_yaml_fail (b->y, v[scale]->at, error, "%s: scale: 0 would leave nothing of the table", what);
+  }
   if (form->type == PW_TABLE && pw_yaml_points (b, what, node, v + n, signal, error) != PW_OK) return error->status;
   if (form->type == PW_TABLE) points = v[n];
   return signal_fault (b, kind, what, node, points, signal, error);

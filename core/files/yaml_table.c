@@ -80,9 +80,18 @@ static int table_columns (pw_yaml_builder *b, const pw_node *list, const char *w
   return pw_yaml_text (b->y, list->first->next, text, &column[1], error);
 }
 
+/* The unit of the field that is read.  "m or rad" is that of the word a choice of the element has: an angle's, or not. */
+static const char *table_unit (const pw_yaml_builder *b) {
+  if (b->field->unit == NULL || strcmp (b->field->unit, "m or rad") != 0) return b->field->unit;
+  const pw_field *choice = b->field;
+  while (choice->type != PW_CHOICE) choice--; /* a field with two units has it before */
+  int chosen = *(const int *)(const void *)(b->definition + choice->offset);
+  return strcmp (choice->choices[chosen], "angle") == 0 ? "rad" : "m";
+}
+
 static int table_file (pw_yaml_builder *b, const char *what, const pw_node *node, const char *const column[2],
                        pw_signal *s, pw_error *error) {
-  const char *name, *why;
+  const char *name, *why, *const unit[2] = { "s", table_unit (b) };
   double *value[2];
   pw_error own = { 0 };
   if (pw_yaml_text (b->y, node, what, &name, error) != PW_OK) return error->status;
@@ -90,7 +99,7 @@ static int table_file (pw_yaml_builder *b, const char *what, const pw_node *node
   FILE *f = table_open (b->y, name, &why);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (b->y, error);
   if (f == NULL) return pw_yaml_fail (b->y, node->at, error, "%s: cannot read \"%.60s\": %s", what, name, why);
-  int status = pw_columns_read (f, name, column, &b->m->arena, value, &s->table.count, &own);
+  int status = pw_columns_read (f, name, column, unit, &b->m->arena, value, &s->table.count, &own);
   fclose (f);
   s->table.t = value[0];
   s->table.value = value[1];

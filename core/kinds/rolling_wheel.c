@@ -40,7 +40,9 @@ static int rolling_prepare (const void *definition, const pw_body *const *bodies
          aside = d->at[1] * c - d->at[0] * s;
   rolling *k = element;
   *k = (rolling){ { d->at[0], d->at[1] }, c, s, along, aside, d->radius, d->heading };
-  own[0] = (pw_own){ d->inertia, d->start, d->rate != 0 ? d->rate : rolling_rate (k, bodies[0]) };
+  own[0] = (pw_own){
+    d->inertia, d->start, d->rate != 0 ? d->rate : rolling_rate (k, bodies[0]), { d->start != 0, d->rate != 0 }
+  };
   (void)error;
   return PW_OK;
 }

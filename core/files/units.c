@@ -1,0 +1,159 @@
+/* Units in the headers of tables: what they are in SI units, and whether they measure what is asked for.
+ *
+ * A unit is a product of names, each perhaps with a power: "N mm", "m/s^2", "km/h".  A slash divides by the one name behind it.
+ * Angles count as a dimension of their own: 1/s does not say whether it means turns or radians. */
+#include <ctype.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "files.h"
+
+const pw_unit_name pw_unit_names[] = {
+  { "m", "1", "m" },
+  { "kg", "1", "kg" },
+  { "s", "1", "s" },
+  { "rad", "1", "rad" },
+  { "N", "1", "kg m/s^2" },
+  { "J", "1", "kg m^2/s^2" },
+  { "W", "1", "kg m^2/s^3" },
+  { "degrees", "deg", "rad" },
+  { "degree", "deg", "rad" },
+  { "deg", "deg", "rad" },
+  { "°", "deg", "rad" },
+  { "grad", "(pi/200)", "rad" },
+  { "gon", "(pi/200)", "rad" },
+  { "mrad", "1e-3", "rad" },
+  { "rev", "(2*pi)", "rad" },
+  { "rpm", "(pi/30)", "rad/s" },
+  { "km/h", "(1/3.6)", "m/s" },
+  { "um", "1e-6", "m" },
+  { "µm", "1e-6", "m" },
+  { "mm", "1e-3", "m" },
+  { "cm", "1e-2", "m" },
+  { "dm", "0.1", "m" },
+  { "km", "1e3", "m" },
+  { "us", "1e-6", "s" },
+  { "µs", "1e-6", "s" },
+  { "ms", "1e-3", "s" },
+  { "min", "60", "s" },
+  { "h", "3600", "s" },
+  { "mN", "1e-3", "N" },
+  { "kN", "1e3", "N" },
+  { "MN", "1e6", "N" },
+  { "Nm", "1", "N m" },
+  { "kNm", "1e3", "N m" },
+  { "Nmm", "1e-3", "N m" },
+  { "g", "1e-3", "kg" },
+  { "kJ", "1e3", "J" },
+  { "kW", "1e3", "W" },
+  { .name = NULL },
+};
+
+enum { UNITS_BASE = 4 }; /* the first of the names */
+
+typedef struct {
+  double factor;
+  int power[UNITS_BASE];
+} units_value;
+
+static int units_read (const char *text, units_value *u);
+
+/* Multiplies by a name of n bytes to a power. */
+static int units_name (const char *name, size_t n, int power, units_value *u) {
+  units_value one = { .factor = 1 };
+  int i = 0;
+  for (; pw_unit_names[i].name; i++)
+    if (strlen (pw_unit_names[i].name) == n && memcmp (pw_unit_names[i].name, name, n) == 0) break;
+  if (pw_unit_names[i].name == NULL && !(n == 1 && *name == '1')) return PW_INPUT;
+  if (pw_unit_names[i].name) pw_read_expression (pw_unit_names[i].factor, &one.factor);
+  if (i < UNITS_BASE)
+    one.power[i] = 1;
+  else if (pw_unit_names[i].name) {
+    units_value rest;
+    units_read (pw_unit_names[i].si, &rest);
+    one.factor *= rest.factor;
+    memcpy (one.power, rest.power, sizeof one.power);
+  }
+  u->factor *= power == 1 ? one.factor : pow (one.factor, power);
+  for (int k = 0; k < UNITS_BASE; k++) u->power[k] += power * one.power[k];
+  return PW_OK;
+}
+
+/* The power behind a name: "^2", "²", "2"; 1 if there is none. */
+static const char *units_power (const char *p, int *power) {
+  static const char square[] = "\xC2\xB2", cube[] = "\xC2\xB3";
+  char *end;
+  *power = strncmp (p, square, 2) == 0 ? 2 : strncmp (p, cube, 2) == 0 ? 3 : 1;
+  if (*power > 1) return p + 2;
+  if (*p == '^') p++;
+  if (!isdigit ((unsigned char)*p) && !(*p == '-' && isdigit ((unsigned char)p[1]))) return p;
+  long value = strtol (p, &end, 10);
+  *power = value > -10 && value < 10 ? (int)value : 0;
+  return end;
+}
+
+static int units_read (const char *text, units_value *u) {
+  static const char ends[] = " */^0123456789-\xC2"; /* the last begins a raised digit or a middle dot */
+  static const char dot[] = "\xC2\xB7";
+  int over = 0;
+  *u = (units_value){ .factor = 1 };
+  for (const char *p = text; *p;) {
+    int power, degree = strncmp (p, "°", 2) == 0 || strncmp (p, "µ", 2) == 0;
+    size_t n = (degree ? 2 : 0) + strcspn (p + (degree ? 2 : 0), ends);
+    if (n == 0 && *p == '1') n = 1;
+    if (n > 0) {
+      const char *behind = units_power (p + n, &power);
+      if (power == 0 || units_name (p, n, over ? -power : power, u) != PW_OK) return PW_INPUT;
+      over = 0;
+      p = behind;
+    }
+    n = strspn (p, " *");
+    if (*(p += n) == '/' && !over)
+      over = 1, p++, n++;
+    else if (strncmp (p, dot, 2) == 0)
+      p += 2, n++;
+    p += strspn (p, " ");
+    if (n == 0 && *p) return PW_INPUT;
+  }
+  return over || *text == 0 ? PW_INPUT : PW_OK;
+}
+
+int pw_unit_factor (const char *unit, const char *wanted, double *factor) {
+  units_value u, w;
+  *factor = 1;
+  if (units_read (unit, &u) != PW_OK) return PW_INPUT;
+  *factor = u.factor;
+  if (wanted == NULL || units_read (wanted, &w) != PW_OK) return PW_OK;
+  return memcmp (u.power, w.power, sizeof u.power) == 0 ? PW_OK : PW_RETRY;
+}
+
+size_t pw_unit_split (const char *cell, char *unit, size_t size) {
+  size_t n = strlen (cell), name;
+  double factor;
+  *unit = 0;
+  if (n < 2 || (cell[n - 1] != ']' && cell[n - 1] != ')')) return n;
+  const char *open = strrchr (cell, cell[n - 1] == ']' ? '[' : '(');
+  if (open == NULL) return n;
+  const char *from = open + 1 + strspn (open + 1, " "), *end = cell + n - 1;
+  while (end > from && end[-1] == ' ') end--;
+  snprintf (unit, size, "%.*s", (int)(end - from < 90 ? end - from : 90), from);
+  if (*open == '(' && pw_unit_factor (unit, NULL, &factor) != PW_OK) return *unit = 0, n; /* it may be any remark */
+  if (strcmp (unit, "-") == 0 || strcmp (unit, "1") == 0) *unit = 0;
+  for (name = (size_t)(open - cell); name > 0 && cell[name - 1] == ' ';) name--;
+  return name;
+}
+
+int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size) {
+  char unit[100];
+  *factor = 1;
+  pw_unit_split (cell, unit, sizeof unit);
+  int status = *unit ? pw_unit_factor (unit, wanted, factor) : PW_OK;
+  if (status == PW_INPUT)
+    snprintf (why, size, "column \"%.60s\": the unit \"%.40s\" is not known; expected %s, or one that converts to it",
+              cell, unit, wanted ? wanted : "an SI unit");
+  if (status == PW_RETRY)
+    snprintf (why, size, "column \"%.60s\": the unit \"%.40s\" does not measure what %s does, which is expected", cell,
+              unit, wanted);
+  return status == PW_OK ? PW_OK : PW_INPUT;
+}
