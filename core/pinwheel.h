@@ -131,11 +131,11 @@ typedef struct pw_model pw_model;
 
 /* A rigid body.  Its frame sits at its centre of mass.  Massless bodies are allowed. */
 typedef struct {
-  const char *name; /* unique among bodies and elements; "ground" is reserved */
-  double mass;      /* [kg], >= 0 */
-  double inertia;   /* about the centre of mass [kg m^2], >= 0 */
-  double start[3];  /* x, y [m], phi [rad] at the start */
-  double rate[3];   /* vx, vy [m/s], omega [rad/s] at the start */
+  const char *name;   /* unique among bodies and elements; "ground" is reserved */
+  double mass;        /* [kg], >= 0 */
+  double inertia;     /* about the centre of mass [kg m^2], >= 0 */
+  double start[3];    /* x, y [m], phi [rad] at the start */
+  double rate[3];     /* vx, vy [m/s], omega [rad/s] at the start */
   unsigned specified; /* bits of PW_SPECIFIES_X, ...: these initial values, and no others; 0: those that are not 0 */
 } pw_body;
 

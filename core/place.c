@@ -68,10 +68,10 @@ void pw_hold (pw_system *s, int hold) {
   s->t_signal = NAN;
 }
 
-double pw_next_breakpoint (pw_system *s, double t) {
+double pw_next_breakpoint (pw_system *s, int knots, double t) {
   double next = INFINITY;
   for (const pw_source *i = s->source, *end = i + s->sources; i < end; i++) {
-    double own = pw_signal_breakpoint (&i->signal, t);
+    double own = pw_signal_breakpoint (&i->signal, knots && !i->forced, t);
     if (own < next) next = own;
     if (own > t) continue;
     s->failed = i;

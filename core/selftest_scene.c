@@ -260,7 +260,7 @@ static void scene_aim (scene *x, const double *q, const double *v, pw_random *r)
     x->local[i] = scene_local (x, x->w, i / x->k->b.cols, i % x->k->b.cols);
   for (int i = 0; i < x->k->b.count * x->k->kind->rows; i++) x->lambda[i] = pw_random_between (r, -1, 1);
   /* no signal breaks between the times tried */
-  x->tau = fmin (T, pw_next_breakpoint (x->s, x->t) - x->t) / 2;
+  x->tau = fmin (T, pw_next_breakpoint (x->s, 0, x->t) - x->t) / 2;
   x->t += x->tau;
 }
 

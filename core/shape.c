@@ -77,8 +77,8 @@ int pw_shape_eval (const pw_source *source, double t, double u[3]) {
   return 0;
 }
 
-double pw_shape_breakpoint (const pw_signal *s, double t) {
+double pw_shape_breakpoint (const pw_signal *s, int knots, double t) {
   if (s->type == PW_RAMP || s->type == PW_SMOOTH_STEP) return shape_rise_breakpoint (s, t);
   if (s->type == PW_PULSE) return shape_pulse_breakpoint (s, t);
-  return s->type == PW_TABLE ? pw_table_breakpoint (s, t) : INFINITY;
+  return s->type == PW_TABLE ? pw_table_breakpoint (s, knots, t) : INFINITY;
 }

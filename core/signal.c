@@ -36,7 +36,7 @@ int pw_signal_eval (const pw_source *source, double t, int derivatives, double u
   return 0;
 }
 
-double pw_signal_breakpoint (const pw_signal *s, double t) {
-  if (s->type != PW_FUNCTION) return pw_shape_breakpoint (s, t);
+double pw_signal_breakpoint (const pw_signal *s, int knots, double t) {
+  if (s->type != PW_FUNCTION) return pw_shape_breakpoint (s, knots, t);
   return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
 }

@@ -9,14 +9,15 @@
  * run. */
 int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]);
 
-/* First time after t at which the signal jumps or its rate or acceleration does, or INFINITY. */
-double pw_signal_breakpoint (const pw_signal *s, double t);
+/* First time after t at which the signal jumps or its rate or acceleration does, or INFINITY; with `knots` also where the
+ * acceleration of a cubic table has a kink. */
+double pw_signal_breakpoint (const pw_signal *s, int knots, double t);
 
 /* ---- Ramps, smooth steps, pulses, and tables (shape.c) ---- */
 
 /* u is all zero before.  Returns 0. */
 int pw_shape_eval (const pw_source *source, double t, double u[3]);
-double pw_shape_breakpoint (const pw_signal *s, double t);
+double pw_shape_breakpoint (const pw_signal *s, int knots, double t);
 
 /* ---- Tables (table.c) ---- */
 
@@ -29,7 +30,7 @@ static inline double pw_table_value (const pw_signal *s, int i) {
 /* Fills 2 count numbers: the spline of a table that has been checked. */
 void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);
-double pw_table_breakpoint (const pw_signal *s, double t);
+double pw_table_breakpoint (const pw_signal *s, int knots, double t);
 
 /* ---- Forms (signal_form.c) ---- */
 

@@ -136,8 +136,9 @@ void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw
 void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
                          pw_residuals *r);
 
-/* First discontinuity of any signal after t, or INFINITY; NaN if a function tells none of both: it has failed. */
-double pw_next_breakpoint (pw_system *s, double t);
+/* First discontinuity of any signal after t, or INFINITY, with `knots` also kinks in the acceleration of what drives a
+ * constraint; NaN if a function tells none of both: it has failed. */
+double pw_next_breakpoint (pw_system *s, int knots, double t);
 
 /* 1 if an element's force, J or gamma is not finite at the state in place, and which: "force of attraction sun", written to
  * the buffer. */

@@ -84,9 +84,9 @@ void pw_table_eval (const pw_signal *s, const double *spline, double t, double u
   u[2] = M + x * jerk;
 }
 
-/* A linear table has a kink at each point; a cubic one is smooth enough but for its ends. */
-double pw_table_breakpoint (const pw_signal *s, double t) {
+/* A linear table has a kink at each point; a cubic one at its ends, and in its acceleration at each. */
+double pw_table_breakpoint (const pw_signal *s, int knots, double t) {
   int n = s->table.count, next = table_passed (s, t);
   if (next == n) return INFINITY;
-  return s->table.t[next > 0 && s->table.interpolation == PW_CUBIC ? n - 1 : next];
+  return s->table.t[next > 0 && s->table.interpolation == PW_CUBIC && !knots ? n - 1 : next];
 }

@@ -42,7 +42,7 @@ void pw_run_watch (pw_run *r) {
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
   char signal[160];
-  double next = pw_next_breakpoint (r->s, r->t);
+  double next = pw_next_breakpoint (r->s, r->method->order > 2, r->t);
   if (!isnan (next)) {
     r->breakpoint = next;
     return PW_OK;

@@ -45,7 +45,7 @@ static void shapes_derivatives (const pw_signal *s) {
   pw_source source = shapes_source (s);
   for (double t = 0.033; t < 5; t += 0.1) {
     double u[3], up[3], down[3];
-    if (pw_signal_breakpoint (s, t - 2 * h) < t + 2 * h) continue;
+    if (pw_signal_breakpoint (s, 0, t - 2 * h) < t + 2 * h) continue;
     shapes_at (&source, t, u);
     shapes_at (&source, t + h, up);
     shapes_at (&source, t - h, down);
@@ -60,7 +60,7 @@ static void shapes_breaks (const pw_signal *s, int count, int smooth) {
   pw_source source = shapes_source (s);
   double t = 0, u[3], before[3], after[3];
   for (int i = 0; i < count; i++) {
-    double next = pw_signal_breakpoint (s, t);
+    double next = pw_signal_breakpoint (s, 0, t);
     assert_true (next > t && isfinite (next));
     int jumps = 0;
     shapes_at (&source, next, u);
@@ -74,7 +74,7 @@ static void shapes_breaks (const pw_signal *s, int count, int smooth) {
     assert_true (jumps || smooth == 2);
     t = next;
   }
-  if (s->pulse.period == 0 || s->type != PW_PULSE) assert_true (isinf (pw_signal_breakpoint (s, t)));
+  if (s->pulse.period == 0 || s->type != PW_PULSE) assert_true (isinf (pw_signal_breakpoint (s, 0, t)));
 }
 
 static void test_forms (void **state) {
@@ -130,7 +130,7 @@ static void test_many_pulses (void **state) {
   double t = 0, u[3];
   (void)state;
   for (int i = 0; i < 20000; i++) {
-    t = pw_signal_breakpoint (&s, t);
+    t = pw_signal_breakpoint (&s, 0, t);
     shapes_at (&source, t, u);
     assert_true (u[0] == (i % 2 == 0));
     shapes_at (&source, nextafter (t, 0), u);

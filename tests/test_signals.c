@@ -12,7 +12,7 @@ static void test_constant (void **state) {
   double u[3];
   assert_int_equal (pw_signal_eval (&source, 7, 1, u), 0);
   assert_true (u[0] == 2.5 && u[1] == 0 && u[2] == 0);
-  assert_true (isinf (pw_signal_breakpoint (&source.signal, 0)));
+  assert_true (isinf (pw_signal_breakpoint (&source.signal, 0, 0)));
 }
 
 static void test_harmonic (void **state) {
@@ -84,7 +84,7 @@ static void test_reads (void **state) {
   q[5] = 0.8;
   assert_int_equal (pw_place (s, 2, q, v), PW_OK);
   assert_true (c.calls == 2 && c.x[0] == 0.8); /* another state at the same time */
-  assert_true (pw_next_breakpoint (s, 0) == 3 && isinf (pw_next_breakpoint (s, 3)));
+  assert_true (pw_next_breakpoint (s, 0, 0) == 3 && isinf (pw_next_breakpoint (s, 0, 3)));
   c.fails = 1;
   assert_int_equal (pw_place (s, 2.5, q, v), PW_METHOD);
   pw_free (s);
