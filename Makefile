@@ -237,6 +237,7 @@ $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
+$(BUILD)/tests/test_cli_limits: $(call obj,core/cli/progress.c)
 # This every call of the libraries below.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/test_faults.c)
 # A part of SUNDIALS that Pinwheel does not use, to compare with.

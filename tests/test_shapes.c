@@ -141,6 +141,17 @@ static void test_many_pulses (void **state) {
 
 /* ---- Splines ---- */
 
+/* Between its ends a cubic table is smooth enough but for what has kinks in its acceleration to stop at each point. */
+static void test_knots (void **state) {
+  (void)state;
+  for (int i = 0; i < SHAPES_POINTS - 1; i++) {
+    assert_true (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[i]) == shapes_t[i + 1]);
+    assert_true (pw_signal_breakpoint (&shapes_rest, 0, shapes_t[i]) == shapes_t[SHAPES_POINTS - 1]);
+  }
+  assert_true (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[0] - 1) == shapes_t[0]);
+  assert_true (isinf (pw_signal_breakpoint (&shapes_rest, 1, shapes_t[SHAPES_POINTS - 1])));
+}
+
 /* A spline with free ends through points of a cubic is that cubic. */
 static void test_cubic (void **state) {
   double y[SHAPES_POINTS], u[3];
@@ -286,9 +297,9 @@ static void test_faults (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_forms),   cmocka_unit_test (test_values), cmocka_unit_test (test_many_pulses),
-    cmocka_unit_test (test_cubic),   cmocka_unit_test (test_rest),   cmocka_unit_test (test_methods),
-    cmocka_unit_test (test_refused), cmocka_unit_test (test_faults),
+    cmocka_unit_test (test_forms),   cmocka_unit_test (test_values),  cmocka_unit_test (test_many_pulses),
+    cmocka_unit_test (test_knots),   cmocka_unit_test (test_cubic),   cmocka_unit_test (test_rest),
+    cmocka_unit_test (test_methods), cmocka_unit_test (test_refused), cmocka_unit_test (test_faults),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -64,6 +64,94 @@ static void test_no_harm_on_the_way (void **state) {
   }
 }
 
+/* ---- What is specified stays, too ---- */
+
+/* A rod on a pin, of which one state or two are specified. */
+static void start_rod (pw_model *m, const void *parameters) {
+  const double *p = parameters;
+  pw_add_body (m, &(pw_body){ .name = "rod",
+                              .mass = 1,
+                              .inertia = 1. / 12,
+                              .start = { p[1], 0, p[0] },
+                              .rate = { 0, p[3], p[2] },
+                              .specified = (unsigned)p[4] });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "ground", "rod" }, .at = { { 0 }, { -0.5, 0 } } });
+}
+
+static const pw_parameter start_rod_list[] = { { .name = "phi" },
+                                               { .name = "x", .offset = 8 },
+                                               { .name = "omega", .offset = 16 },
+                                               { .name = "vy", .offset = 24 },
+                                               { .name = "specified", .offset = 32 },
+                                               { .name = NULL } };
+static const pw_plugin_table start_rod_table = { .abi = PW_ABI,
+                                                 .size = sizeof (pw_plugin_table),
+                                                 .parameters = start_rod_list,
+                                                 .parameters_size = 40,
+                                                 .build = start_rod };
+
+static const pw_start_report *start_of_rod (pw_system **s, pw_run **r, double phi, double x, double omega, double vy,
+                                            double specified) {
+  *s = scene_system (&start_rod_table, "phi", phi, "x", x, "omega", omega, "vy", vy, "specified", specified, NULL);
+  *r = runs_open (*s, "rk4", NULL);
+  check_below ("position", runs_to (*r, 0).position, START_ROUND_OFF, start_reason);
+  check_below ("velocity", runs_to (*r, 0).velocity, START_ROUND_OFF, start_reason);
+  return pw_run_start (*r);
+}
+
+/* An angle and a rate that are specified stay to the bit; what is left out follows. */
+static void test_specified (void **state) {
+  pw_system *s;
+  pw_run *r;
+  (void)state;
+  const pw_start_report *start = start_of_rod (&s, &r, PW_PI / 6, 0, 2, 0, 0);
+  assert_true (start->q[2] == PW_PI / 6 && start->v[2] == 2 && start->moved == 4 && start->changed == 0);
+  check_close ("x", start->q[0], 0.5 * cos (PW_PI / 6), START_ROUND_OFF, start_reason);
+  check_close ("vy", start->v[1], cos (PW_PI / 6), START_ROUND_OFF, start_reason);
+  assert_true (pw_start_specified (s, 2) && pw_start_specified (s, 5) && !pw_start_specified (s, 0));
+  start_close (r, s);
+}
+
+/* A 0 that is meant, and x in its place: the angle follows from x = 0.5 cos phi, omega from vy = 0.5 omega cos phi. */
+static void test_specified_zero (void **state) {
+  pw_system *s;
+  pw_run *r;
+  (void)state;
+  const pw_start_report *start = start_of_rod (&s, &r, 1.5, 0, 0, 0, PW_SPECIFIES_X);
+  assert_true (start->q[0] == 0 && start->changed == 0);
+  check_close ("phi", start->q[2], PW_PI / 2, START_ROUND_OFF, start_reason);
+  start_close (r, s);
+  start = start_of_rod (&s, &r, PW_PI / 3, 0, 0, 0.75, 0);
+  assert_true (start->q[2] == PW_PI / 3 && start->v[1] == 0.75 && start->changed == 0);
+  check_close ("omega", start->v[2], 3, START_ROUND_OFF, start_reason);
+  start_close (r, s);
+}
+
+/* More than the pin allows: as little as possible moves, and the report has what was specified; the rates stay none the less. */
+static void test_specified_too_much (void **state) {
+  pw_system *s;
+  pw_run *r;
+  (void)state;
+  const pw_start_report *start = start_of_rod (&s, &r, PW_PI / 6, 0.5, 2, 0, 0);
+  assert_true (start->freed == 0 && start->changed == 2 && start->v[2] == 2);
+  assert_true (start->q[2] > 0.1 && start->q[2] < PW_PI / 6 && start->q[0] < 0.5);
+  start_close (r, s);
+}
+
+/* What the user gives has the last word. */
+static void test_given_before_specified (void **state) {
+  pw_error error = { 0 };
+  (void)state;
+  pw_model *m = scene_model (&start_rod_table, "phi", PW_PI / 6, NULL);
+  check_ok (pw_set_start (m, "rod.y", 0.4, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_run *r = runs_open (s, "rk4", NULL);
+  const pw_start_report *start = pw_run_start (r);
+  assert_true (start->q[1] == 0.4 && start->freed == 0 && start->changed == 1);
+  check_close ("phi", start->q[2], asin (0.8), START_ROUND_OFF, start_reason);
+  start_close (r, s);
+}
+
 /* ---- What is given stays ---- */
 
 static void test_held (void **state) {
@@ -311,12 +399,22 @@ static void test_far (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_no_harm),    cmocka_unit_test (test_no_harm_on_the_way),
-    cmocka_unit_test (test_held),       cmocka_unit_test (test_held_row),
-    cmocka_unit_test (test_held_rows),  cmocka_unit_test (test_far),
-    cmocka_unit_test (test_freed),      cmocka_unit_test (test_mass_stays),
-    cmocka_unit_test (test_rates_stay), cmocka_unit_test (test_least_change),
-    cmocka_unit_test (test_drive),      cmocka_unit_test (test_impossible),
+    cmocka_unit_test (test_no_harm),
+    cmocka_unit_test (test_no_harm_on_the_way),
+    cmocka_unit_test (test_specified),
+    cmocka_unit_test (test_specified_zero),
+    cmocka_unit_test (test_specified_too_much),
+    cmocka_unit_test (test_given_before_specified),
+    cmocka_unit_test (test_held),
+    cmocka_unit_test (test_held_row),
+    cmocka_unit_test (test_held_rows),
+    cmocka_unit_test (test_far),
+    cmocka_unit_test (test_freed),
+    cmocka_unit_test (test_mass_stays),
+    cmocka_unit_test (test_rates_stay),
+    cmocka_unit_test (test_least_change),
+    cmocka_unit_test (test_drive),
+    cmocka_unit_test (test_impossible),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -151,6 +151,21 @@ static void test_table (void **state) {
   check_close ("angle", truth_error ("largest", "angle"), 0, 0, "exact");
   cli_good ("pinwheel run @/particles.c --truth @/table.csv");
   truth_shows ("table.csv, at 3 times\n");
+  cli_write ("units.csv", "t [ms],one.x [mm],two.phi[deg]\n250,500,0\n500,1125,0\n750,1500,0\n");
+  cli_good ("pinwheel run @/particles.c --truth @/units.csv --json -");
+  check_close ("last", cli_number (cli_out, "truth", "t", NULL), 0.75, 0, "exact");
+  check_close ("largest", truth_error ("largest", "length"), 0.125, 1e-14, "round-off");
+  cli_write ("unit.csv", "t [s],one.x [deg]\n1,0\n");
+  cli_bad (
+      "pinwheel run @/particles.c --truth @/unit.csv", 2,
+      "--truth @/unit.csv: column \"one.x [deg]\": the unit \"deg\" does not measure what m does, which is expected");
+  cli_write ("unit.csv", "t [s],one.x [cubit]\n1,0\n");
+  cli_bad ("pinwheel compare @/particles.c --methods rk4 --truth @/unit.csv", 2,
+           "--truth @/unit.csv: column \"one.x [cubit]\": the unit \"cubit\" is not known; expected m, or one that "
+           "converts to it");
+  cli_write ("unit.csv", "t [m],one.x\n1,0\n");
+  cli_bad ("pinwheel run @/particles.c --truth @/unit.csv", 2,
+           "--truth @/unit.csv: column \"t [m]\": the unit \"m\" does not measure what s does, which is expected");
   cli_write ("late.csv", "t,one.x\n3,6\n");
   cli_bad ("pinwheel run @/particles.c --truth @/late.csv", 2,
            "--truth @/late.csv: no row between the start and the end, t = 1 s");

@@ -78,6 +78,92 @@ static void table_bad (const char *table, const char *text) {
   assert_non_null (strstr (error.text, text));
 }
 
+/* A header's unit converts its column, however it is written. */
+static void test_units (void **state) {
+  static const char *const unit[] = { "[N mm]", "[mN m]", "[N*mm]", "[kN um]", "[g m^2/s^2]", "[Nmm]", "(N mm)" };
+  char csv[200];
+  (void)state;
+  for (size_t i = 0; i < sizeof unit / sizeof *unit; i++) {
+    snprintf (csv, sizeof csv, "t [ms],u %s\n0,1000\n500,-2000\n2000,300\n", unit[i]);
+    table_good (csv, "{file: data.csv}");
+    table_good (csv, "{file: data.csv, columns: [t, u]}");
+  }
+  table_good ("t[min],u[kg m\xC2\xB2/s\xC2\xB2]\n0,1\n8.3333333333333333e-3,-2\n0.033333333333333333,.3\n",
+              "{file: data.csv}");
+  table_good ("t,u (as measured),v\n0,1,x\n0.5,-2,x\n2,.3,x\n", "{file: data.csv}");
+  table_good ("t [s],u [-]\n0,1\n0.5,-2\n2,.3\n", "{file: data.csv}");
+}
+
+/* What is not known, or measures something else, is refused with column and unit. */
+static void test_bad_units (void **state) {
+  static const char csv[] = "t [s],u [lbf ft],w [deg],f [N],z [N m/],h [%]\n0,1,2,3,4,5\n1,2,3,4,5,6\n";
+  (void)state;
+  table_write ("model/u.csv", csv, strlen (csv));
+  table_bad ("{file: u.csv}", "u.csv:1: column \"u [lbf ft]\": the unit \"lbf ft\" is not known; expected N m");
+  table_bad ("{file: u.csv, columns: [t, w]}", "column \"w [deg]\": the unit \"deg\" does not measure what N m does");
+  table_bad ("{file: u.csv, columns: [t, f]}", "column \"f [N]\": the unit \"N\" does not measure what N m does");
+  table_bad ("{file: u.csv, columns: [t, z]}", "the unit \"N m/\" is not known");
+  table_bad ("{file: u.csv, columns: [t, h]}", "the unit \"%\" is not known");
+  table_bad ("{file: u.csv, columns: [f, z]}", "column \"f [N]\": the unit \"N\" does not measure what s does");
+}
+
+/* The unit a signal has: of a drive, that of what it drives. */
+static void table_unit (const char *element, const char *header, double expected, const char *text) {
+  char yaml[500], csv[100];
+  pw_error error = { 0 };
+  snprintf (csv, sizeof csv, "t,u [%s]\n0,0\n1,90\n", header);
+  table_write ("model/data.csv", csv, strlen (csv));
+  snprintf (yaml, sizeof yaml,
+            "pinwheel: 1\nbodies: [{name: a, mass: 1, inertia: 1}]\n"
+            "elements: [{%s: {table: {file: data.csv, interpolation: cubic, ends: rest}}}]\n",
+            element);
+  table_write ("model/m.yaml", yaml, strlen (yaml));
+  pw_file *f = pw_file_open (table_in ("model/m.yaml"), &error);
+  pw_model *m = f ? pw_file_model (f, &error) : NULL;
+  assert_non_null (m);
+  int status = pw_build (m, &error);
+  if (text) {
+    assert_int_equal (status, PW_INPUT);
+    assert_non_null (strstr (error.text, text));
+  } else {
+    check_ok (status, &error);
+    const pw_signal *s = pw_field_at (m->element[0].kind, m->element[0].definition, PW_SIGNAL, 0);
+    check_close (header, s->table.value[1], expected, 4 * CHECK_EPS * expected, "a product or two");
+  }
+  pw_model_free (m);
+  pw_file_close (f);
+}
+
+static void test_unit_of_signal (void **state) {
+  static const char angle[] = "drive: D, body: [a, ground], at: [[0, 0], [0, 0]], what: angle, value",
+                    x[] = "drive: D, body: [a, ground], at: [[0, 0], [0, 0]], what: x, value",
+                    speed[] = "speed: V, body: a, at: [0, 0], value",
+                    pfaffian[] = "pfaffian: P, body: [a, ground], a: [1, 0, 0], b: [0, 0, 0], value";
+  (void)state;
+  table_unit (angle, "deg", PW_PI / 2, NULL);
+  table_unit (angle, "\xC2\xB0", PW_PI / 2, NULL);
+  table_unit (angle, "rev", 180 * PW_PI, NULL);
+  table_unit (angle, "mm", 0, "the unit \"mm\" does not measure what rad does");
+  table_unit (x, "mm", 0.09, NULL);
+  table_unit (x, "deg", 0, "the unit \"deg\" does not measure what m does");
+  table_unit (speed, "km/h", 25, NULL);
+  table_unit (pfaffian, "cm", 0.9, NULL); /* any: its coefficients may have units */
+  table_unit (speed, "rpm", 0, "does not measure what m/s does");
+}
+
+/* offset + scale value, at the compiled signal; the points stay as they are. */
+static void test_scale (void **state) {
+  pw_signal s = { 0 };
+  double point[2][3];
+  (void)state;
+  table_write ("model/data.csv", "0,1\n2,3\n", 8);
+  pw_error error = table_build ("{file: data.csv, scale: 2*deg, offset: -1}", &s, point);
+  check_ok (error.status, &error);
+  assert_true (s.table.scale == 2 * (PW_PI / 180) && s.table.offset == -1 && point[1][1] == 3);
+  table_bad ("{points: [[0, 1], [1, 2]], scale: 0}", "scale: 0 would leave nothing of the table");
+  table_bad ("{points: [[0, 1], [1, 1e300]], scale: 1e300}", "point 2: 1e+300 times 1e+300, and 0 added");
+}
+
 static void test_contents (void **state) {
   (void)state;
   table_write ("model/nul.csv", "0,1\n1,\0002\n", 9);
@@ -147,7 +233,9 @@ static int table_teardown (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms), cmocka_unit_test (test_contents),
-                                      cmocka_unit_test (test_places), cmocka_unit_test (test_limits) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms),     cmocka_unit_test (test_units),
+                                      cmocka_unit_test (test_bad_units), cmocka_unit_test (test_unit_of_signal),
+                                      cmocka_unit_test (test_scale),     cmocka_unit_test (test_contents),
+                                      cmocka_unit_test (test_places),    cmocka_unit_test (test_limits) };
   return cmocka_run_group_tests (tests, table_setup, table_teardown);
 }

@@ -1,0 +1,151 @@
+/* Limits on the command line: --max-steps, --limit, signals that come while rows are written, progress without a terminal. */
+#define _XOPEN_SOURCE 700
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+#include "check.h"
+#include "cli.h"
+#include "cli/progress.h"
+
+/* What there is so far is kept, the exit status is 4, and the limit is named. */
+static void test_max_steps (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel run ezyroller --method erk5 --max-steps 50 -o @/m.csv --json @/m.json"), 4);
+  assert_non_null (strstr (cli_err, "s: the limit max-steps is reached: 50 attempted steps"));
+  assert_non_null (strstr (cli_err, "the table until then is kept in "));
+  assert_true (cli_says (cli_file ("m.json"), "status", "method"));
+  double steps = cli_number (cli_file ("m.json"), "statistics", "steps", NULL);
+  assert_int_equal (cli_run ("wc -l <@/m.csv.part"), 0);
+  int lines;
+  assert_true (sscanf (cli_out, "%d", &lines) == 1 && lines == (int)steps + 2); /* header, start, steps */
+  assert_int_equal (cli_run ("pinwheel run ezyroller --max-steps 5 --t-end 0.1 --json -"), 0);
+  assert_non_null (strstr (cli_err, "--max-steps has no effect: rk4+projection takes "));
+}
+
+static void test_limit (void **state) {
+  static const char *const method[] = { "rk4", "erk8", "bdf", "ida+ggl", "galpha", "leapfrog" };
+  char command[200];
+  (void)state;
+  for (int i = 0; i < 6; i++) {
+    snprintf (command, sizeof command,
+              "pinwheel run ezyroller --method %s --t-end 1e9 --limit 0.02 --max-steps 1e9 --every 1 -o @/l.csv",
+              method[i]);
+    assert_int_equal (cli_run (command), 4);
+    assert_non_null (strstr (cli_err, "s: the limit of 0.02 s of processor time is reached (--limit)"));
+    assert_non_null (strstr (cli_err, "the table until then is kept in "));
+  }
+}
+
+/* Runs of a sweep and of a drift end each by itself, as rows with the reason. */
+static void test_rows (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel sweep ezyroller --vary M0=0.05,0.1 --t-end 1e9 --limit 0.02 -o @/s.csv"), 4);
+  assert_non_null (strstr (cli_err, "all 2 runs failed, the first one: t = "));
+  const char *table = cli_file ("s.csv");
+  assert_true (table && strstr (table, ",method,") && strstr (table, "the limit of 0.02 s of processor time"));
+  cli_shell ("pinwheel sweep ezyroller --vary M0=1e-9,0.1 --method erk8 --t-end 10 --max-steps 20 -o @/n.csv");
+  assert_non_null (strstr (cli_err, "1 of 2 runs failed, the first of them: "));
+  assert_non_null (strstr (cli_err, "max-steps"));
+  cli_shell ("pinwheel drift ezyroller --methods rk4,erk8 --only-methods --t-end 100 --step 1e-4 --limit 0.1 -o @/d");
+  assert_non_null (strstr (cli_out, "rk4+none "));
+  assert_non_null (strstr (cli_out, "the limit of 0.1 s of processor time is reached (--limit)"));
+}
+
+/* A checkpoint from before the limit goes on, under a larger one, to the same bytes. */
+static void test_resume (void **state) {
+  static const char *const method[] = { "erk8+projection", "bdf+projection" };
+  char command[800];
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    snprintf (
+        command, sizeof command,
+        "pinwheel run ezyroller --method %s --t-end 100 --every 0.5 -o @/a.csv --checkpoint @/a.ck "
+        "--checkpoint-every 20 && { "
+        "pinwheel run ezyroller --method %s --t-end 100 --every 0.5 -o @/b.csv --checkpoint @/b.ck "
+        "--checkpoint-every 20 --max-steps %d; test $? = 4; } && "
+        "pinwheel run ezyroller --method %s --t-end 100 --every 0.5 -o @/b.csv --resume @/b.ck && cmp @/a.csv @/b.csv",
+        method[i], method[i], i ? 800 : 120, method[i]);
+    cli_shell (command);
+    assert_non_null (strstr (cli_err, "b.ck goes on from t = "));
+  }
+}
+
+static void test_bad (void **state) {
+  static const cli_wrong wrong[] = {
+    { "ezyroller --limit 0", "--limit 0: expected a number > 0" },
+    { "ezyroller --limit soon", "--limit: \"soon\" is not a number" },
+    { "ezyroller --max-steps 0", "--max-steps 0: expected a whole number >= 1" },
+    { "ezyroller --max-steps 1.5", "--max-steps 1.5: expected a whole number >= 1" },
+  };
+  (void)state;
+  cli_bad_each ("run", wrong, sizeof wrong / sizeof *wrong);
+}
+
+/* A signal that comes while one step is written as a thousand million rows. */
+static void test_rows_of_a_step (void **state) {
+  static const char *const method[] = { "rk4", "erk8", "bdf", "galpha" };
+  char command[300];
+  (void)state;
+  for (int i = 0; i < 4; i++) {
+    snprintf (command, sizeof command,
+              "timeout --preserve-status -s TERM -k 20 0.3 \"${PINWHEEL:-build/pinwheel}\" run ezyroller --method %s "
+              "--every 1e-12 -o @/e.csv; s=$?; rm -f @/e.csv.part; exit $s",
+              method[i]);
+    assert_int_equal (cli_run (command), 130);
+    assert_non_null (strstr (cli_err, "interrupted at t = "));
+  }
+}
+
+/* Standard error as a file: no bar, and a line only when a minute has passed. */
+static void test_lines (void **state) {
+  char path[200], text[400];
+  pw_progress p;
+  (void)state;
+  cli_expand ("@/lines", path, sizeof path);
+  int before = dup (STDERR_FILENO), file = open (path, O_RDWR | O_CREAT | O_TRUNC, 0600);
+  assert_true (before >= 0 && file >= 0);
+  dup2 (file, STDERR_FILENO);
+  pw_progress_start (&p, "ezyroller", 10, 0);
+  pw_progress_at (&p, 1);
+  double due = p.next - p.start;
+  p.start -= 60, p.next -= 60;
+  pw_progress_at (&p, 2.5);
+  pw_progress_at (&p, 3);
+  double again = p.next - p.start;
+  pw_progress_end (&p);
+  dup2 (before, STDERR_FILENO);
+  close (before);
+  ssize_t n = pread (file, text, sizeof text - 1, 0);
+  close (file);
+  assert_true (n > 0 && due == 60 && again >= 120);
+  text[n] = 0;
+  assert_string_equal (text, "pinwheel: ezyroller: 25 %  t = 2.5 of 10 s  3:00 to go\n");
+}
+
+/* Speeds that have grown a thousand times beyond the scene's are reported; the same speed from the start is not. */
+static void test_growth (void **state) {
+  (void)state;
+  cli_write ("spin.yaml", "pinwheel: 1\nabout: a rotor\nrun: {t_end: 3000, method: erk8+projection}\n"
+                          "parameters: [{name: T, value: 1}, {name: w, value: 0}, {name: a, value: 0}]\n"
+                          "bodies: [{name: rotor, mass: 1, inertia: 1, start: {x: a}, rate: {omega: w}}]\n"
+                          "elements:\n  - {pin: P, body: [rotor, ground], at: [[-a, 0], [0, 0]]}\n"
+                          "  - {torque: M, body: [rotor, ground], value: T}\n");
+  assert_int_equal (cli_run ("pinwheel run @/spin.yaml --json -"), 0);
+  assert_non_null (strstr (cli_err, "pinwheel: the motion grows without bound: rotor.omega has become 3e+03 times "));
+  cli_good ("pinwheel run @/spin.yaml --set w=3000 --set T=0 --json -");
+  assert_int_equal (cli_run ("pinwheel run @/spin.yaml --set a=0.5 --method erk8+projection --rtol 1e-4 "
+                             "--t-end 1e6 --max-steps 4e5"),
+                    4);
+  assert_non_null (strstr (cli_err, "max-steps is reached: 400000 attempted steps, "));
+  assert_non_null (strstr (cli_err, "rejected; the motion grows without bound: rotor.omega = "));
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_max_steps), cmocka_unit_test (test_limit),  cmocka_unit_test (test_rows),
+    cmocka_unit_test (test_resume),    cmocka_unit_test (test_bad),    cmocka_unit_test (test_rows_of_a_step),
+    cmocka_unit_test (test_lines),     cmocka_unit_test (test_growth),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
