@@ -139,12 +139,14 @@ static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *tr
     if (pw_place (s, r->t, r->q_given, r->v_given) != PW_OK) break;
     pw_sweep_J (s);
     int now = pw_rank_select (s, tolerance[i], active);
+    if (now < 0) status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
     if (now < 0 || now == rank) continue;
     rank = now;
     r->active = active;
     start_trouble later = { .row = -1 };
     status = start_attempt (r, held, &later, error);
     r->active = before;
+    if (later.rates) *trouble = later; /* it came farther */
   }
   free (active);
   return status;

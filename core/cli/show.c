@@ -65,6 +65,7 @@ static void show_form (const pw_signal *s) {
   printf ("%s (", form->name);
   for (const pw_field *f = form->fields; f->name; f++) {
     const void *at = (const char *)s + f->offset;
+    if (s->type == PW_TABLE && f->type == PW_NUMBER && *(const double *)at == 0) continue; /* no scale, no offset */
     printf ("%s%s ", f == form->fields ? "" : ", ", f->name);
     if (f->type == PW_NUMBER) show_number (*(const double *)at);
     if (f->type == PW_CHOICE) printf ("%s", f->choices[*(const int *)at]);
