@@ -16,6 +16,7 @@ typedef struct {
   int row;
   int rates; /* 0: positions, 1: rates */
   double off;
+  int placed; /* 1: it has found positions */
 } start_trouble;
 
 /* The metric, and INFINITY for what is held; true: the mass matrix, where massless rates are determined by the rows. */
@@ -31,7 +32,7 @@ static int start_positions (pw_projector *p, pw_run *r, double *q, const double 
   pw_system *s = r->s;
   if (pw_place (s, r->t, q, v) == PW_OK && row >= 0) {
     pw_sweep_g (s, p->scratch);
-    *trouble = (start_trouble){ row, 0, fabs (p->scratch[row]) };
+    *trouble = (start_trouble){ row, 0, fabs (p->scratch[row]), 0 };
   }
   return status;
 }
@@ -47,7 +48,7 @@ static int start_rates (pw_projector *p, pw_run *r, double *v, start_trouble *tr
     if (pw_project_velocities (p, r, v) != PW_OK) break;
   }
   if (now.velocity <= 64 * DBL_EPSILON) return PW_OK;
-  *trouble = (start_trouble){ now.row_velocity, 1, now.jv };
+  *trouble = (start_trouble){ now.row_velocity, 1, now.jv, 1 };
   return PW_RETRY;
 }
 
@@ -72,6 +73,7 @@ static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *t
     status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
     if (status == PW_OK) {
       status = start_positions (&p, r, r->q, r->v, trouble);
+      trouble->placed |= status == PW_OK;
       if (status == PW_OK) status = start_rates (&p, r, r->v, trouble);
       pw_projector_close (&p);
       if (status != PW_RETRY || !trouble->rates) break;
@@ -146,7 +148,7 @@ static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *tr
     start_trouble later = { .row = -1 };
     status = start_attempt (r, held, &later, error);
     r->active = before;
-    if (later.rates) *trouble = later; /* it came farther */
+    trouble->placed |= later.placed;
   }
   free (active);
   return status;
@@ -223,15 +225,15 @@ static int start_try (pw_run *r, const unsigned char *held, start_trouble *troub
   size_t n = (size_t)s->coords;
   unsigned char *mask = malloc (4 * n + 1), *last = mask + 2 * n;
   if (mask == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  int status = PW_RETRY, small = (double)s->rows * s->coords < START_SMALL, before = -1, rates = 0;
+  int status = PW_RETRY, small = (double)s->rows * s->coords < START_SMALL, before = -1, placed = 0;
   for (const struct start_way *way = start_ways; way < start_ways + ways && status == PW_RETRY; way++) {
     if (!start_mask (s, held, way, mask)) continue;
     int ranked = small || !((way->q | way->v) & PW_SPECIFIED);
-    if (ranked == before && memcmp (mask, last, rates ? 2 * n : n) == 0) continue;
+    if (ranked == before && memcmp (mask, last, placed ? 2 * n : n) == 0) continue;
     start_trouble now = { .row = -1 };
     status = (ranked ? start_ranked : start_attempt) (r, mask, &now, error);
     memcpy (last, mask, 2 * n);
-    before = ranked, rates = now.rates;
+    before = ranked, placed = now.placed;
     if (now.row >= 0) *trouble = now;
   }
   *freed = start_freed (s, held, mask);
