@@ -217,7 +217,7 @@ static int start_freed (const pw_system *s, const unsigned char *held, const uns
 
 /* Redundant rows of larger scenes (rows times coordinates) are not looked for on behalf of what the model specifies: sketches
  * of linkages, of which all is specified, fail there as a rule. */
-#define START_SMALL 1e5
+#define START_SMALL 1e4
 
 static int start_try (pw_run *r, const unsigned char *held, start_trouble *trouble, int *freed, pw_error *error) {
   const int ways = sizeof start_ways / sizeof *start_ways;
