@@ -13,6 +13,7 @@
 
 #define LIMITS_RESOLVED 1e-2 /* of the unit: eps |q| beyond which a run fails */
 #define LIMITS_FAST 1e3      /* in u / T: speeds beyond which growth is reported */
+enum { LIMITS_LOOK = 16 };   /* steps between two looks at how large coordinates are, for most are small */
 #define LIMITS_GROWS 0.25    /* power of time from which on it is growth */
 
 /* The largest rate at the state reached, in units of the scene; *state: which. */
@@ -33,23 +34,21 @@ double pw_run_growth (const pw_run *r, int *state, double *power) {
   return now > LIMITS_FAST && *power > LIMITS_GROWS ? now : 0;
 }
 
-/* Speeds at times that double: the one before the last mark is at most half of the run ago. */
-static void limits_mark (pw_run *r) {
+/* Speeds at times that double: the one before the last mark is at most half of the run ago.  1: at such a time. */
+static int limits_mark (pw_run *r) {
   int state;
   double span = r->t - r->settings.t;
-  if (span < 2 * r->marked) return;
+  if (span < 2 * r->marked) return 0;
   r->earlier = r->marked, r->speed = r->mark;
   r->marked = span, r->mark = limits_speed (r, &state);
+  return 1;
 }
 
-int pw_run_attempt (pw_run *r, pw_error *error) {
+static int limits_too_many (const pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
   char name[120], grows[240] = "";
   int state;
-  double power;
-  if (pw_run_asked (r)) return PW_STOPPED;
-  if (s->steps + s->rejected < r->settings.max_steps || pw_fixed_steps (r)) return PW_OK;
-  double growth = pw_run_growth (r, &state, &power);
+  double power, growth = pw_run_growth (r, &state, &power);
   if (growth > 0)
     snprintf (grows, sizeof grows,
               "; the motion grows without bound: %s = %.3g %s, %.2g times the scene's own speed, as t^%.1f",
@@ -60,10 +59,16 @@ int pw_run_attempt (pw_run *r, pw_error *error) {
                   s->steps + s->rejected, s->rejected, grows);
 }
 
+int pw_run_attempt (pw_run *r, pw_error *error) {
+  if (pw_run_asked (r)) return PW_STOPPED;
+  if (r->statistics.steps + r->statistics.rejected < r->settings.max_steps || pw_fixed_steps (r)) return PW_OK;
+  return limits_too_many (r, error);
+}
+
 int pw_run_resolve (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   char name[120];
-  limits_mark (r);
+  if (!limits_mark (r) && r->statistics.steps % LIMITS_LOOK != 0) return PW_OK;
   for (int j = 0; j < s->coords; j++) {
     double known = fabs (r->q[j]) * DBL_EPSILON;
     if (!(known > LIMITS_RESOLVED * pw_unit (s, j))) continue;

@@ -146,7 +146,7 @@ static inline int pw_run_asked (pw_run *r) {
 /* Before each attempted step: PW_OK; PW_STOPPED if the caller asks for it; PW_METHOD after too many. */
 int pw_run_attempt (pw_run *r, pw_error *error);
 
-/* After each step: PW_METHOD if it has led so far away that numbers no longer resolve the scene; marks speeds. */
+/* After each step: PW_METHOD if the run has led so far away that numbers no longer resolve the scene; marks speeds. */
 int pw_run_resolve (pw_run *r, pw_error *error);
 
 /* ---- Dynamics ---- */
