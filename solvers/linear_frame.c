@@ -256,7 +256,7 @@ pw_steadiness pw_linear_steady (pw_linearisation *x) {
   pw_run *r = x->r;
   double span = r->settings.span > 0 ? r->settings.span : r->s->scale.time;
   if (!(x->frame.residual <= LINEAR_STEADY)) return PW_ACCELERATED;
-  if (!(pw_next_breakpoint (r->s, r->t) > r->t + span)) return PW_CHANGING;
+  if (!(pw_next_breakpoint (r->s, 0, r->t) > r->t + span)) return PW_CHANGING;
   linear_probe (x);
   int same = linear_same (x, 0.137 * fmin (r->s->scale.time, span));
   for (size_t i = 0; same && i < sizeof share / sizeof *share; i++) same = linear_same (x, share[i] * span);

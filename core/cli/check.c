@@ -47,8 +47,7 @@ void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *
   *to = i < n ? start->q[i] : start->v[i - n];
 }
 
-/* Initial values that the model specifies and the start has changed: those that are held, and those of bodies that are not 0,
- * what an omitted one is. */
+/* Initial values that the model specifies, or the user gave, and the start has changed. */
 static void check_given (pw_check *x) {
   const pw_system *s = x->m.system;
   for (int i = 0; x->r && i < 2 * s->coords; i++) {
@@ -57,7 +56,7 @@ static void check_given (pw_check *x) {
     if (!pw_start_moved (s, pw_run_start (x->r), i)) continue;
     pw_check_state (x, i, name, sizeof name, &from, &to);
     if (fabs (to) < 1e-12 * fabs (from)) to = 0;
-    if (s->held[i] || (i % s->coords < 3 * s->bodies && from != 0))
+    if (pw_start_specified (s, i))
       check_add (&x->finding, "the model specifies %s = %s %s, but the constraints require %s %s", name,
                  pw_format (a, from, 10), pw_state_unit (s, i), pw_format (b, to, 10), pw_state_unit (s, i));
   }
