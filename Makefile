@@ -33,7 +33,7 @@ SYSTEM := -isystem $(SUITESPARSE)
 
 SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lsundials_sunlinsolklu \
                -lsundials_sunmatrixsparse -lklu -lamd -lm
-FILES_LIBS  := -lfyaml -lmuparser -ldl -lm
+FILES_LIBS  := -lfyaml -ldl -lm
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
 SHARED       = $(LINK) -shared -Wl,--no-undefined
 
@@ -48,7 +48,7 @@ obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 
 CORE    := $(wildcard core/*.c core/kinds/*.c)
 SOLVERS := $(wildcard solvers/*.c)
-FILES   := $(wildcard core/files/*.c)
+FILES   := $(wildcard core/files/*.c core/files/expression/*.c)
 CLI     := $(wildcard core/cli/*.c)
 MODELS  := $(wildcard models/*.c)
 QUICK   := $(wildcard tests/test_*.c)
@@ -130,12 +130,13 @@ $(BUILD)/obj/core/%.o:       INCLUDE := -iquote core
 $(BUILD)/obj/core/kinds/%.o: STRICT += $(ONE_BY_ONE)
 $(BUILD)/obj/solvers/%.o:    INCLUDE := -iquote core $(SYSTEM)
 $(BUILD)/obj/core/files/%.o: INCLUDE := -iquote core $(SYSTEM)
+$(BUILD)/obj/core/files/expression/%.o: INCLUDE := -iquote core -iquote core/files
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers
 $(call obj,core/cli/animate.c): INCLUDE += -iquote $(BUILD)/obj/core/cli
 $(call obj,core/cli/animate.c): $(BUILD)/obj/core/cli/animate.inc
 $(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
-$(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote solvers $(SYSTEM)
-$(BUILD)/obj/tests/fuzz/%.o: INCLUDE := -iquote core -iquote core/files -iquote core/cli -iquote solvers -iquote tests/fuzz
+$(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote core/files/expression -iquote solvers $(SYSTEM)
+$(BUILD)/obj/tests/fuzz/%.o: INCLUDE := -iquote core -iquote core/files -iquote core/files/expression -iquote core/cli -iquote solvers -iquote tests/fuzz
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,eighth.o effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
 $(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -iquote core -I$(BUILD)/include
@@ -358,7 +359,7 @@ basic:
 	@cmp -s $(BASIC)/pinwheel.h $(BASIC)/source/core/pinwheel.h || cp $(BASIC)/pinwheel.h $(BASIC)/source/core
 	@$(MAKE) -s --no-print-directory -C $(BASIC)/source -f '$(CURDIR)/Makefile' NO_DEPS=1 BUILD=.. ../libpinwheel.so
 
-SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/cli solvers models tests tests/fuzz benchmarks benchmarks/engine benchmarks/baseline benchmarks/hard docs,$(d)/*.c $(d)/*.h))
+SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/files/expression core/cli solvers models tests tests/fuzz benchmarks benchmarks/engine benchmarks/baseline benchmarks/hard docs,$(d)/*.c $(d)/*.h))
 
 format:
 	clang-format -i $(SOURCES)

@@ -43,7 +43,6 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
 
 void pw_model_free (pw_model *m) {
   if (m == NULL) return;
-  if (m->truth.close) m->truth.close (m->truth.context);
   pw_arena_free (&m->arena);
   free (m->body);
   free (m->element);

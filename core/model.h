@@ -14,7 +14,8 @@ typedef struct {
   double value;
 } pw_given;
 
-/* What a text model knows about its motion: expressions of the time for some states, and the values of names in them. */
+/* What a text model knows about its motion: expressions of the time for some states; and the values of the names in these
+ * and in signals. */
 typedef struct {
   int states;                 /* 0: nothing */
   const char **state, **text; /* states: "bob.phi", and its expression */
@@ -23,7 +24,6 @@ typedef struct {
   double *value;                                   /* names */
   double (*eval) (void *context, int i, double t); /* the value of expression i */
   void *context;
-  void (*close) (void *context);
 } pw_truth_text;
 
 struct pw_model {

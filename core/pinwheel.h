@@ -75,6 +75,8 @@ typedef struct {
                                      memory; may be NULL: all systems, and their threads, share `context` */
   void (*close) (void *context); /* frees what open made, with the system; may be NULL */
   int differenced;               /* 1: gradient is made of differences; `show` says so */
+  const char *text[3];           /* value, rate and acceleration as a text model has them; NULL: not given */
+  const char *jump;              /* a part of the text that jumps when states change, where no step ends; or NULL */
 } pw_function;
 
 /* offset + amplitude cos (omega t + phase) */

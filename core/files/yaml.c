@@ -75,17 +75,16 @@ static int yaml_is_parameter (void *context, const char *name, size_t length, si
 }
 
 /* A default does not follow other parameters: --set would have to change it, too. */
-static int yaml_default (const pw_yaml *y, const pw_node *node, const char *what, pw_expression *x,
-                         const pw_names *names, pw_parameter *p, pw_error *error) {
+static int yaml_default (const pw_yaml *y, const pw_node *node, const char *what, const pw_names *names,
+                         pw_parameter *p, pw_error *error) {
   yaml_search s = { names, 0 };
   if (node->type == PW_YAML_SCALAR && pw_expression_names (node->text, yaml_is_parameter, &s))
     return pw_yaml_fail (y, pw_yaml_place (y, node, s.at), error,
                          "%s: a default is made of numbers; what follows from parameters belongs in let", what);
-  return pw_yaml_number (y, node, what, p->domain, x, &p->value, error);
+  return pw_yaml_number (y, node, what, p->domain, NULL, &p->value, error);
 }
 
-static int yaml_parameter (const pw_yaml *y, const pw_node *node, pw_expression *x, pw_names *names, pw_parameter *p,
-                           pw_error *error) {
+static int yaml_parameter (const pw_yaml *y, const pw_node *node, pw_names *names, pw_parameter *p, pw_error *error) {
   static const char *const key[] = { "name", "value", "unit", "about", "domain", "min", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   if (pw_yaml_keys (y, node, 0, key, "a parameter", v, error) != PW_OK) return error->status;
@@ -100,17 +99,17 @@ static int yaml_parameter (const pw_yaml *y, const pw_node *node, pw_expression 
       (v[2] && yaml_unit (y, v[2], v[1], &p->unit, error) != PW_OK) ||
       (v[3] && pw_yaml_text (y, v[3], "about", &p->about, error) != PW_OK))
     return error->status;
-  return yaml_default (y, v[1], what, x, names, p, error);
+  return yaml_default (y, v[1], what, names, p, error);
 }
 
-static int yaml_parameters (pw_yaml *y, const pw_node *list, pw_expression *x, pw_names *names, pw_error *error) {
+static int yaml_parameters (pw_yaml *y, const pw_node *list, pw_names *names, pw_error *error) {
   if (list && pw_yaml_list (y, list, "parameters", -1, "", error) != PW_OK) return error->status;
   int count = list ? list->count : 0;
   y->parameter = pw_arena_take (&y->arena, ((size_t)count + 1) * sizeof *y->parameter);
   if (y->parameter == NULL) return pw_yaml_no_memory (y, error);
   for (const pw_node *n = list ? list->first : NULL; n; n = n->next) {
     pw_parameter *p = y->parameter + y->parameters;
-    if (yaml_parameter (y, n, x, names, p, error) != PW_OK) return error->status;
+    if (yaml_parameter (y, n, names, p, error) != PW_OK) return error->status;
     p->offset = (size_t)y->parameters++ * sizeof (double);
   }
   y->table.parameters = y->parameter;
@@ -120,13 +119,13 @@ static int yaml_parameters (pw_yaml *y, const pw_node *list, pw_expression *x, p
 
 /* ---- The rest of the head ---- */
 
-static int yaml_run (pw_yaml *y, const pw_node *run, pw_expression *x, pw_error *error) {
+static int yaml_run (pw_yaml *y, const pw_node *run, pw_error *error) {
   static const char *const key[] = { "t_end", "step", "rtol", "method", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   double *number[] = { &y->table.run.t_end, &y->table.run.step, &y->table.run.rtol };
   if (pw_yaml_keys (y, run, 0, key, "run", v, error) != PW_OK) return error->status;
   for (int i = 0; i < 3; i++)
-    if (v[i] && pw_yaml_number (y, v[i], key[i], PW_POSITIVE, x, number[i], error) != PW_OK) return error->status;
+    if (v[i] && pw_yaml_number (y, v[i], key[i], PW_POSITIVE, NULL, number[i], error) != PW_OK) return error->status;
   return v[3] ? pw_yaml_text (y, v[3], "method", &y->table.run.method, error) : PW_OK;
 }
 
@@ -147,7 +146,7 @@ static int yaml_version (const pw_yaml *y, const pw_node *version, pw_error *err
                        "pinwheel: expected 1, the version of the format that this Pinwheel reads");
 }
 
-static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
+static int yaml_head (pw_yaml *y, pw_error *error) {
   static const char *const key[] = { "pinwheel", "about",    "run",   "parameters", "let",
                                      "bodies",   "elements", "truth", NULL };
   const pw_node *v[sizeof key / sizeof *key];
@@ -155,7 +154,7 @@ static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
   if (y->root == NULL) return pw_yaml_fail (y, 0, error, "the file is empty; a model begins with \"pinwheel: 1\"");
   if (pw_yaml_keys (y, y->root, 0, key, "a model", v, error) != PW_OK || yaml_version (y, v[0], error) != PW_OK ||
       (v[1] && pw_yaml_text (y, v[1], "about", &y->table.about, error) != PW_OK) ||
-      (v[2] && yaml_run (y, v[2], x, error) != PW_OK))
+      (v[2] && yaml_run (y, v[2], error) != PW_OK))
     return error->status;
   for (int i = 3; key[i]; i++)
     if (v[i] && v[i]->count > PW_YAML_ITEMS)
@@ -167,7 +166,7 @@ static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
   y->truth = v[7];
   size_t count = (v[3] ? (size_t)v[3]->count : 0) + (v[4] ? (size_t)v[4]->count : 0);
   int status = pw_names_open (&names, count) == PW_OK ? PW_OK : pw_yaml_no_memory (y, error);
-  if (status == PW_OK) status = yaml_parameters (y, v[3], x, &names, error);
+  if (status == PW_OK) status = yaml_parameters (y, v[3], &names, error);
   if (status == PW_OK) status = yaml_let_names (y, &names, error);
   pw_names_close (&names);
   return status;
@@ -178,10 +177,7 @@ static int yaml_head (pw_yaml *y, pw_expression *x, pw_error *error) {
 static int yaml_read (pw_yaml *y, const char *path, size_t largest, pw_error *error) {
   if (pw_yaml_read_source (y, path, largest, error) != PW_OK || pw_yaml_read_tree (y, error) != PW_OK)
     return error->status;
-  pw_expression *x = pw_expression_open (0);
-  int status = x ? yaml_head (y, x, error) : pw_yaml_no_memory (y, error);
-  pw_expression_close (x);
-  return status;
+  return yaml_head (y, error);
 }
 
 /* The folder of "/model.yaml" is "". */

@@ -13,7 +13,7 @@
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
-#include "expression.h"
+#include "expression/expression.h"
 #include "files.h"
 #include "model.h"
 
@@ -89,8 +89,8 @@ int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int c
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_yaml *y, const pw_node *node, const char *what, const char **text, pw_error *error);
 
-/* A scalar as a number of a domain: an expression over what the evaluator knows. */
-int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, pw_expression *x,
+/* A scalar as a number of a domain: an expression over a scope, which may be NULL. */
+int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, const pw_scope *x,
                     double *value, pw_error *error);
 
 /* Whether an expression depends on the time t or a state, BODY.phi, and where (at may be NULL). */
@@ -108,7 +108,7 @@ typedef struct {
   const double *parameter; /* their values */
   double *let;             /* values of what `let` defines */
   int lets;                /* so far */
-  pw_expression *x;        /* an evaluator that knows both */
+  pw_scope *x;             /* both */
   pw_names bodies;         /* names of bodies, to their index */
   pw_names all;            /* names of bodies and elements, to the index in nodes */
   pw_names elements;       /* once an expression asks for them: names of all elements, to the index of their kinds */
@@ -116,15 +116,14 @@ typedef struct {
   const pw_field *field;   /* the one that is read, and the definition it is of, with all fields before it */
   const char *definition;
   int named;
-  double points;     /* of tables, so far */
-  double evaluators; /* of signals by expressions, so far, each by its size */
+  double points; /* of tables, so far */
+  double codes;  /* of signals by expressions, so far */
 } pw_yaml_builder;
 
 /* What one model may have in memory, so that a small file cannot ask for all there is; each is about 1 GB. */
 enum { PW_YAML_ITEMS = 1000000 };   /* bodies, elements, parameters or definitions, of each */
 enum { PW_YAML_POINTS = 20000000 }; /* of all tables */
-enum { PW_YAML_WORDS = 5000000 };   /* names that all signals by expressions know, parameters and definitions */
-enum { PW_YAML_EVALUATOR = 60 };    /* an evaluator without a name is as large as so many names */
+enum { PW_YAML_CODES = 30000000 };  /* operations of all signals by expressions */
 
 void pw_yaml_build (pw_model *m, const void *parameters);
 
@@ -149,6 +148,9 @@ int pw_yaml_state (pw_yaml_builder *b, const pw_yaml_reading *r, const char *nam
 /* Makes a signal of up to three expressions of time: value, rate, acceleration; NULL: not given (yaml_time.c). */
 int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
                      pw_signal *signal, pw_error *error);
+
+/* Keeps the names that expressions may use, and their values, in the model: show writes them (yaml_truth.c). */
+int pw_yaml_keep_names (pw_yaml_builder *b, pw_error *error);
 
 /* Reads a signal of a kind into a field (yaml_signal.c). */
 int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,

@@ -236,18 +236,16 @@ static int build_let (pw_yaml_builder *b, pw_error *error) {
   for (const pw_node *n = b->y->let ? b->y->let->first : NULL; n; n = n->next->next) {
     snprintf (what, sizeof what, "let %s", n->text);
     if (pw_yaml_number (b->y, n->next, what, PW_REAL, b->x, &b->let[b->lets], error) != PW_OK) return error->status;
-    if (pw_expression_name (b->x, n->text, &b->let[b->lets]) != PW_OK) return pw_yaml_no_memory (b->y, error);
-    b->lets++;
+    pw_scope_add (b->x, n->text, b->let[b->lets++]);
   }
   return PW_OK;
 }
 
 static int build_names (pw_yaml_builder *b, const double *value, pw_error *error) {
   const pw_yaml *y = b->y;
-  b->x = pw_expression_open (y->parameters + (y->let ? y->let->count : 0));
+  b->x = pw_scope_open (y->parameters + (y->let ? y->let->count : 0));
   if (b->x == NULL) return pw_yaml_no_memory (y, error);
-  for (int i = 0; i < y->parameters; i++)
-    if (pw_expression_name (b->x, y->parameter[i].name, &value[i]) != PW_OK) return pw_yaml_no_memory (y, error);
+  for (int i = 0; i < y->parameters; i++) pw_scope_add (b->x, y->parameter[i].name, value[i]);
   return build_let (b, error);
 }
 
@@ -274,7 +272,7 @@ void pw_yaml_build (pw_model *m, const void *parameters) {
   char *definition = NULL;
   if (build_open (&b, &definition, &m->error) == PW_OK && build_names (&b, parameters, &m->error) == PW_OK)
     build_all (&b, definition, &m->error);
-  pw_expression_close (b.x);
+  pw_scope_close (b.x);
   pw_names_close (&b.bodies);
   pw_names_close (&b.all);
   pw_names_close (&b.elements);

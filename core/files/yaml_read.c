@@ -114,12 +114,13 @@ static int read_trouble (const pw_yaml *y, const pw_node *node, const char *what
   return pw_yaml_fail (y, pw_yaml_place (y, node, trouble->at), error, "%s: %s", what, trouble->text);
 }
 
-int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, pw_expression *x,
+int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, const pw_scope *x,
                     double *value, pw_error *error) {
   pw_expression_trouble trouble;
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (y, node->at, error, "%s: expected a number, found %s", what, pw_yaml_found (node));
-  int status = pw_expression_number (node->text, value) ? PW_OK : pw_expression_fixed (x, node->text, value, &trouble);
+  int status =
+      pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (x, node->text, value, &trouble);
   if (status == PW_MACHINE) return pw_yaml_no_memory (y, error);
   if (status != PW_OK) return read_trouble (y, node, what, &trouble, error);
   const char *expected = pw_domain_check (domain, *value);

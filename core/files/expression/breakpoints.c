@@ -1,0 +1,319 @@
+/* When an expression of time jumps or bends.
+ *
+ * Enclosures of all values over an interval of time show that no comparison changes there, and no other operation that
+ * breaks; otherwise the interval is halved, the earlier half first.  In what is left, a fraction of 2^-36 of the time, two
+ * neighbouring numbers are found between which something changes: that is where steps have to end
+ * (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapters 5 and 8).
+ * Changes that cancel within such a fraction are passed over; where two numbers stay equal, the fraction grows with the time
+ * passed. */
+#include <float.h>
+#include <math.h>
+#include "expression_parts.h"
+#include "pinwheel.h"
+
+/* What a value may be; whether it may break within the interval at a time of its own, and whether states decide. */
+typedef struct {
+  double lo, hi;
+  int breaks, states;
+} range;
+
+static const range range_any = { -INFINITY, INFINITY, 0, 0 };
+
+/* Round-off of an operation: a few units in the last place. */
+static range range_of (double lo, double hi) {
+  if (isnan (lo) || isnan (hi)) return range_any;
+  return (range){ lo - 4 * DBL_EPSILON * fabs (lo) - DBL_MIN, hi + 4 * DBL_EPSILON * fabs (hi) + DBL_MIN, 0, 0 };
+}
+
+static double range_product (double a, double b) {
+  return a == 0 || b == 0 ? 0 : a * b;
+}
+
+/* The least and the largest of four corners. */
+static range range_corners (double a, double b, double c, double d) {
+  if (isnan (a) || isnan (b) || isnan (c) || isnan (d)) return range_any;
+  return range_of (fmin (fmin (a, b), fmin (c, d)), fmax (fmax (a, b), fmax (c, d)));
+}
+
+static range range_multiply (const range *x, const range *y) {
+  return range_corners (range_product (x->lo, y->lo), range_product (x->lo, y->hi), range_product (x->hi, y->lo),
+                        range_product (x->hi, y->hi));
+}
+
+static range range_divide (const range *x, const range *y) {
+  if (y->lo <= 0 && y->hi >= 0) return range_any;
+  return range_corners (x->lo / y->lo, x->lo / y->hi, x->hi / y->lo, x->hi / y->hi);
+}
+
+static range range_abs (const range *x) {
+  if (x->lo >= 0) return range_of (x->lo, x->hi);
+  range r = x->hi <= 0 ? range_of (-x->hi, -x->lo) : range_of (0, fmax (-x->lo, x->hi));
+  r.breaks = x->hi > 0;
+  return r;
+}
+
+/* Between the values at both ends, and 1 or -1 where an extreme lies between. */
+static range range_sin (double lo, double hi, double shift) {
+  const double turn = 2 * PW_PI, slack = 8 * DBL_EPSILON * (fabs (lo) + fabs (hi) + 1);
+  range r = { -1, 1, 0, 0 };
+  if (!(hi - lo < turn) || !(slack < 0.1)) return r;
+  double a = sin (lo + shift), b = sin (hi + shift);
+  double top = PW_PI / 2 - shift, bottom = top - PW_PI;
+  if (floor ((hi + slack - top) / turn) == floor ((lo - slack - top) / turn)) r.hi = fmin (1, fmax (a, b) + slack);
+  if (floor ((hi + slack - bottom) / turn) == floor ((lo - slack - bottom) / turn))
+    r.lo = fmax (-1, fmin (a, b) - slack);
+  return r;
+}
+
+static range range_even (const range *x, double (*f) (double)) {
+  range r = range_abs (x);
+  return range_of (f (fmax (0, r.lo)), f (r.hi));
+}
+
+static range range_tan (const range *x) {
+  const double slack = 8 * DBL_EPSILON * (fabs (x->lo) + fabs (x->hi) + 1);
+  if (floor ((x->lo - slack) / PW_PI + 0.5) != floor ((x->hi + slack) / PW_PI + 0.5)) return range_any;
+  return range_of (tan (x->lo), tan (x->hi));
+}
+
+static range range_smooth (const pw_expression_function *f, const range *x) {
+  if (f->one == sin) return range_sin (x->lo, x->hi, 0);
+  if (f->one == cos) return range_sin (x->lo, x->hi, PW_PI / 2);
+  if (f->one == cosh) return range_even (x, cosh);
+  if (f->one == tan) return range_tan (x);
+  return f->trend == PW_RISES ? range_of (f->one (x->lo), f->one (x->hi)) : range_of (f->one (x->hi), f->one (x->lo));
+}
+
+/* A whole power; that of an even one has its least value at 0. */
+static range range_whole_power (const range *x, double n) {
+  int even = fmod (n, 2) == 0;
+  if (n < 0 && x->lo <= 0 && x->hi >= 0) return range_any;
+  range b = even ? range_abs (x) : *x;
+  if (even) b.lo = fmax (0, b.lo);
+  return range_corners (pow (b.lo, n), pow (b.lo, n), pow (b.hi, n), pow (b.hi, n));
+}
+
+static range range_power (const range *x, const range *y) {
+  double n = rint (y->lo);
+  if (y->hi - y->lo < 1e-9 && fabs (y->lo - n) < 1e-9) return range_whole_power (x, n);
+  if (x->lo < 0) return range_any;
+  return range_corners (pow (x->lo, y->lo), pow (x->lo, y->hi), pow (x->hi, y->lo), pow (x->hi, y->hi));
+}
+
+/* The angle of (x, y) jumps on the negative x axis. */
+static range range_atan2 (const range *y, const range *x) {
+  if (x->lo <= 0 && y->lo <= 0 && y->hi >= 0) return (range){ -PW_PI, PW_PI, 1, 0 };
+  return range_corners (atan2 (y->lo, x->lo), atan2 (y->lo, x->hi), atan2 (y->hi, x->lo), atan2 (y->hi, x->hi));
+}
+
+static range range_hypot (const range *x, const range *y) {
+  range a = range_abs (x), b = range_abs (y);
+  return range_of (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
+}
+
+static range range_am (const range *u, const range *m) {
+  if (m->hi - m->lo > 1e-12) return range_any;
+  return range_of (pw_jacobi_am (u->lo, m->lo), pw_jacobi_am (u->hi, m->lo));
+}
+
+static range range_pair (const pw_expression_function *f, const range *x, const range *y) {
+  if (f->two == atan2) return range_atan2 (x, y);
+  return f->two == hypot ? range_hypot (x, y) : range_am (x, y);
+}
+
+/* ---- What breaks ---- */
+
+/* Whole numbers: one, or a break. */
+static range range_whole (int op, const range *x) {
+  double (*whole) (double) = op == PW_OP_FLOOR ? floor : op == PW_OP_CEIL ? ceil : round;
+  range r = { whole (x->lo), whole (x->hi), 0, 0 };
+  r.breaks = !(r.lo == r.hi);
+  return r;
+}
+
+static range range_sign (const range *x) {
+  range r = { x->lo > 0 ? 1 : -1, x->hi < 0 ? -1 : 1, x->lo <= 0 && x->hi >= 0, 0 };
+  return r;
+}
+
+static range range_mod (const range *x, const range *y) {
+  range q = range_divide (x, y), n = range_whole (PW_OP_FLOOR, &q);
+  double most = fmax (fabs (y->lo), fabs (y->hi));
+  if (n.breaks) return (range){ y->lo < 0 ? -most : 0, y->hi > 0 ? most : 0, 1, 0 };
+  range part = range_multiply (&n, y);
+  return range_of (x->lo - part.hi, x->hi - part.lo);
+}
+
+static range range_compare (int op, const range *x, const range *y) {
+  static const range no = { 0, 0, 0, 0 }, yes = { 1, 1, 0, 0 }, either = { 0, 1, 1, 0 };
+  int order = x->hi < y->lo ? -1 : x->lo > y->hi ? 1 : x->lo == x->hi && y->lo == y->hi && x->lo == y->lo ? 0 : 2;
+  return order == 2 ? either : pw_expression_truth (op, order) ? yes : no;
+}
+
+/* An operand that decides alone keeps the breaks of the other one out. */
+static range range_logical (int op, const range *x, const range *y) {
+  double alone = op == PW_OP_OR; /* 1 decides an or, 0 an and */
+  const range *decides = x->lo == alone && x->hi == alone ? x : y->lo == alone && y->hi == alone ? y : NULL;
+  if (decides) return *decides;
+  return (range){ op == PW_OP_OR ? fmax (x->lo, y->lo) : fmin (x->lo, y->lo),
+                  op == PW_OP_OR ? fmax (x->hi, y->hi) : fmin (x->hi, y->hi), x->breaks | y->breaks,
+                  x->states | y->states };
+}
+
+static range range_least (const range *x, const range *y) {
+  if (x->hi < y->lo) return *x;
+  if (y->hi < x->lo) return *y;
+  int states = x->states | y->states;
+  return (range){ fmin (x->lo, y->lo), fmin (x->hi, y->hi), x->breaks | y->breaks | !states, states };
+}
+
+static range range_negative (const range *x) {
+  return (range){ -x->hi, -x->lo, x->breaks, x->states };
+}
+
+static range range_most (const range *x, const range *y) {
+  range a = range_negative (x), b = range_negative (y), r = range_least (&a, &b);
+  return range_negative (&r);
+}
+
+static range range_select (const range *condition, const range *x, const range *y) {
+  if (condition->lo > 0) return *x;
+  if (condition->hi < 1) return *y;
+  return (range){ fmin (x->lo, y->lo), fmax (x->hi, y->hi), condition->breaks | x->breaks | y->breaks,
+                  condition->states | x->states | y->states };
+}
+
+/* ---- Operations ---- */
+
+static range range_one (const pw_expression_code *c, const range *x) {
+  switch (c->op) {
+  case PW_OP_NEGATE:
+    return range_negative (x);
+  case PW_OP_ABS:
+    return range_abs (x);
+  case PW_OP_SIGN:
+    return range_sign (x);
+  case PW_OP_ONE:
+    return range_smooth (&pw_expression_functions[c->which], x);
+  default:
+    return range_whole (c->op, x);
+  }
+}
+
+static range range_two (const pw_expression_code *c, const range *x, const range *y) {
+  switch (c->op) {
+  case PW_OP_ADD:
+    return range_of (x->lo + y->lo, x->hi + y->hi);
+  case PW_OP_SUBTRACT:
+    return range_of (x->lo - y->hi, x->hi - y->lo);
+  case PW_OP_MULTIPLY:
+    return range_multiply (x, y);
+  case PW_OP_DIVIDE:
+    return range_divide (x, y);
+  case PW_OP_POWER:
+    return range_power (x, y);
+  case PW_OP_MOD:
+    return range_mod (x, y);
+  case PW_OP_TWO:
+    return range_pair (&pw_expression_functions[c->which], x, y);
+  default:
+    return range_compare (c->op, x, y);
+  }
+}
+
+/* Of numbers that are known the operation itself gives the value; what was equal stays equal. */
+static range range_known (const pw_expression_code *c, const range *x, int operands) {
+  pw_expression_code code[3];
+  int tie = 0;
+  for (int i = 0; i < operands; i++) code[i] = (pw_expression_code){ PW_OP_CONSTANT, 0, x[i].lo };
+  code[operands] = *c;
+  double value = pw_expression_run (code, operands + 1, NULL, &tie);
+  return isnan (value) ? range_any : (range){ value, value, 0, 0 };
+}
+
+/* What breaks does so at a time of its own unless states decide; what is found to be one number breaks no more. */
+static range range_apply (const pw_expression_code *c, const range *x, int operands) {
+  if (operands < 3 && x[0].lo == x[0].hi && x[operands - 1].lo == x[operands - 1].hi)
+    return range_known (c, x, operands);
+  if (c->op == PW_OP_AND || c->op == PW_OP_OR) return range_logical (c->op, x, x + 1);
+  if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_least : range_most) (x, x + 1);
+  if (c->op == PW_OP_SELECT) return range_select (x, x + 1, x + 2);
+  range r = operands == 1 ? range_one (c, x) : range_two (c, x, x + 1);
+  int constant = r.lo == r.hi && c->op != PW_OP_MOD && pw_expression_jumps (c->op);
+  r.states = !constant && (x[0].states || (operands == 2 && x[1].states));
+  r.breaks &= !r.states;
+  r.breaks |= !constant && (x[0].breaks || (operands == 2 && x[1].breaks));
+  return r;
+}
+
+/* The value over an interval of time. */
+static range range_run (const pw_expression *x, double lo, double hi) {
+  range stack[PW_EXPRESSION_STACK], *top = stack;
+  for (const pw_expression_code *c = x->code, *end = c + x->codes; c < end; c++) {
+    int operands = pw_expression_operands (c->op);
+    top -= operands;
+    if (operands)
+      *top = range_apply (c, top, operands);
+    else if (c->op == PW_OP_CONSTANT)
+      *top = (range){ c->value, c->value, 0, 0 };
+    else
+      *top = c->which == 0 ? (range){ lo, hi, 0, 0 } : (range){ -INFINITY, INFINITY, 0, 1 };
+    top++;
+  }
+  return top[-1];
+}
+
+/* ---- The first one ---- */
+
+typedef struct {
+  const pw_expression *x;
+  double from;
+  int left;      /* intervals that may still be looked at */
+  int equal;     /* narrow ones in which nothing has changed */
+  double narrow; /* the fraction of the time that is halved no more */
+} search;
+
+/* A checksum of all comparisons and the like at a time. */
+static unsigned long long search_signature (const pw_expression *x, double t) {
+  double variable[PW_EXPRESSION_VARIABLES] = { t }, u[3];
+  unsigned long long signature = 0;
+  pw_expression_run_jet (x->code, x->codes, variable, 0, u, &signature);
+  return signature;
+}
+
+/* The first number at which something has changed, of two neighbours. */
+static double search_between (const pw_expression *x, double a, double b) {
+  unsigned long long before = search_signature (x, a);
+  for (double middle = a + (b - a) / 2; middle > a && middle < b; middle = a + (b - a) / 2)
+    if (search_signature (x, middle) == before)
+      a = middle;
+    else
+      b = middle;
+  return b;
+}
+
+static double search_first (search *s, double a, double b) {
+  if (s->left-- <= 0) return fmax (a, nextafter (s->from, INFINITY));
+  if (!range_run (s->x, a, b).breaks) return INFINITY;
+  if (b - a <= s->narrow * fmax (fabs (a), fabs (b)) + 1e-18) {
+    if (search_signature (s->x, a) != search_signature (s->x, b)) return search_between (s->x, a, b);
+    if (++s->equal % 500 == 0) s->narrow *= 2;
+    return INFINITY;
+  }
+  double middle = a + (b - a) / 2, first = search_first (s, a, middle);
+  return first < INFINITY ? first : search_first (s, middle, b);
+}
+
+/* Where too much has been looked at, a breakpoint that is none makes the search go on from there. */
+double pw_expression_breakpoint (const pw_expression *x, double t) {
+  const double latest = 1e18;
+  search s = { x, t, 40000, 0, 0x1p-36 };
+  double a = t, found = INFINITY;
+  if (!x->breaks) return INFINITY;
+  for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {
+    if (!range_run (x, a, INFINITY).breaks) break;
+    found = search_first (&s, a, a + w);
+    a += w;
+  }
+  return found;
+}

@@ -1,0 +1,162 @@
+/* Exact derivatives of expressions: each operation passes on (value, first, second derivative) by the chain rule,
+ *
+ *   f' = f_x x' + f_y y',   f'' = f_xx x'^2 + 2 f_xy x' y' + f_yy y'^2 + f_x x'' + f_y y''
+ *
+ * (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  Of two numbers that are equal now, the one whose first
+ * derivative that differs is larger will be the larger: so what jumps has the value just after. */
+#include <math.h>
+#include <string.h>
+#include "expression_parts.h"
+
+typedef struct {
+  double v, d, dd;
+} jet;
+
+/* What does not change has no part in a derivative, be its slope infinite. */
+static inline double jet_times (double slope, double change) {
+  return change == 0 ? 0 : slope * change;
+}
+
+static jet jet_chain (double f, const pw_slopes *s, const jet *x, const jet *y) {
+  jet r = { f, jet_times (s->x, x->d) + jet_times (s->y, y->d), 0 };
+  r.dd = jet_times (s->xx, x->d * x->d) + jet_times (s->xy, 2 * x->d * y->d) + jet_times (s->yy, y->d * y->d) +
+         jet_times (s->x, x->dd) + jet_times (s->y, y->dd);
+  return r;
+}
+
+/* ---- What jumps or bends ---- */
+
+static inline int jet_sign (const jet *x) {
+  double first = x->v != 0 ? x->v : x->d != 0 ? x->d : x->dd;
+  return (first > 0) - (first < 0);
+}
+
+/* How two will compare just after. */
+static int jet_order (const jet *x, const jet *y) {
+  if (x->v != y->v) return x->v < y->v ? -1 : x->v > y->v ? 1 : 2;
+  jet less = { 0, x->d - y->d, x->dd - y->dd };
+  return jet_sign (&less);
+}
+
+/* floor, ceil, round just after; `way` it is going. */
+static double jet_step (int op, double x, int way) {
+  double low = floor (x);
+  if (op == PW_OP_FLOOR) return x == low && way < 0 ? low - 1 : low;
+  if (op == PW_OP_CEIL) return x == low ? low + (way > 0) : ceil (x);
+  return x - low == 0.5 && way != 0 ? low + (way > 0) : round (x);
+}
+
+static jet jet_broken (int op, const jet *x, double *discrete) {
+  const jet change = { 0, x->d, x->dd };
+  int sign = jet_sign (x);
+  *discrete = op == PW_OP_ABS || op == PW_OP_SIGN ? sign : jet_step (op, x->v, jet_sign (&change));
+  return op == PW_OP_ABS ? (jet){ fabs (x->v), sign * x->d, sign * x->dd } : (jet){ .v = *discrete };
+}
+
+static jet jet_plus (const jet *x, double factor, const jet *y) {
+  return (jet){ x->v + factor * y->v, x->d + factor * y->d, x->dd + factor * y->dd };
+}
+
+/* x - q y; q is read off the remainder, so that both jump together. */
+static jet jet_mod (const jet *x, const jet *y, double *q) {
+  double r = pw_expression_mod (x->v, y->v);
+  *q = rint ((x->v - r) / y->v);
+  jet m = jet_plus (x, -*q, y);
+  m.v = r;
+  if (r != 0 || jet_sign (&m) * y->v >= 0) return m;
+  m = jet_plus (&m, 1, y);
+  *q -= 1;
+  return m;
+}
+
+/* ---- Operations ---- */
+
+static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete) {
+  static const jet none = { 0 };
+  if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd };
+  if (c->op == PW_OP_ONE) {
+    const pw_expression_function *f = &pw_expression_functions[c->which];
+    double value = f->one (x->v);
+    if (x->d == 0 && x->dd == 0) return (jet){ .v = value };
+    pw_slopes s = f->slopes (x->v, 0, value);
+    return jet_chain (value, &s, x, &none);
+  }
+  return jet_broken (c->op, x, discrete);
+}
+
+static jet jet_product (const jet *x, const jet *y) {
+  return (jet){ x->v * y->v, jet_times (y->v, x->d) + jet_times (x->v, y->d),
+                jet_times (y->v, x->dd) + 2 * jet_times (x->d, y->d) + jet_times (x->v, y->dd) };
+}
+
+static jet jet_quotient (const jet *x, const jet *y) {
+  double f = x->v / y->v, d = (x->d - jet_times (f, y->d)) / y->v;
+  return (jet){ f, d, (x->dd - 2 * jet_times (d, y->d) - jet_times (f, y->dd)) / y->v };
+}
+
+static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y) {
+  const pw_expression_function *f = &pw_expression_functions[c->which];
+  int power = c->op == PW_OP_POWER;
+  double value = power ? pw_expression_power (x->v, y->v) : f->two (x->v, y->v);
+  pw_slopes s = (power ? pw_expression_power_slopes : f->slopes) (x->v, y->v, value);
+  return jet_chain (value, &s, x, y);
+}
+
+static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
+  switch (c->op) {
+  case PW_OP_ADD:
+    return jet_plus (x, 1, y);
+  case PW_OP_SUBTRACT:
+    return jet_plus (x, -1, y);
+  case PW_OP_MULTIPLY:
+    return jet_product (x, y);
+  case PW_OP_DIVIDE:
+    return jet_quotient (x, y);
+  case PW_OP_POWER:
+  case PW_OP_TWO:
+    return jet_function (c, x, y);
+  case PW_OP_MOD:
+    return jet_mod (x, y, discrete);
+  case PW_OP_AND:
+    return (jet){ .v = x->v != 0 && y->v != 0 };
+  case PW_OP_OR:
+    return (jet){ .v = x->v != 0 || y->v != 0 };
+  }
+  int order = jet_order (x, y);
+  *discrete = order;
+  if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) {
+    int first = order == 2 ? !isnan (x->v) : c->op == PW_OP_MIN ? order < 0 : order > 0;
+    return first ? *x : *y;
+  }
+  *discrete = pw_expression_truth (c->op, order);
+  return (jet){ .v = *discrete };
+}
+
+static void jet_note (unsigned long long *signature, double discrete) {
+  unsigned long long bits;
+  memcpy (&bits, &(double){ discrete + 0.0 }, sizeof bits);
+  *signature = (*signature ^ bits) * 1099511628211u + (*signature >> 29);
+}
+
+void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
+                            unsigned long long *signature) {
+  jet stack[PW_EXPRESSION_STACK], *top = stack;
+  for (const pw_expression_code *c = code, *end = code + codes; c < end; c++) {
+    int operands = pw_expression_operands (c->op);
+    double discrete = 0;
+    top -= operands;
+    if (operands == 0)
+      *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value } : (jet){ variable[c->which], c->which == by, 0 };
+    else if (operands == 1)
+      *top = jet_one (c, top, &discrete);
+    else
+      *top = operands == 2 ? jet_two (c, top, top + 1, &discrete) : top[0].v != 0 ? top[1] : top[2];
+    if (signature && pw_expression_breaks (c->op)) jet_note (signature, discrete);
+    top++;
+  }
+  u[0] = top[-1].v, u[1] = top[-1].d, u[2] = top[-1].dd;
+}
+
+void pw_expression_derivatives (const pw_expression *x, const double *variable, int by, double u[3]) {
+  pw_expression_run_jet (x->code, x->codes, variable, by, u, NULL);
+}

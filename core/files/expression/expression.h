@@ -1,0 +1,87 @@
+/* Expressions: numbers written as arithmetic over names.
+ *
+ *   operators   + - * / ^, < <= > >= == !=, && ||, CONDITION ? THEN : ELSE, parentheses
+ *   functions   sin cos tan asin acos atan atan2 sinh cosh tanh exp log log10 sqrt abs sign floor ceil round hypot mod min max
+ *               jacobi_am (u, m), elliptic_K (m)
+ *   constants   pi, e, deg = pi / 180
+ *
+ * An expression is read once, in a scope of names that stand for numbers; other names are its variables, of which the time
+ * is the first.  What is read never changes again: any number of threads may evaluate it. */
+#ifndef PW_EXPRESSION_H
+#define PW_EXPRESSION_H
+
+#include <stddef.h>
+#include "util.h"
+
+/* What is wrong with an expression, and where in it. */
+typedef struct {
+  size_t at; /* offset in bytes */
+  char text[240];
+} pw_expression_trouble;
+
+/* ---- Reading ---- */
+
+/* Names that stand for numbers. */
+typedef struct pw_scope pw_scope;
+
+/* A scope with room for so many names; NULL without memory. */
+pw_scope *pw_scope_open (int names);
+void pw_scope_close (pw_scope *s);
+
+/* Adds a name; its text must stay.  There must be room. */
+void pw_scope_add (pw_scope *s, const char *name, double value);
+
+/* One operation of an expression; its operands are what the operations before it leave on a stack. */
+typedef struct {
+  short op;    /* pw_expression_op */
+  short which; /* variable or function */
+  double value;
+} pw_expression_code;
+
+/* An expression: its syntax tree in postfix order. */
+typedef struct {
+  int codes;
+  int breaks;       /* 1: it may have jumps or kinks in time */
+  const char *jump; /* a part of the text that may jump as states change, or NULL */
+  int jump_size;
+  pw_expression_code code[];
+} pw_expression;
+
+/* Bytes an expression takes; it may be copied. */
+size_t pw_expression_size (const pw_expression *x);
+
+/* Reads an expression over a scope and variables, names ended by NULL, into an arena.  PW_INPUT with the trouble if it is
+ * not one; PW_MACHINE. */
+int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
+                        const pw_expression **x, pw_expression_trouble *trouble);
+
+/* The value of an expression without variables, which may be non-finite; the scope may be NULL.  Returns the same. */
+int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_trouble *trouble);
+
+/* ---- Values ---- */
+
+/* The value, which may be non-finite.  Where the expression jumps in time, it is that just after. */
+double pw_expression_value (const pw_expression *x, const double *variable);
+
+/* The value and its first two derivatives by one variable; where they jump, those just after. */
+void pw_expression_derivatives (const pw_expression *x, const double *variable, int by, double u[3]);
+
+/* The first time after t at which the value, or a derivative by time, may jump whatever the other variables are; or
+ * INFINITY.  Jumps whose times depend on other variables are not found. */
+double pw_expression_breakpoint (const pw_expression *x, double t);
+
+/* ---- Words ---- */
+
+/* Whether a text can be a name: a letter or _, then letters, digits and _; neither a function nor a constant. */
+int pw_expression_is_name (const char *text);
+/* Whether functions or constants have this name. */
+int pw_expression_is_taken (const char *text);
+
+/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns that. */
+int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
+                         void *context);
+
+/* Whether a text is nothing but a number; its value may overflow to infinity. */
+int pw_expression_number (const char *text, double *value);
+
+#endif

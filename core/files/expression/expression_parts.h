@@ -1,0 +1,125 @@
+/* Between the files of expressions. */
+#ifndef PW_EXPRESSION_PARTS_H
+#define PW_EXPRESSION_PARTS_H
+
+#include "expression.h"
+
+/* Numbers that wait for their operation, at most; variables. */
+enum { PW_EXPRESSION_STACK = 1000, PW_EXPRESSION_VARIABLES = 32 };
+
+/* In groups of operations without operands, of one, of two, of three. */
+typedef enum {
+  PW_OP_CONSTANT,
+  PW_OP_VARIABLE,
+  PW_OP_NEGATE,
+  PW_OP_ABS,
+  PW_OP_SIGN,
+  PW_OP_FLOOR,
+  PW_OP_CEIL,
+  PW_OP_ROUND,
+  PW_OP_ONE, /* a smooth function */
+  PW_OP_ADD,
+  PW_OP_SUBTRACT,
+  PW_OP_MULTIPLY,
+  PW_OP_DIVIDE,
+  PW_OP_POWER,
+  PW_OP_LESS,
+  PW_OP_LESS_EQUAL,
+  PW_OP_GREATER,
+  PW_OP_GREATER_EQUAL,
+  PW_OP_EQUAL,
+  PW_OP_UNEQUAL,
+  PW_OP_AND, /* of truths: 1 or 0 */
+  PW_OP_OR,
+  PW_OP_MOD,
+  PW_OP_MIN,
+  PW_OP_MAX,
+  PW_OP_TWO,   /* a smooth function */
+  PW_OP_SELECT /* by a truth */
+} pw_expression_op;
+
+static inline int pw_expression_operands (int op) {
+  return op >= PW_OP_SELECT ? 3 : op >= PW_OP_ADD ? 2 : op >= PW_OP_NEGATE ? 1 : 0;
+}
+
+/* Comparisons and the like jump from one value to another; abs, min and max only have kinks. */
+static inline int pw_expression_jumps (int op) {
+  return (op >= PW_OP_SIGN && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_UNEQUAL) || op == PW_OP_MOD;
+}
+static inline int pw_expression_breaks (int op) {
+  return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX;
+}
+
+/* How two numbers compare: -1, 0, 1; 2: one of them is not a number. */
+static inline int pw_expression_truth (int op, int order) {
+  switch (op) {
+  case PW_OP_LESS:
+    return order == -1;
+  case PW_OP_LESS_EQUAL:
+    return order == -1 || order == 0;
+  case PW_OP_GREATER:
+    return order == 1;
+  case PW_OP_GREATER_EQUAL:
+    return order == 1 || order == 0;
+  case PW_OP_EQUAL:
+    return order == 0;
+  default:
+    return order != 0;
+  }
+}
+
+/* ---- Functions (functions.c) ---- */
+
+/* Derivatives of f (x, y): by x, y, x x, x y, y y. */
+typedef struct {
+  double x, y, xx, xy, yy;
+} pw_slopes;
+
+/* How a function of one argument changes with it, for enclosures of its values. */
+typedef enum { PW_RISES, PW_FALLS, PW_OTHERWISE } pw_trend;
+
+typedef struct {
+  const char *name;
+  short op;          /* PW_OP_ONE, PW_OP_TWO, or an operation of its own */
+  short least, most; /* arguments; most = 0: any number */
+  double (*one) (double);
+  double (*two) (double, double);
+  pw_slopes (*slopes) (double x, double y, double f);
+  pw_trend trend;
+} pw_expression_function;
+
+typedef struct {
+  const char *name;
+  double value;
+} pw_expression_constant_name;
+
+/* Both ended by a NULL name. */
+extern const pw_expression_function pw_expression_functions[];
+extern const pw_expression_constant_name pw_expression_constants[];
+
+/* The index of a function, or -1. */
+int pw_expression_find (const char *name);
+
+/* x^y, and its derivatives. */
+double pw_expression_power (double x, double y);
+pw_slopes pw_expression_power_slopes (double x, double y, double f);
+/* The remainder with the sign of the divisor: an angle modulo 2 pi lies in [0, 2 pi). */
+double pw_expression_mod (double x, double y);
+
+/* ---- Words (lexer.c) ---- */
+
+/* How long the name at p is, which may go on with a dot: frame.phi; 0 if there is none. */
+size_t pw_expression_name_size (const char *p);
+/* Digits, with a point among them or around, and an exponent; 0 if there is no number. */
+size_t pw_expression_number_size (const char *p);
+
+/* ---- Evaluation ---- */
+
+/* The value of operations; *tie becomes 1 where something is just about to jump. */
+double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *tie);
+
+/* The value and derivatives; a checksum of all that only changes at breakpoints is added to *signature, unless it is NULL. */
+void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
+                            unsigned long long *signature);
+
+#endif

@@ -1,0 +1,179 @@
+/* The functions and constants of expressions, with the derivatives of those that are smooth
+ * (Abramowitz & Stegun 1964, chapters 4 and 17). */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "expression_parts.h"
+#include "pinwheel.h"
+
+/* ---- Of one argument: f', f'' ---- */
+
+static pw_slopes slopes_of_one (double first, double second) {
+  return (pw_slopes){ .x = first, .xx = second };
+}
+
+#define ONE(name, first, second)                                  \
+  static pw_slopes slopes_##name (double x, double y, double f) { \
+    (void)x, (void)y, (void)f;                                    \
+    return slopes_of_one (first, second);                         \
+  }
+
+ONE (sin, cos (x), -f)
+ONE (cos, -sin (x), -f)
+ONE (tan, 1 + f * f, 2 * f * (1 + f * f))
+ONE (asin, 1 / sqrt ((1 - x) * (1 + x)), x / ((1 - x) * (1 + x) * sqrt ((1 - x) * (1 + x))))
+ONE (acos, -1 / sqrt ((1 - x) * (1 + x)), -x / ((1 - x) * (1 + x) * sqrt ((1 - x) * (1 + x))))
+ONE (atan, 1 / (1 + x * x), -2 * x / ((1 + x * x) * (1 + x * x)))
+ONE (sinh, cosh (x), f)
+ONE (cosh, sinh (x), f)
+ONE (tanh, 1 / (cosh (x) * cosh (x)), -2 * f / (cosh (x) * cosh (x)))
+ONE (exp, f, f)
+ONE (log, 1 / x, -1 / (x * x))
+ONE (log10, 1 / (x * log (10)), -1 / (x * x * log (10)))
+ONE (sqrt, 0.5 / f, -0.25 / (f * x))
+
+/* ---- Of two ---- */
+
+static pw_slopes slopes_atan2 (double y, double x, double f) {
+  double r = x * x + y * y;
+  (void)f;
+  return (pw_slopes){ x / r, -y / r, -2 * x * y / (r * r), (y * y - x * x) / (r * r), 2 * x * y / (r * r) };
+}
+
+static pw_slopes slopes_hypot (double x, double y, double f) {
+  double c = x / f, s = y / f;
+  return (pw_slopes){ c, s, s * s / f, -c * s / f, c * c / f };
+}
+
+double pw_expression_power (double x, double y) {
+  return y == 2 ? x * x : y == 3 ? x * x * x : pow (x, y);
+}
+
+/* 0 whenever one factor is. */
+static double slopes_product (double a, double b) {
+  return a == 0 ? 0 : a * b;
+}
+
+pw_slopes pw_expression_power_slopes (double x, double y, double f) {
+  double before = slopes_product (y, pow (x, y - 1)), l = log (x);
+  return (pw_slopes){ before, slopes_product (f, l), slopes_product (y * (y - 1), pow (x, y - 2)),
+                      slopes_product (before, l) + pow (x, y - 1), slopes_product (f, l * l) };
+}
+
+double pw_expression_mod (double x, double y) {
+  double r = fmod (x, y);
+  return r != 0 && (r < 0) != (y < 0) ? r + y : r;
+}
+
+/* ---- Elliptic functions ----
+ *
+ * With the arithmetic-geometric mean a, b, c of core/elliptic.c, R = sum of 2^(n-1) c_n^2 / m from n = 1, phi_n its angles,
+ *
+ *   dK/dm = K (1/2 - R) / (2 (1 - m)),   m (1 - m) d2K/dm2 = K / 4 - (1 - 2 m) dK/dm
+ *   N = E (phi) - (1 - m) u = m (u (1/2 - R) + sum of c_n / m sin phi_n)
+ *   d am/du = dn,   d am/dm = -dn (N / m - sin cos / dn) / (2 (1 - m)) */
+
+enum { SLOPES_MEANS = 12 };
+
+/* Steps of the mean: how many; c_n / a_n, c_n / m, and R. */
+static int slopes_mean (double m, double *a, double ratio[SLOPES_MEANS], double part[SLOPES_MEANS], double *R) {
+  double b = sqrt (1 - m), c = m, p = 1, power = 1;
+  int n = 0;
+  *a = 1;
+  *R = 0;
+  while (n < SLOPES_MEANS && fabs (*a - b) > 4 * DBL_EPSILON * *a) {
+    double mean = (*a + b) / 2;
+    p = n == 0 ? 1 / (2 * (1 + b)) : c * p / (4 * mean);
+    c = m * p;
+    b = sqrt (*a * b);
+    *a = mean;
+    part[n] = p;
+    ratio[n++] = c / mean;
+    *R += power * c * p;
+    power *= 2;
+  }
+  return n;
+}
+
+/* The second derivative of K by its series, where the difference above is small. */
+static double slopes_K_series (double m) {
+  double term = 1, sum = 0, power = 1;
+  for (int n = 1; n < 40; n++) {
+    double k = (2.0 * n - 1) / (2.0 * n);
+    term *= k * k;
+    if (n >= 2) sum += n * (n - 1) * term * power, power *= m;
+  }
+  return PW_PI / 2 * sum;
+}
+
+static pw_slopes slopes_K (double m, double y, double K) {
+  double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS];
+  (void)y;
+  slopes_mean (m, &a, ratio, part, &R);
+  double first = K * (0.5 - R) / (2 * (1 - m));
+  return slopes_of_one (first, fabs (m) < 0.2 ? slopes_K_series (m) : (K / 4 - (1 - 2 * m) * first) / (m * (1 - m)));
+}
+
+/* With u held, d (N/m)/dm = (dn d am/dm + u/2 - N / (2 m)) / m. */
+static pw_slopes slopes_am (double u, double m, double phi) {
+  double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS], s = sin (phi), c = cos (phi), dn = sqrt (1 - m * s * s);
+  int n = slopes_mean (m, &a, ratio, part, &R);
+  double N = u * (0.5 - R), angle = ldexp (a * u, n), rest = 1 - m;
+  for (; n > 0; n--) {
+    N += part[n - 1] * sin (angle);
+    angle = (angle + asin (ratio[n - 1] * sin (angle))) / 2;
+  }
+  double F = N / (2 * rest) - s * c / (2 * rest * dn), by_m = -dn * F;
+  double dn_m = -(s * s + 2 * m * s * c * by_m) / (2 * dn), N_m = (dn * by_m + u / 2 - N / 2) / m;
+  double sc_m = ((c * c - s * s) * by_m - s * c * dn_m / dn) / dn;
+  double F_m = (N_m - sc_m) / (2 * rest) + F / rest;
+  return (pw_slopes){ dn, by_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
+}
+
+/* ---- What there is ---- */
+
+#define FUNCTION_OF_ONE(name, trend) \
+  { #name, PW_OP_ONE, 1, 1, name, NULL, slopes_##name, trend }
+#define FUNCTION_OF_TWO(name) \
+  { #name, PW_OP_TWO, 2, 2, NULL, name, slopes_##name, PW_OTHERWISE }
+#define FUNCTION_THAT_BREAKS(name, op, most) \
+  { name, op, 1, most, NULL, NULL, NULL, PW_OTHERWISE }
+
+const pw_expression_function pw_expression_functions[] = {
+  FUNCTION_OF_ONE (sin, PW_OTHERWISE),
+  FUNCTION_OF_ONE (cos, PW_OTHERWISE),
+  FUNCTION_OF_ONE (tan, PW_OTHERWISE),
+  FUNCTION_OF_ONE (asin, PW_RISES),
+  FUNCTION_OF_ONE (acos, PW_FALLS),
+  FUNCTION_OF_ONE (atan, PW_RISES),
+  FUNCTION_OF_ONE (sinh, PW_RISES),
+  FUNCTION_OF_ONE (cosh, PW_OTHERWISE),
+  FUNCTION_OF_ONE (tanh, PW_RISES),
+  FUNCTION_OF_ONE (exp, PW_RISES),
+  FUNCTION_OF_ONE (log, PW_RISES),
+  FUNCTION_OF_ONE (log10, PW_RISES),
+  FUNCTION_OF_ONE (sqrt, PW_RISES),
+  FUNCTION_THAT_BREAKS ("abs", PW_OP_ABS, 1),
+  FUNCTION_THAT_BREAKS ("floor", PW_OP_FLOOR, 1),
+  FUNCTION_THAT_BREAKS ("ceil", PW_OP_CEIL, 1),
+  FUNCTION_THAT_BREAKS ("round", PW_OP_ROUND, 1),
+  FUNCTION_THAT_BREAKS ("sign", PW_OP_SIGN, 1),
+  FUNCTION_OF_TWO (atan2),
+  FUNCTION_OF_TWO (hypot),
+  { "jacobi_am", PW_OP_TWO, 2, 2, NULL, pw_jacobi_am, slopes_am, PW_OTHERWISE },
+  { "elliptic_K", PW_OP_ONE, 1, 1, pw_elliptic_K, NULL, slopes_K, PW_RISES },
+  { "mod", PW_OP_MOD, 2, 2, NULL, NULL, NULL, PW_OTHERWISE },
+  FUNCTION_THAT_BREAKS ("min", PW_OP_MIN, 0),
+  FUNCTION_THAT_BREAKS ("max", PW_OP_MAX, 0),
+  { .name = NULL },
+};
+
+const pw_expression_constant_name pw_expression_constants[] = {
+  { "pi", PW_PI }, { "e", 2.71828182845904523536 }, { "deg", PW_PI / 180 }, { .name = NULL }
+};
+
+int pw_expression_find (const char *name) {
+  int i = 0;
+  while (pw_expression_functions[i].name && strcmp (pw_expression_functions[i].name, name) != 0) i++;
+  return pw_expression_functions[i].name ? i : -1;
+}

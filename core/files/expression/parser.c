@@ -1,0 +1,384 @@
+/* An expression becomes operations in postfix order, by recursive descent:
+ *
+ *   choice   = binary [? choice : choice]
+ *   binary   = unary {operator unary}           by the strength of operators, from the left
+ *   unary    = + unary | - unary | operand [^ unary]
+ *   operand  = number | name | function (choice, ...) | (choice)
+ *
+ * What has no variables is computed at once.  Each mistake is reported at its place. */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "expression_parts.h"
+#include "pinwheel.h"
+#include "pinwheel-files.h"
+
+enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_CODES = 2 * PARSER_LONGEST, PARSER_NAME = 100 };
+enum { ON_TIME = 1, ON_STATES = 2 };
+
+/* ---- Names that stand for numbers ---- */
+
+struct pw_scope {
+  int names;
+  pw_names table;
+  struct {
+    const char *name;
+    double value;
+  } entry[];
+};
+
+pw_scope *pw_scope_open (int names) {
+  pw_scope *s = calloc (1, sizeof *s + (size_t)names * sizeof *s->entry);
+  if (s && pw_names_open (&s->table, (size_t)names + 1) == PW_OK) return s;
+  free (s);
+  return NULL;
+}
+
+void pw_scope_close (pw_scope *s) {
+  if (s) pw_names_close (&s->table);
+  free (s);
+}
+
+void pw_scope_add (pw_scope *s, const char *name, double value) {
+  s->entry[s->names].name = name;
+  s->entry[s->names].value = value;
+  pw_names_add (&s->table, name, s->names++);
+}
+
+/* ---- Words ---- */
+
+typedef struct {
+  const char *name;
+  short op, strength;
+} parser_operator;
+
+/* The longer ones first; the weakest has strength 1. */
+static const parser_operator parser_operators[] = {
+  { "||", PW_OP_OR, 1 },    { "&&", PW_OP_AND, 2 },     { "<=", PW_OP_LESS_EQUAL, 3 }, { ">=", PW_OP_GREATER_EQUAL, 3 },
+  { "==", PW_OP_EQUAL, 3 }, { "!=", PW_OP_UNEQUAL, 3 }, { "<", PW_OP_LESS, 3 },        { ">", PW_OP_GREATER, 3 },
+  { "+", PW_OP_ADD, 4 },    { "-", PW_OP_SUBTRACT, 4 }, { "*", PW_OP_MULTIPLY, 5 },    { "/", PW_OP_DIVIDE, 5 },
+  { "^", PW_OP_POWER, 6 },  { .name = NULL },
+};
+
+typedef struct {
+  const pw_scope *scope;
+  const char *const *variable;
+  const char *text;
+  size_t at, size;             /* the word being looked at */
+  size_t before;               /* the last one began here */
+  size_t end;                  /* and ended here */
+  char type;                   /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
+  const parser_operator *sign; /* of type 'o' */
+  int nested, waiting;         /* depth of the descent; numbers on the stack */
+  int status;
+  pw_expression_trouble *trouble;
+  int breaks;
+  const char *jump;
+  int jump_size;
+  int codes;
+  pw_expression_code code[PARSER_CODES];
+} parser;
+
+/* A part that has been read: its codes, from where in the text it is, on what it depends, whether it is 1 or 0. */
+typedef struct {
+  size_t from;
+  int first, depends, truth;
+} parser_part;
+
+static const parser_part parser_nothing = { 0 };
+
+/* The first mistake counts. */
+static parser_part parser_wrong (parser *p, size_t at, const char *format, const char *a, const char *b) {
+  if (p->status != PW_OK) return parser_nothing;
+  p->status = PW_INPUT;
+  p->trouble->at = at;
+  snprintf (p->trouble->text, sizeof p->trouble->text, format, a, b);
+  return parser_nothing;
+}
+
+static void parser_wrong_sign (parser *p) {
+  char c = p->text[p->at], shown[2] = { c, 0 };
+  if (c == '=')
+    parser_wrong (p, p->at, "\"=\" would assign; equality is written ==%s%s", "", "");
+  else
+    parser_wrong (p, p->at, "\"%s\" does not belong in an expression%s",
+                  c & 0x80 ? "a letter without ASCII code" : shown, "");
+}
+
+/* Goes on to the next word. */
+static void parser_next (parser *p) {
+  const char *word = p->text + p->at + p->size;
+  p->before = p->at;
+  p->end = p->at + p->size;
+  word += strspn (word, " \t\r\n");
+  p->at = (size_t)(word - p->text);
+  p->sign = NULL;
+  size_t name = pw_expression_name_size (word), number = pw_expression_number_size (word);
+  p->size = name ? name : number ? number : *word != 0;
+  p->type = name ? 'n' : number ? '0' : *word;
+  if (name || number || *word == 0 || strchr ("(),?:", *word)) return;
+  for (const parser_operator *o = parser_operators; o->name && !p->sign; o++)
+    if (strncmp (word, o->name, strlen (o->name)) == 0) p->sign = o;
+  p->type = 'o';
+  if (p->sign == NULL)
+    parser_wrong_sign (p);
+  else if (word[0] == '*' && word[1] == '*')
+    parser_wrong (p, p->at, "a power is written with ^%s%s", "", "");
+  else
+    p->size = strlen (p->sign->name);
+}
+
+/* ---- Codes ---- */
+
+static void parser_code (parser *p, int op, int which, double value) {
+  if (p->status != PW_OK) return;
+  p->waiting += 1 - pw_expression_operands (op);
+  if (p->waiting > PW_EXPRESSION_STACK || p->codes == PARSER_CODES)
+    parser_wrong (p, p->at, "too much is nested here%s%s", "", "");
+  else
+    p->code[p->codes++] = (pw_expression_code){ (short)op, (short)which, value };
+}
+
+static parser_part parser_leaf (parser *p, int op, int which, double value) {
+  parser_part part = { p->at, p->codes, 0, 0 };
+  if (op == PW_OP_VARIABLE) part.depends = which == 0 ? ON_TIME : ON_STATES;
+  parser_code (p, op, which, value);
+  parser_next (p);
+  return part;
+}
+
+/* Adds an operation to its operands; what depends on nothing is replaced by its value. */
+static parser_part parser_emit (parser *p, parser_part part, int depends, int op, int which) {
+  int tie = 0;
+  part.depends |= depends;
+  part.truth = op >= PW_OP_LESS && op <= PW_OP_OR;
+  parser_code (p, op, which, 0);
+  if (p->status != PW_OK) return part;
+  if (part.depends == 0) {
+    double value = pw_expression_run (p->code + part.first, p->codes - part.first, NULL, &tie);
+    p->codes = part.first + 1;
+    p->code[part.first] = (pw_expression_code){ PW_OP_CONSTANT, 0, value };
+  }
+  if (pw_expression_breaks (op) && part.depends & ON_TIME) p->breaks = 1;
+  if (pw_expression_jumps (op) && part.depends & ON_STATES && p->jump == NULL) {
+    p->jump = p->text + part.from;
+    p->jump_size = (int)(p->end - part.from);
+  }
+  return part;
+}
+
+/* A condition is made 1 or 0. */
+static parser_part parser_truth (parser *p, parser_part part) {
+  if (part.truth) return part;
+  parser_code (p, PW_OP_CONSTANT, 0, 0);
+  return parser_emit (p, part, 0, PW_OP_UNEQUAL, 0);
+}
+
+/* ---- Operands ---- */
+
+static parser_part parser_choice (parser *p);
+
+static int parser_deeper (parser *p) {
+  if (++p->nested > PARSER_DEEPEST)
+    parser_wrong (p, p->at, p->type == '(' ? "too many parentheses%s%s" : "too much is nested here%s%s", "", "");
+  return p->status == PW_OK;
+}
+
+/* The word does not fit; `open`: a parenthesis to close before it, 0 if there is none, and its place. */
+static parser_part parser_unexpected (parser *p, char open, size_t at) {
+  if (p->type == 'n' || p->type == '0' || p->type == '(')
+    return parser_wrong (p, p->at, "an operator such as * is missing before \"%s\"%s", (char[2]){ p->text[p->at], 0 },
+                         "");
+  if (open == '?') return parser_wrong (p, at, "there is no \":\" for this \"?\"%s%s", "", "");
+  if (p->type == ',') return parser_wrong (p, p->at, "a comma belongs between the arguments of a function%s%s", "", "");
+  if (p->type == ')') return parser_wrong (p, p->at, "there is no \"(\" for this \")\"%s%s", "", "");
+  if (open && p->type == 0) return parser_wrong (p, at, "there is no \")\" for this \"(\"%s%s", "", "");
+  return parser_wrong (p, p->at, "this does not belong here%s%s", "", "");
+}
+
+static parser_part parser_missing (parser *p) {
+  char last[PARSER_NAME];
+  if (p->status != PW_OK) return parser_nothing;
+  snprintf (last, sizeof last, "%.*s", (int)(p->end - p->before), p->text + p->before);
+  if (p->type == 0 && p->end == 0) return parser_wrong (p, 0, "an expression is missing%s%s", "", "");
+  if (p->type == 0) return parser_wrong (p, p->before, "something is missing after \"%s\"%s", last, "");
+  if (p->type == ')' && p->end) return parser_wrong (p, p->before, "something is missing after \"%s\"%s", last, "");
+  return parser_wrong (p, p->at, "this does not belong here%s%s", "", "");
+}
+
+static parser_part parser_unknown (parser *p, const char *name) {
+  char hint[100];
+  pw_nearest near = { .sought = name };
+  for (const char *const *v = p->variable; v && *v; v++) pw_nearest_try (&near, *v);
+  for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->entry[i].name);
+  for (const pw_expression_constant_name *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
+  for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
+  if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, a name in some expressions only */
+  return parser_wrong (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+}
+
+/* Whether the next word is an opening parenthesis. */
+static int parser_is_call (const parser *p) {
+  const char *after = p->text + p->at + p->size;
+  return after[strspn (after, " \t\r\n")] == '(';
+}
+
+static parser_part parser_name (parser *p, const char *name) {
+  const pw_expression_constant_name *c = pw_expression_constants;
+  int i = 0, known = p->scope ? pw_names_find (&p->scope->table, name) : -1;
+  while (p->variable && p->variable[i] && strcmp (p->variable[i], name) != 0) i++;
+  while (c->name && strcmp (c->name, name) != 0) c++;
+  int variable = p->variable && p->variable[i];
+  if (!variable && known < 0 && c->name == NULL) return parser_unknown (p, name);
+  if (parser_is_call (p))
+    return parser_wrong (p, p->at, "\"%s\" is a number, not a function; a product is written with *%s", name, "");
+  if (variable) return parser_leaf (p, PW_OP_VARIABLE, i, 0);
+  return parser_leaf (p, PW_OP_CONSTANT, 0, known >= 0 ? p->scope->entry[known].value : c->value);
+}
+
+/* Of more arguments than it has, min and max take two at a time. */
+static parser_part parser_call (parser *p, int which) {
+  const pw_expression_function *f = &pw_expression_functions[which];
+  parser_part part = { p->at, p->codes, 0, 0 };
+  int arguments = 0;
+  parser_next (p);
+  size_t open = p->at;
+  do {
+    if (!parser_deeper (p)) return part;
+    parser_next (p);
+    if (p->type == ')' && arguments == 0) break;
+    int on = parser_choice (p).depends;
+    p->nested--;
+    if (f->most == 0 && arguments) part = parser_emit (p, part, on, f->op, which);
+    part.depends |= on, arguments++;
+  } while (p->type == ',' && p->status == PW_OK);
+  if (p->status != PW_OK) return part;
+  if (p->type != ')') return parser_unexpected (p, '(', open);
+  if (arguments < f->least) return parser_wrong (p, p->at, "too few arguments%s%s", "", "");
+  if (f->most && arguments > f->most) return parser_wrong (p, p->at, "too many arguments%s%s", "", "");
+  parser_next (p);
+  return f->most ? parser_emit (p, part, part.depends, f->op, which) : part;
+}
+
+static parser_part parser_group (parser *p) {
+  size_t open = p->at;
+  if (!parser_deeper (p)) return parser_nothing;
+  parser_next (p);
+  parser_part part = parser_choice (p);
+  p->nested--;
+  part.from = open;
+  if (p->status != PW_OK) return part;
+  if (p->type != ')') return parser_unexpected (p, '(', open);
+  parser_next (p);
+  return part;
+}
+
+static parser_part parser_number (parser *p) {
+  char digits[PARSER_LONGEST + 1];
+  double value = 0;
+  snprintf (digits, sizeof digits, "%.*s", (int)p->size, p->text + p->at);
+  if (pw_read_number (digits, &value) != PW_OK && p->status == PW_OK) p->status = PW_MACHINE;
+  return parser_leaf (p, PW_OP_CONSTANT, 0, value);
+}
+
+static parser_part parser_operand (parser *p) {
+  char name[PARSER_NAME];
+  if (p->status != PW_OK) return parser_nothing;
+  if (p->type == '0') return parser_number (p);
+  if (p->type == '(') return parser_group (p);
+  if (p->type != 'n') return parser_missing (p);
+  snprintf (name, sizeof name, "%.*s", (int)p->size, p->text + p->at);
+  int which = pw_expression_find (name);
+  if (which < 0) return parser_name (p, name);
+  if (parser_is_call (p)) return parser_call (p, which);
+  return parser_wrong (p, p->at, "\"%s\" is a function: write its argument in parentheses%s", name, "");
+}
+
+/* ---- Operators ---- */
+
+static parser_part parser_unary (parser *p) {
+  parser_part part = { p->at, p->codes, 0, 0 };
+  int op = p->sign ? p->sign->op : 0;
+  int sign = op == PW_OP_ADD || op == PW_OP_SUBTRACT;
+  if (!sign) part = parser_operand (p);
+  if (!sign && (p->sign == NULL || p->sign->op != PW_OP_POWER)) return part;
+  if (!parser_deeper (p)) return part;
+  parser_next (p);
+  part.depends |= parser_unary (p).depends;
+  p->nested--;
+  if (op == PW_OP_ADD) return part;
+  return parser_emit (p, part, part.depends, sign ? PW_OP_NEGATE : PW_OP_POWER, 0);
+}
+
+static parser_part parser_binary (parser *p, int strength) {
+  parser_part part = parser_unary (p);
+  while (p->status == PW_OK && p->sign && p->sign->strength >= strength) {
+    const parser_operator *o = p->sign;
+    int logical = o->op == PW_OP_AND || o->op == PW_OP_OR;
+    if (logical) part = parser_truth (p, part);
+    parser_next (p);
+    parser_part right = parser_binary (p, o->strength + 1);
+    if (logical) right = parser_truth (p, right);
+    part = parser_emit (p, part, right.depends, o->op, 0);
+  }
+  return part;
+}
+
+static parser_part parser_choice (parser *p) {
+  parser_part part = parser_binary (p, 1);
+  size_t mark = p->at;
+  if (p->status != PW_OK || p->type != '?' || !parser_deeper (p)) return part;
+  part = parser_truth (p, part);
+  parser_next (p);
+  int depends = parser_choice (p).depends;
+  if (p->status == PW_OK && p->type != ':') return parser_unexpected (p, '?', mark);
+  parser_next (p);
+  depends |= parser_choice (p).depends;
+  p->nested--;
+  return parser_emit (p, part, depends, PW_OP_SELECT, 0);
+}
+
+/* ---- The whole ---- */
+
+static int parser_read (parser *p) {
+  p->trouble->at = 0;
+  if (strlen (p->text) > PARSER_LONGEST)
+    return parser_wrong (p, 0, "an expression of more than 4000 characters%s%s", "", ""), p->status;
+  parser_next (p);
+  parser_choice (p);
+  if (p->status == PW_OK && p->type != 0) parser_unexpected (p, 0, 0);
+  return p->status;
+}
+
+size_t pw_expression_size (const pw_expression *x) {
+  return sizeof *x + (size_t)x->codes * sizeof *x->code;
+}
+
+int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
+                        const pw_expression **x, pw_expression_trouble *trouble) {
+  parser p;
+  memset (&p, 0, offsetof (parser, code));
+  p.scope = s, p.variable = variable, p.text = text, p.trouble = trouble;
+  if (parser_read (&p) != PW_OK) return p.status;
+  pw_expression head = { p.codes, p.breaks, p.jump, p.jump_size },
+                *made = pw_arena_take (arena, pw_expression_size (&head));
+  if (made == NULL) return PW_MACHINE;
+  *made = head;
+  memcpy (made->code, p.code, (size_t)p.codes * sizeof *p.code);
+  *x = made;
+  return PW_OK;
+}
+
+int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_trouble *trouble) {
+  parser p;
+  memset (&p, 0, offsetof (parser, code));
+  p.scope = s, p.text = text, p.trouble = trouble;
+  if (parser_read (&p) == PW_OK) *value = p.code[0].value;
+  return p.status;
+}
+
+int pw_read_expression (const char *text, double *value) {
+  pw_expression_trouble trouble;
+  if (pw_read_number (text, value) == PW_OK) return PW_OK;
+  return pw_expression_constant (NULL, text, value, &trouble);
+}
