@@ -61,6 +61,12 @@ typedef enum { PW_CONSTANT, PW_HARMONIC, PW_FUNCTION, PW_RAMP, PW_SMOOTH_STEP, P
 enum { PW_LINEAR, PW_CUBIC };
 enum { PW_ENDS_FREE, PW_ENDS_REST };
 
+/* A function signal as a text model has it. */
+typedef struct {
+  const char *part[3]; /* expressions of value, rate, acceleration; NULL: not given */
+  const char *jump;    /* a part that jumps when states change, where no step ends; or NULL */
+} pw_signal_text;
+
 /* A signal computed by the caller.  `eval` stores the value and, if the signal serves a constraint, its first and
  * second time derivative in value[0..2]; x holds the states named in `reads`, in that order, and gradient (NULL
  * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run.  For the same t
@@ -75,8 +81,7 @@ typedef struct {
                                      memory; may be NULL: all systems, and their threads, share `context` */
   void (*close) (void *context); /* frees what open made, with the system; may be NULL */
   int differenced;               /* 1: gradient is made of differences; `show` says so */
-  const char *text[3];           /* value, rate and acceleration as a text model has them; NULL: not given */
-  const char *jump;              /* a part of the text that jumps when states change, where no step ends; or NULL */
+  const pw_signal_text *text;    /* NULL: it is not of a text model */
 } pw_function;
 
 /* offset + amplitude cos (omega t + phase) */

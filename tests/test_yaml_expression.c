@@ -1,17 +1,35 @@
-/* Expressions: what they are worth, and what is said of those that are none. */
+/* Expressions: their values, exact derivatives and breakpoints, and what is said of those that are none. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 #include "check.h"
 #include "expression.h"
+#include "specimen.h"
 
-static double expression_a = 3, expression_phi = 0.25;
+static const char *const expression_names[] = { "t", "frame.phi", NULL };
+static pw_arena expression_arena;
 
-static pw_expression *expression_open (void) {
-  pw_expression *x = pw_expression_open (2);
+/* Reads over the parameter a = 3 and two variables. */
+static int expression_read (const char *text, const pw_expression **x, pw_expression_trouble *trouble) {
+  pw_scope *s = pw_scope_open (1);
+  assert_non_null (s);
+  pw_scope_add (s, "a", 3);
+  int status = pw_expression_read (s, expression_names, text, &expression_arena, x, trouble);
+  pw_scope_close (s);
+  return status;
+}
+
+/* What must be an expression. */
+static const pw_expression *expression_of (const char *text) {
+  const pw_expression *x = NULL;
+  pw_expression_trouble trouble;
+  if (expression_read (text, &x, &trouble) != PW_OK) print_error ("%s: %s\n", text, trouble.text);
   assert_non_null (x);
-  assert_int_equal (pw_expression_name (x, "a", &expression_a), PW_OK);
-  assert_int_equal (pw_expression_name (x, "frame.phi", &expression_phi), PW_OK);
   return x;
+}
+
+static double expression_at (const char *text, double t, double phi) {
+  return pw_expression_value (expression_of (text), (double[]){ t, phi });
 }
 
 /* The same operations in C, in the same order, give the same bits. */
@@ -27,6 +45,13 @@ static void test_values (void **state) {
     { "a - 0.1", a - 0.1 },
     { "2^3^2", 512 },
     { "-2^2", -4 },
+    { "2^-1^2", 0.5 },
+    { "--a", 3 },
+    { "1 < 2 == 2 > 1", 0 },
+    { "0 || 1 && 0", 0 },
+    { "1 ? 2 : 0 ? 3 : 4", 2 },
+    { "0 ? 2 : 0 ? 3 : 4", 4 },
+    { "min(7)", 7 },
     { "1 + 2*a/4", 1 + 2 * a / 4 },
     { "(1 + 2)*a", 9 },
     { "a--2", 5 },
@@ -49,19 +74,13 @@ static void test_values (void **state) {
     { "log10(1000)", log10 (1000) },
     { "sinh(1) + cosh(1) + tanh(1) + atan(1)", sinh (1) + cosh (1) + tanh (1) + atan (1) },
   };
-  pw_expression *x = expression_open ();
-  pw_expression_trouble trouble;
   (void)state;
   for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
-    if (pw_expression_set (x, good[i].text, &trouble) != PW_OK) print_error ("%s: %s\n", good[i].text, trouble.text);
-    double value = pw_expression_value (x);
+    double value = expression_at (good[i].text, 0, 0.25);
     check_bits (good[i].text, &value, &good[i].value, 1);
   }
-  assert_int_equal (pw_expression_set (x, "log(e)", &trouble), PW_OK);
-  check_close ("log(e)", pw_expression_value (x), 1, CHECK_EPS, "round-off");
-  assert_int_equal (pw_expression_set (x, "e", &trouble), PW_OK);
-  check_close ("e", pw_expression_value (x), e, 4 * CHECK_EPS, "round-off of exp");
-  pw_expression_close (x);
+  check_close ("log(e)", expression_at ("log(e)", 0, 0), 1, CHECK_EPS, "round-off");
+  check_close ("e", expression_at ("e", 0, 0), e, 4 * CHECK_EPS, "round-off of exp");
 }
 
 static void test_troubles (void **state) {
@@ -93,46 +112,304 @@ static void test_troubles (void **state) {
     { "a**2", 1, "a power is written with ^" },
     { "\"a\"", 0, "\"\"\" does not belong in an expression" },
     { "a & 1", 2, "\"&\" does not belong in an expression" },
+    { "a &&", 2, "something is missing after \"&&\"" },
+    { "2*(a + )", 5, "something is missing after \"+\"" },
+    { "a ? 2", 2, "there is no \":\" for this \"?\"" },
+    { "(a ? 2)", 3, "there is no \":\" for this \"?\"" },
+    { "a : 2", 2, "this does not belong here" },
+    { "sin(a, 2, 3)", 11, "too many arguments" },
     { "_pi", 0, "there is no \"_pi\"; did you mean \"pi\"?" },
   };
-  pw_expression *x = expression_open ();
+  const pw_expression *x;
   pw_expression_trouble trouble;
   (void)state;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
-    assert_int_equal (pw_expression_set (x, bad[i].text, &trouble), PW_INPUT);
+    assert_int_equal (expression_read (bad[i].text, &x, &trouble), PW_INPUT);
     if (trouble.at != bad[i].at) print_error ("%s: at %zu, not %zu\n", bad[i].text, trouble.at, bad[i].at);
     assert_int_equal (trouble.at, bad[i].at);
     assert_string_equal (trouble.text, bad[i].trouble);
   }
-  pw_expression_close (x);
 }
 
-/* Assignments and long texts never reach muParser; a failed expression does not spoil the next. */
-static void test_again (void **state) {
-  static char text[6000];
-  pw_expression *x = expression_open ();
+/* Texts that are too long, or in which too much is nested, are refused; long sums are not. */
+static void test_limits (void **state) {
+  static const struct {
+    const char *piece;
+    int count, status;
+  } text[] = { { "1", 4001, PW_INPUT }, { "(", 3000, PW_INPUT },  { "-", 3999, PW_INPUT },    { "2^", 1500, PW_INPUT },
+               { "+1", 2000, PW_OK },   { "t+", 1999, PW_INPUT }, { "t?1:", 999, PW_INPUT },  { "sin(", 900, PW_INPUT },
+               { "*t", 0, PW_INPUT },   { "-", 150, PW_INPUT },   { "0||t<", 700, PW_INPUT }, { "+t||t", 700, PW_OK } };
+  char source[6000];
+  const pw_expression *x;
   pw_expression_trouble trouble;
-  (void)state;
-  assert_int_equal (pw_expression_set (x, "a = 7", &trouble), PW_INPUT);
-  assert_true (expression_a == 3);
-  memset (text, '1', sizeof text - 1);
-  assert_int_equal (pw_expression_set (x, text, &trouble), PW_INPUT);
-  memset (text, '(', 3000);
-  text[3000] = 0;
-  assert_int_equal (pw_expression_set (x, text, &trouble), PW_INPUT);
-  assert_int_equal (pw_expression_set (x, "sin(1, 2)", &trouble), PW_INPUT);
-  assert_int_equal (pw_expression_set (x, "2*a", &trouble), PW_OK);
-  assert_true (pw_expression_value (x) == 6);
   double value = 0;
+  (void)state;
+  for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
+    *source = 0;
+    for (int k = 0; k < text[i].count; k++) strcat (source, text[i].piece);
+    assert_int_equal (expression_read (source, &x, &trouble), text[i].status);
+  }
   assert_int_equal (pw_expression_number ("-1.5e3", &value), 1);
   assert_true (value == -1500);
   assert_int_equal (pw_expression_number ("nan", &value), 0);
   assert_int_equal (pw_expression_number ("1 ", &value), 0);
-  pw_expression_close (x);
+}
+
+/* && and || are logical, whatever of them is known when the expression is read. */
+static void test_truths (void **state) {
+  static const double value[] = { 0, 0.5, 1, -2 };
+  (void)state;
+  for (int i = 0; i < 64; i++) {
+    double a = value[i & 3], b = value[i >> 2 & 3], known[2] = { i & 16, i & 32 };
+    char left[20] = "t", right[20] = "frame.phi", text[100];
+    if (known[0] != 0) snprintf (left, sizeof left, "%g", a);
+    if (known[1] != 0) snprintf (right, sizeof right, "(%g)", b);
+    snprintf (text, sizeof text, "(%s && %s) + 2*(%s || %s) + 4*(%s ? 1 : 0)", left, right, left, right, left);
+    /* at t = 0 itself the truth of t is that just after */
+    if (a == 0 && known[0] == 0) continue;
+    double found = expression_at (text, a, b), expected = (a != 0 && b != 0) + 2 * (a != 0 || b != 0) + 4 * (a != 0);
+    check_bits (text, &found, &expected, 1);
+  }
+}
+
+/* ---- Derivatives ---- */
+
+/* A random expression with finite derivatives of both variables. */
+static void random_text (pw_random *r, int depth, char *text, size_t size) {
+  static const char *const form[] = { "sin(1 + %s)",
+                                      "cos(%s)",
+                                      "tan(0.3*sin(%s))",
+                                      "asin(0.9*sin(%s))",
+                                      "acos(0.9*cos(%s))",
+                                      "atan(%s)",
+                                      "sinh(sin(%s))",
+                                      "cosh(cos(%s))",
+                                      "tanh(%s)",
+                                      "exp(sin(%s))",
+                                      "log(2 + sin(%s))",
+                                      "log10(3 + cos(%s))",
+                                      "sqrt(2 + sin(%s))",
+                                      "elliptic_K(0.5 + 0.4*sin(%s))",
+                                      "elliptic_K(0.1*sin(%s))",
+                                      "elliptic_K(-3 + sin(%s))",
+                                      "jacobi_am(%s, 0.7)",
+                                      "jacobi_am(1.3, 0.5 + 0.3*sin(%s))",
+                                      "abs(7 + sin(%s))",
+                                      "sign(9 + sin(%s))*(%s)",
+                                      "(2 + sin(%s))^2.5",
+                                      "sin(%s)^3",
+                                      "(-sin(%s))",
+                                      "2^cos(%s)",
+                                      "(cos(%s) < 5 ? 3 : 7)",
+                                      "mod(0.3 + 0.1*sin(%s), 1)",
+                                      "floor(3.5 + 0.1*sin(%s))*(%s)",
+                                      "(%s + %s)",
+                                      "(%s)*(%s)",
+                                      "(%s)/(3 + sin(%s))",
+                                      "(2 + sin(%s))^(%s)",
+                                      "(%s - %s)",
+                                      "atan2(sin(%s), 2 + cos(%s))",
+                                      "hypot(1 + cos(%s), 3 + sin(%s))",
+                                      "min(sin(%s), 5 + cos(%s))",
+                                      "max(sin(%s), 5 + cos(%s))",
+                                      "jacobi_am(sin(%s), 0.5 + 0.2*sin(%s))" };
+  static const char *const leaf[] = { "t", "frame.phi", "0.7*t", "a", "t*frame.phi" };
+  char part[2][800];
+  if (depth == 0) {
+    snprintf (text, size, "%s", leaf[(int)pw_random_between (r, 0, 4.999)]);
+    return;
+  }
+  for (int i = 0; i < 2; i++) random_text (r, depth - 1, part[i], sizeof part[i]);
+  const char *f = form[(int)pw_random_between (r, 0, sizeof form / sizeof *form - 0.001)];
+  text[0] = 0;
+  for (int i = 0; *f; f++) {
+    size_t n = strlen (text);
+    int hole = strncmp (f, "%s", 2) == 0;
+    snprintf (text + n, size - n, hole ? "%s" : "%.1s", hole ? part[i++] : f);
+    f += hole;
+  }
+}
+
+/* Differences of order 8 of the value or a derivative. */
+static double difference (const pw_expression *x, const double at[2], int by, int order, double h) {
+  static const double weight[] = { 4 / 5., -1 / 5., 4 / 105., -1 / 280. };
+  double sum = 0, u[2][3];
+  for (int k = 1; k <= 4; k++) {
+    for (int side = 0; side < 2; side++) {
+      double there[2] = { at[0], at[1] };
+      there[by] += side ? -k * h : k * h;
+      pw_expression_derivatives (x, there, by, u[side]);
+    }
+    sum += weight[k - 1] * (u[0][order] - u[1][order]) / h;
+  }
+  return sum;
+}
+
+/* Each derivative is that of the one before it.  Two step sizes tell how far differences can be trusted. */
+static void test_derivatives (void **state) {
+  const int expressions = 3000;
+  pw_random r = { 12 };
+  int sharp = 0;
+  (void)state;
+  for (int i = 0; i < expressions; i++) {
+    char text[1600];
+    random_text (&r, 1 + i % 3, text, sizeof text);
+    if (strlen (text) > 1500) continue;
+    const pw_expression *x = expression_of (text);
+    double at[2] = { pw_random_between (&r, -2, 2), pw_random_between (&r, -2, 2) }, u[3];
+    for (int by = 0; by < 2; by++) {
+      pw_expression_derivatives (x, at, by, u);
+      double value = pw_expression_value (x, at);
+      check_bits (text, &value, u, 1);
+      for (int order = 0; order < 2; order++) {
+        double near = difference (x, at, by, order, 1e-3), far = difference (x, at, by, order, 2e-3);
+        double bound = 2 * fabs (near - far) + 1e-10 * (1 + fabs (u[order]) + fabs (near));
+        sharp += bound < 1e-6 * (1 + fabs (near));
+        check_close (text, u[order + 1], near, bound, "what two step sizes differ by, and their round-off");
+      }
+    }
+  }
+  check_below ("derivatives compared to less than six digits", 4 * expressions - sharp, 0.1 * expressions,
+               "a few are wild");
+}
+
+/* What jumps or bends has the value and derivatives just after. */
+static void test_after (void **state) {
+  static const struct {
+    const char *text;
+    double t, u[3];
+  } at[] = {
+    { "t > 2 ? 3*t : 0", 2, { 6, 3, 0 } },
+    { "t <= 2 ? 0 : t^2", 2, { 4, 4, 2 } },
+    { "abs(t)", 0, { 0, 1, 0 } },
+    { "abs(2 - t)", 2, { 0, 1, 0 } },
+    { "floor(t)", 3, { 3, 0, 0 } },
+    { "floor(-t)", 3, { -4, 0, 0 } },
+    { "ceil(t)", 3, { 4, 0, 0 } },
+    { "round(2*t)", 1.25, { 3, 0, 0 } },
+    { "round(-2*t)", 1.25, { -3, 0, 0 } },
+    { "round(3 - 2*t)", 1.25, { 0, 0, 0 } },
+    { "sign(t)", 0, { 1, 0, 0 } },
+    { "sign(-t)", 0, { -1, 0, 0 } },
+    { "mod(t, 3)", 3, { 0, 1, 0 } },
+    { "mod(-t, 3)", 3, { 3, -1, 0 } },
+    { "min(t, 1)", 1, { 1, 0, 0 } },
+    { "max(t, 1, t^2)", 1, { 1, 2, 2 } },
+    { "t == 1", 1, { 0, 0, 0 } },
+    { "t != 1", 1, { 1, 0, 0 } },
+    { "t && 1", 0, { 1, 0, 0 } },
+    { "sin(t)^2 > 0", 0, { 1, 0, 0 } },
+    { "sqrt(t - 1)", 2, { 1, 0.5, -0.25 } },
+    { "3 < t || t < 2", 3, { 1, 0, 0 } },
+    { "t < 2 || 2 < t", 2, { 1, 0, 0 } },
+    { "a > 3", 1, { 0, 0, 0 } },
+    { "frame.phi >= 1", 1, { 1, 0, 0 } },
+    { "frame.phi > 1", 1, { 0, 0, 0 } },
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof at / sizeof *at; i++) {
+    const pw_expression *x = expression_of (at[i].text);
+    double u[3], variable[] = { at[i].t, 1 }, value = pw_expression_value (x, variable);
+    pw_expression_derivatives (x, variable, 0, u);
+    check_bits (at[i].text, &value, at[i].u, 1);
+    for (int k = 0; k < 3; k++) check_close (at[i].text, u[k], at[i].u[k], 4 * CHECK_EPS, "round-off");
+  }
+}
+
+/* ---- Breakpoints ---- */
+
+static void test_breakpoints (void **state) {
+  static const struct {
+    const char *text;
+    double first, next; /* 0: none */
+  } at[] = {
+    { "7", 0, 0 },
+    { "sin(t) + exp(t)", 0, 0 },
+    { "t > 7.0003 && t < 7.0103 ? 100 : 0", 7.0003, 7.0103 },
+    { "7.0103 >= t && t >= 7.0003", 7.0003, 7.0103 },
+    { "2*t - 1 > 3", 2, 0 },
+    { "1 - t/4 <= -2 ? 1 : 0", 12, 0 },
+    { "t > 1e-7", 1e-7, 0 },
+    { "t > 1e9", 1e9, 0 },
+    { "floor(t)", 1, 2 },
+    { "ceil(t/2)", 2, 4 },
+    { "round(t)", 0.5, 1.5 },
+    { "mod(t, 0.3) < 0.1", 0.1, 0.3 },
+    { "mod(t - 7, 20)", 7, 27 },
+    { "sin(t) > 0.5", 0.5235987755982989, 2.6179938779914944 },
+    { "abs(cos(t))", 1.5707963267948966, 4.7123889803846899 },
+    { "t^2 > 2", 1.4142135623730951, 0 },
+    { "exp(t) < 3 ? 1 : 2", 1.0986122886681098, 0 },
+    { "min(t, 1)", 1, 0 },
+    { "max(1, t, 3)", 3, 0 },
+    { "sign(t - 3)", 3, 0 },
+    { "t == 4", 0, 0 }, /* not for any time */
+    { "sin(t) > 0.5 && t < 1", 0.5235987755982989, 1 },
+    { "0 && t > 3", 0, 0 },
+    { "(t > 3)*(t > 5)", 3, 5 },
+    { "t > 2 ? t > 5 ? 1 : 2 : 3", 2, 5 },
+    { "frame.phi > 0", 0, 0 },
+    { "t > 2 ? frame.phi : 0", 2, 0 },
+    { "frame.phi > t", 0, 0 },
+    { "atan2(sin(t), cos(t))", 3.1415926535897931, 9.4247779607693793 },
+    { "sin(t) > 2", 0, 0 },
+    { "max(0, min(t, 1) - min(t, 1)) + (t > 5)", 1, 5 },
+    { "max(sin(t), sin(t)) + (t > 0.1)", 0.1, -1 }, /* what stays equal hides nothing near */
+    { "jacobi_am(t, 0.5) > 1", 1.0832167728451687, 0 },
+    { "cosh(t) > 2 || tan(t/9) > 1", 1.3169578969248168, 0 },
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof at / sizeof *at; i++) {
+    const pw_expression *x = expression_of (at[i].text);
+    double first = pw_expression_breakpoint (x, 0),
+           next = first < INFINITY ? pw_expression_breakpoint (x, first) : first;
+    double expected[] = { at[i].first == 0 ? INFINITY : at[i].first, at[i].next == 0 ? INFINITY : at[i].next };
+    if (expected[0] == INFINITY) assert_true (first == INFINITY);
+    if (expected[0] < INFINITY)
+      check_close (at[i].text, first, expected[0], 8 * CHECK_EPS * expected[0], "round-off of the comparison");
+    if (at[i].next >= 0 && expected[1] == INFINITY) assert_true (next == INFINITY);
+    if (at[i].next > 0)
+      check_close (at[i].text, next, expected[1], 8 * CHECK_EPS * next, "round-off of the comparison");
+  }
+}
+
+/* Between breakpoints nothing jumps: random thresholds on random curves, scanned at many times. */
+static void test_scanned (void **state) {
+  pw_random r = { 5 };
+  (void)state;
+  for (int i = 0; i < 100; i++) {
+    char text[200];
+    snprintf (text, sizeof text, "(sin(%g*t + %g) + %g*t > %g) + 2*(mod(%g*t, %g) < %g) + 4*floor(%g*t)",
+              pw_random_between (&r, 0.1, 9), pw_random_between (&r, 0, 6), pw_random_between (&r, -0.1, 0.1),
+              pw_random_between (&r, -1, 1), pw_random_between (&r, -3, 3), pw_random_between (&r, 0.5, 2),
+              pw_random_between (&r, 0.1, 0.4), pw_random_between (&r, -2, 2));
+    const pw_expression *x = expression_of (text);
+    double next = pw_expression_breakpoint (x, 0), before = pw_expression_value (x, (double[]){ 0, 0 });
+    for (double t = 0; t < 10; t += 1e-3) {
+      double now = pw_expression_value (x, (double[]){ t, 0 });
+      int passed = next <= t;
+      while (next <= t) {
+        assert_true (pw_expression_value (x, (double[]){ nextafter (next, 0), 0 }) !=
+                     pw_expression_value (x, (double[]){ next, 0 }));
+        next = pw_expression_breakpoint (x, next);
+      }
+      if (!passed) check_bits (text, &now, &before, 1);
+      before = now;
+    }
+  }
+}
+
+static int expression_teardown (void **state) {
+  (void)state;
+  pw_arena_free (&expression_arena);
+  return 0;
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_values), cmocka_unit_test (test_troubles),
-                                      cmocka_unit_test (test_again) };
-  return cmocka_run_group_tests (tests, NULL, NULL);
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_values),      cmocka_unit_test (test_troubles),    cmocka_unit_test (test_limits),
+    cmocka_unit_test (test_truths),      cmocka_unit_test (test_derivatives), cmocka_unit_test (test_after),
+    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_scanned),
+  };
+  return cmocka_run_group_tests (tests, NULL, expression_teardown);
 }

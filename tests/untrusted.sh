@@ -36,9 +36,9 @@ printf 'a: &a [x,x]\nb: &b [*a,*a]\nc: [*b,*b]\n' | refused 'a billion laughs' '
 { printf 'parameters: [{name: p, value: "'; across 1500 '(' | tr -d '\n'; echo '1"}]'; } |
   refused 'parentheses in parentheses' 'too many parentheses'
 { echo 'bodies:'; many 1000001 '  - {name: b%d}'; } | refused 'a million bodies' '1000001 entries; a model may have 1000000'
-{ echo 'parameters:'; many 60000 '  - {name: p%d, value: 1}'; echo "$body"; echo 'elements:'
-  many 100 '  - {torque: t%d, body: [a, ground], value: t}'; } |
-  refused 'many signals that know many parameters' 'need more memory than a model may have'
+sum=$(across 1900 '+t')
+{ echo "$body"; echo 'elements:'; many 8000 "  - {torque: t%d, body: [a, ground], value: $sum}"; } |
+  refused 'many long signals' 'more memory than a model may have'
 { echo t,v; many 100000 '%d,%d'; } >table.csv
 { echo "$body"; echo 'elements:'
   many 300 '  - {torque: t%d, body: [a, ground], value: {table: {file: table.csv, columns: [t, v]}}}'; } |

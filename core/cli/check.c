@@ -172,6 +172,7 @@ double pw_check_doubling (const pw_check *x) {
 
 static int check_model (pw_check *x, int started, pw_error *error) {
   pw_report_angles (x->m.model);
+  pw_report_jumps (x->m.model);
   check_open (x);
   check_given (x);
   int status = check_truth (x, started, error);

@@ -69,6 +69,21 @@ void pw_report_angles (const pw_model *m) {
   }
 }
 
+/* ---- Jumps without a breakpoint ---- */
+
+void pw_report_jumps (const pw_model *m) {
+  for (const pw_element *e = m->element; e < m->element + m->elements; e++)
+    for (const pw_field *f = e->kind->fields; f->name; f++) {
+      const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
+      for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)
+        if (s[i].type == PW_FUNCTION && s[i].function.text && s[i].function.text->jump)
+          fprintf (stderr,
+                   "pinwheel: %s %s: %s: \"%.80s\" may jump as states change; steps do not end there, which costs "
+                   "accuracy\n",
+                   e->kind->name, pw_element_name (e), f->name, s[i].function.text->jump);
+    }
+}
+
 /* ---- The start ---- */
 
 void pw_report_start (const pw_system *s, const pw_start_report *start) {

@@ -13,6 +13,9 @@ void pw_report_unused (const char *method, const pw_cli_wishes *w);
 /* Says on standard error which headings and starting angles are more than a turn: degrees, most likely. */
 void pw_report_angles (const pw_model *m);
 
+/* Says on standard error which expressions may jump as states change, where no step ends. */
+void pw_report_jumps (const pw_model *m);
+
 /* Says on standard error that a fixed step is longer than what moves at the start takes to change. */
 void pw_report_step (const pw_run *r, const char *method, double step);
 

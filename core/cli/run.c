@@ -91,6 +91,7 @@ static int run_open (run *x, pw_error *error) {
   x->r = pw_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
   pw_report_angles (x->m.model);
+  pw_report_jumps (x->m.model);
   pw_report_unused (x->method, &x->wishes);
   pw_report_step (x->r, x->method, fmin (x->settings.step, x->t_end));
   pw_report_differences (x->m.system);

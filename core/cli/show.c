@@ -53,7 +53,13 @@ static void show_harmonic (const pw_signal *s) {
   printf (")");
 }
 
+/* An expression as it was written, or f (t, states). */
 static void show_function (const pw_signal *s) {
+  static const char *const part[] = { "", ", rate ", ", acceleration " };
+  const pw_signal_text *text = s->function.text;
+  for (int i = 0; text && i < 3; i++)
+    if (text->part[i]) printf ("%s%s", part[i], text->part[i]);
+  if (text) return;
   printf ("f (t");
   for (const char *const *r = s->function.reads; r && *r; r++) printf (", %s", *r);
   printf (")");
@@ -117,7 +123,7 @@ static void show_difference (const char *text, int *shown) {
   printf ("  %s\n", text);
 }
 
-/* Blocks of kinds that leave them to Pinwheel, and forces that are expressions of states. */
+/* Blocks of kinds that leave them to Pinwheel, and forces whose functions do. */
 static void show_differences (const pw_cli_model *x) {
   char text[300];
   int shown = 0;

@@ -71,9 +71,20 @@ static int yaml_form_is_default (const pw_field *f, const void *at) {
 }
 
 /* {ramp: {to: 1, duration: 2}} */
+static void yaml_expression (const pw_signal_text *t) {
+  static const char *const key[] = { "{expression: ", ", rate: ", ", acceleration: " };
+  for (int i = 0; i < 3; i++)
+    if (t->part[i]) fputs (key[i], stdout), yaml_text (t->part[i]);
+  putchar ('}');
+}
+
 static void yaml_signal (const pw_signal *s) {
   const pw_signal_form *form = pw_signal_form_of (s);
   const char *glue = "";
+  if (s->type == PW_FUNCTION) {
+    yaml_expression (s->function.text);
+    return;
+  }
   if (form == NULL) {
     yaml_number (s->constant);
     return;
@@ -152,7 +163,7 @@ static int yaml_refuse (const pw_model *m, pw_error *error) {
     for (const pw_field *f = e->kind->fields; f->name; f++) {
       const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
       for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)
-        if (s[i].type == PW_FUNCTION)
+        if (s[i].type == PW_FUNCTION && s[i].function.text == NULL)
           return pw_fail (error, PW_INPUT,
                           "model %s cannot be written as text: the signal \"%s\" of %s %s is a function", m->name,
                           f->name, kind, name);
@@ -180,13 +191,16 @@ static void yaml_run (const pw_run_defaults *run) {
   if (written) puts ("}");
 }
 
-/* The expressions of a truth keep their names, whose values stand under `let`; a function in C has no words. */
+/* Expressions keep their names, whose values stand under `let`. */
+static void yaml_names (const pw_truth_text *t) {
+  if (t->names) puts ("let:");
+  for (int i = 0; i < t->names; i++) printf ("  %s: ", t->name[i]), yaml_number (t->value[i]), putchar ('\n');
+}
+
+/* A function in C has no words. */
 static void yaml_truth (const pw_model *m) {
   const pw_truth_text *t = &m->truth;
   if (m->table->truth) puts ("# The model knows its motion (truth) by a function in C, which is left out.");
-  if (t->states && t->names) puts ("let:");
-  for (int i = 0; t->states && i < t->names; i++)
-    printf ("  %s: ", t->name[i]), yaml_number (t->value[i]), putchar ('\n');
   if (t->states) puts ("truth:");
   for (int i = 0; i < t->states; i++) printf ("  %s: ", t->state[i]), yaml_text (t->text[i]), putchar ('\n');
 }
@@ -197,6 +211,7 @@ int pw_cli_yaml (const pw_cli_model *x, pw_error *error) {
   puts ("pinwheel: 1");
   if (m->table->about && *m->table->about) printf ("about: "), yaml_text (m->table->about), putchar ('\n');
   yaml_run (&m->table->run);
+  yaml_names (&m->truth);
   if (m->bodies) puts ("bodies:");
   for (int i = 0; i < m->bodies; i++) yaml_body (&m->body[i]);
   if (m->elements) puts ("elements:");

@@ -13,7 +13,8 @@ typedef struct {
   const pw_expression *x[3];         /* value, rate, acceleration; NULL: not given, then it is differentiated */
   int derivatives;                   /* by time that are wanted: 0, 1, 2 */
   int states;                        /* it reads, */
-  const char *name[TIME_STATES + 2]; /* "t", "BODY.phi" and the like; for reading only */
+  const char *name[TIME_STATES + 2]; /* "t", "BODY.phi" and the like; for reading only, like */
+  pw_signal_text text;
 } time_function;
 
 /* ---- Evaluation ---- */
@@ -107,18 +108,18 @@ static int time_note (void *context, const char *name, size_t length, size_t at)
 
 /* The part that jumps as states change, as a text of its own. */
 static int time_jump (time_reader *r, const pw_expression *x) {
-  if (x->jump == NULL || r->signal->jump) return PW_OK;
+  if (x->jump == NULL || r->f->text.jump) return PW_OK;
   char *text = pw_arena_take (&r->b->m->arena, (size_t)x->jump_size + 1);
   if (text == NULL) return pw_yaml_no_memory (r->b->y, r->error);
   memcpy (text, x->jump, (size_t)x->jump_size);
-  r->signal->jump = text;
+  r->f->text.jump = text;
   return PW_OK;
 }
 
 static int time_expression (time_reader *r, int i) {
   const pw_yaml *y = r->b->y;
   pw_expression_trouble trouble;
-  if (pw_yaml_text (y, r->node, r->what, &r->signal->text[i], r->error) != PW_OK ||
+  if (pw_yaml_text (y, r->node, r->what, &r->f->text.part[i], r->error) != PW_OK ||
       pw_expression_names (r->node->text, time_note, r) != PW_OK)
     return r->error->status;
   int status = pw_expression_read (r->b->x, r->f->name, r->node->text, &r->b->m->arena, &r->f->x[i], &trouble);
@@ -204,6 +205,7 @@ int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, 
   f->derivatives = pw_kind_forced (kind) ? 0 : kind->level == PW_HOLONOMIC ? 2 : 1;
   signal->function.open = time_open;
   signal->function.close = free;
+  signal->function.text = &f->text;
   time_reader reader = { b, f, NULL, what, pw_kind_forced (kind), &signal->function, error };
   if (pw_yaml_keep_names (b, error) != PW_OK || time_all (&reader, v) != PW_OK) return error->status;
   if (f->states) signal->function.reads = f->name + 1;

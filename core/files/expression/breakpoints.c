@@ -117,7 +117,6 @@ static range range_am (const range *u, const range *m) {
 }
 
 static range range_pair (const pw_expression_function *f, const range *x, const range *y) {
-  if (f->two == atan2) return range_atan2 (x, y);
   return f->two == hypot ? range_hypot (x, y) : range_am (x, y);
 }
 
@@ -214,6 +213,8 @@ static range range_two (const pw_expression_code *c, const range *x, const range
     return range_power (x, y);
   case PW_OP_MOD:
     return range_mod (x, y);
+  case PW_OP_ATAN2:
+    return range_atan2 (x, y);
   case PW_OP_TWO:
     return range_pair (&pw_expression_functions[c->which], x, y);
   default:
@@ -239,7 +240,7 @@ static range range_apply (const pw_expression_code *c, const range *x, int opera
   if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_least : range_most) (x, x + 1);
   if (c->op == PW_OP_SELECT) return range_select (x, x + 1, x + 2);
   range r = operands == 1 ? range_one (c, x) : range_two (c, x, x + 1);
-  int constant = r.lo == r.hi && c->op != PW_OP_MOD && pw_expression_jumps (c->op);
+  int constant = r.lo == r.hi && c->op != PW_OP_MOD && c->op != PW_OP_ATAN2 && pw_expression_jumps (c->op);
   r.states = !constant && (x[0].states || (operands == 2 && x[1].states));
   r.breaks &= !r.states;
   r.breaks |= !constant && (x[0].breaks || (operands == 2 && x[1].breaks));

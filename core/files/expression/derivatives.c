@@ -7,6 +7,7 @@
 #include <math.h>
 #include <string.h>
 #include "expression_parts.h"
+#include "pinwheel.h"
 
 typedef struct {
   double v, d, dd;
@@ -102,6 +103,15 @@ static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y
   return jet_chain (value, &s, x, y);
 }
 
+/* It jumps where y, the first argument, changes sign at negative x. */
+static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
+  jet r = jet_function (c, y, x);
+  int sign = jet_sign (y);
+  *discrete = x->v < 0 && sign < 0;
+  if (y->v == 0 && x->v < 0 && sign != 0) r.v = sign * PW_PI;
+  return r;
+}
+
 static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
   switch (c->op) {
   case PW_OP_ADD:
@@ -115,6 +125,8 @@ static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, dou
   case PW_OP_POWER:
   case PW_OP_TWO:
     return jet_function (c, x, y);
+  case PW_OP_ATAN2:
+    return jet_atan2 (c, x, y, discrete);
   case PW_OP_MOD:
     return jet_mod (x, y, discrete);
   case PW_OP_AND:

@@ -35,6 +35,11 @@ static double value_mod (double a, double b, int *tie) {
   return r;
 }
 
+static double value_atan2 (double y, double x, int *tie) {
+  if (y == 0 && x < 0) *tie = 1;
+  return atan2 (y, x);
+}
+
 static inline double value_two (const pw_expression_code *c, double a, double b, int *tie) {
   switch (c->op) {
   case PW_OP_ADD:
@@ -57,6 +62,8 @@ static inline double value_two (const pw_expression_code *c, double a, double b,
     return fmax (a, b);
   case PW_OP_MOD:
     return value_mod (a, b, tie);
+  case PW_OP_ATAN2:
+    return value_atan2 (a, b, tie);
   case PW_OP_TWO:
     return pw_expression_functions[c->which].two (a, b);
   default:

@@ -34,6 +34,7 @@ typedef enum {
   PW_OP_MOD,
   PW_OP_MIN,
   PW_OP_MAX,
+  PW_OP_ATAN2,
   PW_OP_TWO,   /* a smooth function */
   PW_OP_SELECT /* by a truth */
 } pw_expression_op;
@@ -44,7 +45,8 @@ static inline int pw_expression_operands (int op) {
 
 /* Comparisons and the like jump from one value to another; abs, min and max only have kinks. */
 static inline int pw_expression_jumps (int op) {
-  return (op >= PW_OP_SIGN && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_UNEQUAL) || op == PW_OP_MOD;
+  return (op >= PW_OP_SIGN && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_UNEQUAL) || op == PW_OP_MOD ||
+         op == PW_OP_ATAN2;
 }
 static inline int pw_expression_breaks (int op) {
   return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX;

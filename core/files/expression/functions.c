@@ -158,7 +158,7 @@ const pw_expression_function pw_expression_functions[] = {
   FUNCTION_THAT_BREAKS ("ceil", PW_OP_CEIL, 1),
   FUNCTION_THAT_BREAKS ("round", PW_OP_ROUND, 1),
   FUNCTION_THAT_BREAKS ("sign", PW_OP_SIGN, 1),
-  FUNCTION_OF_TWO (atan2),
+  { "atan2", PW_OP_ATAN2, 2, 2, NULL, atan2, slopes_atan2, PW_OTHERWISE },
   FUNCTION_OF_TWO (hypot),
   { "jacobi_am", PW_OP_TWO, 2, 2, NULL, pw_jacobi_am, slopes_am, PW_OTHERWISE },
   { "elliptic_K", PW_OP_ONE, 1, 1, pw_elliptic_K, NULL, slopes_K, PW_RISES },

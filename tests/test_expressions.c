@@ -1,0 +1,151 @@
+/* Signals by expressions in runs: they do what built-in signals do, steps end where they jump, derivatives are exact. */
+#define _GNU_SOURCE /* mkstemps */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "check.h"
+#include "model.h"
+#include "pinwheel-files.h"
+#include "runs.h"
+
+static char path[] = "/tmp/pinwheel-expression-XXXXXX.yaml";
+
+typedef struct {
+  pw_file *file;
+  pw_model *model;
+  pw_system *system;
+} scene;
+
+/* A model whose elements are given by a format and a value in it. */
+static scene scene_of (const char *elements, const char *value) {
+  pw_error error = { 0 };
+  FILE *f = fopen (path, "w");
+  assert_non_null (f);
+  fputs ("pinwheel: 1\nparameters: [{name: A, value: 0.3}, {name: w, value: 2}, {name: T, value: 1.5}]\n"
+         "bodies: [{name: a, mass: 1, inertia: 0.1}, {name: b, mass: 2, inertia: 0.3, rate: {vx: 1}}]\nelements:\n",
+         f);
+  for (const char *p = elements; *p; p++) *p == '@' ? fputs (value, f) : fputc (*p, f);
+  assert_int_equal (fclose (f), 0);
+  scene x = { .file = pw_file_open (path, &error) };
+  check_ok (x.file ? PW_OK : error.status, &error);
+  x.model = pw_file_model (x.file, &error);
+  check_ok (pw_build (x.model, &error), &error);
+  x.system = pw_compile (x.model, &error);
+  check_ok (x.system ? PW_OK : error.status, &error);
+  return x;
+}
+
+static void scene_close (scene *x) {
+  pw_free (x->system);
+  pw_model_free (x->model);
+  pw_file_close (x->file);
+}
+
+static const pw_signal *scene_signal (const scene *x) {
+  return pw_field_at (x->model->element[0].kind, x->model->element[0].definition, PW_SIGNAL, 0);
+}
+
+/* 100 N for 0.01 s give 1 kg a speed of 1 m/s, however long the steps and however the times are written: a constant force is
+ * integrated without an error of the method, but for the first-order steps that multistep methods restart with. */
+static void test_push (void **state) {
+  static const char *const value[] = { "t > 7.0003 && t < 7.0103 ? 100 : 0",
+                                       "100*(7.0003 < t && 7.0103 >= t)",
+                                       "2*t - 1 > 13.0006 && 3*t < 21.0309 ? 100 : 0",
+                                       "abs(t - 7.0053) < 0.005 ? 100 : 0",
+                                       "mod(t - 7.0003, 20) < 0.01 ? 100 : 0",
+                                       "50*(sign(t - 7.0003) - sign(t - 7.0103))",
+                                       "t < 7.0003 ? 0 : t < 7.0103 ? 100 : 0",
+                                       "100*(ceil((t - 7.0003)/30) - ceil((t - 7.0103)/30))",
+                                       "t^2 > 7.0003^2 && exp(t) < exp(7.0103) ? 100 : 0" };
+  char method[40];
+  double q[6], v[6];
+  (void)state;
+  for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
+    scene x = scene_of ("  - {force: F, body: a, fx: \"@\"}\n", value[i]);
+    for (int k = 0; runs_method (k, method); k++) {
+      runs_state (x.system, method, &(pw_settings){ .step = 0.25, .rtol = 1e-6 }, 10, q, v, NULL);
+      check_close (method, v[0], 1, 1e-6, "the tolerance");
+      if (strncmp (method, "rk4", 3) == 0 || strncmp (method, "leapfrog", 8) == 0)
+        check_close (method, v[0], 1, 1e-12, "two times with round-off of 1e-15, 100 N");
+    }
+    scene_close (&x);
+  }
+}
+
+/* An expression in place of a built-in signal: the same motion but for round-off. */
+static void test_built_in (void **state) {
+  static const char drive[] = "  - {drive: D, body: [a, ground], what: angle, value: @}\n"
+                              "  - {pin: P, body: [a, b], at: [[0.5, 0], [-0.5, 0]]}\n";
+  static const char steered[] = "  - {steered-wheel: W, body: b, at: [0.4, 0.1], heading: @}\n"
+                                "  - {wheel: V, body: b, at: [-0.4, 0]}\n  - {force: F, body: b, fx: 1}\n";
+  static const char speed[] = "  - {speed: S, body: b, at: [0, 0], value: @}\n";
+#define STEP "((t - 0.4)/T)^3*(10 + (t - 0.4)/T*(6*(t - 0.4)/T - 15))"
+  static const struct {
+    const char *elements, *form, *expression;
+  } pair[] = {
+    { drive, "{harmonic: {amplitude: A, omega: w, phase: 0.5, offset: 0.1}}", "\"0.1 + A*cos(w*t + 0.5)\"" },
+    { drive, "{smooth-step: {to: A, start: 0.4, duration: T}}", "\"A*(t < 0.4 ? 0 : t < 0.4 + T ? " STEP " : 1)\"" },
+    { drive, "{expression: A*sin(w*t), rate: A*w*cos(w*t), acceleration: -A*w^2*sin(w*t)}", "A*sin(w*t)" },
+    { drive, "{expression: A*sin(w*t), rate: A*w*cos(w*t)}", "A*sin(w*t)" },
+    { steered, "{harmonic: {amplitude: A, omega: w, phase: 0.5}}", "A*cos(w*t + 0.5)" },
+    { steered, "{smooth-step: {to: A, start: 0.4, duration: T}}", "\"A*(t < 0.4 ? 0 : t < 0.4 + T ? " STEP " : 1)\"" },
+    { steered, "{ramp: {to: A, start: 0.4, duration: T}}", "\"A*max(0, min(1, (t - 0.4)/T))\"" },
+    { steered, "{expression: atan(A*t), rate: A/(1 + (A*t)^2)}", "atan(A*t)" },
+    { speed, "{ramp: {from: 1, to: 2, start: 0.4, duration: T}}", "\"1 + max(0, min(1, (t - 0.4)/T))\"" },
+  };
+  static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl", "bdf+projection", "galpha" };
+  (void)state;
+  for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
+    for (size_t m = 0; m < sizeof method / sizeof *method; m++) {
+      double q[2][6], v[2][6];
+      for (int k = 0; k < 2; k++) {
+        scene x = scene_of (pair[i].elements, k ? pair[i].expression : pair[i].form);
+        runs_state (x.system, method[m], &(pw_settings){ .step = 0.05, .rtol = 1e-7 }, 3, q[k], v[k], NULL);
+        scene_close (&x);
+      }
+      for (int j = 0; j < 6; j++) {
+        check_close (pair[i].expression, q[1][j], q[0][j], 1e-9, "round-off, which adaptive steps carry on");
+        check_close (pair[i].expression, v[1][j], v[0][j], 1e-8, "round-off, which adaptive steps carry on");
+      }
+    }
+}
+
+/* The gradient by states is that of the formula. */
+static void test_gradient (void **state) {
+  scene x = scene_of ("  - {torque: T, body: [b, ground], value: \"@\"}\n",
+                      "t*sin(b.phi)*exp(-b.omega^2) + abs(a.x)*(b.omega > 0 ? 2 : 3)");
+  const pw_signal *s = scene_signal (&x);
+  void *own = s->function.open (s->function.context);
+  double t = 1.3, phi = 0.4, omega = 0.7, ax = -2, value[3], gradient[3];
+  const double states[] = { phi, omega, ax };
+  (void)state;
+  assert_string_equal (s->function.reads[0], "b.phi");
+  assert_int_equal (s->function.eval (own, t, states, value, gradient), 0);
+  double e = exp (-omega * omega);
+  check_close ("value", value[0], t * sin (phi) * e + 4, 8 * CHECK_EPS * 4, "round-off");
+  check_close ("by phi", gradient[0], t * cos (phi) * e, 8 * CHECK_EPS, "round-off");
+  check_close ("by omega", gradient[1], -2 * omega * t * sin (phi) * e, 8 * CHECK_EPS, "round-off");
+  check_close ("by x", gradient[2], -2, 0, "exact");
+  assert_string_equal (s->function.text->jump, "b.omega > 0");
+  s->function.close (own);
+  scene_close (&x);
+}
+
+static int setup (void **state) {
+  (void)state;
+  int file = mkstemps (path, 5);
+  return file < 0 ? -1 : close (file);
+}
+
+static int teardown (void **state) {
+  (void)state;
+  return remove (path);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_push), cmocka_unit_test (test_built_in),
+                                      cmocka_unit_test (test_gradient) };
+  return cmocka_run_group_tests (tests, setup, teardown);
+}
