@@ -10,7 +10,7 @@
 CC=${CC:-cc} BUILD=${BUILD:-build}
 [ -z "$NO_DEPS" ] || { echo "deps: skipped (NO_DEPS=$NO_DEPS)"; exit 0; }
 
-fresh= needs='cc sundials suitesparse libfyaml muparser popt cmocka gnuplot'
+fresh= needs='cc sundials suitesparse libfyaml popt cmocka gnuplot'
 for word; do
   case $word in
   fresh) fresh=1 ;;
@@ -52,10 +52,6 @@ C
   libfyaml) cat <<'C' ;;
 #include <libfyaml.h>
 int try_libfyaml (void) { return fy_document_build_from_string && fy_node_report; }
-C
-  muparser) cat <<'C' ;;
-#include <muParserDLL.h>
-int try_muparser (void) { return mupCreate && mupEval; }
 C
   popt) cat <<'C' ;;
 #include <popt.h>
@@ -124,7 +120,6 @@ package_of () {
 
   # unverified from here on
   dnf-cc) echo gcc ;;
-  dnf-muparser) echo muParser-devel ;;
   dnf-cmocka) echo libcmocka-devel ;;
   dnf-gnuplot) echo gnuplot ;;
   dnf-clang) echo clang ;;

@@ -80,7 +80,6 @@ typedef struct {
   void *(*open) (void *context); /* each compiled system gets a context of its own, made from this one, or NULL without
                                      memory; may be NULL: all systems, and their threads, share `context` */
   void (*close) (void *context); /* frees what open made, with the system; may be NULL */
-  int differenced;               /* 1: gradient is made of differences; `show` says so */
   const pw_signal_text *text;    /* NULL: it is not of a text model */
 } pw_function;
 

@@ -58,18 +58,53 @@ static void test_round_trip_signals (void **state) {
       "pinwheel run @/signals.yaml -m $m -o @/again.csv >/dev/null 2>&1 && cmp @/once.csv @/again.csv || exit 1; done");
 }
 
-static const char cli_function[] = "pinwheel: 1\n"
-                                   "bodies: [{name: a, mass: 1, inertia: 1}]\n"
-                                   "elements: [{torque: T, body: [a, ground], value: sin(t)}]\n";
+static const char cli_function[] =
+    "#include \"pinwheel.h\"\n"
+    "static int f (void *c, double t, const double *x, double u[3], double *g) {\n"
+    "  (void)c, (void)x, (void)g;\n"
+    "  u[0] = t;\n"
+    "  return 0;\n"
+    "}\n"
+    "static void build (pw_model *m, const void *p) {\n"
+    "  (void)p;\n"
+    "  pw_add_body (m, &(pw_body){ .name = \"a\", .mass = 1, .inertia = 1 });\n"
+    "  pw_add_torque (m, &(pw_torque){ .name = \"T\", .body = { \"a\", \"ground\" },\n"
+    "                                  .value = { PW_FUNCTION, .function = { .eval = f } } });\n"
+    "}\n"
+    "PW_MODEL (.build = build);\n";
+
+/* Expressions are shown and written as they are; their names stand under let. */
+static const char cli_expressions[] =
+    "pinwheel: 1\nparameters: [{name: A, value: 0.3}]\nlet: {w: 2*A}\n"
+    "bodies: [{name: a, mass: 1, inertia: 1}, {name: b, mass: 1, inertia: 1, start: {x: 1}}]\n"
+    "elements:\n  - {torque: T, body: [a, ground], value: \"t > 0.05 ? A*sin(w*t) : -b.omega\"}\n"
+    "  - {drive: D, body: [b, ground], what: angle, value: {expression: A*t^2, rate: 2*A*t}}\n"
+    "  - {torque: U, body: [a, ground], value: -A*sign(a.omega - 1)}\n";
+
+static void test_expressions (void **state) {
+  (void)state;
+  cli_write ("e.yaml", cli_expressions);
+  cli_good ("pinwheel show @/e.yaml");
+  assert_non_null (strstr (cli_out, "torque T: body a, ground; value t > 0.05 ? A*sin(w*t) : -b.omega N m\n"));
+  assert_non_null (strstr (cli_out, "value A*t^2, rate 2*A*t m or rad\n"));
+  assert_int_equal (
+      cli_run ("pinwheel show @/e.yaml --yaml >@/again.yaml && pinwheel run @/e.yaml -t 0.2 -o @/e.csv >/dev/null && "
+               "pinwheel run @/again.yaml -t 0.2 -o @/again.csv >/dev/null && cmp @/e.csv @/again.csv"),
+      0);
+  assert_non_null (strstr (cli_err, "torque U: value: \"sign(a.omega - 1)\" may jump as states change"));
+  assert_null (strstr (cli_err, "torque T"));
+  assert_int_equal (cli_run ("pinwheel check @/e.yaml"), 0);
+  assert_non_null (strstr (cli_err, "torque U: value: \"sign(a.omega - 1)\" may jump as states change"));
+}
 
 static void test_no_text (void **state) {
   (void)state;
-  cli_write ("f.yaml", cli_function);
-  cli_bad ("pinwheel show @/f.yaml --yaml", 2,
+  cli_write ("f.c", cli_function);
+  cli_bad ("pinwheel show @/f.c --yaml", 2,
            "model f cannot be written as text: the signal \"value\" of torque T is a function");
   cli_bad ("pinwheel show ezyroller --yaml --start frame.vx=1", 2,
            "--yaml: start values of --start have no place in a text model; give them to run");
-  cli_good ("pinwheel show @/f.yaml");
+  cli_good ("pinwheel show @/f.c");
   assert_non_null (strstr (cli_out, "torque T: body a, ground; value f (t) N m"));
 }
 
@@ -138,9 +173,10 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_same_tables), cmocka_unit_test (test_same_sweeps),
     cmocka_unit_test (test_round_trip),  cmocka_unit_test (test_round_trip_signals),
-    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_max_file),
-    cmocka_unit_test (test_names),       cmocka_unit_test (test_message),
-    cmocka_unit_test (test_new),         cmocka_unit_test (test_held),
+    cmocka_unit_test (test_no_text),     cmocka_unit_test (test_expressions),
+    cmocka_unit_test (test_max_file),    cmocka_unit_test (test_names),
+    cmocka_unit_test (test_message),     cmocka_unit_test (test_new),
+    cmocka_unit_test (test_held),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -49,13 +49,9 @@ static void kinds_example (const pw_kind *k) {
 }
 
 static void kinds_signals (const pw_kind *k) {
-  static const char *const form[] = { "", "{expression: .., rate: .., acceleration: ..}",
-                                      "{expression: .., rate: ..}" };
   if (k->signals == 0) return;
-  if (pw_kind_forced (k))
-    puts ("    a signal: a number, an expression of t and of states such as BODY.phi, or see `pinwheel list signals`");
-  else
-    printf ("    a signal: a number, %s of t, or see `pinwheel list signals`\n", form[k->level]);
+  printf ("    a signal: a number, an expression of t%s, or see `pinwheel list signals`\n",
+          pw_kind_forced (k) ? " and of states such as BODY.phi" : "");
 }
 
 static void kinds_quantities (pw_list_rows *rows, const char *title, const pw_quantity *q, int count) {

@@ -118,26 +118,12 @@ static void show_element (const pw_element *e) {
 
 /* ---- Derivatives without a formula ---- */
 
-static void show_difference (const char *text, int *shown) {
-  if (!(*shown)++) puts ("\nDerivatives by differences, for implicit methods and linearisation");
-  printf ("  %s\n", text);
-}
-
-/* Blocks of kinds that leave them to Pinwheel, and forces whose functions do. */
-static void show_differences (const pw_cli_model *x) {
+/* Blocks of kinds that leave them to Pinwheel. */
+static void show_differences (const pw_system *s) {
   char text[300];
-  int shown = 0;
-  for (int i = 0; i < pw_count_differences (x->system); i++)
-    show_difference (pw_difference_name (x->system, i, text, sizeof text), &shown);
-  for (const pw_element *e = x->model->element; e < x->model->element + x->model->elements; e++)
-    for (const pw_field *f = e->kind->fields; f->name; f++) {
-      const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
-      for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++) {
-        if (s[i].type != PW_FUNCTION || !s[i].function.differenced) continue;
-        snprintf (text, sizeof text, "%s %s: %s, by the states it reads", e->kind->name, pw_element_name (e), f->name);
-        show_difference (text, &shown);
-      }
-    }
+  int count = pw_count_differences (s);
+  if (count) puts ("\nDerivatives by differences, for implicit methods and linearisation");
+  for (int i = 0; i < count; i++) printf ("  %s\n", pw_difference_name (s, i, text, sizeof text));
 }
 
 /* ---- Parameters and the rest ---- */
@@ -198,7 +184,7 @@ static void show_model (const pw_cli_model *m) {
   show_bodies (m);
   if (d->elements) puts ("\nElements");
   for (int i = 0; i < d->elements; i++) show_element (&d->element[i]);
-  show_differences (m);
+  show_differences (m->system);
   show_parameters (d);
   show_defaults (d->table);
   show_truth (m);
