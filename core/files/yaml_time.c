@@ -42,7 +42,7 @@ static int time_eval (void *context, double t, const double *x, double value[3],
     value[0] = pw_expression_value (f->x[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
     pw_expression_derivatives (f->x[0], variable, 1 + i, u);
-    gradient[i] = u[1];
+    gradient[i] = isfinite (u[1]) ? u[1] : 0; /* |v| at rest has none; it only guides Newton's iteration */
   }
   return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
 }

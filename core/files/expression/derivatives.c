@@ -11,17 +11,15 @@
 
 typedef struct {
   double v, d, dd;
+  int on; /* 1: it depends on the variable */
 } jet;
 
-/* What does not change has no part in a derivative, be its slope infinite. */
-static inline double jet_times (double slope, double change) {
-  return change == 0 ? 0 : slope * change;
-}
-
+/* What does not depend on the variable has no part in a derivative, be its slope infinite. */
 static jet jet_chain (double f, const pw_slopes *s, const jet *x, const jet *y) {
-  jet r = { f, jet_times (s->x, x->d) + jet_times (s->y, y->d), 0 };
-  r.dd = jet_times (s->xx, x->d * x->d) + jet_times (s->xy, 2 * x->d * y->d) + jet_times (s->yy, y->d * y->d) +
-         jet_times (s->x, x->dd) + jet_times (s->y, y->dd);
+  jet r = { f, 0, 0, x->on | y->on };
+  if (x->on) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;
+  if (y->on) r.d += s->y * y->d, r.dd += s->yy * y->d * y->d + s->y * y->dd;
+  if (x->on && y->on) r.dd += 2 * s->xy * x->d * y->d;
   return r;
 }
 
@@ -35,7 +33,7 @@ static inline int jet_sign (const jet *x) {
 /* How two will compare just after. */
 static int jet_order (const jet *x, const jet *y) {
   if (x->v != y->v) return x->v < y->v ? -1 : x->v > y->v ? 1 : 2;
-  jet less = { 0, x->d - y->d, x->dd - y->dd };
+  jet less = { 0, x->d - y->d, x->dd - y->dd, 1 };
   return jet_sign (&less);
 }
 
@@ -48,14 +46,14 @@ static double jet_step (int op, double x, int way) {
 }
 
 static jet jet_broken (int op, const jet *x, double *discrete) {
-  const jet change = { 0, x->d, x->dd };
+  const jet change = { 0, x->d, x->dd, x->on };
   int sign = jet_sign (x);
   *discrete = op == PW_OP_ABS || op == PW_OP_SIGN ? sign : jet_step (op, x->v, jet_sign (&change));
-  return op == PW_OP_ABS ? (jet){ fabs (x->v), sign * x->d, sign * x->dd } : (jet){ .v = *discrete };
+  return op == PW_OP_ABS ? (jet){ fabs (x->v), sign * x->d, sign * x->dd, x->on } : (jet){ .v = *discrete };
 }
 
 static jet jet_plus (const jet *x, double factor, const jet *y) {
-  return (jet){ x->v + factor * y->v, x->d + factor * y->d, x->dd + factor * y->dd };
+  return (jet){ x->v + factor * y->v, x->d + factor * y->d, x->dd + factor * y->dd, x->on | y->on };
 }
 
 /* x - q y; q is read off the remainder, so that both jump together. */
@@ -74,11 +72,11 @@ static jet jet_mod (const jet *x, const jet *y, double *q) {
 
 static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete) {
   static const jet none = { 0 };
-  if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd };
+  if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->on };
   if (c->op == PW_OP_ONE) {
     const pw_expression_function *f = &pw_expression_functions[c->which];
     double value = f->one (x->v);
-    if (x->d == 0 && x->dd == 0) return (jet){ .v = value };
+    if (!x->on) return (jet){ .v = value };
     pw_slopes s = f->slopes (x->v, 0, value);
     return jet_chain (value, &s, x, &none);
   }
@@ -86,13 +84,12 @@ static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete)
 }
 
 static jet jet_product (const jet *x, const jet *y) {
-  return (jet){ x->v * y->v, jet_times (y->v, x->d) + jet_times (x->v, y->d),
-                jet_times (y->v, x->dd) + 2 * jet_times (x->d, y->d) + jet_times (x->v, y->dd) };
+  return (jet){ x->v * y->v, y->v * x->d + x->v * y->d, y->v * x->dd + 2 * x->d * y->d + x->v * y->dd, x->on | y->on };
 }
 
 static jet jet_quotient (const jet *x, const jet *y) {
-  double f = x->v / y->v, d = (x->d - jet_times (f, y->d)) / y->v;
-  return (jet){ f, d, (x->dd - 2 * jet_times (d, y->d) - jet_times (f, y->dd)) / y->v };
+  double f = x->v / y->v, d = (x->d - f * y->d) / y->v;
+  return (jet){ f, d, (x->dd - 2 * d * y->d - f * y->dd) / y->v, x->on | y->on };
 }
 
 static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y) {
@@ -158,7 +155,8 @@ void pw_expression_run_jet (const pw_expression_code *code, int codes, const dou
     double discrete = 0;
     top -= operands;
     if (operands == 0)
-      *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value } : (jet){ variable[c->which], c->which == by, 0 };
+      *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }
+                                     : (jet){ variable[c->which], c->which == by, 0, c->which == by };
     else if (operands == 1)
       *top = jet_one (c, top, &discrete);
     else
