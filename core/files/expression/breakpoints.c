@@ -224,11 +224,7 @@ static range range_two (const pw_expression_code *c, const range *x, const range
 
 /* Of numbers that are known the operation itself gives the value; what was equal stays equal. */
 static range range_known (const pw_expression_code *c, const range *x, int operands) {
-  pw_expression_code code[3];
-  int tie = 0;
-  for (int i = 0; i < operands; i++) code[i] = (pw_expression_code){ PW_OP_CONSTANT, 0, x[i].lo };
-  code[operands] = *c;
-  double value = pw_expression_run (code, operands + 1, NULL, &tie);
+  double value = pw_expression_apply (c, x[0].lo, x[operands - 1].lo);
   return isnan (value) ? range_any : (range){ value, value, 0, 0 };
 }
 

@@ -76,7 +76,6 @@ static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete)
   if (c->op == PW_OP_ONE) {
     const pw_expression_function *f = &pw_expression_functions[c->which];
     double value = f->one (x->v);
-    if (!x->on) return (jet){ .v = value };
     pw_slopes s = f->slopes (x->v, 0, value);
     return jet_chain (value, &s, x, &none);
   }
@@ -92,11 +91,16 @@ static jet jet_quotient (const jet *x, const jet *y) {
   return (jet){ f, d, (x->dd - 2 * d * y->d - f * y->dd) / y->v, x->on | y->on };
 }
 
+static jet jet_power (const jet *x, const jet *y) {
+  double value = pw_expression_power (x->v, y->v);
+  pw_slopes s = pw_expression_power_slopes (x->v, y->v, value, y->on);
+  return jet_chain (value, &s, x, y);
+}
+
 static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y) {
   const pw_expression_function *f = &pw_expression_functions[c->which];
-  int power = c->op == PW_OP_POWER;
-  double value = power ? pw_expression_power (x->v, y->v) : f->two (x->v, y->v);
-  pw_slopes s = (power ? pw_expression_power_slopes : f->slopes) (x->v, y->v, value);
+  double value = f->two (x->v, y->v);
+  pw_slopes s = f->slopes (x->v, y->v, value);
   return jet_chain (value, &s, x, y);
 }
 
@@ -120,6 +124,7 @@ static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, dou
   case PW_OP_DIVIDE:
     return jet_quotient (x, y);
   case PW_OP_POWER:
+    return jet_power (x, y);
   case PW_OP_TWO:
     return jet_function (c, x, y);
   case PW_OP_ATAN2:
@@ -157,10 +162,12 @@ void pw_expression_run_jet (const pw_expression_code *code, int codes, const dou
     if (operands == 0)
       *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }
                                      : (jet){ variable[c->which], c->which == by, 0, c->which == by };
-    else if (operands == 1)
-      *top = jet_one (c, top, &discrete);
+    else if (operands == 3)
+      *top = top[0].v != 0 ? top[1] : top[2];
+    else if (!top[0].on && !top[operands - 1].on)
+      *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
     else
-      *top = operands == 2 ? jet_two (c, top, top + 1, &discrete) : top[0].v != 0 ? top[1] : top[2];
+      *top = operands == 1 ? jet_one (c, top, &discrete) : jet_two (c, top, top + 1, &discrete);
     if (signature && pw_expression_breaks (c->op)) jet_note (signature, discrete);
     top++;
   }

@@ -16,19 +16,6 @@ static inline double value_jump (int op, double x, int *tie) {
   return y;
 }
 
-static inline double value_one (const pw_expression_code *c, double x, int *tie) {
-  switch (c->op) {
-  case PW_OP_NEGATE:
-    return -x;
-  case PW_OP_ABS:
-    return fabs (x);
-  case PW_OP_ONE:
-    return pw_expression_functions[c->which].one (x);
-  default:
-    return value_jump (c->op, x, tie);
-  }
-}
-
 static double value_mod (double a, double b, int *tie) {
   double r = pw_expression_mod (a, b);
   if (r == 0) *tie = 1;
@@ -40,50 +27,64 @@ static double value_atan2 (double y, double x, int *tie) {
   return atan2 (y, x);
 }
 
-static inline double value_two (const pw_expression_code *c, double a, double b, int *tie) {
+/* Of two numbers, the second being x; of one, x. */
+static inline double value_of (const pw_expression_code *c, double a, double x, int *tie) {
   switch (c->op) {
+  case PW_OP_NEGATE:
+    return -x;
+  case PW_OP_ABS:
+    return fabs (x);
+  case PW_OP_ONE:
+    return pw_expression_functions[c->which].one (x);
   case PW_OP_ADD:
-    return a + b;
+    return a + x;
   case PW_OP_SUBTRACT:
-    return a - b;
+    return a - x;
   case PW_OP_MULTIPLY:
-    return a * b;
+    return a * x;
   case PW_OP_DIVIDE:
-    return a / b;
+    return a / x;
   case PW_OP_POWER:
-    return pw_expression_power (a, b);
+    return pw_expression_power (a, x);
   case PW_OP_AND:
-    return a != 0 && b != 0;
+    return a != 0 && x != 0;
   case PW_OP_OR:
-    return a != 0 || b != 0;
+    return a != 0 || x != 0;
   case PW_OP_MIN:
-    return fmin (a, b);
+    return fmin (a, x);
   case PW_OP_MAX:
-    return fmax (a, b);
+    return fmax (a, x);
   case PW_OP_MOD:
-    return value_mod (a, b, tie);
+    return value_mod (a, x, tie);
   case PW_OP_ATAN2:
-    return value_atan2 (a, b, tie);
+    return value_atan2 (a, x, tie);
   case PW_OP_TWO:
-    return pw_expression_functions[c->which].two (a, b);
-  default:
-    return pw_expression_truth (c->op, value_order (a, b, tie));
+    return pw_expression_functions[c->which].two (a, x);
   }
+  if (pw_expression_operands (c->op) == 1) return value_jump (c->op, x, tie);
+  return pw_expression_truth (c->op, value_order (a, x, tie));
 }
 
+double pw_expression_apply (const pw_expression_code *c, double a, double x) {
+  int tie;
+  return value_of (c, a, x, &tie);
+}
+
+/* x is the top of the stack. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *tie) {
-  double stack[PW_EXPRESSION_STACK], *top = stack;
-  for (const pw_expression_code *c = code, *end = code + codes; c < end; c++) {
-    int operands = pw_expression_operands (c->op);
-    top -= operands;
-    *top = operands == 2             ? value_two (c, top[0], top[1], tie)
-           : operands == 1           ? value_one (c, top[0], tie)
-           : operands == 3           ? top[0] != 0 ? top[1] : top[2]
-                     : c->op == PW_OP_VARIABLE ? variable[c->which]
-                                     : c->value;
-    top++;
-  }
-  return top[-1];
+  double stack[PW_EXPRESSION_STACK + 1], *top = stack, x = 0;
+  for (const pw_expression_code *c = code, *end = code + codes; c < end; c++)
+    if (c->op <= PW_OP_VARIABLE) {
+      *top++ = x;
+      x = c->op == PW_OP_CONSTANT ? c->value : variable[c->which];
+    } else if (c->op == PW_OP_SELECT) {
+      top -= 2;
+      x = top[0] != 0 ? top[1] : x;
+    } else {
+      double a = c->op >= PW_OP_ADD ? *--top : 0;
+      x = value_of (c, a, x, tie);
+    }
+  return x;
 }
 
 double pw_expression_value (const pw_expression *x, const double *variable) {

@@ -102,9 +102,9 @@ extern const pw_expression_constant_name pw_expression_constants[];
 /* The index of a function, or -1. */
 int pw_expression_find (const char *name);
 
-/* x^y, and its derivatives. */
+/* x^y, and its derivatives; by x alone unless y varies. */
 double pw_expression_power (double x, double y);
-pw_slopes pw_expression_power_slopes (double x, double y, double f);
+pw_slopes pw_expression_power_slopes (double x, double y, double f, int varies);
 /* The remainder with the sign of the divisor: an angle modulo 2 pi lies in [0, 2 pi). */
 double pw_expression_mod (double x, double y);
 
@@ -119,6 +119,9 @@ size_t pw_expression_number_size (const char *p);
 
 /* The value of operations; *tie becomes 1 where something is just about to jump. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *tie);
+
+/* The value of an operation of one number x, or of a and x. */
+double pw_expression_apply (const pw_expression_code *c, double a, double x);
 
 /* The value and derivatives; a checksum of all that only changes at breakpoints is added to *signature, unless it is NULL. */
 void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],

@@ -54,10 +54,15 @@ static double slopes_product (double a, double b) {
   return a == 0 ? 0 : a * b;
 }
 
-pw_slopes pw_expression_power_slopes (double x, double y, double f) {
-  double before = slopes_product (y, pow (x, y - 1)), l = log (x);
-  return (pw_slopes){ before, slopes_product (f, l), slopes_product (y * (y - 1), pow (x, y - 2)),
-                      slopes_product (before, l) + pow (x, y - 1), slopes_product (f, l * l) };
+pw_slopes pw_expression_power_slopes (double x, double y, double f, int varies) {
+  pw_slopes s = { .x = slopes_product (y, pw_expression_power (x, y - 1)),
+                  .xx = slopes_product (y * (y - 1), pw_expression_power (x, y - 2)) };
+  if (!varies) return s;
+  double l = log (x);
+  s.y = slopes_product (f, l);
+  s.xy = slopes_product (s.x, l) + pow (x, y - 1);
+  s.yy = slopes_product (f, l * l);
+  return s;
 }
 
 double pw_expression_mod (double x, double y) {
