@@ -12,7 +12,8 @@ int pw_run_blame (const pw_run *r, int status, pw_error *error) {
   if (status == PW_OK || error == NULL || *pw_failed_signal (r->s, signal, sizeof signal) == 0) return status;
   size_t n = strlen (error->text);
   const char *glue = strstr (error->text, "a signal failed") ? ":" : "; ahead";
-  snprintf (error->text + n, sizeof error->text - n, "%s %s is not a finite number", glue, signal);
+  const char *either = r->s->failed->forced ? "" : ", or a derivative of it,";
+  snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", glue, signal, either);
   return status;
 }
 

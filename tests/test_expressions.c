@@ -131,6 +131,24 @@ static void test_gradient (void **state) {
   scene_close (&x);
 }
 
+/* A derivative without a value stops the run with its reason; one that is given in its place does not. */
+static void test_no_derivative (void **state) {
+  static const char *const value[] = { "sqrt(t^4)", "{expression: sqrt(t^4), rate: 2*t, acceleration: 2}" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_error error = { 0 };
+    scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: @}\n", value[i]);
+    pw_run *r = pw_open (x.system, "rk4+projection", &(pw_settings){ .step = 0.1 }, &error);
+    if (i == 0)
+      check_error (&error, PW_METHOD,
+                   "t = 0 s: a signal failed: drive D: value, or a derivative of it, is not a finite number");
+    else
+      check_close ("angle", runs_to (r, 2).q[2], 4, 1e-13, "round-off");
+    pw_close (r);
+    scene_close (&x);
+  }
+}
+
 static int setup (void **state) {
   (void)state;
   int file = mkstemps (path, 5);
@@ -144,6 +162,6 @@ static int teardown (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_push), cmocka_unit_test (test_built_in),
-                                      cmocka_unit_test (test_gradient) };
+                                      cmocka_unit_test (test_gradient), cmocka_unit_test (test_no_derivative) };
   return cmocka_run_group_tests (tests, setup, teardown);
 }

@@ -304,7 +304,7 @@ static double search_first (search *s, double a, double b) {
 /* Where too much has been looked at, a breakpoint that is none makes the search go on from there. */
 double pw_expression_breakpoint (const pw_expression *x, double t) {
   const double latest = 1e18;
-  search s = { x, t, 40000, 0, 0x1p-36 };
+  search s = { x, t, 400 + 4000000 / (100 + x->codes), 0, 0x1p-36 };
   double a = t, found = INFINITY;
   if (!x->breaks) return INFINITY;
   for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {

@@ -160,7 +160,8 @@ static parser_part parser_emit (parser *p, parser_part part, int depends, int op
     p->code[part.first] = (pw_expression_code){ PW_OP_CONSTANT, 0, value };
   }
   if (pw_expression_breaks (op) && part.depends & ON_TIME) p->breaks = 1;
-  if (pw_expression_jumps (op) && part.depends & ON_STATES && p->jump == NULL) {
+  int point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* it jumps and jumps back */
+  if (pw_expression_jumps (op) && !point && part.depends & ON_STATES && p->jump == NULL) {
     p->jump = p->text + part.from;
     p->jump_size = (int)(p->end - part.from);
   }
