@@ -149,6 +149,17 @@ static void test_no_derivative (void **state) {
   }
 }
 
+/* Constraints take what is continuous where it breaks, however fast it changes; what is not is refused (tests/bad-models). */
+static void test_continuous (void **state) {
+  static const char *const value[] = { "t < 1 ? t^3 : 3*t - 2",        "abs(sin(3*t))^3",           "max(0, t - 1)^2",
+                                       "sin(1e9*t) + max(0, t - 1)^2", "1e8*max(0, t - 1)^3 + 1e8", "t > 5 || 1" };
+  (void)state;
+  for (size_t i = 0; i < sizeof value / sizeof *value; i++) {
+    scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: \"@\"}\n", value[i]);
+    scene_close (&x);
+  }
+}
+
 static int setup (void **state) {
   (void)state;
   int file = mkstemps (path, 5);
@@ -162,6 +173,7 @@ static int teardown (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_push), cmocka_unit_test (test_built_in),
-                                      cmocka_unit_test (test_gradient), cmocka_unit_test (test_no_derivative) };
+                                      cmocka_unit_test (test_gradient), cmocka_unit_test (test_continuous),
+                                      cmocka_unit_test (test_no_derivative) };
   return cmocka_run_group_tests (tests, setup, teardown);
 }

@@ -174,8 +174,10 @@ static int time_continuous (time_reader *r, int levels) {
     if (t == INFINITY) return PW_OK;
     time_derivatives (r->f, &(double){ nextafter (t, -INFINITY) }, before);
     time_derivatives (r->f, &t, after);
+    double between = t - nextafter (t, -INFINITY);
     for (int i = 0; i < levels; i++)
-      if (fabs (after[i] - before[i]) > 1e-9 * time_size (r->f, t, i))
+      if (fabs (after[i] - before[i]) >
+          1e-9 * time_size (r->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
         return pw_yaml_fail (r->b->y, r->node->at, r->error,
                              "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not", r->what, name[i],
                              before[i], after[i], t, levels > 1 ? "a prescribed position" : "a velocity constraint");
