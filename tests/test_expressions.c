@@ -133,9 +133,10 @@ static void test_gradient (void **state) {
 
 /* A derivative without a value stops the run with its reason; one that is given in its place does not. */
 static void test_no_derivative (void **state) {
-  static const char *const value[] = { "sqrt(t^4)", "{expression: sqrt(t^4), rate: 2*t, acceleration: 2}" };
+  static const char *const value[] = { "sqrt(t^4)", "{expression: sqrt(t^4), rate: 2*t, acceleration: 2}",
+                                       "{expression: sqrt(t^4), rate: 2*t}" };
   (void)state;
-  for (int i = 0; i < 2; i++) {
+  for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
     scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: @}\n", value[i]);
     pw_run *r = pw_open (x.system, "rk4+projection", &(pw_settings){ .step = 0.1 }, &error);

@@ -17,7 +17,7 @@ LAYOUT (pw_error, 504);
 LAYOUT (pw_function, 56);
 LAYOUT (pw_signal, 64);
 LAYOUT (pw_signal_text, 32);
-LAYOUT (pw_body, 72);
+LAYOUT (pw_body, 80);
 LAYOUT (pw_parameter, 48);
 LAYOUT (pw_run_defaults, 32);
 LAYOUT (pw_plugin_table, 88);
