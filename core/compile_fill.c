@@ -222,17 +222,16 @@ static double compile_length (const pw_compilation *c) {
   return L > 0 ? L : 1;
 }
 
-/* M, and where it is zero 1e-6 of the mean mass, times L^2 for angles; without any mass 1 and L^2. */
+/* M, and where it is zero 1e-6 of the mean of its entries, angles in units of L: the same in all units, and whether mass or
+ * inertia is missing. */
 static void compile_metric (pw_system *s) {
   double sum = 0, L2 = s->scale.length * s->scale.length;
   int massive = 0;
-  for (int b = 0; b < s->bodies; b++)
-    if (s->mass[3 * b] > 0) sum += s->mass[3 * b], massive++;
+  for (int j = 0; j < s->coords; j++)
+    if (s->mass[j] > 0) sum += s->mass[j] / (pw_is_angle (s, j) ? L2 : 1), massive++;
   double weight = massive ? 1e-6 * sum / massive : 1;
-  for (int j = 0; j < s->coords; j++) {
-    int angle = pw_is_angle (s, j);
-    s->metric[j] = s->mass[j] > 0 ? s->mass[j] : angle ? weight * L2 : weight;
-  }
+  for (int j = 0; j < s->coords; j++)
+    s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
 }
 
 /* ---- */

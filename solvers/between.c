@@ -13,7 +13,7 @@ int pw_between_open (pw_between *b, pw_run *r, int rates, pw_error *error) {
   };
   b->memory = pw_take_arrays (array, sizeof array / sizeof *array);
   if (b->memory == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  return pw_projector_open (&b->projector, r, r->s->metric, NULL, error);
+  return pw_projector_open (&b->projector, r, NULL, NULL, error);
 }
 
 void pw_between_close (pw_between *b) {

@@ -185,7 +185,8 @@ void pw_rank_coefficients (pw_run *r, int i);
 /* ---- Projection ---- */
 
 typedef struct {
-  pw_saddle *position;         /* metric of the positions, holonomic rows */
+  pw_saddle *position;         /* metric of the positions, holonomic rows; or the run's */
+  int own_position;            /* position is not the run's saddle */
   pw_saddle *velocity;         /* all rows */
   int own_velocity;            /* velocity is not the run's saddle */
   double *scratch;             /* 3 rows + coords */
@@ -195,7 +196,7 @@ typedef struct {
   int against;                 /* a redundant row that the last position projection left open, or -1 */
 } pw_projector;
 
-/* Position metric `weight_q` and velocity metric `weight_v` (NULL: the run's own saddle with the mass matrix).  The
+/* Position metric `weight_q` and velocity metric `weight_v` (NULL: the mass matrix).  The
  * system must be placed at a typical pose with J swept. */
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error);
 /* The same with the metric that the method's options ask for. */
@@ -213,9 +214,9 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
  * J v = eta to round-off may be left as they are. */
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda);
 
-/* Takes from an error of positions or rates what a projection onto the first so many rows removes.  The run's saddle is
- * factorised at the placed pose. */
-void pw_project_error (pw_run *r, double *e, int rows);
+/* Takes from an error of positions or velocities what a projection onto the first so many rows removes, in the metric of the
+ * saddle `k` (all rows), which is factorised at the placed configuration. */
+void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
 
 /* ---- Start ---- */
 

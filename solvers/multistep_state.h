@@ -30,6 +30,7 @@ struct pw_method_data {
   SUNNonlinearSolver iteration; /* Adams */
   pw_multistep_newton newton;   /* BDF */
   double *q, *v, *a, *lambda;   /* scratch: coords + 3 each, rows */
+  double *error;                /* scratch: 2 coords */
   int settled;                  /* 1: the accelerations of the state reached are its own */
   double stop;                  /* the stop time CVODES knows */
   double begun;                 /* time of the start or the last restart */

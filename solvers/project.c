@@ -10,6 +10,16 @@
 #include <stdlib.h>
 #include "method.h"
 
+/* In the mass matrix massless coordinates take no part in what is smallest: the rows determine them, here as in the
+ * accelerations, and coordinates with mass do not move because of them.  Where the holonomic rows do not determine all of
+ * them, all rows do: the change of positions is then one that the nonholonomic rows allow. */
+static pw_saddle *project_by_mass (pw_run *r, pw_error *error) {
+  pw_error none = { 0 };
+  pw_saddle *k = pw_saddle_open (r->s, r->s->mass, r->s->holonomic, r->active, &none);
+  if (none.status == PW_MACHINE) pw_fail (error, PW_MACHINE, "%s", none.text);
+  return k || none.status == PW_MACHINE ? k : r->saddle;
+}
+
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error) {
   pw_system *s = r->s;
   *p = (pw_projector){
@@ -17,7 +27,9 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
   };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
   if (p->scratch == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  p->position = pw_saddle_open (s, weight_q, s->holonomic, r->active, error);
+  p->position =
+      weight_q ? pw_saddle_open (s, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
+  p->own_position = p->position != r->saddle;
   if (p->own_velocity) p->velocity = pw_saddle_open (s, weight_v, s->rows, r->active, error);
   if (p->position && p->velocity) return PW_OK;
   pw_projector_close (p);
@@ -29,7 +41,7 @@ const char *const pw_metrics[] = { "mass", "identity", NULL };
 /* The identity metric weighs metres and radians alike, as the plain pseudo-inverse does. */
 int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error) {
   pw_system *s = r->s;
-  if (pw_option_value (r, "metric") == 0) return pw_projector_open (p, r, s->metric, NULL, error);
+  if (pw_option_value (r, "metric") == 0) return pw_projector_open (p, r, NULL, NULL, error);
   double *one = malloc ((size_t)s->coords * sizeof *one);
   if (one == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   for (int j = 0; j < s->coords; j++) one[j] = 1;
@@ -39,7 +51,7 @@ int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error) {
 }
 
 void pw_projector_close (pw_projector *p) {
-  pw_saddle_close (p->position);
+  if (p->own_position) pw_saddle_close (p->position);
   if (p->own_velocity) pw_saddle_close (p->velocity);
   free (p->scratch);
   *p = (pw_projector){ 0 };
@@ -87,7 +99,7 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
     pw_sweep_J (s);
     r->statistics.factorisations++;
     if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;
-    for (int i = 0; i < s->holonomic; i++) g[i] = -g[i];
+    for (int i = 0; i < s->rows; i++) g[i] = i < s->holonomic ? -g[i] : 0;
     pw_saddle_solve (p->position, NULL, g, dq, mu);
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
@@ -153,11 +165,11 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
 }
 
 /* e += W^-1 J^T ..., J e = 0 */
-void pw_project_error (pw_run *r, double *e, int rows) {
+void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows) {
   pw_system *s = r->s;
   double *right = r->scratch, *mu = right + s->rows, *de = mu + s->rows;
   pw_mul_J (s, e, right);
   for (int i = 0; i < s->rows; i++) right[i] = i < rows ? -right[i] : 0;
-  pw_saddle_solve (r->saddle, NULL, right, de, mu);
+  pw_saddle_solve (k, NULL, right, de, mu);
   for (int j = 0; j < s->coords; j++) e[j] += de[j];
 }
