@@ -101,7 +101,7 @@ static int compile_count (pw_compilation *c, pw_error *error) {
 static void compile_layout_slab (const pw_compilation *c, pw_layout *l, pw_slab *k, int i) {
   const pw_kind *kind = c->kind[i];
   size_t n = (size_t)c->count[i], cols = (size_t)(3 * kind->bodies + kind->own);
-  size_t block = cols > 3 ? cols : 3;
+  size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3;
   void *element = pw_take (l, n, kind->element);
   void *body = pw_take (l, n * (size_t)kind->bodies, sizeof (int)),
        *column = pw_take (l, n * (size_t)kind->bodies, sizeof (int));

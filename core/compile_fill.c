@@ -248,6 +248,7 @@ int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_
     s->constraints += kind->rows > 0;
     s->moving += kind->eta != NULL;
     if (kind->force && !kind->constant) s->force[s->forces++] = &s->slab[i];
+    s->saturates |= kind->saturation != NULL;
   }
   pw_sweep_constant (s);
   return PW_OK;

@@ -52,8 +52,8 @@ static const char *fault_fields (const pw_kind *k, char *buffer, size_t size) {
 }
 
 static const char *fault_sweeps (const pw_kind *k) {
-  pw_sweep *const exact[] = { k->g,       k->g_size, k->eta,   k->J,    k->gamma,  k->force,
-                              k->force_u, k->energy, k->power, k->loss, k->contact };
+  pw_sweep *const exact[] = { k->g,       k->g_size, k->eta,   k->J,    k->gamma,   k->force,
+                              k->force_u, k->energy, k->power, k->loss, k->contact, k->saturation };
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
     if (exact[i] == pw_by_differences) return "PW_BY_DIFFERENCES stands in another place than a second-order block's";
   if (k->constant && (k->force == NULL || k->signals > 0)) return "a constant force that is none, or has signals";

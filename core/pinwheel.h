@@ -585,6 +585,9 @@ struct pw_kind {
   void (*J_gamma) (const pw_batch *b, double *J, double *gamma);
   pw_sweep *force;   /* cols: generalised force */
   pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
+  /* 2 cols: a force that saturates, such as friction; by how much each coordinate, then each velocity, may change until the
+   * force has changed by its own size.  INFINITY, already there, where it does not saturate.  NULL: nowhere. */
+  pw_sweep *saturation;
   pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch */
   pw_sweep *jtl_q;   /* cols x cols: derivative of J^T lambda by q, lambda given in the batch */
   pw_sweep *eta_q;   /* rows x cols */

@@ -44,6 +44,7 @@ struct pw_system {
   int bodies, coords, rows, holonomic, slabs, entries;
   int constraints;         /* slabs with rows */
   int forces;              /* slabs with a force that is not constant */
+  int saturates;           /* 1: some of these have a sweep `saturation` */
   pw_slab **force;         /* which */
   int sources;             /* signals */
   int readers;             /* function signals that read states */
@@ -106,6 +107,9 @@ void pw_sweep_g_size (pw_system *s, double *size);   /* not below the length sca
 void pw_sweep_eta (pw_system *s, double *eta);
 void pw_sweep_gamma (pw_system *s, double *gamma);
 void pw_sweep_force (pw_system *s, double *f);
+/* The least of what the placed elements' forces saturate within, by coordinate, then by velocity: 2 (coords + 3); INFINITY
+ * where none does.  Returns 0, and leaves `least` alone, if no kind of the scene has it. */
+void pw_sweep_saturation (pw_system *s, double *least);
 void pw_sweep_constant (pw_system *s); /* the part of f that never changes; done by pw_compile */
 double pw_potential (pw_system *s);
 double pw_kinetic (const pw_system *s, const double *v);

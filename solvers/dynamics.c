@@ -112,3 +112,11 @@ void pw_note_residuals (pw_run *r) {
   s->g = pw_larger (s->g, now->g);
   s->jv = pw_larger (s->jv, now->jv);
 }
+
+/* A single error as large as its tolerance times the square root of their number passes. */
+void pw_bound_tolerances (pw_run *r) {
+  int n = r->s->coords;
+  if (!r->s->saturates) return;
+  pw_sweep_saturation (r->s, r->saturation);
+  for (int j = 0; j < 2 * (n + 3); j++) r->saturation[j] *= 0.1 / sqrt (2 * n);
+}

@@ -76,11 +76,11 @@ static double ida_force (const pw_run *r) {
 static int ida_weights (N_Vector vy, N_Vector weights, void *user) {
   ida_data *d = user;
   const pw_run *r = d->run;
-  const double *y = N_VGetArrayPointer (vy), rtol = r->settings.rtol;
+  const double *y = N_VGetArrayPointer (vy);
   double *w = N_VGetArrayPointer (weights);
   for (int j = 0; j < d->n; j++) {
-    w[j] = 1 / (rtol * fabs (y[j]) + pw_atol (r, j));
-    w[d->n + j] = 1 / (rtol * fabs (y[d->n + j]) + pw_atol_rate (r, j));
+    w[j] = 1 / pw_tolerance (r, j, y[j]);
+    w[d->n + j] = 1 / pw_tolerance_rate (r, j, y[d->n + j]);
   }
   ida_weigh_multipliers (d, y, ida_force (r), w);
   return 0;
@@ -142,6 +142,7 @@ static int ida_open_solver (ida_data *d) {
   if (flag == IDA_SUCCESS) flag = IDASetId (d->ida, d->id);
   if (flag == IDA_SUCCESS) flag = IDASetSuppressAlg (d->ida, 1);
   if (flag == IDA_SUCCESS) flag = IDASetMaxNumSteps (d->ida, -1);
+  if (flag == IDA_SUCCESS) flag = IDASetMaxConvFails (d->ida, PW_SUN_ATTEMPTS);
   if (flag == IDA_SUCCESS) flag = IDASetInitStep (d->ida, pw_first_step (d->run));
   if (flag == IDA_SUCCESS) flag = IDASetLinearSolver (d->ida, d->solver, d->matrix);
   if (flag == IDA_SUCCESS) flag = IDASetJacFn (d->ida, pw_ida_matrix);
@@ -252,6 +253,7 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   if (flag == IDA_TSTOP_RETURN) d->stop = NAN;
   ida_read (d, r->q, r->v, r->a, r->lambda);
   if (pw_ida_place (d, r->t, N_VGetArrayPointer (d->y)) != 0) return ida_fail (d, IDA_RES_FAIL, error);
+  pw_bound_tolerances (r);
   int status = ida_multipliers (d, r->v, r->a_at, r->lambda);
   if (status < 0) return ida_fail (d, IDA_RES_FAIL, error);
   r->near = status != PW_OK || pw_saddle_below (r->saddle, r->watch);

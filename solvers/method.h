@@ -54,6 +54,7 @@ struct pw_run {
 
   double energy0;  /* kinetic + potential at the start */
   double *scratch; /* 2 (coords + 3) + 3 rows */
+  double *saturation; /* 2 (coords + 3): tolerances are not above; INFINITY: any */
   double *q_given, *v_given;
   pw_start_report start;
   pw_statistics statistics;
@@ -69,6 +70,16 @@ static inline double pw_atol (const pw_run *r, int j) {
 }
 static inline double pw_atol_rate (const pw_run *r, int j) {
   return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->s->scale.time;
+}
+/* Takes over how small a change of the placed state reverses a force that saturates (pw_sweep_saturation). */
+void pw_bound_tolerances (pw_run *r);
+/* The tolerances of coordinate j and of its velocity at a value, for methods that iterate: not above what a force saturates
+ * within, or an iteration would end anywhere between the force and its opposite. */
+static inline double pw_tolerance (const pw_run *r, int j, double q) {
+  return fmin (r->settings.rtol * fabs (q) + pw_atol (r, j), r->saturation[j]);
+}
+static inline double pw_tolerance_rate (const pw_run *r, int j, double v) {
+  return fmin (r->settings.rtol * fabs (v) + pw_atol_rate (r, j), r->saturation[r->s->coords + 3 + j]);
 }
 /* 1 if the run takes steps of the given size. */
 int pw_fixed_steps (const pw_run *r);

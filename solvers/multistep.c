@@ -45,11 +45,11 @@ static int multistep_work (pw_real t, N_Vector y, N_Vector rate, void *data) {
 static int multistep_weights (N_Vector vy, N_Vector weights, void *data) {
   const multistep_data *d = data;
   const pw_run *r = d->run;
-  const double *y = N_VGetArrayPointer (vy), rtol = r->settings.rtol;
+  const double *y = N_VGetArrayPointer (vy);
   double *w = N_VGetArrayPointer (weights);
   for (int j = 0; j < d->n; j++) {
-    w[j] = 1 / (rtol * fabs (y[j]) + pw_atol (r, j));
-    w[d->n + j] = 1 / (rtol * fabs (y[d->n + j]) + pw_atol_rate (r, j));
+    w[j] = 1 / pw_tolerance (r, j, y[j]);
+    w[d->n + j] = 1 / pw_tolerance_rate (r, j, y[d->n + j]);
   }
   return 0;
 }
@@ -155,9 +155,11 @@ static int multistep_open_solver (multistep_data *d, int formula) {
   if (flag == CV_SUCCESS) flag = CVodeInit (d->cvode, multistep_rates, r->t, d->y);
   if (flag == CV_SUCCESS) flag = CVodeWFtolerances (d->cvode, multistep_weights);
   if (flag == CV_SUCCESS) flag = CVodeSetMaxNumSteps (d->cvode, -1);
+  if (flag == CV_SUCCESS) flag = CVodeSetMaxConvFails (d->cvode, PW_SUN_ATTEMPTS);
   if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
+  if ((d->projects || r->s->saturates) && flag == CV_SUCCESS)
+    flag = CVodeSetNonlinConvCoef (d->cvode, MULTISTEP_ITERATED);
   if (d->projects) {
-    if (flag == CV_SUCCESS) flag = CVodeSetNonlinConvCoef (d->cvode, MULTISTEP_ITERATED);
     if (flag == CV_SUCCESS) flag = CVodeSetProjFn (d->cvode, multistep_correct);
     if (flag == CV_SUCCESS) flag = CVodeSetProjFrequency (d->cvode, (long)pw_option_value (r, "every"));
   }
@@ -247,6 +249,7 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   if (pw_place (r->s, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   pw_sweep_J (r->s);
+  pw_bound_tolerances (r);
   if (r->settings.ledger && r->s->entries > 0) {
     int flag = CVodeGetQuad (d->cvode, &work, d->work);
     if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);

@@ -28,6 +28,7 @@ int pw_run_evaluate (pw_run *r, pw_error *error) {
   if (status > 0) return pw_fail_singular (r, r->t, error);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (r->settings.ledger) pw_sweep_ledger (r->s, r->lambda, r->rate);
+  pw_bound_tolerances (r);
   return PW_OK;
 }
 

@@ -32,4 +32,9 @@ static inline double coulomb_slope (const coulomb *k, double w) {
   return k->viscous + k->limit * k->inverse * (1 - y * y);
 }
 
+/* The change of w, per one of what it depends on, that reverses the force; INFINITY without a limit. */
+static inline double coulomb_range (const coulomb *k, double w, double per) {
+  return per != 0 && k->inverse > 0 ? (1 / k->inverse + fabs (w)) / fabs (per) : INFINITY;
+}
+
 #endif

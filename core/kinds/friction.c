@@ -34,6 +34,13 @@ static void friction_force_v (const pw_batch *b, double *out) {
   }
 }
 
+static void friction_saturation (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 12) {
+    FRICTION_PARTS;
+    out[8] = out[11] = coulomb_range (k, w, 1);
+  }
+}
+
 static void friction_loss (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     FRICTION_PARTS;
@@ -63,5 +70,6 @@ const pw_kind pw_kind_friction = {
   .prepare = friction_prepare,
   .force = friction_force,
   .force_v = friction_force_v,
+  .saturation = friction_saturation,
   .loss = friction_loss,
 };

@@ -16,16 +16,16 @@ typedef struct {
   double limit; /* L [N m]; 0: none */
 } motor;
 
-/* The torque, and its slope dT/dy. */
+/* The torque, its slope dT/dy, and y. */
 typedef struct {
-  double T, slope;
+  double T, slope, y;
 } motor_state;
 
 static inline motor_state motor_at (const motor *k, const pw_pose *A, const pw_pose *B, const double *u) {
   double y = k->k * (u[0] - A->phi + B->phi) + k->c * (u[3] - A->omega + B->omega);
-  if (k->limit == 0) return (motor_state){ y, 1 };
+  if (k->limit == 0) return (motor_state){ y, 1, y };
   double x = tanh (y / k->limit);
-  return (motor_state){ k->limit * x, 1 - x * x };
+  return (motor_state){ k->limit * x, 1 - x * x, y };
 }
 
 #define MOTOR_PARTS                                                               \
@@ -77,6 +77,14 @@ static void motor_force_v (const pw_batch *b, double *out) {
   }
 }
 
+static void motor_saturation (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 12) {
+    MOTOR_PARTS;
+    if (k->limit > 0 && k->k > 0) out[2] = out[5] = (k->limit + fabs (x.y)) / k->k;
+    if (k->limit > 0 && k->c > 0) out[8] = out[11] = (k->limit + fabs (x.y)) / k->c;
+  }
+}
+
 static void motor_power (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     MOTOR_PARTS;
@@ -112,5 +120,6 @@ const pw_kind pw_kind_motor = {
   .force_u = motor_force_u,
   .force_q = motor_force_q,
   .force_v = motor_force_v,
+  .saturation = motor_saturation,
   .power = motor_power,
 };

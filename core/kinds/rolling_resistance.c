@@ -63,6 +63,15 @@ static void resistance_force_v (const pw_batch *b, double *out) {
   }
 }
 
+static void resistance_saturation (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    RESISTANCE_PARTS;
+    const double per[6] = { 0, 0, c * A->vy - s * A->vx, c, s, -k->aside };
+    for (int i = 0; i < 6; i++)
+      if (per[i] != 0 && k->limit > 0) out[i] = (k->speed + fabs (ve)) / fabs (per[i]);
+  }
+}
+
 static void resistance_loss (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     RESISTANCE_PARTS;
@@ -95,5 +104,6 @@ const pw_kind pw_kind_rolling_resistance = {
   .force = resistance_force,
   .force_q = resistance_force_q,
   .force_v = resistance_force_v,
+  .saturation = resistance_saturation,
   .loss = resistance_loss,
 };

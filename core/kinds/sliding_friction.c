@@ -58,6 +58,18 @@ static void sliding_force_v (const pw_batch *b, double *out) {
   }
 }
 
+static void sliding_saturation (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 12) {
+    SLIDING_PARTS;
+    double Hv[6];
+    line_curve (&s, 1, v, Hv);
+    for (int i = 0; i < 6; i++) {
+      out[i] = coulomb_range (&k->law, w, Hv[i]);
+      out[6 + i] = coulomb_range (&k->law, w, E[i]);
+    }
+  }
+}
+
 static void sliding_loss (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     SLIDING_PARTS;
@@ -92,5 +104,6 @@ const pw_kind pw_kind_sliding_friction = {
   .force = sliding_force,
   .force_q = sliding_force_q,
   .force_v = sliding_force_v,
+  .saturation = sliding_saturation,
   .loss = sliding_loss,
 };

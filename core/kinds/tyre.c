@@ -91,6 +91,20 @@ static void tyre_force_v (const pw_batch *b, double *out) {
   }
 }
 
+/* R along the heading, where the slip grows at rest; across it, with a limit, what takes the force to it and back. */
+static void tyre_saturation (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    TYRE_PARTS;
+    double R = sqrt (x.ve * x.ve + k->speed * k->speed), across = k->limit / k->stiffness * R + fabs (x.vn);
+    double vc = x.c * A->vx + x.s * A->vy, vs = x.c * A->vy - x.s * A->vx;
+    const double E[6] = { 0, 0, vs, x.c, x.s, -k->aside }, S[6] = { 0, 0, -vc, -x.s, x.c, k->along };
+    for (int i = 0; i < 6; i++) {
+      if (E[i] != 0) out[i] = R / fabs (E[i]);
+      if (S[i] != 0 && k->limit > 0) out[i] = fmin (out[i], across / fabs (S[i]));
+    }
+  }
+}
+
 static void tyre_loss (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     TYRE_PARTS;
@@ -133,6 +147,7 @@ const pw_kind pw_kind_tyre = {
   .force = tyre_force,
   .force_q = tyre_force_q,
   .force_v = tyre_force_v,
+  .saturation = tyre_saturation,
   .loss = tyre_loss,
   .contact = tyre_contact,
 };
