@@ -86,23 +86,6 @@ void pw_sweep_force (pw_system *s, double *f) {
   for (pw_slab **k = s->force, **end = k + s->forces; k < end; k++) evaluate_add_force (*k, f);
 }
 
-static void evaluate_least (const pw_system *s, const pw_slab *k, double *least) {
-  int cols = k->b.cols;
-  for (int n = 0; n < k->b.count * 2 * cols; n++) k->block[n] = INFINITY;
-  k->kind->saturation (&k->b, k->block);
-  for (int n = 0; n < k->b.count * 2 * cols; n++) {
-    int part = n % (2 * cols), rate = part >= cols;
-    double *to = least + pw_global (k, n / (2 * cols), part - rate * cols) + rate * (s->coords + 3);
-    *to = fmin (*to, k->block[n]);
-  }
-}
-
-void pw_sweep_saturation (pw_system *s, double *least) {
-  for (int j = 0; j < 2 * (s->coords + 3); j++) least[j] = INFINITY;
-  for (pw_slab **k = s->force, **end = k + s->forces; k < end; k++)
-    if ((*k)->kind->saturation) evaluate_least (s, *k, least);
-}
-
 void pw_sweep_constant (pw_system *s) {
   memset (s->constant, 0, (size_t)s->coords * sizeof *s->constant);
   for (int i = 0; i < s->slabs; i++)

@@ -189,6 +189,43 @@ static void selftest_rest (pw_probe *x) {
   memcpy (x->v, v, sizeof v);
 }
 
+/* ---- Saturation ---- */
+
+/* By how much the force of element e changes from `rest` as local velocity c goes from 0 to v. */
+static double selftest_change (pw_probe *x, int e, int c, double v, const double *rest) {
+  double force[PW_PROBE_OUT + PW_PROBE_GUARD], change = 0;
+  int j = pw_global (x->k, e, c);
+  x->v[j] = v;
+  pw_probe_place (x, PW_PROBE_TIME, 0);
+  selftest_force (x, force);
+  x->v[j] = 0;
+  for (int i = e * x->cols; i < (e + 1) * x->cols; i++) change = fmax (change, fabs (force[i] - rest[i]));
+  return change;
+}
+
+/* From rest, a hundredth of the velocity within which a force says to saturate, or of a large one if it says nothing, changes
+ * it by a small part of what all of that velocity does. */
+static void selftest_saturation (pw_probe *x) {
+  const double large = 1000;
+  double out[PW_PROBE_OUT], rest[PW_PROBE_OUT + PW_PROBE_GUARD], v[PW_PROBE_COORDS];
+  memcpy (v, x->v, sizeof v);
+  memset (x->v, 0, sizeof x->v);
+  pw_probe_place (x, PW_PROBE_TIME, 0);
+  selftest_force (x, rest);
+  for (int i = 0; i < x->elements * 2 * x->cols; i++) out[i] = INFINITY;
+  if (x->kind->saturation) x->kind->saturation (&x->k->b, out);
+  for (int i = 0; i < x->elements * x->cols; i++) {
+    int e = i / x->cols, c = i % x->cols;
+    if (pw_probe_ground (x, e, c)) continue;
+    double far = out[i + (e + 1) * x->cols], all = selftest_change (x, e, c, isfinite (far) ? far : large, rest);
+    double part = selftest_change (x, e, c, (isfinite (far) ? far : large) / 100, rest);
+    if (all < 1e-9 * (1 + pw_probe_largest (x->elements * x->cols, rest))) continue;
+    pw_probe_note (x->report, "saturation", "a force that saturates says within which velocity", part / all, 0.5,
+                   "a hundredth of the velocity, half of the change", x->k->name[e]);
+  }
+  memcpy (x->v, v, sizeof v);
+}
+
 /* ---- Energy ---- */
 
 /* Changes v so that element e has J v = eta, by the least norm; returns 0 if its rows depend on each other. */
@@ -273,6 +310,7 @@ static void selftest_all (pw_probe *x) {
   if (x->kind->unit) selftest_unit (x);
   selftest_blocks (x);
   selftest_rest (x);
+  if (x->kind->force && !x->kind->constant) selftest_saturation (x);
   selftest_power (x);
   pw_probe_sweep (x, x->kind->contact, "contact", 3 * x->elements, out);
 }

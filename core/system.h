@@ -107,9 +107,11 @@ void pw_sweep_g_size (pw_system *s, double *size);   /* not below the length sca
 void pw_sweep_eta (pw_system *s, double *eta);
 void pw_sweep_gamma (pw_system *s, double *gamma);
 void pw_sweep_force (pw_system *s, double *f);
-/* The least of what the placed elements' forces saturate within, by coordinate, then by velocity: 2 (coords + 3); INFINITY
- * where none does.  Returns 0, and leaves `least` alone, if no kind of the scene has it. */
+/* By how much each state may change until a force at the placed state that saturates has changed by its own size: 2 coords;
+ * INFINITY where none does.  Works as long as the scene `saturates`. */
 void pw_sweep_saturation (pw_system *s, double *least);
+/* The smallest of them for velocities, its state, or -1 if none saturates, and its element: "friction hinge". */
+int pw_find_saturation (pw_system *s, double *least, char *element, size_t size);
 void pw_sweep_constant (pw_system *s); /* the part of f that never changes; done by pw_compile */
 double pw_potential (pw_system *s);
 double pw_kinetic (const pw_system *s, const double *v);

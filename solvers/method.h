@@ -55,6 +55,7 @@ struct pw_run {
   double energy0;  /* kinetic + potential at the start */
   double *scratch; /* 2 (coords + 3) + 3 rows */
   double *saturation; /* 2 (coords + 3): tolerances are not above; INFINITY: any */
+  double *saturation; /* 2 coords: tolerances are not above; INFINITY: any */
   double *q_given, *v_given;
   pw_start_report start;
   pw_statistics statistics;
@@ -79,7 +80,7 @@ static inline double pw_tolerance (const pw_run *r, int j, double q) {
   return fmin (r->settings.rtol * fabs (q) + pw_atol (r, j), r->saturation[j]);
 }
 static inline double pw_tolerance_rate (const pw_run *r, int j, double v) {
-  return fmin (r->settings.rtol * fabs (v) + pw_atol_rate (r, j), r->saturation[r->s->coords + 3 + j]);
+  return fmin (r->settings.rtol * fabs (v) + pw_atol_rate (r, j), r->saturation[r->s->coords + j]);
 }
 /* 1 if the run takes steps of the given size. */
 int pw_fixed_steps (const pw_run *r);

@@ -150,6 +150,11 @@ void pw_linear_close (pw_linear *l);
  * INFINITY if the solution itself grows without turning, or rests. */
 double pw_rk4_limit (double re, double im);
 
+/* The smallest velocity within which a force saturates, at the configuration reached and at rest [m/s] or [rad/s]: the velocity
+ * (as pw_find_state numbers states), or -1 if none does, and the element, "friction hinge".  Methods with Newton's iteration
+ * keep their tolerances below it, whatever the settings ask for. */
+int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
+
 const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_start_report *pw_run_start (const pw_run *r);
 /* 1 if the consistent start moved this state (as pw_find_state numbers them) by more than round-off. */

@@ -72,6 +72,12 @@ static void kinds_multiplied (const pw_batch *b, double *out) {
   for (int i = 0; i < PW_PROBE_OUT && !isnan (values[i]); i++) out[i] = kinds_factor * values[i];
 }
 
+/* Declares a thousand times what the original does. */
+static void kinds_wide (const pw_batch *b, double *out) {
+  kinds_original (b, out);
+  for (int i = 0; i < b->count * 2 * b->cols; i++) out[i] *= 1000;
+}
+
 static void kinds_expect_caught (const pw_kind *kind, const char *sweep, const char *how) {
   pw_selftest_report report;
   kinds_run (kind, KINDS_FEW, &report);
@@ -168,6 +174,23 @@ static void test_both (void **state) {
   kinds_expect_caught (&broken, "J_gamma", "with an element left out");
   broken.J_gamma = kinds_both_long;
   kinds_expect_caught (&broken, "J_gamma", "with an entry too many");
+}
+
+/* A saturation that is not declared, and one declared a thousand times too wide. */
+static void test_saturation (void **state) {
+  int kinds = 0;
+  (void)state;
+  for (const pw_kind *const *k = pw_kinds; *k; k++) {
+    if ((*k)->saturation == NULL) continue;
+    pw_kind broken = **k;
+    kinds++;
+    kinds_original = broken.saturation;
+    broken.saturation = NULL;
+    kinds_expect_caught (&broken, "saturation", "missing");
+    broken.saturation = kinds_wide;
+    kinds_expect_caught (&broken, "saturation", "a thousand times too wide");
+  }
+  assert_int_equal (kinds, 5);
 }
 
 /* ---- Tables that do not hold together ---- */
@@ -268,9 +291,9 @@ static void test_refused (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_built_in),      cmocka_unit_test (test_plug_in), cmocka_unit_test (test_broken),
-    cmocka_unit_test (test_sizes),         cmocka_unit_test (test_both),    cmocka_unit_test (test_faults),
-    cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_built_in),   cmocka_unit_test (test_plug_in),       cmocka_unit_test (test_broken),
+    cmocka_unit_test (test_sizes),      cmocka_unit_test (test_both),          cmocka_unit_test (test_faults),
+    cmocka_unit_test (test_saturation), cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -42,6 +42,17 @@ void pw_report_step (const pw_run *r, const char *method, double step) {
            pw_format (h, step, 3), pw_format (pace, T, 2));
 }
 
+void pw_report_atol (pw_run *r, const pw_system *s, double atol) {
+  char a[32], speed[32], element[REPORT_NAME];
+  double least;
+  int state = atol > 0 ? pw_run_saturation (r, &least, element, sizeof element) : -1;
+  if (state < 0 || !(atol > least)) return;
+  fprintf (stderr,
+           "pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's iteration "
+           "take less for the states it depends on, others may be wrong\n",
+           pw_format (a, atol, 3), pw_format (speed, least, 3), pw_state_unit (s, state), element);
+}
+
 /* ---- Angles ---- */
 
 static void report_angle (const char *kind, const char *name, const char *what, double angle) {

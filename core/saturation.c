@@ -1,0 +1,40 @@
+/* Within how small a change of positions and velocities forces that saturate, such as friction, reverse. */
+#include <math.h>
+#include <stdio.h>
+#include "system.h"
+
+/* Fills the slab's block, 2 cols for each element. */
+static int saturation_fill (const pw_slab *k) {
+  int n = k->b.count * 2 * k->b.cols;
+  for (int i = 0; i < n; i++) k->block[i] = INFINITY;
+  k->kind->saturation (&k->b, k->block);
+  return n;
+}
+
+/* The state, as pw_find_state numbers them, of entry i of the block; -1: the ground's. */
+static int saturation_state (const pw_system *s, const pw_slab *k, int i) {
+  int cols = k->b.cols, c = i % (2 * cols), j = pw_global (k, i / (2 * cols), c % cols);
+  return j >= s->coords ? -1 : c < cols ? j : s->coords + j;
+}
+
+void pw_sweep_saturation (pw_system *s, double *least) {
+  for (int j = 0; j < 2 * s->coords; j++) least[j] = INFINITY;
+  for (pw_slab **k = s->force, **end = k + s->forces; k < end; k++)
+    for (int i = 0, n = (*k)->kind->saturation ? saturation_fill (*k) : 0; i < n; i++) {
+      int state = saturation_state (s, *k, i);
+      if (state >= 0) least[state] = fmin (least[state], (*k)->block[i]);
+    }
+}
+
+int pw_find_saturation (pw_system *s, double *least, char *element, size_t size) {
+  int found = -1;
+  *least = INFINITY;
+  for (pw_slab **k = s->force, **end = k + s->forces; k < end; k++)
+    for (int i = 0, n = (*k)->kind->saturation ? saturation_fill (*k) : 0; i < n; i++) {
+      int state = saturation_state (s, *k, i);
+      if (state < s->coords || !((*k)->block[i] < *least)) continue;
+      *least = (*k)->block[i], found = state;
+      snprintf (element, size, "%s %s", (*k)->kind->name, (*k)->name[i / (2 * (*k)->b.cols)]);
+    }
+  return found;
+}
