@@ -1,0 +1,145 @@
+/* Coordinates without mass follow the constraints: projections leave those with mass alone, whatever the units, and whatever
+ * else has mass. */
+#include <math.h>
+#include <stdio.h>
+#include "check.h"
+#include "runs.h"
+#include "scene.h"
+
+typedef struct {
+  double length, mass, other; /* units; the mass of a body that has nothing to do with the others, 0: none */
+} massless;
+
+static const pw_parameter massless_list[] = {
+  { PW_AT (massless, length), 1, "m", "unit of length", PW_POSITIVE },
+  { PW_AT (massless, mass), 1, "kg", "unit of mass", PW_POSITIVE },
+  { PW_AT (massless, other), 0, "kg", "of the other body", PW_NONNEGATIVE },
+  { .name = NULL },
+};
+
+#define MASSLESS_TABLE(f)                                                         \
+  {                                                                               \
+    .abi = PW_ABI, .size = sizeof (pw_plugin_table), .parameters = massless_list, \
+    .parameters_size = sizeof (massless), .build = f                              \
+  }
+
+static const char *const massless_methods[] = {
+  "rk4+projection", "rk4+nullspace",  "erk5+projection",        "erk5+projection:metric=identity", "erk8+projection",
+  "erk8+nullspace", "bdf+projection", "bdf+projection:every=3", "bdf+projection:metric=identity",  "ida+ggl",
+  "galpha+ggl",     "leapfrog+rattle"
+};
+
+static void massless_other (pw_model *m, const massless *p) {
+  if (p->other > 0)
+    pw_add_body (m, &(pw_body){ .name = "other", .mass = p->other, .inertia = p->other, .rate = { 0, 0, 0.1 } });
+}
+
+/* A disc on a massless arm turns at 1 rad/s for ever. */
+static void massless_disc (pw_model *m, const void *parameters) {
+  const massless *p = parameters;
+  double L = p->length;
+  pw_add_body (m, &(pw_body){ .name = "disc", .inertia = p->mass * L * L, .start = { L, 0, 0 }, .rate = { 0, L, 1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "disc", "ground" }, .at = { { -L, 0 }, { 0, 0 } } });
+  massless_other (m, p);
+}
+
+static double massless_turned (const char *method, double length, double mass, double other) {
+  static const pw_plugin_table table = MASSLESS_TABLE (massless_disc);
+  double q[6], v[6];
+  pw_system *s = scene_system (&table, "length", length, "mass", mass, "other", other, NULL);
+  runs_state (s, method, &(pw_settings){ .rtol = 1e-6, .step = 1e-3, .span = 1 }, 1, q, v, NULL);
+  pw_free (s);
+  return fmax (fabs (q[2] - 1), fmax (hypot (q[0] / length - cos (1), q[1] / length - sin (1)), fabs (v[2] - 1)));
+}
+
+static void test_disc (void **state) {
+  static const double units[][3] = { { 1, 1, 0 },      { 1, 1, 1 },   { 1, 1, 1e6 },   { 1e-3, 1, 0 },   { 1e3, 1, 0 },
+                                     { 1, 1e-6, 1e3 }, { 1, 1e6, 0 }, { 1e3, 1e6, 1 }, { 1e-3, 1e-6, 0 } };
+  (void)state;
+  for (size_t i = 0; i < sizeof massless_methods / sizeof *massless_methods; i++)
+    for (size_t k = 0; k < sizeof units / sizeof *units; k++)
+      check_below (massless_methods[i], massless_turned (massless_methods[i], units[k][0], units[k][1], units[k][2]),
+                   1e-4, "100 rtol: the errors of some 30 steps");
+}
+
+/* By mass, where nothing changes but the angle, linearly, there is no error. */
+static void test_exact (void **state) {
+  (void)state;
+  check_below ("bdf+projection", massless_turned ("bdf+projection", 1, 1, 0), 16 * CHECK_EPS, "round-off");
+  check_below ("bdf+projection:every=3", massless_turned ("bdf+projection:every=3", 1, 1, 0), 16 * CHECK_EPS,
+               "round-off");
+}
+
+/* Bars with inertia and with mass only, a massless coupler between bars with both, and a massless wheel carrier. */
+static void massless_chain (pw_model *m, const void *parameters) {
+  const massless *p = parameters;
+  double L = p->length, M = p->mass;
+  pw_add_body (m, &(pw_body){ .name = "a", .inertia = M * L * L, .start = { L, 0, 0 }, .rate = { 0, L, 1 } });
+  pw_add_body (m, &(pw_body){ .name = "b", .start = { 2.5 * L, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "c", .mass = M, .start = { 3.5 * L, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "a", "ground" }, .at = { { -L, 0 }, { 0, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "a", "b" }, .at = { { L, 0 }, { -0.5 * L, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "C", .body = { "b", "c" }, .at = { { 0.5 * L, 0 }, { -0.5 * L, 0 } } });
+  pw_add_rod (
+      m, &(pw_rod){
+             .name = "R", .body = { "c", "ground" }, .at = { { 0.5 * L, 0 }, { 4 * L, -2 * L } }, .length = 2 * L });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -L } });
+  massless_other (m, p);
+}
+
+static void massless_car (pw_model *m, const void *parameters) {
+  const massless *p = parameters;
+  double L = p->length, M = p->mass;
+  pw_add_body (m, &(pw_body){ .name = "frame", .inertia = M * L * L, .rate = { L, 0, 0.3 } });
+  pw_add_body (
+      m, &(pw_body){
+             .name = "tail", .mass = M, .inertia = 0.1 * M * L * L, .start = { -L, 0, 0 }, .rate = { L, 0, -0.2 } });
+  pw_add_body (m, &(pw_body){ .name = "fork", .start = { 1.5 * L, 0, 0.4 } });
+  pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "frame", "tail" }, .at = { { -0.5 * L, 0 }, { 0.5 * L, 0 } } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "fork" }, .at = { { L, 0 }, { -0.5 * L, 0 } } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "V", .body = "frame", .at = { -0.1 * L, 0 } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "W", .body = "fork", .at = { 0.3 * L, 0 } });
+  massless_other (m, p);
+}
+
+/* Lengths of q and v in their unit. */
+static void massless_state (const pw_plugin_table *table, const char *method, double rtol, double length, double mass,
+                            double other, double *q, double *v) {
+  pw_system *s = scene_system (table, "length", length, "mass", mass, "other", other, NULL);
+  runs_state (s, method, &(pw_settings){ .rtol = rtol, .span = 2 }, 2, q, v, NULL);
+  for (int i = 0; i < 9; i++)
+    if (i % 3 != 2) q[i] /= length, v[i] /= length;
+  pw_free (s);
+}
+
+static void massless_agree (const pw_plugin_table *table, const char *method) {
+  static const double units[][3] = { { 1, 1, 0 }, { 1e-3, 1, 0 }, { 1e3, 1e6, 0 }, { 1, 1e-6, 0 }, { 1, 1, 1e3 } };
+  double q[12], v[12], q0[12], v0[12];
+  massless_state (table, "erk8+projection", 1e-12, 1, 1, 0, q0, v0);
+  for (size_t k = 0; k < sizeof units / sizeof *units; k++) {
+    massless_state (table, method, 1e-7, units[k][0], units[k][1], units[k][2], q, v);
+    double worst = 0;
+    for (int i = 0; i < 9; i++) worst = fmax (worst, fmax (fabs (q[i] - q0[i]), fabs (v[i] - v0[i])));
+    check_below (method, worst, 3e-4, "3000 rtol: the errors of some hundred steps, and what they grow to");
+  }
+}
+
+static void test_agree (void **state) {
+  static const pw_plugin_table chain = MASSLESS_TABLE (massless_chain), car = MASSLESS_TABLE (massless_car);
+  static const char *const methods[] = { "bdf+projection", "bdf+projection:every=3", "erk5+projection",
+                                         "erk8+nullspace", "ida+ggl" };
+  (void)state;
+  for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+    massless_agree (&chain, methods[i]);
+    massless_agree (&car, methods[i]);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_disc),
+    cmocka_unit_test (test_exact),
+    cmocka_unit_test (test_agree),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
