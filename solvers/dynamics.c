@@ -112,22 +112,3 @@ void pw_note_residuals (pw_run *r) {
   s->g = pw_larger (s->g, now->g);
   s->jv = pw_larger (s->jv, now->jv);
 }
-
-/* A tenth of what reverses a force, as the error of one state alone: the norm of n errors, each as large as its tolerance, is
- * 1, and one alone may be sqrt (n) times as large. */
-void pw_bound_tolerances (pw_run *r) {
-  int n = 2 * r->s->coords;
-  if (!r->s->saturates) return;
-  pw_sweep_saturation (r->s, r->saturation);
-  for (int j = 0; j < n; j++) r->saturation[j] *= 0.1 / sqrt (n);
-}
-
-int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
-  pw_system *s = r->s;
-  double *rest = r->scratch;
-  int state = -1;
-  for (int j = 0; j < s->coords; j++) rest[j] = 0;
-  if (s->saturates && pw_place (s, r->t, r->q, rest) == PW_OK) state = pw_find_saturation (s, least, element, size);
-  if (s->saturates) (void)pw_place (s, r->t, r->q, r->v);
-  return state;
-}

@@ -129,12 +129,44 @@ static int ida_open_vectors (ida_data *d) {
   return PW_OK;
 }
 
+/* ---- The linear solver that IDA sees: KLU, unless the matrix is outdated ---- */
+
+static SUNLinearSolver_Type ida_solver_type (SUNLinearSolver solver) {
+  (void)solver;
+  return SUNLINEARSOLVER_DIRECT;
+}
+
+static int ida_solver_begin (SUNLinearSolver solver) {
+  return SUNLinSolInitialize (((ida_data *)solver->content)->klu);
+}
+
+static int ida_factorise (SUNLinearSolver solver, SUNMatrix matrix) {
+  return SUNLinSolSetup (((ida_data *)solver->content)->klu, matrix);
+}
+
+static int ida_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, pw_real tolerance) {
+  ida_data *d = solver->content;
+  if (d->run->outdated) return SUNLS_PACKAGE_FAIL_REC; /* IDA then asks for a new one */
+  return SUNLinSolSolve (d->klu, matrix, x, b, tolerance);
+}
+
+static int ida_wrap_solver (ida_data *d) {
+  d->klu = SUNLinSol_KLU (d->y, d->matrix, d->context);
+  d->solver = SUNLinSolNewEmpty (d->context);
+  if (d->klu == NULL || d->solver == NULL) return PW_MACHINE;
+  d->solver->content = d;
+  d->solver->ops->gettype = ida_solver_type;
+  d->solver->ops->initialize = ida_solver_begin;
+  d->solver->ops->setup = ida_factorise;
+  d->solver->ops->solve = ida_solve;
+  return PW_OK;
+}
+
 static int ida_open_solver (ida_data *d) {
   pw_run *r = d->run;
   int flag = 0;
-  d->solver = SUNLinSol_KLU (d->y, d->matrix, d->context);
   d->ida = IDACreate (d->context);
-  if (d->ida == NULL || d->solver == NULL) return PW_MACHINE;
+  if (d->ida == NULL || ida_wrap_solver (d) != PW_OK) return PW_MACHINE;
   if (flag == IDA_SUCCESS) flag = IDASetErrHandlerFn (d->ida, pw_sun_message, &d->said);
   if (flag == IDA_SUCCESS) flag = IDASetUserData (d->ida, d);
   if (flag == IDA_SUCCESS) flag = IDAInit (d->ida, pw_ida_residual, r->t, d->y, d->yp);
@@ -143,6 +175,7 @@ static int ida_open_solver (ida_data *d) {
   if (flag == IDA_SUCCESS) flag = IDASetSuppressAlg (d->ida, 1);
   if (flag == IDA_SUCCESS) flag = IDASetMaxNumSteps (d->ida, -1);
   if (flag == IDA_SUCCESS) flag = IDASetMaxConvFails (d->ida, PW_SUN_ATTEMPTS);
+  if (flag == IDA_SUCCESS) flag = IDASetMaxErrTestFails (d->ida, PW_SUN_ATTEMPTS);
   if (flag == IDA_SUCCESS) flag = IDASetInitStep (d->ida, pw_first_step (d->run));
   if (flag == IDA_SUCCESS) flag = IDASetLinearSolver (d->ida, d->solver, d->matrix);
   if (flag == IDA_SUCCESS) flag = IDASetJacFn (d->ida, pw_ida_matrix);
@@ -175,7 +208,8 @@ static int ida_open (pw_run *r, pw_error *error) {
 static void ida_close (pw_run *r) {
   ida_data *d = r->data;
   if (d->ida) IDAFree (&d->ida);
-  if (d->solver) SUNLinSolFree (d->solver);
+  if (d->solver) SUNLinSolFreeEmpty (d->solver);
+  if (d->klu) SUNLinSolFree (d->klu);
   if (d->matrix) SUNMatDestroy (d->matrix);
   N_Vector const vector[] = { d->y, d->yp, d->id, d->work, d->work0 };
   for (size_t i = 0; i < sizeof vector / sizeof *vector; i++)
@@ -226,7 +260,7 @@ static int ida_fail (ida_data *d, int flag, pw_error *error) {
                                                : pw_sun_reason (&d->said, flag);
   if (d->run->stopped) return d->run->interrupted = 1, PW_STOPPED;
   ida_statistics (d);
-  if (flag == IDA_LSETUP_FAIL && pw_sun_lacks_memory (d->solver)) return ida_no_memory (d->run, error);
+  if (flag == IDA_LSETUP_FAIL && pw_sun_lacks_memory (d->klu)) return ida_no_memory (d->run, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", d->run->t, why, d->run->settings.rtol);
 }
 

@@ -126,6 +126,7 @@ int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector res
   pw_sun_clear (matrix, d->tangent.colptr, d->tangent.rowind);
   pw_tape_fill (&d->tangent.tape, SUNSparseMatrix_Data (matrix));
   ida_matrix_fill (d, y, yp, c);
+  pw_matrix_evaluated (d->run, y, y + d->n);
   return 0;
 }
 

@@ -22,13 +22,13 @@ struct pw_method_data {
   void *ida;
   N_Vector y, yp, id, work, work0;
   SUNMatrix matrix;
-  SUNLinearSolver solver;
-  double *scale;        /* D: coords */
-  double *given;        /* scratch: 2 (coords + 3) + 2 rows */
-  double *lever;        /* rows: 1 for a force, L for a moment */
-  double stop;          /* the stop time IDA knows */
-  double begun;         /* time of the start or the last restart */
-  pw_statistics before; /* what was counted up to then: IDA counts from there */
+  SUNLinearSolver klu, solver; /* KLU on the matrix; what IDA sees */
+  double *scale;               /* D: coords */
+  double *given;               /* scratch: 2 (coords + 3) + 2 rows */
+  double *lever;               /* rows: 1 for a force, L for a moment */
+  double stop;                 /* the stop time IDA knows */
+  double begun;                /* time of the start or the last restart */
+  pw_statistics before;        /* what was counted up to then: IDA counts from there */
   pw_sun_said said;
 };
 

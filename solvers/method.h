@@ -56,6 +56,8 @@ struct pw_run {
   double *scratch; /* 2 (coords + 3) + 3 rows */
   double *saturation; /* 2 (coords + 3): tolerances are not above; INFINITY: any */
   double *saturation; /* 2 coords: tolerances are not above; INFINITY: any */
+  double *matrix_state, *matrix_range; /* 2 coords: where the Newton matrix was evaluated; how far it serves */
+  int outdated;                        /* 1: the state reached is farther */
   double *q_given, *v_given;
   pw_start_report start;
   pw_statistics statistics;
@@ -72,8 +74,11 @@ static inline double pw_atol (const pw_run *r, int j) {
 static inline double pw_atol_rate (const pw_run *r, int j) {
   return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->s->scale.time;
 }
-/* Takes over how small a change of the placed state reverses a force that saturates (pw_sweep_saturation). */
+/* Takes over how small a change of the state reached, which is placed, reverses a force that saturates; and notes whether the
+ * Newton matrix is `outdated` by it (saturation.c). */
 void pw_bound_tolerances (pw_run *r);
+/* The Newton matrix is that of this state, which is placed. */
+void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
 /* The tolerances of coordinate j and of its velocity at a value, for methods that iterate: not above what a force saturates
  * within, or an iteration would end anywhere between the force and its opposite. */
 static inline double pw_tolerance (const pw_run *r, int j, double q) {
@@ -127,10 +132,9 @@ void pw_read_baumgarte (pw_run *r);
   }
 extern const char *const pw_metrics[];
 
-/* A first step for methods that begin with order 1: its error, h^2 / T^2, is at the tolerance. */
-static inline double pw_first_step (const pw_run *r) {
-  return 0.5 * r->s->scale.time * sqrt (r->settings.rtol);
-}
+/* A first step for methods that begin with order 1: its error, h^2 / T^2, is at the tolerance; no state moves by more than its
+ * tolerance beside a force that saturates. */
+double pw_first_step (const pw_run *r);
 
 /* Plans the linear algebra at the state reached, where J is swept, and opens the method there.  fresh: what a small pivot
  * is follows from those here; else it stays what it was. */

@@ -156,6 +156,7 @@ static int multistep_open_solver (multistep_data *d, int formula) {
   if (flag == CV_SUCCESS) flag = CVodeWFtolerances (d->cvode, multistep_weights);
   if (flag == CV_SUCCESS) flag = CVodeSetMaxNumSteps (d->cvode, -1);
   if (flag == CV_SUCCESS) flag = CVodeSetMaxConvFails (d->cvode, PW_SUN_ATTEMPTS);
+  if (flag == CV_SUCCESS) flag = CVodeSetMaxErrTestFails (d->cvode, PW_SUN_ATTEMPTS);
   if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
   if ((d->projects || r->s->saturates) && flag == CV_SUCCESS)
     flag = CVodeSetNonlinConvCoef (d->cvode, MULTISTEP_ITERATED);

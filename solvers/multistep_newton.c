@@ -43,6 +43,7 @@ static int newton_set_up (pw_real t, N_Vector y, N_Vector rates, SUNMatrix matri
   pw_multistep_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
   (void)rates, (void)t1, (void)t2, (void)t3;
+  good = good && !d->run->outdated;
   *fresh = !good;
   if (!good) {
     int columns = 3 * d->n + x->rows, status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
@@ -51,6 +52,7 @@ static int newton_set_up (pw_real t, N_Vector y, N_Vector rates, SUNMatrix matri
     memset (w->value, 0, (size_t)x->colptr[columns] * sizeof *w->value);
     pw_tape_fill (&w->tangent.tape, w->value);
     newton_fill (d);
+    pw_matrix_evaluated (d->run, N_VGetArrayPointer (y), d->v);
     d->run->statistics.jacobians++;
   }
   w->gamma = gamma;
@@ -91,6 +93,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
   const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);
   double *x = N_VGetArrayPointer (vx);
   int n = d->n;
+  if (d->run->outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then asks for a new one */
   newton_right (d, b, N_VGetArrayPointer (w->right));
   int flag = SUNLinSolSolve (w->klu, matrix, w->change, w->right, tolerance);
   if (flag != SUNLS_SUCCESS) return flag;

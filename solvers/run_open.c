@@ -37,15 +37,16 @@ static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
   const pw_array array[] = {
-    { &r->q, 3 * n + rows },    { &r->ledger, entries },    { &r->rate, entries },
-    { &r->q_at, 3 * n + rows }, { &r->ledger_at, entries }, { &r->scratch, 2 * n + 3 * rows },
-    { &r->q_given, n },         { &r->v_given, n },         { &r->saturation, 2 * n },
+    { &r->q, 3 * n + rows },     { &r->ledger, entries },     { &r->rate, entries },
+    { &r->q_at, 3 * n + rows },  { &r->ledger_at, entries },  { &r->scratch, 2 * n + 3 * rows },
+    { &r->q_given, n },          { &r->v_given, n },          { &r->saturation, 2 * n },
+    { &r->matrix_state, 2 * n }, { &r->matrix_range, 2 * n },
   };
   r->memory = pw_take_arrays (array, sizeof array / sizeof *array);
   if (r->memory == NULL) return PW_MACHINE;
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
-  for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = INFINITY;
+  for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = r->matrix_range[j] = INFINITY;
   memcpy (r->q, s->q0, (size_t)s->coords * sizeof (double));
   memcpy (r->v, s->v0, (size_t)s->coords * sizeof (double));
   return PW_OK;

@@ -19,8 +19,8 @@ typedef sunrealtype pw_real;
 typedef realtype pw_real;
 #endif
 
-/* How often a step is retaken, at a quarter of its size, because Newton's iteration does not converge: from 1 s down to the
- * round-off of time.  SUNDIALS' own 10 times, a millionth, do not resolve where friction brings a body to rest. */
+/* How often a step is retaken, at about a quarter of its size, because Newton's iteration does not converge or the error is too
+ * large: from 1 s down to the round-off of time.  SUNDIALS' own 10 times, a millionth, do not resolve where friction brings a body to rest. */
 enum { PW_SUN_ATTEMPTS = 27 };
 
 /* A context for an integrator of so many unknowns.  PW_OK or PW_MACHINE. */

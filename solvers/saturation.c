@@ -1,0 +1,50 @@
+/* Forces that saturate, such as friction, beside tolerances and Newton matrices.
+ *
+ * A matrix from where such a force is steep, at rest, used where it has saturated, makes the corrections of Newton's iteration
+ * about as small as what the force saturates within, however large the residual is: it would pass for converged with the
+ * force of quite another state.  So tolerances stay below that, and a matrix serves only as long as no state has moved by
+ * more than the forces saturated within where it was evaluated. */
+#include <math.h>
+#include <string.h>
+#include "method.h"
+
+/* A tenth of what reverses a force, as the error of one state alone: the norm of n errors, each as large as its tolerance, is
+ * 1, and one alone may be sqrt (n) times as large. */
+void pw_bound_tolerances (pw_run *r) {
+  int coords = r->s->coords, n = 2 * coords;
+  if (!r->s->saturates) return;
+  pw_sweep_saturation (r->s, r->saturation);
+  for (int j = 0; j < n; j++) {
+    double y = j < coords ? r->q[j] : r->v[j - coords];
+    r->outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
+    r->saturation[j] *= 0.1 / sqrt (n);
+  }
+}
+
+void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
+  int coords = r->s->coords;
+  r->outdated = 0;
+  if (!r->s->saturates) return;
+  memcpy (r->matrix_state, q, (size_t)coords * sizeof *q);
+  memcpy (r->matrix_state + coords, v, (size_t)coords * sizeof *v);
+  pw_sweep_saturation (r->s, r->matrix_range);
+}
+
+double pw_first_step (const pw_run *r) {
+  double T = r->s->scale.time, h = 0.5 * T * sqrt (r->settings.rtol);
+  for (int j = 0, n = r->s->coords; j < n; j++) {
+    if (r->v[j] != 0) h = fmin (h, fmax (r->saturation[j] / fabs (r->v[j]), 1e-9 * T));
+    if (r->a[j] != 0) h = fmin (h, fmax (r->saturation[n + j] / fabs (r->a[j]), 1e-9 * T));
+  }
+  return h;
+}
+
+int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
+  pw_system *s = r->s;
+  double *rest = r->scratch;
+  int state = -1;
+  for (int j = 0; j < s->coords; j++) rest[j] = 0;
+  if (s->saturates && pw_place (s, r->t, r->q, rest) == PW_OK) state = pw_find_saturation (s, least, element, size);
+  if (s->saturates) (void)pw_place (s, r->t, r->q, r->v);
+  return state;
+}
