@@ -179,6 +179,12 @@ static int ida_open_solver (ida_data *d) {
   if (flag == IDA_SUCCESS) flag = IDASetInitStep (d->ida, pw_first_step (d->run));
   if (flag == IDA_SUCCESS) flag = IDASetLinearSolver (d->ida, d->solver, d->matrix);
   if (flag == IDA_SUCCESS) flag = IDASetJacFn (d->ida, pw_ida_matrix);
+  if (r->s->saturates) {
+    d->newton = SUNNonlinSol_Newton (d->y, d->context);
+    if (d->newton == NULL) return PW_MACHINE;
+    if (flag == IDA_SUCCESS) flag = IDASetNonlinearSolver (d->ida, d->newton);
+    if (flag == IDA_SUCCESS) flag = pw_sun_test_newton (d->newton, &d->correction);
+  }
   if (r->settings.ledger && r->s->entries > 0) {
     if (flag == IDA_SUCCESS) flag = IDAQuadInit (d->ida, ida_work, d->work0);
     if (flag == IDA_SUCCESS) flag = IDASetQuadErrCon (d->ida, 0);
@@ -210,6 +216,7 @@ static void ida_close (pw_run *r) {
   if (d->ida) IDAFree (&d->ida);
   if (d->solver) SUNLinSolFreeEmpty (d->solver);
   if (d->klu) SUNLinSolFree (d->klu);
+  if (d->newton) SUNNonlinSolFree (d->newton);
   if (d->matrix) SUNMatDestroy (d->matrix);
   N_Vector const vector[] = { d->y, d->yp, d->id, d->work, d->work0 };
   for (size_t i = 0; i < sizeof vector / sizeof *vector; i++)

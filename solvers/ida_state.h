@@ -23,6 +23,8 @@ struct pw_method_data {
   N_Vector y, yp, id, work, work0;
   SUNMatrix matrix;
   SUNLinearSolver klu, solver; /* KLU on the matrix; what IDA sees */
+  SUNNonlinearSolver newton;   /* where a force saturates */
+  double correction;           /* its last one */
   double *scale;               /* D: coords */
   double *given;               /* scratch: 2 (coords + 3) + 2 rows */
   double *lever;               /* rows: 1 for a force, L for a moment */

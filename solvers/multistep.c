@@ -139,10 +139,13 @@ static int multistep_open_arrays (multistep_data *d) {
 }
 
 static int multistep_open_iteration (multistep_data *d, int formula) {
-  if (formula == CV_BDF) return pw_multistep_open_newton (d);
-  d->iteration = SUNNonlinSol_FixedPoint (d->y, 0, d->context);
-  if (d->iteration == NULL) return PW_MACHINE;
-  return CVodeSetNonlinearSolver (d->cvode, d->iteration) == CV_SUCCESS ? PW_OK : PW_MACHINE;
+  int newton = formula == CV_BDF;
+  if (newton && pw_multistep_open_newton (d) != PW_OK) return PW_MACHINE;
+  if (newton && !d->run->s->saturates) return PW_OK;
+  d->iteration = newton ? SUNNonlinSol_Newton (d->y, d->context) : SUNNonlinSol_FixedPoint (d->y, 0, d->context);
+  if (d->iteration == NULL || CVodeSetNonlinearSolver (d->cvode, d->iteration) != CV_SUCCESS) return PW_MACHINE;
+  if (newton && pw_sun_test_newton (d->iteration, &d->correction) != SUN_NLS_SUCCESS) return PW_MACHINE;
+  return PW_OK;
 }
 
 static int multistep_open_solver (multistep_data *d, int formula) {

@@ -27,7 +27,8 @@ struct pw_method_data {
   SUNContext context;
   void *cvode;
   N_Vector y, work, work0;
-  SUNNonlinearSolver iteration; /* Adams */
+  SUNNonlinearSolver iteration; /* Adams; BDF where a force saturates */
+  double correction;            /* its last one, of BDF */
   pw_multistep_newton newton;   /* BDF */
   double *q, *v, *a, *lambda;   /* scratch: coords + 3 each, rows */
   double *error;                /* scratch: 2 coords */

@@ -1,5 +1,6 @@
 /* What the integrators of SUNDIALS share; see sundials.h. */
 #include <assert.h>
+#include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
@@ -44,4 +45,21 @@ SUNMatrix pw_sun_matrix (int size, const int64_t *colptr, const int64_t *rowind,
   SUNMatrix matrix = SUNSparseMatrix (size, size, colptr[size], CSC_MAT, context);
   if (matrix) pw_sun_clear (matrix, colptr, rowind);
   return matrix;
+}
+
+/* The correction, or what is left after it if the iteration goes on converging as it does. */
+static int sun_converged (SUNNonlinearSolver newton, N_Vector y, N_Vector change, pw_real enough, N_Vector weights,
+                          void *data) {
+  double *before = data, size = N_VWrmsNorm (change, weights), rate = size / *before;
+  int iteration = 0;
+  (void)y;
+  SUNNonlinSolGetCurIter (newton, &iteration);
+  *before = size;
+  if (iteration > 0 && !(rate < 0.9)) return size <= enough ? SUN_NLS_SUCCESS : SUN_NLS_CONV_RECVR;
+  double left = iteration == 0 ? 1 : rate / (1 - rate);
+  return size * fmin (1, left) <= enough ? SUN_NLS_SUCCESS : SUN_NLS_CONTINUE;
+}
+
+int pw_sun_test_newton (SUNNonlinearSolver newton, double *size) {
+  return SUNNonlinSolSetConvTestFn (newton, sun_converged, size);
 }

@@ -10,6 +10,7 @@
 #include <nvector/nvector_serial.h>
 #include <sunlinsol/sunlinsol_klu.h>
 #include <sunmatrix/sunmatrix_sparse.h>
+#include <sunnonlinsol/sunnonlinsol_newton.h>
 
 #if SUNDIALS_VERSION_MAJOR >= 7 /* unverified */
 #define PW_SUN_NO_COMM SUN_COMM_NULL
@@ -33,6 +34,11 @@ typedef struct {
 void pw_sun_message (int code, const char *module, const char *function, char *text, void *said);
 /* That message, or the flag in words if there was none. */
 const char *pw_sun_reason (pw_sun_said *said, int flag);
+
+/* Has the corrections of a Newton iteration count as they are: SUNDIALS' own test multiplies the first one by the
+ * rate at which steps before have converged, which says nothing where a force saturates in between.  To be called when
+ * the integrator has the solver; `size` is scratch that lives as long.  Returns as SUNDIALS. */
+int pw_sun_test_newton (SUNNonlinearSolver newton, double *size);
 
 /* A vector whose operations, and those of its clones, are ours (vectors.c); NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
