@@ -585,9 +585,6 @@ struct pw_kind {
   void (*J_gamma) (const pw_batch *b, double *J, double *gamma);
   pw_sweep *force;   /* cols: generalised force */
   pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
-  /* 2 cols: a force that saturates, such as friction; by how much each coordinate, then each velocity, may change until the
-   * force has changed by its own size.  INFINITY, already there, where it does not saturate.  NULL: nowhere. */
-  pw_sweep *saturation;
   pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch */
   pw_sweep *jtl_q;   /* cols x cols: derivative of J^T lambda by q, lambda given in the batch */
   pw_sweep *eta_q;   /* rows x cols */
@@ -599,6 +596,9 @@ struct pw_kind {
   pw_sweep *power;   /* 1: power the element feeds into the system [W] */
   pw_sweep *loss;    /* 1: power it dissipates [W], >= 0 */
   pw_sweep *contact; /* 3: point on the ground [m] and heading [rad], for paths and pictures */
+  /* 2 cols: a force that saturates, such as friction; by how much each coordinate, then each velocity, may change until the
+   * force has changed by its own size.  INFINITY, already there, where it does not saturate.  NULL: nowhere. */
+  pw_sweep *saturation;
 };
 
 /* Every kind k of the list: its table pw_kind_k, and pw_add_k, which is pw_add with that table. */

@@ -26,7 +26,7 @@ LAYOUT (pw_quantity, 32);
 LAYOUT (pw_own, 32);
 LAYOUT (pw_pose, 64);
 LAYOUT (pw_batch, 72);
-LAYOUT (pw_kind, 256);
+LAYOUT (pw_kind, 264);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -118,6 +118,7 @@ LAYOUT_AT (pw_kind, energy, 224);
 LAYOUT_AT (pw_kind, power, 232);
 LAYOUT_AT (pw_kind, loss, 240);
 LAYOUT_AT (pw_kind, contact, 248);
+LAYOUT_AT (pw_kind, saturation, 256);
 
 LAYOUT_VALUE (PW_CONSTANT, 0);
 LAYOUT_VALUE (PW_HARMONIC, 1);

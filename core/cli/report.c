@@ -42,11 +42,16 @@ void pw_report_step (const pw_run *r, const char *method, double step) {
            pw_format (h, step, 3), pw_format (pace, T, 2));
 }
 
-void pw_report_atol (pw_run *r, const pw_system *s, double atol) {
+void pw_report_atol (pw_run *r, const pw_system *s, const char *method, double atol) {
+  const pw_method *integrator;
+  int stabilisation;
   char a[32], speed[32], element[REPORT_NAME];
   double least;
   int state = atol > 0 ? pw_run_saturation (r, &least, element, sizeof element) : -1;
-  if (state < 0 || !(atol > least)) return;
+  if (state < 0 || !(atol > least) ||
+      pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK ||
+      !pw_contestant_adaptive (integrator, method))
+    return;
   fprintf (stderr,
            "pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's iteration "
            "take less for the states it depends on, others may be wrong\n",

@@ -19,7 +19,7 @@ void pw_report_jumps (const pw_model *m);
 /* Says on standard error that a fixed step is longer than what moves at the start takes to change. */
 void pw_report_step (const pw_run *r, const char *method, double step);
 /* Of an absolute tolerance within which a force saturates; 0: none is given. */
-void pw_report_atol (pw_run *r, const pw_system *s, double atol);
+void pw_report_atol (pw_run *r, const pw_system *s, const char *method, double atol);
 
 /* Says on standard error which states the consistent start has moved, if any. */
 void pw_report_start (const pw_system *s, const pw_start_report *start);

@@ -94,7 +94,7 @@ static int run_open (run *x, pw_error *error) {
   pw_report_jumps (x->m.model);
   pw_report_unused (x->method, &x->wishes);
   pw_report_step (x->r, x->method, fmin (x->settings.step, x->t_end));
-  pw_report_atol (x->r, x->m.system, x->settings.atol);
+  pw_report_atol (x->r, x->m.system, x->method, x->settings.atol);
   pw_report_differences (x->m.system);
   pw_report_start (x->m.system, pw_run_start (x->r));
   x->redundant = pw_report_redundancies (x->r);
