@@ -75,7 +75,7 @@ static inline double pw_atol_rate (const pw_run *r, int j) {
   return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->s->scale.time;
 }
 /* Takes over how small a change of the state reached, which is placed, reverses a force that saturates; and notes whether the
- * Newton matrix is `outdated` by it (saturation.c). */
+ * Newton matrix is `outdated` by it (tolerances.c). */
 void pw_bound_tolerances (pw_run *r);
 /* The Newton matrix is that of this state, which is placed. */
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);

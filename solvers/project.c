@@ -27,8 +27,7 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
   };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
   if (p->scratch == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  p->position =
-      weight_q ? pw_saddle_open (s, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
+  p->position = weight_q ? pw_saddle_open (s, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
   p->own_position = p->position != r->saddle;
   if (p->own_velocity) p->velocity = pw_saddle_open (s, weight_v, s->rows, r->active, error);
   if (p->position && p->velocity) return PW_OK;
