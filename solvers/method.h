@@ -77,6 +77,8 @@ static inline double pw_atol_rate (const pw_run *r, int j) {
 /* Takes over how small a change of the state reached, which is placed, reverses a force that saturates; and notes whether the
  * Newton matrix is `outdated` by it (tolerances.c). */
 void pw_bound_tolerances (pw_run *r);
+/* By how much a state (as pw_find_state numbers them) may change from the state reached until a force reverses. */
+double pw_saturation_range (const pw_run *r, int state);
 /* The Newton matrix is that of this state, which is placed. */
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
 /* The tolerances of coordinate j and of its velocity at a value, for methods that iterate: not above what a force saturates

@@ -8,6 +8,8 @@
 #include <string.h>
 #include "method.h"
 
+#define TOLERANCES_PART 0.1
+
 /* A tenth of what reverses a force, as the error of one state alone: the norm of n errors, each as large as its tolerance, is
  * 1, and one alone may be sqrt (n) times as large. */
 void pw_bound_tolerances (pw_run *r) {
@@ -17,8 +19,12 @@ void pw_bound_tolerances (pw_run *r) {
   for (int j = 0; j < n; j++) {
     double y = j < coords ? r->q[j] : r->v[j - coords];
     r->outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
-    r->saturation[j] *= 0.1 / sqrt (n);
+    r->saturation[j] *= TOLERANCES_PART / sqrt (n);
   }
+}
+
+double pw_saturation_range (const pw_run *r, int state) {
+  return r->saturation[state] * sqrt (2 * r->s->coords) / TOLERANCES_PART;
 }
 
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {

@@ -141,6 +141,22 @@ static void test_kinds (void **state) {
           saturation_stops (scene, saturation_methods[m], setting[k][0], 0, setting[k][1], 0.25 + 0.45 * i);
 }
 
+/* Explicit methods follow what is smooth in ten or a thousand steps, and then tremble around rest. */
+static void test_explicit (void **state) {
+  static const char *const methods[] = { "erk5+none", "erk5+projection", "erk8+projection" };
+  (void)state;
+  for (int m = 0; m < 3; m++)
+    for (int k = 2; k <= 3; k++)
+      for (int i = 0; i < 12; i++) {
+        double rtol = pow (10, -k), v = 0.2 + 0.15 * i, q[3], w[3];
+        pw_system *s = scene_system (&saturation_scenes[0].table, "speed", 1e-8, "v", v, NULL);
+        runs_state (s, methods[m], &(pw_settings){ .rtol = rtol, .span = 4 }, 4, q, w, NULL);
+        check_close (methods[m], q[0], v * v / 2, 4 * pow (rtol, 0.75), "4 s at rtol^(3/4)");
+        check_close (methods[m], w[0], 0, 4 * pow (rtol, 0.75), "what the error test allows of 6 states, and T = 2 s");
+        pw_free (s);
+      }
+}
+
 /* An absolute tolerance above it does not change that; a run tells what it is above. */
 static void test_atol (void **state) {
   (void)state;
@@ -164,6 +180,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_block),
     cmocka_unit_test (test_kinds),
+    cmocka_unit_test (test_explicit),
     cmocka_unit_test (test_atol),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
