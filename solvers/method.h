@@ -52,10 +52,9 @@ struct pw_run {
       mark; /* time since the start at which speeds were looked at, doubled each time [s]; the largest there */
   double earlier, speed; /* the same of the time before */
 
-  double energy0;  /* kinetic + potential at the start */
-  double *scratch; /* 2 (coords + 3) + 3 rows */
-  double *saturation; /* 2 (coords + 3): tolerances are not above; INFINITY: any */
-  double *saturation; /* 2 coords: tolerances are not above; INFINITY: any */
+  double energy0;                      /* kinetic + potential at the start */
+  double *scratch;                     /* 2 (coords + 3) + 3 rows */
+  double *saturation;                  /* 2 coords: tolerances are not above; INFINITY: any */
   double *matrix_state, *matrix_range; /* 2 coords: where the Newton matrix was evaluated; how far it serves */
   int outdated;                        /* 1: the state reached is farther */
   double *q_given, *v_given;
