@@ -19,9 +19,25 @@ typedef struct {
   int placed; /* 1: it has found positions */
 } start_trouble;
 
+/* By how much to scale the metric of massless coordinates so that it is 1e-6 of the least entry of the mass matrix, angles in
+ * units of L, instead of the mean: bodies that have nothing to do with them may be heavy.  As far as round-off allows. */
+static double start_light (const pw_system *s) {
+  double least = INFINITY, most = 0, light = 0;
+  for (int j = 0; j < s->coords; j++) {
+    double unit = pw_is_angle (s, j) ? s->scale.length : 1, entry = s->metric[j] / (unit * unit);
+    if (s->mass[j] > 0)
+      least = fmin (least, entry), most = fmax (most, entry);
+    else
+      light = entry;
+  }
+  return light > 0 && most > 0 ? fmax (1e-6 * least, 1e-12 * most) / light : 1;
+}
+
 /* The metric, and INFINITY for what is held; true: the mass matrix, where massless rates are determined by the rows. */
 static void start_weights (const pw_system *s, const double *metric, const unsigned char *held, double *weight) {
-  for (int j = 0; j < s->coords; j++) weight[j] = held && held[j] ? INFINITY : metric[j];
+  double light = start_light (s);
+  for (int j = 0; j < s->coords; j++)
+    weight[j] = held && held[j] ? INFINITY : s->mass[j] > 0 ? metric[j] : light * metric[j];
 }
 
 static int start_positions (pw_projector *p, pw_run *r, double *q, const double *v, start_trouble *trouble) {
