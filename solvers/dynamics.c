@@ -54,17 +54,18 @@ void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda
   const double *f = dynamics_right (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   pw_saddle_solve (r->saddle, f, lambda, a, lambda);
-  if (pw_saddle_below (r->saddle, r->watch)) dynamics_refine (r, v, a, lambda);
+  if (pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
 }
 
-/* Factorises and solves; *near: 1 if a pivot is low. */
+/* Factorises and solves; *near: 1 if a singular configuration is. */
 static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
   const double *f = dynamics_right (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
   int status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);
-  *near = pw_saddle_below (r->saddle, r->watch);
-  if (*near && status == PW_OK) dynamics_refine (r, v, a, lambda);
+  *near = pw_watchdog_near (r);
+  if (*near && r->geometry.sine <= r->refuse) return PW_RETRY;
+  if (status == PW_OK && pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
   return status;
 }
 
@@ -91,15 +92,6 @@ void pw_show_reached (pw_run *r) {
   memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
   r->projected_at = r->projected;
   if (pw_place (r->s, r->t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->s);
-}
-
-int pw_fail_singular (pw_run *r, double t, pw_error *error) {
-  char element[120] = "a constraint";
-  int row;
-  pw_saddle_pivot (r->saddle, &row);
-  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: singular pose: %s says what other constraints say already", t,
-                  element);
 }
 
 void pw_note_residuals (pw_run *r) {

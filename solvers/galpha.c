@@ -178,7 +178,7 @@ static void galpha_accept (pw_run *r, double h, double t1) {
 static int galpha_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (status == PW_MACHINE) return pw_fail (error, PW_MACHINE, "t = %.6g s: out of memory in KLU", r->t);
-  if (r->near) return pw_fail_singular (r, r->t, error);
+  if (pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t,
                   status == PW_INPUT ? "the Newton matrix is singular" : "Newton's iteration does not converge", h);
 }
@@ -195,7 +195,7 @@ static int galpha_advance (pw_run *r, double t_end, pw_error *error) {
   r->statistics.steps++;
   d->count++;
   if (!whole) d->base = t1, d->count = 0;
-  r->near = pw_saddle_factor (r->saddle) != PW_OK || pw_saddle_below (r->saddle, r->watch);
+  r->near = pw_saddle_factor (r->saddle) != PW_OK || pw_watchdog_near (r);
   return PW_OK;
 }
 

@@ -268,6 +268,7 @@ static int ida_fail (ida_data *d, int flag, pw_error *error) {
   if (d->run->stopped) return d->run->interrupted = 1, PW_STOPPED;
   ida_statistics (d);
   if (flag == IDA_LSETUP_FAIL && pw_sun_lacks_memory (d->klu)) return ida_no_memory (d->run, error);
+  if (flag != IDA_RES_FAIL && pw_watchdog_near_state (d->run)) return pw_fail_singular (d->run, d->run->t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", d->run->t, why, d->run->settings.rtol);
 }
 
@@ -297,7 +298,7 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   pw_bound_tolerances (r);
   int status = ida_multipliers (d, r->v, r->a_at, r->lambda);
   if (status < 0) return ida_fail (d, IDA_RES_FAIL, error);
-  r->near = status != PW_OK || pw_saddle_below (r->saddle, r->watch);
+  r->near = status != PW_OK || pw_watchdog_near (r);
   ida_statistics (d);
   return PW_OK;
 }

@@ -16,20 +16,15 @@ double pw_run_agitation (const pw_run *r) {
   return pw_largest (linear * (per / s->scale.length), angular * per);
 }
 
-/* A method that lets go of its constraints is stopped: what follows would not be this mechanism.  Without stabilisation
- * some drift is what was asked for. */
-#define JUDGE_LOST 1e-2
-#define JUDGE_LOST_UNSTABILISED 0.1
-
 static int judge_lost (pw_run *r, pw_error *error) {
   pw_residuals now;
-  char element[120] = "a constraint", cause[60] = "the constraints are lost";
+  char element[120] = "a constraint", cause[60] = "constraint drift";
   pw_sweep_residuals (r->s, NULL, &now);
   int row = now.position > now.velocity ? now.row_position : now.row_velocity;
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
   if (row >= 0 && r->active && !r->active[row])
     snprintf (cause, sizeof cause, "constraints contradict each other");
-  else if (pw_fixed_steps (r))
+  else if (pw_fixed_steps (r) && !pw_stabilised_by (r, "none"))
     snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)",
                   r->t, cause, element, now.position, now.velocity);
@@ -47,24 +42,23 @@ static double judge_off (const pw_run *r) {
  * are off by d are x y = d: branches that do not cross but turn into each other, where s^2 is about 2 d.  A method
  * that follows these constraints as they have become follows the turn, however small its steps. */
 static int judge_blurred (pw_run *r, double off, double part) {
-  const double elsewhere = 30 * r->watch; /* 0.6 of a good one */
-  double sine = fmin (sqrt (off / part), elsewhere);
   int row;
-  if (!(sine > r->guard) || !pw_saddle_below (r->saddle, sine)) return 0;
-  return pw_saddle_pivot (r->saddle, &row) < sine && row < r->s->holonomic;
+  double bound = fmin (sqrt (off / part), r->limits.regular * r->geometry.typical);
+  return bound > r->limits.rank && pw_watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
+         row < r->s->holonomic;
 }
 
 /* Such a turn rounds off the corner, the more so the more the constraints are off: its accelerations are no outburst. */
 static int judge_turn (pw_run *r, double now, pw_error *error) {
-  const double turn = 3, least = 0.1, lost = 0.02, far = 1e-2, nothing = 0.1;
-  double off = judge_off (r), before = fmax (r->before, least);
-  if (!(now <= turn * before) && judge_blurred (r, off, lost))
+  const pw_watchdog *limit = &r->limits;
+  double off = judge_off (r), before = fmax (r->before, limit->least_turn);
+  if (!(now <= limit->turn * before) && judge_blurred (r, off, limit->drift_turn))
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) may lead to another branch, with "
         "%.3g times the accelerations of before; methods with projection pass",
         r->t, r->known.position, now / before);
-  if (!(off <= far) && judge_blurred (r, off, nothing))
+  if (!(off <= limit->drift_far) && judge_blurred (r, off, limit->drift_any))
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) tell no branch from another; "
@@ -73,15 +67,22 @@ static int judge_turn (pw_run *r, double now, pw_error *error) {
   return PW_OK;
 }
 
+/* 1 near a singular configuration of nonholonomic rows, or if the state is not finite. */
+static int judge_near_rows (pw_run *r) {
+  int row;
+  if (!r->near) return 0;
+  pw_watchdog_sine (r, &row);
+  return row < 0 || row >= r->s->holonomic || !isfinite (pw_run_agitation (r));
+}
+
 /* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */
 static int judge_outburst (pw_run *r, pw_error *error) {
-  const double outburst = 100, blurred = 0.01;
   double now = pw_run_agitation (r);
-  if (r->near && !(now <= outburst * r->calm))
+  if (judge_near_rows (r) && !(now <= r->limits.jump * r->calm))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
                     now / r->calm);
-  if (r->near || judge_blurred (r, judge_off (r), blurred)) return judge_turn (r, now, error);
+  if (r->near || judge_blurred (r, judge_off (r), r->limits.drift_near)) return judge_turn (r, now, error);
   r->calm = pw_larger (now, r->calm);
   r->before = now;
   return PW_OK;
@@ -89,24 +90,25 @@ static int judge_outburst (pw_run *r, pw_error *error) {
 
 /* 1 if a redundant row is violated by more than the others, from which it follows, can explain: it contradicts them. */
 static int judge_contradicts (pw_run *r) {
-  const double round_off = 1e-9, magnified = 1e4;
+  const double round_off = r->limits.follows;
   pw_residuals all, enforced;
   pw_sweep_residuals (r->s, NULL, &all);
   if (all.position <= round_off && all.velocity <= round_off) return 0;
   pw_sweep_residuals (r->s, r->active, &enforced);
-  double explained = round_off + magnified * fmax (enforced.position, enforced.velocity);
+  double explained = round_off + r->limits.magnified * fmax (enforced.position, enforced.velocity);
   return !(all.position <= explained && all.velocity <= explained);
 }
 
 int pw_run_judge (pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
   pw_note_residuals (r);
-  if (!(s->position <= JUDGE_LOST && s->velocity <= JUDGE_LOST)) {
-    double lost = pw_stabilised_by (r, "none") ? JUDGE_LOST_UNSTABILISED : JUDGE_LOST;
+  if (!(s->position <= r->limits.lost && s->velocity <= r->limits.lost)) {
+    double lost = pw_stabilised_by (r, "none") ? r->limits.lost_unstabilised : r->limits.lost;
     if (!(s->position <= lost && s->velocity <= lost)) return judge_lost (r, error);
   }
   if (r->redundant && judge_contradicts (r)) return judge_lost (r, error);
-  return judge_outburst (r, error);
+  int status = pw_watchdog_follow (r, error);
+  return status == PW_OK ? judge_outburst (r, error) : status;
 }
 
 double pw_unbalanced (const pw_run *r, const pw_sample *sample) {

@@ -88,7 +88,7 @@ static int leapfrog_factor (pw_run *r, double t, const double *q, const double *
   pw_sweep_J (r->s);
   r->statistics.factorisations++;
   status = pw_saddle_factor (r->saddle);
-  if (status != PW_OK || pw_saddle_below (r->saddle, r->watch)) r->near = 1;
+  if (status != PW_OK || pw_watchdog_near (r)) r->near = 1;
   return status;
 }
 
@@ -147,9 +147,8 @@ static void leapfrog_accept (pw_run *r, double t1) {
 /* Where the iteration fails, the pose that the step begins with may be the reason. */
 static int leapfrog_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_MACHINE) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  if (status == PW_RETRY && !r->near) leapfrog_factor (r, r->t, r->q, r->v);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  if (r->near) return pw_fail_singular (r, r->t, error);
+  if (r->near || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the iteration does not converge; the step of %.6g s may be too large",
                   r->t, h);
 }

@@ -7,6 +7,7 @@
 #include "rank.h"
 #include "saddle.h"
 #include "system.h"
+#include "watchdog.h"
 
 enum { PW_MAX_OPTIONS = 12 };
 
@@ -23,8 +24,10 @@ struct pw_run {
   double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
   char *rank_memory;
   double grip, reselect; /* of the active rows at the state reached (rank.h); below this others are tried */
-  double watch, guard;   /* an evaluation with a smaller pivot is near a singular pose; too near */
-  int near;              /* 1 as soon as one was near */
+  pw_watchdog limits;    /* its thresholds */
+  pw_geometry geometry;  /* how near the constraints are to a singular configuration */
+  double refuse;         /* sine at which an evaluation is refused */
+  int near;              /* 1 as soon as one was near a singular configuration */
   double calm;           /* the largest accelerations away from singular poses, in units of L / T^2; at least 1 */
   double before;         /* those of the last state away from them */
   int differentiates;    /* 1: the method uses the derivatives of the equations (tangent.h) */
@@ -186,7 +189,8 @@ int pw_accelerate_swept (pw_run *r, const double *v, double *a, double *lambda);
 /* The state reached, into the sample arrays; the system is placed there, J swept. */
 void pw_show_reached (pw_run *r);
 
-/* Says which constraints an evaluation could not tell apart, and when. */
+/* Says why the J last evaluated could not be used, and when: the rank is lost, or nearly so, or the values are too extreme
+ * (watchdog.c). */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Takes the residuals of the state just accelerated into r->known and the statistics; those that a projection knows are not

@@ -224,7 +224,7 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
                     pw_row_element (r->s, d->projector.against, element, sizeof element));
   if (flag == CV_LSETUP_FAIL && pw_sun_lacks_memory (d->newton.klu)) return multistep_no_memory (r, error);
-  if (singular || r->near) return pw_fail_singular (r, r->t, error);
+  if (singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   const char *why = flag == CV_ERR_FAILURE          ? "the error test fails however small the step"
                     : flag == CV_CONV_FAILURE       ? "the iteration does not converge however small the step"
                     : flag == CV_LSETUP_FAIL        ? "the Newton matrix is singular"
@@ -285,9 +285,9 @@ static int multistep_settle (multistep_data *d) {
   if (d->settled) return PW_OK;
   pw_statistics keep = r->statistics;
   int near = r->near;
-  pw_saddle_set_guard (r->saddle, 0);
+  r->refuse = 0;
   int status = pw_accelerate (r, pw_before_breakpoint (r, r->t), r->q, r->v, r->a, r->lambda);
-  pw_saddle_set_guard (r->saddle, r->guard);
+  r->refuse = r->limits.rank;
   r->statistics = keep;
   r->near = near;
   d->settled = status == PW_OK;
@@ -300,10 +300,10 @@ static int multistep_complete (multistep_data *d, double t) {
   int status = PW_OK;
   pw_statistics keep = r->statistics;
   d->added = 0;
-  pw_saddle_set_guard (r->saddle, 0);
+  r->refuse = 0;
   if (d->projects) status = multistep_project (d, t, r->q_at, r->v_at);
   if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
-  pw_saddle_set_guard (r->saddle, r->guard);
+  r->refuse = r->limits.rank;
   r->projected_at = r->projected + d->added;
   r->statistics = keep;
   return status;

@@ -266,7 +266,7 @@ int pw_nullspace_rates (pw_nullspace *b, pw_run *r, double t, const double *q, d
 int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda) {
   pw_sweep_gamma (r->s, lambda);
   int status = pw_accelerate_swept (r, v, a, lambda);
-  if (pw_saddle_below (r->saddle, r->watch)) r->near = 1;
+  if (pw_watchdog_near (r)) r->near = 1;
   return status;
 }
 

@@ -61,8 +61,8 @@ void pw_projector_close (pw_projector *p) {
 #define PROJECT_ENOUGH (64 * DBL_EPSILON)
 
 /* Redundant rows follow from the others but for round-off; a row that does not contradicts them.  It takes *row. */
-static int project_others (pw_projector *p, const pw_system *s, const double *g, const double *size, int *row) {
-  const double follows = 1e-9;
+static int project_others (pw_projector *p, const pw_system *s, double follows, const double *g, const double *size,
+                           int *row) {
   double most = follows;
   p->against = -1;
   if (p->active == NULL || p->alone) return PW_OK;
@@ -103,7 +103,7 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
   if (p->active == NULL) r->known.position = now.position, r->known.g = now.g;
-  return project_others (p, s, g, size, row);
+  return project_others (p, s, r->limits.follows, g, size, row);
 }
 
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {
@@ -130,7 +130,7 @@ static int project_once (pw_projector *p, pw_system *s, double *v, int fresh) {
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   r->statistics.factorisations++;
   if (project_once (p, r->s, v, 1) != PW_OK) return PW_RETRY;
-  if (pw_saddle_below (p->velocity, r->watch)) project_once (p, r->s, v, 0);
+  if (pw_saddle_below (p->velocity, r->limits.refine)) project_once (p, r->s, v, 0);
   pw_place_rates (r->s, v);
   return PW_OK;
 }

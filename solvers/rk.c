@@ -271,14 +271,6 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   }
 }
 
-/* 1 if the state reached is near a singular pose; what stages of too large a step see says nothing. */
-static int rk_reached_singular (pw_run *r) {
-  int row;
-  r->near = 0;
-  pw_accelerate (r, r->t, r->q, r->v, r->data->a, r->data->lambda);
-  return r->near || pw_saddle_pivot (r->saddle, &row) <= r->guard;
-}
-
 double pw_rk_distance (const pw_run *r) {
   const pw_system *s = r->s;
   const struct pw_method_data *d = r->data;
@@ -298,11 +290,12 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   if (against >= 0) /* a redundant row asks for what the others forbid */
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
                     pw_row_element (r->s, against, element, sizeof element));
-  if (finite && rk_reached_singular (r)) return pw_fail_singular (r, r->t, error);
+  if (finite && pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (!finite && h < 1e-12 * fabs (r->t))
     return pw_fail (error, PW_METHOD, "t = %.6g s: the state is not finite behind it, however small the step", r->t);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", r->t, h,
-                  !finite             ? "the state is no longer finite"
+                  r->data->split      ? "near a singular pose no two divisions of it agree"
+                  : !finite           ? "the state is no longer finite"
                   : r->data->minimal  ? "the velocities' basis does not last"
                   : r->data->projects ? "the projection does not converge"
                                       : "a stage of it lands in a singular pose");

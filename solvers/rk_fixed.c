@@ -28,12 +28,11 @@ static double fixed_compare (pw_run *r) {
  * latter is accepted, and ends at *t, behind `least`. */
 static int fixed_in_parts (pw_run *r, int status, double t1, int project, double least, double *t) {
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
-  const double good = 1e-11, enough = 1e-7;
   const int parts = sizeof part / sizeof *part;
   double start = r->t, best = INFINITY;
   int choice = 0, known = status == PW_OK;
   if (known) fixed_compare (r);
-  for (int i = 0; i < parts && best > good; i++) {
+  for (int i = 0; i < parts && best > r->limits.agree_best; i++) {
     if (start + part[i] * (t1 - start) <= least) continue;
     if (pw_run_asked (r)) return PW_STOPPED;
     status = fixed_two_parts (r, start + part[i] * (t1 - start), t1, project, 0);
@@ -44,7 +43,7 @@ static int fixed_in_parts (pw_run *r, int status, double t1, int project, double
     if (known && off < best) best = off, choice = i;
     known = 1;
   }
-  if (!(best <= enough)) return PW_RETRY;
+  if (!(best <= r->limits.agree)) return PW_RETRY;
   *t = start + part[choice] * (t1 - start);
   return fixed_two_parts (r, *t, t1, project, 1);
 }

@@ -22,9 +22,8 @@ static int sample_step (pw_run *r, const sample_begin *from, double t, int *near
   double added = 0, h = t - from->t;
   r->t = from->t, r->q = from->q, r->v = from->q + n, r->a = from->q + 2 * n, r->rate = from->rate;
   r->near = 0;
-  pw_saddle_set_guard (r->saddle, 0);
+  r->refuse = 0;
   int status = pw_rk_step (r, h, t, d->projects, r->settings.ledger ? &added : NULL);
-  pw_saddle_set_guard (r->saddle, r->guard);
   *near = r->near;
   *r = reached;
   if (r->settings.ledger) pw_rk_ledger (r, r->ledger_at, from->ledger, h);

@@ -20,7 +20,8 @@ int pw_run_blame (const pw_run *r, int status, pw_error *error) {
 int pw_run_open_saddle (pw_run *r, pw_error *error) {
   pw_saddle_close (r->saddle);
   r->saddle = pw_saddle_open (r->s, r->s->mass, r->s->rows, r->active, error);
-  return r->saddle ? PW_OK : error ? error->status : PW_MACHINE;
+  if (r->saddle == NULL) return error ? error->status : PW_MACHINE;
+  return pw_watchdog_open (r, error);
 }
 
 int pw_run_evaluate (pw_run *r, pw_error *error) {
@@ -33,13 +34,10 @@ int pw_run_evaluate (pw_run *r, pw_error *error) {
 }
 
 void pw_run_watch (pw_run *r) {
-  int row;
-  r->watch = 0.02 * pw_saddle_pivot (r->saddle, &row);
-  r->guard = fmin (1e-6, r->watch);
-  pw_saddle_set_guard (r->saddle, r->guard);
+  pw_watchdog_begin (r);
   if (r->redundant == 0) return;
   r->grip = pw_rank_grip (r);
-  r->reselect = fmin (0.6 * r->grip, 0.7);
+  r->reselect = fmin (r->limits.loosened * r->grip, r->limits.loose);
 }
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
@@ -69,6 +67,7 @@ void pw_close (pw_run *r) {
   if (r == NULL) return;
   run_drop_method (r);
   pw_saddle_close (r->saddle);
+  pw_watchdog_close (r);
   pw_rank_close (r);
   r->s->taken = 0;
   free (r->memory);
@@ -84,12 +83,13 @@ static int run_pass_breakpoint (pw_run *r, pw_error *error) {
 
 int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
+  r->geometry.alert = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status != PW_OK && status != PW_MACHINE) return status;
   if (status == PW_OK && fresh)
     pw_run_watch (r);
   else if (status == PW_OK)
-    pw_saddle_set_guard (r->saddle, r->guard);
+    pw_watchdog_begin (r);
   run_drop_method (r);
   if (status == PW_OK) status = r->method->open (r, error);
   if (status != PW_OK) run_drop_method (r);
@@ -119,9 +119,8 @@ static int run_reselect (pw_run *r, pw_error *error) {
 
 /* Libraries take steps below the round-off of time for ever where an evaluation fails just ahead. */
 static int run_check_progress (pw_run *r, double before, pw_error *error) {
-  const int patience = 1000;
   r->stuck = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stuck + 1;
-  if (r->stuck < patience) return PW_OK;
+  if (r->stuck < r->limits.stalled) return PW_OK;
   return pw_fail (
       error, PW_METHOD,
       "t = %.6g s: no step gets any further, however small: what comes next cannot be evaluated, or not within "
@@ -242,10 +241,12 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   run_exchange (r->q, r->q_at, q, n);
   run_exchange (r->v, r->v_at, v, n);
   r->near = 0;
+  r->geometry.alert = 1;
   status = pw_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
+    pw_watchdog_begin (r);
     if (!r->near) pw_run_calm (r); /* near a singular pose they tell nothing */
     r->energy0 += after - before;
     return r->method->restart (r, error);

@@ -65,22 +65,20 @@ static double run_time_scale (const pw_run *r) {
 
 /* Of a dependent row round-off leaves a pivot of 1e-8, and of 1e-5 behind others that hardly differ among themselves: as
  * large a one is looked into by a means that can tell, if the scene is small enough for it. */
-#define RUN_DEPENDENT 1e-5
-#define RUN_SUSPECT 1e-3
-
 /* Opens the saddle at the consistent start and evaluates the accelerations there; if some rows hardly differ from
  * others, an independent set is chosen first. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
-  int row, status = pw_run_open_saddle (r, error);
+  int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;
-  double pivot = pw_saddle_factor (r->saddle) == PW_OK ? pw_saddle_pivot (r->saddle, &row) : 0;
+  double sine = pw_watchdog_sine (r, NULL);
   int large = (double)r->s->rows * r->s->coords > PW_RANK_MOST;
-  if (pivot < (large ? RUN_DEPENDENT : RUN_SUSPECT)) {
+  if (sine < (large ? r->limits.dependent : r->limits.suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
     int chosen = pw_rank_choose (r, error);
     if (chosen == PW_OK && r->redundant) chosen = pw_run_open_saddle (r, error);
     if (chosen != PW_OK) return chosen;
   }
+  r->geometry.alert = 1;
   status = pw_run_evaluate (r, error);
   if (status == PW_OK) pw_run_watch (r);
   return status;
@@ -132,6 +130,9 @@ static int run_check_derivatives (pw_run *r, const char *method, pw_error *error
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
   pw_settings none = { 0 };
   r->s->failed = NULL;
+  r->limits = pw_watchdog_limits;
+  r->refuse = r->limits.rank;
+  if (pw_watchdog_check_masses (r->s, &r->limits, error) != PW_OK) return PW_INPUT;
   if (pw_parse_options (method, &r->method, &r->stabilisation, r->option, error) != PW_OK) return PW_INPUT;
   int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
   if (status == PW_OK && run_allocate (r) != PW_OK)

@@ -1,0 +1,283 @@
+/* The watchdog's thresholds, and how near the constraints are to a singular configuration; see watchdog.h.
+ *
+ * The sine of the smallest angle between a row and those before it changes by at most about as much as bodies move, so it
+ * is computed anew only when the motion since the last time could have brought it to 0. */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "method.h"
+
+/* Residuals are scaled, sines are of angles between rows.  s: the sine over the largest one; d: what constraints are off by.
+ * Where branches meet the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; those that are off by d are
+ * x y = d, whose branches turn where s^2 = 2 d. */
+const pw_watchdog pw_watchdog_limits = {
+  /* A hundredth of the scene is no longer its motion; without stabilisation some drift is what was asked for. */
+  .lost = 1e-2,
+  .lost_unstabilised = 0.1,
+
+  /* A redundant row follows from the others to some 1e6 eps of round-off, or to what they are off by, magnified by a sine as
+   * small as 1e-4. */
+  .follows = 1e-9,
+  .magnified = 1e4,
+
+  /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; 1e-6 is the sine below which accelerations, good to
+   * eps / s after refinement, are wrong by more than 1e-10 even so.  `suspect`: behind others that hardly differ, round-off
+   * leaves up to 1e-5; a hundred times that is looked into where it can be, `dependent` is refused where not. */
+  .rank = 1e-6,
+  .suspect = 1e-3,
+  .dependent = 1e-5,
+
+  /* A stage of a step h is off by about h^2 / 8, which decides on the branch if s^2 is not large beside it: at 1e-3 s and a few
+   * rad/s for s of 0.02.  A factorisation is good to eps / s^2, 5e-13 at 0.02. */
+  .near = 0.02,
+  .refine = 0.02,
+
+  /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest; accelerations
+   * have left their level by a factor of 3 when it is 0.02 to 0.07.  What is `regular` is no singular configuration, however
+   * large the drift. */
+  .regular = 0.6,
+  .turn = 3,
+  .least_turn = 0.1,
+  .drift_turn = 0.02,
+  .drift_near = 0.01,
+  .drift_far = 1e-2,
+  .drift_any = 0.1,
+
+  /* Nonholonomic rows: the motion passes a singular configuration calmly, a jump reaches 1 / near^1 times and more. */
+  .jump = 100,
+
+  /* The direction of a row of length 1 turns by at most an angle of 1 per rad, that of the others too; step sizes of one
+   * step to the next. */
+  .lipschitz = 2,
+  .growth = 2,
+
+  /* Change points (change_point.c): a sine within a step that is below an eighth of those at its ends is that of a corner
+   * shorter than the step can know of; half of it shows that there may be one.  Strides of 0.3 s stay on a curve whose radius
+   * is s.  A stride that comes no nearer by a tenth of its length leads elsewhere. */
+  .dip = 0.125,
+  .sag = 0.5,
+  .stride = 0.3,
+  .progress = 0.1,
+
+  /* The projection leaves residuals of 1e-14, and with these the sine is known to 1e-7: what is below `floor`, ten times
+   * that, cannot be told from 0 (`met`, with a stride's play).  Such a point is left straight on, at an angle below
+   * 60 degrees to where it was entered. */
+  .floor = 1e-6,
+  .met = 2e-6,
+  .ahead = 0.5,
+
+  /* Methods of order 2 leave (0.4)^2 / 12 = 1 % at a corner as long as 1 / 0.4 steps. */
+  .resolved = 0.4,
+
+  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the error of
+   * a good step, 1e-7, do not agree. */
+  .agree = 1e-7,
+  .agree_best = 1e-11,
+
+  /* Least part of a set of rows that holds the others: another one is looked for at 0.6 of the grip there was, and where a
+   * coefficient exceeds 1 / 0.7. */
+  .loosened = 0.6,
+  .loose = 0.7,
+
+  /* Products of three masses must neither overflow nor vanish. */
+  .extreme = 1e100,
+
+  /* Libraries reduce a step by 4 to 10 at a time, 25 times until nothing is left of it. */
+  .stalled = 1000,
+};
+
+enum { WATCHDOG_PLACES = 4 };
+
+/* ---- Opening ---- */
+
+static int watchdog_root (int *set, int b) {
+  while (set[b] != b) b = set[b] = set[set[b]];
+  return b;
+}
+
+/* 1 if an element joins bodies that others join already (the ground is a body); -1 if memory does not suffice. */
+static int watchdog_has_loops (const pw_system *s) {
+  int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
+  if (set == NULL) return -1;
+  for (int b = 0; b <= s->bodies; b++) set[b] = b;
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints && k->row < s->holonomic; k++)
+    for (int e = 0; e < k->b.count; e++)
+      for (int n = 1; n < k->kind->bodies; n++) {
+        const int *column = k->column + e * k->kind->bodies;
+        int a = watchdog_root (set, column[0] < 3 * s->bodies ? column[0] / 3 : s->bodies);
+        int b = watchdog_root (set, column[n] < 3 * s->bodies ? column[n] / 3 : s->bodies);
+        loops |= a == b;
+        set[b] = a;
+      }
+  free (set);
+  return loops;
+}
+
+/* The rows of a tree of bodies cannot become dependent, whatever its configuration. */
+int pw_watchdog_open (pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  pw_geometry *g = &r->geometry;
+  size_t n = (size_t)s->coords + 3;
+  g->loops = watchdog_has_loops (s);
+  if (g->loops < 0) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  g->fixed = pw_fixed_steps (r);
+  if (g->loops == 0 && s->rows == s->holonomic) return PW_OK;
+  pw_saddle_close (g->saddle);
+  if (g->q == NULL) g->q = malloc (n * sizeof *g->q);
+  double *weight = malloc (n * sizeof *weight);
+  g->saddle = NULL;
+  if (g->q && weight) {
+    for (int j = 0; j < s->coords; j++) weight[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
+    g->saddle = pw_saddle_open (r->s, weight, s->rows, r->active, error);
+  }
+  free (weight);
+  return g->saddle ? PW_OK : pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+}
+
+void pw_watchdog_close (pw_run *r) {
+  pw_saddle_close (r->geometry.saddle);
+  free (r->geometry.q);
+  r->geometry = (pw_geometry){ 0 };
+}
+
+/* ---- Sines ---- */
+
+double pw_watchdog_sine (pw_run *r, int *row) {
+  int which;
+  pw_saddle *k = r->geometry.saddle;
+  if (k == NULL) return 1;
+  int status = pw_saddle_factor (k);
+  double sine = pw_saddle_pivot (k, &which);
+  if (row) *row = which;
+  return status == PW_OK && !isnan (sine) ? sine : 0;
+}
+
+int pw_watchdog_near (pw_run *r) {
+  pw_geometry *g = &r->geometry;
+  if (!g->alert || g->saddle == NULL) return 0;
+  if (!g->fixed && !pw_saddle_below (r->saddle, r->limits.refine)) return 0;
+  g->sine = pw_watchdog_sine (r, NULL);
+  return g->sine < r->limits.near * g->typical;
+}
+
+int pw_fail_singular (pw_run *r, double t, pw_error *error) {
+  char element[120] = "a constraint";
+  int row = -1;
+  double sine = pw_watchdog_sine (r, &row);
+  if (sine > r->limits.near * r->geometry.typical)
+    return pw_fail (
+        error, PW_METHOD,
+        "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
+        "cannot be solved; the configuration is not singular",
+        t);
+  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
+  if (sine <= r->limits.rank)
+    return pw_fail (error, PW_METHOD, "t = %.6g s: singular pose: %s says what other constraints say already", t,
+                    element);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: near a singular pose: %s says almost what other constraints say (sine %.2g); the next "
+                  "step cannot be computed",
+                  t, element, sine);
+}
+
+int pw_watchdog_near_state (pw_run *r) {
+  if (pw_place (r->s, r->t, r->q, r->v) != PW_OK) return 0;
+  pw_sweep_J (r->s);
+  r->geometry.alert = 1;
+  return pw_watchdog_near (r);
+}
+
+int pw_watchdog_check_masses (const pw_system *s, const pw_watchdog *limits, pw_error *error) {
+  for (int j = 0; j < s->coords; j++) {
+    double mass = s->mass[j] / (pw_is_angle (s, j) ? s->scale.length * s->scale.length : 1);
+    char name[120];
+    if (mass == 0 || (mass < limits->extreme && mass > 1 / limits->extreme)) continue;
+    return pw_fail (
+        error, PW_INPUT,
+        "model %s: values too extreme: the mass or inertia that goes with %s is %g: expected 0, or %g to %g", s->model,
+        pw_state_name (s, j, name, sizeof name), s->mass[j], 1 / limits->extreme, limits->extreme);
+  }
+  return PW_OK;
+}
+
+/* ---- Following the motion ---- */
+
+/* The largest change of a coordinate in the last step, since the last state. */
+static double watchdog_step (pw_run *r) {
+  const pw_system *s = r->s;
+  double *last = r->geometry.q, length = 0, angle = 0;
+  int n = 3 * s->bodies;
+  for (int j = 0; j < n; j += 3) {
+    length = pw_larger (fabs (r->q[j] - last[j]), length);
+    length = pw_larger (fabs (r->q[j + 1] - last[j + 1]), length);
+    angle = pw_larger (fabs (r->q[j + 2] - last[j + 2]), angle);
+  }
+  return pw_larger (length / s->scale.length, angle);
+}
+
+/* The sine is that at the state reached. */
+static void watchdog_know (pw_run *r, double sine) {
+  pw_geometry *g = &r->geometry;
+  g->known = sine;
+  g->moved = 0;
+  g->typical = fmax (g->typical, sine);
+}
+
+int pw_watchdog_reaches (const pw_run *r, double sine, double length) {
+  const pw_geometry *g = &r->geometry;
+  return g->saddle && !(g->known - r->limits.lipschitz * g->typical * (g->moved + length) > sine);
+}
+
+/* What sines are like elsewhere: at configurations all over the place, which need not meet the constraints. */
+static void watchdog_look_around (pw_run *r) {
+  pw_system *s = r->s;
+  pw_geometry *g = &r->geometry;
+  for (int n = 1; n <= WATCHDOG_PLACES; n++) {
+    for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * sin (2.39996 * (j + 1) * n + n);
+    if (pw_place (s, r->t, g->q, r->v) != PW_OK) break;
+    pw_sweep_J (s);
+    g->typical = fmax (g->typical, pw_watchdog_sine (r, NULL));
+  }
+  if (pw_place (s, r->t, r->q, r->v) == PW_OK) pw_sweep_J (s);
+}
+
+void pw_watchdog_begin (pw_run *r) {
+  pw_geometry *g = &r->geometry;
+  size_t n = (size_t)r->s->coords * sizeof (double);
+  if (g->saddle == NULL) return;
+  if (g->typical == 0) watchdog_look_around (r);
+  watchdog_know (r, pw_watchdog_sine (r, NULL));
+  g->t = r->t;
+  g->begun = g->known;
+  g->step = g->slope = 0;
+  g->before = NAN;
+  g->crossed = 0;
+  g->alert = 1;
+  memcpy (g->q, r->q, n);
+}
+
+int pw_watchdog_follow (pw_run *r, pw_error *error) {
+  pw_geometry *g = &r->geometry;
+  int status = PW_OK;
+  size_t n = (size_t)r->s->coords * sizeof (double);
+  if (g->saddle == NULL) return PW_OK;
+  g->step = watchdog_step (r);
+  g->moved += g->step;
+  double near = r->limits.near * g->typical;
+  int now = pw_watchdog_reaches (r, near, r->limits.growth * g->step);
+  if (now) {
+    double last = g->moved == g->step ? g->known : NAN;
+    watchdog_know (r, pw_watchdog_sine (r, &g->row));
+    status = pw_change_point_check (r, g->known, error);
+    if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
+    g->before = last;
+  } else
+    g->before = NAN, g->slope = 0, g->crossed = 0;
+  if (now && g->known < near) r->near = 1;
+  g->alert = now && pw_watchdog_reaches (r, near, r->limits.growth * g->step);
+  g->t = r->t;
+  g->begun = now ? g->known : NAN;
+  memcpy (g->q, r->q, n);
+  return status;
+}
