@@ -189,7 +189,7 @@ int pw_watchdog_near_state (pw_run *r) {
 }
 
 int pw_watchdog_check_masses (const pw_system *s, const pw_watchdog *limits, pw_error *error) {
-  for (int j = 0; j < s->coords; j++) {
+  for (int j = 0; s->rows > 0 && j < s->coords; j++) {
     double mass = s->mass[j] / (pw_is_angle (s, j) ? s->scale.length * s->scale.length : 1);
     char name[120];
     if (mass == 0 || (mass < limits->extreme && mass > 1 / limits->extreme)) continue;

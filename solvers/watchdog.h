@@ -60,7 +60,7 @@ double pw_watchdog_sine (struct pw_run *r, int *row);
 /* The same for the state reached. */
 int pw_watchdog_near_state (struct pw_run *r);
 
-/* Refuses masses and inertias whose products overflow.  Errors: PW_INPUT. */
+/* Refuses masses and inertias whose products overflow; without constraints there are none.  Errors: PW_INPUT. */
 int pw_watchdog_check_masses (const pw_system *s, const pw_watchdog *limits, pw_error *error);
 
 /* 1 if the sine may be below this one, or a motion of this length from the state reached may bring it there. */
