@@ -75,11 +75,6 @@ int pw_saddle_below (const pw_saddle *k, double sine) {
   return pw_saddle_pivot (k, &row) < sine;
 }
 
-void pw_saddle_set_guard (pw_saddle *k, double guard) {
-  k->guard = fmax (guard * guard, SADDLE_ROUND_OFF);
-  if (k->small) k->small->guard = k->guard;
-}
-
 double pw_saddle_pivot (const pw_saddle *k, int *row) {
   double pivot = k->pivot;
   *row = k->pivot_row < 0 && k->reduce.components ? pw_reduce_weakest (&k->reduce) : k->pivot_row;

@@ -18,12 +18,9 @@ typedef struct pw_saddle pw_saddle;
 pw_saddle *pw_saddle_open (pw_system *s, const double *weight, int rows, const unsigned char *active, pw_error *error);
 void pw_saddle_close (pw_saddle *k);
 
-/* Factorises with the J last swept.  Returns PW_OK, or PW_RETRY if the smallest pivot is below the guard. */
-int pw_saddle_factor (pw_saddle *k);
-
-/* The least pivot that is good, as pw_saddle_pivot measures it; at first, and at least, what round-off leaves of a
+/* Factorises with the J last swept.  Returns PW_OK, or PW_RETRY if the smallest pivot is what round-off leaves of a
  * dependent row. */
-void pw_saddle_set_guard (pw_saddle *k, double guard);
+int pw_saddle_factor (pw_saddle *k);
 
 /* Solves for a (coords) and lambda (rows; inactive ones get 0).  f may be NULL: zero.  a and f may be
  * the same, lambda and gamma too. */
