@@ -1,0 +1,203 @@
+"""Random mechanisms by every method of Pinwheel, against the reference.
+
+  compare.py [--seed S] [--count N] [--methods A,B,...] [--keep FOLDER] [--program PATH] [--verbose]
+
+Prints counts, and for each mismatch the seed, the method, errors and bounds; status 1 if there are any."""
+import argparse
+import collections
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import numpy as np
+from mechanisms import SPAN, random_mechanism
+
+ORDER = {"rk4": 4, "galpha": 2, "leapfrog": 2}  # of the methods with fixed steps
+STEP = {"rk4": 0.005, "galpha": 0.002, "leapfrog": 0.002}  # [s]
+RTOL = {"erk5": 1e-8, "erk8": 1e-8, "adams": 1e-8, "bdf": 1e-8, "ida": 1e-8}
+
+
+class Refused(Exception):
+    """A run that Pinwheel ends with a status other than 0."""
+
+
+def methods(program):
+    """All INTEGRATOR+STABILISATION of `pinwheel list methods`."""
+    out, integrator = [], None
+    for line in subprocess.run([program, "list", "methods"], capture_output=True, text=True, check=True).stdout.splitlines():
+        name = re.match(r"  (\w+)  ", line)
+        integrator = name.group(1) if name else integrator
+        if re.match(r"    \+\w+", line):
+            out.append(integrator + line.split()[0])
+    return out
+
+
+def reason_in(text):
+    """The line of an error among notices."""
+    lines = [x for x in text.splitlines() if not re.search("redundant|is kept in|were moved|derivatives by", x)]
+    return lines[-1] if lines else ""
+
+
+def run(program, path, method, span, every, setting, more=()):
+    """The rows of a run as dicts, and its summary."""
+    with tempfile.TemporaryDirectory() as d:
+        command = [program, "run", path, "-m", method, "-t", repr(span), "--every", repr(every), "--energy", "-o", d + "/t.csv",
+                   "--json", d + "/s.json", *setting, *more]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+        except subprocess.TimeoutExpired:
+            raise Refused("takes longer than 60 s") from None
+        if done.returncode != 0:
+            raise Refused("exit %d: %s" % (done.returncode, reason_in(done.stderr)))
+        with open(d + "/t.csv") as f:
+            rows = [{k.split(" [")[0]: float(x) for k, x in row.items()} for row in csv.DictReader(f)]
+        with open(d + "/s.json") as f:
+            return rows, json.load(f)
+
+
+def groups(m, row):
+    """The columns of a row that are compared, by what they are."""
+    positions, velocities = m.names()
+    reactions = [k for k in row if k not in positions + velocities and not k.endswith((".work", ".loss")) and "." in k]
+    # How redundant constraints share their work is not unique, as their reactions are not.
+    ledger = ["kinetic", "potential"] + [k for k in row if k.endswith(".loss") or k.endswith(".work") and m.regular] + \
+        ["work"] * (not m.regular)
+    return {"positions": positions, "velocities": velocities, "reactions": reactions, "ledger": ledger}
+
+
+def with_sum(row):
+    return {**row, "work": sum(x for k, x in row.items() if k.endswith(".work"))}
+
+
+def errors(m, table, rows, states_only=False):
+    """Largest difference of each group, relative to its largest value or 1, over the times of the reference."""
+    out, table, rows = {}, [with_sum(r) for r in table], [with_sum(r) for r in rows]
+    for name, columns in groups(m, table[0]).items():
+        if states_only and name in ("reactions", "ledger"):
+            continue
+        size = max([1.0] + [abs(r[c]) for r in table for c in columns])
+        worst = 0.0
+        for want in table:
+            got = min(rows, key=lambda r: abs(r["t"] - want["t"]))
+            for c in columns:
+                if states_only and c not in got:
+                    continue
+                # A power that never is needs no column.
+                x = got.get(c, 0.0 if c.endswith((".work", ".loss")) else np.nan)
+                worst = np.maximum(worst, abs(x - want[c]) / size)
+        out[name] = float(worst)
+    return out
+
+
+def setting(integrator, refine):
+    if integrator in STEP:
+        return ["--step", repr(STEP[integrator] / 2**refine)]
+    return ["--rtol", repr(RTOL[integrator] / 10**refine)]
+
+
+# A tolerance is one on the error of a step.  Over the span, tens to hundreds of steps add theirs, and the motion itself
+# magnifies them; multistep methods keep up to six derivatives of the past.  In 300 mechanisms the largest of these factors
+# were TODO.
+FACTOR = {"erk5": 1e3, "erk8": 1e3, "adams": 1e4, "bdf": 1e4, "ida": 1e4}
+FLOOR = 1e-8  # of the reference, at rtol 1e-11
+
+
+def converges(m, table, method, rows, states_only=False):
+    """None, or what is wrong: errors by group, at ever finer settings; rows (refine): those of a run.
+
+    Steps: halved, the error goes down by 2^order, or is below the floor.  Tolerances: the error is below FACTOR times the
+    tolerance.  Where that is not seen at once, at finer settings again: at coarse ones a method may be outside its
+    asymptotic range."""
+    integrator = method.split("+")[0]
+    history = []
+    for refine in range(5):
+        history.append(errors(m, table, rows(refine), states_only))
+        if integrator in STEP:
+            if refine == 0:
+                continue
+            bad = [g for g, e in history[-1].items()
+                   if not (e < FLOOR or e < history[-2][g] / 2**(ORDER[integrator] - 0.6) and e < 1e-2)]
+        else:
+            bad = [g for g, e in history[-1].items() if not e < FLOOR + FACTOR[integrator] * RTOL[integrator] / 10**refine]
+        if not bad:
+            return None
+    return "%s: %s" % (", ".join(bad), "; ".join(" ".join("%s %.2g" % (g, e[g]) for g in bad) for e in history))
+
+
+def judge(program, path, m, table, method):
+    integrator = method.split("+")[0]
+    return converges(m, table, method, lambda refine: run(program, path, method, SPAN, SPAN / 2, setting(integrator, refine))[0])
+
+
+def reason_of(text):
+    """A message without the numbers and names of one case."""
+    text = re.sub(r"\b[be]\d+(\.\w+)?\b", "..", text)
+    return re.sub(r"[-+]?\d[\d.e+-]*", "#", text)
+
+
+def features(m):
+    model = m.model
+    found = {next(iter(e)) for e in model["elements"]}
+    for e in model["elements"]:
+        for field, s in e.items():
+            if field in ("value", "torque", "fx", "fy", "rate", "heading", "angle"):
+                if isinstance(s, dict):
+                    form = next(iter(s))
+                    found.add("signal " + form + (" " + s[form].get("interpolation", "linear") if form == "table" else ""))
+                elif isinstance(s, str):
+                    found.add("signal expression of " + ("states" if "b" in re.sub("tanh", "", s) else "time"))
+    if min(m.mass) == 0:
+        found.add("massless")
+    if not m.regular:
+        found.add("redundant")
+    return found
+
+
+def main():
+    p = argparse.ArgumentParser()
+    p.add_argument("--seed", type=int, default=1)
+    p.add_argument("--count", type=int, default=300)
+    p.add_argument("--methods")
+    p.add_argument("--keep", default=None, help="folder for models of mismatches")
+    p.add_argument("--program", default=os.environ.get("PINWHEEL", "build/pinwheel"))
+    p.add_argument("--verbose", action="store_true")
+    a = p.parse_args()
+    which = a.methods.split(",") if a.methods else methods(a.program)
+    counts, reasons, seen = collections.Counter(), collections.Counter(), collections.Counter()
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(a.seed, a.seed + a.count):
+            m, table, _ = random_mechanism(seed)
+            path = os.path.join(a.keep or folder, "m%d.yaml" % seed)
+            with open(path, "w") as f:
+                json.dump(m.model, f)
+            seen.update(features(m))
+            good = True
+            for method in which:
+                try:
+                    wrong = judge(a.program, path, m, table, method)
+                except Refused as e:
+                    counts["failed"] += 1
+                    reasons[method.split("+")[0], reason_of(str(e))] += 1
+                    print("failed seed %d %s: %s" % (seed, method, e), flush=True)
+                    good = False
+                    continue
+                counts["compared"] += 1
+                if wrong:
+                    counts["mismatches"] += 1
+                    print("MISMATCH seed %d %s: %s" % (seed, method, wrong), flush=True)
+                    good = False
+            if good and a.keep:
+                os.remove(path)
+    print("mechanisms with: " + ", ".join("%s %d" % x for x in sorted(seen.items())))
+    for (method, reason), n in reasons.most_common():
+        print("failed: %4d %s: %s" % (n, method, reason))
+    print("%d mechanisms x %d methods: %d compared, %d failed with a reason, %d mismatches" % (
+        a.count, len(which), counts["compared"], counts["failed"], counts["mismatches"]))
+    return 1 if counts["mismatches"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,106 @@
+"""Random mechanisms in other words: the same motion in other units, mirrored, displaced, turned, in another order, in two
+runs, by equivalent elements.  Each is compared with the reference of the first.
+
+  metamorphic.py [--seed S] [--count N] [--program PATH] [--keep FOLDER]"""
+import argparse
+import collections
+import json
+import os
+import random
+import re
+import sys
+import tempfile
+import compare
+import transform
+from mechanisms import SPAN, random_mechanism
+
+# One method of each kind; their settings, which go with the unit of time.
+METHODS = ["erk8+projection", "rk4+projection", "bdf+projection", "ida+ggl", "galpha+ggl", "leapfrog+rattle", "erk5+nullspace", "adams+baumgarte"]
+
+
+def settings(method, s, refine):
+    integrator = method.split("+")[0]
+    if integrator in compare.STEP:
+        return ["--step", repr(compare.STEP[integrator] / 2**refine * s)]
+    return ["--rtol", repr(compare.RTOL[integrator] / 10**refine)]
+
+
+class Check:
+    """What all transformations share: the mechanism, its reference, where to write models, what was found."""
+
+    def __init__(self, args, seed, folder, counts):
+        self.args, self.seed, self.folder, self.counts = args, seed, folder, counts
+        self.m, self.table, _ = random_mechanism(seed)
+        self.r = random.Random(seed)
+
+    def write(self, name, model):
+        path = os.path.join(self.args.keep or self.folder, "m%d-%s.yaml" % (self.seed, name))
+        with open(path, "w") as f:
+            json.dump(model, f)
+        return path
+
+    def tell(self, name, method, wrong):
+        self.counts[name, "mismatches" if wrong else "good"] += 1
+        if wrong:
+            print("MISMATCH seed %d %s %s: %s" % (self.seed, name, method, wrong), flush=True)
+
+    def transformed(self, name, result, method):
+        if result is None:
+            return
+        model, back, s = result
+        path = self.write(name, model)
+
+        def rows(refine):
+            out, _ = compare.run(self.args.program, path, method, SPAN * s, SPAN * s / 2, settings(method, s, refine))
+            return [back(row) for row in out]
+        self.attempt(name, method, lambda: compare.converges(self.m, self.table, method, rows, name.startswith("equivalent")))
+        if not self.args.keep:
+            os.remove(path)
+
+    def attempt(self, name, method, wrong):
+        try:
+            self.tell(name, method, wrong())
+        except compare.Refused as e:
+            self.tell(name, method, str(e))
+
+    def split(self, method):
+        """A run to the middle, and another one from where it ended."""
+        half = SPAN / 2
+        first, second = self.write("first", self.m.model), self.write("second", transform.later(self.m.model, half))
+
+        def rows(refine):
+            a, _ = compare.run(self.args.program, first, method, half, half, settings(method, 1, refine))
+            positions, velocities = self.m.names()
+            start = [x for k in positions + velocities for x in ("--start", "%s=%r" % (k, a[-1][k]))]
+            b, _ = compare.run(self.args.program, second, method, half, half, settings(method, 1, refine), start)
+            whole = {k: x + (a[-1][k] if k.endswith((".work", ".loss")) else half if k == "t" else 0) for k, x in b[-1].items()}
+            return [a[0], a[-1], whole]
+        self.attempt("split", method, lambda: compare.converges(self.m, self.table, method, rows))
+
+
+def main():
+    p = argparse.ArgumentParser()
+    p.add_argument("--seed", type=int, default=1)
+    p.add_argument("--count", type=int, default=40)
+    p.add_argument("--keep", default=None, help="folder for models")
+    p.add_argument("--program", default=os.environ.get("PINWHEEL", "build/pinwheel"))
+    a = p.parse_args()
+    counts = collections.Counter()
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(a.seed, a.seed + a.count):
+            c = Check(a, seed, folder, counts)
+            for method in [METHODS[0], c.r.choice(METHODS[1:])]:
+                for f in (transform.units, transform.mirrored, transform.displaced, transform.turned, transform.shuffled):
+                    c.transformed(f.__name__, f(c.m.model, c.r), method)
+                c.split(method)
+                for i, rules in enumerate(transform.EQUIVALENT):
+                    c.transformed("equivalent-" + "-".join(rules), transform.rewrite(c.m.model, rules, c.r), method)
+    for name in sorted({k for k, _ in counts}):
+        print("%-40s %5d good %5d mismatches" % (name, counts[name, "good"], counts[name, "mismatches"]))
+    bad = sum(n for (_, what), n in counts.items() if what == "mismatches")
+    print("%d metamorphic comparisons, %d mismatches" % (sum(counts.values()), bad))
+    return 1 if bad else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

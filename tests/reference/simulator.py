@@ -1,0 +1,497 @@
+"""A second simulator: dense, from the positions of points and their derivatives, without any of Pinwheel's code.
+
+It reads a text model in the syntax of JSON, numbers written as such.  The equations of each element are those of the
+manual, stated through points, directions and what does work on them: a constraint is a quantity that does not change, or
+changes as a signal asks, and its multiplier mu is the force or moment that does work on it,
+
+    M a = f + J^T mu,    J a + b = 0         b: the second derivatives of the constraints at zero accelerations."""
+import bisect
+import json
+import math
+import sys
+import numpy as np
+from scipy.integrate import DOP853
+import taylor
+from taylor import Jet, Rate, dot
+from signals import Signal
+
+
+class Failure(Exception):
+    """A mechanism for which the reference has no trustworthy solution: what is wrong with it."""
+
+
+class Frame:
+    """A body in motion, or the ground: position z of its centre of mass, direction e of its x axis, angle phi."""
+
+    def __init__(self, z, phi):
+        self.z, self.phi = z, phi
+        self.e = taylor.turn(phi)
+
+    def point(self, s):
+        return self.z + self.e * complex(*s)
+
+    def direction(self, angle):
+        return self.e * complex(math.cos(angle), math.sin(angle))
+
+
+class Now:
+    """One state of a mechanism: frames, and what its elements add.
+
+    rows: (name, Rate, g or None); f: applied forces by coordinate; work, loss: powers by element [W]; potential [J]"""
+
+    def __init__(self, m, t, middle, q, v):
+        self.m, self.t, self.middle = m, t, middle
+        unit = m.unit
+        self.coordinate = [Jet(q[i], v[i], 0.0, unit[i]) for i in range(m.n)]
+        zero = np.zeros(m.n)
+        self.frame = {"ground": Frame(Jet(0j, 0j, 0j, zero), Jet(0.0, 0.0, 0.0, zero))}
+        for k, name in enumerate(m.bodies):
+            i = 3 * k
+            self.frame[name] = Frame(Jet(complex(q[i], q[i + 1]), complex(v[i], v[i + 1]), 0j, unit[i] + 1j * unit[i + 1]),
+                                     self.coordinate[i + 2])
+        self.states = m.named(q, v) if m.reads_states else None
+        self.rows, self.f = [], np.zeros(m.n)
+        self.work, self.loss, self.potential = {}, {}, 0.0
+        self.driven = []
+        for kind, name, e in m.elements:
+            KINDS[kind](self, name, e)
+
+    def signal(self, e, field):
+        s = self.m.signals.get((id(e), field))
+        return s.at(self.t, self.middle, self.states) if s else Jet(0.0)
+
+    def two(self, e):
+        return [self.frame[b] for b in e["body"]]
+
+    def points(self, e):
+        return [self.frame[b].point(s) for b, s in zip(e["body"], e.get("at", [[0, 0], [0, 0]]))]
+
+    def hold(self, name, g):
+        """A scalar that stays zero."""
+        self.rows.append((name, g.rate(), g.x))
+
+    def force(self, effort, rate):
+        """A scalar force or moment on what the rate is the velocity of."""
+        self.f += effort * rate.g
+
+    def push(self, F, P):
+        """A force, as a vector, on a point."""
+        self.f += (F.conjugate() * P.g).real
+
+
+def pin(now, name, e):
+    P, Q = now.points(e)
+    d = P - Q
+    now.hold(name + ".Fx", taylor.real(d))
+    now.hold(name + ".Fy", taylor.real(d * -1j))
+
+
+def weld(now, name, e):
+    pin(now, name, e)
+    A, B = now.two(e)
+    now.hold(name + ".M", A.phi - B.phi + e.get("angle", 0))
+
+
+def slot(now, name, e):
+    P, Q = now.points(e)
+    now.hold(name + ".N", dot(now.two(e)[1].direction(e.get("heading", 0)) * 1j, P - Q))
+
+
+def slider(now, name, e):
+    slot(now, name, e)
+    A, B = now.two(e)
+    now.hold(name + ".M", A.phi - B.phi - e.get("angle", 0))
+
+
+def rod(now, name, e):
+    P, Q = now.points(e)
+    now.hold(name + ".F", taylor.sqrt(dot(P - Q, P - Q)) - e["length"])
+
+
+def gear(now, name, e):
+    A, B, C = (f.phi for f in now.two(e))
+    a, b, c = (now.m.start_angle(x) for x in e["body"])
+    i = e["ratio"]
+    offset = e.get("offset", 0) if e.get("from", "start") == "offset" else a - c - i * (b - c)
+    now.hold(name + ".M", A - C - (B - C) * i - offset)
+
+
+def drive(now, name, e):
+    u = now.signal(e, "value")
+    A, B = now.two(e)
+    P, Q = now.points(e)
+    if e["what"] == "angle":
+        g = A.phi - B.phi - u
+    else:
+        g = dot(B.direction(0 if e["what"] == "x" else math.pi / 2), P - Q) - u
+    now.hold(name + ".F", g)
+    now.driven.append((name, len(now.rows) - 1, u.d))
+
+
+def heading(now, e):
+    return now.frame[e["body"]].direction(e.get("heading", 0))
+
+
+def contact(now, e):
+    return now.frame[e["body"]].point(e.get("at", [0, 0]))
+
+
+def wheel(now, name, e):
+    now.rows.append((name + ".N", dot(heading(now, e) * 1j, contact(now, e).rate()), None))
+
+
+def rolling_wheel(now, name, e):
+    wheel(now, name, e)
+    spin = now.coordinate[now.m.own[name]]
+    now.rows.append((name + ".T", dot(heading(now, e), contact(now, e).rate()) - spin.rate() * e["radius"], None))
+    u = now.signal(e, "torque").x
+    now.force(u, spin.rate())
+    now.work[name] = u * spin.d
+
+
+def steered_wheel(now, name, e):
+    h = now.frame[e["body"]].e * taylor.turn(now.signal(e, "heading"))
+    now.rows.append((name + ".N", dot(h * 1j, contact(now, e).rate()), None))
+
+
+def prescribed(now, name, rate, u):
+    """A rate that is u, whose power is that of mu."""
+    now.rows.append((name + ".F", Rate(rate.x - u.x, rate.d - u.d, rate.g), None))
+    now.driven.append((name, len(now.rows) - 1, u.x))
+
+
+def speed(now, name, e):
+    prescribed(now, name, dot(heading(now, e), contact(now, e).rate()), now.signal(e, "value"))
+
+
+def pfaffian(now, name, e):
+    A, B = now.two(e)
+    total = None
+    for body, (x, y, turning) in ((A, e["a"]), (B, e.get("b", [0, 0, 0]))):
+        part = dot(A.e * complex(x, y), body.z.rate()) + body.phi.rate() * turning
+        total = part if total is None else total + part
+    prescribed(now, name, total, now.signal(e, "value"))
+
+
+def tyre(now, name, e):
+    P, h = contact(now, e), heading(now, e)
+    along, across = dot(h, P.rate()).x, dot(h * 1j, P.rate()).x
+    F = -e["stiffness"] * across / math.hypot(along, e["speed"])
+    limit = e.get("load", 0) * e.get("friction", 0)
+    if limit > 0:
+        F = limit * math.tanh(F / limit)
+    now.push(F * h.x * 1j, P)
+    now.loss[name] = -F * across
+
+
+def rolling_resistance(now, name, e):
+    w = dot(heading(now, e), contact(now, e).rate())
+    F = -e["limit"] * math.tanh(w.x / e["speed"])
+    now.force(F, w)
+    now.loss[name] = -F * w.x
+
+
+def spring(now, name, e):
+    P, Q = now.points(e)
+    l = taylor.sqrt(dot(P - Q, P - Q))
+    now.m.near(l.x, name)
+    stretch, c = l.x - e.get("length", 0), e.get("damping", 0)
+    now.force(-e["stiffness"] * stretch - c * l.d, l.rate())
+    now.potential += e["stiffness"] * stretch**2 / 2
+    now.loss[name] = c * l.d**2
+
+
+def rotational_spring(now, name, e):
+    A, B = now.two(e)
+    angle, c = A.phi - B.phi - e.get("angle", 0), e.get("damping", 0)
+    now.force(-e["stiffness"] * angle.x - c * angle.d, angle.rate())
+    now.potential += e["stiffness"] * angle.x**2 / 2
+    now.loss[name] = c * angle.d**2
+
+
+def resisted(now, name, e, w):
+    """A viscous and a Coulomb force against the rate w."""
+    F = e.get("viscous", 0) * w.x
+    if e.get("limit", 0) > 0:
+        F += e["limit"] * math.tanh(w.x / e["speed"])
+    now.force(-F, w)
+    now.loss[name] = F * w.x
+
+
+def friction(now, name, e):
+    A, B = now.two(e)
+    resisted(now, name, e, (A.phi - B.phi).rate())
+
+
+def sliding_friction(now, name, e):
+    P, Q = now.points(e)
+    resisted(now, name, e, dot(now.two(e)[1].direction(e.get("heading", 0)), P - Q).rate())
+
+
+def drag(now, name, e):
+    A = now.frame[e["body"]]
+    v, w = A.z.d, A.phi.d
+    F = -(e.get("linear", 0) + e.get("quadratic", 0) * abs(v)) * v
+    M = -(e.get("turning", 0) + e.get("turning_quadratic", 0) * abs(w)) * w
+    now.push(F, A.z)
+    now.force(M, A.phi.rate())
+    now.loss[name] = -(F * v.conjugate()).real - M * w
+
+
+def gravity(now, name, e):
+    a = complex(*e["acceleration"])
+    for body, mass in zip(now.m.bodies, now.m.mass[0::3]):
+        z = now.frame[body].z
+        now.push(mass * a, z)
+        now.potential -= mass * (a.conjugate() * z.x).real
+
+
+def force(now, name, e):
+    F = complex(now.signal(e, "fx").x, now.signal(e, "fy").x)
+    if e.get("axes", "world") == "body":
+        F *= now.frame[e["body"]].e.x
+    P = contact(now, e)
+    now.push(F, P)
+    now.work[name] = (F.conjugate() * P.d).real
+
+
+def turned(now, name, e, T):
+    """A moment on body 1, its opposite on body 2."""
+    A, B = now.two(e)
+    angle = A.phi - B.phi
+    now.force(T, angle.rate())
+    now.work[name] = T * angle.d
+
+
+def torque(now, name, e):
+    turned(now, name, e, now.signal(e, "value").x)
+
+
+def motor(now, name, e):
+    A, B = now.two(e)
+    angle = A.phi - B.phi
+    y = e.get("stiffness", 0) * (now.signal(e, "angle").x - angle.x) + \
+        e.get("damping", 0) * (now.signal(e, "rate").x - angle.d)
+    limit = e.get("limit", 0)
+    turned(now, name, e, limit * math.tanh(y / limit) if limit > 0 else y)
+
+
+def marker(now, name, e):
+    pass
+
+
+KINDS = {f.__name__.replace("_", "-"): f for f in (
+    pin, weld, slider, slot, rod, gear, drive, wheel, rolling_wheel, steered_wheel, speed, pfaffian, tyre,
+    rolling_resistance, spring, rotational_spring, friction, sliding_friction, drag, gravity, force, torque, motor, marker)}
+SIGNALS = {"value", "torque", "fx", "fy", "rate"}  # and "heading", "angle" where they are signals
+MOMENTS = {"weld": ".M", "slider": ".M", "gear": ".M"}
+
+
+class Mechanism:
+    """A model, ready to be evaluated.
+
+    bodies, elements: of the description; n coordinates: x, y, phi of each body, then the spin angles `own`; mass (n,):
+    masses and inertias; q, v (n,): the described start."""
+
+    def __init__(self, model):
+        self.model, self.bodies = model, [b["name"] for b in model["bodies"]]
+        self.elements = [(kind, e[kind], e) for e in model["elements"] for kind in KINDS if next(iter(e)) == kind]
+        if len(self.elements) < len(model["elements"]):
+            raise Failure("an element of a kind that is not known")
+        rolling = [(name, e) for kind, name, e in self.elements if kind == "rolling-wheel"]
+        self.own = {name: 3 * len(self.bodies) + i for i, (name, e) in enumerate(rolling)}
+        self.n = 3 * len(self.bodies) + len(rolling)
+        self.unit = np.eye(self.n)
+        self.mass = np.array([x for b in model["bodies"] for x in [b.get("mass", 0)] * 2 + [b.get("inertia", 0)]] +
+                             [e.get("inertia", 0) for _, e in rolling], float)
+        start = [b.get("start", {}).get(k, 0) for b in model["bodies"] for k in ("x", "y", "phi")]
+        rate = [b.get("rate", {}).get(k, 0) for b in model["bodies"] for k in ("vx", "vy", "omega")]
+        self.q = np.array(start + [e.get("start", 0) for _, e in rolling], float)
+        self.v = np.array(rate + [e.get("rate", 0) for _, e in rolling], float)
+        self.reads_states, self.signals = False, {}
+        for kind, name, e in self.elements:
+            for field, value in e.items():
+                if field in SIGNALS and not (kind == "rolling-wheel" and field == "rate") or \
+                        (kind, field) in (("steered-wheel", "heading"), ("motor", "angle")):
+                    s = self.signals[id(e), field] = Signal(value)
+                    self.reads_states = self.reads_states or s.states
+        self.breaks = sorted({b for s in self.signals.values() for b in s.breaks})
+        self.length = self._length()
+        self.shortest = math.inf
+        self.regular = False
+
+    def _length(self):
+        """L of the manual, section Scales and tolerances."""
+        far = 0.0
+        for _, _, e in self.elements:
+            if "at" in e:
+                single = isinstance(e["body"], str)
+                for body, at in zip([e["body"]] if single else e["body"], [e["at"]] if single else e["at"]):
+                    far = max(far, math.hypot(*at) if body != "ground" else 0)
+        if far > 0:
+            return far
+        for b in self.model["bodies"]:
+            if b.get("mass", 0) > 0:
+                return math.sqrt(b.get("inertia", 0) / b["mass"]) or 1.0
+        return 1.0
+
+    def start_angle(self, body):
+        return 0.0 if body == "ground" else self.q[3 * self.bodies.index(body) + 2]
+
+    def near(self, length, name):
+        self.shortest = min(self.shortest, length)
+        if length < 0.05:
+            raise Failure("the ends of " + name + " meet")
+
+    def names(self):
+        return [b + s for b in self.bodies for s in (".x", ".y", ".phi")] + [o + ".spin" for o in self.own], \
+               [b + s for b in self.bodies for s in (".vx", ".vy", ".omega")] + [o + ".spin_rate" for o in self.own]
+
+    def named(self, q, v):
+        a, b = self.names()
+        return dict(zip(a + b, list(q) + list(v)))
+
+    # ---- Equations ----
+
+    def constraints(self, now):
+        """J, the residuals of its velocities, the bias b, and the weights by which multipliers are compared."""
+        J = np.array([r.g for _, r, _ in now.rows]).reshape(len(now.rows), self.n)
+        return J, np.array([r.x for _, r, _ in now.rows]), np.array([r.d for _, r, _ in now.rows])
+
+    def weights(self, now):
+        """1 of a force, 1/L of a moment, by row."""
+        angles = {name for kind, name, e in self.elements if kind == "drive" and e["what"] == "angle"}
+        return np.array([1 / self.length if name.endswith(".M") or name[:-2] in angles else 1.0 for name, _, _ in now.rows])
+
+    def solve(self, now):
+        """Accelerations (n,) and multipliers (rows,): least squares; multipliers that are not unique are the smallest."""
+        J, _, b = self.constraints(now)
+        k, n = len(b), self.n
+        if k == 0:
+            return now.f / self.mass, np.zeros(0)
+        w = self.weights(now)
+        K = np.zeros((n + k, n + k))
+        K[:n, :n] = np.diag(self.mass)
+        K[:n, n:] = -(J / w[:, None]).T
+        K[n:, :n] = J / w[:, None]
+        r = np.concatenate([now.f, -b / w])
+        if self.regular:
+            x = np.linalg.solve(K, r)
+        else:
+            x = np.linalg.lstsq(K, r, rcond=1e-9)[0]
+        return x[:n], x[n:] / w
+
+    def derivative(self, t, middle, y):
+        n = self.n
+        now = Now(self, t, middle, y[:n], y[n:2 * n])
+        a, mu = self.solve(now)
+        return np.concatenate([y[n:2 * n], a, list(self.powers(now, mu).values())])
+
+    def powers(self, now, mu):
+        """Powers by column of the ledger, such as "T.work"."""
+        p = {name + ".work": x for name, x in now.work.items()}
+        p.update({name + ".work": mu[i] * u for name, i, u in now.driven})
+        p.update({name + ".loss": x for name, x in now.loss.items()})
+        return p
+
+    # ---- Consistent states ----
+
+    def middle(self, t):
+        """A time of the same smooth piece as what follows t."""
+        after = [b for b in self.breaks if b > t]
+        return (t + after[0]) / 2 if after else t + 1
+
+    def project(self, q, v, t=0.0):
+        """The consistent state next to (q, v): Gauss-Newton on positions, then velocities."""
+        middle = self.middle(t)
+        for _ in range(20):
+            now = Now(self, t, middle, q, v)
+            held = [i for i, (_, _, g) in enumerate(now.rows) if g is not None]
+            if not held:
+                break
+            g = np.array([now.rows[i][2] for i in held])
+            if max(abs(g)) < 1e-14:
+                break
+            q = q - np.linalg.lstsq(self.constraints(now)[0][held], g, rcond=1e-9)[0]
+        now = Now(self, t, middle, q, v)
+        J, residual, _ = self.constraints(now)
+        return q, v - np.linalg.lstsq(J, residual, rcond=1e-9)[0] if len(J) else v
+
+    def condition(self, now):
+        """Smallest singular value of J with rows of length 1, its rank; that of the saddle-point matrix, of size 1."""
+        J, _, _ = self.constraints(now)
+        scale = np.ones(self.n)
+        scale[2:3 * len(self.bodies):3] = 1 / self.length
+        if not len(J):
+            return 1.0, 0, (min(self.mass) > 0) * 1.0
+        J = J * scale
+        s = np.linalg.svd(J / np.linalg.norm(J, axis=1)[:, None], compute_uv=False)
+        rank = int(np.sum(s > 1e-7))
+        # What the rows leave free must have mass.
+        _, _, V = np.linalg.svd(J)
+        N = V[rank:]
+        kinetic = np.linalg.eigvalsh((N * (self.mass * scale**2)) @ N.T) if len(N) else np.array([1.0])
+        return s[rank - 1], rank, kinetic[0]
+
+    # ---- Runs ----
+
+    def run(self, q, v, times, rtol=1e-11, check=True):
+        """States at the times [s]: a list of dicts of columns, as a table of `pinwheel run --energy` has them.  Raises
+        Failure where the motion comes near a singular configuration, or is too fast to be compared."""
+        t, k = 0.0, len(self.powers(Now(self, 0, self.middle(0), q, v), np.zeros(1000)))
+        y = np.concatenate([q, v, np.zeros(k)])
+        rank = None
+        out = []
+        stops = sorted(set(times) | {b for b in self.breaks if 0 < b < max(times)})
+        for stop in [0.0] + stops:
+            middle = (t + stop) / 2 if stop > 0 else self.middle(0)
+            if stop > 0:
+                solver = DOP853(lambda s, z: self.derivative(s, middle, z), t, y, stop, rtol=rtol, atol=rtol * 0.1)
+                steps = 0
+                while solver.status == "running":
+                    if solver.step() is not None or steps > 3000:
+                        raise Failure("the reference does not get on")
+                    steps += 1
+                    if check:
+                        self.watch(solver.t, middle, solver.y, rank)
+                y, t = solver.y, stop
+            else:
+                now = Now(self, 0, middle, q, v)
+                smallest, rank, kinetic = self.condition(now)
+                self.regular = rank == len(now.rows)
+            if stop in times or stop == 0:
+                out.append(self.columns(t, middle, y))
+        return out
+
+    def watch(self, t, middle, y, rank):
+        n = self.n
+        now = Now(self, t, middle, y[:n], y[n:2 * n])
+        smallest, r, kinetic = self.condition(now)
+        if smallest < 0.05 or r != rank or kinetic < 0.01:
+            raise Failure("near a singular configuration")
+        if max(abs(y[n:2 * n])) > 25:
+            raise Failure("too fast")
+
+    def columns(self, t, middle, y):
+        n = self.n
+        q, v, ledger = y[:n], y[n:2 * n], y[2 * n:]
+        now = Now(self, t, middle, q, v)
+        a, mu = self.solve(now)
+        row = {"t": t, **self.named(q, v)}
+        row.update({name: x for (name, _, _), x in zip(now.rows, mu)})
+        row.update(zip(self.powers(now, mu), ledger))
+        row["kinetic"], row["potential"] = 0.5 * float(self.mass @ v**2), now.potential
+        row["residual"] = max([abs(g) for _, _, g in now.rows if g is not None] + [abs(r.x) for _, r, _ in now.rows] + [0])
+        return row
+
+
+def read(path):
+    with open(path) as f:
+        return Mechanism(json.load(f))
+
+
+if __name__ == "__main__":
+    m = read(sys.argv[1])
+    end = float(sys.argv[2]) if len(sys.argv) > 2 else m.model["run"]["t_end"]
+    for row in m.run(*m.project(m.q, m.v), [end], check=False):
+        print(json.dumps(row, indent=1))
