@@ -51,7 +51,9 @@ class Check:
         path = self.write(name, model)
 
         def rows(refine):
-            out, _ = compare.run(self.args.program, path, method, SPAN * s, SPAN * s / 2, settings(method, s, refine))
+            # Baumgarte's coefficients are rates.
+            wish = method + (":alpha=%r:beta=%r" % (10 / s, 10 / s) if method.endswith("baumgarte") else "")
+            out, _ = compare.run(self.args.program, path, wish, SPAN * s, SPAN * s / 2, settings(method, s, refine))
             return [back(row) for row in out]
         self.attempt(name, method, lambda: compare.converges(self.m, self.table, method, rows, name.startswith("equivalent")))
         if not self.args.keep:

@@ -1,0 +1,82 @@
+"""Initial conditions that leave something to do: only the free coordinates given, or a state near a consistent one."""
+import copy
+import numpy as np
+from scipy.linalg import qr
+from mechanisms import SPAN
+from simulator import Failure, Mechanism, Now
+
+OFF = 0.02  # how far described positions are off [m, rad]
+
+
+def rows_at(m, q, v):
+    """J, and which of its rows are holonomic."""
+    now = Now(m, 0.0, m.middle(0.0), q, v)
+    return m.constraints(now)[0], [i for i, (_, _, g) in enumerate(now.rows) if g is not None], now
+
+
+def free(J, n):
+    """As many coordinates as J leaves free, those that determine the others best."""
+    if len(J) == 0:
+        return list(range(n))
+    _, s, V = np.linalg.svd(J)
+    N = V[int(np.sum(s > 1e-7 * s[0])):]
+    return list(qr(N, pivoting=True, mode="r")[1][:len(N)])
+
+
+def described(m, q, v):
+    """The model with another start; gears keep their offsets."""
+    model = copy.deepcopy(m.model)
+    for i, b in enumerate(model["bodies"]):
+        b["start"] = dict(zip(("x", "y", "phi"), map(float, q[3 * i:3 * i + 3])))
+        b["rate"] = dict(zip(("vx", "vy", "omega"), map(float, v[3 * i:3 * i + 3])))
+    for e in model["elements"]:
+        if "rolling-wheel" in e:
+            i = m.own[e["rolling-wheel"]]
+            e["start"], e["rate"] = float(q[i]), float(v[i])
+        if "gear" in e and e.get("from", "start") == "start":
+            a, b, c = (m.start_angle(x) for x in e["body"])
+            e.update({"from": "offset", "offset": a - c - e["ratio"] * (b - c)})
+    return model
+
+
+def by_free(m, r):
+    """The free coordinates and velocities by --start, the others off: a model and options; the start is that of m."""
+    J, held, _ = rows_at(m, m.q, m.v)
+    positions, velocities = m.names()
+    fq, fv = free(J[held], m.n), free(J, m.n)
+    q = np.array([x if i in fq else x + r.uniform(-OFF, OFF) for i, x in enumerate(m.q)])
+    model = described(m, q, [0.01] * m.n)
+    options = [o for i in fq for o in ("--start", "%s=%r" % (positions[i], m.q[i]))]
+    return model, options + [o for i in fv for o in ("--start", "%s=%r" % (velocities[i], m.v[i]))]
+
+
+def nearby(m, r):
+    """A model whose start is only near a consistent one."""
+    return described(m, [x + r.uniform(-OFF, OFF) for x in m.q], [x + r.uniform(-0.3, 0.3) for x in m.v])
+
+
+def least(A, b):
+    """How much of b is not in the range of A, relative to b."""
+    size = np.linalg.norm(b)
+    return 0.0 if size < 1e-13 else np.linalg.norm(b - A @ np.linalg.lstsq(A, b, rcond=1e-9)[0]) / size
+
+
+def corrected(m, row):
+    """What is wrong with the corrections from the described start of m to that of a row of a table, by the manual's
+    equations: None, or a text.  Velocities: M dv = J^T mu.  Positions: what has mass moves only if it must, and then
+    M dq = G^T mu up to the curvature of the constraints, which dq is the size of."""
+    positions, velocities = m.names()
+    q, v = np.array([row[k] for k in positions]), np.array([row[k] for k in velocities])
+    J, held, now = rows_at(m, q, v)
+    residual = max([abs(now.rows[i][2]) for i in held] + [abs(r.x) for _, r, _ in now.rows] + [0.0])
+    if residual > 1e-12:
+        return "not consistent by %.2g" % residual
+    e = least(J.T, m.mass * (v - m.v)) if len(J) else 0.0
+    if e > 1e-9:
+        return "the correction of velocities is not the smallest, by %.2g" % e
+    dq, mean = q - m.q, np.mean(m.mass[m.mass > 0])
+    e = least(J[held].T, m.mass * dq) if held else 0.0
+    # The last multiplier's direction is that of the last iterate; curvatures are about 1 to 10.
+    if e > 20 * np.linalg.norm(dq):
+        return "the correction of positions is not the smallest, by %.2g of it" % e
+    return None
