@@ -1,6 +1,6 @@
 """Random mechanisms by every method of Pinwheel, against the reference.
 
-  compare.py [--seed S] [--count N] [--methods A,B,...] [--keep FOLDER] [--program PATH] [--verbose]
+  compare.py [--seed S] [--count N] [--methods A,B,...] [--keep FOLDER] [--program PATH] [--hard]
 
 Prints counts, and for each mismatch the seed, the method, errors and bounds; status 1 if there are any."""
 import argparse
@@ -21,6 +21,9 @@ from simulator import Failure, Mechanism
 ORDER = {"rk4": 4, "galpha": 2, "leapfrog": 2}  # of the methods with fixed steps
 STEP = {"rk4": 0.005, "galpha": 0.002, "leapfrog": 0.002}  # [s]
 RTOL = {"erk5": 1e-8, "erk8": 1e-8, "adams": 1e-8, "bdf": 1e-8, "ida": 1e-8}
+
+
+FAILURES = 0.002  # the part of runs that may end with a reason: these mechanisms are neither stiff nor singular
 
 
 class Refused(Exception):
@@ -122,15 +125,18 @@ def converges(m, table, method, rows, states_only=False):
     Steps: halved, the error goes down by 2^order, or is below the floor.  Tolerances: the error is below FACTOR times the
     tolerance.  Where that is not seen at once, at finer settings again: at coarse ones a method may be outside its
     asymptotic range."""
-    integrator = method.split("+")[0]
-    history = []
+    integrator, history, bad = method.split("+")[0], [], None
     for refine in range(5):
-        history.append(errors(m, table, rows(refine), states_only))
+        try:
+            history.append(errors(m, table, rows(refine), states_only))
+        except Refused as e:
+            # A step may be too large for an iteration to converge.
+            if refine == 4 or "too large" not in str(e):
+                raise
+            continue
         if integrator in STEP:
-            if refine == 0:
-                continue
-            bad = [g for g, e in history[-1].items()
-                   if not (e < floor(method, g, m, refine) or e < history[-2][g] / 2**(ORDER[integrator] - 0.6) and e < 1e-2)]
+            bad = [g for g, e in history[-1].items() if not halved(e, history[-2][g] if len(history) > 1 else 0, ORDER[integrator],
+                                                                   floor(method, g, m, refine))]
         else:
             bad = [g for g, e in history[-1].items() if not e < FLOOR + FACTOR[integrator] * RTOL[integrator] / 10**refine]
         if not bad:
@@ -138,13 +144,18 @@ def converges(m, table, method, rows, states_only=False):
     return "%s: %s" % (", ".join(bad), "; ".join(" ".join("%s %.2g" % (g, e[g]) for g in bad) for e in history))
 
 
+def halved(e, before, order, least):
+    """Whether e is what half the step leaves of the error before."""
+    return e < least or e < before / 2**(order - 0.6) and e < 1e-2
+
+
 class Case:
     """A mechanism with a start: as it is, by its free coordinates, or near a consistent one, by turns.
 
     path: its model; options: of the program; table: the reference's."""
 
-    def __init__(self, seed, folder, program):
-        self.m, self.table, _ = random_mechanism(seed)
+    def __init__(self, seed, folder, program, hard):
+        self.m, self.table, _ = random_mechanism(seed, hard)
         self.program, self.options, self.wrong = program, [], None
         self.path = os.path.join(folder, "m%d.yaml" % seed)
         model, r, self.kind = self.m.model, random.Random(seed), ("consistent", "free", "nearby")[seed % 3]
@@ -201,14 +212,14 @@ def main():
     p.add_argument("--methods")
     p.add_argument("--keep", default=None, help="folder for models of mismatches")
     p.add_argument("--program", default=os.environ.get("PINWHEEL", "build/pinwheel"))
-    p.add_argument("--verbose", action="store_true")
+    p.add_argument("--hard", action="store_true", help="masses, stiffnesses, friction far apart: for longer campaigns")
     a = p.parse_args()
     which = a.methods.split(",") if a.methods else methods(a.program)
     counts, reasons, seen = collections.Counter(), collections.Counter(), collections.Counter()
     with tempfile.TemporaryDirectory() as folder:
         for seed in range(a.seed, a.seed + a.count):
             try:
-                case = Case(seed, a.keep or folder, a.program)
+                case = Case(seed, a.keep or folder, a.program, a.hard)
             except (Failure, Refused) as e:
                 print("MISMATCH seed %d: the start: %s" % (seed, e), flush=True)
                 counts["mismatches"] += 1
@@ -236,7 +247,7 @@ def main():
         print("failed: %4d %s: %s" % (n, method, reason))
     print("%d mechanisms x %d methods: %d compared, %d failed with a reason, %d mismatches" % (
         a.count, len(which), counts["compared"], counts["failed"], counts["mismatches"]))
-    return 1 if counts["mismatches"] else 0
+    return 1 if counts["mismatches"] or counts["failed"] > FAILURES * (counts["compared"] + counts["failed"]) else 0
 
 
 if __name__ == "__main__":

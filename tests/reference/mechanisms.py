@@ -16,10 +16,12 @@ FORCE = ["tyre", "rolling-resistance", "spring", "spring", "rotational-spring", 
 
 
 class Builder:
-    """bodies and elements of a model as text models write them; r: the generator's random numbers."""
+    """bodies and elements of a model as text models write them; r: the generator's random numbers.
 
-    def __init__(self, seed):
-        self.r = random.Random(seed)
+    hard: masses, stiffnesses and speeds of friction differ by orders of magnitude."""
+
+    def __init__(self, seed, hard=False):
+        self.r, self.hard = random.Random(seed), hard
         self.bodies, self.elements = [], []
 
     def number(self, low, high):
@@ -27,6 +29,10 @@ class Builder:
 
     def signed(self, low, high):
         return self.number(low, high) * self.r.choice([-1, 1])
+
+    def wide(self, low, high):
+        """A factor: 1, or in hard mechanisms a power of ten between these."""
+        return 10.0**self.r.uniform(low, high) if self.hard else 1.0
 
     def chance(self, p):
         return self.r.random() < p
@@ -226,27 +232,27 @@ class Builder:
 
     def _tyre(self):
         fields = {"load": self.number(2, 6), "friction": self.number(0.4, 1)} if self.chance(0.5) else {}
-        self.add("tyre", body=self.one(), at=self.point(), heading=self.number(-3, 3), stiffness=self.number(1, 6),
-                 speed=self.number(0.4, 1), **fields)
+        self.add("tyre", body=self.one(), at=self.point(), heading=self.number(-3, 3), stiffness=self.number(1, 6) * self.wide(0, 3),
+                 speed=self.number(0.4, 1) * self.wide(-3, 0), **fields)
 
     def _rolling_resistance(self):
         self.add("rolling-resistance", body=self.one(), at=self.point(), heading=self.number(-3, 3), limit=self.number(0.3, 2),
-                 speed=self.number(0.3, 1))
+                 speed=self.number(0.3, 1) * self.wide(-4, 0))
 
     def _spring(self):
         body = self.pair()
         at, d = self.apart(body)
-        self.add("spring", body=body, at=at, stiffness=self.number(2, 20), length=self.number(0.3, 1.2) * d,
-                 damping=self.number(0.1, 1) if self.chance(0.6) else 0)
+        self.add("spring", body=body, at=at, stiffness=self.number(2, 20) * self.wide(0, 3), length=self.number(0.3, 1.2) * d,
+                 damping=self.number(0.1, 1) * self.wide(0, 2) if self.chance(0.6) else 0)
 
     def _rotational_spring(self):
-        self.add("rotational-spring", body=self.pair(), stiffness=self.number(0.5, 5), angle=self.number(-1, 1),
-                 damping=self.number(0.05, 0.4) if self.chance(0.6) else 0)
+        self.add("rotational-spring", body=self.pair(), stiffness=self.number(0.5, 5) * self.wide(0, 3), angle=self.number(-1, 1),
+                 damping=self.number(0.05, 0.4) * self.wide(0, 2) if self.chance(0.6) else 0)
 
     def _friction_law(self):
         law = self.r.choice(["viscous", "limit", "both"])
         fields = {"viscous": self.number(0.1, 0.6)} if law != "limit" else {}
-        return {**fields, "limit": self.number(0.2, 1), "speed": self.number(0.3, 1)} if law != "viscous" else fields
+        return {**fields, "limit": self.number(0.2, 1), "speed": self.number(0.3, 1) * self.wide(-4, 0)} if law != "viscous" else fields
 
     def _friction(self):
         self.add("friction", body=self.pair(), **self._friction_law())
@@ -270,7 +276,7 @@ class Builder:
 
     def _motor(self):
         fields = {"limit": self.number(1, 4)} if self.chance(0.5) else {}
-        self.add("motor", body=self.pair(), stiffness=self.number(1, 5), damping=self.number(0.1, 1), angle=self.signal(0.6, "force"),
+        self.add("motor", body=self.pair(), stiffness=self.number(1, 5) * self.wide(0, 2), damping=self.number(0.1, 1) * self.wide(0, 2), angle=self.signal(0.6, "force"),
                  rate=self.signal(0.6, "force"), **fields)
 
     def _marker(self):
@@ -313,7 +319,8 @@ def massless(b):
         saved = dict(body)
         for part in b.r.choice([["mass"], ["inertia"], ["mass", "inertia"], ["mass", "inertia"]]):
             body.pop(part)
-        if b.quality()[1][2] < 0.02:
+        m, (_, _, kinetic) = b.quality()
+        if kinetic < 0.02 * min(1.0, m.lightest):
             body.clear()
             body.update(saved)
 
@@ -341,11 +348,12 @@ def redundant(b):
         b.add(kind, **twin)
 
 
-def build(seed):
+def build(seed, hard=False):
     """A mechanism as a model; Failure if the random numbers did not make one."""
-    b = Builder(seed)
+    b = Builder(seed, hard)
     for i in range(b.r.choice([1, 1, 2, 2, 3, 3, 4, 5])):
-        b.bodies.append({"name": f"b{i}", "mass": b.number(0.5, 2), "inertia": b.number(0.05, 0.5),
+        b.bodies.append({"name": f"b{i}", "mass": b.number(0.5, 2) * b.wide(-4, 1),
+                         "inertia": b.number(0.05, 0.5) * b.wide(-4, 1),
                          "start": {"x": b.number(-1.2, 1.2), "y": b.number(-1.2, 1.2), "phi": b.number(-3, 3)}})
     for i, body in enumerate(b.bodies):
         if b.chance(0.85):
@@ -364,7 +372,7 @@ def build(seed):
         b.place(b.r.choice(FORCE))
     b.r.shuffle(b.elements)
     m, (smallest, _, kinetic) = b.quality()
-    if smallest < 0.15 or kinetic < 0.02:
+    if smallest < 0.15 or kinetic < 0.02 * min(1.0, m.lightest):
         raise Failure("near a singular configuration at the start")
     # Velocities: at random, then consistent.
     _, v = m.project(m.q, np.array([b.r.uniform(-1.5, 1.5) for _ in range(m.n)]))
@@ -376,18 +384,18 @@ def build(seed):
     return b.model()
 
 
-def random_mechanism(seed, count=1000):
+def random_mechanism(seed, hard=False):
     """The first good mechanism of this seed, its table at half the span and the span by the reference, and the tries."""
     reasons = {}
-    for n in range(count):
+    for n in range(1000):
         try:
-            model = build(seed * 1000 + n)
+            model = build(seed * 1000 + n, hard)
             m = Mechanism(model)
             table = m.run(m.q, m.v, [SPAN / 2, SPAN])
             return m, table, reasons
         except (Failure, OverflowError, ZeroDivisionError) as e:
             reasons[str(e) or type(e).__name__] = reasons.get(str(e), 0) + 1
-    raise Failure("no mechanism in %d tries" % count)
+    raise Failure("no mechanism in 1000 tries")
 
 
 if __name__ == "__main__":

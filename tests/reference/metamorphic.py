@@ -65,6 +65,19 @@ class Check:
         except compare.Refused as e:
             self.tell(name, method, str(e))
 
+    def tyres(self, method):
+        """Wheels as tyres, ever stiffer: the difference goes like 1/stiffness."""
+        def wrong():
+            found = []
+            for stiffness in (1e4, 1e5, 1e6):
+                path = self.write("tyres", transform.tyres(self.m.model, stiffness))
+                rows, _ = compare.run(self.args.program, path, method, SPAN, SPAN / 2, ["--rtol", "1e-9"])
+                found.append(max(compare.errors(self.m, self.table, rows, states_only=True).values()))
+            # Ten times the stiffness, a tenth of the difference, give or take its next term; 1e-6: the method's own errors.
+            good = all(b < 1e-6 or b < a / 8 for a, b in zip(found, found[1:]))
+            return None if good and found[-1] < 1e-3 else "differences " + " ".join("%.2g" % x for x in found)
+        self.attempt("tyres", method, wrong)
+
     def split(self, method):
         """A run to the middle, and another one from where it ended."""
         half = SPAN / 2
@@ -97,6 +110,8 @@ def main():
                 c.split(method)
                 for i, rules in enumerate(transform.EQUIVALENT):
                     c.transformed("equivalent-" + "-".join(rules), transform.rewrite(c.m.model, rules, c.r), method)
+            if any("wheel" in e for e in c.m.model["elements"]) and c.m.regular and min(c.m.mass) > 0:
+                c.tyres("bdf+projection")
     for name in sorted({k for k, _ in counts}):
         print("%-40s %5d good %5d mismatches" % (name, counts[name, "good"], counts[name, "mismatches"]))
     bad = sum(n for (_, what), n in counts.items() if what == "mismatches")

@@ -304,6 +304,7 @@ class Mechanism:
         self.unit = np.eye(self.n)
         self.mass = np.array([x for b in model["bodies"] for x in [b.get("mass", 0)] * 2 + [b.get("inertia", 0)]] +
                              [e.get("inertia", 0) for _, e in rolling], float)
+        self.lightest = min(self.mass[self.mass > 0], default=1.0)
         start = [b.get("start", {}).get(k, 0) for b in model["bodies"] for k in ("x", "y", "phi")]
         rate = [b.get("rate", {}).get(k, 0) for b in model["bodies"] for k in ("vx", "vy", "omega")]
         self.q = np.array(start + [e.get("start", 0) for _, e in rolling], float)
@@ -321,10 +322,10 @@ class Mechanism:
         self.regular = False
 
     def _length(self):
-        """L of the manual, section Scales and tolerances."""
+        """L of the manual, section Scales and tolerances; markers change nothing."""
         far = 0.0
-        for _, _, e in self.elements:
-            if "at" in e:
+        for kind, _, e in self.elements:
+            if "at" in e and kind != "marker":
                 single = isinstance(e["body"], str)
                 for body, at in zip([e["body"]] if single else e["body"], [e["at"]] if single else e["at"]):
                     far = max(far, math.hypot(*at) if body != "ground" else 0)
@@ -467,7 +468,7 @@ class Mechanism:
         n = self.n
         now = Now(self, t, middle, y[:n], y[n:2 * n])
         smallest, r, kinetic = self.condition(now)
-        if smallest < 0.05 or r != rank or kinetic < 0.01:
+        if smallest < 0.05 or r != rank or kinetic < 0.01 * min(1.0, self.lightest):
             raise Failure("near a singular configuration")
         if max(abs(y[n:2 * n])) > 25:
             raise Failure("too fast")

@@ -320,6 +320,14 @@ def gear_pfaffian(e, new):
     return [{"pfaffian": e["gear"], "body": e["body"][:2], "a": [0, 0, 1], "b": [0, 0, -e["ratio"]]}]
 
 
+def tyres(model, stiffness):
+    """Wheels give way: their slip is the lateral force times speed / stiffness."""
+    new = copy.deepcopy(model)
+    new["elements"] = [{"tyre": e["wheel"], **{k: e[k] for k in ("body", "at", "heading")}, "stiffness": stiffness, "speed": 0.5}
+                       if "wheel" in e else e for e in new["elements"]]
+    return new
+
+
 EQUIVALENT = [
     {"rod": rod_to_body},
     {"slider": lambda e, new: slots(e["slider"], e, [e["heading"]]) + [angle_drive(e["slider"], e, e["angle"])],
