@@ -1,9 +1,10 @@
 #!/bin/sh
 # Checks what Pinwheel needs and installs only what is missing, with the system's package manager.
 #
-#   deps.sh [fresh] [style] [browser] [slurm]     fresh: do not trust the last result; style: clang and clang-format too;
-#                                               browser: one that can run without a screen, for the tests of animations;
-#                                               slurm: for tests/slurm.sh
+#   deps.sh [fresh] [style] [browser] [slurm] [reference]
+#
+# fresh: do not trust the last result; style: clang and clang-format too; browser: one that can run without a screen, for
+# the tests of animations; slurm: for tests/slurm.sh; reference: Python's numpy and scipy, for tests/reference.sh.
 #
 # Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
 
@@ -17,6 +18,7 @@ for word; do
   style) needs="$needs clang clang-format" ;;
   browser) needs="$needs chromium" ;;
   slurm) needs="$needs slurmctld munged" ;;
+  reference) needs="$needs python3-numpy python3-scipy" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
   esac
 done
@@ -97,6 +99,7 @@ look () {
     cc) links || missing="$missing $n" ;;
     gnuplot | clang | clang-format | chromium) command -v "$n" >/dev/null || missing="$missing $n" ;;
     slurmctld | munged) [ -x "/usr/sbin/$n" ] || missing="$missing $n" ;;
+    python3-*) "${PYTHON:-/usr/bin/python3}" -c "import ${n#python3-}" 2>/dev/null || missing="$missing $n" ;;
     *) libraries="$libraries $n" ;;
     esac
   done
@@ -112,7 +115,7 @@ package_of () {
   apt-sundials) echo libsundials-dev ;;
   apt-suitesparse) echo libsuitesparse-dev ;;
   apt-gnuplot) echo gnuplot-nox ;;
-  apt-clang | apt-clang-format | apt-chromium) echo "$1" ;;
+  apt-clang | apt-clang-format | apt-chromium | apt-python3-*) echo "$1" ;;
   apt-libfyaml) echo libfyaml-dev ;;
   apt-slurmctld) echo slurm-wlm ;;
   apt-munged) echo munge ;;
@@ -125,13 +128,16 @@ package_of () {
   dnf-clang) echo clang ;;
   dnf-clang-format) echo clang-tools-extra ;;
   dnf-chromium) echo chromium ;;
+  dnf-python3-*) echo "$1" ;;
   dnf-*) echo "$1-devel" ;;
 
   pacman-cc) echo gcc ;;
+  pacman-python3-*) echo "python-${1#python3-}" ;;
   pacman-clang-format) echo clang ;;
   brew-cc) echo gcc ;;
   brew-suitesparse) echo suite-sparse ;;
   brew-clang) echo llvm ;;
+  brew-python3-*) echo "${1#python3-}" ;;
   *) echo "$1" ;;
   esac
 }
