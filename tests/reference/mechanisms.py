@@ -110,7 +110,7 @@ class Builder:
         """use: force, velocity or position."""
         forms = ["constant", "harmonic", "smooth-step", "cubic-rest", "expression"]
         forms += ["ramp", "linear", "cubic-free"] if use != "position" else []
-        forms += ["pulse", "states", "plain"] if use == "force" else []
+        forms += ["pulse", "states", "expression", "conditional"] if use == "force" else []
         form, n = self.r.choice(forms), self.number
         start, duration = n(0.05, 0.5) * SPAN, n(0.2, 0.8) * SPAN
         if form == "constant":
@@ -130,8 +130,10 @@ class Builder:
             return self.table(size, form != "linear", form[6:])
         if form == "states":
             return self.state_expression(size)
+        if form == "conditional":
+            return f"t > {start} && t < {round(start + duration, 5)} ? {n(-size, size)} : {n(-size, size)}*cos(2*t)"
         value, rate, acceleration = self.expression(size)
-        if use == "force":
+        if use == "force" or self.chance(0.5):
             return value
         return {"expression": value, "rate": rate, **({"acceleration": acceleration} if use == "position" else {})}
 
@@ -139,6 +141,8 @@ class Builder:
         """A signal of positions that has this value at t = 0."""
         s = self.signal(size, "position")
         d = value - evaluate(s)
+        if isinstance(s, str):
+            return f"{s} + {d!r}" if d >= 0 else f"{s} - {-d!r}"
         if not isinstance(s, dict):
             return value
         (form, f), = list(s.items())[:1]

@@ -43,7 +43,11 @@ def signal(s, scale=1.0, tau=1.0, shift=0.0, states=None):
 
     def words(text, factor):
         text = re.sub(r"\b[A-Za-z]\w*\.([a-z]\w*)\b", lambda m: (states or {}).get(m[1], "%s") % m[0], text)
-        text = re.sub(r"\bt\b", "(t*%r + %r)" % (1 / tau, shift), text) if (tau, shift) != (1.0, 0.0) else text
+        # Times that t is compared with move; elsewhere t does.
+        parts = re.split(r"\bt ([<>]) ([\d.]+)", text)
+        moved = "t" if (tau, shift) == (1.0, 0.0) else "(t*%r + %r)" % (1 / tau, shift)
+        parts[0::3] = [re.sub(r"\bt\b", moved, x) for x in parts[0::3]]
+        text = parts[0] + "".join("t %s %r%s" % (parts[i], (float(parts[i + 1]) - shift) * tau, parts[i + 2]) for i in range(1, len(parts), 3))
         return "%r*(%s)" % (factor, text)
     if isinstance(s, str):
         return words(s, scale)
