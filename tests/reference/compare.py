@@ -154,7 +154,8 @@ def good_enough(integrator, group, history, least, refine):
 
 
 class Case:
-    """A mechanism with a start: as it is, by its free coordinates, or near a consistent one, by turns.
+    """A mechanism with a start: as it is, by its free coordinates or velocities, or near a consistent
+    one, by turns.
 
     path: its model; options: of the program; table: the reference's."""
 
@@ -162,9 +163,11 @@ class Case:
         self.m, self.table, _ = random_mechanism(seed, hard)
         self.program, self.options, self.wrong = program, [], None
         self.path = os.path.join(folder, "m%d.yaml" % seed)
-        model, r, self.kind = self.m.model, random.Random(seed), ("consistent", "free", "nearby")[seed % 3]
+        model, r, self.kind = self.m.model, random.Random(seed), ("consistent", "free", "nearby", "specified")[seed % 4]
         if self.kind == "free":
             model, self.options = initial.by_free(self.m, r)
+        if self.kind == "specified":
+            model = initial.specified(self.m)
         if self.kind == "nearby":
             model = initial.nearby(self.m, r)
         with open(self.path, "w") as f:

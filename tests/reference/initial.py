@@ -1,4 +1,4 @@
-"""Initial conditions that leave something to do: only the free coordinates given, or a state near a consistent one."""
+"""Initial conditions that leave something to do: only what is free given, or a state near a consistent one."""
 import copy
 import numpy as np
 from scipy.linalg import qr
@@ -48,6 +48,18 @@ def by_free(m, r):
     model = described(m, q, [0.01] * m.n)
     options = [o for i in fq for o in ("--start", "%s=%r" % (positions[i], m.q[i]))]
     return model, options + [o for i in fv for o in ("--start", "%s=%r" % (velocities[i], m.v[i]))]
+
+
+def specified(m):
+    """A model that specifies the free velocities and none of the others: they follow."""
+    model = copy.deepcopy(m.model)
+    kept = {m.names()[1][i] for i in free(rows_at(m, m.q, m.v)[0], m.n)}
+    for b in model["bodies"]:
+        b["rate"] = {k: x for k, x in b["rate"].items() if "%s.%s" % (b["name"], k) in kept}
+    for e in model["elements"]:
+        if "rolling-wheel" in e and e["rolling-wheel"] + ".spin_rate" not in kept:
+            del e["rate"]
+    return model
 
 
 def nearby(m, r):
