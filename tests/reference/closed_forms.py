@@ -1,4 +1,5 @@
-"""The reference itself, against what is known without it: closed forms, digits in quadruple precision, balances of energy."""
+"""The reference itself, against what is known without it: closed forms, digits in quadruple
+precision, balances of energy."""
 import functools
 import math
 import os
@@ -10,13 +11,17 @@ from simulator import Mechanism, Now
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PENDULUM = {"bodies": [{"name": "b", "mass": 2, "inertia": 0.3, "start": {"x": 0.5}}],
-            "elements": [{"pin": "O", "body": ["b", "ground"], "at": [[-0.5, 0], [0, 0]]}, {"gravity": "g", "acceleration": [0, -9.81]}]}
+            "elements": [{"pin": "O", "body": ["b", "ground"], "at": [[-0.5, 0], [0, 0]]},
+                         {"gravity": "g", "acceleration": [0, -9.81]}]}
 SKATE = {"bodies": [{"name": "b", "mass": 1, "inertia": 0.1, "rate": {"omega": 1.3}}],
          "elements": [{"wheel": "A", "body": "b", "at": [0, 0]}, {"gravity": "g", "acceleration": [4.905, 0]}]}
-EZYROLLER = {"bodies": [{"name": "frame", "mass": 1, "inertia": 0.1}, {"name": "steer", "start": {"x": 0.375, "phi": math.pi}}],
-             "elements": [{"pin": "B", "body": ["frame", "steer"], "at": [[0.5, 0], [-0.125, 0]]}, {"wheel": "A", "body": "frame", "at": [-0.5, 0]},
+EZYROLLER = {"bodies": [{"name": "frame", "mass": 1, "inertia": 0.1},
+                        {"name": "steer", "start": {"x": 0.375, "phi": math.pi}}],
+             "elements": [{"pin": "B", "body": ["frame", "steer"], "at": [[0.5, 0], [-0.125, 0]]},
+                          {"wheel": "A", "body": "frame", "at": [-0.5, 0]},
                           {"wheel": "C", "body": "steer", "at": [0.125, 0]},
-                          {"torque": "T", "body": ["frame", "steer"], "value": {"harmonic": {"amplitude": 0.1, "omega": math.pi}}}]}
+                          {"torque": "T", "body": ["frame", "steer"],
+                           "value": {"harmonic": {"amplitude": 0.1, "omega": math.pi}}}]}
 
 
 def table(model, times):
@@ -25,7 +30,8 @@ def table(model, times):
 
 
 def pendulum():
-    """phi'' = -w0^2 cos phi from rest at 0: sin (theta/2) = k sn, theta the angle from hanging down (Whittaker 1904, section 44).
+    """phi'' = -w0^2 cos phi from rest at 0: sin (theta/2) = k sn, theta the angle from hanging down (Whittaker 1904,
+    section 44).
     The pin carries weight and the centripetal force: along the rod m (s w^2 - g sin phi)."""
     m, s, I, g, t = 2, 0.5, 0.3, 9.81, 3.7
     w0, k = math.sqrt(m * g * s / (I + m * s * s)), math.sin(math.pi / 4)
@@ -42,7 +48,8 @@ def skate():
     """x = a/(2 w^2) sin^2 wt, y = a/(2 w^2) (wt - sin (2 wt)/2); the edge carries 2 m a sin wt (Neimark & Fufaev 1972)."""
     a, w, t = 4.905, 1.3, 2.0
     row = table(SKATE, [t])[-1]
-    return max(abs(row["b.x"] - a / (2 * w * w) * math.sin(w * t)**2), abs(row["b.y"] - a / (2 * w * w) * (w * t - math.sin(2 * w * t) / 2)),
+    return max(abs(row["b.x"] - a / (2 * w * w) * math.sin(w * t)**2),
+               abs(row["b.y"] - a / (2 * w * w) * (w * t - math.sin(2 * w * t) / 2)),
                abs(row["A.N"] - 2 * a * math.sin(w * t)))
 
 
@@ -65,7 +72,8 @@ def derivatives():
     for m, _, _ in mechanisms():
         q, v = m.q, m.v
         a = m.solve(Now(m, 0.0, m.middle(0.0), q, v))[0]
-        residuals = [np.array([r.x for _, r, _ in Now(m, s, m.middle(0.0), q + s * v + s * s / 2 * a, v + s * a).rows]) for s in (-h, h)]
+        moved = [Now(m, s, m.middle(0.0), q + s * v + s * s / 2 * a, v + s * a) for s in (-h, h)]
+        residuals = [np.array([r.x for _, r, _ in now.rows]) for now in moved]
         if len(residuals[0]):
             worst = max(worst, float(np.max(np.abs(residuals[1] - residuals[0]))) / (2 * h) / (1 + max(abs(a))))
     return worst
@@ -75,7 +83,8 @@ def energy():
     """Kinetic and potential energy are what work and losses leave."""
     worst = 0.0
     for _, rows, _ in mechanisms():
-        size = max(1.0, max(abs(x) for r in rows for k, x in r.items() if k.endswith(("work", "loss", "kinetic", "potential"))))
+        energies = ("work", "loss", "kinetic", "potential")
+        size = max([1.0] + [abs(x) for r in rows for k, x in r.items() if k.endswith(energies)])
         total = [r["kinetic"] + r["potential"] - sum(x for k, x in r.items() if k.endswith(".work")) +
                  sum(x for k, x in r.items() if k.endswith(".loss")) for r in rows]
         worst = max(worst, (max(total) - min(total)) / size)

@@ -33,7 +33,8 @@ class Refused(Exception):
 def methods(program):
     """All INTEGRATOR+STABILISATION of `pinwheel list methods`."""
     out, integrator = [], None
-    for line in subprocess.run([program, "list", "methods"], capture_output=True, text=True, check=True).stdout.splitlines():
+    for line in subprocess.run([program, "list", "methods"], capture_output=True, text=True,
+                               check=True).stdout.splitlines():
         name = re.match(r"  (\w+)  ", line)
         integrator = name.group(1) if name else integrator
         if re.match(r"    \+\w+", line):
@@ -50,7 +51,8 @@ def reason_in(text):
 def run(program, path, method, span, every, setting, more=()):
     """The rows of a run as dicts, and its summary."""
     with tempfile.TemporaryDirectory() as d:
-        command = [program, "run", path, "-m", method, "-t", repr(span), "--every", repr(every), "--energy", "-o", d + "/t.csv",
+        command = [program, "run", path, "-m", method, "-t", repr(span), "--every", repr(every), "--energy", "-o",
+                   d + "/t.csv",
                    "--json", d + "/s.json", *setting, *more]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=60)
@@ -163,7 +165,8 @@ class Case:
         self.m, self.table, _ = random_mechanism(seed, hard)
         self.program, self.options, self.wrong = program, [], None
         self.path = os.path.join(folder, "m%d.yaml" % seed)
-        model, r, self.kind = self.m.model, random.Random(seed), ("consistent", "free", "nearby", "specified")[seed % 4]
+        model, r = self.m.model, random.Random(seed)
+        self.kind = "consistent" if hard else ("consistent", "free", "nearby", "specified")[seed % 4]
         if self.kind == "free":
             model, self.options = initial.by_free(self.m, r)
         if self.kind == "specified":
@@ -202,7 +205,8 @@ def features(m):
             if field in ("value", "torque", "fx", "fy", "rate", "heading", "angle"):
                 if isinstance(s, dict):
                     form = next(iter(s))
-                    found.add("signal " + form + (" " + s[form].get("interpolation", "linear") if form == "table" else ""))
+                    found.add("signal " + form + (" " + s[form].get("interpolation",
+                                                                    "linear") if form == "table" else ""))
                 elif isinstance(s, str):
                     found.add("signal expression of " + ("states" if "b" in re.sub("tanh", "", s) else "time"))
     if min(m.mass) == 0:

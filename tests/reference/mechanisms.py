@@ -103,7 +103,8 @@ class Builder:
     def state_expression(self, size):
         b, c = self.one(), self.one()
         k, d = self.number(0.2, 1) * size, self.number(0.2, 1) * size
-        return self.r.choice([f"-{k}*{b}.omega", f"-{k}*sin({b}.phi) - {d}*{b}.omega", f"{k}*cos({b}.x + {c}.y) - {d}*{c}.vx",
+        return self.r.choice([f"-{k}*{b}.omega", f"-{k}*sin({b}.phi) - {d}*{b}.omega",
+                              f"{k}*cos({b}.x + {c}.y) - {d}*{c}.vx",
                               f"{k}*sin(2*t)*{b}.phi", f"-{d}*tanh({b}.vy)"])
 
     def signal(self, size, use):
@@ -116,13 +117,16 @@ class Builder:
         if form == "constant":
             return n(-size, size) if self.chance(0.5) else {"constant": n(-size, size)}
         if form == "harmonic":
-            return {"harmonic": {"amplitude": n(0.2, 1) * size, "omega": n(1, 5), "phase": n(-3, 3), "offset": n(-0.5, 0.5) * size}}
+            return {"harmonic": {"amplitude": n(0.2, 1) * size, "omega": n(1, 5), "phase": n(-3, 3),
+                                 "offset": n(-0.5, 0.5) * size}}
         if form == "ramp":
             return {"ramp": {"from": n(-1, 1) * size, "to": n(-1, 1) * size, "start": start, "duration": duration}}
         if form == "smooth-step":
-            return {"smooth-step": {"from": n(-1, 1) * size, "to": n(-1, 1) * size, "start": start, "duration": duration}}
+            return {"smooth-step": {"from": n(-1, 1) * size, "to": n(-1, 1) * size, "start": start,
+                                    "duration": duration}}
         if form == "pulse":
-            pulse = {"height": n(0.2, 1) * size, "start": n(-0.1, 0.6) * SPAN, "width": n(0.05, 0.2) * SPAN, "offset": n(-0.3, 0.3) * size}
+            pulse = {"height": n(0.2, 1) * size, "start": n(-0.1, 0.6) * SPAN, "width": n(0.05, 0.2) * SPAN,
+                     "offset": n(-0.3, 0.3) * size}
             if self.chance(0.5):
                 pulse["period"] = n(0.21, 0.4) * SPAN
             return {"pulse": pulse}
@@ -221,42 +225,50 @@ class Builder:
         fields = {"torque": self.signal(1.0, "force")} if self.chance(0.7) else {}
         if self.chance(0.7):
             fields["inertia"] = self.number(0.05, 0.3)
-        self.add("rolling-wheel", body=self.one(), at=self.point(), heading=self.number(-3, 3), radius=self.number(0.2, 0.6),
+        self.add("rolling-wheel", body=self.one(), at=self.point(), heading=self.number(-3, 3),
+                 radius=self.number(0.2, 0.6),
                  start=self.number(-1, 1), rate=self.number(0.5, 1), **fields)
 
     def _steered_wheel(self):
         self.add("steered-wheel", body=self.one(), at=self.point(), heading=self.signal(0.5, "velocity"))
 
     def _speed(self):
-        self.add("speed", body=self.one(), at=self.point(), heading=self.number(-3, 3), value=self.signal(0.8, "velocity"))
+        self.add("speed", body=self.one(), at=self.point(), heading=self.number(-3, 3),
+                 value=self.signal(0.8, "velocity"))
 
     def _pfaffian(self):
-        self.add("pfaffian", body=self.pair(), a=[self.signed(0.3, 1) for _ in range(3)], b=[self.signed(0.3, 1) for _ in range(3)],
+        self.add("pfaffian", body=self.pair(), a=[self.signed(0.3, 1) for _ in range(3)],
+                 b=[self.signed(0.3, 1) for _ in range(3)],
                  value=self.signal(0.5, "velocity"))
 
     def _tyre(self):
         fields = {"load": self.number(2, 6), "friction": self.number(0.4, 1)} if self.chance(0.5) else {}
-        self.add("tyre", body=self.one(), at=self.point(), heading=self.number(-3, 3), stiffness=self.number(1, 6) * self.wide(0, 3),
+        self.add("tyre", body=self.one(), at=self.point(), heading=self.number(-3, 3),
+                 stiffness=self.number(1, 6) * self.wide(0, 3),
                  speed=self.number(0.4, 1) * self.wide(-3, 0), **fields)
 
     def _rolling_resistance(self):
-        self.add("rolling-resistance", body=self.one(), at=self.point(), heading=self.number(-3, 3), limit=self.number(0.3, 2),
+        self.add("rolling-resistance", body=self.one(), at=self.point(), heading=self.number(-3, 3),
+                 limit=self.number(0.3, 2),
                  speed=self.number(0.3, 1) * self.wide(-4, 0))
 
     def _spring(self):
         body = self.pair()
         at, d = self.apart(body)
-        self.add("spring", body=body, at=at, stiffness=self.number(2, 20) * self.wide(0, 3), length=self.number(0.3, 1.2) * d,
+        self.add("spring", body=body, at=at, stiffness=self.number(2, 20) * self.wide(0, 3),
+                 length=self.number(0.3, 1.2) * d,
                  damping=self.number(0.1, 1) * self.wide(0, 2) if self.chance(0.6) else 0)
 
     def _rotational_spring(self):
-        self.add("rotational-spring", body=self.pair(), stiffness=self.number(0.5, 5) * self.wide(0, 3), angle=self.number(-1, 1),
+        self.add("rotational-spring", body=self.pair(), stiffness=self.number(0.5, 5) * self.wide(0, 3),
+                 angle=self.number(-1, 1),
                  damping=self.number(0.05, 0.4) * self.wide(0, 2) if self.chance(0.6) else 0)
 
     def _friction_law(self):
         law = self.r.choice(["viscous", "limit", "both"])
         fields = {"viscous": self.number(0.1, 0.6)} if law != "limit" else {}
-        return {**fields, "limit": self.number(0.2, 1), "speed": self.number(0.3, 1) * self.wide(-4, 0)} if law != "viscous" else fields
+        return {**fields, "limit": self.number(0.2, 1),
+                "speed": self.number(0.3, 1) * self.wide(-4, 0)} if law != "viscous" else fields
 
     def _friction(self):
         self.add("friction", body=self.pair(), **self._friction_law())
@@ -272,7 +284,8 @@ class Builder:
         self.add("gravity", acceleration=[self.number(-5, 5), self.number(-9.81, 0)])
 
     def _force(self):
-        self.add("force", body=self.one(), at=self.point(), axes=self.r.choice(["world", "body"]), fx=self.signal(3, "force"),
+        self.add("force", body=self.one(), at=self.point(), axes=self.r.choice(["world", "body"]),
+                 fx=self.signal(3, "force"),
                  fy=self.signal(3, "force"))
 
     def _torque(self):
@@ -280,7 +293,8 @@ class Builder:
 
     def _motor(self):
         fields = {"limit": self.number(1, 4)} if self.chance(0.5) else {}
-        self.add("motor", body=self.pair(), stiffness=self.number(1, 5) * self.wide(0, 2), damping=self.number(0.1, 1) * self.wide(0, 2), angle=self.signal(0.6, "force"),
+        self.add("motor", body=self.pair(), stiffness=self.number(1, 5) * self.wide(0, 2),
+                 damping=self.number(0.1, 1) * self.wide(0, 2), angle=self.signal(0.6, "force"),
                  rate=self.signal(0.6, "force"), **fields)
 
     def _marker(self):
@@ -289,13 +303,14 @@ class Builder:
     # ---- Whole mechanisms ----
 
     def model(self):
-        return {"pinwheel": 1, "about": "a random mechanism", "run": {"t_end": SPAN}, "bodies": self.bodies, "elements": self.elements}
+        return {"pinwheel": 1, "about": "a random mechanism", "run": {"t_end": SPAN}, "bodies": self.bodies,
+                "elements": self.elements}
 
     def quality(self):
         m = Mechanism(self.model())
         return m, m.condition(Now(m, 0.0, m.middle(0.0), m.q, m.v))
 
-    def attempt(self, kind, body=None, extra_rank=True):
+    def attempt(self, kind, body=None):
         """Adds an element if the configuration stays regular with it and something stays free to move."""
         before = list(self.elements)
         self.place(kind, body)
@@ -331,7 +346,8 @@ def massless(b):
 
 def redundant(b):
     """Says again what the elements say: the same element, a wheel on the same axle, a point on the same line."""
-    candidates = [e for e in b.elements if next(iter(e)) in ("pin", "weld", "slider", "slot", "rod", "gear", "drive", "wheel",
+    candidates = [e for e in b.elements if next(iter(e)) in ("pin", "weld", "slider", "slot", "rod", "gear", "drive",
+                                                             "wheel",
                                                              "steered-wheel", "speed", "pfaffian")]
     for e in b.r.sample(candidates, min(len(candidates), b.r.randint(1, 2))):
         kind = next(iter(e))
@@ -411,5 +427,6 @@ if __name__ == "__main__":
         m, table, reasons = random_mechanism(seed)
         model = m.model
         kinds.update(next(iter(e)) for e in model["elements"])
-        print(seed, len(model["bodies"]), [next(iter(e)) for e in model["elements"]], reasons, "%.2f s" % (time.time() - t), table[-1]["residual"])
+        print(seed, len(model["bodies"]), [next(iter(e)) for e in model["elements"]], reasons,
+              "%.2f s" % (time.time() - t))
     print(kinds)

@@ -15,7 +15,8 @@ import transform
 from mechanisms import SPAN, random_mechanism
 
 # One method of each kind; their settings, which go with the unit of time.
-METHODS = ["erk8+projection", "rk4+projection", "bdf+projection", "ida+ggl", "galpha+ggl", "leapfrog+rattle", "erk5+nullspace", "adams+baumgarte"]
+METHODS = ["erk8+projection", "rk4+projection", "bdf+projection", "ida+ggl", "galpha+ggl", "leapfrog+rattle",
+           "erk5+nullspace", "adams+baumgarte"]
 
 
 def settings(method, s, refine):
@@ -55,7 +56,8 @@ class Check:
             wish = method + (":alpha=%r:beta=%r" % (10 / s, 10 / s) if method.endswith("baumgarte") else "")
             out, _ = compare.run(self.args.program, path, wish, SPAN * s, SPAN * s / 2, settings(method, s, refine))
             return [back(row) for row in out]
-        self.attempt(name, method, lambda: compare.converges(self.m, self.table, method, rows, name.startswith("equivalent")))
+        states_only = name.startswith("equivalent")
+        self.attempt(name, method, lambda: compare.converges(self.m, self.table, method, rows, states_only))
         if not self.args.keep:
             os.remove(path)
 
@@ -88,7 +90,8 @@ class Check:
             positions, velocities = self.m.names()
             start = [x for k in positions + velocities for x in ("--start", "%s=%r" % (k, a[-1][k]))]
             b, _ = compare.run(self.args.program, second, method, half, half, settings(method, 1, refine), start)
-            whole = {k: x + (a[-1][k] if k.endswith((".work", ".loss")) else half if k == "t" else 0) for k, x in b[-1].items()}
+            before = {k: x for k, x in a[-1].items() if k.endswith((".work", ".loss"))}
+            whole = {**b[-1], **{k: b[-1][k] + x for k, x in before.items()}, "t": SPAN}
             return [a[0], a[-1], whole]
         self.attempt("split", method, lambda: compare.converges(self.m, self.table, method, rows))
 
@@ -105,7 +108,8 @@ def main():
         for seed in range(a.seed, a.seed + a.count):
             c = Check(a, seed, folder, counts)
             for method in [METHODS[0], c.r.choice(METHODS[1:])]:
-                for f in (transform.units, transform.mirrored, transform.displaced, transform.turned, transform.shuffled):
+                for f in (transform.units, transform.mirrored, transform.displaced, transform.turned,
+                          transform.shuffled):
                     c.transformed(f.__name__, f(c.m.model, c.r), method)
                 c.split(method)
                 for i, rules in enumerate(transform.EQUIVALENT):

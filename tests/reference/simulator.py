@@ -47,7 +47,8 @@ class Now:
         self.frame = {"ground": Frame(Jet(0j, 0j, 0j, zero), Jet(0.0, 0.0, 0.0, zero))}
         for k, name in enumerate(m.bodies):
             i = 3 * k
-            self.frame[name] = Frame(Jet(complex(q[i], q[i + 1]), complex(v[i], v[i + 1]), 0j, unit[i] + 1j * unit[i + 1]),
+            self.frame[name] = Frame(Jet(complex(q[i], q[i + 1]), complex(v[i], v[i + 1]), 0j,
+                                         unit[i] + 1j * unit[i + 1]),
                                      self.coordinate[i + 2])
         self.states = m.named(q, v) if m.reads_states else None
         self.rows, self.f = [], np.zeros(m.n)
@@ -282,7 +283,8 @@ def marker(now, name, e):
 
 KINDS = {f.__name__.replace("_", "-"): f for f in (
     pin, weld, slider, slot, rod, gear, drive, wheel, rolling_wheel, steered_wheel, speed, pfaffian, tyre,
-    rolling_resistance, spring, rotational_spring, friction, sliding_friction, drag, gravity, force, torque, motor, marker)}
+    rolling_resistance, spring, rotational_spring, friction, sliding_friction, drag, gravity, force, torque, motor,
+                                                   marker)}
 SIGNALS = {"value", "torque", "fx", "fy", "rate"}  # and "heading", "angle" where they are signals
 MOMENTS = {"weld": ".M", "slider": ".M", "gear": ".M"}
 
@@ -362,7 +364,8 @@ class Mechanism:
     def weights(self, now):
         """1 of a force, 1/L of a moment, by row."""
         angles = {name for kind, name, e in self.elements if kind == "drive" and e["what"] == "angle"}
-        return np.array([1 / self.length if name.endswith(".M") or name[:-2] in angles else 1.0 for name, _, _ in now.rows])
+        return np.array([1 / self.length if name.endswith(".M") or name[:-2] in angles else 1.0 for name, _,
+                         _ in now.rows])
 
     def solve(self, now):
         """Accelerations (n,) and multipliers (rows,): least squares; multipliers that are not unique are the smallest."""
@@ -482,7 +485,8 @@ class Mechanism:
         row.update({name: x for (name, _, _), x in zip(now.rows, mu)})
         row.update(zip(self.powers(now, mu), ledger))
         row["kinetic"], row["potential"] = 0.5 * float(self.mass @ v**2), now.potential
-        row["residual"] = max([abs(g) for _, _, g in now.rows if g is not None] + [abs(r.x) for _, r, _ in now.rows] + [0])
+        row["residual"] = max([abs(g) for _, _,
+                               g in now.rows if g is not None] + [abs(r.x) for _, r, _ in now.rows] + [0])
         return row
 
 

@@ -7,7 +7,7 @@ import math
 
 
 class Jet:
-    """A function of the coordinates and time: value x, derivatives d and dd by time, gradient g by the coordinates (array)."""
+    """A function of the coordinates and time: value x, derivatives d and dd by time, gradient g (array) by the coordinates."""
     __slots__ = ("x", "d", "dd", "g")
 
     def __init__(self, x, d=0.0, dd=0.0, g=0.0):
@@ -78,7 +78,8 @@ def real(a):
 
 
 def conj(a):
-    return Jet(a.x.conjugate(), a.d.conjugate(), a.dd.conjugate(), a.g.conjugate() if not isinstance(a.g, float) else a.g)
+    return Jet(a.x.conjugate(), a.d.conjugate(), a.dd.conjugate(),
+               a.g.conjugate() if not isinstance(a.g, float) else a.g)
 
 
 def dot(a, b):

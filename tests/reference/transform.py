@@ -7,12 +7,12 @@ import copy
 import json
 import math
 import re
-from simulator import Mechanism
 
 # Dimensions of fields: exponents of kg, m, s.  What is not here, angles above all, has none.
 LENGTH, SPEED, FORCE, MOMENT = (0, 1, 0), (0, 1, -1), (1, 1, -2), (1, 2, -2)
 FIELDS = {
-    "rod": {"length": LENGTH}, "rolling-wheel": {"radius": LENGTH, "inertia": (1, 2, 0), "rate": (0, 0, -1), "torque": MOMENT},
+    "rod": {"length": LENGTH}, "rolling-wheel": {"radius": LENGTH, "inertia": (1, 2, 0), "rate": (0, 0, -1),
+                                                 "torque": MOMENT},
     "speed": {"value": SPEED}, "pfaffian": {"value": SPEED},
     "tyre": {"stiffness": FORCE, "speed": SPEED, "load": FORCE}, "rolling-resistance": {"limit": FORCE, "speed": SPEED},
     "spring": {"stiffness": (1, 0, -2), "damping": (1, 0, -1), "length": LENGTH},
@@ -24,7 +24,8 @@ FIELDS = {
     "motor": {"stiffness": MOMENT, "damping": (1, 2, -1), "limit": MOMENT, "rate": (0, 0, -1)}}
 STATES = {"x": LENGTH, "y": LENGTH, "phi": (0, 0, 0), "vx": SPEED, "vy": SPEED, "omega": (0, 0, -1), "spin": (0, 0, 0),
           "spin_rate": (0, 0, -1)}
-SIGNALS = {("drive", "value"), ("speed", "value"), ("pfaffian", "value"), ("torque", "value"), ("rolling-wheel", "torque"),
+SIGNALS = {("drive", "value"), ("speed", "value"), ("pfaffian", "value"), ("torque", "value"),
+           ("rolling-wheel", "torque"),
            ("force", "fx"), ("force", "fy"), ("motor", "angle"), ("motor", "rate"), ("steered-wheel", "heading")}
 
 
@@ -46,9 +47,10 @@ def signal(s, scale=1.0, tau=1.0, shift=0.0, states=None):
         # Times that t is compared with move; elsewhere t does.
         parts = re.split(r"\bt ([<>]) ([\d.]+)", text)
         moved = "t" if (tau, shift) == (1.0, 0.0) else "(t*%r + %r)" % (1 / tau, shift)
+        parts[1::3] = [" t %s " % x for x in parts[1::3]]
+        parts[2::3] = [repr((float(x) - shift) * tau) for x in parts[2::3]]
         parts[0::3] = [re.sub(r"\bt\b", moved, x) for x in parts[0::3]]
-        text = parts[0] + "".join("t %s %r%s" % (parts[i], (float(parts[i + 1]) - shift) * tau, parts[i + 2]) for i in range(1, len(parts), 3))
-        return "%r*(%s)" % (factor, text)
+        return "%r*(%s)" % (factor, "".join(parts))
     if isinstance(s, str):
         return words(s, scale)
     if "expression" in s:
@@ -102,7 +104,7 @@ def units(model, r, scales=None):
         if kind == "pfaffian":
             for k in "ab":
                 e[k] = [x * c for x, c in zip(e[k], (1, 1, m))]
-    moments = {name for name, e in ((e[kind_of(e)], e) for e in new["elements"]) if kind_of(e) == "drive" and e["what"] == "angle"}
+    moments = {e["drive"] for e in new["elements"] if kind_of(e) == "drive" and e["what"] == "angle"}
 
     def back(row):
         out = {}
@@ -127,7 +129,8 @@ def mirrored(model, r):
         if "at" in e:
             e["at"] = [[x, -y] for x, y in e["at"]] if isinstance(e["body"], list) else [e["at"][0], -e["at"][1]]
         for field in list(e):
-            odd = (kind, field) in (("steered-wheel", "heading"), ("torque", "value"), ("force", "fy"), ("motor", "angle"),
+            odd = (kind, field) in (("steered-wheel", "heading"), ("torque", "value"), ("force", "fy"),
+                                    ("motor", "angle"),
                                     ("motor", "rate")) or (kind, field) == ("drive", "value") and e["what"] != "x"
             if is_signal(kind, field):
                 e[field] = signal(e[field], -1.0 if odd else 1.0, states=flip)
@@ -160,11 +163,12 @@ def displaced(model, r):
             e["at"] = [[s[0] + d[0], s[1] + d[1]] if b == "ground" else s for b, s in zip(e["body"], e["at"])]
         e.update({f: signal(e[f], states=states) for f in list(e) if is_signal(kind, f)})
         if kind == "gravity":
-            fall -= sum(b.get("mass", 0) for b in model["bodies"]) * (d[0] * e["acceleration"][0] + d[1] * e["acceleration"][1])
+            a = e["acceleration"]
+            fall -= sum(b.get("mass", 0) for b in model["bodies"]) * (d[0] * a[0] + d[1] * a[1])
 
     def back(row):
-        out = {k: x - d[0] if re.fullmatch(r"b\d+\.x", k) else x - d[1] if re.fullmatch(r"b\d+\.y", k) else x for k, x in row.items()}
-        return {**out, "potential": out["potential"] - fall}
+        moved = {k: x - d["xy".index(k[-1])] for k, x in row.items() if re.fullmatch(r"b\d+\.[xy]", k)}
+        return {**row, **moved, "potential": row["potential"] - fall}
     return new, back, 1.0
 
 
@@ -175,7 +179,6 @@ def turned(model, r):
         angle = 0.0
     turn = cmath.exp(1j * angle)
     new = copy.deepcopy(model)
-    ex, ey = "cos(%r)" % angle, "sin(%r)" % angle
     if any(re.search(r"\.(x|y|vx|vy)\b", json.dumps(e.get(f))) for e in new["elements"] for f in e):
         angle, turn = 0.0, 1.0
     states = {"x": "(%%s - %r)" % z.real, "y": "(%%s - %r)" % z.imag, "phi": "(%%s - %r)" % angle}
@@ -195,7 +198,8 @@ def turned(model, r):
             e["acceleration"] = [a.real, a.imag]
             constant -= sum(b.get("mass", 0) for b in model["bodies"]) * (z.conjugate() * a).real
     new["bodies"].append({"name": "base", "start": {"x": z.real, "y": z.imag, "phi": angle}, "rate": {}})
-    new["elements"].append({"weld": "hold", "body": ["base", "ground"], "at": [[0, 0], [z.real, z.imag]], "angle": -angle})
+    new["elements"].append({"weld": "hold", "body": ["base", "ground"], "at": [[0, 0], [z.real, z.imag]],
+                            "angle": -angle})
 
     def back(row):
         out = {k: x for k, x in row.items() if not k.startswith(("base.", "hold."))}
@@ -272,7 +276,7 @@ def wheel_pfaffian(e, new):
     return [{"pfaffian": e["wheel"], "body": [e["body"], "ground"], "a": [-s, c, e["at"][0] * c + e["at"][1] * s]}]
 
 
-def friction_expression(e, w, value="value"):
+def friction_expression(e, w):
     text = "-%r*(%s)" % (e.get("viscous", 0), w)
     return text + (" - %r*tanh((%s)/%r)" % (e["limit"], w, e["speed"]) if e.get("limit", 0) > 0 else "")
 
@@ -288,21 +292,25 @@ def relative(e, name):
 def motor_expression(e, new):
     if not all(isinstance(e[k], (int, float)) for k in ("angle", "rate")):
         return None
-    y = "(%r*(%r - (%s)) + %r*(%r - (%s)))" % (e["stiffness"], e["angle"], relative(e, "phi"), e["damping"], e["rate"], relative(e, "omega"))
-    return [{"torque": e["motor"], "body": e["body"], "value": "%r*tanh(%s/%r)" % (e["limit"], y, e["limit"]) if e.get("limit") else y}]
+    y = "(%r*(%r - (%s)) + " % (e["stiffness"], e["angle"], relative(e, "phi"))
+    y += "%r*(%r - (%s)))" % (e["damping"], e["rate"], relative(e, "omega"))
+    y = "%r*tanh(%s/%r)" % (e["limit"], y, e["limit"]) if e.get("limit") else y
+    return [{"torque": e["motor"], "body": e["body"], "value": y}]
 
 
 def drag_force(e, new):
     b, name = e["body"], e["drag"]
     c = "-(%r + %r*sqrt(%s.vx^2 + %s.vy^2))" % (e.get("linear", 0), e.get("quadratic", 0), b, b)
     d = "-(%r + %r*sqrt(%s.omega^2))*%s.omega" % (e.get("turning", 0), e.get("turning_quadratic", 0), b, b)
-    return [{"force": name, "body": b, "at": [0, 0], "axes": "world", "fx": "%s*%s.vx" % (c, b), "fy": "%s*%s.vy" % (c, b)},
+    return [{"force": name, "body": b, "at": [0, 0], "axes": "world", "fx": "%s*%s.vx" % (c, b),
+             "fy": "%s*%s.vy" % (c, b)},
             {"torque": name + "t", "body": [b, "ground"], "value": d}]
 
 
 def gravity_forces(e, new):
     return [{"force": e["gravity"] + b["name"], "body": b["name"], "at": [0, 0], "axes": "world",
-             "fx": b["mass"] * e["acceleration"][0], "fy": b["mass"] * e["acceleration"][1]} for b in new["bodies"] if b.get("mass", 0) > 0]
+             "fx": b["mass"] * e["acceleration"][0],
+             "fy": b["mass"] * e["acceleration"][1]} for b in new["bodies"] if b.get("mass", 0) > 0]
 
 
 def rolling_without_inertia(e, new):
@@ -327,9 +335,19 @@ def gear_pfaffian(e, new):
 def tyres(model, stiffness):
     """Wheels give way: their slip is the lateral force times speed / stiffness."""
     new = copy.deepcopy(model)
-    new["elements"] = [{"tyre": e["wheel"], **{k: e[k] for k in ("body", "at", "heading")}, "stiffness": stiffness, "speed": 0.5}
+    new["elements"] = [{"tyre": e["wheel"], **{k: e[k] for k in ("body", "at", "heading")}, "stiffness": stiffness,
+                        "speed": 0.5}
                        if "wheel" in e else e for e in new["elements"]]
     return new
+
+
+def speed_of_nought(e, new):
+    return [{"speed": e["wheel"], **{k: e[k] for k in ("body", "at")}, "heading": e["heading"] + math.pi / 2,
+             "value": 0}]
+
+
+def friction_torque(e, new):
+    return [{"torque": e["friction"], "body": e["body"], "value": friction_expression(e, relative(e, "omega"))}]
 
 
 EQUIVALENT = [
@@ -337,15 +355,17 @@ EQUIVALENT = [
     {"slider": lambda e, new: slots(e["slider"], e, [e["heading"]]) + [angle_drive(e["slider"], e, e["angle"])],
      "pin": lambda e, new: slots(e["pin"], e, [0.3, 0.3 + math.pi / 2])},
     {"weld": lambda e, new: [pin_of(e["weld"], e), angle_drive(e["weld"], e, -e["angle"])]},
-    {"weld": lambda e, new: [{"slider": e["weld"] + "a", **{k: e[k] for k in ("body", "at")}, "heading": 0.7, "angle": -e["angle"]}] +
+    {"weld": lambda e, new: [{"slider": e["weld"] + "a", **{k: e[k] for k in ("body", "at")}, "heading": 0.7,
+                              "angle": -e["angle"]}] +
         slots(e["weld"], e, [2.0]), "pin": lambda e, new: [
             {"drive": e["pin"] + w, "body": e["body"], "at": e["at"], "what": w, "value": 0} for w in "xy"]},
     {"wheel": wheel_pfaffian, "gear": gear_pfaffian},
     {"wheel": lambda e, new: [{**{"steered-wheel": e["wheel"]}, **{k: x for k, x in e.items() if k != "wheel"}}]},
-    {"wheel": lambda e, new: [{"speed": e["wheel"], "body": e["body"], "at": e["at"], "heading": e["heading"] + math.pi / 2, "value": 0}]},
-    {"friction": lambda e, new: [{"torque": e["friction"], "body": e["body"], "value": friction_expression(e, relative(e, "omega"))}],
+    {"wheel": speed_of_nought},
+    {"friction": friction_torque,
      "motor": motor_expression},
-    {"rotational-spring": lambda e, new: [{"motor": e["rotational-spring"], "body": e["body"], "stiffness": e["stiffness"],
+    {"rotational-spring": lambda e, new: [{"motor": e["rotational-spring"], "body": e["body"],
+                                           "stiffness": e["stiffness"],
                                            "damping": e["damping"], "angle": e["angle"]}]},
     {"drag": drag_force, "gravity": gravity_forces},
     {"rolling-wheel": rolling_without_inertia}]
