@@ -16,6 +16,9 @@ from taylor import Jet, Rate, dot
 from signals import Signal
 
 
+np.seterr(all="ignore")  # what is not finite is no motion to compare with
+
+
 class Failure(Exception):
     """A mechanism for which the reference has no trustworthy solution: what is wrong with it."""
 
