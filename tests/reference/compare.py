@@ -45,7 +45,7 @@ def methods(program):
 def reason_in(text):
     """The line of an error among notices."""
     lines = [x for x in text.splitlines() if re.search("error:|pinwheel: ", x)
-             and not re.search("redundant|is kept in|were moved|derivatives by", x)]
+             and not re.search("redundant|is kept in|were moved|by differences", x)]
     return lines[-1] if lines else text[-200:]
 
 
