@@ -27,5 +27,5 @@ campaign () {
 
 campaign 'the reference against closed forms' closed_forms.py
 campaign 'random mechanisms by every method' compare.py --seed "${SEED:-1}" --count "${COUNT:-300}"
-campaign 'the same motion in other words' metamorphic.py --seed "${SEED:-1}" --count $((${COUNT:-300} / 5))
+campaign 'the same motion in other words' metamorphic.py --seed "${SEED:-1}" --count $((${COUNT:-300} / 3))
 exit $bad
