@@ -37,11 +37,6 @@ FILES_LIBS  := -lfyaml -ldl -lm
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
 SHARED       = $(LINK) -shared -Wl,--no-undefined
 
-# Sweeps use every processor where the compiler has OpenMP; the libraries have no threads of their own.
-OPENMP = $(eval OPENMP := $$(shell mkdir -p $(BUILD) && \
-           echo 'int omp_get_max_threads (void); int main (void) { return !omp_get_max_threads (); }' | \
-           $(CC) $(SAN) -fopenmp -x c - -o $(BUILD)/openmp 2>/dev/null && echo -fopenmp))$(OPENMP)
-
 # ---- What there is: a file dropped into one of these folders is part of the build ----
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
@@ -134,7 +129,7 @@ $(BUILD)/obj/core/files/expression/%.o: INCLUDE := -iquote core -iquote core/fil
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers
 $(call obj,core/cli/animate.c): INCLUDE += -iquote $(BUILD)/obj/core/cli
 $(call obj,core/cli/animate.c): $(BUILD)/obj/core/cli/animate.inc
-$(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = $(OPENMP)
+$(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = -pthread
 $(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote core/files/expression -iquote solvers $(SYSTEM)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := -iquote core -iquote core/files -iquote core/files/expression -iquote core/cli -iquote solvers -iquote tests/fuzz
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
@@ -192,10 +187,11 @@ $(BUILD)/models/%.so: models/%.c | $(INCLUDES) $(FIRST)
 	$(Q)$(CC) $(STRICT) $(INCLUDE) $(CPPFLAGS) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed -shared \
 	  -MMD -MP -MF $(BUILD)/obj/models/$*.d -o $@ $< -lm
 
-# A link: $(BUILD)/pinwheel finds models/, too, and a file that is reached twice counts once.  Nor may a model be found as the
-# C it was before.
+# A link: $(BUILD)/pinwheel finds models/, too, and a file that is reached twice counts once.  It is relative, so that the
+# tree can be copied.  Nor may a model be found as the C it was before.
 $(BUILD)/models/%.yaml: models/%.yaml
-	@mkdir -p $(@D) && rm -f $(@:.yaml=.so) && ln -sf "$(CURDIR)/$<" $@
+	@mkdir -p $(@D) && rm -f $(@:.yaml=.so)
+	@ln -sfr $< $@ 2>/dev/null || ln -sf "$(CURDIR)/$<" $@
 
 HOUSE_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
@@ -222,7 +218,7 @@ $(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml
 $(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a) | $(PROGRAM) $(PLUGINS) $(INCLUDES)
 	@mkdir -p $(@D)
 	$(call say,LINK)
-	$(Q)$(LINK) $(WRAP) -rdynamic -o $@ $(filter %.o,$^) $(BUILD)/libtests.a \
+	$(Q)$(LINK) $(WRAP) -rdynamic -Wl,-u,limit_begin -o $@ $(filter %.o,$^) $(BUILD)/libtests.a \
 	  -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive \
 	  $(FILES_LIBS) $(SOLVER_LIBS) -lcmocka -lpopt
 
@@ -232,11 +228,12 @@ $(BUILD)/tests/test_embed: | $(BUILD)/docs/embed
 # libraries below it allocate.
 comma := ,
 ALLOC_WRAP := malloc calloc realloc strdup free
-FILES_WRAP := fopen fclose fflush fwrite fread fseek fseeko ftell getline rename ftruncate fsync pwrite mkdir realpath opendir \
+FILES_WRAP := open fopen fdopen fclose fflush fwrite fread fseek fseeko ftell fgets rename ftruncate fsync pread pwrite flock \
+              fchmod mkdir realpath opendir \
               $(addprefix posix_spawn,p _file_actions_init _file_actions_addopen _file_actions_adddup2)
 $(BUILD)/tests/test_alloc: WRAP := $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
-$(BUILD)/tests/test_cli_faults: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
-$(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = $(OPENMP) $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
+$(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP) $(FILES_WRAP))
+$(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
 $(BUILD)/tests/test_cli_limits: $(call obj,core/cli/progress.c)
 # This every call of the libraries below.
@@ -248,7 +245,7 @@ $(BUILD)/tests/test_arkode: WRAP := -Wl,--no-as-needed -lsundials_arkode -Wl,--a
 $(FUZZERS): $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(call obj,$(FUZZ_SHARE)) $(filter-out %/main.o,$(CLI_OBJ)) $(FILES_LIB:.so=.a) $(LIB:.so=.a)
 	@mkdir -p $(@D)
 	$(call say,LINK)
-	$(Q)$(LINK) $(THREADS) $(OPENMP) -rdynamic -o $@ $(filter %.o,$^) -Wl,--whole-archive $(filter %.a,$^) -Wl,--no-whole-archive \
+	$(Q)$(LINK) -pthread -rdynamic -o $@ $(filter %.o,$^) -Wl,--whole-archive $(filter %.a,$^) -Wl,--no-whole-archive \
 	  $(FILES_LIBS) $(SOLVER_LIBS) -lpopt
 
 # ---- Running things ----

@@ -37,7 +37,14 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_carry (a, r->ledger, entries);
   checkpoint_statistics (&r->statistics, a);
   pw_rank_carry (r, a);
-  if (!isfinite (r->t)) a->failed = 1;
+}
+
+/* A file may be whole and yet not have been written by a run. */
+static int checkpoint_plausible (const pw_run *r) {
+  const pw_statistics *s = &r->statistics;
+  int good = isfinite (r->t) && r->t >= 0 && s->steps >= 0 && s->rejected >= 0 && s->rhs >= 0;
+  for (int i = 0; i < r->s->coords; i++) good &= isfinite (r->q[i]) && isfinite (r->v[i]);
+  return good;
 }
 
 /* From the state in the run, in either of them; `a` is loading and has the method's own next, if there is any. */
@@ -73,5 +80,9 @@ int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
   int good = checkpoint_sizes (r, a);
   if (good) checkpoint_state (r, a);
   if (!good || a->failed) return pw_fail (error, PW_INPUT, "the saved state is not of this run");
+  if (!checkpoint_plausible (r))
+    return pw_fail (
+        error, PW_INPUT,
+        "the saved state is not that of a run: its time, t = %g s, or a coordinate or velocity is impossible", r->t);
   return checkpoint_go_on (r, a, error);
 }

@@ -3,9 +3,11 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <spawn.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 #include "calls.h"
@@ -41,6 +43,9 @@ CALL (EAGAIN, EAGAIN, int, posix_spawnp,
       (child, file, actions, with, argv, environment))
 CALL (NULL, ENOMEM, char *, realpath, (const char *path, char *where), (path, where))
 CALL (NULL, EMFILE, DIR *, opendir, (const char *path), (path))
+CALL (-1, EIO, int, flock, (int fd, int how), (fd, how))
+CALL (-1, EROFS, int, fchmod, (int fd, mode_t mode), (fd, mode))
+CALL (-1, EIO, ssize_t, pread, (int fd, void *p, size_t size, off_t at), (fd, p, size, at))
 CALL (-1, EIO, int, fseek, (FILE * f, long at, int from), (f, at, from))
 CALL (-1, EIO, long, ftell, (FILE * f), (f))
 CALL (-1, EIO, int, fseeko, (FILE * f, off_t at, int from), (f, at, from))
@@ -57,7 +62,6 @@ static int call_is_written (FILE *f) {
 FILE *__real_fopen (const char *path, const char *mode);
 FILE *__wrap_fopen (const char *path, const char *mode);
 FILE *__wrap_fopen (const char *path, const char *mode) {
-  if (*mode == 'w') call.synced = 0;
   if (!call_fails ("fopen", *mode == 'r')) return __real_fopen (path, mode);
   errno = EMFILE;
   return NULL;
@@ -79,12 +83,14 @@ int __wrap_fflush (FILE *f) {
   return EOF;
 }
 
+int __real_open (const char *path, int flags, ...);
+
 /* From here on the disk is full. */
 size_t __real_fwrite (const void *p, size_t size, size_t count, FILE *f);
 size_t __wrap_fwrite (const void *p, size_t size, size_t count, FILE *f);
 size_t __wrap_fwrite (const void *p, size_t size, size_t count, FILE *f) {
   if (f == stdout || f == stderr || !call_fails ("fwrite", 0)) return __real_fwrite (p, size, count, f);
-  int full = open ("/dev/full", O_WRONLY);
+  int full = __real_open ("/dev/full", O_WRONLY);
   assert_true (full >= 0 && dup2 (full, fileno (f)) >= 0);
   close (full);
   __real_fwrite (p, size, count, f);
@@ -107,32 +113,74 @@ size_t __wrap_fread (void *p, size_t size, size_t count, FILE *f) {
   return 0;
 }
 
-ssize_t __real_getline (char **line, size_t *room, FILE *f);
-ssize_t __wrap_getline (char **line, size_t *room, FILE *f);
-ssize_t __wrap_getline (char **line, size_t *room, FILE *f) {
-  if (!call_fails ("getline", 1)) return __real_getline (line, room, f);
+char *__real_fgets (char *line, int room, FILE *f);
+char *__wrap_fgets (char *line, int room, FILE *f);
+char *__wrap_fgets (char *line, int room, FILE *f) {
+  if (!call_fails ("fgets", 1)) return __real_fgets (line, room, f);
   call_spoil (f);
-  return -1;
+  return NULL;
 }
 
-/* A checkpoint is on the disk before it takes the place of the one before it. */
+/* ---- What is on the disk ---- */
+
+static int call_same (const struct stat *a, const struct stat *b) {
+  return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
+}
+
+/* A file is on the disk, as it is, before it takes the place of another; its folder must follow. */
 int __real_rename (const char *from, const char *to);
 int __wrap_rename (const char *from, const char *to);
 int __wrap_rename (const char *from, const char *to) {
-  size_t n = strlen (to);
-  if (!call.synced && n > 3 && strcmp (to + n - 3, ".ck") == 0) call.unsynced++;
-  if (!call_fails ("rename", 0)) return __real_rename (from, to);
-  errno = EROFS;
-  return -1;
+  struct stat info;
+  char folder[600];
+  int synced = 0;
+  if (call_fails ("rename", 0)) {
+    errno = EROFS;
+    return -1;
+  }
+  assert_int_equal (lstat (from, &info), 0);
+  for (int i = 0; i < CALL_SYNCED; i++)
+    synced |= call_same (&call.synced[i], &info) && call.synced[i].st_size == info.st_size;
+  if (!synced) call.unsynced++;
+  snprintf (folder, sizeof folder, "%.*s", strrchr (to, '/') ? (int)(strrchr (to, '/') - to) : 1,
+            strrchr (to, '/') ? to : ".");
+  assert_int_equal (stat (folder, &call.folder), 0);
+  call.folder_due = 1;
+  return __real_rename (from, to);
 }
 
-/* A folder need not take it. */
 int __real_fsync (int fd);
 int __wrap_fsync (int fd);
 int __wrap_fsync (int fd) {
   struct stat info;
-  call.synced = 1;
-  if ((fstat (fd, &info) == 0 && S_ISDIR (info.st_mode)) || !call_fails ("fsync", 0)) return __real_fsync (fd);
-  errno = EIO;
+  if (call_fails ("fsync", 0)) {
+    errno = EIO;
+    return -1;
+  }
+  assert_int_equal (fstat (fd, &info), 0);
+  if (!S_ISDIR (info.st_mode))
+    call.synced[call.next++ % CALL_SYNCED] = info;
+  else if (call.folder_due && call_same (&info, &call.folder))
+    call.folder_due = 0;
+  return __real_fsync (fd);
+}
+
+int __wrap_open (const char *path, int flags, ...);
+int __wrap_open (const char *path, int flags, ...) {
+  va_list arguments;
+  va_start (arguments, flags);
+  mode_t mode = flags & O_CREAT ? va_arg (arguments, mode_t) : 0;
+  va_end (arguments);
+  if (!call_fails ("open", (flags & O_ACCMODE) == O_RDONLY && !(flags & O_DIRECTORY)))
+    return __real_open (path, flags, mode);
+  errno = EMFILE;
   return -1;
+}
+
+FILE *__real_fdopen (int fd, const char *mode);
+FILE *__wrap_fdopen (int fd, const char *mode);
+FILE *__wrap_fdopen (int fd, const char *mode) {
+  if (!call_fails ("fdopen", strcmp (mode, "rb") == 0)) return __real_fdopen (fd, mode);
+  errno = EMFILE;
+  return NULL;
 }

@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "check.h"
 #include "cli.h"
@@ -94,7 +95,7 @@ void faults_prepare (void) {
     size_t size = faults_slurp (start, e->d_name, text, sizeof text);
     snprintf (path, sizeof path, "%s/%s", o, e->d_name);
     FILE *f = fopen (path, "wb");
-    assert_true (f && fwrite (text, 1, size, f) == size && fclose (f) == 0);
+    assert_true (f && fwrite (text, 1, size, f) == size && fclose (f) == 0 && chmod (path, 0644) == 0);
   }
   if (d) closedir (d);
 }
@@ -119,7 +120,7 @@ static faults_function *faults_command (const char *name) {
 static int faults_redirect (int fd, const char *name) {
   char path[300];
   snprintf (path, sizeof path, "%s/%s", cli_folder, name);
-  int before = dup (fd), file = open (path, O_WRONLY | O_CREAT | O_TRUNC, 0666);
+  int before = dup (fd), file = creat (path, 0666);
   dup2 (file, fd);
   close (file);
   return before;
@@ -171,6 +172,12 @@ int faults_setup (void **state) {
   setenv ("CC", text, 1);
   snprintf (text, sizeof text, "%s/models/ezyroller.so", build ? build : "build");
   setenv ("MODEL", text, 1);
-  snprintf (text, sizeof text, "%s:%s", cli_folder, getenv ("PATH"));
-  return setenv ("PATH", text, 1);
+  const char *path = getenv ("PATH");
+  size_t size = strlen (cli_folder) + strlen (path ? path : "") + 2;
+  char *longer = malloc (size);
+  if (longer == NULL) return -1;
+  snprintf (longer, size, "%s:%s", cli_folder, path ? path : "");
+  int status = setenv ("PATH", longer, 1);
+  free (longer);
+  return status;
 }

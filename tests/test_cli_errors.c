@@ -47,7 +47,7 @@ static void test_bad_lines (void **state) {
     { "run ezyroller -o - --json -", "-o and --json cannot both write to standard output (-)" },
     { "run ezyroller -o ''", "the name of a file to write is empty" },
     { "run @/nothere.c", "cannot open the model file @/nothere.c: No such file or directory" },
-    { "run @/", "@/ is not a file" },
+    { "run @/", "cannot open the model file @/: it is a directory, not a regular file" },
     { "show", "something is missing; write pinwheel show MODEL [OPTION...]" },
     { "show ezyroler", "there is no model \"ezyroler\"; did you mean \"ezyroller\"?" },
     { "show ezyroller --at -1", "--at -1: expected a number >= 0" },

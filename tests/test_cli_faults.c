@@ -6,6 +6,7 @@
 #include <errno.h>
 #include <stdio.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 #include "alloc.h"
 #include "calls.h"
@@ -15,12 +16,21 @@
 
 static int faults_bad; /* calls after whose failure something was not as it should be */
 
+static int faults_pair; /* 1: the command writes a table and a summary */
+
+static int faults_exists (const char *name) {
+  char path[300];
+  cli_expand (name, path, sizeof path);
+  return access (path, F_OK) == 0;
+}
+
 /* The command once more with one call failing; 1 if it came so far. */
 static int faults_try (const char *command, long *count, long *fail, long n) {
   int free_fd = dup (0);
   close (free_fd);
   faults_prepare ();
   call.name = "allocation";
+  call.folder_due = 0;
   call.reading = 0;
   call.count = alloc.count = 0;
   *fail = n;
@@ -28,9 +38,11 @@ static int faults_try (const char *command, long *count, long *fail, long n) {
   *fail = 0;
   const char *said = cli_file ("log"), *broken = faults_broken ();
   int good = !reached ? status == 0 : (status == 1 || (call.reading && status == 2)) && strstr (said, "pinwheel: ");
+  if (faults_exists ("@/o/a.csv") != faults_exists ("@/o/a.json") && faults_pair) broken = "one of a.csv and a.json";
   if (good && reached && fail == &alloc.fail) good = strstr (said, "out of memory") || strstr (said, strerror (ENOMEM));
   int fd = dup (0);
   close (fd);
+  if (!reached && call.folder_due) broken = "the folder, which is not on the disk";
   if (good && !broken && alloc.live == 0 && fd == free_fd) return reached;
   print_error ("%s: %s %ld: status %d, %d blocks and %d files left open, not whole: %s\n%s", command, call.name, n,
                status, alloc.live, fd - free_fd, broken ? broken : "none", said);
@@ -57,6 +69,7 @@ static void faults_each (const char *command) {
 
 static void faults_from (const char *start, const char *command) {
   faults_begin (start, command);
+  faults_pair = strstr (command, " -o ") && strstr (command, " --json ");
   faults_each (command);
 }
 
@@ -66,6 +79,9 @@ static void test_run (void **state) {
   (void)state;
   faults_most = 200;
   faults_from (":", "run ezyroller --t-end 0.02 -o @/o/a.csv --json @/o/a.json");
+  mode_t before = umask (027); /* the file that is replaced has another mode than a new one */
+  faults_from ("cp @/whole/a.csv @/start/a.csv", "run ezyroller --t-end 0.02 -o @/o/a.csv");
+  umask (before);
   faults_from ("cp @/whole/a.csv @/truth.csv", "run ezyroller --t-end 0.02 --truth @/truth.csv");
 }
 

@@ -138,7 +138,7 @@ static void test_interrupt (void **state) {
   int status =
       cli_run ("\"${PINWHEEL:-build/pinwheel}\" drift ezyroller --t-end 1 --step 1e-3 --vary every=1,2 -o @/i &\n"
                "p=$!; while ! grep -q '^methods,rk4' @/i/drift.csv.part 2>/dev/null; do sleep 0.02; done\n"
-               "kill -INT $p; wait $p; test $? = 130 && ls @/i");
+               "kill -TERM $p; wait $p; test $? = 130 && ls @/i");
   if (status != 0) return; /* it was quicker than the signal: nothing to see */
   assert_non_null (strstr (cli_out, "drift.csv.part\n"));
   assert_non_null (strstr (cli_err, "runs are done, and kept in"));

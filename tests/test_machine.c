@@ -72,7 +72,7 @@ static void test_full (void **state) {
 /* /dev/full takes nothing; a folder that cannot be written; a folder in the place of a file. */
 static void test_unwritable (void **state) {
   (void)state;
-  const char *folder = getuid () == 0 ? "/sys" : "@/closed";
+  const char *folder = getuid () == 0 ? "@/file" : "@/closed"; /* root may write everywhere but below a file */
   const char *const option[] = { "run ezyroller -o %s/x.csv",
                                  "run ezyroller --json %s/x.json",
                                  "run ezyroller --plots %s/x",
@@ -81,7 +81,7 @@ static void test_unwritable (void **state) {
                                  "compare ezyroller -o %s/x",
                                  "drift ezyroller -o %s/x",
                                  "new %s/x.c" };
-  cli_good ("mkdir -p @/closed; chmod a-w @/closed");
+  cli_good ("mkdir -p @/closed; chmod a-w @/closed; touch @/file");
   for (size_t i = 0; i < sizeof option / sizeof *option; i++) {
     char text[500], command[300];
     snprintf (command, sizeof command, option[i], folder);

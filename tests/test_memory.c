@@ -137,7 +137,7 @@ static int memory_run (const char *command, long fail, long limit) {
   pid_t child = fork ();
   assert_true (child >= 0);
   if (child == 0) {
-    for (const int *s = (int[]){ SIGSEGV, SIGBUS, SIGFPE, SIGILL, 0 }; *s; s++) signal (*s, SIG_DFL); /* cmocka's */
+    for (const int *s = (int[]){ SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGALRM, SIGTERM, 0 }; *s; s++) signal (*s, SIG_DFL);
     alarm (300);
     memory->limit = limit;
     memory->fail = fail;

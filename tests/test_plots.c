@@ -112,7 +112,7 @@ static void test_refusals (void **state) {
   (void)state;
   cli_write ("file", "in the way");
   cli_bad ("pinwheel run ezyroller --t-end 1 --plots @/file >/dev/null", 1,
-           "cannot write @/file/motion.dat: Not a directory");
+           "cannot write into @/file: Not a directory");
   cli_bad ("pinwheel run ezyroller --t-end 1 --plots ''", 2, "the folder \"\" for plots: no such name can be used");
 }
 

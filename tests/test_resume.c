@@ -50,11 +50,11 @@ static void test_restarts (void **state) {
       "pinwheel run ezyroller --t-end 30 -m ida+ggl --checkpoint @/a.ck | grep -q 'started anew at 9 checkpoints'");
 }
 
-/* After Ctrl-C: what there is to go on from, and that it does. */
+/* Stopped by a signal: what there is to go on from, and that it does. */
 static void test_interrupted (void **state) {
   (void)state;
   cli_run ("rm -f @/a.*; " RESUME_PROGRAM RESUME_RUN "-m rk4 --step 1e-5 -o @/a.csv --checkpoint @/a.ck & "
-           "while [ ! -e @/a.ck ]; do sleep 0.02; done; kill -INT $!; wait $!; echo $?");
+           "while [ ! -e @/a.ck ]; do sleep 0.02; done; kill -TERM $!; wait $!; echo $?");
   assert_string_equal (cli_out, "130\n");
   assert_non_null (strstr (cli_err, "a.csv.part\n"));
   assert_non_null (strstr (cli_err, "/a.ck goes on from t = "));
@@ -97,7 +97,8 @@ static void test_other_file (void **state) {
   resume_bad ("rm @/b.ck", "", "cannot read the checkpoint @/b.ck: No such file or directory");
   resume_bad ("echo hello >@/b.ck", "", "@/b.ck is no checkpoint of Pinwheel");
   resume_bad (": >@/b.ck", "", "@/b.ck is no checkpoint of Pinwheel");
-  resume_bad ("rm @/b.ck; mkdir @/b.ck", "", "cannot read the checkpoint @/b.ck");
+  resume_bad ("rm @/b.ck; mkdir @/b.ck", "",
+              "cannot read the checkpoint @/b.ck: it is a directory, not a regular file");
   cli_good ("rmdir @/b.ck");
   resume_bad ("sed 1s/1/7/ @/good.ck >@/b.ck", "", "@/b.ck is a checkpoint of format 7; this Pinwheel reads format 1");
   resume_bad ("printf x >>@/b.ck", "", "the checkpoint @/b.ck is damaged: its check sum is wrong");

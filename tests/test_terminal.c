@@ -89,9 +89,9 @@ static void test_insist (void **state) {
                        "PW_MODEL (.about = \"waits\", .build = build);\n");
   cli_run ("\"${PINWHEEL:-build/pinwheel}\" run @/hang.c >@/said & p=$!\n"
            "until grep -q waits @/said || ! kill -0 $p; do sleep 0.05; done\n"
-           "n=0; while kill -INT $p 2>/dev/null && [ $n -lt 200 ]; do n=$((n + 1)); sleep 0.05; done\n"
+           "n=0; while kill -TERM $p 2>/dev/null && [ $n -lt 200 ]; do n=$((n + 1)); sleep 0.05; done\n"
            "[ $n -ge 3 ] || echo too soon; kill -9 $p 2>/dev/null; wait $p 2>/dev/null; echo $?");
-  assert_string_equal (cli_out, "130\n");
+  assert_string_equal (cli_out, "143\n");
 }
 
 int main (void) {

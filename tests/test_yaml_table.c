@@ -195,8 +195,8 @@ static void test_places (void **state) {
   assert_int_equal (symlink ("../model-b/data.csv", table_in ("model/b.csv")), 0);
   table_bad ("{file: b.csv}", LINK);
   assert_int_equal (mkfifo (table_in ("model/pipe.csv"), 0600), 0);
-  table_bad ("{file: pipe.csv}", "it is not a file");
-  table_bad ("{file: sub}", "it is not a file");
+  table_bad ("{file: pipe.csv}", "it is a FIFO or pipe, not a regular file");
+  table_bad ("{file: sub}", "it is a directory, not a regular file");
   table_bad ("{file: none.csv}", "cannot read \"none.csv\": No such file or directory");
   assert_int_equal (symlink ("data.csv", table_in ("model/good.csv")), 0);
   assert_int_equal (symlink ("../data.csv", table_in ("model/sub/good.csv")), 0);

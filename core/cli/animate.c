@@ -141,13 +141,11 @@ int pw_animation_check (const char *path, pw_error *error) {
   return pw_fail (error, PW_INPUT, "--animate %s: expected a name that ends in .html", path);
 }
 
-int pw_animate (const pw_plots *p, const char *path, const char *method, const char *reason, pw_error *error) {
+int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *method, const char *reason) {
   if (p->samples < 2) {
-    fprintf (stderr, "pinwheel: the run is too short for an animation: %s is not written\n", path);
-    return PW_OK;
+    pw_cli_say ("pinwheel: the run is too short for an animation: %s is not written\n", path);
+    return 0;
   }
-  pw_output *o = pw_output_open (path, error);
-  if (o == NULL) return error->status;
   FILE *f = pw_output_stream (o);
   for (const char *const *line = page_lines; *line; line++) {
     const char *mark = strstr (*line, page_mark);
@@ -159,5 +157,5 @@ int pw_animate (const pw_plots *p, const char *path, const char *method, const c
     page_data (f, p, method, reason);
     fputs (mark + sizeof page_mark - 1, f);
   }
-  return pw_output_finish (o, error);
+  return 1;
 }

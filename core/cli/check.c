@@ -195,6 +195,15 @@ static void check_close (pw_check *x) {
   pw_cli_close_model (&x->m);
 }
 
+/* Opens what will be written, so that nothing is computed in vain. */
+static int check_open_json (pw_check *x, const pw_cli_line *l, const char *json, pw_output **o, pw_error *error) {
+  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", json, PW_WRITES, NULL } };
+  if (json == NULL) return PW_OK;
+  if (pw_cli_uses (l, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
+  *o = pw_output_open (json, error);
+  return *o ? PW_OK : error->status;
+}
+
 int pw_cli_check (int argc, const char **argv) {
   char *json = NULL;
   const char **sets = NULL, **starts = NULL;
@@ -205,12 +214,16 @@ int pw_cli_check (int argc, const char **argv) {
   pw_error error = { 0 };
   pw_cli_line l;
   pw_check x = { .r = NULL };
+  pw_output *o = NULL;
   if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
-      pw_cli_open (&x.m, &l, sets, starts, &error) == PW_OK && check_model (&x, starts != NULL, &error) == PW_OK) {
-    if (json == NULL || strcmp (json, "-") != 0) pw_check_text (&x);
-    if (json) pw_check_json (&x, json, &error);
+      pw_cli_open (&x.m, &l, sets, starts, &error) == PW_OK && check_open_json (&x, &l, json, &o, &error) == PW_OK &&
+      check_model (&x, starts != NULL, &error) == PW_OK) {
+    if (o == NULL || pw_output_stream (o) != stdout) pw_check_text (&x);
+    if (o) pw_check_json (&x, o, &error);
+    o = NULL;
     check_verdict (&x, &error);
   }
+  if (o) pw_output_discard (o);
   check_close (&x);
   pw_cli_close (&l);
   return pw_cli_end (&error);

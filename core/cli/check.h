@@ -49,7 +49,7 @@ double pw_check_doubling (const pw_check *x);
 /* A state the consistent start has moved: its name, and from where to where. */
 void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to);
 
-void pw_check_text (const pw_check *x);                                   /* check_text.c */
-int pw_check_json (const pw_check *x, const char *path, pw_error *error); /* check_json.c */
+void pw_check_text (const pw_check *x);                               /* check_text.c */
+int pw_check_json (const pw_check *x, pw_output *o, pw_error *error); /* completes the output (check_json.c) */
 
 #endif

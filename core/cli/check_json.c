@@ -165,9 +165,7 @@ static void json_linear (FILE *f, const pw_check *x) {
   fputs ("]}", f);
 }
 
-int pw_check_json (const pw_check *x, const char *path, pw_error *error) {
-  pw_output *o = pw_output_open (path, error);
-  if (o == NULL) return error->status;
+int pw_check_json (const pw_check *x, pw_output *o, pw_error *error) {
   FILE *f = pw_output_stream (o);
   fputs ("{\"schema\": 1, \"model\": ", f);
   json_text (f, pw_file_name (x->m.file));

@@ -30,7 +30,16 @@ int pw_checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error) {
   return pw_cli_number ("--checkpoint-every", c->every_text, PW_POSITIVE, &c->every, error);
 }
 
+int pw_checkpoints_reserve (pw_checkpoints *c, pw_error *error) {
+  c->lock = pw_output_open (c->path, error);
+  if (c->lock == NULL) return error->status;
+  if (pw_output_is_file (c->lock)) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s: a checkpoint needs a regular file, which can be read again and replaced",
+                  c->path);
+}
+
 void pw_checkpoints_close (pw_checkpoints *c) {
+  if (c->lock) pw_output_discard (c->lock);
   pw_text_free (&c->head);
   pw_archive_free (&c->state);
   pw_checkpoint_free (&c->from);
@@ -61,7 +70,8 @@ void pw_checkpoints_pass (pw_checkpoints *c, double t) {
 
 int pw_checkpoints_write (pw_checkpoints *c, double t, pw_error *error) {
   if (c->state.failed) return pw_fail (error, PW_MACHINE, "out of memory while saving a checkpoint");
-  int status = pw_checkpoint_write (c->path, c->head.at, &c->state, error);
+  pw_output *o = pw_output_open_as (c->path, ".next", error);
+  int status = o ? pw_checkpoint_put (o, c->head.at, &c->state, error) : error->status;
   if (status == PW_OK) c->saved = t;
   return status;
 }

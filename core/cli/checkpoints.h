@@ -15,6 +15,7 @@ typedef struct {
   pw_text head;       /* of the files */
   pw_archive state;   /* of the next one */
   pw_checkpoint from; /* what is resumed */
+  pw_output *lock;    /* FILE.part, empty, which keeps other processes out from the beginning to the end */
 } pw_checkpoints;
 
 /* Table entries for popt: the address of a pw_checkpoints, all zero. */
@@ -36,6 +37,9 @@ typedef struct {
 /* Reads the file to be resumed, if there is one, and the options; `every` stays 0 without checkpoints. */
 int pw_checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error);
 void pw_checkpoints_close (pw_checkpoints *c);
+
+/* Locks the file, so that nothing is computed in vain. */
+int pw_checkpoints_reserve (pw_checkpoints *c, pw_error *error);
 
 /* Completes the head, to which the caller has added lines with all that decides what is computed, and refuses a file of
  * another run. */

@@ -131,7 +131,27 @@ int pw_cli_matrices (const pw_cli_model *m, double t, pw_error *error);
  * model cannot say: function signals, kinds of the model's own. */
 int pw_cli_yaml (const pw_cli_model *m, pw_error *error);
 
+/* ---- Files ---- */
+
+/* The first entry of a command's list for pw_cli_uses. */
+#define PW_CLI_MODEL_USE \
+  { "the model", NULL, PW_READS, NULL }
+
+/* Refuses files that a command would read and write, or write twice.  The list begins with PW_CLI_MODEL_USE, which
+ * stands for the model of the command line and, once its file is open, for the tables it reads; `file` may be NULL. */
+int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error);
+
 /* ---- The end ---- */
+
+#ifdef __GNUC__
+#define PW_PRINTS(n) __attribute__ ((format (printf, n, n + 1)))
+#else
+#define PW_PRINTS(n)
+#endif
+
+/* Print to standard error, and to a stream; on a terminal control characters are escaped, since names may contain them. */
+void pw_cli_say (const char *format, ...) PW_PRINTS (1);
+void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTS (2);
 
 /* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, or as it is if it names a place in a file;
  * returns the exit status. */

@@ -2,6 +2,7 @@
  * against the truth: a row for each rung, failures included. */
 #include <math.h>
 #include <stdlib.h>
+#include <unistd.h>
 #include "compare.h"
 #include "plot.h"
 #include "stop.h"
@@ -37,10 +38,15 @@ static int compare_read (pw_compare *x, int argc, const char **argv, pw_error *e
 
 /* The table is written as rows come, under the name it keeps if something stops it. */
 static int compare_open_csv (pw_compare *x, pw_error *error) {
+  static const char *const names[] = { ".dat", ".gp", ".svg", ".png", "compare.csv", "truth.csv", NULL };
   char path[PLOT_PATH];
   if (x->folder == NULL) return PW_OK;
-  int status = pw_plot_folder (x->folder, error);
-  if (status != PW_OK) return status;
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "--truth", x->truth_path, PW_READS, NULL },
+                   { "-o", x->folder, PW_WRITES_INTO, names } };
+  if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
+  x->lock = pw_plot_folder (x->folder, error);
+  if (x->lock < 0) return error->status;
   snprintf (path, sizeof path, "%s/compare.csv", x->folder);
   x->csv = pw_output_open (path, error);
   return x->csv ? pw_compare_csv_head (x, error) : error->status;
@@ -140,8 +146,8 @@ static int compare_interrupted (pw_compare *x) {
   if (x->rows == 0)
     fputs ("pinwheel: interrupted before the first row was done\n", stderr);
   else
-    fprintf (stderr, "pinwheel: interrupted; %d of %d rows are done%s%s\n", x->rows, x->rungs,
-             *part ? ", and kept in " : "", part);
+    pw_cli_say ("pinwheel: interrupted; %d of %d rows are done%s%s\n", x->rows, x->rungs, *part ? ", and kept in " : "",
+                part);
   return PW_INTERRUPTED;
 }
 
@@ -171,6 +177,7 @@ static int compare_verdict (const pw_compare *x, pw_error *error) {
 }
 
 static void compare_close (pw_compare *x) {
+  if (x->lock >= 0) close (x->lock);
   pw_truth_close (&x->truth);
   pw_cli_close_model (&x->m);
   pw_cli_close (&x->line);
@@ -179,7 +186,7 @@ static void compare_close (pw_compare *x) {
 }
 
 int pw_cli_compare (int argc, const char **argv) {
-  pw_compare x = { .rows = 0 };
+  pw_compare x = { .lock = -1 };
   pw_error error = { 0 };
   int status = compare_read (&x, argc, argv, &error);
   if (status == PW_OK) {

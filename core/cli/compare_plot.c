@@ -43,8 +43,9 @@ static int plot_count (const pw_compare *x, int method) {
 
 /* A block for each method that has a point, two empty lines between them. */
 static int plot_write_data (const pw_compare *x, const pw_plots *p, pw_error *error) {
-  FILE *f = pw_plot_create (p, PLOT_DATA, error);
-  if (f == NULL) return PW_MACHINE;
+  pw_output *o = pw_plot_create (p, PLOT_DATA, error);
+  if (o == NULL) return PW_MACHINE;
+  FILE *f = pw_output_stream (o);
   fputs ("# rung, processor time [s], right-hand sides, largest error of lengths [m] and angles [rad]\n", f);
   for (int i = 0, block = 0; i < x->list.count; i++) {
     if (plot_count (x, i) == 0) continue;
@@ -58,7 +59,7 @@ static int plot_write_data (const pw_compare *x, const pw_plots *p, pw_error *er
       fputc ('\n', f);
     }
   }
-  return pw_plot_finish (p, PLOT_DATA, f, error);
+  return pw_output_finish (o, error);
 }
 
 /* ---- Axes ---- */
@@ -166,7 +167,7 @@ static int plot_one (const pw_compare *x, const pw_plots *p, const plot_figure *
   pw_script_panel (&s, right);
   plot_lines (x, &s, PLOT_RHS, figure->unit);
   fputs ("set format y '1e%T'\nunset xlabel\nunset object 1\n", s.f); /* the next picture begins as this one did */
-  return pw_script_end (&s, p, error);
+  return pw_script_end (&s, error);
 }
 
 int pw_compare_plot (const pw_compare *x, pw_error *error) {

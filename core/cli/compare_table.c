@@ -34,7 +34,7 @@ void pw_compare_truth_line (const pw_compare *x, FILE *f) {
     fprintf (f, "no two methods reach the end together, so errors are not known; --truth FILE.csv would tell them\n");
     return;
   }
-  fprintf (f, "errors are taken against %s%s\n", t->about, x->truth_path ? ", as if it were exact" : "");
+  pw_cli_print (f, "errors are taken against %s%s\n", t->about, x->truth_path ? ", as if it were exact" : "");
   for (int i = 0; i < t->partners; i++)
     fprintf (f, "  %s agrees with it to %s m, %s rad%s\n", t->partner[i].about,
              table_number (t->partner[i].error[MOTION_MOST + MOTION_LENGTH], 0, a),

@@ -2,6 +2,7 @@
  * that depends on Baumgarte's alpha and beta and on the projection's metric and frequency. */
 #include <math.h>
 #include <string.h>
+#include <unistd.h>
 #include "drift.h"
 #include "plot.h"
 #include "stop.h"
@@ -56,12 +57,15 @@ static int drift_settle (pw_drift *x, pw_error *error) {
 }
 
 static int drift_open (pw_drift *x, pw_error *error) {
+  static const char *const names[] = { ".dat", ".gp", ".svg", ".png", "drift.csv", "drift-time.csv", NULL };
   char path[PLOT_PATH + 16];
   int status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
   if (status == PW_OK) status = drift_settle (x, error);
   if (status != PW_OK || x->folder == NULL) return status;
-  status = pw_plot_folder (x->folder, error);
-  if (status != PW_OK) return status;
+  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
+  if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
+  x->lock = pw_plot_folder (x->folder, error);
+  if (x->lock < 0) return error->status;
   snprintf (path, sizeof path, "%s/drift.csv", x->folder);
   x->csv = pw_output_open (path, error);
   return x->csv ? pw_drift_csv_head (x, error) : error->status;
@@ -100,8 +104,8 @@ static int drift_rows (pw_drift *x, pw_error *error) {
 static int drift_interrupted (pw_drift *x) {
   char part[PLOT_PATH + 16] = "";
   if (x->csv) pw_text_abandon (x->csv, x->done, part, sizeof part);
-  fprintf (stderr, "pinwheel: interrupted; %d of %d runs are done%s%s\n", x->done, x->rows,
-           *part ? ", and kept in " : "", part);
+  pw_cli_say ("pinwheel: interrupted; %d of %d runs are done%s%s\n", x->done, x->rows, *part ? ", and kept in " : "",
+              part);
   return PW_INTERRUPTED;
 }
 
@@ -128,7 +132,7 @@ static int drift_verdict (const pw_drift *x, pw_error *error) {
 }
 
 int pw_cli_drift (int argc, const char **argv) {
-  pw_drift x = { .rows = 0 };
+  pw_drift x = { .lock = -1 };
   pw_error error = { 0 };
   int status = drift_read (&x, argc, argv, &error);
   if (status == PW_OK) {
@@ -141,6 +145,7 @@ int pw_cli_drift (int argc, const char **argv) {
     status = drift_finish (&x, status, &error);
     if (status == PW_OK) status = drift_verdict (&x, &error);
   }
+  if (x.lock >= 0) close (x.lock);
   pw_drift_free_rows (&x);
   pw_contestants_close (&x.list);
   pw_cli_close_model (&x.m);

@@ -41,6 +41,7 @@ typedef struct {
   /* as given */
   pw_cli_wishes wishes;
   const char *methods_text, *folder;
+  int lock; /* of the folder; -1: none */
   const char **vary, **sets, **starts;
   int only_methods;
   /* as understood */

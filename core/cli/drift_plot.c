@@ -71,8 +71,9 @@ static int plot_write_data (const pw_drift *x, const plot_figure *figure, int li
                             pw_error *error) {
   char file[60], text[32];
   snprintf (file, sizeof file, "%s.dat", figure->name);
-  FILE *f = pw_plot_create (p, file, error);
-  if (f == NULL) return PW_MACHINE;
+  pw_output *o = pw_plot_create (p, file, error);
+  if (o == NULL) return PW_MACHINE;
+  FILE *f = pw_output_stream (o);
   fprintf (f, "# %s, worst scaled residuals of position and velocity, energy balance [J]\n", figure->axis);
   for (int line = 0, block = 0; line < lines; line++) {
     if (!plot_drawn (x, figure->group, line)) continue;
@@ -88,7 +89,7 @@ static int plot_write_data (const pw_drift *x, const plot_figure *figure, int li
         fputc ('\n', f);
       }
   }
-  return pw_plot_finish (p, file, f, error);
+  return pw_output_finish (o, error);
 }
 
 /* ---- Lines ---- */
@@ -175,7 +176,7 @@ static int plot_one (const pw_drift *x, const plot_figure *figure, const plot_sp
   fprintf (s.f, "set key at screen 0.5,screen %s center top horizontal maxcols %d samplen 5\n",
            pw_format (y, 1 - (double)(SCRIPT_TOP - 6) / s.height, 4), columns);
   plot_panels (x, figure, span, &s);
-  return pw_script_end (&s, p, error);
+  return pw_script_end (&s, error);
 }
 
 int pw_drift_plot (const pw_drift *x, pw_error *error) {

@@ -33,8 +33,9 @@ static const uint64_t print_empty = 14695981039346656037u;
 int pw_print_file (pw_text *t, const char *key, const char *name, const char *path, pw_error *error) {
   char text[200], block[4096];
   uint64_t h = print_empty;
-  FILE *f = fopen (path, "rb");
-  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", path, strerror (errno));
+  const char *reason;
+  FILE *f = pw_open_input (path, &reason);
+  if (f == NULL) return pw_fail (error, errno ? PW_MACHINE : PW_INPUT, "cannot read %s: %s", path, reason);
   for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = print_hash (h, block, n);
   int why = ferror (f) ? errno : 0;
   fclose (f);

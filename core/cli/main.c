@@ -3,6 +3,7 @@
 #include <errno.h>
 #include <signal.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "cli.h"
 #include "util.h"
@@ -81,6 +82,7 @@ int main (int argc, char **argv) {
   signal (SIGPIPE,
           SIG_IGN); /* a closed pipe, and a file that may not grow, is a failed write: what is open is tidied up */
   signal (SIGXFSZ, SIG_IGN);
+  unsetenv ("POSIXLY_CORRECT"); /* popt would take no option that stands after the model */
   int status = main_dispatch (argc, (const char **)argv);
   pw_error error = { 0 };
   if ((fflush (stdout) != 0 || ferror (stdout)) && status == 0)

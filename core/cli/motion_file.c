@@ -23,13 +23,44 @@ typedef struct {
 
 /* ---- Lines ---- */
 
+enum { FILE_LINE = 16 << 20 }; /* bytes of the longest line */
+
+static int file_fail (truth_file *in, int why) {
+  if (in->failed == 0) in->failed = why;
+  return 0;
+}
+
+/* Reads up to the end of the line; 0 at the end of the file, or if it fails. */
+static int file_read_line (truth_file *in) {
+  size_t used = 0;
+  do {
+    if (in->room - used < 2) {
+      size_t room = in->room ? 2 * in->room : 1 << 12;
+      char *more = room > 2 * FILE_LINE ? NULL : realloc (in->line, room);
+      if (more == NULL) return file_fail (in, room > 2 * FILE_LINE ? EOVERFLOW : ENOMEM);
+      in->line = more;
+      in->room = room;
+    }
+    errno = 0;
+    if (fgets (in->line + used, (int)(in->room - used), in->f) == NULL) {
+      if (!feof (in->f)) return file_fail (in, errno);
+      return used > 0;
+    }
+    if (in->line[used] == 0) return file_fail (in, EILSEQ);
+    used += strlen (in->line + used);
+  } while (in->line[used - 1] != '\n');
+  return 1;
+}
+
+/* The next line that is not empty, without its end. */
 static int file_line (truth_file *in) {
-  ssize_t n = getline (&in->line, &in->room, in->f);
-  if (n < 0 && !feof (in->f)) in->failed = errno;
-  if (n < 0) return 0;
-  while (n > 0 && (in->line[n - 1] == '\n' || in->line[n - 1] == '\r')) in->line[--n] = 0;
-  in->number++;
-  return n > 0 || file_line (in);
+  while (file_read_line (in)) {
+    size_t n = strlen (in->line);
+    while (n > 0 && (in->line[n - 1] == '\n' || in->line[n - 1] == '\r')) in->line[--n] = 0;
+    in->number++;
+    if (n > 0) return 1;
+  }
+  return 0;
 }
 
 /* Cuts the next cell off. */
@@ -167,14 +198,29 @@ static int file_read (truth_file *in, pw_motion *m, const pw_system *s, double *
   return status == PW_OK ? file_rows (in, rows, *t_end, m, error) : status;
 }
 
+static int file_failed (const truth_file *in, pw_error *error) {
+  char line[60];
+  if (in->failed == ENOMEM) return pw_fail (error, PW_MACHINE, "--truth %s: out of memory", in->path);
+  snprintf (line, sizeof line, "line %ld has more than %d MB", in->number + 1, FILE_LINE >> 20);
+  return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", in->path,
+                  in->failed == EOVERFLOW ? line
+                  : in->failed == EILSEQ  ? "a table is text, and this has a byte 0"
+                                          : strerror (in->failed));
+}
+
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error) {
-  truth_file in = { .path = path, .f = fopen (path, "r") };
-  if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, strerror (errno));
-  int status = file_read (&in, m, s, t_end, whole, error);
-  if (in.failed) status = pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, strerror (in.failed));
+  const char *why;
+  truth_file in = { .path = path, .f = pw_open_input (path, &why) };
+  if (in.f == NULL && errno == ENOMEM) return pw_fail (error, PW_MACHINE, "--truth %s: out of memory", path);
+  if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, why);
+  pw_error own = { 0 };
+  file_read (&in, m, s, t_end, whole, &own);
+  if (in.failed) own = (pw_error){ 0 }; /* what could not be read is neither empty nor incomplete */
+  if (in.failed) file_failed (&in, &own);
+  if (own.status != PW_OK) pw_fail (error, own.status, "%s", own.text);
   fclose (in.f);
   free (in.line);
   free (in.place);
   free (in.sign);
-  return status;
+  return own.status;
 }

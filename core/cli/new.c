@@ -144,7 +144,7 @@ static int new_write (const char *path, pw_error *error) {
     remove (path);
     return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (why));
   }
-  printf ("%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
+  pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
   return PW_OK;
 }
 

@@ -220,6 +220,6 @@ int pw_cli_end (const pw_error *error) {
   if (error->status == PW_MACHINE && options_nobody_reads ()) return PW_CLOSED_PIPE; /* they know */
   fflush (stdout);
   int placed = strstr (error->text, ": error: ") != NULL; /* as compilers say it, so that editors find the place */
-  fprintf (stderr, "%s%s\n", placed ? "" : "pinwheel: ", error->text);
+  pw_cli_say ("%s%s\n", placed ? "" : "pinwheel: ", error->text);
   return -error->status;
 }

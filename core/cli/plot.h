@@ -3,7 +3,7 @@
 #define PW_PLOT_H
 
 #include <stdio.h>
-#include "pinwheel-files.h"
+#include "cli.h"
 #include "plots.h"
 #include "system.h"
 
@@ -56,6 +56,7 @@ typedef struct {
 
 struct pw_plots {
   const char *folder, *model;
+  int lock; /* keeps other processes from writing into the folder; -1: there is none */
   const pw_system *s;
   double t_end;
   int samples, wanted; /* taken so far, and in all */
@@ -123,16 +124,15 @@ void pw_plot_find_links (pw_plots *p, const pw_model *m);
 /* Their forces [N], x and y each, of a sample the system is placed at with J swept. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 
-/* Makes a folder and those above it. */
+/* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
+ * PW_MACHINE. */
 int pw_plot_folder (const char *folder, pw_error *error);
 
 /* Whether the run has ended early, and in words up to where: "incomplete: up to t = 3.2 s of 10 s". */
 int pw_plot_incomplete (const pw_plots *p, char *text, size_t size);
 
-/* Opens a file of the folder for writing, as NAME.part.  NULL and PW_MACHINE with path and reason if that fails. */
-FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error);
-/* Closes it and gives it its name.  PW_MACHINE if something could not be written; then there is none. */
-int pw_plot_finish (const pw_plots *p, const char *name, FILE *file, pw_error *error);
+/* Opens a file of the folder for writing; its data say so if the run is incomplete.  NULL and PW_MACHINE. */
+pw_output *pw_plot_create (const pw_plots *p, const char *name, pw_error *error);
 
 /* The smallest rectangle around all attachment points, centres and wheels of samples 0 ... n - 1, or around their paths
  * of the wheels (of the centres, if there are no wheels). */

@@ -86,8 +86,9 @@ static int data_closeup (const pw_plots *p) {
 
 /* One block per curve: time, what is kept of the body or wheel, its number in the model. */
 static int data_curves (const pw_plots *p, const char *name, const pw_curves *c, const char *columns, pw_error *error) {
-  FILE *f = pw_plot_create (p, name, error);
-  if (f == NULL) return PW_MACHINE;
+  pw_output *o = pw_plot_create (p, name, error);
+  if (o == NULL) return PW_MACHINE;
+  FILE *f = pw_output_stream (o);
   for (int k = 0; k < c->count; k++) {
     int shown = pw_plot_pick (k, c->count, c->shown);
     fprintf (f, "%s# %s: %s, number\n", k ? "\n\n" : "", c->name (p, shown), columns);
@@ -98,7 +99,7 @@ static int data_curves (const pw_plots *p, const char *name, const pw_curves *c,
       fprintf (f, " %d\n", pw_plot_pick (shown, c->shown, c->all) + 1);
     }
   }
-  return pw_plot_finish (p, name, f, error);
+  return pw_output_finish (o, error);
 }
 
 static int data_motion (const pw_plots *p, pw_error *error) {
@@ -112,26 +113,28 @@ static int data_wheels (const pw_plots *p, pw_error *error) {
 }
 
 static int data_energy (const pw_plots *p, pw_error *error) {
-  FILE *f = pw_plot_create (p, "energy.dat", error);
-  if (f == NULL) return PW_MACHINE;
+  pw_output *o = pw_plot_create (p, "energy.dat", error);
+  if (o == NULL) return PW_MACHINE;
+  FILE *f = pw_output_stream (o);
   fputs ("# t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]", f);
   for (int i = 0; i < p->samples; i++)
     for (int k = 0; k < PLOT_FIRST; k++) data_number (f, pw_plot_sample (p, i)[k], k ? " " : "\n");
   fputs ("\n", f);
-  return pw_plot_finish (p, "energy.dat", f, error);
+  return pw_output_finish (o, error);
 }
 
 static int data_ground (const pw_plots *p, pw_error *error) {
   if (p->grounds == 0) return PW_OK;
-  FILE *f = pw_plot_create (p, "ground.dat", error);
-  if (f == NULL) return PW_MACHINE;
+  pw_output *o = pw_plot_create (p, "ground.dat", error);
+  if (o == NULL) return PW_MACHINE;
+  FILE *f = pw_output_stream (o);
   fputs ("# points of the ground: x [m], y [m]\n", f);
   for (int g = 0; g < p->grounds; g++) {
     data_number (f, p->ground[g][0], "");
     data_number (f, p->ground[g][1], " ");
     fputs ("\n", f);
   }
-  return pw_plot_finish (p, "ground.dat", f, error);
+  return pw_output_finish (o, error);
 }
 
 /* ---- The mechanism: lines of "x y t", blank lines between pieces ---- */
@@ -226,15 +229,16 @@ static double data_half_wheel (const pw_plots *p) {
 
 /* Three blocks: bodies, wheels, bodies that nothing is attached to.  Pictures out of the first n samples. */
 static int data_mechanism (const pw_plots *p, const char *name, int n, pw_error *error) {
-  FILE *f = pw_plot_create (p, name, error);
-  if (f == NULL) return PW_MACHINE;
+  pw_output *o = pw_plot_create (p, name, error);
+  if (o == NULL) return PW_MACHINE;
+  FILE *f = pw_output_stream (o);
   int stride = data_stride (p, n);
   double half = data_half_wheel (p);
   for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
     data_begin_block (f, p, block, block == PLOT_BODIES);
     for (int i = 0; i < n; i += stride) data_block (f, p, i, block, half);
   }
-  return pw_plot_finish (p, name, f, error);
+  return pw_output_finish (o, error);
 }
 
 int pw_plot_has (const pw_plots *p, int block) {

@@ -66,10 +66,9 @@ static void gnuplot_remove_figures (const char *folder, const char *const *scrip
 }
 
 static int gnuplot_absent (const char *folder) {
-  fprintf (stderr,
-           "pinwheel: gnuplot was not found, so no figures are drawn; data and scripts are in %s: gnuplot FILE.gp "
-           "draws them there\n",
-           folder);
+  pw_cli_say ("pinwheel: gnuplot was not found, so no figures are drawn; data and scripts are in %s: gnuplot FILE.gp "
+              "draws them there\n",
+              folder);
   return PW_OK;
 }
 

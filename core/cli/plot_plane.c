@@ -115,7 +115,7 @@ int pw_plot_paths (const pw_plots *p, pw_error *error) {
     plane_panel (&s, p, &g, i);
     pw_script_draw (&s, p, &c, 0, 1, i == 0);
   }
-  return pw_script_end (&s, p, error);
+  return pw_script_end (&s, error);
 }
 
 /* Bodies, wheels and what is nothing but a point, as far as there are any. */
@@ -154,5 +154,5 @@ int pw_plot_mechanism (const pw_plots *p, pw_error *error) {
     if (p->grounds > 0) fputs (", \\\n  'ground.dat' using 1:2 with points pt 9 ps 1.2 lc rgb 'black'", s.f);
     fputs ("\n", s.f);
   }
-  return pw_script_end (&s, p, error);
+  return pw_script_end (&s, error);
 }

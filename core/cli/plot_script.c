@@ -63,8 +63,9 @@ static const char script_look[] =
 int pw_script_open (pw_script *s, const pw_plots *p, pw_error *error) {
   char file[64];
   snprintf (file, sizeof file, "%s.gp", s->name);
-  s->f = pw_plot_create (p, file, error);
-  if (s->f == NULL) return PW_MACHINE;
+  s->output = pw_plot_create (p, file, error);
+  if (s->output == NULL) return PW_MACHINE;
+  s->f = pw_output_stream (s->output);
   fprintf (s->f, "# A figure of a Pinwheel run.  After changes draw it again, in this folder, by:  gnuplot %s\n", file);
   fprintf (s->f, "reset session\n%s", script_look);
   return PW_OK;
@@ -87,11 +88,9 @@ void pw_script_begin (const pw_script *s, const pw_plots *p, const char *title) 
   fprintf (s->f, ": %s%s%s' font (form eq 'svg' ? ',16' : ',13')\n", title, incomplete ? ", " : "", early);
 }
 
-int pw_script_end (const pw_script *s, const pw_plots *p, pw_error *error) {
-  char file[64];
-  snprintf (file, sizeof file, "%s.gp", s->name);
+int pw_script_end (const pw_script *s, pw_error *error) {
   fputs ("unset multiplot\nunset output\n}\n", s->f);
-  return pw_plot_finish (p, file, s->f, error);
+  return pw_output_finish (s->output, error);
 }
 
 /* ---- Families of curves ---- */

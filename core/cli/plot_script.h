@@ -18,7 +18,8 @@ enum {
 
 /* A script being written: a picture and its margins [px]. */
 typedef struct {
-  FILE *f;
+  pw_output *output;
+  FILE *f;          /* its stream */
   const char *name; /* NAME.gp draws NAME.svg and NAME.png */
   int width, height, left, right, top, bottom;
 } pw_script;
@@ -35,11 +36,11 @@ static inline int pw_script_numbered (const pw_curves *c) {
 /* Room for the rows of names at the top of a page. */
 int pw_script_names (const pw_plots *p, const pw_curves *c);
 
-/* Opens NAME.gp and writes what comes before the drawing; NULL s->f and PW_MACHINE if that fails. */
+/* Opens NAME.gp and writes what comes before the drawing; PW_MACHINE if that fails. */
 int pw_script_open (pw_script *s, const pw_plots *p, pw_error *error);
-/* Begins and ends the drawing, once the size of the picture is settled. */
+/* Begins and ends the drawing, once the size of the picture is settled; the end completes the file. */
 void pw_script_begin (const pw_script *s, const pw_plots *p, const char *title);
-int pw_script_end (const pw_script *s, const pw_plots *p, pw_error *error);
+int pw_script_end (const pw_script *s, pw_error *error);
 
 void pw_script_range (const pw_script *s, const char *axis, double from, double to);
 void pw_script_panel (const pw_script *s, pw_panel panel);

@@ -67,7 +67,7 @@ int pw_plot_velocities (const pw_plots *p, pw_error *error) {
   time_panel (&s, 1, TIME_PANEL, TIME_GAP);
   time_span (&s, p, &c, 4);
   pw_script_draw (&s, p, &c, -1, 4, 0);
-  return pw_script_end (&s, p, error);
+  return pw_script_end (&s, error);
 }
 
 /* How often the liveliest angular velocity turns; round-off does not count. */
@@ -116,7 +116,7 @@ int pw_plot_angular (const pw_plots *p, pw_error *error) {
     time_panel (&s, 1, panel, TIME_APART);
     pw_script_draw (&s, p, &c, -1, 5, 0);
   }
-  return pw_script_end (&s, p, error);
+  return pw_script_end (&s, error);
 }
 
 /* ---- Energy ---- */
@@ -185,5 +185,5 @@ int pw_plot_energy (const pw_plots *p, pw_error *error) {
   fputs ("set format x\nset xlabel 't [s]'\n", s.f);
   time_panel (&s, 1, TIME_PANEL, TIME_GAP);
   time_balance (s.f, p);
-  return pw_script_end (&s, p, error);
+  return pw_script_end (&s, error);
 }

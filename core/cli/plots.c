@@ -4,12 +4,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <unistd.h>
 #include "model.h"
 #include "plot.h"
 
 /* ---- The folder ---- */
 
-int pw_plot_folder (const char *folder, pw_error *error) {
+static int plots_make_folder (const char *folder, pw_error *error) {
   char path[PLOT_PATH];
   size_t n = strlen (folder);
   if (n == 0 || n >= sizeof path - 32)
@@ -26,6 +27,10 @@ int pw_plot_folder (const char *folder, pw_error *error) {
   return PW_OK;
 }
 
+int pw_plot_folder (const char *folder, pw_error *error) {
+  return plots_make_folder (folder, error) == PW_OK ? pw_lock_folder (folder, error) : -1;
+}
+
 int pw_plot_incomplete (const pw_plots *p, char *text, size_t size) {
   char t[32], end[32];
   if (p->samples >= p->wanted || p->samples == 0) return 0;
@@ -34,26 +39,15 @@ int pw_plot_incomplete (const pw_plots *p, char *text, size_t size) {
   return 1;
 }
 
-FILE *pw_plot_create (const pw_plots *p, const char *name, pw_error *error) {
-  char path[PLOT_PATH + 8], text[80];
-  snprintf (path, sizeof path, "%s/%s.part", p->folder, name);
-  FILE *file = fopen (path, "w");
-  if (file == NULL) pw_fail (error, PW_MACHINE, "cannot write %s/%s: %s", p->folder, name, strerror (errno));
-  if (file && strstr (name, ".dat") && pw_plot_incomplete (p, text, sizeof text)) fprintf (file, "# %s\n", text);
-  return file;
-}
+const char *const pw_plot_names[] = { ".dat", ".gp", ".svg", ".png", NULL };
 
-int pw_plot_finish (const pw_plots *p, const char *name, FILE *file, pw_error *error) {
-  char part[PLOT_PATH + 8], whole[PLOT_PATH];
-  snprintf (part, sizeof part, "%s/%s.part", p->folder, name);
-  snprintf (whole, sizeof whole, "%s/%s", p->folder, name);
-  errno = 0;
-  int bad = fflush (file) != 0 || ferror (file), why = errno;
-  if (fclose (file) != 0 && !bad) bad = 1, why = errno;
-  if (!bad && rename (part, whole) != 0) bad = 1, why = errno;
-  if (!bad) return PW_OK;
-  remove (part);
-  return pw_fail (error, PW_MACHINE, "cannot write %s: %s", whole, why ? strerror (why) : "the disk may be full");
+pw_output *pw_plot_create (const pw_plots *p, const char *name, pw_error *error) {
+  char path[PLOT_PATH + 8], text[80];
+  snprintf (path, sizeof path, "%s/%s", p->folder, name);
+  pw_output *o = pw_output_open (path, error);
+  if (o && strstr (name, ".dat") && pw_plot_incomplete (p, text, sizeof text))
+    fprintf (pw_output_stream (o), "# %s\n", text);
+  return o;
 }
 
 /* ---- What is drawn ---- */
@@ -188,21 +182,17 @@ static pw_plots *plots_allocate (const pw_plots *sizes, int contacts, pw_error *
 }
 
 /* A folder that cannot be written is better known before the run. */
-static int plots_try_folder (const pw_plots *p, pw_error *error) {
-  if (pw_plot_folder (p->folder, error) != PW_OK) return error->status;
-  char path[PLOT_PATH + 8];
-  FILE *probe = pw_plot_create (p, "motion.dat", error);
-  if (probe == NULL) return PW_MACHINE;
-  fclose (probe);
-  snprintf (path, sizeof path, "%s/motion.dat.part", p->folder);
-  remove (path);
-  return PW_OK;
+static int plots_try_folder (pw_plots *p, pw_error *error) {
+  p->lock = pw_plot_folder (p->folder, error);
+  pw_output *probe = p->lock < 0 ? NULL : pw_plot_create (p, "motion.dat", error);
+  if (probe) pw_output_discard (probe);
+  return probe ? PW_OK : error->status;
 }
 
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
                          pw_error *error) {
   int contacts, all = plots_count_wheels (s, &contacts);
-  pw_plots sizes = { .folder = folder, .model = s->model, .s = s, .t_end = t_end };
+  pw_plots sizes = { .folder = folder, .lock = -1, .model = s->model, .s = s, .t_end = t_end };
   sizes.bodies = plots_least (s->bodies, PLOT_SHOWN);
   sizes.all_wheels = all;
   sizes.wheels = plots_least (all, PLOT_SHOWN);
@@ -211,18 +201,20 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, cons
   sizes.wanted = plots_least (PLOT_SAMPLES, PLOT_NUMBERS / sizes.width);
   if (sizes.wanted < PLOT_FEW) sizes.wanted = PLOT_FEW;
   sizes.wanted++; /* both ends */
-  if (folder && plots_try_folder (&sizes, error) != PW_OK) return NULL;
-  pw_plots *p = plots_allocate (&sizes, contacts, error);
+  pw_plots *p = NULL;
+  if (folder == NULL || plots_try_folder (&sizes, error) == PW_OK) p = plots_allocate (&sizes, contacts, error);
+  if (p == NULL && sizes.lock >= 0) close (sizes.lock);
   if (p == NULL) return NULL;
   for (int i = 0; i < p->bodies; i++) p->body[i] = pw_plot_pick (i, p->bodies, s->bodies);
   plots_choose_wheels (p);
   pw_plot_find_links (p, m);
   if (plots_shapes (p, m, error) == PW_OK) return p;
-  free (p);
+  pw_plots_close (p);
   return NULL;
 }
 
 void pw_plots_close (pw_plots *p) {
+  if (p && p->lock >= 0) close (p->lock);
   free (p);
 }
 
@@ -288,7 +280,7 @@ void pw_plots_carry (pw_plots *p, pw_archive *a) {
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   if (p->folder == NULL) return PW_OK;
   if (p->samples < 2) {
-    fprintf (stderr, "pinwheel: the run is too short for figures: none are drawn in %s\n", p->folder);
+    pw_cli_say ("pinwheel: the run is too short for figures: none are drawn in %s\n", p->folder);
     return PW_OK;
   }
   int status = pw_plot_write_data (p, error);

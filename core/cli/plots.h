@@ -10,6 +10,9 @@
 
 typedef struct pw_plots pw_plots;
 
+/* Endings of the names of the folder's data files, scripts and pictures. */
+extern const char *const pw_plot_names[];
+
 /* Prepares figures of a run from 0 to t_end: the folder is made if need be; NULL: there will be none.  With `forces`,
  * those of elements with points are kept as well.  The system must outlive them; the texts too.  Errors: PW_MACHINE if
  * the folder cannot be written or memory is out. */

@@ -261,8 +261,8 @@ static void report_truth (const pw_truth_error *e) {
   char t[32], at[40];
   if (e == NULL) return;
   snprintf (at, sizeof at, "at %s s", pw_format (t, e->t, 6));
-  printf ("\n  error against the truth of %s, at %d time%s\n  %27s%17s\n", e->source, e->samples,
-          e->samples == 1 ? "" : "s", at, "largest");
+  pw_cli_print (stdout, "\n  error against the truth of %s, at %d time%s\n  %27s%17s\n", e->source, e->samples,
+                e->samples == 1 ? "" : "s", at, "largest");
   for (int i = 0; i < 4; i++) {
     if (isnan (e->end[i]) && isnan (e->most[i])) continue;
     printf ("  %-10s", name[i]);

@@ -40,15 +40,41 @@ static int run_read (run *x, int argc, const char **argv, pw_error *error) {
   return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
 }
 
+/* No file is used twice; before the model is open, and then with the tables that it reads. */
+static int run_uses (run *x, pw_error *error) {
+  const pw_checkpoints *c = &x->check;
+  int alike = c->resume && c->path && strcmp (c->resume, c->path) == 0;
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "--truth", x->truth_path, PW_READS, NULL },
+                   { "--resume", alike ? NULL : c->resume, c->path ? PW_READS : PW_WRITES, NULL },
+                   { "--checkpoint", c->path, PW_WRITES, NULL },
+                   { "-o", x->csv_path, PW_WRITES, NULL },
+                   { "--json", x->json_path, PW_WRITES, NULL },
+                   { "--animate", x->animate_path, PW_WRITES, NULL },
+                   { "--plots", x->plots_path, PW_WRITES_INTO, pw_plot_names } };
+  return pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
+}
+
 /* Opens what will be written, so that nothing is computed in vain. */
 static int run_open_outputs (run *x, pw_error *error) {
   if (x->animate_path && pw_animation_check (x->animate_path, error) != PW_OK) return error->status;
-  if (x->csv_path && x->json_path && strcmp (x->csv_path, x->json_path) == 0)
-    return pw_fail (error, PW_INPUT, "-o and --json cannot both write to %s",
-                    strcmp (x->csv_path, "-") ? x->csv_path : "standard output (-)");
+  if (run_uses (x, error) != PW_OK) return error->status;
   if (x->json_path && (x->json_output = pw_output_open (x->json_path, error)) == NULL) return error->status;
+  if (x->json_output && pw_output_stream (x->json_output) == stdout) x->json_path = "-";
+  if (x->animate_path && (x->page_output = pw_output_open (x->animate_path, error)) == NULL) return error->status;
   if (x->csv_path == NULL || x->check.resume) return PW_OK; /* what is resumed is opened when it is known to be that */
-  return (x->csv_output = pw_output_open (x->csv_path, error)) ? PW_OK : error->status;
+  if ((x->csv_output = pw_output_open (x->csv_path, error)) == NULL) return error->status;
+  if (pw_output_stream (x->csv_output) == stdout) x->csv_path = "-";
+  return PW_OK;
+}
+
+/* A summary is written of every run, but not over a table that the model reads. */
+static int run_open_model (run *x, pw_error *error) {
+  int status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
+  if (x->m.file == NULL || run_uses (x, status == PW_OK ? error : &(pw_error){ 0 }) == PW_OK) return status;
+  if (x->json_output) pw_output_discard (x->json_output);
+  x->json_output = NULL;
+  return error->status;
 }
 
 /* A method nobody has typed is told to be the model's. */
@@ -76,8 +102,7 @@ static int run_settle (run *x, pw_error *error) {
 
 static int run_open (run *x, pw_error *error) {
   int status = run_open_outputs (x, error);
-  if (status == PW_OK)
-    status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
+  if (status == PW_OK) status = run_open_model (x, error);
   if (status == PW_OK) status = run_settle (x, error);
   if (status == PW_OK) status = pw_running_prepare (x, error);
   if (status != PW_OK) return status;
@@ -184,35 +209,62 @@ static int run_integrate (run *x, pw_error *error) {
 
 /* ---- After the run ---- */
 
-/* Completes the table, or leaves what there is of it in NAME.part; of a run that has not begun nothing is left. */
-static void run_finish_table (run *x, int good, pw_error *error) {
+/* Brings the table to the disk, or leaves what there is of it in NAME.part; of a run that has not begun nothing is left. */
+static void run_close_table (run *x, int good, pw_error *error) {
   pw_csv_close (x->csv);
+  int is_file = x->csv_output ? pw_output_is_file (x->csv_output) : x->csv_path != NULL;
+  if (x->csv_output && good && pw_output_ready (x->csv_output, error) == PW_OK) return;
+  x->lost = is_file && error->status == PW_MACHINE;
   if (x->csv_output == NULL) return;
-  if (good)
-    pw_output_finish (x->csv_output, error);
-  else
-    pw_text_abandon (x->csv_output, x->check.resume ? 1 : x->row, x->part, sizeof x->part);
+  pw_text_abandon (x->csv_output, x->check.resume ? 1 : x->row, x->part, sizeof x->part);
+  x->csv_output = NULL;
+  if (good) *x->part = 0; /* the error says so */
+}
+
+/* The run's own failure decides the exit status. */
+static void run_add_error (pw_error *error, const pw_error *own) {
+  if (error->status == PW_OK)
+    *error = *own;
+  else if (own->status != PW_OK)
+    pw_cli_say ("pinwheel: %s\n", own->text);
 }
 
 /* The JSON summary, which is written however the run has ended.  A run that could not be resumed leaves the one before it
  * as it is. */
 static void run_write_json (run *x, const pw_summary *summary, const pw_sample *sample, pw_error *error) {
   if (x->json_output == NULL) return;
+  pw_error own = { 0 };
+  const pw_statistics *statistics = x->r ? pw_run_statistics (x->r) : NULL;
   if (x->check.resume && !x->resumed) {
     pw_output_discard (x->json_output);
+    x->json_output = NULL;
     return;
   }
-  pw_error *own = &(pw_error){ 0 };
-  const pw_statistics *statistics = x->r ? pw_run_statistics (x->r) : NULL;
-  if (pw_json_write (summary, x->m.system, sample, x->energy, statistics, x->json_output, own) == PW_OK)
-    pw_output_finish (x->json_output, own);
-  else
-    pw_output_abandon (x->json_output, (char[8]){ 0 }, 8);
-  if (own->status == PW_OK) return;
-  if (error->status != PW_OK)
-    fprintf (stderr, "pinwheel: %s\n", own->text); /* the run's own failure decides the exit status */
-  else
-    *error = *own;
+  if (pw_json_write (summary, x->m.system, sample, x->energy, statistics, x->json_output, &own) == PW_OK) return;
+  x->lost |= pw_output_is_file (x->json_output);
+  run_add_error (error, &own);
+}
+
+/* Leaves a file under its temporary name, which goes to the buffer. */
+static void run_keep (pw_output **o, char *part, size_t size) {
+  if (*o == NULL || !pw_output_is_file (*o)) return;
+  pw_output_abandon (*o, part, size);
+  *o = NULL;
+}
+
+/* Table, summary and page become complete together, or keep their temporary names.  A run that has failed by itself has
+ * no complete table; its summary says so. */
+static void run_complete (run *x, pw_error *error) {
+  pw_error own = { 0 };
+  char page_part[8];
+  if (x->lost) {
+    run_keep (&x->csv_output, x->part, sizeof x->part);
+    run_keep (&x->json_output, x->json_part, sizeof x->json_part);
+    run_keep (&x->page_output, page_part, sizeof page_part);
+  }
+  pw_output *const all[] = { x->csv_output, x->page_output, x->json_output };
+  pw_output_finish_all (all, sizeof all / sizeof *all, &own);
+  run_add_error (error, &own);
 }
 
 static pw_summary run_summary (const run *x, const pw_error *error, char *reason, size_t size) {
@@ -235,14 +287,16 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
 
 /* Figures and animation; who has stopped the run does not wait for gnuplot. */
 static void run_draw (run *x, const char *reason, pw_error *error) {
-  pw_error *own = &(pw_error){ 0 };
-  if (x->plots == NULL || x->r == NULL) return;
-  int status = pw_plots_finish (x->plots, !pw_stop, own);
-  if (status == PW_OK && x->animate_path) pw_animate (x->plots, x->animate_path, x->method, reason, own);
-  if (error->status == PW_OK)
-    *error = *own;
-  else if (own->status != PW_OK)
-    fprintf (stderr, "pinwheel: %s\n", own->text);
+  pw_error own = { 0 };
+  int drawn = 0;
+  if (x->plots && x->r) pw_plots_finish (x->plots, !pw_stop, &own);
+  if (x->plots && x->r && x->page_output)
+    drawn = pw_animate (x->plots, x->animate_path, x->page_output, x->method, reason);
+  if (x->page_output && !drawn) {
+    pw_output_discard (x->page_output);
+    x->page_output = NULL;
+  }
+  run_add_error (error, &own);
 }
 
 /* 1: standard output is taken by a file. */
@@ -256,7 +310,7 @@ static int run_finish (run *x, pw_error *error) {
   int interrupted = error->status == PW_OK && pw_stop;
   pw_sample sample, *last = NULL;
   if (x->r && pw_at (x->r, pw_time (x->r), &sample, NULL) == PW_OK) last = &sample;
-  run_finish_table (x, error->status == PW_OK && !interrupted, error);
+  run_close_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
   if (x->r) summary.truth = pw_watch_errors (&x->watch, x->m.system);
   if (last) summary.unbalanced = pw_unbalanced (x->r, last);
@@ -266,11 +320,13 @@ static int run_finish (run *x, pw_error *error) {
   if (error->status == PW_OK && x->r) pw_report_growth (x->m.system, x->r);
   run_write_json (x, &summary, last, error);
   run_draw (x, summary.reason, error);
+  run_complete (x, error);
   if (x->profile && last && error->status == PW_OK && !interrupted)
     pw_profile (x->r, last, x->cpu, run_prints_file (x) ? stderr : stdout, error);
-  if (interrupted) fprintf (stderr, "pinwheel: %s\n", reason);
+  if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
-  if (*x->part) fprintf (stderr, "pinwheel: the table until then is kept in %s\n", x->part);
+  if (*x->part) pw_cli_say ("pinwheel: the table until then is kept in %s\n", x->part);
+  if (*x->json_part) pw_cli_say ("pinwheel: the summary is kept in %s\n", x->json_part);
   pw_running_hint (x, interrupted || x->limited || error->status == PW_MACHINE);
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }

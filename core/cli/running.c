@@ -2,6 +2,7 @@
  *
  * A checkpoint is saved after the step that reaches a multiple of the interval, when the step's rows are written.  Its
  * table is brought to the disk first, so that a resumed run finds at least what the checkpoint counts on. */
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "fingerprint.h"
@@ -42,10 +43,8 @@ int pw_running_prepare (pw_running *x, pw_error *error) {
   if (x->csv_path && strcmp (x->csv_path, "-") == 0)
     return pw_fail (error, PW_INPUT,
                     "--checkpoint: a table on standard output cannot be continued; write it to a file");
-  pw_output *probe = pw_output_open (c->path, error); /* nothing should be computed in vain */
-  if (probe == NULL) return error->status;
-  pw_output_discard (probe);
-  status = running_print (x, error);
+  status = pw_checkpoints_reserve (c, error);
+  if (status == PW_OK) status = running_print (x, error);
   if (status == PW_OK) status = pw_checkpoints_match (c, error);
   if (status != PW_OK || x->csv_path == NULL) return status;
   pw_mark mark = { 0 };
@@ -63,14 +62,25 @@ static void running_carry (pw_running *x, pw_archive *a) {
   pw_watch_carry (&x->watch, a);
 }
 
+/* A checkpoint is within the run, and has the rows up to its time. */
+static int running_plausible (const pw_running *x) {
+  double t = pw_time (x->r), rows = x->csv && x->every > 0 ? floor (t / x->every) + 1 : (double)x->row;
+  return t <= x->t_end && x->row >= 0 && fabs ((double)x->row - rows) <= 1 && isfinite (x->cpu) && x->cpu >= 0;
+}
+
 int pw_running_resume (pw_running *x, pw_error *error) {
   pw_checkpoints *c = &x->check;
   char t[32];
   if (c->resume) {
     running_carry (x, &c->from.state);
     if (pw_run_load (x->r, &c->from.state, error) != PW_OK) return error->status;
+    if (!running_plausible (x))
+      return pw_fail (error, PW_INPUT,
+                      "the checkpoint %s is not that of a run: time, number of rows or processor time "
+                      "are impossible",
+                      c->resume);
     x->resumed = 1;
-    fprintf (stderr, "pinwheel: resumed at t = %s s\n", pw_format (t, pw_time (x->r), 6));
+    pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_time (x->r), 6));
   }
   pw_checkpoints_pass (c, pw_time (x->r));
   return PW_OK;
@@ -94,5 +104,5 @@ int pw_running_save (pw_running *x, pw_error *error) {
 void pw_running_hint (const pw_running *x, int stopped) {
   char t[32];
   if (stopped && x->check.saved > 0)
-    fprintf (stderr, "pinwheel: --resume %s goes on from t = %s s\n", x->check.path, pw_format (t, x->check.saved, 6));
+    pw_cli_say ("pinwheel: --resume %s goes on from t = %s s\n", x->check.path, pw_format (t, x->check.saved, 6));
 }

@@ -24,7 +24,7 @@ typedef struct {
   pw_limit limit;
   double t_end, every; /* [s]; every 0: each accepted step is a row */
   /* open */
-  pw_output *csv_output, *json_output;
+  pw_output *csv_output, *json_output, *page_output;
   pw_csv *csv;
   pw_plots *plots;
   pw_watch watch;
@@ -32,12 +32,14 @@ typedef struct {
   const char **redundant; /* what is said about each redundant row; NULL: there are none */
   pw_progress progress;
   /* under way */
-  long row;        /* rows written */
-  int limited;     /* 1: --limit or --max-steps has ended it */
-  int resumed;     /* 1: the state of the checkpoint has been taken over */
-  long batch;      /* steps to take before looking around */
-  double cpu;      /* of the method [s] */
-  char part[4200]; /* where an unfinished table is kept; "": there is none */
+  long row;             /* rows written */
+  int limited;          /* 1: --limit or --max-steps has ended it */
+  int resumed;          /* 1: the state of the checkpoint has been taken over */
+  long batch;           /* steps to take before looking around */
+  double cpu;           /* of the method [s] */
+  char part[4200];      /* where an unfinished table is kept; "": there is none */
+  char json_part[4200]; /* likewise of the summary */
+  int lost;             /* 1: the machine has failed to write the table or the summary */
 } pw_running;
 
 /* Before anything is written: reads the checkpoint that is resumed, makes sure it is of this run, and opens its table. */

@@ -19,18 +19,23 @@ static void stop_on_signal (int number) {
   raise (number);
 }
 
-void pw_stop_catch (void) {
-  struct sigaction action;
+/* A signal that the program was started to ignore, by nohup or in the background of a script, stays ignored. */
+static void stop_set (int number, void (*handler) (int)) {
+  struct sigaction action, before;
   memset (&action, 0, sizeof action);
-  action.sa_handler = stop_on_signal;
+  action.sa_handler = handler;
   sigemptyset (&action.sa_mask);
-  sigaction (SIGINT, &action, NULL);
-  sigaction (SIGTERM, &action, NULL);
+  if (sigaction (number, NULL, &before) == 0 && before.sa_handler != SIG_IGN) sigaction (number, &action, NULL);
+}
+
+void pw_stop_catch (void) {
+  stop_set (SIGINT, stop_on_signal);
+  stop_set (SIGTERM, stop_on_signal);
 }
 
 void pw_stop_release (void) {
-  signal (SIGINT, SIG_DFL);
-  signal (SIGTERM, SIG_DFL);
+  stop_set (SIGINT, SIG_DFL);
+  stop_set (SIGTERM, SIG_DFL);
 }
 
 /* ---- Limits ---- */

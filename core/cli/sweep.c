@@ -3,11 +3,14 @@
  * Every run has a model, a system and a method of its own and depends on nothing but its row of the grid; rows are kept
  * in a journal in the order in which they are finished, and put into the grid's order at the end.  So the table is
  * the same for any number of threads, and for any number of times the sweep was stopped and started again. */
+#define _GNU_SOURCE /* sched_getaffinity */
+#include <errno.h>
 #include <limits.h>
+#include <pthread.h>
+#include <sched.h>
+#include <stdlib.h>
 #include <string.h>
-#ifdef _OPENMP
-#include <omp.h>
-#endif
+#include <unistd.h>
 #include "progress.h"
 #include "stop.h"
 #include "sweep.h"
@@ -22,7 +25,9 @@ typedef struct {
   pw_cli_line line;
   pw_plan plan;
   int jobs;
-  /* under way; one thread at a time */
+  /* under way; one thread at a time, which holds the lock */
+  pthread_mutex_t lock;
+  long next; /* the row that is taken next */
   pw_journal journal;
   pw_progress progress;
   pw_text scratch;
@@ -98,16 +103,22 @@ static int sweep_part (sweep *x, pw_error *error) {
   return PW_OK;
 }
 
+/* OMP_NUM_THREADS, or the processors that this process may use. */
+static long sweep_processors (void) {
+  const char *text = getenv ("OMP_NUM_THREADS");
+  long wanted = text ? strtol (text, NULL, 10) : 0;
+  if (wanted > 0) return wanted;
+#ifdef CPU_COUNT
+  cpu_set_t set;
+  if (sched_getaffinity (0, sizeof set, &set) == 0) return CPU_COUNT (&set);
+#endif
+  long n = sysconf (_SC_NPROCESSORS_ONLN);
+  return n > 0 ? n : 1;
+}
+
 static int sweep_jobs (sweep *x, pw_error *error) {
-  double jobs = 1;
-#ifdef _OPENMP
-  jobs = omp_get_max_threads ();
-#endif
+  double jobs = (double)sweep_processors ();
   int status = pw_cli_number ("--jobs", x->jobs_text, PW_COUNT, &jobs, error);
-#ifndef _OPENMP
-  if (jobs > 1) fputs ("pinwheel: built without OpenMP: one run at a time\n", stderr);
-  jobs = 1;
-#endif
   x->jobs = jobs < 10000 ? (int)jobs : 10000;
   return status;
 }
@@ -129,17 +140,19 @@ static int sweep_settle (sweep *x, pw_error *error) {
 }
 
 static int sweep_open (sweep *x, pw_error *error) {
+  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->path, PW_WRITES, NULL } };
   x->plan.file = pw_cli_file (&x->line, error);
   if (x->plan.file == NULL) return error->status;
   int status = sweep_settle (x, error);
   if (status == PW_OK) status = pw_plan_open (&x->plan, (const char *const *)x->ranges, error);
   if (status == PW_OK && x->plan.parts > x->plan.grid.rows)
     status = pw_fail (error, PW_INPUT, "--part %s: the grid has only %ld rows", x->part_text, x->plan.grid.rows);
+  if (status == PW_OK) status = pw_cli_uses (&x->line, x->plan.file, use, sizeof use / sizeof *use, error);
   if (status == PW_OK) status = pw_journal_open (&x->journal, &x->plan, x->path, error);
   if (status != PW_OK) return status;
   if (x->journal.done > 0)
-    fprintf (stderr, "pinwheel: going on with %s: %ld of %ld runs are done\n", x->journal.part, x->journal.done,
-             x->journal.rows);
+    pw_cli_say ("pinwheel: going on with %s: %ld of %ld runs are done\n", x->journal.part, x->journal.done,
+                x->journal.rows);
   return PW_OK;
 }
 
@@ -159,27 +172,47 @@ static void sweep_one (sweep *x, long k, pw_text *text) {
   pw_text_clear (text);
   int status = pw_sweep_row (&x->plan, pw_plan_row (&x->plan, k), text, &own);
   if (status == PW_RETRY) return;
-#ifdef _OPENMP
-#pragma omp critical(sweep_rows)
-#endif
+  pthread_mutex_lock (&x->lock);
   if (x->error->status == PW_OK) sweep_keep (x, k, status, text, &own);
+  pthread_mutex_unlock (&x->lock);
 }
 
+/* The next row that is not there yet; the number of rows if there is none. */
+static long sweep_take (sweep *x) {
+  pthread_mutex_lock (&x->lock);
+  while (x->next < x->journal.rows && x->journal.line[x->next] != 0) x->next++;
+  long k = pw_stop == 0 ? x->next++ : x->journal.rows;
+  pthread_mutex_unlock (&x->lock);
+  return k;
+}
+
+static void *sweep_thread (void *context) {
+  sweep *x = context;
+  pw_text text = { .at = NULL };
+  for (long k; (k = sweep_take (x)) < x->journal.rows;) sweep_one (x, k, &text);
+  pw_text_free (&text);
+  return NULL;
+}
+
+/* One of the threads is our own. */
 static void sweep_all (sweep *x) {
   long rows = x->journal.rows;
   if (x->jobs > rows) x->jobs = (int)rows;
-#ifdef _OPENMP
-#pragma omp parallel num_threads(x->jobs)
-#endif
-  {
-    pw_text text = { .at = NULL };
-#ifdef _OPENMP
-#pragma omp for schedule(dynamic)
-#endif
-    for (long k = 0; k < rows; k++)
-      if (pw_stop == 0 && x->journal.line[k] == 0) sweep_one (x, k, &text);
-    pw_text_free (&text);
-  }
+  pthread_t *thread = calloc ((size_t)x->jobs, sizeof *thread);
+  int started = 1, why = thread ? 0 : ENOMEM;
+  pthread_mutex_init (&x->lock, NULL);
+  pthread_mutex_lock (&x->lock);
+  while (why == 0 && started < x->jobs && (why = pthread_create (thread + started, NULL, sweep_thread, x)) == 0)
+    started++;
+  if (why)
+    pw_fail (x->error, PW_MACHINE, "cannot start %d runs at a time, only %d: %s; try --jobs %d", x->jobs, started,
+             strerror (why), started);
+  if (why) x->next = rows;
+  pthread_mutex_unlock (&x->lock);
+  sweep_thread (x);
+  while (--started > 0) pthread_join (thread[started], NULL);
+  pthread_mutex_destroy (&x->lock);
+  free (thread);
 }
 
 static int sweep_run (sweep *x, pw_error *error) {
@@ -200,8 +233,7 @@ static int sweep_verdict (const pw_tally *tally, int is_part, pw_error *error) {
   if (tally->failed == 0) return PW_OK;
   if (tally->failed == tally->rows && !is_part)
     return pw_fail (error, -tally->status, "all %ld runs failed, the first one: %s", tally->rows, tally->reason);
-  fprintf (stderr, "pinwheel: %ld of %ld runs failed, the first of them: %s\n", tally->failed, tally->rows,
-           tally->reason);
+  pw_cli_say ("pinwheel: %ld of %ld runs failed, the first of them: %s\n", tally->failed, tally->rows, tally->reason);
   return PW_OK;
 }
 
@@ -220,8 +252,8 @@ static int sweep_finish (sweep *x, pw_error *error) {
     return PW_INTERRUPTED;
   }
   if (x->journal.done < x->journal.rows) {
-    fprintf (stderr, "pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command goes on from there\n",
-             x->journal.done, x->journal.rows, x->journal.part);
+    pw_cli_say ("pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command goes on from there\n",
+                x->journal.done, x->journal.rows, x->journal.part);
     return PW_INTERRUPTED;
   }
   int status = pw_table_finish (&x->journal, &x->plan, &tally, error);

@@ -172,8 +172,4 @@ int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error 
 /* Writes the table at `path` from all parts of a sweep. */
 int pw_table_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error);
 
-/* The real path of a file to be written, for the caller to free.  NULL and PW_MACHINE for what is no regular file, or cannot
- * be written. */
-char *pw_table_path (const char *path, pw_error *error);
-
 #endif

@@ -4,31 +4,12 @@
  * which the next start cuts off.  A lock keeps a second process out; it ends with the process that holds it. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include "sweep.h"
 
 /* ---- Opening ---- */
-
-/* Opens and locks; a file that its owner removed meanwhile, being finished, is opened anew. */
-static int journal_lock (pw_journal *j, pw_error *error) {
-  struct flock lock = { .l_type = F_WRLCK, .l_whence = SEEK_SET };
-  struct stat info = { .st_nlink = 0 };
-  while (info.st_nlink == 0) {
-    if (j->file >= 0) close (j->file);
-    j->file = open (j->part, O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (j->file < 0) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", j->part, strerror (errno));
-    if (fcntl (j->file, F_SETLK, &lock) != 0 && (errno == EACCES || errno == EAGAIN))
-      return pw_fail (error, PW_INPUT, "another process is at work on %s", j->part);
-    if (fstat (j->file, &info) != 0)
-      return pw_fail (error, PW_MACHINE, "cannot read %s: %s", j->part, strerror (errno));
-  }
-  if (!S_ISREG (info.st_mode)) return pw_fail (error, PW_MACHINE, "cannot write %s: it is no file", j->part);
-  return PW_OK;
-}
 
 /* Writes behind what is there, all or nothing. */
 static int journal_write (pw_journal *j, const char *text, size_t size, pw_error *error) {
@@ -95,7 +76,7 @@ static int journal_begin (pw_journal *j, const pw_plan *p, pw_error *error) {
 
 int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error) {
   *j = (pw_journal){ .file = -1, .rows = pw_plan_rows (p) };
-  j->path = pw_table_path (path, error);
+  j->path = pw_output_path (path, error);
   if (j->path == NULL) return error->status;
   size_t size = strlen (j->path) + sizeof ".part";
   j->part = malloc (size);
@@ -103,8 +84,8 @@ int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error
   if (j->part == NULL || j->line == NULL)
     return pw_fail (error, PW_MACHINE, "out of memory for a sweep of %ld rows", j->rows);
   snprintf (j->part, size, "%s.part", j->path);
-  int status = journal_lock (j, error);
-  return status == PW_OK ? journal_begin (j, p, error) : status;
+  j->file = pw_lock_path (j->part, error);
+  return j->file >= 0 ? journal_begin (j, p, error) : error->status;
 }
 
 /* ---- Rows ---- */

@@ -1,66 +1,11 @@
 /* Tables and parts in the order of the grid: put together under another name, then renamed, then the journal goes.
  * Killed anywhere between, the same command finds the journal complete and writes the same bytes again. */
-#define _XOPEN_SOURCE 700 /* realpath */
+#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include "sweep.h"
-
-/* ---- Writing ---- */
-
-typedef struct {
-  const char *path;
-  const char *journal; /* where all rows are, or NULL */
-  char *temporary;
-  FILE *stream;
-} table_file;
-
-char *pw_table_path (const char *path, pw_error *error) {
-  struct stat info;
-  int there = stat (path, &info) == 0, why = 0;
-  if (there && !S_ISREG (info.st_mode)) {
-    pw_fail (error, PW_MACHINE, "cannot write %s: a sweep needs a regular file, next to which it keeps its journal",
-             path);
-    return NULL;
-  }
-  if (there && access (path, W_OK) != 0) why = errno;
-  char *real = why ? NULL : there ? realpath (path, NULL) : strdup (path);
-  if (real == NULL) pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (why ? why : errno));
-  return real;
-}
-
-static int table_fail (const table_file *f, int why, pw_error *error) {
-  const char *reason = why ? strerror (why) : "a write failed";
-  if (f->journal == NULL) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", f->path, reason);
-  return pw_fail (error, PW_MACHINE,
-                  "cannot write %.150s: %s; all rows are in %.150s, so the same command has only to sort them", f->path,
-                  reason, f->journal);
-}
-
-static int table_open (table_file *f, const char *path, const char *journal, pw_error *error) {
-  size_t size = strlen (path) + sizeof ".sorted";
-  *f = (table_file){ .path = path, .journal = journal, .temporary = malloc (size) };
-  if (f->temporary == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-  snprintf (f->temporary, size, "%s.sorted", path);
-  f->stream = fopen (f->temporary, "w");
-  return f->stream ? PW_OK : table_fail (f, errno, error);
-}
-
-/* Completes the file if all went well so far, else removes it. */
-static int table_close (table_file *f, int status, pw_error *error) {
-  errno = 0;
-  int bad = f->stream && (fflush (f->stream) != 0 || ferror (f->stream) || fsync (fileno (f->stream)) != 0);
-  int why = errno;
-  if (f->stream && fclose (f->stream) != 0 && !bad) bad = 1, why = errno;
-  if (status == PW_OK && !bad && rename (f->temporary, f->path) != 0) bad = 1, why = errno;
-  if (status == PW_OK && bad) status = table_fail (f, why, error);
-  if (status != PW_OK && f->stream) unlink (f->temporary);
-  free (f->temporary);
-  return status;
-}
 
 /* ---- How the runs ended ---- */
 
@@ -84,6 +29,14 @@ static void table_count (pw_tally *tally, const pw_line *line) {
   table_reason (line, tally->reason, sizeof tally->reason);
 }
 
+/* Completes the file if all went well so far, else removes it. */
+static int table_close (pw_output *o, pw_error *error) {
+  if (error->status == PW_OK) pw_output_ready (o, error);
+  if (error->status == PW_OK) return pw_output_finish (o, error);
+  pw_output_discard (o);
+  return error->status;
+}
+
 /* ---- From a journal ---- */
 
 static int table_write (const pw_journal *j, const pw_plan *p, const pw_map *map, FILE *stream, pw_tally *tally,
@@ -104,14 +57,18 @@ static int table_write (const pw_journal *j, const pw_plan *p, const pw_map *map
 
 int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error) {
   pw_map map;
-  table_file f;
+  pw_error own = { 0 };
   *tally = (pw_tally){ .rows = 0 };
   if (pw_map_open (&map, j->file) != PW_OK)
     return pw_fail (error, PW_MACHINE, "cannot read %s: %s", j->part, strerror (errno));
-  int status = table_open (&f, j->path, j->part, error);
-  if (status == PW_OK) status = table_write (j, p, &map, f.stream, tally, error);
-  status = table_close (&f, status, error);
+  pw_output *o = pw_output_open_as (j->path, ".sorted", &own);
+  if (o) table_write (j, p, &map, pw_output_stream (o), tally, &own);
+  if (o) table_close (o, &own);
   pw_map_close (&map);
+  int status = own.status;
+  if (status != PW_OK)
+    pw_fail (error, status, "%.300s; all rows are in %.150s, so the same command has only to sort them", own.text,
+             j->part);
   if (status == PW_OK && unlink (j->part) != 0)
     return pw_fail (error, PW_MACHINE, "%s is complete, but %s cannot be removed: %s", j->path, j->part,
                     strerror (errno));
@@ -136,12 +93,13 @@ static long table_value (const table_part *x, const char *key, char **rest) {
 }
 
 static int table_open_part (table_part *x, const char *path, pw_error *error) {
-  int file = open (path, O_RDONLY | O_CLOEXEC);
+  const char *reason;
   char *rest = NULL;
+  FILE *f = pw_open_input (path, &reason);
   x->path = path;
-  if (file < 0) return pw_fail (error, PW_INPUT, "cannot open the part %s: %s", path, strerror (errno));
-  int status = pw_map_open (&x->map, file), why = errno;
-  close (file);
+  if (f == NULL) return pw_fail (error, PW_INPUT, "cannot open the part %s: %s", path, reason);
+  int status = pw_map_open (&x->map, fileno (f)), why = errno;
+  fclose (f);
   if (status != PW_OK) return pw_fail (error, PW_INPUT, "cannot read the part %s: %s", path, strerror (why));
   x->rows = x->at = pw_fingerprint_end (PW_SWEEP_MAGIC, x->map.at, x->map.end);
   if (x->rows) x->part = (int)table_value (x, "part", &rest);
@@ -202,26 +160,20 @@ static int table_weave (table_part *x, int count, FILE *stream, pw_tally *tally,
 }
 
 int pw_table_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error) {
-  table_file f = { .path = NULL };
   *tally = (pw_tally){ .rows = 0 };
-  char *real = pw_table_path (path, error);
+  pw_output *o = NULL;
   table_part *x = calloc ((size_t)count, sizeof *x);
-  int status = real == NULL ? error->status : x == NULL ? pw_fail (error, PW_MACHINE, "out of memory") : PW_OK;
+  int status = x ? PW_OK : pw_fail (error, PW_MACHINE, "out of memory");
   for (int i = 0; i < count && status == PW_OK; i++) {
-    struct stat a, b;
-    if (stat (parts[i], &a) == 0 && stat (path, &b) == 0 && a.st_dev == b.st_dev && a.st_ino == b.st_ino)
-      status = pw_fail (error, PW_INPUT, "%s is a part and would be written over", path);
-    else
-      status = table_open_part (x + i, parts[i], error);
+    const pw_use use[] = { { "-o", path, PW_WRITES, NULL }, { "the part", parts[i], PW_READS, NULL } };
+    status = pw_check_uses (use, 2, error);
+    if (status == PW_OK) status = table_open_part (x + i, parts[i], error);
   }
   if (status == PW_OK) status = table_match (x, count, error);
-  if (status == PW_OK) {
-    status = table_open (&f, real, NULL, error);
-    if (status == PW_OK) status = table_weave (x, count, f.stream, tally, error);
-    status = table_close (&f, status, error);
-  }
+  if (status == PW_OK && (o = pw_output_open_as (path, ".sorted", error)) == NULL) status = error->status;
+  if (o) table_weave (x, count, pw_output_stream (o), tally, error);
+  if (o) status = table_close (o, error);
   for (int i = 0; x && i < count; i++) pw_map_close (&x[i].map);
   free (x);
-  free (real);
   return status;
 }

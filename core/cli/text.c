@@ -78,9 +78,11 @@ int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error) {
 }
 
 void pw_text_abandon (pw_output *o, long rows, char *part, size_t size) {
-  if (pw_output_abandon (o, part, size) == NULL || rows > 0) return;
-  remove (part);
   *part = 0;
+  if (rows > 0)
+    pw_output_abandon (o, part, size);
+  else
+    pw_output_discard (o);
 }
 
 int pw_text_end (pw_output *o, int status, pw_error *error) {

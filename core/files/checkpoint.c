@@ -1,63 +1,50 @@
 /* Checkpoints as files. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include "files.h"
 
 #define CHECKPOINT_LAST "end\n"
 
 /* ---- Writing ---- */
 
-/* The folder knows of the new name only when it is on the disk itself; some file systems refuse that, and need it not. */
-static void checkpoint_sync_folder (const char *path) {
-  char folder[4200] = ".";
-  const char *slash = strrchr (path, '/');
-  if (slash) snprintf (folder, sizeof folder, "%.*s", slash == path ? 1 : (int)(slash - path), path);
-  int fd = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return;
-  (void)fsync (fd);
-  close (fd);
-}
-
 static unsigned long long checkpoint_check (const char *head, size_t head_size, const void *state, size_t size) {
   return pw_check_sum (pw_check_sum (PW_CHECK, head, head_size), state, size);
 }
 
-int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error) {
+int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error) {
   char line[100];
   snprintf (line, sizeof line, "state = %zu bytes, check sum %016llx\n", state->used,
             checkpoint_check (head, strlen (head), state->at, state->used));
-  pw_output *o = pw_output_open (path, error);
-  if (o == NULL) return error->status;
   int status = pw_output_text (o, head, strlen (head), error);
   if (status == PW_OK) status = pw_output_text (o, line, strlen (line), error);
   if (status == PW_OK) status = pw_output_text (o, (const char *)state->at, state->used, error);
-  if (status == PW_OK) status = pw_output_sync (o, error);
-  if (status != PW_OK) {
-    pw_output_discard (o);
-    return status;
-  }
-  status = pw_output_finish (o, error);
-  if (status == PW_OK) checkpoint_sync_folder (path);
+  if (status == PW_OK) status = pw_output_ready (o, error);
+  if (status == PW_OK) return pw_output_finish (o, error);
+  pw_output_discard (o);
   return status;
+}
+
+int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error) {
+  pw_output *o = pw_output_open (path, error);
+  return o ? pw_checkpoint_put (o, head, state, error) : error->status;
 }
 
 /* ---- Reading ---- */
 
 static int checkpoint_slurp (const char *path, char **text, size_t *size, pw_error *error) {
-  FILE *f = fopen (path, "rb");
-  if (f == NULL) return pw_fail (error, PW_INPUT, "cannot read the checkpoint %s: %s", path, strerror (errno));
+  const char *why;
   struct stat info;
-  long end = fstat (fileno (f), &info) == 0 && S_ISREG (info.st_mode) && fseek (f, 0, SEEK_END) == 0 ? ftell (f) : -1;
-  int status = end < 0 || fseek (f, 0, SEEK_SET) != 0 ? PW_INPUT : PW_OK;
-  if (status == PW_OK && (*text = malloc ((size_t)end + 1)) == NULL) status = PW_MACHINE;
-  if (status == PW_OK && fread (*text, 1, (size_t)end, f) != (size_t)end) status = PW_INPUT;
+  FILE *f = pw_open_input (path, &why);
+  if (f == NULL && errno == ENOMEM) return pw_fail (error, PW_MACHINE, "%s: out of memory", path);
+  if (f == NULL) return pw_fail (error, PW_INPUT, "cannot read the checkpoint %s: %s", path, why);
+  int status = fstat (fileno (f), &info) == 0 ? PW_OK : PW_INPUT;
+  size_t end = status == PW_OK ? (size_t)info.st_size : 0;
+  if (status == PW_OK && (*text = malloc (end + 1)) == NULL) status = PW_MACHINE;
+  if (status == PW_OK && fread (*text, 1, end, f) != end) status = PW_INPUT;
   fclose (f);
-  if (status == PW_OK) (*text)[ *size = (size_t)end] = 0;
+  if (status == PW_OK) (*text)[ *size = end] = 0;
   return status == PW_OK        ? PW_OK
          : status == PW_MACHINE ? pw_fail (error, status, "out of memory")
                                 : pw_fail (error, status, "cannot read the checkpoint %s", path);

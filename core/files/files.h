@@ -2,6 +2,7 @@
 #ifndef PW_FILES_H
 #define PW_FILES_H
 
+#include <sys/stat.h>
 #include "pinwheel-files.h"
 #include "util.h"
 
@@ -51,6 +52,8 @@ typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_error *error);
 void pw_yaml_close (pw_yaml *y);
 const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
+/* As pw_file_tables. */
+int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
@@ -74,13 +77,42 @@ extern const pw_unit_name pw_unit_names[]; /* ended by a NULL name */
 /* Reads the rest of a file of at most so many bytes into *text, malloced and ended by a NUL; free it in every case. */
 int pw_slurp (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error);
 
+/* ---- Names of files (location.c) ---- */
+
+/* "it is a directory, not a regular file" */
+const char *pw_not_regular (mode_t mode);
+
+/* The folder that a path's last name is in, malloced; NULL without memory. */
+char *pw_folder_of (const char *path);
+
+/* Where a file is or will be, links followed. */
+typedef struct {
+  char *path;     /* of the file itself; malloced */
+  int descriptor; /* the path stands for this one of the process ("-", /dev/stdout, /dev/fd/3); -1: for none */
+  int exists;     /* 1: `info` is known */
+  struct stat info;
+} pw_location;
+
+/* 0 or an errno value; free the path in every case. */
+int pw_locate (pw_location *p, const char *path);
+
+/* ---- Locks (lock.c) ---- */
+
+typedef enum {
+  PW_LOCK_NEW,     /* an empty file: one that is there, which a killed process has left, is removed */
+  PW_LOCK_KEEP,    /* what is there, or an empty file */
+  PW_LOCK_EXISTING /* what is there; ENOENT if there is none */
+} pw_lock_how;
+
+/* Opens a regular file for reading and writing and locks it until it is closed; *created is 1 for an empty one made here.
+ * A symbolic link is not followed.  -1 and errno, for pw_lock_reason. */
+int pw_lock_file (const char *path, pw_lock_how how, int *created);
+const char *pw_lock_reason (int why);
+
 /* ---- Outputs (output.c) ---- */
 
 /* Writes; PW_MACHINE with the reason if that fails, or a write before it has failed. */
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
-
-/* Brings to the disk what was written; for a regular file.  PW_MACHINE. */
-int pw_output_sync (pw_output *o, pw_error *error);
 
 /* Whether there is something before what is written. */
 int pw_output_continued (const pw_output *o);

@@ -1,25 +1,31 @@
-/* Files that are whole or carry another name: written as NAME.part, renamed when complete.
+/* Files that are complete or have a temporary name: written as NAME.part, renamed when complete.
  *
- * What is there already and is no regular file (a terminal, a pipe, /dev/null) is written as it is. */
-#define _XOPEN_SOURCE 700 /* realpath */
+ * The temporary file is locked from its opening until its folder is on the disk, so that two processes never write the
+ * same output.  What is there already and is no regular file (a terminal, a pipe, /dev/null) is written directly, and so
+ * are descriptors that the process has open. */
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include "files.h"
 
 struct pw_output {
-  FILE *stream;
-  char *path; /* as the user knows it */
-  char *real; /* where it goes in the end: links are followed, not replaced */
-  char *part; /* real + ".part"; NULL: written directly */
-  int why;    /* errno of the first write of ours that failed */
-  int there;  /* 1: continued, with something in it */
+  FILE *stream; /* NULL: closed, nothing but the name is missing */
+  char *path;   /* as the user knows it */
+  char *real;   /* the file itself, links followed */
+  char *part;   /* its temporary name; NULL: written directly */
+  int file;     /* keeps the temporary file locked; -1: written directly */
+  int folder;   /* the one it is in; -1: written directly */
+  int why;      /* errno of the first write of ours that failed */
+  int there;    /* 1: continued, with something in it */
+  int brief;    /* 1: what is incomplete is of no use */
 };
 
 static void output_free (pw_output *o) {
   if (o == NULL) return;
+  if (o->file >= 0) close (o->file);
+  if (o->folder >= 0) close (o->folder);
   free (o->path);
   free (o->real);
   free (o->part);
@@ -28,41 +34,108 @@ static void output_free (pw_output *o) {
 
 static int output_fail (const pw_output *o, int why, int kept, pw_error *error) {
   const char *what = strcmp (o->path, "-") == 0 ? "standard output" : o->path;
-  const char *reason = why ? strerror (why) : "a write failed";
-  if (o->part && kept)
-    return pw_fail (error, PW_MACHINE, "cannot write %s: %s; what was written is in %s", what, reason, o->part);
+  const char *reason = why > 0 ? pw_lock_reason (why) : "a write failed";
+  if (o->part && kept && !o->brief)
+    return pw_fail (error, PW_MACHINE, "cannot write %.200s: %s; what was written is in %.200s", what, reason, o->part);
   return pw_fail (error, PW_MACHINE, "cannot write %s: %s", what, reason);
 }
 
-/* Finds out where it goes. */
-static int output_place (pw_output *o, pw_error *error) {
-  struct stat info;
-  int there = stat (o->path, &info) == 0, direct = there && !S_ISREG (info.st_mode) && !S_ISDIR (info.st_mode);
-  errno = 0;
-  if (there && S_ISDIR (info.st_mode))
-    errno = EISDIR;
-  else if (there && !direct && access (o->path, W_OK) != 0)
-    errno = errno ? errno : EACCES;
-  if (errno) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", o->path, strerror (errno));
-  o->real = there ? realpath (o->path, NULL) : strdup (o->path);
-  if (o->real && !direct) {
-    size_t size = strlen (o->real) + sizeof ".part";
-    o->part = malloc (size);
-    if (o->part) snprintf (o->part, size, "%s.part", o->real);
+/* ---- Opening ---- */
+
+/* A descriptor of the process, or a file that is no regular one.  A FIFO waits for its reader, which a signal ends. */
+static int output_open_direct (pw_output *o, const pw_location *p) {
+  int flags = p->descriptor < 0 ? O_WRONLY : fcntl (p->descriptor, F_GETFL);
+  if (flags < 0) return errno;
+  if ((flags & O_ACCMODE) == O_RDONLY) return EBADF;
+  if (p->descriptor == STDOUT_FILENO) {
+    o->stream = stdout;
+    return 0;
   }
-  if (o->real == NULL || (o->part == NULL && !direct)) return pw_fail (error, PW_MACHINE, "out of memory");
-  return PW_OK;
+  int file =
+      p->descriptor < 0 ? open (p->path, O_WRONLY | O_NOCTTY | O_CLOEXEC) : fcntl (p->descriptor, F_DUPFD_CLOEXEC, 3);
+  o->stream = file < 0 ? NULL : fdopen (file, "w");
+  if (o->stream) return 0;
+  int why = errno;
+  if (file >= 0) close (file);
+  return why;
 }
 
-static int output_open_file (pw_output *o, pw_error *error) {
-  if (output_place (o, error) != PW_OK) return error->status;
-  o->stream = fopen (o->part ? o->part : o->real, "w");
-  if (o->stream) return PW_OK;
-  return pw_fail (error, PW_MACHINE, "cannot write %s: %s", o->path, strerror (errno));
+/* The mode and, as far as we may, the owner of the file that will be replaced. */
+static int output_inherit (int file, const struct stat *old) {
+  struct stat now;
+  mode_t mode = old->st_mode & 07777;
+  if (fstat (file, &now) != 0) return errno;
+  if ((now.st_uid != old->st_uid || now.st_gid != old->st_gid) && fchown (file, old->st_uid, old->st_gid) != 0 &&
+      fchown (file, (uid_t)-1, old->st_gid) != 0)
+    mode &= 0777;
+  if ((now.st_mode & 07777) != mode && fchmod (file, mode) != 0) return errno;
+  return 0;
+}
+
+/* The stream has a descriptor of its own, so that the lock outlives it. */
+static int output_stream (pw_output *o) {
+  int file = fcntl (o->file, F_DUPFD_CLOEXEC, 3);
+  o->stream = file < 0 ? NULL : fdopen (file, "r+");
+  if (o->stream) return 0;
+  int why = errno;
+  if (file >= 0) close (file);
+  return why;
+}
+
+/* Opens the folder and locks the temporary file. */
+static int output_open_part (pw_output *o, pw_lock_how how) {
+  int created;
+  char *folder = pw_folder_of (o->real);
+  if (folder == NULL) return ENOMEM;
+  o->folder = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  int why = o->folder < 0 && errno != EACCES ? errno : 0; /* what cannot be listed can be written into */
+  free (folder);
+  if (why) return why;
+  o->file = pw_lock_file (o->part, how, &created);
+  return o->file < 0 ? errno : 0;
+}
+
+/* Where it goes: into `p`, and o->part unless it is written directly. */
+static int output_place (pw_output *o, pw_location *p, const char *ending) {
+  int why = pw_locate (p, o->path);
+  o->real = p->path;
+  if (why) return why;
+  if (p->exists && S_ISDIR (p->info.st_mode)) return EISDIR;
+  if (p->descriptor >= 0 || (p->exists && !S_ISREG (p->info.st_mode))) return 0;
+  if (p->exists && access (p->path, W_OK) != 0) return errno;
+  size_t size = strlen (o->real) + strlen (ending) + 1;
+  o->part = malloc (size);
+  if (o->part == NULL) return ENOMEM;
+  snprintf (o->part, size, "%s%s", o->real, ending);
+  return 0;
+}
+
+char *pw_output_path (const char *path, pw_error *error) {
+  pw_location p;
+  pw_output o = { .path = (char *)(size_t)path };
+  int why = output_place (&o, &p, "");
+  if (why == 0 && o.part) free (o.real);
+  if (why == 0 && o.part) return o.part;
+  pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, why ? strerror (why) : pw_not_regular (p.info.st_mode));
+  free (o.real);
+  return NULL;
+}
+
+static int output_open_file (pw_output *o, const char *ending) {
+  pw_location p;
+  int why = output_place (o, &p, ending);
+  if (why) return why;
+  if (o->part == NULL) return output_open_direct (o, &p);
+  why = output_open_part (o, PW_LOCK_NEW);
+  if (why == 0 && p.exists) why = output_inherit (o->file, &p.info);
+  if (why == 0) why = output_stream (o);
+  if (why && o->file >= 0) unlink (o->part);
+  return why;
 }
 
 static pw_output *output_new (const char *path, pw_error *error) {
   pw_output *o = calloc (1, sizeof *o);
+  if (o) o->file = o->folder = -1;
   if (o) o->path = strdup (path);
   if (o && o->path && *path) return o;
   if (o && o->path)
@@ -73,20 +146,30 @@ static pw_output *output_new (const char *path, pw_error *error) {
   return NULL;
 }
 
-pw_output *pw_output_open (const char *path, pw_error *error) {
+pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error) {
   pw_output *o = output_new (path, error);
   if (o == NULL) return NULL;
-  if (strcmp (path, "-") == 0) {
-    o->stream = stdout;
-    return o;
-  }
-  if (output_open_file (o, error) == PW_OK) return o;
+  o->brief = strcmp (ending, ".part") != 0;
+  int why = output_open_file (o, ending);
+  if (why == 0) return o;
+  if (why == ENOMEM)
+    pw_fail (error, PW_MACHINE, "cannot write %s: out of memory", path);
+  else
+    output_fail (o, why, 0, error);
   output_free (o);
   return NULL;
 }
 
+pw_output *pw_output_open (const char *path, pw_error *error) {
+  return pw_output_open_as (path, ".part", error);
+}
+
 FILE *pw_output_stream (pw_output *o) {
   return o->stream;
+}
+
+int pw_output_is_file (const pw_output *o) {
+  return o->part != NULL;
 }
 
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error) {
@@ -96,57 +179,95 @@ int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error
   return output_fail (o, o->why, 0, error);
 }
 
-/* Empties the buffer and closes; standard output stays open.  Returns 0, or the reason as an errno, -1 if unknown. */
-static int output_close (pw_output *o) {
-  int before = !ferror (o->stream) ? 0 : o->why ? o->why : -1;
+/* ---- Closing ---- */
+
+/* Writes the buffer to the file, and the file to the disk if it is one.  0, an errno value, or -1 if it is not known. */
+static int output_sync (pw_output *o) {
+  int bad = ferror (o->stream);
+  if (bad) return o->why ? o->why : -1;
   errno = 0;
-  int bad = fflush (o->stream), why = errno;
-  if (o->stream != stdout && fclose (o->stream) != 0 && !bad) bad = 1, why = errno;
+  if (fflush (o->stream) == 0 && (o->file < 0 || fsync (o->file) == 0)) return 0;
+  return errno ? errno : -1;
+}
+
+/* Closes the stream; standard output stays open. */
+static int output_close (pw_output *o, int why) {
+  FILE *f = o->stream;
   o->stream = NULL;
-  return before ? before : bad ? (why ? why : -1) : 0;
+  errno = 0;
+  if (f == NULL || f == stdout || fclose (f) == 0 || why) return why;
+  return errno ? errno : -1;
 }
 
-/* Cuts a file back to its last whole line. */
-static void output_whole_lines (const char *path) {
-  FILE *f = fopen (path, "r+");
-  if (f == NULL) return;
-  long end = fseek (f, 0, SEEK_END) == 0 ? ftell (f) : 0, keep = end;
-  while (keep > 0) {
-    if (fseek (f, keep - 1, SEEK_SET) != 0 || fgetc (f) == '\n') break;
-    keep--;
-  }
-  if (keep < end && ftruncate (fileno (f), keep) != 0) keep = end; /* then it stays as it is */
-  fclose (f);
+int pw_output_ready (pw_output *o, pw_error *error) {
+  if (o->stream == NULL) return o->why ? output_fail (o, o->why, 1, error) : PW_OK;
+  o->why = output_close (o, output_sync (o));
+  return o->why ? output_fail (o, o->why, 1, error) : PW_OK;
 }
 
-int pw_output_finish (pw_output *o, pw_error *error) {
-  int why = output_close (o), status = PW_OK;
-  if (why == 0 && o->part && rename (o->part, o->real) != 0) why = errno;
-  if (why != 0) {
-    if (o->part) output_whole_lines (o->part);
-    status = output_fail (o, why > 0 ? why : 0, 1, error);
-  }
-  output_free (o);
-  return status;
+/* Cuts the temporary file back to its last complete line. */
+static void output_cut (pw_output *o) {
+  char c;
+  off_t end = lseek (o->file, 0, SEEK_END), keep = end;
+  while (keep > 0 && pread (o->file, &c, 1, keep - 1) == 1 && c != '\n') keep--;
+  if (keep < end && ftruncate (o->file, keep) != 0) return; /* then it stays as it is */
 }
 
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
-  output_close (o);
-  char *kept = NULL;
+  if (o->stream) output_close (o, fflush (o->stream));
   buffer[0] = 0;
-  if (o->part) {
-    output_whole_lines (o->part);
-    snprintf (buffer, size, "%s", o->part);
-    kept = buffer;
-  }
+  if (o->part) output_cut (o);
+  if (o->part) snprintf (buffer, size, "%s", o->part);
   output_free (o);
-  return kept;
+  return *buffer ? buffer : NULL;
 }
 
 void pw_output_discard (pw_output *o) {
-  output_close (o);
-  if (o->part) remove (o->part);
+  output_close (o, 0);
+  if (o->part) unlink (o->part);
   output_free (o);
+}
+
+/* The folder knows the new name only when it is on the disk itself; some file systems refuse that, and need it not. */
+static int output_sync_folder (const pw_output *o, pw_error *error) {
+  if (o->folder < 0 || fsync (o->folder) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP) return PW_OK;
+  return pw_fail (error, PW_MACHINE, "%s is written, but its folder cannot be brought to the disk: %s", o->path,
+                  strerror (errno));
+}
+
+/* Renames all of them, or none. */
+static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
+  for (int i = 0; i < count; i++) {
+    if (o[i] == NULL || o[i]->part == NULL || rename (o[i]->part, o[i]->real) == 0) continue;
+    int status = output_fail (o[i], errno, 1, error);
+    while (i-- > 0)
+      if (o[i] && o[i]->part) (void)rename (o[i]->real, o[i]->part);
+    return status;
+  }
+  return PW_OK;
+}
+
+int pw_output_finish_all (pw_output *const *o, int count, pw_error *error) {
+  int status = PW_OK;
+  for (int i = 0; i < count; i++)
+    if (o[i] && status == PW_OK) status = pw_output_ready (o[i], error);
+  if (status == PW_OK) status = output_rename_all (o, count, error);
+  int complete = status == PW_OK;
+  for (int i = 0; i < count; i++) {
+    if (o[i] == NULL) continue;
+    if (complete && status == PW_OK) status = output_sync_folder (o[i], error);
+    if (complete)
+      output_free (o[i]);
+    else if (o[i]->brief)
+      pw_output_discard (o[i]);
+    else
+      pw_output_abandon (o[i], (char[2]){ 0 }, 2);
+  }
+  return status;
+}
+
+int pw_output_finish (pw_output *o, pw_error *error) {
+  return pw_output_finish_all (&o, 1, error);
 }
 
 /* ---- Going on where another process was stopped ---- */
@@ -158,16 +279,16 @@ unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size
 }
 
 /* The check sum of the last 64 kB before `length`; PW_RETRY if there are not so many bytes. */
-static int output_check (FILE *f, pw_mark *mark) {
+static int output_check (int file, pw_mark *mark) {
   char bytes[4096];
-  unsigned long long from = mark->length > 65536 ? mark->length - 65536 : 0;
+  unsigned long long at = mark->length > 65536 ? mark->length - 65536 : 0;
   mark->check = PW_CHECK;
-  if (fseeko (f, (off_t)from, SEEK_SET) != 0) return PW_RETRY;
-  for (unsigned long long left = mark->length - from; left > 0;) {
-    size_t want = left < sizeof bytes ? (size_t)left : sizeof bytes;
-    if (fread (bytes, 1, want, f) != want) return PW_RETRY;
-    mark->check = pw_check_sum (mark->check, bytes, want);
-    left -= want;
+  while (at < mark->length) {
+    size_t want = mark->length - at < sizeof bytes ? (size_t)(mark->length - at) : sizeof bytes;
+    ssize_t n = pread (file, bytes, want, (off_t)at);
+    if (n <= 0) return PW_RETRY;
+    mark->check = pw_check_sum (mark->check, bytes, (size_t)n);
+    at += (unsigned long long)n;
   }
   return PW_OK;
 }
@@ -176,48 +297,49 @@ int pw_output_continued (const pw_output *o) {
   return o->there;
 }
 
-int pw_output_sync (pw_output *o, pw_error *error) {
-  errno = 0;
-  if (fflush (o->stream) != 0 || ferror (o->stream) || fsync (fileno (o->stream)) != 0)
-    return output_fail (o, o->why ? o->why : errno, 0, error);
-  return PW_OK;
-}
-
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
   if (o->part == NULL)
     return pw_fail (error, PW_INPUT, "%s cannot be continued: it is no regular file",
                     o->stream == stdout ? "standard output" : o->path);
-  if (pw_output_sync (o, error) != PW_OK) return PW_MACHINE;
+  int why = output_sync (o);
+  if (why) return output_fail (o, why, 0, error);
   mark->length = (unsigned long long)ftello (o->stream);
-  FILE *f = fopen (o->part, "r");
-  int status = f ? output_check (f, mark) : PW_RETRY;
-  if (f) fclose (f);
-  return status == PW_OK ? PW_OK : pw_fail (error, PW_MACHINE, "cannot read %s", o->part);
+  if (output_check (o->file, mark) == PW_OK) return PW_OK;
+  return pw_fail (error, PW_MACHINE, "cannot read %s", o->part);
 }
 
-/* 1 if the file begins with what was marked; it is left open in o->stream. */
-static int output_is_marked (pw_output *o, const char *path, const pw_mark *mark) {
+/* 1 if the temporary file begins with what was marked. */
+static int output_is_marked (const pw_output *o, const pw_mark *mark) {
   pw_mark now = { .length = mark->length };
-  if (o->stream) fclose (o->stream);
-  o->stream = fopen (path, "r+");
-  return o->stream && output_check (o->stream, &now) == PW_OK && now.check == mark->check;
+  return output_check (o->file, &now) == PW_OK && now.check == mark->check;
 }
 
 /* A process that was killed right after its table was complete has left it under its own name. */
+static int output_take_back (pw_output *o, const pw_mark *mark) {
+  int created, file = pw_lock_file (o->real, PW_LOCK_EXISTING, &created);
+  if (file < 0) return errno;
+  o->file = file;
+  return output_is_marked (o, mark) && rename (o->real, o->part) != 0 ? errno : 0;
+}
+
 static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
-  if (output_place (o, error) != PW_OK) return error->status;
+  pw_location p;
+  int why = output_place (o, &p, ".part");
+  if (why) return output_fail (o, why, 0, error);
   if (o->part == NULL) return pw_fail (error, PW_INPUT, "cannot continue %s: it is no regular file", o->path);
-  int good = output_is_marked (o, o->part, mark), absent = o->stream == NULL && errno == ENOENT;
-  if (absent && output_is_marked (o, o->real, mark)) good = rename (o->real, o->part) == 0;
-  if (!good && absent && o->stream == NULL)
-    return pw_fail (error, PW_INPUT, "cannot continue %s: there is no %s", o->path, o->part);
-  if (!good)
+  why = output_open_part (o, PW_LOCK_EXISTING);
+  int absent = why == ENOENT;
+  if (absent) why = output_take_back (o, mark);
+  if (why == ENOENT) return pw_fail (error, PW_INPUT, "cannot continue %s: there is no %s", o->path, o->part);
+  if (why) return output_fail (o, why, 0, error);
+  if (!output_is_marked (o, mark))
     return pw_fail (error, PW_INPUT, "cannot continue %s: %s is not the table that the checkpoint belongs to", o->path,
                     absent ? "it" : o->part);
-  if (fseeko (o->stream, (off_t)mark->length, SEEK_SET) == 0 &&
-      ftruncate (fileno (o->stream), (off_t)mark->length) == 0)
-    return PW_OK;
-  return pw_fail (error, PW_MACHINE, "cannot write %s: %s", o->part, strerror (errno));
+  why = output_stream (o);
+  if (why == 0 &&
+      (fseeko (o->stream, (off_t)mark->length, SEEK_SET) != 0 || ftruncate (o->file, (off_t)mark->length) != 0))
+    why = errno;
+  return why ? pw_fail (error, PW_MACHINE, "cannot write %s: %s", o->part, strerror (why)) : PW_OK;
 }
 
 pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error) {

@@ -39,6 +39,12 @@ const pw_plugin_table *pw_file_table (const pw_file *f);
 const char *pw_file_name (const pw_file *f); /* "ezyroller" */
 const char *pw_file_path (const pw_file *f);
 
+/* The path of the file that a model's name or path means, malloced; NULL and an error as from pw_file_open. */
+char *pw_file_find (const char *model, pw_error *error);
+
+/* Calls `each` with the path of every table that a text model reads, until it returns non-zero, which is returned. */
+int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context);
+
 /* Calls `each` with the name and path of every model on the search path, in order of name, until it returns non-zero. */
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error);
 
@@ -66,22 +72,61 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 /* The factor of a column by its header's cell, 1 without a unit.  PW_INPUT with what is wrong, column and unit named. */
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
-/* ---- Files that are whole or carry another name ---- */
+/* Opens a regular file for reading, without waiting for anybody.  NULL, with the reason in *why, if that fails or it is
+ * another type of file; errno is ENOMEM if there was no memory. */
+FILE *pw_open_input (const char *path, const char **why);
 
-/* A file written as NAME.part and renamed when complete; "-" is standard output.  What exists and is no regular file
- * (a pipe, a device) is written directly. */
+/* ---- What a command reads and writes ---- */
+
+typedef enum { PW_READS, PW_WRITES, PW_WRITES_INTO } pw_use_how;
+typedef struct {
+  const char *what; /* "--json", "the model"; for messages */
+  const char *path; /* "-" is standard output; NULL: not used */
+  pw_use_how how;
+  const char *const *names; /* PW_WRITES_INTO a folder: endings of the names of the files it gets, NULL at the end */
+} pw_use;
+
+/* Refuses a file that is written and also read, or written twice, under whatever names: files are compared by device and
+ * inode, those that do not exist yet by that of their folder and their name.  PW_INPUT, PW_MACHINE. */
+int pw_check_uses (const pw_use *use, int count, pw_error *error);
+
+/* ---- Complete files ---- */
+
+/* A file written under a temporary name, NAME.part, and renamed when complete; "-" is standard output.
+ *
+ * The temporary file is new, locked against other processes, and never a symbolic link; if the name itself is one, the
+ * file it leads to is replaced.  A file that is replaced passes on its mode and owner.  What is no regular file (a pipe,
+ * a device), and open descriptors (/dev/stdout, /dev/fd/N), are written directly. */
 typedef struct pw_output pw_output;
 
-/* Errors: PW_MACHINE with the path and the reason. */
+/* Errors: PW_MACHINE with the path and the reason, also if another process is writing it. */
 pw_output *pw_output_open (const char *path, pw_error *error);
-FILE *pw_output_stream (pw_output *o);
-/* Completes and frees: flushes, checks, renames.  PW_MACHINE if anything failed: NAME.part stays and the text names it. */
+/* The same with another ending of the temporary name than ".part"; what is incomplete is then removed. */
+pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error);
+FILE *pw_output_stream (pw_output *o); /* stdout for "-", /dev/stdout, /dev/fd/1 */
+/* Whether it is a regular file of its own, not written directly. */
+int pw_output_is_file (const pw_output *o);
+/* Writes all to the disk and closes the stream, so that nothing but the name is missing.  PW_MACHINE. */
+int pw_output_ready (pw_output *o, pw_error *error);
+/* Completes and frees: the file is written to the disk, then renamed, then its folder is written to the disk.
+ * PW_MACHINE if anything failed: NAME.part remains and the text names it. */
 int pw_output_finish (pw_output *o, pw_error *error);
-/* Gives up and frees: NAME.part stays with whole lines.  Its path is written to the buffer, which is returned; NULL, and
- * "" in the buffer, if there is no such file (standard output, a device). */
+/* The same for several outputs, NULL among them, which all become complete or all keep their temporary names. */
+int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
+/* Gives up and frees: NAME.part remains with complete lines.  Its path is written to the buffer, which is returned; NULL,
+ * and "" in the buffer, if there is no such file (standard output, a device). */
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
 /* Gives up and frees, and removes NAME.part. */
 void pw_output_discard (pw_output *o);
+
+/* The path of a regular file to be written, links followed, for the caller to free.  NULL and PW_MACHINE. */
+char *pw_output_path (const char *path, pw_error *error);
+/* Opens a file for reading and writing, creates it if there is none, and locks it until the descriptor that is returned is
+ * closed.  A symbolic link is not followed.  -1 and PW_MACHINE, also if another process has it. */
+int pw_lock_path (const char *path, pw_error *error);
+/* Locks a folder for this process until the descriptor that is returned is closed.  -1 and PW_MACHINE, also if another
+ * process writes into it. */
+int pw_lock_folder (const char *path, pw_error *error);
 
 /* How far a file has come, for another process to go on from. */
 typedef struct {
@@ -105,8 +150,10 @@ pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *
 
 #define PW_CHECKPOINT_MAGIC "pinwheel checkpoint 1\n"
 
-/* Writes a checkpoint under another name, brings it to the disk and renames it: there is always a whole one.  The head
+/* Writes a checkpoint and completes the file, which is freed in every case: there is always a complete one.  The head
  * begins with PW_CHECKPOINT_MAGIC and ends with "end\n".  Errors: PW_MACHINE. */
+int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error);
+/* The same, to the file at a path. */
 int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error);
 
 /* One that was read: text up to `state`, which is ready to be loaded. */

@@ -72,6 +72,11 @@ static int plugin_ending (const char *name) {
   return i;
 }
 
+/* C++ */
+static int plugin_foreign (const char *name) {
+  return pw_ends_in (name, ".cpp") || pw_ends_in (name, ".cc") || pw_ends_in (name, ".cxx") || pw_ends_in (name, ".C");
+}
+
 static int plugin_read (pw_file *f, const char *shown, pw_error *error) {
   f->yaml = pw_yaml_open (f->path, shown, f->largest, error);
   if (f->yaml == NULL) return error->status;
@@ -84,6 +89,9 @@ static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   const char *base = strrchr (f->path, '/');
   base = base ? base + 1 : f->path;
   int ending = plugin_ending (base);
+  if (plugin_foreign (base))
+    return pw_fail (error, PW_INPUT,
+                    "%s: a model is compiled as C, not as C++: write it in C, in a file that ends in .c", f->path);
   if (ending == PLUGIN_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
   if (!pw_is_text (base))
     return pw_fail (error, PW_INPUT, "%s: the name of a model file is UTF-8 without control characters", f->path);
@@ -100,7 +108,8 @@ static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
   if (f->path == NULL)
     return pw_fail (error, errno == ENOMEM ? PW_MACHINE : PW_INPUT, "cannot open the model file %s: %s", path,
                     strerror (errno));
-  if (stat (f->path, &info) == 0 && !S_ISREG (info.st_mode)) return pw_fail (error, PW_INPUT, "%s is not a file", path);
+  if (stat (f->path, &info) == 0 && !S_ISREG (info.st_mode))
+    return pw_fail (error, PW_INPUT, "cannot open the model file %s: %s", path, pw_not_regular (info.st_mode));
   return PW_OK;
 }
 
@@ -141,11 +150,8 @@ static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
   return status;
 }
 
-pw_file *pw_file_open (const char *model, pw_error *error) {
-  return pw_file_open_limited (model, PW_FILE_LARGEST, error);
-}
-
-pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *error) {
+/* Finds the file; `*shown` is its path as the user knows it. */
+static pw_file *plugin_find (const char *model, const char **shown, pw_error *error) {
   if (model == NULL || *model == 0) {
     pw_fail (error, PW_INPUT, "a model's name or path is missing");
     return NULL;
@@ -155,11 +161,34 @@ pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *erro
     pw_fail (error, PW_MACHINE, "out of memory");
     return NULL;
   }
+  int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS || plugin_foreign (model);
+  if ((by_path ? plugin_find_path (f, model, error) : plugin_find_name (f, model, error)) == PW_OK) {
+    *shown = by_path ? model : f->path;
+    return f;
+  }
+  pw_file_close (f);
+  return NULL;
+}
+
+char *pw_file_find (const char *model, pw_error *error) {
+  const char *shown;
+  pw_file *f = plugin_find (model, &shown, error);
+  char *path = f ? f->path : NULL;
+  if (f) f->path = NULL;
+  pw_file_close (f);
+  return path;
+}
+
+pw_file *pw_file_open (const char *model, pw_error *error) {
+  return pw_file_open_limited (model, PW_FILE_LARGEST, error);
+}
+
+pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *error) {
+  const char *shown;
+  pw_file *f = plugin_find (model, &shown, error);
+  if (f == NULL) return NULL;
   f->largest = largest < PW_FILE_MOST ? largest : PW_FILE_MOST;
-  int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS;
-  int status = by_path ? plugin_find_path (f, model, error) : plugin_find_name (f, model, error);
-  if (status == PW_OK) status = plugin_open_path (f, by_path ? model : f->path, error);
-  if (status == PW_OK) return f;
+  if (plugin_open_path (f, shown, error) == PW_OK) return f;
   pw_file_close (f);
   return NULL;
 }
@@ -189,6 +218,10 @@ const char *pw_file_name (const pw_file *f) {
 
 const char *pw_file_path (const pw_file *f) {
   return f->path;
+}
+
+int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context) {
+  return f->yaml ? pw_yaml_tables (f->yaml, each, context) : 0;
 }
 
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error) {

@@ -1,8 +1,22 @@
-/* A file's text as a whole. */
+/* Files that are read: regular ones only, and at most so much of them. */
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 #include "files.h"
+
+FILE *pw_open_input (const char *path, const char **why) {
+  struct stat info = { .st_mode = S_IFREG };
+  int file = open (path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC); /* a FIFO does not wait for its writer */
+  FILE *f = file >= 0 && fstat (file, &info) == 0 && S_ISREG (info.st_mode) ? fdopen (file, "rb") : NULL;
+  if (f) return f;
+  int number = S_ISREG (info.st_mode) ? errno : 0;
+  *why = number ? strerror (number) : pw_not_regular (info.st_mode);
+  if (file >= 0) close (file);
+  errno = number;
+  return NULL;
+}
 
 int pw_slurp (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error) {
   size_t room = 1 << 16;

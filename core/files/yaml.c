@@ -2,9 +2,12 @@
  * whatever takes a model of compiled C takes a text model too; its build function reads bodies and elements. */
 #define _POSIX_C_SOURCE 200809L
 #include <ctype.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
+
+#define YAML_AHEAD 1e6 /* indicators of one list or map in brackets; about 350 bytes each */
 
 /* ---- Parameters ---- */
 
@@ -195,6 +198,7 @@ pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_e
     pw_yaml_close (y);
     return NULL;
   }
+  y->ahead = YAML_AHEAD * fmax (1, (double)largest / PW_FILE_LARGEST);
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = pw_yaml_build };
   if (yaml_read (y, path, largest, error) == PW_OK) return y;
   pw_yaml_close (y);
@@ -212,4 +216,8 @@ void pw_yaml_close (pw_yaml *y) {
 
 const pw_plugin_table *pw_yaml_table (const pw_yaml *y) {
   return &y->table;
+}
+
+int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context) {
+  return y->root ? pw_yaml_each_table (y, y->root, each, context) : 0;
 }

@@ -42,6 +42,7 @@ struct pw_yaml {
   char *folder;          /* it is in, links resolved */
   char *source;          /* the text, ended by a NUL */
   size_t size;
+  double ahead;   /* indicators that libfyaml may have before it makes something of them */
   pw_arena arena; /* nodes and texts */
   const pw_node *root;
   const pw_node *bodies, *elements, *let, *truth; /* or NULL */
@@ -135,6 +136,9 @@ int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, c
 /* The points of a table (yaml_table.c): the values of `points`, `file` and `columns`, NULL where not given. */
 int pw_yaml_points (pw_yaml_builder *b, const char *what, const pw_node *node, const pw_node *const v[3], pw_signal *s,
                     pw_error *error);
+/* Calls `each` with the path of every file named below a node, until it returns non-zero, which is returned. */
+int pw_yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
+                        void *context);
 
 /* What is being read, for messages. */
 typedef struct {

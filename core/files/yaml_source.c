@@ -86,10 +86,10 @@ static int source_check (const pw_yaml *y, pw_error *error) {
 }
 
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error *error) {
-  FILE *f = fopen (path, "rb");
+  const char *why;
+  FILE *f = pw_open_input (path, &why);
   if (f == NULL)
-    return pw_fail (error, errno == ENOMEM ? PW_MACHINE : PW_INPUT, "cannot open the model file %s: %s", y->path,
-                    strerror (errno));
+    return pw_fail (error, errno == ENOMEM ? PW_MACHINE : PW_INPUT, "cannot open the model file %s: %s", y->path, why);
   int status = pw_slurp (f, largest, y->path, "the most a model may have unless --max-file says more", &y->source,
                          &y->size, error);
   fclose (f);

@@ -1,11 +1,8 @@
 /* The points of a table in a text model: a list of [time, value], or two columns of a file in the model's own folder. */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include "yaml.h"
 
 /* ---- In the model ---- */
@@ -52,20 +49,11 @@ static char *table_below (const char *folder, const char *name, const char **why
 
 /* A model that is passed on can read what is passed on with it, nothing else. */
 static FILE *table_open (const pw_yaml *y, const char *name, const char **why) {
-  struct stat info;
   *why = "a table lies in the model's own folder, so its path is relative and has no \"..\"";
   if (*name == '/' || table_climbs (name)) return NULL;
   char *path = table_below (y->folder, name, why);
-  int file = path ? open (path, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC) : -1;
-  if (path && file < 0) *why = strerror (errno);
+  FILE *f = path ? pw_open_input (path, why) : NULL;
   free (path);
-  if (file < 0) return NULL;
-  FILE *f = NULL;
-  if (fstat (file, &info) != 0 || !S_ISREG (info.st_mode))
-    *why = "it is not a file";
-  else if ((f = fdopen (file, "rb")) == NULL)
-    *why = strerror (errno);
-  if (f == NULL) close (file);
   return f;
 }
 
@@ -116,6 +104,21 @@ static int table_read (pw_yaml_builder *b, const char *what, const pw_node *node
   if (v[0]) return table_list (b, what, v[0], s, error);
   if (table_columns (b, v[2], what, column, error) != PW_OK) return error->status;
   return table_file (b, what, v[1], column, s, error);
+}
+
+int pw_yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
+                        void *context) {
+  int stop = 0;
+  for (const pw_node *n = node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
+    const pw_node *value = node->type == PW_YAML_MAP ? n->next : NULL;
+    if (value && n->type == PW_YAML_SCALAR && strcmp (n->text, "file") == 0 && value->type == PW_YAML_SCALAR) {
+      char *path = pw_join (y->folder, value->text, "");
+      stop = path ? each (context, path) : PW_MACHINE;
+      free (path);
+    }
+    if (!stop) stop = pw_yaml_each_table (y, n, each, context);
+  }
+  return stop;
 }
 
 /* Many tables may be read from one file. */

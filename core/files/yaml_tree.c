@@ -5,7 +5,7 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { TREE_DEPTH = 30 };
+enum { TREE_DEPTH = 30, TREE_PIECE = 4096 };
 
 typedef struct {
   pw_yaml *y;
@@ -16,12 +16,33 @@ typedef struct {
   pw_node **tail[TREE_DEPTH]; /* where the next node of each goes */
   int depth;
   int documents;
-  unsigned at; /* of the last node, for what has no place of its own */
+  /* what the parser has of the source beyond the last event */
+  size_t from, fed;     /* its bytes */
+  double marks, opened; /* indicators in it; brackets that open, less those that close */
+  int nested;           /* 1: there were too many brackets */
+  int far;              /* 1: there was too much of it */
+  int line;             /* number, from 0, and */
+  size_t line_at;       /* offset of the line of the last mark */
+  unsigned at;          /* of the last node, for what has no place of its own */
 } tree;
 
-static unsigned tree_place (const tree *x, struct fy_event *e) {
+/* The offset of a mark.  libfyaml 0.7.12 counts it modulo 2^16 when it is fed, columns in characters: the offset is the
+ * first one with that remainder that is not before the column. */
+static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
+  const char *source = x->y->source, *end = source + x->y->size, *p = source + x->line_at;
+  for (; x->line < mark->line && p < end; p++) x->line += *p == '\n';
+  for (; x->line > mark->line && p > source; x->line--) do
+      p--;
+    while (p > source && p[-1] != '\n');
+  x->line_at = (size_t)(p - source);
+  size_t at = x->line_at + (size_t)mark->column;
+  at += (mark->input_pos - at) & 0xffff;
+  return (unsigned)(at < x->y->size ? at : x->y->size);
+}
+
+static unsigned tree_place (tree *x, struct fy_event *e) {
   const struct fy_mark *mark = fy_event_start_mark (e);
-  return mark && mark->line >= 0 ? (unsigned)mark->input_pos : x->at;
+  return mark && mark->line >= 0 ? tree_offset_of (x, mark) : x->at;
 }
 
 /* ---- Nodes ---- */
@@ -98,12 +119,12 @@ static void tree_end (tree *x) {
 
 /* ---- Events ---- */
 
-static int tree_marked (const tree *x, struct fy_event *e, pw_error *error) {
+static int tree_marked (tree *x, struct fy_event *e, pw_error *error) {
   struct fy_token *anchor = fy_event_get_anchor_token (e), *tag = fy_event_get_tag_token (e);
   struct fy_token *token = e->type == FYET_ALIAS ? e->alias.anchor : anchor ? anchor : tag;
   if (token == NULL) return PW_OK;
   const struct fy_mark *mark = fy_token_start_mark (token);
-  size_t at = mark && mark->line >= 0 ? mark->input_pos : tree_place (x, e);
+  size_t at = mark && mark->line >= 0 ? tree_offset_of (x, mark) : tree_place (x, e);
   const char *source = x->y->source;
   while (at > 0 && !strchr ("&*!", source[at]) && source[at - 1] != '\n') at--; /* marks may lie behind the sign */
   return pw_yaml_fail (x->y, at, error, "%s do not belong in a model file; use parameters",
@@ -112,8 +133,44 @@ static int tree_marked (const tree *x, struct fy_event *e, pw_error *error) {
                                              : "tags (!)");
 }
 
+/* ---- Input ---- */
+
+/* libfyaml cannot tell a list or map in brackets from a key before it has seen what follows the closing bracket, and
+ * until then keeps some 350 bytes for each indicator.  So it gets the source piece by piece, and no more once it has asked
+ * for too much of it without an event, or for too many brackets. */
+enum { TREE_NESTED = 10000 };
+
+/* Adds (1) or takes away (-1) the indicators from one offset to another. */
+static void tree_count (tree *x, size_t from, size_t to, int sign) {
+  for (const char *p = x->y->source + from; p < x->y->source + to; p++) {
+    int opens = *p == '[' || *p == '{', closes = *p == ']' || *p == '}';
+    x->opened += sign * (opens - closes);
+    x->marks += sign * (opens || closes || *p == ',' || *p == ':');
+  }
+}
+
+static ssize_t tree_feed (void *user, void *to, size_t count) {
+  tree *x = user;
+  size_t rest = x->y->size - x->fed, n = count < rest ? count : rest;
+  if (n > TREE_PIECE) n = TREE_PIECE;
+  memcpy (to, x->y->source + x->fed, n);
+  tree_count (x, x->fed, x->fed + n, 1);
+  x->fed += n;
+  x->nested = x->opened > TREE_NESTED;
+  x->far = x->marks > x->y->ahead;
+  return x->nested || x->far ? 0 : (ssize_t)n; /* libfyaml 0.7.12 takes an error for something to read again */
+}
+
+static void tree_pass (tree *x, size_t at) {
+  if (at > x->fed) at = x->fed;
+  if (at <= x->from) return;
+  tree_count (x, x->from, at, -1);
+  x->from = at;
+}
+
 static int tree_take (tree *x, struct fy_event *e, pw_error *error) {
   int status = tree_marked (x, e, error);
+  tree_pass (x, tree_place (x, e));
   if (status != PW_OK) return status;
   switch (e->type) {
   case FYET_DOCUMENT_START:
@@ -180,13 +237,23 @@ static int tree_syntax (const tree *x, pw_error *error) {
   return pw_yaml_fail (x->y, at, error, "%s%s", message, tree_hint (x->y, at, message));
 }
 
+static int tree_refused (const tree *x, pw_error *error) {
+  if (x->nested) return pw_yaml_fail (x->y, x->from, error, "nested too deeply");
+  return pw_yaml_fail (
+      x->y, x->from, error,
+      "a list or map in brackets with more than %g commas, colons and brackets, which takes much memory: "
+      "write its entries on lines of their own, after \"- \" or \"key: \"",
+      x->y->ahead);
+}
+
 static int tree_parse (tree *x, pw_error *error) {
   struct fy_event *e;
   int status = PW_OK;
   while (status == PW_OK && (e = fy_parser_parse (x->parser)) != NULL) {
-    status = tree_take (x, e, error);
+    status = x->far ? tree_refused (x, error) : tree_take (x, e, error);
     fy_parser_event_free (x->parser, e);
   }
+  if (status == PW_OK && (x->nested || x->far)) return tree_refused (x, error);
   return status == PW_OK && fy_parser_get_stream_error (x->parser) ? tree_syntax (x, error) : status;
 }
 
@@ -208,7 +275,7 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   x.parser = fy_parser_create (&how);
   int status = PW_OK;
   x.text = fy_token_iter_create (NULL);
-  if (x.parser == NULL || x.text == NULL || fy_parser_set_string (x.parser, y->source, y->size) != 0)
+  if (x.parser == NULL || x.text == NULL || fy_parser_set_input_callback (x.parser, &x, tree_feed) != 0)
     status = pw_yaml_no_memory (y, error);
   else
     status = tree_parse (&x, &wrong);

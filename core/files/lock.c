@@ -1,0 +1,80 @@
+/* Files and folders that belong to one process at a time.
+ *
+ * It is the lock that says so, not that the file exists: a lock ends with the process that holds it, so that what a killed
+ * process has left is in nobody's way. */
+#include <errno.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+#include "files.h"
+
+enum { LOCK_TRIES = 100 }; /* each time another process has just given the file up */
+
+/* An errno value.  Some file systems have no locks: there nothing can be protected. */
+static int lock_take (int file) {
+  while (flock (file, LOCK_EX | LOCK_NB) != 0) {
+    if (errno == ENOLCK || errno == EOPNOTSUPP || errno == ENOSYS) return 0;
+    if (errno != EINTR) return errno;
+  }
+  return 0;
+}
+
+const char *pw_lock_reason (int why) {
+  return why == EWOULDBLOCK ? "another process is writing it"
+         : why == ELOOP     ? "its temporary name is a symbolic link"
+         : why == ENODEV    ? "its temporary name is not that of a regular file"
+                            : strerror (why);
+}
+
+/* Neither a link nor a file that is there already is taken for a new one. */
+static int lock_open (const char *path, pw_lock_how how, int *created) {
+  int file = -1;
+  *created = 0;
+  if (how != PW_LOCK_EXISTING) {
+    file = open (path, O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+    *created = file >= 0;
+    if (file >= 0 || errno != EEXIST) return file;
+  }
+  return open (path, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
+}
+
+/* Locks what was opened.  0; an errno value, ESTALE if the path has come to mean another file meanwhile. */
+static int lock_opened (int file, const char *path) {
+  struct stat info, now;
+  if (fstat (file, &info) != 0) return errno;
+  if (!S_ISREG (info.st_mode)) return ENODEV;
+  int why = lock_take (file);
+  if (why) return why;
+  return lstat (path, &now) == 0 && now.st_dev == info.st_dev && now.st_ino == info.st_ino ? 0 : ESTALE;
+}
+
+int pw_lock_file (const char *path, pw_lock_how how, int *created) {
+  for (int tries = 0; tries < LOCK_TRIES; tries++) {
+    int file = lock_open (path, how, created), why = file < 0 ? errno : lock_opened (file, path);
+    if (why == 0 && (*created || how != PW_LOCK_NEW)) return file;
+    if (why == 0 && unlink (path) != 0) why = errno; /* a killed process has left it */
+    if (*created && why != 0 && why != ESTALE) unlink (path);
+    if (file >= 0) close (file);
+    errno = why;
+    if (why != 0 && why != ESTALE && (why != ENOENT || how == PW_LOCK_EXISTING)) return -1;
+  }
+  return -1;
+}
+
+int pw_lock_path (const char *path, pw_error *error) {
+  int created, file = pw_lock_file (path, PW_LOCK_KEEP, &created);
+  if (file < 0) pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, pw_lock_reason (errno));
+  return file;
+}
+
+int pw_lock_folder (const char *path, pw_error *error) {
+  int file = open (path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  int why = file < 0 ? errno : lock_take (file);
+  if (why == EBADF) why = 0; /* NFS locks only what is open for writing, which no folder is */
+  if (why == 0) return file;
+  if (file >= 0) close (file);
+  pw_fail (error, PW_MACHINE, "cannot write into %s: %s", path,
+           why == EWOULDBLOCK ? "another process is writing into it" : strerror (why));
+  return -1;
+}

@@ -1,0 +1,376 @@
+/* Files that a command writes: each by one process and for one use, complete or under a temporary name, wherever their names
+ * lead; and files of the wrong type that it is asked to read. */
+#define _GNU_SOURCE
+#include <errno.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+#include "check.h"
+#include "cli.h"
+#include "pinwheel-files.h"
+
+/* ---- One use of each file ---- */
+
+static void test_uses (void **state) {
+  (void)state;
+  cli_good ("mkdir -p @/u/D && cd @/u && cp $OLDPWD/tests/models/signals.yaml m.yaml && : >none");
+  cli_good ("cp models/car.yaml @/u/car.yaml; printf 't,M\\n0,1\\n1,2\\n' >@/u/M.csv");
+  cli_write ("u/table.yaml", "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1}\nelements:\n"
+                             "  - {torque: T, body: [a, ground], value: {table: {file: M.csv, columns: [t, M]}}}\n");
+  cli_good (
+      "cd @/u; ln -s car.yaml link.yaml; ln car.yaml hard.csv; ln -s new.csv soft.csv; cat *.yaml M.csv >../before");
+  const cli_wrong each[] = {
+    { "run ezyroller -o o.csv --json ./o.csv", "-o and --json cannot both write to ./o.csv" },
+    { "run ezyroller -o new.csv --json soft.csv", "-o and --json cannot both write to soft.csv" },
+    { "run ezyroller -o o.csv --json D/../o.csv.part", "-o and --json cannot both write to D/../o.csv.part" },
+    { "run ezyroller -o - --json /dev/stdout", "-o and --json cannot both write to /dev/stdout" },
+    { "run ezyroller -o a.html --animate ./a.html", "-o and --animate cannot both write to ./a.html" },
+    { "run ezyroller -o c --checkpoint ./c", "--checkpoint and -o cannot both write to c" },
+    { "run ./car.yaml -o car.yaml", "-o car.yaml would overwrite the model, @/u/car.yaml" },
+    { "run ./link.yaml --json car.yaml", "--json car.yaml would overwrite the model, @/u/car.yaml" },
+    { "run ./car.yaml --checkpoint hard.csv", "--checkpoint hard.csv would overwrite the model, @/u/car.yaml" },
+    { "run ./table.yaml -o M.csv", "-o M.csv would overwrite a table of the model, @/u/M.csv" },
+    { "run ./table.yaml --json ./M.csv", "--json ./M.csv would overwrite a table of the model, @/u/M.csv" },
+    { "run ezyroller -o M.csv --truth ./M.csv", "-o M.csv would overwrite --truth, ./M.csv" },
+    { "run ezyroller --plots D --json D/energy.dat", "--plots D would overwrite --json, D/energy.dat" },
+    { "compare ezyroller -o D --truth D/compare.csv", "-o D would overwrite --truth, D/compare.csv" },
+    { "sweep ./car.yaml --vary m=1,2 -o car.yaml", "-o car.yaml would overwrite the model, @/u/car.yaml" },
+    { "sweep ./table.yaml --vary a.x=1,2 -o M.csv", "-o M.csv would overwrite a table of the model, @/u/M.csv" },
+    { "sweep --merge M.csv -o ./M.csv", "-o ./M.csv would overwrite the part, M.csv" },
+    { "check ./car.yaml --json car.yaml", "--json car.yaml would overwrite the model, @/u/car.yaml" },
+  };
+  for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
+    char text[500];
+    snprintf (text, sizeof text,
+              "p=$PWD/; case $PINWHEEL in /*) p= ;; esac; p=$p${PINWHEEL:-build/pinwheel}; cd @/u; : >D/compare.csv; "
+              "\"$p\" %s",
+              each[i].arguments);
+    cli_bad (text, 2, each[i].message);
+    cli_good ("cd @/u; cat *.yaml M.csv | cmp - ../before; ls | grep -c 'part$\\|^o.csv\\|^new\\|^c$' || true");
+    assert_string_equal (cli_out, "0\n");
+  }
+  cli_good ("pinwheel run ezyroller -t 0.01 -o /dev/null --json /dev/null"); /* it takes everything */
+}
+
+/* ---- Links ---- */
+
+static void test_links (void **state) {
+  (void)state;
+  cli_good (
+      "mkdir -p @/k; cd @/k; mkdir sub; echo mine >mine; for f in a.csv a.json a.ck t.csv; do ln -s mine $f.part; "
+      "done; "
+      "ln -s mine t.csv.sorted; ln -s mine motion.dat.part; ln -s sub/there.csv far.csv; echo old >sub/there.csv; "
+      "ln -s sub/absent.csv none.csv");
+#define OUTPUT_LINK ": its temporary name is a symbolic link"
+  cli_bad ("pinwheel run ezyroller -t 1 -o @/k/a.csv", 1, "cannot write @/k/a.csv" OUTPUT_LINK);
+  cli_bad ("pinwheel run ezyroller -t 1 --json @/k/a.json", 1, "cannot write @/k/a.json" OUTPUT_LINK);
+  cli_bad ("pinwheel run ezyroller -t 1 --checkpoint @/k/a.ck", 1, "cannot write @/k/a.ck" OUTPUT_LINK);
+  cli_bad ("pinwheel run ezyroller -t 1 --plots @/k", 1, "cannot write @/k/motion.dat" OUTPUT_LINK);
+  cli_bad ("pinwheel sweep ezyroller -t 1 --vary a=0.5,0.6 -o @/k/t.csv", 1, "cannot write @/k/t.csv.part" OUTPUT_LINK);
+  cli_good ("rm @/k/t.csv.part");
+  assert_int_equal (cli_run ("pinwheel sweep ezyroller -t 0.1 --vary a=0.5,0.6 -o @/k/t.csv"), 1);
+  assert_non_null (strstr (cli_err, "t.csv" OUTPUT_LINK));
+  assert_string_equal (cli_file ("k/mine"), "mine\n");
+  cli_good ("pinwheel run ezyroller -t 0.01 -o @/k/far.csv; pinwheel run ezyroller -t 0.01 -o @/k/none.csv; cd @/k; "
+            "[ -L far.csv ] && [ -L none.csv ] && wc -l <sub/there.csv && wc -l <sub/absent.csv");
+  assert_string_equal (cli_out, "12\n12\n");
+}
+
+/* ---- One process ---- */
+
+/* Locks a file or folder as another process would. */
+static int output_lock (const char *name, int flags) {
+  char path[300];
+  cli_expand (name, path, sizeof path);
+  int file = open (path, flags, 0666);
+  assert_true (file >= 0 && flock (file, LOCK_EX | LOCK_NB) == 0);
+  return file;
+}
+
+static void output_locked (const char *lock, int flags, const char *command, const char *message) {
+  cli_good ("rm -rf @/l; mkdir -p @/l/D");
+  int file = output_lock (lock, flags);
+  cli_bad (command, 1, message);
+  cli_good ("ls -A @/l/D");
+  assert_string_equal (cli_out, "");
+  if (flags & O_CREAT) assert_int_equal (write (file, "of a process that was killed\n", 29), 29);
+  close (file);
+  cli_shell (command);
+  cli_good ("ls @/l/*.part 2>/dev/null || true"); /* what it has left is in nobody's way */
+  assert_string_equal (cli_out, "");
+}
+
+static void test_lock (void **state) {
+  (void)state;
+#define OUTPUT_OTHER ": another process is writing it"
+  int file = O_RDWR | O_CREAT, folder = O_RDONLY | O_DIRECTORY;
+  output_locked ("@/l/a.csv.part", file, "pinwheel run ezyroller -t 0.1 -o @/l/a.csv",
+                 "cannot write @/l/a.csv" OUTPUT_OTHER);
+  output_locked ("@/l/a.json.part", file, "pinwheel run ezyroller -t 0.1 --json @/l/a.json",
+                 "cannot write @/l/a.json" OUTPUT_OTHER);
+  output_locked ("@/l/a.html.part", file, "pinwheel run ezyroller -t 0.1 --animate @/l/a.html >@/log",
+                 "cannot write @/l/a.html" OUTPUT_OTHER);
+  output_locked ("@/l/a.ck.part", file, "pinwheel run ezyroller -t 0.1 --checkpoint @/l/a.ck >@/log",
+                 "cannot write @/l/a.ck" OUTPUT_OTHER);
+  output_locked ("@/l/a.json.part", file, "pinwheel check ezyroller --json @/l/a.json >@/log",
+                 "cannot write @/l/a.json" OUTPUT_OTHER);
+#define OUTPUT_INTO "cannot write into @/l/D: another process is writing into it"
+  output_locked ("@/l/D", folder, "PATH=/none pinwheel run ezyroller -t 0.1 --plots @/l/D >@/log", OUTPUT_INTO);
+  output_locked ("@/l/D", folder,
+                 "PATH=/none pinwheel compare ezyroller -m rk4 -t 0.1 --step-ladder 0.1:0.05 -o @/l/D >@/log",
+                 OUTPUT_INTO);
+  output_locked ("@/l/D", folder,
+                 "PATH=/none pinwheel drift ezyroller -m rk4+none --only-methods -t 0.1 -o @/l/D >@/log", OUTPUT_INTO);
+  cli_good ("rm -rf @/l; mkdir @/l");
+  int journal = output_lock ("@/l/s.csv.part", file);
+  cli_bad ("pinwheel sweep ezyroller -t 0.1 --vary a=0.5,0.6 -o @/l/s.csv", 1,
+           "cannot write @/l/s.csv.part" OUTPUT_OTHER);
+  close (journal);
+}
+
+/* A run keeps its files locked from its beginning to its end, its checkpoint between two of them. */
+static void test_keeps_lock (void **state) {
+  (void)state;
+  cli_good ("rm -rf @/l; mkdir @/l");
+  cli_run ("\"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e6 --every 100 --json @/l/a.json --animate @/l/a.html "
+           "--checkpoint @/l/a.ck --checkpoint-every 1 -o @/l/a.csv >@/log 2>&1 & p=$!\n"
+           "while [ ! -e @/l/a.ck ]; do sleep 0.02; done\n"
+           "for f in '-o @/l/a.csv' '--json @/l/a.json' '--animate @/l/a.html' '--checkpoint @/l/a.ck'; do\n"
+           "  pinwheel run ezyroller -t 0.1 $f; echo $?\ndone; kill -KILL $p");
+  assert_string_equal (cli_out, "1\n1\n1\n1\n");
+  for (const char *const *n = (const char *const[]){ "a.csv", "a.json", "a.html", "a.ck", NULL }; *n; n++) {
+    char message[100];
+    snprintf (message, sizeof message, "/l/%s" OUTPUT_OTHER, *n);
+    assert_non_null (strstr (cli_err, message));
+  }
+}
+
+/* ---- What is no file of its own ---- */
+
+static void test_direct (void **state) {
+  (void)state;
+#define OUTPUT_RUN "pinwheel run ezyroller -t 0.01 -o "
+  for (const char *const *n = (const char *const[]){ "-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1", NULL }; *n;
+       n++) {
+    char text[300];
+    if (**n == '/' && access ("/proc/self/fd/1", F_OK) != 0) continue;
+    snprintf (text, sizeof text,
+              "echo old >@/all; " OUTPUT_RUN "%s >>@/all; cat @/all | wc -l; " OUTPUT_RUN "%s | wc -l", *n, *n);
+    cli_good (text);
+    assert_string_equal (cli_out, "13\n12\n");
+  }
+  if (access ("/dev/fd/1", F_OK) == 0) {
+    cli_good ("echo old >@/all; " OUTPUT_RUN "/dev/fd/5 5>>@/all; wc -l <@/all");
+    assert_string_equal (cli_out, "13\n");
+    cli_bad (OUTPUT_RUN "/dev/fd/5 5<@/all", 1, "cannot write /dev/fd/5: Bad file descriptor");
+  }
+  cli_good ("mkfifo @/fifo; wc -l <@/fifo & " OUTPUT_RUN
+            "@/fifo; wait; [ -p @/fifo ] && ls @/*.part 2>/dev/null || true");
+  assert_string_equal (cli_out, "12\n");
+  cli_run (
+      "\"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e6 -o @/fifo & sleep 0.3; kill -TERM $!; wait $!; echo $?");
+  assert_string_equal (cli_out, "143\n");
+  cli_bad ("pinwheel run ezyroller --checkpoint /dev/null", 2,
+           "/dev/null: a checkpoint needs a regular file, which can be read again and replaced");
+}
+
+/* ---- What is replaced ---- */
+
+static void test_mode (void **state) {
+  struct stat info;
+  char path[300];
+  (void)state;
+  cli_expand ("@/mode.csv", path, sizeof path);
+  for (int mode = 0600; mode <= 0664; mode += 064) {
+    cli_good ("rm -f @/mode.csv; echo old >@/mode.csv");
+    assert_int_equal (chmod (path, (mode_t)mode), 0);
+    if (getuid () == 0) assert_int_equal (chown (path, 12345, 23456), 0);
+    cli_good (OUTPUT_RUN "@/mode.csv; wc -l <@/mode.csv");
+    assert_string_equal (cli_out, "12\n");
+    assert_int_equal (stat (path, &info), 0);
+    assert_int_equal (info.st_mode & 07777, mode);
+    if (getuid () == 0) assert_true (info.st_uid == 12345 && info.st_gid == 23456);
+  }
+}
+
+/* Of two outputs both are complete or none: the summary's folder goes away during the run. */
+static void test_together (void **state) {
+  (void)state;
+  cli_run ("mkdir -p @/t/sub; cd @/t; mkfifo go\n"
+           "\"$OLDPWD/${PINWHEEL:-build/pinwheel}\" run ezyroller -t 20 -o a.csv --json sub/a.json >log 2>&1 & p=$!\n"
+           "while [ ! -s a.csv.part ]; do sleep 0.01; done; rm -r sub; wait $p; echo $?; ls");
+  if (strstr (cli_out, "No such") == NULL) assert_string_equal (cli_out, "1\na.csv.part\ngo\nlog\n");
+}
+
+/* ---- What is read ---- */
+
+static void test_types (void **state) {
+  (void)state;
+  cli_good ("rm -rf @/r; mkdir -p @/r/D; mkfifo @/r/pipe @/r/p.yaml; ln -s /dev/zero @/r/z.yaml; "
+            ": >@/r/x.cpp");
+#define OUTPUT_PIPE ": it is a FIFO or pipe, not a regular file"
+#define OUTPUT_ZERO ": it is a character device, not a regular file"
+#define OUTPUT_FOLDER ": it is a directory, not a regular file"
+  const cli_wrong each[] = {
+    { "run @/r/p.yaml", "cannot open the model file @/r/p.yaml" OUTPUT_PIPE },
+    { "run @/r/z.yaml", "cannot open the model file @/r/z.yaml" OUTPUT_ZERO },
+    { "run @/r/D", "cannot open the model file @/r/D" OUTPUT_FOLDER },
+    { "run /dev/zero", "cannot open the model file /dev/zero" OUTPUT_ZERO },
+    { "run ezyroller -t 1 --truth @/r/pipe", "--truth @/r/pipe: cannot be read" OUTPUT_PIPE },
+    { "run ezyroller -t 1 --truth @/r/pipe --checkpoint @/r/c", "cannot read @/r/pipe" OUTPUT_PIPE },
+    { "run ezyroller -t 1 --truth /dev/zero", "--truth /dev/zero: cannot be read" OUTPUT_ZERO },
+    { "run ezyroller -t 1 --truth @/r/D", "--truth @/r/D: cannot be read" OUTPUT_FOLDER },
+    { "run ezyroller -t 1 --resume @/r/pipe", "cannot read the checkpoint @/r/pipe" OUTPUT_PIPE },
+    { "sweep --merge @/r/pipe -o @/r/m.csv", "cannot open the part @/r/pipe" OUTPUT_PIPE },
+    { "sweep --merge /dev/zero -o @/r/m.csv", "cannot open the part /dev/zero" OUTPUT_ZERO },
+    { "run @/r/x.cpp", "@/r/x.cpp: a model is compiled as C, not as C++: write it in C, in a file that ends in .c" },
+  };
+  for (size_t i = 0; i < sizeof each / sizeof *each; i++) {
+    char text[300];
+    snprintf (text, sizeof text, "pinwheel %s", each[i].arguments);
+    cli_bad (text, 2, each[i].message);
+  }
+}
+
+/* Five megabytes that open brackets, in less memory than the 340 bytes that libfyaml keeps for each; as many entries of a
+ * list that may be a key; a line without an end.  An address sanitizer needs more by itself. */
+static void test_bounded (void **state) {
+  (void)state;
+#ifdef __SANITIZE_ADDRESS__
+  skip ();
+#endif
+  cli_good (
+      "head -c 5000000 /dev/zero | tr '\\0' '[' >@/deep.yaml; (printf 'x: ['; head -c 5000000 /dev/zero | tr '\\0' "
+      "'[') "
+      ">@/key.yaml; (printf '['; yes '0,' | head -n 2000000 | tr -d '\\n'; echo '0]') >@/wide.yaml; "
+      "head -c 200000000 /dev/zero | tr '\\0' 1 >@/line.csv; (echo 't,frame.x'; head -c 9 /dev/zero) >@/zero.csv");
+#define OUTPUT_LESS "ulimit -v 700000; pinwheel "
+  assert_int_equal (cli_run (OUTPUT_LESS "show @/deep.yaml"), 2);
+  assert_non_null (strstr (cli_err, "nested too deeply"));
+  assert_int_equal (cli_run (OUTPUT_LESS "show @/key.yaml"), 2);
+  assert_non_null (strstr (cli_err, "nested too deeply"));
+  assert_int_equal (cli_run (OUTPUT_LESS "show @/wide.yaml"), 2);
+  assert_non_null (strstr (cli_err, "wide.yaml:1:1: error: a list or map in brackets with more than 1e+06 commas"));
+  cli_bad (OUTPUT_LESS "run ezyroller --truth @/line.csv", 2,
+           "--truth @/line.csv: cannot be read: line 1 has more than 16 MB");
+  cli_bad ("pinwheel run ezyroller --truth @/zero.csv", 2,
+           "--truth @/zero.csv: cannot be read: a table is text, and this has a byte 0");
+  cli_bad ("ulimit -v 2000000; pinwheel sweep pendulum -t 0.1 --vary l=lin:1:2:9999 --jobs 9999 -o @/many.csv "
+           "2>@/err9; s=$?; "
+           "sed 's/only [0-9]*/only N/; s/jobs [0-9]*/jobs N/; s/N: .*;/N;/' @/err9 >&2; exit $s",
+           1, "cannot start 9999 runs at a time, only N; try --jobs N");
+  cli_good ("rm @/*.yaml @/line.csv");
+}
+
+/* The number of a checkpoint's state that has a value, and those after it. */
+static double *output_find (const pw_checkpoint *c, double value) {
+  for (size_t i = 0; i + sizeof value <= c->state.size; i += 4) {
+    double x;
+    memcpy (&x, c->state.at + i, sizeof x);
+    if (fabs (x - value) < 1e-9) return (double *)(void *)(c->state.at + i);
+  }
+  return NULL;
+}
+
+/* A checkpoint with a good check sum whose state no run has written. */
+static void output_forge (int number, double value) {
+  pw_checkpoint c;
+  pw_error error = { 0 };
+  char path[300];
+  cli_expand ("@/f.ck", path, sizeof path);
+  cli_good ("pinwheel run n-trailer -m rk4 --step 0.01 -t 0.6 --checkpoint @/f.ck --checkpoint-every 0.25 >@/log");
+  check_ok (pw_checkpoint_read (path, &c, &error), &error);
+  double *t = output_find (&c, 0.5);
+  assert_non_null (t);
+  memcpy ((unsigned char *)t + number * (int)sizeof value, &value, sizeof value);
+  char *head = strndup (c.text, (size_t)(c.head_end - c.text));
+  pw_archive state = { .at = c.state.at, .used = c.state.size };
+  check_ok (pw_checkpoint_write (path, head, &state, &error), &error);
+  free (head);
+  pw_checkpoint_free (&c);
+  int status = cli_run ("pinwheel run n-trailer -m rk4 --step 0.01 -t 0.6 --resume @/f.ck --checkpoint-every 0.25");
+  if (status != 2) print_error ("number %d is %g: %d %s", number, value, status, cli_err);
+  assert_int_equal (status, 2);
+  assert_non_null (strstr (cli_err, "is not that of a run"));
+}
+
+static void test_forged (void **state) {
+  (void)state;
+  output_forge (0, NAN);
+  output_forge (0, -0.25);
+  output_forge (0, 0.75);
+  output_forge (10, NAN);      /* the first coordinate */
+  output_forge (12, INFINITY); /* the third */
+}
+
+/* ---- The process ---- */
+
+static void test_process (void **state) {
+  (void)state;
+  cli_good ("POSIXLY_CORRECT=1 pinwheel run ezyroller -t 0.01 -o - | wc -l");
+  assert_string_equal (cli_out, "12\n");
+  cli_run ("trap '' INT TERM; \"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 500 --every 100 -o @/i.csv & p=$!\n"
+           "while [ ! -s @/i.csv.part ] && [ ! -e @/i.csv ]; do sleep 0.01; done; kill -INT $p; kill -TERM $p; wait "
+           "$p; echo $?");
+  assert_string_equal (cli_out, "0\n");
+}
+
+/* What a command prints at a terminal. */
+static void output_terminal (const char *program, const char *argument, char *text, size_t size) {
+  int near = posix_openpt (O_RDWR | O_NOCTTY);
+  if (near < 0 || grantpt (near) != 0 || unlockpt (near) != 0) skip ();
+  int far = open (ptsname (near), O_RDWR | O_NOCTTY), how;
+  pid_t child = fork ();
+  if (child == 0) {
+    dup2 (far, STDOUT_FILENO);
+    execl (program, program, "new", argument, (char *)NULL);
+    _exit (127);
+  }
+  close (far);
+  size_t n = 0;
+  for (ssize_t got; n + 1 < size && (got = read (near, text + n, size - 1 - n)) > 0;) n += (size_t)got;
+  text[n] = 0;
+  close (near);
+  waitpid (child, &how, 0);
+}
+
+static void test_terminal (void **state) {
+  const char *program = getenv ("PINWHEEL");
+  char path[300], text[1000];
+  (void)state;
+  cli_expand ("@/odd\033[31m", path, sizeof path);
+  assert_int_equal (mkdir (path, 0700), 0);
+  strcat (path, "/x.yaml");
+  output_terminal (program ? program : "build/pinwheel", path, text, sizeof text);
+  assert_null (strchr (text, '\033'));
+  assert_non_null (strstr (text, "/odd\\x1b[31m/x.yaml is written"));
+}
+
+/* A test program that takes too long ends its children, says its name and fails (limit.c). */
+static void test_limit (void **state) {
+  char text[500];
+  (void)state;
+  snprintf (text, sizeof text, "LIMIT=1 %s @/child", program_invocation_name);
+  assert_int_not_equal (cli_run (text), 0);
+  assert_non_null (strstr (cli_out, "[  FAILED  ] test_output: takes longer than its time limit\n"));
+  cli_good ("n=0; while kill -0 $(cat @/child) 2>/dev/null && [ $n -lt 100 ]; do n=$((n + 1)); sleep 0.05; done; "
+            "[ $n -lt 100 ]");
+}
+
+int main (int argc, char **argv) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_uses),    cmocka_unit_test (test_links),      cmocka_unit_test (test_lock),
+    cmocka_unit_test (test_direct),  cmocka_unit_test (test_keeps_lock), cmocka_unit_test (test_mode),
+    cmocka_unit_test (test_types),   cmocka_unit_test (test_together),   cmocka_unit_test (test_bounded),
+    cmocka_unit_test (test_process), cmocka_unit_test (test_forged),     cmocka_unit_test (test_terminal),
+    cmocka_unit_test (test_limit),
+  };
+  if (argc > 1) return setenv ("CHILD", argv[1], 1) || system ("echo $$ >\"$CHILD\"; sleep 600");
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
