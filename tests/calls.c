@@ -43,7 +43,6 @@ CALL (EAGAIN, EAGAIN, int, posix_spawnp,
       (child, file, actions, with, argv, environment))
 CALL (NULL, ENOMEM, char *, realpath, (const char *path, char *where), (path, where))
 CALL (NULL, EMFILE, DIR *, opendir, (const char *path), (path))
-CALL (-1, EIO, int, flock, (int fd, int how), (fd, how))
 CALL (-1, EROFS, int, fchmod, (int fd, mode_t mode), (fd, mode))
 CALL (-1, EIO, ssize_t, pread, (int fd, void *p, size_t size, off_t at), (fd, p, size, at))
 CALL (-1, EIO, int, fseek, (FILE * f, long at, int from), (f, at, from))
@@ -174,6 +173,18 @@ int __wrap_open (const char *path, int flags, ...) {
   if (!call_fails ("open", (flags & O_ACCMODE) == O_RDONLY && !(flags & O_DIRECTORY)))
     return __real_open (path, flags, mode);
   errno = EMFILE;
+  return -1;
+}
+
+int __real_flock (int fd, int how);
+int __wrap_flock (int fd, int how);
+int __wrap_flock (int fd, int how) {
+  if (call.moved) { /* another process was faster */
+    assert_int_equal (__real_rename (call.moved, call.away), 0);
+    call.moved = NULL;
+  }
+  if (!call_fails ("flock", 0)) return __real_flock (fd, how);
+  errno = EIO;
   return -1;
 }
 

@@ -18,6 +18,7 @@ extern struct call_state {
   struct stat folder;              /* in which a file has got its name last */
   int folder_due;                  /* 1: it has not been brought to the disk since */
   int unsynced;                    /* files that got their names before they were on the disk */
+  const char *moved, *away;        /* a file that is renamed before the next one is locked; NULL: none */
 } call;
 
 #endif

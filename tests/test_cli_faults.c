@@ -129,10 +129,25 @@ static void test_reading (void **state) {
   faults_from (":", "check pendulum --json @/o/a.json");
 }
 
+/* The file that was opened is another process's complete one by the time it is locked: it is left alone. */
+static void test_race (void **state) {
+  char part[300], away[300];
+  (void)state;
+  faults_begin (":", "run ezyroller --t-end 0.02 -o @/o/a.csv");
+  faults_prepare ();
+  cli_expand ("@/o/a.csv.part", part, sizeof part);
+  cli_expand ("@/o/b.csv", away, sizeof away);
+  call.moved = part;
+  call.away = away;
+  assert_int_equal (faults_run ("run ezyroller --t-end 0.02 -o @/o/a.csv"), 0);
+  cli_good ("cmp @/o/a.csv @/whole/a.csv && [ ! -s @/o/b.csv ]");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_run),   cmocka_unit_test (test_checkpoint), cmocka_unit_test (test_plots),
     cmocka_unit_test (test_sweep), cmocka_unit_test (test_drift),      cmocka_unit_test (test_reading),
+    cmocka_unit_test (test_race),
   };
   return cmocka_run_group_tests (tests, faults_setup, cli_teardown);
 }

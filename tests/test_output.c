@@ -265,6 +265,9 @@ static void test_bounded (void **state) {
            "2>@/err9; s=$?; "
            "sed 's/only [0-9]*/only N/; s/jobs [0-9]*/jobs N/; s/N: .*;/N;/' @/err9 >&2; exit $s",
            1, "cannot start 9999 runs at a time, only N; try --jobs N");
+  cli_good ("{ echo 'pinwheel: 1'; yes '# größer' | head -n 20000; echo 'odd: 1'; } >@/far.yaml");
+  assert_int_equal (cli_run ("pinwheel show @/far.yaml"), 2); /* libfyaml counts offsets modulo 65536 */
+  assert_non_null (strstr (cli_err, "far.yaml:20002:1: error: a model has no \"odd\""));
   cli_good ("rm @/*.yaml @/line.csv");
 }
 

@@ -21,23 +21,27 @@ typedef struct {
   double marks, opened; /* indicators in it; brackets that open, less those that close */
   int nested;           /* 1: there were too many brackets */
   int far;              /* 1: there was too much of it */
-  int line;             /* number, from 0, and */
-  size_t line_at;       /* offset of the line of the last mark */
+  int line, column;     /* of the last mark, from 0, and */
+  size_t mark_at;       /* its offset */
   unsigned at;          /* of the last node, for what has no place of its own */
 } tree;
 
-/* The offset of a mark.  libfyaml 0.7.12 counts it modulo 2^16 when it is fed, columns in characters: the offset is the
- * first one with that remainder that is not before the column. */
+/* The offset of a mark, from its line and its column, in characters: offsets of libfyaml 0.7.12 mean nothing once it is
+ * fed.  Marks come in order, or nearly so. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
-  const char *source = x->y->source, *end = source + x->y->size, *p = source + x->line_at;
-  for (; x->line < mark->line && p < end; p++) x->line += *p == '\n';
-  for (; x->line > mark->line && p > source; x->line--) do
-      p--;
-    while (p > source && p[-1] != '\n');
-  x->line_at = (size_t)(p - source);
-  size_t at = x->line_at + (size_t)mark->column;
-  at += (mark->input_pos - at) & 0xffff;
-  return (unsigned)(at < x->y->size ? at : x->y->size);
+  static const char sign[] = "\xEF\xBB\xBF"; /* of UTF-8, which is no column */
+  const char *source = x->y->source, *end = source + x->y->size, *p = source + x->mark_at;
+  if (x->line != mark->line) {
+    for (; x->line < mark->line && p < end; p++) x->line += *p == '\n';
+    for (; p > source && (x->line > mark->line || p[-1] != '\n'); p--) x->line -= p[-1] == '\n';
+    x->column = 0;
+  }
+  if (p == source && strncmp (p, sign, 3) == 0) p += 3;
+  for (; x->column < mark->column && p < end; x->column++) p += pw_utf8_size (p);
+  for (; x->column > mark->column && p > source; x->column--)
+    for (p--; p > source && (*p & 0xC0) == 0x80;) p--;
+  x->mark_at = (size_t)(p - source);
+  return (unsigned)x->mark_at;
 }
 
 static unsigned tree_place (tree *x, struct fy_event *e) {
