@@ -235,7 +235,7 @@ static void test_interrupted (void **state) {
   char command[1000];
   snprintf (
       command, sizeof command,
-      "timeout --preserve-status -s INT 0.3 '%s' run ezyroller --t-end 1e9 --every 1 -o @/stop.csv --json @/stop.json",
+      "timeout --preserve-status -s INT 0.3 '%s' run ezyroller --t-end 1e9 --every 10 -o @/stop.csv --json @/stop.json",
       program ? program : "build/pinwheel");
   assert_int_equal (cli_run (command), 130);
   assert_non_null (strstr (cli_err, "interrupted at t = "));

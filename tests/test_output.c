@@ -308,8 +308,8 @@ static void test_forged (void **state) {
   output_forge (0, NAN);
   output_forge (0, -0.25);
   output_forge (0, 0.75);
-  output_forge (10, NAN);      /* the first coordinate */
-  output_forge (12, INFINITY); /* the third */
+  output_forge (14, NAN); /* coordinates */
+  output_forge (16, INFINITY);
 }
 
 /* ---- The process ---- */
