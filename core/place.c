@@ -11,15 +11,6 @@ static void place_own (pw_system *s, const double *q, const double *v) {
   }
 }
 
-void pw_place_rates (pw_system *s, const double *v) {
-  for (pw_pose *p = s->pose, *end = p + s->bodies; p < end; p++, v += 3) {
-    p->vx = v[0];
-    p->vy = v[1];
-    p->omega = v[2];
-  }
-  if (s->coords > 3 * s->bodies) place_own (s, NULL, v - 3 * s->bodies);
-}
-
 static inline void place_poses (pw_system *s, const double *q, const double *v) {
   if (s->coords > 3 * s->bodies) place_own (s, q, v);
   for (pw_pose *p = s->pose, *end = p + s->bodies; p < end; p++, q += 3, v += 3) {
@@ -28,19 +19,23 @@ static inline void place_poses (pw_system *s, const double *q, const double *v) 
   }
 }
 
-/* The states a function reads. */
-static void place_reads (const pw_system *s, const pw_source *source, const double *q, const double *v) {
+/* The states a function reads; q NULL: positions stay as they were.  Returns how many were taken. */
+static int place_reads (const pw_system *s, const pw_source *source, const double *q, const double *v) {
+  int taken = 0;
   for (int r = 0; r < source->reads; r++) {
-    int j = source->state[r];
-    source->x[r] = j < s->coords ? q[j] : v[j - s->coords];
+    int j = source->state[r], velocity = j >= s->coords;
+    if (q == NULL && !velocity) continue;
+    source->x[r] = velocity ? v[j - s->coords] : q[j];
+    taken++;
   }
+  return taken;
 }
 
-/* Evaluates the signals that read states, or those of time alone. */
+/* Evaluates the signals that read states, of these only those of velocities if q is NULL; or those of time alone. */
 static int place_sources (pw_system *s, int readers, double t, const double *q, const double *v) {
   for (pw_source *i = s->source, *end = i + s->sources; i < end; i++) {
     if ((i->reads > 0) != readers || (s->hold && i->forced)) continue;
-    if (readers) place_reads (s, i, q, v);
+    if (readers && place_reads (s, i, q, v) == 0) continue;
     if (pw_signal_eval (i, t, !i->forced, i->u) == 0) continue;
     s->failed = i;
     return PW_METHOD;
@@ -61,6 +56,17 @@ static int place_signals (pw_system *s, double t, const double *q, const double 
 int pw_place (pw_system *s, double t, const double *q, const double *v) {
   place_poses (s, q, v);
   return t == s->t_signal && s->readers == 0 ? PW_OK : place_signals (s, t, q, v);
+}
+
+int pw_place_rates (pw_system *s, const double *v) {
+  const double *from = v;
+  for (pw_pose *p = s->pose, *end = p + s->bodies; p < end; p++, from += 3) {
+    p->vx = from[0];
+    p->vy = from[1];
+    p->omega = from[2];
+  }
+  if (s->coords > 3 * s->bodies) place_own (s, NULL, v);
+  return s->readers > 0 ? place_sources (s, 1, s->t_signal, NULL, v) : PW_OK;
 }
 
 void pw_hold (pw_system *s, int hold) {

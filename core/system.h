@@ -92,8 +92,8 @@ static inline double pw_larger (double a, double b) {
 /* ---- Placing: poses and signals for one (t, q, v), on which all sweeps below work ---- */
 
 int pw_place (pw_system *s, double t, const double *q, const double *v);
-/* New rates at unchanged time and positions. */
-void pw_place_rates (pw_system *s, const double *v);
+/* New velocities at unchanged time and positions; signals that read velocities are evaluated anew.  Returns as pw_place. */
+int pw_place_rates (pw_system *s, const double *v);
 
 /* 1: the signals of forces keep the values of the last placed time; 0: they follow the time again. */
 void pw_hold (pw_system *s, int hold);

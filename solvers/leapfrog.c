@@ -92,11 +92,12 @@ static int leapfrog_factor (pw_run *r, double t, const double *q, const double *
   return status;
 }
 
-/* One correction of v' for forces that have changed since the last one, which d->f holds. */
-static void leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
+/* One correction of v' for forces that have changed since the last one, which d->f holds.  PW_METHOD if a signal failed. */
+static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
   pw_system *s = r->s;
-  pw_place_rates (s, d->v1);
+  int status = pw_place_rates (s, d->v1);
+  if (status != PW_OK) return status;
   pw_sweep_force (s, d->middle);
   for (int j = 0; j < s->coords; j++) {
     double f = d->middle[j];
@@ -112,6 +113,7 @@ static void leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
     d->v1[j] += d->dv[j];
     leapfrog_measure (p, d->dv[j], d->u[j], pw_unit (s, j) / s->scale.time);
   }
+  return PW_OK;
 }
 
 static int leapfrog_finish (pw_run *r, double h, double t1) {
@@ -122,12 +124,12 @@ static int leapfrog_finish (pw_run *r, double h, double t1) {
   memcpy (d->v1, d->u, (size_t)r->s->coords * sizeof *d->v1);
   memset (d->f, 0, (size_t)r->s->coords * sizeof *d->f);
   for (int good = 0; !good;) {
-    leapfrog_kick (r, h, &p);
+    status = leapfrog_kick (r, h, &p);
+    if (status != PW_OK) return status;
     good = p.done < LEAPFROG_MOST ? pw_leapfrog_judge (&p) : -1;
     if (good < 0) return PW_RETRY;
   }
-  pw_place_rates (r->s, d->v1);
-  return PW_OK;
+  return pw_place_rates (r->s, d->v1);
 }
 
 /* ---- Advancing ---- */

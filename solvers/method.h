@@ -228,7 +228,8 @@ void pw_projector_close (pw_projector *p);
  * swept.  PW_RETRY if it does not converge; *row then tells the worst constraint and *worst its residual. */
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst);
 
-/* One linear solve for J v = eta at the placed pose; the rates are placed.  PW_RETRY if singular. */
+/* One linear solve for J v = eta at the placed pose; the rates are placed.  PW_RETRY if singular; PW_METHOD if a signal of
+ * them failed. */
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
 
 /* Both, and then accelerations and multipliers of the state reached, with the run's saddle factorised there.  Rates that obey

@@ -252,8 +252,7 @@ static int nullspace_correct (pw_nullspace *b, pw_system *s, double *v) {
   for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
     for (const pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
       for (int c = 0; c < p->width; c++) v[p->j + c] += x->reference[c] * b->mu[x->row];
-  pw_place_rates (s, v);
-  return PW_OK;
+  return pw_place_rates (s, v);
 }
 
 int pw_nullspace_rates (pw_nullspace *b, pw_run *r, double t, const double *q, double *v) {

@@ -131,8 +131,7 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   r->statistics.factorisations++;
   if (project_once (p, r->s, v, 1) != PW_OK) return PW_RETRY;
   if (pw_saddle_below (p->velocity, r->limits.refine)) project_once (p, r->s, v, 0);
-  pw_place_rates (r->s, v);
-  return PW_OK;
+  return pw_place_rates (r->s, v);
 }
 
 /* 1 if the placed rates need no correction, with J swept: they obey J v = eta to round-off.  Near a singular pose that does

@@ -53,15 +53,16 @@ static int start_positions (pw_projector *p, pw_run *r, double *q, const double 
   return status;
 }
 
-/* Repeats the linear solve once, which removes the round-off of a large first correction. */
+/* At placed positions and rates.  Repeats the linear solve once, which removes the round-off of a large first correction. */
 static int start_rates (pw_projector *p, pw_run *r, double *v, start_trouble *trouble) {
   pw_residuals now;
   for (int i = 0; i < 3; i++) {
-    pw_place_rates (r->s, v);
     pw_sweep_residuals (r->s, NULL, &now);
     if (now.velocity <= 4 * DBL_EPSILON) return PW_OK;
     if (i == 2) break;
-    if (pw_project_velocities (p, r, v) != PW_OK) break;
+    int status = pw_project_velocities (p, r, v);
+    if (status < 0) return status;
+    if (status != PW_OK) break;
   }
   if (now.velocity <= 64 * DBL_EPSILON) return PW_OK;
   *trouble = (start_trouble){ now.row_velocity, 1, now.jv, 1 };
@@ -273,5 +274,6 @@ int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
     status = start_try (r, held, &trouble, &freed, error);
   start_report (r, freed, &before);
   if (status == PW_OK) status = start_locked (r, error);
+  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   return status == PW_RETRY ? start_fail (r, &trouble, error) : status;
 }

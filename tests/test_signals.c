@@ -84,10 +84,47 @@ static void test_reads (void **state) {
   q[5] = 0.8;
   assert_int_equal (pw_place (s, 2, q, v), PW_OK);
   assert_true (c.calls == 2 && c.x[0] == 0.8); /* another state at the same time */
+  v[0] = 1.3, q[5] = 0.9;
+  assert_int_equal (pw_place_rates (s, v), PW_OK);
+  assert_true (c.calls == 3 && c.t == 2 && c.x[0] == 0.8 && c.x[1] == 1.3); /* other velocities there */
+  pw_sweep_force (s, f);
+  assert_true (f[2] == 2 + 2 * 0.8 + 3 * 1.3);
+  c.fails = 1;
+  assert_int_equal (pw_place_rates (s, v), PW_METHOD);
+  c.fails = 0;
   assert_true (pw_next_breakpoint (s, 0, 0) == 3 && isinf (pw_next_breakpoint (s, 0, 3)));
   c.fails = 1;
   assert_int_equal (pw_place (s, 2.5, q, v), PW_METHOD);
   pw_free (s);
+}
+
+static int signals_of_angle (void *context, double t, const double *x, double value[3], double *gradient) {
+  signals_context *c = context;
+  (void)t, (void)gradient;
+  c->calls++;
+  value[0] = x[0];
+  return 0;
+}
+
+/* New velocities leave alone what reads none, and what is held. */
+static void test_rates_spare (void **state) {
+  static const char *const reads[][2] = { { "steer.phi", NULL }, { "steer.omega", NULL } };
+  (void)state;
+  for (int velocity = 0; velocity < 2; velocity++) {
+    signals_context c = { 0 };
+    pw_signal torque = { PW_FUNCTION,
+                         .function = { .eval = signals_of_angle, .context = &c, .reads = reads[velocity] } };
+    pw_system *s = signals_scene (&torque);
+    double q[6] = { 0 }, v[6] = { 0 };
+    assert_int_equal (pw_place (s, 2, q, v), PW_OK);
+    assert_int_equal (pw_place_rates (s, v), PW_OK);
+    assert_int_equal (c.calls, 1 + velocity);
+    pw_hold (s, 1);
+    assert_int_equal (pw_place (s, 3, q, v), PW_OK);
+    assert_int_equal (pw_place_rates (s, v), PW_OK);
+    assert_int_equal (c.calls, 1 + velocity);
+    pw_free (s);
+  }
 }
 
 /* Stages at the same time share the value of a signal of time alone; a held signal is not evaluated at all. */
@@ -153,8 +190,8 @@ static void test_drive (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_constant),         cmocka_unit_test (test_harmonic), cmocka_unit_test (test_reads),
-    cmocka_unit_test (test_sharing_and_hold), cmocka_unit_test (test_drive),
+    cmocka_unit_test (test_constant),    cmocka_unit_test (test_harmonic),         cmocka_unit_test (test_reads),
+    cmocka_unit_test (test_rates_spare), cmocka_unit_test (test_sharing_and_hold), cmocka_unit_test (test_drive),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
