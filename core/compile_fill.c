@@ -182,14 +182,26 @@ static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools
   return compile_signals (c, s, pools, error);
 }
 
+/* 1 if an element may do work: it has power, or moves a constraint.  A position that is prescribed by constants rests. */
+static int compile_works (const pw_slab *k, int element) {
+  const pw_kind *kind = k->kind;
+  int constants = 0;
+  if (kind->power) return 1;
+  if (kind->rows == 0 || kind->eta == NULL) return 0;
+  for (int u = 0; u < kind->signals; u++)
+    constants += k->source[element * kind->signals + u].signal.type == PW_CONSTANT;
+  return kind->level != PW_HOLONOMIC || constants < kind->signals;
+}
+
 static void compile_entries (pw_system *s) {
   pw_entry *entry = s->entry;
   for (int i = 0; i < s->slabs; i++) {
-    const pw_kind *k = s->slab[i].kind;
-    for (int e = 0; (k->power || (k->rows > 0 && k->eta)) && e < s->slab[i].b.count; e++)
-      *entry++ = (pw_entry){ i, e, PW_WORK };
-    for (int e = 0; k->loss && e < s->slab[i].b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
+    const pw_slab *k = &s->slab[i];
+    for (int e = 0; e < k->b.count; e++)
+      if (compile_works (k, e)) *entry++ = (pw_entry){ i, e, PW_WORK };
+    for (int e = 0; k->kind->loss && e < k->b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
   }
+  s->entries = (int)(entry - s->entry);
 }
 
 /* The values given from outside. */

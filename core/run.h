@@ -18,7 +18,7 @@ typedef struct {
   double step; /* fixed-step methods: step size [s]; default 1e-3 */
   double rtol; /* adaptive methods: relative tolerance; default 1e-6 */
   double atol; /* absolute tolerance of every state; default rtol x (L, 1 rad, L/T, 1/T), see pw_scale */
-  int ledger;  /* 1: keep account of work, losses and the energy balance */
+  int ledger;  /* 1: samples have the ledger's entries, and the energy that projections add is counted */
 
   /* What ends a run that would take too long. */
   long max_steps; /* adaptive methods: attempted steps, rejected ones included; default PW_MAX_STEPS */
@@ -58,10 +58,10 @@ typedef struct {
   double velocity;      /* scaled residual of J v = eta here */
   double kinetic;       /* [J] */
   double potential;     /* [J] */
-  const double *ledger; /* work or loss of each entry of the ledger [J]: pw_count_ledger; NULL if not kept */
+  const double *ledger; /* work or loss of each entry of the ledger [J]: pw_count_ledger; NULL if not asked for */
   double work;          /* fed in by active elements and drives since the start [J] */
   double loss;          /* dissipated [J] */
-  double projection;    /* energy added by projections [J] */
+  double projection;    /* energy added by projections behind steps [J]; 0 without pw_settings.ledger */
   double balance;       /* (kinetic + potential) - at the start - work + loss - projection [J] */
 } pw_sample;
 

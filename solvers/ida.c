@@ -23,20 +23,6 @@ static int ida_multipliers (const ida_data *d, const double *v, double *a, doubl
   return status;
 }
 
-/* Rates of the ledger's entries. */
-static int ida_work (pw_real t, N_Vector vy, N_Vector vyp, N_Vector rate, void *user) {
-  ida_data *d = user;
-  const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
-  const double *lambda = pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp), d->rows, d->tangent.lambda);
-  if (pw_ida_place (d, t, y) != 0) return -1;
-  if (!d->form.rates) {
-    if (ida_multipliers (d, y + d->n, d->given, d->tangent.mu) < 0) return -1;
-    lambda = d->tangent.mu;
-  }
-  pw_sweep_ledger (d->run->s, lambda, N_VGetArrayPointer (rate));
-  return 0;
-}
-
 /* The coefficient c of the current step, 1 / h before there is one; not below 1 / T. */
 static double ida_leading (const ida_data *d) {
   pw_real c = 0;
@@ -86,11 +72,7 @@ static int ida_weights (N_Vector vy, N_Vector weights, void *user) {
   return 0;
 }
 
-/* ---- Opening ---- */
-
-static int ida_no_memory (const pw_run *r, pw_error *error) {
-  return pw_fail (error, PW_MACHINE, "model %s: out of memory in ida", r->s->model);
-}
+/* ---- Inside the last step ---- */
 
 static void ida_fill_vectors (ida_data *d) {
   const pw_run *r = d->run;
@@ -107,24 +89,83 @@ static void ida_fill_vectors (ida_data *d) {
   memcpy (yp + n, r->a, n * sizeof *y);
 }
 
+/* Reads (q, v, a, lambda) out of y and y'. */
+static void ida_read (const ida_data *d, double *q, double *v, double *a, double *lambda) {
+  size_t n = (size_t)d->n;
+  const double *y = N_VGetArrayPointer (d->y), *yp = N_VGetArrayPointer (d->yp);
+  memcpy (q, y, n * sizeof *q);
+  memcpy (v, y + n, n * sizeof *v);
+  memcpy (a, yp + n, n * sizeof *a);
+  for (int i = 0; i < d->run->s->rows; i++) lambda[i] = 0;
+  const double *used = pw_ida_lambda (d, y, yp);
+  for (int i = 0; i < d->rows; i++) lambda[d->tangent.map ? d->tangent.row[i] : i] = used[i];
+}
+
+/* The state at t, into the sample arrays, where the system is placed.  Accelerations and multipliers are those that go with
+ * it, rather than the last iterate's: IDA's error test does not see them.  In a singular pose those of IDA stay.  Returns a
+ * flag of IDA's. */
+static int ida_interpolate (ida_data *d, double t) {
+  pw_run *r = d->run;
+  int flag = t > r->t ? IDA_BAD_T : IDA_SUCCESS;
+  if (t == d->begun && t == r->t)
+    ida_fill_vectors (d);
+  else {
+    if (flag == IDA_SUCCESS) flag = IDAGetDky (d->ida, t, 1, d->yp);
+    if (flag == IDA_SUCCESS) flag = IDAGetDky (d->ida, t, 0, d->y);
+  }
+  if (flag != IDA_SUCCESS) return flag;
+  ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
+  if (pw_ida_place (d, t, N_VGetArrayPointer (d->y)) != 0) return IDA_RES_FAIL;
+  pw_statistics keep = r->statistics;
+  if (pw_saddle_factor (r->saddle) == PW_OK) pw_accelerate_placed (r, r->v_at, r->a_at, r->lambda_at);
+  r->statistics = keep;
+  return IDA_SUCCESS;
+}
+
+/* ---- Work and losses ---- */
+
+static int ida_power (pw_run *r, double t, double *rate) {
+  int flag = ida_interpolate (r->data, t);
+  if (flag == IDA_SUCCESS) pw_sweep_ledger (r->s, r->lambda_at, rate);
+  return flag == IDA_SUCCESS ? PW_OK : PW_RETRY;
+}
+
+/* Work and losses up to the state reached, where the saddle is factorised if `status` says so.  Multipliers that the error
+ * test has not seen are not good enough for them.  0, or -1 if a signal failed. */
+static int ida_work (ida_data *d, int status) {
+  pw_run *r = d->run;
+  int order = 1;
+  const double *lambda = r->lambda;
+  if (status == PW_OK && d->form.rates && pw_ledger_reacts (r->s)) {
+    pw_accelerate_placed (r, r->v, r->a_at, r->lambda_at);
+    lambda = r->lambda_at;
+  }
+  pw_sweep_ledger (r->s, lambda, r->rate);
+  IDAGetLastOrder (d->ida, &order);
+  if (!pw_quadrature_step (&d->quadrature, r, order)) return 0;
+  memcpy (N_VGetArrayPointer (d->y), r->q, (size_t)d->n * sizeof (double));
+  memcpy (N_VGetArrayPointer (d->y) + d->n, r->v, (size_t)d->n * sizeof (double));
+  return pw_ida_place (d, r->t, N_VGetArrayPointer (d->y));
+}
+
+/* ---- Opening ---- */
+
+static int ida_no_memory (const pw_run *r, pw_error *error) {
+  return pw_fail (error, PW_MACHINE, "model %s: out of memory in ida", r->s->model);
+}
+
 static int ida_open_vectors (ida_data *d) {
   const pw_system *s = d->run->s;
   if (pw_sun_open (&d->context, d->size) != PW_OK) return PW_MACHINE;
   d->y = pw_sun_vector (d->size, d->context);
   d->yp = pw_sun_vector (d->size, d->context);
   d->id = pw_sun_vector (d->size, d->context);
-  d->work = pw_sun_vector (s->entries + 1, d->context);
-  d->work0 = pw_sun_vector (s->entries + 1, d->context);
   d->scale = calloc ((size_t)(3 * d->n + 6 + 3 * s->rows), sizeof *d->scale);
-  if (!d->y || !d->yp || !d->id || !d->work || !d->work0 || !d->scale) return PW_MACHINE;
+  if (!d->y || !d->yp || !d->id || !d->scale) return PW_MACHINE;
   d->given = d->scale + d->n;
   d->lever = d->given + 2 * d->n + 6 + 2 * s->rows;
   for (int i = 0; i < d->rows; i++) d->lever[i] = pw_rank_size (s, d->tangent.map ? d->tangent.row[i] : i);
   for (int j = 0; j < d->n; j++) d->scale[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
-  N_VConst (0, d->work);
-  N_VConst (0, d->work0);
-  memcpy (N_VGetArrayPointer (d->work), d->run->ledger, (size_t)s->entries * sizeof (double));
-  memcpy (N_VGetArrayPointer (d->work0), d->run->ledger, (size_t)s->entries * sizeof (double));
   ida_fill_vectors (d);
   return PW_OK;
 }
@@ -185,10 +226,6 @@ static int ida_open_solver (ida_data *d) {
     if (flag == IDA_SUCCESS) flag = IDASetNonlinearSolver (d->ida, d->newton);
     if (flag == IDA_SUCCESS) flag = pw_sun_test_newton (d->newton, &d->correction);
   }
-  if (r->settings.ledger && r->s->entries > 0) {
-    if (flag == IDA_SUCCESS) flag = IDAQuadInit (d->ida, ida_work, d->work0);
-    if (flag == IDA_SUCCESS) flag = IDASetQuadErrCon (d->ida, 0);
-  }
   return flag == 0 ? PW_OK : PW_MACHINE;
 }
 
@@ -206,7 +243,8 @@ static int ida_open (pw_run *r, pw_error *error) {
   d->stop = NAN;
   d->begun = r->t;
   if (r->statistics.steps > 0) d->before = r->statistics;
-  if (ida_open_vectors (d) != PW_OK || pw_ida_open_matrix (d) != PW_OK || ida_open_solver (d) != PW_OK)
+  if (ida_open_vectors (d) != PW_OK || pw_ida_open_matrix (d) != PW_OK || ida_open_solver (d) != PW_OK ||
+      pw_quadrature_open (&d->quadrature, r, ida_power) != PW_OK)
     return ida_no_memory (r, error);
   return PW_OK;
 }
@@ -218,11 +256,12 @@ static void ida_close (pw_run *r) {
   if (d->klu) SUNLinSolFree (d->klu);
   if (d->newton) SUNNonlinSolFree (d->newton);
   if (d->matrix) SUNMatDestroy (d->matrix);
-  N_Vector const vector[] = { d->y, d->yp, d->id, d->work, d->work0 };
+  N_Vector const vector[] = { d->y, d->yp, d->id };
   for (size_t i = 0; i < sizeof vector / sizeof *vector; i++)
     if (vector[i]) N_VDestroy (vector[i]);
   if (d->context) SUNContext_Free (&d->context);
   pw_tangent_close (&d->tangent);
+  pw_quadrature_close (&d->quadrature);
   free (d->scale);
   free (d);
 }
@@ -244,18 +283,6 @@ static void ida_statistics (ida_data *d) {
   s->rhs = before->rhs + now.rhs;
   s->jacobians = before->jacobians + now.jacobians;
   s->factorisations = before->factorisations + now.factorisations;
-}
-
-/* Reads (q, v, a, lambda) out of y and y'. */
-static void ida_read (const ida_data *d, double *q, double *v, double *a, double *lambda) {
-  size_t n = (size_t)d->n;
-  const double *y = N_VGetArrayPointer (d->y), *yp = N_VGetArrayPointer (d->yp);
-  memcpy (q, y, n * sizeof *q);
-  memcpy (v, y + n, n * sizeof *v);
-  memcpy (a, yp + n, n * sizeof *a);
-  for (int i = 0; i < d->run->s->rows; i++) lambda[i] = 0;
-  const double *used = pw_ida_lambda (d, y, yp);
-  for (int i = 0; i < d->rows; i++) lambda[d->tangent.map ? d->tangent.row[i] : i] = used[i];
 }
 
 static int ida_fail (ida_data *d, int flag, pw_error *error) {
@@ -299,45 +326,24 @@ static int ida_advance (pw_run *r, double t_end, pw_error *error) {
   int status = ida_multipliers (d, r->v, r->a_at, r->lambda);
   if (status < 0) return ida_fail (d, IDA_RES_FAIL, error);
   r->near = status != PW_OK || pw_watchdog_near (r);
+  if (r->s->entries > 0 && ida_work (d, status) != 0) return ida_fail (d, IDA_RES_FAIL, error);
   ida_statistics (d);
   return PW_OK;
 }
 
-/* Accelerations and multipliers of a sample are those that go with its state, rather than the last iterate's: IDA's error
- * test does not see them.  In a singular pose those of IDA stay. */
 static int ida_at (pw_run *r, double t, pw_error *error) {
   ida_data *d = r->data;
-  const double *work = N_VGetArrayPointer (d->work);
-  int flag = IDA_SUCCESS;
-  if (t > r->t) flag = IDA_BAD_T;
-  if (t == d->begun && t == r->t)
-    ida_fill_vectors (d);
-  else if (flag == IDA_SUCCESS) {
-    flag = IDAGetDky (d->ida, t, 1, d->yp);
-    if (flag == IDA_SUCCESS) flag = IDAGetDky (d->ida, t, 0, d->y);
-    if (flag == IDA_SUCCESS && r->settings.ledger && r->s->entries > 0) flag = IDAGetQuadDky (d->ida, t, 0, d->work);
-  }
+  if (t <= r->t && r->s->entries > 0) pw_quadrature_at (&d->quadrature, r, t);
+  int flag = ida_interpolate (d, t);
   if (flag == IDA_BAD_T) return pw_fail_outside (r, NAN, t, error);
-  if (flag != IDA_SUCCESS) return ida_fail (d, flag, error);
-  ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
-  for (int i = 0; i < r->s->entries; i++) r->ledger_at[i] = work[i];
-  if (pw_ida_place (d, t, N_VGetArrayPointer (d->y)) != 0)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
-  pw_statistics keep = r->statistics;
-  if (pw_saddle_factor (r->saddle) == PW_OK) pw_accelerate_placed (r, r->v_at, r->a_at, r->lambda_at);
-  r->statistics = keep;
-  return PW_OK;
+  if (flag == IDA_RES_FAIL) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  return flag == IDA_SUCCESS ? PW_OK : ida_fail (d, flag, error);
 }
 
 static int ida_restart (pw_run *r, pw_error *error) {
   ida_data *d = r->data;
   int flag = IDA_SUCCESS;
-  if (r->settings.ledger && r->s->entries > 0) {
-    double t, *work0 = N_VGetArrayPointer (d->work0);
-    flag = IDAGetQuad (d->ida, &t, d->work0);
-    memcpy (N_VGetArrayPointer (d->work), work0, (size_t)r->s->entries * sizeof *work0);
-    if (flag == IDA_SUCCESS) flag = IDAQuadReInit (d->ida, d->work0);
-  }
+  pw_quadrature_restart (&d->quadrature, r);
   ida_fill_vectors (d);
   d->stop = NAN;
   d->begun = r->t;

@@ -2,7 +2,7 @@
 #ifndef PW_IDA_STATE_H
 #define PW_IDA_STATE_H
 
-#include "method.h"
+#include "quadrature.h"
 #include "sundials.h"
 #include "tangent.h"
 
@@ -20,7 +20,8 @@ struct pw_method_data {
   int n, rows, positions, size; /* coordinates, rows in use, of these those with mu, unknowns */
   SUNContext context;
   void *ida;
-  N_Vector y, yp, id, work, work0;
+  N_Vector y, yp, id;
+  pw_quadrature quadrature; /* of work and losses */
   SUNMatrix matrix;
   SUNLinearSolver klu, solver; /* KLU on the matrix; what IDA sees */
   SUNNonlinearSolver newton;   /* where a force saturates */

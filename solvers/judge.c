@@ -1,5 +1,5 @@
 /* Whether what a method has reached is still this mechanism's motion: constraints that are lost or contradict each other,
- * a jump to another branch at a singular pose, energy that comes from nowhere. */
+ * a jump to another branch at a singular pose. */
 #include <stdio.h>
 #include "method.h"
 
@@ -109,13 +109,4 @@ int pw_run_judge (pw_run *r, pw_error *error) {
   if (r->redundant && judge_contradicts (r)) return judge_lost (r, error);
   int status = pw_watchdog_follow (r, error);
   return status == PW_OK ? judge_outburst (r, error) : status;
-}
-
-double pw_unbalanced (const pw_run *r, const pw_sample *sample) {
-  const pw_system *s = r->s;
-  double off = sample->balance, size = fmax (sample->kinetic, fmax (fabs (sample->work), sample->loss)), scene = 0;
-  if (!r->settings.ledger) off = s->entries == 0 ? sample->kinetic + sample->potential - r->energy0 : NAN;
-  for (int j = 0; j < s->coords; j++) scene += 0.5 * s->mass[j] * pw_unit (s, j) * pw_unit (s, j);
-  size = fmax (size, scene / (s->scale.time * s->scale.time));
-  return size > 0 ? fabs (off) / size : NAN;
 }

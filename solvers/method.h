@@ -42,7 +42,7 @@ struct pw_run {
   double *lambda;    /* rows; one block, from q on */
   double *ledger;    /* entries: work and losses up to t */
   double *rate;      /* entries: their rates at t */
-  double projected;  /* energy added by projections up to t */
+  double projected;  /* energy added by projections up to t; only counted with settings.ledger */
 
   /* the state asked for by pw_at */
   double t_at;
@@ -55,8 +55,12 @@ struct pw_run {
       mark; /* time since the start at which speeds were looked at, doubled each time [s]; the largest there */
   double earlier, speed; /* the same of the time before */
 
-  double energy0;                      /* kinetic + potential at the start */
-  double *scratch;                     /* 2 (coords + 3) + 3 rows */
+  double energy0, potential0; /* kinetic + potential at the start; potential */
+  double exchanged;           /* the largest kinetic energy so far, or change of the potential (ledger.c) */
+  double power;               /* the largest sum of the ledger's rates so far */
+  double
+      energy_scene; /* kinetic energy at the velocities L and 1 rad per span; of a massless scene what stands for it */
+  double *scratch;  /* 2 (coords + 3) + 3 rows */
   double *saturation;                  /* 2 coords: tolerances are not above; INFINITY: any */
   double *matrix_state, *matrix_range; /* 2 coords: where the Newton matrix was evaluated; how far it serves */
   int outdated;                        /* 1: the state reached is farther */
@@ -168,6 +172,19 @@ int pw_run_attempt (pw_run *r, pw_error *error);
 
 /* After each step: PW_METHOD if the run has led so far away that numbers no longer resolve the scene; marks speeds. */
 int pw_run_resolve (pw_run *r, pw_error *error);
+
+/* ---- Energy (ledger.c) ---- */
+
+/* The energies of the start, which is placed, and takes note of those of the state reached, which is placed. */
+void pw_ledger_begin (pw_run *r);
+void pw_ledger_note (pw_run *r);
+
+/* 1 if work or losses follow from multipliers. */
+int pw_ledger_reacts (const pw_system *s);
+
+/* What a step of size h may leave of error in all work and losses together [J]: rtol times the energy that has been
+ * exchanged so far, at least that of the scene at L per span; not below the round-off of their rates. */
+double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */
 

@@ -31,16 +31,6 @@ static int multistep_rates (pw_real t, N_Vector vy, N_Vector rates, void *data) 
   return flag;
 }
 
-/* Rates of the ledger's entries: no part of the run's cost. */
-static int multistep_work (pw_real t, N_Vector y, N_Vector rate, void *data) {
-  multistep_data *d = data;
-  pw_statistics keep = d->run->statistics;
-  int flag = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
-  d->run->statistics = keep;
-  if (flag == 0) pw_sweep_ledger (d->run->s, d->lambda, N_VGetArrayPointer (rate));
-  return flag;
-}
-
 /* Error weights, by unit. */
 static int multistep_weights (N_Vector vy, N_Vector weights, void *data) {
   const multistep_data *d = data;
@@ -56,16 +46,15 @@ static int multistep_weights (N_Vector vy, N_Vector weights, void *data) {
 
 /* ---- Projection ---- */
 
-/* Projects (t, q, v), and takes note of the energy this adds if there is a ledger.  Returns as pw_project_positions. */
+/* Projects (t, q, v): a part of the step, and of its energy.  Returns as pw_project_positions. */
 static int multistep_project (multistep_data *d, double t, double *q, double *v) {
   pw_run *r = d->run;
   pw_system *s = r->s;
   int row, status = pw_place (s, t, q, v);
   if (status != PW_OK) return status;
-  double worst, before = r->settings.ledger ? pw_kinetic (s, v) + pw_potential (s) : 0;
+  double worst;
   status = pw_project_positions (&d->projector, r, t, q, v, &row, &worst);
   if (status == PW_OK) status = pw_project_velocities (&d->projector, r, v);
-  if (status == PW_OK && r->settings.ledger) d->added = pw_kinetic (s, v) + pw_potential (s) - before;
   return status;
 }
 
@@ -98,15 +87,63 @@ static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real e
   return status == PW_OK ? 0 : status > 0 ? 1 : -1;
 }
 
+/* ---- Accelerations of the state reached, and inside the last step ---- */
+
+/* Accelerations and multipliers of the state reached; no part of the run's cost. */
+static int multistep_settle (multistep_data *d) {
+  pw_run *r = d->run;
+  if (d->settled) return PW_OK;
+  pw_statistics keep = r->statistics;
+  int near = r->near;
+  r->refuse = 0;
+  int status = pw_accelerate (r, pw_before_breakpoint (r, r->t), r->q, r->v, r->a, r->lambda);
+  r->refuse = r->limits.rank;
+  r->statistics = keep;
+  r->near = near;
+  d->settled = status == PW_OK;
+  return status;
+}
+
+/* Of the polynomial's value at t, projected where the method projects, the rest of the sample. */
+static int multistep_complete (multistep_data *d, double t) {
+  pw_run *r = d->run;
+  int status = PW_OK;
+  pw_statistics keep = r->statistics;
+  r->refuse = 0;
+  if (d->projects) status = multistep_project (d, t, r->q_at, r->v_at);
+  if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
+  r->refuse = r->limits.rank;
+  r->statistics = keep;
+  return status;
+}
+
+/* The polynomial's value at t, into the sample arrays.  CV_SUCCESS or CV_BAD_T. */
+static int multistep_interpolate (multistep_data *d, double t) {
+  pw_run *r = d->run;
+  int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->y) : CV_BAD_T;
+  const double *y = N_VGetArrayPointer (d->y);
+  if (flag != CV_SUCCESS) return flag;
+  memcpy (r->q_at, y, (size_t)d->n * sizeof *y);
+  memcpy (r->v_at, y + d->n, (size_t)d->n * sizeof *y);
+  return flag;
+}
+
+static int multistep_power (pw_run *r, double t, double *rate) {
+  int near = r->near, status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
+  if (status == PW_OK) status = multistep_complete (r->data, t);
+  r->near = near;
+  if (status == PW_OK) pw_sweep_ledger (r->s, r->lambda_at, rate);
+  return status;
+}
+
 /* ---- Opening ---- */
 
 static void multistep_fill (multistep_data *d) {
   const pw_run *r = d->run;
-  size_t bytes = (size_t)d->n * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  size_t bytes = (size_t)d->n * sizeof (double);
   double *y = N_VGetArrayPointer (d->y);
   memcpy (y, r->q, bytes);
   memcpy (y + d->n, r->v, bytes);
-  memcpy (N_VGetArrayPointer (d->work0), r->ledger, entries);
   d->stop = NAN;
   d->settled = 1;
   d->begun = r->t;
@@ -124,16 +161,12 @@ static int multistep_open_arrays (multistep_data *d) {
   size_t n = (size_t)d->n + 3;
   if (pw_sun_open (&d->context, 2 * d->n) != PW_OK) return PW_MACHINE;
   d->y = pw_sun_vector (2 * d->n, d->context);
-  d->work = pw_sun_vector (s->entries + 1, d->context);
-  d->work0 = pw_sun_vector (s->entries + 1, d->context);
   d->q = calloc (5 * n + (size_t)s->rows, sizeof *d->q);
-  if (!d->y || !d->work || !d->work0 || !d->q) return PW_MACHINE;
+  if (!d->y || !d->q) return PW_MACHINE;
   d->v = d->q + n, d->a = d->v + n, d->error = d->a + n, d->lambda = d->error + 2 * n;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
   memcpy (d->a, r->a, (size_t)d->n * sizeof *d->a);
   memcpy (d->lambda, r->lambda, (size_t)s->rows * sizeof *d->lambda);
-  N_VConst (0, d->work);
-  N_VConst (0, d->work0);
   multistep_fill (d);
   return PW_OK;
 }
@@ -167,10 +200,6 @@ static int multistep_open_solver (multistep_data *d, int formula) {
     if (flag == CV_SUCCESS) flag = CVodeSetProjFn (d->cvode, multistep_correct);
     if (flag == CV_SUCCESS) flag = CVodeSetProjFrequency (d->cvode, (long)pw_option_value (r, "every"));
   }
-  if (r->settings.ledger && r->s->entries > 0) {
-    if (flag == CV_SUCCESS) flag = CVodeQuadInit (d->cvode, multistep_work, d->work0);
-    if (flag == CV_SUCCESS) flag = CVodeSetQuadErrCon (d->cvode, 0);
-  }
   return flag == 0 ? multistep_open_iteration (d, formula) : PW_MACHINE;
 }
 
@@ -183,7 +212,9 @@ int pw_multistep_open (pw_run *r, int formula, pw_error *error) {
   pw_read_baumgarte (r);
   int status = d->projects ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;
-  if (multistep_open_arrays (d) == PW_OK && multistep_open_solver (d, formula) == PW_OK) return PW_OK;
+  if (multistep_open_arrays (d) == PW_OK && multistep_open_solver (d, formula) == PW_OK &&
+      pw_quadrature_open (&d->quadrature, r, multistep_power) == PW_OK)
+    return PW_OK;
   return multistep_no_memory (r, error);
 }
 
@@ -192,11 +223,10 @@ void pw_multistep_close (pw_run *r) {
   if (d->cvode) CVodeFree (&d->cvode);
   if (d->iteration) SUNNonlinSolFree (d->iteration);
   pw_multistep_close_newton (d);
-  N_Vector const vector[] = { d->y, d->work, d->work0 };
-  for (size_t i = 0; i < sizeof vector / sizeof *vector; i++)
-    if (vector[i]) N_VDestroy (vector[i]);
+  if (d->y) N_VDestroy (d->y);
   if (d->context) SUNContext_Free (&d->context);
   if (d->projects) pw_projector_close (&d->projector);
+  pw_quadrature_close (&d->quadrature);
   free (d->q);
   free (d);
 }
@@ -229,7 +259,6 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
                     : flag == CV_CONV_FAILURE       ? "the iteration does not converge however small the step"
                     : flag == CV_LSETUP_FAIL        ? "the Newton matrix is singular"
                     : flag == CV_RHSFUNC_FAIL       ? "a signal failed"
-                    : flag == CV_QRHSFUNC_FAIL      ? "a signal failed"
                     : flag == CV_PROJFUNC_FAIL      ? "a signal failed"
                     : flag == CV_REPTD_PROJFUNC_ERR ? "the projection does not converge however small the step"
                     : flag == CV_TOO_MUCH_ACC       ? "the tolerance is beyond the accuracy of the machine"
@@ -237,12 +266,37 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", r->t, why, r->settings.rtol);
 }
 
+/* The same where the system is placed, J swept.  In a singular pose multipliers stay those of the last iterate. */
+static void multistep_settle_placed (multistep_data *d) {
+  pw_run *r = d->run;
+  pw_statistics keep = r->statistics;
+  r->refuse = 0;
+  pw_sweep_gamma (r->s, r->lambda);
+  d->settled = pw_accelerate_swept (r, r->v, r->a, r->lambda) == PW_OK;
+  if (!d->settled) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
+  r->refuse = r->limits.rank;
+  r->statistics = keep;
+}
+
+/* Work and losses up to the state reached.  Multipliers of Newton's last iterate, which may be the first, are not good enough
+ * for them. */
+static int multistep_work (multistep_data *d) {
+  pw_run *r = d->run;
+  int order = 1;
+  if (d->newton.klu && pw_ledger_reacts (r->s)) multistep_settle_placed (d);
+  pw_sweep_ledger (r->s, r->lambda, r->rate);
+  CVodeGetLastOrder (d->cvode, &order);
+  if (!pw_quadrature_step (&d->quadrature, r, order)) return PW_OK;
+  int status = pw_place (r->s, pw_before_breakpoint (r, r->t), r->q, r->v);
+  pw_sweep_J (r->s);
+  return status;
+}
+
 /* The state reached, out of y, and the ledger.  Its accelerations are those of the last iterate until they are asked for
  * (multistep_settle): one evaluation in three. */
 static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   pw_run *r = d->run;
   const double *y = N_VGetArrayPointer (d->y);
-  double work;
   memcpy (r->q, y, (size_t)d->n * sizeof *y);
   memcpy (r->v, y + d->n, (size_t)d->n * sizeof *y);
   memcpy (r->a, d->a, (size_t)d->n * sizeof *y);
@@ -254,12 +308,7 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   pw_sweep_J (r->s);
   pw_bound_tolerances (r);
-  if (r->settings.ledger && r->s->entries > 0) {
-    int flag = CVodeGetQuad (d->cvode, &work, d->work);
-    if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
-    memcpy (r->ledger, N_VGetArrayPointer (d->work), (size_t)r->s->entries * sizeof (double));
-  }
-  r->projected += d->added;
+  if (r->s->entries > 0 && multistep_work (d) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   return PW_OK;
 }
 
@@ -269,7 +318,6 @@ int pw_multistep_advance (pw_run *r, double t_end, pw_error *error) {
   int flag = stop != d->stop ? CVodeSetStopTime (d->cvode, stop) : CV_SUCCESS;
   d->stop = stop;
   r->near = 0;
-  d->added = 0;
   if (flag >= 0) flag = CVode (d->cvode, stop, d->y, &t, CV_ONE_STEP);
   if (flag < 0) return multistep_fail (d, flag, error);
   if (flag == CV_TSTOP_RETURN) d->stop = NAN;
@@ -278,36 +326,6 @@ int pw_multistep_advance (pw_run *r, double t_end, pw_error *error) {
 }
 
 /* ---- Looking into the last step ---- */
-
-/* Accelerations and multipliers of the state reached; no part of the run's cost. */
-static int multistep_settle (multistep_data *d) {
-  pw_run *r = d->run;
-  if (d->settled) return PW_OK;
-  pw_statistics keep = r->statistics;
-  int near = r->near;
-  r->refuse = 0;
-  int status = pw_accelerate (r, pw_before_breakpoint (r, r->t), r->q, r->v, r->a, r->lambda);
-  r->refuse = r->limits.rank;
-  r->statistics = keep;
-  r->near = near;
-  d->settled = status == PW_OK;
-  return status;
-}
-
-/* Of the polynomial's value at t, projected where the method projects, the rest of the sample. */
-static int multistep_complete (multistep_data *d, double t) {
-  pw_run *r = d->run;
-  int status = PW_OK;
-  pw_statistics keep = r->statistics;
-  d->added = 0;
-  r->refuse = 0;
-  if (d->projects) status = multistep_project (d, t, r->q_at, r->v_at);
-  if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
-  r->refuse = r->limits.rank;
-  r->projected_at = r->projected + d->added;
-  r->statistics = keep;
-  return status;
-}
 
 static int multistep_at_fails (pw_run *r, int status, double t, pw_error *error) {
   if (status > 0) return pw_fail_singular (r, t, error);
@@ -321,15 +339,10 @@ int pw_multistep_at (pw_run *r, double t, pw_error *error) {
     if (status == PW_OK) pw_show_reached (r);
     return multistep_at_fails (r, status, t, error);
   }
-  int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->y) : CV_BAD_T;
+  if (t < r->t && r->s->entries > 0) pw_quadrature_at (&d->quadrature, r, t);
+  int flag = multistep_interpolate (d, t);
   if (flag == CV_BAD_T) return pw_fail_outside (r, NAN, t, error);
-  if (flag == CV_SUCCESS && r->settings.ledger && r->s->entries > 0) flag = CVodeGetQuadDky (d->cvode, t, 0, d->work);
   if (flag != CV_SUCCESS) return multistep_fail (d, flag, error);
-  const double *y = N_VGetArrayPointer (d->y);
-  memcpy (r->q_at, y, (size_t)d->n * sizeof *y);
-  memcpy (r->v_at, y + d->n, (size_t)d->n * sizeof *y);
-  if (r->settings.ledger && r->s->entries > 0)
-    memcpy (r->ledger_at, N_VGetArrayPointer (d->work), (size_t)r->s->entries * sizeof *y);
   return multistep_at_fails (r, multistep_complete (d, t), t, error);
 }
 
@@ -338,7 +351,7 @@ int pw_multistep_restart (pw_run *r, pw_error *error) {
   multistep_fill (d);
   int flag = CVodeReInit (d->cvode, r->t, d->y);
   if (flag == CV_SUCCESS) flag = CVodeSetInitStep (d->cvode, pw_first_step (r));
-  if (flag == CV_SUCCESS && r->settings.ledger && r->s->entries > 0) flag = CVodeQuadReInit (d->cvode, d->work0);
+  pw_quadrature_restart (&d->quadrature, r);
   if (flag == CV_SUCCESS) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", r->t, pw_sun_reason (&d->said, flag));
 }

@@ -3,6 +3,7 @@
 #define PW_MULTISTEP_STATE_H
 
 #include "multistep.h"
+#include "quadrature.h"
 #include "sundials.h"
 #include "tangent.h"
 
@@ -23,10 +24,10 @@ struct pw_method_data {
   int n; /* coordinates */
   int projects;
   pw_projector projector;
-  double added; /* energy added by the last projection */
   SUNContext context;
   void *cvode;
-  N_Vector y, work, work0;
+  N_Vector y;
+  pw_quadrature quadrature;     /* of work and losses */
   SUNNonlinearSolver iteration; /* Adams; BDF where a force saturates */
   double correction;            /* its last one, of BDF */
   pw_multistep_newton newton;   /* BDF */

@@ -76,10 +76,13 @@ double pw_time (const pw_run *r);
  * state reached is there however a run has stopped; after a stop it may be all there is. */
 int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error);
 
-/* How much energy a sample has too much or too little, absolutely, relative to the largest of its kinetic energy, work and
- * loss and of what the scene has at L / T.  Without a ledger it is known only of scenes that have no entries for one, where
- * what projections add counts too; else NaN. */
+/* How much energy a sample has too much or too little, what projections have added included, relative to the energy that the
+ * run has exchanged: the largest of its kinetic energy, of the change of its potential energy, and of what the scene has
+ * that moves by L and 1 rad in the span of the run.  Where that is nothing, relative to the larger of work and loss. */
 double pw_unbalanced (const pw_run *r, const pw_sample *sample);
+
+/* In words what may help against an energy defect of this size, as pw_unbalanced tells it. */
+const char *pw_energy_advice (const pw_run *r, double defect);
 
 /* How many times faster than L/T (lengths) or 1/T (angles), the scale of the scene at its start, the fastest coordinate has
  * become, if that is more than 1e3 and it grows on; else 0.  *state: which rate; *power: of the time, with which it grows. */

@@ -68,6 +68,7 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
       d->A[i] = pw_take (&l, n, sizeof (double));
       d->R[i] = pw_take (&l, entries, sizeof (double));
     }
+    d->R[d->tableau->stages] = pw_take (&l, entries, sizeof (double)); /* at the new state, for the error */
     d->q = pw_take (&l, 3 * n + (size_t)s->rows, sizeof (double));
     d->q0 = pw_take (&l, 3 * n, sizeof (double));
     d->weight = pw_take (&l, 2 * n, sizeof (double));
@@ -211,7 +212,7 @@ static int rk_stages (pw_run *r, double h) {
     rk_combine (r, d->q, d->V[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
     status = rk_stage (r, t, d->V[i], d->A[i]);
-    if (status == PW_OK && r->settings.ledger) pw_sweep_ledger (s, d->lambda, d->R[i]);
+    if (status == PW_OK) pw_sweep_ledger (s, d->lambda, d->R[i]);
   }
   if (d->held) pw_hold (s, 0);
   return status;
@@ -261,14 +262,12 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   memcpy (d->q0, r->q, pw_rk_block (r, 0));
   memcpy (r->q, d->q, pw_rk_block (r, 1));
   r->t = t1;
-  if (r->settings.ledger) {
-    memcpy (d->ledger0, r->ledger, entries * sizeof (double));
-    memcpy (d->rate0, r->rate, entries * sizeof (double));
-    d->projected0 = r->projected;
-    pw_rk_ledger (r, r->ledger, d->ledger0, h);
-    r->projected += added;
-    pw_sweep_ledger (r->s, r->lambda, r->rate);
-  }
+  memcpy (d->ledger0, r->ledger, entries * sizeof (double));
+  memcpy (d->rate0, r->rate, entries * sizeof (double));
+  d->projected0 = r->projected;
+  pw_rk_ledger (r, r->ledger, d->ledger0, h);
+  r->projected += added;
+  pw_sweep_ledger (r->s, r->lambda, r->rate);
 }
 
 double pw_rk_distance (const pw_run *r) {

@@ -99,18 +99,38 @@ static double adapt_watch (double e6, double e5) {
   return e6 == 0 ? 0 : e6 * sqrt (e6) / (e6 + e5);
 }
 
-/* The error of the step just computed; at most 1 is good. */
-static double adapt_error (pw_run *r, double h, int projected) {
+/* The error of the state of the step just computed, over h. */
+static double adapt_state (pw_run *r, int projected) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
   d->V[b->stages] = d->v, d->A[b->stages] = d->a;
   adapt_weigh (r);
   double e = adapt_one (r, &d->estimate[0], projected);
-  if (b->e3 == NULL) return h * sqrt (e);
+  if (b->e3 == NULL) return sqrt (e);
   double off = adapt_sharpen (e, adapt_one (r, &d->estimate[1], projected));
   double e6 = adapt_whole (r, &d->estimate[2]);
   if (adapt_watch (e6, e) > off) off = fmax (off, adapt_watch (adapt_left (r, e6, projected), e));
-  return h * off;
+  return off;
+}
+
+/* The same of work and losses, which no projection changes. */
+static double adapt_ledger (pw_run *r, double h) {
+  struct pw_method_data *d = r->data;
+  const pw_tableau *b = d->tableau;
+  double e[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h);
+  pw_sweep_ledger (r->s, d->lambda, d->R[b->stages]);
+  for (int k = 0; k < (b->e3 ? 3 : 1); k++) {
+    adapt_estimate (&d->estimate[k], d->R, r->s->entries, r->ledger_at);
+    for (int i = 0; i < r->s->entries; i++) e[k] += r->ledger_at[i] * r->ledger_at[i] / (tolerance * tolerance);
+  }
+  double off = b->e3 ? fmax (adapt_sharpen (e[0], e[1]), adapt_watch (e[2], e[0])) : sqrt (e[0]);
+  return isfinite (off) ? off : 0;
+}
+
+/* The error of the step just computed; at most 1 is good.  Of a state that is not, work and losses tell nothing. */
+static double adapt_error (pw_run *r, double h, int projected) {
+  double state = h * adapt_state (r, projected);
+  return r->s->entries > 0 && state <= 1 ? fmax (state, h * adapt_ledger (r, h)) : state;
 }
 
 /* Root mean square of the changes of those accelerations whose velocity, at one of the stages, is farther from the beginning

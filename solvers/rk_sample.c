@@ -26,7 +26,7 @@ static int sample_step (pw_run *r, const sample_begin *from, double t, int *near
   int status = pw_rk_step (r, h, t, d->projects, r->settings.ledger ? &added : NULL);
   *near = r->near;
   *r = reached;
-  if (r->settings.ledger) pw_rk_ledger (r, r->ledger_at, from->ledger, h);
+  pw_rk_ledger (r, r->ledger_at, from->ledger, h);
   r->projected_at = from->projected + added;
   return status;
 }
@@ -38,10 +38,8 @@ static int sample_two_parts (pw_run *r, const sample_begin *from, double by, dou
   if (status != PW_OK) return status;
   const sample_begin middle = { by, d->middle, d->ledger_middle, d->rate_middle, r->projected_at };
   memcpy (d->middle, d->q, pw_rk_block (r, 0));
-  if (r->settings.ledger) {
-    memcpy (d->ledger_middle, r->ledger_at, (size_t)r->s->entries * sizeof (double));
-    pw_sweep_ledger (r->s, d->lambda, d->rate_middle);
-  }
+  memcpy (d->ledger_middle, r->ledger_at, (size_t)r->s->entries * sizeof (double));
+  pw_sweep_ledger (r->s, d->lambda, d->rate_middle);
   return sample_step (r, &middle, t, &near);
 }
 

@@ -28,7 +28,7 @@ int pw_run_evaluate (pw_run *r, pw_error *error) {
   int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   if (status > 0) return pw_fail_singular (r, r->t, error);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  if (r->settings.ledger) pw_sweep_ledger (r->s, r->lambda, r->rate);
+  pw_sweep_ledger (r->s, r->lambda, r->rate);
   pw_bound_tolerances (r);
   return PW_OK;
 }
@@ -147,6 +147,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_judge (r, error);
   if (status == PW_OK) status = pw_run_resolve (r, error);
+  if (status == PW_OK) pw_ledger_note (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK) return pw_run_blame (r, status, error);
   if (r->redundant == 0) return PW_OK;
@@ -172,11 +173,9 @@ static void run_account (pw_run *r, pw_sample *sample) {
   pw_system *s = r->s;
   sample->kinetic = pw_kinetic (s, r->v_at);
   sample->potential = pw_potential (s);
-  if (!r->settings.ledger) return;
-  sample->ledger = r->ledger_at;
   for (int i = 0; i < s->entries; i++)
     *(s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += r->ledger_at[i];
-  sample->projection = r->projected_at;
+  if (r->settings.ledger) sample->ledger = r->ledger_at, sample->projection = r->projected_at;
   sample->balance = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss - sample->projection;
 }
 

@@ -86,9 +86,8 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
 
 /* The state is consistent: energies, ledger and statistics begin here. */
 static int run_begin (pw_run *r, pw_error *error) {
-  pw_system *s = r->s;
   pw_run_calm (r);
-  r->energy0 = pw_kinetic (s, r->v) + pw_potential (s);
+  pw_ledger_begin (r);
   pw_forget_residuals (r);
   pw_note_residuals (r);
   return pw_run_look_ahead (r, error);

@@ -287,13 +287,11 @@ void pw_report_growth (const pw_system *s, const pw_run *r) {
            pw_state_name (s, state, name, sizeof name), pw_format (times, growth, 2), pw_format (grows, power, 2));
 }
 
-void pw_report_unbalanced (double part) {
+void pw_report_unbalanced (const pw_run *r, double part) {
   char percent[32];
   if (!(part > 0.01)) return;
-  fprintf (stderr,
-           "pinwheel: the energy does not balance: %s %% of it is unaccounted for; a smaller step or tolerance, or "
-           "another method, follows the motion better\n",
-           pw_format (percent, 100 * part, 2));
+  fprintf (stderr, "pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
+           pw_format (percent, 100 * part, 2), pw_energy_advice (r, part));
 }
 
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,

@@ -36,7 +36,7 @@ void pw_report_redundant (const char *const *text);
 void pw_report_growth (const pw_system *s, const pw_run *r);
 
 /* Says on standard error that a part of the energy is unaccounted for, if it is more than 1 %. */
-void pw_report_unbalanced (double part);
+void pw_report_unbalanced (const pw_run *r, double part);
 
 /* A table for the eye on standard output: last state, reactions, residuals, energies, cost. */
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,

@@ -25,7 +25,7 @@ static int run_read (run *x, int argc, const char **argv, pw_error *error) {
     PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
     { "every", 0, POPT_ARG_STRING, &x->every_text, 0,
       "Time between two rows of the table [s]; by default a row per step", "DT" },
-    { "energy", 0, POPT_ARG_NONE, &x->energy, 0, "Keep account of energies, work and losses", NULL },
+    { "energy", 0, POPT_ARG_NONE, &x->energy, 0, "Print energies, work and losses", NULL },
     { "output", 'o', POPT_ARG_STRING, &x->csv_path, 0, "Write a table of samples; - is standard output", "FILE.csv" },
     { "json", 0, POPT_ARG_STRING, &x->json_path, 0, "Write a summary; - is standard output", "FILE" },
     { "plots", 0, POPT_ARG_STRING, &x->plots_path, 0, "Draw figures into a folder", "DIR" },
@@ -316,7 +316,7 @@ static int run_finish (run *x, pw_error *error) {
   if (last) summary.unbalanced = pw_unbalanced (x->r, last);
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
-  if (error->status == PW_OK) pw_report_unbalanced (summary.unbalanced);
+  if (error->status == PW_OK) pw_report_unbalanced (x->r, summary.unbalanced);
   if (error->status == PW_OK && x->r) pw_report_growth (x->m.system, x->r);
   run_write_json (x, &summary, last, error);
   run_draw (x, summary.reason, error);

@@ -1,0 +1,94 @@
+/* The energy of a run: how much of it moves, what its work and losses are to be accurate to, and what of it is unaccounted
+ * for.  The ledger is kept in every run, since its error takes part in the choice of steps. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "method.h"
+
+/* Kinetic energy of bodies that move by L and turn by 1 rad in the span of the run. */
+static double ledger_of_scene (const pw_run *r) {
+  const pw_system *s = r->s;
+  double sum = 0;
+  for (int j = 0; j < s->coords; j++) sum += 0.5 * s->mass[j] * pw_unit (s, j) * pw_unit (s, j);
+  return sum / (r->settings.span * r->settings.span);
+}
+
+/* Where nothing has mass: the work and losses of a time T at irregular velocities of L / T and 1 / T, and the change of
+ * potential energy by irregular displacements of L and 1 rad.  The system is placed at the state reached, here and behind. */
+static double ledger_of_massless (pw_run *r) {
+  pw_system *s = r->s;
+  double *q = r->scratch, *v = q + s->coords + 3, *lambda = v + s->coords + 3, T = s->scale.time, sum = 0;
+  for (int j = 0; j < s->coords; j++) {
+    double unit = pw_unit (s, j) * (1 + 0.37 * (j % 5)) / 2;
+    q[j] = r->q[j] + unit;
+    v[j] = unit / T;
+  }
+  memset (lambda, 0, (size_t)s->rows * sizeof *lambda);
+  if (pw_place (s, r->t, q, v) == PW_OK) {
+    pw_sweep_ledger (s, lambda, r->ledger_at);
+    for (int i = 0; i < s->entries; i++) sum += T * fabs (r->ledger_at[i]);
+    sum += fabs (pw_potential (s) - r->potential0);
+  }
+  s->failed = NULL;
+  pw_place (s, r->t, r->q, r->v);
+  return sum;
+}
+
+void pw_ledger_begin (pw_run *r) {
+  r->potential0 = pw_potential (r->s);
+  r->exchanged = pw_kinetic (r->s, r->v);
+  r->energy0 = r->exchanged + r->potential0;
+  r->energy_scene = ledger_of_scene (r);
+  if (r->energy_scene == 0 && r->s->entries > 0) r->energy_scene = ledger_of_massless (r);
+}
+
+/* Every step at first, then a part of them: as a scale that is enough, and costs next to nothing. */
+void pw_ledger_note (pw_run *r) {
+  const long every = 16;
+  double power = 0;
+  if (r->statistics.steps > every && r->statistics.steps % every != 0) return;
+  double exchanged = fmax (pw_kinetic (r->s, r->v), fabs (pw_potential (r->s) - r->potential0));
+  for (int i = 0; i < r->s->entries; i++) power += fabs (r->rate[i]);
+  if (exchanged > r->exchanged && isfinite (exchanged)) r->exchanged = exchanged;
+  if (power > r->power && isfinite (power)) r->power = power;
+}
+
+int pw_ledger_reacts (const pw_system *s) {
+  int reacts = 0;
+  for (int i = 0; i < s->entries; i++) reacts |= s->slab[s->entry[i].slab].kind->rows > 0;
+  return reacts;
+}
+
+/* Where motion takes hardly any energy, as of light bodies against friction, the work done so far is what counts, but not
+ * that of more than the time T: it grows for ever. */
+double pw_ledger_tolerance (const pw_run *r, double h) {
+  const double share = 3;         /* which the mean of squares allows to one of some ten states, too */
+  const double round_off = 1e-11; /* of rates, which is that of multipliers */
+  const pw_settings *set = &r->settings;
+  double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);
+  for (int i = 0; i < r->s->entries; i++) work += fabs (r->ledger[i]);
+  double energy = fmax (fmax (r->energy_scene, r->exchanged), fmin (work, r->power * r->s->scale.time));
+  double tolerance = share * rtol * energy + round_off * fabs (h) * r->power + 16 * DBL_EPSILON * work;
+  return tolerance > 0 && isfinite (tolerance) ? tolerance : DBL_MAX;
+}
+
+double pw_unbalanced (const pw_run *r, const pw_sample *sample) {
+  double off = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss;
+  double scale = fmax (r->exchanged, fmax (sample->kinetic, fabs (sample->potential - r->potential0)));
+  scale = fmax (scale, ledger_of_scene (r));
+  if (scale == 0) scale = fmax (fabs (sample->work), sample->loss); /* nothing has mass, nor stores energy */
+  return off == 0 ? 0 : fabs (off) / scale;
+}
+
+const char *pw_energy_advice (const pw_run *r, double defect) {
+  const double limit = 1e-12, of_step = 10; /* times rtol: what a step may lose of the energy */
+  const pw_statistics *s = &r->statistics;
+  int projects = pw_stabilised_by (r, "projection");
+  if (!projects && fmax (s->position, s->velocity) > 0.1 * defect)
+    return "the constraints have drifted; a method with projection keeps them";
+  if (pw_fixed_steps (r)) return "a smaller step, or another method, follows the motion better";
+  if (r->settings.rtol <= limit) return "the tolerance cannot be much smaller; compare with another method";
+  if (defect > of_step * r->settings.rtol * (double)s->steps)
+    return "that is more than the tolerance explains; compare with another method";
+  return "a smaller tolerance, or another method, follows the motion better";
+}

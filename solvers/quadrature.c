@@ -1,0 +1,156 @@
+/* Work and losses along the steps of a multistep method.  Its steps do not depend on them: a polynomial through the rates at
+ * the states reached, of one order more than the step, costs next to nothing, and where that is not accurate enough
+ * nodes inside the step are taken until they are.
+ *
+ *   p (t) = sum_j [t_0 ... t_j] prod_(i < j) (t - t_i),   t_0 the end of the step, t_1 its beginning, ...
+ *
+ * Its last term is taken for its error.  Rates may vanish wherever a step ends and not between; so the energy, which the
+ * states know, has to change by what the work and losses of the step say, too. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "quadrature.h"
+#include "util.h"
+
+int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates) {
+  size_t entries = (size_t)r->s->entries;
+  pw_array array[PW_QUADRATURE_POINTS + 4] = {
+    { &x->ledger0, entries }, { &x->sum, entries }, { &x->finer, entries }, { &x->node, entries }
+  };
+  for (int i = 0; i < PW_QUADRATURE_POINTS; i++) array[4 + i] = (pw_array){ &x->rate[i], entries };
+  x->rates = rates;
+  x->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  if (x->memory == NULL) return PW_MACHINE;
+  pw_quadrature_restart (x, r);
+  return PW_OK;
+}
+
+void pw_quadrature_close (pw_quadrature *x) {
+  free (x->memory);
+}
+
+static void quadrature_keep (pw_quadrature *x, const pw_run *r) {
+  x->t[0] = r->t;
+  memcpy (x->rate[0], r->rate, (size_t)r->s->entries * sizeof (double));
+}
+
+void pw_quadrature_restart (pw_quadrature *x, pw_run *r) {
+  x->points = 1;
+  x->energy = pw_kinetic (r->s, r->v) + pw_potential (r->s);
+  quadrature_keep (x, r);
+}
+
+/* ---- The polynomial ---- */
+
+/* The integrals of prod_(i < j) (s - s_i), j <= k, from 0 to `end`, with s = 0 at the beginning of the step and 1 at its
+ * end. */
+static void quadrature_weights (const double *s, int k, double end, double *w) {
+  double p[PW_QUADRATURE_POINTS + 1] = { 1 };
+  for (int j = 0; j <= k; j++) {
+    double power = end;
+    w[j] = 0;
+    for (int m = 0; m <= j; m++, power *= end) w[j] += p[m] * power / (m + 1);
+    for (int m = j + 1; m > 0; m--) p[m] = p[m - 1] - s[j] * p[m];
+    p[0] *= -s[j];
+  }
+}
+
+/* The integrals up to `end`, into x->sum; returns the size of their last terms. */
+static double quadrature_polynomial (pw_quadrature *x, int entries, int k, double end) {
+  double s[PW_QUADRATURE_POINTS], w[PW_QUADRATURE_POINTS], c[PW_QUADRATURE_POINTS], h = x->t[0] - x->t[1], last = 0;
+  for (int i = 0; i <= k; i++) s[i] = (x->t[i] - x->t[1]) / h;
+  quadrature_weights (s, k, end, w);
+  for (int e = 0; e < entries; e++) {
+    for (int i = 0; i <= k; i++) c[i] = x->rate[i][e];
+    for (int j = 1; j <= k; j++)
+      for (int i = k; i >= j; i--) c[i] = (c[i] - c[i - 1]) / (s[i] - s[i - j]);
+    x->sum[e] = 0;
+    for (int j = 0; j <= k; j++) x->sum[e] += h * c[j] * w[j];
+    last += c[k] * c[k];
+  }
+  return fabs (h * w[k]) * sqrt (last);
+}
+
+/* ---- Nodes inside the step ---- */
+
+/* The integrals over so many equal parts of a step, by Gauss' formula of order 8, into x->finer. */
+static int quadrature_parts (pw_quadrature *x, pw_run *r, double from, double to, int parts) {
+  static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
+                      weight[] = { 0.3478548451374538, 0.6521451548625461 };
+  int entries = r->s->entries;
+  double half = (to - from) / parts / 2;
+  memset (x->finer, 0, (size_t)entries * sizeof *x->finer);
+  for (int i = 0; i < 4 * parts; i++) {
+    double middle = from + (2 * (i / 4) + 1) * half, side = i % 4 < 2 ? -1 : 1;
+    int status = x->rates (r, middle + side * node[i % 2] * half, x->node);
+    if (status != PW_OK) return status;
+    for (int e = 0; e < entries; e++) x->finer[e] += half * weight[i % 2] * x->node[e];
+  }
+  return PW_OK;
+}
+
+/* Halves the parts until the integrals, in x->sum, agree with those before; where rates cannot be evaluated they stay. */
+static void quadrature_refine (pw_quadrature *x, pw_run *r, double from, double to, double tolerance) {
+  const int most = 64;
+  double off = INFINITY;
+  for (int parts = 1; parts <= most && off > tolerance; parts *= 2) {
+    if (quadrature_parts (x, r, from, to, parts) != PW_OK) return;
+    off = 0;
+    for (int e = 0; e < r->s->entries; e++) off += (x->finer[e] - x->sum[e]) * (x->finer[e] - x->sum[e]);
+    off = sqrt (off);
+    memcpy (x->sum, x->finer, (size_t)r->s->entries * sizeof *x->sum);
+  }
+}
+
+/* ---- */
+
+static int quadrature_degree (const pw_quadrature *x, int order) {
+  return order + 1 < x->points ? order + 1 : x->points - 1;
+}
+
+/* 1 if the step is much longer than all since the restart: then its polynomial knows its ends only. */
+static int quadrature_leaps (const pw_quadrature *x) {
+  const double leap = 10;
+  return x->points > 2 && x->t[0] - x->t[1] > leap * (x->t[1] - x->t[x->points - 1]);
+}
+
+/* How much the energy of a step differs from its work and losses. */
+static double quadrature_defect (pw_quadrature *x, pw_run *r) {
+  double before = x->energy, off;
+  x->energy = pw_kinetic (r->s, r->v) + pw_potential (r->s);
+  off = x->energy - before;
+  for (int e = 0; e < r->s->entries; e++) off -= r->s->entry[e].type == PW_WORK ? x->sum[e] : -x->sum[e];
+  return fabs (off);
+}
+
+int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
+  const double methods = 100; /* times the tolerance: what the method's own error in energy may be in a step */
+  int entries = r->s->entries, last = PW_QUADRATURE_POINTS - 1;
+  double *oldest = x->rate[last], h = r->t - x->t[0];
+  memcpy (x->ledger0, r->ledger, (size_t)entries * sizeof (double));
+  if (!(h > 0)) return 0;
+  memmove (x->t + 1, x->t, (size_t)last * sizeof *x->t);
+  memmove (x->rate + 1, x->rate, (size_t)last * sizeof *x->rate);
+  x->rate[0] = oldest;
+  quadrature_keep (x, r);
+  if (x->points <= last) x->points++;
+  x->order = order;
+  double tolerance = pw_ledger_tolerance (r, h),
+         off = quadrature_polynomial (x, entries, quadrature_degree (x, order), 1);
+  x->refined = (quadrature_defect (x, r) > methods * tolerance) | (off > tolerance) | quadrature_leaps (x);
+  if (x->refined) quadrature_refine (x, r, x->t[1], x->t[0], tolerance);
+  for (int e = 0; e < entries; e++) r->ledger[e] += x->sum[e];
+  return x->refined;
+}
+
+void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t) {
+  int entries = r->s->entries;
+  if (t == x->t[0] || x->points < 2) {
+    memcpy (r->ledger_at, r->ledger, (size_t)entries * sizeof (double));
+    return;
+  }
+  double h = x->t[0] - x->t[1];
+  quadrature_polynomial (x, entries, quadrature_degree (x, x->order), (t - x->t[1]) / h);
+  if (x->refined) quadrature_refine (x, r, x->t[1], t, pw_ledger_tolerance (r, h));
+  for (int e = 0; e < entries; e++) r->ledger_at[e] = x->ledger0[e] + x->sum[e];
+}
