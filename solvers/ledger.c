@@ -62,7 +62,7 @@ int pw_ledger_reacts (const pw_system *s) {
 /* Where motion takes hardly any energy, as of light bodies against friction, the work done so far is what counts, but not
  * that of more than the time T: it grows for ever. */
 double pw_ledger_tolerance (const pw_run *r, double h) {
-  const double share = 3;         /* which the mean of squares allows to one of some ten states, too */
+  const double share = 5;         /* which a mean of squares allows to one of 25 states, too */
   const double round_off = 1e-11; /* of rates, which is that of multipliers */
   const pw_settings *set = &r->settings;
   double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);
