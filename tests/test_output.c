@@ -308,8 +308,8 @@ static void test_forged (void **state) {
   output_forge (0, NAN);
   output_forge (0, -0.25);
   output_forge (0, 0.75);
-  output_forge (14, NAN); /* coordinates */
-  output_forge (16, INFINITY);
+  output_forge (16, NAN); /* coordinates, after the 16 numbers of a run */
+  output_forge (18, INFINITY);
 }
 
 /* ---- The process ---- */
