@@ -22,12 +22,16 @@ static int judge_lost (pw_run *r, pw_error *error) {
   pw_sweep_residuals (r->s, NULL, &now);
   int row = now.position > now.velocity ? now.row_position : now.row_velocity;
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
+  const char *advice = "";
   if (row >= 0 && r->active && !r->active[row])
     snprintf (cause, sizeof cause, "constraints contradict each other");
-  else if (pw_fixed_steps (r) && !pw_stabilised_by (r, "none"))
+  else if (pw_stabilised_by (r, "none"))
+    advice = pw_fixed_steps (r) ? "; a smaller step or a stabilisation reduces it"
+                                : "; a smaller tolerance or a stabilisation reduces it";
+  else if (pw_fixed_steps (r))
     snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)",
-                  r->t, cause, element, now.position, now.velocity);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)%s",
+                  r->t, cause, element, now.position, now.velocity, advice);
 }
 
 /* What the constraints are off by, in units of the scene. */
