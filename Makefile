@@ -41,15 +41,15 @@ SHARED       = $(LINK) -shared -Wl,--no-undefined
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 
-CORE    := $(wildcard core/*.c core/kinds/*.c)
-SOLVERS := $(wildcard solvers/*.c)
-FILES   := $(wildcard core/files/*.c core/files/expression/*.c)
-CLI     := $(wildcard core/cli/*.c)
+FILES   := $(wildcard core/files/*.c core/files/*/*.c)
+CLI     := $(wildcard core/cli/*.c core/cli/*/*.c)
+CORE    := $(filter-out $(FILES) $(CLI),$(wildcard core/*/*.c))
+SOLVERS := $(wildcard solvers/*/*.c)
 MODELS  := $(wildcard models/*.c)
-QUICK   := $(wildcard tests/test_*.c)
-SLOW    := $(wildcard tests/slow_*.c)
-SHELLS  := $(filter-out tests/report.sh,$(wildcard tests/*.sh))
-SHARE   := $(filter-out $(QUICK) $(SLOW),$(wildcard tests/*.c)) # linked to every test
+QUICK   := $(wildcard tests/*/test_*.c)
+SLOW    := $(wildcard tests/*/slow_*.c)
+SHELLS  := $(filter-out tests/support/%,$(wildcard tests/*/*.sh))
+SHARE   := $(filter-out $(QUICK) $(SLOW) $(wildcard $(addprefix tests/,fuzz/*.c models/*.c scenes/*.c)),$(wildcard tests/*/*.c)) # linked to every test
 BENCH   := $(wildcard benchmarks/*.c)
 ENGINE  := $(wildcard benchmarks/engine/*.c benchmarks/baseline/*.c)
 HARD    := $(wildcard benchmarks/hard/*.c)
@@ -64,8 +64,8 @@ LIB_OBJ   := $(call obj,$(CORE) $(SOLVERS))
 FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(wildcard models/*.yaml))
-TESTS     := $(QUICK:%.c=$(BUILD)/%)
-SLOWS     := $(SLOW:%.c=$(BUILD)/%)
+TESTS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK)))
+SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 
@@ -118,23 +118,32 @@ deps:
 	@CC='$(CC)' CPPFLAGS='$(CPPFLAGS) $(SYSTEM)' LDFLAGS='$(LDFLAGS)' BUILD='$(BUILD)' NO_DEPS='$(NO_DEPS)' \
 	  sh .ci/deps.sh $(if $(filter deps,$(MAKECMDGOALS)),fresh) $(TOOLS)
 
-# ---- Objects; each folder sees only what it may include (-iquote: core/signal.h is not <signal.h>) ----
+# ---- Objects; each folder sees only what it may include (-iquote: core/signals/signal.h is not <signal.h>) ----
 
-$(BUILD)/obj/core/%.o:       INCLUDE := -iquote core
+layer = $(addprefix -iquote ,$(1))
+CORE_LAYERS   := core $(addprefix core/,base signals model system selftest)
+SOLVER_LAYERS := $(patsubst %/,%,$(wildcard solvers/ solvers/*/))
+FILE_LAYERS   := $(patsubst %/,%,$(wildcard core/files/ core/files/*/))
+CLI_LAYERS    := $(patsubst %/,%,$(wildcard core/cli/ core/cli/*/))
+
+$(BUILD)/obj/core/%.o:       INCLUDE := $(call layer,$(CORE_LAYERS))
 # Numbers that a kind stores as a pair would be computed twice or be waited for.
 $(BUILD)/obj/core/kinds/%.o: STRICT += $(ONE_BY_ONE)
-$(BUILD)/obj/solvers/%.o:    INCLUDE := -iquote core $(SYSTEM)
-$(BUILD)/obj/core/files/%.o: INCLUDE := -iquote core $(SYSTEM)
-$(BUILD)/obj/core/files/expression/%.o: INCLUDE := -iquote core -iquote core/files
-$(BUILD)/obj/core/cli/%.o:   INCLUDE := -iquote core -iquote core/files -iquote solvers
-$(call obj,core/cli/animate.c): INCLUDE += -iquote $(BUILD)/obj/core/cli
-$(call obj,core/cli/animate.c): $(BUILD)/obj/core/cli/animate.inc
-$(call obj,core/cli/sweep.c) $(BUILD)/pinwheel: private THREADS = -pthread
-$(BUILD)/obj/tests/%.o:      INCLUDE := -iquote core -iquote core/files -iquote core/files/expression -iquote solvers $(SYSTEM)
-$(BUILD)/obj/tests/fuzz/%.o: INCLUDE := -iquote core -iquote core/files -iquote core/files/expression -iquote core/cli -iquote solvers -iquote tests/fuzz
+$(BUILD)/obj/core/kinds/%.o: INCLUDE := $(call layer,core core/kinds)
+$(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAYERS)) $(SYSTEM)
+$(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,$(CORE_LAYERS) $(FILE_LAYERS)) $(SYSTEM)
+$(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base core/files core/files/expression)
+$(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,$(CORE_LAYERS) core/files solvers $(CLI_LAYERS))
+$(call obj,core/cli/run/profile.c): INCLUDE += $(call layer,$(SOLVER_LAYERS))
+$(call obj,core/cli/plot/animate.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/plot
+$(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
+$(call obj,core/cli/sweep/sweep.c) $(BUILD)/pinwheel: private THREADS = -pthread
+ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
+$(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
+$(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
-$(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,eighth.o effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := -iquote core -iquote solvers -iquote benchmarks $(SYSTEM)
-$(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -iquote core -I$(BUILD)/include
+$(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,eighth.o effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
+$(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := $(call layer,core core/selftest) -I$(BUILD)/include
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
 
@@ -215,7 +224,9 @@ $(BUILD)/benchmarks/hard: EXTRA_LIBS := -lfyaml
 
 # A test holds the libraries whole, so that the plug-ins it opens find them in it; these and the program are to be of the
 # same sources when it runs.
-$(TESTS) $(SLOWS): $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a) | $(PROGRAM) $(PLUGINS) $(INCLUDES)
+test_obj = $(filter %/$(1).o,$(call obj,$(QUICK) $(SLOW)))
+.SECONDEXPANSION:
+$(TESTS) $(SLOWS): $(BUILD)/tests/%: $$(call test_obj,$$*) $(BUILD)/libtests.a $(FILES_LIB:.so=.a) $(LIB:.so=.a) | $(PROGRAM) $(PLUGINS) $(INCLUDES)
 	@mkdir -p $(@D)
 	$(call say,LINK)
 	$(Q)$(LINK) $(WRAP) -rdynamic -Wl,-u,limit_begin -o $@ $(filter %.o,$^) $(BUILD)/libtests.a \
@@ -237,7 +248,7 @@ $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addpref
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
 $(BUILD)/tests/test_cli_limits: $(call obj,core/cli/progress.c)
 # This every call of the libraries below.
-$(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/test_faults.c)
+$(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/faults/test_faults.c)
 # A part of SUNDIALS that Pinwheel does not use, to compare with.
 $(BUILD)/tests/test_arkode: WRAP := -Wl,--no-as-needed -lsundials_arkode -Wl,--as-needed
 
@@ -346,17 +357,18 @@ gcc:
 # A library with few kinds, of a copy of the sources whose list is shorter: what it does not have cannot cost anything.
 BASIC       := $(VARIANT)/basic
 BASIC_KINDS := pin wheel torque
-BASIC_COPY   = $(filter-out core/pinwheel.h,$(wildcard core/*.[ch] core/kinds/*.h solvers/*.[ch])) $(BASIC_KINDS:%=core/kinds/%.c)
+BASIC_COPY   = $(filter-out core/kinds/%.c core/pinwheel.h $(FILES) $(CLI) $(wildcard core/files/*.h core/cli/*.h), \
+                 $(wildcard core/*.h core/*/*.[ch] solvers/*.h solvers/*/*.[ch])) $(BASIC_KINDS:%=core/kinds/%.c)
 
 basic:
-	@mkdir -p $(BASIC)/source/core/kinds $(BASIC)/source/solvers
+	@mkdir -p $(addprefix $(BASIC)/source/,$(sort $(dir $(BASIC_COPY))))
 	@find $(BASIC)/source -name '*.[ch]' ! -name pinwheel.h -delete
 	@for f in $(BASIC_COPY); do cp -p $$f $(BASIC)/source/$$f || exit 1; done
 	@sed $(foreach k,$(BASIC_KINDS),-e '/PW_KIND ($(k))/b') -e '/^ *PW_KIND (.*)/d' core/pinwheel.h >$(BASIC)/pinwheel.h
 	@cmp -s $(BASIC)/pinwheel.h $(BASIC)/source/core/pinwheel.h || cp $(BASIC)/pinwheel.h $(BASIC)/source/core
 	@$(MAKE) -s --no-print-directory -C $(BASIC)/source -f '$(CURDIR)/Makefile' NO_DEPS=1 BUILD=.. ../libpinwheel.so
 
-SOURCES := $(wildcard $(foreach d,core core/kinds core/files core/files/expression core/cli solvers models tests tests/fuzz benchmarks benchmarks/engine benchmarks/baseline benchmarks/hard docs,$(d)/*.c $(d)/*.h))
+SOURCES := $(foreach d,core solvers models tests benchmarks docs,$(wildcard $(addprefix $(d)/,*.[ch] */*.[ch] */*/*.[ch])))
 
 format:
 	clang-format -i $(SOURCES)

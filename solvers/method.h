@@ -4,7 +4,6 @@
 
 #include <math.h>
 #include "pinwheel-solvers.h"
-#include "rank.h"
 #include "saddle.h"
 #include "system.h"
 #include "watchdog.h"

@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "model.h"
-#include "system.h"
 
 size_t pw_field_bytes (pw_field_type type) {
   switch (type) {

@@ -4,6 +4,15 @@
 
 #include "util.h"
 
+/* The most an element may have; plug-in kinds are checked against it. */
+enum {
+  PW_MAX_BODIES = 4,
+  PW_MAX_OWN = 4,
+  PW_MAX_ROWS = 6,
+  PW_MAX_SIGNALS = 4,
+  PW_MAX_COLS = 3 * PW_MAX_BODIES + PW_MAX_OWN
+};
+
 typedef struct {
   const pw_kind *kind;
   void *definition; /* a copy; kind->definition bytes, the first member its name */
@@ -56,11 +65,6 @@ int pw_check_element (const pw_model *m, const pw_element *e, const pw_names *bo
 
 /* The k-th field of a type in a kind, counting each of its `count`; address inside the definition. */
 void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);
-
-/* 1 if the kind's signals serve its force: they may read states, and inputs=held holds them. */
-static inline int pw_kind_forced (const pw_kind *kind) {
-  return kind->force_u != NULL;
-}
 
 /* Whether it takes part in the motion; a marker does not. */
 static inline int pw_kind_acts (const pw_kind *kind) {

@@ -2,7 +2,18 @@
 #ifndef PW_SIGNAL_H
 #define PW_SIGNAL_H
 
-#include "system.h"
+#include "util.h"
+
+/* A signal of one element, with the states it reads. */
+typedef struct {
+  pw_signal signal;
+  int reads;        /* how many states a function signal reads */
+  const int *state; /* their indices: coordinate j, or coordinates + j for a rate */
+  double *x;        /* reads: their values, then reads: the gradient */
+  double *spline;   /* of a table: rate, then acceleration at each of its points (table.c) */
+  double *u;        /* 3: where its values go */
+  int forced;       /* 1: it serves a force, which needs no derivatives */
+} pw_source;
 
 /* Value, rate and acceleration at time t (the last two only if derivatives are asked for); the states a function
  * reads are in source->x.  Returns what the user's function returned, or not 0 if its values are not finite: that stops the
@@ -48,5 +59,10 @@ const pw_signal_form *pw_signal_form_of (const pw_signal *s);
 /* Says what is wrong with a signal of a kind; "" if nothing is.  *point becomes the point of a table that is meant, or -1.
  * Returns the buffer. */
 char *pw_signal_fault (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
+
+/* 1 if the kind's signals serve its force: they may read states, and inputs=held holds them. */
+static inline int pw_kind_forced (const pw_kind *kind) {
+  return kind->force_u != NULL;
+}
 
 #endif

@@ -1,7 +1,6 @@
 /* The forms of a signal: the numbers each is made of, and what may be wrong with them. */
 #include <math.h>
 #include <stdio.h>
-#include "model.h"
 #include "signal.h"
 
 #define FORM_AT(form, member) .name = #member, .offset = offsetof (pw_signal, form.member)

@@ -1,6 +1,6 @@
 /* Placing a state: the poses of all bodies, the signals of all elements. */
 #include <math.h>
-#include "model.h"
+#include "system.h"
 #include "signal.h"
 
 /* Own coordinates are read where the caller has them. */

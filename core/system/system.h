@@ -7,17 +7,8 @@
 #define PW_SYSTEM_H
 
 #include "run.h"
-
-/* A signal of one element, with the states it reads. */
-typedef struct {
-  pw_signal signal;
-  int reads;        /* how many states a function signal reads */
-  const int *state; /* their indices: coordinate j, or coordinates + j for a rate */
-  double *x;        /* reads: their values, then reads: the gradient */
-  double *spline;   /* of a table: rate, then acceleration at each of its points (table.c) */
-  double *u;        /* 3: where its values go */
-  int forced;       /* 1: it serves a force, which needs no derivatives */
-} pw_source;
+#include "model.h"
+#include "signal.h"
 
 /* One kind in use: its batch, and where its rows and coordinates are. */
 typedef struct {
@@ -152,15 +143,6 @@ int pw_find_wild (pw_system *s, char *buffer, size_t size);
 
 /* Second-order blocks: what the exact Newton matrices of implicit methods need besides M, J and J^T. */
 typedef enum { PW_JW_Q, PW_JTL_Q, PW_ETA_Q, PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V, PW_BLOCKS } pw_block;
-
-/* The most an element may have; plug-in kinds are checked against it. */
-enum {
-  PW_MAX_BODIES = 4,
-  PW_MAX_OWN = 4,
-  PW_MAX_ROWS = 6,
-  PW_MAX_SIGNALS = 4,
-  PW_MAX_COLS = 3 * PW_MAX_BODIES + PW_MAX_OWN
-};
 
 /* The kind's sweep for a block: NULL if identically zero, pw_by_differences if the core has to difference. */
 pw_sweep *pw_block_sweep (const pw_kind *kind, pw_block block);

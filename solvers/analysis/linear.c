@@ -25,6 +25,7 @@
 #include <string.h>
 #include "eigen.h"
 #include "linear.h"
+#include "rank.h"
 #include "util.h"
 
 /* ---- Derivatives ---- */

@@ -8,6 +8,7 @@
 #include <math.h>
 #include <string.h>
 #include "linear.h"
+#include "rank.h"
 
 /* Residuals are dimensionless; accelerations in units of L / T^2, angles times L.
  *

@@ -14,6 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
+#include "rank.h"
 
 enum { CHANGE_STRIDES = 1000, CHANGE_TRIES = 8 };
 

@@ -2,6 +2,7 @@
 #include <stdio.h>
 #include <string.h>
 #include "method.h"
+#include "rank.h"
 
 /* Names a row's element behind what is in the buffer: "pin B" or, with its row, "pin B (B.Fx)"; the new length. */
 static size_t redundancy_name_row (const pw_system *s, int row, int whole, char *buffer, size_t size, size_t n) {

@@ -10,6 +10,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
+#include "rank.h"
 
 /* Where an attempt stopped. */
 typedef struct {

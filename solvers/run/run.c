@@ -4,6 +4,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "rank.h"
 #include "run_parts.h"
 #include "util.h"
 

@@ -5,6 +5,7 @@
  * from the state reached, and so go on alike.  A method's `carry` adds what only it knows: step size, counts. */
 #include <math.h>
 #include "method.h"
+#include "rank.h"
 
 /* 1 if the archive is of a run of these sizes. */
 static int checkpoint_sizes (pw_run *r, pw_archive *a) {

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "methods.h"
+#include "rank.h"
 #include "run_parts.h"
 #include "util.h"
 

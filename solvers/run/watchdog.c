@@ -7,6 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
+#include "rank.h"
 
 /* Residuals are scaled, sines are of angles between rows.  s: the sine over the largest one; d: what constraints are off by.
  * Where branches meet the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; those that are off by d are

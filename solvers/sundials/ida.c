@@ -10,6 +10,7 @@
 #include <idas/idas.h>
 #include "between.h"
 #include "ida_state.h"
+#include "rank.h"
 
 /* ---- What IDA asks for besides ---- */
 

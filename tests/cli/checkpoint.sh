@@ -3,7 +3,7 @@
 # alone, byte for byte, for every method and for scenes with what a state can hold.
 # Run from the top folder; reads PINWHEEL, SEED (of the random moments).
 
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 echo "# SEED=$seed"
 
 # killed MODEL OPTION...: once left alone, once killed until it gets through

@@ -4,7 +4,7 @@
 # about what is the machine's alone: times, and what a drifting method does at a singular pose.
 # Run from the top folder; reads PINWHEEL.
 
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 
 # blocks FILE: for each, a line "# COMMAND" and the lines that are shown below it.
 blocks () {

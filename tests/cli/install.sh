@@ -3,7 +3,7 @@
 # program that embeds the libraries through pkg-config; uninstall leaves nothing.  Reads BUILD, CC.
 
 build=${BUILD:-build} cc=${CC:-cc}
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 
 # The paths contain spaces; "my" is what a list of words would make of "my pinwheel".
 destination="$work/a root" prefix='/opt/my pinwheel'

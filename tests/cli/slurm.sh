@@ -9,7 +9,7 @@ for program in slurmctld slurmd munged sbatch scontrol; do
     exit 0
   }
 done
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 PATH=$PATH:/usr/sbin
 host=$(hostname -s) top=$work
 stop () {

@@ -2,7 +2,7 @@
 # Sweeps under fire: killed at random moments again and again, in one piece and in parts, by GNU parallel if it is there.
 # Run from the top folder; reads PINWHEEL, SEED (of the random moments).
 
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 echo "# SEED=$seed"
 
 grid='ezyroller --vary omega=log:1:10:20 --vary a=0.4,0.5,0.6 --vary frame.omega=0,0.1 --t-end 8'

@@ -4,6 +4,7 @@
 #include "check.h"
 #include "scene.h"
 #include "signal.h"
+#include "system.h"
 #include "toys.h"
 
 static void test_constant (void **state) {

@@ -17,7 +17,7 @@
 #include "scene.h"
 
 #define pw_plugin faults_chain
-#include "../models/chain.c"
+#include "../../models/chain.c"
 #undef pw_plugin
 
 static struct {

@@ -1,7 +1,7 @@
 #!/bin/sh
 # What fuzzing began with and has found, through each target once more.  Reads BUILD.
 
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 
 for target in "${BUILD:-build}"/fuzz/*; do
   name=$(basename "$target")

@@ -3,7 +3,7 @@
 # an error in words, in little time and memory (2 GB of addresses are all they get).
 # Run from the top folder; reads PINWHEEL.
 
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 mkdir "$work/in" && cd "$work/in" || exit 1
 
 # refused NAME TEXT: standard input is a model after its first line; it is refused with the text in the message.

@@ -5,7 +5,7 @@
 
 BUILD=${BUILD:-build}
 builds=$BUILD/variant/bits
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 unset MAKEFLAGS MAKELEVEL MFLAGS CFLAGS CPPFLAGS LDFLAGS
 
 # build NAME CC CFLAGS: the program and the scenes of the tests

@@ -6,7 +6,7 @@
 BUILD=${BUILD:-build}
 unset MAKEFLAGS MAKELEVEL MFLAGS
 command -v valgrind >/dev/null || { echo '# valgrind is not there: not tried'; exit 0; }
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 
 make NO_DEPS=1 BUILD="$BUILD" bench-effects >"$work/log" 2>&1
 status=$?

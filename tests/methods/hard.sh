@@ -2,7 +2,7 @@
 # Hard cases by the methods that are to be relied on, against the verdicts expected of them; `make hard` has all methods.
 # Reads BUILD.
 
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 
 for method in '*+projection' ida+ggl; do
   "${BUILD:-build}/benchmarks/hard" -m "$method" benchmarks/hard >"$work/log" 2>&1

@@ -11,9 +11,9 @@
 #define pw_method_rk4 tableaus_rk4
 #define pw_method_erk5 tableaus_erk5
 #define pw_method_erk8 tableaus_erk8
-#include "../solvers/rk4.c"
-#include "../solvers/erk5.c"
-#include "../solvers/erk8.c"
+#include "../../solvers/rk/rk4.c"
+#include "../../solvers/rk/erk5.c"
+#include "../../solvers/rk/erk8.c"
 
 static const struct {
   const char *name;

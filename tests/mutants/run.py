@@ -114,7 +114,7 @@ class Copy:
         """The name of the first test that fails, "" if all pass."""
         for test in tests:
             script = test.endswith(".sh")
-            target = f"tests/{test}" if script else f"build/tests/{test}"
+            target = next(n for n in self.names if os.path.basename(n) == test) if script else f"build/tests/{test}"
             made = self.make("all", *([] if script else [target]))
             if made.returncode:
                 return "the compiler" if "error:" in made.stderr else "make: " + made.stderr.strip()[-200:]
@@ -161,7 +161,7 @@ def main():
             key, text, verdict = line.rstrip("\n").split("\t")
             if key == state:
                 verdicts[text] = verdict
-    quick = sorted(os.path.basename(n)[:-2] for n in names if re.fullmatch(r"tests/test_\w+\.c", n))
+    quick = sorted(os.path.basename(n)[:-2] for n in names if re.fullmatch(r"tests/\w+/test_\w+\.c", n))
 
     copy, begin, left, survivors = Copy(options.build, names), time.time(), 0, 0
     todo = [m for m in mutations if options.only in m["text"]]

@@ -2,8 +2,8 @@
 # Random mechanisms against a simulator that shares no code with Pinwheel (tests/reference), and in other words against
 # themselves.  Run from the top folder; reads PINWHEEL, PYTHON, COUNT (mechanisms), SEED (the first one).
 
-. "$(dirname "$0")/report.sh"
-here=$(cd "$(dirname "$0")" && pwd)/reference
+. "$(dirname "$0")/../support/report.sh"
+here=$(cd "$(dirname "$0")" && pwd)
 python=${PYTHON:-/usr/bin/python3}
 
 if ! "$python" -c 'import numpy, scipy' 2>/dev/null; then

@@ -4,7 +4,7 @@
 
 large=${BUILD:-build}/variant/large
 unset MAKEFLAGS MAKELEVEL MFLAGS
-. "$(dirname "$0")/report.sh"
+. "$(dirname "$0")/../support/report.sh"
 
 tests=
 for t in saddle start redundant singular hub agree weld rod slider gear drive rolling kinds vehicles restart project random; do

@@ -1,6 +1,6 @@
 /* Eigenvalues, singular values, and the linearisation of scenes whose vibrations are known. */
 #include <math.h>
-#include "../solvers/eigen.h"
+#include "eigen.h"
 #include "check.h"
 #include "runs.h"
 #include "scene.h"

@@ -6,7 +6,7 @@
 #include "trial.h"
 
 #define pw_plugin redundant_parallelogram
-#include "../models/redundant-parallelogram.c"
+#include "../../models/redundant-parallelogram.c"
 #undef pw_plugin
 
 enum { REDUNDANT_COORDS = 20 };

@@ -5,7 +5,7 @@
 
 /* The model file itself, under another name than that of a plug-in's table. */
 #define pw_plugin scene_ezyroller
-#include "../models/ezyroller.c"
+#include "../../models/ezyroller.c"
 
 static pw_model *scene_build (const pw_plugin_table *table, va_list sets) {
   pw_error error = { 0 };

@@ -6,6 +6,7 @@
 #include "cli.h"
 #include "model.h"
 #include "signal.h"
+#include "system.h"
 
 enum { SHOW_DIGITS = 6 };
 

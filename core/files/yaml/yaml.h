@@ -13,7 +13,7 @@
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
-#include "expression/expression.h"
+#include "expression.h"
 #include "files.h"
 #include "model.h"
 
