@@ -4,14 +4,15 @@
 #include <string.h>
 #include "rk_state.h"
 
-/* The step to t1 in two parts; the state there is left in d->q, d->v, and if `keep` is set the first part is accepted. */
-static int fixed_two_parts (pw_run *r, double t, double t1, int project, int keep) {
-  double added = 0, *to = r->settings.ledger ? &added : NULL;
-  int status = pw_rk_step (r, t - r->t, t, project, to);
+/* The step to t1 in two parts; the state there is left in d->q, d->v, and if `keep` is set the first part is accepted.
+ * *added: the energy that projections have added. */
+static int fixed_two_parts (pw_run *r, double t, double t1, int project, int keep, double *added) {
+  *added = 0;
+  int status = pw_rk_step (r, t - r->t, t, project, added);
   if (status != PW_OK) return status;
-  pw_rk_accept (r, t - r->t, t, added);
+  pw_rk_accept (r, t - r->t, t, *added);
   if (keep) return PW_OK;
-  status = pw_rk_step (r, t1 - t, t1, project, to);
+  status = pw_rk_step (r, t1 - t, t1, project, added);
   pw_rk_revert (r);
   return status;
 }
@@ -29,23 +30,23 @@ static double fixed_compare (pw_run *r) {
 static int fixed_in_parts (pw_run *r, int status, double t1, int project, double least, double *t) {
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
   const int parts = sizeof part / sizeof *part;
-  double start = r->t, best = INFINITY;
+  double start = r->t, best = INFINITY, energy = fmax (r->energy_scene, r->exchanged), added;
   int choice = 0, known = status == PW_OK;
   if (known) fixed_compare (r);
   for (int i = 0; i < parts && best > r->limits.agree_best; i++) {
     if (start + part[i] * (t1 - start) <= least) continue;
     if (pw_run_asked (r)) return PW_STOPPED;
-    status = fixed_two_parts (r, start + part[i] * (t1 - start), t1, project, 0);
+    status = fixed_two_parts (r, start + part[i] * (t1 - start), t1, project, 0, &added);
     r->statistics.rejected++;
     if (status < 0) return status;
     if (status != PW_OK) continue;
-    double off = fixed_compare (r);
+    double off = fmax (fixed_compare (r), fabs (added) / energy); /* what a projection corrects is an error, too */
     if (known && off < best) best = off, choice = i;
     known = 1;
   }
   if (!(best <= r->limits.agree)) return PW_RETRY;
   *t = start + part[choice] * (t1 - start);
-  return fixed_two_parts (r, *t, t1, project, 1);
+  return fixed_two_parts (r, *t, t1, project, 1, &added);
 }
 
 /* Near a singular pose an evaluation that lands on it spoils the step.  It is taken in two parts; where it is its end that
