@@ -312,7 +312,7 @@ fuzz:
 	@for t in $(notdir $(FUZZERS)); do echo "$$t: $(TIME) s"; mkdir -p $(VARIANT)/fuzz/corpus/$$t; \
 	  TMPDIR=$$([ -d /dev/shm ] && echo /dev/shm || echo /tmp) $(VARIANT)/fuzz/fuzz/$$t -max_total_time=$(TIME) -timeout=25 \
 	    -rss_limit_mb=4000 -max_len=4096 -dict=tests/fuzz/words.dict -print_final_stats=1 -verbosity=0 \
-	    -artifact_prefix=$(VARIANT)/fuzz/found/$$t- $(VARIANT)/fuzz/corpus/$$t tests/fuzz/corpus/$$t \
+	    -artifact_prefix="$$(cd $(VARIANT)/fuzz/found && pwd)/$$t-" $(VARIANT)/fuzz/corpus/$$t tests/fuzz/corpus/$$t \
 	    $$([ $$t = model ] && echo models tests/models tests/bad-models) 2>$(VARIANT)/fuzz/$$t.log || \
 	    { tail -n 40 $(VARIANT)/fuzz/$$t.log; exit 1; }; grep -h 'number_of_executed' $(VARIANT)/fuzz/$$t.log; done
 fuzz: $(FIRST)

@@ -373,6 +373,28 @@ static void test_breakpoints (void **state) {
   }
 }
 
+/* Numbers that ought to be equal differ by round-off again and again: no breakpoints, and none of the others is lost. */
+static void test_round_off (void **state) {
+  static const char *const noisy[] = { "min(sin(t)^2 + cos(t)^2, 1)", "abs(sin(t)^2 + cos(t)^2 - 1)",
+                                       "max(sin(t), 2*sin(t/2)*cos(t/2))", "sign(exp(t)*exp(-t) - 1)",
+                                       "(t*t > (t - 1)*(t + 1) + 1)" };
+  (void)state;
+  for (size_t i = 0; i < sizeof noisy / sizeof *noisy; i++) {
+    char text[100];
+    int steps = 0, found = 0;
+    double t = 0;
+    snprintf (text, sizeof text, "%s + floor(t/2.5) + (t > 7)", noisy[i]);
+    const pw_expression *x = expression_of (text);
+    for (; t < 9 && steps < 1000; steps++) {
+      t = pw_expression_breakpoint (x, t);
+      found += t == 2.5 || t == 5 || t == 7 || t == 7.5;
+    }
+    assert_in_range (
+        steps, 4, 300); /* searched anew after each hundredth of 1 + t, and after the four: log (10) / log (1.01) + 4 */
+    assert_int_equal (found, 4);
+  }
+}
+
 /* Between breakpoints nothing jumps: random thresholds on random curves, scanned at many times. */
 static void test_scanned (void **state) {
   pw_random r = { 5 };
@@ -409,7 +431,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_values),      cmocka_unit_test (test_troubles),    cmocka_unit_test (test_limits),
     cmocka_unit_test (test_truths),      cmocka_unit_test (test_derivatives), cmocka_unit_test (test_after),
-    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_scanned),
+    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_round_off),   cmocka_unit_test (test_scanned),
   };
   return cmocka_run_group_tests (tests, NULL, expression_teardown);
 }

@@ -107,6 +107,16 @@ static void test_bad_units (void **state) {
   table_bad ("{file: u.csv, columns: [f, z]}", "column \"f [N]\": the unit \"N\" does not measure what s does");
 }
 
+/* What overflows as it is converted is refused. */
+static void test_too_large (void **state) {
+  static const char csv[] = "t [h],u [kN km]\n0,1\n1,-1e303\n1e305,2\n";
+  (void)state;
+  table_write ("model/large.csv", csv, sizeof csv - 1);
+  table_bad ("{file: large.csv}", "large.csv:3: column 2: \"-1e303\" is too large in SI units");
+  table_write ("model/large.csv", "t [h],u\n0,1\n1e305,2\n", 20);
+  table_bad ("{file: large.csv}", "large.csv:3: column 1: \"1e305\" is too large in SI units");
+}
+
 /* The unit a signal has: of a drive, that of what it drives. */
 static void table_unit (const char *element, const char *header, double expected, const char *text) {
   char yaml[500], csv[100];
@@ -233,9 +243,10 @@ static int table_teardown (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms),     cmocka_unit_test (test_units),
-                                      cmocka_unit_test (test_bad_units), cmocka_unit_test (test_unit_of_signal),
-                                      cmocka_unit_test (test_scale),     cmocka_unit_test (test_contents),
-                                      cmocka_unit_test (test_places),    cmocka_unit_test (test_limits) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms),          cmocka_unit_test (test_units),
+                                      cmocka_unit_test (test_bad_units),      cmocka_unit_test (test_too_large),
+                                      cmocka_unit_test (test_unit_of_signal), cmocka_unit_test (test_scale),
+                                      cmocka_unit_test (test_contents),       cmocka_unit_test (test_places),
+                                      cmocka_unit_test (test_limits) };
   return cmocka_run_group_tests (tests, table_setup, table_teardown);
 }

@@ -7,8 +7,6 @@
 #include <sys/stat.h>
 #include "fuzz.h"
 
-size_t LLVMFuzzerMutate (uint8_t *data, size_t size, size_t most);
-
 /* Targets with a mutator of their own ask for it. */
 size_t LLVMFuzzerMutate (uint8_t *data, size_t size, size_t most) {
   (void)data;

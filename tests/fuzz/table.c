@@ -26,3 +26,21 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
   pw_arena_free (&arena);
   return 0;
 }
+
+static fuzz_grammar table_rules[] = {
+  "f:$i$h$l$l$l`$i$l$l`$i#$h$h$l$l$l",
+  "i:0`1`2",
+  "h:time$u$stime$u\n`time$u$storque$u\n`torque$u$stime$u$s$c\n`\"time$u\"$s\"torque$u\"\n`\n",
+  "l:$c$s$c\n`$c$s$c\n`$c$s$c$s$c\n`$c$s$c\r\n`$l$l`\n`# $c\n",
+  "s:,`;`\t",
+  "u:` [$v]` ($v)`[$v]",
+  "v:s`ms`N m`N mm`kN*m`$v/$v`$v^$p`$v $v`deg`rad/s`min`h`us`km`1`-`\xC2\xB5s`\xC2\xB0",
+  "p:2`-1`9`0`-9",
+  "c:$d`$d.$d`-$d`$de$d`$de-$d` $d `\"$d\"`nan`inf`0x1p3``1e308`1e-308`t",
+  "d:1`2`3`4`10`99`0`5",
+  NULL
+};
+
+size_t LLVMFuzzerCustomMutator (uint8_t *data, size_t size, size_t most, unsigned seed) {
+  return fuzz_mutate (table_rules, data, size, most, seed);
+}

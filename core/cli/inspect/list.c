@@ -97,7 +97,7 @@ static int list_what (int words, const char **word, pw_error *error) {
     int here = words == 0 || strcmp (word[0], part[i].name) == 0;
     if (here && words > 1 && !part[i].named)
       return pw_fail (error, PW_INPUT, "\"%s\" is too much; write pinwheel list %s", word[1], part[i].name);
-    if (here && part[i].list (words ? words - 1 : 0, word + (words > 0), error) != PW_OK) return error->status;
+    if (here && part[i].list (words ? words - 1 : 0, words ? word + 1 : word, error) != PW_OK) return error->status;
     if (here && words) return PW_OK;
     pw_nearest_try (&near, part[i].name);
   }

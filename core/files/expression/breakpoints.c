@@ -4,7 +4,7 @@
  * breaks; otherwise the interval is halved, the earlier half first.  In what is left, a fraction of 2^-36 of the time, two
  * neighbouring numbers are found between which something changes: that is where steps have to end
  * (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapters 5 and 8).
- * Changes that cancel within such a fraction are passed over; where two numbers stay equal, the fraction grows with the time
+ * Changes that cancel within such a fraction are passed over, and those of numbers that differ by round-off only; where two numbers stay equal, the fraction grows with the time
  * passed. */
 #include <float.h>
 #include <math.h>
@@ -243,18 +243,20 @@ static range range_apply (const pw_expression_code *c, const range *x, int opera
   return r;
 }
 
-/* The value over an interval of time. */
-static range range_run (const pw_expression *x, double lo, double hi) {
+/* The value over an interval of time; operations that are noisy do not break. */
+static range range_run (const pw_expression *x, const unsigned char *noisy, double lo, double hi) {
   range stack[PW_EXPRESSION_STACK], *top = stack;
   for (const pw_expression_code *c = x->code, *end = c + x->codes; c < end; c++) {
-    int operands = pw_expression_operands (c->op);
+    int operands = pw_expression_operands (c->op), before = 0;
     top -= operands;
+    for (int i = 0; i < operands; i++) before |= top[i].breaks;
     if (operands)
       *top = range_apply (c, top, operands);
     else if (c->op == PW_OP_CONSTANT)
       *top = (range){ c->value, c->value, 0, 0 };
     else
       *top = c->which == 0 ? (range){ lo, hi, 0, 0 } : (range){ -INFINITY, INFINITY, 0, 1 };
+    if (noisy[c - x->code]) top->breaks &= before;
     top++;
   }
   return top[-1];
@@ -265,35 +267,66 @@ static range range_run (const pw_expression *x, double lo, double hi) {
 typedef struct {
   const pw_expression *x;
   double from;
-  int left;      /* intervals that may still be looked at */
-  int equal;     /* narrow ones in which nothing has changed */
-  double narrow; /* the fraction of the time that is halved no more */
+  int left;                                 /* intervals that may still be looked at */
+  int equal;                                /* narrow ones in which nothing has changed */
+  double narrow;                            /* the fraction of the time that is halved no more */
+  int noise;                                /* 1: some operations are */
+  unsigned char noisy[PW_EXPRESSION_CODES]; /* by operation: it changes again and again */
 } search;
 
-/* A checksum of all comparisons and the like at a time. */
-static unsigned long long search_signature (const pw_expression *x, double t) {
+/* What all comparisons and the like give at a time. */
+static void search_look (const search *s, double t, double *discrete) {
   double variable[PW_EXPRESSION_VARIABLES] = { t }, u[3];
-  unsigned long long signature = 0;
-  pw_expression_run_jet (x->code, x->codes, variable, 0, u, &signature);
-  return signature;
+  pw_expression_run_jet (s->x->code, s->x->codes, variable, 0, u, discrete);
+}
+
+static int search_changed (double a, double b) {
+  return a != b && !(isnan (a) && isnan (b));
+}
+
+/* Whether something changes between two times. */
+static int search_differ (const search *s, double a, double b) {
+  double before[PW_EXPRESSION_CODES], after[PW_EXPRESSION_CODES];
+  search_look (s, a, before);
+  search_look (s, b, after);
+  for (int i = 0; i < s->x->codes; i++)
+    if (!s->noisy[i] && search_changed (before[i], after[i])) return 1;
+  return 0;
 }
 
 /* The first number at which something has changed, of two neighbours. */
-static double search_between (const pw_expression *x, double a, double b) {
-  unsigned long long before = search_signature (x, a);
+static double search_between (const search *s, double a, double b) {
+  const double first = a;
   for (double middle = a + (b - a) / 2; middle > a && middle < b; middle = a + (b - a) / 2)
-    if (search_signature (x, middle) == before)
-      a = middle;
-    else
+    if (search_differ (s, first, middle))
       b = middle;
+    else
+      a = middle;
   return b;
+}
+
+/* Notes the operations that change so often just after t that it is the round-off of numbers that ought to be equal, or too
+ * fast for any step; returns whether there are any more. */
+static int search_noise (search *s, double t) {
+  const double width = 1e-6 * (1 + fabs (t));
+  double value[2][PW_EXPRESSION_CODES];
+  short changes[PW_EXPRESSION_CODES] = { 0 };
+  int more = 0;
+  search_look (s, t, value[0]);
+  for (int k = 1; k <= 256; k++) {
+    search_look (s, t + width * (k / 256.0), value[k % 2]);
+    for (int i = 0; i < s->x->codes; i++)
+      if (search_changed (value[0][i], value[1][i]) && ++changes[i] > 8 && !s->noisy[i]) s->noisy[i] = 1, more = 1;
+  }
+  s->noise |= more;
+  return more;
 }
 
 static double search_first (search *s, double a, double b) {
   if (s->left-- <= 0) return fmax (a, nextafter (s->from, INFINITY));
-  if (!range_run (s->x, a, b).breaks) return INFINITY;
+  if (!range_run (s->x, s->noisy, a, b).breaks) return INFINITY;
   if (b - a <= s->narrow * fmax (fabs (a), fabs (b)) + 1e-18) {
-    if (search_signature (s->x, a) != search_signature (s->x, b)) return search_between (s->x, a, b);
+    if (search_differ (s, a, b)) return search_noise (s, b) ? search_first (s, a, b) : search_between (s, a, b);
     if (++s->equal % 500 == 0) s->narrow *= 2;
     return INFINITY;
   }
@@ -301,14 +334,15 @@ static double search_first (search *s, double a, double b) {
   return first < INFINITY ? first : search_first (s, middle, b);
 }
 
-/* Where too much has been looked at, a breakpoint that is none makes the search go on from there. */
+/* Where too much has been looked at, or something was noisy, a breakpoint that is none makes the search go on from there. */
 double pw_expression_breakpoint (const pw_expression *x, double t) {
   const double latest = 1e18;
-  search s = { x, t, 400 + 4000000 / (100 + x->codes), 0, 0x1p-36 };
+  search s = { .x = x, .from = t, .left = 400 + 4000000 / (100 + x->codes), .narrow = 0x1p-36 };
   double a = t, found = INFINITY;
   if (!x->breaks) return INFINITY;
   for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {
-    if (!range_run (x, a, INFINITY).breaks) break;
+    if (!s.noise && !range_run (x, s.noisy, a, INFINITY).breaks) break;
+    if (s.noise && a > t + 1e-2 * (1 + fabs (t))) return a;
     found = search_first (&s, a, a + w);
     a += w;
   }

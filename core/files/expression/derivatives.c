@@ -5,7 +5,6 @@
  * (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  Of two numbers that are equal now, the one whose first
  * derivative that differs is larger will be the larger: so what jumps has the value just after. */
 #include <math.h>
-#include <string.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
 
@@ -146,18 +145,12 @@ static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, dou
   return (jet){ .v = *discrete };
 }
 
-static void jet_note (unsigned long long *signature, double discrete) {
-  unsigned long long bits;
-  memcpy (&bits, &(double){ discrete + 0.0 }, sizeof bits);
-  *signature = (*signature ^ bits) * 1099511628211u + (*signature >> 29);
-}
-
 void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
-                            unsigned long long *signature) {
+                            double *discrete) {
   jet stack[PW_EXPRESSION_STACK], *top = stack;
   for (const pw_expression_code *c = code, *end = code + codes; c < end; c++) {
     int operands = pw_expression_operands (c->op);
-    double discrete = 0;
+    double change = 0;
     top -= operands;
     if (operands == 0)
       *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }
@@ -167,8 +160,8 @@ void pw_expression_run_jet (const pw_expression_code *code, int codes, const dou
     else if (!top[0].on && !top[operands - 1].on)
       *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
     else
-      *top = operands == 1 ? jet_one (c, top, &discrete) : jet_two (c, top, top + 1, &discrete);
-    if (signature && pw_expression_breaks (c->op)) jet_note (signature, discrete);
+      *top = operands == 1 ? jet_one (c, top, &change) : jet_two (c, top, top + 1, &change);
+    if (discrete) discrete[c - code] = change;
     top++;
   }
   u[0] = top[-1].v, u[1] = top[-1].d, u[2] = top[-1].dd;

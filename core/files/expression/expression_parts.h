@@ -4,8 +4,8 @@
 
 #include "expression.h"
 
-/* Numbers that wait for their operation, at most; variables. */
-enum { PW_EXPRESSION_STACK = 1000, PW_EXPRESSION_VARIABLES = 32 };
+/* Numbers that wait for their operation, at most; variables; operations. */
+enum { PW_EXPRESSION_STACK = 1000, PW_EXPRESSION_VARIABLES = 32, PW_EXPRESSION_CODES = 8000 };
 
 /* In groups of operations without operands, of one, of two, of three. */
 typedef enum {
@@ -123,8 +123,8 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
 /* The value of an operation of one number x, or of a and x. */
 double pw_expression_apply (const pw_expression_code *c, double a, double x);
 
-/* The value and derivatives; a checksum of all that only changes at breakpoints is added to *signature, unless it is NULL. */
+/* The value and derivatives; unless it is NULL, discrete[codes] becomes what of each operation only changes at breakpoints. */
 void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
-                            unsigned long long *signature);
+                            double *discrete);
 
 #endif

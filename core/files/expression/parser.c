@@ -13,7 +13,7 @@
 #include "pinwheel.h"
 #include "pinwheel-files.h"
 
-enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_CODES = 2 * PARSER_LONGEST, PARSER_NAME = 100 };
+enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_CODES = PW_EXPRESSION_CODES, PARSER_NAME = 100 };
 enum { ON_TIME = 1, ON_STATES = 2 };
 
 /* ---- Names that stand for numbers ---- */

@@ -112,6 +112,8 @@ static int columns_numbers (const columns *c, const char *line, const int place[
     if (pw_read_number (cell, &value[k]) != PW_OK || !isfinite (value[k]))
       return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", place[k] + 1, cell);
     value[k] *= factor[k];
+    if (!isfinite (value[k]))
+      return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", place[k] + 1, cell);
   }
   return PW_OK;
 }

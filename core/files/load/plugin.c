@@ -134,7 +134,9 @@ static int plugin_unknown (const pw_search *s, const char *name, pw_error *error
 static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
   pw_search s;
   int status = pw_search_open (&s, error), first = 0;
-  if (status == PW_OK) {
+  if (status == PW_OK && s.count == 0)
+    status = plugin_unknown (&s, name, error);
+  else if (status == PW_OK) {
     while (first < s.count && strcmp (s.found[first].name, name) != 0) first++;
     const pw_found *found = s.found + first;
     if (first == s.count)
