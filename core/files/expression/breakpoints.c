@@ -269,6 +269,7 @@ typedef struct {
   double from;
   int left;                                 /* intervals that may still be looked at */
   int equal;                                /* narrow ones in which nothing has changed */
+  int patience;                             /* so many of them double what is narrow */
   double narrow;                            /* the fraction of the time that is halved no more */
   int noise;                                /* 1: some operations are */
   unsigned char noisy[PW_EXPRESSION_CODES]; /* by operation: it changes again and again */
@@ -327,7 +328,7 @@ static double search_first (search *s, double a, double b) {
   if (!range_run (s->x, s->noisy, a, b).breaks) return INFINITY;
   if (b - a <= s->narrow * fmax (fabs (a), fabs (b)) + 1e-18) {
     if (search_differ (s, a, b)) return search_noise (s, b) ? search_first (s, a, b) : search_between (s, a, b);
-    if (++s->equal % 500 == 0) s->narrow *= 2;
+    if (++s->equal % s->patience == 0) s->narrow *= 2;
     return INFINITY;
   }
   double middle = a + (b - a) / 2, first = search_first (s, a, middle);
@@ -338,6 +339,8 @@ static double search_first (search *s, double a, double b) {
 double pw_expression_breakpoint (const pw_expression *x, double t) {
   const double latest = 1e18;
   search s = { .x = x, .from = t, .left = 400 + 4000000 / (100 + x->codes), .narrow = 0x1p-36 };
+  s.patience =
+      1 + s.left / 120; /* 36 doublings, of some two or three intervals each, before too much has been looked at */
   double a = t, found = INFINITY;
   if (!x->breaks) return INFINITY;
   for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {
