@@ -381,10 +381,11 @@ static void test_round_off (void **state) {
                                        "max(sin(t), 2*sin(t/2)*cos(t/2))",
                                        "sign(exp(t)*exp(-t) - 1)",
                                        "(t*t > (t - 1)*(t + 1) + 1)",
-                                       "max(t, t)" TEN_TIMES (" + max(t, t)") /* equal, and many operations */ };
+                                       "max(t, t)" TEN_TIMES (
+                                           " + max(t, t) + max(t, t) + max(t, t)") /* equal, and many operations */ };
   (void)state;
   for (size_t i = 0; i < sizeof noisy / sizeof *noisy; i++) {
-    char text[400];
+    char text[500];
     int steps = 0, found = 0;
     double t = 0;
     snprintf (text, sizeof text, "%s + floor(t/2.5) + (t > 7)", noisy[i]);
