@@ -5,8 +5,10 @@
 #include <fcntl.h>
 #include <locale.h>
 #include <signal.h>
+#include <sys/stat.h>
 #include <sys/time.h>
 #include <unistd.h>
+int command_main (int argc, char **argv);
 #define main command_main
 #include "main.c"
 #undef main
