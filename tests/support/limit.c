@@ -31,6 +31,7 @@ __attribute__ ((constructor)) void limit_begin (void);
 void limit_begin (void) {
   const char *text = getenv ("LIMIT");
   int seconds = text ? atoi (text) : 0;
+  signal (SIGINT, SIG_DFL); /* ignored in what a shell starts in the background */
   if (getpgrp () != getpid () && setpgid (0, 0) != 0) return;
   signal (SIGALRM, limit_end);
   signal (SIGTERM, limit_end);
