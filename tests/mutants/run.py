@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Mutation testing: applies one mutation at a time to a copy of the sources, builds, runs tests and lists the survivors.
 
-    run.py [--time SECONDS] [--only WORD] BUILD
+    run.py [--time SECONDS] [--only WORD] [--named] BUILD
 
 The file `list` beside this one has a line for each mutation:
 
@@ -9,13 +9,15 @@ The file `list` beside this one has a line for each mutation:
     FUNCTION | EXPRESSION => REPLACEMENT | equivalent: REASON
 
 FUNCTION is the name of a function, table or macro of core/, solvers/ or models/; EXPRESSION must occur in it exactly once
-(white space is ignored).  A mutation that does not apply is an error.  The TESTs named run first; if they all pass, every
-quick test runs.  Mutants that are equivalent to the original for the stated reason are listed but not run.
+(white space is ignored; write a | b as a|b).  A mutation that does not apply is an error.  The TESTs named run first; if they
+all pass, every quick test runs, unless --named is given.  Mutants that are equivalent to the original for the stated reason are
+listed but not run.
 
-Verdicts are kept in BUILD/results while the sources stay the same, so an interrupted run continues.  The exit status is 0
+Verdicts are kept in BUILD/results while the sources and the test that detects the mutant stay the same, so an interrupted run
+continues.  The exit status is 0
 if no mutant survived, 1 if one did or does not apply, 3 if the time was not sufficient for all.
 """
-import argparse, hashlib, os, re, shutil, subprocess, sys, time
+import argparse, functools, hashlib, os, re, shutil, subprocess, sys, time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TOP = os.path.dirname(os.path.dirname(HERE))
@@ -39,14 +41,14 @@ def definitions(text):
             if macro is None:
                 macro = position
             if not line.rstrip().endswith("\\"):
-                yield text[macro:end].split("(")[0].replace("#define", ""), macro, end
+                yield re.match(r"#define\s+(\w+)", text[macro:end]).group(1), macro, end
                 macro = None
         elif start is None and re.match(r"[A-Za-z_]", line):
             start = position
             if ";" in line and "{" not in line:
                 yield line, start, end
                 start = None
-        if start is not None and (line.startswith("}") or ("{" in line and "}" in line and text.startswith(line, start))):
+        if start is not None and (re.match(r"}(?!.*{$)", line.rstrip()) or ("{" in line and "}" in line and text.startswith(line, start))):
             yield text[start:end].split("{")[0], start, end
             start = None
         elif start is not None and macro is None and "{" not in text[start:end] and line.rstrip().endswith(";"):
@@ -130,10 +132,26 @@ class Copy:
             f.write(text)
 
 
+@functools.lru_cache(maxsize=None)
+def digest(names):
+    digest = hashlib.sha256()
+    for n in names:
+        with open(os.path.join(TOP, n), "rb") as f:
+            digest.update(n.encode() + f.read())
+    return digest.hexdigest()[:16]
+
+
+def state(names, test):
+    """What a verdict depends on: all sources but other tests, if a test has detected the mutant."""
+    kept = (n for n in names if not n.startswith(("docs/", "tests/mutants/")))
+    return digest(tuple(n for n in kept if not test or not re.fullmatch(r"tests/test_\w+\.c", n) or n == f"tests/{test}.c"))
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--time", type=float, default=7200, help="stop after this many seconds")
     options.add_argument("--only", default="", help="mutations whose line contains this")
+    options.add_argument("--named", action="store_true", help="only the tests named in the list; survivors are not noted")
     options.add_argument("--apply", action="store_true", help="only check that every mutation applies")
     options.add_argument("build")
     options = options.parse_args()
@@ -151,15 +169,11 @@ def main():
         print(f"{len(mutations)} mutations, {wrong} do not apply")
         return 1 if wrong else 0
 
-    digest = hashlib.sha256()
-    for n in names:
-        if not n.startswith(("docs/", "tests/mutants/")):
-            digest.update(n.encode() + open(os.path.join(TOP, n), "rb").read())
-    state, path, verdicts = digest.hexdigest()[:16], os.path.join(options.build, "results"), {}
+    path, verdicts = os.path.join(options.build, "results"), {}
     if os.path.exists(path):
         for line in open(path):
             key, text, verdict = line.rstrip("\n").split("\t")
-            if key == state:
+            if key == state(names, verdict):
                 verdicts[text] = verdict
     quick = sorted(os.path.basename(n)[:-2] for n in names if re.fullmatch(r"tests/\w+/test_\w+\.c", n))
 
@@ -179,10 +193,12 @@ def main():
                 continue
             name, text = m["applied"]
             copy.write(name, text)
-            verdicts[m["text"]] = copy.test(m["tests"]) or copy.test([q for q in quick if q not in m["tests"]])
+            others = [] if options.named else [q for q in quick if q not in m["tests"]]
+            verdicts[m["text"]] = copy.test(m["tests"]) or copy.test(others)
             copy.write(name, files[name])
-            with open(path, "a") as f:
-                f.write(f"{state}\t{m['text']}\t{verdicts[m['text']]}\n")
+            if verdicts[m["text"]] or not options.named:
+                with open(path, "a") as f:
+                    f.write(f"{state(names, verdicts[m['text']])}\t{m['text']}\t{verdicts[m['text']]}\n")
         by = verdicts[m["text"]]
         survivors += by == ""
         print(f"{'detected' if by else 'SURVIVED'}    {m['text']}" + (f"    by {by}" if by else ""), flush=True)
