@@ -182,6 +182,121 @@ static void test_locale (void **state) {
             "@/de.csv\ncmp @/c.csv @/de.csv");
 }
 
+/* ---- Columns ----
+ *
+ * An arm falls about a pin through oil, a bob hangs at rest, a cart rolls on a wheel with a coordinate of its own. */
+
+#define CLI_COLUMNS                                                                                        \
+  "pinwheel: 1\n"                                                                                          \
+  "bodies:\n"                                                                                              \
+  "  - {name: arm, mass: 2, inertia: 0.1, start: {x: 0.3}}\n"                                              \
+  "  - {name: cart, mass: 1, inertia: 0.5, start: {y: 2, phi: 0.3}, rate: {vx: cos(0.3), vy: sin(0.3)}}\n" \
+  "  - {name: bob, mass: 3, inertia: 0.1, start: {x: 5, y: -0.5}}\n"                                       \
+  "elements:\n"                                                                                            \
+  "  - {pin: O, body: [arm, ground], at: [[-0.3, 0], [0, 0]]}\n"                                           \
+  "  - {pin: H, body: [bob, ground], at: [[0, 0.5], [5, 0]]}\n"                                            \
+  "  - {rolling-wheel: W, body: cart, at: [0.1, 0], radius: 0.2, inertia: 0.3}\n"                          \
+  "  - {drag: oil, body: arm, turning: 0.2}\n"                                                             \
+  "  - {torque: twist, body: [cart, ground], value: 0.3}\n"                                                \
+  "  - {gravity: g, acceleration: [0, -9.81]}\n"
+
+/* The value of a column, by its whole heading, in a row from 0. */
+static double cli_cell (const char *csv, int row, const char *heading) {
+  size_t n = strlen (heading);
+  int column = 0;
+  const char *at = csv, *end = strchr (csv, '\n');
+  while (at < end && !(strncmp (at, heading, n) == 0 && (at[n] == ',' || at[n] == '\n'))) {
+    at += strcspn (at, ",\n") + 1;
+    column++;
+  }
+  if (at >= end) print_error ("no column %s\n", heading);
+  assert_true (at < end);
+  for (at = csv; row >= 0; row--) at = strchr (at, '\n') + 1;
+  while (column-- > 0) at = strchr (at, ',') + 1;
+  return strtod (at, NULL);
+}
+
+static const char *cli_columns (const char *options) {
+  char command[300];
+  cli_write ("columns.yaml", CLI_COLUMNS);
+  snprintf (command, sizeof command, "pinwheel run @/columns.yaml --energy -o @/columns.csv %s", options);
+  cli_good (command);
+  return cli_file ("columns.csv");
+}
+
+/* Velocities are what coordinates change by. */
+static void test_state_columns (void **state) {
+  static const char *const pairs[][2] = {
+    { "arm.x [m]", "arm.vx [m/s]" },           { "arm.y [m]", "arm.vy [m/s]" },
+    { "arm.phi [rad]", "arm.omega [rad/s]" },  { "cart.x [m]", "cart.vx [m/s]" },
+    { "W.spin [rad]", "W.spin_rate [rad/s]" },
+  };
+  (void)state;
+  const char *csv = cli_columns ("-t 0.1 --every 0.01");
+  for (int i = 0; i < 5; i++)
+    for (int row = 1; row < 10; row++) {
+      double slope = (cli_cell (csv, row + 1, pairs[i][0]) - cli_cell (csv, row - 1, pairs[i][0])) / 0.02;
+      double v = cli_cell (csv, row, pairs[i][1]);
+      check_close (pairs[i][1], v, slope, 0.01, "h^2 / 6 times a third derivative below 500");
+    }
+}
+
+/* A bob at rest hangs by its weight: the reaction is the force on the first body.  The summary has the same sign. */
+static void test_reaction_columns (void **state) {
+  (void)state;
+  const char *csv = cli_columns ("-t 0.1 --every 0.1 --json @/columns.json");
+  check_close ("H.Fx", cli_cell (csv, 1, "H.Fx [N]"), 0, 1e-12, "round-off");
+  check_close ("H.Fy", cli_cell (csv, 1, "H.Fy [N]"), 3 * 9.81, 1e-12, "the weight of 3 kg, upwards");
+  csv = cli_file ("columns.json");
+  check_close ("H.Fy", cli_number (csv, "reactions", "H.Fy", NULL), 3 * 9.81, 1e-12, "the same");
+}
+
+/* K + V - (K + V)_0 = work - loss + projection + balance, of which steps too large leave something to the last two. */
+static void test_ledger_columns (void **state) {
+  (void)state;
+  const char *csv = cli_columns ("-m rk4+projection --step 0.05 -t 0.3 --every 0.1");
+  double start = cli_cell (csv, 0, "kinetic [J]") + cli_cell (csv, 0, "potential [J]");
+  for (int row = 1; row < 4; row++) {
+    double energy = cli_cell (csv, row, "kinetic [J]") + cli_cell (csv, row, "potential [J]") - start;
+    double work = cli_cell (csv, row, "W.work [J]") + cli_cell (csv, row, "twist.work [J]");
+    double loss = cli_cell (csv, row, "oil.loss [J]"), phi = cli_cell (csv, row, "cart.phi [rad]") - 0.3;
+    double projection = cli_cell (csv, row, "projection [J]"), balance = cli_cell (csv, row, "balance [J]");
+    check_close ("energies", energy, work - loss + projection + balance, 1e-13, "round-off of 10 J");
+    check_close ("work", cli_cell (csv, row, "twist.work [J]"), 0.3 * phi, 1e-5, "moment times angle, to h^4");
+    check_below ("projection and balance are different", 1e-6, fabs (projection - balance), "10 % of either");
+    assert_true (loss > 0);
+  }
+}
+
+/* Numbers are read back as they were, and the last row is at t_end: 3 times 0.1 is not 0.3. */
+static void test_last_row (void **state) {
+  (void)state;
+  const char *csv = cli_columns ("-t 0.3 --every 0.1");
+  assert_int_equal (cli_lines (csv), 5);
+  assert_true (cli_cell (csv, 3, "t [s]") == 0.3);
+  csv = cli_columns ("-t 0.4 --every 0.1");
+  assert_true (cli_cell (csv, 3, "t [s]") == 3 * 0.1);
+}
+
+/* Nobody reads on: the exit status says so, nothing is said, and no temporary file is left. */
+static void test_closed_pipe (void **state) {
+  (void)state;
+  cli_run ("{ pinwheel run pendulum -t 100 --json @/pipe.json -o -; echo $? >@/status; } | head -1 >@/head\n"
+           "ls @ | grep -c '^pipe.*[.]part$'");
+  assert_string_equal (cli_file ("status"), "141\n");
+  assert_true (cli_says (cli_file ("pipe.json"), "status", "machine"));
+  assert_string_equal (cli_out, "0\n");
+  assert_string_equal (cli_err, "");
+}
+
+/* Steps and rejected ones are not mixed up. */
+static void test_statistics (void **state) {
+  (void)state;
+  cli_good ("pinwheel run ezyroller -m erk5+projection --rtol 1e-6 -t 10 --json -");
+  double steps = cli_number (cli_out, "statistics", "steps", NULL);
+  check_below ("rejected", cli_number (cli_out, "statistics", "rejected", NULL), steps / 3 + 5, "a third of the steps");
+}
+
 /* ---- Other commands ---- */
 
 static void test_list (void **state) {
@@ -288,15 +403,18 @@ static void test_new (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_summary),     cmocka_unit_test (test_numbers),
-    cmocka_unit_test (test_long_step),   cmocka_unit_test (test_degrees),
-    cmocka_unit_test (test_no_energy),   cmocka_unit_test (test_unbalanced),
-    cmocka_unit_test (test_own_columns), cmocka_unit_test (test_defaults),
-    cmocka_unit_test (test_table),       cmocka_unit_test (test_table_on_stdout),
-    cmocka_unit_test (test_every),       cmocka_unit_test (test_locale),
-    cmocka_unit_test (test_list),        cmocka_unit_test (test_list_columns),
-    cmocka_unit_test (test_show),        cmocka_unit_test (test_gnuplot_locale),
-    cmocka_unit_test (test_help),        cmocka_unit_test (test_new),
+    cmocka_unit_test (test_summary),        cmocka_unit_test (test_numbers),
+    cmocka_unit_test (test_long_step),      cmocka_unit_test (test_degrees),
+    cmocka_unit_test (test_no_energy),      cmocka_unit_test (test_unbalanced),
+    cmocka_unit_test (test_own_columns),    cmocka_unit_test (test_defaults),
+    cmocka_unit_test (test_table),          cmocka_unit_test (test_table_on_stdout),
+    cmocka_unit_test (test_state_columns),  cmocka_unit_test (test_reaction_columns),
+    cmocka_unit_test (test_ledger_columns), cmocka_unit_test (test_last_row),
+    cmocka_unit_test (test_closed_pipe),    cmocka_unit_test (test_statistics),
+    cmocka_unit_test (test_every),          cmocka_unit_test (test_locale),
+    cmocka_unit_test (test_list),           cmocka_unit_test (test_list_columns),
+    cmocka_unit_test (test_show),           cmocka_unit_test (test_gnuplot_locale),
+    cmocka_unit_test (test_help),           cmocka_unit_test (test_new),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

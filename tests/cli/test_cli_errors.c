@@ -270,12 +270,27 @@ static void test_one_voice (void **state) {
   }
 }
 
+/* Nothing stays of what was compiled, whether that works, fails or is interrupted: Ctrl-C waits until the folder is gone. */
+static void test_compiled (void **state) {
+  (void)state;
+  cli_good ("mkdir @/tmp && TMPDIR=@/tmp pinwheel run models/ezyroller.c -t 0.1 --json @/compiled.json && ls @/tmp");
+  assert_string_equal (cli_out, "");
+  cli_write ("wrong.c", "int x = ;\n");
+  assert_int_equal (cli_run ("TMPDIR=@/tmp pinwheel run @/wrong.c; ls @/tmp"), 0);
+  assert_string_equal (cli_out, "");
+  cli_write ("interrupting", "#!/bin/sh\nkill -TERM $PPID\nsleep 0.2\nexec cc \"$@\"\n");
+  cli_run ("chmod +x @/interrupting; (TMPDIR=@/tmp CC=@/interrupting "
+           "\"${PINWHEEL:-build/pinwheel}\" run models/ezyroller.c -t 0.1); echo $?; sleep 0.4; ls @/tmp");
+  assert_string_equal (cli_out, "143\n");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_bad_lines),   cmocka_unit_test (test_useless_options), cmocka_unit_test (test_unwritable),
     cmocka_unit_test (test_full_disk),   cmocka_unit_test (test_bad_models),      cmocka_unit_test (test_bad_tables),
     cmocka_unit_test (test_bad_files),   cmocka_unit_test (test_found_twice),     cmocka_unit_test (test_failing_step),
     cmocka_unit_test (test_interrupted), cmocka_unit_test (test_moved),           cmocka_unit_test (test_one_voice),
+    cmocka_unit_test (test_compiled),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

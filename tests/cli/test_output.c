@@ -151,6 +151,24 @@ static void test_keeps_lock (void **state) {
   }
 }
 
+/* What a killed process has left under the temporary name is no part of the new file. */
+static void test_left_over (void **state) {
+  (void)state;
+  cli_good ("pinwheel run pendulum -t 0.1 --every 0.1 -o @/fresh.csv\n"
+            "seq 10000 >@/left.csv.part; pinwheel run pendulum -t 0.1 --every 0.1 -o @/left.csv\n"
+            "cmp @/left.csv @/fresh.csv");
+}
+
+/* A table that ends early, here for a limit on its size, ends with a whole line. */
+static void test_whole_lines (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("(ulimit -f 8; pinwheel run pendulum -t 10 --every 0.01 -o @/cut.csv)"), 1);
+  cli_good ("tail -c 1 @/cut.csv.part | od -An -c | tr -d ' '; wc -l <@/cut.csv.part");
+  assert_memory_equal (cli_out, "\\n\n", 3);
+  check_below ("lines", 10, atof (cli_out + 3), "4096 bytes take more than 20 of them");
+  cli_good ("rm @/cut.csv.part");
+}
+
 /* ---- What is no file of its own ---- */
 
 static void test_direct (void **state) {
@@ -368,11 +386,11 @@ static void test_limit (void **state) {
 
 int main (int argc, char **argv) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_uses),    cmocka_unit_test (test_links),      cmocka_unit_test (test_lock),
-    cmocka_unit_test (test_direct),  cmocka_unit_test (test_keeps_lock), cmocka_unit_test (test_mode),
-    cmocka_unit_test (test_types),   cmocka_unit_test (test_together),   cmocka_unit_test (test_bounded),
-    cmocka_unit_test (test_process), cmocka_unit_test (test_forged),     cmocka_unit_test (test_terminal),
-    cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_left_over),  cmocka_unit_test (test_whole_lines), cmocka_unit_test (test_uses),
+    cmocka_unit_test (test_links),      cmocka_unit_test (test_lock),        cmocka_unit_test (test_direct),
+    cmocka_unit_test (test_keeps_lock), cmocka_unit_test (test_mode),        cmocka_unit_test (test_types),
+    cmocka_unit_test (test_together),   cmocka_unit_test (test_bounded),     cmocka_unit_test (test_process),
+    cmocka_unit_test (test_forged),     cmocka_unit_test (test_terminal),    cmocka_unit_test (test_limit),
   };
   if (argc > 1) return setenv ("CHILD", argv[1], 1) || system ("echo $$ >\"$CHILD\"; sleep 600");
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);

@@ -60,6 +60,23 @@ static void test_interrupted (void **state) {
   assert_non_null (strstr (cli_err, "/a.ck goes on from t = "));
 }
 
+/* With a row for every step, too, none is there twice; a run that had ended already, but for its checkpoint, goes on. */
+static void test_every_step (void **state) {
+  static const char *const left[] = { "cp @/one.csv @/two.csv.part", "cp @/one.csv @/two.csv", NULL };
+  (void)state;
+  cli_good ("pinwheel run ezyroller -t 2 --checkpoint-every 0.5 --checkpoint @/one.ck -o @/one.csv");
+  for (const char *const *c = left; *c; c++) {
+    char command[400];
+    snprintf (command, sizeof command,
+              "rm -f @/two.*; %s; cp @/one.ck @/two.ck\n"
+              "pinwheel run ezyroller -t 2 --resume @/two.ck -o @/two.csv 2>@/said; cmp @/one.csv @/two.csv\n"
+              "ls @ | grep -c 'two.*part'; :",
+              *c);
+    cli_good (command);
+    assert_string_equal (cli_out, "0\n");
+  }
+}
+
 /* ---- What is refused ---- */
 
 #define RESUME_SHORT "run ezyroller --t-end 2 --checkpoint-every 0.5 -o @/b.csv "
@@ -160,7 +177,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_killed),    cmocka_unit_test (test_restarts),   cmocka_unit_test (test_interrupted),
     cmocka_unit_test (test_other_run), cmocka_unit_test (test_other_file), cmocka_unit_test (test_damaged),
-    cmocka_unit_test (test_options),   cmocka_unit_test (test_summary),
+    cmocka_unit_test (test_options),   cmocka_unit_test (test_summary),    cmocka_unit_test (test_every_step),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -29,7 +29,7 @@ static void test_cut_journal (void **state) {
              "  n=$((n + 61)); done");
 }
 
-/* Rows in another order, a row twice, a damaged one, a forgotten half-sorted table. */
+/* Rows in another order, a row twice, a damaged one, rows of another part, a forgotten half-sorted table. */
 static void test_odd_journal (void **state) {
   (void)state;
   cli_shell ("s='pinwheel sweep ezyroller " GRID " --part 2/2 -o @/odd.csv'; $s || exit 1\n"
@@ -38,6 +38,8 @@ static void test_odd_journal (void **state) {
              "try () { $s || exit 1; cmp @/odd.csv @/whole || exit 1; }\n"
              "{ front; rows | sort -r; } >@/odd.csv.part; try\n"
              "{ front; rows | head -2; rows; } >@/odd.csv.part; try\n"
+             "pinwheel sweep ezyroller " GRID " --part 1/2 -o @/first.csv || exit 1\n"
+             "{ front; sed '1,/^end$/d' @/first.csv; } >@/odd.csv.part; try\n"
              "{ front; rows | sed '3s/ok,0/ok,1/'; } >@/odd.csv.part; try\n"
              "{ front; rows | head -3; printf 'zzz'; } >@/odd.csv.part; echo x >@/odd.csv.sorted; try\n");
   const char *expected = ": 6 of 6 runs are done\n";

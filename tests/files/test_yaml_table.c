@@ -161,6 +161,54 @@ static void test_unit_of_signal (void **state) {
   table_unit (speed, "rpm", 0, "does not measure what m/s does");
 }
 
+/* 90 of each unit, in SI units. */
+static void test_unit_factors (void **state) {
+  static const struct {
+    const char *unit;
+    double si;
+  } units[] = {
+    { "m", 90 },
+    { "kg", 90 },
+    { "s", 90 },
+    { "rad", 90 },
+    { "N", 90 },
+    { "J", 90 },
+    { "W", 90 },
+    { "degrees", PW_PI / 2 },
+    { "degree", PW_PI / 2 },
+    { "deg", PW_PI / 2 },
+    { "grad", 0.45 * PW_PI },
+    { "gon", 0.45 * PW_PI },
+    { "mrad", 0.09 },
+    { "rev", 180 * PW_PI },
+    { "rpm", 3 * PW_PI },
+    { "km/h", 25 },
+    { "um", 9e-5 },
+    { "mm", 0.09 },
+    { "cm", 0.9 },
+    { "dm", 9 },
+    { "km", 9e4 },
+    { "us", 9e-5 },
+    { "ms", 0.09 },
+    { "min", 5400 },
+    { "h", 324000 },
+    { "mN", 0.09 },
+    { "kN", 9e4 },
+    { "MN", 9e7 },
+    { "Nm", 90 },
+    { "kNm", 9e4 },
+    { "Nmm", 0.09 },
+    { "g", 0.09 },
+    { "kJ", 9e4 },
+    { "kW", 9e4 },
+    { "cm^2", 9e-3 },
+    { "1/ms", 9e4 },
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof units / sizeof *units; i++)
+    table_unit ("pfaffian: P, body: [a, ground], a: [1, 0, 0], b: [0, 0, 0], value", units[i].unit, units[i].si, NULL);
+}
+
 /* offset + scale value, at the compiled signal; the points stay as they are. */
 static void test_scale (void **state) {
   pw_signal s = { 0 };
@@ -245,8 +293,8 @@ static int table_teardown (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_forms),          cmocka_unit_test (test_units),
                                       cmocka_unit_test (test_bad_units),      cmocka_unit_test (test_too_large),
-                                      cmocka_unit_test (test_unit_of_signal), cmocka_unit_test (test_scale),
-                                      cmocka_unit_test (test_contents),       cmocka_unit_test (test_places),
-                                      cmocka_unit_test (test_limits) };
+                                      cmocka_unit_test (test_unit_of_signal), cmocka_unit_test (test_unit_factors),
+                                      cmocka_unit_test (test_scale),          cmocka_unit_test (test_contents),
+                                      cmocka_unit_test (test_places),         cmocka_unit_test (test_limits) };
   return cmocka_run_group_tests (tests, table_setup, table_teardown);
 }

@@ -145,6 +145,175 @@ static void test_edge (void **state) {
   }
 }
 
+/* ---- The control of steps, measured where errors are known ---- */
+
+/* The pair of Dormand & Prince: times, stages, weights of the estimate (Hairer, Norsett & Wanner 1993, table II.5.2). */
+static const double adaptive_c[] = { 0, 1. / 5, 3. / 10, 4. / 5, 8. / 9, 1, 1 };
+static const double adaptive_A[7][6] = {
+  { 0 },
+  { 1. / 5 },
+  { 3. / 40, 9. / 40 },
+  { 44. / 45, -56. / 15, 32. / 9 },
+  { 19372. / 6561, -25360. / 2187, 64448. / 6561, -212. / 729 },
+  { 9017. / 3168, -355. / 33, 46732. / 5247, 49. / 176, -5103. / 18656 },
+  { 35. / 384, 0, 500. / 1113, 125. / 192, -2187. / 6784, 11. / 84 },
+};
+static const double adaptive_e[] = { 71. / 57600, 0, -71. / 16695, 71. / 1920, -17253. / 339200, 22. / 525, -1. / 40 };
+
+static int adaptive_power (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = 1e5 * t * t * t * t;
+  value[1] = 4e5 * t * t * t;
+  value[2] = 12e5 * t * t;
+  return 0;
+}
+
+static int adaptive_bump (void *context, double t, const double *x, double value[3], double *gradient) {
+  const double width = 0.01, z = (t - 1) / width, f = 10 * exp (-z * z);
+  (void)context, (void)x, (void)gradient;
+  value[0] = f;
+  value[1] = -2 * z / width * f;
+  value[2] = (4 * z * z - 2) / (width * width) * f;
+  return 0;
+}
+
+static void adaptive_pushed (pw_model *m, int (*eval) (void *, double, const double *, double *, double *)) {
+  pw_add_body (m, &(pw_body){ .name = "puck", .mass = 1, .inertia = 1, .rate = { 3, 0, 0 } });
+  pw_add_force (m, &(pw_force){ .name = "push", .body = "puck", .fx = { PW_FUNCTION, .function = { .eval = eval } } });
+}
+
+static void adaptive_by_power (pw_model *m, const void *parameters) {
+  (void)parameters;
+  adaptive_pushed (m, adaptive_power);
+}
+
+static void adaptive_by_bump (pw_model *m, const void *parameters) {
+  (void)parameters;
+  adaptive_pushed (m, adaptive_bump);
+}
+
+static const pw_plugin_table adaptive_power_table = { .abi = PW_ABI,
+                                                      .size = sizeof (pw_plugin_table),
+                                                      .build = adaptive_by_power };
+static const pw_plugin_table adaptive_bump_table = { .abi = PW_ABI,
+                                                     .size = sizeof (pw_plugin_table),
+                                                     .build = adaptive_by_bump };
+
+static double adaptive_step (pw_run *r, double t_end) {
+  pw_error error = { 0 };
+  double before = pw_time (r);
+  check_ok (pw_advance (r, t_end, &error), &error);
+  return pw_time (r) - before;
+}
+
+/* The error of a step under the force 1e5 t^4 by its definition: the root of the mean square, over 6 numbers, of the estimates
+ * in units of rtol (|q| + L) and rtol (|v| + L / T). */
+static double adaptive_estimate (double t, double h, const pw_sample *x, const pw_scale *scale) {
+  double v = 0, q = 0;
+  for (int i = 0; i < 7; i++) {
+    double stage = 0;
+    for (int j = 0; j < i; j++) stage += h * adaptive_A[i][j] * 1e5 * pow (t + adaptive_c[j] * h, 4);
+    q += h * adaptive_e[i] * stage;
+    v += h * adaptive_e[i] * 1e5 * pow (t + adaptive_c[i] * h, 4);
+  }
+  q /= fabs (x->q[0]) + scale->length;
+  v /= fabs (x->v[0]) + scale->length / scale->time;
+  return sqrt ((q * q + v * v) / 6);
+}
+
+/* h_new / h = 0.9 err^-(1/5 - 3/4 0.04) err_before^0.04 */
+static void test_norm (void **state) {
+  (void)state;
+  const double rtol = 1e-8;
+  double before = 0, predicted = 0;
+  int compared = 0;
+  pw_system *s = scene_system (&adaptive_power_table, NULL);
+  pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = rtol, .span = 1 });
+  for (int n = 0; n < 40; n++) {
+    double t = pw_time (r);
+    long rejected = pw_run_statistics (r)->rejected;
+    double h = adaptive_step (r, 1);
+    pw_error error = { 0 };
+    pw_sample x;
+    check_ok (pw_at (r, pw_time (r), &x, &error), &error);
+    double now = adaptive_estimate (t, h, &x, pw_run_scale (r)) / rtol;
+    if (n > 1 && pw_run_statistics (r)->rejected == rejected && compared++ >= 0)
+      check_close ("step", h, predicted, 1e-6 * h, "round-off of estimates of 1e-9 of what they are summed from");
+    predicted = h * fmin (5, fmax (0.2, 0.9 * pow (now, -(0.2 - 0.03)) * pow (before, 0.04)));
+    before = fmax (now, 1e-4);
+  }
+  check_below ("few", 10, compared, "of 40 steps most are not rejected");
+  pw_close (r);
+  pw_free (s);
+}
+
+/* A narrow bump takes rejections: the step right behind one is not longer. */
+static void test_after_rejection (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&adaptive_bump_table, NULL);
+  pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = 1e-8, .span = 2 });
+  int found = 0;
+  for (double last = INFINITY; pw_time (r) < 1.5;) {
+    long rejected = pw_run_statistics (r)->rejected;
+    double h = adaptive_step (r, 2);
+    if (pw_run_statistics (r)->rejected == rejected)
+      check_below ("step behind a rejection", h, last * (1 + 1e-9), "no growth; round-off of the times");
+    last = pw_run_statistics (r)->rejected > rejected ? found++, h : INFINITY;
+  }
+  check_below ("no rejections", 0, found, "the bump is narrower than the steps before it");
+  pw_close (r);
+  pw_free (s);
+}
+
+/* A step that was cut short does not make those behind it short. */
+static void test_after_cut (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&scene_ezyroller, NULL);
+  pw_run *r = runs_open (s, "erk5+projection", &(pw_settings){ .rtol = 1e-8, .span = 10 });
+  double h = 0;
+  while (pw_time (r) < 2) h = adaptive_step (r, 10);
+  adaptive_step (r, pw_time (r) + 1e-6 * h);
+  check_below ("the step before the cut", 0.5 * h, adaptive_step (r, 10), "the motion is as smooth as before");
+  pw_close (r);
+  pw_free (s);
+}
+
+/* ---- Motion along the constraints ----
+ *
+ * All of the motion is prescribed, so that a projection takes the whole error away: only its size limits the steps, at
+ * rtol^(3/4).  An estimate of h^5 then gives steps that grow as rtol^(3/20). */
+
+static void adaptive_turned (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "arm", .mass = 1, .inertia = 1, .start = { 1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "ground", "arm" }, .at = { { 0, 0 }, { -1, 0 } } });
+  pw_add_drive (m, &(pw_drive){ .name = "motor",
+                                .body = { "arm", "ground" },
+                                .what = PW_DRIVE_ANGLE,
+                                .value = { PW_HARMONIC, .harmonic = { .amplitude = 5, .omega = 0.5, .offset = -5 } } });
+}
+
+static const pw_plugin_table adaptive_turned_table = { .abi = PW_ABI,
+                                                       .size = sizeof (pw_plugin_table),
+                                                       .build = adaptive_turned };
+
+static double adaptive_steps (const char *method, double rtol, double t_end) {
+  double q[3], v[3];
+  pw_statistics cost;
+  pw_system *s = scene_system (&adaptive_turned_table, NULL);
+  runs_state (s, method, &(pw_settings){ .rtol = rtol, .span = t_end }, t_end, q, v, &cost);
+  pw_free (s);
+  return (double)cost.steps;
+}
+
+static void test_prescribed (void **state) {
+  (void)state;
+  double few = adaptive_steps ("erk5+projection", 1e-4, 50), many = adaptive_steps ("erk5+projection", 1e-10, 50);
+  check_close ("growth of steps", log10 (many / few) / 6, 0.15, 0.02, "rtol^(3/20); rtol^(1/10) without the root");
+  check_below ("steps of bdf+projection", 300, adaptive_steps ("bdf+projection", 1e-4, 50),
+               "less than half of what they are; a projection that hides the error lets them grow for ever");
+}
+
 /* ---- Runs that cannot go on ---- */
 
 /* omega' = omega^2, omega = 1 / (1 - t). */
@@ -230,8 +399,16 @@ static void test_useless_tolerances (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_orders), cmocka_unit_test (test_tolerances), cmocka_unit_test (test_work),
-    cmocka_unit_test (test_edge),   cmocka_unit_test (test_stops),      cmocka_unit_test (test_useless_tolerances),
+    cmocka_unit_test (test_orders),
+    cmocka_unit_test (test_tolerances),
+    cmocka_unit_test (test_work),
+    cmocka_unit_test (test_norm),
+    cmocka_unit_test (test_after_rejection),
+    cmocka_unit_test (test_after_cut),
+    cmocka_unit_test (test_prescribed),
+    cmocka_unit_test (test_edge),
+    cmocka_unit_test (test_stops),
+    cmocka_unit_test (test_useless_tolerances),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

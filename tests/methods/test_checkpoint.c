@@ -1,5 +1,6 @@
 /* A run loaded from a checkpoint goes on, bit for bit, as the one that was saved: every method, every stabilisation. */
 #include <limits.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
@@ -238,10 +239,31 @@ static void test_other (void **state) {
   pw_free (other);
 }
 
+/* The ledger has all work done before the run was saved: by any method, the energy is accounted for to the accuracy of the run. */
+static void test_ledger (void **state) {
+  static const char *const method[] = { "rk4+projection", "erk8+projection", "adams",
+                                        "bdf+projection", "ida+ggl",         "galpha" };
+  (void)state;
+  for (int i = 0; i < 6; i++) {
+    pw_error error = { 0 };
+    pw_archive a = { .at = NULL };
+    pw_system *s = saved_system (0);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2, .ledger = 1 });
+    runs_to (r, 1);
+    check_ok (pw_run_save (r, &a, &error), &error);
+    pw_sample x = runs_to (r, 2);
+    check_below (method[i], fabs (x.balance), 1e-4 * x.work, "errors of galpha at h = 1e-3, the others less");
+    check_below (method[i], 1e-3, x.work, "there is work to be accounted for");
+    pw_archive_free (&a);
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_same),   cmocka_unit_test (test_options), cmocka_unit_test (test_other),
-    cmocka_unit_test (test_kicked), cmocka_unit_test (test_counts),
+    cmocka_unit_test (test_kicked), cmocka_unit_test (test_counts),  cmocka_unit_test (test_ledger),
   };
   return cmocka_run_group_tests (tests, saved_setup, saved_teardown);
 }

@@ -353,6 +353,62 @@ static void test_names (void **state) {
   redundant_says (&redundant_two_table, none);
 }
 
+/* ---- Which rows are kept, and what they are called ---- */
+
+/* A disc on a rod and a drive cannot move.  Of its three rows at the centre the wheel's is farther from the drive's than the
+ * rod's is, but a position must not be given up for a velocity. */
+static void redundant_held (pw_model *m, const void *parameter) {
+  (void)parameter;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 1, 1, 0 }, .rate = { 0, 0, 1 } });
+  pw_add_drive (
+      m, &(pw_drive){ .name = "across", .body = { "disc", "ground" }, .what = PW_DRIVE_X, .value = { .constant = 1 } });
+  pw_add_rod (m, &(pw_rod){ .name = "rod", .body = { "disc", "ground" }, .length = sqrt (2) });
+  pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "disc" });
+}
+
+/* Of the drive along it the wheel's row has only a two-hundredth. */
+static void redundant_askew (pw_model *m, const void *parameter) {
+  (void)parameter;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+  pw_add_drive (m, &(pw_drive){ .name = "ahead", .body = { "disc", "ground" }, .what = PW_DRIVE_X });
+  pw_add_drive (m, &(pw_drive){ .name = "aside", .body = { "disc", "ground" }, .what = PW_DRIVE_Y });
+  pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "disc", .heading = 0.005 });
+}
+
+static void test_kept (void **state) {
+  (void)state;
+  static const pw_plugin_table held = TRIAL_TABLE (redundant_held), askew = TRIAL_TABLE (redundant_askew);
+  static const char *const of_held[] = { "wheel edge (edge.N) follows from drive across, rod rod", NULL };
+  static const char *const of_askew[] = { "wheel edge (edge.N) follows from drive ahead, drive aside", NULL };
+  redundant_says (&held, of_held);
+  redundant_says (&askew, of_askew);
+}
+
+/* A body hangs from a weld at its centre and a pin at the distance d: of the weight W the pin carries p, where
+ * p^2 + (W - p)^2 + (d p / L)^2 is least, moments in units of force times the scene's length. */
+static void redundant_hung (pw_model *m, const void *parameter) {
+  (void)parameter;
+  pw_add_body (m, &(pw_body){ .name = "sign", .mass = 3, .inertia = 2 });
+  pw_add_weld (m, &(pw_weld){ .name = "weld", .body = { "sign", "ground" } });
+  pw_add_pin (m, &(pw_pin){ .name = "pin", .body = { "sign", "ground" }, .at = { { 4, 0 }, { 4, 0 } } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -10 } });
+}
+
+static void test_moments (void **state) {
+  (void)state;
+  static const pw_plugin_table hung = TRIAL_TABLE (redundant_hung);
+  pw_system *s = scene_system (&hung, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  pw_sample x = runs_to (r, 0);
+  double L = pw_run_scale (r)->length, W = 30, d = 4, p = W / (2 + d * d / (L * L));
+  check_below ("the scene's length is not 1", 0.1, fabs (L - 1), "or nothing is said of units");
+  check_close ("pin", trial_reaction (s, &x, "pin.Fy"), p, 1e-12 * W, "round-off");
+  check_close ("weld", trial_reaction (s, &x, "weld.Fy"), W - p, 1e-12 * W, "round-off");
+  check_close ("moment", fabs (trial_reaction (s, &x, "weld.M")), d * p, 1e-12 * W * d, "round-off");
+  pw_close (r);
+  pw_free (s);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_parallelogram_twins),
@@ -363,6 +419,8 @@ int main (void) {
     cmocka_unit_test (test_caster),
     cmocka_unit_test (test_casters),
     cmocka_unit_test (test_names),
+    cmocka_unit_test (test_kept),
+    cmocka_unit_test (test_moments),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
