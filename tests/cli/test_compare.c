@@ -115,7 +115,7 @@ static void test_no_order (void **state) {
 static void test_repeats (void **state) {
   (void)state;
   cli_good (
-      "pinwheel compare ezyroller --methods rk4+projection -t 2 --truth @/known.csv --step-ladder 1e-5:1e-5 -o @/long "
+      "pinwheel compare ezyroller --methods rk4+projection -t 2 --truth @/known.csv --step-ladder 2e-6:2e-6 -o @/long "
       ">@/table");
   assert_true (compare_number ("long/compare.csv", 0, REPEATS) >= 3);
   assert_true (compare_number ("long/compare.csv", 0, SPREAD) >= 0);

@@ -126,21 +126,36 @@ static int call_same (const struct stat *a, const struct stat *b) {
   return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
 }
 
+static int call_is_synced (const struct stat *info) {
+  int synced = 0;
+  for (int i = 0; i < CALL_SYNCED; i++)
+    synced |= call_same (&call.synced[i], info) && call.synced[i].st_size == info->st_size;
+  return synced;
+}
+
+/* A checkpoint counts on its table, which is "a.csv.part" beside it. */
+static void call_check_table (const char *checkpoint) {
+  struct stat info;
+  char table[600];
+  const char *end = strstr (checkpoint, "a.ck.");
+  if (end == NULL) return;
+  snprintf (table, sizeof table, "%.*sa.csv.part", (int)(end - checkpoint), checkpoint);
+  if (lstat (table, &info) == 0 && !call_is_synced (&info)) call.unsynced++;
+}
+
 /* A file is on the disk, as it is, before it takes the place of another; its folder must follow. */
 int __real_rename (const char *from, const char *to);
 int __wrap_rename (const char *from, const char *to);
 int __wrap_rename (const char *from, const char *to) {
   struct stat info;
   char folder[600];
-  int synced = 0;
   if (call_fails ("rename", 0)) {
     errno = EROFS;
     return -1;
   }
   assert_int_equal (lstat (from, &info), 0);
-  for (int i = 0; i < CALL_SYNCED; i++)
-    synced |= call_same (&call.synced[i], &info) && call.synced[i].st_size == info.st_size;
-  if (!synced) call.unsynced++;
+  if (!call_is_synced (&info)) call.unsynced++;
+  call_check_table (from);
   snprintf (folder, sizeof folder, "%.*s", strrchr (to, '/') ? (int)(strrchr (to, '/') - to) : 1,
             strrchr (to, '/') ? to : ".");
   assert_int_equal (stat (folder, &call.folder), 0);

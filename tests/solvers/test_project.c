@@ -59,6 +59,37 @@ static void test_off (void **state) {
   project_try ("n-trailer", NULL, 0, "rk4+projection", 1e-3);
 }
 
+/* The length of the correction of a rate that is off. */
+static double project_length (const char *method) {
+  pw_system *s = scene_named ("ezyroller", "m2", 0.1);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3 });
+  pw_sample x = runs_to (r, 0.3);
+  pw_error error = { 0 };
+  pw_projector p;
+  double q[PROJECT_MOST], v[PROJECT_MOST], a[PROJECT_MOST], lambda[PROJECT_MOST], before[PROJECT_MOST], square = 0;
+  int n = pw_count_coordinates (s);
+  memcpy (q, x.q, (size_t)n * sizeof *q);
+  memcpy (v, x.v, (size_t)n * sizeof *v);
+  check_ok (pw_projector_open_asked (&p, r, &error), &error);
+  v[1] += 1e-3;
+  memcpy (before, v, (size_t)n * sizeof *v);
+  assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
+  for (int j = 0; j < n; j++) square += (v[j] - before[j]) * (v[j] - before[j]);
+  pw_projector_close (&p);
+  pw_close (r);
+  pw_free (s);
+  return sqrt (square);
+}
+
+/* In the identity metric the correction is the shortest one.  A third of its components and more have other weights in the mass
+ * matrix. */
+static void test_metric (void **state) {
+  (void)state;
+  double identity = project_length ("rk4+projection:metric=identity"), mass = project_length ("rk4+projection");
+  print_message ("corrections %.6g and %.6g\n", identity, mass);
+  check_below ("correction", identity, 0.999 * mass, "the mass matrix has entries from 0.1 to 1");
+}
+
 /* A residual that is not a number is the worst of all, whichever row's it is. */
 static void test_wild_residual (void **state) {
   (void)state;
@@ -79,6 +110,6 @@ static void test_wild_residual (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_consistent), cmocka_unit_test (test_off),
-                                      cmocka_unit_test (test_wild_residual) };
+                                      cmocka_unit_test (test_metric), cmocka_unit_test (test_wild_residual) };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -44,6 +44,20 @@ static void test_no_harm (void **state) {
   start_close (r, s);
 }
 
+/* What is off by more than round-off is moved, however little that is. */
+static void test_little (void **state) {
+  static const char *const name[] = { "frame.x", "frame.vy", NULL };
+  static const double value[] = { 0.375 + 1e-10, 1e-10 };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_system *s;
+    const char *const one[] = { name[i], NULL };
+    pw_run *r = start_open (&s, one, value + i);
+    assert_true (pw_run_start (r)->moved > 0);
+    start_close (r, s);
+  }
+}
+
 /* A state on the way is as consistent as it can be: it is not touched, either. */
 static void test_no_harm_on_the_way (void **state) {
   (void)state;
@@ -400,6 +414,7 @@ static void test_far (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_no_harm),
+    cmocka_unit_test (test_little),
     cmocka_unit_test (test_no_harm_on_the_way),
     cmocka_unit_test (test_specified),
     cmocka_unit_test (test_specified_zero),
