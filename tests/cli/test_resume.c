@@ -67,11 +67,12 @@ static void test_every_step (void **state) {
   cli_good ("pinwheel run ezyroller -t 2 --checkpoint-every 0.5 --checkpoint @/one.ck -o @/one.csv");
   for (const char *const *c = left; *c; c++) {
     char command[400];
-    snprintf (command, sizeof command,
-              "rm -f @/two.*; %s; cp @/one.ck @/two.ck\n"
-              "pinwheel run ezyroller -t 2 --resume @/two.ck -o @/two.csv 2>@/said; cmp @/one.csv @/two.csv\n"
-              "ls @ | grep -c 'two.*part'; :",
-              *c);
+    snprintf (
+        command, sizeof command,
+        "rm -f @/two.*; %s; cp @/one.ck @/two.ck\n"
+        "pinwheel run ezyroller -t 2 --resume @/two.ck -o @/two.csv 2>@/said && cmp @/one.csv @/two.csv || exit 1\n"
+        "ls @ | grep -c 'two.*part' || :",
+        *c);
     cli_good (command);
     assert_string_equal (cli_out, "0\n");
   }
