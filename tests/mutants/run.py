@@ -99,6 +99,13 @@ class Copy:
 
     def __init__(self, build, names):
         self.top = os.path.join(build, "source")
+        for folder, folders, old in os.walk(self.top):  # files that have been moved
+            if folder == self.top and "build" in folders:
+                folders.remove("build")
+            for name in old:
+                path = os.path.join(folder, name)
+                if os.path.relpath(path, self.top) not in names:
+                    os.remove(path)
         for name in names:
             there = os.path.join(self.top, name)
             here = os.path.join(TOP, name)
@@ -144,7 +151,7 @@ def digest(names):
 def state(names, test):
     """What a verdict depends on: all sources but other tests, if a test has detected the mutant."""
     kept = (n for n in names if not n.startswith(("docs/", "tests/mutants/")))
-    return digest(tuple(n for n in kept if not test or not re.fullmatch(r"tests/test_\w+\.c", n) or n == f"tests/{test}.c"))
+    return digest(tuple(n for n in kept if not test or not re.fullmatch(r"tests/\w+/test_\w+\.c", n) or n.endswith(f"/{test}.c")))
 
 
 def main():
