@@ -179,8 +179,9 @@ static int adaptive_bump (void *context, double t, const double *x, double value
   return 0;
 }
 
+/* Its motion across makes the kinetic energy so large that, at first, errors of the work count less than those of the state. */
 static void adaptive_pushed (pw_model *m, int (*eval) (void *, double, const double *, double *, double *)) {
-  pw_add_body (m, &(pw_body){ .name = "puck", .mass = 1, .inertia = 1, .rate = { 3, 0, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "puck", .mass = 1, .inertia = 1, .rate = { 3, 30, 0 } });
   pw_add_force (m, &(pw_force){ .name = "push", .body = "puck", .fx = { PW_FUNCTION, .function = { .eval = eval } } });
 }
 
@@ -223,12 +224,12 @@ static double adaptive_estimate (double t, double h, const pw_sample *x, const p
   return sqrt ((q * q + v * v) / 6);
 }
 
-/* h_new / h = 0.9 err^-(1/5 - 3/4 0.04) err_before^0.04 */
+/* h_new / h = 0.9 err^-(1/5 - 3/4 0.04) err_before^0.04, but where the error of the work is larger than the state's. */
 static void test_norm (void **state) {
   (void)state;
-  const double rtol = 1e-8;
+  const double rtol = 1e-8, round_off = 1e-6;
   double before = 0, predicted = 0;
-  int compared = 0;
+  int equal = 0;
   pw_system *s = scene_system (&adaptive_power_table, NULL);
   pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = rtol, .span = 1 });
   for (int n = 0; n < 40; n++) {
@@ -239,12 +240,12 @@ static void test_norm (void **state) {
     pw_sample x;
     check_ok (pw_at (r, pw_time (r), &x, &error), &error);
     double now = adaptive_estimate (t, h, &x, pw_run_scale (r)) / rtol;
-    if (n > 1 && pw_run_statistics (r)->rejected == rejected && compared++ >= 0)
-      check_close ("step", h, predicted, 1e-6 * h, "round-off of estimates of 1e-9 of what they are summed from");
+    equal += n > 1 && pw_run_statistics (r)->rejected == rejected && fabs (h - predicted) <= round_off * h;
     predicted = h * fmin (5, fmax (0.2, 0.9 * pow (now, -(0.2 - 0.03)) * pow (before, 0.04)));
     before = fmax (now, 1e-4);
   }
-  check_below ("few", 10, compared, "of 40 steps most are not rejected");
+  print_message ("%d steps are equal to what the norm predicts\n", equal);
+  check_below ("equal steps", 10, equal, "of 40; another norm or other weights leave none");
   pw_close (r);
   pw_free (s);
 }

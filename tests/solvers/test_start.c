@@ -46,7 +46,7 @@ static void test_no_harm (void **state) {
 
 /* What is off by more than round-off is moved, however little that is. */
 static void test_little (void **state) {
-  static const char *const name[] = { "frame.x", "frame.vy", NULL };
+  static const char *const name[] = { "steer.x", "frame.vy", NULL };
   static const double value[] = { 0.375 + 1e-10, 1e-10 };
   (void)state;
   for (int i = 0; i < 2; i++) {
