@@ -286,8 +286,8 @@ static void test_after_cut (void **state) {
 
 /* ---- Motion along the constraints ----
  *
- * All of the motion is prescribed, of a body without mass, which takes no work, so that a projection takes the whole error away: only its size limits the steps, at
- * rtol^(3/4).  An estimate of h^5 then gives steps that grow as rtol^(3/20). */
+ * All of the motion is prescribed, of a body without mass, which takes no work, so that a projection takes the whole error
+ * away: only its size limits the steps, at rtol^(3/4).  An estimate of h^5 then gives steps that grow as rtol^(3/20). */
 
 static void adaptive_turned (pw_model *m, const void *parameters) {
   (void)parameters;
