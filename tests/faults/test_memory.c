@@ -100,7 +100,7 @@ void free (void *p) {
 /* Calls of libraries that crash when they are refused memory.  Each is made only when there is enough (pw_reserve), so that
  * they crash if one allocation fails where the memory is not exhausted, as here; docs/design.md lists them. */
 static int memory_is_fenced (const char *function) {
-  static const char *const fenced[] = { "fy_parser_set_string", "SUNContext_Create", "N_VClone", "CVodeInit" };
+  static const char *const fenced[] = { "fy_parser_set_input_callback", "SUNContext_Create", "N_VClone", "CVodeInit" };
   for (size_t i = 0; i < sizeof fenced / sizeof *fenced; i++)
     if (strcmp (function, fenced[i]) == 0) return 1;
   return 0;
