@@ -15,6 +15,7 @@ typedef struct {
   double lost, lost_unstabilised;  /* residual at which constraints count as lost */
   double follows, magnified;       /* residual of a redundant row: round-off, and over that of the others */
   double rank, suspect, dependent; /* sines: rank lost; rows are looked into; refused where that is too large a task */
+  double independent;              /* sine of a row that counts as independent of those kept */
   double near, refine;     /* sines: near a singular configuration, as a part of the largest; solutions are refined */
   double regular;          /* sine that is not singular, as a part of the largest */
   double turn, least_turn; /* growth of the accelerations in a turn; least level */
@@ -25,6 +26,7 @@ typedef struct {
   double floor, met, ahead;                            /* sines where branches meet; cosine of the angle */
   double resolved;                                     /* step over the distance of branches */
   double agree, agree_best;                            /* difference of two divisions of a step */
+  double sample, sample_best;                          /* the same inside a step, of a sample */
   double loosened, loose;                              /* grip of the active rows on redundant ones */
   double extreme;                                      /* the largest mass, and one over the smallest [kg] */
   double stalled;                                      /* steps in a row that do not advance */

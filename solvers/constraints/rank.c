@@ -152,7 +152,7 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   double worst;
   if (pw_place (s, r->t, r->q, r->v) != PW_OK) return 0;
   pw_sweep_J (s);
-  rank_basis (s, 1e-7, x->rows, x->kept, x->active);
+  rank_basis (s, r->limits.independent, x->rows, x->kept, x->active);
   rank_direction (s, x, rank, r->v, number);
   for (int j = 0; j < s->coords; j++) x->q[j] = r->q[j] + 0.03 * x->motion[j];
   const unsigned char *before = r->active;
@@ -160,7 +160,7 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   if (pw_projector_open (&p, r, s->metric, s->metric, &none) == PW_OK) {
     p.alone = 1;
     if (pw_project_positions (&p, r, r->t, x->q, r->v, &row, &worst) == PW_OK)
-      away = rank_basis (s, 1e-7, x->rows, x->kept, x->active);
+      away = rank_basis (s, r->limits.independent, x->rows, x->kept, x->active);
     pw_projector_close (&p);
   }
   r->active = before;
@@ -194,7 +194,7 @@ int pw_rank_choose (pw_run *r, pw_error *error) {
   if (rank_search_open (&x, s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   int status = pw_place (s, r->t, r->q, r->v);
   pw_sweep_J (s);
-  int rank = rank_basis (s, 1e-7, x.rows, x.kept, x.active), best = rank;
+  int rank = rank_basis (s, r->limits.independent, x.rows, x.kept, x.active), best = rank;
   memcpy (x.best, x.active, (size_t)s->rows);
   for (int number = 0; number < 3 && status == PW_OK; number++) {
     int away = rank_nearby (r, &x, rank, number);
@@ -221,7 +221,7 @@ int pw_rank_reselect (pw_run *r) {
   int holonomic = 0, all = s->rows - r->redundant;
   if (rank_search_open (&x, s) != PW_OK) return PW_MACHINE;
   for (int i = 0; i < s->holonomic; i++) holonomic += r->active[i];
-  int rank = rank_basis_of (s, 1e-7, holonomic, all, x.rows, x.kept, x.active);
+  int rank = rank_basis_of (s, r->limits.independent, holonomic, all, x.rows, x.kept, x.active);
   int other = rank == all && memcmp (x.active, r->active, (size_t)s->rows) != 0;
   if (other) rank_take (r, (unsigned char *)(r->redundant_row + r->redundant), x.active);
   free (x.memory);

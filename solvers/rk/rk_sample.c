@@ -46,12 +46,11 @@ static int sample_two_parts (pw_run *r, const sample_begin *from, double by, dou
 /* Leaves the best in the sample arrays. */
 static int sample_in_parts (pw_run *r, const sample_begin *from, int status, double t) {
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.541 };
-  const double good = 1e-9, enough = 1e-2;
   const int parts = sizeof part / sizeof *part;
   const struct pw_method_data *d = r->data;
   int known = status == PW_OK, choice = 0;
   double best = INFINITY;
-  for (int i = 0; i < parts && best > good; i++) {
+  for (int i = 0; i < parts && best > r->limits.sample_best; i++) {
     status = sample_two_parts (r, from, from->t + part[i] * (t - from->t), t);
     if (status < 0) return status;
     if (status != PW_OK) continue;
@@ -60,7 +59,7 @@ static int sample_in_parts (pw_run *r, const sample_begin *from, int status, dou
     memcpy (r->q_at, d->q, pw_rk_block (r, 1));
     known = 1;
   }
-  if (!(best <= enough)) return PW_RETRY;
+  if (!(best <= r->limits.sample)) return PW_RETRY;
   status = sample_two_parts (r, from, from->t + part[choice] * (t - from->t), t);
   memcpy (r->q_at, d->q, pw_rk_block (r, 1));
   return status;

@@ -29,6 +29,9 @@ const pw_watchdog pw_watchdog_limits = {
   .suspect = 1e-3,
   .dependent = 1e-5,
 
+  /* Rows of a consistent configuration are known to the 1e-8 that residuals of 1e-16 leave of a sine; ten times that. */
+  .independent = 1e-7,
+
   /* A stage of a step h is off by about h^2 / 8, which decides on the branch if s^2 is not large beside it: at 1e-3 s and a few
    * rad/s for s of 0.02.  A factorisation is good to eps / s^2, 5e-13 at 0.02. */
   .near = 0.02,
@@ -75,6 +78,10 @@ const pw_watchdog pw_watchdog_limits = {
    * a good step, 1e-7, do not agree. */
   .agree = 1e-7,
   .agree_best = 1e-11,
+
+  /* A sample does not go into the next step: one that is seen to be good to a hundredth is worth showing. */
+  .sample = 1e-2,
+  .sample_best = 1e-9,
 
   /* Least part of a set of rows that holds the others: another one is looked for at 0.6 of the grip there was, and where a
    * coefficient exceeds 1 / 0.7. */
