@@ -145,7 +145,7 @@ static void test_stop_inside (void **state) {
 /* A rotor on a pin with a constant torque; without it, as fast as it gets, it only turns. */
 static void limits_rotor (pw_model *m, const void *parameters) {
   const double *torque = parameters;
-  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, *torque ? 0 : 5000 } });
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .rate = { 0, 0, *torque != 0 ? 0 : 5000 } });
   pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
   pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "rotor", "ground" }, .value = { .constant = *torque } });
 }
