@@ -173,7 +173,7 @@ static void test_cubic (void **state) {
 /* Of two points at rest it is 3 x^2 - 2 x^3, and rates at the ends are 0. */
 static void test_rest (void **state) {
   static const double t[] = { 1, 3 }, y[] = { 2, 7 };
-  pw_signal s = { PW_TABLE, .table = { t, y, 2, PW_CUBIC, PW_ENDS_REST } };
+  pw_signal s = { PW_TABLE, .table = { t, y, 2, PW_CUBIC, PW_ENDS_REST, 0, 0 } };
   pw_source source = shapes_source (&s);
   double u[3];
   (void)state;
@@ -209,7 +209,7 @@ static void shapes_car (pw_model *m, const void *parameters) {
   pw_add_speed (m, &(pw_speed){ .name = "engine",
                                 .body = "car",
                                 .at = { -0.3 },
-                                .value = { PW_TABLE, .table = { t, y, 3, PW_LINEAR, 0 } } });
+                                .value = { PW_TABLE, .table = { t, y, 3, PW_LINEAR, 0, 0, 0 } } });
   pw_add_motor (m, &(pw_motor){ .name = "tow",
                                 .body = { "trailer", "car" },
                                 .stiffness = 3,
@@ -222,7 +222,7 @@ static void shapes_car (pw_model *m, const void *parameters) {
   pw_add_drive (m, &(pw_drive){ .name = "swing",
                                 .body = { "boom", "car" },
                                 .what = PW_DRIVE_ANGLE,
-                                .value = { PW_TABLE, .table = { t, y, 3, PW_CUBIC, PW_ENDS_REST } } });
+                                .value = { PW_TABLE, .table = { t, y, 3, PW_CUBIC, PW_ENDS_REST, 0, 0 } } });
 }
 
 static void test_methods (void **state) {
@@ -265,7 +265,7 @@ static void test_refused (void **state) {
 }
 
 static pw_signal shapes_points (const double *t, const double *y, int count, int interpolation) {
-  return (pw_signal){ PW_TABLE, .table = { t, y, count, interpolation, 0 } };
+  return (pw_signal){ PW_TABLE, .table = { t, y, count, interpolation, 0, 0, 0 } };
 }
 
 static void test_faults (void **state) {

@@ -38,7 +38,7 @@ static void feedback_build (pw_model *m, const void *parameters) {
   pw_add_pin (m, &(pw_pin){ .name = "A", .body = { "a", "ground" }, .at = { { -0.5 } } });
   pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "b", "a" }, .at = { { -0.5 }, { 0.5 } } });
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
-  if (p->signals) {
+  if (p->signals != 0) {
     pw_add_torque (m, &(pw_torque){ .name = "T", .body = { "a", "ground" }, .value = FEEDBACK (omega) });
     pw_add_force (m, &(pw_force){ .name = "F", .body = "b", .fx = FEEDBACK (vx), .fy = FEEDBACK (vy) });
   } else {
