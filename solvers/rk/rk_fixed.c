@@ -10,7 +10,7 @@ static int fixed_two_parts (pw_run *r, double t, double t1, int project, int kee
   *added = 0;
   int status = pw_rk_step (r, t - r->t, t, project, added);
   if (status != PW_OK) return status;
-  pw_rk_accept (r, t - r->t, t, *added);
+  pw_rk_accept (r, t - r->t, t, r->settings.ledger ? *added : 0);
   if (keep) return PW_OK;
   status = pw_rk_step (r, t1 - t, t1, project, added);
   pw_rk_revert (r);
