@@ -289,7 +289,7 @@ bench-effects: all basic $(BUILD)/benchmarks/effects
 	@$(BUILD)/benchmarks/effects $(BASIC)
 
 hard: all $(BUILD)/benchmarks/hard
-	@$(BUILD)/benchmarks/hard -o docs/hard-cases.md benchmarks/hard
+	@$(BUILD)/benchmarks/hard -o docs/hard-cases benchmarks/hard
 
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers

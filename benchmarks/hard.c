@@ -1,9 +1,9 @@
 /* hard: every method on every hard case, a matrix of verdicts against what is expected.
  *
- *     hard [-j CELLS] [-c CASE] [-m METHOD] [-v] [-o PAGE.md] FOLDER
+ *     hard [-j CELLS] [-c CASE] [-m METHOD] [-v] [-o PAGE] FOLDER
  *
- * FOLDER holds cases/ and models/; CASE and METHOD are patterns.  Each cell is a process of its own with a limit of
- * processor time, so that a crash or a hang is a verdict too.  Exit status: 0 if all verdicts are as expected and none
+ * Writes PAGE.md and PAGE.csv.  FOLDER holds cases/ and models/; CASE and METHOD are patterns.  Each cell runs in its own process with a limit
+ * of processor time, so that a crash or a hang becomes a verdict.  Exit status: 0 if all verdicts are as expected and none
  * is wrong, 1 if not, 2 for a mistake in the cases. */
 #define _XOPEN_SOURCE 700
 #include <dirent.h>
@@ -16,25 +16,25 @@
 #include <unistd.h>
 #include "hard/hard.h"
 
-enum { HARD_SLOTS = 64, HARD_PATIENCE = 10 /* limit of elapsed time over that of processor time */ };
+enum { HARD_SLOTS = 64, HARD_ELAPSED = 10 /* limit of elapsed time, relative to that of processor time */ };
 
 typedef struct {
   const char *folder, *only_case, *only_method, *page;
   int slots, verbose;
   hard_case *cases;
-  int count, methods, done; /* cases, methods, cells that have come to an end */
+  int count, methods, done; /* cases, methods, finished cells */
   char method[HARD_METHODS][48];
   hard_result *result;
 } hard;
 
-/* A cell under way. */
+/* A running cell. */
 typedef struct {
   pid_t pid; /* 0: none */
-  int from;  /* where its result comes from */
+  int from;  /* pipe of its result */
   int cell;
 } hard_child;
 
-/* ---- What there is ---- */
+/* ---- Cases and methods ---- */
 
 static int hard_by_name (const struct dirent **a, const struct dirent **b) {
   return strcmp ((*a)->d_name, (*b)->d_name);
@@ -73,13 +73,13 @@ static void hard_list_methods (hard *x) {
 
 /* ---- Cells ---- */
 
-/* In the child: the limits, the run, its result. */
+/* In the child process: sets the limits, runs, sends the result. */
 static void hard_cell (const hard_case *c, const char *method, int to) {
   hard_result r;
   struct rlimit limit = { (rlim_t)c->seconds, (rlim_t)c->seconds + 5 }, none = { 0, 0 };
   setrlimit (RLIMIT_CPU, &limit);
   setrlimit (RLIMIT_CORE, &none);
-  alarm ((unsigned)(HARD_PATIENCE * c->seconds));
+  alarm ((unsigned)(HARD_ELAPSED * c->seconds));
   hard_run (c, method, &r);
   _exit (write (to, &r, sizeof r) == (ssize_t)sizeof r ? 0 : 1);
 }
@@ -101,8 +101,8 @@ static void hard_start (hard *x, hard_child *child, int cell) {
   exit (2);
 }
 
-/* One line about a cell that came out otherwise than expected, or about any of them. */
-static void hard_tell (const hard *x, int cell) {
+/* One line about a cell whose result is not as expected, or with -v about any cell. */
+static void hard_report (const hard *x, int cell) {
   const hard_case *c = &x->cases[cell / x->methods];
   const hard_result *r = &x->result[cell];
   const hard_expectation *e = hard_expected (c, x->method[cell % x->methods]);
@@ -125,11 +125,11 @@ static void hard_finish (hard *x, hard_child *child, int status) {
   } else if (status != 0 || read (child->from, r, sizeof *r) != (ssize_t)sizeof *r)
     *r = (hard_result){ .verdict = HARD_CRASH };
   else
-    r->verdict = hard_judge (c, r);
+    r->verdict = hard_verdict_of (c, r);
   close (child->from);
   child->pid = 0;
   if (isatty (STDERR_FILENO)) fprintf (stderr, "\r%d of %d\r", ++x->done, x->count * x->methods);
-  hard_tell (x, child->cell);
+  hard_report (x, child->cell);
 }
 
 static void hard_all (hard *x) {
@@ -154,16 +154,19 @@ static int hard_count_deviations (const hard *x) {
   return deviations;
 }
 
-static void hard_write_page (const hard *x, const hard_matrix *m) {
-  FILE *f = fopen (x->page, "w");
-  if (f) hard_page (m, f);
-  if (f && fclose (f) == 0) return;
-  perror (x->page);
+static void hard_write (const hard *x, const char *suffix, const hard_matrix *m,
+                        void write (const hard_matrix *, FILE *)) {
+  char path[1000];
+  snprintf (path, sizeof path, "%s%s", x->page, suffix);
+  FILE *f = fopen (path, "w");
+  if (f) write (m, f);
+  if (f && !ferror (f) && fclose (f) == 0) return;
+  perror (path);
   exit (2);
 }
 
 static int hard_usage (void) {
-  fputs ("hard [-j CELLS] [-c CASE] [-m METHOD] [-v] [-o PAGE.md] FOLDER\n", stderr);
+  fputs ("hard [-j CELLS] [-c CASE] [-m METHOD] [-v] [-o PAGE] FOLDER\n", stderr);
   return 2;
 }
 
@@ -199,9 +202,12 @@ int main (int argc, char **argv) {
   hard_all (&x);
   const hard_matrix m = { x.cases, x.count, x.methods, (const char (*)[48])x.method, x.result };
   hard_print (&m, stdout);
-  if (x.page) hard_write_page (&x, &m);
+  if (x.page) {
+    hard_write (&x, ".md", &m, hard_page);
+    hard_write (&x, ".csv", &m, hard_table);
+  }
   int deviations = hard_count_deviations (&x);
-  printf ("\n%d cells, %d otherwise than expected\n", x.count * x.methods, deviations);
+  printf ("\n%d cells, %d unexpected\n", x.count * x.methods, deviations);
   free (x.result);
   free (x.cases);
   return deviations > 0;

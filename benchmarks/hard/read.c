@@ -24,7 +24,7 @@ static void read_copy (const read_place *at, char *to, size_t size, const char *
 
 static const char *read_scalar (const read_place *at, struct fy_node *n) {
   const char *text = n ? fy_node_get_scalar0 (n) : NULL;
-  if (n && text == NULL) read_fail (at, "expected a text or number instead of a list or map", "");
+  if (n && text == NULL) read_fail (at, "expected a text or number, found a list or map", "");
   return text;
 }
 
@@ -133,9 +133,10 @@ static void read_model (const read_place *at, struct fy_node *n, const char *mod
     strcpy (c->model, name);
 }
 
-static void read_case (read_place *at, struct fy_node *n, const char *group, const char *models, hard_case *c) {
+static void read_case (read_place *at, struct fy_node *n, struct fy_node *root, const char *models, hard_case *c) {
   *c = (hard_case){ .step = 1e-3, .rtol = 1e-8, .seconds = 20 };
-  read_copy (at, c->group, sizeof c->group, group);
+  read_text (at, root, "group", c->group, sizeof c->group);
+  read_text (at, root, "about", c->group_about, sizeof c->group_about);
   read_text (at, n, "name", c->name, sizeof c->name);
   at->name = c->name;
   read_text (at, n, "about", c->about, sizeof c->about);
@@ -143,8 +144,8 @@ static void read_case (read_place *at, struct fy_node *n, const char *group, con
   read_model (at, n, models, c);
   read_run (at, fy_node_mapping_lookup_by_string (n, "run", FY_NT), c);
   c->sets = read_values (at, fy_node_mapping_lookup_by_string (n, "set", FY_NT), c->set);
-  c->starts = read_values (at, fy_node_mapping_lookup_by_string (n, "start", FY_NT), c->start);
-  c->truths = read_values (at, fy_node_mapping_lookup_by_string (n, "truth", FY_NT), c->truth);
+  c->initials = read_values (at, fy_node_mapping_lookup_by_string (n, "initial", FY_NT), c->initial);
+  c->references = read_values (at, fy_node_mapping_lookup_by_string (n, "reference", FY_NT), c->reference);
   read_bounds (at, fy_node_mapping_lookup_by_string (n, "bounds", FY_NT), c);
   read_stop (at, fy_node_mapping_lookup_by_string (n, "stops", FY_NT), c);
   read_expectations (at, fy_node_mapping_lookup_by_string (n, "expect", FY_NT), c);
@@ -155,12 +156,11 @@ int hard_read (const char *path, const char *models, hard_case *cases, int count
   struct fy_document *d = fy_document_build_from_file (NULL, path);
   if (d == NULL) read_fail (&at, "cannot be read", "");
   struct fy_node *root = fy_document_root (d), *list = fy_node_mapping_lookup_by_string (root, "cases", FY_NT);
-  const char *group = read_scalar (&at, fy_node_mapping_lookup_by_string (root, "group", FY_NT));
   void *next = NULL;
   for (struct fy_node *n; list && (n = fy_node_sequence_iterate (list, &next)); count++) {
     if (count == HARD_CASES) read_fail (&at, "too many cases", "");
     at.name = "";
-    read_case (&at, n, group ? group : path, models, &cases[count]);
+    read_case (&at, n, root, models, &cases[count]);
   }
   fy_document_destroy (d);
   return count;

@@ -24,8 +24,8 @@ static int run_open (const hard_case *c, const char *method, run_cell *x, pw_err
   x->model = x->file ? pw_file_model (x->file, error) : NULL;
   for (int i = 0; x->model && i < c->sets; i++) pw_set (x->model, c->set[i].name, c->set[i].value, error);
   if (x->model && error->status == PW_OK) pw_build (x->model, error);
-  for (int i = 0; error->status == PW_OK && i < c->starts; i++)
-    pw_set_start (x->model, c->start[i].name, c->start[i].value, error);
+  for (int i = 0; error->status == PW_OK && i < c->initials; i++)
+    pw_set_start (x->model, c->initial[i].name, c->initial[i].value, error);
   if (error->status == PW_OK) x->system = pw_compile (x->model, error);
   if (x->system) x->run = pw_open (x->system, method, &settings, error);
   return error->status;
@@ -40,7 +40,7 @@ static void run_close (run_cell *x) {
 
 /* ---- Measuring ---- */
 
-/* NaN counts as the worst there is. */
+/* NaN counts as infinite. */
 static double run_worst (double a, double b) {
   return isnan (a) || isnan (b) ? INFINITY : fmax (a, b);
 }
@@ -56,12 +56,12 @@ static double run_unit (const run_cell *x, const char *name) {
 static double run_error (const hard_case *c, const run_cell *x, const pw_sample *sample) {
   double worst = 0;
   int n = pw_count_coordinates (x->system);
-  for (int i = 0; i < c->truths; i++) {
-    int state = pw_find_state (x->system, c->truth[i].name, NULL);
+  for (int i = 0; i < c->references; i++) {
+    int state = pw_find_state (x->system, c->reference[i].name, NULL);
     if (state < 0) return INFINITY;
     double value = state < n ? sample->q[state] : sample->v[state - n];
-    double size = fmax (fabs (c->truth[i].value), run_unit (x, c->truth[i].name));
-    worst = run_worst (worst, fabs (value - c->truth[i].value) / size);
+    double size = fmax (fabs (c->reference[i].value), run_unit (x, c->reference[i].name));
+    worst = run_worst (worst, fabs (value - c->reference[i].value) / size);
   }
   return worst;
 }
@@ -104,9 +104,9 @@ void hard_run (const hard_case *c, const char *method, hard_result *r) {
   run_close (&x);
 }
 
-/* ---- Judging ---- */
+/* ---- Verdict ---- */
 
-hard_verdict hard_judge (const hard_case *c, const hard_result *r) {
+hard_verdict hard_verdict_of (const hard_case *c, const hard_result *r) {
   hard_verdict worst = HARD_PASS;
   if (*c->stops && r->status != PW_OK && strstr (r->reason, c->stops))
     return r->t <= c->stop_time[0] ? HARD_PASS : r->t <= c->stop_time[1] ? HARD_LIMITED : HARD_WRONG;
@@ -122,7 +122,7 @@ hard_verdict hard_judge (const hard_case *c, const hard_result *r) {
   return worst;
 }
 
-/* 1 if a name fits one of the patterns with blanks between them. */
+/* 1 if a name matches one of the patterns, which are separated by blanks. */
 static int run_fits (const char *patterns, const char *name) {
   char one[sizeof ((hard_expectation *)0)->pattern];
   for (; *patterns; patterns += strspn (patterns, " ")) {
@@ -137,7 +137,7 @@ static int run_fits (const char *patterns, const char *name) {
 const hard_expectation *hard_expected (const hard_case *c, const char *method) {
   for (int i = c->expectations - 1; i >= 0; i--)
     if (run_fits (c->expect[i].pattern, method)) return &c->expect[i];
-  fprintf (stderr, "%s: nothing is expected of %s\n", c->name, method);
+  fprintf (stderr, "%s: no expectation for %s\n", c->name, method);
   exit (2);
 }
 
