@@ -32,7 +32,7 @@ SUITESPARSE ?= /usr/include/suitesparse
 SYSTEM := -isystem $(SUITESPARSE)
 
 SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lsundials_sunlinsolklu \
-               -lsundials_sunmatrixsparse -lklu -lamd -lm
+               -lsundials_sunmatrixsparse -lklu -lamd -llapacke -lm
 FILES_LIBS  := -lfyaml -ldl -lm
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
 SHARED       = $(LINK) -shared -Wl,--no-undefined

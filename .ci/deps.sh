@@ -11,7 +11,7 @@
 CC=${CC:-cc} BUILD=${BUILD:-build}
 [ -z "$NO_DEPS" ] || { echo "deps: skipped (NO_DEPS=$NO_DEPS)"; exit 0; }
 
-fresh= needs='cc sundials suitesparse libfyaml popt cmocka gnuplot'
+fresh= needs='cc sundials suitesparse lapacke libfyaml popt cmocka gnuplot'
 for word; do
   case $word in
   fresh) fresh=1 ;;
@@ -50,6 +50,10 @@ C
 #include <klu.h>
 #include <amd.h>
 int try_suitesparse (void) { return klu_defaults && klu_l_defaults && amd_order && amd_l_order; }
+C
+  lapacke) cat <<'C' ;;
+#include <lapacke.h>
+int try_lapacke (void) { return LAPACKE_dgeev_work && LAPACKE_dgesvj_work; }
 C
   libfyaml) cat <<'C' ;;
 #include <libfyaml.h>
@@ -123,6 +127,7 @@ package_of () {
 
   # unverified from here on
   dnf-cc) echo gcc ;;
+  dnf-lapacke) echo lapack-devel ;;
   dnf-cmocka) echo libcmocka-devel ;;
   dnf-gnuplot) echo gnuplot ;;
   dnf-clang) echo clang ;;
@@ -135,6 +140,7 @@ package_of () {
   pacman-python3-*) echo "python-${1#python3-}" ;;
   pacman-clang-format) echo clang ;;
   brew-cc) echo gcc ;;
+  brew-lapacke) echo lapack ;;
   brew-suitesparse) echo suite-sparse ;;
   brew-clang) echo llvm ;;
   brew-python3-*) echo "${1#python3-}" ;;

@@ -19,11 +19,10 @@
  * The eigenvalues of this matrix A are the exponents of disturbances of a steady motion; linear_frame.c finds the frame,
  * and whether the motion is steady.  (Null-space form: Garcia de Jalon & Bayo 1994, Kinematic and Dynamic Simulation of
  * Multibody Systems.  Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */
-#include <float.h>
+#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "eigen.h"
 #include "linear.h"
 #include "rank.h"
 #include "util.h"
@@ -83,80 +82,40 @@ void pw_linear_vary (pw_linearisation *x) {
 
 /* ---- Bases ---- */
 
-/* x += beta w (w . x) for all but the first `from` entries; w as it lies in a column. */
-static void linear_reflect (int n, int from, const double *w, double beta, double *x) {
-  double dot = 0;
-  for (int i = from; i < n; i++) dot += w[i] * x[i];
-  for (int i = from; i < n; i++) x[i] -= beta * dot * w[i];
+static double *linear_column (const pw_linearisation *x, int j) {
+  return x->Q + (size_t)j * (size_t)x->n;
 }
 
-/* Householder's QR factorisation of the independent rows as columns; the reflections stay below R's diagonal, which goes
- * to x->z. */
-static void linear_factor (pw_linearisation *x) {
-  int n = x->n;
-  double *beta = x->da;
-  for (int k = 0; k < x->rank; k++) {
-    double *c = x->R + (size_t)k * (size_t)n, square = 0;
-    for (int i = k; i < n; i++) square += c[i] * c[i];
-    x->z[k] = c[k] > 0 ? -sqrt (square) : sqrt (square);
-    beta[k] = square > 0 ? 1 / (square + fabs (c[k] * x->z[k])) : 0;
-    c[k] -= x->z[k];
-    for (int j = k + 1; j < x->rank; j++) linear_reflect (n, k, c, beta[k], x->R + (size_t)j * (size_t)n);
-  }
-  for (int j = 0; j < n; j++) {
-    double *e = x->Q + (size_t)j * (size_t)n;
-    memset (e, 0, (size_t)n * sizeof *e);
-    e[j] = 1;
-    for (int k = x->rank - 1; k >= 0; k--) linear_reflect (n, k, x->R + (size_t)k * (size_t)n, beta[k], e);
-  }
-  for (int k = 0; k < x->rank; k++) { /* R, rank long each, in the same place */
-    memmove (x->R + (size_t)k * (size_t)x->rank, x->R + (size_t)k * (size_t)n, (size_t)k * sizeof *x->R);
-    x->R[(size_t)k * (size_t)x->rank + (size_t)k] = x->z[k];
-    for (int i = k + 1; i < x->rank; i++) x->R[(size_t)k * (size_t)x->rank + (size_t)i] = 0;
-  }
+static int linear_stride (int n) {
+  return n > 1 ? n : 1; /* LAPACK refuses 0 */
 }
 
-/* The independent rows, one behind the other in x->R, are factorised. */
-static void linear_bases (pw_linearisation *x) {
+/* J^T = Q R of the independent constraint equations; the least singular value of J. */
+static double linear_bases (pw_linearisation *x) {
+  int n = x->n, rank = x->rank;
+  double least = INFINITY, *tau = x->da;
   pw_rank_rows (x->r->s, x->R, x->norm);
-  for (int k = 0; k < x->rank; k++)
-    if (x->row[k] != k)
-      memcpy (x->R + (size_t)k * (size_t)x->n, x->R + (size_t)x->row[k] * (size_t)x->n, (size_t)x->n * sizeof *x->R);
-  linear_factor (x);
-}
-
-/* Singular values of J^T = Q R are those of R, which stays. */
-static int linear_singular (const pw_linearisation *x, double *least) {
-  size_t k = (size_t)x->rank;
-  if (k == 0) return PW_OK;
-  double *copy = malloc ((k * k + k) * sizeof *copy);
-  if (copy == NULL) return PW_MACHINE;
-  memcpy (copy, x->R, k * k * sizeof *copy);
-  pw_singular_values (x->rank, x->rank, copy, copy + k * k);
-  *least = INFINITY;
-  for (size_t i = 0; i < k; i++) *least = fmin (*least, copy[k * k + i]);
-  free (copy);
-  return PW_OK;
+  for (int k = 0; k < rank; k++)
+    memcpy (linear_column (x, k), x->R + (size_t)x->row[k] * (size_t)n, (size_t)n * sizeof *x->R);
+  memcpy (x->R, x->Q, (size_t)rank * (size_t)n * sizeof *x->R);
+  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->R, n, x->c, 0, NULL, 1, x->z,
+                                            n + x->m + 3) != 0;
+  for (int k = 0; k < rank; k++) least = fmin (least, x->z[0] * x->c[k]);
+  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->z, n);
+  for (int k = 0; k < rank; k++)
+    memcpy (x->R + (size_t)k * (size_t)rank, linear_column (x, k), (size_t)(k + 1) * sizeof *x->R);
+  LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, rank, x->Q, n, tau, x->z, n);
+  return rank && !failed ? least : NAN;
 }
 
 /* ---- The reduced system ---- */
 
-static const double *linear_column (const pw_linearisation *x, int j) {
-  return x->Q + (size_t)j * (size_t)x->n;
-}
-
-static double linear_R (const pw_linearisation *x, int i, int j) {
-  return x->R[(size_t)j * (size_t)x->rank + (size_t)i];
-}
-
 /* dv -= J^+ B dq: solves R^T b = B dq, dv -= Q b. */
 static void linear_follow (pw_linearisation *x) {
   double *b = x->c;
-  for (int i = 0; i < x->rank; i++) {
-    b[i] = x->y[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
-    for (int j = 0; j < i; j++) b[i] -= linear_R (x, j, i) * b[j];
-    b[i] /= linear_R (x, i, i);
-  }
+  int stride = linear_stride (x->rank);
+  for (int i = 0; i < x->rank; i++) b[i] = x->y[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
+  LAPACKE_dtrtrs_work (LAPACK_COL_MAJOR, 'U', 'T', 'N', x->rank, 1, x->R, stride, b, stride);
   for (int i = 0; i < x->rank; i++)
     for (int j = 0; j < x->n; j++) x->x[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_rank_unit (x->r->s, j);
 }
@@ -201,115 +160,6 @@ static void linear_unknown (pw_linearisation *x, int c) {
   pw_linear_coordinates (x, dv, x->da, x->size, x->A + c);
 }
 
-/* ---- Eigenvalues ---- */
-
-/* The size of the errors tried, relative to what is added up to an entry of A, and to the largest one of the balanced matrix:
- * a hundred times round-off, as much as derivatives and QR algorithm lose; and what an eigenvalue must exceed of the shift they
- * cause. */
-static const double LINEAR_ROUND = 100 * DBL_EPSILON, LINEAR_CERTAIN = 10;
-
-/* Whether i comes before k: the one that grows more; of equally growing ones the faster; of a pair that with im > 0. */
-static int linear_before (const pw_linear *l, int i, int k) {
-  if (l->re[i] != l->re[k]) return l->re[i] > l->re[k];
-  if (fabs (l->im[i]) != fabs (l->im[k])) return fabs (l->im[i]) > fabs (l->im[k]);
-  return l->im[i] > l->im[k];
-}
-
-static void linear_swap (pw_linear *l, int i, int k) {
-  double re = l->re[i], im = l->im[i];
-  unsigned char rigid = l->rigid[i];
-  l->re[i] = l->re[k], l->im[i] = l->im[k], l->rigid[i] = l->rigid[k];
-  l->re[k] = re, l->im[k] = im, l->rigid[k] = rigid;
-}
-
-/* Adds errors to B of the size of round-off in each row, of which 1 / T is the least. */
-static void linear_disturb (int n, double rate, double *B) {
-  for (int i = 0; i < n; i++, B += n) {
-    double most = rate;
-    for (int k = 0; k < n; k++) most = fmax (most, fabs (B[k]));
-    for (int k = 0; k < n; k++) B[k] += LINEAR_ROUND * most * sin (1.7 + 2.39996 * (double)(i * n + k + 1));
-  }
-}
-
-static int linear_ascending (const void *a, const void *b) {
-  double x = *(const double *)a, y = *(const double *)b;
-  return (x > y) - (x < y);
-}
-
-/* How far each eigenvalue moves: to the nearest one of the disturbed matrix, and in modulus to the one of its rank there, for
- * among many defective ones the nearest says little; `least` in any case.  The moduli of the disturbed ones replace them. */
-static void linear_shift (int n, const double *re, const double *im, double *re2, const double *im2, double least,
-                          double *shift) {
-  for (int i = 0; i < n; i++) {
-    shift[i] = INFINITY;
-    for (int k = 0; k < n; k++) shift[i] = fmin (shift[i], hypot (re[i] - re2[k], im[i] - im2[k]));
-    shift[i] = fmax (shift[i], least);
-  }
-  for (int k = 0; k < n; k++) re2[k] = hypot (re2[k], im2[k]);
-  qsort (re2, (size_t)n, sizeof *re2, linear_ascending);
-  for (int i = 0; i < n; i++) {
-    double size = hypot (re[i], im[i]);
-    int rank = 0;
-    for (int k = 0; k < n; k++) rank += hypot (re[k], im[k]) < size || (hypot (re[k], im[k]) == size && k < i);
-    shift[i] = fmax (shift[i], fabs (size - re2[rank]));
-  }
-}
-
-/* What is less than its uncertainty is 0, in the same way for both eigenvalues of a pair. */
-static void linear_clean (int n, double *re, double *im, const double *shift) {
-  for (int i = 0, pair; i < n; i += 1 + pair) {
-    pair = im[i] > 0;
-    double uncertain = LINEAR_CERTAIN * fmax (shift[i], shift[i + pair]);
-    for (int k = i; k <= i + pair; k++) {
-      if (!(fabs (re[k]) > uncertain)) re[k] = 0;
-      if (!(fabs (im[k]) > uncertain)) im[k] = 0;
-    }
-  }
-}
-
-/* The eigenvalues that follow the first k, of B, and those of the same matrix with errors, which tell how far they are
- * certain.  Behind B there is room for as much again and three vectors. */
-static int linear_solve (const pw_linearisation *x, pw_linear *l, int k, double *B) {
-  int n = l->unknowns - k;
-  size_t cells = (size_t)n * (size_t)n;
-  double *other = B + cells, most = 1 / x->r->s->scale.time;
-  memcpy (other, B, cells * sizeof *B);
-  linear_disturb (n, most, other);
-  pw_eigen_balance (n, other);
-  for (size_t i = 0; i < cells; i++) most = fmax (most, fabs (other[i]));
-  linear_disturb (n, most, other);
-  double *re = other + cells, *im = re + n, *shift = im + n;
-  if (pw_eigenvalues (n, B, l->re + k, l->im + k) != PW_OK || pw_eigenvalues (n, other, re, im) != PW_OK)
-    return PW_RETRY;
-  linear_shift (n, l->re + k, l->im + k, re, im, LINEAR_ROUND * most, shift);
-  linear_clean (n, l->re + k, l->im + k, shift);
-  return PW_OK;
-}
-
-/* Displacements of the whole, which the symmetry maps into each other, are split off: what is left has no defective zeros
- * because of them.  In a turning frame a displaced motion goes round at -w. */
-static int linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
-  int n = l->unknowns, k = l->symmetries;
-  size_t cells = (size_t)n * (size_t)n;
-  double *B = malloc ((2 * cells + 3 * (size_t)n + 1) * sizeof *B);
-  if (B == NULL) return PW_MACHINE;
-  memcpy (B, x->A, cells * sizeof *B);
-  if (!pw_linear_split (x, k, B)) {
-    memcpy (B, x->A, cells * sizeof *B);
-    k = l->symmetries = 0;
-  }
-  for (int i = k; k > 0 && i < n; i++)
-    memmove (B + (size_t)(i - k) * (size_t)(n - k), B + (size_t)i * (size_t)n + k, (size_t)(n - k) * sizeof *B);
-  for (int i = 0; i < k; i++) l->rigid[i] = 1;
-  if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = -l->im[0];
-  int status = linear_solve (x, l, k, B);
-  free (B);
-  for (int i = 1; i < n; i++)
-    for (int j = i; j > 0 && linear_before (l, j, j - 1); j--) linear_swap (l, j, j - 1);
-  if (status == PW_OK) return PW_OK;
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the eigenvalues of the linearisation cannot be computed", x->r->t);
-}
-
 /* ---- Opening and closing ---- */
 
 static int linear_open (pw_linearisation *x, int all) {
@@ -331,7 +181,7 @@ static int linear_open (pw_linearisation *x, int all) {
     { &x->there, 2 * n + 6 },
     { &x->along, 2 * n },
     { &x->response, n },
-    { &x->residual, 3 * (2 * m + n) },
+    { &x->residual, 4 * (2 * m + n) + 15 },
   };
   x->memory = pw_take_arrays (array, all ? sizeof array / sizeof *array : 0);
   return x->memory ? PW_OK : PW_MACHINE;
@@ -379,15 +229,14 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error) : pw_fail (error, PW_METHOD, "a signal failed");
-  linear_bases (x);
-  if (linear_singular (x, &l->least) != PW_OK) return PW_MACHINE;
+  l->least = linear_bases (x);
   pw_linear_choose_frame (x);
   for (int c = 0; c < x->size; c++) linear_unknown (x, c);
   l->symmetries = pw_linear_symmetries (x);
   if (linear_results (x, l) != PW_OK) return PW_MACHINE;
   memcpy (l->twist, x->frame.twist, sizeof l->twist);
   l->acceleration = x->frame.acceleration;
-  status = linear_eigenvalues (x, l, error);
+  status = pw_linear_eigenvalues (x, l, error);
   if (status == PW_OK) l->steady = pw_linear_steady (x);
   return status;
 }
@@ -415,29 +264,4 @@ void pw_linear_close (pw_linear *l) {
   free (l->rigid);
   l->A = l->re = l->im = NULL;
   l->rigid = NULL;
-}
-
-/* ---- RK4 ---- */
-
-/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu (Hairer & Wanner 1996, section IV.2).  Where the solution grows, the
- * growth is not to be damped: only its turning counts. */
-static int linear_stable (double re, double im, double h) {
-  double x = h * fmin (re, 0), y = h * im, u = 1, v = 0;
-  for (int k = 4; k > 0; k--) { /* u + i v = 1 + z (u + i v) / k */
-    double real = x * u - y * v;
-    v = (x * v + y * u) / k;
-    u = 1 + real / k;
-  }
-  return hypot (u, v) <= 1 + 1e-12;
-}
-
-double pw_rk4_limit (double re, double im) {
-  double size = hypot (fmin (re, 0), im), low = 0, high = 0;
-  if (!(size > 0)) return INFINITY;
-  while (linear_stable (re, im, high) && high * size < 4) low = high, high += 0.01 / size;
-  for (int i = 0; i < 50; i++) {
-    double middle = (low + high) / 2;
-    *(linear_stable (re, im, middle) ? &low : &high) = middle;
-  }
-  return low;
 }

@@ -31,7 +31,7 @@ typedef struct {
   double *y;          /* n + 2 m: all derivatives times it: -F, gamma - J a, J v - eta */
   double *da;         /* n + 3: the accelerations that follow */
   double *z, *c;      /* n + m + 3, m: scratch */
-  double *residual;   /* 3 x (2 m + n): what displacements of the whole violate */
+  double *residual;   /* 3 x (2 m + n): what displacements of the whole violate; then scratch, 2 m + n + 15 */
   double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the state reached */
   double *there;                 /* 2 n: a state later on */
   pw_newton newton;
@@ -51,6 +51,12 @@ void pw_linear_tangent (pw_linearisation *x, int c);
 void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const double *dv, int stride, double *out);
 /* out += W in: (x, y) of each body times w, turned by 90 degrees. */
 void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out);
+
+/* ---- linear_eigenvalues.c ---- */
+
+/* Splits off displacements of the whole, which the symmetry maps into each other, so that what is left has no defective zeros
+ * because of them; in a turning frame a displaced motion turns at -w.  Then the eigenvalues of the rest, into l, sorted. */
+int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
 
 /* ---- linear_frame.c ---- */
 

@@ -4,7 +4,7 @@
  * u + w (-(y - r_y), x - r_x) and its acceleration W v = w (-v_y, v_x, 0).  A relative motion of constant velocity d is steady as
  * well where it changes nothing: the spin of a balanced rotor, bodies that drift apart.  If the frame turns, d turns with it
  * unless it is an angle's, so that W d counts as an acceleration. */
-#include <float.h>
+#include <lapacke.h>
 #include <math.h>
 #include <string.h>
 #include "linear.h"
@@ -59,12 +59,6 @@ void pw_linear_choose_frame (pw_linearisation *x) {
 
 /* ---- Symmetries ---- */
 
-static double linear_norm (const double *x, int n) {
-  double square = 0;
-  for (int i = 0; i < n; i++) square += x[i] * x[i];
-  return sqrt (square);
-}
-
 /* x = the variation by a displacement of the whole along x, along y, or around the frame's origin, by L or 1 rad. */
 static void linear_displace (pw_linearisation *x, int k) {
   pw_system *s = x->r->s;
@@ -114,70 +108,36 @@ static double linear_tolerance (const pw_linearisation *x) {
   return LINEAR_SYMMETRIC + 1e-4 * LINEAR_SYMMETRIC * most;
 }
 
-static void linear_subtract (double *from, double factor, const double *what, int n) {
-  for (int i = 0; i < n; i++) from[i] -= factor * what[i];
-}
-
-/* Gram-Schmidt on the changes takes out the directions that change something, the most first; the same combinations of S
- * stay. */
+/* The null space of the changes, from their singular value decomposition; S becomes a basis of it. */
 int pw_linear_symmetries (pw_linearisation *x) {
-  int length = x->holonomic + x->rank + x->n, left = x->r->s->bodies > 0 ? 3 : 0;
-  double tolerance = linear_tolerance (x);
-  for (int k = 0; k < left; k++) linear_change (x, k, x->residual + k * length);
-  while (left > 0) {
-    int pivot = 0;
-    for (int k = 1; k < left; k++)
-      if (!(linear_norm (x->residual + k * length, length) <= linear_norm (x->residual + pivot * length, length)))
-        pivot = k;
-    double *r = x->residual + pivot * length, *S = x->S + pivot * x->size, norm = linear_norm (r, length);
-    if (norm <= tolerance) break;
-    left--;
-    for (int k = 0; k <= left; k++) {
-      double *other = x->residual + k * length, dot = 0;
-      if (k == pivot) continue;
-      for (int i = 0; i < length; i++) dot += r[i] * other[i];
-      linear_subtract (other, dot / (norm * norm), r, length);
-      linear_subtract (x->S + k * x->size, dot / (norm * norm), S, x->size);
-    }
-    memmove (r, x->residual + left * length, (size_t)length * sizeof *r);
-    memmove (S, x->S + left * x->size, (size_t)x->size * sizeof *S);
+  int length = x->holonomic + x->rank + x->n, left = 0;
+  double tolerance = linear_tolerance (x), sigma[3], V[9], *work = x->residual + 3 * length;
+  if (x->r->s->bodies == 0) return 0;
+  for (int k = 0; k < 3; k++) linear_change (x, k, x->residual + k * length);
+  for (int i = 0; i < 3 * length; i++)
+    if (!isfinite (x->residual[i])) return 0;
+  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', length, 3, x->residual, length, sigma, NULL, 1, V, 3, work,
+                           15 + length))
+    return 0;
+  while (left < 3 && sigma[2 - left] <= tolerance) left++;
+  for (int c = 0; c < x->size; c++) {
+    double S[3] = { x->S[c], x->S[x->size + c], x->S[2 * x->size + c] };
+    for (int k = 0; k < left; k++) x->S[k * x->size + c] = V[2 - k] * S[0] + V[5 - k] * S[1] + V[8 - k] * S[2];
   }
   return left;
 }
 
-/* B = H B H, H = I - beta h h^T. */
-static void linear_reflect_both (double *B, const double *h, double beta, int n) {
-  for (int i = 0; i < n; i++) {
-    double dot = 0;
-    for (int k = 0; k < n; k++) dot += B[i * n + k] * h[k];
-    linear_subtract (B + i * n, beta * dot, h, n);
-  }
-  for (int k = 0; k < n; k++) {
-    double dot = 0;
-    for (int i = 0; i < n; i++) dot += B[i * n + k] * h[i];
-    for (int i = 0; i < n; i++) B[i * n + k] -= beta * dot * h[i];
-  }
-}
-
 int pw_linear_split (pw_linearisation *x, int k, double *B) {
   int n = x->size;
-  double most = linear_norm (B, n * n), off = 0;
-  for (int c = 0; c < k; c++) {
-    double *h = x->S + c * n, norm = linear_norm (h + c, n - c), beta;
-    memset (h, 0, (size_t)c * sizeof *h);
-    h[c] += h[c] < 0 ? -norm : norm;
-    beta = 1 / (norm * fabs (h[c]));
-    if (!isfinite (beta)) return 0;
-    linear_reflect_both (B, h, beta, n);
-    for (int o = c + 1; o < k; o++) {
-      double dot = 0;
-      for (int i = c; i < n; i++) dot += h[i] * x->S[o * n + i];
-      linear_subtract (x->S + o * n, beta * dot, h, n);
-    }
-  }
+  double off = 0, tau[3], *work = x->x; /* at least n */
+  if (k == 0 || k > n) return k == 0;
+  double size = LAPACKE_dlange_work (LAPACK_COL_MAJOR, 'F', n, n, B, n, work);
+  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, k, x->S, n, tau, work, n);
+  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'T', n, n, k, x->S, n, tau, B, n, work, n);
+  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'R', 'N', n, n, k, x->S, n, tau, B, n, work, n);
   for (int i = k; i < n; i++)
     for (int c = 0; c < k; c++) off = pw_largest (off, fabs (B[i * n + c]));
-  return off <= LINEAR_SYMMETRIC * most;
+  return off <= LINEAR_SYMMETRIC * size;
 }
 
 /* ---- Steadiness ---- */
@@ -244,7 +204,7 @@ static void linear_probe (pw_linearisation *x) {
   for (int c = 0; c < x->size; c++) {
     double weight = x->r->s->scale.length * sin (1.7 + 2.39996 * (c + 1));
     pw_linear_tangent (x, c);
-    linear_subtract (x->along, -weight, x->x, 2 * x->n);
+    for (int j = 0; j < 2 * x->n; j++) x->along[j] += weight * x->x[j];
   }
   memcpy (x->x, x->along, 2 * (size_t)x->n * sizeof *x->x);
   pw_linear_vary (x);

@@ -1,79 +1,9 @@
-/* Eigenvalues, singular values, and the linearisation of scenes whose vibrations are known. */
+/* The linearisation of scenes whose vibrations are known. */
 #include <math.h>
-#include "eigen.h"
 #include "check.h"
 #include "runs.h"
 #include "scene.h"
 #include "trial.h"
-
-/* ---- Matrices ---- */
-
-/* A = H D H with the reflection H = I - 2 w w^T / w^T w. */
-static void linear_turned (int n, double *A) {
-  double w[40], square = 0;
-  for (int i = 0; i < n; i++) w[i] = sin (1 + 2.7 * i), square += w[i] * w[i];
-  for (int side = 0; side < 2; side++)
-    for (int k = 0; k < n; k++) {
-      double dot = 0;
-      for (int i = 0; i < n; i++) dot += w[i] * (side ? A[i * n + k] : A[k * n + i]);
-      for (int i = 0; i < n; i++) *(side ? &A[i * n + k] : &A[k * n + i]) -= 2 * dot / square * w[i];
-    }
-}
-
-static void test_known_eigenvalues (void **state) {
-  static const double known[][2] = { { -5, 4 }, { -5, -4 }, { 6, 0 }, { 0, 3 }, { 0, -3 }, { -2, 0 }, { 1e-9, 0 } };
-  double A[49] = { 0 }, re[7], im[7];
-  (void)state;
-  for (int i = 0; i < 7; i++) {
-    A[i * 8] = known[i][0];
-    if (known[i][1] > 0) A[i * 8 + 1] = known[i][1], A[i * 8 + 7] = -known[i][1];
-  }
-  linear_turned (7, A);
-  assert_int_equal (pw_eigenvalues (7, A, re, im), PW_OK);
-  for (int i = 0; i < 7; i++) {
-    double nearest = INFINITY;
-    for (int k = 0; k < 7; k++) nearest = fmin (nearest, hypot (re[k] - known[i][0], im[k] - known[i][1]));
-    check_below ("nearest", nearest, 100 * CHECK_EPS * 7, "100 eps of the largest");
-  }
-}
-
-/* The sums of powers of the eigenvalues are the traces of the powers. */
-static void test_random_eigenvalues (void **state) {
-  enum { N = 40 };
-  static double A[N * N], B[N * N], re[N], im[N];
-  double trace = 0, square = 0, sum = 0, squares = 0, size = 0;
-  (void)state;
-  for (int i = 0; i < N * N; i++) A[i] = B[i] = ldexp (sin (1.0 + 7.1 * i * i), i % 3 * (i / N % 5));
-  for (int i = 0; i < N; i++) trace += A[i * N + i];
-  for (int i = 0; i < N * N; i++) square += A[i] * A[i % N * N + i / N], size = fmax (size, fabs (A[i]));
-  assert_int_equal (pw_eigenvalues (N, B, re, im), PW_OK);
-  for (int i = 0; i < N; i++) {
-    sum += re[i], squares += re[i] * re[i] - im[i] * im[i];
-    if (im[i] > 0) check_close ("pair", im[i + 1], -im[i], 0, "exact");
-  }
-  check_close ("trace", sum, trace, 100 * N * CHECK_EPS * size, "100 N eps");
-  check_close ("trace of the square", squares, square, 100 * N * N * CHECK_EPS * size * size, "100 N^2 eps");
-}
-
-/* Small singular values are as exact as large ones; of a defective matrix, eps^(1/3) is all that is known. */
-static void test_singular_values (void **state) {
-  double x[9] = { 3, 0, 0, 0, 1e-9, 0, 0, 0, 1 }, sigma[3], re[3], im[3];
-  double nilpotent[9] = { 0, 1, 0, 0, 0, 1, 0, 0, 0 };
-  double nan[1] = { NAN };
-  (void)state;
-  for (int i = 0; i < 3; i++) { /* turned in the plane of the first two entries */
-    double u = x[3 * i], v = x[3 * i + 1];
-    x[3 * i] = 0.6 * u - 0.8 * v, x[3 * i + 1] = 0.8 * u + 0.6 * v;
-  }
-  pw_singular_values (3, 3, x, sigma);
-  check_close ("largest", sigma[0], 3, 16 * CHECK_EPS, "round-off");
-  check_close ("least", sigma[1], 1e-9, 1e-9 * 16 * CHECK_EPS, "round-off of its own size");
-  assert_int_equal (pw_eigenvalues (3, nilpotent, re, im), PW_OK);
-  check_below ("nilpotent", hypot (re[0], im[0]), 10 * cbrt (CHECK_EPS), "eps^(1/3)");
-  assert_int_equal (pw_eigenvalues (1, nan, re, im), PW_RETRY);
-}
-
-/* ---- Scenes ---- */
 
 static pw_linear linear_of (const pw_plugin_table *table) {
   pw_error error = { 0 };
@@ -229,15 +159,8 @@ static void test_rk4_limit (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_known_eigenvalues),
-    cmocka_unit_test (test_random_eigenvalues),
-    cmocka_unit_test (test_singular_values),
-    cmocka_unit_test (test_pendulum),
-    cmocka_unit_test (test_oscillator),
-    cmocka_unit_test (test_rotor),
-    cmocka_unit_test (test_sleigh),
-    cmocka_unit_test (test_rank),
-    cmocka_unit_test (test_large),
+    cmocka_unit_test (test_pendulum),  cmocka_unit_test (test_oscillator), cmocka_unit_test (test_rotor),
+    cmocka_unit_test (test_sleigh),    cmocka_unit_test (test_rank),       cmocka_unit_test (test_large),
     cmocka_unit_test (test_rk4_limit),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

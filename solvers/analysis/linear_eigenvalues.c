@@ -1,0 +1,145 @@
+/* The eigenvalues of a linearisation, how far they are certain, and the step that RK4 can take with them. */
+#include <float.h>
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "linear.h"
+
+/* The size of the errors tried, relative to what is added up to an entry of A, and to the largest one of the balanced matrix:
+ * a hundred times round-off, as much as derivatives and QR algorithm lose; and what an eigenvalue must exceed of the shift they
+ * cause. */
+static const double EIGEN_ROUND = 100 * DBL_EPSILON, EIGEN_CERTAIN = 10;
+
+/* The n eigenvalues of A (destroyed), conjugate pairs side by side, that with im > 0 first; `work` has 4 n. */
+static int eigen_values (int n, double *A, double *re, double *im, double *work) {
+  for (int i = 0; i < n * n; i++)
+    if (!isfinite (A[i])) return PW_RETRY;
+  int failed = n && LAPACKE_dgeev_work (LAPACK_COL_MAJOR, 'N', 'N', n, A, n, re, im, NULL, 1, NULL, 1, work, 4 * n);
+  return failed ? PW_RETRY : PW_OK;
+}
+
+/* Adds errors to B of the size of round-off in each row, of which `least` is the smallest. */
+static void eigen_disturb (int n, double least, double *B) {
+  for (int i = 0; i < n; i++, B += n) {
+    double most = least;
+    for (int k = 0; k < n; k++) most = fmax (most, fabs (B[k]));
+    for (int k = 0; k < n; k++) B[k] += EIGEN_ROUND * most * sin (1.7 + 2.39996 * (double)(i * n + k + 1));
+  }
+}
+
+static int eigen_ascending (const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+/* How far each eigenvalue moves: to the nearest one of the disturbed matrix, and in modulus to the one of its rank there, for
+ * among many defective ones the nearest says little; `least` in any case.  The moduli of the disturbed ones replace them. */
+static void eigen_shift (int n, const double *re, const double *im, double *re2, const double *im2, double least,
+                         double *shift) {
+  for (int i = 0; i < n; i++) {
+    shift[i] = INFINITY;
+    for (int k = 0; k < n; k++) shift[i] = fmin (shift[i], hypot (re[i] - re2[k], im[i] - im2[k]));
+    shift[i] = fmax (shift[i], least);
+  }
+  for (int k = 0; k < n; k++) re2[k] = hypot (re2[k], im2[k]);
+  qsort (re2, (size_t)n, sizeof *re2, eigen_ascending);
+  for (int i = 0; i < n; i++) {
+    double size = hypot (re[i], im[i]);
+    int rank = 0;
+    for (int k = 0; k < n; k++) rank += hypot (re[k], im[k]) < size || (hypot (re[k], im[k]) == size && k < i);
+    shift[i] = fmax (shift[i], fabs (size - re2[rank]));
+  }
+}
+
+/* Sets to 0 what is less than its uncertainty, in the same way for both eigenvalues of a pair. */
+static void eigen_clean (int n, double *re, double *im, const double *shift) {
+  for (int i = 0, pair; i < n; i += 1 + pair) {
+    pair = im[i] > 0;
+    double uncertain = EIGEN_CERTAIN * fmax (shift[i], shift[i + pair]);
+    for (int k = i; k <= i + pair; k++) {
+      if (!(fabs (re[k]) > uncertain)) re[k] = 0;
+      if (!(fabs (im[k]) > uncertain)) im[k] = 0;
+    }
+  }
+}
+
+/* The eigenvalues of B, and those of the same matrix with errors, which show how far they are certain.  Behind B there is room
+ * for as much again and 7 n. */
+static int eigen_certain (const pw_linearisation *x, int n, double *B, double *re, double *im) {
+  int cells = n * n, first, last;
+  double *other = B + cells, *re2 = other + cells, *im2 = re2 + n, *shift = im2 + n, *work = shift + n;
+  double most = 1 / x->r->s->scale.time;
+  memcpy (other, B, (size_t)cells * sizeof *B);
+  eigen_disturb (n, most, other);
+  if (n) LAPACKE_dgebal_work (LAPACK_COL_MAJOR, 'S', n, other, n, &first, &last, work);
+  for (int i = 0; i < cells; i++) most = fmax (most, fabs (other[i]));
+  eigen_disturb (n, most, other);
+  if (eigen_values (n, B, re, im, work) != PW_OK || eigen_values (n, other, re2, im2, work) != PW_OK) return PW_RETRY;
+  eigen_shift (n, re, im, re2, im2, EIGEN_ROUND * most, shift);
+  eigen_clean (n, re, im, shift);
+  return PW_OK;
+}
+
+/* Whether i comes before k: the one that grows more; of equally growing ones the faster; of a pair that with im > 0. */
+static int eigen_before (const pw_linear *l, int i, int k) {
+  if (l->re[i] != l->re[k]) return l->re[i] > l->re[k];
+  if (fabs (l->im[i]) != fabs (l->im[k])) return fabs (l->im[i]) > fabs (l->im[k]);
+  return l->im[i] > l->im[k];
+}
+
+static void eigen_sort (pw_linear *l) {
+  for (int i = 1; i < l->unknowns; i++)
+    for (int j = i; j > 0 && eigen_before (l, j, j - 1); j--) {
+      double re = l->re[j], im = l->im[j];
+      unsigned char rigid = l->rigid[j];
+      l->re[j] = l->re[j - 1], l->im[j] = l->im[j - 1], l->rigid[j] = l->rigid[j - 1];
+      l->re[j - 1] = re, l->im[j - 1] = im, l->rigid[j - 1] = rigid;
+    }
+}
+
+int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
+  int n = l->unknowns, k = l->symmetries;
+  size_t cells = (size_t)n * (size_t)n;
+  double *B = malloc ((2 * cells + 7 * (size_t)n + 1) * sizeof *B);
+  if (B == NULL) return PW_MACHINE;
+  memcpy (B, x->A, cells * sizeof *B);
+  if (!pw_linear_split (x, k, B)) {
+    memcpy (B, x->A, cells * sizeof *B);
+    k = l->symmetries = 0;
+  }
+  for (int i = k; k > 0 && i < n; i++)
+    memmove (B + (size_t)(i - k) * (size_t)(n - k), B + (size_t)i * (size_t)n + k, (size_t)(n - k) * sizeof *B);
+  memset (l->rigid, 1, (size_t)k);
+  if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = -l->im[0];
+  int status = eigen_certain (x, n - k, B, l->re + k, l->im + k);
+  free (B);
+  eigen_sort (l);
+  if (status == PW_OK) return PW_OK;
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the eigenvalues of the linearisation cannot be computed", x->r->t);
+}
+
+/* ---- RK4 ---- */
+
+/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu (Hairer & Wanner 1996, section IV.2).  A growing solution must not be
+ * damped: only its frequency counts. */
+static int rk4_stable (double re, double im, double h) {
+  double x = h * fmin (re, 0), y = h * im, u = 1, v = 0;
+  for (int k = 4; k > 0; k--) { /* u + i v = 1 + z (u + i v) / k */
+    double real = x * u - y * v;
+    v = (x * v + y * u) / k;
+    u = 1 + real / k;
+  }
+  return hypot (u, v) <= 1 + 1e-12;
+}
+
+double pw_rk4_limit (double re, double im) {
+  double size = hypot (fmin (re, 0), im), low = 0, high = 0;
+  if (!(size > 0)) return INFINITY;
+  while (rk4_stable (re, im, high) && high * size < 4) low = high, high += 0.01 / size;
+  for (int i = 0; i < 50; i++) {
+    double middle = (low + high) / 2;
+    *(rk4_stable (re, im, middle) ? &low : &high) = middle;
+  }
+  return low;
+}
