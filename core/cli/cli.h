@@ -1,98 +1,100 @@
-/* The program from inside: its commands and what they share.
+/* The program's commands, and what they share.
  *
- * A command is one file with one function, which gets the command line after the word "pinwheel" (argv[0] is
- * "pinwheel run", for messages) and returns the exit status: 0 good, 1 machine, 2 input, 3 start, 4 method, 130
- * interrupted, 141 closed pipe.  It keeps a pw_error, and ends with `return pw_cli_end (&error)`, the one place
- * that prints an error. */
+ * A command is one file with one table, named in the list below.  Its function returns PW_OK, a negative status with the
+ * error set, or a positive exit status if it has reported everything.  Exit statuses are 0 success, 1 resource error, 2
+ * input, 3 initial conditions, 4 method, 130 interrupted, 141 closed pipe. */
 #ifndef PW_CLI_H
 #define PW_CLI_H
 
 #include <popt.h>
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
+#include "stop.h"
 
 enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 }; /* exit statuses after Ctrl-C, and when nobody reads the output */
 
 /* ---- Commands ---- */
 
+/* All commands, in the order of `pinwheel --help`; pw_cli_list is the table of the first, and so on. */
+#define PW_COMMANDS(X) X (list) X (show) X (check) X (run) X (sweep) X (compare) X (drift) X (new)
+
+/* A command line: its arguments and the options that several commands share, NULL if they are not given.  The structure
+ * of options of every command begins with one. */
+typedef struct {
+  const char **argument; /* ended by NULL */
+  int arguments;
+  const char **sets, **starts; /* "NAME=VALUE"; ended by NULL */
+  const char *max_file;
+  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit;
+  /* private */
+  poptContext popt;
+  struct poptOption *table; /* a copy of the command's options, bound to its structure */
+  void **text;              /* what popt allocated for each of them */
+} pw_cli_line;
+
 typedef struct {
   const char *name;     /* "run" */
   const char *synopsis; /* "MODEL [OPTION...]" */
-  const char *about;    /* one line */
-  int (*function) (int argc, const char **argv);
+  const char *summary;  /* one line, for `pinwheel --help` */
+  const char *help;     /* sentences for `pinwheel run --help` */
+  int least, most;      /* number of arguments; most 0: any */
+  size_t size;          /* of the structure of options */
+  int (*function) (void *options, pw_error *error);
+  const struct poptOption *options; /* made of the entries below, ended by POPT_TABLEEND */
 } pw_command;
 
-int pw_cli_list (int argc, const char **argv);
-int pw_cli_show (int argc, const char **argv);
-int pw_cli_check (int argc, const char **argv);
-int pw_cli_new (int argc, const char **argv);
-int pw_cli_run (int argc, const char **argv);
-int pw_cli_sweep (int argc, const char **argv);
-int pw_cli_compare (int argc, const char **argv);
-int pw_cli_drift (int argc, const char **argv);
+#define PW_COMMAND(name) extern const pw_command pw_cli_##name;
+PW_COMMANDS (PW_COMMAND)
 
-/* ---- Options ---- */
+/* Entries of a table of options: a text, a list of texts (the option may be repeated), a flag (an int).  They are zero if
+ * the option is not given, and freed with the command line.  `type` is the structure, `name` "every", `letter` 'e' or 0. */
+#define PW_TEXT_OPTION(type, member, name, letter, value, help) \
+  { name, letter, POPT_ARG_STRING, (void *)offsetof (type, member), 0, help, value }
+#define PW_LIST_OPTION(type, member, name, letter, value, help) \
+  { name, letter, POPT_ARG_ARGV, (void *)offsetof (type, member), 0, help, value }
+#define PW_FLAG_OPTION(type, member, name, help) \
+  { name, 0, POPT_ARG_NONE, (void *)offsetof (type, member), 0, help, NULL }
+/* A heading of the options that follow. */
+#define PW_OPTION_GROUP(title) \
+  { NULL, 0, POPT_ARG_NONE, NULL, 0, title, NULL }
 
-/* A command line that has been read; close it after the last use of its texts. */
-typedef struct {
-  poptContext popt;
-  struct poptOption *table; /* a copy of the command's options, and help */
-  void **text;              /* what popt allocated for each of them */
-  const char **argument;    /* what is no option, ended by NULL */
-  int arguments;            /* how many */
-  char *max_file;           /* of commands with --set: what --max-file was given, or NULL */
-} pw_cli_line;
+/* Options of commands that open a model; that integrate with methods of their own choice; with one method. */
+#define PW_MODEL_OPTIONS                                                                                       \
+  PW_OPTION_GROUP ("Model"),                                                                                   \
+      PW_LIST_OPTION (pw_cli_line, sets, "set", 0, "PARAM=VALUE",                                              \
+                      "Set a parameter of the model to a number or an expression such as 30*deg; repeatable"), \
+      PW_LIST_OPTION (pw_cli_line, starts, "start", 0, "STATE=VALUE",                                          \
+                      "Set the initial value of a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable"),   \
+      PW_TEXT_OPTION (pw_cli_line, max_file, "max-file", 0, "MB", "Read model files of up to this size (default 64)")
+#define PW_STEP_OPTIONS                                                                             \
+  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),                         \
+      PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of fixed-step methods [s]"),    \
+      PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of adaptive methods"), \
+      PW_TEXT_OPTION (pw_cli_line, max_steps, "max-steps", 0, "N",                                  \
+                      "Stop adaptive methods after this many attempted steps (default 1e7)"),       \
+      PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS",                                    \
+                      "Stop a run after this much processor time (default unlimited)")
+#define PW_METHOD_OPTIONS                                                           \
+  PW_OPTION_GROUP ("Integration"),                                                  \
+      PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",                 \
+                      "Integrator and stabilisation, see `pinwheel list methods`"), \
+      PW_STEP_OPTIONS,                                                              \
+      PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A",                            \
+                      "Absolute tolerance of every state (default rtol times its scale)")
 
-/* Reads a command line.  `options` is popt's table without help, which is added here, as --max-file is to --set;
- * take texts with POPT_ARG_STRING, repeated ones with POPT_ARG_ARGV (a NULL-terminated list, or NULL if there were
- * none), numbers as texts and pass them to pw_cli_number.  All of these variables are NULL at first, and what they
- * were given is freed with the line.  Fewer arguments than `least` or more than `most` are refused; `synopsis` says
- * what is expected ("MODEL [OPTION...]").  PW_OK; 1 if help was asked for and has been printed; PW_INPUT for an
- * unknown option, with the nearest valid one, or one without its value.  Close the line in every case. */
-int pw_cli_read (pw_cli_line *l, int argc, const char **argv, const struct poptOption *options, const char *synopsis,
-                 int least, int most, pw_error *error);
-void pw_cli_close (pw_cli_line *l);
+/* Reads the command line (argv[0] is not read), runs the command and reports its error; returns the exit status. */
+int pw_cli_main (const pw_command *c, int argc, const char **argv);
 
-/* Reads the value of an option ("--step") in any locale; a NULL text leaves *value.  PW_INPUT if it is no number of the
- * domain. */
+/* Refuses more than `most` arguments. */
+int pw_cli_at_most (const pw_command *c, const pw_cli_line *l, int most, pw_error *error);
+
+/* Reads the value of an option ("--step") in any locale; a NULL text leaves *value.  PW_INPUT if it is not a number in
+ * the domain. */
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
 
-/* Entries of popt's table for --set and --start: two addresses of `const char **`, NULL at first. */
-#define PW_CLI_MODEL_OPTIONS(sets, starts)                                                                         \
-  { "set",        0, POPT_ARG_ARGV,                                                                                \
-    (sets),       0, "Set a parameter of the model, to a number or an expression such as 30*deg; may be repeated", \
-    "PARAM=VALUE" },                                                                                               \
-  {                                                                                                                \
-    "start", 0, POPT_ARG_ARGV, (starts), 0, "Set a start value, BODY.x|y|phi|vx|vy|omega; may be repeated",        \
-        "STATE=VALUE"                                                                                              \
-  }
-
-/* How to run, as options say it; NULL: as the model wishes. */
-typedef struct {
-  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit;
-} pw_cli_wishes;
-
-/* Entries of popt's table for a pw_cli_wishes: for commands that choose the methods themselves, and for those that run
- * one method. */
-#define PW_CLI_STEP_OPTIONS(w)                                                                                           \
-  { "t-end", 't', POPT_ARG_STRING, &(w)->t_end, 0, "Time to run to [s]", "T" },                                          \
-      { "step", 0, POPT_ARG_STRING, &(w)->step, 0, "Step of fixed-step methods [s]", "H" },                              \
-      { "rtol", 0, POPT_ARG_STRING, &(w)->rtol, 0, "Relative tolerance of adaptive methods", "R" },                      \
-      { "max-steps", 0, POPT_ARG_STRING, &(w)->max_steps, 0, "Attempted steps of adaptive methods (default 1e7)", "N" }, \
-  {                                                                                                                      \
-    "limit", 0, POPT_ARG_STRING, &(w)->limit, 0, "Processor time of a single run [s]; by default any", "SECONDS"         \
-  }
-#define PW_CLI_RUN_OPTIONS(w)                                                                                        \
-  { "method", 'm', POPT_ARG_STRING, &(w)->method, 0, "Integrator and stabilisation, see: pinwheel list methods",     \
-    "METHOD" },                                                                                                      \
-      PW_CLI_STEP_OPTIONS (w), {                                                                                     \
-    "atol", 0, POPT_ARG_STRING, &(w)->atol, 0, "Absolute tolerance of every state; by default rtol times its scale", \
-        "A"                                                                                                          \
-  }
-
-/* Options over a model's wishes: t_end and the settings, but for the ledger. */
-int pw_cli_settle (const pw_cli_wishes *w, const pw_run_defaults *model, double *t_end, pw_settings *settings,
-                   pw_error *error);
+/* The model's defaults overridden by options: t_end, settings except the ledger, and the limit, which stops the run. */
+int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
+                     pw_limit *limit, pw_error *error);
 
 /* ---- Models ---- */
 
@@ -106,30 +108,21 @@ typedef struct {
 /* Opens the model file that a command line's first argument names, by name or path. */
 pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error);
 
-/* Opens the model of a command line, sets "PARAM=VALUE" and "STATE=VALUE" (NULL-terminated lists, or NULL), builds and
- * compiles it.  Returns a status; close the model in every case. */
-int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, const char *const *sets, const char *const *starts,
-                 pw_error *error);
+/* Opens, builds and compiles the model of a command line with its --set and --start.  Returns a status; close the model in
+ * every case. */
+int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
 /* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_set or pw_set_start; `option` ("--set") is for
  * messages. */
-int pw_cli_apply (pw_model *m, const char *option, const char *const *list,
+int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
 
 /* A path, relative to the current directory if it lies below; it may be written to the buffer. */
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
 
-/* How to run a model by default: its own wishes, else 10 s of rk4+projection with steps of 1e-3 s.  rtol stays 0 where
- * the model does not say. */
+/* A model's own run settings, else 10 s of rk4+projection with steps of 1e-3 s; rtol is 0 if the model does not set it. */
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
-
-/* Shows M, J, gamma and all that stands beside them at time t of a run with the model's default method (matrices.c). */
-int pw_cli_matrices (const pw_cli_model *m, double t, pw_error *error);
-
-/* Writes a built model to standard output as text, with all numbers as they are (show_yaml.c).  PW_INPUT for what a text
- * model cannot say: function signals, kinds of the model's own. */
-int pw_cli_yaml (const pw_cli_model *m, pw_error *error);
 
 /* ---- Files ---- */
 
@@ -141,7 +134,7 @@ int pw_cli_yaml (const pw_cli_model *m, pw_error *error);
  * stands for the model of the command line and, once its file is open, for the tables it reads; `file` may be NULL. */
 int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error);
 
-/* ---- The end ---- */
+/* ---- Messages ---- */
 
 #ifdef __GNUC__
 #define PW_PRINTS(n) __attribute__ ((format (printf, n, n + 1)))
@@ -152,6 +145,9 @@ int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int cou
 /* Print to standard error, and to a stream; on a terminal control characters are escaped, since names may contain them. */
 void pw_cli_say (const char *format, ...) PW_PRINTS (1);
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTS (2);
+
+/* Prints a line of text, broken between words, after something `indent` characters wide. */
+void pw_cli_wrap (const char *text, int indent, int width);
 
 /* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, or as it is if it names a place in a file;
  * returns the exit status. */

@@ -67,7 +67,7 @@ uint64_t pw_check_tables (uint64_t sum, const pw_model *m) {
   return sum;
 }
 
-void pw_print_starts (pw_text *t, const char *const *starts) {
+void pw_print_starts (pw_text *t, const char **starts) {
   for (; starts && *starts; starts++) {
     char name[200];
     snprintf (name, sizeof name, "%.*s", (int)strcspn (*starts, "="), *starts);

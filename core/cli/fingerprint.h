@@ -18,7 +18,7 @@ int pw_print_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *
 /* A check sum of the tables in a model's signals, after those it was begun with; begin with 0. */
 uint64_t pw_check_tables (uint64_t sum, const pw_model *m);
 /* "STATE=VALUE" as on the command line; NULL-terminated, or NULL. */
-void pw_print_starts (pw_text *t, const char *const *starts);
+void pw_print_starts (pw_text *t, const char **starts);
 
 /* ---- Reading ---- */
 

@@ -11,23 +11,18 @@
 #define PROGRESS_LINES 60  /* between two lines [s] */
 #define PROGRESS_WIDTH 30  /* characters of a full bar */
 
-static double progress_read (clockid_t id) {
+double pw_seconds (clockid_t id) {
   struct timespec now;
   clock_gettime (id, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* A clock that only goes forward [s]. */
-static double progress_clock (void) {
-  return progress_read (CLOCK_MONOTONIC);
-}
-
 double pw_cpu_clock (void) {
-  return progress_read (CLOCK_PROCESS_CPUTIME_ID);
+  return pw_seconds (CLOCK_PROCESS_CPUTIME_ID);
 }
 
 void pw_progress_start (pw_progress *p, const char *what, double t_end, int on) {
-  double now = progress_clock ();
+  double now = pw_seconds (CLOCK_MONOTONIC);
   int lines = !isatty (STDERR_FILENO);
   *p =
       (pw_progress){ what, "s", 0, t_end, now, now + (lines ? PROGRESS_LINES : PROGRESS_FIRST), 0, on || lines, lines };
@@ -54,7 +49,7 @@ static void progress_duration (double seconds, char *text, size_t size) {
 
 void pw_progress_at (pw_progress *p, double t) {
   if (!p->on) return;
-  double now = progress_clock ();
+  double now = pw_seconds (CLOCK_MONOTONIC);
   if (now < p->next) return;
   p->next = now + (p->lines ? PROGRESS_LINES : PROGRESS_EVERY);
   double part = fmin (fmax (t / p->t_end, 0), 1);

@@ -1,6 +1,8 @@
-/* How far a long run is, and the time to go, on standard error: a bar if that is a terminal, else a line a minute. */
+/* The progress of a long run and the remaining time on standard error: a bar on a terminal, else a line a minute. */
 #ifndef PW_PROGRESS_H
 #define PW_PROGRESS_H
+
+#include <time.h>
 
 typedef struct {
   const char *what; /* shown in front */
@@ -14,6 +16,8 @@ typedef struct {
   int lines;        /* 1: no terminal: lines in place of the bar */
 } pw_progress;
 
+/* The time of a clock [s]. */
+double pw_seconds (clockid_t id);
 /* The processor time of the program [s]. */
 double pw_cpu_clock (void);
 

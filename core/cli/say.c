@@ -1,12 +1,14 @@
-/* Messages and what else contains names of files. */
+/* Messages and other text that contains names; the last message of a command. */
 #define _POSIX_C_SOURCE 200809L
+#include <poll.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 #include <unistd.h>
 #include "cli.h"
 #include "util.h"
 
-/* What a terminal would obey is written as \\xNN. */
+/* Control characters are written as \\xNN. */
 static void say_text (FILE *f, const char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);
@@ -42,4 +44,31 @@ void pw_cli_print (FILE *f, const char *format, ...) {
   va_start (arguments, format);
   say (f, format, arguments);
   va_end (arguments);
+}
+
+void pw_cli_wrap (const char *text, int indent, int width) {
+  int room = width - indent > 40 ? width - indent : 40;
+  while ((int)strlen (text) > room) {
+    int n = room;
+    while (n > 0 && text[n] != ' ') n--;
+    if (n == 0) break;
+    printf ("%.*s\n%*s", n, text, indent, "");
+    text += n + 1;
+  }
+  puts (text);
+}
+
+/* 1 if standard output is a pipe that nobody reads any more: `pinwheel ... | head`. */
+static int say_nobody_reads (void) {
+  struct pollfd out = { .fd = STDOUT_FILENO, .events = POLLOUT };
+  return poll (&out, 1, 0) == 1 && out.revents & POLLERR;
+}
+
+int pw_cli_end (const pw_error *error) {
+  if (error->status == PW_OK) return 0;
+  if (error->status == PW_MACHINE && say_nobody_reads ()) return PW_CLOSED_PIPE; /* the reader left on purpose */
+  fflush (stdout);
+  int placed = strstr (error->text, ": error: ") != NULL; /* as compilers say it, so that editors find the place */
+  pw_cli_say ("%s%s\n", placed ? "" : "pinwheel: ", error->text);
+  return -error->status;
 }

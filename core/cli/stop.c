@@ -3,7 +3,8 @@
 #include <math.h>
 #include <string.h>
 #include <time.h>
-#include "stop.h"
+#include "cli.h"
+#include "progress.h"
 
 #ifdef CLOCK_MONOTONIC_COARSE
 #define STOP_CHEAP CLOCK_MONOTONIC_COARSE
@@ -40,19 +41,8 @@ void pw_stop_release (void) {
 
 /* ---- Limits ---- */
 
-static double stop_clock (clockid_t id) {
-  struct timespec now;
-  clock_gettime (id, &now);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
-
-int pw_limit_read (pw_limit *l, const char *text, pw_error *error) {
-  *l = (pw_limit){ .most = INFINITY };
-  return pw_cli_number ("--limit", text, PW_POSITIVE, &l->most, error);
-}
-
 void pw_limit_start (pw_limit *l) {
-  l->start = stop_clock (CLOCK_THREAD_CPUTIME_ID);
+  l->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
 }
 
 /* The thread's clock takes a system call, so it is asked only when a coarse one has moved: some 250 times a second. */
@@ -60,10 +50,10 @@ int pw_limit_over (void *limit) {
   pw_limit *l = limit;
   if (pw_stop) return 1;
   if (isinf (l->most)) return 0;
-  double now = stop_clock (STOP_CHEAP);
+  double now = pw_seconds (STOP_CHEAP);
   if (now == l->looked) return 0;
   l->looked = now;
-  return stop_clock (CLOCK_THREAD_CPUTIME_ID) - l->start > l->most;
+  return pw_seconds (CLOCK_THREAD_CPUTIME_ID) - l->start > l->most;
 }
 
 int pw_limit_fail (const pw_limit *l, double t, pw_error *error) {

@@ -3,7 +3,7 @@
 #define PW_STOP_H
 
 #include <signal.h>
-#include "cli.h"
+#include "pinwheel.h"
 
 extern volatile sig_atomic_t pw_stop; /* requests so far */
 
@@ -20,8 +20,7 @@ typedef struct {
   double looked; /* at a clock that costs less */
 } pw_limit;
 
-/* Reads --limit; pw_limit_start is due where the run begins. */
-int pw_limit_read (pw_limit *l, const char *text, pw_error *error);
+/* Starts the clock; due where the run begins. */
 void pw_limit_start (pw_limit *l);
 /* Has it run out, or was the program signalled?  For pw_settings.stop; the context is the limit. */
 int pw_limit_over (void *limit);

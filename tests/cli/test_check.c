@@ -168,7 +168,7 @@ static void test_large (void **state) {
 
 static void test_bad_options (void **state) {
   (void)state;
-  cli_bad ("pinwheel check", 2, "something is missing; write pinwheel check MODEL [OPTION...]");
+  cli_bad ("pinwheel check", 2, "missing argument; usage: pinwheel check MODEL [OPTION...]");
   cli_bad ("pinwheel check ezyroller --jsn x", 2, "check has no option \"--jsn\"; did you mean \"--json\"?");
 }
 

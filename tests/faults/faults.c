@@ -102,18 +102,12 @@ void faults_prepare (void) {
 
 /* ---- Commands ---- */
 
-typedef int faults_function (int argc, const char **argv);
-
-static faults_function *faults_command (const char *name) {
-  static const struct {
-    const char *name;
-    faults_function *function;
-  } each[] = { { "run", pw_cli_run },     { "sweep", pw_cli_sweep }, { "compare", pw_cli_compare },
-               { "drift", pw_cli_drift }, { "new", pw_cli_new },     { "show", pw_cli_show },
-               { "check", pw_cli_check }, { "list", pw_cli_list } };
-  for (size_t i = 0; i < sizeof each / sizeof *each; i++)
-    if (strcmp (name, each[i].name) == 0) return each[i].function;
-  return NULL;
+static const pw_command *faults_command (const char *name) {
+#define FAULTS_ENTRY(command) &pw_cli_##command,
+  static const pw_command *const each[] = { PW_COMMANDS (FAULTS_ENTRY) NULL };
+  const pw_command *const *c = each;
+  while (*c && strcmp (name, (*c)->name) != 0) c++;
+  return *c;
 }
 
 /* Sends what goes to a descriptor into a file of the folder; returns another one for where it went before. */
@@ -141,7 +135,7 @@ int faults_run (const char *command) {
   fflush (NULL);
   int out = faults_redirect (1, "printed"), err = faults_redirect (2, "log");
   pw_stop = 0;
-  int status = faults_command (argv[0]) (argc, argv);
+  int status = pw_cli_main (faults_command (argv[0]), argc, argv);
   fflush (NULL);
   faults_restore (out, 1);
   faults_restore (err, 2);

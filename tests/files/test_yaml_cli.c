@@ -103,7 +103,7 @@ static void test_no_text (void **state) {
   cli_bad ("pinwheel show @/f.c --yaml", 2,
            "model f cannot be written as text: the signal \"value\" of torque T is a function");
   cli_bad ("pinwheel show ezyroller --yaml --start frame.vx=1", 2,
-           "--yaml: start values of --start have no place in a text model; give them to run");
+           "--yaml: initial values of --start have no place in a text model; give them to run");
   cli_good ("pinwheel show @/f.c");
   assert_non_null (strstr (cli_out, "torque T: body a, ground; value f (t) N m"));
 }

@@ -195,36 +195,47 @@ static void check_close (pw_check *x) {
   pw_cli_close_model (&x->m);
 }
 
-/* Opens what will be written, so that nothing is computed in vain. */
-static int check_open_json (pw_check *x, const pw_cli_line *l, const char *json, pw_output **o, pw_error *error) {
-  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", json, PW_WRITES, NULL } };
-  if (json == NULL) return PW_OK;
-  if (pw_cli_uses (l, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
-  *o = pw_output_open (json, error);
+/* Opens the output file before anything is computed. */
+static int check_open_json (pw_check *x, pw_output **o, pw_error *error) {
+  pw_use use[] = { PW_CLI_MODEL_USE, { "--json", x->json, PW_WRITES, NULL } };
+  if (x->json == NULL) return PW_OK;
+  if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
+  *o = pw_output_open (x->json, error);
   return *o ? PW_OK : error->status;
 }
 
-int pw_cli_check (int argc, const char **argv) {
-  char *json = NULL;
-  const char **sets = NULL, **starts = NULL;
-  const struct poptOption options[] = { { "json", 0, POPT_ARG_STRING, &json, 0,
-                                          "Write it as JSON; - is standard output, in place of the text", "FILE" },
-                                        PW_CLI_MODEL_OPTIONS (&sets, &starts),
-                                        POPT_TABLEEND };
-  pw_error error = { 0 };
-  pw_cli_line l;
-  pw_check x = { .r = NULL };
+static int check_command (void *options, pw_error *error) {
+  pw_check *x = options;
   pw_output *o = NULL;
-  if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
-      pw_cli_open (&x.m, &l, sets, starts, &error) == PW_OK && check_open_json (&x, &l, json, &o, &error) == PW_OK &&
-      check_model (&x, starts != NULL, &error) == PW_OK) {
-    if (o == NULL || pw_output_stream (o) != stdout) pw_check_text (&x);
-    if (o) pw_check_json (&x, o, &error);
+  if (pw_cli_open (&x->m, &x->line, error) == PW_OK && check_open_json (x, &o, error) == PW_OK &&
+      check_model (x, x->line.starts != NULL, error) == PW_OK) {
+    if (o == NULL || pw_output_stream (o) != stdout) pw_check_text (x);
+    if (o) pw_check_json (x, o, error);
     o = NULL;
-    check_verdict (&x, &error);
+    check_verdict (x, error);
   }
   if (o) pw_output_discard (o);
-  check_close (&x);
-  pw_cli_close (&l);
-  return pw_cli_end (&error);
+  check_close (x);
+  return error->status;
 }
+
+static const struct poptOption check_options[] = {
+  PW_OPTION_GROUP ("Output"),
+  PW_TEXT_OPTION (pw_check, json, "json", 0, "FILE", "Write the report as JSON; - prints it instead of the text"),
+  PW_MODEL_OPTIONS, POPT_TABLEEND
+};
+
+const pw_command pw_cli_check = {
+  .name = "check",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "check mobility, redundancy, initial conditions, derivatives and stability of a model",
+  .help =
+      "Check a model before running it: degrees of freedom, redundant constraint equations, massless bodies, "
+      "consistency of the initial conditions, derivatives of every element type in use (against differences), and the "
+      "eigenvalues of the linearised equations of motion. The exit status is non-zero if there is a problem.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (pw_check),
+  .function = check_command,
+  .options = check_options,
+};

@@ -30,6 +30,8 @@ static inline int pw_check_listed (const pw_check_list *l) {
 
 /* Problems make the model fail; findings do not: it can be run, but may not be what was meant. */
 typedef struct {
+  pw_cli_line line;
+  const char *json; /* path, or NULL */
   pw_cli_model m;
   pw_run *r;              /* NULL: it cannot start, for the reason in `start` */
   pw_error start;         /* why */

@@ -96,7 +96,7 @@ static int list_what (int words, const char **word, pw_error *error) {
     if (words == 0 && i > 0) putchar ('\n');
     int here = words == 0 || strcmp (word[0], part[i].name) == 0;
     if (here && words > 1 && !part[i].named)
-      return pw_fail (error, PW_INPUT, "\"%s\" is too much; write pinwheel list %s", word[1], part[i].name);
+      return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel list %s", word[1], part[i].name);
     if (here && part[i].list (words ? words - 1 : 0, words ? word + 1 : word, error) != PW_OK) return error->status;
     if (here && words) return PW_OK;
     pw_nearest_try (&near, part[i].name);
@@ -106,13 +106,18 @@ static int list_what (int words, const char **word, pw_error *error) {
   return pw_fail (error, PW_INPUT, "there is no list of \"%s\"%s", word[0], pw_nearest_text (&near, hint, sizeof hint));
 }
 
-int pw_cli_list (int argc, const char **argv) {
-  static const struct poptOption options[] = { POPT_TABLEEND };
-  pw_error error = { 0 };
-  pw_cli_line l;
-  if (pw_cli_read (&l, argc, argv, options, "[models | methods [NAME...] | kinds [NAME...] | signals]", 0, argc,
-                   &error) == PW_OK)
-    list_what (l.arguments, l.argument, &error);
-  pw_cli_close (&l);
-  return pw_cli_end (&error);
+static int list_command (void *options, pw_error *error) {
+  const pw_cli_line *l = options;
+  return list_what (l->arguments, l->argument, error);
 }
+
+const pw_command pw_cli_list = {
+  .name = "list",
+  .synopsis = "[models | methods [NAME...] | kinds [NAME...] | signals]",
+  .summary = "list models, integration methods, element types and signals",
+  .help = "List the available models, integration methods, element types (kinds) and forms of signals. With a NAME or "
+          "\"all\", describe the options of a method or the fields of an element type.",
+  .size = sizeof (pw_cli_line),
+  .function = list_command,
+  .options = (const struct poptOption[]){ POPT_TABLEEND },
+};

@@ -1,7 +1,7 @@
 /* pinwheel show --matrices: the equations  M a + J^T lambda = f,  J a = gamma  in numbers. */
 #include <stdio.h>
 #include <stdlib.h>
-#include "cli.h"
+#include "show.h"
 #include "system.h"
 
 enum { MATRICES_DIGITS = 7, MATRICES_PANEL = 6 /* columns of J side by side */ };
@@ -114,7 +114,7 @@ static int matrices_sample (const pw_cli_model *m, const pw_sample *x, pw_error 
   return status;
 }
 
-int pw_cli_matrices (const pw_cli_model *m, double t, pw_error *error) {
+int pw_show_matrices (const pw_cli_model *m, double t, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (m->file));
   pw_settings settings = { .span = t > 0 ? t : d.t_end, .step = d.step, .rtol = d.rtol };
   pw_run *r = pw_open (m->system, d.method, &settings, error);

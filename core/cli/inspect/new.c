@@ -148,12 +148,18 @@ static int new_write (const char *path, pw_error *error) {
   return PW_OK;
 }
 
-int pw_cli_new (int argc, const char **argv) {
-  static const struct poptOption options[] = { POPT_TABLEEND };
-  pw_error error = { 0 };
-  pw_cli_line l;
-  if (pw_cli_read (&l, argc, argv, options, "NAME.c|NAME.yaml", 1, 1, &error) == PW_OK)
-    new_write (l.argument[0], &error);
-  pw_cli_close (&l);
-  return pw_cli_end (&error);
+static int new_command (void *options, pw_error *error) {
+  return new_write (((const pw_cli_line *)options)->argument[0], error);
 }
+
+const pw_command pw_cli_new = {
+  .name = "new",
+  .synopsis = "NAME.c|NAME.yaml",
+  .summary = "write a small commented model to start from",
+  .help = "Write a small commented model, in C or as text, to start from. Existing files are never overwritten.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (pw_cli_line),
+  .function = new_command,
+  .options = (const struct poptOption[]){ POPT_TABLEEND },
+};

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "cli.h"
+#include "show.h"
 #include "model.h"
 #include "signal.h"
 #include "system.h"
@@ -192,32 +192,46 @@ static void show_model (const pw_cli_model *m) {
   show_sizes (m->system);
 }
 
-int pw_cli_show (int argc, const char **argv) {
-  int matrices = 0, yaml = 0;
-  const char **sets = NULL, **starts = NULL;
-  char *at = NULL;
-  double t = 0;
-  const struct poptOption options[] = {
-    { "matrices", 0, POPT_ARG_NONE, &matrices, 0, "Show M, J and gamma at the start instead", NULL },
-    { "at", 0, POPT_ARG_STRING, &at, 0, "The same at time T, after a run by the model's default method", "T" },
-    { "yaml", 0, POPT_ARG_NONE, &yaml, 0, "Write it as a text model that runs to the same trajectory", NULL },
-    PW_CLI_MODEL_OPTIONS (&sets, &starts),
-    POPT_TABLEEND
-  };
-  pw_error error = { 0 };
-  pw_cli_line l;
+typedef struct {
+  pw_cli_line line;
+  int matrices, yaml;
+  const char *at;
+} show;
+
+static int show_command (void *options, pw_error *error) {
+  const show *x = options;
   pw_cli_model m = { .file = NULL };
-  if (pw_cli_read (&l, argc, argv, options, "MODEL [OPTION...]", 1, 1, &error) == PW_OK &&
-      pw_cli_number ("--at", at, PW_NONNEGATIVE, &t, &error) == PW_OK &&
-      pw_cli_open (&m, &l, sets, starts, &error) == PW_OK) {
-    if (yaml)
-      pw_cli_yaml (&m, &error);
-    else if (matrices || at)
-      pw_cli_matrices (&m, t, &error);
-    else
-      show_model (&m);
-  }
+  double t = 0;
+  int status = pw_cli_number ("--at", x->at, PW_NONNEGATIVE, &t, error);
+  if (status == PW_OK) status = pw_cli_open (&m, &x->line, error);
+  if (status == PW_OK && x->yaml)
+    status = pw_show_yaml (&m, error);
+  else if (status == PW_OK && (x->matrices || x->at))
+    status = pw_show_matrices (&m, t, error);
+  else if (status == PW_OK)
+    show_model (&m);
   pw_cli_close_model (&m);
-  pw_cli_close (&l);
-  return pw_cli_end (&error);
+  return status;
 }
+
+static const struct poptOption show_options[] = {
+  PW_OPTION_GROUP ("Output"),
+  PW_FLAG_OPTION (show, matrices, "matrices", "Show M, J and gamma at the initial state instead"),
+  PW_TEXT_OPTION (show, at, "at", 0, "T", "Show M, J and gamma at time T [s] of a run with the model's default method"),
+  PW_FLAG_OPTION (show, yaml, "yaml", "Write the model as a text model with the same trajectory"),
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_show = {
+  .name = "show",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "show the bodies, elements and parameters of a model, or its matrices",
+  .help = "Show the bodies, elements, parameters and default run settings of a model, or the matrices of its equations "
+          "of motion.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (show),
+  .function = show_command,
+  .options = show_options,
+};

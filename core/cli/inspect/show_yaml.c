@@ -3,7 +3,7 @@
  * Numbers are written with 17 digits, and left out where they are what a model that does not say has: 0. */
 #include <math.h>
 #include <stdio.h>
-#include "cli.h"
+#include "show.h"
 #include "model.h"
 #include "signal.h"
 
@@ -170,7 +170,8 @@ static int yaml_refuse (const pw_model *m, pw_error *error) {
     }
   }
   if (m->givens)
-    return pw_fail (error, PW_INPUT, "--yaml: start values of --start have no place in a text model; give them to run");
+    return pw_fail (error, PW_INPUT,
+                    "--yaml: initial values of --start have no place in a text model; give them to run");
   return PW_OK;
 }
 
@@ -205,7 +206,7 @@ static void yaml_truth (const pw_model *m) {
   for (int i = 0; i < t->states; i++) printf ("  %s: ", t->state[i]), yaml_text (t->text[i]), putchar ('\n');
 }
 
-int pw_cli_yaml (const pw_cli_model *x, pw_error *error) {
+int pw_show_yaml (const pw_cli_model *x, pw_error *error) {
   const pw_model *m = x->model;
   if (yaml_refuse (m, error) != PW_OK) return error->status;
   puts ("pinwheel: 1");

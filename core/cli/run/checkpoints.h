@@ -18,22 +18,6 @@ typedef struct {
   pw_output *lock;    /* FILE.part, empty, which keeps other processes out from the beginning to the end */
 } pw_checkpoints;
 
-/* Table entries for popt: the address of a pw_checkpoints, all zero. */
-#define PW_CHECKPOINT_OPTIONS(c)                                                                                    \
-  { "checkpoint", 0, POPT_ARG_STRING, &(c)->path, 0, "Save the state now and then, so that the run can be resumed", \
-    "FILE" },                                                                                                       \
-      { "checkpoint-every",                                                                                         \
-        0,                                                                                                          \
-        POPT_ARG_STRING,                                                                                            \
-        &(c)->every_text,                                                                                           \
-        0,                                                                                                          \
-        "Simulated time between two checkpoints [s]; by default a tenth of the run",                                \
-        "T" },                                                                                                      \
-  {                                                                                                                 \
-    "resume", 0, POPT_ARG_STRING, &(c)->resume, 0, "Go on from a checkpoint of the same command, and save to it",   \
-        "FILE"                                                                                                      \
-  }
-
 /* Reads the file to be resumed, if there is one, and the options; `every` stays 0 without checkpoints. */
 int pw_checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error);
 void pw_checkpoints_close (pw_checkpoints *c);

@@ -15,7 +15,7 @@ static void report_more (FILE *f, int more, const char *hint) {
 
 /* ---- Options ---- */
 
-void pw_report_unused (const char *method, const pw_cli_wishes *w) {
+void pw_report_unused (const char *method, const pw_cli_line *w) {
   const pw_method *integrator;
   int stabilisation;
   if (pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;

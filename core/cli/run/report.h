@@ -8,7 +8,7 @@
 
 /* Says on standard error that a tolerance was given to a method of fixed steps, or a step to one that follows tolerances.  Who
  * gives both, as scripts do, is not told. */
-void pw_report_unused (const char *method, const pw_cli_wishes *w);
+void pw_report_unused (const char *method, const pw_cli_line *w);
 
 /* Says on standard error which headings and starting angles are more than a turn: degrees, most likely. */
 void pw_report_angles (const pw_model *m);

@@ -19,33 +19,12 @@ typedef pw_running run;
 
 /* ---- Before the run ---- */
 
-static int run_read (run *x, int argc, const char **argv, pw_error *error) {
-  const struct poptOption options[] = {
-    PW_CLI_RUN_OPTIONS (&x->wishes),
-    PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
-    { "every", 0, POPT_ARG_STRING, &x->every_text, 0,
-      "Time between two rows of the table [s]; by default a row per step", "DT" },
-    { "energy", 0, POPT_ARG_NONE, &x->energy, 0, "Print energies, work and losses", NULL },
-    { "output", 'o', POPT_ARG_STRING, &x->csv_path, 0, "Write a table of samples; - is standard output", "FILE.csv" },
-    { "json", 0, POPT_ARG_STRING, &x->json_path, 0, "Write a summary; - is standard output", "FILE" },
-    { "plots", 0, POPT_ARG_STRING, &x->plots_path, 0, "Draw figures into a folder", "DIR" },
-    { "animate", 0, POPT_ARG_STRING, &x->animate_path, 0, "Write the motion as a page for a browser, or as a picture",
-      "FILE.html" },
-    { "truth", 0, POPT_ARG_STRING, &x->truth_path, 0,
-      "Take errors against this table, with columns as run writes them, instead of the model's own truth", "FILE.csv" },
-    { "profile", 0, POPT_ARG_NONE, &x->profile, 0, "Measure at the end what each kind and each stage costs", NULL },
-    PW_CHECKPOINT_OPTIONS (&x->check),
-    POPT_TABLEEND,
-  };
-  return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
-}
-
 /* No file is used twice; before the model is open, and then with the tables that it reads. */
 static int run_uses (run *x, pw_error *error) {
   const pw_checkpoints *c = &x->check;
   int alike = c->resume && c->path && strcmp (c->resume, c->path) == 0;
   pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "--truth", x->truth_path, PW_READS, NULL },
+                   { "--truth", x->reference_path, PW_READS, NULL },
                    { "--resume", alike ? NULL : c->resume, c->path ? PW_READS : PW_WRITES, NULL },
                    { "--checkpoint", c->path, PW_WRITES, NULL },
                    { "-o", x->csv_path, PW_WRITES, NULL },
@@ -70,7 +49,7 @@ static int run_open_outputs (run *x, pw_error *error) {
 
 /* A summary is written of every run, but not over a table that the model reads. */
 static int run_open_model (run *x, pw_error *error) {
-  int status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
+  int status = pw_cli_open (&x->m, &x->line, error);
   if (x->m.file == NULL || run_uses (x, status == PW_OK ? error : &(pw_error){ 0 }) == PW_OK) return status;
   if (x->json_output) pw_output_discard (x->json_output);
   x->json_output = NULL;
@@ -89,13 +68,10 @@ static int run_own_method (const run *x, pw_error *error) {
 
 static int run_settle (run *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
-  int status = pw_cli_settle (&x->wishes, &d, &x->t_end, &x->settings, error);
-  if (status == PW_OK) status = pw_limit_read (&x->limit, x->wishes.limit, error);
-  x->settings.stop = pw_limit_over;
-  x->settings.stop_context = &x->limit;
+  int status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
   if (status == PW_OK) status = pw_cli_number ("--every", x->every_text, PW_POSITIVE, &x->every, error);
-  x->method = x->wishes.method ? x->wishes.method : d.method;
-  if (status == PW_OK && x->wishes.method == NULL) status = run_own_method (x, error);
+  x->method = x->line.method ? x->line.method : d.method;
+  if (status == PW_OK && x->line.method == NULL) status = run_own_method (x, error);
   x->settings.ledger = x->energy || x->plots_path || x->animate_path;
   return status;
 }
@@ -110,14 +86,14 @@ static int run_open (run *x, pw_error *error) {
       (x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error)) ==
           NULL)
     return error->status;
-  status = pw_watch_open (&x->watch, &x->m, x->truth_path, x->starts != NULL, x->t_end, error);
+  status = pw_watch_open (&x->watch, &x->m, x->reference_path, x->line.starts != NULL, x->t_end, error);
   if (status != PW_OK) return status;
   pw_limit_start (&x->limit);
   x->r = pw_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
   pw_report_angles (x->m.model);
   pw_report_jumps (x->m.model);
-  pw_report_unused (x->method, &x->wishes);
+  pw_report_unused (x->method, &x->line);
   pw_report_step (x->r, x->method, fmin (x->settings.step, x->t_end));
   pw_report_atol (x->r, x->m.system, x->method, x->settings.atol);
   pw_report_differences (x->m.system);
@@ -325,9 +301,10 @@ static int run_finish (run *x, pw_error *error) {
     pw_profile (x->r, last, x->cpu, run_prints_file (x) ? stderr : stdout, error);
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
+  error->status = PW_OK;
   if (*x->part) pw_cli_say ("pinwheel: the table until then is kept in %s\n", x->part);
   if (*x->json_part) pw_cli_say ("pinwheel: the summary is kept in %s\n", x->json_part);
-  pw_running_hint (x, interrupted || x->limited || error->status == PW_MACHINE);
+  pw_running_hint (x, interrupted || x->limited || status == -PW_MACHINE);
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }
 
@@ -338,19 +315,47 @@ static void run_close (run *x) {
   if (x->r) pw_close (x->r);
   free (x->redundant);
   pw_cli_close_model (&x->m);
-  pw_cli_close (&x->line);
 }
 
-int pw_cli_run (int argc, const char **argv) {
-  run x = { .method = NULL };
-  pw_error error = { 0 };
-  int status = run_read (&x, argc, argv, &error);
-  if (status == PW_OK) {
-    status = run_open (&x, &error);
-    if (status == PW_OK) run_integrate (&x, &error);
-    status = run_finish (&x, &error);
-  } else
-    status = pw_cli_end (&error); /* 0 after help */
-  run_close (&x);
+static int run_command (void *options, pw_error *error) {
+  run *x = options;
+  if (run_open (x, error) == PW_OK) run_integrate (x, error);
+  int status = run_finish (x, error);
+  run_close (x);
   return status;
 }
+
+static const struct poptOption run_options[] = {
+  PW_METHOD_OPTIONS,
+  PW_OPTION_GROUP ("Output"),
+  PW_TEXT_OPTION (run, csv_path, "output", 'o', "FILE.csv", "Write a table of samples; - is standard output"),
+  PW_TEXT_OPTION (run, every_text, "every", 0, "DT", "Time between rows of the table [s] (default: a row per step)"),
+  PW_TEXT_OPTION (run, json_path, "json", 0, "FILE", "Write a summary as JSON; - is standard output"),
+  PW_TEXT_OPTION (run, plots_path, "plots", 0, "DIR", "Draw figures into a folder"),
+  PW_TEXT_OPTION (run, animate_path, "animate", 0, "FILE.html", "Write an animation as a page for web browsers"),
+  PW_FLAG_OPTION (run, energy, "energy", "Show energies, work and losses"),
+  PW_TEXT_OPTION (run, reference_path, "truth", 0, "FILE.csv",
+                  "Measure errors against this table, with columns as in -o, instead of the model's exact solution"),
+  PW_FLAG_OPTION (run, profile, "profile", "Measure the cost of each element type and each stage after the run"),
+  PW_OPTION_GROUP ("Checkpoints"),
+  PW_TEXT_OPTION (run, check.path, "checkpoint", 0, "FILE", "Save the state regularly, so that the run can be resumed"),
+  PW_TEXT_OPTION (run, check.every_text, "checkpoint-every", 0, "T",
+                  "Simulated time between checkpoints [s] (default: a tenth of the run)"),
+  PW_TEXT_OPTION (run, check.resume, "resume", 0, "FILE",
+                  "Continue from a checkpoint of the same command, and save further ones to it"),
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND,
+};
+
+const pw_command pw_cli_run = {
+  .name = "run",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "integrate a model; write a table, a summary, figures, an animation",
+  .help = "Integrate the equations of motion of a model and show the final state, reactions and constraint residuals. "
+          "Options that are not given have the model's own defaults, see `pinwheel show MODEL`.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (run),
+  .function = run_command,
+  .options = run_options,
+};

@@ -25,13 +25,13 @@ static int running_print (pw_running *x, pw_error *error) {
     memcpy (&value, m->parameters + q->offset, sizeof value);
     pw_print_number (t, "parameter", q->name, value);
   }
-  pw_print_starts (t, (const char *const *)x->starts);
+  pw_print_starts (t, x->line.starts);
   pw_print_line (t, "table", NULL, x->csv_path ? "written" : "not written");
   pw_print_number (t, "every", NULL, x->every);
   pw_print_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
   pw_print_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
   pw_print_line (t, "animation", NULL, x->animate_path ? "written" : "not written");
-  if (x->truth_path) return pw_print_file (t, "truth", x->truth_path, x->truth_path, error);
+  if (x->reference_path) return pw_print_file (t, "truth", x->reference_path, x->reference_path, error);
   pw_print_line (t, "truth", NULL, "the model's");
   return PW_OK;
 }

@@ -10,14 +10,12 @@
 
 typedef struct {
   /* as given */
-  pw_cli_wishes wishes;
+  pw_cli_line line;
   const char *every_text;
-  const char *csv_path, *json_path, *plots_path, *animate_path, *truth_path;
-  const char **sets, **starts;
+  const char *csv_path, *json_path, *plots_path, *animate_path, *reference_path;
   int energy, profile;
   pw_checkpoints check;
   /* as understood */
-  pw_cli_line line;
   pw_cli_model m;
   const char *method;
   pw_settings settings;

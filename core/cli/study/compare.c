@@ -10,32 +10,6 @@
 
 /* ---- Before it begins ---- */
 
-static int compare_read (pw_compare *x, int argc, const char **argv, pw_error *error) {
-  const struct poptOption options[] = {
-    { "methods", 'm', POPT_ARG_STRING, &x->methods_text, 0,
-      "Methods, separated by commas; all: every integrator with every stabilisation (default)", "A,B,...|all" },
-    { "rtol-ladder", 0, POPT_ARG_STRING, &x->rtol_text, 0,
-      "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)", "FROM:TO" },
-    { "step-ladder", 0, POPT_ARG_STRING, &x->step_text, 0, "Steps of the others [s], by halves (default 0.1:1e-4)",
-      "FROM:TO" },
-    { "limit", 0, POPT_ARG_STRING, &x->limit_text, 0,
-      "Processor time a single run may take [s]; what would take longer is not run (default 10)", "SECONDS" },
-    { "repeats", 0, POPT_ARG_STRING, &x->repeats_text, 0,
-      "Runs of each rung on the clock, of which the median counts, at most 99 (default 9); half a second of them is "
-      "enough",
-      "N" },
-    { "t-end", 't', POPT_ARG_STRING, &x->t_end_text, 0, "Time to run to [s]", "T" },
-    PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
-    { "truth", 0, POPT_ARG_STRING, &x->truth_path, 0,
-      "Take errors against this table, with columns as run writes them, instead of the model's own truth or one made "
-      "by methods",
-      "FILE.csv" },
-    { "output", 'o', POPT_ARG_STRING, &x->folder, 0, "Write tables and work-precision diagrams into a folder", "DIR" },
-    POPT_TABLEEND,
-  };
-  return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
-}
-
 /* The table is written as rows come, under the name it keeps if something stops it. */
 static int compare_open_csv (pw_compare *x, pw_error *error) {
   static const char *const names[] = { ".dat", ".gp", ".svg", ".png", "compare.csv", "truth.csv", NULL };
@@ -53,13 +27,13 @@ static int compare_open_csv (pw_compare *x, pw_error *error) {
 }
 
 static int compare_open (pw_compare *x, pw_error *error) {
-  int status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
+  int status = pw_cli_open (&x->m, &x->line, error);
   if (status != PW_OK) return status;
   x->t_end = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
   x->limit = 10;
   x->repeats = 9;
-  status = pw_cli_number ("--t-end", x->t_end_text, PW_POSITIVE, &x->t_end, error);
-  if (status == PW_OK) status = pw_cli_number ("--limit", x->limit_text, PW_POSITIVE, &x->limit, error);
+  status = pw_cli_number ("--t-end", x->line.t_end, PW_POSITIVE, &x->t_end, error);
+  if (status == PW_OK) status = pw_cli_number ("--limit", x->line.limit, PW_POSITIVE, &x->limit, error);
   if (status == PW_OK) status = pw_cli_number ("--repeats", x->repeats_text, PW_COUNT, &x->repeats, error);
   if (status == PW_OK && x->repeats > COMPARE_REPEATS)
     return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", x->repeats_text, COMPARE_REPEATS);
@@ -180,21 +154,55 @@ static void compare_close (pw_compare *x) {
   if (x->lock >= 0) close (x->lock);
   pw_truth_close (&x->truth);
   pw_cli_close_model (&x->m);
-  pw_cli_close (&x->line);
   free (x->row);
   pw_contestants_close (&x->list);
 }
 
-int pw_cli_compare (int argc, const char **argv) {
-  pw_compare x = { .lock = -1 };
-  pw_error error = { 0 };
-  int status = compare_read (&x, argc, argv, &error);
-  if (status == PW_OK) {
-    status = compare_open (&x, &error);
-    if (status == PW_OK) status = compare_run (&x, &error);
-    status = compare_finish (&x, status, &error);
-    if (status == PW_OK) status = compare_verdict (&x, &error);
-  }
-  compare_close (&x);
-  return status == PW_INTERRUPTED ? status : pw_cli_end (&error);
+static int compare_command (void *options, pw_error *error) {
+  pw_compare *x = options;
+  x->lock = -1;
+  int status = compare_open (x, error);
+  if (status == PW_OK) status = compare_run (x, error);
+  status = compare_finish (x, status, error);
+  if (status == PW_OK) status = compare_verdict (x, error);
+  compare_close (x);
+  return status == PW_INTERRUPTED ? status : error->status;
 }
+
+static const struct poptOption compare_options[] = {
+  PW_OPTION_GROUP ("Comparison"),
+  PW_TEXT_OPTION (pw_compare, methods_text, "methods", 'm', "A,B,...|all",
+                  "Methods, separated by commas; all: every integrator with every stabilisation (default)"),
+  PW_TEXT_OPTION (pw_compare, rtol_text, "rtol-ladder", 0, "FROM:TO",
+                  "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)"),
+  PW_TEXT_OPTION (pw_compare, step_text, "step-ladder", 0, "FROM:TO",
+                  "Step sizes of fixed-step methods [s], halved each time (default 0.1:1e-4)"),
+  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS",
+                  "Processor time of a single run; runs expected to take longer are skipped (default 10)"),
+  PW_TEXT_OPTION (
+      pw_compare, repeats_text, "repeats", 0, "N",
+      "Timed repetitions of each run, at most 99, of which the median is reported (default 9, or those that "
+      "fit into half a second)"),
+  PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
+  PW_TEXT_OPTION (
+      pw_compare, truth_path, "truth", 0, "FILE.csv",
+      "Measure errors against this table, with columns as in run -o, instead of the model's exact solution or a "
+      "computed reference"),
+  PW_TEXT_OPTION (pw_compare, folder, "output", 'o', "DIR", "Write tables and work-precision diagrams into a folder"),
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND,
+};
+
+const pw_command pw_cli_compare = {
+  .name = "compare",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "compare the accuracy and cost of methods against a reference solution",
+  .help = "Run a model by several methods, each with a ladder of tolerances or step sizes, and compare their errors "
+          "against "
+          "a reference solution with their processor times.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (pw_compare),
+  .function = compare_command,
+  .options = compare_options,
+};

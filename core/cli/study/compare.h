@@ -52,11 +52,10 @@ typedef struct {
 
 typedef struct {
   /* as given */
-  const char *methods_text, *rtol_text, *step_text, *limit_text, *repeats_text, *t_end_text, *truth_path, *folder;
-  int lock; /* of the folder; -1: none */
-  const char **sets, **starts;
-  /* as understood */
   pw_cli_line line;
+  const char *methods_text, *rtol_text, *step_text, *repeats_text, *truth_path, *folder;
+  int lock; /* of the folder; -1: none */
+  /* as understood */
   pw_cli_model m;
   pw_contestants list;
   pw_ladder ladder[2]; /* of steps, of tolerances */

@@ -144,7 +144,7 @@ static int truth_make (pw_compare *x, pw_error *error) {
 
 /* A table's end is that of the comparison, if there is no other. */
 static int truth_table (pw_compare *x, pw_error *error) {
-  double t_end = x->t_end_text ? x->t_end : 0;
+  double t_end = x->line.t_end ? x->t_end : 0;
   int status = pw_motion_read (&x->truth.motion, x->m.system, x->truth_path, &t_end, 1, error);
   if (status == PW_OK) x->t_end = t_end;
   snprintf (x->truth.about, sizeof x->truth.about, "%s", x->truth_path);
@@ -158,7 +158,7 @@ static int truth_of_model (pw_compare *x, pw_error *error) {
 }
 
 int pw_truth_find (pw_compare *x, pw_error *error) {
-  int own = x->truth_path == NULL && pw_has_truth (x->m.model) && x->starts == NULL;
+  int own = x->truth_path == NULL && pw_has_truth (x->m.model) && x->line.starts == NULL;
   if (x->truth_path == NULL && !own) return truth_make (x, error);
   int status = own ? truth_of_model (x, error) : truth_table (x, error);
   if (status != PW_OK) return status;

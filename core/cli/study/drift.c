@@ -10,26 +10,6 @@
 
 /* ---- Before it begins ---- */
 
-static int drift_read (pw_drift *x, int argc, const char **argv, pw_error *error) {
-  const struct poptOption options[] = {
-    { "methods", 'm', POPT_ARG_STRING, &x->methods_text, 0,
-      "Methods side by side, separated by commas; all: every integrator with every stabilisation; default: those of "
-      "rk4, ida and galpha",
-      "A,B,...|all" },
-    PW_CLI_STEP_OPTIONS (&x->wishes),
-    PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
-    { "vary", 'v', POPT_ARG_ARGV, &x->vary, 0,
-      "Values of an option: alpha or beta [1/s] of baumgarte, every [steps] of projection; may be repeated. RANGE as "
-      "of "
-      "sweep: V1,V2,..., lin:FIRST:LAST:COUNT, log:...",
-      "OPTION=RANGE" },
-    { "only-methods", 0, POPT_ARG_NONE, &x->only_methods, 0, "Leave out how the drift depends on options", NULL },
-    { "output", 'o', POPT_ARG_STRING, &x->folder, 0, "Write tables and figures into a folder", "DIR" },
-    POPT_TABLEEND,
-  };
-  return pw_cli_read (&x->line, argc, argv, options, "MODEL [OPTION...]", 1, 1, error);
-}
-
 /* Every stabilisation of an explicit integrator and of the implicit ones. */
 static void drift_usual (char *text, size_t size) {
   static const char *const usual[] = { "rk4", "ida", "galpha" };
@@ -46,10 +26,7 @@ static int drift_settle (pw_drift *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   char usual[1000];
   if (d.rtol == 0) d.rtol = 1e-6;
-  int status = pw_cli_settle (&x->wishes, &d, &x->t_end, &x->settings, error);
-  if (status == PW_OK) status = pw_limit_read (&x->limit, x->wishes.limit, error);
-  x->settings.stop = pw_limit_over;
-  x->settings.stop_context = &x->limit;
+  int status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
   x->settings.ledger = 1;
   drift_usual (usual, sizeof usual);
   if (status == PW_OK) status = pw_contestants_read (&x->list, x->methods_text ? x->methods_text : usual, error);
@@ -59,7 +36,7 @@ static int drift_settle (pw_drift *x, pw_error *error) {
 static int drift_open (pw_drift *x, pw_error *error) {
   static const char *const names[] = { ".dat", ".gp", ".svg", ".png", "drift.csv", "drift-time.csv", NULL };
   char path[PLOT_PATH + 16];
-  int status = pw_cli_open (&x->m, &x->line, (const char *const *)x->sets, (const char *const *)x->starts, error);
+  int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = drift_settle (x, error);
   if (status != PW_OK || x->folder == NULL) return status;
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
@@ -131,24 +108,51 @@ static int drift_verdict (const pw_drift *x, pw_error *error) {
   return pw_fail (error, PW_METHOD, "no method has reached the end; the last of them: %s", x->row[x->rows - 1].reason);
 }
 
-int pw_cli_drift (int argc, const char **argv) {
-  pw_drift x = { .lock = -1 };
-  pw_error error = { 0 };
-  int status = drift_read (&x, argc, argv, &error);
+static int drift_command (void *options, pw_error *error) {
+  pw_drift *x = options;
+  x->lock = -1;
+  int status = drift_open (x, error);
   if (status == PW_OK) {
-    status = drift_open (&x, &error);
-    if (status == PW_OK) {
-      pw_stop_catch ();
-      status = drift_rows (&x, &error);
-      pw_stop_release ();
-    }
-    status = drift_finish (&x, status, &error);
-    if (status == PW_OK) status = drift_verdict (&x, &error);
+    pw_stop_catch ();
+    status = drift_rows (x, error);
+    pw_stop_release ();
   }
-  if (x.lock >= 0) close (x.lock);
-  pw_drift_free_rows (&x);
-  pw_contestants_close (&x.list);
-  pw_cli_close_model (&x.m);
-  pw_cli_close (&x.line);
-  return status == PW_INTERRUPTED ? status : pw_cli_end (&error);
+  status = drift_finish (x, status, error);
+  if (status == PW_OK) status = drift_verdict (x, error);
+  if (x->lock >= 0) close (x->lock);
+  pw_drift_free_rows (x);
+  pw_contestants_close (&x->list);
+  pw_cli_close_model (&x->m);
+  return status == PW_INTERRUPTED ? status : error->status;
 }
+
+static const struct poptOption drift_options[] = {
+  PW_OPTION_GROUP ("Comparison"),
+  PW_TEXT_OPTION (
+      pw_drift, methods_text, "methods", 'm', "A,B,...|all",
+      "Methods, separated by commas; all: every integrator with every stabilisation (default: those of rk4, "
+      "ida and galpha)"),
+  PW_STEP_OPTIONS,
+  PW_LIST_OPTION (
+      pw_drift, vary, "vary", 'v', "OPTION=RANGE",
+      "Values of an option: alpha or beta [1/s] of baumgarte, every [steps] of projection; repeatable. RANGE: "
+      "V1,V2,..., lin:FIRST:LAST:COUNT or log:FIRST:LAST:COUNT"),
+  PW_FLAG_OPTION (pw_drift, only_methods, "only-methods", "Omit the dependence of drift on options"),
+  PW_TEXT_OPTION (pw_drift, folder, "output", 'o', "DIR", "Write tables and figures into a folder"),
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND,
+};
+
+const pw_command pw_cli_drift = {
+  .name = "drift",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "compare the drift of constraints and energy in long runs, by stabilisation",
+  .help =
+      "Compare how constraint residuals and the energy defect grow during a long run, by method and stabilisation, and "
+      "how they depend on the parameters of Baumgarte stabilisation and projection.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (pw_drift),
+  .function = drift_command,
+  .options = drift_options,
+};

@@ -39,13 +39,12 @@ typedef struct {
 
 typedef struct {
   /* as given */
-  pw_cli_wishes wishes;
+  pw_cli_line line;
   const char *methods_text, *folder;
   int lock; /* of the folder; -1: none */
-  const char **vary, **sets, **starts;
+  const char **vary;
   int only_methods;
   /* as understood */
-  pw_cli_line line;
   pw_cli_model m;
   pw_contestants list;
   pw_grid alpha, beta, every; /* one axis each */

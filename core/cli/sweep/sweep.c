@@ -17,12 +17,11 @@
 
 typedef struct {
   /* as given */
-  pw_cli_wishes wishes;
+  pw_cli_line line;
   const char *path, *part_text, *jobs_text;
-  const char **ranges, **sets, **starts;
+  const char **ranges;
   int merge, cpu;
   /* as understood */
-  pw_cli_line line;
   pw_plan plan;
   int jobs;
   /* under way; one thread at a time, which holds the lock */
@@ -36,32 +35,13 @@ typedef struct {
 
 /* ---- Before the sweep ---- */
 
-static int sweep_read (sweep *x, int argc, const char **argv, pw_error *error) {
-  const struct poptOption options[] = {
-    { "vary", 'v', POPT_ARG_ARGV, &x->ranges, 0,
-      "Vary a parameter, or a start value such as frame.vx; may be repeated, the last one varies fastest. "
-      "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,...",
-      "NAME=RANGE" },
-    { "output", 'o', POPT_ARG_STRING, &x->path, 0, "Where the table goes", "FILE.csv" },
-    PW_CLI_RUN_OPTIONS (&x->wishes),
-    PW_CLI_MODEL_OPTIONS (&x->sets, &x->starts),
-    { "jobs", 'j', POPT_ARG_STRING, &x->jobs_text, 0, "Runs at a time; by default one per processor", "N" },
-    { "part", 0, POPT_ARG_STRING, &x->part_text, 0, "Do every N-th run, from the I-th on, for a later --merge", "I/N" },
-    { "merge", 0, POPT_ARG_NONE, &x->merge, 0, "Put the parts named instead of a model together", NULL },
-    { "cpu", 0, POPT_ARG_NONE, &x->cpu, 0, "Add each run's processor time; two such tables are never the same", NULL },
-    POPT_TABLEEND,
-  };
-  int merge = 0;
-  for (int i = 1; i < argc; i++) merge |= strcmp (argv[i], "--merge") == 0;
-  int status = pw_cli_read (&x->line, argc, argv, options, merge ? "--merge PART... -o FILE.csv" : "MODEL [OPTION...]",
-                            1, merge ? INT_MAX : 1, error);
-  if (status != PW_OK) return status;
+static int sweep_read (const sweep *x, pw_error *error) {
   if (x->path == NULL || *x->path == 0) return pw_fail (error, PW_INPUT, "nowhere to write the table: add -o FILE.csv");
   if (strcmp (x->path, "-") == 0)
     return pw_fail (error, PW_INPUT, "-o -: a sweep needs a file, next to which it keeps what it has done");
-  if (!merge && x->ranges == NULL)
+  if (!x->merge && x->ranges == NULL)
     return pw_fail (error, PW_INPUT, "nothing is varied: add --vary NAME=lin:FIRST:LAST:COUNT, log:..., or V1,V2,...");
-  return PW_OK;
+  return x->merge ? PW_OK : pw_cli_at_most (&pw_cli_sweep, &x->line, 1, error);
 }
 
 /* Which option makes no sense with parts; NULL if none is there. */
@@ -69,12 +49,10 @@ static const char *sweep_odd (const sweep *x) {
   const struct {
     const char *name;
     const void *given;
-  } option[] = { { "--vary", x->ranges },        { "--method", x->wishes.method },
-                 { "--t-end", x->wishes.t_end }, { "--step", x->wishes.step },
-                 { "--rtol", x->wishes.rtol },   { "--atol", x->wishes.atol },
-                 { "--limit", x->wishes.limit }, { "--max-steps", x->wishes.max_steps },
-                 { "--set", x->sets },           { "--start", x->starts },
-                 { "--jobs", x->jobs_text },     { "--part", x->part_text },
+  } option[] = { { "--vary", x->ranges },       { "--method", x->line.method },       { "--t-end", x->line.t_end },
+                 { "--step", x->line.step },    { "--rtol", x->line.rtol },           { "--atol", x->line.atol },
+                 { "--limit", x->line.limit },  { "--max-steps", x->line.max_steps }, { "--set", x->line.sets },
+                 { "--start", x->line.starts }, { "--jobs", x->jobs_text },           { "--part", x->part_text },
                  { "--cpu", x->cpu ? x : NULL } };
   for (size_t i = 0; i < sizeof option / sizeof *option; i++)
     if (option[i].given) return option[i].name;
@@ -127,13 +105,12 @@ static int sweep_settle (sweep *x, pw_error *error) {
   pw_plan *p = &x->plan;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
   p->model = x->line.argument[0];
-  p->method = x->wishes.method ? x->wishes.method : d.method;
-  p->sets = (const char *const *)x->sets;
-  p->starts = (const char *const *)x->starts;
+  p->method = x->line.method ? x->line.method : d.method;
+  p->sets = x->line.sets;
+  p->starts = x->line.starts;
   p->cpu = x->cpu;
   pw_limit limit;
-  int status = pw_cli_settle (&x->wishes, &d, &p->t_end, &p->settings, error);
-  if (status == PW_OK) status = pw_limit_read (&limit, x->wishes.limit, error);
+  int status = pw_cli_settings (&x->line, &d, &p->t_end, &p->settings, &limit, error);
   p->limit = limit.most;
   if (status == PW_OK) status = sweep_jobs (x, error);
   return status == PW_OK ? sweep_part (x, error) : status;
@@ -144,7 +121,7 @@ static int sweep_open (sweep *x, pw_error *error) {
   x->plan.file = pw_cli_file (&x->line, error);
   if (x->plan.file == NULL) return error->status;
   int status = sweep_settle (x, error);
-  if (status == PW_OK) status = pw_plan_open (&x->plan, (const char *const *)x->ranges, error);
+  if (status == PW_OK) status = pw_plan_open (&x->plan, x->ranges, error);
   if (status == PW_OK && x->plan.parts > x->plan.grid.rows)
     status = pw_fail (error, PW_INPUT, "--part %s: the grid has only %ld rows", x->part_text, x->plan.grid.rows);
   if (status == PW_OK) status = pw_cli_uses (&x->line, x->plan.file, use, sizeof use / sizeof *use, error);
@@ -265,20 +242,48 @@ static void sweep_close (sweep *x) {
   pw_plan_close (&x->plan);
   pw_file_close (x->plan.file);
   pw_text_free (&x->scratch);
-  pw_cli_close (&x->line);
 }
 
-int pw_cli_sweep (int argc, const char **argv) {
-  sweep x = { .journal.file = -1 };
-  pw_error error = { 0 };
-  int status = sweep_read (&x, argc, argv, &error);
-  if (status == PW_OK && x.merge)
-    status = sweep_merge (&x, &error);
+static int sweep_command (void *options, pw_error *error) {
+  sweep *x = options;
+  x->journal.file = -1;
+  int status = sweep_read (x, error);
+  if (status == PW_OK && x->merge)
+    status = sweep_merge (x, error);
   else if (status == PW_OK) {
-    status = sweep_open (&x, &error);
-    if (status == PW_OK) status = sweep_run (&x, &error);
-    if (status == PW_OK) status = sweep_finish (&x, &error);
+    status = sweep_open (x, error);
+    if (status == PW_OK) status = sweep_run (x, error);
+    if (status == PW_OK) status = sweep_finish (x, error);
   }
-  sweep_close (&x);
-  return status == PW_INTERRUPTED ? status : pw_cli_end (&error);
+  sweep_close (x);
+  return status;
 }
+
+static const struct poptOption sweep_options[] = {
+  PW_OPTION_GROUP ("Sweep"),
+  PW_LIST_OPTION (sweep, ranges, "vary", 'v', "NAME=RANGE",
+                  "Vary a parameter or an initial value such as frame.vx; repeatable, the last one varies fastest. "
+                  "RANGE: lin:FIRST:LAST:COUNT, log:FIRST:LAST:COUNT, or a list V1,V2,..."),
+  PW_TEXT_OPTION (sweep, path, "output", 'o', "FILE.csv", "Write the table to this file"),
+  PW_TEXT_OPTION (sweep, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_TEXT_OPTION (sweep, part_text, "part", 0, "I/N", "Compute every N-th row, from the I-th on, for a later --merge"),
+  PW_FLAG_OPTION (sweep, merge, "merge", "Merge the parts named instead of a model"),
+  PW_FLAG_OPTION (sweep, cpu, "cpu", "Add a column with the processor time of each run, which is never reproducible"),
+  PW_METHOD_OPTIONS,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND,
+};
+
+const pw_command pw_cli_sweep = {
+  .name = "sweep",
+  .synopsis = "MODEL --vary NAME=RANGE... -o FILE.csv [OPTION...]",
+  .summary = "tabulate runs for all combinations of varied parameters",
+  .help =
+      "Run a model for all combinations of varied parameters and initial values, and write a table with one row per "
+      "run. A sweep that was interrupted is continued by the same command. A sweep may be divided into parts, which "
+      "`pinwheel sweep --merge PART... -o FILE.csv` puts together.",
+  .least = 1,
+  .size = sizeof (sweep),
+  .function = sweep_command,
+  .options = sweep_options,
+};

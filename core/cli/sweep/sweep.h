@@ -49,7 +49,7 @@ static inline double pw_grid_value (const pw_grid *g, int axis, long row) {
 typedef struct {
   /* as the command line says; read only */
   const char *model, *method;
-  const char *const *sets, *const *starts;
+  const char **sets, **starts;
   pw_settings settings;
   double t_end; /* [s] */
   double limit; /* of each run's processor time [s]; INFINITY: none */
@@ -72,7 +72,7 @@ typedef struct {
 /* Matches the ranges ("NAME=RANGE") to the model, whose file is open in p->file and stays the caller's, and finds the
  * columns by building scenes of the grid.  Errors: PW_INPUT for whatever does not fit; PW_MACHINE.  Close the plan in
  * every case. */
-int pw_plan_open (pw_plan *p, const char *const *ranges, pw_error *error);
+int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error);
 void pw_plan_close (pw_plan *p);
 
 /* A row's model, built and compiled, m->file left NULL; close it in every case.  May be called by several threads at once. */

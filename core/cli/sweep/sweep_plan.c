@@ -29,7 +29,7 @@ int pw_plan_scene (const pw_plan *p, long row, pw_cli_model *m, pw_error *error)
 /* ---- Axes ---- */
 
 /* 1 if a list of "NAME=VALUE" has this name. */
-static int plan_named (const char *const *list, const char *name) {
+static int plan_named (const char **list, const char *name) {
   size_t n = strlen (name);
   for (; list && *list; list++)
     if (strncmp (*list, name, n) == 0 && (*list)[n] == '=') return 1;
@@ -154,10 +154,10 @@ static void plan_head (pw_plan *p) {
 
 /* ---- The plan ---- */
 
-int pw_plan_open (pw_plan *p, const char *const *ranges, pw_error *error) {
+int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error) {
   const pw_method *method;
   int stabilisation, status = pw_parse_method (p->method, &method, &stabilisation, error);
-  if (status == PW_OK) status = pw_grid_read (&p->grid, ranges, error);
+  if (status == PW_OK) status = pw_grid_read (&p->grid, (const char *const *)ranges, error);
   if (status != PW_OK) return status;
   pw_model *m = pw_file_model (p->file, error);
   if (m == NULL) return error->status;

@@ -1,0 +1,89 @@
+/* The model of a command line, and the files that a command reads and writes. */
+#define _POSIX_C_SOURCE 200809L
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "cli.h"
+
+int pw_cli_apply (pw_model *m, const char *option, const char **list,
+                  int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error) {
+  for (; list && *list; list++) {
+    char name[200];
+    double value;
+    const char *equals = strchr (*list, '=');
+    if (equals == NULL || equals == *list || (size_t)(equals - *list) >= sizeof name)
+      return pw_fail (error, PW_INPUT, "%s %s: expected NAME=VALUE", option, *list);
+    snprintf (name, sizeof name, "%.*s", (int)(equals - *list), *list);
+    if (pw_read_expression (equals + 1, &value) != PW_OK)
+      return pw_fail (error, PW_INPUT, "%s %s: \"%s\" is not a number", option, *list, equals + 1);
+    int status = set (m, name, value, error);
+    if (status != PW_OK) return status;
+  }
+  return PW_OK;
+}
+
+pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error) {
+  const double most = PW_FILE_MOST >> 20;
+  double size = PW_FILE_LARGEST >> 20;
+  if (pw_cli_number ("--max-file", l->max_file, PW_POSITIVE, &size, error) != PW_OK) return NULL;
+  if (size <= most) return pw_file_open_limited (l->argument[0], (size_t)(size * (1 << 20)), error);
+  pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", l->max_file, most);
+  return NULL;
+}
+
+int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error) {
+  *m = (pw_cli_model){ .file = NULL };
+  m->file = pw_cli_file (l, error);
+  if (m->file) m->model = pw_file_model (m->file, error);
+  if (m->model && pw_cli_apply (m->model, "--set", l->sets, pw_set, error) == PW_OK &&
+      pw_cli_apply (m->model, "--start", l->starts, pw_set_start, error) == PW_OK &&
+      pw_build (m->model, error) == PW_OK)
+    m->system = pw_compile (m->model, error);
+  return m->system ? PW_OK : error->status;
+}
+
+void pw_cli_close_model (pw_cli_model *m) {
+  pw_free (m->system);
+  pw_model_free (m->model);
+  pw_file_close (m->file);
+  *m = (pw_cli_model){ .file = NULL };
+}
+
+const char *pw_cli_short_path (const char *path, char *buffer, size_t size) {
+  size_t n = getcwd (buffer, size) ? strlen (buffer) : 0;
+  return n > 1 && strncmp (path, buffer, n) == 0 && path[n] == '/' ? path + n + 1 : path;
+}
+
+pw_run_defaults pw_cli_defaults (const pw_plugin_table *table) {
+  pw_run_defaults d = table->run;
+  if (d.t_end == 0) d.t_end = 10;
+  if (d.step == 0) d.step = 1e-3;
+  if (d.method == NULL) d.method = "rk4+projection";
+  return d;
+}
+
+typedef struct {
+  pw_use *use;
+  int count;
+  pw_error *error;
+} model_uses;
+
+static int model_table (void *context, const char *path) {
+  model_uses *x = context;
+  x->use[0].what = "a table of the model";
+  x->use[0].path = path;
+  return pw_check_uses (x->use, x->count, x->error);
+}
+
+int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error) {
+  model_uses x = { use, count, error };
+  pw_error own = { 0 };
+  char *path = file ? NULL : pw_file_find (l->argument[0], &own);
+  use[0].path = file ? pw_file_path (file) : path;
+  int status = own.status == PW_MACHINE ? pw_fail (error, PW_MACHINE, "%s", own.text) : PW_OK;
+  if (status == PW_OK) status = pw_check_uses (use, count, error); /* opening the model reports what else is wrong */
+  if (status == PW_OK && file) status = pw_file_tables (file, model_table, &x);
+  use[0].path = NULL;
+  free (path);
+  return status;
+}

@@ -1,0 +1,15 @@
+/* The other outputs of `pinwheel show`. */
+#ifndef PW_SHOW_H
+#define PW_SHOW_H
+
+#include "cli.h"
+
+/* Shows M, J, gamma and the quantities of each coordinate and constraint equation at time t of a run with the model's
+ * default method. */
+int pw_show_matrices (const pw_cli_model *m, double t, pw_error *error);
+
+/* Writes a built model to standard output as text, with 17 digits.  PW_INPUT for what a text model cannot express: function
+ * signals, element types of the model's own. */
+int pw_show_yaml (const pw_cli_model *m, pw_error *error);
+
+#endif
