@@ -16,6 +16,7 @@ struct pw_run {
   int stabilisation;             /* index in method->stabilisations */
   double option[PW_MAX_OPTIONS]; /* one per method->options */
   pw_settings settings;
+  int fixed_steps;             /* 1: steps of the given size */
   pw_saddle *saddle;           /* with the mass matrix and all rows: accelerations, impulses */
   const unsigned char *active; /* rows: 0 for the redundant ones; NULL: there are none */
   int redundant;               /* how many */
@@ -95,7 +96,9 @@ static inline double pw_tolerance_rate (const pw_run *r, int j, double v) {
   return fmin (r->settings.rtol * fabs (v) + pw_atol_rate (r, j), r->saturation[r->s->coords + j]);
 }
 /* 1 if the run takes steps of the given size. */
-int pw_fixed_steps (const pw_run *r);
+static inline int pw_fixed_steps (const pw_run *r) {
+  return r->fixed_steps;
+}
 /* The end of the next step of the given size, `count` of which were taken since the time `base`: a multiple of the size,
  * t_end or a breakpoint, whichever is first; *whole: the first. */
 static inline double pw_step_end (const pw_run *r, double base, long count, double t_end, int *whole) {
@@ -104,13 +107,15 @@ static inline double pw_step_end (const pw_run *r, double base, long count, doub
   *whole = t1 < stop + 1e-9 * h;
   return t1 > stop - 1e-9 * h ? stop : t1;
 }
-/* 1 if the run's stabilisation has this name. */
-int pw_stabilised_by (const pw_run *r, const char *name);
+/* 1 if the run's stabilisation is of this kind. */
+static inline int pw_stabilised_by (const pw_run *r, pw_stabilisation_kind kind) {
+  return r->method->stabilisations[r->stabilisation].kind == kind;
+}
 
 /* Stabilisations of methods that integrate the accelerations. */
-#define PW_ACCELERATION_STABILISATIONS                                               \
-  { "none", "accelerations only: the constraints drift" }, {                         \
-    "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)" \
+#define PW_ACCELERATION_STABILISATIONS                                                             \
+  { "none", "accelerations only: the constraints drift", PW_UNSTABILISED }, {                      \
+    "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)", PW_BAUMGARTE \
   }
 
 /* Baumgarte's options, the same for all integrators that have them, and their way into r->alpha and r->beta. */

@@ -17,4 +17,7 @@
 /* pw_parse_method that keeps the options: values has room for PW_MAX_OPTIONS. */
 int pw_parse_options (const char *text, const pw_method **method, int *stabilisation, double *values, pw_error *error);
 
+/* Whether the run takes steps of the given size: its method, or an option of it, says so. */
+void pw_choose_steps (pw_run *r);
+
 #endif

@@ -28,8 +28,21 @@ typedef struct {
   const char *unit, *about;
 } pw_option;
 
+/* Stabilisations that the run treats in a way of their own; a method may have others. */
+typedef enum {
+  PW_STABILISED_OTHERWISE,
+  PW_UNSTABILISED,
+  PW_BAUMGARTE,
+  PW_PROJECTION,
+  PW_NULLSPACE,
+  PW_INDEX2,
+  PW_GGL,
+  PW_SI1
+} pw_stabilisation_kind;
+
 typedef struct {
   const char *name, *about;
+  pw_stabilisation_kind kind;
 } pw_stabilisation;
 
 /* An integrator: one const table in one file. */

@@ -61,7 +61,7 @@ static int galpha_restart (pw_run *r, pw_error *error) {
 static int galpha_open (pw_run *r, pw_error *error) {
   galpha *d = r->data = calloc (1, sizeof *d);
   if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  d->ggl = pw_stabilised_by (r, "ggl");
+  d->ggl = pw_stabilised_by (r, PW_GGL);
   galpha_coefficients (d, pw_option_value (r, "rho"));
   int status = pw_tangent_open (&d->work.tangent, r);
   d->n = r->s->coords;
@@ -204,9 +204,9 @@ static int galpha_at (pw_run *r, double t, pw_error *error) {
 }
 
 static const pw_stabilisation galpha_stabilisations[] = {
-  { "index3", "positions enforced, and the rates of nonholonomic rows (Arnold & Brüls 2007)" },
-  { "ggl", "stabilised index 2: positions and rates both enforced (Gear, Gupta & Leimkuhler 1985)" },
-  { NULL, NULL },
+  { "index3", "positions enforced, and the rates of nonholonomic rows (Arnold & Brüls 2007)", PW_STABILISED_OTHERWISE },
+  { "ggl", "stabilised index 2: positions and rates both enforced (Gear, Gupta & Leimkuhler 1985)", PW_GGL },
+  { .name = NULL },
 };
 
 static const pw_option galpha_options[] = {

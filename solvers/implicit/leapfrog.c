@@ -174,8 +174,9 @@ static int leapfrog_at (pw_run *r, double t, pw_error *error) {
 }
 
 static const pw_stabilisation leapfrog_stabilisations[] = {
-  { "rattle", "positions and rates both enforced by the step's own multipliers (Andersen 1983)" },
-  { NULL, NULL },
+  { "rattle", "positions and rates both enforced by the step's own multipliers (Andersen 1983)",
+    PW_STABILISED_OTHERWISE },
+  { .name = NULL },
 };
 
 static const pw_option leapfrog_options[] = { { .name = NULL } };

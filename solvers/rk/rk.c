@@ -16,12 +16,14 @@ static const char *const rk_positions[] = { "projected", "drift", NULL };
 static const char *const rk_inputs[] = { "stage", "held", NULL };
 
 const pw_stabilisation pw_rk_stabilisations[] = {
-  { "none", "accelerations only: the constraints drift" },
-  { "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)" },
-  { "projection", "coordinate projection onto positions and rates after each step (Lubich 1991, Eich 1993)" },
-  { "nullspace", "minimal velocities in a basis of the null space of J: rates obey all rows at every stage "
-                 "(Kim & Vanderploeg 1986)" },
-  { NULL, NULL },
+  PW_ACCELERATION_STABILISATIONS,
+  { "projection", "coordinate projection onto positions and rates after each step (Lubich 1991, Eich 1993)",
+    PW_PROJECTION },
+  { "nullspace",
+    "minimal velocities in a basis of the null space of J: rates obey all rows at every stage "
+    "(Kim & Vanderploeg 1986)",
+    PW_NULLSPACE },
+  { .name = NULL },
 };
 
 const pw_option pw_rk_options[] = {
@@ -94,8 +96,8 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   rk_list_weights (d);
   d->adaptive = tableau->e != NULL && pw_option_value (r, "steps") == 0;
   d->held = pw_option_value (r, "inputs") != 0;
-  d->projects = pw_stabilised_by (r, "projection");
-  d->minimal = pw_stabilised_by (r, "nullspace");
+  d->projects = pw_stabilised_by (r, PW_PROJECTION);
+  d->minimal = pw_stabilised_by (r, PW_NULLSPACE);
   d->closes = d->minimal && pw_option_value (r, "positions") == 0;
   d->every = (int)pw_option_value (r, "every");
   pw_read_baumgarte (r);

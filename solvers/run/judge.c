@@ -25,7 +25,7 @@ static int judge_lost (pw_run *r, pw_error *error) {
   const char *advice = "";
   if (row >= 0 && r->active && !r->active[row])
     snprintf (cause, sizeof cause, "constraints contradict each other");
-  else if (pw_stabilised_by (r, "none"))
+  else if (pw_stabilised_by (r, PW_UNSTABILISED))
     advice = pw_fixed_steps (r) ? "; a smaller step or a stabilisation reduces it"
                                 : "; a smaller tolerance or a stabilisation reduces it";
   else if (pw_fixed_steps (r))
@@ -107,7 +107,7 @@ int pw_run_judge (pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
   pw_note_residuals (r);
   if (!(s->position <= r->limits.lost && s->velocity <= r->limits.lost)) {
-    double lost = pw_stabilised_by (r, "none") ? r->limits.lost_unstabilised : r->limits.lost;
+    double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->limits.lost_unstabilised : r->limits.lost;
     if (!(s->position <= lost && s->velocity <= lost)) return judge_lost (r, error);
   }
   if (r->redundant && judge_contradicts (r)) return judge_lost (r, error);

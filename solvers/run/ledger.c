@@ -83,7 +83,7 @@ double pw_unbalanced (const pw_run *r, const pw_sample *sample) {
 const char *pw_energy_advice (const pw_run *r, double defect) {
   const double limit = 1e-12, of_step = 10; /* times rtol: what a step may lose of the energy */
   const pw_statistics *s = &r->statistics;
-  int projects = pw_stabilised_by (r, "projection");
+  int projects = pw_stabilised_by (r, PW_PROJECTION);
   if (!projects && fmax (s->position, s->velocity) > 0.1 * defect)
     return "the constraints have drifted; a method with projection keeps them";
   if (pw_fixed_steps (r)) return "a smaller step, or another method, follows the motion better";

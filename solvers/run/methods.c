@@ -155,18 +155,14 @@ double pw_option_value (const pw_run *r, const char *name) {
   return r->option[i];
 }
 
-int pw_fixed_steps (const pw_run *r) {
+void pw_choose_steps (pw_run *r) {
+  r->fixed_steps = !r->method->adaptive;
   for (int i = 0; r->method->options[i].name; i++)
-    if (strcmp (r->method->options[i].name, "steps") == 0) return r->option[i] != 0;
-  return !r->method->adaptive;
+    if (strcmp (r->method->options[i].name, "steps") == 0) r->fixed_steps = r->option[i] != 0;
 }
 
 void pw_read_baumgarte (pw_run *r) {
-  if (!pw_stabilised_by (r, "baumgarte")) return;
+  if (!pw_stabilised_by (r, PW_BAUMGARTE)) return;
   r->alpha = pw_option_value (r, "alpha");
   r->beta = pw_option_value (r, "beta");
-}
-
-int pw_stabilised_by (const pw_run *r, const char *name) {
-  return strcmp (r->method->stabilisations[r->stabilisation].name, name) == 0;
 }

@@ -134,6 +134,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->refuse = r->limits.rank;
   if (pw_watchdog_check_masses (r->s, &r->limits, error) != PW_OK) return PW_INPUT;
   if (pw_parse_options (method, &r->method, &r->stabilisation, r->option, error) != PW_OK) return PW_INPUT;
+  pw_choose_steps (r);
   int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
   if (status == PW_OK && run_allocate (r) != PW_OK)
     status = pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);

@@ -9,15 +9,16 @@ static int adams_open (pw_run *r, pw_error *error) {
 
 static const pw_stabilisation adams_stabilisations[] = {
   PW_ACCELERATION_STABILISATIONS,
-  { NULL, NULL },
+  { .name = NULL },
 };
 
 /* Measured on the EzyRoller at rtol 1e-6: with a restart after each projected step 100 times the steps.  Projecting in
  * each evaluation alone lets y drift all the same, and on a pendulum made errors 7 times larger. */
 static const pw_stabilisation adams_refused[] = {
-  { "projection", "CVODES projects with bdf only, and restarts behind each projection would leave order 1; "
-                  "take bdf+projection or erk8+projection" },
-  { NULL, NULL },
+  { .name = "projection",
+    .about = "CVODES projects with bdf only, and restarts behind each projection would leave order 1; "
+             "take bdf+projection or erk8+projection" },
+  { .name = NULL },
 };
 
 static const pw_option adams_options[] = {

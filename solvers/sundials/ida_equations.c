@@ -11,7 +11,7 @@
 #include "ida_state.h"
 
 pw_ida_form pw_ida_choose_form (const pw_run *r) {
-  int si1 = pw_stabilised_by (r, "si1"), ggl = pw_stabilised_by (r, "ggl"), index2 = pw_stabilised_by (r, "index2");
+  int si1 = pw_stabilised_by (r, PW_SI1), ggl = pw_stabilised_by (r, PW_GGL), index2 = pw_stabilised_by (r, PW_INDEX2);
   return (pw_ida_form){ .rates = si1 || ggl || index2, .positions = si1 || ggl, .impulses = si1 };
 }
 

@@ -208,7 +208,7 @@ int pw_multistep_open (pw_run *r, int formula, pw_error *error) {
   if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   d->run = r;
   d->n = r->s->coords;
-  d->projects = pw_stabilised_by (r, "projection");
+  d->projects = pw_stabilised_by (r, PW_PROJECTION);
   pw_read_baumgarte (r);
   int status = d->projects ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;

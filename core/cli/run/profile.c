@@ -291,7 +291,7 @@ static int profile_allocate (profile *p, pw_error *error) {
 /* The projector of a method that projects, in its metric. */
 static int profile_open_projector (profile *p, pw_error *error) {
   double *one = p->a;
-  if (!pw_stabilised_by (p->r, "projection")) return PW_OK;
+  if (!pw_stabilised_by (p->r, PW_PROJECTION)) return PW_OK;
   if (profile_option (p, "metric", 0) == 0) return pw_projector_open (&p->projector, p->r, NULL, NULL, error);
   for (int j = 0; j < p->s->coords; j++) one[j] = 1;
   return pw_projector_open (&p->projector, p->r, one, one, error);
