@@ -135,8 +135,9 @@ $(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,$(CORE_LAYERS) $(FILE_LAYER
 $(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base core/files core/files/expression)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,$(CORE_LAYERS) core/files solvers $(CLI_LAYERS))
 $(call obj,core/cli/run/profile.c): INCLUDE += $(call layer,$(SOLVER_LAYERS))
-$(call obj,core/cli/plot/animate.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/plot
+$(call obj,core/cli/plot/animate.c core/cli/plot/figure.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/plot
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
+$(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
 $(call obj,core/cli/sweep/sweep.c) $(BUILD)/pinwheel: private THREADS = -pthread
 ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
@@ -157,10 +158,16 @@ $(call obj,$(BENCH) $(HARD) $(EMBED)): | $(INCLUDES)
 -include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(FUZZ) $(FUZZ_SHARE) $(BENCH) $(ENGINE) $(HARD) $(EMBED)))
 -include $(MODELS:%.c=$(BUILD)/obj/%.d)
 
-# The page of an animation becomes part of the program: its lines as C strings.
+# The page of an animation and the templates of figures become part of the program: their lines as C strings.
+AS_STRINGS := sed -e 's/\\/&&/g' -e 's/"/\\"/g' -e 's/.*/"&\\n",/'
 $(BUILD)/obj/%.inc: %.html
 	@mkdir -p $(@D)
-	@sed -e 's/\\/&&/g' -e 's/"/\\"/g' -e 's/.*/"&\\n",/' $< >$@
+	@$(AS_STRINGS) $< >$@
+
+$(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp)
+	@mkdir -p $(@D)
+	@for f in $^; do echo "static const char *const figure_$$(basename $$f .gp | tr - _)[] = {"; \
+	  $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
 
 # ---- Libraries, headers, models, programs ----
 

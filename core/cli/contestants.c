@@ -1,9 +1,8 @@
 /* Methods that are set side by side. */
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "contestants.h"
-
-/* ---- Names ---- */
 
 int pw_contestant_adaptive (const pw_method *integrator, const char *name) {
   return integrator->adaptive && strstr (name, ":steps=fixed") == NULL;
@@ -72,53 +71,4 @@ void pw_contestants_close (pw_contestants *c) {
   free (c->method);
   free (c->names);
   *c = (pw_contestants){ .count = 0 };
-}
-
-/* ---- Looks ---- */
-
-static const char *contestants_dash (const char *method) {
-  static const struct {
-    const char *name, *dash;
-  } known[] = { { "projection", "1" },        { "none", "(2,4)" },       { "baumgarte", "(14,6)" },
-                { "ggl", "(14,5,3,5)" },      { "nullspace", "(30,8)" }, { "index2", "(14,5,3,5,3,5)" },
-                { "si1", "(24,5,24,5,3,5)" }, { "index3", "(6,6)" },     { NULL, "(20,4,2,4,2,4,2,4)" } };
-  const pw_method *integrator;
-  int stabilisation, i = 0;
-  if (pw_parse_method (method, &integrator, &stabilisation, NULL) != PW_OK) return "1";
-  while (known[i].name && strcmp (known[i].name, integrator->stabilisations[stabilisation].name) != 0) i++;
-  return known[i].dash;
-}
-
-/* A method without its stabilisation: of "erk8+projection:every=2", "erk8:every=2". */
-static void contestants_rest (const char *method, char *rest, size_t size) {
-  size_t n = strcspn (method, "+:"), m = method[n] == '+' ? strcspn (method + n, ":") : 0;
-  snprintf (rest, size, "%.*s%s", (int)n, method, method + n + m);
-}
-
-/* Numbers from 0 for what differs in more than the stabilisation, in order of appearance. */
-static int contestants_number (const pw_contestants *c, int method) {
-  char rest[200], other[200];
-  int numbers = 0;
-  contestants_rest (c->method[method].name, rest, sizeof rest);
-  for (int i = 0; i < method; i++) {
-    int again = 0;
-    contestants_rest (c->method[i].name, other, sizeof other);
-    if (strcmp (other, rest) == 0) return contestants_number (c, i);
-    for (int j = 0; j < i && !again; j++) {
-      char earlier[200];
-      contestants_rest (c->method[j].name, earlier, sizeof earlier);
-      again = strcmp (earlier, other) == 0;
-    }
-    numbers += !again;
-  }
-  return numbers;
-}
-
-void pw_contestants_style (const pw_contestants *c, int method, int own, FILE *f) {
-  static const char *const colour[] = { "#004488", "#bb5566", "#997700", "#000000", "#228877", "#774499", "#777777" };
-  static const int mark[] = { 7, 4, 9, 12, 5, 6, 2, 8, 13, 1, 10, 3, 11 };
-  const int colours = sizeof colour / sizeof *colour, marks = sizeof mark / sizeof *mark;
-  int n = contestants_number (c, method);
-  fprintf (f, "dt %s lc rgb '%s' pt %d", contestants_dash (c->method[method].name), colour[n % colours],
-           mark[(own ? method : n) % marks]);
 }

@@ -1,8 +1,7 @@
-/* Methods that are set side by side: their names, and how each looks in a figure. */
+/* Methods that are set side by side. */
 #ifndef PW_CONTESTANTS_H
 #define PW_CONTESTANTS_H
 
-#include <stdio.h>
 #include "pinwheel-solvers.h"
 
 typedef struct {
@@ -23,9 +22,5 @@ void pw_contestants_close (pw_contestants *c);
 
 /* 1 if a method follows tolerances, 0 if it takes steps of a given size, by nature or because its options say so. */
 int pw_contestant_adaptive (const pw_method *integrator, const char *name);
-
-/* Writes a method's dash, colour and mark: "dt 1 lc rgb '#004488' pt 7".  An integrator has a colour and a mark
- * (each method one, if `own`), a stabilisation a dash, so that lines can be told apart without colour. */
-void pw_contestants_style (const pw_contestants *c, int method, int own, FILE *f);
 
 #endif

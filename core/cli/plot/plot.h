@@ -4,6 +4,7 @@
 
 #include <stdio.h>
 #include "cli.h"
+#include "figure.h"
 #include "plots.h"
 #include "system.h"
 
@@ -14,11 +15,9 @@ enum {
   PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be told apart */
   PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
   PLOT_CURVES = 60,       /* bodies or wheels that get a curve, at most */
-  PLOT_KEYED = 12,        /* curves that get a name each; more are coloured by number */
+  PLOT_NAMED = 12,        /* curves that get a name each; more are coloured by number */
   PLOT_IMAGES = 60,       /* pictures of the mechanism along its way, at most */
-  PLOT_FEWEST = 8,        /* and at least */
-  PLOT_SCRIPTS = 8,       /* drawn at a time, at most */
-  PLOT_PATH = 4096        /* longest path of a file, its end included */
+  PLOT_FEWEST = 8         /* and at least */
 };
 
 /* What is kept of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each
@@ -65,7 +64,6 @@ struct pw_plots {
   int links;           /* elements whose forces are kept */
   int grounds;         /* points of the ground */
   int all_wheels;      /* in the system */
-  int closeup;         /* samples of the start that get a picture of their own; 0: none */
   int *body;           /* bodies: index in the system */
   int *slab, *element; /* wheels: where they are in the system */
   pw_plot_body *shape; /* bodies */
@@ -100,6 +98,7 @@ static inline int pw_plot_pick (int i, int shown, int all) {
 /* A family of curves, one per body or wheel; above a dozen they are coloured by number instead of named. */
 typedef struct {
   const char *file;      /* a block for each: time, numbers, number in the model */
+  const char *columns;   /* "x [m], ..." */
   const char *what;      /* "body", for the colour bar */
   int count, shown, all; /* curves, out of those kept, out of those there are */
   int numbers;           /* kept of each */
@@ -124,16 +123,6 @@ void pw_plot_find_links (pw_plots *p, const pw_model *m);
 /* Their forces [N], x and y each, of a sample the system is placed at with J swept. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 
-/* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
- * PW_MACHINE. */
-int pw_plot_folder (const char *folder, pw_error *error);
-
-/* Whether the run has ended early, and in words up to where: "incomplete: up to t = 3.2 s of 10 s". */
-int pw_plot_incomplete (const pw_plots *p, char *text, size_t size);
-
-/* Opens a file of the folder for writing; its data say so if the run is incomplete.  NULL and PW_MACHINE. */
-pw_output *pw_plot_create (const pw_plots *p, const char *name, pw_error *error);
-
 /* The smallest rectangle around all attachment points, centres and wheels of samples 0 ... n - 1, or around their paths
  * of the wheels (of the centres, if there are no wheels). */
 pw_plot_box pw_plot_box_of (const pw_plots *p, int n);
@@ -146,14 +135,11 @@ double pw_plot_size (const pw_plots *p);
 enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
 int pw_plot_has (const pw_plots *p, int block);
 
-/* Writes the data files; sets p->closeup. */
-int pw_plot_write_data (pw_plots *p, pw_error *error);
-/* Writes the scripts. */
-int pw_plot_write_scripts (const pw_plots *p, pw_error *error);
-/* Runs gnuplot on them. */
-int pw_plot_run (const pw_plots *p, pw_error *error);
-/* Runs gnuplot in a folder on at most PLOT_SCRIPTS scripts, a list ended by NULL; says on standard error if there is
- * none. */
-int pw_plot_gnuplot (const char *folder, const char *const *scripts, pw_error *error);
+/* Samples of the start that get a figure of their own, since the mechanism goes so far that it is small in a figure of the
+ * whole run: those that fit a figure a few times its size; 0: none.  A single point has no size. */
+int pw_plot_closeup (const pw_plots *p);
+
+/* Writes the data files. */
+int pw_plot_write_data (const pw_plots *p, const pw_figures *f, int closeup, pw_error *error);
 
 #endif

@@ -1,5 +1,6 @@
 /* Data files of the figures: plain columns, a comment line with names and units at the top. */
 #include <math.h>
+#include "figure.h"
 #include "plot.h"
 
 static void data_number (FILE *f, double value, const char *before) {
@@ -66,9 +67,7 @@ double pw_plot_size (const pw_plots *p) {
   return size > 0 ? size : p->s->scale.length;
 }
 
-/* A mechanism that goes far is small in the picture of its whole way: the beginning, as far as it fits a picture a few
- * times its size, then gets one of its own.  A mere point has no size. */
-static int data_closeup (const pw_plots *p) {
+int pw_plot_closeup (const pw_plots *p) {
   double size = pw_plot_size (p);
   if (p->wheels == 0 && !pw_plot_has (p, PLOT_BODIES)) return 0;
   if (data_diagonal (pw_plot_box_of (p, p->samples)) < 10 * size) return 0;
@@ -85,54 +84,43 @@ static int data_closeup (const pw_plots *p) {
 /* ---- Files ---- */
 
 /* One block per curve: time, what is kept of the body or wheel, its number in the model. */
-static int data_curves (const pw_plots *p, const char *name, const pw_curves *c, const char *columns, pw_error *error) {
-  pw_output *o = pw_plot_create (p, name, error);
-  if (o == NULL) return PW_MACHINE;
-  FILE *f = pw_output_stream (o);
+static int data_curves (const pw_plots *p, const pw_figures *f, const pw_curves *c, pw_error *error) {
+  pw_output *o = c->count ? pw_figure_data (f, c->file, error) : NULL;
+  if (o == NULL) return c->count ? PW_MACHINE : PW_OK;
+  FILE *out = pw_output_stream (o);
   for (int k = 0; k < c->count; k++) {
     int shown = pw_plot_pick (k, c->count, c->shown);
-    fprintf (f, "%s# %s: %s, number\n", k ? "\n\n" : "", c->name (p, shown), columns);
+    fprintf (out, "%s# %s: %s, number\n", k ? "\n\n" : "", c->name (p, shown), c->columns);
     for (int i = 0; i < p->samples; i++) {
       const double *x = c->at (p, i, shown);
-      data_number (f, pw_plot_sample (p, i)[PLOT_T], "");
-      for (int j = 0; j < c->numbers; j++) data_number (f, x[j], " ");
-      fprintf (f, " %d\n", pw_plot_pick (shown, c->shown, c->all) + 1);
+      data_number (out, pw_plot_sample (p, i)[PLOT_T], "");
+      for (int j = 0; j < c->numbers; j++) data_number (out, x[j], " ");
+      fprintf (out, " %d\n", pw_plot_pick (shown, c->shown, c->all) + 1);
     }
   }
   return pw_output_finish (o, error);
 }
 
-static int data_motion (const pw_plots *p, pw_error *error) {
-  pw_curves c = pw_plot_bodies (p);
-  return data_curves (p, "motion.dat", &c, "t [s], x [m], y [m], phi [rad], vx [m/s], vy [m/s], omega [rad/s]", error);
-}
-
-static int data_wheels (const pw_plots *p, pw_error *error) {
-  pw_curves c = pw_plot_wheels (p);
-  return c.count ? data_curves (p, "wheels.dat", &c, "t [s], x [m], y [m], heading [rad]", error) : PW_OK;
-}
-
-static int data_energy (const pw_plots *p, pw_error *error) {
-  pw_output *o = pw_plot_create (p, "energy.dat", error);
+static int data_energy (const pw_plots *p, const pw_figures *f, pw_error *error) {
+  pw_output *o = pw_figure_data (f, "energy.dat", error);
   if (o == NULL) return PW_MACHINE;
-  FILE *f = pw_output_stream (o);
-  fputs ("# t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]", f);
+  FILE *out = pw_output_stream (o);
+  fputs ("# t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]", out);
   for (int i = 0; i < p->samples; i++)
-    for (int k = 0; k < PLOT_FIRST; k++) data_number (f, pw_plot_sample (p, i)[k], k ? " " : "\n");
-  fputs ("\n", f);
+    for (int k = 0; k < PLOT_FIRST; k++) data_number (out, pw_plot_sample (p, i)[k], k ? " " : "\n");
+  fputs ("\n", out);
   return pw_output_finish (o, error);
 }
 
-static int data_ground (const pw_plots *p, pw_error *error) {
-  if (p->grounds == 0) return PW_OK;
-  pw_output *o = pw_plot_create (p, "ground.dat", error);
-  if (o == NULL) return PW_MACHINE;
-  FILE *f = pw_output_stream (o);
-  fputs ("# points of the ground: x [m], y [m]\n", f);
+static int data_ground (const pw_plots *p, const pw_figures *f, pw_error *error) {
+  pw_output *o = p->grounds ? pw_figure_data (f, "ground.dat", error) : NULL;
+  if (o == NULL) return p->grounds ? PW_MACHINE : PW_OK;
+  FILE *out = pw_output_stream (o);
+  fputs ("# points of the ground: x [m], y [m]\n", out);
   for (int g = 0; g < p->grounds; g++) {
-    data_number (f, p->ground[g][0], "");
-    data_number (f, p->ground[g][1], " ");
-    fputs ("\n", f);
+    data_number (out, p->ground[g][0], "");
+    data_number (out, p->ground[g][1], " ");
+    fputs ("\n", out);
   }
   return pw_output_finish (o, error);
 }
@@ -208,9 +196,9 @@ static int data_stride (const pw_plots *p, int n) {
 
 /* The beginning of a block, two blank lines after the one before.  gnuplot counts blocks by their data, so an empty one gets
  * a point that is not drawn. */
-static void data_begin_block (FILE *f, const pw_plots *p, int block, int first) {
+static void data_begin_block (FILE *f, const pw_plots *p, int block) {
   static const char *const titles[] = { "bodies", "wheels", "bodies without attachments" };
-  fprintf (f, "%s# %s: x [m], y [m], t [s]\n", first ? "" : "\n\n", titles[block]);
+  fprintf (f, "%s# %s: x [m], y [m], t [s]\n", block == PLOT_BODIES ? "" : "\n\n", titles[block]);
   if (!pw_plot_has (p, block)) fputs ("nan nan nan\n", f);
 }
 
@@ -222,21 +210,16 @@ static void data_block (FILE *f, const pw_plots *p, int i, int block, double hal
     data_vertex (f, pw_plot_motion (p, i, b), pw_plot_sample (p, i)[PLOT_T]);
 }
 
-/* Half of a wheel as it is drawn. */
-static double data_half_wheel (const pw_plots *p) {
-  return 0.06 * pw_plot_size (p);
-}
-
-/* Three blocks: bodies, wheels, bodies that nothing is attached to.  Pictures out of the first n samples. */
-static int data_mechanism (const pw_plots *p, const char *name, int n, pw_error *error) {
-  pw_output *o = pw_plot_create (p, name, error);
+/* Three blocks: bodies, wheels, bodies without attachments; snapshots out of the first n samples. */
+static int data_mechanism (const pw_plots *p, const pw_figures *f, const char *name, int n, pw_error *error) {
+  pw_output *o = pw_figure_data (f, name, error);
   if (o == NULL) return PW_MACHINE;
-  FILE *f = pw_output_stream (o);
+  FILE *out = pw_output_stream (o);
   int stride = data_stride (p, n);
-  double half = data_half_wheel (p);
+  double half_wheel = 0.06 * pw_plot_size (p);
   for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
-    data_begin_block (f, p, block, block == PLOT_BODIES);
-    for (int i = 0; i < n; i += stride) data_block (f, p, i, block, half);
+    data_begin_block (out, p, block);
+    for (int i = 0; i < n; i += stride) data_block (out, p, i, block, half_wheel);
   }
   return pw_output_finish (o, error);
 }
@@ -249,13 +232,13 @@ int pw_plot_has (const pw_plots *p, int block) {
   return b < p->bodies;
 }
 
-int pw_plot_write_data (pw_plots *p, pw_error *error) {
-  p->closeup = data_closeup (p);
-  int status = data_motion (p, error);
-  if (status == PW_OK) status = data_wheels (p, error);
-  if (status == PW_OK) status = data_energy (p, error);
-  if (status == PW_OK) status = data_ground (p, error);
-  if (status == PW_OK) status = data_mechanism (p, "mechanism.dat", p->samples, error);
-  if (status == PW_OK && p->closeup > 0) status = data_mechanism (p, "mechanism-start.dat", p->closeup, error);
+int pw_plot_write_data (const pw_plots *p, const pw_figures *f, int closeup, pw_error *error) {
+  const pw_curves bodies = pw_plot_bodies (p), wheels = pw_plot_wheels (p);
+  int status = data_curves (p, f, &bodies, error);
+  if (status == PW_OK) status = data_curves (p, f, &wheels, error);
+  if (status == PW_OK) status = data_energy (p, f, error);
+  if (status == PW_OK) status = data_ground (p, f, error);
+  if (status == PW_OK) status = data_mechanism (p, f, "mechanism.dat", p->samples, error);
+  if (status == PW_OK && closeup > 0) status = data_mechanism (p, f, "mechanism-start.dat", closeup, error);
   return status;
 }

@@ -1,54 +1,13 @@
 /* What figures keep of a run: evenly spaced samples of as many bodies and wheels as can be told apart. */
-#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <unistd.h>
 #include "model.h"
+#include "figure.h"
 #include "plot.h"
 
-/* ---- The folder ---- */
-
-static int plots_make_folder (const char *folder, pw_error *error) {
-  char path[PLOT_PATH];
-  size_t n = strlen (folder);
-  if (n == 0 || n >= sizeof path - 32)
-    return pw_fail (error, PW_INPUT, "the folder \"%s\" for plots: no such name can be used", folder);
-  memcpy (path, folder, n + 1);
-  for (size_t i = 1; i <= n; i++) {
-    if (path[i] != '/' && path[i] != 0) continue;
-    char end = path[i];
-    path[i] = 0;
-    if (mkdir (path, 0777) != 0 && errno != EEXIST)
-      return pw_fail (error, PW_MACHINE, "cannot make the folder %s: %s", path, strerror (errno));
-    path[i] = end;
-  }
-  return PW_OK;
-}
-
-int pw_plot_folder (const char *folder, pw_error *error) {
-  return plots_make_folder (folder, error) == PW_OK ? pw_lock_folder (folder, error) : -1;
-}
-
-int pw_plot_incomplete (const pw_plots *p, char *text, size_t size) {
-  char t[32], end[32];
-  if (p->samples >= p->wanted || p->samples == 0) return 0;
-  snprintf (text, size, "incomplete: up to t = %s s of %s s",
-            pw_format (t, pw_plot_sample (p, p->samples - 1)[PLOT_T], 4), pw_format (end, p->t_end, 4));
-  return 1;
-}
-
 const char *const pw_plot_names[] = { ".dat", ".gp", ".svg", ".png", NULL };
-
-pw_output *pw_plot_create (const pw_plots *p, const char *name, pw_error *error) {
-  char path[PLOT_PATH + 8], text[80];
-  snprintf (path, sizeof path, "%s/%s", p->folder, name);
-  pw_output *o = pw_output_open (path, error);
-  if (o && strstr (name, ".dat") && pw_plot_incomplete (p, text, sizeof text))
-    fprintf (pw_output_stream (o), "# %s\n", text);
-  return o;
-}
 
 /* ---- What is drawn ---- */
 
@@ -131,12 +90,23 @@ static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
 
 pw_curves pw_plot_bodies (const pw_plots *p) {
   int count = plots_least (p->bodies, PLOT_CURVES);
-  return (pw_curves){ "motion.dat", "body", count, p->bodies, p->s->bodies, 6, pw_plot_body_name, pw_plot_motion };
+  return (pw_curves){ "motion.dat",
+                      "t [s], x [m], y [m], phi [rad], vx [m/s], vy [m/s], omega [rad/s]",
+                      "body",
+                      count,
+                      p->bodies,
+                      p->s->bodies,
+                      6,
+                      pw_plot_body_name,
+                      pw_plot_motion };
 }
 
 pw_curves pw_plot_wheels (const pw_plots *p) {
   int count = plots_least (p->wheels, PLOT_CURVES);
-  return (pw_curves){ "wheels.dat", "wheel", count, p->wheels, p->all_wheels, 3, pw_plot_wheel_name, pw_plot_wheel };
+  return (pw_curves){
+    "wheels.dat", "t [s], x [m], y [m], heading [rad]", "wheel", count, p->wheels, p->all_wheels, 3, pw_plot_wheel_name,
+    pw_plot_wheel
+  };
 }
 
 /* ---- One allocation ---- */
@@ -181,10 +151,11 @@ static pw_plots *plots_allocate (const pw_plots *sizes, int contacts, pw_error *
   return p;
 }
 
-/* A folder that cannot be written is better known before the run. */
+/* Reports a folder that cannot be written before the run. */
 static int plots_try_folder (pw_plots *p, pw_error *error) {
-  p->lock = pw_plot_folder (p->folder, error);
-  pw_output *probe = p->lock < 0 ? NULL : pw_plot_create (p, "motion.dat", error);
+  const pw_figures f = { .folder = p->folder };
+  p->lock = pw_figure_folder (p->folder, error);
+  pw_output *probe = p->lock < 0 ? NULL : pw_figure_data (&f, "motion.dat", error);
   if (probe) pw_output_discard (probe);
   return probe ? PW_OK : error->status;
 }
@@ -275,15 +246,4 @@ void pw_plots_carry (pw_plots *p, pw_archive *a) {
   if (a->failed) return;
   p->samples = samples;
   pw_carry (a, p->data, (size_t)samples * (size_t)p->width * sizeof *p->data);
-}
-
-int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
-  if (p->folder == NULL) return PW_OK;
-  if (p->samples < 2) {
-    pw_cli_say ("pinwheel: the run is too short for figures: none are drawn in %s\n", p->folder);
-    return PW_OK;
-  }
-  int status = pw_plot_write_data (p, error);
-  if (status == PW_OK) status = pw_plot_write_scripts (p, error);
-  return status == PW_OK && draw ? pw_plot_run (p, error) : status;
 }

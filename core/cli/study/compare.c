@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 #include "compare.h"
-#include "plot.h"
+#include "figure.h"
 #include "stop.h"
 #include "text.h"
 
@@ -13,13 +13,13 @@
 /* The table is written as rows come, under the name it keeps if something stops it. */
 static int compare_open_csv (pw_compare *x, pw_error *error) {
   static const char *const names[] = { ".dat", ".gp", ".svg", ".png", "compare.csv", "truth.csv", NULL };
-  char path[PLOT_PATH];
+  char path[FIGURE_PATH];
   if (x->folder == NULL) return PW_OK;
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--truth", x->truth_path, PW_READS, NULL },
                    { "-o", x->folder, PW_WRITES_INTO, names } };
   if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
-  x->lock = pw_plot_folder (x->folder, error);
+  x->lock = pw_figure_folder (x->folder, error);
   if (x->lock < 0) return error->status;
   snprintf (path, sizeof path, "%s/compare.csv", x->folder);
   x->csv = pw_output_open (path, error);
@@ -115,7 +115,7 @@ static int compare_run (pw_compare *x, pw_error *error) {
 /* ---- After it ---- */
 
 static int compare_interrupted (pw_compare *x) {
-  char part[PLOT_PATH + 16] = "";
+  char part[FIGURE_PATH + 16] = "";
   if (x->csv) pw_text_abandon (x->csv, x->rows, part, sizeof part);
   if (x->rows == 0)
     fputs ("pinwheel: interrupted before the first row was done\n", stderr);
@@ -130,7 +130,7 @@ static int compare_finish (pw_compare *x, int status, pw_error *error) {
   if (status == PW_RETRY && pw_stop) return compare_interrupted (x);
   if (x->csv == NULL) return status;
   if (status != PW_OK) {
-    pw_text_abandon (x->csv, x->rows, (char[PLOT_PATH + 16]){ 0 }, PLOT_PATH + 16);
+    pw_text_abandon (x->csv, x->rows, (char[FIGURE_PATH + 16]){ 0 }, FIGURE_PATH + 16);
     return status;
   }
   pw_output *csv = x->csv;

@@ -4,7 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "drift.h"
-#include "plot.h"
+#include "figure.h"
 #include "stop.h"
 #include "text.h"
 
@@ -35,13 +35,13 @@ static int drift_settle (pw_drift *x, pw_error *error) {
 
 static int drift_open (pw_drift *x, pw_error *error) {
   static const char *const names[] = { ".dat", ".gp", ".svg", ".png", "drift.csv", "drift-time.csv", NULL };
-  char path[PLOT_PATH + 16];
+  char path[FIGURE_PATH + 16];
   int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = drift_settle (x, error);
   if (status != PW_OK || x->folder == NULL) return status;
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
   if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
-  x->lock = pw_plot_folder (x->folder, error);
+  x->lock = pw_figure_folder (x->folder, error);
   if (x->lock < 0) return error->status;
   snprintf (path, sizeof path, "%s/drift.csv", x->folder);
   x->csv = pw_output_open (path, error);
@@ -79,7 +79,7 @@ static int drift_rows (pw_drift *x, pw_error *error) {
 /* ---- After it ---- */
 
 static int drift_interrupted (pw_drift *x) {
-  char part[PLOT_PATH + 16] = "";
+  char part[FIGURE_PATH + 16] = "";
   if (x->csv) pw_text_abandon (x->csv, x->done, part, sizeof part);
   pw_cli_say ("pinwheel: interrupted; %d of %d runs are done%s%s\n", x->done, x->rows, *part ? ", and kept in " : "",
               part);
@@ -93,7 +93,7 @@ static int drift_finish (pw_drift *x, int status, pw_error *error) {
   pw_output *csv = x->csv;
   x->csv = NULL;
   if (status != PW_OK) {
-    pw_text_abandon (csv, x->done, (char[PLOT_PATH + 16]){ 0 }, PLOT_PATH + 16);
+    pw_text_abandon (csv, x->done, (char[FIGURE_PATH + 16]){ 0 }, FIGURE_PATH + 16);
     return status;
   }
   status = pw_output_finish (csv, error);

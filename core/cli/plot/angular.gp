@@ -1,0 +1,26 @@
+
+# ---- Angular velocities; where they oscillate often, the end of the run in detail as well ----
+
+stats data using 7 name 'omega' nooutput
+detail = turns < 30 ? 0 : turns*0.2 <= 12 ? 0.2 : turns*0.1 <= 12 ? 0.1 : turns*0.05 <= 12 ? 0.05 : 0.02
+title = 'angular velocities'.(detail > 0 ? ', and their last part in detail' : '')
+high = detail > 0 ? 235.0 : 340.0
+height = top + high + (detail > 0 ? 72 + high : 0) + bottom
+do for [form in 'svg png'] {
+  eval page(form)
+  eval legend(1)
+  set xlabel 't [s]'
+  set ylabel 'ω [rad/s]'
+  set xrange [0:t_end]
+  eval panel(left, width - right, top, top + high)
+  eval yrange(omega_min, omega_max)
+  eval draw(1, 7, 1)
+  if (detail > 0) {
+    set xrange [t_end*(1 - detail):t_end]
+    unset colorbox
+    eval panel(left, width - right, top + high + 72, top + 2*high + 72)
+    eval draw(1, 7, 0)
+  }
+  unset multiplot
+  unset output
+}

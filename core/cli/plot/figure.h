@@ -1,0 +1,42 @@
+/* A folder of figures: data files, gnuplot scripts made of templates (*.gp), and what gnuplot draws. */
+#ifndef PW_FIGURE_H
+#define PW_FIGURE_H
+
+#include <stdio.h>
+#include "cli.h"
+
+enum {
+  FIGURE_SCRIPTS = 8, /* drawn at a time, at most */
+  FIGURE_PATH = 4096  /* longest path of a file, its end included */
+};
+
+typedef struct {
+  const char *folder, *model;
+  char incomplete[80]; /* ", incomplete: up to t = 3.2 s of 10 s", or "" */
+} pw_figures;
+
+/* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
+ * PW_MACHINE. */
+int pw_figure_folder (const char *folder, pw_error *error);
+
+/* Opens a data file.  NULL and PW_MACHINE. */
+pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error);
+
+/* Opens NAME.gp.  Assign the variables of its template, then end it; PW_MACHINE if a file cannot be written. */
+pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error);
+void pw_figure_number (FILE *f, const char *variable, double value);
+void pw_figure_text (FILE *f, const char *variable, const char *value);
+/* Elements of an array: "array NAME[COUNT]" first, then each element as a variable "NAME[1]" .... */
+void pw_figure_array (FILE *f, const char *name, int count);
+void pw_figure_element (FILE *f, const char *name, int i, const char *value);
+/* Methods, with marks of their own if `spread`: the declaration first, then each from 1; a line that is no method has
+ * method NULL. */
+void pw_figure_methods (FILE *f, int count, int spread);
+void pw_figure_method (FILE *f, int i, const char *label, const char *method);
+int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
+
+/* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported on
+ * standard error.  PW_MACHINE if gnuplot fails. */
+int pw_figure_draw (const char *folder, const char *const *names, pw_error *error);
+
+#endif

@@ -1,0 +1,66 @@
+
+# ---- Panels with equal axes: the whole run and, if the mechanism goes far, its beginning ----
+# Panel i shows x0[i] to x1[i] and y0[i] to y1[i], at px0[i] to px1[i] and py0[i] to py1[i] of the page.
+
+if (name eq 'mechanism') { bottom = bottom + 94 } # room for a colour bar
+array px0[2]
+array px1[2]
+array py0[2]
+array py1[2]
+do for [i = 1:panels] {
+  edge = 0.05*max(x1[i] - x0[i], y1[i] - y0[i])
+  if (edge == 0) { edge = 1 }
+  x0[i] = x0[i] - edge
+  x1[i] = x1[i] + edge
+  y0[i] = y0[i] - edge
+  y1[i] = y1[i] + edge
+}
+aspect(i, least, most) = min(max((y1[i] - y0[i])/(x1[i] - x0[i]), least), most)
+if (panels == 1) {
+  wide = width - left - right
+  high = wide*aspect(1, 0.3, 2)
+  if (high > 680) {
+    wide = wide*680/high
+    high = 680.0
+    width = left + right + int(wide)
+  }
+  py0[1] = top
+  py1[1] = top + high
+  px1[1] = left + wide
+  height = top + int(high) + bottom
+} else { if (aspect(1, 0, 1) < 0.5) { # a long straight path above its beginning
+  wide = width - left - right
+  py0[1] = top + 30
+  py1[1] = py0[1] + wide*aspect(1, 0.15, 0.5)
+  px1[1] = left + wide
+  py0[2] = py1[1] + bottom + 30
+  py1[2] = py0[2] + wide*aspect(2, 0.25, 0.6)
+  px0[2] = left
+  px1[2] = left + wide
+  height = int(py1[2]) + bottom
+} else { # side by side
+  width = 1000.0
+  wide = width - left - right - 76
+  px1[1] = left + 0.4*wide
+  px0[2] = px1[1] + 76
+  px1[2] = left + wide + 76
+  py0[1] = top + 30
+  py0[2] = py0[1]
+  py1[1] = py0[1] + max(0.4*wide*aspect(1, 0.5, 2), 0.6*wide*aspect(2, 0.5, 1.3))
+  py1[2] = py1[1]
+  height = int(py1[1]) + bottom
+}}
+px0[1] = left
+do for [i = 1:panels] {
+  ratio = (py1[i] - py0[i])/(px1[i] - px0[i])
+  high = max(y1[i] - y0[i], (x1[i] - x0[i])*ratio)
+  x = 0.5*(x0[i] + x1[i])
+  y = 0.5*(y0[i] + y1[i])
+  x0[i] = x - 0.5*high/ratio
+  x1[i] = x + 0.5*high/ratio
+  y0[i] = y - 0.5*high
+  y1[i] = y + 0.5*high
+}
+place(i) = panel(px0[i], px1[i], py0[i], py1[i]). \
+  sprintf('; set xrange [%.9g:%.9g]; set yrange [%.9g:%.9g]', x0[i], x1[i], y0[i], y1[i]). \
+  (panels == 1 ? '' : i == 1 ? "; set title 'whole run'" : sprintf("; set title 'the first %.3g s'", t_detail))

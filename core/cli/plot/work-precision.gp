@@ -1,0 +1,57 @@
+
+# ---- Work-precision diagram: error against CPU time and against evaluations, a line for each method ----
+
+data = 'work-precision.dat'
+width = 1000.0
+left = 84.0
+columns = max(1, int((width - left)/(76 + 8.0*longest)))
+top = 46 + 22*((methods + columns - 1)/columns)
+height = top + 470 + bottom
+wide = 0.5*(width - left - 44 - right)
+stats data using 2 name 'cpu' nooutput
+stats data using 3 name 'rhs' nooutput
+stats data using (column(column_of_error) > 0 ? column(column_of_error) : NaN) name 'error' nooutput
+largest = min(3*error_max, max(10*error_min, size_of_motion)) # larger errors mean nothing
+set logscale xy
+set format '1e%T'
+unset offsets
+unset xzeroaxis
+do for [form in 'svg png'] {
+  eval page(form)
+  # The key has a panel of its own, as wide as both others.
+  eval key(36.0, columns).' samplen 5'
+  set tics scale 0
+  set format ''
+  set border 0
+  unset grid
+  set xrange [1:10]
+  set yrange [1:10]
+  eval panel(left, width - right, 42.0, top - 2.0)
+  plot for [i = 1:methods] NaN with linespoints ls i title label[i]
+  set tics scale 0.6
+  set border 31
+  set grid back lt 1 lw 0.6 lc rgb '#dddddd'
+  set ylabel label_of_error
+  set format '1e%T'
+  set yrange [error_min/4:largest]
+  if (uncertainty > error_min/4) {
+    set object 1 rectangle from graph 0,graph 0 to graph 1,first uncertainty behind fc rgb '#e8e8e8' fs noborder
+    set label 1 'below the uncertainty of the reference' at graph 0.02,first uncertainty offset 0,-0.6 textcolor rgb '#555555'
+  }
+  set xlabel 'CPU time [s]'
+  set xrange [cpu_min/1.6:cpu_max*1.6]
+  eval panel(left, left + wide, top, top + 470.0)
+  plot for [i = 1:methods] data index i - 1 using 2:column_of_error with linespoints ls i notitle
+  unset ylabel
+  set format y ''
+  unset label 1
+  set xlabel 'right-hand side evaluations'
+  set xrange [rhs_min/1.6:rhs_max*1.6]
+  eval panel(left + wide + 44, width - right, top, top + 470.0)
+  plot for [i = 1:methods] data index i - 1 using 3:column_of_error with linespoints ls i notitle
+  set format y '1e%T'
+  unset xlabel
+  unset object 1
+  unset multiplot
+  unset output
+}
