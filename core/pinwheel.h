@@ -131,6 +131,18 @@ typedef struct {
   };
 } pw_signal;
 
+/* A signal made of numbers: serves checks, text models, `show` and `list signals`. */
+typedef struct {
+  const char *name; /* "ramp", as written in a model file */
+  pw_signal_type type;
+  const char *about;
+  const struct pw_field *fields; /* numbers and choices, their offsets those in pw_signal; ended by a NULL name */
+} pw_signal_form;
+
+/* All forms, ended by a NULL name; constants and functions have none. */
+extern const pw_signal_form pw_signal_forms[];
+const pw_signal_form *pw_signal_form_of (const pw_signal *s); /* or NULL */
+
 /* ---- The description ---- */
 
 typedef struct pw_model pw_model;
@@ -488,7 +500,7 @@ typedef struct {
 typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE } pw_field_type;
 
 /* One field of a definition structure: serves validation, text models, `show`, `list kinds` and the manual. */
-typedef struct {
+typedef struct pw_field {
   const char *name;           /* as written in a model file */
   size_t offset;              /* in the definition structure */
   pw_field_type type;         /* double, double[2], double[2], const char *, pw_signal, int */
@@ -601,6 +613,25 @@ struct pw_kind {
   pw_sweep *saturation;
 };
 
+/* How many values a field stands for, and the bytes of one; 0: there is no such type. */
+static inline int pw_field_count (const pw_field *f) {
+  return f->count > 0 ? f->count : 1;
+}
+size_t pw_field_bytes (pw_field_type type);
+
+/* The k-th value of a type in a definition, counting each of its fields' `count`; NULL if there are not as many. */
+void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);
+
+/* 1 if elements of the kind take part in the motion; a marker does not. */
+static inline int pw_kind_acts (const pw_kind *kind) {
+  return kind->rows > 0 || kind->own > 0 || kind->force != NULL;
+}
+
+/* 1 if its signals serve a force: they may depend on states, and need no derivatives. */
+static inline int pw_kind_forced (const pw_kind *kind) {
+  return kind->force_u != NULL;
+}
+
 /* Every kind k of the list: its table pw_kind_k, and pw_add_k, which is pw_add with that table. */
 #define PW_KIND(k)                                                       \
   extern const pw_kind pw_kind_##k;                                      \
@@ -633,6 +664,37 @@ int pw_set_signal (pw_model *m, const char *element, const char *field, const pw
 /* Gives a start value, "frame.vx" or "wheel.spin", which the consistent start then holds.  Errors: PW_INPUT for a value that
  * is not finite; whether there is such a state is pw_compile's to tell. */
 int pw_set_start (pw_model *m, const char *state, double value, pw_error *error);
+
+/* ---- What a model consists of ---- */
+
+const char *pw_model_name (const pw_model *m);
+const pw_plugin_table *pw_model_table (const pw_model *m);
+double pw_model_parameter (const pw_model *m, const pw_parameter *p); /* its value; p: in the model's table */
+
+/* Its bodies and elements in the order they were added, once it is built; they belong to the model, until more are added. */
+typedef struct {
+  const pw_kind *kind;
+  void *definition; /* kind->definition bytes, the first member its name */
+} pw_element;
+const pw_body *pw_model_bodies (const pw_model *m, int *count);
+const pw_element *pw_model_elements (const pw_model *m, int *count);
+static inline const char *pw_element_name (const pw_element *e) {
+  return *(const char *const *)e->definition;
+}
+int pw_model_starts (const pw_model *m); /* how many values pw_set_start has given */
+
+/* What a text model knows about its motion: expressions of the time for some states; and the values of the names in these
+ * and in signals. */
+typedef struct {
+  int states;                 /* 0: nothing */
+  const char **state, **text; /* states: "bob.phi", and its expression */
+  int names;
+  const char **name;                               /* names */
+  double *value;                                   /* names */
+  double (*eval) (void *context, int i, double t); /* the value of expression i */
+  void *context;
+} pw_truth_text;
+const pw_truth_text *pw_model_truth (const pw_model *m);
 
 /* ---- The compiled system ---- */
 
@@ -677,6 +739,62 @@ int pw_find_reaction (const pw_system *s, const char *name, pw_error *error);
 
 /* The kind and name of a row's element ("wheel C"), as pw_state_name. */
 char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size);
+
+/* Its name; the name of a body; the diagonal of M [kg], [kg m^2]: one number per coordinate; the length scale L [m]. */
+const char *pw_system_name (const pw_system *s);
+const char *pw_system_body_name (const pw_system *s, int body);
+const double *pw_system_mass (const pw_system *s);
+double pw_system_length (const pw_system *s);
+
+/* The initial conditions as described: coordinates and velocities. */
+const double *pw_system_initial_q (const pw_system *s);
+const double *pw_system_initial_v (const pw_system *s);
+
+/* 1 if multipliers may jump at time t: the signal of a force jumps there, or any derivative of one that a constraint follows. */
+int pw_system_jumps (const pw_system *s, double t);
+
+/* ---- Its elements, in the order of its constraint equations ---- */
+
+/* An element that acts on every body counts once for each. */
+typedef struct {
+  const char *name;
+  const pw_kind *kind; /* kind->level is the type of its constraint equations */
+  const int *body;     /* kind->bodies indices; that of the ground is the number of bodies */
+  int row;             /* its first constraint equation, of kind->rows */
+  int coordinate;      /* its first internal coordinate, of kind->own */
+  int contact;         /* index of its contact point; -1: it has none */
+  int force;           /* where its forces begin in pw_system_forces */
+} pw_element_info;
+int pw_system_elements (const pw_system *s);
+pw_element_info pw_system_element (const pw_system *s, int element);
+int pw_system_row_element (const pw_system *s, int row); /* the element of a constraint equation */
+
+/* The functions below evaluate a state; a run whose system it is goes on as if they had not been called.  Errors: PW_METHOD
+ * if a signal fails, PW_MACHINE. */
+
+/* Point on the ground [m] and heading [rad] of each contact. */
+int pw_system_contacts (const pw_system *s);
+int pw_system_contact_points (pw_system *s, double t, const double *q, const double *v, double (*out)[3],
+                              pw_error *error);
+
+/* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies, the ground's without
+ * meaning: -J^T lambda and what it applies.  Constraint equations on velocities count alike. */
+int pw_system_force_size (const pw_system *s);
+int pw_system_forces (pw_system *s, double t, const double *q, const double *v, const double *lambda, double *out,
+                      pw_error *error);
+
+/* The equations M a + J^T lambda = f,  J v = eta,  J a = gamma at a state.  J by its entries, those that are 0 here among
+ * them, row by row of each element; there is at most one for each row and column. */
+typedef struct {
+  int coordinates, rows, holonomic, entries;
+  double *mass, *force; /* coordinates: diagonal of M; f */
+  double *g;            /* holonomic */
+  double *eta, *gamma;  /* rows */
+  int *row, *column;    /* entries: where they are in J */
+  double *value;        /* entries */
+} pw_equations;
+int pw_system_equations (pw_system *s, double t, const double *q, const double *v, pw_equations *out, pw_error *error);
+void pw_equations_free (pw_equations *e); /* in every case */
 
 /* Second-order blocks that are PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as pw_state_name. */
 int pw_count_differences (const pw_system *s);

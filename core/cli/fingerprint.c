@@ -5,7 +5,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "fingerprint.h"
-#include "model.h"
 
 /* ---- Making ---- */
 
@@ -55,7 +54,9 @@ int pw_print_model (pw_text *t, const pw_file *file, uint64_t tables, pw_error *
 }
 
 uint64_t pw_check_tables (uint64_t sum, const pw_model *m) {
-  for (const pw_element *e = m->element; e < m->element + m->elements; e++)
+  int elements;
+  const pw_element *e = pw_model_elements (m, &elements);
+  for (const pw_element *end = e + elements; e < end; e++)
     for (int i = 0; i < e->kind->signals; i++) {
       const pw_signal *s = pw_field_at (e->kind, e->definition, PW_SIGNAL, i);
       if (s->type != PW_TABLE) continue;

@@ -162,12 +162,42 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   return m->error.status;
 }
 
+const char *pw_model_name (const pw_model *m) {
+  return m->name;
+}
+
+const pw_plugin_table *pw_model_table (const pw_model *m) {
+  return m->table;
+}
+
+double pw_model_parameter (const pw_model *m, const pw_parameter *p) {
+  double value;
+  memcpy (&value, m->parameters + p->offset, sizeof value);
+  return value;
+}
+
+const pw_body *pw_model_bodies (const pw_model *m, int *count) {
+  *count = m->bodies;
+  return m->body;
+}
+
+const pw_element *pw_model_elements (const pw_model *m, int *count) {
+  *count = m->elements;
+  return m->element;
+}
+
+int pw_model_starts (const pw_model *m) {
+  return m->givens;
+}
+
+const pw_truth_text *pw_model_truth (const pw_model *m) {
+  return &m->truth;
+}
+
 void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k) {
-  static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double),
-                                 sizeof (char *), sizeof (pw_signal),  sizeof (int) };
   for (const pw_field *f = kind->fields; f->name; f++) {
     if (f->type != type) continue;
-    if (k < pw_field_count (f)) return (char *)(size_t)definition + f->offset + (size_t)k * size[type];
+    if (k < pw_field_count (f)) return (char *)(size_t)definition + f->offset + (size_t)k * pw_field_bytes (type);
     k -= pw_field_count (f);
   }
   return NULL;

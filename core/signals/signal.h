@@ -45,24 +45,8 @@ double pw_table_breakpoint (const pw_signal *s, int knots, double t);
 
 /* ---- Forms (signal_form.c) ---- */
 
-/* A signal made of numbers: serves checks, text models, `show` and `list signals`. */
-typedef struct {
-  const char *name; /* "ramp", as written in a model file */
-  pw_signal_type type;
-  const char *about;
-  const pw_field *fields; /* numbers and choices, their offsets those in pw_signal; ended by a NULL name */
-} pw_signal_form;
-
-extern const pw_signal_form pw_signal_forms[]; /* ended by a NULL name; constants and functions have none */
-const pw_signal_form *pw_signal_form_of (const pw_signal *s);
-
 /* Says what is wrong with a signal of a kind; "" if nothing is.  *point becomes the point of a table that is meant, or -1.
  * Returns the buffer. */
 char *pw_signal_fault (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
-
-/* 1 if the kind's signals serve its force: they may read states, and inputs=held holds them. */
-static inline int pw_kind_forced (const pw_kind *kind) {
-  return kind->force_u != NULL;
-}
 
 #endif

@@ -1,4 +1,6 @@
 /* Names and sizes of a compiled system. */
+#include <float.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "model.h"
@@ -26,6 +28,38 @@ int pw_count_holonomic (const pw_system *s) {
 
 int pw_count_ledger (const pw_system *s) {
   return s->entries;
+}
+
+const char *pw_system_name (const pw_system *s) {
+  return s->model;
+}
+
+const char *pw_system_body_name (const pw_system *s, int body) {
+  return s->body_name[body];
+}
+
+const double *pw_system_mass (const pw_system *s) {
+  return s->mass;
+}
+
+double pw_system_length (const pw_system *s) {
+  return s->scale.length;
+}
+
+const double *pw_system_initial_q (const pw_system *s) {
+  return s->q0;
+}
+
+const double *pw_system_initial_v (const pw_system *s) {
+  return s->v0;
+}
+
+int pw_system_jumps (const pw_system *s, double t) {
+  double near = 8 * DBL_EPSILON * fabs (t);
+  for (const pw_source *i = s->source, *end = i + s->sources; i < end; i++)
+    if (!i->forced || i->signal.type == PW_PULSE || i->signal.type == PW_FUNCTION)
+      if (pw_signal_breakpoint (&i->signal, 0, t - near) <= t + near) return 1;
+  return 0;
 }
 
 int pw_find_body (const pw_system *s, const char *name) {

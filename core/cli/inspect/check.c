@@ -6,7 +6,6 @@
 #include <string.h>
 #include "check.h"
 #include "report.h"
-#include "system.h"
 
 enum { CHECK_SEEDS = 5 };
 
@@ -41,7 +40,7 @@ static void check_open (pw_check *x) {
 
 void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to) {
   const pw_start_report *start = pw_run_start (x->r);
-  int n = x->m.system->coords;
+  int n = pw_count_coordinates (x->m.system);
   pw_state_name (x->m.system, i, name, size);
   *from = i < n ? start->q_given[i] : start->v_given[i - n];
   *to = i < n ? start->q[i] : start->v[i - n];
@@ -50,7 +49,7 @@ void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *
 /* Initial values that the model specifies, or the user gave, and the start has changed. */
 static void check_given (pw_check *x) {
   const pw_system *s = x->m.system;
-  for (int i = 0; x->r && i < 2 * s->coords; i++) {
+  for (int i = 0; x->r && i < 2 * pw_count_coordinates (s); i++) {
     char name[300], a[32], b[32];
     double from, to;
     if (!pw_start_moved (s, pw_run_start (x->r), i)) continue;
@@ -64,7 +63,7 @@ static void check_given (pw_check *x) {
 
 /* What the model says it knows about its motion must hold at the start. */
 static int check_truth (pw_check *x, int started, pw_error *error) {
-  int n = x->m.system->coords;
+  int n = pw_count_coordinates (x->m.system);
   if (x->r == NULL || started || !pw_has_truth (x->m.model)) return PW_OK;
   double *truth = malloc (2 * (size_t)n * sizeof *truth);
   if (truth == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
@@ -110,17 +109,34 @@ static const pw_selftest_check *check_fault (const pw_checked_kind *k, int *insi
   return report->failed ? &report->check[check_first_failed (report)] : NULL;
 }
 
+/* Elements of a kind stand together in a system. */
+static int check_list_kinds (pw_check *x, pw_error *error) {
+  const pw_system *s = x->m.system;
+  int elements = pw_system_elements (s);
+  const pw_kind *last = NULL;
+  for (int pass = 0; pass < 2; pass++) {
+    x->kinds = 0;
+    for (int i = 0; i < elements; i++) {
+      const pw_kind *kind = pw_system_element (s, i).kind;
+      x->kinds += kind != last;
+      if (x->kind) x->kind[x->kinds - 1].kind = kind, x->kind[x->kinds - 1].count++;
+      last = kind;
+    }
+    if (x->kind) break;
+    last = NULL;
+    x->kind = calloc ((size_t)x->kinds + 1, sizeof *x->kind);
+    if (x->kind == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  }
+  return PW_OK;
+}
+
 /* A table that does not hold together is not tried in the scene. */
 static int check_kinds (pw_check *x, pw_error *error) {
   pw_system *s = x->m.system;
-  const double *q = x->r ? pw_run_start (x->r)->q : s->q0, *v = x->r ? pw_run_start (x->r)->v : s->v0;
-  int inside, status = PW_OK;
-  x->kind = calloc ((size_t)s->slabs + 1, sizeof *x->kind);
-  if (x->kind == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-  for (; x->kinds < s->slabs && status == PW_OK; x->kinds++) {
-    pw_checked_kind *k = &x->kind[x->kinds];
-    k->kind = s->slab[x->kinds].kind;
-    k->count = s->slab[x->kinds].b.count;
+  const double *q = x->r ? pw_run_start (x->r)->q : pw_system_initial_q (s),
+               *v = x->r ? pw_run_start (x->r)->v : pw_system_initial_v (s);
+  int inside, status = check_list_kinds (x, error);
+  for (pw_checked_kind *k = x->kind; status == PW_OK && k < x->kind + x->kinds; k++) {
     status = check_alone (k, error);
     if (status != PW_OK) break;
     if (k->alone.failed == 0 || strcmp (k->alone.check[check_first_failed (&k->alone)].name, "table") != 0)

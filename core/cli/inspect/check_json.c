@@ -1,7 +1,6 @@
 /* What `pinwheel check` found, as JSON: numbers with 17 digits, null for what is not known or not finite. */
 #include <math.h>
 #include "check.h"
-#include "system.h"
 #include "util.h"
 
 /* Bytes that are no UTF-8 become U+FFFD, the replacement character. */
@@ -56,7 +55,7 @@ static void json_texts (FILE *f, const char *const *text) {
 static void json_mobility (FILE *f, const pw_check *x) {
   const pw_system *s = x->m.system;
   fprintf (f, ",\n  \"mobility\": {\"bodies\": %d, \"coordinates\": %d, \"rows\": %d, \"holonomic_rows\": %d",
-           s->bodies, s->coords, s->rows, s->holonomic);
+           pw_count_bodies (s), pw_count_coordinates (s), pw_count_rows (s), pw_count_holonomic (s));
   json_member (f, "configuration", x->r ? (double)x->linear.positions : NAN);
   json_member (f, "velocity", x->r ? (double)x->linear.velocities : NAN);
   json_member (f, "rank", x->r ? (double)x->linear.rank : NAN);
@@ -70,10 +69,11 @@ static void json_mass (FILE *f, const pw_check *x) {
   const pw_system *s = x->m.system;
   int listed = 0;
   fputs (",\n  \"massless\": [", f);
-  for (int b = 0; b < s->bodies; b++) {
-    if (s->mass[3 * b] != 0 && s->mass[3 * b + 2] != 0) continue;
+  for (int b = 0; b < pw_count_bodies (s); b++) {
+    const double *M = pw_system_mass (s) + 3 * b;
+    if (M[0] != 0 && M[2] != 0) continue;
     if (listed++) fputs (", ", f);
-    json_text (f, s->body_name[b]);
+    json_text (f, pw_system_body_name (s, b));
   }
   fputs ("],\n  \"saddle_point\": ", f);
   if (x->r == NULL && x->start.status != PW_INPUT)
@@ -92,7 +92,7 @@ static void json_start (FILE *f, const pw_check *x) {
   }
   const pw_start_report *start = pw_run_start (x->r);
   fprintf (f, "{\"moved\": %d, \"freed\": %s, \"changes\": [", start->moved, start->freed ? "true" : "false");
-  for (int i = 0; i < 2 * x->m.system->coords; i++) {
+  for (int i = 0; i < 2 * pw_count_coordinates (x->m.system); i++) {
     double from, to;
     if (!pw_start_moved (x->m.system, start, i)) continue;
     pw_check_state (x, i, name, sizeof name, &from, &to);

@@ -2,7 +2,6 @@
 #include <math.h>
 #include <string.h>
 #include "check.h"
-#include "system.h"
 
 enum { CHECK_LISTED = 8, CHECK_EIGENVALUES = 60 };
 
@@ -37,8 +36,9 @@ static void text_mobility (const pw_check *x) {
   char text[100];
   int listed = 0;
   puts ("\nMobility");
-  text_count ("coordinates", s->coords);
-  snprintf (text, sizeof text, "%d (%d on positions, %d on velocities)", s->rows, s->holonomic, s->rows - s->holonomic);
+  int rows = pw_count_rows (s), holonomic = pw_count_holonomic (s);
+  text_count ("coordinates", pw_count_coordinates (s));
+  snprintf (text, sizeof text, "%d (%d on positions, %d on velocities)", rows, holonomic, rows - holonomic);
   text_line ("constraint rows", text);
   if (x->r == NULL) return;
   text_count ("degrees of freedom, configuration", x->linear.positions);
@@ -52,18 +52,19 @@ static void text_mobility (const pw_check *x) {
 
 /* What a body lacks; NULL: nothing. */
 static const char *text_lack (const pw_system *s, int b) {
-  if (s->mass[3 * b] == 0) return s->mass[3 * b + 2] == 0 ? "neither mass nor inertia" : "no mass";
-  return s->mass[3 * b + 2] == 0 ? "no inertia" : NULL;
+  const double *M = pw_system_mass (s) + 3 * b;
+  if (M[0] == 0) return M[2] == 0 ? "neither mass nor inertia" : "no mass";
+  return M[2] == 0 ? "no inertia" : NULL;
 }
 
 static void text_mass (const pw_check *x) {
   const pw_system *s = x->m.system;
-  int lacking = 0;
+  int lacking = 0, bodies = pw_count_bodies (s);
   puts ("\nMass");
-  for (int b = 0; b < s->bodies; b++) lacking += text_lack (s, b) != NULL;
+  for (int b = 0; b < bodies; b++) lacking += text_lack (s, b) != NULL;
   text_count ("bodies without mass or inertia", lacking);
-  for (int b = 0, listed = 0; b < s->bodies && listed < CHECK_LISTED; b++)
-    if (text_lack (s, b)) printf ("    %s has %s\n", s->body_name[b], text_lack (s, b)), listed++;
+  for (int b = 0, listed = 0; b < bodies && listed < CHECK_LISTED; b++)
+    if (text_lack (s, b)) printf ("    %s has %s\n", pw_system_body_name (s, b), text_lack (s, b)), listed++;
   text_more (lacking - CHECK_LISTED);
   text_line ("saddle-point matrix", x->r                          ? "regular"
                                     : x->start.status == PW_INPUT ? "singular; see below"
@@ -85,7 +86,7 @@ static void text_start (const pw_check *x) {
   if (start->moved > 0)
     printf ("  %d value%s moved%s\n", start->moved, start->moved == 1 ? " was" : "s were",
             start->freed ? ", given ones among them: not all of those can be held" : "");
-  for (int i = 0; i < 2 * x->m.system->coords && listed < CHECK_LISTED; i++) {
+  for (int i = 0; i < 2 * pw_count_coordinates (x->m.system) && listed < CHECK_LISTED; i++) {
     double from, to;
     if (!pw_start_moved (x->m.system, start, i)) continue;
     pw_check_state (x, i, name, sizeof name, &from, &to);

@@ -2,8 +2,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "list.h"
-#include "model.h"
-#include "signal.h"
 #include "util.h"
 
 /* ---- All kinds, a line each ---- */

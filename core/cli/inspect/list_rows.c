@@ -2,7 +2,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "list.h"
-#include "model.h"
 
 enum { ROWS_WIDTH = 110 }; /* of a line, where the last column leaves room for it */
 

@@ -4,9 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "show.h"
-#include "model.h"
-#include "signal.h"
-#include "system.h"
 
 enum { SHOW_DIGITS = 6 };
 
@@ -32,12 +29,13 @@ static void show_bodies (const pw_cli_model *m) {
   char mass[32], inertia[32];
   printf ("\nBodies\n  %-12s %-10s %-18s %-26s %s\n", "", "mass [kg]", "inertia [kg m^2]",
           "start (x, y [m], phi [rad])", "rate (vx, vy [m/s], omega [rad/s])");
-  for (int b = 0; b < s->bodies; b++) {
-    printf ("  %-12s %-10s %-18s ", s->body_name[b], pw_format (mass, s->mass[3 * b], SHOW_DIGITS),
-            pw_format (inertia, s->mass[3 * b + 2], SHOW_DIGITS));
-    show_tuple (s->q0 + 3 * b, 3, 26);
+  for (int b = 0; b < pw_count_bodies (s); b++) {
+    const double *M = pw_system_mass (s) + 3 * b;
+    printf ("  %-12s %-10s %-18s ", pw_system_body_name (s, b), pw_format (mass, M[0], SHOW_DIGITS),
+            pw_format (inertia, M[2], SHOW_DIGITS));
+    show_tuple (pw_system_initial_q (s) + 3 * b, 3, 26);
     putchar (' ');
-    show_tuple (s->v0 + 3 * b, 3, 0);
+    show_tuple (pw_system_initial_v (s) + 3 * b, 3, 0);
     putchar ('\n');
   }
 }
@@ -103,14 +101,12 @@ static void show_value (const pw_field *f, const char *at) {
 }
 
 static void show_element (const pw_element *e) {
-  static const size_t size[] = { sizeof (double),       2 * sizeof (double), 2 * sizeof (double),
-                                 sizeof (const char *), sizeof (pw_signal),  sizeof (int) };
   printf ("  %s %s: ", e->kind->name, pw_element_name (e));
   for (const pw_field *f = e->kind->fields; f->name; f++) {
     printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
     for (int i = 0; i < pw_field_count (f); i++) {
       if (i) printf (", ");
-      show_value (f, (const char *)e->definition + f->offset + (size_t)i * size[f->type]);
+      show_value (f, (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type));
     }
     if (f->unit) printf (" %s", f->unit);
   }
@@ -131,13 +127,12 @@ static void show_differences (const pw_system *s) {
 
 static void show_parameters (const pw_model *m) {
   static const char *const domain[] = { "", ">= 0", "> 0", "1, 2, ..." };
-  const pw_parameter *p = m->table->parameters;
+  const pw_parameter *p = pw_model_table (m)->parameters;
   if (p == NULL || p->name == NULL) return;
   puts ("\nParameters, changed with --set NAME=VALUE");
   for (; p->name; p++) {
-    double value;
+    double value = pw_model_parameter (m, p);
     char text[32], with_unit[64];
-    memcpy (&value, m->parameters + p->offset, sizeof value);
     snprintf (with_unit, sizeof with_unit, "%s %s", pw_format (text, value, SHOW_DIGITS), p->unit ? p->unit : "");
     printf ("  %-12s %-18s %-10s %s", p->name, with_unit, domain[p->domain], p->about ? p->about : "");
     if (value != p->value) printf (" (default %s)", pw_format (text, p->value, SHOW_DIGITS));
@@ -156,15 +151,16 @@ static void show_defaults (const pw_plugin_table *table) {
 }
 
 static void show_sizes (const pw_system *s) {
-  printf ("\nSizes: %d %s, %d coordinates, %d constraint row%s (%d on positions, %d on velocities)\n", s->bodies,
-          s->bodies == 1 ? "body" : "bodies", s->coords, s->rows, s->rows == 1 ? "" : "s", s->holonomic,
-          s->rows - s->holonomic);
+  int bodies = pw_count_bodies (s), rows = pw_count_rows (s), holonomic = pw_count_holonomic (s);
+  printf ("\nSizes: %d %s, %d coordinates, %d constraint row%s (%d on positions, %d on velocities)\n", bodies,
+          bodies == 1 ? "body" : "bodies", pw_count_coordinates (s), rows, rows == 1 ? "" : "s", holonomic,
+          rows - holonomic);
 }
 
 /* The states whose motion the model knows. */
 static void show_truth (const pw_cli_model *m) {
   enum { MOST = 12 };
-  int n = m->system->coords, known = 0;
+  int n = pw_count_coordinates (m->system), known = 0;
   char name[300];
   double *x = pw_has_truth (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
   if (x && pw_true_state (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
@@ -179,15 +175,17 @@ static void show_truth (const pw_cli_model *m) {
 
 static void show_model (const pw_cli_model *m) {
   char folder[1000];
-  const pw_model *d = m->model;
-  printf ("%s: %s\n%s\n", d->name, d->table->about ? d->table->about : "",
+  int elements;
+  const pw_plugin_table *table = pw_model_table (m->model);
+  const pw_element *e = pw_model_elements (m->model, &elements);
+  printf ("%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
           pw_cli_short_path (pw_file_path (m->file), folder, sizeof folder));
   show_bodies (m);
-  if (d->elements) puts ("\nElements");
-  for (int i = 0; i < d->elements; i++) show_element (&d->element[i]);
+  if (elements) puts ("\nElements");
+  for (int i = 0; i < elements; i++) show_element (&e[i]);
   show_differences (m->system);
-  show_parameters (d);
-  show_defaults (d->table);
+  show_parameters (m->model);
+  show_defaults (table);
   show_truth (m);
   show_sizes (m->system);
 }

@@ -4,8 +4,6 @@
 #include <math.h>
 #include <stdio.h>
 #include "show.h"
-#include "model.h"
-#include "signal.h"
 
 static void yaml_number (double value) {
   char text[32];
@@ -115,15 +113,9 @@ static void yaml_value (const pw_field *f, const void *at) {
   if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
 }
 
-static size_t yaml_size (const pw_field *f) {
-  static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double),
-                                 sizeof (char *), sizeof (pw_signal),  sizeof (int) };
-  return size[f->type];
-}
-
 /* Optional fields that are all zero need no word. */
 static int yaml_is_default (const pw_field *f, const char *at) {
-  size_t size = yaml_size (f) * (size_t)pw_field_count (f);
+  size_t size = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
   if (f->required || f->type == PW_BODY) return 0;
   for (size_t i = 0; i < size; i++)
     if (at[i]) return 0;
@@ -137,7 +129,7 @@ static void yaml_element (const pw_element *e) {
     int count = pw_field_count (f);
     if (yaml_is_default (f, at)) continue;
     printf (", %s: %s", f->name, count > 1 ? "[" : "");
-    for (int i = 0; i < count; i++, at += yaml_size (f)) {
+    for (int i = 0; i < count; i++, at += pw_field_bytes (f->type)) {
       if (i) printf (", ");
       yaml_value (f, at);
     }
@@ -155,21 +147,24 @@ static int yaml_is_built_in (const pw_kind *kind) {
 }
 
 static int yaml_refuse (const pw_model *m, pw_error *error) {
-  for (const pw_element *e = m->element; e < m->element + m->elements; e++) {
+  int elements;
+  const char *model = pw_model_name (m);
+  const pw_element *e = pw_model_elements (m, &elements);
+  for (const pw_element *end = e + elements; e < end; e++) {
     const char *kind = e->kind->name, *name = pw_element_name (e);
     if (!yaml_is_built_in (e->kind))
       return pw_fail (error, PW_INPUT, "model %s cannot be written as text: %s %s is of a kind of the model's own",
-                      m->name, kind, name);
+                      model, kind, name);
     for (const pw_field *f = e->kind->fields; f->name; f++) {
       const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
       for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)
         if (s[i].type == PW_FUNCTION && s[i].function.text == NULL)
           return pw_fail (error, PW_INPUT,
-                          "model %s cannot be written as text: the signal \"%s\" of %s %s is a function", m->name,
+                          "model %s cannot be written as text: the signal \"%s\" of %s %s is a function", model,
                           f->name, kind, name);
     }
   }
-  if (m->givens)
+  if (pw_model_starts (m))
     return pw_fail (error, PW_INPUT,
                     "--yaml: initial values of --start have no place in a text model; give them to run");
   return PW_OK;
@@ -200,8 +195,8 @@ static void yaml_names (const pw_truth_text *t) {
 
 /* A function in C has no words. */
 static void yaml_truth (const pw_model *m) {
-  const pw_truth_text *t = &m->truth;
-  if (m->table->truth) puts ("# The model knows its motion (truth) by a function in C, which is left out.");
+  const pw_truth_text *t = pw_model_truth (m);
+  if (pw_model_table (m)->truth) puts ("# The model knows its motion (truth) by a function in C, which is left out.");
   if (t->states) puts ("truth:");
   for (int i = 0; i < t->states; i++) printf ("  %s: ", t->state[i]), yaml_text (t->text[i]), putchar ('\n');
 }
@@ -210,13 +205,17 @@ int pw_show_yaml (const pw_cli_model *x, pw_error *error) {
   const pw_model *m = x->model;
   if (yaml_refuse (m, error) != PW_OK) return error->status;
   puts ("pinwheel: 1");
-  if (m->table->about && *m->table->about) printf ("about: "), yaml_text (m->table->about), putchar ('\n');
-  yaml_run (&m->table->run);
-  yaml_names (&m->truth);
-  if (m->bodies) puts ("bodies:");
-  for (int i = 0; i < m->bodies; i++) yaml_body (&m->body[i]);
-  if (m->elements) puts ("elements:");
-  for (int i = 0; i < m->elements; i++) yaml_element (&m->element[i]);
+  const pw_plugin_table *table = pw_model_table (m);
+  int bodies, elements;
+  const pw_body *b = pw_model_bodies (m, &bodies);
+  const pw_element *e = pw_model_elements (m, &elements);
+  if (table->about && *table->about) printf ("about: "), yaml_text (table->about), putchar ('\n');
+  yaml_run (&table->run);
+  yaml_names (pw_model_truth (m));
+  if (bodies) puts ("bodies:");
+  for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
+  if (elements) puts ("elements:");
+  for (int i = 0; i < elements; i++) yaml_element (&e[i]);
   yaml_truth (m);
   return PW_OK;
 }

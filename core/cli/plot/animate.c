@@ -83,11 +83,11 @@ static void page_links (FILE *f, const pw_plots *p) {
   fputs ("links:[", f);
   for (int i = 0; i < p->links; i++) {
     const pw_plot_link *link = &p->link[i];
-    const pw_slab *k = &p->s->slab[link->slab];
+    const pw_element_info e = pw_system_element (p->s, link->element);
     fputs (i ? ",\n{name:" : "\n{name:", f);
-    page_text (f, k->name[link->element]);
+    page_text (f, e.name);
     fputs (",kind:", f);
-    page_text (f, k->kind->name);
+    page_text (f, e.kind->name);
     fprintf (f, ",force:%d,ends:[", link->force);
     for (int n = 0; n < link->ends; n++) {
       fprintf (f, "%s{body:%d,at:", n ? "," : "", link->end[n].body);

@@ -6,7 +6,6 @@
 #include "cli.h"
 #include "figure.h"
 #include "plots.h"
-#include "system.h"
 
 enum {
   PLOT_SAMPLES = 1600,    /* of a small scene */
@@ -39,8 +38,8 @@ int pw_plot_inside (const pw_plot_body *shape, int k);
 
 /* An element with points: what it connects, and on which of its ends the force is shown. */
 typedef struct {
-  int slab, element;
-  int ends; /* 1 or 2 */
+  int element; /* of the system */
+  int ends;    /* 1 or 2 */
   struct {
     int body;     /* among those drawn, -1: the ground */
     double at[2]; /* [m] */
@@ -56,23 +55,22 @@ typedef struct {
 struct pw_plots {
   const char *folder, *model;
   int lock; /* keeps other processes from writing into the folder; -1: there is none */
-  const pw_system *s;
+  pw_system *s;
   double t_end;
-  int samples, wanted; /* taken so far, and in all */
-  int width;           /* numbers per sample */
-  int bodies, wheels;  /* drawn; markers are among the wheels */
-  int links;           /* elements whose forces are kept */
-  int grounds;         /* points of the ground */
-  int all_wheels;      /* in the system */
-  int *body;           /* bodies: index in the system */
-  int *slab, *element; /* wheels: where they are in the system */
-  pw_plot_body *shape; /* bodies */
-  double (*ground)[2]; /* grounds [m] */
-  double *data;        /* wanted x width */
-  pw_pose *pose;       /* of every body, and the ground */
-  double *contact;     /* scratch: what the largest batch of wheels fills */
-  pw_plot_link *link;  /* links */
-  double *block;       /* scratch: generalised forces of the largest batch */
+  int samples, wanted;  /* taken so far, and in all */
+  int width;            /* numbers per sample */
+  int bodies, wheels;   /* drawn; markers are among the wheels */
+  int links;            /* elements whose forces are kept */
+  int grounds;          /* points of the ground */
+  int all_wheels;       /* in the system */
+  int *body;            /* bodies: index in the system */
+  int *element;         /* wheels: which of the system's */
+  pw_plot_body *shape;  /* bodies */
+  double (*ground)[2];  /* grounds [m] */
+  double *data;         /* wanted x width */
+  double (*contact)[3]; /* scratch: all_wheels */
+  pw_plot_link *link;   /* links */
+  double *forces;       /* scratch: of all elements */
 };
 
 /* Sample i, and the parts of one. */
@@ -120,7 +118,7 @@ int pw_plot_body_of_wheel (const pw_plots *p, int wheel);
 
 /* Finds elements with points of the bodies drawn, at most as many as there is room for. */
 void pw_plot_find_links (pw_plots *p, const pw_model *m);
-/* Their forces [N], x and y each, of a sample the system is placed at with J swept. */
+/* Their forces [N], x and y each. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 
 /* The smallest rectangle around all attachment points, centres and wheels of samples 0 ... n - 1, or around their paths

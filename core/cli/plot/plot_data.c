@@ -64,7 +64,7 @@ static double data_diagonal (pw_plot_box box) {
 
 double pw_plot_size (const pw_plots *p) {
   double size = data_diagonal (pw_plot_box_of (p, 1));
-  return size > 0 ? size : p->s->scale.length;
+  return size > 0 ? size : pw_system_length (p->s);
 }
 
 int pw_plot_closeup (const pw_plots *p) {

@@ -1,11 +1,8 @@
 /* Motions, and how far one is from another. */
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "motion.h"
-#include "signal.h"
-#include "system.h"
 
 int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error) {
   int width = 2 * pw_count_coordinates (s) + pw_count_rows (s);
@@ -78,16 +75,6 @@ static void motion_states (const pw_system *s, const pw_motion *truth, const pw_
   }
 }
 
-/* Whether multipliers may jump at time t: they have two values there, and methods differ in which they show.  So it is
- * where the signal of a force jumps, or any derivative of one that a constraint follows; a force on a ramp only bends. */
-static int motion_jumps (const pw_system *s, double t) {
-  double near = 8 * DBL_EPSILON * fabs (t);
-  for (const pw_source *i = s->source, *end = i + s->sources; i < end; i++)
-    if (!i->forced || i->signal.type == PW_PULSE || i->signal.type == PW_FUNCTION)
-      if (pw_signal_breakpoint (&i->signal, 0, t - near) <= t + near) return 1;
-  return 0;
-}
-
 /* The largest multiplier of the same unit as row i: forces and moments are not weighed against each other. */
 static double motion_load (const pw_system *s, const pw_motion *truth, int i) {
   double most = 0;
@@ -101,8 +88,9 @@ static double motion_load (const pw_system *s, const pw_motion *truth, int i) {
 static void motion_multipliers (const pw_system *s, const pw_motion *truth, const pw_motion *m, double *error) {
   const char *unit = NULL; /* of neighbours it is mostly the same */
   double load = 1;
-  int jumps[MOTION_SAMPLES], smooth = 0;
-  for (int k = 0; k < m->samples; k++) smooth += !(jumps[k] = motion_jumps (s, truth->t[k]));
+  int jumps[MOTION_SAMPLES],
+      smooth = 0; /* they have two values where they jump, and methods differ in which they show */
+  for (int k = 0; k < m->samples; k++) smooth += !(jumps[k] = pw_system_jumps (s, truth->t[k]));
   if (smooth == 0) error[MOTION_LAMBDA] = NAN;
   for (int i = 0; i < pw_count_rows (s); i++) {
     if (unit == NULL || strcmp (unit, pw_reaction_unit (s, i)) != 0) {

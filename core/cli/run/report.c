@@ -4,7 +4,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include "contestants.h"
-#include "model.h"
 #include "report.h"
 
 enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300, REPORT_TEXT = 400 };
@@ -71,9 +70,11 @@ static void report_angle (const char *kind, const char *name, const char *what, 
 }
 
 void pw_report_angles (const pw_model *m) {
-  for (int i = 0; i < m->bodies; i++) report_angle ("body", m->body[i].name, "start phi", m->body[i].start[2]);
-  for (int i = 0; i < m->elements; i++) {
-    const pw_element *e = &m->element[i];
+  int bodies, elements;
+  const pw_body *b = pw_model_bodies (m, &bodies);
+  const pw_element *e = pw_model_elements (m, &elements);
+  for (int i = 0; i < bodies; i++) report_angle ("body", b[i].name, "start phi", b[i].start[2]);
+  for (const pw_element *end = e + elements; e < end; e++)
     for (const pw_field *f = e->kind->fields; f->name; f++) {
       const void *at = (const char *)e->definition + f->offset;
       if (strcmp (f->name, "heading") != 0) continue;
@@ -82,13 +83,14 @@ void pw_report_angles (const pw_model *m) {
       if (signal || f->type == PW_NUMBER)
         report_angle (e->kind->name, pw_element_name (e), f->name, signal ? signal->constant : *(const double *)at);
     }
-  }
 }
 
 /* ---- Jumps without a breakpoint ---- */
 
 void pw_report_jumps (const pw_model *m) {
-  for (const pw_element *e = m->element; e < m->element + m->elements; e++)
+  int elements;
+  const pw_element *e = pw_model_elements (m, &elements);
+  for (const pw_element *end = e + elements; e < end; e++)
     for (const pw_field *f = e->kind->fields; f->name; f++) {
       const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
       for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)

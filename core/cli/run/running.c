@@ -6,7 +6,6 @@
 #include <stdio.h>
 #include <string.h>
 #include "fingerprint.h"
-#include "model.h"
 #include "running.h"
 
 /* All that decides what is computed and written. */
@@ -20,11 +19,8 @@ static int running_print (pw_running *x, pw_error *error) {
   pw_print_number (t, "step", NULL, x->settings.step);
   pw_print_number (t, "rtol", NULL, x->settings.rtol);
   pw_print_number (t, "atol", NULL, x->settings.atol);
-  for (const pw_parameter *q = m->table->parameters; q && q->name; q++) {
-    double value;
-    memcpy (&value, m->parameters + q->offset, sizeof value);
-    pw_print_number (t, "parameter", q->name, value);
-  }
+  for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
+    pw_print_number (t, "parameter", q->name, pw_model_parameter (m, q));
   pw_print_starts (t, x->line.starts);
   pw_print_line (t, "table", NULL, x->csv_path ? "written" : "not written");
   pw_print_number (t, "every", NULL, x->every);

@@ -2,7 +2,6 @@
  * sweep begin with it, so that rows of different sweeps are never mixed. */
 #include <math.h>
 #include <string.h>
-#include "model.h"
 #include "sweep.h"
 
 void pw_fingerprint_tables (pw_plan *p, const pw_model *m) {
@@ -11,12 +10,10 @@ void pw_fingerprint_tables (pw_plan *p, const pw_model *m) {
 
 /* Parameters that are not varied, as they are after --set. */
 static void print_parameters (pw_plan *p, const pw_model *m) {
-  for (const pw_parameter *q = m->table->parameters; q && q->name; q++) {
+  for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++) {
     int varied = 0;
-    double value;
     for (int i = 0; i < p->grid.axes; i++) varied |= p->grid.axis[i].parameter == q;
-    memcpy (&value, m->parameters + q->offset, sizeof value);
-    if (!varied) pw_print_number (&p->fingerprint, "parameter", q->name, value);
+    if (!varied) pw_print_number (&p->fingerprint, "parameter", q->name, pw_model_parameter (m, q));
   }
 }
 

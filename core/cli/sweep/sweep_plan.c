@@ -1,7 +1,6 @@
 /* What all runs of a sweep have in common: the model, the grid, the columns. */
 #include <stdlib.h>
 #include <string.h>
-#include "model.h"
 #include "sweep.h"
 
 enum { PLAN_TRIES = 1000 }; /* scenes that cannot be built before the grid is given up */
@@ -38,7 +37,7 @@ static int plan_named (const char **list, const char *name) {
 
 /* Every value of a parameter must lie in its domain; what is no parameter is a state, if it has a dot. */
 static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error) {
-  const pw_parameter *q = m->table->parameters;
+  const pw_parameter *q = pw_model_table (m)->parameters;
   while (q && q->name && strcmp (q->name, a->name) != 0) q++;
   if (q && q->name) a->parameter = q, a->unit = q->unit;
   const char *option = a->parameter ? "--set" : "--start";

@@ -1,0 +1,151 @@
+/* The elements of a compiled system one by one: what they are, their contact points, the forces in them, the equations. */
+#include <stdlib.h>
+#include <string.h>
+#include "system.h"
+
+int pw_system_elements (const pw_system *s) {
+  int count = 0;
+  for (int i = 0; i < s->slabs; i++) count += s->slab[i].b.count;
+  return count;
+}
+
+pw_element_info pw_system_element (const pw_system *s, int element) {
+  pw_element_info x = { .contact = 0 };
+  const pw_slab *k = s->slab;
+  for (; element >= k->b.count; element -= k++->b.count) {
+    x.contact += k->kind->contact ? k->b.count : 0;
+    x.force += 3 * k->b.count * k->kind->bodies;
+  }
+  x.kind = k->kind;
+  x.name = k->name[element];
+  x.body = k->b.body + element * k->kind->bodies;
+  x.row = k->row + element * k->kind->rows;
+  x.coordinate = k->own + element * k->kind->own;
+  x.contact = k->kind->contact ? x.contact + element : -1;
+  x.force += 3 * element * k->kind->bodies;
+  return x;
+}
+
+int pw_system_row_element (const pw_system *s, int row) {
+  int element = 0;
+  const pw_slab *k = s->slab;
+  for (; row >= k->row + k->b.count * k->kind->rows; k++) element += k->b.count;
+  return element + (row - k->row) / k->kind->rows;
+}
+
+static int elements_place (pw_system *s, double t, const double *q, const double *v, pw_error *error) {
+  if (pw_place (s, t, q, v) == PW_OK) return PW_OK;
+  return pw_fail (error, PW_METHOD, "at t = %g s a signal of the model reports an error", t);
+}
+
+/* ---- Contact points ---- */
+
+int pw_system_contacts (const pw_system *s) {
+  int count = 0;
+  for (int i = 0; i < s->slabs; i++) count += s->slab[i].kind->contact ? s->slab[i].b.count : 0;
+  return count;
+}
+
+int pw_system_contact_points (pw_system *s, double t, const double *q, const double *v, double (*out)[3],
+                              pw_error *error) {
+  int status = elements_place (s, t, q, v, error);
+  for (const pw_slab *k = s->slab; status == PW_OK && k < s->slab + s->slabs; k++) {
+    if (k->kind->contact == NULL) continue;
+    k->kind->contact (&k->b, out[0]);
+    out += k->b.count;
+  }
+  return status;
+}
+
+/* ---- Forces ---- */
+
+/* F -= J^T lambda, the columns of the bodies. */
+static void elements_reactions (const pw_slab *k, const double *lambda, double *F) {
+  const double *J = k->J;
+  int bodies = 3 * k->kind->bodies;
+  for (int e = 0; e < k->b.count; e++, F += bodies)
+    for (int i = 0; i < k->kind->rows; i++, J += k->b.cols, lambda++)
+      for (int c = 0; c < bodies; c++) F[c] -= J[c] * *lambda;
+}
+
+static void elements_applied (const pw_slab *k, double *F) {
+  int bodies = 3 * k->kind->bodies;
+  k->kind->force (&k->b, k->block);
+  for (int e = 0; e < k->b.count; e++, F += bodies)
+    for (int c = 0; c < bodies; c++) F[c] += k->block[e * k->b.cols + c];
+}
+
+int pw_system_force_size (const pw_system *s) {
+  int size = 0;
+  for (int i = 0; i < s->slabs; i++) size += 3 * s->slab[i].b.count * s->slab[i].kind->bodies;
+  return size;
+}
+
+int pw_system_forces (pw_system *s, double t, const double *q, const double *v, const double *lambda, double *out,
+                      pw_error *error) {
+  if (elements_place (s, t, q, v, error) != PW_OK) return PW_METHOD;
+  memset (out, 0, (size_t)pw_system_force_size (s) * sizeof *out);
+  pw_sweep_J (s);
+  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+    if (k->kind->rows) elements_reactions (k, lambda + k->row, out);
+    if (k->kind->force) elements_applied (k, out);
+    out += 3 * k->b.count * k->kind->bodies;
+  }
+  return PW_OK;
+}
+
+/* ---- Equations ---- */
+
+/* The entries of J, row by row: where each is, and its value; out NULL: they are counted only. */
+static int elements_jacobian (const pw_system *s, pw_equations *out) {
+  int entries = 0;
+  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
+    for (int i = 0; i < k->b.count * k->kind->rows; i++)
+      for (int c = 0; c < k->b.cols; c++) {
+        int column = pw_global (k, i / k->kind->rows, c);
+        if (column >= s->coords) continue;
+        if (out) {
+          out->row[entries] = k->row + i;
+          out->column[entries] = column;
+          out->value[entries] = k->J[i * k->b.cols + c];
+        }
+        entries++;
+      }
+  return entries;
+}
+
+static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *error) {
+  size_t n = (size_t)s->coords, rows = (size_t)s->rows, entries = (size_t)elements_jacobian (s, NULL);
+  double *space = calloc (2 * n + 3 * rows + 2 * entries + 6, sizeof *space); /* two indices take a number */
+  *out =
+      (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };
+  if (space == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  out->mass = space;
+  out->force = space + n; /* three more: the ground's */
+  out->g = out->force + n + 3;
+  out->eta = out->g + rows;
+  out->gamma = out->eta + rows;
+  out->value = out->gamma + rows;
+  out->row = (int *)(void *)(out->value + entries);
+  out->column = out->row + entries;
+  return PW_OK;
+}
+
+int pw_system_equations (pw_system *s, double t, const double *q, const double *v, pw_equations *out, pw_error *error) {
+  int status = elements_allocate (s, out, error);
+  if (status == PW_OK) status = elements_place (s, t, q, v, error);
+  if (status != PW_OK) return status;
+  pw_sweep_J (s);
+  elements_jacobian (s, out);
+  memcpy (out->mass, s->mass, (size_t)s->coords * sizeof *out->mass);
+  pw_sweep_force (s, out->force);
+  pw_sweep_g (s, out->g);
+  pw_sweep_eta (s, out->eta);
+  pw_sweep_gamma (s, out->gamma);
+  return PW_OK;
+}
+
+void pw_equations_free (pw_equations *e) {
+  free (e->mass);
+  *e = (pw_equations){ .rows = 0 };
+}
