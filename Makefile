@@ -134,7 +134,6 @@ $(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAY
 $(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,$(CORE_LAYERS) $(FILE_LAYERS)) $(SYSTEM)
 $(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base core/files core/files/expression)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,$(CORE_LAYERS) core/files solvers $(CLI_LAYERS))
-$(call obj,core/cli/run/profile.c): INCLUDE += $(call layer,$(SOLVER_LAYERS))
 $(call obj,core/cli/plot/animate.c core/cli/plot/figure.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/plot
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc

@@ -171,6 +171,36 @@ double pw_rk4_limit (double re, double im);
  * keep their tolerances below it, whatever the settings ask for. */
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size);
 
+/* ---- What an evaluation of the accelerations costs (timing.c) ---- */
+
+/* Processor times [ns] of all elements of a kind: of signals, of J and gamma, of forces; of g.  0: there is none. */
+typedef struct {
+  const pw_kind *kind;
+  int elements;
+  double signals, constraints, force, positions;
+} pw_profile_kind;
+
+/* Processor times [ns] of an evaluation and of its stages; medians. */
+typedef struct {
+  int kinds;
+  pw_profile_kind *kind;
+  double poses;         /* kinematics of the bodies alone */
+  double kinematics;    /* and signals */
+  double equations;     /* J, gamma, f */
+  double stabilisation; /* Baumgarte's terms */
+  double factorisation, solution;
+  double evaluation;  /* all in one go */
+  double evaluations; /* per step, without those after projections; 0: steps are not made of such evaluations */
+  double projection;  /* with the evaluation after it */
+  double projections; /* per step */
+  double iterations;  /* of the positions in each */
+} pw_profile;
+
+/* Measures at the state reached, in a second or a few.  Afterwards the run can only be closed.  PW_RETRY: it is in a singular
+ * configuration, and nothing is measured.  Errors: PW_MACHINE.  Free the profile in every case. */
+int pw_run_profile (pw_run *r, pw_profile *p, pw_error *error);
+void pw_profile_free (pw_profile *p);
+
 const pw_statistics *pw_run_statistics (const pw_run *r);
 const pw_start_report *pw_run_start (const pw_run *r);
 /* 1 if the consistent start moved this state (as pw_find_state numbers them) by more than round-off. */

@@ -6,9 +6,8 @@
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
-/* Measures, at the last state of a run that is over, what each kind costs per evaluation of the accelerations, and what
- * each stage costs per evaluation and per step; prints two tables.  Takes a second or a few.  The run is of no use
- * afterwards but to be closed.  `cpu` is its processor time [s].  Errors: PW_MACHINE. */
-int pw_profile (pw_run *r, const pw_sample *last, double cpu, FILE *out, pw_error *error);
+/* Measures a run that is over (pw_run_profile) and prints two tables: what each kind of element and what each stage of an
+ * evaluation costs.  `cpu` is the run's processor time [s].  Errors: PW_MACHINE. */
+int pw_print_profile (const pw_system *s, pw_run *r, double cpu, FILE *out, pw_error *error);
 
 #endif

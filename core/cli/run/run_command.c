@@ -298,7 +298,7 @@ static int run_finish (run *x, pw_error *error) {
   run_draw (x, summary.reason, error);
   run_complete (x, error);
   if (x->profile && last && error->status == PW_OK && !interrupted)
-    pw_profile (x->r, last, x->cpu, run_prints_file (x) ? stderr : stdout, error);
+    pw_print_profile (x->m.system, x->r, x->cpu, run_prints_file (x) ? stderr : stdout, error);
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
   error->status = PW_OK;
