@@ -55,7 +55,7 @@ ENGINE  := $(wildcard benchmarks/engine/*.c benchmarks/baseline/*.c)
 HARD    := $(wildcard benchmarks/hard/*.c)
 EMBED   := $(wildcard docs/*.c)
 
-HEADERS := core/pinwheel.h core/run.h solvers/pinwheel-solvers.h core/files/pinwheel-files.h
+HEADERS := core/pinwheel.h core/run.h core/pinwheel-selftest.h solvers/pinwheel-solvers.h core/files/pinwheel-files.h
 INCLUDES := $(addprefix $(BUILD)/include/,$(notdir $(HEADERS)))
 
 LIB       := $(BUILD)/libpinwheel.so
@@ -133,7 +133,7 @@ $(BUILD)/obj/core/kinds/%.o: INCLUDE := $(call layer,core core/kinds)
 $(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAYERS)) $(SYSTEM)
 $(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,$(CORE_LAYERS) $(FILE_LAYERS)) $(SYSTEM)
 $(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base core/files core/files/expression)
-$(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,$(CORE_LAYERS) core/files solvers $(CLI_LAYERS))
+$(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,core core/base core/files solvers $(CLI_LAYERS))
 $(call obj,core/cli/plot/animate.c core/cli/plot/figure.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/plot
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
@@ -143,7 +143,7 @@ $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults 
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,eighth.o effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
-$(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := $(call layer,core core/selftest) -I$(BUILD)/include
+$(BUILD)/obj/benchmarks/hard/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/docs/%.o:       INCLUDE := -I$(BUILD)/include
 $(BUILD)/models/%.so:        INCLUDE := -I$(BUILD)/include
 

@@ -5,7 +5,7 @@
 #include <string.h>
 #include <time.h>
 #include "hard.h"
-#include "verify.h"
+#include "pinwheel-selftest.h"
 
 enum { RUN_SAMPLES = 50 };
 

@@ -2,7 +2,7 @@
 #ifndef PW_PROBE_INCLUDED
 #define PW_PROBE_INCLUDED
 
-#include "selftest.h"
+#include "pinwheel-selftest.h"
 #include "specimen.h"
 
 enum {

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "system.h"
-#include "verify.h"
+#include "pinwheel-selftest.h"
 
 /* Residuals and the sizes of their terms. */
 typedef struct {

@@ -5,7 +5,7 @@
 #include "check.h"
 #include "model.h"
 #include "probe.h"
-#include "selftest.h"
+#include "pinwheel-selftest.h"
 #include "toys.h"
 
 enum { KINDS_SEEDS = 100, KINDS_FEW = 3 };

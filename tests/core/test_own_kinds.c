@@ -6,7 +6,7 @@
 #include "cli.h"
 #include "pinwheel-files.h"
 #include "scene.h"
-#include "selftest.h"
+#include "pinwheel-selftest.h"
 #include "system.h"
 #include "trial.h"
 

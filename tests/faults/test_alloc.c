@@ -11,9 +11,8 @@
 #include "pinwheel-solvers.h"
 #include "runs.h"
 #include "scene.h"
-#include "selftest.h"
+#include "pinwheel-selftest.h"
 #include "toys.h"
-#include "verify.h"
 
 /* ---- Scenarios ---- */
 

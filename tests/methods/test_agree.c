@@ -7,7 +7,7 @@
 #include "runs.h"
 #include "scene.h"
 #include "toys.h"
-#include "verify.h"
+#include "pinwheel-selftest.h"
 
 /* ---- Scenes: between them, all that a kind may have ---- */
 

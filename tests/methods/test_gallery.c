@@ -6,7 +6,7 @@
 #include "pinwheel-files.h"
 #include "system.h"
 #include "trial.h"
-#include "verify.h"
+#include "pinwheel-selftest.h"
 
 #define HW4 1.6e-11 /* (h w)^4 at h = 2 us and a crank of w = 1000 rad/s */
 

@@ -6,7 +6,7 @@
 #include "check.h"
 #include "mechanism.h"
 #include "runs.h"
-#include "verify.h"
+#include "pinwheel-selftest.h"
 
 #define TRY_SPAN 0.5   /* [s]: short enough for a chaotic motion to remember where it started */
 #define TRY_RTOL 1e-10 /* of erk8, the method the others are compared with */

@@ -5,7 +5,7 @@
 #include "scene.h"
 #include "system.h"
 #include "trial.h"
-#include "verify.h"
+#include "pinwheel-selftest.h"
 
 enum { TRIAL_COORDS = 40 };
 

@@ -3,7 +3,7 @@
 #define PW_CHECK_H
 
 #include "cli.h"
-#include "selftest.h"
+#include "pinwheel-selftest.h"
 
 enum {
   CHECK_MOST = 400 /* coordinates: above it nothing is computed that takes time as their cube */,

@@ -1,6 +1,7 @@
-/* The self-test of a kind: every sweep of its table against differences of another one. */
-#ifndef PW_SELFTEST_H
-#define PW_SELFTEST_H
+/* Verification: the self-test of an element type, every function of its table against differences of another one; and how far
+ * a sample is from the equations of motion. */
+#ifndef PINWHEEL_SELFTEST_H
+#define PINWHEEL_SELFTEST_H
 
 #include "pinwheel.h"
 
@@ -36,6 +37,28 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
  * scene's own elements and signals.  The checks go into a report of their own.  Errors: PW_MACHINE. */
 int pw_selftest_scene (pw_system *s, const pw_kind *kind, double t, const double *q, const double *v, unsigned seed,
                        pw_selftest_report *report, pw_error *error);
+
+/* ---- Independent verifier ---- */
+
+/* How well one set of equations holds. */
+typedef struct {
+  double scaled;   /* worst residual over the sum of the absolute values of its terms; inf: not a number */
+  double absolute; /* the largest residual itself, in the units of its row */
+  char name[80];   /* where the worst scaled one is: "B.Fx", "frame.vx" */
+} pw_verdict;
+
+typedef struct {
+  pw_verdict position;     /* g (q, t) = 0 */
+  pw_verdict velocity;     /* J v = eta */
+  pw_verdict acceleration; /* J a = gamma */
+  pw_verdict force;        /* M a + J^T lambda = f; absolute in N or N m */
+} pw_verification;
+
+/* Recomputes all four residuals at a state from the elements themselves, one after the other, with none of the
+ * solvers' arithmetic.  q, v and a have pw_count_coordinates entries, lambda pw_count_rows.  Errors: PW_MACHINE,
+ * PW_METHOD if a signal fails. */
+int pw_verify (pw_system *s, double t, const double *q, const double *v, const double *a, const double *lambda,
+               pw_verification *result);
 
 #ifdef __cplusplus
 }
