@@ -146,7 +146,7 @@ static void test_bad_parts (void **state) {
   cli_bad ("pinwheel sweep --merge @/p1.csv @/p2.csv @/p3.csv -o @/p2.csv", 2,
            "-o @/p2.csv would overwrite the part, @/p2.csv");
   cli_bad ("pinwheel sweep --merge @/p1.csv -o @/m.csv --jobs 2", 2,
-           "--jobs has no place beside --merge: the parts say what they are");
+           "--jobs cannot be combined with --merge: the parts define the sweep");
   cli_good ("ls @ | grep -c '^m.csv' || true");
   assert_string_equal (cli_out, "0\n");
 }

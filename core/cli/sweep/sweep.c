@@ -12,7 +12,6 @@
 #include <string.h>
 #include <unistd.h>
 #include "progress.h"
-#include "stop.h"
 #include "sweep.h"
 
 typedef struct {
@@ -44,41 +43,28 @@ static int sweep_read (const sweep *x, pw_error *error) {
   return x->merge ? PW_OK : pw_cli_at_most (&pw_cli_sweep, &x->line, 1, error);
 }
 
-/* Which option makes no sense with parts; NULL if none is there. */
+/* The first option that has no effect on parts; NULL if there is none. */
 static const char *sweep_odd (const sweep *x) {
-  const struct {
-    const char *name;
-    const void *given;
-  } option[] = { { "--vary", x->ranges },       { "--method", x->line.method },       { "--t-end", x->line.t_end },
-                 { "--step", x->line.step },    { "--rtol", x->line.rtol },           { "--atol", x->line.atol },
-                 { "--limit", x->line.limit },  { "--max-steps", x->line.max_steps }, { "--set", x->line.sets },
-                 { "--start", x->line.starts }, { "--jobs", x->jobs_text },           { "--part", x->part_text },
-                 { "--cpu", x->cpu ? x : NULL } };
-  for (size_t i = 0; i < sizeof option / sizeof *option; i++)
-    if (option[i].given) return option[i].name;
+  const pw_cli_line *l = &x->line;
+  const void *given[] = { x->ranges, l->method,    l->t_end,  l->step,      l->rtol,      l->atol,          l->limit,
+                          l->sets,   l->max_steps, l->starts, x->jobs_text, x->part_text, x->cpu ? x : NULL };
+  static const char *const name[] = { "--vary", "--method",    "--t-end", "--step", "--rtol", "--atol", "--limit",
+                                      "--set",  "--max-steps", "--start", "--jobs", "--part", "--cpu" };
+  for (size_t i = 0; i < sizeof given / sizeof *given; i++)
+    if (given[i]) return name[i];
   return NULL;
 }
 
 /* "I/N" */
 static int sweep_part (sweep *x, pw_error *error) {
-  char number[2][12] = { "", "" };
-  double value[2] = { 1, 1 };
-  const char *text = x->part_text, *slash = text ? strchr (text, '/') : NULL;
-  size_t n = slash ? (size_t)(slash - text) : 0;
-  int good = text == NULL;
-  if (slash && n < sizeof number[0] && strlen (slash + 1) < sizeof number[1]) {
-    memcpy (number[0], text, n);
-    strcpy (number[1], slash + 1);
-    good = 1;
-    for (int i = 0; i < 2; i++)
-      good &= pw_read_number (number[i], value + i) == PW_OK && !*pw_domain_check (PW_COUNT, value[i]);
-    good &= value[0] <= value[1] && value[1] <= 1e6;
-  }
-  if (!good)
-    return pw_fail (error, PW_INPUT, "--part %.60s: expected I/N, whole numbers with 1 <= I <= N <= 1000000", text);
-  x->plan.part = (int)value[0];
-  x->plan.parts = (int)value[1];
-  return PW_OK;
+  pw_plan *p = &x->plan;
+  char rest;
+  p->part = p->parts = 1;
+  if (x->part_text == NULL || (sscanf (x->part_text, "%7d/%7d%c", &p->part, &p->parts, &rest) == 2 && 1 <= p->part &&
+                               p->part <= p->parts && p->parts <= 1000000))
+    return PW_OK;
+  return pw_fail (error, PW_INPUT, "--part %.60s: expected I/N, whole numbers with 1 <= I <= N <= 1000000",
+                  x->part_text);
 }
 
 /* OMP_NUM_THREADS, or the processors that this process may use. */
@@ -217,7 +203,7 @@ static int sweep_verdict (const pw_tally *tally, int is_part, pw_error *error) {
 static int sweep_merge (sweep *x, pw_error *error) {
   pw_tally tally;
   const char *odd = sweep_odd (x);
-  if (odd) return pw_fail (error, PW_INPUT, "%s has no place beside --merge: the parts say what they are", odd);
+  if (odd) return pw_fail (error, PW_INPUT, "%s cannot be combined with --merge: the parts define the sweep", odd);
   int status = pw_table_merge (x->line.argument, x->line.arguments, x->path, &tally, error);
   return status == PW_OK ? sweep_verdict (&tally, 0, error) : status;
 }

@@ -90,16 +90,7 @@ static inline long pw_plan_row (const pw_plan *p, long k) {
   return p->part - 1 + k * p->parts;
 }
 
-/* ---- The fingerprint (sweep_fingerprint.c) ---- */
-
-#define PW_SWEEP_MAGIC "pinwheel sweep 1\n"
-
-/* Takes the tables of a built scene, which may come from files, into p->tables. */
-void pw_fingerprint_tables (pw_plan *p, const pw_model *m);
-
-/* Fills p->fingerprint, when all else of the plan is there; the model is not built and has the parameters the command
- * line sets. */
-int pw_fingerprint_make (pw_plan *p, const pw_model *m, pw_error *error);
+#define PW_SWEEP_MAGIC "pinwheel sweep 1\n" /* the first line of a fingerprint */
 
 /* ---- One run (sweep_row.c) ---- */
 
@@ -107,34 +98,6 @@ int pw_fingerprint_make (pw_plan *p, const pw_model *m, pw_error *error);
  * the same; PW_RETRY if pw_stop became non-zero on the way; PW_MACHINE with the error if it could not be done.  May be
  * called by several threads at once. */
 int pw_sweep_row (const pw_plan *p, long row, pw_text *text, pw_error *error);
-
-/* ---- Lines of journals and parts (sweep_line.c) ----
- *
- *     pinwheel sweep 1              the fingerprint: lines "KEY = VALUE"
- *     ...
- *     part = 2/4
- *     end
- *     17 0 83c1f0a2 1.5,0.05,ok,... a row's number, its run's exit status, a check sum, its line of the table */
-
-typedef struct {
-  long row;
-  int status;       /* exit status of the run */
-  const char *text; /* the table's line, which ends with a newline */
-  size_t size;      /* its bytes, the newline included */
-  size_t bytes;     /* of the whole line */
-} pw_line;
-
-/* Appends a row's line; text without a newline. */
-void pw_line_add (pw_text *t, long row, int status, const char *text);
-/* Reads the line at `at`, before `end`; 0 if it is not whole or not sound. */
-int pw_line_read (const char *at, const char *end, pw_line *line);
-
-/* A file in memory, read only. */
-typedef struct {
-  const char *at, *end;
-} pw_map;
-int pw_map_open (pw_map *m, int file); /* PW_OK, or PW_MACHINE and errno */
-void pw_map_close (pw_map *m);
 
 /* ---- The journal (sweep_journal.c) ---- */
 
@@ -157,8 +120,6 @@ int pw_journal_add (pw_journal *j, const pw_plan *p, long k, int status, const c
                     pw_error *error);
 /* Without a row so far, a journal that was created here is removed. */
 void pw_journal_close (pw_journal *j);
-
-/* ---- Tables and parts in the order of the grid (sweep_table.c) ---- */
 
 /* How the runs of a table ended. */
 typedef struct {

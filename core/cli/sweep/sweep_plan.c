@@ -1,4 +1,5 @@
 /* What all runs of a sweep have in common: the model, the grid, the columns. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "sweep.h"
@@ -108,7 +109,7 @@ static int plan_scan_row (pw_plan *p, long row, plan_scan *x, pw_error *error) {
   pw_cli_model m;
   pw_error own = { 0 };
   int status = pw_plan_scene (p, row, &m, &own);
-  if (status == PW_OK) pw_fingerprint_tables (p, m.model);
+  if (status == PW_OK) p->tables = pw_check_tables (p->tables, m.model);
   if (status == PW_OK) status = plan_columns_of (p, m.system, &own);
   pw_cli_close_model (&m);
   if (status == PW_OK)
@@ -151,6 +152,53 @@ static void plan_head (pw_plan *p) {
   pw_text_cell (&p->head, "reason");
 }
 
+/* ---- The fingerprint ---- */
+
+/* Parameters that are not varied, as they are after --set. */
+static void plan_parameters (pw_plan *p, const pw_model *m) {
+  for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++) {
+    int varied = 0;
+    for (int i = 0; i < p->grid.axes; i++) varied |= p->grid.axis[i].parameter == q;
+    if (!varied) pw_print_number (&p->fingerprint, "parameter", q->name, pw_model_parameter (m, q));
+  }
+}
+
+static void plan_grid (pw_plan *p) {
+  pw_print_starts (&p->fingerprint, p->starts);
+  pw_text order = { .at = NULL };
+  for (int i = 0; i < p->grid.axes; i++) {
+    pw_print_line (&p->fingerprint, "vary", p->grid.axis[i].name, p->grid.axis[i].range);
+    pw_text_cell (&order, p->grid.axis[i].name);
+  }
+  p->fingerprint.failed |= order.failed;
+  pw_print_line (&p->fingerprint, "order", NULL, order.at ? order.at : "");
+  pw_text_free (&order);
+}
+
+static int plan_fingerprint (pw_plan *p, const pw_model *m, pw_error *error) {
+  char part[60];
+  pw_text_add (&p->fingerprint, PW_SWEEP_MAGIC);
+  pw_print_line (&p->fingerprint, "version", NULL, PW_VERSION);
+  if (pw_print_model (&p->fingerprint, p->file, p->tables, error) != PW_OK) return error->status;
+  pw_print_line (&p->fingerprint, "method", NULL, p->method);
+  pw_print_number (&p->fingerprint, "t-end", NULL, p->t_end);
+  pw_print_number (&p->fingerprint, "step", NULL, p->settings.step);
+  pw_print_number (&p->fingerprint, "rtol", NULL, p->settings.rtol);
+  pw_print_number (&p->fingerprint, "atol", NULL, p->settings.atol);
+  if (p->settings.max_steps != PW_MAX_STEPS)
+    pw_print_number (&p->fingerprint, "max-steps", NULL, (double)p->settings.max_steps);
+  if (isfinite (p->limit)) pw_print_number (&p->fingerprint, "limit", NULL, p->limit);
+  plan_parameters (p, m);
+  plan_grid (p);
+  pw_print_number (&p->fingerprint, "rows", NULL, (double)p->grid.rows);
+  pw_print_line (&p->fingerprint, "columns", NULL, p->head.at ? p->head.at : "");
+  snprintf (part, sizeof part, "%d/%d", p->part, p->parts);
+  pw_print_line (&p->fingerprint, "part", NULL, part);
+  pw_text_add (&p->fingerprint, "end\n");
+  if (p->fingerprint.failed || p->head.failed) return pw_fail (error, PW_MACHINE, "out of memory");
+  return PW_OK;
+}
+
 /* ---- The plan ---- */
 
 int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error) {
@@ -163,7 +211,7 @@ int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error) {
   status = plan_axes (p, m, error);
   if (status == PW_OK) status = plan_columns (p, error);
   if (status == PW_OK) plan_head (p);
-  if (status == PW_OK) status = pw_fingerprint_make (p, m, error);
+  if (status == PW_OK) status = plan_fingerprint (p, m, error);
   pw_model_free (m);
   return status;
 }

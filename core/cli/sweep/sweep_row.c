@@ -2,21 +2,14 @@
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
-#include <time.h>
-#include "stop.h"
+#include "progress.h"
 #include "sweep.h"
 
-/* What is known of a run when it is over; a run that has not begun knows nothing. */
+/* The result of a run; NaN where it is not known. */
 typedef struct {
   double t, kinetic, position, velocity, steps, rhs, cpu;
   double *state; /* columns */
 } row_result;
-
-static double row_clock (void) {
-  struct timespec now;
-  clock_gettime (CLOCK_THREAD_CPUTIME_ID, &now);
-  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
-}
 
 /* States go to the columns of their names. */
 static int row_states (const pw_plan *p, const pw_system *s, const pw_sample *sample, double *state, pw_error *error) {
@@ -27,7 +20,7 @@ static int row_states (const pw_plan *p, const pw_system *s, const pw_sample *sa
     int column = pw_names_find (&p->index, pw_state_name (s, from, name, sizeof name));
     if (column < 0)
       return pw_fail (error, PW_INPUT,
-                      "%s has no column: which bodies there are may only depend on parameters that are counts", name);
+                      "%s has no column: the number of bodies may only depend on parameters that are counts", name);
     state[column] = from < n ? sample->q[from] : sample->v[from - n];
   }
   return PW_OK;
@@ -47,7 +40,7 @@ static int row_read (const pw_plan *p, const pw_system *s, pw_run *r, row_result
   return row_states (p, s, &sample, x->state, error);
 }
 
-/* The run itself; PW_RETRY if it was stopped.  A failure on the way does not hide how far it came. */
+/* The run itself; PW_RETRY if it was stopped.  A run that fails still reports how far it came. */
 static int row_run (const pw_plan *p, long row, row_result *x, pw_error *error) {
   pw_cli_model m;
   pw_limit limit = { .most = p->limit };
@@ -55,7 +48,7 @@ static int row_run (const pw_plan *p, long row, row_result *x, pw_error *error) 
   settings.stop = pw_limit_over;
   settings.stop_context = &limit;
   pw_limit_start (&limit);
-  double start = row_clock ();
+  double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
   pw_run *r = NULL;
   int status = pw_plan_scene (p, row, &m, error);
   if (status == PW_OK && (r = pw_open (m.system, p->method, &settings, error)) == NULL) status = error->status;
@@ -68,7 +61,7 @@ static int row_run (const pw_plan *p, long row, row_result *x, pw_error *error) 
     pw_close (r);
   }
   pw_cli_close_model (&m);
-  x->cpu = row_clock () - start;
+  x->cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
   return status > 0 && pw_stop == 0 ? pw_fail (error, PW_METHOD, "the method gave up") : status;
 }
 
