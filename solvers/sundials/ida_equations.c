@@ -8,36 +8,31 @@
  * with D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
  * Gear 1988).  In si1 the unknowns are the integrals of the multipliers, and called lambda and mu as well. */
 #include <string.h>
-#include "ida_state.h"
-
-pw_ida_form pw_ida_choose_form (const pw_run *r) {
-  int si1 = pw_stabilised_by (r, PW_SI1), ggl = pw_stabilised_by (r, PW_GGL), index2 = pw_stabilised_by (r, PW_INDEX2);
-  return (pw_ida_form){ .rates = si1 || ggl || index2, .positions = si1 || ggl, .impulses = si1 };
-}
+#include "ida.h"
 
 int pw_ida_place (ida_data *d, double t, const double *y) {
-  int status = pw_place (d->run->s, pw_before_breakpoint (d->run, t), y, y + d->n);
-  if (status == PW_OK) pw_sweep_J (d->run->s);
+  int status = pw_place (d->sun.run->s, pw_before_breakpoint (d->sun.run, t), y, y + d->n);
+  if (status == PW_OK) pw_sweep_J (d->sun.run->s);
   return status == PW_OK ? 0 : -1;
 }
 
-/* Multipliers of all rows, from the unknowns or their rates. */
+/* Multipliers of all rows, from the unknowns or their derivatives. */
 static const double *ida_lambda (ida_data *d, const double *y, const double *yp) {
   return pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp), d->rows, d->tangent.lambda);
 }
 
 static const double *ida_mu (ida_data *d, const double *y, const double *yp) {
-  return pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp) + d->rows, d->positions, d->tangent.mu);
+  return pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp) + d->rows, d->mus, d->tangent.mu);
 }
 
 /* ---- Residual ---- */
 
 /* q' - v + D G^T mu */
 static void ida_kinematics (ida_data *d, const double *y, const double *yp, double *out) {
-  pw_system *s = d->run->s;
+  pw_system *s = d->sun.run->s;
   int n = d->n;
   for (int j = 0; j < n; j++) out[j] = yp[j] - y[n + j];
-  if (d->positions == 0) return;
+  if (!d->positions) return;
   double *pull = d->given;
   memset (pull, 0, (size_t)n * sizeof *pull);
   pw_add_JT (s, ida_mu (d, y, yp), pull);
@@ -46,7 +41,7 @@ static void ida_kinematics (ida_data *d, const double *y, const double *yp, doub
 
 /* M v' + J^T lambda - f */
 static void ida_momentum (ida_data *d, const double *y, const double *yp, double *out) {
-  pw_system *s = d->run->s;
+  pw_system *s = d->sun.run->s;
   int n = d->n;
   double *pull = d->given, *f = pull + n + 3;
   memset (pull, 0, (size_t)n * sizeof *pull);
@@ -57,7 +52,7 @@ static void ida_momentum (ida_data *d, const double *y, const double *yp, double
 
 /* J v' - gamma + 2 alpha (J v - eta) + beta^2 g, all rows, onto J v - eta */
 static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *other) {
-  pw_run *r = d->run;
+  pw_run *r = d->sun.run;
   pw_system *s = r->s;
   for (int i = 0; i < s->rows; i++) jv[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
   pw_mul_J (s, yp + d->n, other);
@@ -71,23 +66,23 @@ static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *o
 
 /* J v - eta and g; or the stabilised accelerations */
 static void ida_constraints (ida_data *d, const double *y, const double *yp, double *out) {
-  pw_system *s = d->run->s;
+  pw_system *s = d->sun.run->s;
   double *jv = d->given, *other = jv + s->rows;
   pw_mul_J (s, y + d->n, jv);
   pw_sweep_eta (s, other);
   for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
-  if (!d->form.rates) ida_stabilised (d, yp, jv, other);
+  if (!d->velocities) ida_stabilised (d, yp, jv, other);
   pw_tangent_compress (&d->tangent, jv, d->rows, out);
-  if (!d->form.positions) return;
+  if (!d->positions) return;
   pw_sweep_g (s, other);
-  pw_tangent_compress (&d->tangent, other, d->positions, out + d->rows);
+  pw_tangent_compress (&d->tangent, other, d->mus, out + d->rows);
 }
 
 int pw_ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *data) {
   ida_data *d = data;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
   double *f = N_VGetArrayPointer (out);
-  if (pw_run_asked (d->run) || pw_ida_place (d, t, y) != 0) return -1;
+  if (pw_run_asked (d->sun.run) || pw_ida_place (d, t, y) != 0) return -1;
   ida_kinematics (d, y, yp, f);
   ida_momentum (d, y, yp, f + d->n);
   ida_constraints (d, y, yp, f + 2 * d->n);
@@ -107,14 +102,14 @@ static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, dou
                                 .mu = 2 * n + d->rows,
                                 .of_q = c,
                                 .of_a = c,
-                                .of_lambda = d->form.impulses ? c : 1 };
-  pw_tangent_kinematics (&d->tangent, &to, d->form.positions ? ida_mu (d, y, yp) : NULL, d->scale);
+                                .of_lambda = d->impulses ? c : 1 };
+  pw_tangent_kinematics (&d->tangent, &to, d->positions ? ida_mu (d, y, yp) : NULL, d->scale);
   pw_tangent_momentum (&d->tangent, &to, ida_lambda (d, y, yp));
-  if (d->form.rates)
+  if (d->velocities)
     pw_tangent_rates (&d->tangent, &to, y + n, 1);
   else
     pw_tangent_accelerations (&d->tangent, &to, y + n, yp + n);
-  if (d->form.positions) pw_tangent_positions (&d->tangent, &to, 2 * n + d->rows);
+  if (d->positions) pw_tangent_positions (&d->tangent, &to, 2 * n + d->rows);
 }
 
 int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector residual, SUNMatrix matrix, void *data,
@@ -126,15 +121,14 @@ int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector res
   pw_sun_clear (matrix, d->tangent.colptr, d->tangent.rowind);
   pw_tape_fill (&d->tangent.tape, SUNSparseMatrix_Data (matrix));
   ida_matrix_fill (d, y, yp, c);
-  pw_matrix_evaluated (d->run, y, y + d->n);
+  pw_matrix_evaluated (d->sun.run, y, y + d->n);
   return 0;
 }
 
 int pw_ida_open_matrix (ida_data *d) {
   pw_tangent *x = &d->tangent;
   pw_tape_record (&x->tape);
-  ida_matrix_fill (d, N_VGetArrayPointer (d->y), N_VGetArrayPointer (d->yp), 1);
+  ida_matrix_fill (d, N_VGetArrayPointer (d->sun.y), N_VGetArrayPointer (d->yp), 1);
   if (pw_tape_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
-  d->matrix = pw_sun_matrix (d->size, x->colptr, x->rowind, d->context);
-  return d->matrix ? PW_OK : PW_MACHINE;
+  return pw_sun_open_matrix (&d->sun, d->size, x->colptr, x->rowind);
 }

@@ -1,18 +1,40 @@
-/* The multistep methods of CVODES on the accelerations: one driver for both formulas.
- *
- *   y = (q, v),   y' = (v, a (t, q, v)),   a from  M a + J^T lambda = f,  J a = gamma, with Baumgarte's terms if asked for
- *
- * (Hindmarsh et al. 2005, SUNDIALS: Suite of nonlinear and differential/algebraic equation solvers.) */
+/* What the driver of CVODES (multistep.c) and its Newton matrix (bdf_newton.c) share.  For these files only. */
 #ifndef PW_MULTISTEP_H
 #define PW_MULTISTEP_H
 
-#include "method.h"
+#include "sundials.h"
+#include "tangent.h"
 
-/* What a pw_method of this family puts in its table; the formula is CV_ADAMS or CV_BDF. */
-int pw_multistep_open (pw_run *r, int formula, pw_error *error);
-int pw_multistep_advance (pw_run *r, double t_end, pw_error *error);
-int pw_multistep_at (pw_run *r, double t, pw_error *error);
-int pw_multistep_restart (pw_run *r, pw_error *error);
-void pw_multistep_close (pw_run *r);
+/* Newton's iteration of BDF; see bdf_newton.c. */
+typedef struct {
+  pw_tangent tangent; /* its matrix is T */
+  double *value;      /* of T */
+  double gamma;       /* of the matrix last set up */
+  pw_tape tape;       /* from the entries of T, in their order, into the matrix */
+  int64_t *colptr, *rowind;
+  N_Vector right, change; /* coords and rows in use */
+} pw_bdf_newton;
+
+struct pw_method_data {
+  pw_sun sun; /* first */
+  void *cvode;
+  int n; /* coordinates */
+  int projects;
+  pw_projector projector;
+  pw_bdf_newton newton;       /* BDF */
+  double *q, *v, *a, *lambda; /* scratch: coords + 3 each, rows */
+  double *error;              /* scratch: 2 coords */
+  int evaluated;              /* 1: the accelerations of the state reached are its own */
+  char *memory;
+};
+
+typedef struct pw_method_data multistep_data;
+
+/* Accelerations of an unknown y, into d->a and d->lambda: 0; above: a smaller step may do; below: a signal failed. */
+int pw_multistep_accelerate (multistep_data *d, double t, const double *y);
+
+/* Opens the Newton matrix and hands it to CVODES.  PW_OK or PW_MACHINE. */
+int pw_bdf_open_newton (multistep_data *d);
+void pw_bdf_close_newton (multistep_data *d);
 
 #endif

@@ -1,5 +1,7 @@
 /* What the integrators of SUNDIALS share; see sundials.h. */
 #include <assert.h>
+#include <cvodes/cvodes.h>
+#include <idas/idas.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -7,28 +9,46 @@
 #include "sundials.h"
 #include "util.h"
 
-/* SUNDIALS' index type is 64 bits wide, as the tape's. */
 static_assert (sizeof (sunindextype) == sizeof (int64_t), "SUNDIALS with 64-bit indices is expected");
+static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAIL && CV_RHSFUNC_FAIL == IDA_RES_FAIL &&
+                   CV_LSETUP_FAIL == IDA_LSETUP_FAIL && CV_TOO_MUCH_ACC == IDA_TOO_MUCH_ACC,
+               "CVODES and IDAS have the same flags");
 
 /* SUNDIALS 6.4 writes to vectors and loggers that it had no memory for, so there has to be enough while an integrator is
  * opened: for its vectors, at most 60 of them (13 of a Nordsieck array of order 12, a dozen more, as many for quadratures,
  * and what a restart adds), each with a table of its operations, and for all else. */
-int pw_sun_open (SUNContext *context, int unknowns) {
+int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
   enum { VECTORS = 60, TABLE = 1024, REST = 1 << 17 };
-  if (pw_reserve (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK) return PW_MACHINE;
-  return SUNContext_Create (PW_SUN_NO_COMM, context) == 0 ? PW_OK : PW_MACHINE;
+  x->run = r;
+  if (pw_reserve (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
+      SUNContext_Create (PW_SUN_NO_COMM, &x->context) != 0)
+    return PW_MACHINE;
+  x->y = pw_sun_vector (unknowns, x->context);
+  if (x->y) pw_sun_restart (x);
+  return x->y ? PW_OK : PW_MACHINE;
 }
 
-void pw_sun_message (int code, const char *module, const char *function, char *text, void *said) {
-  pw_sun_said *s = said;
-  (void)code, (void)module, (void)function;
-  snprintf (s->text, sizeof s->text, "%s", text);
+void pw_sun_close (pw_sun *x) {
+  if (x->solver) SUNLinSolFreeEmpty (x->solver);
+  if (x->klu) SUNLinSolFree (x->klu);
+  if (x->iteration) SUNNonlinSolFree (x->iteration);
+  if (x->matrix) SUNMatDestroy (x->matrix);
+  if (x->y) N_VDestroy (x->y);
+  if (x->context) SUNContext_Free (&x->context);
+  pw_quadrature_close (&x->quadrature);
 }
 
-const char *pw_sun_reason (pw_sun_said *said, int flag) {
-  if (*said->text == 0) snprintf (said->text, sizeof said->text, "SUNDIALS fails with the flag %d", flag);
-  return said->text;
+void pw_sun_restart (pw_sun *x) {
+  const pw_run *r = x->run;
+  double *y = N_VGetArrayPointer (x->y);
+  memcpy (y, r->q, (size_t)r->s->coords * sizeof *y);
+  memcpy (y + r->s->coords, r->v, (size_t)r->s->coords * sizeof *y);
+  x->stop = NAN;
+  x->t0 = r->t;
+  x->before = r->statistics;
 }
+
+/* ---- Linear solver ---- */
 
 void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind) {
   size_t size = (size_t)SUNSparseMatrix_Columns (matrix), nonzeros = (size_t)colptr[size];
@@ -37,15 +57,40 @@ void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowin
   memset (SUNSparseMatrix_Data (matrix), 0, nonzeros * sizeof (double));
 }
 
-int pw_sun_lacks_memory (SUNLinearSolver klu) {
-  return SUNLinSol_KLUGetCommon (klu)->status == KLU_OUT_OF_MEMORY;
+int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind) {
+  x->matrix = SUNSparseMatrix (size, size, colptr[size], CSC_MAT, x->context);
+  if (x->matrix) pw_sun_clear (x->matrix, colptr, rowind);
+  return x->matrix ? PW_OK : PW_MACHINE;
 }
 
-SUNMatrix pw_sun_matrix (int size, const int64_t *colptr, const int64_t *rowind, SUNContext context) {
-  SUNMatrix matrix = SUNSparseMatrix (size, size, colptr[size], CSC_MAT, context);
-  if (matrix) pw_sun_clear (matrix, colptr, rowind);
-  return matrix;
+static SUNLinearSolver_Type sun_solver_type (SUNLinearSolver solver) {
+  (void)solver;
+  return SUNLINEARSOLVER_DIRECT;
 }
+
+/* The content of each solver begins with its pw_sun. */
+static int sun_factorise (SUNLinearSolver solver, SUNMatrix matrix) {
+  return SUNLinSolSetup (((pw_sun *)solver->content)->klu, matrix);
+}
+
+static int sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector result, N_Vector b, pw_real tolerance) {
+  const pw_sun *x = solver->content;
+  if (x->run->outdated) return SUNLS_PACKAGE_FAIL_REC;
+  return SUNLinSolSolve (x->klu, matrix, result, b, tolerance);
+}
+
+int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve) {
+  x->klu = SUNLinSol_KLU (right, x->matrix, x->context);
+  x->solver = SUNLinSolNewEmpty (x->context);
+  if (x->klu == NULL || x->solver == NULL) return PW_MACHINE;
+  x->solver->content = content;
+  x->solver->ops->gettype = sun_solver_type;
+  x->solver->ops->setup = sun_factorise;
+  x->solver->ops->solve = solve ? solve : sun_solve;
+  return PW_OK;
+}
+
+/* ---- Newton's iteration, error weights ---- */
 
 /* The correction, or what is left after it if the iteration goes on converging as it does. */
 static int sun_converged (SUNNonlinearSolver newton, N_Vector y, N_Vector change, pw_real enough, N_Vector weights,
@@ -62,4 +107,52 @@ static int sun_converged (SUNNonlinearSolver newton, N_Vector y, N_Vector change
 
 int pw_sun_test_newton (SUNNonlinearSolver newton, double *size) {
   return SUNNonlinSolSetConvTestFn (newton, sun_converged, size);
+}
+
+void pw_sun_weigh (const pw_sun *x, const double *y, double *w) {
+  for (int j = 0, n = x->run->s->coords; j < n; j++) {
+    w[j] = 1 / pw_tolerance (x->run, j, y[j]);
+    w[n + j] = 1 / pw_tolerance_rate (x->run, j, y[n + j]);
+  }
+}
+
+/* ---- Errors ---- */
+
+void pw_sun_message (int code, const char *module, const char *function, char *text, void *x) {
+  (void)code, (void)module, (void)function;
+  snprintf (((pw_sun *)x)->message, sizeof ((pw_sun *)x)->message, "%s", text);
+}
+
+/* The integrator's message, or the flag if there was none. */
+static const char *sun_reason (pw_sun *x, int flag) {
+  if (*x->message == 0) snprintf (x->message, sizeof x->message, "SUNDIALS fails with the flag %d", flag);
+  return x->message;
+}
+
+int pw_sun_no_memory (const pw_run *r, pw_error *error) {
+  return pw_fail (error, PW_MACHINE, "model %s: out of memory in %s", r->s->model, r->method->name);
+}
+
+int pw_sun_fail_signal (double t, pw_error *error) {
+  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+}
+
+int pw_sun_fail_restart (pw_sun *x, int flag, pw_error *error) {
+  return pw_fail (error, PW_METHOD, "t = %.6g s: restart: %s", x->run->t, sun_reason (x, flag));
+}
+
+int pw_sun_fail (pw_sun *x, int flag, int singular, const char *why, pw_error *error) {
+  pw_run *r = x->run;
+  if (r->stopped) return r->interrupted = 1, PW_STOPPED;
+  if (flag == CV_LSETUP_FAIL && SUNLinSol_KLUGetCommon (x->klu)->status == KLU_OUT_OF_MEMORY)
+    return pw_sun_no_memory (r, error);
+  if (flag == CV_RHSFUNC_FAIL) return pw_sun_fail_signal (r->t, error);
+  if (singular || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
+  if (why == NULL)
+    why = flag == CV_ERR_FAILURE    ? "the error test fails however small the step"
+          : flag == CV_CONV_FAILURE ? "the iteration does not converge however small the step"
+          : flag == CV_LSETUP_FAIL  ? "the Newton matrix is singular"
+          : flag == CV_TOO_MUCH_ACC ? "the tolerance is beyond the accuracy of the machine"
+                                    : sun_reason (x, flag);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s (rtol %.3g)", r->t, why, r->settings.rtol);
 }

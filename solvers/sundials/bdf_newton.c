@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <cvodes/cvodes.h>
-#include "multistep_state.h"
+#include "multistep.h"
 
 /* Columns of T: q, v, a, lambda. */
 static void newton_fill (multistep_data *d) {
@@ -26,7 +26,7 @@ static void newton_fill (multistep_data *d) {
 }
 
 /* The matrix from T. */
-static void newton_combine (pw_multistep_newton *w, int n) {
+static void newton_combine (pw_bdf_newton *w, int n) {
   const pw_tangent *x = &w->tangent;
   const double power[] = { w->gamma * w->gamma, w->gamma, 1 };
   for (int c = 0; c < 3 * n + x->rows; c++) {
@@ -36,14 +36,14 @@ static void newton_combine (pw_multistep_newton *w, int n) {
   }
 }
 
-/* Asked for by CVODES: T, unless the one there will do, and the matrix with gamma. */
-static int newton_set_up (pw_real t, N_Vector y, N_Vector rates, SUNMatrix matrix, booleantype good, booleantype *fresh,
-                          pw_real gamma, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
+/* Called by CVODES: T, unless the present one will do, and the matrix with gamma. */
+static int newton_set_up (pw_real t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype good,
+                          booleantype *fresh, pw_real gamma, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
   multistep_data *d = data;
-  pw_multistep_newton *w = &d->newton;
+  pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
-  (void)rates, (void)t1, (void)t2, (void)t3;
-  good = good && !d->run->outdated;
+  (void)derivative, (void)t1, (void)t2, (void)t3;
+  good = good && !d->sun.run->outdated;
   *fresh = !good;
   if (!good) {
     int columns = 3 * d->n + x->rows, status = pw_multistep_accelerate (d, t, N_VGetArrayPointer (y));
@@ -52,32 +52,22 @@ static int newton_set_up (pw_real t, N_Vector y, N_Vector rates, SUNMatrix matri
     memset (w->value, 0, (size_t)x->colptr[columns] * sizeof *w->value);
     pw_tape_fill (&w->tangent.tape, w->value);
     newton_fill (d);
-    pw_matrix_evaluated (d->run, N_VGetArrayPointer (y), d->v);
-    d->run->statistics.jacobians++;
+    pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
+    d->sun.run->statistics.jacobians++;
   }
   w->gamma = gamma;
   pw_sun_clear (matrix, w->colptr, w->rowind);
   pw_tape_fill (&w->tape, SUNSparseMatrix_Data (matrix));
   newton_combine (w, d->n);
+  d->sun.run->statistics.factorisations++; /* CVODES factorises next */
   return 0;
 }
 
 /* ---- The linear solver that CVODES sees ---- */
 
-static SUNLinearSolver_Type newton_type (SUNLinearSolver solver) {
-  (void)solver;
-  return SUNLINEARSOLVER_DIRECT;
-}
-
-static int newton_factorise (SUNLinearSolver solver, SUNMatrix matrix) {
-  multistep_data *d = solver->content;
-  d->run->statistics.factorisations++;
-  return SUNLinSolSetup (d->newton.klu, matrix);
-}
-
 /* right = - T_q (b_q + gamma b_v) - T_v b_v */
 static void newton_right (const multistep_data *d, const double *b, double *right) {
-  const pw_multistep_newton *w = &d->newton;
+  const pw_bdf_newton *w = &d->newton;
   const pw_tangent *x = &w->tangent;
   int n = d->n;
   memset (right, 0, (size_t)(n + x->rows) * sizeof *right);
@@ -89,13 +79,13 @@ static void newton_right (const multistep_data *d, const double *b, double *righ
 
 static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, N_Vector vb, pw_real tolerance) {
   multistep_data *d = solver->content;
-  pw_multistep_newton *w = &d->newton;
+  pw_bdf_newton *w = &d->newton;
   const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);
   double *x = N_VGetArrayPointer (vx);
   int n = d->n;
-  if (d->run->outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then asks for a new one */
+  if (d->sun.run->outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then asks for a new one */
   newton_right (d, b, N_VGetArrayPointer (w->right));
-  int flag = SUNLinSolSolve (w->klu, matrix, w->change, w->right, tolerance);
+  int flag = SUNLinSolSolve (d->sun.klu, matrix, w->change, w->right, tolerance);
   if (flag != SUNLS_SUCCESS) return flag;
   for (int j = 0; j < n; j++) {
     x[n + j] = b[n + j] + w->gamma * da[j];
@@ -108,7 +98,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
 
 /* The patterns of T and of the matrix, each by recording one filling. */
 static int newton_lay_out (multistep_data *d) {
-  pw_multistep_newton *w = &d->newton;
+  pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;
   int columns = 3 * d->n + x->rows, size = d->n + x->rows;
   pw_tape_record (&x->tape);
@@ -121,36 +111,22 @@ static int newton_lay_out (multistep_data *d) {
   return w->value ? PW_OK : PW_MACHINE;
 }
 
-static int newton_open_solver (multistep_data *d) {
-  pw_multistep_newton *w = &d->newton;
-  w->solver = SUNLinSolNewEmpty (d->context);
-  if (w->solver == NULL) return PW_MACHINE;
-  w->solver->content = d;
-  w->solver->ops->gettype = newton_type;
-  w->solver->ops->setup = newton_factorise;
-  w->solver->ops->solve = newton_solve;
-  int flag = CVodeSetLinearSolver (d->cvode, w->solver, w->matrix);
-  flag |= CVodeSetLinSysFn (d->cvode, newton_set_up);
-  return flag == 0 ? PW_OK : PW_MACHINE;
-}
-
-int pw_multistep_open_newton (multistep_data *d) {
-  pw_multistep_newton *w = &d->newton;
-  if (pw_tangent_open (&w->tangent, d->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_MACHINE;
+int pw_bdf_open_newton (multistep_data *d) {
+  pw_bdf_newton *w = &d->newton;
+  pw_sun *x = &d->sun;
+  if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_MACHINE;
   int size = d->n + w->tangent.rows;
-  w->right = pw_sun_vector (size, d->context);
-  w->change = pw_sun_vector (size, d->context);
-  w->matrix = pw_sun_matrix (size, w->colptr, w->rowind, d->context);
-  if (!w->right || !w->change || !w->matrix) return PW_MACHINE;
-  w->klu = SUNLinSol_KLU (w->right, w->matrix, d->context);
-  return w->klu ? newton_open_solver (d) : PW_MACHINE;
+  w->right = pw_sun_vector (size, x->context);
+  w->change = pw_sun_vector (size, x->context);
+  if (!w->right || !w->change || pw_sun_open_matrix (x, size, w->colptr, w->rowind) != PW_OK ||
+      pw_sun_open_solver (x, w->right, d, newton_solve) != PW_OK)
+    return PW_MACHINE;
+  int failed = CVodeSetLinearSolver (d->cvode, x->solver, x->matrix) || CVodeSetLinSysFn (d->cvode, newton_set_up);
+  return failed ? PW_MACHINE : PW_OK;
 }
 
-void pw_multistep_close_newton (multistep_data *d) {
-  pw_multistep_newton *w = &d->newton;
-  if (w->solver) SUNLinSolFreeEmpty (w->solver);
-  if (w->klu) SUNLinSolFree (w->klu);
-  if (w->matrix) SUNMatDestroy (w->matrix);
+void pw_bdf_close_newton (multistep_data *d) {
+  pw_bdf_newton *w = &d->newton;
   if (w->right) N_VDestroy (w->right);
   if (w->change) N_VDestroy (w->change);
   pw_tape_close (&w->tape);
