@@ -177,6 +177,22 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
 int pw_csv_write (pw_csv *c, pw_system *s, const pw_sample *sample, pw_error *error);
 void pw_csv_close (pw_csv *c);
 
+/* ---- JSON ---- */
+
+/* Writes JSON to a stream: numbers with 17 digits, null for what is not finite.  Begin with { .f = stream } and open one
+ * container.  A key is NULL in lists and for the outermost container. */
+typedef struct {
+  FILE *f;
+  int lines;        /* levels whose items stand on lines of their own */
+  int line;         /* 1: so does the next item, or the end of the container */
+  int depth, items; /* containers that are open; items of the innermost so far */
+} pw_json;
+void pw_json_open (pw_json *j, const char *key, char bracket); /* '{' or '[' */
+void pw_json_close (pw_json *j, char bracket);
+void pw_json_number (pw_json *j, const char *key, double value);
+void pw_json_text (pw_json *j, const char *key, const char *text); /* NULL: null */
+void pw_json_flag (pw_json *j, const char *key, int value);
+
 /* ---- Summaries ---- */
 
 /* How far a run was from the truth: the largest coordinate and rate of lengths, angles, speeds [m/s] and angular rates; of

@@ -25,7 +25,7 @@ static void test_ezyroller (void **state) {
   check_shows ("  consistent as described\n");
   check_shows ("  wheel (2 elements)                 good");
   check_shows ("  eigenvalues                        all 0");
-  check_shows ("\nNothing is wrong\n");
+  check_shows ("\nNo problems found\n");
 }
 
 /* Hanging, a compound pendulum: w^2 = m g l / (I + m l^2). */
@@ -58,7 +58,7 @@ static void test_spring (void **state) {
 static void test_redundant (void **state) {
   (void)state;
   cli_good ("pinwheel check car");
-  check_shows ("constraint rows                    4 (0 on positions, 4 on velocities)");
+  check_shows ("constraint equations               4 (0 on positions, 4 on velocities)");
   check_shows ("rank of J                          2\n");
   check_shows ("    wheels rear-left and rear-right: the same lateral constraint\n");
 }
@@ -66,8 +66,8 @@ static void test_redundant (void **state) {
 static void test_start (void **state) {
   (void)state;
   cli_good ("pinwheel check ezyroller --start frame.vy=0.5");
-  check_shows ("Start\n  ");
-  check_shows (" moved");
+  check_shows ("Initial conditions\n  ");
+  check_shows (" changed");
   check_shows ("frame.omega ");
   check_shows (", by ");
   cli_good ("pinwheel check ezyroller --start frame.vy=0.5 --json -");
@@ -118,7 +118,7 @@ static void test_broken_kind (void **state) {
   check_shows ("at random: force_q = d force/dq does not hold");
   check_shows ("in this model: force_q = d force/dq does not hold");
   check_shows ("\n1 problem\n");
-  assert_non_null (strstr (cli_err, "pinwheel: kind well fails its self-test: force_q = d force/dq"));
+  assert_non_null (strstr (cli_err, "pinwheel: element type well fails its self-test: force_q = d force/dq"));
   assert_int_equal (cli_run ("pinwheel check @/broken.c --json -"), 2);
   check_shows ("{\"check\": \"force_q\", \"in\": \"random scenes\", \"expected\": \"force_q = d force/dq\"");
   check_shows ("{\"check\": \"force_q\", \"in\": \"this model\"");

@@ -1,5 +1,5 @@
-/* pinwheel check: is a model what it was meant to be?  Its mobility, redundant rows, massless bodies, consistent start, the
- * derivatives of every kind in use, and how fast it lives at its start. */
+/* pinwheel check: mobility, redundant constraint equations, massless bodies, consistent initial conditions, derivatives of
+ * every element type in use, and the linearised equations of motion. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -9,11 +9,7 @@
 
 enum { CHECK_SEEDS = 5 };
 
-static void check_add (pw_check_list *l, const char *format, ...)
-#ifdef __GNUC__
-    __attribute__ ((format (printf, 2, 3)))
-#endif
-    ;
+static void check_add (pw_check_list *l, const char *format, ...) PW_PRINTS (2);
 
 static void check_add (pw_check_list *l, const char *format, ...) {
   va_list list;
@@ -23,9 +19,9 @@ static void check_add (pw_check_list *l, const char *format, ...) {
   va_end (list);
 }
 
-/* ---- The start ---- */
+/* ---- Initial conditions ---- */
 
-/* Whatever method the model wants, what is checked is the model. */
+/* The method is always the same: the model is checked, not the method it selects. */
 static void check_open (pw_check *x) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   pw_settings settings = { .span = d.t_end, .step = d.step };
@@ -46,7 +42,7 @@ void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *
   *to = i < n ? start->q[i] : start->v[i - n];
 }
 
-/* Initial values that the model specifies, or the user gave, and the start has changed. */
+/* Initial values given by the model or the user that the consistent initialisation has changed. */
 static void check_given (pw_check *x) {
   const pw_system *s = x->m.system;
   for (int i = 0; x->r && i < 2 * pw_count_coordinates (s); i++) {
@@ -61,30 +57,30 @@ static void check_given (pw_check *x) {
   }
 }
 
-/* What the model says it knows about its motion must hold at the start. */
-static int check_truth (pw_check *x, int started, pw_error *error) {
+/* The model's reference solution must hold initially. */
+static int check_reference (pw_check *x, int started, pw_error *error) {
   int n = pw_count_coordinates (x->m.system);
   if (x->r == NULL || started || !pw_has_truth (x->m.model)) return PW_OK;
-  double *truth = malloc (2 * (size_t)n * sizeof *truth);
-  if (truth == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-  int status = pw_true_state (x->m.model, x->m.system, 0, truth, truth + n, error);
+  double *reference = malloc (2 * (size_t)n * sizeof *reference);
+  if (reference == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  int status = pw_true_state (x->m.model, x->m.system, 0, reference, reference + n, error);
   for (int i = 0; i < 2 * n && status == PW_OK; i++) {
     char name[300], a[32], b[32];
     double from, to;
-    if (isnan (truth[i])) continue;
+    if (isnan (reference[i])) continue;
     x->known++;
     pw_check_state (x, i, name, sizeof name, &from, &to);
-    if (!(fabs (truth[i] - to) <= 1e-9 * (1 + fabs (to))))
-      check_add (&x->problem, "the model's truth does not hold at the start: %s is %s, not %s", name,
-                 pw_format (a, to, 9), pw_format (b, truth[i], 9));
+    if (!(fabs (reference[i] - to) <= 1e-9 * (1 + fabs (to))))
+      check_add (&x->problem, "the model's reference solution does not hold initially: %s is %s, not %s", name,
+                 pw_format (a, to, 9), pw_format (b, reference[i], 9));
   }
-  free (truth);
+  free (reference);
   return status;
 }
 
-/* ---- The kinds ---- */
+/* ---- Element types ---- */
 
-/* A kind that no scene can be made for stays untested, and says why. */
+/* An element type for which no random scene can be made stays untested, with the reason. */
 static int check_alone (pw_checked_kind *k, pw_error *error) {
   int status = PW_OK;
   for (unsigned seed = 1; status == PW_OK && seed <= CHECK_SEEDS; seed++) {
@@ -102,14 +98,13 @@ static int check_first_failed (const pw_selftest_report *report) {
   return i;
 }
 
-/* What makes a kind fail, NULL if nothing; `inside` tells where. */
-static const pw_selftest_check *check_fault (const pw_checked_kind *k, int *inside) {
+/* The first check that fails, or NULL. */
+static const pw_selftest_check *check_fault (const pw_checked_kind *k) {
   const pw_selftest_report *report = k->alone.failed ? &k->alone : &k->inside;
-  *inside = report == &k->inside;
   return report->failed ? &report->check[check_first_failed (report)] : NULL;
 }
 
-/* Elements of a kind stand together in a system. */
+/* Elements of one type are consecutive in a system. */
 static int check_list_kinds (pw_check *x, pw_error *error) {
   const pw_system *s = x->m.system;
   int elements = pw_system_elements (s);
@@ -130,20 +125,21 @@ static int check_list_kinds (pw_check *x, pw_error *error) {
   return PW_OK;
 }
 
-/* A table that does not hold together is not tried in the scene. */
+/* An inconsistent table is not tried in the scene. */
 static int check_kinds (pw_check *x, pw_error *error) {
   pw_system *s = x->m.system;
   const double *q = x->r ? pw_run_start (x->r)->q : pw_system_initial_q (s),
                *v = x->r ? pw_run_start (x->r)->v : pw_system_initial_v (s);
-  int inside, status = check_list_kinds (x, error);
+  int status = check_list_kinds (x, error);
   for (pw_checked_kind *k = x->kind; status == PW_OK && k < x->kind + x->kinds; k++) {
     status = check_alone (k, error);
     if (status != PW_OK) break;
     if (k->alone.failed == 0 || strcmp (k->alone.check[check_first_failed (&k->alone)].name, "table") != 0)
       status = pw_selftest_scene (s, k->kind, 0, q, v, 1, &k->inside, error);
-    const pw_selftest_check *fault = check_fault (k, &inside);
+    const pw_selftest_check *fault = check_fault (k);
     if (fault)
-      check_add (&x->problem, "kind %s fails its self-test: %s (%s)", k->kind->name, fault->about, fault->where);
+      check_add (&x->problem, "element type %s fails its self-test: %s (%s)", k->kind->name, fault->about,
+                 fault->where);
   }
   return status;
 }
@@ -164,7 +160,7 @@ static void check_fastest (pw_check *x) {
 
 static int check_linear (pw_check *x, pw_error *error) {
   char a[32], b[32];
-  x->limit = INFINITY;
+  x->limit = x->doubling = INFINITY;
   x->fastest = -1;
   if (x->r == NULL) return PW_OK;
   int status = pw_linearise (x->r, CHECK_MOST, &x->linear, error);
@@ -173,15 +169,12 @@ static int check_linear (pw_check *x, pw_error *error) {
   if (x->explicit_rk4 && x->step > x->limit)
     check_add (&x->problem, "the model's step of %s s is too large for rk4, which is stable up to %s s",
                pw_format (a, x->step, 6), pw_format (b, x->limit, 3));
-  if (pw_check_doubling (x) < INFINITY)
-    check_add (&x->finding, "the motion is unstable: a disturbance doubles in %s s",
-               pw_format (a, pw_check_doubling (x), CHECK_DIGITS));
-  return PW_OK;
-}
-
-double pw_check_doubling (const pw_check *x) {
   const pw_linear *l = &x->linear;
-  return l->A && l->steady == PW_STEADY && l->unknowns > 0 && l->re[0] > 0 ? log (2) / l->re[0] : INFINITY;
+  if (l->steady != PW_STEADY || l->unknowns == 0 || !(l->re[0] > 0)) return PW_OK;
+  x->doubling = log (2) / l->re[0];
+  check_add (&x->finding, "the motion is unstable: a perturbation doubles in %s s",
+             pw_format (a, x->doubling, CHECK_DIGITS));
+  return PW_OK;
 }
 
 /* ---- */
@@ -191,12 +184,12 @@ static int check_model (pw_check *x, int started, pw_error *error) {
   pw_report_jumps (x->m.model);
   check_open (x);
   check_given (x);
-  int status = check_truth (x, started, error);
+  int status = check_reference (x, started, error);
   if (status == PW_OK) status = check_linear (x, error);
   return status == PW_OK ? check_kinds (x, error) : status;
 }
 
-/* What is wrong decides the exit status: a start that fails in its own way, else the model. */
+/* The exit status is that of the initialisation if it failed, else that of a faulty model. */
 static void check_verdict (const pw_check *x, pw_error *error) {
   if (x->problem.count == 0) return;
   pw_fail (error, x->start.status ? x->start.status : PW_INPUT, "%s%s", x->problem.text[0],
@@ -225,8 +218,9 @@ static int check_command (void *options, pw_error *error) {
   pw_output *o = NULL;
   if (pw_cli_open (&x->m, &x->line, error) == PW_OK && check_open_json (x, &o, error) == PW_OK &&
       check_model (x, x->line.starts != NULL, error) == PW_OK) {
-    if (o == NULL || pw_output_stream (o) != stdout) pw_check_text (x);
-    if (o) pw_check_json (x, o, error);
+    if (o == NULL || pw_output_stream (o) != stdout) pw_check_report (x, NULL);
+    if (o) pw_check_report (x, &(pw_json){ .f = pw_output_stream (o) });
+    if (o) pw_output_finish (o, error);
     o = NULL;
     check_verdict (x, error);
   }

@@ -1,4 +1,4 @@
-/* What `pinwheel check` finds out about a model. */
+/* The results of `pinwheel check`. */
 #ifndef PW_CHECK_H
 #define PW_CHECK_H
 
@@ -10,48 +10,43 @@ enum {
   CHECK_DIGITS = 5
 };
 
-/* The self-test of a kind in use. */
+/* The self-test of an element type in use. */
 typedef struct {
   const pw_kind *kind;
   int count;                        /* elements */
-  pw_selftest_report alone, inside; /* in scenes of its own; in this one */
-  char untested[500];               /* why there is no test alone; "": there is one */
+  pw_selftest_report alone, inside; /* in random scenes; in this model */
+  char untested[500];               /* why there is no test in random scenes, or "" */
 } pw_checked_kind;
 
-/* The first of some messages, and how many there are. */
+/* Messages: how many, and the first of them. */
 typedef struct {
   int count;
   char text[8][700];
 } pw_check_list;
-static inline int pw_check_listed (const pw_check_list *l) {
-  int most = (int)(sizeof l->text / sizeof *l->text);
-  return l->count < most ? l->count : most;
-}
 
-/* Problems make the model fail; findings do not: it can be run, but may not be what was meant. */
+/* Problems make the model fail; findings do not: it can be run, but may not be what was intended. */
 typedef struct {
   pw_cli_line line;
   const char *json; /* path, or NULL */
   pw_cli_model m;
-  pw_run *r;              /* NULL: it cannot start, for the reason in `start` */
+  pw_run *r;              /* NULL: it cannot be started, for the reason in `start` */
   pw_error start;         /* why */
   pw_linear linear;       /* zero without a run */
-  const char **redundant; /* what is said about each redundant row, ended by NULL; or NULL */
+  const char **redundant; /* a description of each redundant constraint equation, ended by NULL; or NULL */
   pw_checked_kind *kind;  /* of the scene */
   int kinds;
-  int known;          /* states whose motion the model knows, compared with the start */
-  double step, limit; /* the model's step, and the largest that RK4 can take [s]; 0 and INFINITY: none */
-  int explicit_rk4;   /* 1: the model wants to be run by rk4 */
-  int fastest;        /* the eigenvalue of largest modulus, displacements of the whole left out; -1: all are 0 */
+  int known;          /* states of the model's reference solution, compared with the initial state */
+  double step, limit; /* the model's step, and the largest with which RK4 is stable [s]; 0 and INFINITY: none */
+  int explicit_rk4;   /* 1: the model selects rk4 */
+  int fastest;        /* the eigenvalue of largest modulus except rigid displacements; -1: all are 0 */
+  double doubling; /* time in which the fastest growing perturbation of a steady motion doubles [s]; INFINITY: none */
   pw_check_list problem, finding;
 } pw_check;
 
-/* In what time the fastest growing disturbance of a steady motion doubles [s]; INFINITY: none grows, or that is not known. */
-double pw_check_doubling (const pw_check *x);
-/* A state the consistent start has moved: its name, and from where to where. */
+/* A state that the consistent initialisation has changed: its name, and the values before and after. */
 void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to);
 
-void pw_check_text (const pw_check *x);                               /* check_text.c */
-int pw_check_json (const pw_check *x, pw_output *o, pw_error *error); /* completes the output (check_json.c) */
+/* Writes the report: as JSON to j, or as text to standard output if j is NULL (check_report.c). */
+void pw_check_report (const pw_check *x, pw_json *j);
 
 #endif

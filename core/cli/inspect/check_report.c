@@ -1,0 +1,367 @@
+/* The report of `pinwheel check`: a sequence of entries, each with its key in JSON, and its label and words in the text. */
+#include <math.h>
+#include <stdarg.h>
+#include "check.h"
+
+enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 };
+
+/* ---- Entries ---- */
+
+static void report_section (pw_json *j, const char *key, char bracket, const char *title) {
+  if (j == NULL && title) printf ("\n%s\n", title);
+  if (j == NULL) return;
+  j->line = 1;
+  pw_json_open (j, key, bracket);
+}
+
+static void report_end (pw_json *j, char bracket) {
+  if (j) pw_json_close (j, bracket);
+}
+
+/* A number in JSON, unless the key is NULL; a line in the text, unless the label is NULL. */
+static void report_entry (pw_json *j, const char *key, double value, const char *label, const char *format, ...)
+    PW_PRINTS (5);
+
+static void report_entry (pw_json *j, const char *key, double value, const char *label, const char *format, ...) {
+  va_list list;
+  if (j && key) pw_json_number (j, key, value);
+  if (j || label == NULL) return;
+  printf ("  %-34s ", label);
+  va_start (list, format);
+  vprintf (format, list);
+  va_end (list);
+  putchar ('\n');
+}
+
+/* An item of a list, of which the text has the first few; the same number counts them. */
+static void report_item (pw_json *j, int *listed, const char *text, const char *format, ...) PW_PRINTS (4);
+
+static void report_item (pw_json *j, int *listed, const char *text, const char *format, ...) {
+  va_list list;
+  if (j && text) pw_json_text (j, NULL, text);
+  if ((*listed)++ >= REPORT_LISTED || j) return;
+  va_start (list, format);
+  printf ("    ");
+  vprintf (format, list);
+  putchar ('\n');
+  va_end (list);
+}
+
+static void report_end_list (pw_json *j, int listed) {
+  report_end (j, ']');
+  if (j == NULL && listed > REPORT_LISTED) printf ("    and %d more\n", listed - REPORT_LISTED);
+}
+
+/* ---- Mobility and mass ---- */
+
+static void report_singular_value (pw_json *j, const pw_check *x) {
+  const pw_linear *l = &x->linear;
+  double length = x->r ? pw_run_scale (x->r)->length : NAN;
+  char value[32], unit[32];
+  const char *label = l->rank > 0 ? "smallest singular value of J" : NULL;
+  if (isnan (l->least))
+    report_entry (j, "least_singular_value", NAN, label, "not computed: %d coordinates, the limit is %d",
+                  l->coordinates, CHECK_MOST);
+  else
+    report_entry (j, "least_singular_value", x->r ? l->least : NAN, label,
+                  "%s, rows of length 1, angles in units of L = %s m", pw_format (value, l->least, CHECK_DIGITS),
+                  pw_format (unit, length, CHECK_DIGITS));
+  if (j) pw_json_number (j, "length_scale", length);
+}
+
+static void report_mobility (pw_json *j, const pw_check *x) {
+  const pw_system *s = x->m.system;
+  const pw_linear *l = &x->linear;
+  int coordinates = pw_count_coordinates (s), rows = pw_count_rows (s), holonomic = pw_count_holonomic (s), listed = 0;
+  report_section (j, "mobility", '{', "Mobility");
+  if (j) pw_json_number (j, "bodies", pw_count_bodies (s));
+  report_entry (j, "coordinates", coordinates, "coordinates", "%d", coordinates);
+  report_entry (j, "rows", rows, "constraint equations", "%d (%d on positions, %d on velocities)", rows, holonomic,
+                rows - holonomic);
+  if (j) pw_json_number (j, "holonomic_rows", holonomic);
+  const struct {
+    const char *key, *label;
+    int value;
+  } count[] = { { "configuration", "degrees of freedom, configuration", l->positions },
+                { "velocity", "degrees of freedom, velocity", l->velocities },
+                { "rank", "rank of J", l->rank } };
+  for (int i = 0; i < 3; i++)
+    report_entry (j, count[i].key, x->r ? (double)count[i].value : NAN, x->r ? count[i].label : NULL, "%d", count[i].value);
+  report_singular_value (j, x);
+  report_end (j, '}');
+  report_section (j, "redundant", '[', NULL);
+  if (x->r) report_entry (j, NULL, 0, "redundant constraint equations", "%d", pw_run_redundant (x->r));
+  for (const char *const *r = x->redundant; r && *r; r++) report_item (j, &listed, *r, "%s", *r);
+  report_end_list (j, listed);
+}
+
+static void report_mass (pw_json *j, const pw_check *x) {
+  static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
+  const char *matrix = x->r ? "regular" : x->start.status == PW_INPUT ? "singular" : NULL;
+  const pw_system *s = x->m.system;
+  const double *M = pw_system_mass (s);
+  int lacking = 0, listed = 0;
+  for (int b = 0; b < pw_count_bodies (s); b++) lacking += M[3 * b] == 0 || M[3 * b + 2] == 0;
+  report_section (j, "massless", '[', "Mass");
+  report_entry (j, NULL, 0, "bodies without mass or inertia", "%d", lacking);
+  for (int b = 0; b < pw_count_bodies (s); b++) {
+    int which = (M[3 * b] == 0) + 2 * (M[3 * b + 2] == 0);
+    const char *name = pw_system_body_name (s, b);
+    if (which) report_item (j, &listed, name, "%s has %s", name, lack[which]);
+  }
+  report_end_list (j, listed);
+  report_entry (j, NULL, 0, "saddle-point matrix", "%s%s", matrix ? matrix : "not known",
+                matrix && x->r == NULL ? "; see below" : "");
+  if (j == NULL) return;
+  j->line = 1;
+  pw_json_text (j, "saddle_point", matrix);
+}
+
+/* ---- Initial conditions ---- */
+
+static void report_change (pw_json *j, const pw_check *x, int i, int *listed) {
+  char name[300], a[32], b[32], c[32];
+  double from, to;
+  pw_check_state (x, i, name, sizeof name, &from, &to);
+  if (j) pw_json_open (j, NULL, '{');
+  if (j) pw_json_text (j, "state", name);
+  if (j) pw_json_number (j, "from", from), pw_json_number (j, "to", to);
+  report_item (j, listed, NULL, "%-20s from %s to %s, by %s %s", name, pw_format (a, from, 10), pw_format (b, to, 10),
+               pw_format (c, to - from, 3), pw_state_unit (x->m.system, i));
+  report_end (j, '}');
+}
+
+static void report_start (pw_json *j, const pw_check *x) {
+  int listed = 0, n = pw_count_coordinates (x->m.system);
+  if (j && x->r == NULL) {
+    j->line = 1;
+    pw_json_text (j, "start", NULL);
+    return;
+  }
+  report_section (j, "start", '{', "Initial conditions");
+  if (x->r == NULL) {
+    printf ("  FAILED: %s\n", x->start.text);
+    return;
+  }
+  const pw_start_report *start = pw_run_start (x->r);
+  if (j) {
+    pw_json_number (j, "moved", start->moved);
+    pw_json_flag (j, "freed", start->freed);
+    pw_json_open (j, "changes", '[');
+  } else if (start->moved == 0)
+    puts ("  consistent as described");
+  else
+    printf ("  %d value%s changed%s\n", start->moved, start->moved == 1 ? " was" : "s were",
+            start->freed ? ", including given ones: they cannot all be satisfied" : "");
+  for (int i = 0; i < 2 * n; i++)
+    if (pw_start_moved (x->m.system, start, i)) report_change (j, x, i, &listed);
+  report_end_list (j, listed);
+  report_end (j, '}');
+  if (j == NULL && x->known)
+    printf ("  compared with the reference solution of the model in %d state%s\n", x->known, x->known == 1 ? "" : "s");
+}
+
+/* ---- Element types ---- */
+
+static void report_failures (pw_json *j, const pw_selftest_report *r, const char *where, const char *label) {
+  char error[32], bound[32];
+  for (const pw_selftest_check *c = r->check; c < r->check + r->checks; c++) {
+    if (!c->failed) continue;
+    if (j == NULL) {
+      printf ("    %s: %s does not hold: off by %s, the bound is %s\n      %s\n", label, c->about,
+              pw_format (error, c->error, 2), pw_format (bound, c->bound, 2), c->where);
+      continue;
+    }
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "check", c->name);
+    pw_json_text (j, "in", where);
+    pw_json_text (j, "expected", c->about);
+    pw_json_number (j, "error", c->error);
+    pw_json_number (j, "bound", c->bound);
+    pw_json_text (j, "where", c->where);
+    pw_json_close (j, '}');
+  }
+}
+
+static void report_kind (pw_json *j, const pw_checked_kind *k) {
+  char name[100];
+  if (j) {
+    j->line = 1;
+    pw_json_open (j, NULL, '{');
+    pw_json_text (j, "kind", k->kind->name);
+    pw_json_number (j, "elements", k->count);
+    pw_json_number (j, "checks", k->alone.checks + k->inside.checks);
+    pw_json_open (j, "failed", '[');
+  } else {
+    snprintf (name, sizeof name, "%s (%d element%s)", k->kind->name, k->count, k->count == 1 ? "" : "s");
+    printf ("  %-34s %s: %d checks at random, %d in this model\n", name,
+            k->alone.failed + k->inside.failed ? "FAILED" : "good", k->alone.checks, k->inside.checks);
+    if (*k->untested) printf ("    not tested at random: %s\n", k->untested);
+  }
+  report_failures (j, &k->alone, "random scenes", "at random");
+  report_failures (j, &k->inside, "this model", "in this model");
+  report_end (j, ']');
+  report_end (j, '}');
+}
+
+/* ---- Linearisation ---- */
+
+/* An eigenvalue, or a conjugate pair. */
+static char *report_eigenvalue (const pw_linear *l, int i, char buffer[100]) {
+  char re[32], im[32];
+  snprintf (buffer, 100, l->im[i] != 0 ? "%s +- %s i 1/s" : "%s 1/s", pw_format (re, l->re[i], CHECK_DIGITS),
+            pw_format (im, fabs (l->im[i]), CHECK_DIGITS));
+  return buffer;
+}
+
+/* How many eigenvalues from i on are the same. */
+static int report_same (const pw_linear *l, int i) {
+  int k = i;
+  while (k < l->unknowns && l->re[k] == l->re[i] && fabs (l->im[k]) == fabs (l->im[i]) && l->rigid[k] == l->rigid[i])
+    k++;
+  return k - i;
+}
+
+static void report_eigenvalues (const pw_linear *l) {
+  char text[100], times[30];
+  for (int i = 0, lines = 0, same; i < l->unknowns; i += same, lines++) {
+    if (lines == REPORT_EIGENVALUES) {
+      printf ("    and %d more\n", l->unknowns - i);
+      return;
+    }
+    same = report_same (l, i);
+    int multiplicity = l->im[i] != 0 ? same / 2 : same;
+    snprintf (times, sizeof times, multiplicity > 1 ? ", %d times" : "", multiplicity);
+    report_entry (NULL, NULL, 0, i == 0 ? "eigenvalues, rightmost first" : "", "%s%s%s", report_eigenvalue (l, i, text),
+                  times, l->rigid[i] ? ": rigid displacement" : "");
+  }
+}
+
+static void report_motion (pw_json *j, const pw_linear *l) {
+  static const char *const steady[] = { "steady", "accelerated", "changing" };
+  char a[32], w[32];
+  if (j) pw_json_text (j, "motion", steady[l->steady]);
+  report_entry (j, "acceleration", l->acceleration, l->steady == PW_ACCELERATED ? "motion" : NULL,
+                "not steady: accelerations of %s m/s^2 in the co-moving frame", pw_format (a, l->acceleration, 3));
+  if (l->steady == PW_CHANGING)
+    report_entry (j, NULL, 0, "motion", "not steady: the equations change with time or along the motion");
+  if (l->steady != PW_STEADY) report_entry (j, NULL, 0, "", "the eigenvalues are not stability exponents");
+  report_entry (j, "turn_rate", l->twist[2], l->twist[2] != 0 ? "co-moving frame" : NULL, "turns at %s rad/s",
+                pw_format (w, l->twist[2], CHECK_DIGITS));
+  if (j) pw_json_number (j, "symmetries", l->symmetries);
+}
+
+static void report_stability (pw_json *j, const pw_check *x) {
+  const pw_linear *l = &x->linear;
+  double slowest = -INFINITY;
+  char time[32];
+  for (int i = 0; i < l->unknowns; i++)
+    if (!l->rigid[i]) slowest = fmax (slowest, l->re[i]);
+  const char *label = l->steady == PW_STEADY && isfinite (slowest) ? "stability" : NULL;
+  if (slowest > 0)
+    report_entry (j, "doubling_time", x->doubling, label, "unstable, doubles in %s s",
+                  pw_format (time, x->doubling, CHECK_DIGITS));
+  else if (slowest < 0)
+    report_entry (j, "doubling_time", x->doubling, label, "stable, the slowest perturbation halves in %s s",
+                  pw_format (time, log (2) / -slowest, CHECK_DIGITS));
+  else
+    report_entry (j, "doubling_time", x->doubling, label,
+                  "neutral: no perturbation grows exponentially, not all decay");
+}
+
+static void report_fastest (pw_json *j, const pw_check *x) {
+  const pw_linear *l = &x->linear;
+  int there = x->fastest >= 0;
+  double re = there ? l->re[x->fastest] : 0, im = there ? fabs (l->im[x->fastest]) : 0, size = hypot (re, im);
+  double damping = !there ? NAN : re != 0 ? -re / size : 0;
+  char text[100], a[32], b[32];
+  if (there) report_entry (j, NULL, 0, "fastest eigenvalue", "%s", report_eigenvalue (l, x->fastest, text));
+  report_entry (j, "frequency_hz", im / (2 * PW_PI), im != 0 ? "its frequency" : NULL,
+                "%s Hz, undamped it would be %s Hz", pw_format (a, im / (2 * PW_PI), CHECK_DIGITS),
+                pw_format (b, size / (2 * PW_PI), CHECK_DIGITS));
+  report_entry (j, "damping", damping, im != 0 ? "its damping" : NULL, "%s of critical",
+                pw_format (a, damping, CHECK_DIGITS));
+  if (there && im == 0)
+    report_entry (j, NULL, 0, re < 0 ? "it decays by e in" : "it grows by e in", "%s s",
+                  pw_format (a, 1 / size, CHECK_DIGITS));
+  if (isinf (x->limit))
+    report_entry (j, "rk4_step", x->limit, there ? "RK4 is stable" : NULL, "with any step: the fast modes grow");
+  else
+    report_entry (j, "rk4_step", x->limit, there ? "RK4 is stable up to a step of" : NULL,
+                  "%s s; the model's step is %s s", pw_format (a, x->limit, 3), pw_format (b, x->step, 6));
+}
+
+static void report_linear (pw_json *j, const pw_check *x) {
+  const pw_linear *l = &x->linear;
+  if (j && l->A == NULL) {
+    j->line = 1;
+    pw_json_text (j, "linearisation", NULL);
+  }
+  if (x->r == NULL || (j && l->A == NULL)) return;
+  report_section (j, "linearisation", '{', "Linearised at the initial state");
+  report_entry (j, "unknowns", l->unknowns, "unknowns", "%d", l->unknowns);
+  if (l->A == NULL) {
+    report_entry (j, NULL, 0, "eigenvalues", "not computed: %d coordinates, the limit is %d", l->coordinates,
+                  CHECK_MOST);
+    return;
+  }
+  report_motion (j, l);
+  if (j == NULL && x->fastest < 0 && l->twist[2] == 0)
+    report_entry (j, NULL, 0, "eigenvalues", "all 0: nothing vibrates, grows or decays");
+  else if (j == NULL)
+    report_eigenvalues (l);
+  report_stability (j, x);
+  report_fastest (j, x);
+  report_section (j, "eigenvalues", '[', NULL);
+  for (int i = 0; j && i < l->unknowns; i++) {
+    pw_json_open (j, NULL, '[');
+    pw_json_number (j, NULL, l->re[i]);
+    pw_json_number (j, NULL, l->im[i]);
+    pw_json_close (j, ']');
+  }
+  report_end (j, ']');
+  report_end (j, '}');
+}
+
+/* ---- The report ---- */
+
+static void report_list (pw_json *j, const char *key, const pw_check_list *l) {
+  int most = (int)(sizeof l->text / sizeof *l->text);
+  if (j == NULL && l->count > 0) printf ("\n%d %s%s\n", l->count, key, l->count == 1 ? "" : "s");
+  if (j) report_section (j, key[0] == 'p' ? "problems" : "findings", '[', NULL);
+  for (int i = 0; i < l->count && i < most; i++)
+    if (j)
+      pw_json_text (j, NULL, l->text[i]);
+    else
+      printf ("  %s\n", l->text[i]);
+  report_end (j, ']');
+}
+
+void pw_check_report (const pw_check *x, pw_json *j) {
+  const char *about = pw_file_table (x->m.file)->about;
+  if (j) {
+    pw_json_open (j, NULL, '{');
+    pw_json_number (j, "schema", 1);
+    pw_json_text (j, "model", pw_file_name (x->m.file));
+    pw_json_text (j, "status", x->problem.count ? "failed" : "ok");
+    report_list (j, "problem", &x->problem);
+    report_list (j, "finding", &x->finding);
+  } else
+    printf ("%s: %s\n", pw_file_name (x->m.file), about ? about : "");
+  report_mobility (j, x);
+  report_mass (j, x);
+  report_start (j, x);
+  report_section (j, "kinds", '[',
+                  "Self-test of the element types in use: each function against differences of others");
+  for (const pw_checked_kind *k = x->kind; k < x->kind + x->kinds; k++) report_kind (j, k);
+  report_end (j, ']');
+  report_linear (j, x);
+  if (j) {
+    j->line = 1;
+    pw_json_close (j, '}');
+    return;
+  }
+  if (x->problem.count + x->finding.count == 0) puts ("\nNo problems found");
+  report_list (j, "problem", &x->problem);
+  report_list (j, "finding", &x->finding);
+}
