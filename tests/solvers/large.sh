@@ -1,5 +1,5 @@
 #!/bin/sh
-# Scenes of any size in the way of large ones: programs of tests with a library that knows no small scenes.
+# Scenes of any size on the sparse path: programs of tests with a library that has no dense path.
 # Run from the top folder; reads BUILD.
 
 large=${BUILD:-build}/variant/large
@@ -11,8 +11,8 @@ for t in saddle start redundant singular hub agree weld rod slider gear drive ro
   tests="$tests $large/tests/test_$t"
 done
 # shellcheck disable=SC2086
-make NO_DEPS=1 BUILD="$large" CPPFLAGS="$CPPFLAGS -DPW_SMALL_MOST=0" all $tests >"$work/log" 2>&1
-report 'a library without small scenes' $?
+make NO_DEPS=1 BUILD="$large" CPPFLAGS="$CPPFLAGS -DPW_DENSE_MOST=0" all $tests >"$work/log" 2>&1
+report 'a library without the dense path' $?
 [ $bad = 0 ] || exit $bad
 
 for t in $tests; do

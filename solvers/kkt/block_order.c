@@ -1,10 +1,9 @@
-/* Order and layout of a block L D L^T (Duff, Erisman & Reid 2017, Direct Methods for Sparse Matrices, chapters 5, 10
- * and 12); see ldl.h. */
+/* Order and layout of a block L D L^T; see block_ldl.h. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 #include <amd.h>
-#include "ldl.h"
+#include "block_ldl.h"
 #include "util.h"
 
 /* ---- Pattern ---- */
@@ -12,16 +11,16 @@
 /* Lists of places: the pattern of each column, first of K, then of L. */
 typedef struct {
   int *first, *list;
-} ldl_lists;
+} order_lists;
 
-static int ldl_compare (const void *a, const void *b) {
+static int order_compare (const void *a, const void *b) {
   int x = *(const int *)a, y = *(const int *)b;
   return (x > y) - (x < y);
 }
 
 /* Sorted lists without repetition of the rows of each column, from pairs; `place` renumbers and may be NULL; `lower`
  * keeps rows below the diagonal only.  The lists are allocated here. */
-static int ldl_collect (int nodes, long pairs, const int *pair, const int *place, int lower, ldl_lists *lists) {
+static int order_collect (int nodes, long pairs, const int *pair, const int *place, int lower, order_lists *lists) {
   int *first = lists->first = calloc ((size_t)nodes + 2, sizeof (int));
   int *list = lists->list = malloc ((size_t)(2 * pairs + 1) * sizeof (int));
   if (first == NULL || list == NULL) return PW_MACHINE;
@@ -40,7 +39,7 @@ static int ldl_collect (int nodes, long pairs, const int *pair, const int *place
   int to = 0, from = 0;
   for (int c = 0; c < nodes; c++) {
     int end = first[c + 1], previous = -1;
-    qsort (list + from, (size_t)(end - from), sizeof (int), ldl_compare);
+    qsort (list + from, (size_t)(end - from), sizeof (int), order_compare);
     first[c] = to;
     for (int i = from; i < end; i++)
       if (list[i] != previous) list[to++] = previous = list[i];
@@ -50,18 +49,18 @@ static int ldl_collect (int nodes, long pairs, const int *pair, const int *place
   return PW_OK;
 }
 
-static void ldl_lists_close (ldl_lists *l) {
+static void order_lists_close (order_lists *l) {
   free (l->first);
   free (l->list);
   l->first = l->list = NULL;
 }
 
 /* Puts higher ranks later, without changing the order otherwise; place: of each node. */
-static int ldl_sort_ranks (int nodes, const int *rank, int *order, int *place) {
+static int order_sort_ranks (int nodes, const int *rank, int *order, int *place) {
   int at = 0, *old = malloc (((size_t)nodes + 1) * sizeof *old);
   if (old == NULL) return PW_MACHINE;
   memcpy (old, order, (size_t)nodes * sizeof *old);
-  for (int r = 0; r < PW_LDL_RANKS; r++)
+  for (int r = 0; r < PW_BLOCK_RANKS; r++)
     for (int j = 0; j < nodes; j++)
       if (rank[old[j]] == r) order[place[old[j]] = at++] = old[j];
   free (old);
@@ -69,8 +68,8 @@ static int ldl_sort_ranks (int nodes, const int *rank, int *order, int *place) {
 }
 
 /* Minimum degree order of the graph of the nodes of rank 0. */
-static int ldl_order (int nodes, const int *rank, long pairs, const int *pair, int *order) {
-  ldl_lists graph = { NULL, NULL };
+static int order_by_degree (int nodes, const int *rank, long pairs, const int *pair, int *order) {
+  order_lists graph = { NULL, NULL };
   int *inner = malloc ((size_t)(2 * pairs + 1) * sizeof *inner);
   if (inner == NULL) return PW_MACHINE;
   long inners = 0;
@@ -79,10 +78,10 @@ static int ldl_order (int nodes, const int *rank, long pairs, const int *pair, i
     inner[2 * inners] = pair[2 * i];
     inner[2 * inners++ + 1] = pair[2 * i + 1];
   }
-  int status = ldl_collect (nodes, inners, inner, NULL, 0, &graph);
+  int status = order_collect (nodes, inners, inner, NULL, 0, &graph);
   if (status == PW_OK && nodes > 0 && amd_order (nodes, graph.first, graph.list, order, NULL, NULL) < 0)
     status = PW_MACHINE;
-  ldl_lists_close (&graph);
+  order_lists_close (&graph);
   free (inner);
   return status;
 }
@@ -91,9 +90,9 @@ static int ldl_order (int nodes, const int *rank, long pairs, const int *pair, i
 typedef struct {
   int *mark, *child, *sibling;
   size_t room; /* of L's list */
-} ldl_tree;
+} order_tree;
 
-static int ldl_tree_open (ldl_tree *t, int nodes, const ldl_lists *K, ldl_lists *L) {
+static int order_tree_open (order_tree *t, int nodes, const order_lists *K, order_lists *L) {
   size_t n = (size_t)nodes + 1;
   t->room = (size_t)K->first[nodes] + 16;
   t->mark = malloc (3 * n * sizeof *t->mark);
@@ -108,7 +107,7 @@ static int ldl_tree_open (ldl_tree *t, int nodes, const ldl_lists *K, ldl_lists 
 }
 
 /* Room for the rows of a column, each perhaps several times. */
-static int ldl_tree_grow (ldl_tree *t, int j, const ldl_lists *K, ldl_lists *L) {
+static int order_tree_grow (order_tree *t, int j, const order_lists *K, order_lists *L) {
   size_t most = (size_t)L->first[j] + (size_t)(K->first[j + 1] - K->first[j]);
   for (int c = t->child[j]; c >= 0; c = t->sibling[c]) most += (size_t)(L->first[c + 1] - L->first[c]);
   if (most <= t->room) return PW_OK;
@@ -122,11 +121,11 @@ static int ldl_tree_grow (ldl_tree *t, int j, const ldl_lists *K, ldl_lists *L) 
 
 /* Columns of L: those of K, and those of the children in the elimination tree without the child's parent.  PW_RETRY
  * if there are more than `most` blocks. */
-static int ldl_fill (int nodes, const ldl_lists *K, int most, ldl_lists *L) {
-  ldl_tree t = { NULL, NULL, NULL, 0 };
-  int status = ldl_tree_open (&t, nodes, K, L);
+static int order_fill (int nodes, const order_lists *K, int most, order_lists *L) {
+  order_tree t = { NULL, NULL, NULL, 0 };
+  int status = order_tree_open (&t, nodes, K, L);
   for (int j = 0; j < nodes && status == PW_OK; j++) {
-    status = ldl_tree_grow (&t, j, K, L);
+    status = order_tree_grow (&t, j, K, L);
     if (status != PW_OK) break;
     int used = L->first[j], *list = L->list;
     t.mark[j] = j;
@@ -137,7 +136,7 @@ static int ldl_fill (int nodes, const ldl_lists *K, int most, ldl_lists *L) {
     L->first[j + 1] = used;
     if (used > most) status = PW_RETRY;
     if (used == L->first[j]) continue;
-    qsort (list + L->first[j], (size_t)(used - L->first[j]), sizeof *list, ldl_compare);
+    qsort (list + L->first[j], (size_t)(used - L->first[j]), sizeof *list, order_compare);
     int parent = list[L->first[j]];
     t.sibling[j] = t.child[parent];
     t.child[parent] = j;
@@ -148,27 +147,28 @@ static int ldl_fill (int nodes, const ldl_lists *K, int most, ldl_lists *L) {
 
 /* Orders by rank, else as it is or by minimum degree, and lists the rows of each column in L.  PW_RETRY if there are
  * more than `most` blocks. */
-static int ldl_try (int nodes, const int *rank, long pairs, const int *pair, int most, int *order, int *place,
-                    ldl_lists *L) {
-  ldl_lists K = { NULL, NULL };
-  int status = ldl_sort_ranks (nodes, rank, order, place);
-  if (status == PW_OK) status = ldl_collect (nodes, pairs, pair, place, 1, &K);
-  if (status == PW_OK) status = ldl_fill (nodes, &K, most, L);
-  ldl_lists_close (&K);
+static int order_try (int nodes, const int *rank, long pairs, const int *pair, int most, int *order, int *place,
+                      order_lists *L) {
+  order_lists K = { NULL, NULL };
+  int status = order_sort_ranks (nodes, rank, order, place);
+  if (status == PW_OK) status = order_collect (nodes, pairs, pair, place, 1, &K);
+  if (status == PW_OK) status = order_fill (nodes, &K, most, L);
+  order_lists_close (&K);
   return status;
 }
 
 /* The better one of both orders. */
-static int ldl_plan (int nodes, const int *rank, long pairs, const int *pair, int *order, int *place, ldl_lists *L) {
-  ldl_lists natural = { NULL, NULL };
+static int order_plan (int nodes, const int *rank, long pairs, const int *pair, int *order, int *place,
+                       order_lists *L) {
+  order_lists natural = { NULL, NULL };
   int *other = malloc ((2 * (size_t)nodes + 1) * sizeof *other);
-  int status = other ? ldl_order (nodes, rank, pairs, pair, order) : PW_MACHINE;
-  if (status == PW_OK) status = ldl_try (nodes, rank, pairs, pair, INT_MAX, order, place, L);
+  int status = other ? order_by_degree (nodes, rank, pairs, pair, order) : PW_MACHINE;
+  if (status == PW_OK) status = order_try (nodes, rank, pairs, pair, INT_MAX, order, place, L);
   for (int j = 0; j < nodes && status == PW_OK; j++) other[j] = j;
   if (status == PW_OK) {
-    status = ldl_try (nodes, rank, pairs, pair, L->first[nodes], other, other + nodes, &natural);
+    status = order_try (nodes, rank, pairs, pair, L->first[nodes], other, other + nodes, &natural);
     if (status == PW_OK) {
-      ldl_lists worse = *L;
+      order_lists worse = *L;
       *L = natural;
       natural = worse;
       memcpy (order, other, (size_t)nodes * sizeof *order);
@@ -176,42 +176,36 @@ static int ldl_plan (int nodes, const int *rank, long pairs, const int *pair, in
     } else if (status == PW_RETRY)
       status = PW_OK;
   }
-  ldl_lists_close (&natural);
+  order_lists_close (&natural);
   free (other);
   return status;
 }
 
 /* ---- Layout ---- */
 
-int pw_ldl_find (const pw_ldl *l, int p, int q) {
+int pw_block_find (const pw_block_ldl *l, int p, int q) {
   const pw_column *c = &l->column[q];
-  int at = c->at + pw_ldl_triangle (c->size) + c->size;
+  int at = c->at + pw_block_diagonal (c->size);
   for (int i = c->first; l->below[i] != p; i++) at += c->size * l->column[l->below[i]].size;
   return at;
 }
 
 /* Where the blocks are.  Returns PW_MACHINE if there are too many values. */
-static int ldl_place_columns (pw_ldl *l) {
+static int order_place_columns (pw_block_ldl *l) {
   size_t at = 0;
   for (int j = 0; j < l->nodes; j++) {
     pw_column *c = &l->column[j];
     c->at = (int)at;
-    if (c->shape == PW_LINK) continue;
-    at += (size_t)(pw_ldl_triangle (c->size) + c->size);
-    int longest = c->size;
-    for (int i = c->first; i < c[1].first; i++) {
-      int size = l->column[l->below[i]].size;
-      at += (size_t)(c->size * size);
-      if (size > longest) longest = size;
-    }
+    if (c->in_chain) continue;
+    at += (size_t)pw_block_diagonal (c->size);
+    for (int i = c->first; i < c[1].first; i++) at += (size_t)(c->size * l->column[l->below[i]].size);
     if (at > INT_MAX) return PW_MACHINE;
-    c->shape = longest <= 2 ? PW_SHORT : PW_ANY;
   }
   l->column[l->nodes].at = l->values = (int)at;
   return PW_OK;
 }
 
-static size_t ldl_count_targets (int nodes, const ldl_lists *L) {
+static size_t order_count_targets (int nodes, const order_lists *L) {
   size_t count = 0;
   for (int j = 0; j < nodes; j++) {
     size_t n = (size_t)(L->first[j + 1] - L->first[j]);
@@ -221,14 +215,14 @@ static size_t ldl_count_targets (int nodes, const ldl_lists *L) {
 }
 
 /* Column by column: rows q of a column are visited once, each finding its targets by walking down column q. */
-static void ldl_place_targets (pw_ldl *l) {
+static void order_place_targets (pw_block_ldl *l) {
   int *target = l->target;
   for (const pw_column *c = l->column; c < l->column + l->nodes; c++) {
     int n = c[1].first - c->first;
     const int *below = l->below + c->first;
     for (int q = 0; q < n; q++) {
       const pw_column *d = &l->column[below[q]];
-      int at = d->at + pw_ldl_triangle (d->size) + d->size, i = d->first;
+      int at = d->at + pw_block_diagonal (d->size), i = d->first;
       for (int p = q + 1; p < n; p++, i++) {
         for (; l->below[i] != below[p]; i++) at += d->size * l->column[l->below[i]].size;
         /* rows p descending: before row p there are those of n - 1 .. p + 1 */
@@ -240,17 +234,17 @@ static void ldl_place_targets (pw_ldl *l) {
   }
 }
 
-static int ldl_take (pw_ldl *l, const int *size, const int *y, const int *order, const ldl_lists *L) {
-  size_t n = (size_t)l->nodes, below = (size_t)L->first[l->nodes], targets = ldl_count_targets (l->nodes, L);
+static int order_take (pw_block_ldl *l, const int *size, const int *y, const int *order, const order_lists *L) {
+  size_t n = (size_t)l->nodes, below = (size_t)L->first[l->nodes], targets = order_count_targets (l->nodes, L);
   pw_layout lay = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
     l->column = pw_take (&lay, n + 1, sizeof *l->column);
     l->below = pw_take (&lay, below, sizeof *l->below);
     l->target = pw_take (&lay, targets, sizeof *l->target);
     if (pass == 1) break;
-    l->memory = malloc (lay.used);
-    if (l->memory == NULL) return PW_MACHINE;
-    lay = (pw_layout){ l->memory, 0 };
+    l->pattern = malloc (lay.used);
+    if (l->pattern == NULL) return PW_MACHINE;
+    lay = (pw_layout){ l->pattern, 0 };
   }
   memcpy (l->below, L->list, below * sizeof (int));
   for (int j = 0; j < l->nodes; j++)
@@ -259,39 +253,35 @@ static int ldl_take (pw_ldl *l, const int *size, const int *y, const int *order,
   return PW_OK;
 }
 
-int pw_ldl_lay_out (pw_ldl *l) {
-  if (ldl_place_columns (l) != PW_OK) return PW_MACHINE;
-  ldl_place_targets (l);
+int pw_block_lay_out (pw_block_ldl *l) {
+  if (order_place_columns (l) != PW_OK) return PW_MACHINE;
+  order_place_targets (l);
   l->value = malloc (((size_t)l->values + 1) * sizeof *l->value);
   return l->value ? PW_OK : PW_MACHINE;
 }
 
-pw_ldl *pw_ldl_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair) {
-  pw_ldl *l = calloc (1, sizeof *l);
+pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair) {
+  pw_block_ldl *l = calloc (1, sizeof *l);
   int *order = malloc (((size_t)nodes + 1) * sizeof *order);
-  ldl_lists L = { NULL, NULL };
+  order_lists L = { NULL, NULL };
   if (l) l->place = malloc (((size_t)nodes + 1) * sizeof *l->place);
-  int status = l && order && l->place ? ldl_plan (nodes, rank, pairs, pair, order, l->place, &L) : PW_MACHINE;
+  int status = l && order && l->place ? order_plan (nodes, rank, pairs, pair, order, l->place, &L) : PW_MACHINE;
   if (status == PW_OK) {
     l->nodes = nodes;
-    status = ldl_take (l, size, y, order, &L);
+    status = order_take (l, size, y, order, &L);
   }
-  ldl_lists_close (&L);
+  order_lists_close (&L);
   free (order);
   if (status == PW_OK) return l;
-  pw_ldl_close (l);
+  pw_block_close (l);
   return NULL;
 }
 
-void pw_ldl_settle (pw_ldl *l) {
-  free (l->place);
-  l->place = NULL;
-}
-
-void pw_ldl_close (pw_ldl *l) {
+void pw_block_close (pw_block_ldl *l) {
   if (l == NULL) return;
   free (l->place);
   free (l->value);
+  free (l->pattern);
   free (l->memory);
   free (l);
 }

@@ -1,0 +1,122 @@
+/* Assembly and elimination; see block_ldl.h.
+ *
+ *   for each body:      K_ab += J_a W^-1 J_b^T
+ *   for each column j:  D = K_jj,  L_pj = K_pj D^-1,  K_pq -= L_pj K_qj^T  for all p >= q below j
+ *
+ * Right-looking, every place known in advance.  D^-1 is kept explicitly: a node has at most 2 unknowns. */
+#include <string.h>
+#include "block_parts.h"
+
+/* ---- Assembly ---- */
+
+/* K += R B^T: rows of R, those of B ka x kb. */
+static inline void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B, int step) {
+  K[0] += block_product (width, R[0], B);
+  if (ka == 2) K[1] += block_product (width, R[1], B);
+  if (kb == 2) K[ka] += block_product (width, R[0], B + step);
+  if (ka == 2 && kb == 2) K[3] += block_product (width, R[1], B + step);
+}
+
+/* A contribution of ka rows with itself and with those that come after it; coupling: of this one and the next. */
+static inline void block_contribute (int ka, int width, const pw_block_ldl *l, const pw_body_block *p,
+                                     const pw_contribution *a, const int *coupling) {
+  const double *A = a->J, *w = l->inverse + p->j;
+  double *D = l->value + a->D;
+  block_row R[2] = { block_weigh (width, A, w) };
+  if (ka == 2) R[1] = block_weigh (width, A + a->step, w);
+  D[0] += block_product (width, R[0], A);
+  if (ka == 2) D[1] += block_product (width, R[1], A), D[2] += block_product (width, R[1], A + a->step);
+  D[ka == 2 ? 3 : 1] = D[0];
+  if (ka == 2) D[4] = D[2];
+  for (const pw_contribution *b = a + 1; b < l->contribution + p[1].first; b++)
+    BLOCK_SIZE (b->size, block_couple, ka, width, l->value + *coupling++, R, b->J, b->step);
+}
+
+/* A body that is not condensed: its mass, its columns of J, and what later equations would have on the diagonal if it were. */
+static void block_keep (const pw_block_ldl *l, const pw_body_block *p) {
+  const pw_contribution *own = l->contribution + p[1].first - 2;
+  const double *w = l->inverse + p->j;
+  const int *coupling = l->coupling + p->coupling;
+  double *D = l->value + own[0].D, *turn = l->value + own[1].D;
+  D[0] = D[3] = -1 / w[0], D[2] = D[4] = -1 / w[1], turn[0] = turn[1] = -1 / w[2];
+  for (const pw_contribution *a = l->contribution + p->first; a < own; a++)
+    for (int n = 0; n < 3; n += 2) { /* its first node has the columns 0 and 1, its second one column 2 */
+      double *K = l->value + *coupling++, *was = l->value + a->D + a->size * (a->size + 1) / 2;
+      int later = a->D > own->D, size = n == 0 ? 2 : 1;
+      for (int i = 0; i < a->size; i++)
+        for (int c = 0; c < size; c++) {
+          double J = a->J[i * a->step + n + c];
+          K[later ? i * size + c : c * a->size + i] = J;
+          if (later) was[i] += J * w[n + c] * J;
+        }
+    }
+}
+
+static void block_assemble (const pw_block_ldl *l) {
+  memset (l->value, 0, (size_t)l->values * sizeof *l->value);
+  for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++) {
+    const int *coupling = l->coupling + p->coupling;
+    const pw_contribution *a = l->contribution + p->first, *end = l->contribution + p[1].first;
+    if (p->uncondensed)
+      block_keep (l, p);
+    else if (p->width == 3)
+      for (; a < end; coupling += end - ++a) BLOCK_SIZE (a->size, block_contribute, 3, l, p, a, coupling);
+    else
+      for (; a < end; coupling += end - ++a) BLOCK_SIZE (a->size, block_contribute, 1, l, p, a, coupling);
+  }
+}
+
+/* ---- Elimination ---- */
+
+/* T -= L A^T: L ki x kj, A kq x kj. */
+static inline void block_subtract (int kq, double *T, block_square L, const double *A, int ki, int kj) {
+  T[0] -= block_dot (kj, L.xx, L.xy, A);
+  if (kq == 2) T[1] -= block_dot (kj, L.xx, L.xy, A + kj);
+  if (ki == 2) T[kq] -= block_dot (kj, L.yx, L.yy, A);
+  if (ki == 2 && kq == 2) T[3] -= block_dot (kj, L.yx, L.yy, A + kj);
+}
+
+/* Row p of a column: its updates, then L in place of K.  A: its block; B: the column's first block. */
+static inline void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_column *c, int p, double *A,
+                                        const double *B, block_square D, const int *target, int kj) {
+  const pw_column *column = l->column;
+  block_square L = block_scale (ki, kj, A, D);
+  for (int q = c->first; q < p; q++) {
+    int kq = column[l->below[q]].size;
+    BLOCK_SIZE (kq, block_subtract, l->value + *target++, L, B, ki, kj);
+    B += kq * kj;
+  }
+  block_subtract_diagonal (ki, l->value + column[l->below[p]].at, L, A, kj);
+  A[0] = L.xx;
+  if (kj == 2) A[1] = L.xy;
+  if (ki == 2) A[kj] = L.yx;
+  if (ki == 2 && kj == 2) A[3] = L.yy;
+}
+
+/* A column of kj unknowns; returns the next column's targets. */
+static inline const int *block_eliminate (int kj, pw_block_ldl *l, const pw_column *c, const int *target) {
+  double *D = l->value + c->at, *B = D + pw_block_diagonal (kj), *A = l->value + c[1].at;
+  block_square inverse = block_invert (kj, D, l, c->y);
+  for (int p = c[1].first - 1; p >= c->first; target += p-- - c->first) {
+    int ki = l->column[l->below[p]].size;
+    A -= ki * kj;
+    BLOCK_SIZE (ki, block_eliminate_row, l, c, p, A, B, inverse, target, kj);
+  }
+  return target;
+}
+
+void pw_block_factor (pw_block_ldl *l) {
+  const pw_chain *chain = l->chain;
+  const int *target = l->target;
+  l->pivot = INFINITY;
+  l->row = -1;
+  block_assemble (l);
+  for (int j = 0; j < l->nodes && (j == 0 || l->pivot > l->least);)
+    if (chain->column == j) {
+      pw_chain_factor (l, chain);
+      j += chain++->bodies;
+    } else {
+      const pw_column *c = &l->column[j++];
+      target = BLOCK_SIZE (c->size, block_eliminate, l, c, target);
+    }
+}

@@ -1,0 +1,128 @@
+/* Block L D L^T of the condensed matrix S = J W^-1 J^T, sparse: nodes of 1 or 2 unknowns, ordered and laid out once,
+ * assembled body by body and factorised column by column (Duff, Erisman & Reid 2017, Direct Methods for Sparse Matrices,
+ * chapters 5, 10 and 12).
+ *
+ * A node is a constraint equation, or two of one element.  A body block is what meets at a body (or an internal
+ * coordinate): the contributions of the nodes that touch it, each being the node's columns there.  Any two contributions of a
+ * body block couple their nodes.
+ *
+ * Where very many nodes meet at a body, S would become dense.  Then the body is not condensed: its accelerations a_k are
+ * unknowns too,
+ *
+ *     [ S    J_k ] [ lambda ]   [ J W^-1 f - gamma ]
+ *     [ J_k^T -M ] [ -a_k   ] = [ f_k              ]      with S of all other bodies,
+ *
+ * quasi-definite, so that L D L^T goes without pivoting (Vanderbei 1995), with the nodes of -a_k after its equations, and
+ * equations that touch nothing but uncondensed bodies after that.
+ *
+ * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the pins inside
+ * a chain, so their part of the matrix is block tridiagonal and need not be stored: with a body's arms a and b to the pins
+ * c and c + 1 and the inverses m of its mass and i of its inertia
+ *
+ *   K_cc += m 1 + i a a^T,   K_(c+1)c = +-m 1 + i b a^T = K,   K_(c+1)(c+1) += m 1 + i b b^T
+ *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
+ *   backwards:   y_c = D_c^-1 (y_c - K^T y_(c+1)),   K^T y = +-m y + i (b . y) a
+ *
+ * where D and y are carried from pin to pin, and D^-1 alone is kept. */
+#ifndef PW_BLOCK_LDL_H
+#define PW_BLOCK_LDL_H
+
+#include "pinwheel.h"
+
+enum { PW_BLOCK_NODE = 2, PW_BLOCK_RANKS = 3 }; /* most unknowns in a node; ranks */
+
+/* A node, in the order of elimination.  Its values follow one another: the lower triangle of the diagonal block by rows, what
+ * the entries on the diagonal were before anything was eliminated, then the blocks below, each by rows. */
+typedef struct {
+  int at;                 /* its values */
+  int y;                  /* its first unknown in the right-hand side */
+  int first;              /* its rows below: from here to `first` of the next column */
+  unsigned char size;     /* unknowns */
+  unsigned char in_chain; /* 1: within a chain, where it has no values */
+} pw_column;
+
+/* The columns of a node at a body. */
+typedef struct {
+  const double *J; /* first row and column */
+  int y;           /* of its first row in the right-hand side */
+  int D;           /* its node's diagonal block in the values */
+  short step;      /* from row to row of J */
+  short size;      /* rows */
+} pw_contribution;
+
+typedef struct {
+  int j;               /* first coordinate */
+  int first;           /* its contributions in the order of their columns: to `first` of the next block */
+  int coupling;        /* for each contribution a, for the contributions b after it: where K_ba is in the values */
+  unsigned char width; /* columns: 3, or 1 of an internal coordinate */
+  unsigned char uncondensed; /* 1: its own two nodes are the last contributions; couplings are those with them alone */
+} pw_body_block;
+
+/* Places are those of the first body; the others' follow at equal distances. */
+typedef struct {
+  int column;                 /* its first pin's; those of the others follow */
+  int bodies;                 /* as many columns are eliminated here, the next one receives their last update */
+  const double *A, *B;        /* J of the first and of the second pin in the body's columns */
+  int step;                   /* from row to row of J */
+  int y;                      /* of the first pin in the right-hand side */
+  int j;                      /* first coordinate */
+  int next_J, next_y, next_j; /* from body to body */
+  int inverse;                /* its D^-1: lower triangle; 3 from column to column */
+} pw_chain;
+
+typedef struct {
+  int nodes;
+  pw_column *column; /* nodes + 1: the last one ends the ranges */
+  int *below;        /* numbers of the columns that the rows below belong to, ascending in each column */
+  int *target;       /* for each column, for its rows p descending, q < p: where K_pq is */
+  int *place;        /* column of each node; until planning is over */
+  double *value;
+  int values;
+  const double *inverse; /* diagonal of W^-1 */
+  pw_body_block *body;   /* bodies + 1: the last one ends the ranges */
+  pw_contribution *contribution;
+  int *coupling;
+  pw_chain *chain;       /* chains + 1: the last one begins nowhere; their bodies have no block */
+  double *chain_inverse; /* of the chains' columns: D^-1, lower triangles */
+  int bodies, chains;
+  double pivot; /* smallest pivot of the last factorisation, relative to the diagonal entry it came from */
+  int row;      /* its position in the right-hand side */
+  double least; /* a factorisation ends at the first pivot that is not larger: 0, but while it is planned */
+  char *pattern, *memory;
+} pw_block_ldl;
+
+/* ---- Planning (block_order.c) ---- */
+
+/* nodes: how many; size: unknowns of each; y: where they are in the right-hand side; rank: those of a higher one come later;
+ * pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not needed.
+ * The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff 1996).
+ * NULL if memory is out. */
+pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair);
+void pw_block_close (pw_block_ldl *l);
+
+/* Lays out the values.  PW_OK, or PW_MACHINE if memory is out or there are 2^31 values or more. */
+int pw_block_lay_out (pw_block_ldl *l);
+
+/* Where the block of columns p > q is, rows those of p. */
+int pw_block_find (const pw_block_ldl *l, int p, int q);
+
+/* Values of a diagonal block: its lower triangle, and what the diagonal was. */
+static inline int pw_block_diagonal (int size) {
+  return size * (size + 3) / 2;
+}
+
+/* ---- Numbers ---- */
+
+/* S = J W^-1 J^T = L D L^T; stops at a pivot that is not larger than `least`. */
+void pw_block_factor (pw_block_ldl *l);
+
+/* y, which holds gamma, becomes lambda; a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
+void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a);
+
+/* The same for a chain, between the rest: elimination, which stops at a pivot that is not positive; the right-hand side
+ * forwards; and backwards, with accelerations. */
+void pw_chain_factor (pw_block_ldl *l, const pw_chain *c);
+void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y);
+void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a);
+
+#endif

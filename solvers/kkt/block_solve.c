@@ -1,0 +1,123 @@
+/* Solution with the factors; see block_ldl.h.
+ *
+ *   for each body:                y_a -= J_a W^-1 f
+ *   for each column j:            y_p -= L_pj y_j
+ *   for each column j backwards:  y_j = -D^-1 y_j - sum_p L_pj^T y_p
+ *   for each body:                a = W^-1 (f - sum_a J_a^T y_a) */
+#include "block_parts.h"
+
+/* ---- Bodies; sizes are constants where these are inlined ---- */
+
+/* y -= J z */
+static inline void block_gather (int size, int width, double *y, const double *J, int step, block_row z) {
+  y[0] -= block_product (width, z, J);
+  if (size == 2) y[1] -= block_product (width, z, J + step);
+}
+
+/* z - J^T y */
+static inline block_row block_scatter (int size, int width, const double *y, const double *J, int step, block_row z) {
+  const double *K = J + step;
+  z.x -= size == 2 ? J[0] * y[0] + K[0] * y[1] : J[0] * y[0];
+  if (width == 3) z.y -= size == 2 ? J[1] * y[0] + K[1] * y[1] : J[1] * y[0];
+  if (width == 3) z.z -= size == 2 ? J[2] * y[0] + K[2] * y[1] : J[2] * y[0];
+  return z;
+}
+
+static inline void block_right_of (const pw_block_ldl *l, const pw_body_block *p, const double *f, double *y,
+                                   int width) {
+  const block_row z = block_weigh (width, f + p->j, l->inverse + p->j);
+  for (const pw_contribution *a = l->contribution + p->first; a < l->contribution + p[1].first; a++)
+    BLOCK_SIZE (a->size, block_gather, width, y + a->y, a->J, a->step, z);
+}
+
+static inline void block_accelerate (const pw_block_ldl *l, const pw_body_block *p, const double *f, const double *y,
+                                     double *a, int width) {
+  const double *w = l->inverse + p->j;
+  block_row z = { 0 };
+  if (f) z = width == 3 ? (block_row){ f[p->j], f[p->j + 1], f[p->j + 2] } : (block_row){ .x = f[p->j] };
+  for (const pw_contribution *x = l->contribution + p->first; x < l->contribution + p[1].first; x++)
+    z = BLOCK_SIZE (x->size, block_scatter, width, y + x->y, x->J, x->step, z);
+  a[p->j] = w[0] * z.x;
+  if (width == 3) a[p->j + 1] = w[1] * z.y, a[p->j + 2] = w[2] * z.z;
+}
+
+/* ---- Columns ---- */
+
+/* to -= L from, L ki x kj */
+static inline void block_forward (int ki, double *to, const double *L, const double *from, int kj) {
+  to[0] -= block_dot (kj, from[0], from[kj - 1], L);
+  if (ki == 2) to[1] -= block_dot (kj, from[0], from[kj - 1], L + kj);
+}
+
+static inline void block_forward_column (int kj, const pw_block_ldl *l, const pw_column *c, double *y) {
+  const double *L = l->value + c->at + pw_block_diagonal (kj);
+  for (int p = c->first; p < c[1].first; p++) {
+    const pw_column *row = l->column + l->below[p];
+    BLOCK_SIZE (row->size, block_forward, y + row->y, L, y + c->y, kj);
+    L += row->size * kj;
+  }
+}
+
+/* sum -= L^T x */
+static inline void block_backward (int ki, double *sum, const double *L, const double *x, int kj) {
+  sum[0] -= ki == 2 ? L[0] * x[0] + L[kj] * x[1] : L[0] * x[0];
+  if (kj == 2) sum[1] -= ki == 2 ? L[1] * x[0] + L[3] * x[1] : L[1] * x[0];
+}
+
+static inline void block_backward_column (int kj, const pw_block_ldl *l, const pw_column *c, double *y) {
+  const double *D = l->value + c->at, *L = D + pw_block_diagonal (kj);
+  double *to = y + c->y, sum[2] = { -D[0] * to[0], 0 };
+  if (kj == 2) sum[0] -= D[1] * to[1], sum[1] = -D[1] * to[0] - D[2] * to[1];
+  for (int p = c->first; p < c[1].first; p++) {
+    const pw_column *row = l->column + l->below[p];
+    BLOCK_SIZE (row->size, block_backward, sum, L, y + row->y, kj);
+    L += row->size * kj;
+  }
+  to[0] = sum[0];
+  if (kj == 2) to[1] = sum[1];
+}
+
+/* ---- Both ---- */
+
+static void block_right (const pw_block_ldl *l, const double *f, double *y) {
+  for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++)
+    if (p->uncondensed)
+      for (int n = 0; n < 3; n++) y[l->contribution[p[1].first - 2].y + n] -= f[p->j + n];
+    else if (p->width == 3)
+      block_right_of (l, p, f, y, 3);
+    else
+      block_right_of (l, p, f, y, 1);
+}
+
+static void block_accelerations (const pw_block_ldl *l, const double *f, const double *y, double *a) {
+  for (const pw_body_block *p = l->body, *last = p + l->bodies; p < last; p++)
+    if (p->uncondensed)
+      for (int n = 0; n < 3; n++) a[p->j + n] = -y[l->contribution[p[1].first - 2].y + n];
+    else if (p->width == 3)
+      block_accelerate (l, p, f, y, a, 3);
+    else
+      block_accelerate (l, p, f, y, a, 1);
+}
+
+void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a) {
+  const pw_chain *chain = l->chain;
+  const pw_column *c = l->column;
+  if (f) block_right (l, f, y);
+  for (int j = 0; j < l->nodes;)
+    if (chain->column == j) {
+      pw_chain_forward (l, chain, f, y);
+      j += chain++->bodies;
+    } else {
+      BLOCK_SIZE (c[j].size, block_forward_column, l, c + j, y);
+      j++;
+    }
+  for (int j = l->nodes; j > 0;)
+    if (chain > l->chain && chain[-1].column + chain[-1].bodies == j) {
+      pw_chain_backward (l, --chain, f, y, a);
+      j = chain->column;
+    } else {
+      j--;
+      BLOCK_SIZE (c[j].size, block_backward_column, l, c + j, y);
+    }
+  block_accelerations (l, f, y, a);
+}

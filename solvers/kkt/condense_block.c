@@ -1,0 +1,168 @@
+/* Planning of the sparse path: the pattern of S, body blocks, uncondensed bodies; see condense.h and block_ldl.h. */
+#include <stdlib.h>
+#include <string.h>
+#include "condense.h"
+#include "util.h"
+
+/* ---- Pattern ---- */
+
+/* The first of the two nodes of an uncondensed body, or -1. */
+static int condense_own_nodes (const pw_plan *c, int j) {
+  return j < 3 * c->k->s->bodies ? c->uncondensed[j / 3] : -1;
+}
+
+static void condense_note_pair (pw_plan *c, int *pair, int a, int b) {
+  if (pair) pair[2 * c->pairs] = a, pair[2 * c->pairs + 1] = b;
+  c->pairs++;
+}
+
+/* Pairs of nodes that meet in a group, or with an uncondensed body; only counted while `pair` is NULL. */
+static void condense_pairs (pw_plan *c, int *pair) {
+  c->pairs = 0;
+  for (int n = 0; n < c->groups; n++) {
+    int j = pw_plan_group (c, n), own = condense_own_nodes (c, j);
+    for (int x = c->start[j]; x < c->start[j + 1]; x++) {
+      int a = c->contribution[c->list[x]].node;
+      if (own >= 0) condense_note_pair (c, pair, a, own), condense_note_pair (c, pair, a, own + 1);
+      for (int y = c->start[j]; y < x && own < 0; y++)
+        condense_note_pair (c, pair, a, c->contribution[c->list[y]].node);
+    }
+  }
+}
+
+static pw_block_ldl *condense_pattern (pw_plan *c) {
+  condense_pairs (c, NULL);
+  int *pair = malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair),
+      *size = malloc ((3 * (size_t)c->nodes + 1) * sizeof *size);
+  pw_block_ldl *l = NULL;
+  if (pair && size) {
+    int *y = size + c->nodes, *rank = y + c->nodes;
+    condense_pairs (c, pair);
+    for (int n = 0; n < c->nodes; n++) size[n] = c->node[n].size, y[n] = c->node[n].y, rank[n] = c->node[n].rank;
+    l = pw_block_open (c->nodes, size, y, rank, c->pairs, pair);
+  }
+  free (pair);
+  free (size);
+  return l;
+}
+
+/* The contributions of each group in the order of their columns (few: by insertion). */
+static void condense_sort (const pw_plan *c, const int *place) {
+  for (int n = 0; n < c->groups; n++) {
+    int j = pw_plan_group (c, n), *list = c->list + c->start[j], count = c->start[j + 1] - c->start[j];
+    for (int x = 1; x < count; x++)
+      for (int y = x; y > 0; y--) {
+        int a = list[y - 1], b = list[y];
+        if (place[c->contribution[a].node] <= place[c->contribution[b].node]) break;
+        list[y - 1] = b, list[y] = a;
+      }
+  }
+}
+
+/* ---- Body blocks ---- */
+
+static int condense_coupling (const pw_block_ldl *l, int a, int b) {
+  int p = l->place[a], q = l->place[b];
+  return p > q ? pw_block_find (l, p, q) : pw_block_find (l, q, p);
+}
+
+/* Fills the block of a group; *contributions and *couplings count. */
+static void condense_body (const pw_plan *c, pw_block_ldl *l, int j, pw_body_block *p, int *contributions,
+                           int *couplings) {
+  int own = condense_own_nodes (c, j);
+  *p = (pw_body_block){ .j = j,
+                        .first = *contributions,
+                        .coupling = *couplings,
+                        .width = (unsigned char)pw_plan_width (c, j),
+                        .uncondensed = own >= 0 };
+  for (int x = c->start[j]; x < c->start[j + 1]; x++) {
+    const pw_plan_contribution *a = &c->contribution[c->list[x]];
+    const pw_plan_node *n = &c->node[a->node];
+    l->contribution[(*contributions)++] =
+        (pw_contribution){ a->J, n->y, l->column[l->place[a->node]].at, (short)a->step, (short)n->size };
+    if (own >= 0)
+      for (int i = 0; i < 2; i++) l->coupling[(*couplings)++] = condense_coupling (l, a->node, own + i);
+    else
+      for (int y = x + 1; y < c->start[j + 1]; y++)
+        l->coupling[(*couplings)++] = condense_coupling (l, a->node, c->contribution[c->list[y]].node);
+  }
+  for (int i = own; own >= 0 && i < own + 2; i++)
+    l->contribution[(*contributions)++] =
+        (pw_contribution){ .y = c->node[i].y, .D = l->column[l->place[i]].at, .size = (short)c->node[i].size };
+}
+
+static void condense_take_block (const pw_plan *c, pw_layout *lay, pw_block_ldl *l) {
+  l->body = pw_take (lay, (size_t)l->bodies + 1, sizeof *l->body);
+  l->contribution =
+      pw_take (lay, (size_t)(c->contributions - 2 * c->linked + 2 * c->uncondenseds), sizeof *l->contribution);
+  l->coupling = pw_take (lay, (size_t)(c->pairs - c->linked), sizeof *l->coupling);
+  l->chain = pw_take (lay, (size_t)c->chains + 1, sizeof *l->chain);
+  l->chain_inverse = pw_take (lay, 3 * (size_t)c->linked, sizeof *l->chain_inverse);
+}
+
+static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
+  int contributions = 0, couplings = 0, body = 0;
+  pw_layout lay = { NULL, 0 };
+  l->inverse = c->k->inverse;
+  l->bodies = c->groups - c->linked;
+  l->chains = c->chains;
+  condense_take_block (c, &lay, l);
+  l->memory = malloc (lay.used + 1);
+  if (l->memory == NULL) return PW_MACHINE;
+  lay = (pw_layout){ l->memory, 0 };
+  condense_take_block (c, &lay, l);
+  memcpy (l->chain, c->chain, (size_t)c->chains * sizeof *l->chain);
+  l->chain[l->chains] = (pw_chain){ .column = l->nodes + 1 };
+  for (int n = 0; n < c->groups; n++)
+    if (!c->is_linked[n]) condense_body (c, l, pw_plan_group (c, n), &l->body[body++], &contributions, &couplings);
+  l->body[body] = (pw_body_block){ .first = contributions, .coupling = couplings };
+  return PW_OK;
+}
+
+/* ---- Opening ---- */
+
+static int condense_open (pw_plan *c) {
+  pw_block_ldl *l = c->k->block = condense_pattern (c);
+  if (l) condense_sort (c, l->place);
+  int status = l ? pw_condense_chains (c, l) : PW_MACHINE;
+  if (status == PW_OK) status = pw_block_lay_out (l);
+  if (status == PW_OK) status = condense_fill (c, l);
+  free (c->chain);
+  free (c->is_linked);
+  c->chain = NULL;
+  c->is_linked = NULL;
+  return status;
+}
+
+/* The first node before the uncondensed bodies with a pivot of nearly nothing, or -1. */
+static int condense_find_dependent (const pw_plan *c) {
+  const double follows = 1e-8; /* squared sine */
+  pw_block_ldl *l = c->k->block;
+  l->least = follows;
+  pw_block_factor (l);
+  l->least = 0;
+  if (l->pivot > follows || l->row < 0) return -1;
+  for (int n = 0; n < c->nodes; n++)
+    if (c->node[n].rank == 0 && l->row >= c->node[n].y && l->row < c->node[n].y + c->node[n].size) return n;
+  return -1;
+}
+
+/* Before the uncondensed bodies, an equation may follow from others: two legs of a platform that stands on the ground.  Such
+ * equations, as the present configuration shows them, come after the bodies, one by one; if they are many, all equations that
+ * touch these bodies do, for what is left touches none. */
+int pw_condense_block (pw_plan *c) {
+  const int most = 12;
+  for (int attempt = 0;; attempt++) {
+    int status = condense_open (c), n = -1;
+    if (status == PW_OK && c->uncondenseds > 0 && attempt <= most) n = condense_find_dependent (c);
+    if (n < 0) {
+      if (c->k->block) free (c->k->block->place), c->k->block->place = NULL;
+      return status;
+    }
+    c->node[n].rank = 2;
+    for (int p = 0; p < c->contributions && attempt == most; p++)
+      if (condense_own_nodes (c, c->contribution[p].j) >= 0) c->node[c->contribution[p].node].rank = 2;
+    pw_block_close (c->k->block);
+    c->k->block = NULL;
+  }
+}
