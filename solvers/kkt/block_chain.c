@@ -32,7 +32,7 @@ void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
   const ptrdiff_t next_J = c->next_J, next_j = c->next_j, step = c->step;
   const double *A = c->A, *B = c->B, *w = l->inverse + c->j;
   const double *before = l->value + l->column[c->column].at;
-  double *after = l->value + l->column[c->column + c->bodies].at, *keep = l->chain_inverse + c->inverse;
+  double *after = l->value + l->column[c->column + c->bodies].at, *keep = l->chain_factor + c->factor;
   double D[CHAIN_BLOCK];
   for (int n = 0; n < CHAIN_BLOCK; n++) D[n] = before[n];
   for (int n = 0, row = c->y; n < c->bodies; n++, A += next_J, B += next_J, w += next_j, row += c->next_y, keep += 3) {
@@ -42,8 +42,9 @@ void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
     const double K[] = { coupling.xx, coupling.xy, coupling.yx, coupling.yy };
     const block_square P = chain_diagonal (a, m, i), Q = chain_diagonal (b, m, i);
     D[0] += P.xx, D[1] += P.xy, D[2] += P.yy, D[3] += P.xx, D[4] += P.yy;
-    const block_square inverse = block_invert (2, D, l, row), L = block_scale (2, 2, K, inverse);
-    keep[0] = inverse.xx, keep[1] = inverse.yx, keep[2] = inverse.yy;
+    block_pivot (2, D, l, row);
+    keep[0] = D[0], keep[1] = D[1], keep[2] = D[2];
+    const block_square L = block_scale (2, 2, K, D);
     D[0] = D[3] = Q.xx, D[1] = Q.xy, D[2] = D[4] = Q.yy;
     block_subtract_diagonal (2, D, L, K, 2);
     if (!(l->pivot > 0)) return;
@@ -54,7 +55,7 @@ void pw_chain_factor (pw_block_ldl *l, const pw_chain *c) {
 /* y_(c+1) -= K D^-1 y_c */
 void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y) {
   const ptrdiff_t next_J = c->next_J, next_y = c->next_y, step = c->step;
-  const double *A = c->A, *B = c->B, *keep = l->chain_inverse + c->inverse;
+  const double *A = c->A, *B = c->B, *keep = l->chain_factor + c->factor;
   double *from = y + c->y;
   for (ptrdiff_t n = 0, j = c->j; n < c->bodies; n++, j += c->next_j, A += next_J, B += next_J, keep += 3) {
     const chain_arm a = chain_read (A, step), b = chain_read (B, step);
@@ -65,10 +66,10 @@ void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f
       from[0] -= a.s * X + a.x * T, from[1] -= a.s * Y + a.y * T;
       to[0] -= b.s * X + b.x * T, to[1] -= b.s * Y + b.y * T;
     }
-    const double x = keep[0] * from[0] + keep[1] * from[1], z = keep[1] * from[0] + keep[2] * from[1];
-    const double turn = i * (a.x * x + a.y * z);
-    to[0] -= mass * x + turn * b.x;
-    to[1] -= mass * z + turn * b.y;
+    const block_pair z = block_divide (2, keep, from[0], from[1]);
+    const double turn = i * (a.x * z.x + a.y * z.y);
+    to[0] -= mass * z.x + turn * b.x;
+    to[1] -= mass * z.y + turn * b.y;
     from = to;
   }
 }
@@ -81,12 +82,13 @@ void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *
   for (ptrdiff_t n = c->bodies; n-- > 0;) {
     const ptrdiff_t j = c->j + n * next_j;
     const chain_arm u = chain_read (c->A + n * next_J, step), v = chain_read (c->B + n * next_J, step);
-    const double m = l->inverse[j], i = l->inverse[j + 2], *keep = l->chain_inverse + c->inverse + 3 * n;
+    const double m = l->inverse[j], i = l->inverse[j + 2], *keep = l->chain_factor + c->factor + 3 * n;
     const block_square K = chain_coupling (u, v, m, i);
     double *own = y + c->y + n * next_y, X = v.s * x, Y = v.s * z, T = v.x * x + v.y * z;
     const double right = own[0] + (K.xx * x + K.yx * z), up = own[1] + (K.xy * x + K.yy * z);
-    own[0] = x = -(keep[0] * right + keep[1] * up);
-    own[1] = z = -(keep[1] * right + keep[2] * up);
+    const block_pair own_z = block_divide (2, keep, right, up);
+    own[0] = x = -own_z.x;
+    own[1] = z = -own_z.y;
     X += u.s * x, Y += u.s * z, T += u.x * x + u.y * z;
     if (f)
       a[j] = m * (f[j] - X), a[j + 1] = m * (f[j + 1] - Y), a[j + 2] = i * (f[j + 2] - T);

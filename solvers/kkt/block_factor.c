@@ -3,7 +3,7 @@
  *   for each body:      K_ab += J_a W^-1 J_b^T
  *   for each column j:  D = K_jj,  L_pj = K_pj D^-1,  K_pq -= L_pj K_qj^T  for all p >= q below j
  *
- * Right-looking, every place known in advance.  D^-1 is kept explicitly: a node has at most 2 unknowns. */
+ * Right-looking, every place known in advance.  Of D its own factors are kept. */
 #include <string.h>
 #include "block_parts.h"
 
@@ -78,7 +78,7 @@ static inline void block_subtract (int kq, double *T, block_square L, const doub
 
 /* Row p of a column: its updates, then L in place of K.  A: its block; B: the column's first block. */
 static inline void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_column *c, int p, double *A,
-                                        const double *B, block_square D, const int *target, int kj) {
+                                        const double *B, const double *D, const int *target, int kj) {
   const pw_column *column = l->column;
   block_square L = block_scale (ki, kj, A, D);
   for (int q = c->first; q < p; q++) {
@@ -96,11 +96,11 @@ static inline void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_
 /* A column of kj unknowns; returns the next column's targets. */
 static inline const int *block_eliminate (int kj, pw_block_ldl *l, const pw_column *c, const int *target) {
   double *D = l->value + c->at, *B = D + pw_block_diagonal (kj), *A = l->value + c[1].at;
-  block_square inverse = block_invert (kj, D, l, c->y);
+  block_pivot (kj, D, l, c->y);
   for (int p = c[1].first - 1; p >= c->first; target += p-- - c->first) {
     int ki = l->column[l->below[p]].size;
     A -= ki * kj;
-    BLOCK_SIZE (ki, block_eliminate_row, l, c, p, A, B, inverse, target, kj);
+    BLOCK_SIZE (ki, block_eliminate_row, l, c, p, A, B, D, target, kj);
   }
   return target;
 }

@@ -23,7 +23,7 @@
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
  *   backwards:   y_c = D_c^-1 (y_c - K^T y_(c+1)),   K^T y = +-m y + i (b . y) a
  *
- * where D and y are carried from pin to pin, and D^-1 alone is kept. */
+ * where D and y are carried from pin to pin, and the factors of D alone are kept. */
 #ifndef PW_BLOCK_LDL_H
 #define PW_BLOCK_LDL_H
 
@@ -67,7 +67,7 @@ typedef struct {
   int y;                      /* of the first pin in the right-hand side */
   int j;                      /* first coordinate */
   int next_J, next_y, next_j; /* from body to body */
-  int inverse;                /* its D^-1: lower triangle; 3 from column to column */
+  int factor;                 /* the factors of its D; 3 from column to column */
 } pw_chain;
 
 typedef struct {
@@ -82,8 +82,8 @@ typedef struct {
   pw_body_block *body;   /* bodies + 1: the last one ends the ranges */
   pw_contribution *contribution;
   int *coupling;
-  pw_chain *chain;       /* chains + 1: the last one begins nowhere; their bodies have no block */
-  double *chain_inverse; /* of the chains' columns: D^-1, lower triangles */
+  pw_chain *chain;      /* chains + 1: the last one begins nowhere; their bodies have no block */
+  double *chain_factor; /* factors of D in the chains' columns */
   int bodies, chains;
   double pivot; /* smallest pivot of the last factorisation, relative to the diagonal entry it came from */
   int row;      /* its position in the right-hand side */

@@ -35,27 +35,32 @@ static inline void block_judge (pw_block_ldl *l, double pivot, double was, int y
   l->row = y;
 }
 
-/* Inverts a diagonal block in place. */
-static inline block_square block_invert (int k, double *D, pw_block_ldl *l, int y) {
-  if (k == 1) {
-    block_judge (l, D[0], D[1], y);
-    D[0] = 1 / D[0];
-    return (block_square){ .xx = D[0] };
-  }
-  double a = D[0], b = D[1], c = D[2], minor = a * c - b * b, f = 1 / minor;
-  block_judge (l, a, D[3], y);
+/* A diagonal block L D L^T in place of its lower triangle: 1 / d_1, l, 1 / d_2. */
+static inline void block_pivot (int k, double *D, pw_block_ldl *l, int y) {
+  double a = D[0], b = D[1], minor = k == 2 ? a * D[2] - b * b : 0;
+  block_judge (l, a, D[k == 2 ? 3 : 1], y);
+  D[0] = 1 / a;
+  if (k == 1) return;
   block_judge (l, minor, fabs (a) * D[4], y + 1);
-  D[0] = c * f, D[1] = -b * f, D[2] = a * f;
-  return (block_square){ D[0], D[1], D[1], D[2] };
+  D[1] = b * D[0], D[2] = a / minor;
+}
+
+typedef struct {
+  double x, y;
+} block_pair;
+
+/* (x, y) divided by such a block. */
+static inline block_pair block_divide (int k, const double *D, double x, double y) {
+  if (k == 1) return (block_pair){ .x = x * D[0] };
+  double z = (y - D[1] * x) * D[2];
+  return (block_pair){ x * D[0] - D[1] * z, z };
 }
 
 /* L = A D^-1: A ki x kj. */
-static inline block_square block_scale (int ki, int kj, const double *A, block_square D) {
-  block_square L = { .xx = A[0] * D.xx };
-  if (kj == 2) L.xx += A[1] * D.yx, L.xy = A[0] * D.xy + A[1] * D.yy;
-  if (ki == 2) L.yx = A[kj] * D.xx;
-  if (ki == 2 && kj == 2) L.yx += A[3] * D.yx, L.yy = A[2] * D.xy + A[3] * D.yy;
-  return L;
+static inline block_square block_scale (int ki, int kj, const double *A, const double *D) {
+  block_pair x = block_divide (kj, D, A[0], kj == 2 ? A[1] : 0), y = { 0 };
+  if (ki == 2) y = block_divide (kj, D, A[kj], kj == 2 ? A[3] : 0);
+  return (block_square){ x.x, x.y, y.x, y.y };
 }
 
 static inline double block_dot (int kj, double x, double y, const double *A) {

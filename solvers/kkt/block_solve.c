@@ -66,8 +66,9 @@ static inline void block_backward (int ki, double *sum, const double *L, const d
 
 static inline void block_backward_column (int kj, const pw_block_ldl *l, const pw_column *c, double *y) {
   const double *D = l->value + c->at, *L = D + pw_block_diagonal (kj);
-  double *to = y + c->y, sum[2] = { -D[0] * to[0], 0 };
-  if (kj == 2) sum[0] -= D[1] * to[1], sum[1] = -D[1] * to[0] - D[2] * to[1];
+  double *to = y + c->y;
+  block_pair own = block_divide (kj, D, to[0], kj == 2 ? to[1] : 0);
+  double sum[2] = { -own.x, -own.y };
   for (int p = c->first; p < c[1].first; p++) {
     const pw_column *row = l->column + l->below[p];
     BLOCK_SIZE (row->size, block_backward, sum, L, y + row->y, kj);

@@ -97,7 +97,7 @@ static void condense_take_block (const pw_plan *c, pw_layout *lay, pw_block_ldl 
       pw_take (lay, (size_t)(c->contributions - 2 * c->linked + 2 * c->uncondenseds), sizeof *l->contribution);
   l->coupling = pw_take (lay, (size_t)(c->pairs - c->linked), sizeof *l->coupling);
   l->chain = pw_take (lay, (size_t)c->chains + 1, sizeof *l->chain);
-  l->chain_inverse = pw_take (lay, 3 * (size_t)c->linked, sizeof *l->chain_inverse);
+  l->chain_factor = pw_take (lay, 3 * (size_t)c->linked, sizeof *l->chain_factor);
 }
 
 static int condense_fill (const pw_plan *c, pw_block_ldl *l) {

@@ -48,7 +48,7 @@ static void chain_join (pw_plan *c, pw_block_ldl *l, const chain_between *betwee
     if (b->sources != 1 || b->link.bodies == 0) continue;
     pw_chain *chain = &c->chain[c->chains++];
     *chain = b->link;
-    chain->inverse = 3 * c->linked;
+    chain->factor = 3 * c->linked;
     c->is_linked[b->link.j / 3] = 1;
     for (; p < l->nodes && between[p].sources == 1 && meet[p] == 2; p++) {
       if (between[p].link.bodies == 0) break;

@@ -417,7 +417,7 @@ static void test_evaluations (void **state) {
 
 static void test_jump (void **state) {
   (void)state;
-  pw_system *s = scene_named ("snakeboard", NULL, 0);
+  pw_system *s = scene_named ("chaplygin-sleigh", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_error error = { 0 };
   r->near = 1;
