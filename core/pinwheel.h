@@ -566,35 +566,31 @@ typedef enum {
 /* An element kind: one const table in one file.  A NULL sweep means identically zero; the self-test verifies it.
  * Sizes are given per element. */
 struct pw_kind {
-  const char *name;            /* "pin" */
-  const char *about;           /* one line */
-  size_t definition;           /* bytes of the definition structure, whose first member is `const char *name` */
-  size_t element;              /* bytes of the prepared element */
-  const pw_field *fields;      /* ended by a NULL name; `name` itself is not listed */
-  int bodies;                  /* bodies an element touches: as many as its fields of type PW_BODY name */
-  int own;                     /* coordinates of its own */
-  int rows;                    /* constraint rows */
-  int signals;                 /* signals, in the order of its fields; they serve the force if there is a force_u */
-  int each_body;               /* 1: no body is named; the element acts on every body that has mass */
-  int constant;                /* 1: its force depends on nothing: evaluated once, when the scene is compiled */
-  int unit;                    /* 1: it has two rows, and a body's x and y columns are +1 or -1 times the unit matrix */
-  pw_level level;              /* of its rows */
-  const pw_quantity *reaction; /* one per row: what -lambda is */
-  const pw_quantity *coordinate;                               /* one per own coordinate */
+  const char *name;              /* "pin" */
+  const char *about;             /* one line */
+  size_t definition;             /* bytes of the definition structure, whose first member is `const char *name` */
+  size_t element;                /* bytes of the prepared element */
+  const pw_field *fields;        /* ended by a NULL name; `name` itself is not listed */
+  int bodies;                    /* bodies an element touches: as many as its fields of type PW_BODY name */
+  int own;                       /* coordinates of its own */
+  int rows;                      /* constraint rows */
+  int signals;                   /* signals, in the order of its fields; they serve the force if there is a force_u */
+  int each_body;                 /* 1: no body is named; the element acts on every body that has mass */
+  int constant;                  /* 1: its force depends on nothing: evaluated once, when the scene is compiled */
+  pw_level level;                /* of its rows */
+  const pw_quantity *reaction;   /* one per row: what -lambda is */
+  const pw_quantity *coordinate; /* one per own coordinate */
   const char *(*reaction_unit) (const void *element, int row); /* where it depends on the element; may be NULL */
 
   /* Turns a checked definition into a prepared element; bodies are those it names or acts on, in order, the ground as
    * a body without mass.  own takes mass and start of each own coordinate, zero so far.  Returns a status. */
   int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_own *own, pw_error *error);
 
-  pw_sweep *g;      /* rows: residual of holonomic rows */
-  pw_sweep *g_size; /* rows: sum of the absolute values of the terms of g, against which g is judged */
-  pw_sweep *eta;    /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
-  pw_sweep *J;      /* rows x cols */
-  pw_sweep *gamma;  /* rows: right-hand side of J a = gamma */
-  /* Both at once, where that is faster; may be NULL.  J holds what `J` left there at another state: what never changes
-   * need not be written again. */
-  void (*J_gamma) (const pw_batch *b, double *J, double *gamma);
+  pw_sweep *g;       /* rows: residual of holonomic rows */
+  pw_sweep *g_size;  /* rows: sum of the absolute values of the terms of g, against which g is judged */
+  pw_sweep *eta;     /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
+  pw_sweep *J;       /* rows x cols */
+  pw_sweep *gamma;   /* rows: right-hand side of J a = gamma */
   pw_sweep *force;   /* cols: generalised force */
   pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
   pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch */

@@ -54,39 +54,20 @@ static void pin_g_size (const pw_batch *b, double *out) {
   }
 }
 
-/* The columns of both angles; the others never change. */
-static inline void pin_row_J (pin_arms s, double *out) {
-  out[2] = -s.Y1, out[5] = s.Y2;
-  out[8] = s.X1, out[11] = -s.X2;
-}
-
-static inline void pin_row_gamma (pin_arms s, const pw_pose *A, const pw_pose *B, double *out) {
-  double w1 = A->omega * A->omega, w2 = B->omega * B->omega;
-  out[0] = s.X1 * w1 - s.X2 * w2;
-  out[1] = s.Y1 * w1 - s.Y2 * w2;
-}
-
 static void pin_J (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 12) {
     PIN_PARTS;
-    out[0] = 1, out[1] = 0, out[3] = -1, out[4] = 0;
-    out[6] = 0, out[7] = 1, out[9] = 0, out[10] = -1;
-    pin_row_J (s, out);
+    out[0] = 1, out[1] = 0, out[2] = -s.Y1, out[3] = -1, out[4] = 0, out[5] = s.Y2;
+    out[6] = 0, out[7] = 1, out[8] = s.X1, out[9] = 0, out[10] = -1, out[11] = -s.X2;
   }
 }
 
 static void pin_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
+  for (int e = 0; e < b->count; e++, out += 2) {
     PIN_PARTS;
-    pin_row_gamma (s, A, B, out + 2 * e);
-  }
-}
-
-static void pin_J_gamma (const pw_batch *b, double *J, double *gamma) {
-  for (int e = 0; e < b->count; e++) {
-    PIN_PARTS;
-    pin_row_J (s, J + 12 * e);
-    pin_row_gamma (s, A, B, gamma + 2 * e);
+    double w1 = A->omega * A->omega, w2 = B->omega * B->omega;
+    out[0] = s.X1 * w1 - s.X2 * w2;
+    out[1] = s.Y1 * w1 - s.Y2 * w2;
   }
 }
 
@@ -150,7 +131,6 @@ const pw_kind pw_kind_pin = {
   .fields = pin_fields,
   .bodies = 2,
   .rows = 2,
-  .unit = 1,
   .level = PW_HOLONOMIC,
   .reaction = pin_reaction,
   .prepare = pin_prepare,
@@ -158,7 +138,6 @@ const pw_kind pw_kind_pin = {
   .g_size = pin_g_size,
   .J = pin_J,
   .gamma = pin_gamma,
-  .J_gamma = pin_J_gamma,
   .jw_q = pin_jw_q,
   .jtl_q = pin_jtl_q,
   .gamma_q = pin_gamma_q,

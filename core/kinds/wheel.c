@@ -45,14 +45,6 @@ static void wheel_gamma (const pw_batch *b, double *out) {
   }
 }
 
-static void wheel_J_gamma (const pw_batch *b, double *J, double *gamma) {
-  for (int e = 0; e < b->count; e++, J += 3) {
-    WHEEL_PARTS;
-    J[0] = -s, J[1] = c; /* J[2], the arm, never changes */
-    gamma[e] = A->omega * (c * A->vx + s * A->vy);
-  }
-}
-
 static void wheel_jw_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     WHEEL_PARTS;
@@ -113,7 +105,6 @@ const pw_kind pw_kind_wheel = {
   .prepare = wheel_prepare,
   .J = wheel_J,
   .gamma = wheel_gamma,
-  .J_gamma = wheel_J_gamma,
   .jw_q = wheel_jw_q,
   .jtl_q = wheel_jtl_q,
   .gamma_q = wheel_gamma_q,

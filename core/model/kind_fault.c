@@ -56,7 +56,6 @@ static const char *fault_sweeps (const pw_kind *k) {
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
     if (exact[i] == pw_by_differences) return "PW_BY_DIFFERENCES stands in another place than a second-order block's";
   if (k->constant && (k->force == NULL || k->signals > 0)) return "a constant force that is none, or has signals";
-  if (k->unit && k->rows != 2) return "the columns of a unit matrix, but not two rows";
   if (k->rows > 0 && k->J == NULL) return "constraint rows without J";
   if (k->level == PW_HOLONOMIC && k->g == NULL) return "holonomic rows without g";
   if (k->level != PW_HOLONOMIC && k->g) return "g, but no holonomic rows";

@@ -67,30 +67,6 @@ static void selftest_gamma (pw_probe *x) {
   pw_probe_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", x->rows, 1, value, reference);
 }
 
-static double selftest_off (int n, const double *value, const double *reference) {
-  double off = 0;
-  for (int i = 0; i < n; i++) off += fabs (value[i] - reference[i]);
-  return off / (1 + pw_probe_largest (n, reference));
-}
-
-/* Both at once are what each is alone; J holds that of another state before. */
-static void selftest_J_gamma (pw_probe *x) {
-  double J[PW_PROBE_OUT + PW_PROBE_GUARD], gamma[PW_PROBE_OUT + PW_PROBE_GUARD], one[PW_PROBE_OUT + PW_PROBE_GUARD];
-  int n = x->elements * x->rows, all = n * x->cols, beyond = 0;
-  pw_probe_place (x, PW_PROBE_MOTION, 1);
-  pw_probe_sweep (x, x->kind->J, "J", all, J);
-  pw_probe_place (x, PW_PROBE_MOTION, 0);
-  for (int i = 0; i < n + PW_PROBE_GUARD; i++) gamma[i] = NAN;
-  x->kind->J_gamma (&x->k->b, J, gamma);
-  for (int i = 0; i < PW_PROBE_GUARD; i++) beyond += !isnan (J[all + i]) + !isnan (gamma[n + i]);
-  pw_probe_sweep (x, x->kind->J, "J", all, one);
-  double off = beyond + selftest_off (all, J, one);
-  pw_probe_sweep (x, x->kind->gamma, "gamma", n, one);
-  off += selftest_off (n, gamma, one);
-  pw_probe_note (x->report, "J_gamma", "J_gamma fills what J and gamma do", off, PW_PROBE_OUT * DBL_EPSILON,
-                 "round-off", "");
-}
-
 static void selftest_force_u (pw_probe *x) {
   double value[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT], plus[PW_PROBE_OUT + PW_PROBE_GUARD],
       minus[PW_PROBE_OUT + PW_PROBE_GUARD];
@@ -118,20 +94,6 @@ static void selftest_constant (pw_probe *x) {
   pw_probe_place (x, PW_PROBE_MOTION, 0);
   for (int i = 0; i < n; i++) changed += before[i] != after[i];
   pw_probe_note (x->report, "constant", "a constant force does not change", changed, 0, "exact", "");
-}
-
-/* The x and y columns of a kind that says so are the unit matrix, or its opposite. */
-static void selftest_unit (pw_probe *x) {
-  double J[PW_PROBE_OUT + PW_PROBE_GUARD];
-  int others = x->rows != 2;
-  pw_probe_sweep (x, x->kind->J, "J", x->elements * x->rows * x->cols, J);
-  for (int e = 0; e < x->elements && others == 0; e++)
-    for (int n = 0; n < x->kind->bodies; n++) {
-      const double *first = J + 2 * e * x->cols + 3 * n, *second = first + x->cols;
-      others += fabs (first[0]) != 1 || first[1] != 0 || second[0] != 0 || second[1] != first[0];
-    }
-  pw_probe_note (x->report, "unit", "two rows, the columns of x and y are +1 or -1 times the unit matrix", others, 0,
-                 "exact", "");
 }
 
 /* ---- Second-order blocks ---- */
@@ -304,10 +266,8 @@ static void selftest_all (pw_probe *x) {
   pw_probe_place (x, PW_PROBE_TIME, 0);
   if (x->kind->level == PW_HOLONOMIC) selftest_holonomic (x);
   if (x->rows > 0) selftest_gamma (x);
-  if (x->kind->J_gamma) selftest_J_gamma (x);
   if (x->kind->signals > 0) selftest_force_u (x);
   if (x->kind->constant) selftest_constant (x);
-  if (x->kind->unit) selftest_unit (x);
   selftest_blocks (x);
   selftest_rest (x);
   if (x->kind->force && !x->kind->constant) selftest_saturation (x);

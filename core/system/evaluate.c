@@ -11,20 +11,6 @@ void pw_sweep_J (pw_system *s) {
   EACH_CONSTRAINT (k, s) k->kind->J (&k->b, k->J);
 }
 
-void pw_sweep_J_gamma (pw_system *s, double *gamma) {
-  EACH_CONSTRAINT (k, s) {
-    if (k->kind->J_gamma) {
-      k->kind->J_gamma (&k->b, k->J, gamma + k->row);
-      continue;
-    }
-    k->kind->J (&k->b, k->J);
-    if (k->kind->gamma)
-      k->kind->gamma (&k->b, gamma + k->row);
-    else
-      memset (gamma + k->row, 0, (size_t)(k->b.count * k->kind->rows) * sizeof *gamma);
-  }
-}
-
 /* One array over rows, filled by the same sweep of every kind; a kind without it leaves zeros. */
 static void evaluate_rows (pw_system *s, size_t sweep, int rows, double *out) {
   EACH_CONSTRAINT (k, s) {

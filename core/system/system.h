@@ -92,7 +92,6 @@ void pw_hold (pw_system *s, int hold);
 /* ---- Sweeps; g and the like are `rows` long, f and w `coords` + 3 ---- */
 
 void pw_sweep_J (pw_system *s);                      /* fills every slab's J */
-void pw_sweep_J_gamma (pw_system *s, double *gamma); /* J and gamma at once; J has been swept before */
 void pw_sweep_g (pw_system *s, double *g);           /* holonomic rows only */
 void pw_sweep_g_size (pw_system *s, double *size);   /* not below the length scale */
 void pw_sweep_eta (pw_system *s, double *eta);

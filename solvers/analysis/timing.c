@@ -52,10 +52,6 @@ static void profile_J_gamma (profile *p, long n) {
   const pw_slab *k = p->k;
   const pw_kind *kind = k->kind;
   for (; n > 0; n--) {
-    if (kind->J_gamma) {
-      kind->J_gamma (&k->b, k->J, p->gamma + k->row);
-      continue;
-    }
     kind->J (&k->b, k->J);
     if (kind->gamma) kind->gamma (&k->b, p->gamma + k->row);
   }
@@ -75,7 +71,8 @@ static void profile_g (profile *p, long n) {
 
 static void profile_sweep (profile *p, long n) {
   for (; n > 0; n--) {
-    pw_sweep_J_gamma (p->s, p->gamma);
+    pw_sweep_J (p->s);
+    pw_sweep_gamma (p->s, p->gamma);
     pw_sweep_force (p->s, p->f);
   }
 }

@@ -150,7 +150,8 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
   double worst;
   int row, status = project_positions (p, r, t, q, v, &row, &worst);
   if (status != PW_OK) return status;
-  pw_sweep_J_gamma (r->s, lambda);
+  pw_sweep_J (r->s);
+  pw_sweep_gamma (r->s, lambda);
   if (project_is_good (p, r)) return pw_accelerate_swept (r, v, a, lambda);
   status = pw_project_velocities (p, r, v);
   if (status != PW_OK) return status;

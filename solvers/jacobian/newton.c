@@ -37,9 +37,9 @@ static inline int newton_row (const pw_put *put, int row) {
   return put->map ? put->map[row] : row;
 }
 
-/* Two rows +-r1 +-r2 + ... = 0 that have the unit matrix in a body's x and y columns are functions of angles beyond that. */
+/* A pin's two rows +-r1 +-r2 + ... = 0 are functions of angles beyond the unit matrix in a body's x and y columns. */
 static int newton_turns (const pw_kind *kind) {
-  return kind->unit && kind->level == PW_HOLONOMIC;
+  return kind == &pw_kind_pin;
 }
 
 static inline int newton_is_length (const pw_kind *kind, int c) {

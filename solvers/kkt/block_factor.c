@@ -6,11 +6,12 @@
  * Right-looking, every place known in advance.  Of D its own factors are kept. */
 #include <string.h>
 #include "block_parts.h"
+#include "unroll.h"
 
 /* ---- Assembly ---- */
 
 /* K += R B^T: rows of R, those of B ka x kb. */
-static inline void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B, int step) {
+PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_row *R, const double *B, int step) {
   K[0] += block_product (width, R[0], B);
   if (ka == 2) K[1] += block_product (width, R[1], B);
   if (kb == 2) K[ka] += block_product (width, R[0], B + step);
@@ -18,8 +19,8 @@ static inline void block_couple (int kb, int ka, int width, double *K, const blo
 }
 
 /* A contribution of ka rows with itself and with those that come after it; coupling: of this one and the next. */
-static inline void block_contribute (int ka, int width, const pw_block_ldl *l, const pw_body_block *p,
-                                     const pw_contribution *a, const int *coupling) {
+PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const pw_body_block *p,
+                                 const pw_contribution *a, const int *coupling) {
   const double *A = a->J, *w = l->inverse + p->j;
   double *D = l->value + a->D;
   block_row R[2] = { block_weigh (width, A, w) };
@@ -77,8 +78,8 @@ static inline void block_subtract (int kq, double *T, block_square L, const doub
 }
 
 /* Row p of a column: its updates, then L in place of K.  A: its block; B: the column's first block. */
-static inline void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_column *c, int p, double *A,
-                                        const double *B, const double *D, const int *target, int kj) {
+PW_INLINE void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_column *c, int p, double *A,
+                                    const double *B, const double *D, const int *target, int kj) {
   const pw_column *column = l->column;
   block_square L = block_scale (ki, kj, A, D);
   for (int q = c->first; q < p; q++) {
@@ -94,7 +95,7 @@ static inline void block_eliminate_row (int ki, const pw_block_ldl *l, const pw_
 }
 
 /* A column of kj unknowns; returns the next column's targets. */
-static inline const int *block_eliminate (int kj, pw_block_ldl *l, const pw_column *c, const int *target) {
+PW_INLINE const int *block_eliminate (int kj, pw_block_ldl *l, const pw_column *c, const int *target) {
   double *D = l->value + c->at, *B = D + pw_block_diagonal (kj), *A = l->value + c[1].at;
   block_pivot (kj, D, l, c->y);
   for (int p = c[1].first - 1; p >= c->first; target += p-- - c->first) {

@@ -5,17 +5,18 @@
  *   for each column j backwards:  y_j = -D^-1 y_j - sum_p L_pj^T y_p
  *   for each body:                a = W^-1 (f - sum_a J_a^T y_a) */
 #include "block_parts.h"
+#include "unroll.h"
 
 /* ---- Bodies; sizes are constants where these are inlined ---- */
 
 /* y -= J z */
-static inline void block_gather (int size, int width, double *y, const double *J, int step, block_row z) {
+PW_INLINE void block_gather (int size, int width, double *y, const double *J, int step, block_row z) {
   y[0] -= block_product (width, z, J);
   if (size == 2) y[1] -= block_product (width, z, J + step);
 }
 
 /* z - J^T y */
-static inline block_row block_scatter (int size, int width, const double *y, const double *J, int step, block_row z) {
+PW_INLINE block_row block_scatter (int size, int width, const double *y, const double *J, int step, block_row z) {
   const double *K = J + step;
   z.x -= size == 2 ? J[0] * y[0] + K[0] * y[1] : J[0] * y[0];
   if (width == 3) z.y -= size == 2 ? J[1] * y[0] + K[1] * y[1] : J[1] * y[0];
@@ -23,15 +24,14 @@ static inline block_row block_scatter (int size, int width, const double *y, con
   return z;
 }
 
-static inline void block_right_of (const pw_block_ldl *l, const pw_body_block *p, const double *f, double *y,
-                                   int width) {
+PW_INLINE void block_right_of (const pw_block_ldl *l, const pw_body_block *p, const double *f, double *y, int width) {
   const block_row z = block_weigh (width, f + p->j, l->inverse + p->j);
   for (const pw_contribution *a = l->contribution + p->first; a < l->contribution + p[1].first; a++)
     BLOCK_SIZE (a->size, block_gather, width, y + a->y, a->J, a->step, z);
 }
 
-static inline void block_accelerate (const pw_block_ldl *l, const pw_body_block *p, const double *f, const double *y,
-                                     double *a, int width) {
+PW_INLINE void block_accelerate (const pw_block_ldl *l, const pw_body_block *p, const double *f, const double *y,
+                                 double *a, int width) {
   const double *w = l->inverse + p->j;
   block_row z = { 0 };
   if (f) z = width == 3 ? (block_row){ f[p->j], f[p->j + 1], f[p->j + 2] } : (block_row){ .x = f[p->j] };
@@ -44,12 +44,12 @@ static inline void block_accelerate (const pw_block_ldl *l, const pw_body_block 
 /* ---- Columns ---- */
 
 /* to -= L from, L ki x kj */
-static inline void block_forward (int ki, double *to, const double *L, const double *from, int kj) {
+PW_INLINE void block_forward (int ki, double *to, const double *L, const double *from, int kj) {
   to[0] -= block_dot (kj, from[0], from[kj - 1], L);
   if (ki == 2) to[1] -= block_dot (kj, from[0], from[kj - 1], L + kj);
 }
 
-static inline void block_forward_column (int kj, const pw_block_ldl *l, const pw_column *c, double *y) {
+PW_INLINE void block_forward_column (int kj, const pw_block_ldl *l, const pw_column *c, double *y) {
   const double *L = l->value + c->at + pw_block_diagonal (kj);
   for (int p = c->first; p < c[1].first; p++) {
     const pw_column *row = l->column + l->below[p];
@@ -59,12 +59,12 @@ static inline void block_forward_column (int kj, const pw_block_ldl *l, const pw
 }
 
 /* sum -= L^T x */
-static inline void block_backward (int ki, double *sum, const double *L, const double *x, int kj) {
+PW_INLINE void block_backward (int ki, double *sum, const double *L, const double *x, int kj) {
   sum[0] -= ki == 2 ? L[0] * x[0] + L[kj] * x[1] : L[0] * x[0];
   if (kj == 2) sum[1] -= ki == 2 ? L[1] * x[0] + L[3] * x[1] : L[1] * x[0];
 }
 
-static inline void block_backward_column (int kj, const pw_block_ldl *l, const pw_column *c, double *y) {
+PW_INLINE void block_backward_column (int kj, const pw_block_ldl *l, const pw_column *c, double *y) {
   const double *D = l->value + c->at, *L = D + pw_block_diagonal (kj);
   double *to = y + c->y;
   block_pair own = block_divide (kj, D, to[0], kj == 2 ? to[1] : 0);

@@ -77,7 +77,8 @@ int pw_accelerate_swept (pw_run *r, const double *v, double *a, double *lambda) 
 int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
   int near, status = pw_place (r->s, t, q, v);
   if (status != PW_OK) return status;
-  pw_sweep_J_gamma (r->s, lambda);
+  pw_sweep_J (r->s);
+  pw_sweep_gamma (r->s, lambda);
   status = dynamics_solve (r, v, a, lambda, &near);
   if (near) r->near = 1;
   return status;

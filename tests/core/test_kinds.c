@@ -140,42 +140,6 @@ static void test_sizes (void **state) {
   }
 }
 
-/* Both at once: one entry off, one not written, one too many. */
-static void kinds_both_off (const pw_batch *b, double *J, double *gamma) {
-  pw_kind_pin.J_gamma (b, J, gamma);
-  gamma[2 * b->count - 1] *= 1 + 1e-5;
-}
-
-static void kinds_both_stale (const pw_batch *b, double *J, double *gamma) {
-  double before = J[2];
-  pw_kind_pin.J_gamma (b, J, gamma);
-  J[2] = before;
-}
-
-static void kinds_both_short (const pw_batch *b, double *J, double *gamma) {
-  pw_batch fewer = *b;
-  fewer.count--;
-  pw_kind_pin.J_gamma (&fewer, J, gamma);
-}
-
-static void kinds_both_long (const pw_batch *b, double *J, double *gamma) {
-  pw_kind_pin.J_gamma (b, J, gamma);
-  gamma[2 * b->count] = 0;
-}
-
-static void test_both (void **state) {
-  pw_kind broken = pw_kind_pin;
-  (void)state;
-  broken.J_gamma = kinds_both_off;
-  kinds_expect_caught (&broken, "J_gamma", "off by 1e-5");
-  broken.J_gamma = kinds_both_stale;
-  kinds_expect_caught (&broken, "J_gamma", "with an entry of another state");
-  broken.J_gamma = kinds_both_short;
-  kinds_expect_caught (&broken, "J_gamma", "with an element left out");
-  broken.J_gamma = kinds_both_long;
-  kinds_expect_caught (&broken, "J_gamma", "with an entry too many");
-}
-
 /* A saturation that is not declared, and one declared a thousand times too wide. */
 static void test_saturation (void **state) {
   int kinds = 0;
@@ -232,7 +196,6 @@ static void test_faults (void **state) {
   KINDS_FAULT (signals, 1, "signals is not the number of fields of type PW_SIGNAL");
   KINDS_FAULT (each_body, 1, "a kind that acts on each body has one body and names none");
   KINDS_FAULT (constant, 1, "a constant force that is none, or has signals");
-  KINDS_FAULT (rows, 1, "the columns of a unit matrix, but not two rows");
   KINDS_FAULT (J, pw_by_differences, "PW_BY_DIFFERENCES stands in another place than a second-order block's");
   KINDS_FAULT (J, NULL, "constraint rows without J");
   KINDS_FAULT (g, NULL, "holonomic rows without g");
@@ -292,7 +255,7 @@ static void test_refused (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_built_in),   cmocka_unit_test (test_plug_in),       cmocka_unit_test (test_broken),
-    cmocka_unit_test (test_sizes),      cmocka_unit_test (test_both),          cmocka_unit_test (test_faults),
+    cmocka_unit_test (test_sizes),               cmocka_unit_test (test_faults),
     cmocka_unit_test (test_saturation), cmocka_unit_test (test_wheel_contact), cmocka_unit_test (test_refused),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

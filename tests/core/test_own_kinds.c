@@ -100,7 +100,7 @@ static void test_methods (void **state) {
   }
 }
 
-/* ---- Two rows with the unit matrix, a coordinate of the element's own and a force: a guide ----
+/* ---- Two rows, a coordinate of the element's own and a force: a guide ----
  *
  *   g = r - (1, 2) u = 0,   force -k x along x,   so that 6 u'' = -k u with unit mass and inertia */
 
@@ -163,7 +163,6 @@ static const pw_kind guide_kind = {
   .bodies = 1,
   .own = 1,
   .rows = 2,
-  .unit = 1,
   .level = PW_HOLONOMIC,
   .reaction = guide_reaction,
   .coordinate = guide_coordinate,
