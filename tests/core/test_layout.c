@@ -26,7 +26,7 @@ LAYOUT (pw_quantity, 32);
 LAYOUT (pw_own, 32);
 LAYOUT (pw_pose, 64);
 LAYOUT (pw_batch, 72);
-LAYOUT (pw_kind, 264);
+LAYOUT (pw_kind, 256);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
