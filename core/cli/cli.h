@@ -96,6 +96,9 @@ int pw_cli_number (const char *option, const char *text, pw_domain domain, doubl
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
+/* 1 if the step size of a method follows a tolerance; 0 if it is fixed, by nature or by an option of the method. */
+int pw_cli_adaptive (const pw_method *integrator, const char *method);
+
 /* ---- Models ---- */
 
 /* A model opened, built and compiled. */

@@ -3,7 +3,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "contestants.h"
 #include "report.h"
 
 enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300, REPORT_TEXT = 400 };
@@ -18,7 +17,7 @@ void pw_report_unused (const char *method, const pw_cli_line *w) {
   const pw_method *integrator;
   int stabilisation;
   if (pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
-  int adaptive = pw_contestant_adaptive (integrator, method);
+  int adaptive = pw_cli_adaptive (integrator, method);
   if (adaptive && w->step && !w->rtol && !w->atol)
     fprintf (stderr, "pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
   if (!adaptive && w->max_steps)
@@ -33,7 +32,7 @@ void pw_report_step (const pw_run *r, const char *method, double step) {
   int stabilisation;
   double T = pw_run_scale (r)->time;
   if (!(step > T) || pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK ||
-      pw_contestant_adaptive (integrator, method))
+      pw_cli_adaptive (integrator, method))
     return;
   fprintf (stderr,
            "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
@@ -49,7 +48,7 @@ void pw_report_atol (pw_run *r, const pw_system *s, const char *method, double a
   int state = atol > 0 ? pw_run_saturation (r, &least, element, sizeof element) : -1;
   if (state < 0 || !(atol > least) ||
       pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK ||
-      !pw_contestant_adaptive (integrator, method))
+      !pw_cli_adaptive (integrator, method))
     return;
   fprintf (stderr,
            "pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's iteration "

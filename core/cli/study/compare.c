@@ -1,177 +1,249 @@
-/* pinwheel compare: what accuracy costs.  One model by several methods, each over a ladder of tolerances or steps,
- * against the truth: a row for each rung, failures included. */
+/* pinwheel compare: the accuracy and the cost of methods.  A row for each method and level of its ladder of tolerances or
+ * steps: one run with samples and the ledger, then timed runs of the method alone. */
 #include <math.h>
 #include <stdlib.h>
-#include <unistd.h>
+#include <string.h>
 #include "compare.h"
-#include "figure.h"
-#include "stop.h"
-#include "text.h"
 
-/* ---- Before it begins ---- */
+#define COMPARE_FEW 3      /* timed runs at least, unless the limit forbids it; */
+#define COMPARE_ENOUGH 0.5 /* more until they have taken this long [s] */
+#define COMPARE_FINER 1.2  /* ratio of the numbers of steps that shows an order */
+#define COMPARE_CLEAR 10   /* times the reference's uncertainty: halved steps then show an order to log2 1.1 = 0.14 */
+#define COMPARE_AGREE 0.1  /* of an order: the largest difference of the last two in the asymptotic range */
 
-/* The table is written as rows come, under the name it keeps if something stops it. */
-static int compare_open_csv (pw_compare *x, pw_error *error) {
-  static const char *const names[] = { ".dat", ".gp", ".svg", ".png", "compare.csv", "truth.csv", NULL };
-  char path[FIGURE_PATH];
-  if (x->folder == NULL) return PW_OK;
-  pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "--truth", x->truth_path, PW_READS, NULL },
-                   { "-o", x->folder, PW_WRITES_INTO, names } };
-  if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
-  x->lock = pw_figure_folder (x->folder, error);
-  if (x->lock < 0) return error->status;
-  snprintf (path, sizeof path, "%s/compare.csv", x->folder);
-  x->csv = pw_output_open (path, error);
-  return x->csv ? pw_compare_csv_head (x, error) : error->status;
+/* ---- Ladders ---- */
+
+typedef struct {
+  double from, to; /* from > to > 0 */
+} ladder;
+
+/* "FROM:TO", in either order, or a single level. */
+static int ladder_read (const char *option, const char *text, ladder *l, pw_error *error) {
+  if (text == NULL) return PW_OK;
+  char first[40];
+  size_t n = strcspn (text, ":");
+  if (n >= sizeof first || strlen (text + n) > sizeof first)
+    return pw_fail (error, PW_INPUT, "%s %.80s: expected FROM:TO", option, text);
+  snprintf (first, sizeof first, "%.*s", (int)n, text);
+  double from = 0, to = 0;
+  int status = pw_cli_number (option, first, PW_POSITIVE, &from, error);
+  if (status == PW_OK) status = pw_cli_number (option, text[n] ? text + n + 1 : first, PW_POSITIVE, &to, error);
+  if (status != PW_OK) return status;
+  *l = (ladder){ fmax (from, to), fmin (from, to) };
+  if (l->from / l->to > 1e30) return pw_fail (error, PW_INPUT, "%s %.80s: too long a ladder", option, text);
+  return PW_OK;
 }
 
-static int compare_open (pw_compare *x, pw_error *error) {
-  int status = pw_cli_open (&x->m, &x->line, error);
-  if (status != PW_OK) return status;
-  x->t_end = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
-  x->limit = 10;
+/* Level i of a ladder, or 0 after its end; steps are halved, tolerances divided by ten and rounded to 12 digits: 1e-6. */
+static double ladder_level (ladder l, int adaptive, int i) {
+  char text[32];
+  double level = ldexp (l.from, -i);
+  if (adaptive) pw_read_number (pw_format (text, l.from / pow (10, i), 12), &level);
+  return level >= l.to * (1 - 1e-9) ? level : 0;
+}
+
+/* A row for each level of each method. */
+static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) {
+  int levels[2] = { 0, 0 }, rows = 0;
+  for (int k = 0; k < 2; k++)
+    while (ladder_level (of[k], k, levels[k]) > 0) levels[k]++;
+  for (int i = 0; i < x->methods.count; i++) rows += levels[x->methods.method[i].adaptive];
+  int status = pw_study_allocate (x, rows, error);
+  for (int i = 0; status == PW_OK && i < x->methods.count; i++) {
+    const pw_study_method *m = &x->methods.method[i];
+    for (int k = 0; k < levels[m->adaptive]; k++) {
+      pw_row *r = &x->row[x->rows++];
+      *r = (pw_row){ .line = i, .adaptive = m->adaptive, .level = ladder_level (of[m->adaptive], m->adaptive, k) };
+      strcpy (r->method, m->name);
+    }
+  }
+  return status;
+}
+
+static int compare_plan (pw_study *s, pw_error *error) {
+  pw_compare *x = (pw_compare *)s;
+  ladder of[2] = { { 0.1, 1e-4 }, { 1e-3, 1e-12 } }; /* steps, tolerances */
+  s->t_end = pw_cli_defaults (pw_file_table (s->m.file)).t_end;
+  s->limit.most = INFINITY; /* the clock is read between batches of steps only: timed runs are not slowed down */
+  s->cpu_end = 10;
   x->repeats = 9;
-  status = pw_cli_number ("--t-end", x->line.t_end, PW_POSITIVE, &x->t_end, error);
-  if (status == PW_OK) status = pw_cli_number ("--limit", x->line.limit, PW_POSITIVE, &x->limit, error);
+  int status = pw_cli_number ("--t-end", s->line.t_end, PW_POSITIVE, &s->t_end, error);
+  if (status == PW_OK) status = pw_cli_number ("--limit", s->line.limit, PW_POSITIVE, &s->cpu_end, error);
   if (status == PW_OK) status = pw_cli_number ("--repeats", x->repeats_text, PW_COUNT, &x->repeats, error);
   if (status == PW_OK && x->repeats > COMPARE_REPEATS)
     return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", x->repeats_text, COMPARE_REPEATS);
-  if (status == PW_OK) status = pw_compare_methods (x, error);
-  return status == PW_OK ? compare_open_csv (x, error) : status;
+  if (status == PW_OK) status = pw_study_methods_read (&s->methods, s->methods_text ? s->methods_text : "all", error);
+  if (status == PW_OK) status = ladder_read ("--step-ladder", x->step_text, &of[0], error);
+  if (status == PW_OK) status = ladder_read ("--rtol-ladder", x->rtol_text, &of[1], error);
+  x->finest_step = of[0].to;
+  return status == PW_OK ? compare_plan_rows (s, of, error) : status;
 }
 
-/* ---- Rows ---- */
+/* ---- Runs ---- */
 
-/* What the next rung will take, from those before: each halving doubles; what a decade costs more is learnt from the
- * last one, or guessed for a method of order 5. */
-static double compare_predict (const pw_compare *x, int first, int adaptive) {
-  const pw_rung *last = &x->row[x->rows - 1];
-  if (x->rows == first || last->state == COMPARE_FAILED || last->state == COMPARE_REFUSED) return 0;
-  if (last->state != COMPARE_DONE) return INFINITY;
-  if (!adaptive) return 2 * last->cpu;
-  if (x->rows < first + 2 || last[-1].state != COMPARE_DONE) return 1.6 * last->cpu;
+/* Takes the samples that the last step has reached. */
+static int compare_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
+  pw_sample sample;
+  const pw_motion *m = v->motion;
+  for (; v->sample < m->samples && m->t[v->sample] <= pw_time (run); v->sample++) {
+    int status = pw_at (run, m->t[v->sample], &sample, error);
+    if (status != PW_OK) return status;
+    pw_motion_take (v->motion, v->study->m.system, v->sample, &sample);
+    v->row->balance = fmax (v->row->balance, fabs (sample.balance));
+  }
+  v->due = v->sample < m->samples ? m->t[v->sample] : INFINITY;
+  return PW_OK;
+}
+
+int pw_compare_run (pw_compare *x, pw_row *r, pw_motion *motion, pw_error *error) {
+  pw_study *s = &x->study;
+  pw_study_visitor v = { .visit = compare_visit, .study = s, .row = r, .motion = motion };
+  s->settings =
+      (pw_settings){ .span = s->t_end, .ledger = motion != NULL, .stop = pw_limit_over, .stop_context = &s->limit };
+  *(r->adaptive ? &s->settings.rtol : &s->settings.step) = r->level;
+  if (motion) r->balance = 0;
+  return pw_study_run (s, r, motion ? &v : NULL, error);
+}
+
+/* ---- A row ---- */
+
+static void compare_unknown (pw_row *r) {
+  for (int i = 0; i < MOTION_ERRORS; i++) r->error[i] = NAN;
+  r->balance = r->spread = r->order = NAN;
+}
+
+/* An error below the uncertainty of the reference is no larger than that. */
+static void compare_errors (pw_compare *x, pw_row *r) {
+  const pw_reference *reference = &x->reference;
+  if (!reference->known) return;
+  pw_motion_distance (x->study.m.system, &reference->motion, &x->scratch, r->error);
+  for (int i = 0; i < MOTION_ERRORS; i++) {
+    if (reference->uncertainty[i] == 0) r->error[i] = NAN;
+    if (!(r->error[i] <= reference->uncertainty[i])) continue;
+    r->error[i] = reference->uncertainty[i];
+    r->below |= 1u << i;
+  }
+}
+
+/* log (error before / error) over log (steps / steps before); NaN where an error is unknown or may be the reference's by more
+ * than a tenth, and where the numbers of steps are much the same. */
+static double compare_order_of (const pw_compare *x, const pw_row *r) {
+  const pw_row *before = r - 1;
+  int i = isnan (r->error[MOTION_MOST]) ? MOTION_MOST + MOTION_ANGLE : MOTION_MOST;
+  int known =
+      before->state == ROW_DONE && r->state == ROW_DONE && r->error[i] > COMPARE_CLEAR * x->reference.uncertainty[i];
+  double finer =
+      r->adaptive ? (double)r->statistics.steps / (double)before->statistics.steps : before->level / r->level;
+  return known && finer > COMPARE_FINER ? log (before->error[i] / r->error[i]) / log (finer) : NAN;
+}
+
+/* The observed order of convergence of a row with `before` levels of its method before it: only in the asymptotic range,
+ * where the last two orders agree and errors are well above the uncertainty of the reference; else NaN. */
+static double compare_order (const pw_compare *x, const pw_row *r, int before) {
+  double order = before >= 2 ? compare_order_of (x, r) : NAN, last = before >= 2 ? compare_order_of (x, r - 1) : NAN;
+  return order > 0 && fabs (order - last) <= COMPARE_AGREE * order ? order : NAN;
+}
+
+static int compare_numbers (const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
+  double cpu[COMPARE_REPEATS], sum = 0;
+  int n = 0;
+  while (n < x->repeats && !(n >= COMPARE_FEW && sum > COMPARE_ENOUGH) && sum <= x->study.cpu_end) {
+    int status = pw_compare_run (x, r, NULL, error);
+    if (status != PW_OK) return status;
+    sum += cpu[n++] = r->cpu;
+    pw_progress_at (&x->study.progress, x->study.done + (n + 1.0) / (x->repeats + 1));
+  }
+  qsort (cpu, (size_t)n, sizeof *cpu, compare_numbers);
+  r->repeats = n;
+  r->cpu = n % 2 ? cpu[n / 2] : (cpu[n / 2 - 1] + cpu[n / 2]) / 2;
+  r->spread = n > 1 ? cpu[n - 1] - cpu[0] : NAN;
+  return PW_OK;
+}
+
+/* The CPU time of a row predicted from the `before` levels of its method before it: a halved step doubles it; the factor of a
+ * decade is that of the last one, or at first that of a method of order 5. */
+static double compare_predict (const pw_row *r, int before) {
+  const pw_row *last = r - 1;
+  if (before == 0 || last->state == ROW_FAILED || last->state == ROW_REFUSED) return 0;
+  if (last->state != ROW_DONE) return INFINITY;
+  if (!r->adaptive) return 2 * last->cpu;
+  if (before < 2 || last[-1].state != ROW_DONE) return 1.6 * last->cpu;
   return fmax (last->cpu / last[-1].cpu, 1) * last->cpu;
 }
 
-static void compare_too_slow (const pw_compare *x, pw_rung *r, double predicted) {
-  char limit[32], about[60] = "";
-  for (int i = 0; i < MOTION_ERRORS; i++) r->error[i] = NAN;
-  r->state = COMPARE_SLOW;
-  if (isfinite (predicted)) snprintf (about, sizeof about, ", about %.2g s", predicted);
-  snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", about, pw_format (limit, x->limit, 4));
-}
-
-/* The rungs of a method. */
-static int compare_ladder (pw_compare *x, const pw_contestant *method, pw_motion *scratch, pw_error *error) {
-  int first = x->rows, status = PW_OK;
-  double rung;
-  for (int k = 0; status == PW_OK && (rung = pw_compare_rung (&x->ladder[method->adaptive], method->adaptive, k)) > 0;
-       k++) {
-    pw_rung *r = &x->row[x->rows];
-    double predicted = compare_predict (x, first, method->adaptive);
-    *r = (pw_rung){ .method = method, .rung = rung };
-    if (predicted > x->limit)
-      compare_too_slow (x, r, predicted);
-    else
-      status = pw_compare_row (x, r, scratch, error);
-    if (status != PW_OK) break;
-    r->order = pw_compare_order (x, r, x->rows - first);
-    x->rows++;
-    pw_progress_end (&x->progress);
-    pw_compare_line (x, r, stdout);
-    fflush (stdout);
-    if (x->csv) status = pw_compare_csv_line (x, r, error);
+static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
+  pw_compare *x = (pw_compare *)s;
+  pw_error own = { 0 };
+  char limit[32], text[60] = "";
+  int before = 0;
+  while (r - before > s->row && r[-before - 1].line == r->line) before++;
+  double predicted = compare_predict (r, before);
+  compare_unknown (r);
+  s->share = 1 / (x->repeats + 1);
+  if (predicted > s->cpu_end) {
+    r->state = ROW_SKIPPED;
+    if (isfinite (predicted)) snprintf (text, sizeof text, ", about %.2g s", predicted);
+    snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", text, pw_format (limit, s->cpu_end, 4));
+    return PW_OK;
   }
+  int status = pw_compare_run (x, r, &x->scratch, &own);
+  if (status == PW_OK) {
+    compare_errors (x, r);
+    status = compare_times (x, r, &own);
+  }
+  if (r->state == ROW_STOPPED)
+    snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s",
+              pw_format (limit, s->cpu_end, 4), pw_format (text, r->t, 4));
+  status = pw_study_outcome (r, status, &own, error);
+  r->order = compare_order (x, r, before);
   return status;
 }
 
-static int compare_rows (pw_compare *x, pw_error *error) {
-  pw_motion scratch;
-  int status = pw_motion_open (&scratch, x->m.system, x->truth.known ? x->truth.motion.samples : MOTION_SAMPLES, error);
+/* ---- The command ---- */
+
+static int compare_begin (pw_study *s, pw_error *error) {
+  pw_compare *x = (pw_compare *)s;
+  int status = pw_reference_find (x, error);
+  if (status == PW_OK && s->folder) status = pw_compare_write_reference (x, error);
+  const pw_motion *motion = &x->reference.motion;
+  int samples = x->reference.known ? motion->samples : MOTION_SAMPLES;
+  if (status == PW_OK) status = pw_motion_open (&x->scratch, s->m.system, samples, error);
   if (status != PW_OK) return status;
-  pw_motion_times (&scratch, x->t_end);
-  for (int k = 0; x->truth.known && k < scratch.samples; k++) scratch.t[k] = x->truth.motion.t[k];
-  pw_compare_truth_line (x, stdout);
-  fputc ('\n', stdout);
-  pw_compare_head (x, stdout);
-  pw_progress_count (&x->progress, pw_file_name (x->m.file), "rows", 0, x->rungs);
-  for (int i = 0; status == PW_OK && i < x->list.count; i++)
-    status = compare_ladder (x, &x->list.method[i], &scratch, error);
-  pw_progress_end (&x->progress);
-  pw_motion_close (&scratch);
-  return status;
+  pw_motion_times (&x->scratch, s->t_end);
+  if (x->reference.known) memcpy (x->scratch.t, motion->t, (size_t)samples * sizeof *motion->t);
+  pw_compare_print_reference (x, stdout);
+  return PW_OK;
 }
 
-static int compare_run (pw_compare *x, pw_error *error) {
-  pw_stop_catch ();
-  int status = pw_truth_find (x, error);
-  if (status == PW_OK && x->folder) status = pw_compare_csv_truth (x, error);
-  if (status == PW_OK) status = compare_rows (x, error);
-  pw_stop_release ();
-  return status;
-}
-
-/* ---- After it ---- */
-
-static int compare_interrupted (pw_compare *x) {
-  char part[FIGURE_PATH + 16] = "";
-  if (x->csv) pw_text_abandon (x->csv, x->rows, part, sizeof part);
-  if (x->rows == 0)
-    fputs ("pinwheel: interrupted before the first row was done\n", stderr);
-  else
-    pw_cli_say ("pinwheel: interrupted; %d of %d rows are done%s%s\n", x->rows, x->rungs, *part ? ", and kept in " : "",
-                part);
-  return PW_INTERRUPTED;
-}
-
-/* Diagrams are drawn of the rows there are. */
-static int compare_finish (pw_compare *x, int status, pw_error *error) {
-  if (status == PW_RETRY && pw_stop) return compare_interrupted (x);
-  if (x->csv == NULL) return status;
-  if (status != PW_OK) {
-    pw_text_abandon (x->csv, x->rows, (char[FIGURE_PATH + 16]){ 0 }, FIGURE_PATH + 16);
-    return status;
-  }
-  pw_output *csv = x->csv;
-  x->csv = NULL;
-  status = pw_output_finish (csv, error);
-  return status == PW_OK ? pw_compare_plot (x, error) : status;
-}
-
-/* A comparison in which nothing has worked is a failure. */
-static int compare_verdict (const pw_compare *x, pw_error *error) {
-  const pw_rung *failed = NULL;
-  for (int i = 0; i < x->rows; i++) {
-    if (x->row[i].state == COMPARE_DONE) return PW_OK;
-    if (x->row[i].state == COMPARE_FAILED || x->row[i].state == COMPARE_REFUSED) failed = &x->row[i];
-  }
-  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last of them: %s", failed->reason)
-                : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
-}
-
-static void compare_close (pw_compare *x) {
-  if (x->lock >= 0) close (x->lock);
-  pw_truth_close (&x->truth);
-  pw_cli_close_model (&x->m);
-  free (x->row);
-  pw_contestants_close (&x->list);
+static void compare_close (pw_study *s) {
+  pw_compare *x = (pw_compare *)s;
+  pw_motion_close (&x->reference.motion);
+  pw_motion_close (&x->scratch);
 }
 
 static int compare_command (void *options, pw_error *error) {
-  pw_compare *x = options;
-  x->lock = -1;
-  int status = compare_open (x, error);
-  if (status == PW_OK) status = compare_run (x, error);
-  status = compare_finish (x, status, error);
-  if (status == PW_OK) status = compare_verdict (x, error);
-  compare_close (x);
-  return status == PW_INTERRUPTED ? status : error->status;
+  static const pw_study_type type = { .table = "compare.csv",
+                                      .unit = "rows",
+                                      .plan = compare_plan,
+                                      .begin = compare_begin,
+                                      .measure = compare_measure,
+                                      .head = pw_compare_head,
+                                      .line = pw_compare_line,
+                                      .names = pw_compare_names,
+                                      .cells = pw_compare_cells,
+                                      .figures = pw_compare_figures,
+                                      .close = compare_close };
+  return pw_study_command (options, &type, error);
 }
 
 static const struct poptOption compare_options[] = {
   PW_OPTION_GROUP ("Comparison"),
-  PW_TEXT_OPTION (pw_compare, methods_text, "methods", 'm', "A,B,...|all",
+  PW_TEXT_OPTION (pw_study, methods_text, "methods", 'm', "A,B,...|all",
                   "Methods, separated by commas; all: every integrator with every stabilisation (default)"),
   PW_TEXT_OPTION (pw_compare, rtol_text, "rtol-ladder", 0, "FROM:TO",
                   "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)"),
@@ -185,10 +257,10 @@ static const struct poptOption compare_options[] = {
       "fit into half a second)"),
   PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
   PW_TEXT_OPTION (
-      pw_compare, truth_path, "truth", 0, "FILE.csv",
+      pw_study, reference_path, "truth", 0, "FILE.csv",
       "Measure errors against this table, with columns as in run -o, instead of the model's exact solution or a "
       "computed reference"),
-  PW_TEXT_OPTION (pw_compare, folder, "output", 'o', "DIR", "Write tables and work-precision diagrams into a folder"),
+  PW_TEXT_OPTION (pw_study, folder, "output", 'o', "DIR", "Write tables and work-precision diagrams into a folder"),
   PW_MODEL_OPTIONS,
   POPT_TABLEEND,
 };

@@ -1,135 +1,210 @@
-/* pinwheel drift: what a long run does to the constraints and the energy, under each stabilisation side by side, and how
- * that depends on Baumgarte's alpha and beta and on the projection's metric and frequency. */
+/* pinwheel drift: how constraint residuals and the energy balance grow in a long run, by method and stabilisation, and how
+ * that depends on Baumgarte's alpha and beta and on the metric and frequency of projections. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "drift.h"
-#include "figure.h"
-#include "stop.h"
-#include "text.h"
+#include "util.h"
 
-/* ---- Before it begins ---- */
+#define DRIFT_ROUND_OFF 1e-14 /* scaled residuals below have no meaningful growth */
 
-/* Every stabilisation of an explicit integrator and of the implicit ones. */
-static void drift_usual (char *text, size_t size) {
-  static const char *const usual[] = { "rk4", "ida", "galpha" };
-  size_t n = 0;
-  *text = 0;
-  for (size_t k = 0; k < sizeof usual / sizeof *usual; k++)
-    for (int i = 0; pw_methods[i]; i++)
-      for (const pw_stabilisation *s = pw_methods[i]->stabilisations;
-           strcmp (pw_methods[i]->name, usual[k]) == 0 && s->name; s++)
-        n += (size_t)snprintf (text + n, size - n, "%s%s+%s", n ? "," : "", pw_methods[i]->name, s->name);
+/* ---- What is varied ---- */
+
+/* Reads one "NAME=RANGE" into a grid of one axis. */
+static int drift_axis (pw_grid *g, const char *text, pw_error *error) {
+  const char *const list[] = { text, NULL };
+  pw_grid_free (g);
+  int status = pw_grid_read (g, list, error);
+  for (long i = 0; status == PW_OK && i < g->rows; i++) {
+    double value = pw_grid_value (g, 0, i);
+    const char *expected = pw_domain_check (strcmp (g->axis->name, "every") == 0 ? PW_COUNT : PW_NONNEGATIVE, value);
+    if (*expected)
+      status = pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected %s", g->axis->name, g->axis->range, expected);
+  }
+  return status;
 }
 
-static int drift_settle (pw_drift *x, pw_error *error) {
-  pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
-  char usual[1000];
-  if (d.rtol == 0) d.rtol = 1e-6;
-  int status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
-  x->settings.ledger = 1;
-  drift_usual (usual, sizeof usual);
-  if (status == PW_OK) status = pw_contestants_read (&x->list, x->methods_text ? x->methods_text : usual, error);
-  return status == PW_OK ? pw_drift_rows (x, error) : status;
+static int drift_vary (pw_drift *x, const char *text, pw_error *error) {
+  const struct {
+    const char *name;
+    pw_grid *grid;
+  } known[] = { { "alpha", &x->alpha }, { "beta", &x->beta }, { "every", &x->every } };
+  char name[60], hint[100];
+  snprintf (name, sizeof name, "%.*s", (int)strcspn (text, "="), text);
+  pw_nearest near = { .sought = name };
+  for (size_t i = 0; i < sizeof known / sizeof *known; i++) {
+    if (strcmp (known[i].name, name) == 0) return drift_axis (known[i].grid, text, error);
+    pw_nearest_try (&near, known[i].name);
+  }
+  return pw_fail (error, PW_INPUT, "--vary %.100s: alpha, beta and every can be varied%s", text,
+                  pw_nearest_text (&near, hint, sizeof hint));
 }
 
-static int drift_open (pw_drift *x, pw_error *error) {
-  static const char *const names[] = { ".dat", ".gp", ".svg", ".png", "drift.csv", "drift-time.csv", NULL };
-  char path[FIGURE_PATH + 16];
-  int status = pw_cli_open (&x->m, &x->line, error);
-  if (status == PW_OK) status = drift_settle (x, error);
-  if (status != PW_OK || x->folder == NULL) return status;
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
-  if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
-  x->lock = pw_figure_folder (x->folder, error);
-  if (x->lock < 0) return error->status;
-  snprintf (path, sizeof path, "%s/drift.csv", x->folder);
-  x->csv = pw_output_open (path, error);
-  return x->csv ? pw_drift_csv_head (x, error) : error->status;
+/* The defaults, then what was given. */
+static int drift_axes (pw_drift *x, pw_error *error) {
+  static const char *const usual[] = { "alpha=1,3,10,30,100,300,1000", "beta=1,10,100,1000", "every=1,2,5,10,20,50,100",
+                                       NULL };
+  int status = PW_OK;
+  for (const char *const *v = usual; status == PW_OK && *v; v++) status = drift_vary (x, *v, error);
+  for (const char **v = x->vary; status == PW_OK && v && *v; v++) status = drift_vary (x, *v, error);
+  return status;
 }
 
 /* ---- Rows ---- */
 
-static void drift_title (const pw_drift *x) {
-  char t[32], h[32], rtol[32];
-  printf (
-      "%s, %s s, steps of %s s or rtol %s: the worst of all steps, the worst of the last %g %%, and how it grows\n\n",
-      pw_file_name (x->m.file), pw_format (t, x->t_end, 6), pw_format (h, x->settings.step, 6),
-      pw_format (rtol, x->settings.rtol, 6), 100.0 / DRIFT_PARTS);
+static int drift_has_option (const pw_method *method, const char *name) {
+  for (const pw_option *o = method->options; o && o->name; o++)
+    if (strcmp (o->name, name) == 0) return 1;
+  return 0;
 }
 
-static int drift_rows (pw_drift *x, pw_error *error) {
-  int status = PW_OK;
-  drift_title (x);
-  pw_progress_count (&x->progress, pw_file_name (x->m.file), "runs", 0, x->rows);
-  for (x->done = 0; x->done < x->rows; x->done++) {
-    pw_drift_row *r = &x->row[x->done];
-    status = pw_drift_run (x, r, error);
-    pw_progress_end (&x->progress);
-    if (status != PW_OK) return status;
-    if (x->done == 0 || r->group != r[-1].group) pw_drift_head (x, r->group, stdout);
-    pw_drift_line (x, r, stdout);
-    fflush (stdout);
-    if (x->csv) status = pw_drift_csv_line (x, r, error);
-    if (status != PW_OK) return status;
+/* The first integrator in the list that has an option; rk4 if none has. */
+static const char *drift_integrator (const pw_drift *x, const char *option) {
+  for (int i = 0; i < x->study.methods.count; i++) {
+    const pw_method *method;
+    int stabilisation;
+    if (pw_parse_method (x->study.methods.method[i].name, &method, &stabilisation, NULL) == PW_OK &&
+        drift_has_option (method, option))
+      return method->name;
+  }
+  return "rk4";
+}
+
+static void drift_plan_baumgarte (pw_drift *x) {
+  const char *integrator = drift_integrator (x, "alpha");
+  char a[32], b[32];
+  for (long j = 0; j < x->beta.rows; j++)
+    for (long i = 0; i < x->alpha.rows; i++) {
+      pw_row *r = &x->study.row[x->study.rows++];
+      *r = (pw_row){ .group = DRIFT_BAUMGARTE,
+                     .line = (int)j,
+                     .along = pw_grid_value (&x->alpha, 0, i),
+                     .beta = pw_grid_value (&x->beta, 0, j) };
+      snprintf (r->method, sizeof r->method, "%s+baumgarte:alpha=%s:beta=%s", integrator, pw_format (a, r->along, 9),
+                pw_format (b, r->beta, 9));
+    }
+}
+
+static void drift_plan_projection (pw_drift *x) {
+  static const char *const metric[] = { "mass", "identity" };
+  const char *integrator = drift_integrator (x, "every");
+  for (int j = 0; j < 2; j++)
+    for (long i = 0; i < x->every.rows; i++) {
+      pw_row *r = &x->study.row[x->study.rows++];
+      *r = (pw_row){ .group = DRIFT_PROJECTION, .line = j, .along = pw_grid_value (&x->every, 0, i), .beta = NAN };
+      snprintf (r->method, sizeof r->method, "%s+projection:metric=%s:every=%.0f", integrator, metric[j], r->along);
+    }
+}
+
+/* The methods have the parts of a run, too, for figures against time. */
+static int drift_plan_rows (pw_drift *x, pw_error *error) {
+  pw_study *s = &x->study;
+  double most = s->methods.count + (double)x->alpha.rows * (double)x->beta.rows + 2 * (double)x->every.rows;
+  if (most > 10000) return pw_fail (error, PW_INPUT, "%.0f runs are too many; vary less", most);
+  if (pw_study_allocate (s, (int)most, error) != PW_OK) return error->status;
+  for (int i = 0; i < s->methods.count; i++) {
+    pw_row *r = &s->row[s->rows++];
+    *r = (pw_row){ .group = DRIFT_METHODS, .line = i, .along = NAN, .beta = NAN };
+    strcpy (r->method, s->methods.method[i].name);
+    r->part = calloc (DRIFT_PARTS, sizeof *r->part);
+    if (r->part == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  }
+  if (x->only_methods) return PW_OK;
+  drift_plan_baumgarte (x);
+  drift_plan_projection (x);
+  return PW_OK;
+}
+
+static int drift_plan (pw_study *s, pw_error *error) {
+  pw_drift *x = (pw_drift *)s;
+  const char *methods = s->methods_text ? s->methods_text : "rk4+all,ida+all,galpha+all";
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (s->m.file));
+  if (d.rtol == 0) d.rtol = 1e-6;
+  int status = pw_cli_settings (&s->line, &d, &s->t_end, &s->settings, &s->limit, error);
+  s->settings.ledger = 1;
+  if (status == PW_OK) status = pw_study_methods_read (&s->methods, methods, error);
+  if (status == PW_OK) status = drift_axes (x, error);
+  return status == PW_OK ? drift_plan_rows (x, error) : status;
+}
+
+/* ---- Runs ---- */
+
+static void drift_raise (double *most, double value) {
+  if (!(value <= *most)) *most = value;
+}
+
+/* The part of the run that a time belongs to, its end included. */
+static int drift_part (const pw_study *x, double t) {
+  int k = (int)ceil (t / x->t_end * DRIFT_PARTS - 1e-9) - 1;
+  return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;
+}
+
+/* After every accepted step, since between steps a projected method shows nothing of what it corrects. */
+static int drift_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
+  pw_row *r = v->row;
+  pw_sample sample;
+  int status = pw_at (run, pw_time (run), &sample, error), k = drift_part (v->study, pw_time (run));
+  if (status != PW_OK) return status;
+  const double value[DRIFT_QUANTITIES] = { sample.position, sample.velocity, fabs (sample.balance) };
+  for (int i = 0; i < DRIFT_QUANTITIES; i++) {
+    drift_raise (&r->most[i], value[i]);
+    if (k < DRIFT_PARTS / 2) drift_raise (&r->early[i], value[i]);
+    if (k == DRIFT_PARTS - 1) r->end[i] = fmax (r->end[i], value[i]);
+    if (r->part) r->part[k][i] = fmax (r->part[k][i], value[i]);
   }
   return PW_OK;
 }
 
-/* ---- After it ---- */
-
-static int drift_interrupted (pw_drift *x) {
-  char part[FIGURE_PATH + 16] = "";
-  if (x->csv) pw_text_abandon (x->csv, x->done, part, sizeof part);
-  pw_cli_say ("pinwheel: interrupted; %d of %d runs are done%s%s\n", x->done, x->rows, *part ? ", and kept in " : "",
-              part);
-  return PW_INTERRUPTED;
-}
-
-/* A whole table loses its ending .part; figures are drawn of it. */
-static int drift_finish (pw_drift *x, int status, pw_error *error) {
-  if (status == PW_RETRY && pw_stop) return drift_interrupted (x);
-  if (x->csv == NULL) return status;
-  pw_output *csv = x->csv;
-  x->csv = NULL;
-  if (status != PW_OK) {
-    pw_text_abandon (csv, x->done, (char[FIGURE_PATH + 16]){ 0 }, FIGURE_PATH + 16);
-    return status;
+static int drift_measure (pw_study *x, pw_row *r, pw_error *error) {
+  pw_error own = { 0 };
+  pw_study_visitor v = { .visit = drift_visit, .study = x, .row = r };
+  for (int i = 0; i < DRIFT_QUANTITIES; i++) {
+    r->end[i] = NAN;
+    for (int k = 0; r->part && k < DRIFT_PARTS; k++) r->part[k][i] = NAN;
   }
-  status = pw_output_finish (csv, error);
-  if (status == PW_OK) status = pw_drift_csv_time (x, error);
-  return status == PW_OK ? pw_drift_plot (x, error) : status;
+  return pw_study_outcome (r, pw_study_run (x, r, &v, &own), &own, error);
 }
 
-/* If no run has reached the end, that is a failure. */
-static int drift_verdict (const pw_drift *x, pw_error *error) {
-  for (int i = 0; i < x->rows; i++)
-    if (x->row[i].status == PW_OK) return PW_OK;
-  return pw_fail (error, PW_METHOD, "no method has reached the end; the last of them: %s", x->row[x->rows - 1].reason);
+double pw_drift_growth (const pw_row *r, int quantity) {
+  int known = quantity == DRIFT_BALANCE || r->most[quantity] > DRIFT_ROUND_OFF;
+  return r->state == ROW_DONE && known && r->early[quantity] > 0 ? log2 (r->most[quantity] / r->early[quantity]) : NAN;
+}
+
+/* ---- The command ---- */
+
+static int drift_begin (pw_study *x, pw_error *error) {
+  (void)error;
+  pw_drift_print_title (x);
+  return PW_OK;
+}
+
+static void drift_close (pw_study *s) {
+  pw_drift *x = (pw_drift *)s;
+  for (int i = 0; i < s->rows; i++) free (s->row[i].part);
+  pw_grid_free (&x->alpha);
+  pw_grid_free (&x->beta);
+  pw_grid_free (&x->every);
 }
 
 static int drift_command (void *options, pw_error *error) {
-  pw_drift *x = options;
-  x->lock = -1;
-  int status = drift_open (x, error);
-  if (status == PW_OK) {
-    pw_stop_catch ();
-    status = drift_rows (x, error);
-    pw_stop_release ();
-  }
-  status = drift_finish (x, status, error);
-  if (status == PW_OK) status = drift_verdict (x, error);
-  if (x->lock >= 0) close (x->lock);
-  pw_drift_free_rows (x);
-  pw_contestants_close (&x->list);
-  pw_cli_close_model (&x->m);
-  return status == PW_INTERRUPTED ? status : error->status;
+  static const pw_study_type type = { .table = "drift.csv",
+                                      .unit = "runs",
+                                      .plan = drift_plan,
+                                      .begin = drift_begin,
+                                      .measure = drift_measure,
+                                      .head = pw_drift_head,
+                                      .line = pw_drift_line,
+                                      .names = pw_drift_names,
+                                      .cells = pw_drift_cells,
+                                      .figures = pw_drift_figures,
+                                      .close = drift_close };
+  return pw_study_command (options, &type, error);
 }
 
 static const struct poptOption drift_options[] = {
   PW_OPTION_GROUP ("Comparison"),
   PW_TEXT_OPTION (
-      pw_drift, methods_text, "methods", 'm', "A,B,...|all",
+      pw_study, methods_text, "methods", 'm', "A,B,...|all",
       "Methods, separated by commas; all: every integrator with every stabilisation (default: those of rk4, "
       "ida and galpha)"),
   PW_STEP_OPTIONS,
@@ -138,7 +213,7 @@ static const struct poptOption drift_options[] = {
       "Values of an option: alpha or beta [1/s] of baumgarte, every [steps] of projection; repeatable. RANGE: "
       "V1,V2,..., lin:FIRST:LAST:COUNT or log:FIRST:LAST:COUNT"),
   PW_FLAG_OPTION (pw_drift, only_methods, "only-methods", "Omit the dependence of drift on options"),
-  PW_TEXT_OPTION (pw_drift, folder, "output", 'o', "DIR", "Write tables and figures into a folder"),
+  PW_TEXT_OPTION (pw_study, folder, "output", 'o', "DIR", "Write tables and figures into a folder"),
   PW_MODEL_OPTIONS,
   POPT_TABLEEND,
 };

@@ -1,74 +1,69 @@
-/* The truth: a table's, the model's own, or where there is neither that of methods that have little in common, each at its
- * tightest.  Two of them that agree best are the truth, as far as they agree. */
+/* The reference solution of a comparison: a table, the exact solution of the model, or else computed by methods that have
+ * little in common, each at its tightest.  Of the two that agree best one is the reference; its uncertainty is their distance. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
 #include "compare.h"
-#include "stop.h"
 
-enum { TRUTH_CANDIDATES = COMPARE_PARTNERS + 1 };
-#define TRUTH_LIMIT 10     /* processor time a candidate may take, at least [s] */
-#define TRUTH_LOOSEST 1e-9 /* tolerances are loosened up to here if a method fails, */
-#define TRUTH_FEWEST 1000  /* fixed steps up to the end over this, */
-#define TRUTH_STEPS 1e5    /* from the end over this, or the ladder's last one */
-#define TRUTH_ROUND_OFF 8  /* eps of the largest number: nothing is known better */
+enum { REFERENCE_CANDIDATES = COMPARE_PARTNERS + 1 };
+#define REFERENCE_LIMIT 10     /* CPU time of a candidate, at least [s] */
+#define REFERENCE_LOOSEST 1e-9 /* tolerances are loosened up to this if a method fails, */
+#define REFERENCE_FEWEST 1000  /* fixed steps up to t_end over this, */
+#define REFERENCE_STEPS 1e5    /* from t_end over this, or the last one of the ladder */
+#define REFERENCE_ROUND_OFF 8  /* eps of the largest number: the smallest uncertainty */
 
 typedef struct {
-  pw_contestant method;
-  double rung;
+  pw_row row;
   int good;
   pw_motion motion;
-} truth_candidate;
+} candidate;
 
-/* ---- What is known about a motion ---- */
+/* ---- Uncertainty ---- */
 
-/* Where columns are compared, agreement to the bit is no better than round-off. */
-static void truth_floor (const pw_compare *x, pw_truth *t) {
-  int n = pw_count_coordinates (x->m.system), loads = 0;
+/* Agreement to the bit, where columns are compared, is no better than round-off. */
+static void reference_floor (const pw_system *s, pw_reference *t) {
+  int n = pw_count_coordinates (s), loads = 0;
   for (int k = 0; k < t->motion.samples; k++)
     for (int j = 0; j < t->motion.width; j++) {
       double value = fabs (t->motion.x[k * t->motion.width + j]);
       if (isnan (value)) continue;
       loads |= j >= 2 * n;
-      if (j < 2 * n) t->size[pw_motion_unit (x->m.system, j)] = fmax (t->size[pw_motion_unit (x->m.system, j)], value);
+      if (j < 2 * n) t->size[pw_motion_unit (s, j)] = fmax (t->size[pw_motion_unit (s, j)], value);
     }
   for (int i = 0; i < MOTION_ERRORS; i++) {
     double size = i < MOTION_LAMBDA ? t->size[i % MOTION_UNITS] : loads;
-    if (i < MOTION_MOST) t->uncertainty[i] = t->uncertainty[i + MOTION_MOST]; /* at the end it may be luck */
-    t->uncertainty[i] = fmax (t->uncertainty[i], TRUTH_ROUND_OFF * DBL_EPSILON * size);
+    if (i < MOTION_MOST) t->uncertainty[i] = t->uncertainty[i + MOTION_MOST]; /* at the end it may be accidental */
+    t->uncertainty[i] = fmax (t->uncertainty[i], REFERENCE_ROUND_OFF * DBL_EPSILON * size);
   }
-  if (t->uncertainty[MOTION_LAMBDA] >= 1) t->uncertainty[MOTION_LAMBDA] = 0; /* as large as they are: not known */
+  if (t->uncertainty[MOTION_LAMBDA] >= 1) t->uncertainty[MOTION_LAMBDA] = 0; /* as large as the multipliers: unknown */
 }
 
 /* ---- Candidates ---- */
 
-/* Runs one; a tolerance or step that proves too small is made larger.  PW_RETRY: it has none to offer. */
-static int truth_run (pw_compare *x, truth_candidate *c, pw_error *error) {
-  double limit = x->limit;
+/* Runs one; a tolerance or step that proves too small is increased.  PW_RETRY: interrupted. */
+static int reference_run (pw_compare *x, candidate *c, pw_error *error) {
+  pw_study *s = &x->study;
+  double limit = s->cpu_end, loosest = c->row.adaptive ? REFERENCE_LOOSEST : s->t_end / REFERENCE_FEWEST;
+  pw_error own = { 0 };
   int status = PW_RETRY;
-  x->limit = fmax (x->limit, TRUTH_LIMIT);
-  double loosest = c->method.adaptive ? TRUTH_LOOSEST : x->t_end / TRUTH_FEWEST;
-  for (; status != PW_OK && c->rung <= loosest; c->rung *= 10) {
-    pw_rung r = { .method = &c->method, .rung = c->rung };
-    pw_error own = { 0 };
-    status = pw_compare_run (x, &r, &c->motion, &own);
-    if (status == PW_OK || pw_stop || r.state == COMPARE_STOPPED) break;
-    if (status == PW_MACHINE || status == PW_START) {
-      *error = own;
-      break;
-    }
+  s->cpu_end = fmax (s->cpu_end, REFERENCE_LIMIT);
+  while (status != PW_OK && c->row.level <= loosest) {
+    own = (pw_error){ 0 };
+    status = pw_compare_run (x, &c->row, &c->motion, &own);
+    if (status == PW_OK || pw_stop || c->row.state == ROW_STOPPED || status == PW_MACHINE || status == PW_START) break;
+    c->row.level *= 10;
   }
-  x->limit = limit;
+  s->cpu_end = limit;
   c->good = status == PW_OK;
-  return status == PW_MACHINE || status == PW_START ? status : pw_stop ? PW_RETRY : PW_OK;
+  return c->good ? PW_OK : pw_study_outcome (&c->row, status, &own, error);
 }
 
-/* How far two are apart, as a part of how large the motion is. */
-static double truth_apart (const pw_compare *x, const truth_candidate *a, const truth_candidate *b) {
+/* The distance of two motions relative to the size of the motion. */
+static double reference_distance (const pw_system *s, const candidate *a, const candidate *b) {
   double error[MOTION_ERRORS], most = 0;
-  pw_truth t = { .motion = a->motion };
-  truth_floor (x, &t);
-  pw_motion_distance (x->m.system, &a->motion, &b->motion, error);
+  pw_reference t = { .motion = a->motion };
+  reference_floor (s, &t);
+  pw_motion_distance (s, &a->motion, &b->motion, error);
   for (int i = 0; i < MOTION_UNITS; i++) {
     double part = error[MOTION_MOST + i] / (t.size[i] > 0 ? t.size[i] : 1);
     if (!(part <= most)) most = part;
@@ -76,97 +71,90 @@ static double truth_apart (const pw_compare *x, const truth_candidate *a, const 
   return most;
 }
 
-static void truth_name (const truth_candidate *c, char *text, size_t size) {
-  char rung[32];
-  snprintf (text, size, "%s, %s %s%s", c->method.name, c->method.adaptive ? "rtol" : "step",
-            pw_format (rung, c->rung, 4), c->method.adaptive ? "" : " s");
+static void reference_name (const candidate *c, char *text, size_t size) {
+  char level[32];
+  snprintf (text, size, "%s, %s %s%s", c->row.method, c->row.adaptive ? "rtol" : "step",
+            pw_format (level, c->row.level, 4), c->row.adaptive ? "" : " s");
 }
 
 /* Whether two methods share their integrator. */
-static int truth_related (const truth_candidate *a, const truth_candidate *b) {
-  size_t n = strcspn (a->method.name, "+");
-  return strncmp (a->method.name, b->method.name, n + 1) == 0;
+static int reference_related (const candidate *a, const candidate *b) {
+  size_t n = strcspn (a->row.method, "+");
+  return strncmp (a->row.method, b->row.method, n + 1) == 0;
 }
 
 /* The two that agree best, and how well; INFINITY if there are no two. */
-static double truth_pair (const pw_compare *x, const truth_candidate *c, int related, int *best, int *with) {
+static double reference_pair (const pw_system *s, const candidate *c, int related, int *best, int *with) {
   double least = INFINITY;
-  for (int i = 0; i < TRUTH_CANDIDATES; i++)
-    for (int j = i + 1; j < TRUTH_CANDIDATES; j++) {
-      if (!c[i].good || !c[j].good || truth_related (&c[i], &c[j]) != related) continue;
-      double apart = truth_apart (x, &c[i], &c[j]);
+  for (int i = 0; i < REFERENCE_CANDIDATES; i++)
+    for (int j = i + 1; j < REFERENCE_CANDIDATES; j++) {
+      if (!c[i].good || !c[j].good || reference_related (&c[i], &c[j]) != related) continue;
+      double apart = reference_distance (s, &c[i], &c[j]);
       if (apart < least) least = apart, *best = i, *with = j;
     }
   return least;
 }
 
-/* Two of one integrator are taken if there are no others; the first of the two is the truth. */
-static void truth_choose (pw_compare *x, truth_candidate *c) {
-  pw_truth *t = &x->truth;
+/* Two of one integrator are taken if there are no others; the first of the two is the reference. */
+static void reference_choose (pw_compare *x, candidate *c) {
+  const pw_system *s = x->study.m.system;
+  pw_reference *t = &x->reference;
   int best = -1, with = -1;
-  if (isinf (truth_pair (x, c, 0, &best, &with)) && isinf (truth_pair (x, c, 1, &best, &with))) return;
+  if (isinf (reference_pair (s, c, 0, &best, &with)) && isinf (reference_pair (s, c, 1, &best, &with))) return;
   t->known = 1;
-  truth_name (&c[best], t->about, sizeof t->about);
-  pw_motion_distance (x->m.system, &c[best].motion, &c[with].motion, t->uncertainty);
-  for (int i = 0; i < TRUTH_CANDIDATES; i++) {
+  reference_name (&c[best], t->about, sizeof t->about);
+  pw_motion_distance (s, &c[best].motion, &c[with].motion, t->uncertainty);
+  for (int i = 0; i < REFERENCE_CANDIDATES; i++) {
     int place = i == with ? 0 : t->partners + (t->partners == 0);
     if (i == best || !c[i].good) continue;
-    truth_name (&c[i], t->partner[place].about, sizeof t->partner[place].about);
-    pw_motion_distance (x->m.system, &c[best].motion, &c[i].motion, t->partner[place].error);
+    reference_name (&c[i], t->partner[place].about, sizeof t->partner[place].about);
+    pw_motion_distance (s, &c[best].motion, &c[i].motion, t->partner[place].error);
     t->partners = place + 1 > t->partners ? place + 1 : t->partners;
   }
   t->motion = c[best].motion;
   c[best].motion = (pw_motion){ .samples = 0 };
-  truth_floor (x, t);
+  reference_floor (s, t);
 }
 
-static int truth_make (pw_compare *x, pw_error *error) {
-  double step = fmin (x->ladder[0].to, x->t_end / TRUTH_STEPS);
-  truth_candidate c[TRUTH_CANDIDATES] = { { .method = { "erk8+projection", 1 }, .rung = 3e-14 },
-                                          { .method = { "rk4+projection", 0 }, .rung = step },
-                                          { .method = { "ida+ggl", 1 }, .rung = 1e-13 },
-                                          { .method = { "ida+baumgarte", 1 }, .rung = 1e-13 } };
+static int reference_compute (pw_compare *x, pw_error *error) {
+  pw_study *s = &x->study;
+  double step = fmin (x->finest_step, s->t_end / REFERENCE_STEPS);
+  candidate c[REFERENCE_CANDIDATES] = {
+    { .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 } },
+    { .row = { .method = "rk4+projection", .adaptive = 0, .level = step } },
+    { .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
+    { .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
+  };
   int status = PW_OK;
-  pw_progress_count (&x->progress, "reference", "methods", 0, TRUTH_CANDIDATES);
-  for (int i = 0; status == PW_OK && i < TRUTH_CANDIDATES; i++, x->rows++) {
-    status = pw_motion_open (&c[i].motion, x->m.system, MOTION_SAMPLES, error);
-    if (status == PW_OK) {
-      pw_motion_times (&c[i].motion, x->t_end);
-      status = truth_run (x, &c[i], error);
-    }
+  pw_progress_count (&s->progress, "reference", "methods", 0, REFERENCE_CANDIDATES);
+  for (s->done = 0; status == PW_OK && s->done < REFERENCE_CANDIDATES; s->done++) {
+    status = pw_motion_open (&c[s->done].motion, s->m.system, MOTION_SAMPLES, error);
+    if (status != PW_OK) break;
+    pw_motion_times (&c[s->done].motion, s->t_end);
+    status = reference_run (x, &c[s->done], error);
   }
-  pw_progress_end (&x->progress);
-  x->rows = 0;
-  if (status == PW_OK) truth_choose (x, c);
-  for (int i = 0; i < TRUTH_CANDIDATES; i++) pw_motion_close (&c[i].motion);
+  pw_progress_end (&s->progress);
+  s->done = 0;
+  if (status == PW_OK) reference_choose (x, c);
+  for (int i = 0; i < REFERENCE_CANDIDATES; i++) pw_motion_close (&c[i].motion);
   return status;
 }
 
-/* A table's end is that of the comparison, if there is no other. */
-static int truth_table (pw_compare *x, pw_error *error) {
-  double t_end = x->line.t_end ? x->t_end : 0;
-  int status = pw_motion_read (&x->truth.motion, x->m.system, x->truth_path, &t_end, 1, error);
-  if (status == PW_OK) x->t_end = t_end;
-  snprintf (x->truth.about, sizeof x->truth.about, "%s", x->truth_path);
-  return status;
-}
-
-/* What the model knows holds for the start it describes. */
-static int truth_of_model (pw_compare *x, pw_error *error) {
-  snprintf (x->truth.about, sizeof x->truth.about, "the model's own truth");
-  return pw_motion_truth (&x->truth.motion, x->m.model, x->m.system, x->t_end, error);
-}
-
-int pw_truth_find (pw_compare *x, pw_error *error) {
-  int own = x->truth_path == NULL && pw_has_truth (x->m.model) && x->line.starts == NULL;
-  if (x->truth_path == NULL && !own) return truth_make (x, error);
-  int status = own ? truth_of_model (x, error) : truth_table (x, error);
+/* The exact solution of the model holds for the initial conditions of the model. */
+int pw_reference_find (pw_compare *x, pw_error *error) {
+  pw_study *s = &x->study;
+  pw_reference *t = &x->reference;
+  double t_end = s->line.t_end ? s->t_end : 0; /* 0: that of the table */
+  int status, exact = s->reference_path == NULL && pw_has_truth (s->m.model) && s->line.starts == NULL;
+  if (s->reference_path == NULL && !exact) return reference_compute (x, error);
+  snprintf (t->about, sizeof t->about, "%s", exact ? "the exact solution of the model" : s->reference_path);
+  if (exact)
+    status = pw_motion_truth (&t->motion, s->m.model, s->m.system, s->t_end, error);
+  else
+    status = pw_motion_read (&t->motion, s->m.system, s->reference_path, &t_end, 1, error);
   if (status != PW_OK) return status;
-  x->truth.known = 1;
-  truth_floor (x, &x->truth);
+  if (!exact) s->t_end = t_end;
+  t->known = 1;
+  reference_floor (s->m.system, t);
   return PW_OK;
-}
-
-void pw_truth_close (pw_truth *t) {
-  pw_motion_close (&t->motion);
 }

@@ -1,74 +1,62 @@
-/* Methods that are set side by side. */
+/* The list of methods of a study. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include "contestants.h"
+#include "study.h"
 
-int pw_contestant_adaptive (const pw_method *integrator, const char *name) {
-  return integrator->adaptive && strstr (name, ":steps=fixed") == NULL;
-}
-
-static int contestants_count_all (size_t *bytes) {
-  int count = 0;
-  for (int i = 0; pw_methods[i]; i++)
-    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; s->name; s++, count++)
-      *bytes += strlen (pw_methods[i]->name) + strlen (s->name) + 2;
-  return count;
-}
-
-static void contestants_add (pw_contestants *c, const char *name, const pw_method *integrator) {
-  for (int i = 0; i < c->count; i++)
-    if (strcmp (c->method[i].name, name) == 0) return;
-  c->method[c->count++] = (pw_contestant){ name, pw_contestant_adaptive (integrator, name) };
-}
-
-static char *contestants_add_all (pw_contestants *c, char *at) {
-  for (int i = 0; pw_methods[i]; i++)
-    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; s->name; s++) {
-      int n = sprintf (at, "%s+%s", pw_methods[i]->name, s->name);
-      contestants_add (c, at, pw_methods[i]);
-      at += n + 1;
-    }
-  return at;
-}
-
-/* One name of n bytes, copied to `at`. */
-static int contestants_add_one (pw_contestants *c, char *at, const char *text, size_t n, pw_error *error) {
+static int methods_add (pw_study_methods *list, const char *name, pw_error *error) {
   const pw_method *integrator;
-  int stabilisation;
-  memcpy (at, text, n);
-  at[n] = 0;
-  int status = pw_parse_method (at, &integrator, &stabilisation, error);
-  if (status == PW_OK) contestants_add (c, at, integrator);
+  int stabilisation, status = pw_parse_method (name, &integrator, &stabilisation, error);
+  for (int i = 0; i < list->count; i++)
+    if (strcmp (list->method[i].name, name) == 0) return status;
+  if (status != PW_OK) return status;
+  pw_study_method *method = &list->method[list->count++];
+  strcpy (method->name, name);
+  method->adaptive = pw_cli_adaptive (integrator, name);
+  return PW_OK;
+}
+
+/* Every stabilisation of an integrator, or of all of them: NULL. */
+static int methods_add_all (pw_study_methods *list, const char *integrator, pw_error *error) {
+  char name[STUDY_NAME];
+  int status = PW_OK;
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; status == PW_OK && s->name; s++) {
+      if (integrator && strcmp (integrator, pw_methods[i]->name) != 0) continue;
+      snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, s->name);
+      status = methods_add (list, name, error);
+    }
   return status;
 }
 
-int pw_contestants_read (pw_contestants *c, const char *text, pw_error *error) {
+/* "all", "INTEGRATOR+all", or a method. */
+static int methods_add_item (pw_study_methods *list, char *item, pw_error *error) {
+  const pw_method *method;
+  int stabilisation;
+  if (strcmp (item, "all") == 0) return methods_add_all (list, NULL, error);
+  char *plus = item + strcspn (item, "+:");
+  if (strcmp (plus, "+all") != 0) return methods_add (list, item, error);
+  *plus = 0;
+  int status = pw_parse_method (item, &method, &stabilisation, error);
+  return status == PW_OK ? methods_add_all (list, method->name, error) : status;
+}
+
+int pw_study_methods_read (pw_study_methods *list, const char *text, pw_error *error) {
   const char *whole = text;
-  size_t bytes = strlen (text) + 1;
-  int most = contestants_count_all (&bytes) + 1, status = PW_OK;
-  for (const char *p = text; *p; p++) most += *p == ',';
-  *c = (pw_contestants){ .names = malloc (bytes), .method = calloc ((size_t)most, sizeof *c->method) };
-  if (c->names == NULL || c->method == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-  char *at = c->names;
-  for (int all = 0; status == PW_OK; text++) {
-    size_t n = strcspn (text, ",");
+  char item[STUDY_NAME];
+  int most = 1, status = PW_OK;
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; s->name; s++) most++;
+  for (const char *c = text; *c; c++) most += *c == ',';
+  *list = (pw_study_methods){ .method = calloc ((size_t)most, sizeof *list->method) };
+  if (list->method == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  for (size_t n; status == PW_OK; text += n + 1) {
+    n = strcspn (text, ",");
     if (n == 0) return pw_fail (error, PW_INPUT, "--methods \"%.80s\": a name is missing", whole);
-    if (n == 3 && strncmp (text, "all", 3) == 0) {
-      if (!all) at = contestants_add_all (c, at);
-      all = 1;
-    } else {
-      status = contestants_add_one (c, at, text, n, error);
-      at += n + 1;
-    }
-    text += n;
-    if (*text == 0) break;
+    if (n >= sizeof item) return pw_fail (error, PW_INPUT, "--methods \"%.80s\": too long a name", whole);
+    snprintf (item, sizeof item, "%.*s", (int)n, text);
+    status = methods_add_item (list, item, error);
+    if (text[n] == 0) break;
   }
   return status;
-}
-
-void pw_contestants_close (pw_contestants *c) {
-  free (c->method);
-  free (c->names);
-  *c = (pw_contestants){ .count = 0 };
 }
