@@ -113,6 +113,8 @@ const char *pw_lock_reason (int why);
 
 /* Writes; PW_MACHINE with the reason if that fails, or a write before it has failed. */
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
+/* PW_MACHINE if something written to its stream since errno was 0 has failed. */
+int pw_output_check (pw_output *o, pw_error *error);
 
 /* Whether there is something before what is written. */
 int pw_output_continued (const pw_output *o);

@@ -172,11 +172,16 @@ int pw_output_is_file (const pw_output *o) {
   return o->part != NULL;
 }
 
-int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error) {
-  errno = 0;
-  if (fwrite (text, 1, size, o->stream) == size && !ferror (o->stream)) return PW_OK;
+int pw_output_check (pw_output *o, pw_error *error) {
+  if (!ferror (o->stream)) return PW_OK;
   if (o->why == 0) o->why = errno;
   return output_fail (o, o->why, 0, error);
+}
+
+int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error) {
+  errno = 0;
+  fwrite (text, 1, size, o->stream);
+  return pw_output_check (o, error);
 }
 
 /* ---- Closing ---- */
