@@ -36,16 +36,15 @@ void pw_rank_rows (const pw_system *s, double *rows, double *norm) {
     }
 }
 
-/* Takes the kept rows' directions out of a row, twice (Giraud, Langou & Rozloznik 2005); its norm afterwards. */
+/* Takes the kept rows' directions out of a row; its norm afterwards. */
 static double rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n) {
   double norm = 0;
-  for (int pass = 0; pass < 2; pass++)
-    for (int k = 0; k < rank; k++) {
-      const double *other = rows + (size_t)kept[k] * (size_t)n;
-      double dot = 0;
-      for (int j = 0; j < n; j++) dot += row[j] * other[j];
-      for (int j = 0; j < n; j++) row[j] -= dot * other[j];
-    }
+  for (int k = 0; k < rank; k++) {
+    const double *other = rows + (size_t)kept[k] * (size_t)n;
+    double dot = 0;
+    for (int j = 0; j < n; j++) dot += row[j] * other[j];
+    for (int j = 0; j < n; j++) row[j] -= dot * other[j];
+  }
   for (int j = 0; j < n; j++) norm += row[j] * row[j];
   return sqrt (norm);
 }
@@ -61,7 +60,7 @@ static int rank_pivot (const double *norm, const unsigned char *active, int firs
 }
 
 /* Keeps independent rows among first .. end - 1 behind the `rank` ones kept so far, until there are `most`; returns the new
- * rank. */
+ * rank.  Each is orthogonalised as others are kept, and once more before it is (Giraud, Langou & Rozloznik 2005). */
 static int rank_keep (double tol, int most, double *rows, double *norm, int *kept, unsigned char *active, int rank,
                       int first, int end, int n) {
   for (int i = first; i < end; i++) norm[i] = rank_orthogonalise (rows + (size_t)i * (size_t)n, rows, kept, rank, n);

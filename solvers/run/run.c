@@ -114,7 +114,6 @@ static int run_reselect (pw_run *r, pw_error *error) {
   int other = pw_rank_reselect (r);
   if (other < 0) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   if (other == 0) return PW_OK;
-  memcpy (r->ledger, r->ledger_at, (size_t)r->s->entries * sizeof (double));
   return pw_run_renew (r, 1, error);
 }
 

@@ -65,9 +65,8 @@ static int checkpoint_go_on (pw_run *r, pw_archive *a, pw_error *error) {
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   pw_sample sample;
   if (r->near) return PW_RETRY;
-  int status = pw_at (r, r->t, &sample, error); /* brings the ledger up to date */
+  int status = pw_at (r, r->t, &sample, error); /* evaluates what the method leaves to samples */
   if (status != PW_OK) return status;
-  for (int i = 0; i < r->s->entries; i++) r->ledger[i] = r->ledger_at[i];
   checkpoint_sizes (r, a);
   checkpoint_state (r, a);
   pw_archive own = { .used = a->used, .loading = 1 };

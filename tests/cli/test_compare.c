@@ -110,6 +110,20 @@ static void test_no_order (void **state) {
   for (int row = 0; row < 3; row++) assert_string_equal (compare_cell ("round/compare.csv", row, ORDER), "nan");
 }
 
+/* The last row knows the reference's uncertainty only: what is not ten times that has no order, however well it fits. */
+static void test_uncertain_order (void **state) {
+  (void)state;
+  cli_good ("pinwheel compare ezyroller --methods rk4+projection --t-end 2 --step-ladder 0.02:0.0003 --repeats 1 "
+            "-o @/uncertain >@/table");
+  double uncertainty = compare_number ("uncertain/compare.csv", 6, MOST);
+  assert_non_null (strstr (compare_cell ("uncertain/compare.csv", 6, BELOW), "largest.length"));
+  for (int row = 2; row < 7; row++) {
+    double most = compare_number ("uncertain/compare.csv", row, MOST);
+    int known = strcmp (compare_cell ("uncertain/compare.csv", row, ORDER), "nan") != 0;
+    assert_true (row > 3 ? !known || most > 10 * uncertainty : known);
+  }
+}
+
 /* However long a run takes, it is repeated: one number has no spread.  (On a machine that does this one in less than a sixth of a
  * second, more repeats follow anyway.) */
 static void test_repeats (void **state) {
@@ -177,6 +191,25 @@ static void test_jump (void **state) {
     double error = compare_number ("jump/compare.csv", i, MULTIPLIER);
     assert_true (error > 0 && error < 1e-3); /* the jump is 1 */
   }
+}
+
+/* Errors of multipliers are relative to the largest of their unit: masses a power of 2 as large change no digit. */
+static void test_multiplier_scale (void **state) {
+  double error[2];
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    char text[600];
+    snprintf (text, sizeof text,
+              "pinwheel: 1\nbodies:\n  - {name: a, mass: %d, start: {x: 1}}\n  - {name: b, mass: %d, start: {x: 2}}\n"
+              "elements:\n  - {pin: A, body: [a, ground], at: [[-1, 0], [0, 0]]}\n"
+              "  - {pin: B, body: [a, b], at: [[0, 0], [-1, 0]]}\n  - {gravity: g, acceleration: [0, -10]}\n",
+              i ? 1024 : 1, i ? 1024 : 1);
+    cli_write ("double.yaml", text);
+    cli_good ("pinwheel compare @/double.yaml --methods rk4+projection --t-end 0.5 --step-ladder 0.02 --repeats 1 "
+              "-o @/double >@/table");
+    error[i] = compare_number ("double/compare.csv", 0, MULTIPLIER);
+  }
+  assert_true (error[0] > 0 && error[1] == error[0]);
 }
 
 /* The truth of its own making agrees with digits computed in quadruple precision (tests/reference) as far as it claims. */
@@ -296,10 +329,13 @@ static int compare_setup (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_rows),      cmocka_unit_test (test_orders),     cmocka_unit_test (test_no_order),
-    cmocka_unit_test (test_repeats),   cmocka_unit_test (test_row_is_run), cmocka_unit_test (test_truth),
-    cmocka_unit_test (test_own_truth), cmocka_unit_test (test_jump),       cmocka_unit_test (test_all),
-    cmocka_unit_test (test_limit),     cmocka_unit_test (test_failure),    cmocka_unit_test (test_interrupt),
+    cmocka_unit_test (test_rows),     cmocka_unit_test (test_orders),
+    cmocka_unit_test (test_no_order), cmocka_unit_test (test_uncertain_order),
+    cmocka_unit_test (test_repeats),  cmocka_unit_test (test_row_is_run),
+    cmocka_unit_test (test_truth),    cmocka_unit_test (test_own_truth),
+    cmocka_unit_test (test_jump),     cmocka_unit_test (test_multiplier_scale),
+    cmocka_unit_test (test_all),      cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_failure),  cmocka_unit_test (test_interrupt),
     cmocka_unit_test (test_bad),
   };
   return cmocka_run_group_tests (tests, compare_setup, cli_teardown);

@@ -180,6 +180,36 @@ static void test_growth (void **state) {
     }
 }
 
+/* A torque that changes sign: the speed, (1 - cos w t) / w, was as large at half of the time as it is again. */
+static void limits_swung (pw_model *m, const void *parameters) {
+  const double omega = *(const double *)parameters;
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1 });
+  pw_add_pin (m, &(pw_pin){ .name = "P", .body = { "rotor", "ground" } });
+  pw_add_torque (
+      m, &(pw_torque){ .name = "T",
+                       .body = { "rotor", "ground" },
+                       .value = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = omega, .phase = -PW_PI / 2 } } });
+}
+
+/* Growth is that since a mark at 8192 s or so, not that of the last step. */
+static void test_no_growth (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof (pw_plugin_table),
+                                         .parameters = limits_list,
+                                         .parameters_size = sizeof (double),
+                                         .build = limits_swung };
+  (void)state;
+  int which;
+  const double omega = 3 * PW_PI / 8192, t = (6 * PW_PI + 2.2) / omega;
+  double power;
+  pw_system *s = scene_system (&table, "torque", omega, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1, .span = 1 });
+  check_close ("speed", runs_to (r, t).v[2], (1 - cos (2.2)) / omega, 1e-6 / omega, "1e-6: (w h)^4, with room");
+  assert_true (pw_run_growth (r, &which, &power) == 0 && power < 0);
+  pw_close (r);
+  pw_free (s);
+}
+
 /* At 4.5e13 rad an angle is known to 0.01 rad. */
 static void test_beyond_numbers (void **state) {
   (void)state;
@@ -198,7 +228,8 @@ int main (void) {
     cmocka_unit_test (test_max_steps),     cmocka_unit_test (test_max_steps_of_fixed_steps),
     cmocka_unit_test (test_bad_max_steps), cmocka_unit_test (test_stop),
     cmocka_unit_test (test_stop_samples),  cmocka_unit_test (test_stop_inside),
-    cmocka_unit_test (test_growth),        cmocka_unit_test (test_beyond_numbers)
+    cmocka_unit_test (test_growth),        cmocka_unit_test (test_no_growth),
+    cmocka_unit_test (test_beyond_numbers)
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -40,7 +40,7 @@ static void machine_whole (const char *writer) {
 /* Files under their own names are whole: of as many lines as those in @/whole; or they say that they are not.  A
  * checkpoint may be of any time; that it is whole is tested where it is resumed. */
 static void machine_check_whole (const char *writer) {
-  cli_run ("for f in @/o/*; do case $f in *.part | *.ck | */\\*) continue ;; esac\n"
+  cli_run ("for f in @/o/*; do case $f in *.part | *.sorted | *.ck | */\\*) continue ;; esac\n"
            "  head -1 $f | grep -q '^# incomplete: ' || [ \"$(wc -l <$f)\" = \"$(wc -l <@/whole/${f##*/})\" ] || echo "
            "${f##*/}\n"
            "done");

@@ -112,6 +112,28 @@ static void test_parallelogram_twins (void **state) {
   redundant_twins (&redundant_parallelogram, &redundant_slotted_table, 1, 1e-3, redundant_cranks);
 }
 
+/* One crank is given at another angle than the others: off the constraints all rows are independent, more or less. */
+static void test_parallelogram_start (void **state) {
+  static const char *const crank[] = { "crank1.phi", "crank2.phi", "crank3.phi" };
+  static const double off[] = { 1e-5, 1e-3, 0.1 };
+  (void)state;
+  for (int i = 0; i < 3; i++)
+    for (int k = 0; k < 3; k++) {
+      pw_error error = { 0 };
+      double phi = off[k] - PW_PI / 4;
+      pw_model *m = scene_model (&redundant_parallelogram, NULL);
+      check_ok (pw_set_start (m, crank[i], phi, &error), &error);
+      pw_system *s = scene_compile (m);
+      pw_run *r = runs_open (s, "rk4+projection", NULL);
+      assert_int_equal (pw_run_start (r)->freed, 0);
+      pw_sample x = runs_to (r, 0);
+      for (int j = 0; j < 3; j++)
+        check_close (crank[j], trial_state (s, &x, crank[j]), phi, 64 * CHECK_EPS, "64 eps: what a start is good to");
+      pw_close (r);
+      pw_free (s);
+    }
+}
+
 /* ---- A tricycle: two wheels on one axle, a steered one in front ---- */
 
 static void redundant_tricycle (pw_model *m, int wheels) {
@@ -297,6 +319,16 @@ static void test_caster (void **state) {
   }
 }
 
+/* Bolts that drift apart are four independent rows: even so three are kept, and the wheel. */
+static void test_drifting_bolts (void **state) {
+  (void)state;
+  static const char *const name[] = { "hull.x", "hull.y", "hull.phi", "load.x", "load.y", "fork.phi", NULL };
+  double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
+  redundant_end (&redundant_on_caster_table, "rk4+none", 0, 3, name, a, 0.004);
+  redundant_end (&redundant_on_caster_plainly_table, "rk4+none", 0, 3, name, b, 0.004);
+  check_below ("the bolted bracket", redundant_off (a, b, 6), 1e-3, "drift");
+}
+
 /* ---- A cart on two casters, their forks without mass, with two wheels on each axle ----
  *
  * The rows of the second wheels touch no mass: what the elimination leaves of them is nothing but round-off. */
@@ -412,11 +444,13 @@ static void test_moments (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_parallelogram_twins),
+    cmocka_unit_test (test_parallelogram_start),
     cmocka_unit_test (test_axle),
     cmocka_unit_test (test_axle_forces),
     cmocka_unit_test (test_frame),
     cmocka_unit_test (test_bracket),
     cmocka_unit_test (test_caster),
+    cmocka_unit_test (test_drifting_bolts),
     cmocka_unit_test (test_casters),
     cmocka_unit_test (test_names),
     cmocka_unit_test (test_kept),

@@ -58,6 +58,20 @@ static void test_little (void **state) {
   }
 }
 
+/* Round-off is put right, but nothing is said of it. */
+static void test_round_off (void **state) {
+  static const char *const name[] = { "steer.x", NULL };
+  static const double value[] = { 0.375 + 12 * CHECK_EPS };
+  (void)state;
+  pw_system *s;
+  pw_run *r = start_open (&s, name, value);
+  const pw_start_report *start = pw_run_start (r);
+  int changed = 0;
+  for (int j = 0; j < 6; j++) changed += start->q[j] != start->q_given[j];
+  assert_true (changed > 0 && start->moved == 0);
+  start_close (r, s);
+}
+
 /* A state on the way is as consistent as it can be: it is not touched, either. */
 static void test_no_harm_on_the_way (void **state) {
   (void)state;
@@ -259,6 +273,28 @@ static void test_mass_stays (void **state) {
   start_close (r, s);
 }
 
+/* The same where an angle is specified, and rates that the wheel does not allow: these are changed, no position is. */
+static void start_slips (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { 1, 0.3, 0.2 } });
+  pw_add_body (m, &(pw_body){ .name = "steer", .start = { 0, 0, 2 } });
+  pw_add_pin (m, &(pw_pin){ .name = "B", .body = { "frame", "steer" }, .at = { { 0.5, 0 }, { -0.125, 0 } } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "A", .body = "frame", .at = { -0.5, 0 } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "C", .body = "steer" });
+}
+
+static void test_rates_yield (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = start_slips };
+  (void)state;
+  pw_system *s = scene_system (&table, NULL);
+  pw_run *r = runs_open (s, "rk4", NULL);
+  const pw_start_report *start = pw_run_start (r);
+  const double frame[3] = { 0 };
+  check_bits ("frame", start->q, frame, 3);
+  assert_true (start->q[5] == 2 && start->v[1] != 0.3);
+  start_close (r, s);
+}
+
 /* Positions that cannot all be held do not free the rates. */
 static void test_rates_stay (void **state) {
   (void)state;
@@ -415,6 +451,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_no_harm),
     cmocka_unit_test (test_little),
+    cmocka_unit_test (test_round_off),
     cmocka_unit_test (test_no_harm_on_the_way),
     cmocka_unit_test (test_specified),
     cmocka_unit_test (test_specified_zero),
@@ -426,6 +463,7 @@ int main (void) {
     cmocka_unit_test (test_far),
     cmocka_unit_test (test_freed),
     cmocka_unit_test (test_mass_stays),
+    cmocka_unit_test (test_rates_yield),
     cmocka_unit_test (test_rates_stay),
     cmocka_unit_test (test_least_change),
     cmocka_unit_test (test_drive),

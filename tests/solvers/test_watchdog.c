@@ -443,19 +443,40 @@ static void test_masses (void **state) {
   pw_free (s);
 }
 
+/* Accelerations are judged in units of the scene: under another torque a disc turns as before, faster. */
+static void watchdog_build_disc (pw_model *m, const void *parameter) {
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+  pw_add_pin (m, &(pw_pin){ .name = "hub", .body = { "disc", "ground" } });
+  pw_add_torque (m, &(pw_torque){ .name = "motor",
+                                  .body = { "disc", "ground" },
+                                  .value = { .constant = *(const double *)parameter } });
+}
+
+static void test_agitation (void **state) {
+  static const pw_parameter list[] = { { .name = "torque", .value = 1 }, { .name = NULL } };
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof (pw_plugin_table),
+                                         .parameters = list,
+                                         .parameters_size = sizeof (double),
+                                         .build = watchdog_build_disc };
+  (void)state;
+  for (int k = 0; k <= 6; k += 2) {
+    pw_system *s = scene_system (&table, "torque", pow (10, k), NULL);
+    pw_run *r = runs_open (s, "rk4+projection", NULL);
+    check_close ("agitation", pw_run_agitation (r), 1, 16 * CHECK_EPS, "round-off");
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_light_cart),
-    cmocka_unit_test (test_sine),
-    cmocka_unit_test (test_near_slider_crank),
-    cmocka_unit_test (test_near_four_bar),
-    cmocka_unit_test (test_no_change_point),
-    cmocka_unit_test (test_messages),
-    cmocka_unit_test (test_extreme),
-    cmocka_unit_test (test_limits),
-    cmocka_unit_test (test_evaluations),
-    cmocka_unit_test (test_jump),
-    cmocka_unit_test (test_masses),
+    cmocka_unit_test (test_light_cart),        cmocka_unit_test (test_sine),
+    cmocka_unit_test (test_near_slider_crank), cmocka_unit_test (test_near_four_bar),
+    cmocka_unit_test (test_no_change_point),   cmocka_unit_test (test_messages),
+    cmocka_unit_test (test_extreme),           cmocka_unit_test (test_limits),
+    cmocka_unit_test (test_evaluations),       cmocka_unit_test (test_jump),
+    cmocka_unit_test (test_agitation),         cmocka_unit_test (test_masses),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

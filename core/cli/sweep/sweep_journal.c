@@ -93,7 +93,6 @@ static int journal_write (pw_journal *j, const char *text, size_t size, pw_error
   size_t done = 0;
   while (done < size) {
     ssize_t n = pwrite (j->file, text + done, size - done, j->size + (off_t)done);
-    if (n < 0 && errno == EINTR) continue;
     if (n <= 0) {
       const char *why = n < 0 ? strerror (errno) : "no bytes were taken";
       if (done > 0 && ftruncate (j->file, j->size) != 0) why = "no room"; /* the next start cuts it off */
