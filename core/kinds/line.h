@@ -1,4 +1,4 @@
-/* A point of body 1 on a line of body 2: the row that slot and slider share.
+/* A point of body 1 on a line of body 2: the equation that slot, slider and drive share.
  *
  *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic row)
  *   G     = [ n  t.a | -n  -t.D ]             t: along the line, n: t turned by +90 degrees, a = R(phi1) s1
@@ -18,6 +18,7 @@ typedef struct {
   double s1[2]; /* the point in body 1's frame [m] */
   double n[2];  /* normal of the line in body 2's frame */
   double c;     /* where the line is along n [m] */
+  double angle; /* of a slider: phi1 - phi2 [rad]; of a drive: 1 if it is one of an angle, with n = 0 */
 } line;
 
 /* A line in its present place: directions in world axes, the arm a, the distance D, and their components. */
@@ -27,7 +28,7 @@ typedef struct {
 } line_axes;
 
 static inline line line_make (const double at[2][2], double heading) {
-  line k = { { at[0][0], at[0][1] }, { -sin (heading), cos (heading) }, 0 };
+  line k = { { at[0][0], at[0][1] }, { -sin (heading), cos (heading) }, 0, 0 };
   k.c = k.n[0] * at[1][0] + k.n[1] * at[1][1];
   return k;
 }
@@ -91,6 +92,41 @@ static inline void line_gamma_q (const line_axes *s, const pw_pose *A, const pw_
 static inline void line_gamma_v (const line_axes *s, const pw_pose *A, const pw_pose *B, double *out) {
   const double v[6] = { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega };
   line_curve (s, -2, v, out);
+}
+
+/* ---- Batches of one equation per element, a line ---- */
+
+#define LINE_PARTS                                                                \
+  const line *k = (const line *)b->element + e;                                   \
+  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
+  const line_axes s = line_turn (k, A, B)
+
+static inline void lines_jw_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    LINE_PARTS;
+    line_curve (&s, 1, b->w + 6 * e, out);
+  }
+}
+
+static inline void lines_jtl_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 36) {
+    LINE_PARTS;
+    line_jtl_q (&s, b->lambda[e], out);
+  }
+}
+
+static inline void lines_gamma_q (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    LINE_PARTS;
+    line_gamma_q (&s, A, B, out);
+  }
+}
+
+static inline void lines_gamma_v (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    LINE_PARTS;
+    line_gamma_v (&s, A, B, out);
+  }
 }
 
 #endif

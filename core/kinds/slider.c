@@ -7,43 +7,35 @@
  * -lambda(2); on body 2 the opposites. */
 #include "line.h"
 
-typedef struct {
-  line line;
-  double beta; /* phi1 - phi2 [rad] */
-} slider;
-
-#define SLIDER_PARTS                                                              \
-  const slider *k = (const slider *)b->element + e;                               \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
-  const line_axes s = line_turn (&k->line, A, B)
-
 static int slider_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
                            pw_error *error) {
   const pw_slider *d = definition;
-  *(slider *)element = (slider){ line_make (d->at, d->heading), d->angle };
+  line *k = element;
+  *k = line_make (d->at, d->heading);
+  k->angle = d->angle;
   (void)bodies, (void)own, (void)error;
   return PW_OK;
 }
 
 static void slider_g (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 2) {
-    SLIDER_PARTS;
-    out[0] = line_g (&k->line, &s);
-    out[1] = A->phi - B->phi - k->beta;
+    LINE_PARTS;
+    out[0] = line_g (k, &s);
+    out[1] = A->phi - B->phi - k->angle;
   }
 }
 
 static void slider_g_size (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 2) {
-    SLIDER_PARTS;
-    out[0] = line_g_size (&k->line, &s, A, B);
-    out[1] = fabs (A->phi) + fabs (B->phi) + fabs (k->beta);
+    LINE_PARTS;
+    out[0] = line_g_size (k, &s, A, B);
+    out[1] = fabs (A->phi) + fabs (B->phi) + fabs (k->angle);
   }
 }
 
 static void slider_J (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 12) {
-    SLIDER_PARTS;
+    LINE_PARTS;
     line_J (&s, out);
     out[6] = out[7] = out[9] = out[10] = 0, out[8] = 1, out[11] = -1;
   }
@@ -51,7 +43,7 @@ static void slider_J (const pw_batch *b, double *out) {
 
 static void slider_gamma (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 2) {
-    SLIDER_PARTS;
+    LINE_PARTS;
     out[0] = line_gamma (&s, A, B);
     out[1] = 0;
   }
@@ -59,7 +51,7 @@ static void slider_gamma (const pw_batch *b, double *out) {
 
 static void slider_jw_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 12) {
-    SLIDER_PARTS;
+    LINE_PARTS;
     line_curve (&s, 1, b->w + 6 * e, out);
     memset (out + 6, 0, 6 * sizeof *out);
   }
@@ -67,14 +59,14 @@ static void slider_jw_q (const pw_batch *b, double *out) {
 
 static void slider_jtl_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 36) {
-    SLIDER_PARTS;
+    LINE_PARTS;
     line_jtl_q (&s, b->lambda[2 * e], out);
   }
 }
 
 static void slider_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 12) {
-    SLIDER_PARTS;
+    LINE_PARTS;
     line_gamma_q (&s, A, B, out);
     memset (out + 6, 0, 6 * sizeof *out);
   }
@@ -82,7 +74,7 @@ static void slider_gamma_q (const pw_batch *b, double *out) {
 
 static void slider_gamma_v (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 12) {
-    SLIDER_PARTS;
+    LINE_PARTS;
     line_gamma_v (&s, A, B, out);
     memset (out + 6, 0, 6 * sizeof *out);
   }
@@ -108,7 +100,7 @@ const pw_kind pw_kind_slider = {
   .name = "slider",
   .about = "a body slides along a line of another and does not turn against it (prismatic joint)",
   .definition = sizeof (pw_slider),
-  .element = sizeof (slider),
+  .element = sizeof (line),
   .fields = slider_fields,
   .bodies = 2,
   .rows = 2,

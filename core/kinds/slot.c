@@ -5,11 +5,6 @@
  * Its derivatives are in line.h.  On body 1 acts the force -lambda along n, at its point; on body 2 the opposite. */
 #include "line.h"
 
-#define SLOT_PARTS                                                                \
-  const line *k = (const line *)b->element + e;                                   \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
-  const line_axes s = line_turn (k, A, B)
-
 static int slot_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
                          pw_error *error) {
   const pw_slot *d = definition;
@@ -20,57 +15,29 @@ static int slot_prepare (const void *definition, const pw_body *const *bodies, v
 
 static void slot_g (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
-    SLOT_PARTS;
+    LINE_PARTS;
     out[e] = line_g (k, &s);
   }
 }
 
 static void slot_g_size (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
-    SLOT_PARTS;
+    LINE_PARTS;
     out[e] = line_g_size (k, &s, A, B);
   }
 }
 
 static void slot_J (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
-    SLOT_PARTS;
+    LINE_PARTS;
     line_J (&s, out);
   }
 }
 
 static void slot_gamma (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
-    SLOT_PARTS;
+    LINE_PARTS;
     out[e] = line_gamma (&s, A, B);
-  }
-}
-
-static void slot_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    SLOT_PARTS;
-    line_curve (&s, 1, b->w + 6 * e, out);
-  }
-}
-
-static void slot_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    SLOT_PARTS;
-    line_jtl_q (&s, b->lambda[e], out);
-  }
-}
-
-static void slot_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    SLOT_PARTS;
-    line_gamma_q (&s, A, B, out);
-  }
-}
-
-static void slot_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    SLOT_PARTS;
-    line_gamma_v (&s, A, B, out);
   }
 }
 
@@ -103,8 +70,8 @@ const pw_kind pw_kind_slot = {
   .g_size = slot_g_size,
   .J = slot_J,
   .gamma = slot_gamma,
-  .jw_q = slot_jw_q,
-  .jtl_q = slot_jtl_q,
-  .gamma_q = slot_gamma_q,
-  .gamma_v = slot_gamma_v,
+  .jw_q = lines_jw_q,
+  .jtl_q = lines_jtl_q,
+  .gamma_q = lines_gamma_q,
+  .gamma_v = lines_gamma_v,
 };

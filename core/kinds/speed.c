@@ -1,31 +1,18 @@
-/* speed: the speed of a point P along a direction fixed in its body follows a signal u.
+/* speed: the speed of a point P along a direction fixed in its body follows a signal u (contact.h).
  *
  *   e . v_P = u,  e = (cos, sin)(phi + psi)                       (1 nonholonomic row)
  *   S     = [ cos(theta)  sin(theta)  -m ]      theta = phi + psi; m: the arm of P to the left of e
  *   eta   = u
  *   gamma = u' + w (sin(theta) vx - cos(theta) vy)                so that S a = gamma
  *
- * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
  * The force on the body at P, along e, is F = -lambda; its power is F u. */
 #include <math.h>
-#include <string.h>
-#include "pinwheel.h"
-
-typedef struct {
-  double cos, sin; /* of the direction in the body */
-  double aside;    /* m [m] */
-} speed;
-
-#define SPEED_PARTS                               \
-  const speed *k = (const speed *)b->element + e; \
-  const pw_pose *A = &b->pose[b->body[e]];        \
-  const double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin
+#include "contact.h"
 
 static int speed_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
                           pw_error *error) {
   const pw_speed *d = definition;
-  double c = cos (d->heading), s = sin (d->heading);
-  *(speed *)element = (speed){ c, s, d->at[1] * c - d->at[0] * s };
+  *(contact *)element = contact_make (d->at, d->heading, cos (d->heading), sin (d->heading));
   (void)bodies, (void)own, (void)error;
   return PW_OK;
 }
@@ -34,47 +21,9 @@ static void speed_eta (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e];
 }
 
-static void speed_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    SPEED_PARTS;
-    out[0] = c, out[1] = s, out[2] = -k->aside;
-  }
-}
-
 static void speed_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    SPEED_PARTS;
-    out[e] = b->u[3 * e + 1] + A->omega * (s * A->vx - c * A->vy);
-  }
-}
-
-static void speed_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    SPEED_PARTS;
-    out[0] = out[1] = 0, out[2] = c * b->w[3 * e + 1] - s * b->w[3 * e];
-  }
-}
-
-static void speed_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    SPEED_PARTS;
-    memset (out, 0, 9 * sizeof *out);
-    out[2] = -s * b->lambda[e], out[5] = c * b->lambda[e];
-  }
-}
-
-static void speed_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    SPEED_PARTS;
-    out[0] = out[1] = 0, out[2] = A->omega * (c * A->vx + s * A->vy);
-  }
-}
-
-static void speed_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    SPEED_PARTS;
-    out[0] = A->omega * s, out[1] = -A->omega * c, out[2] = s * A->vx - c * A->vy;
-  }
+  contact_gamma (b, out);
+  for (int e = 0; e < b->count; e++) out[e] += b->u[3 * e + 1];
 }
 
 static const pw_field speed_fields[] = {
@@ -92,7 +41,7 @@ const pw_kind pw_kind_speed = {
   .name = "speed",
   .about = "the speed of a point along a direction fixed in its body follows a signal of time",
   .definition = sizeof (pw_speed),
-  .element = sizeof (speed),
+  .element = sizeof (contact),
   .fields = speed_fields,
   .bodies = 1,
   .rows = 1,
@@ -101,10 +50,10 @@ const pw_kind pw_kind_speed = {
   .reaction = speed_reaction,
   .prepare = speed_prepare,
   .eta = speed_eta,
-  .J = speed_J,
+  .J = contact_J,
   .gamma = speed_gamma,
-  .jw_q = speed_jw_q,
-  .jtl_q = speed_jtl_q,
-  .gamma_q = speed_gamma_q,
-  .gamma_v = speed_gamma_v,
+  .jw_q = contact_jw_q,
+  .jtl_q = contact_jtl_q,
+  .gamma_q = contact_gamma_q,
+  .gamma_v = contact_gamma_v,
 };
