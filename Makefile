@@ -43,7 +43,7 @@ obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 
 FILES   := $(wildcard core/files/*.c core/files/*/*.c)
 CLI     := $(wildcard core/cli/*.c core/cli/*/*.c)
-CORE    := $(filter-out $(FILES) $(CLI),$(wildcard core/*/*.c))
+CORE    := $(filter-out $(FILES) $(CLI),$(wildcard core/*/*.c core/kinds/*/*.c))
 SOLVERS := $(wildcard solvers/*/*.c)
 MODELS  := $(wildcard models/*.c)
 QUICK   := $(wildcard tests/*/test_*.c)
@@ -364,7 +364,7 @@ gcc:
 BASIC       := $(VARIANT)/basic
 BASIC_KINDS := pin wheel torque
 BASIC_COPY   = $(filter-out core/kinds/%.c core/pinwheel.h $(FILES) $(CLI) $(wildcard core/files/*.h core/cli/*.h), \
-                 $(wildcard core/*.h core/*/*.[ch] solvers/*.h solvers/*/*.[ch])) $(BASIC_KINDS:%=core/kinds/%.c)
+                 $(wildcard core/*.h core/*/*.[ch] solvers/*.h solvers/*/*.[ch])) $(wildcard $(BASIC_KINDS:%=core/kinds/*/%.c))
 
 basic:
 	@mkdir -p $(addprefix $(BASIC)/source/,$(sort $(dir $(BASIC_COPY))))
@@ -390,7 +390,8 @@ D    := $(DESTDIR)$(PREFIX)
 MAN  := docs/pinwheel.1 docs/pinwheel-model.5
 DOCS := README.md $(wildcard docs/*.md) docs/CITATION.cff
 FIGURES  := $(wildcard docs/figures/*)
-EXAMPLES := docs/embed.c $(wildcard models/*.c) core/kinds/torque.c core/kinds/wheel.c core/kinds/rolling_wheel.c
+EXAMPLES := docs/embed.c $(wildcard models/*.c) core/kinds/forces/torque.c \
+            $(addprefix core/kinds/,contact.h holonomic/gear.c nonholonomic/rolling_wheel.c)
 
 define PKGCONFIG
 prefix=$(PREFIX)

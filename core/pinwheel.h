@@ -468,7 +468,7 @@ typedef struct {
   double at[2]; /* the point in the body's frame [m] */
 } pw_marker;
 
-/* The list of kinds: the one line to add for a new file in core/kinds/. */
+/* The list of kinds: the one line to add for a new file in a directory of core/kinds/. */
 #define PW_KINDS               \
   PW_KIND (pin)                \
   PW_KIND (weld)               \
