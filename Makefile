@@ -134,7 +134,8 @@ $(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAY
 $(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,$(CORE_LAYERS) $(FILE_LAYERS)) $(SYSTEM)
 $(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base core/files core/files/expression)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,core core/base core/files solvers $(CLI_LAYERS))
-$(call obj,core/cli/plot/animate.c core/cli/plot/figure.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/plot
+$(call obj,core/cli/plot/animate.c core/cli/plot/figure.c core/cli/inspect/new.c): INCLUDE += $(addprefix -iquote $(BUILD)/obj/core/cli/,plot inspect)
+$(call obj,core/cli/inspect/new.c): $(BUILD)/obj/core/cli/inspect/new.inc
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
 $(call obj,core/cli/sweep/sweep.c) $(BUILD)/pinwheel: private THREADS = -pthread
@@ -157,11 +158,15 @@ $(call obj,$(BENCH) $(HARD) $(EMBED)): | $(INCLUDES)
 -include $(patsubst %.o,%.d,$(call obj,$(CORE) $(SOLVERS) $(FILES) $(CLI) $(QUICK) $(SLOW) $(SHARE) $(FUZZ) $(FUZZ_SHARE) $(BENCH) $(ENGINE) $(HARD) $(EMBED)))
 -include $(MODELS:%.c=$(BUILD)/obj/%.d)
 
-# The page of an animation and the templates of figures become part of the program: their lines as C strings.
+# The page of an animation and the templates of figures and new models become part of the program: their lines as C strings.
 AS_STRINGS := sed -e 's/\\/&&/g' -e 's/"/\\"/g' -e 's/.*/"&\\n",/'
 $(BUILD)/obj/%.inc: %.html
 	@mkdir -p $(@D)
 	@$(AS_STRINGS) $< >$@
+
+$(BUILD)/obj/core/cli/inspect/new.inc: $(wildcard core/cli/inspect/*.in)
+	@mkdir -p $(@D)
+	@for f in $^; do echo "static const char *const $$(basename $$f .in | tr .- _)[] = {"; $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
 
 $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp)
 	@mkdir -p $(@D)

@@ -313,7 +313,7 @@ static void test_list (void **state) {
   assert_null (strstr (cli_out, "metric"));
   cli_good ("pinwheel list methods rk4 bdf");
   assert_non_null (strstr (cli_out, "    :metric=mass|identity  (default mass; with projection)\n"));
-  assert_non_null (strstr (cli_out, "  bdf  (chooses its steps; --rtol, --atol)\n"));
+  assert_non_null (strstr (cli_out, "  bdf  (adaptive steps; --rtol, --atol)\n"));
   assert_null (strstr (cli_out, "galpha"));
   cli_good ("pinwheel list methods all");
   assert_non_null (strstr (cli_out, "    :rho=NUMBER  (default 0.8)\n"));
@@ -398,7 +398,7 @@ static void test_new (void **state) {
   cli_good ("pinwheel show @/mine.c");
   cli_good ("pinwheel run @/mine.c --t-end 1 --json -");
   assert_true (cli_says (cli_out, "status", "ok") && cli_says (cli_out, "model", "mine"));
-  cli_bad ("pinwheel new @/mine.c", 2, "@/mine.c is there already; it has been left as it is");
+  cli_bad ("pinwheel new @/mine.c", 2, "@/mine.c exists already and was not changed");
 }
 
 int main (void) {

@@ -54,7 +54,7 @@ static void test_bad_lines (void **state) {
     { "list foo", "there is no list of \"foo\"; valid are models, methods, kinds, signals" },
     { "list models b", "unexpected argument \"b\"; usage: pinwheel list models" },
     { "list methods rk5", "there is no integrator \"rk5\"; did you mean \"erk5\"?" },
-    { "list kinds pinn", "there is no kind \"pinn\"; did you mean \"pin\"?" },
+    { "list kinds pinn", "there is no element type \"pinn\"; did you mean \"pin\"?" },
     { "new", "missing argument; usage: pinwheel new NAME.c|NAME.yaml" },
     { "new foo.x", "\"foo.x\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml" },
     { "new 'a b.c'", "\"a b.c\": a model file's name is made of letters, digits, _ and -, and ends in .c or .yaml" },

@@ -1,19 +1,117 @@
-/* pinwheel list: the models, methods and kinds there are. */
+/* pinwheel list: models, methods, element types and signals. */
 #include <stdio.h>
 #include <string.h>
-#include "list.h"
+#include "cli.h"
 #include "util.h"
+
+/* ---- Rows in columns ---- */
+
+enum { LIST_ROWS = 40, LIST_WIDTH = 110 /* of a line, where the last column leaves room for it */ };
+
+/* One row: "radius", "number [m]", "required", "radius of the wheel". */
+typedef struct {
+  char name[32], type[40], given[80];
+  const char *about;
+} list_row;
+
+typedef struct {
+  list_row row[LIST_ROWS];
+  int rows;
+} list_table;
+
+/* Copies all texts except the last. */
+static void list_add (list_table *x, const char *name, const char *type, const char *given, const char *about) {
+  if (x->rows == LIST_ROWS) return;
+  list_row *r = &x->row[x->rows++];
+  snprintf (r->name, sizeof r->name, "%s", name);
+  snprintf (r->type, sizeof r->type, "%s", type);
+  snprintf (r->given, sizeof r->given, "%s", given);
+  r->about = about;
+}
+
+/* "required" or the default; the domain of a number; the alternatives of a choice. */
+static void list_given (const pw_field *f, char *text, size_t size) {
+  static const char *const zero[] = { "0", "[0, 0]", "[0, 0]", "", "0", "" };
+  static const char *const domain[] = { "", " (>= 0)", " (> 0)", " (1, 2, ...)" };
+  snprintf (text, size, "%s%s", f->required || f->type == PW_BODY ? "required" : zero[f->type],
+            f->type == PW_NUMBER ? domain[f->domain] : "");
+  for (int i = 0; f->type == PW_CHOICE && f->choices[i]; i++) {
+    size_t used = strlen (text);
+    snprintf (text + used, size - used, "%s%s", i ? " | " : f->required ? ": " : "", f->choices[i]);
+  }
+}
+
+static void list_fields (list_table *x, const pw_field *fields) {
+  static const char *const types[] = { "number", "point", "vector", "body", "signal", "choice" };
+  for (const pw_field *f = fields; f->name; f++) {
+    char type[60], given[80], times[16] = "";
+    if (pw_field_count (f) > 1) snprintf (times, sizeof times, "%d x ", f->count);
+    snprintf (type, sizeof type, "%s%s%s%s%s", times, types[f->type], f->unit ? " [" : "", f->unit ? f->unit : "",
+              f->unit ? "]" : "");
+    list_given (f, given, sizeof given);
+    list_add (x, f->name, type, given, f->about ? f->about : "");
+  }
+}
+
+static void list_wider (int *width, const char *text) {
+  if (*width < (int)strlen (text)) *width = (int)strlen (text);
+}
+
+/* Prints the rows, indented by six, and removes them. */
+static void list_print (list_table *x) {
+  int name = 0, type = 0, given = 0;
+  for (const list_row *r = x->row; r < x->row + x->rows; r++) {
+    list_wider (&name, r->name);
+    list_wider (&type, r->type);
+    list_wider (&given, r->given);
+  }
+  for (const list_row *r = x->row; r < x->row + x->rows; r++) {
+    int indent = printf ("      %-*s  %-*s  ", name, r->name, type, r->type);
+    if (given) indent += printf ("%-*s  ", given, r->given);
+    pw_cli_wrap (r->about, indent, LIST_WIDTH);
+  }
+  x->rows = 0;
+}
+
+/* ---- What can be named ---- */
+
+/* Something described by name: methods, element types. */
+typedef struct {
+  const char *what;            /* "element type" */
+  const char *(*name) (int i); /* NULL at the end */
+  void (*show) (int i);
+} list_things;
+
+/* Describes those that are named; "all" names all. */
+static int list_named (const list_things *x, int names, const char **name, pw_error *error) {
+  char hint[100];
+  int shown = 0;
+  for (int k = 0; k < names; k++) {
+    int all = strcmp (name[k], "all") == 0, found = all;
+    pw_nearest near = { .sought = name[k] };
+    for (int i = 0; x->name (i); i++) {
+      pw_nearest_try (&near, x->name (i));
+      if (!all && strcmp (x->name (i), name[k]) != 0) continue;
+      if (shown++ > 0) putchar ('\n');
+      x->show (i);
+      found = 1;
+    }
+    if (!found)
+      return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", x->what, name[k],
+                      pw_nearest_text (&near, hint, sizeof hint));
+  }
+  return PW_OK;
+}
 
 /* ---- Models ---- */
 
 static int list_width (void *context, const char *name, const char *path) {
-  int *width = context, n = (int)strlen (name);
   (void)path;
-  if (*width < n) *width = n;
+  list_wider (context, name);
   return 0;
 }
 
-/* A file that cannot be opened is listed with the reason: the list is where one looks for it. */
+/* A file that cannot be opened is listed with the reason. */
 static int list_model (void *context, const char *name, const char *path) {
   char folder[1000];
   pw_error error = { 0 };
@@ -49,66 +147,147 @@ static void list_option (const pw_option *o) {
   printf (")\n        %s\n", o->about);
 }
 
-static void list_method (const pw_method *m, int options) {
-  printf ("  %s  (%s)\n      %s\n", m->name, m->adaptive ? "chooses its steps; --rtol, --atol" : "fixed steps; --step",
+static void list_method (const pw_method *m) {
+  printf ("  %s  (%s)\n      %s\n", m->name, m->adaptive ? "adaptive steps; --rtol, --atol" : "fixed steps; --step",
           m->about);
   for (const pw_stabilisation *s = m->stabilisations; s && s->name; s++)
-    printf ("    +%-12s %s%s\n", s->name, s->about, s == m->stabilisations ? " (if none is named)" : "");
+    printf ("    +%-12s %s%s\n", s->name, s->about, s == m->stabilisations ? " (default)" : "");
   for (const pw_stabilisation *s = m->refused; s && s->name; s++) printf ("    no %s: %s\n", s->name, s->about);
-  for (const pw_option *o = m->options; options && o && o->name; o++) list_option (o);
 }
 
-static int list_method_named (const char *name, pw_error *error) {
-  char hint[100];
-  pw_nearest near = { .sought = name };
-  int all = strcmp (name, "all") == 0;
-  for (const pw_method *const *m = pw_methods; *m; m++) {
-    if (all || strcmp ((*m)->name, name) == 0) list_method (*m, 1);
-    if (strcmp ((*m)->name, name) == 0) return PW_OK;
-    pw_nearest_try (&near, (*m)->name);
-  }
-  if (all) return PW_OK;
-  return pw_fail (error, PW_INPUT, "there is no integrator \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+static const char *list_method_name (int i) {
+  return pw_methods[i] ? pw_methods[i]->name : NULL;
+}
+
+static void list_method_show (int i) {
+  list_method (pw_methods[i]);
+  for (const pw_option *o = pw_methods[i]->options; o && o->name; o++) list_option (o);
 }
 
 static int list_methods (int names, const char **name, pw_error *error) {
-  for (int i = 0; i < names && error->status == PW_OK; i++) list_method_named (name[i], error);
-  if (names) return error->status;
+  static const list_things methods = { "integrator", list_method_name, list_method_show };
+  if (names) return list_named (&methods, names, name, error);
   puts ("Methods, written INTEGRATOR[+STABILISATION][:OPTION=VALUE]...");
-  for (const pw_method *const *m = pw_methods; *m; m++) list_method (*m, 0);
-  puts ("`pinwheel list methods NAME...` tells their options, `pinwheel list methods all` those of all");
+  for (const pw_method *const *m = pw_methods; *m; m++) list_method (*m);
+  puts ("`pinwheel list methods NAME...` shows the options of a method, `pinwheel list methods all` those of all");
   return PW_OK;
 }
 
-/* ---- */
+/* ---- Element types ---- */
 
-static int list_what (int words, const char **word, pw_error *error) {
+static const char *list_kind_name (int i) {
+  return pw_kinds[i] ? pw_kinds[i]->name : NULL;
+}
+
+/* The shortest element of the type in a text model. */
+static void list_example (const pw_kind *k) {
+  static const char *const text[] = { "NUMBER", "[X, Y]", "[X, Y]", "BODY", "SIGNAL", "" };
+  printf ("    - {%s: NAME", k->name);
+  for (const pw_field *f = k->fields; f->name; f++) {
+    int count = pw_field_count (f);
+    if (!f->required && f->type != PW_BODY) continue;
+    printf (", %s: %s", f->name, count > 1 ? "[" : "");
+    for (int i = 0; i < count; i++)
+      printf ("%s%s", i ? ", " : "", f->type == PW_CHOICE ? f->choices[0] : text[f->type]);
+    if (count > 1) putchar (']');
+  }
+  puts ("}");
+}
+
+static void list_quantities (const char *title, const pw_quantity *q, int count) {
+  list_table rows = { .rows = 0 };
+  if (count > 0) printf ("    %s\n", title);
+  for (int i = 0; i < count; i++) list_add (&rows, q[i].name, q[i].unit, q[i].rate ? q[i].rate : "", q[i].about);
+  list_print (&rows);
+}
+
+static void list_kind_show (int i) {
+  static const char *const level[] = { "force", "constraint on positions", "constraint on velocities" };
+  const pw_kind *k = pw_kinds[i];
+  list_table rows = { .rows = 0 };
+  printf ("%s: %s\n    %s", k->name, k->about, pw_kind_acts (k) ? level[k->level] : "without effect");
+  if (k->rows) printf (", %d constraint equation%s per element", k->rows, k->rows == 1 ? "" : "s");
+  puts (k->each_body ? ", acts on every body that has mass" : "");
+  list_example (k);
+  puts ("    fields");
+  list_fields (&rows, k->fields);
+  list_print (&rows);
+  if (k->signals)
+    printf ("    a signal: a number, an expression of t%s, or see `pinwheel list signals`\n",
+            pw_kind_forced (k) ? " and of states such as BODY.phi" : "");
+  list_quantities ("reactions", k->reaction, k->rows);
+  list_quantities ("internal coordinates, and their rates", k->coordinate, k->own);
+}
+
+static int list_kinds (int names, const char **name, pw_error *error) {
+  static const list_things kinds = { "element type", list_kind_name, list_kind_show };
+  static const struct {
+    int acts;
+    pw_level level;
+    const char *name;
+  } part[] = { { 1, PW_HOLONOMIC, "constraints on positions" },
+               { 1, PW_NONHOLONOMIC, "constraints on velocities" },
+               { 1, PW_FORCE, "forces" },
+               { 0, PW_FORCE, "without effect" } };
+  if (names) return list_named (&kinds, names, name, error);
+  puts ("Element types (kinds)");
+  for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
+    printf ("  %s\n", part[i].name);
+    for (const pw_kind *const *k = pw_kinds; *k; k++)
+      if ((*k)->level == part[i].level && pw_kind_acts (*k) == part[i].acts)
+        printf ("    %-18s  %s\n", (*k)->name, (*k)->about);
+  }
+  puts ("`pinwheel list kinds NAME...` shows the fields of a type, `pinwheel list kinds all` those of all");
+  return PW_OK;
+}
+
+/* ---- Signals ---- */
+
+static int list_signals (int names, const char **name, pw_error *error) {
+  list_table rows = { .rows = 0 };
+  (void)names, (void)name, (void)error;
+  puts ("Signals: a number, an expression of time (in C a function), or one of");
+  for (const pw_signal_form *s = pw_signal_forms; s->name; s++) {
+    printf ("  %s: %s\n", s->name, s->about);
+    list_fields (&rows, s->fields);
+    if (s->type == PW_TABLE) {
+      list_add (&rows, "points", "list", "", "[[TIME, VALUE], ...]; in a text model, or");
+      list_add (&rows, "file", "text", "", "a CSV file in the model's folder, and");
+      list_add (&rows, "columns", "2 x text", "[1, 2]", "its columns of times and values, names or numbers");
+    }
+    list_print (&rows);
+  }
+  return PW_OK;
+}
+
+/* ---- The command ---- */
+
+static int list_command (void *options, pw_error *error) {
   static const struct {
     const char *name;
     int (*list) (int names, const char **name, pw_error *error);
-    int named; /* 1: some of it can be named */
+    int named; /* 1: accepts names */
   } part[] = { { "models", list_models, 0 },
                { "methods", list_methods, 1 },
-               { "kinds", pw_list_kinds, 1 },
-               { "signals", pw_list_signals, 0 } };
-  pw_nearest near = { .sought = words ? word[0] : "" };
+               { "kinds", list_kinds, 1 },
+               { "signals", list_signals, 0 } };
+  const pw_cli_line *l = options;
+  const char *const sought = l->arguments ? l->argument[0] : NULL;
+  pw_nearest near = { .sought = sought ? sought : "" };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
-    if (words == 0 && i > 0) putchar ('\n');
-    int here = words == 0 || strcmp (word[0], part[i].name) == 0;
-    if (here && words > 1 && !part[i].named)
-      return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel list %s", word[1], part[i].name);
-    if (here && part[i].list (words ? words - 1 : 0, words ? word + 1 : word, error) != PW_OK) return error->status;
-    if (here && words) return PW_OK;
+    if (sought == NULL) {
+      if (i > 0) putchar ('\n');
+      if (part[i].list (0, NULL, error) != PW_OK) return error->status;
+    } else if (strcmp (sought, part[i].name) == 0) {
+      if (l->arguments > 1 && !part[i].named)
+        return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel list %s", l->argument[1], sought);
+      return part[i].list (l->arguments - 1, l->argument + 1, error);
+    }
     pw_nearest_try (&near, part[i].name);
   }
   char hint[100];
-  if (words == 0) return PW_OK;
-  return pw_fail (error, PW_INPUT, "there is no list of \"%s\"%s", word[0], pw_nearest_text (&near, hint, sizeof hint));
-}
-
-static int list_command (void *options, pw_error *error) {
-  const pw_cli_line *l = options;
-  return list_what (l->arguments, l->argument, error);
+  if (sought == NULL) return PW_OK;
+  return pw_fail (error, PW_INPUT, "there is no list of \"%s\"%s", sought, pw_nearest_text (&near, hint, sizeof hint));
 }
 
 const pw_command pw_cli_list = {
