@@ -13,7 +13,7 @@ static const char *const page_lines[] = {
 
 static const char page_mark[] = "/* DATA */";
 
-/* ---- Pieces of JavaScript ---- */
+/* ---- JavaScript literals ---- */
 
 /* A text between quotes, safe inside a script element. */
 static void page_text (FILE *f, const char *text) {

@@ -1,4 +1,4 @@
-/* Figures from inside: what is kept of a run, and the steps from there to a picture. */
+/* What figures and animations keep of a run, and the parts of them that they share. */
 #ifndef PW_PLOT_H
 #define PW_PLOT_H
 
@@ -11,11 +11,11 @@ enum {
   PLOT_SAMPLES = 1600,    /* of a small scene */
   PLOT_FEW = 240,         /* of a large one, at least */
   PLOT_NUMBERS = 8000000, /* kept in all, unless that is less than PLOT_FEW samples */
-  PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be told apart */
+  PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be distinguished */
   PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
   PLOT_CURVES = 60,       /* bodies or wheels that get a curve, at most */
   PLOT_NAMED = 12,        /* curves that get a name each; more are coloured by number */
-  PLOT_IMAGES = 60,       /* pictures of the mechanism along its way, at most */
+  PLOT_IMAGES = 60,       /* snapshots of the mechanism, at most */
   PLOT_FEWEST = 8         /* and at least */
 };
 
@@ -31,9 +31,7 @@ typedef struct {
   double corner[PLOT_POINTS + 1][2];
 } pw_plot_body;
 
-/* Fills the outline (plot_outline.c). */
-void pw_plot_outline (pw_plot_body *shape);
-/* 1 if attachment point k is no corner of it. */
+/* 1 if attachment point k is not a corner of the outline. */
 int pw_plot_inside (const pw_plot_body *shape, int k);
 
 /* An element with points: what it connects, and on which of its ends the force is shown. */
@@ -54,10 +52,10 @@ typedef struct {
 
 struct pw_plots {
   const char *folder, *model;
-  int lock; /* keeps other processes from writing into the folder; -1: there is none */
+  int lock; /* of the folder; -1: none */
   pw_system *s;
   double t_end;
-  int samples, wanted;  /* taken so far, and in all */
+  int samples, wanted;  /* taken so far; planned */
   int width;            /* numbers per sample */
   int bodies, wheels;   /* drawn; markers are among the wheels */
   int links;            /* elements whose forces are kept */
@@ -88,7 +86,7 @@ static inline double *pw_plot_force (const pw_plots *p, int i, int link) {
   return pw_plot_sample (p, i) + PLOT_FIRST + 6 * p->bodies + 3 * p->wheels + 2 * link;
 }
 
-/* Number i of `shown` things taken evenly out of `all`. */
+/* Index of item i of `shown` items chosen at equal distances from `all`. */
 static inline int pw_plot_pick (int i, int shown, int all) {
   return (int)((long long)i * all / shown);
 }
@@ -98,7 +96,7 @@ typedef struct {
   const char *file;      /* a block for each: time, numbers, number in the model */
   const char *columns;   /* "x [m], ..." */
   const char *what;      /* "body", for the colour bar */
-  int count, shown, all; /* curves, out of those kept, out of those there are */
+  int count, shown, all; /* curves; bodies or wheels kept; in the system */
   int numbers;           /* kept of each */
   const char *(*name) (const pw_plots *p, int shown);
   double *(*at) (const pw_plots *p, int i, int shown); /* its numbers in sample i */
@@ -109,27 +107,30 @@ pw_curves pw_plot_wheels (const pw_plots *p);
 
 const char *pw_plot_body_name (const pw_plots *p, int body);
 const char *pw_plot_wheel_name (const pw_plots *p, int wheel);
-/* Whether it is a wheel; a marker is kept among them. */
+/* 1 for a wheel, 0 for a marker, which is kept among the wheels. */
 int pw_plot_rolls (const pw_plots *p, int wheel);
-/* "paths of the wheels and markers", or what else figures and animations follow. */
+/* Title of the paths drawn: "paths of the wheels and markers". */
 const char *pw_plot_followed (const pw_plots *p);
 /* The body a wheel belongs to, among those drawn; -1: the ground, -2: none of them. */
 int pw_plot_body_of_wheel (const pw_plots *p, int wheel);
+
+/* Finds the attachment points of bodies and of the ground, from the points of elements' definitions. */
+int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error);
 
 /* Finds elements with points of the bodies drawn, at most as many as there is room for. */
 void pw_plot_find_links (pw_plots *p, const pw_model *m);
 /* Their forces [N], x and y each. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 
-/* The smallest rectangle around all attachment points, centres and wheels of samples 0 ... n - 1, or around their paths
- * of the wheels (of the centres, if there are no wheels). */
+/* The smallest rectangle around all attachment points, centres of mass and wheels of samples 0 ... n - 1; around the paths of
+ * the wheels (of the centres of mass if there are no wheels). */
 pw_plot_box pw_plot_box_of (const pw_plots *p, int n);
 pw_plot_box pw_plot_box_of_paths (const pw_plots *p, int n);
 
 /* Largest dimension of the mechanism at the start [m]. */
 double pw_plot_size (const pw_plots *p);
 
-/* Blocks of the mechanism's data, and whether there is anything in one. */
+/* Blocks of the mechanism's data, and whether one has any content. */
 enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
 int pw_plot_has (const pw_plots *p, int block);
 

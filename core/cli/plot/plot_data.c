@@ -9,7 +9,7 @@ static void data_number (FILE *f, double value, const char *before) {
   fputs (pw_format (text, value, 10), f);
 }
 
-/* ---- Shapes ---- */
+/* ---- Size ---- */
 
 /* A point of a body in the world. */
 static void data_point (const double *motion, const double *at, double out[2]) {
@@ -39,17 +39,17 @@ static void data_extend_sample (const pw_plots *p, int i, pw_plot_box *box) {
   for (int w = 0; w < p->wheels; w++) data_extend (box, pw_plot_wheel (p, i, w));
 }
 
-static const pw_plot_box data_nothing = { INFINITY, -INFINITY, INFINITY, -INFINITY };
+static const pw_plot_box data_empty = { INFINITY, -INFINITY, INFINITY, -INFINITY };
 
 pw_plot_box pw_plot_box_of (const pw_plots *p, int n) {
-  pw_plot_box box = data_nothing;
+  pw_plot_box box = data_empty;
   for (int i = 0; i < n; i++) data_extend_sample (p, i, &box);
   for (int g = 0; g < p->grounds; g++) data_extend (&box, p->ground[g]);
   return box;
 }
 
 pw_plot_box pw_plot_box_of_paths (const pw_plots *p, int n) {
-  pw_plot_box box = data_nothing;
+  pw_plot_box box = data_empty;
   for (int i = 0; i < n; i++)
     if (p->wheels > 0)
       for (int w = 0; w < p->wheels; w++) data_extend (&box, pw_plot_wheel (p, i, w));
@@ -71,7 +71,7 @@ int pw_plot_closeup (const pw_plots *p) {
   double size = pw_plot_size (p);
   if (p->wheels == 0 && !pw_plot_has (p, PLOT_BODIES)) return 0;
   if (data_diagonal (pw_plot_box_of (p, p->samples)) < 10 * size) return 0;
-  pw_plot_box box = data_nothing;
+  pw_plot_box box = data_empty;
   int n = 0;
   while (n < p->samples) {
     data_extend_sample (p, n, &box);
@@ -125,7 +125,7 @@ static int data_ground (const pw_plots *p, const pw_figures *f, pw_error *error)
   return pw_output_finish (o, error);
 }
 
-/* ---- The mechanism: lines of "x y t", blank lines between pieces ---- */
+/* ---- The mechanism: lines of "x y t", blank lines between polygons ---- */
 
 static void data_vertex (FILE *f, const double *point, double t) {
   data_number (f, point[0], "");
@@ -134,7 +134,7 @@ static void data_vertex (FILE *f, const double *point, double t) {
   fputs ("\n", f);
 }
 
-/* A body that is a line: from each attachment point to the centre of mass and on to the next one. */
+/* A body without an outline: lines from each attachment point to the centre of mass and on to the next one. */
 static void data_line (FILE *f, const pw_plot_body *shape, const double *motion, double t) {
   for (int k = 0; k < shape->count; k++) {
     double point[2];
@@ -145,7 +145,7 @@ static void data_line (FILE *f, const pw_plot_body *shape, const double *motion,
   if (shape->count > 0) fputs ("\n", f);
 }
 
-/* A body that is a plate: its outline, and lines from the centre of mass to attachment points inside. */
+/* A body with an outline: that, and lines from the centre of mass to attachment points inside. */
 static void data_plate (FILE *f, const pw_plot_body *shape, const double *motion, double t) {
   double point[2];
   for (int k = 0; k <= shape->corners; k++) {
@@ -177,32 +177,31 @@ static void data_wheel (FILE *f, const pw_plots *p, int i, int wheel, double hal
   fputs ("\n", f);
 }
 
-/* Samples from one picture of the mechanism to the next, of the first n: as many as move the body that goes farthest by
- * a third of the mechanism, within bounds. */
+/* Samples from one snapshot to the next, of the first n: the body with the longest path moves by about a third of the size of
+ * the mechanism. */
 static int data_stride (const pw_plots *p, int n) {
-  double farthest = 0;
+  double longest = 0;
   for (int b = 0; b < p->bodies; b++) {
-    double way = 0;
+    double path = 0;
     for (int i = 1; i < n; i++) {
       const double *from = pw_plot_motion (p, i - 1, b), *to = pw_plot_motion (p, i, b);
-      way += hypot (to[0] - from[0], to[1] - from[1]);
+      path += hypot (to[0] - from[0], to[1] - from[1]);
     }
-    if (way > farthest) farthest = way;
+    longest = fmax (longest, path);
   }
-  double images = fmin (fmax (3 * farthest / (pw_plot_size (p)), PLOT_FEWEST), PLOT_IMAGES);
+  double images = fmin (fmax (3 * longest / pw_plot_size (p), PLOT_FEWEST), PLOT_IMAGES);
   int stride = (int)((n - 1) / images);
   return stride < 1 ? 1 : stride;
 }
 
-/* The beginning of a block, two blank lines after the one before.  gnuplot counts blocks by their data, so an empty one gets
- * a point that is not drawn. */
+/* The head of a block, two blank lines after the one before.  gnuplot counts blocks with data only, so an empty one gets a
+ * point that is not drawn. */
 static void data_begin_block (FILE *f, const pw_plots *p, int block) {
   static const char *const titles[] = { "bodies", "wheels", "bodies without attachments" };
   fprintf (f, "%s# %s: x [m], y [m], t [s]\n", block == PLOT_BODIES ? "" : "\n\n", titles[block]);
   if (!pw_plot_has (p, block)) fputs ("nan nan nan\n", f);
 }
 
-/* What a block shows of sample i. */
 static void data_block (FILE *f, const pw_plots *p, int i, int block, double half) {
   for (int b = 0; b < p->bodies && block == PLOT_BODIES; b++) data_body (f, p, i, b);
   for (int w = 0; w < p->wheels && block == PLOT_WHEELS; w++) data_wheel (f, p, i, w, half);

@@ -1,15 +1,14 @@
-/* What figures keep of a run: evenly spaced samples of as many bodies and wheels as can be told apart. */
+/* What figures keep of a run: equally spaced samples of as many bodies and wheels as can be distinguished. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "figure.h"
 #include "plot.h"
-#include "util.h"
 
 const char *const pw_plot_names[] = { ".dat", ".gp", ".svg", ".png", NULL };
 
-/* ---- What is drawn ---- */
+/* ---- Names and families of curves ---- */
 
 static int plots_least (int a, int b) {
   return a < b ? a : b;
@@ -42,35 +41,6 @@ const char *pw_plot_followed (const pw_plots *p) {
          : rolling == p->wheels ? "paths of the wheels"
          : rolling > 0          ? "paths of the wheels and markers"
                                 : "paths of the markers";
-}
-
-/* Adds an attachment point unless the body has it already; its centre of mass is drawn anyway. */
-static void plots_add_point (pw_plot_body *shape, const double *at) {
-  if (shape->count == PLOT_POINTS || (at[0] == 0 && at[1] == 0)) return;
-  for (int i = 0; i < shape->count; i++)
-    if (shape->at[i][0] == at[0] && shape->at[i][1] == at[1]) return;
-  memcpy (shape->at[shape->count++], at, 2 * sizeof *at);
-}
-
-/* The points of elements' definitions that go with their bodies. */
-static int plots_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
-  pw_names shown;
-  int elements;
-  const pw_element *e = pw_model_elements (m, &elements);
-  if (pw_names_open (&shown, (size_t)p->bodies) != PW_OK) return pw_fail (error, PW_MACHINE, "plots: out of memory");
-  for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, pw_plot_body_name (p, i), i);
-  for (const pw_element *end = e + elements; e < end; e++)
-    for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
-      const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-      const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);
-      int b = pw_names_find (&shown, body);
-      if (at && b >= 0) plots_add_point (&p->shape[b], at);
-      if (at && strcmp (body, "ground") == 0 && p->grounds < PLOT_SHOWN)
-        memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
-    }
-  for (int b = 0; b < p->bodies; b++) pw_plot_outline (&p->shape[b]);
-  pw_names_close (&shown);
-  return PW_OK;
 }
 
 pw_curves pw_plot_bodies (const pw_plots *p) {
@@ -154,7 +124,7 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, pw_s
   for (int i = 0; i < p->bodies; i++) p->body[i] = pw_plot_pick (i, p->bodies, pw_count_bodies (s));
   plots_choose_wheels (p);
   pw_plot_find_links (p, m);
-  if (plots_shapes (p, m, error) == PW_OK) return p;
+  if (pw_plot_find_shapes (p, m, error) == PW_OK) return p;
   pw_plots_close (p);
   return NULL;
 }

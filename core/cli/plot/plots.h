@@ -1,5 +1,5 @@
-/* What figures and animations keep of a run, and the figures: paths, velocities, energies and the mechanism along its
- * way, drawn by gnuplot; animations are in animate.h.
+/* Figures of a run: paths, velocities, energies and snapshots of the motion, drawn by gnuplot; and what they and animations
+ * (animate.h) keep of the run.
  *
  * The folder of figures gets data files (*.dat), gnuplot scripts (*.gp) and what the scripts draw (*.svg, *.png).  A script can
  * be edited and run again there: gnuplot FILE.gp. */
@@ -13,23 +13,23 @@ typedef struct pw_plots pw_plots;
 /* Endings of the names of the folder's data files, scripts and pictures. */
 extern const char *const pw_plot_names[];
 
-/* Prepares figures of a run from 0 to t_end: the folder is made if need be; NULL: there will be none.  With `forces`,
- * those of elements with points are kept as well.  The system must outlive them; the texts too.  Errors: PW_MACHINE if
- * the folder cannot be written or memory is out. */
+/* Prepares figures of a run from 0 to t_end in a folder, which is created if necessary; NULL: without figures.  With `forces`,
+ * those of elements with points are kept as well.  System and texts must outlive them.  PW_MACHINE if the folder cannot be
+ * written or memory is exhausted. */
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, pw_system *s, double t_end,
                          pw_error *error);
 
 /* When the next sample is wanted [s]; INFINITY when there are enough. */
 double pw_plots_next (const pw_plots *p);
 
-/* Takes a sample with the ledger, at which the system is placed with J swept (as pw_at leaves it). */
+/* Takes a sample with the ledger. */
 void pw_plots_add (pw_plots *p, const pw_sample *sample);
 
 /* Saves or loads the samples taken so far. */
 void pw_plots_carry (pw_plots *p, pw_archive *a);
 
-/* Without a folder, nothing.  Writes data and scripts and, if `draw`, runs gnuplot; a missing gnuplot is no error,
- * but a notice on standard error.  Errors: PW_MACHINE if a file cannot be written or gnuplot fails. */
+/* Does nothing without a folder.  Writes data and scripts and, if `draw`, runs gnuplot; a missing gnuplot is reported on
+ * standard error, but not an error.  PW_MACHINE if a file cannot be written or gnuplot fails. */
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error);
 
 void pw_plots_close (pw_plots *p);

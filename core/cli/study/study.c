@@ -50,8 +50,8 @@ int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error) 
 
 int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error *error) {
   if (status == PW_OK || r->state == ROW_STOPPED) return PW_OK;
-  if (status == PW_RETRY && pw_stop) return PW_RETRY;
   if (status == PW_MACHINE || status == PW_START) return pw_fail (error, status, "%s", run_error->text);
+  if (pw_stop) return PW_RETRY;
   r->state = status == PW_INPUT ? ROW_REFUSED : ROW_FAILED;
   snprintf (r->reason, sizeof r->reason, "%s", run_error->status ? run_error->text : "the method gave up");
   return PW_OK;

@@ -1,0 +1,127 @@
+/* The shapes of bodies in figures and animations, and the links between them: elements with points, and their forces. */
+#include <math.h>
+#include <string.h>
+#include "plot.h"
+#include "util.h"
+
+/* ---- Outlines ---- */
+
+/* Twice the area of the triangle a b c, positive if they turn to the left. */
+static double shapes_turn (const double *a, const double *b, const double *c) {
+  return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+}
+
+/* Whether p comes before the best next corner: further to the right, or farther in the same direction. */
+static int shapes_before (const double *from, const double *best, const double *p, double flat) {
+  double turn = shapes_turn (from, best, p);
+  if (fabs (turn) > flat) return turn < 0;
+  return hypot (p[0] - from[0], p[1] - from[1]) > hypot (best[0] - from[0], best[1] - from[1]);
+}
+
+/* Gift wrapping (Jarvis 1973). */
+static void shapes_outline (pw_plot_body *shape) {
+  double p[PLOT_POINTS + 1][2] = { { 0, 0 } }, size = 0;
+  int n = shape->count + 1, at = 0;
+  memcpy (p + 1, shape->at, (size_t)shape->count * sizeof *p);
+  for (int i = 0; i < n; i++) {
+    size = fmax (size, hypot (p[i][0], p[i][1]));
+    if (p[i][0] < p[at][0] || (p[i][0] == p[at][0] && p[i][1] < p[at][1])) at = i;
+  }
+  const int first = at;
+  shape->corners = 0;
+  do {
+    int next = at == 0 ? 1 : 0;
+    memcpy (shape->corner[shape->corners++], p[at], sizeof *p);
+    for (int i = 0; i < n && n > 1; i++)
+      if (i != at && i != next && shapes_before (p[at], p[next], p[i], 1e-9 * size * size)) next = i;
+    at = n > 1 ? next : first;
+  } while (at != first && shape->corners < n);
+  if (shape->corners < 3) shape->corners = 0;
+}
+
+int pw_plot_inside (const pw_plot_body *shape, int k) {
+  for (int i = 0; i < shape->corners; i++)
+    if (memcmp (shape->corner[i], shape->at[k], sizeof shape->at[k]) == 0) return 0;
+  return 1;
+}
+
+/* Adds an attachment point unless the body has it already; its centre of mass is drawn anyway. */
+static void shapes_add_point (pw_plot_body *shape, const double *at) {
+  if (shape->count == PLOT_POINTS || (at[0] == 0 && at[1] == 0)) return;
+  for (int i = 0; i < shape->count; i++)
+    if (shape->at[i][0] == at[0] && shape->at[i][1] == at[1]) return;
+  memcpy (shape->at[shape->count++], at, 2 * sizeof *at);
+}
+
+int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
+  pw_names shown;
+  int elements;
+  const pw_element *e = pw_model_elements (m, &elements);
+  if (pw_names_open (&shown, (size_t)p->bodies) != PW_OK) return pw_fail (error, PW_MACHINE, "plots: out of memory");
+  for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, pw_system_body_name (p->s, p->body[i]), i);
+  for (const pw_element *end = e + elements; e < end; e++)
+    for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
+      const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
+      const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);
+      int b = pw_names_find (&shown, body);
+      if (at && b >= 0) shapes_add_point (&p->shape[b], at);
+      if (at && strcmp (body, "ground") == 0 && p->grounds < PLOT_SHOWN)
+        memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
+    }
+  for (int b = 0; b < p->bodies; b++) shapes_outline (&p->shape[b]);
+  pw_names_close (&shown);
+  return PW_OK;
+}
+
+/* ---- Links ---- */
+
+/* The number of a system's body among those shown, -1 for the ground, -2 for one that is not shown. */
+static int shapes_shown (const pw_plots *p, int body) {
+  if (body >= pw_count_bodies (p->s)) return -1;
+  int b = (int)((long long)body * p->bodies / pw_count_bodies (p->s));
+  for (int near = b - 1; near <= b + 1; near++)
+    if (near >= 0 && near < p->bodies && p->body[near] == body) return near;
+  return -2;
+}
+
+int pw_plot_body_of_wheel (const pw_plots *p, int wheel) {
+  return shapes_shown (p, pw_system_element (p->s, p->element[wheel]).body[0]);
+}
+
+/* Fills a link; 0 if the element has no point, or a body that is not shown. */
+static int shapes_fill (const pw_plots *p, const pw_element *e, int element, pw_plot_link *link) {
+  const int *bodies = pw_system_element (p->s, element).body;
+  *link = (pw_plot_link){ .element = element, .force = -1 };
+  for (int n = 0; n < e->kind->bodies && link->ends < 2; n++) {
+    const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
+    int body = shapes_shown (p, bodies[n]);
+    if (at == NULL) continue;
+    if (body == -2) return 0;
+    if (link->force < 0 && body >= 0) link->force = link->ends, link->column = 3 * n;
+    link->end[link->ends].body = body;
+    memcpy (link->end[link->ends++].at, at, 2 * sizeof *at);
+  }
+  return link->force >= 0;
+}
+
+/* The elements of a kind are in the same order in the model and in the system. */
+void pw_plot_find_links (pw_plots *p, const pw_model *m) {
+  int most = p->links, all = pw_system_elements (p->s), elements, next = 0;
+  const pw_element *e = pw_model_elements (m, &elements);
+  const pw_kind *last = NULL;
+  p->links = 0;
+  for (int i = 0; i < all && p->links < most; i++) {
+    const pw_kind *kind = pw_system_element (p->s, i).kind;
+    if (kind->each_body) continue;
+    if (kind != last) next = 0;
+    last = kind;
+    while (e[next].kind != kind) next++;
+    p->links += shapes_fill (p, &e[next++], i, &p->link[p->links]);
+  }
+}
+
+void pw_plot_forces (const pw_plots *p, const pw_sample *x, double *out) {
+  if (pw_system_forces (p->s, x->t, x->q, x->v, x->lambda, p->forces, NULL) != PW_OK) return;
+  for (int i = 0; i < p->links; i++, out += 2)
+    memcpy (out, p->forces + pw_system_element (p->s, p->link[i].element).force + p->link[i].column, 2 * sizeof *out);
+}
