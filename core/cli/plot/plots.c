@@ -5,6 +5,7 @@
 #include <unistd.h>
 #include "figure.h"
 #include "plot.h"
+#include "util.h"
 
 const char *const pw_plot_names[] = { ".dat", ".gp", ".svg", ".png", NULL };
 
