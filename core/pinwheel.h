@@ -547,7 +547,7 @@ typedef struct {
   const double *v;      /* count x kind->own: their rates */
   const double *u;      /* count x kind->signals x 3: value, rate and acceleration of each signal */
   const double *w;      /* count x cols: the direction w, for jw_q only */
-  const double *lambda; /* count x kind->rows: the multipliers, for jtl_q, power and loss only */
+  const double *lambda; /* count x kind->rows: the multipliers, for power and loss only */
 } pw_batch;
 
 /* Fills one array for the whole batch. */
@@ -593,8 +593,7 @@ struct pw_kind {
   pw_sweep *gamma;   /* rows: right-hand side of J a = gamma */
   pw_sweep *force;   /* cols: generalised force */
   pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
-  pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch */
-  pw_sweep *jtl_q;   /* cols x cols: derivative of J^T lambda by q, lambda given in the batch */
+  pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch; that of J^T lambda follows from it */
   pw_sweep *eta_q;   /* rows x cols */
   pw_sweep *gamma_q; /* rows x cols */
   pw_sweep *gamma_v; /* rows x cols */

@@ -148,14 +148,6 @@ static void wire_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-static void wire_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    wire_state s = wire_at (b, e);
-    for (int i = 0; i < 9; i++) out[i] = 0;
-    out[0] = s.p * b->lambda[e], out[4] = s.r * b->lambda[e];
-  }
-}
-
 static void wire_gamma_v (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     wire_state s = wire_at (b, e);
@@ -179,7 +171,6 @@ static const pw_kind wire_kind = {
   .J = wire_J,
   .gamma = wire_gamma,
   .jw_q = wire_jw_q,
-  .jtl_q = wire_jtl_q,
   .gamma_v = wire_gamma_v,
 };
 

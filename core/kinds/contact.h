@@ -55,14 +55,6 @@ static inline void contact_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-static inline void contact_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    CONTACT_PARTS;
-    memset (out, 0, 9 * sizeof *out);
-    out[2] = -y * b->lambda[e], out[5] = x * b->lambda[e];
-  }
-}
-
 static inline void contact_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     CONTACT_PARTS;

@@ -108,13 +108,6 @@ static inline void lines_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-static inline void lines_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    LINE_PARTS;
-    line_jtl_q (&s, b->lambda[e], out);
-  }
-}
-
 static inline void lines_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
     LINE_PARTS;

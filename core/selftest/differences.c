@@ -14,7 +14,7 @@ static const pw_slab *differences_find (const pw_system *s, int i, pw_block *blo
   *count = 0;
   for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++)
     for (int b = 0; b < PW_BLOCKS; b++) {
-      if (pw_block_sweep (k->kind, (pw_block)b) != pw_by_differences || (*count)++ != i) continue;
+      if (b == PW_JTL_Q || pw_block_sweep (k->kind, (pw_block)b) != pw_by_differences || (*count)++ != i) continue;
       *block = (pw_block)b;
       return k;
     }

@@ -123,7 +123,6 @@ static void selftest_blocks (pw_probe *x) {
   double sJ = pw_probe_largest (n * x->cols, J), sg = pw_probe_largest (n, gamma);
   if (x->rows > 0) {
     selftest_block (x, PW_JW_Q, "jw_q", "jw_q = d(J w)/dq", sJ);
-    selftest_block (x, PW_JTL_Q, "jtl_q", "jtl_q = d(J^T lambda)/dq", sJ);
     selftest_block (x, PW_ETA_Q, "eta_q", "eta_q = d eta/dq", 0);
     selftest_block (x, PW_GAMMA_Q, "gamma_q", "gamma_q = d gamma/dq", sg);
     selftest_block (x, PW_GAMMA_V, "gamma_v", "gamma_v = d gamma/dv", sg);

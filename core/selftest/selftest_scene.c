@@ -107,14 +107,6 @@ static void scene_drift (scene *x, double *out) {
   for (int i = 0; i < x->k->b.count * rows; i++) out[i] -= eta[i];
 }
 
-static void scene_JT_lambda (scene *x, double *out) {
-  int rows = x->k->kind->rows, cols = x->k->b.cols;
-  x->k->kind->J (&x->k->b, x->J);
-  scene_zero (out, x->k->b.count * cols);
-  for (int i = 0; i < x->k->b.count * rows; i++)
-    for (int c = 0; c < cols; c++) out[i / rows * cols + c] += x->J[i * cols + c] * x->lambda[i];
-}
-
 /* ---- Comparing ---- */
 
 /* The least error of each entry so far, with steps of size h. */
@@ -228,7 +220,6 @@ static void scene_all (scene *x) {
   if (kind->rows > 0) {
     scene_acceleration (x);
     scene_block (x, PW_JW_Q, "jw_q", "jw_q = d(J w)/dq", scene_Jw);
-    scene_block (x, PW_JTL_Q, "jtl_q", "jtl_q = d(J^T lambda)/dq", scene_JT_lambda);
     scene_block (x, PW_ETA_Q, "eta_q", "eta_q = d eta/dq", scene_eta);
     scene_block (x, PW_GAMMA_Q, "gamma_q", "gamma_q = d gamma/dq", scene_gamma);
     scene_block (x, PW_GAMMA_V, "gamma_v", "gamma_v = d gamma/dv", scene_gamma);

@@ -14,7 +14,7 @@ static const struct {
   int columns; /* as many rows as local columns, instead of kind->rows */
 } blocks_table[PW_BLOCKS] = {
   [PW_JW_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_J_W, 0, 0 },
-  [PW_JTL_Q] = { offsetof (pw_kind, jtl_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, 0, 1 },
+  [PW_JTL_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, 0, 1 },
   [PW_ETA_Q] = { offsetof (pw_kind, eta_q), offsetof (pw_kind, eta), BLOCKS_RAW, 0, 0 },
   [PW_GAMMA_Q] = { offsetof (pw_kind, gamma_q), offsetof (pw_kind, gamma), BLOCKS_RAW, 0, 0 },
   [PW_GAMMA_V] = { offsetof (pw_kind, gamma_v), offsetof (pw_kind, gamma), BLOCKS_RAW, 1, 0 },
@@ -146,14 +146,36 @@ int pw_block_missing (const pw_system *s, const pw_slab *k, int e, pw_block bloc
   return 0;
 }
 
+/* d(J^T lambda)/dq of element e from its d(J w)/dq: entry (r, c) is sum_i lambda_i dJ_ir/dq_c, where w = e_r gives column r of
+ * J. */
+static void blocks_transpose (const pw_slab *k, int e, pw_sweep *jw_q, double *out) {
+  double w[PW_MAX_COLS] = { 0 }, slope[PW_MAX_ROWS * PW_MAX_COLS];
+  int cols = k->b.cols;
+  blocks_single one;
+  blocks_isolate (k, e, &one);
+  one.b.w = w;
+  memset (out, 0, (size_t)(cols * cols) * sizeof *out);
+  for (int r = 0; r < cols; r++) {
+    w[r] = 1;
+    jw_q (&one.b, slope);
+    w[r] = 0;
+    for (int i = 0; i < k->kind->rows; i++)
+      for (int c = 0; c < cols; c++) out[r * cols + c] += k->b.lambda[e * k->kind->rows + i] * slope[i * cols + c];
+  }
+}
+
 int pw_sweep_block (const pw_system *s, const pw_slab *k, pw_block block, double *out) {
   pw_sweep *sweep = pw_block_sweep (k->kind, block);
   if (sweep == NULL) return 0;
-  if (sweep != pw_by_differences)
+  if (sweep != pw_by_differences && block != PW_JTL_Q) {
     sweep (&k->b, out);
-  else
-    for (int e = 0; e < k->b.count; e++)
-      pw_difference (s, k, e, block, out + e * pw_block_rows (k->kind, block) * k->b.cols);
+    return 1;
+  }
+  for (int e = 0, size = pw_block_rows (k->kind, block) * k->b.cols; e < k->b.count; e++, out += size)
+    if (sweep == pw_by_differences)
+      pw_difference (s, k, e, block, out);
+    else
+      blocks_transpose (k, e, sweep, out);
   return 1;
 }
 

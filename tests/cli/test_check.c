@@ -209,9 +209,6 @@ static void test_scene (void **state) {
   halved = pw_kind_pin;
   halved.jw_q = NULL;
   check_scene_expect (&halved, "jw_q");
-  halved = pw_kind_pin;
-  halved.jtl_q = NULL;
-  check_scene_expect (&halved, "jtl_q");
   halved = pw_kind_spring;
   halved.force_v = NULL;
   check_scene_expect (&halved, "force_v");

@@ -48,10 +48,10 @@ static const struct {
 } kinds_sweeps[] = {
 #define KINDS_SWEEP(s) \
   { #s, offsetof(pw_kind, s) }
-  KINDS_SWEEP (g),       KINDS_SWEEP (g_size),  KINDS_SWEEP (eta),     KINDS_SWEEP (J),       KINDS_SWEEP (gamma),
-  KINDS_SWEEP (force),   KINDS_SWEEP (force_u), KINDS_SWEEP (jw_q),    KINDS_SWEEP (jtl_q),   KINDS_SWEEP (eta_q),
-  KINDS_SWEEP (gamma_q), KINDS_SWEEP (gamma_v), KINDS_SWEEP (force_q), KINDS_SWEEP (force_v), KINDS_SWEEP (energy),
-  KINDS_SWEEP (power),   KINDS_SWEEP (loss),
+  KINDS_SWEEP (g),       KINDS_SWEEP (g_size),  KINDS_SWEEP (eta),     KINDS_SWEEP (J),
+  KINDS_SWEEP (gamma),   KINDS_SWEEP (force),   KINDS_SWEEP (force_u), KINDS_SWEEP (jw_q),
+  KINDS_SWEEP (eta_q),   KINDS_SWEEP (gamma_q), KINDS_SWEEP (gamma_v), KINDS_SWEEP (force_q),
+  KINDS_SWEEP (force_v), KINDS_SWEEP (energy),  KINDS_SWEEP (power),   KINDS_SWEEP (loss),
 #undef KINDS_SWEEP
 };
 enum { KINDS_SWEEPS = sizeof kinds_sweeps / sizeof *kinds_sweeps };

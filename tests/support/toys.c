@@ -216,7 +216,6 @@ const pw_kind toy_kind_roller = {
   .J = roller_J,
   .gamma = roller_gamma,
   .jw_q = PW_BY_DIFFERENCES,
-  .jtl_q = PW_BY_DIFFERENCES,
   .gamma_q = PW_BY_DIFFERENCES,
   .gamma_v = PW_BY_DIFFERENCES,
 };

@@ -99,7 +99,6 @@ const pw_kind pw_kind_drive = {
   .J = drive_J,
   .gamma = drive_gamma,
   .jw_q = lines_jw_q,
-  .jtl_q = lines_jtl_q,
   .gamma_q = lines_gamma_q,
   .gamma_v = lines_gamma_v,
 };

@@ -101,16 +101,6 @@ static void pin_gamma_v (const pw_batch *b, double *out) {
   }
 }
 
-static void pin_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    PIN_PARTS;
-    const double *l = b->lambda + 2 * e;
-    for (int i = 0; i < 36; i++) out[i] = 0;
-    out[14] = -s.X1 * l[0] - s.Y1 * l[1];
-    out[35] = s.X2 * l[0] + s.Y2 * l[1];
-  }
-}
-
 static const pw_field pin_fields[] = {
   { PW_AT (pw_pin, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies, or ground for one of them" },
   { PW_AT (pw_pin, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
@@ -139,7 +129,6 @@ const pw_kind pw_kind_pin = {
   .J = pin_J,
   .gamma = pin_gamma,
   .jw_q = pin_jw_q,
-  .jtl_q = pin_jtl_q,
   .gamma_q = pin_gamma_q,
   .gamma_v = pin_gamma_v,
 };

@@ -102,16 +102,6 @@ static void rod_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-static void rod_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    ROD_PARTS;
-    double f = b->lambda[e] / s.L;
-    for (int i = 0; i < 36; i++) out[i] = f * (s.D[0][i / 6] * s.D[0][i % 6] + s.D[1][i / 6] * s.D[1][i % 6]);
-    out[14] -= f * rod_dot (s.d, s.S1);
-    out[35] += f * rod_dot (s.d, s.S2);
-  }
-}
-
 /* d' changes with the angles by -w1 (X1, Y1) and w2 (X2, Y2), the arms by their columns of D, one with its sign. */
 static void rod_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
@@ -162,7 +152,6 @@ const pw_kind pw_kind_rod = {
   .J = rod_J,
   .gamma = rod_gamma,
   .jw_q = rod_jw_q,
-  .jtl_q = rod_jtl_q,
   .gamma_q = rod_gamma_q,
   .gamma_v = rod_gamma_v,
 };

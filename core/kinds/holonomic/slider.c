@@ -57,13 +57,6 @@ static void slider_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-static void slider_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    LINE_PARTS;
-    line_jtl_q (&s, b->lambda[2 * e], out);
-  }
-}
-
 static void slider_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 12) {
     LINE_PARTS;
@@ -112,7 +105,6 @@ const pw_kind pw_kind_slider = {
   .J = slider_J,
   .gamma = slider_gamma,
   .jw_q = slider_jw_q,
-  .jtl_q = slider_jtl_q,
   .gamma_q = slider_gamma_q,
   .gamma_v = slider_gamma_v,
 };

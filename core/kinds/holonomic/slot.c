@@ -71,7 +71,6 @@ const pw_kind pw_kind_slot = {
   .J = slot_J,
   .gamma = slot_gamma,
   .jw_q = lines_jw_q,
-  .jtl_q = lines_jtl_q,
   .gamma_q = lines_gamma_q,
   .gamma_v = lines_gamma_v,
 };

@@ -99,16 +99,6 @@ static void weld_gamma_v (const pw_batch *b, double *out) {
   }
 }
 
-static void weld_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    WELD_PARTS
-    const double *l = b->lambda + 3 * e;
-    memset (out, 0, 36 * sizeof *out);
-    out[14] = -X1 * l[0] - Y1 * l[1];
-    out[35] = X2 * l[0] + Y2 * l[1];
-  }
-}
-
 static const pw_field weld_fields[] = {
   { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies, or ground for one of them" },
   { PW_AT (pw_weld, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
@@ -139,7 +129,6 @@ const pw_kind pw_kind_weld = {
   .J = weld_J,
   .gamma = weld_gamma,
   .jw_q = weld_jw_q,
-  .jtl_q = weld_jtl_q,
   .gamma_q = weld_gamma_q,
   .gamma_v = weld_gamma_v,
 };

@@ -62,15 +62,6 @@ static void pfaffian_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-static void pfaffian_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    PFAFFIAN_PARTS;
-    double l = b->lambda[e];
-    memset (out, 0, 36 * sizeof *out);
-    out[2] = -l * Ay, out[8] = l * Ax, out[20] = -l * By, out[26] = l * Bx;
-  }
-}
-
 static void pfaffian_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
     PFAFFIAN_PARTS;
@@ -119,7 +110,6 @@ const pw_kind pw_kind_pfaffian = {
   .J = pfaffian_J,
   .gamma = pfaffian_gamma,
   .jw_q = pfaffian_jw_q,
-  .jtl_q = pfaffian_jtl_q,
   .gamma_q = pfaffian_gamma_q,
   .gamma_v = pfaffian_gamma_v,
 };

@@ -91,16 +91,6 @@ static void rolling_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-static void rolling_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 16) {
-    ROLLING_PARTS;
-    const double *l = b->lambda + 2 * e;
-    memset (out, 0, 16 * sizeof *out);
-    out[2] = -c * l[0] - s * l[1], out[6] = c * l[1] - s * l[0];
-    (void)k;
-  }
-}
-
 static void rolling_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 8) {
     ROLLING_PARTS;
@@ -170,7 +160,6 @@ const pw_kind pw_kind_rolling_wheel = {
   .force = rolling_force,
   .force_u = rolling_force_u,
   .jw_q = rolling_jw_q,
-  .jtl_q = rolling_jtl_q,
   .gamma_q = rolling_gamma_q,
   .gamma_v = rolling_gamma_v,
   .power = rolling_power,

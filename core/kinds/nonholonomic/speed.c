@@ -53,7 +53,6 @@ const pw_kind pw_kind_speed = {
   .J = contact_J,
   .gamma = speed_gamma,
   .jw_q = contact_jw_q,
-  .jtl_q = contact_jtl_q,
   .gamma_q = contact_gamma_q,
   .gamma_v = contact_gamma_v,
 };

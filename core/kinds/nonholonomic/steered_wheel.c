@@ -66,14 +66,6 @@ static void steered_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-static void steered_jtl_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    STEERED_PARTS;
-    memset (out, 0, 9 * sizeof *out);
-    out[2] = -x.c * b->lambda[e], out[5] = -x.s * b->lambda[e];
-  }
-}
-
 static void steered_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     STEERED_PARTS;
@@ -122,7 +114,6 @@ const pw_kind pw_kind_steered_wheel = {
   .J = steered_J,
   .gamma = steered_gamma,
   .jw_q = steered_jw_q,
-  .jtl_q = steered_jtl_q,
   .gamma_q = steered_gamma_q,
   .gamma_v = steered_gamma_v,
   .contact = steered_contact,

@@ -48,7 +48,6 @@ const pw_kind pw_kind_wheel = {
   .J = contact_J,
   .gamma = contact_gamma,
   .jw_q = contact_jw_q,
-  .jtl_q = contact_jtl_q,
   .gamma_q = contact_gamma_q,
   .gamma_v = contact_gamma_v,
   .contact = wheel_contact,
