@@ -17,6 +17,7 @@
  *
  * J is swept over panels, the rows that touch a body or an own coordinate.  At the step's start K is symmetric and positive
  * definite, so that its factorisation needs no pivoting; it is done without while no pivot is small, else anew with it. */
+#include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -59,7 +60,6 @@ static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
     b->panel = pw_take (&l, panels, sizeof *b->panel);
     b->piece = pw_take (&l, pieces, sizeof *b->piece);
     b->K = pw_take (&l, m * m, sizeof (double));
-    b->scale = pw_take (&l, m, sizeof (double));
     b->inverse = pw_take (&l, (size_t)s->coords, sizeof (double));
     b->mu = pw_take (&l, m, sizeof (double));
     b->eta = pw_take (&l, all, sizeof (double));
@@ -136,92 +136,49 @@ static void nullspace_assemble (pw_nullspace *b, pw_system *s, const double *w) 
       nullspace_gather (b, p, w, 1);
 }
 
-/* K = L U and mu = K^-1 mu without pivoting, m a constant where it is inlined.  Returns 0 where a pivot has lost more than
- * so much of its diagonal entry. */
-PW_INLINE int nullspace_eliminate (double *K, double *mu, int m) {
+/* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 where a pivot has lost more than so much of its diagonal
+ * entry. */
+static int nullspace_eliminate (double *K, double *mu, int m) {
   const double least = 0.01;
-  PW_UNROLL for (int p = 0; p < m; p++) {
+  for (int p = 0; p < m; p++) {
     double diagonal = K[p * m + p];
-    PW_UNROLL for (int i = 0; i < p; i++) {
+    for (int i = 0; i < p; i++) {
       double f = K[p * m + i] * K[i * m + i];
-      PW_UNROLL for (int j = i + 1; j < m; j++) K[p * m + j] -= f * K[i * m + j];
+      for (int j = i + 1; j < m; j++) K[p * m + j] -= f * K[i * m + j];
       mu[p] -= f * mu[i];
     }
     if (!(K[p * m + p] > least * diagonal)) return 0;
     K[p * m + p] = 1 / K[p * m + p];
   }
-  PW_UNROLL for (int i = m - 1; i >= 0; i--) {
-    PW_UNROLL for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
+  for (int i = m - 1; i >= 0; i--) {
+    for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
     mu[i] *= K[i * m + i];
   }
   return 1;
 }
 
-#define NULLSPACE_SIZES QUICK (1) QUICK (2) QUICK (3) QUICK (4) QUICK (5) QUICK (6)
-
-static int nullspace_quick (pw_nullspace *b) {
-  switch (b->rows) {
-#define QUICK(m) \
-  case m:        \
-    return nullspace_eliminate (b->K, b->mu, m);
-    NULLSPACE_SIZES
-#undef QUICK
-  default:
-    return nullspace_eliminate (b->K, b->mu, b->rows);
-  }
-}
-
-/* ---- The same with pivoting ---- */
-
-static void nullspace_swap (pw_nullspace *b, int p, int q) {
-  int m = b->rows;
-  double scale = b->scale[p];
-  b->scale[p] = b->scale[q], b->scale[q] = scale;
-  for (int j = 0; j < m; j++) {
-    double x = b->K[p * m + j];
-    b->K[p * m + j] = b->K[q * m + j], b->K[q * m + j] = x;
-  }
-}
-
-/* K = P L U, partial pivoting by scaled rows.  PW_RETRY if a pivot is what round-off leaves of a dependent row. */
-static int nullspace_factor (pw_nullspace *b) {
+/* The same with pivoting, rows scaled.  PW_RETRY if a pivot is what round-off leaves of a dependent row. */
+static int nullspace_pivot (pw_nullspace *b) {
   const double least = 1e-13;
   int m = b->rows;
   double *K = b->K;
   for (int i = 0; i < m; i++) {
-    b->scale[i] = 0;
-    for (int j = 0; j < m; j++) b->scale[i] = fmax (b->scale[i], fabs (K[i * m + j]));
+    double most = 0;
+    for (int j = 0; j < m; j++) most = pw_largest (most, fabs (K[i * m + j]));
+    if (!(most > 0 && isfinite (most))) return PW_RETRY;
+    for (int j = 0; j < m; j++) K[i * m + j] /= most;
+    b->mu[i] /= most;
   }
-  for (int p = 0; p < m; p++) {
-    int best = p;
-    for (int i = p + 1; i < m; i++)
-      if (fabs (K[i * m + p]) * b->scale[best] > fabs (K[best * m + p]) * b->scale[i]) best = i;
-    if (!(fabs (K[best * m + p]) > least * b->scale[best])) return PW_RETRY;
-    b->pivot[p] = best;
-    if (best != p) nullspace_swap (b, p, best);
-    for (int i = p + 1; i < m; i++) {
-      double f = K[i * m + p] /= K[p * m + p];
-      for (int j = p + 1; f != 0 && j < m; j++) K[i * m + j] -= f * K[p * m + j];
+  for (int i = 0; i < m; i++) /* LAPACK's rows are columns here */
+    for (int j = 0; j < i; j++) {
+      double x = K[i * m + j];
+      K[i * m + j] = K[j * m + i], K[j * m + i] = x;
     }
-  }
+  LAPACKE_dgetrf_work (LAPACK_COL_MAJOR, m, m, K, m, b->pivot);
+  for (int p = 0; p < m; p++)
+    if (!(fabs (K[p * m + p]) > least)) return PW_RETRY;
+  LAPACKE_dgetrs_work (LAPACK_COL_MAJOR, 'N', m, 1, K, m, b->pivot, b->mu, m);
   return PW_OK;
-}
-
-/* mu = K^-1 mu */
-static void nullspace_solve (pw_nullspace *b) {
-  int m = b->rows;
-  const double *K = b->K;
-  double *mu = b->mu;
-  for (int p = 0; p < m; p++) {
-    double x = mu[b->pivot[p]];
-    mu[b->pivot[p]] = mu[p], mu[p] = x;
-  }
-  for (int i = 0; i < m; i++)
-    for (int j = 0; j < i; j++) mu[i] -= K[i * m + j] * mu[j];
-  for (int i = m - 1; i >= 0; i--) {
-    for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
-    mu[i] /= K[i * m + i];
-  }
 }
 
 /* ---- A step ---- */
@@ -239,11 +196,9 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
 /* mu; PW_RETRY if K is singular. */
 static int nullspace_multipliers (pw_nullspace *b, pw_system *s, const double *w) {
   nullspace_assemble (b, s, w);
-  if (nullspace_quick (b)) return PW_OK;
+  if (nullspace_eliminate (b->K, b->mu, b->rows)) return PW_OK;
   nullspace_assemble (b, s, w);
-  if (nullspace_factor (b) != PW_OK) return PW_RETRY;
-  nullspace_solve (b);
-  return PW_OK;
+  return nullspace_pivot (b);
 }
 
 /* The rates at the placed pose, J swept. */

@@ -24,12 +24,12 @@ typedef struct {
   int panels;                /* bodies and own coordinates */
   pw_nullspace_panel *panel; /* panels + 2 */
   pw_nullspace_piece *piece;
-  double *K, *scale; /* rows x rows: J W^-1 J0^T, factorised in place; rows: the largest entry of each */
-  double *inverse;   /* coords: of W */
-  double *mu;        /* rows */
-  double *eta;       /* all rows */
-  double *v;         /* coords + 3: scratch */
-  int *pivot;        /* rows */
+  double *K;       /* rows x rows: J W^-1 J0^T, factorised in place */
+  double *inverse; /* coords: of W */
+  double *mu;      /* rows */
+  double *eta;     /* all rows */
+  double *v;       /* coords + 3: scratch */
+  int *pivot;      /* rows */
   char *memory;
 } pw_nullspace;
 
