@@ -38,6 +38,10 @@ report 'a model in C, compiled on the fly' $?
 report 'a model as text' $?
 
 cd - >/dev/null || exit 1
+make -s --no-print-directory NO_DEPS=1 BUILD="$work/copied" "$work/copied/models/pendulum.yaml" >"$work/log" 2>&1 &&
+  case $(readlink "$work/copied/models/pendulum.yaml") in /*) false ;; esac
+report 'links to the models are relative, so that a build can be copied' $?
+
 if command -v pkg-config >/dev/null; then
   export PKG_CONFIG_PATH="$top/lib/pkgconfig"
   cp "$top/share/doc/pinwheel/examples/embed.c" "$work"

@@ -73,6 +73,9 @@ static void test_links (void **state) {
   cli_bad ("pinwheel run ezyroller -t 1 --checkpoint @/k/a.ck", 1, "cannot write @/k/a.ck" OUTPUT_LINK);
   cli_bad ("pinwheel run ezyroller -t 1 --plots @/k", 1, "cannot write @/k/motion.dat" OUTPUT_LINK);
   cli_bad ("pinwheel sweep ezyroller -t 1 --vary a=0.5,0.6 -o @/k/t.csv", 1, "cannot write @/k/t.csv.part" OUTPUT_LINK);
+  cli_good ("rm @/k/t.csv.part; mkfifo @/k/t.csv.part");
+  cli_bad ("pinwheel sweep ezyroller -t 1 --vary a=0.5,0.6 -o @/k/t.csv", 1,
+           "cannot write @/k/t.csv.part: its temporary name is not that of a regular file");
   cli_good ("rm @/k/t.csv.part");
   assert_int_equal (cli_run ("pinwheel sweep ezyroller -t 0.1 --vary a=0.5,0.6 -o @/k/t.csv"), 1);
   assert_non_null (strstr (cli_err, "t.csv" OUTPUT_LINK));
@@ -328,6 +331,7 @@ static void test_forged (void **state) {
   output_forge (0, 0.75);
   output_forge (16, NAN); /* coordinates, after the 16 numbers of a run */
   output_forge (18, INFINITY);
+  output_forge (16 + 9, NAN); /* velocities */
 }
 
 /* ---- The process ---- */

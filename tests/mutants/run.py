@@ -8,8 +8,8 @@ The file `list` beside this one has a line for each mutation:
     FUNCTION | EXPRESSION => REPLACEMENT | TEST...
     FUNCTION | EXPRESSION => REPLACEMENT | equivalent: REASON
 
-FUNCTION is the name of a function, table or macro of core/, solvers/ or models/; EXPRESSION must occur in it exactly once
-(white space is ignored; write a | b as a|b).  A mutation that does not apply is an error.  The TESTs named run first; if they
+FUNCTION is the name of a function, table or macro of core/, solvers/, models/ or tests/support/, or `Makefile`; EXPRESSION must
+occur in it exactly once (white space is ignored; write a | b as a|b).  A mutation that does not apply is an error.  The TESTs named run first; if they
 all pass, every quick test runs, unless --named is given.  Mutants that are equivalent to the original for the stated reason are
 listed but not run.
 
@@ -21,7 +21,7 @@ import argparse, functools, hashlib, os, re, shutil, subprocess, sys, time
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 TOP = os.path.dirname(os.path.dirname(HERE))
-ROOTS = ("core/", "solvers/", "models/")
+ROOTS = ("core/", "solvers/", "models/", "tests/support/")
 TEST_LIMIT = 240  # seconds for a test program; the slowest takes about 20 without a mutation
 
 
@@ -67,7 +67,7 @@ def apply(mutation, files):
     for path, text in files.items():
         if mutation["function"] not in text:
             continue
-        for header, start, end in definitions(text):
+        for header, start, end in [(path, 0, len(text))] if path == "Makefile" else definitions(text):
             if name.search(header.strip()):
                 places += 1
                 for m in pattern(mutation["expression"]).finditer(text, start, end):
@@ -165,7 +165,7 @@ def main():
     os.makedirs(options.build, exist_ok=True)
     mutations = list(read_list(os.path.join(HERE, "list")))
     names = sources()
-    files = {n: open(os.path.join(TOP, n)).read() for n in names if n.startswith(ROOTS) and n.endswith((".c", ".h"))}
+    files = {n: open(os.path.join(TOP, n)).read() for n in names if n == "Makefile" or n.startswith(ROOTS) and n.endswith((".c", ".h"))}
     wrong = 0
     for m in mutations:
         m["applied"], why = apply(m, files)
