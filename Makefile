@@ -19,8 +19,9 @@ endif
 # ---- How to compile and link ----
 
 WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes
-# -fno-plt: calls between the files of a library are calls, not calls of jumps.
-STRICT := -std=c11 -fPIC -fno-plt -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)
+# -fvisibility=hidden: a library exports what its public headers declare.  -fno-plt: calls between the files of a library are
+# calls, not calls of jumps.
+STRICT := -std=c11 -fPIC -fvisibility=hidden -fno-plt -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)
 ONE_BY_ONE := -fno-tree-slp-vectorize
 # gcc 12.2 fuses multiplications and additions when it vectorises straight code, -ffp-contract=off or not, for processors
 # that can: results would depend on the build.  The default processor of x86-64 cannot.
@@ -61,6 +62,8 @@ INCLUDES := $(addprefix $(BUILD)/include/,$(notdir $(HEADERS)))
 LIB       := $(BUILD)/libpinwheel.so
 FILES_LIB := $(BUILD)/libpinwheel-files.so
 LIB_OBJ   := $(call obj,$(CORE) $(SOLVERS))
+# Utilities that are no interface: the program and each library have their own.
+BASE_OBJ  := $(call obj,$(addprefix core/base/,characters.c nearest.c store.c))
 FILES_OBJ := $(call obj,$(FILES))
 CLI_OBJ   := $(call obj,$(CLI))
 PLUGINS   := $(MODELS:%.c=$(BUILD)/%.so) $(patsubst %,$(BUILD)/%,$(wildcard models/*.yaml))
@@ -131,7 +134,7 @@ $(BUILD)/obj/core/%.o:       INCLUDE := $(call layer,$(CORE_LAYERS))
 $(BUILD)/obj/core/kinds/%.o: STRICT += $(ONE_BY_ONE)
 $(BUILD)/obj/core/kinds/%.o: INCLUDE := $(call layer,core core/kinds)
 $(BUILD)/obj/solvers/%.o:    INCLUDE := $(call layer,$(CORE_LAYERS) $(SOLVER_LAYERS)) $(SYSTEM)
-$(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,$(CORE_LAYERS) $(FILE_LAYERS)) $(SYSTEM)
+$(BUILD)/obj/core/files/%.o: INCLUDE := $(call layer,core core/base $(FILE_LAYERS)) $(SYSTEM)
 $(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base core/files core/files/expression)
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,core core/base core/files solvers $(CLI_LAYERS))
 $(call obj,core/cli/plot/animate.c core/cli/plot/figure.c core/cli/inspect/new.c): INCLUDE += $(addprefix -iquote $(BUILD)/obj/core/cli/,plot inspect)
@@ -140,6 +143,8 @@ $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
 $(call obj,core/cli/sweep/sweep.c) $(BUILD)/pinwheel: private THREADS = -pthread
 ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
+# Libraries below call functions that tests wrap.
+$(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
 $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
@@ -180,9 +185,9 @@ $(LIB): $(LIB_OBJ)
 	$(Q)$(SHARED) -Wl,-soname,$(@F).$(ABI) -o $@.$(ABI) $^ $(SOLVER_LIBS)
 	$(Q)ln -sf $(@F).$(ABI) $@
 
-$(FILES_LIB): $(FILES_OBJ) $(LIB)
+$(FILES_LIB): $(FILES_OBJ) $(BASE_OBJ) $(LIB)
 	$(call say,LINK)
-	$(Q)$(SHARED) -Wl,-soname,$(@F).$(ABI) -Wl,-rpath,'$$ORIGIN' -o $@.$(ABI) $(FILES_OBJ) -L$(BUILD) -lpinwheel $(FILES_LIBS)
+	$(Q)$(SHARED) -Wl,-soname,$(@F).$(ABI) -Wl,-rpath,'$$ORIGIN' -o $@.$(ABI) $(FILES_OBJ) $(BASE_OBJ) -L$(BUILD) -lpinwheel $(FILES_LIBS)
 	$(Q)ln -sf $(@F).$(ABI) $@
 
 $(LIB:.so=.a): $(LIB_OBJ)
@@ -215,9 +220,15 @@ $(BUILD)/models/%.yaml: models/%.yaml
 
 HOUSE_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
-$(PROGRAM): $(CLI_OBJ) $(LIB) $(FILES_LIB)
+$(PROGRAM): $(CLI_OBJ) $(BASE_OBJ) $(LIB) $(FILES_LIB)
 	$(call say,LINK)
-	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(HOUSE_LIBS) -lpopt -lm
+	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(BASE_OBJ) $(HOUSE_LIBS) -lpopt -lm
+
+# Benchmarks that look inside have the libraries whole, as tests do.
+WHOLE := -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive $(FILES_LIBS) $(SOLVER_LIBS)
+INSIDE := $(addprefix $(BUILD)/benchmarks/,engine eighth peers)
+$(INSIDE): HOUSE_LIBS = -rdynamic $(WHOLE)
+$(INSIDE): $(FILES_LIB:.so=.a) $(LIB:.so=.a)
 
 $(PROGRAMS): $(BUILD)/%: $(BUILD)/obj/%.o $(LIB) $(FILES_LIB)
 	@mkdir -p $(@D)
@@ -241,8 +252,7 @@ $(TESTS) $(SLOWS): $(BUILD)/tests/%: $$(call test_obj,$$*) $(BUILD)/libtests.a $
 	@mkdir -p $(@D)
 	$(call say,LINK)
 	$(Q)$(LINK) $(WRAP) -rdynamic -Wl,-u,limit_begin -o $@ $(filter %.o,$^) $(BUILD)/libtests.a \
-	  -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive \
-	  $(FILES_LIBS) $(SOLVER_LIBS) -lcmocka -lpopt
+	  $(WHOLE) -lcmocka -lpopt
 
 $(BUILD)/tests/test_embed: | $(BUILD)/docs/embed
 

@@ -9,6 +9,10 @@
 extern "C" {
 #endif
 
+#ifdef __GNUC__
+#pragma GCC visibility push(default)
+#endif
+
 enum { PW_SELFTEST_CHECKS = 24 };
 
 /* One comparison: the worst of all elements, entries and seeds. */
@@ -59,6 +63,10 @@ typedef struct {
  * PW_METHOD if a signal fails. */
 int pw_verify (pw_system *s, double t, const double *q, const double *v, const double *a, const double *lambda,
                pw_verification *result);
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
 
 #ifdef __cplusplus
 }

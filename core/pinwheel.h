@@ -20,9 +20,19 @@
 extern "C" {
 #endif
 
+#ifdef __GNUC__
+#pragma GCC visibility push(default)
+#endif
+
 #define PW_VERSION "0.1.0"
 #define PW_ABI 1 /* raised, once 0.1.0 is out, when a plug-in compiled against an older header could be misread */
 #define PW_PI 3.14159265358979323846
+
+#ifdef __GNUC__
+#define PW_EXPORT __attribute__ ((visibility ("default")))
+#else
+#define PW_EXPORT
+#endif
 
 /* ---- Status and errors ---- */
 
@@ -216,8 +226,8 @@ typedef struct {
 } pw_plugin_table;
 
 /* Ends a model file:  PW_MODEL (.about = "...", .parameters = ..., .build = build) */
-#define PW_MODEL(...)                     \
-  extern const pw_plugin_table pw_plugin; \
+#define PW_MODEL(...)                               \
+  extern PW_EXPORT const pw_plugin_table pw_plugin; \
   const pw_plugin_table pw_plugin = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), __VA_ARGS__ }
 
 /* Adds a body.  The model keeps a copy, the name included.  Returns PW_OK or the first error of the model, which
@@ -689,7 +699,29 @@ typedef struct {
   double (*eval) (void *context, int i, double t); /* the value of expression i */
   void *context;
 } pw_truth_text;
-const pw_truth_text *pw_model_truth (const pw_model *m);
+const pw_truth_text *pw_model_truth (const pw_model *m);           /* all zero: it knows nothing */
+void pw_model_set_truth (pw_model *m, const pw_truth_text *truth); /* which must live as long as the model */
+
+/* ---- For build functions that read their models from elsewhere ---- */
+
+/* Frees an object with the model: memory of function signals, for instance.  PW_MACHINE, and the object is freed at once. */
+int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object));
+
+/* The first error of a model, which a build function may set. */
+pw_error *pw_model_error (pw_model *m);
+
+/* What pw_compile would refuse in a body, and in an element, but for bodies that do not exist; errors begin with
+ * "model NAME: ".  PW_INPUT. */
+int pw_model_check_body (const pw_model *m, const pw_body *body, pw_error *error);
+int pw_model_check_element (const pw_model *m, const pw_element *element, pw_error *error);
+
+/* What is wrong with a signal of a kind, written to the buffer, which is returned; "" if nothing is.  *point becomes the point
+ * of a table that is meant, or -1. */
+char *pw_signal_fault (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
+
+/* Checks a plug-in's table: its ABI, that it can build, its texts and parameters.  Errors: PW_INPUT, beginning with `what`, a path
+ * or "model NAME". */
+int pw_plugin_check (const pw_plugin_table *table, const char *what, pw_error *error);
 
 /* ---- The compiled system ---- */
 
@@ -794,6 +826,10 @@ void pw_equations_free (pw_equations *e); /* in every case */
 /* Second-order blocks that are PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as pw_state_name. */
 int pw_count_differences (const pw_system *s);
 char *pw_difference_name (const pw_system *s, int i, char *buffer, size_t size);
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
 
 #ifdef __cplusplus
 }

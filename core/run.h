@@ -9,6 +9,10 @@
 extern "C" {
 #endif
 
+#ifdef __GNUC__
+#pragma GCC visibility push(default)
+#endif
+
 #define PW_MAX_STEPS 10000000 /* attempted steps of a run by an adaptive method, if nothing is said */
 
 /* How to integrate; zeros leave the defaults. */
@@ -96,6 +100,10 @@ void pw_carry (pw_archive *a, void *bytes, size_t count);
 void pw_carry_count (pw_archive *a, long *count); /* fails for what no count can be, or none that goes on */
 void pw_archive_clear (pw_archive *a);            /* back to the beginning */
 void pw_archive_free (pw_archive *a);
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
 
 #ifdef __cplusplus
 }

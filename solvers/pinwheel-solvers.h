@@ -15,6 +15,10 @@
 extern "C" {
 #endif
 
+#ifdef __GNUC__
+#pragma GCC visibility push(default)
+#endif
+
 typedef struct pw_run pw_run;
 typedef struct pw_method_data pw_method_data; /* what an integrator keeps; each defines its own */
 
@@ -208,6 +212,10 @@ int pw_start_moved (const pw_system *s, const pw_start_report *report, int state
 /* 1 if the model specifies the initial value of this state, or the user gave it; 0 if it was left out. */
 int pw_start_specified (const pw_system *s, int state);
 const pw_scale *pw_run_scale (const pw_run *r);
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
 
 #ifdef __cplusplus
 }

@@ -6,7 +6,9 @@
 #include "pinwheel.h"
 
 /* Refuses NULL in the place of "a system", left by an earlier call whose error the caller need not have looked at. */
-int pw_require (const void *object, const char *what, pw_error *error);
+static inline int pw_require (const void *object, const char *what, pw_error *error) {
+  return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", what);
+}
 
 /* Keeps the valid name nearest to one that was not found, as a share of the longer one's length; start with
  * { .sought = name }. */
@@ -73,9 +75,6 @@ char *pw_take_arrays (const pw_array *array, size_t arrays);
 /* PW_OK if there are so many bytes to be had at this moment, else PW_MACHINE.  Asked before calls of libraries that crash
  * when they are refused memory. */
 int pw_reserve (size_t bytes);
-
-/* Parameters lie inside their structure and start with a value that makes sense; messages begin with `what` and `name`. */
-int pw_check_parameters (const char *what, const char *name, const pw_plugin_table *table, pw_error *error);
 
 /* "" if a value lies in the domain, else what was expected (">= 0"). */
 const char *pw_domain_check (pw_domain domain, double value);

@@ -9,6 +9,10 @@
 extern "C" {
 #endif
 
+#ifdef __GNUC__
+#pragma GCC visibility push(default)
+#endif
+
 /* ---- Models ---- */
 
 /* A model file that is open: a plug-in loaded or a text model read, and its table. */
@@ -218,6 +222,10 @@ typedef struct {
 /* Writes the JSON summary: whatever is not known (model and method too may be NULL) or not finite is null. */
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error);
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
 
 #ifdef __cplusplus
 }

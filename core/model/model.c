@@ -5,6 +5,12 @@
 #include <string.h>
 #include "model.h"
 
+struct pw_kept {
+  void *object;
+  void (*free_object) (void *object);
+  struct pw_kept *next;
+};
+
 static int model_no_memory (pw_model *m) {
   return pw_fail (&m->error, PW_MACHINE, "model %s: out of memory", m->name ? m->name : "");
 }
@@ -14,17 +20,9 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
     pw_fail (error, PW_INPUT, "a model has no %s", name ? "table" : "name");
     return NULL;
   }
-  if (table->abi != PW_ABI || table->size != sizeof *table) {
-    pw_fail (error, PW_INPUT,
-             "model %s was compiled for ABI %u of %zu bytes, this Pinwheel has ABI %u of %zu: compile it anew", name,
-             table->abi, table->size, (unsigned)PW_ABI, sizeof *table);
-    return NULL;
-  }
-  if (table->build == NULL) {
-    pw_fail (error, PW_INPUT, "model %s has no build function", name);
-    return NULL;
-  }
-  if (pw_check_parameters ("model ", name, table, error) != PW_OK) return NULL;
+  char what[200];
+  snprintf (what, sizeof what, "model %s", name);
+  if (pw_plugin_check (table, what, error) != PW_OK) return NULL;
   pw_model *m = calloc (1, sizeof *m);
   if (m) {
     m->table = table;
@@ -43,6 +41,7 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
 
 void pw_model_free (pw_model *m) {
   if (m == NULL) return;
+  for (struct pw_kept *k = m->kept; k; k = k->next) k->free_object (k->object);
   pw_arena_free (&m->arena);
   free (m->body);
   free (m->element);
@@ -126,7 +125,7 @@ static const double *model_numbers (pw_model *m, const double *from, int count) 
   return memcpy (copy, from, (size_t)count * sizeof *copy);
 }
 
-/* A table's points become the model's own; what is no table is left for pw_check_element to say. */
+/* A table's points become the model's own; what is no table is left for the check of elements. */
 static void model_table (pw_model *m, pw_signal *s) {
   if (s == NULL || s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
   s->table.t = model_numbers (m, s->table.t, s->table.count);
@@ -191,7 +190,27 @@ int pw_model_starts (const pw_model *m) {
 }
 
 const pw_truth_text *pw_model_truth (const pw_model *m) {
-  return &m->truth;
+  static const pw_truth_text nothing;
+  return m->truth ? m->truth : &nothing;
+}
+
+void pw_model_set_truth (pw_model *m, const pw_truth_text *truth) {
+  m->truth = truth;
+}
+
+int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object)) {
+  struct pw_kept *k = pw_arena_take (&m->arena, sizeof *k);
+  if (k == NULL) {
+    free_object (object);
+    return model_no_memory (m);
+  }
+  *k = (struct pw_kept){ object, free_object, m->kept };
+  m->kept = k;
+  return PW_OK;
+}
+
+pw_error *pw_model_error (pw_model *m) {
+  return &m->error;
 }
 
 void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k) {

@@ -29,7 +29,8 @@ struct pw_model {
   int elements, element_room;
   pw_given *given;
   int givens, given_room;
-  pw_truth_text truth;
+  const pw_truth_text *truth;
+  struct pw_kept *kept; /* freed with the model */
   int built;
   pw_error error; /* the first one */
 };
@@ -39,8 +40,6 @@ enum { PW_NAME_MOST = 50 };
 
 /* Checks every body and element against its field table: names, numbers, bodies' names, signals. */
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
-int pw_check_body (const pw_model *m, const pw_body *b, pw_error *error);
-int pw_check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error);
 
 /* "" if the table of a kind holds together, else what is wrong with it, perhaps in the buffer.  Anything else may crash on
  * one that does not. */

@@ -4,17 +4,34 @@
 #include "model.h"
 #include "signal.h"
 
-int pw_check_parameters (const char *what, const char *name, const pw_plugin_table *table, pw_error *error) {
-  for (const pw_parameter *p = table->parameters; p && p->name; p++) {
-    const char *expected = pw_domain_check (p->domain, p->value);
-    if (p->offset + sizeof (double) > table->parameters_size)
-      return pw_fail (error, PW_INPUT,
-                      "%s%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof", what,
-                      name, p->name);
-    if (*expected)
-      return pw_fail (error, PW_INPUT, "%s%s: parameter %s has the default %g: expected %s", what, name, p->name,
-                      p->value, expected);
-  }
+static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, const char *what, pw_error *error) {
+  const char *expected = pw_domain_check (p->domain, p->value);
+  if (!pw_is_text (p->name) || (p->unit && !pw_is_text (p->unit)) || (p->about && !pw_is_text (p->about)))
+    return pw_fail (error, PW_INPUT,
+                    "%s: name, unit or meaning of parameter %s is no text: expected UTF-8 without control characters",
+                    what, p->name);
+  if (p->offset + sizeof (double) > t->parameters_size)
+    return pw_fail (error, PW_INPUT,
+                    "%s: parameter %s lies outside the model's structure: set .parameters_size to its sizeof", what,
+                    p->name);
+  if (*expected == 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "%s: parameter %s has the default %g: expected %s", what, p->name, p->value,
+                  expected);
+}
+
+/* What is shown of a model does not touch the terminal, and is UTF-8 in summaries. */
+int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error) {
+  if (t->abi != PW_ABI || t->size != sizeof *t)
+    return pw_fail (error, PW_INPUT,
+                    "%s was compiled for another Pinwheel (ABI %u, this one has %u; table of %zu bytes, here %zu): "
+                    "compile it anew",
+                    what, t->abi, (unsigned)PW_ABI, t->size, sizeof *t);
+  if (t->build == NULL)
+    return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", what);
+  if (t->about && !pw_is_text (t->about))
+    return pw_fail (error, PW_INPUT, "%s: .about is no text: expected UTF-8 without control characters", what);
+  for (const pw_parameter *p = t->parameters; p && p->name; p++)
+    if (check_parameter (t, p, what, error) != PW_OK) return PW_INPUT;
   return PW_OK;
 }
 
@@ -32,7 +49,7 @@ static int check_name (const pw_model *m, const char *what, const char *name, pw
   return PW_OK;
 }
 
-int pw_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
+int pw_model_check_body (const pw_model *m, const pw_body *b, pw_error *error) {
   if (check_name (m, "body", b->name, error) != PW_OK) return PW_INPUT;
   const struct {
     const char *name;
@@ -67,7 +84,7 @@ static int check_body_name (const pw_model *m, const pw_element *e, const char *
   if (body == NULL || *body == 0)
     return pw_fail (error, PW_INPUT, "model %s: %s %s: a body is missing; the ground is written \"ground\"", m->name,
                     kind, name);
-  if (strcmp (body, "ground") == 0 || pw_names_find (bodies, body) >= 0) return PW_OK;
+  if (strcmp (body, "ground") == 0 || bodies == NULL || pw_names_find (bodies, body) >= 0) return PW_OK;
   pw_nearest near = { .sought = body };
   for (int i = 0; i < m->bodies; i++) pw_nearest_try (&near, m->body[i].name);
   pw_nearest_try (&near, "ground");
@@ -108,7 +125,8 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
   return PW_OK;
 }
 
-int pw_check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error) {
+/* bodies NULL: any will do. */
+static int check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error) {
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
   for (const pw_field *f = e->kind->fields; f->name; f++)
     if (check_field (m, e, f, bodies, error) != PW_OK) return PW_INPUT;
@@ -127,10 +145,14 @@ int pw_check_element (const pw_model *m, const pw_element *e, const pw_names *bo
   return PW_OK;
 }
 
+int pw_model_check_element (const pw_model *m, const pw_element *e, pw_error *error) {
+  return check_element (m, e, NULL, error);
+}
+
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error) {
   for (int i = 0; i < m->bodies; i++)
-    if (pw_check_body (m, &m->body[i], error) != PW_OK) return PW_INPUT;
+    if (pw_model_check_body (m, &m->body[i], error) != PW_OK) return PW_INPUT;
   for (int i = 0; i < m->elements; i++)
-    if (pw_check_element (m, &m->element[i], bodies, error) != PW_OK) return PW_INPUT;
+    if (check_element (m, &m->element[i], bodies, error) != PW_OK) return PW_INPUT;
   return PW_OK;
 }

@@ -43,10 +43,4 @@ void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);
 double pw_table_breakpoint (const pw_signal *s, int knots, double t);
 
-/* ---- Forms (signal_form.c) ---- */
-
-/* Says what is wrong with a signal of a kind; "" if nothing is.  *point becomes the point of a table that is meant, or -1.
- * Returns the buffer. */
-char *pw_signal_fault (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
-
 #endif

@@ -99,14 +99,15 @@ static void test_bad_tables (void **state) {
   table.abi = PW_ABI + 6;
   assert_null (pw_model_new ("cart", &table, &error));
   snprintf (text, sizeof text,
-            "model cart was compiled for ABI %d of %zu bytes, this Pinwheel has ABI %d of %zu: compile it anew",
-            PW_ABI + 6, sizeof table, PW_ABI, sizeof table);
+            "model cart was compiled for another Pinwheel (ABI %d, this one has %d; table of %zu bytes, here %zu): "
+            "compile it anew",
+            PW_ABI + 6, PW_ABI, sizeof table, sizeof table);
   check_error (&error, PW_INPUT, text);
   table = description_table;
   table.build = NULL;
   error.status = PW_OK;
   assert_null (pw_model_new ("cart", &table, &error));
-  check_error (&error, PW_INPUT, "model cart has no build function");
+  check_error (&error, PW_INPUT, "model cart has no build function: PW_MODEL (...) at its end must set .build");
 }
 
 static void test_order_of_calls (void **state) {

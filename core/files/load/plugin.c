@@ -17,29 +17,6 @@ struct pw_file {
 
 /* ---- Loading ---- */
 
-/* What is shown of a model does not touch the terminal, and is UTF-8 in summaries. */
-static int plugin_texts (const pw_file *f, pw_error *error) {
-  const pw_plugin_table *t = f->table;
-  if (t->about && !pw_is_text (t->about))
-    return pw_fail (error, PW_INPUT, "%s: .about is no text: expected UTF-8 without control characters", f->path);
-  for (const pw_parameter *p = t->parameters; p && p->name; p++)
-    if (!pw_is_text (p->name) || (p->unit && !pw_is_text (p->unit)) || (p->about && !pw_is_text (p->about)))
-      return pw_fail (error, PW_INPUT,
-                      "%s: name, unit or meaning of parameter %s is no text: expected UTF-8 without control characters",
-                      f->path, p->name);
-  return PW_OK;
-}
-
-static int plugin_check (const pw_file *f, pw_error *error) {
-  const pw_plugin_table *t = f->table;
-  if (t->abi != PW_ABI || t->size != sizeof *t)
-    return pw_fail (error, PW_INPUT, "%s was compiled for another Pinwheel (ABI %u, this one has %u): compile it anew",
-                    f->path, t->abi, (unsigned)PW_ABI);
-  if (t->build == NULL)
-    return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", f->path);
-  return plugin_texts (f, error) == PW_OK ? pw_check_parameters ("", f->path, t, error) : error->status;
-}
-
 /* dlerror repeats the path in front of its reason. */
 static const char *plugin_reason (const char *object) {
   const char *why = dlerror ();
@@ -58,7 +35,7 @@ static int plugin_load (void *context, const char *object, pw_error *error) {
   f->table = dlsym (f->handle, "pw_plugin");
   if (f->table == NULL)
     return pw_fail (error, PW_INPUT, "%s is no Pinwheel model: a model file ends with PW_MODEL (...)", f->path);
-  return plugin_check (f, error);
+  return pw_plugin_check (f->table, f->path, error);
 }
 
 /* ---- Finding ---- */

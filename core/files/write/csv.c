@@ -5,12 +5,12 @@
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
-#include "system.h"
 
 struct pw_csv {
   pw_output *output;
   int ledger;
-  char *line; /* grows as needed */
+  double (*contact)[3]; /* points of the system */
+  char *line;           /* grows as needed */
   size_t used, room;
   int failed; /* out of memory */
 };
@@ -61,31 +61,34 @@ static int csv_end (pw_csv *c, pw_error *error) {
 
 static void csv_name_states (pw_csv *c, const pw_system *s) {
   char name[300];
-  for (int b = 0; b < s->bodies; b++)
+  int bodies = pw_count_bodies (s), n = pw_count_coordinates (s);
+  for (int b = 0; b < bodies; b++)
     for (int i = 0; i < 6; i++) {
-      int state = i < 3 ? 3 * b + i : s->coords + 3 * b + i - 3;
+      int state = i < 3 ? 3 * b + i : n + 3 * b + i - 3;
       csv_name (c, pw_state_name (s, state, name, sizeof name), pw_state_unit (s, state));
     }
-  for (int j = 3 * s->bodies; j < s->coords; j++)
-    for (int state = j; state < 2 * s->coords; state += s->coords)
+  for (int j = 3 * bodies; j < n; j++)
+    for (int state = j; state < 2 * n; state += n)
       csv_name (c, pw_state_name (s, state, name, sizeof name), pw_state_unit (s, state));
 }
 
 static void csv_name_contacts (pw_csv *c, const pw_system *s) {
   char name[300];
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++)
-    for (int e = 0; k->kind->contact && e < k->b.count; e++)
-      for (int i = 0; i < 2; i++) {
-        snprintf (name, sizeof name, "%s.%c", k->name[e], "xy"[i]);
-        csv_name (c, name, "m");
-      }
+  int elements = pw_system_elements (s);
+  for (int e = 0; e < elements; e++) {
+    const pw_element_info x = pw_system_element (s, e);
+    for (int i = 0; x.contact >= 0 && i < 2; i++) {
+      snprintf (name, sizeof name, "%s.%c", x.name, "xy"[i]);
+      csv_name (c, name, "m");
+    }
+  }
 }
 
 static void csv_name_ledger (pw_csv *c, const pw_system *s) {
   char name[300];
   csv_name (c, "kinetic", "J");
   csv_name (c, "potential", "J");
-  for (int i = 0; i < s->entries; i++) csv_name (c, pw_ledger_name (s, i, name, sizeof name), "J");
+  for (int i = 0; i < pw_count_ledger (s); i++) csv_name (c, pw_ledger_name (s, i, name, sizeof name), "J");
   csv_name (c, "projection", "J");
   csv_name (c, "balance", "J");
 }
@@ -95,7 +98,8 @@ static int csv_header (pw_csv *c, const pw_system *s, pw_error *error) {
   csv_name (c, "t", "s");
   csv_name_states (c, s);
   csv_name_contacts (c, s);
-  for (int i = 0; i < s->rows; i++) csv_name (c, pw_reaction_name (s, i, name, sizeof name), pw_reaction_unit (s, i));
+  for (int i = 0; i < pw_count_rows (s); i++)
+    csv_name (c, pw_reaction_name (s, i, name, sizeof name), pw_reaction_unit (s, i));
   csv_name (c, "residual.position", NULL);
   csv_name (c, "residual.velocity", NULL);
   if (c->ledger) csv_name_ledger (c, s);
@@ -104,7 +108,9 @@ static int csv_header (pw_csv *c, const pw_system *s, pw_error *error) {
 
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
   pw_csv *c = calloc (1, sizeof *c);
-  if (c == NULL) {
+  if (c) c->contact = calloc ((size_t)pw_system_contacts (s) + 1, sizeof *c->contact);
+  if (c == NULL || c->contact == NULL) {
+    pw_csv_close (c);
     pw_fail (error, PW_MACHINE, "out of memory while writing a table");
     return NULL;
   }
@@ -117,6 +123,7 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
 
 void pw_csv_close (pw_csv *c) {
   if (c == NULL) return;
+  free (c->contact);
   free (c->line);
   free (c);
 }
@@ -124,34 +131,30 @@ void pw_csv_close (pw_csv *c) {
 /* ---- Samples ---- */
 
 static void csv_states (pw_csv *c, const pw_system *s, const pw_sample *x) {
-  for (int b = 0; b < s->bodies; b++) {
+  int bodies = pw_count_bodies (s), n = pw_count_coordinates (s);
+  for (int b = 0; b < bodies; b++) {
     for (int i = 0; i < 3; i++) csv_number (c, x->q[3 * b + i]);
     for (int i = 0; i < 3; i++) csv_number (c, x->v[3 * b + i]);
   }
-  for (int j = 3 * s->bodies; j < s->coords; j++) {
+  for (int j = 3 * bodies; j < n; j++) {
     csv_number (c, x->q[j]);
     csv_number (c, x->v[j]);
   }
 }
 
 static int csv_contacts (pw_csv *c, pw_system *s, const pw_sample *x, pw_error *error) {
-  if (pw_place (s, x->t, x->q, x->v) != PW_OK)
-    return pw_fail (error, PW_METHOD, "at t = %g s a signal of the model reports an error", x->t);
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
-    if (k->kind->contact == NULL) continue;
-    k->kind->contact (&k->b, k->block);
-    for (int e = 0; e < k->b.count; e++) {
-      csv_number (c, k->block[3 * e]);
-      csv_number (c, k->block[3 * e + 1]);
-    }
+  int status = pw_system_contact_points (s, x->t, x->q, x->v, c->contact, error);
+  for (int i = 0; status == PW_OK && i < pw_system_contacts (s); i++) {
+    csv_number (c, c->contact[i][0]);
+    csv_number (c, c->contact[i][1]);
   }
-  return PW_OK;
+  return status;
 }
 
 static void csv_ledger (pw_csv *c, const pw_system *s, const pw_sample *x) {
   csv_number (c, x->kinetic);
   csv_number (c, x->potential);
-  for (int i = 0; i < s->entries; i++) csv_number (c, x->ledger ? x->ledger[i] : NAN);
+  for (int i = 0; i < pw_count_ledger (s); i++) csv_number (c, x->ledger ? x->ledger[i] : NAN);
   csv_number (c, x->projection);
   csv_number (c, x->balance);
 }
@@ -164,7 +167,7 @@ int pw_csv_write (pw_csv *c, pw_system *s, const pw_sample *sample, pw_error *er
     c->used = 0;
     return status;
   }
-  for (int i = 0; i < s->rows; i++) csv_number (c, 0 - sample->lambda[i]); /* 0 - 0 is not -0 */
+  for (int i = 0; i < pw_count_rows (s); i++) csv_number (c, 0 - sample->lambda[i]); /* 0 - 0 is not -0 */
   csv_number (c, sample->position);
   csv_number (c, sample->velocity);
   if (c->ledger) csv_ledger (c, s, sample);

@@ -15,7 +15,6 @@
 
 #include "expression.h"
 #include "files.h"
-#include "model.h"
 
 /* ---- The tree ---- */
 
@@ -106,6 +105,8 @@ size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
 typedef struct {
   const pw_yaml *y;
   pw_model *m;
+  pw_arena *arena;         /* lives as long as the model */
+  pw_truth_text *truth;    /* the model's */
   const double *parameter; /* their values */
   double *let;             /* values of what `let` defines */
   int lets;                /* so far */

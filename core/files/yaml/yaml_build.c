@@ -21,7 +21,7 @@ static int build_name (pw_yaml_builder *b, const pw_node *node, const char *what
 /* The core's message without its "model NAME: ", at a place. */
 static int build_refuse (const pw_yaml_builder *b, const pw_node *node, const pw_error *own, pw_error *error) {
   char prefix[200];
-  int n = snprintf (prefix, sizeof prefix, "model %s: ", b->m->name);
+  int n = snprintf (prefix, sizeof prefix, "model %s: ", pw_model_name (b->m));
   const char *text = own->text;
   if (n > 0 && strncmp (text, prefix, (size_t)n) == 0) text += n;
   return own->status == PW_MACHINE ? pw_fail (error, own->status, "%s", own->text)
@@ -65,8 +65,8 @@ static int build_body (pw_yaml_builder *b, const pw_node *node, pw_error *error)
       build_triple (b, v[4], what[1], rate, body.rate, &body.specified, 3, error) != PW_OK)
     return error->status;
   pw_error own = { 0 };
-  if (pw_check_body (b->m, &body, &own) != PW_OK) return build_refuse (b, v[0], &own, error);
-  pw_names_add (&b->bodies, body.name, b->m->bodies);
+  if (pw_model_check_body (b->m, &body, &own) != PW_OK) return build_refuse (b, v[0], &own, error);
+  pw_names_add (&b->bodies, body.name, 0);
   return pw_add_body (b->m, &body);
 }
 
@@ -85,7 +85,9 @@ static int build_body_name (pw_yaml_builder *b, const pw_node *node, const char 
   if (pw_yaml_text (b->y, node, what, name, error) != PW_OK) return error->status;
   if (strcmp (*name, "ground") == 0 || pw_names_find (&b->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
-  for (int i = 0; i < b->m->bodies; i++) pw_nearest_try (&near, b->m->body[i].name);
+  int bodies;
+  const pw_body *body = pw_model_bodies (b->m, &bodies);
+  for (int i = 0; i < bodies; i++) pw_nearest_try (&near, body[i].name);
   pw_nearest_try (&near, "ground");
   return pw_yaml_fail (b->y, node->at, error, "%s: there is no body \"%.60s\"%s", what, *name,
                        pw_nearest_text (&near, hint, sizeof hint));
@@ -127,8 +129,6 @@ static int build_value (pw_yaml_builder *b, const pw_kind *kind, const pw_field 
 
 static int build_field (pw_yaml_builder *b, const pw_kind *kind, const pw_field *f, const pw_node *node,
                         const char *element, char *at, pw_error *error) {
-  static const size_t size[] = { sizeof (double), 2 * sizeof (double), 2 * sizeof (double),
-                                 sizeof (char *), sizeof (pw_signal),  sizeof (int) };
   static const char *const plural[] = { "numbers", "points, each [x, y],", "vectors, each [x, y],", "bodies", "signals",
                                         "choices" };
   char what[200];
@@ -136,7 +136,7 @@ static int build_field (pw_yaml_builder *b, const pw_kind *kind, const pw_field 
   snprintf (what, sizeof what, "%s %.60s: %s", kind->name, element, f->name);
   if (count == 1) return build_value (b, kind, f, node, what, at, error);
   if (pw_yaml_list (b->y, node, what, count, plural[f->type], error) != PW_OK) return error->status;
-  for (const pw_node *n = node->first; n; n = n->next, at += size[f->type])
+  for (const pw_node *n = node->first; n; n = n->next, at += pw_field_bytes (f->type))
     if (build_value (b, kind, f, n, what, at, error) != PW_OK) return error->status;
   return PW_OK;
 }
@@ -215,7 +215,7 @@ static int build_element (pw_yaml_builder *b, const pw_node *node, char *definit
   memcpy (definition, &name, sizeof name);
   if (build_fields (b, kind, node, name, definition, error) != PW_OK) return error->status;
   pw_element e = { kind, definition };
-  if (pw_check_element (b->m, &e, &b->bodies, &own) != PW_OK) return build_refuse (b, node->first->next, &own, error);
+  if (pw_model_check_element (b->m, &e, &own) != PW_OK) return build_refuse (b, node->first->next, &own, error);
   return pw_add (b->m, kind, definition);
 }
 
@@ -249,6 +249,20 @@ static int build_names (pw_yaml_builder *b, const double *value, pw_error *error
   return build_let (b, error);
 }
 
+static void build_free (void *arena) {
+  pw_arena_free (arena);
+  free (arena);
+}
+
+/* What outlives the building: expressions, points of tables, what is known about the motion. */
+static int build_keep (pw_yaml_builder *b, pw_error *error) {
+  b->arena = calloc (1, sizeof *b->arena);
+  if (b->arena == NULL || pw_model_keep (b->m, b->arena, build_free) != PW_OK) return pw_yaml_no_memory (b->y, error);
+  b->truth = pw_arena_take (b->arena, sizeof *b->truth);
+  pw_model_set_truth (b->m, b->truth);
+  return b->truth ? PW_OK : pw_yaml_no_memory (b->y, error);
+}
+
 static int build_open (pw_yaml_builder *b, char **definition, pw_error *error) {
   const pw_yaml *y = b->y;
   if ((y->bodies && pw_yaml_list (y, y->bodies, "bodies", -1, "", error) != PW_OK) ||
@@ -268,10 +282,13 @@ static int build_open (pw_yaml_builder *b, char **definition, pw_error *error) {
 }
 
 void pw_yaml_build (pw_model *m, const void *parameters) {
-  pw_yaml_builder b = { .y = (const pw_yaml *)(const void *)m->table, .m = m, .parameter = parameters };
+  const void *table = pw_model_table (m);
+  pw_yaml_builder b = { .y = table, .m = m, .parameter = parameters };
+  pw_error *error = pw_model_error (m);
   char *definition = NULL;
-  if (build_open (&b, &definition, &m->error) == PW_OK && build_names (&b, parameters, &m->error) == PW_OK)
-    build_all (&b, definition, &m->error);
+  if (build_keep (&b, error) == PW_OK && build_open (&b, &definition, error) == PW_OK &&
+      build_names (&b, parameters, error) == PW_OK)
+    build_all (&b, definition, error);
   pw_scope_close (b.x);
   pw_names_close (&b.bodies);
   pw_names_close (&b.all);

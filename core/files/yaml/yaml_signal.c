@@ -8,7 +8,6 @@
  */
 #include <stdio.h>
 #include <string.h>
-#include "signal.h"
 #include "yaml.h"
 
 /* Reads what a form is made of; a table's points besides. */

@@ -26,7 +26,9 @@ static int state_no_owner (pw_yaml_builder *b, const pw_yaml_reading *r, const c
                            pw_error *error) {
   char hint[200];
   pw_nearest near = { .sought = owner };
-  for (int i = 0; i < b->m->bodies; i++) pw_nearest_try (&near, b->m->body[i].name);
+  int bodies;
+  const pw_body *body = pw_model_bodies (b->m, &bodies);
+  for (int i = 0; i < bodies; i++) pw_nearest_try (&near, body[i].name);
   for (size_t i = 0; i < b->elements.size; i++) {
     const struct pw_name *e = &b->elements.slot[i];
     if (e->name && pw_kinds[e->value]->own > 0) pw_nearest_try (&near, e->name);

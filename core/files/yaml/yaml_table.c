@@ -11,7 +11,7 @@ static int table_list (pw_yaml_builder *b, const char *what, const pw_node *list
   char text[240];
   if (pw_yaml_list (b->y, list, what, -1, "", error) != PW_OK) return error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
-  double *t = pw_arena_take (&b->m->arena, bytes), *value = pw_arena_take (&b->m->arena, bytes);
+  double *t = pw_arena_take (b->arena, bytes), *value = pw_arena_take (b->arena, bytes);
   if (t == NULL || value == NULL) return pw_yaml_no_memory (b->y, error);
   s->table.t = t;
   s->table.value = value;
@@ -87,7 +87,7 @@ static int table_file (pw_yaml_builder *b, const char *what, const pw_node *node
   FILE *f = table_open (b->y, name, &why);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (b->y, error);
   if (f == NULL) return pw_yaml_fail (b->y, node->at, error, "%s: cannot read \"%.60s\": %s", what, name, why);
-  int status = pw_columns_read (f, name, column, unit, &b->m->arena, value, &s->table.count, &own);
+  int status = pw_columns_read (f, name, column, unit, b->arena, value, &s->table.count, &own);
   fclose (f);
   s->table.t = value[0];
   s->table.value = value[1];

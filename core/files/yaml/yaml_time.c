@@ -4,7 +4,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "signal.h"
 #include "yaml.h"
 
 enum { TIME_STATES = 16, TIME_TRIED = 100 }; /* states that a signal reads; breakpoints that are tried out */
@@ -100,7 +99,7 @@ static int time_note (void *context, const char *name, size_t length, size_t at)
   if (f->states == TIME_STATES || length >= sizeof text)
     return pw_yaml_fail (r->b->y, pw_yaml_place (r->b->y, r->node, at), r->error, "%s: more than %d states", r->what,
                          TIME_STATES);
-  char *kept = pw_arena_text (&r->b->m->arena, text);
+  char *kept = pw_arena_text (r->b->arena, text);
   if (kept == NULL) return pw_yaml_no_memory (r->b->y, r->error);
   f->name[++f->states] = kept;
   return PW_OK;
@@ -109,7 +108,7 @@ static int time_note (void *context, const char *name, size_t length, size_t at)
 /* The part that jumps as states change, as a text of its own. */
 static int time_jump (time_reader *r, const pw_expression *x) {
   if (x->jump == NULL || r->f->text.jump) return PW_OK;
-  char *text = pw_arena_take (&r->b->m->arena, (size_t)x->jump_size + 1);
+  char *text = pw_arena_take (r->b->arena, (size_t)x->jump_size + 1);
   if (text == NULL) return pw_yaml_no_memory (r->b->y, r->error);
   memcpy (text, x->jump, (size_t)x->jump_size);
   r->f->text.jump = text;
@@ -122,7 +121,7 @@ static int time_expression (time_reader *r, int i) {
   if (pw_yaml_text (y, r->node, r->what, &r->f->text.part[i], r->error) != PW_OK ||
       pw_expression_names (r->node->text, time_note, r) != PW_OK)
     return r->error->status;
-  int status = pw_expression_read (r->b->x, r->f->name, r->node->text, &r->b->m->arena, &r->f->x[i], &trouble);
+  int status = pw_expression_read (r->b->x, r->f->name, r->node->text, r->b->arena, &r->f->x[i], &trouble);
   if (status == PW_INPUT)
     return pw_yaml_fail (y, pw_yaml_place (y, r->node, trouble.at), r->error, "%s: %s", r->what, trouble.text);
   if (status != PW_OK) return pw_yaml_no_memory (y, r->error);
@@ -200,7 +199,7 @@ static int time_all (time_reader *r, const pw_node *const v[3]) {
 
 int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
                      pw_signal *signal, pw_error *error) {
-  time_function *f = pw_arena_take (&b->m->arena, sizeof *f);
+  time_function *f = pw_arena_take (b->arena, sizeof *f);
   if (f == NULL) return pw_yaml_no_memory (b->y, error);
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = time_eval, .context = f } };
   f->name[0] = "t";

@@ -17,18 +17,18 @@ static int truth_expression (const pw_yaml_builder *b, const pw_node *node, cons
   char what[100];
   snprintf (what, sizeof what, "truth of %.60s", state);
   if (pw_yaml_text (b->y, node, what, &text, error) != PW_OK) return error->status;
-  int status = pw_expression_read (b->x, time, text, &b->m->arena, x, &trouble);
+  int status = pw_expression_read (b->x, time, text, b->arena, x, &trouble);
   if (status == PW_INPUT)
     return pw_yaml_fail (b->y, pw_yaml_place (b->y, node, trouble.at), error, "%s: %s", what, trouble.text);
   return status == PW_OK ? PW_OK : pw_yaml_no_memory (b->y, error);
 }
 
 int pw_yaml_keep_names (pw_yaml_builder *b, pw_error *error) {
-  pw_truth_text *t = &b->m->truth;
+  pw_truth_text *t = b->truth;
   size_t names = (size_t)b->y->parameters + (size_t)b->lets;
   if (t->name) return PW_OK;
-  t->name = pw_arena_take (&b->m->arena, (names + 1) * sizeof *t->name);
-  t->value = pw_arena_take (&b->m->arena, (names + 1) * sizeof *t->value);
+  t->name = pw_arena_take (b->arena, (names + 1) * sizeof *t->name);
+  t->value = pw_arena_take (b->arena, (names + 1) * sizeof *t->value);
   if (t->name == NULL || t->value == NULL) return pw_yaml_no_memory (b->y, error);
   for (int i = 0; i < b->y->parameters; i++, t->names++) {
     t->name[t->names] = b->y->parameter[i].name;
@@ -60,16 +60,16 @@ static int truth_entries (pw_yaml_builder *b, pw_truth_text *t, pw_names *seen, 
 
 int pw_yaml_truth (pw_yaml_builder *b, pw_error *error) {
   const pw_node *map = b->y->truth;
-  pw_truth_text *t = &b->m->truth;
+  pw_truth_text *t = b->truth;
   pw_names seen = { .size = 0 };
   if (map == NULL) return PW_OK;
   if (map->type != PW_YAML_MAP)
     return pw_yaml_fail (b->y, map->at, error, "truth: expected a map {STATE: EXPRESSION, ...}, found %s",
                          pw_yaml_found (map));
   if (pw_yaml_keep_names (b, error) != PW_OK) return error->status;
-  t->state = pw_arena_take (&b->m->arena, ((size_t)map->count + 1) * sizeof *t->state);
-  t->text = pw_arena_take (&b->m->arena, ((size_t)map->count + 1) * sizeof *t->text);
-  t->context = pw_arena_take (&b->m->arena, ((size_t)map->count + 1) * sizeof (pw_expression *));
+  t->state = pw_arena_take (b->arena, ((size_t)map->count + 1) * sizeof *t->state);
+  t->text = pw_arena_take (b->arena, ((size_t)map->count + 1) * sizeof *t->text);
+  t->context = pw_arena_take (b->arena, ((size_t)map->count + 1) * sizeof (pw_expression *));
   if (t->state == NULL || t->text == NULL || t->context == NULL) return pw_yaml_no_memory (b->y, error);
   t->eval = truth_eval;
   int status = pw_names_open (&seen, (size_t)map->count) == PW_OK ? PW_OK : pw_yaml_no_memory (b->y, error);

@@ -1,0 +1,77 @@
+/* The nearest valid name, and the domains of numbers. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "util.h"
+
+/* Edit distance (Levenshtein 1966), by one row; names longer than the row count as far away. */
+static size_t nearest_distance (const char *a, const char *b) {
+  size_t row[64], n = strlen (b);
+  if (n >= sizeof row / sizeof *row) return n;
+  for (size_t j = 0; j <= n; j++) row[j] = j;
+  for (size_t i = 0; a[i]; i++) {
+    size_t diagonal = row[0];
+    row[0] = i + 1;
+    for (size_t j = 0; j < n; j++) {
+      size_t substitute = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      size_t least = (row[j] < diagonal ? row[j] : diagonal) + 1;
+      row[j + 1] = substitute < least ? substitute : least;
+    }
+  }
+  return row[n];
+}
+
+/* A name is near if less than half of it would have to change, up to half of a short one, or one begins or ends with the other. */
+static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, size_t distance) {
+  size_t longer = n > m ? n : m, shorter = n + m - longer;
+  return 2 * distance < longer + (distance <= 2) ||
+         (shorter > 0 && (memcmp (a, b, shorter) == 0 || memcmp (a + n - shorter, b + m - shorter, shorter) == 0));
+}
+
+static int nearest_lower (char c) {
+  return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
+}
+
+/* Whether two names differ in capitals alone. */
+static int nearest_same (const char *a, const char *b) {
+  while (*a && nearest_lower (*a) == nearest_lower (*b)) a++, b++;
+  return *a == *b;
+}
+
+static void nearest_keep (pw_nearest *n, const char *candidate) {
+  size_t used = strlen (n->all), more = strlen (candidate);
+  n->crowded |= used + more + 3 > sizeof n->all;
+  if (n->crowded) return;
+  if (used) memcpy (n->all + used, ", ", 2), used += 2;
+  memcpy (n->all + used, candidate, more + 1);
+}
+
+void pw_nearest_try (pw_nearest *n, const char *candidate) {
+  size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
+  size_t distance = nearest_same (n->sought, candidate) ? 0 : nearest_distance (n->sought, candidate);
+  nearest_keep (n, candidate);
+  if (n->best && distance * n->length >= n->distance * length) return;
+  n->best = candidate;
+  n->distance = distance;
+  n->length = length;
+  n->near = nearest_is_near (n->sought, a, candidate, b, distance);
+}
+
+char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size) {
+  buffer[0] = 0;
+  if (n->best && n->near)
+    snprintf (buffer, size, "; did you mean \"%s\"?", n->best);
+  else if (n->best && !n->crowded)
+    snprintf (buffer, size, "; valid %s %s", strchr (n->all, ',') ? "are" : "is", n->all);
+  return buffer;
+}
+
+const char *pw_domain_check (pw_domain domain, double value) {
+  if (!isfinite (value)) return "a finite number";
+  if (domain == PW_NONNEGATIVE && value < 0) return "a number >= 0";
+  if (domain == PW_POSITIVE && value <= 0) return "a number > 0";
+  if (domain == PW_COUNT && (value < 1 || value != floor (value) || value > 1e9)) return "a whole number >= 1";
+  if (domain == PW_FRACTION && (value < 0 || value > 1)) return "a number from 0 to 1";
+  return "";
+}
