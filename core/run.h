@@ -30,6 +30,8 @@ typedef struct {
       void *context); /* asked before each attempted step, before each evaluation of adams, bdf and ida, and before a
                                   sample inside a step; not 0: the call returns PW_STOPPED at once.  May be NULL */
   void *stop_context; /* passed to stop */
+
+  const struct pw_method *const *methods; /* the caller's own, ended by NULL, beside the built-in ones; or NULL */
 } pw_settings;
 
 /* The scales of a scene, from its description and start: everything judged absolutely is judged against them. */

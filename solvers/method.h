@@ -3,7 +3,7 @@
 #define PW_METHOD_H
 
 #include <math.h>
-#include "pinwheel-solvers.h"
+#include "pinwheel-method.h"
 #include "saddle.h"
 #include "system.h"
 #include "watchdog.h"
@@ -71,8 +71,6 @@ struct pw_run {
   char *memory;
 };
 
-/* Value of an option by name; it must exist. */
-double pw_option_value (const pw_run *r, const char *name);
 /* Absolute tolerances of coordinate j and of its rate: the one the user gave, or rtol in units of the scene. */
 static inline double pw_atol (const pw_run *r, int j) {
   return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j);
@@ -192,9 +190,7 @@ double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */
 
-/* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the run has them; J stays swept and the saddle
- * factorised.  PW_RETRY in a singular pose; PW_METHOD if a signal failed. */
-int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
+/* pw_accelerate leaves J swept and the saddle factorised. */
 
 /* A step that ends at a discontinuity sees what the signals are just before it. */
 static inline double pw_before_breakpoint (const pw_run *r, double t) {

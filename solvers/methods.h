@@ -14,8 +14,10 @@
   PW_METHOD (galpha) \
   PW_METHOD (leapfrog)
 
-/* pw_parse_method that keeps the options: values has room for PW_MAX_OPTIONS. */
-int pw_parse_options (const char *text, const pw_method **method, int *stabilisation, double *values, pw_error *error);
+/* pw_parse_method that keeps the options, values has room for PW_MAX_OPTIONS, and looks through `own` methods, too (NULL: there
+ * are none). */
+int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
+                      double *values, pw_error *error);
 
 /* Whether the run takes steps of the given size: its method, or an option of it, says so. */
 void pw_choose_steps (pw_run *r);

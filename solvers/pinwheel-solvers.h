@@ -20,6 +20,7 @@ extern "C" {
 #endif
 
 typedef struct pw_run pw_run;
+typedef struct pw_method pw_method;
 typedef struct pw_method_data pw_method_data; /* what an integrator keeps; each defines its own */
 
 /* An option of a method; a number, or one of some choices. */
@@ -49,8 +50,8 @@ typedef struct {
   pw_stabilisation_kind kind;
 } pw_stabilisation;
 
-/* An integrator: one const table in one file. */
-typedef struct {
+/* An integrator: one const table in one file.  All methods of Pinwheel are such tables; pinwheel-method.h is for your own. */
+struct pw_method {
   const char *name;                       /* "rk4" */
   const char *about;                      /* one line, with its source (author, year) */
   int adaptive;                           /* 1: follows rtol and atol; 0: follows step */
@@ -65,7 +66,7 @@ typedef struct {
   void (*close) (pw_run *r);
   void (*carry) (pw_run *r, pw_archive *a); /* saves or loads what steps after a checkpoint need beyond the state: step
                                                size, counts; NULL: the method starts anew at checkpoints */
-} pw_method;
+};
 
 /* All integrators, ended by NULL. */
 extern const pw_method *const pw_methods[];

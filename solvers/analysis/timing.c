@@ -170,16 +170,10 @@ static void profile_stages (profile *p, pw_profile *x) {
   x->factorisation = ns[3], x->solution = ns[4], x->evaluation = ns[5];
 }
 
-static double profile_every (const pw_run *r) {
-  const pw_option *o = r->method->options;
-  while (o->name && strcmp (o->name, "every") != 0) o++;
-  return o->name ? pw_option_value (r, "every") : 1;
-}
-
 /* A projection with as many iterations as those of the run had: between none and some. */
 static void profile_projection (profile *p, pw_profile *x) {
   double steps = (double)p->done.steps, none, some;
-  x->projections = 1 / profile_every (p->r);
+  x->projections = 1 / fmax (1, pw_option_value (p->r, "every"));
   double others = (double)p->done.rhs + (p->projector.own_velocity ? x->projections * steps : 0);
   x->iterations = fmax (0, (double)p->done.factorisations - others) / (x->projections * steps);
   p->from = p->q;

@@ -100,7 +100,6 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->minimal = pw_stabilised_by (r, PW_NULLSPACE);
   d->closes = d->minimal && pw_option_value (r, "positions") == 0;
   d->every = (int)pw_option_value (r, "every");
-  pw_read_baumgarte (r);
   if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   int status = d->projects || d->closes ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
   if (status == PW_OK && d->minimal) status = pw_nullspace_open (&d->nullspace, r, error);

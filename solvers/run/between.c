@@ -55,6 +55,11 @@ static int between_inside (pw_between *b, pw_run *r, double t) {
   for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * b->lambda0[i] + x * r->lambda[i];
   for (int i = 0; i < s->entries; i++)
     r->ledger_at[i] = b->ledger0[i] + h * x * (b->rate0[i] + 0.5 * x * (r->rate[i] - b->rate0[i]));
+  if (b->rates < 0) {
+    int placed = pw_place (s, t, r->q_at, r->v_at);
+    if (placed == PW_OK) pw_sweep_J (s);
+    return placed;
+  }
   int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at, &row, &worst);
   return status == PW_OK && b->rates ? pw_project_velocities (&b->projector, r, r->v_at) : status;
 }

@@ -7,7 +7,7 @@
 typedef struct {
   double t0;                                        /* the beginning of the last step */
   double *q0, *v0, *a0, *lambda0, *ledger0, *rate0; /* the state there; lambda: all rows */
-  int rates;                                        /* 1: the method has J v = eta */
+  int rates;                                        /* 1: the method has J v = eta; -1: it has no constraints */
   pw_projector projector;
   char *memory;
 } pw_between;

@@ -25,16 +25,31 @@ static int methods_part (char *part, size_t size, const char **text, const char 
   return PW_OK;
 }
 
-static int methods_integrator (const char *name, const pw_method **method, pw_error *error) {
+/* What a table lacks; "" if nothing. */
+static const char *methods_lack (const pw_method *m) {
+  int options = 0;
+  while (m->options && m->options[options].name) options++;
+  if (m->stabilisations == NULL || m->stabilisations[0].name == NULL) return "its table has no stabilisations";
+  if (m->options == NULL) return "its table has no options: a list that is ended by a NULL name";
+  if (options > PW_MAX_OPTIONS) return "its table has more than 12 options";
+  if (!m->open || !m->advance || !m->at || !m->restart || !m->close)
+    return "its table needs open, advance, at, restart and close";
+  return "";
+}
+
+static int methods_integrator (const char *name, const pw_method *const *own, const pw_method **method,
+                               pw_error *error) {
+  const pw_method *const *const list[] = { pw_methods, own };
   pw_nearest near = { .sought = name };
   char hint[100];
-  for (int i = 0; pw_methods[i]; i++) {
-    pw_nearest_try (&near, pw_methods[i]->name);
-    if (strcmp (pw_methods[i]->name, name) == 0) {
-      *method = pw_methods[i];
-      return PW_OK;
+  for (int l = 0; l < 2; l++)
+    for (int i = 0; list[l] && list[l][i]; i++) {
+      pw_nearest_try (&near, list[l][i]->name);
+      if (strcmp (list[l][i]->name, name) != 0) continue;
+      *method = list[l][i];
+      const char *lack = methods_lack (*method);
+      return *lack ? pw_fail (error, PW_INPUT, "integrator %s: %s", name, lack) : PW_OK;
     }
-  }
   return pw_fail (error, PW_INPUT, "there is no integrator \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
 }
 
@@ -114,14 +129,15 @@ static int methods_option (const pw_method *method, int stabilisation, char *par
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-int pw_parse_options (const char *text, const pw_method **method, int *stabilisation, double *values, pw_error *error) {
+int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
+                      double *values, pw_error *error) {
   char part[80];
   unsigned given = 0;
   const char *whole = text;
   *stabilisation = 0;
   if (text == NULL) return pw_fail (error, PW_INPUT, "the name of a method is missing");
   if (methods_part (part, sizeof part, &text, whole, error) != PW_OK ||
-      methods_integrator (part, method, error) != PW_OK)
+      methods_integrator (part, own, method, error) != PW_OK)
     return PW_INPUT;
   for (int i = 0; (*method)->options[i].name; i++) values[i] = (*method)->options[i].value;
   if (*text == '+') {
@@ -146,13 +162,13 @@ int pw_parse_options (const char *text, const pw_method **method, int *stabilisa
 
 int pw_parse_method (const char *text, const pw_method **method, int *stabilisation, pw_error *error) {
   double values[PW_MAX_OPTIONS];
-  return pw_parse_options (text, method, stabilisation, values, error);
+  return pw_parse_options (text, NULL, method, stabilisation, values, error);
 }
 
 double pw_option_value (const pw_run *r, const char *name) {
   int i = 0;
-  while (strcmp (r->method->options[i].name, name) != 0) i++;
-  return r->option[i];
+  while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
+  return r->method->options[i].name ? r->option[i] : 0;
 }
 
 void pw_choose_steps (pw_run *r) {

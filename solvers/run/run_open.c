@@ -133,7 +133,9 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->limits = pw_watchdog_limits;
   r->refuse = r->limits.rank;
   if (pw_watchdog_check_masses (r->s, &r->limits, error) != PW_OK) return PW_INPUT;
-  if (pw_parse_options (method, &r->method, &r->stabilisation, r->option, error) != PW_OK) return PW_INPUT;
+  if (pw_parse_options (method, settings ? settings->methods : NULL, &r->method, &r->stabilisation, r->option, error) !=
+      PW_OK)
+    return PW_INPUT;
   pw_choose_steps (r);
   int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
   if (status == PW_OK && run_allocate (r) != PW_OK)
@@ -149,6 +151,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   r->s->scale.time = run_time_scale (r);
   pw_count_moved (r);
   status = run_begin (r, error);
+  if (status == PW_OK) pw_read_baumgarte (r);
   if (status == PW_OK) status = r->method->open (r, error);
   return status == PW_OK ? run_check_derivatives (r, method, error) : status;
 }

@@ -175,7 +175,6 @@ static int ida_open (pw_run *r, pw_error *error) {
   d->impulses = pw_stabilised_by (r, PW_SI1);
   d->positions = d->impulses || pw_stabilised_by (r, PW_GGL);
   d->velocities = d->positions || pw_stabilised_by (r, PW_INDEX2);
-  pw_read_baumgarte (r);
   if (pw_tangent_open (&d->tangent, r) != PW_OK) return pw_sun_no_memory (r, error);
   d->n = r->s->coords;
   d->rows = d->tangent.rows;

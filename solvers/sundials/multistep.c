@@ -164,7 +164,6 @@ static int multistep_open (pw_run *r, int formula, pw_error *error) {
   if (d == NULL) return pw_sun_no_memory (r, error);
   d->n = r->s->coords;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
-  pw_read_baumgarte (r);
   int status = d->projects ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
   if (status != PW_OK) return status;
   if (multistep_open_arrays (d, r) == PW_OK && multistep_open_solver (d, formula) == PW_OK &&

@@ -1,0 +1,86 @@
+/* Integration methods of your own, compiled against the installed headers (docs/method.c is one).
+ *
+ * A method is a const pw_method table (pinwheel-solvers.h).  A program hands its tables to runs in pw_settings.methods; their
+ * names then work in pw_open as those of the built-in methods do, with stabilisations and options.  The run makes the start
+ * consistent, calls `open`, and then `advance` for each step: one that ends at or before t_end and the next discontinuity.  It
+ * evaluates the state reached, watches constraints and energy, and calls `restart` behind a discontinuity.
+ *
+ * The functions below make a one-step method of a formula for the new state:
+ *
+ *     static int euler_open (pw_run *r, pw_error *error) { return pw_step_open (r, 2, error); }
+ *
+ *     static int euler_advance (pw_run *r, double t_end, pw_error *error) {
+ *       const pw_state x = pw_run_state (r);
+ *       double h = pw_step_size (r, t_end), *q = pw_step_array (r, 0), *v = pw_step_array (r, 1);
+ *       for (int j = 0; j < pw_count_coordinates (x.system); j++) q[j] = x.q[j] + h * (v[j] = x.v[j] + h * x.a[j]);
+ *       return pw_step_accept (r, PW_OK, h, q, v, error);
+ *     }
+ *
+ *     const pw_method euler = { .name = "euler", .open = euler_open, .advance = euler_advance, PW_STEP_FUNCTIONS, ... }; */
+#ifndef PINWHEEL_METHOD_H
+#define PINWHEEL_METHOD_H
+
+#include "pinwheel-solvers.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+#ifdef __GNUC__
+#pragma GCC visibility push(default)
+#endif
+
+/* The state reached.  The arrays belong to the run and change when a step is accepted. */
+typedef struct {
+  const pw_system *system;
+  const pw_settings *settings; /* with defaults filled in */
+  double t;
+  double breakpoint;    /* the next discontinuity of a signal, at which a step has to end; INFINITY: there is none */
+  const double *q, *v;  /* coordinates and velocities */
+  const double *a;      /* accelerations */
+  const double *lambda; /* multipliers */
+} pw_state;
+pw_state pw_run_state (const pw_run *r);
+
+/* The value of an option of the method's table; of a choice its index; 0 if there is none. */
+double pw_option_value (const pw_run *r, const char *name);
+
+/* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the stabilisation is PW_BAUMGARTE and the table has the
+ * options alpha and beta.  PW_RETRY in a singular configuration; PW_METHOD if a signal failed. */
+int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
+
+/* The time of a stage: a step that ends at a discontinuity evaluates signals just before it. */
+double pw_stage_time (const pw_run *r, double t);
+
+/* ---- One-step methods ---- */
+
+/* Opens what these functions keep for a run, with so many arrays for the method.  Errors: PW_MACHINE. */
+int pw_step_open (pw_run *r, int arrays, pw_error *error);
+
+/* Array i, the same in every step: room for coordinates or for constraint equations, whichever are more. */
+double *pw_step_array (pw_run *r, int i);
+
+/* The size of the next step: settings->step, less where the step would pass t_end or a discontinuity. */
+double pw_step_size (pw_run *r, double t_end);
+
+/* Ends `advance`.  `status` is that of the stages; if it is PW_OK, (q, v) at t + h becomes the state reached: projected onto the
+ * constraints if the stabilisation is PW_PROJECTION (in the metric of M), with accelerations and multipliers.  Work and losses
+ * are integrated by the trapezoidal rule.  q and v are not those of the state reached.  Errors: PW_METHOD, with the reason. */
+int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_error *error);
+
+/* The other functions of the table.  Samples between steps are interpolated by cubic polynomials: of order 4. */
+int pw_step_at (pw_run *r, double t, pw_error *error);
+int pw_step_restart (pw_run *r, pw_error *error);
+void pw_step_close (pw_run *r);
+void pw_step_carry (pw_run *r, pw_archive *a);
+#define PW_STEP_FUNCTIONS .at = pw_step_at, .restart = pw_step_restart, .close = pw_step_close, .carry = pw_step_carry
+
+#ifdef __GNUC__
+#pragma GCC visibility pop
+#endif
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

@@ -1,0 +1,123 @@
+/* What one-step methods of the user's are made of (pinwheel-method.h). */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "between.h"
+#include "pinwheel-method.h"
+#include "util.h"
+
+struct pw_method_data {
+  pw_between last;
+  pw_projector projector; /* if the method projects */
+  double base;            /* time from which steps are counted */
+  long count;             /* steps since then */
+  double end;             /* of the step whose size was asked for */
+  int whole;              /* 1: it is of the given size */
+  size_t length;          /* of an array */
+  double *a, *lambda;     /* of the new state */
+  double *array;
+  char *memory;
+};
+
+pw_state pw_run_state (const pw_run *r) {
+  return (pw_state){ r->s, &r->settings, r->t, r->breakpoint, r->q, r->v, r->a, r->lambda };
+}
+
+double pw_stage_time (const pw_run *r, double t) {
+  return pw_before_breakpoint (r, t);
+}
+
+/* ---- Opening ---- */
+
+int pw_step_restart (pw_run *r, pw_error *error) {
+  struct pw_method_data *d = r->data;
+  (void)error;
+  d->base = d->last.t0 = r->t;
+  d->count = 0;
+  return PW_OK;
+}
+
+int pw_step_open (pw_run *r, int arrays, pw_error *error) {
+  struct pw_method_data *d = r->data = calloc (1, sizeof *d);
+  size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
+  int projects = pw_stabilised_by (r, PW_PROJECTION);
+  if (d) d->length = n > rows ? n : rows;
+  const pw_array array[] = { { &d->a, n }, { &d->lambda, rows }, { &d->array, (size_t)arrays * (d ? d->length : 0) } };
+  if (d) d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  if (d == NULL || d->memory == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  int status = pw_between_open (&d->last, r, projects ? 1 : -1, error);
+  if (status == PW_OK && projects) status = pw_projector_open (&d->projector, r, NULL, NULL, error);
+  return status == PW_OK ? pw_step_restart (r, error) : status;
+}
+
+void pw_step_close (pw_run *r) {
+  pw_between_close (&r->data->last);
+  pw_projector_close (&r->data->projector);
+  free (r->data->memory);
+  free (r->data);
+}
+
+void pw_step_carry (pw_run *r, pw_archive *a) {
+  pw_carry (a, &r->data->base, sizeof r->data->base);
+  pw_carry_count (a, &r->data->count);
+}
+
+double *pw_step_array (pw_run *r, int i) {
+  return r->data->array + (size_t)i * r->data->length;
+}
+
+/* ---- Steps ---- */
+
+double pw_step_size (pw_run *r, double t_end) {
+  struct pw_method_data *d = r->data;
+  d->end = pw_step_end (r, d->base, d->count, t_end, &d->whole);
+  return d->end - r->t;
+}
+
+/* Accelerations at the new state, which is projected first. */
+static int step_evaluate (pw_run *r, double t, double *q, double *v) {
+  struct pw_method_data *d = r->data;
+  pw_system *s = r->s;
+  double size = 0;
+  for (int j = 0; j < s->coords; j++) size += q[j] * q[j] + v[j] * v[j];
+  if (!(size < 1e300)) return PW_RETRY;
+  if (d->projector.position == NULL) return pw_accelerate (r, t, q, v, d->a, d->lambda);
+  int status = pw_place (s, t, q, v);
+  double before = pw_kinetic (s, v) + pw_potential (s);
+  if (status == PW_OK) status = pw_project_state (&d->projector, r, t, q, v, d->a, d->lambda);
+  if (status == PW_OK && r->settings.ledger) r->projected += pw_kinetic (s, v) + pw_potential (s) - before;
+  return status;
+}
+
+static int step_fail (pw_run *r, int status, double h, pw_error *error) {
+  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: the step of %.6g s is too large: its end cannot be evaluated, or not be projected", r->t,
+                  h);
+}
+
+int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_error *error) {
+  struct pw_method_data *d = r->data;
+  size_t n = (size_t)r->s->coords * sizeof *q;
+  int asked = fabs (r->t + h - d->end) <= 1e-9 * h; /* or a step of another size */
+  double t1 = asked ? d->end : r->t + h;
+  if (status == PW_OK) status = step_evaluate (r, t1, q, v);
+  if (status != PW_OK) return step_fail (r, status, h, error);
+  pw_between_keep (&d->last, r);
+  r->t = t1;
+  memcpy (r->q, q, n);
+  memcpy (r->v, v, n);
+  memcpy (r->a, d->a, n);
+  memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
+  pw_between_count (&d->last, r);
+  r->statistics.steps++;
+  d->count++;
+  if (!asked || !d->whole) d->base = t1, d->count = 0;
+  return PW_OK;
+}
+
+int pw_step_at (pw_run *r, double t, pw_error *error) {
+  r->projected_at = r->projected;
+  return pw_between_at (&r->data->last, r, t, error);
+}
