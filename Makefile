@@ -405,7 +405,7 @@ D    := $(DESTDIR)$(PREFIX)
 MAN  := docs/pinwheel.1 docs/pinwheel-model.5
 DOCS := README.md $(wildcard docs/*.md) docs/CITATION.cff
 FIGURES  := $(wildcard docs/figures/*)
-EXAMPLES := docs/embed.c $(wildcard models/*.c) core/kinds/forces/torque.c \
+EXAMPLES := $(EMBED) $(wildcard models/*.c) core/kinds/forces/torque.c \
             $(addprefix core/kinds/,contact.h holonomic/gear.c nonholonomic/rolling_wheel.c)
 
 define PKGCONFIG

@@ -50,6 +50,11 @@ if command -v pkg-config >/dev/null; then
   (cd "$work" && eval "$cc -std=c11 embed.c -o embed $(pkg-config --cflags --libs pinwheel) -lm \
     -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./embed) >"$work/log" 2>&1
   report 'a program that embeds it, by the recipe in embed.c' $?
+  cp "$top/share/doc/pinwheel/examples/method.c" "$work"
+  (cd "$work" && eval "$cc -std=c11 method.c -o method $(pkg-config --cflags --libs pinwheel) -lm \
+    -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./method) >"$work/log" 2>&1 &&
+    awk '$NF == "nan" { next } { n++; bad += $NF < 2.9 || $NF > 3.1 } END { exit n != 6 || bad }' "$work/log"
+  report 'a method of its own, of order 3 as it should be' $?
   [ "$(pkg-config --modversion pinwheel)" = "$("$top/bin/pinwheel" --version | cut -d' ' -f2)" ] &&
     grep -q "^version: $(pkg-config --modversion pinwheel)\$" docs/CITATION.cff
   report 'one version everywhere' $?

@@ -1,0 +1,155 @@
+/* A method of the caller's own, made of pinwheel-method.h: symplectic Euler, with and without projection, with Baumgarte's
+ * terms.  Its order in accuracy is in docs/method.c for another one. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "pinwheel-method.h"
+#include "runs.h"
+#include "scene.h"
+
+static int own_open (pw_run *r, pw_error *error) {
+  return pw_step_open (r, 2, error);
+}
+
+static int own_advance (pw_run *r, double t_end, pw_error *error) {
+  const pw_state x = pw_run_state (r);
+  double h = pw_step_size (r, t_end), *q = pw_step_array (r, 0), *v = pw_step_array (r, 1);
+  for (int j = 0; j < pw_count_coordinates (x.system); j++) q[j] = x.q[j] + h * (v[j] = x.v[j] + h * x.a[j]);
+  return pw_step_accept (r, PW_OK, h, q, v, error);
+}
+
+static const pw_stabilisation own_stabilisations[] = { { "none", "", PW_UNSTABILISED },
+                                                       { "projection", "", PW_PROJECTION },
+                                                       { "baumgarte", "", PW_BAUMGARTE },
+                                                       { .name = NULL } };
+static const pw_option own_options[] = {
+  { .name = "alpha", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .about = "" },
+  { .name = "beta", .with = "baumgarte", .value = 10, .domain = PW_NONNEGATIVE, .about = "" },
+  { .name = NULL }
+};
+static const pw_method own = { .name = "euler",
+                               .about = "symplectic Euler",
+                               .order = 1,
+                               .stabilisations = own_stabilisations,
+                               .options = own_options,
+                               .open = own_open,
+                               .advance = own_advance,
+                               PW_STEP_FUNCTIONS };
+static const pw_method own_incomplete = { .name = "incomplete",
+                                          .stabilisations = own_stabilisations,
+                                          .options = own_options,
+                                          .open = own_open,
+                                          PW_STEP_FUNCTIONS };
+static const pw_method *const own_methods[] = { &own, &own_incomplete, NULL };
+
+static const pw_settings own_settings = { .step = 1e-3, .methods = own_methods };
+
+static pw_system *own_system (const pw_signal *torque) {
+  pw_error error = { 0 };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  if (torque) check_ok (pw_set_signal (m, "rider", "value", torque, &error), &error);
+  return scene_compile (m);
+}
+
+/* Projection keeps the constraints to round-off, feedback keeps them nearer than nothing does. */
+static void test_stabilisations (void **state) {
+  (void)state;
+  static const char *const method[] = { "euler", "euler+baumgarte:alpha=50:beta=50", "euler+projection" };
+  double off[3];
+  for (int i = 0; i < 3; i++) {
+    pw_system *s = own_system (NULL);
+    pw_run *r = runs_open (s, method[i], &own_settings);
+    runs_to (r, 1);
+    off[i] = pw_run_statistics (r)->position;
+    assert_int_equal (pw_run_statistics (r)->steps, 1000);
+    pw_close (r);
+    pw_free (s);
+  }
+  check_below ("with feedback", off[1], off[0] / 2, "it has to matter");
+  check_below ("projected", off[2], 1e-14, "round-off");
+  assert_true (off[0] > 1e-6);
+}
+
+/* Steps are cut at a discontinuity and at t_end, and are multiples of the given size from there. */
+static void test_breakpoint (void **state) {
+  (void)state;
+  const pw_signal pulse = { PW_PULSE, .pulse = { .height = 0.1, .start = 0.0104, .width = 0.02 } };
+  pw_system *s = own_system (&pulse);
+  pw_run *r = runs_open (s, "euler+projection", &own_settings);
+  pw_error error = { 0 };
+  int met = 0;
+  while (pw_time (r) < 0.02) {
+    check_ok (pw_advance (r, 0.02, &error), &error);
+    if (pw_time (r) == 0.0104) met = 1;
+  }
+  assert_true (met);
+  check_close ("the end", pw_time (r), 0.02, 0, "the last step ends there");
+  assert_int_equal (pw_run_statistics (r)->steps, 11 + 10);
+  pw_close (r);
+  pw_free (s);
+}
+
+/* A sample inside a step meets the constraints, and lies between the ends as a cubic does. */
+static void test_sample (void **state) {
+  (void)state;
+  pw_system *s = own_system (NULL);
+  pw_run *r = runs_open (s, "euler+projection", &own_settings);
+  runs_to (r, 0.5);
+  pw_sample x;
+  pw_error error = { 0 };
+  check_ok (pw_at (r, 0.5, &x, &error), &error);
+  double end = x.q[0], v = x.v[0];
+  check_ok (pw_at (r, 0.4995, &x, &error), &error);
+  check_close ("halfway", x.q[0], end - 0.0005 * v, 1e-6,
+               "h^2/8 of an acceleration below 1, and the method's own error");
+  check_below ("residual", fmax (x.position, x.velocity), 1e-13, "it is projected");
+  assert_int_equal (pw_at (r, 0.49, &x, &error), PW_INPUT);
+  pw_close (r);
+  pw_free (s);
+}
+
+/* A saved run goes on to the bit. */
+static void test_checkpoint (void **state) {
+  (void)state;
+  pw_archive a = { 0 };
+  pw_error error = { 0 };
+  double q[2][12];
+  for (int i = 0; i < 2; i++) {
+    pw_system *s = own_system (NULL);
+    pw_run *r = runs_open (s, "euler+projection", &own_settings);
+    if (i == 0) {
+      runs_to (r, 0.1234);
+      check_ok (pw_run_save (r, &a, &error), &error);
+    } else {
+      a = (pw_archive){ a.at, 0, a.used, 1, 0 };
+      check_ok (pw_run_load (r, &a, &error), &error);
+    }
+    memcpy (q[i], runs_to (r, 0.4).q, (size_t)pw_count_coordinates (s) * sizeof **q);
+    pw_close (r);
+    pw_free (s);
+  }
+  check_bits ("q", q[0], q[1], 6);
+  pw_archive_free (&a);
+}
+
+static void test_errors (void **state) {
+  (void)state;
+  pw_system *s = own_system (NULL);
+  pw_error error = { 0 };
+  assert_null (pw_open (s, "eulr", &own_settings, &error));
+  check_error (&error, PW_INPUT, "there is no integrator \"eulr\"; did you mean \"euler\"?");
+  error.status = PW_OK;
+  assert_null (pw_open (s, "incomplete", &own_settings, &error));
+  check_error (&error, PW_INPUT, "integrator incomplete: its table needs open, advance, at, restart and close");
+  error.status = PW_OK;
+  assert_null (pw_open (s, "euler", NULL, &error));
+  assert_int_equal (error.status, PW_INPUT);
+  pw_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_stabilisations), cmocka_unit_test (test_breakpoint),
+                                      cmocka_unit_test (test_sample), cmocka_unit_test (test_checkpoint),
+                                      cmocka_unit_test (test_errors) };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
