@@ -1,45 +1,41 @@
 /* rolling-resistance: a force along a heading, against the motion of its contact point P along it.
  *
- *   F = -L tanh (v_e / v0),  v_e = E . (vx, vy, w)                v_e: speed of P along the heading
+ *   F = -L tanh (v_e / v0),  v_e = E . (vx, vy, w)                v_e: speed of P along the heading (coulomb.h)
  *   E = [ cos(theta)  sin(theta)  -m ]          theta = phi + psi; m: the arm of P to the left of the heading
  *   f = F E,  loss = -F v_e >= 0
  *
- * (Wong 2008, Theory of Ground Vehicles, section 1.2; Andersson, Soderberg & Bjorklund 2007, Tribology International
- * 40, 580-587, for the smoothing by tanh.)
+ * (Wong 2008, Theory of Ground Vehicles, section 1.2.)
  * It is all along the heading: a wheel at the same point holds it sideways. */
-#include <math.h>
-#include <string.h>
-#include "pinwheel.h"
+#include "contact.h"
+#include "coulomb.h"
 
 typedef struct {
-  double cos, sin; /* of the heading in the body */
-  double aside;    /* m [m] */
-  double limit;    /* L [N] */
-  double speed;    /* v0 [m/s] */
+  contact point; /* its direction is the heading */
+  coulomb law;
 } resistance;
 
-/* Names the parts of element e: heading in the world, the speed along it, the force and its slope. */
-#define RESISTANCE_PARTS                                                                     \
-  const resistance *k = (const resistance *)b->element + e;                                  \
-  const pw_pose *A = &b->pose[b->body[e]];                                                   \
-  const double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin; \
-  const double ve = c * A->vx + s * A->vy - k->aside * A->omega, y = tanh (ve / k->speed);   \
-  const double F = -k->limit * y, slope = -k->limit * (1 - y * y) / k->speed;                \
-  (void)F, (void)slope
+/* Names the parts of element e: E, and the speed along it. */
+#define RESISTANCE_PARTS                                                                        \
+  const resistance *k = (const resistance *)b->element + e;                                     \
+  const contact *P = &k->point;                                                                 \
+  const pw_pose *A = &b->pose[b->body[e]];                                                      \
+  const double E[3] = { A->cos * P->a - A->sin * P->b, A->sin * P->a + A->cos * P->b, P->arm }; \
+  const double ve = E[0] * A->vx + E[1] * A->vy + E[2] * A->omega
 
 static int resistance_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
                                pw_error *error) {
   const pw_rolling_resistance *d = definition;
-  double c = cos (d->heading), s = sin (d->heading);
-  *(resistance *)element = (resistance){ c, s, d->at[1] * c - d->at[0] * s, d->limit, d->speed };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+  resistance *k = element;
+  k->point = contact_make (d->at, d->heading, cos (d->heading), sin (d->heading));
+  (void)bodies, (void)own;
+  return coulomb_make (0, d->limit, d->speed, &k->law, error);
 }
 
 static void resistance_force (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     RESISTANCE_PARTS;
-    out[0] = F * c, out[1] = F * s, out[2] = -F * k->aside;
+    double F = -coulomb_force (&k->law, ve);
+    for (int i = 0; i < 3; i++) out[i] = F * E[i];
   }
 }
 
@@ -47,18 +43,18 @@ static void resistance_force (const pw_batch *b, double *out) {
 static void resistance_force_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 9) {
     RESISTANCE_PARTS;
-    double turn = slope * (c * A->vy - s * A->vx);
+    double F = -coulomb_force (&k->law, ve), turn = -coulomb_slope (&k->law, ve) * (E[0] * A->vy - E[1] * A->vx);
     memset (out, 0, 9 * sizeof *out);
-    out[2] = turn * c - F * s;
-    out[5] = turn * s + F * c;
-    out[8] = -turn * k->aside;
+    out[2] = turn * E[0] - F * E[1];
+    out[5] = turn * E[1] + F * E[0];
+    out[8] = turn * E[2];
   }
 }
 
 static void resistance_force_v (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 9) {
     RESISTANCE_PARTS;
-    const double E[3] = { c, s, -k->aside };
+    double slope = -coulomb_slope (&k->law, ve);
     for (int i = 0; i < 9; i++) out[i] = slope * E[i / 3] * E[i % 3];
   }
 }
@@ -66,16 +62,15 @@ static void resistance_force_v (const pw_batch *b, double *out) {
 static void resistance_saturation (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
     RESISTANCE_PARTS;
-    const double per[6] = { 0, 0, c * A->vy - s * A->vx, c, s, -k->aside };
-    for (int i = 0; i < 6; i++)
-      if (per[i] != 0 && k->limit > 0) out[i] = (k->speed + fabs (ve)) / fabs (per[i]);
+    out[2] = coulomb_range (&k->law, ve, E[0] * A->vy - E[1] * A->vx);
+    for (int i = 0; i < 3; i++) out[3 + i] = coulomb_range (&k->law, ve, E[i]);
   }
 }
 
 static void resistance_loss (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     RESISTANCE_PARTS;
-    out[e] = -F * ve;
+    out[e] = coulomb_force (&k->law, ve) * ve;
   }
 }
 

@@ -22,10 +22,11 @@ typedef struct {
 } rolling;
 
 /* Names the parts of element e: its pose and the direction (c, s) it rolls in. */
-#define ROLLING_PARTS                                 \
-  const rolling *k = (const rolling *)b->element + e; \
-  const pw_pose *A = &b->pose[b->body[e]];            \
-  const double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin
+#define ROLLING_PARTS                                                                        \
+  const rolling *k = (const rolling *)b->element + e;                                        \
+  const pw_pose *A = &b->pose[b->body[e]];                                                   \
+  const double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin; \
+  (void)k, (void)A, (void)c, (void)s
 
 /* The spin rate with which it rolls as the body starts. */
 static double rolling_rate (const rolling *k, const pw_body *body) {
@@ -60,7 +61,6 @@ static void rolling_gamma (const pw_batch *b, double *out) {
     ROLLING_PARTS;
     out[0] = A->omega * (c * A->vx + s * A->vy);
     out[1] = A->omega * (s * A->vx - c * A->vy);
-    (void)k;
   }
 }
 
@@ -87,7 +87,6 @@ static void rolling_jw_q (const pw_batch *b, double *out) {
     ROLLING_PARTS;
     double x = b->w[4 * e], y = b->w[4 * e + 1];
     rolling_angle (out, -c * x - s * y, c * y - s * x);
-    (void)k;
   }
 }
 
@@ -95,7 +94,6 @@ static void rolling_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 8) {
     ROLLING_PARTS;
     rolling_angle (out, A->omega * (c * A->vy - s * A->vx), A->omega * (c * A->vx + s * A->vy));
-    (void)k;
   }
 }
 
@@ -104,7 +102,6 @@ static void rolling_gamma_v (const pw_batch *b, double *out) {
     ROLLING_PARTS;
     out[0] = A->omega * c, out[1] = A->omega * s, out[2] = c * A->vx + s * A->vy, out[3] = 0;
     out[4] = A->omega * s, out[5] = -A->omega * c, out[6] = s * A->vx - c * A->vy, out[7] = 0;
-    (void)k;
   }
 }
 
