@@ -69,7 +69,7 @@ static void test_degrees (void **state) {
   snprintf (text, sizeof text, model, "30", "-90", "45");
   cli_write ("skate.yaml", text);
   assert_int_equal (cli_run ("pinwheel check @/skate.yaml"), 0);
-  assert_non_null (strstr (cli_err, "pinwheel: body skate: start phi = 30 rad is more than a turn"));
+  assert_non_null (strstr (cli_err, "pinwheel: body skate: initial phi = 30 rad is more than a turn"));
   assert_non_null (strstr (cli_err,
                            "pinwheel: wheel W: heading = -90 rad is more than a turn and ends at -116.6 degrees; "
                            "degrees are written -90*deg\n"));

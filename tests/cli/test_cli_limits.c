@@ -67,7 +67,7 @@ static void test_resume (void **state) {
         "pinwheel run ezyroller --method %s --t-end 100 --every 0.5 -o @/b.csv --resume @/b.ck && cmp @/a.csv @/b.csv",
         method[i], method[i], i ? 800 : 120, method[i]);
     cli_shell (command);
-    assert_non_null (strstr (cli_err, "b.ck goes on from t = "));
+    assert_non_null (strstr (cli_err, "b.ck continues from t = "));
   }
 }
 

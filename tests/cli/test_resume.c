@@ -47,7 +47,7 @@ static void test_restarts (void **state) {
   cli_good ("pinwheel " RESUME_RUN "-m ida+ggl --json @/a.json --checkpoint @/a.ck");
   assert_true (cli_number (cli_file ("a.json"), "restarts", NULL) == 59);
   cli_good (
-      "pinwheel run ezyroller --t-end 30 -m ida+ggl --checkpoint @/a.ck | grep -q 'started anew at 9 checkpoints'");
+      "pinwheel run ezyroller --t-end 30 -m ida+ggl --checkpoint @/a.ck | grep -q 'restarted at 9 checkpoints'");
 }
 
 /* Stopped by a signal: what there is to go on from, and that it does. */
@@ -57,7 +57,7 @@ static void test_interrupted (void **state) {
            "while [ ! -e @/a.ck ]; do sleep 0.02; done; kill -TERM $!; wait $!; echo $?");
   assert_string_equal (cli_out, "130\n");
   assert_non_null (strstr (cli_err, "a.csv.part\n"));
-  assert_non_null (strstr (cli_err, "/a.ck goes on from t = "));
+  assert_non_null (strstr (cli_err, "/a.ck continues from t = "));
 }
 
 /* With a row for every step, too, none is there twice; a run that had ended already, but for its checkpoint, goes on. */

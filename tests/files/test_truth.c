@@ -65,7 +65,7 @@ static void test_text (void **state) {
   cli_good ("pinwheel run @/block.yaml --set a=0.5 --set k=45 --step 0.001 --json -");
   check_close ("order", log10 (coarse / truth_error ("largest", "length")), 4, 0.1, "order 4 in h");
   cli_good ("pinwheel run @/block.yaml");
-  truth_shows ("error against the truth of the model, at 100 times\n");
+  truth_shows ("error against the reference solution of the model, at 100 times\n");
   truth_shows ("  length ");
   cli_good ("pinwheel show @/block.yaml");
   truth_shows ("\nKnows its motion (truth): block.x\n");
@@ -97,9 +97,9 @@ static void test_compare (void **state) {
   (void)state;
   cli_write ("block.yaml", truth_text);
   cli_good ("pinwheel compare @/block.yaml --methods rk4,erk5 --step-ladder 0.1:0.02 --rtol-ladder 1e-4:1e-5");
-  truth_shows ("errors are taken against the model's own truth\n");
+  truth_shows ("errors are measured against the exact solution of the model\n");
   cli_good ("pinwheel compare @/block.yaml --methods rk4 --step-ladder 0.1:0.05 --start block.x=1.2 --t-end 1");
-  assert_null (strstr (cli_out, "the model's own truth"));
+  assert_null (strstr (cli_out, "the exact solution of the model"));
 }
 
 static void test_round_trip (void **state) {
@@ -122,11 +122,11 @@ static void test_function (void **state) {
   check_below ("angle", truth_error ("largest", "angle"), 1e-14, "round-off");
   truth_shows ("Knows its motion (truth): one.x, one.phi, two.x, one.vx\n");
   cli_good ("pinwheel check @/particles.c");
-  truth_shows ("  compared with the truth of the model, which knows 4 states\n");
+  truth_shows ("  compared with the reference solution of the model in 4 states\n");
   truth_write_c ("0.25");
   cli_good ("pinwheel run @/particles.c --json -");
   check_close ("a wrong truth", truth_error ("end", "length"), 0.25, 1e-12, "round-off");
-  cli_bad ("pinwheel check @/particles.c", 2, "the model's truth does not hold at the start: two.x is 0, not 0.25");
+  cli_bad ("pinwheel check @/particles.c", 2, "the model's reference solution does not hold initially: two.x is 0, not 0.25");
 }
 
 static void test_started_elsewhere (void **state) {
@@ -134,7 +134,7 @@ static void test_started_elsewhere (void **state) {
   truth_write_c ("0");
   assert_int_equal (cli_run ("pinwheel run @/particles.c --start one.x=5 --json -"), 0);
   truth_shows ("\"truth\": null");
-  assert_non_null (strstr (cli_err, "with --start no errors are taken"));
+  assert_non_null (strstr (cli_err, "with --start errors are not computed"));
 }
 
 /* A table: its times are the samples, those after the end are left out, columns it does not have are not compared. */

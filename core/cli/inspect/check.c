@@ -180,8 +180,7 @@ static int check_linear (pw_check *x, pw_error *error) {
 /* ---- */
 
 static int check_model (pw_check *x, int started, pw_error *error) {
-  pw_report_angles (x->m.model);
-  pw_report_jumps (x->m.model);
+  pw_report_model (x->m.model);
   check_open (x);
   check_given (x);
   int status = check_reference (x, started, error);

@@ -1,10 +1,16 @@
-/* Checkpoints of pinwheel run. */
+/* Checkpoints of a run: their contents, when they are due, and how a run continues from one.
+ *
+ * A checkpoint is saved after the step that reaches a multiple of the interval, when the step's rows are written.  The table
+ * is brought to the disk first, so that a resumed run finds at least the rows that the checkpoint counts. */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
-#include "checkpoints.h"
 #include "fingerprint.h"
+#include "run_command.h"
 
 static const char checkpoints_key[] = "checkpoint-every";
+
+/* ---- Before the run ---- */
 
 /* The interval of the file that is resumed. */
 static void checkpoints_interval (pw_checkpoints *c) {
@@ -17,7 +23,8 @@ static void checkpoints_interval (pw_checkpoints *c) {
   if (pw_read_number (text, &c->every) != PW_OK || !(c->every > 0)) c->every = 0;
 }
 
-int pw_checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error) {
+/* Reads the options and the file to be resumed, and locks the file.  Without checkpoints `every` stays 0. */
+static int checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error) {
   c->due = INFINITY;
   if (c->resume && c->path == NULL) c->path = c->resume;
   if (c->path == NULL && c->every_text == NULL) return PW_OK;
@@ -26,16 +33,77 @@ int pw_checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error) {
   if (c->resume && pw_checkpoint_read (c->resume, &c->from, error) != PW_OK) return error->status;
   c->every = t_end / 10;
   if (c->resume) checkpoints_interval (c);
-  pw_text_add (&c->head, PW_CHECKPOINT_MAGIC);
   return pw_cli_number ("--checkpoint-every", c->every_text, PW_POSITIVE, &c->every, error);
 }
 
-int pw_checkpoints_reserve (pw_checkpoints *c, pw_error *error) {
+static int checkpoints_lock (pw_checkpoints *c, pw_error *error) {
   c->lock = pw_output_open (c->path, error);
   if (c->lock == NULL) return error->status;
   if (pw_output_is_file (c->lock)) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s: a checkpoint needs a regular file, which can be read again and replaced",
                   c->path);
+}
+
+/* The head: everything that determines what is computed and written. */
+static int checkpoints_head (pw_run_command *x, pw_error *error) {
+  const unsigned short order = 1;
+  char numbers[60];
+  pw_text *t = &x->check.head;
+  const pw_model *m = x->m.model;
+  pw_text_add (t, PW_CHECKPOINT_MAGIC);
+  pw_print_line (t, "version", NULL, PW_VERSION);
+  if (pw_print_model (t, x->m.file, pw_check_tables (0, m), error) != PW_OK) return error->status;
+  pw_print_line (t, "method", NULL, x->method);
+  pw_print_number (t, "t-end", NULL, x->t_end);
+  pw_print_number (t, "step", NULL, x->settings.step);
+  pw_print_number (t, "rtol", NULL, x->settings.rtol);
+  pw_print_number (t, "atol", NULL, x->settings.atol);
+  for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
+    pw_print_number (t, "parameter", q->name, pw_model_parameter (m, q));
+  pw_print_starts (t, x->line.starts);
+  pw_print_line (t, "table", NULL, x->csv_path ? "written" : "not written");
+  pw_print_number (t, "every", NULL, x->every);
+  pw_print_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
+  pw_print_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
+  pw_print_line (t, "animation", NULL, x->animate_path ? "written" : "not written");
+  if (x->reference_path == NULL)
+    pw_print_line (t, "truth", NULL, "the model's");
+  else if (pw_print_file (t, "truth", x->reference_path, x->reference_path, error) != PW_OK)
+    return error->status;
+  pw_print_number (t, checkpoints_key, NULL, x->check.every);
+  snprintf (numbers, sizeof numbers, "%s endian, %zu bytes", *(const unsigned char *)&order ? "little" : "big",
+            sizeof (long));
+  pw_print_line (t, "numbers", NULL, numbers);
+  pw_text_add (t, "end\n");
+  return t->failed ? pw_fail (error, PW_MACHINE, "out of memory") : PW_OK;
+}
+
+/* Refuses a checkpoint of another run. */
+static int checkpoints_match (const pw_checkpoints *c, pw_error *error) {
+  static const char *words[2] = { "there", "here" };
+  char what[300];
+  if (c->resume && pw_fingerprint_differ (c->from.text, c->from.head_end, c->head.at, c->head.at + c->head.used, 1,
+                                          words, what, sizeof what))
+    return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", c->resume, what);
+  return PW_OK;
+}
+
+int pw_checkpoints_prepare (pw_run_command *x, pw_error *error) {
+  pw_checkpoints *c = &x->check;
+  int status = checkpoints_open (c, x->t_end, error);
+  if (status != PW_OK || c->path == NULL) return status;
+  if (x->csv_path && strcmp (x->csv_path, "-") == 0)
+    return pw_fail (error, PW_INPUT,
+                    "--checkpoint: a table on standard output cannot be continued; write it to a file");
+  status = checkpoints_lock (c, error);
+  if (status == PW_OK) status = checkpoints_head (x, error);
+  if (status == PW_OK) status = checkpoints_match (c, error);
+  if (status != PW_OK || x->csv_path == NULL) return status;
+  pw_mark mark = { 0 };
+  if (c->resume == NULL) return pw_output_mark (x->csv_output, &mark, error); /* fails if it cannot be continued */
+  pw_carry (&c->from.state, &mark, sizeof mark);
+  x->csv_output = pw_output_continue (x->csv_path, &mark, error);
+  return x->csv_output ? PW_OK : error->status;
 }
 
 void pw_checkpoints_close (pw_checkpoints *c) {
@@ -45,33 +113,63 @@ void pw_checkpoints_close (pw_checkpoints *c) {
   pw_checkpoint_free (&c->from);
 }
 
-int pw_checkpoints_match (pw_checkpoints *c, pw_error *error) {
-  static const char *words[2] = { "there", "here" };
-  const unsigned short order = 1;
-  char what[300], numbers[60];
-  pw_print_number (&c->head, checkpoints_key, NULL, c->every);
-  snprintf (numbers, sizeof numbers, "%s endian, %zu bytes", *(const unsigned char *)&order ? "little" : "big",
-            sizeof (long));
-  pw_print_line (&c->head, "numbers", NULL, numbers);
-  pw_text_add (&c->head, "end\n");
-  if (c->head.failed) return pw_fail (error, PW_MACHINE, "out of memory");
-  if (c->resume && pw_fingerprint_differ (c->from.text, c->from.head_end, c->head.at, c->head.at + c->head.used, 1,
-                                          words, what, sizeof what))
-    return pw_fail (error, PW_INPUT, "the checkpoint %.100s belongs to another run: %.300s", c->resume, what);
-  return PW_OK;
-}
+/* ---- Saving and resuming ---- */
 
-void pw_checkpoints_pass (pw_checkpoints *c, double t) {
+/* The first multiple of the interval after t is due next. */
+static void checkpoints_next (pw_checkpoints *c, double t) {
   if (c->every == 0) return;
   double n = floor (t / c->every);
   while (n * c->every <= t) n++;
   c->due = n * c->every;
 }
 
-int pw_checkpoints_write (pw_checkpoints *c, double t, pw_error *error) {
+/* What the program adds to the state of the run. */
+static void checkpoints_serialise (pw_run_command *x, pw_archive *a) {
+  pw_carry (a, &x->row, sizeof x->row);
+  pw_carry (a, &x->cpu, sizeof x->cpu);
+  if (x->plots) pw_plots_carry (x->plots, a);
+  pw_comparison_serialise (&x->comparison, a);
+}
+
+/* A checkpoint is within the run, and has the rows up to its time. */
+static int checkpoints_plausible (const pw_run_command *x) {
+  double t = pw_time (x->r), rows = x->csv && x->every > 0 ? floor (t / x->every) + 1 : (double)x->row;
+  return t <= x->t_end && x->row >= 0 && fabs ((double)x->row - rows) <= 1 && isfinite (x->cpu) && x->cpu >= 0;
+}
+
+int pw_checkpoints_resume (pw_run_command *x, pw_error *error) {
+  pw_checkpoints *c = &x->check;
+  char t[32];
+  if (c->resume) {
+    checkpoints_serialise (x, &c->from.state);
+    if (pw_run_load (x->r, &c->from.state, error) != PW_OK) return error->status;
+    if (!checkpoints_plausible (x))
+      return pw_fail (error, PW_INPUT,
+                      "the checkpoint %s is not that of a run: time, number of rows or processor time "
+                      "are impossible",
+                      c->resume);
+    x->resumed = 1;
+    pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_time (x->r), 6));
+  }
+  checkpoints_next (c, pw_time (x->r));
+  return PW_OK;
+}
+
+int pw_checkpoints_save (pw_run_command *x, pw_error *error) {
+  pw_checkpoints *c = &x->check;
+  double t = pw_time (x->r);
+  pw_mark mark = { 0 };
+  if (t >= x->t_end) return PW_OK;
+  if (x->csv_output && pw_output_mark (x->csv_output, &mark, error) != PW_OK) return error->status;
+  pw_archive_clear (&c->state);
+  if (x->csv_output) pw_carry (&c->state, &mark, sizeof mark);
+  checkpoints_serialise (x, &c->state);
+  int status = pw_run_save (x->r, &c->state, error);
+  if (status != PW_OK) return status > 0 ? PW_OK : status;
+  checkpoints_next (c, t);
   if (c->state.failed) return pw_fail (error, PW_MACHINE, "out of memory while saving a checkpoint");
   pw_output *o = pw_output_open_as (c->path, ".next", error);
-  int status = o ? pw_checkpoint_put (o, c->head.at, &c->state, error) : error->status;
+  status = o ? pw_checkpoint_put (o, c->head.at, &c->state, error) : error->status;
   if (status == PW_OK) c->saved = t;
   return status;
 }

@@ -1,4 +1,4 @@
-/* The truth from a file: a table of samples with the columns of a run's; those that are missing are not compared. */
+/* A reference from a file: a table with the columns of `pinwheel run -o`; those that are missing are not compared. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -19,19 +19,19 @@ typedef struct {
   double *sign;  /* reactions are -lambda; times what its unit is in SI units */
   double second; /* the same of the time */
   int columns, known;
-} truth_file;
+} file_reader;
 
 /* ---- Lines ---- */
 
 enum { FILE_LINE = 16 << 20 }; /* bytes of the longest line */
 
-static int file_fail (truth_file *in, int why) {
+static int file_fail (file_reader *in, int why) {
   if (in->failed == 0) in->failed = why;
   return 0;
 }
 
 /* Reads up to the end of the line; 0 at the end of the file, or if it fails. */
-static int file_read_line (truth_file *in) {
+static int file_read_line (file_reader *in) {
   size_t used = 0;
   do {
     if (in->room - used < 2) {
@@ -53,7 +53,7 @@ static int file_read_line (truth_file *in) {
 }
 
 /* The next line that is not empty, without its end. */
-static int file_line (truth_file *in) {
+static int file_line (file_reader *in) {
   while (file_read_line (in)) {
     size_t n = strlen (in->line);
     while (n > 0 && (in->line[n - 1] == '\n' || in->line[n - 1] == '\r')) in->line[--n] = 0;
@@ -71,7 +71,7 @@ static char *file_cell (char **rest) {
   return cell;
 }
 
-static int file_number (const truth_file *in, const char *cell, double *value, pw_error *error) {
+static int file_number (const file_reader *in, const char *cell, double *value, pw_error *error) {
   if (pw_read_number (cell, value) == PW_OK) return PW_OK;
   return pw_fail (error, PW_INPUT, "--truth %s: line %ld: \"%.60s\" is not a number", in->path, in->number, cell);
 }
@@ -91,7 +91,7 @@ static int file_place (const pw_system *s, const char *name, size_t n, double *s
   return -1;
 }
 
-static int file_columns (truth_file *in, const pw_system *s, pw_error *error) {
+static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
   char example[300], unit[260], *rest;
   int n = pw_count_coordinates (s);
   if (!file_line (in)) return pw_fail (error, PW_INPUT, "--truth %s: the file is empty", in->path);
@@ -125,7 +125,7 @@ static int file_columns (truth_file *in, const pw_system *s, pw_error *error) {
 /* ---- Rows ---- */
 
 /* The next line's time; PW_RETRY at the end. */
-static int file_time (truth_file *in, char **rest, double *t, pw_error *error) {
+static int file_time (file_reader *in, char **rest, double *t, pw_error *error) {
   if (!file_line (in)) return PW_RETRY;
   *rest = in->line;
   int status = file_number (in, file_cell (rest), t, error);
@@ -134,7 +134,7 @@ static int file_time (truth_file *in, char **rest, double *t, pw_error *error) {
 }
 
 /* Rows after the start and up to the end; without an end, the last row's time is it. */
-static int file_count (truth_file *in, double *t_end, int whole, int *rows, pw_error *error) {
+static int file_count (file_reader *in, double *t_end, int whole, int *rows, pw_error *error) {
   double t, last = 0, before = -INFINITY;
   char *rest;
   int status;
@@ -157,7 +157,7 @@ static int file_count (truth_file *in, double *t_end, int whole, int *rows, pw_e
                   in->path, pw_format (end, *t_end, 9), pw_format (reached, last, 9));
 }
 
-static int file_row (truth_file *in, char *rest, double *x, int width, pw_error *error) {
+static int file_row (file_reader *in, char *rest, double *x, int width, pw_error *error) {
   for (int i = 0; i < width; i++) x[i] = NAN;
   for (int i = 0; i < in->columns; i++) {
     const char *cell = file_cell (&rest);
@@ -172,7 +172,7 @@ static int file_row (truth_file *in, char *rest, double *x, int width, pw_error 
 
 /* Takes as many rows as there are samples, evenly, the last one among them; times that are the end but for round-off are
  * it. */
-static int file_rows (truth_file *in, int rows, double t_end, pw_motion *m, pw_error *error) {
+static int file_rows (file_reader *in, int rows, double t_end, pw_motion *m, pw_error *error) {
   char *rest;
   double t;
   for (int row = 0, k = 0; k < m->samples;) {
@@ -186,7 +186,7 @@ static int file_rows (truth_file *in, int rows, double t_end, pw_motion *m, pw_e
   return PW_OK;
 }
 
-static int file_read (truth_file *in, pw_motion *m, const pw_system *s, double *t_end, int whole, pw_error *error) {
+static int file_read (file_reader *in, pw_motion *m, const pw_system *s, double *t_end, int whole, pw_error *error) {
   int rows;
   int status = file_columns (in, s, error);
   if (status == PW_OK) status = file_count (in, t_end, whole, &rows, error);
@@ -198,7 +198,7 @@ static int file_read (truth_file *in, pw_motion *m, const pw_system *s, double *
   return status == PW_OK ? file_rows (in, rows, *t_end, m, error) : status;
 }
 
-static int file_failed (const truth_file *in, pw_error *error) {
+static int file_failed (const file_reader *in, pw_error *error) {
   char line[60];
   if (in->failed == ENOMEM) return pw_fail (error, PW_MACHINE, "--truth %s: out of memory", in->path);
   snprintf (line, sizeof line, "line %ld has more than %d MB", in->number + 1, FILE_LINE >> 20);
@@ -210,7 +210,7 @@ static int file_failed (const truth_file *in, pw_error *error) {
 
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error) {
   const char *why;
-  truth_file in = { .path = path, .f = pw_open_input (path, &why) };
+  file_reader in = { .path = path, .f = pw_open_input (path, &why) };
   if (in.f == NULL && errno == ENOMEM) return pw_fail (error, PW_MACHINE, "--truth %s: out of memory", path);
   if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, why);
   pw_error own = { 0 };

@@ -1,4 +1,4 @@
-/* What a run says about itself. */
+/* Messages and results of a run. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,129 +11,127 @@ static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
 }
 
-/* ---- Options ---- */
+/* ---- Settings ---- */
 
-void pw_report_unused (const char *method, const pw_cli_line *w) {
+/* Options without effect; that both steps and tolerances are given, as in scripts, is not reported. */
+static void report_unused (const char *method, int adaptive, const pw_cli_line *l) {
+  if (adaptive && l->step && !l->rtol && !l->atol)
+    pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
+  if (!adaptive && l->max_steps)
+    pw_cli_say ("pinwheel: --max-steps has no effect: %s takes as many steps as --step requires\n", method);
+  if (!adaptive && (l->rtol || l->atol) && !l->step)
+    pw_cli_say ("pinwheel: --%s has no effect: %s takes steps of --step\n", l->rtol ? "rtol" : "atol", method);
+}
+
+/* A fixed step longer than the time in which the initial motion changes. */
+static void report_step (const pw_run *r, double step) {
+  char h[32], pace[32];
+  double T = pw_run_scale (r)->time;
+  if (step > T)
+    pw_cli_say (
+        "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
+        "compare with shorter ones\n",
+        pw_format (h, step, 3), pw_format (pace, T, 2));
+}
+
+/* An absolute tolerance within which a force saturates. */
+static void report_atol (pw_run *r, const pw_system *s, double atol) {
+  char a[32], speed[32], element[REPORT_NAME];
+  double least;
+  int state = atol > 0 ? pw_run_saturation (r, &least, element, sizeof element) : -1;
+  if (state >= 0 && atol > least)
+    pw_cli_say ("pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's "
+                "iteration reduce it for the states it depends on, others may be wrong\n",
+                pw_format (a, atol, 3), pw_format (speed, least, 3), pw_state_unit (s, state), element);
+}
+
+void pw_report_settings (pw_run *r, const pw_system *s, const char *method, const pw_cli_line *l,
+                         const pw_settings *settings) {
   const pw_method *integrator;
   int stabilisation;
   if (pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
   int adaptive = pw_cli_adaptive (integrator, method);
-  if (adaptive && w->step && !w->rtol && !w->atol)
-    fprintf (stderr, "pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
-  if (!adaptive && w->max_steps)
-    fprintf (stderr, "pinwheel: --max-steps has no effect: %s takes as many steps of --step as there are\n", method);
-  if (!adaptive && (w->rtol || w->atol) && !w->step)
-    fprintf (stderr, "pinwheel: --%s has no effect: %s takes steps of --step\n", w->rtol ? "rtol" : "atol", method);
+  report_unused (method, adaptive, l);
+  if (adaptive)
+    report_atol (r, s, settings->atol);
+  else
+    report_step (r, fmin (settings->step, settings->span));
 }
 
-void pw_report_step (const pw_run *r, const char *method, double step) {
-  char h[32], pace[32];
-  const pw_method *integrator;
-  int stabilisation;
-  double T = pw_run_scale (r)->time;
-  if (!(step > T) || pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK ||
-      pw_cli_adaptive (integrator, method))
-    return;
-  fprintf (stderr,
-           "pinwheel: a step of %s s is long for a motion that changes within %s s, and nothing controls its error: "
-           "compare with shorter ones\n",
-           pw_format (h, step, 3), pw_format (pace, T, 2));
-}
+/* ---- The model ---- */
 
-void pw_report_atol (pw_run *r, const pw_system *s, const char *method, double atol) {
-  const pw_method *integrator;
-  int stabilisation;
-  char a[32], speed[32], element[REPORT_NAME];
-  double least;
-  int state = atol > 0 ? pw_run_saturation (r, &least, element, sizeof element) : -1;
-  if (state < 0 || !(atol > least) ||
-      pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK ||
-      !pw_cli_adaptive (integrator, method))
-    return;
-  fprintf (stderr,
-           "pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's iteration "
-           "take less for the states it depends on, others may be wrong\n",
-           pw_format (a, atol, 3), pw_format (speed, least, 3), pw_state_unit (s, state), element);
-}
-
-/* ---- Angles ---- */
-
+/* Angles of more than a turn: most likely they are degrees. */
 static void report_angle (const char *kind, const char *name, const char *what, double angle) {
   char value[32], degrees[32];
   if (!(fabs (angle) > 2 * PW_PI)) return;
   pw_format (value, angle, 6);
   pw_format (degrees, fmod (angle * 180 / PW_PI, 360), 4);
-  fprintf (stderr,
-           "pinwheel: %s %s: %s = %s rad is more than a turn and ends at %s degrees; degrees are written %s*deg\n",
-           kind, name, what, value, degrees, value);
+  pw_cli_say ("pinwheel: %s %s: %s = %s rad is more than a turn and ends at %s degrees; degrees are written %s*deg\n",
+              kind, name, what, value, degrees, value);
 }
 
-void pw_report_angles (const pw_model *m) {
+/* Expressions that may jump as states change, where no step ends. */
+static void report_jump (const pw_element *e, const char *field, const pw_signal *s) {
+  if (s->type == PW_FUNCTION && s->function.text && s->function.text->jump)
+    pw_cli_say (
+        "pinwheel: %s %s: %s: \"%.80s\" may jump as states change; steps do not end there, which costs accuracy\n",
+        e->kind->name, pw_element_name (e), field, s->function.text->jump);
+}
+
+static void report_field (const pw_element *e, const pw_field *f) {
+  const void *at = (const char *)e->definition + f->offset;
+  const pw_signal *s = f->type == PW_SIGNAL ? at : NULL;
+  int heading = strcmp (f->name, "heading") == 0;
+  if (heading && f->type == PW_NUMBER) report_angle (e->kind->name, pw_element_name (e), f->name, *(const double *)at);
+  if (heading && s && s->type == PW_CONSTANT) report_angle (e->kind->name, pw_element_name (e), f->name, s->constant);
+  for (int i = 0; s && i < pw_field_count (f); i++) report_jump (e, f->name, s + i);
+}
+
+void pw_report_model (const pw_model *m) {
   int bodies, elements;
   const pw_body *b = pw_model_bodies (m, &bodies);
   const pw_element *e = pw_model_elements (m, &elements);
-  for (int i = 0; i < bodies; i++) report_angle ("body", b[i].name, "start phi", b[i].start[2]);
-  for (const pw_element *end = e + elements; e < end; e++)
-    for (const pw_field *f = e->kind->fields; f->name; f++) {
-      const void *at = (const char *)e->definition + f->offset;
-      if (strcmp (f->name, "heading") != 0) continue;
-      const pw_signal *signal = f->type == PW_SIGNAL ? at : NULL;
-      if (signal && signal->type != PW_CONSTANT) continue;
-      if (signal || f->type == PW_NUMBER)
-        report_angle (e->kind->name, pw_element_name (e), f->name, signal ? signal->constant : *(const double *)at);
-    }
+  for (int i = 0; i < bodies; i++) report_angle ("body", b[i].name, "initial phi", b[i].start[2]);
+  for (int i = 0; i < elements; i++)
+    for (const pw_field *f = e[i].kind->fields; f->name; f++) report_field (&e[i], f);
 }
 
-/* ---- Jumps without a breakpoint ---- */
+/* ---- Initialisation ---- */
 
-void pw_report_jumps (const pw_model *m) {
-  int elements;
-  const pw_element *e = pw_model_elements (m, &elements);
-  for (const pw_element *end = e + elements; e < end; e++)
-    for (const pw_field *f = e->kind->fields; f->name; f++) {
-      const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
-      for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)
-        if (s[i].type == PW_FUNCTION && s[i].function.text && s[i].function.text->jump)
-          fprintf (stderr,
-                   "pinwheel: %s %s: %s: \"%.80s\" may jump as states change; steps do not end there, which costs "
-                   "accuracy\n",
-                   e->kind->name, pw_element_name (e), f->name, s[i].function.text->jump);
-    }
-}
-
-/* ---- The start ---- */
-
-void pw_report_start (const pw_system *s, const pw_start_report *start) {
+/* States that the consistent initialisation has changed. */
+static void report_start (const pw_system *s, const pw_start_report *start) {
   int n = pw_count_coordinates (s), moved = start->moved, listed = 0;
   char changed[80] = "";
   if (moved == 0) return;
   if (start->changed) snprintf (changed, sizeof changed, ", %d of them specified by the model", start->changed);
-  fprintf (stderr, "pinwheel: the start did not satisfy the constraints; %d of its values %s moved%s%s:\n", moved,
-           moved == 1 ? "was" : "were", start->freed ? ", given ones among them, since those cannot all be held" : "",
-           changed);
+  pw_cli_say ("pinwheel: the initial values did not satisfy the constraints; %d of them %s changed%s%s:\n", moved,
+              moved == 1 ? "was" : "were", start->freed ? ", including given ones, which cannot all be satisfied" : "",
+              changed);
   for (int i = 0; i < 2 * n && listed < REPORT_MOVED; i++) {
     double from = i < n ? start->q_given[i] : start->v_given[i - n], to = i < n ? start->q[i] : start->v[i - n];
     char name[REPORT_NAME], a[32], b[32];
     if (!pw_start_moved (s, start, i)) continue;
-    fprintf (stderr, "  %s from %s to %s %s%s\n", pw_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
-             pw_format (b, to, 10), pw_state_unit (s, i),
-             start->changed && pw_start_specified (s, i) ? " (specified)" : "");
+    pw_cli_say ("  %s from %s to %s %s%s\n", pw_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
+                pw_format (b, to, 10), pw_state_unit (s, i),
+                start->changed && pw_start_specified (s, i) ? " (specified)" : "");
     listed++;
   }
   report_more (stderr, moved - listed, "");
 }
 
-/* ---- Derivatives without a formula ---- */
-
-void pw_report_differences (const pw_system *s) {
-  int n = pw_count_differences (s);
+void pw_report_initialisation (const pw_run *r, const pw_system *s, const char *const *redundant) {
+  int n = pw_count_differences (s), count = 0;
   char name[REPORT_NAME];
   for (int i = 0; i < n && i < REPORT_MOVED; i++)
-    fprintf (stderr, "pinwheel: derivatives by differences: %s\n", pw_difference_name (s, i, name, sizeof name));
+    pw_cli_say ("pinwheel: derivatives by differences: %s\n", pw_difference_name (s, i, name, sizeof name));
   report_more (stderr, n - REPORT_MOVED, "");
+  report_start (s, pw_run_start (r));
+  for (; redundant && redundant[count]; count++)
+    if (count < REPORT_MOVED) pw_cli_say ("pinwheel: redundant: %s\n", redundant[count]);
+  report_more (stderr, count - REPORT_MOVED, "");
+  if (count > 0)
+    pw_cli_say ("pinwheel: reactions of redundant constraints are not unique: those of least norm are given\n");
 }
-
-/* ---- Redundant rows ---- */
 
 const char **pw_report_redundancies (pw_run *r) {
   size_t n = (size_t)pw_run_redundant (r);
@@ -145,18 +143,7 @@ const char **pw_report_redundancies (pw_run *r) {
   return text;
 }
 
-void pw_report_redundant (const char *const *text) {
-  int n = 0, more = 0;
-  for (; text && *text; text++)
-    if (n++ < REPORT_MOVED)
-      fprintf (stderr, "pinwheel: redundant: %s\n", *text);
-    else
-      more++;
-  report_more (stderr, more, "");
-  if (n > 0) fprintf (stderr, "pinwheel: reactions of redundant constraints are not unique: the smallest are given\n");
-}
-
-/* ---- The end ---- */
+/* ---- Results ---- */
 
 /* Characters in a UTF-8 text, for columns that line up. */
 static int report_length (const char *text) {
@@ -202,8 +189,8 @@ static void report_bodies (const pw_system *s, const pw_sample *last) {
   report_more (stdout, bodies - shown, ": -o FILE.csv writes them all");
 }
 
-/* Coordinates that elements own. */
-static void report_own (const pw_system *s, const pw_sample *last) {
+/* Internal coordinates of elements. */
+static void report_internal (const pw_system *s, const pw_sample *last) {
   int first = 3 * pw_count_bodies (s), n = pw_count_coordinates (s),
       end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
   char name[REPORT_NAME];
@@ -246,24 +233,27 @@ static void report_reactions (const pw_system *s, const pw_sample *last) {
 }
 
 static void report_energy (const pw_sample *last) {
-  const char *names[] = { "kinetic", "potential", "work", "dissipated", "projection", "balance" };
-  double values[] = { last->kinetic, last->potential, last->work, last->loss, last->projection, last->balance };
+  const struct {
+    const char *name;
+    double value;
+  } row[] = { { "kinetic", last->kinetic }, { "potential", last->potential },   { "work", last->work },
+              { "dissipated", last->loss }, { "projection", last->projection }, { "balance", last->balance } };
   printf ("\n  energy\n");
   for (int i = 0; i < 6; i++) {
-    printf ("  %-10s", names[i]);
-    report_number (values[i], 8, 17);
+    printf ("  %-10s", row[i].name);
+    report_number (row[i].value, 8, 17);
     printf (" J\n");
   }
 }
 
-static void report_truth (const pw_truth_error *e) {
+static void report_errors (const pw_truth_error *e) {
   static const char *const name[] = { "length", "angle", "speed", "rate" }, *const unit[] = { "m", "rad", "m/s",
                                                                                               "rad/s" };
   char t[32], at[40];
   if (e == NULL) return;
   snprintf (at, sizeof at, "at %s s", pw_format (t, e->t, 6));
-  pw_cli_print (stdout, "\n  error against the truth of %s, at %d time%s\n  %27s%17s\n", e->source, e->samples,
-                e->samples == 1 ? "" : "s", at, "largest");
+  pw_cli_print (stdout, "\n  error against the reference solution of %s, at %d time%s\n  %27s%17s\n", e->source,
+                e->samples, e->samples == 1 ? "" : "s", at, "largest");
   for (int i = 0; i < 4; i++) {
     if (isnan (e->end[i]) && isnan (e->most[i])) continue;
     printf ("  %-10s", name[i]);
@@ -277,22 +267,18 @@ static void report_truth (const pw_truth_error *e) {
   printf (" of the largest\n");
 }
 
-void pw_report_growth (const pw_system *s, const pw_run *r) {
+void pw_report_warnings (const pw_run *r, const pw_system *s, double unbalanced) {
   int state;
   double power, growth = pw_run_growth (r, &state, &power);
-  char name[REPORT_NAME], times[32], grows[32];
-  if (growth == 0) return;
-  fprintf (stderr,
-           "pinwheel: the motion grows without bound: %s has become %s times the scene's own speed and grows as t^%s; "
-           "nothing opposes what drives it\n",
-           pw_state_name (s, state, name, sizeof name), pw_format (times, growth, 2), pw_format (grows, power, 2));
-}
-
-void pw_report_unbalanced (const pw_run *r, double part) {
-  char percent[32];
-  if (!(part > 0.01)) return;
-  fprintf (stderr, "pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
-           pw_format (percent, 100 * part, 2), pw_energy_advice (r, part));
+  char name[REPORT_NAME], times[32], grows[32], percent[32];
+  if (unbalanced > 0.01)
+    pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
+                pw_format (percent, 100 * unbalanced, 2), pw_energy_advice (r, unbalanced));
+  if (growth != 0)
+    pw_cli_say (
+        "pinwheel: the motion grows without bound: %s has become %s times the scene's own speed and grows as t^%s; "
+        "nothing opposes what drives it\n",
+        pw_state_name (s, state, name, sizeof name), pw_format (times, growth, 2), pw_format (grows, power, 2));
 }
 
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,
@@ -300,16 +286,16 @@ void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_samp
   char t[32], a[32], b[32];
   printf ("%s, %s, at t = %s s\n\n", summary->model, summary->method, pw_format (t, last->t, 8));
   report_bodies (s, last);
-  report_own (s, last);
+  report_internal (s, last);
   report_reactions (s, last);
   if (energy) report_energy (last);
-  report_truth (summary->truth);
+  report_errors (summary->truth);
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", pw_format (a, statistics->position, 2),
           pw_format (b, statistics->velocity, 2));
   printf (
       "  %ld steps, %ld rejected, %ld right-hand sides, %ld Jacobians, %ld factorisations, %s s of processor time\n",
       statistics->steps, statistics->rejected, statistics->rhs, statistics->jacobians, statistics->factorisations,
       pw_format (a, summary->cpu, 3));
-  if (statistics->restarts > 0) printf ("  started anew at %ld checkpoints\n", statistics->restarts);
+  if (statistics->restarts > 0) printf ("  restarted at %ld checkpoints\n", statistics->restarts);
   if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
 }

@@ -1,4 +1,4 @@
-/* pinwheel run: integrates a model and writes what became of it.
+/* pinwheel run: integrates a model and writes the results.
  *
  * Steps are taken in batches that end where a sample is due, so that between samples nothing but the method runs, and
  * only the method is on the clock. */
@@ -8,14 +8,13 @@
 #include "animate.h"
 #include "profile.h"
 #include "report.h"
-#include "running.h"
-#include "stop.h"
+#include "run_command.h"
 
 #define RUN_SHORT 0.01 /* a batch that took less processor time [s] may be longer the next time */
 #define RUN_LONG 0.04  /* one that took more must be shorter: Ctrl-C and the progress bar wait for its end */
 enum { RUN_BATCH = 4096 };
 
-typedef pw_running run;
+typedef pw_run_command run;
 
 /* ---- Before the run ---- */
 
@@ -34,14 +33,15 @@ static int run_uses (run *x, pw_error *error) {
   return pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
 }
 
-/* Opens what will be written, so that nothing is computed in vain. */
+/* Opens the output files before anything is computed. */
 static int run_open_outputs (run *x, pw_error *error) {
   if (x->animate_path && pw_animation_check (x->animate_path, error) != PW_OK) return error->status;
   if (run_uses (x, error) != PW_OK) return error->status;
   if (x->json_path && (x->json_output = pw_output_open (x->json_path, error)) == NULL) return error->status;
   if (x->json_output && pw_output_stream (x->json_output) == stdout) x->json_path = "-";
   if (x->animate_path && (x->page_output = pw_output_open (x->animate_path, error)) == NULL) return error->status;
-  if (x->csv_path == NULL || x->check.resume) return PW_OK; /* what is resumed is opened when it is known to be that */
+  if (x->csv_path == NULL || x->check.resume)
+    return PW_OK; /* a table that is continued is opened once the checkpoint is verified */
   if ((x->csv_output = pw_output_open (x->csv_path, error)) == NULL) return error->status;
   if (pw_output_stream (x->csv_output) == stdout) x->csv_path = "-";
   return PW_OK;
@@ -56,7 +56,7 @@ static int run_open_model (run *x, pw_error *error) {
   return error->status;
 }
 
-/* A method nobody has typed is told to be the model's. */
+/* An error in the method that the model selects names the model. */
 static int run_own_method (const run *x, pw_error *error) {
   const pw_method *method;
   int stabilisation;
@@ -66,7 +66,7 @@ static int run_own_method (const run *x, pw_error *error) {
   return pw_fail (error, status, "model %s: the method it asks for: %s", pw_file_name (x->m.file), why.text);
 }
 
-static int run_settle (run *x, pw_error *error) {
+static int run_settings (run *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   int status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
   if (status == PW_OK) status = pw_cli_number ("--every", x->every_text, PW_POSITIVE, &x->every, error);
@@ -79,30 +79,25 @@ static int run_settle (run *x, pw_error *error) {
 static int run_open (run *x, pw_error *error) {
   int status = run_open_outputs (x, error);
   if (status == PW_OK) status = run_open_model (x, error);
-  if (status == PW_OK) status = run_settle (x, error);
-  if (status == PW_OK) status = pw_running_prepare (x, error);
+  if (status == PW_OK) status = run_settings (x, error);
+  if (status == PW_OK) status = pw_checkpoints_prepare (x, error);
   if (status != PW_OK) return status;
   if ((x->plots_path || x->animate_path) &&
       (x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error)) ==
           NULL)
     return error->status;
-  status = pw_watch_open (&x->watch, &x->m, x->reference_path, x->line.starts != NULL, x->t_end, error);
+  status = pw_comparison_open (&x->comparison, &x->m, x->reference_path, x->line.starts != NULL, x->t_end, error);
   if (status != PW_OK) return status;
   pw_limit_start (&x->limit);
   x->r = pw_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
-  pw_report_angles (x->m.model);
-  pw_report_jumps (x->m.model);
-  pw_report_unused (x->method, &x->line);
-  pw_report_step (x->r, x->method, fmin (x->settings.step, x->t_end));
-  pw_report_atol (x->r, x->m.system, x->method, x->settings.atol);
-  pw_report_differences (x->m.system);
-  pw_report_start (x->m.system, pw_run_start (x->r));
   x->redundant = pw_report_redundancies (x->r);
-  pw_report_redundant (x->redundant);
+  pw_report_model (x->m.model);
+  pw_report_settings (x->r, x->m.system, x->method, &x->line, &x->settings);
+  pw_report_initialisation (x->r, x->m.system, x->redundant);
   if (x->csv_output && (x->csv = pw_csv_open (x->m.system, x->energy, x->csv_output, error)) == NULL)
     return error->status;
-  return pw_running_resume (x, error);
+  return pw_checkpoints_resume (x, error);
 }
 
 /* ---- The run ---- */
@@ -132,9 +127,9 @@ static int run_take_samples (run *x, pw_error *error) {
     status = pw_at (x->r, pw_plots_next (x->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (x->plots, &sample);
   }
-  while (status == PW_OK && pw_watch_next (&x->watch) <= now) {
-    status = pw_at (x->r, pw_watch_next (&x->watch), &sample, error);
-    if (status == PW_OK) pw_watch_take (&x->watch, x->m.system, &sample);
+  while (status == PW_OK && pw_comparison_next (&x->comparison) <= now) {
+    status = pw_at (x->r, pw_comparison_next (&x->comparison), &sample, error);
+    if (status == PW_OK) pw_comparison_take (&x->comparison, x->m.system, &sample);
   }
   return status;
 }
@@ -143,7 +138,7 @@ static int run_take_samples (run *x, pw_error *error) {
 static int run_batch (run *x, pw_error *error) {
   double due =
       fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), fmin (x->check.due, x->t_end));
-  due = fmin (due, pw_watch_next (&x->watch));
+  due = fmin (due, pw_comparison_next (&x->comparison));
   double start = pw_cpu_clock ();
   int status;
   long n = 0;
@@ -162,7 +157,7 @@ static int run_steps (run *x, pw_error *error) {
   while (status == PW_OK && pw_time (x->r) < x->t_end && !pw_stop) {
     status = run_batch (x, error);
     if (status == PW_OK) status = run_take_samples (x, error);
-    if (status == PW_OK && pw_time (x->r) >= x->check.due) status = pw_running_save (x, error);
+    if (status == PW_OK && pw_time (x->r) >= x->check.due) status = pw_checkpoints_save (x, error);
     pw_progress_at (&x->progress, pw_time (x->r));
   }
   return status;
@@ -282,18 +277,17 @@ static int run_prints_file (const run *x) {
 
 /* Everything that follows the last step: table, summary, figures, the last word. */
 static int run_finish (run *x, pw_error *error) {
-  char reason[80] = "";
+  char reason[80] = "", t[32];
   int interrupted = error->status == PW_OK && pw_stop;
   pw_sample sample, *last = NULL;
   if (x->r && pw_at (x->r, pw_time (x->r), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
-  if (x->r) summary.truth = pw_watch_errors (&x->watch, x->m.system);
+  if (x->r) summary.truth = pw_comparison_errors (&x->comparison, x->m.system);
   if (last) summary.unbalanced = pw_unbalanced (x->r, last);
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
-  if (error->status == PW_OK) pw_report_unbalanced (x->r, summary.unbalanced);
-  if (error->status == PW_OK && x->r) pw_report_growth (x->m.system, x->r);
+  if (error->status == PW_OK) pw_report_warnings (x->r, x->m.system, summary.unbalanced);
   run_write_json (x, &summary, last, error);
   run_draw (x, summary.reason, error);
   run_complete (x, error);
@@ -304,14 +298,15 @@ static int run_finish (run *x, pw_error *error) {
   error->status = PW_OK;
   if (*x->part) pw_cli_say ("pinwheel: the table until then is kept in %s\n", x->part);
   if (*x->json_part) pw_cli_say ("pinwheel: the summary is kept in %s\n", x->json_part);
-  pw_running_hint (x, interrupted || x->limited || status == -PW_MACHINE);
+  if (x->check.saved > 0 && (interrupted || x->limited || status == -PW_MACHINE))
+    pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", x->check.path, pw_format (t, x->check.saved, 6));
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }
 
 static void run_close (run *x) {
   pw_checkpoints_close (&x->check);
   pw_plots_close (x->plots);
-  pw_watch_close (&x->watch);
+  pw_comparison_close (&x->comparison);
   if (x->r) pw_close (x->r);
   free (x->redundant);
   pw_cli_close_model (&x->m);

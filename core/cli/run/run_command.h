@@ -1,0 +1,65 @@
+/* The command `pinwheel run`, and its checkpoints. */
+#ifndef PW_RUN_COMMAND_H
+#define PW_RUN_COMMAND_H
+
+#include "cli.h"
+#include "motion.h"
+#include "plots.h"
+#include "progress.h"
+#include "text.h"
+
+typedef struct {
+  /* as given; NULL: not */
+  const char *path, *every_text, *resume;
+  /* as understood */
+  double every;       /* simulated time between two [s] */
+  double due;         /* when the next one is to be saved [s]; INFINITY: never */
+  double saved;       /* time of the last one [s]; 0: there is none */
+  pw_text head;       /* of the files */
+  pw_archive state;   /* of the next one */
+  pw_checkpoint from; /* what is resumed */
+  pw_output *lock;    /* FILE.part, empty, which keeps other processes out from the beginning to the end */
+} pw_checkpoints;
+
+typedef struct {
+  /* as given */
+  pw_cli_line line;
+  const char *every_text;
+  const char *csv_path, *json_path, *plots_path, *animate_path, *reference_path;
+  int energy, profile;
+  pw_checkpoints check;
+  /* as understood */
+  pw_cli_model m;
+  const char *method;
+  pw_settings settings;
+  pw_limit limit;
+  double t_end, every; /* [s]; every 0: each accepted step is a row */
+  /* open */
+  pw_output *csv_output, *json_output, *page_output;
+  pw_csv *csv;
+  pw_plots *plots;
+  pw_comparison comparison;
+  pw_run *r;
+  const char **redundant; /* a description of each redundant constraint equation; NULL: there are none */
+  pw_progress progress;
+  /* in progress */
+  long row;             /* rows written */
+  int limited;          /* 1: --limit or --max-steps has stopped it */
+  int resumed;          /* 1: the state of the checkpoint has been loaded */
+  long batch;           /* steps to take before samples, signals and progress are considered */
+  double cpu;           /* of the method [s] */
+  char part[4200];      /* path of the unfinished table, or "" */
+  char json_part[4200]; /* likewise of the summary */
+  int lost;             /* 1: the table or the summary could not be written */
+} pw_run_command;
+
+/* Before anything is written: reads the checkpoint that is resumed, verifies that it belongs to this run, and opens its
+ * table. */
+int pw_checkpoints_prepare (pw_run_command *x, pw_error *error);
+/* When all is open: brings the run to the checkpoint's state, if one is resumed. */
+int pw_checkpoints_resume (pw_run_command *x, pw_error *error);
+/* Saves a checkpoint that is due, unless the configuration is near singular; then it stays due. */
+int pw_checkpoints_save (pw_run_command *x, pw_error *error);
+void pw_checkpoints_close (pw_checkpoints *c);
+
+#endif
