@@ -1,12 +1,12 @@
-/* Fingerprints: lines "KEY = VALUE" with all that decides what a run or a sweep computes.  A file that is to be continued
- * begins with one, so that results of different runs are never mixed. */
+/* Fingerprints: lines "KEY = VALUE" with everything that determines the results of a run or a sweep.  Files that can be
+ * continued begin with one, so that results of different runs are never mixed. */
 #include <errno.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
 #include "fingerprint.h"
 
-/* ---- Making ---- */
+/* ---- Writing ---- */
 
 void pw_print_line (pw_text *t, const char *key, const char *of, const char *value) {
   pw_text_add (t, key);

@@ -1,4 +1,4 @@
-/* Texts that grow, and the cells of a table's line. */
+/* Strings of variable length, and the cells of a line of a CSV table. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>

@@ -87,6 +87,17 @@ static void test_row_is_run (void **state) {
   }
 }
 
+/* Every stabilisation of an integrator, each once; by default those of three. */
+static void test_all_of_one (void **state) {
+  (void)state;
+  cli_good ("pinwheel drift pendulum --t-end 0.1 --methods rk4+none,rk4+all --only-methods -o @/one >@/out1; "
+            "tail -n +2 @/one/drift.csv | cut -d, -f2");
+  assert_string_equal (cli_out, "rk4+none\nrk4+baumgarte\nrk4+projection\nrk4+nullspace\n");
+  cli_good ("pinwheel drift pendulum --t-end 0.1 --only-methods -o @/usual >@/out1; "
+            "tail -n +2 @/usual/drift.csv | cut -d, -f2 | sed 's/+.*//' | uniq");
+  assert_string_equal (cli_out, "rk4\nida\ngalpha\n");
+}
+
 /* What the options do: seldom projections leave more, and a grid of alpha and beta has all its rows. */
 static void test_options (void **state) {
   (void)state;
@@ -150,6 +161,8 @@ static void test_bad (void **state) {
   const cli_wrong bad[] = {
     { "ezyrolle", "there is no model \"ezyrolle\"; did you mean \"ezyroller\"?" },
     { "ezyroller --methods rk4+nome", "integrator rk4 has no stabilisation \"nome\"; did you mean \"none\"?" },
+    { "ezyroller --methods rk5+all", "there is no integrator \"rk5\"; did you mean \"erk5\"?" },
+    { "ezyroller --methods rk4+none+all", "method \"rk4+none+all\": expected INTEGRATOR+STABILISATION:OPTION=VALUE" },
     { "ezyroller --step 0", "--step 0: expected a number > 0" },
     { "ezyroller --vary alfa=1", "--vary alfa=1: alpha, beta and every can be varied; did you mean \"alpha\"?" },
     { "ezyroller --vary alpha=-1", "--vary alpha=-1: expected a number >= 0" },
@@ -166,9 +179,9 @@ static void test_bad (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_growth), cmocka_unit_test (test_row_is_run), cmocka_unit_test (test_options),
-    cmocka_unit_test (test_times),  cmocka_unit_test (test_failure),    cmocka_unit_test (test_interrupt),
-    cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_growth),    cmocka_unit_test (test_row_is_run), cmocka_unit_test (test_all_of_one),
+    cmocka_unit_test (test_options),   cmocka_unit_test (test_times),      cmocka_unit_test (test_failure),
+    cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

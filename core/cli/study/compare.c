@@ -243,8 +243,9 @@ static int compare_command (void *options, pw_error *error) {
 
 static const struct poptOption compare_options[] = {
   PW_OPTION_GROUP ("Comparison"),
-  PW_TEXT_OPTION (pw_study, methods_text, "methods", 'm', "A,B,...|all",
-                  "Methods, separated by commas; all: every integrator with every stabilisation (default)"),
+  PW_TEXT_OPTION (
+      pw_study, methods_text, "methods", 'm', "A,B,...|all",
+      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all: of every integrator (default)"),
   PW_TEXT_OPTION (pw_compare, rtol_text, "rtol-ladder", 0, "FROM:TO",
                   "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)"),
   PW_TEXT_OPTION (pw_compare, step_text, "step-ladder", 0, "FROM:TO",

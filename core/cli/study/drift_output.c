@@ -102,7 +102,7 @@ static int table_write_times (const pw_study *x, pw_error *error) {
 static const struct {
   const char *name, *title, *axis;
 } plot_figure[DRIFT_GROUPS] = {
-  { "drift", "drift of the constraints and of the energy", "t [s]" },
+  { "drift", "drift of the constraints and the energy", "t [s]" },
   { "drift-baumgarte", "largest drift by Baumgarte's parameters", "alpha [1/s]" },
   { "drift-projection", "largest drift by the interval between projections", "steps per projection (every)" },
 };
