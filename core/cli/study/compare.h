@@ -29,7 +29,7 @@ typedef struct {
   pw_motion scratch; /* of the row being measured */
 } pw_compare;
 
-/* ---- compare.c ---- */
+/* ---- compare_run.c ---- */
 
 /* One run of a row; with a motion its samples are taken, and the ledger is kept.  As pw_study_run. */
 int pw_compare_run (pw_compare *x, pw_row *r, pw_motion *motion, pw_error *error);

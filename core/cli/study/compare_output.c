@@ -2,7 +2,6 @@
 #include <math.h>
 #include <string.h>
 #include "compare.h"
-#include "figure.h"
 
 static const char *const table_column[MOTION_ERRORS] = { "end.length",    "end.angle",      "end.speed",
                                                          "end.rate",      "largest.length", "largest.angle",
@@ -130,55 +129,35 @@ int pw_compare_write_reference (const pw_compare *x, pw_error *error) {
 
 /* ---- Diagrams: error against CPU time and against evaluations, a line for each method ---- */
 
-static int plot_drawn (const pw_row *r, int method) {
-  return r->line == method && r->state == ROW_DONE && r->cpu > 0 && r->statistics.rhs > 0;
+static int plot_point (const pw_study *x, const pw_row *r, int k, double value[STUDY_VALUES]) {
+  (void)x;
+  if (k > 0) return -1;
+  value[0] = r->level;
+  value[1] = r->cpu;
+  value[2] = (double)r->statistics.rhs;
+  value[3] = r->error[MOTION_MOST + MOTION_LENGTH];
+  value[4] = r->error[MOTION_MOST + MOTION_ANGLE];
+  return r->state == ROW_DONE && r->cpu > 0 && r->statistics.rhs > 0;
 }
 
-static int plot_count (const pw_study *x, int method) {
-  int count = 0;
-  for (int i = 0; i < x->rows; i++) count += plot_drawn (&x->row[i], method);
-  return count;
+static const char *plot_label (const pw_study *x, int group, int line, char text[STUDY_NAME]) {
+  (void)group;
+  (void)text;
+  return x->methods.method[line].name;
 }
 
-/* A block for each method that has a point, two empty lines between them. */
-static int plot_write_data (const pw_study *x, const pw_figures *figures, pw_error *error) {
-  pw_output *o = pw_figure_data (figures, "work-precision.dat", error);
-  if (o == NULL) return PW_MACHINE;
-  FILE *f = pw_output_stream (o);
-  fputs (
-      "# tolerance or step, CPU time [s], right-hand side evaluations, largest error of lengths [m] and angles [rad]\n",
-      f);
-  for (int i = 0, block = 0; i < x->methods.count; i++) {
-    if (plot_count (x, i) == 0) continue;
-    fprintf (f, "%s# %s\n", block++ ? "\n\n" : "", x->methods.method[i].name);
-    for (const pw_row *r = x->row; r < x->row + x->rows; r++) {
-      char number[32];
-      if (!plot_drawn (r, i)) continue;
-      fprintf (f, "%s ", pw_format (number, r->level, 9));
-      fprintf (f, "%s %ld", pw_format (number, r->cpu, 9), r->statistics.rhs);
-      for (int k = 0; k < 2; k++) fprintf (f, " %s", pw_format (number, r->error[MOTION_MOST + k], 9));
-      fputc ('\n', f);
-    }
-  }
-  return pw_output_finish (o, error);
-}
-
-static int plot_write_script (const pw_compare *c, const pw_figures *figures, const char *name, int unit,
+static int plot_write_script (const pw_study_figure *g, const pw_figures *figures, const char *name, int unit,
                               pw_error *error) {
+  const pw_reference *reference = &((const pw_compare *)g->study)->reference;
   pw_output *o = pw_figure_begin (figures, name, error);
   if (o == NULL) return PW_MACHINE;
   FILE *f = pw_output_stream (o);
-  const pw_study *x = &c->study;
-  int methods = 0;
-  for (int i = 0; i < x->methods.count; i++) methods += plot_count (x, i) > 0;
   pw_figure_text (f, "title", unit ? "work-precision diagram of angles" : "work-precision diagram");
   pw_figure_text (f, "label_of_error", unit ? "largest error of an angle [rad]" : "largest error of a coordinate [m]");
   pw_figure_number (f, "column_of_error", 4 + unit);
-  pw_figure_number (f, "uncertainty", c->reference.uncertainty[MOTION_MOST + unit]);
-  pw_figure_number (f, "size_of_motion", c->reference.size[unit]);
-  pw_figure_methods (f, methods, 0);
-  for (int i = 0, n = 0; i < x->methods.count; i++)
-    if (plot_count (x, i) > 0) pw_figure_method (f, ++n, x->methods.method[i].name, x->methods.method[i].name);
+  pw_figure_number (f, "uncertainty", reference->uncertainty[MOTION_MOST + unit]);
+  pw_figure_number (f, "size_of_motion", reference->size[unit]);
+  pw_study_write_lines (g, 0, f);
   return pw_figure_end (o, "work-precision", error);
 }
 
@@ -186,17 +165,20 @@ static int plot_write_script (const pw_compare *c, const pw_figures *figures, co
 int pw_compare_figures (pw_study *x, pw_error *error) {
   static const char *const names[] = { "work-precision", "work-precision-angles" };
   const pw_figures figures = { .folder = x->folder, .model = pw_file_name (x->m.file) };
+  const pw_study_figure g = { .study = x,
+                              .name = names[0],
+                              .heading =
+                                  "tolerance or step, CPU time [s], right-hand side evaluations, largest error of "
+                                  "lengths [m] and angles [rad]",
+                              .columns = STUDY_VALUES,
+                              .point = plot_point,
+                              .label = plot_label };
   const char *drawn[3] = { NULL };
-  int status = plot_write_data (x, &figures, error);
+  int status = pw_study_write_data (&g, &figures, error);
   for (int unit = 0, n = 0; status == PW_OK && unit < 2; unit++) {
-    int known = 0;
-    for (int i = 0; i < x->rows; i++) {
-      const pw_row *r = &x->row[i];
-      known |= plot_drawn (r, r->line) && isfinite (r->error[MOTION_MOST + unit]) && r->error[MOTION_MOST + unit] > 0;
-    }
-    if (!known) continue;
+    if (!pw_study_positive (&g, 3 + unit)) continue;
     drawn[n++] = names[unit];
-    status = plot_write_script ((const pw_compare *)x, &figures, names[unit], unit, error);
+    status = plot_write_script (&g, &figures, names[unit], unit, error);
   }
   return status == PW_OK && drawn[0] ? pw_figure_draw (x->folder, drawn, error) : status;
 }

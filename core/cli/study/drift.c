@@ -6,8 +6,6 @@
 #include "drift.h"
 #include "util.h"
 
-#define DRIFT_ROUND_OFF 1e-14 /* scaled residuals below have no meaningful growth */
-
 /* ---- What is varied ---- */
 
 /* Reads one "NAME=RANGE" into a grid of one axis. */
@@ -163,11 +161,6 @@ static int drift_measure (pw_study *x, pw_row *r, pw_error *error) {
     for (int k = 0; r->part && k < DRIFT_PARTS; k++) r->part[k][i] = NAN;
   }
   return pw_study_outcome (r, pw_study_run (x, r, &v, &own), &own, error);
-}
-
-double pw_drift_growth (const pw_row *r, int quantity) {
-  int known = quantity == DRIFT_BALANCE || r->most[quantity] > DRIFT_ROUND_OFF;
-  return r->state == ROW_DONE && known && r->early[quantity] > 0 ? log2 (r->most[quantity] / r->early[quantity]) : NAN;
 }
 
 /* ---- The command ---- */

@@ -17,10 +17,6 @@ typedef struct {
   pw_grid alpha, beta, every; /* one axis each */
 } pw_drift;
 
-/* The exponent of time with which the largest value of a quantity grows, from the middle of the run to its end: 0 if it is
- * bounded; NaN if there is none, or only round-off. */
-double pw_drift_growth (const pw_row *r, int quantity);
-
 /* ---- drift_output.c ---- */
 
 void pw_drift_print_title (const pw_study *x);

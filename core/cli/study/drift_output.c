@@ -2,11 +2,19 @@
 #include <math.h>
 #include <string.h>
 #include "drift.h"
-#include "figure.h"
+
+#define TABLE_ROUND_OFF 1e-14 /* scaled residuals below have no meaningful growth */
 
 static const char *const table_quantity[DRIFT_QUANTITIES] = { "position", "velocity", "balance" };
 
-/* ---- To read ---- */
+/* ---- Tables ---- */
+
+/* The exponent of time with which the largest value of a quantity grows, from the middle of the run to its end: 0 if it is
+ * bounded; NaN if there is none, or only round-off. */
+static double table_growth (const pw_row *r, int quantity) {
+  int known = quantity == DRIFT_BALANCE || r->most[quantity] > TABLE_ROUND_OFF;
+  return r->state == ROW_DONE && known && r->early[quantity] > 0 ? log2 (r->most[quantity] / r->early[quantity]) : NAN;
+}
 
 void pw_drift_print_title (const pw_study *x) {
   char t[32], h[32], rtol[32];
@@ -28,7 +36,7 @@ void pw_drift_head (const pw_study *x, int group, int w, FILE *f) {
 }
 
 /* "t^2.0" */
-static const char *table_growth (double power, char text[16]) {
+static const char *table_power (double power, char text[16]) {
   if (isnan (power)) return "-";
   snprintf (text, 16, "t^%.1f", power < 0.05 ? 0 : power);
   return text;
@@ -39,7 +47,7 @@ void pw_drift_line (const pw_study *x, const pw_row *r, FILE *f) {
   (void)x;
   if (r->state != ROW_DONE) return;
   for (int i = 0; i < DRIFT_QUANTITIES; i++)
-    fprintf (f, "  %7.1e %8.1e %6s", r->most[i], r->end[i], table_growth (pw_drift_growth (r, i), text));
+    fprintf (f, "  %7.1e %8.1e %6s", r->most[i], r->end[i], table_power (table_growth (r, i), text));
   fprintf (f, "  %8ld %9ld %8ld", r->statistics.steps, r->statistics.rhs, r->statistics.factorisations);
 }
 
@@ -72,7 +80,7 @@ void pw_drift_cells (const pw_study *x, const pw_row *r, pw_text *t) {
   for (int i = 0; i < DRIFT_QUANTITIES; i++) {
     pw_text_number (t, r->t > 0 ? r->most[i] : NAN);
     pw_text_number (t, r->end[i]);
-    pw_text_number (t, pw_drift_growth (r, i));
+    pw_text_number (t, table_growth (r, i));
   }
   for (size_t i = 0; i < sizeof count / sizeof *count; i++) pw_text_number (t, (double)count[i]);
 }
@@ -107,113 +115,51 @@ static const struct {
   { "drift-projection", "largest drift by the interval between projections", "steps per projection (every)" },
 };
 
-static int plot_points (const pw_row *r) {
-  return r->part ? DRIFT_PARTS : r->state == ROW_DONE;
+static int plot_point (const pw_study *x, const pw_row *r, int k, double value[STUDY_VALUES]) {
+  if (k >= (r->part ? DRIFT_PARTS : r->state == ROW_DONE)) return -1;
+  value[0] = r->part ? x->t_end * (k + 1) / DRIFT_PARTS : r->along;
+  for (int i = 0; i < DRIFT_QUANTITIES; i++) value[i + 1] = r->part ? r->part[k][i] : r->most[i];
+  return value[1 + DRIFT_VELOCITY] >= 0;
 }
 
-/* Point k of a row: its abscissa, and its quantities; NULL if it has none. */
-static const double *plot_point (const pw_study *x, const pw_row *r, int k, double *along) {
-  const double *value = r->part ? r->part[k] : r->most;
-  *along = r->part ? x->t_end * (k + 1) / DRIFT_PARTS : r->along;
-  return value[DRIFT_VELOCITY] >= 0 ? value : NULL;
+static const char *plot_label (const pw_study *x, int group, int line, char text[STUDY_NAME]) {
+  const pw_grid *beta = &((const pw_drift *)x)->beta;
+  char number[32];
+  if (group == DRIFT_METHODS) return x->methods.method[line].name;
+  if (group == DRIFT_PROJECTION) return line ? "metric=identity" : "metric=mass";
+  snprintf (text, STUDY_NAME, "beta = %s /s", pw_format (number, pw_grid_value (beta, 0, line), 6));
+  return text;
 }
 
-/* Whether a line of a figure has a point. */
-static int plot_drawn (const pw_study *x, int group, int line) {
-  double along;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    for (int k = 0; r->group == group && r->line == line && k < plot_points (r); k++)
-      if (plot_point (x, r, k, &along)) return 1;
-  return 0;
-}
-
-/* Whether a quantity is positive anywhere in a figure; that of positions is zero without pins. */
-static int plot_positive (const pw_study *x, int group, int quantity) {
-  double along;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    for (int k = 0; r->group == group && k < plot_points (r); k++) {
-      const double *value = plot_point (x, r, k, &along);
-      if (value && value[quantity] > 0 && isfinite (value[quantity])) return 1;
-    }
-  return 0;
-}
-
-/* Lines that a figure may have. */
-static int plot_lines (const pw_study *x, int group) {
-  return group == DRIFT_METHODS     ? x->methods.count
-         : group == DRIFT_BAUMGARTE ? (int)((const pw_drift *)x)->beta.rows
-                                    : 2;
-}
-
-static void plot_write_line (const pw_study *x, int group, int line, FILE *f) {
-  char text[32];
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    for (int k = 0; r->group == group && r->line == line && k < plot_points (r); k++) {
-      double along;
-      const double *value = plot_point (x, r, k, &along);
-      if (value == NULL) continue;
-      fputs (pw_format (text, along, 9), f);
-      for (int i = 0; i < DRIFT_QUANTITIES; i++) /* zero has no logarithm */
-        fprintf (f, " %s", value[i] > 0 ? pw_format (text, value[i], 6) : "NaN");
-      fputc ('\n', f);
-    }
-}
-
-static int plot_write_data (const pw_study *x, const pw_figures *figures, int group, pw_error *error) {
-  char name[60];
-  snprintf (name, sizeof name, "%s.dat", plot_figure[group].name);
-  pw_output *o = pw_figure_data (figures, name, error);
+/* With panels of the quantities that are not zero throughout, as the residual of position is without pins. */
+static int plot_write_script (const pw_study_figure *g, const pw_figures *figures, pw_error *error) {
+  pw_output *o = pw_figure_begin (figures, g->name, error);
   if (o == NULL) return PW_MACHINE;
   FILE *f = pw_output_stream (o);
-  fprintf (f, "# %s, largest scaled residuals of position and velocity, energy balance [J]\n", plot_figure[group].axis);
-  for (int line = 0, block = 0; line < plot_lines (x, group); line++) {
-    if (!plot_drawn (x, group, line)) continue;
-    fputs (block++ ? "\n\n" : "", f);
-    plot_write_line (x, group, line, f);
-  }
-  return pw_output_finish (o, error);
-}
-
-static void plot_label (const pw_study *x, int group, int line, int n, FILE *f) {
-  const char *method = group == DRIFT_METHODS ? x->methods.method[line].name : NULL;
-  char label[60], beta[32];
-  snprintf (label, sizeof label, "metric=%s", line ? "identity" : "mass");
-  if (group == DRIFT_BAUMGARTE)
-    snprintf (label, sizeof label, "beta = %s /s",
-              pw_format (beta, pw_grid_value (&((const pw_drift *)x)->beta, 0, line), 6));
-  pw_figure_method (f, n, method ? method : label, method);
-}
-
-static int plot_write_script (const pw_study *x, const pw_figures *figures, int group, pw_error *error) {
-  pw_output *o = pw_figure_begin (figures, plot_figure[group].name, error);
-  if (o == NULL) return PW_MACHINE;
-  FILE *f = pw_output_stream (o);
-  int drawn = 0;
-  for (int line = 0; line < plot_lines (x, group); line++) drawn += plot_drawn (x, group, line);
-  pw_figure_text (f, "title", plot_figure[group].title);
-  pw_figure_text (f, "label_of_x", plot_figure[group].axis);
-  pw_figure_number (f, "logarithmic", group != DRIFT_METHODS);
+  pw_figure_text (f, "title", plot_figure[g->group].title);
+  pw_figure_text (f, "label_of_x", plot_figure[g->group].axis);
+  pw_figure_number (f, "logarithmic", g->group != DRIFT_METHODS);
   fputs ("quantities = '", f);
-  for (int i = 0; i < DRIFT_QUANTITIES; i++)
-    if (plot_positive (x, group, i)) fprintf (f, "%d ", i + 1);
+  for (int i = 1; i <= DRIFT_QUANTITIES; i++)
+    if (pw_study_positive (g, i)) fprintf (f, "%d ", i);
   fputs ("'\n", f);
-  pw_figure_methods (f, drawn, group == DRIFT_METHODS);
-  for (int line = 0, n = 0; line < plot_lines (x, group); line++)
-    if (plot_drawn (x, group, line)) plot_label (x, group, line, ++n, f);
+  pw_study_write_lines (g, g->group == DRIFT_METHODS, f);
   return pw_figure_end (o, "drift", error);
 }
 
 int pw_drift_figures (pw_study *x, pw_error *error) {
   const pw_figures figures = { .folder = x->folder, .model = pw_file_name (x->m.file) };
   const char *drawn[DRIFT_GROUPS + 1] = { NULL };
+  char heading[160];
   int status = table_write_times (x, error);
   for (int group = 0, n = 0; status == PW_OK && group < DRIFT_GROUPS; group++) {
-    int panels = 0;
-    for (int i = 0; i < DRIFT_QUANTITIES; i++) panels += plot_positive (x, group, i);
-    if (panels == 0) continue;
-    status = plot_write_data (x, &figures, group, error);
-    if (status == PW_OK) status = plot_write_script (x, &figures, group, error);
-    drawn[n++] = plot_figure[group].name;
+    pw_study_figure g = { x, group, plot_figure[group].name, heading, 1 + DRIFT_QUANTITIES, plot_point, plot_label };
+    snprintf (heading, sizeof heading, "%s, largest scaled residuals of position and velocity, energy balance [J]",
+              plot_figure[group].axis);
+    if (!pw_study_positive (&g, 1) && !pw_study_positive (&g, 2) && !pw_study_positive (&g, 3)) continue;
+    status = pw_study_write_data (&g, &figures, error);
+    if (status == PW_OK) status = plot_write_script (&g, &figures, error);
+    drawn[n++] = g.name;
   }
   return status == PW_OK && drawn[0] ? pw_figure_draw (x->folder, drawn, error) : status;
 }

@@ -6,6 +6,7 @@
 
 #include <stdio.h>
 #include "cli.h"
+#include "figure.h"
 #include "motion.h"
 #include "progress.h"
 #include "text.h"
@@ -135,6 +136,30 @@ int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error
 
 /* "ok", "failed", ... for CSV. */
 const char *pw_study_status (const pw_row *r);
+
+/* ---- Figures (study_figures.c) ---- */
+
+enum { STUDY_VALUES = 5 };
+
+/* Lines in a figure: those of a group of rows, whose lines of group 0 are the methods. */
+typedef struct {
+  const pw_study *study;
+  int group;
+  const char *name;    /* of the data, NAME.dat */
+  const char *heading; /* names of the columns */
+  int columns;
+  /* The numbers of point k of a row: 1; 0 if it is not drawn, -1 if there are no more points. */
+  int (*point) (const pw_study *x, const pw_row *r, int k, double value[STUDY_VALUES]);
+  /* The label of a line; it may be written to the buffer. */
+  const char *(*label) (const pw_study *x, int group, int line, char text[STUDY_NAME]);
+} pw_study_figure;
+
+/* 1 if a column, from 0, has positive numbers. */
+int pw_study_positive (const pw_study_figure *g, int column);
+/* Writes the data: a block for each line that has a point, two empty lines between them. */
+int pw_study_write_data (const pw_study_figure *g, const pw_figures *figures, pw_error *error);
+/* Writes the labels of these lines into a script; `spread` as pw_figure_methods. */
+void pw_study_write_lines (const pw_study_figure *g, int spread, FILE *f);
 
 /* Opens a further table of the folder; NULL and PW_MACHINE. */
 pw_output *pw_study_open (const pw_study *x, const char *name, pw_error *error);
