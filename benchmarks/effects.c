@@ -150,6 +150,7 @@ static const pw_plugin_table effects_table = { .abi = PW_ABI,
 /* ---- Under callgrind ---- */
 
 typedef struct {
+  pw_system *system;
   pw_run *run;
   double t[EFFECTS_POOL], q[EFFECTS_POOL][12], v[EFFECTS_POOL][12], a[12], lambda[8];
 } effects_data;
@@ -164,7 +165,7 @@ static long effects_evaluate (void *context, long n) {
 }
 
 /* Opens a scene. */
-static pw_run *effects_open (const char *key, int massless) {
+static pw_run *effects_open (const char *key, int massless, pw_system **system) {
   pw_error e = { 0 };
   int scene = 0;
   while (scene < EFFECTS_SCENES - 1 && strcmp (effects_scene[scene].key, key) != 0) scene++;
@@ -174,11 +175,11 @@ static pw_run *effects_open (const char *key, int massless) {
   pw_run *r = s ? pw_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10 }, &e) : NULL;
   if (r == NULL) engine_die (key, e.text);
   pw_model_free (m);
+  *system = s;
   return r;
 }
 
-static void effects_close (pw_run *r) {
-  pw_system *s = r->s;
+static void effects_close (pw_run *r, pw_system *s) {
   pw_close (r);
   pw_free (s);
 }
@@ -187,7 +188,8 @@ static void effects_close (pw_run *r) {
  * than for another; what else the scene has stays as it starts. */
 static void effects_fill (effects_data *d, int massless) {
   pw_error e = { 0 };
-  pw_run *alone = effects_open ("none", massless);
+  pw_system *s;
+  pw_run *alone = effects_open ("none", massless, &s);
   for (int k = 0; k < EFFECTS_POOL; k++) {
     for (int i = 0; i < EFFECTS_SPACING && e.status == PW_OK; i++) pw_advance (alone, 100, &e);
     d->t[k] = alone->t;
@@ -197,17 +199,17 @@ static void effects_fill (effects_data *d, int massless) {
     memcpy (d->v[k], alone->v, (size_t)alone->s->coords * sizeof (double));
   }
   if (e.status != PW_OK) engine_die ("the EzyRoller alone", e.text);
-  effects_close (alone);
+  effects_close (alone, s);
 }
 
 /* Evaluates in the function that callgrind is told to watch. */
 static int effects_child (const char *key, const char *side) {
   static effects_data d;
   int massless = strcmp (side, "massless") == 0;
-  d.run = effects_open (key, massless);
+  d.run = effects_open (key, massless, &d.system);
   effects_fill (&d, massless);
   engine_counted (&(timing_work){ effects_evaluate, &d }, EFFECTS_ROUNDS * EFFECTS_POOL);
-  effects_close (d.run);
+  effects_close (d.run, d.system);
   return 0;
 }
 

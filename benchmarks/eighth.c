@@ -111,17 +111,15 @@ static void eighth_open (eighth_scene *s, int massless) {
   pw_error error = { 0 };
   ezy_open (&s->hand, &p);
   s->system = engine_ezyroller (massless);
-  s->run = engine_open (engine_ezyroller (massless), "rk4+none", &(pw_settings){ .span = EIGHTH_SECONDS });
+  s->run = engine_open (s->system, "rk4+none", &(pw_settings){ .span = EIGHTH_SECONDS });
   if (pw_projector_open (&s->projector, s->run, s->run->s->metric, NULL, &error) != PW_OK)
     engine_die ("projector", error.text);
   eighth_by_hand (s, NULL, 0.0125, s->truth);
 }
 
 static void eighth_close (eighth_scene *s) {
-  pw_system *lent = s->run->s;
   pw_projector_close (&s->projector);
   pw_close (s->run);
-  pw_free (lent);
   pw_free (s->system);
 }
 

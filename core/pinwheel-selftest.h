@@ -3,7 +3,7 @@
 #ifndef PINWHEEL_SELFTEST_H
 #define PINWHEEL_SELFTEST_H
 
-#include "pinwheel.h"
+#include "run.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -38,9 +38,10 @@ typedef struct {
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error);
 
 /* The same where a scene uses the kind: its derivatives along a random motion around the state q, v at time t, with the
- * scene's own elements and signals.  The checks go into a report of their own.  Errors: PW_MACHINE. */
-int pw_selftest_scene (pw_system *s, const pw_kind *kind, double t, const double *q, const double *v, unsigned seed,
-                       pw_selftest_report *report, pw_error *error);
+ * scene's own elements and signals, in units of its length scale and the time T.  The checks go into a report of their
+ * own.  Errors: PW_MACHINE. */
+int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
+                       unsigned seed, pw_selftest_report *report, pw_error *error);
 
 /* ---- Independent verifier ---- */
 
@@ -59,10 +60,10 @@ typedef struct {
 } pw_verification;
 
 /* Recomputes all four residuals at a state from the elements themselves, one after the other, with none of the
- * solvers' arithmetic.  q, v and a have pw_count_coordinates entries, lambda pw_count_rows.  Errors: PW_MACHINE,
+ * solvers' arithmetic.  q, v and a have pw_count_coordinates entries, lambda pw_count_rows; scale is the run's.  Errors: PW_MACHINE,
  * PW_METHOD if a signal fails. */
-int pw_verify (pw_system *s, double t, const double *q, const double *v, const double *a, const double *lambda,
-               pw_verification *result);
+int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double *q, const double *v, const double *a,
+               const double *lambda, pw_verification *result);
 
 #ifdef __GNUC__
 #pragma GCC visibility pop

@@ -725,9 +725,13 @@ int pw_plugin_check (const pw_plugin_table *table, const char *what, pw_error *e
 
 /* ---- The compiled system ---- */
 
-/* A system belongs to one thread at a time; it does not refer to the model it was compiled from, but to the kinds
- * and the function signals. */
+/* A compiled system is never modified: any number of runs and threads may share it.  It does not refer to the model it was
+ * compiled from, but to the element types and the function signals. */
 typedef struct pw_system pw_system;
+
+/* What an evaluation modifies: configurations, J, values of signals, scratch memory.  A run has one; so does a program that
+ * evaluates a system itself.  It belongs to one thread at a time, and the system must outlive it. */
+typedef struct pw_workspace pw_workspace;
 
 /* Checks and compiles a built model.  NULL with the error filled if it cannot be. */
 pw_system *pw_compile (const pw_model *m, pw_error *error);
@@ -796,18 +800,21 @@ int pw_system_elements (const pw_system *s);
 pw_element_info pw_system_element (const pw_system *s, int element);
 int pw_system_row_element (const pw_system *s, int row); /* the element of a constraint equation */
 
-/* The functions below evaluate a state; a run whose system it is goes on as if they had not been called.  Errors: PW_METHOD
- * if a signal fails, PW_MACHINE. */
+/* A workspace for the functions below, which evaluate a state.  NULL and the error without memory. */
+pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error);
+void pw_workspace_free (pw_workspace *w);
+
+/* The functions below evaluate a state.  Errors: PW_METHOD if a signal fails, PW_MACHINE. */
 
 /* Point on the ground [m] and heading [rad] of each contact. */
 int pw_system_contacts (const pw_system *s);
-int pw_system_contact_points (pw_system *s, double t, const double *q, const double *v, double (*out)[3],
+int pw_system_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                               pw_error *error);
 
 /* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies, the ground's without
  * meaning: -J^T lambda and what it applies.  Constraint equations on velocities count alike. */
 int pw_system_force_size (const pw_system *s);
-int pw_system_forces (pw_system *s, double t, const double *q, const double *v, const double *lambda, double *out,
+int pw_system_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
                       pw_error *error);
 
 /* The equations M a + J^T lambda = f,  J v = eta,  J a = gamma at a state.  J by its entries, those that are 0 here among
@@ -820,7 +827,8 @@ typedef struct {
   int *row, *column;    /* entries: where they are in J */
   double *value;        /* entries */
 } pw_equations;
-int pw_system_equations (pw_system *s, double t, const double *q, const double *v, pw_equations *out, pw_error *error);
+int pw_system_equations (const pw_system *s, double t, const double *q, const double *v, pw_equations *out,
+                         pw_error *error);
 void pw_equations_free (pw_equations *e); /* in every case */
 
 /* Second-order blocks that are PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as pw_state_name. */

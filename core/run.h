@@ -84,6 +84,7 @@ typedef struct {
   int freed;                       /* 1: the values the user gave could not all be held */
   int changed;                     /* of the states moved, those that the model specifies */
   double position, velocity;       /* scaled residuals before */
+  double time;                     /* time scale of the run [s] */
 } pw_start_report;
 
 /* ---- Saved states ---- */

@@ -11,7 +11,8 @@
 enum { PW_MAX_OPTIONS = 12 };
 
 struct pw_run {
-  pw_system *s;
+  const pw_system *s;
+  pw_workspace *w;
   const pw_method *method;
   int stabilisation;             /* index in method->stabilisations */
   double option[PW_MAX_OPTIONS]; /* one per method->options */
@@ -76,7 +77,7 @@ static inline double pw_atol (const pw_run *r, int j) {
   return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j);
 }
 static inline double pw_atol_rate (const pw_run *r, int j) {
-  return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->s->scale.time;
+  return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->w->scale.time;
 }
 /* Takes over how small a change of the state reached, which is placed, reverses a force that saturates; and notes whether the
  * Newton matrix is `outdated` by it (tolerances.c). */

@@ -71,11 +71,11 @@ struct pw_method {
 /* All integrators, ended by NULL. */
 extern const pw_method *const pw_methods[];
 
-/* Makes the start of the system consistent and opens a method on it.  The system must outlive the run, and belongs
- * to it until pw_close.  Errors: PW_INPUT for a system that has a run already, or a method, option or setting that does
+/* Makes the start of the system consistent and opens a method on it.  The system must outlive the run, which
+ * only reads it: any number of runs, in any threads, may share it.  Errors: PW_INPUT for a method, option or setting that does
  * not exist or fit, with the nearest valid name, or whose method uses a derivative that a kind leaves out though it is not
  * zero; PW_START for a start that cannot be made consistent; PW_MACHINE. */
-pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
+pw_run *pw_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error);
 
 /* Checks a method's name and options without a system; fills the integrator and the stabilisation's number. */
 int pw_parse_method (const char *method, const pw_method **integrator, int *stabilisation, pw_error *error);

@@ -68,7 +68,8 @@ static double run_error (const hard_case *c, const run_cell *x, const pw_sample 
 
 static double run_equations (const run_cell *x, const pw_sample *sample) {
   pw_verification v;
-  int status = pw_verify (x->system, sample->t, sample->q, sample->v, sample->a, sample->lambda, &v);
+  int status =
+      pw_verify (x->system, pw_run_scale (x->run), sample->t, sample->q, sample->v, sample->a, sample->lambda, &v);
   return status == PW_OK ? run_worst (v.acceleration.scaled, v.force.scaled) : INFINITY;
 }
 

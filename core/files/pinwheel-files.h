@@ -178,7 +178,7 @@ void pw_checkpoint_free (pw_checkpoint *c);
  * places the sample's state in the system.  Errors: PW_MACHINE; PW_METHOD if a signal of the model fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
-int pw_csv_write (pw_csv *c, pw_system *s, const pw_sample *sample, pw_error *error);
+int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);
 void pw_csv_close (pw_csv *c);
 
 /* ---- JSON ---- */

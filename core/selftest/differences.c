@@ -48,11 +48,11 @@ static int differences_built_in (const pw_kind *kind) {
 }
 
 /* Elements of the slab that are looked at: the first, the last, one between. */
-static int differences_missing (pw_system *s, pw_slab *k, char *buffer, size_t size) {
+static int differences_missing (const pw_workspace *w, pw_slab *k, char *buffer, size_t size) {
   const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
   for (int b = 0; b < PW_BLOCKS; b++)
     for (int i = 0; i < 3 && k->b.count > 0; i++) {
-      if (!pw_block_missing (s, k, element[i], (pw_block)b)) continue;
+      if (!pw_block_missing (w, k, element[i], (pw_block)b)) continue;
       snprintf (buffer, size, "%s of element type %s", differences_name[b], k->kind->name);
       return 1;
     }
@@ -64,35 +64,36 @@ static void differences_random (pw_random *random, double *x, int n) {
 }
 
 /* Directions, multipliers and signals of a slab are random. */
-static int differences_look (pw_system *s, pw_slab *k, pw_random *random, char *buffer, size_t size) {
+static int differences_look (pw_workspace *w, pw_slab *k, pw_random *random, char *buffer, size_t size) {
   int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
-  double *w = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *w);
-  if (w == NULL) return PW_MACHINE;
-  differences_random (random, w, cols + rows);
+  double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);
+  if (x == NULL) return PW_MACHINE;
+  differences_random (random, x, cols + rows);
   differences_random (random, k->u, 3 * k->b.count * k->kind->signals);
-  k->b.w = w, k->b.lambda = w + cols;
-  int found = differences_missing (s, k, buffer, size);
+  k->b.w = x, k->b.lambda = x + cols;
+  int found = differences_missing (w, k, buffer, size);
   k->b.w = k->b.lambda = NULL;
-  free (w);
+  free (x);
   return found;
 }
 
-int pw_find_missing (pw_system *s, double t, const double *q, const double *v, char *buffer, size_t size) {
+int pw_find_missing (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size) {
+  const pw_system *s = w->s;
   pw_random random = { 1 };
   int own = 0, found = 0;
-  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) own += !differences_built_in (k->kind);
+  for (pw_slab *k = w->slab; k < w->slab + s->slabs; k++) own += !differences_built_in (k->kind);
   if (own == 0) return 0;
   double *state = malloc ((2 * (size_t)s->coords + 1) * sizeof *state);
   if (state == NULL) return PW_MACHINE;
   for (int i = 0; i < 2 * s->coords; i++) {
     int rate = i >= s->coords, j = rate ? i - s->coords : i;
-    double unit = pw_unit (s, j) / (rate ? s->scale.time : 1);
+    double unit = pw_unit (s, j) / (rate ? w->scale.time : 1);
     state[i] = (rate ? v[j] : q[j]) + 0.1 * unit * pw_random_between (&random, -1, 1);
   }
-  pw_place (s, t, state, state + s->coords);
-  for (pw_slab *k = s->slab; found == 0 && k < s->slab + s->slabs; k++)
-    if (!differences_built_in (k->kind)) found = differences_look (s, k, &random, buffer, size);
+  pw_place (w, t, state, state + s->coords);
+  for (pw_slab *k = w->slab; found == 0 && k < w->slab + s->slabs; k++)
+    if (!differences_built_in (k->kind)) found = differences_look (w, k, &random, buffer, size);
   free (state);
-  pw_hold (s, s->hold); /* signals are evaluated anew */
+  pw_hold (w, w->hold); /* signals are evaluated anew */
   return found;
 }

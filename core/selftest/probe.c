@@ -94,7 +94,7 @@ void pw_probe_place (pw_probe *x, int j, double h) {
     x->q_now[i] = x->q[i] + (motion ? h * (x->v[i] + h * x->a[i] / 2) : i == j ? h : 0);
     x->v_now[i] = x->v[i] + (motion ? h * x->a[i] : 0);
   }
-  pw_place (x->s, j < 0 ? x->t + h : x->t, x->q_now, x->v_now);
+  pw_place (x->work, j < 0 ? x->t + h : x->t, x->q_now, x->v_now);
 }
 
 double pw_probe_local (const pw_probe *x, const double *vector, int e, int c) {

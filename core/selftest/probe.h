@@ -18,7 +18,8 @@ enum {
 /* Where the test stands. */
 typedef struct {
   const pw_kind *kind;
-  pw_system *s;
+  const pw_system *s;
+  pw_workspace *work;
   pw_slab *k;
   int elements, rows, cols; /* rows and cols per element */
   double t, q[PW_PROBE_COORDS], v[PW_PROBE_COORDS], a[PW_PROBE_COORDS];

@@ -103,10 +103,10 @@ static void selftest_block (pw_probe *x, pw_block block, const char *name, const
   int rows = pw_block_rows (x->kind, block);
   pw_sweep *sweep = pw_block_sweep (x->kind, block);
   if (sweep == pw_by_differences)
-    pw_sweep_block (x->s, x->k, block, value);
+    pw_sweep_block (x->work, x->k, block, value);
   else
     pw_probe_sweep (x, sweep, name, x->elements * rows * x->cols, value);
-  for (int e = 0; e < x->elements; e++) pw_difference (x->s, x->k, e, block, reference + e * rows * x->cols);
+  for (int e = 0; e < x->elements; e++) pw_difference (x->work, x->k, e, block, reference + e * rows * x->cols);
   x->size = size;
   pw_probe_compare (x, name, about, rows, x->cols, value, reference);
 }
@@ -282,7 +282,12 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
   pw_random random = { seed };
   pw_system *s = pw_specimen (kind, &random, error);
   if (s == NULL) return error ? error->status : PW_INPUT;
-  pw_probe x = { .kind = kind, .s = s, .k = s->slab, .rows = kind->rows, .report = report };
+  pw_workspace *w = pw_workspace_new (s, error);
+  if (w == NULL) {
+    pw_free (s);
+    return PW_MACHINE;
+  }
+  pw_probe x = { .kind = kind, .s = s, .work = w, .k = w->slab, .rows = kind->rows, .report = report };
   x.elements = s->slab->b.count;
   x.cols = s->slab->b.cols;
   for (int j = 3 * s->bodies; j < s->coords; j++)
@@ -290,6 +295,7 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
                    "inertia of an own coordinate");
   pw_probe_aim (&x, &random);
   selftest_all (&x);
+  pw_workspace_free (w);
   pw_free (s);
   return PW_OK;
 }

@@ -16,7 +16,8 @@ static const char scene_reason[] = "1e-5 of the sum of all terms: the best of se
 typedef enum { SCENE_Q, SCENE_V, SCENE_TIME, SCENE_MOTION } scene_move;
 
 typedef struct {
-  pw_system *s;
+  const pw_system *s;
+  pw_workspace *work;
   pw_slab *k;
   double t, tau;                      /* the time, and how far it may move */
   double *q, *v, *a, *dq, *dv, *w;    /* coords: the state and its motion; directions */
@@ -39,7 +40,7 @@ static void scene_place (const scene *x, scene_move move, double h) {
     x->q_now[j] = x->q[j] + step * (x->v[j] + step * x->a[j] / 2) + (move == SCENE_Q ? h * x->dq[j] : 0);
     x->v_now[j] = x->v[j] + step * x->a[j] + (move == SCENE_V ? h * x->dv[j] : 0);
   }
-  pw_place (x->s, move >= SCENE_TIME ? x->t + h * x->tau : x->t, x->q_now, x->v_now);
+  pw_place (x->work, move >= SCENE_TIME ? x->t + h * x->tau : x->t, x->q_now, x->v_now);
 }
 
 /* ---- Products ---- */
@@ -187,7 +188,7 @@ static void scene_block (scene *x, pw_block block, const char *name, const char 
   scene_begin (x);
   x->k->b.w = x->local;
   x->k->b.lambda = x->lambda;
-  if (pw_sweep_block (x->s, x->k, block, x->block))
+  if (pw_sweep_block (x->work, x->k, block, x->block))
     scene_times (x, x->block, rows, move == SCENE_V ? x->dv : x->dq, 1, x->value, x->terms);
   scene_compare (x, name, about, rows, f, move);
 }
@@ -228,16 +229,16 @@ static void scene_all (scene *x) {
     scene_gradients (x, SCENE_Q);
     scene_gradients (x, SCENE_V);
   }
-  pw_hold (x->s, 1); /* what signals make of the state is theirs */
+  pw_hold (x->work, 1); /* what signals make of the state is theirs */
   scene_block (x, PW_FORCE_Q, "force_q", "force_q = d force/dq", scene_force);
   scene_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", scene_force);
-  pw_hold (x->s, 0);
+  pw_hold (x->work, 0);
 }
 
 /* ---- The motion ---- */
 
 static void scene_aim (scene *x, const double *q, const double *v, pw_random *r) {
-  double T = x->s->scale.time > 0 ? x->s->scale.time : 1;
+  double T = x->work->scale.time;
   for (int j = 0; j < x->s->coords; j++) {
     double unit = pw_unit (x->s, j);
     x->q[j] = q[j];
@@ -251,7 +252,7 @@ static void scene_aim (scene *x, const double *q, const double *v, pw_random *r)
     x->local[i] = scene_local (x, x->w, i / x->k->b.cols, i % x->k->b.cols);
   for (int i = 0; i < x->k->b.count * x->k->kind->rows; i++) x->lambda[i] = pw_random_between (r, -1, 1);
   /* no signal breaks between the times tried */
-  x->tau = fmin (T, pw_next_breakpoint (x->s, 0, x->t) - x->t) / 2;
+  x->tau = fmin (T, pw_next_breakpoint (x->work, 0, x->t) - x->t) / 2;
   x->t += x->tau;
 }
 
@@ -293,18 +294,23 @@ static int scene_open (scene *x) {
   return PW_OK;
 }
 
-int pw_selftest_scene (pw_system *s, const pw_kind *kind, double t, const double *q, const double *v, unsigned seed,
-                       pw_selftest_report *report, pw_error *error) {
+int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
+                       unsigned seed, pw_selftest_report *report, pw_error *error) {
   pw_random random = { seed };
-  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+  pw_workspace *w = pw_workspace_new (s, error);
+  if (w == NULL) return PW_MACHINE;
+  int status = PW_OK;
+  w->scale.time = T;
+  for (pw_slab *k = w->slab; k < w->slab + s->slabs && status == PW_OK; k++) {
     if (k->kind != kind || k->b.count == 0) continue;
-    scene x = { .s = s, .k = k, .t = t, .report = report };
-    if (scene_open (&x) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-    pw_hold (s, 0);
-    scene_aim (&x, q, v, &random);
-    scene_all (&x);
-    k->b.w = k->b.lambda = NULL;
+    scene x = { .s = s, .work = w, .k = k, .t = t, .report = report };
+    if (scene_open (&x) == PW_OK) {
+      scene_aim (&x, q, v, &random);
+      scene_all (&x);
+    } else
+      status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
     free (x.memory);
   }
-  return PW_OK;
+  pw_workspace_free (w);
+  return status;
 }

@@ -11,7 +11,8 @@
 
 /* Residuals and the sizes of their terms. */
 typedef struct {
-  pw_system *s;
+  const pw_system *s;
+  const pw_workspace *w;
   double *position, *velocity, *acceleration, *force;
   double *position_size, *velocity_size, *acceleration_size, *force_size;
   double *block; /* what one kind's sweep fills */
@@ -74,7 +75,7 @@ static void verify_forces (verify *x, const pw_slab *k) {
  * with the other.  Without any force, that of a mass times L / T^2. */
 static void verify_force_sizes (verify *x) {
   const pw_system *s = x->s;
-  double L = s->scale.length, T = s->scale.time, largest = 0;
+  double L = x->w->scale.length, T = x->w->scale.time, largest = 0;
   for (int j = 0; j < s->coords; j++) {
     double unit = pw_is_angle (s, j) ? L : 1;
     largest = fmax (largest, fmax (x->force_size[j] / unit, s->mass[j] / (unit * unit) * L / (T * T)));
@@ -102,11 +103,12 @@ static void verify_judge (const pw_system *s, int n, const double *residual, con
 
 static void verify_all (verify *x, const double *v, const double *a, const double *lambda, pw_verification *result) {
   const pw_system *s = x->s;
-  double L = s->scale.length, T = s->scale.time;
+  double L = x->w->scale.length, T = x->w->scale.time;
   for (int j = 0; j < s->coords; j++) verify_add (&x->force[j], &x->force_size[j], s->mass[j] * a[j]);
   for (int i = 0; i < s->slabs; i++) {
-    if (s->slab[i].kind->rows > 0) verify_rows (x, &s->slab[i], v, a, lambda);
-    if (s->slab[i].kind->force) verify_forces (x, &s->slab[i]);
+    const pw_slab *k = &x->w->slab[i];
+    if (k->kind->rows > 0) verify_rows (x, k, v, a, lambda);
+    if (k->kind->force) verify_forces (x, k);
   }
   verify_force_sizes (x);
   verify_judge (s, s->holonomic, x->position, x->position_size, 0, pw_reaction_name, 0, &result->position);
@@ -127,22 +129,27 @@ static size_t verify_room (const pw_system *s) {
   return most;
 }
 
-int pw_verify (pw_system *s, double t, const double *q, const double *v, const double *a, const double *lambda,
-               pw_verification *result) {
+int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double *q, const double *v, const double *a,
+               const double *lambda, pw_verification *result) {
   size_t rows = (size_t)s->rows, coords = (size_t)s->coords;
   double *room = calloc (6 * rows + 2 * coords + verify_room (s), sizeof *room);
-  if (room == NULL) return PW_MACHINE;
-  verify x = { .s = s, .position = room };
-  x.velocity = x.position + rows;
-  x.acceleration = x.velocity + rows;
-  x.position_size = x.acceleration + rows;
-  x.velocity_size = x.position_size + rows;
-  x.acceleration_size = x.velocity_size + rows;
-  x.force = x.acceleration_size + rows;
-  x.force_size = x.force + coords;
-  x.block = x.force_size + coords;
-  int status = pw_place (s, t, q, v);
-  if (status == PW_OK) verify_all (&x, v, a, lambda, result);
+  pw_workspace *w = room ? pw_workspace_new (s, NULL) : NULL;
+  int status = PW_MACHINE;
+  if (w) {
+    verify x = { .s = s, .w = w, .position = room };
+    x.velocity = x.position + rows;
+    x.acceleration = x.velocity + rows;
+    x.position_size = x.acceleration + rows;
+    x.velocity_size = x.position_size + rows;
+    x.acceleration_size = x.velocity_size + rows;
+    x.force = x.acceleration_size + rows;
+    x.force_size = x.force + coords;
+    x.block = x.force_size + coords;
+    w->scale = *scale;
+    status = pw_place (w, t, q, v);
+    if (status == PW_OK) verify_all (&x, v, a, lambda, result);
+  }
+  pw_workspace_free (w);
   free (room);
   return status;
 }

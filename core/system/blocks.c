@@ -97,33 +97,33 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
 }
 
 /* The scene's unit of a local column, or of its velocity. */
-static double blocks_unit (const pw_system *s, const pw_kind *kind, int c, int rates) {
-  double unit = c < 3 * kind->bodies && c % 3 < 2 ? s->scale.length : 1;
-  return rates ? unit / s->scale.time : unit;
+static double blocks_unit (const pw_workspace *w, const pw_kind *kind, int c, int rates) {
+  double unit = c < 3 * kind->bodies && c % 3 < 2 ? w->scale.length : 1;
+  return rates ? unit / w->scale.time : unit;
 }
 
 /* A step in units of the scene, made exactly representable: where truncation, h^2 / unit^2, and the round-off of x, eps x / h,
  * are about the same. */
-static double blocks_step (const pw_system *s, const pw_kind *kind, int c, int rates, double x) {
-  double unit = blocks_unit (s, kind, c, rates);
+static double blocks_step (const pw_workspace *w, const pw_kind *kind, int c, int rates, double x) {
+  double unit = blocks_unit (w, kind, c, rates);
   volatile double moved = x + unit * cbrt (2.3e-16 * fmax (1, fabs (x) / unit));
   return moved - x;
 }
 
-void pw_difference (const pw_system *s, const pw_slab *k, int e, pw_block block, double *out) {
+void pw_difference (const pw_workspace *w, const pw_slab *k, int e, pw_block block, double *out) {
   const pw_kind *kind = k->kind;
   int rates = blocks_table[block].rates, rows = pw_block_rows (kind, block), cols = k->b.cols;
   blocks_single one;
   blocks_isolate (k, e, &one);
   for (int c = 0; c < cols; c++) {
     double plus[PW_MAX_COLS], minus[PW_MAX_COLS], *x = blocks_variable (kind, &one, c, rates), x0 = *x;
-    double h = blocks_step (s, kind, c, rates, x0);
+    double h = blocks_step (w, kind, c, rates, x0);
     *x = x0 + h;
     blocks_value (kind, block, &one, plus);
     *x = x0 - h;
     blocks_value (kind, block, &one, minus);
     *x = x0;
-    int ground = c < 3 * kind->bodies && k->column[e * kind->bodies + c / 3] >= s->coords;
+    int ground = c < 3 * kind->bodies && k->column[e * kind->bodies + c / 3] >= w->s->coords;
     for (int r = 0; r < rows; r++) out[r * cols + c] = ground ? 0 : (plus[r] - minus[r]) / (2 * h);
   }
 }
@@ -131,7 +131,7 @@ void pw_difference (const pw_system *s, const pw_slab *k, int e, pw_block block,
 /* Differences of a function that does not depend on a variable are round-off of its value over the step: 4e-11. */
 #define BLOCKS_ZERO 1e-6
 
-int pw_block_missing (const pw_system *s, const pw_slab *k, int e, pw_block block) {
+int pw_block_missing (const pw_workspace *w, const pw_slab *k, int e, pw_block block) {
   double value[PW_MAX_COLS], slope[PW_MAX_COLS * PW_MAX_COLS], most = 0;
   const pw_kind *kind = k->kind;
   int rows = pw_block_rows (kind, block), cols = k->b.cols;
@@ -140,9 +140,9 @@ int pw_block_missing (const pw_system *s, const pw_slab *k, int e, pw_block bloc
   blocks_isolate (k, e, &one);
   blocks_value (kind, block, &one, value);
   for (int r = 0; r < rows; r++) most = fmax (most, fabs (value[r]));
-  pw_difference (s, k, e, block, slope);
+  pw_difference (w, k, e, block, slope);
   for (int i = 0; i < rows * cols; i++)
-    if (fabs (slope[i]) * blocks_unit (s, kind, i % cols, blocks_table[block].rates) > BLOCKS_ZERO * most) return 1;
+    if (fabs (slope[i]) * blocks_unit (w, kind, i % cols, blocks_table[block].rates) > BLOCKS_ZERO * most) return 1;
   return 0;
 }
 
@@ -164,7 +164,7 @@ static void blocks_transpose (const pw_slab *k, int e, pw_sweep *jw_q, double *o
   }
 }
 
-int pw_sweep_block (const pw_system *s, const pw_slab *k, pw_block block, double *out) {
+int pw_sweep_block (const pw_workspace *w, const pw_slab *k, pw_block block, double *out) {
   pw_sweep *sweep = pw_block_sweep (k->kind, block);
   if (sweep == NULL) return 0;
   if (sweep != pw_by_differences && block != PW_JTL_Q) {
@@ -173,7 +173,7 @@ int pw_sweep_block (const pw_system *s, const pw_slab *k, pw_block block, double
   }
   for (int e = 0, size = pw_block_rows (k->kind, block) * k->b.cols; e < k->b.count; e++, out += size)
     if (sweep == pw_by_differences)
-      pw_difference (s, k, e, block, out);
+      pw_difference (w, k, e, block, out);
     else
       blocks_transpose (k, e, sweep, out);
   return 1;

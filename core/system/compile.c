@@ -90,7 +90,7 @@ static int compile_count (pw_compilation *c, pw_error *error) {
       const pw_signal *signal = pw_field_at (e->kind, e->definition, PW_SIGNAL, u);
       if (signal->type == PW_TABLE) c->points += (size_t)signal->table.count * (size_t)pw_compile_copies (m, e->kind);
       if (signal->type != PW_FUNCTION || signal->function.reads == NULL) continue;
-      for (const char *const *r = signal->function.reads; *r; r++) c->reads += pw_compile_copies (m, e->kind);
+      for (const char *const *r = signal->function.reads; *r; r++) c->size.reads += pw_compile_copies (m, e->kind);
     }
   }
   return PW_OK;
@@ -100,28 +100,21 @@ static int compile_count (pw_compilation *c, pw_error *error) {
 
 static void compile_layout_slab (const pw_compilation *c, pw_layout *l, pw_slab *k, int i) {
   const pw_kind *kind = c->kind[i];
-  size_t n = (size_t)c->count[i], cols = (size_t)(3 * kind->bodies + kind->own);
-  size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3;
+  size_t n = (size_t)c->count[i], bodies = n * (size_t)kind->bodies;
   void *element = pw_take (l, n, kind->element);
-  void *body = pw_take (l, n * (size_t)kind->bodies, sizeof (int)),
-       *column = pw_take (l, n * (size_t)kind->bodies, sizeof (int));
-  void *u = pw_take (l, n * (size_t)kind->signals * 3, sizeof (double));
-  void *J = pw_take (l, n * (size_t)kind->rows * cols, sizeof (double));
-  int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
-  void *space = pw_take (l, scratch ? n * block : 0, sizeof (double));
+  void *body = pw_take (l, bodies, sizeof (int)), *column = pw_take (l, bodies, sizeof (int));
   void *name = pw_take (l, n, sizeof (char *));
   if (l->base == NULL) return;
-  *k = (pw_slab){ .kind = kind, .column = column, .J = J, .block = space, .u = u, .name = name };
-  k->b = (pw_batch){ .count = c->count[i], .cols = (int)cols, .element = element, .body = body, .u = u };
+  *k = (pw_slab){ .kind = kind, .column = column, .name = name };
+  k->b = (pw_batch){ .count = c->count[i], .cols = 3 * kind->bodies + kind->own, .element = element, .body = body };
 }
 
 static void compile_layout (const pw_compilation *c, pw_layout *l, pw_system **system, pw_pools *pools) {
-  size_t coords = (size_t)c->size.coords, bodies = (size_t)c->size.bodies, rows = (size_t)c->size.rows;
+  size_t coords = (size_t)c->size.coords, bodies = (size_t)c->size.bodies;
   pw_system *s = pw_take (l, 1, sizeof *s), none;
   if (l->base == NULL) s = &none;
   *s = c->size;
   s->slab = pw_take (l, (size_t)c->size.slabs + 1, sizeof *s->slab);
-  s->pose = pw_take (l, bodies + 1, sizeof *s->pose);
   s->source = pw_take (l, (size_t)c->size.sources, sizeof *s->source);
   s->body_name = pw_take (l, bodies, sizeof *s->body_name);
   s->mass = pw_take (l, coords, sizeof *s->mass);
@@ -130,13 +123,10 @@ static void compile_layout (const pw_compilation *c, pw_layout *l, pw_system **s
   s->q0 = pw_take (l, coords, sizeof *s->q0);
   s->v0 = pw_take (l, coords, sizeof *s->v0);
   s->held = pw_take (l, 2 * coords, 1);
-  s->scratch = pw_take (l, 3 * rows + coords + 3, sizeof *s->scratch);
   s->entry = pw_take (l, (size_t)c->size.entries, sizeof *s->entry);
-  s->force = pw_take (l, (size_t)c->size.slabs, sizeof *s->force);
   for (int i = 0; i < c->kinds; i++) compile_layout_slab (c, l, l->base ? s->slab + i : NULL, i);
-  pools->x = pw_take (l, 2 * (size_t)c->reads, sizeof (double));
   pools->table = pw_take (l, 4 * c->points, sizeof (double));
-  pools->state = pw_take (l, (size_t)c->reads, sizeof (int));
+  pools->state = pw_take (l, (size_t)c->size.reads, sizeof (int));
   pools->text = pw_take (l, c->text, 1);
   *system = s;
 }
@@ -181,12 +171,15 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
   return s;
 }
 
-/* Signals that have not been compiled are all zero. */
-void pw_free (pw_system *s) {
-  for (int i = 0; s && i < s->sources; i++) {
-    const pw_signal *signal = &s->source[i].signal;
+void pw_close_signals (const pw_source *source, int count) {
+  for (int i = 0; i < count; i++) {
+    const pw_signal *signal = &source[i].signal;
     if (signal->type == PW_FUNCTION && signal->function.open && signal->function.close)
       signal->function.close (signal->function.context);
   }
+}
+
+void pw_free (pw_system *s) {
+  if (s) pw_close_signals (s->source, s->sources);
   free (s);
 }

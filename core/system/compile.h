@@ -16,7 +16,6 @@ typedef struct {
   int kinds;
   pw_system size;          /* its counts */
   size_t text;             /* bytes of all names */
-  int reads;               /* states read by signals, in all */
   size_t points;           /* of tables, in all */
   size_t room;             /* bytes of the largest element, and the guard behind it */
   unsigned char *prepared; /* so many: where an element is prepared */
@@ -28,7 +27,6 @@ enum { PW_COMPILE_GUARD = 64, PW_COMPILE_MARK = 0xa5 };
 /* Arrays that the elements share: where each goes on. */
 typedef struct {
   char *text;
-  double *x; /* of signals that read states */
   double *table;
   int *state;
 } pw_pools;

@@ -30,7 +30,6 @@ static void compile_bodies (const pw_compilation *c, pw_system *s, pw_pools *poo
       s->held[s->coords + 3 * i + k] = compile_origin (b, b->rate[k], 3 + k, 0);
     }
   }
-  s->pose[s->bodies] = (pw_pose){ .cos = 1 };
 }
 
 /* The points of a table, and what is between them. */
@@ -51,7 +50,6 @@ static void compile_table (pw_source *source, pw_pools *pools) {
 static int compile_reads (const pw_compilation *c, pw_system *s, pw_source *source, const char *const *reads,
                           pw_pools *pools, const char *element, pw_error *error) {
   source->state = pools->state;
-  source->x = pools->x;
   for (const char *const *r = reads; *r; r++) {
     pw_error why = { 0 };
     int state = pw_find_state (s, *r, &why);
@@ -60,7 +58,6 @@ static int compile_reads (const pw_compilation *c, pw_system *s, pw_source *sour
     *pools->state++ = state;
     source->reads++;
   }
-  pools->x += 2 * source->reads;
   s->readers += source->reads > 0;
   return PW_OK;
 }
@@ -151,7 +148,7 @@ static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *poo
       int e = next[c->slab_of[n]]++;
       for (int u = 0; u < k->kind->signals; u++) {
         int i = e * k->kind->signals + u;
-        k->source[i] = (pw_source){ .u = k->u + 3 * i, .forced = pw_kind_forced (k->kind) };
+        k->source[i] = (pw_source){ .forced = pw_kind_forced (k->kind) };
         if (compile_source (c, s, &k->source[i], pw_field_at (k->kind, from->definition, PW_SIGNAL, u), pools,
                             k->name[e], error) != PW_OK)
           return PW_INPUT;
@@ -166,12 +163,9 @@ static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools
   pw_source *source = s->source;
   for (int i = 0; i < s->slabs; i++) {
     pw_slab *k = &s->slab[i];
-    k->b.pose = s->pose;
     k->row = row;
     k->own = own;
     k->source = source;
-    k->b.q = s->q0 + own;
-    k->b.v = s->v0 + own;
     row += k->b.count * k->kind->rows;
     own += k->b.count * k->kind->own;
     source += k->b.count * k->kind->signals;
@@ -246,10 +240,19 @@ static void compile_metric (pw_system *s) {
     s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
 }
 
+/* The sum of the forces that never change, at any state. */
+static int compile_constant (pw_system *s, pw_error *error) {
+  pw_workspace *w = pw_workspace_new (s, error);
+  if (w == NULL) return PW_MACHINE;
+  pw_sweep_constant (w, s->constant);
+  pw_workspace_free (w);
+  return PW_OK;
+}
+
 /* ---- */
 
 int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
-  s->t_signal = NAN;
+  int constant = 0;
   compile_bodies (c, s, pools);
   if (compile_slabs (c, s, pools, error) != PW_OK || compile_given (c, s, error) != PW_OK) return PW_INPUT;
   compile_entries (s);
@@ -259,9 +262,9 @@ int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_
     const pw_kind *kind = s->slab[i].kind;
     s->constraints += kind->rows > 0;
     s->moving += kind->eta != NULL;
-    if (kind->force && !kind->constant) s->force[s->forces++] = &s->slab[i];
+    s->forces += kind->force && !kind->constant;
+    constant |= kind->force && kind->constant;
     s->saturates |= kind->saturation != NULL;
   }
-  pw_sweep_constant (s);
-  return PW_OK;
+  return constant ? compile_constant (s, error) : PW_OK;
 }

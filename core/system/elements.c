@@ -33,8 +33,8 @@ int pw_system_row_element (const pw_system *s, int row) {
   return element + (row - k->row) / k->kind->rows;
 }
 
-static int elements_place (pw_system *s, double t, const double *q, const double *v, pw_error *error) {
-  if (pw_place (s, t, q, v) == PW_OK) return PW_OK;
+static int elements_place (pw_workspace *w, double t, const double *q, const double *v, pw_error *error) {
+  if (pw_place (w, t, q, v) == PW_OK) return PW_OK;
   return pw_fail (error, PW_METHOD, "at t = %g s a signal of the model reports an error", t);
 }
 
@@ -46,10 +46,10 @@ int pw_system_contacts (const pw_system *s) {
   return count;
 }
 
-int pw_system_contact_points (pw_system *s, double t, const double *q, const double *v, double (*out)[3],
+int pw_system_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                               pw_error *error) {
-  int status = elements_place (s, t, q, v, error);
-  for (const pw_slab *k = s->slab; status == PW_OK && k < s->slab + s->slabs; k++) {
+  int status = elements_place (w, t, q, v, error);
+  for (const pw_slab *k = w->slab; status == PW_OK && k < w->slab + w->s->slabs; k++) {
     if (k->kind->contact == NULL) continue;
     k->kind->contact (&k->b, out[0]);
     out += k->b.count;
@@ -81,12 +81,12 @@ int pw_system_force_size (const pw_system *s) {
   return size;
 }
 
-int pw_system_forces (pw_system *s, double t, const double *q, const double *v, const double *lambda, double *out,
+int pw_system_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
                       pw_error *error) {
-  if (elements_place (s, t, q, v, error) != PW_OK) return PW_METHOD;
-  memset (out, 0, (size_t)pw_system_force_size (s) * sizeof *out);
-  pw_sweep_J (s);
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+  if (elements_place (w, t, q, v, error) != PW_OK) return PW_METHOD;
+  memset (out, 0, (size_t)pw_system_force_size (w->s) * sizeof *out);
+  pw_sweep_J (w);
+  for (const pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
     if (k->kind->rows) elements_reactions (k, lambda + k->row, out);
     if (k->kind->force) elements_applied (k, out);
     out += 3 * k->b.count * k->kind->bodies;
@@ -97,9 +97,10 @@ int pw_system_forces (pw_system *s, double t, const double *q, const double *v, 
 /* ---- Equations ---- */
 
 /* The entries of J, row by row: where each is, and its value; out NULL: they are counted only. */
-static int elements_jacobian (const pw_system *s, pw_equations *out) {
+static int elements_jacobian (const pw_workspace *w, pw_equations *out) {
+  const pw_system *s = w->s;
   int entries = 0;
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
+  for (const pw_slab *k = w->slab; k < w->slab + s->constraints; k++)
     for (int i = 0; i < k->b.count * k->kind->rows; i++)
       for (int c = 0; c < k->b.cols; c++) {
         int column = pw_global (k, i / k->kind->rows, c);
@@ -114,8 +115,9 @@ static int elements_jacobian (const pw_system *s, pw_equations *out) {
   return entries;
 }
 
-static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *error) {
-  size_t n = (size_t)s->coords, rows = (size_t)s->rows, entries = (size_t)elements_jacobian (s, NULL);
+static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error *error) {
+  const pw_system *s = w->s;
+  size_t n = (size_t)s->coords, rows = (size_t)s->rows, entries = (size_t)elements_jacobian (w, NULL);
   double *space = calloc (2 * n + 3 * rows + 2 * entries + 6, sizeof *space); /* two indices take a number */
   *out =
       (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };
@@ -131,18 +133,27 @@ static int elements_allocate (const pw_system *s, pw_equations *out, pw_error *e
   return PW_OK;
 }
 
-int pw_system_equations (pw_system *s, double t, const double *q, const double *v, pw_equations *out, pw_error *error) {
-  int status = elements_allocate (s, out, error);
-  if (status == PW_OK) status = elements_place (s, t, q, v, error);
-  if (status != PW_OK) return status;
-  pw_sweep_J (s);
-  elements_jacobian (s, out);
-  memcpy (out->mass, s->mass, (size_t)s->coords * sizeof *out->mass);
-  pw_sweep_force (s, out->force);
-  pw_sweep_g (s, out->g);
-  pw_sweep_eta (s, out->eta);
-  pw_sweep_gamma (s, out->gamma);
+static int elements_evaluate (pw_workspace *w, double t, const double *q, const double *v, pw_equations *out,
+                              pw_error *error) {
+  if (elements_place (w, t, q, v, error) != PW_OK) return PW_METHOD;
+  pw_sweep_J (w);
+  elements_jacobian (w, out);
+  memcpy (out->mass, w->s->mass, (size_t)w->s->coords * sizeof *out->mass);
+  pw_sweep_force (w, out->force);
+  pw_sweep_g (w, out->g);
+  pw_sweep_eta (w, out->eta);
+  pw_sweep_gamma (w, out->gamma);
   return PW_OK;
+}
+
+int pw_system_equations (const pw_system *s, double t, const double *q, const double *v, pw_equations *out,
+                         pw_error *error) {
+  *out = (pw_equations){ .rows = 0 };
+  pw_workspace *w = pw_workspace_new (s, error);
+  int status = w ? elements_allocate (w, out, error) : PW_MACHINE;
+  if (status == PW_OK) status = elements_evaluate (w, t, q, v, out, error);
+  pw_workspace_free (w);
+  return status;
 }
 
 void pw_equations_free (pw_equations *e) {

@@ -5,15 +5,15 @@
 #include "unroll.h"
 
 /* The slabs with rows come first. */
-#define EACH_CONSTRAINT(k, s) for (pw_slab *k = (s)->slab, *end = k + (s)->constraints; k < end; k++)
+#define EACH_CONSTRAINT(k, w) for (pw_slab *k = (w)->slab, *end = k + (w)->s->constraints; k < end; k++)
 
-void pw_sweep_J (pw_system *s) {
-  EACH_CONSTRAINT (k, s) k->kind->J (&k->b, k->J);
+void pw_sweep_J (pw_workspace *w) {
+  EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
 }
 
 /* One array over rows, filled by the same sweep of every kind; a kind without it leaves zeros. */
-static void evaluate_rows (pw_system *s, size_t sweep, int rows, double *out) {
-  EACH_CONSTRAINT (k, s) {
+static void evaluate_rows (pw_workspace *w, size_t sweep, int rows, double *out) {
+  EACH_CONSTRAINT (k, w) {
     if (k->row >= rows) break;
     pw_sweep *f = *(pw_sweep *const *)(const void *)((const char *)k->kind + sweep);
     if (f)
@@ -23,21 +23,21 @@ static void evaluate_rows (pw_system *s, size_t sweep, int rows, double *out) {
   }
 }
 
-void pw_sweep_g (pw_system *s, double *g) {
-  evaluate_rows (s, offsetof (pw_kind, g), s->holonomic, g);
+void pw_sweep_g (pw_workspace *w, double *g) {
+  evaluate_rows (w, offsetof (pw_kind, g), w->s->holonomic, g);
 }
 
-void pw_sweep_g_size (pw_system *s, double *size) {
-  evaluate_rows (s, offsetof (pw_kind, g_size), s->holonomic, size);
-  for (int i = 0; i < s->holonomic; i++) size[i] = pw_larger (size[i], s->scale.length);
+void pw_sweep_g_size (pw_workspace *w, double *size) {
+  evaluate_rows (w, offsetof (pw_kind, g_size), w->s->holonomic, size);
+  for (int i = 0; i < w->s->holonomic; i++) size[i] = pw_larger (size[i], w->scale.length);
 }
 
-void pw_sweep_eta (pw_system *s, double *eta) {
-  evaluate_rows (s, offsetof (pw_kind, eta), s->rows, eta);
+void pw_sweep_eta (pw_workspace *w, double *eta) {
+  evaluate_rows (w, offsetof (pw_kind, eta), w->s->rows, eta);
 }
 
-void pw_sweep_gamma (pw_system *s, double *gamma) {
-  evaluate_rows (s, offsetof (pw_kind, gamma), s->rows, gamma);
+void pw_sweep_gamma (pw_workspace *w, double *gamma) {
+  evaluate_rows (w, offsetof (pw_kind, gamma), w->s->rows, gamma);
 }
 
 static inline const double *evaluate_add (double *to, const double *force) {
@@ -67,21 +67,20 @@ static inline void evaluate_add_force (const pw_slab *k, double *f) {
     block = evaluate_add (f + *column, block);
 }
 
-void pw_sweep_force (pw_system *s, double *f) {
-  memcpy (f, s->constant, (size_t)s->coords * sizeof *f);
-  for (pw_slab **k = s->force, **end = k + s->forces; k < end; k++) evaluate_add_force (*k, f);
+void pw_sweep_force (pw_workspace *w, double *f) {
+  memcpy (f, w->s->constant, (size_t)w->s->coords * sizeof *f);
+  for (pw_slab **k = w->force, **end = k + w->s->forces; k < end; k++) evaluate_add_force (*k, f);
 }
 
-void pw_sweep_constant (pw_system *s) {
-  memset (s->constant, 0, (size_t)s->coords * sizeof *s->constant);
-  for (int i = 0; i < s->slabs; i++)
-    if (s->slab[i].kind->force && s->slab[i].kind->constant) evaluate_add_force (&s->slab[i], s->constant);
+void pw_sweep_constant (pw_workspace *w, double *f) {
+  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++)
+    if (k->kind->force && k->kind->constant) evaluate_add_force (k, f);
 }
 
 /* Sum of one number per element over all kinds that have the sweep. */
-static double evaluate_total (pw_system *s, size_t sweep) {
+static double evaluate_total (pw_workspace *w, size_t sweep) {
   double sum = 0;
-  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
     pw_sweep *f = *(pw_sweep *const *)(const void *)((const char *)k->kind + sweep);
     if (f == NULL) continue;
     f (&k->b, k->block);
@@ -90,8 +89,8 @@ static double evaluate_total (pw_system *s, size_t sweep) {
   return sum;
 }
 
-double pw_potential (pw_system *s) {
-  return evaluate_total (s, offsetof (pw_kind, energy));
+double pw_potential (pw_workspace *w) {
+  return evaluate_total (w, offsetof (pw_kind, energy));
 }
 
 double pw_kinetic (const pw_system *s, const double *v) {
@@ -100,13 +99,13 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-void pw_sweep_ledger (pw_system *s, const double *lambda, double *rate) {
+void pw_sweep_ledger (pw_workspace *w, const double *lambda, double *rate) {
   const pw_slab *swept = NULL;
   int type = -1;
-  double *eta = s->scratch;
-  for (int i = 0; i < s->entries; i++) {
-    const pw_entry *entry = &s->entry[i];
-    pw_slab *k = &s->slab[entry->slab];
+  double *eta = w->scratch;
+  for (int i = 0; i < w->s->entries; i++) {
+    const pw_entry *entry = &w->s->entry[i];
+    pw_slab *k = &w->slab[entry->slab];
     int drive = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL;
     if (k != swept || (int)entry->type != type) {
       k->b.lambda = lambda + k->row;
@@ -140,20 +139,20 @@ PW_INLINE void evaluate_mul (const pw_system *s, const pw_slab *k, const double 
   }
 }
 
-void pw_mul_J (const pw_system *s, const double *w, double *out) {
-  for (const pw_slab *k = s->slab, *end = k + s->constraints; k < end; k++) {
+void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
+  for (const pw_slab *k = w->slab, *end = k + w->s->constraints; k < end; k++) {
     double *to = out + k->row;
     if (k->kind->own == 0 && k->kind->bodies == 2)
-      evaluate_mul (s, k, w, to, 2, 0);
+      evaluate_mul (w->s, k, x, to, 2, 0);
     else if (k->kind->own == 0 && k->kind->bodies == 1)
-      evaluate_mul (s, k, w, to, 1, 0);
+      evaluate_mul (w->s, k, x, to, 1, 0);
     else
-      evaluate_mul (s, k, w, to, k->kind->bodies, k->kind->own);
+      evaluate_mul (w->s, k, x, to, k->kind->bodies, k->kind->own);
   }
 }
 
-void pw_add_JT (const pw_system *s, const double *lambda, double *out) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
+void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
+  for (const pw_slab *k = w->slab; k < w->slab + w->s->constraints; k++) {
     const double *J = k->J;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++, lambda++) {
@@ -223,11 +222,11 @@ PW_APART evaluate_worst evaluate_speeds_of_any (const pw_slab *k, const double *
   return evaluate_speeds_of (k, eta, enforced, unit, worst, k->kind->bodies, k->kind->own);
 }
 
-void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
-  double *eta = s->moving ? s->scratch : NULL, unit = s->scale.length / s->scale.time;
+void pw_sweep_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
+  double *eta = w->s->moving ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
   evaluate_worst worst = { .row = -1 };
-  if (eta) pw_sweep_eta (s, eta);
-  EACH_CONSTRAINT (k, s) {
+  if (eta) pw_sweep_eta (w, eta);
+  EACH_CONSTRAINT (k, w) {
     if (k->kind->own == 0 && k->kind->bodies == 2)
       worst = evaluate_speeds_of (k, eta, enforced, unit, worst, 2, 0);
     else if (k->kind->own == 0 && k->kind->bodies == 1)
@@ -240,14 +239,14 @@ void pw_sweep_velocity_residual (pw_system *s, const unsigned char *enforced, pw
   r->row_velocity = worst.row;
 }
 
-void pw_sweep_position_residual (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
-  double *value = s->scratch, *size = value + s->rows;
-  pw_sweep_g (s, value);
-  pw_sweep_g_size (s, size);
-  pw_judge_positions (s, value, size, enforced, r);
+void pw_sweep_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
+  double *value = w->scratch, *size = value + w->s->rows;
+  pw_sweep_g (w, value);
+  pw_sweep_g_size (w, size);
+  pw_judge_positions (w->s, value, size, enforced, r);
 }
 
-void pw_sweep_residuals (pw_system *s, const unsigned char *enforced, pw_residuals *r) {
-  pw_sweep_position_residual (s, enforced, r);
-  pw_sweep_velocity_residual (s, enforced, r);
+void pw_sweep_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
+  pw_sweep_position_residual (w, enforced, r);
+  pw_sweep_velocity_residual (w, enforced, r);
 }

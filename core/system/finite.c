@@ -10,8 +10,8 @@ static int finite_first (const double *x, int count, int each) {
   return -1;
 }
 
-int pw_find_wild (pw_system *s, char *buffer, size_t size) {
-  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+int pw_find_wild (pw_workspace *w, char *buffer, size_t size) {
+  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
     const char *what = "force";
     int e = -1, rows = k->kind->rows, n = k->b.count;
     if (k->kind->force) {
@@ -23,8 +23,8 @@ int pw_find_wild (pw_system *s, char *buffer, size_t size) {
       what = "J", e = finite_first (k->J, n, rows * k->b.cols);
     }
     if (e < 0 && rows > 0 && k->kind->gamma) {
-      k->kind->gamma (&k->b, s->scratch + k->row);
-      what = "gamma", e = finite_first (s->scratch + k->row, n, rows);
+      k->kind->gamma (&k->b, w->scratch + k->row);
+      what = "gamma", e = finite_first (w->scratch + k->row, n, rows);
     }
     if (e < 0) continue;
     snprintf (buffer, size, "%s of %s %s", what, k->kind->name, k->name[e]);

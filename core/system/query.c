@@ -181,12 +181,12 @@ char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size) {
   return buffer;
 }
 
-char *pw_failed_signal (const pw_system *s, char *buffer, size_t size) {
+char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   buffer[0] = 0;
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+  for (const pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
     int signals = k->kind->signals;
-    if (s->failed == NULL || s->failed < k->source || s->failed >= k->source + k->b.count * signals) continue;
-    int i = (int)(s->failed - k->source), n = i % signals;
+    if (w->failed == NULL || w->failed < k->source || w->failed >= k->source + k->b.count * signals) continue;
+    int i = (int)(w->failed - k->source), n = i % signals;
     const pw_field *f = k->kind->fields;
     for (; f->name; f++) {
       if (f->type != PW_SIGNAL) continue;

@@ -32,25 +32,24 @@
 /* Rows of -F = (J^T lambda)_q - f_q, -f_v; of gamma_q - (J a)_q, gamma_v; of B. */
 static void linear_put (pw_linearisation *x, const double *v) {
   pw_run *r = x->r;
-  pw_system *s = r->s;
   int n = x->n;
   pw_put put = { .rows = x->m, .factor = 1, .factor_nonholonomic = 1, .lambda = x->lambda };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JTL_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_JTL_Q, &put);
   put.factor = -1;
-  pw_newton_block (&x->newton, s, &x->tape, PW_FORCE_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_FORCE_Q, &put);
   put.col = n;
-  pw_newton_block (&x->newton, s, &x->tape, PW_FORCE_V, &put);
-  pw_newton_readers (&x->newton, s, &x->tape, 0, 0, n);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_FORCE_V, &put);
+  pw_newton_readers (&x->newton, r->w, &x->tape, 0, 0, n);
   put = (pw_put){ .row = n, .rows = x->m, .factor = 1, .factor_nonholonomic = 1 };
-  pw_newton_block (&x->newton, s, &x->tape, PW_GAMMA_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_Q, &put);
   put.col = n;
-  pw_newton_block (&x->newton, s, &x->tape, PW_GAMMA_V, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_V, &put);
   put = (pw_put){ .row = n, .rows = x->m, .factor = -1, .factor_nonholonomic = -1, .w = x->a };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
   put = (pw_put){ .row = n + x->m, .rows = x->m, .factor = 1, .factor_nonholonomic = 1, .w = v };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
   put = (pw_put){ .row = n + x->m, .rows = x->m, .factor = -1, .factor_nonholonomic = -1 };
-  pw_newton_block (&x->newton, s, &x->tape, PW_ETA_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_ETA_Q, &put);
 }
 
 static int linear_derivatives (pw_linearisation *x) {
@@ -94,7 +93,7 @@ static int linear_stride (int n) {
 static double linear_bases (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double least = INFINITY, *tau = x->da;
-  pw_rank_rows (x->r->s, x->R, x->norm);
+  pw_rank_rows (x->r->w, x->R, x->norm);
   for (int k = 0; k < rank; k++)
     memcpy (linear_column (x, k), x->R + (size_t)x->row[k] * (size_t)n, (size_t)n * sizeof *x->R);
   memcpy (x->R, x->Q, (size_t)rank * (size_t)n * sizeof *x->R);
@@ -122,7 +121,7 @@ static void linear_follow (pw_linearisation *x) {
 
 void pw_linear_tangent (pw_linearisation *x, int c) {
   int velocity = c >= x->positions, column = velocity ? x->rank + c - x->positions : x->holonomic + c;
-  double T = x->r->s->scale.time;
+  double T = x->r->w->scale.time;
   memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
   for (int j = 0; j < x->n; j++)
     x->x[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_rank_unit (x->r->s, j) / (velocity ? T : 1);
@@ -140,7 +139,7 @@ static double linear_along (const pw_linearisation *x, int column, const double 
 
 void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const double *dv, int stride, double *out) {
   for (int i = 0; i < x->positions; i++, out += stride) *out = linear_along (x, x->holonomic + i, dq);
-  for (int i = 0; i < x->velocities; i++, out += stride) *out = linear_along (x, x->rank + i, dv) * x->r->s->scale.time;
+  for (int i = 0; i < x->velocities; i++, out += stride) *out = linear_along (x, x->rank + i, dv) * x->r->w->scale.time;
 }
 
 void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out) {

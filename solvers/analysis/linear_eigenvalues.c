@@ -69,7 +69,7 @@ static void eigen_clean (int n, double *re, double *im, const double *shift) {
 static int eigen_certain (const pw_linearisation *x, int n, double *B, double *re, double *im) {
   int cells = n * n, first, last;
   double *other = B + cells, *re2 = other + cells, *im2 = re2 + n, *shift = im2 + n, *work = shift + n;
-  double most = 1 / x->r->s->scale.time;
+  double most = 1 / x->r->w->scale.time;
   memcpy (other, B, (size_t)cells * sizeof *B);
   eigen_disturb (n, most, other);
   if (n) LAPACKE_dgebal_work (LAPACK_COL_MAJOR, 'S', n, other, n, &first, &last, work);

@@ -18,7 +18,7 @@
 static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13, LINEAR_SYMMETRIC = 1e-9;
 
 static double linear_unit (const pw_linearisation *x) {
-  const pw_scale *s = &x->r->s->scale;
+  const pw_scale *s = &x->r->w->scale;
   return s->length / (s->time * s->time);
 }
 
@@ -61,7 +61,7 @@ void pw_linear_choose_frame (pw_linearisation *x) {
 
 /* x = the variation by a displacement of the whole along x, along y, or around the frame's origin, by L or 1 rad. */
 static void linear_displace (pw_linearisation *x, int k) {
-  pw_system *s = x->r->s;
+  const pw_system *s = x->r->s;
   const double *q = x->r->q, *v = x->r->v;
   memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
   for (int j = 0; j < 3 * s->bodies; j += 3) {
@@ -79,12 +79,12 @@ static void linear_displace (pw_linearisation *x, int k) {
 /* What the variation x violates of G dq = 0 and J dv + B dq = 0, scaled; y is that of x, J swept. */
 static double *linear_violation (pw_linearisation *x, double *out) {
   const pw_system *s = x->r->s;
-  pw_mul_J (s, x->x, x->c);
+  pw_mul_J (x->r->w, x->x, x->c);
   for (int k = 0; k < x->holonomic; k++) *out++ = x->c[x->row[k]] / x->norm[x->row[k]] / s->scale.length;
-  pw_mul_J (s, x->x + x->n, x->c);
+  pw_mul_J (x->r->w, x->x + x->n, x->c);
   for (int k = 0; k < x->rank; k++) {
     int i = x->row[k];
-    *out++ = (x->c[i] + x->y[x->n + x->m + i]) / x->norm[i] * s->scale.time / s->scale.length;
+    *out++ = (x->c[i] + x->y[x->n + x->m + i]) / x->norm[i] * x->r->w->scale.time / s->scale.length;
   }
   return out;
 }
@@ -102,7 +102,7 @@ static void linear_change (pw_linearisation *x, int k, double *out) {
 
 /* Round-off grows with the derivatives of the accelerations. */
 static double linear_tolerance (const pw_linearisation *x) {
-  double most = 0, T = x->r->s->scale.time;
+  double most = 0, T = x->r->w->scale.time;
   for (int i = x->positions; i < x->size; i++)
     for (int k = 0; k < x->size; k++) most = pw_largest (most, fabs (x->A[i * x->size + k]) * T);
   return LINEAR_SYMMETRIC + 1e-4 * LINEAR_SYMMETRIC * most;
@@ -179,12 +179,11 @@ static int linear_agree (const pw_linearisation *x, const double *a, const doubl
 
 /* Whether the equations and their linearisation are the same, but turned, after a time. */
 static int linear_same (pw_linearisation *x, double time) {
-  pw_system *s = x->r->s;
   double angle = x->frame.twist[2] * time, *q = x->there, *v = q + x->n, *expected = x->z;
   pw_residuals now;
   linear_later (x, time, q, v);
   if (pw_linear_evaluate (x, x->r->t + time, q, v) != PW_OK) return 0;
-  pw_sweep_residuals (s, x->r->active, &now);
+  pw_sweep_residuals (x->r->w, x->r->active, &now);
   if (!(now.position <= LINEAR_STEADY && now.velocity <= LINEAR_STEADY)) return 0;
   linear_rotate (x, angle, x->a0, expected);
   if (!linear_agree (x, x->a, expected)) return 0;
@@ -215,11 +214,11 @@ static void linear_probe (pw_linearisation *x) {
 pw_steadiness pw_linear_steady (pw_linearisation *x) {
   static const double share[] = { 0.0123, 0.31, 0.77, 1 };
   pw_run *r = x->r;
-  double span = r->settings.span > 0 ? r->settings.span : r->s->scale.time;
+  double span = r->settings.span > 0 ? r->settings.span : r->w->scale.time;
   if (!(x->frame.residual <= LINEAR_STEADY)) return PW_ACCELERATED;
-  if (!(pw_next_breakpoint (r->s, 0, r->t) > r->t + span)) return PW_CHANGING;
+  if (!(pw_next_breakpoint (r->w, 0, r->t) > r->t + span)) return PW_CHANGING;
   linear_probe (x);
-  int same = linear_same (x, 0.137 * fmin (r->s->scale.time, span));
+  int same = linear_same (x, 0.137 * fmin (r->w->scale.time, span));
   for (size_t i = 0; same && i < sizeof share / sizeof *share; i++) same = linear_same (x, share[i] * span);
   return pw_linear_evaluate (x, r->t, r->q, r->v) == PW_OK && same ? PW_STEADY : PW_CHANGING;
 }

@@ -15,7 +15,7 @@ enum { PROFILE_BATCHES = 5, PROFILE_PIECES = 6 };
 
 typedef struct {
   pw_run *r;
-  pw_system *s;
+  const pw_system *s;
   pw_saddle *saddle;        /* as the run's own */
   pw_projector projector;   /* if the method projects */
   const pw_slab *k;         /* the kind being measured */
@@ -34,11 +34,11 @@ typedef struct {
 typedef void profile_work (profile *p, long n);
 
 static void profile_poses (profile *p, long n) {
-  for (; n > 0; n--) pw_place (p->s, p->t, p->q, p->v);
+  for (; n > 0; n--) pw_place (p->r->w, p->t, p->q, p->v);
 }
 
 static void profile_place (profile *p, long n) {
-  for (; n > 0; n--) pw_place (p->s, n % 2 ? p->t : p->before, p->q, p->v);
+  for (; n > 0; n--) pw_place (p->r->w, n % 2 ? p->t : p->before, p->q, p->v);
 }
 
 static void profile_signals (profile *p, long n) {
@@ -71,18 +71,18 @@ static void profile_g (profile *p, long n) {
 
 static void profile_sweep (profile *p, long n) {
   for (; n > 0; n--) {
-    pw_sweep_J (p->s);
-    pw_sweep_gamma (p->s, p->gamma);
-    pw_sweep_force (p->s, p->f);
+    pw_sweep_J (p->r->w);
+    pw_sweep_gamma (p->r->w, p->gamma);
+    pw_sweep_force (p->r->w, p->f);
   }
 }
 
 /* What Baumgarte's terms take. */
 static void profile_stabilise (profile *p, long n) {
   for (; n > 0; n--) {
-    pw_mul_J (p->s, p->v, p->jv);
-    pw_sweep_eta (p->s, p->eta);
-    pw_sweep_g (p->s, p->eta);
+    pw_mul_J (p->r->w, p->v, p->jv);
+    pw_sweep_eta (p->r->w, p->eta);
+    pw_sweep_g (p->r->w, p->eta);
   }
 }
 
@@ -218,9 +218,9 @@ static int profile_open (profile *p, pw_error *error) {
   memcpy (p->q, p->r->q, bytes);
   memcpy (p->v, p->r->v, bytes);
   for (int j = 0; j < p->s->coords; j++) p->far[j] = p->q[j] + PROFILE_DISTANCE * p->s->scale.length * sin (j + 1);
-  pw_place (p->s, p->t, p->q, p->v);
-  pw_sweep_J (p->s);
-  p->saddle = pw_saddle_open (p->s, p->s->mass, p->s->rows, p->r->active, error);
+  pw_place (p->r->w, p->t, p->q, p->v);
+  pw_sweep_J (p->r->w);
+  p->saddle = pw_saddle_open (p->r->w, p->s->mass, p->s->rows, p->r->active, error);
   if (p->saddle == NULL) return PW_MACHINE;
   return pw_stabilised_by (p->r, PW_PROJECTION) ? pw_projector_open_asked (&p->projector, p->r, error) : PW_OK;
 }

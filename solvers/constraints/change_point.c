@@ -122,7 +122,7 @@ static change_verdict change_go (change_walk *w) {
 /* ---- The check ---- */
 
 static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *error) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3;
   double *memory = malloc (6 * n * sizeof *memory);
   const pw_residuals known = r->known;
@@ -146,8 +146,8 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
 }
 
 static double change_sine_at (pw_run *r, double t, const double *q) {
-  if (pw_place (r->s, t, q, r->v) != PW_OK) return 0;
-  pw_sweep_J (r->s);
+  if (pw_place (r->w, t, q, r->v) != PW_OK) return 0;
+  pw_sweep_J (r->w);
   return pw_watchdog_sine (r, NULL);
 }
 
@@ -210,9 +210,9 @@ int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   if (isnan (g->begun)) g->begun = change_sine_at (r, g->t, g->q);
   int dips = change_dips (r, g->begun, sine, length);
   change_verdict verdict = dips ? change_walk_there (r, &w, &why) : CHANGE_UNKNOWN;
-  if (pw_place (r->s, r->t, r->q, r->v) != PW_OK)
+  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_sweep_J (r->s);
+  pw_sweep_J (r->w);
   if (why.status != PW_OK) return pw_fail (error, why.status, "%s", why.text);
   return dips ? change_judge (r, &w, verdict, sine, length, error) : PW_OK;
 }

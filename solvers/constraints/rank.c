@@ -20,10 +20,11 @@ double pw_rank_unit (const pw_system *s, int j) {
   return pw_is_angle (s, j) ? s->scale.length : 1;
 }
 
-void pw_rank_rows (const pw_system *s, double *rows, double *norm) {
+void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
+  const pw_system *s = w->s;
   int n = s->coords;
   memset (rows, 0, (size_t)s->rows * (size_t)n * sizeof *rows);
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
+  for (const pw_slab *k = w->slab; k < w->slab + w->s->constraints; k++)
     for (int i = 0; i < k->b.count * k->kind->rows; i++) {
       double *row = rows + (size_t)(k->row + i) * (size_t)n, square = 0;
       for (int c = 0; c < k->b.cols; c++) {
@@ -83,17 +84,18 @@ static int rank_keep (double tol, int most, double *rows, double *norm, int *kep
 
 /* The kept rows become an orthonormal basis of the range of J^T, their numbers go to `kept`.  Holonomic rows come first:
  * a nonholonomic one must not take the place of a position.  At most so many of them, and so many in all. */
-static int rank_basis_of (const pw_system *s, double tol, int holonomic, int all, double *rows, int *kept,
+static int rank_basis_of (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
                           unsigned char *active) {
+  const pw_system *s = w->s;
   double *norm = rows + (size_t)s->rows * (size_t)s->coords;
-  pw_rank_rows (s, rows, NULL);
+  pw_rank_rows (w, rows, NULL);
   memset (active, 0, (size_t)s->rows);
   int rank = rank_keep (tol, holonomic, rows, norm, kept, active, 0, 0, s->holonomic, s->coords);
   return rank_keep (tol, all, rows, norm, kept, active, rank, s->holonomic, s->rows, s->coords);
 }
 
-static int rank_basis (const pw_system *s, double tol, double *rows, int *kept, unsigned char *active) {
-  return rank_basis_of (s, tol, s->rows, s->rows, rows, kept, active);
+static int rank_basis (const pw_workspace *w, double tol, double *rows, int *kept, unsigned char *active) {
+  return rank_basis_of (w, tol, w->s->rows, w->s->rows, rows, kept, active);
 }
 
 /* rows x (coords + 1): the rows, then their norms. */
@@ -101,10 +103,11 @@ static size_t rank_room (const pw_system *s) {
   return (size_t)s->rows * ((size_t)s->coords + 1);
 }
 
-int pw_rank_select (const pw_system *s, double tol, unsigned char *active) {
+int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active) {
+  const pw_system *s = w->s;
   double *rows = malloc ((rank_room (s) + 1) * sizeof *rows);
   int *kept = malloc (((size_t)s->rows + 1) * sizeof *kept), rank = PW_MACHINE;
-  if (rows && kept) rank = rank_basis (s, tol, rows, kept, active);
+  if (rows && kept) rank = rank_basis (w, tol, rows, kept, active);
   free (rows);
   free (kept);
   return rank;
@@ -144,14 +147,14 @@ static void rank_direction (const pw_system *s, const rank_search *x, int rank, 
 
 /* The rank a short motion away, with the rows that are independent there in x->active; 0 if there is no such pose. */
 static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   pw_projector p;
   pw_error none = { 0 };
   int row, away = 0;
   double worst;
-  if (pw_place (s, r->t, r->q, r->v) != PW_OK) return 0;
-  pw_sweep_J (s);
-  rank_basis (s, r->limits.independent, x->rows, x->kept, x->active);
+  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK) return 0;
+  pw_sweep_J (r->w);
+  rank_basis (r->w, r->limits.independent, x->rows, x->kept, x->active);
   rank_direction (s, x, rank, r->v, number);
   for (int j = 0; j < s->coords; j++) x->q[j] = r->q[j] + 0.03 * x->motion[j];
   const unsigned char *before = r->active;
@@ -159,7 +162,7 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   if (pw_projector_open (&p, r, s->metric, s->metric, &none) == PW_OK) {
     p.alone = 1;
     if (pw_project_positions (&p, r, r->t, x->q, r->v, &row, &worst) == PW_OK)
-      away = rank_basis (s, r->limits.independent, x->rows, x->kept, x->active);
+      away = rank_basis (r->w, r->limits.independent, x->rows, x->kept, x->active);
     pw_projector_close (&p);
   }
   r->active = before;
@@ -176,7 +179,7 @@ static void rank_take (pw_run *r, unsigned char *mask, const unsigned char *acti
 }
 
 static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   size_t m = (size_t)s->rows, k = (size_t)redundant;
   r->rank_memory =
       malloc (m + k * sizeof (int) + 16 + (k * m + k * k + k + (size_t)s->coords + 3 + m) * sizeof (double));
@@ -188,12 +191,12 @@ static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
 }
 
 int pw_rank_choose (pw_run *r, pw_error *error) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   rank_search x;
   if (rank_search_open (&x, s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  int status = pw_place (s, r->t, r->q, r->v);
-  pw_sweep_J (s);
-  int rank = rank_basis (s, r->limits.independent, x.rows, x.kept, x.active), best = rank;
+  int status = pw_place (r->w, r->t, r->q, r->v);
+  pw_sweep_J (r->w);
+  int rank = rank_basis (r->w, r->limits.independent, x.rows, x.kept, x.active), best = rank;
   memcpy (x.best, x.active, (size_t)s->rows);
   for (int number = 0; number < 3 && status == PW_OK; number++) {
     int away = rank_nearby (r, &x, rank, number);
@@ -209,18 +212,18 @@ int pw_rank_choose (pw_run *r, pw_error *error) {
   else if (best < s->rows && rank_store (r, x.best, s->rows - best) != PW_OK)
     status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   free (x.memory);
-  if (pw_place (s, r->t, r->q, r->v) == PW_OK) pw_sweep_J (s);
+  if (pw_place (r->w, r->t, r->q, r->v) == PW_OK) pw_sweep_J (r->w);
   return status;
 }
 
 /* Constraints that have drifted are less dependent than they should be: as many rows are kept as before. */
 int pw_rank_reselect (pw_run *r) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   rank_search x;
   int holonomic = 0, all = s->rows - r->redundant;
   if (rank_search_open (&x, s) != PW_OK) return PW_MACHINE;
   for (int i = 0; i < s->holonomic; i++) holonomic += r->active[i];
-  int rank = rank_basis_of (s, r->limits.independent, holonomic, all, x.rows, x.kept, x.active);
+  int rank = rank_basis_of (r->w, r->limits.independent, holonomic, all, x.rows, x.kept, x.active);
   int other = rank == all && memcmp (x.active, r->active, (size_t)s->rows) != 0;
   if (other) rank_take (r, (unsigned char *)(r->redundant_row + r->redundant), x.active);
   free (x.memory);
@@ -247,9 +250,10 @@ void pw_rank_close (pw_run *r) {
 /* ---- Sharing ---- */
 
 /* f = J_i^T */
-static void rank_row (const pw_system *s, int row, double *f) {
+static void rank_row (const pw_workspace *w, int row, double *f) {
+  const pw_system *s = w->s;
   memset (f, 0, (size_t)s->coords * sizeof *f);
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
+  for (const pw_slab *k = w->slab; k < w->slab + w->s->constraints; k++) {
     int n = row - k->row;
     if (n < 0 || n >= k->b.count * k->kind->rows) continue;
     for (int c = 0; c < k->b.cols; c++) {
@@ -259,23 +263,23 @@ static void rank_row (const pw_system *s, int row, double *f) {
   }
 }
 
-double pw_rank_size (const pw_system *s, int row) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++) {
+double pw_rank_size (const pw_workspace *w, int row) {
+  for (const pw_slab *k = w->slab; k < w->slab + w->s->constraints; k++) {
     int n = row - k->row;
     if (n < 0 || n >= k->b.count * k->kind->rows) continue;
     const double *J = k->J + n * k->b.cols;
     for (int b = 0; b < k->kind->bodies; b++)
       if (J[3 * b] != 0 || J[3 * b + 1] != 0) return 1;
   }
-  return s->scale.length;
+  return w->scale.length;
 }
 
 void pw_rank_coefficients (pw_run *r, int i) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   int m = s->rows, k = r->redundant;
   double *f = r->coefficient + k * m + k * k + k, *nothing = f + s->coords + 3;
   memset (nothing, 0, (size_t)m * sizeof *nothing);
-  rank_row (s, r->redundant_row[i], f);
+  rank_row (r->w, r->redundant_row[i], f);
   pw_saddle_solve (r->saddle, f, nothing, f, r->coefficient + i * m);
 }
 
@@ -300,17 +304,17 @@ static void rank_add_row (const pw_system *s, const pw_slab *k, int n, double we
 
 /* A sum of the redundant rows, irregular so that nothing cancels, takes one solve however many they are. */
 double pw_rank_grip (pw_run *r) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   int m = s->rows, k = r->redundant;
   double *c = r->coefficient, *f = c + k * m + k * k + k, *nothing = f + s->coords + 3, most = 0;
   memset (f, 0, (size_t)(s->coords + 3 + m) * sizeof *f);
-  for (const pw_slab *b = s->slab; b < s->slab + s->constraints; b++)
+  for (const pw_slab *b = r->w->slab; b < r->w->slab + s->constraints; b++)
     for (int n = 0; n < b->b.count * b->kind->rows; n++) {
       double x = sin (2.39996 * (b->row + n + 1));
       if (!r->active[b->row + n]) rank_add_row (s, b, n, (x + copysign (1, x)) / 2, f);
     }
   pw_saddle_solve (r->saddle, f, nothing, f, c);
-  for (const pw_slab *b = s->slab; b < s->slab + s->constraints; b++)
+  for (const pw_slab *b = r->w->slab; b < r->w->slab + s->constraints; b++)
     for (int n = 0; n < b->b.count * b->kind->rows; n++)
       if (r->active[b->row + n]) most = pw_largest (most, fabs (c[b->row + n]) * rank_length (s, b, n));
   return isnan (most) ? 0 : 1 / most;
@@ -334,7 +338,7 @@ static void rank_cholesky (double *A, double *b, int k) {
 }
 
 void pw_rank_share (pw_run *r, double *lambda) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   int m = s->rows, k = r->redundant;
   if (k == 0) return;
   for (int i = 0; i < k; i++) pw_rank_coefficients (r, i);
@@ -344,7 +348,7 @@ void pw_rank_share (pw_run *r, double *lambda) {
     for (int j = 0; j <= i; j++) A[i * k + j] = 0;
   }
   for (int row = 0; row < m; row++) {
-    double size = pw_rank_size (s, row), weight = 1 / (size * size);
+    double size = pw_rank_size (r->w, row), weight = 1 / (size * size);
     for (int i = 0; i < k; i++) {
       double n = (r->redundant_row[i] == row) - c[i * m + row];
       z[i] -= weight * n * lambda[row];

@@ -12,7 +12,7 @@ struct pw_run;
 
 /* All rows of the swept J, dense (rows x coords), lengths and angles in units of the scene and each of length 1; `norm`
  * (rows, or NULL) takes what they were divided by; empty rows stay 0. */
-void pw_rank_rows (const pw_system *s, double *rows, double *norm);
+void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 
 /* Length of a unit of coordinate j in them: they are the derivatives by q[j] times this. */
 double pw_rank_unit (const pw_system *s, int j);
@@ -20,7 +20,7 @@ double pw_rank_unit (const pw_system *s, int j);
 /* Rows kept by Gram-Schmidt on the swept J, lengths and angles in units of the scene: active[i] = 1 for a row whose part
  * independent of those kept before exceeds tol of it; holonomic rows first, of these the most independent ones, in
  * order where they are about equal.  Returns the rank, or PW_MACHINE. */
-int pw_rank_select (const pw_system *s, double tol, unsigned char *active);
+int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active);
 
 /* Chooses r->active for the run at its consistent start: rows dependent there and at two poses nearby.  Leaves it NULL
  * if all rows are independent.  Errors: PW_MACHINE, PW_START (the start is a singular pose). */
@@ -39,7 +39,7 @@ double pw_rank_grip (struct pw_run *r);
 void pw_rank_carry (struct pw_run *r, pw_archive *a);
 
 /* The unit of a row's multiplier, as J is swept: 1 of a force, L of a moment, which a row without x and y columns has. */
-double pw_rank_size (const pw_system *s, int row);
+double pw_rank_size (const pw_workspace *w, int row);
 
 /* Multipliers of all rows from those of the active ones: the smallest (forces in units of 1, moments of L) with the same
  * J^T lambda.  J must be swept and the run's saddle factorised at the pose. */

@@ -43,11 +43,11 @@ static void redundancy_say_pair (const pw_system *s, int one, int two, char *buf
 
 char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   enum { MOST = 6 };
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   size_t n = redundancy_name_row (s, row, 1, buffer, size, 0);
-  if (pw_place (s, r->t, r->q, r->v) != PW_OK) return buffer;
-  pw_sweep_J (s);
+  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
+  pw_sweep_J (r->w);
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   pw_rank_coefficients (r, i);
   const double *c = r->coefficient + i * s->rows;

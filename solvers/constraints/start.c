@@ -46,9 +46,8 @@ static int start_positions (pw_projector *p, pw_run *r, double *q, const double 
   double worst;
   int status = pw_project_positions (p, r, r->t, q, v, &row, &worst);
   if (status == PW_OK) return PW_OK;
-  pw_system *s = r->s;
-  if (pw_place (s, r->t, q, v) == PW_OK && row >= 0) {
-    pw_sweep_g (s, p->scratch);
+  if (pw_place (r->w, r->t, q, v) == PW_OK && row >= 0) {
+    pw_sweep_g (r->w, p->scratch);
     *trouble = (start_trouble){ row, 0, fabs (p->scratch[row]), 0 };
   }
   return status;
@@ -58,7 +57,7 @@ static int start_positions (pw_projector *p, pw_run *r, double *q, const double 
 static int start_rates (pw_projector *p, pw_run *r, double *v, start_trouble *trouble) {
   pw_residuals now;
   for (int i = 0; i < 3; i++) {
-    pw_sweep_residuals (r->s, NULL, &now);
+    pw_sweep_residuals (r->w, NULL, &now);
     if (now.velocity <= 4 * DBL_EPSILON) return PW_OK;
     if (i == 2) break;
     int status = pw_project_velocities (p, r, v);
@@ -73,7 +72,7 @@ static int start_rates (pw_projector *p, pw_run *r, double *v, start_trouble *tr
 /* One attempt from the given state, with some of it held.  The velocity metric is the mass matrix where that
  * determines everything, else the position metric. */
 static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *trouble, pw_error *error) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   double *weight = malloc (2 * bytes);
   if (weight == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
@@ -84,9 +83,9 @@ static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *t
     pw_error none = { 0 };
     memcpy (r->q, r->q_given, bytes);
     memcpy (r->v, r->v_given, bytes);
-    status = pw_place (s, r->t, r->q, r->v);
+    status = pw_place (r->w, r->t, r->q, r->v);
     if (status != PW_OK) break;
-    pw_sweep_J (s);
+    pw_sweep_J (r->w);
     start_weights (s, choice == 0 ? s->mass : s->metric, held ? held + s->coords : NULL, weight + s->coords);
     status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
     if (status == PW_OK) {
@@ -115,13 +114,14 @@ static int start_fail (pw_run *r, const start_trouble *trouble, pw_error *error)
 
 int pw_start_moved (const pw_system *s, const pw_start_report *report, int state) {
   int rate = state >= s->coords, j = rate ? state - s->coords : state;
-  double unit = pw_unit (s, j) / (rate ? s->scale.time : 1);
+  double unit = pw_unit (s, j) / (rate ? report->time : 1);
   double from = rate ? report->v_given[j] : report->q_given[j], to = rate ? report->v[j] : report->q[j];
   return !(fabs (to - from) <= 16 * DBL_EPSILON * (fabs (to) + unit));
 }
 
 void pw_count_moved (pw_run *r) {
   r->start.moved = r->start.changed = 0;
+  r->start.time = r->w->scale.time;
   for (int j = 0; j < 2 * r->s->coords; j++) {
     if (!pw_start_moved (r->s, &r->start, j)) continue;
     r->start.moved++;
@@ -149,16 +149,16 @@ static void start_report (pw_run *r, int freed, const pw_residuals *before) {
  * Off the constraints redundant rows look independent, the more so the farther off: hence the tolerances. */
 static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *trouble, pw_error *error) {
   static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   const unsigned char *before = r->active;
   int status = start_attempt (r, held, trouble, error), rank = s->rows;
   if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
   unsigned char *active = malloc ((size_t)s->rows + 1);
   if (active == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   for (size_t i = 0; i < sizeof tolerance / sizeof *tolerance && status == PW_RETRY; i++) {
-    if (pw_place (s, r->t, r->q_given, r->v_given) != PW_OK) break;
-    pw_sweep_J (s);
-    int now = pw_rank_select (s, tolerance[i], active);
+    if (pw_place (r->w, r->t, r->q_given, r->v_given) != PW_OK) break;
+    pw_sweep_J (r->w);
+    int now = pw_rank_select (r->w, tolerance[i], active);
     if (now < 0) status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
     if (now < 0 || now == rank) continue;
     rank = now;
@@ -174,7 +174,7 @@ static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *tr
 
 /* A start that was given rates and is left with none: the wheels lock it. */
 static int start_locked (pw_run *r, pw_error *error) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   double given = 0, left = 0;
   char element[120], before[120] = "", text[300] = "";
   for (int j = 0; j < s->coords; j++) {
@@ -239,7 +239,7 @@ static int start_freed (const pw_system *s, const unsigned char *held, const uns
 
 static int start_try (pw_run *r, const unsigned char *held, start_trouble *trouble, int *freed, pw_error *error) {
   const int ways = sizeof start_ways / sizeof *start_ways;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   size_t n = (size_t)s->coords;
   unsigned char *mask = malloc (4 * n + 1), *last = mask + 2 * n;
   if (mask == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
@@ -260,17 +260,17 @@ static int start_try (pw_run *r, const unsigned char *held, start_trouble *troub
 }
 
 int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   pw_residuals before;
   start_trouble trouble = { .row = -1 };
   int freed = 0;
   memcpy (r->q_given, r->q, bytes);
   memcpy (r->v_given, r->v, bytes);
-  int status = pw_place (s, r->t, r->q, r->v);
+  int status = pw_place (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_sweep_J (s);
-  pw_sweep_residuals (s, NULL, &before);
+  pw_sweep_J (r->w);
+  pw_sweep_residuals (r->w, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
     status = start_try (r, held, &trouble, &freed, error);
   start_report (r, freed, &before);

@@ -120,12 +120,12 @@ static int galpha_try (pw_run *r, double h, double *jerk) {
 /* The part of C h^2 a-dot that the holonomic rows forbid, least in the mass matrix, onto the rates. */
 static int galpha_displace (pw_run *r, double h, const double *jerk) {
   galpha *d = r->data;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->v1;
-  int status = pw_place (s, r->t, r->q, d->v);
+  int status = pw_place (r->w, r->t, r->q, d->v);
   if (status != PW_OK) return status;
-  pw_sweep_J (s);
-  pw_mul_J (s, jerk, d->jv);
+  pw_sweep_J (r->w);
+  pw_mul_J (r->w, jerk, d->jv);
   for (int i = 0; i < s->rows; i++) d->jv[i] *= i < s->holonomic ? C * h * h : 0;
   status = pw_saddle_factor (r->saddle);
   if (status != PW_OK) return status;
@@ -141,8 +141,8 @@ static int galpha_begin (pw_run *r, double h) {
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
   if (!d->ggl && d->h > 0) { /* rates have the error that goes with the size before */
-    status = pw_place (r->s, r->t, r->q, d->v);
-    if (status == PW_OK) pw_sweep_J (r->s);
+    status = pw_place (r->w, r->t, r->q, d->v);
+    if (status == PW_OK) pw_sweep_J (r->w);
     if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
   }
   if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, d->v, d->a, d->eta);

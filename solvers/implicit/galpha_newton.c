@@ -15,8 +15,8 @@
 
 static int galpha_place (pw_run *r, double t1) {
   galpha *d = r->data;
-  int status = pw_place (r->s, pw_before_breakpoint (r, t1), d->q1, d->v1);
-  if (status == PW_OK) pw_sweep_J (r->s);
+  int status = pw_place (r->w, pw_before_breakpoint (r, t1), d->q1, d->v1);
+  if (status == PW_OK) pw_sweep_J (r->w);
   return status;
 }
 
@@ -35,7 +35,7 @@ static void galpha_kinematics (pw_run *r, double h, double *out) {
   double c = d->gamma / (h * d->beta);
   const double *mu = galpha_mu (d);
   memset (d->pull, 0, (size_t)d->n * sizeof *d->pull);
-  if (mu) pw_add_JT (r->s, mu, d->pull);
+  if (mu) pw_add_JT (r->w, mu, d->pull);
   for (int j = 0; j < d->n; j++) {
     double dq = h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
     out[j] = c * (d->q1[j] - r->q[j] - dq) + d->D[j] * d->pull[j];
@@ -45,20 +45,20 @@ static void galpha_kinematics (pw_run *r, double h, double *out) {
 static void galpha_momentum (pw_run *r, double *out) {
   galpha *d = r->data;
   memset (d->pull, 0, (size_t)d->n * sizeof *d->pull);
-  pw_add_JT (r->s, galpha_lambda (d), d->pull);
-  pw_sweep_force (r->s, d->f);
+  pw_add_JT (r->w, galpha_lambda (d), d->pull);
+  pw_sweep_force (r->w, d->f);
   for (int j = 0; j < d->n; j++) out[j] = r->s->mass[j] * d->a1[j] + d->pull[j] - d->f[j];
 }
 
 /* J v - eta of all rows, and g behind it; or g in the place of the holonomic ones. */
 static void galpha_constraints (pw_run *r, double *out) {
   galpha *d = r->data;
-  pw_system *s = r->s;
-  pw_mul_J (s, d->v1, d->jv);
-  pw_sweep_eta (s, d->eta);
+  const pw_system *s = r->s;
+  pw_mul_J (r->w, d->v1, d->jv);
+  pw_sweep_eta (r->w, d->eta);
   for (int i = 0; i < s->rows; i++) d->jv[i] -= d->eta[i];
   if (d->ggl) pw_tangent_compress (&d->work.tangent, d->jv, d->rows, out);
-  pw_sweep_g (s, d->ggl ? d->eta : d->jv);
+  pw_sweep_g (r->w, d->ggl ? d->eta : d->jv);
   if (d->ggl)
     pw_tangent_compress (&d->work.tangent, d->eta, d->positions, out + d->rows);
   else
@@ -178,7 +178,7 @@ static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
 int pw_galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20;
   galpha *d = r->data;
-  double before = INFINITY, size, floor, good = fmin (1e-9, 1e-3 * pow (h / r->s->scale.time, 4)), rate = 1;
+  double before = INFINITY, size, floor, good = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
   if (h != d->h) galpha_scale (r, h);
   galpha_predict (r, h);
   for (int i = 0, fresh = 1; i < most; i++) {

@@ -83,9 +83,9 @@ int pw_leapfrog_judge (leapfrog_progress *p) {
 
 /* Places the system at (t, q, v), factorises the saddle there and takes note of a singular pose. */
 static int leapfrog_factor (pw_run *r, double t, const double *q, const double *v) {
-  int status = pw_place (r->s, t, q, v);
+  int status = pw_place (r->w, t, q, v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->s);
+  pw_sweep_J (r->w);
   r->statistics.factorisations++;
   status = pw_saddle_factor (r->saddle);
   if (status != PW_OK || pw_watchdog_near (r)) r->near = 1;
@@ -95,23 +95,23 @@ static int leapfrog_factor (pw_run *r, double t, const double *q, const double *
 /* One correction of v' for forces that have changed since the last one, which d->f holds.  PW_METHOD if a signal failed. */
 static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
-  pw_system *s = r->s;
-  int status = pw_place_rates (s, d->v1);
+  const pw_system *s = r->s;
+  int status = pw_place_rates (r->w, d->v1);
   if (status != PW_OK) return status;
-  pw_sweep_force (s, d->middle);
+  pw_sweep_force (r->w, d->middle);
   for (int j = 0; j < s->coords; j++) {
     double f = d->middle[j];
     d->middle[j] = 0.5 * h * (f - d->f[j]);
     d->f[j] = f;
   }
-  pw_mul_J (s, d->v1, d->off);
-  pw_sweep_eta (s, d->eta);
+  pw_mul_J (r->w, d->v1, d->off);
+  pw_sweep_eta (r->w, d->eta);
   for (int i = 0; i < s->rows; i++) d->off[i] = d->eta[i] - d->off[i];
   pw_saddle_solve (r->saddle, d->middle, d->off, d->dv, d->mu);
   p->size = 0, p->large = 1;
   for (int j = 0; j < s->coords; j++) {
     d->v1[j] += d->dv[j];
-    leapfrog_measure (p, d->dv[j], d->u[j], pw_unit (s, j) / s->scale.time);
+    leapfrog_measure (p, d->dv[j], d->u[j], pw_unit (s, j) / r->w->scale.time);
   }
   return PW_OK;
 }
@@ -129,7 +129,7 @@ static int leapfrog_finish (pw_run *r, double h, double t1) {
     good = p.done < LEAPFROG_MOST ? pw_leapfrog_judge (&p) : -1;
     if (good < 0) return PW_RETRY;
   }
-  return pw_place_rates (r->s, d->v1);
+  return pw_place_rates (r->w, d->v1);
 }
 
 /* ---- Advancing ---- */

@@ -14,8 +14,8 @@ enum { DRIFT_MOST = 30 }; /* iterations */
 /* ---- Poses: the beginning, the middle, the end ---- */
 
 static int drift_place (pw_run *r, double t, const double *q, const double *v) {
-  int status = pw_place (r->s, t, q, v);
-  if (status == PW_OK) pw_sweep_J (r->s);
+  int status = pw_place (r->w, t, q, v);
+  if (status == PW_OK) pw_sweep_J (r->w);
   return status;
 }
 
@@ -40,28 +40,28 @@ static void drift_move (pw_run *r, double h) {
 /* M and J^T of the beginning, where the system is placed. */
 static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   for (int j = 0; j < s->coords; j++) pw_tape_put (&x->tape, j, j, s->mass[j]);
-  pw_newton_JT (s, &x->tape,
+  pw_newton_JT (r->w, &x->tape,
                 &(pw_put){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
 }
 
 /* S + h/2 ((S u)_q - b_q) of the middle, where the system is placed. */
 static void drift_put_middle (pw_run *r, double h) {
   pw_tangent *x = &r->data->work.tangent;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   pw_put put = { .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
   put.factor_nonholonomic = -0.5 * h;
-  pw_newton_block (&x->newton, s, &x->tape, PW_ETA_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_ETA_Q, &put);
   put.factor_nonholonomic = 1;
-  pw_newton_J (s, &x->tape, &put);
+  pw_newton_J (r->w, &x->tape, &put);
 }
 
 /* G of the end, where the system is placed. */
 static void drift_put_end (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
-  pw_newton_J (r->s, &x->tape, &(pw_put){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
+  pw_newton_J (r->w, &x->tape, &(pw_put){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
 }
 
 int pw_leapfrog_open_matrix (pw_run *r) {
@@ -97,19 +97,19 @@ static int drift_factor (pw_run *r, double h, double t1) {
 /* What is left of the rows. */
 static int drift_rows (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   int status = PW_OK;
   if (s->rows > s->holonomic) {
     status = drift_place_middle (r, h);
     if (status != PW_OK) return status;
-    pw_mul_J (s, d->u, d->off);
-    pw_sweep_eta (s, d->eta);
+    pw_mul_J (r->w, d->u, d->off);
+    pw_sweep_eta (r->w, d->eta);
     for (int i = s->holonomic; i < s->rows; i++) d->off[i] -= d->eta[i];
   }
   if (s->holonomic > 0) {
-    status = pw_place (s, pw_before_breakpoint (r, t1), d->q1, d->u);
+    status = pw_place (r->w, pw_before_breakpoint (r, t1), d->q1, d->u);
     if (status != PW_OK) return status;
-    pw_sweep_g (s, d->eta);
+    pw_sweep_g (r->w, d->eta);
     for (int i = 0; i < s->holonomic; i++) d->off[i] = d->eta[i] / h;
   }
   r->statistics.rhs++;

@@ -46,8 +46,9 @@ static inline int newton_is_length (const pw_kind *kind, int c) {
   return c < 3 * kind->bodies && c % 3 != 2;
 }
 
-void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, const pw_put *put) {
-  for (pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+void pw_newton_block (pw_newton *n, pw_workspace *w, pw_tape *t, pw_block block, const pw_put *put) {
+  const pw_system *s = w->s;
+  for (pw_slab *k = w->slab; k < w->slab + s->slabs; k++) {
     int rows = pw_block_rows (k->kind, block), cols = k->b.cols;
     int of_rows = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
     int constraint = of_rows || block == PW_JTL_Q;
@@ -56,7 +57,7 @@ void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, co
     if (put->w) newton_gather (s, k, put->w, n->w);
     k->b.w = n->w;
     k->b.lambda = put->lambda ? put->lambda + k->row : NULL;
-    if (!t->recording) pw_sweep_block (s, k, block, n->block);
+    if (!t->recording) pw_sweep_block (w, k, block, n->block);
     const double *value = n->block;
     double factor = of_rows && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
     int angles = constraint && newton_turns (k->kind);
@@ -79,8 +80,9 @@ void pw_newton_block (pw_newton *n, pw_system *s, pw_tape *t, pw_block block, co
 }
 
 /* Calls over all entries of J: both directions share it. */
-static void newton_J (const pw_system *s, pw_tape *t, const pw_put *put, int transposed) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0 && k->row < put->rows; k++) {
+static void newton_J (const pw_workspace *w, pw_tape *t, const pw_put *put, int transposed) {
+  const pw_system *s = w->s;
+  for (const pw_slab *k = w->slab; k < w->slab + s->slabs && k->kind->rows > 0 && k->row < put->rows; k++) {
     const double *value = k->J;
     double factor = k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
     int turns = newton_turns (k->kind);
@@ -99,16 +101,17 @@ static void newton_J (const pw_system *s, pw_tape *t, const pw_put *put, int tra
   }
 }
 
-void pw_newton_J (const pw_system *s, pw_tape *t, const pw_put *put) {
-  newton_J (s, t, put, 0);
+void pw_newton_J (const pw_workspace *w, pw_tape *t, const pw_put *put) {
+  newton_J (w, t, put, 0);
 }
 
-void pw_newton_JT (const pw_system *s, pw_tape *t, const pw_put *put) {
-  newton_J (s, t, put, 1);
+void pw_newton_JT (const pw_workspace *w, pw_tape *t, const pw_put *put) {
+  newton_J (w, t, put, 1);
 }
 
-void pw_newton_readers (pw_newton *n, pw_system *s, pw_tape *t, int row, int col, int col_v) {
-  for (pw_slab *k = s->slab; s->readers > 0 && k < s->slab + s->slabs; k++) {
+void pw_newton_readers (pw_newton *n, pw_workspace *w, pw_tape *t, int row, int col, int col_v) {
+  const pw_system *s = w->s;
+  for (pw_slab *k = w->slab; s->readers > 0 && k < w->slab + s->slabs; k++) {
     int signals = k->kind->signals, cols = k->b.cols;
     if (signals == 0 || k->kind->force_u == NULL) continue;
     if (!t->recording) k->kind->force_u (&k->b, n->block);

@@ -53,22 +53,22 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
 
 /* of_q I + D (G^T mu)_q, -I, D G^T */
 void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_place *to, const double *mu, const double *D) {
-  pw_system *s = x->run->s;
+  const pw_system *s = x->run->s;
   for (int j = 0; j < s->coords; j++) {
     pw_tape_put (&x->tape, j, to->q + j, to->of_q);
     pw_tape_put (&x->tape, j, to->v + j, -1);
   }
   if (mu == NULL) return;
   pw_put put = { .col = to->q, .rows = s->holonomic, .factor = 1, .row_scale = D, .map = x->map, .lambda = mu };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JTL_Q, &put);
+  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_JTL_Q, &put);
   put.col = to->mu;
   put.factor = to->of_lambda;
-  pw_newton_JT (s, &x->tape, &put);
+  pw_newton_JT (x->run->w, &x->tape, &put);
 }
 
 /* (J v)_q - eta_q, J */
 void pw_tangent_rates (pw_tangent *x, const pw_tangent_place *to, const double *v, double of_holonomic) {
-  pw_system *s = x->run->s;
+  const pw_system *s = x->run->s;
   pw_put put = { .row = to->constraint,
                  .col = to->q,
                  .rows = s->rows,
@@ -76,23 +76,24 @@ void pw_tangent_rates (pw_tangent *x, const pw_tangent_place *to, const double *
                  .factor_nonholonomic = 1,
                  .map = x->map,
                  .w = v };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_JW_Q, &put);
   put.factor = -of_holonomic, put.factor_nonholonomic = -1;
-  pw_newton_block (&x->newton, s, &x->tape, PW_ETA_Q, &put);
+  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_ETA_Q, &put);
   put.factor = of_holonomic, put.factor_nonholonomic = 1;
   put.col = to->v;
-  pw_newton_J (s, &x->tape, &put);
+  pw_newton_J (x->run->w, &x->tape, &put);
 }
 
 /* G */
 void pw_tangent_positions (pw_tangent *x, const pw_tangent_place *to, int row) {
-  pw_system *s = x->run->s;
-  pw_newton_J (s, &x->tape, &(pw_put){ .row = row, .col = to->q, .rows = s->holonomic, .factor = 1, .map = x->map });
+  const pw_system *s = x->run->s;
+  pw_newton_J (x->run->w, &x->tape,
+               &(pw_put){ .row = row, .col = to->q, .rows = s->holonomic, .factor = 1, .map = x->map });
 }
 
 /* (J^T lambda)_q - f_q, -f_v, M, J^T */
 void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const double *lambda) {
-  pw_system *s = x->run->s;
+  const pw_system *s = x->run->s;
   pw_put put = { .row = to->momentum,
                  .col = to->q,
                  .rows = s->rows,
@@ -100,45 +101,45 @@ void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const doubl
                  .factor_nonholonomic = 1,
                  .map = x->map,
                  .lambda = lambda };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JTL_Q, &put);
+  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_JTL_Q, &put);
   put.factor = -1;
-  pw_newton_block (&x->newton, s, &x->tape, PW_FORCE_Q, &put);
+  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_FORCE_Q, &put);
   put.col = to->v;
-  pw_newton_block (&x->newton, s, &x->tape, PW_FORCE_V, &put);
-  pw_newton_readers (&x->newton, s, &x->tape, to->momentum, to->q, to->v);
+  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_FORCE_V, &put);
+  pw_newton_readers (&x->newton, x->run->w, &x->tape, to->momentum, to->q, to->v);
   for (int j = 0; j < s->coords; j++) pw_tape_put (&x->tape, to->momentum + j, to->a + j, to->of_a * s->mass[j]);
   put.factor = put.factor_nonholonomic = to->of_lambda;
   put.col = to->lambda;
-  pw_newton_JT (s, &x->tape, &put);
+  pw_newton_JT (x->run->w, &x->tape, &put);
 }
 
 /* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G, 2 alpha J - gamma_v, J */
 void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_place *to, const double *v, const double *a) {
   pw_run *r = x->run;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   double alpha = r->alpha, with_v = to->a == to->v ? to->of_a : 0;
   pw_put put = {
     .row = to->constraint, .col = to->q, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map, .w = a
   };
-  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
   put.w = v;
   put.factor = 2 * alpha, put.factor_nonholonomic = alpha;
-  pw_newton_block (&x->newton, s, &x->tape, PW_JW_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
   put.factor = -2 * alpha, put.factor_nonholonomic = -alpha;
-  pw_newton_block (&x->newton, s, &x->tape, PW_ETA_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_ETA_Q, &put);
   put.factor = put.factor_nonholonomic = -1;
-  pw_newton_block (&x->newton, s, &x->tape, PW_GAMMA_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_Q, &put);
   put.col = to->v;
-  pw_newton_block (&x->newton, s, &x->tape, PW_GAMMA_V, &put);
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_V, &put);
   put.factor = with_v + 2 * alpha, put.factor_nonholonomic = with_v + alpha;
-  pw_newton_J (s, &x->tape, &put);
+  pw_newton_J (r->w, &x->tape, &put);
   put.col = to->q;
   put.rows = s->holonomic;
   put.factor = r->beta * r->beta;
-  pw_newton_J (s, &x->tape, &put);
+  pw_newton_J (r->w, &x->tape, &put);
   if (to->a == to->v) return;
   put.col = to->a;
   put.rows = s->rows;
   put.factor = put.factor_nonholonomic = to->of_a;
-  pw_newton_J (s, &x->tape, &put);
+  pw_newton_J (r->w, &x->tape, &put);
 }

@@ -16,7 +16,8 @@ typedef struct {
 } pw_schur_row;
 
 struct pw_saddle {
-  pw_system *s;
+  const pw_system *s;
+  const pw_workspace *w; /* where J is */
   int rows;
   pw_massless massless;
   double *inverse;     /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight; the ground's 0 */

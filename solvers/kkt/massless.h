@@ -66,7 +66,7 @@ typedef struct {
 
 /* Finds the components and matches at the pose J was swept at.  Errors: PW_MACHINE, PW_INPUT (a coordinate that no
  * row determines, by name). */
-int pw_massless_open (pw_massless *r, pw_system *s, const double *weight, int rows, const unsigned char *active,
+int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);
 void pw_massless_close (pw_massless *r);
 

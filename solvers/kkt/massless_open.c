@@ -7,7 +7,8 @@
 
 /* Union-find over bodies and own coordinates that have columns without weight. */
 typedef struct {
-  pw_system *s;
+  const pw_system *s;
+  const pw_workspace *w;
   const double *weight;
   const unsigned char *active;
   int rows, groups;
@@ -69,7 +70,7 @@ typedef void massless_visit (massless_plan *p, pw_massless *r, const pw_slab *k,
 static void massless_each_row (massless_plan *p, pw_massless *r, massless_visit *visit) {
   const pw_system *s = p->s;
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++)
+  for (const pw_slab *k = p->w->slab; k < p->w->slab + s->slabs && k->kind->rows > 0; k++)
     for (int e = 0; e < k->b.count; e++) {
       int n = massless_touched (s, k, e, group, at), light = -1;
       for (int i = 0; i < n && light < 0; i++)
@@ -85,7 +86,7 @@ static void massless_each_row (massless_plan *p, pw_massless *r, massless_visit 
 static void massless_unite (massless_plan *p) {
   const pw_system *s = p->s;
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++)
+  for (const pw_slab *k = p->w->slab; k < p->w->slab + s->slabs && k->kind->rows > 0; k++)
     for (int e = 0; e < k->b.count; e++) {
       int any = 0, last = -1, n = massless_touched (s, k, e, group, at);
       for (int i = 0; i < k->kind->rows; i++) any |= massless_is_active (p, k->row + e * k->kind->rows + i);
@@ -209,7 +210,7 @@ static int massless_number (pw_massless *r, massless_plan *p, pw_error *error) {
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
   char *seen = calloc ((size_t)p->groups + 1, 1);
   if (seen == NULL) return PW_MACHINE;
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs && k->kind->rows > 0; k++)
+  for (const pw_slab *k = p->w->slab; k < p->w->slab + s->slabs && k->kind->rows > 0; k++)
     for (int e = 0; e < k->b.count; e++)
       for (int n = massless_touched (s, k, e, group, at); n-- > 0;)
         for (int i = 0; i < k->kind->rows; i++)
@@ -239,11 +240,12 @@ static int massless_fill (pw_massless *r, massless_plan *p, pw_error *error) {
   return massless_check (r, p, error);
 }
 
-int pw_massless_open (pw_massless *r, pw_system *s, const double *weight, int rows, const unsigned char *active,
+int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error) {
+  const pw_system *s = w->s;
   int groups = massless_groups (s), status = PW_MACHINE;
   *r = (pw_massless){ 0 };
-  massless_plan p = { .s = s, .weight = weight, .active = active, .rows = rows, .groups = groups };
+  massless_plan p = { .s = s, .w = w, .weight = weight, .active = active, .rows = rows, .groups = groups };
   p.parent = malloc (((size_t)groups + 1) * sizeof *p.parent);
   p.member = malloc (((size_t)groups + 1) * sizeof *p.member);
   r->component_of_row = malloc (((size_t)s->rows + 1) * sizeof *r->component_of_row);

@@ -15,17 +15,18 @@
 /* A pivot is 1 minus the square of a cosine: of a dependent row round-off leaves some eps. */
 #define SADDLE_ROUND_OFF (200 * DBL_EPSILON)
 
-pw_saddle *pw_saddle_open (pw_system *s, const double *weight, int rows, const unsigned char *active, pw_error *error) {
+pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
+                           pw_error *error) {
   int status = PW_MACHINE;
   pw_saddle *k = calloc (1, sizeof *k);
   if (k) {
-    *k = (pw_saddle){ .s = s, .guard = SADDLE_ROUND_OFF, .pivot = INFINITY, .pivot_row = -1 };
-    status = pw_massless_open (&k->massless, s, weight, rows, active, error);
+    *k = (pw_saddle){ .s = w->s, .w = w, .guard = SADDLE_ROUND_OFF, .pivot = INFINITY, .pivot_row = -1 };
+    status = pw_massless_open (&k->massless, w, weight, rows, active, error);
     if (status == PW_OK) status = pw_condense (k, weight, rows, active);
   }
   if (status == PW_OK) return k;
   pw_saddle_close (k);
-  pw_fail (error, status, "model %s: out of memory", s->model);
+  pw_fail (error, status, "model %s: out of memory", w->s->model);
   return NULL;
 }
 

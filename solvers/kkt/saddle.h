@@ -15,7 +15,8 @@ typedef struct pw_saddle pw_saddle;
 /* rows: the first so many rows of J take part (all, or the holonomic ones), of these those with active[i] != 0 if
  * active is given; the system's J must be swept at a typical pose.  weight: coords, copied.
  * Errors: PW_MACHINE; PW_INPUT if a coordinate without weight is determined by no row. */
-pw_saddle *pw_saddle_open (pw_system *s, const double *weight, int rows, const unsigned char *active, pw_error *error);
+pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
+                           pw_error *error);
 void pw_saddle_close (pw_saddle *k);
 
 /* Factorises with the J last swept.  Returns PW_OK, or PW_RETRY if the smallest pivot is what round-off leaves of a

@@ -38,8 +38,9 @@ static void nullspace_add (pw_nullspace *b, const pw_system *s, int j, int row, 
 }
 
 /* Counts the pieces of every panel, one place further on, or fills them in. */
-static void nullspace_list (pw_nullspace *b, const pw_system *s, int fill) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
+static void nullspace_list (pw_nullspace *b, const pw_workspace *w, int fill) {
+  const pw_system *s = w->s;
+  for (const pw_slab *k = w->slab; k < w->slab + s->constraints; k++)
     for (int e = 0; e < k->b.count; e++)
       for (int i = 0, n = e * k->kind->rows; i < k->kind->rows; i++, n++) {
         const double *J = k->J + n * k->b.cols;
@@ -73,10 +74,11 @@ static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
 }
 
 /* Panel n has the pieces from its `first` to the next one's. */
-static void nullspace_plan (pw_nullspace *b, const pw_system *s) {
-  nullspace_list (b, s, 0);
+static void nullspace_plan (pw_nullspace *b, const pw_workspace *w) {
+  const pw_system *s = w->s;
+  nullspace_list (b, w, 0);
   for (int n = 0; n <= b->panels; n++) b->panel[n + 1].first += b->panel[n].first;
-  nullspace_list (b, s, 1);
+  nullspace_list (b, w, 1);
   for (int n = 0; n < b->panels; n++) {
     b->panel[n].j = n < s->bodies ? 3 * n : n + 2 * s->bodies;
     b->panel[n].width = n < s->bodies ? 3 : 1;
@@ -93,7 +95,7 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
   if (nullspace_allocate (b, s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
   for (int i = 0, n = 0; i < s->rows; i++) b->place[i] = r->active && !r->active[i] ? -1 : n++;
-  nullspace_plan (b, s);
+  nullspace_plan (b, r->w);
   for (int j = 0; j < s->coords; j++) b->inverse[j] = 1 / s->metric[j];
   return PW_OK;
 }
@@ -120,13 +122,13 @@ PW_INLINE void nullspace_gather (pw_nullspace *b, const pw_nullspace_panel *p, c
 }
 
 /* K and the right-hand side, the latter in mu. */
-static void nullspace_assemble (pw_nullspace *b, pw_system *s, const double *w) {
+static void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w) {
   int m = b->rows;
   memset (b->K, 0, (size_t)m * (size_t)m * sizeof *b->K);
   memset (b->mu, 0, (size_t)m * sizeof *b->mu);
-  if (s->moving) {
-    pw_sweep_eta (s, b->eta);
-    for (int i = 0; i < s->rows; i++)
+  if (r->s->moving) {
+    pw_sweep_eta (r->w, b->eta);
+    for (int i = 0; i < r->s->rows; i++)
       if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i];
   }
   for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
@@ -184,9 +186,9 @@ static int nullspace_pivot (pw_nullspace *b) {
 /* ---- A step ---- */
 
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
-  int status = pw_place (r->s, r->t, r->q, r->v);
+  int status = pw_place (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->s);
+  pw_sweep_J (r->w);
   for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
     for (pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
       for (int c = 0; c < p->width; c++) x->reference[c] = x->J[c] * b->inverse[p->j + c];
@@ -194,31 +196,31 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
 }
 
 /* mu; PW_RETRY if K is singular. */
-static int nullspace_multipliers (pw_nullspace *b, pw_system *s, const double *w) {
-  nullspace_assemble (b, s, w);
+static int nullspace_multipliers (pw_nullspace *b, pw_run *r, const double *w) {
+  nullspace_assemble (b, r, w);
   if (nullspace_eliminate (b->K, b->mu, b->rows)) return PW_OK;
-  nullspace_assemble (b, s, w);
+  nullspace_assemble (b, r, w);
   return nullspace_pivot (b);
 }
 
 /* The rates at the placed pose, J swept. */
-static int nullspace_correct (pw_nullspace *b, pw_system *s, double *v) {
-  if (nullspace_multipliers (b, s, v) != PW_OK) return PW_RETRY;
+static int nullspace_correct (pw_nullspace *b, pw_run *r, double *v) {
+  if (nullspace_multipliers (b, r, v) != PW_OK) return PW_RETRY;
   for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
     for (const pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
       for (int c = 0; c < p->width; c++) v[p->j + c] += x->reference[c] * b->mu[x->row];
-  return pw_place_rates (s, v);
+  return pw_place_rates (r->w, v);
 }
 
 int pw_nullspace_rates (pw_nullspace *b, pw_run *r, double t, const double *q, double *v) {
-  int status = pw_place (r->s, t, q, v);
+  int status = pw_place (r->w, t, q, v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->s);
-  return nullspace_correct (b, r->s, v);
+  pw_sweep_J (r->w);
+  return nullspace_correct (b, r, v);
 }
 
 int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda) {
-  pw_sweep_gamma (r->s, lambda);
+  pw_sweep_gamma (r->w, lambda);
   int status = pw_accelerate_swept (r, v, a, lambda);
   if (pw_watchdog_near (r)) r->near = 1;
   return status;
@@ -226,21 +228,21 @@ int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lamb
 
 /* The energy at (t, q) with the minimal velocities that w has. */
 static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double *q, const double *w, double *energy) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   memcpy (b->v, w, (size_t)s->coords * sizeof *w);
   int status = pw_nullspace_rates (b, r, t, q, b->v);
-  if (status == PW_OK) *energy = pw_kinetic (s, b->v) + pw_potential (s);
+  if (status == PW_OK) *energy = pw_kinetic (s, b->v) + pw_potential (r->w);
   return status;
 }
 
 int pw_nullspace_settle (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   int row, status = PW_OK;
   double worst, before = 0;
   if (p == NULL || s->holonomic == 0) return pw_nullspace_rates (b, r, t, q, v);
   if (added) status = nullspace_energy (b, r, t, q, v, &before);
   if (status == PW_OK) status = pw_project_positions (p, r, t, q, v, &row, &worst);
-  if (status == PW_OK) status = nullspace_correct (b, s, v);
-  if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (s) - before;
+  if (status == PW_OK) status = nullspace_correct (b, r, v);
+  if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (r->w) - before;
   return status;
 }

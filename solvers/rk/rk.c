@@ -197,8 +197,8 @@ static inline int rk_stage (pw_run *r, double t, double *v, double *a) {
 /* Signals of forces keep the values of the step's beginning, wherever the system was placed last: by a sample, or a step
  * that was rejected. */
 static int rk_hold (pw_run *r) {
-  int status = pw_place (r->s, r->t, r->q, r->v);
-  pw_hold (r->s, status == PW_OK);
+  int status = pw_place (r->w, r->t, r->q, r->v);
+  pw_hold (r->w, status == PW_OK);
   return status;
 }
 
@@ -206,31 +206,30 @@ static int rk_hold (pw_run *r) {
 static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
-  pw_system *s = r->s;
   d->V[0] = r->v, d->A[0] = r->a, d->R[0] = r->rate;
   int status = d->held ? rk_hold (r) : PW_OK;
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
     rk_combine (r, d->q, d->V[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
     status = rk_stage (r, t, d->V[i], d->A[i]);
-    if (status == PW_OK) pw_sweep_ledger (s, d->lambda, d->R[i]);
+    if (status == PW_OK) pw_sweep_ledger (r->w, d->lambda, d->R[i]);
   }
-  if (d->held) pw_hold (s, 0);
+  if (d->held) pw_hold (r->w, 0);
   return status;
 }
 
 /* Projects the new state, and evaluates its accelerations; the energy this adds goes to the ledger. */
 static int rk_project (pw_run *r, double t, double *added) {
   struct pw_method_data *d = r->data;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   int status = PW_OK;
   double before = 0;
   if (added) {
-    status = pw_place (s, t, d->q, d->v);
-    before = pw_kinetic (s, d->v) + pw_potential (s);
+    status = pw_place (r->w, t, d->q, d->v);
+    before = pw_kinetic (s, d->v) + pw_potential (r->w);
   }
   if (status == PW_OK) status = pw_project_state (&d->projector, r, t, d->q, d->v, d->a, d->lambda);
-  if (status == PW_OK && added) *added += pw_kinetic (s, d->v) + pw_potential (s) - before;
+  if (status == PW_OK && added) *added += pw_kinetic (s, d->v) + pw_potential (r->w) - before;
   return status;
 }
 
@@ -268,7 +267,7 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   d->projected0 = r->projected;
   pw_rk_ledger (r, r->ledger, d->ledger0, h);
   r->projected += added;
-  pw_sweep_ledger (r->s, r->lambda, r->rate);
+  pw_sweep_ledger (r->w, r->lambda, r->rate);
 }
 
 double pw_rk_distance (const pw_run *r) {
@@ -276,7 +275,7 @@ double pw_rk_distance (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   double most = 0;
   for (int j = 0; j < s->coords; j++) {
-    double q = fabs (d->q[j] - r->q_at[j]), v = s->scale.time * fabs (d->v[j] - r->v_at[j]);
+    double q = fabs (d->q[j] - r->q_at[j]), v = r->w->scale.time * fabs (d->v[j] - r->v_at[j]);
     most = pw_largest (most, pw_largest (q, v) / pw_unit (s, j));
   }
   return most;

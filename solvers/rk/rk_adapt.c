@@ -27,7 +27,7 @@
 
 void pw_rk_begin_adaptive (pw_run *r) {
   struct pw_method_data *d = r->data;
-  d->h = 0.1 * r->s->scale.time * pow (r->settings.rtol, d->tableau->exponent);
+  d->h = 0.1 * r->w->scale.time * pow (r->settings.rtol, d->tableau->exponent);
   d->before = 1e-4;
 }
 
@@ -118,7 +118,7 @@ static double adapt_ledger (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
   double e[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h);
-  pw_sweep_ledger (r->s, d->lambda, d->R[b->stages]);
+  pw_sweep_ledger (r->w, d->lambda, d->R[b->stages]);
   for (int k = 0; k < (b->e3 ? 3 : 1); k++) {
     adapt_estimate (&d->estimate[k], d->R, r->s->entries, r->ledger_at);
     for (int i = 0; i < r->s->entries; i++) e[k] += r->ledger_at[i] * r->ledger_at[i] / (tolerance * tolerance);
@@ -193,7 +193,7 @@ static int adapt_fail (pw_run *r, int status, double h, pw_error *error) {
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {
   struct pw_method_data *d = r->data;
   double stop = fmin (t_end, r->breakpoint), most = 5;
-  double least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->s->scale.time);
+  double least = 16 * DBL_EPSILON * fmax (fabs (r->t), 1e-6 * r->w->scale.time);
   int status = PW_OK, project = d->projects && (r->statistics.steps + 1) % d->every == 0;
   for (;;) {
     double t1 = r->t + d->h, added = 0, off;

@@ -33,7 +33,7 @@ void pw_between_keep (pw_between *b, const pw_run *r) {
 }
 
 void pw_between_count (pw_between *b, pw_run *r) {
-  pw_sweep_ledger (r->s, r->lambda, r->rate);
+  pw_sweep_ledger (r->w, r->lambda, r->rate);
   for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->t0) * (b->rate0[i] + r->rate[i]);
 }
 
@@ -44,7 +44,7 @@ static double between_hermite (double x, double h, double y0, double s0, double 
 }
 
 static int between_inside (pw_between *b, pw_run *r, double t) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   double h = r->t - b->t0, x = (t - b->t0) / h, worst;
   int row;
   for (int j = 0; j < s->coords; j++) {
@@ -56,8 +56,8 @@ static int between_inside (pw_between *b, pw_run *r, double t) {
   for (int i = 0; i < s->entries; i++)
     r->ledger_at[i] = b->ledger0[i] + h * x * (b->rate0[i] + 0.5 * x * (r->rate[i] - b->rate0[i]));
   if (b->rates < 0) {
-    int placed = pw_place (s, t, r->q_at, r->v_at);
-    if (placed == PW_OK) pw_sweep_J (s);
+    int placed = pw_place (r->w, t, r->q_at, r->v_at);
+    if (placed == PW_OK) pw_sweep_J (r->w);
     return placed;
   }
   int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at, &row, &worst);

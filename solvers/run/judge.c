@@ -6,7 +6,7 @@
 double pw_run_agitation (const pw_run *r) {
   const pw_system *s = r->s;
   const double *a = r->a, *own = a + 3 * s->bodies;
-  double linear = 0, angular = 0, per = s->scale.time * s->scale.time;
+  double linear = 0, angular = 0, per = r->w->scale.time * r->w->scale.time;
   for (; a < own; a += 3) {
     linear = pw_largest (linear, fabs (a[0]));
     linear = pw_largest (linear, fabs (a[1]));
@@ -19,7 +19,7 @@ double pw_run_agitation (const pw_run *r) {
 static int judge_lost (pw_run *r, pw_error *error) {
   pw_residuals now;
   char element[120] = "a constraint", cause[60] = "constraint drift";
-  pw_sweep_residuals (r->s, NULL, &now);
+  pw_sweep_residuals (r->w, NULL, &now);
   int row = now.position > now.velocity ? now.row_position : now.row_velocity;
   if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
   const char *advice = "";
@@ -96,9 +96,9 @@ static int judge_outburst (pw_run *r, pw_error *error) {
 static int judge_contradicts (pw_run *r) {
   const double round_off = r->limits.follows;
   pw_residuals all, enforced;
-  pw_sweep_residuals (r->s, NULL, &all);
+  pw_sweep_residuals (r->w, NULL, &all);
   if (all.position <= round_off && all.velocity <= round_off) return 0;
-  pw_sweep_residuals (r->s, r->active, &enforced);
+  pw_sweep_residuals (r->w, r->active, &enforced);
   double explained = round_off + r->limits.magnified * fmax (enforced.position, enforced.velocity);
   return !(all.position <= explained && all.velocity <= explained);
 }

@@ -16,26 +16,26 @@ static double ledger_of_scene (const pw_run *r) {
 /* Where nothing has mass: the work and losses of a time T at irregular velocities of L / T and 1 / T, and the change of
  * potential energy by irregular displacements of L and 1 rad.  The system is placed at the state reached, here and behind. */
 static double ledger_of_massless (pw_run *r) {
-  pw_system *s = r->s;
-  double *q = r->scratch, *v = q + s->coords + 3, *lambda = v + s->coords + 3, T = s->scale.time, sum = 0;
+  const pw_system *s = r->s;
+  double *q = r->scratch, *v = q + s->coords + 3, *lambda = v + s->coords + 3, T = r->w->scale.time, sum = 0;
   for (int j = 0; j < s->coords; j++) {
     double unit = pw_unit (s, j) * (1 + 0.37 * (j % 5)) / 2;
     q[j] = r->q[j] + unit;
     v[j] = unit / T;
   }
   memset (lambda, 0, (size_t)s->rows * sizeof *lambda);
-  if (pw_place (s, r->t, q, v) == PW_OK) {
-    pw_sweep_ledger (s, lambda, r->ledger_at);
+  if (pw_place (r->w, r->t, q, v) == PW_OK) {
+    pw_sweep_ledger (r->w, lambda, r->ledger_at);
     for (int i = 0; i < s->entries; i++) sum += T * fabs (r->ledger_at[i]);
-    sum += fabs (pw_potential (s) - r->potential0);
+    sum += fabs (pw_potential (r->w) - r->potential0);
   }
-  s->failed = NULL;
-  pw_place (s, r->t, r->q, r->v);
+  r->w->failed = NULL;
+  pw_place (r->w, r->t, r->q, r->v);
   return sum;
 }
 
 void pw_ledger_begin (pw_run *r) {
-  r->potential0 = pw_potential (r->s);
+  r->potential0 = pw_potential (r->w);
   r->exchanged = pw_kinetic (r->s, r->v);
   r->energy0 = r->exchanged + r->potential0;
   r->energy_scene = ledger_of_scene (r);
@@ -47,7 +47,7 @@ void pw_ledger_note (pw_run *r) {
   const long every = 16;
   double power = 0;
   if (r->statistics.steps > every && r->statistics.steps % every != 0) return;
-  double exchanged = fmax (pw_kinetic (r->s, r->v), fabs (pw_potential (r->s) - r->potential0));
+  double exchanged = fmax (pw_kinetic (r->s, r->v), fabs (pw_potential (r->w) - r->potential0));
   for (int i = 0; i < r->s->entries; i++) power += fabs (r->rate[i]);
   if (exchanged > r->exchanged && isfinite (exchanged)) r->exchanged = exchanged;
   if (power > r->power && isfinite (power)) r->power = power;
@@ -67,7 +67,7 @@ double pw_ledger_tolerance (const pw_run *r, double h) {
   const pw_settings *set = &r->settings;
   double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);
   for (int i = 0; i < r->s->entries; i++) work += fabs (r->ledger[i]);
-  double energy = fmax (fmax (r->energy_scene, r->exchanged), fmin (work, r->power * r->s->scale.time));
+  double energy = fmax (fmax (r->energy_scene, r->exchanged), fmin (work, r->power * r->w->scale.time));
   double tolerance = share * rtol * energy + round_off * fabs (h) * r->power + 16 * DBL_EPSILON * work;
   return tolerance > 0 && isfinite (tolerance) ? tolerance : DBL_MAX;
 }

@@ -22,7 +22,7 @@ static double limits_speed (const pw_run *r, int *state) {
   double most = 0;
   *state = s->coords;
   for (int j = 0; j < s->coords; j++) {
-    double speed = fabs (r->v[j]) * s->scale.time / pw_unit (s, j);
+    double speed = fabs (r->v[j]) * r->w->scale.time / pw_unit (s, j);
     if (speed > most) most = speed, *state = s->coords + j;
   }
   return most;

@@ -77,15 +77,15 @@ double pw_step_size (pw_run *r, double t_end) {
 /* Accelerations at the new state, which is projected first. */
 static int step_evaluate (pw_run *r, double t, double *q, double *v) {
   struct pw_method_data *d = r->data;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   double size = 0;
   for (int j = 0; j < s->coords; j++) size += q[j] * q[j] + v[j] * v[j];
   if (!(size < 1e300)) return PW_RETRY;
   if (d->projector.position == NULL) return pw_accelerate (r, t, q, v, d->a, d->lambda);
-  int status = pw_place (s, t, q, v);
-  double before = pw_kinetic (s, v) + pw_potential (s);
+  int status = pw_place (r->w, t, q, v);
+  double before = pw_kinetic (s, v) + pw_potential (r->w);
   if (status == PW_OK) status = pw_project_state (&d->projector, r, t, q, v, d->a, d->lambda);
-  if (status == PW_OK && r->settings.ledger) r->projected += pw_kinetic (s, v) + pw_potential (s) - before;
+  if (status == PW_OK && r->settings.ledger) r->projected += pw_kinetic (s, v) + pw_potential (r->w) - before;
   return status;
 }
 

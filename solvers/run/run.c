@@ -10,17 +10,17 @@
 
 int pw_run_blame (const pw_run *r, int status, pw_error *error) {
   char signal[160];
-  if (status == PW_OK || error == NULL || *pw_failed_signal (r->s, signal, sizeof signal) == 0) return status;
+  if (status == PW_OK || error == NULL || *pw_failed_signal (r->w, signal, sizeof signal) == 0) return status;
   size_t n = strlen (error->text);
   const char *glue = strstr (error->text, "a signal failed") ? ":" : "; ahead";
-  const char *either = r->s->failed->forced ? "" : ", or a derivative of it,";
+  const char *either = r->w->failed->forced ? "" : ", or a derivative of it,";
   snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", glue, signal, either);
   return status;
 }
 
 int pw_run_open_saddle (pw_run *r, pw_error *error) {
   pw_saddle_close (r->saddle);
-  r->saddle = pw_saddle_open (r->s, r->s->mass, r->s->rows, r->active, error);
+  r->saddle = pw_saddle_open (r->w, r->s->mass, r->s->rows, r->active, error);
   if (r->saddle == NULL) return error ? error->status : PW_MACHINE;
   return pw_watchdog_open (r, error);
 }
@@ -29,7 +29,7 @@ int pw_run_evaluate (pw_run *r, pw_error *error) {
   int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   if (status > 0) return pw_fail_singular (r, r->t, error);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_sweep_ledger (r->s, r->lambda, r->rate);
+  pw_sweep_ledger (r->w, r->lambda, r->rate);
   pw_bound_tolerances (r);
   return PW_OK;
 }
@@ -43,13 +43,13 @@ void pw_run_watch (pw_run *r) {
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
   char signal[160];
-  double next = pw_next_breakpoint (r->s, r->method->order > 2, r->t);
+  double next = pw_next_breakpoint (r->w, r->method->order > 2, r->t);
   if (!isnan (next)) {
     r->breakpoint = next;
     return PW_OK;
   }
-  pw_failed_signal (r->s, signal, sizeof signal);
-  r->s->failed = NULL;
+  pw_failed_signal (r->w, signal, sizeof signal);
+  r->w->failed = NULL;
   return pw_fail (error, PW_METHOD, "t = %.17g s: %s: its breakpoint function tells a time that is not later", r->t,
                   signal);
 }
@@ -70,7 +70,7 @@ void pw_close (pw_run *r) {
   pw_saddle_close (r->saddle);
   pw_watchdog_close (r);
   pw_rank_close (r);
-  r->s->taken = 0;
+  pw_workspace_free (r->w);
   free (r->memory);
   free (r);
 }
@@ -139,7 +139,7 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   status = pw_run_attempt (r, error);
   if (status != PW_OK) return status;
   pw_forget_residuals (r);
-  r->s->failed = NULL;
+  r->w->failed = NULL;
   if (r->t >= r->breakpoint || r->interrupted) status = run_pass_breakpoint (r, error);
   r->interrupted = 0;
   if (status == PW_OK && r->redundant && r->grip < r->reselect) status = run_reselect (r, error);
@@ -170,9 +170,9 @@ double pw_time (const pw_run *r) {
 
 /* Energies and the ledger of the state in the sample arrays, which is placed. */
 static void run_account (pw_run *r, pw_sample *sample) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   sample->kinetic = pw_kinetic (s, r->v_at);
-  sample->potential = pw_potential (s);
+  sample->potential = pw_potential (r->w);
   for (int i = 0; i < s->entries; i++)
     *(s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += r->ledger_at[i];
   if (r->settings.ledger) sample->ledger = r->ledger_at, sample->projection = r->projected_at;
@@ -192,7 +192,7 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
   if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_share (r, r->lambda_at);
   run_account (r, sample);
-  pw_sweep_residuals (r->s, NULL, &now);
+  pw_sweep_residuals (r->w, NULL, &now);
   sample->position = now.position;
   sample->velocity = now.velocity;
   return PW_OK;
@@ -219,9 +219,9 @@ static void run_exchange (double *x, double *kept, const double *other, int n) {
 }
 
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
-  if (pw_place (r->s, r->t, r->q, r->v) != PW_OK)
+  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  *energy = pw_kinetic (r->s, r->v) + pw_potential (r->s);
+  *energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
   return PW_OK;
 }
 
@@ -236,7 +236,7 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   int status = run_energy (r, &before, error);
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
-  r->s->t_signal = NAN;
+  r->w->t_signal = NAN;
   run_exchange (r->q, r->q_at, q, n);
   run_exchange (r->v, r->v_at, v, n);
   r->near = 0;
@@ -269,5 +269,5 @@ const pw_start_report *pw_run_start (const pw_run *r) {
 }
 
 const pw_scale *pw_run_scale (const pw_run *r) {
-  return &r->s->scale;
+  return &r->w->scale;
 }

@@ -51,9 +51,9 @@ static int checkpoint_plausible (const pw_run *r) {
 
 /* From the state in the run, in either of them; `a` is loading and has the method's own next, if there is any. */
 static int checkpoint_go_on (pw_run *r, pw_archive *a, pw_error *error) {
-  if (pw_place (r->s, r->t, r->q, r->v) != PW_OK)
+  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_sweep_J (r->s);
+  pw_sweep_J (r->w);
   r->near = 0;
   if (r->method->carry == NULL) r->statistics.restarts++;
   int status = pw_run_renew (r, 0, error);

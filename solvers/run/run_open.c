@@ -105,8 +105,8 @@ static int run_check_finite (pw_run *r, pw_error *error) {
     if (wild < 0 && !isfinite (r->a[j])) wild = j;
   }
   for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
-  if (isfinite (sum) || pw_place (r->s, r->t, r->q, r->v) != PW_OK) return PW_OK;
-  if (pw_find_wild (r->s, element, sizeof element))
+  if (isfinite (sum) || pw_place (r->w, r->t, r->q, r->v) != PW_OK) return PW_OK;
+  if (pw_find_wild (r->w, element, sizeof element))
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
   if (wild < 0) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: the acceleration of %s is not finite", r->t,
@@ -117,10 +117,10 @@ static int run_check_finite (pw_run *r, pw_error *error) {
 static int run_check_derivatives (pw_run *r, const char *method, pw_error *error) {
   char block[200];
   if (!r->differentiates) return PW_OK;
-  int found = pw_find_missing (r->s, r->t, r->q, r->v, block, sizeof block);
+  int found = pw_find_missing (r->w, r->t, r->q, r->v, block, sizeof block);
   if (found == PW_MACHINE) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   if (found == 0)
-    return pw_place (r->s, r->t, r->q, r->v) == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "a signal failed");
+    return pw_place (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "a signal failed");
   return pw_fail (
       error, PW_INPUT,
       "model %s: %s is left out, but it is not zero, and %s needs it: add it, or PW_BY_DIFFERENCES in its place",
@@ -129,7 +129,6 @@ static int run_check_derivatives (pw_run *r, const char *method, pw_error *error
 
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
   pw_settings none = { 0 };
-  r->s->failed = NULL;
   r->limits = pw_watchdog_limits;
   r->refuse = r->limits.rank;
   if (pw_watchdog_check_masses (r->s, &r->limits, error) != PW_OK) return PW_INPUT;
@@ -142,13 +141,13 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
     status = pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
   if (status != PW_OK) return status;
   r->t = r->t_at = r->settings.t;
-  pw_hold (r->s, 0);
-  r->s->scale.time = r->settings.span;
+  pw_hold (r->w, 0);
+  r->w->scale.time = r->settings.span;
   status = pw_make_consistent (r, r->s->held, error);
   if (status == PW_OK) status = run_first_evaluation (r, error);
   if (status == PW_OK) status = run_check_finite (r, error);
   if (status != PW_OK) return status;
-  r->s->scale.time = run_time_scale (r);
+  r->w->scale.time = run_time_scale (r);
   pw_count_moved (r);
   status = run_begin (r, error);
   if (status == PW_OK) pw_read_baumgarte (r);
@@ -156,24 +155,16 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   return status == PW_OK ? run_check_derivatives (r, method, error) : status;
 }
 
-/* A run that has the system to itself: two would move the poses under each other's feet. */
-static pw_run *run_take (pw_system *s, pw_error *error) {
-  pw_run *r = NULL;
+pw_run *pw_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
-  if (s->taken)
-    pw_fail (error, PW_INPUT, "model %s: a run is open on this system already: close that, or compile the model again",
-             s->model);
-  else if ((r = calloc (1, sizeof *r)) == NULL)
+  pw_run *r = calloc (1, sizeof *r);
+  if (r == NULL) {
     pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  else
-    s->taken = 1, r->s = s;
-  return r;
-}
-
-pw_run *pw_open (pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
-  pw_run *r = run_take (s, error);
-  if (r == NULL) return NULL;
-  if (pw_run_blame (r, run_open (r, method, settings, error), error) == PW_OK) return r;
+    return NULL;
+  }
+  r->s = s;
+  r->w = pw_workspace_new (s, error);
+  if (r->w && pw_run_blame (r, run_open (r, method, settings, error), error) == PW_OK) return r;
   pw_close (r);
   return NULL;
 }

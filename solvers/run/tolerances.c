@@ -15,7 +15,7 @@
 void pw_bound_tolerances (pw_run *r) {
   int coords = r->s->coords, n = 2 * coords;
   if (!r->s->saturates) return;
-  pw_sweep_saturation (r->s, r->saturation);
+  pw_sweep_saturation (r->w, r->saturation);
   for (int j = 0; j < n; j++) {
     double y = j < coords ? r->q[j] : r->v[j - coords];
     r->outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
@@ -33,11 +33,11 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
   if (!r->s->saturates) return;
   memcpy (r->matrix_state, q, (size_t)coords * sizeof *q);
   memcpy (r->matrix_state + coords, v, (size_t)coords * sizeof *v);
-  pw_sweep_saturation (r->s, r->matrix_range);
+  pw_sweep_saturation (r->w, r->matrix_range);
 }
 
 double pw_first_step (const pw_run *r) {
-  double T = r->s->scale.time, h = 0.5 * T * sqrt (r->settings.rtol);
+  double T = r->w->scale.time, h = 0.5 * T * sqrt (r->settings.rtol);
   for (int j = 0, n = r->s->coords; j < n; j++) {
     if (r->v[j] != 0) h = fmin (h, fmax (r->saturation[j] / fabs (r->v[j]), 1e-9 * T));
     if (r->a[j] != 0) h = fmin (h, fmax (r->saturation[n + j] / fabs (r->a[j]), 1e-9 * T));
@@ -46,11 +46,12 @@ double pw_first_step (const pw_run *r) {
 }
 
 int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   double *rest = r->scratch;
   int state = -1;
   for (int j = 0; j < s->coords; j++) rest[j] = 0;
-  if (s->saturates && pw_place (s, r->t, r->q, rest) == PW_OK) state = pw_find_saturation (s, least, element, size);
-  if (s->saturates) (void)pw_place (s, r->t, r->q, r->v);
+  if (s->saturates && pw_place (r->w, r->t, r->q, rest) == PW_OK)
+    state = pw_find_saturation (r->w, least, element, size);
+  if (s->saturates) (void)pw_place (r->w, r->t, r->q, r->v);
   return state;
 }

@@ -137,7 +137,7 @@ int pw_watchdog_open (pw_run *r, pw_error *error) {
   g->saddle = NULL;
   if (g->q && weight) {
     for (int j = 0; j < s->coords; j++) weight[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
-    g->saddle = pw_saddle_open (r->s, weight, s->rows, r->active, error);
+    g->saddle = pw_saddle_open (r->w, weight, s->rows, r->active, error);
   }
   free (weight);
   return g->saddle ? PW_OK : pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
@@ -190,8 +190,8 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
 }
 
 int pw_watchdog_near_state (pw_run *r) {
-  if (pw_place (r->s, r->t, r->q, r->v) != PW_OK) return 0;
-  pw_sweep_J (r->s);
+  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK) return 0;
+  pw_sweep_J (r->w);
   r->geometry.alert = 1;
   return pw_watchdog_near (r);
 }
@@ -239,15 +239,15 @@ int pw_watchdog_reaches (const pw_run *r, double sine, double length) {
 
 /* What sines are like elsewhere: at configurations all over the place, which need not meet the constraints. */
 static void watchdog_look_around (pw_run *r) {
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   pw_geometry *g = &r->geometry;
   for (int n = 1; n <= WATCHDOG_PLACES; n++) {
     for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * sin (2.39996 * (j + 1) * n + n);
-    if (pw_place (s, r->t, g->q, r->v) != PW_OK) break;
-    pw_sweep_J (s);
+    if (pw_place (r->w, r->t, g->q, r->v) != PW_OK) break;
+    pw_sweep_J (r->w);
     g->typical = fmax (g->typical, pw_watchdog_sine (r, NULL));
   }
-  if (pw_place (s, r->t, r->q, r->v) == PW_OK) pw_sweep_J (s);
+  if (pw_place (r->w, r->t, r->q, r->v) == PW_OK) pw_sweep_J (r->w);
 }
 
 void pw_watchdog_begin (pw_run *r) {

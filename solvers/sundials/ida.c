@@ -18,13 +18,13 @@ static double ida_leading (const ida_data *d) {
   const pw_run *r = d->sun.run;
   pw_real c = 0;
   if (r->t == d->sun.t0 || IDAGetCurrentCj (d->memory, &c) != IDA_SUCCESS || c == 0) c = 1 / pw_first_step (r);
-  return fmax (c, 1 / r->s->scale.time);
+  return fmax (c, 1 / r->w->scale.time);
 }
 
 /* The scale of forces: that of the masses, else that of the multipliers; 1 where nothing has mass and nothing pulls. */
 static double ida_force (const pw_run *r) {
   const pw_system *s = r->s;
-  double L = s->scale.length, T = s->scale.time, force = 0;
+  double L = s->scale.length, T = r->w->scale.time, force = 0;
   for (int j = 0; j < s->coords; j++) force = fmax (force, s->mass[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
   if (force > 0) return force;
   for (int i = 0; i < s->rows; i++) force = fmax (force, fabs (r->lambda[i]));
@@ -43,7 +43,7 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
   const double *y = N_VGetArrayPointer (vy);
   int stiff = d->velocities && !d->impulses;
   double *w = N_VGetArrayPointer (weights), force = ida_force (r);
-  double L = r->s->scale.length, T = r->s->scale.time, c = stiff ? ida_leading (d) : 1 / T;
+  double L = r->s->scale.length, T = r->w->scale.time, c = stiff ? ida_leading (d) : 1 / T;
   double relax = d->impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   pw_sun_weigh (&d->sun, y, w);
   for (int i = 0; i < d->rows; i++) {
@@ -107,7 +107,7 @@ static int ida_interpolate (ida_data *d, double t) {
 
 static int ida_power (pw_run *r, double t, double *rate) {
   int flag = ida_interpolate (r->data, t);
-  if (flag == IDA_SUCCESS) pw_sweep_ledger (r->s, r->lambda_at, rate);
+  if (flag == IDA_SUCCESS) pw_sweep_ledger (r->w, r->lambda_at, rate);
   return flag == IDA_SUCCESS ? PW_OK : PW_RETRY;
 }
 
@@ -122,7 +122,7 @@ static int ida_work (ida_data *d, int status) {
     pw_accelerate_placed (r, r->v, r->a_at, r->lambda_at);
     lambda = r->lambda_at;
   }
-  pw_sweep_ledger (r->s, lambda, r->rate);
+  pw_sweep_ledger (r->w, lambda, r->rate);
   IDAGetLastOrder (d->memory, &order);
   if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return 0;
   memcpy (y, r->q, (size_t)d->n * sizeof *y);
@@ -141,7 +141,7 @@ static int ida_open_vectors (ida_data *d, pw_run *r) {
   if (!d->yp || !d->id || !d->scale) return PW_MACHINE;
   d->given = d->scale + d->n;
   d->unit = d->given + 2 * d->n + 6 + 2 * s->rows;
-  for (int i = 0; i < d->rows; i++) d->unit[i] = pw_rank_size (s, d->tangent.map ? d->tangent.row[i] : i);
+  for (int i = 0; i < d->rows; i++) d->unit[i] = pw_rank_size (d->sun.run->w, d->tangent.map ? d->tangent.row[i] : i);
   for (int j = 0; j < d->n; j++) d->scale[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   for (int i = 0; i < d->size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->n || d->impulses;
   ida_fill_vectors (d);

@@ -11,8 +11,8 @@
 #include "ida.h"
 
 int pw_ida_place (ida_data *d, double t, const double *y) {
-  int status = pw_place (d->sun.run->s, pw_before_breakpoint (d->sun.run, t), y, y + d->n);
-  if (status == PW_OK) pw_sweep_J (d->sun.run->s);
+  int status = pw_place (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->n);
+  if (status == PW_OK) pw_sweep_J (d->sun.run->w);
   return status == PW_OK ? 0 : -1;
 }
 
@@ -29,52 +29,51 @@ static const double *ida_mu (ida_data *d, const double *y, const double *yp) {
 
 /* q' - v + D G^T mu */
 static void ida_kinematics (ida_data *d, const double *y, const double *yp, double *out) {
-  pw_system *s = d->sun.run->s;
   int n = d->n;
   for (int j = 0; j < n; j++) out[j] = yp[j] - y[n + j];
   if (!d->positions) return;
   double *pull = d->given;
   memset (pull, 0, (size_t)n * sizeof *pull);
-  pw_add_JT (s, ida_mu (d, y, yp), pull);
+  pw_add_JT (d->sun.run->w, ida_mu (d, y, yp), pull);
   for (int j = 0; j < n; j++) out[j] += d->scale[j] * pull[j];
 }
 
 /* M v' + J^T lambda - f */
 static void ida_momentum (ida_data *d, const double *y, const double *yp, double *out) {
-  pw_system *s = d->sun.run->s;
+  const pw_system *s = d->sun.run->s;
   int n = d->n;
   double *pull = d->given, *f = pull + n + 3;
   memset (pull, 0, (size_t)n * sizeof *pull);
-  pw_add_JT (s, ida_lambda (d, y, yp), pull);
-  pw_sweep_force (s, f);
+  pw_add_JT (d->sun.run->w, ida_lambda (d, y, yp), pull);
+  pw_sweep_force (d->sun.run->w, f);
   for (int j = 0; j < n; j++) out[j] = s->mass[j] * yp[n + j] + pull[j] - f[j];
 }
 
 /* J v' - gamma + 2 alpha (J v - eta) + beta^2 g, all rows, onto J v - eta */
 static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *other) {
   pw_run *r = d->sun.run;
-  pw_system *s = r->s;
+  const pw_system *s = r->s;
   for (int i = 0; i < s->rows; i++) jv[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
-  pw_mul_J (s, yp + d->n, other);
+  pw_mul_J (r->w, yp + d->n, other);
   for (int i = 0; i < s->rows; i++) jv[i] += other[i];
-  pw_sweep_gamma (s, other);
+  pw_sweep_gamma (r->w, other);
   for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
   if (r->beta == 0) return;
-  pw_sweep_g (s, other);
+  pw_sweep_g (r->w, other);
   for (int i = 0; i < s->holonomic; i++) jv[i] += r->beta * r->beta * other[i];
 }
 
 /* J v - eta and g; or the stabilised accelerations */
 static void ida_constraints (ida_data *d, const double *y, const double *yp, double *out) {
-  pw_system *s = d->sun.run->s;
+  const pw_system *s = d->sun.run->s;
   double *jv = d->given, *other = jv + s->rows;
-  pw_mul_J (s, y + d->n, jv);
-  pw_sweep_eta (s, other);
+  pw_mul_J (d->sun.run->w, y + d->n, jv);
+  pw_sweep_eta (d->sun.run->w, other);
   for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
   if (!d->velocities) ida_stabilised (d, yp, jv, other);
   pw_tangent_compress (&d->tangent, jv, d->rows, out);
   if (!d->positions) return;
-  pw_sweep_g (s, other);
+  pw_sweep_g (d->sun.run->w, other);
   pw_tangent_compress (&d->tangent, other, d->mus, out + d->rows);
 }
 

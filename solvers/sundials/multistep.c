@@ -50,7 +50,7 @@ static int multistep_weigh (N_Vector y, N_Vector weights, void *data) {
 /* Projects (t, q, v): a part of the step, and of its energy.  Returns as pw_project_positions. */
 static int multistep_project (multistep_data *d, double t, double *q, double *v) {
   pw_run *r = d->sun.run;
-  int row, status = pw_place (r->s, t, q, v);
+  int row, status = pw_place (r->w, t, q, v);
   double worst;
   if (status == PW_OK) status = pw_project_positions (&d->projector, r, t, q, v, &row, &worst);
   return status == PW_OK ? pw_project_velocities (&d->projector, r, v) : status;
@@ -115,7 +115,7 @@ static int multistep_power (pw_run *r, double t, double *rate) {
   int near = r->near, status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
   if (status == PW_OK) status = multistep_complete (r->data, t);
   r->near = near;
-  if (status == PW_OK) pw_sweep_ledger (r->s, r->lambda_at, rate);
+  if (status == PW_OK) pw_sweep_ledger (r->w, r->lambda_at, rate);
   return status;
 }
 
@@ -215,7 +215,7 @@ static void multistep_evaluate (multistep_data *d) {
   pw_run *r = d->sun.run;
   pw_statistics keep = r->statistics;
   r->refuse = 0;
-  pw_sweep_gamma (r->s, r->lambda);
+  pw_sweep_gamma (r->w, r->lambda);
   d->evaluated = pw_accelerate_swept (r, r->v, r->a, r->lambda) == PW_OK;
   if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
   r->refuse = r->limits.rank;
@@ -228,11 +228,11 @@ static int multistep_work (multistep_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
   if (d->sun.klu && pw_ledger_reacts (r->s)) multistep_evaluate (d);
-  pw_sweep_ledger (r->s, r->lambda, r->rate);
+  pw_sweep_ledger (r->w, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
   if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
-  int status = pw_place (r->s, pw_before_breakpoint (r, r->t), r->q, r->v);
-  pw_sweep_J (r->s);
+  int status = pw_place (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
+  pw_sweep_J (r->w);
   return status;
 }
 
@@ -248,9 +248,9 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   r->t = t;
   pw_forget_residuals (r);
   d->evaluated = 0;
-  if (pw_place (r->s, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
+  if (pw_place (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
-  pw_sweep_J (r->s);
+  pw_sweep_J (r->w);
   pw_bound_tolerances (r);
   if (r->s->entries > 0 && multistep_work (d) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   return PW_OK;

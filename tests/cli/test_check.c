@@ -189,7 +189,7 @@ static void check_scene_expect (const pw_kind *kind, const char *what) {
   assert_non_null (s);
   double q[PW_PROBE_COORDS], v[PW_PROBE_COORDS];
   for (int j = 0; j < s->coords; j++) q[j] = sin (1. + 3 * j), v[j] = 0;
-  check_ok (pw_selftest_scene (s, kind, 0, q, v, 7, &report, &error), &error);
+  check_ok (pw_selftest_scene (s, 1, kind, 0, q, v, 7, &report, &error), &error);
   for (int i = 0; i < report.checks; i++)
     if (report.check[i].failed != (what != NULL && strcmp (report.check[i].name, what) == 0))
       fail_msg ("%s: %s is %g, %s", kind->name, report.check[i].name, report.check[i].error, report.check[i].where);

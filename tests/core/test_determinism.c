@@ -15,12 +15,12 @@ static const struct {
 } same_scenes[] = {
   { "models/ezyroller.c", NULL, 0, 1 },           { "models/ezyroller.c", "m2", 0.1, 1 },
   { "tests/scenes/zoo.c", NULL, 0, 0.4 },         { "tests/scenes/chain.c", "links", 5, 0.4 },
-  { "tests/scenes/chain.c", "links", 150, 0.02 },
+  { "tests/scenes/chain.c", "links", 150, 0.02 }, { "tests/scenes/feedback.yaml", NULL, 0, 0.4 },
 };
 static const char *const same_methods[] = { "rk4+none",      "rk4+projection", "rk4+projection:metric=identity",
                                             "ida+none",      "ida+ggl",        "rk4+projection:every=3",
                                             "ida+baumgarte", "ida+index2",     "ida+si1",
-                                            "adams+none",    "bdf+projection" };
+                                            "adams+none",    "bdf+projection", "rk4+baumgarte:inputs=held" };
 
 enum {
   SAME_SCENES = sizeof same_scenes / sizeof *same_scenes,
@@ -75,7 +75,7 @@ static pw_system *same_system (int scene, pw_error *error) {
 }
 
 /* The hash of a run on a system; 0 if it fails. */
-static uint64_t same_run_on (pw_system *s, int run, pw_error *error) {
+static uint64_t same_run_on (const pw_system *s, int run, pw_error *error) {
   double t = same_scenes[run / SAME_METHODS].t_end;
   pw_settings settings = { .step = 1e-3, .rtol = 1e-6, .span = t, .ledger = 1 };
   pw_run *r = pw_open (s, same_methods[run % SAME_METHODS], &settings, error);
@@ -151,6 +151,7 @@ static void test_used_system (void **state) {
 }
 
 typedef struct {
+  const pw_system *const *shared; /* one for each scene; NULL: each run compiles its own */
   int first;
   uint64_t hash[SAME_RUNS];
 } same_worker;
@@ -160,34 +161,52 @@ static void *same_work (void *context) {
   for (int i = 0; i < SAME_RUNS; i++) {
     int run = (w->first + i) % SAME_RUNS;
     pw_error error = { 0 };
-    w->hash[run] = same_run (run, &error);
+    const pw_system *s = w->shared ? w->shared[run / SAME_METHODS] : NULL;
+    w->hash[run] = s ? same_run_on (s, run, &error) : same_run (run, &error);
   }
   return NULL;
 }
 
-static void test_threads (void **state) {
-  (void)state;
+static void same_threads (const pw_system *const *shared, const char *what) {
   for (int threads = 2; threads <= SAME_THREADS; threads *= 2) {
     same_worker *w = calloc ((size_t)threads, sizeof *w);
     pthread_t id[SAME_THREADS];
     assert_non_null (w);
     for (int i = 0; i < threads; i++) {
+      w[i].shared = shared;
       w[i].first = i * (SAME_RUNS / threads / 2); /* neighbours at work on the same scenes */
       assert_int_equal (pthread_create (&id[i], NULL, same_work, w + i), 0);
     }
     for (int i = 0; i < threads; i++) pthread_join (id[i], NULL);
     for (int i = 0; i < threads; i++)
-      for (int run = 0; run < SAME_RUNS; run++) same_expect (run, w[i].hash[run], "in a thread");
+      for (int run = 0; run < SAME_RUNS; run++) same_expect (run, w[i].hash[run], what);
     free (w);
   }
 }
 
+static void test_threads (void **state) {
+  (void)state;
+  same_threads (NULL, "in a thread");
+}
+
+/* All threads run all methods at once on one compiled system of each scene, which no run modifies. */
+static void test_shared_system (void **state) {
+  pw_system *s[SAME_SCENES];
+  const pw_system *shared[SAME_SCENES];
+  (void)state;
+  for (int i = 0; i < SAME_SCENES; i++) {
+    pw_error error = { 0 };
+    shared[i] = s[i] = same_system (i, &error);
+    check_ok (error.status, &error);
+  }
+  same_threads (shared, "in a thread, on a shared system");
+  for (int i = 0; i < SAME_SCENES; i++) pw_free (s[i]);
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_hashes),
-    cmocka_unit_test (test_again),
-    cmocka_unit_test (test_used_system),
-    cmocka_unit_test (test_threads),
+    cmocka_unit_test (test_hashes),  cmocka_unit_test (test_again),         cmocka_unit_test (test_used_system),
+    cmocka_unit_test (test_threads), cmocka_unit_test (test_shared_system),
   };
   return cmocka_run_group_tests_name ("determinism", tests, same_setup, same_teardown);
 }

@@ -213,7 +213,8 @@ static void test_wheel_contact (void **state) {
     pw_random random = { seed };
     pw_system *s = pw_specimen (&pw_kind_wheel, &random, &error);
     assert_non_null (s);
-    pw_probe x = { .kind = &pw_kind_wheel, .s = s, .k = s->slab, .elements = 3, .rows = 1, .cols = 3 };
+    pw_workspace *w = pw_workspace_new (s, NULL);
+    pw_probe x = { .kind = &pw_kind_wheel, .s = s, .work = w, .k = w->slab, .elements = 3, .rows = 1, .cols = 3 };
     double plus[9 + PW_PROBE_GUARD], minus[9], contact[9], speed[3];
     pw_probe_aim (&x, &random);
     pw_probe_place (&x, PW_PROBE_MOTION, PW_PROBE_H);
@@ -223,7 +224,7 @@ static void test_wheel_contact (void **state) {
     pw_probe_place (&x, PW_PROBE_MOTION, 0);
     x.kind->contact (&x.k->b, contact);
     x.kind->J (&x.k->b, x.k->J);
-    pw_mul_J (s, x.v, speed);
+    pw_mul_J (w, x.v, speed);
     for (int e = 0; e < 3; e++) {
       double vx = (plus[3 * e] - minus[3 * e]) / (2 * PW_PROBE_H),
              vy = (plus[3 * e + 1] - minus[3 * e + 1]) / (2 * PW_PROBE_H);
@@ -231,6 +232,7 @@ static void test_wheel_contact (void **state) {
       check_close ("speed across the heading", speed[e], across, 10 * pw_probe_bound (),
                    "central differences, terms up to 10");
     }
+    pw_workspace_free (w);
     pw_free (s);
   }
 }

@@ -17,6 +17,7 @@ typedef struct {
   pw_file *file;
   pw_model *model;
   pw_system *s;
+  pw_workspace *w;
   pw_run *r;
   pw_sample x;
 } queries;
@@ -29,11 +30,14 @@ static queries queries_open (const char *model) {
   k.s = pw_compile (k.model, &error);
   k.r = runs_open (k.s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   k.x = runs_to (k.r, 0.01);
+  k.w = pw_workspace_new (k.s, &error);
+  assert_non_null (k.w);
   return k;
 }
 
 static void queries_close (queries *k) {
   pw_close (k->r);
+  pw_workspace_free (k->w);
   pw_free (k->s);
   pw_model_free (k->model);
   pw_file_close (k->file);
@@ -47,7 +51,7 @@ static void test_forces (void **state) {
     queries k = queries_open (queries_scene[i]);
     int bodies = pw_count_bodies (k.s);
     double *F = malloc ((size_t)pw_system_force_size (k.s) * sizeof *F), sum[3], size;
-    check_ok (pw_system_forces (k.s, k.x.t, k.x.q, k.x.v, k.x.lambda, F, NULL), NULL);
+    check_ok (pw_system_forces (k.w, k.x.t, k.x.q, k.x.v, k.x.lambda, F, NULL), NULL);
     for (int b = 0; b < bodies; b++)
       for (int c = 0; c < 3; c++) {
         sum[c] = -pw_system_mass (k.s)[3 * b + c] * k.x.a[3 * b + c];
@@ -141,9 +145,9 @@ static void test_contacts (void **state) {
   double out[4][3], *q = malloc ((size_t)pw_count_coordinates (k.s) * sizeof *q);
   assert_int_equal (pw_system_contacts (k.s), 2);
   memcpy (q, k.x.q, (size_t)pw_count_coordinates (k.s) * sizeof *q);
-  check_ok (pw_system_contact_points (k.s, k.x.t, q, k.x.v, out, &error), &error);
+  check_ok (pw_system_contact_points (k.w, k.x.t, q, k.x.v, out, &error), &error);
   for (int j = 0; j < pw_count_coordinates (k.s); j += 3) q[j] += at[0], q[j + 1] += at[1];
-  check_ok (pw_system_contact_points (k.s, k.x.t, q, k.x.v, out + 2, &error), &error);
+  check_ok (pw_system_contact_points (k.w, k.x.t, q, k.x.v, out + 2, &error), &error);
   for (int i = 0; i < 2; i++) {
     for (int c = 0; c < 2; c++)
       check_close ("displaced contact", out[2 + i][c], out[i][c] + at[c], 1e-15, "one rounding of numbers below 1");

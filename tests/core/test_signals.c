@@ -77,25 +77,27 @@ static void test_reads (void **state) {
     PW_FUNCTION, .function = { .eval = signals_eval, .context = &c, .reads = reads, .breakpoint = signals_breakpoint }
   };
   pw_system *s = signals_scene (&torque);
+  pw_workspace *w = pw_workspace_new (s, NULL);
   double q[6] = { 0, 0, 0.3, 0, 0, 0.7 }, v[6] = { 1.1, 0, 0, 0, 0, 0.9 }, f[9];
-  assert_int_equal (pw_place (s, 2, q, v), PW_OK);
+  assert_int_equal (pw_place (w, 2, q, v), PW_OK);
   assert_true (c.calls == 1 && c.t == 2 && c.x[0] == 0.7 && c.x[1] == 1.1);
-  pw_sweep_force (s, f);
+  pw_sweep_force (w, f);
   assert_true (f[2] == 2 + 2 * 0.7 + 3 * 1.1 && f[5] == -f[2] && f[0] == 0);
   q[5] = 0.8;
-  assert_int_equal (pw_place (s, 2, q, v), PW_OK);
+  assert_int_equal (pw_place (w, 2, q, v), PW_OK);
   assert_true (c.calls == 2 && c.x[0] == 0.8); /* another state at the same time */
   v[0] = 1.3, q[5] = 0.9;
-  assert_int_equal (pw_place_rates (s, v), PW_OK);
+  assert_int_equal (pw_place_rates (w, v), PW_OK);
   assert_true (c.calls == 3 && c.t == 2 && c.x[0] == 0.8 && c.x[1] == 1.3); /* other velocities there */
-  pw_sweep_force (s, f);
+  pw_sweep_force (w, f);
   assert_true (f[2] == 2 + 2 * 0.8 + 3 * 1.3);
   c.fails = 1;
-  assert_int_equal (pw_place_rates (s, v), PW_METHOD);
+  assert_int_equal (pw_place_rates (w, v), PW_METHOD);
   c.fails = 0;
-  assert_true (pw_next_breakpoint (s, 0, 0) == 3 && isinf (pw_next_breakpoint (s, 0, 3)));
+  assert_true (pw_next_breakpoint (w, 0, 0) == 3 && isinf (pw_next_breakpoint (w, 0, 3)));
   c.fails = 1;
-  assert_int_equal (pw_place (s, 2.5, q, v), PW_METHOD);
+  assert_int_equal (pw_place (w, 2.5, q, v), PW_METHOD);
+  pw_workspace_free (w);
   pw_free (s);
 }
 
@@ -116,14 +118,16 @@ static void test_rates_spare (void **state) {
     pw_signal torque = { PW_FUNCTION,
                          .function = { .eval = signals_of_angle, .context = &c, .reads = reads[velocity] } };
     pw_system *s = signals_scene (&torque);
+    pw_workspace *w = pw_workspace_new (s, NULL);
     double q[6] = { 0 }, v[6] = { 0 };
-    assert_int_equal (pw_place (s, 2, q, v), PW_OK);
-    assert_int_equal (pw_place_rates (s, v), PW_OK);
+    assert_int_equal (pw_place (w, 2, q, v), PW_OK);
+    assert_int_equal (pw_place_rates (w, v), PW_OK);
     assert_int_equal (c.calls, 1 + velocity);
-    pw_hold (s, 1);
-    assert_int_equal (pw_place (s, 3, q, v), PW_OK);
-    assert_int_equal (pw_place_rates (s, v), PW_OK);
+    pw_hold (w, 1);
+    assert_int_equal (pw_place (w, 3, q, v), PW_OK);
+    assert_int_equal (pw_place_rates (w, v), PW_OK);
     assert_int_equal (c.calls, 1 + velocity);
+    pw_workspace_free (w);
     pw_free (s);
   }
 }
@@ -134,24 +138,26 @@ static void test_sharing_and_hold (void **state) {
   signals_context c = { 0 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = signals_of_time, .context = &c } };
   pw_system *s = signals_scene (&torque);
+  pw_workspace *w = pw_workspace_new (s, NULL);
   double q[6] = { 0 }, v[6] = { 0 }, f[9];
-  pw_place (s, 2, q, v);
-  pw_place (s, 2, q, v);
+  pw_place (w, 2, q, v);
+  pw_place (w, 2, q, v);
   assert_int_equal (c.calls, 1);
-  pw_hold (s, 1);
-  pw_place (s, 3, q, v);
-  pw_sweep_force (s, f);
+  pw_hold (w, 1);
+  pw_place (w, 3, q, v);
+  pw_sweep_force (w, f);
   assert_true (c.calls == 1 && f[2] == 4);
-  pw_hold (s, 0);
-  pw_place (s, 3, q, v);
-  pw_sweep_force (s, f);
+  pw_hold (w, 0);
+  pw_place (w, 3, q, v);
+  pw_sweep_force (w, f);
   assert_true (c.calls == 2 && f[2] == 9);
   c.fails = 1;
-  assert_int_equal (pw_place (s, 4, q, v), PW_METHOD);
+  assert_int_equal (pw_place (w, 4, q, v), PW_METHOD);
   c.fails = 0;
-  assert_int_equal (pw_place (s, 3, q, v), PW_OK); /* a failure in between leaves no value behind */
-  pw_sweep_force (s, f);
+  assert_int_equal (pw_place (w, 3, q, v), PW_OK); /* a failure in between leaves no value behind */
+  pw_sweep_force (w, f);
   assert_true (f[2] == 9);
+  pw_workspace_free (w);
   pw_free (s);
 }
 
@@ -174,18 +180,20 @@ static void test_drive (void **state) {
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = signals_build };
   signals_driven = (signals_context){ 0 };
   pw_system *s = scene_system (&table, NULL);
+  pw_workspace *w = pw_workspace_new (s, NULL);
   double q[3] = { 0, 0, 10 }, v[3] = { 0 }, y;
-  pw_place (s, 3, q, v);
-  pw_sweep_g (s, &y);
+  pw_place (w, 3, q, v);
+  pw_sweep_g (w, &y);
   assert_true (y == 10 - 9);
-  pw_sweep_eta (s, &y);
+  pw_sweep_eta (w, &y);
   assert_true (y == 6);
-  pw_sweep_gamma (s, &y);
+  pw_sweep_gamma (w, &y);
   assert_true (y == 2);
-  pw_hold (s, 1); /* holds forces only */
-  pw_place (s, 4, q, v);
-  pw_sweep_g (s, &y);
+  pw_hold (w, 1); /* holds forces only */
+  pw_place (w, 4, q, v);
+  pw_sweep_g (w, &y);
   assert_true (y == 10 - 16);
+  pw_workspace_free (w);
   pw_free (s);
 }
 

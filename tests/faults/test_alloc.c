@@ -111,7 +111,7 @@ static int alloc_check (const char *what, pw_error *error) {
   if (status == PW_OK && r == NULL) status = error->status;
   if (status == PW_OK) status = pw_linearise (r, 100, &linear, error);
   if (status == PW_OK)
-    status = pw_selftest_scene (s, &pw_kind_pin, 0, pw_run_start (r)->q, pw_run_start (r)->v, 1, &report, error);
+    status = pw_selftest_scene (s, 1, &pw_kind_pin, 0, pw_run_start (r)->q, pw_run_start (r)->v, 1, &report, error);
   pw_linear_close (&linear);
   pw_close (r);
   pw_free (s);
@@ -125,7 +125,7 @@ static int alloc_verify (const char *what, pw_error *error) {
   static const double zero[6] = { 0 };
   int status = alloc_system (&s, error);
   if (status == PW_OK) {
-    status = pw_verify (s, 0, zero, zero, zero, zero, &result);
+    status = pw_verify (s, &(pw_scale){ 1, 1 }, 0, zero, zero, zero, zero, &result);
     if (status != PW_OK) pw_fail (error, status, "out of memory");
   }
   pw_free (s);

@@ -108,9 +108,10 @@ static void test_meeting (void **state) {
   (void)state;
   static const pw_plugin_table table = TRIAL_TABLE (spring_meeting);
   pw_system *s = scene_system (&table, NULL);
+  pw_workspace *w = pw_workspace_new (s, NULL);
   double out[72];
-  assert_int_equal (pw_place (s, 0, s->q0, s->v0), PW_OK);
-  const pw_batch *b = &s->slab[0].b;
+  assert_int_equal (pw_place (w, 0, s->q0, s->v0), PW_OK);
+  const pw_batch *b = &w->slab[0].b;
   pw_kind_spring.force (b, out);
   for (int i = 0; i < 12; i++) assert_true (out[i] == 0);
   pw_kind_spring.force_q (b, out);
@@ -123,6 +124,7 @@ static void test_meeting (void **state) {
   check_close ("energy", out[1], 5 * 0.3 * 0.3 / 2, CHECK_EPS, "k l0^2 / 2");
   pw_kind_spring.loss (b, out);
   assert_true (out[0] == 0 && out[1] == 0);
+  pw_workspace_free (w);
   pw_free (s);
 }
 
@@ -138,16 +140,18 @@ static void test_settling (void **state) {
   (void)state;
   static const pw_plugin_table table = TRIAL_TABLE (spring_settling);
   pw_system *s = scene_system (&table, NULL);
+  pw_workspace *w = pw_workspace_new (s, NULL);
   double out[36];
   for (double size = 1; size > 1e-17; size /= 10) {
     const double q[3] = { 3e-308 * size, 4e-308 * size, 0 }, v[3] = { -1e-308 * size, 0, 0 };
-    assert_int_equal (pw_place (s, 0, q, v), PW_OK);
+    assert_int_equal (pw_place (w, 0, q, v), PW_OK);
     pw_sweep *const sweep[] = { pw_kind_spring.force_q, pw_kind_spring.force_v };
     for (int i = 0; i < 2; i++) {
-      sweep[i](&s->slab[0].b, out);
+      sweep[i](&w->slab[0].b, out);
       for (int j = 0; j < 36; j++) check_below ("derivative", fabs (out[j]), 20, "stiffness and damping are 5 and 2");
     }
   }
+  pw_workspace_free (w);
   pw_free (s);
 }
 

@@ -234,7 +234,7 @@ static void agree_verify (int scene, const agree_verdict *bound) {
   for (int k = 0; k <= 20; k++) {
     pw_sample now = runs_to (r, 0.1 * k);
     pw_verification v;
-    assert_int_equal (pw_verify (s, now.t, now.q, now.v, now.a, now.lambda, &v), PW_OK);
+    assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, now.q, now.v, now.a, now.lambda, &v), PW_OK);
     char what[120];
     const struct {
       const char *name;
@@ -283,14 +283,14 @@ static void test_verifier_notices (void **state) {
       pw_verification v;
       for (int k = 0; k < 4; k++) memcpy (x[k], given[k], (size_t)(k == 3 ? rows : n) * sizeof (double));
       x[part][j] += 1e-6;
-      assert_int_equal (pw_verify (s, now.t, x[0], x[1], x[2], x[3], &v), PW_OK);
+      assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, x[0], x[1], x[2], x[3], &v), PW_OK);
       int noticed =
           v.position.scaled > 1e-9 || v.velocity.scaled > 1e-9 || v.acceleration.scaled > 1e-9 || v.force.scaled > 1e-9;
       assert_true (noticed || (part == 0 && j >= 3 * pw_count_bodies (s))); /* nothing depends on the spin angle */
     }
   x[0][0] = NAN;
   pw_verification v;
-  assert_int_equal (pw_verify (s, now.t, x[0], now.v, now.a, now.lambda, &v), PW_OK);
+  assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, x[0], now.v, now.a, now.lambda, &v), PW_OK);
   assert_true (isinf (v.position.scaled) && v.position.name[0]);
   pw_close (r);
   pw_free (s);

@@ -93,7 +93,7 @@ static double leapfrog_way_back (const char *model, const char *method, double h
   pw_sample x = runs_to (r, 0);
   memcpy (q, x.q, (size_t)s->coords * sizeof *q);
   memcpy (v, x.v, (size_t)s->coords * sizeof *v);
-  double back[LEAPFROG_COORDS], T = s->scale.time;
+  double back[LEAPFROG_COORDS], T = pw_run_scale (r)->time;
   x = runs_to (r, n * h);
   for (int j = 0; j < s->coords; j++) back[j] = -x.v[j];
   check_ok (pw_restart (r, NULL, back, &error), &error);

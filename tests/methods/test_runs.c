@@ -166,20 +166,34 @@ static void test_twice (void **state) {
   pw_free (s);
 }
 
-/* ---- One run at a time ---- */
+/* ---- Runs that share a system ---- */
 
-/* A second run would move the system under the first one: it is refused until that is closed. */
-static void test_taken (void **state) {
+/* Runs that take turns on one system do not notice each other: each ends where it does by itself. */
+static void test_shared (void **state) {
+  static const char *const method[] = { "rk4+projection", "ida+ggl", "bdf+projection", "galpha+ggl",
+                                        "rk4:inputs=held" };
+  enum { METHODS = sizeof method / sizeof *method };
+  double alone[METHODS][2][6];
+  pw_run *r[METHODS];
   (void)state;
-  pw_error error = { 0 };
   pw_system *s = scene_system (&scene_ezyroller, NULL);
-  assert_null (pw_open (s, "no-such-method", NULL, NULL)); /* leaves the system free */
-  pw_run *r = runs_open (s, "rk4", NULL);
-  assert_null (pw_open (s, "ida+ggl", NULL, &error));
-  check_error (&error, PW_INPUT,
-               "model ezyroller: a run is open on this system already: close that, or compile the model again");
-  pw_close (r);
-  pw_close (runs_open (s, "ida+ggl", NULL));
+  for (int i = 0; i < METHODS; i++) {
+    r[i] = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .span = 1 + i });
+    for (int k = 1; k <= 10; k++) runs_to (r[i], 0.1 * k);
+    pw_sample x = runs_to (r[i], 1);
+    memcpy (alone[i][0], x.q, sizeof alone[i][0]);
+    memcpy (alone[i][1], x.v, sizeof alone[i][1]);
+    pw_close (r[i]);
+  }
+  for (int i = 0; i < METHODS; i++) r[i] = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .span = 1 + i });
+  for (int k = 1; k <= 10; k++)
+    for (int i = 0; i < METHODS; i++) runs_to (r[i], 0.1 * k);
+  for (int i = 0; i < METHODS; i++) {
+    pw_sample x = runs_to (r[i], 1);
+    check_bits ("q", x.q, alone[i][0], 6);
+    check_bits ("v", x.v, alone[i][1], 6);
+    pw_close (r[i]);
+  }
   pw_free (s);
 }
 
@@ -322,7 +336,7 @@ int main (void) {
     cmocka_unit_test (test_outside),
     cmocka_unit_test (test_t_end),
     cmocka_unit_test (test_twice),
-    cmocka_unit_test (test_taken),
+    cmocka_unit_test (test_shared),
     cmocka_unit_test (test_missing),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

@@ -40,7 +40,7 @@ static void try_measure (pw_system *s, pw_run *r, try_end *end) {
   memcpy (end->q, x.q, bytes);
   memcpy (end->v, x.v, bytes);
   end->statistics = *pw_run_statistics (r);
-  end->status = pw_verify (s, x.t, x.q, x.v, x.a, x.lambda, &end->verification);
+  end->status = pw_verify (s, pw_run_scale (r), x.t, x.q, x.v, x.a, x.lambda, &end->verification);
 }
 
 static void try_run (pw_system *s, const char *method, double rtol, double step, try_end *end) {

@@ -106,7 +106,7 @@ static void chains_run (int how, double end[8]) {
   pw_system *s = scene_system (&chains_table, "how", (double)how, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01, .span = 0.2 });
   pw_sample x = runs_to (r, 0.2);
-  trial_verify (s, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
+  trial_verify (s, r, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
   for (int i = 0; i < 6; i++) end[i] = trial_state (s, &x, name[i]);
   end[6] = fabs (trial_reaction (s, &x, "bar-pin6.Fx"));
   end[7] = fabs (trial_reaction (s, &x, "bar-pin6.Fy"));

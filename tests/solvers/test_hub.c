@@ -162,7 +162,7 @@ static void hub_run (const pw_plugin_table *table, double place, double hub[6]) 
   pw_system *s = scene_system (table, "place", place, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01, .span = 0.2 });
   pw_sample x = runs_to (r, 0.2);
-  trial_verify (s, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
+  trial_verify (s, r, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
   for (int i = 0; i < 6; i++) hub[i] = trial_state (s, &x, name[i]);
   pw_close (r);
   pw_free (s);

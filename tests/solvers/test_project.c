@@ -26,7 +26,7 @@ static void project_try (const char *model, const char *parameter, double value,
   check_ok (pw_projector_open_asked (&p, r, &error), &error);
   v[1] += off;
   assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
-  pw_sweep_residuals (s, NULL, &now);
+  pw_sweep_residuals (r->w, NULL, &now);
   check_below (model, now.position, 4 * CHECK_EPS, "round-off");
   check_below (model, now.velocity, 4 * CHECK_EPS, "round-off");
   check_bits ("positions", q, x.q, n);

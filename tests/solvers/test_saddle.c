@@ -34,11 +34,11 @@ static double saddle_error (const trial *x, const double *f, const double *gamma
   const pw_system *s = x->run->s;
   double most = 0, size = 0, *left = calloc ((size_t)(s->coords + 3 + s->rows), sizeof *left);
   double *Ja = left + s->coords + 3;
-  pw_add_JT (s, lambda, left);
+  pw_add_JT (x->run->w, lambda, left);
   for (int j = 0; j < s->coords; j++) size = fmax (size, fabs (left[j]) + fabs (x->weight[j] * a[j]));
   for (int j = 0; j < s->coords; j++)
     most = fmax (most, fabs (left[j] + x->weight[j] * a[j] - (f ? f[j] : 0)) / (1 + size));
-  pw_mul_J (s, a, Ja);
+  pw_mul_J (x->run->w, a, Ja);
   size = 0;
   for (int i = 0; i < x->rows; i++) size = fmax (size, fabs (gamma[i]));
   for (int j = 0; j < s->coords; j++) size = fmax (size, fabs (a[j]));
@@ -56,11 +56,11 @@ static void saddle_spoil (trial *x, pw_saddle *k, unsigned *random) {
   for (size_t j = 0; j < coords; j++) q[j] = r->q[j] + saddle_number (random);
   for (size_t j = 2; j < 3 * (size_t)r->s->bodies; j += 3)
     if (saddle_number (random) > 0.3) q[j] = NAN;
-  assert_int_equal (pw_place (r->s, r->t, q, r->v), PW_OK);
-  pw_sweep_J (r->s);
+  assert_int_equal (pw_place (r->w, r->t, q, r->v), PW_OK);
+  pw_sweep_J (r->w);
   pw_saddle_factor (k);
-  assert_int_equal (pw_place (r->s, r->t, r->q, r->v), PW_OK);
-  pw_sweep_J (r->s);
+  assert_int_equal (pw_place (r->w, r->t, r->q, r->v), PW_OK);
+  pw_sweep_J (r->w);
   free (q);
 }
 
@@ -71,7 +71,7 @@ static double saddle_solve (trial *x) {
   double *f = calloc (3 * coords + 3 * rows + 1, sizeof *f), *a = f + coords, *gamma = a + coords;
   double *lambda = gamma + rows, worst = 0;
   pw_error error = { 0 };
-  pw_saddle *k = pw_saddle_open (x->run->s, x->weight, x->rows, x->run->active, &error);
+  pw_saddle *k = pw_saddle_open (x->run->w, x->weight, x->rows, x->run->active, &error);
   check_ok (k ? PW_OK : error.status, &error);
   for (int way = 0; way < 4; way++) {
     const double *force = way & 1 ? f : NULL;
@@ -98,8 +98,8 @@ static double saddle_scene (pw_system *s, double t_end, int all) {
   double worst = r ? 0 : -1;
   for (int moment = 0; r && moment < 2; moment++) {
     if (moment > 0) check_ok (pw_advance_to (r, t_end, t_end, &error), &error);
-    assert_int_equal (pw_place (s, r->t, r->q, r->v), PW_OK);
-    pw_sweep_J (s);
+    assert_int_equal (pw_place (r->w, r->t, r->q, r->v), PW_OK);
+    pw_sweep_J (r->w);
     for (int which = 0; which < 4; which += all ? 1 : 2) {
       trial x = { .run = r, .weight = which & 1 ? s->metric : s->mass, .random = (unsigned)(7 * which + moment) };
       x.rows = which & 2 ? s->holonomic : s->rows;
@@ -266,16 +266,17 @@ static const pw_plugin_table saddle_rods_table = { .abi = PW_ABI,
 
 /* The saddle of a scene whose bodies are turned so that nothing is in line, with so many coordinates held from those of a
  * body on. */
-static pw_saddle *saddle_turned (pw_system *s, int body, int held) {
+static pw_saddle *saddle_turned (pw_workspace *w, int body, int held) {
+  const pw_system *s = w->s;
   double weight[SADDLE_COORDS], q[SADDLE_COORDS];
   pw_error error = { 0 };
   assert_true (s->coords == SADDLE_COORDS && s->rows <= 2 * SADDLE_LINKS && s->rows > PW_DENSE);
   memcpy (weight, s->mass, sizeof weight);
   for (int j = 3 * body; j < 3 * body + held; j++) weight[j] = INFINITY;
   for (int j = 0; j < SADDLE_COORDS; j++) q[j] = s->q0[j] + (j % 3 == 2 ? j : 0);
-  assert_int_equal (pw_place (s, 0, q, s->v0), PW_OK);
-  pw_sweep_J (s);
-  pw_saddle *k = pw_saddle_open (s, weight, s->rows, NULL, &error);
+  assert_int_equal (pw_place (w, 0, q, s->v0), PW_OK);
+  pw_sweep_J (w);
+  pw_saddle *k = pw_saddle_open (w, weight, s->rows, NULL, &error);
   check_ok (k ? PW_OK : error.status, &error);
   return k;
 }
@@ -287,10 +288,11 @@ static void test_held (void **state) {
   for (int body = 0; body + 1 < SADDLE_LINKS; body += body > 0 ? 1 : 2) { /* fewer than two links cannot give way */
     double a[SADDLE_COORDS + 3], lambda[2 * SADDLE_LINKS], Ja[2 * SADDLE_LINKS], gamma[2 * SADDLE_LINKS];
     pw_system *s = scene_named ("chain", "n", SADDLE_LINKS);
-    pw_saddle *k = saddle_turned (s, body, 6);
+    pw_workspace *w = pw_workspace_new (s, NULL);
+    pw_saddle *k = saddle_turned (w, body, 6);
     for (int i = 0; i < s->rows; i++) gamma[i] = 1 + 0.1 * i, lambda[i] = 2;
     assert_int_equal (pw_saddle_factor_solve (k, NULL, gamma, a, lambda), PW_OK);
-    pw_mul_J (s, a, Ja);
+    pw_mul_J (w, a, Ja);
     for (int j = 3 * body; j < 3 * body + 6; j++) assert_true (a[j] == 0);
     for (int i = 0; i < s->rows; i++) {
       int pin = i / 2, idle = pin == body + 1 || (pin == 0 && body == 0);
@@ -298,6 +300,7 @@ static void test_held (void **state) {
       if (!idle) check_close ("J a", Ja[i], gamma[i], 1e4 * CHECK_EPS, "round-off of a chain");
     }
     pw_saddle_close (k);
+    pw_workspace_free (w);
     pw_free (s);
   }
 }
@@ -308,12 +311,14 @@ static void test_empty (void **state) {
   for (int rod = 0; rod < SADDLE_LINKS; rod++) {
     double a[SADDLE_COORDS + 3], lambda[2 * SADDLE_LINKS], gamma[2 * SADDLE_LINKS] = { 1 };
     pw_system *s = scene_system (&saddle_rods_table, NULL);
-    pw_saddle *k = saddle_turned (s, 0, 0);
+    pw_workspace *w = pw_workspace_new (s, NULL);
+    pw_saddle *k = saddle_turned (w, 0, 0);
     assert_int_equal (pw_saddle_factor (k), PW_OK);
-    memset (s->slab[0].J + (ptrdiff_t)rod * s->slab[0].b.cols, 0, (size_t)s->slab[0].b.cols * sizeof (double));
+    memset (w->slab[0].J + (ptrdiff_t)rod * w->slab[0].b.cols, 0, (size_t)w->slab[0].b.cols * sizeof (double));
     assert_int_equal (pw_saddle_factor (k), PW_RETRY);
     assert_int_equal (pw_saddle_factor_solve (k, NULL, gamma, a, lambda), PW_RETRY);
     pw_saddle_close (k);
+    pw_workspace_free (w);
     pw_free (s);
   }
 }
@@ -378,12 +383,14 @@ static void test_dependent (void **state) {
     for (int which = 0; which < 4; which++) {
       pw_error error = { 0 };
       pw_system *s = scene_system (&table[which / 2], "angle", 0.1 * i, "mass", (double)(which % 2), NULL);
-      assert_int_equal (pw_place (s, 0, s->q0, s->v0), PW_OK);
-      pw_sweep_J (s);
-      pw_saddle *k = pw_saddle_open (s, s->mass, s->rows, NULL, &error);
+      pw_workspace *w = pw_workspace_new (s, NULL);
+      assert_int_equal (pw_place (w, 0, s->q0, s->v0), PW_OK);
+      pw_sweep_J (w);
+      pw_saddle *k = pw_saddle_open (w, s->mass, s->rows, NULL, &error);
       check_ok (k ? PW_OK : error.status, &error);
       assert_int_equal (pw_saddle_factor (k), PW_RETRY);
       pw_saddle_close (k);
+      pw_workspace_free (w);
       pw_free (s);
     }
 }

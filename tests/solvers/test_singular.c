@@ -245,13 +245,13 @@ static void test_not_numbers (void **state) {
     r->a[j] = NAN;
     assert_int_equal (pw_run_judge (r, &error), PW_METHOD);
     r->a[j] = a, r->q[j] = NAN, r->v[j] = NAN;
-    assert_int_equal (pw_place (s, 0, r->q, r->v), PW_OK);
-    pw_sweep_J (s);
-    pw_sweep_residuals (s, NULL, &now);
+    assert_int_equal (pw_place (r->w, 0, r->q, r->v), PW_OK);
+    pw_sweep_J (r->w);
+    pw_sweep_residuals (r->w, NULL, &now);
     assert_true (isnan (now.position) && isnan (now.velocity));
     r->q[j] = q, r->v[j] = v;
-    assert_int_equal (pw_place (s, 0, r->q, r->v), PW_OK);
-    pw_sweep_J (s);
+    assert_int_equal (pw_place (r->w, 0, r->q, r->v), PW_OK);
+    pw_sweep_J (r->w);
   }
   pw_close (r);
   pw_free (s);

@@ -391,8 +391,8 @@ static double watchdog_residual (pw_run *r, double angle) {
   double gamma[8], Ja[8], most = 0;
   watchdog_bend (r, angle);
   assert_int_equal (pw_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_OK);
-  pw_sweep_gamma (r->s, gamma);
-  pw_mul_J (r->s, r->a, Ja);
+  pw_sweep_gamma (r->w, gamma);
+  pw_mul_J (r->w, r->a, Ja);
   for (int i = 0; i < r->s->rows; i++) most = fmax (most, fabs (Ja[i] - gamma[i]));
   return most;
 }
@@ -421,7 +421,7 @@ static void test_jump (void **state) {
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_error error = { 0 };
   r->near = 1;
-  r->a[0] = 1.5 * r->limits.jump * r->calm * s->scale.length / (s->scale.time * s->scale.time);
+  r->a[0] = 1.5 * r->limits.jump * r->calm * s->scale.length / (r->w->scale.time * r->w->scale.time);
   assert_int_equal (pw_run_judge (r, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "lost at a singular pose: the accelerations are 150 times"));
   r->limits.jump *= 2;

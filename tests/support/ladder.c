@@ -64,7 +64,7 @@ ladder_error ladder_solve (const char *model, const char *method, const pw_setti
   pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 3e-14, .span = t });
   pw_sample x = runs_to (r, t), y = runs_to (exact, t);
   ladder_error off = { .cost = *pw_run_statistics (r) };
-  double most = 0, T = S->scale.time;
+  double most = 0, T = pw_run_scale (exact)->time;
   for (int j = 0; j < s->coords; j++) {
     off.q = fmax (off.q, fabs (x.q[j] - y.q[j]) / pw_unit (s, j));
     off.v = fmax (off.v, fabs (x.v[j] - y.v[j]) / pw_unit (s, j) * T);

@@ -35,9 +35,9 @@ static trial_size trial_measure (const pw_system *s, const pw_sample *x) {
   return size;
 }
 
-void trial_verify (pw_system *s, const pw_sample *x, double bound, const char *reason) {
+void trial_verify (const pw_system *s, const pw_run *r, const pw_sample *x, double bound, const char *reason) {
   pw_verification v;
-  assert_int_equal (pw_verify (s, x->t, x->q, x->v, x->a, x->lambda, &v), PW_OK);
+  assert_int_equal (pw_verify (s, pw_run_scale (r), x->t, x->q, x->v, x->a, x->lambda, &v), PW_OK);
   check_below ("verifier, position", v.position.scaled, bound, reason);
   check_below ("verifier, velocity", v.velocity.scaled, bound, reason);
   check_below ("verifier, acceleration", v.acceleration.scaled, bound, reason);
@@ -79,7 +79,7 @@ void trial (const pw_plugin_table *table, double t_end) {
   memcpy (reference, x.q, (size_t)s->coords * sizeof *reference);
   memcpy (reference + s->coords, x.v, (size_t)s->coords * sizeof *reference);
   check_below ("balance", fabs (x.balance), 1e-9 * size.energy, "1000 h^4 at h = 1e-3");
-  trial_verify (s, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
+  trial_verify (s, r, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
   pw_close (r);
   trial_implicit (s, "ida+ggl", 1e3, t_end, reference, size);
   trial_implicit (s, "ida+baumgarte", 1e3, t_end, reference, size);

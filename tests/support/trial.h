@@ -9,7 +9,7 @@
 void trial (const pw_plugin_table *table, double t_end);
 
 /* The sample obeys the equations as the independent verifier sees them: scaled residuals. */
-void trial_verify (pw_system *s, const pw_sample *x, double bound, const char *reason);
+void trial_verify (const pw_system *s, const pw_run *r, const pw_sample *x, double bound, const char *reason);
 
 /* A state ("cart.x", "cart.vx") or a reaction ("motor.F") of a sample, by name. */
 double trial_state (const pw_system *s, const pw_sample *x, const char *name);

@@ -127,7 +127,8 @@ static int check_list_kinds (pw_check *x, pw_error *error) {
 
 /* An inconsistent table is not tried in the scene. */
 static int check_kinds (pw_check *x, pw_error *error) {
-  pw_system *s = x->m.system;
+  const pw_system *s = x->m.system;
+  double T = x->r ? pw_run_scale (x->r)->time : 1;
   const double *q = x->r ? pw_run_start (x->r)->q : pw_system_initial_q (s),
                *v = x->r ? pw_run_start (x->r)->v : pw_system_initial_v (s);
   int status = check_list_kinds (x, error);
@@ -135,7 +136,7 @@ static int check_kinds (pw_check *x, pw_error *error) {
     status = check_alone (k, error);
     if (status != PW_OK) break;
     if (k->alone.failed == 0 || strcmp (k->alone.check[check_first_failed (&k->alone)].name, "table") != 0)
-      status = pw_selftest_scene (s, k->kind, 0, q, v, 1, &k->inside, error);
+      status = pw_selftest_scene (s, T, k->kind, 0, q, v, 1, &k->inside, error);
     const pw_selftest_check *fault = check_fault (k);
     if (fault)
       check_add (&x->problem, "element type %s fails its self-test: %s (%s)", k->kind->name, fault->about,

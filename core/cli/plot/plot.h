@@ -53,7 +53,8 @@ typedef struct {
 struct pw_plots {
   const char *folder, *model;
   int lock; /* of the folder; -1: none */
-  pw_system *s;
+  const pw_system *s;
+  pw_workspace *workspace; /* for contact points and forces */
   double t_end;
   int samples, wanted;  /* taken so far; planned */
   int width;            /* numbers per sample */

@@ -121,7 +121,7 @@ void pw_plot_find_links (pw_plots *p, const pw_model *m) {
 }
 
 void pw_plot_forces (const pw_plots *p, const pw_sample *x, double *out) {
-  if (pw_system_forces (p->s, x->t, x->q, x->v, x->lambda, p->forces, NULL) != PW_OK) return;
+  if (pw_system_forces (p->workspace, x->t, x->q, x->v, x->lambda, p->forces, NULL) != PW_OK) return;
   for (int i = 0; i < p->links; i++, out += 2)
     memcpy (out, p->forces + pw_system_element (p->s, p->link[i].element).force + p->link[i].column, 2 * sizeof *out);
 }

@@ -105,7 +105,7 @@ static int plots_try_folder (pw_plots *p, pw_error *error) {
   return probe ? PW_OK : error->status;
 }
 
-pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, pw_system *s, double t_end,
+pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
                          pw_error *error) {
   pw_plots sizes = { .folder = folder, .lock = -1, .model = pw_system_name (s), .s = s, .t_end = t_end };
   int elements;
@@ -123,15 +123,17 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, pw_s
   if (p == NULL && sizes.lock >= 0) close (sizes.lock);
   if (p == NULL) return NULL;
   for (int i = 0; i < p->bodies; i++) p->body[i] = pw_plot_pick (i, p->bodies, pw_count_bodies (s));
+  p->workspace = pw_workspace_new (s, error);
   plots_choose_wheels (p);
   pw_plot_find_links (p, m);
-  if (pw_plot_find_shapes (p, m, error) == PW_OK) return p;
+  if (p->workspace && pw_plot_find_shapes (p, m, error) == PW_OK) return p;
   pw_plots_close (p);
   return NULL;
 }
 
 void pw_plots_close (pw_plots *p) {
   if (p && p->lock >= 0) close (p->lock);
+  if (p) pw_workspace_free (p->workspace);
   free (p);
 }
 
@@ -143,7 +145,8 @@ double pw_plots_next (const pw_plots *p) {
 }
 
 static void plots_contacts (const pw_plots *p, const pw_sample *x, double *out) {
-  if (pw_system_contact_points (p->s, x->t, x->q, x->v, p->contact, NULL) != PW_OK) return; /* the run has been there */
+  if (pw_system_contact_points (p->workspace, x->t, x->q, x->v, p->contact, NULL) != PW_OK)
+    return; /* the run has been there */
   for (int i = 0; i < p->wheels; i++, out += 3)
     memcpy (out, p->contact[pw_system_element (p->s, p->element[i]).contact], 3 * sizeof *out);
 }

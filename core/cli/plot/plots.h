@@ -16,7 +16,7 @@ extern const char *const pw_plot_names[];
 /* Prepares figures of a run from 0 to t_end in a folder, which is created if necessary; NULL: without figures.  With `forces`,
  * those of elements with points are kept as well.  System and texts must outlive them.  PW_MACHINE if the folder cannot be
  * written or memory is exhausted. */
-pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, pw_system *s, double t_end,
+pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
                          pw_error *error);
 
 /* When the next sample is wanted [s]; INFINITY when there are enough. */

@@ -8,6 +8,7 @@
 
 struct pw_csv {
   pw_output *output;
+  pw_workspace *workspace; /* for the points of contact; NULL: there are none */
   int ledger;
   double (*contact)[3]; /* points of the system */
   char *line;           /* grows as needed */
@@ -116,13 +117,17 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
   }
   c->output = o;
   c->ledger = ledger;
-  if (pw_output_continued (o) || csv_header (c, s, error) == PW_OK) return c;
+  int status = PW_OK;
+  if (pw_system_contacts (s) > 0 && (c->workspace = pw_workspace_new (s, error)) == NULL) status = PW_MACHINE;
+  if (status == PW_OK && !pw_output_continued (o)) status = csv_header (c, s, error);
+  if (status == PW_OK) return c;
   pw_csv_close (c);
   return NULL;
 }
 
 void pw_csv_close (pw_csv *c) {
   if (c == NULL) return;
+  pw_workspace_free (c->workspace);
   free (c->contact);
   free (c->line);
   free (c);
@@ -142,8 +147,9 @@ static void csv_states (pw_csv *c, const pw_system *s, const pw_sample *x) {
   }
 }
 
-static int csv_contacts (pw_csv *c, pw_system *s, const pw_sample *x, pw_error *error) {
-  int status = pw_system_contact_points (s, x->t, x->q, x->v, c->contact, error);
+static int csv_contacts (pw_csv *c, const pw_system *s, const pw_sample *x, pw_error *error) {
+  if (c->workspace == NULL) return PW_OK;
+  int status = pw_system_contact_points (c->workspace, x->t, x->q, x->v, c->contact, error);
   for (int i = 0; status == PW_OK && i < pw_system_contacts (s); i++) {
     csv_number (c, c->contact[i][0]);
     csv_number (c, c->contact[i][1]);
@@ -159,7 +165,7 @@ static void csv_ledger (pw_csv *c, const pw_system *s, const pw_sample *x) {
   csv_number (c, x->balance);
 }
 
-int pw_csv_write (pw_csv *c, pw_system *s, const pw_sample *sample, pw_error *error) {
+int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
   csv_number (c, sample->t);
   csv_states (c, s, sample);
   int status = csv_contacts (c, s, sample, error);

@@ -1,0 +1,75 @@
+/* Workspaces: what a run modifies, beside a compiled system that it only reads. */
+#include <math.h>
+#include <stdlib.h>
+#include "system.h"
+
+/* A copy of the system's batch, with arrays of the workspace. */
+static void workspace_batch (pw_layout *l, const pw_slab *from, const pw_workspace *w, pw_slab *k) {
+  const pw_kind *kind = from->kind;
+  size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
+  size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3;
+  int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
+  double *u = pw_take (l, n * (size_t)kind->signals * 3, sizeof *u);
+  double *J = pw_take (l, n * (size_t)kind->rows * cols, sizeof *J);
+  double *space = pw_take (l, scratch ? n * block : 0, sizeof *space);
+  if (l->base == NULL) return;
+  *k = *from;
+  k->J = J, k->block = space, k->b.u = k->u = u;
+  k->b.pose = w->pose;
+  k->b.q = w->s->q0 + k->own, k->b.v = w->s->v0 + k->own;
+  k->source = w->source + (from->source - w->s->source);
+}
+
+static void workspace_layout (pw_layout *l, pw_workspace *w) {
+  const pw_system *s = w->s;
+  pw_take (l, 1, sizeof *w);
+  w->slab = pw_take (l, (size_t)s->slabs, sizeof *w->slab);
+  w->force = pw_take (l, (size_t)s->forces, sizeof *w->force);
+  w->source = pw_take (l, (size_t)s->sources, sizeof *w->source);
+  w->pose = pw_take (l, (size_t)s->bodies + 1, sizeof *w->pose);
+  w->scratch = pw_take (l, (size_t)(3 * s->rows + s->coords) + 3, sizeof *w->scratch);
+  for (int i = 0; i < s->slabs; i++) workspace_batch (l, &s->slab[i], w, l->base ? &w->slab[i] : NULL);
+  double *x = pw_take (l, 2 * (size_t)s->reads, sizeof *x);
+  for (int i = 0; l->base && i < s->sources; x += 2 * s->source[i++].reads) {
+    w->source[i] = s->source[i];
+    w->source[i].x = x;
+  }
+}
+
+/* Functions that have a context of their own get one for this workspace. */
+static int workspace_open_signals (pw_workspace *w) {
+  int status = PW_OK;
+  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++)
+    for (int i = 0; i < k->b.count * k->kind->signals; i++) {
+      pw_function *f = &k->source[i].signal.function;
+      k->source[i].u = k->u + 3 * i;
+      if (k->source[i].signal.type != PW_FUNCTION || f->open == NULL) continue;
+      f->context = status == PW_OK ? f->open (f->context) : NULL;
+      if (f->context == NULL) status = PW_MACHINE, f->close = NULL; /* nor are those after it */
+    }
+  return status;
+}
+
+pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
+  pw_layout l = { NULL, 0 };
+  workspace_layout (&l, &(pw_workspace){ .s = s });
+  pw_workspace *w = calloc (1, l.used);
+  if (w) {
+    w->s = s;
+    w->scale = s->scale;
+    w->t_signal = NAN;
+    workspace_layout (&(pw_layout){ (char *)w, 0 }, w);
+    w->pose[s->bodies].cos = 1;
+    for (int i = 0, n = 0; i < s->slabs; i++)
+      if (w->slab[i].kind->force && !w->slab[i].kind->constant) w->force[n++] = &w->slab[i];
+    if (workspace_open_signals (w) == PW_OK) return w;
+  }
+  pw_workspace_free (w);
+  pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  return NULL;
+}
+
+void pw_workspace_free (pw_workspace *w) {
+  if (w) pw_close_signals (w->source, w->s->sources);
+  free (w);
+}
