@@ -29,20 +29,19 @@ static double range_product (double a, double b) {
   return a == 0 || b == 0 ? 0 : a * b;
 }
 
-/* The least and the largest of four corners. */
-static range range_corners (double a, double b, double c, double d) {
+static double range_quotient (double a, double b) {
+  return a / b;
+}
+
+/* Between the least and the largest value of f at the corners, for an f that is monotonic in each argument. */
+static range range_corners (double (*f) (double, double), const range *x, const range *y) {
+  double a = f (x->lo, y->lo), b = f (x->lo, y->hi), c = f (x->hi, y->lo), d = f (x->hi, y->hi);
   if (isnan (a) || isnan (b) || isnan (c) || isnan (d)) return range_any;
   return range_of (fmin (fmin (a, b), fmin (c, d)), fmax (fmax (a, b), fmax (c, d)));
 }
 
-static range range_multiply (const range *x, const range *y) {
-  return range_corners (range_product (x->lo, y->lo), range_product (x->lo, y->hi), range_product (x->hi, y->lo),
-                        range_product (x->hi, y->hi));
-}
-
 static range range_divide (const range *x, const range *y) {
-  if (y->lo <= 0 && y->hi >= 0) return range_any;
-  return range_corners (x->lo / y->lo, x->lo / y->hi, x->hi / y->lo, x->hi / y->hi);
+  return y->lo <= 0 && y->hi >= 0 ? range_any : range_corners (range_quotient, x, y);
 }
 
 static range range_abs (const range *x) {
@@ -90,34 +89,26 @@ static range range_whole_power (const range *x, double n) {
   if (n < 0 && x->lo <= 0 && x->hi >= 0) return range_any;
   range b = even ? range_abs (x) : *x;
   if (even) b.lo = fmax (0, b.lo);
-  return range_corners (pow (b.lo, n), pow (b.lo, n), pow (b.hi, n), pow (b.hi, n));
+  return range_corners (pow, &b, &(range){ n, n, 0, 0 });
 }
 
 static range range_power (const range *x, const range *y) {
   double n = rint (y->lo);
   if (y->hi - y->lo < 1e-9 && fabs (y->lo - n) < 1e-9) return range_whole_power (x, n);
-  if (x->lo < 0) return range_any;
-  return range_corners (pow (x->lo, y->lo), pow (x->lo, y->hi), pow (x->hi, y->lo), pow (x->hi, y->hi));
+  return x->lo < 0 ? range_any : range_corners (pow, x, y);
 }
 
 /* The angle of (x, y) jumps on the negative x axis. */
 static range range_atan2 (const range *y, const range *x) {
   if (x->lo <= 0 && y->lo <= 0 && y->hi >= 0) return (range){ -PW_PI, PW_PI, 1, 0 };
-  return range_corners (atan2 (y->lo, x->lo), atan2 (y->lo, x->hi), atan2 (y->hi, x->lo), atan2 (y->hi, x->hi));
+  return range_corners (atan2, y, x);
 }
 
-static range range_hypot (const range *x, const range *y) {
-  range a = range_abs (x), b = range_abs (y);
-  return range_of (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
-}
-
-static range range_am (const range *u, const range *m) {
-  if (m->hi - m->lo > 1e-12) return range_any;
-  return range_of (pw_jacobi_am (u->lo, m->lo), pw_jacobi_am (u->hi, m->lo));
-}
-
+/* hypot, or jacobi_am (x, y) with one y. */
 static range range_pair (const pw_expression_function *f, const range *x, const range *y) {
-  return f->two == hypot ? range_hypot (x, y) : range_am (x, y);
+  range a = range_abs (x), b = range_abs (y);
+  if (f->two == hypot) return range_of (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
+  return y->hi - y->lo > 1e-12 ? range_any : range_of (f->two (x->lo, y->lo), f->two (x->hi, y->lo));
 }
 
 /* ---- What breaks ---- */
@@ -139,7 +130,7 @@ static range range_mod (const range *x, const range *y) {
   range q = range_divide (x, y), n = range_whole (PW_OP_FLOOR, &q);
   double most = fmax (fabs (y->lo), fabs (y->hi));
   if (n.breaks) return (range){ y->lo < 0 ? -most : 0, y->hi > 0 ? most : 0, 1, 0 };
-  range part = range_multiply (&n, y);
+  range part = range_corners (range_product, &n, y);
   return range_of (x->lo - part.hi, x->hi - part.lo);
 }
 
@@ -206,7 +197,7 @@ static range range_two (const pw_expression_code *c, const range *x, const range
   case PW_OP_SUBTRACT:
     return range_of (x->lo - y->hi, x->hi - y->lo);
   case PW_OP_MULTIPLY:
-    return range_multiply (x, y);
+    return range_corners (range_product, x, y);
   case PW_OP_DIVIDE:
     return range_divide (x, y);
   case PW_OP_POWER:

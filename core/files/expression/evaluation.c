@@ -1,6 +1,16 @@
-/* The values of expressions. */
+/* The values of expressions, and their exact derivatives.
+ *
+ * For derivatives, each operation passes on (value, first, second derivative) by the chain rule,
+ *
+ *   f' = f_x x' + f_y y',   f'' = f_xx x'^2 + 2 f_xy x' y' + f_yy y'^2 + f_x x'' + f_y y''
+ *
+ * (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  If two numbers are equal now, the one whose first
+ * derivative that differs is larger will be the larger: an expression that jumps has the value just after the jump. */
 #include <math.h>
 #include "expression_parts.h"
+#include "pinwheel.h"
+
+/* ---- Values ---- */
 
 static inline int value_order (double a, double b, int *tie) {
   if (a == b) *tie = 1;
@@ -14,17 +24,6 @@ static inline double value_jump (int op, double x, int *tie) {
                                  : round (x);
   if (op == PW_OP_ROUND ? fabs (x - trunc (x)) == 0.5 : op == PW_OP_SIGN ? x == 0 : x == y) *tie = 1;
   return y;
-}
-
-static double value_mod (double a, double b, int *tie) {
-  double r = pw_expression_mod (a, b);
-  if (r == 0) *tie = 1;
-  return r;
-}
-
-static double value_atan2 (double y, double x, int *tie) {
-  if (y == 0 && x < 0) *tie = 1;
-  return atan2 (y, x);
 }
 
 /* Of two numbers, the second being x; of one, x. */
@@ -55,9 +54,12 @@ static inline double value_of (const pw_expression_code *c, double a, double x, 
   case PW_OP_MAX:
     return fmax (a, x);
   case PW_OP_MOD:
-    return value_mod (a, x, tie);
+    a = pw_expression_mod (a, x);
+    if (a == 0) *tie = 1;
+    return a;
   case PW_OP_ATAN2:
-    return value_atan2 (a, x, tie);
+    if (a == 0 && x < 0) *tie = 1;
+    return atan2 (a, x);
   case PW_OP_TWO:
     return pw_expression_functions[c->which].two (a, x);
   }
@@ -85,6 +87,166 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
       x = value_of (c, a, x, tie);
     }
   return x;
+}
+
+/* ---- Derivatives ---- */
+
+typedef struct {
+  double v, d, dd;
+  int on; /* 1: it depends on the variable */
+} jet;
+
+/* What does not depend on the variable has no part in a derivative, be its slope infinite. */
+static jet jet_chain (double f, const pw_slopes *s, const jet *x, const jet *y) {
+  jet r = { f, 0, 0, x->on | y->on };
+  if (x->on) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;
+  if (y->on) r.d += s->y * y->d, r.dd += s->yy * y->d * y->d + s->y * y->dd;
+  if (x->on && y->on) r.dd += 2 * s->xy * x->d * y->d;
+  return r;
+}
+
+/* ---- What jumps or bends ---- */
+
+static inline int jet_sign (const jet *x) {
+  double first = x->v != 0 ? x->v : x->d != 0 ? x->d : x->dd;
+  return (first > 0) - (first < 0);
+}
+
+/* How two will compare just after. */
+static int jet_order (const jet *x, const jet *y) {
+  if (x->v != y->v) return x->v < y->v ? -1 : x->v > y->v ? 1 : 2;
+  jet less = { 0, x->d - y->d, x->dd - y->dd, 1 };
+  return jet_sign (&less);
+}
+
+/* floor, ceil, round just after; `way` it is going. */
+static double jet_step (int op, double x, int way) {
+  double low = floor (x);
+  if (op == PW_OP_FLOOR) return x == low && way < 0 ? low - 1 : low;
+  if (op == PW_OP_CEIL) return x == low ? low + (way > 0) : ceil (x);
+  return x - low == 0.5 && way != 0 ? low + (way > 0) : round (x);
+}
+
+static jet jet_broken (int op, const jet *x, double *discrete) {
+  const jet change = { 0, x->d, x->dd, x->on };
+  int sign = jet_sign (x);
+  *discrete = op == PW_OP_ABS || op == PW_OP_SIGN ? sign : jet_step (op, x->v, jet_sign (&change));
+  return op == PW_OP_ABS ? (jet){ fabs (x->v), sign * x->d, sign * x->dd, x->on } : (jet){ .v = *discrete };
+}
+
+static jet jet_plus (const jet *x, double factor, const jet *y) {
+  return (jet){ x->v + factor * y->v, x->d + factor * y->d, x->dd + factor * y->dd, x->on | y->on };
+}
+
+/* x - q y; q is read off the remainder, so that both jump together. */
+static jet jet_mod (const jet *x, const jet *y, double *q) {
+  double r = pw_expression_mod (x->v, y->v);
+  *q = rint ((x->v - r) / y->v);
+  jet m = jet_plus (x, -*q, y);
+  m.v = r;
+  if (r != 0 || jet_sign (&m) * y->v >= 0) return m;
+  m = jet_plus (&m, 1, y);
+  *q -= 1;
+  return m;
+}
+
+/* ---- Operations ---- */
+
+static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete) {
+  static const jet none = { 0 };
+  if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->on };
+  if (c->op == PW_OP_ONE) {
+    const pw_expression_function *f = &pw_expression_functions[c->which];
+    double value = f->one (x->v);
+    pw_slopes s = f->slopes (x->v, 0, value);
+    return jet_chain (value, &s, x, &none);
+  }
+  return jet_broken (c->op, x, discrete);
+}
+
+static jet jet_product (const jet *x, const jet *y) {
+  return (jet){ x->v * y->v, y->v * x->d + x->v * y->d, y->v * x->dd + 2 * x->d * y->d + x->v * y->dd, x->on | y->on };
+}
+
+static jet jet_quotient (const jet *x, const jet *y) {
+  double f = x->v / y->v, d = (x->d - f * y->d) / y->v;
+  return (jet){ f, d, (x->dd - 2 * d * y->d - f * y->dd) / y->v, x->on | y->on };
+}
+
+/* A power or a function of two arguments. */
+static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y) {
+  const pw_expression_function *f = &pw_expression_functions[c->which];
+  int power = c->op == PW_OP_POWER;
+  double value = power ? pw_expression_power (x->v, y->v) : f->two (x->v, y->v);
+  pw_slopes s = power ? pw_expression_power_slopes (x->v, y->v, value, y->on) : f->slopes (x->v, y->v, value);
+  return jet_chain (value, &s, x, y);
+}
+
+/* It jumps where y, the first argument, changes sign at negative x. */
+static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
+  jet r = jet_function (c, y, x);
+  int sign = jet_sign (y);
+  *discrete = x->v < 0 && sign < 0;
+  if (y->v == 0 && x->v < 0 && sign != 0) r.v = sign * PW_PI;
+  return r;
+}
+
+static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
+  switch (c->op) {
+  case PW_OP_ADD:
+    return jet_plus (x, 1, y);
+  case PW_OP_SUBTRACT:
+    return jet_plus (x, -1, y);
+  case PW_OP_MULTIPLY:
+    return jet_product (x, y);
+  case PW_OP_DIVIDE:
+    return jet_quotient (x, y);
+  case PW_OP_POWER:
+  case PW_OP_TWO:
+    return jet_function (c, x, y);
+  case PW_OP_ATAN2:
+    return jet_atan2 (c, x, y, discrete);
+  case PW_OP_MOD:
+    return jet_mod (x, y, discrete);
+  case PW_OP_AND:
+    return (jet){ .v = x->v != 0 && y->v != 0 };
+  case PW_OP_OR:
+    return (jet){ .v = x->v != 0 || y->v != 0 };
+  }
+  int order = jet_order (x, y);
+  *discrete = order;
+  if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) {
+    int first = order == 2 ? !isnan (x->v) : c->op == PW_OP_MIN ? order < 0 : order > 0;
+    return first ? *x : *y;
+  }
+  *discrete = pw_expression_truth (c->op, order);
+  return (jet){ .v = *discrete };
+}
+
+void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
+                            double *discrete) {
+  jet stack[PW_EXPRESSION_STACK], *top = stack;
+  for (const pw_expression_code *c = code, *end = code + codes; c < end; c++) {
+    int operands = pw_expression_operands (c->op);
+    double change = 0;
+    top -= operands;
+    if (operands == 0)
+      *top = c->op == PW_OP_CONSTANT ? (jet){ .v = c->value }
+                                     : (jet){ variable[c->which], c->which == by, 0, c->which == by };
+    else if (operands == 3)
+      *top = top[0].v != 0 ? top[1] : top[2];
+    else if (!top[0].on && !top[operands - 1].on)
+      *top = (jet){ .v = pw_expression_apply (c, top[0].v, top[operands - 1].v) };
+    else
+      *top = operands == 1 ? jet_one (c, top, &change) : jet_two (c, top, top + 1, &change);
+    if (discrete) discrete[c - code] = change;
+    top++;
+  }
+  u[0] = top[-1].v, u[1] = top[-1].d, u[2] = top[-1].dd;
+}
+
+void pw_expression_derivatives (const pw_expression *x, const double *variable, int by, double u[3]) {
+  pw_expression_run_jet (x->code, x->codes, variable, by, u, NULL);
 }
 
 double pw_expression_value (const pw_expression *x, const double *variable) {

@@ -54,20 +54,10 @@ static inline int pw_expression_breaks (int op) {
 
 /* How two numbers compare: -1, 0, 1; 2: one of them is not a number. */
 static inline int pw_expression_truth (int op, int order) {
-  switch (op) {
-  case PW_OP_LESS:
-    return order == -1;
-  case PW_OP_LESS_EQUAL:
-    return order == -1 || order == 0;
-  case PW_OP_GREATER:
-    return order == 1;
-  case PW_OP_GREATER_EQUAL:
-    return order == 1 || order == 0;
-  case PW_OP_EQUAL:
-    return order == 0;
-  default:
-    return order != 0;
-  }
+  int equal = order == 0 && (op == PW_OP_LESS_EQUAL || op == PW_OP_GREATER_EQUAL || op == PW_OP_EQUAL);
+  int less = order == -1 && (op == PW_OP_LESS || op == PW_OP_LESS_EQUAL);
+  int greater = order == 1 && (op == PW_OP_GREATER || op == PW_OP_GREATER_EQUAL);
+  return equal || less || greater || (order != 0 && op == PW_OP_UNEQUAL);
 }
 
 /* ---- Functions (functions.c) ---- */
@@ -107,13 +97,6 @@ double pw_expression_power (double x, double y);
 pw_slopes pw_expression_power_slopes (double x, double y, double f, int varies);
 /* The remainder with the sign of the divisor: an angle modulo 2 pi lies in [0, 2 pi). */
 double pw_expression_mod (double x, double y);
-
-/* ---- Words (lexer.c) ---- */
-
-/* How long the name at p is, which may go on with a dot: frame.phi; 0 if there is none. */
-size_t pw_expression_name_size (const char *p);
-/* Digits, with a point among them or around, and an exponent; 0 if there is no number. */
-size_t pw_expression_number_size (const char *p);
 
 /* ---- Evaluation ---- */
 

@@ -6,12 +6,74 @@
  *   operand  = number | name | function (choice, ...) | (choice)
  *
  * What has no variables is computed at once.  Each mistake is reported at its place. */
+#include <ctype.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
 #include "pinwheel-files.h"
+
+/* ---- Names and numbers in a text ---- */
+
+static int lexer_begins_name (char c) {
+  return isalpha ((unsigned char)c) || c == '_';
+}
+
+/* The length of the name at p, which may contain dots (frame.phi); 0 if there is none. */
+static size_t lexer_name_size (const char *p) {
+  size_t n = 0;
+  if (lexer_begins_name (*p))
+    while (lexer_begins_name (p[n]) || isdigit ((unsigned char)p[n]) || (n && p[n] == '.')) n++;
+  return n;
+}
+
+static size_t lexer_digits (const char *p) {
+  return strspn (p, "0123456789");
+}
+
+/* Digits, perhaps with a decimal point and an exponent; 0 if there is no number. */
+static size_t lexer_number_size (const char *p) {
+  size_t whole = lexer_digits (p), n = whole;
+  if (p[n] == '.') {
+    size_t part = lexer_digits (p + n + 1);
+    if (whole + part == 0) return 0;
+    n += 1 + part;
+  }
+  if (n && (p[n] == 'e' || p[n] == 'E')) {
+    size_t sign = p[n + 1] == '+' || p[n + 1] == '-', power = lexer_digits (p + n + 1 + sign);
+    if (power) n += 1 + sign + power;
+  }
+  return n;
+}
+
+int pw_expression_number (const char *text, double *value) {
+  size_t sign = *text == '+' || *text == '-', n = lexer_number_size (text + sign);
+  return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
+}
+
+int pw_expression_is_taken (const char *text) {
+  const pw_expression_constant_name *c = pw_expression_constants;
+  while (c->name && strcmp (c->name, text) != 0) c++;
+  return c->name || pw_expression_find (text) >= 0;
+}
+
+int pw_expression_is_name (const char *text) {
+  size_t n = lexer_name_size (text);
+  return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
+}
+
+int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
+                         void *context) {
+  for (const char *p = text; *p;) {
+    size_t n = lexer_name_size (p), number = n ? 0 : lexer_number_size (p);
+    int stop = n ? each (context, p, n, (size_t)(p - text)) : 0;
+    if (stop) return stop;
+    p += n ? n : number ? number : 1;
+  }
+  return 0;
+}
 
 enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_CODES = PW_EXPRESSION_CODES, PARSER_NAME = 100 };
 enum { ON_TIME = 1, ON_STATES = 2 };
@@ -88,21 +150,28 @@ typedef struct {
 static const parser_part parser_nothing = { 0 };
 
 /* The first mistake counts. */
-static parser_part parser_wrong (parser *p, size_t at, const char *format, const char *a, const char *b) {
+#ifdef __GNUC__
+__attribute__ ((format (printf, 3, 4)))
+#endif
+static parser_part
+parser_wrong (parser *p, size_t at, const char *format, ...) {
   if (p->status != PW_OK) return parser_nothing;
   p->status = PW_INPUT;
   p->trouble->at = at;
-  snprintf (p->trouble->text, sizeof p->trouble->text, format, a, b);
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (p->trouble->text, sizeof p->trouble->text, format, arguments);
+  va_end (arguments);
   return parser_nothing;
 }
 
 static void parser_wrong_sign (parser *p) {
   char c = p->text[p->at], shown[2] = { c, 0 };
   if (c == '=')
-    parser_wrong (p, p->at, "\"=\" would assign; equality is written ==%s%s", "", "");
+    parser_wrong (p, p->at, "\"=\" would assign; equality is written ==");
   else
-    parser_wrong (p, p->at, "\"%s\" does not belong in an expression%s",
-                  c & 0x80 ? "a letter without ASCII code" : shown, "");
+    parser_wrong (p, p->at, "\"%s\" does not belong in an expression",
+                  c & 0x80 ? "a letter without ASCII code" : shown);
 }
 
 /* Goes on to the next word. */
@@ -113,7 +182,7 @@ static void parser_next (parser *p) {
   word += strspn (word, " \t\r\n");
   p->at = (size_t)(word - p->text);
   p->sign = NULL;
-  size_t name = pw_expression_name_size (word), number = pw_expression_number_size (word);
+  size_t name = lexer_name_size (word), number = lexer_number_size (word);
   p->size = name ? name : number ? number : *word != 0;
   p->type = name ? 'n' : number ? '0' : *word;
   if (name || number || *word == 0 || strchr ("(),?:", *word)) return;
@@ -123,7 +192,7 @@ static void parser_next (parser *p) {
   if (p->sign == NULL)
     parser_wrong_sign (p);
   else if (word[0] == '*' && word[1] == '*')
-    parser_wrong (p, p->at, "a power is written with ^%s%s", "", "");
+    parser_wrong (p, p->at, "a power is written with ^");
   else
     p->size = strlen (p->sign->name);
 }
@@ -134,7 +203,7 @@ static void parser_code (parser *p, int op, int which, double value) {
   if (p->status != PW_OK) return;
   p->waiting += 1 - pw_expression_operands (op);
   if (p->waiting > PW_EXPRESSION_STACK || p->codes == PARSER_CODES)
-    parser_wrong (p, p->at, "too much is nested here%s%s", "", "");
+    parser_wrong (p, p->at, "too much is nested here");
   else
     p->code[p->codes++] = (pw_expression_code){ (short)op, (short)which, value };
 }
@@ -181,30 +250,29 @@ static parser_part parser_choice (parser *p);
 
 static int parser_deeper (parser *p) {
   if (++p->nested > PARSER_DEEPEST)
-    parser_wrong (p, p->at, p->type == '(' ? "too many parentheses%s%s" : "too much is nested here%s%s", "", "");
+    parser_wrong (p, p->at, "%s", p->type == '(' ? "too many parentheses" : "too much is nested here");
   return p->status == PW_OK;
 }
 
 /* The word does not fit; `open`: a parenthesis to close before it, 0 if there is none, and its place. */
 static parser_part parser_unexpected (parser *p, char open, size_t at) {
   if (p->type == 'n' || p->type == '0' || p->type == '(')
-    return parser_wrong (p, p->at, "an operator such as * is missing before \"%s\"%s", (char[2]){ p->text[p->at], 0 },
-                         "");
-  if (open == '?') return parser_wrong (p, at, "there is no \":\" for this \"?\"%s%s", "", "");
-  if (p->type == ',') return parser_wrong (p, p->at, "a comma belongs between the arguments of a function%s%s", "", "");
-  if (p->type == ')') return parser_wrong (p, p->at, "there is no \"(\" for this \")\"%s%s", "", "");
-  if (open && p->type == 0) return parser_wrong (p, at, "there is no \")\" for this \"(\"%s%s", "", "");
-  return parser_wrong (p, p->at, "this does not belong here%s%s", "", "");
+    return parser_wrong (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });
+  if (open == '?') return parser_wrong (p, at, "there is no \":\" for this \"?\"");
+  if (p->type == ',') return parser_wrong (p, p->at, "a comma belongs between the arguments of a function");
+  if (p->type == ')') return parser_wrong (p, p->at, "there is no \"(\" for this \")\"");
+  if (open && p->type == 0) return parser_wrong (p, at, "there is no \")\" for this \"(\"");
+  return parser_wrong (p, p->at, "this does not belong here");
 }
 
 static parser_part parser_missing (parser *p) {
   char last[PARSER_NAME];
   if (p->status != PW_OK) return parser_nothing;
   snprintf (last, sizeof last, "%.*s", (int)(p->end - p->before), p->text + p->before);
-  if (p->type == 0 && p->end == 0) return parser_wrong (p, 0, "an expression is missing%s%s", "", "");
-  if (p->type == 0) return parser_wrong (p, p->before, "something is missing after \"%s\"%s", last, "");
-  if (p->type == ')' && p->end) return parser_wrong (p, p->before, "something is missing after \"%s\"%s", last, "");
-  return parser_wrong (p, p->at, "this does not belong here%s%s", "", "");
+  if (p->type == 0 && p->end == 0) return parser_wrong (p, 0, "an expression is missing");
+  if (p->type == 0) return parser_wrong (p, p->before, "something is missing after \"%s\"", last);
+  if (p->type == ')' && p->end) return parser_wrong (p, p->before, "something is missing after \"%s\"", last);
+  return parser_wrong (p, p->at, "this does not belong here");
 }
 
 static parser_part parser_unknown (parser *p, const char *name) {
@@ -232,7 +300,7 @@ static parser_part parser_name (parser *p, const char *name) {
   int variable = p->variable && p->variable[i];
   if (!variable && known < 0 && c->name == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
-    return parser_wrong (p, p->at, "\"%s\" is a number, not a function; a product is written with *%s", name, "");
+    return parser_wrong (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
   if (variable) return parser_leaf (p, PW_OP_VARIABLE, i, 0);
   return parser_leaf (p, PW_OP_CONSTANT, 0, known >= 0 ? p->scope->entry[known].value : c->value);
 }
@@ -255,8 +323,8 @@ static parser_part parser_call (parser *p, int which) {
   } while (p->type == ',' && p->status == PW_OK);
   if (p->status != PW_OK) return part;
   if (p->type != ')') return parser_unexpected (p, '(', open);
-  if (arguments < f->least) return parser_wrong (p, p->at, "too few arguments%s%s", "", "");
-  if (f->most && arguments > f->most) return parser_wrong (p, p->at, "too many arguments%s%s", "", "");
+  if (arguments < f->least) return parser_wrong (p, p->at, "too few arguments");
+  if (f->most && arguments > f->most) return parser_wrong (p, p->at, "too many arguments");
   parser_next (p);
   return f->most ? parser_emit (p, part, part.depends, f->op, which) : part;
 }
@@ -292,7 +360,7 @@ static parser_part parser_operand (parser *p) {
   int which = pw_expression_find (name);
   if (which < 0) return parser_name (p, name);
   if (parser_is_call (p)) return parser_call (p, which);
-  return parser_wrong (p, p->at, "\"%s\" is a function: write its argument in parentheses%s", name, "");
+  return parser_wrong (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
 }
 
 /* ---- Operators ---- */
@@ -344,7 +412,7 @@ static parser_part parser_choice (parser *p) {
 static int parser_read (parser *p) {
   p->trouble->at = 0;
   if (strlen (p->text) > PARSER_LONGEST)
-    return parser_wrong (p, 0, "an expression of more than 4000 characters%s%s", "", ""), p->status;
+    return parser_wrong (p, 0, "an expression of more than %d characters", PARSER_LONGEST), p->status;
   parser_next (p);
   parser_choice (p);
   if (p->status == PW_OK && p->type != 0) parser_unexpected (p, 0, 0);
