@@ -1,16 +1,76 @@
-/* Signals: values and time derivatives of what the user wants to happen over time. */
+/* Signals: prescribed functions of time, with their first two derivatives; tables are in table.c. */
 #include <math.h>
 #include "signal.h"
 
-/* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p); a force needs no sine */
-static void signal_harmonic (const pw_signal *s, double angle, double u[3]) {
-  double A = s->harmonic.amplitude, w = s->harmonic.omega, c = A * cos (angle);
-  u[0] = s->harmonic.offset + c;
-  u[1] = -A * w * sin (angle);
-  u[2] = -w * w * c;
+/* ---- Ramps, smooth steps, pulses ---- */
+
+/* from + (to - from) x, x = (t - start) / duration */
+static void signal_ramp (const pw_signal *s, double x, double u[3]) {
+  double rise = s->ramp.to - s->ramp.from;
+  u[0] = s->ramp.from + rise * x;
+  u[1] = rise / s->ramp.duration;
 }
 
-/* What is not a number has failed, too. */
+/* from + (to - from) (10 x^3 - 15 x^4 + 6 x^5): rate and acceleration begin and end with 0
+ * (Flash & Hogan 1985, Journal of Neuroscience 5, 1688-1703). */
+static void signal_smooth_step (const pw_signal *s, double x, double u[3]) {
+  double rise = s->ramp.to - s->ramp.from, T = s->ramp.duration;
+  u[0] = s->ramp.from + rise * (x * x * x * (10 + x * (6 * x - 15)));
+  u[1] = rise * (30 * x * x * (1 - x) * (1 - x)) / T;
+  u[2] = rise * (60 * x * (1 - x) * (1 - 2 * x)) / (T * T);
+}
+
+/* Ramps and smooth steps are constant before their start and after their end. */
+static void signal_rise (const pw_signal *s, double t, double u[3]) {
+  if (t < s->ramp.start)
+    u[0] = s->ramp.from;
+  else if (t >= s->ramp.start + s->ramp.duration)
+    u[0] = s->ramp.to;
+  else
+    (s->type == PW_RAMP ? signal_ramp : signal_smooth_step) (s, (t - s->ramp.start) / s->ramp.duration, u);
+}
+
+static double signal_rise_breakpoint (const pw_signal *s, double t) {
+  double end = s->ramp.start + s->ramp.duration;
+  return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
+}
+
+/* The beginning of the pulse period that contains t, and of the next one; t is not before the first. */
+static void signal_pulses (const pw_signal *s, double t, double *here, double *next) {
+  double start = s->pulse.start, period = s->pulse.period;
+  *here = start;
+  *next = INFINITY;
+  if (period == 0) return;
+  double k = floor ((t - start) / period);
+  if (start + k * period > t) k--; /* the quotient was rounded */
+  if (start + (k + 1) * period <= t) k++;
+  *here = start + k * period;
+  *next = start + (k + 1) * period;
+}
+
+static double signal_pulse_end (const pw_signal *s, double here) {
+  return s->pulse.width > 0 ? here + s->pulse.width : INFINITY;
+}
+
+static void signal_pulse (const pw_signal *s, double t, double u[3]) {
+  double here, next;
+  u[0] = s->pulse.offset;
+  if (t < s->pulse.start) return;
+  signal_pulses (s, t, &here, &next);
+  if (t < signal_pulse_end (s, here)) u[0] += s->pulse.height;
+}
+
+static double signal_pulse_breakpoint (const pw_signal *s, double t) {
+  double here, next;
+  if (t < s->pulse.start) return s->pulse.start;
+  signal_pulses (s, t, &here, &next);
+  double end = signal_pulse_end (s, here);
+  return t < end ? end : next > t ? next : INFINITY; /* late enough, times no longer tell pulses apart */
+}
+
+/* ---- All signals ---- */
+
+/* A value that is not finite is a failure, too. */
 static int signal_function (const pw_source *source, double t, int derivatives, double u[3]) {
   const pw_function *f = &source->signal.function;
   int status = f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
@@ -18,25 +78,45 @@ static int signal_function (const pw_source *source, double t, int derivatives, 
   return !isfinite (u[0]) || (derivatives && !(isfinite (u[1]) && isfinite (u[2])));
 }
 
-/* What most scenes have comes first. */
+/* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p); a force needs the value alone */
+static void signal_harmonic (const pw_signal *s, double t, int derivatives, double u[3]) {
+  double A = s->harmonic.amplitude, w = s->harmonic.omega, angle = w * t + s->harmonic.phase, c = A * cos (angle);
+  u[0] = s->harmonic.offset + c;
+  if (!derivatives) return;
+  u[1] = -A * w * sin (angle);
+  u[2] = -w * w * c;
+}
+
 int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]) {
   const pw_signal *s = &source->signal;
-  u[1] = u[2] = 0;
-  if (s->type == PW_HARMONIC && !derivatives) {
-    u[0] = s->harmonic.offset + s->harmonic.amplitude * cos (s->harmonic.omega * t + s->harmonic.phase);
-    return 0;
-  }
-  u[0] = 0;
-  if (s->type == PW_FUNCTION) return signal_function (source, t, derivatives, u);
-  if (s->type > PW_HARMONIC) return pw_shape_eval (source, t, u);
+  u[0] = u[1] = u[2] = 0;
   if (s->type == PW_HARMONIC)
-    signal_harmonic (s, s->harmonic.omega * t + s->harmonic.phase, u);
-  else
+    signal_harmonic (s, t, derivatives, u);
+  else if (s->type == PW_CONSTANT)
     u[0] = s->constant;
+  else if (s->type == PW_FUNCTION)
+    return signal_function (source, t, derivatives, u);
+  else if (s->type == PW_TABLE)
+    pw_table_eval (s, source->spline, t, u);
+  else if (s->type == PW_PULSE)
+    signal_pulse (s, t, u);
+  else
+    signal_rise (s, t, u);
   return 0;
 }
 
 double pw_signal_breakpoint (const pw_signal *s, int knots, double t) {
-  if (s->type != PW_FUNCTION) return pw_shape_breakpoint (s, knots, t);
-  return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
+  switch (s->type) {
+  case PW_RAMP:
+  case PW_SMOOTH_STEP:
+    return signal_rise_breakpoint (s, t);
+  case PW_PULSE:
+    return signal_pulse_breakpoint (s, t);
+  case PW_TABLE:
+    return pw_table_breakpoint (s, knots, t);
+  case PW_FUNCTION:
+    return s->function.breakpoint ? s->function.breakpoint (s->function.context, t) : INFINITY;
+  default:
+    return INFINITY;
+  }
 }

@@ -24,12 +24,6 @@ int pw_signal_eval (const pw_source *source, double t, int derivatives, double u
  * acceleration of a cubic table has a kink. */
 double pw_signal_breakpoint (const pw_signal *s, int knots, double t);
 
-/* ---- Ramps, smooth steps, pulses, and tables (shape.c) ---- */
-
-/* u is all zero before.  Returns 0. */
-int pw_shape_eval (const pw_source *source, double t, double u[3]);
-double pw_shape_breakpoint (const pw_signal *s, int knots, double t);
-
 /* ---- Tables (table.c) ---- */
 
 /* The signal at a point. */

@@ -15,7 +15,7 @@ static const pw_field form_harmonic[] = {
 
 static const pw_field form_ramp[] = {
   { FORM_AT (ramp, from), PW_NUMBER, .about = "value up to the start" },
-  { FORM_AT (ramp, to), PW_NUMBER, .required = 1, .about = "value behind it" },
+  { FORM_AT (ramp, to), PW_NUMBER, .required = 1, .about = "value after it" },
   { FORM_AT (ramp, start), PW_NUMBER, .unit = "s", .about = "time at which it begins" },
   { FORM_AT (ramp, duration), PW_NUMBER, .unit = "s", .required = 1, .domain = PW_POSITIVE,
     .about = "how long it takes" },
@@ -50,7 +50,7 @@ const pw_signal_form pw_signal_forms[] = {
   { "ramp", PW_RAMP, "from one value to another along a straight line", form_ramp },
   { "smooth-step", PW_SMOOTH_STEP, "from one value to another with continuous rate and acceleration", form_ramp },
   { "pulse", PW_PULSE, "a jump up and back down, once or each period", form_pulse },
-  { "table", PW_TABLE, "through points (time, value); the first and the last value are held outside", form_table },
+  { "table", PW_TABLE, "through points (time, value); the first and the last value are constant outside", form_table },
   { .name = NULL },
 };
 
