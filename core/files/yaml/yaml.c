@@ -218,6 +218,22 @@ const pw_plugin_table *pw_yaml_table (const pw_yaml *y) {
   return &y->table;
 }
 
+/* Calls `each` with the path of every file named below a node, until it returns non-zero, which is returned. */
+static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
+                            void *context) {
+  int stop = 0;
+  for (const pw_node *n = node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
+    const pw_node *value = node->type == PW_YAML_MAP ? n->next : NULL;
+    if (value && n->type == PW_YAML_SCALAR && strcmp (n->text, "file") == 0 && value->type == PW_YAML_SCALAR) {
+      char *path = pw_join (y->folder, value->text, "");
+      stop = path ? each (context, path) : PW_MACHINE;
+      free (path);
+    }
+    if (!stop) stop = yaml_each_table (y, n, each, context);
+  }
+  return stop;
+}
+
 int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context) {
-  return y->root ? pw_yaml_each_table (y, y->root, each, context) : 0;
+  return y->root ? yaml_each_table (y, y->root, each, context) : 0;
 }

@@ -1,15 +1,12 @@
-/* Models as text: what the files yaml*.c share.
+/* Text models: what the files of this folder share, each below using those above it.
  *
- *   yaml_source.c  the text: reading it, refusing what is no text, messages with line, column and caret
- *   yaml_tree.c    libfyaml's events become a tree of scalars, lists and maps
- *   yaml_read.c    keys, numbers and names out of the tree
- *   yaml.c         the head of a model: parameters and run defaults, which make a plug-in's table
- *   yaml_build.c   bodies and elements, through the field tables of their kinds
- *   yaml_signal.c  signals
- *   yaml_time.c    signals by expressions of time
- *   yaml_state.c   states that expressions name
- *   yaml_table.c   points of tables, in the model or in a file
- *   yaml_truth.c   what is known about the motion */
+ *   yaml_source.c      the text: reading it, refusing what is not text, messages with line, column and caret
+ *   yaml_tree.c        libfyaml's events become a tree of scalars, lists and maps
+ *   yaml_read.c        keys, numbers and names from the tree
+ *   yaml_expression.c  signals by expressions of time and states, the reference solution
+ *   yaml_signal.c      other signals, points of tables
+ *   yaml_build.c       bodies and elements, through the field tables of their types
+ *   yaml.c             the head of a model: parameters and default run settings, which make a plug-in's table */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -129,39 +126,23 @@ enum { PW_YAML_CODES = 30000000 };  /* operations of all signals by expressions 
 
 void pw_yaml_build (pw_model *m, const void *parameters);
 
-/* [x, y], and one of some words. */
+/* [x, y], and one of several words. */
 int pw_yaml_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error);
 int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices, int *value,
                     pw_error *error);
 
-/* The points of a table (yaml_table.c): the values of `points`, `file` and `columns`, NULL where not given. */
-int pw_yaml_points (pw_yaml_builder *b, const char *what, const pw_node *node, const pw_node *const v[3], pw_signal *s,
-                    pw_error *error);
-/* Calls `each` with the path of every file named below a node, until it returns non-zero, which is returned. */
-int pw_yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (void *context, const char *path),
-                        void *context);
+/* Adds the names of all bodies so far. */
+void pw_yaml_try_bodies (const pw_yaml_builder *b, pw_nearest *near);
 
-/* What is being read, for messages. */
-typedef struct {
-  const pw_node *node;
-  const char *what; /* "torque T: value" */
-} pw_yaml_reading;
-
-/* Checks a name with a dot, at an offset of the text read, to be that of a state (yaml_state.c). */
-int pw_yaml_state (pw_yaml_builder *b, const pw_yaml_reading *r, const char *name, size_t at, pw_error *error);
-
-/* Makes a signal of up to three expressions of time: value, rate, acceleration; NULL: not given (yaml_time.c). */
+/* Makes a signal of up to three expressions of time: value, rate, acceleration; NULL: not given (yaml_expression.c). */
 int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
                      pw_signal *signal, pw_error *error);
-
-/* Keeps the names that expressions may use, and their values, in the model: show writes them (yaml_truth.c). */
-int pw_yaml_keep_names (pw_yaml_builder *b, pw_error *error);
 
 /* Reads a signal of a kind into a field (yaml_signal.c). */
 int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,
                     pw_error *error);
 
-/* Reads what the model knows about its motion, when its bodies and elements are there (yaml_truth.c). */
+/* Reads the reference solution, when bodies and elements are there (yaml_expression.c). */
 int pw_yaml_truth (pw_yaml_builder *b, pw_error *error);
 
 #endif

@@ -72,40 +72,15 @@ static int build_body (pw_yaml_builder *b, const pw_node *node, pw_error *error)
 
 /* ---- Fields ---- */
 
-int pw_yaml_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error) {
-  if (pw_yaml_list (b->y, node, what, 2, "numbers, [x, y]", error) != PW_OK ||
-      pw_yaml_number (b->y, node->first, what, PW_REAL, b->x, value, error) != PW_OK)
-    return error->status;
-  return pw_yaml_number (b->y, node->first->next, what, PW_REAL, b->x, value + 1, error);
-}
-
 static int build_body_name (pw_yaml_builder *b, const pw_node *node, const char *what, const char **name,
                             pw_error *error) {
   char hint[100];
   if (pw_yaml_text (b->y, node, what, name, error) != PW_OK) return error->status;
   if (strcmp (*name, "ground") == 0 || pw_names_find (&b->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
-  int bodies;
-  const pw_body *body = pw_model_bodies (b->m, &bodies);
-  for (int i = 0; i < bodies; i++) pw_nearest_try (&near, body[i].name);
+  pw_yaml_try_bodies (b, &near);
   pw_nearest_try (&near, "ground");
   return pw_yaml_fail (b->y, node->at, error, "%s: there is no body \"%.60s\"%s", what, *name,
-                       pw_nearest_text (&near, hint, sizeof hint));
-}
-
-int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices, int *value,
-                    pw_error *error) {
-  char hint[100];
-  const char *text;
-  if (pw_yaml_text (b->y, node, what, &text, error) != PW_OK) return error->status;
-  pw_nearest near = { .sought = text };
-  for (int i = 0; choices[i]; i++) {
-    pw_nearest_try (&near, choices[i]);
-    if (strcmp (choices[i], text) != 0) continue;
-    *value = i;
-    return PW_OK;
-  }
-  return pw_yaml_fail (b->y, node->at, error, "%s: there is no choice \"%.60s\"%s", what, text,
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 

@@ -127,3 +127,34 @@ int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_
   if (*expected) return pw_yaml_fail (y, node->at, error, "%s = %g: expected %s", what, *value, expected);
   return PW_OK;
 }
+
+/* ---- For what is built ---- */
+
+int pw_yaml_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error) {
+  if (pw_yaml_list (b->y, node, what, 2, "numbers, [x, y]", error) != PW_OK ||
+      pw_yaml_number (b->y, node->first, what, PW_REAL, b->x, value, error) != PW_OK)
+    return error->status;
+  return pw_yaml_number (b->y, node->first->next, what, PW_REAL, b->x, value + 1, error);
+}
+
+int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices, int *value,
+                    pw_error *error) {
+  char hint[100];
+  const char *text;
+  if (pw_yaml_text (b->y, node, what, &text, error) != PW_OK) return error->status;
+  pw_nearest near = { .sought = text };
+  for (int i = 0; choices[i]; i++) {
+    pw_nearest_try (&near, choices[i]);
+    if (strcmp (choices[i], text) != 0) continue;
+    *value = i;
+    return PW_OK;
+  }
+  return pw_yaml_fail (b->y, node->at, error, "%s: there is no choice \"%.60s\"%s", what, text,
+                       pw_nearest_text (&near, hint, sizeof hint));
+}
+
+void pw_yaml_try_bodies (const pw_yaml_builder *b, pw_nearest *near) {
+  int bodies;
+  const pw_body *body = pw_model_bodies (b->m, &bodies);
+  for (int i = 0; i < bodies; i++) pw_nearest_try (near, body[i].name);
+}
