@@ -395,6 +395,53 @@ static void test_dependent (void **state) {
     }
 }
 
+/* Bars pinned to each other in pairs, of which one does not know of the others. */
+static void pairs_build (pw_model *m, double angle, int pairs) {
+  char a[20], b[20], pin[20];
+  for (int i = 0; i < pairs; i++) {
+    snprintf (a, sizeof a, "a%d", i);
+    snprintf (b, sizeof b, "b%d", i);
+    snprintf (pin, sizeof pin, "pin%d", i);
+    pw_add_body (m, &(pw_body){ .name = a, .mass = 1, .inertia = 0.01, .start = { 0, 0, angle } });
+    pw_add_body (m, &(pw_body){ .name = b, .mass = 2, .inertia = 0.02, .start = { 0, 0, angle } });
+    pw_add_pin (m, &(pw_pin){ .name = pin, .body = { a, b }, .at = { { 1, 0.2 }, { 1, 0.2 } } });
+  }
+}
+
+static void pairs_one (pw_model *m, const void *parameters) {
+  pairs_build (m, ((const bolted *)parameters)->angle, 1);
+}
+
+static void pairs_many (pw_model *m, const void *parameters) {
+  pairs_build (m, ((const bolted *)parameters)->angle, SADDLE_LINKS);
+}
+
+static double pairs_sine (const pw_plugin_table *table, double angle) {
+  int row;
+  pw_error error = { 0 };
+  pw_system *s = scene_system (table, "angle", angle, NULL);
+  assert_int_equal (pw_place (s, 0, s->q0, s->v0), PW_OK);
+  pw_sweep_J (s);
+  pw_saddle *k = pw_saddle_open (s, s->mass, s->rows, NULL, &error);
+  check_ok (k ? PW_OK : error.status, &error);
+  assert_int_equal (pw_saddle_factor (k), PW_OK);
+  double sine = pw_saddle_pivot (k, &row);
+  pw_saddle_close (k);
+  pw_free (s);
+  return sine;
+}
+
+/* The sine between the rows of a pin does not depend on how many other pins there are. */
+static void test_sine (void **state) {
+  static const pw_plugin_table one = BOLTED_TABLE (pairs_one), many = BOLTED_TABLE (pairs_many);
+  (void)state;
+  for (int i = 0; i < 16; i++) {
+    double sine = pairs_sine (&one, 0.1 * i);
+    assert_true (sine > 0.1 && sine < 1);
+    check_close ("sine", pairs_sine (&many, 0.1 * i), sine, 1e3 * CHECK_EPS, "round-off, over a sine above 0.1");
+  }
+}
+
 static void test_random (void **state) {
   int tried = 0;
   double worst = 0;
@@ -439,9 +486,9 @@ static void test_not_a_number (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_models),       cmocka_unit_test (test_linkages),  cmocka_unit_test (test_held),
-    cmocka_unit_test (test_empty),        cmocka_unit_test (test_dependent), cmocka_unit_test (test_random),
-    cmocka_unit_test (test_not_a_number),
+    cmocka_unit_test (test_models), cmocka_unit_test (test_linkages),     cmocka_unit_test (test_held),
+    cmocka_unit_test (test_empty),  cmocka_unit_test (test_dependent),    cmocka_unit_test (test_sine),
+    cmocka_unit_test (test_random), cmocka_unit_test (test_not_a_number),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -397,13 +397,31 @@ static double watchdog_residual (pw_run *r, double angle) {
   return most;
 }
 
+/* How far J v is from 0 after irregular velocities have been projected at this angle. */
+static double watchdog_projected (pw_run *r, double angle) {
+  pw_projector p;
+  pw_error error = { 0 };
+  double v[9], Jv[8], most = 0;
+  check_ok (pw_projector_open (&p, r, NULL, NULL, &error), &error);
+  watchdog_bend (r, angle);
+  for (int j = 0; j < 9; j++) v[j] = sin (1 + j);
+  assert_int_equal (pw_place (r->s, 0, r->q, v), PW_OK);
+  pw_sweep_J (r->s);
+  assert_int_equal (pw_project_velocities (&p, r, v), PW_OK);
+  pw_mul_J (r->s, v, Jv);
+  for (int i = 0; i < r->s->rows; i++) most = fmax (most, fabs (Jv[i]));
+  pw_projector_close (&p);
+  return most;
+}
+
 static void test_evaluations (void **state) {
   (void)state;
   pw_system *s = scene_system (&watchdog_bars_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   const double angle = 1e-4;
-  double refined = watchdog_residual (r, angle), sine = r->geometry.sine;
+  double refined = watchdog_residual (r, angle), sine = r->geometry.sine, projected = watchdog_projected (r, angle);
   r->limits.refine = 0;
+  check_below ("projected", projected, 0.1 * watchdog_projected (r, angle), "eps / s instead of eps / s^2");
   check_below ("refined", refined, 0.1 * watchdog_residual (r, angle), "eps / s instead of eps / s^2");
   r->refuse = 2 * sine;
   watchdog_bend (r, angle);
