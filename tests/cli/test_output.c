@@ -302,7 +302,8 @@ static double *output_find (const pw_checkpoint *c, double value) {
   return NULL;
 }
 
-/* A checkpoint with a good check sum whose state no run has written. */
+/* A checkpoint with a good check sum whose state no run has written: of its numbers one, counted from the time or, if it is
+ * negative, from the two before the run's own, the number of rows and the processor time. */
 static void output_forge (int number, double value) {
   pw_checkpoint c;
   pw_error error = { 0 };
@@ -312,7 +313,8 @@ static void output_forge (int number, double value) {
   check_ok (pw_checkpoint_read (path, &c, &error), &error);
   double *t = output_find (&c, 0.5);
   assert_non_null (t);
-  memcpy ((unsigned char *)t + number * (int)sizeof value, &value, sizeof value);
+  unsigned char *place = number < 0 ? c.state.at + 2 * sizeof value : (unsigned char *)t;
+  memcpy (place + number * (int)sizeof value, &value, sizeof value);
   char *head = strndup (c.text, (size_t)(c.head_end - c.text));
   pw_archive state = { .at = c.state.at, .used = c.state.size };
   check_ok (pw_checkpoint_write (path, head, &state, &error), &error);
@@ -332,6 +334,9 @@ static void test_forged (void **state) {
   output_forge (16, NAN); /* coordinates, after the 16 numbers of a run */
   output_forge (18, INFINITY);
   output_forge (16 + 9, NAN); /* velocities */
+  output_forge (-1, NAN);
+  output_forge (-1, -1);
+  output_forge (-2, -1); /* as an integer: negative */
 }
 
 /* ---- The process ---- */
@@ -340,10 +345,12 @@ static void test_process (void **state) {
   (void)state;
   cli_good ("POSIXLY_CORRECT=1 pinwheel run ezyroller -t 0.01 -o - | wc -l");
   assert_string_equal (cli_out, "12\n");
-  cli_run ("trap '' INT TERM; \"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 500 --every 100 -o @/i.csv & p=$!\n"
-           "while [ ! -s @/i.csv.part ] && [ ! -e @/i.csv ]; do sleep 0.01; done; kill -INT $p; kill -TERM $p; wait "
-           "$p; echo $?");
-  assert_string_equal (cli_out, "0\n");
+  cli_run (
+      "trap '' INT TERM; \"${PINWHEEL:-build/pinwheel}\" run ezyroller -t 1e6 --every 0.01 -o @/i.csv 2>@/log & p=$!\n"
+      "while [ ! -s @/i.csv.part ]; do sleep 0.01; done; kill -INT $p; kill -TERM $p; size=$(wc -c <@/i.csv.part)\n"
+      "while kill -0 $p && [ $(wc -c <@/i.csv.part) -lt $((size + 100000)) ]; do sleep 0.01; done\n"
+      "kill -KILL $p; wait $p; echo $?"); /* it has gone on writing */
+  assert_string_equal (cli_out, "137\n");
 }
 
 /* What a command prints at a terminal. */
