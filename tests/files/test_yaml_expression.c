@@ -403,6 +403,19 @@ static void test_round_off (void **state) {
   }
 }
 
+/* (t - 1)/(2 t) is a whole number at t = 1/(2 k + 1): too many of these lie just after 0, none after 0.01 may be missed. */
+static void test_accumulating (void **state) {
+  const pw_expression *x = expression_of ("mod(t - 1, t ? 2*t : 1)");
+  (void)state;
+  double t = 0;
+  for (int k = 49; k >= 0;) {
+    double jump = 1. / (2 * k + 1);
+    t = pw_expression_breakpoint (x, t);
+    assert_true (t <= jump + 4e-16);
+    if (t > jump - 4e-16) k--;
+  }
+}
+
 /* Between breakpoints nothing jumps: random thresholds on random curves, scanned at many times. */
 static void test_scanned (void **state) {
   pw_random r = { 5 };
@@ -439,7 +452,8 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_values),      cmocka_unit_test (test_troubles),    cmocka_unit_test (test_limits),
     cmocka_unit_test (test_truths),      cmocka_unit_test (test_derivatives), cmocka_unit_test (test_after),
-    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_round_off),   cmocka_unit_test (test_scanned),
+    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_round_off),   cmocka_unit_test (test_accumulating),
+    cmocka_unit_test (test_scanned),
   };
   return cmocka_run_group_tests (tests, NULL, expression_teardown);
 }

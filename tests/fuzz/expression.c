@@ -346,13 +346,14 @@ static void expression_between (const char *text, double a, double b) {
     expression_differs ("no breakpoint", (double[]){ b, 0 }, 0, a, b);
 }
 
+/* Not where breakpoints lie so close that some may be left out for a hundredth of 1 + t. */
 static void expression_breakpoints (const pw_expression *x, const char *text) {
   double t = 0;
   int of_time = strstr (text, "speed") == NULL;
   for (int i = 0; i < 3 && t < 1e300; i++) {
     double next = pw_expression_breakpoint (x, t), end = fmin (next, t + 4);
     if (!(next > t)) abort ();
-    for (int k = 0; of_time && x->breaks && k < 4 && end - t > 1e-3; k++)
+    for (int k = 0; of_time && x->breaks && k < 4 && end - t > 1.01e-2 * (1 + fabs (t)); k++)
       expression_between (text, t + (end - t) * (k + 0.01) / 4.1, t + (end - t) * (k + 1.01) / 4.1);
     t = next;
   }

@@ -262,7 +262,7 @@ typedef struct {
   int equal;                                /* narrow ones in which nothing has changed */
   int patience;                             /* so many of them double what is narrow */
   double narrow;                            /* the fraction of the time that is halved no more */
-  int noise;                                /* 1: some operations are */
+  double until;                             /* up to this time some operations are noisy; INFINITY: none */
   unsigned char noisy[PW_EXPRESSION_CODES]; /* by operation: it changes again and again */
 } search;
 
@@ -310,7 +310,7 @@ static int search_noise (search *s, double t) {
     for (int i = 0; i < s->x->codes; i++)
       if (search_changed (value[0][i], value[1][i]) && ++changes[i] > 8 && !s->noisy[i]) s->noisy[i] = 1, more = 1;
   }
-  s->noise |= more;
+  if (more) s->until = fmin (s->until, t + 1e-2 * (1 + fabs (t)));
   return more;
 }
 
@@ -329,16 +329,15 @@ static double search_first (search *s, double a, double b) {
 /* Where too much has been looked at, or something was noisy, a breakpoint that is none makes the search go on from there. */
 double pw_expression_breakpoint (const pw_expression *x, double t) {
   const double latest = 1e18;
-  search s = { .x = x, .from = t, .left = 400 + 4000000 / (100 + x->codes), .narrow = 0x1p-36 };
+  search s = { .x = x, .from = t, .left = 400 + 4000000 / (100 + x->codes), .narrow = 0x1p-36, .until = INFINITY };
   s.patience =
       1 + s.left / 120; /* 36 doublings, of some two or three intervals each, before too much has been looked at */
   double a = t, found = INFINITY;
   if (!x->breaks) return INFINITY;
   for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {
-    if (!s.noise && !range_run (x, s.noisy, a, INFINITY).breaks) break;
-    if (s.noise && a > t + 1e-2 * (1 + fabs (t))) return a;
+    if (a >= s.until || (s.until == INFINITY && !range_run (x, s.noisy, a, INFINITY).breaks)) break;
     found = search_first (&s, a, a + w);
     a += w;
   }
-  return found;
+  return fmin (found, s.until);
 }
