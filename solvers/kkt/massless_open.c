@@ -5,7 +5,7 @@
 
 /* ---- Components ---- */
 
-/* Union-find over bodies and own coordinates that have columns without weight. */
+/* Union-find over groups, bodies and internal coordinates, that have columns without weight. */
 typedef struct {
   const pw_system *s;
   const pw_workspace *w;
@@ -13,7 +13,7 @@ typedef struct {
   const unsigned char *active;
   int rows, groups;
   int *parent; /* groups */
-  int *member; /* groups: component number of a root, or -1 */
+  int *member; /* groups: component number of a root; -1: no active row touches it */
 } massless_plan;
 
 static int massless_groups (const pw_system *s) {
@@ -32,7 +32,7 @@ static int massless_group_width (const pw_system *s, int g) {
   return g < s->bodies ? 3 : 1;
 }
 
-static int massless_light (const massless_plan *p, int g) {
+static int massless_in (const massless_plan *p, int g) {
   int j = massless_group_first (p->s, g);
   for (int n = 0; n < massless_group_width (p->s, g); n++)
     if (p->weight[j + n] == 0) return 1;
@@ -64,46 +64,20 @@ static int massless_is_active (const massless_plan *p, int row) {
   return row < p->rows && (p->active == NULL || p->active[row]);
 }
 
-/* Calls for every active row of every element that touches a light group; the component is that of this group. */
-typedef void massless_visit (massless_plan *p, pw_massless *r, const pw_slab *k, int e, int row, int component);
-
-static void massless_each_row (massless_plan *p, pw_massless *r, massless_visit *visit) {
-  const pw_system *s = p->s;
-  int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  for (const pw_slab *k = p->w->slab; k < p->w->slab + s->slabs && k->kind->rows > 0; k++)
-    for (int e = 0; e < k->b.count; e++) {
-      int n = massless_touched (s, k, e, group, at), light = -1;
-      for (int i = 0; i < n && light < 0; i++)
-        if (massless_light (p, group[i])) light = group[i];
-      for (int i = 0; light >= 0 && i < k->kind->rows; i++) {
-        int row = k->row + e * k->kind->rows + i;
-        if (massless_is_active (p, row)) visit (p, r, k, e, row, p->member[massless_root (p, light)]);
-      }
-    }
-}
-
-/* Light groups that share an active row belong together. */
+/* Massless groups that share an active row belong together; marks them as touched. */
 static void massless_unite (massless_plan *p) {
-  const pw_system *s = p->s;
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  for (const pw_slab *k = p->w->slab; k < p->w->slab + s->slabs && k->kind->rows > 0; k++)
+  for (const pw_slab *k = p->w->slab; k < p->w->slab + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
-      int any = 0, last = -1, n = massless_touched (s, k, e, group, at);
+      int any = 0, last = -1, n = massless_touched (p->s, k, e, group, at);
       for (int i = 0; i < k->kind->rows; i++) any |= massless_is_active (p, k->row + e * k->kind->rows + i);
       for (int i = 0; any && i < n; i++) {
-        if (!massless_light (p, group[i])) continue;
+        if (!massless_in (p, group[i])) continue;
+        p->member[group[i]] = 0;
         if (last >= 0) p->parent[massless_root (p, group[i])] = massless_root (p, last);
         last = group[i];
       }
     }
-}
-
-static void massless_count_row (massless_plan *p, pw_massless *r, const pw_slab *k, int e, int row, int component) {
-  pw_component *c = &r->component[component];
-  int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  (void)row;
-  c->rows++;
-  c->groups += massless_touched (p->s, k, e, group, at); /* an upper bound */
 }
 
 static int massless_add_group (const pw_system *s, pw_component *c, int g) {
@@ -116,18 +90,36 @@ static int massless_add_group (const pw_system *s, pw_component *c, int g) {
   return c->group_column[c->groups - 1];
 }
 
-static void massless_fill_row (massless_plan *p, pw_massless *r, const pw_slab *k, int e, int row, int component) {
-  pw_component *c = &r->component[component];
-  int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS], n = massless_touched (p->s, k, e, group, at);
-  const double *J = k->J + (row - k->row) * k->b.cols;
+/* Adds a row of the groups it touches to a component, or counts both, the groups with repetition. */
+static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *at,
+                              const double *J) {
+  if (c->block == NULL) {
+    c->rows++;
+    c->groups += n;
+    return;
+  }
   pw_massless_block *block = c->block + c->rows * PW_MASSLESS_BLOCKS;
   for (int i = 0; i < PW_MASSLESS_BLOCKS; i++) block[i].width = 0;
   for (int i = 0; i < n; i++) {
-    int column = massless_add_group (p->s, c, group[i]);
-    block[i] = (pw_massless_block){ J + at[i], column, massless_group_width (p->s, group[i]) };
+    int column = massless_add_group (s, c, group[i]);
+    block[i] = (pw_massless_block){ J + at[i], column, massless_group_width (s, group[i]) };
   }
-  r->component_of_row[row] = component;
   c->row[c->rows++] = row;
+}
+
+/* Every active row of every element that touches a massless group, to the component of this group. */
+static void massless_add_rows (massless_plan *p, pw_massless *r) {
+  int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
+  for (const pw_slab *k = p->w->slab; k < p->w->slab + p->s->constraints; k++)
+    for (int e = 0; e < k->b.count; e++) {
+      int n = massless_touched (p->s, k, e, group, at), first = 0;
+      while (first < n && !massless_in (p, group[first])) first++;
+      for (int i = e * k->kind->rows; first < n && i < (e + 1) * k->kind->rows; i++) {
+        if (!massless_is_active (p, k->row + i)) continue;
+        int component = r->component_of_row[k->row + i] = p->member[massless_root (p, group[first])];
+        massless_add_row (p->s, &r->component[component], k->row + i, n, group, at, k->J + i * k->b.cols);
+      }
+    }
 }
 
 /* ---- Layout ---- */
@@ -181,7 +173,7 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
                   s->model, pw_state_name (s, j, name, sizeof name), lacking, lacking);
 }
 
-/* Marks the light columns and says which of them no row determines. */
+/* Marks the massless columns and says which of them no row determines. */
 static int massless_check (pw_massless *r, const massless_plan *p, pw_error *error) {
   const pw_system *s = p->s;
   for (int i = 0; i < r->components; i++) {
@@ -204,27 +196,16 @@ static int massless_check (pw_massless *r, const massless_plan *p, pw_error *err
   return PW_OK;
 }
 
-/* Numbers the components by their roots; a light group that no active row touches is an error. */
+/* Numbers the components by their roots; a massless group that no active row touches is an error. */
 static int massless_number (pw_massless *r, massless_plan *p, pw_error *error) {
-  const pw_system *s = p->s;
-  int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  char *seen = calloc ((size_t)p->groups + 1, 1);
-  if (seen == NULL) return PW_MACHINE;
-  for (const pw_slab *k = p->w->slab; k < p->w->slab + s->slabs && k->kind->rows > 0; k++)
-    for (int e = 0; e < k->b.count; e++)
-      for (int n = massless_touched (s, k, e, group, at); n-- > 0;)
-        for (int i = 0; i < k->kind->rows; i++)
-          seen[group[n]] |= (char)massless_is_active (p, k->row + e * k->kind->rows + i);
-  int status = PW_OK;
-  for (int g = 0; g < p->groups && status == PW_OK; g++) {
-    if (!massless_light (p, g)) continue;
-    int j = massless_group_first (s, g);
+  for (int g = 0; g < p->groups; g++) {
+    if (!massless_in (p, g)) continue;
+    int j = massless_group_first (p->s, g);
     while (p->weight[j] != 0) j++;
-    if (!seen[g]) status = massless_undetermined (s, j, error);
+    if (p->member[g] < 0) return massless_undetermined (p->s, j, error);
     if (massless_root (p, g) == g) p->member[g] = r->components++;
   }
-  free (seen);
-  return status;
+  return PW_OK;
 }
 
 static int massless_fill (pw_massless *r, massless_plan *p, pw_error *error) {
@@ -234,9 +215,9 @@ static int massless_fill (pw_massless *r, massless_plan *p, pw_error *error) {
   r->component = calloc ((size_t)r->components, sizeof *r->component);
   if (r->component == NULL) return PW_MACHINE;
   r->end = r->component + r->components;
-  massless_each_row (p, r, massless_count_row);
+  massless_add_rows (p, r);
   if (massless_lay_out (r, p) != PW_OK) return PW_MACHINE;
-  massless_each_row (p, r, massless_fill_row);
+  massless_add_rows (p, r);
   return massless_check (r, p, error);
 }
 
