@@ -23,6 +23,7 @@ struct pw_run {
   int redundant;               /* how many */
   int *redundant_row;          /* which */
   double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
+  double *shared;              /* rows: least-norm multipliers for the ledger */
   char *rank_memory;
   double grip, reselect; /* of the active rows at the state reached (rank.h); below this others are tried */
   pw_watchdog limits;    /* its thresholds */
@@ -181,6 +182,10 @@ int pw_run_resolve (pw_run *r, pw_error *error);
 /* The energies of the start, which is placed, and takes note of those of the state reached, which is placed. */
 void pw_ledger_begin (pw_run *r);
 void pw_ledger_note (pw_run *r);
+
+/* Rates of the ledger's entries [W] from the active rows' multipliers, at the state in place, where J is evaluated.
+ * Redundant drives share their work as they share their reactions. */
+void pw_ledger_rates (pw_run *r, const double *lambda, double *rate);
 
 /* 1 if work or losses follow from multipliers. */
 int pw_ledger_reacts (const pw_system *s);

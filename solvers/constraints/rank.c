@@ -179,13 +179,13 @@ static void rank_take (pw_run *r, unsigned char *mask, const unsigned char *acti
 }
 
 static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
-  const pw_system *s = r->s;
-  size_t m = (size_t)s->rows, k = (size_t)redundant;
-  r->rank_memory =
-      malloc (m + k * sizeof (int) + 16 + (k * m + k * k + k + (size_t)s->coords + 3 + m) * sizeof (double));
+  size_t m = (size_t)r->s->rows, k = (size_t)redundant;
+  size_t numbers = k * m + k * k + k + (size_t)r->s->coords + 3 + 2 * m;
+  r->rank_memory = malloc (numbers * sizeof (double) + k * sizeof (int) + m);
   if (r->rank_memory == NULL) return PW_MACHINE;
   r->coefficient = (double *)(void *)r->rank_memory;
-  r->redundant_row = (int *)(void *)(r->coefficient + k * m + k * k + k + (size_t)s->coords + 3 + m);
+  r->shared = r->coefficient + numbers - m;
+  r->redundant_row = (int *)(void *)(r->coefficient + numbers);
   rank_take (r, (unsigned char *)(r->redundant_row + k), active);
   return PW_OK;
 }

@@ -212,7 +212,7 @@ static int rk_stages (pw_run *r, double h) {
     rk_combine (r, d->q, d->V[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
     status = rk_stage (r, t, d->V[i], d->A[i]);
-    if (status == PW_OK) pw_sweep_ledger (r->w, d->lambda, d->R[i]);
+    if (status == PW_OK) pw_ledger_rates (r, d->lambda, d->R[i]);
   }
   if (d->held) pw_hold (r->w, 0);
   return status;
@@ -267,7 +267,7 @@ void pw_rk_accept (pw_run *r, double h, double t1, double added) {
   d->projected0 = r->projected;
   pw_rk_ledger (r, r->ledger, d->ledger0, h);
   r->projected += added;
-  pw_sweep_ledger (r->w, r->lambda, r->rate);
+  pw_ledger_rates (r, r->lambda, r->rate);
 }
 
 double pw_rk_distance (const pw_run *r) {

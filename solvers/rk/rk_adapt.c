@@ -118,7 +118,7 @@ static double adapt_ledger (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
   double e[3] = { 0 }, tolerance = pw_ledger_tolerance (r, h);
-  pw_sweep_ledger (r->w, d->lambda, d->R[b->stages]);
+  pw_ledger_rates (r, d->lambda, d->R[b->stages]);
   for (int k = 0; k < (b->e3 ? 3 : 1); k++) {
     adapt_estimate (&d->estimate[k], d->R, r->s->entries, r->ledger_at);
     for (int i = 0; i < r->s->entries; i++) e[k] += r->ledger_at[i] * r->ledger_at[i] / (tolerance * tolerance);

@@ -39,7 +39,7 @@ static int sample_two_parts (pw_run *r, const sample_begin *from, double by, dou
   const sample_begin middle = { by, d->middle, d->ledger_middle, d->rate_middle, r->projected_at };
   memcpy (d->middle, d->q, pw_rk_block (r, 0));
   memcpy (d->ledger_middle, r->ledger_at, (size_t)r->s->entries * sizeof (double));
-  pw_sweep_ledger (r->w, d->lambda, d->rate_middle);
+  pw_ledger_rates (r, d->lambda, d->rate_middle);
   return sample_step (r, &middle, t, &near);
 }
 

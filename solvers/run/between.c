@@ -33,7 +33,7 @@ void pw_between_keep (pw_between *b, const pw_run *r) {
 }
 
 void pw_between_count (pw_between *b, pw_run *r) {
-  pw_sweep_ledger (r->w, r->lambda, r->rate);
+  pw_ledger_rates (r, r->lambda, r->rate);
   for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->t0) * (b->rate0[i] + r->rate[i]);
 }
 

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 #include "method.h"
+#include "rank.h"
 
 /* Kinetic energy of bodies that move by L and turn by 1 rad in the span of the run. */
 static double ledger_of_scene (const pw_run *r) {
@@ -51,6 +52,15 @@ void pw_ledger_note (pw_run *r) {
   for (int i = 0; i < r->s->entries; i++) power += fabs (r->rate[i]);
   if (exchanged > r->exchanged && isfinite (exchanged)) r->exchanged = exchanged;
   if (power > r->power && isfinite (power)) r->power = power;
+}
+
+void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
+  if (r->redundant && r->s->moving && pw_saddle_factor (r->saddle) == PW_OK) {
+    memcpy (r->shared, lambda, (size_t)r->s->rows * sizeof *lambda);
+    pw_rank_share (r, r->shared);
+    lambda = r->shared;
+  }
+  pw_sweep_ledger (r->w, lambda, rate);
 }
 
 int pw_ledger_reacts (const pw_system *s) {

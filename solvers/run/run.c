@@ -29,7 +29,7 @@ int pw_run_evaluate (pw_run *r, pw_error *error) {
   int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   if (status > 0) return pw_fail_singular (r, r->t, error);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_sweep_ledger (r->w, r->lambda, r->rate);
+  pw_ledger_rates (r, r->lambda, r->rate);
   pw_bound_tolerances (r);
   return PW_OK;
 }

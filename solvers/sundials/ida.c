@@ -107,7 +107,7 @@ static int ida_interpolate (ida_data *d, double t) {
 
 static int ida_power (pw_run *r, double t, double *rate) {
   int flag = ida_interpolate (r->data, t);
-  if (flag == IDA_SUCCESS) pw_sweep_ledger (r->w, r->lambda_at, rate);
+  if (flag == IDA_SUCCESS) pw_ledger_rates (r, r->lambda_at, rate);
   return flag == IDA_SUCCESS ? PW_OK : PW_RETRY;
 }
 
@@ -122,7 +122,7 @@ static int ida_work (ida_data *d, int status) {
     pw_accelerate_placed (r, r->v, r->a_at, r->lambda_at);
     lambda = r->lambda_at;
   }
-  pw_sweep_ledger (r->w, lambda, r->rate);
+  pw_ledger_rates (r, lambda, r->rate);
   IDAGetLastOrder (d->memory, &order);
   if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return 0;
   memcpy (y, r->q, (size_t)d->n * sizeof *y);

@@ -115,7 +115,7 @@ static int multistep_power (pw_run *r, double t, double *rate) {
   int near = r->near, status = multistep_interpolate (r->data, t) == CV_SUCCESS ? PW_OK : PW_RETRY;
   if (status == PW_OK) status = multistep_complete (r->data, t);
   r->near = near;
-  if (status == PW_OK) pw_sweep_ledger (r->w, r->lambda_at, rate);
+  if (status == PW_OK) pw_ledger_rates (r, r->lambda_at, rate);
   return status;
 }
 
@@ -228,7 +228,7 @@ static int multistep_work (multistep_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
   if (d->sun.klu && pw_ledger_reacts (r->s)) multistep_evaluate (d);
-  pw_sweep_ledger (r->w, r->lambda, r->rate);
+  pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
   if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
   int status = pw_place (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);

@@ -162,6 +162,35 @@ static void redundant_two (pw_model *m, const void *parameter) {
 static const pw_plugin_table redundant_three_table = TRIAL_TABLE (redundant_three);
 static const pw_plugin_table redundant_two_table = TRIAL_TABLE (redundant_two);
 
+/* Two equal drives turn a crank against its weight: each has half of the reaction and does half of the work. */
+static void redundant_drives (pw_model *m, const void *parameter) {
+  (void)parameter;
+  const pw_signal turn = { PW_SMOOTH_STEP, .ramp = { .to = 1, .duration = 1 } };
+  pw_add_body (m, &(pw_body){ .name = "crank", .mass = 1, .inertia = 0.1, .start = { 1 } });
+  pw_add_pin (m, &(pw_pin){ .name = "axle", .body = { "crank", "ground" }, .at = { { -1, 0 }, { 0, 0 } } });
+  pw_add_drive (m, &(pw_drive){ .name = "a", .body = { "crank", "ground" }, .what = PW_DRIVE_ANGLE, .value = turn });
+  pw_add_drive (m, &(pw_drive){ .name = "b", .body = { "crank", "ground" }, .what = PW_DRIVE_ANGLE, .value = turn });
+  pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -10 } });
+}
+
+static const pw_plugin_table redundant_drives_table = TRIAL_TABLE (redundant_drives);
+
+static void test_drives (void **state) {
+  static const char *const method[] = { "rk4+projection", "erk8+projection", "ida+ggl", "bdf+projection",
+                                        "galpha+ggl" };
+  (void)state;
+  for (int i = 0; i < 5; i++) {
+    pw_system *s = scene_system (&redundant_drives_table, NULL);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .rtol = 1e-8, .step = 1e-3, .span = 1, .ledger = 1 });
+    pw_sample x = runs_to (r, 1);
+    assert_int_equal (pw_count_ledger (s), 2);
+    check_close (method[i], x.ledger[0], x.ledger[1], 1e-9 * (1 + fabs (x.ledger[0])), "shared like the reactions");
+    check_close (method[i], x.ledger[0] + x.ledger[1], 10 * sin (1), 1e-5, "the weight is lifted by sin (1)");
+    pw_close (r);
+    pw_free (s);
+  }
+}
+
 static void test_axle (void **state) {
   (void)state;
   static const char *const name[] = { "frame.x",     "frame.y", "frame.phi", "fork.phi",   "frame.vx", "frame.vy",
@@ -445,6 +474,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_parallelogram_twins),
     cmocka_unit_test (test_parallelogram_start),
+    cmocka_unit_test (test_drives),
     cmocka_unit_test (test_axle),
     cmocka_unit_test (test_axle_forces),
     cmocka_unit_test (test_frame),
