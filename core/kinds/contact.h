@@ -1,5 +1,5 @@
-/* Wheels: contact points, and the equation that wheel and speed share: the velocity of a point P of a body along a direction d
- * that is fixed in the body.
+/* Wheels: contact points, and the equation that wheel and speed share: the velocity of a point P of a body along a
+ * direction d that is fixed in the body.
  *
  *   d . v_P = u,  d = R(phi) (a, b)                               (1 nonholonomic row)
  *   S     = [ dx  dy  l ]                                         l: the arm of P along (b, -a) in the body
@@ -12,7 +12,8 @@
 #include <string.h>
 #include "pinwheel.h"
 
-/* Where a wheel at a point of a body touches the ground, and its heading there: for paths and pictures.  `at` and `heading` are in the body's frame, out in the world's. */
+/* Where a wheel at a point of a body touches the ground, and its heading there: for paths and pictures.  `at` and
+ * `heading` are in the body's frame, out in the world's. */
 static inline void contact_place (const pw_pose *A, const double at[2], double heading, double out[3]) {
   out[0] = A->x + A->cos * at[0] - A->sin * at[1];
   out[1] = A->y + A->sin * at[0] + A->cos * at[1];

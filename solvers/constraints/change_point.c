@@ -1,15 +1,16 @@
 /* Change points: configurations at which branches of a motion meet, or nearly do.
  *
- * In suitable coordinates the constraints near one are x y = e, with the sine |(x, y)|.  For e = 0 the branches cross and
- * the motion goes straight on; for e != 0 it turns within a distance of sqrt (e), and a step that is longer than that can
- * go straight on to the other branch, where all constraints hold again.  Neither residuals nor energies show this.
+ * In suitable coordinates the constraints near one are x y = e, with the sine |(x, y)|.  For e = 0 the branches
+ * cross and the motion goes straight on; for e != 0 it turns within a distance of sqrt (e), and a step that is
+ * longer than that can go straight on to the other branch, where all constraints hold again.  Neither residuals nor
+ * energies show this.
  *
  * So where the sine can have had a minimum within a step, the way from its beginning to its end is walked on the
- * constraint manifold: towards the end in strides that are a part of the sine, each followed by a projection.  A walk that
- * gets stuck has found that the end is on another branch.  Where the sine falls below `floor` the branches meet but for
- * round-off; such a point is stepped over, and the motion must go straight on.
- * (Following a solution curve by predictor and projection: Allgower & Georg 2003, Introduction to numerical continuation
- * methods, chapters 2 and 8.) */
+ * constraint manifold: towards the end in strides that are a part of the sine, each followed by a projection.  A
+ * walk that stalls has found that the end is on another branch.  Where the sine falls below `floor` the branches
+ * meet but for round-off; such a point is stepped over, and the motion must go straight on. (Following a solution
+ * curve by predictor and projection: Allgower & Georg 2003, Introduction to numerical continuation methods, chapters
+ * 2 and 8.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>

@@ -1,4 +1,4 @@
-/* Coordinate projection: the nearest positions with g = 0, the nearest rates with J v = eta.
+/* Coordinate projection: the nearest positions with g = 0, the nearest velocities with J v = eta.
  *
  *   [ W G^T ] [ dq ]   [  0 ]          [ W J^T ] [ dv ]   [     0     ]
  *   [ G  0  ] [ mu ] = [ -g ]          [ J  0  ] [ mu ] = [ eta - J v ]
@@ -11,8 +11,9 @@
 #include "method.h"
 
 /* In the mass matrix massless coordinates take no part in what is smallest: the rows determine them, here as in the
- * accelerations, and coordinates with mass do not move because of them.  Where the holonomic rows do not determine all of
- * them, all rows do: the change of positions is then one that the nonholonomic rows allow. */
+ * accelerations, and coordinates with mass do not move because of them.  Where the holonomic equations do not
+ * determine all of them, all equations do: the change of positions is then one that the nonholonomic equations
+ * allow. */
 static pw_saddle *project_by_mass (pw_run *r, pw_error *error) {
   pw_error none = { 0 };
   pw_saddle *k = pw_saddle_open (r->w, r->s->mass, r->s->holonomic, r->active, &none);
@@ -60,7 +61,8 @@ void pw_projector_close (pw_projector *p) {
 #define PROJECT_GOOD (4 * DBL_EPSILON)
 #define PROJECT_ENOUGH (64 * DBL_EPSILON)
 
-/* Redundant rows follow from the others but for round-off; a row that does not contradicts them.  It takes *row. */
+/* Redundant equations follow from the others but for round-off; a row that does not contradicts them.  It takes
+ * *row. */
 static int project_others (pw_projector *p, const pw_system *s, double follows, const double *g, const double *size,
                            int *row) {
   double most = follows;
@@ -135,8 +137,8 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   return pw_place_rates (r->w, v);
 }
 
-/* 1 if the placed rates need no correction, with J swept: they obey J v = eta to round-off.  Near a singular pose that does
- * not say enough, and nor does it of redundant rows. */
+/* 1 if the placed velocities need no correction, with J evaluated: they obey J v = eta to round-off.  Near a
+ * singular configuration that does not say enough, and nor does it of redundant equations. */
 static int project_is_good (const pw_projector *p, pw_run *r) {
   r->known.velocity = NAN;
   if (p->own_velocity || p->active || r->near) return 0;

@@ -1,12 +1,13 @@
-/* Redundant rows: an independent set is chosen, the others are watched.
+/* Redundant equations: an independent set is selected, the others are watched.
  *
- * A redundant row is J_i = sum_a c_ia J_a over active rows a.  Its coefficients come from the saddle point:
- * with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum c_ia e_a span the multipliers that
- * pull on nothing, so the least-norm ones are lambda + sum z_i n_i with z from a small least-squares problem.
+ * A redundant equation is J_i = sum_a c_ia J_a over active equations a.  Its coefficients come from the saddle
+ * point: with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum c_ia e_a span the
+ * multipliers that pull on nothing, so the least-norm ones are lambda + sum z_i n_i with z from a small
+ * least-squares problem.
  *
- * The rank is judged at consistent poses off the singular set: at the start and at two poses a short motion away.
- * In motion a set may turn bad where another one is good: then it is chosen anew.
- * (Garcia de Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
+ * The rank is judged at consistent configurations off the singular set: at the start and at two configurations a
+ * short motion away. In motion a set may turn bad where another one is good: then it is selected again. (Garcia de
+ * Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -60,8 +61,9 @@ static int rank_pivot (const double *norm, const unsigned char *active, int firs
   return -1;
 }
 
-/* Keeps independent rows among first .. end - 1 behind the `rank` ones kept so far, until there are `most`; returns the new
- * rank.  Each is orthogonalised as others are kept, and once more before it is (Giraud, Langou & Rozloznik 2005). */
+/* Keeps independent equations among first .. end - 1 after the `rank` ones kept so far, until there are `most`;
+ * returns the new rank.  Each is orthogonalised as others are kept, and once more before it is (Giraud, Langou &
+ * Rozloznik 2005). */
 static int rank_keep (double tol, int most, double *rows, double *norm, int *kept, unsigned char *active, int rank,
                       int first, int end, int n) {
   for (int i = first; i < end; i++) norm[i] = rank_orthogonalise (rows + (size_t)i * (size_t)n, rows, kept, rank, n);
@@ -82,8 +84,8 @@ static int rank_keep (double tol, int most, double *rows, double *norm, int *kep
   return rank;
 }
 
-/* The kept rows become an orthonormal basis of the range of J^T, their numbers go to `kept`.  Holonomic rows come first:
- * a nonholonomic one must not take the place of a position.  At most so many of them, and so many in all. */
+/* The kept rows become an orthonormal basis of the range of J^T, their numbers go to `kept`.  Holonomic rows come
+ * first: a nonholonomic one must not take the place of a position.  At most `holonomic` of them, and `all` in all. */
 static int rank_basis_of (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
                           unsigned char *active) {
   const pw_system *s = w->s;
@@ -135,7 +137,7 @@ static int rank_search_open (rank_search *x, const pw_system *s) {
   return PW_OK;
 }
 
-/* A direction that the rows allow, of size 1 in units of the scene: the given rates, or a fixed irregular one. */
+/* A direction that the rows allow, of size 1 in units of the scene: the given velocities, or a fixed irregular one. */
 static void rank_direction (const pw_system *s, const rank_search *x, int rank, const double *v, int number) {
   double most = 0;
   for (int j = 0; j < s->coords; j++)
@@ -145,7 +147,8 @@ static void rank_direction (const pw_system *s, const rank_search *x, int rank, 
   for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / pw_rank_unit (s, j);
 }
 
-/* The rank a short motion away, with the rows that are independent there in x->active; 0 if there is no such pose. */
+/* The rank a short motion away, with the rows that are independent there in x->active; 0 if there is no such
+ * configuration. */
 static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   const pw_system *s = r->s;
   pw_projector p;
@@ -302,7 +305,7 @@ static void rank_add_row (const pw_system *s, const pw_slab *k, int n, double we
   }
 }
 
-/* A sum of the redundant rows, irregular so that nothing cancels, takes one solve however many they are. */
+/* A sum of the redundant equations, irregular so that nothing cancels, takes one solve however many they are. */
 double pw_rank_grip (pw_run *r) {
   const pw_system *s = r->s;
   int m = s->rows, k = r->redundant;

@@ -1,10 +1,10 @@
-/* Says of a redundant row, in words, which others it follows from. */
+/* Describes which equations a redundant one follows from. */
 #include <stdio.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
 
-/* Names a row's element behind what is in the buffer: "pin B" or, with its row, "pin B (B.Fx)"; the new length. */
+/* Names a row's element after what is in the buffer: "pin B" or, with its row, "pin B (B.Fx)"; the new length. */
 static size_t redundancy_name_row (const pw_system *s, int row, int whole, char *buffer, size_t size, size_t n) {
   char element[120], reaction[120];
   if (n + 1 >= size) return n;

@@ -14,12 +14,12 @@ typedef struct {
 int pw_newton_open (pw_newton *n, const pw_system *s); /* PW_OK or PW_MACHINE */
 void pw_newton_close (pw_newton *n);
 
-/* Puts factor x block of every slab: rows from `row` on (constraint rows for blocks with as many rows, else
+/* Puts factor x block of every slab: rows from `row` on (constraint equations for blocks with as many rows, else
  * coordinates; row_scale, if given, multiplies each), columns from `col` on.  w is the direction of jw_q (coords),
- * lambda the multipliers of jtl_q (rows); `rows` limits the constraint rows that take part. */
+ * lambda the multipliers of jtl_q (rows); `rows` limits the constraint equations that take part. */
 typedef struct {
   int row, col, rows;
-  double factor; /* of holonomic rows, and of coordinates */
+  double factor; /* of holonomic equations, and of coordinates */
   double factor_nonholonomic;
   const double *row_scale;
   const int *map; /* rows: place of each constraint row, or -1: it is left out; NULL: as they are */
@@ -27,7 +27,7 @@ typedef struct {
 } pw_put;
 void pw_newton_block (pw_newton *n, pw_workspace *w, pw_tape *t, pw_block block, const pw_put *put);
 
-/* Puts factor x J, or its transpose, with the J last swept. */
+/* Puts factor x J, or its transpose, with the J last evaluated. */
 void pw_newton_J (const pw_workspace *w, pw_tape *t, const pw_put *put);
 void pw_newton_JT (const pw_workspace *w, pw_tape *t, const pw_put *put);
 

@@ -1,5 +1,5 @@
-/* A square sparse matrix factorised again and again (KLU: Davis & Palamadai Natarajan 2010): ordered once, its pivots kept
- * while they are good. */
+/* A square sparse matrix factorised again and again (KLU: Davis & Palamadai Natarajan 2010): ordered once, its
+ * pivots kept while they are good. */
 #ifndef PW_SPARSE_H
 #define PW_SPARSE_H
 
@@ -11,7 +11,7 @@ typedef struct {
   klu_l_symbolic *order;
   klu_l_numeric *factors;
   int64_t *colptr, *rowind; /* the pattern, the caller's */
-  double least;             /* ratio of pivots below which they are chosen anew */
+  double least;             /* ratio of pivots below which they are selected again */
 } pw_sparse;
 
 /* n columns in compressed form.  PW_OK or PW_MACHINE. */
@@ -21,7 +21,7 @@ void pw_sparse_close (pw_sparse *k);
 /* PW_OK, PW_RETRY if the matrix is singular, PW_MACHINE. */
 int pw_sparse_factor (pw_sparse *k, double *value);
 
-/* The next factorisation chooses its pivots anew. */
+/* The next factorisation chooses its pivots again. */
 static inline void pw_sparse_forget (pw_sparse *k) {
   if (k->factors) klu_l_free_numeric (&k->factors, &k->common);
 }

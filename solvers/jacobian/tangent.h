@@ -2,7 +2,7 @@
  *
  *   kinematics      q' - v + D G^T mu                                       by (q, v, mu)
  *   momentum        M a + J^T lambda - f                                    by (q, v, a, lambda)
- *   rates           J v - eta                                               by (q, v)
+ *   velocities      J v - eta                                               by (q, v)
  *   positions       g                                                       by q
  *   accelerations   J a - gamma + 2 alpha (J v - eta) + beta^2 g            by (q, v, a) */
 #ifndef PW_TANGENT_H
@@ -14,9 +14,9 @@
 typedef struct {
   pw_run *run;
   int rows, holonomic; /* in use */
-  int *map;            /* all rows: number among those in use, or -1; NULL: all are in use */
+  int *map;            /* all equations: number among those in use, or -1; NULL: all are in use */
   const int *row;      /* rows: its number among all */
-  double *lambda, *mu; /* all rows: values of the unknowns last looked at */
+  double *lambda, *mu; /* all equations: values of the unknowns last looked at */
   pw_newton newton;
   pw_tape tape;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
@@ -25,20 +25,21 @@ typedef struct {
 int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_MACHINE */
 void pw_tangent_close (pw_tangent *x);
 
-/* Values of all rows from those of the first `count` in use; `all` is there for them. */
+/* Values of all equations from those of the first `count` in use; `all` is there for them. */
 const double *pw_tangent_expand (const pw_tangent *x, const double *used, int count, double *all);
-/* From values of all rows those of the first `count` in use. */
+/* From values of all equations those of the first `count` in use. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used);
 
-/* Where the parts go.  a may share its columns with v: its part comes times `of_a`, that of q' times `of_q` in those of q,
- * that of lambda and mu times `of_lambda`. */
+/* Where the parts go.  a may share its columns with v: its part comes times `of_a`, that of q' times `of_q` in those
+ * of q, that of lambda and mu times `of_lambda`. */
 typedef struct {
   int momentum, constraint; /* first row of each; that of the kinematics is 0 */
   int q, v, a, lambda, mu;  /* first column of each */
   double of_q, of_a, of_lambda;
 } pw_tangent_place;
 
-/* Puts these rows at the placed pose with J swept; lambda and mu (NULL: there are none): all rows, D, v and a: coords. */
+/* Puts these rows at the placed configuration with J evaluated; lambda and mu (NULL: there are none): all equations,
+ * D, v and a: coords. */
 void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const double *lambda);
 void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_place *to, const double *mu, const double *D);
 void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_place *to, const double *v, const double *a);

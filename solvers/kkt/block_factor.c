@@ -33,7 +33,8 @@ PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const
     BLOCK_SIZE (b->size, block_couple, ka, width, l->value + *coupling++, R, b->J, b->step);
 }
 
-/* A body that is not condensed: its mass, its columns of J, and what later equations would have on the diagonal if it were. */
+/* A body that is not condensed: its mass, its columns of J, and what later equations would have on the diagonal if
+ * it were. */
 static void block_keep (const pw_block_ldl *l, const pw_body_block *p) {
   const pw_contribution *own = l->contribution + p[1].first - 2;
   const double *w = l->inverse + p->j;

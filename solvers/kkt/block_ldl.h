@@ -1,23 +1,23 @@
 /* Block L D L^T of the condensed matrix S = J W^-1 J^T, sparse: nodes of 1 or 2 unknowns, ordered and laid out once,
- * assembled body by body and factorised column by column (Duff, Erisman & Reid 2017, Direct Methods for Sparse Matrices,
- * chapters 5, 10 and 12).
+ * assembled body by body and factorised column by column (Duff, Erisman & Reid 2017, Direct Methods for Sparse
+ * Matrices, chapters 5, 10 and 12).
  *
  * A node is a constraint equation, or two of one element.  A body block is what meets at a body (or an internal
- * coordinate): the contributions of the nodes that touch it, each being the node's columns there.  Any two contributions of a
- * body block couple their nodes.
+ * coordinate): the contributions of the nodes that touch it, each being the node's columns there.  Any two
+ * contributions of a body block couple their nodes.
  *
- * Where very many nodes meet at a body, S would become dense.  Then the body is not condensed: its accelerations a_k are
- * unknowns too,
+ * Where very many nodes meet at a body, S would become dense.  Then the body is not condensed: its accelerations a_k
+ * are unknowns too,
  *
  *     [ S    J_k ] [ lambda ]   [ J W^-1 f - gamma ]
  *     [ J_k^T -M ] [ -a_k   ] = [ f_k              ]      with S of all other bodies,
  *
- * quasi-definite, so that L D L^T goes without pivoting (Vanderbei 1995), with the nodes of -a_k after its equations, and
- * equations that touch nothing but uncondensed bodies after that.
+ * quasi-definite, so that L D L^T goes without pivoting (Vanderbei 1995), with the nodes of -a_k after its
+ * equations, and equations that touch nothing but uncondensed bodies after that.
  *
- * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the pins inside
- * a chain, so their part of the matrix is block tridiagonal and need not be stored: with a body's arms a and b to the pins
- * c and c + 1 and the inverses m of its mass and i of its inertia
+ * Chains are bodies one after another, each pinned to the one before and the one after.  Nothing else touches the
+ * pins inside a chain, so their part of the matrix is block tridiagonal and need not be stored: with a body's arms a
+ * and b to the pins c and c + 1 and the inverses m of its mass and i of its inertia
  *
  *   K_cc += m 1 + i a a^T,   K_(c+1)c = +-m 1 + i b a^T = K,   K_(c+1)(c+1) += m 1 + i b b^T
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
@@ -31,8 +31,8 @@
 
 enum { PW_BLOCK_NODE = 2, PW_BLOCK_RANKS = 3 }; /* most unknowns in a node; ranks */
 
-/* A node, in the order of elimination.  Its values follow one another: the lower triangle of the diagonal block by rows, what
- * the entries on the diagonal were before anything was eliminated, then the blocks below, each by rows. */
+/* A node, in the order of elimination.  Its values follow one another: the lower triangle of the diagonal block by
+ * rows, what the entries on the diagonal were before anything was eliminated, then the blocks below, each by rows. */
 typedef struct {
   int at;                 /* its values */
   int y;                  /* its first unknown in the right-hand side */
@@ -93,10 +93,10 @@ typedef struct {
 
 /* ---- Planning (block_order.c) ---- */
 
-/* nodes: how many; size: unknowns of each; y: where they are in the right-hand side; rank: those of a higher one come later;
- * pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not needed.
- * The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff 1996).
- * NULL if memory is out. */
+/* nodes: how many; size: unknowns of each; y: where they are in the right-hand side; rank: those of a higher one
+ * come later; pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the
+ * diagonal not needed. The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy,
+ * Davis & Duff 1996). NULL if memory is out. */
 pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l);
 

@@ -26,9 +26,9 @@ typedef struct {
   double xx, xy, yx, yy;
 } block_square;
 
-/* The smallest pivot relative to its diagonal entry, without dividing as long as it stays the smallest; what is not a
- * number is taken for smaller, and so is 0 out of 0.  `was` is not negative, or else a pivot below 0 could make up for the
- * one before it; that of an uncondensed body is, and does not count. */
+/* The smallest pivot relative to its diagonal entry, without dividing as long as it stays the smallest; what is not
+ * a number is taken for smaller, and so is 0 out of 0.  `was` is not negative, or else a pivot below 0 could make up
+ * for the one before it; that of an uncondensed body is, and does not count. */
 static inline void block_judge (pw_block_ldl *l, double pivot, double was, int y) {
   if (pivot > l->pivot * was || was < 0) return;
   l->pivot = pivot / was;

@@ -29,8 +29,8 @@ static void condense_element (pw_plan *c, const pw_slab *b, int e, int r, int si
   c->nodes++;
 }
 
-/* 1 for an equation that stands for itself: not left out, not a component's, and not one that only prescribed coordinates
- * enter, which says nothing of the others. */
+/* 1 for an equation that stands for itself: not left out, not a component's, and not one that only prescribed
+ * coordinates enter, which says nothing of the others. */
 static int condense_takes_part (const pw_plan *c, const pw_slab *b, int e, int r, const unsigned char *active) {
   const double *J = b->J + (e * b->kind->rows + r) * b->b.cols, *inverse = c->k->inverse;
   int i = b->row + e * b->kind->rows + r, prescribed = 0;

@@ -1,7 +1,7 @@
 /* How a scene's constraint equations are condensed: what saddle.c executes and condense*.c plan.
  *
- * Equations are grouped into nodes of 1 or 2 of one element; a node contributes to each body or internal coordinate with
- * weight that it touches.  Two contributions to the same one make a block of S = J W^-1 J^T. */
+ * Equations are grouped into nodes of 1 or 2 of one element; a node contributes to each body or internal coordinate
+ * with weight that it touches.  Two contributions to the same one make a block of S = J W^-1 J^T. */
 #ifndef PW_CONDENSE_H
 #define PW_CONDENSE_H
 
@@ -88,8 +88,8 @@ static inline int pw_plan_width (const pw_plan *c, int j) {
 /* Makes k->block.  Errors: PW_MACHINE. */
 int pw_condense_block (pw_plan *c);
 
-/* Finds the chains, and marks their inner columns; the contributions of each group are in the order of their columns.  PW_OK
- * or PW_MACHINE. */
+/* Finds the chains, and marks their inner columns; the contributions of each group are in the order of their
+ * columns.  PW_OK or PW_MACHINE. */
 int pw_condense_chains (pw_plan *c, pw_block_ldl *l);
 
 #endif

@@ -147,9 +147,9 @@ static int condense_find_dependent (const pw_plan *c) {
   return -1;
 }
 
-/* Before the uncondensed bodies, an equation may follow from others: two legs of a platform that stands on the ground.  Such
- * equations, as the present configuration shows them, come after the bodies, one by one; if they are many, all equations that
- * touch these bodies do, for what is left touches none. */
+/* Before the uncondensed bodies, an equation may follow from others: two legs of a platform that stands on the
+ * ground.  Such equations, as the present configuration shows them, come after the bodies, one by one; if they are
+ * many, all equations that touch these bodies do, for what is left touches none. */
 int pw_condense_block (pw_plan *c) {
   const int most = 12;
   for (int attempt = 0;; attempt++) {

@@ -48,7 +48,7 @@ PW_INLINE void dense_accelerate (const pw_dense_block *p, const double *f, const
   PW_UNROLL for (int c = 0; c < width; c++) a[p->j + c] = p->w[c] * sum[c];
 }
 
-/* Calls f with the width, a constant, behind its arguments, for each body block. */
+/* Calls f with the width, a constant, after its arguments, for each body block. */
 #define DENSE_EACH(f, ...)                                    \
   for (const pw_dense_block *p = k->block; p < k->end; p++) { \
     if (p->width == 3)                                        \

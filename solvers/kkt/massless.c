@@ -50,7 +50,8 @@ PW_INLINE void massless_solve_transposed (const double *P, double *x, int n) {
   }
 }
 
-/* Adds factor J to row i of Z~; returns the square of what it adds, angles in units of length, where there is weight. */
+/* Adds factor J to row i of Z~; returns the square of what it adds, angles in units of length, where there is
+ * weight. */
 static double massless_add_run (pw_component *c, const pw_massive_block *x, int i, double factor) {
   double square = 0;
   for (int n = 0; n < x->width; n++) {

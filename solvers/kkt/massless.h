@@ -30,14 +30,14 @@ typedef struct {
 
 typedef struct {
   int rows, cols, pivots;
-  int groups;        /* bodies and own coordinates touched */
+  int groups;        /* bodies and internal coordinates touched */
   int *group;        /* first global coordinate of each */
   int *group_column; /* first local column of each */
   int *row;          /* global row; the pivots first, in order */
   int *pivot;        /* local column of each pivot */
   int *massless_j;   /* global coordinate of each pivot */
   double *scale;     /* makes a pivot relative to the largest entry its row had when they were matched */
-  double *least;     /* how small each of these may become before the rows are matched anew */
+  double *least;     /* how small each of these may become before the rows are matched again */
   double worst;      /* smallest pivot, relative, at most 1 */
   double left;       /* smallest Z~ relative to what it is the difference of, at most 1; and its row */
   int left_row;
@@ -64,18 +64,19 @@ typedef struct {
   char *memory;
 } pw_massless;
 
-/* Finds the components and matches at the pose J was swept at.  Errors: PW_MACHINE, PW_INPUT (a coordinate that no
- * row determines, by name). */
+/* Finds the components and matches at the configuration J was evaluated at.  Errors: PW_MACHINE, PW_INPUT (a
+ * coordinate that no row determines, by name). */
 int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);
 void pw_massless_close (pw_massless *r);
 
-/* Matches a component's massless coordinates to rows at the J last swept, with complete pivoting over their columns.
- * Returns how many pivots were found.  For massless.c and massless_open.c alone. */
+/* Matches a component's massless coordinates to rows at the J last evaluated, with complete pivoting over their
+ * columns. Returns how many pivots were found.  For massless.c and massless_open.c alone. */
 int pw_massless_match (pw_component *c);
 
-/* Eliminates with the J last evaluated, and matches anew if a pivot has become much smaller than when it was matched.
- * Returns the smallest pivot squared, relative to its row, or what is left of a row over, if that is less; 0 if singular. */
+/* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was
+ * matched. Returns the smallest pivot squared, relative to its row, or what is left of a row over, if that is less;
+ * 0 if singular. */
 double pw_massless_factor (pw_massless *r);
 
 /* The row of that smallest pivot. */

@@ -71,7 +71,7 @@ static void massless_measure (pw_component *c) {
   }
 }
 
-/* The p-th pivot and those behind it were not found: rows have been swapped, but what is planned is for their places of
+/* The p-th pivot and those after it were not found: rows have been swapped, but what is planned is for their places of
  * before.  Until they are matched again no pivot is large enough, and these are the smallest. */
 static int massless_unmatched (pw_component *c, int p) {
   for (int i = 0; i < c->pivots; i++) c->least[i] = NAN;
@@ -79,8 +79,8 @@ static int massless_unmatched (pw_component *c, int p) {
   return p;
 }
 
-/* Gaussian elimination; angles in units of length, rows scaled by the largest entry they had: what is left of a dependent
- * row is small. */
+/* Gaussian elimination; angles in units of length, rows scaled by the largest entry they had: what is left of a
+ * dependent row is small. */
 int pw_massless_match (pw_component *c) {
   const double guard = 0.1;
   massless_copy (c);

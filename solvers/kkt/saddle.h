@@ -1,10 +1,10 @@
 /* The saddle-point system  [ W J^T ; J 0 ] (a, lambda) = (f, gamma)  of a scene, with W diagonal.
  *
  * W is the mass matrix for accelerations and impulses, or a metric for projections.  An entry of W may be 0 (a
- * coordinate without mass: eliminated through a constraint row matched to it) or INFINITY (held: it does not move; a row that
- * only held ones enter takes no part, its multiplier is 0).
- * Coordinates with weight are condensed out exactly; the rows left are factorised as a sparse symmetric matrix whose
- * order and pattern are laid out once.  Nothing is allocated after opening. */
+ * coordinate without mass: eliminated through a constraint row matched to it) or INFINITY (prescribed: it does not
+ * move; a row that only prescribed ones enter takes no part, its multiplier is 0). Coordinates with weight are
+ * condensed out exactly; the rows left are factorised as a sparse symmetric matrix whose order and pattern are laid
+ * out once.  Nothing is allocated after opening. */
 #ifndef PW_SADDLE_H
 #define PW_SADDLE_H
 
@@ -12,14 +12,14 @@
 
 typedef struct pw_saddle pw_saddle;
 
-/* rows: the first so many rows of J take part (all, or the holonomic ones), of these those with active[i] != 0 if
- * active is given; the system's J must be swept at a typical pose.  weight: coords, copied.
+/* rows: how many rows of J take part (all, or the holonomic ones), of these those with active[i] != 0 if
+ * active is given; the system's J must be evaluated at a typical configuration.  weight: coords, copied.
  * Errors: PW_MACHINE; PW_INPUT if a coordinate without weight is determined by no row. */
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                            pw_error *error);
 void pw_saddle_close (pw_saddle *k);
 
-/* Factorises with the J last swept.  Returns PW_OK, or PW_RETRY if the smallest pivot is what round-off leaves of a
+/* Factorises with the J last evaluated.  Returns PW_OK, or PW_RETRY if the smallest pivot is what round-off leaves of a
  * dependent row. */
 int pw_saddle_factor (pw_saddle *k);
 
@@ -34,7 +34,7 @@ int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, 
 int pw_saddle_below (const pw_saddle *k, double sine);
 
 /* The smallest pivot of the last factorisation, as the sine of the angle between a row and those before it, and that
- * row: small near a singular pose. */
+ * row: small near a singular configuration. */
 double pw_saddle_pivot (const pw_saddle *k, int *row);
 
 #endif

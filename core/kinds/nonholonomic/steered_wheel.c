@@ -4,9 +4,8 @@
  *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u; l and m: the arm of P along the heading and to its left
  *   gamma = (w + u') (cos(theta) vx + sin(theta) vy) - u' m w     so that S a = gamma, with l' = u' m
  *
- * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
- * The lateral force on the body, along n, is N = -lambda.  It acts at the point the wheel turns about, so that steering
- * takes no moment and does no work. */
+ * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.) The lateral force on the body, along n, is N
+ * = -lambda.  It acts at the point the wheel turns about, so that steering takes no moment and does no work. */
 #include <math.h>
 #include <string.h>
 #include "contact.h"

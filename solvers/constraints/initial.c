@@ -1,9 +1,9 @@
-/* The consistent start: positions by Gauss-Newton, then rates by one linear solve.
+/* Consistent initial conditions: positions by Gauss-Newton, then velocities by one linear solve.
  *
- * What the user gave is prescribed, and so is what the model specifies and, if it can be, the position of whatever has mass;
- * the rest moves as little as possible in the metric.  If that fails, first the rates that the model specifies are free, then
- * its positions, then the given positions, and then everything.  A state that is consistent to round-off is left alone, to
- * the bit. */
+ * What the user gave is prescribed, and so is what the model specifies and, if it can be, the position of whatever
+ * has mass; the rest moves as little as possible in the metric.  If that fails, first the velocities that the model
+ * specifies are released, then its positions, then the given positions, and then everything.  A state that is
+ * consistent to round-off is left alone, to the bit. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -15,14 +15,15 @@
 /* Where an attempt stopped. */
 typedef struct {
   int row;
-  int rates; /* 0: positions, 1: rates */
+  int rates; /* 0: positions, 1: velocities */
   double off;
   int placed; /* 1: it has found positions */
-} start_trouble;
+} initial_failure;
 
-/* By how much to scale the metric of massless coordinates so that it is 1e-6 of the least entry of the mass matrix, angles in
- * units of L, instead of the mean: bodies that have nothing to do with them may be heavy.  As far as round-off allows. */
-static double start_light (const pw_system *s) {
+/* By how much to scale the metric of massless coordinates so that it is 1e-6 of the least entry of the mass matrix,
+ * angles in units of L, instead of the mean: bodies that have nothing to do with them may be heavy.  As far as
+ * round-off allows. */
+static double initial_massless_scale (const pw_system *s) {
   double least = INFINITY, most = 0, light = 0;
   for (int j = 0; j < s->coords; j++) {
     double unit = pw_is_angle (s, j) ? s->scale.length : 1, entry = s->metric[j] / (unit * unit);
@@ -34,27 +35,29 @@ static double start_light (const pw_system *s) {
   return light > 0 && most > 0 ? fmax (1e-6 * least, 1e-12 * most) / light : 1;
 }
 
-/* The metric, and INFINITY for what is held; true: the mass matrix, where massless rates are determined by the rows. */
-static void start_weights (const pw_system *s, const double *metric, const unsigned char *held, double *weight) {
-  double light = start_light (s);
+/* The metric, and INFINITY for what is prescribed; true: the mass matrix, where massless velocities are determined
+ * by the rows. */
+static void initial_weights (const pw_system *s, const double *metric, const unsigned char *held, double *weight) {
+  double light = initial_massless_scale (s);
   for (int j = 0; j < s->coords; j++)
     weight[j] = held && held[j] ? INFINITY : s->mass[j] > 0 ? metric[j] : light * metric[j];
 }
 
-static int start_positions (pw_projector *p, pw_run *r, double *q, const double *v, start_trouble *trouble) {
+static int initial_positions (pw_projector *p, pw_run *r, double *q, const double *v, initial_failure *failure) {
   int row = -1;
   double worst;
   int status = pw_project_positions (p, r, r->t, q, v, &row, &worst);
   if (status == PW_OK) return PW_OK;
   if (pw_place (r->w, r->t, q, v) == PW_OK && row >= 0) {
     pw_sweep_g (r->w, p->scratch);
-    *trouble = (start_trouble){ row, 0, fabs (p->scratch[row]), 0 };
+    *failure = (initial_failure){ row, 0, fabs (p->scratch[row]), 0 };
   }
   return status;
 }
 
-/* At placed positions and rates.  Repeats the linear solve once, which removes the round-off of a large first correction. */
-static int start_rates (pw_projector *p, pw_run *r, double *v, start_trouble *trouble) {
+/* At placed positions and velocities.  Repeats the linear solve once, which removes the round-off of a large first
+ * correction. */
+static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_failure *failure) {
   pw_residuals now;
   for (int i = 0; i < 3; i++) {
     pw_sweep_residuals (r->w, NULL, &now);
@@ -65,18 +68,18 @@ static int start_rates (pw_projector *p, pw_run *r, double *v, start_trouble *tr
     if (status != PW_OK) break;
   }
   if (now.velocity <= 64 * DBL_EPSILON) return PW_OK;
-  *trouble = (start_trouble){ now.row_velocity, 1, now.jv, 1 };
+  *failure = (initial_failure){ now.row_velocity, 1, now.jv, 1 };
   return PW_RETRY;
 }
 
-/* One attempt from the given state, with some of it held.  The velocity metric is the mass matrix where that
+/* One attempt from the given state, with some of it prescribed.  The velocity metric is the mass matrix where that
  * determines everything, else the position metric. */
-static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *trouble, pw_error *error) {
+static int initial_attempt (pw_run *r, const unsigned char *held, initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   double *weight = malloc (2 * bytes);
   if (weight == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  start_weights (s, s->metric, held, weight);
+  initial_weights (s, s->metric, held, weight);
   int status = PW_OK;
   for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
     pw_projector p;
@@ -86,14 +89,14 @@ static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *t
     status = pw_place (r->w, r->t, r->q, r->v);
     if (status != PW_OK) break;
     pw_sweep_J (r->w);
-    start_weights (s, choice == 0 ? s->mass : s->metric, held ? held + s->coords : NULL, weight + s->coords);
+    initial_weights (s, choice == 0 ? s->mass : s->metric, held ? held + s->coords : NULL, weight + s->coords);
     status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
     if (status == PW_OK) {
-      status = start_positions (&p, r, r->q, r->v, trouble);
-      trouble->placed |= status == PW_OK;
-      if (status == PW_OK) status = start_rates (&p, r, r->v, trouble);
+      status = initial_positions (&p, r, r->q, r->v, failure);
+      failure->placed |= status == PW_OK;
+      if (status == PW_OK) status = initial_velocities (&p, r, r->v, failure);
       pw_projector_close (&p);
-      if (status != PW_RETRY || !trouble->rates) break;
+      if (status != PW_RETRY || !failure->rates) break;
     }
     if (none.status == PW_MACHINE) status = pw_fail (error, PW_MACHINE, "%s", none.text);
     if (choice == 0 && none.status != PW_MACHINE) status = PW_OK;
@@ -102,14 +105,14 @@ static int start_attempt (pw_run *r, const unsigned char *held, start_trouble *t
   return status;
 }
 
-static int start_fail (pw_run *r, const start_trouble *trouble, pw_error *error) {
+static int initial_fail (pw_run *r, const initial_failure *failure, pw_error *error) {
   char element[120];
-  if (trouble->row < 0) return pw_fail (error, PW_START, "model %s: the start cannot be made consistent", r->s->model);
-  pw_row_element (r->s, trouble->row, element, sizeof element);
-  int angle = strcmp (pw_reaction_unit (r->s, trouble->row), "N m") == 0;
+  if (failure->row < 0) return pw_fail (error, PW_START, "model %s: the start cannot be made consistent", r->s->model);
+  pw_row_element (r->s, failure->row, element, sizeof element);
+  int angle = strcmp (pw_reaction_unit (r->s, failure->row), "N m") == 0;
   return pw_fail (error, PW_START, "model %s: the start cannot be made consistent: %s is %s by %.6g %s%s", r->s->model,
-                  element, trouble->rates ? "violated" : "open", trouble->off, angle ? "rad" : "m",
-                  trouble->rates ? "/s" : "; if it can close, begin nearer to where it does");
+                  element, failure->rates ? "violated" : "open", failure->off, angle ? "rad" : "m",
+                  failure->rates ? "/s" : "; if it can close, begin nearer to where it does");
 }
 
 int pw_start_moved (const pw_system *s, const pw_start_report *report, int state) {
@@ -134,7 +137,7 @@ int pw_start_specified (const pw_system *s, int state) {
 }
 
 /* Fills the report; the state given is in q_given, the new one in q. */
-static void start_report (pw_run *r, int freed, const pw_residuals *before) {
+static void initial_report (pw_run *r, int freed, const pw_residuals *before) {
   pw_start_report *report = &r->start;
   *report = (pw_start_report){ .q_given = r->q_given,
                                .v_given = r->v_given,
@@ -145,13 +148,14 @@ static void start_report (pw_run *r, int freed, const pw_residuals *before) {
                                .velocity = before->velocity };
 }
 
-/* Redundant rows make the plain attempt fail: it is repeated with an independent set, found where the state was given.
- * Off the constraints redundant rows look independent, the more so the farther off: hence the tolerances. */
-static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *trouble, pw_error *error) {
+/* Redundant equations make the plain attempt fail: it is repeated with an independent set, found where the state was
+ * given. Off the constraints redundant equations look independent, the more so the farther off: hence the
+ * tolerances. */
+static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure *failure, pw_error *error) {
   static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
   const pw_system *s = r->s;
   const unsigned char *before = r->active;
-  int status = start_attempt (r, held, trouble, error), rank = s->rows;
+  int status = initial_attempt (r, held, failure, error), rank = s->rows;
   if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
   unsigned char *active = malloc ((size_t)s->rows + 1);
   if (active == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
@@ -163,17 +167,17 @@ static int start_ranked (pw_run *r, const unsigned char *held, start_trouble *tr
     if (now < 0 || now == rank) continue;
     rank = now;
     r->active = active;
-    start_trouble later = { .row = -1 };
-    status = start_attempt (r, held, &later, error);
+    initial_failure later = { .row = -1 };
+    status = initial_attempt (r, held, &later, error);
     r->active = before;
-    trouble->placed |= later.placed;
+    failure->placed |= later.placed;
   }
   free (active);
   return status;
 }
 
-/* A start that was given rates and is left with none: the wheels lock it. */
-static int start_locked (pw_run *r, pw_error *error) {
+/* Given velocities of which nothing is left: the wheels allow no motion. */
+static int initial_locked (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0;
   char element[120], before[120] = "", text[300] = "";
@@ -192,30 +196,30 @@ static int start_locked (pw_run *r, pw_error *error) {
                   text);
 }
 
-/* What is prescribed, in the order tried: positions and rates by where they are from, and the positions of whatever has mass.
- * Where positions fail, the rates are not tried. */
-static const struct start_way {
+/* What is prescribed, in the order tried: positions and velocities by where they are from, and the positions of
+ * whatever has mass. Where positions fail, the velocities are not tried. */
+static const struct initial_way {
   unsigned char q, v;
-  enum { START_FREE, START_MASS, START_MASS_PERHAPS } mass; /* the last: where some of them may be meant or not */
-} start_ways[] = {
-  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, START_MASS },
-  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN, START_MASS },
-  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, START_MASS_PERHAPS },
-  { PW_GIVEN, PW_GIVEN, START_MASS_PERHAPS },
-  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, START_FREE },
-  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN, START_FREE },
-  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, START_MASS },
-  { PW_GIVEN, PW_GIVEN, START_MASS },
-  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, START_FREE },
-  { PW_GIVEN, PW_GIVEN, START_FREE },
-  { 0, PW_GIVEN | PW_SPECIFIED, START_FREE },
-  { 0, PW_GIVEN, START_FREE },
-  { 0, 0, START_FREE },
+  enum { INITIAL_FREE, INITIAL_MASS, INITIAL_MASS_PERHAPS } mass; /* the last: where some of them may be meant or not */
+} initial_ways[] = {
+  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, INITIAL_MASS },
+  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN, INITIAL_MASS },
+  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, INITIAL_MASS_PERHAPS },
+  { PW_GIVEN, PW_GIVEN, INITIAL_MASS_PERHAPS },
+  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, INITIAL_FREE },
+  { PW_GIVEN | PW_SPECIFIED, PW_GIVEN, INITIAL_FREE },
+  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, INITIAL_MASS },
+  { PW_GIVEN, PW_GIVEN, INITIAL_MASS },
+  { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, INITIAL_FREE },
+  { PW_GIVEN, PW_GIVEN, INITIAL_FREE },
+  { 0, PW_GIVEN | PW_SPECIFIED, INITIAL_FREE },
+  { 0, PW_GIVEN, INITIAL_FREE },
+  { 0, 0, INITIAL_FREE },
 };
 
 /* The mask of a way; 0 if it makes no sense here. */
-static int start_mask (const pw_system *s, const unsigned char *held, const struct start_way *way,
-                       unsigned char *mask) {
+static int initial_mask (const pw_system *s, const unsigned char *held, const struct initial_way *way,
+                         unsigned char *mask) {
   int n = s->coords, light = 0, heavy = 0, perhaps = 0;
   for (int j = 0; j < n; j++) {
     int q = held ? held[j] : 0, v = held ? held[n + j] : 0, keep = way->mass && s->mass[j] > 0 && !(q & way->q);
@@ -223,38 +227,38 @@ static int start_mask (const pw_system *s, const unsigned char *held, const stru
     mask[n + j] = (v & way->v) != 0;
     light += s->mass[j] == 0 && !mask[j], heavy += keep, perhaps += keep && q & PW_PERHAPS;
   }
-  return !way->mass || (light > 0 && heavy > 0 && (way->mass == START_MASS || perhaps > 0));
+  return !way->mass || (light > 0 && heavy > 0 && (way->mass == INITIAL_MASS || perhaps > 0));
 }
 
 /* 1 if some of what the user gave is not in the mask. */
-static int start_freed (const pw_system *s, const unsigned char *held, const unsigned char *mask) {
+static int initial_released (const pw_system *s, const unsigned char *held, const unsigned char *mask) {
   int freed = 0;
   for (int j = 0; held && j < 2 * s->coords; j++) freed |= held[j] & PW_GIVEN && !mask[j];
   return freed;
 }
 
-/* Redundant rows of larger scenes (rows times coordinates) are not looked for on behalf of what the model specifies: sketches
- * of linkages, of which all is specified, fail there as a rule. */
-#define START_SMALL 1e4
+/* Redundant equations of larger scenes (rows times coordinates) are not looked for on behalf of what the model
+ * specifies: sketches of linkages, of which all is specified, fail there as a rule. */
+#define INITIAL_SMALL 1e4
 
-static int start_try (pw_run *r, const unsigned char *held, start_trouble *trouble, int *freed, pw_error *error) {
-  const int ways = sizeof start_ways / sizeof *start_ways;
+static int initial_try (pw_run *r, const unsigned char *held, initial_failure *failure, int *freed, pw_error *error) {
+  const int ways = sizeof initial_ways / sizeof *initial_ways;
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords;
   unsigned char *mask = malloc (4 * n + 1), *last = mask + 2 * n;
   if (mask == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  int status = PW_RETRY, small = (double)s->rows * s->coords < START_SMALL, before = -1, placed = 0;
-  for (const struct start_way *way = start_ways; way < start_ways + ways && status == PW_RETRY; way++) {
-    if (!start_mask (s, held, way, mask)) continue;
+  int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, placed = 0;
+  for (const struct initial_way *way = initial_ways; way < initial_ways + ways && status == PW_RETRY; way++) {
+    if (!initial_mask (s, held, way, mask)) continue;
     int ranked = small || !((way->q | way->v) & PW_SPECIFIED);
     if (ranked == before && memcmp (mask, last, placed ? 2 * n : n) == 0) continue;
-    start_trouble now = { .row = -1 };
-    status = (ranked ? start_ranked : start_attempt) (r, mask, &now, error);
+    initial_failure now = { .row = -1 };
+    status = (ranked ? initial_ranked : initial_attempt) (r, mask, &now, error);
     memcpy (last, mask, 2 * n);
     before = ranked, placed = now.placed;
-    if (now.row >= 0) *trouble = now;
+    if (now.row >= 0) *failure = now;
   }
-  *freed = start_freed (s, held, mask);
+  *freed = initial_released (s, held, mask);
   free (mask);
   return status;
 }
@@ -263,7 +267,7 @@ int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   pw_residuals before;
-  start_trouble trouble = { .row = -1 };
+  initial_failure failure = { .row = -1 };
   int freed = 0;
   memcpy (r->q_given, r->q, bytes);
   memcpy (r->v_given, r->v, bytes);
@@ -272,9 +276,9 @@ int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
   pw_sweep_J (r->w);
   pw_sweep_residuals (r->w, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
-    status = start_try (r, held, &trouble, &freed, error);
-  start_report (r, freed, &before);
-  if (status == PW_OK) status = start_locked (r, error);
+    status = initial_try (r, held, &failure, &freed, error);
+  initial_report (r, freed, &before);
+  if (status == PW_OK) status = initial_locked (r, error);
   if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  return status == PW_RETRY ? start_fail (r, &trouble, error) : status;
+  return status == PW_RETRY ? initial_fail (r, &failure, error) : status;
 }
