@@ -68,10 +68,10 @@ if command -v c++ >/dev/null; then
   cat >"$work/plus.cc" <<'EOF'
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
-int main () {
+int main (int count, char **argument) {
   pw_error e = {};
   pw_settings settings = {};
-  pw_file *file = pw_file_open ("pendulum", &e);
+  pw_file *file = pw_file_open (count > 1 ? argument[1] : "pendulum", &e);
   pw_model *model = pw_file_model (file, &e);
   pw_build (model, &e);
   pw_system *system = pw_compile (model, &e);
@@ -82,8 +82,8 @@ int main () {
 }
 EOF
   c++ -std=c++11 -Wall -Wextra -Wpedantic -Werror -I"$top/include/pinwheel" "$work/plus.cc" -o "$work/plus" -L"$top/lib" \
-    -lpinwheel-files -lpinwheel -Wl,-rpath,"$top/lib" >"$work/log" 2>&1 && (cd "$work" && ./plus) >"$work/log" 2>&1
-  report 'and one in C++' $?
+    -lpinwheel-files -lpinwheel -Wl,-rpath,"$top/lib" >"$work/log" 2>&1 && (cd "$work" && ./plus && ./plus ./mine.c) >"$work/log" 2>&1
+  report 'and one in C++, which compiles a model, too' $?
 fi
 
 # Every option of run, every command and every key of a model stands in its page.
