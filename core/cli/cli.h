@@ -11,7 +11,10 @@
 #include "pinwheel-solvers.h"
 #include "stop.h"
 
-enum { PW_INTERRUPTED = 130, PW_CLOSED_PIPE = 141 }; /* exit statuses after Ctrl-C, and when nobody reads the output */
+enum {
+  PW_INTERRUPTED = 130,
+  PW_CLOSED_PIPE = 141
+}; /* exit statuses after Ctrl-C, and when the output pipe is closed */
 
 /* ---- Commands ---- */
 

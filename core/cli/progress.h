@@ -7,7 +7,7 @@
 typedef struct {
   const char *what; /* shown in front */
   const char *unit; /* "s": it goes by time; else what is counted */
-  double from;      /* where it began, 0 unless it goes on with something */
+  double from;      /* where it began; not 0 if a run or sweep is continued */
   double t_end;     /* where it ends: time [s] or count */
   double start;     /* clock when it started [s] */
   double next;      /* clock when it may be drawn or written again [s] */

@@ -12,10 +12,10 @@
 static void say_text (FILE *f, const char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);
-    int odd = n == 0 || pw_control (text);
+    int escaped = n == 0 || pw_control (text);
     if (n == 0) n = 1;
     for (int i = 0; i < n; i++) {
-      if (odd)
+      if (escaped)
         fprintf (f, "\\x%02x", (unsigned char)text[i]);
       else
         fputc (text[i], f);
@@ -58,15 +58,15 @@ void pw_cli_wrap (const char *text, int indent, int width) {
   puts (text);
 }
 
-/* 1 if standard output is a pipe that nobody reads any more: `pinwheel ... | head`. */
-static int say_nobody_reads (void) {
+/* 1 if standard output is a pipe that the reader has closed: `pinwheel ... | head`. */
+static int say_pipe_closed (void) {
   struct pollfd out = { .fd = STDOUT_FILENO, .events = POLLOUT };
   return poll (&out, 1, 0) == 1 && out.revents & POLLERR;
 }
 
 int pw_cli_end (const pw_error *error) {
   if (error->status == PW_OK) return 0;
-  if (error->status == PW_MACHINE && say_nobody_reads ()) return PW_CLOSED_PIPE; /* the reader left on purpose */
+  if (error->status == PW_MACHINE && say_pipe_closed ()) return PW_CLOSED_PIPE;
   fflush (stdout);
   int placed = strstr (error->text, ": error: ") != NULL; /* as compilers say it, so that editors find the place */
   pw_cli_say ("%s%s\n", placed ? "" : "pinwheel: ", error->text);

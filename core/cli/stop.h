@@ -1,4 +1,4 @@
-/* Ctrl-C and its like: a request to come to an end, which commands look at between steps. */
+/* Requests to stop, by Ctrl-C or a limit of processor time, which commands check between steps. */
 #ifndef PW_STOP_H
 #define PW_STOP_H
 
@@ -7,24 +7,24 @@
 
 extern volatile sig_atomic_t pw_stop; /* requests so far */
 
-/* From here on signals are counted.  The first one asks for a stop after the current step; some senders signal a program
- * and its group as well, so it is the third one that ends it, should that step never end. */
+/* Counts signals from here on.  The first requests a stop after the current step; since some senders signal a program and its
+ * group as well, only the third ends the program, in case that step never ends. */
 void pw_stop_catch (void);
-/* From here on they end the program again. */
+/* Lets signals end the program again. */
 void pw_stop_release (void);
 
-/* The end that a run is asked to come to from outside: by signals, or by the processor time that its thread may take. */
+/* The limit of a run's processor time, measured by the clock of its thread. */
 typedef struct {
   double most;   /* [s]; INFINITY: any */
   double start;  /* of the thread's clock [s] */
-  double looked; /* at a clock that costs less */
+  double looked; /* coarse clock when the thread's clock was last read [s] */
 } pw_limit;
 
 /* Starts the clock; due where the run begins. */
 void pw_limit_start (pw_limit *l);
-/* Has it run out, or was the program signalled?  For pw_settings.stop; the context is the limit. */
+/* 1 if the limit is exceeded or a signal has requested a stop.  For pw_settings.stop; the context is the limit. */
 int pw_limit_over (void *limit);
-/* What a run that was stopped (PW_STOPPED) at time t ends with: PW_RETRY after a signal; else PW_METHOD, with the limit. */
+/* The status of a run that was stopped (PW_STOPPED) at time t: PW_RETRY after a signal; else PW_METHOD with the limit. */
 int pw_limit_fail (const pw_limit *l, double t, pw_error *error);
 
 #endif

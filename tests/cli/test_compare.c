@@ -308,7 +308,7 @@ static void test_bad (void **state) {
     { "ezyroller --truth @/z.csv", "--truth @/z.csv: line 2: \"one\" is not a number" },
     { "ezyroller --truth @/back.csv", "--truth @/back.csv: line 3: times must increase" },
     { "ezyroller --truth @/short.csv --t-end 2",
-      "--truth @/short.csv: no row at the end, t = 2 s; the last one before it is at 1 s" },
+      "--truth @/short.csv: no row at the final time, t = 2 s; the last one before it is at 1 s" },
   };
   cli_write ("empty.csv", "");
   cli_write ("x.csv", "x,t\n0,0\n");

@@ -64,7 +64,7 @@ static void test_kills (void **state) {
   char expected[200];
   cli_expand ("130\n@/kill.csv.part\n", expected, sizeof expected);
   assert_string_equal (cli_out, expected);
-  assert_non_null (strstr (cli_err, "; the same command goes on from there\n"));
+  assert_non_null (strstr (cli_err, "; the same command continues from there\n"));
   snprintf (
       command, sizeof command,
       "%si=3; while [ $i -lt 60 ]; do i=$((i + 1))\n"

@@ -68,7 +68,7 @@ static void test_text (void **state) {
   truth_shows ("error against the reference solution of the model, at 100 times\n");
   truth_shows ("  length ");
   cli_good ("pinwheel show @/block.yaml");
-  truth_shows ("\nKnows its motion (truth): block.x\n");
+  truth_shows ("\nReference solution (truth): block.x\n");
 }
 
 /* Errors do not change the run: table and end are the same to the bit. */
@@ -111,7 +111,7 @@ static void test_round_trip (void **state) {
             "grep -q largest @/a && cmp @/a @/b");
   truth_write_c ("0");
   cli_good ("pinwheel show @/particles.c --yaml");
-  truth_shows ("# The model knows its motion (truth) by a function in C, which is left out.\n");
+  truth_shows ("# The reference solution of the model (truth) is a function in C, which cannot be written as text.\n");
 }
 
 static void test_function (void **state) {
@@ -120,7 +120,7 @@ static void test_function (void **state) {
   cli_good ("pinwheel run @/particles.c --set u=3 --json - && pinwheel show @/particles.c");
   check_below ("length", truth_error ("largest", "length"), 1e-14, "round-off");
   check_below ("angle", truth_error ("largest", "angle"), 1e-14, "round-off");
-  truth_shows ("Knows its motion (truth): one.x, one.phi, two.x, one.vx\n");
+  truth_shows ("Reference solution (truth): one.x, one.phi, two.x, one.vx\n");
   cli_good ("pinwheel check @/particles.c");
   truth_shows ("  compared with the reference solution of the model in 4 states\n");
   truth_write_c ("0.25");
@@ -168,7 +168,7 @@ static void test_table (void **state) {
            "--truth @/unit.csv: column \"t [m]\": the unit \"m\" does not measure what s does, which is expected");
   cli_write ("late.csv", "t,one.x\n3,6\n");
   cli_bad ("pinwheel run @/particles.c --truth @/late.csv", 2,
-           "--truth @/late.csv: no row between the start and the end, t = 1 s");
+           "--truth @/late.csv: no row between 0 and the final time, t = 1 s");
   cli_bad ("pinwheel run @/particles.c --truth @/none.csv", 2,
            "--truth @/none.csv: cannot be read: No such file or directory");
 }

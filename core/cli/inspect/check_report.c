@@ -86,7 +86,8 @@ static void report_mobility (pw_json *j, const pw_check *x) {
                 { "velocity", "degrees of freedom, velocity", l->velocities },
                 { "rank", "rank of J", l->rank } };
   for (int i = 0; i < 3; i++)
-    report_entry (j, count[i].key, x->r ? (double)count[i].value : NAN, x->r ? count[i].label : NULL, "%d", count[i].value);
+    report_entry (j, count[i].key, x->r ? (double)count[i].value : NAN, x->r ? count[i].label : NULL, "%d",
+                  count[i].value);
   report_singular_value (j, x);
   report_end (j, '}');
   report_section (j, "redundant", '[', NULL);

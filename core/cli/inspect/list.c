@@ -73,7 +73,7 @@ static void list_print (list_table *x) {
   x->rows = 0;
 }
 
-/* ---- What can be named ---- */
+/* ---- Descriptions by name ---- */
 
 /* Something described by name: methods, element types. */
 typedef struct {

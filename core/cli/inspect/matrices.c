@@ -32,7 +32,7 @@ static void matrices_coordinates (const pw_system *s, const pw_equations *k, con
 
 static void matrices_rows (const pw_system *s, const pw_equations *k, const pw_sample *x) {
   char name[300];
-  printf ("\ngamma and its companions by constraint row, named after the row's reaction, which is -lambda\n"
+  printf ("\ngamma, eta, g and lambda by constraint equation, named after its reaction, which is -lambda\n"
           "  %-22s %14s %14s %14s %14s\n",
           "", "gamma", "eta", "g", "lambda");
   for (int i = 0; i < k->rows; i++) {

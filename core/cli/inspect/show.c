@@ -1,4 +1,4 @@
-/* pinwheel show: what a model is made of. */
+/* pinwheel show: bodies, elements, parameters and defaults of a model. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -28,7 +28,7 @@ static void show_bodies (const pw_cli_model *m) {
   const pw_system *s = m->system;
   char mass[32], inertia[32];
   printf ("\nBodies\n  %-12s %-10s %-18s %-26s %s\n", "", "mass [kg]", "inertia [kg m^2]",
-          "start (x, y [m], phi [rad])", "rate (vx, vy [m/s], omega [rad/s])");
+          "initial x, y [m], phi [rad]", "initial vx, vy [m/s], omega [rad/s]");
   for (int b = 0; b < pw_count_bodies (s); b++) {
     const double *M = pw_system_mass (s) + 3 * b;
     printf ("  %-12s %-10s %-18s ", pw_system_body_name (s, b), pw_format (mass, M[0], SHOW_DIGITS),
@@ -115,7 +115,7 @@ static void show_element (const pw_element *e) {
 
 /* ---- Derivatives without a formula ---- */
 
-/* Blocks of kinds that leave them to Pinwheel. */
+/* Blocks that element types leave to Pinwheel. */
 static void show_differences (const pw_system *s) {
   char text[300];
   int count = pw_count_differences (s);
@@ -152,13 +152,13 @@ static void show_defaults (const pw_plugin_table *table) {
 
 static void show_sizes (const pw_system *s) {
   int bodies = pw_count_bodies (s), rows = pw_count_rows (s), holonomic = pw_count_holonomic (s);
-  printf ("\nSizes: %d %s, %d coordinates, %d constraint row%s (%d on positions, %d on velocities)\n", bodies,
+  printf ("\nSizes: %d %s, %d coordinates, %d constraint equation%s (%d on positions, %d on velocities)\n", bodies,
           bodies == 1 ? "body" : "bodies", pw_count_coordinates (s), rows, rows == 1 ? "" : "s", holonomic,
           rows - holonomic);
 }
 
-/* The states whose motion the model knows. */
-static void show_truth (const pw_cli_model *m) {
+/* The states that the reference solution of the model has. */
+static void show_reference (const pw_cli_model *m) {
   enum { MOST = 12 };
   int n = pw_count_coordinates (m->system), known = 0;
   char name[300];
@@ -167,7 +167,7 @@ static void show_truth (const pw_cli_model *m) {
     for (int i = 0; i < 2 * n; i++)
       if (!isnan (x[i]) && ++known <= MOST)
         printf ("%s%s",
-                known > 1 ? ", " : "\nKnows its motion (truth): ", pw_state_name (m->system, i, name, sizeof name));
+                known > 1 ? ", " : "\nReference solution (truth): ", pw_state_name (m->system, i, name, sizeof name));
   if (known > MOST) printf (", and %d more", known - MOST);
   if (known) putchar ('\n');
   free (x);
@@ -186,7 +186,7 @@ static void show_model (const pw_cli_model *m) {
   show_differences (m->system);
   show_parameters (m->model);
   show_defaults (table);
-  show_truth (m);
+  show_reference (m);
   show_sizes (m->system);
 }
 

@@ -10,7 +10,7 @@ static void yaml_number (double value) {
   fputs (pw_format (text, value, 17), stdout);
 }
 
-/* Whether a number is what it is if nothing is said; -0 is not. */
+/* 1 for the default, 0; -0 is different. */
 static int yaml_is_zero (double value) {
   return value == 0 && !signbit (value);
 }
@@ -113,7 +113,7 @@ static void yaml_value (const pw_field *f, const void *at) {
   if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
 }
 
-/* Optional fields that are all zero need no word. */
+/* Optional fields that are all zero are omitted. */
 static int yaml_is_default (const pw_field *f, const char *at) {
   size_t size = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
   if (f->required || f->type == PW_BODY) return 0;
@@ -138,7 +138,7 @@ static void yaml_element (const pw_element *e) {
   puts ("}");
 }
 
-/* ---- What has no words ---- */
+/* ---- What cannot be written as text ---- */
 
 static int yaml_is_built_in (const pw_kind *kind) {
   const pw_kind *const *k = pw_kinds;
@@ -193,10 +193,10 @@ static void yaml_names (const pw_truth_text *t) {
   for (int i = 0; i < t->names; i++) printf ("  %s: ", t->name[i]), yaml_number (t->value[i]), putchar ('\n');
 }
 
-/* A function in C has no words. */
 static void yaml_truth (const pw_model *m) {
   const pw_truth_text *t = pw_model_truth (m);
-  if (pw_model_table (m)->truth) puts ("# The model knows its motion (truth) by a function in C, which is left out.");
+  if (pw_model_table (m)->truth)
+    puts ("# The reference solution of the model (truth) is a function in C, which cannot be written as text.");
   if (t->states) puts ("truth:");
   for (int i = 0; i < t->states; i++) printf ("  %s: ", t->state[i]), yaml_text (t->text[i]), putchar ('\n');
 }

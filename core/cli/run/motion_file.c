@@ -150,10 +150,10 @@ static int file_count (file_reader *in, double *t_end, int whole, int *rows, pw_
   if (*t_end == 0) *t_end = last;
   char end[32], reached[32];
   if (*rows == 0 && !whole)
-    return pw_fail (error, PW_INPUT, "--truth %s: no row between the start and the end, t = %s s", in->path,
+    return pw_fail (error, PW_INPUT, "--truth %s: no row between 0 and the final time, t = %s s", in->path,
                     pw_format (end, *t_end, 9));
   if (*rows > 0 && (!whole || fabs (last - *t_end) <= FILE_SAME * *t_end)) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--truth %s: no row at the end, t = %s s; the last one before it is at %s s",
+  return pw_fail (error, PW_INPUT, "--truth %s: no row at the final time, t = %s s; the last one before it is at %s s",
                   in->path, pw_format (end, *t_end, 9), pw_format (reached, last, 9));
 }
 

@@ -88,7 +88,7 @@ int pw_print_profile (const pw_system *s, pw_run *r, double cpu, FILE *out, pw_e
   pw_profile p;
   int status = pw_run_profile (r, &p, error);
   if (status == PW_OK) profile_print (s, r, &p, cpu, out);
-  if (status == PW_RETRY) fprintf (out, "\n  no profile: the run ended in a singular pose\n");
+  if (status == PW_RETRY) fprintf (out, "\n  no profile: the run ended in a singular configuration\n");
   pw_profile_free (&p);
   return status == PW_RETRY ? PW_OK : status;
 }

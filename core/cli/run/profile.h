@@ -1,4 +1,4 @@
-/* What `pinwheel run --profile` says: where the time goes. */
+/* The tables of `pinwheel run --profile`. */
 #ifndef PW_PROFILE_H
 #define PW_PROFILE_H
 

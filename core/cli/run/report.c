@@ -194,7 +194,7 @@ static void report_internal (const pw_system *s, const pw_sample *last) {
   int first = 3 * pw_count_bodies (s), n = pw_count_coordinates (s),
       end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
   char name[REPORT_NAME];
-  int width = 0, unit = 0; /* of a rate's name and a coordinate's unit, the widest */
+  int width = 0, unit = 0; /* widest name of a velocity, widest unit of a coordinate */
   for (int j = first; j < end; j++) {
     int long_name = report_length (pw_state_name (s, n + j, name, sizeof name)),
         long_unit = report_length (pw_state_unit (s, j));

@@ -180,7 +180,7 @@ static int run_integrate (run *x, pw_error *error) {
 
 /* ---- After the run ---- */
 
-/* Brings the table to the disk, or leaves what there is of it in NAME.part; of a run that has not begun nothing is left. */
+/* Writes the table to the disk, or keeps what exists of it as NAME.part; nothing is kept of a run that has not begun. */
 static void run_close_table (run *x, int good, pw_error *error) {
   pw_csv_close (x->csv);
   int is_file = x->csv_output ? pw_output_is_file (x->csv_output) : x->csv_path != NULL;
@@ -189,7 +189,7 @@ static void run_close_table (run *x, int good, pw_error *error) {
   if (x->csv_output == NULL) return;
   pw_text_abandon (x->csv_output, x->check.resume ? 1 : x->row, x->part, sizeof x->part);
   x->csv_output = NULL;
-  if (good) *x->part = 0; /* the error says so */
+  if (good) *x->part = 0; /* the error names it */
 }
 
 /* The run's own failure decides the exit status. */
@@ -223,8 +223,8 @@ static void run_keep (pw_output **o, char *part, size_t size) {
   *o = NULL;
 }
 
-/* Table, summary and page become complete together, or keep their temporary names.  A run that has failed by itself has
- * no complete table; its summary says so. */
+/* Table, summary and page become complete together, or keep their temporary names.  A failed run has
+ * no complete table, which its summary reports. */
 static void run_complete (run *x, pw_error *error) {
   pw_error own = { 0 };
   char page_part[8];

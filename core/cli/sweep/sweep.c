@@ -23,7 +23,7 @@ typedef struct {
   /* as understood */
   pw_plan plan;
   int jobs;
-  /* under way; one thread at a time, which holds the lock */
+  /* in progress; accessed by the thread that holds the lock */
   pthread_mutex_t lock;
   long next; /* the row that is taken next */
   pw_journal journal;
@@ -44,7 +44,7 @@ static int sweep_read (const sweep *x, pw_error *error) {
 }
 
 /* The first option that has no effect on parts; NULL if there is none. */
-static const char *sweep_odd (const sweep *x) {
+static const char *sweep_ignored (const sweep *x) {
   const pw_cli_line *l = &x->line;
   const void *given[] = { x->ranges, l->method,    l->t_end,  l->step,      l->rtol,      l->atol,          l->limit,
                           l->sets,   l->max_steps, l->starts, x->jobs_text, x->part_text, x->cpu ? x : NULL };
@@ -114,7 +114,7 @@ static int sweep_open (sweep *x, pw_error *error) {
   if (status == PW_OK) status = pw_journal_open (&x->journal, &x->plan, x->path, error);
   if (status != PW_OK) return status;
   if (x->journal.done > 0)
-    pw_cli_say ("pinwheel: going on with %s: %ld of %ld runs are done\n", x->journal.part, x->journal.done,
+    pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", x->journal.part, x->journal.done,
                 x->journal.rows);
   return PW_OK;
 }
@@ -202,8 +202,9 @@ static int sweep_verdict (const pw_tally *tally, int is_part, pw_error *error) {
 
 static int sweep_merge (sweep *x, pw_error *error) {
   pw_tally tally;
-  const char *odd = sweep_odd (x);
-  if (odd) return pw_fail (error, PW_INPUT, "%s cannot be combined with --merge: the parts define the sweep", odd);
+  const char *option = sweep_ignored (x);
+  if (option)
+    return pw_fail (error, PW_INPUT, "%s cannot be combined with --merge: the parts define the sweep", option);
   int status = pw_table_merge (x->line.argument, x->line.arguments, x->path, &tally, error);
   return status == PW_OK ? sweep_verdict (&tally, 0, error) : status;
 }
@@ -215,7 +216,7 @@ static int sweep_finish (sweep *x, pw_error *error) {
     return PW_INTERRUPTED;
   }
   if (x->journal.done < x->journal.rows) {
-    pw_cli_say ("pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command goes on from there\n",
+    pw_cli_say ("pinwheel: interrupted; %ld of %ld runs are kept in %s; the same command continues from there\n",
                 x->journal.done, x->journal.rows, x->journal.part);
     return PW_INTERRUPTED;
   }

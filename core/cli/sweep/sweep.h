@@ -24,7 +24,7 @@ typedef struct {
   double *value;                                        /* PW_AXIS_LIST: count */
   long count;
   long stride;                   /* rows between two of its values */
-  const pw_parameter *parameter; /* NULL: it is the start value of a state */
+  const pw_parameter *parameter; /* NULL: it is the initial value of a state */
   const char *unit;
 } pw_axis;
 
@@ -44,10 +44,10 @@ static inline double pw_grid_value (const pw_grid *g, int axis, long row) {
   return pw_axis_value (a, row / a->stride % a->count);
 }
 
-/* ---- What all runs have in common (sweep_plan.c) ---- */
+/* ---- The plan: what all runs share (sweep_plan.c) ---- */
 
 typedef struct {
-  /* as the command line says; read only */
+  /* from the command line; read only */
   const char *model, *method;
   const char **sets, **starts;
   pw_settings settings;
@@ -70,7 +70,7 @@ typedef struct {
 } pw_plan;
 
 /* Matches the ranges ("NAME=RANGE") to the model, whose file is open in p->file and stays the caller's, and finds the
- * columns by building scenes of the grid.  Errors: PW_INPUT for whatever does not fit; PW_MACHINE.  Close the plan in
+ * columns by building scenes of the grid.  Errors: PW_INPUT, PW_MACHINE.  Close the plan in
  * every case. */
 int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error);
 void pw_plan_close (pw_plan *p);
@@ -101,7 +101,7 @@ int pw_sweep_row (const pw_plan *p, long row, pw_text *text, pw_error *error);
 
 /* ---- The journal (sweep_journal.c) ---- */
 
-/* Rows as they come, in a file next to the table, which a sweep that was stopped goes on from. */
+/* Rows in the order of completion, in a file next to the table, from which a sweep that was stopped continues. */
 typedef struct {
   char *path;  /* of the table, links followed */
   char *part;  /* of the journal: path.part */
@@ -125,7 +125,7 @@ void pw_journal_close (pw_journal *j);
 typedef struct {
   long rows, failed;
   int status;       /* exit status of the first that failed */
-  char reason[300]; /* how it did, as its row says */
+  char reason[300]; /* from its row */
 } pw_tally;
 
 /* Writes the table of a complete journal, or its part, and removes the journal. */

@@ -1,4 +1,4 @@
-/* What is varied: lists and ranges, and their grid. */
+/* Lists and ranges of values, and their grid. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -6,7 +6,7 @@
 
 /* ---- Ranges ---- */
 
-/* Reads the number before `end` in a text that goes on. */
+/* Reads the number in the first `size` bytes. */
 static int grid_number (const char *text, size_t size, double *value) {
   char number[64];
   if (size >= sizeof number) return PW_INPUT;
@@ -115,7 +115,7 @@ int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error) {
   for (; g->axes < n && status == PW_OK; g->axes++) {
     char *text = strdup (ranges[g->axes]);
     if (text == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-    g->axis[g->axes].name = text; /* freed with the grid, whatever comes */
+    g->axis[g->axes].name = text; /* freed with the grid in every case */
     status = grid_axis (g->axis + g->axes, text, error);
     for (int i = 0; i < g->axes && status == PW_OK; i++)
       if (strcmp (g->axis[i].name, text) == 0) status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", text);

@@ -88,7 +88,7 @@ static void journal_map_close (journal_map *m) {
 
 /* ---- The journal ---- */
 
-/* Writes behind what is there, all or nothing. */
+/* Appends a text, all or nothing. */
 static int journal_write (pw_journal *j, const char *text, size_t size, pw_error *error) {
   size_t done = 0;
   while (done < size) {
@@ -96,8 +96,8 @@ static int journal_write (pw_journal *j, const char *text, size_t size, pw_error
     if (n <= 0) {
       const char *why = n < 0 ? strerror (errno) : "no bytes were taken";
       if (done > 0 && ftruncate (j->file, j->size) != 0) why = "no room"; /* the next start cuts it off */
-      return pw_fail (error, PW_MACHINE, "cannot write %s: %s; the same command will go on after its %ld rows", j->part,
-                      why, j->done);
+      return pw_fail (error, PW_MACHINE, "cannot write %s: %s; the same command will continue after its %ld rows",
+                      j->part, why, j->done);
     }
     done += (size_t)n;
   }

@@ -1,4 +1,4 @@
-/* What all runs of a sweep have in common: the model, the grid, the columns. */
+/* The plan of a sweep, which all runs share: the model, the grid, the columns. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -99,7 +99,7 @@ static int plan_columns_of (pw_plan *p, const pw_system *s, pw_error *error) {
   return PW_OK;
 }
 
-/* What a scan has seen. */
+/* The results of building scenes. */
 typedef struct {
   int built, refused;
   pw_error first; /* why a scene could not be built */
