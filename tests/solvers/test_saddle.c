@@ -420,13 +420,15 @@ static double pairs_sine (const pw_plugin_table *table, double angle) {
   int row;
   pw_error error = { 0 };
   pw_system *s = scene_system (table, "angle", angle, NULL);
-  assert_int_equal (pw_place (s, 0, s->q0, s->v0), PW_OK);
-  pw_sweep_J (s);
-  pw_saddle *k = pw_saddle_open (s, s->mass, s->rows, NULL, &error);
+  pw_workspace *w = pw_workspace_new (s, NULL);
+  assert_int_equal (pw_place (w, 0, s->q0, s->v0), PW_OK);
+  pw_sweep_J (w);
+  pw_saddle *k = pw_saddle_open (w, s->mass, s->rows, NULL, &error);
   check_ok (k ? PW_OK : error.status, &error);
   assert_int_equal (pw_saddle_factor (k), PW_OK);
   double sine = pw_saddle_pivot (k, &row);
   pw_saddle_close (k);
+  pw_workspace_free (w);
   pw_free (s);
   return sine;
 }

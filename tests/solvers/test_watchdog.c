@@ -405,10 +405,10 @@ static double watchdog_projected (pw_run *r, double angle) {
   check_ok (pw_projector_open (&p, r, NULL, NULL, &error), &error);
   watchdog_bend (r, angle);
   for (int j = 0; j < 9; j++) v[j] = sin (1 + j);
-  assert_int_equal (pw_place (r->s, 0, r->q, v), PW_OK);
-  pw_sweep_J (r->s);
+  assert_int_equal (pw_place (r->w, 0, r->q, v), PW_OK);
+  pw_sweep_J (r->w);
   assert_int_equal (pw_project_velocities (&p, r, v), PW_OK);
-  pw_mul_J (r->s, v, Jv);
+  pw_mul_J (r->w, v, Jv);
   for (int i = 0; i < r->s->rows; i++) most = fmax (most, fabs (Jv[i]));
   pw_projector_close (&p);
   return most;
