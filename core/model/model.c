@@ -1,4 +1,5 @@
 /* The description: parameters, bodies and elements as the build function declares them. */
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -213,15 +214,6 @@ pw_error *pw_model_error (pw_model *m) {
   return &m->error;
 }
 
-void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k) {
-  for (const pw_field *f = kind->fields; f->name; f++) {
-    if (f->type != type) continue;
-    if (k < pw_field_count (f)) return (char *)(size_t)definition + f->offset + (size_t)k * pw_field_bytes (type);
-    k -= pw_field_count (f);
-  }
-  return NULL;
-}
-
 int pw_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (element == NULL || field == NULL || signal == NULL)
@@ -264,4 +256,23 @@ int pw_set_start (pw_model *m, const char *state, double value, pw_error *error)
     if (m->given[m->givens].state) m->givens++;
   }
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
+}
+
+/* ---- Reference solution: a function in C, or expressions of a text model ---- */
+
+int pw_has_truth (const pw_model *m) {
+  return m->table->truth != NULL || pw_model_truth (m)->states > 0;
+}
+
+int pw_true_state (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
+  int n = pw_count_coordinates (s);
+  for (int j = 0; j < n; j++) q[j] = v[j] = NAN;
+  if (m->table->truth) m->table->truth (m->parameters, t, q, v);
+  const pw_truth_text *text = pw_model_truth (m);
+  for (int i = 0; i < text->states; i++) {
+    int state = pw_find_state (s, text->state[i], error);
+    if (state < 0) return state;
+    *(state < n ? q + state : v + state - n) = text->eval (text->context, i, t);
+  }
+  return PW_OK;
 }

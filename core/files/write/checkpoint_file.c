@@ -1,6 +1,6 @@
 /* Checkpoints as files. */
-#define _POSIX_C_SOURCE 200809L
 #include <errno.h>
+#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #include "files.h"
@@ -33,21 +33,14 @@ int pw_checkpoint_write (const char *path, const char *head, const pw_archive *s
 
 /* ---- Reading ---- */
 
-static int checkpoint_slurp (const char *path, char **text, size_t *size, pw_error *error) {
+static int checkpoint_load (const char *path, char **text, size_t *size, pw_error *error) {
   const char *why;
-  struct stat info;
   FILE *f = pw_open_input (path, &why);
   if (f == NULL && errno == ENOMEM) return pw_fail (error, PW_MACHINE, "%s: out of memory", path);
   if (f == NULL) return pw_fail (error, PW_INPUT, "cannot read the checkpoint %s: %s", path, why);
-  int status = fstat (fileno (f), &info) == 0 ? PW_OK : PW_INPUT;
-  size_t end = status == PW_OK ? (size_t)info.st_size : 0;
-  if (status == PW_OK && (*text = malloc (end + 1)) == NULL) status = PW_MACHINE;
-  if (status == PW_OK && fread (*text, 1, end, f) != end) status = PW_INPUT;
+  int status = pw_slurp (f, SIZE_MAX / 4, path, "the most of a checkpoint", text, size, error);
   fclose (f);
-  if (status == PW_OK) (*text)[ *size = end] = 0;
-  return status == PW_OK        ? PW_OK
-         : status == PW_MACHINE ? pw_fail (error, status, "out of memory")
-                                : pw_fail (error, status, "cannot read the checkpoint %s", path);
+  return status;
 }
 
 /* Checks the first line. */
@@ -60,7 +53,7 @@ static int checkpoint_version (const char *path, const char *text, pw_error *err
                   (int)strspn (text + word, "0123456789"), text + word, atoi (magic + word));
 }
 
-/* Finds the end of the head, and the state behind it. */
+/* Finds the end of the head, and the state after it. */
 static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw_error *error) {
   size_t bytes = 0;
   unsigned long long check = 0;
@@ -84,7 +77,7 @@ static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw
 int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error) {
   size_t size = 0;
   *c = (pw_checkpoint){ .text = NULL };
-  int status = checkpoint_slurp (path, &c->text, &size, error);
+  int status = checkpoint_load (path, &c->text, &size, error);
   if (status == PW_OK) status = checkpoint_version (path, c->text, error);
   return status == PW_OK ? checkpoint_parse (path, c, size, error) : status;
 }

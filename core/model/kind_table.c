@@ -1,8 +1,15 @@
-/* Does the table of a kind hold together?  Asked before anything of it is used, so that a slip in a plug-in is told by
- * name instead of crashing the program. */
+/* Element types: the list of built-in ones, the fields of a definition, and checks of a type's table.  A table is checked before
+ * anything in it is used, so that a mistake in a plug-in is reported instead of crashing the program. */
 #include <stdio.h>
 #include <string.h>
 #include "model.h"
+
+const pw_kind *const pw_kinds[] = {
+#define PW_KIND(k) &pw_kind_##k,
+  PW_KINDS
+#undef PW_KIND
+      NULL
+};
 
 size_t pw_field_bytes (pw_field_type type) {
   switch (type) {
@@ -19,6 +26,15 @@ size_t pw_field_bytes (pw_field_type type) {
     return sizeof (int);
   }
   return 0;
+}
+
+void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k) {
+  for (const pw_field *f = kind->fields; f->name; f++) {
+    if (f->type != type) continue;
+    if (k < pw_field_count (f)) return (char *)(size_t)definition + f->offset + (size_t)k * pw_field_bytes (type);
+    k -= pw_field_count (f);
+  }
+  return NULL;
 }
 
 /* What is wrong with one field, or "". */
