@@ -99,7 +99,7 @@ char *pw_take_arrays (const pw_array *array, size_t arrays) {
 }
 
 int pw_reserve (size_t bytes) {
-  void *volatile p = malloc (bytes); /* what nobody looks at would not be asked for */
+  void *volatile p = malloc (bytes); /* volatile: an unused allocation would be optimised away */
   int status = p ? PW_OK : PW_MACHINE;
   free (p);
   return status;

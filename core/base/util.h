@@ -1,4 +1,4 @@
-/* Small things the core shares: error texts, nearest names, a name table, arenas. */
+/* Utilities: nearest names, texts, a table of names, arenas, layouts. */
 #ifndef PW_UTIL_H
 #define PW_UTIL_H
 
@@ -16,7 +16,7 @@ typedef struct {
   const char *sought;
   const char *best;
   size_t distance, length; /* of the best from the name sought, and of the longer of the two */
-  int near;                /* 1: the best may well be what was meant */
+  int near;                /* 1: near enough to suggest it */
   int crowded;             /* 1: there are more than all holds */
   char all[88];            /* the valid names, while there is room for them */
 } pw_nearest;
@@ -72,8 +72,8 @@ typedef struct {
 /* Lays out arrays in one allocation, which is zeroed and returned; NULL if there is no memory. */
 char *pw_take_arrays (const pw_array *array, size_t arrays);
 
-/* PW_OK if there are so many bytes to be had at this moment, else PW_MACHINE.  Asked before calls of libraries that crash
- * when they are refused memory. */
+/* PW_OK if `bytes` can be allocated now, else PW_MACHINE.  Used before calls of libraries that crash when an allocation
+ * fails. */
 int pw_reserve (size_t bytes);
 
 /* "" if a value lies in the domain, else what was expected (">= 0"). */

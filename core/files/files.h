@@ -1,4 +1,4 @@
-/* What the files of this folder share. */
+/* Internal interfaces of libpinwheel-files. */
 #ifndef PW_FILES_H
 #define PW_FILES_H
 
@@ -72,9 +72,9 @@ typedef struct {
 
 extern const pw_unit_name pw_unit_names[]; /* ended by a NULL name */
 
-/* ---- Texts (slurp.c) ---- */
+/* ---- Reading (slurp.c) ---- */
 
-/* Reads the rest of a file of at most so many bytes into *text, malloced and ended by a NUL; free it in every case. */
+/* Reads the rest of a file of at most `most` bytes into *text, malloced, with a 0 after it; free it in every case. */
 int pw_slurp (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error);
 
 /* ---- Names of files (location.c) ---- */

@@ -27,7 +27,7 @@ typedef struct pw_file pw_file;
  * Nothing is taken from the current directory unless named by path.
  *
  * Errors: PW_INPUT for a model that is not found (with the nearest name), found twice (with both paths), does not
- * compile, is no Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_MACHINE. */
+ * compile, is not a Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_MACHINE. */
 pw_file *pw_file_open (const char *model, pw_error *error);
 
 /* The same with another limit in bytes than PW_FILE_LARGEST for a model in YAML, up to PW_FILE_MOST.  Reading one takes
@@ -65,8 +65,8 @@ int pw_read_expression (const char *text, double *value);
 
 /* ---- Units in the headers of tables, "NAME [UNIT]" (units.c) ---- */
 
-/* What one of a unit is in SI units; PW_INPUT if it is not known, PW_RETRY if it does not measure what `wanted` (NULL:
- * anything) does. */
+/* Converts a unit to SI units; PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of `wanted` (NULL:
+ * any). */
 int pw_unit_factor (const char *unit, const char *wanted, double *factor);
 
 /* The bytes of the name in a header's cell; its unit goes to the buffer: what is between brackets at its end, or a known unit
@@ -76,7 +76,7 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size);
 /* The factor of a column by its header's cell, 1 without a unit.  PW_INPUT with what is wrong, column and unit named. */
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
-/* Opens a regular file for reading, without waiting for anybody.  NULL, with the reason in *why, if that fails or it is
+/* Opens a regular file for reading, without waiting (a FIFO is refused).  NULL, with the reason in *why, if that fails or it is
  * another type of file; errno is ENOMEM if there was no memory. */
 FILE *pw_open_input (const char *path, const char **why);
 
@@ -99,7 +99,7 @@ int pw_check_uses (const pw_use *use, int count, pw_error *error);
 /* A file written under a temporary name, NAME.part, and renamed when complete; "-" is standard output.
  *
  * The temporary file is new, locked against other processes, and never a symbolic link; if the name itself is one, the
- * file it leads to is replaced.  A file that is replaced passes on its mode and owner.  What is no regular file (a pipe,
+ * file it leads to is replaced.  A file that is replaced passes on its mode and owner.  What is not a regular file (a pipe,
  * a device), and open descriptors (/dev/stdout, /dev/fd/N), are written directly. */
 typedef struct pw_output pw_output;
 
@@ -137,7 +137,7 @@ typedef struct {
   unsigned long long length, check; /* bytes; a check sum of the last of them */
 } pw_mark;
 
-/* Brings all that was written to the disk.  Errors: PW_MACHINE; PW_INPUT for what is no regular file. */
+/* Writes all output to the disk.  Errors: PW_MACHINE; PW_INPUT if it is not a regular file. */
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error);
 /* Opens NAME.part once more and cuts off what was written after the mark.  A table goes on without a header.  PW_INPUT if it
  * is not there or not what was marked; PW_MACHINE. */
@@ -167,7 +167,7 @@ typedef struct {
   pw_archive state;     /* its bytes belong to the text */
 } pw_checkpoint;
 
-/* PW_INPUT if it is no checkpoint, of another version, cut off or damaged; PW_MACHINE.  Free it in every case. */
+/* PW_INPUT if it is not a checkpoint, of another version, cut off or damaged; PW_MACHINE.  Free it in every case. */
 int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error);
 void pw_checkpoint_free (pw_checkpoint *c);
 

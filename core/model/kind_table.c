@@ -37,7 +37,7 @@ void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type ty
   return NULL;
 }
 
-/* What is wrong with one field, or "". */
+/* The fault of one field, or "". */
 static const char *fault_field (const pw_kind *k, const pw_field *f) {
   size_t bytes = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
   if (bytes == 0) return "its type does not exist";

@@ -126,14 +126,14 @@ static const double *model_numbers (pw_model *m, const double *from, int count) 
   return memcpy (copy, from, (size_t)count * sizeof *copy);
 }
 
-/* A table's points become the model's own; what is no table is left for the check of elements. */
+/* Copies the points of a table; pw_compile reports invalid ones. */
 static void model_table (pw_model *m, pw_signal *s) {
   if (s == NULL || s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
   s->table.t = model_numbers (m, s->table.t, s->table.count);
   s->table.value = model_numbers (m, s->table.value, s->table.count);
 }
 
-/* Looks at a kind's table when its first element is added, or nearly so. */
+/* Checks an element type, unless the element before has the same. */
 static int model_kind (pw_model *m, const pw_kind *kind) {
   if (m->elements > 0 && m->element[m->elements - 1].kind == kind) return PW_OK;
   char buffer[200];

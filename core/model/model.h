@@ -41,8 +41,8 @@ enum { PW_NAME_MOST = 50 };
 /* Checks every body and element against its field table: names, numbers, bodies' names, signals. */
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
 
-/* "" if the table of a kind holds together, else what is wrong with it, perhaps in the buffer.  Anything else may crash on
- * one that does not. */
+/* "" if the table of an element type is consistent, else its fault, perhaps in the buffer.  Other functions may crash on an
+ * inconsistent table. */
 const char *pw_kind_fault (const pw_kind *kind, char *buffer, size_t size);
 
 #endif

@@ -19,7 +19,7 @@ static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, con
                   expected);
 }
 
-/* What is shown of a model does not touch the terminal, and is UTF-8 in summaries. */
+/* Texts are UTF-8 without control characters, since they are printed and written to JSON. */
 int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error) {
   if (t->abi != PW_ABI || t->size != sizeof *t)
     return pw_fail (error, PW_INPUT,

@@ -2,18 +2,18 @@
  *
  *   u = y_i + b_i s + M_i s^2 / 2 + (M_j - M_i) s^3 / (6 h),   s = t - t_i,  j = i + 1,  h = t_j - t_i
  *
- * between two points; the first and the last value are held outside.  Of a cubic table the accelerations M_i make the
+ * between two points; the first and the last value are constant outside.  Of a cubic table the accelerations M_i make the
  * rate continuous, too (de Boor 2001, A Practical Guide to Splines, chapter IV):
  *
  *   h_k M_k + 2 (h_k + h_i) M_i + h_i M_j = 6 ((y_j - y_i) / h_i - (y_i - y_k) / h_k),   k = i - 1
  *
- * With free ends the first two pieces are one cubic, and so are the last two ("not a knot"); with ends at rest b is 0
+ * With free ends the first two intervals share one cubic, and so are the last two ("not a knot"); with ends at rest b is 0
  * at both.  A linear table has M = 0. */
 #include <math.h>
 #include <string.h>
 #include "signal.h"
 
-/* Row i of the equations for M: the coefficients of its neighbour before, of itself, of that behind, and the right side. */
+/* Row i of the equations for M: the coefficients of the point before, of itself, of the point after, and the right side. */
 static void table_row (const double *t, const double *y, int n, int ends, int i, double row[4]) {
   double before = i > 0 ? t[i] - t[i - 1] : 0, behind = i < n - 1 ? t[i + 1] - t[i] : 0;
   double from = i > 0 ? (y[i] - y[i - 1]) / before : 0, to = i < n - 1 ? (y[i + 1] - y[i]) / behind : 0;

@@ -4,17 +4,18 @@
  * breaks; otherwise the interval is halved, the earlier half first.  In what is left, a fraction of 2^-36 of the time, two
  * neighbouring numbers are found between which something changes: that is where steps have to end
  * (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapters 5 and 8).
- * Changes that cancel within such a fraction are passed over, and those of numbers that differ by round-off only; where two numbers stay equal, the fraction grows with the time
- * passed. */
+ * Changes that cancel within such a fraction are ignored, and so are those of numbers that differ by round-off only.  Where two
+ * numbers stay equal, the fraction grows with the time passed. */
 #include <float.h>
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
 
-/* What a value may be; whether it may break within the interval at a time of its own, and whether states decide. */
+/* Enclosure of a value over an interval of time. */
 typedef struct {
   double lo, hi;
-  int breaks, states;
+  int breaks; /* 1: it may jump or bend at a time that does not depend on states */
+  int states; /* 1: states may decide where it jumps or bends */
 } range;
 
 static const range range_any = { -INFINITY, INFINITY, 0, 0 };
@@ -111,9 +112,9 @@ static range range_pair (const pw_expression_function *f, const range *x, const 
   return y->hi - y->lo > 1e-12 ? range_any : range_of (f->two (x->lo, y->lo), f->two (x->hi, y->lo));
 }
 
-/* ---- What breaks ---- */
+/* ---- Operations that jump or bend ---- */
 
-/* Whole numbers: one, or a break. */
+/* floor, ceil, round: one whole number, or a break. */
 static range range_whole (int op, const range *x) {
   double (*whole) (double) = op == PW_OP_FLOOR ? floor : op == PW_OP_CEIL ? ceil : round;
   range r = { whole (x->lo), whole (x->hi), 0, 0 };
@@ -140,7 +141,7 @@ static range range_compare (int op, const range *x, const range *y) {
   return order == 2 ? either : pw_expression_truth (op, order) ? yes : no;
 }
 
-/* An operand that decides alone keeps the breaks of the other one out. */
+/* An operand that decides alone hides the breaks of the other one. */
 static range range_logical (int op, const range *x, const range *y) {
   double alone = op == PW_OP_OR; /* 1 decides an or, 0 an and */
   const range *decides = x->lo == alone && x->hi == alone ? x : y->lo == alone && y->hi == alone ? y : NULL;
@@ -213,13 +214,13 @@ static range range_two (const pw_expression_code *c, const range *x, const range
   }
 }
 
-/* Of numbers that are known the operation itself gives the value; what was equal stays equal. */
+/* Operands that are single numbers are evaluated exactly, so that equal numbers stay equal. */
 static range range_known (const pw_expression_code *c, const range *x, int operands) {
   double value = pw_expression_apply (c, x[0].lo, x[operands - 1].lo);
   return isnan (value) ? range_any : (range){ value, value, 0, 0 };
 }
 
-/* What breaks does so at a time of its own unless states decide; what is found to be one number breaks no more. */
+/* A break counts unless states decide about its time; a value that is one number over the interval has no breaks. */
 static range range_apply (const pw_expression_code *c, const range *x, int operands) {
   if (operands < 3 && x[0].lo == x[0].hi && x[operands - 1].lo == x[operands - 1].hi)
     return range_known (c, x, operands);
@@ -258,15 +259,15 @@ static range range_run (const pw_expression *x, const unsigned char *noisy, doub
 typedef struct {
   const pw_expression *x;
   double from;
-  int left;                                 /* intervals that may still be looked at */
-  int equal;                                /* narrow ones in which nothing has changed */
-  int patience;                             /* so many of them double what is narrow */
-  double narrow;                            /* the fraction of the time that is halved no more */
+  int left;                                 /* remaining intervals */
+  int equal;                                /* narrow intervals without a change */
+  int patience;                             /* after this many of them `narrow` doubles */
+  double narrow;                            /* fraction of the time below which intervals are not halved */
   double until;                             /* up to this time some operations are noisy; INFINITY: none */
   unsigned char noisy[PW_EXPRESSION_CODES]; /* by operation: it changes again and again */
 } search;
 
-/* What all comparisons and the like give at a time. */
+/* Evaluates all discrete operations (comparisons and the like) at a time. */
 static void search_look (const search *s, double t, double *discrete) {
   double variable[PW_EXPRESSION_VARIABLES] = { t }, u[3];
   pw_expression_run_jet (s->x->code, s->x->codes, variable, 0, u, discrete);
@@ -326,7 +327,7 @@ static double search_first (search *s, double a, double b) {
   return first < INFINITY ? first : search_first (s, middle, b);
 }
 
-/* Where too much has been looked at, or something was noisy, a breakpoint that is none makes the search go on from there. */
+/* If the search reaches its limit or finds noise, it returns a time that is not a breakpoint, from which it continues later. */
 double pw_expression_breakpoint (const pw_expression *x, double t) {
   const double latest = 1e18;
   search s = { .x = x, .from = t, .left = 400 + 4000000 / (100 + x->codes), .narrow = 0x1p-36, .until = INFINITY };

@@ -96,7 +96,7 @@ typedef struct {
   int on; /* 1: it depends on the variable */
 } jet;
 
-/* What does not depend on the variable has no part in a derivative, be its slope infinite. */
+/* Operands that do not depend on the variable do not contribute, even with an infinite slope. */
 static jet jet_chain (double f, const pw_slopes *s, const jet *x, const jet *y) {
   jet r = { f, 0, 0, x->on | y->on };
   if (x->on) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;
@@ -105,14 +105,14 @@ static jet jet_chain (double f, const pw_slopes *s, const jet *x, const jet *y) 
   return r;
 }
 
-/* ---- What jumps or bends ---- */
+/* ---- Derivatives of operations that jump or bend ---- */
 
 static inline int jet_sign (const jet *x) {
   double first = x->v != 0 ? x->v : x->d != 0 ? x->d : x->dd;
   return (first > 0) - (first < 0);
 }
 
-/* How two will compare just after. */
+/* How two numbers compare just after. */
 static int jet_order (const jet *x, const jet *y) {
   if (x->v != y->v) return x->v < y->v ? -1 : x->v > y->v ? 1 : 2;
   jet less = { 0, x->d - y->d, x->dd - y->dd, 1 };

@@ -6,14 +6,14 @@
  *   constants   pi, e, deg = pi / 180
  *
  * An expression is read once, in a scope of names that stand for numbers; other names are its variables, of which the time
- * is the first.  What is read never changes again: any number of threads may evaluate it. */
+ * is the first.  An expression is immutable: any number of threads may evaluate it. */
 #ifndef PW_EXPRESSION_H
 #define PW_EXPRESSION_H
 
 #include <stddef.h>
 #include "util.h"
 
-/* What is wrong with an expression, and where in it. */
+/* An error in an expression. */
 typedef struct {
   size_t at; /* offset in bytes */
   char text[240];
@@ -24,7 +24,7 @@ typedef struct {
 /* Names that stand for numbers. */
 typedef struct pw_scope pw_scope;
 
-/* A scope with room for so many names; NULL without memory. */
+/* A scope with room for `names` names; NULL without memory. */
 pw_scope *pw_scope_open (int names);
 void pw_scope_close (pw_scope *s);
 

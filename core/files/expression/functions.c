@@ -49,7 +49,7 @@ double pw_expression_power (double x, double y) {
   return y == 2 ? x * x : y == 3 ? x * x * x : pow (x, y);
 }
 
-/* 0 whenever one factor is. */
+/* 0 if a is 0, even if b is infinite. */
 static double slopes_product (double a, double b) {
   return a == 0 ? 0 : a * b;
 }
@@ -72,7 +72,7 @@ double pw_expression_mod (double x, double y) {
 
 /* ---- Elliptic functions ----
  *
- * With the arithmetic-geometric mean a, b, c of core/elliptic.c, R = sum of 2^(n-1) c_n^2 / m from n = 1, phi_n its angles,
+ * With the arithmetic-geometric mean a, b, c of core/base/elliptic.c, R = sum of 2^(n-1) c_n^2 / m from n = 1, phi_n its angles,
  *
  *   dK/dm = K (1/2 - R) / (2 (1 - m)),   m (1 - m) d2K/dm2 = K / 4 - (1 - 2 m) dK/dm
  *   N = E (phi) - (1 - m) u = m (u (1/2 - R) + sum of c_n / m sin phi_n)
@@ -119,7 +119,7 @@ static pw_slopes slopes_K (double m, double y, double K) {
   return slopes_of_one (first, fabs (m) < 0.2 ? slopes_K_series (m) : (K / 4 - (1 - 2 * m) * first) / (m * (1 - m)));
 }
 
-/* With u held, d (N/m)/dm = (dn d am/dm + u/2 - N / (2 m)) / m. */
+/* With constant u, d (N/m)/dm = (dn d am/dm + u/2 - N / (2 m)) / m. */
 static pw_slopes slopes_am (double u, double m, double phi) {
   double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS], s = sin (phi), c = cos (phi), dn = sqrt (1 - m * s * s);
   int n = slopes_mean (m, &a, ratio, part, &R);
@@ -135,7 +135,7 @@ static pw_slopes slopes_am (double u, double m, double phi) {
   return (pw_slopes){ dn, by_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
 }
 
-/* ---- What there is ---- */
+/* ---- List of functions and constants ---- */
 
 #define FUNCTION_OF_ONE(name, trend) \
   { #name, PW_OP_ONE, 1, 1, name, NULL, slopes_##name, trend }

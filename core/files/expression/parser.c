@@ -5,7 +5,7 @@
  *   unary    = + unary | - unary | operand [^ unary]
  *   operand  = number | name | function (choice, ...) | (choice)
  *
- * What has no variables is computed at once.  Each mistake is reported at its place. */
+ * Parts without variables are computed at once.  Each mistake is reported at its place. */
 #include <ctype.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -141,7 +141,7 @@ typedef struct {
   pw_expression_code code[PARSER_CODES];
 } parser;
 
-/* A part that has been read: its codes, from where in the text it is, on what it depends, whether it is 1 or 0. */
+/* A part that has been read: its offset in the text, its first operation, what it depends on, whether it is 1 or 0. */
 typedef struct {
   size_t from;
   int first, depends, truth;
@@ -254,7 +254,7 @@ static int parser_deeper (parser *p) {
   return p->status == PW_OK;
 }
 
-/* The word does not fit; `open`: a parenthesis to close before it, 0 if there is none, and its place. */
+/* Reports an unexpected word; `open`: the parenthesis (or ?) that is still open, or 0, and its offset. */
 static parser_part parser_unexpected (parser *p, char open, size_t at) {
   if (p->type == 'n' || p->type == '0' || p->type == '(')
     return parser_wrong (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });

@@ -25,7 +25,7 @@ static void build_word (build_command *c, const char *word) {
   if (c->words < BUILD_WORDS - 1) c->word[c->words++] = (char *)(size_t)word;
 }
 
-/* CC may be more than one word ("ccache gcc"); half of the room is kept for our own. */
+/* CC may be more than one word ("ccache gcc"); half of the array is reserved for our options. */
 static int build_compiler (build_command *c) {
   const char *cc = getenv ("CC");
   c->text = strdup (cc && cc[strspn (cc, " \t")] ? cc : "cc");

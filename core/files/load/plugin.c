@@ -1,4 +1,4 @@
-/* Model files: found by name or path, loaded, and checked before anything of them is used. */
+/* Model files: found by name or path, loaded, and checked before use. */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <dlfcn.h>
 #include <errno.h>

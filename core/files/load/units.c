@@ -1,6 +1,6 @@
 /* Units in the headers of tables: what they are in SI units, and whether they measure what is asked for.
  *
- * A unit is a product of names, each perhaps with a power: "N mm", "m/s^2", "km/h".  A slash divides by the one name behind it.
+ * A unit is a product of names, each perhaps with a power: "N mm", "m/s^2", "km/h".  A slash divides by the one name after it.
  * Angles count as a dimension of their own: 1/s does not say whether it means turns or radians. */
 #include <ctype.h>
 #include <math.h>
@@ -80,7 +80,7 @@ static int units_name (const char *name, size_t n, int power, units_value *u) {
   return PW_OK;
 }
 
-/* The power behind a name: "^2", "²", "2"; 1 if there is none. */
+/* The power after a name: "^2", "²", "2"; 1 if there is none. */
 static const char *units_power (const char *p, int *power) {
   static const char square[] = "\xC2\xB2", cube[] = "\xC2\xB3";
   char *end;

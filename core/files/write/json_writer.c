@@ -2,7 +2,7 @@
 #include <math.h>
 #include "files.h"
 
-/* What stands before an item or the end of a container. */
+/* Writes the separator before an item or the end of a container. */
 static void json_space (pw_json *j, int depth, const char *otherwise) {
   if (j->depth <= j->lines || j->line)
     fprintf (j->f, "\n%*s", 2 * depth, "");

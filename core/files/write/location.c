@@ -79,7 +79,7 @@ typedef struct {
   int known;          /* 1: that was found */
 } place_use;
 
-/* What cannot be found cannot be opened, either; PW_MACHINE without memory. */
+/* A file that cannot be found cannot be opened either; PW_MACHINE without memory. */
 static int place_use_find (place_use *u, const pw_use *use) {
   *u = (place_use){ .use = use };
   int why = use->path ? pw_locate (&u->place, use->path) : ENOENT;

@@ -1,7 +1,7 @@
 /* Files and folders that belong to one process at a time.
  *
- * It is the lock that says so, not that the file exists: a lock ends with the process that holds it, so that what a killed
- * process has left is in nobody's way. */
+ * The lock counts, not the existence of the file: a lock ends with the process that holds it, so files that a killed process
+ * left do not block others. */
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { LOCK_TRIES = 100 }; /* each time another process has just given the file up */
+enum { LOCK_TRIES = 100 }; /* one for each time another process has just released the file */
 
 /* An errno value.  Some file systems have no locks: there nothing can be protected. */
 static int lock_take (int file) {
@@ -27,7 +27,7 @@ const char *pw_lock_reason (int why) {
                             : strerror (why);
 }
 
-/* Neither a link nor a file that is there already is taken for a new one. */
+/* Never follows a link; a new file must not exist already. */
 static int lock_open (const char *path, pw_lock_how how, int *created) {
   int file = -1;
   *created = 0;
@@ -53,7 +53,7 @@ int pw_lock_file (const char *path, pw_lock_how how, int *created) {
   for (int tries = 0; tries < LOCK_TRIES; tries++) {
     int file = lock_open (path, how, created), why = file < 0 ? errno : lock_opened (file, path);
     if (why == 0 && (*created || how != PW_LOCK_NEW)) return file;
-    if (why == 0 && unlink (path) != 0) why = errno; /* a killed process has left it */
+    if (why == 0 && unlink (path) != 0) why = errno; /* left by a killed process */
     if (*created && why != 0 && why != ESTALE) unlink (path);
     if (file >= 0) close (file);
     errno = why;

@@ -11,15 +11,15 @@
 #include "files.h"
 
 struct pw_output {
-  FILE *stream; /* NULL: closed, nothing but the name is missing */
-  char *path;   /* as the user knows it */
-  char *real;   /* the file itself, links followed */
-  char *part;   /* its temporary name; NULL: written directly */
-  int file;     /* keeps the temporary file locked; -1: written directly */
-  int folder;   /* the one it is in; -1: written directly */
-  int why;      /* errno of the first write of ours that failed */
-  int there;    /* 1: continued, with something in it */
-  int brief;    /* 1: what is incomplete is of no use */
+  FILE *stream;  /* NULL: closed, nothing but the name is missing */
+  char *path;    /* as the user knows it */
+  char *real;    /* of the file itself, links followed */
+  char *part;    /* its temporary name; NULL: written directly */
+  int file;      /* keeps the temporary file locked; -1: written directly */
+  int folder;    /* the one it is in; -1: written directly */
+  int why;       /* errno of the first write that failed */
+  int continued; /* 1: continued: the file is not empty */
+  int discard;   /* 1: an incomplete file is removed */
 };
 
 static void output_free (pw_output *o) {
@@ -35,14 +35,14 @@ static void output_free (pw_output *o) {
 static int output_fail (const pw_output *o, int why, int kept, pw_error *error) {
   const char *what = strcmp (o->path, "-") == 0 ? "standard output" : o->path;
   const char *reason = why > 0 ? pw_lock_reason (why) : "a write failed";
-  if (o->part && kept && !o->brief)
+  if (o->part && kept && !o->discard)
     return pw_fail (error, PW_MACHINE, "cannot write %.200s: %s; what was written is in %.200s", what, reason, o->part);
   return pw_fail (error, PW_MACHINE, "cannot write %s: %s", what, reason);
 }
 
 /* ---- Opening ---- */
 
-/* A descriptor of the process, or a file that is no regular one.  A FIFO waits for its reader, which a signal ends. */
+/* A descriptor of the process, or a file that is not a regular file.  A FIFO waits for its reader, which a signal ends. */
 static int output_open_direct (pw_output *o, const pw_location *p) {
   int flags = p->descriptor < 0 ? O_WRONLY : fcntl (p->descriptor, F_GETFL);
   if (flags < 0) return errno;
@@ -149,7 +149,7 @@ static pw_output *output_new (const char *path, pw_error *error) {
 pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error) {
   pw_output *o = output_new (path, error);
   if (o == NULL) return NULL;
-  o->brief = strcmp (ending, ".part") != 0;
+  o->discard = strcmp (ending, ".part") != 0;
   int why = output_open_file (o, ending);
   if (why == 0) return o;
   if (why == ENOMEM)
@@ -263,7 +263,7 @@ int pw_output_finish_all (pw_output *const *o, int count, pw_error *error) {
     if (complete && status == PW_OK) status = output_sync_folder (o[i], error);
     if (complete)
       output_free (o[i]);
-    else if (o[i]->brief)
+    else if (o[i]->discard)
       pw_output_discard (o[i]);
     else
       pw_output_abandon (o[i], (char[2]){ 0 }, 2);
@@ -283,7 +283,7 @@ unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size
   return sum;
 }
 
-/* The check sum of the last 64 kB before `length`; PW_RETRY if there are not so many bytes. */
+/* The check sum of the last 64 kB before `length`; PW_RETRY if the file is shorter. */
 static int output_check (int file, pw_mark *mark) {
   char bytes[4096];
   unsigned long long at = mark->length > 65536 ? mark->length - 65536 : 0;
@@ -299,7 +299,7 @@ static int output_check (int file, pw_mark *mark) {
 }
 
 int pw_output_continued (const pw_output *o) {
-  return o->there;
+  return o->continued;
 }
 
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
@@ -319,7 +319,7 @@ static int output_is_marked (const pw_output *o, const pw_mark *mark) {
   return output_check (o->file, &now) == PW_OK && now.check == mark->check;
 }
 
-/* A process that was killed right after its table was complete has left it under its own name. */
+/* If a process was killed just after completing its table, the table has its final name. */
 static int output_take_back (pw_output *o, const pw_mark *mark) {
   int created, file = pw_lock_file (o->real, PW_LOCK_EXISTING, &created);
   if (file < 0) return errno;
@@ -350,7 +350,7 @@ static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
 pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error) {
   pw_output *o = output_new (path, error);
   if (o && output_reopen (o, mark, error) == PW_OK) {
-    o->there = 1;
+    o->continued = 1;
     return o;
   }
   if (o && o->stream) fclose (o->stream);

@@ -48,7 +48,7 @@ struct pw_yaml {
 
 /* ---- The text (yaml_source.c) ---- */
 
-/* Reads the file of at most so many bytes: y->source and size. */
+/* Reads a file of at most `largest` bytes into y->source and y->size. */
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error *error);
 
 /* Fails with "PATH:LINE:COLUMN: error: TEXT", the line of the source at an offset, and a caret below. */
@@ -71,15 +71,15 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
 enum { PW_YAML_KEYS = 40 }; /* at most, in a map of fixed keys */
 
-/* Looks for known keys (ended by NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
- * are passed over.  Whatever else is there, twice or empty is refused; `what` ("a body") is for messages. */
+/* Finds known keys (ended by NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
+ * are skipped.  Other keys, repeated keys and empty values are refused; `what` ("a body") is for messages. */
 int pw_yaml_keys (const pw_yaml *y, const pw_node *map, int skip, const char *const *key, const char *what,
                   const pw_node **value, pw_error *error);
 
 /* "a list", "a map", "text" */
 const char *pw_yaml_found (const pw_node *node);
 
-/* Refuses what is not a list; `count` >= 0: of so many entries, `items` ("bodies"). */
+/* Refuses anything but a list; if `count` >= 0, a list of `count` entries, `items` ("bodies"). */
 int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, const char *items,
                   pw_error *error);
 
@@ -98,7 +98,7 @@ size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
 
 /* ---- Building (yaml_build.c) ---- */
 
-/* What a build function works with. */
+/* State of the build function. */
 typedef struct {
   const pw_yaml *y;
   pw_model *m;
@@ -119,7 +119,7 @@ typedef struct {
   double codes;  /* of signals by expressions, so far */
 } pw_yaml_builder;
 
-/* What one model may have in memory, so that a small file cannot ask for all there is; each is about 1 GB. */
+/* Limits of one model, about 1 GB each, so that a small file cannot use all memory. */
 enum { PW_YAML_ITEMS = 1000000 };   /* bodies, elements, parameters or definitions, of each */
 enum { PW_YAML_POINTS = 20000000 }; /* of all tables */
 enum { PW_YAML_CODES = 30000000 };  /* operations of all signals by expressions */

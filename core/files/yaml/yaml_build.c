@@ -118,13 +118,13 @@ static int build_field (pw_yaml_builder *b, const pw_kind *kind, const pw_field 
 
 /* ---- Elements ---- */
 
-/* Whether a word stands in a text. */
+/* Whether a text contains a word. */
 static int build_says (const char *text, const char *word) {
   const char *at = strlen (word) < 3 ? NULL : strstr (text, word);
   return at != NULL && (at == text || strchr (" (", at[-1]));
 }
 
-/* The kind that stands further back in an element, as a key or as {kind: wheel, ...}; NULL if there is none. */
+/* The element type that appears later in an element, as a key or as {kind: wheel, ...}; NULL if there is none. */
 static const char *build_later_kind (const pw_node *first) {
   for (const pw_node *n = first; n; n = n->next->next) {
     int named = n->type == PW_YAML_SCALAR && (strcmp (n->text, "kind") == 0 || strcmp (n->text, "type") == 0);
@@ -205,7 +205,7 @@ static int build_all (pw_yaml_builder *b, char *definition, pw_error *error) {
   return pw_yaml_truth (b, error);
 }
 
-/* What is defined once, from the parameters and what was defined before. */
+/* Reads `let`: numbers defined from parameters and from those above them. */
 static int build_let (pw_yaml_builder *b, pw_error *error) {
   char what[100];
   for (const pw_node *n = b->y->let ? b->y->let->first : NULL; n; n = n->next->next) {
@@ -229,7 +229,7 @@ static void build_free (void *arena) {
   free (arena);
 }
 
-/* What outlives the building: expressions, points of tables, what is known about the motion. */
+/* What lives as long as the model: expressions, points of tables, the reference solution. */
 static int build_keep (pw_yaml_builder *b, pw_error *error) {
   b->arena = calloc (1, sizeof *b->arena);
   if (b->arena == NULL || pw_model_keep (b->m, b->arena, build_free) != PW_OK) return pw_yaml_no_memory (b->y, error);

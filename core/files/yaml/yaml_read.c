@@ -12,7 +12,7 @@ static int read_empty (const pw_node *n) {
 
 /* ---- Maps ---- */
 
-/* A key that is more than a name: what may have been meant, or "". */
+/* A hint for a key that is more than a name, or "". */
 static const char *read_slip (const char *text, const char *const *key) {
   for (int i = 0; key[i]; i++) {
     size_t n = strlen (key[i]);
@@ -104,7 +104,7 @@ int pw_yaml_moves (const char *text, size_t *at) {
   return pw_expression_names (text, read_moves, at);
 }
 
-/* Says why an expression is no number. */
+/* Reports why an expression is not a number. */
 static int read_trouble (const pw_yaml *y, const pw_node *node, const char *what, const pw_expression_trouble *trouble,
                          pw_error *error) {
   size_t at;
@@ -128,7 +128,7 @@ int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_
   return PW_OK;
 }
 
-/* ---- For what is built ---- */
+/* ---- Pairs, choices, bodies ---- */
 
 int pw_yaml_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error) {
   if (pw_yaml_list (b->y, node, what, 2, "numbers, [x, y]", error) != PW_OK ||

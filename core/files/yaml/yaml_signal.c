@@ -142,7 +142,7 @@ static int signal_fields (pw_yaml_builder *b, const pw_signal_form *form, const 
   return PW_OK;
 }
 
-/* What only the whole tells: at the point of the table that is meant, or at the signal. */
+/* Checks the signal as a whole; reports an error at the point of the table concerned, or at the signal. */
 static int signal_fault (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node,
                          const pw_node *points, const pw_signal *signal, pw_error *error) {
   char fault[300];

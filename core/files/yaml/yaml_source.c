@@ -1,6 +1,6 @@
 /* The text of a model file, and messages that point into it.
  *
- * libfyaml 0.7.12 must not see just anything: some lines that begin with % keep it busy for ever.  So the text is
+ * libfyaml 0.7.12 does not terminate on some lines that begin with %.  So the text is
  * checked first: its size, UTF-8, no control characters, no such line. */
 #include <errno.h>
 #include <stdarg.h>
@@ -36,7 +36,7 @@ static void source_window (const pw_yaml *y, size_t at, const char **begin, cons
   while (*to > here && (**to & 0xC0) == 0x80) --*to;
 }
 
-/* What is no text is shown as ? and a blank. */
+/* Shows invalid bytes as ?, control characters as blanks. */
 static void source_clean (char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);
@@ -66,7 +66,7 @@ int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
   return pw_fail (error, PW_MACHINE, "%s: out of memory", y->path);
 }
 
-/* ---- What is no text ---- */
+/* ---- Checks of the text ---- */
 
 static int source_check (const pw_yaml *y, pw_error *error) {
   const char *begin = y->source, *p = begin, *end = begin + y->size;

@@ -29,7 +29,7 @@ typedef struct {
 /* The offset of a mark, from its line and its column, in characters: offsets of libfyaml 0.7.12 mean nothing once it is
  * fed.  Marks come in order, or nearly so. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
-  static const char sign[] = "\xEF\xBB\xBF"; /* of UTF-8, which is no column */
+  static const char sign[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
   const char *source = x->y->source, *end = source + x->y->size, *p = source + x->mark_at;
   if (x->line != mark->line) {
     for (; x->line < mark->line && p < end; p++) x->line += *p == '\n';
@@ -130,7 +130,7 @@ static int tree_marked (tree *x, struct fy_event *e, pw_error *error) {
   const struct fy_mark *mark = fy_token_start_mark (token);
   size_t at = mark && mark->line >= 0 ? tree_offset_of (x, mark) : tree_place (x, e);
   const char *source = x->y->source;
-  while (at > 0 && !strchr ("&*!", source[at]) && source[at - 1] != '\n') at--; /* marks may lie behind the sign */
+  while (at > 0 && !strchr ("&*!", source[at]) && source[at - 1] != '\n') at--; /* marks may follow the sign */
   return pw_yaml_fail (x->y, at, error, "%s do not belong in a model file; use parameters",
                        e->type == FYET_ALIAS ? "aliases (*)"
                        : anchor              ? "anchors (&)"
@@ -204,7 +204,7 @@ static size_t tree_offset (const pw_yaml *y, int line, int column) {
   return (size_t)(p - y->source);
 }
 
-/* What newcomers to YAML do wrong, by the line and by what libfyaml says of it; "" if that does not tell. */
+/* A hint for a frequent mistake, from the line and the message of libfyaml, or "". */
 static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) {
   static const struct {
     const char *message, *hint;
@@ -225,7 +225,7 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
   return "";
 }
 
-/* What ends too early is told where it begins. */
+/* Reports an unterminated node at its start. */
 static int tree_syntax (const tree *x, pw_error *error) {
   void *first = NULL;
   struct fy_diag_error *e = fy_diag_errors_iterate (x->diag, &first);
@@ -261,7 +261,7 @@ static int tree_parse (tree *x, pw_error *error) {
   return status == PW_OK && fy_parser_get_stream_error (x->parser) ? tree_syntax (x, error) : status;
 }
 
-/* libfyaml without memory calls a text faulty, or takes a part for the whole; it crashes where it begins. */
+/* Without memory libfyaml reports a syntax error, drops a part of the text, or crashes when it opens. */
 enum { TREE_RESERVE = 1 << 16 };
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
