@@ -18,8 +18,10 @@ static void json_string (FILE *f, const char *text) {
     n = pw_utf8_size (text);
     if (*text == '"' || *text == '\\')
       fprintf (f, "\\%c", *text);
+    else if (*text == '\n')
+      fputs ("\\n", f);
     else if ((unsigned char)*text < ' ')
-      fprintf (f, "\\u%04x", (unsigned)*text);
+      fprintf (f, "\\u%04X", (unsigned)*text);
     else
       fwrite (n ? text : "\xEF\xBF\xBD", 1, (size_t)(n ? n : 3), f);
   }
