@@ -50,7 +50,7 @@ static void test_parse (void **state) {
   check_ok (pw_parse_method ("rk4", &m, &stabilisation, &error), &error);
   assert_string_equal (m->name, "rk4");
   assert_int_equal (stabilisation, 0);
-  check_ok (pw_parse_options ("rk4+baumgarte:alpha=2.5e1:beta=.5", &m, &stabilisation, value, &error), &error);
+  check_ok (pw_parse_options ("rk4+baumgarte:alpha=2.5e1:beta=.5", NULL, &m, &stabilisation, value, &error), &error);
   assert_string_equal (m->stabilisations[stabilisation].name, "baumgarte");
   for (int i = 0; m->options[i].name; i++) {
     if (strcmp (m->options[i].name, "alpha") == 0) assert_true (value[i] == 25);
