@@ -12,7 +12,7 @@
  * w, the acceleration-like variable, belongs to the time t + shift h, shift = alpha_m - alpha_f, up to h^2; D as in ida.
  * The coefficients follow from the spectral radius rho at infinite frequency.
  *
- * To be of order 2 from the first step on w starts as a + shift h a-dot; and in index3, where g = 0 asks the rates for
+ * To be of order 2 from the first step on w starts as a + shift h a-dot; and in index3, where g = 0 asks the velocities for
  * an error C h^2 G a-dot with C = 1/6 - beta - shift/2, v starts with that error: without it multipliers begin with an error of
  * order h (Arnold, Brüls & Cardona 2015, Error analysis of generalized-alpha Lie group time integration methods for
  * constrained mechanical systems).  A step of another size begins anew.  Where a-dot is that of vibrations too fast for the
@@ -28,19 +28,6 @@
 
 /* ---- Opening ---- */
 
-static int galpha_allocate (galpha *d, const pw_system *s) {
-  size_t n = (size_t)s->coords + 3, size = (size_t)d->size, rows = (size_t)s->rows;
-  const pw_array array[] = { { &d->v, n },      { &d->a, n },    { &d->w, n },      { &d->q1, n },
-                             { &d->v1, n },     { &d->a1, n },   { &d->w1, n },     { &d->lambda1, rows },
-                             { &d->mu1, rows }, { &d->z, size }, { &d->row, size }, { &d->column, size },
-                             { &d->pull, n },   { &d->f, n },    { &d->jv, rows },  { &d->eta, rows },
-                             { &d->D, n } };
-  d->work.memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (d->work.memory == NULL) return PW_MACHINE;
-  for (int j = 0; j < s->coords; j++) d->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
-  return PW_OK;
-}
-
 /* Order 2 with the least damping of low frequencies for a given rho. */
 static void galpha_coefficients (galpha *d, double rho) {
   d->alpha_m = (2 * rho - 1) / (rho + 1);
@@ -49,35 +36,27 @@ static void galpha_coefficients (galpha *d, double rho) {
   d->beta = 0.25 * (d->gamma + 0.5) * (d->gamma + 0.5);
 }
 
-static int galpha_restart (pw_run *r, pw_error *error) {
-  galpha *d = r->data;
-  (void)error;
-  d->base = d->work.last.t0 = r->t;
-  d->count = 0;
-  d->h = 0;
-  return PW_OK;
-}
-
 static int galpha_open (pw_run *r, pw_error *error) {
   galpha *d = r->data = calloc (1, sizeof *d);
-  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  const pw_system *s = r->s;
+  size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, size = 2 * (n + rows);
+  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  const pw_array array[] = { { &d->v, n },      { &d->a, n },       { &d->w, n },      { &d->work.q1, n },
+                             { &d->a1, n },     { &d->work.v1, n }, { &d->w1, n },     { &d->lambda1, rows },
+                             { &d->mu1, rows }, { &d->z, size },    { &d->row, size }, { &d->column, size },
+                             { &d->pull, n },   { &d->f, n },       { &d->jv, rows },  { &d->eta, rows },
+                             { &d->D, n } };
+  int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
   d->ggl = pw_stabilised_by (r, PW_GGL);
   galpha_coefficients (d, pw_option_value (r, "rho"));
-  int status = pw_tangent_open (&d->work.tangent, r);
-  d->n = r->s->coords;
+  d->n = s->coords;
   d->rows = d->work.tangent.rows;
   d->positions = d->ggl ? d->work.tangent.holonomic : 0;
   d->size = 2 * d->n + d->rows + d->positions;
-  if (status == PW_OK) status = galpha_allocate (d, r->s);
+  for (int j = 0; status == PW_OK && j < d->n; j++)
+    d->D[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   if (status == PW_OK) status = pw_galpha_open_matrix (r);
-  if (status != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  status = pw_between_open (&d->work.last, r, d->ggl, error);
-  return status == PW_OK ? galpha_restart (r, error) : status;
-}
-
-static void galpha_close (pw_run *r) {
-  pw_implicit_close (&r->data->work);
-  free (r->data);
+  return pw_implicit_opened (r, status, d->ggl, error);
 }
 
 /* ---- Beginning ---- */
@@ -88,10 +67,10 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
   galpha *d = r->data;
   double s = 1e-3 * h;
   for (int j = 0; j < d->n; j++) {
-    d->q1[j] = r->q[j] + s * (d->v[j] + 0.5 * s * d->a[j]);
-    d->v1[j] = d->v[j] + s * d->a[j];
+    d->work.q1[j] = r->q[j] + s * (d->v[j] + 0.5 * s * d->a[j]);
+    d->work.v1[j] = d->v[j] + s * d->a[j];
   }
-  int status = pw_accelerate (r, pw_before_breakpoint (r, r->t + s), d->q1, d->v1, jerk, d->eta);
+  int status = pw_accelerate (r, pw_before_breakpoint (r, r->t + s), d->work.q1, d->work.v1, jerk, d->eta);
   for (int j = 0; j < d->n; j++) jerk[j] = (jerk[j] - d->a[j]) / s;
   return status;
 }
@@ -117,11 +96,11 @@ static int galpha_try (pw_run *r, double h, double *jerk) {
   return status > 0 ? PW_OK : status; /* the step itself may still succeed */
 }
 
-/* The part of C h^2 a-dot that the holonomic rows forbid, least in the mass matrix, onto the rates. */
+/* The part of C h^2 a-dot that the holonomic rows forbid, least in the mass matrix, onto the velocities. */
 static int galpha_displace (pw_run *r, double h, const double *jerk) {
   galpha *d = r->data;
   const pw_system *s = r->s;
-  double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->v1;
+  double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->work.v1;
   int status = pw_place (r->w, r->t, r->q, d->v);
   if (status != PW_OK) return status;
   pw_sweep_J (r->w);
@@ -140,7 +119,7 @@ static int galpha_begin (pw_run *r, double h) {
   double *jerk = d->w1;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
-  if (!d->ggl && d->h > 0) { /* rates have the error that goes with the size before */
+  if (!d->ggl && d->work.h > 0) { /* velocities have the error that goes with the size before */
     status = pw_place (r->w, r->t, r->q, d->v);
     if (status == PW_OK) pw_sweep_J (r->w);
     if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
@@ -155,57 +134,34 @@ static int galpha_begin (pw_run *r, double h) {
 
 /* ---- Advancing ---- */
 
-/* The successor becomes the state reached. */
-static void galpha_accept (pw_run *r, double h, double t1) {
+static int galpha_step (pw_run *r, double h, double t1) {
+  int status = h != r->data->work.h ? galpha_begin (r, h) : PW_OK;
+  return status == PW_OK ? pw_galpha_solve (r, h, t1) : status;
+}
+
+static void galpha_accept (pw_run *r) {
   galpha *d = r->data;
   size_t n = (size_t)d->n * sizeof (double);
-  pw_between_keep (&d->work.last, r);
-  memcpy (r->q, d->q1, n);
-  memcpy (r->v, d->v1, n);
   memcpy (r->a, d->a1, n);
-  memcpy (d->v, d->v1, n);
+  memcpy (d->v, r->v, n);
   memcpy (d->a, d->a1, n);
   memcpy (d->w, d->w1, n);
   for (int i = 0; i < r->s->rows; i++) {
     int used = d->work.tangent.map ? d->work.tangent.map[i] : i;
     r->lambda[i] = used < 0 ? 0 : d->lambda1[used];
   }
-  r->t = t1;
-  d->h = h;
-  pw_between_count (&d->work.last, r);
-}
-
-static int galpha_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  if (status == PW_MACHINE) return pw_fail (error, PW_MACHINE, "t = %.6g s: out of memory in KLU", r->t);
-  if (pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t,
-                  status == PW_INPUT ? "the Newton matrix is singular" : "Newton's iteration does not converge", h);
 }
 
 static int galpha_advance (pw_run *r, double t_end, pw_error *error) {
-  galpha *d = r->data;
-  int whole, status = PW_OK;
-  double t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
-  r->near = 0;
-  if (h != d->h) status = galpha_begin (r, h);
-  if (status == PW_OK) status = pw_galpha_solve (r, h, t1);
-  if (status != PW_OK) return galpha_fail (r, status, h, error);
-  galpha_accept (r, h, t1);
-  r->statistics.steps++;
-  d->count++;
-  if (!whole) d->base = t1, d->count = 0;
-  r->near = pw_saddle_factor (r->saddle) != PW_OK || pw_watchdog_near (r);
-  return PW_OK;
-}
-
-static int galpha_at (pw_run *r, double t, pw_error *error) {
-  return pw_between_at (&r->data->work.last, r, t, error);
+  int status = pw_implicit_advance (r, t_end, galpha_step, galpha_accept, error);
+  if (status == PW_OK) r->near = pw_saddle_factor (r->saddle) != PW_OK || pw_watchdog_near (r);
+  return status;
 }
 
 static const pw_stabilisation galpha_stabilisations[] = {
-  { "index3", "positions enforced, and the rates of nonholonomic rows (Arnold & Brüls 2007)", PW_STABILISED_OTHERWISE },
-  { "ggl", "stabilised index 2: positions and rates both enforced (Gear, Gupta & Leimkuhler 1985)", PW_GGL },
+  { "index3", "positions enforced, and the velocities of nonholonomic rows (Arnold & Brüls 2007)",
+    PW_STABILISED_OTHERWISE },
+  { "ggl", "stabilised index 2: positions and velocities both enforced (Gear, Gupta & Leimkuhler 1985)", PW_GGL },
   { .name = NULL },
 };
 
@@ -225,7 +181,7 @@ const pw_method pw_method_galpha = {
   .options = galpha_options,
   .open = galpha_open,
   .advance = galpha_advance,
-  .at = galpha_at,
-  .restart = galpha_restart,
-  .close = galpha_close,
+  .at = pw_implicit_at,
+  .restart = pw_implicit_restart,
+  .close = pw_implicit_close,
 };

@@ -15,7 +15,7 @@
 
 static int galpha_place (pw_run *r, double t1) {
   galpha *d = r->data;
-  int status = pw_place (r->w, pw_before_breakpoint (r, t1), d->q1, d->v1);
+  int status = pw_place (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->work.v1);
   if (status == PW_OK) pw_sweep_J (r->w);
   return status;
 }
@@ -38,7 +38,7 @@ static void galpha_kinematics (pw_run *r, double h, double *out) {
   if (mu) pw_add_JT (r->w, mu, d->pull);
   for (int j = 0; j < d->n; j++) {
     double dq = h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
-    out[j] = c * (d->q1[j] - r->q[j] - dq) + d->D[j] * d->pull[j];
+    out[j] = c * (d->work.q1[j] - r->q[j] - dq) + d->D[j] * d->pull[j];
   }
 }
 
@@ -54,7 +54,7 @@ static void galpha_momentum (pw_run *r, double *out) {
 static void galpha_constraints (pw_run *r, double *out) {
   galpha *d = r->data;
   const pw_system *s = r->s;
-  pw_mul_J (r->w, d->v1, d->jv);
+  pw_mul_J (r->w, d->work.v1, d->jv);
   pw_sweep_eta (r->w, d->eta);
   for (int i = 0; i < s->rows; i++) d->jv[i] -= d->eta[i];
   if (d->ggl) pw_tangent_compress (&d->work.tangent, d->jv, d->rows, out);
@@ -92,7 +92,7 @@ static void galpha_fill (pw_run *r, double h) {
                                 .of_lambda = 1 };
   pw_tangent_kinematics (&d->work.tangent, &to, galpha_mu (d), d->D);
   pw_tangent_momentum (&d->work.tangent, &to, galpha_lambda (d));
-  pw_tangent_rates (&d->work.tangent, &to, d->v1, d->ggl);
+  pw_tangent_rates (&d->work.tangent, &to, d->work.v1, d->ggl);
   pw_tangent_positions (&d->work.tangent, &to, d->ggl ? 2 * n + d->rows : 2 * n);
 }
 
@@ -122,8 +122,7 @@ static void galpha_scale (const pw_run *r, double h) {
 static int galpha_factor (pw_run *r, double h) {
   galpha *d = r->data;
   const pw_tangent *x = &d->work.tangent;
-  memset (d->work.value, 0, (size_t)x->colptr[d->size] * sizeof *d->work.value);
-  pw_tape_fill (&d->work.tangent.tape, d->work.value);
+  pw_implicit_fill (&d->work, d->size);
   galpha_fill (r, h);
   for (int c = 0; c < d->size; c++)
     for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++) d->work.value[i] *= d->row[x->rowind[i]] * d->column[c];
@@ -141,8 +140,8 @@ static void galpha_predict (pw_run *r, double h) {
   for (int j = 0; j < d->n; j++) {
     d->a1[j] = d->a[j];
     d->w1[j] = (d->a[j] - d->alpha_m * d->w[j]) / (1 - d->alpha_m);
-    d->v1[j] = d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
-    d->q1[j] = r->q[j] + h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
+    d->work.v1[j] = d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
+    d->work.q1[j] = r->q[j] + h * (d->v[j] + h * ((0.5 - d->beta) * d->w[j] + d->beta * d->w1[j]));
   }
   pw_tangent_compress (&d->work.tangent, r->lambda, d->rows, d->lambda1);
   memset (d->mu1, 0, (size_t)r->s->rows * sizeof *d->mu1);
@@ -161,11 +160,11 @@ static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
     double unit = pw_unit (r->s, j), size = pw_largest (fabs (d->z[j]), fabs (d->z[n + j])) / unit;
     *most = pw_largest (*most, size);
     d->z[n + j] *= d->column[n + j];
-    d->q1[j] += d->z[j];
+    d->work.q1[j] += d->z[j];
     d->w1[j] += d->z[n + j] / (h * d->gamma);
     d->a1[j] += e * d->z[n + j];
-    d->v1[j] = d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
-    large = fmax (large, fmax (fabs (d->q1[j]), h * fabs (d->v1[j])) / unit);
+    d->work.v1[j] = d->v[j] + h * ((1 - d->gamma) * d->w[j] + d->gamma * d->w1[j]);
+    large = fmax (large, fmax (fabs (d->work.q1[j]), h * fabs (d->work.v1[j])) / unit);
   }
   for (int i = 0; i < d->rows; i++) d->lambda1[i] += d->column[2 * n + i] * d->z[2 * n + i];
   for (int i = 0; i < d->positions; i++) d->mu1[i] += d->column[2 * n + d->rows + i] * d->z[2 * n + d->rows + i];
@@ -179,7 +178,7 @@ int pw_galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20;
   galpha *d = r->data;
   double before = INFINITY, size, floor, good = fmin (1e-9, 1e-3 * pow (h / r->w->scale.time, 4)), rate = 1;
-  if (h != d->h) galpha_scale (r, h);
+  if (h != d->work.h) galpha_scale (r, h);
   galpha_predict (r, h);
   for (int i = 0, fresh = 1; i < most; i++) {
     int status = galpha_residual (r, h, t1);

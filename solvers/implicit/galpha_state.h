@@ -6,18 +6,15 @@
 #include "method.h"
 
 struct pw_method_data {
+  pw_implicit work;             /* first */
   int ggl;                      /* stabilised index 2, else index 3 */
   int n, rows, positions, size; /* coordinates, rows in use, of these those with mu, unknowns */
   double alpha_m, alpha_f, beta, gamma;
-  double h;                                  /* size of the last step; 0: the next one begins anew */
-  double base;                               /* time from which steps are counted */
-  long count;                                /* steps since then */
-  double *D;                                 /* coords: 1 for lengths, 1/L^2 for angles */
-  double *v, *a, *w;                         /* rates, accelerations and w that the next step goes on from */
-  double *q1, *v1, *a1, *w1, *lambda1, *mu1; /* the successor; lambda, mu: rows in use */
-  double *z, *row, *column;                  /* size: residual, then correction; scales of the matrix */
-  double *pull, *f, *jv, *eta;               /* scratch: coords + 3, coords + 3, all rows, all rows */
-  pw_implicit work;
+  double *D;                       /* coords: 1 for lengths, 1/L^2 for angles */
+  double *v, *a, *w;               /* velocities, accelerations and w that the next step goes on from */
+  double *a1, *w1, *lambda1, *mu1; /* the successor; lambda, mu: rows in use */
+  double *z, *row, *column;        /* size: residual, then correction; scales of the matrix */
+  double *pull, *f, *jv, *eta;     /* scratch: coords + 3, coords + 3, all rows, all rows */
 };
 
 typedef struct pw_method_data galpha;

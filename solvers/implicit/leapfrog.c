@@ -1,5 +1,5 @@
 /* leapfrog: the reversible leapfrog for constrained systems, explicit in forces of positions, fixed step.  From t to
- * t' = t + h, with u the rates at half the step and (q*, t*) the mean of both ends,
+ * t' = t + h, with u the velocities at half the step and (q*, t*) the mean of both ends,
  *
  *   M (u - v)  = h/2 (f (t, q, v) - J (q)^T lambda+)         g (t', q') = 0,    S (t*, q*) u = b (t*, q*)
  *   q' - q     = h u
@@ -10,65 +10,52 @@
  * Non-holonomic integrators) with a discrete constraint that is the same from either end, which makes the method
  * reversible (McLachlan & Perlmutter 2006, Integrators for nonholonomic mechanical systems).  Each line exchanged with
  * its counterpart, h for -h, is the same step backwards: the method is symmetric, so of order 2, and with forces even
- * in the rates it retraces its way when they are turned round.  lambda+ and lambda- only carry the step; accelerations and
+ * in the velocities it retraces the motion when they are reversed.  lambda+ and lambda- only carry the step; accelerations and
  * multipliers reported are those of the equations of motion at its end.
  *
- * All equations are solved to round-off: for u and q' by Newton's iteration (leapfrog_drift.c), for v' and forces of the
- * rates by substitution.  None asks for M^-1: coordinates without mass follow from their rows, as everywhere. */
+ * All equations are solved to round-off: for u and q' by Newton's iteration, for v' and forces of the velocities by
+ * substitution.  None asks for M^-1: coordinates without mass follow from their rows, as everywhere. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "leapfrog_state.h"
+#include "implicit.h"
 #include "util.h"
 
-enum { LEAPFROG_MOST = 100 }; /* substitutions for forces of the rates */
+enum { DRIFT_MOST = 30, LEAPFROG_MOST = 100 }; /* iterations; substitutions for forces of the velocities */
 
-/* ---- Opening ---- */
+struct pw_method_data {
+  pw_implicit work;        /* first */
+  double *u;               /* velocities at half the step; coords + 3, as the next line */
+  double *middle, *dv, *f; /* mean of positions, a correction of velocities, forces */
+  double *off, *mu, *eta;  /* all rows: residuals, multipliers of a correction, right-hand side */
+  double *z;               /* coords and rows in use: a correction of u and its multipliers */
+};
 
-static int leapfrog_restart (pw_run *r, pw_error *error) {
-  leapfrog *d = r->data;
-  (void)error;
-  d->base = d->work.last.t0 = r->t;
-  d->count = 0;
-  return PW_OK;
-}
+typedef struct pw_method_data leapfrog;
 
-static int leapfrog_allocate (leapfrog *d, const pw_system *s) {
-  size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows;
-  const pw_array array[] = {
-    { &d->u, n }, { &d->q1, n },     { &d->v1, n },    { &d->middle, n }, { &d->dv, n },
-    { &d->f, n }, { &d->off, rows }, { &d->mu, rows }, { &d->eta, rows }, { &d->z, n + rows }
-  };
-  d->work.memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  return d->work.memory ? PW_OK : PW_MACHINE;
-}
+/* Convergence of an iteration, from the sizes of its corrections. */
+typedef struct {
+  double size;   /* of the last one, the largest of its coordinates, each over what it was before */
+  double large;  /* the largest coordinate, in units of the scene: round-off of one may show in another */
+  double before; /* size of the one before */
+  double rate;   /* of the last to the one before */
+  int done;      /* corrections before the last one */
+} leapfrog_progress;
 
-static int leapfrog_open (pw_run *r, pw_error *error) {
-  leapfrog *d = r->data = calloc (1, sizeof *d);
-  int status = d ? leapfrog_allocate (d, r->s) : PW_MACHINE;
-  if (status == PW_OK) status = pw_tangent_open (&d->work.tangent, r);
-  if (status == PW_OK) status = pw_leapfrog_open_matrix (r);
-  if (status != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  status = pw_between_open (&d->work.last, r, 1, error);
-  return status == PW_OK ? leapfrog_restart (r, error) : status;
-}
-
-static void leapfrog_close (pw_run *r) {
-  pw_implicit_close (&r->data->work);
-  free (r->data);
-}
-
-static void leapfrog_carry (pw_run *r, pw_archive *a) {
-  leapfrog *d = r->data;
-  pw_carry (a, &d->base, sizeof d->base);
-  pw_carry_count (a, &d->count);
+/* Takes the correction of one coordinate into the sizes, which are 0 and 1 at first; its value does not iterate, so that
+ * divergence shows. */
+static inline void leapfrog_measure (leapfrog_progress *p, double correction, double value, double unit) {
+  double size = fabs (correction) / (fabs (value) + unit);
+  if (!(size <= p->size)) p->size = size;
+  p->large = fmax (p->large, fabs (value) / unit);
 }
 
 /* ---- Iterations ---- */
 
-int pw_leapfrog_judge (leapfrog_progress *p) {
-  const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON; /* by light bodies, or short ones */
+/* 1: round-off is reached, or would be with the next one; 0: go on; -1: it does not converge. */
+static int leapfrog_converged (leapfrog_progress *p) {
+  const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON; /* by bodies of small mass or length */
   p->rate = p->done > 0 ? p->size / p->before : 1;
   if (!isfinite (p->size)) return -1;
   if (p->size <= round_off || (p->rate < 1 && p->size * p->rate / (1 - p->rate) <= 0.25 * round_off)) return 1;
@@ -79,13 +66,149 @@ int pw_leapfrog_judge (leapfrog_progress *p) {
   return 0;
 }
 
+/* ---- First half: u and q', by Newton's iteration ----
+ *
+ *  Unknown are u and L = h/2 (lambda+ - lambda):
+ *
+ *   M (u - v - h/2 a) + J (q)^T L = 0        a, lambda: accelerations and multipliers at (t, q, v)
+ *   g (t', q + h u) / h = 0                  S (t*, q*) u - b (t*, q*) = 0,   q* = q + h/2 u
+ *
+ * The first line is linear: it holds for u = v + h/2 a with L = 0, and after every correction. */
+
+static int leapfrog_place (pw_run *r, double t, const double *q, const double *v) {
+  int status = pw_place (r->w, t, q, v);
+  if (status == PW_OK) pw_sweep_J (r->w);
+  return status;
+}
+
+static void drift_move (pw_run *r, double h) {
+  leapfrog *d = r->data;
+  for (int j = 0; j < r->s->coords; j++) {
+    d->work.q1[j] = r->q[j] + h * d->u[j];
+    d->middle[j] = r->q[j] + 0.5 * h * d->u[j];
+  }
+}
+
+/* ---- Matrix ---- */
+
+/* M and J^T of the beginning, whose kinematics are up to date. */
+static void drift_put_momentum (pw_run *r) {
+  pw_tangent *x = &r->data->work.tangent;
+  const pw_system *s = r->s;
+  for (int j = 0; j < s->coords; j++) pw_tape_put (&x->tape, j, j, s->mass[j]);
+  pw_newton_JT (r->w, &x->tape,
+                &(pw_put){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
+}
+
+/* S + h/2 ((S u)_q - b_q) of the middle, whose kinematics are up to date. */
+static void drift_put_middle (pw_run *r, double h) {
+  pw_tangent *x = &r->data->work.tangent;
+  const pw_system *s = r->s;
+  pw_put put = { .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u };
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
+  put.factor_nonholonomic = -0.5 * h;
+  pw_newton_block (&x->newton, r->w, &x->tape, PW_ETA_Q, &put);
+  put.factor_nonholonomic = 1;
+  pw_newton_J (r->w, &x->tape, &put);
+}
+
+/* G of the end, whose kinematics are up to date. */
+static void drift_put_end (pw_run *r) {
+  pw_tangent *x = &r->data->work.tangent;
+  pw_newton_J (r->w, &x->tape, &(pw_put){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
+}
+
+static int drift_open_matrix (pw_run *r) {
+  leapfrog *d = r->data;
+  pw_tape_record (&d->work.tangent.tape);
+  drift_put_momentum (r);
+  drift_put_middle (r, 1);
+  drift_put_end (r);
+  return pw_implicit_lay_out (&d->work, r->s->coords + d->work.tangent.rows);
+}
+
+static int drift_factor (pw_run *r, double h, double t1) {
+  leapfrog *d = r->data;
+  pw_tangent *x = &d->work.tangent;
+  pw_implicit_fill (&d->work, r->s->coords + x->rows);
+  int status = leapfrog_place (r, r->t, r->q, r->v);
+  if (status != PW_OK) return status;
+  drift_put_momentum (r);
+  status = leapfrog_place (r, r->t + 0.5 * h, d->middle, d->u);
+  if (status != PW_OK) return status;
+  drift_put_middle (r, h);
+  status = leapfrog_place (r, pw_before_breakpoint (r, t1), d->work.q1, d->u);
+  if (status != PW_OK) return status;
+  drift_put_end (r);
+  r->statistics.jacobians++;
+  r->statistics.factorisations++;
+  return pw_sparse_factor (&d->work.sparse, d->work.value);
+}
+
+/* ---- Iteration ---- */
+
+/* Residuals of the constraints. */
+static int drift_rows (pw_run *r, double h, double t1) {
+  leapfrog *d = r->data;
+  const pw_system *s = r->s;
+  int status = PW_OK;
+  if (s->rows > s->holonomic) {
+    status = leapfrog_place (r, r->t + 0.5 * h, d->middle, d->u);
+    if (status != PW_OK) return status;
+    pw_mul_J (r->w, d->u, d->off);
+    pw_sweep_eta (r->w, d->eta);
+    for (int i = s->holonomic; i < s->rows; i++) d->off[i] -= d->eta[i];
+  }
+  if (s->holonomic > 0) {
+    status = pw_place (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->u);
+    if (status != PW_OK) return status;
+    pw_sweep_g (r->w, d->eta);
+    for (int i = 0; i < s->holonomic; i++) d->off[i] = d->eta[i] / h;
+  }
+  r->statistics.rhs++;
+  return PW_OK;
+}
+
+/* One correction of u, measured in positions. */
+static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
+  leapfrog *d = r->data;
+  int n = r->s->coords;
+  memset (d->z, 0, (size_t)n * sizeof *d->z);
+  for (int i = 0; i < r->s->rows; i++) d->off[i] = -d->off[i];
+  pw_tangent_compress (&d->work.tangent, d->off, d->work.tangent.rows, d->z + n);
+  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_MACHINE;
+  p->size = 0, p->large = 1;
+  for (int j = 0; j < n; j++) {
+    d->u[j] += d->z[j];
+    leapfrog_measure (p, h * d->z[j], r->q[j], pw_unit (r->s, j));
+  }
+  drift_move (r, h);
+  return PW_OK;
+}
+
+/* The matrix is evaluated at the prediction, and again where corrections do not shrink well. */
+static int drift_solve (pw_run *r, double h, double t1) {
+  leapfrog *d = r->data;
+  leapfrog_progress p = { .rate = 1 };
+  for (int j = 0; j < r->s->coords; j++) d->u[j] = r->v[j] + 0.5 * h * r->a[j];
+  drift_move (r, h);
+  for (int i = 0, good = r->s->rows == 0; !good; i++) {
+    int fresh = i == 0 || (i > 1 && p.rate > 0.02), status = fresh ? drift_factor (r, h, t1) : PW_OK;
+    if (status == PW_OK) status = drift_rows (r, h, t1);
+    if (status == PW_OK) status = drift_correct (r, h, &p);
+    if (status != PW_OK) return status;
+    good = i < DRIFT_MOST ? leapfrog_converged (&p) : -1;
+    if (good < 0) return PW_RETRY;
+  }
+  return PW_OK;
+}
+
 /* ---- Second half: v' ---- */
 
-/* Places the system at (t, q, v), factorises the saddle there and takes note of a singular pose. */
+/* Kinematics and the saddle at (t, q, v); notes a singular configuration. */
 static int leapfrog_factor (pw_run *r, double t, const double *q, const double *v) {
-  int status = pw_place (r->w, t, q, v);
+  int status = leapfrog_place (r, t, q, v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->w);
   r->statistics.factorisations++;
   status = pw_saddle_factor (r->saddle);
   if (status != PW_OK || pw_watchdog_near (r)) r->near = 1;
@@ -96,7 +219,7 @@ static int leapfrog_factor (pw_run *r, double t, const double *q, const double *
 static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
   const pw_system *s = r->s;
-  int status = pw_place_rates (r->w, d->v1);
+  int status = pw_place_rates (r->w, d->work.v1);
   if (status != PW_OK) return status;
   pw_sweep_force (r->w, d->middle);
   for (int j = 0; j < s->coords; j++) {
@@ -104,13 +227,13 @@ static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
     d->middle[j] = 0.5 * h * (f - d->f[j]);
     d->f[j] = f;
   }
-  pw_mul_J (r->w, d->v1, d->off);
+  pw_mul_J (r->w, d->work.v1, d->off);
   pw_sweep_eta (r->w, d->eta);
   for (int i = 0; i < s->rows; i++) d->off[i] = d->eta[i] - d->off[i];
   pw_saddle_solve (r->saddle, d->middle, d->off, d->dv, d->mu);
   p->size = 0, p->large = 1;
   for (int j = 0; j < s->coords; j++) {
-    d->v1[j] += d->dv[j];
+    d->work.v1[j] += d->dv[j];
     leapfrog_measure (p, d->dv[j], d->u[j], pw_unit (s, j) / r->w->scale.time);
   }
   return PW_OK;
@@ -119,62 +242,56 @@ static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
 static int leapfrog_finish (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
   leapfrog_progress p = { 0 };
-  int status = leapfrog_factor (r, pw_before_breakpoint (r, t1), d->q1, d->u);
+  int status = leapfrog_factor (r, pw_before_breakpoint (r, t1), d->work.q1, d->u);
   if (status != PW_OK) return status;
-  memcpy (d->v1, d->u, (size_t)r->s->coords * sizeof *d->v1);
+  memcpy (d->work.v1, d->u, (size_t)r->s->coords * sizeof *d->work.v1);
   memset (d->f, 0, (size_t)r->s->coords * sizeof *d->f);
   for (int good = 0; !good;) {
     status = leapfrog_kick (r, h, &p);
     if (status != PW_OK) return status;
-    good = p.done < LEAPFROG_MOST ? pw_leapfrog_judge (&p) : -1;
+    good = p.done < LEAPFROG_MOST ? leapfrog_converged (&p) : -1;
     if (good < 0) return PW_RETRY;
   }
-  return pw_place_rates (r->w, d->v1);
+  return pw_place_rates (r->w, d->work.v1);
+}
+
+/* ---- Opening ---- */
+
+static int leapfrog_open (pw_run *r, pw_error *error) {
+  leapfrog *d = r->data = calloc (1, sizeof *d);
+  size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
+  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  const pw_array array[] = { { &d->u, n },      { &d->work.q1, n }, { &d->work.v1, n }, { &d->middle, n },
+                             { &d->dv, n },     { &d->f, n },       { &d->off, rows },  { &d->mu, rows },
+                             { &d->eta, rows }, { &d->z, n + rows } };
+  int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
+  if (status == PW_OK) status = drift_open_matrix (r);
+  return pw_implicit_opened (r, status, 1, error);
+}
+
+static void leapfrog_carry (pw_run *r, pw_archive *a) {
+  leapfrog *d = r->data;
+  pw_carry (a, &d->work.base, sizeof d->work.base);
+  pw_carry_count (a, &d->work.count);
 }
 
 /* ---- Advancing ---- */
 
-static void leapfrog_accept (pw_run *r, double t1) {
-  leapfrog *d = r->data;
-  size_t n = (size_t)r->s->coords * sizeof (double);
-  pw_between_keep (&d->work.last, r);
-  memcpy (r->q, d->q1, n);
-  memcpy (r->v, d->v1, n);
-  pw_accelerate_placed (r, r->v, r->a, r->lambda);
-  r->t = t1;
-  pw_between_count (&d->work.last, r);
-  r->statistics.steps++;
+static int leapfrog_step (pw_run *r, double h, double t1) {
+  int status = drift_solve (r, h, t1);
+  return status == PW_OK ? leapfrog_finish (r, h, t1) : status;
 }
 
-/* Where the iteration fails, the pose that the step begins with may be the reason. */
-static int leapfrog_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status == PW_MACHINE) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  if (r->near || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the iteration does not converge; the step of %.6g s may be too large",
-                  r->t, h);
+static void leapfrog_accept (pw_run *r) {
+  pw_accelerate_placed (r, r->v, r->a, r->lambda);
 }
 
 static int leapfrog_advance (pw_run *r, double t_end, pw_error *error) {
-  leapfrog *d = r->data;
-  int whole;
-  double t1 = pw_step_end (r, d->base, d->count, t_end, &whole), h = whole ? r->settings.step : t1 - r->t;
-  r->near = 0;
-  int status = pw_leapfrog_drift (r, h, t1);
-  if (status == PW_OK) status = leapfrog_finish (r, h, t1);
-  if (status != PW_OK) return leapfrog_fail (r, status, h, error);
-  leapfrog_accept (r, t1);
-  d->count++;
-  if (!whole) d->base = t1, d->count = 0;
-  return PW_OK;
-}
-
-static int leapfrog_at (pw_run *r, double t, pw_error *error) {
-  return pw_between_at (&r->data->work.last, r, t, error);
+  return pw_implicit_advance (r, t_end, leapfrog_step, leapfrog_accept, error);
 }
 
 static const pw_stabilisation leapfrog_stabilisations[] = {
-  { "rattle", "positions and rates both enforced by the step's own multipliers (Andersen 1983)",
+  { "rattle", "positions and velocities both enforced by the step's own multipliers (Andersen 1983)",
     PW_STABILISED_OTHERWISE },
   { .name = NULL },
 };
@@ -189,8 +306,8 @@ const pw_method pw_method_leapfrog = {
   .options = leapfrog_options,
   .open = leapfrog_open,
   .advance = leapfrog_advance,
-  .at = leapfrog_at,
-  .restart = leapfrog_restart,
-  .close = leapfrog_close,
+  .at = pw_implicit_at,
+  .restart = pw_implicit_restart,
+  .close = pw_implicit_close,
   .carry = leapfrog_carry,
 };
