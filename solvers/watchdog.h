@@ -28,8 +28,8 @@ typedef struct {
   double agree, agree_best;                            /* difference of two divisions of a step */
   double sample, sample_best;                          /* the same inside a step, of a sample */
   double loosened, loose;                              /* grip of the active rows on redundant ones */
-  double extreme;                                      /* the largest mass, and one over the smallest [kg] */
-  double stalled;                                      /* steps in a row that do not advance */
+  double extreme; /* the largest mass, and one over the smallest [kg]; the largest initial value */
+  double stalled; /* steps in a row that do not advance */
 } pw_watchdog;
 
 extern const pw_watchdog pw_watchdog_limits;
@@ -62,8 +62,8 @@ double pw_watchdog_sine (struct pw_run *r, int *row);
 /* The same for the state reached. */
 int pw_watchdog_near_state (struct pw_run *r);
 
-/* Refuses masses and inertias whose products overflow; without constraints there are none.  Errors: PW_INPUT. */
-int pw_watchdog_check_masses (const pw_system *s, const pw_watchdog *limits, pw_error *error);
+/* Refuses initial values whose products overflow, and, in scenes with constraints, such masses and inertias.  Errors: PW_INPUT. */
+int pw_watchdog_check_values (const pw_system *s, const pw_watchdog *limits, pw_error *error);
 
 /* 1 if the sine may be below this one, or a motion of this length from the state reached may bring it there. */
 int pw_watchdog_reaches (const struct pw_run *r, double sine, double length);

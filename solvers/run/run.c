@@ -203,9 +203,9 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
 static int run_check_state (const pw_run *r, const double *x, int rates, pw_error *error) {
   char name[120];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
-    if (!isfinite (x[j]))
-      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number", r->s->model,
-                      pw_state_name (r->s, j + rates * n, name, sizeof name), x[j]);
+    if (!(fabs (x[j]) < r->limits.extreme))
+      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number below %g", r->s->model,
+                      pw_state_name (r->s, j + rates * n, name, sizeof name), x[j], r->limits.extreme);
   return PW_OK;
 }
 

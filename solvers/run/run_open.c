@@ -131,7 +131,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   pw_settings none = { 0 };
   r->limits = pw_watchdog_limits;
   r->refuse = r->limits.rank;
-  if (pw_watchdog_check_masses (r->s, &r->limits, error) != PW_OK) return PW_INPUT;
+  if (pw_watchdog_check_values (r->s, &r->limits, error) != PW_OK) return PW_INPUT;
   if (pw_parse_options (method, settings ? settings->methods : NULL, &r->method, &r->stabilisation, r->option, error) !=
       PW_OK)
     return PW_INPUT;

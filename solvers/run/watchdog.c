@@ -196,7 +196,14 @@ int pw_watchdog_near_state (pw_run *r) {
   return pw_watchdog_near (r);
 }
 
-int pw_watchdog_check_masses (const pw_system *s, const pw_watchdog *limits, pw_error *error) {
+int pw_watchdog_check_values (const pw_system *s, const pw_watchdog *limits, pw_error *error) {
+  for (int i = 0; i < 2 * s->coords; i++) {
+    double value = i < s->coords ? s->q0[i] : s->v0[i - s->coords];
+    char name[120];
+    if (!(fabs (value) < limits->extreme))
+      return pw_fail (error, PW_INPUT, "model %s: values too extreme: %s is initially %g: expected less than %g",
+                      s->model, pw_state_name (s, i, name, sizeof name), value, limits->extreme);
+  }
   for (int j = 0; s->rows > 0 && j < s->coords; j++) {
     double mass = s->mass[j] / (pw_is_angle (s, j) ? s->scale.length * s->scale.length : 1);
     char name[120];
