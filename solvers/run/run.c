@@ -204,8 +204,8 @@ static int run_check_state (const pw_run *r, const double *x, int rates, pw_erro
   char name[120];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
     if (!(fabs (x[j]) < r->limits.extreme))
-      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number below %g", r->s->model,
-                      pw_state_name (r->s, j + rates * n, name, sizeof name), x[j], r->limits.extreme);
+      return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number", r->s->model,
+                      pw_state_name (r->s, j + rates * n, name, sizeof name), x[j]);
   return PW_OK;
 }
 
