@@ -18,7 +18,7 @@ endif
 
 # ---- How to compile and link ----
 
-WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes
+WARN   := -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wstrict-prototypes -Wmissing-prototypes -Wcast-qual
 # -fvisibility=hidden: a library exports what its public headers declare.  -fno-plt: calls between the files of a library are
 # calls, not calls of jumps.
 STRICT := -std=c11 -fPIC -fvisibility=hidden -fno-plt -ffp-contract=off -fno-semantic-interposition $(WARN) $(if $(WERROR),-Werror)

@@ -87,9 +87,11 @@ typedef struct {
   void *context; /* passed to eval and breakpoint as it is; must outlive the systems, or what open makes of it does */
   const char *const *reads; /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
   double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
-  void *(*open) (void *context); /* each compiled system gets a context of its own, made from this one, or NULL without
-                                     memory; may be NULL: all systems, and their threads, share `context` */
-  void (*close) (void *context); /* frees what open made, with the system; may be NULL */
+  void *(*open) (
+      void *context); /* each compiled system, and each workspace and run from the system's, gets a context of its
+                                     own, made from this one, or NULL without memory; threads may call it at the same time.
+                                     May be NULL: all share `context`, and eval must be safe in all threads that run them */
+  void (*close) (void *context); /* frees what open made, with the system or workspace; may be NULL */
   const pw_signal_text *text;    /* NULL: it is not of a text model */
 } pw_function;
 
@@ -625,7 +627,7 @@ static inline int pw_field_count (const pw_field *f) {
 size_t pw_field_bytes (pw_field_type type);
 
 /* The k-th value of a type in a definition, counting each of its fields' `count`; NULL if there are not as many. */
-void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);
+const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);
 
 /* 1 if elements of the kind take part in the motion; a marker does not. */
 static inline int pw_kind_acts (const pw_kind *kind) {

@@ -64,7 +64,7 @@ int main (int argc, char **argv) {
           SIG_IGN); /* a closed pipe and a file that must not grow are failed writes, after which all is closed */
   signal (SIGXFSZ, SIG_IGN);
   unsetenv ("POSIXLY_CORRECT"); /* popt would not accept options after the model */
-  int status = main_dispatch (argc, (const char **)argv);
+  int status = main_dispatch (argc, (const char **)(void *)argv);
   pw_error error = { 0 };
   if ((fflush (stdout) != 0 || ferror (stdout)) && status == 0)
     pw_fail (&error, PW_MACHINE, "cannot write to standard output: %s", strerror (errno));

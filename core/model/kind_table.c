@@ -28,10 +28,10 @@ size_t pw_field_bytes (pw_field_type type) {
   return 0;
 }
 
-void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k) {
+const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k) {
   for (const pw_field *f = kind->fields; f->name; f++) {
     if (f->type != type) continue;
-    if (k < pw_field_count (f)) return (char *)(size_t)definition + f->offset + (size_t)k * pw_field_bytes (type);
+    if (k < pw_field_count (f)) return (const char *)definition + f->offset + (size_t)k * pw_field_bytes (type);
     k -= pw_field_count (f);
   }
   return NULL;

@@ -45,4 +45,10 @@ int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
  * inconsistent table. */
 const char *pw_kind_fault (const pw_kind *kind, char *buffer, size_t size);
 
+/* pw_field_at of a definition that is to be modified. */
+static inline void *pw_field_in (const pw_kind *kind, void *definition, pw_field_type type, int k) {
+  const char *at = pw_field_at (kind, definition, type, k);
+  return at ? (char *)definition + (at - (const char *)definition) : NULL;
+}
+
 #endif

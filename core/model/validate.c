@@ -132,9 +132,9 @@ static int check_element (const pw_model *m, const pw_element *e, const pw_names
     if (check_field (m, e, f, bodies, error) != PW_OK) return PW_INPUT;
   const char *first = NULL;
   for (int i = 0; i < e->kind->bodies && !e->kind->each_body; i++) {
-    const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, i);
+    const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, i);
     for (int n = 0; n < i; n++)
-      if (strcmp (*(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n), body) == 0)
+      if (strcmp (*(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n), body) == 0)
         return pw_fail (error, PW_INPUT, "model %s: %s %s: %s of its bodies are \"%s\"", m->name, e->kind->name,
                         pw_element_name (e), e->kind->bodies > 2 ? "two" : "both", body);
     first = body;

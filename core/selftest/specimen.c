@@ -76,7 +76,7 @@ static void specimen_element (pw_model *m, const specimen *x, int e) {
     for (int i = 0; i < pw_field_count (f); i++)
       specimen_value (x->random, f, definition + f->offset + (size_t)i * pw_field_bytes (f->type));
   for (int n = 0; n < x->kind->bodies && !x->kind->each_body; n++)
-    *(const char **)pw_field_at (x->kind, definition, PW_BODY, n) = specimen_body (x, e, n);
+    *(const char **)pw_field_in (x->kind, definition, PW_BODY, n) = specimen_body (x, e, n);
   pw_add (m, x->kind, definition);
 }
 

@@ -43,7 +43,8 @@ static int compile_kinds (pw_compilation *c, pw_error *error) {
   c->kind = malloc (room * sizeof *c->kind);
   c->count = calloc (room, sizeof *c->count);
   c->slab_of = malloc (room * sizeof *c->slab_of);
-  if (c->kind == NULL || c->count == NULL || c->slab_of == NULL)
+  c->array = calloc (room, sizeof *c->array);
+  if (c->kind == NULL || c->count == NULL || c->slab_of == NULL || c->array == NULL)
     return pw_fail (error, PW_MACHINE, "model %s: out of memory", m->name);
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
@@ -101,12 +102,15 @@ static int compile_count (pw_compilation *c, pw_error *error) {
 static void compile_layout_slab (const pw_compilation *c, pw_layout *l, pw_slab *k, int i) {
   const pw_kind *kind = c->kind[i];
   size_t n = (size_t)c->count[i], bodies = n * (size_t)kind->bodies;
-  void *element = pw_take (l, n, kind->element);
-  void *body = pw_take (l, bodies, sizeof (int)), *column = pw_take (l, bodies, sizeof (int));
+  pw_batch_arrays *a = &c->array[i];
+  a->element = pw_take (l, n, kind->element);
+  a->body = pw_take (l, bodies, sizeof *a->body);
+  a->column = pw_take (l, bodies, sizeof *a->column);
   void *name = pw_take (l, n, sizeof (char *));
   if (l->base == NULL) return;
-  *k = (pw_slab){ .kind = kind, .column = column, .name = name };
-  k->b = (pw_batch){ .count = c->count[i], .cols = 3 * kind->bodies + kind->own, .element = element, .body = body };
+  *k = (pw_slab){ .kind = kind, .column = a->column, .name = name };
+  k->b =
+      (pw_batch){ .count = c->count[i], .cols = 3 * kind->bodies + kind->own, .element = a->element, .body = a->body };
 }
 
 static void compile_layout (const pw_compilation *c, pw_layout *l, pw_system **system, pw_pools *pools) {
@@ -167,6 +171,7 @@ pw_system *pw_compile (const pw_model *m, pw_error *error) {
   free (c.kind);
   free (c.count);
   free (c.slab_of);
+  free (c.array);
   free (c.prepared);
   return s;
 }

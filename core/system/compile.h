@@ -6,13 +6,20 @@
 #include "model.h"
 #include "system.h"
 
+/* Arrays of a batch, which only the compiler modifies. */
+typedef struct {
+  char *element;
+  int *body, *column;
+} pw_batch_arrays;
+
 /* What is known before the allocation. */
 typedef struct {
   const pw_model *m;
   pw_names body, element;
-  const pw_kind **kind; /* kinds in use, in the order of the slabs */
-  int *count;           /* elements of each */
-  int *slab_of;         /* slab of each element */
+  const pw_kind **kind;   /* kinds in use, in the order of the slabs */
+  int *count;             /* elements of each */
+  int *slab_of;           /* slab of each element */
+  pw_batch_arrays *array; /* of each slab */
   int kinds;
   pw_system size;          /* its counts */
   size_t text;             /* bytes of all names */

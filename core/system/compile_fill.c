@@ -77,8 +77,8 @@ static int compile_source (const pw_compilation *c, pw_system *s, pw_source *sou
 }
 
 /* Prepares an element beside the system, to see that it stays within its size, and puts it in. */
-static int compile_prepare (const pw_compilation *c, pw_slab *k, int e, const pw_element *from,
-                            const pw_body *const *bodies, pw_own *own, pw_error *error) {
+static int compile_prepare (const pw_compilation *c, const pw_system *s, const pw_slab *k, int e,
+                            const pw_element *from, const pw_body *const *bodies, pw_own *own, pw_error *error) {
   const pw_kind *kind = k->kind;
   size_t size = kind->element;
   pw_error why = { 0 };
@@ -90,7 +90,7 @@ static int compile_prepare (const pw_compilation *c, pw_slab *k, int e, const pw
     if (c->prepared[size + (size_t)i] != PW_COMPILE_MARK)
       return pw_fail (error, PW_INPUT, "model %s: kind %s: prepare writes more than the %zu bytes of .element",
                       c->m->name, kind->name, size);
-  memcpy ((char *)(size_t)k->b.element + (size_t)e * size, c->prepared, size);
+  memcpy (c->array[k - s->slab].element + (size_t)e * size, c->prepared, size);
   return PW_OK;
 }
 
@@ -100,17 +100,19 @@ static int compile_element (const pw_compilation *c, pw_system *s, pw_slab *k, i
   static const pw_body ground = { .name = "ground" };
   const pw_kind *kind = k->kind;
   const pw_body *bodies[PW_MAX_BODIES];
-  int *place = (int *)(size_t)k->b.body + e * kind->bodies, *column = (int *)(size_t)k->column + e * kind->bodies;
+  const pw_batch_arrays *array = &c->array[k - s->slab];
+  int *place = array->body + e * kind->bodies, *column = array->column + e * kind->bodies;
   for (int n = 0; n < kind->bodies; n++) {
-    int index =
-        body >= 0 ? body : pw_names_find (&c->body, *(const char **)pw_field_at (kind, from->definition, PW_BODY, n));
+    int index = body >= 0
+                    ? body
+                    : pw_names_find (&c->body, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
     bodies[n] = index < 0 ? &ground : &c->m->body[index];
     place[n] = index < 0 ? s->bodies : index;
     column[n] = index < 0 ? s->coords : 3 * index;
   }
   if (kind->prepare == NULL) return PW_OK;
   pw_own own[PW_MAX_OWN] = { { 0 } };
-  if (compile_prepare (c, k, e, from, bodies, own, error) != PW_OK) return PW_INPUT;
+  if (compile_prepare (c, s, k, e, from, bodies, own, error) != PW_OK) return PW_INPUT;
   for (int n = 0, j = k->own + e * kind->own; n < kind->own; n++, j++) {
     s->mass[j] = own[n].mass;
     s->q0[j] = own[n].start;
@@ -219,7 +221,7 @@ static double compile_length (const pw_compilation *c) {
     if (!pw_kind_acts (e->kind)) continue;
     for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
       const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-      const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);
+      const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n);
       if (at && strcmp (body, "ground") != 0) L = fmax (L, hypot (at[0], at[1]));
     }
   }

@@ -55,8 +55,9 @@ static void test_row_is_run (void **state) {
     const char *row = cli_file ("row.csv");
     for (int line = 0; line < 3; line++) row = strchr (row, '\n') + 1;
     for (int comma = 0; comma < 17; comma++) row = strchr (row, ',') + 1;
-    double position = strtod (row, (char **)&row), velocity = strtod (row + 1, (char **)&row);
-    double steps = strtod (row + 1, (char **)&row), rhs = strtod (row + 1, NULL);
+    char *next;
+    double position = strtod (row, &next), velocity = strtod (next + 1, &next);
+    double steps = strtod (next + 1, &next), rhs = strtod (next + 1, NULL);
     assert_true (position == cli_number (cli_out, "residual", "position", NULL));
     assert_true (velocity == cli_number (cli_out, "residual", "velocity", NULL));
     assert_true (steps == cli_number (cli_out, "statistics", "steps", NULL));

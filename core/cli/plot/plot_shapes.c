@@ -62,7 +62,7 @@ int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
   for (const pw_element *end = e + elements; e < end; e++)
     for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
       const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-      const char *body = *(const char **)pw_field_at (e->kind, e->definition, PW_BODY, n);
+      const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n);
       int b = pw_names_find (&shown, body);
       if (at && b >= 0) shapes_add_point (&p->shape[b], at);
       if (at && strcmp (body, "ground") == 0 && p->grounds < PLOT_SHOWN)

@@ -17,7 +17,7 @@
 
 /* One varied quantity. */
 typedef struct {
-  const char *name;
+  char *name;
   const char *range;                                    /* "lin:1:10:100", as written */
   enum { PW_AXIS_LIST, PW_AXIS_LIN, PW_AXIS_LOG } type; /* how its values are spaced */
   double first, last;                                   /* of PW_AXIS_LIN and PW_AXIS_LOG */

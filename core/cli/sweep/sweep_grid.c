@@ -126,7 +126,7 @@ int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error) {
 void pw_grid_free (pw_grid *g) {
   for (int i = 0; i < g->axes; i++) {
     free (g->axis[i].value);
-    free ((char *)(size_t)g->axis[i].name);
+    free (g->axis[i].name);
   }
   free (g->axis);
   *g = (pw_grid){ .axis = NULL };

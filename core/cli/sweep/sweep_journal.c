@@ -30,7 +30,7 @@ typedef struct {
 
 /* A file in memory, read only. */
 typedef struct {
-  const char *at, *end;
+  char *at, *end;
 } journal_map;
 
 /* ---- Lines ---- */
@@ -82,7 +82,7 @@ static int journal_map_open (journal_map *m, int file) {
 }
 
 static void journal_map_close (journal_map *m) {
-  if (m->end > m->at) munmap ((void *)(size_t)m->at, (size_t)(m->end - m->at));
+  if (m->end > m->at) munmap (m->at, (size_t)(m->end - m->at));
   *m = (journal_map){ NULL, NULL };
 }
 
