@@ -176,6 +176,9 @@ static void test_truth (void **state) {
   cli_good ("cut -d, -f1,4 @/known.csv >@/few.csv && pinwheel compare ezyroller --methods rk4 --truth @/few.csv "
             "--repeats 1 --t-end "
             "1 --step-ladder 0.05 -o @/few");
+  cli_good (
+      "cp @/few.csv @/few && pinwheel compare ezyroller --methods rk4 --truth @/few/few.csv --repeats 1 --t-end 1 "
+      "--step-ladder 0.05 -o @/few >@/table"); /* a file of the folder that is not written */
   assert_string_equal (compare_cell ("few/compare.csv", 0, END), "nan");
   assert_true (compare_number ("few/compare.csv", 0, END + 1) > 0);
   assert_string_equal (compare_cell ("few/compare.csv", 0, MULTIPLIER), "nan");

@@ -201,7 +201,7 @@ static void compare_close (pw_study *s) {
 }
 
 static int compare_command (void *options, pw_error *error) {
-  static const pw_study_type type = { .table = "compare.csv",
+  static const pw_study_type type = { .tables = { "compare.csv", "truth.csv" },
                                       .unit = "rows",
                                       .plan = compare_plan,
                                       .begin = compare_begin,

@@ -180,7 +180,7 @@ static void drift_close (pw_study *s) {
 }
 
 static int drift_command (void *options, pw_error *error) {
-  static const pw_study_type type = { .table = "drift.csv",
+  static const pw_study_type type = { .tables = { "drift.csv", "drift-time.csv" },
                                       .unit = "runs",
                                       .plan = drift_plan,
                                       .begin = drift_begin,

@@ -77,7 +77,8 @@ const char *pw_study_status (const pw_row *r) {
 
 /* The CSV gets rows as they come, under the name NAME.part, which it keeps if the study is stopped. */
 static int study_open_folder (pw_study *x, pw_error *error) {
-  static const char *const names[] = { ".dat", ".gp", ".svg", ".png", ".csv", NULL };
+  const char *const *tables = x->type->tables;
+  const char *const names[] = { ".dat", ".gp", ".svg", ".png", tables[0], tables[1], NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--truth", x->reference_path, PW_READS, NULL },
                    { "-o", x->folder, PW_WRITES_INTO, names } };
@@ -85,7 +86,7 @@ static int study_open_folder (pw_study *x, pw_error *error) {
   if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
   x->lock = pw_figure_folder (x->folder, error);
   if (x->lock < 0) return error->status;
-  x->csv = pw_study_open (x, x->type->table, error);
+  x->csv = pw_study_open (x, tables[0], error);
   if (x->csv == NULL) return error->status;
   pw_text t = { .at = NULL };
   x->type->names (&t);

@@ -73,18 +73,18 @@ typedef struct pw_study pw_study;
 
 /* What a command states.  Functions return a status. */
 typedef struct {
-  const char *table; /* "compare.csv" */
-  const char *unit;  /* of the progress: "rows" */
+  const char *tables[2]; /* CSV files in the folder: that of the rows, and a further one */
+  const char *unit;      /* of the progress: "rows" */
   /* Reads options, once the model is open; allocates and fills the rows. */
   int (*plan) (pw_study *x, pw_error *error);
   /* Before the first row, with signals caught: writes what precedes the table. */
   int (*begin) (pw_study *x, pw_error *error);
   /* Measures a row by pw_study_run; pw_study_outcome makes a method's failure a row. */
   int (*measure) (pw_study *x, pw_row *r, pw_error *error);
-  /* Heading of a group, and the rest of a row that is done. */
+  /* Print the heading of a group, and a row after the name of its method. */
   void (*head) (const pw_study *x, int group, int width, FILE *f);
   void (*line) (const pw_study *x, const pw_row *r, FILE *f);
-  /* Cells of the CSV: those of the first line, and of a row; the reason is added. */
+  /* Add the cells of the CSV's first line, and of a row, except the reason. */
   void (*names) (pw_text *t);
   void (*cells) (const pw_study *x, const pw_row *r, pw_text *t);
   /* After the last row, if there is a folder: further tables and figures. */
@@ -108,7 +108,7 @@ struct pw_study {
   pw_row *row;
   int rows, done;
   pw_progress progress;
-  double share;   /* of a row's progress that a run has, 1 unless rows have several runs */
+  double share;   /* of a run in the progress of its row */
   pw_output *csv; /* NULL: none */
 };
 
@@ -118,7 +118,7 @@ int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error);
 /* Allocates rows that are zero. */
 int pw_study_allocate (pw_study *x, int rows, pw_error *error);
 
-/* What looks at a run: after each step that reaches time `due`, which it may change. */
+/* Is called after each step of a run that reaches time `due`, which it may change. */
 typedef struct pw_study_visitor {
   double due;
   int (*visit) (struct pw_study_visitor *v, pw_run *run, pw_error *error);
@@ -131,7 +131,7 @@ typedef struct pw_study_visitor {
 /* One run of a row with the study's settings to the end or a limit: fills t, statistics, cpu, and state if it is stopped by
  * cpu_end; the visitor may be NULL.  PW_RETRY: stopped, or interrupted. */
 int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error);
-/* Puts a status of pw_study_run into the row.  Returns PW_OK, or what ends the study. */
+/* Puts a failure of pw_study_run into the row.  Returns PW_OK, or the status that ends the study. */
 int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error *error);
 
 /* "ok", "failed", ... for CSV. */
