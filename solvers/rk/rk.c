@@ -17,10 +17,10 @@ static const char *const rk_inputs[] = { "stage", "held", NULL };
 
 const pw_stabilisation pw_rk_stabilisations[] = {
   PW_ACCELERATION_STABILISATIONS,
-  { "projection", "coordinate projection onto positions and rates after each step (Lubich 1991, Eich 1993)",
+  { "projection", "coordinate projection onto positions and velocities after each step (Lubich 1991, Eich 1993)",
     PW_PROJECTION },
   { "nullspace",
-    "minimal velocities in a basis of the null space of J: rates obey all rows at every stage "
+    "minimal velocities in a basis of the null space of J: velocities obey all constraints at every stage "
     "(Kim & Vanderploeg 1986)",
     PW_NULLSPACE },
   { .name = NULL },

@@ -3,7 +3,7 @@
  *   h_new = 0.9 h err^-(k - 3 m / 4) err_before^m,  within a fifth and five times of h
  *
  * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
- * error e is that of positions and rates in units of the tolerances.  Of what a projection takes away from it, e', only
+ * error e is that of positions and velocities in units of the tolerances.  Of what a projection takes away from it, e', only
  * the part along the constraints is left (Eich 1993; Hindmarsh et al., CVODE) and a little of the whole:
  *
  *   e = sqrt (e'^2 + rtol^(1/2) e_before^2)      so that the displacement, e_before rtol, is at most rtol^(3/4)
@@ -48,7 +48,7 @@ static void adapt_estimate (const pw_rk_row *w, double *const *K, int n, double 
   for (int j = 0; j < w->count; j++) out[i] += w->weight[j] * K[w->stage[j]][i];
 }
 
-/* One over the tolerances of positions and rates, of a step from the state reached to the new one. */
+/* One over the tolerances of positions and velocities, of a step from the state reached to the new one. */
 static void adapt_weigh (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   double *w = d->weight, rtol = r->settings.rtol;

@@ -283,8 +283,8 @@ static int ida_at (pw_run *r, double t, pw_error *error) {
 static const pw_stabilisation ida_stabilisations[] = {
   { "none", "acceleration level: the constraints drift", PW_UNSTABILISED },
   { "baumgarte", "feedback of the residuals into the accelerations (Baumgarte 1972)", PW_BAUMGARTE },
-  { "index2", "rates enforced, positions drift", PW_INDEX2 },
-  { "ggl", "stabilised index 2: positions and rates both enforced (Gear, Gupta & Leimkuhler 1985)", PW_GGL },
+  { "index2", "velocities enforced, positions drift", PW_INDEX2 },
+  { "ggl", "stabilised index 2: positions and velocities both enforced (Gear, Gupta & Leimkuhler 1985)", PW_GGL },
   { "si1", "stabilised index 1: the same, with the multipliers as rates of states in the error test (Gear 1988)",
     PW_SI1 },
   { .name = NULL },
