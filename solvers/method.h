@@ -23,7 +23,7 @@ struct pw_run {
   int redundant;               /* how many */
   int *redundant_row;          /* which */
   double *coefficient;         /* redundant x rows: of the active rows in each; then scratch */
-  double *shared;              /* rows: least-norm multipliers for the ledger */
+  double *shared;              /* rows: least-norm multipliers for the ledger; NULL: no redundant row moves */
   char *rank_memory;
   double grip, reselect; /* of the active rows at the state reached (rank.h); below this others are tried */
   pw_watchdog limits;    /* its thresholds */

@@ -172,13 +172,18 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   return away;
 }
 
-/* The set and its complement become the run's. */
-static void rank_take (pw_run *r, unsigned char *mask, const unsigned char *active) {
-  memcpy (mask, active, (size_t)r->s->rows);
-  r->active = mask;
+/* The run's mask and the equations that it leaves out; work is shared only if one of these moves. */
+static void rank_take (pw_run *r) {
+  const pw_system *s = r->s;
+  double *shared = (double *)(void *)r->redundant_row - s->rows;
   r->redundant = 0;
-  for (int i = 0; i < r->s->rows; i++)
-    if (!active[i]) r->redundant_row[r->redundant++] = i;
+  r->shared = NULL;
+  for (const pw_slab *k = r->w->slab; k < r->w->slab + s->constraints; k++)
+    for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) {
+      if (r->active[i]) continue;
+      r->redundant_row[r->redundant++] = i;
+      if (k->kind->eta) r->shared = shared;
+    }
 }
 
 static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
@@ -187,9 +192,9 @@ static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
   r->rank_memory = malloc (numbers * sizeof (double) + k * sizeof (int) + m);
   if (r->rank_memory == NULL) return PW_MACHINE;
   r->coefficient = (double *)(void *)r->rank_memory;
-  r->shared = r->coefficient + numbers - m;
   r->redundant_row = (int *)(void *)(r->coefficient + numbers);
-  rank_take (r, (unsigned char *)(r->redundant_row + k), active);
+  r->active = memcpy (r->redundant_row + k, active, m);
+  rank_take (r);
   return PW_OK;
 }
 
@@ -228,19 +233,21 @@ int pw_rank_reselect (pw_run *r) {
   for (int i = 0; i < s->holonomic; i++) holonomic += r->active[i];
   int rank = rank_basis_of (r->w, r->limits.independent, holonomic, all, x.rows, x.kept, x.active);
   int other = rank == all && memcmp (x.active, r->active, (size_t)s->rows) != 0;
-  if (other) rank_take (r, (unsigned char *)(r->redundant_row + r->redundant), x.active);
+  if (other) memcpy (r->redundant_row + r->redundant, x.active, (size_t)s->rows), rank_take (r);
   free (x.memory);
   return other;
 }
 
 void pw_rank_carry (pw_run *r, pw_archive *a) {
-  int found = 0, *row = r->redundant_row, most = r->redundant;
+  int found = 0, most = r->redundant;
   if (most == 0) return;
-  unsigned char *mask = (unsigned char *)(row + most);
+  unsigned char *mask = (unsigned char *)(r->redundant_row + most);
   pw_carry (a, mask, (size_t)r->s->rows);
-  for (int i = 0; i < r->s->rows; i++)
-    if (!mask[i] && found++ < most) row[found - 1] = i;
-  if (found != most) a->failed = 1;
+  for (int i = 0; i < r->s->rows; i++) found += !mask[i];
+  if (found == most)
+    rank_take (r);
+  else
+    a->failed = 1;
 }
 
 void pw_rank_close (pw_run *r) {

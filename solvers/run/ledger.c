@@ -55,7 +55,7 @@ void pw_ledger_note (pw_run *r) {
 }
 
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
-  if (r->redundant && r->s->moving && pw_saddle_factor (r->saddle) == PW_OK) {
+  if (r->redundant && r->shared && pw_saddle_factor (r->saddle) == PW_OK) {
     memcpy (r->shared, lambda, (size_t)r->s->rows * sizeof *lambda);
     pw_rank_share (r, r->shared);
     lambda = r->shared;
