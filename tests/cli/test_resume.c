@@ -46,8 +46,7 @@ static void test_restarts (void **state) {
   assert_true (cli_number (cli_file ("a.json"), "steps", NULL) == 30000);
   cli_good ("pinwheel " RESUME_RUN "-m ida+ggl --json @/a.json --checkpoint @/a.ck");
   assert_true (cli_number (cli_file ("a.json"), "restarts", NULL) == 59);
-  cli_good (
-      "pinwheel run ezyroller --t-end 30 -m ida+ggl --checkpoint @/a.ck | grep -q 'restarted at 9 checkpoints'");
+  cli_good ("pinwheel run ezyroller --t-end 30 -m ida+ggl --checkpoint @/a.ck | grep -q 'restarted at 9 checkpoints'");
 }
 
 /* Stopped by a signal: what there is to go on from, and that it does. */

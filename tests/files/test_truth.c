@@ -126,7 +126,8 @@ static void test_function (void **state) {
   truth_write_c ("0.25");
   cli_good ("pinwheel run @/particles.c --json -");
   check_close ("a wrong truth", truth_error ("end", "length"), 0.25, 1e-12, "round-off");
-  cli_bad ("pinwheel check @/particles.c", 2, "the model's reference solution does not hold initially: two.x is 0, not 0.25");
+  cli_bad ("pinwheel check @/particles.c", 2,
+           "the model's reference solution does not hold initially: two.x is 0, not 0.25");
 }
 
 static void test_started_elsewhere (void **state) {

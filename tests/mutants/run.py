@@ -116,7 +116,7 @@ class Copy:
         self.names = names
 
     def make(self, *targets):
-        return subprocess.run(["make", "-s", "NO_DEPS=1", "BUILD=build", *targets], cwd=self.top, text=True,
+        return subprocess.run(["make", "-s", f"-j{os.cpu_count()}", "NO_DEPS=1", "BUILD=build", *targets], cwd=self.top, text=True,
                               stdin=subprocess.DEVNULL, capture_output=True)
 
     def test(self, tests):
