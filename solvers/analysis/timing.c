@@ -193,7 +193,7 @@ static void profile_measure (profile *p, pw_profile *x) {
   }
   x->poses = profile_time (p, profile_poses);
   for (; x->kinds < p->s->slabs; x->kinds++) {
-    p->k = &p->s->slab[x->kinds];
+    p->k = &p->r->w->slab[x->kinds];
     profile_kind (p, &x->kind[x->kinds]);
   }
 }
