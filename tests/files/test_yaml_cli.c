@@ -156,7 +156,7 @@ static void test_new (void **state) {
   (void)state;
   cli_good ("pinwheel new @/mine.yaml");
   cli_good ("pinwheel new @/mine.c");
-  cli_bad ("pinwheel new @/mine.yaml", 2, "@/mine.yaml is there already; it has been left as it is");
+  cli_bad ("pinwheel new @/mine.yaml", 2, "@/mine.yaml exists already and was not changed");
   cli_good ("pinwheel run @/mine.yaml --every 0.5 --set torque=0.5 -o @/text.csv >/dev/null && "
             "pinwheel run @/mine.c --every 0.5 --set torque=0.5 -o @/c.csv >/dev/null && cmp @/c.csv @/text.csv");
 }
