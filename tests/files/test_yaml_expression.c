@@ -416,6 +416,21 @@ static void test_accumulating (void **state) {
   }
 }
 
+/* A whole number that bisection meets exactly is a break, too, whichever way it is passed. */
+static void test_whole (void **state) {
+  static const char *const jumping[] = { "ceil(t)",    "2*ceil(t)",      "floor(-t)", "3 - floor(-t)",
+                                         "mod(-t, 1)", "round(0.5 - t)", "floor(t)" };
+  (void)state;
+  for (size_t i = 0; i < sizeof jumping / sizeof *jumping; i++) {
+    const pw_expression *x = expression_of (jumping[i]);
+    double t = 0;
+    for (int k = 1; k <= 100; k++) {
+      t = pw_expression_breakpoint (x, t);
+      check_bits (jumping[i], &t, (double[]){ k }, 1);
+    }
+  }
+}
+
 /* Between breakpoints nothing jumps: random thresholds on random curves, scanned at many times. */
 static void test_scanned (void **state) {
   pw_random r = { 5 };
@@ -450,10 +465,10 @@ static int expression_teardown (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_values),      cmocka_unit_test (test_troubles),    cmocka_unit_test (test_limits),
-    cmocka_unit_test (test_truths),      cmocka_unit_test (test_derivatives), cmocka_unit_test (test_after),
-    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_round_off),   cmocka_unit_test (test_accumulating),
-    cmocka_unit_test (test_scanned),
+    cmocka_unit_test (test_values),       cmocka_unit_test (test_troubles),    cmocka_unit_test (test_limits),
+    cmocka_unit_test (test_truths),       cmocka_unit_test (test_derivatives), cmocka_unit_test (test_after),
+    cmocka_unit_test (test_breakpoints),  cmocka_unit_test (test_round_off),   cmocka_unit_test (test_whole),
+    cmocka_unit_test (test_accumulating), cmocka_unit_test (test_scanned),
   };
   return cmocka_run_group_tests (tests, NULL, expression_teardown);
 }

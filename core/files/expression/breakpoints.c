@@ -114,10 +114,12 @@ static range range_pair (const pw_expression_function *f, const range *x, const 
 
 /* ---- Operations that jump or bend ---- */
 
-/* floor, ceil, round: one whole number, or a break. */
+/* floor, ceil, round: one whole number, or a break.  Both ends belong to the interval, with the value just after a jump there,
+ * whichever way it goes. */
 static range range_whole (int op, const range *x) {
-  double (*whole) (double) = op == PW_OP_FLOOR ? floor : op == PW_OP_CEIL ? ceil : round;
-  range r = { whole (x->lo), whole (x->hi), 0, 0 };
+  double shift = op == PW_OP_ROUND ? 0.5 : 0;
+  range r = { ceil (x->lo + shift), floor (x->hi + shift), 0, 0 };
+  *(op == PW_OP_CEIL ? &r.hi : &r.lo) += op == PW_OP_CEIL ? 1 : -1;
   r.breaks = !(r.lo == r.hi);
   return r;
 }
