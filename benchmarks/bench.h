@@ -25,13 +25,13 @@ static inline bench_scene bench_open (const char *name) {
   pw_error error = { 0 };
   bench_scene s = { .file = pw_file_open (name, &error) };
   if (s.file) s.model = pw_file_model (s.file, &error);
-  if (s.model && pw_build (s.model, &error) == PW_OK) s.system = pw_compile (s.model, &error);
+  if (s.model && pw_model_build (s.model, &error) == PW_OK) s.system = pw_system_compile (s.model, &error);
   if (s.system == NULL) bench_fail (name, &error);
   return s;
 }
 
 static inline void bench_close (bench_scene *s) {
-  pw_free (s->system);
+  pw_system_free (s->system);
   pw_model_free (s->model);
   pw_file_close (s->file);
 }

@@ -25,7 +25,7 @@ typedef struct {
 } demo_result;
 
 static void demo_keep (const pw_system *s, const pw_sample *sample, double state[DEMO_STATES]) {
-  for (int i = 0; i < DEMO_STATES; i++) state[i] = sample->q[pw_find_state (s, demo_state[i], NULL)];
+  for (int i = 0; i < DEMO_STATES; i++) state[i] = sample->q[pw_system_find_state (s, demo_state[i], NULL)];
 }
 
 static demo_result demo_run (const demo_case *c) {
@@ -34,10 +34,12 @@ static demo_result demo_run (const demo_case *c) {
   pw_settings settings = { .span = DEMO_SECONDS, .step = c->step, .rtol = c->rtol, .atol = c->rtol, .ledger = 1 };
   demo_result result = { .cpu = 0 };
   double start = bench_clock ();
-  pw_run *r = pw_open (scene.system, c->method, &settings, &error);
+  pw_run *r = pw_run_open (scene.system, c->method, &settings, &error);
   for (int second = 1; r && second <= DEMO_SECONDS; second++) {
     pw_sample sample;
-    if (pw_advance_to (r, second, DEMO_SECONDS, &error) != PW_OK || pw_at (r, second, &sample, &error) != PW_OK) break;
+    if (pw_run_advance_to (r, second, DEMO_SECONDS, &error) != PW_OK ||
+        pw_run_sample (r, second, &sample, &error) != PW_OK)
+      break;
     result.balance = fmax (result.balance, fabs (sample.balance));
     if (second == DEMO_PUBLISHED) demo_keep (scene.system, &sample, result.state[0]);
     if (second == DEMO_SECONDS) demo_keep (scene.system, &sample, result.state[1]);
@@ -45,7 +47,7 @@ static demo_result demo_run (const demo_case *c) {
   result.cpu = bench_clock () - start;
   if (error.status != PW_OK) bench_fail (c->method, &error);
   result.statistics = *pw_run_statistics (r);
-  pw_close (r);
+  pw_run_close (r);
   bench_close (&scene);
   return result;
 }

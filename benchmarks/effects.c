@@ -25,7 +25,7 @@ static void effects_add (pw_model *m, const char *kind, const void *definition) 
       pw_add (m, *k, definition);
       return;
     }
-  pw_refuse (m, "no kind %s in this library", kind);
+  pw_model_refuse (m, "no kind %s in this library", kind);
 }
 
 static void effects_wheel (pw_model *m) {
@@ -159,7 +159,7 @@ static long effects_evaluate (void *context, long n) {
   effects_data *d = context;
   for (long i = 0; i < n; i++) {
     int k = (int)(i % EFFECTS_POOL);
-    pw_accelerate (d->run, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
+    pw_run_accelerate (d->run, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
   }
   return n;
 }
@@ -170,9 +170,9 @@ static pw_run *effects_open (const char *key, int massless, pw_system **system) 
   int scene = 0;
   while (scene < EFFECTS_SCENES - 1 && strcmp (effects_scene[scene].key, key) != 0) scene++;
   pw_model *m = pw_model_new ("effects", &effects_table, &e);
-  if (m) pw_set (m, "scene", scene, &e), pw_set (m, "massless", massless, &e);
-  pw_system *s = m && pw_build (m, &e) == PW_OK ? pw_compile (m, &e) : NULL;
-  pw_run *r = s ? pw_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10 }, &e) : NULL;
+  if (m) pw_model_set (m, "scene", scene, &e), pw_model_set (m, "massless", massless, &e);
+  pw_system *s = m && pw_model_build (m, &e) == PW_OK ? pw_system_compile (m, &e) : NULL;
+  pw_run *r = s ? pw_run_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10 }, &e) : NULL;
   if (r == NULL) engine_die (key, e.text);
   pw_model_free (m);
   *system = s;
@@ -180,8 +180,8 @@ static pw_run *effects_open (const char *key, int massless, pw_system **system) 
 }
 
 static void effects_close (pw_run *r, pw_system *s) {
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* States along the way of the EzyRoller alone, the same for all scenes, since a sine takes more instructions for one angle
@@ -191,7 +191,7 @@ static void effects_fill (effects_data *d, int massless) {
   pw_system *s;
   pw_run *alone = effects_open ("none", massless, &s);
   for (int k = 0; k < EFFECTS_POOL; k++) {
-    for (int i = 0; i < EFFECTS_SPACING && e.status == PW_OK; i++) pw_advance (alone, 100, &e);
+    for (int i = 0; i < EFFECTS_SPACING && e.status == PW_OK; i++) pw_run_advance (alone, 100, &e);
     d->t[k] = alone->t;
     memcpy (d->q[k], d->run->q, (size_t)d->run->s->coords * sizeof (double));
     memcpy (d->v[k], d->run->v, (size_t)d->run->s->coords * sizeof (double));
@@ -224,7 +224,7 @@ static int effects_list_kinds (void) {
 static const char *const effects_side[] = { "massive", "massless" };
 
 static double effects_count (const char *program, const char *key, int massless) {
-  double all = engine_count (program, key, effects_side[massless], "pw_accelerate");
+  double all = engine_count (program, key, effects_side[massless], "pw_run_accelerate");
   if (all == 0) engine_die (key, "nothing was counted; is valgrind installed?");
   return all / (EFFECTS_ROUNDS * EFFECTS_POOL);
 }

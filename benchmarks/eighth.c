@@ -66,7 +66,7 @@ static void eighth_our_rate (void *context, double t, const double *q, const dou
   eighth_scene *s = context;
   eighth_copy (s->q, q);
   eighth_copy (s->v, v);
-  pw_accelerate (s->run, t, s->q, s->v, s->a, lambda);
+  pw_run_accelerate (s->run, t, s->q, s->v, s->a, lambda);
   eighth_copy (a, s->a);
 }
 
@@ -95,12 +95,12 @@ static double eighth_ours (void *scene, const ladder *way, double rtol, double *
   pw_error error = { 0 };
   pw_sample sample;
   pw_run *r = engine_open (s->system, method, &(pw_settings){ .rtol = rtol, .span = EIGHTH_SECONDS });
-  while (pw_time (r) < EIGHTH_SECONDS)
-    if (pw_advance (r, EIGHTH_SECONDS, &error) != PW_OK) engine_die (method, error.text);
-  if (pw_at (r, EIGHTH_SECONDS, &sample, &error) != PW_OK) engine_die (method, error.text);
+  while (pw_run_time (r) < EIGHTH_SECONDS)
+    if (pw_run_advance (r, EIGHTH_SECONDS, &error) != PW_OK) engine_die (method, error.text);
+  if (pw_run_sample (r, EIGHTH_SECONDS, &sample, &error) != PW_OK) engine_die (method, error.text);
   eighth_copy (q, sample.q);
   double evaluations = (double)pw_run_statistics (r)->rhs;
-  pw_close (r);
+  pw_run_close (r);
   return evaluations;
 }
 
@@ -119,8 +119,8 @@ static void eighth_open (eighth_scene *s, int massless) {
 
 static void eighth_close (eighth_scene *s) {
   pw_projector_close (&s->projector);
-  pw_close (s->run);
-  pw_free (s->system);
+  pw_run_close (s->run);
+  pw_system_free (s->system);
 }
 
 /* ---- Measuring ---- */

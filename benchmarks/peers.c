@@ -36,11 +36,11 @@ static double peers_ours (void *scene, const ladder *way, double rung, double *q
   pw_sample sample;
   pw_run *r = engine_open (s->system, way->method, &(pw_settings){ .rtol = rung, .step = rung, .span = s->seconds });
   int status = PW_OK;
-  while (status == PW_OK && pw_time (r) < s->seconds) status = pw_advance (r, s->seconds, &error);
-  if (status == PW_OK && pw_at (r, s->seconds, &sample, &error) != PW_OK) engine_die (way->method, error.text);
-  for (int j = 0; j < pw_count_coordinates (s->system); j++) q[j] = status == PW_OK ? sample.q[j] : NAN;
+  while (status == PW_OK && pw_run_time (r) < s->seconds) status = pw_run_advance (r, s->seconds, &error);
+  if (status == PW_OK && pw_run_sample (r, s->seconds, &sample, &error) != PW_OK) engine_die (way->method, error.text);
+  for (int j = 0; j < pw_system_coordinates (s->system); j++) q[j] = status == PW_OK ? sample.q[j] : NAN;
   double evaluations = (double)pw_run_statistics (r)->rhs;
-  pw_close (r);
+  pw_run_close (r);
   return evaluations;
 }
 
@@ -48,7 +48,7 @@ static double peers_ours (void *scene, const ladder *way, double rung, double *q
 
 #define PEERS_HAND(text, key, from, by, rungs, what, step) \
   { .name = text, .method = key, .first = from, .factor = by, .count = rungs, .run = what, .function = step }
-#define PEERS_OURS(key, from, by, rungs) PEERS_HAND (key, key, from, by, rungs, peers_ours, "pw_advance")
+#define PEERS_OURS(key, from, by, rungs) PEERS_HAND (key, key, from, by, rungs, peers_ours, "pw_run_advance")
 #define PEERS_CHAIN(text) PEERS_HAND (text, "", 0.04, 0.8, 18, by_hand_chain, "by_hand_chain_step")
 
 static peers_scene peers_scenes[] = {
@@ -148,7 +148,7 @@ static void peers_measure (void) {
     for (int k = 0; k < PEERS_WAYS; k++) {
       peers_scene *s = peers_scene_of (k);
       for (int i = 0; i < peers_way (k)->count; i++)
-        ladder_take (peers_way (k), s, s->truth, pw_count_coordinates (s->system), q, round, i);
+        ladder_take (peers_way (k), s, s->truth, pw_system_coordinates (s->system), q, round, i);
     }
   for (int k = 0; k < PEERS_WAYS; k++) ladder_sort (peers_way (k), PEERS_ROUNDS);
 }
@@ -193,6 +193,6 @@ int main (int argc, char **argv) {
   peers_open ();
   peers_measure ();
   peers_report (argv[0], csv);
-  for (int i = 0; i < PEERS_SCENES; i++) pw_free (peers_scenes[i].system);
+  for (int i = 0; i < PEERS_SCENES; i++) pw_system_free (peers_scenes[i].system);
   return csv && fclose (csv) != 0;
 }

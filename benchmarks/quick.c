@@ -17,13 +17,13 @@ static double quick_run (const quick_case *c, pw_statistics *statistics) {
     .span = QUICK_SECONDS, .step = c->step, .rtol = c->rtol, .atol = c->rtol, .ledger = c->ledger
   };
   double start = bench_clock ();
-  pw_run *r = pw_open (scene.system, c->method, &settings, &error);
-  while (r && pw_time (r) < QUICK_SECONDS)
-    if (pw_advance (r, QUICK_SECONDS, &error) != PW_OK) break;
+  pw_run *r = pw_run_open (scene.system, c->method, &settings, &error);
+  while (r && pw_run_time (r) < QUICK_SECONDS)
+    if (pw_run_advance (r, QUICK_SECONDS, &error) != PW_OK) break;
   double cpu = bench_clock () - start;
   if (error.status != PW_OK) bench_fail (c->method, &error);
   *statistics = *pw_run_statistics (r);
-  pw_close (r);
+  pw_run_close (r);
   bench_close (&scene);
   return cpu;
 }

@@ -34,12 +34,12 @@ typedef struct {
 /* Tests a kind, built-in or a plug-in's, by its table alone, in a scene and at a state that follow from the seed.
  * Start with a zeroed report; further calls with other seeds keep the worst of every check.  A check that fails is in
  * the report; the status is PW_OK then, too.  Errors: PW_INPUT if the kind refuses whatever definition its field table
- * allows, PW_MACHINE. */
+ * allows, PW_RESOURCE. */
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error);
 
 /* The same where a scene uses the kind: its derivatives along a random motion around the state q, v at time t, with the
  * scene's own elements and signals, in units of its length scale and the time T.  The checks go into a report of their
- * own.  Errors: PW_MACHINE. */
+ * own.  Errors: PW_RESOURCE. */
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,
                        unsigned seed, pw_selftest_report *report, pw_error *error);
 
@@ -60,7 +60,7 @@ typedef struct {
 } pw_verification;
 
 /* Recomputes all four residuals at a state from the elements themselves, one after the other, with none of the
- * solvers' arithmetic.  q, v and a have pw_count_coordinates entries, lambda pw_count_rows; scale is the run's.  Errors: PW_MACHINE,
+ * solvers' arithmetic.  q, v and a have pw_system_coordinates entries, lambda pw_system_rows; scale is the run's.  Errors: PW_RESOURCE,
  * PW_METHOD if a signal fails. */
 int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double *q, const double *v, const double *a,
                const double *lambda, pw_verification *result);

@@ -39,13 +39,13 @@ extern "C" {
 /* What a function returns: 0 good, > 0 not done but may be tried again, < 0 stop.  The negative of a
  * negative status is the exit status of the program. */
 typedef enum {
-  PW_OK = 0,       /* good */
-  PW_RETRY = 1,    /* not usable, a smaller step may be */
-  PW_STOPPED = 2,  /* a run was asked to stop by pw_settings.stop: it is where it was, and can go on */
-  PW_MACHINE = -1, /* out of memory, a file cannot be written */
-  PW_INPUT = -2,   /* the description or an option is wrong */
-  PW_START = -3,   /* the start cannot be made consistent */
-  PW_METHOD = -4   /* the method failed on the way */
+  PW_OK = 0,        /* good */
+  PW_RETRY = 1,     /* not usable, a smaller step may be */
+  PW_STOPPED = 2,   /* a run was asked to stop by pw_settings.stop: it is where it was, and can go on */
+  PW_RESOURCE = -1, /* out of memory, a file cannot be written */
+  PW_INPUT = -2,    /* the description or an option is wrong */
+  PW_INITIAL = -3,  /* the start cannot be made consistent */
+  PW_METHOD = -4    /* the method failed on the way */
 } pw_status;
 
 /* A caller-owned error, all zero at first: the first failure is kept, later ones do not overwrite it.  NULL in the place of
@@ -80,7 +80,7 @@ typedef struct {
 /* A signal computed by the caller.  `eval` stores the value and, if the signal serves a constraint, its first and
  * second time derivative in value[0..2]; x holds the states named in `reads`, in that order, and gradient (NULL
  * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run.  For the same t
- * and x it must give the same values, but for changes between steps that pw_restart follows (a torque that a controller
+ * and x it must give the same values, but for changes between steps that pw_run_restart follows (a torque that a controller
  * of yours sets anew). */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
@@ -121,7 +121,7 @@ typedef struct {
 
 /* Through points. */
 typedef struct {
-  const double *t;     /* times of its points, increasing [s]; pw_add and pw_set_signal copy the points */
+  const double *t;     /* times of its points, increasing [s]; pw_add and pw_model_set_signal copy the points */
   const double *value; /* at these times; the first and the last are held outside */
   int count;           /* of points: at least 2, of a cubic table with free ends 4 */
   int interpolation;   /* PW_LINEAR, PW_CUBIC: a spline with continuous rate and acceleration */
@@ -233,7 +233,7 @@ typedef struct {
   const pw_plugin_table pw_plugin = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), __VA_ARGS__ }
 
 /* Adds a body.  The model keeps a copy, the name included.  Returns PW_OK or the first error of the model, which
- * pw_build reports: a build function need not look at it. */
+ * pw_model_build reports: a build function need not look at it. */
 int pw_add_body (pw_model *m, const pw_body *body);
 
 /* Adds an element of any kind; `definition` is the kind's definition structure, of which a copy is kept, names and
@@ -241,7 +241,7 @@ int pw_add_body (pw_model *m, const pw_body *body);
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 
 /* Lets a build function refuse what it was given ("links: at most 1000").  Returns the status. */
-int pw_refuse (pw_model *m, const char *format, ...);
+int pw_model_refuse (pw_model *m, const char *format, ...);
 
 /* Jacobi's amplitude am (u | m) and the complete elliptic integral K (m), m = k^2 <= 1 (NaN above): sn = sin (am).  A
  * pendulum let go at an angle A from its lowest point is at 2 asin (k sn (K - w t)), k = sin (A / 2). */
@@ -538,7 +538,7 @@ typedef struct {
   double start;     /* its value at the start [rad] */
   double rate;      /* its rate at the start [rad/s] */
   int specified[2]; /* 1: start, rate are what the definition says, not a consequence of something else */
-} pw_own;
+} pw_internal;
 
 /* Where a body is and how it moves; the ground is a body at rest at the origin. */
 typedef struct {
@@ -563,10 +563,10 @@ typedef struct {
 } pw_batch;
 
 /* Fills one array for the whole batch. */
-typedef void pw_sweep (const pw_batch *b, double *out);
+typedef void pw_batch_function (const pw_batch *b, double *out);
 
 /* In a second-order block's place: asks the core to difference the function below it. */
-pw_sweep pw_by_differences;
+pw_batch_function pw_by_differences;
 #define PW_BY_DIFFERENCES pw_by_differences
 
 typedef enum {
@@ -596,28 +596,30 @@ struct pw_kind {
 
   /* Turns a checked definition into a prepared element; bodies are those it names or acts on, in order, the ground as
    * a body without mass.  own takes mass and start of each own coordinate, zero so far.  Returns a status. */
-  int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_own *own, pw_error *error);
+  int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+                  pw_error *error);
 
-  pw_sweep *g;       /* rows: residual of holonomic rows */
-  pw_sweep *g_size;  /* rows: sum of the absolute values of the terms of g, against which g is judged */
-  pw_sweep *eta;     /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
-  pw_sweep *J;       /* rows x cols */
-  pw_sweep *gamma;   /* rows: right-hand side of J a = gamma */
-  pw_sweep *force;   /* cols: generalised force */
-  pw_sweep *force_u; /* cols x signals: derivative of the force by each signal's value */
-  pw_sweep *jw_q;    /* rows x cols: derivative of J w by q, w given in the batch; that of J^T lambda follows from it */
-  pw_sweep *eta_q;   /* rows x cols */
-  pw_sweep *gamma_q; /* rows x cols */
-  pw_sweep *gamma_v; /* rows x cols */
-  pw_sweep *force_q; /* cols x cols */
-  pw_sweep *force_v; /* cols x cols */
-  pw_sweep *energy;  /* 1: potential energy [J] */
-  pw_sweep *power;   /* 1: power the element feeds into the system [W] */
-  pw_sweep *loss;    /* 1: power it dissipates [W], >= 0 */
-  pw_sweep *contact; /* 3: point on the ground [m] and heading [rad], for paths and pictures */
+  pw_batch_function *g;       /* rows: residual of holonomic rows */
+  pw_batch_function *g_size;  /* rows: sum of the absolute values of the terms of g, against which g is judged */
+  pw_batch_function *eta;     /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
+  pw_batch_function *J;       /* rows x cols */
+  pw_batch_function *gamma;   /* rows: right-hand side of J a = gamma */
+  pw_batch_function *force;   /* cols: generalised force */
+  pw_batch_function *force_u; /* cols x signals: derivative of the force by each signal's value */
+  pw_batch_function
+      *jw_q; /* rows x cols: derivative of J w by q, w given in the batch; that of J^T lambda follows from it */
+  pw_batch_function *eta_q;   /* rows x cols */
+  pw_batch_function *gamma_q; /* rows x cols */
+  pw_batch_function *gamma_v; /* rows x cols */
+  pw_batch_function *force_q; /* cols x cols */
+  pw_batch_function *force_v; /* cols x cols */
+  pw_batch_function *energy;  /* 1: potential energy [J] */
+  pw_batch_function *power;   /* 1: power the element feeds into the system [W] */
+  pw_batch_function *loss;    /* 1: power it dissipates [W], >= 0 */
+  pw_batch_function *contact; /* 3: point on the ground [m] and heading [rad], for paths and pictures */
   /* 2 cols: a force that saturates, such as friction; by how much each coordinate, then each velocity, may change until the
    * force has changed by its own size.  INFINITY, already there, where it does not saturate.  NULL: nowhere. */
-  pw_sweep *saturation;
+  pw_batch_function *saturation;
 };
 
 /* How many values a field stands for, and the bytes of one; 0: there is no such type. */
@@ -658,19 +660,19 @@ extern const pw_kind *const pw_kinds[];
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error);
 void pw_model_free (pw_model *m);
 
-/* Sets a parameter before pw_build.  Errors: unknown name, value outside its domain. */
-int pw_set (pw_model *m, const char *parameter, double value, pw_error *error);
+/* Sets a parameter before pw_model_build.  Errors: unknown name, value outside its domain. */
+int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *error);
 
 /* Runs the model's build function.  Errors: whatever an added body or element is wrong about. */
-int pw_build (pw_model *m, pw_error *error);
+int pw_model_build (pw_model *m, pw_error *error);
 
-/* Replaces a signal of a built model: pw_set_signal (m, "rider", "value", &signal, e).  Errors: PW_INPUT for an element or
- * field that does not exist, with the nearest name; whether the field can take the signal is pw_compile's to tell. */
-int pw_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
+/* Replaces a signal of a built model: pw_model_set_signal (m, "rider", "value", &signal, e).  Errors: PW_INPUT for an element or
+ * field that does not exist, with the nearest name; whether the field can take the signal is pw_system_compile's to tell. */
+int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
 
 /* Gives a start value, "frame.vx" or "wheel.spin", which the consistent start then holds.  Errors: PW_INPUT for a value that
- * is not finite; whether there is such a state is pw_compile's to tell. */
-int pw_set_start (pw_model *m, const char *state, double value, pw_error *error);
+ * is not finite; whether there is such a state is pw_system_compile's to tell. */
+int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error *error);
 
 /* ---- What a model consists of ---- */
 
@@ -688,7 +690,7 @@ const pw_element *pw_model_elements (const pw_model *m, int *count);
 static inline const char *pw_element_name (const pw_element *e) {
   return *(const char *const *)e->definition;
 }
-int pw_model_starts (const pw_model *m); /* how many values pw_set_start has given */
+int pw_model_initial (const pw_model *m); /* how many values pw_model_set_initial has given */
 
 /* What a text model knows about its motion: expressions of the time for some states; and the values of the names in these
  * and in signals. */
@@ -700,26 +702,26 @@ typedef struct {
   double *value;                                   /* names */
   double (*eval) (void *context, int i, double t); /* the value of expression i */
   void *context;
-} pw_truth_text;
-const pw_truth_text *pw_model_truth (const pw_model *m);           /* all zero: it knows nothing */
-void pw_model_set_truth (pw_model *m, const pw_truth_text *truth); /* which must live as long as the model */
+} pw_reference_text;
+const pw_reference_text *pw_model_reference (const pw_model *m);           /* all zero: it knows nothing */
+void pw_model_set_reference (pw_model *m, const pw_reference_text *truth); /* which must live as long as the model */
 
 /* ---- For build functions that read their models from elsewhere ---- */
 
-/* Frees an object with the model: memory of function signals, for instance.  PW_MACHINE, and the object is freed at once. */
+/* Frees an object with the model: memory of function signals, for instance.  PW_RESOURCE, and the object is freed at once. */
 int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object));
 
 /* The first error of a model, which a build function may set. */
 pw_error *pw_model_error (pw_model *m);
 
-/* What pw_compile would refuse in a body, and in an element, but for bodies that do not exist; errors begin with
+/* What pw_system_compile would refuse in a body, and in an element, but for bodies that do not exist; errors begin with
  * "model NAME: ".  PW_INPUT. */
 int pw_model_check_body (const pw_model *m, const pw_body *body, pw_error *error);
 int pw_model_check_element (const pw_model *m, const pw_element *element, pw_error *error);
 
 /* What is wrong with a signal of a kind, written to the buffer, which is returned; "" if nothing is.  *point becomes the point
  * of a table that is meant, or -1. */
-char *pw_signal_fault (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
+char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
 
 /* Checks a plug-in's table: its ABI, that it can build, its texts and parameters.  Errors: PW_INPUT, beginning with `what`, a path
  * or "model NAME". */
@@ -736,42 +738,42 @@ typedef struct pw_system pw_system;
 typedef struct pw_workspace pw_workspace;
 
 /* Checks and compiles a built model.  NULL with the error filled if it cannot be. */
-pw_system *pw_compile (const pw_model *m, pw_error *error);
-void pw_free (pw_system *s);
+pw_system *pw_system_compile (const pw_model *m, pw_error *error);
+void pw_system_free (pw_system *s);
 
 /* 1 if a built model knows its motion (see pw_plugin_table), and what it knows at time t: q and v have as many entries as
  * the system compiled from it has coordinates; what is not known is NaN.  It holds for the described start, not for values
- * of pw_set_start.  Errors: PW_INPUT for a state the system does not have. */
-int pw_has_truth (const pw_model *m);
-int pw_true_state (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error);
+ * of pw_model_set_initial.  Errors: PW_INPUT for a state the system does not have. */
+int pw_system_has_reference (const pw_model *m);
+int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error);
 
 /* Sizes: bodies, coordinates (q and v have as many entries each), constraint rows, of which the first are holonomic. */
-int pw_count_bodies (const pw_system *s);
-int pw_count_coordinates (const pw_system *s);
-int pw_count_rows (const pw_system *s);
-int pw_count_holonomic (const pw_system *s);
+int pw_system_bodies (const pw_system *s);
+int pw_system_coordinates (const pw_system *s);
+int pw_system_rows (const pw_system *s);
+int pw_system_holonomic (const pw_system *s);
 
 /* Index of a body by name, or -1. */
-int pw_find_body (const pw_system *s, const char *name);
+int pw_system_find_body (const pw_system *s, const char *name);
 
 /* Index of a state by name: i for coordinate q[i], n + i for its rate v[i], n the number of coordinates.  PW_INPUT
  * and the error, with the nearest name, if there is no such state. */
-int pw_find_state (const pw_system *s, const char *name, pw_error *error);
+int pw_system_find_state (const pw_system *s, const char *name, pw_error *error);
 
 /* The name and unit of a state ("frame.vx", "m/s"); the name is written to the buffer, which is returned. */
-char *pw_state_name (const pw_system *s, int state, char *buffer, size_t size);
-const char *pw_state_unit (const pw_system *s, int state);
+char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size);
+const char *pw_system_state_unit (const pw_system *s, int state);
 
-/* The name and unit of a row's reaction ("B.Fx", "N"), as pw_state_name. */
-char *pw_reaction_name (const pw_system *s, int row, char *buffer, size_t size);
-const char *pw_reaction_unit (const pw_system *s, int row);
+/* The name and unit of a row's reaction ("B.Fx", "N"), as pw_system_state_name. */
+char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size);
+const char *pw_system_reaction_unit (const pw_system *s, int row);
 
 /* The row whose reaction has this name: its value is -lambda[row] of a sample.  PW_INPUT and the error, with the nearest
  * name, if there is none. */
-int pw_find_reaction (const pw_system *s, const char *name, pw_error *error);
+int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error);
 
-/* The kind and name of a row's element ("wheel C"), as pw_state_name. */
-char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size);
+/* The kind and name of a row's element ("wheel C"), as pw_system_state_name. */
+char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size);
 
 /* Its name; the name of a body; the diagonal of M [kg], [kg m^2]: one number per coordinate; the length scale L [m]. */
 const char *pw_system_name (const pw_system *s);
@@ -796,7 +798,7 @@ typedef struct {
   int row;             /* its first constraint equation, of kind->rows */
   int coordinate;      /* its first internal coordinate, of kind->own */
   int contact;         /* index of its contact point; -1: it has none */
-  int force;           /* where its forces begin in pw_system_forces */
+  int force;           /* where its forces begin in pw_workspace_forces */
 } pw_element_info;
 int pw_system_elements (const pw_system *s);
 pw_element_info pw_system_element (const pw_system *s, int element);
@@ -806,18 +808,18 @@ int pw_system_row_element (const pw_system *s, int row); /* the element of a con
 pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error);
 void pw_workspace_free (pw_workspace *w);
 
-/* The functions below evaluate a state.  Errors: PW_METHOD if a signal fails, PW_MACHINE. */
+/* The functions below evaluate a state.  Errors: PW_METHOD if a signal fails, PW_RESOURCE. */
 
 /* Point on the ground [m] and heading [rad] of each contact. */
 int pw_system_contacts (const pw_system *s);
-int pw_system_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
-                              pw_error *error);
+int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
+                                 pw_error *error);
 
 /* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies, the ground's without
  * meaning: -J^T lambda and what it applies.  Constraint equations on velocities count alike. */
 int pw_system_force_size (const pw_system *s);
-int pw_system_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
-                      pw_error *error);
+int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
+                         pw_error *error);
 
 /* The equations M a + J^T lambda = f,  J v = eta,  J a = gamma at a state.  J by its entries, those that are 0 here among
  * them, row by row of each element; there is at most one for each row and column. */
@@ -833,9 +835,9 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error);
 void pw_equations_free (pw_equations *e); /* in every case */
 
-/* Second-order blocks that are PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as pw_state_name. */
-int pw_count_differences (const pw_system *s);
-char *pw_difference_name (const pw_system *s, int i, char *buffer, size_t size);
+/* Second-order blocks that are PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as pw_system_state_name. */
+int pw_system_differences (const pw_system *s);
+char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 
 #ifdef __GNUC__
 #pragma GCC visibility pop

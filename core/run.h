@@ -57,24 +57,25 @@ typedef struct {
 /* The state at one time.  The arrays belong to the run and hold until its next call. */
 typedef struct {
   double t;
-  const double *q, *v;  /* coordinates and rates: pw_count_coordinates each */
+  const double *q, *v;  /* coordinates and rates: pw_system_coordinates each */
   const double *a;      /* accelerations */
-  const double *lambda; /* multipliers, M a + J^T lambda = f: pw_count_rows */
+  const double *lambda; /* multipliers, M a + J^T lambda = f: pw_system_rows */
   double position;      /* scaled residual of g = 0 here */
   double velocity;      /* scaled residual of J v = eta here */
   double kinetic;       /* [J] */
   double potential;     /* [J] */
-  const double *ledger; /* work or loss of each entry of the ledger [J]: pw_count_ledger; NULL if not asked for */
-  double work;          /* fed in by active elements and drives since the start [J] */
-  double loss;          /* dissipated [J] */
-  double projection;    /* energy added by projections behind steps [J]; 0 without pw_settings.ledger */
-  double balance;       /* (kinetic + potential) - at the start - work + loss - projection [J] */
+  const double
+      *ledger;       /* work or loss of each entry of the ledger [J]: pw_system_ledger_entries; NULL if not asked for */
+  double work;       /* fed in by active elements and drives since the start [J] */
+  double loss;       /* dissipated [J] */
+  double projection; /* energy added by projections behind steps [J]; 0 without pw_settings.ledger */
+  double balance;    /* (kinetic + potential) - at the start - work + loss - projection [J] */
 } pw_sample;
 
 /* Entries of the ledger: the name of entry i is "rider.work" or "damper.loss"; "drag.frame.loss" of an element that
  * acts on every body. */
-int pw_count_ledger (const pw_system *s);
-char *pw_ledger_name (const pw_system *s, int entry, char *buffer, size_t size);
+int pw_system_ledger_entries (const pw_system *s);
+char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size);
 
 /* What the consistent start did. */
 typedef struct {
@@ -85,7 +86,7 @@ typedef struct {
   int changed;                     /* of the states moved, those that the model specifies */
   double position, velocity;       /* scaled residuals before */
   double time;                     /* time scale of the run [s] */
-} pw_start_report;
+} pw_initial_report;
 
 /* ---- Saved states ---- */
 
@@ -94,14 +95,14 @@ typedef struct {
   unsigned char *at;
   size_t used; /* saved so far; taken so far when loading */
   size_t size; /* room; all there is when loading */
-  int loading; /* 1: pw_carry takes bytes out */
+  int loading; /* 1: pw_archive_bytes takes bytes out */
   int failed;  /* out of memory; when loading: more was asked for than there is */
 } pw_archive;
 
 /* Saves bytes, or loads them: one function that lists what a state consists of serves both ways. */
-void pw_carry (pw_archive *a, void *bytes, size_t count);
-void pw_carry_count (pw_archive *a, long *count); /* fails for what no count can be, or none that goes on */
-void pw_archive_clear (pw_archive *a);            /* back to the beginning */
+void pw_archive_bytes (pw_archive *a, void *bytes, size_t count);
+void pw_archive_count (pw_archive *a, long *count); /* fails for what no count can be, or none that goes on */
+void pw_archive_clear (pw_archive *a);              /* back to the beginning */
 void pw_archive_free (pw_archive *a);
 
 #ifdef __GNUC__

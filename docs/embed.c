@@ -30,21 +30,21 @@ int main (void) {
 
   pw_file *file = pw_file_open ("ezyroller", &e);
   pw_model *model = pw_file_model (file, &e);
-  pw_set (model, "a", 0.6, &e);
-  pw_build (model, &e);
-  pw_set_signal (model, "rider", "value", &torque, &e);
-  pw_system *system = pw_compile (model, &e);
-  pw_run *run = pw_open (system, "rk4+projection", &(pw_settings){ .step = 1e-3 }, &e);
-  pw_advance_to (run, 10, 10, &e);
-  pw_at (run, 10, &now, &e);
+  pw_model_set (model, "a", 0.6, &e);
+  pw_model_build (model, &e);
+  pw_model_set_signal (model, "rider", "value", &torque, &e);
+  pw_system *system = pw_system_compile (model, &e);
+  pw_run *run = pw_run_open (system, "rk4+projection", &(pw_settings){ .step = 1e-3 }, &e);
+  pw_run_advance_to (run, 10, 10, &e);
+  pw_run_sample (run, 10, &now, &e);
 
   if (e.status == PW_OK) {
-    const double *frame = now.q + 3 * pw_find_body (system, "frame");
+    const double *frame = now.q + 3 * pw_system_find_body (system, "frame");
     printf ("frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t, frame[0], frame[1], frame[2]);
   } else
     fprintf (stderr, "embed: %s\n", e.text);
-  pw_close (run);
-  pw_free (system);
+  pw_run_close (run);
+  pw_system_free (system);
   pw_model_free (model);
   pw_file_close (file);
   return -e.status;

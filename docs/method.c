@@ -17,7 +17,7 @@ static int kutta3_open (pw_run *r, pw_error *error) {
  * and k = (v, a). */
 static int kutta3_advance (pw_run *r, double t_end, pw_error *error) {
   const pw_state x = pw_run_state (r);
-  const int n = pw_count_coordinates (x.system);
+  const int n = pw_system_coordinates (x.system);
   const double h = pw_step_size (r, t_end);
   double *array[ARRAYS];
   for (int i = 0; i < ARRAYS; i++) array[i] = pw_step_array (r, i);
@@ -26,12 +26,12 @@ static int kutta3_advance (pw_run *r, double t_end, pw_error *error) {
     q[j] = x.q[j] + h / 2 * x.v[j];
     v2[j] = x.v[j] + h / 2 * x.a[j];
   }
-  int status = pw_accelerate (r, x.t + h / 2, q, v2, a2, array[LAMBDA]);
+  int status = pw_run_accelerate (r, x.t + h / 2, q, v2, a2, array[LAMBDA]);
   for (int j = 0; j < n; j++) {
     q[j] = x.q[j] + h * (2 * v2[j] - x.v[j]);
     v3[j] = x.v[j] + h * (2 * a2[j] - x.a[j]);
   }
-  if (status == PW_OK) status = pw_accelerate (r, pw_stage_time (r, x.t + h), q, v3, a3, array[LAMBDA]);
+  if (status == PW_OK) status = pw_run_accelerate (r, pw_stage_time (r, x.t + h), q, v3, a3, array[LAMBDA]);
   for (int j = 0; j < n; j++) {
     q[j] = x.q[j] + h / 6 * (x.v[j] + 4 * v2[j] + v3[j]);
     v[j] = x.v[j] + h / 6 * (x.a[j] + 4 * a2[j] + a3[j]);
@@ -63,15 +63,15 @@ static double error_of_run (const char *method, double step, pw_error *e) {
   pw_sample now;
   pw_file *file = pw_file_open ("pendulum", e);
   pw_model *model = pw_file_model (file, e);
-  pw_build (model, e);
-  pw_system *system = pw_compile (model, e);
-  pw_run *run = pw_open (system, method, &(pw_settings){ .step = step, .methods = methods }, e);
-  pw_advance_to (run, t_end, t_end, e);
-  pw_at (run, t_end, &now, e);
-  if (e->status == PW_OK && pw_true_state (model, system, t_end, q, v, e) == PW_OK)
-    for (int j = 0; j < pw_count_coordinates (system); j++) most = fmax (most, fabs (now.q[j] - q[j]));
-  pw_close (run);
-  pw_free (system);
+  pw_model_build (model, e);
+  pw_system *system = pw_system_compile (model, e);
+  pw_run *run = pw_run_open (system, method, &(pw_settings){ .step = step, .methods = methods }, e);
+  pw_run_advance_to (run, t_end, t_end, e);
+  pw_run_sample (run, t_end, &now, e);
+  if (e->status == PW_OK && pw_system_reference (model, system, t_end, q, v, e) == PW_OK)
+    for (int j = 0; j < pw_system_coordinates (system); j++) most = fmax (most, fabs (now.q[j] - q[j]));
+  pw_run_close (run);
+  pw_system_free (system);
   pw_model_free (model);
   pw_file_close (file);
   return most;

@@ -25,7 +25,7 @@ static const pw_field attraction_fields[] = {
   { .name = NULL },
 };
 
-static int attraction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int attraction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                                pw_error *error) {
   (void)bodies, (void)own, (void)error;
   *(double *)element = ((const attraction *)definition)->strength;
@@ -93,7 +93,7 @@ typedef struct {
   double x, y, a, p, r;
 } wire_element;
 
-static int wire_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int wire_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
   const wire *d = definition;
   double a = d->axis[0], b = d->axis[1];
@@ -193,7 +193,7 @@ static const pw_parameter parameters[] = {
 static void build (pw_model *m, const void *parameter) {
   const model *p = parameter;
   if (p->e >= 1) {
-    pw_refuse (m, "e = %g: an ellipse has an eccentricity below 1", p->e);
+    pw_model_refuse (m, "e = %g: an ellipse has an eccentricity below 1", p->e);
     return;
   }
   double b = p->a * sqrt (1 - p->e * p->e), v = sqrt (p->mu / p->a * (1 + p->e) / (1 - p->e));

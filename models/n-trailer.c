@@ -44,7 +44,7 @@ static void build (pw_model *m, const void *parameter) {
   vehicle (m, p, "tractor", "A0", R, angle, p->m0, p->I0);
   for (int i = 1; i <= (int)p->n; i++, L += p->longer, mass *= p->ratio) {
     if (L >= R) {
-      pw_refuse (m, "R = %g: trailer %d is too long to turn on this radius", p->R, i);
+      pw_model_refuse (m, "R = %g: trailer %d is too long to turn on this radius", p->R, i);
       return;
     }
     R = sqrt (R * R - L * L);

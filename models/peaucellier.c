@@ -54,7 +54,7 @@ static void build (pw_model *m, const void *parameter) {
   const inversor *p = parameter;
   double OB = 2 * p->a * cos (p->swing / 2), L = p->L / 2, r = p->s / 2;
   if (OB <= fabs (p->L - p->s) || 2 * p->a >= p->L + p->s) {
-    pw_refuse (m, "swing = %g: arms and rhombus do not reach the crank there", p->swing);
+    pw_model_refuse (m, "swing = %g: arms and rhombus do not reach the crank there", p->swing);
     return;
   }
   joints j = place (p, p->swing);

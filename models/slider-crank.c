@@ -27,7 +27,7 @@ static void build (pw_model *m, const void *parameter) {
   const slider_crank *p = parameter;
   double c = cos (p->theta), s = sin (p->theta), w = p->omega;
   if (p->l1 * fabs (s) > p->l2) {
-    pw_refuse (m, "l2 = %g: the rod does not reach the slider's axis at theta = %g", p->l2, p->theta);
+    pw_model_refuse (m, "l2 = %g: the rod does not reach the slider's axis at theta = %g", p->l2, p->theta);
     return;
   }
   double beta = -asin (p->l1 * s / p->l2), rate = -p->l1 * c * w / (p->l2 * cos (beta));

@@ -33,7 +33,7 @@ struct pw_run {
   double calm;           /* the largest accelerations away from singular poses, in units of L / T^2; at least 1 */
   double before;         /* those of the last state away from them */
   int differentiates;    /* 1: the method uses the derivatives of the equations (tangent.h) */
-  double alpha, beta;    /* Baumgarte's, used by pw_accelerate; 0: none */
+  double alpha, beta;    /* Baumgarte's, used by pw_run_accelerate; 0: none */
   double breakpoint;     /* first discontinuity of a signal after t */
   int stuck;             /* steps in a row that were as good as none */
   pw_residuals known;    /* of the state reached; NaN: not yet judged, nor told by a projection */
@@ -46,7 +46,7 @@ struct pw_run {
   double *rate;      /* entries: their rates at t */
   double projected;  /* energy added by projections up to t; only counted with settings.ledger */
 
-  /* the state asked for by pw_at */
+  /* the state asked for by pw_run_sample */
   double t_at;
   double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* the same block, from q_at on */
   double projected_at;
@@ -67,7 +67,7 @@ struct pw_run {
   double *matrix_state, *matrix_range; /* 2 coords: where the Newton matrix was evaluated; how far it serves */
   int outdated;                        /* 1: the state reached is farther */
   double *q_given, *v_given;
-  pw_start_report start;
+  pw_initial_report start;
   pw_statistics statistics;
   pw_method_data *data; /* the integrator's own */
   char *memory;
@@ -77,13 +77,13 @@ struct pw_run {
 static inline double pw_atol (const pw_run *r, int j) {
   return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j);
 }
-static inline double pw_atol_rate (const pw_run *r, int j) {
+static inline double pw_atol_velocity (const pw_run *r, int j) {
   return r->settings.atol > 0 ? r->settings.atol : r->settings.rtol * pw_unit (r->s, j) / r->w->scale.time;
 }
 /* Takes over how small a change of the state reached, which is placed, reverses a force that saturates; and notes whether the
  * Newton matrix is `outdated` by it (tolerances.c). */
 void pw_bound_tolerances (pw_run *r);
-/* By how much a state (as pw_find_state numbers them) may change from the state reached until a force reverses. */
+/* By how much a state (as pw_system_find_state numbers them) may change from the state reached until a force reverses. */
 double pw_saturation_range (const pw_run *r, int state);
 /* The Newton matrix is that of this state, which is placed. */
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
@@ -92,8 +92,8 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
 static inline double pw_tolerance (const pw_run *r, int j, double q) {
   return fmin (r->settings.rtol * fabs (q) + pw_atol (r, j), r->saturation[j]);
 }
-static inline double pw_tolerance_rate (const pw_run *r, int j, double v) {
-  return fmin (r->settings.rtol * fabs (v) + pw_atol_rate (r, j), r->saturation[r->s->coords + j]);
+static inline double pw_tolerance_velocity (const pw_run *r, int j, double v) {
+  return fmin (r->settings.rtol * fabs (v) + pw_atol_velocity (r, j), r->saturation[r->s->coords + j]);
 }
 /* 1 if the run takes steps of the given size. */
 static inline int pw_fixed_steps (const pw_run *r) {
@@ -158,10 +158,10 @@ static inline double pw_largest (double most, double x) {
 }
 
 /* The size of the accelerations at the state reached, in units of L / T^2 (judge.c). */
-double pw_run_agitation (const pw_run *r);
+double pw_run_acceleration_norm (const pw_run *r);
 /* Looks at the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
  * another branch. */
-int pw_run_judge (pw_run *r, pw_error *error);
+int pw_run_watchdog (pw_run *r, pw_error *error);
 
 /* ---- Limits (limits.c) ---- */
 
@@ -196,7 +196,7 @@ double pw_ledger_tolerance (const pw_run *r, double h);
 
 /* ---- Dynamics ---- */
 
-/* pw_accelerate leaves J swept and the saddle factorised. */
+/* pw_run_accelerate leaves J swept and the saddle factorised. */
 
 /* A step that ends at a discontinuity sees what the signals are just before it. */
 static inline double pw_before_breakpoint (const pw_run *r, double t) {
@@ -204,10 +204,10 @@ static inline double pw_before_breakpoint (const pw_run *r, double t) {
 }
 
 /* The same where J is swept and the saddle factorised at this pose, and the rates are placed. */
-void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda);
+void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* The same where J is swept and the rates are placed, but the saddle is not factorised; gamma is in lambda. */
-int pw_accelerate_swept (pw_run *r, const double *v, double *a, double *lambda);
+int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* The state reached, into the sample arrays; the system is placed there, J swept. */
 void pw_show_reached (pw_run *r);
@@ -265,9 +265,9 @@ void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
 
 /* ---- Start ---- */
 
-/* Makes r->q, r->v consistent at r->t and fills the report.  Errors: PW_START. */
-int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error);
+/* Makes r->q, r->v consistent at r->t and fills the report.  Errors: PW_INITIAL. */
+int pw_run_make_consistent (pw_run *r, const unsigned char *held, pw_error *error);
 /* Counts what moved in the report, when the scales are known. */
-void pw_count_moved (pw_run *r);
+void pw_run_count_moved (pw_run *r);
 
 #endif

@@ -14,7 +14,7 @@
   PW_METHOD (galpha) \
   PW_METHOD (leapfrog)
 
-/* pw_parse_method that keeps the options, values has room for PW_MAX_OPTIONS, and looks through `own` methods, too (NULL: there
+/* pw_method_parse that keeps the options, values has room for PW_MAX_OPTIONS, and looks through `own` methods, too (NULL: there
  * are none). */
 int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
                       double *values, pw_error *error);

@@ -1,7 +1,7 @@
 /* Integration methods of your own, compiled against the installed headers (docs/method.c is one).
  *
  * A method is a const pw_method table (pinwheel-solvers.h).  A program hands its tables to runs in pw_settings.methods; their
- * names then work in pw_open as those of the built-in methods do, with stabilisations and options.  The run makes the start
+ * names then work in pw_run_open as those of the built-in methods do, with stabilisations and options.  The run makes the start
  * consistent, calls `open`, and then `advance` for each step: one that ends at or before t_end and the next discontinuity.  It
  * evaluates the state reached, watches constraints and energy, and calls `restart` behind a discontinuity.
  *
@@ -12,7 +12,7 @@
  *     static int euler_advance (pw_run *r, double t_end, pw_error *error) {
  *       const pw_state x = pw_run_state (r);
  *       double h = pw_step_size (r, t_end), *q = pw_step_array (r, 0), *v = pw_step_array (r, 1);
- *       for (int j = 0; j < pw_count_coordinates (x.system); j++) q[j] = x.q[j] + h * (v[j] = x.v[j] + h * x.a[j]);
+ *       for (int j = 0; j < pw_system_coordinates (x.system); j++) q[j] = x.q[j] + h * (v[j] = x.v[j] + h * x.a[j]);
  *       return pw_step_accept (r, PW_OK, h, q, v, error);
  *     }
  *
@@ -43,18 +43,18 @@ typedef struct {
 pw_state pw_run_state (const pw_run *r);
 
 /* The value of an option of the method's table; of a choice its index; 0 if there is none. */
-double pw_option_value (const pw_run *r, const char *name);
+double pw_run_option (const pw_run *r, const char *name);
 
 /* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the stabilisation is PW_BAUMGARTE and the table has the
  * options alpha and beta.  PW_RETRY in a singular configuration; PW_METHOD if a signal failed. */
-int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
+int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
 
 /* The time of a stage: a step that ends at a discontinuity evaluates signals just before it. */
 double pw_stage_time (const pw_run *r, double t);
 
 /* ---- One-step methods ---- */
 
-/* Opens what these functions keep for a run, with so many arrays for the method.  Errors: PW_MACHINE. */
+/* Opens what these functions keep for a run, with so many arrays for the method.  Errors: PW_RESOURCE. */
 int pw_step_open (pw_run *r, int arrays, pw_error *error);
 
 /* Array i, the same in every step: room for coordinates or for constraint equations, whichever are more. */
@@ -72,8 +72,9 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
 int pw_step_at (pw_run *r, double t, pw_error *error);
 int pw_step_restart (pw_run *r, pw_error *error);
 void pw_step_close (pw_run *r);
-void pw_step_carry (pw_run *r, pw_archive *a);
-#define PW_STEP_FUNCTIONS .at = pw_step_at, .restart = pw_step_restart, .close = pw_step_close, .carry = pw_step_carry
+void pw_step_serialise (pw_run *r, pw_archive *a);
+#define PW_STEP_FUNCTIONS \
+  .at = pw_step_at, .restart = pw_step_restart, .close = pw_step_close, .carry = pw_step_serialise
 
 #ifdef __GNUC__
 #pragma GCC visibility pop

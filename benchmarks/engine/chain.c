@@ -18,7 +18,7 @@ static long chain_hand (void *context, long n) {
 
 static long chain_ours (void *context, long n) {
   chain_data *d = context;
-  for (long i = 0; i < n; i++) pw_accelerate (d->run, 0, d->q, d->v, d->a[1], d->lambda[1]);
+  for (long i = 0; i < n; i++) pw_run_accelerate (d->run, 0, d->q, d->v, d->a[1], d->lambda[1]);
   return n * d->hand.links;
 }
 
@@ -40,7 +40,7 @@ void engine_open_chain (engine_case *c) {
   c->base = (timing_work){ chain_hand, d };
   c->ours = (timing_work){ chain_ours, d };
   c->base_function = "chain_accelerate";
-  c->our_function = "pw_accelerate";
+  c->our_function = "pw_run_accelerate";
   chain_hand (d, 1);
   chain_ours (d, 1);
   c->difference = fmax (engine_difference (d->a[0], d->a[1], 3 * c->links),
@@ -51,8 +51,8 @@ void engine_close_chain (engine_case *c) {
   chain_data *d = c->data;
   double *const array[] = { d->q, d->v, d->a[0], d->a[1], d->lambda[0], d->lambda[1] };
   for (size_t i = 0; i < sizeof array / sizeof *array; i++) free (array[i]);
-  pw_close (d->run);
-  pw_free (d->system);
+  pw_run_close (d->run);
+  pw_system_free (d->system);
   chain_close (&d->hand);
   free (d);
 }
@@ -72,7 +72,7 @@ struct engine_cost {
 
 static long cost_evaluation (void *context, long n) {
   engine_cost *d = context;
-  for (long i = 0; i < n; i++) pw_accelerate (d->run, 0, d->q, d->v, d->q1, d->lambda);
+  for (long i = 0; i < n; i++) pw_run_accelerate (d->run, 0, d->q, d->v, d->q1, d->lambda);
   return n * d->system->bodies;
 }
 
@@ -100,9 +100,9 @@ static double cost_ida (engine_cost *d) {
   pw_run *r = engine_open (d->system, "ida+ggl", &(pw_settings){ .span = 1, .rtol = 1e-6 });
   double start = timing_now ();
   for (int k = 0; k < steps; k++)
-    if (pw_advance (r, 10, &error) != PW_OK) engine_die ("ida+ggl", error.text);
+    if (pw_run_advance (r, 10, &error) != PW_OK) engine_die ("ida+ggl", error.text);
   double ns = 1e9 * (timing_now () - start) / steps / d->system->bodies;
-  pw_close (r);
+  pw_run_close (r);
   return ns;
 }
 
@@ -141,8 +141,8 @@ void engine_cost_take (engine_cost *d) {
 double engine_cost_close (engine_cost *d) {
   double ns = timing_median (d->ns, d->batches);
   if (d->task == ENGINE_PROJECTION) pw_projector_close (&d->projector);
-  if (d->run) pw_close (d->run);
-  pw_free (d->system);
+  if (d->run) pw_run_close (d->run);
+  pw_system_free (d->system);
   free (d->q);
   free (d);
   return ns;

@@ -59,8 +59,8 @@ static ezy_data *ezy_open_sides (engine_case *c, int massless0, int massless1, c
 void engine_close_ezy (engine_case *c) {
   ezy_data *d = c->data;
   for (int i = 0; i < 2; i++) {
-    pw_close (d->side[i].run);
-    pw_free (d->side[i].system);
+    pw_run_close (d->side[i].run);
+    pw_system_free (d->side[i].system);
   }
   free (d);
 }
@@ -98,7 +98,7 @@ static long ezy_ours (void *context, long n) {
   ezy_side *d = context;
   for (long i = 0; i < n; i++) {
     int k = (int)(i % EZY_POOL);
-    pw_accelerate (d->run, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
+    pw_run_accelerate (d->run, d->t[k], d->q[k], d->v[k], d->a, d->lambda);
   }
   return n;
 }
@@ -121,14 +121,14 @@ void engine_open_rhs (engine_case *c) {
   c->base.run = c->massless ? ezy_hand_massless : ezy_hand_massive;
   c->ours.run = ezy_ours;
   c->base_function = c->massless ? "ezy_massless" : "ezy_massive";
-  c->our_function = "pw_accelerate";
+  c->our_function = "pw_run_accelerate";
   c->difference = ezy_compare (c, d);
 }
 
 void engine_open_light (engine_case *c) {
   ezy_open_sides (c, 0, 1, "rk4+none");
   c->base.run = c->ours.run = ezy_ours;
-  c->base_function = c->our_function = "pw_accelerate";
+  c->base_function = c->our_function = "pw_run_accelerate";
 }
 
 /* phi1'' and phi2' = omega2 are in both. */
@@ -137,7 +137,7 @@ void engine_open_minimal (engine_case *c) {
   c->base.run = ezy_hand_minimal;
   c->ours.run = ezy_ours;
   c->base_function = "ezy_minimal";
-  c->our_function = "pw_accelerate";
+  c->our_function = "pw_run_accelerate";
   for (long n = 1; n <= EZY_POOL; n++) {
     c->base.run (c->base.context, n);
     c->ours.run (c->ours.context, n);
@@ -164,8 +164,8 @@ static long ezy_our_step (void *context, long n) {
   ezy_state start;
   ezy_start (&d->hand, &start);
   for (long i = 0; i < n; i++) {
-    if (d->steps++ % EZY_ROUND == 0) pw_restart (d->run, start.q, start.v, &error);
-    pw_advance (d->run, 1e9, &error);
+    if (d->steps++ % EZY_ROUND == 0) pw_run_restart (d->run, start.q, start.v, &error);
+    pw_run_advance (d->run, 1e9, &error);
   }
   if (error.status != PW_OK) engine_die ("ezyroller", error.text);
   return n;
@@ -176,7 +176,7 @@ void engine_open_step (engine_case *c) {
   c->base.run = ezy_hand_step;
   c->ours.run = ezy_our_step;
   c->base_function = c->massless ? "ezy_massless_step" : "ezy_massive_step";
-  c->our_function = "pw_advance";
+  c->our_function = "pw_run_advance";
   c->base.run (c->base.context, 10000);
   c->ours.run (c->ours.context, 10000);
   c->difference = fmax (engine_difference (d->side[0].state.q, d->side[1].run->q, 6),
@@ -186,5 +186,5 @@ void engine_open_step (engine_case *c) {
 void engine_open_light_step (engine_case *c) {
   ezy_open_sides (c, 0, 1, "rk4+projection");
   c->base.run = c->ours.run = ezy_our_step;
-  c->base_function = c->our_function = "pw_advance";
+  c->base_function = c->our_function = "pw_run_advance";
 }

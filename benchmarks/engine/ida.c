@@ -39,13 +39,13 @@ static long ida_ours (void *context, long n) {
     pw_error error = { 0 };
     pw_run *r =
         engine_open (d->system, "ida+ggl", &(pw_settings){ .span = IDA_SPAN, .rtol = d->rtol, .atol = d->rtol });
-    while (pw_time (r) < IDA_SPAN)
-      if (pw_advance (r, IDA_SPAN, &error) != PW_OK) engine_die ("ida+ggl", error.text);
+    while (pw_run_time (r) < IDA_SPAN)
+      if (pw_run_advance (r, IDA_SPAN, &error) != PW_OK) engine_die ("ida+ggl", error.text);
     const pw_statistics *s = pw_run_statistics (r);
     all += s->steps;
     d->residuals[1] = s->rhs;
     for (int j = 0; j < 6; j++) d->q[1][j] = r->q[j];
-    pw_close (r);
+    pw_run_close (r);
   }
   return all;
 }
@@ -59,7 +59,7 @@ void engine_open_ida (engine_case *c) {
   c->base = (timing_work){ ida_hand, d };
   c->ours = (timing_work){ ida_ours, d };
   c->base_function = "ezy_ida_step";
-  c->our_function = "pw_advance";
+  c->our_function = "pw_run_advance";
   c->base_steps = ida_hand (d, 1);
   c->our_steps = ida_ours (d, 1);
   c->base_residuals = d->residuals[0];
@@ -69,6 +69,6 @@ void engine_open_ida (engine_case *c) {
 
 void engine_close_ida (engine_case *c) {
   ida_data *d = c->data;
-  pw_free (d->system);
+  pw_system_free (d->system);
   free (d);
 }

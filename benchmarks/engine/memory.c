@@ -37,9 +37,9 @@ static double memory_touch (pw_run *r, int links) {
   double *q = calloc (5 * n, sizeof *q), *v = q + n, *a = v + n, *lambda = a + n, touched = 0;
   if (q == NULL) engine_die ("memory", "out of memory");
   engine_bend (links, 0, q, v);
-  pw_accelerate (r, 0, q, v, a, lambda);
+  pw_run_accelerate (r, 0, q, v, a, lambda);
   if (memory_forget ()) {
-    pw_accelerate (r, 0, q, v, a, lambda);
+    pw_run_accelerate (r, 0, q, v, a, lambda);
     touched = memory_touched () - (double)(11 * links) * sizeof *q;
   }
   free (q);
@@ -51,13 +51,13 @@ engine_memory engine_measure_memory (int links) {
   double start = timing_now (), use0 = memory_used ();
   pw_model *m = engine_describe_chain (links);
   double use1 = memory_used ();
-  pw_system *s = pw_compile (m, &error);
+  pw_system *s = pw_system_compile (m, &error);
   if (s == NULL) engine_die ("chain", error.text);
   double use2 = memory_used (), compiled = timing_now ();
   pw_run *r = engine_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
   double use3 = memory_used (), opened = timing_now (), touched = memory_touch (r, links);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   pw_model_free (m);
   return (engine_memory){ (use1 - use0) / links, (use2 - use1) / links, (use3 - use2) / links,
                           touched / links,       compiled - start,      opened - compiled };

@@ -121,8 +121,8 @@ static pw_model *scene_describe (const char *name, void (*build) (pw_model *, co
   if (keep == NULL) engine_die (name, "out of memory");
   *keep = table;
   pw_model *m = pw_model_new (name, keep, &error);
-  if (m == NULL || pw_set (m, "n", n, &error) != PW_OK || pw_set (m, "massless", massless, &error) != PW_OK ||
-      pw_build (m, &error) != PW_OK)
+  if (m == NULL || pw_model_set (m, "n", n, &error) != PW_OK ||
+      pw_model_set (m, "massless", massless, &error) != PW_OK || pw_model_build (m, &error) != PW_OK)
     engine_die (name, error.text);
   return m;
 }
@@ -130,7 +130,7 @@ static pw_model *scene_describe (const char *name, void (*build) (pw_model *, co
 static pw_system *scene_compile (const char *name, void (*build) (pw_model *, const void *), int n, int massless) {
   pw_error error = { 0 };
   pw_model *m = scene_describe (name, build, n, massless);
-  pw_system *s = pw_compile (m, &error);
+  pw_system *s = pw_system_compile (m, &error);
   if (s == NULL) engine_die (name, error.text);
   pw_model_free (m);
   return s;
@@ -158,7 +158,7 @@ pw_model *engine_describe_chain (int links) {
 
 pw_run *engine_open (pw_system *s, const char *method, const pw_settings *settings) {
   pw_error error = { 0 };
-  pw_run *r = pw_open (s, method, settings, &error);
+  pw_run *r = pw_run_open (s, method, settings, &error);
   if (r == NULL) engine_die (method, error.text);
   return r;
 }

@@ -22,18 +22,18 @@ static int run_open (const hard_case *c, const char *method, run_cell *x, pw_err
   const pw_settings settings = { .span = c->t_end, .step = c->step, .rtol = c->rtol, .ledger = 1 };
   x->file = pw_file_open (c->model, error);
   x->model = x->file ? pw_file_model (x->file, error) : NULL;
-  for (int i = 0; x->model && i < c->sets; i++) pw_set (x->model, c->set[i].name, c->set[i].value, error);
-  if (x->model && error->status == PW_OK) pw_build (x->model, error);
+  for (int i = 0; x->model && i < c->sets; i++) pw_model_set (x->model, c->set[i].name, c->set[i].value, error);
+  if (x->model && error->status == PW_OK) pw_model_build (x->model, error);
   for (int i = 0; error->status == PW_OK && i < c->initials; i++)
-    pw_set_start (x->model, c->initial[i].name, c->initial[i].value, error);
-  if (error->status == PW_OK) x->system = pw_compile (x->model, error);
-  if (x->system) x->run = pw_open (x->system, method, &settings, error);
+    pw_model_set_initial (x->model, c->initial[i].name, c->initial[i].value, error);
+  if (error->status == PW_OK) x->system = pw_system_compile (x->model, error);
+  if (x->system) x->run = pw_run_open (x->system, method, &settings, error);
   return error->status;
 }
 
 static void run_close (run_cell *x) {
-  if (x->run) pw_close (x->run);
-  pw_free (x->system);
+  if (x->run) pw_run_close (x->run);
+  pw_system_free (x->system);
   pw_model_free (x->model);
   if (x->file) pw_file_close (x->file);
 }
@@ -48,16 +48,17 @@ static double run_worst (double a, double b) {
 /* The scene's unit of a state, from the unit it is printed with. */
 static double run_unit (const run_cell *x, const char *name) {
   const pw_scale *scale = pw_run_scale (x->run);
-  int i = pw_find_state (x->system, name, NULL);
-  const char *unit = pw_state_unit (x->system, i);
-  return (strncmp (unit, "rad", 3) == 0 ? 1 : scale->length) / (i < pw_count_coordinates (x->system) ? 1 : scale->time);
+  int i = pw_system_find_state (x->system, name, NULL);
+  const char *unit = pw_system_state_unit (x->system, i);
+  return (strncmp (unit, "rad", 3) == 0 ? 1 : scale->length) /
+         (i < pw_system_coordinates (x->system) ? 1 : scale->time);
 }
 
 static double run_error (const hard_case *c, const run_cell *x, const pw_sample *sample) {
   double worst = 0;
-  int n = pw_count_coordinates (x->system);
+  int n = pw_system_coordinates (x->system);
   for (int i = 0; i < c->references; i++) {
-    int state = pw_find_state (x->system, c->reference[i].name, NULL);
+    int state = pw_system_find_state (x->system, c->reference[i].name, NULL);
     if (state < 0) return INFINITY;
     double value = state < n ? sample->q[state] : sample->v[state - n];
     double size = fmax (fabs (c->reference[i].value), run_unit (x, c->reference[i].name));
@@ -79,7 +80,7 @@ static int run_through (const hard_case *c, const run_cell *x, hard_result *r, p
   pw_sample sample = { .t = 0 };
   for (int i = 1; i <= RUN_SAMPLES; i++) {
     double t = i == RUN_SAMPLES ? c->t_end : c->t_end * i / RUN_SAMPLES;
-    if (pw_advance_to (x->run, t, c->t_end, error) != PW_OK || pw_at (x->run, t, &sample, error) != PW_OK)
+    if (pw_run_advance_to (x->run, t, c->t_end, error) != PW_OK || pw_run_sample (x->run, t, &sample, error) != PW_OK)
       return error->status;
     balance = run_worst (balance, fabs (sample.balance));
     energy = run_worst (energy, fmax (sample.kinetic, fmax (fabs (sample.work), sample.loss)));
@@ -99,7 +100,7 @@ void hard_run (const hard_case *c, const char *method, hard_result *r) {
   for (int k = 0; k < HARD_MEASURES; k++) r->measure[k] = NAN;
   r->status = run_open (c, method, &x, &error);
   if (r->status == PW_OK) r->status = run_through (c, &x, r, &error);
-  if (x.run) r->t = pw_time (x.run);
+  if (x.run) r->t = pw_run_time (x.run);
   r->cpu = (double)clock () / CLOCKS_PER_SEC;
   memcpy (r->reason, error.text, sizeof r->reason);
   run_close (&x);
@@ -112,7 +113,7 @@ hard_verdict hard_verdict_of (const hard_case *c, const hard_result *r) {
   if (*c->stops && r->status != PW_OK && strstr (r->reason, c->stops))
     return r->t <= c->stop_time[0] ? HARD_PASS : r->t <= c->stop_time[1] ? HARD_LIMITED : HARD_WRONG;
   if (*c->stops && r->status == PW_OK) return HARD_WRONG;
-  if (r->status != PW_OK) return *r->reason && r->status < PW_MACHINE ? HARD_REFUSE : HARD_WRONG;
+  if (r->status != PW_OK) return *r->reason && r->status < PW_RESOURCE ? HARD_REFUSE : HARD_WRONG;
   if (r->t < c->t_end) return HARD_WRONG;
   for (int k = 0; k < HARD_MEASURES; k++) {
     const double *bound = c->bound[k], value = r->measure[k];

@@ -14,7 +14,7 @@ static int archive_grow (pw_archive *a, size_t count) {
   return 1;
 }
 
-void pw_carry (pw_archive *a, void *bytes, size_t count) {
+void pw_archive_bytes (pw_archive *a, void *bytes, size_t count) {
   if (count == 0 || a->failed) return;
   a->failed = a->loading ? a->size - a->used < count : !archive_grow (a, count);
   if (a->failed) return;
@@ -25,8 +25,8 @@ void pw_carry (pw_archive *a, void *bytes, size_t count) {
   a->used += count;
 }
 
-void pw_carry_count (pw_archive *a, long *count) {
-  pw_carry (a, count, sizeof *count);
+void pw_archive_count (pw_archive *a, long *count) {
+  pw_archive_bytes (a, count, sizeof *count);
   if (a->loading && (*count < 0 || *count > LONG_MAX / 2)) a->failed = 1;
 }
 

@@ -15,7 +15,7 @@ int pw_names_open (pw_names *n, size_t entries) {
   n->size = 16;
   while (n->size < 2 * entries) n->size *= 2;
   n->slot = calloc (n->size, sizeof *n->slot);
-  return n->slot ? PW_OK : PW_MACHINE;
+  return n->slot ? PW_OK : PW_RESOURCE;
 }
 
 void pw_names_close (pw_names *n) {
@@ -100,7 +100,7 @@ char *pw_take_arrays (const pw_array *array, size_t arrays) {
 
 int pw_reserve (size_t bytes) {
   void *volatile p = malloc (bytes); /* volatile: an unused allocation would be optimised away */
-  int status = p ? PW_OK : PW_MACHINE;
+  int status = p ? PW_OK : PW_RESOURCE;
   free (p);
   return status;
 }

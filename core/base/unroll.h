@@ -19,9 +19,9 @@
 /* In the place of `static` of a function beside a shorter and more frequent way through its caller, which then need not save
  * what this one uses. */
 #if defined(__GNUC__)
-#define PW_APART static __attribute__ ((noinline))
+#define PW_NOINLINE static __attribute__ ((noinline))
 #else
-#define PW_APART static
+#define PW_NOINLINE static
 #endif
 
 /* At the top of a file that reads pairs of numbers which were stored one by one: read as one vector, they would have

@@ -44,7 +44,7 @@ typedef struct {
     int value;
   } * slot;
 } pw_names;
-int pw_names_open (pw_names *n, size_t entries); /* PW_OK or PW_MACHINE */
+int pw_names_open (pw_names *n, size_t entries); /* PW_OK or PW_RESOURCE */
 void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value); /* -1, or the value the name already has */
 int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
@@ -72,7 +72,7 @@ typedef struct {
 /* Lays out arrays in one allocation, which is zeroed and returned; NULL if there is no memory. */
 char *pw_take_arrays (const pw_array *array, size_t arrays);
 
-/* PW_OK if `bytes` can be allocated now, else PW_MACHINE.  Used before calls of libraries that crash when an allocation
+/* PW_OK if `bytes` can be allocated now, else PW_RESOURCE.  Used before calls of libraries that crash when an allocation
  * fails. */
 int pw_reserve (size_t bytes);
 

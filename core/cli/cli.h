@@ -119,7 +119,7 @@ pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error);
 int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
-/* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_set or pw_set_start; `option` ("--set") is for
+/* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_model_set or pw_model_set_initial; `option` ("--set") is for
  * messages. */
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);

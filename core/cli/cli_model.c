@@ -35,15 +35,15 @@ int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error) {
   *m = (pw_cli_model){ .file = NULL };
   m->file = pw_cli_file (l, error);
   if (m->file) m->model = pw_file_model (m->file, error);
-  if (m->model && pw_cli_apply (m->model, "--set", l->sets, pw_set, error) == PW_OK &&
-      pw_cli_apply (m->model, "--start", l->starts, pw_set_start, error) == PW_OK &&
-      pw_build (m->model, error) == PW_OK)
-    m->system = pw_compile (m->model, error);
+  if (m->model && pw_cli_apply (m->model, "--set", l->sets, pw_model_set, error) == PW_OK &&
+      pw_cli_apply (m->model, "--start", l->starts, pw_model_set_initial, error) == PW_OK &&
+      pw_model_build (m->model, error) == PW_OK)
+    m->system = pw_system_compile (m->model, error);
   return m->system ? PW_OK : error->status;
 }
 
 void pw_cli_close_model (pw_cli_model *m) {
-  pw_free (m->system);
+  pw_system_free (m->system);
   pw_model_free (m->model);
   pw_file_close (m->file);
   *m = (pw_cli_model){ .file = NULL };
@@ -72,7 +72,7 @@ static int model_table (void *context, const char *path) {
   model_uses *x = context;
   x->use[0].what = "a table of the model";
   x->use[0].path = path;
-  return pw_check_uses (x->use, x->count, x->error);
+  return pw_check_paths (x->use, x->count, x->error);
 }
 
 int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error) {
@@ -80,8 +80,8 @@ int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int cou
   pw_error own = { 0 };
   char *path = file ? NULL : pw_file_find (l->argument[0], &own);
   use[0].path = file ? pw_file_path (file) : path;
-  int status = own.status == PW_MACHINE ? pw_fail (error, PW_MACHINE, "%s", own.text) : PW_OK;
-  if (status == PW_OK) status = pw_check_uses (use, count, error); /* opening the model reports what else is wrong */
+  int status = own.status == PW_RESOURCE ? pw_fail (error, PW_RESOURCE, "%s", own.text) : PW_OK;
+  if (status == PW_OK) status = pw_check_paths (use, count, error); /* opening the model reports what else is wrong */
   if (status == PW_OK && file) status = pw_file_tables (file, model_table, &x);
   use[0].path = NULL;
   free (path);

@@ -22,7 +22,7 @@ static int command_table (pw_cli_line *l, const struct poptOption *options) {
   while (!command_is_end (options + n)) n++;
   l->table = calloc (n + 2, sizeof *l->table);
   l->text = calloc (n + 2, sizeof *l->text);
-  if (l->table == NULL || l->text == NULL) return PW_MACHINE;
+  if (l->table == NULL || l->text == NULL) return PW_RESOURCE;
   n = 0;
   for (const struct poptOption *o = options; !command_is_end (o); o++) {
     if (o->longName == NULL) continue; /* a heading */
@@ -105,11 +105,11 @@ int pw_cli_at_most (const pw_command *c, const pw_cli_line *l, int most, pw_erro
 static int command_read (const pw_command *c, pw_cli_line *l, int argc, const char **argv, pw_error *error) {
   errno = 0;
   if (command_table (l, c->options) == PW_OK) l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
-  if (l->popt == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (l->popt == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int got = poptGetNextOpt (l->popt);
   for (; got > 0 && got != COMMAND_HELP; got = poptGetNextOpt (l->popt)) command_note (l, got - 1);
   if (errno == ENOMEM)
-    return pw_fail (error, PW_MACHINE, "out of memory"); /* popt leaves out what it has no room for */
+    return pw_fail (error, PW_RESOURCE, "out of memory"); /* popt leaves out what it has no room for */
   if (got == COMMAND_HELP) {
     command_help (c, l);
     return 1;
@@ -137,7 +137,7 @@ static void command_close (pw_cli_line *l) {
 int pw_cli_main (const pw_command *c, int argc, const char **argv) {
   pw_error error = { 0 };
   pw_cli_line *l = calloc (1, c->size);
-  int status = l ? command_read (c, l, argc, argv, &error) : pw_fail (&error, PW_MACHINE, "out of memory");
+  int status = l ? command_read (c, l, argc, argv, &error) : pw_fail (&error, PW_RESOURCE, "out of memory");
   status = status == PW_OK ? c->function (l, &error) : 0; /* 0 after help */
   if (l) command_close (l);
   return status > 0 ? status : pw_cli_end (&error);

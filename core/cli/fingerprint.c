@@ -34,11 +34,11 @@ int pw_print_file (pw_text *t, const char *key, const char *name, const char *pa
   uint64_t h = print_empty;
   const char *reason;
   FILE *f = pw_open_input (path, &reason);
-  if (f == NULL) return pw_fail (error, errno ? PW_MACHINE : PW_INPUT, "cannot read %s: %s", path, reason);
+  if (f == NULL) return pw_fail (error, errno ? PW_RESOURCE : PW_INPUT, "cannot read %s: %s", path, reason);
   for (size_t n; (n = fread (block, 1, sizeof block, f)) > 0;) h = print_hash (h, block, n);
   int why = ferror (f) ? errno : 0;
   fclose (f);
-  if (why) return pw_fail (error, PW_MACHINE, "cannot read %s: %s", path, strerror (why));
+  if (why) return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", path, strerror (why));
   snprintf (text, sizeof text, "%.150s, contents %016llx", name, (unsigned long long)h);
   pw_print_line (t, key, NULL, text);
   return PW_OK;
@@ -68,7 +68,7 @@ uint64_t pw_check_tables (uint64_t sum, const pw_model *m) {
   return sum;
 }
 
-void pw_print_starts (pw_text *t, const char **starts) {
+void pw_print_initial (pw_text *t, const char **starts) {
   for (; starts && *starts; starts++) {
     char name[200];
     snprintf (name, sizeof name, "%.*s", (int)strcspn (*starts, "="), *starts);

@@ -67,6 +67,6 @@ int main (int argc, char **argv) {
   int status = main_dispatch (argc, (const char **)(void *)argv);
   pw_error error = { 0 };
   if ((fflush (stdout) != 0 || ferror (stdout)) && status == 0)
-    pw_fail (&error, PW_MACHINE, "cannot write to standard output: %s", strerror (errno));
+    pw_fail (&error, PW_RESOURCE, "cannot write to standard output: %s", strerror (errno));
   return status ? status : pw_cli_end (&error);
 }

@@ -66,7 +66,7 @@ static int say_pipe_closed (void) {
 
 int pw_cli_end (const pw_error *error) {
   if (error->status == PW_OK) return 0;
-  if (error->status == PW_MACHINE && say_pipe_closed ()) return PW_CLOSED_PIPE;
+  if (error->status == PW_RESOURCE && say_pipe_closed ()) return PW_CLOSED_PIPE;
   fflush (stdout);
   int placed = strstr (error->text, ": error: ") != NULL; /* as compilers say it, so that editors find the place */
   pw_cli_say ("%s%s\n", placed ? "" : "pinwheel: ", error->text);

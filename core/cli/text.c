@@ -73,8 +73,8 @@ int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error) {
   pw_text_add (t, "\n");
   int failed = t->failed, bad = !failed && (fputs (t->at, f) < 0 || fflush (f) != 0);
   pw_text_free (t);
-  if (failed) return pw_fail (error, PW_MACHINE, "out of memory");
-  return bad ? pw_fail (error, PW_MACHINE, "cannot write into %s: %s", folder, strerror (errno)) : PW_OK;
+  if (failed) return pw_fail (error, PW_RESOURCE, "out of memory");
+  return bad ? pw_fail (error, PW_RESOURCE, "cannot write into %s: %s", folder, strerror (errno)) : PW_OK;
 }
 
 void pw_text_abandon (pw_output *o, long rows, char *part, size_t size) {

@@ -22,7 +22,7 @@ void pw_text_cell (pw_text *t, const char *text);
 void pw_text_name (pw_text *t, const char *name, const char *unit);
 /* A cell in quotes, on one line. */
 void pw_text_quoted (pw_text *t, const char *text);
-/* Ends the line, writes it to a file of the folder, and frees it.  PW_OK or PW_MACHINE. */
+/* Ends the line, writes it to a file of the folder, and frees it.  PW_OK or PW_RESOURCE. */
 int pw_text_line (pw_text *t, FILE *f, const char *folder, pw_error *error);
 
 /* Closes an incomplete table: it remains as NAME.part, whose path goes to the buffer; without rows it is removed, and the path

@@ -21,11 +21,11 @@ typedef struct {
   char folders[400]; /* the folders that are there, "/first:/second", for messages */
 } pw_search;
 
-/* Looks into every folder of the search path.  Close in every case.  PW_OK or PW_MACHINE. */
+/* Looks into every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* The folder with pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_MACHINE. */
+/* The folder with pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
 int pw_search_include (char **include, pw_error *error);
 
 /* folder + "/" + name + ending, malloced; NULL without memory. */
@@ -40,13 +40,13 @@ int pw_ends_in (const char *name, const char *ending);
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
 /* Compiles a C file in a private temporary folder, hands the object to `use` and removes both.  PW_INPUT if it does not
- * compile or there is no compiler; PW_MACHINE; or what `use` returns. */
+ * compile or there is no compiler; PW_RESOURCE; or what `use` returns. */
 int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error);
 
 /* ---- Models in YAML (yaml.c) ---- */
 
 /* A text model in memory: a plug-in's table made of it.  `shown` is the path in messages, `largest` the bytes it
- * may have.  PW_INPUT with the place of what is wrong; PW_MACHINE.  Bodies and elements are read when a model is
+ * may have.  PW_INPUT with the place of what is wrong; PW_RESOURCE.  Bodies and elements are read when a model is
  * built. */
 typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_error *error);
@@ -59,7 +59,7 @@ int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *pa
 
 /* Reads two columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first column
  * is increasing.  `unit` is the one each shall have (NULL: any), to which it is converted if the header names another.
- * PW_INPUT with "SHOWN:LINE: what is wrong", PW_MACHINE. */
+ * PW_INPUT with "SHOWN:LINE: what is wrong", PW_RESOURCE. */
 int pw_columns_read (FILE *f, const char *shown, const char *const column[2], const char *const unit[2],
                      pw_arena *arena, double *value[2], int *count, pw_error *error);
 
@@ -75,7 +75,7 @@ extern const pw_unit_name pw_unit_names[]; /* ended by a NULL name */
 /* ---- Reading (slurp.c) ---- */
 
 /* Reads the rest of a file of at most `most` bytes into *text, malloced, with a 0 after it; free it in every case. */
-int pw_slurp (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error);
+int pw_read_rest (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error);
 
 /* ---- Names of files (location.c) ---- */
 
@@ -111,9 +111,9 @@ const char *pw_lock_reason (int why);
 
 /* ---- Outputs (output.c) ---- */
 
-/* Writes; PW_MACHINE with the reason if that fails, or a write before it has failed. */
+/* Writes; PW_RESOURCE with the reason if that fails, or a write before it has failed. */
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
-/* PW_MACHINE if something written to its stream since errno was 0 has failed. */
+/* PW_RESOURCE if something written to its stream since errno was 0 has failed. */
 int pw_output_check (pw_output *o, pw_error *error);
 
 /* Whether there is something before what is written. */

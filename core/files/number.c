@@ -28,7 +28,7 @@ char *pw_format (char buffer[32], double value, int digits) {
 int pw_read_number (const char *text, double *value) {
   if (*text == 0 || isspace ((unsigned char)*text)) return PW_INPUT;
   locale_t c = newlocale (LC_ALL_MASK, "C", (locale_t)0);
-  if (c == (locale_t)0) return PW_MACHINE;
+  if (c == (locale_t)0) return PW_RESOURCE;
   locale_t before = uselocale (c);
   char *end;
   double x = strtod (text, &end);

@@ -27,7 +27,7 @@ typedef struct pw_file pw_file;
  * Nothing is taken from the current directory unless named by path.
  *
  * Errors: PW_INPUT for a model that is not found (with the nearest name), found twice (with both paths), does not
- * compile, is not a Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_MACHINE. */
+ * compile, is not a Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_RESOURCE. */
 pw_file *pw_file_open (const char *model, pw_error *error);
 
 /* The same with another limit in bytes than PW_FILE_LARGEST for a model in YAML, up to PW_FILE_MOST.  Reading one takes
@@ -91,8 +91,8 @@ typedef struct {
 } pw_use;
 
 /* Refuses a file that is written and also read, or written twice, under whatever names: files are compared by device and
- * inode, those that do not exist yet by that of their folder and their name.  PW_INPUT, PW_MACHINE. */
-int pw_check_uses (const pw_use *use, int count, pw_error *error);
+ * inode, those that do not exist yet by that of their folder and their name.  PW_INPUT, PW_RESOURCE. */
+int pw_check_paths (const pw_use *use, int count, pw_error *error);
 
 /* ---- Complete files ---- */
 
@@ -103,17 +103,17 @@ int pw_check_uses (const pw_use *use, int count, pw_error *error);
  * a device), and open descriptors (/dev/stdout, /dev/fd/N), are written directly. */
 typedef struct pw_output pw_output;
 
-/* Errors: PW_MACHINE with the path and the reason, also if another process is writing it. */
+/* Errors: PW_RESOURCE with the path and the reason, also if another process is writing it. */
 pw_output *pw_output_open (const char *path, pw_error *error);
 /* The same with another ending of the temporary name than ".part"; what is incomplete is then removed. */
 pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error);
 FILE *pw_output_stream (pw_output *o); /* stdout for "-", /dev/stdout, /dev/fd/1 */
 /* Whether it is a regular file of its own, not written directly. */
 int pw_output_is_file (const pw_output *o);
-/* Writes all to the disk and closes the stream, so that nothing but the name is missing.  PW_MACHINE. */
+/* Writes all to the disk and closes the stream, so that nothing but the name is missing.  PW_RESOURCE. */
 int pw_output_ready (pw_output *o, pw_error *error);
 /* Completes and frees: the file is written to the disk, then renamed, then its folder is written to the disk.
- * PW_MACHINE if anything failed: NAME.part remains and the text names it. */
+ * PW_RESOURCE if anything failed: NAME.part remains and the text names it. */
 int pw_output_finish (pw_output *o, pw_error *error);
 /* The same for several outputs, NULL among them, which all become complete or all keep their temporary names. */
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
@@ -123,12 +123,12 @@ char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
 /* Gives up and frees, and removes NAME.part. */
 void pw_output_discard (pw_output *o);
 
-/* The path of a regular file to be written, links followed, for the caller to free.  NULL and PW_MACHINE. */
+/* The path of a regular file to be written, links followed, for the caller to free.  NULL and PW_RESOURCE. */
 char *pw_output_path (const char *path, pw_error *error);
 /* Opens a file for reading and writing, creates it if there is none, and locks it until the descriptor that is returned is
- * closed.  A symbolic link is not followed.  -1 and PW_MACHINE, also if another process has it. */
+ * closed.  A symbolic link is not followed.  -1 and PW_RESOURCE, also if another process has it. */
 int pw_lock_path (const char *path, pw_error *error);
-/* Locks a folder for this process until the descriptor that is returned is closed.  -1 and PW_MACHINE, also if another
+/* Locks a folder for this process until the descriptor that is returned is closed.  -1 and PW_RESOURCE, also if another
  * process writes into it. */
 int pw_lock_folder (const char *path, pw_error *error);
 
@@ -137,10 +137,10 @@ typedef struct {
   unsigned long long length, check; /* bytes; a check sum of the last of them */
 } pw_mark;
 
-/* Writes all output to the disk.  Errors: PW_MACHINE; PW_INPUT if it is not a regular file. */
+/* Writes all output to the disk.  Errors: PW_RESOURCE; PW_INPUT if it is not a regular file. */
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error);
 /* Opens NAME.part once more and cuts off what was written after the mark.  A table goes on without a header.  PW_INPUT if it
- * is not there or not what was marked; PW_MACHINE. */
+ * is not there or not what was marked; PW_RESOURCE. */
 pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error);
 
 /* ---- Checkpoints ----
@@ -155,7 +155,7 @@ pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *
 #define PW_CHECKPOINT_MAGIC "pinwheel checkpoint 1\n"
 
 /* Writes a checkpoint and completes the file, which is freed in every case: there is always a complete one.  The head
- * begins with PW_CHECKPOINT_MAGIC and ends with "end\n".  Errors: PW_MACHINE. */
+ * begins with PW_CHECKPOINT_MAGIC and ends with "end\n".  Errors: PW_RESOURCE. */
 int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error);
 /* The same, to the file at a path. */
 int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error);
@@ -167,7 +167,7 @@ typedef struct {
   pw_archive state;     /* its bytes belong to the text */
 } pw_checkpoint;
 
-/* PW_INPUT if it is not a checkpoint, of another version, cut off or damaged; PW_MACHINE.  Free it in every case. */
+/* PW_INPUT if it is not a checkpoint, of another version, cut off or damaged; PW_RESOURCE.  Free it in every case. */
 int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error);
 void pw_checkpoint_free (pw_checkpoint *c);
 
@@ -175,7 +175,7 @@ void pw_checkpoint_free (pw_checkpoint *c);
 
 /* A CSV of samples: one header line "t [s],frame.x [m],...", then a line per sample with 17 digits: states, contact
  * points, reactions (-lambda), scaled residuals, and energies if the run keeps a ledger.  Non-finite is nan.  Writing
- * places the sample's state in the system.  Errors: PW_MACHINE; PW_METHOD if a signal of the model fails. */
+ * places the sample's state in the system.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);
@@ -206,17 +206,17 @@ typedef struct {
   int samples;        /* compared */
   double t;           /* of the last one [s] */
   double end[4], most[4], reactions;
-} pw_truth_error;
+} pw_reference_error;
 
 /* What a run was and how it ended; `reason` is "" when the status is ok. */
 typedef struct {
   const char *model, *method;
   const char *status; /* "ok", "input", "start", "method", "machine", "interrupted" */
   const char *reason;
-  double cpu;                   /* [s], integration alone */
-  const char *const *redundant; /* what is said about each redundant row, ended by NULL; may be NULL: none */
-  const pw_truth_error *truth;  /* NULL: there is none to compare with */
-  double unbalanced;            /* relative, as pw_unbalanced says; NaN: not known */
+  double cpu;                      /* [s], integration alone */
+  const char *const *redundant;    /* what is said about each redundant row, ended by NULL; may be NULL: none */
+  const pw_reference_error *truth; /* NULL: there is none to compare with */
+  double unbalanced;               /* relative, as pw_run_energy_defect says; NaN: not known */
 } pw_summary;
 
 /* Writes the JSON summary: whatever is not known (model and method too may be NULL) or not finite is null. */

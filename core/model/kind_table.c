@@ -67,8 +67,8 @@ static const char *fault_fields (const pw_kind *k, char *buffer, size_t size) {
 }
 
 static const char *fault_sweeps (const pw_kind *k) {
-  pw_sweep *const exact[] = { k->g,       k->g_size, k->eta,   k->J,    k->gamma,   k->force,
-                              k->force_u, k->energy, k->power, k->loss, k->contact, k->saturation };
+  pw_batch_function *const exact[] = { k->g,       k->g_size, k->eta,   k->J,    k->gamma,   k->force,
+                                       k->force_u, k->energy, k->power, k->loss, k->contact, k->saturation };
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
     if (exact[i] == pw_by_differences) return "PW_BY_DIFFERENCES stands in another place than a second-order block's";
   if (k->constant && (k->force == NULL || k->signals > 0)) return "a constant force that is none, or has signals";
@@ -97,14 +97,14 @@ static const char *fault_names (const pw_kind *k) {
   return "";
 }
 
-const char *pw_kind_fault (const pw_kind *k, char *buffer, size_t size) {
+const char *pw_kind_check (const pw_kind *k, char *buffer, size_t size) {
   if (k->name == NULL || *k->name == 0) return "no name";
   if (fault_is_long (k->name)) return "a name of more than 50 bytes";
   if (k->definition < sizeof (char *)) return "the definition has no room for its name";
-  if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->own < 0 || k->own > PW_MAX_OWN || k->rows < 0 ||
+  if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->own < 0 || k->own > PW_MAX_INTERNAL || k->rows < 0 ||
       k->rows > PW_MAX_ROWS || k->signals < 0 || k->signals > PW_MAX_SIGNALS) {
-    snprintf (buffer, size, "at most %d bodies, %d own coordinates, %d rows and %d signals", PW_MAX_BODIES, PW_MAX_OWN,
-              PW_MAX_ROWS, PW_MAX_SIGNALS);
+    snprintf (buffer, size, "at most %d bodies, %d own coordinates, %d rows and %d signals", PW_MAX_BODIES,
+              PW_MAX_INTERNAL, PW_MAX_ROWS, PW_MAX_SIGNALS);
     return buffer;
   }
   if (k->bodies + k->own == 0) return "neither a body nor a coordinate of its own";

@@ -13,7 +13,7 @@ struct pw_kept {
 };
 
 static int model_no_memory (pw_model *m) {
-  return pw_fail (&m->error, PW_MACHINE, "model %s: out of memory", m->name ? m->name : "");
+  return pw_fail (&m->error, PW_RESOURCE, "model %s: out of memory", m->name ? m->name : "");
 }
 
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error) {
@@ -32,7 +32,7 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
   }
   if (m == NULL || m->name == NULL || m->parameters == NULL) {
     pw_model_free (m);
-    pw_fail (error, PW_MACHINE, "model %s: out of memory", name);
+    pw_fail (error, PW_RESOURCE, "model %s: out of memory", name);
     return NULL;
   }
   for (const pw_parameter *p = table->parameters; p && p->name; p++)
@@ -50,7 +50,7 @@ void pw_model_free (pw_model *m) {
   free (m);
 }
 
-int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
+int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (parameter == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a parameter is missing", m->name);
   pw_nearest near = { .sought = parameter };
@@ -61,7 +61,8 @@ int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
         return pw_fail (error, PW_INPUT, "model %s: parameter %s = %.17g: expected %s", m->name, parameter, value,
                         expected);
       if (m->built)
-        return pw_fail (error, PW_INPUT, "model %s: parameter %s: pw_set after pw_build", m->name, parameter);
+        return pw_fail (error, PW_INPUT, "model %s: parameter %s: pw_model_set after pw_model_build", m->name,
+                        parameter);
       memcpy (m->parameters + p->offset, &value, sizeof value);
       return PW_OK;
     }
@@ -72,15 +73,15 @@ int pw_set (pw_model *m, const char *parameter, double value, pw_error *error) {
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-int pw_build (pw_model *m, pw_error *error) {
+int pw_model_build (pw_model *m, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
-  if (m->built) return pw_fail (error, PW_INPUT, "model %s: pw_build for the second time", m->name);
+  if (m->built) return pw_fail (error, PW_INPUT, "model %s: pw_model_build for the second time", m->name);
   m->table->build (m, m->parameters);
   m->built = 1;
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
 }
 
-int pw_refuse (pw_model *m, const char *format, ...) {
+int pw_model_refuse (pw_model *m, const char *format, ...) {
   char text[400];
   va_list arguments;
   va_start (arguments, format);
@@ -108,7 +109,7 @@ static const char *model_text (pw_model *m, const char *text) {
 }
 
 int pw_add_body (pw_model *m, const pw_body *body) {
-  if (body == NULL) return pw_refuse (m, "pw_add_body without a body");
+  if (body == NULL) return pw_model_refuse (m, "pw_add_body without a body");
   if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
     return m->error.status;
   pw_body *b = &m->body[m->bodies++];
@@ -126,7 +127,7 @@ static const double *model_numbers (pw_model *m, const double *from, int count) 
   return memcpy (copy, from, (size_t)count * sizeof *copy);
 }
 
-/* Copies the points of a table; pw_compile reports invalid ones. */
+/* Copies the points of a table; pw_system_compile reports invalid ones. */
 static void model_table (pw_model *m, pw_signal *s) {
   if (s == NULL || s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
   s->table.t = model_numbers (m, s->table.t, s->table.count);
@@ -137,7 +138,7 @@ static void model_table (pw_model *m, pw_signal *s) {
 static int model_kind (pw_model *m, const pw_kind *kind) {
   if (m->elements > 0 && m->element[m->elements - 1].kind == kind) return PW_OK;
   char buffer[200];
-  const char *fault = kind ? pw_kind_fault (kind, buffer, sizeof buffer) : "there is none";
+  const char *fault = kind ? pw_kind_check (kind, buffer, sizeof buffer) : "there is none";
   if (*fault == 0) return PW_OK;
   return pw_fail (&m->error, PW_INPUT, "model %s: kind %s: %s", m->name,
                   kind && kind->name && *kind->name ? kind->name : "(unnamed)", fault);
@@ -147,7 +148,7 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (m->error.status != PW_OK || model_kind (m, kind) != PW_OK ||
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
-  if (definition == NULL) return pw_refuse (m, "pw_add of kind %s without a definition", kind->name);
+  if (definition == NULL) return pw_model_refuse (m, "pw_add of kind %s without a definition", kind->name);
   void *copy = pw_arena_take (&m->arena, kind->definition);
   if (copy == NULL) return model_no_memory (m);
   memcpy (copy, definition, kind->definition);
@@ -186,16 +187,16 @@ const pw_element *pw_model_elements (const pw_model *m, int *count) {
   return m->element;
 }
 
-int pw_model_starts (const pw_model *m) {
+int pw_model_initial (const pw_model *m) {
   return m->givens;
 }
 
-const pw_truth_text *pw_model_truth (const pw_model *m) {
-  static const pw_truth_text nothing;
+const pw_reference_text *pw_model_reference (const pw_model *m) {
+  static const pw_reference_text nothing;
   return m->truth ? m->truth : &nothing;
 }
 
-void pw_model_set_truth (pw_model *m, const pw_truth_text *truth) {
+void pw_model_set_reference (pw_model *m, const pw_reference_text *truth) {
   m->truth = truth;
 }
 
@@ -214,7 +215,8 @@ pw_error *pw_model_error (pw_model *m) {
   return &m->error;
 }
 
-int pw_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error) {
+int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal,
+                         pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (element == NULL || field == NULL || signal == NULL)
     return pw_fail (error, PW_INPUT, "model %s: %s is missing", m->name,
@@ -245,7 +247,7 @@ int pw_set_signal (pw_model *m, const char *element, const char *field, const pw
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-int pw_set_start (pw_model *m, const char *state, double value, pw_error *error) {
+int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
   if (state == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", m->name);
   const char *expected = pw_domain_check (PW_REAL, value);
@@ -260,17 +262,17 @@ int pw_set_start (pw_model *m, const char *state, double value, pw_error *error)
 
 /* ---- Reference solution: a function in C, or expressions of a text model ---- */
 
-int pw_has_truth (const pw_model *m) {
-  return m->table->truth != NULL || pw_model_truth (m)->states > 0;
+int pw_system_has_reference (const pw_model *m) {
+  return m->table->truth != NULL || pw_model_reference (m)->states > 0;
 }
 
-int pw_true_state (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
-  int n = pw_count_coordinates (s);
+int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
+  int n = pw_system_coordinates (s);
   for (int j = 0; j < n; j++) q[j] = v[j] = NAN;
   if (m->table->truth) m->table->truth (m->parameters, t, q, v);
-  const pw_truth_text *text = pw_model_truth (m);
+  const pw_reference_text *text = pw_model_reference (m);
   for (int i = 0; i < text->states; i++) {
-    int state = pw_find_state (s, text->state[i], error);
+    int state = pw_system_find_state (s, text->state[i], error);
     if (state < 0) return state;
     *(state < n ? q + state : v + state - n) = text->eval (text->context, i, t);
   }

@@ -1,4 +1,4 @@
-/* The description from inside: what pw_compile reads. */
+/* The description from inside: what pw_system_compile reads. */
 #ifndef PW_MODEL_H
 #define PW_MODEL_H
 
@@ -7,10 +7,10 @@
 /* The most an element may have; plug-in kinds are checked against it. */
 enum {
   PW_MAX_BODIES = 4,
-  PW_MAX_OWN = 4,
+  PW_MAX_INTERNAL = 4,
   PW_MAX_ROWS = 6,
   PW_MAX_SIGNALS = 4,
-  PW_MAX_COLS = 3 * PW_MAX_BODIES + PW_MAX_OWN
+  PW_MAX_COLS = 3 * PW_MAX_BODIES + PW_MAX_INTERNAL
 };
 
 typedef struct {
@@ -29,7 +29,7 @@ struct pw_model {
   int elements, element_room;
   pw_given *given;
   int givens, given_room;
-  const pw_truth_text *truth;
+  const pw_reference_text *truth;
   struct pw_kept *kept; /* freed with the model */
   int built;
   pw_error error; /* the first one */
@@ -43,7 +43,7 @@ int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
 
 /* "" if the table of an element type is consistent, else its fault, perhaps in the buffer.  Other functions may crash on an
  * inconsistent table. */
-const char *pw_kind_fault (const pw_kind *kind, char *buffer, size_t size);
+const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 
 /* pw_field_at of a definition that is to be modified. */
 static inline void *pw_field_in (const pw_kind *kind, void *definition, pw_field_type type, int k) {

@@ -73,7 +73,7 @@ static int check_signal (const pw_model *m, const pw_element *e, const pw_field 
                          pw_error *error) {
   char fault[300];
   int point;
-  if (*pw_signal_fault (s, e->kind, &point, fault, sizeof fault) == 0) return PW_OK;
+  if (*pw_signal_check (s, e->kind, &point, fault, sizeof fault) == 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "model %s: %s %s: %s: %s", m->name, e->kind->name, pw_element_name (e), f->name,
                   fault);
 }

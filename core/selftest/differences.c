@@ -10,28 +10,28 @@ static const char *const differences_name[PW_BLOCKS] = {
 };
 
 /* The slab and block of the i-th one; NULL if there are no more, and then *count how many there are. */
-static const pw_slab *differences_find (const pw_system *s, int i, pw_block *block, int *count) {
+static const pw_element_batch *differences_find (const pw_system *s, int i, pw_block *block, int *count) {
   *count = 0;
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++)
+  for (const pw_element_batch *k = s->slab; k < s->slab + s->slabs; k++)
     for (int b = 0; b < PW_BLOCKS; b++) {
-      if (b == PW_JTL_Q || pw_block_sweep (k->kind, (pw_block)b) != pw_by_differences || (*count)++ != i) continue;
+      if (b == PW_JTL_Q || pw_block_function (k->kind, (pw_block)b) != pw_by_differences || (*count)++ != i) continue;
       *block = (pw_block)b;
       return k;
     }
   return NULL;
 }
 
-int pw_count_differences (const pw_system *s) {
+int pw_system_differences (const pw_system *s) {
   pw_block block;
   int count;
   differences_find (s, -1, &block, &count);
   return count;
 }
 
-char *pw_difference_name (const pw_system *s, int i, char *buffer, size_t size) {
+char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size) {
   pw_block block;
   int count;
-  const pw_slab *k = differences_find (s, i, &block, &count);
+  const pw_element_batch *k = differences_find (s, i, &block, &count);
   if (k)
     snprintf (buffer, size, "%s of kind %s", differences_name[block], k->kind->name);
   else
@@ -48,7 +48,7 @@ static int differences_built_in (const pw_kind *kind) {
 }
 
 /* Elements of the slab that are looked at: the first, the last, one between. */
-static int differences_missing (const pw_workspace *w, pw_slab *k, char *buffer, size_t size) {
+static int differences_missing (const pw_workspace *w, pw_element_batch *k, char *buffer, size_t size) {
   const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
   for (int b = 0; b < PW_BLOCKS; b++)
     for (int i = 0; i < 3 && k->b.count > 0; i++) {
@@ -64,10 +64,10 @@ static void differences_random (pw_random *random, double *x, int n) {
 }
 
 /* Directions, multipliers and signals of a slab are random. */
-static int differences_look (pw_workspace *w, pw_slab *k, pw_random *random, char *buffer, size_t size) {
+static int differences_look (pw_workspace *w, pw_element_batch *k, pw_random *random, char *buffer, size_t size) {
   int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
   double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);
-  if (x == NULL) return PW_MACHINE;
+  if (x == NULL) return PW_RESOURCE;
   differences_random (random, x, cols + rows);
   differences_random (random, k->u, 3 * k->b.count * k->kind->signals);
   k->b.w = x, k->b.lambda = x + cols;
@@ -81,19 +81,19 @@ int pw_find_missing (pw_workspace *w, double t, const double *q, const double *v
   const pw_system *s = w->s;
   pw_random random = { 1 };
   int own = 0, found = 0;
-  for (pw_slab *k = w->slab; k < w->slab + s->slabs; k++) own += !differences_built_in (k->kind);
+  for (pw_element_batch *k = w->slab; k < w->slab + s->slabs; k++) own += !differences_built_in (k->kind);
   if (own == 0) return 0;
   double *state = malloc ((2 * (size_t)s->coords + 1) * sizeof *state);
-  if (state == NULL) return PW_MACHINE;
+  if (state == NULL) return PW_RESOURCE;
   for (int i = 0; i < 2 * s->coords; i++) {
     int rate = i >= s->coords, j = rate ? i - s->coords : i;
     double unit = pw_unit (s, j) / (rate ? w->scale.time : 1);
     state[i] = (rate ? v[j] : q[j]) + 0.1 * unit * pw_random_between (&random, -1, 1);
   }
-  pw_place (w, t, state, state + s->coords);
-  for (pw_slab *k = w->slab; found == 0 && k < w->slab + s->slabs; k++)
+  pw_update_kinematics (w, t, state, state + s->coords);
+  for (pw_element_batch *k = w->slab; found == 0 && k < w->slab + s->slabs; k++)
     if (!differences_built_in (k->kind)) found = differences_look (w, k, &random, buffer, size);
   free (state);
-  pw_hold (w, w->hold); /* signals are evaluated anew */
+  pw_hold_signals (w, w->hold); /* signals are evaluated anew */
   return found;
 }

@@ -55,8 +55,8 @@ void pw_probe_compare (pw_probe *x, const char *name, const char *about, int row
 /* ---- The state ---- */
 
 /* Bodies near the corners of a square, everything else at random. */
-void pw_probe_aim (pw_probe *x, pw_random *r) {
-  static const double corner[PW_SPECIMEN_BODIES][2] = { { 2, 2 }, { -2, 2 }, { -2, -2 }, { 2, -2 } };
+void pw_probe_randomise (pw_probe *x, pw_random *r) {
+  static const double corner[PW_SCENE_BODIES][2] = { { 2, 2 }, { -2, 2 }, { -2, -2 }, { 2, -2 } };
   x->t = pw_random_between (r, 0.1, 3);
   for (int j = 0; j < x->s->coords; j++) {
     x->q[j] = pw_random_between (r, -0.5, 0.5);
@@ -75,7 +75,7 @@ void pw_probe_aim (pw_probe *x, pw_random *r) {
 
 /* ---- Functions of the state, and their slopes ---- */
 
-void pw_probe_sweep (pw_probe *x, pw_sweep *f, const char *name, int n, double *out) {
+void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int n, double *out) {
   for (int i = 0; i < n + PW_PROBE_GUARD; i++) out[i] = f ? NAN : 0;
   if (f == NULL) return;
   f (&x->k->b, out);
@@ -88,13 +88,13 @@ void pw_probe_sweep (pw_probe *x, pw_sweep *f, const char *name, int n, double *
   pw_probe_note (x->report, "size", "each sweep fills its array and no more", untouched + beyond, 0, "exact", where);
 }
 
-void pw_probe_place (pw_probe *x, int j, double h) {
+void pw_probe_update (pw_probe *x, int j, double h) {
   int motion = j == PW_PROBE_MOTION;
   for (int i = 0; i < x->s->coords; i++) {
     x->q_now[i] = x->q[i] + (motion ? h * (x->v[i] + h * x->a[i] / 2) : i == j ? h : 0);
     x->v_now[i] = x->v[i] + (motion ? h * x->a[i] : 0);
   }
-  pw_place (x->work, j < 0 ? x->t + h : x->t, x->q_now, x->v_now);
+  pw_update_kinematics (x->work, j < 0 ? x->t + h : x->t, x->q_now, x->v_now);
 }
 
 double pw_probe_local (const pw_probe *x, const double *vector, int e, int c) {
@@ -103,7 +103,7 @@ double pw_probe_local (const pw_probe *x, const double *vector, int e, int c) {
 
 void pw_probe_times (pw_probe *x, const double *w, double *out) {
   double J[PW_PROBE_OUT + PW_PROBE_GUARD];
-  pw_probe_sweep (x, x->kind->J, "J", x->elements * x->rows * x->cols, J);
+  pw_probe_evaluate (x, x->kind->J, "J", x->elements * x->rows * x->cols, J);
   for (int i = 0; i < x->elements * x->rows; i++) {
     out[i] = 0;
     for (int c = 0; c < x->cols; c++) out[i] += J[i * x->cols + c] * pw_probe_local (x, w, i / x->rows, c);
@@ -118,11 +118,11 @@ double pw_probe_largest (int n, const double *y) {
 
 void pw_probe_slope (pw_probe *x, pw_probe_function *f, int j, int n, double *slope) {
   double plus[PW_PROBE_OUT + PW_PROBE_GUARD], minus[PW_PROBE_OUT + PW_PROBE_GUARD];
-  pw_probe_place (x, j, PW_PROBE_H);
+  pw_probe_update (x, j, PW_PROBE_H);
   f (x, plus);
-  pw_probe_place (x, j, -PW_PROBE_H);
+  pw_probe_update (x, j, -PW_PROBE_H);
   f (x, minus);
-  pw_probe_place (x, j, 0);
+  pw_probe_update (x, j, 0);
   x->size = pw_probe_largest (n, plus);
   for (int i = 0; i < n; i++) slope[i] = (plus[i] - minus[i]) / (2 * PW_PROBE_H);
 }

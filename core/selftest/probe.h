@@ -6,8 +6,8 @@
 #include "specimen.h"
 
 enum {
-  PW_PROBE_COORDS = 3 * PW_SPECIMEN_BODIES + PW_SPECIMEN_BATCH * PW_MAX_OWN,
-  PW_PROBE_OUT = PW_SPECIMEN_BATCH * PW_MAX_COLS * PW_MAX_COLS,
+  PW_PROBE_COORDS = 3 * PW_SCENE_BODIES + PW_SCENE_BATCH * PW_MAX_INTERNAL,
+  PW_PROBE_OUT = PW_SCENE_BATCH * PW_MAX_COLS * PW_MAX_COLS,
   PW_PROBE_GUARD = 8,   /* numbers behind an array that have to stay what they are */
   PW_PROBE_MOTION = -1, /* moves, besides that of one coordinate */
   PW_PROBE_TIME = -2
@@ -20,11 +20,11 @@ typedef struct {
   const pw_kind *kind;
   const pw_system *s;
   pw_workspace *work;
-  pw_slab *k;
+  pw_element_batch *k;
   int elements, rows, cols; /* rows and cols per element */
   double t, q[PW_PROBE_COORDS], v[PW_PROBE_COORDS], a[PW_PROBE_COORDS];
   double q_now[PW_PROBE_COORDS], v_now[PW_PROBE_COORDS]; /* as placed */
-  double w[PW_SPECIMEN_BATCH * PW_MAX_COLS], lambda[PW_SPECIMEN_BATCH * PW_MAX_ROWS];
+  double w[PW_SCENE_BATCH * PW_MAX_COLS], lambda[PW_SCENE_BATCH * PW_MAX_ROWS];
   double size; /* largest value of the function last differenced */
   pw_selftest_report *report;
 } pw_probe;
@@ -33,15 +33,15 @@ typedef struct {
 typedef void pw_probe_function (pw_probe *x, double *out);
 
 /* Puts a state on the probe, at random. */
-void pw_probe_aim (pw_probe *x, pw_random *r);
+void pw_probe_randomise (pw_probe *x, pw_random *r);
 
 /* Places the state moved by h: along the motion q + v h + a h^2 / 2, in time alone, or in coordinate j. */
-void pw_probe_place (pw_probe *x, int j, double h);
+void pw_probe_update (pw_probe *x, int j, double h);
 
 /* Runs a sweep that fills n numbers; a NULL one leaves zeros.  Reports a sweep that writes more or less. */
-void pw_probe_sweep (pw_probe *x, pw_sweep *f, const char *name, int n, double *out);
+void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int n, double *out);
 
-/* Slope of n values of f for a move (see pw_probe_place). */
+/* Slope of n values of f for a move (see pw_probe_update). */
 void pw_probe_slope (pw_probe *x, pw_probe_function *f, int j, int n, double *slope);
 
 /* out = J w, element by element, w a vector over all coordinates. */

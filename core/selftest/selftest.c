@@ -9,21 +9,21 @@
 /* ---- What is differenced ---- */
 
 static void selftest_g (pw_probe *x, double *out) {
-  pw_probe_sweep (x, x->kind->g, "g", x->elements * x->rows, out);
+  pw_probe_evaluate (x, x->kind->g, "g", x->elements * x->rows, out);
 }
 
 static void selftest_energy (pw_probe *x, double *out) {
-  pw_probe_sweep (x, x->kind->energy, "energy", x->elements, out);
+  pw_probe_evaluate (x, x->kind->energy, "energy", x->elements, out);
 }
 
 static void selftest_force (pw_probe *x, double *out) {
-  pw_probe_sweep (x, x->kind->force, "force", x->elements * x->cols, out);
+  pw_probe_evaluate (x, x->kind->force, "force", x->elements * x->cols, out);
 }
 
 /* J v - eta */
 static void selftest_drift (pw_probe *x, double *out) {
   double eta[PW_PROBE_OUT + PW_PROBE_GUARD];
-  pw_probe_sweep (x, x->kind->eta, "eta", x->elements * x->rows, eta);
+  pw_probe_evaluate (x, x->kind->eta, "eta", x->elements * x->rows, eta);
   pw_probe_times (x, x->v_now, out);
   for (int i = 0; i < x->elements * x->rows; i++) out[i] -= eta[i];
 }
@@ -40,16 +40,16 @@ static void selftest_holonomic (pw_probe *x) {
   }
   for (int i = 0; i < n * x->cols; i++)
     if (pw_probe_ground (x, i / (x->rows * x->cols), i % x->cols)) reference[i] = 0;
-  pw_probe_sweep (x, x->kind->J, "J", n * x->cols, value);
+  pw_probe_evaluate (x, x->kind->J, "J", n * x->cols, value);
   pw_probe_compare (x, "J", "J = dg/dq", x->rows, x->cols, value, reference);
 
   pw_probe_slope (x, selftest_g, PW_PROBE_TIME, n, reference);
   for (int i = 0; i < n; i++) reference[i] = -reference[i];
-  pw_probe_sweep (x, x->kind->eta, "eta", n, value);
+  pw_probe_evaluate (x, x->kind->eta, "eta", n, value);
   pw_probe_compare (x, "eta", "eta = -dg/dt", x->rows, 1, value, reference);
 
   selftest_g (x, reference);
-  pw_probe_sweep (x, x->kind->g_size, "g_size", n, value);
+  pw_probe_evaluate (x, x->kind->g_size, "g_size", n, value);
   for (int i = 0; i < n; i++) { /* what is large enough agrees with itself */
     double size = fabs (reference[i]);
     reference[i] = fmax (value[i], size);
@@ -62,7 +62,7 @@ static void selftest_gamma (pw_probe *x) {
   int n = x->elements * x->rows;
   pw_probe_slope (x, selftest_drift, PW_PROBE_MOTION, n, reference);
   pw_probe_times (x, x->a, value);
-  pw_probe_sweep (x, x->kind->gamma, "gamma", n, gamma);
+  pw_probe_evaluate (x, x->kind->gamma, "gamma", n, gamma);
   for (int i = 0; i < n; i++) value[i] -= gamma[i];
   pw_probe_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", x->rows, 1, value, reference);
 }
@@ -80,7 +80,7 @@ static void selftest_force_u (pw_probe *x) {
     for (int i = 0; i < n; i++) reference[i * signals + u] = (plus[i] - minus[i]) / (2 * PW_PROBE_H);
   }
   x->size = pw_probe_largest (n, plus);
-  pw_probe_sweep (x, x->kind->force_u, "force_u", n * signals, value);
+  pw_probe_evaluate (x, x->kind->force_u, "force_u", n * signals, value);
   pw_probe_compare (x, "force_u", "force_u = d force/du", x->cols * signals, 1, value, reference);
 }
 
@@ -89,9 +89,9 @@ static void selftest_constant (pw_probe *x) {
   double before[PW_PROBE_OUT + PW_PROBE_GUARD], after[PW_PROBE_OUT + PW_PROBE_GUARD];
   int n = x->elements * x->cols, changed = 0;
   selftest_force (x, before);
-  pw_probe_place (x, PW_PROBE_MOTION, 1);
+  pw_probe_update (x, PW_PROBE_MOTION, 1);
   selftest_force (x, after);
-  pw_probe_place (x, PW_PROBE_MOTION, 0);
+  pw_probe_update (x, PW_PROBE_MOTION, 0);
   for (int i = 0; i < n; i++) changed += before[i] != after[i];
   pw_probe_note (x->report, "constant", "a constant force does not change", changed, 0, "exact", "");
 }
@@ -101,11 +101,11 @@ static void selftest_constant (pw_probe *x) {
 static void selftest_block (pw_probe *x, pw_block block, const char *name, const char *about, double size) {
   double value[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT];
   int rows = pw_block_rows (x->kind, block);
-  pw_sweep *sweep = pw_block_sweep (x->kind, block);
+  pw_batch_function *sweep = pw_block_function (x->kind, block);
   if (sweep == pw_by_differences)
-    pw_sweep_block (x->work, x->k, block, value);
+    pw_evaluate_block (x->work, x->k, block, value);
   else
-    pw_probe_sweep (x, sweep, name, x->elements * rows * x->cols, value);
+    pw_probe_evaluate (x, sweep, name, x->elements * rows * x->cols, value);
   for (int e = 0; e < x->elements; e++) pw_difference (x->work, x->k, e, block, reference + e * rows * x->cols);
   x->size = size;
   pw_probe_compare (x, name, about, rows, x->cols, value, reference);
@@ -114,11 +114,11 @@ static void selftest_block (pw_probe *x, pw_block block, const char *name, const
 static void selftest_blocks (pw_probe *x) {
   double J[PW_PROBE_OUT + PW_PROBE_GUARD], gamma[PW_PROBE_OUT + PW_PROBE_GUARD], force[PW_PROBE_OUT + PW_PROBE_GUARD];
   int n = x->elements * x->rows;
-  pw_probe_place (x, PW_PROBE_TIME, 0);
+  pw_probe_update (x, PW_PROBE_TIME, 0);
   x->k->b.w = x->w;
   x->k->b.lambda = x->lambda;
-  pw_probe_sweep (x, x->kind->J, "J", n * x->cols, J);
-  pw_probe_sweep (x, x->kind->gamma, "gamma", n, gamma);
+  pw_probe_evaluate (x, x->kind->J, "J", n * x->cols, J);
+  pw_probe_evaluate (x, x->kind->gamma, "gamma", n, gamma);
   selftest_force (x, force);
   double sJ = pw_probe_largest (n * x->cols, J), sg = pw_probe_largest (n, gamma);
   if (x->rows > 0) {
@@ -138,14 +138,14 @@ static void selftest_rest (pw_probe *x) {
   double out[PW_PROBE_OUT + PW_PROBE_GUARD], v[PW_PROBE_COORDS];
   memcpy (v, x->v, sizeof v);
   for (int j = 0; j < x->s->coords; j++) x->v[j] *= 1e-310;
-  pw_probe_place (x, PW_PROBE_TIME, 0);
-  pw_probe_sweep (x, x->kind->gamma, "gamma near rest", x->elements * x->rows, out);
-  pw_probe_sweep (x, x->kind->force, "force near rest", x->elements * x->cols, out);
-  pw_probe_sweep (x, x->kind->loss, "loss near rest", x->elements, out);
+  pw_probe_update (x, PW_PROBE_TIME, 0);
+  pw_probe_evaluate (x, x->kind->gamma, "gamma near rest", x->elements * x->rows, out);
+  pw_probe_evaluate (x, x->kind->force, "force near rest", x->elements * x->cols, out);
+  pw_probe_evaluate (x, x->kind->loss, "loss near rest", x->elements, out);
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
-    pw_sweep *sweep = pw_block_sweep (x->kind, blocks[i]);
+    pw_batch_function *sweep = pw_block_function (x->kind, blocks[i]);
     int n = x->elements * pw_block_rows (x->kind, blocks[i]) * x->cols;
-    if (sweep != pw_by_differences) pw_probe_sweep (x, sweep, "a derivative near rest", n, out);
+    if (sweep != pw_by_differences) pw_probe_evaluate (x, sweep, "a derivative near rest", n, out);
   }
   memcpy (x->v, v, sizeof v);
 }
@@ -157,7 +157,7 @@ static double selftest_change (pw_probe *x, int e, int c, double v, const double
   double force[PW_PROBE_OUT + PW_PROBE_GUARD], change = 0;
   int j = pw_global (x->k, e, c);
   x->v[j] = v;
-  pw_probe_place (x, PW_PROBE_TIME, 0);
+  pw_probe_update (x, PW_PROBE_TIME, 0);
   selftest_force (x, force);
   x->v[j] = 0;
   for (int i = e * x->cols; i < (e + 1) * x->cols; i++) change = fmax (change, fabs (force[i] - rest[i]));
@@ -171,7 +171,7 @@ static void selftest_saturation (pw_probe *x) {
   double out[PW_PROBE_OUT], rest[PW_PROBE_OUT + PW_PROBE_GUARD], v[PW_PROBE_COORDS];
   memcpy (v, x->v, sizeof v);
   memset (x->v, 0, sizeof x->v);
-  pw_probe_place (x, PW_PROBE_TIME, 0);
+  pw_probe_update (x, PW_PROBE_TIME, 0);
   selftest_force (x, rest);
   for (int i = 0; i < x->elements * 2 * x->cols; i++) out[i] = INFINITY;
   if (x->kind->saturation) x->kind->saturation (&x->k->b, out);
@@ -193,9 +193,9 @@ static void selftest_saturation (pw_probe *x) {
 static int selftest_obey (pw_probe *x, int e) {
   double J[PW_PROBE_OUT + PW_PROBE_GUARD], A[PW_MAX_ROWS][PW_MAX_ROWS] = { { 0 } }, b[PW_PROBE_OUT];
   int n = x->rows;
-  pw_probe_place (x, PW_PROBE_TIME, 0);
+  pw_probe_update (x, PW_PROBE_TIME, 0);
   selftest_drift (x, b);
-  pw_probe_sweep (x, x->kind->J, "J", x->elements * n * x->cols, J);
+  pw_probe_evaluate (x, x->kind->J, "J", x->elements * n * x->cols, J);
   double *row = J + e * n * x->cols, *rest = b + e * n;
   for (int c = 0; c < x->cols; c++)
     for (int r = 0; r < n; r++) row[r * x->cols + c] *= !pw_probe_ground (x, e, c);
@@ -225,16 +225,16 @@ static int selftest_obey (pw_probe *x, int e) {
  * what it takes from its energy and from outside, less its losses. */
 static void selftest_power_of (pw_probe *x, int e) {
   double force[PW_PROBE_OUT + PW_PROBE_GUARD], drift[PW_PROBE_OUT], eta[PW_PROBE_OUT + PW_PROBE_GUARD];
-  double slope[PW_SPECIMEN_BATCH], power[PW_SPECIMEN_BATCH + PW_PROBE_GUARD], loss[PW_SPECIMEN_BATCH + PW_PROBE_GUARD];
+  double slope[PW_SCENE_BATCH], power[PW_SCENE_BATCH + PW_PROBE_GUARD], loss[PW_SCENE_BATCH + PW_PROBE_GUARD];
   pw_probe_slope (x, selftest_energy, PW_PROBE_MOTION, x->elements, slope);
   selftest_force (x, force);
-  pw_probe_sweep (x, x->kind->power, "power", x->elements, power);
-  pw_probe_sweep (x, x->kind->loss, "loss", x->elements, loss);
+  pw_probe_evaluate (x, x->kind->power, "power", x->elements, power);
+  pw_probe_evaluate (x, x->kind->loss, "loss", x->elements, loss);
   double fed = 0, size = fmax (x->size, fmax (fabs (power[e]), fabs (loss[e])));
   for (int c = 0; c < x->cols; c++) fed += force[e * x->cols + c] * pw_probe_local (x, x->v, e, c);
   if (x->rows > 0) {
     pw_probe_times (x, x->v, drift);
-    pw_probe_sweep (x, x->kind->eta, "eta", x->elements * x->rows, eta);
+    pw_probe_evaluate (x, x->kind->eta, "eta", x->elements * x->rows, eta);
   }
   for (int r = e * x->rows; r < (e + 1) * x->rows; r++) {
     fed -= x->lambda[r] * drift[r];
@@ -261,8 +261,8 @@ static void selftest_power (pw_probe *x) {
 /* ---- */
 
 static void selftest_all (pw_probe *x) {
-  double out[3 * PW_SPECIMEN_BATCH + PW_PROBE_GUARD];
-  pw_probe_place (x, PW_PROBE_TIME, 0);
+  double out[3 * PW_SCENE_BATCH + PW_PROBE_GUARD];
+  pw_probe_update (x, PW_PROBE_TIME, 0);
   if (x->kind->level == PW_HOLONOMIC) selftest_holonomic (x);
   if (x->rows > 0) selftest_gamma (x);
   if (x->kind->signals > 0) selftest_force_u (x);
@@ -271,21 +271,21 @@ static void selftest_all (pw_probe *x) {
   selftest_rest (x);
   if (x->kind->force && !x->kind->constant) selftest_saturation (x);
   selftest_power (x);
-  pw_probe_sweep (x, x->kind->contact, "contact", 3 * x->elements, out);
+  pw_probe_evaluate (x, x->kind->contact, "contact", 3 * x->elements, out);
 }
 
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error) {
   char buffer[200];
-  const char *fault = pw_kind_fault (kind, buffer, sizeof buffer);
+  const char *fault = pw_kind_check (kind, buffer, sizeof buffer);
   pw_probe_note (report, "table", "sizes, fields and sweeps go together", *fault != 0, 0, "exact", fault);
   if (*fault) return PW_OK;
   pw_random random = { seed };
-  pw_system *s = pw_specimen (kind, &random, error);
+  pw_system *s = pw_random_scene (kind, &random, error);
   if (s == NULL) return error ? error->status : PW_INPUT;
   pw_workspace *w = pw_workspace_new (s, error);
   if (w == NULL) {
-    pw_free (s);
-    return PW_MACHINE;
+    pw_system_free (s);
+    return PW_RESOURCE;
   }
   pw_probe x = { .kind = kind, .s = s, .work = w, .k = w->slab, .rows = kind->rows, .report = report };
   x.elements = s->slab->b.count;
@@ -293,9 +293,9 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
   for (int j = 3 * s->bodies; j < s->coords; j++)
     pw_probe_note (report, "table", "", !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
                    "inertia of an own coordinate");
-  pw_probe_aim (&x, &random);
+  pw_probe_randomise (&x, &random);
   selftest_all (&x);
   pw_workspace_free (w);
-  pw_free (s);
+  pw_system_free (s);
   return PW_OK;
 }

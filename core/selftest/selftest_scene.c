@@ -18,7 +18,7 @@ typedef enum { SCENE_Q, SCENE_V, SCENE_TIME, SCENE_MOTION } scene_move;
 typedef struct {
   const pw_system *s;
   pw_workspace *work;
-  pw_slab *k;
+  pw_element_batch *k;
   double t, tau;                      /* the time, and how far it may move */
   double *q, *v, *a, *dq, *dv, *w;    /* coords: the state and its motion; directions */
   double *q_now, *v_now;              /* coords: as placed */
@@ -40,7 +40,7 @@ static void scene_place (const scene *x, scene_move move, double h) {
     x->q_now[j] = x->q[j] + step * (x->v[j] + step * x->a[j] / 2) + (move == SCENE_Q ? h * x->dq[j] : 0);
     x->v_now[j] = x->v[j] + step * x->a[j] + (move == SCENE_V ? h * x->dv[j] : 0);
   }
-  pw_place (x->work, move >= SCENE_TIME ? x->t + h * x->tau : x->t, x->q_now, x->v_now);
+  pw_update_kinematics (x->work, move >= SCENE_TIME ? x->t + h * x->tau : x->t, x->q_now, x->v_now);
 }
 
 /* ---- Products ---- */
@@ -66,7 +66,7 @@ static void scene_zero (double *out, int n) {
   memset (out, 0, (size_t)n * sizeof *out);
 }
 
-static void scene_sweep (scene *x, pw_sweep *sweep, int rows, double *out) {
+static void scene_sweep (scene *x, pw_batch_function *sweep, int rows, double *out) {
   scene_zero (out, x->k->b.count * rows);
   if (sweep) sweep (&x->k->b, out);
 }
@@ -188,7 +188,7 @@ static void scene_block (scene *x, pw_block block, const char *name, const char 
   scene_begin (x);
   x->k->b.w = x->local;
   x->k->b.lambda = x->lambda;
-  if (pw_sweep_block (x->work, x->k, block, x->block))
+  if (pw_evaluate_block (x->work, x->k, block, x->block))
     scene_times (x, x->block, rows, move == SCENE_V ? x->dv : x->dq, 1, x->value, x->terms);
   scene_compare (x, name, about, rows, f, move);
 }
@@ -229,10 +229,10 @@ static void scene_all (scene *x) {
     scene_gradients (x, SCENE_Q);
     scene_gradients (x, SCENE_V);
   }
-  pw_hold (x->work, 1); /* what signals make of the state is theirs */
+  pw_hold_signals (x->work, 1); /* what signals make of the state is theirs */
   scene_block (x, PW_FORCE_Q, "force_q", "force_q = d force/dq", scene_force);
   scene_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", scene_force);
-  pw_hold (x->work, 0);
+  pw_hold_signals (x->work, 0);
 }
 
 /* ---- The motion ---- */
@@ -285,7 +285,7 @@ static int scene_open (scene *x) {
   size_t total = 1;
   for (size_t i = 0; i < sizeof array / sizeof *array; i++) total += array[i].count;
   x->memory = calloc (total, sizeof *x->memory);
-  if (x->memory == NULL) return PW_MACHINE;
+  if (x->memory == NULL) return PW_RESOURCE;
   double *at = x->memory;
   for (size_t i = 0; i < sizeof array / sizeof *array; i++) {
     *array[i].array = at;
@@ -298,17 +298,17 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
                        unsigned seed, pw_selftest_report *report, pw_error *error) {
   pw_random random = { seed };
   pw_workspace *w = pw_workspace_new (s, error);
-  if (w == NULL) return PW_MACHINE;
+  if (w == NULL) return PW_RESOURCE;
   int status = PW_OK;
   w->scale.time = T;
-  for (pw_slab *k = w->slab; k < w->slab + s->slabs && status == PW_OK; k++) {
+  for (pw_element_batch *k = w->slab; k < w->slab + s->slabs && status == PW_OK; k++) {
     if (k->kind != kind || k->b.count == 0) continue;
     scene x = { .s = s, .work = w, .k = k, .t = t, .report = report };
     if (scene_open (&x) == PW_OK) {
       scene_aim (&x, q, v, &random);
       scene_all (&x);
     } else
-      status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+      status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
     free (x.memory);
   }
   pw_workspace_free (w);

@@ -58,17 +58,17 @@ static void specimen_value (pw_random *r, const pw_field *f, void *at) {
 
 /* Element e takes every body in turn, from another one on; the last element hangs on the ground. */
 static const char *specimen_body (const specimen *x, int e, int n) {
-  static const char *const name[PW_SPECIMEN_BODIES] = { "b0", "b1", "b2", "b3" };
-  int last = e == PW_SPECIMEN_ELEMENTS - 1;
+  static const char *const name[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
+  int last = e == PW_SCENE_ELEMENTS - 1;
   if (last && x->kind->bodies > 1 && n == (int)(x->random->state % (unsigned)x->kind->bodies)) return "ground";
-  return name[(e + n) % PW_SPECIMEN_BODIES];
+  return name[(e + n) % PW_SCENE_BODIES];
 }
 
 static void specimen_element (pw_model *m, const specimen *x, int e) {
-  static const char *const name[PW_SPECIMEN_ELEMENTS] = { "e0", "e1", "e2" };
+  static const char *const name[PW_SCENE_ELEMENTS] = { "e0", "e1", "e2" };
   char *definition = pw_arena_take (&m->arena, x->kind->definition);
   if (definition == NULL) {
-    pw_fail (&m->error, PW_MACHINE, "model %s: out of memory", m->name);
+    pw_fail (&m->error, PW_RESOURCE, "model %s: out of memory", m->name);
     return;
   }
   *(const char **)(void *)definition = name[e];
@@ -81,13 +81,13 @@ static void specimen_element (pw_model *m, const specimen *x, int e) {
 }
 
 static void specimen_build (pw_model *m, const void *parameters) {
-  static const char *const name[PW_SPECIMEN_BODIES] = { "b0", "b1", "b2", "b3" };
+  static const char *const name[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
   const specimen *x = parameters;
-  for (int b = 0; b < PW_SPECIMEN_BODIES; b++)
+  for (int b = 0; b < PW_SCENE_BODIES; b++)
     pw_add_body (m, &(pw_body){ .name = name[b],
                                 .mass = pw_random_between (x->random, 0.5, 2),
                                 .inertia = pw_random_between (x->random, 0.1, 1) });
-  for (int e = 0; e < (x->kind->each_body ? 1 : PW_SPECIMEN_ELEMENTS); e++) specimen_element (m, x, e);
+  for (int e = 0; e < (x->kind->each_body ? 1 : PW_SCENE_ELEMENTS); e++) specimen_element (m, x, e);
 }
 
 static pw_system *specimen_try (const pw_kind *kind, pw_random *random, pw_error *error) {
@@ -98,12 +98,12 @@ static pw_system *specimen_try (const pw_kind *kind, pw_random *random, pw_error
   pw_model *m = pw_model_new (kind->name, &table, error);
   if (m == NULL) return NULL;
   memcpy (m->parameters, &(specimen){ kind, random }, sizeof (specimen));
-  if (pw_build (m, error) == PW_OK) s = pw_compile (m, error);
+  if (pw_model_build (m, error) == PW_OK) s = pw_system_compile (m, error);
   pw_model_free (m);
   return s;
 }
 
-pw_system *pw_specimen (const pw_kind *kind, pw_random *random, pw_error *error) {
+pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error) {
   pw_error why;
   for (int i = 0; i < 50; i++) { /* a kind may refuse numbers that do not go together */
     why = (pw_error){ 0 };

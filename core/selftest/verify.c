@@ -25,14 +25,15 @@ static void verify_add (double *sum, double *size, double term) {
 }
 
 /* Fills the block by a sweep of n numbers, with zeros if there is none. */
-static const double *verify_sweep (verify *x, const pw_slab *k, pw_sweep *f, int n) {
+static const double *verify_sweep (verify *x, const pw_element_batch *k, pw_batch_function *f, int n) {
   memset (x->block, 0, (size_t)n * sizeof *x->block);
   if (f) f (&k->b, x->block);
   return x->block;
 }
 
 /* Sums up J v, J a and J^T lambda of a slab. */
-static void verify_products (verify *x, const pw_slab *k, const double *v, const double *a, const double *lambda) {
+static void verify_products (verify *x, const pw_element_batch *k, const double *v, const double *a,
+                             const double *lambda) {
   int rows = k->kind->rows, cols = k->b.cols;
   const double *J = verify_sweep (x, k, k->kind->J, k->b.count * rows * cols);
   for (int e = 0; e < k->b.count; e++)
@@ -46,7 +47,7 @@ static void verify_products (verify *x, const pw_slab *k, const double *v, const
       }
 }
 
-static void verify_rows (verify *x, const pw_slab *k, const double *v, const double *a, const double *lambda) {
+static void verify_rows (verify *x, const pw_element_batch *k, const double *v, const double *a, const double *lambda) {
   const pw_kind *kind = k->kind;
   int n = k->b.count * kind->rows, holonomic = kind->level == PW_HOLONOMIC;
   verify_products (x, k, v, a, lambda);
@@ -61,7 +62,7 @@ static void verify_rows (verify *x, const pw_slab *k, const double *v, const dou
   for (int i = 0; i < n; i++) x->position_size[k->row + i] = fmax (y[i], x->s->scale.length);
 }
 
-static void verify_forces (verify *x, const pw_slab *k) {
+static void verify_forces (verify *x, const pw_element_batch *k) {
   const double *y = verify_sweep (x, k, k->kind->force, k->b.count * k->b.cols);
   for (int i = 0; i < k->b.count * k->b.cols; i++) {
     int j = pw_global (k, i / k->b.cols, i % k->b.cols);
@@ -106,23 +107,23 @@ static void verify_all (verify *x, const double *v, const double *a, const doubl
   double L = x->w->scale.length, T = x->w->scale.time;
   for (int j = 0; j < s->coords; j++) verify_add (&x->force[j], &x->force_size[j], s->mass[j] * a[j]);
   for (int i = 0; i < s->slabs; i++) {
-    const pw_slab *k = &x->w->slab[i];
+    const pw_element_batch *k = &x->w->slab[i];
     if (k->kind->rows > 0) verify_rows (x, k, v, a, lambda);
     if (k->kind->force) verify_forces (x, k);
   }
   verify_force_sizes (x);
-  verify_judge (s, s->holonomic, x->position, x->position_size, 0, pw_reaction_name, 0, &result->position);
-  verify_judge (s, s->rows, x->velocity, x->velocity_size, L / T, pw_reaction_name, 0, &result->velocity);
-  verify_judge (s, s->rows, x->acceleration, x->acceleration_size, L / (T * T), pw_reaction_name, 0,
+  verify_judge (s, s->holonomic, x->position, x->position_size, 0, pw_system_reaction_name, 0, &result->position);
+  verify_judge (s, s->rows, x->velocity, x->velocity_size, L / T, pw_system_reaction_name, 0, &result->velocity);
+  verify_judge (s, s->rows, x->acceleration, x->acceleration_size, L / (T * T), pw_system_reaction_name, 0,
                 &result->acceleration);
-  verify_judge (s, s->coords, x->force, x->force_size, 0, pw_state_name, s->coords, &result->force);
+  verify_judge (s, s->coords, x->force, x->force_size, 0, pw_system_state_name, s->coords, &result->force);
 }
 
 /* The most numbers a sweep of any kind in use fills. */
 static size_t verify_room (const pw_system *s) {
   size_t most = 1;
   for (int i = 0; i < s->slabs; i++) {
-    const pw_slab *k = &s->slab[i];
+    const pw_element_batch *k = &s->slab[i];
     size_t n = (size_t)k->b.count * (size_t)k->b.cols * (size_t)(k->kind->rows > 0 ? k->kind->rows : 1);
     if (n > most) most = n;
   }
@@ -134,7 +135,7 @@ int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double
   size_t rows = (size_t)s->rows, coords = (size_t)s->coords;
   double *room = calloc (6 * rows + 2 * coords + verify_room (s), sizeof *room);
   pw_workspace *w = room ? pw_workspace_new (s, NULL) : NULL;
-  int status = PW_MACHINE;
+  int status = PW_RESOURCE;
   if (w) {
     verify x = { .s = s, .w = w, .position = room };
     x.velocity = x.position + rows;
@@ -146,7 +147,7 @@ int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double
     x.force_size = x.force + coords;
     x.block = x.force_size + coords;
     w->scale = *scale;
-    status = pw_place (w, t, q, v);
+    status = pw_update_kinematics (w, t, q, v);
     if (status == PW_OK) verify_all (&x, v, a, lambda, result);
   }
   pw_workspace_free (w);

@@ -134,7 +134,7 @@ static void form_function (const pw_signal *s, const pw_kind *kind, char *text, 
     snprintf (text, size, "a constraint's signal may depend on time only");
 }
 
-char *pw_signal_fault (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size) {
+char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size) {
   const pw_signal_form *form = pw_signal_form_of (s);
   *buffer = 0;
   *point = -1;

@@ -22,11 +22,11 @@ static const struct {
   [PW_FORCE_V] = { offsetof (pw_kind, force_v), offsetof (pw_kind, force), BLOCKS_RAW, 1, 1 },
 };
 
-static pw_sweep *blocks_member (const pw_kind *kind, size_t offset) {
-  return *(pw_sweep *const *)(const void *)((const char *)kind + offset);
+static pw_batch_function *blocks_member (const pw_kind *kind, size_t offset) {
+  return *(pw_batch_function *const *)(const void *)((const char *)kind + offset);
 }
 
-pw_sweep *pw_block_sweep (const pw_kind *kind, pw_block block) {
+pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
   return blocks_member (kind, blocks_table[block].sweep);
 }
 
@@ -39,10 +39,10 @@ typedef struct {
   pw_batch b;
   int body[PW_MAX_BODIES];
   pw_pose pose[PW_MAX_BODIES];
-  double q[PW_MAX_OWN], v[PW_MAX_OWN];
+  double q[PW_MAX_INTERNAL], v[PW_MAX_INTERNAL];
 } blocks_single;
 
-static void blocks_isolate (const pw_slab *k, int e, blocks_single *one) {
+static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one) {
   const pw_kind *kind = k->kind;
   one->b = k->b;
   one->b.count = 1;
@@ -73,7 +73,7 @@ static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, 
 }
 
 static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *one, double *y) {
-  pw_sweep *below = blocks_member (kind, blocks_table[block].below);
+  pw_batch_function *below = blocks_member (kind, blocks_table[block].below);
   int rows = kind->rows, cols = one->b.cols;
   double J[PW_MAX_ROWS * PW_MAX_COLS] = { 0 };
   memset (y, 0, PW_MAX_COLS * sizeof *y);
@@ -110,7 +110,7 @@ static double blocks_step (const pw_workspace *w, const pw_kind *kind, int c, in
   return moved - x;
 }
 
-void pw_difference (const pw_workspace *w, const pw_slab *k, int e, pw_block block, double *out) {
+void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block, double *out) {
   const pw_kind *kind = k->kind;
   int rates = blocks_table[block].rates, rows = pw_block_rows (kind, block), cols = k->b.cols;
   blocks_single one;
@@ -131,12 +131,12 @@ void pw_difference (const pw_workspace *w, const pw_slab *k, int e, pw_block blo
 /* Differences of a function that does not depend on a variable are round-off of its value over the step: 4e-11. */
 #define BLOCKS_ZERO 1e-6
 
-int pw_block_missing (const pw_workspace *w, const pw_slab *k, int e, pw_block block) {
+int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block) {
   double value[PW_MAX_COLS], slope[PW_MAX_COLS * PW_MAX_COLS], most = 0;
   const pw_kind *kind = k->kind;
   int rows = pw_block_rows (kind, block), cols = k->b.cols;
   blocks_single one;
-  if (pw_block_sweep (kind, block) || blocks_member (kind, blocks_table[block].below) == NULL) return 0;
+  if (pw_block_function (kind, block) || blocks_member (kind, blocks_table[block].below) == NULL) return 0;
   blocks_isolate (k, e, &one);
   blocks_value (kind, block, &one, value);
   for (int r = 0; r < rows; r++) most = fmax (most, fabs (value[r]));
@@ -148,7 +148,7 @@ int pw_block_missing (const pw_workspace *w, const pw_slab *k, int e, pw_block b
 
 /* d(J^T lambda)/dq of element e from its d(J w)/dq: entry (r, c) is sum_i lambda_i dJ_ir/dq_c, where w = e_r gives column r of
  * J. */
-static void blocks_transpose (const pw_slab *k, int e, pw_sweep *jw_q, double *out) {
+static void blocks_transpose (const pw_element_batch *k, int e, pw_batch_function *jw_q, double *out) {
   double w[PW_MAX_COLS] = { 0 }, slope[PW_MAX_ROWS * PW_MAX_COLS];
   int cols = k->b.cols;
   blocks_single one;
@@ -164,8 +164,8 @@ static void blocks_transpose (const pw_slab *k, int e, pw_sweep *jw_q, double *o
   }
 }
 
-int pw_sweep_block (const pw_workspace *w, const pw_slab *k, pw_block block, double *out) {
-  pw_sweep *sweep = pw_block_sweep (k->kind, block);
+int pw_evaluate_block (const pw_workspace *w, const pw_element_batch *k, pw_block block, double *out) {
+  pw_batch_function *sweep = pw_block_function (k->kind, block);
   if (sweep == NULL) return 0;
   if (sweep != pw_by_differences && block != PW_JTL_Q) {
     sweep (&k->b, out);

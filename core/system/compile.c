@@ -12,7 +12,7 @@
 static int compile_names (pw_compilation *c, pw_error *error) {
   const pw_model *m = c->m;
   if (pw_names_open (&c->body, (size_t)m->bodies) != PW_OK || pw_names_open (&c->element, (size_t)m->elements) != PW_OK)
-    return pw_fail (error, PW_MACHINE, "model %s: out of memory", m->name);
+    return pw_fail (error, PW_RESOURCE, "model %s: out of memory", m->name);
   for (int i = 0; i < m->bodies; i++)
     if (m->body[i].name && pw_names_add (&c->body, m->body[i].name, i) >= 0)
       return pw_fail (error, PW_INPUT, "model %s: two bodies are named \"%s\"", m->name, m->body[i].name);
@@ -45,7 +45,7 @@ static int compile_kinds (pw_compilation *c, pw_error *error) {
   c->slab_of = malloc (room * sizeof *c->slab_of);
   c->array = calloc (room, sizeof *c->array);
   if (c->kind == NULL || c->count == NULL || c->slab_of == NULL || c->array == NULL)
-    return pw_fail (error, PW_MACHINE, "model %s: out of memory", m->name);
+    return pw_fail (error, PW_RESOURCE, "model %s: out of memory", m->name);
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;
@@ -58,7 +58,7 @@ static int compile_kinds (pw_compilation *c, pw_error *error) {
       if (c->room < kind->element + PW_COMPILE_GUARD) c->room = kind->element + PW_COMPILE_GUARD;
     }
   c->prepared = malloc (c->room + 1);
-  return c->prepared ? PW_OK : pw_fail (error, PW_MACHINE, "model %s: out of memory", m->name);
+  return c->prepared ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", m->name);
 }
 
 static int compile_accounts (const pw_kind *k) {
@@ -99,7 +99,7 @@ static int compile_count (pw_compilation *c, pw_error *error) {
 
 /* ---- One allocation ---- */
 
-static void compile_layout_slab (const pw_compilation *c, pw_layout *l, pw_slab *k, int i) {
+static void compile_layout_slab (const pw_compilation *c, pw_layout *l, pw_element_batch *k, int i) {
   const pw_kind *kind = c->kind[i];
   size_t n = (size_t)c->count[i], bodies = n * (size_t)kind->bodies;
   pw_batch_arrays *a = &c->array[i];
@@ -108,7 +108,7 @@ static void compile_layout_slab (const pw_compilation *c, pw_layout *l, pw_slab 
   a->column = pw_take (l, bodies, sizeof *a->column);
   void *name = pw_take (l, n, sizeof (char *));
   if (l->base == NULL) return;
-  *k = (pw_slab){ .kind = kind, .column = a->column, .name = name };
+  *k = (pw_element_batch){ .kind = kind, .column = a->column, .name = name };
   k->b =
       (pw_batch){ .count = c->count[i], .cols = 3 * kind->bodies + kind->own, .element = a->element, .body = a->body };
 }
@@ -141,7 +141,7 @@ static pw_system *compile_allocate (const pw_compilation *c, pw_pools *pools, pw
   compile_layout (c, &l, &s, pools);
   l = (pw_layout){ calloc (1, l.used), 0 };
   if (l.base == NULL) {
-    pw_fail (error, PW_MACHINE, "model %s: out of memory", c->m->name);
+    pw_fail (error, PW_RESOURCE, "model %s: out of memory", c->m->name);
     return NULL;
   }
   compile_layout (c, &l, &s, pools);
@@ -150,20 +150,20 @@ static pw_system *compile_allocate (const pw_compilation *c, pw_pools *pools, pw
 
 /* ---- */
 
-pw_system *pw_compile (const pw_model *m, pw_error *error) {
+pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
   pw_compilation c = { .m = m };
   pw_pools pools;
   pw_system *s = NULL;
   if (pw_require (m, "a model", error) != PW_OK) return NULL;
   if (!m->built)
-    pw_fail (error, PW_INPUT, "model %s: pw_compile before pw_build", m->name);
-  else if (m->error.status != PW_OK) /* of what was added behind pw_build */
+    pw_fail (error, PW_INPUT, "model %s: pw_system_compile before pw_model_build", m->name);
+  else if (m->error.status != PW_OK) /* of what was added behind pw_model_build */
     pw_fail (error, m->error.status, "%s", m->error.text);
   else if (compile_names (&c, error) == PW_OK && compile_kinds (&c, error) == PW_OK &&
            compile_count (&c, error) == PW_OK)
     s = compile_allocate (&c, &pools, error);
   if (s && pw_compile_fill (&c, s, &pools, error) != PW_OK) {
-    pw_free (s);
+    pw_system_free (s);
     s = NULL;
   }
   pw_names_close (&c.body);
@@ -184,7 +184,7 @@ void pw_close_signals (const pw_source *source, int count) {
   }
 }
 
-void pw_free (pw_system *s) {
+void pw_system_free (pw_system *s) {
   if (s) pw_close_signals (s->source, s->sources);
   free (s);
 }

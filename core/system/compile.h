@@ -1,4 +1,4 @@
-/* From the description to the compiled system: what pw_compile counts before the allocation, and what it fills behind
+/* From the description to the compiled system: what pw_system_compile counts before the allocation, and what it fills behind
  * it.  For compile.c and compile_fill.c only. */
 #ifndef PW_COMPILE_H
 #define PW_COMPILE_H
@@ -41,7 +41,7 @@ typedef struct {
 /* How many elements of the system an element of the description stands for. */
 int pw_compile_copies (const pw_model *m, const pw_kind *kind);
 
-/* Fills a system that has been laid out.  Errors: PW_MACHINE, PW_INPUT. */
+/* Fills a system that has been laid out.  Errors: PW_RESOURCE, PW_INPUT. */
 int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error);
 
 #endif

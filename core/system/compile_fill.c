@@ -52,7 +52,7 @@ static int compile_reads (const pw_compilation *c, pw_system *s, pw_source *sour
   source->state = pools->state;
   for (const char *const *r = reads; *r; r++) {
     pw_error why = { 0 };
-    int state = pw_find_state (s, *r, &why);
+    int state = pw_system_find_state (s, *r, &why);
     if (state < 0)
       return pw_fail (error, PW_INPUT, "model %s: element %s reads a state: %s", c->m->name, element, why.text);
     *pools->state++ = state;
@@ -66,7 +66,7 @@ static int compile_source (const pw_compilation *c, pw_system *s, pw_source *sou
                            pw_pools *pools, const char *element, pw_error *error) {
   if (signal->type == PW_FUNCTION && signal->function.open) {
     void *own = signal->function.open (signal->function.context);
-    if (own == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", c->m->name);
+    if (own == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", c->m->name);
     source->signal = *signal;
     source->signal.function.context = own;
   } else
@@ -77,8 +77,8 @@ static int compile_source (const pw_compilation *c, pw_system *s, pw_source *sou
 }
 
 /* Prepares an element beside the system, to see that it stays within its size, and puts it in. */
-static int compile_prepare (const pw_compilation *c, const pw_system *s, const pw_slab *k, int e,
-                            const pw_element *from, const pw_body *const *bodies, pw_own *own, pw_error *error) {
+static int compile_prepare (const pw_compilation *c, const pw_system *s, const pw_element_batch *k, int e,
+                            const pw_element *from, const pw_body *const *bodies, pw_internal *own, pw_error *error) {
   const pw_kind *kind = k->kind;
   size_t size = kind->element;
   pw_error why = { 0 };
@@ -95,8 +95,8 @@ static int compile_prepare (const pw_compilation *c, const pw_system *s, const p
 }
 
 /* Puts element `e` of its slab where the kind will find it; `body` is the one an each_body kind acts on, or -1. */
-static int compile_element (const pw_compilation *c, pw_system *s, pw_slab *k, int e, const pw_element *from, int body,
-                            pw_error *error) {
+static int compile_element (const pw_compilation *c, pw_system *s, pw_element_batch *k, int e, const pw_element *from,
+                            int body, pw_error *error) {
   static const pw_body ground = { .name = "ground" };
   const pw_kind *kind = k->kind;
   const pw_body *bodies[PW_MAX_BODIES];
@@ -111,7 +111,7 @@ static int compile_element (const pw_compilation *c, pw_system *s, pw_slab *k, i
     column[n] = index < 0 ? s->coords : 3 * index;
   }
   if (kind->prepare == NULL) return PW_OK;
-  pw_own own[PW_MAX_OWN] = { { 0 } };
+  pw_internal own[PW_MAX_INTERNAL] = { { 0 } };
   if (compile_prepare (c, s, k, e, from, bodies, own, error) != PW_OK) return PW_INPUT;
   for (int n = 0, j = k->own + e * kind->own; n < kind->own; n++, j++) {
     s->mass[j] = own[n].mass;
@@ -124,7 +124,7 @@ static int compile_element (const pw_compilation *c, pw_system *s, pw_slab *k, i
 }
 
 /* Puts an element of the description, once or for every body with mass; *e counts the elements of the slab. */
-static int compile_put (const pw_compilation *c, pw_system *s, pw_slab *k, int *e, const pw_element *from,
+static int compile_put (const pw_compilation *c, pw_system *s, pw_element_batch *k, int *e, const pw_element *from,
                         pw_pools *pools, pw_error *error) {
   const char *name = compile_text (pools, pw_element_name (from));
   if (!k->kind->each_body) {
@@ -145,7 +145,7 @@ static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *poo
   memset (next, 0, (size_t)s->slabs * sizeof *next);
   for (int n = 0; n < c->m->elements; n++) {
     const pw_element *from = &c->m->element[n];
-    pw_slab *k = &s->slab[c->slab_of[n]];
+    pw_element_batch *k = &s->slab[c->slab_of[n]];
     for (int copy = pw_compile_copies (c->m, k->kind); copy > 0; copy--) {
       int e = next[c->slab_of[n]]++;
       for (int u = 0; u < k->kind->signals; u++) {
@@ -164,7 +164,7 @@ static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools
   int row = 0, own = 3 * s->bodies;
   pw_source *source = s->source;
   for (int i = 0; i < s->slabs; i++) {
-    pw_slab *k = &s->slab[i];
+    pw_element_batch *k = &s->slab[i];
     k->row = row;
     k->own = own;
     k->source = source;
@@ -179,7 +179,7 @@ static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools
 }
 
 /* 1 if an element may do work: it has power, or moves a constraint.  A position that is prescribed by constants rests. */
-static int compile_works (const pw_slab *k, int element) {
+static int compile_works (const pw_element_batch *k, int element) {
   const pw_kind *kind = k->kind;
   int constants = 0;
   if (kind->power) return 1;
@@ -192,7 +192,7 @@ static int compile_works (const pw_slab *k, int element) {
 static void compile_entries (pw_system *s) {
   pw_entry *entry = s->entry;
   for (int i = 0; i < s->slabs; i++) {
-    const pw_slab *k = &s->slab[i];
+    const pw_element_batch *k = &s->slab[i];
     for (int e = 0; e < k->b.count; e++)
       if (compile_works (k, e)) *entry++ = (pw_entry){ i, e, PW_WORK };
     for (int e = 0; k->kind->loss && e < k->b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
@@ -203,7 +203,7 @@ static void compile_entries (pw_system *s) {
 /* The values given from outside. */
 static int compile_given (const pw_compilation *c, pw_system *s, pw_error *error) {
   for (int i = 0; i < c->m->givens; i++) {
-    int state = pw_find_state (s, c->m->given[i].state, error);
+    int state = pw_system_find_state (s, c->m->given[i].state, error);
     if (state < 0) return PW_INPUT;
     s->held[state] |= PW_GIVEN;
     *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = c->m->given[i].value;
@@ -245,8 +245,8 @@ static void compile_metric (pw_system *s) {
 /* The sum of the forces that never change, at any state. */
 static int compile_constant (pw_system *s, pw_error *error) {
   pw_workspace *w = pw_workspace_new (s, error);
-  if (w == NULL) return PW_MACHINE;
-  pw_sweep_constant (w, s->constant);
+  if (w == NULL) return PW_RESOURCE;
+  pw_evaluate_constant (w, s->constant);
   pw_workspace_free (w);
   return PW_OK;
 }

@@ -11,7 +11,7 @@ int pw_system_elements (const pw_system *s) {
 
 pw_element_info pw_system_element (const pw_system *s, int element) {
   pw_element_info x = { .contact = 0 };
-  const pw_slab *k = s->slab;
+  const pw_element_batch *k = s->slab;
   for (; element >= k->b.count; element -= k++->b.count) {
     x.contact += k->kind->contact ? k->b.count : 0;
     x.force += 3 * k->b.count * k->kind->bodies;
@@ -28,13 +28,13 @@ pw_element_info pw_system_element (const pw_system *s, int element) {
 
 int pw_system_row_element (const pw_system *s, int row) {
   int element = 0;
-  const pw_slab *k = s->slab;
+  const pw_element_batch *k = s->slab;
   for (; row >= k->row + k->b.count * k->kind->rows; k++) element += k->b.count;
   return element + (row - k->row) / k->kind->rows;
 }
 
 static int elements_place (pw_workspace *w, double t, const double *q, const double *v, pw_error *error) {
-  if (pw_place (w, t, q, v) == PW_OK) return PW_OK;
+  if (pw_update_kinematics (w, t, q, v) == PW_OK) return PW_OK;
   return pw_fail (error, PW_METHOD, "at t = %g s a signal of the model reports an error", t);
 }
 
@@ -46,10 +46,10 @@ int pw_system_contacts (const pw_system *s) {
   return count;
 }
 
-int pw_system_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
-                              pw_error *error) {
+int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
+                                 pw_error *error) {
   int status = elements_place (w, t, q, v, error);
-  for (const pw_slab *k = w->slab; status == PW_OK && k < w->slab + w->s->slabs; k++) {
+  for (const pw_element_batch *k = w->slab; status == PW_OK && k < w->slab + w->s->slabs; k++) {
     if (k->kind->contact == NULL) continue;
     k->kind->contact (&k->b, out[0]);
     out += k->b.count;
@@ -60,7 +60,7 @@ int pw_system_contact_points (pw_workspace *w, double t, const double *q, const 
 /* ---- Forces ---- */
 
 /* F -= J^T lambda, the columns of the bodies. */
-static void elements_reactions (const pw_slab *k, const double *lambda, double *F) {
+static void elements_reactions (const pw_element_batch *k, const double *lambda, double *F) {
   const double *J = k->J;
   int bodies = 3 * k->kind->bodies;
   for (int e = 0; e < k->b.count; e++, F += bodies)
@@ -68,7 +68,7 @@ static void elements_reactions (const pw_slab *k, const double *lambda, double *
       for (int c = 0; c < bodies; c++) F[c] -= J[c] * *lambda;
 }
 
-static void elements_applied (const pw_slab *k, double *F) {
+static void elements_applied (const pw_element_batch *k, double *F) {
   int bodies = 3 * k->kind->bodies;
   k->kind->force (&k->b, k->block);
   for (int e = 0; e < k->b.count; e++, F += bodies)
@@ -81,12 +81,12 @@ int pw_system_force_size (const pw_system *s) {
   return size;
 }
 
-int pw_system_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
-                      pw_error *error) {
+int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
+                         pw_error *error) {
   if (elements_place (w, t, q, v, error) != PW_OK) return PW_METHOD;
   memset (out, 0, (size_t)pw_system_force_size (w->s) * sizeof *out);
-  pw_sweep_J (w);
-  for (const pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
+  pw_evaluate_J (w);
+  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
     if (k->kind->rows) elements_reactions (k, lambda + k->row, out);
     if (k->kind->force) elements_applied (k, out);
     out += 3 * k->b.count * k->kind->bodies;
@@ -100,7 +100,7 @@ int pw_system_forces (pw_workspace *w, double t, const double *q, const double *
 static int elements_jacobian (const pw_workspace *w, pw_equations *out) {
   const pw_system *s = w->s;
   int entries = 0;
-  for (const pw_slab *k = w->slab; k < w->slab + s->constraints; k++)
+  for (const pw_element_batch *k = w->slab; k < w->slab + s->constraints; k++)
     for (int i = 0; i < k->b.count * k->kind->rows; i++)
       for (int c = 0; c < k->b.cols; c++) {
         int column = pw_global (k, i / k->kind->rows, c);
@@ -121,7 +121,7 @@ static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error
   double *space = calloc (2 * n + 3 * rows + 2 * entries + 6, sizeof *space); /* two indices take a number */
   *out =
       (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };
-  if (space == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (space == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   out->mass = space;
   out->force = space + n; /* three more: the ground's */
   out->g = out->force + n + 3;
@@ -136,13 +136,13 @@ static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error
 static int elements_evaluate (pw_workspace *w, double t, const double *q, const double *v, pw_equations *out,
                               pw_error *error) {
   if (elements_place (w, t, q, v, error) != PW_OK) return PW_METHOD;
-  pw_sweep_J (w);
+  pw_evaluate_J (w);
   elements_jacobian (w, out);
   memcpy (out->mass, w->s->mass, (size_t)w->s->coords * sizeof *out->mass);
-  pw_sweep_force (w, out->force);
-  pw_sweep_g (w, out->g);
-  pw_sweep_eta (w, out->eta);
-  pw_sweep_gamma (w, out->gamma);
+  pw_evaluate_force (w, out->force);
+  pw_evaluate_g (w, out->g);
+  pw_evaluate_eta (w, out->eta);
+  pw_evaluate_gamma (w, out->gamma);
   return PW_OK;
 }
 
@@ -150,7 +150,7 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error) {
   *out = (pw_equations){ .rows = 0 };
   pw_workspace *w = pw_workspace_new (s, error);
-  int status = w ? elements_allocate (w, out, error) : PW_MACHINE;
+  int status = w ? elements_allocate (w, out, error) : PW_RESOURCE;
   if (status == PW_OK) status = elements_evaluate (w, t, q, v, out, error);
   pw_workspace_free (w);
   return status;

@@ -5,9 +5,9 @@
 #include "unroll.h"
 
 /* The slabs with rows come first. */
-#define EACH_CONSTRAINT(k, w) for (pw_slab *k = (w)->slab, *end = k + (w)->s->constraints; k < end; k++)
+#define EACH_CONSTRAINT(k, w) for (pw_element_batch *k = (w)->slab, *end = k + (w)->s->constraints; k < end; k++)
 
-void pw_sweep_J (pw_workspace *w) {
+void pw_evaluate_J (pw_workspace *w) {
   EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
 }
 
@@ -15,7 +15,7 @@ void pw_sweep_J (pw_workspace *w) {
 static void evaluate_rows (pw_workspace *w, size_t sweep, int rows, double *out) {
   EACH_CONSTRAINT (k, w) {
     if (k->row >= rows) break;
-    pw_sweep *f = *(pw_sweep *const *)(const void *)((const char *)k->kind + sweep);
+    pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + sweep);
     if (f)
       f (&k->b, out + k->row);
     else
@@ -23,20 +23,20 @@ static void evaluate_rows (pw_workspace *w, size_t sweep, int rows, double *out)
   }
 }
 
-void pw_sweep_g (pw_workspace *w, double *g) {
+void pw_evaluate_g (pw_workspace *w, double *g) {
   evaluate_rows (w, offsetof (pw_kind, g), w->s->holonomic, g);
 }
 
-void pw_sweep_g_size (pw_workspace *w, double *size) {
+void pw_evaluate_g_size (pw_workspace *w, double *size) {
   evaluate_rows (w, offsetof (pw_kind, g_size), w->s->holonomic, size);
   for (int i = 0; i < w->s->holonomic; i++) size[i] = pw_larger (size[i], w->scale.length);
 }
 
-void pw_sweep_eta (pw_workspace *w, double *eta) {
+void pw_evaluate_eta (pw_workspace *w, double *eta) {
   evaluate_rows (w, offsetof (pw_kind, eta), w->s->rows, eta);
 }
 
-void pw_sweep_gamma (pw_workspace *w, double *gamma) {
+void pw_evaluate_gamma (pw_workspace *w, double *gamma) {
   evaluate_rows (w, offsetof (pw_kind, gamma), w->s->rows, gamma);
 }
 
@@ -47,7 +47,7 @@ static inline const double *evaluate_add (double *to, const double *force) {
   return force + 3;
 }
 
-PW_APART void evaluate_add_own (const pw_slab *k, double *f) {
+PW_NOINLINE void evaluate_add_own (const pw_element_batch *k, double *f) {
   const int own = k->kind->own, *column = k->column;
   const double *block = k->block;
   for (int e = 0; e < k->b.count; e++) {
@@ -56,7 +56,7 @@ PW_APART void evaluate_add_own (const pw_slab *k, double *f) {
   }
 }
 
-static inline void evaluate_add_force (const pw_slab *k, double *f) {
+static inline void evaluate_add_force (const pw_element_batch *k, double *f) {
   k->kind->force (&k->b, k->block);
   if (k->kind->own > 0) {
     evaluate_add_own (k, f);
@@ -67,21 +67,21 @@ static inline void evaluate_add_force (const pw_slab *k, double *f) {
     block = evaluate_add (f + *column, block);
 }
 
-void pw_sweep_force (pw_workspace *w, double *f) {
+void pw_evaluate_force (pw_workspace *w, double *f) {
   memcpy (f, w->s->constant, (size_t)w->s->coords * sizeof *f);
-  for (pw_slab **k = w->force, **end = k + w->s->forces; k < end; k++) evaluate_add_force (*k, f);
+  for (pw_element_batch **k = w->force, **end = k + w->s->forces; k < end; k++) evaluate_add_force (*k, f);
 }
 
-void pw_sweep_constant (pw_workspace *w, double *f) {
-  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++)
+void pw_evaluate_constant (pw_workspace *w, double *f) {
+  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++)
     if (k->kind->force && k->kind->constant) evaluate_add_force (k, f);
 }
 
 /* Sum of one number per element over all kinds that have the sweep. */
 static double evaluate_total (pw_workspace *w, size_t sweep) {
   double sum = 0;
-  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
-    pw_sweep *f = *(pw_sweep *const *)(const void *)((const char *)k->kind + sweep);
+  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
+    pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + sweep);
     if (f == NULL) continue;
     f (&k->b, k->block);
     for (int e = 0; e < k->b.count; e++) sum += k->block[e];
@@ -99,13 +99,13 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-void pw_sweep_ledger (pw_workspace *w, const double *lambda, double *rate) {
-  const pw_slab *swept = NULL;
+void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
+  const pw_element_batch *swept = NULL;
   int type = -1;
   double *eta = w->scratch;
   for (int i = 0; i < w->s->entries; i++) {
     const pw_entry *entry = &w->s->entry[i];
-    pw_slab *k = &w->slab[entry->slab];
+    pw_element_batch *k = &w->slab[entry->slab];
     int drive = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL;
     if (k != swept || (int)entry->type != type) {
       k->b.lambda = lambda + k->row;
@@ -124,7 +124,8 @@ void pw_sweep_ledger (pw_workspace *w, const double *lambda, double *rate) {
 }
 
 /* out = J w for a slab; the numbers of bodies and of own coordinates are constants where it is inlined. */
-PW_INLINE void evaluate_mul (const pw_system *s, const pw_slab *k, const double *w, double *out, int bodies, int own) {
+PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, const double *w, double *out, int bodies,
+                             int own) {
   static const double ground[3] = { 0, 0, 0 };
   const double *J = k->J, *x[PW_MAX_BODIES] = { 0 }, *y = w + k->own;
   const int *column = k->column;
@@ -140,7 +141,7 @@ PW_INLINE void evaluate_mul (const pw_system *s, const pw_slab *k, const double 
 }
 
 void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
-  for (const pw_slab *k = w->slab, *end = k + w->s->constraints; k < end; k++) {
+  for (const pw_element_batch *k = w->slab, *end = k + w->s->constraints; k < end; k++) {
     double *to = out + k->row;
     if (k->kind->own == 0 && k->kind->bodies == 2)
       evaluate_mul (w->s, k, x, to, 2, 0);
@@ -152,7 +153,7 @@ void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
 }
 
 void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
-  for (const pw_slab *k = w->slab; k < w->slab + w->s->constraints; k++) {
+  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->constraints; k++) {
     const double *J = k->J;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++, lambda++) {
@@ -181,8 +182,8 @@ static inline evaluate_worst evaluate_judge (evaluate_worst worst, int row, doub
   return worst;
 }
 
-void pw_judge_positions (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
-                         pw_residuals *r) {
+void pw_worst_position (const pw_system *s, const double *g, const double *size, const unsigned char *enforced,
+                        pw_residuals *r) {
   evaluate_worst worst = { .row = -1 };
   for (int i = 0; i < s->holonomic; i++)
     if (enforced == NULL || enforced[i]) worst = evaluate_judge (worst, i, g[i], size[i]);
@@ -192,8 +193,9 @@ void pw_judge_positions (const pw_system *s, const double *g, const double *size
 }
 
 /* Judges J v - eta of a slab at the placed rates, as evaluate_mul; eta NULL: zero. */
-PW_INLINE evaluate_worst evaluate_speeds_of (const pw_slab *k, const double *eta, const unsigned char *enforced,
-                                             double unit, evaluate_worst worst, int bodies, int own) {
+PW_INLINE evaluate_worst evaluate_speeds_of (const pw_element_batch *k, const double *eta,
+                                             const unsigned char *enforced, double unit, evaluate_worst worst,
+                                             int bodies, int own) {
   const double *J = k->J, *y = k->b.v;
   const int *body = k->b.body;
   int i = k->row;
@@ -217,15 +219,15 @@ PW_INLINE evaluate_worst evaluate_speeds_of (const pw_slab *k, const double *eta
   return worst;
 }
 
-PW_APART evaluate_worst evaluate_speeds_of_any (const pw_slab *k, const double *eta, const unsigned char *enforced,
-                                                double unit, evaluate_worst worst) {
+PW_NOINLINE evaluate_worst evaluate_speeds_of_any (const pw_element_batch *k, const double *eta,
+                                                   const unsigned char *enforced, double unit, evaluate_worst worst) {
   return evaluate_speeds_of (k, eta, enforced, unit, worst, k->kind->bodies, k->kind->own);
 }
 
-void pw_sweep_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
+void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
   double *eta = w->s->moving ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
   evaluate_worst worst = { .row = -1 };
-  if (eta) pw_sweep_eta (w, eta);
+  if (eta) pw_evaluate_eta (w, eta);
   EACH_CONSTRAINT (k, w) {
     if (k->kind->own == 0 && k->kind->bodies == 2)
       worst = evaluate_speeds_of (k, eta, enforced, unit, worst, 2, 0);
@@ -239,14 +241,14 @@ void pw_sweep_velocity_residual (pw_workspace *w, const unsigned char *enforced,
   r->row_velocity = worst.row;
 }
 
-void pw_sweep_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
+void pw_evaluate_position_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
   double *value = w->scratch, *size = value + w->s->rows;
-  pw_sweep_g (w, value);
-  pw_sweep_g_size (w, size);
-  pw_judge_positions (w->s, value, size, enforced, r);
+  pw_evaluate_g (w, value);
+  pw_evaluate_g_size (w, size);
+  pw_worst_position (w->s, value, size, enforced, r);
 }
 
-void pw_sweep_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
-  pw_sweep_position_residual (w, enforced, r);
-  pw_sweep_velocity_residual (w, enforced, r);
+void pw_evaluate_residuals (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
+  pw_evaluate_position_residual (w, enforced, r);
+  pw_evaluate_velocity_residual (w, enforced, r);
 }

@@ -10,8 +10,8 @@ static int finite_first (const double *x, int count, int each) {
   return -1;
 }
 
-int pw_find_wild (pw_workspace *w, char *buffer, size_t size) {
-  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
+int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
+  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
     const char *what = "force";
     int e = -1, rows = k->kind->rows, n = k->b.count;
     if (k->kind->force) {

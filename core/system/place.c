@@ -6,7 +6,7 @@
 
 /* Own coordinates are read where the caller has them. */
 static void place_own (pw_workspace *w, const double *q, const double *v) {
-  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
+  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
     if (q) k->b.q = q + k->own;
     k->b.v = v + k->own;
   }
@@ -54,12 +54,12 @@ static int place_signals (pw_workspace *w, double t, const double *q, const doub
   return w->s->readers > 0 ? place_sources (w, 1, t, q, v) : PW_OK;
 }
 
-int pw_place (pw_workspace *w, double t, const double *q, const double *v) {
+int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
   place_poses (w, q, v);
   return t == w->t_signal && w->s->readers == 0 ? PW_OK : place_signals (w, t, q, v);
 }
 
-int pw_place_rates (pw_workspace *w, const double *v) {
+int pw_update_velocities (pw_workspace *w, const double *v) {
   const double *from = v;
   for (pw_pose *p = w->pose, *end = p + w->s->bodies; p < end; p++, from += 3) {
     p->vx = from[0];
@@ -70,7 +70,7 @@ int pw_place_rates (pw_workspace *w, const double *v) {
   return w->s->readers > 0 ? place_sources (w, 1, w->t_signal, NULL, v) : PW_OK;
 }
 
-void pw_hold (pw_workspace *w, int hold) {
+void pw_hold_signals (pw_workspace *w, int hold) {
   w->hold = hold;
   w->t_signal = NAN;
 }

@@ -10,23 +10,23 @@
 static const char *const query_names[] = { "x", "y", "phi", "vx", "vy", "omega" };
 static const char *const query_units[] = { "m", "m", "rad", "m/s", "m/s", "rad/s" };
 
-int pw_count_bodies (const pw_system *s) {
+int pw_system_bodies (const pw_system *s) {
   return s->bodies;
 }
 
-int pw_count_coordinates (const pw_system *s) {
+int pw_system_coordinates (const pw_system *s) {
   return s->coords;
 }
 
-int pw_count_rows (const pw_system *s) {
+int pw_system_rows (const pw_system *s) {
   return s->rows;
 }
 
-int pw_count_holonomic (const pw_system *s) {
+int pw_system_holonomic (const pw_system *s) {
   return s->holonomic;
 }
 
-int pw_count_ledger (const pw_system *s) {
+int pw_system_ledger_entries (const pw_system *s) {
   return s->entries;
 }
 
@@ -62,15 +62,15 @@ int pw_system_jumps (const pw_system *s, double t) {
   return 0;
 }
 
-int pw_find_body (const pw_system *s, const char *name) {
+int pw_system_find_body (const pw_system *s, const char *name) {
   for (int b = 0; name && b < s->bodies; b++)
     if (strcmp (s->body_name[b], name) == 0) return b;
   return -1;
 }
 
 /* The slab that owns a coordinate j >= 3 bodies, and the element's and quantity's numbers in it. */
-static const pw_slab *query_owner (const pw_system *s, int j, int *element, int *number) {
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+static const pw_element_batch *query_owner (const pw_system *s, int j, int *element, int *number) {
+  for (const pw_element_batch *k = s->slab; k < s->slab + s->slabs; k++) {
     int n = j - k->own;
     if (k->kind->own == 0 || n < 0 || n >= k->b.count * k->kind->own) continue;
     *element = n / k->kind->own;
@@ -80,21 +80,21 @@ static const pw_slab *query_owner (const pw_system *s, int j, int *element, int 
   return NULL;
 }
 
-char *pw_state_name (const pw_system *s, int state, char *buffer, size_t size) {
+char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
   int rate = state >= s->coords, j = rate ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) {
     snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_names[3 * rate + j % 3]);
     return buffer;
   }
-  const pw_slab *k = query_owner (s, j, &e, &n);
+  const pw_element_batch *k = query_owner (s, j, &e, &n);
   if (k) snprintf (buffer, size, "%s.%s", k->name[e], rate ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
   return buffer;
 }
 
-const char *pw_state_unit (const pw_system *s, int state) {
+const char *pw_system_state_unit (const pw_system *s, int state) {
   int rate = state >= s->coords, j = rate ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) return query_units[3 * rate + j % 3];
-  const pw_slab *k = query_owner (s, j, &e, &n);
+  const pw_element_batch *k = query_owner (s, j, &e, &n);
   if (k == NULL) return "";
   if (!rate) return k->kind->coordinate[n].unit;
   return strcmp (k->kind->coordinate[n].unit, "m") == 0 ? "m/s" : "rad/s";
@@ -119,7 +119,7 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
   return -1;
 }
 
-int pw_find_state (const pw_system *s, const char *name, pw_error *error) {
+int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
   char best[120], text[120], hint[160];
   if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", s->model);
   pw_nearest near = { .sought = name };
@@ -127,10 +127,11 @@ int pw_find_state (const pw_system *s, const char *name, pw_error *error) {
   if (state >= 0) return state;
   for (int j = 3 * s->bodies; j < s->coords; j++)
     for (int rate = 0; rate < 2; rate++)
-      if (strcmp (pw_state_name (s, j + rate * s->coords, text, sizeof text), name) == 0) return j + rate * s->coords;
+      if (strcmp (pw_system_state_name (s, j + rate * s->coords, text, sizeof text), name) == 0)
+        return j + rate * s->coords;
   int search = near.best == NULL;
   for (int i = 0; search && i < 2 * s->coords; i++) {
-    pw_nearest_try (&near, pw_state_name (s, i, text, sizeof text));
+    pw_nearest_try (&near, pw_system_state_name (s, i, text, sizeof text));
     if (near.best == text) near.best = strcpy (best, text);
   }
   return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name,
@@ -138,52 +139,52 @@ int pw_find_state (const pw_system *s, const char *name, pw_error *error) {
 }
 
 /* The slab of a row, and the element and the row's number in it. */
-static const pw_slab *query_row (const pw_system *s, int row, int *element, int *number) {
-  const pw_slab *k = s->slab;
+static const pw_element_batch *query_row (const pw_system *s, int row, int *element, int *number) {
+  const pw_element_batch *k = s->slab;
   while (row >= k->row + k->b.count * k->kind->rows) k++;
   *element = (row - k->row) / k->kind->rows;
   *number = (row - k->row) % k->kind->rows;
   return k;
 }
 
-char *pw_reaction_name (const pw_system *s, int row, char *buffer, size_t size) {
+char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
-  const pw_slab *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_row (s, row, &e, &n);
   snprintf (buffer, size, "%s.%s", k->name[e], k->kind->reaction[n].name);
   return buffer;
 }
 
-const char *pw_reaction_unit (const pw_system *s, int row) {
+const char *pw_system_reaction_unit (const pw_system *s, int row) {
   int e, n;
-  const pw_slab *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_row (s, row, &e, &n);
   if (k->kind->reaction_unit == NULL) return k->kind->reaction[n].unit;
   return k->kind->reaction_unit ((const char *)k->b.element + (size_t)e * k->kind->element, n);
 }
 
-int pw_find_reaction (const pw_system *s, const char *name, pw_error *error) {
+int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error) {
   if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a reaction is missing", s->model);
   char best[120], text[120], hint[160];
   pw_nearest near = { .sought = name };
   for (int i = 0; i < s->rows; i++)
-    if (strcmp (pw_reaction_name (s, i, text, sizeof text), name) == 0) return i;
+    if (strcmp (pw_system_reaction_name (s, i, text, sizeof text), name) == 0) return i;
   for (int i = 0; i < s->rows; i++) {
-    pw_nearest_try (&near, pw_reaction_name (s, i, text, sizeof text));
+    pw_nearest_try (&near, pw_system_reaction_name (s, i, text, sizeof text));
     if (near.best == text) near.best = strcpy (best, text);
   }
   return pw_fail (error, PW_INPUT, "model %s has no reaction \"%s\"%s", s->model, name,
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-char *pw_row_element (const pw_system *s, int row, char *buffer, size_t size) {
+char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size) {
   int e, n;
-  const pw_slab *k = query_row (s, row, &e, &n);
+  const pw_element_batch *k = query_row (s, row, &e, &n);
   snprintf (buffer, size, "%s %s", k->kind->name, k->name[e]);
   return buffer;
 }
 
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   buffer[0] = 0;
-  for (const pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++) {
+  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
     int signals = k->kind->signals;
     if (w->failed == NULL || w->failed < k->source || w->failed >= k->source + k->b.count * signals) continue;
     int i = (int)(w->failed - k->source), n = i % signals;
@@ -198,9 +199,9 @@ char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   return buffer;
 }
 
-char *pw_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
+char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
   const pw_entry *x = &s->entry[entry];
-  const pw_slab *k = &s->slab[x->slab];
+  const pw_element_batch *k = &s->slab[x->slab];
   const char *what = x->type == PW_WORK ? "work" : "loss";
   if (k->kind->each_body)
     snprintf (buffer, size, "%s.%s.%s", k->name[x->element], s->body_name[k->b.body[x->element]], what);

@@ -4,22 +4,22 @@
 #include "system.h"
 
 /* Fills the slab's block, 2 cols for each element. */
-static int saturation_fill (const pw_slab *k) {
+static int saturation_fill (const pw_element_batch *k) {
   int n = k->b.count * 2 * k->b.cols;
   for (int i = 0; i < n; i++) k->block[i] = INFINITY;
   k->kind->saturation (&k->b, k->block);
   return n;
 }
 
-/* The state, as pw_find_state numbers them, of entry i of the block; -1: the ground's. */
-static int saturation_state (const pw_system *s, const pw_slab *k, int i) {
+/* The state, as pw_system_find_state numbers them, of entry i of the block; -1: the ground's. */
+static int saturation_state (const pw_system *s, const pw_element_batch *k, int i) {
   int cols = k->b.cols, c = i % (2 * cols), j = pw_global (k, i / (2 * cols), c % cols);
   return j >= s->coords ? -1 : c < cols ? j : s->coords + j;
 }
 
-void pw_sweep_saturation (pw_workspace *w, double *least) {
+void pw_evaluate_saturation (pw_workspace *w, double *least) {
   for (int j = 0; j < 2 * w->s->coords; j++) least[j] = INFINITY;
-  for (pw_slab **k = w->force, **end = k + w->s->forces; k < end; k++)
+  for (pw_element_batch **k = w->force, **end = k + w->s->forces; k < end; k++)
     for (int i = 0, n = (*k)->kind->saturation ? saturation_fill (*k) : 0; i < n; i++) {
       int state = saturation_state (w->s, *k, i);
       if (state >= 0) least[state] = fmin (least[state], (*k)->block[i]);
@@ -29,7 +29,7 @@ void pw_sweep_saturation (pw_workspace *w, double *least) {
 int pw_find_saturation (pw_workspace *w, double *least, char *element, size_t size) {
   int found = -1;
   *least = INFINITY;
-  for (pw_slab **k = w->force, **end = k + w->s->forces; k < end; k++)
+  for (pw_element_batch **k = w->force, **end = k + w->s->forces; k < end; k++)
     for (int i = 0, n = (*k)->kind->saturation ? saturation_fill (*k) : 0; i < n; i++) {
       int state = saturation_state (w->s, *k, i);
       if (state < w->s->coords || !((*k)->block[i] < *least)) continue;

@@ -4,7 +4,7 @@
 #include "system.h"
 
 /* A copy of the system's batch, with arrays of the workspace. */
-static void workspace_batch (pw_layout *l, const pw_slab *from, const pw_workspace *w, pw_slab *k) {
+static void workspace_batch (pw_layout *l, const pw_element_batch *from, const pw_workspace *w, pw_element_batch *k) {
   const pw_kind *kind = from->kind;
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
   size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3;
@@ -39,13 +39,13 @@ static void workspace_layout (pw_layout *l, pw_workspace *w) {
 /* Functions that have a context of their own get one for this workspace. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
-  for (pw_slab *k = w->slab; k < w->slab + w->s->slabs; k++)
+  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++)
     for (int i = 0; i < k->b.count * k->kind->signals; i++) {
       pw_function *f = &k->source[i].signal.function;
       k->source[i].u = k->u + 3 * i;
       if (k->source[i].signal.type != PW_FUNCTION || f->open == NULL) continue;
       f->context = status == PW_OK ? f->open (f->context) : NULL;
-      if (f->context == NULL) status = PW_MACHINE, f->close = NULL; /* nor are those after it */
+      if (f->context == NULL) status = PW_RESOURCE, f->close = NULL; /* nor are those after it */
     }
   return status;
 }
@@ -65,7 +65,7 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
     if (workspace_open_signals (w) == PW_OK) return w;
   }
   pw_workspace_free (w);
-  pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   return NULL;
 }
 

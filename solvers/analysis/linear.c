@@ -39,7 +39,7 @@ static void linear_put (pw_linearisation *x, const double *v) {
   pw_newton_block (&x->newton, r->w, &x->tape, PW_FORCE_Q, &put);
   put.col = n;
   pw_newton_block (&x->newton, r->w, &x->tape, PW_FORCE_V, &put);
-  pw_newton_readers (&x->newton, r->w, &x->tape, 0, 0, n);
+  pw_newton_signals (&x->newton, r->w, &x->tape, 0, 0, n);
   put = (pw_put){ .row = n, .rows = x->m, .factor = 1, .factor_nonholonomic = 1 };
   pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_Q, &put);
   put.col = n;
@@ -53,20 +53,20 @@ static void linear_put (pw_linearisation *x, const double *v) {
 }
 
 static int linear_derivatives (pw_linearisation *x) {
-  if (pw_newton_open (&x->newton, x->r->s) != PW_OK) return PW_MACHINE;
-  pw_tape_record (&x->tape);
+  if (pw_newton_open (&x->newton, x->r->s) != PW_OK) return PW_RESOURCE;
+  pw_scatter_record (&x->tape);
   linear_put (x, x->r->v);
   int size = 2 * x->n > x->n + 2 * x->m ? 2 * x->n : x->n + 2 * x->m;
-  if (pw_tape_lay_out (&x->tape, size, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
+  if (pw_scatter_lay_out (&x->tape, size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
   x->value = calloc ((size_t)x->colptr[size] + 1, sizeof *x->value);
-  return x->value ? PW_OK : PW_MACHINE;
+  return x->value ? PW_OK : PW_RESOURCE;
 }
 
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v) {
-  int status = pw_accelerate (x->r, t, q, v, x->a, x->lambda);
+  int status = pw_run_accelerate (x->r, t, q, v, x->a, x->lambda);
   if (status != PW_OK) return status;
   memset (x->value, 0, ((size_t)x->colptr[2 * x->n] + 1) * sizeof *x->value);
-  pw_tape_fill (&x->tape, x->value);
+  pw_scatter_begin (&x->tape, x->value);
   linear_put (x, v);
   return PW_OK;
 }
@@ -183,12 +183,12 @@ static int linear_open (pw_linearisation *x, int all) {
     { &x->residual, 4 * (2 * m + n) + 15 },
   };
   x->memory = pw_take_arrays (array, all ? sizeof array / sizeof *array : 0);
-  return x->memory ? PW_OK : PW_MACHINE;
+  return x->memory ? PW_OK : PW_RESOURCE;
 }
 
 static void linear_close (pw_linearisation *x) {
   pw_newton_close (&x->newton);
-  pw_tape_close (&x->tape);
+  pw_scatter_close (&x->tape);
   free (x->colptr);
   free (x->rowind);
   free (x->value);
@@ -207,7 +207,7 @@ static int linear_rows (pw_linearisation *x) {
   x->positions = x->n - x->holonomic;
   x->velocities = x->n - x->rank;
   x->size = x->positions + x->velocities;
-  return x->row ? PW_OK : PW_MACHINE;
+  return x->row ? PW_OK : PW_RESOURCE;
 }
 
 static int linear_results (const pw_linearisation *x, pw_linear *l) {
@@ -215,7 +215,7 @@ static int linear_results (const pw_linearisation *x, pw_linear *l) {
   l->A = malloc ((size * size + 1) * sizeof *l->A);
   l->re = calloc (2 * size + 1, sizeof *l->re);
   l->rigid = calloc (size + 1, 1);
-  if (l->A == NULL || l->re == NULL || l->rigid == NULL) return PW_MACHINE;
+  if (l->A == NULL || l->re == NULL || l->rigid == NULL) return PW_RESOURCE;
   l->im = l->re + size;
   memcpy (l->A, x->A, size * size * sizeof *l->A);
   return PW_OK;
@@ -224,7 +224,7 @@ static int linear_results (const pw_linearisation *x, pw_linear *l) {
 /* The state reached is evaluated last: there the system stays. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
-  if (linear_derivatives (x) != PW_OK) return PW_MACHINE;
+  if (linear_derivatives (x) != PW_OK) return PW_RESOURCE;
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error) : pw_fail (error, PW_METHOD, "a signal failed");
@@ -232,7 +232,7 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_linear_choose_frame (x);
   for (int c = 0; c < x->size; c++) linear_unknown (x, c);
   l->symmetries = pw_linear_symmetries (x);
-  if (linear_results (x, l) != PW_OK) return PW_MACHINE;
+  if (linear_results (x, l) != PW_OK) return PW_RESOURCE;
   memcpy (l->twist, x->frame.twist, sizeof l->twist);
   l->acceleration = x->frame.acceleration;
   status = pw_linear_eigenvalues (x, l, error);
@@ -240,7 +240,7 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   return status;
 }
 
-int pw_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
+int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
   pw_linearisation x = { .r = r, .n = r->s->coords, .m = r->s->rows };
   pw_statistics before = r->statistics;
   int near = r->near, status = linear_rows (&x), all = x.n <= most;
@@ -254,10 +254,10 @@ int pw_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
   linear_close (&x);
   r->statistics = before;
   r->near = near;
-  return status == PW_MACHINE ? pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model) : status;
+  return status == PW_RESOURCE ? pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model) : status;
 }
 
-void pw_linear_close (pw_linear *l) {
+void pw_linear_free (pw_linear *l) {
   free (l->A);
   free (l->re);
   free (l->rigid);

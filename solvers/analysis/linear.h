@@ -35,13 +35,13 @@ typedef struct {
   double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the state reached */
   double *there;                 /* 2 n: a state later on */
   pw_newton newton;
-  pw_tape tape;
+  pw_scatter_map tape;
   int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as y */
   double *value;
   char *memory;
 } pw_linearisation;
 
-/* Accelerations and derivatives at a state, where the system stays.  Returns as pw_accelerate. */
+/* Accelerations and derivatives at a state, where the system stays.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
 /* y and da from the variation x. */
 void pw_linear_vary (pw_linearisation *x);

@@ -102,7 +102,7 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
   int n = l->unknowns, k = l->symmetries;
   size_t cells = (size_t)n * (size_t)n;
   double *B = malloc ((2 * cells + 7 * (size_t)n + 1) * sizeof *B);
-  if (B == NULL) return PW_MACHINE;
+  if (B == NULL) return PW_RESOURCE;
   memcpy (B, x->A, cells * sizeof *B);
   if (!pw_linear_split (x, k, B)) {
     memcpy (B, x->A, cells * sizeof *B);

@@ -183,7 +183,7 @@ static int linear_same (pw_linearisation *x, double time) {
   pw_residuals now;
   linear_later (x, time, q, v);
   if (pw_linear_evaluate (x, x->r->t + time, q, v) != PW_OK) return 0;
-  pw_sweep_residuals (x->r->w, x->r->active, &now);
+  pw_evaluate_residuals (x->r->w, x->r->active, &now);
   if (!(now.position <= LINEAR_STEADY && now.velocity <= LINEAR_STEADY)) return 0;
   linear_rotate (x, angle, x->a0, expected);
   if (!linear_agree (x, x->a, expected)) return 0;

@@ -16,15 +16,15 @@ enum { PROFILE_BATCHES = 5, PROFILE_PIECES = 6 };
 typedef struct {
   pw_run *r;
   const pw_system *s;
-  pw_saddle *saddle;        /* as the run's own */
-  pw_projector projector;   /* if the method projects */
-  const pw_slab *k;         /* the kind being measured */
-  pw_statistics done;       /* by the run, before anything was measured */
-  double t, before;         /* two times, so that signals are evaluated each time */
-  double *q, *v, *far;      /* the last state, and positions off the constraints */
-  const double *from;       /* q or far */
-  double *a, *f, *y;        /* coords + 3: results */
-  double *gamma, *eta, *jv; /* rows: results */
+  pw_saddle *saddle;         /* as the run's own */
+  pw_projector projector;    /* if the method projects */
+  const pw_element_batch *k; /* the kind being measured */
+  pw_statistics done;        /* by the run, before anything was measured */
+  double t, before;          /* two times, so that signals are evaluated each time */
+  double *q, *v, *far;       /* the last state, and positions off the constraints */
+  const double *from;        /* q or far */
+  double *a, *f, *y;         /* coords + 3: results */
+  double *gamma, *eta, *jv;  /* rows: results */
   double *lambda;
   char *memory;
 } profile;
@@ -34,22 +34,22 @@ typedef struct {
 typedef void profile_work (profile *p, long n);
 
 static void profile_poses (profile *p, long n) {
-  for (; n > 0; n--) pw_place (p->r->w, p->t, p->q, p->v);
+  for (; n > 0; n--) pw_update_kinematics (p->r->w, p->t, p->q, p->v);
 }
 
 static void profile_place (profile *p, long n) {
-  for (; n > 0; n--) pw_place (p->r->w, n % 2 ? p->t : p->before, p->q, p->v);
+  for (; n > 0; n--) pw_update_kinematics (p->r->w, n % 2 ? p->t : p->before, p->q, p->v);
 }
 
 static void profile_signals (profile *p, long n) {
-  const pw_slab *k = p->k;
+  const pw_element_batch *k = p->k;
   int derivatives = !pw_kind_forced (k->kind), count = k->b.count * k->kind->signals;
   for (; n > 0; n--)
     for (int i = 0; i < count; i++) pw_signal_eval (&k->source[i], p->t, derivatives, k->u + 3 * i);
 }
 
 static void profile_J_gamma (profile *p, long n) {
-  const pw_slab *k = p->k;
+  const pw_element_batch *k = p->k;
   const pw_kind *kind = k->kind;
   for (; n > 0; n--) {
     kind->J (&k->b, k->J);
@@ -62,7 +62,7 @@ static void profile_force (profile *p, long n) {
 }
 
 static void profile_g (profile *p, long n) {
-  const pw_slab *k = p->k;
+  const pw_element_batch *k = p->k;
   for (; n > 0; n--) {
     k->kind->g (&k->b, p->eta + k->row);
     if (k->kind->g_size) k->kind->g_size (&k->b, p->jv + k->row);
@@ -71,9 +71,9 @@ static void profile_g (profile *p, long n) {
 
 static void profile_sweep (profile *p, long n) {
   for (; n > 0; n--) {
-    pw_sweep_J (p->r->w);
-    pw_sweep_gamma (p->r->w, p->gamma);
-    pw_sweep_force (p->r->w, p->f);
+    pw_evaluate_J (p->r->w);
+    pw_evaluate_gamma (p->r->w, p->gamma);
+    pw_evaluate_force (p->r->w, p->f);
   }
 }
 
@@ -81,8 +81,8 @@ static void profile_sweep (profile *p, long n) {
 static void profile_stabilise (profile *p, long n) {
   for (; n > 0; n--) {
     pw_mul_J (p->r->w, p->v, p->jv);
-    pw_sweep_eta (p->r->w, p->eta);
-    pw_sweep_g (p->r->w, p->eta);
+    pw_evaluate_eta (p->r->w, p->eta);
+    pw_evaluate_g (p->r->w, p->eta);
   }
 }
 
@@ -95,7 +95,7 @@ static void profile_solve (profile *p, long n) {
 }
 
 static void profile_evaluation (profile *p, long n) {
-  for (; n > 0; n--) pw_accelerate (p->r, n % 2 ? p->t : p->before, p->q, p->v, p->a, p->lambda);
+  for (; n > 0; n--) pw_run_accelerate (p->r, n % 2 ? p->t : p->before, p->q, p->v, p->a, p->lambda);
 }
 
 /* A projection from p->from, and the evaluation after it, which finds J and its factors there. */
@@ -173,7 +173,7 @@ static void profile_stages (profile *p, pw_profile *x) {
 /* A projection with as many iterations as those of the run had: between none and some. */
 static void profile_projection (profile *p, pw_profile *x) {
   double steps = (double)p->done.steps, none, some;
-  x->projections = 1 / fmax (1, pw_option_value (p->r, "every"));
+  x->projections = 1 / fmax (1, pw_run_option (p->r, "every"));
   double others = (double)p->done.rhs + (p->projector.own_velocity ? x->projections * steps : 0);
   x->iterations = fmax (0, (double)p->done.factorisations - others) / (x->projections * steps);
   p->from = p->q;
@@ -206,7 +206,7 @@ static int profile_allocate (profile *p, pw_error *error) {
                              { &p->f, n },     { &p->y, n },        { &p->gamma, rows }, { &p->eta, rows },
                              { &p->jv, rows }, { &p->lambda, rows } };
   p->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  return p->memory ? PW_OK : pw_fail (error, PW_MACHINE, "out of memory");
+  return p->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 static int profile_open (profile *p, pw_error *error) {
@@ -218,18 +218,18 @@ static int profile_open (profile *p, pw_error *error) {
   memcpy (p->q, p->r->q, bytes);
   memcpy (p->v, p->r->v, bytes);
   for (int j = 0; j < p->s->coords; j++) p->far[j] = p->q[j] + PROFILE_DISTANCE * p->s->scale.length * sin (j + 1);
-  pw_place (p->r->w, p->t, p->q, p->v);
-  pw_sweep_J (p->r->w);
+  pw_update_kinematics (p->r->w, p->t, p->q, p->v);
+  pw_evaluate_J (p->r->w);
   p->saddle = pw_saddle_open (p->r->w, p->s->mass, p->s->rows, p->r->active, error);
-  if (p->saddle == NULL) return PW_MACHINE;
+  if (p->saddle == NULL) return PW_RESOURCE;
   return pw_stabilised_by (p->r, PW_PROJECTION) ? pw_projector_open_asked (&p->projector, p->r, error) : PW_OK;
 }
 
 int pw_run_profile (pw_run *r, pw_profile *x, pw_error *error) {
   profile p = { .r = r, .s = r->s, .done = r->statistics };
   *x = (pw_profile){ .kind = calloc ((size_t)r->s->slabs + 1, sizeof *x->kind) };
-  int status = x->kind ? profile_open (&p, error) : pw_fail (error, PW_MACHINE, "out of memory");
-  if (status == PW_OK) status = pw_accelerate (r, p.t, p.q, p.v, p.a, p.lambda) == PW_OK ? PW_OK : PW_RETRY;
+  int status = x->kind ? profile_open (&p, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_run_accelerate (r, p.t, p.q, p.v, p.a, p.lambda) == PW_OK ? PW_OK : PW_RETRY;
   if (status == PW_OK) profile_measure (&p, x);
   r->statistics = p.done;
   pw_projector_close (&p.projector);

@@ -131,7 +131,7 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
   change_verdict verdict = CHANGE_UNKNOWN;
   *w = (change_walk){ .r = r, .row = -1 };
   if (memory == NULL) {
-    pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+    pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
     return verdict;
   }
   w->q = memory, w->next = w->q + n, w->end = w->next + n, w->in = w->end + n;
@@ -147,8 +147,8 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
 }
 
 static double change_sine_at (pw_run *r, double t, const double *q) {
-  if (pw_place (r->w, t, q, r->v) != PW_OK) return 0;
-  pw_sweep_J (r->w);
+  if (pw_update_kinematics (r->w, t, q, r->v) != PW_OK) return 0;
+  pw_evaluate_J (r->w);
   return pw_watchdog_sine (r, NULL);
 }
 
@@ -173,7 +173,7 @@ static int change_dips (pw_run *r, double begun, double sine, double length) {
 
 static int change_fail (pw_run *r, int row, double least, const char *what, double length, pw_error *error) {
   char element[120] = "the constraints";
-  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
+  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: change point at %s: %s; branches come within %.2g of each other, the step is "
                   "%.2g long (scaled); take a smaller %s",
@@ -211,9 +211,9 @@ int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   if (isnan (g->begun)) g->begun = change_sine_at (r, g->t, g->q);
   int dips = change_dips (r, g->begun, sine, length);
   change_verdict verdict = dips ? change_walk_there (r, &w, &why) : CHANGE_UNKNOWN;
-  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK)
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_sweep_J (r->w);
+  pw_evaluate_J (r->w);
   if (why.status != PW_OK) return pw_fail (error, why.status, "%s", why.text);
   return dips ? change_judge (r, &w, verdict, sine, length, error) : PW_OK;
 }

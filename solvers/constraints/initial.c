@@ -48,8 +48,8 @@ static int initial_positions (pw_projector *p, pw_run *r, double *q, const doubl
   double worst;
   int status = pw_project_positions (p, r, r->t, q, v, &row, &worst);
   if (status == PW_OK) return PW_OK;
-  if (pw_place (r->w, r->t, q, v) == PW_OK && row >= 0) {
-    pw_sweep_g (r->w, p->scratch);
+  if (pw_update_kinematics (r->w, r->t, q, v) == PW_OK && row >= 0) {
+    pw_evaluate_g (r->w, p->scratch);
     *failure = (initial_failure){ row, 0, fabs (p->scratch[row]), 0 };
   }
   return status;
@@ -60,7 +60,7 @@ static int initial_positions (pw_projector *p, pw_run *r, double *q, const doubl
 static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_failure *failure) {
   pw_residuals now;
   for (int i = 0; i < 3; i++) {
-    pw_sweep_residuals (r->w, NULL, &now);
+    pw_evaluate_residuals (r->w, NULL, &now);
     if (now.velocity <= 4 * DBL_EPSILON) return PW_OK;
     if (i == 2) break;
     int status = pw_project_velocities (p, r, v);
@@ -78,7 +78,7 @@ static int initial_attempt (pw_run *r, const unsigned char *held, initial_failur
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   double *weight = malloc (2 * bytes);
-  if (weight == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (weight == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   initial_weights (s, s->metric, held, weight);
   int status = PW_OK;
   for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
@@ -86,9 +86,9 @@ static int initial_attempt (pw_run *r, const unsigned char *held, initial_failur
     pw_error none = { 0 };
     memcpy (r->q, r->q_given, bytes);
     memcpy (r->v, r->v_given, bytes);
-    status = pw_place (r->w, r->t, r->q, r->v);
+    status = pw_update_kinematics (r->w, r->t, r->q, r->v);
     if (status != PW_OK) break;
-    pw_sweep_J (r->w);
+    pw_evaluate_J (r->w);
     initial_weights (s, choice == 0 ? s->mass : s->metric, held ? held + s->coords : NULL, weight + s->coords);
     status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
     if (status == PW_OK) {
@@ -98,8 +98,8 @@ static int initial_attempt (pw_run *r, const unsigned char *held, initial_failur
       pw_projector_close (&p);
       if (status != PW_RETRY || !failure->rates) break;
     }
-    if (none.status == PW_MACHINE) status = pw_fail (error, PW_MACHINE, "%s", none.text);
-    if (choice == 0 && none.status != PW_MACHINE) status = PW_OK;
+    if (none.status == PW_RESOURCE) status = pw_fail (error, PW_RESOURCE, "%s", none.text);
+    if (choice == 0 && none.status != PW_RESOURCE) status = PW_OK;
   }
   free (weight);
   return status;
@@ -107,45 +107,46 @@ static int initial_attempt (pw_run *r, const unsigned char *held, initial_failur
 
 static int initial_fail (pw_run *r, const initial_failure *failure, pw_error *error) {
   char element[120];
-  if (failure->row < 0) return pw_fail (error, PW_START, "model %s: the start cannot be made consistent", r->s->model);
-  pw_row_element (r->s, failure->row, element, sizeof element);
-  int angle = strcmp (pw_reaction_unit (r->s, failure->row), "N m") == 0;
-  return pw_fail (error, PW_START, "model %s: the start cannot be made consistent: %s is %s by %.6g %s%s", r->s->model,
-                  element, failure->rates ? "violated" : "open", failure->off, angle ? "rad" : "m",
+  if (failure->row < 0)
+    return pw_fail (error, PW_INITIAL, "model %s: the start cannot be made consistent", r->s->model);
+  pw_system_row_name (r->s, failure->row, element, sizeof element);
+  int angle = strcmp (pw_system_reaction_unit (r->s, failure->row), "N m") == 0;
+  return pw_fail (error, PW_INITIAL, "model %s: the start cannot be made consistent: %s is %s by %.6g %s%s",
+                  r->s->model, element, failure->rates ? "violated" : "open", failure->off, angle ? "rad" : "m",
                   failure->rates ? "/s" : "; if it can close, begin nearer to where it does");
 }
 
-int pw_start_moved (const pw_system *s, const pw_start_report *report, int state) {
+int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state) {
   int rate = state >= s->coords, j = rate ? state - s->coords : state;
   double unit = pw_unit (s, j) / (rate ? report->time : 1);
   double from = rate ? report->v_given[j] : report->q_given[j], to = rate ? report->v[j] : report->q[j];
   return !(fabs (to - from) <= 16 * DBL_EPSILON * (fabs (to) + unit));
 }
 
-void pw_count_moved (pw_run *r) {
+void pw_run_count_moved (pw_run *r) {
   r->start.moved = r->start.changed = 0;
   r->start.time = r->w->scale.time;
   for (int j = 0; j < 2 * r->s->coords; j++) {
-    if (!pw_start_moved (r->s, &r->start, j)) continue;
+    if (!pw_initial_moved (r->s, &r->start, j)) continue;
     r->start.moved++;
     r->start.changed += (r->s->held[j] & (PW_GIVEN | PW_SPECIFIED)) == PW_SPECIFIED;
   }
 }
 
-int pw_start_specified (const pw_system *s, int state) {
+int pw_initial_specified (const pw_system *s, int state) {
   return (s->held[state] & (PW_GIVEN | PW_SPECIFIED)) != 0;
 }
 
 /* Fills the report; the state given is in q_given, the new one in q. */
 static void initial_report (pw_run *r, int freed, const pw_residuals *before) {
-  pw_start_report *report = &r->start;
-  *report = (pw_start_report){ .q_given = r->q_given,
-                               .v_given = r->v_given,
-                               .q = r->q,
-                               .v = r->v,
-                               .freed = freed,
-                               .position = before->position,
-                               .velocity = before->velocity };
+  pw_initial_report *report = &r->start;
+  *report = (pw_initial_report){ .q_given = r->q_given,
+                                 .v_given = r->v_given,
+                                 .q = r->q,
+                                 .v = r->v,
+                                 .freed = freed,
+                                 .position = before->position,
+                                 .velocity = before->velocity };
 }
 
 /* Redundant equations make the plain attempt fail: it is repeated with an independent set, found where the state was
@@ -158,12 +159,12 @@ static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure
   int status = initial_attempt (r, held, failure, error), rank = s->rows;
   if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
   unsigned char *active = malloc ((size_t)s->rows + 1);
-  if (active == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (active == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   for (size_t i = 0; i < sizeof tolerance / sizeof *tolerance && status == PW_RETRY; i++) {
-    if (pw_place (r->w, r->t, r->q_given, r->v_given) != PW_OK) break;
-    pw_sweep_J (r->w);
+    if (pw_update_kinematics (r->w, r->t, r->q_given, r->v_given) != PW_OK) break;
+    pw_evaluate_J (r->w);
     int now = pw_rank_select (r->w, tolerance[i], active);
-    if (now < 0) status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+    if (now < 0) status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
     if (now < 0 || now == rank) continue;
     rank = now;
     r->active = active;
@@ -188,10 +189,10 @@ static int initial_locked (pw_run *r, pw_error *error) {
   if (s->rows == s->holonomic || given == 0 || left > 1e-20 * given) return PW_OK;
   for (int i = s->holonomic; i < s->rows && strlen (text) < 150; i++) {
     size_t n = strlen (text);
-    if (strcmp (pw_row_element (s, i, element, sizeof element), before) != 0)
+    if (strcmp (pw_system_row_name (s, i, element, sizeof element), before) != 0)
       snprintf (text + n, sizeof text - n, "%s%s", n ? ", " : "", strcpy (before, element));
   }
-  return pw_fail (error, PW_START,
+  return pw_fail (error, PW_INITIAL,
                   "model %s: the given rates would have to be removed entirely: %s allow no such motion", s->model,
                   text);
 }
@@ -246,7 +247,7 @@ static int initial_try (pw_run *r, const unsigned char *held, initial_failure *f
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords;
   unsigned char *mask = malloc (4 * n + 1), *last = mask + 2 * n;
-  if (mask == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (mask == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, placed = 0;
   for (const struct initial_way *way = initial_ways; way < initial_ways + ways && status == PW_RETRY; way++) {
     if (!initial_mask (s, held, way, mask)) continue;
@@ -263,7 +264,7 @@ static int initial_try (pw_run *r, const unsigned char *held, initial_failure *f
   return status;
 }
 
-int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
+int pw_run_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   pw_residuals before;
@@ -271,10 +272,10 @@ int pw_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
   int freed = 0;
   memcpy (r->q_given, r->q, bytes);
   memcpy (r->v_given, r->v, bytes);
-  int status = pw_place (r->w, r->t, r->q, r->v);
+  int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_sweep_J (r->w);
-  pw_sweep_residuals (r->w, NULL, &before);
+  pw_evaluate_J (r->w);
+  pw_evaluate_residuals (r->w, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
     status = initial_try (r, held, &failure, &freed, error);
   initial_report (r, freed, &before);

@@ -17,8 +17,8 @@
 static pw_saddle *project_by_mass (pw_run *r, pw_error *error) {
   pw_error none = { 0 };
   pw_saddle *k = pw_saddle_open (r->w, r->s->mass, r->s->holonomic, r->active, &none);
-  if (none.status == PW_MACHINE) pw_fail (error, PW_MACHINE, "%s", none.text);
-  return k || none.status == PW_MACHINE ? k : r->saddle;
+  if (none.status == PW_RESOURCE) pw_fail (error, PW_RESOURCE, "%s", none.text);
+  return k || none.status == PW_RESOURCE ? k : r->saddle;
 }
 
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error) {
@@ -27,13 +27,13 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
     .own_velocity = weight_v != NULL, .velocity = weight_v ? NULL : r->saddle, .active = r->active, .against = -1
   };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
-  if (p->scratch == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (p->scratch == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   p->position = weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
   p->own_position = p->position != r->saddle;
   if (p->own_velocity) p->velocity = pw_saddle_open (r->w, weight_v, s->rows, r->active, error);
   if (p->position && p->velocity) return PW_OK;
   pw_projector_close (p);
-  return PW_MACHINE;
+  return PW_RESOURCE;
 }
 
 const char *const pw_metrics[] = { "mass", "identity", NULL };
@@ -41,9 +41,9 @@ const char *const pw_metrics[] = { "mass", "identity", NULL };
 /* The identity metric weighs metres and radians alike, as the plain pseudo-inverse does. */
 int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  if (pw_option_value (r, "metric") == 0) return pw_projector_open (p, r, NULL, NULL, error);
+  if (pw_run_option (r, "metric") == 0) return pw_projector_open (p, r, NULL, NULL, error);
   double *one = malloc ((size_t)s->coords * sizeof *one);
-  if (one == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (one == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   for (int j = 0; j < s->coords; j++) one[j] = 1;
   int status = pw_projector_open (p, r, one, one, error);
   free (one);
@@ -86,18 +86,18 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
   pw_residuals now = { 0 };
   double *g = p->scratch, *size = g + s->rows, *mu = size + s->rows, *dq = mu + s->rows, before = INFINITY;
   for (p->iterations = 0;; p->iterations++) {
-    int status = pw_place (r->w, t, q, v);
+    int status = pw_update_kinematics (r->w, t, q, v);
     if (status != PW_OK) return status;
-    pw_sweep_g (r->w, g);
-    if (!(before < slight)) pw_sweep_g_size (r->w, size);
-    pw_judge_positions (s, g, size, p->active, &now);
+    pw_evaluate_g (r->w, g);
+    if (!(before < slight)) pw_evaluate_g_size (r->w, size);
+    pw_worst_position (s, g, size, p->active, &now);
     *row = now.row_position;
     *worst = now.position;
     int stalled = *worst > before / 4;
     if (*worst <= PROJECT_GOOD || (stalled && *worst <= PROJECT_ENOUGH)) break;
     if (p->iterations >= most || !isfinite (*worst)) return PW_RETRY;
     before = *worst;
-    pw_sweep_J (r->w);
+    pw_evaluate_J (r->w);
     r->statistics.factorisations++;
     if (pw_saddle_factor (p->position) != PW_OK) return PW_RETRY;
     for (int i = 0; i < s->rows; i++) g[i] = i < s->holonomic ? -g[i] : 0;
@@ -110,7 +110,7 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
 
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst) {
   int status = project_positions (p, r, t, q, v, row, worst);
-  if (status == PW_OK) pw_sweep_J (r->w);
+  if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
 
@@ -120,7 +120,7 @@ static int project_once (pw_projector *p, pw_run *r, double *v, int fresh) {
   double *right = p->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
   int status = PW_OK;
   pw_mul_J (r->w, v, right);
-  if (s->moving) pw_sweep_eta (r->w, eta);
+  if (s->moving) pw_evaluate_eta (r->w, eta);
   for (int i = 0; i < s->rows; i++) right[i] = (s->moving ? eta[i] : 0) - right[i];
   if (fresh)
     status = pw_saddle_factor_solve (p->velocity, NULL, right, dv, mu);
@@ -134,7 +134,7 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   r->statistics.factorisations++;
   if (project_once (p, r, v, 1) != PW_OK) return PW_RETRY;
   if (pw_saddle_below (p->velocity, r->limits.refine)) project_once (p, r, v, 0);
-  return pw_place_rates (r->w, v);
+  return pw_update_velocities (r->w, v);
 }
 
 /* 1 if the placed velocities need no correction, with J evaluated: they obey J v = eta to round-off.  Near a
@@ -143,7 +143,7 @@ static int project_is_good (const pw_projector *p, pw_run *r) {
   r->known.velocity = NAN;
   if (p->own_velocity || p->active || r->near) return 0;
   pw_residuals now;
-  pw_sweep_velocity_residual (r->w, NULL, &now);
+  pw_evaluate_velocity_residual (r->w, NULL, &now);
   if (!(now.velocity <= PROJECT_GOOD)) return 0;
   r->known.velocity = now.velocity, r->known.jv = now.jv;
   return 1;
@@ -153,17 +153,17 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
   double worst;
   int row, status = project_positions (p, r, t, q, v, &row, &worst);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->w);
-  pw_sweep_gamma (r->w, lambda);
-  if (project_is_good (p, r)) return pw_accelerate_swept (r, v, a, lambda);
+  pw_evaluate_J (r->w);
+  pw_evaluate_gamma (r->w, lambda);
+  if (project_is_good (p, r)) return pw_run_accelerate_evaluated (r, v, a, lambda);
   status = pw_project_velocities (p, r, v);
   if (status != PW_OK) return status;
   if (!p->own_velocity) {
-    pw_accelerate_placed (r, v, a, lambda);
+    pw_run_accelerate_updated (r, v, a, lambda);
     return PW_OK;
   }
-  pw_sweep_gamma (r->w, lambda);
-  return pw_accelerate_swept (r, v, a, lambda);
+  pw_evaluate_gamma (r->w, lambda);
+  return pw_run_accelerate_evaluated (r, v, a, lambda);
 }
 
 /* e += W^-1 J^T ..., J e = 0 */

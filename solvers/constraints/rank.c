@@ -25,7 +25,7 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
   const pw_system *s = w->s;
   int n = s->coords;
   memset (rows, 0, (size_t)s->rows * (size_t)n * sizeof *rows);
-  for (const pw_slab *k = w->slab; k < w->slab + w->s->constraints; k++)
+  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->constraints; k++)
     for (int i = 0; i < k->b.count * k->kind->rows; i++) {
       double *row = rows + (size_t)(k->row + i) * (size_t)n, square = 0;
       for (int c = 0; c < k->b.cols; c++) {
@@ -108,7 +108,7 @@ static size_t rank_room (const pw_system *s) {
 int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active) {
   const pw_system *s = w->s;
   double *rows = malloc ((rank_room (s) + 1) * sizeof *rows);
-  int *kept = malloc (((size_t)s->rows + 1) * sizeof *kept), rank = PW_MACHINE;
+  int *kept = malloc (((size_t)s->rows + 1) * sizeof *kept), rank = PW_RESOURCE;
   if (rows && kept) rank = rank_basis (w, tol, rows, kept, active);
   free (rows);
   free (kept);
@@ -127,7 +127,7 @@ typedef struct {
 static int rank_search_open (rank_search *x, const pw_system *s) {
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
   x->memory = malloc ((rank_room (s) + 2 * n + 4) * sizeof (double) + m * sizeof (int) + 2 * m);
-  if (x->memory == NULL) return PW_MACHINE;
+  if (x->memory == NULL) return PW_RESOURCE;
   x->rows = (double *)(void *)x->memory;
   x->q = x->rows + rank_room (s);
   x->motion = x->q + n;
@@ -155,8 +155,8 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   pw_error none = { 0 };
   int row, away = 0;
   double worst;
-  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK) return 0;
-  pw_sweep_J (r->w);
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return 0;
+  pw_evaluate_J (r->w);
   rank_basis (r->w, r->limits.independent, x->rows, x->kept, x->active);
   rank_direction (s, x, rank, r->v, number);
   for (int j = 0; j < s->coords; j++) x->q[j] = r->q[j] + 0.03 * x->motion[j];
@@ -178,7 +178,7 @@ static void rank_take (pw_run *r) {
   double *shared = (double *)(void *)r->redundant_row - s->rows;
   r->redundant = 0;
   r->shared = NULL;
-  for (const pw_slab *k = r->w->slab; k < r->w->slab + s->constraints; k++)
+  for (const pw_element_batch *k = r->w->slab; k < r->w->slab + s->constraints; k++)
     for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) {
       if (r->active[i]) continue;
       r->redundant_row[r->redundant++] = i;
@@ -190,7 +190,7 @@ static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
   size_t m = (size_t)r->s->rows, k = (size_t)redundant;
   size_t numbers = k * m + k * k + k + (size_t)r->s->coords + 3 + 2 * m;
   r->rank_memory = malloc (numbers * sizeof (double) + k * sizeof (int) + m);
-  if (r->rank_memory == NULL) return PW_MACHINE;
+  if (r->rank_memory == NULL) return PW_RESOURCE;
   r->coefficient = (double *)(void *)r->rank_memory;
   r->redundant_row = (int *)(void *)(r->coefficient + numbers);
   r->active = memcpy (r->redundant_row + k, active, m);
@@ -198,12 +198,12 @@ static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
   return PW_OK;
 }
 
-int pw_rank_choose (pw_run *r, pw_error *error) {
+int pw_rank_open (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   rank_search x;
-  if (rank_search_open (&x, s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
-  int status = pw_place (r->w, r->t, r->q, r->v);
-  pw_sweep_J (r->w);
+  if (rank_search_open (&x, s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
+  pw_evaluate_J (r->w);
   int rank = rank_basis (r->w, r->limits.independent, x.rows, x.kept, x.active), best = rank;
   memcpy (x.best, x.active, (size_t)s->rows);
   for (int number = 0; number < 3 && status == PW_OK; number++) {
@@ -213,14 +213,14 @@ int pw_rank_choose (pw_run *r, pw_error *error) {
     memcpy (x.best, x.active, (size_t)s->rows);
   }
   if (best > rank)
-    status = pw_fail (error, PW_START,
+    status = pw_fail (error, PW_INITIAL,
                       "model %s: the start is a singular pose: %d constraint rows are independent there, %d nearby; "
                       "start a little off it",
                       s->model, rank, best);
   else if (best < s->rows && rank_store (r, x.best, s->rows - best) != PW_OK)
-    status = pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+    status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   free (x.memory);
-  if (pw_place (r->w, r->t, r->q, r->v) == PW_OK) pw_sweep_J (r->w);
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
 
@@ -229,7 +229,7 @@ int pw_rank_reselect (pw_run *r) {
   const pw_system *s = r->s;
   rank_search x;
   int holonomic = 0, all = s->rows - r->redundant;
-  if (rank_search_open (&x, s) != PW_OK) return PW_MACHINE;
+  if (rank_search_open (&x, s) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < s->holonomic; i++) holonomic += r->active[i];
   int rank = rank_basis_of (r->w, r->limits.independent, holonomic, all, x.rows, x.kept, x.active);
   int other = rank == all && memcmp (x.active, r->active, (size_t)s->rows) != 0;
@@ -238,11 +238,11 @@ int pw_rank_reselect (pw_run *r) {
   return other;
 }
 
-void pw_rank_carry (pw_run *r, pw_archive *a) {
+void pw_rank_serialise (pw_run *r, pw_archive *a) {
   int found = 0, most = r->redundant;
   if (most == 0) return;
   unsigned char *mask = (unsigned char *)(r->redundant_row + most);
-  pw_carry (a, mask, (size_t)r->s->rows);
+  pw_archive_bytes (a, mask, (size_t)r->s->rows);
   for (int i = 0; i < r->s->rows; i++) found += !mask[i];
   if (found == most)
     rank_take (r);
@@ -263,7 +263,7 @@ void pw_rank_close (pw_run *r) {
 static void rank_row (const pw_workspace *w, int row, double *f) {
   const pw_system *s = w->s;
   memset (f, 0, (size_t)s->coords * sizeof *f);
-  for (const pw_slab *k = w->slab; k < w->slab + w->s->constraints; k++) {
+  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->constraints; k++) {
     int n = row - k->row;
     if (n < 0 || n >= k->b.count * k->kind->rows) continue;
     for (int c = 0; c < k->b.cols; c++) {
@@ -273,8 +273,8 @@ static void rank_row (const pw_workspace *w, int row, double *f) {
   }
 }
 
-double pw_rank_size (const pw_workspace *w, int row) {
-  for (const pw_slab *k = w->slab; k < w->slab + w->s->constraints; k++) {
+double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
+  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->constraints; k++) {
     int n = row - k->row;
     if (n < 0 || n >= k->b.count * k->kind->rows) continue;
     const double *J = k->J + n * k->b.cols;
@@ -293,7 +293,7 @@ void pw_rank_coefficients (pw_run *r, int i) {
   pw_saddle_solve (r->saddle, f, nothing, f, r->coefficient + i * m);
 }
 
-static double rank_length (const pw_system *s, const pw_slab *k, int n) {
+static double rank_length (const pw_system *s, const pw_element_batch *k, int n) {
   double square = 0;
   for (int c = 0; c < k->b.cols; c++) {
     int j = pw_global (k, n / k->kind->rows, c);
@@ -304,7 +304,7 @@ static double rank_length (const pw_system *s, const pw_slab *k, int n) {
 }
 
 /* f += weight J_i^T, rows of length 1. */
-static void rank_add_row (const pw_system *s, const pw_slab *k, int n, double weight, double *f) {
+static void rank_add_row (const pw_system *s, const pw_element_batch *k, int n, double weight, double *f) {
   double length = rank_length (s, k, n);
   for (int c = 0; c < k->b.cols && length > 0; c++) {
     int j = pw_global (k, n / k->kind->rows, c);
@@ -313,18 +313,18 @@ static void rank_add_row (const pw_system *s, const pw_slab *k, int n, double we
 }
 
 /* A sum of the redundant equations, irregular so that nothing cancels, takes one solve however many they are. */
-double pw_rank_grip (pw_run *r) {
+double pw_rank_conditioning (pw_run *r) {
   const pw_system *s = r->s;
   int m = s->rows, k = r->redundant;
   double *c = r->coefficient, *f = c + k * m + k * k + k, *nothing = f + s->coords + 3, most = 0;
   memset (f, 0, (size_t)(s->coords + 3 + m) * sizeof *f);
-  for (const pw_slab *b = r->w->slab; b < r->w->slab + s->constraints; b++)
+  for (const pw_element_batch *b = r->w->slab; b < r->w->slab + s->constraints; b++)
     for (int n = 0; n < b->b.count * b->kind->rows; n++) {
       double x = sin (2.39996 * (b->row + n + 1));
       if (!r->active[b->row + n]) rank_add_row (s, b, n, (x + copysign (1, x)) / 2, f);
     }
   pw_saddle_solve (r->saddle, f, nothing, f, c);
-  for (const pw_slab *b = r->w->slab; b < r->w->slab + s->constraints; b++)
+  for (const pw_element_batch *b = r->w->slab; b < r->w->slab + s->constraints; b++)
     for (int n = 0; n < b->b.count * b->kind->rows; n++)
       if (r->active[b->row + n]) most = pw_largest (most, fabs (c[b->row + n]) * rank_length (s, b, n));
   return isnan (most) ? 0 : 1 / most;
@@ -347,7 +347,7 @@ static void rank_cholesky (double *A, double *b, int k) {
   }
 }
 
-void pw_rank_share (pw_run *r, double *lambda) {
+void pw_rank_least_norm (pw_run *r, double *lambda) {
   const pw_system *s = r->s;
   int m = s->rows, k = r->redundant;
   if (k == 0) return;
@@ -358,7 +358,7 @@ void pw_rank_share (pw_run *r, double *lambda) {
     for (int j = 0; j <= i; j++) A[i * k + j] = 0;
   }
   for (int row = 0; row < m; row++) {
-    double size = pw_rank_size (r->w, row), weight = 1 / (size * size);
+    double size = pw_rank_multiplier_unit (r->w, row), weight = 1 / (size * size);
     for (int i = 0; i < k; i++) {
       double n = (r->redundant_row[i] == row) - c[i * m + row];
       z[i] -= weight * n * lambda[row];

@@ -19,36 +19,36 @@ double pw_rank_unit (const pw_system *s, int j);
 
 /* Rows kept by Gram-Schmidt on the evaluated J, lengths and angles in units of the scene: active[i] = 1 for a row
  * whose part independent of those kept before exceeds tol of it; holonomic equations first, of these the most
- * independent ones, in order where they are about equal.  Returns the rank, or PW_MACHINE. */
+ * independent ones, in order where they are about equal.  Returns the rank, or PW_RESOURCE. */
 int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active);
 
 /* Selects r->active for the run at its consistent start: rows dependent there and at two configurations nearby.
- * Leaves it NULL if all equations are independent.  Errors: PW_MACHINE, PW_START (the start is a singular
+ * Leaves it NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the start is a singular
  * configuration). */
-int pw_rank_choose (struct pw_run *r, pw_error *error);
+int pw_rank_open (struct pw_run *r, pw_error *error);
 
 /* Selects r->active again at the configuration J is evaluated at, if there is another set of the same rank: 1; 0 if
- * there is none.  The run's saddle and method then still have the old one.  Errors: PW_MACHINE. */
+ * there is none.  The run's saddle and method then still have the old one.  Errors: PW_RESOURCE. */
 int pw_rank_reselect (struct pw_run *r);
 
 /* How well the active equations hold the others: 1 over the largest coefficient of one of them, rows of length 1, in
  * an irregular sum of the redundant ones.  What the active equations are off by, the others are off by that over
  * this.  J must be evaluated and the run's saddle factorised at the configuration. */
-double pw_rank_grip (struct pw_run *r);
+double pw_rank_conditioning (struct pw_run *r);
 
 /* Saves or loads r->active, which has as many redundant equations as before.  Saddle and method then still have the
  * old one. */
-void pw_rank_carry (struct pw_run *r, pw_archive *a);
+void pw_rank_serialise (struct pw_run *r, pw_archive *a);
 
 /* The unit of a row's multiplier, as J is evaluated: 1 of a force, L of a moment, which a row without x and y
  * columns has. */
-double pw_rank_size (const pw_workspace *w, int row);
+double pw_rank_multiplier_unit (const pw_workspace *w, int row);
 
 /* Multipliers of all equations from those of the active ones: the smallest (forces in units of 1, moments of L) with
  * the same J^T lambda.  J must be evaluated and the run's saddle factorised at the configuration. */
-void pw_rank_share (struct pw_run *r, double *lambda);
+void pw_rank_least_norm (struct pw_run *r, double *lambda);
 
-/* Frees what pw_rank_choose allocated. */
+/* Frees what pw_rank_open allocated. */
 void pw_rank_close (struct pw_run *r);
 
 #endif

@@ -8,8 +8,8 @@
 static size_t redundancy_name_row (const pw_system *s, int row, int whole, char *buffer, size_t size, size_t n) {
   char element[120], reaction[120];
   if (n + 1 >= size) return n;
-  pw_row_element (s, row, element, sizeof element);
-  pw_reaction_name (s, row, reaction, sizeof reaction);
+  pw_system_row_name (s, row, element, sizeof element);
+  pw_system_reaction_name (s, row, reaction, sizeof reaction);
   n += (size_t)(whole ? snprintf (buffer + n, size - n, "%s (%s)", element, reaction)
                       : snprintf (buffer + n, size - n, "%s", element));
   return n < size ? n : size - 1;
@@ -29,9 +29,10 @@ static const char *redundancy_word (const char *a, const char *b) {
 /* "wheels left and right: the same lateral constraint" */
 static void redundancy_say_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
   char a[120], b[120], x[120], y[120];
-  pw_row_element (s, one, a, sizeof a);
-  pw_row_element (s, two, b, sizeof b);
-  const char *word = redundancy_word (pw_reaction_name (s, one, x, sizeof x), pw_reaction_name (s, two, y, sizeof y));
+  pw_system_row_name (s, one, a, sizeof a);
+  pw_system_row_name (s, two, b, sizeof b);
+  const char *word =
+      redundancy_word (pw_system_reaction_name (s, one, x, sizeof x), pw_system_reaction_name (s, two, y, sizeof y));
   size_t kind = strcspn (a, " ");
   if (strcmp (a, b) == 0)
     snprintf (buffer, size, "%s: %s and %s are the same constraint", a, x, y);
@@ -46,17 +47,17 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   size_t n = redundancy_name_row (s, row, 1, buffer, size, 0);
-  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
-  pw_sweep_J (r->w);
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
+  pw_evaluate_J (r->w);
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   pw_rank_coefficients (r, i);
   const double *c = r->coefficient + i * s->rows;
   char element[120], own[120], before[120] = "";
-  pw_row_element (s, row, own, sizeof own);
+  pw_system_row_name (s, row, own, sizeof own);
   for (int a = 0; a < s->rows; a++) {
     if (fabs (c[a]) < 1e-8) continue;
     partners++, last = a;
-    pw_row_element (s, a, element, sizeof element);
+    pw_system_row_name (s, a, element, sizeof element);
     if (elements > MOST || n + 1 >= size || strcmp (element, own) == 0 || strcmp (element, before) == 0) continue;
     strcpy (before, element);
     const char *glue = elements == MOST ? " and others" : elements > 0 ? ", " : " follows from ";

@@ -40,7 +40,7 @@ static int galpha_open (pw_run *r, pw_error *error) {
   galpha *d = r->data = calloc (1, sizeof *d);
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, size = 2 * (n + rows);
-  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (d == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   const pw_array array[] = { { &d->v, n },      { &d->a, n },       { &d->w, n },      { &d->work.q1, n },
                              { &d->a1, n },     { &d->work.v1, n }, { &d->w1, n },     { &d->lambda1, rows },
                              { &d->mu1, rows }, { &d->z, size },    { &d->row, size }, { &d->column, size },
@@ -48,7 +48,7 @@ static int galpha_open (pw_run *r, pw_error *error) {
                              { &d->D, n } };
   int status = pw_implicit_open (&d->work, r, array, sizeof array / sizeof *array);
   d->ggl = pw_stabilised_by (r, PW_GGL);
-  galpha_coefficients (d, pw_option_value (r, "rho"));
+  galpha_coefficients (d, pw_run_option (r, "rho"));
   d->n = s->coords;
   d->rows = d->work.tangent.rows;
   d->positions = d->ggl ? d->work.tangent.holonomic : 0;
@@ -70,7 +70,7 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
     d->work.q1[j] = r->q[j] + s * (d->v[j] + 0.5 * s * d->a[j]);
     d->work.v1[j] = d->v[j] + s * d->a[j];
   }
-  int status = pw_accelerate (r, pw_before_breakpoint (r, r->t + s), d->work.q1, d->work.v1, jerk, d->eta);
+  int status = pw_run_accelerate (r, pw_before_breakpoint (r, r->t + s), d->work.q1, d->work.v1, jerk, d->eta);
   for (int j = 0; j < d->n; j++) jerk[j] = (jerk[j] - d->a[j]) / s;
   return status;
 }
@@ -101,9 +101,9 @@ static int galpha_displace (pw_run *r, double h, const double *jerk) {
   galpha *d = r->data;
   const pw_system *s = r->s;
   double C = 1. / 6 - d->beta - 0.5 * (d->alpha_m - d->alpha_f), *dv = d->work.v1;
-  int status = pw_place (r->w, r->t, r->q, d->v);
+  int status = pw_update_kinematics (r->w, r->t, r->q, d->v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->w);
+  pw_evaluate_J (r->w);
   pw_mul_J (r->w, jerk, d->jv);
   for (int i = 0; i < s->rows; i++) d->jv[i] *= i < s->holonomic ? C * h * h : 0;
   status = pw_saddle_factor (r->saddle);
@@ -120,11 +120,11 @@ static int galpha_begin (pw_run *r, double h) {
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
   if (!d->ggl && d->work.h > 0) { /* velocities have the error that goes with the size before */
-    status = pw_place (r->w, r->t, r->q, d->v);
-    if (status == PW_OK) pw_sweep_J (r->w);
+    status = pw_update_kinematics (r->w, r->t, r->q, d->v);
+    if (status == PW_OK) pw_evaluate_J (r->w);
     if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);
   }
-  if (status == PW_OK) status = pw_accelerate (r, r->t, r->q, d->v, d->a, d->eta);
+  if (status == PW_OK) status = pw_run_accelerate (r, r->t, r->q, d->v, d->a, d->eta);
   if (status == PW_OK) status = galpha_jerk (r, h, jerk);
   if (status == PW_OK && galpha_fast (r, h, jerk)) status = galpha_try (r, h, jerk);
   if (status != PW_OK) return status;

@@ -15,8 +15,8 @@
 
 static int galpha_place (pw_run *r, double t1) {
   galpha *d = r->data;
-  int status = pw_place (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->work.v1);
-  if (status == PW_OK) pw_sweep_J (r->w);
+  int status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->work.v1);
+  if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
 
@@ -46,7 +46,7 @@ static void galpha_momentum (pw_run *r, double *out) {
   galpha *d = r->data;
   memset (d->pull, 0, (size_t)d->n * sizeof *d->pull);
   pw_add_JT (r->w, galpha_lambda (d), d->pull);
-  pw_sweep_force (r->w, d->f);
+  pw_evaluate_force (r->w, d->f);
   for (int j = 0; j < d->n; j++) out[j] = r->s->mass[j] * d->a1[j] + d->pull[j] - d->f[j];
 }
 
@@ -55,10 +55,10 @@ static void galpha_constraints (pw_run *r, double *out) {
   galpha *d = r->data;
   const pw_system *s = r->s;
   pw_mul_J (r->w, d->work.v1, d->jv);
-  pw_sweep_eta (r->w, d->eta);
+  pw_evaluate_eta (r->w, d->eta);
   for (int i = 0; i < s->rows; i++) d->jv[i] -= d->eta[i];
   if (d->ggl) pw_tangent_compress (&d->work.tangent, d->jv, d->rows, out);
-  pw_sweep_g (r->w, d->ggl ? d->eta : d->jv);
+  pw_evaluate_g (r->w, d->ggl ? d->eta : d->jv);
   if (d->ggl)
     pw_tangent_compress (&d->work.tangent, d->eta, d->positions, out + d->rows);
   else
@@ -81,24 +81,24 @@ static int galpha_residual (pw_run *r, double h, double t1) {
 static void galpha_fill (pw_run *r, double h) {
   galpha *d = r->data;
   int n = d->n;
-  const pw_tangent_place to = { .momentum = n,
-                                .constraint = 2 * n,
-                                .v = n,
-                                .a = n,
-                                .lambda = 2 * n,
-                                .mu = 2 * n + d->rows,
-                                .of_q = d->gamma / (h * d->beta),
-                                .of_a = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma),
-                                .of_lambda = 1 };
+  const pw_tangent_update to = { .momentum = n,
+                                 .constraint = 2 * n,
+                                 .v = n,
+                                 .a = n,
+                                 .lambda = 2 * n,
+                                 .mu = 2 * n + d->rows,
+                                 .of_q = d->gamma / (h * d->beta),
+                                 .of_a = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma),
+                                 .of_lambda = 1 };
   pw_tangent_kinematics (&d->work.tangent, &to, galpha_mu (d), d->D);
   pw_tangent_momentum (&d->work.tangent, &to, galpha_lambda (d));
-  pw_tangent_rates (&d->work.tangent, &to, d->work.v1, d->ggl);
+  pw_tangent_velocities (&d->work.tangent, &to, d->work.v1, d->ggl);
   pw_tangent_positions (&d->work.tangent, &to, d->ggl ? 2 * n + d->rows : 2 * n);
 }
 
 int pw_galpha_open_matrix (pw_run *r) {
   galpha *d = r->data;
-  pw_tape_record (&d->work.tangent.tape);
+  pw_scatter_record (&d->work.tangent.tape);
   galpha_fill (r, 1);
   return pw_implicit_lay_out (&d->work, d->size);
 }
@@ -148,13 +148,13 @@ static void galpha_predict (pw_run *r, double h) {
 }
 
 /* Solves for the correction and applies it.  *most takes its size, that of q and h v in units of the scene; *floor what
- * round-off makes of them.  PW_OK or PW_MACHINE. */
+ * round-off makes of them.  PW_OK or PW_RESOURCE. */
 static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
   galpha *d = r->data;
   int n = d->n;
   double large = 1, e = (1 - d->alpha_m) / ((1 - d->alpha_f) * h * d->gamma);
   for (int i = 0; i < d->size; i++) d->z[i] *= -d->row[i];
-  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_MACHINE;
+  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_RESOURCE;
   *most = 0;
   for (int j = 0; j < n; j++) {
     double unit = pw_unit (r->s, j), size = pw_largest (fabs (d->z[j]), fabs (d->z[n + j])) / unit;

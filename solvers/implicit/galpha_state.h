@@ -19,7 +19,7 @@ struct pw_method_data {
 
 typedef struct pw_method_data galpha;
 
-/* Records the pattern and makes room for the matrix.  PW_OK or PW_MACHINE. */
+/* Records the pattern and makes room for the matrix.  PW_OK or PW_RESOURCE. */
 int pw_galpha_open_matrix (pw_run *r);
 
 /* The successor at t1 = t + h, with its accelerations and multipliers; the system is left placed there, J swept.  PW_RETRY

@@ -11,25 +11,25 @@ static pw_implicit *implicit_of (pw_run *r) {
 
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count) {
   x->memory = pw_take_arrays (array, count);
-  return x->memory ? pw_tangent_open (&x->tangent, r) : PW_MACHINE;
+  return x->memory ? pw_tangent_open (&x->tangent, r) : PW_RESOURCE;
 }
 
 int pw_implicit_lay_out (pw_implicit *x, int size) {
   pw_tangent *t = &x->tangent;
-  if (pw_tape_lay_out (&t->tape, size, &t->colptr, &t->rowind) != PW_OK) return PW_MACHINE;
+  if (pw_scatter_lay_out (&t->tape, size, &t->colptr, &t->rowind) != PW_OK) return PW_RESOURCE;
   x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
-  return x->value ? pw_sparse_open (&x->sparse, size, t->colptr, t->rowind) : PW_MACHINE;
+  return x->value ? pw_sparse_open (&x->sparse, size, t->colptr, t->rowind) : PW_RESOURCE;
 }
 
 int pw_implicit_opened (pw_run *r, int status, int velocities, pw_error *error) {
-  if (status != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  status = pw_between_open (&implicit_of (r)->last, r, velocities, error);
+  if (status != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  status = pw_dense_output_open (&implicit_of (r)->last, r, velocities, error);
   return status == PW_OK ? pw_implicit_restart (r, error) : status;
 }
 
 void pw_implicit_close (pw_run *r) {
   pw_implicit *x = implicit_of (r);
-  pw_between_close (&x->last);
+  pw_dense_output_close (&x->last);
   pw_sparse_close (&x->sparse);
   pw_tangent_close (&x->tangent);
   free (x->value);
@@ -50,13 +50,13 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
 
 void pw_implicit_fill (pw_implicit *x, int size) {
   memset (x->value, 0, (size_t)x->tangent.colptr[size] * sizeof *x->value);
-  pw_tape_fill (&x->tangent.tape, x->value);
+  pw_scatter_begin (&x->tangent.tape, x->value);
 }
 
 /* Where the iteration fails, the configuration that the step begins with may be the reason. */
 static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  if (status == PW_MACHINE) return pw_fail (error, PW_MACHINE, "t = %.6g s: out of memory in KLU", r->t);
+  if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
   if (r->near || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   return pw_fail (error, PW_METHOD, "t = %.6g s: %s; the step of %.6g s may be too large", r->t,
                   status == PW_INPUT ? "the Newton matrix is singular" : "the iteration does not converge", h);
@@ -70,13 +70,13 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
   r->near = 0;
   int status = step (r, h, t1);
   if (status != PW_OK) return implicit_fail (r, status, h, error);
-  pw_between_keep (&x->last, r);
+  pw_dense_output_keep (&x->last, r);
   memcpy (r->q, x->q1, n);
   memcpy (r->v, x->v1, n);
   accept (r);
   r->t = t1;
   x->h = h;
-  pw_between_count (&x->last, r);
+  pw_dense_output_count (&x->last, r);
   r->statistics.steps++;
   x->count++;
   if (!whole) x->base = t1, x->count = 0;
@@ -84,5 +84,5 @@ int pw_implicit_advance (pw_run *r, double t_end, pw_implicit_step *step, void (
 }
 
 int pw_implicit_at (pw_run *r, double t, pw_error *error) {
-  return pw_between_at (&implicit_of (r)->last, r, t, error);
+  return pw_dense_output_at (&implicit_of (r)->last, r, t, error);
 }

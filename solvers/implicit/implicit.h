@@ -16,14 +16,14 @@ typedef struct {
   pw_tangent tangent; /* its tape has recorded the matrix */
   pw_sparse sparse;   /* which solves with it */
   double *value;      /* of the matrix */
-  pw_between last;
+  pw_dense_output last;
   char *memory; /* of the method's own arrays */
 } pw_implicit;
 
-/* Allocates the method's arrays, `count` of them, and the tangent: PW_OK or PW_MACHINE. */
+/* Allocates the method's arrays, `count` of them, and the tangent: PW_OK or PW_RESOURCE. */
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count);
 
-/* Makes room for the matrix that was recorded, of this size: PW_OK or PW_MACHINE. */
+/* Makes room for the matrix that was recorded, of this size: PW_OK or PW_RESOURCE. */
 int pw_implicit_lay_out (pw_implicit *x, int size);
 
 /* Ends the opening, if `status` is PW_OK so far; velocities: whether the method has J v = eta. */
@@ -33,7 +33,7 @@ int pw_implicit_opened (pw_run *r, int status, int velocities, pw_error *error);
 void pw_implicit_fill (pw_implicit *x, int size);
 
 /* From the state reached to its successor q1, v1 at t1 = t + h, where kinematics are then up to date: PW_RETRY if the iteration
- * does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed, PW_MACHINE. */
+ * does not converge, PW_INPUT if its matrix is singular, PW_METHOD if a signal failed, PW_RESOURCE. */
 typedef int pw_implicit_step (pw_run *r, double h, double t1);
 
 /* One step; q1 and v1 become the state reached, `accept` does the same for accelerations and multipliers. */

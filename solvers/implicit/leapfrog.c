@@ -76,8 +76,8 @@ static int leapfrog_converged (leapfrog_progress *p) {
  * The first line is linear: it holds for u = v + h/2 a with L = 0, and after every correction. */
 
 static int leapfrog_place (pw_run *r, double t, const double *q, const double *v) {
-  int status = pw_place (r->w, t, q, v);
-  if (status == PW_OK) pw_sweep_J (r->w);
+  int status = pw_update_kinematics (r->w, t, q, v);
+  if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
 
@@ -95,7 +95,7 @@ static void drift_move (pw_run *r, double h) {
 static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
   const pw_system *s = r->s;
-  for (int j = 0; j < s->coords; j++) pw_tape_put (&x->tape, j, j, s->mass[j]);
+  for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->tape, j, j, s->mass[j]);
   pw_newton_JT (r->w, &x->tape,
                 &(pw_put){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
 }
@@ -120,7 +120,7 @@ static void drift_put_end (pw_run *r) {
 
 static int drift_open_matrix (pw_run *r) {
   leapfrog *d = r->data;
-  pw_tape_record (&d->work.tangent.tape);
+  pw_scatter_record (&d->work.tangent.tape);
   drift_put_momentum (r);
   drift_put_middle (r, 1);
   drift_put_end (r);
@@ -156,13 +156,13 @@ static int drift_rows (pw_run *r, double h, double t1) {
     status = leapfrog_place (r, r->t + 0.5 * h, d->middle, d->u);
     if (status != PW_OK) return status;
     pw_mul_J (r->w, d->u, d->off);
-    pw_sweep_eta (r->w, d->eta);
+    pw_evaluate_eta (r->w, d->eta);
     for (int i = s->holonomic; i < s->rows; i++) d->off[i] -= d->eta[i];
   }
   if (s->holonomic > 0) {
-    status = pw_place (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->u);
+    status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->u);
     if (status != PW_OK) return status;
-    pw_sweep_g (r->w, d->eta);
+    pw_evaluate_g (r->w, d->eta);
     for (int i = 0; i < s->holonomic; i++) d->off[i] = d->eta[i] / h;
   }
   r->statistics.rhs++;
@@ -176,7 +176,7 @@ static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
   memset (d->z, 0, (size_t)n * sizeof *d->z);
   for (int i = 0; i < r->s->rows; i++) d->off[i] = -d->off[i];
   pw_tangent_compress (&d->work.tangent, d->off, d->work.tangent.rows, d->z + n);
-  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_MACHINE;
+  if (pw_sparse_solve (&d->work.sparse, d->z) != PW_OK) return PW_RESOURCE;
   p->size = 0, p->large = 1;
   for (int j = 0; j < n; j++) {
     d->u[j] += d->z[j];
@@ -219,16 +219,16 @@ static int leapfrog_factor (pw_run *r, double t, const double *q, const double *
 static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
   const pw_system *s = r->s;
-  int status = pw_place_rates (r->w, d->work.v1);
+  int status = pw_update_velocities (r->w, d->work.v1);
   if (status != PW_OK) return status;
-  pw_sweep_force (r->w, d->middle);
+  pw_evaluate_force (r->w, d->middle);
   for (int j = 0; j < s->coords; j++) {
     double f = d->middle[j];
     d->middle[j] = 0.5 * h * (f - d->f[j]);
     d->f[j] = f;
   }
   pw_mul_J (r->w, d->work.v1, d->off);
-  pw_sweep_eta (r->w, d->eta);
+  pw_evaluate_eta (r->w, d->eta);
   for (int i = 0; i < s->rows; i++) d->off[i] = d->eta[i] - d->off[i];
   pw_saddle_solve (r->saddle, d->middle, d->off, d->dv, d->mu);
   p->size = 0, p->large = 1;
@@ -252,7 +252,7 @@ static int leapfrog_finish (pw_run *r, double h, double t1) {
     good = p.done < LEAPFROG_MOST ? leapfrog_converged (&p) : -1;
     if (good < 0) return PW_RETRY;
   }
-  return pw_place_rates (r->w, d->work.v1);
+  return pw_update_velocities (r->w, d->work.v1);
 }
 
 /* ---- Opening ---- */
@@ -260,7 +260,7 @@ static int leapfrog_finish (pw_run *r, double h, double t1) {
 static int leapfrog_open (pw_run *r, pw_error *error) {
   leapfrog *d = r->data = calloc (1, sizeof *d);
   size_t n = (size_t)r->s->coords + 3, rows = (size_t)r->s->rows;
-  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (d == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   const pw_array array[] = { { &d->u, n },      { &d->work.q1, n }, { &d->work.v1, n }, { &d->middle, n },
                              { &d->dv, n },     { &d->f, n },       { &d->off, rows },  { &d->mu, rows },
                              { &d->eta, rows }, { &d->z, n + rows } };
@@ -271,8 +271,8 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
 
 static void leapfrog_carry (pw_run *r, pw_archive *a) {
   leapfrog *d = r->data;
-  pw_carry (a, &d->work.base, sizeof d->work.base);
-  pw_carry_count (a, &d->work.count);
+  pw_archive_bytes (a, &d->work.base, sizeof d->work.base);
+  pw_archive_count (a, &d->work.count);
 }
 
 /* ---- Advancing ---- */
@@ -283,7 +283,7 @@ static int leapfrog_step (pw_run *r, double h, double t1) {
 }
 
 static void leapfrog_accept (pw_run *r) {
-  pw_accelerate_placed (r, r->v, r->a, r->lambda);
+  pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
 }
 
 static int leapfrog_advance (pw_run *r, double t_end, pw_error *error) {

@@ -4,7 +4,7 @@
 
 int pw_newton_open (pw_newton *n, const pw_system *s) {
   size_t block = 1, w = 1;
-  for (const pw_slab *k = s->slab; k < s->slab + s->slabs; k++) {
+  for (const pw_element_batch *k = s->slab; k < s->slab + s->slabs; k++) {
     size_t cols = (size_t)k->b.cols, rows = cols > (size_t)k->kind->rows ? cols : (size_t)k->kind->rows;
     size_t count = (size_t)k->b.count;
     if (count * rows * cols > block) block = count * rows * cols;
@@ -15,7 +15,7 @@ int pw_newton_open (pw_newton *n, const pw_system *s) {
   n->w = malloc (w * sizeof *n->w);
   if (n->block && n->w) return PW_OK;
   pw_newton_close (n);
-  return PW_MACHINE;
+  return PW_RESOURCE;
 }
 
 void pw_newton_close (pw_newton *n) {
@@ -24,7 +24,7 @@ void pw_newton_close (pw_newton *n) {
   n->block = n->w = NULL;
 }
 
-static void newton_gather (const pw_system *s, const pw_slab *k, const double *w, double *local) {
+static void newton_gather (const pw_system *s, const pw_element_batch *k, const double *w, double *local) {
   for (int e = 0; e < k->b.count; e++)
     for (int c = 0; c < k->b.cols; c++) {
       int j = pw_global (k, e, c);
@@ -46,18 +46,18 @@ static inline int newton_is_length (const pw_kind *kind, int c) {
   return c < 3 * kind->bodies && c % 3 != 2;
 }
 
-void pw_newton_block (pw_newton *n, pw_workspace *w, pw_tape *t, pw_block block, const pw_put *put) {
+void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_put *put) {
   const pw_system *s = w->s;
-  for (pw_slab *k = w->slab; k < w->slab + s->slabs; k++) {
+  for (pw_element_batch *k = w->slab; k < w->slab + s->slabs; k++) {
     int rows = pw_block_rows (k->kind, block), cols = k->b.cols;
     int of_rows = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
     int constraint = of_rows || block == PW_JTL_Q;
     if (constraint && (k->kind->rows == 0 || k->row >= put->rows)) continue;
-    if (pw_block_sweep (k->kind, block) == NULL) continue;
+    if (pw_block_function (k->kind, block) == NULL) continue;
     if (put->w) newton_gather (s, k, put->w, n->w);
     k->b.w = n->w;
     k->b.lambda = put->lambda ? put->lambda + k->row : NULL;
-    if (!t->recording) pw_sweep_block (w, k, block, n->block);
+    if (!t->recording) pw_evaluate_block (w, k, block, n->block);
     const double *value = n->block;
     double factor = of_rows && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
     int angles = constraint && newton_turns (k->kind);
@@ -73,16 +73,16 @@ void pw_newton_block (pw_newton *n, pw_workspace *w, pw_tape *t, pw_block block,
           int j = pw_global (k, e, c);
           if (j >= s->coords || i < 0 || (!of_rows && i >= s->coords)) continue;
           if (angles && newton_is_length (k->kind, c)) continue;
-          pw_tape_put (t, put->row + i, put->col + j, t->recording ? 0 : scaled * *value);
+          pw_scatter_add (t, put->row + i, put->col + j, t->recording ? 0 : scaled * *value);
         }
       }
   }
 }
 
 /* Calls over all entries of J: both directions share it. */
-static void newton_J (const pw_workspace *w, pw_tape *t, const pw_put *put, int transposed) {
+static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put, int transposed) {
   const pw_system *s = w->s;
-  for (const pw_slab *k = w->slab; k < w->slab + s->slabs && k->kind->rows > 0 && k->row < put->rows; k++) {
+  for (const pw_element_batch *k = w->slab; k < w->slab + s->slabs && k->kind->rows > 0 && k->row < put->rows; k++) {
     const double *value = k->J;
     double factor = k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
     int turns = newton_turns (k->kind);
@@ -93,25 +93,25 @@ static void newton_J (const pw_workspace *w, pw_tape *t, const pw_put *put, int 
           int j = pw_global (k, e, c);
           if (j >= s->coords || i < 0 || (turns && newton_is_length (k->kind, c) && c % 3 == 1 - r)) continue;
           if (transposed)
-            pw_tape_put (t, put->row + j, put->col + i, factor * *value * (put->row_scale ? put->row_scale[j] : 1));
+            pw_scatter_add (t, put->row + j, put->col + i, factor * *value * (put->row_scale ? put->row_scale[j] : 1));
           else
-            pw_tape_put (t, put->row + i, put->col + j, factor * *value);
+            pw_scatter_add (t, put->row + i, put->col + j, factor * *value);
         }
       }
   }
 }
 
-void pw_newton_J (const pw_workspace *w, pw_tape *t, const pw_put *put) {
+void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put) {
   newton_J (w, t, put, 0);
 }
 
-void pw_newton_JT (const pw_workspace *w, pw_tape *t, const pw_put *put) {
+void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_put *put) {
   newton_J (w, t, put, 1);
 }
 
-void pw_newton_readers (pw_newton *n, pw_workspace *w, pw_tape *t, int row, int col, int col_v) {
+void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v) {
   const pw_system *s = w->s;
-  for (pw_slab *k = w->slab; s->readers > 0 && k < w->slab + s->slabs; k++) {
+  for (pw_element_batch *k = w->slab; s->readers > 0 && k < w->slab + s->slabs; k++) {
     int signals = k->kind->signals, cols = k->b.cols;
     if (signals == 0 || k->kind->force_u == NULL) continue;
     if (!t->recording) k->kind->force_u (&k->b, n->block);
@@ -123,8 +123,8 @@ void pw_newton_readers (pw_newton *n, pw_workspace *w, pw_tape *t, int row, int 
           for (int c = 0; c < cols; c++) {
             int i = pw_global (k, e, c);
             if (i >= s->coords) continue;
-            pw_tape_put (t, row + i, to,
-                         t->recording ? 0 : -n->block[(e * cols + c) * signals + u] * source->x[source->reads + x]);
+            pw_scatter_add (t, row + i, to,
+                            t->recording ? 0 : -n->block[(e * cols + c) * signals + u] * source->x[source->reads + x]);
           }
         }
       }

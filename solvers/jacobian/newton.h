@@ -11,7 +11,7 @@ typedef struct {
   double *w;     /* largest count x cols */
 } pw_newton;
 
-int pw_newton_open (pw_newton *n, const pw_system *s); /* PW_OK or PW_MACHINE */
+int pw_newton_open (pw_newton *n, const pw_system *s); /* PW_OK or PW_RESOURCE */
 void pw_newton_close (pw_newton *n);
 
 /* Puts factor x block of every slab: rows from `row` on (constraint equations for blocks with as many rows, else
@@ -25,14 +25,14 @@ typedef struct {
   const int *map; /* rows: place of each constraint row, or -1: it is left out; NULL: as they are */
   const double *w, *lambda;
 } pw_put;
-void pw_newton_block (pw_newton *n, pw_workspace *w, pw_tape *t, pw_block block, const pw_put *put);
+void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_put *put);
 
 /* Puts factor x J, or its transpose, with the J last evaluated. */
-void pw_newton_J (const pw_workspace *w, pw_tape *t, const pw_put *put);
-void pw_newton_JT (const pw_workspace *w, pw_tape *t, const pw_put *put);
+void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put);
+void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_put *put);
 
 /* Puts -(force by signal) x (signal by the states it reads): rows from `row` on, q in columns from `col` on, v in
  * columns from `col_v` on. */
-void pw_newton_readers (pw_newton *n, pw_workspace *w, pw_tape *t, int row, int col, int col_v);
+void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v);
 
 #endif

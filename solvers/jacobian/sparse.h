@@ -14,11 +14,11 @@ typedef struct {
   double least;             /* ratio of pivots below which they are selected again */
 } pw_sparse;
 
-/* n columns in compressed form.  PW_OK or PW_MACHINE. */
+/* n columns in compressed form.  PW_OK or PW_RESOURCE. */
 int pw_sparse_open (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind);
 void pw_sparse_close (pw_sparse *k);
 
-/* PW_OK, PW_RETRY if the matrix is singular, PW_MACHINE. */
+/* PW_OK, PW_RETRY if the matrix is singular, PW_RESOURCE. */
 int pw_sparse_factor (pw_sparse *k, double *value);
 
 /* The next factorisation chooses its pivots again. */
@@ -26,7 +26,7 @@ static inline void pw_sparse_forget (pw_sparse *k) {
   if (k->factors) klu_l_free_numeric (&k->factors, &k->common);
 }
 
-/* x = A^-1 x.  PW_OK or PW_MACHINE. */
+/* x = A^-1 x.  PW_OK or PW_RESOURCE. */
 int pw_sparse_solve (pw_sparse *k, double *x);
 
 #endif

@@ -9,7 +9,7 @@ static int tangent_number_rows (pw_tangent *x) {
   x->holonomic = s->holonomic;
   if (r->active == NULL) return PW_OK;
   x->map = malloc ((size_t)(2 * s->rows) * sizeof *x->map);
-  if (x->map == NULL) return PW_MACHINE;
+  if (x->map == NULL) return PW_RESOURCE;
   int *row = x->map + s->rows;
   x->row = row;
   x->rows = x->holonomic = 0;
@@ -26,14 +26,14 @@ int pw_tangent_open (pw_tangent *x, pw_run *r) {
   *x = (pw_tangent){ .run = r };
   r->differentiates = 1;
   x->lambda = calloc ((size_t)(2 * r->s->rows) + 1, sizeof *x->lambda);
-  if (x->lambda == NULL) return PW_MACHINE;
+  if (x->lambda == NULL) return PW_RESOURCE;
   x->mu = x->lambda + r->s->rows;
   int status = tangent_number_rows (x);
   return status == PW_OK ? pw_newton_open (&x->newton, r->s) : status;
 }
 
 void pw_tangent_close (pw_tangent *x) {
-  pw_tape_close (&x->tape);
+  pw_scatter_close (&x->tape);
   pw_newton_close (&x->newton);
   free (x->map);
   free (x->lambda);
@@ -52,11 +52,11 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
 }
 
 /* of_q I + D (G^T mu)_q, -I, D G^T */
-void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_place *to, const double *mu, const double *D) {
+void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const double *mu, const double *D) {
   const pw_system *s = x->run->s;
   for (int j = 0; j < s->coords; j++) {
-    pw_tape_put (&x->tape, j, to->q + j, to->of_q);
-    pw_tape_put (&x->tape, j, to->v + j, -1);
+    pw_scatter_add (&x->tape, j, to->q + j, to->of_q);
+    pw_scatter_add (&x->tape, j, to->v + j, -1);
   }
   if (mu == NULL) return;
   pw_put put = { .col = to->q, .rows = s->holonomic, .factor = 1, .row_scale = D, .map = x->map, .lambda = mu };
@@ -67,7 +67,7 @@ void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_place *to, const dou
 }
 
 /* (J v)_q - eta_q, J */
-void pw_tangent_rates (pw_tangent *x, const pw_tangent_place *to, const double *v, double of_holonomic) {
+void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const double *v, double of_holonomic) {
   const pw_system *s = x->run->s;
   pw_put put = { .row = to->constraint,
                  .col = to->q,
@@ -85,14 +85,14 @@ void pw_tangent_rates (pw_tangent *x, const pw_tangent_place *to, const double *
 }
 
 /* G */
-void pw_tangent_positions (pw_tangent *x, const pw_tangent_place *to, int row) {
+void pw_tangent_positions (pw_tangent *x, const pw_tangent_update *to, int row) {
   const pw_system *s = x->run->s;
   pw_newton_J (x->run->w, &x->tape,
                &(pw_put){ .row = row, .col = to->q, .rows = s->holonomic, .factor = 1, .map = x->map });
 }
 
 /* (J^T lambda)_q - f_q, -f_v, M, J^T */
-void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const double *lambda) {
+void pw_tangent_momentum (pw_tangent *x, const pw_tangent_update *to, const double *lambda) {
   const pw_system *s = x->run->s;
   pw_put put = { .row = to->momentum,
                  .col = to->q,
@@ -106,15 +106,15 @@ void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const doubl
   pw_newton_block (&x->newton, x->run->w, &x->tape, PW_FORCE_Q, &put);
   put.col = to->v;
   pw_newton_block (&x->newton, x->run->w, &x->tape, PW_FORCE_V, &put);
-  pw_newton_readers (&x->newton, x->run->w, &x->tape, to->momentum, to->q, to->v);
-  for (int j = 0; j < s->coords; j++) pw_tape_put (&x->tape, to->momentum + j, to->a + j, to->of_a * s->mass[j]);
+  pw_newton_signals (&x->newton, x->run->w, &x->tape, to->momentum, to->q, to->v);
+  for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->tape, to->momentum + j, to->a + j, to->of_a * s->mass[j]);
   put.factor = put.factor_nonholonomic = to->of_lambda;
   put.col = to->lambda;
   pw_newton_JT (x->run->w, &x->tape, &put);
 }
 
 /* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G, 2 alpha J - gamma_v, J */
-void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_place *to, const double *v, const double *a) {
+void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_update *to, const double *v, const double *a) {
   pw_run *r = x->run;
   const pw_system *s = r->s;
   double alpha = r->alpha, with_v = to->a == to->v ? to->of_a : 0;

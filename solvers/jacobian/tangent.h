@@ -18,11 +18,11 @@ typedef struct {
   const int *row;      /* rows: its number among all */
   double *lambda, *mu; /* all equations: values of the unknowns last looked at */
   pw_newton newton;
-  pw_tape tape;
+  pw_scatter_map tape;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
 } pw_tangent;
 
-int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_MACHINE */
+int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE */
 void pw_tangent_close (pw_tangent *x);
 
 /* Values of all equations from those of the first `count` in use; `all` is there for them. */
@@ -36,15 +36,15 @@ typedef struct {
   int momentum, constraint; /* first row of each; that of the kinematics is 0 */
   int q, v, a, lambda, mu;  /* first column of each */
   double of_q, of_a, of_lambda;
-} pw_tangent_place;
+} pw_tangent_update;
 
 /* Puts these rows at the placed configuration with J evaluated; lambda and mu (NULL: there are none): all equations,
  * D, v and a: coords. */
-void pw_tangent_momentum (pw_tangent *x, const pw_tangent_place *to, const double *lambda);
-void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_place *to, const double *mu, const double *D);
-void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_place *to, const double *v, const double *a);
+void pw_tangent_momentum (pw_tangent *x, const pw_tangent_update *to, const double *lambda);
+void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const double *mu, const double *D);
+void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_update *to, const double *v, const double *a);
 /* Holonomic rows times a factor: 0 leaves their place to the positions, which begin at a row of their choice. */
-void pw_tangent_rates (pw_tangent *x, const pw_tangent_place *to, const double *v, double of_holonomic);
-void pw_tangent_positions (pw_tangent *x, const pw_tangent_place *to, int row);
+void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const double *v, double of_holonomic);
+void pw_tangent_positions (pw_tangent *x, const pw_tangent_update *to, int row);
 
 #endif

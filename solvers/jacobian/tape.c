@@ -3,11 +3,11 @@
 #include <string.h>
 #include "tape.h"
 
-void pw_tape_record (pw_tape *t) {
-  *t = (pw_tape){ .recording = 1 };
+void pw_scatter_record (pw_scatter_map *t) {
+  *t = (pw_scatter_map){ .recording = 1 };
 }
 
-void pw_tape_note (pw_tape *t, int row, int col) {
+void pw_scatter_note (pw_scatter_map *t, int row, int col) {
   if (t->failed) return;
   if (t->count == t->room) {
     size_t room = t->room ? 2 * t->room : 256;
@@ -36,13 +36,13 @@ static void tape_sort (const int *key, const size_t *from, size_t count, int n, 
   }
 }
 
-int pw_tape_lay_out (pw_tape *t, int n, int64_t **colptr, int64_t **rowind) {
+int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **rowind) {
   size_t *by_row = malloc ((t->count + 1) * sizeof *by_row), *order = malloc ((t->count + 1) * sizeof *order);
   size_t *start = malloc (((size_t)n + 2) * sizeof *start);
   t->place = malloc ((t->count + 1) * sizeof *t->place);
   *colptr = malloc (((size_t)n + 1) * sizeof **colptr);
   *rowind = malloc ((t->count + 1) * sizeof **rowind);
-  int status = !t->failed && by_row && order && start && t->place && *colptr && *rowind ? PW_OK : PW_MACHINE;
+  int status = !t->failed && by_row && order && start && t->place && *colptr && *rowind ? PW_OK : PW_RESOURCE;
   if (status == PW_OK) {
     tape_sort (t->row, NULL, t->count, n, start, by_row);
     tape_sort (t->col, by_row, t->count, n, start, order);
@@ -71,9 +71,9 @@ int pw_tape_lay_out (pw_tape *t, int n, int64_t **colptr, int64_t **rowind) {
   return status;
 }
 
-void pw_tape_close (pw_tape *t) {
+void pw_scatter_close (pw_scatter_map *t) {
   free (t->row);
   free (t->col);
   free (t->place);
-  *t = (pw_tape){ 0 };
+  *t = (pw_scatter_map){ 0 };
 }

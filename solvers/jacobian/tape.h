@@ -1,7 +1,7 @@
 /* A sparse matrix filled again and again by the same sequence of contributions: the sequence is recorded once, laid out
  * in compressed columns, and from then on each contribution finds its place by its number. */
-#ifndef PW_TAPE_H
-#define PW_TAPE_H
+#ifndef PW_SCATTER_H
+#define PW_SCATTER_H
 
 #include <stdint.h>
 #include "pinwheel.h"
@@ -14,24 +14,24 @@ typedef struct {
   size_t next;        /* contribution to come */
   double *value;      /* while filling */
   int failed;         /* out of memory while recording */
-} pw_tape;
+} pw_scatter_map;
 
-void pw_tape_record (pw_tape *t);
-/* Ends the recording: colptr (n + 1) and rowind (nonzeros) are allocated with malloc for the caller.  PW_MACHINE. */
-int pw_tape_lay_out (pw_tape *t, int n, int64_t **colptr, int64_t **rowind);
-void pw_tape_close (pw_tape *t);
+void pw_scatter_record (pw_scatter_map *t);
+/* Ends the recording: colptr (n + 1) and rowind (nonzeros) are allocated with malloc for the caller.  PW_RESOURCE. */
+int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **rowind);
+void pw_scatter_close (pw_scatter_map *t);
 
 /* Begins a filling of the values, which the caller has zeroed. */
-static inline void pw_tape_fill (pw_tape *t, double *value) {
+static inline void pw_scatter_begin (pw_scatter_map *t, double *value) {
   t->next = 0;
   t->value = value;
 }
 
-void pw_tape_note (pw_tape *t, int row, int col);
+void pw_scatter_note (pw_scatter_map *t, int row, int col);
 
-static inline void pw_tape_put (pw_tape *t, int row, int col, double value) {
+static inline void pw_scatter_add (pw_scatter_map *t, int row, int col, double value) {
   if (t->recording)
-    pw_tape_note (t, row, col);
+    pw_scatter_note (t, row, col);
   else
     t->value[t->place[t->next++]] += value;
 }

@@ -100,7 +100,7 @@ typedef struct {
 pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l);
 
-/* Lays out the values.  PW_OK, or PW_MACHINE if memory is out or there are 2^31 values or more. */
+/* Lays out the values.  PW_OK, or PW_RESOURCE if memory is out or there are 2^31 values or more. */
 int pw_block_lay_out (pw_block_ldl *l);
 
 /* Where the block of columns p > q is, rows those of p. */

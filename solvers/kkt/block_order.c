@@ -23,7 +23,7 @@ static int order_compare (const void *a, const void *b) {
 static int order_collect (int nodes, long pairs, const int *pair, const int *place, int lower, order_lists *lists) {
   int *first = lists->first = calloc ((size_t)nodes + 2, sizeof (int));
   int *list = lists->list = malloc ((size_t)(2 * pairs + 1) * sizeof (int));
-  if (first == NULL || list == NULL) return PW_MACHINE;
+  if (first == NULL || list == NULL) return PW_RESOURCE;
   for (int pass = 0; pass < 2; pass++) { /* counts column c in first[c + 2], then fills through first[c + 1] */
     for (long i = 0; i < 2 * pairs; i++) {
       int c = pair[i], r = pair[i ^ 1];
@@ -58,7 +58,7 @@ static void order_lists_close (order_lists *l) {
 /* Puts higher ranks later, without changing the order otherwise; place: of each node. */
 static int order_sort_ranks (int nodes, const int *rank, int *order, int *place) {
   int at = 0, *old = malloc (((size_t)nodes + 1) * sizeof *old);
-  if (old == NULL) return PW_MACHINE;
+  if (old == NULL) return PW_RESOURCE;
   memcpy (old, order, (size_t)nodes * sizeof *old);
   for (int r = 0; r < PW_BLOCK_RANKS; r++)
     for (int j = 0; j < nodes; j++)
@@ -71,7 +71,7 @@ static int order_sort_ranks (int nodes, const int *rank, int *order, int *place)
 static int order_by_degree (int nodes, const int *rank, long pairs, const int *pair, int *order) {
   order_lists graph = { NULL, NULL };
   int *inner = malloc ((size_t)(2 * pairs + 1) * sizeof *inner);
-  if (inner == NULL) return PW_MACHINE;
+  if (inner == NULL) return PW_RESOURCE;
   long inners = 0;
   for (long i = 0; i < pairs; i++) {
     if (rank[pair[2 * i]] > 0 || rank[pair[2 * i + 1]] > 0) continue;
@@ -80,7 +80,7 @@ static int order_by_degree (int nodes, const int *rank, long pairs, const int *p
   }
   int status = order_collect (nodes, inners, inner, NULL, 0, &graph);
   if (status == PW_OK && nodes > 0 && amd_order (nodes, graph.first, graph.list, order, NULL, NULL) < 0)
-    status = PW_MACHINE;
+    status = PW_RESOURCE;
   order_lists_close (&graph);
   free (inner);
   return status;
@@ -98,7 +98,7 @@ static int order_tree_open (order_tree *t, int nodes, const order_lists *K, orde
   t->mark = malloc (3 * n * sizeof *t->mark);
   L->first = malloc (n * sizeof *L->first);
   L->list = malloc (t->room * sizeof *L->list);
-  if (t->mark == NULL || L->first == NULL || L->list == NULL) return PW_MACHINE;
+  if (t->mark == NULL || L->first == NULL || L->list == NULL) return PW_RESOURCE;
   t->child = t->mark + n;
   t->sibling = t->child + n;
   for (int j = 0; j < nodes; j++) t->mark[j] = t->child[j] = -1;
@@ -111,9 +111,9 @@ static int order_tree_grow (order_tree *t, int j, const order_lists *K, order_li
   size_t most = (size_t)L->first[j] + (size_t)(K->first[j + 1] - K->first[j]);
   for (int c = t->child[j]; c >= 0; c = t->sibling[c]) most += (size_t)(L->first[c + 1] - L->first[c]);
   if (most <= t->room) return PW_OK;
-  if (most > INT_MAX / 2) return PW_MACHINE;
+  if (most > INT_MAX / 2) return PW_RESOURCE;
   int *more = realloc (L->list, 2 * most * sizeof *more);
-  if (more == NULL) return PW_MACHINE;
+  if (more == NULL) return PW_RESOURCE;
   L->list = more;
   t->room = 2 * most;
   return PW_OK;
@@ -162,7 +162,7 @@ static int order_plan (int nodes, const int *rank, long pairs, const int *pair, 
                        order_lists *L) {
   order_lists natural = { NULL, NULL };
   int *other = malloc ((2 * (size_t)nodes + 1) * sizeof *other);
-  int status = other ? order_by_degree (nodes, rank, pairs, pair, order) : PW_MACHINE;
+  int status = other ? order_by_degree (nodes, rank, pairs, pair, order) : PW_RESOURCE;
   if (status == PW_OK) status = order_try (nodes, rank, pairs, pair, INT_MAX, order, place, L);
   for (int j = 0; j < nodes && status == PW_OK; j++) other[j] = j;
   if (status == PW_OK) {
@@ -190,7 +190,7 @@ int pw_block_find (const pw_block_ldl *l, int p, int q) {
   return at;
 }
 
-/* Where the blocks are.  Returns PW_MACHINE if there are too many values. */
+/* Where the blocks are.  Returns PW_RESOURCE if there are too many values. */
 static int order_place_columns (pw_block_ldl *l) {
   size_t at = 0;
   for (int j = 0; j < l->nodes; j++) {
@@ -199,7 +199,7 @@ static int order_place_columns (pw_block_ldl *l) {
     if (c->in_chain) continue;
     at += (size_t)pw_block_diagonal (c->size);
     for (int i = c->first; i < c[1].first; i++) at += (size_t)(c->size * l->column[l->below[i]].size);
-    if (at > INT_MAX) return PW_MACHINE;
+    if (at > INT_MAX) return PW_RESOURCE;
   }
   l->column[l->nodes].at = l->values = (int)at;
   return PW_OK;
@@ -243,7 +243,7 @@ static int order_take (pw_block_ldl *l, const int *size, const int *y, const int
     l->target = pw_take (&lay, targets, sizeof *l->target);
     if (pass == 1) break;
     l->pattern = malloc (lay.used);
-    if (l->pattern == NULL) return PW_MACHINE;
+    if (l->pattern == NULL) return PW_RESOURCE;
     lay = (pw_layout){ l->pattern, 0 };
   }
   memcpy (l->below, L->list, below * sizeof (int));
@@ -254,10 +254,10 @@ static int order_take (pw_block_ldl *l, const int *size, const int *y, const int
 }
 
 int pw_block_lay_out (pw_block_ldl *l) {
-  if (order_place_columns (l) != PW_OK) return PW_MACHINE;
+  if (order_place_columns (l) != PW_OK) return PW_RESOURCE;
   order_place_targets (l);
   l->value = malloc (((size_t)l->values + 1) * sizeof *l->value);
-  return l->value ? PW_OK : PW_MACHINE;
+  return l->value ? PW_OK : PW_RESOURCE;
 }
 
 pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair) {
@@ -265,7 +265,7 @@ pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int
   int *order = malloc (((size_t)nodes + 1) * sizeof *order);
   order_lists L = { NULL, NULL };
   if (l) l->place = malloc (((size_t)nodes + 1) * sizeof *l->place);
-  int status = l && order && l->place ? order_plan (nodes, rank, pairs, pair, order, l->place, &L) : PW_MACHINE;
+  int status = l && order && l->place ? order_plan (nodes, rank, pairs, pair, order, l->place, &L) : PW_RESOURCE;
   if (status == PW_OK) {
     l->nodes = nodes;
     status = order_take (l, size, y, order, &L);

@@ -15,7 +15,7 @@ static void condense_contribute (pw_plan *c, const double *J, int step, int j, i
   c->contributions++;
 }
 
-static void condense_element (pw_plan *c, const pw_slab *b, int e, int r, int size) {
+static void condense_element (pw_plan *c, const pw_element_batch *b, int e, int r, int size) {
   const pw_kind *kind = b->kind;
   const double *J = b->J + (e * kind->rows + r) * b->b.cols;
   int i = b->row + e * kind->rows + r;
@@ -31,7 +31,8 @@ static void condense_element (pw_plan *c, const pw_slab *b, int e, int r, int si
 
 /* 1 for an equation that stands for itself: not left out, not a component's, and not one that only prescribed
  * coordinates enter, which says nothing of the others. */
-static int condense_takes_part (const pw_plan *c, const pw_slab *b, int e, int r, const unsigned char *active) {
+static int condense_takes_part (const pw_plan *c, const pw_element_batch *b, int e, int r,
+                                const unsigned char *active) {
   const double *J = b->J + (e * b->kind->rows + r) * b->b.cols, *inverse = c->k->inverse;
   int i = b->row + e * b->kind->rows + r, prescribed = 0;
   if ((active && !active[i]) || c->k->massless.component_of_row[i] >= 0) return 0;
@@ -46,7 +47,8 @@ static int condense_takes_part (const pw_plan *c, const pw_slab *b, int e, int r
 /* Runs of such equations of an element. */
 static void condense_elements (pw_plan *c, int rows, const unsigned char *active) {
   const pw_system *s = c->k->s;
-  for (const pw_slab *b = c->k->w->slab; b < c->k->w->slab + s->slabs && b->kind->rows > 0 && b->row < rows; b++)
+  for (const pw_element_batch *b = c->k->w->slab; b < c->k->w->slab + s->slabs && b->kind->rows > 0 && b->row < rows;
+       b++)
     for (int e = 0; e < b->b.count; e++)
       for (int r = 0, size; r<b->kind->rows; r += size> 0 ? size : 1) {
         for (size = 0; r + size < b->kind->rows && size < PW_BLOCK_NODE; size++)
@@ -87,7 +89,7 @@ static int condense_allocate (pw_plan *c, int rows, const unsigned char *active)
   c->start = calloc ((size_t)c->k->s->coords + 2, sizeof *c->start);
   c->list = malloc (((size_t)c->contributions + 1) * sizeof *c->list);
   c->node = node;
-  if (node == NULL || c->contribution == NULL || c->start == NULL || c->list == NULL) return PW_MACHINE;
+  if (node == NULL || c->contribution == NULL || c->start == NULL || c->list == NULL) return PW_RESOURCE;
   condense_nodes (c, rows, active);
   for (int p = 0; p < c->contributions; p++) c->start[c->contribution[p].j + 2]++;
   for (int j = 0; j < c->k->s->coords; j++) c->start[j + 2] += c->start[j + 1];
@@ -140,11 +142,11 @@ static int condense_is_crowded (const pw_plan *c, int b) {
 static int condense_uncondensed (pw_plan *c) {
   int bodies = c->k->s->bodies, nodes = c->nodes;
   c->uncondensed = malloc (((size_t)bodies + 1) * sizeof *c->uncondensed);
-  if (c->uncondensed == NULL) return PW_MACHINE;
+  if (c->uncondensed == NULL) return PW_RESOURCE;
   for (int b = 0; b < bodies; b++) c->uncondensed[b] = condense_is_crowded (c, b) ? nodes + 2 * c->uncondenseds++ : -1;
   if (c->uncondenseds == 0) return PW_OK;
   pw_plan_node *node = realloc (c->node, (size_t)(nodes + 2 * c->uncondenseds) * sizeof *node);
-  if (node == NULL) return PW_MACHINE;
+  if (node == NULL) return PW_RESOURCE;
   c->node = node;
   for (int y = c->k->s->rows + c->k->schurs, n = 0; n < c->uncondenseds; n++, y += 3) {
     node[c->nodes++] = (pw_plan_node){ .size = 2, .row = PW_PLAN_UNCONDENSED, .rank = 1, .y = y };
@@ -190,12 +192,12 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows) {
   for (int i = 0; i < rows; i++) k->inactives += k->massless.component_of_row[i] < 0;
   k->inactives -= unknowns - k->schurs;
   int is_dense = unknowns <= PW_DENSE_MOST && k->s->coords <= CONDENSE_DENSE_COORDS;
-  if (!is_dense && condense_uncondensed (c) != PW_OK) return PW_MACHINE;
+  if (!is_dense && condense_uncondensed (c) != PW_OK) return PW_RESOURCE;
   k->more = k->schurs + 3 * c->uncondenseds;
   pw_layout l = { NULL, 0 };
   condense_take (c, &l, is_dense);
   k->memory = malloc (l.used + 1);
-  if (k->memory == NULL) return PW_MACHINE;
+  if (k->memory == NULL) return PW_RESOURCE;
   l = (pw_layout){ k->memory, 0 };
   pw_dense_block *block = condense_take (c, &l, is_dense);
   condense_fill_rows (c, rows);
@@ -208,7 +210,7 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
   pw_plan c = { .k = k, .groups = k->s->coords - 2 * k->s->bodies };
   k->rows = rows;
   k->inverse = calloc ((size_t)k->s->coords + 3, sizeof *k->inverse);
-  if (k->inverse == NULL) return PW_MACHINE;
+  if (k->inverse == NULL) return PW_RESOURCE;
   for (int j = 0; j < k->s->coords; j++) k->inverse[j] = weight[j] > 0 ? 1 / weight[j] : 0;
   int status = condense_allocate (&c, rows, active);
   if (status == PW_OK) status = condense_lay_out (&c, weight, rows);

@@ -36,7 +36,7 @@ struct pw_saddle {
   char *memory;
 };
 
-/* Plans everything but `massless`, which is there.  Errors: PW_MACHINE. */
+/* Plans everything but `massless`, which is there.  Errors: PW_RESOURCE. */
 int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsigned char *active);
 
 /* ---- Planning ---- */
@@ -85,11 +85,11 @@ static inline int pw_plan_width (const pw_plan *c, int j) {
   return j < 3 * c->k->s->bodies ? 3 : 1;
 }
 
-/* Makes k->block.  Errors: PW_MACHINE. */
+/* Makes k->block.  Errors: PW_RESOURCE. */
 int pw_condense_block (pw_plan *c);
 
 /* Finds the chains, and marks their inner columns; the contributions of each group are in the order of their
- * columns.  PW_OK or PW_MACHINE. */
+ * columns.  PW_OK or PW_RESOURCE. */
 int pw_condense_chains (pw_plan *c, pw_block_ldl *l);
 
 #endif

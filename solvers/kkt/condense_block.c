@@ -108,7 +108,7 @@ static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
   l->chains = c->chains;
   condense_take_block (c, &lay, l);
   l->memory = malloc (lay.used + 1);
-  if (l->memory == NULL) return PW_MACHINE;
+  if (l->memory == NULL) return PW_RESOURCE;
   lay = (pw_layout){ l->memory, 0 };
   condense_take_block (c, &lay, l);
   memcpy (l->chain, c->chain, (size_t)c->chains * sizeof *l->chain);
@@ -124,7 +124,7 @@ static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
 static int condense_open (pw_plan *c) {
   pw_block_ldl *l = c->k->block = condense_pattern (c);
   if (l) condense_sort (c, l->place);
-  int status = l ? pw_condense_chains (c, l) : PW_MACHINE;
+  int status = l ? pw_condense_chains (c, l) : PW_RESOURCE;
   if (status == PW_OK) status = pw_block_lay_out (l);
   if (status == PW_OK) status = condense_fill (c, l);
   free (c->chain);

@@ -82,7 +82,7 @@ int pw_condense_chains (pw_plan *c, pw_block_ldl *l) {
   int *meet = calloc (nodes, sizeof *meet);
   c->chain = malloc (nodes * sizeof *c->chain);
   c->is_linked = calloc ((size_t)c->groups + 1, 1);
-  int status = between && meet && c->chain && c->is_linked ? PW_OK : PW_MACHINE;
+  int status = between && meet && c->chain && c->is_linked ? PW_OK : PW_RESOURCE;
   for (int p = 0; p < c->contributions && status == PW_OK; p++) meet[l->place[c->contribution[p].node]]++;
   for (int body = 0; body < c->k->s->bodies && status == PW_OK; body++) {
     pw_chain link;

@@ -55,7 +55,7 @@ typedef struct {
   double *lambda;            /* rows: mu of the pivots, then lambda of the others */
 } pw_component;
 
-enum { PW_MASSLESS_BLOCKS = PW_MAX_BODIES + PW_MAX_OWN };
+enum { PW_MASSLESS_BLOCKS = PW_MAX_BODIES + PW_MAX_INTERNAL };
 
 typedef struct {
   int components;
@@ -64,7 +64,7 @@ typedef struct {
   char *memory;
 } pw_massless;
 
-/* Finds the components and matches at the configuration J was evaluated at.  Errors: PW_MACHINE, PW_INPUT (a
+/* Finds the components and matches at the configuration J was evaluated at.  Errors: PW_RESOURCE, PW_INPUT (a
  * coordinate that no row determines, by name). */
 int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);

@@ -45,7 +45,7 @@ static int massless_root (const massless_plan *p, int g) {
 }
 
 /* The groups an element touches, the ground left out; their first local columns go to `at`. */
-static int massless_touched (const pw_system *s, const pw_slab *k, int e, int *group, int *at) {
+static int massless_touched (const pw_system *s, const pw_element_batch *k, int e, int *group, int *at) {
   int n = 0;
   for (int b = 0; b < k->kind->bodies; b++) {
     int j = k->column[e * k->kind->bodies + b];
@@ -67,7 +67,7 @@ static int massless_is_active (const massless_plan *p, int row) {
 /* Massless groups that share an active row belong together; marks them as touched. */
 static void massless_unite (massless_plan *p) {
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  for (const pw_slab *k = p->w->slab; k < p->w->slab + p->s->constraints; k++)
+  for (const pw_element_batch *k = p->w->slab; k < p->w->slab + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
       int any = 0, last = -1, n = massless_touched (p->s, k, e, group, at);
       for (int i = 0; i < k->kind->rows; i++) any |= massless_is_active (p, k->row + e * k->kind->rows + i);
@@ -110,7 +110,7 @@ static void massless_add_row (const pw_system *s, pw_component *c, int row, int 
 /* Every active row of every element that touches a massless group, to the component of this group. */
 static void massless_add_rows (massless_plan *p, pw_massless *r) {
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  for (const pw_slab *k = p->w->slab; k < p->w->slab + p->s->constraints; k++)
+  for (const pw_element_batch *k = p->w->slab; k < p->w->slab + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
       int n = massless_touched (p->s, k, e, group, at), first = 0;
       while (first < n && !massless_in (p, group[first])) first++;
@@ -156,7 +156,7 @@ static int massless_lay_out (pw_massless *r, const massless_plan *p) {
     }
     if (pass == 1) break;
     r->memory = calloc (1, l.used + 1);
-    if (r->memory == NULL) return PW_MACHINE;
+    if (r->memory == NULL) return PW_RESOURCE;
     l = (pw_layout){ r->memory, 0 };
   }
   for (int i = 0; i < r->components; i++) r->component[i].rows = r->component[i].groups = 0;
@@ -170,7 +170,7 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
   const char *lacking = pw_is_angle (s, j) ? "inertia" : "mass";
   return pw_fail (error, PW_INPUT,
                   "model %s: %s has no %s, and no constraint determines how it moves; give it %s, or constrain it",
-                  s->model, pw_state_name (s, j, name, sizeof name), lacking, lacking);
+                  s->model, pw_system_state_name (s, j, name, sizeof name), lacking, lacking);
 }
 
 /* Marks the massless columns and says which of them no row determines. */
@@ -213,10 +213,10 @@ static int massless_fill (pw_massless *r, massless_plan *p, pw_error *error) {
   int status = massless_number (r, p, error);
   if (status != PW_OK || r->components == 0) return status;
   r->component = calloc ((size_t)r->components, sizeof *r->component);
-  if (r->component == NULL) return PW_MACHINE;
+  if (r->component == NULL) return PW_RESOURCE;
   r->end = r->component + r->components;
   massless_add_rows (p, r);
-  if (massless_lay_out (r, p) != PW_OK) return PW_MACHINE;
+  if (massless_lay_out (r, p) != PW_OK) return PW_RESOURCE;
   massless_add_rows (p, r);
   return massless_check (r, p, error);
 }
@@ -224,7 +224,7 @@ static int massless_fill (pw_massless *r, massless_plan *p, pw_error *error) {
 int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error) {
   const pw_system *s = w->s;
-  int groups = massless_groups (s), status = PW_MACHINE;
+  int groups = massless_groups (s), status = PW_RESOURCE;
   *r = (pw_massless){ 0 };
   massless_plan p = { .s = s, .w = w, .weight = weight, .active = active, .rows = rows, .groups = groups };
   p.parent = malloc (((size_t)groups + 1) * sizeof *p.parent);

@@ -17,7 +17,7 @@
 
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                            pw_error *error) {
-  int status = PW_MACHINE;
+  int status = PW_RESOURCE;
   pw_saddle *k = calloc (1, sizeof *k);
   if (k) {
     *k = (pw_saddle){ .s = w->s, .w = w, .guard = SADDLE_ROUND_OFF, .pivot = INFINITY, .pivot_row = -1 };

@@ -14,7 +14,7 @@ typedef struct pw_saddle pw_saddle;
 
 /* rows: how many rows of J take part (all, or the holonomic ones), of these those with active[i] != 0 if
  * active is given; the system's J must be evaluated at a typical configuration.  weight: coords, copied.
- * Errors: PW_MACHINE; PW_INPUT if a coordinate without weight is determined by no row. */
+ * Errors: PW_RESOURCE; PW_INPUT if a coordinate without weight is determined by no row. */
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                            pw_error *error);
 void pw_saddle_close (pw_saddle *k);

@@ -40,7 +40,7 @@ static void nullspace_add (pw_nullspace *b, const pw_system *s, int j, int row, 
 /* Counts the pieces of every panel, one place further on, or fills them in. */
 static void nullspace_list (pw_nullspace *b, const pw_workspace *w, int fill) {
   const pw_system *s = w->s;
-  for (const pw_slab *k = w->slab; k < w->slab + s->constraints; k++)
+  for (const pw_element_batch *k = w->slab; k < w->slab + s->constraints; k++)
     for (int e = 0; e < k->b.count; e++)
       for (int i = 0, n = e * k->kind->rows; i < k->kind->rows; i++, n++) {
         const double *J = k->J + n * k->b.cols;
@@ -52,7 +52,7 @@ static void nullspace_list (pw_nullspace *b, const pw_workspace *w, int fill) {
 
 static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
   size_t m = (size_t)b->rows, all = (size_t)s->rows, panels = (size_t)b->panels + 2, pieces = 0;
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints; k++)
+  for (const pw_element_batch *k = s->slab; k < s->slab + s->constraints; k++)
     pieces += (size_t)(k->b.count * k->kind->rows * (k->kind->bodies + k->kind->own));
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
@@ -67,7 +67,7 @@ static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
     b->v = pw_take (&l, (size_t)s->coords + 3, sizeof (double));
     if (pass == 1) break;
     b->memory = calloc (1, l.used + 1);
-    if (b->memory == NULL) return PW_MACHINE;
+    if (b->memory == NULL) return PW_RESOURCE;
     l = (pw_layout){ b->memory, 0 };
   }
   return PW_OK;
@@ -93,7 +93,7 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
                     "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "
                     "this scene has %d; take %s+projection",
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
-  if (nullspace_allocate (b, s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (nullspace_allocate (b, s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   for (int i = 0, n = 0; i < s->rows; i++) b->place[i] = r->active && !r->active[i] ? -1 : n++;
   nullspace_plan (b, r->w);
   for (int j = 0; j < s->coords; j++) b->inverse[j] = 1 / s->metric[j];
@@ -112,7 +112,7 @@ PW_INLINE double nullspace_dot (const double *x, const double *y, int width) {
 }
 
 /* K += J W^-1 J0^T, mu -= J w over a panel; its width is a constant where this is inlined. */
-PW_INLINE void nullspace_gather (pw_nullspace *b, const pw_nullspace_panel *p, const double *w, int width) {
+PW_INLINE void nullspace_gather (pw_nullspace *b, const pw_nullspace_block *p, const double *w, int width) {
   const pw_nullspace_piece *from = b->piece + p->first, *end = b->piece + p[1].first;
   for (const pw_nullspace_piece *x = from; x < end; x++) {
     double J[3] = { x->J[0], width > 1 ? x->J[1] : 0, width > 1 ? x->J[2] : 0 }, *K = b->K + x->row * b->rows;
@@ -127,11 +127,11 @@ static void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w) {
   memset (b->K, 0, (size_t)m * (size_t)m * sizeof *b->K);
   memset (b->mu, 0, (size_t)m * sizeof *b->mu);
   if (r->s->moving) {
-    pw_sweep_eta (r->w, b->eta);
+    pw_evaluate_eta (r->w, b->eta);
     for (int i = 0; i < r->s->rows; i++)
       if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i];
   }
-  for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
+  for (const pw_nullspace_block *p = b->panel, *end = p + b->panels; p < end; p++)
     if (p->width == 3)
       nullspace_gather (b, p, w, 3);
     else
@@ -186,10 +186,10 @@ static int nullspace_pivot (pw_nullspace *b) {
 /* ---- A step ---- */
 
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
-  int status = pw_place (r->w, r->t, r->q, r->v);
+  int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->w);
-  for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
+  pw_evaluate_J (r->w);
+  for (const pw_nullspace_block *p = b->panel, *end = p + b->panels; p < end; p++)
     for (pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
       for (int c = 0; c < p->width; c++) x->reference[c] = x->J[c] * b->inverse[p->j + c];
   return PW_OK;
@@ -206,22 +206,22 @@ static int nullspace_multipliers (pw_nullspace *b, pw_run *r, const double *w) {
 /* The rates at the placed pose, J swept. */
 static int nullspace_correct (pw_nullspace *b, pw_run *r, double *v) {
   if (nullspace_multipliers (b, r, v) != PW_OK) return PW_RETRY;
-  for (const pw_nullspace_panel *p = b->panel, *end = p + b->panels; p < end; p++)
+  for (const pw_nullspace_block *p = b->panel, *end = p + b->panels; p < end; p++)
     for (const pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
       for (int c = 0; c < p->width; c++) v[p->j + c] += x->reference[c] * b->mu[x->row];
-  return pw_place_rates (r->w, v);
+  return pw_update_velocities (r->w, v);
 }
 
-int pw_nullspace_rates (pw_nullspace *b, pw_run *r, double t, const double *q, double *v) {
-  int status = pw_place (r->w, t, q, v);
+int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double *q, double *v) {
+  int status = pw_update_kinematics (r->w, t, q, v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->w);
+  pw_evaluate_J (r->w);
   return nullspace_correct (b, r, v);
 }
 
 int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda) {
-  pw_sweep_gamma (r->w, lambda);
-  int status = pw_accelerate_swept (r, v, a, lambda);
+  pw_evaluate_gamma (r->w, lambda);
+  int status = pw_run_accelerate_evaluated (r, v, a, lambda);
   if (pw_watchdog_near (r)) r->near = 1;
   return status;
 }
@@ -230,16 +230,16 @@ int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lamb
 static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double *q, const double *w, double *energy) {
   const pw_system *s = r->s;
   memcpy (b->v, w, (size_t)s->coords * sizeof *w);
-  int status = pw_nullspace_rates (b, r, t, q, b->v);
+  int status = pw_nullspace_velocities (b, r, t, q, b->v);
   if (status == PW_OK) *energy = pw_kinetic (s, b->v) + pw_potential (r->w);
   return status;
 }
 
-int pw_nullspace_settle (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added) {
+int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t, double *q, double *v, double *added) {
   const pw_system *s = r->s;
   int row, status = PW_OK;
   double worst, before = 0;
-  if (p == NULL || s->holonomic == 0) return pw_nullspace_rates (b, r, t, q, v);
+  if (p == NULL || s->holonomic == 0) return pw_nullspace_velocities (b, r, t, q, v);
   if (added) status = nullspace_energy (b, r, t, q, v, &before);
   if (status == PW_OK) status = pw_project_positions (p, r, t, q, v, &row, &worst);
   if (status == PW_OK) status = nullspace_correct (b, r, v);

@@ -81,7 +81,7 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
     d->rate_middle = pw_take (&l, entries, sizeof (double));
     if (pass == 1) break;
     d->memory = calloc (1, l.used);
-    if (d->memory == NULL) return PW_MACHINE;
+    if (d->memory == NULL) return PW_RESOURCE;
     l = (pw_layout){ d->memory, 0 };
   }
   d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;
@@ -91,16 +91,16 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
 
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   struct pw_method_data *d = r->data = calloc (1, sizeof *d);
-  if (d == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (d == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   d->tableau = tableau;
   rk_list_weights (d);
-  d->adaptive = tableau->e != NULL && pw_option_value (r, "steps") == 0;
-  d->held = pw_option_value (r, "inputs") != 0;
+  d->adaptive = tableau->e != NULL && pw_run_option (r, "steps") == 0;
+  d->held = pw_run_option (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
   d->minimal = pw_stabilised_by (r, PW_NULLSPACE);
-  d->closes = d->minimal && pw_option_value (r, "positions") == 0;
-  d->every = (int)pw_option_value (r, "every");
-  if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  d->closes = d->minimal && pw_run_option (r, "positions") == 0;
+  d->every = (int)pw_run_option (r, "every");
+  if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   int status = d->projects || d->closes ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
   if (status == PW_OK && d->minimal) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;
@@ -128,13 +128,13 @@ int pw_rk_restart (pw_run *r, pw_error *error) {
   return PW_OK;
 }
 
-void pw_rk_carry (pw_run *r, pw_archive *a) {
+void pw_rk_serialise (pw_run *r, pw_archive *a) {
   struct pw_method_data *d = r->data;
-  pw_carry (a, &d->base, sizeof d->base);
-  pw_carry_count (a, &d->count);
-  pw_carry (a, &d->split, sizeof d->split);
-  pw_carry (a, &d->h, sizeof d->h);
-  pw_carry (a, &d->before, sizeof d->before);
+  pw_archive_bytes (a, &d->base, sizeof d->base);
+  pw_archive_count (a, &d->count);
+  pw_archive_bytes (a, &d->split, sizeof d->split);
+  pw_archive_bytes (a, &d->h, sizeof d->h);
+  pw_archive_bytes (a, &d->before, sizeof d->before);
 }
 
 /* ---- A step ---- */
@@ -163,7 +163,7 @@ PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk
   }
 }
 
-PW_APART void rk_combine_any (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h) {
+PW_NOINLINE void rk_combine_any (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h) {
   rk_combine_by (r, q, v, w, h, w->count);
 }
 
@@ -189,20 +189,20 @@ void pw_rk_ledger (const pw_run *r, double *out, const double *y, double h) {
 /* Accelerations of a stage at the positions d->q. */
 static inline int rk_stage (pw_run *r, double t, double *v, double *a) {
   struct pw_method_data *d = r->data;
-  if (!d->minimal) return pw_accelerate (r, t, d->q, v, a, d->lambda);
-  int status = pw_nullspace_rates (&d->nullspace, r, t, d->q, v);
+  if (!d->minimal) return pw_run_accelerate (r, t, d->q, v, a, d->lambda);
+  int status = pw_nullspace_velocities (&d->nullspace, r, t, d->q, v);
   return status == PW_OK ? pw_nullspace_accelerate (r, v, a, d->lambda) : status;
 }
 
 /* Signals of forces keep the values of the step's beginning, wherever the system was placed last: by a sample, or a step
  * that was rejected. */
 static int rk_hold (pw_run *r) {
-  int status = pw_place (r->w, r->t, r->q, r->v);
-  pw_hold (r->w, status == PW_OK);
+  int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
+  pw_hold_signals (r->w, status == PW_OK);
   return status;
 }
 
-/* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Returns as pw_accelerate. */
+/* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Returns as pw_run_accelerate. */
 static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
@@ -214,7 +214,7 @@ static int rk_stages (pw_run *r, double h) {
     status = rk_stage (r, t, d->V[i], d->A[i]);
     if (status == PW_OK) pw_ledger_rates (r, d->lambda, d->R[i]);
   }
-  if (d->held) pw_hold (r->w, 0);
+  if (d->held) pw_hold_signals (r->w, 0);
   return status;
 }
 
@@ -225,7 +225,7 @@ static int rk_project (pw_run *r, double t, double *added) {
   int status = PW_OK;
   double before = 0;
   if (added) {
-    status = pw_place (r->w, t, d->q, d->v);
+    status = pw_update_kinematics (r->w, t, d->q, d->v);
     before = pw_kinetic (s, d->v) + pw_potential (r->w);
   }
   if (status == PW_OK) status = pw_project_state (&d->projector, r, t, d->q, d->v, d->a, d->lambda);
@@ -249,8 +249,8 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   rk_combine (r, d->q, d->v, &d->row[0], h);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) return rk_project (r, t1, added);
-  if (!d->minimal) return pw_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
-  status = pw_nullspace_settle (&d->nullspace, d->closes ? &d->projector : NULL, r, t1, d->q, d->v, added);
+  if (!d->minimal) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
+  status = pw_nullspace_finalise (&d->nullspace, d->closes ? &d->projector : NULL, r, t1, d->q, d->v, added);
   return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
@@ -288,7 +288,7 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (against >= 0) /* a redundant row asks for what the others forbid */
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
-                    pw_row_element (r->s, against, element, sizeof element));
+                    pw_system_row_name (r->s, against, element, sizeof element));
   if (finite && pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   if (!finite && h < 1e-12 * fabs (r->t))
     return pw_fail (error, PW_METHOD, "t = %.6g s: the state is not finite behind it, however small the step", r->t);
@@ -306,7 +306,7 @@ void pw_rk_revert (pw_run *r) {
   r->t = d->t0;
   memcpy (r->q, d->q0, n);
   memcpy (r->v, d->v0, n);
-  pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  pw_run_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   memcpy (r->a, d->a0, n);
   memcpy (r->ledger, d->ledger0, entries);
   memcpy (r->rate, d->rate0, entries);

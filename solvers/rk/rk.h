@@ -23,7 +23,7 @@ int pw_rk_advance (pw_run *r, double t_end, pw_error *error);
 int pw_rk_at (pw_run *r, double t, pw_error *error);
 int pw_rk_restart (pw_run *r, pw_error *error);
 void pw_rk_close (pw_run *r);
-void pw_rk_carry (pw_run *r, pw_archive *a);
+void pw_rk_serialise (pw_run *r, pw_archive *a);
 extern const pw_stabilisation pw_rk_stabilisations[];
 extern const pw_option pw_rk_options[]; /* the first is for tableaus with an error estimate */
 

@@ -54,7 +54,7 @@ static void adapt_weigh (const pw_run *r) {
   double *w = d->weight, rtol = r->settings.rtol;
   for (int j = 0; j < r->s->coords; j++) {
     *w++ = 1 / (pw_atol (r, j) + rtol * fmax (fabs (r->q[j]), fabs (d->q[j])));
-    *w++ = 1 / (pw_atol_rate (r, j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
+    *w++ = 1 / (pw_atol_velocity (r, j) + rtol * fmax (fabs (r->v[j]), fabs (d->v[j])));
   }
 }
 
@@ -166,10 +166,10 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   double before = pw_before_breakpoint (r, t1);
   r->near = 0;
   int status = pw_rk_step (r, h, t1, project, added);
-  if (status == PW_OK && before < t1) status = pw_accelerate (r, before, d->q, d->v, d->a, d->lambda);
+  if (status == PW_OK && before < t1) status = pw_run_accelerate (r, before, d->q, d->v, d->a, d->lambda);
   *off = status == PW_OK ? adapt_error (r, h, project) : INFINITY;
   if (r->s->saturates && *off <= 1) *off = hypot (*off, pow (r->settings.rtol, 0.25) * h * adapt_reversal (r));
-  if (status == PW_OK && before < t1) status = pw_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
+  if (status == PW_OK && before < t1) status = pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
   if (status != PW_OK) *off = INFINITY;
   return status;
 }

@@ -5,23 +5,23 @@
 #include "between.h"
 #include "util.h"
 
-int pw_between_open (pw_between *b, pw_run *r, int rates, pw_error *error) {
+int pw_dense_output_open (pw_dense_output *b, pw_run *r, int rates, pw_error *error) {
   size_t n = (size_t)r->s->coords, rows = (size_t)r->s->rows, entries = (size_t)r->s->entries;
-  *b = (pw_between){ .t0 = r->t, .rates = rates };
+  *b = (pw_dense_output){ .t0 = r->t, .rates = rates };
   const pw_array array[] = {
     { &b->q0, n }, { &b->v0, n }, { &b->a0, n }, { &b->lambda0, rows }, { &b->ledger0, entries }, { &b->rate0, entries }
   };
   b->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (b->memory == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (b->memory == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   return pw_projector_open (&b->projector, r, NULL, NULL, error);
 }
 
-void pw_between_close (pw_between *b) {
+void pw_dense_output_close (pw_dense_output *b) {
   pw_projector_close (&b->projector);
   free (b->memory);
 }
 
-void pw_between_keep (pw_between *b, const pw_run *r) {
+void pw_dense_output_keep (pw_dense_output *b, const pw_run *r) {
   size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
   b->t0 = r->t;
   memcpy (b->q0, r->q, n);
@@ -32,7 +32,7 @@ void pw_between_keep (pw_between *b, const pw_run *r) {
   memcpy (b->rate0, r->rate, entries);
 }
 
-void pw_between_count (pw_between *b, pw_run *r) {
+void pw_dense_output_count (pw_dense_output *b, pw_run *r) {
   pw_ledger_rates (r, r->lambda, r->rate);
   for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->t0) * (b->rate0[i] + r->rate[i]);
 }
@@ -43,7 +43,7 @@ static double between_hermite (double x, double h, double y0, double s0, double 
   return y0 + up * (y1 - y0) + h * x * (1 - x) * ((1 - x) * s0 - x * s1);
 }
 
-static int between_inside (pw_between *b, pw_run *r, double t) {
+static int between_inside (pw_dense_output *b, pw_run *r, double t) {
   const pw_system *s = r->s;
   double h = r->t - b->t0, x = (t - b->t0) / h, worst;
   int row;
@@ -56,8 +56,8 @@ static int between_inside (pw_between *b, pw_run *r, double t) {
   for (int i = 0; i < s->entries; i++)
     r->ledger_at[i] = b->ledger0[i] + h * x * (b->rate0[i] + 0.5 * x * (r->rate[i] - b->rate0[i]));
   if (b->rates < 0) {
-    int placed = pw_place (r->w, t, r->q_at, r->v_at);
-    if (placed == PW_OK) pw_sweep_J (r->w);
+    int placed = pw_update_kinematics (r->w, t, r->q_at, r->v_at);
+    if (placed == PW_OK) pw_evaluate_J (r->w);
     return placed;
   }
   int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at, &row, &worst);
@@ -70,7 +70,7 @@ int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {
   return pw_fail (error, PW_INPUT, "t = %.17g s lies outside the last step, %.17g to %.17g s", t, t0, r->t);
 }
 
-int pw_between_at (pw_between *b, pw_run *r, double t, pw_error *error) {
+int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error) {
   if (t > r->t || t < b->t0) return pw_fail_outside (r, b->t0, t, error);
   if (t == r->t) {
     pw_show_reached (r);

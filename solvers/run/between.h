@@ -1,6 +1,6 @@
 /* The last step of a method that keeps both of its ends: what it was between them. */
-#ifndef PW_BETWEEN_H
-#define PW_BETWEEN_H
+#ifndef PW_DENSE_OUTPUT_H
+#define PW_DENSE_OUTPUT_H
 
 #include "method.h"
 
@@ -10,22 +10,22 @@ typedef struct {
   int rates;                                        /* 1: the method has J v = eta; -1: it has no constraints */
   pw_projector projector;
   char *memory;
-} pw_between;
+} pw_dense_output;
 
-/* rates: what it says above.  Errors: PW_MACHINE. */
-int pw_between_open (pw_between *b, pw_run *r, int rates, pw_error *error);
-void pw_between_close (pw_between *b);
+/* rates: what it says above.  Errors: PW_RESOURCE. */
+int pw_dense_output_open (pw_dense_output *b, pw_run *r, int rates, pw_error *error);
+void pw_dense_output_close (pw_dense_output *b);
 
 /* The state reached is now the beginning of a step. */
-void pw_between_keep (pw_between *b, const pw_run *r);
+void pw_dense_output_keep (pw_dense_output *b, const pw_run *r);
 
 /* The ledger goes on to the end of the step, where the state is placed and r->lambda known: trapezoidal rule. */
-void pw_between_count (pw_between *b, pw_run *r);
+void pw_dense_output_count (pw_dense_output *b, pw_run *r);
 
 /* Says that t is not inside the last step, which begins at t0 (NaN: where is not known).  PW_INPUT. */
 int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error);
 
 /* The state at t into the run's sample arrays, placed there with J swept: a method's `at`. */
-int pw_between_at (pw_between *b, pw_run *r, double t, pw_error *error);
+int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error);
 
 #endif

@@ -12,9 +12,9 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   const pw_system *s = r->s;
   double *jv = r->scratch + s->coords + 3 + s->rows, *other = jv + s->rows;
   pw_mul_J (r->w, v, jv);
-  pw_sweep_eta (r->w, other);
+  pw_evaluate_eta (r->w, other);
   for (int i = 0; i < s->rows; i++) gamma[i] -= (i < s->holonomic ? 2 : 1) * r->alpha * (jv[i] - other[i]);
-  pw_sweep_g (r->w, other);
+  pw_evaluate_g (r->w, other);
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * other[i];
 }
 
@@ -22,7 +22,7 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
 static inline const double *dynamics_right (pw_run *r, const double *v, double *f, double *gamma) {
   if (r->alpha + r->beta > 0) dynamics_stabilise (r, v, gamma);
   if (r->s->forces == 0) return r->s->constant;
-  pw_sweep_force (r->w, f);
+  pw_evaluate_force (r->w, f);
   return f;
 }
 
@@ -31,8 +31,8 @@ static inline const double *dynamics_right (pw_run *r, const double *v, double *
 static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
   const pw_system *s = r->s;
   double *f = r->scratch, *gamma = f + s->coords + 3, *da = r->w->scratch, *dl = da + s->coords + 3, *Ja = dl + s->rows;
-  pw_sweep_gamma (r->w, gamma);
-  if (dynamics_right (r, v, f, gamma) != f) pw_sweep_force (r->w, f);
+  pw_evaluate_gamma (r->w, gamma);
+  if (dynamics_right (r, v, f, gamma) != f) pw_evaluate_force (r->w, f);
   for (int j = 0; j < s->coords; j++) da[j] = a[j];
   for (int i = 0; i < s->rows; i++) dl[i] = lambda[i];
   for (int pass = 0; pass < 3; pass++) {
@@ -49,8 +49,8 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
 
 /* In all of these lambda holds gamma first. */
 
-void pw_accelerate_placed (pw_run *r, const double *v, double *a, double *lambda) {
-  pw_sweep_gamma (r->w, lambda);
+void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda) {
+  pw_evaluate_gamma (r->w, lambda);
   const double *f = dynamics_right (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   pw_saddle_solve (r->saddle, f, lambda, a, lambda);
@@ -69,16 +69,16 @@ static inline int dynamics_solve (pw_run *r, const double *v, double *a, double 
   return status;
 }
 
-int pw_accelerate_swept (pw_run *r, const double *v, double *a, double *lambda) {
+int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *lambda) {
   int near;
   return dynamics_solve (r, v, a, lambda, &near);
 }
 
-int pw_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
-  int near, status = pw_place (r->w, t, q, v);
+int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda) {
+  int near, status = pw_update_kinematics (r->w, t, q, v);
   if (status != PW_OK) return status;
-  pw_sweep_J (r->w);
-  pw_sweep_gamma (r->w, lambda);
+  pw_evaluate_J (r->w);
+  pw_evaluate_gamma (r->w, lambda);
   status = dynamics_solve (r, v, a, lambda, &near);
   if (near) r->near = 1;
   return status;
@@ -92,14 +92,14 @@ void pw_show_reached (pw_run *r) {
   memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
   memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
   r->projected_at = r->projected;
-  if (pw_place (r->w, r->t, r->q_at, r->v_at) == PW_OK) pw_sweep_J (r->w);
+  if (pw_update_kinematics (r->w, r->t, r->q_at, r->v_at) == PW_OK) pw_evaluate_J (r->w);
 }
 
 void pw_note_residuals (pw_run *r) {
   pw_residuals *now = &r->known;
   pw_statistics *s = &r->statistics;
-  if (isnan (now->position)) pw_sweep_position_residual (r->w, NULL, now);
-  if (isnan (now->velocity)) pw_sweep_velocity_residual (r->w, NULL, now);
+  if (isnan (now->position)) pw_evaluate_position_residual (r->w, NULL, now);
+  if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, NULL, now);
   s->position = pw_larger (s->position, now->position);
   s->velocity = pw_larger (s->velocity, now->velocity);
   s->g = pw_larger (s->g, now->g);

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include "method.h"
 
-double pw_run_agitation (const pw_run *r) {
+double pw_run_acceleration_norm (const pw_run *r) {
   const pw_system *s = r->s;
   const double *a = r->a, *own = a + 3 * s->bodies;
   double linear = 0, angular = 0, per = r->w->scale.time * r->w->scale.time;
@@ -19,9 +19,9 @@ double pw_run_agitation (const pw_run *r) {
 static int judge_lost (pw_run *r, pw_error *error) {
   pw_residuals now;
   char element[120] = "a constraint", cause[60] = "constraint drift";
-  pw_sweep_residuals (r->w, NULL, &now);
+  pw_evaluate_residuals (r->w, NULL, &now);
   int row = now.position > now.velocity ? now.row_position : now.row_velocity;
-  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
+  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   const char *advice = "";
   if (row >= 0 && r->active && !r->active[row])
     snprintf (cause, sizeof cause, "constraints contradict each other");
@@ -76,12 +76,12 @@ static int judge_near_rows (pw_run *r) {
   int row;
   if (!r->near) return 0;
   pw_watchdog_sine (r, &row);
-  return row < 0 || row >= r->s->holonomic || !isfinite (pw_run_agitation (r));
+  return row < 0 || row >= r->s->holonomic || !isfinite (pw_run_acceleration_norm (r));
 }
 
 /* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */
 static int judge_outburst (pw_run *r, pw_error *error) {
-  double now = pw_run_agitation (r);
+  double now = pw_run_acceleration_norm (r);
   if (judge_near_rows (r) && !(now <= r->limits.jump * r->calm))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
@@ -96,14 +96,14 @@ static int judge_outburst (pw_run *r, pw_error *error) {
 static int judge_contradicts (pw_run *r) {
   const double round_off = r->limits.follows;
   pw_residuals all, enforced;
-  pw_sweep_residuals (r->w, NULL, &all);
+  pw_evaluate_residuals (r->w, NULL, &all);
   if (all.position <= round_off && all.velocity <= round_off) return 0;
-  pw_sweep_residuals (r->w, r->active, &enforced);
+  pw_evaluate_residuals (r->w, r->active, &enforced);
   double explained = round_off + r->limits.magnified * fmax (enforced.position, enforced.velocity);
   return !(all.position <= explained && all.velocity <= explained);
 }
 
-int pw_run_judge (pw_run *r, pw_error *error) {
+int pw_run_watchdog (pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
   pw_note_residuals (r);
   if (!(s->position <= r->limits.lost && s->velocity <= r->limits.lost)) {

@@ -25,13 +25,13 @@ static double ledger_of_massless (pw_run *r) {
     v[j] = unit / T;
   }
   memset (lambda, 0, (size_t)s->rows * sizeof *lambda);
-  if (pw_place (r->w, r->t, q, v) == PW_OK) {
-    pw_sweep_ledger (r->w, lambda, r->ledger_at);
+  if (pw_update_kinematics (r->w, r->t, q, v) == PW_OK) {
+    pw_evaluate_ledger (r->w, lambda, r->ledger_at);
     for (int i = 0; i < s->entries; i++) sum += T * fabs (r->ledger_at[i]);
     sum += fabs (pw_potential (r->w) - r->potential0);
   }
   r->w->failed = NULL;
-  pw_place (r->w, r->t, r->q, r->v);
+  pw_update_kinematics (r->w, r->t, r->q, r->v);
   return sum;
 }
 
@@ -57,10 +57,10 @@ void pw_ledger_note (pw_run *r) {
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
   if (r->redundant && r->shared && pw_saddle_factor (r->saddle) == PW_OK) {
     memcpy (r->shared, lambda, (size_t)r->s->rows * sizeof *lambda);
-    pw_rank_share (r, r->shared);
+    pw_rank_least_norm (r, r->shared);
     lambda = r->shared;
   }
-  pw_sweep_ledger (r->w, lambda, rate);
+  pw_evaluate_ledger (r->w, lambda, rate);
 }
 
 int pw_ledger_reacts (const pw_system *s) {
@@ -82,7 +82,7 @@ double pw_ledger_tolerance (const pw_run *r, double h) {
   return tolerance > 0 && isfinite (tolerance) ? tolerance : DBL_MAX;
 }
 
-double pw_unbalanced (const pw_run *r, const pw_sample *sample) {
+double pw_run_energy_defect (const pw_run *r, const pw_sample *sample) {
   double off = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss;
   double scale = fmax (r->exchanged, fmax (sample->kinetic, fabs (sample->potential - r->potential0)));
   scale = fmax (scale, ledger_of_scene (r));
@@ -90,7 +90,7 @@ double pw_unbalanced (const pw_run *r, const pw_sample *sample) {
   return off == 0 ? 0 : fabs (off) / scale;
 }
 
-const char *pw_energy_advice (const pw_run *r, double defect) {
+const char *pw_run_energy_advice (const pw_run *r, double defect) {
   const double limit = 1e-12, of_step = 10; /* times rtol: what a step may lose of the energy */
   const pw_statistics *s = &r->statistics;
   int projects = pw_stabilised_by (r, PW_PROJECTION);

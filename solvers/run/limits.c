@@ -52,8 +52,8 @@ static int limits_too_many (const pw_run *r, pw_error *error) {
   if (growth > 0)
     snprintf (grows, sizeof grows,
               "; the motion grows without bound: %s = %.3g %s, %.2g times the scene's own speed, as t^%.1f",
-              pw_state_name (r->s, state, name, sizeof name), r->v[state - r->s->coords], pw_state_unit (r->s, state),
-              growth, power);
+              pw_system_state_name (r->s, state, name, sizeof name), r->v[state - r->s->coords],
+              pw_system_state_unit (r->s, state), growth, power);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: the limit max-steps is reached: %ld attempted steps, %ld of them rejected%s", r->t,
                   s->steps + s->rejected, s->rejected, grows);
@@ -76,10 +76,10 @@ int pw_run_resolve (pw_run *r, pw_error *error) {
       return pw_fail (error, PW_METHOD,
                       "t = %.6g s: the step of %.6g s is too large: the state grows beyond all bounds", r->t,
                       r->settings.step);
-    pw_state_name (s, j, name, sizeof name);
+    pw_system_state_name (s, j, name, sizeof name);
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: the motion has grown beyond what numbers resolve: %s = %.3g %s, known to %.2g only",
-                    r->t, name, r->q[j], pw_state_unit (s, j), known);
+                    r->t, name, r->q[j], pw_system_state_unit (s, j), known);
   }
   return PW_OK;
 }

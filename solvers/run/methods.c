@@ -160,12 +160,12 @@ int pw_parse_options (const char *text, const pw_method *const *own, const pw_me
   return PW_OK;
 }
 
-int pw_parse_method (const char *text, const pw_method **method, int *stabilisation, pw_error *error) {
+int pw_method_parse (const char *text, const pw_method **method, int *stabilisation, pw_error *error) {
   double values[PW_MAX_OPTIONS];
   return pw_parse_options (text, NULL, method, stabilisation, values, error);
 }
 
-double pw_option_value (const pw_run *r, const char *name) {
+double pw_run_option (const pw_run *r, const char *name) {
   int i = 0;
   while (r->method->options[i].name && strcmp (r->method->options[i].name, name) != 0) i++;
   return r->method->options[i].name ? r->option[i] : 0;
@@ -179,6 +179,6 @@ void pw_choose_steps (pw_run *r) {
 
 void pw_read_baumgarte (pw_run *r) {
   if (!pw_stabilised_by (r, PW_BAUMGARTE)) return;
-  r->alpha = pw_option_value (r, "alpha");
-  r->beta = pw_option_value (r, "beta");
+  r->alpha = pw_run_option (r, "alpha");
+  r->beta = pw_run_option (r, "beta");
 }

@@ -7,7 +7,7 @@
 #include "util.h"
 
 struct pw_method_data {
-  pw_between last;
+  pw_dense_output last;
   pw_projector projector; /* if the method projects */
   double base;            /* time from which steps are counted */
   long count;             /* steps since then */
@@ -44,22 +44,22 @@ int pw_step_open (pw_run *r, int arrays, pw_error *error) {
   if (d) d->length = n > rows ? n : rows;
   const pw_array array[] = { { &d->a, n }, { &d->lambda, rows }, { &d->array, (size_t)arrays * (d ? d->length : 0) } };
   if (d) d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (d == NULL || d->memory == NULL) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
-  int status = pw_between_open (&d->last, r, projects ? 1 : -1, error);
+  if (d == NULL || d->memory == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  int status = pw_dense_output_open (&d->last, r, projects ? 1 : -1, error);
   if (status == PW_OK && projects) status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? pw_step_restart (r, error) : status;
 }
 
 void pw_step_close (pw_run *r) {
-  pw_between_close (&r->data->last);
+  pw_dense_output_close (&r->data->last);
   pw_projector_close (&r->data->projector);
   free (r->data->memory);
   free (r->data);
 }
 
-void pw_step_carry (pw_run *r, pw_archive *a) {
-  pw_carry (a, &r->data->base, sizeof r->data->base);
-  pw_carry_count (a, &r->data->count);
+void pw_step_serialise (pw_run *r, pw_archive *a) {
+  pw_archive_bytes (a, &r->data->base, sizeof r->data->base);
+  pw_archive_count (a, &r->data->count);
 }
 
 double *pw_step_array (pw_run *r, int i) {
@@ -81,8 +81,8 @@ static int step_evaluate (pw_run *r, double t, double *q, double *v) {
   double size = 0;
   for (int j = 0; j < s->coords; j++) size += q[j] * q[j] + v[j] * v[j];
   if (!(size < 1e300)) return PW_RETRY;
-  if (d->projector.position == NULL) return pw_accelerate (r, t, q, v, d->a, d->lambda);
-  int status = pw_place (r->w, t, q, v);
+  if (d->projector.position == NULL) return pw_run_accelerate (r, t, q, v, d->a, d->lambda);
+  int status = pw_update_kinematics (r->w, t, q, v);
   double before = pw_kinetic (s, v) + pw_potential (r->w);
   if (status == PW_OK) status = pw_project_state (&d->projector, r, t, q, v, d->a, d->lambda);
   if (status == PW_OK && r->settings.ledger) r->projected += pw_kinetic (s, v) + pw_potential (r->w) - before;
@@ -104,13 +104,13 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
   double t1 = asked ? d->end : r->t + h;
   if (status == PW_OK) status = step_evaluate (r, t1, q, v);
   if (status != PW_OK) return step_fail (r, status, h, error);
-  pw_between_keep (&d->last, r);
+  pw_dense_output_keep (&d->last, r);
   r->t = t1;
   memcpy (r->q, q, n);
   memcpy (r->v, v, n);
   memcpy (r->a, d->a, n);
   memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
-  pw_between_count (&d->last, r);
+  pw_dense_output_count (&d->last, r);
   r->statistics.steps++;
   d->count++;
   if (!asked || !d->whole) d->base = t1, d->count = 0;
@@ -119,5 +119,5 @@ int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_er
 
 int pw_step_at (pw_run *r, double t, pw_error *error) {
   r->projected_at = r->projected;
-  return pw_between_at (&r->data->last, r, t, error);
+  return pw_dense_output_at (&r->data->last, r, t, error);
 }

@@ -12,7 +12,7 @@
 #include "quadrature.h"
 #include "util.h"
 
-int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates) {
+int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_velocities_at *rates) {
   size_t entries = (size_t)r->s->entries;
   pw_array array[PW_QUADRATURE_POINTS + 4] = {
     { &x->ledger0, entries }, { &x->sum, entries }, { &x->finer, entries }, { &x->node, entries }
@@ -20,7 +20,7 @@ int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates) {
   for (int i = 0; i < PW_QUADRATURE_POINTS; i++) array[4 + i] = (pw_array){ &x->rate[i], entries };
   x->rates = rates;
   x->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (x->memory == NULL) return PW_MACHINE;
+  if (x->memory == NULL) return PW_RESOURCE;
   pw_quadrature_restart (x, r);
   return PW_OK;
 }

@@ -7,11 +7,11 @@
 enum { PW_QUADRATURE_POINTS = 7 }; /* at most: of more the polynomial costs more than nodes where it is not enough */
 
 /* The rates of the ledger's entries at a time inside the last step, by the method's own interpolation; it leaves the run as
- * it is, but for the sample arrays and where the system is placed.  Returns as pw_place. */
-typedef int pw_rates_at (pw_run *r, double t, double *rate);
+ * it is, but for the sample arrays and where the system is placed.  Returns as pw_update_kinematics. */
+typedef int pw_velocities_at (pw_run *r, double t, double *rate);
 
 typedef struct {
-  pw_rates_at *rates;
+  pw_velocities_at *rates;
   int points, order;                  /* since the last restart; of the last step */
   int refined;                        /* 1: the last step was integrated by nodes inside it */
   double t[PW_QUADRATURE_POINTS];     /* newest first */
@@ -22,8 +22,8 @@ typedef struct {
   char *memory;
 } pw_quadrature;
 
-/* PW_OK or PW_MACHINE. */
-int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_rates_at *rates);
+/* PW_OK or PW_RESOURCE. */
+int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_velocities_at *rates);
 void pw_quadrature_close (pw_quadrature *x);
 
 /* Begins anew at the state reached, where the system is placed, and the ledger and its rates are known. */

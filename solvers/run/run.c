@@ -8,7 +8,7 @@
 #include "run_parts.h"
 #include "util.h"
 
-int pw_run_blame (const pw_run *r, int status, pw_error *error) {
+int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
   char signal[160];
   if (status == PW_OK || error == NULL || *pw_failed_signal (r->w, signal, sizeof signal) == 0) return status;
   size_t n = strlen (error->text);
@@ -21,12 +21,12 @@ int pw_run_blame (const pw_run *r, int status, pw_error *error) {
 int pw_run_open_saddle (pw_run *r, pw_error *error) {
   pw_saddle_close (r->saddle);
   r->saddle = pw_saddle_open (r->w, r->s->mass, r->s->rows, r->active, error);
-  if (r->saddle == NULL) return error ? error->status : PW_MACHINE;
+  if (r->saddle == NULL) return error ? error->status : PW_RESOURCE;
   return pw_watchdog_open (r, error);
 }
 
 int pw_run_evaluate (pw_run *r, pw_error *error) {
-  int status = pw_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
+  int status = pw_run_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   if (status > 0) return pw_fail_singular (r, r->t, error);
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   pw_ledger_rates (r, r->lambda, r->rate);
@@ -37,7 +37,7 @@ int pw_run_evaluate (pw_run *r, pw_error *error) {
 void pw_run_watch (pw_run *r) {
   pw_watchdog_begin (r);
   if (r->redundant == 0) return;
-  r->grip = pw_rank_grip (r);
+  r->grip = pw_rank_conditioning (r);
   r->reselect = fmin (r->limits.loosened * r->grip, r->limits.loose);
 }
 
@@ -54,8 +54,8 @@ int pw_run_look_ahead (pw_run *r, pw_error *error) {
                   signal);
 }
 
-void pw_run_calm (pw_run *r) {
-  r->before = pw_run_agitation (r);
+void pw_run_reference_level (pw_run *r) {
+  r->before = pw_run_acceleration_norm (r);
   r->calm = fmax (1, r->before);
 }
 
@@ -64,7 +64,7 @@ static void run_drop_method (pw_run *r) {
   r->data = NULL;
 }
 
-void pw_close (pw_run *r) {
+void pw_run_close (pw_run *r) {
   if (r == NULL) return;
   run_drop_method (r);
   pw_saddle_close (r->saddle);
@@ -86,7 +86,7 @@ int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   r->geometry.alert = 1;
   if (status == PW_OK) status = pw_run_evaluate (r, error);
-  if (status != PW_OK && status != PW_MACHINE) return status;
+  if (status != PW_OK && status != PW_RESOURCE) return status;
   if (status == PW_OK && fresh)
     pw_run_watch (r);
   else if (status == PW_OK)
@@ -100,7 +100,7 @@ int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
 /* Without its method, which memory did not suffice for, a run can only be closed. */
 static int run_is_lost (const pw_run *r, pw_error *error) {
   if (r->data) return 0;
-  pw_fail (error, PW_MACHINE, "model %s: the run was given up at t = %.6g s for lack of memory", r->s->model, r->t);
+  pw_fail (error, PW_RESOURCE, "model %s: the run was given up at t = %.6g s for lack of memory", r->s->model, r->t);
   return 1;
 }
 
@@ -109,10 +109,10 @@ static int run_is_lost (const pw_run *r, pw_error *error) {
 static int run_reselect (pw_run *r, pw_error *error) {
   pw_sample sample;
   r->reselect = r->grip / 2;
-  int status = pw_at (r, r->t, &sample, error);
+  int status = pw_run_sample (r, r->t, &sample, error);
   if (status != PW_OK) return status;
   int other = pw_rank_reselect (r);
-  if (other < 0) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (other < 0) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   if (other == 0) return PW_OK;
   return pw_run_renew (r, 1, error);
 }
@@ -128,13 +128,13 @@ static int run_check_progress (pw_run *r, double before, pw_error *error) {
       r->t);
 }
 
-int pw_advance (pw_run *r, double t_end, pw_error *error) {
+int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   int status = pw_require (r, "a run", error);
   if (status != PW_OK) return status;
   double before = r->t;
   if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
-  if (run_is_lost (r, error)) return PW_MACHINE;
+  if (run_is_lost (r, error)) return PW_RESOURCE;
   r->stopped = 0;
   status = pw_run_attempt (r, error);
   if (status != PW_OK) return status;
@@ -145,26 +145,26 @@ int pw_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK && r->redundant && r->grip < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
-  if (status == PW_OK) status = pw_run_judge (r, error);
+  if (status == PW_OK) status = pw_run_watchdog (r, error);
   if (status == PW_OK) status = pw_run_resolve (r, error);
   if (status == PW_OK) pw_ledger_note (r);
   if (status == PW_OK) status = run_check_progress (r, before, error);
-  if (status != PW_OK) return pw_run_blame (r, status, error);
+  if (status != PW_OK) return pw_run_annotate_error (r, status, error);
   if (r->redundant == 0) return PW_OK;
-  r->grip = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_grip (r) : 0;
+  r->grip = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_conditioning (r) : 0;
   return PW_OK;
 }
 
-int pw_advance_to (pw_run *r, double t, double t_end, pw_error *error) {
+int pw_run_advance_to (pw_run *r, double t, double t_end, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   while (r->t < t && r->t < t_end) {
-    int status = pw_advance (r, t_end, error);
+    int status = pw_run_advance (r, t_end, error);
     if (status != PW_OK) return status;
   }
   return PW_OK;
 }
 
-double pw_time (const pw_run *r) {
+double pw_run_time (const pw_run *r) {
   return r->t;
 }
 
@@ -179,10 +179,10 @@ static void run_account (pw_run *r, pw_sample *sample) {
   sample->balance = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss - sample->projection;
 }
 
-int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
+int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   pw_residuals now;
   if (pw_require (r, "a run", error) != PW_OK || pw_require (sample, "a sample", error) != PW_OK) return PW_INPUT;
-  if (run_is_lost (r, error)) return PW_MACHINE;
+  if (run_is_lost (r, error)) return PW_RESOURCE;
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
   r->stopped = 0;
   if (t < r->t && pw_run_asked (r)) return PW_STOPPED;
@@ -190,9 +190,9 @@ int pw_at (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   int status = r->method->at (r, t, error);
   if (status != PW_OK) return status;
   *sample = (pw_sample){ .t = t, .q = r->q_at, .v = r->v_at, .a = r->a_at, .lambda = r->lambda_at };
-  if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_share (r, r->lambda_at);
+  if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, r->lambda_at);
   run_account (r, sample);
-  pw_sweep_residuals (r->w, NULL, &now);
+  pw_evaluate_residuals (r->w, NULL, &now);
   sample->position = now.position;
   sample->velocity = now.velocity;
   return PW_OK;
@@ -205,7 +205,7 @@ static int run_check_state (const pw_run *r, const double *x, int rates, pw_erro
   for (int j = 0, n = r->s->coords; x && j < n; j++)
     if (!(fabs (x[j]) < r->limits.extreme))
       return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number", r->s->model,
-                      pw_state_name (r->s, j + rates * n, name, sizeof name), x[j]);
+                      pw_system_state_name (r->s, j + rates * n, name, sizeof name), x[j]);
   return PW_OK;
 }
 
@@ -219,7 +219,7 @@ static void run_exchange (double *x, double *kept, const double *other, int n) {
 }
 
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
-  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK)
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   *energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
   return PW_OK;
@@ -227,11 +227,11 @@ static int run_energy (pw_run *r, double *energy, pw_error *error) {
 
 /* What the caller changes of the energy is not the method's: it counts as energy at the start.  Functions of the caller's
  * may give other values, and other breakpoints, than before. */
-int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
+int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   int n = r->s->coords;
   double before = 0, after = 0;
-  if (run_is_lost (r, error)) return PW_MACHINE;
+  if (run_is_lost (r, error)) return PW_RESOURCE;
   if (run_check_state (r, q, 0, error) != PW_OK || run_check_state (r, v, 1, error) != PW_OK) return PW_INPUT;
   int status = run_energy (r, &before, error);
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
@@ -241,12 +241,12 @@ int pw_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   run_exchange (r->v, r->v_at, v, n);
   r->near = 0;
   r->geometry.alert = 1;
-  status = pw_make_consistent (r, NULL, error);
+  status = pw_run_make_consistent (r, NULL, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
     pw_watchdog_begin (r);
-    if (!r->near) pw_run_calm (r); /* near a singular pose they tell nothing */
+    if (!r->near) pw_run_reference_level (r); /* near a singular pose they tell nothing */
     r->energy0 += after - before;
     return r->method->restart (r, error);
   }
@@ -264,7 +264,7 @@ const pw_statistics *pw_run_statistics (const pw_run *r) {
   return &r->statistics;
 }
 
-const pw_start_report *pw_run_start (const pw_run *r) {
+const pw_initial_report *pw_run_initial (const pw_run *r) {
   return &r->start;
 }
 

@@ -14,7 +14,7 @@ static int checkpoint_sizes (pw_run *r, pw_archive *a) {
   int good = 1;
   for (int i = 0; i < SIZES; i++) {
     int size = own[i];
-    pw_carry (a, &size, sizeof size);
+    pw_archive_bytes (a, &size, sizeof size);
     good &= size == own[i];
   }
   return good;
@@ -23,8 +23,8 @@ static int checkpoint_sizes (pw_run *r, pw_archive *a) {
 static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
   long *const count[] = { &s->steps, &s->rejected, &s->rhs, &s->jacobians, &s->factorisations, &s->restarts };
   double *const worst[] = { &s->position, &s->velocity, &s->g, &s->jv };
-  for (size_t i = 0; i < sizeof count / sizeof *count; i++) pw_carry_count (a, count[i]);
-  for (size_t i = 0; i < sizeof worst / sizeof *worst; i++) pw_carry (a, worst[i], sizeof (double));
+  for (size_t i = 0; i < sizeof count / sizeof *count; i++) pw_archive_count (a, count[i]);
+  for (size_t i = 0; i < sizeof worst / sizeof *worst; i++) pw_archive_bytes (a, worst[i], sizeof (double));
 }
 
 static void checkpoint_state (pw_run *r, pw_archive *a) {
@@ -33,12 +33,12 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
                              &r->potential0, &r->exchanged,  &r->power,     &r->calm,
                              &r->before,     &r->grip,       &r->reselect,  &r->geometry.typical,
                              &r->marked,     &r->mark,       &r->earlier,   &r->speed };
-  for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_carry (a, number[i], sizeof (double));
-  pw_carry (a, r->q, n);
-  pw_carry (a, r->v, n);
-  pw_carry (a, r->ledger, entries);
+  for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
+  pw_archive_bytes (a, r->q, n);
+  pw_archive_bytes (a, r->v, n);
+  pw_archive_bytes (a, r->ledger, entries);
   checkpoint_statistics (&r->statistics, a);
-  pw_rank_carry (r, a);
+  pw_rank_serialise (r, a);
 }
 
 /* A file may be whole and yet not have been written by a run. */
@@ -51,9 +51,9 @@ static int checkpoint_plausible (const pw_run *r) {
 
 /* From the state in the run, in either of them; `a` is loading and has the method's own next, if there is any. */
 static int checkpoint_go_on (pw_run *r, pw_archive *a, pw_error *error) {
-  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK)
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_sweep_J (r->w);
+  pw_evaluate_J (r->w);
   r->near = 0;
   if (r->method->carry == NULL) r->statistics.restarts++;
   int status = pw_run_renew (r, 0, error);
@@ -65,13 +65,13 @@ static int checkpoint_go_on (pw_run *r, pw_archive *a, pw_error *error) {
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   pw_sample sample;
   if (r->near) return PW_RETRY;
-  int status = pw_at (r, r->t, &sample, error); /* evaluates what the method leaves to samples */
+  int status = pw_run_sample (r, r->t, &sample, error); /* evaluates what the method leaves to samples */
   if (status != PW_OK) return status;
   checkpoint_sizes (r, a);
   checkpoint_state (r, a);
   pw_archive own = { .used = a->used, .loading = 1 };
   if (r->method->carry) r->method->carry (r, a);
-  if (a->failed) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (a->failed) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   own.at = a->at;
   own.size = a->used;
   return checkpoint_go_on (r, &own, error);

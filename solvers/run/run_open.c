@@ -44,7 +44,7 @@ static int run_allocate (pw_run *r) {
     { &r->matrix_state, 2 * n }, { &r->matrix_range, 2 * n },
   };
   r->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (r->memory == NULL) return PW_MACHINE;
+  if (r->memory == NULL) return PW_RESOURCE;
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
   for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = r->matrix_range[j] = INFINITY;
@@ -75,7 +75,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   int large = (double)r->s->rows * r->s->coords > PW_RANK_MOST;
   if (sine < (large ? r->limits.dependent : r->limits.suspect)) {
     if (large) return pw_fail_singular (r, r->t, error);
-    int chosen = pw_rank_choose (r, error);
+    int chosen = pw_rank_open (r, error);
     if (chosen == PW_OK && r->redundant) chosen = pw_run_open_saddle (r, error);
     if (chosen != PW_OK) return chosen;
   }
@@ -87,7 +87,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
 
 /* The state is consistent: energies, ledger and statistics begin here. */
 static int run_begin (pw_run *r, pw_error *error) {
-  pw_run_calm (r);
+  pw_run_reference_level (r);
   pw_ledger_begin (r);
   pw_forget_residuals (r);
   pw_note_residuals (r);
@@ -105,12 +105,12 @@ static int run_check_finite (pw_run *r, pw_error *error) {
     if (wild < 0 && !isfinite (r->a[j])) wild = j;
   }
   for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
-  if (isfinite (sum) || pw_place (r->w, r->t, r->q, r->v) != PW_OK) return PW_OK;
-  if (pw_find_wild (r->w, element, sizeof element))
+  if (isfinite (sum) || pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return PW_OK;
+  if (pw_find_nonfinite (r->w, element, sizeof element))
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
   if (wild < 0) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: the acceleration of %s is not finite", r->t,
-                  pw_state_name (r->s, wild, element, sizeof element));
+                  pw_system_state_name (r->s, wild, element, sizeof element));
 }
 
 /* A method that uses derivatives would run with a wrong matrix where an element type leaves one out. */
@@ -118,9 +118,10 @@ static int run_check_derivatives (pw_run *r, const char *method, pw_error *error
   char block[200];
   if (!r->differentiates) return PW_OK;
   int found = pw_find_missing (r->w, r->t, r->q, r->v, block, sizeof block);
-  if (found == PW_MACHINE) return pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+  if (found == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   if (found == 0)
-    return pw_place (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "a signal failed");
+    return pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK
+                                                                  : pw_fail (error, PW_METHOD, "a signal failed");
   return pw_fail (
       error, PW_INPUT,
       "model %s: %s is left out, but it is not zero, and %s needs it: add it, or PW_BY_DIFFERENCES in its place",
@@ -138,33 +139,33 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   pw_choose_steps (r);
   int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
   if (status == PW_OK && run_allocate (r) != PW_OK)
-    status = pw_fail (error, PW_MACHINE, "model %s: out of memory", r->s->model);
+    status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   if (status != PW_OK) return status;
   r->t = r->t_at = r->settings.t;
-  pw_hold (r->w, 0);
+  pw_hold_signals (r->w, 0);
   r->w->scale.time = r->settings.span;
-  status = pw_make_consistent (r, r->s->held, error);
+  status = pw_run_make_consistent (r, r->s->held, error);
   if (status == PW_OK) status = run_first_evaluation (r, error);
   if (status == PW_OK) status = run_check_finite (r, error);
   if (status != PW_OK) return status;
   r->w->scale.time = run_time_scale (r);
-  pw_count_moved (r);
+  pw_run_count_moved (r);
   status = run_begin (r, error);
   if (status == PW_OK) pw_read_baumgarte (r);
   if (status == PW_OK) status = r->method->open (r, error);
   return status == PW_OK ? run_check_derivatives (r, method, error) : status;
 }
 
-pw_run *pw_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
+pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *settings, pw_error *error) {
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
   pw_run *r = calloc (1, sizeof *r);
   if (r == NULL) {
-    pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+    pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
     return NULL;
   }
   r->s = s;
   r->w = pw_workspace_new (s, error);
-  if (r->w && pw_run_blame (r, run_open (r, method, settings, error), error) == PW_OK) return r;
-  pw_close (r);
+  if (r->w && pw_run_annotate_error (r, run_open (r, method, settings, error), error) == PW_OK) return r;
+  pw_run_close (r);
   return NULL;
 }

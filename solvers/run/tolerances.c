@@ -15,7 +15,7 @@
 void pw_bound_tolerances (pw_run *r) {
   int coords = r->s->coords, n = 2 * coords;
   if (!r->s->saturates) return;
-  pw_sweep_saturation (r->w, r->saturation);
+  pw_evaluate_saturation (r->w, r->saturation);
   for (int j = 0; j < n; j++) {
     double y = j < coords ? r->q[j] : r->v[j - coords];
     r->outdated |= fabs (y - r->matrix_state[j]) > r->matrix_range[j];
@@ -33,7 +33,7 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
   if (!r->s->saturates) return;
   memcpy (r->matrix_state, q, (size_t)coords * sizeof *q);
   memcpy (r->matrix_state + coords, v, (size_t)coords * sizeof *v);
-  pw_sweep_saturation (r->w, r->matrix_range);
+  pw_evaluate_saturation (r->w, r->matrix_range);
 }
 
 double pw_first_step (const pw_run *r) {
@@ -50,8 +50,8 @@ int pw_run_saturation (pw_run *r, double *least, char *element, size_t size) {
   double *rest = r->scratch;
   int state = -1;
   for (int j = 0; j < s->coords; j++) rest[j] = 0;
-  if (s->saturates && pw_place (r->w, r->t, r->q, rest) == PW_OK)
+  if (s->saturates && pw_update_kinematics (r->w, r->t, r->q, rest) == PW_OK)
     state = pw_find_saturation (r->w, least, element, size);
-  if (s->saturates) (void)pw_place (r->w, r->t, r->q, r->v);
+  if (s->saturates) (void)pw_update_kinematics (r->w, r->t, r->q, r->v);
   return state;
 }

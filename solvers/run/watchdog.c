@@ -109,7 +109,7 @@ static int watchdog_has_loops (const pw_system *s) {
   int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
   if (set == NULL) return -1;
   for (int b = 0; b <= s->bodies; b++) set[b] = b;
-  for (const pw_slab *k = s->slab; k < s->slab + s->constraints && k->row < s->holonomic; k++)
+  for (const pw_element_batch *k = s->slab; k < s->slab + s->constraints && k->row < s->holonomic; k++)
     for (int e = 0; e < k->b.count; e++)
       for (int n = 1; n < k->kind->bodies; n++) {
         const int *column = k->column + e * k->kind->bodies;
@@ -128,7 +128,7 @@ int pw_watchdog_open (pw_run *r, pw_error *error) {
   pw_geometry *g = &r->geometry;
   size_t n = (size_t)s->coords + 3;
   g->loops = watchdog_has_loops (s);
-  if (g->loops < 0) return pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  if (g->loops < 0) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   g->fixed = pw_fixed_steps (r);
   if (g->loops == 0 && s->rows == s->holonomic) return PW_OK;
   pw_saddle_close (g->saddle);
@@ -140,7 +140,7 @@ int pw_watchdog_open (pw_run *r, pw_error *error) {
     g->saddle = pw_saddle_open (r->w, weight, s->rows, r->active, error);
   }
   free (weight);
-  return g->saddle ? PW_OK : pw_fail (error, PW_MACHINE, "model %s: out of memory", s->model);
+  return g->saddle ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
 }
 
 void pw_watchdog_close (pw_run *r) {
@@ -179,7 +179,7 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
         "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
         "cannot be solved; the configuration is not singular",
         t);
-  if (row >= 0) pw_row_element (r->s, row, element, sizeof element);
+  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   if (sine <= r->limits.rank)
     return pw_fail (error, PW_METHOD, "t = %.6g s: singular pose: %s says what other constraints say already", t,
                     element);
@@ -190,8 +190,8 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
 }
 
 int pw_watchdog_near_state (pw_run *r) {
-  if (pw_place (r->w, r->t, r->q, r->v) != PW_OK) return 0;
-  pw_sweep_J (r->w);
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return 0;
+  pw_evaluate_J (r->w);
   r->geometry.alert = 1;
   return pw_watchdog_near (r);
 }
@@ -202,7 +202,7 @@ int pw_watchdog_check_values (const pw_system *s, const pw_watchdog *limits, pw_
     char name[120];
     if (!(fabs (value) < limits->extreme))
       return pw_fail (error, PW_INPUT, "model %s: values too extreme: %s is initially %g: expected less than %g",
-                      s->model, pw_state_name (s, i, name, sizeof name), value, limits->extreme);
+                      s->model, pw_system_state_name (s, i, name, sizeof name), value, limits->extreme);
   }
   for (int j = 0; s->rows > 0 && j < s->coords; j++) {
     double mass = s->mass[j] / (pw_is_angle (s, j) ? s->scale.length * s->scale.length : 1);
@@ -211,7 +211,7 @@ int pw_watchdog_check_values (const pw_system *s, const pw_watchdog *limits, pw_
     return pw_fail (
         error, PW_INPUT,
         "model %s: values too extreme: the mass or inertia that goes with %s is %g: expected 0, or %g to %g", s->model,
-        pw_state_name (s, j, name, sizeof name), s->mass[j], 1 / limits->extreme, limits->extreme);
+        pw_system_state_name (s, j, name, sizeof name), s->mass[j], 1 / limits->extreme, limits->extreme);
   }
   return PW_OK;
 }
@@ -250,11 +250,11 @@ static void watchdog_look_around (pw_run *r) {
   pw_geometry *g = &r->geometry;
   for (int n = 1; n <= WATCHDOG_PLACES; n++) {
     for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * sin (2.39996 * (j + 1) * n + n);
-    if (pw_place (r->w, r->t, g->q, r->v) != PW_OK) break;
-    pw_sweep_J (r->w);
+    if (pw_update_kinematics (r->w, r->t, g->q, r->v) != PW_OK) break;
+    pw_evaluate_J (r->w);
     g->typical = fmax (g->typical, pw_watchdog_sine (r, NULL));
   }
-  if (pw_place (r->w, r->t, r->q, r->v) == PW_OK) pw_sweep_J (r->w);
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK) pw_evaluate_J (r->w);
 }
 
 void pw_watchdog_begin (pw_run *r) {

@@ -18,7 +18,7 @@
 /* Columns of T: q, v, a, lambda. */
 static void newton_fill (multistep_data *d) {
   int n = d->n;
-  const pw_tangent_place to = {
+  const pw_tangent_update to = {
     .momentum = 0, .constraint = n, .q = 0, .v = n, .a = 2 * n, .lambda = 3 * n, .of_a = 1, .of_lambda = 1
   };
   pw_tangent_momentum (&d->newton.tangent, &to, d->lambda);
@@ -32,7 +32,7 @@ static void newton_combine (pw_bdf_newton *w, int n) {
   for (int c = 0; c < 3 * n + x->rows; c++) {
     int part = c < 2 * n ? c / n : 2, to = c < 2 * n ? c % n : c - 2 * n;
     for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++)
-      pw_tape_put (&w->tape, (int)x->rowind[i], to, w->value ? power[part] * w->value[i] : 0);
+      pw_scatter_add (&w->tape, (int)x->rowind[i], to, w->value ? power[part] * w->value[i] : 0);
   }
 }
 
@@ -50,14 +50,14 @@ static int newton_set_up (pw_real t, N_Vector y, N_Vector derivative, SUNMatrix 
     if (status != 0) return status;
     memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
     memset (w->value, 0, (size_t)x->colptr[columns] * sizeof *w->value);
-    pw_tape_fill (&w->tangent.tape, w->value);
+    pw_scatter_begin (&w->tangent.tape, w->value);
     newton_fill (d);
     pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
     d->sun.run->statistics.jacobians++;
   }
   w->gamma = gamma;
   pw_sun_clear (matrix, w->colptr, w->rowind);
-  pw_tape_fill (&w->tape, SUNSparseMatrix_Data (matrix));
+  pw_scatter_begin (&w->tape, SUNSparseMatrix_Data (matrix));
   newton_combine (w, d->n);
   d->sun.run->statistics.factorisations++; /* CVODES factorises next */
   return 0;
@@ -101,35 +101,35 @@ static int newton_lay_out (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;
   int columns = 3 * d->n + x->rows, size = d->n + x->rows;
-  pw_tape_record (&x->tape);
+  pw_scatter_record (&x->tape);
   newton_fill (d);
-  if (pw_tape_lay_out (&x->tape, columns, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
-  pw_tape_record (&w->tape);
+  if (pw_scatter_lay_out (&x->tape, columns, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
+  pw_scatter_record (&w->tape);
   newton_combine (w, d->n);
-  if (pw_tape_lay_out (&w->tape, size, &w->colptr, &w->rowind) != PW_OK) return PW_MACHINE;
+  if (pw_scatter_lay_out (&w->tape, size, &w->colptr, &w->rowind) != PW_OK) return PW_RESOURCE;
   w->value = calloc ((size_t)x->colptr[columns] + 1, sizeof *w->value);
-  return w->value ? PW_OK : PW_MACHINE;
+  return w->value ? PW_OK : PW_RESOURCE;
 }
 
 int pw_bdf_open_newton (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_sun *x = &d->sun;
-  if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_MACHINE;
+  if (pw_tangent_open (&w->tangent, x->run) != PW_OK || newton_lay_out (d) != PW_OK) return PW_RESOURCE;
   int size = d->n + w->tangent.rows;
   w->right = pw_sun_vector (size, x->context);
   w->change = pw_sun_vector (size, x->context);
   if (!w->right || !w->change || pw_sun_open_matrix (x, size, w->colptr, w->rowind) != PW_OK ||
       pw_sun_open_solver (x, w->right, d, newton_solve) != PW_OK)
-    return PW_MACHINE;
+    return PW_RESOURCE;
   int failed = CVodeSetLinearSolver (d->cvode, x->solver, x->matrix) || CVodeSetLinSysFn (d->cvode, newton_set_up);
-  return failed ? PW_MACHINE : PW_OK;
+  return failed ? PW_RESOURCE : PW_OK;
 }
 
 void pw_bdf_close_newton (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   if (w->right) N_VDestroy (w->right);
   if (w->change) N_VDestroy (w->change);
-  pw_tape_close (&w->tape);
+  pw_scatter_close (&w->tape);
   pw_tangent_close (&w->tangent);
   free (w->value);
   free (w->colptr);

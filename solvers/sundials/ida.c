@@ -96,9 +96,9 @@ static int ida_interpolate (ida_data *d, double t) {
   }
   if (flag != IDA_SUCCESS) return flag;
   ida_read (d, r->q_at, r->v_at, r->a_at, r->lambda_at);
-  if (pw_ida_place (d, t, N_VGetArrayPointer (d->sun.y)) != 0) return IDA_RES_FAIL;
+  if (pw_ida_update (d, t, N_VGetArrayPointer (d->sun.y)) != 0) return IDA_RES_FAIL;
   pw_statistics keep = r->statistics;
-  if (pw_saddle_factor (r->saddle) == PW_OK) pw_accelerate_placed (r, r->v_at, r->a_at, r->lambda_at);
+  if (pw_saddle_factor (r->saddle) == PW_OK) pw_run_accelerate_updated (r, r->v_at, r->a_at, r->lambda_at);
   r->statistics = keep;
   return IDA_SUCCESS;
 }
@@ -119,7 +119,7 @@ static int ida_work (ida_data *d, int status) {
   double *y = N_VGetArrayPointer (d->sun.y);
   const double *lambda = r->lambda;
   if (status == PW_OK && d->velocities && pw_ledger_reacts (r->s)) {
-    pw_accelerate_placed (r, r->v, r->a_at, r->lambda_at);
+    pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda_at);
     lambda = r->lambda_at;
   }
   pw_ledger_rates (r, lambda, r->rate);
@@ -127,21 +127,22 @@ static int ida_work (ida_data *d, int status) {
   if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return 0;
   memcpy (y, r->q, (size_t)d->n * sizeof *y);
   memcpy (y + d->n, r->v, (size_t)d->n * sizeof *y);
-  return pw_ida_place (d, r->t, y);
+  return pw_ida_update (d, r->t, y);
 }
 
 /* ---- Opening ---- */
 
 static int ida_open_vectors (ida_data *d, pw_run *r) {
   const pw_system *s = r->s;
-  if (pw_sun_open (&d->sun, r, d->size) != PW_OK) return PW_MACHINE;
+  if (pw_sun_open (&d->sun, r, d->size) != PW_OK) return PW_RESOURCE;
   d->yp = pw_sun_vector (d->size, d->sun.context);
   d->id = pw_sun_vector (d->size, d->sun.context);
   d->scale = calloc ((size_t)(3 * d->n + 6 + 3 * s->rows), sizeof *d->scale);
-  if (!d->yp || !d->id || !d->scale) return PW_MACHINE;
+  if (!d->yp || !d->id || !d->scale) return PW_RESOURCE;
   d->given = d->scale + d->n;
   d->unit = d->given + 2 * d->n + 6 + 2 * s->rows;
-  for (int i = 0; i < d->rows; i++) d->unit[i] = pw_rank_size (d->sun.run->w, d->tangent.map ? d->tangent.row[i] : i);
+  for (int i = 0; i < d->rows; i++)
+    d->unit[i] = pw_rank_multiplier_unit (d->sun.run->w, d->tangent.map ? d->tangent.row[i] : i);
   for (int j = 0; j < d->n; j++) d->scale[j] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
   for (int i = 0; i < d->size; i++) N_VGetArrayPointer (d->id)[i] = i < 2 * d->n || d->impulses;
   ida_fill_vectors (d);
@@ -155,18 +156,18 @@ static int ida_initialise (SUNLinearSolver solver) {
 static int ida_open_solver (ida_data *d) {
   pw_sun *x = &d->sun;
   void *m = d->memory = IDACreate (x->context);
-  if (m == NULL || pw_sun_open_solver (x, x->y, d, NULL) != PW_OK) return PW_MACHINE;
+  if (m == NULL || pw_sun_open_solver (x, x->y, d, NULL) != PW_OK) return PW_RESOURCE;
   x->solver->ops->initialize = ida_initialise;
   if (IDASetErrHandlerFn (m, pw_sun_message, x) || IDASetUserData (m, d) ||
       IDAInit (m, pw_ida_residual, x->run->t, x->y, d->yp) || IDAWFtolerances (m, ida_weigh) || IDASetId (m, d->id) ||
       IDASetSuppressAlg (m, 1) || IDASetMaxNumSteps (m, -1) || IDASetMaxConvFails (m, PW_SUN_ATTEMPTS) ||
       IDASetMaxErrTestFails (m, PW_SUN_ATTEMPTS) || IDASetInitStep (m, pw_first_step (x->run)) ||
       IDASetLinearSolver (m, x->solver, x->matrix) || IDASetJacFn (m, pw_ida_matrix))
-    return PW_MACHINE;
+    return PW_RESOURCE;
   if (!x->run->s->saturates) return PW_OK;
   x->iteration = SUNNonlinSol_Newton (x->y, x->context);
-  if (x->iteration == NULL || IDASetNonlinearSolver (m, x->iteration)) return PW_MACHINE;
-  return pw_sun_test_newton (x->iteration, &x->correction) == 0 ? PW_OK : PW_MACHINE;
+  if (x->iteration == NULL || IDASetNonlinearSolver (m, x->iteration)) return PW_RESOURCE;
+  return pw_sun_test_newton (x->iteration, &x->correction) == 0 ? PW_OK : PW_RESOURCE;
 }
 
 static int ida_open (pw_run *r, pw_error *error) {
@@ -236,7 +237,7 @@ static int ida_restart (pw_run *r, pw_error *error) {
 static int ida_skip (pw_run *r, double stop, pw_error *error) {
   r->t = stop;
   r->statistics.steps++;
-  if (pw_ida_place (r->data, stop, N_VGetArrayPointer (r->data->sun.y)) != 0)
+  if (pw_ida_update (r->data, stop, N_VGetArrayPointer (r->data->sun.y)) != 0)
     return ida_fail (r->data, IDA_RES_FAIL, error);
   return ida_restart (r, error);
 }
@@ -247,11 +248,11 @@ static int ida_skip (pw_run *r, double stop, pw_error *error) {
 static int ida_reach (ida_data *d) {
   pw_run *r = d->sun.run;
   ida_read (d, r->q, r->v, r->a, r->lambda);
-  if (pw_ida_place (d, r->t, N_VGetArrayPointer (d->sun.y)) != 0) return PW_METHOD;
+  if (pw_ida_update (d, r->t, N_VGetArrayPointer (d->sun.y)) != 0) return PW_METHOD;
   pw_bound_tolerances (r);
   int status = pw_saddle_factor (r->saddle);
   if (status < 0) return status;
-  if (status == PW_OK && !d->velocities) pw_accelerate_placed (r, r->v, r->a_at, r->lambda);
+  if (status == PW_OK && !d->velocities) pw_run_accelerate_updated (r, r->v, r->a_at, r->lambda);
   r->near = status != PW_OK || pw_watchdog_near (r);
   return r->s->entries > 0 && ida_work (d, status) != 0 ? PW_METHOD : PW_OK;
 }

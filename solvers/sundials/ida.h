@@ -23,7 +23,7 @@ struct pw_method_data {
 typedef struct pw_method_data ida_data;
 
 /* Updates kinematics and J at the unknowns.  0, or -1 if a signal failed. */
-int pw_ida_place (ida_data *d, double t, const double *y);
+int pw_ida_update (ida_data *d, double t, const double *y);
 
 /* Where the multipliers of the rows in use are: among the unknowns, or among their derivatives. */
 static inline const double *pw_ida_lambda (const ida_data *d, const double *y, const double *yp) {
@@ -35,7 +35,7 @@ int pw_ida_residual (pw_real t, N_Vector y, N_Vector yp, N_Vector out, void *dat
 int pw_ida_matrix (pw_real t, pw_real c, N_Vector y, N_Vector yp, N_Vector residual, SUNMatrix matrix, void *data,
                    N_Vector t1, N_Vector t2, N_Vector t3);
 
-/* Lays out the pattern by recording one filling at y, y', and makes the matrix.  PW_OK or PW_MACHINE. */
+/* Lays out the pattern by recording one filling at y, y', and makes the matrix.  PW_OK or PW_RESOURCE. */
 int pw_ida_open_matrix (ida_data *d);
 
 #endif

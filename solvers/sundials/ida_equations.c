@@ -10,9 +10,9 @@
 #include <string.h>
 #include "ida.h"
 
-int pw_ida_place (ida_data *d, double t, const double *y) {
-  int status = pw_place (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->n);
-  if (status == PW_OK) pw_sweep_J (d->sun.run->w);
+int pw_ida_update (ida_data *d, double t, const double *y) {
+  int status = pw_update_kinematics (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->n);
+  if (status == PW_OK) pw_evaluate_J (d->sun.run->w);
   return status == PW_OK ? 0 : -1;
 }
 
@@ -45,7 +45,7 @@ static void ida_momentum (ida_data *d, const double *y, const double *yp, double
   double *pull = d->given, *f = pull + n + 3;
   memset (pull, 0, (size_t)n * sizeof *pull);
   pw_add_JT (d->sun.run->w, ida_lambda (d, y, yp), pull);
-  pw_sweep_force (d->sun.run->w, f);
+  pw_evaluate_force (d->sun.run->w, f);
   for (int j = 0; j < n; j++) out[j] = s->mass[j] * yp[n + j] + pull[j] - f[j];
 }
 
@@ -56,10 +56,10 @@ static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *o
   for (int i = 0; i < s->rows; i++) jv[i] *= (i < s->holonomic ? 2 : 1) * r->alpha;
   pw_mul_J (r->w, yp + d->n, other);
   for (int i = 0; i < s->rows; i++) jv[i] += other[i];
-  pw_sweep_gamma (r->w, other);
+  pw_evaluate_gamma (r->w, other);
   for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
   if (r->beta == 0) return;
-  pw_sweep_g (r->w, other);
+  pw_evaluate_g (r->w, other);
   for (int i = 0; i < s->holonomic; i++) jv[i] += r->beta * r->beta * other[i];
 }
 
@@ -68,12 +68,12 @@ static void ida_constraints (ida_data *d, const double *y, const double *yp, dou
   const pw_system *s = d->sun.run->s;
   double *jv = d->given, *other = jv + s->rows;
   pw_mul_J (d->sun.run->w, y + d->n, jv);
-  pw_sweep_eta (d->sun.run->w, other);
+  pw_evaluate_eta (d->sun.run->w, other);
   for (int i = 0; i < s->rows; i++) jv[i] -= other[i];
   if (!d->velocities) ida_stabilised (d, yp, jv, other);
   pw_tangent_compress (&d->tangent, jv, d->rows, out);
   if (!d->positions) return;
-  pw_sweep_g (d->sun.run->w, other);
+  pw_evaluate_g (d->sun.run->w, other);
   pw_tangent_compress (&d->tangent, other, d->mus, out + d->rows);
 }
 
@@ -81,7 +81,7 @@ int pw_ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *d
   ida_data *d = data;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
   double *f = N_VGetArrayPointer (out);
-  if (pw_run_asked (d->sun.run) || pw_ida_place (d, t, y) != 0) return -1;
+  if (pw_run_asked (d->sun.run) || pw_ida_update (d, t, y) != 0) return -1;
   ida_kinematics (d, y, yp, f);
   ida_momentum (d, y, yp, f + d->n);
   ida_constraints (d, y, yp, f + 2 * d->n);
@@ -92,20 +92,20 @@ int pw_ida_residual (pw_real t, N_Vector vy, N_Vector vyp, N_Vector out, void *d
 
 static void ida_matrix_fill (ida_data *d, const double *y, const double *yp, double c) {
   int n = d->n;
-  const pw_tangent_place to = { .momentum = n,
-                                .constraint = 2 * n,
-                                .q = 0,
-                                .v = n,
-                                .a = n,
-                                .lambda = 2 * n,
-                                .mu = 2 * n + d->rows,
-                                .of_q = c,
-                                .of_a = c,
-                                .of_lambda = d->impulses ? c : 1 };
+  const pw_tangent_update to = { .momentum = n,
+                                 .constraint = 2 * n,
+                                 .q = 0,
+                                 .v = n,
+                                 .a = n,
+                                 .lambda = 2 * n,
+                                 .mu = 2 * n + d->rows,
+                                 .of_q = c,
+                                 .of_a = c,
+                                 .of_lambda = d->impulses ? c : 1 };
   pw_tangent_kinematics (&d->tangent, &to, d->positions ? ida_mu (d, y, yp) : NULL, d->scale);
   pw_tangent_momentum (&d->tangent, &to, ida_lambda (d, y, yp));
   if (d->velocities)
-    pw_tangent_rates (&d->tangent, &to, y + n, 1);
+    pw_tangent_velocities (&d->tangent, &to, y + n, 1);
   else
     pw_tangent_accelerations (&d->tangent, &to, y + n, yp + n);
   if (d->positions) pw_tangent_positions (&d->tangent, &to, 2 * n + d->rows);
@@ -116,9 +116,9 @@ int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector res
   ida_data *d = data;
   const double *y = N_VGetArrayPointer (vy), *yp = N_VGetArrayPointer (vyp);
   (void)residual, (void)t1, (void)t2, (void)t3;
-  if (pw_ida_place (d, t, y) != 0) return -1;
+  if (pw_ida_update (d, t, y) != 0) return -1;
   pw_sun_clear (matrix, d->tangent.colptr, d->tangent.rowind);
-  pw_tape_fill (&d->tangent.tape, SUNSparseMatrix_Data (matrix));
+  pw_scatter_begin (&d->tangent.tape, SUNSparseMatrix_Data (matrix));
   ida_matrix_fill (d, y, yp, c);
   pw_matrix_evaluated (d->sun.run, y, y + d->n);
   return 0;
@@ -126,8 +126,8 @@ int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector res
 
 int pw_ida_open_matrix (ida_data *d) {
   pw_tangent *x = &d->tangent;
-  pw_tape_record (&x->tape);
+  pw_scatter_record (&x->tape);
   ida_matrix_fill (d, N_VGetArrayPointer (d->sun.y), N_VGetArrayPointer (d->yp), 1);
-  if (pw_tape_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_MACHINE;
+  if (pw_scatter_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
   return pw_sun_open_matrix (&d->sun, d->size, x->colptr, x->rowind);
 }

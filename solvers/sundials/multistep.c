@@ -24,7 +24,7 @@
 
 int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
   pw_run *r = d->sun.run;
-  int status = pw_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
+  int status = pw_run_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
   return status == PW_OK ? 0 : status > 0 ? 1 : -1;
 }
 
@@ -50,7 +50,7 @@ static int multistep_weigh (N_Vector y, N_Vector weights, void *data) {
 /* Projects (t, q, v): a part of the step, and of its energy.  Returns as pw_project_positions. */
 static int multistep_project (multistep_data *d, double t, double *q, double *v) {
   pw_run *r = d->sun.run;
-  int row, status = pw_place (r->w, t, q, v);
+  int row, status = pw_update_kinematics (r->w, t, q, v);
   double worst;
   if (status == PW_OK) status = pw_project_positions (&d->projector, r, t, q, v, &row, &worst);
   return status == PW_OK ? pw_project_velocities (&d->projector, r, v) : status;
@@ -94,7 +94,7 @@ static int multistep_complete (multistep_data *d, double t) {
   pw_statistics keep = r->statistics;
   r->refuse = 0;
   if (d->projects) status = multistep_project (d, t, r->q_at, r->v_at);
-  if (status == PW_OK) status = pw_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
+  if (status == PW_OK) status = pw_run_accelerate (r, t, r->q_at, r->v_at, r->a_at, r->lambda_at);
   r->refuse = r->limits.rank;
   r->statistics = keep;
   return status;
@@ -124,9 +124,9 @@ static int multistep_power (pw_run *r, double t, double *rate) {
 static int multistep_open_arrays (multistep_data *d, pw_run *r) {
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
   const pw_array array[] = { { &d->q, n }, { &d->v, n }, { &d->a, n }, { &d->error, 2 * n }, { &d->lambda, rows } };
-  if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_MACHINE;
+  if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
   d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (d->memory == NULL) return PW_MACHINE;
+  if (d->memory == NULL) return PW_RESOURCE;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
   memcpy (d->a, r->a, (size_t)d->n * sizeof *d->a);
   memcpy (d->lambda, r->lambda, rows * sizeof *d->lambda);
@@ -137,11 +137,11 @@ static int multistep_open_arrays (multistep_data *d, pw_run *r) {
 static int multistep_open_iteration (multistep_data *d, int formula) {
   pw_sun *x = &d->sun;
   int newton = formula == CV_BDF;
-  if (newton && pw_bdf_open_newton (d) != PW_OK) return PW_MACHINE;
+  if (newton && pw_bdf_open_newton (d) != PW_OK) return PW_RESOURCE;
   if (newton && !x->run->s->saturates) return PW_OK;
   x->iteration = newton ? SUNNonlinSol_Newton (x->y, x->context) : SUNNonlinSol_FixedPoint (x->y, 0, x->context);
-  if (x->iteration == NULL || CVodeSetNonlinearSolver (d->cvode, x->iteration)) return PW_MACHINE;
-  return newton && pw_sun_test_newton (x->iteration, &x->correction) ? PW_MACHINE : PW_OK;
+  if (x->iteration == NULL || CVodeSetNonlinearSolver (d->cvode, x->iteration)) return PW_RESOURCE;
+  return newton && pw_sun_test_newton (x->iteration, &x->correction) ? PW_RESOURCE : PW_OK;
 }
 
 static int multistep_open_solver (multistep_data *d, int formula) {
@@ -151,11 +151,11 @@ static int multistep_open_solver (multistep_data *d, int formula) {
       CVodeInit (m, multistep_derivative, r->t, d->sun.y) || CVodeWFtolerances (m, multistep_weigh) ||
       CVodeSetMaxNumSteps (m, -1) || CVodeSetMaxConvFails (m, PW_SUN_ATTEMPTS) ||
       CVodeSetMaxErrTestFails (m, PW_SUN_ATTEMPTS) || CVodeSetInitStep (m, pw_first_step (r)))
-    return PW_MACHINE;
-  if ((d->projects || r->s->saturates) && CVodeSetNonlinConvCoef (m, MULTISTEP_ITERATED)) return PW_MACHINE;
+    return PW_RESOURCE;
+  if ((d->projects || r->s->saturates) && CVodeSetNonlinConvCoef (m, MULTISTEP_ITERATED)) return PW_RESOURCE;
   if (d->projects &&
-      (CVodeSetProjFn (m, multistep_correct) || CVodeSetProjFrequency (m, (long)pw_option_value (r, "every"))))
-    return PW_MACHINE;
+      (CVodeSetProjFn (m, multistep_correct) || CVodeSetProjFrequency (m, (long)pw_run_option (r, "every"))))
+    return PW_RESOURCE;
   return multistep_open_iteration (d, formula);
 }
 
@@ -202,7 +202,7 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
   if (!r->stopped) multistep_count (d);
   if (!r->stopped && flag == CV_REPTD_PROJFUNC_ERR && d->projector.against >= 0)
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
-                    pw_row_element (r->s, d->projector.against, element, sizeof element));
+                    pw_system_row_name (r->s, d->projector.against, element, sizeof element));
   if (flag == CV_PROJFUNC_FAIL) flag = CV_RHSFUNC_FAIL; /* a signal failed */
   return pw_sun_fail (&d->sun, flag, singular,
                       flag == CV_REPTD_PROJFUNC_ERR ? "the projection does not converge however small the step" : NULL,
@@ -215,8 +215,8 @@ static void multistep_evaluate (multistep_data *d) {
   pw_run *r = d->sun.run;
   pw_statistics keep = r->statistics;
   r->refuse = 0;
-  pw_sweep_gamma (r->w, r->lambda);
-  d->evaluated = pw_accelerate_swept (r, r->v, r->a, r->lambda) == PW_OK;
+  pw_evaluate_gamma (r->w, r->lambda);
+  d->evaluated = pw_run_accelerate_evaluated (r, r->v, r->a, r->lambda) == PW_OK;
   if (!d->evaluated) memcpy (r->lambda, d->lambda, (size_t)r->s->rows * sizeof *r->lambda);
   r->refuse = r->limits.rank;
   r->statistics = keep;
@@ -231,8 +231,8 @@ static int multistep_work (multistep_data *d) {
   pw_ledger_rates (r, r->lambda, r->rate);
   CVodeGetLastOrder (d->cvode, &order);
   if (!pw_quadrature_step (&d->sun.quadrature, r, order)) return PW_OK;
-  int status = pw_place (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
-  pw_sweep_J (r->w);
+  int status = pw_update_kinematics (r->w, pw_before_breakpoint (r, r->t), r->q, r->v);
+  pw_evaluate_J (r->w);
   return status;
 }
 
@@ -248,9 +248,9 @@ static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   r->t = t;
   pw_forget_residuals (r);
   d->evaluated = 0;
-  if (pw_place (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
+  if (pw_update_kinematics (r->w, pw_before_breakpoint (r, t), r->q, r->v) != PW_OK)
     return multistep_fail (d, CV_RHSFUNC_FAIL, error);
-  pw_sweep_J (r->w);
+  pw_evaluate_J (r->w);
   pw_bound_tolerances (r);
   if (r->s->entries > 0 && multistep_work (d) != PW_OK) return multistep_fail (d, CV_RHSFUNC_FAIL, error);
   return PW_OK;
@@ -276,7 +276,7 @@ static int multistep_complete_reached (multistep_data *d) {
   int near = r->near;
   if (d->evaluated) return PW_OK;
   r->refuse = 0;
-  int status = pw_accelerate (r, pw_before_breakpoint (r, r->t), r->q, r->v, r->a, r->lambda);
+  int status = pw_run_accelerate (r, pw_before_breakpoint (r, r->t), r->q, r->v, r->a, r->lambda);
   r->refuse = r->limits.rank;
   r->statistics = keep;
   r->near = near;

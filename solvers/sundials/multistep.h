@@ -7,10 +7,10 @@
 
 /* Newton's iteration of BDF; see bdf_newton.c. */
 typedef struct {
-  pw_tangent tangent; /* its matrix is T */
-  double *value;      /* of T */
-  double gamma;       /* of the matrix last set up */
-  pw_tape tape;       /* from the entries of T, in their order, into the matrix */
+  pw_tangent tangent;  /* its matrix is T */
+  double *value;       /* of T */
+  double gamma;        /* of the matrix last set up */
+  pw_scatter_map tape; /* from the entries of T, in their order, into the matrix */
   int64_t *colptr, *rowind;
   N_Vector right, change; /* coords and rows in use */
 } pw_bdf_newton;
@@ -33,7 +33,7 @@ typedef struct pw_method_data multistep_data;
 /* Accelerations of an unknown y, into d->a and d->lambda: 0; above: a smaller step may do; below: a signal failed. */
 int pw_multistep_accelerate (multistep_data *d, double t, const double *y);
 
-/* Opens the Newton matrix and hands it to CVODES.  PW_OK or PW_MACHINE. */
+/* Opens the Newton matrix and hands it to CVODES.  PW_OK or PW_RESOURCE. */
 int pw_bdf_open_newton (multistep_data *d);
 void pw_bdf_close_newton (multistep_data *d);
 

@@ -22,10 +22,10 @@ int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
   x->run = r;
   if (pw_reserve (VECTORS * (TABLE + (size_t)unknowns * sizeof (double)) + REST) != PW_OK ||
       SUNContext_Create (PW_SUN_NO_COMM, &x->context) != 0)
-    return PW_MACHINE;
+    return PW_RESOURCE;
   x->y = pw_sun_vector (unknowns, x->context);
   if (x->y) pw_sun_restart (x);
-  return x->y ? PW_OK : PW_MACHINE;
+  return x->y ? PW_OK : PW_RESOURCE;
 }
 
 void pw_sun_close (pw_sun *x) {
@@ -60,7 +60,7 @@ void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowin
 int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind) {
   x->matrix = SUNSparseMatrix (size, size, colptr[size], CSC_MAT, x->context);
   if (x->matrix) pw_sun_clear (x->matrix, colptr, rowind);
-  return x->matrix ? PW_OK : PW_MACHINE;
+  return x->matrix ? PW_OK : PW_RESOURCE;
 }
 
 static SUNLinearSolver_Type sun_solver_type (SUNLinearSolver solver) {
@@ -82,7 +82,7 @@ static int sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector result,
 int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve) {
   x->klu = SUNLinSol_KLU (right, x->matrix, x->context);
   x->solver = SUNLinSolNewEmpty (x->context);
-  if (x->klu == NULL || x->solver == NULL) return PW_MACHINE;
+  if (x->klu == NULL || x->solver == NULL) return PW_RESOURCE;
   x->solver->content = content;
   x->solver->ops->gettype = sun_solver_type;
   x->solver->ops->setup = sun_factorise;
@@ -112,7 +112,7 @@ int pw_sun_test_newton (SUNNonlinearSolver newton, double *size) {
 void pw_sun_weigh (const pw_sun *x, const double *y, double *w) {
   for (int j = 0, n = x->run->s->coords; j < n; j++) {
     w[j] = 1 / pw_tolerance (x->run, j, y[j]);
-    w[n + j] = 1 / pw_tolerance_rate (x->run, j, y[n + j]);
+    w[n + j] = 1 / pw_tolerance_velocity (x->run, j, y[n + j]);
   }
 }
 
@@ -130,7 +130,7 @@ static const char *sun_reason (pw_sun *x, int flag) {
 }
 
 int pw_sun_no_memory (const pw_run *r, pw_error *error) {
-  return pw_fail (error, PW_MACHINE, "model %s: out of memory in %s", r->s->model, r->method->name);
+  return pw_fail (error, PW_RESOURCE, "model %s: out of memory in %s", r->s->model, r->method->name);
 }
 
 int pw_sun_fail_signal (double t, pw_error *error) {

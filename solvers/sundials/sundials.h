@@ -40,7 +40,7 @@ typedef struct {
   char message[256];            /* its last one, instead of its printing */
 } pw_sun;
 
-/* Context and unknowns, filled with the state reached.  PW_OK or PW_MACHINE, as all that open something. */
+/* Context and unknowns, filled with the state reached.  PW_OK or PW_RESOURCE, as all that open something. */
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns);
 void pw_sun_close (pw_sun *x);
 

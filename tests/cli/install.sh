@@ -73,11 +73,11 @@ int main (int count, char **argument) {
   pw_settings settings = {};
   pw_file *file = pw_file_open (count > 1 ? argument[1] : "pendulum", &e);
   pw_model *model = pw_file_model (file, &e);
-  pw_build (model, &e);
-  pw_system *system = pw_compile (model, &e);
-  pw_run *run = pw_open (system, "ida+ggl", &settings, &e);
-  pw_advance_to (run, 1, 1, &e);
-  pw_close (run), pw_free (system), pw_model_free (model), pw_file_close (file);
+  pw_model_build (model, &e);
+  pw_system *system = pw_system_compile (model, &e);
+  pw_run *run = pw_run_open (system, "ida+ggl", &settings, &e);
+  pw_run_advance_to (run, 1, 1, &e);
+  pw_run_close (run), pw_system_free (system), pw_model_free (model), pw_file_close (file);
   return -e.status;
 }
 EOF

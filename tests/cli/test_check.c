@@ -185,7 +185,7 @@ static void check_scene_expect (const pw_kind *kind, const char *what) {
   pw_error error = { 0 };
   pw_selftest_report report = { 0 };
   pw_random random = { 5 };
-  pw_system *s = pw_specimen (kind, &random, &error);
+  pw_system *s = pw_random_scene (kind, &random, &error);
   assert_non_null (s);
   double q[PW_PROBE_COORDS], v[PW_PROBE_COORDS];
   for (int j = 0; j < s->coords; j++) q[j] = sin (1. + 3 * j), v[j] = 0;
@@ -194,7 +194,7 @@ static void check_scene_expect (const pw_kind *kind, const char *what) {
     if (report.check[i].failed != (what != NULL && strcmp (report.check[i].name, what) == 0))
       fail_msg ("%s: %s is %g, %s", kind->name, report.check[i].name, report.check[i].error, report.check[i].where);
   assert_int_equal (report.failed, what != NULL);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void test_scene (void **state) {

@@ -20,14 +20,14 @@ static void test_max_steps (void **state) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&scene_ezyroller, NULL);
     pw_run *r = runs_open (s, *method, &(pw_settings){ .rtol = 1e-8, .max_steps = 60 });
-    assert_int_equal (pw_advance_to (r, 100, 100, &error), PW_METHOD);
+    assert_int_equal (pw_run_advance_to (r, 100, 100, &error), PW_METHOD);
     const pw_statistics *done = pw_run_statistics (r);
     assert_non_null (strstr (error.text, "s: the limit max-steps is reached: "));
-    assert_true (done->steps + done->rejected >= 60 && done->steps + done->rejected < 80 && pw_time (r) > 0);
+    assert_true (done->steps + done->rejected >= 60 && done->steps + done->rejected < 80 && pw_run_time (r) > 0);
     pw_sample sample;
-    check_ok (pw_at (r, pw_time (r), &sample, &(pw_error){ 0 }), NULL); /* what there is so far stays */
-    pw_close (r);
-    pw_free (s);
+    check_ok (pw_run_sample (r, pw_run_time (r), &sample, &(pw_error){ 0 }), NULL); /* what there is so far stays */
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -39,8 +39,8 @@ static void test_max_steps_of_fixed_steps (void **state) {
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .max_steps = 10 });
     runs_to (r, 1);
     assert_int_equal (pw_run_statistics (r)->steps, 100);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -48,9 +48,9 @@ static void test_bad_max_steps (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_system *s = scene_system (&scene_ezyroller, NULL);
-  assert_null (pw_open (s, "erk5", &(pw_settings){ .max_steps = -1 }, &error));
+  assert_null (pw_run_open (s, "erk5", &(pw_settings){ .max_steps = -1 }, &error));
   check_error (&error, PW_INPUT, "setting max_steps = -1: expected a number > 0");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* ---- The caller's wish ---- */
@@ -76,11 +76,11 @@ static void test_stop (void **state) {
         runs_state (s, *method, &settings, 1, whole, whole + 6, NULL);
         settings.stop = limits_stop, settings.stop_context = &calls;
         pw_run *r = runs_open (s, *method, &settings);
-        for (int status = 0; status != PW_OK || pw_time (r) < 1;) {
-          double before = pw_time (r);
-          status = pw_advance (r, 1, &error);
+        for (int status = 0; status != PW_OK || pw_run_time (r) < 1;) {
+          double before = pw_run_time (r);
+          status = pw_run_advance (r, 1, &error);
           if (status != PW_STOPPED) check_ok (status, &error);
-          assert_true (status == PW_OK || pw_time (r) == before);
+          assert_true (status == PW_OK || pw_run_time (r) == before);
           stopped += status == PW_STOPPED;
         }
         pw_sample sample = runs_to (r, 1);
@@ -89,8 +89,8 @@ static void test_stop (void **state) {
         double bound = k ? 1e-5 : 1e-12;
         const char *reason = k ? "a thousand times the tolerance" : "the same steps, to round-off";
         for (int j = 0; j < 6; j++) check_close (*method, q[j], whole[j], bound, reason);
-        pw_close (r);
-        pw_free (s);
+        pw_run_close (r);
+        pw_system_free (s);
       }
 }
 
@@ -109,15 +109,15 @@ static void test_stop_samples (void **state) {
     pw_system *s = scene_system (&scene_ezyroller, NULL);
     pw_run *r = runs_open (s, name, &(pw_settings){ .stop = limits_asked, .stop_context = &asked });
     runs_to (r, 0.1);
-    double now = pw_time (r);
-    check_ok (pw_advance (r, 1, &error), &error);
+    double now = pw_run_time (r);
+    check_ok (pw_run_advance (r, 1, &error), &error);
     asked = 1;
-    assert_int_equal (pw_at (r, (now + pw_time (r)) / 2, &sample, &error), PW_STOPPED);
-    check_ok (pw_at (r, pw_time (r), &sample, &error), &error);
-    assert_int_equal (pw_advance (r, 1, &error), PW_STOPPED);
+    assert_int_equal (pw_run_sample (r, (now + pw_run_time (r)) / 2, &sample, &error), PW_STOPPED);
+    check_ok (pw_run_sample (r, pw_run_time (r), &sample, &error), &error);
+    assert_int_equal (pw_run_advance (r, 1, &error), PW_STOPPED);
     assert_int_equal (error.status, PW_OK);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -133,10 +133,10 @@ static void test_stop_inside (void **state) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&scene_ezyroller, NULL);
     pw_run *r = runs_open (s, *method, &(pw_settings){ .stop = limits_inside, .stop_context = &calls });
-    assert_int_equal (pw_advance (r, 1, &error), PW_STOPPED);
-    assert_true (error.status == PW_OK && calls == 2 && pw_time (r) == 0);
-    pw_close (r);
-    pw_free (s);
+    assert_int_equal (pw_run_advance (r, 1, &error), PW_STOPPED);
+    assert_true (error.status == PW_OK && calls == 2 && pw_run_time (r) == 0);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -175,8 +175,8 @@ static void test_growth (void **state) {
       if (!spins) check_close ("growth", growth, 3000, 3, "1e-3: the tolerance of bdf, with room");
       if (!spins) check_close ("power", power, 1, 0.01, "speeds at two times that are good to 1e-3");
       if (!spins) assert_int_equal (which, 5);
-      pw_close (r);
-      pw_free (s);
+      pw_run_close (r);
+      pw_system_free (s);
     }
 }
 
@@ -206,8 +206,8 @@ static void test_no_growth (void **state) {
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1, .span = 1 });
   check_close ("speed", runs_to (r, t).v[2], (1 - cos (2.2)) / omega, 1e-6 / omega, "1e-6: (w h)^4, with room");
   assert_true (pw_run_growth (r, &which, &power) == 0 && power < 0);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* At 4.5e13 rad an angle is known to 0.01 rad. */
@@ -216,11 +216,12 @@ static void test_beyond_numbers (void **state) {
   pw_error error = { 0 };
   pw_system *s = scene_system (&limits_table, "torque", 0., NULL);
   pw_run *r = runs_open (s, "erk5+projection", &(pw_settings){ .span = 1 });
-  assert_int_equal (pw_advance_to (r, 1e12, 1e12, &error), PW_METHOD);
+  assert_int_equal (pw_run_advance_to (r, 1e12, 1e12, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "s: the motion has grown beyond what numbers resolve: rotor.phi = "));
-  assert_true (pw_time (r) > 4.4e13 / 5000 && pw_time (r) < 5 * 4.6e13 / 5000); /* a step grows fivefold at most */
-  pw_close (r);
-  pw_free (s);
+  assert_true (pw_run_time (r) > 4.4e13 / 5000 &&
+               pw_run_time (r) < 5 * 4.6e13 / 5000); /* a step grows fivefold at most */
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 int main (void) {

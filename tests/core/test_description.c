@@ -27,7 +27,7 @@ static const pw_parameter description_list[] = {
 
 static void description_build (pw_model *m, const void *parameters) {
   const description_parameters *p = parameters;
-  if (p->links > 5) pw_refuse (m, "links = %g: at most %d", p->links, 5);
+  if (p->links > 5) pw_model_refuse (m, "links = %g: at most %d", p->links, 5);
   pw_add_body (
       m,
       &(pw_body){ .name = "frame", .mass = p->mass, .inertia = 1, .start = { p->length, 1, 2 }, .rate = { 3, 4, 5 } });
@@ -46,17 +46,17 @@ static void test_parameters (void **state) {
   (void)state;
   pw_system *s = scene_system (&description_table, NULL);
   assert_true (s->q0[0] == 2 && s->mass[0] == 3); /* the defaults */
-  pw_free (s);
+  pw_system_free (s);
   s = scene_system (&description_table, "length", -7.5, "mass", 0.25, NULL);
   assert_true (s->q0[0] == -7.5 && s->q0[1] == 1 && s->q0[2] == 2 && s->v0[0] == 3 && s->v0[1] == 4 && s->v0[2] == 5);
   assert_true (s->mass[0] == 0.25 && s->mass[1] == 0.25 && s->mass[2] == 1);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void description_not_set (const char *name, double value, const char *text) {
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &description_table, &error);
-  assert_int_equal (pw_set (m, name, value, &error), PW_INPUT);
+  assert_int_equal (pw_model_set (m, name, value, &error), PW_INPUT);
   check_error (&error, PW_INPUT, text);
   pw_model_free (m);
 }
@@ -76,7 +76,7 @@ static void test_no_parameters (void **state) {
   pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = description_build };
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &table, &error);
-  assert_int_equal (pw_set (m, "length", 1, &error), PW_INPUT);
+  assert_int_equal (pw_model_set (m, "length", 1, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model cart has no parameter \"length\"");
   pw_model_free (m);
 }
@@ -85,8 +85,8 @@ static void test_refused (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &description_table, &error);
-  check_ok (pw_set (m, "links", 7, &error), &error);
-  assert_int_equal (pw_build (m, &error), PW_INPUT);
+  check_ok (pw_model_set (m, "links", 7, &error), &error);
+  assert_int_equal (pw_model_build (m, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model cart: links = 7: at most 5");
   pw_model_free (m);
 }
@@ -114,15 +114,15 @@ static void test_order_of_calls (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = pw_model_new ("cart", &description_table, &error);
-  assert_null (pw_compile (m, &error));
-  check_error (&error, PW_INPUT, "model cart: pw_compile before pw_build");
+  assert_null (pw_system_compile (m, &error));
+  check_error (&error, PW_INPUT, "model cart: pw_system_compile before pw_model_build");
   error.status = PW_OK;
-  check_ok (pw_build (m, &error), &error);
-  assert_int_equal (pw_set (m, "length", 1, &error), PW_INPUT);
-  check_error (&error, PW_INPUT, "model cart: parameter length: pw_set after pw_build");
+  check_ok (pw_model_build (m, &error), &error);
+  assert_int_equal (pw_model_set (m, "length", 1, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model cart: parameter length: pw_model_set after pw_model_build");
   error.status = PW_OK;
-  assert_int_equal (pw_build (m, &error), PW_INPUT);
-  check_error (&error, PW_INPUT, "model cart: pw_build for the second time");
+  assert_int_equal (pw_model_build (m, &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "model cart: pw_model_build for the second time");
   pw_model_free (m);
 }
 
@@ -130,11 +130,11 @@ static void test_order_of_calls (void **state) {
 static void test_missing (void **state) {
   (void)state;
   pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
-  assert_int_equal (pw_set (NULL, "length", 1, &e[0]), PW_INPUT);
-  assert_int_equal (pw_build (NULL, &e[1]), PW_INPUT);
-  assert_int_equal (pw_set_signal (NULL, "motor", "value", &(pw_signal){ 0 }, &e[2]), PW_INPUT);
-  assert_int_equal (pw_set_start (NULL, "cart.x", 1, &e[3]), PW_INPUT);
-  assert_null (pw_compile (NULL, &e[4]));
+  assert_int_equal (pw_model_set (NULL, "length", 1, &e[0]), PW_INPUT);
+  assert_int_equal (pw_model_build (NULL, &e[1]), PW_INPUT);
+  assert_int_equal (pw_model_set_signal (NULL, "motor", "value", &(pw_signal){ 0 }, &e[2]), PW_INPUT);
+  assert_int_equal (pw_model_set_initial (NULL, "cart.x", 1, &e[3]), PW_INPUT);
+  assert_null (pw_system_compile (NULL, &e[4]));
   for (int i = 0; i < 5; i++) check_error (&e[i], PW_INPUT, "a model is missing");
   assert_null (pw_file_model (NULL, &e[5]));
   check_error (&e[5], PW_INPUT, "a model file is missing");
@@ -160,7 +160,7 @@ static void test_missing_definitions (void **state) {
     pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = build[i] };
     pw_error error = { 0 };
     pw_model *m = pw_model_new ("cart", &table, &error);
-    assert_int_equal (pw_build (m, &error), PW_INPUT);
+    assert_int_equal (pw_model_build (m, &error), PW_INPUT);
     check_error (&error, PW_INPUT, text[i]);
     pw_model_free (m);
   }
@@ -168,7 +168,7 @@ static void test_missing_definitions (void **state) {
 
 static void description_refused (pw_model *m, const char *text) {
   pw_error error = { 0 };
-  assert_null (pw_compile (m, &error));
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT, text);
   pw_model_free (m);
 }
@@ -178,7 +178,7 @@ static void description_refused (pw_model *m, const char *text) {
 static void description_no_signal (const char *element, const char *field, const char *text) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  assert_int_equal (pw_set_signal (m, element, field, &(pw_signal){ 0 }, &error), PW_INPUT);
+  assert_int_equal (pw_model_set_signal (m, element, field, &(pw_signal){ 0 }, &error), PW_INPUT);
   check_error (&error, PW_INPUT, text);
   pw_model_free (m);
 }
@@ -195,24 +195,24 @@ static void test_start (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_start (m, "frame.phi", 0.5, &error), &error);
-  check_ok (pw_set_start (m, "steer.vy", -2, &error), &error);
+  check_ok (pw_model_set_initial (m, "frame.phi", 0.5, &error), &error);
+  check_ok (pw_model_set_initial (m, "steer.vy", -2, &error), &error);
   pw_system *s = scene_compile (m);
   assert_true (s->q0[2] == 0.5 && s->v0[4] == -2 && s->held[2] && s->held[6 + 4]);
   int held = 0;
   for (int i = 0; i < 12; i++) held += s->held[i] & PW_GIVEN;
   assert_int_equal (held, 2);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void test_bad_start (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  assert_int_equal (pw_set_start (m, "frame.phi", NAN, &error), PW_INPUT);
+  assert_int_equal (pw_model_set_initial (m, "frame.phi", NAN, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model ezyroller: start frame.phi = nan: expected a finite number");
   error.status = PW_OK;
-  check_ok (pw_set_start (m, "frame.ph", 1, &error), &error);
+  check_ok (pw_model_set_initial (m, "frame.ph", 1, &error), &error);
   description_refused (m, "model ezyroller has no state \"frame.ph\"; did you mean \"frame.phi\"?");
 }
 
@@ -222,36 +222,36 @@ static void test_query (void **state) {
   (void)state;
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char text[100];
-  assert_int_equal (pw_count_bodies (s), 2);
-  assert_int_equal (pw_count_coordinates (s), 6);
-  assert_int_equal (pw_count_rows (s), 4);
-  assert_int_equal (pw_count_holonomic (s), 2);
-  assert_int_equal (pw_count_ledger (s), 1);
-  assert_int_equal (pw_find_body (s, "steer"), 1);
-  assert_int_equal (pw_find_body (s, "ster"), -1);
+  assert_int_equal (pw_system_bodies (s), 2);
+  assert_int_equal (pw_system_coordinates (s), 6);
+  assert_int_equal (pw_system_rows (s), 4);
+  assert_int_equal (pw_system_holonomic (s), 2);
+  assert_int_equal (pw_system_ledger_entries (s), 1);
+  assert_int_equal (pw_system_find_body (s, "steer"), 1);
+  assert_int_equal (pw_system_find_body (s, "ster"), -1);
   static const char *const state_names[] = { "frame.x",     "frame.y",   "frame.phi", "steer.x",
                                              "steer.y",     "steer.phi", "frame.vx",  "frame.vy",
                                              "frame.omega", "steer.vx",  "steer.vy",  "steer.omega" };
   static const char *const units[] = { "m", "m", "rad", "m", "m", "rad", "m/s", "m/s", "rad/s", "m/s", "m/s", "rad/s" };
   for (int i = 0; i < 12; i++) {
-    assert_string_equal (pw_state_name (s, i, text, sizeof text), state_names[i]);
-    assert_string_equal (pw_state_unit (s, i), units[i]);
-    assert_int_equal (pw_find_state (s, state_names[i], NULL), i);
+    assert_string_equal (pw_system_state_name (s, i, text, sizeof text), state_names[i]);
+    assert_string_equal (pw_system_state_unit (s, i), units[i]);
+    assert_int_equal (pw_system_find_state (s, state_names[i], NULL), i);
   }
   static const char *const reactions[] = { "B.Fx", "B.Fy", "A.N", "C.N" }, *const elements[] = { "pin B", "pin B",
                                                                                                  "wheel A", "wheel C" };
   for (int i = 0; i < 4; i++) {
-    assert_string_equal (pw_reaction_name (s, i, text, sizeof text), reactions[i]);
-    assert_string_equal (pw_reaction_unit (s, i), "N");
-    assert_string_equal (pw_row_element (s, i, text, sizeof text), elements[i]);
+    assert_string_equal (pw_system_reaction_name (s, i, text, sizeof text), reactions[i]);
+    assert_string_equal (pw_system_reaction_unit (s, i), "N");
+    assert_string_equal (pw_system_row_name (s, i, text, sizeof text), elements[i]);
   }
-  assert_string_equal (pw_ledger_name (s, 0, text, sizeof text), "rider.work");
-  pw_free (s);
+  assert_string_equal (pw_system_ledger_name (s, 0, text, sizeof text), "rider.work");
+  pw_system_free (s);
 }
 
 static void description_no_state (const pw_system *s, const char *name, const char *text) {
   pw_error error = { 0 };
-  assert_int_equal (pw_find_state (s, name, &error), PW_INPUT);
+  assert_int_equal (pw_system_find_state (s, name, &error), PW_INPUT);
   check_error (&error, PW_INPUT, text);
 }
 
@@ -261,7 +261,7 @@ static void test_bad_query (void **state) {
   description_no_state (s, "steer.omga", "model ezyroller has no state \"steer.omga\"; did you mean \"steer.omega\"?");
   description_no_state (s, "ster.phi", "model ezyroller has no state \"ster.phi\"; did you mean \"steer.phi\"?");
   description_no_state (s, "phi", "model ezyroller has no state \"phi\"; did you mean \"frame.phi\"?");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* Coordinates and losses of elements have names, too. */
@@ -275,20 +275,20 @@ static void test_own_coordinates (void **state) {
   pw_add (m, &toy_kind_spring,
           &(toy_spring){ .name = "k", .body = { "frame", "steer" }, .at = { { 3, 4 }, { 0 } }, .length = 1 });
   pw_error error = { 0 };
-  check_ok (pw_set_start (m, "right.spinrate", 7, &error), &error);
+  check_ok (pw_model_set_initial (m, "right.spinrate", 7, &error), &error);
   pw_system *s = scene_compile (m);
   char text[100];
-  assert_int_equal (pw_count_coordinates (s), 8);
+  assert_int_equal (pw_system_coordinates (s), 8);
   assert_true (s->mass[6] == 0.2 && s->mass[7] == 0.3 && s->v0[7] == 7);
-  assert_string_equal (pw_state_name (s, 6, text, sizeof text), "left.spin");
-  assert_string_equal (pw_state_name (s, 8 + 7, text, sizeof text), "right.spinrate");
-  assert_string_equal (pw_state_unit (s, 7), "rad");
-  assert_string_equal (pw_state_unit (s, 8 + 7), "rad/s");
-  assert_string_equal (pw_reaction_name (s, 3, text, sizeof text), "right.T");
-  assert_string_equal (pw_ledger_name (s, 0, text, sizeof text), "k.loss");
+  assert_string_equal (pw_system_state_name (s, 6, text, sizeof text), "left.spin");
+  assert_string_equal (pw_system_state_name (s, 8 + 7, text, sizeof text), "right.spinrate");
+  assert_string_equal (pw_system_state_unit (s, 7), "rad");
+  assert_string_equal (pw_system_state_unit (s, 8 + 7), "rad/s");
+  assert_string_equal (pw_system_reaction_name (s, 3, text, sizeof text), "right.T");
+  assert_string_equal (pw_system_ledger_name (s, 0, text, sizeof text), "k.loss");
   assert_true (s->scale.length == 5); /* the farthest attachment */
   description_no_state (s, "left.spun", "model scene has no state \"left.spun\"; did you mean \"left.spin\"?");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* The description may be changed after it has been handed over: the model keeps copies. */
@@ -302,9 +302,9 @@ static void test_copies (void **state) {
   memset (name, 'x', 1);
   pw_system *s = scene_compile (m);
   char text[100];
-  assert_int_equal (pw_find_body (s, "cart"), 2);
-  assert_string_equal (pw_row_element (s, 0, text, sizeof text), "wheel W");
-  pw_free (s);
+  assert_int_equal (pw_system_find_body (s, "cart"), 2);
+  assert_string_equal (pw_system_row_name (s, 0, text, sizeof text), "wheel W");
+  pw_system_free (s);
 }
 
 /* Reactions are found by the names they have in tables. */
@@ -312,15 +312,15 @@ static void test_find_reaction (void **state) {
   (void)state;
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char name[40];
-  for (int row = 0; row < pw_count_rows (s); row++)
-    assert_int_equal (pw_find_reaction (s, pw_reaction_name (s, row, name, sizeof name), NULL), row);
+  for (int row = 0; row < pw_system_rows (s); row++)
+    assert_int_equal (pw_system_find_reaction (s, pw_system_reaction_name (s, row, name, sizeof name), NULL), row);
   pw_error error = { 0 };
-  assert_int_equal (pw_find_reaction (s, "B.Fz", &error), PW_INPUT);
+  assert_int_equal (pw_system_find_reaction (s, "B.Fz", &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model ezyroller has no reaction \"B.Fz\"; did you mean \"B.Fx\"?");
   error = (pw_error){ 0 };
-  assert_int_equal (pw_find_reaction (s, NULL, &error), PW_INPUT);
+  assert_int_equal (pw_system_find_reaction (s, NULL, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model ezyroller: the name of a reaction is missing");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 int main (void) {

@@ -68,8 +68,9 @@ static uint64_t same_hash (pw_run *r, const pw_sample *x, int coordinates, int r
 static pw_system *same_system (int scene, pw_error *error) {
   pw_system *s = NULL;
   pw_model *m = pw_file_model (same_file[scene], error);
-  if (m && same_scenes[scene].parameter) pw_set (m, same_scenes[scene].parameter, same_scenes[scene].value, error);
-  if (m && pw_build (m, error) == PW_OK) s = pw_compile (m, error);
+  if (m && same_scenes[scene].parameter)
+    pw_model_set (m, same_scenes[scene].parameter, same_scenes[scene].value, error);
+  if (m && pw_model_build (m, error) == PW_OK) s = pw_system_compile (m, error);
   pw_model_free (m);
   return s;
 }
@@ -78,20 +79,20 @@ static pw_system *same_system (int scene, pw_error *error) {
 static uint64_t same_run_on (const pw_system *s, int run, pw_error *error) {
   double t = same_scenes[run / SAME_METHODS].t_end;
   pw_settings settings = { .step = 1e-3, .rtol = 1e-6, .span = t, .ledger = 1 };
-  pw_run *r = pw_open (s, same_methods[run % SAME_METHODS], &settings, error);
+  pw_run *r = pw_run_open (s, same_methods[run % SAME_METHODS], &settings, error);
   pw_sample sample;
   uint64_t h = 0;
   if (r == NULL) return 0;
-  if (pw_advance_to (r, t, t, error) == PW_OK && pw_at (r, t, &sample, error) == PW_OK)
-    h = same_hash (r, &sample, pw_count_coordinates (s), pw_count_rows (s));
-  pw_close (r);
+  if (pw_run_advance_to (r, t, t, error) == PW_OK && pw_run_sample (r, t, &sample, error) == PW_OK)
+    h = same_hash (r, &sample, pw_system_coordinates (s), pw_system_rows (s));
+  pw_run_close (r);
   return h;
 }
 
 static uint64_t same_run (int run, pw_error *error) {
   pw_system *s = same_system (run / SAME_METHODS, error);
   uint64_t h = s ? same_run_on (s, run, error) : 0;
-  pw_free (s);
+  pw_system_free (s);
   return h;
 }
 
@@ -146,7 +147,7 @@ static void test_used_system (void **state) {
       int run = scene * SAME_METHODS + (5 * i + 2) % SAME_METHODS;
       same_expect (run, same_run_on (s, run, &error), "on a system used before");
     }
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -200,7 +201,7 @@ static void test_shared_system (void **state) {
     check_ok (error.status, &error);
   }
   same_threads (shared, "in a thread, on a shared system");
-  for (int i = 0; i < SAME_SCENES; i++) pw_free (s[i]);
+  for (int i = 0; i < SAME_SCENES; i++) pw_system_free (s[i]);
 }
 
 int main (void) {

@@ -43,15 +43,15 @@ static void test_embed (void **state) {
   snprintf (command, sizeof command, "'%s/docs/embed'", embed_build ());
   assert_int_equal (embed_run (command, printed, sizeof printed), 0);
   pw_model *m = scene_model (&scene_ezyroller, "a", 0.6, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   pw_sample now = runs_to (r, 10);
   snprintf (expected, sizeof expected, "frame at t = %g s: x = %.6f m, y = %.6f m, phi = %.6f rad\n", now.t, now.q[0],
             now.q[1], now.q[2]);
   assert_string_equal (printed, expected);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_layers (void **state) {

@@ -56,12 +56,12 @@ static const struct {
 };
 enum { KINDS_SWEEPS = sizeof kinds_sweeps / sizeof *kinds_sweeps };
 
-static pw_sweep **kinds_member (pw_kind *kind, size_t offset) {
-  return (pw_sweep **)(void *)((char *)kind + offset);
+static pw_batch_function **kinds_member (pw_kind *kind, size_t offset) {
+  return (pw_batch_function **)(void *)((char *)kind + offset);
 }
 
 /* The sweep that kinds_multiplied stands in for, and by what it multiplies. */
-static pw_sweep *kinds_original;
+static pw_batch_function *kinds_original;
 static double kinds_factor;
 
 /* Multiplies whatever the original writes; how much that is shows from what it leaves alone. */
@@ -90,7 +90,7 @@ static void kinds_expect_caught (const pw_kind *kind, const char *sweep, const c
 static void kinds_break (const pw_kind *kind) {
   for (int i = 0; i < KINDS_SWEEPS; i++) {
     pw_kind broken = *kind;
-    pw_sweep **member = kinds_member (&broken, kinds_sweeps[i].sweep);
+    pw_batch_function **member = kinds_member (&broken, kinds_sweeps[i].sweep);
     kinds_original = *member;
     if (kinds_original == NULL) continue;
     *member = NULL;
@@ -130,7 +130,7 @@ static void kinds_long (const pw_batch *b, double *out) {
 }
 
 static void test_sizes (void **state) {
-  static pw_sweep *const wrong[] = { kinds_first_only, kinds_short, kinds_long };
+  static pw_batch_function *const wrong[] = { kinds_first_only, kinds_short, kinds_long };
   (void)state;
   kinds_original = pw_kind_pin.J;
   for (int i = 0; i < 3; i++) {
@@ -211,17 +211,17 @@ static void test_wheel_contact (void **state) {
   for (uint64_t seed = 1; seed <= 20; seed++) {
     pw_error error = { 0 };
     pw_random random = { seed };
-    pw_system *s = pw_specimen (&pw_kind_wheel, &random, &error);
+    pw_system *s = pw_random_scene (&pw_kind_wheel, &random, &error);
     assert_non_null (s);
     pw_workspace *w = pw_workspace_new (s, NULL);
     pw_probe x = { .kind = &pw_kind_wheel, .s = s, .work = w, .k = w->slab, .elements = 3, .rows = 1, .cols = 3 };
     double plus[9 + PW_PROBE_GUARD], minus[9], contact[9], speed[3];
-    pw_probe_aim (&x, &random);
-    pw_probe_place (&x, PW_PROBE_MOTION, PW_PROBE_H);
+    pw_probe_randomise (&x, &random);
+    pw_probe_update (&x, PW_PROBE_MOTION, PW_PROBE_H);
     x.kind->contact (&x.k->b, plus);
-    pw_probe_place (&x, PW_PROBE_MOTION, -PW_PROBE_H);
+    pw_probe_update (&x, PW_PROBE_MOTION, -PW_PROBE_H);
     x.kind->contact (&x.k->b, minus);
-    pw_probe_place (&x, PW_PROBE_MOTION, 0);
+    pw_probe_update (&x, PW_PROBE_MOTION, 0);
     x.kind->contact (&x.k->b, contact);
     x.kind->J (&x.k->b, x.k->J);
     pw_mul_J (w, x.v, speed);
@@ -233,12 +233,12 @@ static void test_wheel_contact (void **state) {
                    "central differences, terms up to 10");
     }
     pw_workspace_free (w);
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
 /* A kind that refuses every definition its table allows says so. */
-static int kinds_refuse (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int kinds_refuse (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
   (void)definition, (void)bodies, (void)element, (void)own;
   return pw_fail (error, PW_INPUT, "nothing suits me");

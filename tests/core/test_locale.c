@@ -16,18 +16,18 @@ static void locale_write (const char *model, const char *name) {
   pw_file *f = pw_file_open (model, &error);
   check_ok (error.status, &error);
   pw_model *m = pw_file_model (f, &error);
-  check_ok (pw_build (m, &error), &error);
-  pw_system *s = pw_compile (m, &error);
+  check_ok (pw_model_build (m, &error), &error);
+  pw_system *s = pw_system_compile (m, &error);
   check_ok (error.status, &error);
-  pw_run *r = pw_open (s, "rk4+baumgarte:alpha=2.5:beta=.5", &(pw_settings){ .step = 1e-2, .ledger = 1 }, &error);
+  pw_run *r = pw_run_open (s, "rk4+baumgarte:alpha=2.5:beta=.5", &(pw_settings){ .step = 1e-2, .ledger = 1 }, &error);
   check_ok (error.status, &error);
   snprintf (path, sizeof path, "%s/%s.csv", cli_folder, name);
   pw_output *o = pw_output_open (path, &error);
   pw_csv *csv = pw_csv_open (s, 1, o, &error);
   check_ok (error.status, &error);
   for (int i = 1; i <= 5; i++) {
-    check_ok (pw_advance_to (r, 0.05 * i, 1, &error), &error);
-    check_ok (pw_at (r, 0.05 * i, &sample, &error), &error);
+    check_ok (pw_run_advance_to (r, 0.05 * i, 1, &error), &error);
+    check_ok (pw_run_sample (r, 0.05 * i, &sample, &error), &error);
     check_ok (pw_csv_write (csv, s, &sample, &error), &error);
   }
   pw_csv_close (csv);
@@ -37,8 +37,8 @@ static void locale_write (const char *model, const char *name) {
   pw_summary summary = { .model = "x", .method = "y", .status = "ok", .reason = "", .cpu = 0.25 };
   check_ok (pw_json_write (&summary, s, &sample, 1, pw_run_statistics (r), o, &error), &error);
   check_ok (pw_output_finish (o, &error), &error);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   pw_model_free (m);
   pw_file_close (f);
 }

@@ -18,7 +18,7 @@ static const pw_plugin_table messages_table = { .abi = PW_ABI, .size = sizeof me
 
 static void messages_refused (pw_model *m, const char *text) {
   pw_error error = { 0 };
-  assert_null (pw_compile (m, &error));
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT, text);
   pw_model_free (m);
 }
@@ -163,7 +163,7 @@ static void test_bad_kinds (void **state) {
 }
 
 /* Writes as much as its definition has, whatever room there is. */
-static int messages_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int messages_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                              pw_error *error) {
   (void)bodies, (void)own, (void)error;
   memcpy (element, definition, sizeof (messages_chooser));
@@ -185,20 +185,20 @@ static void test_missing_names (void **state) {
   pw_model *m = scene_model (&messages_table, NULL);
   const pw_signal nothing = { 0 };
   pw_error error = { 0 };
-  assert_int_equal (pw_set (m, NULL, 1, &error), PW_INPUT);
+  assert_int_equal (pw_model_set (m, NULL, 1, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model scene: the name of a parameter is missing");
   error = (pw_error){ 0 };
-  assert_int_equal (pw_set_start (m, NULL, 1, &error), PW_INPUT);
+  assert_int_equal (pw_model_set_initial (m, NULL, 1, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model scene: the name of a state is missing");
   error = (pw_error){ 0 };
-  assert_int_equal (pw_set_signal (m, NULL, "value", &nothing, &error), PW_INPUT);
+  assert_int_equal (pw_model_set_signal (m, NULL, "value", &nothing, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model scene: the name of an element is missing");
   pw_system *s = scene_compile (m);
   error = (pw_error){ 0 };
-  assert_int_equal (pw_find_state (s, NULL, &error), PW_INPUT);
+  assert_int_equal (pw_system_find_state (s, NULL, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model scene: the name of a state is missing");
-  assert_int_equal (pw_find_body (s, NULL), -1);
-  pw_free (s);
+  assert_int_equal (pw_system_find_body (s, NULL), -1);
+  pw_system_free (s);
 }
 
 static const pw_parameter messages_outside[] = { { "a", 8, 1, "m", "a length", PW_REAL }, { .name = NULL } };

@@ -25,14 +25,14 @@ static own own_open (double factor) {
   own x = { .file = pw_file_open ("elliptic-wire", &error) };
   check_ok (x.file ? PW_OK : error.status, &error);
   pw_model *m = pw_file_model (x.file, &error);
-  check_ok (m ? pw_set (m, "factor", factor, &error) : error.status, &error);
-  check_ok (pw_build (m, &error), &error);
+  check_ok (m ? pw_model_set (m, "factor", factor, &error) : error.status, &error);
+  check_ok (pw_model_build (m, &error), &error);
   x.s = scene_compile (m);
   return x;
 }
 
 static void own_close (own *x) {
-  pw_free (x->s);
+  pw_system_free (x->s);
   pw_file_close (x->file);
 }
 
@@ -62,7 +62,7 @@ static void test_planet (void **state) {
     check_close ("N", trial_reaction (x.s, &now, "orbit.N"), 0, 5e-9, "(h w)^4 times the attraction");
     check_close ("balance", now.balance, 0, 5e-9, "(h w)^4");
   }
-  pw_close (r);
+  pw_run_close (r);
   own_close (&x);
 }
 
@@ -78,7 +78,7 @@ static void test_faster (void **state) {
     check_close ("force", -s * trial_reaction (x.s, &now, "orbit.N"), (1.2 * 1.2 - 1) * 4 / rho, 1e-7,
                  "t (h w)^4 times the force at perihelion");
   }
-  pw_close (r);
+  pw_run_close (r);
   own_close (&x);
 }
 
@@ -95,7 +95,7 @@ static void test_methods (void **state) {
     pw_sample now = runs_to (r, 2);
     double off = hypot (trial_state (x.s, &now, "bead.x") - p[0], trial_state (x.s, &now, "bead.y") - p[1]);
     check_below (method, off, 1e-4, "(h w)^2 for the methods of lowest order, 1e4 rtol for the others");
-    pw_close (r);
+    pw_run_close (r);
     own_close (&x);
   }
 }
@@ -111,10 +111,10 @@ typedef struct {
 
 enum { GUIDE_STIFFNESS = 600, GUIDE_RATE = 10 };
 
-static int guide_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *u,
+static int guide_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *u,
                           pw_error *error) {
   (void)definition, (void)bodies, (void)element, (void)error;
-  u[0] = (pw_own){ .mass = 1, .start = 0.1 };
+  u[0] = (pw_internal){ .mass = 1, .start = 0.1 };
   return PW_OK;
 }
 
@@ -193,8 +193,8 @@ static void test_guide (void **state) {
     const pw_statistics *n = pw_run_statistics (r);
     assert_true (n->rejected <= 5 && n->steps <= 2000 && n->jacobians <= n->steps);
     check_close (method, now.q[3], 0.1 * cos (GUIDE_RATE * 2.0), 1e-4, "t h^2 w^3, 1e4 rtol");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 

@@ -26,8 +26,8 @@ static queries queries_open (const char *model) {
   pw_error error = { 0 };
   queries k = { .file = pw_file_open (model, &error) };
   k.model = pw_file_model (k.file, &error);
-  check_ok (pw_build (k.model, &error), &error);
-  k.s = pw_compile (k.model, &error);
+  check_ok (pw_model_build (k.model, &error), &error);
+  k.s = pw_system_compile (k.model, &error);
   k.r = runs_open (k.s, "rk4+projection", &(pw_settings){ .step = 1e-3 });
   k.x = runs_to (k.r, 0.01);
   k.w = pw_workspace_new (k.s, &error);
@@ -36,9 +36,9 @@ static queries queries_open (const char *model) {
 }
 
 static void queries_close (queries *k) {
-  pw_close (k->r);
+  pw_run_close (k->r);
   pw_workspace_free (k->w);
-  pw_free (k->s);
+  pw_system_free (k->s);
   pw_model_free (k->model);
   pw_file_close (k->file);
 }
@@ -49,9 +49,9 @@ static void test_forces (void **state) {
   (void)state;
   for (int i = 0; i < SCENES; i++) {
     queries k = queries_open (queries_scene[i]);
-    int bodies = pw_count_bodies (k.s);
+    int bodies = pw_system_bodies (k.s);
     double *F = malloc ((size_t)pw_system_force_size (k.s) * sizeof *F), sum[3], size;
-    check_ok (pw_system_forces (k.w, k.x.t, k.x.q, k.x.v, k.x.lambda, F, NULL), NULL);
+    check_ok (pw_workspace_forces (k.w, k.x.t, k.x.q, k.x.v, k.x.lambda, F, NULL), NULL);
     for (int b = 0; b < bodies; b++)
       for (int c = 0; c < 3; c++) {
         sum[c] = -pw_system_mass (k.s)[3 * b + c] * k.x.a[3 * b + c];
@@ -92,7 +92,7 @@ static void test_equations (void **state) {
     for (int j = 0; j < e.rows; j++) check_close (queries_scene[i], Jv[j], e.eta[j], 1e-11 * largest, reason);
     for (int j = 0; j < e.holonomic; j++)
       check_below (queries_scene[i], fabs (e.g[j]), 1e-12, "positions are projected");
-    assert_int_equal (e.rows, pw_count_rows (k.s));
+    assert_int_equal (e.rows, pw_system_rows (k.s));
     free (r);
     pw_equations_free (&e);
     queries_close (&k);
@@ -116,17 +116,18 @@ static void test_elements (void **state) {
       assert_int_equal (info.row, rows);
       for (int row = rows; row < rows + info.kind->rows; row++) {
         assert_int_equal (pw_system_row_element (k.s, row), n);
-        assert_int_equal (info.kind->level, row < pw_count_holonomic (k.s) ? PW_HOLONOMIC : PW_NONHOLONOMIC);
-        assert_int_equal (strncmp (pw_reaction_name (k.s, row, name, sizeof name), info.name, strlen (info.name)), 0);
+        assert_int_equal (info.kind->level, row < pw_system_holonomic (k.s) ? PW_HOLONOMIC : PW_NONHOLONOMIC);
+        assert_int_equal (
+            strncmp (pw_system_reaction_name (k.s, row, name, sizeof name), info.name, strlen (info.name)), 0);
       }
       rows += info.kind->rows;
     }
     for (int j = 0; j < described; j++) found += e[j].kind->each_body;
     assert_int_equal (found, described);
-    assert_int_equal (rows, pw_count_rows (k.s));
+    assert_int_equal (rows, pw_system_rows (k.s));
     assert_int_equal (contacts, pw_system_contacts (k.s));
     const pw_body *b = pw_model_bodies (k.model, &bodies);
-    assert_int_equal (bodies, pw_count_bodies (k.s));
+    assert_int_equal (bodies, pw_system_bodies (k.s));
     for (int j = 0; j < bodies; j++) {
       assert_string_equal (b[j].name, pw_system_body_name (k.s, j));
       check_bits ("described start", pw_system_initial_q (k.s) + 3 * j, b[j].start, 3);
@@ -142,12 +143,12 @@ static void test_contacts (void **state) {
   (void)state;
   pw_error error = { 0 };
   queries k = queries_open ("ezyroller");
-  double out[4][3], *q = malloc ((size_t)pw_count_coordinates (k.s) * sizeof *q);
+  double out[4][3], *q = malloc ((size_t)pw_system_coordinates (k.s) * sizeof *q);
   assert_int_equal (pw_system_contacts (k.s), 2);
-  memcpy (q, k.x.q, (size_t)pw_count_coordinates (k.s) * sizeof *q);
-  check_ok (pw_system_contact_points (k.w, k.x.t, q, k.x.v, out, &error), &error);
-  for (int j = 0; j < pw_count_coordinates (k.s); j += 3) q[j] += at[0], q[j + 1] += at[1];
-  check_ok (pw_system_contact_points (k.w, k.x.t, q, k.x.v, out + 2, &error), &error);
+  memcpy (q, k.x.q, (size_t)pw_system_coordinates (k.s) * sizeof *q);
+  check_ok (pw_workspace_contact_points (k.w, k.x.t, q, k.x.v, out, &error), &error);
+  for (int j = 0; j < pw_system_coordinates (k.s); j += 3) q[j] += at[0], q[j + 1] += at[1];
+  check_ok (pw_workspace_contact_points (k.w, k.x.t, q, k.x.v, out + 2, &error), &error);
   for (int i = 0; i < 2; i++) {
     for (int c = 0; c < 2; c++)
       check_close ("displaced contact", out[2 + i][c], out[i][c] + at[c], 1e-15, "one rounding of numbers below 1");

@@ -241,7 +241,7 @@ static void shapes_refused (int of, pw_signal value, const char *text) {
     pw_add_steered_wheel (m, &(pw_steered_wheel){ .name = "X", .body = "frame", .heading = value });
   if (of == SHAPES_POSITION)
     pw_add_drive (m, &(pw_drive){ .name = "X", .body = { "frame", "ground" }, .what = PW_DRIVE_ANGLE, .value = value });
-  assert_null (pw_compile (m, &error));
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT, text);
   pw_model_free (m);
 }

@@ -65,7 +65,7 @@ static double signals_breakpoint (void *context, double t) {
 static pw_system *signals_scene (const pw_signal *torque) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", torque, &error), &error);
   return scene_compile (m);
 }
 
@@ -79,26 +79,26 @@ static void test_reads (void **state) {
   pw_system *s = signals_scene (&torque);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double q[6] = { 0, 0, 0.3, 0, 0, 0.7 }, v[6] = { 1.1, 0, 0, 0, 0, 0.9 }, f[9];
-  assert_int_equal (pw_place (w, 2, q, v), PW_OK);
+  assert_int_equal (pw_update_kinematics (w, 2, q, v), PW_OK);
   assert_true (c.calls == 1 && c.t == 2 && c.x[0] == 0.7 && c.x[1] == 1.1);
-  pw_sweep_force (w, f);
+  pw_evaluate_force (w, f);
   assert_true (f[2] == 2 + 2 * 0.7 + 3 * 1.1 && f[5] == -f[2] && f[0] == 0);
   q[5] = 0.8;
-  assert_int_equal (pw_place (w, 2, q, v), PW_OK);
+  assert_int_equal (pw_update_kinematics (w, 2, q, v), PW_OK);
   assert_true (c.calls == 2 && c.x[0] == 0.8); /* another state at the same time */
   v[0] = 1.3, q[5] = 0.9;
-  assert_int_equal (pw_place_rates (w, v), PW_OK);
+  assert_int_equal (pw_update_velocities (w, v), PW_OK);
   assert_true (c.calls == 3 && c.t == 2 && c.x[0] == 0.8 && c.x[1] == 1.3); /* other velocities there */
-  pw_sweep_force (w, f);
+  pw_evaluate_force (w, f);
   assert_true (f[2] == 2 + 2 * 0.8 + 3 * 1.3);
   c.fails = 1;
-  assert_int_equal (pw_place_rates (w, v), PW_METHOD);
+  assert_int_equal (pw_update_velocities (w, v), PW_METHOD);
   c.fails = 0;
   assert_true (pw_next_breakpoint (w, 0, 0) == 3 && isinf (pw_next_breakpoint (w, 0, 3)));
   c.fails = 1;
-  assert_int_equal (pw_place (w, 2.5, q, v), PW_METHOD);
+  assert_int_equal (pw_update_kinematics (w, 2.5, q, v), PW_METHOD);
   pw_workspace_free (w);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static int signals_of_angle (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -120,15 +120,15 @@ static void test_rates_spare (void **state) {
     pw_system *s = signals_scene (&torque);
     pw_workspace *w = pw_workspace_new (s, NULL);
     double q[6] = { 0 }, v[6] = { 0 };
-    assert_int_equal (pw_place (w, 2, q, v), PW_OK);
-    assert_int_equal (pw_place_rates (w, v), PW_OK);
+    assert_int_equal (pw_update_kinematics (w, 2, q, v), PW_OK);
+    assert_int_equal (pw_update_velocities (w, v), PW_OK);
     assert_int_equal (c.calls, 1 + velocity);
-    pw_hold (w, 1);
-    assert_int_equal (pw_place (w, 3, q, v), PW_OK);
-    assert_int_equal (pw_place_rates (w, v), PW_OK);
+    pw_hold_signals (w, 1);
+    assert_int_equal (pw_update_kinematics (w, 3, q, v), PW_OK);
+    assert_int_equal (pw_update_velocities (w, v), PW_OK);
     assert_int_equal (c.calls, 1 + velocity);
     pw_workspace_free (w);
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -140,25 +140,25 @@ static void test_sharing_and_hold (void **state) {
   pw_system *s = signals_scene (&torque);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double q[6] = { 0 }, v[6] = { 0 }, f[9];
-  pw_place (w, 2, q, v);
-  pw_place (w, 2, q, v);
+  pw_update_kinematics (w, 2, q, v);
+  pw_update_kinematics (w, 2, q, v);
   assert_int_equal (c.calls, 1);
-  pw_hold (w, 1);
-  pw_place (w, 3, q, v);
-  pw_sweep_force (w, f);
+  pw_hold_signals (w, 1);
+  pw_update_kinematics (w, 3, q, v);
+  pw_evaluate_force (w, f);
   assert_true (c.calls == 1 && f[2] == 4);
-  pw_hold (w, 0);
-  pw_place (w, 3, q, v);
-  pw_sweep_force (w, f);
+  pw_hold_signals (w, 0);
+  pw_update_kinematics (w, 3, q, v);
+  pw_evaluate_force (w, f);
   assert_true (c.calls == 2 && f[2] == 9);
   c.fails = 1;
-  assert_int_equal (pw_place (w, 4, q, v), PW_METHOD);
+  assert_int_equal (pw_update_kinematics (w, 4, q, v), PW_METHOD);
   c.fails = 0;
-  assert_int_equal (pw_place (w, 3, q, v), PW_OK); /* a failure in between leaves no value behind */
-  pw_sweep_force (w, f);
+  assert_int_equal (pw_update_kinematics (w, 3, q, v), PW_OK); /* a failure in between leaves no value behind */
+  pw_evaluate_force (w, f);
   assert_true (f[2] == 9);
   pw_workspace_free (w);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* ---- A constraint gets the derivatives, too ---- */
@@ -182,19 +182,19 @@ static void test_drive (void **state) {
   pw_system *s = scene_system (&table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double q[3] = { 0, 0, 10 }, v[3] = { 0 }, y;
-  pw_place (w, 3, q, v);
-  pw_sweep_g (w, &y);
+  pw_update_kinematics (w, 3, q, v);
+  pw_evaluate_g (w, &y);
   assert_true (y == 10 - 9);
-  pw_sweep_eta (w, &y);
+  pw_evaluate_eta (w, &y);
   assert_true (y == 6);
-  pw_sweep_gamma (w, &y);
+  pw_evaluate_gamma (w, &y);
   assert_true (y == 2);
-  pw_hold (w, 1); /* holds forces only */
-  pw_place (w, 4, q, v);
-  pw_sweep_g (w, &y);
+  pw_hold_signals (w, 1); /* holds forces only */
+  pw_update_kinematics (w, 4, q, v);
+  pw_evaluate_g (w, &y);
   assert_true (y == 10 - 16);
   pw_workspace_free (w);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 int main (void) {

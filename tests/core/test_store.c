@@ -137,9 +137,9 @@ static void test_first_error_stays (void **state) {
   (void)state;
   pw_error error = { 0 };
   assert_int_equal (pw_fail (&error, PW_INPUT, "first %d", 1), PW_INPUT);
-  assert_int_equal (pw_fail (&error, PW_MACHINE, "second"), PW_MACHINE);
+  assert_int_equal (pw_fail (&error, PW_RESOURCE, "second"), PW_RESOURCE);
   check_error (&error, PW_INPUT, "first 1");
-  assert_int_equal (pw_fail (NULL, PW_START, "nobody listens"), PW_START);
+  assert_int_equal (pw_fail (NULL, PW_INITIAL, "nobody listens"), PW_INITIAL);
 }
 
 static void test_long_error (void **state) {

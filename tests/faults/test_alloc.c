@@ -34,10 +34,10 @@ static void alloc_each (alloc_scenario *scenario, const char *what) {
       assert_true (fail > 1);
       return;
     }
-    if (status != PW_MACHINE || strstr (error.text, "out of memory") == NULL)
+    if (status != PW_RESOURCE || strstr (error.text, "out of memory") == NULL)
       print_error ("%s: allocation %ld failed: status %d, \"%s\"\n", what, fail, status, error.text);
-    assert_int_equal (status, PW_MACHINE);
-    assert_int_equal (error.status, PW_MACHINE);
+    assert_int_equal (status, PW_RESOURCE);
+    assert_int_equal (error.status, PW_RESOURCE);
     assert_non_null (strstr (error.text, "out of memory"));
   }
 }
@@ -45,14 +45,14 @@ static void alloc_each (alloc_scenario *scenario, const char *what) {
 /* The EzyRoller with toys on it, built from outside. */
 static int alloc_model (pw_model **m, pw_error *error) {
   *m = pw_model_new ("ezyroller", &scene_ezyroller, error);
-  int status = *m ? pw_set (*m, "M0", 0.2, error) : error->status;
-  if (status == PW_OK) status = pw_build (*m, error);
+  int status = *m ? pw_model_set (*m, "M0", 0.2, error) : error->status;
+  if (status == PW_OK) status = pw_model_build (*m, error);
   if (status != PW_OK) return status;
   pw_add (*m, &toy_kind_spring,
           &(toy_spring){
               .name = "k", .body = { "frame", "ground" }, .at = { { 1, 1 }, { 0 } }, .stiffness = 0.01, .length = 1 });
-  status = pw_set_start (*m, "frame.vx", 0.1, error);
-  if (status == PW_OK) status = pw_set_start (*m, "steer.phi", 3, error);
+  status = pw_model_set_initial (*m, "frame.vx", 0.1, error);
+  if (status == PW_OK) status = pw_model_set_initial (*m, "steer.phi", 3, error);
   return status;
 }
 
@@ -61,7 +61,7 @@ static int alloc_system (pw_system **s, pw_error *error) {
   *s = NULL;
   int status = alloc_model (&m, error);
   if (status == PW_OK) {
-    *s = pw_compile (m, error);
+    *s = pw_system_compile (m, error);
     status = *s ? PW_OK : error->status;
   }
   pw_model_free (m);
@@ -72,7 +72,7 @@ static int alloc_compile (const char *what, pw_error *error) {
   (void)what;
   pw_system *s;
   int status = alloc_system (&s, error);
-  pw_free (s);
+  pw_system_free (s);
   return status;
 }
 
@@ -81,16 +81,16 @@ static int alloc_run (const char *method, pw_error *error) {
   pw_sample sample;
   int status = alloc_system (&s, error);
   if (status != PW_OK) return status;
-  pw_run *r = pw_open (s, method, &(pw_settings){ .step = 1e-2, .rtol = 1e-4, .ledger = 1 }, error);
-  status = r ? pw_advance_to (r, 0.1, 0.1, error) : error->status;
-  if (status == PW_OK) status = pw_at (r, pw_time (r), &sample, error);
+  pw_run *r = pw_run_open (s, method, &(pw_settings){ .step = 1e-2, .rtol = 1e-4, .ledger = 1 }, error);
+  status = r ? pw_run_advance_to (r, 0.1, 0.1, error) : error->status;
+  if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, error);
   pw_archive archive = { .at = NULL };
   if (status == PW_OK) status = pw_run_save (r, &archive, error);
   pw_archive_free (&archive);
-  if (status == PW_OK) status = pw_restart (r, NULL, NULL, error);
-  if (status == PW_OK) status = pw_advance (r, 0.2, error);
-  pw_close (r);
-  pw_free (s);
+  if (status == PW_OK) status = pw_run_restart (r, NULL, NULL, error);
+  if (status == PW_OK) status = pw_run_advance (r, 0.2, error);
+  pw_run_close (r);
+  pw_system_free (s);
   return status;
 }
 
@@ -107,14 +107,14 @@ static int alloc_check (const char *what, pw_error *error) {
   pw_selftest_report report = { 0 };
   (void)what;
   int status = alloc_system (&s, error);
-  pw_run *r = status == PW_OK ? pw_open (s, "rk4+projection", NULL, error) : NULL;
+  pw_run *r = status == PW_OK ? pw_run_open (s, "rk4+projection", NULL, error) : NULL;
   if (status == PW_OK && r == NULL) status = error->status;
-  if (status == PW_OK) status = pw_linearise (r, 100, &linear, error);
+  if (status == PW_OK) status = pw_run_linearise (r, 100, &linear, error);
   if (status == PW_OK)
-    status = pw_selftest_scene (s, 1, &pw_kind_pin, 0, pw_run_start (r)->q, pw_run_start (r)->v, 1, &report, error);
-  pw_linear_close (&linear);
-  pw_close (r);
-  pw_free (s);
+    status = pw_selftest_scene (s, 1, &pw_kind_pin, 0, pw_run_initial (r)->q, pw_run_initial (r)->v, 1, &report, error);
+  pw_linear_free (&linear);
+  pw_run_close (r);
+  pw_system_free (s);
   return status;
 }
 
@@ -128,7 +128,7 @@ static int alloc_verify (const char *what, pw_error *error) {
     status = pw_verify (s, &(pw_scale){ 1, 1 }, 0, zero, zero, zero, zero, &result);
     if (status != PW_OK) pw_fail (error, status, "out of memory");
   }
-  pw_free (s);
+  pw_system_free (s);
   return status;
 }
 
@@ -138,28 +138,28 @@ static int alloc_files (const char *path, pw_error *error) {
   char part[200];
   int status = alloc_system (&s, error);
   if (status != PW_OK) return status;
-  pw_run *r = pw_open (s, "rk4", &(pw_settings){ .ledger = 1 }, error);
+  pw_run *r = pw_run_open (s, "rk4", &(pw_settings){ .ledger = 1 }, error);
   pw_output *table = r ? pw_output_open (path, error) : NULL;
   pw_csv *csv = table ? pw_csv_open (s, 1, table, error) : NULL;
-  status = csv ? pw_at (r, 0, &sample, error) : error->status;
+  status = csv ? pw_run_sample (r, 0, &sample, error) : error->status;
   if (status == PW_OK) status = pw_csv_write (csv, s, &sample, error);
   pw_csv_close (csv);
   if (table && status == PW_OK)
     status = pw_output_finish (table, error);
   else if (table)
     pw_output_abandon (table, part, sizeof part);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   return status;
 }
 
 static int alloc_text (const char *path, pw_error *error) {
   pw_file *f = pw_file_open (path, error);
   pw_model *m = f ? pw_file_model (f, error) : NULL;
-  int status = m ? pw_build (m, error) : error->status;
-  pw_system *s = status == PW_OK ? pw_compile (m, error) : NULL;
+  int status = m ? pw_model_build (m, error) : error->status;
+  pw_system *s = status == PW_OK ? pw_system_compile (m, error) : NULL;
   status = s ? PW_OK : error->status;
-  pw_free (s);
+  pw_system_free (s);
   pw_model_free (m);
   pw_file_close (f);
   return status;
@@ -221,8 +221,8 @@ static void test_steps (void **state) {
     long before = alloc.count;
     runs_to (r, 2);
     assert_int_equal (alloc.count, before);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 

@@ -108,17 +108,17 @@ FAULT_KLU (0, klu_l_solve, (klu_l_symbolic * s, klu_l_numeric *f, int64_t n, int
 static int fault_run (pw_system *s, const char *method, pw_error *error) {
   pw_sample sample;
   pw_archive archive = { .at = NULL };
-  pw_run *r = pw_open (s, method, &(pw_settings){ .step = 0.02, .rtol = 1e-3, .ledger = 1 }, error);
-  int status = r ? pw_advance_to (r, 0.1, 0.1, error) : error->status;
-  if (status == PW_OK) status = pw_advance (r, 0.2, error);
-  if (status == PW_OK) status = pw_at (r, 0.5 * (0.1 + pw_time (r)), &sample, error);
+  pw_run *r = pw_run_open (s, method, &(pw_settings){ .step = 0.02, .rtol = 1e-3, .ledger = 1 }, error);
+  int status = r ? pw_run_advance_to (r, 0.1, 0.1, error) : error->status;
+  if (status == PW_OK) status = pw_run_advance (r, 0.2, error);
+  if (status == PW_OK) status = pw_run_sample (r, 0.5 * (0.1 + pw_run_time (r)), &sample, error);
   if (status == PW_OK) status = pw_run_save (r, &archive, error);
-  if (status == PW_OK) status = pw_advance (r, 0.3, error);
-  if (status == PW_OK) status = pw_restart (r, NULL, NULL, error);
-  if (status == PW_OK) status = pw_advance (r, 0.4, error);
-  if (status == PW_OK) status = pw_at (r, pw_time (r), &sample, error);
+  if (status == PW_OK) status = pw_run_advance (r, 0.3, error);
+  if (status == PW_OK) status = pw_run_restart (r, NULL, NULL, error);
+  if (status == PW_OK) status = pw_run_advance (r, 0.4, error);
+  if (status == PW_OK) status = pw_run_sample (r, pw_run_time (r), &sample, error);
   pw_archive_free (&archive);
-  pw_close (r);
+  pw_run_close (r);
   return status;
 }
 
@@ -160,7 +160,7 @@ static void fault_each (pw_system *s, const char *method) {
       check_ok (status, &error);
       break;
     }
-    int good = (status == PW_MACHINE || status == PW_METHOD) && error.status == status && strlen (error.text) > 10 &&
+    int good = (status == PW_RESOURCE || status == PW_METHOD) && error.status == status && strlen (error.text) > 10 &&
                strstr (error.text, "s:  ") == NULL;
     if (status == PW_OK) good = fault_may_pass ();
     if (!good)
@@ -175,7 +175,7 @@ static void test_faults (void **state) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   char name[40];
   for (int i = 0; runs_method (i, name); i++) fault_each (s, name);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* A scene large enough for its rows to be ordered. */
@@ -184,7 +184,7 @@ static void test_ordering (void **state) {
   pw_system *s = scene_system (&faults_chain, "n", 20.0, NULL);
   fault_each (s, "rk4+projection");
   assert_true (fault.name && strcmp (fault.name, "amd_order") == 0);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 int main (void) {

@@ -31,14 +31,14 @@ static scene scene_of (const char *elements, const char *value) {
   scene x = { .file = pw_file_open (path, &error) };
   check_ok (x.file ? PW_OK : error.status, &error);
   x.model = pw_file_model (x.file, &error);
-  check_ok (pw_build (x.model, &error), &error);
-  x.system = pw_compile (x.model, &error);
+  check_ok (pw_model_build (x.model, &error), &error);
+  x.system = pw_system_compile (x.model, &error);
   check_ok (x.system ? PW_OK : error.status, &error);
   return x;
 }
 
 static void scene_close (scene *x) {
-  pw_free (x->system);
+  pw_system_free (x->system);
   pw_model_free (x->model);
   pw_file_close (x->file);
 }
@@ -139,13 +139,13 @@ static void test_no_derivative (void **state) {
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
     scene x = scene_of ("  - {drive: D, body: [a, ground], what: angle, value: @}\n", value[i]);
-    pw_run *r = pw_open (x.system, "rk4+projection", &(pw_settings){ .step = 0.1 }, &error);
+    pw_run *r = pw_run_open (x.system, "rk4+projection", &(pw_settings){ .step = 0.1 }, &error);
     if (i == 0)
       check_error (&error, PW_METHOD,
                    "t = 0 s: a signal failed: drive D: value, or a derivative of it, is not a finite number");
     else
       check_close ("angle", runs_to (r, 2).q[2], 4, 1e-13, "round-off");
-    pw_close (r);
+    pw_run_close (r);
     scene_close (&x);
   }
 }

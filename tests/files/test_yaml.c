@@ -24,15 +24,15 @@ static text text_open (const char *name, const char *parameter, double value) {
   check_ok (x.file ? PW_OK : error.status, &error);
   x.model = pw_file_model (x.file, &error);
   check_ok (x.model ? PW_OK : error.status, &error);
-  if (parameter) check_ok (pw_set (x.model, parameter, value, &error), &error);
-  check_ok (pw_build (x.model, &error), &error);
-  x.system = pw_compile (x.model, &error);
+  if (parameter) check_ok (pw_model_set (x.model, parameter, value, &error), &error);
+  check_ok (pw_model_build (x.model, &error), &error);
+  x.system = pw_system_compile (x.model, &error);
   check_ok (x.system ? PW_OK : error.status, &error);
   return x;
 }
 
 static void text_close (text *x) {
-  pw_free (x->system);
+  pw_system_free (x->system);
   pw_model_free (x->model);
   pw_file_close (x->file);
 }
@@ -97,10 +97,10 @@ static void test_parameters (void **state) {
   pw_file *f = pw_file_open ("tests/models/ezyroller.yaml", &error);
   check_ok (f ? PW_OK : error.status, &error);
   pw_model *m = pw_file_model (f, &error);
-  assert_int_equal (pw_set (m, "omga", 1, &error), PW_INPUT);
+  assert_int_equal (pw_model_set (m, "omga", 1, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model ezyroller has no parameter \"omga\"; did you mean \"omega\"?");
   error.status = 0;
-  assert_int_equal (pw_set (m, "m1", 0, &error), PW_INPUT);
+  assert_int_equal (pw_model_set (m, "m1", 0, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model ezyroller: parameter m1 = 0: expected a number > 0");
   pw_model_free (m);
   pw_file_close (f);
@@ -243,8 +243,8 @@ static void test_no_value (void **state) {
   pw_error error = { 0 };
   (void)state;
   pw_run *r = runs_open (x.system, "rk4", &(pw_settings){ .step = 1e-2 });
-  assert_int_equal (pw_advance_to (r, 2, 2, &error), PW_METHOD);
-  pw_close (r);
+  assert_int_equal (pw_run_advance_to (r, 2, 2, &error), PW_METHOD);
+  pw_run_close (r);
   text_close (&x);
 }
 

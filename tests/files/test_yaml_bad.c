@@ -16,7 +16,7 @@ static pw_error bad_open (const char *path) {
   pw_error error = { 0 };
   pw_file *f = pw_file_open (path, &error);
   pw_model *m = f ? pw_file_model (f, &error) : NULL;
-  if (m && pw_build (m, &error) == PW_OK) pw_free (pw_compile (m, &error));
+  if (m && pw_model_build (m, &error) == PW_OK) pw_system_free (pw_system_compile (m, &error));
   pw_model_free (m);
   pw_file_close (f);
   return error;

@@ -28,15 +28,15 @@ static void format_run (void) {
   pw_file *f = pw_file_open (format_path, &error);
   check_ok (f ? PW_OK : error.status, &error);
   pw_model *m = pw_file_model (f, &error);
-  check_ok (m ? pw_build (m, &error) : PW_MACHINE, &error);
-  pw_system *s = pw_compile (m, &error);
+  check_ok (m ? pw_model_build (m, &error) : PW_RESOURCE, &error);
+  pw_system *s = pw_system_compile (m, &error);
   check_ok (s ? PW_OK : error.status, &error);
   const pw_run_defaults *d = &pw_file_table (f)->run;
   pw_run *r = runs_open (s, d->method ? d->method : "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   pw_sample end = runs_to (r, 1);
   check_below ("position residual of an example", end.position, 1e-13, "projected: round-off");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   pw_model_free (m);
   pw_file_close (f);
 }

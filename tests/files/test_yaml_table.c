@@ -34,11 +34,11 @@ static pw_error table_build (const char *table, pw_signal *signal, double point[
   table_write ("model/m.yaml", text, strlen (text));
   pw_file *f = pw_file_open (table_in ("model/m.yaml"), &error);
   pw_model *m = f ? pw_file_model (f, &error) : NULL;
-  if (m && pw_build (m, &error) == PW_OK) {
+  if (m && pw_model_build (m, &error) == PW_OK) {
     *signal = ((const pw_torque *)m->element[0].definition)->value;
     for (int i = 0; i < 3 && i < signal->table.count; i++)
       point[0][i] = signal->table.t[i], point[1][i] = signal->table.value[i];
-    pw_free (pw_compile (m, &error));
+    pw_system_free (pw_system_compile (m, &error));
   }
   pw_model_free (m);
   pw_file_close (f);
@@ -131,7 +131,7 @@ static void table_unit (const char *element, const char *header, double expected
   pw_file *f = pw_file_open (table_in ("model/m.yaml"), &error);
   pw_model *m = f ? pw_file_model (f, &error) : NULL;
   assert_non_null (m);
-  int status = pw_build (m, &error);
+  int status = pw_model_build (m, &error);
   if (text) {
     assert_int_equal (status, PW_INPUT);
     assert_non_null (strstr (error.text, text));

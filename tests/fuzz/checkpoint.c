@@ -19,15 +19,15 @@ enum { CHECKPOINT_METHODS = sizeof checkpoint_methods / sizeof *checkpoint_metho
 static void checkpoint_load (const uint8_t *data, size_t size, const char *method) {
   pw_error error = { 0 };
   pw_settings settings = { .step = 1e-3, .rtol = 1e-6, .span = 1, .ledger = 1 };
-  pw_run *r = pw_open (fuzz_pendulum (), method, &settings, &error);
+  pw_run *r = pw_run_open (fuzz_pendulum (), method, &settings, &error);
   pw_archive a = { .at = (unsigned char *)(size_t)data, .size = size, .loading = 1 };
   if (r == NULL) abort ();
   if (pw_run_load (r, &a, &error) == PW_OK) {
-    double t = pw_time (r);
-    for (int i = 0; i < 2 && error.status == PW_OK && t < 1e6; i++) pw_advance (r, t + 1e-3, &error);
+    double t = pw_run_time (r);
+    for (int i = 0; i < 2 && error.status == PW_OK && t < 1e6; i++) pw_run_advance (r, t + 1e-3, &error);
   } else if (error.status >= 0)
     abort ();
-  pw_close (r);
+  pw_run_close (r);
 }
 
 /* ---- Forged ---- */

@@ -146,7 +146,7 @@ static pw_model *fuzz_model;
 static pw_system *fuzz_system;
 
 static void fuzz_free (void) {
-  pw_free (fuzz_system);
+  pw_system_free (fuzz_system);
   pw_model_free (fuzz_model);
   pw_file_close (fuzz_model_file);
 }
@@ -156,7 +156,7 @@ struct pw_system *fuzz_pendulum (void) {
   if (fuzz_system) return fuzz_system;
   fuzz_model_file = pw_file_open ("models/pendulum.yaml", &error);
   fuzz_model = fuzz_model_file ? pw_file_model (fuzz_model_file, &error) : NULL;
-  if (fuzz_model && pw_build (fuzz_model, &error) == PW_OK) fuzz_system = pw_compile (fuzz_model, &error);
+  if (fuzz_model && pw_model_build (fuzz_model, &error) == PW_OK) fuzz_system = pw_system_compile (fuzz_model, &error);
   if (fuzz_system == NULL) {
     fprintf (stderr, "%s\n", error.text);
     exit (1);

@@ -13,14 +13,14 @@
 static void model_run (pw_system *s, const char *method) {
   pw_error error = { 0 };
   pw_settings settings = { .step = 1e-3, .span = 1e-2, .ledger = 1 };
-  pw_run *r = s->coords <= 60 && s->rows <= 60 ? pw_open (s, method, &settings, &error) : NULL;
-  for (int i = 0; r && i < 3 && error.status == PW_OK; i++) pw_advance (r, 1, &error);
+  pw_run *r = s->coords <= 60 && s->rows <= 60 ? pw_run_open (s, method, &settings, &error) : NULL;
+  for (int i = 0; r && i < 3 && error.status == PW_OK; i++) pw_run_advance (r, 1, &error);
   pw_linear linear = { .A = NULL };
-  if (r && pw_linearise (r, 20, &linear, &(pw_error){ 0 }) == PW_OK && linear.A)
+  if (r && pw_run_linearise (r, 20, &linear, &(pw_error){ 0 }) == PW_OK && linear.A)
     for (int i = 0; i < linear.unknowns; i++)
       if (isinf (linear.re[i]) || isinf (linear.im[i])) abort ();
-  pw_linear_close (&linear);
-  if (r) pw_close (r);
+  pw_linear_free (&linear);
+  if (r) pw_run_close (r);
 }
 
 int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
@@ -29,10 +29,10 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
   pw_error error = { 0 };
   pw_file *file = pw_file_open (fuzz_file (data, size, ".yaml"), &error);
   pw_model *m = file ? pw_file_model (file, &error) : NULL;
-  pw_system *s = m && pw_build (m, &error) == PW_OK ? pw_compile (m, &error) : NULL;
+  pw_system *s = m && pw_model_build (m, &error) == PW_OK ? pw_system_compile (m, &error) : NULL;
   if (s == NULL && error.status >= 0) abort (); /* what fails says so */
   if (s) model_run (s, methods[size % 5]);
-  pw_free (s);
+  pw_system_free (s);
   pw_model_free (m);
   pw_file_close (file);
   return 0;

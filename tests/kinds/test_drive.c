@@ -74,8 +74,8 @@ static void drive_shake (const char *method, double bound, const char *reason) {
                (drive_p.M + m) * drive_p.g + m * l * (om2 * sin (th) + om * om * cos (th)), 1e3 * bound, reason);
   check_close ("balance", x.balance, 0, 1e3 * bound, reason);
   assert_true (fabs (x.work) > 0.1);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_shaken (void **state) {
@@ -118,7 +118,7 @@ static void test_bead (void **state) {
   (void)state;
   pw_system *s = scene_system (&drive_bead_table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
-  check_below ("start", pw_run_start (r)->velocity, 16 * CHECK_EPS, "given consistently");
+  check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   double b2 = 0.1 * 0.1, J0 = drive_b.I + drive_b.i + drive_b.m * (drive_b.r * drive_b.r + b2);
   double L = J0 * drive_b.w + drive_b.m * -0.1 * drive_b.A * drive_b.s; /* the path lies 0.1 m beside the centre */
   for (int i = 1; i <= 10; i++) {
@@ -139,8 +139,8 @@ static void test_bead (void **state) {
                  "10 (h w)^4 at h = 1e-3 and w = 4/s");
     check_close ("balance", x.balance, 0, 1e-9, "(h w)^4");
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- A flywheel turned by s (t) against a platform: both angular momenta add up to nothing ---- */
@@ -166,15 +166,15 @@ static void test_flywheel (void **state) {
   const char *reason = "(h w)^4 at h = 1e-3 and w = 2/s";
   check_close ("flywheel", x.q[2], angle * 0.6 / 0.8, bound, reason);
   check_close ("platform", x.q[5], -angle * 0.2 / 0.8, bound, reason);
-  for (int row = 0; row < pw_count_rows (s); row++) {
+  for (int row = 0; row < pw_system_rows (s); row++) {
     char name[40];
-    int moment = strcmp (pw_reaction_name (s, row, name, sizeof name), "motor.F") == 0;
-    assert_string_equal (pw_reaction_unit (s, row), moment ? "N m" : "N");
+    int moment = strcmp (pw_system_reaction_name (s, row, name, sizeof name), "motor.F") == 0;
+    assert_string_equal (pw_system_reaction_unit (s, row), moment ? "N m" : "N");
   }
   check_close ("moment", trial_reaction (s, &x, "motor.F"), 0.2 * 12 * cos (2.6) * 0.6 / 0.8, bound, reason);
   check_close ("work", x.work, x.kinetic, bound, reason);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- Starts, and what is refused ---- */
@@ -188,8 +188,8 @@ static void test_start (void **state) {
   double bound = 64 * CHECK_EPS;
   check_close ("X", x.q[0], drive_p.A * cos (drive_p.w * 0.7), bound, "the constraint");
   check_close ("X'", x.v[0], -drive_p.A * drive_p.w * sin (drive_p.w * 0.7), bound, "the constraint");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static int drive_follow (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -204,8 +204,8 @@ static void test_refused (void **state) {
   pw_error error = { 0 };
   pw_signal follow = { PW_FUNCTION, .function = { .eval = drive_follow, .reads = reads } };
   pw_model *m = scene_model (&drive_shaken_table, NULL);
-  check_ok (pw_set_signal (m, "shaker", "value", &follow, &error), &error);
-  assert_null (pw_compile (m, &error));
+  check_ok (pw_model_set_signal (m, "shaker", "value", &follow, &error), &error);
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT, "model scene: drive shaker: value: a constraint's signal may depend on time only");
   pw_model_free (m);
 }

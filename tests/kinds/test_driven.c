@@ -9,7 +9,7 @@
 static pw_system *driven_scene (const pw_signal *torque) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", torque, &error), &error);
   return scene_compile (m);
 }
 
@@ -18,7 +18,7 @@ static void driven_run (const pw_signal *torque, const char *method, const pw_se
   double v[6];
   pw_system *s = driven_scene (torque);
   runs_state (s, method, settings, 4, q, v, cost);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static double driven_error (const pw_signal *torque, const char *method, double step, const double *exact) {
@@ -106,11 +106,11 @@ static void test_short_pulse (void **state) {
     double q[3], v[3];
     pw_error error = { 0 };
     pw_model *m = scene_model (&driven_disc_table, NULL);
-    check_ok (pw_set_signal (m, "push", "value", &force, &error), &error);
+    check_ok (pw_model_set_signal (m, "push", "value", &force, &error), &error);
     pw_system *s = scene_compile (m);
     runs_state (s, method[i], &(pw_settings){ .rtol = 1e-6, .step = 0.7, .span = 40 }, 40, q, v, NULL);
     check_close (method[i], v[2], 0.5, 1e-9, "torque times time over inertia: round-off of times");
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -122,13 +122,13 @@ static void test_copies (void **state) {
   (void)state;
   driven_run (&torque, "rk4", &(pw_settings){ .step = 0.01 }, q[0], NULL);
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   memset (t, 0, sizeof t);
   memset (y, 0, sizeof y);
   pw_system *s = scene_compile (m);
   runs_state (s, "rk4", &(pw_settings){ .step = 0.01 }, 4, q[1], v, NULL);
   check_bits ("states", q[0], q[1], 6);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* A crank driven through the points of a cubic table, whose acceleration has a kink at each: where methods of higher order end
@@ -173,7 +173,7 @@ static void test_knots (void **state) {
   check_close ("erk8, fixed", q[5], exact[5], 1e-12, "round-off; 1e-8 where kinks lie inside of steps");
   runs_state (s, "bdf+projection", &(pw_settings){ .rtol = 1e-6, .span = 4 }, 4, q, v, &cost);
   assert_true (cost.steps < 700); /* some 350; 900 if it started anew at each point */
-  pw_free (s);
+  pw_system_free (s);
 }
 
 int main (void) {

@@ -61,12 +61,12 @@ static void feedback_run (const char *method, double signals, double step, doubl
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-8, .span = 1 });
   runs_to (r, 1);
   for (int i = 0; i < 2; i++, state += 12) {
-    check_ok (pw_at (r, 1 - 0.3 * i * step, &x, &error), &error);
+    check_ok (pw_run_sample (r, 1 - 0.3 * i * step, &x, &error), &error);
     memcpy (state, x.q, 6 * sizeof *state);
     memcpy (state + 6, x.a, 6 * sizeof *state);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_methods (void **state) {

@@ -65,8 +65,8 @@ static void friction_rub (const char *method, double viscous, double limit, doub
     check_close ("loss", x.loss, I * (friction_d.w * friction_d.w - w * w) / 2, bound, reason);
     check_close ("balance", x.balance, 0, bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_discs (void **state) {
@@ -113,8 +113,8 @@ static void friction_slide (const char *method, double viscous, double limit, do
     check_close ("loss", x.loss, M * (friction_b.v * friction_b.v - w * w) / 2, 10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_slide (void **state) {
@@ -128,7 +128,7 @@ static void test_refused (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&friction_discs_table, "limit", 0.2, "speed", 0.0, NULL);
-  assert_null (pw_compile (m, &error));
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT,
                "model scene: friction rub: speed = 0: expected > 0, since below it the limit is smoothed");
   pw_model_free (m);
@@ -171,8 +171,8 @@ static void friction_fly (const char *method, double linear, double quadratic, d
         10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_flight (void **state) {
@@ -216,8 +216,8 @@ static void friction_coast (const char *method, double bound, const char *reason
     check_close ("loss", x.loss, friction_c.m * (friction_c.v * friction_c.v - v * v) / 2, 10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_coast (void **state) {

@@ -49,7 +49,7 @@ static void gear_turn (double ratio, double held) {
   const double bound = 1e5 * CHECK_EPS;
   const char *reason = "RK4 is exact for parabolas: round-off of 200 steps";
   double i = held > 0 ? 1 - ratio : ratio, a = gear_T / (gear_I[0] + gear_I[1] / (i * i));
-  check_below ("start", pw_run_start (r)->position, 16 * CHECK_EPS, "the start's own offset");
+  check_below ("start", pw_run_initial (r)->position, 16 * CHECK_EPS, "the start's own offset");
   pw_sample x = runs_to (r, 2);
   check_close ("in", x.q[2], 0.4 + 2 * a, bound, reason);
   check_close ("out", x.q[5], -0.3 + 2 * a / i, bound, reason);
@@ -57,8 +57,8 @@ static void gear_turn (double ratio, double held) {
   check_close ("moment", trial_reaction (s, &x, "gear.M"), gear_I[0] * a - gear_T, bound, reason);
   check_close ("work", x.work, gear_T * 2 * a, bound, reason);
   check_close ("balance", x.balance, 0, bound, reason);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_turn (void **state) {
@@ -74,12 +74,12 @@ static void test_offset (void **state) {
   (void)state;
   pw_system *s = scene_system (&gear_table, "from", (double)PW_GEAR_OFFSET, "offset", 0.25, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-2 });
-  const double *q = pw_run_start (r)->q;
+  const double *q = pw_run_initial (r)->q;
   check_close ("offset", q[2] + 3 * q[5], 0.25, 100 * CHECK_EPS, "the constraint");
   check_close ("least change", gear_I[0] * (q[2] - 0.4), gear_I[1] * (q[5] + 0.3) / 3, 1e-9,
                "the change is M^-1 G^T times a number");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void gear_twice (pw_model *m, const void *parameters) {
@@ -94,12 +94,12 @@ static void test_refused (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&gear_table, "ratio", 0.0, NULL);
-  assert_null (pw_compile (m, &error));
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT, "model scene: gear gear: ratio = 0: expected another number, positive or negative");
   pw_model_free (m);
   error = (pw_error){ 0 };
   m = scene_model (&twice, NULL);
-  assert_null (pw_compile (m, &error));
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT, "model scene: gear gear: two of its bodies are \"a\"");
   pw_model_free (m);
 }

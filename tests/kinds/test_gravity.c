@@ -30,8 +30,8 @@ static void test_fall (void **state) {
   check_close ("balance", x.balance, 0, 1e3 * bound, "round-off of an energy of 1 kJ");
   for (int k = 0; k < s->slabs; k++)
     if (s->slab[k].kind == &pw_kind_gravity) assert_int_equal (s->slab[k].b.count, 1);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- Knife edge on an incline: x = k sin^2 wt, y = k (wt - sin (2wt) / 2), k = g sin alpha / 2w^2 ---- */
@@ -58,8 +58,8 @@ static void gravity_skate (const char *method, double bound, const char *reason)
     check_close ("x (10 s)", x.q[0], 0.7258393717013280771, bound, reason);
     check_close ("y (10 s)", x.q[1], 23.40550088629524659, bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_incline (void **state) {
@@ -88,8 +88,8 @@ static void test_pendulum (void **state) {
   check_close ("x", x.q[0], 0.2750874625761168601, 1e-9, "10 (h g/L)^4 at h = 1e-3, over 4 swings");
   check_close ("y", x.q[1], -0.9614192050991250643, 1e-9, "10 (h g/L)^4 at h = 1e-3, over 4 swings");
   check_close ("balance", x.balance, 0, 1e-9, "10 (h g/L)^4");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- A kind of one's own that acts on every body: drag, f = -c v on each centre of mass ---- */
@@ -99,7 +99,7 @@ typedef struct {
   double c; /* [N s/m] */
 } gravity_drag;
 
-static int gravity_drag_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int gravity_drag_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                                  pw_error *error) {
   *(double *)element = ((const gravity_drag *)definition)->c;
   (void)bodies, (void)own, (void)error;
@@ -164,17 +164,17 @@ static void test_each_body (void **state) {
   pw_system *s = scene_system (&gravity_rain_table, NULL);
   pw_run *r = runs_open (s, "rk4", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   pw_sample x = runs_to (r, 1);
-  assert_int_equal (pw_count_ledger (s), 2);
+  assert_int_equal (pw_system_ledger_entries (s), 2);
   for (int i = 0; i < 2; i++) {
     char name[60];
     double end = -mass[i] * 9.81 / 0.8;
     check_close ("vy", x.v[3 * i + 1], end + (up[i] - end) * exp (-0.8 / mass[i]), 1e-11, "10 (h c / m)^4");
-    assert_string_equal (pw_ledger_name (s, i, name, sizeof name), entry[i]);
+    assert_string_equal (pw_system_ledger_name (s, i, name, sizeof name), entry[i]);
     assert_true (x.ledger[i] > 0);
   }
   check_close ("balance", x.balance, 0, 1e-9, "1000 (h c / m)^4");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_methods (void **state) {

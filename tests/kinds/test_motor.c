@@ -72,8 +72,8 @@ static void motor_swing (const char *method, double driven, double bound, const 
       check_close ("loss", x.loss, lost, 10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_oscillator (void **state) {
@@ -114,8 +114,8 @@ static void motor_run_up (const char *method, double limit, double bound, const 
     check_close ("balance", x.balance, 0, bound, reason);
     if (limit > 0) assert_true (x.v[2] < limit * t / 0.4);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_limit (void **state) {
@@ -163,7 +163,7 @@ static void motor_fly (const char *method, double bound, const char *reason) {
   check_close ("x", x.q[0], a * (1 - cos (w * t)) / (w * w), bound, reason);
   check_close ("y", x.q[1], a * (t - sin (w * t) / w) / w, bound, reason);
   check_close ("work", x.work, motor_f.m * a * a * (1 - cos (w * t)) / (w * w), bound, reason);
-  pw_close (r), pw_free (s);
+  pw_run_close (r), pw_system_free (s);
   s = scene_system (&push, NULL);
   r = runs_open (s, method, &settings);
   x = runs_to (r, t);
@@ -174,7 +174,7 @@ static void motor_fly (const char *method, double bound, const char *reason) {
   check_close ("work", x.work, motor_f.F * X - 0.4 * Y, bound, reason);
   check_close ("balance", x.balance, 0, bound, reason);
   assert_true (fabs (x.v[2] - w) > 0.1);
-  pw_close (r), pw_free (s);
+  pw_run_close (r), pw_system_free (s);
 }
 
 static void test_force (void **state) {

@@ -26,7 +26,7 @@ static void rod_whirl (const char *method, double bound, const char *reason) {
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2, .ledger = 1 });
   double r0 = rod_d.L * rod_d.m[1] / (rod_d.m[0] + rod_d.m[1]), pull = rod_d.m[0] * r0 * rod_d.w * rod_d.w;
-  check_below ("start", pw_run_start (r)->velocity, 16 * CHECK_EPS, "given consistently");
+  check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   for (int i = 1; i <= 4; i++) {
     double t = 0.5 * i;
     pw_sample x = runs_to (r, t);
@@ -36,8 +36,8 @@ static void rod_whirl (const char *method, double bound, const char *reason) {
     check_close ("rod", trial_reaction (s, &x, "rod.F"), -pull, 100 * bound, reason);
     check_close ("balance", x.balance, 0, 100 * bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_whirl (void **state) {
@@ -97,8 +97,8 @@ static void test_link (void **state) {
     check_close ("Fx", trial_reaction (p, &y, "A.Fx"), -F * cos (phi), 1e-6, reason);
     check_close ("Fy", trial_reaction (p, &y, "A.Fy"), -F * sin (phi), 1e-6, reason);
   }
-  pw_close (r), pw_close (q);
-  pw_free (s), pw_free (p);
+  pw_run_close (r), pw_run_close (q);
+  pw_system_free (s), pw_system_free (p);
 }
 
 /* ---- By all methods: a chain of bodies on rods that hold them beside their centres ---- */

@@ -52,8 +52,8 @@ static void rolling_turn (const char *method, double inertia, double bound, cons
   check_close ("traction", trial_reaction (system, &x, "wheel.T"), rolling_u.m * a, 100 * bound, reason);
   check_close ("work", x.work, rolling_u.u * a * t * t / (2 * r), 10 * bound, reason);
   check_close ("balance", x.balance, 0, 10 * bound, reason);
-  pw_close (run);
-  pw_free (system);
+  pw_run_close (run);
+  pw_system_free (system);
 }
 
 static void test_unicycle (void **state) {
@@ -128,8 +128,8 @@ static void rolling_circle (const pw_plugin_table *table, const double shares[2]
   check_close ("left force", trial_reaction (s, &x, "left.N"), shares[0] * side, 1e3 * bound, reason);
   check_close ("right force", trial_reaction (s, &x, "right.N"), shares[1] * side, 1e3 * bound, reason);
   check_close ("balance", x.balance, 0, 10 * bound, reason);
-  pw_close (run);
-  pw_free (s);
+  pw_run_close (run);
+  pw_system_free (s);
 }
 
 static void rolling_every_method (const pw_plugin_table *table, const double shares[2]) {
@@ -152,8 +152,8 @@ static void test_robot (void **state) {
   assert_int_equal (pw_run_redundant (r), 1);
   assert_string_equal (pw_run_redundancy (r, 0, text, sizeof text),
                        "rolling-wheels left and right: the same lateral constraint");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_hub (void **state) {
@@ -176,15 +176,15 @@ static void rolling_speed (const char *method, double bound, const char *reason)
   pw_error error = { 0 };
   pw_signal motor = { PW_FUNCTION, .function = { .eval = rolling_motor, .reads = reads } };
   pw_model *m = scene_model (&rolling_unicycle_table, NULL);
-  check_ok (pw_set_signal (m, "wheel", "torque", &motor, &error), &error);
-  check_ok (pw_set_start (m, "body.omega", 0, &error), &error);
+  check_ok (pw_model_set_signal (m, "wheel", "torque", &motor, &error), &error);
+  check_ok (pw_model_set_initial (m, "body.omega", 0, &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *run = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 2 });
   pw_sample x = runs_to (run, 2);
   double J = rolling_u.m * rolling_u.r * rolling_u.r + 0.03;
   check_close ("speed", trial_state (s, &x, "wheel.spin_rate"), 20 * (1 - exp (-0.05 * 2 / J)), bound, reason);
-  pw_close (run);
-  pw_free (s);
+  pw_run_close (run);
+  pw_system_free (s);
 }
 
 static void test_motor (void **state) {
@@ -213,10 +213,10 @@ static void test_start (void **state) {
   static const pw_plugin_table table = TRIAL_TABLE (rolling_coast);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
-  assert_int_equal (pw_run_start (r)->moved, 0);
-  check_close ("spin rate", pw_run_start (r)->v[3], 2 / 0.2, 64 * CHECK_EPS, "speed of the contact point / radius");
-  pw_close (r);
-  pw_free (s);
+  assert_int_equal (pw_run_initial (r)->moved, 0);
+  check_close ("spin rate", pw_run_initial (r)->v[3], 2 / 0.2, 64 * CHECK_EPS, "speed of the contact point / radius");
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* What is given from outside is held: the body follows its wheel. */
@@ -224,14 +224,14 @@ static void test_given (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&rolling_unicycle_table, NULL);
-  check_ok (pw_set_start (m, "wheel.spin_rate", 4, &error), &error);
+  check_ok (pw_model_set_initial (m, "wheel.spin_rate", 4, &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
-  assert_int_equal (pw_run_start (r)->freed, 0);
-  check_close ("vx", pw_run_start (r)->v[0], 4 * rolling_u.r * cos (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
-  check_close ("vy", pw_run_start (r)->v[1], 4 * rolling_u.r * sin (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
-  pw_close (r);
-  pw_free (s);
+  assert_int_equal (pw_run_initial (r)->freed, 0);
+  check_close ("vx", pw_run_initial (r)->v[0], 4 * rolling_u.r * cos (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
+  check_close ("vy", pw_run_initial (r)->v[1], 4 * rolling_u.r * sin (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- A bicycle without lean: the rear wheel is driven, the front one steers freely on a fork with trail ---- */

@@ -105,15 +105,15 @@ static void saturation_stops (int scene, const char *method, double rtol, double
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .atol = atol, .span = 4 });
   snprintf (what, sizeof what, "%s, %s, rtol %g, atol %g, speed %g, v = %g", saturation_scenes[scene].name, method,
             rtol, atol, speed, v);
-  while (pw_time (r) < 4 && steps++ < 1000) check_ok (pw_advance (r, 4, &error), &error);
-  check_close (what, pw_time (r), 4, 0, "a thousand steps: the force and its smoothing need some ten each");
-  check_ok (pw_at (r, 4, &x, &error), &error);
+  while (pw_run_time (r) < 4 && steps++ < 1000) check_ok (pw_run_advance (r, 4, &error), &error);
+  check_close (what, pw_run_time (r), 4, 0, "a thousand steps: the force and its smoothing need some ten each");
+  check_ok (pw_run_sample (r, 4, &x, &error), &error);
   double bound = 100 * fmax (rtol, atol) * (1 + 4 * moving) + 100 * speed;
   check_close (what, x.q[j], 4 * moving + v * v / 2, bound,
                "100 rtol, and what is left of the motion where it is smooth");
   check_close (what, x.v[j], moving, 10 * rtol * moving + 10 * speed, "at rest within the smoothing");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static const char *const saturation_methods[] = { "bdf+none",   "bdf+projection", "ida+none",
@@ -153,7 +153,7 @@ static void test_explicit (void **state) {
         runs_state (s, methods[m], &(pw_settings){ .rtol = rtol, .span = 4 }, 4, q, w, NULL);
         check_close (methods[m], q[0], v * v / 2, 4 * pow (rtol, 0.75), "4 s at rtol^(3/4)");
         check_close (methods[m], w[0], 0, 4 * pow (rtol, 0.75), "what the error test allows of 6 states, and T = 2 s");
-        pw_free (s);
+        pw_system_free (s);
       }
 }
 
@@ -168,11 +168,11 @@ static void test_atol (void **state) {
     pw_system *s = scene_system (&saturation_scenes[scene].table, "speed", 1e-8, NULL);
     pw_run *r = runs_open (s, "bdf+projection", NULL);
     int j = pw_run_saturation (r, &least, element, sizeof element);
-    assert_true (j == pw_count_coordinates (s) + saturation_scenes[scene].state);
+    assert_true (j == pw_system_coordinates (s) + saturation_scenes[scene].state);
     check_close (saturation_scenes[scene].name, least, 1e-8, 1e-8 * 8 * CHECK_EPS, "round-off");
     assert_string_equal (element + strlen (element) - 2, " f");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 

@@ -38,7 +38,7 @@ static void test_incline (void **state) {
                sa = sin (slider_i.alpha), bound = 1e4 * CHECK_EPS;
   double X = c * slider_i.at[0] - si * slider_i.at[1], Y = si * slider_i.at[0] + c * slider_i.at[1];
   double N = slider_i.m * slider_i.g * ca, way = slider_i.v * t - slider_i.g * sa * t * t / 2;
-  check_below ("start", pw_run_start (r)->velocity, 16 * CHECK_EPS, "given consistently");
+  check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   pw_sample x = runs_to (r, t);
   check_close ("x", x.q[0], slider_i.foot[0] - X + way * ca, bound,
                "RK4 is exact for parabolas: round-off of 200 steps");
@@ -47,8 +47,8 @@ static void test_incline (void **state) {
   check_close ("N", trial_reaction (s, &x, "rail.N"), N, bound, "round-off");
   check_close ("M", trial_reaction (s, &x, "rail.M"), -N * (ca * X + sa * Y), bound, "round-off");
   check_close ("balance", x.balance, 0, 100 * bound, "round-off");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- A scotch yoke: a crank's pin in a slot of a body that slides ----
@@ -84,8 +84,8 @@ static void slider_turn (const char *method, double bound, const char *reason) {
     check_close ("N", trial_reaction (s, &x, "slot.N"), -mr * (w1 * sn + w * w * cs), 100 * bound, reason);
     check_close ("balance", x.balance, 0, 100 * bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_yoke (void **state) {
@@ -149,8 +149,8 @@ static void slider_state (double by, const char *force, const char *moment, doub
   for (int i = 0; i < 6; i++) out[i] = x.q[i], out[6 + i] = x.v[i];
   out[12] = trial_reaction (s, &x, force);
   out[13] = moment ? trial_reaction (s, &x, moment) : 0;
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_drives (void **state) {

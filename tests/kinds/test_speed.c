@@ -59,7 +59,7 @@ static void speed_place (double t, double out[2]) {
 static void speed_follow (const char *method, double stated, double bound, const char *reason) {
   pw_system *s = scene_system (&speed_sled_table, "stated", stated, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 3, .ledger = 1 });
-  check_below ("start", pw_run_start (r)->velocity, 16 * CHECK_EPS, "given consistently");
+  check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   for (int i = 1; i <= 3; i++) {
     double t = i, place[2], u0 = speed_s.o + speed_s.A, u = speed_s.o + speed_s.A * cos (speed_s.s * t),
            a = -speed_s.A * speed_s.s * sin (speed_s.s * t);
@@ -74,8 +74,8 @@ static void speed_follow (const char *method, double stated, double bound, const
     check_close ("work", x.work, speed_s.m * (u * u - u0 * u0) / 2, 10 * bound, reason);
     check_close ("balance", x.balance, 0, 10 * bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_sled (void **state) {
@@ -119,8 +119,8 @@ static void test_pair (void **state) {
   check_close ("first angle", x.q[2], i * a * t * t / 2, bound, reason);
   check_close ("mesh", trial_reaction (s, &x, "mesh.F"), speed_p.I[0] * i * a, bound, reason);
   check_close ("balance", x.balance, 0, 10 * bound, reason);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void speed_nothing (pw_model *m, const void *parameters) {
@@ -134,7 +134,7 @@ static void test_refused (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&nothing, NULL);
-  assert_null (pw_compile (m, &error));
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT, "model scene: pfaffian none: a and b are all zero: that relates nothing");
   pw_model_free (m);
 }

@@ -40,8 +40,8 @@ static void spring_swing (const char *method, double bound, const char *reason) 
     check_close ("balance", x.balance, 0, 100 * bound, reason);
     assert_true (x.loss > 0);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_oscillator (void **state) {
@@ -84,8 +84,8 @@ static void test_ellipse (void **state) {
       check_close ("coordinate", x.q[j], spring_start[i].x[j] * cos (w * t) + spring_start[i].v[j] / w * sin (w * t),
                    1e-11, "(h w)^4 / 10 at h = 1e-3 and w = 3/s");
     check_close ("balance", x.balance, 0, 1e-10, "(h w)^4 at h = 1e-3 and w = 3/s");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -110,7 +110,7 @@ static void test_meeting (void **state) {
   pw_system *s = scene_system (&table, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
   double out[72];
-  assert_int_equal (pw_place (w, 0, s->q0, s->v0), PW_OK);
+  assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
   const pw_batch *b = &w->slab[0].b;
   pw_kind_spring.force (b, out);
   for (int i = 0; i < 12; i++) assert_true (out[i] == 0);
@@ -125,7 +125,7 @@ static void test_meeting (void **state) {
   pw_kind_spring.loss (b, out);
   assert_true (out[0] == 0 && out[1] == 0);
   pw_workspace_free (w);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* ---- A bead that a damped spring of free length 0 brings to rest: at last numbers have no inverse ---- */
@@ -144,15 +144,15 @@ static void test_settling (void **state) {
   double out[36];
   for (double size = 1; size > 1e-17; size /= 10) {
     const double q[3] = { 3e-308 * size, 4e-308 * size, 0 }, v[3] = { -1e-308 * size, 0, 0 };
-    assert_int_equal (pw_place (w, 0, q, v), PW_OK);
-    pw_sweep *const sweep[] = { pw_kind_spring.force_q, pw_kind_spring.force_v };
+    assert_int_equal (pw_update_kinematics (w, 0, q, v), PW_OK);
+    pw_batch_function *const sweep[] = { pw_kind_spring.force_q, pw_kind_spring.force_v };
     for (int i = 0; i < 2; i++) {
       sweep[i](&w->slab[0].b, out);
       for (int j = 0; j < 36; j++) check_below ("derivative", fabs (out[j]), 20, "stiffness and damping are 5 and 2");
     }
   }
   pw_workspace_free (w);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* ---- Three bodies, tied together, to each other's arms and to the ground ---- */

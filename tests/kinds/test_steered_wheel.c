@@ -63,14 +63,14 @@ static void steered_drive (const char *method, double bound, const char *reason)
   steered_path (t, path);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = t, .ledger = 1 });
-  check_below ("start", pw_run_start (r)->velocity, 16 * CHECK_EPS, "given consistently");
+  check_below ("start", pw_run_initial (r)->velocity, 16 * CHECK_EPS, "given consistently");
   pw_sample x = runs_to (r, t);
   for (int i = 0; i < 3; i++) check_close ("path", x.q[i], path[i], bound, reason);
   check_close ("speed", hypot (x.v[0], x.v[1]), steered_speed (t), bound, reason);
   check_close ("kinetic", x.balance, 0, bound, reason);
   assert_true (x.work == 0);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_car (void **state) {
@@ -130,8 +130,9 @@ static void steered_compare (double one, double other, double bound, const char 
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 }),
          *q = runs_open (p, "rk4+projection", &(pw_settings){ .step = 1e-3, .ledger = 1 });
   double start[3]; /* what the consistent start makes of the truck's rates need not be the same with a fork */
-  for (int j = 0; j < 3; j++) start[j] = pw_run_start (r)->v[j];
-  for (int j = 0; j < 3; j++) check_close ("start", start[j], pw_run_start (q)->v[j], 1e-5, "the fork's small weights");
+  for (int j = 0; j < 3; j++) start[j] = pw_run_initial (r)->v[j];
+  for (int j = 0; j < 3; j++)
+    check_close ("start", start[j], pw_run_initial (q)->v[j], 1e-5, "the fork's small weights");
   for (int i = 1; i <= 4; i++) {
     pw_sample x = runs_to (r, 0.5 * i), y = runs_to (q, 0.5 * i);
     for (int j = 0; j < 3; j++) {
@@ -141,8 +142,8 @@ static void steered_compare (double one, double other, double bound, const char 
     check_close ("front", trial_reaction (s, &x, "front.N"), trial_reaction (p, &y, "front.N"), 10 * bound, reason);
     check_close ("work", x.work, y.work, bound, reason);
   }
-  pw_close (r), pw_close (q);
-  pw_free (s), pw_free (p);
+  pw_run_close (r), pw_run_close (q);
+  pw_system_free (s), pw_system_free (p);
 }
 
 static void test_fork (void **state) {

@@ -52,8 +52,8 @@ static void tyre_stop (const char *method, double load, double bound, const char
     check_close ("speed", hypot (x.v[0], x.v[1]), v, bound, reason);
     check_close ("loss", x.loss, tyre_s.m * (tyre_s.v * tyre_s.v - v * v) / 2, bound, reason);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_slide (void **state) {
@@ -108,13 +108,13 @@ static void test_limit (void **state) {
   pw_settings settings = { .rtol = 1e-10, .span = 2 };
   pw_system *s = scene_system (&tyre_vehicle_table, NULL);
   runs_state (s, "ida+ggl", &settings, 2, wheel, rate, NULL);
-  pw_free (s);
+  pw_system_free (s);
   for (int i = 0; i < STEPS; i++, stiffness *= sqrt (10)) {
     s = scene_system (&tyre_vehicle_table, "stiffness", stiffness, NULL);
     runs_state (s, "ida+ggl", &settings, 2, q, v, NULL);
     distance[i] = 0;
     for (int j = 0; j < 6; j++) distance[i] = fmax (distance[i], fabs (q[j] - wheel[j]));
-    pw_free (s);
+    pw_system_free (s);
   }
   check_close ("slope over two decades", log10 (distance[0] / distance[STEPS - 1]) / 2, 1, 0.02,
                "1/C, and the next power of 1/C at the soft end");
@@ -128,7 +128,7 @@ static void test_refused (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_model *m = scene_model (&tyre_slide_table, "load", 5.0, "friction", 0.0, NULL);
-  assert_null (pw_compile (m, &error));
+  assert_null (pw_system_compile (m, &error));
   check_error (&error, PW_INPUT,
                "model scene: tyre T: friction = 0: expected > 0, since a load limits the force to friction x load");
   pw_model_free (m);

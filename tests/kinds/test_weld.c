@@ -65,8 +65,8 @@ static void weld_compare (const char *method, double bound, const char *reason) 
   check_close ("blade", trial_reaction (two, &x2, "blade.N"), trial_reaction (one, &x1, "blade.N"), 1e3 * bound,
                reason);
   check_close ("balance", x2.balance, 0, 1e3 * bound, reason);
-  pw_close (r1), pw_close (r2);
-  pw_free (one), pw_free (two);
+  pw_run_close (r1), pw_run_close (r2);
+  pw_system_free (one), pw_system_free (two);
 }
 
 static void test_one_body (void **state) {
@@ -130,8 +130,8 @@ static void test_points (void **state) {
     double bound = i < 2 ? 1e-11 : 3e-5;
     check_close (method[i], trial_state (s, &x, "p11.phi"), y.q[2], bound,
                  i < 2 ? "the same steps: round-off" : "100 h^2/12 of its frequency of about 1/s");
-    pw_close (r), pw_close (twin);
-    pw_free (s), pw_free (t);
+    pw_run_close (r), pw_run_close (twin);
+    pw_system_free (s), pw_system_free (t);
   }
 }
 
@@ -150,7 +150,7 @@ static void test_beam (void **state) {
   static const pw_plugin_table table = TRIAL_TABLE (weld_beam);
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01 });
-  assert_int_equal (pw_run_start (r)->moved, 1);
+  assert_int_equal (pw_run_initial (r)->moved, 1);
   pw_sample x = runs_to (r, 1);
   double bound = 1e4 * CHECK_EPS;
   check_close ("x", x.q[0], 1.5, bound, "round-off of 100 steps");
@@ -158,8 +158,8 @@ static void test_beam (void **state) {
   check_close ("Fx", trial_reaction (s, &x, "wall.Fx"), -4 * 2, 40 * bound, "weight");
   check_close ("Fy", trial_reaction (s, &x, "wall.Fy"), 4 * 9.81, 40 * bound, "weight");
   check_close ("M", trial_reaction (s, &x, "wall.M"), 4 * 9.81 * 1.5, 60 * bound, "weight times arm");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_methods (void **state) {

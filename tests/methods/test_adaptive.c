@@ -16,7 +16,7 @@ static double adaptive_error (const char *method, pw_settings settings, pw_stati
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   settings.span = 10;
   runs_state (s, method, &settings, 10, q, v, cost);
-  pw_free (s);
+  pw_system_free (s);
   return fmax (fmax (fabs (q[0] - x[1]), fabs (q[1] - x[2])), fmax (fabs (q[2] - x[3]), fabs (q[5] - x[4])));
 }
 
@@ -132,16 +132,16 @@ static void test_edge (void **state) {
     pw_system *s = scene_system (&table, "swing", swing, NULL);
     pw_run *r = runs_open (s, "erk8+none", &(pw_settings){ .rtol = 1e-10, .span = t_end });
     double worst = 0;
-    while (pw_time (r) < t_end) {
+    while (pw_run_time (r) < t_end) {
       pw_sample x;
-      check_ok (pw_advance (r, t_end, &error), &error);
-      check_ok (pw_at (r, pw_time (r), &x, &error), &error);
+      check_ok (pw_run_advance (r, t_end, &error), &error);
+      check_ok (pw_run_sample (r, pw_run_time (r), &x, &error), &error);
       double v = (k * k * cos (w * x.t) + k * w * sin (w * x.t)) / (k * k + w * w);
       worst = fmax (worst, fabs (x.v[0] - v));
     }
     check_below ("rate", worst, 1e-7, "1e3 rtol, twice the largest; with the two estimates of DOP853 alone it is 5e-7");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -204,9 +204,9 @@ static const pw_plugin_table adaptive_bump_table = { .abi = PW_ABI,
 
 static double adaptive_step (pw_run *r, double t_end) {
   pw_error error = { 0 };
-  double before = pw_time (r);
-  check_ok (pw_advance (r, t_end, &error), &error);
-  return pw_time (r) - before;
+  double before = pw_run_time (r);
+  check_ok (pw_run_advance (r, t_end, &error), &error);
+  return pw_run_time (r) - before;
 }
 
 /* The error of a step under the force 1e5 t^4 by its definition: the root of the mean square, over 6 numbers, of the estimates
@@ -233,12 +233,12 @@ static void test_norm (void **state) {
   pw_system *s = scene_system (&adaptive_power_table, NULL);
   pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = rtol, .span = 1 });
   for (int n = 0; n < 40; n++) {
-    double t = pw_time (r);
+    double t = pw_run_time (r);
     long rejected = pw_run_statistics (r)->rejected;
     double h = adaptive_step (r, 1);
     pw_error error = { 0 };
     pw_sample x;
-    check_ok (pw_at (r, pw_time (r), &x, &error), &error);
+    check_ok (pw_run_sample (r, pw_run_time (r), &x, &error), &error);
     double now = adaptive_estimate (t, h, &x, pw_run_scale (r)) / rtol;
     equal += n > 1 && pw_run_statistics (r)->rejected == rejected && fabs (h - predicted) <= round_off * h;
     predicted = h * fmin (5, fmax (0.2, 0.9 * pow (now, -(0.2 - 0.03)) * pow (before, 0.04)));
@@ -246,8 +246,8 @@ static void test_norm (void **state) {
   }
   print_message ("%d steps are equal to what the norm predicts\n", equal);
   check_below ("equal steps", 10, equal, "of 40; another norm or other weights leave none");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* A narrow bump takes rejections, which may shrink a step far more than needed: the step right behind them is not longer. */
@@ -257,7 +257,7 @@ static void test_after_rejection (void **state) {
   for (adaptive_height = 1e-3; adaptive_height < 1e6; adaptive_height *= 3) {
     pw_system *s = scene_system (&adaptive_bump_table, NULL);
     pw_run *r = runs_open (s, "erk5+none", &(pw_settings){ .rtol = 1e-8, .span = 2 });
-    for (double last = INFINITY; pw_time (r) < 1.5;) {
+    for (double last = INFINITY; pw_run_time (r) < 1.5;) {
       long rejected = pw_run_statistics (r)->rejected;
       double h = adaptive_step (r, 2);
       int none = pw_run_statistics (r)->rejected == rejected;
@@ -265,8 +265,8 @@ static void test_after_rejection (void **state) {
       found += !none;
       last = none ? INFINITY : h;
     }
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
   check_below ("bumps", 10, found, "one for each of 19 bumps, a third as wide as the steps before them");
 }
@@ -277,11 +277,11 @@ static void test_after_cut (void **state) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_run *r = runs_open (s, "erk5+projection", &(pw_settings){ .rtol = 1e-8, .span = 10 });
   double h = 0;
-  while (pw_time (r) < 2) h = adaptive_step (r, 10);
-  adaptive_step (r, pw_time (r) + 1e-6 * h);
+  while (pw_run_time (r) < 2) h = adaptive_step (r, 10);
+  adaptive_step (r, pw_run_time (r) + 1e-6 * h);
   check_below ("the step before the cut", 0.5 * h, adaptive_step (r, 10), "the motion is as smooth as before");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- Motion along the constraints ----
@@ -308,7 +308,7 @@ static double adaptive_steps (const char *method, double rtol, double t_end) {
   pw_statistics cost;
   pw_system *s = scene_system (&adaptive_turned_table, NULL);
   runs_state (s, method, &(pw_settings){ .rtol = rtol, .span = t_end }, t_end, q, v, &cost);
-  pw_free (s);
+  pw_system_free (s);
   return (double)cost.steps;
 }
 
@@ -365,17 +365,17 @@ static void adaptive_stops (const char *method, const pw_plugin_table *table, do
   pw_error error = { 0 }, none = { 0 };
   pw_system *s = scene_system (table, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = 1e-8, .span = 2 });
-  assert_int_equal (pw_advance_to (r, 2, 2, &error), PW_METHOD);
+  assert_int_equal (pw_run_advance_to (r, 2, 2, &error), PW_METHOD);
   assert_int_equal (error.status, PW_METHOD);
-  snprintf (text, sizeof text, "t = %.6g s: ", pw_time (r));
+  snprintf (text, sizeof text, "t = %.6g s: ", pw_run_time (r));
   assert_memory_equal (error.text, text, strlen (text));
   assert_non_null (strstr (error.text, cause));
-  check_below ("time reached", pw_time (r), last, "no state behind the point where the motion ends");
+  check_below ("time reached", pw_run_time (r), last, "no state behind the point where the motion ends");
   pw_sample now;
-  check_ok (pw_at (r, pw_time (r), &now, &none), &none);
+  check_ok (pw_run_sample (r, pw_run_time (r), &now, &none), &none);
   assert_true (isfinite (now.q[2]) && isfinite (now.v[2]));
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_stops (void **state) {
@@ -395,11 +395,11 @@ static void test_useless_tolerances (void **state) {
       pw_error error = { 0 };
       pw_system *s = scene_system (&scene_ezyroller, NULL);
       pw_run *r = runs_open (s, adaptive_methods[i], &(pw_settings){ .rtol = 0.5, .atol = atol[k], .span = 10 });
-      int status = pw_advance_to (r, 10, 10, &error);
-      assert_true ((status == PW_OK && pw_time (r) == 10) || (status == PW_METHOD && pw_time (r) < 10));
+      int status = pw_run_advance_to (r, 10, 10, &error);
+      assert_true ((status == PW_OK && pw_run_time (r) == 10) || (status == PW_METHOD && pw_run_time (r) < 10));
       if (status == PW_METHOD) assert_memory_equal (error.text, "t = ", 4);
-      pw_close (r);
-      pw_free (s);
+      pw_run_close (r);
+      pw_system_free (s);
     }
 }
 

@@ -56,7 +56,7 @@ static pw_system *agree_scene (int scene) {
   if (scene == AGREE_MASSLESS) return scene_system (&scene_ezyroller, NULL);
   pw_model *m = scene_model (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
   pw_signal torque = { PW_FUNCTION, .function = { .eval = agree_steering, .reads = reads } };
-  if (scene == AGREE_READER) check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  if (scene == AGREE_READER) check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   return scene_compile (m);
 }
 
@@ -100,14 +100,14 @@ static void test_integrators (void **state) {
       runs_state (s, agree_methods[i].name, &(pw_settings){ .step = 1e-3, .rtol = rtol, .span = 3 }, 3, Q, V, NULL);
       double bound = agree_methods[i].factor > 0 ? agree_methods[i].factor * rtol : agree_order_4 (1e-3);
       const char *reason = agree_methods[i].factor > 0 ? "1e3 rtol" : agree_reason;
-      for (int j = 0; j < pw_count_coordinates (s); j++) {
+      for (int j = 0; j < pw_system_coordinates (s); j++) {
         char what[100], name[60];
         snprintf (what, sizeof what, "%s, %s, %s", agree_names[scene], agree_methods[i].name,
-                  pw_state_name (s, j, name, sizeof name));
+                  pw_system_state_name (s, j, name, sizeof name));
         check_close (what, Q[j], q[j], bound, reason);
       }
     }
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -131,20 +131,20 @@ static void test_ledger (void **state) {
       check_close (what, now.balance, 0, i < 3 ? agree_order_4 (1e-3) : 1e3 * with.rtol,
                    i < 3 ? agree_reason : "1e3 rtol");
       double work = 0, loss = 0;
-      for (int e = 0; e < pw_count_ledger (s); e++)
-        *(strstr (pw_ledger_name (s, e, what, sizeof what), ".work") ? &work : &loss) += now.ledger[e];
+      for (int e = 0; e < pw_system_ledger_entries (s); e++)
+        *(strstr (pw_system_ledger_name (s, e, what, sizeof what), ".work") ? &work : &loss) += now.ledger[e];
       assert_true (now.kinetic > 0 && now.loss >= 0 && now.work == work && now.loss == loss);
       double q[AGREE_MOST], v[AGREE_MOST];
       pw_statistics cost = *pw_run_statistics (r), other;
-      memcpy (q, now.q, sizeof (double) * (size_t)pw_count_coordinates (s));
-      memcpy (v, now.v, sizeof (double) * (size_t)pw_count_coordinates (s));
-      pw_close (r);
+      memcpy (q, now.q, sizeof (double) * (size_t)pw_system_coordinates (s));
+      memcpy (v, now.v, sizeof (double) * (size_t)pw_system_coordinates (s));
+      pw_run_close (r);
       double Q[AGREE_MOST], V[AGREE_MOST];
       runs_state (s, method[i], &without, 3, Q, V, &other);
-      check_bits ("positions without a ledger", Q, q, pw_count_coordinates (s));
-      check_bits ("rates without a ledger", V, v, pw_count_coordinates (s));
+      check_bits ("positions without a ledger", Q, q, pw_system_coordinates (s));
+      check_bits ("rates without a ledger", V, v, pw_system_coordinates (s));
       assert_true (cost.steps == other.steps && cost.rejected == other.rejected && cost.rhs == other.rhs);
-      pw_free (s);
+      pw_system_free (s);
     }
 }
 
@@ -167,8 +167,8 @@ static void test_sampling (void **state) {
       pw_run *r = runs_open (s, method[i], &settings);
       for (int k = 0; k <= 300; k++) { /* 0.00671 s does not divide the step */
         double t = 0.00671 * k < 2 ? 0.00671 * k : 2;
-        check_ok (pw_advance_to (r, t, 2, &error), &error);
-        check_ok (pw_at (r, t, &now, &error), &error);
+        check_ok (pw_run_advance_to (r, t, 2, &error), &error);
+        check_ok (pw_run_sample (r, t, &now, &error), &error);
         assert_true (now.t == t);
         if (i > 3) continue;
         check_below ("position of a sample", now.position, i < 2 ? 16 * CHECK_EPS : 1e-6,
@@ -177,12 +177,12 @@ static void test_sampling (void **state) {
                      i < 2 ? "projected: round-off" : "100 rtol");
       }
       now = runs_to (r, 2);
-      check_bits ("positions", now.q, q, pw_count_coordinates (s));
-      check_bits ("rates", now.v, v, pw_count_coordinates (s));
+      check_bits ("positions", now.q, q, pw_system_coordinates (s));
+      check_bits ("rates", now.v, v, pw_system_coordinates (s));
       assert_int_equal (pw_run_statistics (r)->steps, plain.steps);
       assert_int_equal (pw_run_statistics (r)->rhs, plain.rhs);
-      pw_close (r);
-      pw_free (s);
+      pw_run_close (r);
+      pw_system_free (s);
     }
 }
 
@@ -193,7 +193,7 @@ static void test_dense (void **state) {
   for (int scene = 0; scene < AGREE_SCENES; scene++)
     for (int i = 0; i < 2; i++) {
       pw_system *s = agree_scene (scene);
-      int n = pw_count_coordinates (s);
+      int n = pw_system_coordinates (s);
       pw_run *fine = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-4, .span = 1 });
       double q[10][AGREE_MOST], v[10][AGREE_MOST], t[10];
       for (int k = 0; k < 10; k++) {
@@ -202,21 +202,21 @@ static void test_dense (void **state) {
         memcpy (q[k], now.q, (size_t)n * sizeof (double));
         memcpy (v[k], now.v, (size_t)n * sizeof (double));
       }
-      pw_close (fine);
+      pw_run_close (fine);
       pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .rtol = 1e-8, .span = 1 });
       for (int k = 0; k < 10; k++) {
         pw_error error = { 0 };
         pw_sample now;
-        check_ok (pw_advance_to (r, t[k], 1, &error), &error);
-        check_ok (pw_at (r, t[k], &now, &error), &error);
+        check_ok (pw_run_advance_to (r, t[k], 1, &error), &error);
+        check_ok (pw_run_sample (r, t[k], &now, &error), &error);
         double bound = i == 0 ? agree_order_4 (1e-2) : 1e3 * 1e-8;
         for (int j = 0; j < n; j++) {
           check_close ("position of a sample", now.q[j], q[k][j], bound, i == 0 ? agree_reason : "1e3 rtol");
           check_close ("rate of a sample", now.v[j], v[k][j], 10 * bound, i == 0 ? "10 (h omega)^4" : "1e4 rtol");
         }
       }
-      pw_close (r);
-      pw_free (s);
+      pw_run_close (r);
+      pw_system_free (s);
     }
 }
 
@@ -253,8 +253,8 @@ static void agree_verify (int scene, const agree_verdict *bound) {
     check_close ("the run's own position residual", now.position, v.position.scaled, 8 * CHECK_EPS + 0.5 * now.position,
                  "one formula");
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_verifier (void **state) {
@@ -275,7 +275,7 @@ static void test_verifier_notices (void **state) {
   pw_system *s = agree_scene (AGREE_CART);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
   pw_sample now = runs_to (r, 0.5);
-  int n = pw_count_coordinates (s), rows = pw_count_rows (s);
+  int n = pw_system_coordinates (s), rows = pw_system_rows (s);
   double x[4][AGREE_MOST];
   const double *given[] = { now.q, now.v, now.a, now.lambda };
   for (int part = 0; part < 4; part++)
@@ -286,14 +286,14 @@ static void test_verifier_notices (void **state) {
       assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, x[0], x[1], x[2], x[3], &v), PW_OK);
       int noticed =
           v.position.scaled > 1e-9 || v.velocity.scaled > 1e-9 || v.acceleration.scaled > 1e-9 || v.force.scaled > 1e-9;
-      assert_true (noticed || (part == 0 && j >= 3 * pw_count_bodies (s))); /* nothing depends on the spin angle */
+      assert_true (noticed || (part == 0 && j >= 3 * pw_system_bodies (s))); /* nothing depends on the spin angle */
     }
   x[0][0] = NAN;
   pw_verification v;
   assert_int_equal (pw_verify (s, pw_run_scale (r), now.t, x[0], now.v, now.a, now.lambda, &v), PW_OK);
   assert_true (isinf (v.position.scaled) && v.position.name[0]);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- Units ---- */
@@ -322,8 +322,8 @@ static void test_units (void **state) {
       check_close ("steps", (double)Cost.steps, (double)cost.steps, 0.1 * (double)cost.steps, "the same to 10 %");
       check_below ("scaled residual", Cost.position, 2 * cost.position + 64 * CHECK_EPS,
                    "the same, whatever the units");
-      pw_free (s);
-      pw_free (S);
+      pw_system_free (s);
+      pw_system_free (S);
     }
 }
 
@@ -356,8 +356,8 @@ static void test_units_of_moments (void **state) {
     runs_state (S, method[i], &settings, 1, Q, V, &Cost);
     check_close ("angle", Q[2], q[2], 1e-4, "1e4 rtol");
     check_close ("steps", (double)Cost.steps, (double)cost.steps, 0.1 * (double)cost.steps, "the same to 10 %");
-    pw_free (s);
-    pw_free (S);
+    pw_system_free (s);
+    pw_system_free (S);
   }
 }
 

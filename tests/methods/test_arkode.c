@@ -20,7 +20,7 @@ static int arkode_slope (pw_real t, N_Vector y, N_Vector slope, void *run) {
   double *to = N_VGetArrayPointer (slope);
   memcpy (q, from, (size_t)n * sizeof *q);
   memcpy (v, from + n, (size_t)n * sizeof *v);
-  if (pw_accelerate (r, t, q, v, a, lambda) != PW_OK) return -1;
+  if (pw_run_accelerate (r, t, q, v, a, lambda) != PW_OK) return -1;
   memcpy (to, v, (size_t)n * sizeof *v);
   memcpy (to + n, a, (size_t)n * sizeof *a);
   return 0;
@@ -66,8 +66,8 @@ static void test_same_steps (void **state) {
         check_close ("position, ARKODE", q[j], y[j], bound, "10 eps of each step");
         check_close ("rate, ARKODE", v[j], y[6 + j], bound, "10 eps of each step");
       }
-      pw_close (r);
-      pw_free (s);
+      pw_run_close (r);
+      pw_system_free (s);
     }
 }
 

@@ -40,9 +40,9 @@ static pw_system *saved_system (int scene) {
   pw_model *m = pw_file_model (saved_file[scene], &error);
   assert_non_null (m);
   if (saved_scenes[scene].parameter)
-    check_ok (pw_set (m, saved_scenes[scene].parameter, saved_scenes[scene].value, &error), &error);
-  check_ok (pw_build (m, &error), &error);
-  pw_system *s = pw_compile (m, &error);
+    check_ok (pw_model_set (m, saved_scenes[scene].parameter, saved_scenes[scene].value, &error), &error);
+  check_ok (pw_model_build (m, &error), &error);
+  pw_system *s = pw_system_compile (m, &error);
   pw_model_free (m);
   check_ok (error.status, &error);
   return s;
@@ -69,10 +69,10 @@ static void saved_keep (saved_end *e, const double *x, int n) {
 static void saved_finish (pw_run *r, pw_system *s, int scene, pw_archive *archive, int moment, saved_end *e) {
   pw_error error = { 0 };
   double t_end = saved_scenes[scene].t_end;
-  while (pw_time (r) < t_end) {
+  while (pw_run_time (r) < t_end) {
     double due = t_end * (moment + 1) / (SAVED_MOMENTS + 1);
-    check_ok (pw_advance (r, pw_time (r) < due ? due : t_end, &error), &error);
-    if (moment == SAVED_MOMENTS || pw_time (r) < due) continue;
+    check_ok (pw_run_advance (r, pw_run_time (r) < due ? due : t_end, &error), &error);
+    if (moment == SAVED_MOMENTS || pw_run_time (r) < due) continue;
     int status = pw_run_save (r, &archive[moment], &error);
     check_ok (status > 0 ? PW_OK : status, &error);
     if (status == PW_OK) moment++;
@@ -81,11 +81,11 @@ static void saved_finish (pw_run *r, pw_system *s, int scene, pw_archive *archiv
   pw_sample x = runs_to (r, t_end);
   const pw_statistics *n = pw_run_statistics (r);
   e->size = 0;
-  saved_keep (e, x.q, pw_count_coordinates (s));
-  saved_keep (e, x.v, pw_count_coordinates (s));
-  saved_keep (e, x.a, pw_count_coordinates (s));
-  saved_keep (e, x.lambda, pw_count_rows (s));
-  saved_keep (e, x.ledger, pw_count_ledger (s));
+  saved_keep (e, x.q, pw_system_coordinates (s));
+  saved_keep (e, x.v, pw_system_coordinates (s));
+  saved_keep (e, x.a, pw_system_coordinates (s));
+  saved_keep (e, x.lambda, pw_system_rows (s));
+  saved_keep (e, x.ledger, pw_system_ledger_entries (s));
   saved_keep (e, (double[]){ x.balance, x.projection, n->position, n->velocity, n->g, n->jv }, 6);
   saved_keep (e,
               (double[]){ (double)n->steps, (double)n->rejected, (double)n->rhs, (double)n->jacobians,
@@ -101,13 +101,13 @@ static void saved_undisturbed (int scene, const char *method, const pw_method *i
   pw_system *s = saved_system (scene);
   pw_run *r = saved_open (s, scene, method);
   for (int i = 1; i <= SAVED_MOMENTS + 1; i++)
-    check_ok (pw_advance_to (r, t_end, t_end * i / (SAVED_MOMENTS + 1), &error), &error);
+    check_ok (pw_run_advance_to (r, t_end, t_end * i / (SAVED_MOMENTS + 1), &error), &error);
   const pw_statistics *plain = pw_run_statistics (r);
   assert_int_equal (n->restarts, 0);
   assert_int_equal (n->steps, plain->steps);
   assert_int_equal (n->rejected, plain->rejected);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* The run that is saved, then one loaded from each of its archives. */
@@ -120,10 +120,10 @@ static void saved_compare (int scene, const char *method) {
   saved_finish (r, s, scene, archive, 0, &whole);
   const pw_method *integrator;
   int stabilisation;
-  check_ok (pw_parse_method (method, &integrator, &stabilisation, &error), &error);
+  check_ok (pw_method_parse (method, &integrator, &stabilisation, &error), &error);
   if (integrator->carry == NULL) assert_int_equal (pw_run_statistics (r)->restarts, SAVED_MOMENTS);
   saved_undisturbed (scene, method, integrator, pw_run_statistics (r));
-  pw_close (r);
+  pw_run_close (r);
   for (int moment = 0; moment < SAVED_MOMENTS; moment++) {
     pw_archive again[SAVED_MOMENTS] = { { .at = NULL } };
     pw_archive from = { .at = archive[moment].at, .size = archive[moment].used, .loading = 1 };
@@ -135,11 +135,11 @@ static void saved_compare (int scene, const char *method) {
       print_error ("%s, %s, from %d of %d\n", saved_scenes[scene].scene, method, moment + 1, SAVED_MOMENTS);
     assert_int_equal (part.size, whole.size);
     assert_memory_equal (part.number, whole.number, (size_t)whole.size * sizeof (double));
-    pw_close (r);
+    pw_run_close (r);
     for (int i = 0; i < SAVED_MOMENTS; i++) pw_archive_free (&again[i]);
   }
   for (int i = 0; i < SAVED_MOMENTS; i++) pw_archive_free (&archive[i]);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void test_same (void **state) {
@@ -168,17 +168,17 @@ static void test_kicked (void **state) {
   pw_run *r = saved_open (s, 0, "rk4+projection");
   pw_sample now = runs_to (r, 0.5);
   for (int j = 0; j < 6; j++) v[j] = 3 * now.v[j];
-  check_ok (pw_restart (r, NULL, v, &error), &error);
+  check_ok (pw_run_restart (r, NULL, v, &error), &error);
   check_ok (pw_run_save (r, &archive, &error), &error);
   double balance = runs_to (r, 1).balance;
-  pw_close (r);
+  pw_run_close (r);
   r = saved_open (s, 0, "rk4+projection");
   pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
   check_ok (pw_run_load (r, &from, &error), &error);
   check_close ("balance", runs_to (r, 1).balance, balance, 0, "to the bit");
-  pw_close (r);
+  pw_run_close (r);
   pw_archive_free (&archive);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* Counts from which none can go on, wherever in the state they stand, are refused or of no harm. */
@@ -190,10 +190,10 @@ static void test_counts (void **state) {
     pw_archive archive = { .at = NULL };
     pw_system *s = saved_system (0);
     pw_run *r = saved_open (s, 0, method[m]);
-    check_ok (pw_advance (r, 1, &error), &error);
+    check_ok (pw_run_advance (r, 1, &error), &error);
     check_ok (pw_run_save (r, &archive, &error), &error);
     pw_statistics done = *pw_run_statistics (r);
-    pw_close (r);
+    pw_run_close (r);
     int refused = 0;
     for (size_t at = 0; at + sizeof (long) <= archive.used; at++) {
       if (memcmp (archive.at + at, &done.steps, sizeof done.steps) != 0) continue;
@@ -202,12 +202,12 @@ static void test_counts (void **state) {
       r = saved_open (s, 0, method[m]);
       error = (pw_error){ 0 };
       refused += pw_run_load (r, &from, &error) == PW_INPUT;
-      pw_close (r);
+      pw_run_close (r);
       memcpy (archive.at + at, &done.steps, sizeof done.steps);
     }
     assert_true (refused > 0);
     pw_archive_free (&archive);
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -218,25 +218,25 @@ static void test_other (void **state) {
   pw_archive archive = { .at = NULL };
   pw_system *s = saved_system (0), *other = saved_system (2);
   pw_run *r = saved_open (s, 0, "erk8+projection");
-  check_ok (pw_advance (r, 1, &error), &error);
+  check_ok (pw_run_advance (r, 1, &error), &error);
   check_ok (pw_run_save (r, &archive, &error), &error);
-  pw_close (r);
+  pw_run_close (r);
   for (size_t size = 0; size < archive.used; size += 1 + archive.used / 50) {
     pw_archive from = { .at = archive.at, .size = size, .loading = 1 };
     error = (pw_error){ 0 };
     r = saved_open (s, 0, "erk8+projection");
     assert_int_equal (pw_run_load (r, &from, &error), PW_INPUT);
     assert_string_equal (error.text, "the saved state is not of this run");
-    pw_close (r);
+    pw_run_close (r);
   }
   pw_archive from = { .at = archive.at, .size = archive.used, .loading = 1 };
   error = (pw_error){ 0 };
   r = saved_open (other, 2, "erk8+projection");
   assert_int_equal (pw_run_load (r, &from, &error), PW_INPUT);
-  pw_close (r);
+  pw_run_close (r);
   pw_archive_free (&archive);
-  pw_free (s);
-  pw_free (other);
+  pw_system_free (s);
+  pw_system_free (other);
 }
 
 /* The ledger has all work done before the run was saved: by any method, the energy is accounted for to the accuracy of the run. */
@@ -255,8 +255,8 @@ static void test_ledger (void **state) {
     check_below (method[i], fabs (x.balance), 1e-4 * x.work, "errors of galpha at h = 1e-3, the others less");
     check_below (method[i], 1e-3, x.work, "there is work to be accounted for");
     pw_archive_free (&a);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 

@@ -50,8 +50,8 @@ static void ezy_digits (const char *method, const pw_settings *settings, const e
   const pw_statistics *cost = pw_run_statistics (r);
   check_below ("worst |g| of the run", cost->g, bound->g, bound->reason);
   check_below ("worst |J v - eta| of the run", cost->jv, bound->jv, bound->reason);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_rk4_projection (void **state) {
@@ -109,8 +109,8 @@ static void ezy_multiplier (const char *method, double bound, const char *reason
     check_close ("wheel C", fabs (now.lambda[3]), fabs (ezy_torque (0.1 * i)) / 0.25, bound, reason);
     check_close ("hinge B", hypot (now.lambda[0], now.lambda[1]), fabs (now.lambda[3]), bound, "the same force");
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_multiplier (void **state) {
@@ -128,10 +128,10 @@ static void ezy_straight (const char *method, double bound, const char *reason) 
   static const double value[] = { 0, 0, 0, 1, 0, 0, PW_PI / 2 };
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, "M0", 0.0, NULL);
-  for (int i = 0; i < 7; i++) check_ok (pw_set_start (m, given[i], value[i], &error), &error);
+  for (int i = 0; i < 7; i++) check_ok (pw_model_set_initial (m, given[i], value[i], &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1, .ledger = 1 });
-  assert_int_equal (pw_run_start (r)->freed, 0);
+  assert_int_equal (pw_run_initial (r)->freed, 0);
   pw_sample now = runs_to (r, 1);
   check_close ("phi2(1)", now.q[5], 3.104965471129630, bound, reason);
   check_close ("x1(1)", now.q[0], 1, bound, reason);
@@ -139,8 +139,8 @@ static void ezy_straight (const char *method, double bound, const char *reason) 
   check_close ("phi1(1)", now.q[2], 0, bound, reason);
   check_close ("u(1)", now.v[0], 1, bound, reason);
   check_close ("energy", now.kinetic, 0.5, bound, "conserved");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_straight (void **state) {
@@ -208,8 +208,8 @@ static void test_reduced (void **state) {
     check_close ("omega1", now.v[2], w, bound, reason);
     check_close ("kinetic energy", now.kinetic,
                  (ezy_other.m1 * (u * u + v_across * v_across) + ezy_other.I1 * w * w) / 2, bound, reason);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -224,8 +224,8 @@ static void test_mirror (void **state) {
   for (int j = 0; j < 5; j++)
     check_close ("mirror", Q[j], j % 3 == 0 ? q[j] : -q[j], bound, "round-off over 300 steps");
   check_close ("mirror", Q[5] - PW_PI, -(q[5] - PW_PI), bound, "round-off over 300 steps");
-  pw_free (s);
-  pw_free (S);
+  pw_system_free (s);
+  pw_system_free (S);
 }
 
 int main (void) {

@@ -101,8 +101,8 @@ static double galpha_condition (const char *model, const char *method, double h)
   pw_sparse *k = &r->data->work.sparse;
   klu_l_condest (k->colptr, r->data->work.value, k->order, k->factors, &k->common);
   double condition = k->common.condest;
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   return condition;
 }
 
@@ -120,10 +120,10 @@ static void galpha_stops (const char *model, const char *method, double step, co
   pw_error error = { 0 };
   pw_system *s = ladder_open (model);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .span = 100 });
-  assert_int_equal (pw_advance_to (r, 100, 100, &error), PW_METHOD);
+  assert_int_equal (pw_run_advance_to (r, 100, 100, &error), PW_METHOD);
   if (strstr (error.text, cause) == NULL) fail_msg ("%s", error.text);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_large_steps (void **state) {
@@ -150,8 +150,8 @@ static void test_samples (void **state) {
       for (double t = 0.0237; t < 1; t += 0.0411) {
         pw_error error = { 0 };
         pw_sample x, y = runs_to (exact, t);
-        check_ok (pw_advance_to (r, t, 1, &error), &error);
-        check_ok (pw_at (r, t, &x, &error), &error);
+        check_ok (pw_run_advance_to (r, t, 1, &error), &error);
+        check_ok (pw_run_sample (r, t, &x, &error), &error);
         check_below ("sample's position", x.position, 64 * CHECK_EPS, "round-off");
         check_below ("sample's rates", x.velocity, i ? 64 * CHECK_EPS : h * h * 100, "round-off; 100 (h/s)^2");
         balance[k] = fmax (balance[k], fabs (x.balance));
@@ -159,15 +159,15 @@ static void test_samples (void **state) {
         for (int j = 0; j < 5; j++) force[k] = fmax (force[k], fabs (x.lambda[j] - y.lambda[j]));
       }
       memcpy (q[k], runs_to (r, 1).q, sizeof q[k]);
-      pw_close (r);
-      pw_close (exact);
+      pw_run_close (r);
+      pw_run_close (exact);
       if (k == 0) { /* without samples and ledger */
         double Q[6], v[6];
         runs_state (s, method[i], &(pw_settings){ .step = h, .span = 1 }, 1, Q, v, NULL);
         check_bits ("positions without samples", q[0], Q, 6);
       }
-      pw_free (s);
-      pw_free (S);
+      pw_system_free (s);
+      pw_system_free (S);
     }
     check_below ("states of samples", off[1], off[0] / 10, "order 2 has 1/16");
     check_below ("multipliers of samples", force[1], force[0] / 10, "order 2 has 1/16");
@@ -191,15 +191,15 @@ static void galpha_switched_run (const char *method, pw_settings settings, doubl
   pw_error error = { 0 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = galpha_switched, .breakpoint = galpha_breakpoint } };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, method, &settings);
   pw_sample x = runs_to (r, 0.5);
   memcpy (state, x.q, 6 * sizeof *state);
   memcpy (state + 6, x.v, 6 * sizeof *state);
   memcpy (lambda, x.lambda, 4 * sizeof *lambda);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_breakpoint (void **state) {
@@ -245,9 +245,9 @@ static void test_damping (void **state) {
     }
     if (rho[i] < 1) check_below (method, energy[1], energy[0] * pow (rho[i], 20), "rho^2 in energy, of 20 steps one");
     if (rho[i] == 1) check_close (method, energy[1] / energy[0], 1, 0.1, "nothing is damped");
-    pw_close (r);
+    pw_run_close (r);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* ---- A vibration a thousand times too fast for the step ---- */
@@ -278,8 +278,8 @@ static void test_no_overshoot (void **state) {
                      "a double root: a power of k besides");
     }
     check_below (method[i], most, 1e-3 * (1 + 1e-9), "as it starts");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 

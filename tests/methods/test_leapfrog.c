@@ -96,14 +96,14 @@ static double leapfrog_way_back (const char *model, const char *method, double h
   double back[LEAPFROG_COORDS], T = pw_run_scale (r)->time;
   x = runs_to (r, n * h);
   for (int j = 0; j < s->coords; j++) back[j] = -x.v[j];
-  check_ok (pw_restart (r, NULL, back, &error), &error);
+  check_ok (pw_run_restart (r, NULL, back, &error), &error);
   x = runs_to (r, 2 * n * h);
   for (int j = 0; j < s->coords; j++) {
     off = fmax (off, fabs (x.q[j] - q[j]) / pw_unit (s, j));
     off = fmax (off, fabs (x.v[j] + v[j]) / pw_unit (s, j) * T);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   return off;
 }
 
@@ -137,13 +137,13 @@ static double leapfrog_drift_of (const char *model, const char *method, double h
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = h, .span = 1, .ledger = 1 });
   for (int i = 0; i < 4 * steps; i++) {
     pw_sample x;
-    check_ok (pw_advance (r, INFINITY, &error), &error);
-    check_ok (pw_at (r, pw_time (r), &x, &error), &error);
+    check_ok (pw_run_advance (r, INFINITY, &error), &error);
+    check_ok (pw_run_sample (r, pw_run_time (r), &x, &error), &error);
     mean[i / steps] += x.balance / steps;
     if (i < steps) most = fmax (most, fabs (x.balance));
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   return fabs (mean[3] - mean[0]) / most;
 }
 
@@ -184,10 +184,10 @@ static void leapfrog_damped (pw_model *m, const void *parameters) {
 static void leapfrog_stops (pw_system *s, double step, const char *cause) {
   pw_error error = { 0 };
   pw_run *r = runs_open (s, "leapfrog", &(pw_settings){ .step = step, .span = 100 });
-  assert_int_equal (pw_advance_to (r, 100, 100, &error), PW_METHOD);
+  assert_int_equal (pw_run_advance_to (r, 100, 100, &error), PW_METHOD);
   if (strstr (error.text, cause) == NULL) fail_msg ("%s", error.text);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_large_steps (void **state) {

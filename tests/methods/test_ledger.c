@@ -144,15 +144,15 @@ static void ledger_run (int scene, const char *method, const pw_settings *settin
     pw_run *r = runs_open (s, method, settings);
     for (size_t k = 0; k < sizeof t / sizeof *t; k++) {
       pw_sample x;
-      check_ok (pw_advance_to (r, t[k], i ? t[k] : 2, &error), &error); /* inside a step, or at its end */
-      check_ok (pw_at (r, t[k], &x, &error), &error);
+      check_ok (pw_run_advance_to (r, t[k], i ? t[k] : 2, &error), &error); /* inside a step, or at its end */
+      check_ok (pw_run_sample (r, t[k], &x, &error), &error);
       ledger_compare (scene, method, &x, bound, reason);
       check_close ("balance", x.balance, 0, bound, reason);
-      check_below ("energy defect", pw_unbalanced (r, &x), bound, reason);
+      check_below ("energy defect", pw_run_energy_defect (r, &x), bound, reason);
     }
-    pw_close (r);
+    pw_run_close (r);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void test_closed_forms (void **state) {
@@ -185,12 +185,12 @@ static void test_always_kept (void **state) {
         pw_system *s = scene_system (&ledger_scene[scene].table, NULL);
         pw_run *r = runs_open (s, name, &(pw_settings){ .step = 1e-2, .span = 2, .ledger = asked });
         pw_sample x = runs_to (r, 1);
-        memcpy (kept[asked], (const double[]){ x.work, x.loss, pw_unbalanced (r, &x) }, 3 * sizeof (double));
+        memcpy (kept[asked], (const double[]){ x.work, x.loss, pw_run_energy_defect (r, &x) }, 3 * sizeof (double));
         memcpy (kept[asked] + 3, x.q, 3 * sizeof (double));
         memcpy (kept[asked] + 6, x.v, 3 * sizeof (double));
         assert_true ((x.ledger != NULL) == asked);
-        pw_close (r);
-        pw_free (s);
+        pw_run_close (r);
+        pw_system_free (s);
       }
       check_bits (name, kept[0], kept[1],
                   2 + 7 * (scene != 3)); /* of what adds up to nothing there is only round-off */
@@ -207,31 +207,31 @@ static void test_exchanged (void **state) {
   pw_sample x = runs_to (r, 100);
   assert_true (x.loss > 1000);
   x.work += 0.5;
-  check_close ("defect of 0.5 J", pw_unbalanced (r, &x), 0.5 / 2.5, 0.01, "of 2.5 J at the start");
-  pw_close (r);
-  pw_free (s);
+  check_close ("defect of 0.5 J", pw_run_energy_defect (r, &x), 0.5 / 2.5, 0.01, "of 2.5 J at the start");
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* A position that is prescribed by a constant does no work, and has no account. */
 static void test_constant_drive (void **state) {
   (void)state;
   pw_system *s = scene_named ("slider-crank", "l2", 1);
-  assert_int_equal (pw_count_ledger (s), 0);
+  assert_int_equal (pw_system_ledger_entries (s), 0);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
   pw_sample x = runs_to (r, 1);
-  check_below ("defect", pw_unbalanced (r, &x), 1e-10, "(h w)^4 at w = 3 / s");
-  pw_close (r);
-  pw_free (s);
+  check_below ("defect", pw_run_energy_defect (r, &x), 1e-10, "(h w)^4 at w = 3 / s");
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void ledger_advise (const char *model, const char *method, double rtol, double defect, const char *advice) {
   pw_system *s = scene_named (model, NULL, 0);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-2, .rtol = rtol, .span = 1 });
   runs_to (r, 1);
-  const char *said = pw_energy_advice (r, defect);
+  const char *said = pw_run_energy_advice (r, defect);
   if (strstr (said, advice) == NULL) fail_msg ("%s, rtol %g, defect %g: %s", method, rtol, defect, said);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* A smaller tolerance is recommended where it helps. */

@@ -36,9 +36,9 @@ static void test_every_pair (void **state) {
     pw_run *r = runs_open (s, name, NULL);
     pw_sample now = runs_to (r, 0.01);
     assert_true (now.t == 0.01 && pw_run_statistics (r)->steps > 0);
-    pw_close (r);
+    pw_run_close (r);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void test_parse (void **state) {
@@ -47,7 +47,7 @@ static void test_parse (void **state) {
   int stabilisation;
   double value[PW_MAX_OPTIONS];
   pw_error error = { 0 };
-  check_ok (pw_parse_method ("rk4", &m, &stabilisation, &error), &error);
+  check_ok (pw_method_parse ("rk4", &m, &stabilisation, &error), &error);
   assert_string_equal (m->name, "rk4");
   assert_int_equal (stabilisation, 0);
   check_ok (pw_parse_options ("rk4+baumgarte:alpha=2.5e1:beta=.5", NULL, &m, &stabilisation, value, &error), &error);
@@ -57,7 +57,7 @@ static void test_parse (void **state) {
     if (strcmp (m->options[i].name, "beta") == 0) assert_true (value[i] == 0.5);
     if (strcmp (m->options[i].name, "every") == 0) assert_true (value[i] == 1); /* a default */
   }
-  check_ok (pw_parse_method ("rk4+projection:metric=identity:inputs=held:every=3", &m, &stabilisation, &error), &error);
+  check_ok (pw_method_parse ("rk4+projection:metric=identity:inputs=held:every=3", &m, &stabilisation, &error), &error);
 }
 
 /* The text may go on where it ends in "..." */
@@ -65,7 +65,7 @@ static void methods_refused (const char *name, const char *text) {
   const pw_method *m;
   int stabilisation;
   pw_error error = { 0 };
-  assert_int_equal (pw_parse_method (name, &m, &stabilisation, &error), PW_INPUT);
+  assert_int_equal (pw_method_parse (name, &m, &stabilisation, &error), PW_INPUT);
   const char *open = strstr (text, "...");
   if (open == NULL)
     check_error (&error, PW_INPUT, text);
@@ -126,9 +126,9 @@ static void test_long_names (void **state) {
 static void methods_bad_setting (const pw_settings *settings, const char *text) {
   pw_error error = { 0 };
   pw_system *s = scene_system (&scene_ezyroller, NULL);
-  assert_null (pw_open (s, "rk4", settings, &error));
+  assert_null (pw_run_open (s, "rk4", settings, &error));
   check_error (&error, PW_INPUT, text);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void test_settings (void **state) {

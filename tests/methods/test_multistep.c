@@ -119,9 +119,9 @@ static void test_stiff (void **state) {
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_statistics cost = multi_cost (s, method[i], 2, q);
     check_below (method[i], 10 * (double)cost.steps, (double)by_hand.steps, "ten times fewer steps");
-    for (int j = 0; j < pw_count_coordinates (s); j++) check_close (method[i], q[j], exact[j], 1e-3, "1000 rtol");
+    for (int j = 0; j < pw_system_coordinates (s); j++) check_close (method[i], q[j], exact[j], 1e-3, "1000 rtol");
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* A matrix serves many steps; the functional iteration has none. */

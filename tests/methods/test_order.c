@@ -15,7 +15,7 @@ static double order_error (const char *method, double step) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   runs_state (s, method, &(pw_settings){ .step = step, .span = 10 }, 10, q, v, NULL);
   worst = fmax (fmax (fabs (q[0] - x[1]), fabs (q[1] - x[2])), fmax (fabs (q[2] - x[3]), fabs (q[5] - x[4])));
-  pw_free (s);
+  pw_system_free (s);
   return worst;
 }
 
@@ -67,10 +67,10 @@ static void order_switched_run (const char *method, const pw_settings *settings,
   pw_error error = { 0 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = order_switched, .breakpoint = order_breakpoint } };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   pw_system *s = scene_compile (m);
   runs_state (s, method, settings, 1, q, v, cost);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static double order_switched_error (const char *method, double step) {

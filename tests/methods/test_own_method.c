@@ -14,7 +14,7 @@ static int own_open (pw_run *r, pw_error *error) {
 static int own_advance (pw_run *r, double t_end, pw_error *error) {
   const pw_state x = pw_run_state (r);
   double h = pw_step_size (r, t_end), *q = pw_step_array (r, 0), *v = pw_step_array (r, 1);
-  for (int j = 0; j < pw_count_coordinates (x.system); j++) q[j] = x.q[j] + h * (v[j] = x.v[j] + h * x.a[j]);
+  for (int j = 0; j < pw_system_coordinates (x.system); j++) q[j] = x.q[j] + h * (v[j] = x.v[j] + h * x.a[j]);
   return pw_step_accept (r, PW_OK, h, q, v, error);
 }
 
@@ -47,7 +47,7 @@ static const pw_settings own_settings = { .step = 1e-3, .methods = own_methods }
 static pw_system *own_system (const pw_signal *torque) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  if (torque) check_ok (pw_set_signal (m, "rider", "value", torque, &error), &error);
+  if (torque) check_ok (pw_model_set_signal (m, "rider", "value", torque, &error), &error);
   return scene_compile (m);
 }
 
@@ -62,8 +62,8 @@ static void test_stabilisations (void **state) {
     runs_to (r, 1);
     off[i] = pw_run_statistics (r)->position;
     assert_int_equal (pw_run_statistics (r)->steps, 1000);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
   check_below ("with feedback", off[1], off[0] / 2, "it has to matter");
   check_below ("projected", off[2], 1e-14, "round-off");
@@ -78,18 +78,18 @@ static void test_breakpoint (void **state) {
   pw_run *r = runs_open (s, "euler+projection", &own_settings);
   pw_error error = { 0 };
   int met = 0;
-  check_ok (pw_advance (r, 0.0005, &error), &error);
-  check_ok (pw_advance (r, 0.02, &error), &error);
-  check_close ("a step behind one that was cut", pw_time (r), 0.0015, 1e-15, "a rounding");
-  while (pw_time (r) < 0.02) {
-    check_ok (pw_advance (r, 0.02, &error), &error);
-    if (pw_time (r) == 0.0104) met = 1;
+  check_ok (pw_run_advance (r, 0.0005, &error), &error);
+  check_ok (pw_run_advance (r, 0.02, &error), &error);
+  check_close ("a step behind one that was cut", pw_run_time (r), 0.0015, 1e-15, "a rounding");
+  while (pw_run_time (r) < 0.02) {
+    check_ok (pw_run_advance (r, 0.02, &error), &error);
+    if (pw_run_time (r) == 0.0104) met = 1;
   }
   assert_true (met);
-  check_close ("the end", pw_time (r), 0.02, 0, "the last step ends there");
+  check_close ("the end", pw_run_time (r), 0.02, 0, "the last step ends there");
   assert_int_equal (pw_run_statistics (r)->steps, 11 + 10);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* A sample inside a step meets the constraints, and lies between the ends as a cubic does. */
@@ -100,15 +100,15 @@ static void test_sample (void **state) {
   runs_to (r, 0.5);
   pw_sample x;
   pw_error error = { 0 };
-  check_ok (pw_at (r, 0.5, &x, &error), &error);
+  check_ok (pw_run_sample (r, 0.5, &x, &error), &error);
   double end = x.q[0], v = x.v[0];
-  check_ok (pw_at (r, 0.4995, &x, &error), &error);
+  check_ok (pw_run_sample (r, 0.4995, &x, &error), &error);
   check_close ("halfway", x.q[0], end - 0.0005 * v, 1e-6,
                "h^2/8 of an acceleration below 1, and the method's own error");
   check_below ("residual", fmax (x.position, x.velocity), 1e-13, "it is projected");
-  assert_int_equal (pw_at (r, 0.49, &x, &error), PW_INPUT);
-  pw_close (r);
-  pw_free (s);
+  assert_int_equal (pw_run_sample (r, 0.49, &x, &error), PW_INPUT);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* A saved run goes on to the bit. */
@@ -127,9 +127,9 @@ static void test_checkpoint (void **state) {
       a = (pw_archive){ a.at, 0, a.used, 1, 0 };
       check_ok (pw_run_load (r, &a, &error), &error);
     }
-    memcpy (q[i], runs_to (r, 0.4).q, (size_t)pw_count_coordinates (s) * sizeof **q);
-    pw_close (r);
-    pw_free (s);
+    memcpy (q[i], runs_to (r, 0.4).q, (size_t)pw_system_coordinates (s) * sizeof **q);
+    pw_run_close (r);
+    pw_system_free (s);
   }
   check_bits ("q", q[0], q[1], 6);
   pw_archive_free (&a);
@@ -139,15 +139,15 @@ static void test_errors (void **state) {
   (void)state;
   pw_system *s = own_system (NULL);
   pw_error error = { 0 };
-  assert_null (pw_open (s, "eulr", &own_settings, &error));
+  assert_null (pw_run_open (s, "eulr", &own_settings, &error));
   check_error (&error, PW_INPUT, "there is no integrator \"eulr\"; did you mean \"euler\"?");
   error.status = PW_OK;
-  assert_null (pw_open (s, "incomplete", &own_settings, &error));
+  assert_null (pw_run_open (s, "incomplete", &own_settings, &error));
   check_error (&error, PW_INPUT, "integrator incomplete: its table needs open, advance, at, restart and close");
   error.status = PW_OK;
-  assert_null (pw_open (s, "euler", NULL, &error));
+  assert_null (pw_run_open (s, "euler", NULL, &error));
   assert_int_equal (error.status, PW_INPUT);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 int main (void) {

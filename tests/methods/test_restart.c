@@ -19,7 +19,7 @@ static void test_onwards (void **state) {
     pw_run *r = runs_open (s, method[i], &settings);
     runs_to (r, 1);
     pw_statistics before = *pw_run_statistics (r);
-    check_ok (pw_restart (r, NULL, NULL, &error), &error);
+    check_ok (pw_run_restart (r, NULL, NULL, &error), &error);
     pw_sample now = runs_to (r, 2);
     const pw_statistics *cost = pw_run_statistics (r); /* counts from the beginning of the run */
     assert_true (cost->steps > before.steps && cost->rhs > before.rhs && cost->rejected >= before.rejected);
@@ -29,11 +29,11 @@ static void test_onwards (void **state) {
     check_close ("balance", now.balance, 0, i < 2 ? 1e-10 : 1e-5, "the ledger goes on");
     double moved[6];
     for (int j = 0; j < 6; j++) moved[j] = now.q[j] + (j % 3 == 0 ? 10 : 0); /* both bodies 10 m to the side */
-    check_ok (pw_restart (r, moved, NULL, &error), &error);
+    check_ok (pw_run_restart (r, moved, NULL, &error), &error);
     now = runs_to (r, 2.5);
     assert_true (now.q[0] > 9);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -47,11 +47,11 @@ static void test_slower (void **state) {
   pw_sample before = runs_to (r, 2);
   double work = before.work, left = before.kinetic / 4;
   for (int j = 0; j < 6; j++) v[j] = before.v[j] / 2;
-  check_ok (pw_restart (r, NULL, v, &error), &error);
+  check_ok (pw_run_restart (r, NULL, v, &error), &error);
   pw_sample now = runs_to (r, 2.001);
   check_close ("work of a step", now.work - work, now.kinetic - left, 1e-13, "the method's error in one step, h^5");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* A restart that is refused leaves the run where it was, to the bit. */
@@ -66,17 +66,17 @@ static void test_refused (void **state) {
   double q[6];
   memcpy (q, now.q, sizeof q);
   q[4] = NAN;
-  assert_int_equal (pw_restart (r, q, NULL, &error), PW_INPUT);
+  assert_int_equal (pw_run_restart (r, q, NULL, &error), PW_INPUT);
   check_error (&error, PW_INPUT, "model ezyroller: restart with steer.y = nan: expected a finite number");
-  assert_int_equal (pw_advance (r, NAN, NULL), PW_INPUT);
-  assert_int_equal (pw_at (r, NAN, &now, NULL), PW_INPUT);
+  assert_int_equal (pw_run_advance (r, NAN, NULL), PW_INPUT);
+  assert_int_equal (pw_run_sample (r, NAN, &now, NULL), PW_INPUT);
   now = runs_to (r, 2);
   pw_sample other = runs_to (left, 2);
   for (int i = 0; i < 6; i++)
     check_close ("positions", now.q[i], other.q[i], 1e-13, "round-off of a factorisation anew");
   check_close ("balance", now.balance, other.balance, 1e-13, "round-off");
-  pw_close (r), pw_close (left);
-  pw_free (s), pw_free (same);
+  pw_run_close (r), pw_run_close (left);
+  pw_system_free (s), pw_system_free (same);
 }
 
 /* A kick is the caller's: the balance tells the method's error only, before and behind it. */
@@ -89,12 +89,12 @@ static void test_kick (void **state) {
   pw_sample now = runs_to (r, 1);
   double kinetic = now.kinetic;
   for (int j = 0; j < 6; j++) v[j] = 3 * now.v[j];
-  check_ok (pw_restart (r, NULL, v, &error), &error);
-  check_ok (pw_at (r, 1, &now, &error), &error);
+  check_ok (pw_run_restart (r, NULL, v, &error), &error);
+  check_ok (pw_run_sample (r, 1, &now, &error), &error);
   check_close ("kick", now.kinetic, 9 * kinetic, 1e-14, "round-off");
   check_close ("balance", now.balance, 0, 1e-10, "(h w)^4");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* Nor is it taken for the method's where nothing but the energy itself is known. */
@@ -105,14 +105,14 @@ static void test_kick_unkept (void **state) {
   pw_system *s = scene_named ("n-four-bar", "N", 2);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
   pw_sample now = runs_to (r, 0.1);
-  assert_int_equal (pw_count_ledger (s), 0);
-  assert_true (pw_count_coordinates (s) <= 30);
-  for (int j = 0; j < pw_count_coordinates (s); j++) v[j] = 3 * now.v[j];
-  check_ok (pw_restart (r, NULL, v, &error), &error);
+  assert_int_equal (pw_system_ledger_entries (s), 0);
+  assert_true (pw_system_coordinates (s) <= 30);
+  for (int j = 0; j < pw_system_coordinates (s); j++) v[j] = 3 * now.v[j];
+  check_ok (pw_run_restart (r, NULL, v, &error), &error);
   now = runs_to (r, 0.2);
-  check_below ("energy", pw_unbalanced (r, &now), 1e-5, "(h w)^4 at w = 50 / s");
-  pw_close (r);
-  pw_free (s);
+  check_below ("energy", pw_run_energy_defect (r, &now), 1e-5, "(h w)^4 at w = 50 / s");
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- A torque that the caller sets anew between steps, as a controller does ---- */
@@ -128,17 +128,17 @@ static double restart_controlled (const char *method, double step) {
   double u = 0;
   pw_signal torque = { PW_FUNCTION, .function = { .eval = restart_held, .context = &u } };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = 1e-12, .span = 2 });
   for (int k = 0; k < 20; k++) {
     u = 0.1 * cos (0.4 * k);
-    check_ok (pw_restart (r, NULL, NULL, &error), &error);
-    check_ok (pw_advance_to (r, 0.1 * (k + 1), 0.1 * (k + 1), &error), &error);
+    check_ok (pw_run_restart (r, NULL, NULL, &error), &error);
+    check_ok (pw_run_advance_to (r, 0.1 * (k + 1), 0.1 * (k + 1), &error), &error);
   }
-  double phi = runs_to (r, pw_time (r)).q[2];
-  pw_close (r);
-  pw_free (s);
+  double phi = runs_to (r, pw_run_time (r)).q[2];
+  pw_run_close (r);
+  pw_system_free (s);
   return phi;
 }
 

@@ -25,7 +25,7 @@ static pw_system *runs_fused (runs_fuse *fuse) {
   pw_error error = { 0 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = runs_burns, .context = fuse } };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   return scene_compile (m);
 }
 
@@ -38,19 +38,19 @@ static void test_signal_fails (void **state) {
     pw_error error = { 0 };
     pw_system *s = runs_fused (&fuse);
     pw_run *r = runs_open (s, method[i], NULL);
-    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
-    double t = pw_time (r);
+    assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
+    double t = pw_run_time (r);
     assert_true (t > 0.3 && t <= 0.5);
     assert_non_null (strstr (error.text, "a signal failed"));
     assert_int_equal (strncmp (error.text, "t = ", 4), 0);
     check_close ("time in the message", strtod (error.text + 4, NULL), t, 1e-5, "six digits");
     pw_sample sample;
     error.status = PW_OK;
-    check_ok (pw_at (r, t, &sample, &error), &error);
-    pw_close (r);
-    assert_null (pw_open (s, "rk5", NULL, &error)); /* another run of the system has nothing to do with it */
+    check_ok (pw_run_sample (r, t, &sample, &error), &error);
+    pw_run_close (r);
+    assert_null (pw_run_open (s, "rk5", NULL, &error)); /* another run of the system has nothing to do with it */
     assert_null (strstr (error.text, "finite"));
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -59,9 +59,9 @@ static void test_signal_fails_at_once (void **state) {
   runs_fuse fuse = { -1 };
   pw_error error = { 0 };
   pw_system *s = runs_fused (&fuse);
-  assert_null (pw_open (s, "rk4", NULL, &error));
+  assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (&error, PW_METHOD, "t = 0 s: a signal failed: torque rider: value is not a finite number");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* A spring too stiff for the step. */
@@ -81,11 +81,11 @@ static void test_too_large_a_step (void **state) {
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.1 });
-  assert_int_equal (pw_advance_to (r, 100, 100, &error), PW_METHOD);
+  assert_int_equal (pw_run_advance_to (r, 100, 100, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "s: the step of 0.1 s is too large: the "));
-  assert_true (pw_time (r) < 100);
-  pw_close (r);
-  pw_free (s);
+  assert_true (pw_run_time (r) < 100);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- A body that nothing determines ---- */
@@ -100,11 +100,11 @@ static void test_massless (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
-  assert_null (pw_open (s, "rk4", NULL, &error));
+  assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (
       &error, PW_INPUT,
       "model scene: loose.x has no mass, and no constraint determines how it moves; give it mass, or constrain it");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* ---- Scenes without some sort of rows, or all ---- */
@@ -138,9 +138,9 @@ static void test_few_rows (void **state) {
       check_close ("angle", now.q[2], 0.25 / 0.5 * 2 * 2 / 2, bound, reason);
       check_close ("x", now.q[0], with == 0 ? 3 * 2 : 0, bound, reason);
       check_close ("work", now.work, 0.25 * now.q[2], bound, reason);
-      pw_close (r);
+      pw_run_close (r);
     }
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -162,8 +162,8 @@ static void test_twice (void **state) {
   assert_int_equal (pw_run_redundant (r), 2);
   assert_string_equal (pw_run_redundancy (r, 0, text, sizeof text), "pins P and Q: the same x constraint");
   assert_string_equal (pw_run_redundancy (r, 1, text, sizeof text), "pins P and Q: the same y constraint");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- Runs that share a system ---- */
@@ -183,7 +183,7 @@ static void test_shared (void **state) {
     pw_sample x = runs_to (r[i], 1);
     memcpy (alone[i][0], x.q, sizeof alone[i][0]);
     memcpy (alone[i][1], x.v, sizeof alone[i][1]);
-    pw_close (r[i]);
+    pw_run_close (r[i]);
   }
   for (int i = 0; i < METHODS; i++) r[i] = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .span = 1 + i });
   for (int k = 1; k <= 10; k++)
@@ -192,28 +192,28 @@ static void test_shared (void **state) {
     pw_sample x = runs_to (r[i], 1);
     check_bits ("q", x.q, alone[i][0], 6);
     check_bits ("v", x.v, alone[i][1], 6);
-    pw_close (r[i]);
+    pw_run_close (r[i]);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void test_missing (void **state) {
   (void)state;
   pw_error e[] = { { 0 }, { 0 }, { 0 }, { 0 }, { 0 }, { 0 } };
   pw_sample sample;
-  assert_null (pw_open (NULL, "rk4", NULL, &e[0]));
+  assert_null (pw_run_open (NULL, "rk4", NULL, &e[0]));
   check_error (&e[0], PW_INPUT, "a system is missing");
-  assert_int_equal (pw_advance (NULL, 1, &e[1]), PW_INPUT);
-  assert_int_equal (pw_advance_to (NULL, 1, 1, &e[2]), PW_INPUT);
-  assert_int_equal (pw_at (NULL, 1, &sample, &e[3]), PW_INPUT);
-  assert_int_equal (pw_restart (NULL, NULL, NULL, &e[4]), PW_INPUT);
+  assert_int_equal (pw_run_advance (NULL, 1, &e[1]), PW_INPUT);
+  assert_int_equal (pw_run_advance_to (NULL, 1, 1, &e[2]), PW_INPUT);
+  assert_int_equal (pw_run_sample (NULL, 1, &sample, &e[3]), PW_INPUT);
+  assert_int_equal (pw_run_restart (NULL, NULL, NULL, &e[4]), PW_INPUT);
   for (int i = 1; i < 5; i++) check_error (&e[i], PW_INPUT, "a run is missing");
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_run *r = runs_open (s, "rk4", NULL);
-  assert_int_equal (pw_at (r, 0, NULL, &e[5]), PW_INPUT);
+  assert_int_equal (pw_run_sample (r, 0, NULL, &e[5]), PW_INPUT);
   check_error (&e[5], PW_INPUT, "a sample is missing");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- Looking into a run ---- */
@@ -227,12 +227,12 @@ static void test_outside (void **state) {
     pw_system *s = scene_system (&scene_ezyroller, NULL);
     pw_run *r = runs_open (s, method[i], NULL);
     runs_to (r, 0.5);
-    assert_int_equal (pw_at (r, 0.1, &sample, &error), PW_INPUT);
+    assert_int_equal (pw_run_sample (r, 0.1, &sample, &error), PW_INPUT);
     assert_non_null (strstr (error.text, "lies outside the last step"));
     error.status = PW_OK;
-    assert_int_equal (pw_at (r, 0.6, &sample, &error), PW_INPUT);
-    pw_close (r);
-    pw_free (s);
+    assert_int_equal (pw_run_sample (r, 0.6, &sample, &error), PW_INPUT);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -244,14 +244,14 @@ static void test_t_end (void **state) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&scene_ezyroller, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.03 });
-    while (pw_time (r) < 0.1) check_ok (pw_advance (r, 0.1, &error), &error);
-    assert_true (pw_time (r) == 0.1);
-    check_ok (pw_advance (r, 0.1, &error), &error);
-    assert_true (pw_time (r) == 0.1);
+    while (pw_run_time (r) < 0.1) check_ok (pw_run_advance (r, 0.1, &error), &error);
+    assert_true (pw_run_time (r) == 0.1);
+    check_ok (pw_run_advance (r, 0.1, &error), &error);
+    assert_true (pw_run_time (r) == 0.1);
     runs_to (r, 0.25);
-    assert_true (pw_time (r) == 0.25);
-    pw_close (r);
-    pw_free (s);
+    assert_true (pw_run_time (r) == 0.25);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -267,7 +267,7 @@ static pw_system *runs_wild_system (double *from) {
   pw_error error = { 0 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = runs_wild, .context = from } };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   return scene_compile (m);
 }
 
@@ -281,10 +281,10 @@ static void test_wild (void **state) {
     pw_error error = { 0 };
     pw_system *s = runs_wild_system (&from);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 1e-2, .span = 1 });
-    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
-    assert_true (pw_time (r) > 0.4 && pw_time (r) <= 0.51);
-    pw_close (r);
-    pw_free (s);
+    assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
+    assert_true (pw_run_time (r) > 0.4 && pw_run_time (r) <= 0.51);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -308,9 +308,9 @@ static void test_weak_start (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
-  assert_null (pw_open (s, "rk4", NULL, &error));
+  assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (&error, PW_METHOD, "t = 0 s: the acceleration of b.phi is not finite");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void test_wild_start (void **state) {
@@ -318,9 +318,9 @@ static void test_wild_start (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
-  assert_null (pw_open (s, "erk8+projection", NULL, &error));
+  assert_null (pw_run_open (s, "erk8+projection", NULL, &error));
   check_error (&error, PW_METHOD, "t = 0 s: force of spring k is not finite");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 int main (void) {

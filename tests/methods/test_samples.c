@@ -20,12 +20,12 @@ static void samples_state (const char *method, double rtol, int look, double *q,
   S = scene_system (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .span = t_end, .ledger = 1 });
   pw_run *exact = runs_open (S, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = t_end });
-  for (double t0 = 0; pw_time (r) < t_end; t0 = pw_time (r)) {
+  for (double t0 = 0; pw_run_time (r) < t_end; t0 = pw_run_time (r)) {
     pw_sample now;
-    check_ok (pw_advance (r, t_end, &error), &error);
+    check_ok (pw_run_advance (r, t_end, &error), &error);
     for (int k = 0; look && k < 2; k++) {
-      double t = t0 + (k == 0 ? 0.37 : 0.9) * (pw_time (r) - t0);
-      check_ok (pw_at (r, t, &now, &error), &error);
+      double t = t0 + (k == 0 ? 0.37 : 0.9) * (pw_run_time (r) - t0);
+      check_ok (pw_run_sample (r, t, &now, &error), &error);
       pw_sample there = runs_to (exact, t);
       for (int j = 0; j < 6; j++) {
         check_close (method, now.q[j], there.q[j], 100 * rtol, "100 rtol, as at the ends of steps");
@@ -39,12 +39,12 @@ static void samples_state (const char *method, double rtol, int look, double *q,
   pw_sample now = runs_to (r, t_end);
   memcpy (q, now.q, 6 * sizeof *q);
   memcpy (v, now.v, 6 * sizeof *v);
-  memcpy (ledger, now.ledger, (size_t)pw_count_ledger (s) * sizeof *ledger);
+  memcpy (ledger, now.ledger, (size_t)pw_system_ledger_entries (s) * sizeof *ledger);
   *cost = *pw_run_statistics (r);
-  pw_close (r);
-  pw_close (exact);
-  pw_free (s);
-  pw_free (S);
+  pw_run_close (r);
+  pw_run_close (exact);
+  pw_system_free (s);
+  pw_system_free (S);
 }
 
 static void test_samples (void **state) {
@@ -71,19 +71,19 @@ static void test_bits (void **state) {
     pw_settings settings = { .rtol = 1e-9, .span = 2 };
     pw_system *s = scene_system (&scene_ezyroller, NULL), *S = scene_system (&scene_ezyroller, NULL);
     pw_run *r = runs_open (s, method[i], &settings);
-    for (double t0 = 0; pw_time (r) < 2; t0 = pw_time (r)) {
+    for (double t0 = 0; pw_run_time (r) < 2; t0 = pw_run_time (r)) {
       double q[6], v[6], t;
       pw_sample now;
-      check_ok (pw_advance (r, 2, &error), &error);
-      check_ok (pw_at (r, t = 0.4 * t0 + 0.6 * pw_time (r), &now, &error), &error);
+      check_ok (pw_run_advance (r, 2, &error), &error);
+      check_ok (pw_run_sample (r, t = 0.4 * t0 + 0.6 * pw_run_time (r), &now, &error), &error);
       runs_state (S, method[i], &settings, t, q, v, NULL);
       check_bits ("positions of a run that ends there", now.q, q, 6);
       check_bits ("rates of a run that ends there", now.v, v, 6);
     }
     assert_int_equal (pw_run_statistics (r)->rejected, 0); /* a run that ends there might not be told to retreat */
-    pw_close (r);
-    pw_free (s);
-    pw_free (S);
+    pw_run_close (r);
+    pw_system_free (s);
+    pw_system_free (S);
   }
 }
 
@@ -105,7 +105,7 @@ static pw_system *samples_switched_scene (void) {
   pw_error error = { 0 };
   pw_signal torque = { PW_FUNCTION, .function = { .eval = samples_switched, .breakpoint = samples_breakpoint } };
   pw_model *m = scene_model (&scene_ezyroller, NULL);
-  check_ok (pw_set_signal (m, "rider", "value", &torque, &error), &error);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   return scene_compile (m);
 }
 
@@ -120,10 +120,10 @@ static void test_breakpoint (void **state) {
     pw_system *s = samples_switched_scene (), *S = samples_switched_scene ();
     runs_state (S, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, 1, q, v, NULL);
     pw_run *r = runs_open (s, samples_methods[i], &(pw_settings){ .rtol = rtol, .span = 1, .ledger = 1 });
-    while (pw_time (r) < 1) {
-      check_ok (pw_advance (r, 1, &error), &error);
-      there += pw_time (r) == 1. / 3;
-      before += pw_time (r) > 0.3 && pw_time (r) < 1. / 3;
+    while (pw_run_time (r) < 1) {
+      check_ok (pw_run_advance (r, 1, &error), &error);
+      there += pw_run_time (r) == 1. / 3;
+      before += pw_run_time (r) > 0.3 && pw_run_time (r) < 1. / 3;
     }
     assert_int_equal (there, 1);
     check_below ("steps just before the switch", before, 2, "no approach in small steps");
@@ -134,9 +134,9 @@ static void test_breakpoint (void **state) {
       check_close (samples_methods[i], now.v[j], v[j], 100 * rtol, "100 rtol");
     }
     check_close ("balance", now.balance, 0, 100 * rtol, "100 rtol");
-    pw_close (r);
-    pw_free (s);
-    pw_free (S);
+    pw_run_close (r);
+    pw_system_free (s);
+    pw_system_free (S);
   }
 }
 
@@ -154,8 +154,8 @@ static void test_across (void **state) {
     pw_run *r = runs_open (s, method[i], &settings), *exact = runs_open (S, "rk4+projection", &(pw_settings){ 0 });
     for (int k = 1; k <= 24; k++) {
       double t = k / 24.;
-      check_ok (pw_advance_to (r, t, 1, &error), &error);
-      check_ok (pw_at (r, t, &now, &error), &error);
+      check_ok (pw_run_advance_to (r, t, 1, &error), &error);
+      check_ok (pw_run_sample (r, t, &now, &error), &error);
       pw_sample there = runs_to (exact, t);
       for (int j = 0; j < 6; j++)
         check_close (method[i], now.q[j], there.q[j], 1e3 * rtol, "1e3 rtol; rk4 at its step");
@@ -163,10 +163,10 @@ static void test_across (void **state) {
         for (int j = 0; j < 6; j++)
           check_close ("acceleration", now.a[j], there.a[j], 1e5 * rtol, "1e5 rtol: one derivative up");
     }
-    pw_close (r);
-    pw_close (exact);
-    pw_free (s);
-    pw_free (S);
+    pw_run_close (r);
+    pw_run_close (exact);
+    pw_system_free (s);
+    pw_system_free (S);
   }
 }
 
@@ -182,10 +182,10 @@ static void test_short_end (void **state) {
     assert_true (0.1 * 3 > 0.3);
     runs_to (r, 0.1 * 3);
     assert_int_equal (pw_run_statistics (r)->steps, steps + 1);
-    check_ok (pw_advance (r, 2, &error), &error);
-    check_below ("half of a usual step of erk5", 0.03, pw_time (r) - 0.3, "steps go on as they were");
-    pw_close (r);
-    pw_free (s);
+    check_ok (pw_run_advance (r, 2, &error), &error);
+    check_below ("half of a usual step of erk5", 0.03, pw_run_time (r) - 0.3, "steps go on as they were");
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 

@@ -19,7 +19,7 @@ static const char *steps_method (int i, char name[STEPS_NAME]) {
         snprintf (name, STEPS_NAME, "%s+%s%s", pw_methods[m]->name, x->name, held ? ":inputs=held" : "");
         const pw_method *method;
         int number;
-        if ((!held || pw_parse_method (name, &method, &number, NULL) == PW_OK) && i-- == 0) return name;
+        if ((!held || pw_method_parse (name, &method, &number, NULL) == PW_OK) && i-- == 0) return name;
       }
   return NULL;
 }
@@ -51,16 +51,16 @@ static void steps_run (pw_system *s, const char *method, int looks, double q[3],
   pw_error error = { 0 };
   pw_sample sample;
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 0.01, .rtol = 1e-4 });
-  while (pw_time (r) < 0.3) {
-    double before = pw_time (r);
-    check_ok (pw_advance (r, 0.3, &error), &error);
+  while (pw_run_time (r) < 0.3) {
+    double before = pw_run_time (r);
+    check_ok (pw_run_advance (r, 0.3, &error), &error);
     for (int i = 1; i <= looks; i++)
-      check_ok (pw_at (r, before + (pw_time (r) - before) * i / (looks + 1), &sample, &error), &error);
+      check_ok (pw_run_sample (r, before + (pw_run_time (r) - before) * i / (looks + 1), &sample, &error), &error);
   }
   sample = runs_to (r, 0.3);
   memcpy (q, sample.q, 3 * sizeof *q);
   memcpy (v, sample.v, 3 * sizeof *v);
-  pw_close (r);
+  pw_run_close (r);
 }
 
 /* However often a run is looked into, it stays the same. */
@@ -75,7 +75,7 @@ static void test_looks (void **state) {
     check_bits ("positions", q_seen, q, 3);
     check_bits ("rates", v_seen, v, 3);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* Held signals have within a step the values of its beginning, which a look may have gone behind: the angle of the step
@@ -86,14 +86,14 @@ static void test_held_inside (void **state) {
   pw_sample sample;
   pw_system *s = steps_open (steps_swing, (pw_signal){ 0 });
   pw_run *r = runs_open (s, "rk4+projection:inputs=held", &(pw_settings){ .step = 0.01 });
-  check_ok (pw_advance (r, 1, &error), &error);
+  check_ok (pw_run_advance (r, 1, &error), &error);
   for (int i = 3; i > 0; i--) {
     double t = 0.0025 * i;
-    check_ok (pw_at (r, t, &sample, &error), &error);
+    check_ok (pw_run_sample (r, t, &sample, &error), &error);
     check_close ("angle", sample.q[2], t * t / 2 / 1.1, 1e-12, "64 eps");
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* The beginning of a step is inside it. */
@@ -105,14 +105,14 @@ static void test_beginning (void **state) {
     pw_error error = { 0 };
     pw_sample sample;
     pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01 });
-    check_ok (pw_advance (r, 1, &error), &error);
-    assert_true (pw_time (r) > 0);
-    check_ok (pw_at (r, 0, &sample, &error), &error);
+    check_ok (pw_run_advance (r, 1, &error), &error);
+    assert_true (pw_run_time (r) > 0);
+    check_ok (pw_run_sample (r, 0, &sample, &error), &error);
     check_close ("angle", sample.q[2], 0, 16 * DBL_EPSILON, "the start, projected");
     check_close ("rate", sample.v[2], 0, 16 * DBL_EPSILON, "the start, projected");
-    pw_close (r);
+    pw_run_close (r);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* ---- Ends ---- */
@@ -127,13 +127,13 @@ static void test_endless (void **state) {
     for (int endless = 0; endless < 2; endless++) {
       pw_error error = { 0 };
       pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01, .rtol = 1e-10 });
-      for (int k = 0; k < 3; k++) check_ok (pw_advance (r, endless ? INFINITY : 1e3, &error), &error);
-      t[endless] = pw_time (r);
-      pw_close (r);
+      for (int k = 0; k < 3; k++) check_ok (pw_run_advance (r, endless ? INFINITY : 1e3, &error), &error);
+      t[endless] = pw_run_time (r);
+      pw_run_close (r);
     }
     check_close (name, t[1], t[0], 0, "the same steps");
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* Two pulses begin at times that differ by the last digit, and the run ends by as little behind them, or later. */
@@ -148,10 +148,10 @@ static void test_hardly_apart (void **state) {
     pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01, .rtol = 1e-6, .ledger = 1 });
     check_close ("angle", runs_to (r, nextafter (two, 1)).q[2], 0, 16 * DBL_EPSILON, "nothing has happened yet");
     check_close ("angle", runs_to (r, 1).q[2], 2 / 1.1 * 0.7 * 0.7 / 2, 1e-4, "100 rtol; leapfrog, galpha: h^2");
-    assert_true (pw_time (r) == 1);
-    pw_close (r);
+    assert_true (pw_run_time (r) == 1);
+    pw_run_close (r);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* ---- Functions of the caller's ---- */
@@ -173,16 +173,16 @@ static void test_not_a_number (void **state) {
   for (int i = 0; steps_method (i, name); i++) {
     pw_error error = { 0 };
     pw_run *r = runs_open (s, name, &(pw_settings){ .step = 0.01 });
-    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
-    assert_true (pw_time (r) > 0.1 && pw_time (r) <= until);
+    assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
+    assert_true (pw_run_time (r) > 0.1 && pw_run_time (r) <= until);
     assert_non_null (strstr (error.text, "torque T: value is not a finite number"));
-    pw_close (r);
+    pw_run_close (r);
   }
   until = -1;
   pw_error error = { 0 };
-  assert_null (pw_open (s, "rk4", NULL, &error));
+  assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (&error, PW_METHOD, "t = 0 s: a signal failed: torque T: value is not a finite number");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* Where a function tells the next breakpoint from. */
@@ -213,19 +213,19 @@ static void test_breakpoints_told (void **state) {
     pw_error error = { 0 };
     wrong = (steps_wrong){ 0.125, told[i] };
     pw_run *r = runs_open (s, "rk4", NULL);
-    assert_int_equal (pw_advance_to (r, 1, 1, &error), PW_METHOD);
+    assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
     check_error (&error, PW_METHOD,
                  "t = 0.125 s: torque T: value: its breakpoint function tells a time that is not later");
     wrong = (steps_wrong){ 0, told[i] };
     error = (pw_error){ 0 };
-    assert_int_equal (pw_restart (r, NULL, NULL, &error), PW_METHOD);
-    pw_close (r);
+    assert_int_equal (pw_run_restart (r, NULL, NULL, &error), PW_METHOD);
+    pw_run_close (r);
     error = (pw_error){ 0 };
     if (told[i] > 0) continue;
-    assert_null (pw_open (s, "rk4", NULL, &error));
+    assert_null (pw_run_open (s, "rk4", NULL, &error));
     check_error (&error, PW_METHOD, "t = 0 s: torque T: value: its breakpoint function tells a time that is not later");
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 int main (void) {

@@ -66,17 +66,17 @@ static void test_ackermann_angles (void **state) {
   (void)state;
   pw_system *s = gallery_open ("ackermann-car", NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
-  const pw_slab *k = w->slab;
+  const pw_element_batch *k = w->slab;
   while (k->kind != &pw_kind_steered_wheel) k++;
   for (double t = 0; t < 10; t += 0.37) {
-    pw_place (w, t, s->q0, s->v0);
+    pw_update_kinematics (w, t, s->q0, s->v0);
     double left = k->b.u[0], right = k->b.u[3];
     check_close ("cot - cot", (1 / tan (right) - 1 / tan (left)) * tan (right), 1.5 / 2.6 * tan (right), 64 * CHECK_EPS,
                  "round-off");
     assert_true (left * cos (0.2 * PW_PI * t) > 0);
   }
   pw_workspace_free (w);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* In a steady turn each axle ends on a circle that Pythagoras gives, and the hitches carry nothing. */

@@ -21,7 +21,7 @@ static void build (pw_model *m, const void *parameter) {
   double l = p->length;
   char name[20], before[20] = "ground", pin[20];
   if (p->pull < 0) {
-    pw_refuse (m, "the spring\n\"pulls\", %g N/m does not", p->pull);
+    pw_model_refuse (m, "the spring\n\"pulls\", %g N/m does not", p->pull);
     return;
   }
   for (int i = 0; i < n; i++) {

@@ -27,12 +27,12 @@ typedef struct {
 } try_count;
 
 static void try_measure (pw_system *s, pw_run *r, try_end *end) {
-  size_t bytes = (size_t)pw_count_coordinates (s) * sizeof (double);
+  size_t bytes = (size_t)pw_system_coordinates (s) * sizeof (double);
   pw_sample x;
   for (int i = 1; i <= 10 && end->status == PW_OK; i++) {
     double t = TRY_SPAN * i / 10;
-    end->status = pw_advance_to (r, t, TRY_SPAN, &end->error);
-    if (end->status == PW_OK) end->status = pw_at (r, t, &x, &end->error);
+    end->status = pw_run_advance_to (r, t, TRY_SPAN, &end->error);
+    if (end->status == PW_OK) end->status = pw_run_sample (r, t, &x, &end->error);
     if (end->status != PW_OK) return;
     end->balance = fmax (end->balance, fabs (x.balance));
     end->energy = fmax (end->energy, fmax (x.kinetic, fmax (fabs (x.work), x.loss)));
@@ -45,13 +45,13 @@ static void try_measure (pw_system *s, pw_run *r, try_end *end) {
 
 static void try_run (pw_system *s, const char *method, double rtol, double step, try_end *end) {
   *end = (try_end){ .status = PW_INPUT };
-  assert_true (s == NULL || pw_count_coordinates (s) <= (int)(sizeof end->q / sizeof *end->q));
+  assert_true (s == NULL || pw_system_coordinates (s) <= (int)(sizeof end->q / sizeof *end->q));
   pw_settings settings = { .rtol = rtol, .step = step, .span = TRY_SPAN, .ledger = 1 };
-  pw_run *r = s ? pw_open (s, method, &settings, &end->error) : NULL;
+  pw_run *r = s ? pw_run_open (s, method, &settings, &end->error) : NULL;
   end->status = r ? PW_OK : end->error.status;
   if (r == NULL) return;
   try_measure (s, r, end);
-  pw_close (r);
+  pw_run_close (r);
 }
 
 /* Says what is wrong with a seed, unless it is not more than the bound. */
@@ -70,15 +70,15 @@ static double try_distance (pw_system *a, const try_end *x, pw_system *b, const 
   char name[100];
   for (int i = 0; i < m->bodies; i++) {
     pw_body now = { .mass = 1 };
-    int ja = 3 * pw_find_body (a, m->body[i].name), jb = 3 * pw_find_body (b, m->body[i].name);
+    int ja = 3 * pw_system_find_body (a, m->body[i].name), jb = 3 * pw_system_find_body (b, m->body[i].name);
     memcpy (now.start, x->q + ja, sizeof now.start);
     memcpy (now.rate, x->v + ja, sizeof now.rate);
     mechanism_see (view, &now);
     for (int k = 0; k < 3; k++)
       worst = fmax (worst, fmax (fabs (now.start[k] - y->q[jb + k]), fabs (now.rate[k] - y->v[jb + k])));
   }
-  for (int j = 3 * m->bodies; j < pw_count_coordinates (a); j++) {
-    int other = pw_find_state (b, pw_state_name (a, j, name, sizeof name), NULL);
+  for (int j = 3 * m->bodies; j < pw_system_coordinates (a); j++) {
+    int other = pw_system_find_state (b, pw_system_state_name (a, j, name, sizeof name), NULL);
     worst = fmax (worst, fabs (x->q[j] - y->q[other]));
   }
   return worst;
@@ -87,7 +87,7 @@ static double try_distance (pw_system *a, const try_end *x, pw_system *b, const 
 /* Rates give the size of a mechanism's motion: its errors grow with them. */
 static double try_size (pw_system *s, const try_end *x) {
   double size = 1;
-  for (int j = 0; j < pw_count_coordinates (s); j++) size = fmax (size, fabs (x->v[j]));
+  for (int j = 0; j < pw_system_coordinates (s); j++) size = fmax (size, fabs (x->v[j]));
   return size;
 }
 
@@ -116,7 +116,7 @@ static void try_views (try_count *n, const mechanism *m, pw_system *s, const try
       n->refused++;
       if (y.status != PW_METHOD || !try_whips (s, x)) n->failed++;
     }
-    pw_free (other);
+    pw_system_free (other);
   }
 }
 
@@ -175,9 +175,9 @@ static void try_seed (try_count *n) {
   } else {
     print_message ("seed %u: %s\n", n->seed, x.error.text);
     n->refused++;
-    if (x.status == PW_START && !try_prescribed (&m)) n->failed++; /* it could always be at rest */
+    if (x.status == PW_INITIAL && !try_prescribed (&m)) n->failed++; /* it could always be at rest */
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 void mechanism_try (unsigned first, unsigned count) {

@@ -130,7 +130,7 @@ pw_system *mechanism_compile (const mechanism *x, const mechanism_view *view, pw
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = view_build };
   view_of = x, view_from = view;
   pw_model *m = pw_model_new ("mechanism", &table, error);
-  pw_system *s = m && pw_build (m, error) == PW_OK ? pw_compile (m, error) : NULL;
+  pw_system *s = m && pw_model_build (m, error) == PW_OK ? pw_system_compile (m, error) : NULL;
   pw_model_free (m);
   return s;
 }

@@ -110,8 +110,8 @@ static void chains_run (int how, double end[8]) {
   for (int i = 0; i < 6; i++) end[i] = trial_state (s, &x, name[i]);
   end[6] = fabs (trial_reaction (s, &x, "bar-pin6.Fx"));
   end[7] = fabs (trial_reaction (s, &x, "bar-pin6.Fy"));
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_same (void **state) {

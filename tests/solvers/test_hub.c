@@ -164,8 +164,8 @@ static void hub_run (const pw_plugin_table *table, double place, double hub[6]) 
   pw_sample x = runs_to (r, 0.2);
   trial_verify (s, r, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
   for (int i = 0; i < 6; i++) hub[i] = trial_state (s, &x, name[i]);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void hub_everywhere (const pw_plugin_table *table) {

@@ -10,10 +10,10 @@ static pw_linear linear_of (const pw_plugin_table *table) {
   pw_linear l;
   pw_system *s = scene_system (table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
-  check_ok (pw_linearise (r, 100, &l, &error), &error);
+  check_ok (pw_run_linearise (r, 100, &l, &error), &error);
   for (int i = 1; i < l.unknowns; i++) assert_true (l.re[i] <= l.re[i - 1]);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   return l;
 }
 
@@ -41,7 +41,7 @@ static void test_pendulum (void **state) {
   linear_expect (&l, 0, 0, sqrt (2 * 9.81 * 0.7 / (0.5 + 2 * 0.49)));
   linear_expect (&l, 1, 0, -sqrt (2 * 9.81 * 0.7 / (0.5 + 2 * 0.49)));
   check_close ("least", l.least, 1, 16 * CHECK_EPS, "perpendicular rows");
-  pw_linear_close (&l);
+  pw_linear_free (&l);
 }
 
 static void linear_oscillator (pw_model *m, const void *parameters) {
@@ -60,7 +60,7 @@ static void test_oscillator (void **state) {
   linear_expect (&l, 4, -0.8, sqrt (60 / 1.5 - 0.64));
   linear_expect (&l, 5, -0.8, -sqrt (60 / 1.5 - 0.64));
   for (int i = 0; i < 4; i++) linear_expect (&l, i, 0, 0);
-  pw_linear_close (&l);
+  pw_linear_free (&l);
 }
 
 /* A link pinned to an arm that turns steadily swings about the radius: w^2 = m R l W^2 / (I + m l^2). */
@@ -86,7 +86,7 @@ static void test_rotor (void **state) {
   assert_int_equal (l.velocities, 1);
   linear_expect (&l, 0, 0, 7 * sqrt (2 * 0.9 * 0.4 / (0.1 + 2 * 0.16)));
   linear_expect (&l, 2, 0, 0);
-  pw_linear_close (&l);
+  pw_linear_free (&l);
 }
 
 /* The Chaplygin sleigh runs straight, mass behind: (I + m a^2) w' = -m a u w grows. */
@@ -105,7 +105,7 @@ static void test_sleigh (void **state) {
   assert_int_equal (l.velocities, 1);
   linear_expect (&l, 0, 3 * 0.2 * 4 / (0.5 + 3 * 0.04), 0);
   for (int i = 1; i < 4; i++) check_below ("the others", hypot (l.re[i], l.im[i]), 1e-4, "0, defective: eps^(1/3)");
-  pw_linear_close (&l);
+  pw_linear_free (&l);
 }
 
 /* Twin wheels are one row; of massless bodies nothing is left over. */
@@ -123,13 +123,13 @@ static void test_rank (void **state) {
   assert_int_equal (l.positions, 3);
   assert_int_equal (l.velocities, 2);
   assert_int_equal (l.rank, 1);
-  pw_linear_close (&l);
+  pw_linear_free (&l);
   l = linear_of (&scene_ezyroller);
   assert_int_equal (l.positions, 4);
   assert_int_equal (l.velocities, 2);
   assert_int_equal (l.rank, 4);
   assert_true (l.re != NULL && l.least > 0.1);
-  pw_linear_close (&l);
+  pw_linear_free (&l);
 }
 
 static void test_large (void **state) {
@@ -139,11 +139,11 @@ static void test_large (void **state) {
   (void)state;
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
-  check_ok (pw_linearise (r, 2, &l, &error), &error);
+  check_ok (pw_run_linearise (r, 2, &l, &error), &error);
   assert_true (l.re == NULL && l.velocities == 1);
-  pw_linear_close (&l);
-  pw_close (r);
-  pw_free (s);
+  pw_linear_free (&l);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- RK4 ---- */

@@ -56,8 +56,8 @@ static void test_locked (void **state) {
         check_close (method[i], x.q[j], q[j], 16 * CHECK_EPS, "at rest");
         check_close (method[i], x.v[j], 0, 16 * CHECK_EPS, "at rest");
       }
-      pw_close (r);
-      pw_free (s);
+      pw_run_close (r);
+      pw_system_free (s);
     }
 }
 
@@ -66,14 +66,14 @@ static void test_locked_start (void **state) {
   for (int wheels = 3; wheels <= 4; wheels++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&locked_cart_table, "wheels", (double)wheels, "speed", 1.5, NULL);
-    assert_null (pw_open (s, "rk4+projection", NULL, &error));
-    check_error (&error, PW_START,
+    assert_null (pw_run_open (s, "rk4+projection", NULL, &error));
+    check_error (&error, PW_INITIAL,
                  wheels == 3
                      ? "model scene: the given rates would have to be removed entirely: wheel front, wheel left, "
                        "wheel right allow no such motion"
                      : "model scene: the given rates would have to be removed entirely: wheel front, wheel left, "
                        "wheel right, wheel rear allow no such motion");
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -92,11 +92,11 @@ static void test_locked_spin (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
-  assert_null (pw_open (s, "rk4", NULL, &error));
+  assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (
-      &error, PW_START,
+      &error, PW_INITIAL,
       "model scene: the given rates would have to be removed entirely: rolling-wheel wheel allow no such motion");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* Rates of which the wheels leave but a little are no such case: a hundredth of them goes ahead. */
@@ -114,8 +114,8 @@ static void test_skidding (void **state) {
   pw_sample x = runs_to (r, 1);
   check_close ("ahead", x.v[0], 0.01, 16 * CHECK_EPS, "the part that the wheel allows");
   check_close ("aside", x.v[1], 0, 16 * CHECK_EPS, "the part that it does not");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* Three axles that meet in one point at the start, until the third wheel is steered away. */
@@ -153,15 +153,15 @@ static void test_locks_in_motion (void **state) {
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&table, NULL);
-    pw_run *r = pw_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 1 }, &error);
-    int status = r ? pw_advance_to (r, 1, 1, &error) : error.status;
+    pw_run *r = pw_run_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 1 }, &error);
+    int status = r ? pw_run_advance_to (r, 1, 1, &error) : error.status;
     print_message ("%s: %s\n", method[i], error.text);
-    assert_true (status == PW_METHOD || status == PW_START);
+    assert_true (status == PW_METHOD || status == PW_INITIAL);
     assert_non_null (strstr (error.text, "wheel "));
     /* the heading is t^2 / 2: within 20 steps of 1e-3 s, or when it is above what the tolerance leaves of the others */
-    if (r) check_below ("time", pw_time (r), 0.05, "told at once");
-    if (r) pw_close (r);
-    pw_free (s);
+    if (r) check_below ("time", pw_run_time (r), 0.05, "told at once");
+    if (r) pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -183,13 +183,13 @@ static void test_gap (void **state) {
   pw_error error = { 0 };
   double open = 0;
   pw_system *s = scene_system (&table, NULL);
-  assert_null (pw_open (s, "rk4+projection", NULL, &error));
+  assert_null (pw_run_open (s, "rk4+projection", NULL, &error));
   print_message ("%s\n", error.text);
-  assert_int_equal (error.status, PW_START);
+  assert_int_equal (error.status, PW_INITIAL);
   const char *by = strstr (error.text, " is open by ");
   assert_non_null (by);
   assert_true (sscanf (by, " is open by %lf", &open) == 1 && open > 1 && open < 10);
-  pw_free (s);
+  pw_system_free (s);
 }
 
 typedef struct {
@@ -226,20 +226,20 @@ static void test_drives (void **state) {
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&locked_drives_table, "offset", 0.1, NULL);
-    assert_null (pw_open (s, method[i], NULL, &error));
+    assert_null (pw_run_open (s, method[i], NULL, &error));
     print_message ("%s\n", error.text);
-    assert_int_equal (error.status, PW_START);
+    assert_int_equal (error.status, PW_INITIAL);
     assert_non_null (strstr (error.text, "drive "));
-    pw_free (s);
+    pw_system_free (s);
     error = (pw_error){ 0 };
     s = scene_system (&locked_drives_table, NULL);
-    pw_run *r = pw_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-6, .span = 1 }, &error);
-    int status = r ? pw_advance_to (r, 1, 1, &error) : error.status;
+    pw_run *r = pw_run_open (s, method[i], &(pw_settings){ .step = 1e-3, .rtol = 1e-6, .span = 1 }, &error);
+    int status = r ? pw_run_advance_to (r, 1, 1, &error) : error.status;
     print_message ("%s\n", error.text);
-    assert_true (status == PW_METHOD || status == PW_START);
+    assert_true (status == PW_METHOD || status == PW_INITIAL);
     assert_non_null (strstr (error.text, "drive "));
-    if (r) pw_close (r);
-    pw_free (s);
+    if (r) pw_run_close (r);
+    pw_system_free (s);
   }
 }
 

@@ -48,7 +48,7 @@ static double massless_turned (const char *method, double length, double mass, d
   double q[6], v[6];
   pw_system *s = scene_system (&table, "length", length, "mass", mass, "other", other, NULL);
   runs_state (s, method, &(pw_settings){ .rtol = 1e-6, .step = 1e-3, .span = 1 }, 1, q, v, NULL);
-  pw_free (s);
+  pw_system_free (s);
   return fmax (fabs (q[2] - 1), fmax (hypot (q[0] / length - cos (1), q[1] / length - sin (1)), fabs (v[2] - 1)));
 }
 
@@ -109,7 +109,7 @@ static void massless_state (const pw_plugin_table *table, const char *method, do
   runs_state (s, method, &(pw_settings){ .rtol = rtol, .span = 2 }, 2, q, v, NULL);
   for (int i = 0; i < 9; i++)
     if (i % 3 != 2) q[i] /= length, v[i] /= length;
-  pw_free (s);
+  pw_system_free (s);
 }
 
 static void massless_agree (const pw_plugin_table *table, const char *method) {

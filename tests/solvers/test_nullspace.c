@@ -57,7 +57,7 @@ static void test_tolerances (void **state) {
       runs_state (s, method[i], &(pw_settings){ .rtol = rtol, .span = 10 }, 10, q[0], v[0], NULL);
       runs_state (s, "erk8+projection", &(pw_settings){ .rtol = 1e-13, .span = 10 }, 10, q[1], v[1], NULL);
       for (int j = 0; j < 6; j++) check_close (method[i], q[0][j], q[1][j], 100 * rtol, "100 rtol");
-      pw_free (s);
+      pw_system_free (s);
     }
 }
 
@@ -73,8 +73,8 @@ static void test_ledger (void **state) {
     check_below ("sample's residuals", x.position + x.velocity, 64 * CHECK_EPS, "round-off");
     memcpy (q[ledger], x.q, sizeof q[0]);
     memcpy (v[ledger], x.v, sizeof v[0]);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
   check_bits ("positions without ledger", q[0], q[1], 6);
   check_bits ("rates without ledger", v[0], v[1], 6);
@@ -100,12 +100,12 @@ static void test_refused (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
-  assert_null (pw_open (s, "erk5+nullspace", NULL, &error));
+  assert_null (pw_run_open (s, "erk5+nullspace", NULL, &error));
   check_error (
       &error, PW_INPUT,
       "model scene: stabilisation nullspace works with dense matrices, for up to 256 constraint rows, and this "
       "scene has 258; take erk5+projection");
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* A step over which the motion turns away from its basis: a reason, not a number. */
@@ -114,11 +114,11 @@ static void test_large_step (void **state) {
   pw_error error = { 0 };
   pw_system *s = ladder_open ("pendulum");
   pw_run *r = runs_open (s, "rk4+nullspace", &(pw_settings){ .step = 3, .span = 100 });
-  int status = pw_advance_to (r, 100, 100, &error);
+  int status = pw_run_advance_to (r, 100, 100, &error);
   assert_int_equal (status, PW_METHOD);
   assert_non_null (strstr (error.text, "the step of 3 s is too large"));
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- What is without mass, and how a body is divided, makes no difference ---- */
@@ -173,7 +173,7 @@ static void test_parts (void **state) {
     check_close ("positions", Q[j], q[j], 1e-10, "round-off of 100 steps, magnified by small weights");
     check_close ("rates", V[j], v[j], 1e-10, "round-off of 100 steps, magnified by small weights");
   }
-  pw_free (s), pw_free (twin);
+  pw_system_free (s), pw_system_free (twin);
 }
 
 int main (void) {

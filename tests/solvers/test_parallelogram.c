@@ -12,8 +12,8 @@ static void parallelogram_try (const char *method, parallelogram_check *check, d
   pw_system *s = scene_named ("redundant-parallelogram", NULL, 0);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1, .ledger = 1 });
   check (s, r, bound, reason);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void parallelogram_every_method (parallelogram_check *check, double adaptive, const char *reason) {
@@ -75,8 +75,8 @@ static void test_partners (void **state) {
                        "pin B2 (B2.Fy) follows from pin A1, pin B1, pin A2, pin A3, pin B3");
   pw_run_redundancy (r, 0, text, 10);
   assert_int_equal (strlen (text), 9);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 int main (void) {

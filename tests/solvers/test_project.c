@@ -17,7 +17,7 @@ static void project_try (const char *model, const char *parameter, double value,
   pw_error error = { 0 };
   pw_projector p;
   pw_residuals now;
-  int n = pw_count_coordinates (s), rows = pw_count_rows (s);
+  int n = pw_system_coordinates (s), rows = pw_system_rows (s);
   double q[PROJECT_MOST], v[PROJECT_MOST], a[PROJECT_MOST], other[PROJECT_MOST], lambda[PROJECT_MOST], mu[PROJECT_MOST],
       most = 1;
   assert_true (n + 3 <= PROJECT_MOST && rows <= PROJECT_MOST);
@@ -26,7 +26,7 @@ static void project_try (const char *model, const char *parameter, double value,
   check_ok (pw_projector_open_asked (&p, r, &error), &error);
   v[1] += off;
   assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
-  pw_sweep_residuals (r->w, NULL, &now);
+  pw_evaluate_residuals (r->w, NULL, &now);
   check_below (model, now.position, 4 * CHECK_EPS, "round-off");
   check_below (model, now.velocity, 4 * CHECK_EPS, "round-off");
   check_bits ("positions", q, x.q, n);
@@ -35,13 +35,13 @@ static void project_try (const char *model, const char *parameter, double value,
     check_close ("what is known", r->known.velocity, now.velocity, 0, "the same sweep");
   } else
     assert_true (fabs (v[1] - x.v[1]) < fabs (off) && isnan (r->known.velocity));
-  assert_int_equal (pw_accelerate (r, x.t, q, v, other, mu), PW_OK);
+  assert_int_equal (pw_run_accelerate (r, x.t, q, v, other, mu), PW_OK);
   for (int j = 0; j < n; j++) most = fmax (most, fabs (other[j]));
   for (int j = 0; j < n; j++) check_close (model, a[j], other[j], 256 * CHECK_EPS * most, "round-off, condition");
   for (int i = 0; i < rows; i++) check_close (model, lambda[i], mu[i], 256 * CHECK_EPS * most, "round-off, condition");
   pw_projector_close (&p);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static void test_consistent (void **state) {
@@ -67,7 +67,7 @@ static double project_length (const char *method) {
   pw_error error = { 0 };
   pw_projector p;
   double q[PROJECT_MOST], v[PROJECT_MOST], a[PROJECT_MOST], lambda[PROJECT_MOST], before[PROJECT_MOST], square = 0;
-  int n = pw_count_coordinates (s);
+  int n = pw_system_coordinates (s);
   memcpy (q, x.q, (size_t)n * sizeof *q);
   memcpy (v, x.v, (size_t)n * sizeof *v);
   check_ok (pw_projector_open_asked (&p, r, &error), &error);
@@ -76,8 +76,8 @@ static double project_length (const char *method) {
   assert_int_equal (pw_project_state (&p, r, x.t, q, v, a, lambda), PW_OK);
   for (int j = 0; j < n; j++) square += (v[j] - before[j]) * (v[j] - before[j]);
   pw_projector_close (&p);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   return sqrt (square);
 }
 
@@ -101,11 +101,11 @@ static void test_wild_residual (void **state) {
     double g[PROJECT_MOST] = { 1e-3, 2e-3, 3e-3 };
     pw_residuals now;
     g[wild] = NAN;
-    pw_judge_positions (s, g, size, NULL, &now);
+    pw_worst_position (s, g, size, NULL, &now);
     assert_true (isnan (now.position));
     assert_int_equal (now.row_position, wild);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 int main (void) {

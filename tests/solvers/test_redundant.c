@@ -27,8 +27,8 @@ static void redundant_end (const pw_plugin_table *table, const char *method, dou
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = step, .rtol = rtol, .span = t });
   pw_sample x = runs_to (r, t);
   for (int i = 0; name[i]; i++) end[i] = trial_state (s, &x, name[i]);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 static double redundant_off (const double *a, const double *b, int n) {
@@ -76,8 +76,8 @@ static void redundant_says (const pw_plugin_table *table, const char *const *tex
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   assert_int_equal (pw_run_redundant (r), n);
   for (int i = 0; i < n; i++) assert_string_equal (pw_run_redundancy (r, i, buffer, sizeof buffer), text[i]);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- Three cranks carry one coupler ---- */
@@ -122,15 +122,15 @@ static void test_parallelogram_start (void **state) {
       pw_error error = { 0 };
       double phi = off[k] - PW_PI / 4;
       pw_model *m = scene_model (&redundant_parallelogram, NULL);
-      check_ok (pw_set_start (m, crank[i], phi, &error), &error);
+      check_ok (pw_model_set_initial (m, crank[i], phi, &error), &error);
       pw_system *s = scene_compile (m);
       pw_run *r = runs_open (s, "rk4+projection", NULL);
-      assert_int_equal (pw_run_start (r)->freed, 0);
+      assert_int_equal (pw_run_initial (r)->freed, 0);
       pw_sample x = runs_to (r, 0);
       for (int j = 0; j < 3; j++)
         check_close (crank[j], trial_state (s, &x, crank[j]), phi, 64 * CHECK_EPS, "64 eps: what a start is good to");
-      pw_close (r);
-      pw_free (s);
+      pw_run_close (r);
+      pw_system_free (s);
     }
 }
 
@@ -183,11 +183,11 @@ static void test_drives (void **state) {
     pw_system *s = scene_system (&redundant_drives_table, NULL);
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .rtol = 1e-8, .step = 1e-3, .span = 1, .ledger = 1 });
     pw_sample x = runs_to (r, 1);
-    assert_int_equal (pw_count_ledger (s), 2);
+    assert_int_equal (pw_system_ledger_entries (s), 2);
     check_close (method[i], x.ledger[0], x.ledger[1], 1e-9 * (1 + fabs (x.ledger[0])), "shared like the reactions");
     check_close (method[i], x.ledger[0] + x.ledger[1], 10 * sin (1), 1e-5, "the weight is lifted by sin (1)");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -211,10 +211,10 @@ static void test_axle_forces (void **state) {
     check_close ("the sum", left + right, whole, 1e-12 * (1 + fabs (whole)), "twins in a fixed-step method");
     check_close ("the halves", left, right, 1e-12 * (1 + fabs (whole)), "the smallest reactions are equal ones");
   }
-  pw_close (r);
-  pw_close (one);
-  pw_free (s);
-  pw_free (twin);
+  pw_run_close (r);
+  pw_run_close (one);
+  pw_system_free (s);
+  pw_system_free (twin);
 }
 
 /* ---- Two bodies joined by a weld and two pins, hanging from the ground ---- */
@@ -466,8 +466,8 @@ static void test_moments (void **state) {
   check_close ("pin", trial_reaction (s, &x, "pin.Fy"), p, 1e-12 * W, "round-off");
   check_close ("weld", trial_reaction (s, &x, "weld.Fy"), W - p, 1e-12 * W, "round-off");
   check_close ("moment", fabs (trial_reaction (s, &x, "weld.M")), d * p, 1e-12 * W * d, "round-off");
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 int main (void) {

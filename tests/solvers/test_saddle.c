@@ -56,11 +56,11 @@ static void saddle_spoil (trial *x, pw_saddle *k, unsigned *random) {
   for (size_t j = 0; j < coords; j++) q[j] = r->q[j] + saddle_number (random);
   for (size_t j = 2; j < 3 * (size_t)r->s->bodies; j += 3)
     if (saddle_number (random) > 0.3) q[j] = NAN;
-  assert_int_equal (pw_place (r->w, r->t, q, r->v), PW_OK);
-  pw_sweep_J (r->w);
+  assert_int_equal (pw_update_kinematics (r->w, r->t, q, r->v), PW_OK);
+  pw_evaluate_J (r->w);
   pw_saddle_factor (k);
-  assert_int_equal (pw_place (r->w, r->t, r->q, r->v), PW_OK);
-  pw_sweep_J (r->w);
+  assert_int_equal (pw_update_kinematics (r->w, r->t, r->q, r->v), PW_OK);
+  pw_evaluate_J (r->w);
   free (q);
 }
 
@@ -94,12 +94,12 @@ static double saddle_solve (trial *x) {
  * cannot start. */
 static double saddle_scene (pw_system *s, double t_end, int all) {
   pw_error error = { 0 };
-  pw_run *r = pw_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
+  pw_run *r = pw_run_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
   double worst = r ? 0 : -1;
   for (int moment = 0; r && moment < 2; moment++) {
-    if (moment > 0) check_ok (pw_advance_to (r, t_end, t_end, &error), &error);
-    assert_int_equal (pw_place (r->w, r->t, r->q, r->v), PW_OK);
-    pw_sweep_J (r->w);
+    if (moment > 0) check_ok (pw_run_advance_to (r, t_end, t_end, &error), &error);
+    assert_int_equal (pw_update_kinematics (r->w, r->t, r->q, r->v), PW_OK);
+    pw_evaluate_J (r->w);
     for (int which = 0; which < 4; which += all ? 1 : 2) {
       trial x = { .run = r, .weight = which & 1 ? s->metric : s->mass, .random = (unsigned)(7 * which + moment) };
       x.rows = which & 2 ? s->holonomic : s->rows;
@@ -109,8 +109,8 @@ static double saddle_scene (pw_system *s, double t_end, int all) {
       worst = fmax (worst, saddle_solve (&x));
     }
   }
-  if (r) pw_close (r);
-  pw_free (s);
+  if (r) pw_run_close (r);
+  pw_system_free (s);
   return worst;
 }
 
@@ -274,8 +274,8 @@ static pw_saddle *saddle_turned (pw_workspace *w, int body, int held) {
   memcpy (weight, s->mass, sizeof weight);
   for (int j = 3 * body; j < 3 * body + held; j++) weight[j] = INFINITY;
   for (int j = 0; j < SADDLE_COORDS; j++) q[j] = s->q0[j] + (j % 3 == 2 ? j : 0);
-  assert_int_equal (pw_place (w, 0, q, s->v0), PW_OK);
-  pw_sweep_J (w);
+  assert_int_equal (pw_update_kinematics (w, 0, q, s->v0), PW_OK);
+  pw_evaluate_J (w);
   pw_saddle *k = pw_saddle_open (w, weight, s->rows, NULL, &error);
   check_ok (k ? PW_OK : error.status, &error);
   return k;
@@ -301,7 +301,7 @@ static void test_held (void **state) {
     }
     pw_saddle_close (k);
     pw_workspace_free (w);
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -319,7 +319,7 @@ static void test_empty (void **state) {
     assert_int_equal (pw_saddle_factor_solve (k, NULL, gamma, a, lambda), PW_RETRY);
     pw_saddle_close (k);
     pw_workspace_free (w);
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -384,14 +384,14 @@ static void test_dependent (void **state) {
       pw_error error = { 0 };
       pw_system *s = scene_system (&table[which / 2], "angle", 0.1 * i, "mass", (double)(which % 2), NULL);
       pw_workspace *w = pw_workspace_new (s, NULL);
-      assert_int_equal (pw_place (w, 0, s->q0, s->v0), PW_OK);
-      pw_sweep_J (w);
+      assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
+      pw_evaluate_J (w);
       pw_saddle *k = pw_saddle_open (w, s->mass, s->rows, NULL, &error);
       check_ok (k ? PW_OK : error.status, &error);
       assert_int_equal (pw_saddle_factor (k), PW_RETRY);
       pw_saddle_close (k);
       pw_workspace_free (w);
-      pw_free (s);
+      pw_system_free (s);
     }
 }
 
@@ -421,15 +421,15 @@ static double pairs_sine (const pw_plugin_table *table, double angle) {
   pw_error error = { 0 };
   pw_system *s = scene_system (table, "angle", angle, NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
-  assert_int_equal (pw_place (w, 0, s->q0, s->v0), PW_OK);
-  pw_sweep_J (w);
+  assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
+  pw_evaluate_J (w);
   pw_saddle *k = pw_saddle_open (w, s->mass, s->rows, NULL, &error);
   check_ok (k ? PW_OK : error.status, &error);
   assert_int_equal (pw_saddle_factor (k), PW_OK);
   double sine = pw_saddle_pivot (k, &row);
   pw_saddle_close (k);
   pw_workspace_free (w);
-  pw_free (s);
+  pw_system_free (s);
   return sine;
 }
 
@@ -468,12 +468,12 @@ static void test_not_a_number (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_system *s = scene_named ("theo-jansen", NULL, 0);
-  pw_run *r = pw_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
+  pw_run *r = pw_run_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
   check_ok (r ? PW_OK : error.status, &error);
   for (int j = 0; j < s->coords; j++) {
     double a = r->a[j];
     r->a[j] = NAN;
-    assert_true (isnan (pw_run_agitation (r)));
+    assert_true (isnan (pw_run_acceleration_norm (r)));
     r->a[j] = a;
     r->data->q[j] = NAN;
     assert_true (isnan (pw_rk_distance (r)));
@@ -481,9 +481,9 @@ static void test_not_a_number (void **state) {
     assert_true (isnan (pw_rk_distance (r)));
     r->data->v[j] = 0;
   }
-  assert_true (isfinite (pw_run_agitation (r)) && isfinite (pw_rk_distance (r)));
-  pw_close (r);
-  pw_free (s);
+  assert_true (isfinite (pw_run_acceleration_norm (r)) && isfinite (pw_rk_distance (r)));
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 int main (void) {

@@ -18,9 +18,9 @@ static void test_four_bar (void **state) {
   int passes = 0;
   double energy = 0, balance = 0, start = NAN, before = 1;
   pw_error error = { 0 };
-  while (pw_time (r) < 10) {
-    check_ok (pw_advance (r, 10, &error), &error);
-    pw_sample x = runs_to (r, pw_time (r));
+  while (pw_run_time (r) < 10) {
+    check_ok (pw_run_advance (r, 10, &error), &error);
+    pw_sample x = runs_to (r, pw_run_time (r));
     if (isnan (start)) start = x.kinetic + x.potential;
     energy = fmax (energy, fabs (x.kinetic + x.potential - start));
     balance = fmax (balance, fabs (x.balance));
@@ -39,8 +39,8 @@ static void test_four_bar (void **state) {
   /* between passes the balance swings by 1.01e-9 J, which falls with the fourth power of the step: relative to 36 J */
   check_below ("balance, worst of the run", balance, 1e-9 * start, "kept over ten passes, of the energy there is");
   assert_true (pw_run_statistics (r)->rejected > 0);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* Steps that end on a singular pose are passed by a longer one, however small they are. */
@@ -58,8 +58,8 @@ static void test_steps_on_it (void **state) {
     }
     check_below ("balance", most, 1e-8 * before, "kept over the passes, of the energy there is");
     assert_true ((double)pw_run_statistics (r)->steps < 1.01 * t / steps[i].step);
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -73,8 +73,8 @@ static void test_slider_crank (void **state) {
     pw_sample x = runs_to (r, 1);
     check_close (method[i], trial_state (s, &x, "crank.phi"), 2.428234829106999646, 1e-9, "published digits");
     check_close ("balance", x.balance, 0, 1e-9, "energy is kept");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -86,10 +86,10 @@ static void singular_or_told (const char *model, const char *method, double rtol
   char what[80];
   pw_system *s = scene_named (model, NULL, 0);
   pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = rtol, .span = t });
-  int status = pw_advance_to (r, t, t, &error);
+  int status = pw_run_advance_to (r, t, t, &error);
   snprintf (what, sizeof what, "%s, rtol %g", model, rtol);
   if (status == PW_OK) {
-    check_ok (pw_at (r, t, &x, &error), &error);
+    check_ok (pw_run_sample (r, t, &x, &error), &error);
     double off = remainder (trial_state (s, &x, name) - exact, period);
     check_below (what, fabs (off), 1e5 * rtol, "1e4 rtol, and 10 for the passes");
   } else {
@@ -97,8 +97,8 @@ static void singular_or_told (const char *model, const char *method, double rtol
     assert_int_equal (status, PW_METHOD);
     assert_true (strlen (error.text) > 20);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* All of these ended with status ok on another branch before drifted constraints were watched. */
@@ -148,11 +148,11 @@ static void test_flat_start (void **state) {
   for (int i = 0; i < 2; i++) {
     pw_error error = { 0 };
     pw_system *s = scene_system (&table, NULL);
-    assert_null (pw_open (s, method[i], NULL, &error));
-    check_error (&error, PW_START,
+    assert_null (pw_run_open (s, method[i], NULL, &error));
+    check_error (&error, PW_INITIAL,
                  "model scene: the start is a singular pose: 7 constraint rows are independent there, 8 nearby; start "
                  "a little off it");
-    pw_free (s);
+    pw_system_free (s);
   }
 }
 
@@ -197,15 +197,15 @@ static void test_restarted_in (void **state) {
     pw_system *s = scene_system (&table, NULL);
     pw_run *r = runs_open (s, method[i], NULL);
     double start[9];
-    memcpy (start, pw_run_start (r)->q, sizeof start);
-    assert_int_equal (pw_restart (r, flat, rest, &error), PW_METHOD);
+    memcpy (start, pw_run_initial (r)->q, sizeof start);
+    assert_int_equal (pw_run_restart (r, flat, rest, &error), PW_METHOD);
     assert_int_equal (
         sscanf (error.text, "t = 0 s: singular pose: pin %c says what other constraints say already", &pin), 1);
     assert_true (pin >= 'A' && pin <= 'D');
     pw_sample now = runs_to (r, 0.01);
     for (int j = 0; j < 9; j++) check_close ("it has hardly moved", now.q[j], start[j], 0.1, "from rest, in 10 ms");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -222,12 +222,12 @@ static void test_sped_up (void **state) {
     pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 2e-3, .span = 2 });
     pw_sample x = runs_to (r, slow);
     for (int j = 0; j < 15; j++) v[j] = fast * x.v[j];
-    check_ok (pw_restart (r, NULL, v, &error), &error);
+    check_ok (pw_run_restart (r, NULL, v, &error), &error);
     x = runs_to (r, end);
     check_close ("angle", x.q[2], PW_PI / 2 - slow - fast * (end - slow), 1e-3,
                  "(0.08 rad)^3 of the methods of order 2");
-    pw_close (r);
-    pw_free (s);
+    pw_run_close (r);
+    pw_system_free (s);
   }
 }
 
@@ -241,20 +241,20 @@ static void test_not_numbers (void **state) {
     pw_error error = { 0 };
     pw_residuals now;
     r->near = 1;
-    check_ok (pw_run_judge (r, &error), &error);
+    check_ok (pw_run_watchdog (r, &error), &error);
     r->a[j] = NAN;
-    assert_int_equal (pw_run_judge (r, &error), PW_METHOD);
+    assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
     r->a[j] = a, r->q[j] = NAN, r->v[j] = NAN;
-    assert_int_equal (pw_place (r->w, 0, r->q, r->v), PW_OK);
-    pw_sweep_J (r->w);
-    pw_sweep_residuals (r->w, NULL, &now);
+    assert_int_equal (pw_update_kinematics (r->w, 0, r->q, r->v), PW_OK);
+    pw_evaluate_J (r->w);
+    pw_evaluate_residuals (r->w, NULL, &now);
     assert_true (isnan (now.position) && isnan (now.velocity));
     r->q[j] = q, r->v[j] = v;
-    assert_int_equal (pw_place (r->w, 0, r->q, r->v), PW_OK);
-    pw_sweep_J (r->w);
+    assert_int_equal (pw_update_kinematics (r->w, 0, r->q, r->v), PW_OK);
+    pw_evaluate_J (r->w);
   }
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 int main (void) {

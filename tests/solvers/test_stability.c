@@ -15,10 +15,10 @@ static pw_linear stability_of (void (*build) (pw_model *, const void *)) {
   pw_linear l;
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &settings);
-  check_ok (pw_linearise (r, 100, &l, &error), &error);
+  check_ok (pw_run_linearise (r, 100, &l, &error), &error);
   for (int i = 1; i < l.unknowns; i++) assert_true (l.re[i] <= l.re[i - 1]);
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
   return l;
 }
 
@@ -126,7 +126,7 @@ static void test_trailers (void **state) {
                        "exact derivatives; redundant rows cost digits");
       }
       assert_int_equal (stability_zeros (&l), train.axle == ROLLING ? 8 : 0);
-      pw_linear_close (&l);
+      pw_linear_free (&l);
     }
 }
 
@@ -140,7 +140,7 @@ static void test_defective (void **state) {
     check_close ("re", l.re[i], -1, 1e-4, "a Jordan block of three: eps^(1/3)");
     assert_true (l.im[i] == 0);
   }
-  pw_linear_close (&l);
+  pw_linear_free (&l);
 }
 
 /* ---- The Chaplygin sleigh, free: -m a u / J, J = I + m a^2, with the blade a behind the centre of mass ---- */
@@ -166,7 +166,7 @@ static void test_sleigh (void **state) {
     assert_int_equal (l.symmetries, 3);
     assert_int_equal (stability_zeros (&l), 1);
     stability_has (&l, -3 * sleigh * 2 / (0.5 + 3 * 0.04), 0, 1e-12, "1e4 eps");
-    pw_linear_close (&l);
+    pw_linear_free (&l);
   }
 }
 
@@ -197,7 +197,7 @@ static void test_car (void **state) {
     stability_has (&l, half + root, 0, 1e-7, "10 times the change by the regularising speed");
     stability_has (&l, half - root, 0, 1e-7, "10 times the change by the regularising speed");
     if (k != 0) assert_int_equal (l.re[0] > 0, k > 0);
-    pw_linear_close (&l);
+    pw_linear_free (&l);
   }
 }
 
@@ -290,7 +290,7 @@ static void test_scenes (void **state) {
       fail_msg ("scene %zu: steady %d, %d symmetries", i, l.steady, l.symmetries);
     double s = sqrt (fabs (each[i].square));
     if (s > 0) stability_has (&l, each[i].square > 0 ? s : 0, each[i].square > 0 ? 0 : s, 1e-9, "1e7 eps");
-    pw_linear_close (&l);
+    pw_linear_free (&l);
   }
 }
 
@@ -305,16 +305,16 @@ static void stability_hinges (double disturbance, double out[2][5]) {
   double q[9], v[9];
   for (int k = 0; k < 5; k++) {
     pw_run *r = runs_open (s, "erk8+projection", &settings);
-    const pw_start_report *start = pw_run_start (r);
+    const pw_initial_report *start = pw_run_initial (r);
     memcpy (q, start->q, sizeof q);
     memcpy (v, start->v, sizeof v);
     q[8] += disturbance;
-    check_ok (pw_restart (r, q, v, &error), &error);
+    check_ok (pw_run_restart (r, q, v, &error), &error);
     pw_sample x = runs_to (r, 0.2 + 0.3 * k);
     for (int i = 0; i < 2; i++) out[i][k] = x.q[3 * i + 5] - x.q[3 * i + 2];
-    pw_close (r);
+    pw_run_close (r);
   }
-  pw_free (s);
+  pw_system_free (s);
 }
 
 /* Differences of runs disturbed to both sides follow  d'' - s d' + p d = 0  over steps of time, s and p the sum and the product
@@ -333,15 +333,15 @@ static void test_disturbed (void **state) {
   double root = sqrt (sum * sum / 4 - product);
   pw_system *s = scene_named ("n-trailer", NULL, 0);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
-  check_ok (pw_linearise (r, 100, &l, &error), &error);
+  check_ok (pw_run_linearise (r, 100, &l, &error), &error);
   assert_int_equal (l.steady, PW_STEADY);
   assert_int_equal (stability_zeros (&l), 2);
   stability_has (&l, log (sum / 2 + root) / 0.3, 0, 1e-5,
                  "third order of the disturbance, 1e-8, over what is left of it");
   stability_has (&l, log (sum / 2 - root) / 0.3, 0, 1e-5, "the same");
-  pw_linear_close (&l);
-  pw_close (r);
-  pw_free (s);
+  pw_linear_free (&l);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 /* ---- What `check` writes ---- */

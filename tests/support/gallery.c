@@ -18,9 +18,9 @@ pw_system *gallery_open (const char *model, ...) {
   va_list list;
   va_start (list, model);
   for (const char *name; (name = va_arg (list, const char *)) != NULL;)
-    check_ok (pw_set (m, name, va_arg (list, double), &error), &error);
+    check_ok (pw_model_set (m, name, va_arg (list, double), &error), &error);
   va_end (list);
-  check_ok (pw_build (m, &error), &error);
+  check_ok (pw_model_build (m, &error), &error);
   pw_system *s = scene_compile (m);
   pw_file_close (f);
   return s;
@@ -31,8 +31,8 @@ pw_run *gallery_run (pw_system *s, double step, double t) {
 }
 
 void gallery_close (pw_run *r, pw_system *s) {
-  pw_close (r);
-  pw_free (s);
+  pw_run_close (r);
+  pw_system_free (s);
 }
 
 void gallery_energy (pw_system *s, double step, double t, double bound, int driven) {

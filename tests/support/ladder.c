@@ -48,7 +48,7 @@ pw_system *ladder_open (const char *model) {
   check_ok (f ? PW_OK : error.status, &error);
   pw_model *m = pw_file_model (f, &error);
   check_ok (m ? PW_OK : error.status, &error);
-  check_ok (pw_build (m, &error), &error);
+  check_ok (pw_model_build (m, &error), &error);
   pw_system *s = scene_compile (m);
   pw_file_close (f);
   return s;
@@ -74,10 +74,10 @@ ladder_error ladder_solve (const char *model, const char *method, const pw_setti
     most = fmax (most, fabs (y.lambda[i]));
   }
   off.lambda /= most;
-  pw_close (r);
-  pw_close (exact);
-  pw_free (s);
-  pw_free (S);
+  pw_run_close (r);
+  pw_run_close (exact);
+  pw_system_free (s);
+  pw_system_free (S);
   return off;
 }
 

@@ -6,7 +6,7 @@
 
 pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings) {
   pw_error error = { 0 };
-  pw_run *r = pw_open (s, method, settings, &error);
+  pw_run *r = pw_run_open (s, method, settings, &error);
   check_ok (r ? PW_OK : error.status, &error);
   return r;
 }
@@ -24,8 +24,8 @@ const pw_method *runs_method (int i, char name[40]) {
 pw_sample runs_to (pw_run *r, double t) {
   pw_error error = { 0 };
   pw_sample sample;
-  check_ok (pw_advance_to (r, t, t, &error), &error);
-  check_ok (pw_at (r, t, &sample, &error), &error);
+  check_ok (pw_run_advance_to (r, t, t, &error), &error);
+  check_ok (pw_run_sample (r, t, &sample, &error), &error);
   return sample;
 }
 
@@ -33,10 +33,10 @@ void runs_state (pw_system *s, const char *method, const pw_settings *settings, 
                  pw_statistics *statistics) {
   pw_run *r = runs_open (s, method, settings);
   pw_sample sample = runs_to (r, t);
-  memcpy (q, sample.q, (size_t)pw_count_coordinates (s) * sizeof *q);
-  memcpy (v, sample.v, (size_t)pw_count_coordinates (s) * sizeof *v);
+  memcpy (q, sample.q, (size_t)pw_system_coordinates (s) * sizeof *q);
+  memcpy (v, sample.v, (size_t)pw_system_coordinates (s) * sizeof *v);
   if (statistics) *statistics = *pw_run_statistics (r);
-  pw_close (r);
+  pw_run_close (r);
 }
 
 int runs_reference (const char *path, int lines, int columns, double *table) {

@@ -12,8 +12,8 @@ static pw_model *scene_build (const pw_plugin_table *table, va_list sets) {
   pw_model *m = pw_model_new (table == &scene_ezyroller ? "ezyroller" : "scene", table, &error);
   check_ok (m ? PW_OK : error.status, &error);
   for (const char *name = va_arg (sets, const char *); name; name = va_arg (sets, const char *))
-    check_ok (pw_set (m, name, va_arg (sets, double), &error), &error);
-  check_ok (pw_build (m, &error), &error);
+    check_ok (pw_model_set (m, name, va_arg (sets, double), &error), &error);
+  check_ok (pw_model_build (m, &error), &error);
   return m;
 }
 
@@ -27,7 +27,7 @@ pw_model *scene_model (const pw_plugin_table *table, ...) {
 
 pw_system *scene_compile (pw_model *m) {
   pw_error error = { 0 };
-  pw_system *s = pw_compile (m, &error);
+  pw_system *s = pw_system_compile (m, &error);
   check_ok (s ? PW_OK : error.status, &error);
   pw_model_free (m);
   return s;
@@ -47,8 +47,8 @@ pw_system *scene_named (const char *model, const char *parameter, double value) 
   check_ok (f ? PW_OK : error.status, &error);
   pw_model *m = pw_file_model (f, &error);
   check_ok (m ? PW_OK : error.status, &error);
-  if (parameter) check_ok (pw_set (m, parameter, value, &error), &error);
-  check_ok (pw_build (m, &error), &error);
+  if (parameter) check_ok (pw_model_set (m, parameter, value, &error), &error);
+  check_ok (pw_model_build (m, &error), &error);
   pw_system *s = scene_compile (m);
   pw_file_close (f);
   return s;

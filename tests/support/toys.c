@@ -31,7 +31,7 @@ static spring_state spring_at (const pw_batch *b, int e) {
   return s;
 }
 
-static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                            pw_error *error) {
   const toy_spring *d = definition;
   *(spring *)element =
@@ -159,7 +159,7 @@ typedef struct {
   double at[2], r;
 } roller;
 
-static int roller_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int roller_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                            pw_error *error) {
   const toy_roller *d = definition;
   *(roller *)element = (roller){ { d->at[0], d->at[1] }, d->radius };
@@ -226,7 +226,7 @@ typedef struct {
   double f[2];
 } weight;
 
-static int weight_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int weight_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                            pw_error *error) {
   const toy_weight *d = definition;
   *(weight *)element = (weight){ { bodies[0]->mass * d->g[0], bodies[0]->mass * d->g[1] } };

@@ -11,14 +11,14 @@ enum { TRIAL_COORDS = 40 };
 
 double trial_state (const pw_system *s, const pw_sample *x, const char *name) {
   pw_error error = { 0 };
-  int state = pw_find_state (s, name, &error);
+  int state = pw_system_find_state (s, name, &error);
   check_ok (state < 0 ? PW_INPUT : PW_OK, &error);
   return state < s->coords ? x->q[state] : x->v[state - s->coords];
 }
 
 double trial_reaction (const pw_system *s, const pw_sample *x, const char *name) {
   pw_error error = { 0 };
-  int row = pw_find_reaction (s, name, &error);
+  int row = pw_system_find_reaction (s, name, &error);
   check_ok (row < 0 ? PW_INPUT : PW_OK, &error);
   return -x->lambda[row];
 }
@@ -48,7 +48,7 @@ static void trial_compare (const pw_system *s, const char *method, const pw_samp
                            double bound, const char *reason) {
   char what[120], name[60];
   for (int i = 0; i < 2 * s->coords; i++) {
-    snprintf (what, sizeof what, "%s %s", method, pw_state_name (s, i, name, sizeof name));
+    snprintf (what, sizeof what, "%s %s", method, pw_system_state_name (s, i, name, sizeof name));
     check_close (what, i < s->coords ? x->q[i] : x->v[i - s->coords], reference[i], bound, reason);
   }
 }
@@ -66,7 +66,7 @@ static void trial_implicit (pw_system *s, const char *method, double times, doub
   check_below (what, fabs (x.balance), times * rtol * size.energy, "times rtol");
   snprintf (what, sizeof what, "%s: rejected of %ld steps", method, cost->steps);
   check_below (what, (double)cost->rejected, 10 + 0.1 * (double)cost->steps, "an exact Newton matrix");
-  pw_close (r);
+  pw_run_close (r);
 }
 
 void trial (const pw_plugin_table *table, double t_end) {
@@ -80,11 +80,11 @@ void trial (const pw_plugin_table *table, double t_end) {
   memcpy (reference + s->coords, x.v, (size_t)s->coords * sizeof *reference);
   check_below ("balance", fabs (x.balance), 1e-9 * size.energy, "1000 h^4 at h = 1e-3");
   trial_verify (s, r, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
-  pw_close (r);
+  pw_run_close (r);
   trial_implicit (s, "ida+ggl", 1e3, t_end, reference, size);
   trial_implicit (s, "ida+baumgarte", 1e3, t_end, reference, size);
   trial_implicit (s, "ida+si1", 1e3, t_end, reference, size);
   trial_implicit (s, "bdf+projection", 1e4, t_end, reference, size);
   trial_implicit (s, "bdf+baumgarte", 1e4, t_end, reference, size);
-  pw_free (s);
+  pw_system_free (s);
 }

@@ -27,7 +27,7 @@ static void check_open (pw_check *x) {
   pw_settings settings = { .span = d.t_end, .step = d.step };
   x->step = d.step;
   x->explicit_rk4 = strncmp (d.method, "rk4", 3) == 0;
-  x->r = pw_open (x->m.system, "rk4+projection", &settings, &x->start);
+  x->r = pw_run_open (x->m.system, "rk4+projection", &settings, &x->start);
   if (x->r == NULL)
     check_add (&x->problem, "%s", x->start.text);
   else
@@ -35,9 +35,9 @@ static void check_open (pw_check *x) {
 }
 
 void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to) {
-  const pw_start_report *start = pw_run_start (x->r);
-  int n = pw_count_coordinates (x->m.system);
-  pw_state_name (x->m.system, i, name, size);
+  const pw_initial_report *start = pw_run_initial (x->r);
+  int n = pw_system_coordinates (x->m.system);
+  pw_system_state_name (x->m.system, i, name, size);
   *from = i < n ? start->q_given[i] : start->v_given[i - n];
   *to = i < n ? start->q[i] : start->v[i - n];
 }
@@ -45,25 +45,26 @@ void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *
 /* Initial values given by the model or the user that the consistent initialisation has changed. */
 static void check_given (pw_check *x) {
   const pw_system *s = x->m.system;
-  for (int i = 0; x->r && i < 2 * pw_count_coordinates (s); i++) {
+  for (int i = 0; x->r && i < 2 * pw_system_coordinates (s); i++) {
     char name[300], a[32], b[32];
     double from, to;
-    if (!pw_start_moved (s, pw_run_start (x->r), i)) continue;
+    if (!pw_initial_moved (s, pw_run_initial (x->r), i)) continue;
     pw_check_state (x, i, name, sizeof name, &from, &to);
     if (fabs (to) < 1e-12 * fabs (from)) to = 0;
-    if (pw_start_specified (s, i))
+    if (pw_initial_specified (s, i))
       check_add (&x->finding, "the model specifies %s = %s %s, but the constraints require %s %s", name,
-                 pw_format (a, from, 10), pw_state_unit (s, i), pw_format (b, to, 10), pw_state_unit (s, i));
+                 pw_format (a, from, 10), pw_system_state_unit (s, i), pw_format (b, to, 10),
+                 pw_system_state_unit (s, i));
   }
 }
 
 /* The model's reference solution must hold initially. */
 static int check_reference (pw_check *x, int started, pw_error *error) {
-  int n = pw_count_coordinates (x->m.system);
-  if (x->r == NULL || started || !pw_has_truth (x->m.model)) return PW_OK;
+  int n = pw_system_coordinates (x->m.system);
+  if (x->r == NULL || started || !pw_system_has_reference (x->m.model)) return PW_OK;
   double *reference = malloc (2 * (size_t)n * sizeof *reference);
-  if (reference == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
-  int status = pw_true_state (x->m.model, x->m.system, 0, reference, reference + n, error);
+  if (reference == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = pw_system_reference (x->m.model, x->m.system, 0, reference, reference + n, error);
   for (int i = 0; i < 2 * n && status == PW_OK; i++) {
     char name[300], a[32], b[32];
     double from, to;
@@ -86,7 +87,7 @@ static int check_alone (pw_checked_kind *k, pw_error *error) {
   for (unsigned seed = 1; status == PW_OK && seed <= CHECK_SEEDS; seed++) {
     pw_error own = { 0 };
     status = pw_selftest (k->kind, seed, &k->alone, &own);
-    if (status == PW_MACHINE) return pw_fail (error, status, "%s", own.text);
+    if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
     if (status != PW_OK) snprintf (k->untested, sizeof k->untested, "%s", own.text);
   }
   return PW_OK;
@@ -120,7 +121,7 @@ static int check_list_kinds (pw_check *x, pw_error *error) {
     if (x->kind) break;
     last = NULL;
     x->kind = calloc ((size_t)x->kinds + 1, sizeof *x->kind);
-    if (x->kind == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+    if (x->kind == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   }
   return PW_OK;
 }
@@ -129,8 +130,8 @@ static int check_list_kinds (pw_check *x, pw_error *error) {
 static int check_kinds (pw_check *x, pw_error *error) {
   const pw_system *s = x->m.system;
   double T = x->r ? pw_run_scale (x->r)->time : 1;
-  const double *q = x->r ? pw_run_start (x->r)->q : pw_system_initial_q (s),
-               *v = x->r ? pw_run_start (x->r)->v : pw_system_initial_v (s);
+  const double *q = x->r ? pw_run_initial (x->r)->q : pw_system_initial_q (s),
+               *v = x->r ? pw_run_initial (x->r)->v : pw_system_initial_v (s);
   int status = check_list_kinds (x, error);
   for (pw_checked_kind *k = x->kind; status == PW_OK && k < x->kind + x->kinds; k++) {
     status = check_alone (k, error);
@@ -164,7 +165,7 @@ static int check_linear (pw_check *x, pw_error *error) {
   x->limit = x->doubling = INFINITY;
   x->fastest = -1;
   if (x->r == NULL) return PW_OK;
-  int status = pw_linearise (x->r, CHECK_MOST, &x->linear, error);
+  int status = pw_run_linearise (x->r, CHECK_MOST, &x->linear, error);
   if (status != PW_OK || x->linear.A == NULL) return status;
   check_fastest (x);
   if (x->explicit_rk4 && x->step > x->limit)
@@ -197,8 +198,8 @@ static void check_verdict (const pw_check *x, pw_error *error) {
 }
 
 static void check_close (pw_check *x) {
-  pw_linear_close (&x->linear);
-  if (x->r) pw_close (x->r);
+  pw_linear_free (&x->linear);
+  if (x->r) pw_run_close (x->r);
   free (x->redundant);
   free (x->kind);
   pw_cli_close_model (&x->m);

@@ -72,9 +72,10 @@ static void report_singular_value (pw_json *j, const pw_check *x) {
 static void report_mobility (pw_json *j, const pw_check *x) {
   const pw_system *s = x->m.system;
   const pw_linear *l = &x->linear;
-  int coordinates = pw_count_coordinates (s), rows = pw_count_rows (s), holonomic = pw_count_holonomic (s), listed = 0;
+  int coordinates = pw_system_coordinates (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s),
+      listed = 0;
   report_section (j, "mobility", '{', "Mobility");
-  if (j) pw_json_number (j, "bodies", pw_count_bodies (s));
+  if (j) pw_json_number (j, "bodies", pw_system_bodies (s));
   report_entry (j, "coordinates", coordinates, "coordinates", "%d", coordinates);
   report_entry (j, "rows", rows, "constraint equations", "%d (%d on positions, %d on velocities)", rows, holonomic,
                 rows - holonomic);
@@ -102,10 +103,10 @@ static void report_mass (pw_json *j, const pw_check *x) {
   const pw_system *s = x->m.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
-  for (int b = 0; b < pw_count_bodies (s); b++) lacking += M[3 * b] == 0 || M[3 * b + 2] == 0;
+  for (int b = 0; b < pw_system_bodies (s); b++) lacking += M[3 * b] == 0 || M[3 * b + 2] == 0;
   report_section (j, "massless", '[', "Mass");
   report_entry (j, NULL, 0, "bodies without mass or inertia", "%d", lacking);
-  for (int b = 0; b < pw_count_bodies (s); b++) {
+  for (int b = 0; b < pw_system_bodies (s); b++) {
     int which = (M[3 * b] == 0) + 2 * (M[3 * b + 2] == 0);
     const char *name = pw_system_body_name (s, b);
     if (which) report_item (j, &listed, name, "%s has %s", name, lack[which]);
@@ -128,12 +129,12 @@ static void report_change (pw_json *j, const pw_check *x, int i, int *listed) {
   if (j) pw_json_text (j, "state", name);
   if (j) pw_json_number (j, "from", from), pw_json_number (j, "to", to);
   report_item (j, listed, NULL, "%-20s from %s to %s, by %s %s", name, pw_format (a, from, 10), pw_format (b, to, 10),
-               pw_format (c, to - from, 3), pw_state_unit (x->m.system, i));
+               pw_format (c, to - from, 3), pw_system_state_unit (x->m.system, i));
   report_end (j, '}');
 }
 
 static void report_start (pw_json *j, const pw_check *x) {
-  int listed = 0, n = pw_count_coordinates (x->m.system);
+  int listed = 0, n = pw_system_coordinates (x->m.system);
   if (j && x->r == NULL) {
     j->line = 1;
     pw_json_text (j, "start", NULL);
@@ -144,7 +145,7 @@ static void report_start (pw_json *j, const pw_check *x) {
     printf ("  FAILED: %s\n", x->start.text);
     return;
   }
-  const pw_start_report *start = pw_run_start (x->r);
+  const pw_initial_report *start = pw_run_initial (x->r);
   if (j) {
     pw_json_number (j, "moved", start->moved);
     pw_json_flag (j, "freed", start->freed);
@@ -155,7 +156,7 @@ static void report_start (pw_json *j, const pw_check *x) {
     printf ("  %d value%s changed%s\n", start->moved, start->moved == 1 ? " was" : "s were",
             start->freed ? ", including given ones: they cannot all be satisfied" : "");
   for (int i = 0; i < 2 * n; i++)
-    if (pw_start_moved (x->m.system, start, i)) report_change (j, x, i, &listed);
+    if (pw_initial_moved (x->m.system, start, i)) report_change (j, x, i, &listed);
   report_end_list (j, listed);
   report_end (j, '}');
   if (j == NULL && x->known)

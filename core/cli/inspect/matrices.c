@@ -23,7 +23,7 @@ static void matrices_coordinates (const pw_system *s, const pw_equations *k, con
   printf ("\nM (diagonal), forces and state by coordinate; SI units\n  %-22s %14s %14s %14s %14s %14s\n", "", "M", "f",
           "q", "v", "a");
   for (int j = 0; j < k->coordinates; j++) {
-    matrices_name (pw_state_name (s, j, name, sizeof name), pw_state_unit (s, j));
+    matrices_name (pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
     const double value[] = { k->mass[j], k->force[j], x->q[j], x->v[j], x->a[j] };
     for (int i = 0; i < 5; i++) matrices_number (value[i]);
     putchar ('\n');
@@ -36,7 +36,7 @@ static void matrices_rows (const pw_system *s, const pw_equations *k, const pw_s
           "  %-22s %14s %14s %14s %14s\n",
           "", "gamma", "eta", "g", "lambda");
   for (int i = 0; i < k->rows; i++) {
-    matrices_name (pw_reaction_name (s, i, name, sizeof name), pw_reaction_unit (s, i));
+    matrices_name (pw_system_reaction_name (s, i, name, sizeof name), pw_system_reaction_unit (s, i));
     matrices_number (k->gamma[i]);
     matrices_number (k->eta[i]);
     if (i < k->holonomic)
@@ -52,7 +52,7 @@ static void matrices_rows (const pw_system *s, const pw_equations *k, const pw_s
 static void matrices_panel (const pw_system *s, const pw_equations *k, int first, int columns, double *J) {
   char name[300];
   printf ("\n  %-22s", "J");
-  for (int c = 0; c < columns; c++) printf (" %14s", pw_state_name (s, first + c, name, sizeof name));
+  for (int c = 0; c < columns; c++) printf (" %14s", pw_system_state_name (s, first + c, name, sizeof name));
   putchar ('\n');
   memset (J, 0, (size_t)k->rows * MATRICES_PANEL * sizeof *J);
   for (int i = 0; i < k->entries; i++)
@@ -62,7 +62,7 @@ static void matrices_panel (const pw_system *s, const pw_equations *k, int first
     int used = k->coordinates <= 2 * MATRICES_PANEL;
     for (int c = 0; c < columns; c++) used |= J[c] != 0;
     if (!used) continue;
-    printf ("  %-22s", pw_reaction_name (s, i, name, sizeof name));
+    printf ("  %-22s", pw_system_reaction_name (s, i, name, sizeof name));
     for (int c = 0; c < columns; c++) matrices_number (J[c]);
     putchar ('\n');
   }
@@ -72,7 +72,7 @@ static int matrices_print (const pw_cli_model *m, const pw_equations *k, const p
   const pw_system *s = m->system;
   char t[32];
   double *J = malloc ((size_t)k->rows * MATRICES_PANEL * sizeof *J + 1);
-  if (J == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (J == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   printf ("%s at t = %s s\n", pw_file_name (m->file), pw_format (t, x->t, MATRICES_DIGITS));
   matrices_coordinates (s, k, x);
   if (k->rows == 0) puts ("\nThe model has no constraints: no J, no gamma");
@@ -97,12 +97,12 @@ static int matrices_sample (const pw_cli_model *m, const pw_sample *x, pw_error 
 int pw_show_matrices (const pw_cli_model *m, double t, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (m->file));
   pw_settings settings = { .span = t > 0 ? t : d.t_end, .step = d.step, .rtol = d.rtol };
-  pw_run *r = pw_open (m->system, d.method, &settings, error);
+  pw_run *r = pw_run_open (m->system, d.method, &settings, error);
   if (r == NULL) return error->status;
   pw_sample x;
-  int status = t > 0 ? pw_advance_to (r, t, t, error) : PW_OK;
-  if (status == PW_OK) status = pw_at (r, t, &x, error);
+  int status = t > 0 ? pw_run_advance_to (r, t, t, error) : PW_OK;
+  if (status == PW_OK) status = pw_run_sample (r, t, &x, error);
   if (status == PW_OK) status = matrices_sample (m, &x, error);
-  pw_close (r);
+  pw_run_close (r);
   return status;
 }

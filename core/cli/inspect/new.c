@@ -37,14 +37,14 @@ static int new_write (const char *path, pw_error *error) {
   if (new_name (path, name, sizeof name, &ending, error) != PW_OK) return PW_INPUT;
   FILE *f = fopen (path, "wx"); /* never over a file that is there */
   if (f == NULL && errno == EEXIST) return pw_fail (error, PW_INPUT, "%s exists already and was not changed", path);
-  if (f == NULL) return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (errno));
+  if (f == NULL) return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (errno));
   new_print (f, name, ending[1] == 'y' ? new_model_yaml : new_model_c);
   errno = 0;
   int bad = fflush (f) != 0 || ferror (f), why = errno;
   if (fclose (f) != 0 && !bad) bad = 1, why = errno;
   if (bad) {
     remove (path);
-    return pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, strerror (why));
+    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, strerror (why));
   }
   pw_cli_print (stdout, "%s is written; now:  pinwheel run %s%s\n", path, strchr (path, '/') ? "" : "./", path);
   return PW_OK;

@@ -29,7 +29,7 @@ static void show_bodies (const pw_cli_model *m) {
   char mass[32], inertia[32];
   printf ("\nBodies\n  %-12s %-10s %-18s %-26s %s\n", "", "mass [kg]", "inertia [kg m^2]",
           "initial x, y [m], phi [rad]", "initial vx, vy [m/s], omega [rad/s]");
-  for (int b = 0; b < pw_count_bodies (s); b++) {
+  for (int b = 0; b < pw_system_bodies (s); b++) {
     const double *M = pw_system_mass (s) + 3 * b;
     printf ("  %-12s %-10s %-18s ", pw_system_body_name (s, b), pw_format (mass, M[0], SHOW_DIGITS),
             pw_format (inertia, M[2], SHOW_DIGITS));
@@ -118,9 +118,9 @@ static void show_element (const pw_element *e) {
 /* Blocks that element types leave to Pinwheel. */
 static void show_differences (const pw_system *s) {
   char text[300];
-  int count = pw_count_differences (s);
+  int count = pw_system_differences (s);
   if (count) puts ("\nDerivatives by differences, for implicit methods and linearisation");
-  for (int i = 0; i < count; i++) printf ("  %s\n", pw_difference_name (s, i, text, sizeof text));
+  for (int i = 0; i < count; i++) printf ("  %s\n", pw_system_difference_name (s, i, text, sizeof text));
 }
 
 /* ---- Parameters and the rest ---- */
@@ -151,23 +151,23 @@ static void show_defaults (const pw_plugin_table *table) {
 }
 
 static void show_sizes (const pw_system *s) {
-  int bodies = pw_count_bodies (s), rows = pw_count_rows (s), holonomic = pw_count_holonomic (s);
+  int bodies = pw_system_bodies (s), rows = pw_system_rows (s), holonomic = pw_system_holonomic (s);
   printf ("\nSizes: %d %s, %d coordinates, %d constraint equation%s (%d on positions, %d on velocities)\n", bodies,
-          bodies == 1 ? "body" : "bodies", pw_count_coordinates (s), rows, rows == 1 ? "" : "s", holonomic,
+          bodies == 1 ? "body" : "bodies", pw_system_coordinates (s), rows, rows == 1 ? "" : "s", holonomic,
           rows - holonomic);
 }
 
 /* The states that the reference solution of the model has. */
 static void show_reference (const pw_cli_model *m) {
   enum { MOST = 12 };
-  int n = pw_count_coordinates (m->system), known = 0;
+  int n = pw_system_coordinates (m->system), known = 0;
   char name[300];
-  double *x = pw_has_truth (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
-  if (x && pw_true_state (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
+  double *x = pw_system_has_reference (m->model) ? malloc (2 * (size_t)n * sizeof *x) : NULL;
+  if (x && pw_system_reference (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
     for (int i = 0; i < 2 * n; i++)
       if (!isnan (x[i]) && ++known <= MOST)
-        printf ("%s%s",
-                known > 1 ? ", " : "\nReference solution (truth): ", pw_state_name (m->system, i, name, sizeof name));
+        printf ("%s%s", known > 1 ? ", " : "\nReference solution (truth): ",
+                pw_system_state_name (m->system, i, name, sizeof name));
   if (known > MOST) printf (", and %d more", known - MOST);
   if (known) putchar ('\n');
   free (x);

@@ -164,7 +164,7 @@ static int yaml_refuse (const pw_model *m, pw_error *error) {
                           f->name, kind, name);
     }
   }
-  if (pw_model_starts (m))
+  if (pw_model_initial (m))
     return pw_fail (error, PW_INPUT,
                     "--yaml: initial values of --start have no place in a text model; give them to run");
   return PW_OK;
@@ -188,13 +188,13 @@ static void yaml_run (const pw_run_defaults *run) {
 }
 
 /* Expressions keep their names, whose values stand under `let`. */
-static void yaml_names (const pw_truth_text *t) {
+static void yaml_names (const pw_reference_text *t) {
   if (t->names) puts ("let:");
   for (int i = 0; i < t->names; i++) printf ("  %s: ", t->name[i]), yaml_number (t->value[i]), putchar ('\n');
 }
 
 static void yaml_truth (const pw_model *m) {
-  const pw_truth_text *t = pw_model_truth (m);
+  const pw_reference_text *t = pw_model_reference (m);
   if (pw_model_table (m)->truth)
     puts ("# The reference solution of the model (truth) is a function in C, which cannot be written as text.");
   if (t->states) puts ("truth:");
@@ -211,7 +211,7 @@ int pw_show_yaml (const pw_cli_model *x, pw_error *error) {
   const pw_element *e = pw_model_elements (m, &elements);
   if (table->about && *table->about) printf ("about: "), yaml_text (table->about), putchar ('\n');
   yaml_run (&table->run);
-  yaml_names (pw_model_truth (m));
+  yaml_names (pw_model_reference (m));
   if (bodies) puts ("bodies:");
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
   if (elements) puts ("elements:");

@@ -23,7 +23,7 @@ static int figure_make_folder (const char *folder, pw_error *error) {
     char end = path[i];
     path[i] = 0;
     if (mkdir (path, 0777) != 0 && errno != EEXIST)
-      return pw_fail (error, PW_MACHINE, "cannot make the folder %s: %s", path, strerror (errno));
+      return pw_fail (error, PW_RESOURCE, "cannot make the folder %s: %s", path, strerror (errno));
     path[i] = end;
   }
   return PW_OK;
@@ -112,7 +112,7 @@ void pw_figure_methods (FILE *f, int count, int spread) {
 void pw_figure_method (FILE *f, int i, const char *label, const char *method) {
   const pw_method *integrator;
   int stabilisation;
-  int known = method && pw_parse_method (method, &integrator, &stabilisation, NULL) == PW_OK;
+  int known = method && pw_method_parse (method, &integrator, &stabilisation, NULL) == PW_OK;
   pw_figure_element (f, "label", i, label);
   pw_figure_element (f, "stabilisation", i, known ? integrator->stabilisations[stabilisation].name : "");
 }
@@ -203,16 +203,16 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   gnuplot_remove_figures (folder, names);
   int failed = gnuplot_start (argv, &child);
   if (failed == ENOENT) return gnuplot_absent (folder);
-  if (failed) return pw_fail (error, PW_MACHINE, "cannot run gnuplot: %s", strerror (failed));
+  if (failed) return pw_fail (error, PW_RESOURCE, "cannot run gnuplot: %s", strerror (failed));
   while (waitpid (child, &status, 0) < 0)
-    if (errno != EINTR) return pw_fail (error, PW_MACHINE, "lost gnuplot: %s", strerror (errno));
+    if (errno != EINTR) return pw_fail (error, PW_RESOURCE, "lost gnuplot: %s", strerror (errno));
   if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (folder);
   if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
   gnuplot_remove_figures (folder, names);
   if (WIFSIGNALED (status))
-    return pw_fail (error, PW_MACHINE, "gnuplot was ended by signal %d; data and scripts are in %s", WTERMSIG (status),
+    return pw_fail (error, PW_RESOURCE, "gnuplot was ended by signal %d; data and scripts are in %s", WTERMSIG (status),
                     folder);
-  return pw_fail (error, PW_MACHINE,
+  return pw_fail (error, PW_RESOURCE,
                   "gnuplot failed with exit status %d; its message is above, data and scripts are in %s",
                   WEXITSTATUS (status), folder);
 }

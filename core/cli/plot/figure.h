@@ -16,13 +16,13 @@ typedef struct {
 } pw_figures;
 
 /* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
- * PW_MACHINE. */
+ * PW_RESOURCE. */
 int pw_figure_folder (const char *folder, pw_error *error);
 
-/* Opens a data file.  NULL and PW_MACHINE. */
+/* Opens a data file.  NULL and PW_RESOURCE. */
 pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error);
 
-/* Opens NAME.gp.  Assign the variables of its template, then end it; PW_MACHINE if a file cannot be written. */
+/* Opens NAME.gp.  Assign the variables of its template, then end it; PW_RESOURCE if a file cannot be written. */
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error);
 void pw_figure_number (FILE *f, const char *variable, double value);
 void pw_figure_text (FILE *f, const char *variable, const char *value);
@@ -36,7 +36,7 @@ void pw_figure_method (FILE *f, int i, const char *label, const char *method);
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
 
 /* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported on
- * standard error.  PW_MACHINE if gnuplot fails. */
+ * standard error.  PW_RESOURCE if gnuplot fails. */
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error);
 
 #endif

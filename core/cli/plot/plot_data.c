@@ -86,7 +86,7 @@ int pw_plot_closeup (const pw_plots *p) {
 /* One block per curve: time, what is kept of the body or wheel, its number in the model. */
 static int data_curves (const pw_plots *p, const pw_figures *f, const pw_curves *c, pw_error *error) {
   pw_output *o = c->count ? pw_figure_data (f, c->file, error) : NULL;
-  if (o == NULL) return c->count ? PW_MACHINE : PW_OK;
+  if (o == NULL) return c->count ? PW_RESOURCE : PW_OK;
   FILE *out = pw_output_stream (o);
   for (int k = 0; k < c->count; k++) {
     int shown = pw_plot_pick (k, c->count, c->shown);
@@ -103,7 +103,7 @@ static int data_curves (const pw_plots *p, const pw_figures *f, const pw_curves 
 
 static int data_energy (const pw_plots *p, const pw_figures *f, pw_error *error) {
   pw_output *o = pw_figure_data (f, "energy.dat", error);
-  if (o == NULL) return PW_MACHINE;
+  if (o == NULL) return PW_RESOURCE;
   FILE *out = pw_output_stream (o);
   fputs ("# t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]", out);
   for (int i = 0; i < p->samples; i++)
@@ -114,7 +114,7 @@ static int data_energy (const pw_plots *p, const pw_figures *f, pw_error *error)
 
 static int data_ground (const pw_plots *p, const pw_figures *f, pw_error *error) {
   pw_output *o = p->grounds ? pw_figure_data (f, "ground.dat", error) : NULL;
-  if (o == NULL) return p->grounds ? PW_MACHINE : PW_OK;
+  if (o == NULL) return p->grounds ? PW_RESOURCE : PW_OK;
   FILE *out = pw_output_stream (o);
   fputs ("# points of the ground: x [m], y [m]\n", out);
   for (int g = 0; g < p->grounds; g++) {
@@ -212,7 +212,7 @@ static void data_block (FILE *f, const pw_plots *p, int i, int block, double hal
 /* Three blocks: bodies, wheels, bodies without attachments; snapshots out of the first n samples. */
 static int data_mechanism (const pw_plots *p, const pw_figures *f, const char *name, int n, pw_error *error) {
   pw_output *o = pw_figure_data (f, name, error);
-  if (o == NULL) return PW_MACHINE;
+  if (o == NULL) return PW_RESOURCE;
   FILE *out = pw_output_stream (o);
   int stride = data_stride (p, n);
   double half_wheel = 0.06 * pw_plot_size (p);

@@ -64,7 +64,7 @@ static void figures_mechanism (FILE *f, const pw_plots *p) {
 static int figures_write (const pw_plots *p, const pw_figures *figures, const char *name, int closeup,
                           pw_error *error) {
   pw_output *o = pw_figure_begin (figures, name, error);
-  if (o == NULL) return PW_MACHINE;
+  if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
   pw_figure_number (f, "t_end", pw_plot_sample (p, p->samples - 1)[PLOT_T]);
   switch (*name) {

@@ -57,7 +57,7 @@ int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
   pw_names shown;
   int elements;
   const pw_element *e = pw_model_elements (m, &elements);
-  if (pw_names_open (&shown, (size_t)p->bodies) != PW_OK) return pw_fail (error, PW_MACHINE, "plots: out of memory");
+  if (pw_names_open (&shown, (size_t)p->bodies) != PW_OK) return pw_fail (error, PW_RESOURCE, "plots: out of memory");
   for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, pw_system_body_name (p->s, p->body[i]), i);
   for (const pw_element *end = e + elements; e < end; e++)
     for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
@@ -77,8 +77,8 @@ int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
 
 /* The number of a system's body among those shown, -1 for the ground, -2 for one that is not shown. */
 static int shapes_shown (const pw_plots *p, int body) {
-  if (body >= pw_count_bodies (p->s)) return -1;
-  int b = (int)((long long)body * p->bodies / pw_count_bodies (p->s));
+  if (body >= pw_system_bodies (p->s)) return -1;
+  int b = (int)((long long)body * p->bodies / pw_system_bodies (p->s));
   for (int near = b - 1; near <= b + 1; near++)
     if (near >= 0 && near < p->bodies && p->body[near] == body) return near;
   return -2;
@@ -121,7 +121,7 @@ void pw_plot_find_links (pw_plots *p, const pw_model *m) {
 }
 
 void pw_plot_forces (const pw_plots *p, const pw_sample *x, double *out) {
-  if (pw_system_forces (p->workspace, x->t, x->q, x->v, x->lambda, p->forces, NULL) != PW_OK) return;
+  if (pw_workspace_forces (p->workspace, x->t, x->q, x->v, x->lambda, p->forces, NULL) != PW_OK) return;
   for (int i = 0; i < p->links; i++, out += 2)
     memcpy (out, p->forces + pw_system_element (p->s, p->link[i].element).force + p->link[i].column, 2 * sizeof *out);
 }

@@ -51,7 +51,7 @@ pw_curves pw_plot_bodies (const pw_plots *p) {
                       "body",
                       count,
                       p->bodies,
-                      pw_count_bodies (p->s),
+                      pw_system_bodies (p->s),
                       6,
                       pw_plot_body_name,
                       pw_plot_motion };
@@ -89,7 +89,7 @@ static pw_plots *plots_allocate (const pw_plots *sizes, pw_error *error) {
   plots_layout (&l, &p, sizes);
   l = (pw_layout){ calloc (1, l.used), 0 };
   if (l.base == NULL) {
-    pw_fail (error, PW_MACHINE, "plots: out of memory");
+    pw_fail (error, PW_RESOURCE, "plots: out of memory");
     return NULL;
   }
   plots_layout (&l, &p, sizes);
@@ -110,7 +110,7 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, cons
   pw_plots sizes = { .folder = folder, .lock = -1, .model = pw_system_name (s), .s = s, .t_end = t_end };
   int elements;
   pw_model_elements (m, &elements);
-  sizes.bodies = plots_least (pw_count_bodies (s), PLOT_SHOWN);
+  sizes.bodies = plots_least (pw_system_bodies (s), PLOT_SHOWN);
   sizes.all_wheels = pw_system_contacts (s);
   sizes.wheels = plots_least (sizes.all_wheels, PLOT_SHOWN);
   sizes.links = forces ? plots_least (elements, PLOT_SHOWN) : 0;
@@ -122,7 +122,7 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, cons
   if (folder == NULL || plots_try_folder (&sizes, error) == PW_OK) p = plots_allocate (&sizes, error);
   if (p == NULL && sizes.lock >= 0) close (sizes.lock);
   if (p == NULL) return NULL;
-  for (int i = 0; i < p->bodies; i++) p->body[i] = pw_plot_pick (i, p->bodies, pw_count_bodies (s));
+  for (int i = 0; i < p->bodies; i++) p->body[i] = pw_plot_pick (i, p->bodies, pw_system_bodies (s));
   p->workspace = pw_workspace_new (s, error);
   plots_choose_wheels (p);
   pw_plot_find_links (p, m);
@@ -145,7 +145,7 @@ double pw_plots_next (const pw_plots *p) {
 }
 
 static void plots_contacts (const pw_plots *p, const pw_sample *x, double *out) {
-  if (pw_system_contact_points (p->workspace, x->t, x->q, x->v, p->contact, NULL) != PW_OK)
+  if (pw_workspace_contact_points (p->workspace, x->t, x->q, x->v, p->contact, NULL) != PW_OK)
     return; /* the run has been there */
   for (int i = 0; i < p->wheels; i++, out += 3)
     memcpy (out, p->contact[pw_system_element (p->s, p->element[i]).contact], 3 * sizeof *out);
@@ -171,11 +171,11 @@ void pw_plots_add (pw_plots *p, const pw_sample *sample) {
   if (p->links > 0) pw_plot_forces (p, sample, pw_plot_force (p, i, 0));
 }
 
-void pw_plots_carry (pw_plots *p, pw_archive *a) {
+void pw_plots_serialise (pw_plots *p, pw_archive *a) {
   int samples = p->samples;
-  pw_carry (a, &samples, sizeof samples);
+  pw_archive_bytes (a, &samples, sizeof samples);
   if (samples < 0 || samples > p->wanted) a->failed = 1;
   if (a->failed) return;
   p->samples = samples;
-  pw_carry (a, p->data, (size_t)samples * (size_t)p->width * sizeof *p->data);
+  pw_archive_bytes (a, p->data, (size_t)samples * (size_t)p->width * sizeof *p->data);
 }

@@ -60,7 +60,7 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
   pw_print_number (t, "atol", NULL, x->settings.atol);
   for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
     pw_print_number (t, "parameter", q->name, pw_model_parameter (m, q));
-  pw_print_starts (t, x->line.starts);
+  pw_print_initial (t, x->line.starts);
   pw_print_line (t, "table", NULL, x->csv_path ? "written" : "not written");
   pw_print_number (t, "every", NULL, x->every);
   pw_print_line (t, "energy", NULL, x->energy ? "kept" : "not kept");
@@ -75,7 +75,7 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
             sizeof (long));
   pw_print_line (t, "numbers", NULL, numbers);
   pw_text_add (t, "end\n");
-  return t->failed ? pw_fail (error, PW_MACHINE, "out of memory") : PW_OK;
+  return t->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : PW_OK;
 }
 
 /* Refuses a checkpoint of another run. */
@@ -101,7 +101,7 @@ int pw_checkpoints_prepare (pw_run_command *x, pw_error *error) {
   if (status != PW_OK || x->csv_path == NULL) return status;
   pw_mark mark = { 0 };
   if (c->resume == NULL) return pw_output_mark (x->csv_output, &mark, error); /* fails if it cannot be continued */
-  pw_carry (&c->from.state, &mark, sizeof mark);
+  pw_archive_bytes (&c->from.state, &mark, sizeof mark);
   x->csv_output = pw_output_continue (x->csv_path, &mark, error);
   return x->csv_output ? PW_OK : error->status;
 }
@@ -125,15 +125,15 @@ static void checkpoints_next (pw_checkpoints *c, double t) {
 
 /* What the program adds to the state of the run. */
 static void checkpoints_serialise (pw_run_command *x, pw_archive *a) {
-  pw_carry (a, &x->row, sizeof x->row);
-  pw_carry (a, &x->cpu, sizeof x->cpu);
-  if (x->plots) pw_plots_carry (x->plots, a);
+  pw_archive_bytes (a, &x->row, sizeof x->row);
+  pw_archive_bytes (a, &x->cpu, sizeof x->cpu);
+  if (x->plots) pw_plots_serialise (x->plots, a);
   pw_comparison_serialise (&x->comparison, a);
 }
 
 /* A checkpoint is within the run, and has the rows up to its time. */
 static int checkpoints_plausible (const pw_run_command *x) {
-  double t = pw_time (x->r), rows = x->csv && x->every > 0 ? floor (t / x->every) + 1 : (double)x->row;
+  double t = pw_run_time (x->r), rows = x->csv && x->every > 0 ? floor (t / x->every) + 1 : (double)x->row;
   return t <= x->t_end && x->row >= 0 && fabs ((double)x->row - rows) <= 1 && isfinite (x->cpu) && x->cpu >= 0;
 }
 
@@ -149,25 +149,25 @@ int pw_checkpoints_resume (pw_run_command *x, pw_error *error) {
                       "are impossible",
                       c->resume);
     x->resumed = 1;
-    pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_time (x->r), 6));
+    pw_cli_say ("pinwheel: resumed at t = %s s\n", pw_format (t, pw_run_time (x->r), 6));
   }
-  checkpoints_next (c, pw_time (x->r));
+  checkpoints_next (c, pw_run_time (x->r));
   return PW_OK;
 }
 
 int pw_checkpoints_save (pw_run_command *x, pw_error *error) {
   pw_checkpoints *c = &x->check;
-  double t = pw_time (x->r);
+  double t = pw_run_time (x->r);
   pw_mark mark = { 0 };
   if (t >= x->t_end) return PW_OK;
   if (x->csv_output && pw_output_mark (x->csv_output, &mark, error) != PW_OK) return error->status;
   pw_archive_clear (&c->state);
-  if (x->csv_output) pw_carry (&c->state, &mark, sizeof mark);
+  if (x->csv_output) pw_archive_bytes (&c->state, &mark, sizeof mark);
   checkpoints_serialise (x, &c->state);
   int status = pw_run_save (x->r, &c->state, error);
   if (status != PW_OK) return status > 0 ? PW_OK : status;
   checkpoints_next (c, t);
-  if (c->state.failed) return pw_fail (error, PW_MACHINE, "out of memory while saving a checkpoint");
+  if (c->state.failed) return pw_fail (error, PW_RESOURCE, "out of memory while saving a checkpoint");
   pw_output *o = pw_output_open_as (c->path, ".next", error);
   status = o ? pw_checkpoint_put (o, c->head.at, &c->state, error) : error->status;
   if (status == PW_OK) c->saved = t;

@@ -5,13 +5,13 @@
 #include "motion.h"
 
 int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error) {
-  int width = 2 * pw_count_coordinates (s) + pw_count_rows (s);
+  int width = 2 * pw_system_coordinates (s) + pw_system_rows (s);
   *m = (pw_motion){ .samples = samples, .width = width };
   m->t = calloc ((size_t)samples, sizeof *m->t);
   m->x = calloc ((size_t)samples * (size_t)width, sizeof *m->x);
   if (m->t && m->x) return PW_OK;
   pw_motion_close (m);
-  return pw_fail (error, PW_MACHINE, "out of memory");
+  return pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 void pw_motion_close (pw_motion *m) {
@@ -25,21 +25,21 @@ void pw_motion_times (pw_motion *m, double t_end) {
 }
 
 void pw_motion_take (pw_motion *m, const pw_system *s, int i, const pw_sample *sample) {
-  size_t n = (size_t)pw_count_coordinates (s), rows = (size_t)pw_count_rows (s);
+  size_t n = (size_t)pw_system_coordinates (s), rows = (size_t)pw_system_rows (s);
   double *to = m->x + (size_t)i * (size_t)m->width;
   memcpy (to, sample->q, n * sizeof *to);
   memcpy (to + n, sample->v, n * sizeof *to);
   if (rows) memcpy (to + 2 * n, sample->lambda, rows * sizeof *to);
 }
 
-int pw_motion_truth (pw_motion *m, const pw_model *model, const pw_system *s, double t_end, pw_error *error) {
-  int n = pw_count_coordinates (s), status = pw_motion_open (m, s, MOTION_SAMPLES, error);
+int pw_motion_reference (pw_motion *m, const pw_model *model, const pw_system *s, double t_end, pw_error *error) {
+  int n = pw_system_coordinates (s), status = pw_motion_open (m, s, MOTION_SAMPLES, error);
   if (status != PW_OK) return status;
   pw_motion_times (m, t_end);
   for (int k = 0; k < m->samples && status == PW_OK; k++) {
     double *x = m->x + k * m->width;
     for (int j = 2 * n; j < m->width; j++) x[j] = NAN;
-    status = pw_true_state (model, s, m->t[k], x, x + n, error);
+    status = pw_system_reference (model, s, m->t[k], x, x + n, error);
   }
   return status;
 }
@@ -52,8 +52,8 @@ static int motion_knows (const pw_motion *m, int j) {
 }
 
 int pw_motion_unit (const pw_system *s, int state) {
-  int rate = state >= pw_count_coordinates (s);
-  int angle = strncmp (pw_state_unit (s, state), "rad", 3) == 0;
+  int rate = state >= pw_system_coordinates (s);
+  int angle = strncmp (pw_system_state_unit (s, state), "rad", 3) == 0;
   return (rate ? MOTION_SPEED : MOTION_LENGTH) + angle;
 }
 
@@ -64,7 +64,7 @@ static void motion_raise (double *most, double value) {
 }
 
 static void motion_states (const pw_system *s, const pw_motion *reference, const pw_motion *m, double *error) {
-  for (int j = 0; j < 2 * pw_count_coordinates (s); j++) {
+  for (int j = 0; j < 2 * pw_system_coordinates (s); j++) {
     int unit = pw_motion_unit (s, j);
     for (int k = 0; k < m->samples; k++) {
       double exact = reference->x[k * reference->width + j];
@@ -79,10 +79,10 @@ static void motion_states (const pw_system *s, const pw_motion *reference, const
 /* The largest multiplier of the same unit as row i: forces and moments are not weighed against each other. */
 static double motion_load (const pw_system *s, const pw_motion *reference, int i) {
   double most = 0;
-  for (int j = 0; j < pw_count_rows (s); j++)
-    if (strcmp (pw_reaction_unit (s, i), pw_reaction_unit (s, j)) == 0)
+  for (int j = 0; j < pw_system_rows (s); j++)
+    if (strcmp (pw_system_reaction_unit (s, i), pw_system_reaction_unit (s, j)) == 0)
       for (int k = 0; k < reference->samples; k++)
-        most = fmax (most, fabs (reference->x[k * reference->width + 2 * pw_count_coordinates (s) + j]));
+        most = fmax (most, fabs (reference->x[k * reference->width + 2 * pw_system_coordinates (s) + j]));
   return most > 0 ? most : 1;
 }
 
@@ -93,12 +93,12 @@ static void motion_multipliers (const pw_system *s, const pw_motion *reference, 
       smooth = 0; /* they have two values where they jump, and methods differ in which they show */
   for (int k = 0; k < m->samples; k++) smooth += !(jumps[k] = pw_system_jumps (s, reference->t[k]));
   if (smooth == 0) error[MOTION_LAMBDA] = NAN;
-  for (int i = 0; i < pw_count_rows (s); i++) {
-    if (unit == NULL || strcmp (unit, pw_reaction_unit (s, i)) != 0) {
-      unit = pw_reaction_unit (s, i);
+  for (int i = 0; i < pw_system_rows (s); i++) {
+    if (unit == NULL || strcmp (unit, pw_system_reaction_unit (s, i)) != 0) {
+      unit = pw_system_reaction_unit (s, i);
       load = motion_load (s, reference, i);
     }
-    int j = 2 * pw_count_coordinates (s) + i;
+    int j = 2 * pw_system_coordinates (s) + i;
     for (int k = 0; k < m->samples; k++) {
       double exact = reference->x[k * reference->width + j];
       if (!isnan (exact) && !jumps[k])
@@ -120,7 +120,7 @@ int pw_comparison_open (pw_comparison *c, const pw_cli_model *m, const char *pat
                         pw_error *error) {
   int status = PW_OK;
   *c = (pw_comparison){ .error = { .source = path ? path : "the model" } };
-  if (path == NULL && !pw_has_truth (m->model)) return PW_OK;
+  if (path == NULL && !pw_system_has_reference (m->model)) return PW_OK;
   if (path == NULL && started) {
     fputs ("pinwheel: the model's reference solution holds for its own initial values: with --start errors are not "
            "computed\n",
@@ -130,7 +130,7 @@ int pw_comparison_open (pw_comparison *c, const pw_cli_model *m, const char *pat
   if (path)
     status = pw_motion_read (&c->reference, m->system, path, &t_end, 0, error);
   else
-    status = pw_motion_truth (&c->reference, m->model, m->system, t_end, error);
+    status = pw_motion_reference (&c->reference, m->model, m->system, t_end, error);
   if (status == PW_OK) status = pw_motion_open (&c->motion, m->system, c->reference.samples, error);
   c->on = status == PW_OK;
   return status;
@@ -152,16 +152,16 @@ void pw_comparison_take (pw_comparison *c, const pw_system *s, const pw_sample *
 void pw_comparison_serialise (pw_comparison *c, pw_archive *a) {
   int next = c->next;
   if (!c->on) return;
-  pw_carry (a, &next, sizeof next);
+  pw_archive_bytes (a, &next, sizeof next);
   if (next < 0 || next > c->motion.samples) a->failed = 1;
   if (a->failed) return;
   c->next = next;
-  pw_carry (a, c->motion.x, (size_t)next * (size_t)c->motion.width * sizeof *c->motion.x);
+  pw_archive_bytes (a, c->motion.x, (size_t)next * (size_t)c->motion.width * sizeof *c->motion.x);
 }
 
 /* Errors in a unit are not known if the reference has no such state. */
 static void comparison_unknown (pw_comparison *c, const pw_system *s) {
-  int n = pw_count_coordinates (s), known[MOTION_UNITS] = { 0 }, reactions = 0;
+  int n = pw_system_coordinates (s), known[MOTION_UNITS] = { 0 }, reactions = 0;
   for (int j = 0; j < 2 * n; j++) known[pw_motion_unit (s, j)] |= motion_knows (&c->reference, j);
   for (int j = 2 * n; j < c->reference.width; j++) reactions |= motion_knows (&c->reference, j);
   for (int i = 0; i < MOTION_UNITS; i++)
@@ -169,7 +169,7 @@ static void comparison_unknown (pw_comparison *c, const pw_system *s) {
   if (!reactions) c->error.reactions = NAN;
 }
 
-const pw_truth_error *pw_comparison_errors (pw_comparison *c, const pw_system *s) {
+const pw_reference_error *pw_comparison_errors (pw_comparison *c, const pw_system *s) {
   double error[MOTION_ERRORS];
   if (!c->on || c->next == 0) return NULL;
   c->motion.samples = c->reference.samples = c->next; /* a run may have ended early */

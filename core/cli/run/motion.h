@@ -31,7 +31,7 @@ void pw_motion_distance (const pw_system *s, const pw_motion *reference, const p
 int pw_motion_unit (const pw_system *s, int state);
 
 /* Opens a motion with the model's own reference solution up to t_end. */
-int pw_motion_truth (pw_motion *m, const pw_model *model, const pw_system *s, double t_end, pw_error *error);
+int pw_motion_reference (pw_motion *m, const pw_model *model, const pw_system *s, double t_end, pw_error *error);
 
 /* Opens a motion from a table with columns as `pinwheel run -o` writes them; rows are thinned to MOTION_SAMPLES, those after
  * t_end are skipped.  *t_end 0: that of the last row.  `whole`: there must be a row at the end (motion_file.c).  PW_INPUT with line. */
@@ -43,11 +43,11 @@ typedef struct {
   int on; /* 0: there is no reference */
   pw_motion reference, motion;
   int next; /* the sample due next */
-  pw_truth_error error;
+  pw_reference_error error;
 } pw_comparison;
 
 /* Opens the reference of a run up to t_end: the table at `path`, or else the model's own reference solution, unless `started`
- * says that the run has other initial values.  Close it in every case.  Errors: PW_INPUT, PW_MACHINE. */
+ * says that the run has other initial values.  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
 int pw_comparison_open (pw_comparison *c, const pw_cli_model *m, const char *path, int started, double t_end,
                         pw_error *error);
 void pw_comparison_close (pw_comparison *c);
@@ -57,6 +57,6 @@ void pw_comparison_take (pw_comparison *c, const pw_system *s, const pw_sample *
 /* Saves or loads the samples of a checkpoint. */
 void pw_comparison_serialise (pw_comparison *c, pw_archive *a);
 /* The errors of the samples taken; NULL if there are none. */
-const pw_truth_error *pw_comparison_errors (pw_comparison *c, const pw_system *s);
+const pw_reference_error *pw_comparison_errors (pw_comparison *c, const pw_system *s);
 
 #endif

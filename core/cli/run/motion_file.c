@@ -81,24 +81,25 @@ static int file_number (const file_reader *in, const char *cell, double *value, 
 /* "frame.x [m]" to its place in a motion, or -1. */
 static int file_place (const pw_system *s, const char *name, size_t n, double *sign) {
   char known[300];
-  int states = 2 * pw_count_coordinates (s);
+  int states = 2 * pw_system_coordinates (s);
   *sign = 1;
   for (int i = 0; i < states; i++)
-    if (strlen (pw_state_name (s, i, known, sizeof known)) == n && memcmp (known, name, n) == 0) return i;
+    if (strlen (pw_system_state_name (s, i, known, sizeof known)) == n && memcmp (known, name, n) == 0) return i;
   *sign = -1;
-  for (int i = 0; i < pw_count_rows (s); i++)
-    if (strlen (pw_reaction_name (s, i, known, sizeof known)) == n && memcmp (known, name, n) == 0) return states + i;
+  for (int i = 0; i < pw_system_rows (s); i++)
+    if (strlen (pw_system_reaction_name (s, i, known, sizeof known)) == n && memcmp (known, name, n) == 0)
+      return states + i;
   return -1;
 }
 
 static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
   char example[300], unit[260], *rest;
-  int n = pw_count_coordinates (s);
+  int n = pw_system_coordinates (s);
   if (!file_line (in)) return pw_fail (error, PW_INPUT, "--truth %s: the file is empty", in->path);
   for (const char *c = in->line; *c; c++) in->columns += *c == ',';
   in->place = calloc ((size_t)in->columns + 1, sizeof *in->place);
   in->sign = calloc ((size_t)in->columns + 1, sizeof *in->sign);
-  if (in->place == NULL || in->sign == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (in->place == NULL || in->sign == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   rest = in->line;
   const char *first = file_cell (&rest);
   if (pw_unit_split (first, unit, sizeof unit) != 1 || *first != 't')
@@ -111,15 +112,15 @@ static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
     in->place[i] = file_place (s, cell, pw_unit_split (cell, unit, sizeof unit), &in->sign[i]);
     in->known += in->place[i] >= 0 && in->place[i] < 2 * n;
     const char *wanted = in->place[i] < 0       ? NULL
-                         : in->place[i] < 2 * n ? pw_state_unit (s, in->place[i])
-                                                : pw_reaction_unit (s, in->place[i] - 2 * n);
+                         : in->place[i] < 2 * n ? pw_system_state_unit (s, in->place[i])
+                                                : pw_system_reaction_unit (s, in->place[i] - 2 * n);
     if (in->place[i] >= 0 && pw_unit_check (cell, wanted, &factor, unit, sizeof unit) != PW_OK)
       return pw_fail (error, PW_INPUT, "--truth %s: %s", in->path, unit);
     in->sign[i] *= factor;
   }
   if (in->known) return PW_OK;
   return pw_fail (error, PW_INPUT, "--truth %s: no column is a state of this model, such as \"%s\"", in->path,
-                  pw_state_name (s, 0, example, sizeof example));
+                  pw_system_state_name (s, 0, example, sizeof example));
 }
 
 /* ---- Rows ---- */
@@ -200,7 +201,7 @@ static int file_read (file_reader *in, pw_motion *m, const pw_system *s, double 
 
 static int file_failed (const file_reader *in, pw_error *error) {
   char line[60];
-  if (in->failed == ENOMEM) return pw_fail (error, PW_MACHINE, "--truth %s: out of memory", in->path);
+  if (in->failed == ENOMEM) return pw_fail (error, PW_RESOURCE, "--truth %s: out of memory", in->path);
   snprintf (line, sizeof line, "line %ld has more than %d MB", in->number + 1, FILE_LINE >> 20);
   return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", in->path,
                   in->failed == EOVERFLOW ? line
@@ -211,7 +212,7 @@ static int file_failed (const file_reader *in, pw_error *error) {
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error) {
   const char *why;
   file_reader in = { .path = path, .f = pw_open_input (path, &why) };
-  if (in.f == NULL && errno == ENOMEM) return pw_fail (error, PW_MACHINE, "--truth %s: out of memory", path);
+  if (in.f == NULL && errno == ENOMEM) return pw_fail (error, PW_RESOURCE, "--truth %s: out of memory", path);
   if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, why);
   pw_error own = { 0 };
   file_read (&in, m, s, t_end, whole, &own);

@@ -71,8 +71,8 @@ static void profile_print (const pw_system *s, const pw_run *r, const pw_profile
   char t[32], evaluations[32], iterations[32];
   double steps = (double)pw_run_statistics (r)->steps;
   fprintf (out, "\n  what an evaluation of the accelerations costs at t = %s s [ns]\n\n",
-           pw_format (t, pw_time (r), 8));
-  profile_kinds (p, pw_count_bodies (s), out);
+           pw_format (t, pw_run_time (r), 8));
+  profile_kinds (p, pw_system_bodies (s), out);
   profile_stages (p, out);
   if (steps == 0) return;
   pw_format (evaluations, (double)pw_run_statistics (r)->rhs / steps, 3);

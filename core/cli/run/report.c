@@ -42,14 +42,14 @@ static void report_atol (pw_run *r, const pw_system *s, double atol) {
   if (state >= 0 && atol > least)
     pw_cli_say ("pinwheel: --atol %s is above %s %s, within which the force of %s reverses: methods with Newton's "
                 "iteration reduce it for the states it depends on, others may be wrong\n",
-                pw_format (a, atol, 3), pw_format (speed, least, 3), pw_state_unit (s, state), element);
+                pw_format (a, atol, 3), pw_format (speed, least, 3), pw_system_state_unit (s, state), element);
 }
 
 void pw_report_settings (pw_run *r, const pw_system *s, const char *method, const pw_cli_line *l,
                          const pw_settings *settings) {
   const pw_method *integrator;
   int stabilisation;
-  if (pw_parse_method (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
+  if (pw_method_parse (method, &integrator, &stabilisation, &(pw_error){ 0 }) != PW_OK) return;
   int adaptive = pw_cli_adaptive (integrator, method);
   report_unused (method, adaptive, l);
   if (adaptive)
@@ -99,8 +99,8 @@ void pw_report_model (const pw_model *m) {
 /* ---- Initialisation ---- */
 
 /* States that the consistent initialisation has changed. */
-static void report_start (const pw_system *s, const pw_start_report *start) {
-  int n = pw_count_coordinates (s), moved = start->moved, listed = 0;
+static void report_start (const pw_system *s, const pw_initial_report *start) {
+  int n = pw_system_coordinates (s), moved = start->moved, listed = 0;
   char changed[80] = "";
   if (moved == 0) return;
   if (start->changed) snprintf (changed, sizeof changed, ", %d of them specified by the model", start->changed);
@@ -110,22 +110,22 @@ static void report_start (const pw_system *s, const pw_start_report *start) {
   for (int i = 0; i < 2 * n && listed < REPORT_MOVED; i++) {
     double from = i < n ? start->q_given[i] : start->v_given[i - n], to = i < n ? start->q[i] : start->v[i - n];
     char name[REPORT_NAME], a[32], b[32];
-    if (!pw_start_moved (s, start, i)) continue;
-    pw_cli_say ("  %s from %s to %s %s%s\n", pw_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
-                pw_format (b, to, 10), pw_state_unit (s, i),
-                start->changed && pw_start_specified (s, i) ? " (specified)" : "");
+    if (!pw_initial_moved (s, start, i)) continue;
+    pw_cli_say ("  %s from %s to %s %s%s\n", pw_system_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
+                pw_format (b, to, 10), pw_system_state_unit (s, i),
+                start->changed && pw_initial_specified (s, i) ? " (specified)" : "");
     listed++;
   }
   report_more (stderr, moved - listed, "");
 }
 
 void pw_report_initialisation (const pw_run *r, const pw_system *s, const char *const *redundant) {
-  int n = pw_count_differences (s), count = 0;
+  int n = pw_system_differences (s), count = 0;
   char name[REPORT_NAME];
   for (int i = 0; i < n && i < REPORT_MOVED; i++)
-    pw_cli_say ("pinwheel: derivatives by differences: %s\n", pw_difference_name (s, i, name, sizeof name));
+    pw_cli_say ("pinwheel: derivatives by differences: %s\n", pw_system_difference_name (s, i, name, sizeof name));
   report_more (stderr, n - REPORT_MOVED, "");
-  report_start (s, pw_run_start (r));
+  report_start (s, pw_run_initial (r));
   for (; redundant && redundant[count]; count++)
     if (count < REPORT_MOVED) pw_cli_say ("pinwheel: redundant: %s\n", redundant[count]);
   report_more (stderr, count - REPORT_MOVED, "");
@@ -169,10 +169,10 @@ static void report_element (char *name) {
 
 static void report_bodies (const pw_system *s, const pw_sample *last) {
   static const char *const heads[] = { "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
-  int bodies = pw_count_bodies (s), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES, width = 5;
+  int bodies = pw_system_bodies (s), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES, width = 5;
   char name[REPORT_NAME];
   for (int b = 0; b < shown; b++) {
-    report_element (pw_state_name (s, 3 * b, name, sizeof name));
+    report_element (pw_system_state_name (s, 3 * b, name, sizeof name));
     if (report_length (name) > width) width = report_length (name);
   }
   printf ("  ");
@@ -180,7 +180,7 @@ static void report_bodies (const pw_system *s, const pw_sample *last) {
   for (int k = 0; k < 6; k++) printf ("%15s", heads[k]);
   printf ("\n");
   for (int b = 0; b < shown; b++) {
-    report_element (pw_state_name (s, 3 * b, name, sizeof name));
+    report_element (pw_system_state_name (s, 3 * b, name, sizeof name));
     printf ("  ");
     report_left (name, width);
     for (int k = 0; k < 6; k++) report_number (k < 3 ? last->q[3 * b + k] : last->v[3 * b + k - 3], 8, 15);
@@ -191,43 +191,43 @@ static void report_bodies (const pw_system *s, const pw_sample *last) {
 
 /* Internal coordinates of elements. */
 static void report_internal (const pw_system *s, const pw_sample *last) {
-  int first = 3 * pw_count_bodies (s), n = pw_count_coordinates (s),
+  int first = 3 * pw_system_bodies (s), n = pw_system_coordinates (s),
       end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
   char name[REPORT_NAME];
   int width = 0, unit = 0; /* widest name of a velocity, widest unit of a coordinate */
   for (int j = first; j < end; j++) {
-    int long_name = report_length (pw_state_name (s, n + j, name, sizeof name)),
-        long_unit = report_length (pw_state_unit (s, j));
+    int long_name = report_length (pw_system_state_name (s, n + j, name, sizeof name)),
+        long_unit = report_length (pw_system_state_unit (s, j));
     width = long_name > width ? long_name : width;
     unit = long_unit > unit ? long_unit : unit;
   }
   for (int j = first; j < end; j++) {
     printf ("  ");
-    report_left (pw_state_name (s, j, name, sizeof name), width);
+    report_left (pw_system_state_name (s, j, name, sizeof name), width);
     report_number (last->q[j], 8, 15);
     printf (" ");
-    report_left (pw_state_unit (s, j), unit);
+    report_left (pw_system_state_unit (s, j), unit);
     printf ("   ");
-    report_left (pw_state_name (s, n + j, name, sizeof name), width);
+    report_left (pw_system_state_name (s, n + j, name, sizeof name), width);
     report_number (last->v[j], 8, 15);
-    printf (" %s\n", pw_state_unit (s, n + j));
+    printf (" %s\n", pw_system_state_unit (s, n + j));
   }
   report_more (stdout, n - end, "");
 }
 
 static void report_reactions (const pw_system *s, const pw_sample *last) {
-  int rows = pw_count_rows (s), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS, width = 8;
+  int rows = pw_system_rows (s), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS, width = 8;
   char name[REPORT_NAME];
   for (int i = 0; i < shown; i++) {
-    int n = report_length (pw_reaction_name (s, i, name, sizeof name));
+    int n = report_length (pw_system_reaction_name (s, i, name, sizeof name));
     if (n > width) width = n;
   }
   if (rows > 0) printf ("\n  reaction\n");
   for (int i = 0; i < shown; i++) {
     printf ("  ");
-    report_left (pw_reaction_name (s, i, name, sizeof name), width);
+    report_left (pw_system_reaction_name (s, i, name, sizeof name), width);
     report_number (0 - last->lambda[i], 8, 15);
-    printf (" %s\n", pw_reaction_unit (s, i));
+    printf (" %s\n", pw_system_reaction_unit (s, i));
   }
   report_more (stdout, rows - shown, ": -o FILE.csv writes them all");
 }
@@ -246,7 +246,7 @@ static void report_energy (const pw_sample *last) {
   }
 }
 
-static void report_errors (const pw_truth_error *e) {
+static void report_errors (const pw_reference_error *e) {
   static const char *const name[] = { "length", "angle", "speed", "rate" }, *const unit[] = { "m", "rad", "m/s",
                                                                                               "rad/s" };
   char t[32], at[40];
@@ -273,12 +273,12 @@ void pw_report_warnings (const pw_run *r, const pw_system *s, double unbalanced)
   char name[REPORT_NAME], times[32], grows[32], percent[32];
   if (unbalanced > 0.01)
     pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
-                pw_format (percent, 100 * unbalanced, 2), pw_energy_advice (r, unbalanced));
+                pw_format (percent, 100 * unbalanced, 2), pw_run_energy_advice (r, unbalanced));
   if (growth != 0)
     pw_cli_say (
         "pinwheel: the motion grows without bound: %s has become %s times the scene's own speed and grows as t^%s; "
         "nothing opposes what drives it\n",
-        pw_state_name (s, state, name, sizeof name), pw_format (times, growth, 2), pw_format (grows, power, 2));
+        pw_system_state_name (s, state, name, sizeof name), pw_format (times, growth, 2), pw_format (grows, power, 2));
 }
 
 void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_sample *last, int energy,

@@ -61,7 +61,7 @@ static int run_own_method (const run *x, pw_error *error) {
   const pw_method *method;
   int stabilisation;
   pw_error why = { 0 };
-  int status = pw_parse_method (x->method, &method, &stabilisation, &why);
+  int status = pw_method_parse (x->method, &method, &stabilisation, &why);
   if (status == PW_OK) return PW_OK;
   return pw_fail (error, status, "model %s: the method it asks for: %s", pw_file_name (x->m.file), why.text);
 }
@@ -89,7 +89,7 @@ static int run_open (run *x, pw_error *error) {
   status = pw_comparison_open (&x->comparison, &x->m, x->reference_path, x->line.starts != NULL, x->t_end, error);
   if (status != PW_OK) return status;
   pw_limit_start (&x->limit);
-  x->r = pw_open (x->m.system, x->method, &x->settings, error);
+  x->r = pw_run_open (x->m.system, x->method, &x->settings, error);
   if (x->r == NULL) return error->status;
   x->redundant = pw_report_redundancies (x->r);
   pw_report_model (x->m.model);
@@ -112,11 +112,11 @@ static double run_next_row (const run *x) {
 
 /* Writes the rows and keeps the samples that the last step has reached. */
 static int run_take_samples (run *x, pw_error *error) {
-  double now = pw_time (x->r);
+  double now = pw_run_time (x->r);
   pw_sample sample;
   int status = PW_OK;
   while (status == PW_OK && run_next_row (x) <= now) {
-    status = pw_at (x->r, x->every > 0 ? run_next_row (x) : now, &sample, error);
+    status = pw_run_sample (x->r, x->every > 0 ? run_next_row (x) : now, &sample, error);
     if (status == PW_OK) status = pw_csv_write (x->csv, x->m.system, &sample, error);
     if (status != PW_OK) break;
     x->row++;
@@ -124,11 +124,11 @@ static int run_take_samples (run *x, pw_error *error) {
     if (x->every == 0) break;
   }
   while (status == PW_OK && x->plots && pw_plots_next (x->plots) <= now) {
-    status = pw_at (x->r, pw_plots_next (x->plots), &sample, error);
+    status = pw_run_sample (x->r, pw_plots_next (x->plots), &sample, error);
     if (status == PW_OK) pw_plots_add (x->plots, &sample);
   }
   while (status == PW_OK && pw_comparison_next (&x->comparison) <= now) {
-    status = pw_at (x->r, pw_comparison_next (&x->comparison), &sample, error);
+    status = pw_run_sample (x->r, pw_comparison_next (&x->comparison), &sample, error);
     if (status == PW_OK) pw_comparison_take (&x->comparison, x->m.system, &sample);
   }
   return status;
@@ -143,8 +143,8 @@ static int run_batch (run *x, pw_error *error) {
   int status;
   long n = 0;
   do {
-    status = pw_advance (x->r, x->t_end, error);
-  } while (status == PW_OK && ++n < x->batch && pw_time (x->r) < due && !pw_stop);
+    status = pw_run_advance (x->r, x->t_end, error);
+  } while (status == PW_OK && ++n < x->batch && pw_run_time (x->r) < due && !pw_stop);
   double used = pw_cpu_clock () - start;
   x->cpu += used;
   if (used < RUN_SHORT && n == x->batch && x->batch < RUN_BATCH) x->batch *= 2;
@@ -154,11 +154,11 @@ static int run_batch (run *x, pw_error *error) {
 
 static int run_steps (run *x, pw_error *error) {
   int status = x->check.resume ? PW_OK : run_take_samples (x, error); /* a checkpoint has its samples */
-  while (status == PW_OK && pw_time (x->r) < x->t_end && !pw_stop) {
+  while (status == PW_OK && pw_run_time (x->r) < x->t_end && !pw_stop) {
     status = run_batch (x, error);
     if (status == PW_OK) status = run_take_samples (x, error);
-    if (status == PW_OK && pw_time (x->r) >= x->check.due) status = pw_checkpoints_save (x, error);
-    pw_progress_at (&x->progress, pw_time (x->r));
+    if (status == PW_OK && pw_run_time (x->r) >= x->check.due) status = pw_checkpoints_save (x, error);
+    pw_progress_at (&x->progress, pw_run_time (x->r));
   }
   return status;
 }
@@ -168,11 +168,11 @@ static int run_integrate (run *x, pw_error *error) {
   x->batch = 1;
   pw_stop_catch ();
   pw_progress_start (&x->progress, pw_file_name (x->m.file), x->t_end, !table_on_screen);
-  x->progress.from = pw_time (x->r);
+  x->progress.from = pw_run_time (x->r);
   int status = run_steps (x, error);
   pw_progress_end (&x->progress);
   pw_stop_release ();
-  if (status == PW_STOPPED) status = pw_limit_fail (&x->limit, pw_time (x->r), error);
+  if (status == PW_STOPPED) status = pw_limit_fail (&x->limit, pw_run_time (x->r), error);
   const pw_statistics *s = pw_run_statistics (x->r);
   x->limited = status == PW_METHOD && (pw_limit_over (&x->limit) || s->steps + s->rejected >= x->settings.max_steps);
   return status;
@@ -185,7 +185,7 @@ static void run_close_table (run *x, int good, pw_error *error) {
   pw_csv_close (x->csv);
   int is_file = x->csv_output ? pw_output_is_file (x->csv_output) : x->csv_path != NULL;
   if (x->csv_output && good && pw_output_ready (x->csv_output, error) == PW_OK) return;
-  x->lost = is_file && error->status == PW_MACHINE;
+  x->lost = is_file && error->status == PW_RESOURCE;
   if (x->csv_output == NULL) return;
   pw_text_abandon (x->csv_output, x->check.resume ? 1 : x->row, x->part, sizeof x->part);
   x->csv_output = NULL;
@@ -249,7 +249,7 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
                          .redundant = x->redundant };
   if (error->status == PW_OK && pw_stop) {
     char t[32];
-    snprintf (reason, size, "interrupted at t = %s s", pw_format (t, pw_time (x->r), 6));
+    snprintf (reason, size, "interrupted at t = %s s", pw_format (t, pw_run_time (x->r), 6));
     summary.status = "interrupted";
     summary.reason = reason;
   }
@@ -280,11 +280,11 @@ static int run_finish (run *x, pw_error *error) {
   char reason[80] = "", t[32];
   int interrupted = error->status == PW_OK && pw_stop;
   pw_sample sample, *last = NULL;
-  if (x->r && pw_at (x->r, pw_time (x->r), &sample, NULL) == PW_OK) last = &sample;
+  if (x->r && pw_run_sample (x->r, pw_run_time (x->r), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
   if (x->r) summary.truth = pw_comparison_errors (&x->comparison, x->m.system);
-  if (last) summary.unbalanced = pw_unbalanced (x->r, last);
+  if (last) summary.unbalanced = pw_run_energy_defect (x->r, last);
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
   if (error->status == PW_OK) pw_report_warnings (x->r, x->m.system, summary.unbalanced);
@@ -298,7 +298,7 @@ static int run_finish (run *x, pw_error *error) {
   error->status = PW_OK;
   if (*x->part) pw_cli_say ("pinwheel: the table until then is kept in %s\n", x->part);
   if (*x->json_part) pw_cli_say ("pinwheel: the summary is kept in %s\n", x->json_part);
-  if (x->check.saved > 0 && (interrupted || x->limited || status == -PW_MACHINE))
+  if (x->check.saved > 0 && (interrupted || x->limited || status == -PW_RESOURCE))
     pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", x->check.path, pw_format (t, x->check.saved, 6));
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
 }
@@ -307,7 +307,7 @@ static void run_close (run *x) {
   pw_checkpoints_close (&x->check);
   pw_plots_close (x->plots);
   pw_comparison_close (&x->comparison);
-  if (x->r) pw_close (x->r);
+  if (x->r) pw_run_close (x->r);
   free (x->redundant);
   pw_cli_close_model (&x->m);
 }

@@ -150,7 +150,7 @@ static int plot_write_script (const pw_study_figure *g, const pw_figures *figure
                               pw_error *error) {
   const pw_reference *reference = &((const pw_compare *)g->study)->reference;
   pw_output *o = pw_figure_begin (figures, name, error);
-  if (o == NULL) return PW_MACHINE;
+  if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
   pw_figure_text (f, "title", unit ? "work-precision diagram of angles" : "work-precision diagram");
   pw_figure_text (f, "label_of_error", unit ? "largest error of an angle [rad]" : "largest error of a coordinate [m]");

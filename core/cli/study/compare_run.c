@@ -6,8 +6,8 @@
 static int compare_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
   pw_sample sample;
   const pw_motion *m = v->motion;
-  for (; v->sample < m->samples && m->t[v->sample] <= pw_time (run); v->sample++) {
-    int status = pw_at (run, m->t[v->sample], &sample, error);
+  for (; v->sample < m->samples && m->t[v->sample] <= pw_run_time (run); v->sample++) {
+    int status = pw_run_sample (run, m->t[v->sample], &sample, error);
     if (status != PW_OK) return status;
     pw_motion_take (v->motion, v->study->m.system, v->sample, &sample);
     v->row->balance = fmax (v->row->balance, fabs (sample.balance));

@@ -61,7 +61,7 @@ static const char *drift_integrator (const pw_drift *x, const char *option) {
   for (int i = 0; i < x->study.methods.count; i++) {
     const pw_method *method;
     int stabilisation;
-    if (pw_parse_method (x->study.methods.method[i].name, &method, &stabilisation, NULL) == PW_OK &&
+    if (pw_method_parse (x->study.methods.method[i].name, &method, &stabilisation, NULL) == PW_OK &&
         drift_has_option (method, option))
       return method->name;
   }
@@ -105,7 +105,7 @@ static int drift_plan_rows (pw_drift *x, pw_error *error) {
     *r = (pw_row){ .group = DRIFT_METHODS, .line = i, .along = NAN, .beta = NAN };
     strcpy (r->method, s->methods.method[i].name);
     r->part = calloc (DRIFT_PARTS, sizeof *r->part);
-    if (r->part == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+    if (r->part == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   }
   if (x->only_methods) return PW_OK;
   drift_plan_baumgarte (x);
@@ -141,7 +141,7 @@ static int drift_part (const pw_study *x, double t) {
 static int drift_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
   pw_row *r = v->row;
   pw_sample sample;
-  int status = pw_at (run, pw_time (run), &sample, error), k = drift_part (v->study, pw_time (run));
+  int status = pw_run_sample (run, pw_run_time (run), &sample, error), k = drift_part (v->study, pw_run_time (run));
   if (status != PW_OK) return status;
   const double value[DRIFT_QUANTITIES] = { sample.position, sample.velocity, fabs (sample.balance) };
   for (int i = 0; i < DRIFT_QUANTITIES; i++) {

@@ -134,7 +134,7 @@ static const char *plot_label (const pw_study *x, int group, int line, char text
 /* With panels of the quantities that are not zero throughout, as the residual of position is without pins. */
 static int plot_write_script (const pw_study_figure *g, const pw_figures *figures, pw_error *error) {
   pw_output *o = pw_figure_begin (figures, g->name, error);
-  if (o == NULL) return PW_MACHINE;
+  if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
   pw_figure_text (f, "title", plot_figure[g->group].title);
   pw_figure_text (f, "label_of_x", plot_figure[g->group].axis);

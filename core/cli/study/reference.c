@@ -22,7 +22,7 @@ typedef struct {
 
 /* Agreement to the bit, where columns are compared, is no better than round-off. */
 static void reference_floor (const pw_system *s, pw_reference *t) {
-  int n = pw_count_coordinates (s), loads = 0;
+  int n = pw_system_coordinates (s), loads = 0;
   for (int k = 0; k < t->motion.samples; k++)
     for (int j = 0; j < t->motion.width; j++) {
       double value = fabs (t->motion.x[k * t->motion.width + j]);
@@ -50,7 +50,8 @@ static int reference_run (pw_compare *x, candidate *c, pw_error *error) {
   while (status != PW_OK && c->row.level <= loosest) {
     own = (pw_error){ 0 };
     status = pw_compare_run (x, &c->row, &c->motion, &own);
-    if (status == PW_OK || pw_stop || c->row.state == ROW_STOPPED || status == PW_MACHINE || status == PW_START) break;
+    if (status == PW_OK || pw_stop || c->row.state == ROW_STOPPED || status == PW_RESOURCE || status == PW_INITIAL)
+      break;
     c->row.level *= 10;
   }
   s->cpu_end = limit;
@@ -145,11 +146,11 @@ int pw_reference_find (pw_compare *x, pw_error *error) {
   pw_study *s = &x->study;
   pw_reference *t = &x->reference;
   double t_end = s->line.t_end ? s->t_end : 0; /* 0: that of the table */
-  int status, exact = s->reference_path == NULL && pw_has_truth (s->m.model) && s->line.starts == NULL;
+  int status, exact = s->reference_path == NULL && pw_system_has_reference (s->m.model) && s->line.starts == NULL;
   if (s->reference_path == NULL && !exact) return reference_compute (x, error);
   snprintf (t->about, sizeof t->about, "%s", exact ? "the exact solution of the model" : s->reference_path);
   if (exact)
-    status = pw_motion_truth (&t->motion, s->m.model, s->m.system, s->t_end, error);
+    status = pw_motion_reference (&t->motion, s->m.model, s->m.system, s->t_end, error);
   else
     status = pw_motion_read (&t->motion, s->m.system, s->reference_path, &t_end, 1, error);
   if (status != PW_OK) return status;

@@ -15,20 +15,20 @@
 static int study_steps (pw_study *x, pw_row *r, pw_run *run, pw_study_visitor *v, pw_error *error) {
   int status = PW_OK;
   long batch = 8;
-  while (status == PW_OK && pw_time (run) < x->t_end) {
+  while (status == PW_OK && pw_run_time (run) < x->t_end) {
     double start = pw_cpu_clock ();
     long n = 0;
     do {
-      status = pw_advance (run, x->t_end, error);
-      if (status == PW_OK && v && pw_time (run) >= v->due) status = v->visit (v, run, error);
-    } while (status == PW_OK && ++n < batch && pw_time (run) < x->t_end);
+      status = pw_run_advance (run, x->t_end, error);
+      if (status == PW_OK && v && pw_run_time (run) >= v->due) status = v->visit (v, run, error);
+    } while (status == PW_OK && ++n < batch && pw_run_time (run) < x->t_end);
     double used = pw_cpu_clock () - start;
     r->cpu += used;
     if (used < STUDY_SHORT && n == batch && batch < 65536) batch *= 2;
     if (used > STUDY_LONG && batch > 1) batch /= 2;
-    pw_progress_at (&x->progress, x->done + x->share * fmin (pw_time (run) / x->t_end, 1));
-    if (status == PW_STOPPED) return pw_limit_fail (&x->limit, pw_time (run), error);
-    if (status == PW_OK && r->cpu > x->cpu_end && pw_time (run) < x->t_end) {
+    pw_progress_at (&x->progress, x->done + x->share * fmin (pw_run_time (run) / x->t_end, 1));
+    if (status == PW_STOPPED) return pw_limit_fail (&x->limit, pw_run_time (run), error);
+    if (status == PW_OK && r->cpu > x->cpu_end && pw_run_time (run) < x->t_end) {
       r->state = ROW_STOPPED;
       return PW_RETRY;
     }
@@ -39,18 +39,18 @@ static int study_steps (pw_study *x, pw_row *r, pw_run *run, pw_study_visitor *v
 int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error) {
   r->cpu = 0;
   pw_limit_start (&x->limit);
-  pw_run *run = pw_open (x->m.system, r->method, &x->settings, error);
+  pw_run *run = pw_run_open (x->m.system, r->method, &x->settings, error);
   if (run == NULL) return error->status;
   int status = study_steps (x, r, run, v, error);
-  r->t = pw_time (run);
+  r->t = pw_run_time (run);
   r->statistics = *pw_run_statistics (run);
-  pw_close (run);
+  pw_run_close (run);
   return status;
 }
 
 int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error *error) {
   if (status == PW_OK || r->state == ROW_STOPPED) return PW_OK;
-  if (status == PW_MACHINE || status == PW_START) return pw_fail (error, status, "%s", run_error->text);
+  if (status == PW_RESOURCE || status == PW_INITIAL) return pw_fail (error, status, "%s", run_error->text);
   if (pw_stop) return PW_RETRY;
   r->state = status == PW_INPUT ? ROW_REFUSED : ROW_FAILED;
   snprintf (r->reason, sizeof r->reason, "%s", run_error->status ? run_error->text : "the method gave up");
@@ -59,7 +59,7 @@ int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error
 
 int pw_study_allocate (pw_study *x, int rows, pw_error *error) {
   x->row = calloc ((size_t)rows + 1, sizeof *x->row);
-  return x->row ? PW_OK : pw_fail (error, PW_MACHINE, "out of memory");
+  return x->row ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* ---- The tables ---- */

@@ -161,7 +161,7 @@ int pw_study_write_data (const pw_study_figure *g, const pw_figures *figures, pw
 /* Writes the labels of these lines into a script; `spread` as pw_figure_methods. */
 void pw_study_write_lines (const pw_study_figure *g, int spread, FILE *f);
 
-/* Opens a further table of the folder; NULL and PW_MACHINE. */
+/* Opens a further table of the folder; NULL and PW_RESOURCE. */
 pw_output *pw_study_open (const pw_study *x, const char *name, pw_error *error);
 
 #endif

@@ -41,7 +41,7 @@ int pw_study_write_data (const pw_study_figure *g, const pw_figures *figures, pw
   char name[STUDY_NAME];
   snprintf (name, sizeof name, "%s.dat", g->name);
   pw_output *o = pw_figure_data (figures, name, error);
-  if (o == NULL) return PW_MACHINE;
+  if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
   fprintf (f, "# %s\n", g->heading);
   for (int line = 0, block = 0; line < figures_lines (g); line++) {

@@ -6,7 +6,7 @@
 
 static int methods_add (pw_study_methods *list, const char *name, pw_error *error) {
   const pw_method *integrator;
-  int stabilisation, status = pw_parse_method (name, &integrator, &stabilisation, error);
+  int stabilisation, status = pw_method_parse (name, &integrator, &stabilisation, error);
   for (int i = 0; i < list->count; i++)
     if (strcmp (list->method[i].name, name) == 0) return status;
   if (status != PW_OK) return status;
@@ -37,7 +37,7 @@ static int methods_add_item (pw_study_methods *list, char *item, pw_error *error
   char *plus = item + strcspn (item, "+:");
   if (strcmp (plus, "+all") != 0) return methods_add (list, item, error);
   *plus = 0;
-  int status = pw_parse_method (item, &method, &stabilisation, error);
+  int status = pw_method_parse (item, &method, &stabilisation, error);
   return status == PW_OK ? methods_add_all (list, method->name, error) : status;
 }
 
@@ -49,7 +49,7 @@ int pw_study_methods_read (pw_study_methods *list, const char *text, pw_error *e
     for (const pw_stabilisation *s = pw_methods[i]->stabilisations; s->name; s++) most++;
   for (const char *c = text; *c; c++) most += *c == ',';
   *list = (pw_study_methods){ .method = calloc ((size_t)most, sizeof *list->method) };
-  if (list->method == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (list->method == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (size_t n; status == PW_OK; text += n + 1) {
     n = strcspn (text, ",");
     if (n == 0) return pw_fail (error, PW_INPUT, "--methods \"%.80s\": a name is missing", whole);

@@ -123,7 +123,7 @@ static int sweep_open (sweep *x, pw_error *error) {
 
 /* Keeps a row, or the first error, which stops the sweep. */
 static void sweep_keep (sweep *x, long k, int status, const pw_text *text, const pw_error *own) {
-  if (status == PW_MACHINE)
+  if (status == PW_RESOURCE)
     pw_fail (x->error, status, "%s", own->text);
   else if (pw_journal_add (&x->journal, &x->plan, k, -status, text->at, &x->scratch, x->error) == PW_OK)
     pw_progress_at (&x->progress, (double)x->journal.done);
@@ -168,7 +168,7 @@ static void sweep_all (sweep *x) {
   while (why == 0 && started < x->jobs && (why = pthread_create (thread + started, NULL, sweep_thread, x)) == 0)
     started++;
   if (why)
-    pw_fail (x->error, PW_MACHINE, "cannot start %d runs at a time, only %d: %s; try --jobs %d", x->jobs, started,
+    pw_fail (x->error, PW_RESOURCE, "cannot start %d runs at a time, only %d: %s; try --jobs %d", x->jobs, started,
              strerror (why), started);
   if (why) x->next = rows;
   pthread_mutex_unlock (&x->lock);

@@ -70,7 +70,7 @@ typedef struct {
 } pw_plan;
 
 /* Matches the ranges ("NAME=RANGE") to the model, whose file is open in p->file and stays the caller's, and finds the
- * columns by building scenes of the grid.  Errors: PW_INPUT, PW_MACHINE.  Close the plan in
+ * columns by building scenes of the grid.  Errors: PW_INPUT, PW_RESOURCE.  Close the plan in
  * every case. */
 int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error);
 void pw_plan_close (pw_plan *p);
@@ -78,7 +78,7 @@ void pw_plan_close (pw_plan *p);
 /* A row's model, built and compiled, m->file left NULL; close it in every case.  May be called by several threads at once. */
 int pw_plan_scene (const pw_plan *p, long row, pw_cli_model *m, pw_error *error);
 
-/* The i-th of a system's 2 pw_count_coordinates states in the order of a table: six of each body, then what elements
+/* The i-th of a system's 2 pw_system_coordinates states in the order of a table: six of each body, then what elements
  * own. */
 int pw_plan_state (const pw_system *s, int i);
 
@@ -95,7 +95,7 @@ static inline long pw_plan_row (const pw_plan *p, long k) {
 /* ---- One run (sweep_row.c) ---- */
 
 /* Does a run from start to end and appends its cells, without the line's end.  Returns the run's own status, a row all
- * the same; PW_RETRY if pw_stop became non-zero on the way; PW_MACHINE with the error if it could not be done.  May be
+ * the same; PW_RETRY if pw_stop became non-zero on the way; PW_RESOURCE with the error if it could not be done.  May be
  * called by several threads at once. */
 int pw_sweep_row (const pw_plan *p, long row, pw_text *text, pw_error *error);
 
@@ -113,9 +113,9 @@ typedef struct {
 } pw_journal;
 
 /* Opens the journal of the table at `path`, or begins one.  Lines after the first that is not whole and sound are cut off.
- * Errors: PW_MACHINE if it cannot be written, PW_INPUT if it belongs to another sweep or another process is at work. */
+ * Errors: PW_RESOURCE if it cannot be written, PW_INPUT if it belongs to another sweep or another process is at work. */
 int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error);
-/* Appends row k of the part; `text` is scratch.  One thread at a time.  PW_MACHINE: the journal keeps what it had. */
+/* Appends row k of the part; `text` is scratch.  One thread at a time.  PW_RESOURCE: the journal keeps what it had. */
 int pw_journal_add (pw_journal *j, const pw_plan *p, long k, int status, const char *cells, pw_text *text,
                     pw_error *error);
 /* Without a row so far, a journal that was created here is removed. */

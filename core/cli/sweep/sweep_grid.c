@@ -20,7 +20,7 @@ static int grid_list (pw_axis *a, pw_error *error) {
   a->count = 1;
   for (const char *c = a->range; *c; c++) a->count += *c == ',';
   a->value = calloc ((size_t)a->count, sizeof *a->value);
-  if (a->value == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (a->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   const char *c = a->range;
   for (long i = 0; i < a->count; i++) {
     size_t n = strcspn (c, ",");
@@ -111,10 +111,10 @@ int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error) {
   int n = 0, status = PW_OK;
   while (ranges && ranges[n]) n++;
   *g = (pw_grid){ .axis = calloc ((size_t)n + 1, sizeof *g->axis) };
-  if (g->axis == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (g->axis == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (; g->axes < n && status == PW_OK; g->axes++) {
     char *text = strdup (ranges[g->axes]);
-    if (text == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+    if (text == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
     g->axis[g->axes].name = text; /* freed with the grid in every case */
     status = grid_axis (g->axis + g->axes, text, error);
     for (int i = 0; i < g->axes && status == PW_OK; i++)

@@ -72,10 +72,10 @@ static int journal_map_open (journal_map *m, int file) {
   struct stat info;
   *m = (journal_map){ "", "" };
   m->end = m->at;
-  if (fstat (file, &info) != 0) return PW_MACHINE;
+  if (fstat (file, &info) != 0) return PW_RESOURCE;
   if (info.st_size == 0) return PW_OK;
   void *at = mmap (NULL, (size_t)info.st_size, PROT_READ, MAP_PRIVATE, file, 0);
-  if (at == MAP_FAILED) return PW_MACHINE;
+  if (at == MAP_FAILED) return PW_RESOURCE;
   m->at = at;
   m->end = m->at + info.st_size;
   return PW_OK;
@@ -96,7 +96,7 @@ static int journal_write (pw_journal *j, const char *text, size_t size, pw_error
     if (n <= 0) {
       const char *why = n < 0 ? strerror (errno) : "no bytes were taken";
       if (done > 0 && ftruncate (j->file, j->size) != 0) why = "no room"; /* the next start cuts it off */
-      return pw_fail (error, PW_MACHINE, "cannot write %s: %s; the same command will continue after its %ld rows",
+      return pw_fail (error, PW_RESOURCE, "cannot write %s: %s; the same command will continue after its %ld rows",
                       j->part, why, j->done);
     }
     done += (size_t)n;
@@ -139,13 +139,13 @@ static int journal_read (pw_journal *j, const pw_plan *p, const journal_map *map
 static int journal_begin (pw_journal *j, const pw_plan *p, pw_error *error) {
   journal_map map;
   if (journal_map_open (&map, j->file) != PW_OK)
-    return pw_fail (error, PW_MACHINE, "cannot read %s: %s", j->part, strerror (errno));
+    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", j->part, strerror (errno));
   int status = journal_read (j, p, &map, error);
   off_t there = (off_t)(map.end - map.at);
   journal_map_close (&map);
   if (status != PW_OK) return status;
   if (there > j->size && ftruncate (j->file, j->size) != 0)
-    return pw_fail (error, PW_MACHINE, "cannot write %s: %s", j->part, strerror (errno));
+    return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", j->part, strerror (errno));
   j->created = j->size == 0;
   return j->created ? journal_write (j, p->fingerprint.at, p->fingerprint.used, error) : PW_OK;
 }
@@ -158,7 +158,7 @@ int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error
   j->part = malloc (size);
   j->line = calloc ((size_t)j->rows + 1, sizeof *j->line);
   if (j->part == NULL || j->line == NULL)
-    return pw_fail (error, PW_MACHINE, "out of memory for a sweep of %ld rows", j->rows);
+    return pw_fail (error, PW_RESOURCE, "out of memory for a sweep of %ld rows", j->rows);
   snprintf (j->part, size, "%s.part", j->path);
   j->file = pw_lock_path (j->part, error);
   return j->file >= 0 ? journal_begin (j, p, error) : error->status;
@@ -169,7 +169,7 @@ int pw_journal_add (pw_journal *j, const pw_plan *p, long k, int status, const c
   off_t at = j->size;
   pw_text_clear (text);
   journal_line_add (text, pw_plan_row (p, k), status, cells);
-  if (text->failed) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (text->failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   if (journal_write (j, text->at, text->used, error) != PW_OK) return error->status;
   j->line[k] = at;
   j->done++;
@@ -224,7 +224,7 @@ static int table_write (const pw_journal *j, const pw_plan *p, const journal_map
     journal_line line;
     const char *at = map->at + j->line[k];
     if (!journal_line_read (at, map->end, &line))
-      return pw_fail (error, PW_MACHINE, "%s was changed by another program", j->part);
+      return pw_fail (error, PW_RESOURCE, "%s was changed by another program", j->part);
     fwrite (p->parts > 1 ? at : line.text, 1, p->parts > 1 ? line.bytes : line.size, stream);
     table_count (tally, &line);
   }
@@ -236,7 +236,7 @@ int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error 
   pw_error own = { 0 };
   *tally = (pw_tally){ .rows = 0 };
   if (journal_map_open (&map, j->file) != PW_OK)
-    return pw_fail (error, PW_MACHINE, "cannot read %s: %s", j->part, strerror (errno));
+    return pw_fail (error, PW_RESOURCE, "cannot read %s: %s", j->part, strerror (errno));
   pw_output *o = pw_output_open_as (j->path, ".sorted", &own);
   if (o) table_write (j, p, &map, pw_output_stream (o), tally, &own);
   if (o) table_close (o, &own);
@@ -246,7 +246,7 @@ int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error 
     pw_fail (error, status, "%.300s; all rows are in %.150s, so the same command has only to sort them", own.text,
              j->part);
   if (status == PW_OK && unlink (j->part) != 0)
-    return pw_fail (error, PW_MACHINE, "%s is complete, but %s cannot be removed: %s", j->path, j->part,
+    return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", j->path, j->part,
                     strerror (errno));
   return status;
 }
@@ -335,10 +335,10 @@ int pw_table_merge (const char *const *parts, int count, const char *path, pw_ta
   *tally = (pw_tally){ .rows = 0 };
   pw_output *o = NULL;
   table_part *x = calloc ((size_t)count, sizeof *x);
-  int status = x ? PW_OK : pw_fail (error, PW_MACHINE, "out of memory");
+  int status = x ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < count && status == PW_OK; i++) {
     const pw_use use[] = { { "-o", path, PW_WRITES, NULL }, { "the part", parts[i], PW_READS, NULL } };
-    status = pw_check_uses (use, 2, error);
+    status = pw_check_paths (use, 2, error);
     if (status == PW_OK) status = table_open_part (x + i, parts[i], error);
   }
   if (status == PW_OK) status = table_match (x, count, error);

@@ -10,19 +10,20 @@ enum { PLAN_TRIES = 1000 }; /* scenes that cannot be built before the grid is gi
 
 /* Sets what was asked for, then what is varied: parameters before the model is built, start values after. */
 static int plan_build (const pw_plan *p, long row, pw_model *m, pw_error *error) {
-  int status = pw_cli_apply (m, "--set", p->sets, pw_set, error);
+  int status = pw_cli_apply (m, "--set", p->sets, pw_model_set, error);
   for (int i = 0; i < p->grid.axes && status == PW_OK; i++)
-    if (p->grid.axis[i].parameter) status = pw_set (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
-  if (status == PW_OK) status = pw_cli_apply (m, "--start", p->starts, pw_set_start, error);
+    if (p->grid.axis[i].parameter)
+      status = pw_model_set (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
+  if (status == PW_OK) status = pw_cli_apply (m, "--start", p->starts, pw_model_set_initial, error);
   for (int i = 0; i < p->grid.axes && status == PW_OK; i++)
     if (p->grid.axis[i].parameter == NULL)
-      status = pw_set_start (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
-  return status == PW_OK ? pw_build (m, error) : status;
+      status = pw_model_set_initial (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
+  return status == PW_OK ? pw_model_build (m, error) : status;
 }
 
 int pw_plan_scene (const pw_plan *p, long row, pw_cli_model *m, pw_error *error) {
   *m = (pw_cli_model){ .model = pw_file_model (p->file, error) };
-  if (m->model && plan_build (p, row, m->model, error) == PW_OK) m->system = pw_compile (m->model, error);
+  if (m->model && plan_build (p, row, m->model, error) == PW_OK) m->system = pw_system_compile (m->model, error);
   return m->system ? PW_OK : error->status;
 }
 
@@ -45,15 +46,16 @@ static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error
   if (plan_named (a->parameter ? p->sets : p->starts, a->name))
     return pw_fail (error, PW_INPUT, "%s is given by --vary and by %s", a->name, option);
   if (a->parameter == NULL && strchr (a->name, '.')) return PW_OK;
-  if (a->parameter == NULL) return pw_set (m, a->name, pw_axis_value (a, 0), error);
+  if (a->parameter == NULL) return pw_model_set (m, a->name, pw_axis_value (a, 0), error);
   for (long i = 0; i < a->count; i++)
-    if (*pw_domain_check (q->domain, pw_axis_value (a, i))) return pw_set (m, a->name, pw_axis_value (a, i), error);
+    if (*pw_domain_check (q->domain, pw_axis_value (a, i)))
+      return pw_model_set (m, a->name, pw_axis_value (a, i), error);
   return PW_OK;
 }
 
 /* Finds the axes in a model that is not built, which has the parameters the command line sets. */
 static int plan_axes (pw_plan *p, pw_model *m, pw_error *error) {
-  int status = pw_cli_apply (m, "--set", p->sets, pw_set, error);
+  int status = pw_cli_apply (m, "--set", p->sets, pw_model_set, error);
   for (int i = 0; i < p->grid.axes && status == PW_OK; i++) status = plan_axis (p, p->grid.axis + i, m, error);
   return status;
 }
@@ -61,7 +63,7 @@ static int plan_axes (pw_plan *p, pw_model *m, pw_error *error) {
 /* ---- Columns ---- */
 
 int pw_plan_state (const pw_system *s, int i) {
-  int n = pw_count_coordinates (s), bodies = pw_count_bodies (s), k = i - 6 * bodies;
+  int n = pw_system_coordinates (s), bodies = pw_system_bodies (s), k = i - 6 * bodies;
   if (k >= 0) return 3 * bodies + k / 2 + k % 2 * n;
   return i % 6 < 3 ? i / 6 * 3 + i % 6 : n + i / 6 * 3 + i % 6 - 3;
 }
@@ -71,11 +73,11 @@ static int plan_grow (pw_plan *p) {
   if (p->columns < p->room) return PW_OK;
   int room = p->room ? 2 * p->room : 64;
   struct pw_column *more = realloc (p->column, (size_t)room * sizeof *more);
-  if (more == NULL) return PW_MACHINE;
+  if (more == NULL) return PW_RESOURCE;
   p->column = more;
   p->room = room;
   pw_names_close (&p->index);
-  if (pw_names_open (&p->index, (size_t)room) != PW_OK) return PW_MACHINE;
+  if (pw_names_open (&p->index, (size_t)room) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < p->columns; i++) pw_names_add (&p->index, p->column[i].name, i);
   return PW_OK;
 }
@@ -83,18 +85,18 @@ static int plan_grow (pw_plan *p) {
 /* Adds the states of a scene that are not there yet, and the units of start values. */
 static int plan_columns_of (pw_plan *p, const pw_system *s, pw_error *error) {
   char name[300];
-  for (int i = 0; i < 2 * pw_count_coordinates (s); i++) {
+  for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
     int state = pw_plan_state (s, i);
-    pw_state_name (s, state, name, sizeof name);
+    pw_system_state_name (s, state, name, sizeof name);
     if (p->room && pw_names_find (&p->index, name) >= 0) continue;
     const char *copy = pw_arena_text (&p->arena, name);
-    if (copy == NULL || plan_grow (p) != PW_OK) return pw_fail (error, PW_MACHINE, "out of memory");
-    p->column[p->columns] = (struct pw_column){ copy, pw_state_unit (s, state) };
+    if (copy == NULL || plan_grow (p) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
+    p->column[p->columns] = (struct pw_column){ copy, pw_system_state_unit (s, state) };
     pw_names_add (&p->index, copy, p->columns++);
   }
   for (pw_axis *a = p->grid.axis; a < p->grid.axis + p->grid.axes; a++) {
-    int state = a->parameter == NULL ? pw_find_state (s, a->name, NULL) : -1;
-    if (state >= 0) a->unit = pw_state_unit (s, state);
+    int state = a->parameter == NULL ? pw_system_find_state (s, a->name, NULL) : -1;
+    if (state >= 0) a->unit = pw_system_state_unit (s, state);
   }
   return PW_OK;
 }
@@ -114,7 +116,7 @@ static int plan_scan_row (pw_plan *p, long row, plan_scan *x, pw_error *error) {
   pw_cli_close_model (&m);
   if (status == PW_OK)
     x->built = 1;
-  else if (status == PW_MACHINE)
+  else if (status == PW_RESOURCE)
     return pw_fail (error, status, "%s", own.text);
   else if (x->refused++ == 0)
     x->first = own;
@@ -164,7 +166,7 @@ static void plan_parameters (pw_plan *p, const pw_model *m) {
 }
 
 static void plan_grid (pw_plan *p) {
-  pw_print_starts (&p->fingerprint, p->starts);
+  pw_print_initial (&p->fingerprint, p->starts);
   pw_text order = { .at = NULL };
   for (int i = 0; i < p->grid.axes; i++) {
     pw_print_line (&p->fingerprint, "vary", p->grid.axis[i].name, p->grid.axis[i].range);
@@ -195,7 +197,7 @@ static int plan_fingerprint (pw_plan *p, const pw_model *m, pw_error *error) {
   snprintf (part, sizeof part, "%d/%d", p->part, p->parts);
   pw_print_line (&p->fingerprint, "part", NULL, part);
   pw_text_add (&p->fingerprint, "end\n");
-  if (p->fingerprint.failed || p->head.failed) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (p->fingerprint.failed || p->head.failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   return PW_OK;
 }
 
@@ -203,7 +205,7 @@ static int plan_fingerprint (pw_plan *p, const pw_model *m, pw_error *error) {
 
 int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error) {
   const pw_method *method;
-  int stabilisation, status = pw_parse_method (p->method, &method, &stabilisation, error);
+  int stabilisation, status = pw_method_parse (p->method, &method, &stabilisation, error);
   if (status == PW_OK) status = pw_grid_read (&p->grid, (const char *const *)ranges, error);
   if (status != PW_OK) return status;
   pw_model *m = pw_file_model (p->file, error);

@@ -14,10 +14,10 @@ typedef struct {
 /* States go to the columns of their names. */
 static int row_states (const pw_plan *p, const pw_system *s, const pw_sample *sample, double *state, pw_error *error) {
   char name[300];
-  int n = pw_count_coordinates (s);
+  int n = pw_system_coordinates (s);
   for (int i = 0; i < 2 * n; i++) {
     int from = pw_plan_state (s, i);
-    int column = pw_names_find (&p->index, pw_state_name (s, from, name, sizeof name));
+    int column = pw_names_find (&p->index, pw_system_state_name (s, from, name, sizeof name));
     if (column < 0)
       return pw_fail (error, PW_INPUT,
                       "%s has no column: the number of bodies may only depend on parameters that are counts", name);
@@ -29,12 +29,12 @@ static int row_states (const pw_plan *p, const pw_system *s, const pw_sample *sa
 static int row_read (const pw_plan *p, const pw_system *s, pw_run *r, row_result *x, pw_error *error) {
   pw_sample sample;
   const pw_statistics *statistics = pw_run_statistics (r);
-  x->t = pw_time (r);
+  x->t = pw_run_time (r);
   x->position = statistics->position;
   x->velocity = statistics->velocity;
   x->steps = (double)statistics->steps;
   x->rhs = (double)statistics->rhs;
-  int status = pw_at (r, x->t, &sample, error);
+  int status = pw_run_sample (r, x->t, &sample, error);
   if (status != PW_OK) return status;
   x->kinetic = sample.kinetic;
   return row_states (p, s, &sample, x->state, error);
@@ -51,14 +51,14 @@ static int row_run (const pw_plan *p, long row, row_result *x, pw_error *error) 
   double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
   pw_run *r = NULL;
   int status = pw_plan_scene (p, row, &m, error);
-  if (status == PW_OK && (r = pw_open (m.system, p->method, &settings, error)) == NULL) status = error->status;
-  while (status == PW_OK && pw_time (r) < p->t_end) status = pw_advance (r, p->t_end, error);
-  if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_time (r), error);
+  if (status == PW_OK && (r = pw_run_open (m.system, p->method, &settings, error)) == NULL) status = error->status;
+  while (status == PW_OK && pw_run_time (r) < p->t_end) status = pw_run_advance (r, p->t_end, error);
+  if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_run_time (r), error);
   if (r) {
     pw_error *own = &(pw_error){ 0 };
     int read = row_read (p, m.system, r, x, status == PW_OK ? error : own);
     if (status == PW_OK) status = read;
-    pw_close (r);
+    pw_run_close (r);
   }
   pw_cli_close_model (&m);
   x->cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
@@ -84,12 +84,12 @@ int pw_sweep_row (const pw_plan *p, long row, pw_text *text, pw_error *error) {
   pw_error own = { 0 };
   row_result x = { NAN, NAN, NAN, NAN, NAN, NAN, NAN, NULL };
   x.state = malloc (((size_t)p->columns + 1) * sizeof *x.state);
-  if (x.state == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (x.state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < p->columns; i++) x.state[i] = NAN;
   int status = row_run (p, row, &x, &own);
-  if (status == PW_MACHINE) pw_fail (error, status, "row %ld of the grid: %s", row + 1, own.text);
-  if (status != PW_RETRY && status != PW_MACHINE) row_write (p, row, status, &x, own.text, text);
+  if (status == PW_RESOURCE) pw_fail (error, status, "row %ld of the grid: %s", row + 1, own.text);
+  if (status != PW_RETRY && status != PW_RESOURCE) row_write (p, row, status, &x, own.text, text);
   free (x.state);
-  if (text->failed) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (text->failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   return status;
 }

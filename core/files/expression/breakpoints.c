@@ -140,7 +140,7 @@ static range range_mod (const range *x, const range *y) {
 static range range_compare (int op, const range *x, const range *y) {
   static const range no = { 0, 0, 0, 0 }, yes = { 1, 1, 0, 0 }, either = { 0, 1, 1, 0 };
   int order = x->hi < y->lo ? -1 : x->lo > y->hi ? 1 : x->lo == x->hi && y->lo == y->hi && x->lo == y->lo ? 0 : 2;
-  return order == 2 ? either : pw_expression_truth (op, order) ? yes : no;
+  return order == 2 ? either : pw_expression_compare (op, order) ? yes : no;
 }
 
 /* An operand that decides alone hides the breaks of the other one. */

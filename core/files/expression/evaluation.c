@@ -64,7 +64,7 @@ static inline double value_of (const pw_expression_code *c, double a, double x, 
     return pw_expression_functions[c->which].two (a, x);
   }
   if (pw_expression_operands (c->op) == 1) return value_jump (c->op, x, tie);
-  return pw_expression_truth (c->op, value_order (a, x, tie));
+  return pw_expression_compare (c->op, value_order (a, x, tie));
 }
 
 double pw_expression_apply (const pw_expression_code *c, double a, double x) {
@@ -219,7 +219,7 @@ static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, dou
     int first = order == 2 ? !isnan (x->v) : c->op == PW_OP_MIN ? order < 0 : order > 0;
     return first ? *x : *y;
   }
-  *discrete = pw_expression_truth (c->op, order);
+  *discrete = pw_expression_compare (c->op, order);
   return (jet){ .v = *discrete };
 }
 

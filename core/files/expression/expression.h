@@ -51,7 +51,7 @@ typedef struct {
 size_t pw_expression_size (const pw_expression *x);
 
 /* Reads an expression over a scope and variables, names ended by NULL, into an arena.  PW_INPUT with the trouble if it is
- * not one; PW_MACHINE. */
+ * not one; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **x, pw_expression_trouble *trouble);
 

@@ -53,7 +53,7 @@ static inline int pw_expression_breaks (int op) {
 }
 
 /* How two numbers compare: -1, 0, 1; 2: one of them is not a number. */
-static inline int pw_expression_truth (int op, int order) {
+static inline int pw_expression_compare (int op, int order) {
   int equal = order == 0 && (op == PW_OP_LESS_EQUAL || op == PW_OP_GREATER_EQUAL || op == PW_OP_EQUAL);
   int less = order == -1 && (op == PW_OP_LESS || op == PW_OP_LESS_EQUAL);
   int greater = order == 1 && (op == PW_OP_GREATER || op == PW_OP_GREATER_EQUAL);

@@ -346,7 +346,7 @@ static parser_part parser_number (parser *p) {
   char digits[PARSER_LONGEST + 1];
   double value = 0;
   snprintf (digits, sizeof digits, "%.*s", (int)p->size, p->text + p->at);
-  if (pw_read_number (digits, &value) != PW_OK && p->status == PW_OK) p->status = PW_MACHINE;
+  if (pw_read_number (digits, &value) != PW_OK && p->status == PW_OK) p->status = PW_RESOURCE;
   return parser_leaf (p, PW_OP_CONSTANT, 0, value);
 }
 
@@ -431,7 +431,7 @@ int pw_expression_read (const pw_scope *s, const char *const *variable, const ch
   if (parser_read (&p) != PW_OK) return p.status;
   pw_expression head = { p.codes, p.breaks, p.jump, p.jump_size },
                 *made = pw_arena_take (arena, pw_expression_size (&head));
-  if (made == NULL) return PW_MACHINE;
+  if (made == NULL) return PW_RESOURCE;
   *made = head;
   memcpy (made->code, p.code, (size_t)p.codes * sizeof *p.code);
   *x = made;

@@ -29,7 +29,7 @@ static void build_word (build_command *c, const char *word) {
 static int build_compiler (build_command *c) {
   const char *cc = getenv ("CC");
   c->text = strdup (cc && cc[strspn (cc, " \t")] ? cc : "cc");
-  if (c->text == NULL) return PW_MACHINE;
+  if (c->text == NULL) return PW_RESOURCE;
   char *rest = NULL;
   for (char *w = strtok_r (c->text, " \t", &rest); w && c->words < BUILD_WORDS / 2; w = strtok_r (NULL, " \t", &rest))
     build_word (c, w);
@@ -84,7 +84,7 @@ static int build_run (const build_command *c, const char *source, const sigset_t
   while (why == 0 && waitpid (child, &outcome, 0) < 0)
     if (errno != EINTR) why = errno;
   if (why != 0 && why != ENOENT && why != EACCES)
-    return pw_fail (error, PW_MACHINE, "cannot run the C compiler \"%s\": %s", c->word[0], strerror (why));
+    return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", c->word[0], strerror (why));
   if (why != 0 || (WIFEXITED (outcome) && WEXITSTATUS (outcome) == 127))
     return pw_fail (
         error, PW_INPUT,
@@ -102,7 +102,7 @@ static char *build_folder (pw_error *error) {
   if (tmp == NULL || *tmp == 0) tmp = "/tmp";
   char *folder = pw_join (tmp, "pinwheel-XXXXXX", "");
   if (folder && mkdtemp (folder)) return folder; /* mkdtemp gives mode 0700 */
-  pw_fail (error, PW_MACHINE, "cannot make a temporary folder in %s: %s", tmp, strerror (errno));
+  pw_fail (error, PW_RESOURCE, "cannot make a temporary folder in %s: %s", tmp, strerror (errno));
   free (folder);
   return NULL;
 }
@@ -118,7 +118,7 @@ static int build_object (const char *path, const char *object, const sigset_t *b
                       "\"../include/pinwheel\"",
                       path);
   else if (status == PW_OK && build_compiler (&c) != PW_OK)
-    status = pw_fail (error, PW_MACHINE, "out of memory");
+    status = pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) {
     build_options (&c, include, path, object);
     status = build_run (&c, path, before, error);
@@ -131,9 +131,9 @@ static int build_object (const char *path, const char *object, const sigset_t *b
 static int build_in_folder (const char *path, const sigset_t *before, pw_object_user *use, void *context,
                             pw_error *error) {
   char *folder = build_folder (error);
-  if (folder == NULL) return PW_MACHINE;
+  if (folder == NULL) return PW_RESOURCE;
   char *object = pw_join (folder, "model.so", "");
-  int status = object ? build_object (path, object, before, error) : pw_fail (error, PW_MACHINE, "out of memory");
+  int status = object ? build_object (path, object, before, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) status = use (context, object, error);
   if (object) unlink (object);
   rmdir (folder);

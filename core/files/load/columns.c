@@ -166,7 +166,7 @@ static int columns_all (columns *c, const char *const column[2], const char *con
   for (int k = 0; k < 2; k++) {
     if (columns_open (c, line, named, column[k], unit[k], &place[k], &factor[k]) != PW_OK) return PW_INPUT;
     value[k] = pw_arena_take (arena, lines * sizeof (double));
-    if (value[k] == NULL) return pw_fail (c->error, PW_MACHINE, "%s: out of memory", c->shown);
+    if (value[k] == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
   }
   return columns_rows (c, named ? columns_line (c) : line, place, factor, value, count);
 }
@@ -177,7 +177,7 @@ int pw_columns_read (FILE *f, const char *shown, const char *const column[2], co
   char *text;
   size_t size;
   *count = 0;
-  int status = pw_slurp (f, COLUMNS_LARGEST, shown, "the most a table may have", &text, &size, error);
+  int status = pw_read_rest (f, COLUMNS_LARGEST, shown, "the most a table may have", &text, &size, error);
   columns c = { .shown = shown, .rest = text, .error = error };
   if (status == PW_OK && strlen (text) != size)
     status = pw_fail (error, PW_INPUT, "%.80s: a table is text, and this has a byte 0", shown);

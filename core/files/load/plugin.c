@@ -30,7 +30,7 @@ static int plugin_load (void *context, const char *object, pw_error *error) {
   errno = 0;
   f->handle = dlopen (object, RTLD_NOW | RTLD_LOCAL);
   if (f->handle == NULL && errno == ENOMEM)
-    return pw_fail (error, PW_MACHINE, "cannot load %s: out of memory", f->path);
+    return pw_fail (error, PW_RESOURCE, "cannot load %s: out of memory", f->path);
   if (f->handle == NULL) return pw_fail (error, PW_INPUT, "cannot load %s: %s", f->path, plugin_reason (object));
   f->table = dlsym (f->handle, "pw_plugin");
   if (f->table == NULL)
@@ -73,7 +73,7 @@ static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   if (!pw_is_text (base))
     return pw_fail (error, PW_INPUT, "%s: the name of a model file is UTF-8 without control characters", f->path);
   f->name = strdup (base);
-  if (f->name == NULL) return pw_fail (error, PW_MACHINE, "out of memory");
+  if (f->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   f->name[strlen (base) - strlen (plugin_endings[ending])] = 0;
   if (ending == PLUGIN_YAML) return plugin_read (f, shown, error);
   return ending == PLUGIN_C ? pw_compile_file (f->path, plugin_load, f, error) : plugin_load (f, f->path, error);
@@ -83,7 +83,7 @@ static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
   struct stat info;
   f->path = realpath (path, NULL);
   if (f->path == NULL)
-    return pw_fail (error, errno == ENOMEM ? PW_MACHINE : PW_INPUT, "cannot open the model file %s: %s", path,
+    return pw_fail (error, errno == ENOMEM ? PW_RESOURCE : PW_INPUT, "cannot open the model file %s: %s", path,
                     strerror (errno));
   if (stat (f->path, &info) == 0 && !S_ISREG (info.st_mode))
     return pw_fail (error, PW_INPUT, "cannot open the model file %s: %s", path, pw_not_regular (info.st_mode));
@@ -123,7 +123,7 @@ static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
           pw_fail (error, PW_INPUT, "two files answer to the model \"%s\": %s and %s; name one of them by its path",
                    name, found[0].path, found[1].path);
     else if ((f->path = strdup (found->path)) == NULL)
-      status = pw_fail (error, PW_MACHINE, "out of memory");
+      status = pw_fail (error, PW_RESOURCE, "out of memory");
   }
   pw_search_close (&s);
   return status;
@@ -137,7 +137,7 @@ static pw_file *plugin_find (const char *model, const char **shown, pw_error *er
   }
   pw_file *f = calloc (1, sizeof *f);
   if (f == NULL) {
-    pw_fail (error, PW_MACHINE, "out of memory");
+    pw_fail (error, PW_RESOURCE, "out of memory");
     return NULL;
   }
   int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS || plugin_foreign (model);

@@ -26,7 +26,7 @@ int pw_ends_in (const char *name, const char *ending) {
 }
 
 static int search_no_memory (pw_error *error) {
-  return pw_fail (error, PW_MACHINE, "out of memory while looking for models");
+  return pw_fail (error, PW_RESOURCE, "out of memory while looking for models");
 }
 
 /* The folder of the running program (0) or of this library (1), malloced; NULL if unknown. */
@@ -106,7 +106,7 @@ static int search_folder (pw_search *s, const char *folder, pw_error *error) {
   free (real);
   DIR *dir = fresh ? opendir (folder) : NULL;
   if (fresh && dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
-    return pw_fail (error, PW_MACHINE, "cannot look into the folder %s: %s", folder, strerror (errno));
+    return pw_fail (error, PW_RESOURCE, "cannot look into the folder %s: %s", folder, strerror (errno));
   if (dir == NULL) return PW_OK;
   int status = PW_OK;
   struct dirent *entry;

@@ -54,7 +54,7 @@ static int csv_end (pw_csv *c, pw_error *error) {
   csv_text (c, "\n");
   size_t used = c->used;
   c->used = 0;
-  if (c->failed) return pw_fail (error, PW_MACHINE, "out of memory while writing a table");
+  if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
   return pw_output_text (c->output, c->line, used, error);
 }
 
@@ -62,15 +62,15 @@ static int csv_end (pw_csv *c, pw_error *error) {
 
 static void csv_name_states (pw_csv *c, const pw_system *s) {
   char name[300];
-  int bodies = pw_count_bodies (s), n = pw_count_coordinates (s);
+  int bodies = pw_system_bodies (s), n = pw_system_coordinates (s);
   for (int b = 0; b < bodies; b++)
     for (int i = 0; i < 6; i++) {
       int state = i < 3 ? 3 * b + i : n + 3 * b + i - 3;
-      csv_name (c, pw_state_name (s, state, name, sizeof name), pw_state_unit (s, state));
+      csv_name (c, pw_system_state_name (s, state, name, sizeof name), pw_system_state_unit (s, state));
     }
   for (int j = 3 * bodies; j < n; j++)
     for (int state = j; state < 2 * n; state += n)
-      csv_name (c, pw_state_name (s, state, name, sizeof name), pw_state_unit (s, state));
+      csv_name (c, pw_system_state_name (s, state, name, sizeof name), pw_system_state_unit (s, state));
 }
 
 static void csv_name_contacts (pw_csv *c, const pw_system *s) {
@@ -89,7 +89,8 @@ static void csv_name_ledger (pw_csv *c, const pw_system *s) {
   char name[300];
   csv_name (c, "kinetic", "J");
   csv_name (c, "potential", "J");
-  for (int i = 0; i < pw_count_ledger (s); i++) csv_name (c, pw_ledger_name (s, i, name, sizeof name), "J");
+  for (int i = 0; i < pw_system_ledger_entries (s); i++)
+    csv_name (c, pw_system_ledger_name (s, i, name, sizeof name), "J");
   csv_name (c, "projection", "J");
   csv_name (c, "balance", "J");
 }
@@ -99,8 +100,8 @@ static int csv_header (pw_csv *c, const pw_system *s, pw_error *error) {
   csv_name (c, "t", "s");
   csv_name_states (c, s);
   csv_name_contacts (c, s);
-  for (int i = 0; i < pw_count_rows (s); i++)
-    csv_name (c, pw_reaction_name (s, i, name, sizeof name), pw_reaction_unit (s, i));
+  for (int i = 0; i < pw_system_rows (s); i++)
+    csv_name (c, pw_system_reaction_name (s, i, name, sizeof name), pw_system_reaction_unit (s, i));
   csv_name (c, "residual.position", NULL);
   csv_name (c, "residual.velocity", NULL);
   if (c->ledger) csv_name_ledger (c, s);
@@ -112,13 +113,13 @@ pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *err
   if (c) c->contact = calloc ((size_t)pw_system_contacts (s) + 1, sizeof *c->contact);
   if (c == NULL || c->contact == NULL) {
     pw_csv_close (c);
-    pw_fail (error, PW_MACHINE, "out of memory while writing a table");
+    pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
     return NULL;
   }
   c->output = o;
   c->ledger = ledger;
   int status = PW_OK;
-  if (pw_system_contacts (s) > 0 && (c->workspace = pw_workspace_new (s, error)) == NULL) status = PW_MACHINE;
+  if (pw_system_contacts (s) > 0 && (c->workspace = pw_workspace_new (s, error)) == NULL) status = PW_RESOURCE;
   if (status == PW_OK && !pw_output_continued (o)) status = csv_header (c, s, error);
   if (status == PW_OK) return c;
   pw_csv_close (c);
@@ -136,7 +137,7 @@ void pw_csv_close (pw_csv *c) {
 /* ---- Samples ---- */
 
 static void csv_states (pw_csv *c, const pw_system *s, const pw_sample *x) {
-  int bodies = pw_count_bodies (s), n = pw_count_coordinates (s);
+  int bodies = pw_system_bodies (s), n = pw_system_coordinates (s);
   for (int b = 0; b < bodies; b++) {
     for (int i = 0; i < 3; i++) csv_number (c, x->q[3 * b + i]);
     for (int i = 0; i < 3; i++) csv_number (c, x->v[3 * b + i]);
@@ -149,7 +150,7 @@ static void csv_states (pw_csv *c, const pw_system *s, const pw_sample *x) {
 
 static int csv_contacts (pw_csv *c, const pw_system *s, const pw_sample *x, pw_error *error) {
   if (c->workspace == NULL) return PW_OK;
-  int status = pw_system_contact_points (c->workspace, x->t, x->q, x->v, c->contact, error);
+  int status = pw_workspace_contact_points (c->workspace, x->t, x->q, x->v, c->contact, error);
   for (int i = 0; status == PW_OK && i < pw_system_contacts (s); i++) {
     csv_number (c, c->contact[i][0]);
     csv_number (c, c->contact[i][1]);
@@ -160,7 +161,7 @@ static int csv_contacts (pw_csv *c, const pw_system *s, const pw_sample *x, pw_e
 static void csv_ledger (pw_csv *c, const pw_system *s, const pw_sample *x) {
   csv_number (c, x->kinetic);
   csv_number (c, x->potential);
-  for (int i = 0; i < pw_count_ledger (s); i++) csv_number (c, x->ledger ? x->ledger[i] : NAN);
+  for (int i = 0; i < pw_system_ledger_entries (s); i++) csv_number (c, x->ledger ? x->ledger[i] : NAN);
   csv_number (c, x->projection);
   csv_number (c, x->balance);
 }
@@ -173,7 +174,7 @@ int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_err
     c->used = 0;
     return status;
   }
-  for (int i = 0; i < pw_count_rows (s); i++) csv_number (c, 0 - sample->lambda[i]); /* 0 - 0 is not -0 */
+  for (int i = 0; i < pw_system_rows (s); i++) csv_number (c, 0 - sample->lambda[i]); /* 0 - 0 is not -0 */
   csv_number (c, sample->position);
   csv_number (c, sample->velocity);
   if (c->ledger) csv_ledger (c, s, sample);

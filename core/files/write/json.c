@@ -8,7 +8,7 @@
 static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
   static const char *const names[] = { "x", "y", "phi", "vx", "vy", "omega" };
   pw_json_open (j, "bodies", '{');
-  for (int b = 0; b < pw_count_bodies (s); b++) {
+  for (int b = 0; b < pw_system_bodies (s); b++) {
     pw_json_open (j, pw_system_body_name (s, b), '{');
     for (int i = 0; i < 6; i++) pw_json_number (j, names[i], (i < 3 ? x->q : x->v - 3)[3 * b + i]);
     pw_json_close (j, '}');
@@ -19,11 +19,11 @@ static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
 /* Internal coordinates "ELEMENT.NAME" and their rates, those of an element in an object; most models have none. */
 static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
   char name[300], element[300] = "";
-  int n = pw_count_coordinates (s), first = 3 * pw_count_bodies (s);
+  int n = pw_system_coordinates (s), first = 3 * pw_system_bodies (s);
   if (n == first) return;
   pw_json_open (j, "elements", '{');
   for (int i = first; i < n; i++) {
-    char *dot = strrchr (pw_state_name (s, i, name, sizeof name), '.');
+    char *dot = strrchr (pw_system_state_name (s, i, name, sizeof name), '.');
     *dot = 0;
     if (strcmp (element, name) != 0) {
       if (*element) pw_json_close (j, '}');
@@ -31,7 +31,7 @@ static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
       pw_json_open (j, element, '{');
     }
     pw_json_number (j, dot + 1, x->q[i]);
-    pw_json_number (j, strrchr (pw_state_name (s, n + i, name, sizeof name), '.') + 1, x->v[i]);
+    pw_json_number (j, strrchr (pw_system_state_name (s, n + i, name, sizeof name), '.') + 1, x->v[i]);
   }
   pw_json_close (j, '}');
   pw_json_close (j, '}');
@@ -40,8 +40,8 @@ static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
 static void json_reactions (pw_json *j, const pw_system *s, const pw_sample *x) {
   char name[300];
   pw_json_open (j, "reactions", '{');
-  for (int i = 0; i < pw_count_rows (s); i++)
-    pw_json_number (j, pw_reaction_name (s, i, name, sizeof name), 0 - x->lambda[i]);
+  for (int i = 0; i < pw_system_rows (s); i++)
+    pw_json_number (j, pw_system_reaction_name (s, i, name, sizeof name), 0 - x->lambda[i]);
   pw_json_close (j, '}');
 }
 
@@ -78,12 +78,12 @@ static void json_lists (pw_json *j, const char *const *redundant, const pw_syste
   for (; redundant && *redundant; redundant++) pw_json_text (j, NULL, *redundant);
   pw_json_close (j, ']');
   pw_json_open (j, "differences", '[');
-  for (int i = 0, n = s ? pw_count_differences (s) : 0; i < n; i++)
-    pw_json_text (j, NULL, pw_difference_name (s, i, name, sizeof name));
+  for (int i = 0, n = s ? pw_system_differences (s) : 0; i < n; i++)
+    pw_json_text (j, NULL, pw_system_difference_name (s, i, name, sizeof name));
   pw_json_close (j, ']');
 }
 
-static void json_reference (pw_json *j, const pw_truth_error *e) {
+static void json_reference (pw_json *j, const pw_reference_error *e) {
   static const char *const names[] = { "length", "angle", "speed", "rate" };
   if (e == NULL) {
     pw_json_text (j, "truth", NULL);

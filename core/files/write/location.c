@@ -79,15 +79,15 @@ typedef struct {
   int known;          /* 1: that was found */
 } place_use;
 
-/* A file that cannot be found cannot be opened either; PW_MACHINE without memory. */
+/* A file that cannot be found cannot be opened either; PW_RESOURCE without memory. */
 static int place_use_find (place_use *u, const pw_use *use) {
   *u = (place_use){ .use = use };
   int why = use->path ? pw_locate (&u->place, use->path) : ENOENT;
-  if (why) return why == ENOMEM ? PW_MACHINE : PW_OK;
+  if (why) return why == ENOMEM ? PW_RESOURCE : PW_OK;
   char *folder = pw_folder_of (u->place.path);
   u->known = folder && stat (folder, &u->folder) == 0;
   free (folder);
-  return folder ? PW_OK : PW_MACHINE;
+  return folder ? PW_OK : PW_RESOURCE;
 }
 
 /* Whether a name is another one with one of some endings. */
@@ -123,9 +123,9 @@ static int place_fail (const pw_use *a, const pw_use *b, pw_error *error) {
   return pw_fail (error, PW_INPUT, "%s %.300s would overwrite %s, %.300s", a->what, a->path, b->what, path);
 }
 
-int pw_check_uses (const pw_use *use, int count, pw_error *error) {
+int pw_check_paths (const pw_use *use, int count, pw_error *error) {
   place_use *u = calloc ((size_t)count, sizeof *u);
-  int status = u ? PW_OK : PW_MACHINE;
+  int status = u ? PW_OK : PW_RESOURCE;
   for (int i = 0; i < count && status == PW_OK; i++) status = place_use_find (u + i, use + i);
   if (status != PW_OK) pw_fail (error, status, "out of memory");
   for (int i = 0; i < count && status == PW_OK; i++)

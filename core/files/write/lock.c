@@ -64,7 +64,7 @@ int pw_lock_file (const char *path, pw_lock_how how, int *created) {
 
 int pw_lock_path (const char *path, pw_error *error) {
   int created, file = pw_lock_file (path, PW_LOCK_KEEP, &created);
-  if (file < 0) pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, pw_lock_reason (errno));
+  if (file < 0) pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, pw_lock_reason (errno));
   return file;
 }
 
@@ -74,7 +74,7 @@ int pw_lock_folder (const char *path, pw_error *error) {
   if (why == EBADF) why = 0; /* NFS locks only what is open for writing, which no folder is */
   if (why == 0) return file;
   if (file >= 0) close (file);
-  pw_fail (error, PW_MACHINE, "cannot write into %s: %s", path,
+  pw_fail (error, PW_RESOURCE, "cannot write into %s: %s", path,
            why == EWOULDBLOCK ? "another process is writing into it" : strerror (why));
   return -1;
 }

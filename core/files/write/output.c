@@ -36,8 +36,9 @@ static int output_fail (const pw_output *o, int why, int kept, pw_error *error) 
   const char *what = strcmp (o->path, "-") == 0 ? "standard output" : o->path;
   const char *reason = why > 0 ? pw_lock_reason (why) : "a write failed";
   if (o->part && kept && !o->discard)
-    return pw_fail (error, PW_MACHINE, "cannot write %.200s: %s; what was written is in %.200s", what, reason, o->part);
-  return pw_fail (error, PW_MACHINE, "cannot write %s: %s", what, reason);
+    return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", what, reason,
+                    o->part);
+  return pw_fail (error, PW_RESOURCE, "cannot write %s: %s", what, reason);
 }
 
 /* ---- Opening ---- */
@@ -116,7 +117,7 @@ char *pw_output_path (const char *path, pw_error *error) {
   int why = output_place (&o, &p, "");
   if (why == 0 && o.part) free (o.real);
   if (why == 0 && o.part) return o.part;
-  pw_fail (error, PW_MACHINE, "cannot write %s: %s", path, why ? strerror (why) : pw_not_regular (p.info.st_mode));
+  pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, why ? strerror (why) : pw_not_regular (p.info.st_mode));
   free (o.real);
   return NULL;
 }
@@ -141,7 +142,7 @@ static pw_output *output_new (const char *path, pw_error *error) {
   if (o && o->path)
     pw_fail (error, PW_INPUT, "the name of a file to write is empty");
   else
-    pw_fail (error, PW_MACHINE, "out of memory");
+    pw_fail (error, PW_RESOURCE, "out of memory");
   output_free (o);
   return NULL;
 }
@@ -153,7 +154,7 @@ pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *er
   int why = output_open_file (o, ending);
   if (why == 0) return o;
   if (why == ENOMEM)
-    pw_fail (error, PW_MACHINE, "cannot write %s: out of memory", path);
+    pw_fail (error, PW_RESOURCE, "cannot write %s: out of memory", path);
   else
     output_fail (o, why, 0, error);
   output_free (o);
@@ -236,7 +237,7 @@ void pw_output_discard (pw_output *o) {
 /* The folder knows the new name only when it is on the disk itself; some file systems refuse that, and need it not. */
 static int output_sync_folder (const pw_output *o, pw_error *error) {
   if (o->folder < 0 || fsync (o->folder) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP) return PW_OK;
-  return pw_fail (error, PW_MACHINE, "%s is written, but its folder cannot be brought to the disk: %s", o->path,
+  return pw_fail (error, PW_RESOURCE, "%s is written, but its folder cannot be brought to the disk: %s", o->path,
                   strerror (errno));
 }
 
@@ -310,7 +311,7 @@ int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
   if (why) return output_fail (o, why, 0, error);
   mark->length = (unsigned long long)ftello (o->stream);
   if (output_check (o->file, mark) == PW_OK) return PW_OK;
-  return pw_fail (error, PW_MACHINE, "cannot read %s", o->part);
+  return pw_fail (error, PW_RESOURCE, "cannot read %s", o->part);
 }
 
 /* 1 if the temporary file begins with what was marked. */
@@ -344,7 +345,7 @@ static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
   if (why == 0 &&
       (fseeko (o->stream, (off_t)mark->length, SEEK_SET) != 0 || ftruncate (o->file, (off_t)mark->length) != 0))
     why = errno;
-  return why ? pw_fail (error, PW_MACHINE, "cannot write %s: %s", o->part, strerror (why)) : PW_OK;
+  return why ? pw_fail (error, PW_RESOURCE, "cannot write %s: %s", o->part, strerror (why)) : PW_OK;
 }
 
 pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error) {

@@ -188,13 +188,13 @@ static int yaml_paths (pw_yaml *y, const char *path, const char *shown) {
   const char *slash = strrchr (path, '/');
   y->path = strdup (shown);
   y->folder = slash ? strndup (path, (size_t)(slash - path)) : strdup (".");
-  return y->path && y->folder ? PW_OK : PW_MACHINE;
+  return y->path && y->folder ? PW_OK : PW_RESOURCE;
 }
 
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_error *error) {
   pw_yaml *y = calloc (1, sizeof *y);
   if (y == NULL || yaml_paths (y, path, shown) != PW_OK) {
-    pw_fail (error, PW_MACHINE, "out of memory");
+    pw_fail (error, PW_RESOURCE, "out of memory");
     pw_yaml_close (y);
     return NULL;
   }
@@ -226,7 +226,7 @@ static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (
     const pw_node *value = node->type == PW_YAML_MAP ? n->next : NULL;
     if (value && n->type == PW_YAML_SCALAR && strcmp (n->text, "file") == 0 && value->type == PW_YAML_SCALAR) {
       char *path = pw_join (y->folder, value->text, "");
-      stop = path ? each (context, path) : PW_MACHINE;
+      stop = path ? each (context, path) : PW_RESOURCE;
       free (path);
     }
     if (!stop) stop = yaml_each_table (y, n, each, context);

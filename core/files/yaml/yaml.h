@@ -102,17 +102,17 @@ size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
 typedef struct {
   const pw_yaml *y;
   pw_model *m;
-  pw_arena *arena;         /* lives as long as the model */
-  pw_truth_text *truth;    /* the model's */
-  const double *parameter; /* their values */
-  double *let;             /* values of what `let` defines */
-  int lets;                /* so far */
-  pw_scope *x;             /* both */
-  pw_names bodies;         /* names of bodies, to their index */
-  pw_names all;            /* names of bodies and elements, to the index in nodes */
-  pw_names elements;       /* once an expression asks for them: names of all elements, to the index of their kinds */
-  const pw_node **node;    /* where each was named */
-  const pw_field *field;   /* the one that is read, and the definition it is of, with all fields before it */
+  pw_arena *arena;          /* lives as long as the model */
+  pw_reference_text *truth; /* the model's */
+  const double *parameter;  /* their values */
+  double *let;              /* values of what `let` defines */
+  int lets;                 /* so far */
+  pw_scope *x;              /* both */
+  pw_names bodies;          /* names of bodies, to their index */
+  pw_names all;             /* names of bodies and elements, to the index in nodes */
+  pw_names elements;        /* once an expression asks for them: names of all elements, to the index of their kinds */
+  const pw_node **node;     /* where each was named */
+  const pw_field *field;    /* the one that is read, and the definition it is of, with all fields before it */
   const char *definition;
   int named;
   double points; /* of tables, so far */
@@ -143,6 +143,6 @@ int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, c
                     pw_error *error);
 
 /* Reads the reference solution, when bodies and elements are there (yaml_expression.c). */
-int pw_yaml_truth (pw_yaml_builder *b, pw_error *error);
+int pw_yaml_reference (pw_yaml_builder *b, pw_error *error);
 
 #endif

@@ -24,8 +24,8 @@ static int build_refuse (const pw_yaml_builder *b, const pw_node *node, const pw
   int n = snprintf (prefix, sizeof prefix, "model %s: ", pw_model_name (b->m));
   const char *text = own->text;
   if (n > 0 && strncmp (text, prefix, (size_t)n) == 0) text += n;
-  return own->status == PW_MACHINE ? pw_fail (error, own->status, "%s", own->text)
-                                   : pw_yaml_fail (b->y, node->at, error, "%s", text);
+  return own->status == PW_RESOURCE ? pw_fail (error, own->status, "%s", own->text)
+                                    : pw_yaml_fail (b->y, node->at, error, "%s", text);
 }
 
 /* ---- Bodies ---- */
@@ -202,7 +202,7 @@ static int build_all (pw_yaml_builder *b, char *definition, pw_error *error) {
     if (build_body (b, n, error) != PW_OK) return error->status;
   for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
     if (build_element (b, n, definition, error) != PW_OK) return error->status;
-  return pw_yaml_truth (b, error);
+  return pw_yaml_reference (b, error);
 }
 
 /* Reads `let`: numbers defined from parameters and from those above them. */
@@ -234,7 +234,7 @@ static int build_keep (pw_yaml_builder *b, pw_error *error) {
   b->arena = calloc (1, sizeof *b->arena);
   if (b->arena == NULL || pw_model_keep (b->m, b->arena, build_free) != PW_OK) return pw_yaml_no_memory (b->y, error);
   b->truth = pw_arena_take (b->arena, sizeof *b->truth);
-  pw_model_set_truth (b->m, b->truth);
+  pw_model_set_reference (b->m, b->truth);
   return b->truth ? PW_OK : pw_yaml_no_memory (b->y, error);
 }
 

@@ -173,7 +173,7 @@ static void *time_open (void *context) {
 
 /* Keeps the names that expressions may use, and their values, for `show`. */
 static int time_keep_names (pw_yaml_builder *b, pw_error *error) {
-  pw_truth_text *t = b->truth;
+  pw_reference_text *t = b->truth;
   size_t names = (size_t)b->y->parameters + (size_t)b->lets;
   if (t->name) return PW_OK;
   t->name = pw_arena_take (b->arena, (names + 1) * sizeof *t->name);
@@ -328,7 +328,7 @@ static double truth_eval (void *context, int i, double t) {
   return pw_expression_value (x[i], &t);
 }
 
-static int truth_entries (pw_yaml_builder *b, pw_truth_text *t, pw_names *seen, pw_error *error) {
+static int truth_entries (pw_yaml_builder *b, pw_reference_text *t, pw_names *seen, pw_error *error) {
   static const char *const time[] = { "t", NULL };
   const pw_expression **x = t->context;
   char what[100];
@@ -346,9 +346,9 @@ static int truth_entries (pw_yaml_builder *b, pw_truth_text *t, pw_names *seen, 
   return PW_OK;
 }
 
-int pw_yaml_truth (pw_yaml_builder *b, pw_error *error) {
+int pw_yaml_reference (pw_yaml_builder *b, pw_error *error) {
   const pw_node *map = b->y->truth;
-  pw_truth_text *t = b->truth;
+  pw_reference_text *t = b->truth;
   pw_names seen = { .size = 0 };
   if (map == NULL) return PW_OK;
   if (map->type != PW_YAML_MAP)

@@ -121,7 +121,7 @@ int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_
     return pw_yaml_fail (y, node->at, error, "%s: expected a number, found %s", what, pw_yaml_found (node));
   int status =
       pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (x, node->text, value, &trouble);
-  if (status == PW_MACHINE) return pw_yaml_no_memory (y, error);
+  if (status == PW_RESOURCE) return pw_yaml_no_memory (y, error);
   if (status != PW_OK) return read_trouble (y, node, what, &trouble, error);
   const char *expected = pw_domain_check (domain, *value);
   if (*expected) return pw_yaml_fail (y, node->at, error, "%s = %g: expected %s", what, *value, expected);

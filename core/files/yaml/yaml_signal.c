@@ -147,7 +147,7 @@ static int signal_fault (pw_yaml_builder *b, const pw_kind *kind, const char *wh
                          const pw_node *points, const pw_signal *signal, pw_error *error) {
   char fault[300];
   int point;
-  if (*pw_signal_fault (signal, kind, &point, fault, sizeof fault) == 0) return PW_OK;
+  if (*pw_signal_check (signal, kind, &point, fault, sizeof fault) == 0) return PW_OK;
   for (const pw_node *n = points ? points->first : NULL; n && point >= 0; n = n->next)
     if (point-- == 0) node = n;
   return pw_yaml_fail (b->y, node->at, error, "%s: %s", what, fault);

@@ -63,7 +63,7 @@ int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *form
 }
 
 int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
-  return pw_fail (error, PW_MACHINE, "%s: out of memory", y->path);
+  return pw_fail (error, PW_RESOURCE, "%s: out of memory", y->path);
 }
 
 /* ---- Checks of the text ---- */
@@ -89,9 +89,9 @@ int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error 
   const char *why;
   FILE *f = pw_open_input (path, &why);
   if (f == NULL)
-    return pw_fail (error, errno == ENOMEM ? PW_MACHINE : PW_INPUT, "cannot open the model file %s: %s", y->path, why);
-  int status = pw_slurp (f, largest, y->path, "the most a model may have unless --max-file says more", &y->source,
-                         &y->size, error);
+    return pw_fail (error, errno == ENOMEM ? PW_RESOURCE : PW_INPUT, "cannot open the model file %s: %s", y->path, why);
+  int status = pw_read_rest (f, largest, y->path, "the most a model may have unless --max-file says more", &y->source,
+                             &y->size, error);
   fclose (f);
   return status == PW_OK ? source_check (y, error) : status;
 }

@@ -110,7 +110,7 @@ static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type, pw_error 
   unsigned at = tree_place (x, e);
   if (x->depth == TREE_DEPTH) return pw_yaml_fail (x->y, at, error, "nested too deeply");
   pw_node *n = tree_add (x, type, at, error);
-  if (n == NULL) return PW_MACHINE;
+  if (n == NULL) return PW_RESOURCE;
   x->open[x->depth] = n;
   x->tail[x->depth++] = &n->first;
   return PW_OK;

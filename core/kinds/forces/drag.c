@@ -20,7 +20,7 @@ typedef struct {
   const pw_pose *A = &b->pose[b->body[e]];      \
   const double v = hypot (A->vx, A->vy), c = k->c1 + k->c2 * v, d = k->d1 + k->d2 * fabs (A->omega)
 
-static int drag_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int drag_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
   const pw_drag *d = definition;
   *(drag *)element = (drag){ d->linear, d->quadratic, d->turning, d->turning_quadratic };

@@ -32,7 +32,7 @@ static inline force_state force_at (const force *k, const pw_pose *A, const doub
   const pw_pose *A = &b->pose[b->body[e]];        \
   const force_state x = force_at (k, A, b->u + 6 * e)
 
-static int force_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int force_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                           pw_error *error) {
   const pw_force *d = definition;
   *(force *)element = (force){ { d->at[0], d->at[1] }, d->axes == PW_AXES_BODY };

@@ -10,7 +10,7 @@
   const coulomb *k = (const coulomb *)b->element + e; \
   const double w = b->pose[b->body[2 * e]].omega - b->pose[b->body[2 * e + 1]].omega
 
-static int friction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int friction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                              pw_error *error) {
   const pw_friction *d = definition;
   (void)bodies, (void)own;

@@ -7,7 +7,7 @@ typedef struct {
   double fx, fy; /* weight [N] */
 } gravity;
 
-static int gravity_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int gravity_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                             pw_error *error) {
   const pw_gravity *d = definition;
   double m = bodies[0]->mass;

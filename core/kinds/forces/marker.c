@@ -9,7 +9,7 @@ typedef struct {
   double at[2]; /* in the body's frame [m] */
 } marker;
 
-static int marker_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int marker_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                            pw_error *error) {
   const pw_marker *d = definition;
   *(marker *)element = (marker){ { d->at[0], d->at[1] } };

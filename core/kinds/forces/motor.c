@@ -33,7 +33,7 @@ static inline motor_state motor_at (const motor *k, const pw_pose *A, const pw_p
   const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
   const motor_state x = motor_at (k, A, B, b->u + 6 * e)
 
-static int motor_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int motor_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                           pw_error *error) {
   const pw_motor *d = definition;
   *(motor *)element = (motor){ d->stiffness, d->damping, d->limit };

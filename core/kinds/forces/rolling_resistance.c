@@ -22,7 +22,7 @@ typedef struct {
   const double E[3] = { A->cos * P->a - A->sin * P->b, A->sin * P->a + A->cos * P->b, P->arm }; \
   const double ve = E[0] * A->vx + E[1] * A->vy + E[2] * A->omega
 
-static int resistance_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int resistance_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                                pw_error *error) {
   const pw_rolling_resistance *d = definition;
   resistance *k = element;

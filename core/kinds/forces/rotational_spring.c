@@ -19,7 +19,7 @@ typedef struct {
   const double angle = A->phi - B->phi - k->beta, rate = A->omega - B->omega;     \
   (void)angle, (void)rate
 
-static int twist_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int twist_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                           pw_error *error) {
   const pw_rotational_spring *d = definition;
   *(twist *)element = (twist){ d->stiffness, d->damping, d->angle };

@@ -23,7 +23,7 @@ typedef struct {
   line_J (&s, E);                                                                 \
   for (int i = 0; i < 6; i++) w += E[i] * v[i]
 
-static int sliding_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int sliding_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                             pw_error *error) {
   const pw_sliding_friction *d = definition;
   sliding *k = element;

@@ -46,7 +46,7 @@ static inline spring_state spring_at (const spring *k, const pw_pose *A, const p
   const spring *k = (const spring *)b->element + e; \
   const spring_state s = spring_at (k, &b->pose[b->body[2 * e]], &b->pose[b->body[2 * e + 1]])
 
-static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                            pw_error *error) {
   const pw_spring *d = definition;
   *(spring *)element = (spring){

@@ -49,7 +49,7 @@ static tyre_slip tyre_at (const tyre *k, const pw_pose *A) {
   const pw_pose *A = &b->pose[b->body[e]];      \
   const tyre_slip x = tyre_at (k, A)
 
-static int tyre_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int tyre_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
   const pw_tyre *d = definition;
   double c = cos (d->heading), s = sin (d->heading), along = d->at[0] * c + d->at[1] * s,

@@ -10,7 +10,7 @@
  * body 1 with -lambda: along e at its point, or as a moment; on body 2 with the opposite. */
 #include "line.h"
 
-static int drive_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int drive_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                           pw_error *error) {
   const pw_drive *d = definition;
   line k = { .s1 = { d->at[0][0], d->at[0][1] }, .angle = d->what == PW_DRIVE_ANGLE };

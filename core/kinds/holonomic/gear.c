@@ -15,7 +15,7 @@ typedef struct {
   double offset; /* c [rad] */
 } gear;
 
-static int gear_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int gear_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
   const pw_gear *d = definition;
   double phi[3];

@@ -30,7 +30,7 @@ static inline pin_arms pin_turn (const pin *p, const pw_pose *A, const pw_pose *
   const pin_arms s = pin_turn ((const pin *)b->element + e, A, B);                \
   (void)A, (void)B, (void)s
 
-static int pin_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int pin_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                         pw_error *error) {
   const pw_pin *d = definition;
   *(pin *)element = (pin){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] } };

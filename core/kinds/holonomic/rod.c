@@ -50,7 +50,7 @@ static inline void rod_through (const rod_state *s, const double x[2], double *o
   for (int j = 0; j < 6; j++) out[j] = (x[0] * s->D[0][j] + x[1] * s->D[1][j]) / s->L;
 }
 
-static int rod_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int rod_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                         pw_error *error) {
   const pw_rod *d = definition;
   *(rod *)element = (rod){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->length };

@@ -7,7 +7,7 @@
  * -lambda(2); on body 2 the opposites. */
 #include "line.h"
 
-static int slider_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int slider_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                            pw_error *error) {
   const pw_slider *d = definition;
   line *k = element;

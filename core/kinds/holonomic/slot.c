@@ -5,7 +5,7 @@
  * Its derivatives are in line.h.  On body 1 acts the force -lambda along n, at its point; on body 2 the opposite. */
 #include "line.h"
 
-static int slot_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int slot_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
   const pw_slot *d = definition;
   *(line *)element = line_make (d->at, d->heading);

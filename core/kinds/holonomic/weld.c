@@ -25,7 +25,7 @@ typedef struct {
   const double X1 = A->cos * k->s1[0] - A->sin * k->s1[1], Y1 = A->sin * k->s1[0] + A->cos * k->s1[1]; \
   const double X2 = B->cos * k->s2[0] - B->sin * k->s2[1], Y2 = B->sin * k->s2[0] + B->cos * k->s2[1];
 
-static int weld_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int weld_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
   const pw_weld *d = definition;
   *(weld *)element = (weld){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->angle };

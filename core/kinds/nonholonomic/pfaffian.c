@@ -22,7 +22,7 @@ typedef struct {
   const double Bx = P->cos * k->b[0] - P->sin * k->b[1], By = P->sin * k->b[0] + P->cos * k->b[1]; \
   (void)Q
 
-static int pfaffian_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int pfaffian_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                              pw_error *error) {
   const pw_pfaffian *d = definition;
   pfaffian *k = element;

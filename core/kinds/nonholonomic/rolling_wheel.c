@@ -34,14 +34,14 @@ static double rolling_rate (const rolling *k, const pw_body *body) {
   return (cos (angle) * body->rate[0] + sin (angle) * body->rate[1] - k->aside * body->rate[2]) / k->radius;
 }
 
-static int rolling_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int rolling_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                             pw_error *error) {
   const pw_rolling_wheel *d = definition;
   double c = cos (d->heading), s = sin (d->heading), along = d->at[0] * c + d->at[1] * s,
          aside = d->at[1] * c - d->at[0] * s;
   rolling *k = element;
   *k = (rolling){ { d->at[0], d->at[1] }, c, s, along, aside, d->radius, d->heading };
-  own[0] = (pw_own){
+  own[0] = (pw_internal){
     d->inertia, d->start, d->rate != 0 ? d->rate : rolling_rate (k, bodies[0]), { d->start != 0, d->rate != 0 }
   };
   (void)error;

@@ -9,7 +9,7 @@
 #include <math.h>
 #include "contact.h"
 
-static int speed_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int speed_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                           pw_error *error) {
   const pw_speed *d = definition;
   *(contact *)element = contact_make (d->at, d->heading, cos (d->heading), sin (d->heading));

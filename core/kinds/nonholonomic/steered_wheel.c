@@ -36,7 +36,7 @@ static inline steered_state steered_at (const steered *k, const pw_pose *A, cons
   const pw_pose *A = &b->pose[b->body[e]];            \
   const steered_state x = steered_at (k, A, b->u + 3 * e)
 
-static int steered_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int steered_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                             pw_error *error) {
   const pw_steered_wheel *d = definition;
   *(steered *)element = (steered){ { d->at[0], d->at[1] } };

@@ -8,7 +8,7 @@
 #include <math.h>
 #include "contact.h"
 
-static int wheel_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_own *own,
+static int wheel_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                           pw_error *error) {
   const pw_wheel *d = definition;
   *(contact *)element = contact_make (d->at, d->heading, -sin (d->heading), cos (d->heading));
