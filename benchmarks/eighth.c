@@ -27,7 +27,7 @@ typedef struct {
   pw_run *run; /* lends its right-hand side */
   pw_projector projector;
   double q[9], v[9], a[9]; /* as long as Pinwheel's own */
-  double truth[6];
+  double reference[6];
 } eighth_scene;
 
 /* ---- By hand ---- */
@@ -114,7 +114,7 @@ static void eighth_open (eighth_scene *s, int massless) {
   s->run = engine_open (s->system, "rk4+none", &(pw_settings){ .span = EIGHTH_SECONDS });
   if (pw_projector_open (&s->projector, s->run, s->run->s->metric, NULL, &error) != PW_OK)
     engine_die ("projector", error.text);
-  eighth_by_hand (s, NULL, 0.0125, s->truth);
+  eighth_by_hand (s, NULL, 0.0125, s->reference);
 }
 
 static void eighth_close (eighth_scene *s) {
@@ -166,7 +166,7 @@ static void eighth_case (int massless, FILE *csv) {
   eighth_open (&s, massless);
   for (int round = 0; round < EIGHTH_ROUNDS; round++)
     for (int i = 0; i < EIGHTH_WAYS; i++)
-      for (int k = 0; k < way[i].count; k++) ladder_take (&way[i], &s, s.truth, 6, q, round, k);
+      for (int k = 0; k < way[i].count; k++) ladder_take (&way[i], &s, s.reference, 6, q, round, k);
   printf ("\nsteering %s: processor time [ms] for an error of the lengths after %d s\n"
           "(in brackets how many times that erk8+projection takes)\n  %-40s  %-17s  %s\n",
           scene, EIGHTH_SECONDS, "", "   1e-6 m", "   1e-9 m");

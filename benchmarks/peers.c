@@ -25,7 +25,7 @@ typedef struct {
   int links; /* of a chain; 0: the EzyRoller */
   double seconds;
   pw_system *system;
-  const double *truth;
+  const double *reference;
 } peers_scene;
 
 /* ---- Pinwheel ---- */
@@ -46,9 +46,9 @@ static double peers_ours (void *scene, const ladder *way, double rung, double *q
 
 /* ---- Pairs ---- */
 
-#define PEERS_HAND(text, key, from, by, rungs, what, step) \
-  { .name = text, .method = key, .first = from, .factor = by, .count = rungs, .run = what, .function = step }
-#define PEERS_OURS(key, from, by, rungs) PEERS_HAND (key, key, from, by, rungs, peers_ours, "pw_run_advance")
+#define PEERS_HAND(text, key, from, by, levels, what, step) \
+  { .name = text, .method = key, .first = from, .factor = by, .count = levels, .run = what, .function = step }
+#define PEERS_OURS(key, from, by, levels) PEERS_HAND (key, key, from, by, levels, peers_ours, "pw_run_advance")
 #define PEERS_CHAIN(text) PEERS_HAND (text, "", 0.04, 0.8, 18, by_hand_chain, "by_hand_chain_step")
 
 static peers_scene peers_scenes[] = {
@@ -103,12 +103,12 @@ static peers_scene *peers_scene_of (int k) {
 }
 
 static void peers_open (void) {
-  static double truth[PEERS_SCENES][3 * PEERS_LINKS];
+  static double reference[PEERS_SCENES][3 * PEERS_LINKS];
   for (int i = 0; i < PEERS_SCENES; i++) {
     peers_scene *s = &peers_scenes[i];
     s->system = s->links ? engine_chain (s->links) : engine_ezyroller (0);
-    s->truth = s->links ? truth[i] : peers_truth;
-    if (s->links) by_hand_chain (&s->links, NULL, 2e-4, truth[i]);
+    s->reference = s->links ? reference[i] : peers_truth;
+    if (s->links) by_hand_chain (&s->links, NULL, 2e-4, reference[i]);
   }
 }
 
@@ -148,7 +148,7 @@ static void peers_measure (void) {
     for (int k = 0; k < PEERS_WAYS; k++) {
       peers_scene *s = peers_scene_of (k);
       for (int i = 0; i < peers_way (k)->count; i++)
-        ladder_take (peers_way (k), s, s->truth, pw_system_coordinates (s->system), q, round, i);
+        ladder_take (peers_way (k), s, s->reference, pw_system_coordinates (s->system), q, round, i);
     }
   for (int k = 0; k < PEERS_WAYS; k++) ladder_sort (peers_way (k), PEERS_ROUNDS);
 }

@@ -224,7 +224,7 @@ typedef struct {
   /* The motion from the described start, where it is known; may be NULL.  Stores what is known at time t of the
    * coordinates, three for each body in the order they were added, then those that elements own, and of their rates; all
    * of them are NaN, not known, before. */
-  void (*truth) (const void *parameters, double t, double *q, double *v);
+  void (*reference) (const void *parameters, double t, double *q, double *v);
 } pw_plugin_table;
 
 /* Ends a model file:  PW_MODEL (.about = "...", .parameters = ..., .build = build) */
@@ -545,21 +545,21 @@ typedef struct {
   double x, y, phi;     /* centre of mass [m], angle [rad] */
   double cos, sin;      /* of phi */
   double vx, vy, omega; /* [m/s], [rad/s] */
-} pw_pose;
+} pw_configuration;
 
 /* All elements of one kind in a scene, as its sweeps see them.  Element e has local coordinates: (x, y, phi) of each
  * of its bodies, then its own; there are `cols` of them.  Arrays are row-major, one element after the other. */
 typedef struct {
-  int count;            /* elements */
-  int cols;             /* 3 kind->bodies + kind->own */
-  const void *element;  /* count structures of kind->element bytes, made by kind->prepare */
-  const int *body;      /* count x kind->bodies indices into pose */
-  const pw_pose *pose;  /* of every body of the scene, and the ground */
-  const double *q;      /* count x kind->own: own coordinates */
-  const double *v;      /* count x kind->own: their rates */
-  const double *u;      /* count x kind->signals x 3: value, rate and acceleration of each signal */
-  const double *w;      /* count x cols: the direction w, for jw_q only */
-  const double *lambda; /* count x kind->rows: the multipliers, for power and loss only */
+  int count;                             /* elements */
+  int cols;                              /* 3 kind->bodies + kind->own */
+  const void *element;                   /* count structures of kind->element bytes, made by kind->prepare */
+  const int *body;                       /* count x kind->bodies indices into configuration */
+  const pw_configuration *configuration; /* of every body of the scene, and the ground */
+  const double *q;                       /* count x kind->own: own coordinates */
+  const double *v;                       /* count x kind->own: their rates */
+  const double *u;                       /* count x kind->signals x 3: value, rate and acceleration of each signal */
+  const double *w;                       /* count x cols: the direction w, for jw_q only */
+  const double *lambda;                  /* count x kind->rows: the multipliers, for power and loss only */
 } pw_batch;
 
 /* Fills one array for the whole batch. */
@@ -703,12 +703,13 @@ typedef struct {
   double (*eval) (void *context, int i, double t); /* the value of expression i */
   void *context;
 } pw_reference_text;
-const pw_reference_text *pw_model_reference (const pw_model *m);           /* all zero: it knows nothing */
-void pw_model_set_reference (pw_model *m, const pw_reference_text *truth); /* which must live as long as the model */
+const pw_reference_text *pw_model_reference (const pw_model *m); /* all zero: it knows nothing */
+void pw_model_set_reference (pw_model *m,
+                             const pw_reference_text *reference); /* which must live as long as the model */
 
 /* ---- For build functions that read their models from elsewhere ---- */
 
-/* Frees an object with the model: memory of function signals, for instance.  PW_RESOURCE, and the object is freed at once. */
+/* Frees an object with the model: memory of function signals, for instance.  PW_RESOURCE, and the object is released at once. */
 int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object));
 
 /* The first error of a model, which a build function may set. */

@@ -82,7 +82,7 @@ typedef struct {
   const double *q_given, *v_given; /* the state as described */
   const double *q, *v;             /* the state the run starts from, until it has advanced */
   int moved;                       /* number of states that differ by more than round-off */
-  int freed;                       /* 1: the values the user gave could not all be held */
+  int released;                    /* 1: the values the user gave could not all be held */
   int changed;                     /* of the states moved, those that the model specifies */
   double position, velocity;       /* scaled residuals before */
   double time;                     /* time scale of the run [s] */

@@ -33,7 +33,7 @@ static int attraction_prepare (const void *definition, const pw_body *const *bod
 }
 
 static double attraction_between (const pw_batch *b, int e, double d[2]) {
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]];
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
   d[0] = A->x - B->x, d[1] = A->y - B->y;
   return hypot (d[0], d[1]);
 }
@@ -109,7 +109,7 @@ typedef struct {
 
 static wire_state wire_at (const pw_batch *b, int e) {
   const wire_element *k = (const wire_element *)b->element + e;
-  const pw_pose *A = &b->pose[b->body[e]];
+  const pw_configuration *A = &b->configuration[b->body[e]];
   return (wire_state){ A->x - k->x, A->y - k->y, A->vx, A->vy, k->a, k->p, k->r };
 }
 

@@ -1,6 +1,6 @@
 /* N four-bar linkages in a row: N + 1 vertical cranks of 1 m at x = 0 .. N, joined at their tops by N couplers of 1 m.
  *
- * All cranks stay parallel.  Whenever they are horizontal the linkage is in a singular pose: N constraint rows become
+ * All cranks stay parallel.  Whenever they are horizontal the linkage is in a singular configuration: N constraint rows become
  * dependent and the cranks could go separate ways; the physical motion passes straight through:
  * theta'' = -(g / l) ((N + 1) / 2 + N) / ((N + 1) / 3 + N) cos theta.
  * (Gonzalez, Dopico, Pastorino & Cuadrado 2006, Multibody System Dynamics 16; IFToMM benchmark A02.) */
@@ -51,7 +51,7 @@ static void build (pw_model *m, const void *parameter) {
 
 /* A pendulum that goes over the top: with psi = theta + pi / 2 from the lowest point and W its rate there,
  * psi = 2 am (K + W t / 2 | m), m = 4 kappa / W^2. */
-static void truth (const void *parameter, double t, double *q, double *v) {
+static void reference (const void *parameter, double t, double *q, double *v) {
   const four_bar *p = parameter;
   double kappa = p->g / p->l * ((p->N + 1) / 2 + p->N) / ((p->N + 1) / 3 + p->N);
   double W = copysign (sqrt (p->speed * p->speed + 4 * kappa), p->speed), m = 4 * kappa / (W * W);
@@ -67,4 +67,4 @@ static void truth (const void *parameter, double t, double *q, double *v) {
 
 PW_MODEL (.about = "N four-bar linkages in a row, which pass singular poses", .parameters = parameters,
           .parameters_size = sizeof (four_bar), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
-          .build = build, .truth = truth);
+          .build = build, .reference = reference);

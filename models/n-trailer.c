@@ -59,7 +59,7 @@ static void build (pw_model *m, const void *parameter) {
 }
 
 /* All go round the centre, (0, R). */
-static void truth (const void *parameter, double t, double *q, double *v) {
+static void reference (const void *parameter, double t, double *q, double *v) {
   const trailers *p = parameter;
   double R = p->R, angle = -PW_PI / 2, L = p->L;
   for (int i = 0; i <= (int)p->n; i++, q += 3, v += 3) {
@@ -76,4 +76,4 @@ static void truth (const void *parameter, double t, double *q, double *v) {
 
 PW_MODEL (.about = "tractor with n trailers in a steady turn", .parameters = parameters,
           .parameters_size = sizeof (trailers), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
-          .build = build, .truth = truth);
+          .build = build, .reference = reference);

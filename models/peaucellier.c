@@ -88,7 +88,7 @@ static void known (const double from[2], const double to[2], const double from0[
   q[0] = (from[0] + to[0]) / 2, q[1] = (from[1] + to[1]) / 2, q[2] = start + remainder (now - start, 2 * PW_PI);
 }
 
-static void truth (const void *parameter, double t, double *q, double *v) {
+static void reference (const void *parameter, double t, double *q, double *v) {
   const inversor *p = parameter;
   joints j = place (p, p->swing * cos (p->omega * t)), j0 = place (p, p->swing);
   (void)v;
@@ -103,4 +103,4 @@ static void truth (const void *parameter, double t, double *q, double *v) {
 
 PW_MODEL (.about = "Peaucellier's inversor, which draws an exactly straight line", .parameters = parameters,
           .parameters_size = sizeof (inversor), .run = { .t_end = 1, .step = 1e-3, .method = "rk4+projection" },
-          .build = build, .truth = truth);
+          .build = build, .reference = reference);

@@ -45,7 +45,7 @@ static void build (pw_model *m, const void *parameter) {
 }
 
 /* A pendulum let go at psi = theta + pi / 2 from the lowest point: sin (psi / 2) = k sn (K - w t), k = sin (psi0 / 2). */
-static void truth (const void *parameter, double t, double *q, double *v) {
+static void reference (const void *parameter, double t, double *q, double *v) {
   const parallelogram *p = parameter;
   double k = sin (p->theta / 2 + PW_PI / 4), w = sqrt (p->g * (1.5 * p->m + p->mc) / (p->l * (p->m + p->mc)));
   double am = pw_jacobi_am (pw_elliptic_K (k * k) - w * t, k * k);
@@ -61,4 +61,4 @@ static void truth (const void *parameter, double t, double *q, double *v) {
 
 PW_MODEL (.about = "three cranks carry one coupler: one constraint row too many", .parameters = parameters,
           .parameters_size = sizeof (parallelogram), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
-          .build = build, .truth = truth);
+          .build = build, .reference = reference);

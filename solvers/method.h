@@ -30,13 +30,13 @@ struct pw_run {
   pw_geometry geometry;  /* how near the constraints are to a singular configuration */
   double refuse;         /* sine at which an evaluation is refused */
   int near;              /* 1 as soon as one was near a singular configuration */
-  double calm;           /* the largest accelerations away from singular poses, in units of L / T^2; at least 1 */
-  double before;         /* those of the last state away from them */
-  int differentiates;    /* 1: the method uses the derivatives of the equations (tangent.h) */
-  double alpha, beta;    /* Baumgarte's, used by pw_run_accelerate; 0: none */
-  double breakpoint;     /* first discontinuity of a signal after t */
-  int stuck;             /* steps in a row that were as good as none */
-  pw_residuals known;    /* of the state reached; NaN: not yet judged, nor told by a projection */
+  double calm;        /* the largest accelerations away from singular configurations, in units of L / T^2; at least 1 */
+  double before;      /* those of the last state away from them */
+  int differentiates; /* 1: the method uses the derivatives of the equations (tangent.h) */
+  double alpha, beta; /* Baumgarte's, used by pw_run_accelerate; 0: none */
+  double breakpoint;  /* first discontinuity of a signal after t */
+  int stuck;          /* steps in a row that were as good as none */
+  pw_residuals known; /* of the state reached; NaN: not yet judged, nor told by a projection */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;
@@ -203,7 +203,7 @@ static inline double pw_before_breakpoint (const pw_run *r, double t) {
   return t < r->breakpoint ? t : nextafter (r->breakpoint, -INFINITY);
 }
 
-/* The same where J is swept and the saddle factorised at this pose, and the rates are placed. */
+/* The same where J is swept and the saddle factorised at this configuration, and the rates are placed. */
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda);
 
 /* The same where J is swept and the rates are placed, but the saddle is not factorised; gamma is in lambda. */
@@ -223,7 +223,7 @@ static inline void pw_forget_residuals (pw_run *r) {
   r->known.position = r->known.velocity = NAN;
 }
 
-/* What the i-th redundant row follows from, at the pose J is swept and the saddle factorised at. */
+/* What the i-th redundant row follows from, at the configuration J is swept and the saddle factorised at. */
 void pw_rank_coefficients (pw_run *r, int i);
 
 /* ---- Projection ---- */
@@ -241,7 +241,7 @@ typedef struct {
 } pw_projector;
 
 /* Position metric `weight_q` and velocity metric `weight_v` (NULL: the mass matrix).  The
- * system must be placed at a typical pose with J swept. */
+ * system must be placed at a typical configuration with J swept. */
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error);
 /* The same with the metric that the method's options ask for. */
 int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error);
@@ -251,7 +251,7 @@ void pw_projector_close (pw_projector *p);
  * swept.  PW_RETRY if it does not converge; *row then tells the worst constraint and *worst its residual. */
 int pw_project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row, double *worst);
 
-/* One linear solve for J v = eta at the placed pose; the rates are placed.  PW_RETRY if singular; PW_METHOD if a signal of
+/* One linear solve for J v = eta at the placed configuration; the rates are placed.  PW_RETRY if singular; PW_METHOD if a signal of
  * them failed. */
 int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
 

@@ -117,7 +117,7 @@ void pw_run_close (pw_run *r);
 
 /* Saves the state reached, behind what the archive has already, and goes on from there as a run that is loaded from it:
  * matrices are planned anew, and a method with a memory of earlier steps starts anew, which its statistics count.
- * Samples of the last step must have been taken.  PW_RETRY near a singular pose, where nothing is done: try after the
+ * Samples of the last step must have been taken.  PW_RETRY near a singular configuration, where nothing is done: try after the
  * next step.  Errors: PW_RESOURCE. */
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error);
 
@@ -189,10 +189,10 @@ typedef struct {
 typedef struct {
   int kinds;
   pw_profile_kind *kind;
-  double poses;         /* kinematics of the bodies alone */
-  double kinematics;    /* and signals */
-  double equations;     /* J, gamma, f */
-  double stabilisation; /* Baumgarte's terms */
+  double configurations; /* kinematics of the bodies alone */
+  double kinematics;     /* and signals */
+  double equations;      /* J, gamma, f */
+  double stabilisation;  /* Baumgarte's terms */
   double factorisation, solution;
   double evaluation;  /* all in one go */
   double evaluations; /* per step, without those after projections; 0: steps are not made of such evaluations */

@@ -1,4 +1,4 @@
-/* Whole runs by the programs of benchmarks/baseline, as rungs of a ladder: step or tolerance in, positions out. */
+/* Whole runs by the programs of benchmarks/baseline, as levels of a ladder: step or tolerance in, positions out. */
 #ifndef BY_HAND_H
 #define BY_HAND_H
 

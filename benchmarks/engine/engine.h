@@ -41,7 +41,7 @@ pw_system *engine_grid (int cells);  /* cells x cells squares of pinned bars, 2 
 pw_run *engine_open (pw_system *s, const char *method, const pw_settings *settings);
 pw_model *engine_describe_chain (int links); /* the chain's description, built */
 
-/* A consistent pose and rates of the chain or snake with bent joints; arrays of 3 links (+ 3). */
+/* A consistent configuration and rates of the chain or snake with bent joints; arrays of 3 links (+ 3). */
 void engine_bend (int links, int free, double *q, double *v);
 
 /* The largest difference of two arrays, relative to the largest value. */

@@ -5,7 +5,7 @@ double ladder_rung (const ladder *l, int i) {
   return l->first * pow (l->factor, i);
 }
 
-void ladder_take (ladder *l, void *scene, const double *truth, int n, double *q, int round, int rung) {
+void ladder_take (ladder *l, void *scene, const double *reference, int n, double *q, int round, int rung) {
   ladder_point *p = &l->point[rung];
   double start = timing_now ();
   p->rung = ladder_rung (l, rung);
@@ -13,7 +13,7 @@ void ladder_take (ladder *l, void *scene, const double *truth, int n, double *q,
   p->cpu[round] = timing_now () - start;
   p->error = 0;
   for (int j = 0; j < n; j++)
-    if (j % 3 < 2) p->error = isnan (q[j]) ? NAN : fmax (p->error, fabs (q[j] - truth[j]));
+    if (j % 3 < 2) p->error = isnan (q[j]) ? NAN : fmax (p->error, fabs (q[j] - reference[j]));
 }
 
 void ladder_sort (ladder *l, int rounds) {

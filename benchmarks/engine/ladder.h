@@ -27,7 +27,7 @@ struct ladder {
 double ladder_rung (const ladder *l, int i);
 
 /* Takes one point; the error is that of the lengths among n coordinates, with room for them in q. */
-void ladder_take (ladder *l, void *scene, const double *truth, int n, double *q, int round, int rung);
+void ladder_take (ladder *l, void *scene, const double *reference, int n, double *q, int round, int rung);
 
 /* Sorts the times of so many rounds; the median is then in the middle. */
 void ladder_sort (ladder *l, int rounds);

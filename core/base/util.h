@@ -49,7 +49,7 @@ void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value); /* -1, or the value the name already has */
 int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
 
-/* A growing store that is freed as a whole. */
+/* A growing store that is released as a whole. */
 typedef struct {
   struct pw_chunk *chunk;
 } pw_arena;

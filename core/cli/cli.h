@@ -50,7 +50,7 @@ typedef struct {
 PW_COMMANDS (PW_COMMAND)
 
 /* Entries of a table of options: a text, a list of texts (the option may be repeated), a flag (an int).  They are zero if
- * the option is not given, and freed with the command line.  `type` is the structure, `name` "every", `letter` 'e' or 0. */
+ * the option is not given, and released with the command line.  `type` is the structure, `name` "every", `letter` 'e' or 0. */
 #define PW_TEXT_OPTION(type, member, name, letter, value, help) \
   { name, letter, POPT_ARG_STRING, (void *)offsetof (type, member), 0, help, value }
 #define PW_LIST_OPTION(type, member, name, letter, value, help) \

@@ -35,7 +35,7 @@ static int command_table (pw_cli_line *l, const struct poptOption *options) {
   return PW_OK;
 }
 
-/* popt allocates copies of texts, and lists of copies: records that of an option just read, to be freed even if the variable
+/* popt allocates copies of texts, and lists of copies: records that of an option just read, to be released even if the variable
  * changes.  If an option is repeated, a text replaces the previous one, a list grows. */
 static void command_note (pw_cli_line *l, int i) {
   unsigned type = l->table[i].argInfo & POPT_ARG_MASK;

@@ -154,7 +154,7 @@ pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *
 
 #define PW_CHECKPOINT_MAGIC "pinwheel checkpoint 1\n"
 
-/* Writes a checkpoint and completes the file, which is freed in every case: there is always a complete one.  The head
+/* Writes a checkpoint and completes the file, which is released in every case: there is always a complete one.  The head
  * begins with PW_CHECKPOINT_MAGIC and ends with "end\n".  Errors: PW_RESOURCE. */
 int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error);
 /* The same, to the file at a path. */
@@ -199,7 +199,7 @@ void pw_json_flag (pw_json *j, const char *key, int value);
 
 /* ---- Summaries ---- */
 
-/* How far a run was from the truth: the largest coordinate and rate of lengths, angles, speeds [m/s] and angular rates; of
+/* How far a run was from the reference: the largest coordinate and rate of lengths, angles, speeds [m/s] and angular rates; of
  * reactions relative to the largest one of the same unit.  NaN: not known. */
 typedef struct {
   const char *source; /* "the model", or the path of a table */
@@ -213,10 +213,10 @@ typedef struct {
   const char *model, *method;
   const char *status; /* "ok", "input", "start", "method", "machine", "interrupted" */
   const char *reason;
-  double cpu;                      /* [s], integration alone */
-  const char *const *redundant;    /* what is said about each redundant row, ended by NULL; may be NULL: none */
-  const pw_reference_error *truth; /* NULL: there is none to compare with */
-  double unbalanced;               /* relative, as pw_run_energy_defect says; NaN: not known */
+  double cpu;                          /* [s], integration alone */
+  const char *const *redundant;        /* what is said about each redundant row, ended by NULL; may be NULL: none */
+  const pw_reference_error *reference; /* NULL: there is none to compare with */
+  double unbalanced;                   /* relative, as pw_run_energy_defect says; NaN: not known */
 } pw_summary;
 
 /* Writes the JSON summary: whatever is not known (model and method too may be NULL) or not finite is null. */

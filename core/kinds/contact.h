@@ -14,7 +14,7 @@
 
 /* Where a wheel at a point of a body touches the ground, and its heading there: for paths and pictures.  `at` and
  * `heading` are in the body's frame, out in the world's. */
-static inline void contact_place (const pw_pose *A, const double at[2], double heading, double out[3]) {
+static inline void contact_place (const pw_configuration *A, const double at[2], double heading, double out[3]) {
   out[0] = A->x + A->cos * at[0] - A->sin * at[1];
   out[1] = A->y + A->sin * at[0] + A->cos * at[1];
   out[2] = A->phi + heading;
@@ -30,9 +30,9 @@ static inline contact contact_make (const double at[2], double heading, double a
   return (contact){ a, b, at[0] * b - at[1] * a, { at[0], at[1] }, heading };
 }
 
-#define CONTACT_PARTS                                 \
-  const contact *k = (const contact *)b->element + e; \
-  const pw_pose *A = &b->pose[b->body[e]];            \
+#define CONTACT_PARTS                                        \
+  const contact *k = (const contact *)b->element + e;        \
+  const pw_configuration *A = &b->configuration[b->body[e]]; \
   const double x = A->cos * k->a - A->sin * k->b, y = A->sin * k->a + A->cos * k->b
 
 static inline void contact_J (const pw_batch *b, double *out) {

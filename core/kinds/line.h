@@ -33,7 +33,7 @@ static inline line line_make (const double at[2][2], double heading) {
   return k;
 }
 
-static inline line_axes line_turn (const line *k, const pw_pose *A, const pw_pose *B) {
+static inline line_axes line_turn (const line *k, const pw_configuration *A, const pw_configuration *B) {
   line_axes s = { .nx = B->cos * k->n[0] - B->sin * k->n[1], .ny = B->sin * k->n[0] + B->cos * k->n[1] };
   s.tx = s.ny, s.ty = -s.nx;
   s.X = A->cos * k->s1[0] - A->sin * k->s1[1], s.Y = A->sin * k->s1[0] + A->cos * k->s1[1];
@@ -47,7 +47,8 @@ static inline double line_g (const line *k, const line_axes *s) {
   return s->nD - k->c;
 }
 
-static inline double line_g_size (const line *k, const line_axes *s, const pw_pose *A, const pw_pose *B) {
+static inline double line_g_size (const line *k, const line_axes *s, const pw_configuration *A,
+                                  const pw_configuration *B) {
   return fabs (s->nx) * (fabs (A->x) + fabs (s->X) + fabs (B->x)) +
          fabs (s->ny) * (fabs (A->y) + fabs (s->Y) + fabs (B->y)) + fabs (k->c);
 }
@@ -56,7 +57,7 @@ static inline void line_J (const line_axes *s, double *out) {
   out[0] = s->nx, out[1] = s->ny, out[2] = s->ta, out[3] = -s->nx, out[4] = -s->ny, out[5] = -s->tD;
 }
 
-static inline double line_gamma (const line_axes *s, const pw_pose *A, const pw_pose *B) {
+static inline double line_gamma (const line_axes *s, const pw_configuration *A, const pw_configuration *B) {
   double w1 = A->omega, w2 = B->omega, tV = s->tx * (A->vx - B->vx) + s->ty * (A->vy - B->vy);
   return 2 * w2 * tV + w1 * (w1 - 2 * w2) * s->na + w2 * w2 * s->nD;
 }
@@ -79,7 +80,8 @@ static inline void line_jtl_q (const line_axes *s, double l, double *out) {
   out[14] = -l * s->na, out[17] = out[32] = l * s->na, out[35] = -l * s->nD;
 }
 
-static inline void line_gamma_q (const line_axes *s, const pw_pose *A, const pw_pose *B, double *out) {
+static inline void line_gamma_q (const line_axes *s, const pw_configuration *A, const pw_configuration *B,
+                                 double *out) {
   double w1 = A->omega, w2 = B->omega, nV = s->nx * (A->vx - B->vx) + s->ny * (A->vy - B->vy);
   out[0] = w2 * w2 * s->nx;
   out[1] = w2 * w2 * s->ny;
@@ -89,16 +91,17 @@ static inline void line_gamma_q (const line_axes *s, const pw_pose *A, const pw_
   out[5] = 2 * w2 * nV - w1 * (w1 - 2 * w2) * s->ta - w2 * w2 * s->tD;
 }
 
-static inline void line_gamma_v (const line_axes *s, const pw_pose *A, const pw_pose *B, double *out) {
+static inline void line_gamma_v (const line_axes *s, const pw_configuration *A, const pw_configuration *B,
+                                 double *out) {
   const double v[6] = { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega };
   line_curve (s, -2, v, out);
 }
 
 /* ---- Batches of one equation per element, a line ---- */
 
-#define LINE_PARTS                                                                \
-  const line *k = (const line *)b->element + e;                                   \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
+#define LINE_PARTS                                                                                           \
+  const line *k = (const line *)b->element + e;                                                              \
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
   const line_axes s = line_turn (k, A, B)
 
 static inline void lines_jw_q (const pw_batch *b, double *out) {

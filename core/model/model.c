@@ -193,11 +193,11 @@ int pw_model_initial (const pw_model *m) {
 
 const pw_reference_text *pw_model_reference (const pw_model *m) {
   static const pw_reference_text nothing;
-  return m->truth ? m->truth : &nothing;
+  return m->reference ? m->reference : &nothing;
 }
 
-void pw_model_set_reference (pw_model *m, const pw_reference_text *truth) {
-  m->truth = truth;
+void pw_model_set_reference (pw_model *m, const pw_reference_text *reference) {
+  m->reference = reference;
 }
 
 int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object)) {
@@ -263,13 +263,13 @@ int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error
 /* ---- Reference solution: a function in C, or expressions of a text model ---- */
 
 int pw_system_has_reference (const pw_model *m) {
-  return m->table->truth != NULL || pw_model_reference (m)->states > 0;
+  return m->table->reference != NULL || pw_model_reference (m)->states > 0;
 }
 
 int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error) {
   int n = pw_system_coordinates (s);
   for (int j = 0; j < n; j++) q[j] = v[j] = NAN;
-  if (m->table->truth) m->table->truth (m->parameters, t, q, v);
+  if (m->table->reference) m->table->reference (m->parameters, t, q, v);
   const pw_reference_text *text = pw_model_reference (m);
   for (int i = 0; i < text->states; i++) {
     int state = pw_system_find_state (s, text->state[i], error);

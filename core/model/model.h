@@ -29,8 +29,8 @@ struct pw_model {
   int elements, element_room;
   pw_given *given;
   int givens, given_room;
-  const pw_reference_text *truth;
-  struct pw_kept *kept; /* freed with the model */
+  const pw_reference_text *reference;
+  struct pw_kept *kept; /* released with the model */
   int built;
   pw_error error; /* the first one */
 };

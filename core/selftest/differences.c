@@ -9,10 +9,10 @@ static const char *const differences_name[PW_BLOCKS] = {
   [PW_GAMMA_V] = "gamma_v", [PW_FORCE_Q] = "force_q", [PW_FORCE_V] = "force_v",
 };
 
-/* The slab and block of the i-th one; NULL if there are no more, and then *count how many there are. */
+/* The batch and block of the i-th one; NULL if there are no more, and then *count how many there are. */
 static const pw_element_batch *differences_find (const pw_system *s, int i, pw_block *block, int *count) {
   *count = 0;
-  for (const pw_element_batch *k = s->slab; k < s->slab + s->slabs; k++)
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
     for (int b = 0; b < PW_BLOCKS; b++) {
       if (b == PW_JTL_Q || pw_block_function (k->kind, (pw_block)b) != pw_by_differences || (*count)++ != i) continue;
       *block = (pw_block)b;
@@ -47,7 +47,7 @@ static int differences_built_in (const pw_kind *kind) {
   return pw_kinds[i] != NULL;
 }
 
-/* Elements of the slab that are looked at: the first, the last, one between. */
+/* Elements of the batch that are looked at: the first, the last, one between. */
 static int differences_missing (const pw_workspace *w, pw_element_batch *k, char *buffer, size_t size) {
   const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
   for (int b = 0; b < PW_BLOCKS; b++)
@@ -63,7 +63,7 @@ static void differences_random (pw_random *random, double *x, int n) {
   for (int i = 0; i < n; i++) x[i] = pw_random_between (random, -1, 1);
 }
 
-/* Directions, multipliers and signals of a slab are random. */
+/* Directions, multipliers and signals of a batch are random. */
 static int differences_look (pw_workspace *w, pw_element_batch *k, pw_random *random, char *buffer, size_t size) {
   int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
   double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);
@@ -81,7 +81,7 @@ int pw_find_missing (pw_workspace *w, double t, const double *q, const double *v
   const pw_system *s = w->s;
   pw_random random = { 1 };
   int own = 0, found = 0;
-  for (pw_element_batch *k = w->slab; k < w->slab + s->slabs; k++) own += !differences_built_in (k->kind);
+  for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) own += !differences_built_in (k->kind);
   if (own == 0) return 0;
   double *state = malloc ((2 * (size_t)s->coords + 1) * sizeof *state);
   if (state == NULL) return PW_RESOURCE;
@@ -91,7 +91,7 @@ int pw_find_missing (pw_workspace *w, double t, const double *q, const double *v
     state[i] = (rate ? v[j] : q[j]) + 0.1 * unit * pw_random_between (&random, -1, 1);
   }
   pw_update_kinematics (w, t, state, state + s->coords);
-  for (pw_element_batch *k = w->slab; found == 0 && k < w->slab + s->slabs; k++)
+  for (pw_element_batch *k = w->batch; found == 0 && k < w->batch + s->batches; k++)
     if (!differences_built_in (k->kind)) found = differences_look (w, k, &random, buffer, size);
   free (state);
   pw_hold_signals (w, w->hold); /* signals are evaluated anew */

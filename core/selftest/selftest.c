@@ -287,9 +287,9 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
     pw_system_free (s);
     return PW_RESOURCE;
   }
-  pw_probe x = { .kind = kind, .s = s, .work = w, .k = w->slab, .rows = kind->rows, .report = report };
-  x.elements = s->slab->b.count;
-  x.cols = s->slab->b.cols;
+  pw_probe x = { .kind = kind, .s = s, .work = w, .k = w->batch, .rows = kind->rows, .report = report };
+  x.elements = s->batch->b.count;
+  x.cols = s->batch->b.cols;
   for (int j = 3 * s->bodies; j < s->coords; j++)
     pw_probe_note (report, "table", "", !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
                    "inertia of an own coordinate");

@@ -1,6 +1,6 @@
-/* The self-test of a kind where a scene uses it: with its own elements, signals and numbers, at its own pose.
+/* The self-test of a kind where a scene uses it: with its own elements, signals and numbers, at its own configuration.
  *
- * Everything moves at random around the pose, in units of the scene.  The kind's derivatives along that motion are compared
+ * Everything moves at random around the configuration, in units of the scene.  The kind's derivatives along that motion are compared
  * with differences over steps from 2^-8 to 2^-20, of which the best counts for each entry: a right formula agrees with one
  * of them whatever its own scale is, a wrong one is off by about its size with all. */
 #include <float.h>
@@ -301,7 +301,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
   if (w == NULL) return PW_RESOURCE;
   int status = PW_OK;
   w->scale.time = T;
-  for (pw_element_batch *k = w->slab; k < w->slab + s->slabs && status == PW_OK; k++) {
+  for (pw_element_batch *k = w->batch; k < w->batch + s->batches && status == PW_OK; k++) {
     if (k->kind != kind || k->b.count == 0) continue;
     scene x = { .s = s, .work = w, .k = k, .t = t, .report = report };
     if (scene_open (&x) == PW_OK) {

@@ -31,7 +31,7 @@ static const double *verify_sweep (verify *x, const pw_element_batch *k, pw_batc
   return x->block;
 }
 
-/* Sums up J v, J a and J^T lambda of a slab. */
+/* Sums up J v, J a and J^T lambda of a batch. */
 static void verify_products (verify *x, const pw_element_batch *k, const double *v, const double *a,
                              const double *lambda) {
   int rows = k->kind->rows, cols = k->b.cols;
@@ -106,8 +106,8 @@ static void verify_all (verify *x, const double *v, const double *a, const doubl
   const pw_system *s = x->s;
   double L = x->w->scale.length, T = x->w->scale.time;
   for (int j = 0; j < s->coords; j++) verify_add (&x->force[j], &x->force_size[j], s->mass[j] * a[j]);
-  for (int i = 0; i < s->slabs; i++) {
-    const pw_element_batch *k = &x->w->slab[i];
+  for (int i = 0; i < s->batches; i++) {
+    const pw_element_batch *k = &x->w->batch[i];
     if (k->kind->rows > 0) verify_rows (x, k, v, a, lambda);
     if (k->kind->force) verify_forces (x, k);
   }
@@ -122,8 +122,8 @@ static void verify_all (verify *x, const double *v, const double *a, const doubl
 /* The most numbers a sweep of any kind in use fills. */
 static size_t verify_room (const pw_system *s) {
   size_t most = 1;
-  for (int i = 0; i < s->slabs; i++) {
-    const pw_element_batch *k = &s->slab[i];
+  for (int i = 0; i < s->batches; i++) {
+    const pw_element_batch *k = &s->batch[i];
     size_t n = (size_t)k->b.count * (size_t)k->b.cols * (size_t)(k->kind->rows > 0 ? k->kind->rows : 1);
     if (n > most) most = n;
   }

@@ -34,11 +34,11 @@ int pw_block_rows (const pw_kind *kind, pw_block block) {
   return blocks_table[block].columns ? 3 * kind->bodies + kind->own : kind->rows;
 }
 
-/* A batch of one element with poses of its own, which can be moved without moving its neighbours. */
+/* A batch of one element with configurations of its own, which can be moved without moving its neighbours. */
 typedef struct {
   pw_batch b;
   int body[PW_MAX_BODIES];
-  pw_pose pose[PW_MAX_BODIES];
+  pw_configuration configuration[PW_MAX_BODIES];
   double q[PW_MAX_INTERNAL], v[PW_MAX_INTERNAL];
 } blocks_single;
 
@@ -48,7 +48,7 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
   one->b.count = 1;
   one->b.element = (const char *)k->b.element + (size_t)e * kind->element;
   for (int n = 0; n < kind->bodies; n++) {
-    one->pose[n] = k->b.pose[k->b.body[e * kind->bodies + n]];
+    one->configuration[n] = k->b.configuration[k->b.body[e * kind->bodies + n]];
     one->body[n] = n;
   }
   for (int n = 0; n < kind->own; n++) {
@@ -56,7 +56,7 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
     one->v[n] = k->b.v[e * kind->own + n];
   }
   one->b.body = one->body;
-  one->b.pose = one->pose;
+  one->b.configuration = one->configuration;
   one->b.q = one->q;
   one->b.v = one->v;
   one->b.u = k->b.u + 3 * e * kind->signals;
@@ -67,7 +67,7 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
 /* The number behind local column c. */
 static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, int rates) {
   if (c >= 3 * kind->bodies) return (rates ? one->v : one->q) + c - 3 * kind->bodies;
-  pw_pose *p = &one->pose[c / 3];
+  pw_configuration *p = &one->configuration[c / 3];
   double *const q[] = { &p->x, &p->y, &p->phi }, *const v[] = { &p->vx, &p->vy, &p->omega };
   return rates ? v[c % 3] : q[c % 3];
 }
@@ -78,8 +78,8 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
   double J[PW_MAX_ROWS * PW_MAX_COLS] = { 0 };
   memset (y, 0, PW_MAX_COLS * sizeof *y);
   for (int n = 0; n < kind->bodies; n++) {
-    one->pose[n].cos = cos (one->pose[n].phi);
-    one->pose[n].sin = sin (one->pose[n].phi);
+    one->configuration[n].cos = cos (one->configuration[n].phi);
+    one->configuration[n].sin = sin (one->configuration[n].phi);
   }
   if (below == NULL) return;
   if (blocks_table[block].product == BLOCKS_RAW) {

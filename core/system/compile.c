@@ -81,7 +81,7 @@ static int compile_count (pw_compilation *c, pw_error *error) {
   c->size.coords = (int)coords;
   c->size.rows = (int)rows;
   c->size.entries = (int)entries;
-  c->size.slabs = c->kinds;
+  c->size.batches = c->kinds;
   c->text = strlen (m->name) + 1;
   for (int i = 0; i < m->bodies; i++) c->text += strlen (m->body[i].name) + 1;
   for (int i = 0; i < m->elements; i++) {
@@ -118,7 +118,7 @@ static void compile_layout (const pw_compilation *c, pw_layout *l, pw_system **s
   pw_system *s = pw_take (l, 1, sizeof *s), none;
   if (l->base == NULL) s = &none;
   *s = c->size;
-  s->slab = pw_take (l, (size_t)c->size.slabs + 1, sizeof *s->slab);
+  s->batch = pw_take (l, (size_t)c->size.batches + 1, sizeof *s->batch);
   s->source = pw_take (l, (size_t)c->size.sources, sizeof *s->source);
   s->body_name = pw_take (l, bodies, sizeof *s->body_name);
   s->mass = pw_take (l, coords, sizeof *s->mass);
@@ -128,7 +128,7 @@ static void compile_layout (const pw_compilation *c, pw_layout *l, pw_system **s
   s->v0 = pw_take (l, coords, sizeof *s->v0);
   s->held = pw_take (l, 2 * coords, 1);
   s->entry = pw_take (l, (size_t)c->size.entries, sizeof *s->entry);
-  for (int i = 0; i < c->kinds; i++) compile_layout_slab (c, l, l->base ? s->slab + i : NULL, i);
+  for (int i = 0; i < c->kinds; i++) compile_layout_slab (c, l, l->base ? s->batch + i : NULL, i);
   pools->table = pw_take (l, 4 * c->points, sizeof (double));
   pools->state = pw_take (l, (size_t)c->size.reads, sizeof (int));
   pools->text = pw_take (l, c->text, 1);

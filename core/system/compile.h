@@ -16,10 +16,10 @@ typedef struct {
 typedef struct {
   const pw_model *m;
   pw_names body, element;
-  const pw_kind **kind;   /* kinds in use, in the order of the slabs */
+  const pw_kind **kind;   /* kinds in use, in the order of the batches */
   int *count;             /* elements of each */
-  int *slab_of;           /* slab of each element */
-  pw_batch_arrays *array; /* of each slab */
+  int *slab_of;           /* batch of each element */
+  pw_batch_arrays *array; /* of each batch */
   int kinds;
   pw_system size;          /* its counts */
   size_t text;             /* bytes of all names */

@@ -90,17 +90,17 @@ static int compile_prepare (const pw_compilation *c, const pw_system *s, const p
     if (c->prepared[size + (size_t)i] != PW_COMPILE_MARK)
       return pw_fail (error, PW_INPUT, "model %s: kind %s: prepare writes more than the %zu bytes of .element",
                       c->m->name, kind->name, size);
-  memcpy (c->array[k - s->slab].element + (size_t)e * size, c->prepared, size);
+  memcpy (c->array[k - s->batch].element + (size_t)e * size, c->prepared, size);
   return PW_OK;
 }
 
-/* Puts element `e` of its slab where the kind will find it; `body` is the one an each_body kind acts on, or -1. */
+/* Puts element `e` of its batch where the kind will find it; `body` is the one an each_body kind acts on, or -1. */
 static int compile_element (const pw_compilation *c, pw_system *s, pw_element_batch *k, int e, const pw_element *from,
                             int body, pw_error *error) {
   static const pw_body ground = { .name = "ground" };
   const pw_kind *kind = k->kind;
   const pw_body *bodies[PW_MAX_BODIES];
-  const pw_batch_arrays *array = &c->array[k - s->slab];
+  const pw_batch_arrays *array = &c->array[k - s->batch];
   int *place = array->body + e * kind->bodies, *column = array->column + e * kind->bodies;
   for (int n = 0; n < kind->bodies; n++) {
     int index = body >= 0
@@ -123,7 +123,7 @@ static int compile_element (const pw_compilation *c, pw_system *s, pw_element_ba
   return PW_OK;
 }
 
-/* Puts an element of the description, once or for every body with mass; *e counts the elements of the slab. */
+/* Puts an element of the description, once or for every body with mass; *e counts the elements of the batch. */
 static int compile_put (const pw_compilation *c, pw_system *s, pw_element_batch *k, int *e, const pw_element *from,
                         pw_pools *pools, pw_error *error) {
   const char *name = compile_text (pools, pw_element_name (from));
@@ -141,11 +141,11 @@ static int compile_put (const pw_compilation *c, pw_system *s, pw_element_batch 
 
 /* After the elements, whose own coordinates a signal may read. */
 static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
-  int *next = c->count; /* from now on counts the elements seen of each slab */
-  memset (next, 0, (size_t)s->slabs * sizeof *next);
+  int *next = c->count; /* from now on counts the elements seen of each batch */
+  memset (next, 0, (size_t)s->batches * sizeof *next);
   for (int n = 0; n < c->m->elements; n++) {
     const pw_element *from = &c->m->element[n];
-    pw_element_batch *k = &s->slab[c->slab_of[n]];
+    pw_element_batch *k = &s->batch[c->slab_of[n]];
     for (int copy = pw_compile_copies (c->m, k->kind); copy > 0; copy--) {
       int e = next[c->slab_of[n]]++;
       for (int u = 0; u < k->kind->signals; u++) {
@@ -163,8 +163,8 @@ static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *poo
 static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
   int row = 0, own = 3 * s->bodies;
   pw_source *source = s->source;
-  for (int i = 0; i < s->slabs; i++) {
-    pw_element_batch *k = &s->slab[i];
+  for (int i = 0; i < s->batches; i++) {
+    pw_element_batch *k = &s->batch[i];
     k->row = row;
     k->own = own;
     k->source = source;
@@ -191,8 +191,8 @@ static int compile_works (const pw_element_batch *k, int element) {
 
 static void compile_entries (pw_system *s) {
   pw_entry *entry = s->entry;
-  for (int i = 0; i < s->slabs; i++) {
-    const pw_element_batch *k = &s->slab[i];
+  for (int i = 0; i < s->batches; i++) {
+    const pw_element_batch *k = &s->batch[i];
     for (int e = 0; e < k->b.count; e++)
       if (compile_works (k, e)) *entry++ = (pw_entry){ i, e, PW_WORK };
     for (int e = 0; k->kind->loss && e < k->b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
@@ -260,8 +260,8 @@ int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_
   compile_entries (s);
   s->scale = (pw_scale){ compile_length (c), 1 };
   compile_metric (s);
-  for (int i = 0; i < s->slabs; i++) {
-    const pw_kind *kind = s->slab[i].kind;
+  for (int i = 0; i < s->batches; i++) {
+    const pw_kind *kind = s->batch[i].kind;
     s->constraints += kind->rows > 0;
     s->moving += kind->eta != NULL;
     s->forces += kind->force && !kind->constant;

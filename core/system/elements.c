@@ -5,13 +5,13 @@
 
 int pw_system_elements (const pw_system *s) {
   int count = 0;
-  for (int i = 0; i < s->slabs; i++) count += s->slab[i].b.count;
+  for (int i = 0; i < s->batches; i++) count += s->batch[i].b.count;
   return count;
 }
 
 pw_element_info pw_system_element (const pw_system *s, int element) {
   pw_element_info x = { .contact = 0 };
-  const pw_element_batch *k = s->slab;
+  const pw_element_batch *k = s->batch;
   for (; element >= k->b.count; element -= k++->b.count) {
     x.contact += k->kind->contact ? k->b.count : 0;
     x.force += 3 * k->b.count * k->kind->bodies;
@@ -28,7 +28,7 @@ pw_element_info pw_system_element (const pw_system *s, int element) {
 
 int pw_system_row_element (const pw_system *s, int row) {
   int element = 0;
-  const pw_element_batch *k = s->slab;
+  const pw_element_batch *k = s->batch;
   for (; row >= k->row + k->b.count * k->kind->rows; k++) element += k->b.count;
   return element + (row - k->row) / k->kind->rows;
 }
@@ -42,14 +42,14 @@ static int elements_place (pw_workspace *w, double t, const double *q, const dou
 
 int pw_system_contacts (const pw_system *s) {
   int count = 0;
-  for (int i = 0; i < s->slabs; i++) count += s->slab[i].kind->contact ? s->slab[i].b.count : 0;
+  for (int i = 0; i < s->batches; i++) count += s->batch[i].kind->contact ? s->batch[i].b.count : 0;
   return count;
 }
 
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error) {
   int status = elements_place (w, t, q, v, error);
-  for (const pw_element_batch *k = w->slab; status == PW_OK && k < w->slab + w->s->slabs; k++) {
+  for (const pw_element_batch *k = w->batch; status == PW_OK && k < w->batch + w->s->batches; k++) {
     if (k->kind->contact == NULL) continue;
     k->kind->contact (&k->b, out[0]);
     out += k->b.count;
@@ -77,7 +77,7 @@ static void elements_applied (const pw_element_batch *k, double *F) {
 
 int pw_system_force_size (const pw_system *s) {
   int size = 0;
-  for (int i = 0; i < s->slabs; i++) size += 3 * s->slab[i].b.count * s->slab[i].kind->bodies;
+  for (int i = 0; i < s->batches; i++) size += 3 * s->batch[i].b.count * s->batch[i].kind->bodies;
   return size;
 }
 
@@ -86,7 +86,7 @@ int pw_workspace_forces (pw_workspace *w, double t, const double *q, const doubl
   if (elements_place (w, t, q, v, error) != PW_OK) return PW_METHOD;
   memset (out, 0, (size_t)pw_system_force_size (w->s) * sizeof *out);
   pw_evaluate_J (w);
-  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (k->kind->rows) elements_reactions (k, lambda + k->row, out);
     if (k->kind->force) elements_applied (k, out);
     out += 3 * k->b.count * k->kind->bodies;
@@ -100,7 +100,7 @@ int pw_workspace_forces (pw_workspace *w, double t, const double *q, const doubl
 static int elements_jacobian (const pw_workspace *w, pw_equations *out) {
   const pw_system *s = w->s;
   int entries = 0;
-  for (const pw_element_batch *k = w->slab; k < w->slab + s->constraints; k++)
+  for (const pw_element_batch *k = w->batch; k < w->batch + s->constraints; k++)
     for (int i = 0; i < k->b.count * k->kind->rows; i++)
       for (int c = 0; c < k->b.cols; c++) {
         int column = pw_global (k, i / k->kind->rows, c);

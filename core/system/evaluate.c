@@ -4,8 +4,8 @@
 #include "system.h"
 #include "unroll.h"
 
-/* The slabs with rows come first. */
-#define EACH_CONSTRAINT(k, w) for (pw_element_batch *k = (w)->slab, *end = k + (w)->s->constraints; k < end; k++)
+/* The batches with rows come first. */
+#define EACH_CONSTRAINT(k, w) for (pw_element_batch *k = (w)->batch, *end = k + (w)->s->constraints; k < end; k++)
 
 void pw_evaluate_J (pw_workspace *w) {
   EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
@@ -73,14 +73,14 @@ void pw_evaluate_force (pw_workspace *w, double *f) {
 }
 
 void pw_evaluate_constant (pw_workspace *w, double *f) {
-  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++)
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++)
     if (k->kind->force && k->kind->constant) evaluate_add_force (k, f);
 }
 
 /* Sum of one number per element over all kinds that have the sweep. */
 static double evaluate_total (pw_workspace *w, size_t sweep) {
   double sum = 0;
-  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + sweep);
     if (f == NULL) continue;
     f (&k->b, k->block);
@@ -105,7 +105,7 @@ void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   double *eta = w->scratch;
   for (int i = 0; i < w->s->entries; i++) {
     const pw_entry *entry = &w->s->entry[i];
-    pw_element_batch *k = &w->slab[entry->slab];
+    pw_element_batch *k = &w->batch[entry->batch];
     int drive = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL;
     if (k != swept || (int)entry->type != type) {
       k->b.lambda = lambda + k->row;
@@ -123,7 +123,7 @@ void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   }
 }
 
-/* out = J w for a slab; the numbers of bodies and of own coordinates are constants where it is inlined. */
+/* out = J w for a batch; the numbers of bodies and of own coordinates are constants where it is inlined. */
 PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, const double *w, double *out, int bodies,
                              int own) {
   static const double ground[3] = { 0, 0, 0 };
@@ -141,7 +141,7 @@ PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, cons
 }
 
 void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
-  for (const pw_element_batch *k = w->slab, *end = k + w->s->constraints; k < end; k++) {
+  for (const pw_element_batch *k = w->batch, *end = k + w->s->constraints; k < end; k++) {
     double *to = out + k->row;
     if (k->kind->own == 0 && k->kind->bodies == 2)
       evaluate_mul (w->s, k, x, to, 2, 0);
@@ -153,7 +153,7 @@ void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
 }
 
 void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
-  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->constraints; k++) {
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints; k++) {
     const double *J = k->J;
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++, lambda++) {
@@ -192,7 +192,7 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
   r->row_position = worst.row;
 }
 
-/* Judges J v - eta of a slab at the placed rates, as evaluate_mul; eta NULL: zero. */
+/* Judges J v - eta of a batch at the placed rates, as evaluate_mul; eta NULL: zero. */
 PW_INLINE evaluate_worst evaluate_speeds_of (const pw_element_batch *k, const double *eta,
                                              const unsigned char *enforced, double unit, evaluate_worst worst,
                                              int bodies, int own) {
@@ -203,7 +203,7 @@ PW_INLINE evaluate_worst evaluate_speeds_of (const pw_element_batch *k, const do
     for (int r = 0; r < k->kind->rows; r++, i++) {
       double sum = 0, size = 0;
       PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
-        const pw_pose *p = &k->b.pose[body[n]];
+        const pw_configuration *p = &k->b.configuration[body[n]];
         double vx = J[0] * p->vx, vy = J[1] * p->vy, w = J[2] * p->omega;
         sum += vx + vy + w;
         size += fabs (vx) + fabs (vy) + fabs (w);

@@ -11,7 +11,7 @@ static int finite_first (const double *x, int count, int each) {
 }
 
 int pw_find_nonfinite (pw_workspace *w, char *buffer, size_t size) {
-  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     const char *what = "force";
     int e = -1, rows = k->kind->rows, n = k->b.count;
     if (k->kind->force) {

@@ -1,4 +1,4 @@
-/* Placing a state: the poses of all bodies, the signals of all elements. */
+/* Placing a state: the configurations of all bodies, the signals of all elements. */
 #include <math.h>
 #include "system.h"
 #include "signal.h"
@@ -6,7 +6,7 @@
 
 /* Own coordinates are read where the caller has them. */
 static void place_own (pw_workspace *w, const double *q, const double *v) {
-  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (q) k->b.q = q + k->own;
     k->b.v = v + k->own;
   }
@@ -14,9 +14,9 @@ static void place_own (pw_workspace *w, const double *q, const double *v) {
 
 static inline void place_poses (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) place_own (w, q, v);
-  for (pw_pose *p = w->pose, *end = p + w->s->bodies; p < end; p++, q += 3, v += 3) {
+  for (pw_configuration *p = w->configuration, *end = p + w->s->bodies; p < end; p++, q += 3, v += 3) {
     double phi = q[2];
-    *p = (pw_pose){ q[0], q[1], phi, cos (phi), sin (phi), v[0], v[1], v[2] };
+    *p = (pw_configuration){ q[0], q[1], phi, cos (phi), sin (phi), v[0], v[1], v[2] };
   }
 }
 
@@ -61,7 +61,7 @@ int pw_update_kinematics (pw_workspace *w, double t, const double *q, const doub
 
 int pw_update_velocities (pw_workspace *w, const double *v) {
   const double *from = v;
-  for (pw_pose *p = w->pose, *end = p + w->s->bodies; p < end; p++, from += 3) {
+  for (pw_configuration *p = w->configuration, *end = p + w->s->bodies; p < end; p++, from += 3) {
     p->vx = from[0];
     p->vy = from[1];
     p->omega = from[2];

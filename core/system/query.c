@@ -68,9 +68,9 @@ int pw_system_find_body (const pw_system *s, const char *name) {
   return -1;
 }
 
-/* The slab that owns a coordinate j >= 3 bodies, and the element's and quantity's numbers in it. */
+/* The batch that owns a coordinate j >= 3 bodies, and the element's and quantity's numbers in it. */
 static const pw_element_batch *query_owner (const pw_system *s, int j, int *element, int *number) {
-  for (const pw_element_batch *k = s->slab; k < s->slab + s->slabs; k++) {
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
     int n = j - k->own;
     if (k->kind->own == 0 || n < 0 || n >= k->b.count * k->kind->own) continue;
     *element = n / k->kind->own;
@@ -138,9 +138,9 @@ int pw_system_find_state (const pw_system *s, const char *name, pw_error *error)
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* The slab of a row, and the element and the row's number in it. */
+/* The batch of a row, and the element and the row's number in it. */
 static const pw_element_batch *query_row (const pw_system *s, int row, int *element, int *number) {
-  const pw_element_batch *k = s->slab;
+  const pw_element_batch *k = s->batch;
   while (row >= k->row + k->b.count * k->kind->rows) k++;
   *element = (row - k->row) / k->kind->rows;
   *number = (row - k->row) % k->kind->rows;
@@ -184,7 +184,7 @@ char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size
 
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   buffer[0] = 0;
-  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++) {
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     int signals = k->kind->signals;
     if (w->failed == NULL || w->failed < k->source || w->failed >= k->source + k->b.count * signals) continue;
     int i = (int)(w->failed - k->source), n = i % signals;
@@ -201,7 +201,7 @@ char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
 
 char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
   const pw_entry *x = &s->entry[entry];
-  const pw_element_batch *k = &s->slab[x->slab];
+  const pw_element_batch *k = &s->batch[x->batch];
   const char *what = x->type == PW_WORK ? "work" : "loss";
   if (k->kind->each_body)
     snprintf (buffer, size, "%s.%s.%s", k->name[x->element], s->body_name[k->b.body[x->element]], what);

@@ -3,7 +3,7 @@
 #include <stdio.h>
 #include "system.h"
 
-/* Fills the slab's block, 2 cols for each element. */
+/* Fills the batch's block, 2 cols for each element. */
 static int saturation_fill (const pw_element_batch *k) {
   int n = k->b.count * 2 * k->b.cols;
   for (int i = 0; i < n; i++) k->block[i] = INFINITY;

@@ -1,6 +1,6 @@
 /* The compiled system and the workspace of a run, for core/ and solvers/, not for models.
  *
- * Each is one allocation.  Index names: body b, slab k, element e of a slab, local column c of an element,
+ * Each is one allocation.  Index names: body b, batch k, element e of a batch, local column c of an element,
  * global coordinate j, row i.  Arrays that are scattered into have three entries more than there are coordinates:
  * the ground's, never read. */
 #ifndef PW_SYSTEM_H
@@ -27,45 +27,45 @@ typedef struct {
 
 /* An account of work or loss. */
 typedef struct {
-  int slab, element;
+  int batch, element;
   enum { PW_WORK, PW_LOSS } type;
 } pw_entry;
 
 /* Never modified after pw_system_compile: any number of runs and threads share it. */
 struct pw_system {
   const char *model;
-  int bodies, coords, rows, holonomic, slabs, entries;
-  int constraints;        /* slabs with rows */
-  int forces;             /* slabs with a force that is not constant */
-  int saturates;          /* 1: some of these have a sweep `saturation` */
-  int sources;            /* signals */
-  int readers;            /* function signals that read states */
-  int reads;              /* states read by them, in all */
-  int moving;             /* slabs with an eta: constraints that move */
-  pw_scale scale;         /* its time is 1 s: that of a run is in the workspace */
-  const char **body_name; /* bodies */
-  double *mass;           /* coords: diagonal of M */
-  double *constant;       /* coords + 3: sum of the forces that never change */
-  double *metric;         /* coords: M, and small weights where M is zero */
-  double *q0, *v0;        /* coords: the described start */
-  unsigned char *held;    /* 2 coords: where initial values are from: PW_GIVEN, ... */
-  pw_element_batch *slab; /* slabs: holonomic kinds first, then nonholonomic ones, then forces */
-  pw_source *source;      /* sources: slab by slab */
-  pw_entry *entry;        /* entries */
+  int bodies, coords, rows, holonomic, batches, entries;
+  int constraints;         /* batches with rows */
+  int forces;              /* batches with a force that is not constant */
+  int saturates;           /* 1: some of these have a sweep `saturation` */
+  int sources;             /* signals */
+  int readers;             /* function signals that read states */
+  int reads;               /* states read by them, in all */
+  int moving;              /* batches with an eta: constraints that move */
+  pw_scale scale;          /* its time is 1 s: that of a run is in the workspace */
+  const char **body_name;  /* bodies */
+  double *mass;            /* coords: diagonal of M */
+  double *constant;        /* coords + 3: sum of the forces that never change */
+  double *metric;          /* coords: M, and small weights where M is zero */
+  double *q0, *v0;         /* coords: the described start */
+  unsigned char *held;     /* 2 coords: where initial values are from: PW_GIVEN, ... */
+  pw_element_batch *batch; /* batches: holonomic kinds first, then nonholonomic ones, then forces */
+  pw_source *source;       /* sources: batch by batch */
+  pw_entry *entry;         /* entries */
 };
 
 /* What a run modifies (pinwheel.h). */
 struct pw_workspace {
   const pw_system *s;
-  pw_element_batch *slab;   /* slabs: the system's, with arrays of this workspace */
-  pw_element_batch **force; /* those with a force that is not constant */
-  pw_source *source;        /* sources */
-  pw_pose *pose;            /* bodies + 1; the last is the ground */
-  double *scratch;          /* rows x 3 + coords + 3 */
-  pw_scale scale;           /* the run's */
-  int hold;                 /* 1: signals of forces keep their values (inputs=held) */
-  double t_signal;          /* the time the signals were last evaluated at; NaN: never */
-  const pw_source *failed;  /* the signal that has failed last; NULL: none */
+  pw_element_batch *batch;         /* batches: the system's, with arrays of this workspace */
+  pw_element_batch **force;        /* those with a force that is not constant */
+  pw_source *source;               /* sources */
+  pw_configuration *configuration; /* bodies + 1; the last is the ground */
+  double *scratch;                 /* rows x 3 + coords + 3 */
+  pw_scale scale;                  /* the run's */
+  int hold;                        /* 1: signals of forces keep their values (inputs=held) */
+  double t_signal;                 /* the time the signals were last evaluated at; NaN: never */
+  const pw_source *failed;         /* the signal that has failed last; NULL: none */
 };
 
 /* Closes the contexts that functions have of their own; signals that have not been opened are all zero. */
@@ -93,7 +93,7 @@ static inline double pw_larger (double a, double b) {
   return a > b ? a : b;
 }
 
-/* ---- Placing: poses and signals for one (t, q, v), on which all sweeps below work ---- */
+/* ---- Placing: configurations and signals for one (t, q, v), on which all sweeps below work ---- */
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v);
 /* New velocities at unchanged time and positions; signals that read velocities are evaluated anew.  Returns as pw_update_kinematics. */
@@ -104,7 +104,7 @@ void pw_hold_signals (pw_workspace *w, int hold);
 
 /* ---- Sweeps; g and the like are `rows` long, f and w `coords` + 3 ---- */
 
-void pw_evaluate_J (pw_workspace *w);                    /* fills every slab's J */
+void pw_evaluate_J (pw_workspace *w);                    /* fills every batch's J */
 void pw_evaluate_g (pw_workspace *w, double *g);         /* holonomic rows only */
 void pw_evaluate_g_size (pw_workspace *w, double *size); /* not below the length scale */
 void pw_evaluate_eta (pw_workspace *w, double *eta);
@@ -163,11 +163,11 @@ pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block);
 /* Rows of a block per element: kind->rows, or the local columns. */
 int pw_block_rows (const pw_kind *kind, pw_block block);
 
-/* Fills count x block rows x cols for a slab whose poses, w and lambda are placed; by central differences of the
+/* Fills count x block rows x cols for a batch whose configurations, w and lambda are placed; by central differences of the
  * function below where the kind asks for it.  Returns 0 and leaves out alone where the block is identically zero. */
 int pw_evaluate_block (const pw_workspace *w, const pw_element_batch *k, pw_block block, double *out);
 
-/* 1 if the kind leaves the block of element e out as identically zero, but by differences it is not; poses, w and lambda are
+/* 1 if the kind leaves the block of element e out as identically zero, but by differences it is not; configurations, w and lambda are
  * placed. */
 int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block);
 

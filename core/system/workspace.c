@@ -15,7 +15,7 @@ static void workspace_batch (pw_layout *l, const pw_element_batch *from, const p
   if (l->base == NULL) return;
   *k = *from;
   k->J = J, k->block = space, k->b.u = k->u = u;
-  k->b.pose = w->pose;
+  k->b.configuration = w->configuration;
   k->b.q = w->s->q0 + k->own, k->b.v = w->s->v0 + k->own;
   k->source = w->source + (from->source - w->s->source);
 }
@@ -23,12 +23,12 @@ static void workspace_batch (pw_layout *l, const pw_element_batch *from, const p
 static void workspace_layout (pw_layout *l, pw_workspace *w) {
   const pw_system *s = w->s;
   pw_take (l, 1, sizeof *w);
-  w->slab = pw_take (l, (size_t)s->slabs, sizeof *w->slab);
+  w->batch = pw_take (l, (size_t)s->batches, sizeof *w->batch);
   w->force = pw_take (l, (size_t)s->forces, sizeof *w->force);
   w->source = pw_take (l, (size_t)s->sources, sizeof *w->source);
-  w->pose = pw_take (l, (size_t)s->bodies + 1, sizeof *w->pose);
+  w->configuration = pw_take (l, (size_t)s->bodies + 1, sizeof *w->configuration);
   w->scratch = pw_take (l, (size_t)(3 * s->rows + s->coords) + 3, sizeof *w->scratch);
-  for (int i = 0; i < s->slabs; i++) workspace_batch (l, &s->slab[i], w, l->base ? &w->slab[i] : NULL);
+  for (int i = 0; i < s->batches; i++) workspace_batch (l, &s->batch[i], w, l->base ? &w->batch[i] : NULL);
   double *x = pw_take (l, 2 * (size_t)s->reads, sizeof *x);
   for (int i = 0; l->base && i < s->sources; x += 2 * s->source[i++].reads) {
     w->source[i] = s->source[i];
@@ -39,7 +39,7 @@ static void workspace_layout (pw_layout *l, pw_workspace *w) {
 /* Functions that have a context of their own get one for this workspace. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
-  for (pw_element_batch *k = w->slab; k < w->slab + w->s->slabs; k++)
+  for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++)
     for (int i = 0; i < k->b.count * k->kind->signals; i++) {
       pw_function *f = &k->source[i].signal.function;
       k->source[i].u = k->u + 3 * i;
@@ -59,9 +59,9 @@ pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
     w->scale = s->scale;
     w->t_signal = NAN;
     workspace_layout (&(pw_layout){ (char *)w, 0 }, w);
-    w->pose[s->bodies].cos = 1;
-    for (int i = 0, n = 0; i < s->slabs; i++)
-      if (w->slab[i].kind->force && !w->slab[i].kind->constant) w->force[n++] = &w->slab[i];
+    w->configuration[s->bodies].cos = 1;
+    for (int i = 0, n = 0; i < s->batches; i++)
+      if (w->batch[i].kind->force && !w->batch[i].kind->constant) w->force[n++] = &w->batch[i];
     if (workspace_open_signals (w) == PW_OK) return w;
   }
   pw_workspace_free (w);

@@ -191,9 +191,9 @@ static void profile_measure (profile *p, pw_profile *x) {
     if (p->projector.position) profile_projection (p, x);
     x->evaluations = (double)p->done.rhs / (double)p->done.steps - x->projections;
   }
-  x->poses = profile_time (p, profile_poses);
-  for (; x->kinds < p->s->slabs; x->kinds++) {
-    p->k = &p->r->w->slab[x->kinds];
+  x->configurations = profile_time (p, profile_poses);
+  for (; x->kinds < p->s->batches; x->kinds++) {
+    p->k = &p->r->w->batch[x->kinds];
     profile_kind (p, &x->kind[x->kinds]);
   }
 }
@@ -227,7 +227,7 @@ static int profile_open (profile *p, pw_error *error) {
 
 int pw_run_profile (pw_run *r, pw_profile *x, pw_error *error) {
   profile p = { .r = r, .s = r->s, .done = r->statistics };
-  *x = (pw_profile){ .kind = calloc ((size_t)r->s->slabs + 1, sizeof *x->kind) };
+  *x = (pw_profile){ .kind = calloc ((size_t)r->s->batches + 1, sizeof *x->kind) };
   int status = x->kind ? profile_open (&p, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   if (status == PW_OK) status = pw_run_accelerate (r, p.t, p.q, p.v, p.a, p.lambda) == PW_OK ? PW_OK : PW_RETRY;
   if (status == PW_OK) profile_measure (&p, x);

@@ -138,13 +138,13 @@ int pw_initial_specified (const pw_system *s, int state) {
 }
 
 /* Fills the report; the state given is in q_given, the new one in q. */
-static void initial_report (pw_run *r, int freed, const pw_residuals *before) {
+static void initial_report (pw_run *r, int released, const pw_residuals *before) {
   pw_initial_report *report = &r->start;
   *report = (pw_initial_report){ .q_given = r->q_given,
                                  .v_given = r->v_given,
                                  .q = r->q,
                                  .v = r->v,
-                                 .freed = freed,
+                                 .released = released,
                                  .position = before->position,
                                  .velocity = before->velocity };
 }
@@ -233,16 +233,17 @@ static int initial_mask (const pw_system *s, const unsigned char *held, const st
 
 /* 1 if some of what the user gave is not in the mask. */
 static int initial_released (const pw_system *s, const unsigned char *held, const unsigned char *mask) {
-  int freed = 0;
-  for (int j = 0; held && j < 2 * s->coords; j++) freed |= held[j] & PW_GIVEN && !mask[j];
-  return freed;
+  int released = 0;
+  for (int j = 0; held && j < 2 * s->coords; j++) released |= held[j] & PW_GIVEN && !mask[j];
+  return released;
 }
 
 /* Redundant equations of larger scenes (rows times coordinates) are not looked for on behalf of what the model
  * specifies: sketches of linkages, of which all is specified, fail there as a rule. */
 #define INITIAL_SMALL 1e4
 
-static int initial_try (pw_run *r, const unsigned char *held, initial_failure *failure, int *freed, pw_error *error) {
+static int initial_try (pw_run *r, const unsigned char *held, initial_failure *failure, int *released,
+                        pw_error *error) {
   const int ways = sizeof initial_ways / sizeof *initial_ways;
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords;
@@ -259,7 +260,7 @@ static int initial_try (pw_run *r, const unsigned char *held, initial_failure *f
     before = ranked, placed = now.placed;
     if (now.row >= 0) *failure = now;
   }
-  *freed = initial_released (s, held, mask);
+  *released = initial_released (s, held, mask);
   free (mask);
   return status;
 }
@@ -269,7 +270,7 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *held, pw_error *erro
   size_t bytes = (size_t)s->coords * sizeof (double);
   pw_residuals before;
   initial_failure failure = { .row = -1 };
-  int freed = 0;
+  int released = 0;
   memcpy (r->q_given, r->q, bytes);
   memcpy (r->v_given, r->v, bytes);
   int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
@@ -277,8 +278,8 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *held, pw_error *erro
   pw_evaluate_J (r->w);
   pw_evaluate_residuals (r->w, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
-    status = initial_try (r, held, &failure, &freed, error);
-  initial_report (r, freed, &before);
+    status = initial_try (r, held, &failure, &released, error);
+  initial_report (r, released, &before);
   if (status == PW_OK) status = initial_locked (r, error);
   if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   return status == PW_RETRY ? initial_fail (r, &failure, error) : status;

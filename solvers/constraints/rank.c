@@ -25,7 +25,7 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
   const pw_system *s = w->s;
   int n = s->coords;
   memset (rows, 0, (size_t)s->rows * (size_t)n * sizeof *rows);
-  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->constraints; k++)
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints; k++)
     for (int i = 0; i < k->b.count * k->kind->rows; i++) {
       double *row = rows + (size_t)(k->row + i) * (size_t)n, square = 0;
       for (int c = 0; c < k->b.cols; c++) {
@@ -178,7 +178,7 @@ static void rank_take (pw_run *r) {
   double *shared = (double *)(void *)r->redundant_row - s->rows;
   r->redundant = 0;
   r->shared = NULL;
-  for (const pw_element_batch *k = r->w->slab; k < r->w->slab + s->constraints; k++)
+  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
     for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) {
       if (r->active[i]) continue;
       r->redundant_row[r->redundant++] = i;
@@ -263,7 +263,7 @@ void pw_rank_close (pw_run *r) {
 static void rank_row (const pw_workspace *w, int row, double *f) {
   const pw_system *s = w->s;
   memset (f, 0, (size_t)s->coords * sizeof *f);
-  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->constraints; k++) {
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints; k++) {
     int n = row - k->row;
     if (n < 0 || n >= k->b.count * k->kind->rows) continue;
     for (int c = 0; c < k->b.cols; c++) {
@@ -274,7 +274,7 @@ static void rank_row (const pw_workspace *w, int row, double *f) {
 }
 
 double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
-  for (const pw_element_batch *k = w->slab; k < w->slab + w->s->constraints; k++) {
+  for (const pw_element_batch *k = w->batch; k < w->batch + w->s->constraints; k++) {
     int n = row - k->row;
     if (n < 0 || n >= k->b.count * k->kind->rows) continue;
     const double *J = k->J + n * k->b.cols;
@@ -318,13 +318,13 @@ double pw_rank_conditioning (pw_run *r) {
   int m = s->rows, k = r->redundant;
   double *c = r->coefficient, *f = c + k * m + k * k + k, *nothing = f + s->coords + 3, most = 0;
   memset (f, 0, (size_t)(s->coords + 3 + m) * sizeof *f);
-  for (const pw_element_batch *b = r->w->slab; b < r->w->slab + s->constraints; b++)
+  for (const pw_element_batch *b = r->w->batch; b < r->w->batch + s->constraints; b++)
     for (int n = 0; n < b->b.count * b->kind->rows; n++) {
       double x = sin (2.39996 * (b->row + n + 1));
       if (!r->active[b->row + n]) rank_add_row (s, b, n, (x + copysign (1, x)) / 2, f);
     }
   pw_saddle_solve (r->saddle, f, nothing, f, c);
-  for (const pw_element_batch *b = r->w->slab; b < r->w->slab + s->constraints; b++)
+  for (const pw_element_batch *b = r->w->batch; b < r->w->batch + s->constraints; b++)
     for (int n = 0; n < b->b.count * b->kind->rows; n++)
       if (r->active[b->row + n]) most = pw_largest (most, fabs (c[b->row + n]) * rank_length (s, b, n));
   return isnan (most) ? 0 : 1 / most;

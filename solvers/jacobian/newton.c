@@ -4,7 +4,7 @@
 
 int pw_newton_open (pw_newton *n, const pw_system *s) {
   size_t block = 1, w = 1;
-  for (const pw_element_batch *k = s->slab; k < s->slab + s->slabs; k++) {
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
     size_t cols = (size_t)k->b.cols, rows = cols > (size_t)k->kind->rows ? cols : (size_t)k->kind->rows;
     size_t count = (size_t)k->b.count;
     if (count * rows * cols > block) block = count * rows * cols;
@@ -48,7 +48,7 @@ static inline int newton_is_length (const pw_kind *kind, int c) {
 
 void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_put *put) {
   const pw_system *s = w->s;
-  for (pw_element_batch *k = w->slab; k < w->slab + s->slabs; k++) {
+  for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) {
     int rows = pw_block_rows (k->kind, block), cols = k->b.cols;
     int of_rows = block == PW_JW_Q || block == PW_ETA_Q || block == PW_GAMMA_Q || block == PW_GAMMA_V;
     int constraint = of_rows || block == PW_JTL_Q;
@@ -82,7 +82,8 @@ void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block
 /* Calls over all entries of J: both directions share it. */
 static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put, int transposed) {
   const pw_system *s = w->s;
-  for (const pw_element_batch *k = w->slab; k < w->slab + s->slabs && k->kind->rows > 0 && k->row < put->rows; k++) {
+  for (const pw_element_batch *k = w->batch; k < w->batch + s->batches && k->kind->rows > 0 && k->row < put->rows;
+       k++) {
     const double *value = k->J;
     double factor = k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
     int turns = newton_turns (k->kind);
@@ -111,7 +112,7 @@ void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_put *put) 
 
 void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v) {
   const pw_system *s = w->s;
-  for (pw_element_batch *k = w->slab; s->readers > 0 && k < w->slab + s->slabs; k++) {
+  for (pw_element_batch *k = w->batch; s->readers > 0 && k < w->batch + s->batches; k++) {
     int signals = k->kind->signals, cols = k->b.cols;
     if (signals == 0 || k->kind->force_u == NULL) continue;
     if (!t->recording) k->kind->force_u (&k->b, n->block);

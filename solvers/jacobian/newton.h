@@ -7,14 +7,14 @@
 
 /* Scratch for the blocks of one system. */
 typedef struct {
-  double *block; /* largest count x rows x cols of any slab */
+  double *block; /* largest count x rows x cols of any batch */
   double *w;     /* largest count x cols */
 } pw_newton;
 
 int pw_newton_open (pw_newton *n, const pw_system *s); /* PW_OK or PW_RESOURCE */
 void pw_newton_close (pw_newton *n);
 
-/* Puts factor x block of every slab: rows from `row` on (constraint equations for blocks with as many rows, else
+/* Puts factor x block of every batch: rows from `row` on (constraint equations for blocks with as many rows, else
  * coordinates; row_scale, if given, multiplies each), columns from `col` on.  w is the direction of jw_q (coords),
  * lambda the multipliers of jtl_q (rows); `rows` limits the constraint equations that take part. */
 typedef struct {

@@ -47,8 +47,8 @@ static int condense_takes_part (const pw_plan *c, const pw_element_batch *b, int
 /* Runs of such equations of an element. */
 static void condense_elements (pw_plan *c, int rows, const unsigned char *active) {
   const pw_system *s = c->k->s;
-  for (const pw_element_batch *b = c->k->w->slab; b < c->k->w->slab + s->slabs && b->kind->rows > 0 && b->row < rows;
-       b++)
+  for (const pw_element_batch *b = c->k->w->batch;
+       b < c->k->w->batch + s->batches && b->kind->rows > 0 && b->row < rows; b++)
     for (int e = 0; e < b->b.count; e++)
       for (int r = 0, size; r<b->kind->rows; r += size> 0 ? size : 1) {
         for (size = 0; r + size < b->kind->rows && size < PW_BLOCK_NODE; size++)

@@ -16,7 +16,7 @@
 
 /* A body's three columns of one row, or an internal coordinate's one. */
 typedef struct {
-  const double *J; /* in the slab */
+  const double *J; /* in the batch */
   int column;      /* local, in the component */
   int width;
 } pw_massless_block;
@@ -45,7 +45,7 @@ typedef struct {
   unsigned char *massless;   /* cols: 1 for a coordinate without weight */
   double *unit;              /* cols: length scale of an angle, 1 of a length */
   pw_massless_block *block;  /* rows x PW_MASSLESS_BLOCKS; width 0 ends a row's */
-  const double **from;       /* rows x pivots: the entries of P and K in the slabs */
+  const double **from;       /* rows x pivots: the entries of P and K in the batches */
   pw_massive_block *massive; /* those of H, then those of Z */
   int massives, massives_h;  /* all, and those of H */
   double *P;                 /* pivots x pivots: L below the diagonal, U above it, the inverse of U's diagonal on it */

@@ -67,7 +67,7 @@ static int massless_is_active (const massless_plan *p, int row) {
 /* Massless groups that share an active row belong together; marks them as touched. */
 static void massless_unite (massless_plan *p) {
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  for (const pw_element_batch *k = p->w->slab; k < p->w->slab + p->s->constraints; k++)
+  for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
       int any = 0, last = -1, n = massless_touched (p->s, k, e, group, at);
       for (int i = 0; i < k->kind->rows; i++) any |= massless_is_active (p, k->row + e * k->kind->rows + i);
@@ -110,7 +110,7 @@ static void massless_add_row (const pw_system *s, pw_component *c, int row, int 
 /* Every active row of every element that touches a massless group, to the component of this group. */
 static void massless_add_rows (massless_plan *p, pw_massless *r) {
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
-  for (const pw_element_batch *k = p->w->slab; k < p->w->slab + p->s->constraints; k++)
+  for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
       int n = massless_touched (p->s, k, e, group, at), first = 0;
       while (first < n && !massless_in (p, group[first])) first++;

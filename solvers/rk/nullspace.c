@@ -40,7 +40,7 @@ static void nullspace_add (pw_nullspace *b, const pw_system *s, int j, int row, 
 /* Counts the pieces of every panel, one place further on, or fills them in. */
 static void nullspace_list (pw_nullspace *b, const pw_workspace *w, int fill) {
   const pw_system *s = w->s;
-  for (const pw_element_batch *k = w->slab; k < w->slab + s->constraints; k++)
+  for (const pw_element_batch *k = w->batch; k < w->batch + s->constraints; k++)
     for (int e = 0; e < k->b.count; e++)
       for (int i = 0, n = e * k->kind->rows; i < k->kind->rows; i++, n++) {
         const double *J = k->J + n * k->b.cols;
@@ -52,7 +52,7 @@ static void nullspace_list (pw_nullspace *b, const pw_workspace *w, int fill) {
 
 static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
   size_t m = (size_t)b->rows, all = (size_t)s->rows, panels = (size_t)b->panels + 2, pieces = 0;
-  for (const pw_element_batch *k = s->slab; k < s->slab + s->constraints; k++)
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints; k++)
     pieces += (size_t)(k->b.count * k->kind->rows * (k->kind->bodies + k->kind->own));
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
@@ -203,7 +203,7 @@ static int nullspace_multipliers (pw_nullspace *b, pw_run *r, const double *w) {
   return nullspace_pivot (b);
 }
 
-/* The rates at the placed pose, J swept. */
+/* The rates at the placed configuration, J swept. */
 static int nullspace_correct (pw_nullspace *b, pw_run *r, double *v) {
   if (nullspace_multipliers (b, r, v) != PW_OK) return PW_RETRY;
   for (const pw_nullspace_block *p = b->panel, *end = p + b->panels; p < end; p++)

@@ -41,7 +41,7 @@ void pw_nullspace_close (pw_nullspace *b);
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r);
 
 /* The rates at (t, q) with the minimal velocities that v has, into v.  Leaves the system placed there, J swept.
- * PW_RETRY where the step has gone too far for its basis, or the pose is singular. */
+ * PW_RETRY where the step has gone too far for its basis, or the configuration is singular. */
 int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double *q, double *v);
 
 /* Accelerations and multipliers where the rates have just been made so.  Returns as pw_run_accelerate. */

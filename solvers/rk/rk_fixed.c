@@ -1,5 +1,5 @@
 /* Runge-Kutta with steps of the given size: multiples of it from the start, cut at t_end and at breakpoints, and split
- * where one of them would land on a singular pose. */
+ * where one of them would land on a singular configuration. */
 #include <math.h>
 #include <string.h>
 #include "rk_state.h"
@@ -49,7 +49,7 @@ static int fixed_in_parts (pw_run *r, int status, double t1, int project, double
   return fixed_two_parts (r, *t, t1, project, 1, &added);
 }
 
-/* Near a singular pose an evaluation that lands on it spoils the step.  It is taken in two parts; where it is its end that
+/* Near a singular configuration an evaluation that lands on it spoils the step.  It is taken in two parts; where it is its end that
  * lands there, what is divided is a longer step, up to `stop`, of which the first part passes t1. */
 static int fixed_step_around (pw_run *r, int status, double t1, double stop, int project, double *t) {
   static const double beyond[] = { 0.62, 2.62, 7.62 };

@@ -1,6 +1,6 @@
 /* Runge-Kutta: looking into the last step.  A sample is a step from its beginning, as accurate as the method.
  *
- * Near a singular pose a stage that lands on it spoils such a step, though the longer one that was accepted may have been
+ * Near a singular configuration a stage that lands on it spoils such a step, though the longer one that was accepted may have been
  * good.  Then it is taken in two parts, in several ways, and the one is good that comes nearest to another. */
 #include <math.h>
 #include <string.h>
@@ -14,7 +14,7 @@ typedef struct {
 } sample_begin;
 
 /* A step to t, left in d->q; the ledger there in ledger_at, projected_at.  *near: 1 if an evaluation was near a singular
- * pose. */
+ * configuration. */
 static int sample_step (pw_run *r, const sample_begin *from, double t, int *near) {
   struct pw_method_data *d = r->data;
   const pw_run reached = *r;

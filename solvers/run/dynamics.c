@@ -18,7 +18,7 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * other[i];
 }
 
-/* Stabilises gamma and sums the forces at the placed pose: in f, unless there are none but constant ones. */
+/* Stabilises gamma and sums the forces at the placed configuration: in f, unless there are none but constant ones. */
 static inline const double *dynamics_right (pw_run *r, const double *v, double *f, double *gamma) {
   if (r->alpha + r->beta > 0) dynamics_stabilise (r, v, gamma);
   if (r->s->forces == 0) return r->s->constant;
@@ -26,7 +26,7 @@ static inline const double *dynamics_right (pw_run *r, const double *v, double *
   return f;
 }
 
-/* Iterative refinement (Wilkinson 1963): near a singular pose, with s the sine of the smallest angle between rows, the
+/* Iterative refinement (Wilkinson 1963): near a singular configuration, with s the sine of the smallest angle between rows, the
  * factorisation is good to eps / s^2 only, its residuals bring that to eps / s. */
 static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
   const pw_system *s = r->s;

@@ -1,5 +1,5 @@
 /* Whether what a method has reached is still this mechanism's motion: constraints that are lost or contradict each other,
- * a jump to another branch at a singular pose. */
+ * a jump to another branch at a singular configuration. */
 #include <stdio.h>
 #include "method.h"
 
@@ -79,7 +79,7 @@ static int judge_near_rows (pw_run *r) {
   return row < 0 || row >= r->s->holonomic || !isfinite (pw_run_acceleration_norm (r));
 }
 
-/* The physical motion passes a singular pose as calmly as any other; a jump to another branch is an outburst. */
+/* The physical motion passes a singular configuration as calmly as any other; a jump to another branch is an outburst. */
 static int judge_outburst (pw_run *r, pw_error *error) {
   double now = pw_run_acceleration_norm (r);
   if (judge_near_rows (r) && !(now <= r->limits.jump * r->calm))

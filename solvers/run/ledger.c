@@ -65,7 +65,7 @@ void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
 
 int pw_ledger_reacts (const pw_system *s) {
   int reacts = 0;
-  for (int i = 0; i < s->entries; i++) reacts |= s->slab[s->entry[i].slab].kind->rows > 0;
+  for (int i = 0; i < s->entries; i++) reacts |= s->batch[s->entry[i].batch].kind->rows > 0;
   return reacts;
 }
 

@@ -246,7 +246,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
     pw_watchdog_begin (r);
-    if (!r->near) pw_run_reference_level (r); /* near a singular pose they tell nothing */
+    if (!r->near) pw_run_reference_level (r); /* near a singular configuration they tell nothing */
     r->energy0 += after - before;
     return r->method->restart (r, error);
   }

@@ -13,7 +13,7 @@ int pw_run_open_saddle (pw_run *r, pw_error *error);
 /* Accelerations, multipliers and the ledger's rates of the state reached, anew; says why if that fails. */
 int pw_run_evaluate (pw_run *r, pw_error *error);
 
-/* What near a singular pose means: a small part of the pivot at a good one, which the state reached is. */
+/* What near a singular configuration means: a small part of the pivot at a good one, which the state reached is. */
 void pw_run_watch (pw_run *r);
 
 /* Finds the next discontinuity behind the state reached. */

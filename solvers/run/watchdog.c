@@ -109,7 +109,7 @@ static int watchdog_has_loops (const pw_system *s) {
   int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
   if (set == NULL) return -1;
   for (int b = 0; b <= s->bodies; b++) set[b] = b;
-  for (const pw_element_batch *k = s->slab; k < s->slab + s->constraints && k->row < s->holonomic; k++)
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints && k->row < s->holonomic; k++)
     for (int e = 0; e < k->b.count; e++)
       for (int n = 1; n < k->kind->bodies; n++) {
         const int *column = k->column + e * k->kind->bodies;

@@ -5,7 +5,7 @@
 #include "check.h"
 #include "cli.h"
 
-/* A page written in the folder, whole; to be freed. */
+/* A page written in the folder, whole; to be released. */
 static char *animate_page (const char *name) {
   char path[4200];
   snprintf (path, sizeof path, "%s/%s", cli_folder, name);

@@ -1,4 +1,4 @@
-/* Comparisons from outside: rows and ladders, orders, truths made and read, limits, failures, files, bad input. */
+/* Comparisons from outside: rows and ladders, orders, references made and read, limits, failures, files, bad input. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -77,7 +77,7 @@ static void test_rows (void **state) {
                               "work-precision.svg\n");
 }
 
-/* Fixed-step methods converge at their order, against a truth that is better than all of them. */
+/* Fixed-step methods converge at their order, against a reference that is better than all of them. */
 static void test_orders (void **state) {
   (void)state;
   cli_good ("pinwheel compare ezyroller --methods rk4+none,rk4+projection,erk5+projection:steps=fixed --t-end 2 "
@@ -160,7 +160,7 @@ static void test_row_is_run (void **state) {
   }
 }
 
-/* A run's own table as truth: the same method and rung has no error but round-off; another one has that between them. */
+/* A run's own table as reference: the same method and rung has no error but round-off; another one has that between them. */
 static void test_truth (void **state) {
   (void)state;
   cli_good (
@@ -185,7 +185,7 @@ static void test_truth (void **state) {
 }
 
 /* Where a signal jumps multipliers have two values.  Runge-Kutta methods show that behind, others that before: such a sample
- * is no error of theirs, and does not keep the truth from telling those at the other samples. */
+ * is no error of theirs, and does not keep the reference from telling those at the other samples. */
 static void test_jump (void **state) {
   (void)state;
   cli_good ("pinwheel compare tests/scenes/shove.yaml --methods rk4+projection,ida+ggl --step-ladder 0.01 "
@@ -215,7 +215,7 @@ static void test_multiplier_scale (void **state) {
   assert_true (error[0] > 0 && error[1] == error[0]);
 }
 
-/* The truth of its own making agrees with digits computed in quadruple precision (tests/reference) as far as it claims. */
+/* The reference of its own making agrees with digits computed in quadruple precision (tests/reference) as far as it claims. */
 static void test_own_truth (void **state) {
   (void)state;
   const double x[3] = { 0.122485077560987708, -0.0509563103339871023, -0.0717230785643341303 };

@@ -22,7 +22,7 @@ static void test_roller (void **state) {
                "4096 eps");
 }
 
-/* Reactions have a truth of their own. */
+/* Reactions have a reference of their own. */
 static void test_reactions (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.5 -o @/truth.csv >@/log && "

@@ -214,7 +214,7 @@ static void test_wheel_contact (void **state) {
     pw_system *s = pw_random_scene (&pw_kind_wheel, &random, &error);
     assert_non_null (s);
     pw_workspace *w = pw_workspace_new (s, NULL);
-    pw_probe x = { .kind = &pw_kind_wheel, .s = s, .work = w, .k = w->slab, .elements = 3, .rows = 1, .cols = 3 };
+    pw_probe x = { .kind = &pw_kind_wheel, .s = s, .work = w, .k = w->batch, .elements = 3, .rows = 1, .cols = 3 };
     double plus[9 + PW_PROBE_GUARD], minus[9], contact[9], speed[3];
     pw_probe_randomise (&x, &random);
     pw_probe_update (&x, PW_PROBE_MOTION, PW_PROBE_H);

@@ -1,4 +1,4 @@
-/* Kinds of a plug-in's own, as models/elliptic-wire.c has them: its truth, every method, the program, the self-test. */
+/* Kinds of a plug-in's own, as models/elliptic-wire.c has them: its reference, every method, the program, the self-test. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -36,7 +36,7 @@ static void own_close (own *x) {
   pw_file_close (x->file);
 }
 
-/* ---- The truth ---- */
+/* ---- The reference ---- */
 
 /* Where a planet is t after its perihelion: Kepler's equation E - e sin E = t, by Newton's method. */
 static void own_planet (double t, double p[2]) {
@@ -119,12 +119,12 @@ static int guide_prepare (const void *definition, const pw_body *const *bodies, 
 }
 
 static void guide_g (const pw_batch *b, double *out) {
-  const pw_pose *A = &b->pose[b->body[0]];
+  const pw_configuration *A = &b->configuration[b->body[0]];
   out[0] = A->x - b->q[0], out[1] = A->y - 2 * b->q[0];
 }
 
 static void guide_g_size (const pw_batch *b, double *out) {
-  const pw_pose *A = &b->pose[b->body[0]];
+  const pw_configuration *A = &b->configuration[b->body[0]];
   out[0] = fabs (A->x) + fabs (b->q[0]), out[1] = fabs (A->y) + 2 * fabs (b->q[0]);
 }
 
@@ -135,7 +135,7 @@ static void guide_J (const pw_batch *b, double *out) {
 }
 
 static void guide_force (const pw_batch *b, double *out) {
-  out[0] = -GUIDE_STIFFNESS * b->pose[b->body[0]].x;
+  out[0] = -GUIDE_STIFFNESS * b->configuration[b->body[0]].x;
   out[1] = out[2] = out[3] = 0;
 }
 
@@ -247,9 +247,9 @@ static void test_expression (void **state) {
 static void test_selftest (void **state) {
   (void)state;
   own x = own_open (1);
-  assert_int_equal (x.s->slabs, 2);
+  assert_int_equal (x.s->batches, 2);
   for (int i = 0; i < 2; i++) {
-    const pw_kind *kind = x.s->slab[i].kind;
+    const pw_kind *kind = x.s->batch[i].kind;
     pw_selftest_report report = { 0 };
     pw_error error = { 0 };
     for (unsigned seed = 1; seed <= 100; seed++) check_ok (pw_selftest (kind, seed, &report, &error), &error);

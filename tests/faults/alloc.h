@@ -10,7 +10,7 @@ enum { ALLOC_SLOTS = 1 << 14 };
 extern struct alloc_state {
   long count;              /* allocations so far */
   long fail;               /* the one that fails; 0: none */
-  int live;                /* not yet freed */
+  int live;                /* not yet released */
   void *slot[ALLOC_SLOTS]; /* where they are */
 } alloc;
 

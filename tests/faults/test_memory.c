@@ -45,7 +45,7 @@ static struct memory_state {
   int frames;                 /* who asked for the first of them */
   void *frame[MEMORY_FRAMES]; /* return addresses, the innermost first */
   int status;                 /* of the command; -1 as long as it runs */
-  int left;                   /* blocks of Pinwheel's own that were not freed */
+  int left;                   /* blocks of Pinwheel's own that were not released */
 } * memory;
 
 /* ---- Allocations ---- */

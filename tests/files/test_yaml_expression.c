@@ -165,7 +165,7 @@ static void test_truths (void **state) {
     if (known[0] != 0) snprintf (left, sizeof left, "%g", a);
     if (known[1] != 0) snprintf (right, sizeof right, "(%g)", b);
     snprintf (text, sizeof text, "(%s && %s) + 2*(%s || %s) + 4*(%s ? 1 : 0)", left, right, left, right, left);
-    /* at t = 0 itself the truth of t is that just after */
+    /* at t = 0 itself the reference of t is that just after */
     if (a == 0 && known[0] == 0) continue;
     double found = expression_at (text, a, b), expected = (a != 0 && b != 0) + 2 * (a != 0 || b != 0) + 4 * (a != 0);
     check_bits (text, &found, &expected, 1);

@@ -205,8 +205,8 @@ static long double evaluator_compare (evaluator *e) {
     if (i == 6) return x;
     long double y = evaluator_sum (e);
     e->tie |= x == y;
-    int truth[] = { x <= y, x >= y, x == y, x != y, x<y, x> y };
-    x = truth[i];
+    int reference[] = { x <= y, x >= y, x == y, x != y, x<y, x> y };
+    x = reference[i];
   }
 }
 

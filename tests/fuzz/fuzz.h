@@ -11,7 +11,7 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size);
 /* Writes the bytes to a file of this process's own and returns its path; the next call writes it anew. */
 const char *fuzz_file (const uint8_t *data, size_t size, const char *ending);
 
-/* A copy of the bytes that ends in a NUL; to be freed. */
+/* A copy of the bytes that ends in a NUL; to be released. */
 char *fuzz_text (const uint8_t *data, size_t size);
 
 /* Cuts a text at its line ends into at most `most` pieces; a list ended by NULL. */

@@ -28,8 +28,8 @@ static void test_fall (void **state) {
   check_close ("phi", trial_state (s, &x, "stone.phi"), 12, size * bound, "round-off of 200 steps");
   check_close ("potential", x.potential, -3 * (0.5 * x.q[0] - 9.81 * x.q[1]), 1e3 * CHECK_EPS, "-m a . r");
   check_close ("balance", x.balance, 0, 1e3 * bound, "round-off of an energy of 1 kJ");
-  for (int k = 0; k < s->slabs; k++)
-    if (s->slab[k].kind == &pw_kind_gravity) assert_int_equal (s->slab[k].b.count, 1);
+  for (int k = 0; k < s->batches; k++)
+    if (s->batch[k].kind == &pw_kind_gravity) assert_int_equal (s->batch[k].b.count, 1);
   pw_run_close (r);
   pw_system_free (s);
 }
@@ -108,7 +108,7 @@ static int gravity_drag_prepare (const void *definition, const pw_body *const *b
 
 static void gravity_drag_force (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
-    const pw_pose *A = &b->pose[b->body[e]];
+    const pw_configuration *A = &b->configuration[b->body[e]];
     double c = ((const double *)b->element)[e];
     out[0] = -c * A->vx, out[1] = -c * A->vy, out[2] = 0;
   }
@@ -121,7 +121,7 @@ static void gravity_drag_force_v (const pw_batch *b, double *out) {
 
 static void gravity_drag_loss (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
-    const pw_pose *A = &b->pose[b->body[e]];
+    const pw_configuration *A = &b->configuration[b->body[e]];
     out[e] = ((const double *)b->element)[e] * (A->vx * A->vx + A->vy * A->vy);
   }
 }

@@ -227,7 +227,7 @@ static void test_given (void **state) {
   check_ok (pw_model_set_initial (m, "wheel.spin_rate", 4, &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
-  assert_int_equal (pw_run_initial (r)->freed, 0);
+  assert_int_equal (pw_run_initial (r)->released, 0);
   check_close ("vx", pw_run_initial (r)->v[0], 4 * rolling_u.r * cos (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
   check_close ("vy", pw_run_initial (r)->v[1], 4 * rolling_u.r * sin (rolling_u.heading), 64 * CHECK_EPS, "it rolls");
   pw_run_close (r);

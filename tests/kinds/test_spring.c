@@ -111,7 +111,7 @@ static void test_meeting (void **state) {
   pw_workspace *w = pw_workspace_new (s, NULL);
   double out[72];
   assert_int_equal (pw_update_kinematics (w, 0, s->q0, s->v0), PW_OK);
-  const pw_batch *b = &w->slab[0].b;
+  const pw_batch *b = &w->batch[0].b;
   pw_kind_spring.force (b, out);
   for (int i = 0; i < 12; i++) assert_true (out[i] == 0);
   pw_kind_spring.force_q (b, out);
@@ -147,7 +147,7 @@ static void test_settling (void **state) {
     assert_int_equal (pw_update_kinematics (w, 0, q, v), PW_OK);
     pw_batch_function *const sweep[] = { pw_kind_spring.force_q, pw_kind_spring.force_v };
     for (int i = 0; i < 2; i++) {
-      sweep[i](&w->slab[0].b, out);
+      sweep[i](&w->batch[0].b, out);
       for (int j = 0; j < 36; j++) check_below ("derivative", fabs (out[j]), 20, "stiffness and damping are 5 and 2");
     }
   }

@@ -131,7 +131,7 @@ static void ezy_straight (const char *method, double bound, const char *reason) 
   for (int i = 0; i < 7; i++) check_ok (pw_model_set_initial (m, given[i], value[i], &error), &error);
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-10, .span = 1, .ledger = 1 });
-  assert_int_equal (pw_run_initial (r)->freed, 0);
+  assert_int_equal (pw_run_initial (r)->released, 0);
   pw_sample now = runs_to (r, 1);
   check_close ("phi2(1)", now.q[5], 3.104965471129630, bound, reason);
   check_close ("x1(1)", now.q[0], 1, bound, reason);

@@ -1,4 +1,4 @@
-/* The models of the gallery against the truth each of them has. */
+/* The models of the gallery against the reference each of them has. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -176,7 +176,7 @@ static int gallery_default (void *context, const char *model, const char *path) 
   pw_run_defaults run = pw_file_table (f)->run;
   pw_system *s = gallery_open (path, NULL);
   pw_run *r = runs_open (s, run.method, &(pw_settings){ .step = run.step, .span = run.t_end, .ledger = 1 });
-  assert_int_equal (pw_run_initial (r)->freed, 0);
+  assert_int_equal (pw_run_initial (r)->released, 0);
   check_below ("start, positions", pw_run_initial (r)->position, 64 * CHECK_EPS, "described to round-off");
   pw_sample x = runs_to (r, run.t_end);
   double size = 1 + fabs (x.kinetic) + fabs (x.potential) + fabs (x.work) + fabs (x.loss);

@@ -107,19 +107,19 @@ static void ledger_driven_truth (double t, double *work, double *loss) {
   *work = 2 * one - square, *loss = square;
 }
 
-#define LEDGER_SCENE(what, moved)                                            \
-  {                                                                          \
-    .name = #what, .truth = ledger_##what##_truth, .size = moved, .table = { \
-      .abi = PW_ABI,                                                         \
-      .size = sizeof (pw_plugin_table),                                      \
-      .build = ledger_##what                                                 \
-    }                                                                        \
+#define LEDGER_SCENE(what, moved)                                                \
+  {                                                                              \
+    .name = #what, .reference = ledger_##what##_truth, .size = moved, .table = { \
+      .abi = PW_ABI,                                                             \
+      .size = sizeof (pw_plugin_table),                                          \
+      .build = ledger_##what                                                     \
+    }                                                                            \
   }
 
 static const struct {
   const char *name;
   pw_plugin_table table;
-  void (*truth) (double t, double *work, double *loss);
+  void (*reference) (double t, double *work, double *loss);
   double size; /* the energy it moves [J] */
 } ledger_scene[] = { LEDGER_SCENE (turned, 2),   LEDGER_SCENE (lifted, 25), LEDGER_SCENE (shaken, 3),
                      LEDGER_SCENE (massless, 5), LEDGER_SCENE (towed, 12),  LEDGER_SCENE (driven, 2) };
@@ -128,7 +128,7 @@ enum { LEDGER_SCENES = sizeof ledger_scene / sizeof *ledger_scene };
 static void ledger_compare (int scene, const char *method, const pw_sample *x, double bound, const char *reason) {
   char what[100];
   double work, loss;
-  ledger_scene[scene].truth (x->t, &work, &loss);
+  ledger_scene[scene].reference (x->t, &work, &loss);
   snprintf (what, sizeof what, "%s, %s, work at %g s", ledger_scene[scene].name, method, x->t);
   check_close (what, x->work, work, bound, reason);
   snprintf (what, sizeof what, "%s, %s, loss at %g s", ledger_scene[scene].name, method, x->t);

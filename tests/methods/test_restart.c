@@ -147,9 +147,10 @@ static void test_controlled (void **state) {
   static const char *const method[] = { "rk4+projection", "galpha+ggl", "leapfrog" };
   static const double order[] = { 4, 2, 2 };
   (void)state;
-  double truth = restart_controlled ("erk8+projection", 0);
+  double reference = restart_controlled ("erk8+projection", 0);
   for (int i = 0; i < 3; i++) {
-    double coarse = restart_controlled (method[i], 0.02) - truth, fine = restart_controlled (method[i], 0.01) - truth;
+    double coarse = restart_controlled (method[i], 0.02) - reference,
+           fine = restart_controlled (method[i], 0.01) - reference;
     check_close (method[i], log2 (coarse / fine), order[i], 0.3, "order over one halving");
   }
 }

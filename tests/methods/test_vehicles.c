@@ -1,4 +1,4 @@
-/* Vehicles of the gallery against the truth each of them has. */
+/* Vehicles of the gallery against the reference each of them has. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -66,7 +66,7 @@ static void test_ackermann_angles (void **state) {
   (void)state;
   pw_system *s = gallery_open ("ackermann-car", NULL);
   pw_workspace *w = pw_workspace_new (s, NULL);
-  const pw_element_batch *k = w->slab;
+  const pw_element_batch *k = w->batch;
   while (k->kind != &pw_kind_steered_wheel) k++;
   for (double t = 0; t < 10; t += 0.37) {
     pw_update_kinematics (w, t, s->q0, s->v0);

@@ -91,7 +91,7 @@ static double try_size (pw_system *s, const try_end *x) {
   return size;
 }
 
-/* The motion passes a singular pose so closely that its rates grow a thousandfold: round-off tells whether it can. */
+/* The motion passes a singular configuration so closely that its rates grow a thousandfold: round-off tells whether it can. */
 static int try_whips (pw_system *s, const try_end *x) {
   return try_size (s, x) > 1e3;
 }

@@ -1,4 +1,4 @@
-/* Methods without projection at every tolerance, through singular poses: right, or told. */
+/* Methods without projection at every tolerance, through singular configurations: right, or told. */
 #include "check.h"
 #include "turns.h"
 

@@ -125,7 +125,7 @@ static void test_parallelogram_start (void **state) {
       check_ok (pw_model_set_initial (m, crank[i], phi, &error), &error);
       pw_system *s = scene_compile (m);
       pw_run *r = runs_open (s, "rk4+projection", NULL);
-      assert_int_equal (pw_run_initial (r)->freed, 0);
+      assert_int_equal (pw_run_initial (r)->released, 0);
       pw_sample x = runs_to (r, 0);
       for (int j = 0; j < 3; j++)
         check_close (crank[j], trial_state (s, &x, crank[j]), phi, 64 * CHECK_EPS, "64 eps: what a start is good to");

@@ -1,5 +1,5 @@
 /* Solutions of the saddle-point system obey it, whatever path they take: with mass and with the metric of projections, all
- * rows and those on positions alone, factorised apart or at once, with forces and without, and behind poses where they
+ * rows and those on positions alone, factorised apart or at once, with forces and without, and behind configurations where they
  * cannot be factorised.
  *
  *   W a + J^T lambda = f,   J a = gamma */
@@ -48,7 +48,7 @@ static double saddle_error (const trial *x, const double *f, const double *gamma
   return most;
 }
 
-/* Factorises at a pose of which some angles are no numbers, as a step that is far too large leaves it, and comes back. */
+/* Factorises at a configuration of which some angles are no numbers, as a step that is far too large leaves it, and comes back. */
 static void saddle_spoil (trial *x, pw_saddle *k, unsigned *random) {
   pw_run *r = x->run;
   size_t coords = (size_t)r->s->coords;
@@ -314,7 +314,7 @@ static void test_empty (void **state) {
     pw_workspace *w = pw_workspace_new (s, NULL);
     pw_saddle *k = saddle_turned (w, 0, 0);
     assert_int_equal (pw_saddle_factor (k), PW_OK);
-    memset (w->slab[0].J + (ptrdiff_t)rod * w->slab[0].b.cols, 0, (size_t)w->slab[0].b.cols * sizeof (double));
+    memset (w->batch[0].J + (ptrdiff_t)rod * w->batch[0].b.cols, 0, (size_t)w->batch[0].b.cols * sizeof (double));
     assert_int_equal (pw_saddle_factor (k), PW_RETRY);
     assert_int_equal (pw_saddle_factor_solve (k, NULL, gamma, a, lambda), PW_RETRY);
     pw_saddle_close (k);

@@ -1,4 +1,4 @@
-/* Singular poses are passed or told. */
+/* Singular configurations are passed or told. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,7 +8,7 @@
 #include "trial.h"
 #include "turns.h"
 
-/* ---- Through singular poses ---- */
+/* ---- Through singular configurations ---- */
 
 /* Two four-bar linkages: all cranks pass through the horizontal ten times in 10 s. */
 static void test_four_bar (void **state) {
@@ -43,7 +43,7 @@ static void test_four_bar (void **state) {
   pw_system_free (s);
 }
 
-/* Steps that end on a singular pose are passed by a longer one, however small they are. */
+/* Steps that end on a singular configuration are passed by a longer one, however small they are. */
 static void test_steps_on_it (void **state) {
   static const struct { double cranks, step, t; } steps[] = { { 2, 7.75e-4, 10 }, { 5, 1e-4, 1 }, { 40, 3.1e-4, 1.5 } };
   (void)state;
@@ -181,7 +181,7 @@ static void singular_rhombus (pw_model *m, const void *parameter) {
   pw_add_pin (m, &(pw_pin){ .name = "D", .body = { "right", "ground" }, .at = { { -0.5, 0 }, { 1, 0 } } });
 }
 
-/* A run that is put into a singular pose says so, with the name of a pin, and goes on from where it was. */
+/* A run that is put into a singular configuration says so, with the name of a pin, and goes on from where it was. */
 static void test_restarted_in (void **state) {
   static const pw_plugin_table table = { .abi = PW_ABI,
                                          .size = sizeof (pw_plugin_table),
@@ -210,7 +210,7 @@ static void test_restarted_in (void **state) {
 }
 
 /* What is an outburst of accelerations follows from those behind a restart: a linkage that is sped up just before a singular
- * pose passes it as one that came as fast. */
+ * configuration passes it as one that came as fast. */
 static void test_sped_up (void **state) {
   static const char *const method[] = { "rk4", "leapfrog", "galpha+index3" };
   const double slow = 1.4908, fast = 40, end = 1.5; /* at 0.08 rad from it; a step is 0.08 rad then */

@@ -38,7 +38,7 @@ static void test_no_harm (void **state) {
   pw_system *s;
   pw_run *r = start_open (&s, NULL, NULL);
   const pw_initial_report *start = pw_run_initial (r);
-  assert_true (start->moved == 0 && start->freed == 0);
+  assert_true (start->moved == 0 && start->released == 0);
   check_bits ("positions", start->q, s->q0, 6);
   check_bits ("rates", start->v, s->v0, 6);
   start_close (r, s);
@@ -161,7 +161,7 @@ static void test_specified_too_much (void **state) {
   pw_run *r;
   (void)state;
   const pw_initial_report *start = start_of_rod (&s, &r, PW_PI / 6, 0.5, 2, 0, 0);
-  assert_true (start->freed == 0 && start->changed == 2 && start->v[2] == 2);
+  assert_true (start->released == 0 && start->changed == 2 && start->v[2] == 2);
   assert_true (start->q[2] > 0.1 && start->q[2] < PW_PI / 6 && start->q[0] < 0.5);
   start_close (r, s);
 }
@@ -175,7 +175,7 @@ static void test_given_before_specified (void **state) {
   pw_system *s = scene_compile (m);
   pw_run *r = runs_open (s, "rk4", NULL);
   const pw_initial_report *start = pw_run_initial (r);
-  assert_true (start->q[1] == 0.4 && start->freed == 0 && start->changed == 1);
+  assert_true (start->q[1] == 0.4 && start->released == 0 && start->changed == 1);
   check_close ("phi", start->q[2], asin (0.8), START_ROUND_OFF, start_reason);
   start_close (r, s);
 }
@@ -189,7 +189,7 @@ static void test_held (void **state) {
   pw_system *s;
   pw_run *r = start_open (&s, name, value);
   const pw_initial_report *start = pw_run_initial (r);
-  assert_int_equal (start->freed, 0);
+  assert_int_equal (start->released, 0);
   assert_true (start->q[2] == 0.3 && start->q[5] == 2 && start->v[0] == 1.5);
   int moved = 0;
   for (int j = 0; j < 6; j++) moved += (start->q[j] != start->q_given[j]) + (start->v[j] != start->v_given[j]);
@@ -208,7 +208,7 @@ static void test_held_row (void **state) {
   pw_system *s;
   pw_run *r = start_open (&s, name, value);
   const pw_initial_report *start = pw_run_initial (r);
-  assert_int_equal (start->freed, 0);
+  assert_int_equal (start->released, 0);
   const double q[] = { 1, 2, 0, 1.5, 2.125, PW_PI / 2 }, v[] = { 1, 0.1, 0.2, 1, 0.2, 4 };
   check_bits ("frame", start->q, q, 3);
   check_bits ("frame", start->v, v, 3);
@@ -250,7 +250,7 @@ static void test_held_rows (void **state) {
     pw_system *s = scene_compile (m);
     pw_run *r = runs_open (s, "rk4", NULL);
     const pw_initial_report *start = pw_run_initial (r);
-    assert_true (start->freed == 0 && start->moved > 0);
+    assert_true (start->released == 0 && start->moved > 0);
     check_bits ("link0", start->q, value, 3);
     assert_true (start->q[8] == 0);
     check_below ("position", runs_to (r, 0).position, START_ROUND_OFF, start_reason);
@@ -267,7 +267,7 @@ static void test_mass_stays (void **state) {
   pw_run *r = start_open (&s, name, value);
   const pw_initial_report *start = pw_run_initial (r);
   const double frame[3] = { 0 };
-  assert_int_equal (start->freed, 0);
+  assert_int_equal (start->released, 0);
   check_bits ("frame", start->q, frame, 3);
   assert_true (start->q[5] == 2 && start->moved == 2);
   start_close (r, s);
@@ -303,7 +303,7 @@ static void test_rates_stay (void **state) {
   pw_system *s;
   pw_run *r = start_open (&s, name, value);
   const pw_initial_report *start = pw_run_initial (r);
-  assert_int_equal (start->freed, 1);
+  assert_int_equal (start->released, 1);
   assert_true (start->v[4] == 5 && start->q[3] < 1);
   start_close (r, s);
 }
@@ -316,7 +316,7 @@ static void test_freed (void **state) {
   pw_system *s;
   pw_run *r = start_open (&s, name, value);
   const pw_initial_report *start = pw_run_initial (r);
-  assert_true (start->freed == 1 && start->moved > 0);
+  assert_true (start->released == 1 && start->moved > 0);
   start_close (r, s);
 }
 

@@ -1,4 +1,4 @@
-/* Runs through singular poses by methods that let constraints drift. */
+/* Runs through singular configurations by methods that let constraints drift. */
 #ifndef TURNS_H
 #define TURNS_H
 

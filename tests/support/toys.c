@@ -15,7 +15,7 @@ typedef struct {
 
 static spring_state spring_at (const pw_batch *b, int e) {
   const spring *p = (const spring *)b->element + e;
-  const pw_pose *A[2] = { &b->pose[b->body[2 * e]], &b->pose[b->body[2 * e + 1]] };
+  const pw_configuration *A[2] = { &b->configuration[b->body[2 * e]], &b->configuration[b->body[2 * e + 1]] };
   spring_state s;
   double px[2], py[2], vx[2], vy[2];
   for (int i = 0; i < 2; i++) {
@@ -108,12 +108,13 @@ const pw_kind toy_kind_spring = {
 
 static void drive_g (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++)
-    out[e] = b->pose[b->body[2 * e]].phi - b->pose[b->body[2 * e + 1]].phi - b->u[3 * e];
+    out[e] = b->configuration[b->body[2 * e]].phi - b->configuration[b->body[2 * e + 1]].phi - b->u[3 * e];
 }
 
 static void drive_g_size (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++)
-    out[e] = fabs (b->pose[b->body[2 * e]].phi) + fabs (b->pose[b->body[2 * e + 1]].phi) + fabs (b->u[3 * e]);
+    out[e] = fabs (b->configuration[b->body[2 * e]].phi) + fabs (b->configuration[b->body[2 * e + 1]].phi) +
+             fabs (b->u[3 * e]);
 }
 
 static void drive_J (const pw_batch *b, double *out) {
@@ -171,7 +172,7 @@ static int roller_prepare (const void *definition, const pw_body *const *bodies,
 static void roller_J (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 8) {
     const roller *p = (const roller *)b->element + e;
-    const pw_pose *A = &b->pose[b->body[e]];
+    const pw_configuration *A = &b->configuration[b->body[e]];
     out[0] = -A->sin, out[1] = A->cos, out[2] = p->at[0], out[3] = 0;
     out[4] = A->cos, out[5] = A->sin, out[6] = -p->at[1], out[7] = -p->r;
   }
@@ -179,7 +180,7 @@ static void roller_J (const pw_batch *b, double *out) {
 
 static void roller_gamma (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 2) {
-    const pw_pose *A = &b->pose[b->body[e]];
+    const pw_configuration *A = &b->configuration[b->body[e]];
     out[0] = A->omega * (A->cos * A->vx + A->sin * A->vy);
     out[1] = A->omega * (A->sin * A->vx - A->cos * A->vy);
   }
@@ -244,7 +245,7 @@ static void weight_force (const pw_batch *b, double *out) {
 static void weight_energy (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     const weight *p = (const weight *)b->element + e;
-    const pw_pose *A = &b->pose[b->body[e]];
+    const pw_configuration *A = &b->configuration[b->body[e]];
     out[e] = -p->f[0] * A->x - p->f[1] * A->y;
   }
 }

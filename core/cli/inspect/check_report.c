@@ -148,13 +148,13 @@ static void report_start (pw_json *j, const pw_check *x) {
   const pw_initial_report *start = pw_run_initial (x->r);
   if (j) {
     pw_json_number (j, "moved", start->moved);
-    pw_json_flag (j, "freed", start->freed);
+    pw_json_flag (j, "freed", start->released);
     pw_json_open (j, "changes", '[');
   } else if (start->moved == 0)
     puts ("  consistent as described");
   else
     printf ("  %d value%s changed%s\n", start->moved, start->moved == 1 ? " was" : "s were",
-            start->freed ? ", including given ones: they cannot all be satisfied" : "");
+            start->released ? ", including given ones: they cannot all be satisfied" : "");
   for (int i = 0; i < 2 * n; i++)
     if (pw_initial_moved (x->m.system, start, i)) report_change (j, x, i, &listed);
   report_end_list (j, listed);

@@ -195,7 +195,7 @@ static void yaml_names (const pw_reference_text *t) {
 
 static void yaml_truth (const pw_model *m) {
   const pw_reference_text *t = pw_model_reference (m);
-  if (pw_model_table (m)->truth)
+  if (pw_model_table (m)->reference)
     puts ("# The reference solution of the model (truth) is a function in C, which cannot be written as text.");
   if (t->states) puts ("truth:");
   for (int i = 0; i < t->states; i++) printf ("  %s: ", t->state[i]), yaml_text (t->text[i]), putchar ('\n');

@@ -34,8 +34,8 @@ static void profile_kinds (const pw_profile *p, int bodies, FILE *out) {
   fprintf (out, "  %-14s%9s%9s%9s%10s%10s%10s%10s%10s%10s\n", "kind", "elements", "rows", "unknowns", "signals",
            "J, gamma", "force", "sum", "share", "g");
   fprintf (out, "  %-14s%9d%9d%9d%30s", "(bodies)", bodies, 0, 3 * bodies, "");
-  profile_number (out, 1, p->poses, 10);
-  profile_share (out, p->poses, p->evaluation);
+  profile_number (out, 1, p->configurations, 10);
+  profile_share (out, p->configurations, p->evaluation);
   fprintf (out, "\n");
   for (int i = 0; i < p->kinds; i++) profile_kind (&p->kind[i], p->evaluation, out);
 }

@@ -105,8 +105,8 @@ static void report_start (const pw_system *s, const pw_initial_report *start) {
   if (moved == 0) return;
   if (start->changed) snprintf (changed, sizeof changed, ", %d of them specified by the model", start->changed);
   pw_cli_say ("pinwheel: the initial values did not satisfy the constraints; %d of them %s changed%s%s:\n", moved,
-              moved == 1 ? "was" : "were", start->freed ? ", including given ones, which cannot all be satisfied" : "",
-              changed);
+              moved == 1 ? "was" : "were",
+              start->released ? ", including given ones, which cannot all be satisfied" : "", changed);
   for (int i = 0; i < 2 * n && listed < REPORT_MOVED; i++) {
     double from = i < n ? start->q_given[i] : start->v_given[i - n], to = i < n ? start->q[i] : start->v[i - n];
     char name[REPORT_NAME], a[32], b[32];
@@ -289,7 +289,7 @@ void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_samp
   report_internal (s, last);
   report_reactions (s, last);
   if (energy) report_energy (last);
-  report_errors (summary->truth);
+  report_errors (summary->reference);
   printf ("\n  worst scaled residuals: position %s, velocity %s\n", pw_format (a, statistics->position, 2),
           pw_format (b, statistics->velocity, 2));
   printf (

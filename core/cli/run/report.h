@@ -21,7 +21,7 @@ void pw_report_warnings (const pw_run *r, const pw_system *s, double unbalanced)
 
 /* ---- Results ---- */
 
-/* Descriptions of the redundant constraint equations, ended by NULL, to be freed as one; NULL if there are none, or no
+/* Descriptions of the redundant constraint equations, ended by NULL, to be released as one; NULL if there are none, or no
  * memory. */
 const char **pw_report_redundancies (pw_run *r);
 

@@ -283,7 +283,7 @@ static int run_finish (run *x, pw_error *error) {
   if (x->r && pw_run_sample (x->r, pw_run_time (x->r), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
-  if (x->r) summary.truth = pw_comparison_errors (&x->comparison, x->m.system);
+  if (x->r) summary.reference = pw_comparison_errors (&x->comparison, x->m.system);
   if (last) summary.unbalanced = pw_run_energy_defect (x->r, last);
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));

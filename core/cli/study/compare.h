@@ -43,7 +43,7 @@ int pw_reference_find (pw_compare *x, pw_error *error);
 /* ---- compare_output.c ---- */
 
 void pw_compare_print_reference (const pw_compare *x, FILE *f);
-/* How the reference was found, as DIR/truth.csv. */
+/* How the reference was found, as DIR/reference.csv. */
 int pw_compare_write_reference (const pw_compare *x, pw_error *error);
 void pw_compare_head (const pw_study *x, int group, int width, FILE *f);
 void pw_compare_line (const pw_study *x, const pw_row *r, FILE *f);

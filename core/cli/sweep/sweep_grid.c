@@ -115,7 +115,7 @@ int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error) {
   for (; g->axes < n && status == PW_OK; g->axes++) {
     char *text = strdup (ranges[g->axes]);
     if (text == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-    g->axis[g->axes].name = text; /* freed with the grid in every case */
+    g->axis[g->axes].name = text; /* released with the grid in every case */
     status = grid_axis (g->axis + g->axes, text, error);
     for (int i = 0; i < g->axes && status == PW_OK; i++)
       if (strcmp (g->axis[i].name, text) == 0) status = pw_fail (error, PW_INPUT, "--vary %.200s is given twice", text);

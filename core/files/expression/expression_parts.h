@@ -29,14 +29,14 @@ typedef enum {
   PW_OP_GREATER_EQUAL,
   PW_OP_EQUAL,
   PW_OP_UNEQUAL,
-  PW_OP_AND, /* of truths: 1 or 0 */
+  PW_OP_AND, /* of references: 1 or 0 */
   PW_OP_OR,
   PW_OP_MOD,
   PW_OP_MIN,
   PW_OP_MAX,
   PW_OP_ATAN2,
   PW_OP_TWO,   /* a smooth function */
-  PW_OP_SELECT /* by a truth */
+  PW_OP_SELECT /* by a reference */
 } pw_expression_op;
 
 static inline int pw_expression_operands (int op) {

@@ -144,7 +144,7 @@ typedef struct {
 /* A part that has been read: its offset in the text, its first operation, what it depends on, whether it is 1 or 0. */
 typedef struct {
   size_t from;
-  int first, depends, truth;
+  int first, depends, reference;
 } parser_part;
 
 static const parser_part parser_nothing = { 0 };
@@ -220,7 +220,7 @@ static parser_part parser_leaf (parser *p, int op, int which, double value) {
 static parser_part parser_emit (parser *p, parser_part part, int depends, int op, int which) {
   int tie = 0;
   part.depends |= depends;
-  part.truth = op >= PW_OP_LESS && op <= PW_OP_OR;
+  part.reference = op >= PW_OP_LESS && op <= PW_OP_OR;
   parser_code (p, op, which, 0);
   if (p->status != PW_OK) return part;
   if (part.depends == 0) {
@@ -239,7 +239,7 @@ static parser_part parser_emit (parser *p, parser_part part, int depends, int op
 
 /* A condition is made 1 or 0. */
 static parser_part parser_truth (parser *p, parser_part part) {
-  if (part.truth) return part;
+  if (part.reference) return part;
   parser_code (p, PW_OP_CONSTANT, 0, 0);
   return parser_emit (p, part, 0, PW_OP_UNEQUAL, 0);
 }

@@ -132,7 +132,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   json_sample (&j, s, sample, ledger);
   pw_json_number (&j, "unbalanced", summary->unbalanced);
   json_lists (&j, summary->redundant, s);
-  json_reference (&j, summary->truth);
+  json_reference (&j, summary->reference);
   json_statistics (&j, statistics, summary->cpu);
   pw_json_close (&j, '}');
   return pw_output_check (o, error);

@@ -166,7 +166,7 @@ static int yaml_head (pw_yaml *y, pw_error *error) {
   y->let = v[4];
   y->bodies = v[5];
   y->elements = v[6];
-  y->truth = v[7];
+  y->reference = v[7];
   size_t count = (v[3] ? (size_t)v[3]->count : 0) + (v[4] ? (size_t)v[4]->count : 0);
   int status = pw_names_open (&names, count) == PW_OK ? PW_OK : pw_yaml_no_memory (y, error);
   if (status == PW_OK) status = yaml_parameters (y, v[3], &names, error);

@@ -41,8 +41,8 @@ struct pw_yaml {
   double ahead;   /* indicators that libfyaml may have before it makes something of them */
   pw_arena arena; /* nodes and texts */
   const pw_node *root;
-  const pw_node *bodies, *elements, *let, *truth; /* or NULL */
-  pw_parameter *parameter;                        /* ended by a NULL name */
+  const pw_node *bodies, *elements, *let, *reference; /* or NULL */
+  pw_parameter *parameter;                            /* ended by a NULL name */
   int parameters;
 };
 
@@ -102,17 +102,17 @@ size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
 typedef struct {
   const pw_yaml *y;
   pw_model *m;
-  pw_arena *arena;          /* lives as long as the model */
-  pw_reference_text *truth; /* the model's */
-  const double *parameter;  /* their values */
-  double *let;              /* values of what `let` defines */
-  int lets;                 /* so far */
-  pw_scope *x;              /* both */
-  pw_names bodies;          /* names of bodies, to their index */
-  pw_names all;             /* names of bodies and elements, to the index in nodes */
-  pw_names elements;        /* once an expression asks for them: names of all elements, to the index of their kinds */
-  const pw_node **node;     /* where each was named */
-  const pw_field *field;    /* the one that is read, and the definition it is of, with all fields before it */
+  pw_arena *arena;              /* lives as long as the model */
+  pw_reference_text *reference; /* the model's */
+  const double *parameter;      /* their values */
+  double *let;                  /* values of what `let` defines */
+  int lets;                     /* so far */
+  pw_scope *x;                  /* both */
+  pw_names bodies;              /* names of bodies, to their index */
+  pw_names all;                 /* names of bodies and elements, to the index in nodes */
+  pw_names elements;     /* once an expression asks for them: names of all elements, to the index of their kinds */
+  const pw_node **node;  /* where each was named */
+  const pw_field *field; /* the one that is read, and the definition it is of, with all fields before it */
   const char *definition;
   int named;
   double points; /* of tables, so far */

@@ -233,9 +233,9 @@ static void build_free (void *arena) {
 static int build_keep (pw_yaml_builder *b, pw_error *error) {
   b->arena = calloc (1, sizeof *b->arena);
   if (b->arena == NULL || pw_model_keep (b->m, b->arena, build_free) != PW_OK) return pw_yaml_no_memory (b->y, error);
-  b->truth = pw_arena_take (b->arena, sizeof *b->truth);
-  pw_model_set_reference (b->m, b->truth);
-  return b->truth ? PW_OK : pw_yaml_no_memory (b->y, error);
+  b->reference = pw_arena_take (b->arena, sizeof *b->reference);
+  pw_model_set_reference (b->m, b->reference);
+  return b->reference ? PW_OK : pw_yaml_no_memory (b->y, error);
 }
 
 static int build_open (pw_yaml_builder *b, char **definition, pw_error *error) {

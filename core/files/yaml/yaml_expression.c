@@ -173,7 +173,7 @@ static void *time_open (void *context) {
 
 /* Keeps the names that expressions may use, and their values, for `show`. */
 static int time_keep_names (pw_yaml_builder *b, pw_error *error) {
-  pw_reference_text *t = b->truth;
+  pw_reference_text *t = b->reference;
   size_t names = (size_t)b->y->parameters + (size_t)b->lets;
   if (t->name) return PW_OK;
   t->name = pw_arena_take (b->arena, (names + 1) * sizeof *t->name);
@@ -321,7 +321,7 @@ int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, 
   return PW_OK;
 }
 
-/* ---- Reference solution: `truth`, a map of states to expressions of time ---- */
+/* ---- Reference solution: `reference`, a map of states to expressions of time ---- */
 
 static double truth_eval (void *context, int i, double t) {
   const pw_expression *const *x = context;
@@ -332,7 +332,7 @@ static int truth_entries (pw_yaml_builder *b, pw_reference_text *t, pw_names *se
   static const char *const time[] = { "t", NULL };
   const pw_expression **x = t->context;
   char what[100];
-  for (const pw_node *n = b->y->truth->first; n; n = n->next->next) {
+  for (const pw_node *n = b->y->reference->first; n; n = n->next->next) {
     if (strchr (n->text, '.') == NULL)
       return pw_yaml_fail (b->y, n->at, error, "truth: expected a state such as BODY.phi, found \"%.60s\"", n->text);
     const reading state = { b, n, "truth", error }, value = { b, n->next, what, error };
@@ -347,8 +347,8 @@ static int truth_entries (pw_yaml_builder *b, pw_reference_text *t, pw_names *se
 }
 
 int pw_yaml_reference (pw_yaml_builder *b, pw_error *error) {
-  const pw_node *map = b->y->truth;
-  pw_reference_text *t = b->truth;
+  const pw_node *map = b->y->reference;
+  pw_reference_text *t = b->reference;
   pw_names seen = { .size = 0 };
   if (map == NULL) return PW_OK;
   if (map->type != PW_YAML_MAP)

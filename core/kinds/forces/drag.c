@@ -15,9 +15,9 @@ typedef struct {
 } drag;
 
 /* Names the parts of element e: the speed, and force and moment per speed. */
-#define DRAG_PARTS                              \
-  const drag *k = (const drag *)b->element + e; \
-  const pw_pose *A = &b->pose[b->body[e]];      \
+#define DRAG_PARTS                                           \
+  const drag *k = (const drag *)b->element + e;              \
+  const pw_configuration *A = &b->configuration[b->body[e]]; \
   const double v = hypot (A->vx, A->vy), c = k->c1 + k->c2 * v, d = k->d1 + k->d2 * fabs (A->omega)
 
 static int drag_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

@@ -19,7 +19,7 @@ typedef struct {
   double c, s, X, Y, Fx, Fy, M;
 } force_state;
 
-static inline force_state force_at (const force *k, const pw_pose *A, const double *u) {
+static inline force_state force_at (const force *k, const pw_configuration *A, const double *u) {
   force_state x = { .c = k->turns ? A->cos : 1, .s = k->turns ? A->sin : 0 };
   x.X = A->cos * k->at[0] - A->sin * k->at[1], x.Y = A->sin * k->at[0] + A->cos * k->at[1];
   x.Fx = x.c * u[0] - x.s * u[3], x.Fy = x.s * u[0] + x.c * u[3];
@@ -27,9 +27,9 @@ static inline force_state force_at (const force *k, const pw_pose *A, const doub
   return x;
 }
 
-#define FORCE_PARTS                               \
-  const force *k = (const force *)b->element + e; \
-  const pw_pose *A = &b->pose[b->body[e]];        \
+#define FORCE_PARTS                                          \
+  const force *k = (const force *)b->element + e;            \
+  const pw_configuration *A = &b->configuration[b->body[e]]; \
   const force_state x = force_at (k, A, b->u + 6 * e)
 
 static int force_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

@@ -8,7 +8,7 @@
 
 #define FRICTION_PARTS                                \
   const coulomb *k = (const coulomb *)b->element + e; \
-  const double w = b->pose[b->body[2 * e]].omega - b->pose[b->body[2 * e + 1]].omega
+  const double w = b->configuration[b->body[2 * e]].omega - b->configuration[b->body[2 * e + 1]].omega
 
 static int friction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                              pw_error *error) {

@@ -26,7 +26,7 @@ static void gravity_force (const pw_batch *b, double *out) {
 static void gravity_energy (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     const gravity *k = (const gravity *)b->element + e;
-    const pw_pose *A = &b->pose[b->body[e]];
+    const pw_configuration *A = &b->configuration[b->body[e]];
     out[e] = -k->fx * A->x - k->fy * A->y;
   }
 }

@@ -20,7 +20,7 @@ static int marker_prepare (const void *definition, const pw_body *const *bodies,
 static void marker_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const marker *k = (const marker *)b->element + e;
-    contact_place (&b->pose[b->body[e]], k->at, 0, out);
+    contact_place (&b->configuration[b->body[e]], k->at, 0, out);
   }
 }
 

@@ -21,16 +21,17 @@ typedef struct {
   double T, slope, y;
 } motor_state;
 
-static inline motor_state motor_at (const motor *k, const pw_pose *A, const pw_pose *B, const double *u) {
+static inline motor_state motor_at (const motor *k, const pw_configuration *A, const pw_configuration *B,
+                                    const double *u) {
   double y = k->k * (u[0] - A->phi + B->phi) + k->c * (u[3] - A->omega + B->omega);
   if (k->limit == 0) return (motor_state){ y, 1, y };
   double x = tanh (y / k->limit);
   return (motor_state){ k->limit * x, 1 - x * x, y };
 }
 
-#define MOTOR_PARTS                                                               \
-  const motor *k = (const motor *)b->element + e;                                 \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
+#define MOTOR_PARTS                                                                                          \
+  const motor *k = (const motor *)b->element + e;                                                            \
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
   const motor_state x = motor_at (k, A, B, b->u + 6 * e)
 
 static int motor_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

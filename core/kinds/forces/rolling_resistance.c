@@ -18,7 +18,7 @@ typedef struct {
 #define RESISTANCE_PARTS                                                                        \
   const resistance *k = (const resistance *)b->element + e;                                     \
   const contact *P = &k->point;                                                                 \
-  const pw_pose *A = &b->pose[b->body[e]];                                                      \
+  const pw_configuration *A = &b->configuration[b->body[e]];                                    \
   const double E[3] = { A->cos * P->a - A->sin * P->b, A->sin * P->a + A->cos * P->b, P->arm }; \
   const double ve = E[0] * A->vx + E[1] * A->vy + E[2] * A->omega
 

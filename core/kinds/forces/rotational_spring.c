@@ -13,10 +13,10 @@ typedef struct {
   double k, c, beta; /* stiffness [N m/rad], damping [N m s/rad], free angle [rad] */
 } twist;
 
-#define TWIST_PARTS                                                               \
-  const twist *k = (const twist *)b->element + e;                                 \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
-  const double angle = A->phi - B->phi - k->beta, rate = A->omega - B->omega;     \
+#define TWIST_PARTS                                                                                          \
+  const twist *k = (const twist *)b->element + e;                                                            \
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
+  const double angle = A->phi - B->phi - k->beta, rate = A->omega - B->omega;                                \
   (void)angle, (void)rate
 
 static int twist_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

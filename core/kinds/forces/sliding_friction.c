@@ -13,14 +13,14 @@ typedef struct {
   coulomb law;
 } sliding;
 
-/* Names the parts of element e: itself, its two poses, axes, E and w. */
-#define SLIDING_PARTS                                                             \
-  const sliding *k = (const sliding *)b->element + e;                             \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
-  const line_axes s = line_turn (&k->across, A, B);                               \
-  const double v[6] = { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega };         \
-  double E[6], w = 0;                                                             \
-  line_J (&s, E);                                                                 \
+/* Names the parts of element e: itself, its two configurations, axes, E and w. */
+#define SLIDING_PARTS                                                                                        \
+  const sliding *k = (const sliding *)b->element + e;                                                        \
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
+  const line_axes s = line_turn (&k->across, A, B);                                                          \
+  const double v[6] = { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega };                                    \
+  double E[6], w = 0;                                                                                        \
+  line_J (&s, E);                                                                                            \
   for (int i = 0; i < 6; i++) w += E[i] * v[i]
 
 static int sliding_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

@@ -25,7 +25,7 @@ typedef struct {
   double F[2];           /* pull */
 } spring_state;
 
-static inline spring_state spring_at (const spring *k, const pw_pose *A, const pw_pose *B) {
+static inline spring_state spring_at (const spring *k, const pw_configuration *A, const pw_configuration *B) {
   spring_state s = { .X1 = A->cos * k->s1[0] - A->sin * k->s1[1],
                      .Y1 = A->sin * k->s1[0] + A->cos * k->s1[1],
                      .X2 = B->cos * k->s2[0] - B->sin * k->s2[1],
@@ -44,7 +44,7 @@ static inline spring_state spring_at (const spring *k, const pw_pose *A, const p
 
 #define SPRING_PARTS                                \
   const spring *k = (const spring *)b->element + e; \
-  const spring_state s = spring_at (k, &b->pose[b->body[2 * e]], &b->pose[b->body[2 * e + 1]])
+  const spring_state s = spring_at (k, &b->configuration[b->body[2 * e]], &b->configuration[b->body[2 * e + 1]])
 
 static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                            pw_error *error) {
@@ -93,7 +93,7 @@ static void spring_slope (const spring *k, const spring_state *s, double K[2][2]
 static void spring_force_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 36) {
     SPRING_PARTS;
-    double w1 = b->pose[b->body[2 * e]].omega, w2 = b->pose[b->body[2 * e + 1]].omega;
+    double w1 = b->configuration[b->body[2 * e]].omega, w2 = b->configuration[b->body[2 * e + 1]].omega;
     double K[2][2], turn[2] = { -w1 * (s.e[0] * s.X1 + s.e[1] * s.Y1), w2 * (s.e[0] * s.X2 + s.e[1] * s.Y2) };
     const double D[2][6] = SPRING_D;
     spring_slope (k, &s, K);

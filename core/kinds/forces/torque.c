@@ -16,7 +16,7 @@ static void torque_force_u (const pw_batch *b, double *out) {
 
 static void torque_power (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++)
-    out[e] = b->u[3 * e] * (b->pose[b->body[2 * e]].omega - b->pose[b->body[2 * e + 1]].omega);
+    out[e] = b->u[3 * e] * (b->configuration[b->body[2 * e]].omega - b->configuration[b->body[2 * e + 1]].omega);
 }
 
 static const pw_field torque_fields[] = {

@@ -28,7 +28,7 @@ typedef struct {
   double F_ve, F_vn;      /* derivatives of F */
 } tyre_slip;
 
-static tyre_slip tyre_at (const tyre *k, const pw_pose *A) {
+static tyre_slip tyre_at (const tyre *k, const pw_configuration *A) {
   tyre_slip x = { .c = A->cos * k->cos - A->sin * k->sin, .s = A->sin * k->cos + A->cos * k->sin };
   x.ve = x.c * A->vx + x.s * A->vy - k->aside * A->omega;
   x.vn = x.c * A->vy - x.s * A->vx + k->along * A->omega;
@@ -44,9 +44,9 @@ static tyre_slip tyre_at (const tyre *k, const pw_pose *A) {
   return x;
 }
 
-#define TYRE_PARTS                              \
-  const tyre *k = (const tyre *)b->element + e; \
-  const pw_pose *A = &b->pose[b->body[e]];      \
+#define TYRE_PARTS                                           \
+  const tyre *k = (const tyre *)b->element + e;              \
+  const pw_configuration *A = &b->configuration[b->body[e]]; \
   const tyre_slip x = tyre_at (k, A)
 
 static int tyre_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
@@ -115,7 +115,7 @@ static void tyre_loss (const pw_batch *b, double *out) {
 static void tyre_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const tyre *k = (const tyre *)b->element + e;
-    contact_place (&b->pose[b->body[e]], k->at, k->heading, out);
+    contact_place (&b->configuration[b->body[e]], k->at, k->heading, out);
   }
 }
 

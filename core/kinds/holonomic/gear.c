@@ -27,10 +27,10 @@ static int gear_prepare (const void *definition, const pw_body *const *bodies, v
   return PW_OK;
 }
 
-#define GEAR_PARTS                                                                         \
-  const gear *k = (const gear *)b->element + e;                                            \
-  const double phi1 = b->pose[b->body[3 * e]].phi, phi2 = b->pose[b->body[3 * e + 1]].phi; \
-  const double phi3 = b->pose[b->body[3 * e + 2]].phi
+#define GEAR_PARTS                                                                                           \
+  const gear *k = (const gear *)b->element + e;                                                              \
+  const double phi1 = b->configuration[b->body[3 * e]].phi, phi2 = b->configuration[b->body[3 * e + 1]].phi; \
+  const double phi3 = b->configuration[b->body[3 * e + 2]].phi
 
 static void gear_g (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {

@@ -19,15 +19,15 @@ typedef struct {
   double X1, Y1, X2, Y2;
 } pin_arms;
 
-static inline pin_arms pin_turn (const pin *p, const pw_pose *A, const pw_pose *B) {
+static inline pin_arms pin_turn (const pin *p, const pw_configuration *A, const pw_configuration *B) {
   return (pin_arms){ A->cos * p->s1[0] - A->sin * p->s1[1], A->sin * p->s1[0] + A->cos * p->s1[1],
                      B->cos * p->s2[0] - B->sin * p->s2[1], B->sin * p->s2[0] + B->cos * p->s2[1] };
 }
 
-/* Names the parts of element e: its two poses and arms. */
-#define PIN_PARTS                                                                 \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
-  const pin_arms s = pin_turn ((const pin *)b->element + e, A, B);                \
+/* Names the parts of element e: its two configurations and arms. */
+#define PIN_PARTS                                                                                            \
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
+  const pin_arms s = pin_turn ((const pin *)b->element + e, A, B);                                           \
   (void)A, (void)B, (void)s
 
 static int pin_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

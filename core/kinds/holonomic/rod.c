@@ -24,7 +24,7 @@ typedef struct {
   double L;
 } rod_state;
 
-static inline rod_state rod_at (const rod *k, const pw_pose *A, const pw_pose *B) {
+static inline rod_state rod_at (const rod *k, const pw_configuration *A, const pw_configuration *B) {
   rod_state s = { .w1 = A->omega, .w2 = B->omega, .L = k->length };
   s.S1[0] = A->cos * k->s1[0] - A->sin * k->s1[1], s.S1[1] = A->sin * k->s1[0] + A->cos * k->s1[1];
   s.S2[0] = B->cos * k->s2[0] - B->sin * k->s2[1], s.S2[1] = B->sin * k->s2[0] + B->cos * k->s2[1];
@@ -36,9 +36,9 @@ static inline rod_state rod_at (const rod *k, const pw_pose *A, const pw_pose *B
   return s;
 }
 
-#define ROD_PARTS                                                                 \
-  const rod *k = (const rod *)b->element + e;                                     \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]]; \
+#define ROD_PARTS                                                                                            \
+  const rod *k = (const rod *)b->element + e;                                                                \
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
   const rod_state s = rod_at (k, A, B)
 
 static inline double rod_dot (const double *a, const double *b) {

@@ -18,11 +18,11 @@ typedef struct {
   double beta;         /* phi2 - phi1 [rad] */
 } weld;
 
-/* Names the parts of element e: its two poses and its arms in world axes. */
-#define WELD_PARTS                                                                                     \
-  const weld *k = (const weld *)b->element + e;                                                        \
-  const pw_pose *A = &b->pose[b->body[2 * e]], *B = &b->pose[b->body[2 * e + 1]];                      \
-  const double X1 = A->cos * k->s1[0] - A->sin * k->s1[1], Y1 = A->sin * k->s1[0] + A->cos * k->s1[1]; \
+/* Names the parts of element e: its two configurations and its arms in world axes. */
+#define WELD_PARTS                                                                                           \
+  const weld *k = (const weld *)b->element + e;                                                              \
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
+  const double X1 = A->cos * k->s1[0] - A->sin * k->s1[1], Y1 = A->sin * k->s1[0] + A->cos * k->s1[1];       \
   const double X2 = B->cos * k->s2[0] - B->sin * k->s2[1], Y2 = B->sin * k->s2[0] + B->cos * k->s2[1];
 
 static int weld_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

@@ -15,11 +15,11 @@ typedef struct {
   double a[3], b[3];
 } pfaffian;
 
-#define PFAFFIAN_PARTS                                                                             \
-  const pfaffian *k = (const pfaffian *)b->element + e;                                            \
-  const pw_pose *P = &b->pose[b->body[2 * e]], *Q = &b->pose[b->body[2 * e + 1]];                  \
-  const double Ax = P->cos * k->a[0] - P->sin * k->a[1], Ay = P->sin * k->a[0] + P->cos * k->a[1]; \
-  const double Bx = P->cos * k->b[0] - P->sin * k->b[1], By = P->sin * k->b[0] + P->cos * k->b[1]; \
+#define PFAFFIAN_PARTS                                                                                       \
+  const pfaffian *k = (const pfaffian *)b->element + e;                                                      \
+  const pw_configuration *P = &b->configuration[b->body[2 * e]], *Q = &b->configuration[b->body[2 * e + 1]]; \
+  const double Ax = P->cos * k->a[0] - P->sin * k->a[1], Ay = P->sin * k->a[0] + P->cos * k->a[1];           \
+  const double Bx = P->cos * k->b[0] - P->sin * k->b[1], By = P->sin * k->b[0] + P->cos * k->b[1];           \
   (void)Q
 
 static int pfaffian_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

@@ -21,10 +21,10 @@ typedef struct {
   double heading;      /* [rad] */
 } rolling;
 
-/* Names the parts of element e: its pose and the direction (c, s) it rolls in. */
+/* Names the parts of element e: its configuration and the direction (c, s) it rolls in. */
 #define ROLLING_PARTS                                                                        \
   const rolling *k = (const rolling *)b->element + e;                                        \
-  const pw_pose *A = &b->pose[b->body[e]];                                                   \
+  const pw_configuration *A = &b->configuration[b->body[e]];                                 \
   const double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin; \
   (void)k, (void)A, (void)c, (void)s
 
@@ -108,7 +108,7 @@ static void rolling_gamma_v (const pw_batch *b, double *out) {
 static void rolling_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const rolling *k = (const rolling *)b->element + e;
-    contact_place (&b->pose[b->body[e]], k->at, k->heading, out);
+    contact_place (&b->configuration[b->body[e]], k->at, k->heading, out);
   }
 }
 

@@ -21,7 +21,7 @@ typedef struct {
   double turn, rate;   /* u' and w + u' */
 } steered_state;
 
-static inline steered_state steered_at (const steered *k, const pw_pose *A, const double *u) {
+static inline steered_state steered_at (const steered *k, const pw_configuration *A, const double *u) {
   double c = cos (u[0]), s = sin (u[0]);
   return (steered_state){ .c = A->cos * c - A->sin * s,
                           .s = A->sin * c + A->cos * s,
@@ -31,9 +31,9 @@ static inline steered_state steered_at (const steered *k, const pw_pose *A, cons
                           .rate = A->omega + u[1] };
 }
 
-#define STEERED_PARTS                                 \
-  const steered *k = (const steered *)b->element + e; \
-  const pw_pose *A = &b->pose[b->body[e]];            \
+#define STEERED_PARTS                                        \
+  const steered *k = (const steered *)b->element + e;        \
+  const pw_configuration *A = &b->configuration[b->body[e]]; \
   const steered_state x = steered_at (k, A, b->u + 3 * e)
 
 static int steered_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
@@ -82,7 +82,7 @@ static void steered_gamma_v (const pw_batch *b, double *out) {
 static void steered_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const steered *k = (const steered *)b->element + e;
-    contact_place (&b->pose[b->body[e]], k->at, b->u[3 * e], out);
+    contact_place (&b->configuration[b->body[e]], k->at, b->u[3 * e], out);
   }
 }
 

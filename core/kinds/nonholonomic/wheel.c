@@ -19,7 +19,7 @@ static int wheel_prepare (const void *definition, const pw_body *const *bodies, 
 static void wheel_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const contact *k = (const contact *)b->element + e;
-    contact_place (&b->pose[b->body[e]], k->at, k->heading, out);
+    contact_place (&b->configuration[b->body[e]], k->at, k->heading, out);
   }
 }
 
