@@ -524,17 +524,17 @@ typedef struct pw_field {
   const char *about;          /* meaning */
 } pw_field;
 
-/* Name and unit of a constraint row's reaction, or of an own coordinate. */
+/* Name and unit of a constraint row's reaction, or of an internal coordinate. */
 typedef struct {
   const char *name;  /* "Fx" */
   const char *unit;  /* "N" */
-  const char *rate;  /* own coordinates only: the name of its velocity */
+  const char *rate;  /* internal coordinates only: the name of its velocity */
   const char *about; /* sign and meaning */
 } pw_quantity;
 
 /* A coordinate an element owns, as its kind's prepare describes it. */
 typedef struct {
-  double mass; /* its entry of M [kg m^2], >= 0; an own coordinate may be massless if the element's rows determine it */
+  double mass; /* its entry of M [kg m^2], >= 0; an internal coordinate may be massless if the element's rows determine it */
   double start;     /* its value at the start [rad] */
   double rate;      /* its rate at the start [rad/s] */
   int specified[2]; /* 1: start, rate are what the definition says, not a consequence of something else */
@@ -555,7 +555,7 @@ typedef struct {
   const void *element;                   /* count structures of kind->element bytes, made by kind->prepare */
   const int *body;                       /* count x kind->bodies indices into configuration */
   const pw_configuration *configuration; /* of every body of the scene, and the ground */
-  const double *q;                       /* count x kind->own: own coordinates */
+  const double *q;                       /* count x kind->own: internal coordinates */
   const double *v;                       /* count x kind->own: their rates */
   const double *u;                       /* count x kind->signals x 3: value, rate and acceleration of each signal */
   const double *w;                       /* count x cols: the direction w, for jw_q only */
@@ -591,11 +591,11 @@ struct pw_kind {
   int constant;                  /* 1: its force depends on nothing: evaluated once, when the scene is compiled */
   pw_level level;                /* of its rows */
   const pw_quantity *reaction;   /* one per row: what -lambda is */
-  const pw_quantity *coordinate; /* one per own coordinate */
+  const pw_quantity *coordinate; /* one per internal coordinate */
   const char *(*reaction_unit) (const void *element, int row); /* where it depends on the element; may be NULL */
 
   /* Turns a checked definition into a prepared element; bodies are those it names or acts on, in order, the ground as
-   * a body without mass.  own takes mass and start of each own coordinate, zero so far.  Returns a status. */
+   * a body without mass.  own takes mass and start of each internal coordinate, zero so far.  Returns a status. */
   int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                   pw_error *error);
 

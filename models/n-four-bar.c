@@ -65,6 +65,6 @@ static void reference (const void *parameter, double t, double *q, double *v) {
   }
 }
 
-PW_MODEL (.about = "N four-bar linkages in a row, which pass singular poses", .parameters = parameters,
+PW_MODEL (.about = "N four-bar linkages in a row, which pass singular configurations", .parameters = parameters,
           .parameters_size = sizeof (four_bar), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
           .build = build, .reference = reference);

@@ -91,9 +91,9 @@ static const char *fault_names (const pw_kind *k) {
   for (int i = 0; i < k->own; i++)
     if (k->coordinate == NULL || k->coordinate[i].name == NULL || k->coordinate[i].rate == NULL ||
         k->coordinate[i].unit == NULL)
-      return "own coordinates without names";
+      return "internal coordinates without names";
     else if (fault_is_long (k->coordinate[i].name) || fault_is_long (k->coordinate[i].rate))
-      return "an own coordinate's name of more than 50 bytes";
+      return "an internal coordinate's name of more than 50 bytes";
   return "";
 }
 
@@ -103,7 +103,7 @@ const char *pw_kind_check (const pw_kind *k, char *buffer, size_t size) {
   if (k->definition < sizeof (char *)) return "the definition has no room for its name";
   if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->own < 0 || k->own > PW_MAX_INTERNAL || k->rows < 0 ||
       k->rows > PW_MAX_ROWS || k->signals < 0 || k->signals > PW_MAX_SIGNALS) {
-    snprintf (buffer, size, "at most %d bodies, %d own coordinates, %d rows and %d signals", PW_MAX_BODIES,
+    snprintf (buffer, size, "at most %d bodies, %d internal coordinates, %d rows and %d signals", PW_MAX_BODIES,
               PW_MAX_INTERNAL, PW_MAX_ROWS, PW_MAX_SIGNALS);
     return buffer;
   }

@@ -292,7 +292,7 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
   x.cols = s->batch->b.cols;
   for (int j = 3 * s->bodies; j < s->coords; j++)
     pw_probe_note (report, "table", "", !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
-                   "inertia of an own coordinate");
+                   "inertia of an internal coordinate");
   pw_probe_randomise (&x, &random);
   selftest_all (&x);
   pw_workspace_free (w);

@@ -139,7 +139,7 @@ static int compile_put (const pw_compilation *c, pw_system *s, pw_element_batch 
   return PW_OK;
 }
 
-/* After the elements, whose own coordinates a signal may read. */
+/* After the elements, whose internal coordinates a signal may read. */
 static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
   int *next = c->count; /* from now on counts the elements seen of each batch */
   memset (next, 0, (size_t)s->batches * sizeof *next);

@@ -123,7 +123,7 @@ void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   }
 }
 
-/* out = J w for a batch; the numbers of bodies and of own coordinates are constants where it is inlined. */
+/* out = J w for a batch; the numbers of bodies and of internal coordinates are constants where it is inlined. */
 PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, const double *w, double *out, int bodies,
                              int own) {
   static const double ground[3] = { 0, 0, 0 };

@@ -4,7 +4,7 @@
 #include "signal.h"
 #include "unroll.h"
 
-/* Own coordinates are read where the caller has them. */
+/* Internal coordinates are read where the caller has them. */
 static void place_own (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (q) k->b.q = q + k->own;

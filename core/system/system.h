@@ -16,7 +16,7 @@ typedef struct {
   pw_batch b; /* as the element type sees it */
   const pw_kind *kind;
   int row;           /* global index of its first row */
-  int own;           /* global index of its first own coordinate */
+  int own;           /* global index of its first internal coordinate */
   const int *column; /* count x bodies: first coordinate of each body; the ground's is s->coords */
   const char **name; /* count */
   double *J;         /* count x rows x cols */

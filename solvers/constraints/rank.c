@@ -214,7 +214,7 @@ int pw_rank_open (pw_run *r, pw_error *error) {
   }
   if (best > rank)
     status = pw_fail (error, PW_INITIAL,
-                      "model %s: the start is a singular pose: %d constraint rows are independent there, %d nearby; "
+                      "model %s: the start is a singular configuration: %d constraint rows are independent there, %d nearby; "
                       "start a little off it",
                       s->model, rank, best);
   else if (best < s->rows && rank_store (r, x.best, s->rows - best) != PW_OK)

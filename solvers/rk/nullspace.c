@@ -15,7 +15,7 @@
  * basis held while it is good; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of
  * mechanical system dynamics.)
  *
- * J is swept over panels, the rows that touch a body or an own coordinate.  At the step's start K is symmetric and positive
+ * J is swept over panels, the rows that touch a body or an internal coordinate.  At the step's start K is symmetric and positive
  * definite, so that its factorisation needs no pivoting; it is done without while no pivot is small, else anew with it. */
 #include <lapacke.h>
 #include <math.h>

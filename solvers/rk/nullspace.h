@@ -6,7 +6,7 @@
 
 enum { PW_NULLSPACE_MOST = 256 }; /* rows: they are solved densely */
 
-/* A row's entries at a body, or at an own coordinate. */
+/* A row's entries at a body, or at an internal coordinate. */
 typedef struct {
   int row;             /* among the active ones */
   const double *J;     /* as last swept */
@@ -21,7 +21,7 @@ typedef struct {
 typedef struct {
   int rows;                  /* active ones */
   int *place;                /* all rows: number among the active ones, or -1 */
-  int panels;                /* bodies and own coordinates */
+  int panels;                /* bodies and internal coordinates */
   pw_nullspace_block *panel; /* panels + 2 */
   pw_nullspace_piece *piece;
   double *K;       /* rows x rows: J W^-1 J0^T, factorised in place */

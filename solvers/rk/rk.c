@@ -293,11 +293,11 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   if (!finite && h < 1e-12 * fabs (r->t))
     return pw_fail (error, PW_METHOD, "t = %.6g s: the state is not finite behind it, however small the step", r->t);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", r->t, h,
-                  r->data->split      ? "near a singular pose no two divisions of it agree"
+                  r->data->split      ? "near a singular configuration no two divisions of it agree"
                   : !finite           ? "the state is no longer finite"
                   : r->data->minimal  ? "the velocities' basis does not last"
                   : r->data->projects ? "the projection does not converge"
-                                      : "a stage of it lands in a singular pose");
+                                      : "a stage of it lands in a singular configuration");
 }
 
 void pw_rk_revert (pw_run *r) {

@@ -59,13 +59,13 @@ static int judge_turn (pw_run *r, double now, pw_error *error) {
   if (!(now <= limit->turn * before) && judge_blurred (r, off, limit->drift_turn))
     return pw_fail (
         error, PW_METHOD,
-        "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) may lead to another branch, with "
+        "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) may lead to another branch, with "
         "%.3g times the accelerations of before; methods with projection pass",
         r->t, r->known.position, now / before);
   if (!(off <= limit->drift_far) && judge_blurred (r, off, limit->drift_any))
     return pw_fail (
         error, PW_METHOD,
-        "t = %.6g s: lost at a singular pose: constraints off by %.2g (scaled) tell no branch from another; "
+        "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) tell no branch from another; "
         "methods with projection pass",
         r->t, r->known.position);
   return PW_OK;
@@ -84,7 +84,7 @@ static int judge_outburst (pw_run *r, pw_error *error) {
   double now = pw_run_acceleration_norm (r);
   if (judge_near_rows (r) && !(now <= r->limits.jump * r->calm))
     return pw_fail (error, PW_METHOD,
-                    "t = %.6g s: lost at a singular pose: the accelerations are %.3g times those before", r->t,
+                    "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
                     now / r->calm);
   if (r->near || judge_blurred (r, judge_off (r), r->limits.drift_near)) return judge_turn (r, now, error);
   r->calm = pw_larger (now, r->calm);

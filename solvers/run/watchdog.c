@@ -181,10 +181,10 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
         t);
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   if (sine <= r->limits.rank)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: singular pose: %s says what other constraints say already", t,
+    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s says what other constraints say already", t,
                     element);
   return pw_fail (error, PW_METHOD,
-                  "t = %.6g s: near a singular pose: %s says almost what other constraints say (sine %.2g); the next "
+                  "t = %.6g s: near a singular configuration: %s says almost what other constraints say (sine %.2g); the next "
                   "step cannot be computed",
                   t, element, sine);
 }

@@ -43,7 +43,7 @@ report "massless bodies, many steps, killed $kills times" $?
 killed redundant-parallelogram --t-end 60 --every 0.005 --energy --checkpoint-every 0.9
 report "redundant rows, killed $kills times" $?
 killed n-four-bar --t-end 20 --step 1e-3 --every 0.01 --checkpoint-every 0.3
-report "singular poses, killed $kills times" $?
+report "singular configurations, killed $kills times" $?
 killed chain --set n=200 --t-end 2 --every 0.01 --checkpoint-every 0.05
 report "a large scene, killed $kills times" $?
 exit $bad

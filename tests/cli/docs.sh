@@ -1,7 +1,7 @@
 #!/bin/sh
 # What the manual and the other pages show is what the program prints: each block that begins with "$ build/pinwheel" is run,
 # and its lines are found in the output, in their order.  Numbers agree to 1 %, or both are below 1e-6 in size, or the line is
-# about what is the machine's alone: times, and what a drifting method does at a singular pose.
+# about what is the machine's alone: times, and what a drifting method does at a singular configuration.
 # Run from the top folder; reads PINWHEEL.
 
 . "$(dirname "$0")/../support/report.sh"
@@ -21,7 +21,7 @@ missing () {
       d = a - b; if (d < 0) d = -d; if (a < 0) a = -a; if (b < 0) b = -b
       return d <= 0.01 * a || (a < 1e-6 && b < 1e-6) }
     function like(a, b, n, i, x, y, free) {
-      free = a ~ /cpu_s|processor time|[0-9] %|lost at a singular pose|\[ns\]|took/
+      free = a ~ /cpu_s|processor time|[0-9] %|lost at a singular configuration|\[ns\]|took/
       n = split (a, x); if (split (b, y) != n) return 0
       for (i = 1; i <= n; i++) {
         x[i] = bare(x[i]); y[i] = bare(y[i])

@@ -181,11 +181,11 @@ static void test_faults (void **state) {
   } while (0)
   KINDS_FAULT (name, NULL, "no name");
   KINDS_FAULT (definition, 0, "the definition has no room for its name");
-  KINDS_FAULT (bodies, 5, "at most 4 bodies, 4 own coordinates, 6 rows and 4 signals");
+  KINDS_FAULT (bodies, 5, "at most 4 bodies, 4 internal coordinates, 6 rows and 4 signals");
   KINDS_FAULT (bodies, 0, "neither a body nor a coordinate of its own");
   KINDS_FAULT (level, PW_FORCE, "rows and level contradict each other");
   KINDS_FAULT (reaction, NULL, "constraint rows without names of their reactions");
-  KINDS_FAULT (own, 1, "own coordinates without names");
+  KINDS_FAULT (own, 1, "internal coordinates without names");
   KINDS_FAULT (prepare, NULL, "something to prepare, but no prepare function");
   KINDS_FAULT (fields, NULL, "no table of fields");
   KINDS_FAULT (fields, kinds_typeless, "field mode: its type does not exist");

@@ -156,7 +156,7 @@ static const pw_quantity guide_coordinate[] = { { "u", "rad", "urate", "along th
 
 static const pw_kind guide_kind = {
   .name = "guide",
-  .about = "the centre of mass of a body stays on a line, along which an own coordinate counts",
+  .about = "the centre of mass of a body stays on a line, along which an internal coordinate counts",
   .definition = sizeof (guide),
   .element = 1,
   .fields = guide_fields,

@@ -188,7 +188,7 @@ static void test_gallery (void **state) {
     { "differential-drive --set ahead=0.1 --set right=0.2 --set track=0.4 --set radius=0.1", 1e-10, "100 h^4" },
     { "car --set steer=-0.2 --set b=1.1 --set u0=3", 1e-10, "100 h^4" },
     { "n-trailer --set n=4 --set R=3 --set w=-0.8 --set longer=0.1", 1e-10, "100 h^4" },
-    { "n-four-bar --set speed=2 --set N=3 --set l=1.2", 1e-8, "1e4 h^4: 6 rad/s, singular poses" },
+    { "n-four-bar --set speed=2 --set N=3 --set l=1.2", 1e-8, "1e4 h^4: 6 rad/s, singular configurations" },
     { "redundant-parallelogram --set theta=0.4 --set mc=1 --set l=0.7", 1e-9, "1000 h^4: 6 rad/s" },
     { "peaucellier --set swing=0.7 --set omega=2 --set a=0.35", 1e-12, "prescribed: round-off" },
   };

@@ -11,7 +11,7 @@
 
 /* ---- Scenes: between them, all that a kind may have ---- */
 
-/* A cart on a rolling wheel with its own coordinate, tied to the ground by a damped spring, with an arm that swings as
+/* A cart on a rolling wheel with its internal coordinate, tied to the ground by a damped spring, with an arm that swings as
  * its motor says and a free pendulum at the arm's end. */
 static void agree_cart (pw_model *m, const void *parameters) {
   (void)parameters;

@@ -272,7 +272,7 @@ static void test_messages (void **state) {
   watchdog_says ("slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4, "change point");
   watchdog_says ("slider-crank", "l2", 1.00001, "galpha+ggl", 1e-2, 4, "change point");
   watchdog_says ("slider-crank", "l2", 1.000003, "erk8+projection", 1e-3, 4, "change point");
-  watchdog_says ("slider-crank", NULL, 0, "galpha+ggl", 1e-4, 4, "near a singular pose");
+  watchdog_says ("slider-crank", NULL, 0, "galpha+ggl", 1e-4, 4, "near a singular configuration");
 }
 
 static void test_extreme (void **state) {
@@ -446,7 +446,7 @@ static void test_jump (void **state) {
   r->near = 1;
   r->a[0] = 1.5 * r->limits.jump * r->calm * s->scale.length / (r->w->scale.time * r->w->scale.time);
   assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
-  assert_non_null (strstr (error.text, "lost at a singular pose: the accelerations are 150 times"));
+  assert_non_null (strstr (error.text, "lost at a singular configuration: the accelerations are 150 times"));
   r->limits.jump *= 2;
   error = (pw_error){ 0 };
   r->near = 1;

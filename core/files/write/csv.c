@@ -1,6 +1,6 @@
 /* Tables of samples, one line each, that Octave, Python and gnuplot read as they are.
  *
- *   t [s] | states of each body, of each own coordinate | contact points | reactions | residuals | energies */
+ *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
