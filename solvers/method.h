@@ -157,7 +157,7 @@ static inline double pw_largest (double most, double x) {
   return x > most || isnan (x) ? x : most;
 }
 
-/* The size of the accelerations at the state reached, in units of L / T^2 (judge.c). */
+/* The size of the accelerations at the state reached, in units of L / T^2 (branch.c). */
 double pw_run_acceleration_norm (const pw_run *r);
 /* Looks at the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
  * another branch. */

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include "specimen.h"
+#include "random_scene.h"
 
 static const char *const differences_name[PW_BLOCKS] = {
   [PW_JW_Q] = "jw_q",       [PW_JTL_Q] = "jtl_q",     [PW_ETA_Q] = "eta_q",     [PW_GAMMA_Q] = "gamma_q",

@@ -3,7 +3,7 @@
 #define PW_PROBE_INCLUDED
 
 #include "pinwheel-selftest.h"
-#include "specimen.h"
+#include "random_scene.h"
 
 enum {
   PW_PROBE_COORDS = 3 * PW_SCENE_BODIES + PW_SCENE_BATCH * PW_MAX_INTERNAL,

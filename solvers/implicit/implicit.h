@@ -2,7 +2,7 @@
 #ifndef PW_IMPLICIT_H
 #define PW_IMPLICIT_H
 
-#include "between.h"
+#include "dense_output.h"
 #include "sparse.h"
 #include "tangent.h"
 #include "util.h"

@@ -3,7 +3,7 @@
 #define PW_NEWTON_H
 
 #include "system.h"
-#include "tape.h"
+#include "scatter.h"
 
 /* Scratch for the blocks of one system. */
 typedef struct {

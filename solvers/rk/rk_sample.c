@@ -4,7 +4,7 @@
  * good.  Then it is taken in two parts, in several ways, and the one is good that comes nearest to another. */
 #include <math.h>
 #include <string.h>
-#include "between.h"
+#include "dense_output.h"
 #include "rk_state.h"
 
 /* A state that a step can begin from, as the run has it. */

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "between.h"
+#include "dense_output.h"
 #include "pinwheel-method.h"
 #include "util.h"
 

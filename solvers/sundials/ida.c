@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <idas/idas.h>
-#include "between.h"
+#include "dense_output.h"
 #include "ida.h"
 #include "rank.h"
 

@@ -12,7 +12,7 @@
 #include <string.h>
 #include <cvodes/cvodes.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
-#include "between.h"
+#include "dense_output.h"
 #include "multistep.h"
 #include "util.h"
 

@@ -4,7 +4,7 @@
 #include <string.h>
 #include "check.h"
 #include "expression.h"
-#include "specimen.h"
+#include "random_scene.h"
 
 static const char *const expression_names[] = { "t", "frame.phi", NULL };
 static pw_arena expression_arena;

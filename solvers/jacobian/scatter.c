@@ -1,7 +1,7 @@
-/* Recording and layout of repeated sparse assemblies; see tape.h. */
+/* Recording and layout of repeated sparse assemblies; see scatter.h. */
 #include <stdlib.h>
 #include <string.h>
-#include "tape.h"
+#include "scatter.h"
 
 void pw_scatter_record (pw_scatter_map *t) {
   *t = (pw_scatter_map){ .recording = 1 };

@@ -2,7 +2,7 @@
  * that the method has; multipliers and accelerations, of which the ends are good to h^2, and the ledger's rates, linearly. */
 #include <stdlib.h>
 #include <string.h>
-#include "between.h"
+#include "dense_output.h"
 #include "util.h"
 
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, int rates, pw_error *error) {

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "model.h"
-#include "specimen.h"
+#include "random_scene.h"
 
 /* splitmix64 (Steele, Lea, Flood 2014). */
 static uint64_t specimen_next (pw_random *r) {
