@@ -77,7 +77,7 @@ FUZZ_SHARE := tests/fuzz/fuzz.c $(if $(FUZZING),,tests/fuzz/replay.c)
 FUZZ       := $(filter-out tests/fuzz/fuzz.c tests/fuzz/replay.c,$(wildcard tests/fuzz/*.c))
 FUZZERS    := $(FUZZ:tests/fuzz/%.c=$(BUILD)/fuzz/%)
 
-.PHONY: all everything demo test test-all layers san tsan valgrind fuzz fuzzers mutants cov clang gcc format format-check bench bench-quick bench-engine \
+.PHONY: all everything demo test test-all layers words san tsan valgrind fuzz fuzzers mutants cov clang gcc format format-check bench bench-quick bench-engine \
         bench-effects hard basic deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
@@ -96,9 +96,9 @@ help:
 	@echo 'make bench-engine     an evaluation, a step against programs written by hand; growth with size'
 	@echo 'make bench-effects    instructions of an evaluation, with one effect more at a time; what is not used costs none'
 	@echo 'make hard             every method on every hard case, against the expected verdicts; writes docs/hard-cases.md'
-	@echo 'make layers           proof of what depends on what'
+	@echo 'make layers           proof of what depends on what; words: standard terms in names and text'
 	@echo 'make san              the tests with ASan and UBSan; clang, gcc: all of it without a warning'
-	@echo 'make fuzz TIME=60     models, expressions, tables, checkpoints, command lines from a fuzzer, so many seconds each'
+	@echo 'make fuzz TIME=60     models, expressions, tables, checkpoints, command lines from a fuzzer, TIME seconds each'
 	@echo 'make mutants TIME=7200   one small change at a time to the sources; lists those that no test notices; resumes'
 	@echo 'make cov              lines that the tests run, and those they do not'
 	@echo 'make tsan             runs in many threads with ThreadSanitizer; valgrind: some tests with memcheck'
@@ -311,6 +311,9 @@ bench-effects: all basic $(BUILD)/benchmarks/effects
 
 hard: all $(BUILD)/benchmarks/hard
 	@$(BUILD)/benchmarks/hard -o docs/hard-cases benchmarks/hard
+
+words:
+	@sh .ci/words
 
 layers: all
 	@BUILD=$(BUILD) sh .ci/layers

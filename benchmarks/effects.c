@@ -202,7 +202,7 @@ static void effects_fill (effects_data *d, int massless) {
   effects_close (alone, s);
 }
 
-/* Evaluates in the function that callgrind is told to watch. */
+/* Evaluates in the function that callgrind counts. */
 static int effects_child (const char *key, const char *side) {
   static effects_data d;
   int massless = strcmp (side, "massless") == 0;

@@ -127,7 +127,7 @@ static void eighth_close (eighth_scene *s) {
 
 static void eighth_put (const char *scene, const ladder *w, FILE *csv) {
   for (const ladder_point *p = w->point; p < w->point + w->count; p++)
-    fprintf (csv, "%s,%s,point,%.9g,%.9g,%.9g\n", scene, w->name, p->rung, p->error, p->cpu[EIGHTH_ROUNDS / 2]);
+    fprintf (csv, "%s,%s,point,%.9g,%.9g,%.9g\n", scene, w->name, p->level, p->error, p->cpu[EIGHTH_ROUNDS / 2]);
   for (int j = 0; j < EIGHTH_TARGETS; j++)
     if (ladder_time (w, eighth_target[j], EIGHTH_ROUNDS) > 0)
       fprintf (csv, "%s,%s,line,nan,%.9g,%.9g\n", scene, w->name, eighth_target[j],
@@ -181,7 +181,7 @@ static void eighth_case (int massless, FILE *csv) {
 int main (int argc, char **argv) {
   FILE *csv = argc > 1 ? fopen (argv[1], "w") : NULL;
   if (argc > 1 && csv == NULL) engine_die (argv[1], "cannot be written");
-  if (csv) fputs ("steering,program,what,rung,error_m,cpu_s\n", csv);
+  if (csv) fputs ("steering,program,what,level,error_m,cpu_s\n", csv);
   puts ("EzyRoller: erk8+projection against an 8th-order program by hand");
   eighth_case (1, csv);
   eighth_case (0, csv);

@@ -4,7 +4,7 @@
  *   peers [CSV]           every method down a ladder of tolerances or steps, by turns; what errors of the lengths at the
  *                         end of 1e-3, 1e-6, 1e-9, 1e-12 m cost; instructions of a run at about 1e-6, by callgrind if it
  *                         is there
- *   peers --count K RUNG  run K alone, for callgrind
+ *   peers --count K LEVEL  run K alone, for callgrind
  *
  * Errors of the EzyRoller are against digits computed in quadruple precision (8th order, minimal coordinates, 10,000 and
  * 20,000 steps agree to 17 digits), those of chains against the program by hand with a small step.  Targets are what
@@ -30,11 +30,11 @@ typedef struct {
 
 /* ---- Pinwheel ---- */
 
-static double peers_ours (void *scene, const ladder *way, double rung, double *q) {
+static double peers_ours (void *scene, const ladder *way, double level, double *q) {
   const peers_scene *s = scene;
   pw_error error = { 0 };
   pw_sample sample;
-  pw_run *r = engine_open (s->system, way->method, &(pw_settings){ .rtol = rung, .step = rung, .span = s->seconds });
+  pw_run *r = engine_open (s->system, way->method, &(pw_settings){ .rtol = level, .step = level, .span = s->seconds });
   int status = PW_OK;
   while (status == PW_OK && pw_run_time (r) < s->seconds) status = pw_run_advance (r, s->seconds, &error);
   if (status == PW_OK && pw_run_sample (r, s->seconds, &sample, &error) != PW_OK) engine_die (way->method, error.text);
@@ -116,27 +116,27 @@ static void peers_open (void) {
 
 typedef struct {
   int way;
-  double rung;
+  double level;
 } peers_job;
 
 static long peers_once (void *context, long n) {
   const peers_job *job = context;
   static double q[3 * PEERS_LINKS];
   const ladder *l = peers_way (job->way);
-  l->run (peers_scene_of (job->way), l, job->rung, q);
+  l->run (peers_scene_of (job->way), l, job->level, q);
   return n;
 }
 
-/* Per evaluation, over a whole run at the rung whose error is next to 1e-6; 0: not known. */
+/* Per evaluation, over a whole run at the level whose error is next to 1e-6; 0: not known. */
 static double peers_instructions (const char *program, int k) {
   const ladder *l = peers_way (k);
-  char key[20], rung[40];
+  char key[20], level[40];
   int best = 0;
   for (int i = 0; i < l->count; i++)
     if (fabs (log (l->point[i].error / 1e-6)) < fabs (log (l->point[best].error / 1e-6))) best = i;
   snprintf (key, sizeof key, "%d", k);
-  snprintf (rung, sizeof rung, "%.17g", l->point[best].rung);
-  return engine_count (program, key, rung, l->function) / l->point[best].evaluations;
+  snprintf (level, sizeof level, "%.17g", l->point[best].level);
+  return engine_count (program, key, level, l->function) / l->point[best].evaluations;
 }
 
 /* ---- Measuring ---- */

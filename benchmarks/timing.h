@@ -62,7 +62,7 @@ static inline double timing_alone (const timing_work *w, int batches, double sec
   return timing_median (ns, batches);
 }
 
-/* Both, in interleaved pairs of batches of about so many seconds each; every other pair in the other order. */
+/* Both, in interleaved pairs of batches of about this duration [s] each; every other pair in the other order. */
 static inline timing_result timing_compare (const timing_work *base, const timing_work *ours, int pairs,
                                             double seconds) {
   double a[TIMING_PAIRS_MAX], b[TIMING_PAIRS_MAX], ratio[TIMING_PAIRS_MAX];

@@ -534,7 +534,8 @@ typedef struct {
 
 /* A coordinate an element owns, as its kind's prepare describes it. */
 typedef struct {
-  double mass; /* its entry of M [kg m^2], >= 0; an internal coordinate may be massless if the element's rows determine it */
+  double
+      mass; /* its entry of M [kg m^2], >= 0; an internal coordinate may be massless if the element's rows determine it */
   double start;     /* its value at the start [rad] */
   double rate;      /* its rate at the start [rad/s] */
   int specified[2]; /* 1: start, rate are what the definition says, not a consequence of something else */
@@ -600,7 +601,7 @@ struct pw_kind {
                   pw_error *error);
 
   pw_batch_function *g;       /* rows: residual of holonomic rows */
-  pw_batch_function *g_size;  /* rows: sum of the absolute values of the terms of g, against which g is judged */
+  pw_batch_function *g_size;  /* rows: sum of the absolute values of the terms of g, the reference size of g */
   pw_batch_function *eta;     /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
   pw_batch_function *J;       /* rows x cols */
   pw_batch_function *gamma;   /* rows: right-hand side of J a = gamma */

@@ -34,7 +34,7 @@ typedef struct {
   const struct pw_method *const *methods; /* the caller's own, ended by NULL, beside the built-in ones; or NULL */
 } pw_settings;
 
-/* The scales of a scene, from its description and start: everything judged absolutely is judged against them. */
+/* The scales of a scene, from its description and initial state: the units of absolute thresholds. */
 typedef struct {
   double length; /* L: largest distance of an attachment from its body's centre of mass, else radius of gyration [m] */
   double time;   /* T: 1 / max (1 / span, fastest rate, square root of the fastest acceleration), in units of L [s] */

@@ -51,6 +51,6 @@ static void build (pw_model *m, const void *parameter) {
   if (p->g != 0) pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-PW_MODEL (.about = "crank, rod and slider; with equal lengths it passes a singular configuration", .parameters = parameters,
-          .parameters_size = sizeof (slider_crank), .run = { .t_end = 1, .step = 1e-3, .method = "rk4+projection" },
-          .build = build);
+PW_MODEL (.about = "crank, rod and slider; with equal lengths it passes a singular configuration",
+          .parameters = parameters, .parameters_size = sizeof (slider_crank),
+          .run = { .t_end = 1, .step = 1e-3, .method = "rk4+projection" }, .build = build);

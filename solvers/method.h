@@ -30,13 +30,14 @@ struct pw_run {
   pw_geometry geometry;  /* how near the constraints are to a singular configuration */
   double refuse;         /* sine at which an evaluation is refused */
   int near;              /* 1 as soon as one was near a singular configuration */
-  double calm;        /* the largest accelerations away from singular configurations, in units of L / T^2; at least 1 */
-  double before;      /* those of the last state away from them */
-  int differentiates; /* 1: the method uses the derivatives of the equations (tangent.h) */
-  double alpha, beta; /* Baumgarte's, used by pw_run_accelerate; 0: none */
-  double breakpoint;  /* first discontinuity of a signal after t */
-  int stuck;          /* steps in a row that were as good as none */
-  pw_residuals known; /* of the state reached; NaN: not yet judged, nor told by a projection */
+  double
+      reference_level; /* the largest accelerations away from singular configurations, in units of L / T^2; at least 1 */
+  double before;       /* those of the last state away from them */
+  int differentiates;  /* 1: the method uses the derivatives of the equations (tangent.h) */
+  double alpha, beta;  /* Baumgarte's, used by pw_run_accelerate; 0: none */
+  double breakpoint;   /* first discontinuity of a signal after t */
+  int stuck;           /* steps in a row that were as good as none */
+  pw_residuals known;  /* of the state reached; NaN: not known */
 
   /* the state reached: always with its accelerations and multipliers */
   double t;
@@ -140,7 +141,7 @@ void pw_read_baumgarte (pw_run *r);
     .about = "norm in which the correction is smallest: mass matrix, or identity (pseudo-inverse)" }, \
   {                                                                                                   \
     .name = "every", .with = "projection", .value = 1, .domain = PW_COUNT, .unit = "steps",           \
-    .about = "project after each so many steps"                                                       \
+    .about = "steps from one projection to the next"                                                  \
   }
 extern const char *const pw_metrics[];
 
@@ -259,7 +260,7 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v);
  * J v = eta to round-off may be left as they are. */
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda);
 
-/* Takes from an error of positions or velocities what a projection onto the first so many rows removes, in the metric of the
+/* Takes from an error of positions or velocities what a projection onto the first `rows` equations removes, in the metric of the
  * saddle `k` (all rows), which is factorised at the placed configuration. */
 void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
 

@@ -54,7 +54,7 @@ double pw_stage_time (const pw_run *r, double t);
 
 /* ---- One-step methods ---- */
 
-/* Opens what these functions keep for a run, with so many arrays for the method.  Errors: PW_RESOURCE. */
+/* Opens what these functions keep for a run, with `arrays` arrays for the method.  Errors: PW_RESOURCE. */
 int pw_step_open (pw_run *r, int arrays, pw_error *error);
 
 /* Array i, the same in every step: room for coordinates or for constraint equations, whichever are more. */

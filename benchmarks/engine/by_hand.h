@@ -7,7 +7,7 @@
 
 enum { BY_HAND_SECONDS = 100 };
 
-/* The EzyRoller with a massive steering assembly, from rest, so many seconds. */
+/* The EzyRoller with a massive steering assembly, from rest, for this time [s]. */
 extern const ezy_model by_hand_model;
 double by_hand_minimal (void *scene, const ladder *way, double h, double *q);   /* 8th order, minimal coordinates */
 double by_hand_eighth (void *scene, const ladder *way, double h, double *q);    /* 8th order and projection */

@@ -5,11 +5,11 @@ double ladder_rung (const ladder *l, int i) {
   return l->first * pow (l->factor, i);
 }
 
-void ladder_take (ladder *l, void *scene, const double *reference, int n, double *q, int round, int rung) {
-  ladder_point *p = &l->point[rung];
+void ladder_take (ladder *l, void *scene, const double *reference, int n, double *q, int round, int level) {
+  ladder_point *p = &l->point[level];
   double start = timing_now ();
-  p->rung = ladder_rung (l, rung);
-  p->evaluations = l->run (scene, l, p->rung, q);
+  p->level = ladder_rung (l, level);
+  p->evaluations = l->run (scene, l, p->level, q);
   p->cpu[round] = timing_now () - start;
   p->error = 0;
   for (int j = 0; j < n; j++)

@@ -8,8 +8,8 @@
 enum { LADDER_ROUNDS = 7, LADDER_RUNGS = 24 };
 
 typedef struct {
-  double rung, error, evaluations; /* step [s] or tolerance; [m]; of the accelerations or the residual */
-  double cpu[LADDER_ROUNDS];       /* [s], sorted in the end */
+  double level, error, evaluations; /* step [s] or tolerance; [m]; of the accelerations or the residual */
+  double cpu[LADDER_ROUNDS];        /* [s], sorted in the end */
 } ladder_point;
 
 /* One way to go down: from `first`, by `factor`. */
@@ -19,7 +19,7 @@ struct ladder {
   double first, factor;
   int count;
   /* Runs to the end, q taking the positions there (NaN: it fails); returns the evaluations. */
-  double (*run) (void *scene, const ladder *way, double rung, double *q);
+  double (*run) (void *scene, const ladder *way, double level, double *q);
   const char *function; /* what callgrind counts, if asked */
   ladder_point point[LADDER_RUNGS];
 };
@@ -27,9 +27,9 @@ struct ladder {
 double ladder_rung (const ladder *l, int i);
 
 /* Takes one point; the error is that of the lengths among n coordinates, with room for them in q. */
-void ladder_take (ladder *l, void *scene, const double *reference, int n, double *q, int round, int rung);
+void ladder_take (ladder *l, void *scene, const double *reference, int n, double *q, int round, int level);
 
-/* Sorts the times of so many rounds; the median is then in the middle. */
+/* Sorts the times of all rounds; the median is then in the middle. */
 void ladder_sort (ladder *l, int rounds);
 
 /* Processor time [s] and evaluations for an error [m]; 0: it is not reached. */

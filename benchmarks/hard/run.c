@@ -1,4 +1,4 @@
-/* One cell: a case by a method, run to its end, measured, judged. */
+/* One cell: a case by a method, run to its end and measured. */
 #include <fnmatch.h>
 #include <math.h>
 #include <stdlib.h>

@@ -6,7 +6,7 @@ present () {
   return 0
 }
 
-# The least processor time of a rung whose largest error is no more than the target, in ms.
+# The least processor time of a level whose largest error is no more than the target, in ms.
 work_table () {
   methods=$(present | paste -sd' ' -)
   awk -F, -v methods="$methods" '
@@ -35,9 +35,9 @@ work_table () {
         print "" } }' "$csv"
 }
 
-# Methods none of whose rungs has reached the end, and those some of whose have failed.
+# Methods none of whose levels has reached the end, and those some of whose have failed.
 failure_table () {
-  echo '| scene | method | rungs that reach the end | why the others do not (the first of them) |'
+  echo '| scene | method | levels that reach the end | why the others do not (the first of them) |'
   echo '|---|---|---|---|'
   awk -F, '
     NR == 1 || $1 == "original" { next }

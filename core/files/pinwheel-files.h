@@ -216,7 +216,7 @@ typedef struct {
   double cpu;                          /* [s], integration alone */
   const char *const *redundant;        /* what is said about each redundant row, ended by NULL; may be NULL: none */
   const pw_reference_error *reference; /* NULL: there is none to compare with */
-  double unbalanced;                   /* relative, as pw_run_energy_defect says; NaN: not known */
+  double energy_defect;                /* relative, as pw_run_energy_defect says; NaN: not known */
 } pw_summary;
 
 /* Writes the JSON summary: whatever is not known (model and method too may be NULL) or not finite is null. */

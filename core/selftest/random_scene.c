@@ -5,7 +5,7 @@
 #include "random_scene.h"
 
 /* splitmix64 (Steele, Lea, Flood 2014). */
-static uint64_t specimen_next (pw_random *r) {
+static uint64_t scene_next (pw_random *r) {
   uint64_t z = (r->state += 0x9e3779b97f4a7c15u);
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
@@ -13,7 +13,7 @@ static uint64_t specimen_next (pw_random *r) {
 }
 
 double pw_random_between (pw_random *r, double low, double high) {
-  return low + (high - low) * ldexp ((double)(specimen_next (r) >> 11), -53);
+  return low + (high - low) * ldexp ((double)(scene_next (r) >> 11), -53);
 }
 
 /* ---- Random definitions ---- */
@@ -22,9 +22,9 @@ double pw_random_between (pw_random *r, double low, double high) {
 typedef struct {
   const pw_kind *kind;
   pw_random *random;
-} specimen;
+} random_scene;
 
-static double specimen_number (pw_random *r, pw_domain domain) {
+static double scene_number (pw_random *r, pw_domain domain) {
   if (domain == PW_COUNT) return floor (pw_random_between (r, 1, 6));
   if (domain == PW_FRACTION) return pw_random_between (r, 0, 1);
   if (domain == PW_NONNEGATIVE && pw_random_between (r, 0, 1) < 0.2) return 0;
@@ -32,7 +32,7 @@ static double specimen_number (pw_random *r, pw_domain domain) {
   return domain == PW_REAL && pw_random_between (r, 0, 1) < 0.5 ? -size : size;
 }
 
-static pw_signal specimen_signal (pw_random *r) {
+static pw_signal scene_signal (pw_random *r) {
   pw_signal s = { .type = PW_HARMONIC };
   s.harmonic.amplitude = pw_random_between (r, 0.5, 1.5);
   s.harmonic.omega = pw_random_between (r, 0.5, 2);
@@ -41,30 +41,30 @@ static pw_signal specimen_signal (pw_random *r) {
   return s;
 }
 
-static int specimen_choice (pw_random *r, const pw_field *f) {
+static int scene_choice (pw_random *r, const pw_field *f) {
   int choices = 0;
   while (f->choices[choices]) choices++;
   return (int)floor (pw_random_between (r, 0, choices));
 }
 
 /* One value of a field.  Points stay near the centre of mass, so that bodies far apart keep their points apart. */
-static void specimen_value (pw_random *r, const pw_field *f, void *at) {
-  if (f->type == PW_NUMBER) *(double *)at = specimen_number (r, f->domain);
-  if (f->type == PW_SIGNAL) *(pw_signal *)at = specimen_signal (r);
-  if (f->type == PW_CHOICE) *(int *)at = specimen_choice (r, f);
+static void scene_value (pw_random *r, const pw_field *f, void *at) {
+  if (f->type == PW_NUMBER) *(double *)at = scene_number (r, f->domain);
+  if (f->type == PW_SIGNAL) *(pw_signal *)at = scene_signal (r);
+  if (f->type == PW_CHOICE) *(int *)at = scene_choice (r, f);
   for (int i = 0; i < 2 && f->type == PW_POINT; i++) ((double *)at)[i] = pw_random_between (r, -0.6, 0.6);
-  for (int i = 0; i < 2 && f->type == PW_VECTOR; i++) ((double *)at)[i] = specimen_number (r, PW_REAL);
+  for (int i = 0; i < 2 && f->type == PW_VECTOR; i++) ((double *)at)[i] = scene_number (r, PW_REAL);
 }
 
 /* Element e takes every body in turn, from another one on; the last element hangs on the ground. */
-static const char *specimen_body (const specimen *x, int e, int n) {
+static const char *scene_body (const random_scene *x, int e, int n) {
   static const char *const name[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
   int last = e == PW_SCENE_ELEMENTS - 1;
   if (last && x->kind->bodies > 1 && n == (int)(x->random->state % (unsigned)x->kind->bodies)) return "ground";
   return name[(e + n) % PW_SCENE_BODIES];
 }
 
-static void specimen_element (pw_model *m, const specimen *x, int e) {
+static void scene_element (pw_model *m, const random_scene *x, int e) {
   static const char *const name[PW_SCENE_ELEMENTS] = { "e0", "e1", "e2" };
   char *definition = pw_arena_take (&m->arena, x->kind->definition);
   if (definition == NULL) {
@@ -74,30 +74,30 @@ static void specimen_element (pw_model *m, const specimen *x, int e) {
   *(const char **)(void *)definition = name[e];
   for (const pw_field *f = x->kind->fields; f->name; f++)
     for (int i = 0; i < pw_field_count (f); i++)
-      specimen_value (x->random, f, definition + f->offset + (size_t)i * pw_field_bytes (f->type));
+      scene_value (x->random, f, definition + f->offset + (size_t)i * pw_field_bytes (f->type));
   for (int n = 0; n < x->kind->bodies && !x->kind->each_body; n++)
-    *(const char **)pw_field_in (x->kind, definition, PW_BODY, n) = specimen_body (x, e, n);
+    *(const char **)pw_field_in (x->kind, definition, PW_BODY, n) = scene_body (x, e, n);
   pw_add (m, x->kind, definition);
 }
 
-static void specimen_build (pw_model *m, const void *parameters) {
+static void scene_build (pw_model *m, const void *parameters) {
   static const char *const name[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
-  const specimen *x = parameters;
+  const random_scene *x = parameters;
   for (int b = 0; b < PW_SCENE_BODIES; b++)
     pw_add_body (m, &(pw_body){ .name = name[b],
                                 .mass = pw_random_between (x->random, 0.5, 2),
                                 .inertia = pw_random_between (x->random, 0.1, 1) });
-  for (int e = 0; e < (x->kind->each_body ? 1 : PW_SCENE_ELEMENTS); e++) specimen_element (m, x, e);
+  for (int e = 0; e < (x->kind->each_body ? 1 : PW_SCENE_ELEMENTS); e++) scene_element (m, x, e);
 }
 
-static pw_system *specimen_try (const pw_kind *kind, pw_random *random, pw_error *error) {
+static pw_system *scene_try (const pw_kind *kind, pw_random *random, pw_error *error) {
   const pw_plugin_table table = {
-    .abi = PW_ABI, .size = sizeof table, .parameters_size = sizeof (specimen), .build = specimen_build
+    .abi = PW_ABI, .size = sizeof table, .parameters_size = sizeof (random_scene), .build = scene_build
   };
   pw_system *s = NULL;
   pw_model *m = pw_model_new (kind->name, &table, error);
   if (m == NULL) return NULL;
-  memcpy (m->parameters, &(specimen){ kind, random }, sizeof (specimen));
+  memcpy (m->parameters, &(random_scene){ kind, random }, sizeof (random_scene));
   if (pw_model_build (m, error) == PW_OK) s = pw_system_compile (m, error);
   pw_model_free (m);
   return s;
@@ -107,7 +107,7 @@ pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *er
   pw_error why;
   for (int i = 0; i < 50; i++) { /* a kind may refuse numbers that do not go together */
     why = (pw_error){ 0 };
-    pw_system *s = specimen_try (kind, random, &why);
+    pw_system *s = scene_try (kind, random, &why);
     if (s) return s;
     if (why.status != PW_INPUT) break;
   }

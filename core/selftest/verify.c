@@ -1,7 +1,7 @@
 /* The independent verifier: plain loops over elements, rows and columns, nothing shared with the solvers but the kinds.
  *
- * Each residual is judged against the sum of the absolute values of its terms, and against what the scene's length L
- * and time T make of its unit, so that round-off is about 1e-16 whatever the units.  Forces are judged against the
+ * Each residual is compared with the sum of the absolute values of its terms, and against what the scene's length L
+ * and time T make of its unit, so that round-off is about 1e-16 whatever the units.  Forces are compared with the
  * largest in the scene, since those on a massless body may all be round-off themselves. */
 #include <math.h>
 #include <stdlib.h>
@@ -86,7 +86,7 @@ static void verify_force_sizes (verify *x) {
 
 typedef char *verify_name (const pw_system *s, int i, char *buffer, size_t size);
 
-/* The worst of n residuals, none judged against less than `floor`. */
+/* The worst of n residuals, none compared with less than `floor`. */
 static void verify_judge (const pw_system *s, int n, const double *residual, const double *size, double floor,
                           verify_name *name, int first, pw_verdict *verdict) {
   int worst = -1;

@@ -35,7 +35,7 @@ int pw_compile_copies (const pw_model *m, const pw_kind *kind) {
   return massive;
 }
 
-/* Slabs: holonomic kinds in order of appearance, then nonholonomic ones, then forces. */
+/* Batches: holonomic types in order of appearance, then nonholonomic ones, then forces. */
 static int compile_kinds (pw_compilation *c, pw_error *error) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
   const pw_model *m = c->m;

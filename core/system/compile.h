@@ -25,7 +25,7 @@ typedef struct {
   size_t text;             /* bytes of all names */
   size_t points;           /* of tables, in all */
   size_t room;             /* bytes of the largest element, and the guard behind it */
-  unsigned char *prepared; /* so many: where an element is prepared */
+  unsigned char *prepared; /* room bytes: where an element is prepared */
 } pw_compilation;
 
 /* Bytes behind an element that prepare must leave alone. */

@@ -5,15 +5,15 @@
 #include "unroll.h"
 
 /* Internal coordinates are read where the caller has them. */
-static void place_own (pw_workspace *w, const double *q, const double *v) {
+static void kinematics_own (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (q) k->b.q = q + k->own;
     k->b.v = v + k->own;
   }
 }
 
-static inline void place_poses (pw_workspace *w, const double *q, const double *v) {
-  if (w->s->coords > 3 * w->s->bodies) place_own (w, q, v);
+static inline void kinematics_poses (pw_workspace *w, const double *q, const double *v) {
+  if (w->s->coords > 3 * w->s->bodies) kinematics_own (w, q, v);
   for (pw_configuration *p = w->configuration, *end = p + w->s->bodies; p < end; p++, q += 3, v += 3) {
     double phi = q[2];
     *p = (pw_configuration){ q[0], q[1], phi, cos (phi), sin (phi), v[0], v[1], v[2] };
@@ -21,7 +21,7 @@ static inline void place_poses (pw_workspace *w, const double *q, const double *
 }
 
 /* The states a function reads; q NULL: positions stay as they were.  Returns how many were taken. */
-static int place_reads (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
+static int kinematics_reads (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
   int taken = 0;
   for (int r = 0; r < source->reads; r++) {
     int j = source->state[r], velocity = j >= w->s->coords;
@@ -33,10 +33,10 @@ static int place_reads (const pw_workspace *w, const pw_source *source, const do
 }
 
 /* Evaluates the signals that read states, of these only those of velocities if q is NULL; or those of time alone. */
-PW_INLINE int place_sources (pw_workspace *w, int readers, double t, const double *q, const double *v) {
+PW_INLINE int kinematics_sources (pw_workspace *w, int readers, double t, const double *q, const double *v) {
   for (pw_source *i = w->source, *end = i + w->s->sources; i < end; i++) {
     if ((i->reads > 0) != readers || (w->hold && i->forced)) continue;
-    if (readers && place_reads (w, i, q, v) == 0) continue;
+    if (readers && kinematics_reads (w, i, q, v) == 0) continue;
     if (pw_signal_eval (i, t, !i->forced, i->u) == 0) continue;
     w->failed = i;
     return PW_METHOD;
@@ -45,18 +45,18 @@ PW_INLINE int place_sources (pw_workspace *w, int readers, double t, const doubl
 }
 
 /* Signals of time alone are evaluated once per time: stages at the same time share them. */
-static int place_signals (pw_workspace *w, double t, const double *q, const double *v) {
+static int kinematics_signals (pw_workspace *w, double t, const double *q, const double *v) {
   if (t != w->t_signal) {
     w->t_signal = NAN; /* if one fails, others have changed */
-    if (place_sources (w, 0, t, q, v) != PW_OK) return PW_METHOD;
+    if (kinematics_sources (w, 0, t, q, v) != PW_OK) return PW_METHOD;
     w->t_signal = t;
   }
-  return w->s->readers > 0 ? place_sources (w, 1, t, q, v) : PW_OK;
+  return w->s->readers > 0 ? kinematics_sources (w, 1, t, q, v) : PW_OK;
 }
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
-  place_poses (w, q, v);
-  return t == w->t_signal && w->s->readers == 0 ? PW_OK : place_signals (w, t, q, v);
+  kinematics_poses (w, q, v);
+  return t == w->t_signal && w->s->readers == 0 ? PW_OK : kinematics_signals (w, t, q, v);
 }
 
 int pw_update_velocities (pw_workspace *w, const double *v) {
@@ -66,8 +66,8 @@ int pw_update_velocities (pw_workspace *w, const double *v) {
     p->vy = from[1];
     p->omega = from[2];
   }
-  if (w->s->coords > 3 * w->s->bodies) place_own (w, NULL, v);
-  return w->s->readers > 0 ? place_sources (w, 1, w->t_signal, NULL, v) : PW_OK;
+  if (w->s->coords > 3 * w->s->bodies) kinematics_own (w, NULL, v);
+  return w->s->readers > 0 ? kinematics_sources (w, 1, w->t_signal, NULL, v) : PW_OK;
 }
 
 void pw_hold_signals (pw_workspace *w, int hold) {

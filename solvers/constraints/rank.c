@@ -5,7 +5,7 @@
  * multipliers that pull on nothing, so the least-norm ones are lambda + sum z_i n_i with z from a small
  * least-squares problem.
  *
- * The rank is judged at consistent configurations off the singular set: at the start and at two configurations a
+ * The rank is found at consistent configurations off the singular set: at the start and at two configurations a
  * short motion away. In motion a set may turn bad where another one is good: then it is selected again. (Garcia de
  * Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
 #include <float.h>
@@ -213,10 +213,11 @@ int pw_rank_open (pw_run *r, pw_error *error) {
     memcpy (x.best, x.active, (size_t)s->rows);
   }
   if (best > rank)
-    status = pw_fail (error, PW_INITIAL,
-                      "model %s: the start is a singular configuration: %d constraint rows are independent there, %d nearby; "
-                      "start a little off it",
-                      s->model, rank, best);
+    status = pw_fail (
+        error, PW_INITIAL,
+        "model %s: the start is a singular configuration: %d constraint rows are independent there, %d nearby; "
+        "start a little off it",
+        s->model, rank, best);
   else if (best < s->rows && rank_store (r, x.best, s->rows - best) != PW_OK)
     status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   free (x.memory);

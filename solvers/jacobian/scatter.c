@@ -26,7 +26,7 @@ void pw_scatter_note (pw_scatter_map *t, int row, int col) {
 }
 
 /* Contributions sorted by a key in [0, n), stably: order takes their numbers, start (n + 1) the ranges. */
-static void tape_sort (const int *key, const size_t *from, size_t count, int n, size_t *start, size_t *order) {
+static void scatter_sort (const int *key, const size_t *from, size_t count, int n, size_t *start, size_t *order) {
   memset (start, 0, ((size_t)n + 2) * sizeof *start);
   for (size_t i = 0; i < count; i++) start[key[i] + 2]++;
   for (int k = 0; k < n; k++) start[k + 2] += start[k + 1];
@@ -44,8 +44,8 @@ int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **ro
   *rowind = malloc ((t->count + 1) * sizeof **rowind);
   int status = !t->failed && by_row && order && start && t->place && *colptr && *rowind ? PW_OK : PW_RESOURCE;
   if (status == PW_OK) {
-    tape_sort (t->row, NULL, t->count, n, start, by_row);
-    tape_sort (t->col, by_row, t->count, n, start, order);
+    scatter_sort (t->row, NULL, t->count, n, start, by_row);
+    scatter_sort (t->col, by_row, t->count, n, start, order);
     int64_t nonzeros = 0;
     size_t i = 0;
     for (int c = 0; c < n; c++) {

@@ -159,7 +159,7 @@ static double adapt_factor (const struct pw_method_data *d, double error) {
   return fmin (5, fmax (0.2, f));
 }
 
-/* The step to t1.  Where signals are discontinuous there its error is judged by the new state's derivative before that:
+/* The step to t1.  Where signals are discontinuous there its error is estimated with the new state's derivative before that:
  * the jump is no error of the step. */
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *off) {
   struct pw_method_data *d = r->data;

@@ -18,7 +18,7 @@ struct pw_method_data {
       row[PW_RK_STAGES];     /* of the stages from 1 on; in the place of stage 0, which needs none, of the new state */
   pw_rk_row estimate[3];     /* of the error estimates; behind the stages' derivatives is the new state's */
   int adaptive;              /* 1: steps follow the tolerances; 0: they are of the given size */
-  int projects, held, every; /* projection; inputs held over the step; project each so many steps */
+  int projects, held, every; /* projection; inputs held over the step; steps between projections */
   int minimal, closes;       /* nullspace: velocities are minimal; and positions are projected */
   pw_projector projector;
   pw_nullspace nullspace;

@@ -16,7 +16,7 @@ double pw_run_acceleration_norm (const pw_run *r) {
   return pw_largest (linear * (per / s->scale.length), angular * per);
 }
 
-static int judge_lost (pw_run *r, pw_error *error) {
+static int branch_lost (pw_run *r, pw_error *error) {
   pw_residuals now;
   char element[120] = "a constraint", cause[60] = "constraint drift";
   pw_evaluate_residuals (r->w, NULL, &now);
@@ -35,7 +35,7 @@ static int judge_lost (pw_run *r, pw_error *error) {
 }
 
 /* What the constraints are off by, in units of the scene. */
-static double judge_off (const pw_run *r) {
+static double branch_off (const pw_run *r) {
   return pw_larger (r->known.position, r->known.g / r->s->scale.length);
 }
 
@@ -45,7 +45,7 @@ static double judge_off (const pw_run *r) {
  * Where two branches of a motion cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|.  Those that
  * are off by d are x y = d: branches that do not cross but turn into each other, where s^2 is about 2 d.  A method
  * that follows these constraints as they have become follows the turn, however small its steps. */
-static int judge_blurred (pw_run *r, double off, double part) {
+static int branch_blurred (pw_run *r, double off, double part) {
   int row;
   double bound = fmin (sqrt (off / part), r->limits.regular * r->geometry.typical);
   return bound > r->limits.rank && pw_watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
@@ -53,16 +53,16 @@ static int judge_blurred (pw_run *r, double off, double part) {
 }
 
 /* Such a turn rounds off the corner, the more so the more the constraints are off: its accelerations are no outburst. */
-static int judge_turn (pw_run *r, double now, pw_error *error) {
+static int branch_turn (pw_run *r, double now, pw_error *error) {
   const pw_watchdog *limit = &r->limits;
-  double off = judge_off (r), before = fmax (r->before, limit->least_turn);
-  if (!(now <= limit->turn * before) && judge_blurred (r, off, limit->drift_turn))
-    return pw_fail (
-        error, PW_METHOD,
-        "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) may lead to another branch, with "
-        "%.3g times the accelerations of before; methods with projection pass",
-        r->t, r->known.position, now / before);
-  if (!(off <= limit->drift_far) && judge_blurred (r, off, limit->drift_any))
+  double off = branch_off (r), before = fmax (r->before, limit->least_turn);
+  if (!(now <= limit->turn * before) && branch_blurred (r, off, limit->drift_turn))
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) may lead to "
+                    "another branch, with "
+                    "%.3g times the accelerations of before; methods with projection pass",
+                    r->t, r->known.position, now / before);
+  if (!(off <= limit->drift_far) && branch_blurred (r, off, limit->drift_any))
     return pw_fail (
         error, PW_METHOD,
         "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) tell no branch from another; "
@@ -72,7 +72,7 @@ static int judge_turn (pw_run *r, double now, pw_error *error) {
 }
 
 /* 1 near a singular configuration of nonholonomic rows, or if the state is not finite. */
-static int judge_near_rows (pw_run *r) {
+static int branch_near_rows (pw_run *r) {
   int row;
   if (!r->near) return 0;
   pw_watchdog_sine (r, &row);
@@ -80,20 +80,20 @@ static int judge_near_rows (pw_run *r) {
 }
 
 /* The physical motion passes a singular configuration as calmly as any other; a jump to another branch is an outburst. */
-static int judge_outburst (pw_run *r, pw_error *error) {
+static int branch_outburst (pw_run *r, pw_error *error) {
   double now = pw_run_acceleration_norm (r);
-  if (judge_near_rows (r) && !(now <= r->limits.jump * r->calm))
+  if (branch_near_rows (r) && !(now <= r->limits.jump * r->reference_level))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
-                    now / r->calm);
-  if (r->near || judge_blurred (r, judge_off (r), r->limits.drift_near)) return judge_turn (r, now, error);
-  r->calm = pw_larger (now, r->calm);
+                    now / r->reference_level);
+  if (r->near || branch_blurred (r, branch_off (r), r->limits.drift_near)) return branch_turn (r, now, error);
+  r->reference_level = pw_larger (now, r->reference_level);
   r->before = now;
   return PW_OK;
 }
 
 /* 1 if a redundant row is violated by more than the others, from which it follows, can explain: it contradicts them. */
-static int judge_contradicts (pw_run *r) {
+static int branch_contradicts (pw_run *r) {
   const double round_off = r->limits.follows;
   pw_residuals all, enforced;
   pw_evaluate_residuals (r->w, NULL, &all);
@@ -108,9 +108,9 @@ int pw_run_watchdog (pw_run *r, pw_error *error) {
   pw_note_residuals (r);
   if (!(s->position <= r->limits.lost && s->velocity <= r->limits.lost)) {
     double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->limits.lost_unstabilised : r->limits.lost;
-    if (!(s->position <= lost && s->velocity <= lost)) return judge_lost (r, error);
+    if (!(s->position <= lost && s->velocity <= lost)) return branch_lost (r, error);
   }
-  if (r->redundant && judge_contradicts (r)) return judge_lost (r, error);
+  if (r->redundant && branch_contradicts (r)) return branch_lost (r, error);
   int status = pw_watchdog_follow (r, error);
-  return status == PW_OK ? judge_outburst (r, error) : status;
+  return status == PW_OK ? branch_outburst (r, error) : status;
 }

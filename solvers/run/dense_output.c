@@ -38,18 +38,18 @@ void pw_dense_output_count (pw_dense_output *b, pw_run *r) {
 }
 
 /* Cubic Hermite interpolation of y with slopes s between 0 and 1, the step h wide. */
-static double between_hermite (double x, double h, double y0, double s0, double y1, double s1) {
+static double dense_hermite (double x, double h, double y0, double s0, double y1, double s1) {
   double up = x * x * (3 - 2 * x);
   return y0 + up * (y1 - y0) + h * x * (1 - x) * ((1 - x) * s0 - x * s1);
 }
 
-static int between_inside (pw_dense_output *b, pw_run *r, double t) {
+static int dense_inside (pw_dense_output *b, pw_run *r, double t) {
   const pw_system *s = r->s;
   double h = r->t - b->t0, x = (t - b->t0) / h, worst;
   int row;
   for (int j = 0; j < s->coords; j++) {
-    r->q_at[j] = between_hermite (x, h, b->q0[j], b->v0[j], r->q[j], r->v[j]);
-    r->v_at[j] = between_hermite (x, h, b->v0[j], b->a0[j], r->v[j], r->a[j]);
+    r->q_at[j] = dense_hermite (x, h, b->q0[j], b->v0[j], r->q[j], r->v[j]);
+    r->v_at[j] = dense_hermite (x, h, b->v0[j], b->a0[j], r->v[j], r->a[j]);
     r->a_at[j] = (1 - x) * b->a0[j] + x * r->a[j];
   }
   for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * b->lambda0[i] + x * r->lambda[i];
@@ -77,7 +77,7 @@ int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error
     return PW_OK;
   }
   pw_statistics keep = r->statistics;
-  int status = between_inside (b, r, t);
+  int status = dense_inside (b, r, t);
   r->statistics = keep;
   if (status == PW_OK) return PW_OK;
   if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);

@@ -73,7 +73,7 @@ static double quadrature_polynomial (pw_quadrature *x, int entries, int k, doubl
 
 /* ---- Nodes inside the step ---- */
 
-/* The integrals over so many equal parts of a step, by Gauss' formula of order 8, into x->finer. */
+/* The integrals over equal parts of a step, by Gauss' formula of order 8, into x->finer. */
 static int quadrature_parts (pw_quadrature *x, pw_run *r, double from, double to, int parts) {
   static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
                       weight[] = { 0.3478548451374538, 0.6521451548625461 };

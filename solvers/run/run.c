@@ -56,7 +56,7 @@ int pw_run_look_ahead (pw_run *r, pw_error *error) {
 
 void pw_run_reference_level (pw_run *r) {
   r->before = pw_run_acceleration_norm (r);
-  r->calm = fmax (1, r->before);
+  r->reference_level = fmax (1, r->before);
 }
 
 static void run_drop_method (pw_run *r) {

@@ -99,18 +99,18 @@ static int run_begin (pw_run *r, pw_error *error) {
 static int run_check_finite (pw_run *r, pw_error *error) {
   char element[200];
   double sum = 0;
-  int wild = -1;
+  int bad = -1;
   for (int j = 0; j < r->s->coords; j++) {
     sum += fabs (r->a[j]);
-    if (wild < 0 && !isfinite (r->a[j])) wild = j;
+    if (bad < 0 && !isfinite (r->a[j])) bad = j;
   }
   for (int i = 0; i < r->s->rows; i++) sum += fabs (r->lambda[i]);
   if (isfinite (sum) || pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return PW_OK;
   if (pw_find_nonfinite (r->w, element, sizeof element))
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s is not finite", r->t, element);
-  if (wild < 0) return PW_OK;
+  if (bad < 0) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: the acceleration of %s is not finite", r->t,
-                  pw_system_state_name (r->s, wild, element, sizeof element));
+                  pw_system_state_name (r->s, bad, element, sizeof element));
 }
 
 /* A method that uses derivatives would run with a wrong matrix where an element type leaves one out. */

@@ -65,7 +65,7 @@ const pw_watchdog pw_watchdog_limits = {
   .progress = 0.1,
 
   /* The projection leaves residuals of 1e-14, and with these the sine is known to 1e-7: what is below `floor`, ten times
-   * that, cannot be told from 0 (`met`, with a stride's play).  Such a point is left straight on, at an angle below
+   * that, cannot be distinguished from 0 (`met`, with a stride's play).  Such a point is left straight on, at an angle below
    * 60 degrees to where it was entered. */
   .floor = 1e-6,
   .met = 2e-6,
@@ -181,12 +181,13 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
         t);
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   if (sine <= r->limits.rank)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s says what other constraints say already", t,
-                    element);
-  return pw_fail (error, PW_METHOD,
-                  "t = %.6g s: near a singular configuration: %s says almost what other constraints say (sine %.2g); the next "
-                  "step cannot be computed",
-                  t, element, sine);
+    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s says what other constraints say already",
+                    t, element);
+  return pw_fail (
+      error, PW_METHOD,
+      "t = %.6g s: near a singular configuration: %s says almost what other constraints say (sine %.2g); the next "
+      "step cannot be computed",
+      t, element, sine);
 }
 
 int pw_watchdog_near_state (pw_run *r) {

@@ -154,7 +154,8 @@ static void test_energy (void **state) {
     double h = leapfrog_conservative[i].h, transient = i == 4 ? 0.1 : 0.05;
     check_below (model, leapfrog_drift_of (model, "leapfrog", h, 2000), transient, "of the error that comes and goes");
   }
-  check_below ("n-four-bar", leapfrog_drift_of ("n-four-bar", "leapfrog", 2e-3, 2000), 0.05, "past singular configurations");
+  check_below ("n-four-bar", leapfrog_drift_of ("n-four-bar", "leapfrog", 2e-3, 2000), 0.05,
+               "past singular configurations");
   check_below ("pendulum, rk4", 0.5, leapfrog_drift_of ("pendulum", "rk4+projection", 0.1, 2000), "it drifts");
   check_below ("board, rk4", 10 * leapfrog_drift_of ("board", "leapfrog", 0.02, 2000),
                leapfrog_drift_of ("board", "rk4+projection", 0.02, 2000), "it drifts");

@@ -444,7 +444,7 @@ static void test_jump (void **state) {
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_error error = { 0 };
   r->near = 1;
-  r->a[0] = 1.5 * r->limits.jump * r->calm * s->scale.length / (r->w->scale.time * r->w->scale.time);
+  r->a[0] = 1.5 * r->limits.jump * r->reference_level * s->scale.length / (r->w->scale.time * r->w->scale.time);
   assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
   assert_non_null (strstr (error.text, "lost at a singular configuration: the accelerations are 150 times"));
   r->limits.jump *= 2;

@@ -20,7 +20,7 @@ static int figures_turns (const pw_plots *p) {
   return most;
 }
 
-/* The data, and a label for each curve unless they are so many that they are coloured by number. */
+/* The data, and a label for each curve unless there are too many, which are coloured by number. */
 static void figures_curves (FILE *f, const pw_plots *p, pw_curves c) {
   pw_figure_text (f, "data", c.file);
   pw_figure_number (f, "curves", c.count);

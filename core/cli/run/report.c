@@ -267,13 +267,13 @@ static void report_errors (const pw_reference_error *e) {
   printf (" of the largest\n");
 }
 
-void pw_report_warnings (const pw_run *r, const pw_system *s, double unbalanced) {
+void pw_report_warnings (const pw_run *r, const pw_system *s, double defect) {
   int state;
   double power, growth = pw_run_growth (r, &state, &power);
   char name[REPORT_NAME], times[32], grows[32], percent[32];
-  if (unbalanced > 0.01)
+  if (defect > 0.01)
     pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
-                pw_format (percent, 100 * unbalanced, 2), pw_run_energy_advice (r, unbalanced));
+                pw_format (percent, 100 * defect, 2), pw_run_energy_advice (r, defect));
   if (growth != 0)
     pw_cli_say (
         "pinwheel: the motion grows without bound: %s has become %s times the scene's own speed and grows as t^%s; "

@@ -17,7 +17,7 @@ void pw_report_settings (pw_run *r, const pw_system *s, const char *method, cons
 void pw_report_initialisation (const pw_run *r, const pw_system *s, const char *const *redundant);
 
 /* After the run: a relative energy defect of more than 1 % (NaN: not known), speeds that grow out of all proportion. */
-void pw_report_warnings (const pw_run *r, const pw_system *s, double unbalanced);
+void pw_report_warnings (const pw_run *r, const pw_system *s, double defect);
 
 /* ---- Results ---- */
 

@@ -245,7 +245,7 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
                          .status = status[-error->status],
                          .reason = error->text,
                          .cpu = x->cpu,
-                         .unbalanced = NAN,
+                         .energy_defect = NAN,
                          .redundant = x->redundant };
   if (error->status == PW_OK && pw_stop) {
     char t[32];
@@ -284,10 +284,10 @@ static int run_finish (run *x, pw_error *error) {
   run_close_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
   if (x->r) summary.reference = pw_comparison_errors (&x->comparison, x->m.system);
-  if (last) summary.unbalanced = pw_run_energy_defect (x->r, last);
+  if (last) summary.energy_defect = pw_run_energy_defect (x->r, last);
   if (last && x->csv_path == NULL && x->json_path == NULL)
     pw_report_end (&summary, x->m.system, last, x->energy, pw_run_statistics (x->r));
-  if (error->status == PW_OK) pw_report_warnings (x->r, x->m.system, summary.unbalanced);
+  if (error->status == PW_OK) pw_report_warnings (x->r, x->m.system, summary.energy_defect);
   run_write_json (x, &summary, last, error);
   run_draw (x, summary.reason, error);
   run_complete (x, error);

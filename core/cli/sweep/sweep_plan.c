@@ -37,7 +37,7 @@ static int plan_named (const char **list, const char *name) {
   return 0;
 }
 
-/* Every value of a parameter must lie in its domain; what is no parameter is a state, if it has a dot. */
+/* Every value of a parameter must lie in its domain; other names with a dot are states. */
 static int plan_axis (const pw_plan *p, pw_axis *a, pw_model *m, pw_error *error) {
   const pw_parameter *q = pw_model_table (m)->parameters;
   while (q && q->name && strcmp (q->name, a->name) != 0) q++;

@@ -145,7 +145,7 @@ static int columns_open (const columns *c, const char *first, int named, const c
   return columns_fail (c, "%s", why);
 }
 
-/* So many lines there are at most. */
+/* The largest number of lines. */
 static size_t columns_lines (const char *text) {
   size_t n = 1;
   while ((text = strchr (text, '\n')) != NULL) text++, n++;

@@ -130,7 +130,7 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   pw_json_text (&j, "status", summary->status);
   pw_json_text (&j, "reason", summary->reason);
   json_sample (&j, s, sample, ledger);
-  pw_json_number (&j, "unbalanced", summary->unbalanced);
+  pw_json_number (&j, "unbalanced", summary->energy_defect);
   json_lists (&j, summary->redundant, s);
   json_reference (&j, summary->reference);
   json_statistics (&j, statistics, summary->cpu);
