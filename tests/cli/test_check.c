@@ -101,7 +101,7 @@ static void test_broken_kind (void **state) {
              "  { .name = NULL } };\n"
              "static void force (const pw_batch *b, double *f) {\n"
              "  for (int e = 0; e < b->count; e++, f += 3) {\n"
-             "    const pw_pose *p = b->pose + b->body[e];\n"
+             "    const pw_configuration *p = b->configuration + b->body[e];\n"
              "    f[0] = -2 * p->x, f[1] = 0, f[2] = 0;\n"
              "  }\n"
              "}\n"

@@ -33,7 +33,7 @@ static const char truth_c[] =
     "  q[3] = p->u * t + OFF;\n"
     "}\n"
     "PW_MODEL (.about = \"particles\", .parameters = parameters, .parameters_size = sizeof (particle),\n"
-    "          .run = { .t_end = 1, .step = 0.1 }, .build = build, .truth = truth);\n";
+    "          .run = { .t_end = 1, .step = 0.1 }, .build = build, .reference = truth);\n";
 
 static void truth_write_c (const char *off) {
   char text[3000];
