@@ -2,23 +2,25 @@
  * eigenvalues, the step RK4 can take.
  *
  * A state obeys g (q, t) = 0 and J v = eta, so that variations obey  G dq = 0,  J dv = -B dq,  B = (J v)_q - eta_q.
- * With orthonormal bases N_q of the null space of G and N_v of that of J (both from one QR factorisation of J^T, holonomic
- * rows first, in units of the scene) they are
+ * With orthonormal bases N_q of the null space of G and N_v of that of J (both from one QR factorisation of J^T,
+ * holonomic equations first, in units of the scene) they are
  *
  *     dq = N_q z,   dv = N_v u / T - J^+ B N_q z,
  *
- * T the scene's time scale, and z and u are minimal coordinates of the states around this one.  Accelerations vary by the saddle point,
+ * with T the time scale of the scene; z and u are minimal coordinates of the neighbouring states.  The variations of
+ * the accelerations follow from the saddle-point system
  *
  *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv,  (gamma_q - (J a)_q) dq + gamma_v dv ),
  *
- * time held still.  In a steady motion every body moves with the twist (vx, vy, w) of one frame: seen from there the state
- * rests, and so does the manifold of the constraints.  Components of vectors in that frame turn at -w, hence
+ * at constant time.  In a steady motion every body moves with the twist (vx, vy, w) of one frame, in which the state
+ * and the constraint manifold are at rest.  The components of vectors in that frame rotate at -w, hence
  *
  *     z' = N_q^T (dv - W dq),   u' = T N_v^T (da - W dv),   W (x, y, phi) = w (-y, x, 0) for each body.
  *
- * The eigenvalues of this matrix A are the exponents of disturbances of a steady motion; linear_frame.c finds the frame,
- * and whether the motion is steady.  (Null-space form: Garcia de Jalon & Bayo 1994, Kinematic and Dynamic Simulation of
- * Multibody Systems.  Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and Symmetry.) */
+ * The eigenvalues of this matrix A are the exponents of disturbances of a steady motion; linear_frame.c finds the
+ * frame, and whether the motion is steady.  (Null-space form: Garcia de Jalon & Bayo 1994, Kinematic and Dynamic
+ * Simulation of Multibody Systems.  Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and
+ * Symmetry.) */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -29,7 +31,7 @@
 
 /* ---- Derivatives ---- */
 
-/* Rows of -F = (J^T lambda)_q - f_q, -f_v; of gamma_q - (J a)_q, gamma_v; of B. */
+/* Rows of the derivatives: -F = (J^T lambda)_q - f_q, -f_v; gamma_q - (J a)_q, gamma_v; B. */
 static void linear_put (pw_linearisation *x, const double *v) {
   pw_run *r = x->r;
   int n = x->n;
@@ -89,7 +91,7 @@ static int linear_stride (int n) {
   return n > 1 ? n : 1; /* LAPACK refuses 0 */
 }
 
-/* J^T = Q R of the independent constraint equations; the least singular value of J. */
+/* J^T = Q R of the independent constraint equations; returns the smallest singular value of J. */
 static double linear_bases (pw_linearisation *x) {
   int n = x->n, rank = x->rank;
   double least = INFINITY, *tau = x->da;
@@ -149,7 +151,7 @@ void pw_linear_turn (const pw_linearisation *x, double w, const double *in, doub
   }
 }
 
-/* Column c of A: what follows from a variation along one of the minimal coordinates. */
+/* Column c of A: the effect of a variation along minimal coordinate c. */
 static void linear_unknown (pw_linearisation *x, int c) {
   double *dq = x->x, *dv = x->x + x->n, w = x->frame.twist[2];
   pw_linear_tangent (x, c);
@@ -196,7 +198,7 @@ static void linear_close (pw_linearisation *x) {
   free (x->memory);
 }
 
-/* The independent rows; holonomic ones stand first in J. */
+/* The independent constraint equations; holonomic ones are first in J. */
 static int linear_rows (pw_linearisation *x) {
   x->row = malloc (((size_t)x->m + 1) * sizeof *x->row);
   for (int i = 0; x->row && i < x->m; i++) {
@@ -221,7 +223,7 @@ static int linear_results (const pw_linearisation *x, pw_linear *l) {
   return PW_OK;
 }
 
-/* The state reached is evaluated last: there the system stays. */
+/* The current state is evaluated last, so that the workspace is left there. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
   if (linear_derivatives (x) != PW_OK) return PW_RESOURCE;

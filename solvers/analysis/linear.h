@@ -1,12 +1,12 @@
-/* A linearisation in progress; for linear*.c only.  Index names: n coordinates, m constraint equations; a variation of the
- * state is x = (dq, dv), and has `size` minimal coordinates: first those of positions, then those of velocities. */
+/* A linearisation in progress; for linear*.c only.  Index names: n coordinates, m constraint equations; a variation of
+ * the state is x = (dq, dv), and has `size` minimal coordinates: first those of positions, then those of velocities. */
 #ifndef PW_LINEAR_H
 #define PW_LINEAR_H
 
 #include "method.h"
 #include "newton.h"
 
-/* The co-moving frame: that of a reference body, at rest or with its twist. */
+/* The co-moving frame, at a reference body, at rest or with the twist of the body. */
 typedef struct {
   double origin[2];    /* of the frame [m] */
   double twist[3];     /* velocity of the origin, angular velocity [m/s, rad/s] */
@@ -19,21 +19,21 @@ typedef struct {
   int n, m;
   int holonomic, rank; /* independent constraint equations, those of positions first */
   int positions, velocities, size;
-  int *row; /* rank: which equations they are */
+  int *row; /* rank: indices of these equations */
   pw_linear_frame frame;
-  double *a, *lambda; /* n + 3, m: at the state last evaluated */
-  double *norm;       /* m: lengths of the rows of J in units of the scene */
-  double *R;          /* rank x rank: J^T = Q R, column after column; first the rows themselves, n long each */
-  double *Q;          /* n x n, column after column */
-  double *A;          /* size x size, by rows */
-  double *S;          /* 3 x size: symmetry directions in minimal coordinates */
-  double *x;          /* 2 n: a variation */
-  double *y;          /* n + 2 m: all derivatives times it: -F, gamma - J a, J v - eta */
-  double *da;         /* n + 3: the accelerations that follow */
-  double *z, *c;      /* n + m + 3, m: scratch */
-  double *residual;   /* 3 x (2 m + n): what displacements of the whole violate; then scratch, 2 m + n + 15 */
-  double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the state reached */
-  double *there;                 /* 2 n: a state later on */
+  double *a, *lambda;            /* n + 3, m: at the state last evaluated */
+  double *norm;                  /* m: lengths of the rows of J in units of the scene */
+  double *R;                     /* rank x rank: J^T = Q R, by columns; before that the rows of J, n long each */
+  double *Q;                     /* n x n, by columns */
+  double *A;                     /* size x size, by rows */
+  double *S;                     /* 3 x size: symmetry directions in minimal coordinates */
+  double *x;                     /* 2 n: a variation */
+  double *y;                     /* n + 2 m: derivatives times x: those of -F, gamma - J a, J v - eta */
+  double *da;                    /* n + 3: the resulting variation of accelerations */
+  double *z, *c;                 /* n + m + 3, m: scratch */
+  double *residual;              /* 3 x (2 m + n): violations by rigid displacements; then scratch, 2 m + n + 15 */
+  double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the current state */
+  double *there;                 /* 2 n: a later state */
   pw_newton newton;
   pw_scatter_map tape;
   int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as y */
@@ -41,33 +41,35 @@ typedef struct {
   char *memory;
 } pw_linearisation;
 
-/* Accelerations and derivatives at a state, where the system stays.  Returns as pw_run_accelerate. */
+/* Evaluates accelerations and derivatives at a state; kinematics are left there.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
-/* y and da from the variation x. */
+/* Computes y and da from the variation x. */
 void pw_linear_vary (pw_linearisation *x);
-/* x = the variation along minimal coordinate c. */
+/* Sets x to the variation along minimal coordinate c. */
 void pw_linear_tangent (pw_linearisation *x, int c);
 /* The minimal coordinates of a variation, `stride` apart. */
 void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const double *dv, int stride, double *out);
-/* out += W in: (x, y) of each body times w, turned by 90 degrees. */
+/* out += W in: (x, y) of each body, times w and rotated by 90 degrees. */
 void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out);
 
 /* ---- linear_eigenvalues.c ---- */
 
-/* Splits off displacements of the whole, which the symmetry maps into each other, so that what is left has no defective zeros
- * because of them; in a turning frame a displaced motion turns at -w.  Then the eigenvalues of the rest, into l, sorted. */
+/* Splits off rigid displacements of the whole, an invariant subspace with known eigenvalues (in a rotating frame a
+ * displaced motion rotates at -w), so that they do not cause defective zeros; then computes the other eigenvalues.
+ * Into l, sorted. */
 int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
 
 /* ---- linear_frame.c ---- */
 
-/* Chooses the frame in which the accelerations of the state evaluated are smallest. */
+/* Chooses the frame in which the accelerations of the evaluated state are smallest. */
 void pw_linear_choose_frame (pw_linearisation *x);
-/* How many of the displacements of the whole (x, y, phi) change nothing to first order; they go to S. */
+/* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; their
+ * directions go to S. */
 int pw_linear_symmetries (pw_linearisation *x);
-/* Transforms B, as A, by reflections that take the first k vectors of S to the first k unit vectors.  Returns 1 if they span
- * an invariant subspace: the lower left block is then 0. */
+/* Transforms B, stored as A, by reflections that map the first k vectors of S to the first k unit vectors.  Returns 1
+ * if they span an invariant subspace: the lower left block is then 0. */
 int pw_linear_split (pw_linearisation *x, int k, double *B);
-/* Whether A stays the same along the motion; see pw_linear.  The state reached is evaluated again at the end. */
+/* Whether A is constant along the motion; see pw_linear.  Leaves the workspace at the current state. */
 pw_steadiness pw_linear_steady (pw_linearisation *x);
 
 #endif

@@ -1,4 +1,4 @@
-/* The eigenvalues of a linearisation, how far they are certain, and the step that RK4 can take with them. */
+/* The eigenvalues of a linearisation, their uncertainty, and the largest step with which RK4 is stable. */
 #include <float.h>
 #include <lapacke.h>
 #include <math.h>
@@ -6,12 +6,12 @@
 #include <string.h>
 #include "linear.h"
 
-/* The size of the errors tried, relative to what is added up to an entry of A, and to the largest one of the balanced matrix:
- * a hundred times round-off, as much as derivatives and QR algorithm lose; and what an eigenvalue must exceed of the shift they
- * cause. */
+/* EIGEN_ROUND: size of the trial errors, relative to the terms of an entry of A and to the largest entry of the
+ * balanced matrix: a hundred times round-off, the loss in derivatives and QR algorithm.  EIGEN_CERTAIN: an eigenvalue
+ * counts as nonzero if it exceeds this multiple of the shift they cause. */
 static const double EIGEN_ROUND = 100 * DBL_EPSILON, EIGEN_CERTAIN = 10;
 
-/* The n eigenvalues of A (destroyed), conjugate pairs side by side, that with im > 0 first; `work` has 4 n. */
+/* The n eigenvalues of A (destroyed), conjugate pairs adjacent, im > 0 first; `work` has 4 n entries. */
 static int eigen_values (int n, double *A, double *re, double *im, double *work) {
   for (int i = 0; i < n * n; i++)
     if (!isfinite (A[i])) return PW_RETRY;
@@ -19,7 +19,7 @@ static int eigen_values (int n, double *A, double *re, double *im, double *work)
   return failed ? PW_RETRY : PW_OK;
 }
 
-/* Adds errors to B of the size of round-off in each row, of which `least` is the smallest. */
+/* Adds errors of EIGEN_ROUND times the largest entry of each row, at least `least`, to B. */
 static void eigen_disturb (int n, double least, double *B) {
   for (int i = 0; i < n; i++, B += n) {
     double most = least;
@@ -33,8 +33,9 @@ static int eigen_ascending (const void *a, const void *b) {
   return (x > y) - (x < y);
 }
 
-/* How far each eigenvalue moves: to the nearest one of the disturbed matrix, and in modulus to the one of its rank there, for
- * among many defective ones the nearest says little; `least` in any case.  The moduli of the disturbed ones replace them. */
+/* The shift of each eigenvalue: the distance to the nearest one of the perturbed matrix, or the difference to the
+ * modulus of the same rank if that is larger (the nearest is not meaningful among many defective ones); at least
+ * `least`.  re2 becomes the sorted moduli of the perturbed ones. */
 static void eigen_shift (int n, const double *re, const double *im, double *re2, const double *im2, double least,
                          double *shift) {
   for (int i = 0; i < n; i++) {
@@ -52,7 +53,7 @@ static void eigen_shift (int n, const double *re, const double *im, double *re2,
   }
 }
 
-/* Sets to 0 what is less than its uncertainty, in the same way for both eigenvalues of a pair. */
+/* Sets real and imaginary parts below their uncertainty to 0, the same for both eigenvalues of a pair. */
 static void eigen_clean (int n, double *re, double *im, const double *shift) {
   for (int i = 0, pair; i < n; i += 1 + pair) {
     pair = im[i] > 0;
@@ -64,8 +65,7 @@ static void eigen_clean (int n, double *re, double *im, const double *shift) {
   }
 }
 
-/* The eigenvalues of B, and those of the same matrix with errors, which show how far they are certain.  Behind B there is room
- * for as much again and 7 n. */
+/* The eigenvalues of B; those of the perturbed matrix give their uncertainty.  B has room for 2 n^2 + 7 n entries. */
 static int eigen_certain (const pw_linearisation *x, int n, double *B, double *re, double *im) {
   int cells = n * n, first, last;
   double *other = B + cells, *re2 = other + cells, *im2 = re2 + n, *shift = im2 + n, *work = shift + n;
@@ -81,7 +81,7 @@ static int eigen_certain (const pw_linearisation *x, int n, double *B, double *r
   return PW_OK;
 }
 
-/* Whether i comes before k: the one that grows more; of equally growing ones the faster; of a pair that with im > 0. */
+/* Whether i comes before k: larger real part first, then larger frequency, then im > 0. */
 static int eigen_before (const pw_linear *l, int i, int k) {
   if (l->re[i] != l->re[k]) return l->re[i] > l->re[k];
   if (fabs (l->im[i]) != fabs (l->im[k])) return fabs (l->im[i]) > fabs (l->im[k]);
@@ -121,8 +121,8 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
 
 /* ---- RK4 ---- */
 
-/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu (Hairer & Wanner 1996, section IV.2).  A growing solution must not be
- * damped: only its frequency counts. */
+/* |1 + z + z^2/2 + z^3/6 + z^4/24| <= 1 for z = h mu (Hairer & Wanner 1996, section IV.2).  For a growing solution only
+ * its frequency counts. */
 static int rk4_stable (double re, double im, double h) {
   double x = h * fmin (re, 0), y = h * im, u = 1, v = 0;
   for (int k = 4; k > 0; k--) { /* u + i v = 1 + z (u + i v) / k */

@@ -1,9 +1,9 @@
 /* The co-moving frame of a linearisation; the symmetries of the whole; whether the motion is steady.
  *
- * A frame with the origin r, the velocity u and the angular velocity w sees a body at rest if its velocity is
- * u + w (-(y - r_y), x - r_x) and its acceleration W v = w (-v_y, v_x, 0).  A relative motion of constant velocity d is steady as
- * well where it changes nothing: the spin of a balanced rotor, bodies that drift apart.  If the frame turns, d turns with it
- * unless it is an angle's, so that W d counts as an acceleration. */
+ * A frame with the origin r, the velocity u and the angular velocity w sees a body at rest if its velocity is u + w
+ * (-(y - r_y), x - r_x) and its acceleration W v = w (-v_y, v_x, 0).  A motion relative to the frame with constant
+ * velocity d is also steady if the equations do not depend on it: the spin of a balanced rotor, bodies that drift
+ * apart.  In a rotating frame d rotates with it unless it belongs to an angle, so W d counts as an acceleration. */
 #include <lapacke.h>
 #include <math.h>
 #include <string.h>
@@ -12,9 +12,9 @@
 
 /* Residuals are dimensionless; accelerations in units of L / T^2, angles times L.
  *
- * LINEAR_STEADY: below it the linearisation changes by that share within the scene's time scale T, less than initial values of
- * 6 digits are known to.  LINEAR_EXACT: round-off of accelerations, over which a turning frame must not be chosen.
- * LINEAR_SYMMETRIC: round-off of derivatives of moderate size, and its growth with them. */
+ * LINEAR_STEADY: below it the linearisation changes by that fraction within the time scale T, less than the accuracy of
+ * initial values with 6 digits.  LINEAR_EXACT: round-off of accelerations, for which a rotating frame must not be
+ * chosen.  LINEAR_SYMMETRIC: round-off of derivatives of moderate size, and 1e4 times its growth with their size. */
 static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13, LINEAR_SYMMETRIC = 1e-9;
 
 static double linear_unit (const pw_linearisation *x) {
@@ -24,7 +24,7 @@ static double linear_unit (const pw_linearisation *x) {
 
 /* ---- The frame ---- */
 
-/* The largest |a - W v|, and |W d| of what moves relative to the frame. */
+/* The largest |a - W v|, and |W d| of motions relative to the frame. */
 static double linear_residual (const pw_linearisation *x, const pw_linear_frame *f) {
   const double *q = x->r->q, *v = x->r->v, *a = x->a, w = f->twist[2];
   double most = 0;
@@ -39,7 +39,7 @@ static double linear_residual (const pw_linearisation *x, const pw_linear_frame 
   return most;
 }
 
-/* At rest, or with the twist of the body b. */
+/* The frame at body b, at rest or with its twist. */
 static pw_linear_frame linear_try (const pw_linearisation *x, int b, int turning) {
   const double *q = x->r->q + 3 * b, *v = x->r->v + 3 * b;
   pw_linear_frame f = { .origin = { q[0], q[1] }, .twist = { v[0], v[1], turning ? v[2] : 0 } };
@@ -59,7 +59,8 @@ void pw_linear_choose_frame (pw_linearisation *x) {
 
 /* ---- Symmetries ---- */
 
-/* x = the variation by a displacement of the whole along x, along y, or around the frame's origin, by L or 1 rad. */
+/* x = the variation by a rigid displacement of the whole: by L along x (k = 0) or y (1), or by 1 rad about the frame's
+ * origin (2). */
 static void linear_displace (pw_linearisation *x, int k) {
   const pw_system *s = x->r->s;
   const double *q = x->r->q, *v = x->r->v;
@@ -76,7 +77,7 @@ static void linear_displace (pw_linearisation *x, int k) {
   if (k == 2) pw_linear_turn (x, 1, v, x->x + x->n);
 }
 
-/* What the variation x violates of G dq = 0 and J dv + B dq = 0, scaled; y is that of x, J swept. */
+/* The scaled residuals of G dq = 0 and J dv + B dq = 0 for the variation x; y and J must be up to date. */
 static double *linear_violation (pw_linearisation *x, double *out) {
   const pw_system *s = x->r->s;
   pw_mul_J (x->r->w, x->x, x->c);
@@ -89,7 +90,7 @@ static double *linear_violation (pw_linearisation *x, double *out) {
   return out;
 }
 
-/* Everything that a displacement of the whole changes. */
+/* All changes caused by a rigid displacement of the whole. */
 static void linear_change (pw_linearisation *x, int k, double *out) {
   const double *dq = x->x, *dv = x->x + x->n;
   linear_displace (x, k);
@@ -142,7 +143,7 @@ int pw_linear_split (pw_linearisation *x, int k, double *B) {
 
 /* ---- Steadiness ---- */
 
-/* A vector of all coordinates, turned by an angle with the frame. */
+/* Rotates a vector of all coordinates with the frame. */
 static void linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out) {
   double c = cos (angle), s = sin (angle);
   memcpy (out, in, (size_t)x->n * sizeof *out);
@@ -152,8 +153,8 @@ static void linear_rotate (const pw_linearisation *x, double angle, const double
   }
 }
 
-/* Where a steady motion is after a time: turned with the frame about its origin, which has moved along an arc.  Angles,
- * internal coordinates, and everything if the frame does not turn, go on at their own velocity. */
+/* The state of a steady motion after a time: rotated with the frame about its origin, which has moved along an arc.
+ * Angles, internal coordinates, and all coordinates if the frame does not rotate, continue at constant velocity. */
 static void linear_later (const pw_linearisation *x, double time, double *q, double *v) {
   const pw_linear_frame *f = &x->frame;
   double w = f->twist[2], c = cos (w * time), s = sin (w * time);
@@ -166,7 +167,7 @@ static void linear_later (const pw_linearisation *x, double time, double *q, dou
   }
 }
 
-/* Whether two vectors of accelerations agree as far as round-off and the steadiness allow. */
+/* Whether two vectors of accelerations agree to LINEAR_STEADY. */
 static int linear_agree (const pw_linearisation *x, const double *a, const double *b) {
   double off = 0, most = linear_unit (x);
   for (int j = 0; j < x->n; j++) {
@@ -177,7 +178,7 @@ static int linear_agree (const pw_linearisation *x, const double *a, const doubl
   return off <= LINEAR_STEADY * most;
 }
 
-/* Whether the equations and their linearisation are the same, but turned, after a time. */
+/* Whether the equations and their linearisation are the same after a time, except for the rotation. */
 static int linear_same (pw_linearisation *x, double time) {
   double angle = x->frame.twist[2] * time, *q = x->there, *v = q + x->n, *expected = x->z;
   pw_residuals now;
@@ -197,7 +198,7 @@ static int linear_same (pw_linearisation *x, double time) {
   return linear_agree (x, x->da, expected);
 }
 
-/* A variation in which every minimal coordinate has its part, and what follows from it. */
+/* A variation with components along all minimal coordinates, and its accelerations. */
 static void linear_probe (pw_linearisation *x) {
   memset (x->along, 0, 2 * (size_t)x->n * sizeof *x->along);
   for (int c = 0; c < x->size; c++) {

@@ -1,7 +1,7 @@
-/* What an evaluation of the accelerations costs.
+/* The cost of an evaluation of the accelerations.
  *
- * Nothing is measured while a run goes on: when it is over, the parts of an evaluation are repeated at its last state, each
- * alone and often enough for a clock.  So a run is the same to the bit with a profile and without, and costs the same. */
+ * Measurements are made after the run: each part of an evaluation is repeated at the last state, often enough for the
+ * clock.  So a profile changes neither the results nor the cost of the run. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -10,16 +10,16 @@
 #include "util.h"
 
 enum { PROFILE_BATCHES = 5, PROFILE_PIECES = 6 };
-#define PROFILE_BATCH 0.005    /* least processor time of a batch [s] */
-#define PROFILE_DISTANCE 1e-10 /* off the constraints, before a projection, in units of the length scale */
+#define PROFILE_BATCH 0.005    /* minimum processor time of a batch [s] */
+#define PROFILE_DISTANCE 1e-10 /* displacement off the constraints before a projection, in units of the length scale */
 
 typedef struct {
   pw_run *r;
   const pw_system *s;
-  pw_saddle *saddle;         /* as the run's own */
+  pw_saddle *saddle;         /* as that of the run */
   pw_projector projector;    /* if the method projects */
   const pw_element_batch *k; /* the kind being measured */
-  pw_statistics done;        /* by the run, before anything was measured */
+  pw_statistics done;        /* counts of the run, before the measurements */
   double t, before;          /* two times, so that signals are evaluated each time */
   double *q, *v, *far;       /* the last state, and positions off the constraints */
   const double *from;        /* q or far */
@@ -33,11 +33,11 @@ typedef struct {
 
 typedef void profile_work (profile *p, long n);
 
-static void profile_poses (profile *p, long n) {
+static void profile_configurations (profile *p, long n) {
   for (; n > 0; n--) pw_update_kinematics (p->r->w, p->t, p->q, p->v);
 }
 
-static void profile_place (profile *p, long n) {
+static void profile_kinematics (profile *p, long n) {
   for (; n > 0; n--) pw_update_kinematics (p->r->w, n % 2 ? p->t : p->before, p->q, p->v);
 }
 
@@ -69,7 +69,7 @@ static void profile_g (profile *p, long n) {
   }
 }
 
-static void profile_sweep (profile *p, long n) {
+static void profile_equations (profile *p, long n) {
   for (; n > 0; n--) {
     pw_evaluate_J (p->r->w);
     pw_evaluate_gamma (p->r->w, p->gamma);
@@ -77,7 +77,7 @@ static void profile_sweep (profile *p, long n) {
   }
 }
 
-/* What Baumgarte's terms take. */
+/* The work for Baumgarte's terms. */
 static void profile_stabilise (profile *p, long n) {
   for (; n > 0; n--) {
     pw_mul_J (p->r->w, p->v, p->jv);
@@ -98,7 +98,7 @@ static void profile_evaluation (profile *p, long n) {
   for (; n > 0; n--) pw_run_accelerate (p->r, n % 2 ? p->t : p->before, p->q, p->v, p->a, p->lambda);
 }
 
-/* A projection from p->from, and the evaluation after it, which finds J and its factors there. */
+/* A projection from p->from and the evaluation after it, which reuses J and its factors. */
 static void profile_project (profile *p, long n) {
   size_t bytes = (size_t)p->s->coords * sizeof (double);
   for (; n > 0; n--) {
@@ -127,8 +127,8 @@ static double profile_batch (profile *p, profile_work *work, long n) {
   return profile_clock () - start;
 }
 
-/* The median time of one piece [ns], for several that take turns, so that a machine that is slow for a while is slow for
- * all of them; a piece that is NULL takes none. */
+/* The median time [ns] of each kind of work; the kinds take turns, so that a temporary slowdown of the machine affects
+ * all of them.  0 for NULL. */
 static void profile_times (profile *p, profile_work *const *work, int count, double *ns) {
   double time[PROFILE_PIECES][PROFILE_BATCHES];
   long n[PROFILE_PIECES];
@@ -161,16 +161,18 @@ static void profile_kind (profile *p, pw_profile_kind *x) {
 
 static void profile_stages (profile *p, pw_profile *x) {
   int stabilised = p->r->alpha != 0 || p->r->beta != 0;
-  profile_work *const work[PROFILE_PIECES] = { profile_place,  profile_sweep, stabilised ? profile_stabilise : NULL,
-                                               profile_factor, profile_solve, profile_evaluation };
+  profile_work *const work[PROFILE_PIECES] = {
+    profile_kinematics, profile_equations, stabilised ? profile_stabilise : NULL,
+    profile_factor,     profile_solve,     profile_evaluation
+  };
   double ns[PROFILE_PIECES];
-  profile_sweep (p, 1);
+  profile_equations (p, 1);
   profile_times (p, work, PROFILE_PIECES, ns);
   x->kinematics = ns[0], x->equations = ns[1], x->stabilisation = ns[2];
   x->factorisation = ns[3], x->solution = ns[4], x->evaluation = ns[5];
 }
 
-/* A projection with as many iterations as those of the run had: between none and some. */
+/* The cost of a projection with the average number of iterations of the run, interpolated between none and some. */
 static void profile_projection (profile *p, pw_profile *x) {
   double steps = (double)p->done.steps, none, some;
   x->projections = 1 / fmax (1, pw_run_option (p->r, "every"));
@@ -186,12 +188,12 @@ static void profile_projection (profile *p, pw_profile *x) {
 
 static void profile_measure (profile *p, pw_profile *x) {
   profile_stages (p, x);
-  /* the steps of an explicit method are made of these evaluations */
+  /* explicit methods only: their steps consist of these evaluations */
   if (p->done.jacobians == 0 && p->done.steps > 0) {
     if (p->projector.position) profile_projection (p, x);
     x->evaluations = (double)p->done.rhs / (double)p->done.steps - x->projections;
   }
-  x->configurations = profile_time (p, profile_poses);
+  x->configurations = profile_time (p, profile_configurations);
   for (; x->kinds < p->s->batches; x->kinds++) {
     p->k = &p->r->w->batch[x->kinds];
     profile_kind (p, &x->kind[x->kinds]);

@@ -9,18 +9,19 @@
  *   index3    g = 0,              S v' = b   (nonholonomic rows),   mu = 0
  *   ggl       g = 0,              J v' = eta                        stabilised index 2 (Gear, Gupta & Leimkuhler 1985)
  *
- * w, the acceleration-like variable, belongs to the time t + shift h, shift = alpha_m - alpha_f, up to h^2; D as in ida.
- * The coefficients follow from the spectral radius rho at infinite frequency.
+ * The acceleration-like variable w approximates the acceleration at t + shift h, shift = alpha_m - alpha_f, with an
+ * error of order h^2; D as in ida.  The coefficients follow from the spectral radius rho at infinite frequency.
  *
- * To be of order 2 from the first step on w starts as a + shift h a-dot; and in index3, where g = 0 asks the velocities for
- * an error C h^2 G a-dot with C = 1/6 - beta - shift/2, v starts with that error: without it multipliers begin with an error of
- * order h (Arnold, Brüls & Cardona 2015, Error analysis of generalized-alpha Lie group time integration methods for
- * constrained mechanical systems).  A step of another size begins anew.  Where a-dot is that of vibrations too fast for the
- * step, this would start them a hundred times as large as they are: there it is the change of a in a step tried from w = a.
+ * For order 2 from the first step, the initial w is a + shift h a-dot.  In index3, where g = 0 requires a velocity
+ * error C h^2 G a-dot, C = 1/6 - beta - shift/2, the initial v includes that error; otherwise the first multipliers
+ * have an error of order h (Arnold, Brüls & Cardona 2015, Error analysis of generalized-alpha Lie group time
+ * integration methods for constrained mechanical systems).  A change of step size requires a new initialisation.  If
+ * vibrations too fast for the step dominate a-dot, this would amplify them a hundredfold; then a-dot is the change of a
+ * in a trial step from w = a.
  *
- * Newton's equations are scaled by powers of the step, so that their condition does not depend on it (Bottasso, Bauchau
- * & Cardona 2007, Time-step-size-independent conditioning and sensitivity to perturbations in the numerical solution of
- * index three differential algebraic equations). */
+ * Newton's equations are scaled by powers of the step, so that their condition number does not depend on it (Bottasso,
+ * Bauchau & Cardona 2007, Time-step-size-independent conditioning and sensitivity to perturbations in the numerical
+ * solution of index three differential algebraic equations). */
 #include <stdlib.h>
 #include <string.h>
 #include "galpha_state.h"
@@ -59,10 +60,10 @@ static int galpha_open (pw_run *r, pw_error *error) {
   return pw_implicit_opened (r, status, d->ggl, error);
 }
 
-/* ---- Beginning ---- */
+/* ---- Initialisation ---- */
 
-/* a-dot at the state reached, into `jerk`: a difference over a part of the step, short enough not to leave the time scale
- * of stiff forces, long enough for round-off. */
+/* a-dot at the current state: a difference quotient over 1e-3 of the step, short enough for stiff forces, long enough
+ * for round-off. */
 static int galpha_jerk (pw_run *r, double h, double *jerk) {
   galpha *d = r->data;
   double s = 1e-3 * h;
@@ -75,7 +76,7 @@ static int galpha_jerk (pw_run *r, double h, double *jerk) {
   return status;
 }
 
-/* Whether accelerations would change by much more than themselves in a step: something in the scene is faster. */
+/* 1 if a-dot would change the accelerations by several times their size in a step: the scene has faster vibrations. */
 static int galpha_fast (const pw_run *r, double h, const double *jerk) {
   const galpha *d = r->data;
   double change = 0, size = 0;
@@ -86,8 +87,8 @@ static int galpha_fast (const pw_run *r, double h, const double *jerk) {
   return h * sqrt (change) > 4 * sqrt (size);
 }
 
-/* a-dot over the whole step, of a step tried from w = a: a vibration that the step does not resolve stays as large as it
- * is, where its own a-dot would make a hundred times as much of it. */
+/* a-dot as the change of a in a trial step from w = a, which does not amplify vibrations that the step does not
+ * resolve. */
 static int galpha_try (pw_run *r, double h, double *jerk) {
   galpha *d = r->data;
   memcpy (d->w, d->a, (size_t)d->n * sizeof *d->w);
@@ -96,7 +97,7 @@ static int galpha_try (pw_run *r, double h, double *jerk) {
   return status > 0 ? PW_OK : status; /* the step itself may still succeed */
 }
 
-/* The part of C h^2 a-dot that the holonomic rows forbid, least in the mass matrix, onto the velocities. */
+/* Adds to the velocities the part of C h^2 a-dot normal to the holonomic constraints, least in the metric of M. */
 static int galpha_displace (pw_run *r, double h, const double *jerk) {
   galpha *d = r->data;
   const pw_system *s = r->s;
@@ -113,13 +114,13 @@ static int galpha_displace (pw_run *r, double h, const double *jerk) {
   return PW_OK;
 }
 
-/* A step of size h is to be the first of its size: what it goes on from. */
+/* Initialises v, a and w for the first step of size h. */
 static int galpha_begin (pw_run *r, double h) {
   galpha *d = r->data;
   double *jerk = d->w1;
   int status = PW_OK;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
-  if (!d->ggl && d->work.h > 0) { /* velocities have the error that goes with the size before */
+  if (!d->ggl && d->work.h > 0) { /* velocities include the error of the previous step size */
     status = pw_update_kinematics (r->w, r->t, r->q, d->v);
     if (status == PW_OK) pw_evaluate_J (r->w);
     if (status == PW_OK) status = pw_project_velocities (&d->work.last.projector, r, d->v);

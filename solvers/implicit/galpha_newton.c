@@ -1,19 +1,20 @@
-/* The equations of a step of galpha, solved by Newton's iteration.  Unknown are q', v', lambda', mu; w' and a' follow from
- * v'.  With c = gamma / (h beta) and e = (1 - alpha_m) / ((1 - alpha_f) h gamma):
+/* The equations of a step of galpha, solved by Newton's iteration.  Unknown are q', v', lambda', mu; w' and a' follow
+ * from v'.  With c = gamma / (h beta) and e = (1 - alpha_m) / ((1 - alpha_f) h gamma):
  *
  *   c (q' - q - h v - h^2 (1/2 - beta) w - h^2 beta w') + D G^T mu = 0          dw' = dv' / (h gamma)
  *   M a' + J^T lambda' - f = 0                                                 da' = e dv'
  *   J v' - eta = 0,  g = 0
  *
- * so its matrix is that of ida with c and e in the places of dF/dy' coefficients.  Corrections of v', lambda', mu are in
- * units of c, c e m, c and rows divided by c, c e m, c, with m a mass: all of it is then of the same size for every h. */
+ * so the matrix is that of ida with c and e as the coefficients of dF/dy'.  Corrections of v', lambda', mu are in units
+ * of c, c e m, c, and the equations are divided by c, c e m, c, with m a mass: then all entries are of the same size
+ * for every h. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "galpha_state.h"
 
-static int galpha_place (pw_run *r, double t1) {
+static int galpha_update (pw_run *r, double t1) {
   galpha *d = r->data;
   int status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t1), d->work.q1, d->work.v1);
   if (status == PW_OK) pw_evaluate_J (r->w);
@@ -50,7 +51,7 @@ static void galpha_momentum (pw_run *r, double *out) {
   for (int j = 0; j < d->n; j++) out[j] = r->s->mass[j] * d->a1[j] + d->pull[j] - d->f[j];
 }
 
-/* J v - eta of all rows, and g behind it; or g in the place of the holonomic ones. */
+/* ggl: J v - eta, then g.  index3: J v - eta, with g in place of the holonomic equations. */
 static void galpha_constraints (pw_run *r, double *out) {
   galpha *d = r->data;
   const pw_system *s = r->s;
@@ -67,7 +68,7 @@ static void galpha_constraints (pw_run *r, double *out) {
 
 static int galpha_residual (pw_run *r, double h, double t1) {
   galpha *d = r->data;
-  int status = galpha_place (r, t1);
+  int status = galpha_update (r, t1);
   if (status != PW_OK) return status;
   galpha_kinematics (r, h, d->z);
   galpha_momentum (r, d->z + d->n);
@@ -134,7 +135,7 @@ static int galpha_factor (pw_run *r, double h) {
 
 /* ---- Iteration ---- */
 
-/* The successor as if the accelerations did not change. */
+/* The prediction: the accelerations stay constant. */
 static void galpha_predict (pw_run *r, double h) {
   galpha *d = r->data;
   for (int j = 0; j < d->n; j++) {
@@ -147,8 +148,8 @@ static void galpha_predict (pw_run *r, double h) {
   memset (d->mu1, 0, (size_t)r->s->rows * sizeof *d->mu1);
 }
 
-/* Solves for the correction and applies it.  *most takes its size, that of q and h v in units of the scene; *floor what
- * round-off makes of them.  PW_OK or PW_RESOURCE. */
+/* Solves for the correction and applies it.  *most: its size, the largest of q and h v in units of the scene; *floor:
+ * their round-off.  PW_OK or PW_RESOURCE. */
 static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
   galpha *d = r->data;
   int n = d->n;
@@ -172,8 +173,9 @@ static int galpha_correct (pw_run *r, double h, double *most, double *floor) {
   return PW_OK;
 }
 
-/* The matrix is evaluated at the prediction, and again where corrections do not shrink well.  What is left at the end is to
- * be small against the method's error in multipliers, h^2 of them, and those are a correction over h^2. */
+/* The matrix is evaluated at the prediction, and again while convergence is slow.  The remaining error must be small
+ * against the method's error in multipliers, which is of order h^2; a correction changes the multipliers by 1/h^2 times
+ * its size. */
 int pw_galpha_solve (pw_run *r, double h, double t1) {
   const int most = 20;
   galpha *d = r->data;
@@ -189,7 +191,7 @@ int pw_galpha_solve (pw_run *r, double h, double t1) {
     if (!isfinite (size)) return PW_RETRY;
     if (i > 0) rate = size / before;
     int stalled = rate > 0.25 && size <= 32 * floor;
-    if (size <= enough || stalled || (rate < 1 && size * rate / (1 - rate) <= enough)) return galpha_place (r, t1);
+    if (size <= enough || stalled || (rate < 1 && size * rate / (1 - rate) <= enough)) return galpha_update (r, t1);
     if (rate > 2 && i > 3) return PW_RETRY;
     fresh = i > 0 && rate > 0.02;
     if (fresh) pw_sparse_forget (&d->work.sparse);

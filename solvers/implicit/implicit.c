@@ -53,7 +53,7 @@ void pw_implicit_fill (pw_implicit *x, int size) {
   pw_scatter_begin (&x->tangent.tape, x->value);
 }
 
-/* Where the iteration fails, the configuration that the step begins with may be the reason. */
+/* Reports a failed step; the reason may be a singular configuration at its beginning. */
 static int implicit_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);

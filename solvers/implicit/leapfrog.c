@@ -5,16 +5,16 @@
  *   q' - q     = h u
  *   M (v' - u) = h/2 (f (t', q', v') - J (q')^T lambda-)     J (t', q') v' = eta (t', q')
  *
- * For holonomic rows this is RATTLE (Andersen 1983, Rattle: a "velocity" version of the Shake algorithm for molecular
- * dynamics calculations); for nonholonomic rows the discrete Lagrange-d'Alembert principle (Cortés & Martínez 2001,
- * Non-holonomic integrators) with a discrete constraint that is the same from either end, which makes the method
- * reversible (McLachlan & Perlmutter 2006, Integrators for nonholonomic mechanical systems).  Each line exchanged with
- * its counterpart, h for -h, is the same step backwards: the method is symmetric, so of order 2, and with forces even
- * in the velocities it retraces the motion when they are reversed.  lambda+ and lambda- only carry the step; accelerations and
- * multipliers reported are those of the equations of motion at its end.
+ * For holonomic constraints this is RATTLE (Andersen 1983, Rattle: a "velocity" version of the Shake algorithm for
+ * molecular dynamics calculations); for nonholonomic constraints the discrete Lagrange-d'Alembert principle (Cortés &
+ * Martínez 2001, Non-holonomic integrators) with a discrete constraint that is symmetric in both ends, which makes the
+ * method reversible (McLachlan & Perlmutter 2006, Integrators for nonholonomic mechanical systems).  Exchanging both
+ * ends and h with -h gives the same equations: the method is symmetric, hence of order 2, and with forces even in the
+ * velocities it retraces the motion when they are reversed.  lambda+ and lambda- are internal to the step; the reported
+ * accelerations and multipliers solve the equations of motion at its end.
  *
- * All equations are solved to round-off: for u and q' by Newton's iteration, for v' and forces of the velocities by
- * substitution.  None asks for M^-1: coordinates without mass follow from their rows, as everywhere. */
+ * All equations are solved to round-off: for u and q' by Newton's iteration, for v' and velocity-dependent forces by
+ * fixed-point iteration.  M^-1 is not needed: massless coordinates follow from their constraint equations. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -22,29 +22,29 @@
 #include "implicit.h"
 #include "util.h"
 
-enum { DRIFT_MOST = 30, LEAPFROG_MOST = 100 }; /* iterations; substitutions for forces of the velocities */
+enum { DRIFT_MOST = 30, LEAPFROG_MOST = 100 }; /* Newton iterations for u; fixed-point iterations for v' */
 
 struct pw_method_data {
   pw_implicit work;        /* first */
-  double *u;               /* velocities at half the step; coords + 3, as the next line */
+  double *u;               /* velocities at half the step; coords + 3, as in the next line */
   double *middle, *dv, *f; /* mean of positions, a correction of velocities, forces */
-  double *off, *mu, *eta;  /* all rows: residuals, multipliers of a correction, right-hand side */
-  double *z;               /* coords and rows in use: a correction of u and its multipliers */
+  double *off, *mu, *eta;  /* all equations: residuals, multipliers of a correction, right-hand side */
+  double *z;               /* coords and independent equations: a correction of u and its multipliers */
 };
 
 typedef struct pw_method_data leapfrog;
 
 /* Convergence of an iteration, from the sizes of its corrections. */
 typedef struct {
-  double size;   /* of the last one, the largest of its coordinates, each over what it was before */
-  double large;  /* the largest coordinate, in units of the scene: round-off of one may show in another */
-  double before; /* size of the one before */
-  double rate;   /* of the last to the one before */
+  double size;   /* of the last correction: the largest relative change of a coordinate */
+  double large;  /* the largest coordinate in units of the scene: its round-off may affect others */
+  double before; /* size of the previous correction */
+  double rate;   /* ratio of the last size to the previous one */
   int done;      /* corrections before the last one */
 } leapfrog_progress;
 
-/* Takes the correction of one coordinate into the sizes, which are 0 and 1 at first; its value does not iterate, so that
- * divergence shows. */
+/* Updates size and large, initially 0 and 1, for the correction of one coordinate; `value` stays the same in all
+ * iterations, so that divergence is detected. */
 static inline void leapfrog_measure (leapfrog_progress *p, double correction, double value, double unit) {
   double size = fabs (correction) / (fabs (value) + unit);
   if (!(size <= p->size)) p->size = size;
@@ -53,9 +53,9 @@ static inline void leapfrog_measure (leapfrog_progress *p, double correction, do
 
 /* ---- Iterations ---- */
 
-/* 1: round-off is reached, or would be with the next one; 0: go on; -1: it does not converge. */
+/* 1: converged to round-off, or the next correction would be below it; 0: continue; -1: diverged. */
 static int leapfrog_converged (leapfrog_progress *p) {
-  const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON; /* by bodies of small mass or length */
+  const double round_off = 2 * DBL_EPSILON, magnified = 1e4 * DBL_EPSILON; /* by small masses or lengths */
   p->rate = p->done > 0 ? p->size / p->before : 1;
   if (!isfinite (p->size)) return -1;
   if (p->size <= round_off || (p->rate < 1 && p->size * p->rate / (1 - p->rate) <= 0.25 * round_off)) return 1;
@@ -68,20 +68,20 @@ static int leapfrog_converged (leapfrog_progress *p) {
 
 /* ---- First half: u and q', by Newton's iteration ----
  *
- *  Unknown are u and L = h/2 (lambda+ - lambda):
+ *  The unknowns are u and L = h/2 (lambda+ - lambda):
  *
  *   M (u - v - h/2 a) + J (q)^T L = 0        a, lambda: accelerations and multipliers at (t, q, v)
  *   g (t', q + h u) / h = 0                  S (t*, q*) u - b (t*, q*) = 0,   q* = q + h/2 u
  *
- * The first line is linear: it holds for u = v + h/2 a with L = 0, and after every correction. */
+ * The first line is linear: it holds for the initial u = v + h/2 a, L = 0, and after every correction. */
 
-static int leapfrog_place (pw_run *r, double t, const double *q, const double *v) {
+static int leapfrog_update (pw_run *r, double t, const double *q, const double *v) {
   int status = pw_update_kinematics (r->w, t, q, v);
   if (status == PW_OK) pw_evaluate_J (r->w);
   return status;
 }
 
-static void drift_move (pw_run *r, double h) {
+static void drift_positions (pw_run *r, double h) {
   leapfrog *d = r->data;
   for (int j = 0; j < r->s->coords; j++) {
     d->work.q1[j] = r->q[j] + h * d->u[j];
@@ -91,7 +91,7 @@ static void drift_move (pw_run *r, double h) {
 
 /* ---- Matrix ---- */
 
-/* M and J^T of the beginning, whose kinematics are up to date. */
+/* M and J^T at the beginning; kinematics must be those of the beginning. */
 static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
   const pw_system *s = r->s;
@@ -100,7 +100,7 @@ static void drift_put_momentum (pw_run *r) {
                 &(pw_put){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
 }
 
-/* S + h/2 ((S u)_q - b_q) of the middle, whose kinematics are up to date. */
+/* S + h/2 ((S u)_q - b_q) at the middle; kinematics must be those of the middle. */
 static void drift_put_middle (pw_run *r, double h) {
   pw_tangent *x = &r->data->work.tangent;
   const pw_system *s = r->s;
@@ -112,7 +112,7 @@ static void drift_put_middle (pw_run *r, double h) {
   pw_newton_J (r->w, &x->tape, &put);
 }
 
-/* G of the end, whose kinematics are up to date. */
+/* G at the end; kinematics must be those of the end. */
 static void drift_put_end (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
   pw_newton_J (r->w, &x->tape, &(pw_put){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
@@ -131,13 +131,13 @@ static int drift_factor (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
   pw_tangent *x = &d->work.tangent;
   pw_implicit_fill (&d->work, r->s->coords + x->rows);
-  int status = leapfrog_place (r, r->t, r->q, r->v);
+  int status = leapfrog_update (r, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   drift_put_momentum (r);
-  status = leapfrog_place (r, r->t + 0.5 * h, d->middle, d->u);
+  status = leapfrog_update (r, r->t + 0.5 * h, d->middle, d->u);
   if (status != PW_OK) return status;
   drift_put_middle (r, h);
-  status = leapfrog_place (r, pw_before_breakpoint (r, t1), d->work.q1, d->u);
+  status = leapfrog_update (r, pw_before_breakpoint (r, t1), d->work.q1, d->u);
   if (status != PW_OK) return status;
   drift_put_end (r);
   r->statistics.jacobians++;
@@ -148,12 +148,12 @@ static int drift_factor (pw_run *r, double h, double t1) {
 /* ---- Iteration ---- */
 
 /* Residuals of the constraints. */
-static int drift_rows (pw_run *r, double h, double t1) {
+static int drift_residual (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
   const pw_system *s = r->s;
   int status = PW_OK;
   if (s->rows > s->holonomic) {
-    status = leapfrog_place (r, r->t + 0.5 * h, d->middle, d->u);
+    status = leapfrog_update (r, r->t + 0.5 * h, d->middle, d->u);
     if (status != PW_OK) return status;
     pw_mul_J (r->w, d->u, d->off);
     pw_evaluate_eta (r->w, d->eta);
@@ -182,19 +182,19 @@ static int drift_correct (pw_run *r, double h, leapfrog_progress *p) {
     d->u[j] += d->z[j];
     leapfrog_measure (p, h * d->z[j], r->q[j], pw_unit (r->s, j));
   }
-  drift_move (r, h);
+  drift_positions (r, h);
   return PW_OK;
 }
 
-/* The matrix is evaluated at the prediction, and again where corrections do not shrink well. */
+/* The matrix is evaluated at the prediction, and again while convergence is slow. */
 static int drift_solve (pw_run *r, double h, double t1) {
   leapfrog *d = r->data;
   leapfrog_progress p = { .rate = 1 };
   for (int j = 0; j < r->s->coords; j++) d->u[j] = r->v[j] + 0.5 * h * r->a[j];
-  drift_move (r, h);
+  drift_positions (r, h);
   for (int i = 0, good = r->s->rows == 0; !good; i++) {
     int fresh = i == 0 || (i > 1 && p.rate > 0.02), status = fresh ? drift_factor (r, h, t1) : PW_OK;
-    if (status == PW_OK) status = drift_rows (r, h, t1);
+    if (status == PW_OK) status = drift_residual (r, h, t1);
     if (status == PW_OK) status = drift_correct (r, h, &p);
     if (status != PW_OK) return status;
     good = i < DRIFT_MOST ? leapfrog_converged (&p) : -1;
@@ -205,9 +205,9 @@ static int drift_solve (pw_run *r, double h, double t1) {
 
 /* ---- Second half: v' ---- */
 
-/* Kinematics and the saddle at (t, q, v); notes a singular configuration. */
+/* Kinematics and factors of the saddle-point matrix at (t, q, v); sets r->near in a singular configuration. */
 static int leapfrog_factor (pw_run *r, double t, const double *q, const double *v) {
-  int status = leapfrog_place (r, t, q, v);
+  int status = leapfrog_update (r, t, q, v);
   if (status != PW_OK) return status;
   r->statistics.factorisations++;
   status = pw_saddle_factor (r->saddle);
@@ -215,7 +215,8 @@ static int leapfrog_factor (pw_run *r, double t, const double *q, const double *
   return status;
 }
 
-/* One correction of v' for forces that have changed since the last one, which d->f holds.  PW_METHOD if a signal failed. */
+/* One correction of v', for the change of the forces since the last one; d->f holds the forces.  PW_METHOD if a signal
+ * failed. */
 static int leapfrog_kick (pw_run *r, double h, leapfrog_progress *p) {
   leapfrog *d = r->data;
   const pw_system *s = r->s;
@@ -269,7 +270,7 @@ static int leapfrog_open (pw_run *r, pw_error *error) {
   return pw_implicit_opened (r, status, 1, error);
 }
 
-static void leapfrog_carry (pw_run *r, pw_archive *a) {
+static void leapfrog_serialise (pw_run *r, pw_archive *a) {
   leapfrog *d = r->data;
   pw_archive_bytes (a, &d->work.base, sizeof d->work.base);
   pw_archive_count (a, &d->work.count);
@@ -309,5 +310,5 @@ const pw_method pw_method_leapfrog = {
   .at = pw_implicit_at,
   .restart = pw_implicit_restart,
   .close = pw_implicit_close,
-  .carry = leapfrog_carry,
+  .carry = leapfrog_serialise,
 };

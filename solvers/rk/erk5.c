@@ -1,7 +1,7 @@
 /* erk5: the pair of orders 5 and 4 of Dormand & Prince 1980 (Hairer, Norsett & Wanner 1993, table II.5.2).
  *
- * The pair's seventh stage is the derivative at the new state: it is taken behind the projection, as the first stage of
- * the next step is. */
+ * The seventh stage is the derivative at the new state, evaluated after the projection; it is also the first stage of
+ * the next step. */
 #include "rk.h"
 
 static const double erk5_c[] = { 0, 1. / 5, 3. / 10, 4. / 5, 8. / 9, 1 };

@@ -1,12 +1,12 @@
 /* erk8: the method of order 8 of Dormand & Prince with error estimates of orders 5 and 3, DOP853 (Hairer, Norsett &
  * Wanner 1993, Solving Ordinary Differential Equations I, section II.5; coefficients as in their code of that name).
  *
- * Where stability decides on the steps these two say too little.  The one of order 5 does not see a damped motion at
- * h lambda = -5.65, stability ends at -6.39; and that of order 3, by which it is divided, is large while the motion is
- * smooth.  So an estimate of order 6 stands by, which on a smooth motion is smaller than they are.
+ * Where stability limits the step, these two estimates are not enough.  The estimate of order 5 is blind to a damped
+ * motion at h lambda = -5.65 (the stability limit is -6.39), and the estimate of order 3, which divides it, is large
+ * for smooth motions too.  Hence a third estimate of order 6, which is the smallest of the three on a smooth motion.
  *
- * The step control remembers the error before: a periodic drive makes errors rise and fall, and without memory one step
- * in five is rejected on the EzyRoller, with it hardly one in a hundred. */
+ * The step control uses the previous error as well: a periodic drive makes errors rise and fall.  On the EzyRoller one
+ * step in five is rejected without this memory, about one in a hundred with it. */
 #include "rk.h"
 
 /* clang-format off */
@@ -45,13 +45,13 @@ static const double erk8_e[] = {
   0.1664377182454986536961530415e1, -0.3503288487499736816886487290, 0.3341791187130174790297318841,
   0.8192320648511571246570742613e-1, -0.2235530786388629525884427845e-1, 0,
 };
-/* 12 times the weights that are of order 6 on stages 1 and 6 to 11, where that of stage 8 is 1 */
+/* 12 times the weights of order 6 on stages 1 and 6 to 11, normalised to 1 for stage 8 */
 static const double erk8_e6[] = {
   12 * 0.2924623918176328585655549052e-2, 0, 0, 0, 0, 12 * -0.7940482586994692945623099645,
   12 * -0.2450719733525890492596984518, 12, 12 * -0.8333430535631892043063928771e-1,
   12 * 0.1163619165439829982388016070, 12 * 0.3167996946217937428190548013e-2, 0, 0,
 };
-/* b less the weights of order 3 on stages 1, 9 and 12 */
+/* b minus the weights of order 3 on stages 1, 9 and 12 */
 static const double erk8_e3[] = {
   5.42937341165687622380535766363e-2 - 0.244094488188976377952755905512, 0, 0, 0, 0, 4.45031289275240888144113950566,
   1.89151789931450038304281599044, -5.8012039600105847814672114227,

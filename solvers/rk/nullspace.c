@@ -1,22 +1,24 @@
-/* Minimal velocities: u = B^T W v, with the columns of B a basis of ker J0, J0 the constraint matrix at the step's start,
- * held over the step; W the metric of positions: the mass matrix, and small weights where there is no mass.  Integrated are
+/* Minimal velocities u = B^T W v.  The columns of B are a basis of ker J0, with J0 the constraint matrix at the
+ * beginning of the step, constant over the step.  W is the metric of positions: the mass matrix, with small weights for
+ * massless coordinates.  The equations integrated are
  *
  *   q' = v(t, q, u),    u' = B^T W a(t, q, v),      v:  J(t, q) v = eta,  B^T W v = u
  *
- * so that all rows hold on the level of rates, at every stage, however large the step.  For d freedoms u has d entries.
- * A Runge-Kutta stage of u is B^T W times the same stage w of v, since B is constant, and B^T W (v - w) = 0 means that
- * v - w is in the range of W^-1 J0^T.  So no basis has to be formed, and the result depends on none:
+ * so that all velocity constraints hold at every stage, for any step size.  u has as many entries as there are degrees
+ * of freedom.  A Runge-Kutta stage of u is B^T W times the same stage w of v, since B is constant, and B^T W (v - w) =
+ * 0 puts v - w in the range of W^-1 J0^T.  So no basis is formed, and the result is independent of its choice:
  *
  *   v = w + W^-1 J0^T mu,    K mu = eta - J w,    K = J W^-1 J0^T
  *
- * The next step has a basis of its own; v, and with it the motion, is the same in both.  With this W a body in two welded parts
- * moves like one, to round-off, and what is without mass follows what has some.
- * (Kim & Vanderploeg 1986, QR decomposition for state space representation of constrained mechanical dynamic systems: a
- * basis held while it is good; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of
- * mechanical system dynamics.)
+ * The next step uses another basis; v, and with it the motion, does not change.  With this W a body made of two welded
+ * parts moves like one body, to round-off, and massless coordinates follow the massive ones. (Kim & Vanderploeg 1986,
+ * QR decomposition for state space representation of constrained mechanical dynamic systems: a basis kept while it is
+ * well conditioned; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of mechanical
+ * system dynamics.)
  *
- * J is swept over panels, the rows that touch a body or an internal coordinate.  At the step's start K is symmetric and positive
- * definite, so that its factorisation needs no pivoting; it is done without while no pivot is small, else anew with it. */
+ * J is evaluated in body blocks: the constraint equations that involve one body or internal coordinate.  At the
+ * beginning of the step K is symmetric positive definite, and its factorisation needs no pivoting; it is repeated with
+ * pivoting if a pivot becomes small. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
@@ -27,8 +29,8 @@
 
 /* ---- Opening ---- */
 
-/* The next piece of row `row` at the coordinates from j on; while there are no panels yet, they are counted. */
-static void nullspace_add (pw_nullspace *b, const pw_system *s, int j, int row, const double *J) {
+/* Appends the entries of equation `row` at the coordinates from j on to their body block; counts them if J is NULL. */
+static void nullspace_add_piece (pw_nullspace *b, const pw_system *s, int j, int row, const double *J) {
   if (j >= s->coords || row < 0) return;
   int n = j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies;
   if (J)
@@ -37,16 +39,18 @@ static void nullspace_add (pw_nullspace *b, const pw_system *s, int j, int row, 
     b->panel[n + 2].first++;
 }
 
-/* Counts the pieces of every panel, one place further on, or fills them in. */
-static void nullspace_list (pw_nullspace *b, const pw_workspace *w, int fill) {
+/* Fills in the entries of every body block, or counts them, those of block n in panel[n + 2].first. */
+static void nullspace_list_pieces (pw_nullspace *b, const pw_workspace *w, int fill) {
   const pw_system *s = w->s;
   for (const pw_element_batch *k = w->batch; k < w->batch + s->constraints; k++)
     for (int e = 0; e < k->b.count; e++)
       for (int i = 0, n = e * k->kind->rows; i < k->kind->rows; i++, n++) {
         const double *J = k->J + n * k->b.cols;
         int row = b->place[k->row + n], bodies = k->kind->bodies, own = k->kind->own;
-        for (int c = 0; c < bodies; c++) nullspace_add (b, s, k->column[e * bodies + c], row, fill ? J + 3 * c : NULL);
-        for (int c = 0; c < own; c++) nullspace_add (b, s, k->own + e * own + c, row, fill ? J + 3 * bodies + c : NULL);
+        for (int c = 0; c < bodies; c++)
+          nullspace_add_piece (b, s, k->column[e * bodies + c], row, fill ? J + 3 * c : NULL);
+        for (int c = 0; c < own; c++)
+          nullspace_add_piece (b, s, k->own + e * own + c, row, fill ? J + 3 * bodies + c : NULL);
       }
 }
 
@@ -73,12 +77,12 @@ static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
   return PW_OK;
 }
 
-/* Panel n has the pieces from its `first` to the next one's. */
+/* The entries of panel n are those from its `first` up to the `first` of panel n + 1. */
 static void nullspace_plan (pw_nullspace *b, const pw_workspace *w) {
   const pw_system *s = w->s;
-  nullspace_list (b, w, 0);
+  nullspace_list_pieces (b, w, 0);
   for (int n = 0; n <= b->panels; n++) b->panel[n + 1].first += b->panel[n].first;
-  nullspace_list (b, w, 1);
+  nullspace_list_pieces (b, w, 1);
   for (int n = 0; n < b->panels; n++) {
     b->panel[n].j = n < s->bodies ? 3 * n : n + 2 * s->bodies;
     b->panel[n].width = n < s->bodies ? 3 : 1;
@@ -111,7 +115,7 @@ PW_INLINE double nullspace_dot (const double *x, const double *y, int width) {
   return width == 1 ? x[0] * y[0] : x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
 }
 
-/* K += J W^-1 J0^T, mu -= J w over a panel; its width is a constant where this is inlined. */
+/* K += J W^-1 J0^T, mu -= J w for one panel; `width` is a constant in each inlined copy. */
 PW_INLINE void nullspace_gather (pw_nullspace *b, const pw_nullspace_block *p, const double *w, int width) {
   const pw_nullspace_piece *from = b->piece + p->first, *end = b->piece + p[1].first;
   for (const pw_nullspace_piece *x = from; x < end; x++) {
@@ -121,7 +125,7 @@ PW_INLINE void nullspace_gather (pw_nullspace *b, const pw_nullspace_block *p, c
   }
 }
 
-/* K and the right-hand side, the latter in mu. */
+/* Assembles K, and the right-hand side in mu. */
 static void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w) {
   int m = b->rows;
   memset (b->K, 0, (size_t)m * (size_t)m * sizeof *b->K);
@@ -138,8 +142,8 @@ static void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w) {
       nullspace_gather (b, p, w, 1);
 }
 
-/* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 where a pivot has lost more than so much of its diagonal
- * entry. */
+/* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 if a pivot is smaller than `least` times its
+ * diagonal entry. */
 static int nullspace_eliminate (double *K, double *mu, int m) {
   const double least = 0.01;
   for (int p = 0; p < m; p++) {
@@ -159,7 +163,7 @@ static int nullspace_eliminate (double *K, double *mu, int m) {
   return 1;
 }
 
-/* The same with pivoting, rows scaled.  PW_RETRY if a pivot is what round-off leaves of a dependent row. */
+/* The same with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint equations. */
 static int nullspace_pivot (pw_nullspace *b) {
   const double least = 1e-13;
   int m = b->rows;
@@ -171,7 +175,7 @@ static int nullspace_pivot (pw_nullspace *b) {
     for (int j = 0; j < m; j++) K[i * m + j] /= most;
     b->mu[i] /= most;
   }
-  for (int i = 0; i < m; i++) /* LAPACK's rows are columns here */
+  for (int i = 0; i < m; i++) /* transpose: LAPACK stores columns */
     for (int j = 0; j < i; j++) {
       double x = K[i * m + j];
       K[i * m + j] = K[j * m + i], K[j * m + i] = x;
@@ -195,7 +199,7 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   return PW_OK;
 }
 
-/* mu; PW_RETRY if K is singular. */
+/* Solves K mu = eta - J w; PW_RETRY if K is singular. */
 static int nullspace_multipliers (pw_nullspace *b, pw_run *r, const double *w) {
   nullspace_assemble (b, r, w);
   if (nullspace_eliminate (b->K, b->mu, b->rows)) return PW_OK;
@@ -203,7 +207,7 @@ static int nullspace_multipliers (pw_nullspace *b, pw_run *r, const double *w) {
   return nullspace_pivot (b);
 }
 
-/* The rates at the placed configuration, J swept. */
+/* Velocities at the current kinematics; J must be up to date. */
 static int nullspace_correct (pw_nullspace *b, pw_run *r, double *v) {
   if (nullspace_multipliers (b, r, v) != PW_OK) return PW_RETRY;
   for (const pw_nullspace_block *p = b->panel, *end = p + b->panels; p < end; p++)
@@ -226,7 +230,7 @@ int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lamb
   return status;
 }
 
-/* The energy at (t, q) with the minimal velocities that w has. */
+/* The energy at (t, q) with the minimal velocities of w. */
 static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double *q, const double *w, double *energy) {
   const pw_system *s = r->s;
   memcpy (b->v, w, (size_t)s->coords * sizeof *w);

@@ -2,8 +2,8 @@
  *
  *   q_i = q + h sum_j A_ij v_j,   v_i = v + h sum_j A_ij a_j,   j < i;   new: with b in place of A
  *
- * The ledger's rates are carried through the same stages.  After each step the state may be projected; its
- * accelerations are evaluated at once, as the first stage of the next step, so that a run always knows them. */
+ * The ledger's rates are integrated with the same stages.  After each step the state may be projected; its
+ * accelerations are evaluated immediately, as the first stage of the next step, so that they are always available. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -150,8 +150,8 @@ PW_INLINE void rk_two (double *restrict out, const double *y, double *const *k, 
   out[i + 1] = b;
 }
 
-/* The state reached + h sum_j w_j (V_j, A_j); there is room for an entry behind the last.  m, the number of weights, is a
- * constant where this is inlined. */
+/* The current state + h sum_j w_j (V_j, A_j); the arrays have room for one more entry.  m, the number of weights, is a
+ * constant in the inlined copies. */
 PW_INLINE void rk_combine_by (const pw_run *r, double *q, double *v, const pw_rk_row *w, double h, int m) {
   const struct pw_method_data *d = r->data;
   const double *q0 = r->q, *v0 = r->v;
@@ -194,15 +194,15 @@ static inline int rk_stage (pw_run *r, double t, double *v, double *a) {
   return status == PW_OK ? pw_nullspace_accelerate (r, v, a, d->lambda) : status;
 }
 
-/* Signals of forces keep the values of the step's beginning, wherever the system was placed last: by a sample, or a step
- * that was rejected. */
+/* Zero-order hold: signals of forces keep their values at the beginning of the step.  Kinematics are updated first,
+ * since a sample or a rejected step may have changed them. */
 static int rk_hold (pw_run *r) {
   int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
   pw_hold_signals (r->w, status == PW_OK);
   return status;
 }
 
-/* Evaluates stages 1, 2, ...; stage 0 is the state reached.  Returns as pw_run_accelerate. */
+/* Evaluates stages 1, 2, ...; stage 0 is the current state.  Returns as pw_run_accelerate. */
 static int rk_stages (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
@@ -218,7 +218,7 @@ static int rk_stages (pw_run *r, double h) {
   return status;
 }
 
-/* Projects the new state, and evaluates its accelerations; the energy this adds goes to the ledger. */
+/* Projects the new state and evaluates its accelerations; *added grows by the energy this adds. */
 static int rk_project (pw_run *r, double t, double *added) {
   struct pw_method_data *d = r->data;
   const pw_system *s = r->s;
@@ -233,7 +233,7 @@ static int rk_project (pw_run *r, double t, double *added) {
   return status;
 }
 
-/* 1 if nothing is so large that its square would not be a number. */
+/* 1 if the squares of all entries are finite. */
 static int rk_finite (const pw_run *r, const double *q, const double *v) {
   double sum = 0;
   for (int j = 0; j < r->s->coords; j++) sum += q[j] * q[j] + v[j] * v[j];
@@ -286,7 +286,7 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   int against = (r->data->projects || r->data->closes) && finite ? r->data->projector.against : -1;
   char element[120];
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  if (against >= 0) /* a redundant row asks for what the others forbid */
+  if (against >= 0) /* a redundant equation contradicts the others */
     return pw_fail (error, PW_METHOD, "t = %.6g s: %s contradicts the other constraints", r->t,
                     pw_system_row_name (r->s, against, element, sizeof element));
   if (finite && pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);

@@ -6,7 +6,7 @@
 
 enum { PW_RK_STAGES = 16 };
 
-/* c and b have `stages` entries; A holds the rows below the diagonal, one after the other. */
+/* c and b have `stages` entries; A holds the rows of the lower triangle, one after the other. */
 typedef struct {
   int stages, order;
   const double *c, *A, *b;
@@ -14,10 +14,10 @@ typedef struct {
   const double *e3; /* as e: of a second, cruder estimate, combined as in DOP853; NULL: none */
   const double *e6; /* as e: of a third, sharper one, with e3 only */
   double exponent;  /* of the error in the step size: 1 / order of the estimate + 1 */
-  double memory;    /* of the error before, in the step size (Gustafsson 1991) */
+  double memory;    /* of the previous error in the step size (Gustafsson 1991) */
 } pw_tableau;
 
-/* What a pw_method of this family puts in its table. */
+/* For the table of each method. */
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error);
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error);
 int pw_rk_at (pw_run *r, double t, pw_error *error);
@@ -25,6 +25,6 @@ int pw_rk_restart (pw_run *r, pw_error *error);
 void pw_rk_close (pw_run *r);
 void pw_rk_serialise (pw_run *r, pw_archive *a);
 extern const pw_stabilisation pw_rk_stabilisations[];
-extern const pw_option pw_rk_options[]; /* the first is for tableaus with an error estimate */
+extern const pw_option pw_rk_options[]; /* the first one only for tableaus with an error estimate */
 
 #endif

@@ -1,26 +1,27 @@
-/* Runge-Kutta with steps that follow the tolerances.
+/* Runge-Kutta methods with step-size control.
  *
- *   h_new = 0.9 h err^-(k - 3 m / 4) err_before^m,  within a fifth and five times of h
+ *   h_new = 0.9 h err^-(k - 3 m / 4) err_before^m,  limited to h/5 ... 5 h
  *
  * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
- * error e is that of positions and velocities in units of the tolerances.  Of what a projection takes away from it, e', only
- * the part along the constraints is left (Eich 1993; Hindmarsh et al., CVODE) and a little of the whole:
+ * error e is that of positions and velocities in units of the tolerances.  A projection leaves e', the part of the
+ * error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small share of the whole is
+ * added:
  *
  *   e = sqrt (e'^2 + rtol^(1/2) e_before^2)      so that the displacement, e_before rtol, is at most rtol^(3/4)
  *
- * The displacement acts along the constraints by its square, through their curvature; without a limit the steps of a
- * motion that is mostly prescribed would grow until that counts.
+ * Through the curvature of the constraints, the square of the displacement adds to the tangential error; without this
+ * limit the steps of a mostly prescribed motion would grow until that dominates.
  *
- * Where a force reverses within a step, such as friction, estimates of any order may miss it: the largest change of the
- * acceleration at its stages, h |a_i - a| / 2, counts as the error before a projection does, so that a body stopped by friction trembles at
- * speeds of at most rtol^(3/4).
+ * Where a force reverses within a step, such as friction, estimates of any order may miss it.  The largest change of
+ * the acceleration at the stages, h |a_i - a| / 2, therefore counts like the error before a projection, so that a body
+ * stopped by friction oscillates at speeds of at most rtol^(3/4).
  *
- * Where there are estimates of three orders, e5 is sharpened by e3 as in DOP853, and e6 watches over both:
+ * With estimates of three orders, e5 is combined with e3 as in DOP853, and e6 guards both:
  *
- *   max (e5^2 / sqrt (e5^2 + e3^2 / 100), e6^3 / (e6^2 + e5^2))      of h^8 and h^9 while the motion is smooth
+ *   max (e5^2 / sqrt (e5^2 + e3^2 / 100), e6^3 / (e6^2 + e5^2))      of order h^8 and h^9 for smooth motions
  *
- * Where a damped motion is at the limit of stability, e5 may be blind to it and e3 is large for other reasons: then e5
- * may be many times the tolerances, or nothing, and the motion be wrong. */
+ * At the stability limit of a damped motion e5 may be blind to the instability while e3 is large for other reasons:
+ * without e6 the error may then be many times the tolerances and remain undetected. */
 #include <float.h>
 #include <math.h>
 #include "rk_state.h"
@@ -48,7 +49,7 @@ static void adapt_estimate (const pw_rk_row *w, double *const *K, int n, double 
   for (int j = 0; j < w->count; j++) out[i] += w->weight[j] * K[w->stage[j]][i];
 }
 
-/* One over the tolerances of positions and velocities, of a step from the state reached to the new one. */
+/* Reciprocal tolerances of positions and velocities for the step from the current to the new state. */
 static void adapt_weigh (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   double *w = d->weight, rtol = r->settings.rtol;
@@ -58,7 +59,7 @@ static void adapt_weigh (const pw_run *r) {
   }
 }
 
-/* Mean square of positions' and rates' errors in units of the tolerances. */
+/* Mean square of the errors of positions and velocities in units of the tolerances. */
 static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
   const double *w = r->data->weight;
   int coords = r->s->coords;
@@ -70,7 +71,7 @@ static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
   return sum / (2 * coords);
 }
 
-/* The error of an estimate: what it is, and what of it a projection leaves. */
+/* The error of an estimate, before and after projection. */
 static double adapt_whole (pw_run *r, const pw_rk_row *e) {
   struct pw_method_data *d = r->data;
   adapt_estimate (e, d->V, r->s->coords, r->q_at);
@@ -90,7 +91,7 @@ static double adapt_one (pw_run *r, const pw_rk_row *e, int projected) {
   return adapt_left (r, adapt_whole (r, e), projected);
 }
 
-/* Mean squares of three estimates, the errors at the head of this file. */
+/* Combinations of the mean squares of three estimates; see the top of this file. */
 static double adapt_sharpen (double e5, double e3) {
   return e5 == 0 ? 0 : e5 / sqrt (e5 + 0.01 * e3);
 }
@@ -99,7 +100,7 @@ static double adapt_watch (double e6, double e5) {
   return e6 == 0 ? 0 : e6 * sqrt (e6) / (e6 + e5);
 }
 
-/* The error of the state of the step just computed, over h. */
+/* The error of the new state, divided by h. */
 static double adapt_state (pw_run *r, int projected) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
@@ -113,7 +114,7 @@ static double adapt_state (pw_run *r, int projected) {
   return off;
 }
 
-/* The same of work and losses, which no projection changes. */
+/* The error of work and losses, which projections do not change, divided by h. */
 static double adapt_ledger (pw_run *r, double h) {
   struct pw_method_data *d = r->data;
   const pw_tableau *b = d->tableau;
@@ -127,14 +128,14 @@ static double adapt_ledger (pw_run *r, double h) {
   return isfinite (off) ? off : 0;
 }
 
-/* The error of the step just computed; at most 1 is good.  Of a state that is not, work and losses tell nothing. */
+/* The error of the step, accepted up to 1.  Work and losses are checked only if the state is accepted. */
 static double adapt_error (pw_run *r, double h, int projected) {
   double state = h * adapt_state (r, projected);
   return r->s->entries > 0 && state <= 1 ? fmax (state, h * adapt_ledger (r, h)) : state;
 }
 
-/* Root mean square of the changes of those accelerations whose velocity, at one of the stages, is farther from the beginning
- * than what a force saturates within. */
+/* Root mean square of the changes of those accelerations whose velocity changes, at one of the stages, by more than the
+ * range in which a force saturates. */
 static double adapt_reversal (const pw_run *r) {
   const struct pw_method_data *d = r->data;
   int n = r->s->coords, stages = d->tableau->stages;
@@ -151,7 +152,7 @@ static double adapt_reversal (const pw_run *r) {
   return sqrt (sum / (2 * n));
 }
 
-/* 0.2 to 5 times the step. */
+/* The factor of the step size, 0.2 to 5. */
 static double adapt_factor (const struct pw_method_data *d, double error) {
   const pw_tableau *b = d->tableau;
   if (error == 0) return 5;
@@ -159,8 +160,8 @@ static double adapt_factor (const struct pw_method_data *d, double error) {
   return fmin (5, fmax (0.2, f));
 }
 
-/* The step to t1.  Where signals are discontinuous there its error is estimated with the new state's derivative before that:
- * the jump is no error of the step. */
+/* The step to t1.  If a signal jumps at t1, the error is estimated with the derivative before the jump, which is not an
+ * error of the step. */
 static int adapt_step (pw_run *r, double h, double t1, int project, double *added, double *off) {
   struct pw_method_data *d = r->data;
   double before = pw_before_breakpoint (r, t1);
@@ -174,7 +175,7 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   return status;
 }
 
-/* A step that was cut short says little about the next one, other than that it may be as large as it was to be. */
+/* A step that was cut short does not reduce the next one: that gets at least the size planned before. */
 static void adapt_accept (pw_run *r, double h, double t1, double added, double off, double most, int cut) {
   struct pw_method_data *d = r->data;
   double next = h * fmin (most, adapt_factor (d, off));

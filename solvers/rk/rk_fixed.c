@@ -1,11 +1,11 @@
-/* Runge-Kutta with steps of the given size: multiples of it from the start, cut at t_end and at breakpoints, and split
- * where one of them would land on a singular configuration. */
+/* Runge-Kutta methods with fixed steps, which end at multiples of the step size.  They are cut at t_end and at
+ * breakpoints, and split where a stage or the end would land on a singular configuration. */
 #include <math.h>
 #include <string.h>
 #include "rk_state.h"
 
-/* The step to t1 in two parts; the state there is left in d->q, d->v, and if `keep` is set the first part is accepted.
- * *added: the energy that projections have added. */
+/* The step to t1 in two parts, by way of t; leaves the new state in d->q, d->v.  With `keep` it accepts the first part
+ * and omits the second.  *added: the energy added by projections. */
 static int fixed_two_parts (pw_run *r, double t, double t1, int project, int keep, double *added) {
   *added = 0;
   int status = pw_rk_step (r, t - r->t, t, project, added);
@@ -17,7 +17,7 @@ static int fixed_two_parts (pw_run *r, double t, double t1, int project, int kee
   return status;
 }
 
-/* How far the state in d->q, d->v is from the one in q_at, v_at, whose place it takes. */
+/* The distance of the state in d->q, d->v from the one in q_at, v_at, which it then replaces. */
 static double fixed_compare (pw_run *r) {
   const struct pw_method_data *d = r->data;
   double most = pw_rk_distance (r);
@@ -25,8 +25,8 @@ static double fixed_compare (pw_run *r) {
   return most;
 }
 
-/* The step to t1 in two parts of irregular sizes, in several ways, until two of them agree; then the first part of the
- * latter is accepted, and ends at *t, behind `least`. */
+/* Tries divisions of the step to t1 in two parts of irregular sizes until the results of two of them agree; then
+ * accepts the first part of the latter, which ends at *t > least. */
 static int fixed_in_parts (pw_run *r, int status, double t1, int project, double least, double *t) {
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.127, 0.541, 0.943, 0.302, 0.764, 0.891 };
   const int parts = sizeof part / sizeof *part;
@@ -40,7 +40,7 @@ static int fixed_in_parts (pw_run *r, int status, double t1, int project, double
     r->statistics.rejected++;
     if (status < 0) return status;
     if (status != PW_OK) continue;
-    double off = fmax (fixed_compare (r), fabs (added) / energy); /* what a projection corrects is an error, too */
+    double off = fmax (fixed_compare (r), fabs (added) / energy); /* energy of projections is an error, too */
     if (known && off < best) best = off, choice = i;
     known = 1;
   }
@@ -49,8 +49,8 @@ static int fixed_in_parts (pw_run *r, int status, double t1, int project, double
   return fixed_two_parts (r, *t, t1, project, 1, &added);
 }
 
-/* Near a singular configuration an evaluation that lands on it spoils the step.  It is taken in two parts; where it is its end that
- * lands there, what is divided is a longer step, up to `stop`, of which the first part passes t1. */
+/* A stage that lands on a singular configuration spoils the step, so the step is divided in two.  If its end lands
+ * there, a longer step, up to `stop`, is divided so that the first part ends after t1. */
 static int fixed_step_around (pw_run *r, int status, double t1, double stop, int project, double *t) {
   static const double beyond[] = { 0.62, 2.62, 7.62 };
   const int lengths = sizeof beyond / sizeof *beyond;

@@ -1,19 +1,20 @@
-/* Runge-Kutta: looking into the last step.  A sample is a step from its beginning, as accurate as the method.
+/* Runge-Kutta methods: samples inside the last step.  A sample is a step from the beginning of the last one, as
+ * accurate as the method.
  *
- * Near a singular configuration a stage that lands on it spoils such a step, though the longer one that was accepted may have been
- * good.  Then it is taken in two parts, in several ways, and the one is good that comes nearest to another. */
+ * Near a singular configuration a stage may land on it and spoil this step, even if the accepted step was good.  Then
+ * several divisions in two parts are tried, and the one closest to another is taken. */
 #include <math.h>
 #include <string.h>
 #include "dense_output.h"
 #include "rk_state.h"
 
-/* A state that a step can begin from, as the run has it. */
+/* A state from which a step can begin, with the run's layout. */
 typedef struct {
   double t, *q;
   double *ledger, *rate, projected;
 } sample_begin;
 
-/* A step to t, left in d->q; the ledger there in ledger_at, projected_at.  *near: 1 if an evaluation was near a singular
+/* A step to t: state in d->q, ledger in ledger_at, projected_at.  *near: 1 if an evaluation was near a singular
  * configuration. */
 static int sample_step (pw_run *r, const sample_begin *from, double t, int *near) {
   struct pw_method_data *d = r->data;
@@ -31,7 +32,7 @@ static int sample_step (pw_run *r, const sample_begin *from, double t, int *near
   return status;
 }
 
-/* From the beginning by way of another time. */
+/* The same in two parts, by way of the time `by`. */
 static int sample_two_parts (pw_run *r, const sample_begin *from, double by, double t) {
   struct pw_method_data *d = r->data;
   int near, status = sample_step (r, from, by, &near);
@@ -43,7 +44,7 @@ static int sample_two_parts (pw_run *r, const sample_begin *from, double by, dou
   return sample_step (r, &middle, t, &near);
 }
 
-/* Leaves the best in the sample arrays. */
+/* Tries several divisions and leaves the best result in the sample arrays. */
 static int sample_in_parts (pw_run *r, const sample_begin *from, int status, double t) {
   static const double part[] = { 0.382, 0.681, 0.209, 0.847, 0.541 };
   const int parts = sizeof part / sizeof *part;

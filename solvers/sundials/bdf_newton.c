@@ -4,12 +4,12 @@
  *
  *   x_q = b_q + gamma x_v,   x_v = b_v + gamma da
  *
- * only da and dlambda are unknown, in a matrix like that of the accelerations:
+ * only da and dlambda remain, with a matrix like that of the accelerations:
  *
  *   (T_a + gamma T_v + gamma^2 T_q) da + T_lambda dlambda = - T_q (b_q + gamma b_v) - T_v b_v
  *
- * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU analyses the matrix once, refactors
- * it, and pivots anew where its reciprocal condition has sunk. */
+ * T is evaluated when CVODES asks for a new Jacobian; gamma changes more often.  KLU analyses the matrix once and
+ * refactors it, with new pivots if its reciprocal condition number has decreased. */
 #include <stdlib.h>
 #include <string.h>
 #include <cvodes/cvodes.h>
@@ -36,7 +36,7 @@ static void newton_combine (pw_bdf_newton *w, int n) {
   }
 }
 
-/* Called by CVODES: T, unless the present one will do, and the matrix with gamma. */
+/* Called by CVODES: evaluates T unless the current one is still good, then forms the matrix with gamma. */
 static int newton_set_up (pw_real t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype good,
                           booleantype *fresh, pw_real gamma, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
   multistep_data *d = data;
@@ -83,7 +83,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
   const double *b = N_VGetArrayPointer (vb), *da = N_VGetArrayPointer (w->change);
   double *x = N_VGetArrayPointer (vx);
   int n = d->n;
-  if (d->sun.run->outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then asks for a new one */
+  if (d->sun.run->outdated) return SUNLS_PACKAGE_FAIL_REC; /* CVODES then requests a new matrix */
   newton_right (d, b, N_VGetArrayPointer (w->right));
   int flag = SUNLinSolSolve (d->sun.klu, matrix, w->change, w->right, tolerance);
   if (flag != SUNLS_SUCCESS) return flag;
@@ -96,7 +96,7 @@ static int newton_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector vx, 
 
 /* ---- Opening ---- */
 
-/* The patterns of T and of the matrix, each by recording one filling. */
+/* Records the patterns of T and of the matrix by filling each once. */
 static int newton_lay_out (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;

@@ -1,7 +1,7 @@
 /* ida: the variable-order BDF code IDAS of SUNDIALS (Hindmarsh et al. 2005), on the equations of ida_equations.c.
  *
- * The Newton matrix is exact and sparse, factorised by KLU.  lambda and mu are kept out of the error test, and only
- * they: velocities of massless coordinates are in it.  In si1 all are in it. */
+ * The Newton matrix is exact and sparse, factorised by KLU.  The error test excludes lambda and mu but no velocities,
+ * not even those of massless coordinates.  In si1 it includes all unknowns. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -13,7 +13,7 @@
 
 /* ---- Error weights ---- */
 
-/* The coefficient c of the current step, 1 / h before there is one; not below 1 / T. */
+/* The coefficient c of the current step, 1 / h before the first; at least 1 / T. */
 static double ida_leading (const ida_data *d) {
   const pw_run *r = d->sun.run;
   pw_real c = 0;
@@ -21,7 +21,7 @@ static double ida_leading (const ida_data *d) {
   return fmax (c, 1 / r->w->scale.time);
 }
 
-/* The scale of forces: that of the masses, else that of the multipliers; 1 where nothing has mass and nothing pulls. */
+/* The scale of forces: from the masses, else from the multipliers, else 1. */
 static double ida_force (const pw_run *r) {
   const pw_system *s = r->s;
   double L = s->scale.length, T = r->w->scale.time, force = 0;
@@ -31,11 +31,11 @@ static double ida_force (const pw_run *r) {
   return force > 0 ? force : 1;
 }
 
-/* Error weights; of the multipliers by the scale of forces and velocities, times L for moments and what goes with angles.
+/* Error weights.  Those of the multipliers use the scales of forces and velocities, times L for moments and angles.
  *
- * Where they are unknowns the error test does not see them, and a correction of them is as large as one of v or q
- * divided by the step: if J v = eta is solved, the convergence test sees them divided by c.  Where they are derivatives, it
- * is their integrals over T that are weighted; lambda itself is that of the step before. */
+ * As unknowns the multipliers are not in the error test, and their corrections are those of v or q divided by the step:
+ * with J v = eta their weights are divided by c for the convergence test.  As derivatives, their integrals over T are
+ * weighted, with lambda of the previous step. */
 static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
   ida_data *d = user;
   const pw_run *r = d->sun.run;
@@ -56,7 +56,7 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
 
 /* ---- States ---- */
 
-/* Initial conditions of IDA: the state reached. */
+/* Fills IDA's vectors with the current state. */
 static void ida_fill_vectors (ida_data *d) {
   const pw_run *r = d->sun.run;
   size_t n = (size_t)d->n;
@@ -70,7 +70,7 @@ static void ida_fill_vectors (ida_data *d) {
   memcpy (yp + n, r->a, n * sizeof *y);
 }
 
-/* Reads (q, v, a, lambda) out of y and y'. */
+/* Copies (q, v, a, lambda) from y and y'. */
 static void ida_read (const ida_data *d, double *q, double *v, double *a, double *lambda) {
   size_t n = (size_t)d->n;
   const double *y = N_VGetArrayPointer (d->sun.y), *yp = N_VGetArrayPointer (d->yp);
@@ -82,9 +82,9 @@ static void ida_read (const ida_data *d, double *q, double *v, double *a, double
   for (int i = 0; i < d->rows; i++) lambda[d->tangent.map ? d->tangent.row[i] : i] = used[i];
 }
 
-/* The state at t into the sample arrays, kinematics included.  Accelerations and multipliers are those that go with it, rather
- * than the last iterate's: IDA's error test does not see them.  In a singular configuration those of IDA stay.  Returns a flag
- * of IDA's. */
+/* Interpolates the state at t into the sample arrays and updates kinematics.  Accelerations and multipliers are
+ * computed from the state, since IDA's error test does not control its own; these remain only in singular
+ * configurations.  Returns an IDA flag. */
 static int ida_interpolate (ida_data *d, double t) {
   pw_run *r = d->sun.run;
   int flag = t > r->t ? IDA_BAD_T : IDA_SUCCESS;
@@ -111,8 +111,8 @@ static int ida_power (pw_run *r, double t, double *rate) {
   return flag == IDA_SUCCESS ? PW_OK : PW_RETRY;
 }
 
-/* Work and losses up to the state reached, where the saddle is factorised if `status` says so.  Multipliers that the error
- * test has not seen are not good enough for them.  0, or -1 if a signal failed. */
+/* Work and losses up to the current state; the saddle-point matrix is factorised if `status` is PW_OK.  Multipliers
+ * outside the error test are not accurate enough and are recomputed.  0, or -1 if a signal failed. */
 static int ida_work (ida_data *d, int status) {
   pw_run *r = d->sun.run;
   int order = 1;
@@ -233,7 +233,7 @@ static int ida_restart (pw_run *r, pw_error *error) {
   return flag == IDA_SUCCESS ? PW_OK : pw_sun_fail_restart (&d->sun, flag, error);
 }
 
-/* IDA does not begin where it is to stop within the round-off of time.  Nothing moves there. */
+/* IDA refuses to start within round-off of its stop time: moves the time there without a step. */
 static int ida_skip (pw_run *r, double stop, pw_error *error) {
   r->t = stop;
   r->statistics.steps++;
@@ -242,9 +242,9 @@ static int ida_skip (pw_run *r, double stop, pw_error *error) {
   return ida_restart (r, error);
 }
 
-/* The state reached out of y, and the ledger.  Multipliers of IDA are good where J v = eta is solved.  On the level of
- * accelerations nothing but Newton's iteration determines them where the motion is prescribed, and they may wander off without
- * harm to the motion: there they are computed anew.  PW_METHOD if a signal failed. */
+/* Reads the current state from y and updates the ledger.  IDA's multipliers are accurate if it solves J v = eta.  On
+ * acceleration level, only the Newton iteration determines those of prescribed motions, and they may drift without
+ * effect on the motion: there they are recomputed.  PW_METHOD if a signal failed. */
 static int ida_reach (ida_data *d) {
   pw_run *r = d->sun.run;
   ida_read (d, r->q, r->v, r->a, r->lambda);

@@ -1,4 +1,4 @@
-/* What the equations shown to IDA (ida_equations.c) and the run of the method (ida.c) share.  For these files only. */
+/* Private to ida: the equations (ida_equations.c) and the driver (ida.c). */
 #ifndef PW_IDA_H
 #define PW_IDA_H
 
@@ -9,11 +9,11 @@ struct pw_method_data {
   pw_sun sun;   /* first */
   void *memory; /* IDA's */
   /* how the constraints are enforced */
-  int velocities; /* 1: J v = eta; 0: on the level of accelerations */
+  int velocities; /* 1: J v = eta; 0: acceleration level */
   int positions;  /* 1: g = 0 as well, with mu */
   int impulses;   /* 1: the unknowns are the integrals of lambda and mu */
   pw_tangent tangent;
-  int n, rows, mus, size; /* coordinates, rows in use, multipliers mu, unknowns */
+  int n, rows, mus, size; /* coordinates, independent equations, multipliers mu, unknowns */
   N_Vector yp, id;
   double *scale; /* D: coords */
   double *given; /* scratch: 2 (coords + 3) + 2 rows */
@@ -25,7 +25,7 @@ typedef struct pw_method_data ida_data;
 /* Updates kinematics and J at the unknowns.  0, or -1 if a signal failed. */
 int pw_ida_update (ida_data *d, double t, const double *y);
 
-/* Where the multipliers of the rows in use are: among the unknowns, or among their derivatives. */
+/* The multipliers of the independent equations, among the unknowns or among their derivatives. */
 static inline const double *pw_ida_lambda (const ida_data *d, const double *y, const double *yp) {
   return (d->impulses ? yp : y) + 2 * d->n;
 }
@@ -35,7 +35,7 @@ int pw_ida_residual (pw_real t, N_Vector y, N_Vector yp, N_Vector out, void *dat
 int pw_ida_matrix (pw_real t, pw_real c, N_Vector y, N_Vector yp, N_Vector residual, SUNMatrix matrix, void *data,
                    N_Vector t1, N_Vector t2, N_Vector t3);
 
-/* Lays out the pattern by recording one filling at y, y', and makes the matrix.  PW_OK or PW_RESOURCE. */
+/* Records the pattern by filling the matrix once at y, y', and allocates it.  PW_OK or PW_RESOURCE. */
 int pw_ida_open_matrix (ida_data *d);
 
 #endif

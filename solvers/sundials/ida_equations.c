@@ -6,7 +6,7 @@
  *   si1               q' = v - D G^T mu',   M v' + J^T lambda' = f,  J v = eta,   g = 0
  *
  * with D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
- * Gear 1988).  In si1 the unknowns are the integrals of the multipliers, and called lambda and mu as well. */
+ * Gear 1988).  In si1 the unknowns lambda and mu are the integrals of the multipliers. */
 #include <string.h>
 #include "ida.h"
 
@@ -16,7 +16,7 @@ int pw_ida_update (ida_data *d, double t, const double *y) {
   return status == PW_OK ? 0 : -1;
 }
 
-/* Multipliers of all rows, from the unknowns or their derivatives. */
+/* Multipliers of all equations, from the unknowns or their derivatives. */
 static const double *ida_lambda (ida_data *d, const double *y, const double *yp) {
   return pw_tangent_expand (&d->tangent, pw_ida_lambda (d, y, yp), d->rows, d->tangent.lambda);
 }
@@ -49,7 +49,7 @@ static void ida_momentum (ida_data *d, const double *y, const double *yp, double
   for (int j = 0; j < n; j++) out[j] = s->mass[j] * yp[n + j] + pull[j] - f[j];
 }
 
-/* J v' - gamma + 2 alpha (J v - eta) + beta^2 g, all rows, onto J v - eta */
+/* jv = J v' - gamma + 2 alpha (J v - eta) + beta^2 g of all equations; jv is J v - eta on entry */
 static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *other) {
   pw_run *r = d->sun.run;
   const pw_system *s = r->s;
@@ -63,7 +63,7 @@ static void ida_stabilised (ida_data *d, const double *yp, double *jv, double *o
   for (int i = 0; i < s->holonomic; i++) jv[i] += r->beta * r->beta * other[i];
 }
 
-/* J v - eta and g; or the stabilised accelerations */
+/* J v - eta, and g; or the stabilised acceleration constraints */
 static void ida_constraints (ida_data *d, const double *y, const double *yp, double *out) {
   const pw_system *s = d->sun.run->s;
   double *jv = d->given, *other = jv + s->rows;

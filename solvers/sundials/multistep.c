@@ -1,11 +1,11 @@
 /* adams, bdf: the multistep methods of CVODES on the accelerations, one driver for both formulas.
  *
- *   y = (q, v),   y' = (v, a (t, q, v)),   a from  M a + J^T lambda = f,  J a = gamma, with Baumgarte's terms if asked for
+ *   y = (q, v),   y' = (v, a (t, q, v)),   a from  M a + J^T lambda = f,  J a = gamma, with Baumgarte's terms if selected
  *
- * adams: Adams-Moulton formulas of orders 1 to 12, for scenes that are not stiff.  The iteration is functional: it needs no
- * matrix, and converges only where the step resolves every motion.  bdf: backward differentiation formulas of orders 1 to 5,
- * for stiff scenes (Curtiss & Hirschfelder 1952; Gear 1971).  The iteration is Newton's, its matrix exact (bdf_newton.c); each
- * step may be projected, and so is its error (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of nonlinear and
+ * adams: Adams-Moulton formulas of orders 1 to 12, for non-stiff scenes.  The fixed-point iteration needs no matrix and
+ * converges only if the step resolves every motion.  bdf: backward differentiation formulas of orders 1 to 5, for stiff
+ * scenes (Curtiss & Hirschfelder 1952; Gear 1971).  It uses Newton's iteration with an exact matrix (bdf_newton.c);
+ * steps and their errors may be projected (Eich 1993).  (Hindmarsh et al. 2005, SUNDIALS: Suite of nonlinear and
  * differential/algebraic equation solvers.) */
 #include <math.h>
 #include <stdlib.h>
@@ -16,11 +16,11 @@
 #include "multistep.h"
 #include "util.h"
 
-/* What Newton's iteration may leave, as a part of the tolerance, where the error test sees only what the projection leaves:
- * less than CVODES' own 0.1.  Under stiff damping what it leaves is energy. */
+/* Convergence coefficient of the Newton iteration if the error test sees only the projected error, or forces saturate:
+ * less than CVODES' default of 0.1, since under stiff damping the remaining error is energy. */
 #define MULTISTEP_ITERATED 0.01
 
-/* ---- What CVODES asks for ---- */
+/* ---- Callbacks ---- */
 
 int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
   pw_run *r = d->sun.run;
@@ -47,7 +47,7 @@ static int multistep_weigh (N_Vector y, N_Vector weights, void *data) {
 
 /* ---- Projection ---- */
 
-/* Projects (t, q, v): a part of the step, and of its energy.  Returns as pw_project_positions. */
+/* Projects q and v at t.  Returns as pw_project_positions. */
 static int multistep_project (multistep_data *d, double t, double *q, double *v) {
   pw_run *r = d->sun.run;
   int row, status = pw_update_kinematics (r->w, t, q, v);
@@ -56,8 +56,9 @@ static int multistep_project (multistep_data *d, double t, double *q, double *v)
   return status == PW_OK ? pw_project_velocities (&d->projector, r, v) : status;
 }
 
-/* Of the error the part along the constraints counts (Eich 1993), found in the metric of the projection; and, as in
- * rk_adapt.c, a little of the whole: of what is far off the constraints more moves along them than the estimate can tell. */
+/* Keeps the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
+ * share of the whole as in rk_adapt.c: large displacements off the constraints have tangential effects that the
+ * estimate misses. */
 static void multistep_project_error (multistep_data *d, double *e) {
   pw_run *r = d->sun.run;
   double *whole = d->error, little = sqrt (r->settings.rtol);
@@ -73,7 +74,7 @@ static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real e
   const double *y = N_VGetArrayPointer (vy);
   double *out = N_VGetArrayPointer (change);
   size_t bytes = (size_t)d->n * sizeof *y;
-  (void)enough; /* to round-off, whatever the tolerance */
+  (void)enough; /* projects to round-off whatever the tolerance */
   memcpy (d->q, y, bytes);
   memcpy (d->v, y + d->n, bytes);
   int status = multistep_project (d, t, d->q, d->v);
@@ -87,7 +88,8 @@ static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real e
 
 /* ---- Inside the last step ---- */
 
-/* Of the polynomial's value at t, projected where the method projects, the rest of the sample. */
+/* Completes a sample: projects the interpolated state if the method projects, then evaluates accelerations and
+ * multipliers. */
 static int multistep_complete (multistep_data *d, double t) {
   pw_run *r = d->sun.run;
   int status = PW_OK;
@@ -100,7 +102,7 @@ static int multistep_complete (multistep_data *d, double t) {
   return status;
 }
 
-/* The polynomial's value at t, into the sample arrays.  CV_SUCCESS or CV_BAD_T. */
+/* Interpolates the state at t into the sample arrays.  CV_SUCCESS or CV_BAD_T. */
 static int multistep_interpolate (multistep_data *d, double t) {
   pw_run *r = d->sun.run;
   int flag = t < r->t ? CVodeGetDky (d->cvode, t, 0, d->sun.y) : CV_BAD_T;
@@ -209,8 +211,8 @@ static int multistep_fail (multistep_data *d, int flag, pw_error *error) {
                       error);
 }
 
-/* Accelerations and multipliers of the state reached, where kinematics and J are up to date; no part of the run's cost.  In a
- * singular configuration multipliers stay those of the last iterate. */
+/* Accelerations and multipliers of the current state, whose kinematics and J are up to date; not counted in the
+ * statistics.  In a singular configuration the multipliers of the last iterate remain. */
 static void multistep_evaluate (multistep_data *d) {
   pw_run *r = d->sun.run;
   pw_statistics keep = r->statistics;
@@ -222,8 +224,8 @@ static void multistep_evaluate (multistep_data *d) {
   r->statistics = keep;
 }
 
-/* Work and losses up to the state reached.  Multipliers of Newton's last iterate, which may be the first, are not good enough
- * for them. */
+/* Work and losses up to the current state.  The multipliers of Newton's last iterate, which may be the first, are not
+ * accurate enough. */
 static int multistep_work (multistep_data *d) {
   pw_run *r = d->sun.run;
   int order = 1;
@@ -236,8 +238,8 @@ static int multistep_work (multistep_data *d) {
   return status;
 }
 
-/* The state reached, out of y, and the ledger.  Its accelerations are those of the last iterate until they are asked for
- * (multistep_at): one evaluation in three. */
+/* Reads the current state from y and updates the ledger.  Its accelerations are those of the last iterate until
+ * multistep_at needs them, which saves one evaluation in three. */
 static int multistep_reach (multistep_data *d, double t, pw_error *error) {
   pw_run *r = d->sun.run;
   const double *y = N_VGetArrayPointer (d->sun.y);
@@ -269,7 +271,7 @@ static int multistep_advance (pw_run *r, double t_end, pw_error *error) {
   return multistep_reach (d, flag == CV_TSTOP_RETURN ? stop : t, error);
 }
 
-/* Accelerations of the state reached, if it has not got them: no part of the run's cost. */
+/* Evaluates the accelerations of the current state unless that is done already; not counted in the statistics. */
 static int multistep_complete_reached (multistep_data *d) {
   pw_run *r = d->sun.run;
   pw_statistics keep = r->statistics;
@@ -330,8 +332,8 @@ static const pw_stabilisation bdf_stabilisations[] = {
 
 static const pw_stabilisation adams_stabilisations[] = { PW_ACCELERATION_STABILISATIONS, { .name = NULL } };
 
-/* Measured on the EzyRoller at rtol 1e-6: with a restart after each projected step 100 times the steps.  Projecting in
- * each evaluation alone lets y drift all the same, and on a pendulum made errors 7 times larger. */
+/* Measured on the EzyRoller at rtol 1e-6: restarting after each projection takes 100 times the steps.  Projecting only
+ * within evaluations does not stop the drift of y, and made errors 7 times larger on a pendulum. */
 static const pw_stabilisation adams_refused[] = {
   { .name = "projection",
     .about = "CVODES projects with bdf only, and restarts behind each projection would leave order 1; "

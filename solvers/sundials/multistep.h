@@ -1,4 +1,4 @@
-/* What the driver of CVODES (multistep.c) and its Newton matrix (bdf_newton.c) share.  For these files only. */
+/* Private to the driver of CVODES (multistep.c) and its Newton matrix (bdf_newton.c). */
 #ifndef PW_MULTISTEP_H
 #define PW_MULTISTEP_H
 
@@ -10,9 +10,9 @@ typedef struct {
   pw_tangent tangent;  /* its matrix is T */
   double *value;       /* of T */
   double gamma;        /* of the matrix last set up */
-  pw_scatter_map tape; /* from the entries of T, in their order, into the matrix */
+  pw_scatter_map tape; /* from the entries of T, in order, to the matrix */
   int64_t *colptr, *rowind;
-  N_Vector right, change; /* coords and rows in use */
+  N_Vector right, change; /* coords and independent equations */
 } pw_bdf_newton;
 
 struct pw_method_data {
@@ -24,13 +24,14 @@ struct pw_method_data {
   pw_bdf_newton newton;       /* BDF */
   double *q, *v, *a, *lambda; /* scratch: coords + 3 each, rows */
   double *error;              /* scratch: 2 coords */
-  int evaluated;              /* 1: the accelerations of the state reached are its own */
+  int evaluated;              /* 1: the accelerations of the current state have been evaluated */
   char *memory;
 };
 
 typedef struct pw_method_data multistep_data;
 
-/* Accelerations of an unknown y, into d->a and d->lambda: 0; above: a smaller step may do; below: a signal failed. */
+/* Accelerations and multipliers at y, into d->a and d->lambda.  0; > 0: a smaller step may succeed; < 0: a signal
+ * failed. */
 int pw_multistep_accelerate (multistep_data *d, double t, const double *y);
 
 /* Opens the Newton matrix and hands it to CVODES.  PW_OK or PW_RESOURCE. */

@@ -1,4 +1,4 @@
-/* What the integrators of SUNDIALS share; see sundials.h. */
+/* Common parts of the SUNDIALS integrators; see sundials.h. */
 #include <assert.h>
 #include <cvodes/cvodes.h>
 #include <idas/idas.h>
@@ -14,9 +14,9 @@ static_assert (CV_ERR_FAILURE == IDA_ERR_FAIL && CV_CONV_FAILURE == IDA_CONV_FAI
                    CV_LSETUP_FAIL == IDA_LSETUP_FAIL && CV_TOO_MUCH_ACC == IDA_TOO_MUCH_ACC,
                "CVODES and IDAS have the same flags");
 
-/* SUNDIALS 6.4 writes to vectors and loggers that it had no memory for, so there has to be enough while an integrator is
- * opened: for its vectors, at most 60 of them (13 of a Nordsieck array of order 12, a dozen more, as many for quadratures,
- * and what a restart adds), each with a table of its operations, and for all else. */
+/* SUNDIALS 6.4 dereferences vectors and loggers whose allocation failed, so enough memory is reserved first: for at
+ * most 60 vectors (13 of a Nordsieck array of order 12, a dozen more, as many for quadratures, and those of a restart),
+ * each with a table of operations, and for the rest. */
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns) {
   enum { VECTORS = 60, TABLE = 1024, REST = 1 << 17 };
   x->run = r;
@@ -92,7 +92,7 @@ int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *
 
 /* ---- Newton's iteration, error weights ---- */
 
-/* The correction, or what is left after it if the iteration goes on converging as it does. */
+/* Tests the size of the correction, or of the error that remains after it at the current rate of convergence. */
 static int sun_converged (SUNNonlinearSolver newton, N_Vector y, N_Vector change, pw_real enough, N_Vector weights,
                           void *data) {
   double *before = data, size = N_VWrmsNorm (change, weights), rate = size / *before;

@@ -1,5 +1,5 @@
-/* What the integrators of SUNDIALS share, and the one place that knows its version.  Built and tested with 6.4; what 7.x
- * renames is written below and marked unverified. */
+/* Common parts of the SUNDIALS integrators; the only file that depends on its version.  Tested with 6.4; the names of
+ * 7.x are unverified. */
 #ifndef PW_SUNDIALS_H
 #define PW_SUNDIALS_H
 
@@ -21,47 +21,48 @@ typedef sunrealtype pw_real;
 typedef realtype pw_real;
 #endif
 
-/* How often a step is retaken, at about a quarter of its size, because Newton's iteration does not converge or the error is too
- * large: from 1 s down to the round-off of time.  SUNDIALS' own 10 times, a millionth, do not resolve where friction brings a body to rest. */
+/* Attempts at a step, each about a quarter of the previous one, if the Newton iteration does not converge or the error
+ * is too large: from 1 s down to the round-off of time.  SUNDIALS' default of 10, a millionth of the step, does not
+ * resolve the moment at which friction stops a body. */
 enum { PW_SUN_ATTEMPTS = 27 };
 
 typedef struct {
   pw_run *run;
   SUNContext context;
-  N_Vector y;                   /* unknowns: q, v, what else there is */
+  N_Vector y;                   /* unknowns: q, v, then those of the method */
   SUNMatrix matrix;             /* of Newton's iteration */
-  SUNLinearSolver klu, solver;  /* KLU on the matrix; what the integrator sees */
-  SUNNonlinearSolver iteration; /* NULL: the integrator's own */
-  double correction;            /* of a Newton iteration: the last one */
+  SUNLinearSolver klu, solver;  /* KLU; the wrapper that the integrator calls */
+  SUNNonlinearSolver iteration; /* NULL: the default of the integrator */
+  double correction;            /* size of the last Newton correction */
   pw_quadrature quadrature;     /* of work and losses */
-  double stop;                  /* the stop time the integrator knows */
+  double stop;                  /* the stop time set in the integrator */
   double t0;                    /* of the initial conditions or the last restart */
-  pw_statistics before;         /* what was counted until then: the integrator counts from there */
-  char message[256];            /* its last one, instead of its printing */
+  pw_statistics before;         /* counts at t0, where those of the integrator begin */
+  char message[256];            /* the last message of the integrator */
 } pw_sun;
 
-/* Context and unknowns, filled with the state reached.  PW_OK or PW_RESOURCE, as all that open something. */
+/* Opens context and unknowns, filled with the current state.  PW_OK or PW_RESOURCE, as all functions that open. */
 int pw_sun_open (pw_sun *x, pw_run *r, int unknowns);
 void pw_sun_close (pw_sun *x);
 
-/* Begins at the state reached. */
+/* Restarts at the current state. */
 void pw_sun_restart (pw_sun *x);
 
-/* A vector whose operations, and those of its clones, are ours (vectors.c); NULL: out of memory. */
+/* A vector with the operations of vectors.c, as have its clones; NULL: out of memory. */
 N_Vector pw_sun_vector (sunindextype length, SUNContext context);
 
-/* The matrix of this pattern, in compressed columns, and a linear solver that refuses to use an outdated matrix, so that the
- * integrator asks for a new one; `solve` (NULL: KLU's) is what it does otherwise, with `content`. */
+/* A matrix of this pattern, in compressed columns, and a linear solver that refuses an outdated matrix, so that the
+ * integrator requests a new one; otherwise it calls `solve` (NULL: that of KLU) with `content`. */
 typedef int pw_sun_solve (SUNLinearSolver solver, SUNMatrix matrix, N_Vector x, N_Vector b, pw_real tolerance);
 int pw_sun_open_matrix (pw_sun *x, int size, const int64_t *colptr, const int64_t *rowind);
 int pw_sun_open_solver (pw_sun *x, N_Vector right, void *content, pw_sun_solve *solve);
 
-/* All values 0, and the pattern anew: SUNDIALS clears it together with the values. */
+/* Sets all values to 0 and restores the pattern, which SUNDIALS clears together with the values. */
 void pw_sun_clear (SUNMatrix matrix, const int64_t *colptr, const int64_t *rowind);
 
-/* Makes the corrections of a Newton iteration count as they are: SUNDIALS' own test multiplies the first one by the rate at
- * which steps before have converged, which says nothing where a force saturates in between.  To be called when the integrator
- * has the solver; `size` is scratch that lives as long.  Returns as SUNDIALS. */
+/* Replaces SUNDIALS' convergence test, which multiplies the first correction by the convergence rate of previous steps;
+ * that is meaningless if a force saturates in between.  Call it after the solver is attached to the integrator; `size`
+ * is scratch with the lifetime of the solver.  Returns as SUNDIALS. */
 int pw_sun_test_newton (SUNNonlinearSolver newton, double *size);
 
 /* Error weights of q and v, from their tolerances. */
@@ -70,8 +71,8 @@ void pw_sun_weigh (const pw_sun *x, const double *y, double *w);
 /* Collects the messages of an integrator: `x` is a pw_sun. */
 void pw_sun_message (int code, const char *module, const char *function, char *text, void *x);
 
-/* Errors: why the integrator fails with this flag, and why it cannot begin anew.  singular: the configuration is the reason;
- * why: what flags of its own mean, or NULL. */
+/* Report why the integrator failed with this flag, or cannot restart.  singular: 1 if the configuration is singular;
+ * why: the meaning of a flag specific to the integrator, or NULL. */
 int pw_sun_fail (pw_sun *x, int flag, int singular, const char *why, pw_error *error);
 int pw_sun_fail_restart (pw_sun *x, int flag, pw_error *error);
 int pw_sun_no_memory (const pw_run *r, pw_error *error);

@@ -1,13 +1,13 @@
-/* Vectors for SUNDIALS: its serial ones, with the operations that its integrators spend their time in written anew.  A
- * step of high order adds dozens of vectors of a dozen entries, through calls that a distribution may have built for
- * debugging; here they are straight loops, and several sums go in one call where the integrators ask for that.
+/* Serial vectors for SUNDIALS with faster operations.  A step of high order adds dozens of vectors of a dozen entries,
+ * by library functions that a distribution may have built without optimisation; here these are plain loops, and the
+ * fused operations for several vectors are provided as well.
  *
- * Sums of two are the same numbers, to the bit, whatever the factors; norms are summed by twos. */
+ * Linear sums are identical to those of SUNDIALS to the bit; norms add even and odd entries separately. */
 #include <math.h>
 #include "sundials.h"
 #include "unroll.h"
 
-/* z = a x + b y; all four are read before one is written, so z may be x or y. */
+/* z = a x + b y; four entries are read before they are written, so z may be x or y. */
 PW_INLINE void vectors_sum (sunindextype n, double a, const double *x, double b, const double *y, double *z) {
   sunindextype i = 0;
   for (; i + 3 < n; i += 4) {
@@ -18,7 +18,7 @@ PW_INLINE void vectors_sum (sunindextype n, double a, const double *x, double b,
   for (; i < n; i++) z[i] = a * x[i] + b * y[i];
 }
 
-/* A constant factor of 1 vanishes where the sum is inlined. */
+/* A factor of 1 is eliminated by inlining. */
 static void vectors_sum_by (sunindextype n, double a, const double *x, double b, const double *y, double *z) {
   if (a == 1 && b == 1)
     vectors_sum (n, 1, x, 1, y, z);
@@ -73,7 +73,7 @@ static int vectors_scale_each (int count, pw_real *c, N_Vector *x, N_Vector *z) 
 
 /* ---- Norms ---- */
 
-/* The sum of (x_i w_i)^2, of those with id_i > 0 if there is an id. */
+/* The sum of (x_i w_i)^2; with an id, only over id_i > 0. */
 PW_INLINE double vectors_squares (N_Vector vx, N_Vector vw, const double *id) {
   sunindextype i = 0, n = NV_LENGTH_S (vx);
   const double *x = NV_DATA_S (vx), *w = NV_DATA_S (vw);
