@@ -1,8 +1,8 @@
-/* Andrews' squeezer: seven bodies, three loops, a spring, and a motor of constant torque that whirls the small crank.
+/* Andrews' squeezer: seven bodies, three loops, a spring, and a motor of constant torque on the small crank.
  *
- * Bodies K1 .. K7 and their angles as in the test set: K1 the crank (beta), K2 the rod from F on the crank to E, where three
- * loops meet; K3 the triangle on B with the spring; K4, K5 from E to the ground at A; K6, K7 likewise.  The run is short
- * and fast: the crank makes 2.5 turns in 0.03 s.
+ * Bodies K1 .. K7 and their angles as in the test set: K1 the crank (beta), K2 the rod from F on the crank to E, where
+ * three loops meet; K3 the triangle on B with the spring; K4, K5 from E to the ground at A; K6, K7 likewise.  The crank
+ * makes 2.5 turns in 0.03 s.
  * (Lioen & de Swart; Mazzia & Magherini: Test Set for Initial Value Problem Solvers, Andrews' squeezing mechanism.) */
 #include <math.h>
 #include "pinwheel.h"
@@ -24,9 +24,9 @@ static const double d = .028, da = .0115, e = .02, ea = .01421, rr = .007, ra = 
                     sb = .01043, sc = .018, sd = .02, ta = .02308, tb = .00916, u = .04, ua = .01228, ub = .00449,
                     zf = .02, zt = .04, fa = .01421;
 
-/* A body whose frame is turned by phi and whose point `at` of that frame is at (x, y). */
-static void part (pw_model *m, const char *name, double mass, double inertia, double x, double y, double phi,
-                  const double at[2]) {
+/* A body at the angle phi whose point `at`, in its frame, is at (x, y). */
+static void add_part (pw_model *m, const char *name, double mass, double inertia, double x, double y, double phi,
+                      const double at[2]) {
   double c = cos (phi), s = sin (phi);
   pw_add_body (m, &(pw_body){ .name = name,
                               .mass = mass,
@@ -43,13 +43,13 @@ static void bodies (pw_model *m) {
   const double beta = -0.0617138900142764496, gamma = 0.455279819163070380, Ph = 0.222668390165885885,
                delta = 0.487364979543842550, epsilon = 1.23054744454982119;
   double xf = rr * cos (beta), yf = rr * sin (beta), xe = xf - d * cos (beta), ye = yf - d * sin (beta);
-  part (m, "K1", .04325, 2.194e-6, 0, 0, beta, (double[]){ -ra, 0 });
-  part (m, "K2", .00365, 4.410e-7, xf, yf, beta, (double[]){ da, 0 });
-  part (m, "K3", .02373, 5.255e-6, xb, yb, gamma, (double[]){ -sb, sa });
-  part (m, "K4", .00706, 5.667e-7, xe, ye, Ph + delta, (double[]){ 0, -ea });
-  part (m, "K5", .07050, 1.169e-5, xa, ya, delta, (double[]){ -ta, -tb });
-  part (m, "K6", .00706, 5.667e-7, xe, ye, epsilon - Ph, (double[]){ fa, 0 });
-  part (m, "K7", .05498, 1.912e-5, xa, ya, epsilon, (double[]){ ub, ua });
+  add_part (m, "K1", .04325, 2.194e-6, 0, 0, beta, (double[]){ -ra, 0 });
+  add_part (m, "K2", .00365, 4.410e-7, xf, yf, beta, (double[]){ da, 0 });
+  add_part (m, "K3", .02373, 5.255e-6, xb, yb, gamma, (double[]){ -sb, sa });
+  add_part (m, "K4", .00706, 5.667e-7, xe, ye, Ph + delta, (double[]){ 0, -ea });
+  add_part (m, "K5", .07050, 1.169e-5, xa, ya, delta, (double[]){ -ta, -tb });
+  add_part (m, "K6", .00706, 5.667e-7, xe, ye, epsilon - Ph, (double[]){ fa, 0 });
+  add_part (m, "K7", .05498, 1.912e-5, xa, ya, epsilon, (double[]){ ub, ua });
 }
 
 static void build (pw_model *m, const void *parameter) {

@@ -1,6 +1,6 @@
 /* Chain: n uniform rods pinned end to end, the first one to the ground, released from a straight line.
  *
- * From two links on the motion is chaotic; its energy is kept. */
+ * With two or more links the motion is chaotic; energy is conserved. */
 #include <math.h>
 #include <stdio.h>
 #include "pinwheel.h"

@@ -1,16 +1,16 @@
-/* Bead on an elliptic wire, attracted by one of its foci: a model with two kinds of element of its own, a force and a
+/* Bead on an elliptic wire, attracted by one of its foci: a model that defines two element types, a force and a
  * constraint.
  *
- * At the speed of Kepler's motion (factor = 1) the bead goes round as a planet does and the wire carries nothing.  At any
- * other speed v^2 differs from Kepler's v_K^2 by the same amount everywhere, and the wire carries m (v^2 - v_K^2) / rho,
- * rho the radius of curvature: m (factor^2 - 1) v_K(0)^2 / rho.
+ * At the speed of Kepler's motion (factor = 1) the bead moves like a planet and the reaction of the wire is zero.
+ * At any other speed v^2 - v_K^2 is constant and the reaction is m (v^2 - v_K^2) / rho = m (factor^2 - 1) v_K(0)^2 /
+ * rho, where rho is the radius of curvature.
  * (Bonnet's theorem, 1844; Whittaker 1937, Analytical Dynamics, section 51.) */
 #include <math.h>
 #include "pinwheel.h"
 
-/* ---- attraction: body 1 and body 2 attract each other as masses do ----
+/* ---- attraction: gravitation between body 1 and body 2 ----
  *
- * With d from body 2 to body 1 and r = |d|: force -k d / r^3 on body 1, its opposite on body 2; energy -k / r. */
+ * With d from body 2 to body 1 and r = |d|: force -k d / r^3 on body 1, k d / r^3 on body 2; energy -k / r. */
 
 typedef struct {
   const char *name;
@@ -32,7 +32,7 @@ static int attraction_prepare (const void *definition, const pw_body *const *bod
   return PW_OK;
 }
 
-static double attraction_between (const pw_batch *b, int e, double d[2]) {
+static double attraction_distance (const pw_batch *b, int e, double d[2]) {
   const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
   d[0] = A->x - B->x, d[1] = A->y - B->y;
   return hypot (d[0], d[1]);
@@ -40,7 +40,7 @@ static double attraction_between (const pw_batch *b, int e, double d[2]) {
 
 static void attraction_force (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
-    double d[2], r = attraction_between (b, e, d), pull = -((const double *)b->element)[e] / (r * r * r);
+    double d[2], r = attraction_distance (b, e, d), pull = -((const double *)b->element)[e] / (r * r * r);
     out[0] = pull * d[0], out[1] = pull * d[1], out[2] = 0;
     out[3] = -out[0], out[4] = -out[1], out[5] = 0;
   }
@@ -48,7 +48,7 @@ static void attraction_force (const pw_batch *b, double *out) {
 
 static void attraction_energy (const pw_batch *b, double *out) {
   double d[2];
-  for (int e = 0; e < b->count; e++) out[e] = -((const double *)b->element)[e] / attraction_between (b, e, d);
+  for (int e = 0; e < b->count; e++) out[e] = -((const double *)b->element)[e] / attraction_distance (b, e, d);
 }
 
 static const pw_kind attraction_kind = {
@@ -68,7 +68,7 @@ static const pw_kind attraction_kind = {
 /* ---- wire: a body's centre of mass stays on an ellipse of the ground ----
  *
  * With (X, Y) from the ellipse's centre: g = ((X/a)^2 + (Y/b)^2 - 1) a/2 = 0,  G = (X/a, Y a/b^2, 0),
- * gamma = -(vx^2/a + vy^2 a/b^2).  -lambda times (X/a, Y a/b^2) is the force on the body. */
+ * gamma = -(vx^2/a + vy^2 a/b^2).  The force on the body is -lambda (X/a, Y a/b^2). */
 
 typedef struct {
   const char *name;
@@ -88,7 +88,7 @@ static const pw_field wire_fields[] = {
 static const pw_quantity wire_reaction[] = { { "N", "N", NULL,
                                                "times (X/a, Y a/b^2): the force on the body, outwards" } };
 
-/* A prepared wire: its centre, a, and the factors 1/a and a/b^2 of G. */
+/* Parameters of a wire: centre, a, and the factors 1/a and a/b^2 of G. */
 typedef struct {
   double x, y, a, p, r;
 } wire_element;
@@ -102,7 +102,7 @@ static int wire_prepare (const void *definition, const pw_body *const *bodies, v
   return PW_OK;
 }
 
-/* Element e: the wire, and where the body is on it. */
+/* Element e: position relative to the centre, velocity, parameters. */
 typedef struct {
   double X, Y, vx, vy, a, p, r;
 } wire_state;
@@ -189,7 +189,7 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* Starts where the wire is nearest to the focus, which is the ground's origin. */
+/* The bead starts at the point nearest to the focus, which is the origin of the ground. */
 static void build (pw_model *m, const void *parameter) {
   const model *p = parameter;
   if (p->e >= 1) {

@@ -1,7 +1,7 @@
 /* N four-bar linkages in a row: N + 1 vertical cranks of 1 m at x = 0 .. N, joined at their tops by N couplers of 1 m.
  *
- * All cranks stay parallel.  Whenever they are horizontal the linkage is in a singular configuration: N constraint rows become
- * dependent and the cranks could go separate ways; the physical motion passes straight through:
+ * All cranks stay parallel.  When they are horizontal the linkage is in a singular configuration: N constraint
+ * equations become dependent and the motion could branch; the cranks of the reference solution stay parallel:
  * theta'' = -(g / l) ((N + 1) / 2 + N) / ((N + 1) / 3 + N) cos theta.
  * (Gonzalez, Dopico, Pastorino & Cuadrado 2006, Multibody System Dynamics 16; IFToMM benchmark A02.) */
 #include <math.h>
@@ -49,7 +49,7 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-/* A pendulum that goes over the top: with psi = theta + pi / 2 from the lowest point and W its rate there,
+/* A rotating pendulum: with psi = theta + pi / 2 from the lowest point and W the angular velocity there,
  * psi = 2 am (K + W t / 2 | m), m = 4 kappa / W^2. */
 static void reference (const void *parameter, double t, double *q, double *v) {
   const four_bar *p = parameter;

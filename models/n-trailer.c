@@ -1,8 +1,8 @@
-/* n-trailer: a tractor on one axle pulls n trailers, each hitched on the axle before it, in a steady turn.
+/* n-trailer: a tractor on one axle pulls n trailers, each hitched to the axle ahead of it, in a steady turn.
  *
- * With every centre of mass on its axle the radii follow R_i^2 = R_(i-1)^2 - L_i^2, all bodies turn at the same rate w, the
- * hinges carry nothing and wheel i carries m_i w^2 R_i.
- * (Laumond 1993, Controllability of a multibody mobile robot, for the vehicle.) */
+ * With every centre of mass on its axle the radii follow R_i^2 = R_(i-1)^2 - L_i^2, all bodies have the angular
+ * velocity w, the reactions are zero in the hinges and m_i w^2 R_i in wheel i.
+ * (Laumond 1993, Controllability of a multibody mobile robot: the vehicle.) */
 #include <math.h>
 #include <stdio.h>
 #include "pinwheel.h"
@@ -25,9 +25,10 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* A body on its axle, on the circle of radius R about (0, R0), `angle` from the centre; it heads along the circle. */
-static void vehicle (pw_model *m, const trailers *p, const char *name, const char *axle, double R, double angle,
-                     double mass, double inertia) {
+/* A vehicle whose centre of mass is on its axle, at `angle` on the circle of radius R about (0, p->R), heading along
+ * it. */
+static void add_vehicle (pw_model *m, const trailers *p, const char *name, const char *axle, double R, double angle,
+                         double mass, double inertia) {
   double c = cos (angle), s = sin (angle);
   pw_add_body (m, &(pw_body){ .name = name,
                               .mass = mass,
@@ -41,7 +42,7 @@ static void build (pw_model *m, const void *parameter) {
   const trailers *p = parameter;
   double R = p->R, angle = -PW_PI / 2, L = p->L, mass = p->m;
   char name[24], axle[24], hitch[24], before[24] = "tractor";
-  vehicle (m, p, "tractor", "A0", R, angle, p->m0, p->I0);
+  add_vehicle (m, p, "tractor", "A0", R, angle, p->m0, p->I0);
   for (int i = 1; i <= (int)p->n; i++, L += p->longer, mass *= p->ratio) {
     if (L >= R) {
       pw_model_refuse (m, "R = %g: trailer %d is too long to turn on this radius", p->R, i);
@@ -52,13 +53,13 @@ static void build (pw_model *m, const void *parameter) {
     snprintf (name, sizeof name, "trailer%d", i);
     snprintf (axle, sizeof axle, "A%d", i);
     snprintf (hitch, sizeof hitch, "H%d", i);
-    vehicle (m, p, name, axle, R, angle, mass, mass * p->rho * p->rho);
+    add_vehicle (m, p, name, axle, R, angle, mass, mass * p->rho * p->rho);
     pw_add_pin (m, &(pw_pin){ .name = hitch, .body = { name, before }, .at = { { L, 0 } } });
     snprintf (before, sizeof before, "trailer%d", i);
   }
 }
 
-/* All go round the centre, (0, R). */
+/* Circular motion about (0, R). */
 static void reference (const void *parameter, double t, double *q, double *v) {
   const trailers *p = parameter;
   double R = p->R, angle = -PW_PI / 2, L = p->L;

@@ -1,7 +1,7 @@
 /* Peaucellier's inversor: eight bars, the ground one of them, that draw an exactly straight line.
  *
- * Two arms of length L from O and a rhombus of side s keep OB OP = L^2 - s^2; the crank from A = (a, 0) keeps B on a circle
- * through O, and so P on the line x = (L^2 - s^2) / (2 a).  The crank is driven to and fro.
+ * Two arms of length L from O and a rhombus of side s keep OB OP = L^2 - s^2; the crank from A = (a, 0) keeps B on a
+ * circle through O and thus P on the line x = (L^2 - s^2) / (2 a).  The crank angle is prescribed.
  * (Peaucellier 1864; Lipkin 1871.) */
 #include <math.h>
 #include "pinwheel.h"
@@ -21,7 +21,7 @@ static const pw_parameter parameters[] = {
 };
 
 /* A uniform bar from one point to another. */
-static void bar (pw_model *m, const inversor *p, const char *name, const double from[2], const double to[2]) {
+static void add_bar (pw_model *m, const inversor *p, const char *name, const double from[2], const double to[2]) {
   double x = to[0] - from[0], y = to[1] - from[1], l = hypot (x, y), mass = p->density * l;
   pw_add_body (m, &(pw_body){ .name = name,
                               .mass = mass,
@@ -29,18 +29,18 @@ static void bar (pw_model *m, const inversor *p, const char *name, const double 
                               .start = { (from[0] + to[0]) / 2, (from[1] + to[1]) / 2, atan2 (y, x) } });
 }
 
-static void pin (pw_model *m, const char *name, const char *one, double x1, const char *two, double x2) {
+static void add_pin (pw_model *m, const char *name, const char *one, double x1, const char *two, double x2) {
   pw_add_pin (m, &(pw_pin){ .name = name, .body = { one, two }, .at = { { x1, 0 }, { x2, 0 } } });
 }
 
-/* The joints with the crank at an angle: A, O on the ground, B on the crank, C and D on the arms, P draws the line. */
+/* The joints at a crank angle: A, O on the ground, B on the crank, C and D on the arms, P on the line. */
 typedef struct {
   double A[2], O[2], B[2], C[2], D[2], P[2];
 } joints;
 
-static joints place (const inversor *p, double angle) {
+static joints joints_at (const inversor *p, double angle) {
   double half = angle / 2, c = cos (half), s = sin (half);
-  /* Along OB from O: to the middle of the rhombus, and from there to C, D. */
+  /* mid: from O to the middle of the rhombus along OB; aside: from there to C and D. */
   double OB = 2 * p->a * c, OP = (p->L * p->L - p->s * p->s) / OB, mid = (OB + OP) / 2,
          aside = sqrt (p->L * p->L - mid * mid);
   return (joints){ .A = { p->a, 0 },
@@ -57,24 +57,24 @@ static void build (pw_model *m, const void *parameter) {
     pw_model_refuse (m, "swing = %g: arms and rhombus do not reach the crank there", p->swing);
     return;
   }
-  joints j = place (p, p->swing);
-  bar (m, p, "crank", j.A, j.B);
-  bar (m, p, "OC", j.O, j.C);
-  bar (m, p, "OD", j.O, j.D);
-  bar (m, p, "BC", j.B, j.C);
-  bar (m, p, "BD", j.B, j.D);
-  bar (m, p, "PC", j.P, j.C);
-  bar (m, p, "PD", j.P, j.D);
-  pin (m, "A", "crank", -p->a / 2, "ground", p->a);
-  pin (m, "O1", "OC", -L, "ground", 0);
-  pin (m, "O2", "OD", -L, "ground", 0);
-  pin (m, "B1", "crank", p->a / 2, "BC", -r);
-  pin (m, "B2", "crank", p->a / 2, "BD", -r);
-  pin (m, "C1", "OC", L, "BC", r);
-  pin (m, "C2", "OC", L, "PC", r);
-  pin (m, "D1", "OD", L, "BD", r);
-  pin (m, "D2", "OD", L, "PD", r);
-  pin (m, "P", "PC", -r, "PD", -r);
+  joints j = joints_at (p, p->swing);
+  add_bar (m, p, "crank", j.A, j.B);
+  add_bar (m, p, "OC", j.O, j.C);
+  add_bar (m, p, "OD", j.O, j.D);
+  add_bar (m, p, "BC", j.B, j.C);
+  add_bar (m, p, "BD", j.B, j.D);
+  add_bar (m, p, "PC", j.P, j.C);
+  add_bar (m, p, "PD", j.P, j.D);
+  add_pin (m, "A", "crank", -p->a / 2, "ground", p->a);
+  add_pin (m, "O1", "OC", -L, "ground", 0);
+  add_pin (m, "O2", "OD", -L, "ground", 0);
+  add_pin (m, "B1", "crank", p->a / 2, "BC", -r);
+  add_pin (m, "B2", "crank", p->a / 2, "BD", -r);
+  add_pin (m, "C1", "OC", L, "BC", r);
+  add_pin (m, "C2", "OC", L, "PC", r);
+  add_pin (m, "D1", "OD", L, "BD", r);
+  add_pin (m, "D2", "OD", L, "PD", r);
+  add_pin (m, "P", "PC", -r, "PD", -r);
   pw_add_marker (m, &(pw_marker){ .name = "pencil", .body = "PC", .at = { -r, 0 } });
   pw_add_drive (m, &(pw_drive){ .name = "swing",
                                 .body = { "crank", "ground" },
@@ -82,23 +82,24 @@ static void build (pw_model *m, const void *parameter) {
                                 .value = { PW_HARMONIC, .harmonic = { .amplitude = p->swing, .omega = p->omega } } });
 }
 
-/* Where a bar is; its angle is the one near that of its start. */
-static void known (const double from[2], const double to[2], const double from0[2], const double to0[2], double *q) {
+/* The configuration of a bar; its angle is within pi of the initial one. */
+static void bar_configuration (const double from[2], const double to[2], const double from0[2], const double to0[2],
+                               double *q) {
   double start = atan2 (to0[1] - from0[1], to0[0] - from0[0]), now = atan2 (to[1] - from[1], to[0] - from[0]);
   q[0] = (from[0] + to[0]) / 2, q[1] = (from[1] + to[1]) / 2, q[2] = start + remainder (now - start, 2 * PW_PI);
 }
 
 static void reference (const void *parameter, double t, double *q, double *v) {
   const inversor *p = parameter;
-  joints j = place (p, p->swing * cos (p->omega * t)), j0 = place (p, p->swing);
+  joints j = joints_at (p, p->swing * cos (p->omega * t)), j0 = joints_at (p, p->swing);
   (void)v;
-  known (j.A, j.B, j0.A, j0.B, q);
-  known (j.O, j.C, j0.O, j0.C, q + 3);
-  known (j.O, j.D, j0.O, j0.D, q + 6);
-  known (j.B, j.C, j0.B, j0.C, q + 9);
-  known (j.B, j.D, j0.B, j0.D, q + 12);
-  known (j.P, j.C, j0.P, j0.C, q + 15);
-  known (j.P, j.D, j0.P, j0.D, q + 18);
+  bar_configuration (j.A, j.B, j0.A, j0.B, q);
+  bar_configuration (j.O, j.C, j0.O, j0.C, q + 3);
+  bar_configuration (j.O, j.D, j0.O, j0.D, q + 6);
+  bar_configuration (j.B, j.C, j0.B, j0.C, q + 9);
+  bar_configuration (j.B, j.D, j0.B, j0.D, q + 12);
+  bar_configuration (j.P, j.C, j0.P, j0.C, q + 15);
+  bar_configuration (j.P, j.D, j0.P, j0.D, q + 18);
 }
 
 PW_MODEL (.about = "Peaucellier's inversor, which draws an exactly straight line", .parameters = parameters,

@@ -1,7 +1,7 @@
-/* Redundant parallelogram: three equal cranks carry one rigid coupler; two would do.
+/* Redundant parallelogram: three equal cranks carry one rigid coupler; two suffice.
  *
- * Of the 12 constraint rows 11 are independent: which crank carries how much of the coupler along its length is not
- * determined by rigid-body mechanics.  The motion is that of one angle theta of the cranks against the horizontal,
+ * Of the 12 constraint equations, 11 are independent: the distribution of the cranks' reactions along the coupler is
+ * not determined by rigid-body mechanics.  The angle theta of the cranks against the horizontal obeys
  * theta'' = -(g / l) (3/2 + mc/m) / (1 + mc/m) cos theta.
  * (After the IFToMM library of computational benchmark problems; Gonzalez et al. 2006.) */
 #include <math.h>
@@ -44,14 +44,15 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-/* A pendulum let go at psi = theta + pi / 2 from the lowest point: sin (psi / 2) = k sn (K - w t), k = sin (psi0 / 2). */
+/* A pendulum released at psi = theta + pi / 2 from the lowest point: sin (psi / 2) = k sn (K - w t),
+ * k = sin (psi0 / 2). */
 static void reference (const void *parameter, double t, double *q, double *v) {
   const parallelogram *p = parameter;
   double k = sin (p->theta / 2 + PW_PI / 4), w = sqrt (p->g * (1.5 * p->m + p->mc) / (p->l * (p->m + p->mc)));
   double am = pw_jacobi_am (pw_elliptic_K (k * k) - w * t, k * k);
   double theta = 2 * asin (k * sin (am)) - PW_PI / 2, rate = -2 * k * w * cos (am);
   double x = p->l * cos (theta), y = p->l * sin (theta);
-  if (fabs (p->theta + PW_PI / 2) >= PW_PI) return; /* another turn of the cranks */
+  if (fabs (p->theta + PW_PI / 2) >= PW_PI) return; /* not within one turn of the lowest point: no reference */
   for (int i = 0; i < 4; i++, q += 3, v += 3) {     /* the coupler, then the cranks */
     double part = i == 0 ? 1 : 0.5;
     q[0] = p->l * (i == 0 ? 1 : i - 1) + part * x, q[1] = part * y, q[2] = i == 0 ? 0 : theta;

@@ -1,7 +1,7 @@
-/* Theo Jansen's leg: a crank and seven links whose proportions make the foot walk.
+/* Theo Jansen's leg: a crank and seven links whose proportions give the foot a walking motion.
  *
- * The lengths are those of the strandbeests, in hundredths of a metre at size 0.01: two triangles, b d e on the ground's pivot
- * B and g h i with the foot, and the bars j, k, c and f.  The crank turns at constant speed about O.
+ * The lengths are those of the strandbeests, in hundredths of a metre at size 0.01: two triangles, b d e on the ground
+ * pivot B and g h i with the foot, and the bars j, k, c and f.  The crank turns at constant speed about O.
  * (Jansen 2007, The Great Pretender.) */
 #include <math.h>
 #include "pinwheel.h"
@@ -27,8 +27,8 @@ typedef struct {
   double x, y, vx, vy;
 } point;
 
-/* The point at distances r from P and s from Q, to the left on the way from P to Q; it moves so that it stays there. */
-static point meet (point P, double r, point Q, double s) {
+/* The point at distances r from P and s from Q, to the left of the line from P to Q, with its velocity. */
+static point intersection (point P, double r, point Q, double s) {
   double x = Q.x - P.x, y = Q.y - P.y, D = x * x + y * y, along = (D + r * r - s * s) / (2 * D);
   double aside = sqrt (r * r / D - along * along);
   point X = { P.x + along * x - aside * y, P.y + along * y + aside * x, 0, 0 };
@@ -39,8 +39,8 @@ static point meet (point P, double r, point Q, double s) {
   return X;
 }
 
-/* The rate at which the line from P to Q turns. */
-static double turn (point P, point Q) {
+/* The angular velocity of the line from P to Q. */
+static double angular_velocity (point P, point Q) {
   double x = Q.x - P.x, y = Q.y - P.y;
   return (x * (Q.vy - P.vy) - y * (Q.vx - P.vx)) / (x * x + y * y);
 }
@@ -49,21 +49,21 @@ static double distance (point P, point Q) {
   return hypot (Q.x - P.x, Q.y - P.y);
 }
 
-static void bar (pw_model *m, const leg *p, const char *name, point P, point Q) {
+static void add_bar (pw_model *m, const leg *p, const char *name, point P, point Q) {
   double length = distance (P, Q) * p->size, mass = p->density * length, half = p->size / 2;
   pw_add_body (m, &(pw_body){ .name = name,
                               .mass = mass,
                               .inertia = mass * length * length / 12,
                               .start = { (P.x + Q.x) * half, (P.y + Q.y) * half, atan2 (Q.y - P.y, Q.x - P.x) },
-                              .rate = { (P.vx + Q.vx) * half, (P.vy + Q.vy) * half, turn (P, Q) } });
+                              .rate = { (P.vx + Q.vx) * half, (P.vy + Q.vy) * half, angular_velocity (P, Q) } });
 }
 
 static point centre (point P, point Q, point R) {
   return (point){ (P.x + Q.x + R.x) / 3, (P.y + Q.y + R.y) / 3, (P.vx + Q.vx + R.vx) / 3, (P.vy + Q.vy + R.vy) / 3 };
 }
 
-/* A plate of the mass of its rim, not turned at the start: its points are as far from its centre as in the world. */
-static void plate (pw_model *m, const leg *p, const char *name, point P, point Q, point R) {
+/* A triangular plate with the mass of its sides.  Its initial angle is 0: body and world axes are parallel. */
+static void add_plate (pw_model *m, const leg *p, const char *name, point P, point Q, point R) {
   double q = distance (P, Q), r = distance (Q, R), s = distance (R, P), u = p->size;
   double mass = p->density * (q + r + s) * u;
   point C = centre (P, Q, R);
@@ -71,23 +71,23 @@ static void plate (pw_model *m, const leg *p, const char *name, point P, point Q
                               .mass = mass,
                               .inertia = mass * (q * q + r * r + s * s) * u * u / 36,
                               .start = { C.x * u, C.y * u, 0 },
-                              .rate = { C.vx * u, C.vy * u, turn (P, Q) } });
+                              .rate = { C.vx * u, C.vy * u, angular_velocity (P, Q) } });
 }
 
 static void build (pw_model *m, const void *parameter) {
   const leg *p = parameter;
   double u = p->size;
   point O = { 0, 0, 0, 0 }, A = { crank, 0, 0, crank * p->omega }, B = { -a, -l, 0, 0 };
-  point T = meet (B, b, A, j), K = meet (A, k, B, c), L = meet (B, d, T, e), M = meet (K, g, L, f),
-        F = meet (K, i, M, h);
+  point T = intersection (B, b, A, j), K = intersection (A, k, B, c), L = intersection (B, d, T, e),
+        M = intersection (K, g, L, f), F = intersection (K, i, M, h);
   point U = centre (B, T, L), V = centre (K, M, F);
-  bar (m, p, "crank", O, A);
-  bar (m, p, "j", A, T);
-  bar (m, p, "k", A, K);
-  bar (m, p, "c", B, K);
-  bar (m, p, "f", L, M);
-  plate (m, p, "shoulder", B, T, L);
-  plate (m, p, "shin", K, M, F);
+  add_bar (m, p, "crank", O, A);
+  add_bar (m, p, "j", A, T);
+  add_bar (m, p, "k", A, K);
+  add_bar (m, p, "c", B, K);
+  add_bar (m, p, "f", L, M);
+  add_plate (m, p, "shoulder", B, T, L);
+  add_plate (m, p, "shin", K, M, F);
 #define PIN(Name, one, X1, Y1, two, X2, Y2) \
   pw_add_pin (m, &(pw_pin){ .name = Name, .body = { one, two }, .at = { { (X1)*u, (Y1)*u }, { (X2)*u, (Y2)*u } } })
   PIN ("O", "crank", -crank / 2, 0, "ground", 0, 0);

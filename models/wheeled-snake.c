@@ -1,6 +1,7 @@
-/* Wheeled snake: n links with a wheel under the middle of each; motors bend the joints in a wave that runs backwards.
+/* Wheeled snake: n links with a wheel under the middle of each; motors bend the joints in a wave that travels
+ * backwards.
  *
- * The wheels do not slip sideways, so that the wave pushes the snake forwards.  The kinetic energy is the work of the
+ * The wheels do not slip sideways, so the wave drives the snake forwards.  The kinetic energy is the work of the
  * motors.
  * (Hirose 1993, Biologically Inspired Robots: Snake-like Locomotors and Manipulators.) */
 #include <math.h>
@@ -23,8 +24,8 @@ static const pw_parameter parameters[] = {
   { .name = NULL },
 };
 
-/* The angle of joint i between link i - 1 and link i: the link's against the one ahead. */
-static double joint (const snake *p, int i) {
+/* The angle of joint i: link i relative to link i - 1, the one ahead. */
+static double joint_angle (const snake *p, int i) {
   return p->amplitude * cos (-p->lag * i);
 }
 
@@ -44,10 +45,10 @@ static void motor (pw_model *m, const snake *p, int i, const char *link, const c
 
 static void build (pw_model *m, const void *parameter) {
   const snake *p = parameter;
-  double x = 0, y = 0, phi = 0; /* where the front end of a link is, and its angle */
+  double x = 0, y = 0, phi = 0; /* front end and angle of a link */
   char link[24], ahead[24] = "", name[24];
   for (int i = 0; i < (int)p->n; i++) {
-    phi += i ? joint (p, i) : 0;
+    phi += i ? joint_angle (p, i) : 0;
     double c = p->l * cos (phi), s = p->l * sin (phi);
     snprintf (link, sizeof link, "link%d", i + 1);
     pw_add_body (m, &(pw_body){ .name = link,

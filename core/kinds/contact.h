@@ -1,7 +1,7 @@
-/* Wheels: contact points, and the equation that wheel and speed share: the velocity of a point P of a body along a
- * direction d that is fixed in the body.
+/* Wheels: contact points, and the constraint equation shared by wheel and speed: it prescribes the velocity of a point
+ * P of a body along a direction d fixed in the body.
  *
- *   d . v_P = u,  d = R(phi) (a, b)                               (1 nonholonomic row)
+ *   d . v_P = u,  d = R(phi) (a, b)                               (1 nonholonomic equation)
  *   S     = [ dx  dy  l ]                                         l: the arm of P along (b, -a) in the body
  *   gamma = u' + w (dy vx - dx vy)                                so that S a = gamma
  *
@@ -12,18 +12,19 @@
 #include <string.h>
 #include "pinwheel.h"
 
-/* Where a wheel at a point of a body touches the ground, and its heading there: for paths and pictures.  `at` and
- * `heading` are in the body's frame, out in the world's. */
-static inline void contact_place (const pw_configuration *A, const double at[2], double heading, double out[3]) {
+/* Transforms a contact point and its heading from the body's frame to (x, y, angle) in the world frame, for output and
+ * figures. */
+static inline void contact_to_world (const pw_configuration *A, const double at[2], double heading, double out[3]) {
   out[0] = A->x + A->cos * at[0] - A->sin * at[1];
   out[1] = A->y + A->sin * at[0] + A->cos * at[1];
   out[2] = A->phi + heading;
 }
 
 typedef struct {
-  double a, b, arm; /* of the direction in the body; of the point [m] */
-  double at[2];     /* the point in the body's frame [m] */
-  double heading;   /* [rad] */
+  double a, b;    /* components of the direction in the body's frame */
+  double arm;     /* lever arm of the point about the body's origin [m] */
+  double at[2];   /* the point in the body's frame [m] */
+  double heading; /* [rad] */
 } contact;
 
 static inline contact contact_make (const double at[2], double heading, double a, double b) {

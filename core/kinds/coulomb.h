@@ -1,10 +1,10 @@
-/* Friction against a relative rate w: viscous, and Coulomb smoothed at rest.
+/* Viscous friction and regularised Coulomb friction, opposing a relative velocity w.
  *
  *   F = c w + L tanh (w / w0),  dF/dw = c + (L / w0) (1 - tanh^2 (w / w0)),  loss = F w >= 0
  *
  * (Andersson, Soderberg & Bjorklund 2007, Tribology International 40, 580-587, for the smoothing by tanh.)
- * The limit L is a number, a Coulomb coefficient times load: forces do not see multipliers.  Being smooth, it does not
- * stick; under a load M < L it creeps at w0 atanh (M / L). */
+ * The limit L (friction coefficient times normal load) is constant, since forces cannot depend on multipliers.  The
+ * regularised law cannot stick: under a load M < L it creeps at w0 atanh (M / L). */
 #ifndef PW_COULOMB_H
 #define PW_COULOMB_H
 
@@ -32,7 +32,7 @@ static inline double coulomb_slope (const coulomb *k, double w) {
   return k->viscous + k->limit * k->inverse * (1 - y * y);
 }
 
-/* The change of w, per one of what it depends on, that reverses the force; INFINITY without a limit. */
+/* The change of a variable that reverses the force, `per` being dw/d(variable); INFINITY without a limit. */
 static inline double coulomb_range (const coulomb *k, double w, double per) {
   return per != 0 && k->inverse > 0 ? (1 / k->inverse + fabs (w)) / fabs (per) : INFINITY;
 }

@@ -1,6 +1,6 @@
-/* A point of body 1 on a line of body 2: the equation that slot, slider and drive share.
+/* A point of body 1 on a line of body 2: the constraint equation shared by slot, slider and drive.
  *
- *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic row)
+ *   g     = n . D - c = 0,  D = r1 + R(phi1) s1 - r2,  c = n . R(phi2) s2           (1 holonomic equation)
  *   G     = [ n  t.a | -n  -t.D ]             t: along the line, n: t turned by +90 degrees, a = R(phi1) s1
  *   gamma = -v.H v = 2 w2 t.(r1' - r2') + w1 (w1 - 2 w2) n.a + w2^2 n.D             so that G a = gamma
  *
@@ -17,11 +17,11 @@
 typedef struct {
   double s1[2]; /* the point in body 1's frame [m] */
   double n[2];  /* normal of the line in body 2's frame */
-  double c;     /* where the line is along n [m] */
-  double angle; /* of a slider: phi1 - phi2 [rad]; of a drive: 1 if it is one of an angle, with n = 0 */
+  double c;     /* offset of the line along n [m] */
+  double angle; /* slider: phi1 - phi2 [rad]; drive: 1 if it prescribes an angle (then n = 0), else 0 */
 } line;
 
-/* A line in its present place: directions in world axes, the arm a, the distance D, and their components. */
+/* A line in the current configuration: n, t, the arm a = (X, Y) and D in world axes, and their dot products. */
 typedef struct {
   double nx, ny, tx, ty, X, Y, Dx, Dy;
   double na, nD, ta, tD;
@@ -97,7 +97,7 @@ static inline void line_gamma_v (const line_axes *s, const pw_configuration *A, 
   line_curve (s, -2, v, out);
 }
 
-/* ---- Batches of one equation per element, a line ---- */
+/* ---- Batches of elements with one line equation each ---- */
 
 #define LINE_PARTS                                                                                           \
   const line *k = (const line *)b->element + e;                                                              \

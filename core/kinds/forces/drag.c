@@ -1,10 +1,10 @@
-/* drag: air at rest slows down a body, at its centre of mass and in its turning.
+/* drag: resistance of air at rest to the translation and rotation of a body; the force acts at its centre of mass.
  *
  *   F = -(c1 + c2 |v|) v,  v = (vx, vy)
  *   M = -(d1 + d2 |w|) w
  *   f = (Fx, Fy, M),  loss = -F . v - M w >= 0
  *
- * (Batchelor 1967, An Introduction to Fluid Dynamics, sections 4.9 and 5.11: slow and fast bodies.) */
+ * (Batchelor 1967, An Introduction to Fluid Dynamics, sections 4.9 and 5.11: low and high Reynolds numbers.) */
 #include <math.h>
 #include <string.h>
 #include "pinwheel.h"
@@ -14,7 +14,7 @@ typedef struct {
   double d1, d2; /* [N m s/rad], [N m s^2/rad^2] */
 } drag;
 
-/* Names the parts of element e: the speed, and force and moment per speed. */
+/* Element e: speed, force per speed, moment per angular velocity. */
 #define DRAG_PARTS                                           \
   const drag *k = (const drag *)b->element + e;              \
   const pw_configuration *A = &b->configuration[b->body[e]]; \
@@ -40,7 +40,7 @@ static void drag_force (const pw_batch *b, double *out) {
 static void drag_force_v (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 9) {
     DRAG_PARTS;
-    double x = v > 0 ? A->vx / v : 0, y = v > 0 ? A->vy / v : 0; /* its direction; 1 / v may be infinite */
+    double x = v > 0 ? A->vx / v : 0, y = v > 0 ? A->vy / v : 0; /* direction; not v_x * (1 / v), which may overflow */
     memset (out, 0, 9 * sizeof *out);
     out[0] = -c - k->c2 * A->vx * x;
     out[1] = out[3] = -k->c2 * A->vx * y;

@@ -1,20 +1,19 @@
-/* force: two signals, the components of a force on a point of a body, along world axes or the body's own.
+/* force: an external force on a point of a body; two signals give its components along world or body axes.
  *
  *   F = (ux, uy) or R(phi) (ux, uy)
  *   f = (Fx, Fy, X Fy - Y Fx),  (X, Y) = R(phi) s
  *   power = F . v_P = Fx vx + Fy vy + (X Fy - Y Fx) w
  *
- * (Shabana 2001, Computational Dynamics, section 5.3.)
- * It comes from outside: nothing else is pushed back. */
+ * (Shabana 2001, Computational Dynamics, section 5.3.) It has no reaction on another body. */
 #include <string.h>
 #include "pinwheel.h"
 
 typedef struct {
   double at[2]; /* in the body's frame [m] */
-  int turns;    /* 1: along the body's axes */
+  int turns;    /* 1: components along the body's axes */
 } force;
 
-/* A force now: along world axes and its moment; c and s are of the angle its components turn by. */
+/* A force in the current state: world components and moment; c, s: cosine and sine of the angle of its axes. */
 typedef struct {
   double c, s, X, Y, Fx, Fy, M;
 } force_state;
@@ -56,7 +55,7 @@ static void force_force_u (const pw_batch *b, double *out) {
   }
 }
 
-/* Where the force turns with the body, its moment does not change. */
+/* A force that turns with the body has a constant moment. */
 static void force_force_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 9) {
     FORCE_PARTS;

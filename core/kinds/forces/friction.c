@@ -1,8 +1,8 @@
-/* friction: a torque against the turning of body 1 on body 2, as in a pin.
+/* friction: a torque opposing the rotation of body 1 relative to body 2, as in a pin.
  *
  *   f = (0, 0, -T | 0, 0, T),  loss = T w >= 0,  w = w1 - w2            T(w) as F in coulomb.h
  *
- * The limit is a Coulomb coefficient times radius times load. */
+ * The limit is the friction coefficient times radius times load. */
 #include <string.h>
 #include "coulomb.h"
 

@@ -1,8 +1,8 @@
-/* marker: a point of a body whose path is of interest; it takes part in nothing.
+/* marker: a point of a body whose path is recorded; it does not affect the motion.
  *
- *   P = r + R(phi) s          no rows, no force
+ *   P = r + R(phi) s          no constraint, no force
  *
- * Tables have its place, figures and animations its path: a coupler's curve, the foot of a leg, a pencil. */
+ * Tables contain its position; figures and animations show its path, for example a coupler curve. */
 #include "contact.h"
 
 typedef struct {
@@ -20,7 +20,7 @@ static int marker_prepare (const void *definition, const pw_body *const *bodies,
 static void marker_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const marker *k = (const marker *)b->element + e;
-    contact_place (&b->configuration[b->body[e]], k->at, 0, out);
+    contact_to_world (&b->configuration[b->body[e]], k->at, 0, out);
   }
 }
 

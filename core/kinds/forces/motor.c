@@ -1,19 +1,19 @@
-/* motor: turns body 1 against body 2 to an angle u1 and a rate u2, two signals, with a torque that saturates.
+/* motor: a saturating torque between body 1 and body 2 that tracks a relative angle u1 and angular velocity u2
+ * (signals).
  *
  *   y = k (u1 - phi1 + phi2) + c (u2 - w1 + w2)
- *   T = L tanh (y / L);  T = y where there is no limit L
+ *   T = L tanh (y / L);  T = y without a limit L
  *   f = (0, 0, T | 0, 0, -T),  power = T (w1 - w2)
  *
  * (Spong, Hutchinson & Vidyasagar 2006, Robot Modeling and Control, section 6.3, for the law; tanh keeps it smooth.)
- * All of its power is work, none of it loss or potential energy, and it may be negative: a motor that brakes takes
- * energy out of the system, wherever that goes. */
+ * All of its power counts as work, not as loss or potential energy; it is negative when the motor brakes. */
 #include <math.h>
 #include <string.h>
 #include "pinwheel.h"
 
 typedef struct {
   double k, c;  /* [N m/rad], [N m s/rad] */
-  double limit; /* L [N m]; 0: none */
+  double limit; /* L [N m]; 0: no limit */
 } motor;
 
 /* The torque, its slope dT/dy, and y. */

@@ -1,20 +1,20 @@
-/* rolling-resistance: a force along a heading, against the motion of its contact point P along it.
+/* rolling-resistance: a force along a heading that opposes the velocity of the contact point P in that direction.
  *
  *   F = -L tanh (v_e / v0),  v_e = E . (vx, vy, w)                v_e: speed of P along the heading (coulomb.h)
  *   E = [ cos(theta)  sin(theta)  -m ]          theta = phi + psi; m: the arm of P to the left of the heading
  *   f = F E,  loss = -F v_e >= 0
  *
  * (Wong 2008, Theory of Ground Vehicles, section 1.2.)
- * It is all along the heading: a wheel at the same point holds it sideways. */
+ * It has no lateral component; a wheel at the same point provides that. */
 #include "contact.h"
 #include "coulomb.h"
 
 typedef struct {
-  contact point; /* its direction is the heading */
+  contact point; /* direction: the heading */
   coulomb law;
 } resistance;
 
-/* Names the parts of element e: E, and the speed along it. */
+/* Element e: E and the speed along it. */
 #define RESISTANCE_PARTS                                                                        \
   const resistance *k = (const resistance *)b->element + e;                                     \
   const contact *P = &k->point;                                                                 \
@@ -39,7 +39,7 @@ static void resistance_force (const pw_batch *b, double *out) {
   }
 }
 
-/* F E by phi: dE/dphi = (-s, c, 0), so v_e changes by c vy - s vx. */
+/* d(F E)/dphi with dE/dphi = (-s, c, 0) and dv_e/dphi = c vy - s vx. */
 static void resistance_force_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 9) {
     RESISTANCE_PARTS;

@@ -1,11 +1,11 @@
-/* rotational-spring: turns two bodies towards an angle between them, with a damper beside it.
+/* rotational-spring: a spring and a parallel damper between the angles of two bodies.
  *
  *   T = k (phi1 - phi2 - beta) + c (w1 - w2)
  *   f = (0, 0, -T | 0, 0, T)
  *   V = k (phi1 - phi2 - beta)^2 / 2,  loss = c (w1 - w2)^2
  *
  * (Shabana 2001, Computational Dynamics, section 6.5.)
- * Angles are counted through full turns: a spring wound up once more pulls harder. */
+ * Angles accumulate over full turns. */
 #include <string.h>
 #include "pinwheel.h"
 

@@ -1,19 +1,19 @@
-/* sliding-friction: a force against the motion of a point of body 1 along a line of body 2, as in a slider or slot.
+/* sliding-friction: a force opposing the motion of a point of body 1 along a line of body 2, as in a slider or slot.
  *
  *   s = e . (r1 + R(phi1) s1 - r2) - c,  E = ds/dq,  w = E . v          e: unit vector along the line
  *   f = -F E,  loss = F w >= 0                                          F(w) as in coulomb.h
  *   df/dq = -dF/dw E (H v)^T - F H,  df/dv = -dF/dw E E^T,  H = d2s/dq2
  *
- * E and H are those of line.h for a line across this one, whose normal is e: s is the distance from it. */
+ * E and H are those of line.h for the perpendicular line with normal e; s is the distance from that line. */
 #include "coulomb.h"
 #include "line.h"
 
 typedef struct {
-  line across;
+  line across; /* the perpendicular line */
   coulomb law;
 } sliding;
 
-/* Names the parts of element e: itself, its two configurations, axes, E and w. */
+/* Element e: parameters, both configurations, axes, E and w. */
 #define SLIDING_PARTS                                                                                        \
   const sliding *k = (const sliding *)b->element + e;                                                        \
   const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \

@@ -1,13 +1,13 @@
-/* spring: pulls a point of body 1 and a point of body 2 together along their line, with a damper beside it.
+/* spring: a spring and a parallel damper between a point of body 1 and a point of body 2.
  *
  *   d = r1 + R(phi1) s1 - r2 - R(phi2) s2,  l = |d|,  e = d / l
- *   F = k (l - l0) e + c l' e                 pulls body 1 by -F at its point and body 2 by F
+ *   F = k (l - l0) e + c l' e                 -F acts on body 1 at its point, F on body 2
  *   f = -D^T F,  D = dd/dq = [ 1 0 -Y1 | -1 0 Y2 ; 0 1 X1 | 0 -1 -X2 ],  (X, Y) = R(phi) s
  *   V = k (l - l0)^2 / 2,  loss = c l'^2
  *
  * (Shabana 2001, Computational Dynamics, section 6.5.)
- * Where l = 0, or too small for its inverse, there is no direction: e = 0, so the force is zero there.  With l0 = 0 the
- * spring's part k d is smooth and that is its limit; with l0 > 0 the ends should not meet. */
+ * If l = 0, or 1 / l overflows, the direction is undefined: e = 0 and the force is zero.  For l0 = 0 this is the limit
+ * of the smooth spring force k d; for l0 > 0 the ends should not meet. */
 #include <math.h>
 #include "pinwheel.h"
 
@@ -16,11 +16,11 @@ typedef struct {
   double k, c, l0;     /* stiffness [N/m], damping [N s/m], free length [m] */
 } spring;
 
-/* One spring in its present state. */
+/* A spring in the current state. */
 typedef struct {
   double X1, Y1, X2, Y2; /* arms in world axes */
   double d[2], rate[2];  /* from end 2 to end 1, and its velocity */
-  double e[2], l, il;    /* direction, length, 1 / length; direction and 1 / length are zero where the length is */
+  double e[2], l, il;    /* direction, length, 1 / length; direction and 1 / length are 0 if the length is */
   double speed;          /* l' */
   double F[2];           /* pull */
 } spring_state;
@@ -65,7 +65,7 @@ static void spring_force (const pw_batch *b, double *out) {
   }
 }
 
-/* out = -D^T K W, 6 x 6; K is dF/dd or dF/dd', W what d or d' changes by with each coordinate. */
+/* out = -D^T K W, 6 x 6; K = dF/dd or dF/dd', W = Jacobian of d or d'. */
 static void spring_product (double *out, const double D[2][6], const double K[2][2], const double W[2][6]) {
   for (int j = 0; j < 6; j++) {
     double x = K[0][0] * W[0][j] + K[0][1] * W[1][j], y = K[1][0] * W[0][j] + K[1][1] * W[1][j];
@@ -89,7 +89,7 @@ static void spring_slope (const spring *k, const spring_state *s, double K[2][2]
                 k->c * s->il * s->e[i] * (s->rate[j] - s->speed * s->e[j]);
 }
 
-/* With the turning of the arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi = -w (X, Y). */
+/* Includes the rotation of the arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi = -w (X, Y). */
 static void spring_force_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 36) {
     SPRING_PARTS;

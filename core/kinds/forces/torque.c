@@ -1,4 +1,4 @@
-/* torque: the signal u acts on body 1, and its opposite on body 2.
+/* torque: the signal u acts on body 1, -u on body 2.
  *
  *   f = (0, 0, u | 0, 0, -u),  power = u (w1 - w2) */
 #include "pinwheel.h"

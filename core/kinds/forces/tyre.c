@@ -1,25 +1,25 @@
-/* tyre: a wheel that gives way sideways: a lateral force on the contact point P that opposes its slip.
+/* tyre: a wheel with lateral slip; a lateral force at the contact point P opposes the slip.
  *
  *   sigma = v_n / R,  R = sqrt (v_e^2 + v0^2)      v_e, v_n: speed of P along the heading and to its left
- *   F     = -C sigma                                              (linear: no load)
+ *   F     = -C sigma                                              (linear: no limit)
  *   F     = -mu N tanh (C sigma / (mu N))                         (saturating)
  *   f     = F S,  S = [ -sin(theta)  cos(theta)  l ]              theta = phi + psi, l: the arm along the heading
  *   loss  = -F v_n >= 0
  *
  * (Pacejka 2012, Tire and Vehicle Dynamics, chapter 1, for slip and cornering stiffness; the regularising v0 keeps the
- * slip smooth at rest.)  As C grows, v_n = -F R / C vanishes like 1/C: the tyre becomes the knife edge. */
+ * slip smooth at rest.)  As C grows, v_n = -F R / C vanishes like 1/C: the tyre approaches a knife edge. */
 #include <math.h>
 #include <string.h>
 #include "contact.h"
 
 typedef struct {
   double at[2];        /* contact point in the body's frame [m] */
-  double cos, sin;     /* of the heading in the body */
+  double cos, sin;     /* of the heading in the body's frame */
   double along, aside; /* components of the arm along the heading and to its left [m] */
   double heading;      /* [rad] */
   double stiffness;    /* C [N] */
   double speed;        /* v0 [m/s] */
-  double limit;        /* mu N [N]; 0: none */
+  double limit;        /* mu N [N]; 0: no limit */
 } tyre;
 
 /* The slip of one tyre: directions, speeds, the force and its derivatives. */
@@ -71,7 +71,7 @@ static void tyre_force (const pw_batch *b, double *out) {
   }
 }
 
-/* F S by phi: dS/dphi = -(c, s, 0), and dv_n, dv_e = -(c, s) v, (-s, c) v with v the body's velocity. */
+/* d(F S)/dphi with dS/dphi = -(c, s, 0), dv_n/dphi = -(c, s) . v, dv_e/dphi = (-s, c) . v, v: velocity of the body. */
 static void tyre_force_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 9) {
     TYRE_PARTS;
@@ -91,7 +91,8 @@ static void tyre_force_v (const pw_batch *b, double *out) {
   }
 }
 
-/* R along the heading, where the slip grows at rest; across it, with a limit, what takes the force to it and back. */
+/* Velocity scales: R along the heading, over which the slip varies near rest; laterally, if there is a limit, the
+ * change that reverses a saturated force. */
 static void tyre_saturation (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
     TYRE_PARTS;
@@ -115,7 +116,7 @@ static void tyre_loss (const pw_batch *b, double *out) {
 static void tyre_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const tyre *k = (const tyre *)b->element + e;
-    contact_place (&b->configuration[b->body[e]], k->at, k->heading, out);
+    contact_to_world (&b->configuration[b->body[e]], k->at, k->heading, out);
   }
 }
 

@@ -1,11 +1,11 @@
-/* gear: the angles of two bodies, seen from a third, their carrier, keep a ratio i.
+/* gear: the angles of two bodies relative to a third, the carrier, keep a ratio i.
  *
- *   g = (phi1 - phi3) - i (phi2 - phi3) - c = 0                    (1 holonomic row, linear)
+ *   g = (phi1 - phi3) - i (phi2 - phi3) - c = 0                    (1 holonomic equation, linear)
  *   G = [ 0 0 1 | 0 0 -i | 0 0 i-1 ],  gamma = 0
  *
- * (Willis 1870, Principles of Mechanism.)  Two wheels of radii R1 and R2 that mesh outside have i = -R2 / R1, a wheel
- * inside a ring i = R2 / R1.  Where the axles are is up to pins.
- * On body 1 acts the moment -lambda, on body 2 i lambda, on the carrier (1 - i) lambda. */
+ * (Willis 1870, Principles of Mechanism.)  External gears of radii R1 and R2 have i = -R2 / R1, a gear inside a ring
+ * i = R2 / R1.  Pins define the axles.  The moments are -lambda on body 1, i lambda on body 2, (1 - i) lambda on the
+ * carrier. */
 #include <math.h>
 #include <string.h>
 #include "pinwheel.h"

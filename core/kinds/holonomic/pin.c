@@ -1,12 +1,12 @@
 /* pin: a point of body 1 and a point of body 2 coincide.
  *
- *   g     = r1 + R(phi1) s1 - r2 - R(phi2) s2 = 0                 (2 holonomic rows, world x and y)
+ *   g     = r1 + R(phi1) s1 - r2 - R(phi2) s2 = 0                 (2 holonomic equations, world x and y)
  *   G     = [ 1 0 -Y1 | -1 0  Y2 ]       with (X, Y) = R(phi) s, the arm in world axes
  *           [ 0 1  X1 |  0 -1 -X2 ]
  *   gamma = (X1, Y1) w1^2 - (X2, Y2) w2^2                         so that G a = gamma
  *
  * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3.)
- * The force on body 1 is -lambda in world axes, on body 2 its opposite. */
+ * The force in world axes is -lambda on body 1, lambda on body 2. */
 #include <math.h>
 #include "pinwheel.h"
 
@@ -24,7 +24,7 @@ static inline pin_arms pin_turn (const pin *p, const pw_configuration *A, const 
                      B->cos * p->s2[0] - B->sin * p->s2[1], B->sin * p->s2[0] + B->cos * p->s2[1] };
 }
 
-/* Names the parts of element e: its two configurations and arms. */
+/* Element e: both configurations and arms. */
 #define PIN_PARTS                                                                                            \
   const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
   const pin_arms s = pin_turn ((const pin *)b->element + e, A, B);                                           \
@@ -71,7 +71,7 @@ static void pin_gamma (const pw_batch *b, double *out) {
   }
 }
 
-/* Fills the two angle columns of a 2 x 6 block whose other columns are zero. */
+/* Sets the two angle columns of a 2 x 6 block, the others to zero. */
 static inline void pin_angles (double *out, double x1, double y1, double x2, double y2) {
   for (int i = 0; i < 12; i++) out[i] = 0;
   out[2] = x1, out[8] = y1, out[5] = x2, out[11] = y2;

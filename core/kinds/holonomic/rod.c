@@ -1,12 +1,12 @@
-/* rod: a massless bar of length L holds a point of body 1 and a point of body 2 apart.
+/* rod: a massless bar keeps a point of body 1 and a point of body 2 at the distance L.
  *
- *   g     = (d.d - L^2) / (2 L) = 0,  d = r1 + R(phi1) s1 - r2 - R(phi2) s2             (1 holonomic row)
+ *   g     = (d.d - L^2) / (2 L) = 0,  d = r1 + R(phi1) s1 - r2 - R(phi2) s2             (1 holonomic equation)
  *   G     = d^T D / L,  D = dd/dq = [ 1 0 -Y1 | -1 0 Y2 ; 0 1 X1 | 0 -1 -X2 ],  (X, Y) = R(phi) s
  *   gamma = ( d.((X1, Y1) w1^2 - (X2, Y2) w2^2) - d'.d' ) / L                           so that G a = gamma
  *
  * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3, with d.d - L^2 divided by
- * 2 L: near the constraint g is the distance less L, and no square root is taken.)
- * On body 1 acts the force -lambda along d / L, away from body 2; on body 2 the opposite. */
+ * 2 L: near the constraint g is the distance minus L, without a square root.)
+ * The force on body 1 is -lambda d / L, away from body 2; body 2 receives the opposite. */
 #include <math.h>
 #include "pinwheel.h"
 
@@ -15,12 +15,12 @@ typedef struct {
   double length;       /* [m] */
 } rod;
 
-/* One rod in its present state. */
+/* A rod in the current state. */
 typedef struct {
   double D[2][6];
   double S1[2], S2[2];  /* arms in world axes */
   double d[2], rate[2]; /* from end 2 to end 1, and its velocity */
-  double w1, w2;        /* rates of the bodies */
+  double w1, w2;        /* angular velocities of the bodies */
   double L;
 } rod_state;
 
@@ -89,7 +89,7 @@ static void rod_gamma (const pw_batch *b, double *out) {
   }
 }
 
-/* ((D w)^T D + d^T d(D w)/dq) / L, where D w changes with the angles by -(X1, Y1) w(phi1) and (X2, Y2) w(phi2). */
+/* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w(phi1), d(D w)/dphi2 = (X2, Y2) w(phi2). */
 static void rod_jw_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
     ROD_PARTS;
@@ -102,7 +102,8 @@ static void rod_jw_q (const pw_batch *b, double *out) {
   }
 }
 
-/* d' changes with the angles by -w1 (X1, Y1) and w2 (X2, Y2), the arms by their columns of D, one with its sign. */
+/* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); the derivatives of the arms are columns of D, for arm 2 negated.
+ * */
 static void rod_gamma_q (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 6) {
     ROD_PARTS;

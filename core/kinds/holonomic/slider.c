@@ -1,10 +1,10 @@
-/* slider: a prismatic joint; a point of body 1 stays on a line of body 2, and their angle stays what it is.
+/* slider: a prismatic joint; a point of body 1 stays on a line of body 2 at a constant relative angle.
  *
- *   g     = ( n . (r1 + R(phi1) s1 - r2 - R(phi2) s2),  phi1 - phi2 - beta ) = 0      (2 holonomic rows)
- *   gamma = ( as of line.h,  0 )                         n: normal of the line, to the left of its heading
+ *   g     = ( n . (r1 + R(phi1) s1 - r2 - R(phi2) s2),  phi1 - phi2 - beta ) = 0      (2 holonomic equations)
+ *   gamma = ( as in line.h,  0 )                         n: normal of the line, to the left of its heading
  *
- * The first row's derivatives are in line.h.  On body 1 act the force -lambda(1) along n, at its point, and the moment
- * -lambda(2); on body 2 the opposites. */
+ * line.h has the derivatives of the first equation.  The force -lambda(1) along n, at the point, and the moment
+ * -lambda(2) act on body 1; the opposites act on body 2. */
 #include "line.h"
 
 static int slider_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

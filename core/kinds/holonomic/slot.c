@@ -1,8 +1,8 @@
 /* slot: a point of body 1 stays on a line of body 2.
  *
- *   g = n . (r1 + R(phi1) s1 - r2 - R(phi2) s2) = 0,  n: normal of the line, to the left of its heading  (1 holonomic row)
+ *   g = n . (r1 + R(phi1) s1 - r2 - R(phi2) s2) = 0,  n: normal of the line, to the left of its heading  (1 holonomic)
  *
- * Its derivatives are in line.h.  On body 1 acts the force -lambda along n, at its point; on body 2 the opposite. */
+ * line.h has the derivatives.  The force on body 1 is -lambda along n, at its point; body 2 receives the opposite. */
 #include "line.h"
 
 static int slot_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,

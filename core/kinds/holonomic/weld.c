@@ -1,14 +1,14 @@
-/* weld: a pin that does not turn; body 2 is fixed to body 1 at the angle beta.
+/* weld: body 2 is fixed to body 1 at a point and at the relative angle beta.
  *
- *   g     = ( r1 + R(phi1) s1 - r2 - R(phi2) s2,  phi1 - phi2 + beta ) = 0     (3 holonomic rows)
+ *   g     = ( r1 + R(phi1) s1 - r2 - R(phi2) s2,  phi1 - phi2 + beta ) = 0     (3 holonomic equations)
  *   G     = [ 1 0 -Y1 | -1 0  Y2 ]       with (X, Y) = R(phi) s, the arm in world axes
  *           [ 0 1  X1 |  0 -1 -X2 ]
  *           [ 0 0  1  |  0  0 -1 ]
  *   gamma = ( (X1, Y1) w1^2 - (X2, Y2) w2^2,  0 )                              so that G a = gamma
  *
  * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3.)
- * On body 1 act the force -lambda(1, 2) in world axes, at the common point, and the moment -lambda(3); on body 2 their
- * opposites. */
+ * The force -lambda(1, 2) in world axes, at the common point, and the moment -lambda(3) act on body 1; the opposites
+ * act on body 2. */
 #include <math.h>
 #include <string.h>
 #include "pinwheel.h"
@@ -18,7 +18,7 @@ typedef struct {
   double beta;         /* phi2 - phi1 [rad] */
 } weld;
 
-/* Names the parts of element e: its two configurations and its arms in world axes. */
+/* Element e: both configurations, and both arms in world axes. */
 #define WELD_PARTS                                                                                           \
   const weld *k = (const weld *)b->element + e;                                                              \
   const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
@@ -69,7 +69,7 @@ static void weld_gamma (const pw_batch *b, double *out) {
   }
 }
 
-/* Fills the two angle columns of the first two rows of a 3 x 6 block whose other entries are zero. */
+/* Sets the angle columns of the first two equations in a 3 x 6 block, all other entries to zero. */
 static inline void weld_angles (double *out, double x1, double y1, double x2, double y2) {
   memset (out, 0, 18 * sizeof *out);
   out[2] = x1, out[8] = y1, out[5] = x2, out[11] = y2;

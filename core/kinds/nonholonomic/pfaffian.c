@@ -1,12 +1,12 @@
-/* pfaffian: a linear relation between the velocities of two bodies, as body 1 sees them, with a signal u.
+/* pfaffian: a linear combination of the velocities of two bodies, in the axes of body 1, equals a signal u.
  *
- *   a . (R(phi1)^T r1', w1) + b . (R(phi1)^T r2', w2) = u          (1 nonholonomic row)
+ *   a . (R(phi1)^T r1', w1) + b . (R(phi1)^T r2', w2) = u          (1 nonholonomic equation)
  *   S     = [ A a3 | B b3 ],  A = R(phi1) (a1, a2), B = R(phi1) (b1, b2),  eta = u
- *   gamma = u' - w1 (p(A).r1' + p(B).r2')                          so that S a = gamma; p turns by +90 degrees
+ *   gamma = u' - w1 (p(A).r1' + p(B).r2')                          so that S a = gamma; p rotates by +90 degrees
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
- * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3; it need not
- * balance: what is missing comes from outside.  Its power is F u. */
+ * The reaction F = -lambda acts on body 1 as the force F A and the moment F a3, on body 2 as F B and F b3; the
+ * two need not balance; the difference is an external force.  The power is F u. */
 #include <math.h>
 #include <string.h>
 #include "pinwheel.h"

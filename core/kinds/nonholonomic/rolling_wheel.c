@@ -1,35 +1,35 @@
-/* rolling-wheel: a wheel of radius R that rolls without slip; its spin angle chi is a coordinate of its own.
+/* rolling-wheel: a wheel of radius R that rolls without slip; its spin angle chi is an internal coordinate.
  *
- *   n . v_P = 0,  e . v_P - R chi' = 0,  e = (cos, sin)(phi + psi), n = (-sin, cos)(phi + psi)    (2 nonholonomic rows)
+ *   n . v_P = 0,  e . v_P - R chi' = 0,  e = (cos, sin)(phi + psi), n = (-sin, cos)(phi + psi)    (2 nonholonomic)
  *   S     = [ -s  c   l   0 ]      (c, s) = e; l and m are the components of the contact point's arm along e and n
  *           [  c  s  -m  -R ]
  *   gamma = ( w (c vx + s vy),  w (s vx - c vy) )                 so that S a = gamma
  *   f     = u on chi, power = u chi'                              u: torque about the axle
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.)
- * On the body act -lambda(1) along n and -lambda(2) along e.  The axle is horizontal, so what u reacts on and the
- * wheel's gyroscopic moments lie out of the plane. */
+ * On the body act -lambda(1) along n and -lambda(2) along e.  The axle is horizontal, so the reaction to u and the
+ * gyroscopic moments of the wheel have no component in the plane model. */
 #include <math.h>
 #include <string.h>
 #include "contact.h"
 
 typedef struct {
   double at[2];        /* contact point in the body's frame [m] */
-  double cos, sin;     /* of the heading in the body */
+  double cos, sin;     /* of the heading in the body's frame */
   double along, aside; /* components of the arm along the heading and to its left [m] */
   double radius;       /* [m] */
   double heading;      /* [rad] */
 } rolling;
 
-/* Names the parts of element e: its configuration and the direction (c, s) it rolls in. */
+/* Element e: configuration of the body and rolling direction (c, s). */
 #define ROLLING_PARTS                                                                        \
   const rolling *k = (const rolling *)b->element + e;                                        \
   const pw_configuration *A = &b->configuration[b->body[e]];                                 \
   const double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin; \
   (void)k, (void)A, (void)c, (void)s
 
-/* The spin rate with which it rolls as the body starts. */
-static double rolling_rate (const rolling *k, const pw_body *body) {
+/* The spin rate for rolling at the initial velocity of the body. */
+static double rolling_spin_rate (const rolling *k, const pw_body *body) {
   double angle = body->start[2] + k->heading;
   return (cos (angle) * body->rate[0] + sin (angle) * body->rate[1] - k->aside * body->rate[2]) / k->radius;
 }
@@ -42,7 +42,7 @@ static int rolling_prepare (const void *definition, const pw_body *const *bodies
   rolling *k = element;
   *k = (rolling){ { d->at[0], d->at[1] }, c, s, along, aside, d->radius, d->heading };
   own[0] = (pw_internal){
-    d->inertia, d->start, d->rate != 0 ? d->rate : rolling_rate (k, bodies[0]), { d->start != 0, d->rate != 0 }
+    d->inertia, d->start, d->rate != 0 ? d->rate : rolling_spin_rate (k, bodies[0]), { d->start != 0, d->rate != 0 }
   };
   (void)error;
   return PW_OK;
@@ -76,7 +76,7 @@ static void rolling_power (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e] * b->v[e];
 }
 
-/* Fills the angle's column of a 2 x 4 block whose other columns are zero. */
+/* Sets the phi column of a 2 x 4 block, the others to zero. */
 static inline void rolling_angle (double *out, double first, double second) {
   memset (out, 0, 8 * sizeof *out);
   out[2] = first, out[6] = second;
@@ -108,7 +108,7 @@ static void rolling_gamma_v (const pw_batch *b, double *out) {
 static void rolling_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const rolling *k = (const rolling *)b->element + e;
-    contact_place (&b->configuration[b->body[e]], k->at, k->heading, out);
+    contact_to_world (&b->configuration[b->body[e]], k->at, k->heading, out);
   }
 }
 

@@ -1,11 +1,11 @@
 /* steered-wheel: a knife edge whose heading in the body is a signal u of time.
  *
- *   n . v_P = 0,  n = (-sin, cos)(phi + u)                        (1 nonholonomic row)
- *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u; l and m: the arm of P along the heading and to its left
+ *   n . v_P = 0,  n = (-sin, cos)(phi + u)                        (1 nonholonomic equation)
+ *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + u;  l, m: arm of P along the heading, to its left
  *   gamma = (w + u') (cos(theta) vx + sin(theta) vy) - u' m w     so that S a = gamma, with l' = u' m
  *
  * (Neimark & Fufaev 1972, Dynamics of Nonholonomic Systems, chapter I.) The lateral force on the body, along n, is N
- * = -lambda.  It acts at the point the wheel turns about, so that steering takes no moment and does no work. */
+ * = -lambda.  It acts at the steering pivot, so steering needs no moment and does no work. */
 #include <math.h>
 #include <string.h>
 #include "contact.h"
@@ -14,7 +14,7 @@ typedef struct {
   double at[2]; /* contact point in the body's frame [m] */
 } steered;
 
-/* A wheel in its present place. */
+/* A wheel in the current state. */
 typedef struct {
   double c, s;         /* heading in the world */
   double along, aside; /* l, m */
@@ -82,7 +82,7 @@ static void steered_gamma_v (const pw_batch *b, double *out) {
 static void steered_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const steered *k = (const steered *)b->element + e;
-    contact_place (&b->configuration[b->body[e]], k->at, b->u[3 * e], out);
+    contact_to_world (&b->configuration[b->body[e]], k->at, b->u[3 * e], out);
   }
 }
 

@@ -1,6 +1,6 @@
-/* wheel: a knife edge; the contact point P does not move across the heading (contact.h).
+/* wheel: a knife edge; the contact point P has no velocity perpendicular to the heading (contact.h).
  *
- *   n . v_P = 0,  n = (-sin, cos)(phi + psi)                      (1 nonholonomic row)
+ *   n . v_P = 0,  n = (-sin, cos)(phi + psi)                      (1 nonholonomic equation)
  *   S     = [ -sin(theta)  cos(theta)  l ]      theta = phi + psi, l = s . (cos psi, sin psi): the arm along the heading
  *   gamma = w (cos(theta) vx + sin(theta) vy)                     so that S a = gamma
  *
@@ -19,7 +19,7 @@ static int wheel_prepare (const void *definition, const pw_body *const *bodies, 
 static void wheel_contact (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++, out += 3) {
     const contact *k = (const contact *)b->element + e;
-    contact_place (&b->configuration[b->body[e]], k->at, k->heading, out);
+    contact_to_world (&b->configuration[b->body[e]], k->at, k->heading, out);
   }
 }
 
