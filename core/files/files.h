@@ -6,22 +6,22 @@
 #include "pinwheel-files.h"
 #include "util.h"
 
-/* ---- Where models are (search.c) ---- */
+/* ---- Search path for models (search.c) ---- */
 
 typedef struct {
   char *name; /* "ezyroller" */
   char *path; /* of the file itself, links resolved */
 } pw_found;
 
-/* Every model file on the search path, in order of name, then of path. */
+/* All model files on the search path, sorted by name, then by path. */
 typedef struct {
   pw_arena arena;
   pw_found *found;
   int count, room;
-  char folders[400]; /* the folders that are there, "/first:/second", for messages */
+  char folders[400]; /* the existing folders, "/first:/second", for messages */
 } pw_search;
 
-/* Looks into every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */
+/* Searches every folder of the search path.  Close in every case.  PW_OK or PW_RESOURCE. */
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
@@ -31,12 +31,12 @@ int pw_search_include (char **include, pw_error *error);
 /* folder + "/" + name + ending, malloced; NULL without memory. */
 char *pw_join (const char *folder, const char *name, const char *ending);
 
-/* Whether a name ends in ".so" or the like, with something before it. */
+/* Whether a name ends in ".so" or the like, with at least one character before it. */
 int pw_ends_in (const char *name, const char *ending);
 
 /* ---- Model files in C (build.c) ---- */
 
-/* Uses a shared object; it may be deleted afterwards. */
+/* Uses a shared object, which may be deleted afterwards. */
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
 /* Compiles a C file in a private temporary folder, hands the object to `use` and removes both.  PW_INPUT if it does not
@@ -45,9 +45,8 @@ int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_er
 
 /* ---- Models in YAML (yaml.c) ---- */
 
-/* A text model in memory: a plug-in's table made of it.  `shown` is the path in messages, `largest` the bytes it
- * may have.  PW_INPUT with the place of what is wrong; PW_RESOURCE.  Bodies and elements are read when a model is
- * built. */
+/* A text model in memory, with a plug-in's table.  `shown` is the path in messages, `largest` the limit in bytes.
+ * PW_INPUT with the position of the error; PW_RESOURCE.  Bodies and elements are read when a model is built. */
 typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_error *error);
 void pw_yaml_close (pw_yaml *y);
@@ -57,17 +56,18 @@ int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *pa
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* Reads two columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first column
- * is increasing.  `unit` is the one each shall have (NULL: any), to which it is converted if the header names another.
- * PW_INPUT with "SHOWN:LINE: what is wrong", PW_RESOURCE. */
+/* Reads two columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first
+ * column must be increasing.  `unit` is the requested unit of each (NULL: any), to which it is converted if the header
+ * names another.
+ * PW_INPUT with "SHOWN:LINE: REASON", PW_RESOURCE. */
 int pw_columns_read (FILE *f, const char *shown, const char *const column[2], const char *const unit[2],
                      pw_arena *arena, double *value[2], int *count, pw_error *error);
 
 /* ---- Units (units.c) ---- */
 
-/* A unit that is known: "mm" is "1e-3" of "m".  The first four are those that all others are made of. */
+/* A known unit: "mm" is "1e-3" of "m".  The first four are the base units. */
 typedef struct {
-  const char *name, *factor, *si; /* the factor an expression; "1": it is a unit of the SI */
+  const char *name, *factor, *si; /* the factor is an expression; "1": an SI unit */
 } pw_unit_name;
 
 extern const pw_unit_name pw_unit_names[]; /* ended by a NULL name */
@@ -82,13 +82,13 @@ int pw_read_rest (FILE *f, size_t most, const char *path, const char *what, char
 /* "it is a directory, not a regular file" */
 const char *pw_not_regular (mode_t mode);
 
-/* The folder that a path's last name is in, malloced; NULL without memory. */
+/* The folder of the file at a path, malloced; NULL without memory. */
 char *pw_folder_of (const char *path);
 
-/* Where a file is or will be, links followed. */
+/* The location of an existing or future file, links followed. */
 typedef struct {
   char *path;     /* of the file itself; malloced */
-  int descriptor; /* the path stands for this one of the process ("-", /dev/stdout, /dev/fd/3); -1: for none */
+  int descriptor; /* descriptor of this process that the path means ("-", /dev/stdout, /dev/fd/3), or -1 */
   int exists;     /* 1: `info` is known */
   struct stat info;
 } pw_location;
@@ -99,27 +99,27 @@ int pw_locate (pw_location *p, const char *path);
 /* ---- Locks (lock.c) ---- */
 
 typedef enum {
-  PW_LOCK_NEW,     /* an empty file: one that is there, which a killed process has left, is removed */
-  PW_LOCK_KEEP,    /* what is there, or an empty file */
-  PW_LOCK_EXISTING /* what is there; ENOENT if there is none */
+  PW_LOCK_NEW,     /* an empty file; removes one left by a killed process */
+  PW_LOCK_KEEP,    /* the existing file, or an empty one */
+  PW_LOCK_EXISTING /* the existing file; ENOENT if there is none */
 } pw_lock_how;
 
-/* Opens a regular file for reading and writing and locks it until it is closed; *created is 1 for an empty one made here.
- * A symbolic link is not followed.  -1 and errno, for pw_lock_reason. */
+/* Opens a regular file for reading and writing and locks it until it is closed; *created is 1 for an empty one made
+ * here. A symbolic link is not followed.  -1 and errno, for pw_lock_reason. */
 int pw_lock_file (const char *path, pw_lock_how how, int *created);
 const char *pw_lock_reason (int why);
 
 /* ---- Outputs (output.c) ---- */
 
-/* Writes; PW_RESOURCE with the reason if that fails, or a write before it has failed. */
+/* Writes; PW_RESOURCE with the reason if this or an earlier write fails. */
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error);
-/* PW_RESOURCE if something written to its stream since errno was 0 has failed. */
+/* PW_RESOURCE if a write to its stream has failed since errno was 0. */
 int pw_output_check (pw_output *o, pw_error *error);
 
-/* Whether there is something before what is written. */
+/* Whether the output continues a file that is not empty. */
 int pw_output_continued (const pw_output *o);
 
-/* FNV-1a (Fowler, Noll, Vo) of bytes, after those it was begun with; begin with PW_CHECK. */
+/* Continues the FNV-1a hash (Fowler, Noll, Vo) with more bytes; begin with PW_CHECK. */
 #define PW_CHECK 14695981039346656037u
 unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size_t count);
 

@@ -8,7 +8,7 @@
 #include <string.h>
 #include "pinwheel-files.h"
 
-/* Replaces the decimal point of the locale, which may have several bytes. */
+/* Replaces the locale's decimal point, which may be several bytes long. */
 static void number_point (char *text) {
   size_t begin = strspn (text, "+-0123456789");
   size_t length = strcspn (text + begin, "+-0123456789e");

@@ -1,5 +1,5 @@
-/* A model file in C becomes a shared object: the user's compiler, run without a shell, in a folder nobody else can
- * write to. */
+/* Compiles a model file in C to a shared object: runs the user's compiler without a shell, in a folder that only the
+ * user can write to. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <signal.h>
@@ -14,9 +14,9 @@ extern char **environ;
 
 enum { BUILD_WORDS = 40 };
 
-/* The command line: the words of CC, then ours. */
+/* The command line: the words of CC, then our options. */
 typedef struct {
-  char *text; /* a copy of CC, cut into words */
+  char *text; /* a copy of CC, split into words */
   char *word[BUILD_WORDS];
   int words;
 } build_command;
@@ -42,7 +42,7 @@ static void build_options (build_command *c, const char *include, const char *so
                                          "-ffp-contract=off",
 #ifdef __APPLE__
                                          "-undefined",
-                                         "dynamic_lookup", /* the plug-in links to nothing */
+                                         "dynamic_lookup", /* the plug-in links to no library */
 #endif
                                          "-fPIC",
                                          "-shared",
@@ -56,7 +56,7 @@ static void build_options (build_command *c, const char *include, const char *so
   build_word (c, "-lm");
 }
 
-/* Starts the compiler with its messages on standard error, and signals as a program expects them. */
+/* Starts the compiler with its messages on standard error and default signal handling. */
 static int build_spawn (const build_command *c, const sigset_t *before, pid_t *child) {
   posix_spawn_file_actions_t files;
   posix_spawnattr_t attributes;
@@ -142,7 +142,7 @@ static int build_in_folder (const char *path, const sigset_t *before, pw_object_
   return status;
 }
 
-/* Ctrl-C, which the compiler gets too, waits until the folder is gone. */
+/* Defers Ctrl-C, which also reaches the compiler, until the folder is removed. */
 int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error) {
   sigset_t stop, before;
   sigemptyset (&stop);

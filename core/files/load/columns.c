@@ -1,7 +1,8 @@
-/* Two columns of a table of numbers in a CSV file.
+/* Reads two columns of numbers from a CSV file.
  *
- * Lines of cells, separated by whichever of , ; and tab the first line has; a line without any number before the others
- * names the columns, "NAME" or "NAME [unit]"; a unit that is not the one wanted converts the column.  Empty lines and lines that begin with # are passed over. */
+ * The separator is the one of , ; and tab that the first line contains.  A first line without numbers names the
+ * columns, "NAME" or "NAME [unit]"; a column in another unit than requested is converted.  Empty lines and lines that
+ * begin with # are skipped. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -12,9 +13,9 @@ enum { COLUMNS_LARGEST = 64 << 20, COLUMNS_MOST = 1000000 }; /* bytes; lines of 
 
 typedef struct {
   const char *shown; /* path for messages */
-  char *rest;        /* of the text */
-  int line;          /* number of the one last read */
-  int cells;         /* in each line */
+  char *rest;        /* text not yet read */
+  int line;          /* number of the last line read */
+  int cells;         /* per line */
   char separator;
   pw_error *error;
 } columns;
@@ -49,7 +50,7 @@ static int columns_count (const columns *c, const char *line) {
   return n;
 }
 
-/* Cuts cell i (from 0) off into the buffer, without blanks and quotes around it. */
+/* Copies cell i (from 0) to the buffer, without surrounding blanks and quotes. */
 static const char *columns_cell (const columns *c, const char *line, int i, char *buffer, size_t size) {
   while (i-- > 0) line = strchr (line, c->separator) + 1;
   const char stop[] = { c->separator, 0 }, *end = line + strcspn (line, stop);
@@ -70,14 +71,14 @@ static int columns_names (const columns *c, const char *line) {
 
 /* ---- Which columns ---- */
 
-/* Whether a cell of the first line is the column asked for, with or without its unit. */
+/* Whether a cell of the first line names the requested column, with or without its unit. */
 static int columns_is (const char *cell, const char *name) {
   char unit[100];
   size_t n = strlen (name);
   return strcmp (cell, name) == 0 || (pw_unit_split (cell, unit, sizeof unit) == n && strncmp (cell, name, n) == 0);
 }
 
-/* The column of a name in the first line, or of a number. */
+/* Finds a column from its name in the first line or from its number. */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *place) {
   char cell[100], unit[100], best[100] = "", hint[200];
   pw_nearest near = { .sought = name };
@@ -133,7 +134,7 @@ static int columns_rows (columns *c, char *line, const int place[2], const doubl
   return PW_OK;
 }
 
-/* Finds a column, and what to multiply it by. */
+/* Finds a column and its conversion factor. */
 static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit, int *place,
                          double *factor) {
   char cell[100], why[260];
@@ -173,7 +174,7 @@ static int columns_all (columns *c, const char *const column[2], const char *con
 
 int pw_columns_read (FILE *f, const char *shown, const char *const column[2], const char *const unit[2],
                      pw_arena *arena, double *value[2], int *count, pw_error *error) {
-  static const char mark[] = "\xEF\xBB\xBF"; /* of UTF-8, which some programs write first */
+  static const char mark[] = "\xEF\xBB\xBF"; /* byte order mark, which some programs write */
   char *text;
   size_t size;
   *count = 0;

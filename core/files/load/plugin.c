@@ -1,4 +1,4 @@
-/* Model files: found by name or path, loaded, and checked before use. */
+/* Finds model files from a name or a path, loads and checks them. */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <dlfcn.h>
 #include <errno.h>
@@ -17,7 +17,7 @@ struct pw_file {
 
 /* ---- Loading ---- */
 
-/* dlerror repeats the path in front of its reason. */
+/* Removes the path that dlerror puts before its reason. */
 static const char *plugin_reason (const char *object) {
   const char *why = dlerror ();
   if (why == NULL) return "unknown reason";
@@ -90,7 +90,7 @@ static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
   return PW_OK;
 }
 
-/* A file of the current directory must be named by path: says so if there is one, else gives the nearest name. */
+/* The hint for an unknown name: to use a path if the current directory has such a file, else the nearest name. */
 static int plugin_unknown (const pw_search *s, const char *name, pw_error *error) {
   struct stat info;
   char hint[120], here[200];

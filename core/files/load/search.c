@@ -1,7 +1,7 @@
-/* Where models are: the folders of PINWHEEL_MODELS, then those that belong to the running program and this library.
+/* The search path for models: the folders of PINWHEEL_MODELS, then those of the running program and of this library.
  *
- * Folders next to the program, or one up from it (tests), serve the build tree; those under ../lib and ../include an
- * installed one; the library's own place serves programs that are elsewhere, such as a user's own. */
+ * Folders next to the program, or one level up (tests), serve the build tree; ../lib and ../include serve an
+ * installation; the folder of the library serves programs installed elsewhere. */
 #define _GNU_SOURCE /* dladdr */
 #include <dirent.h>
 #include <dlfcn.h>
@@ -52,7 +52,7 @@ static int search_anchor (int which, char **folder, pw_error *error) {
 
 /* ---- Model files ---- */
 
-/* Keeps one model file; the same file reached twice counts once. */
+/* Adds a model file, unless it is in the list already. */
 static int search_keep (pw_search *s, const char *name, size_t length, const char *path, pw_error *error) {
   for (int i = 0; i < s->count; i++)
     if (strcmp (s->found[i].path, path) == 0 && strncmp (s->found[i].name, name, length) == 0 &&
@@ -89,7 +89,7 @@ static int search_entry (pw_search *s, const char *folder, const char *entry, pw
   return status;
 }
 
-/* Notes a folder as "/first:/second"; 0 if it has been looked into before. */
+/* Adds a folder to "/first:/second"; 0 if it was searched before. */
 static int search_note (pw_search *s, const char *real) {
   size_t n = strlen (real), used = strlen (s->folders);
   for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
@@ -98,7 +98,7 @@ static int search_note (pw_search *s, const char *real) {
   return 1;
 }
 
-/* A folder that is not there or closed to us is passed over, as in PATH; one that the machine fails to open is not. */
+/* Skips missing and inaccessible folders, as for PATH; other failures are errors. */
 static int search_folder (pw_search *s, const char *folder, pw_error *error) {
   char *real = realpath (folder, NULL);
   if (real == NULL && errno == ENOMEM) return search_no_memory (error);
@@ -162,7 +162,7 @@ void pw_search_close (pw_search *s) {
 
 /* ---- The header ---- */
 
-/* Looks into one folder: *include stays if it has no header. */
+/* Searches one folder; leaves *include unchanged if it has no header. */
 static int search_header (const char *anchor, const char *where, char **include, pw_error *error) {
   char *folder = pw_join (anchor, where, ""), *header = folder ? pw_join (folder, "pinwheel.h", "") : NULL;
   int status = header ? PW_OK : search_no_memory (error);

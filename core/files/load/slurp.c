@@ -1,4 +1,4 @@
-/* Files that are read: regular ones only, and at most so much of them. */
+/* Reads regular files up to a limit. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -8,7 +8,7 @@
 
 FILE *pw_open_input (const char *path, const char **why) {
   struct stat info = { .st_mode = S_IFREG };
-  int file = open (path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC); /* a FIFO does not wait for its writer */
+  int file = open (path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC); /* does not block on a FIFO */
   FILE *f = file >= 0 && fstat (file, &info) == 0 && S_ISREG (info.st_mode) ? fdopen (file, "rb") : NULL;
   if (f) return f;
   int number = S_ISREG (info.st_mode) ? errno : 0;

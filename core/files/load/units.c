@@ -1,7 +1,7 @@
-/* Units in the headers of tables: what they are in SI units, and whether they measure what is asked for.
+/* Units in the headers of tables: conversion to SI units and check of the dimension.
  *
- * A unit is a product of names, each perhaps with a power: "N mm", "m/s^2", "km/h".  A slash divides by the one name after it.
- * Angles count as a dimension of their own: 1/s does not say whether it means turns or radians. */
+ * A unit is a product of names with optional powers: "N mm", "m/s^2", "km/h".  A slash divides by the single name after
+ * it.  Angles are a separate dimension, since 1/s could mean turns or radians. */
 #include <ctype.h>
 #include <math.h>
 #include <stdio.h>
@@ -50,7 +50,7 @@ const pw_unit_name pw_unit_names[] = {
   { .name = NULL },
 };
 
-enum { UNITS_BASE = 4 }; /* the first of the names */
+enum { UNITS_BASE = 4 }; /* base units, first in the list */
 
 typedef struct {
   double factor;
@@ -59,7 +59,7 @@ typedef struct {
 
 static int units_read (const char *text, units_value *u);
 
-/* Multiplies by a name of n bytes to a power. */
+/* Multiplies by a power of the unit whose name has n bytes. */
 static int units_name (const char *name, size_t n, int power, units_value *u) {
   units_value one = { .factor = 1 };
   int i = 0;
@@ -138,7 +138,7 @@ size_t pw_unit_split (const char *cell, char *unit, size_t size) {
   const char *from = open + 1 + strspn (open + 1, " "), *end = cell + n - 1;
   while (end > from && end[-1] == ' ') end--;
   snprintf (unit, size, "%.*s", (int)(end - from < 90 ? end - from : 90), from);
-  if (*open == '(' && pw_unit_factor (unit, NULL, &factor) != PW_OK) return *unit = 0, n; /* it may be any remark */
+  if (*open == '(' && pw_unit_factor (unit, NULL, &factor) != PW_OK) return *unit = 0, n; /* may be any remark */
   if (strcmp (unit, "-") == 0 || strcmp (unit, "1") == 0) *unit = 0;
   for (name = (size_t)(open - cell); name > 0 && cell[name - 1] == ' ';) name--;
   return name;

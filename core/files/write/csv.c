@@ -1,4 +1,4 @@
-/* Tables of samples, one line each, that Octave, Python and gnuplot read as they are.
+/* Tables of samples, one line each, readable by Octave, Python and gnuplot.
  *
  *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies */
 #include <math.h>
@@ -8,9 +8,9 @@
 
 struct pw_csv {
   pw_output *output;
-  pw_workspace *workspace; /* for the points of contact; NULL: there are none */
+  pw_workspace *workspace; /* for contact points; NULL if the system has none */
   int ledger;
-  double (*contact)[3]; /* points of the system */
+  double (*contact)[3]; /* contact points of the system */
   char *line;           /* grows as needed */
   size_t used, room;
   int failed; /* out of memory */
@@ -49,7 +49,7 @@ static void csv_name (pw_csv *c, const char *name, const char *unit) {
   csv_text (c, "]");
 }
 
-/* Lines are written whole. */
+/* Writes whole lines. */
 static int csv_end (pw_csv *c, pw_error *error) {
   csv_text (c, "\n");
   size_t used = c->used;
@@ -174,7 +174,7 @@ int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_err
     c->used = 0;
     return status;
   }
-  for (int i = 0; i < pw_system_rows (s); i++) csv_number (c, 0 - sample->lambda[i]); /* 0 - 0 is not -0 */
+  for (int i = 0; i < pw_system_rows (s); i++) csv_number (c, 0 - sample->lambda[i]); /* avoids -0 */
   csv_number (c, sample->position);
   csv_number (c, sample->velocity);
   if (c->ledger) csv_ledger (c, s, sample);

@@ -16,7 +16,7 @@ static void json_bodies (pw_json *j, const pw_system *s, const pw_sample *x) {
   pw_json_close (j, '}');
 }
 
-/* Internal coordinates "ELEMENT.NAME" and their rates, those of an element in an object; most models have none. */
+/* Internal coordinates "ELEMENT.NAME" and their velocities, one object per element. */
 static void json_elements (pw_json *j, const pw_system *s, const pw_sample *x) {
   char name[300], element[300] = "";
   int n = pw_system_coordinates (s), first = 3 * pw_system_bodies (s);

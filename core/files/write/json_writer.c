@@ -1,4 +1,4 @@
-/* JSON, item by item. */
+/* Writes JSON item by item. */
 #include <math.h>
 #include "files.h"
 

@@ -1,11 +1,11 @@
-/* Where files are: links followed, also those to a file that does not exist yet; which names stand for the same file. */
+/* Locations of files: follows links, also to files that do not exist yet, and detects names of the same file. */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "files.h"
 
-enum { PLACE_LINKS = 40 }; /* one after the other; more are a circle */
+enum { LOCATION_LINKS = 40 }; /* a longer chain counts as a cycle */
 
 const char *pw_not_regular (mode_t mode) {
   return S_ISDIR (mode)    ? "it is a directory, not a regular file"
@@ -16,35 +16,35 @@ const char *pw_not_regular (mode_t mode) {
                            : "it is not a regular file";
 }
 
-static const char *place_base (const char *path) {
+static const char *location_base (const char *path) {
   const char *slash = strrchr (path, '/');
   return slash ? slash + 1 : path;
 }
 
 char *pw_folder_of (const char *path) {
-  size_t n = (size_t)(place_base (path) - path);
+  size_t n = (size_t)(location_base (path) - path);
   if (n == 0) return strdup (".");
   return strndup (path, n > 1 ? n - 1 : 1);
 }
 
-static int place_same (const struct stat *a, const struct stat *b) {
+static int location_same (const struct stat *a, const struct stat *b) {
   return a->st_dev == b->st_dev && a->st_ino == b->st_ino;
 }
 
-/* The descriptor of this process that /dev/fd/N, /proc/self/fd/N and other names of that folder stand for; -1: none. */
-static int place_descriptor (const char *path) {
-  const char *base = place_base (path);
+/* The descriptor of this process that a path in /dev/fd or /proc/self/fd means, or -1. */
+static int location_descriptor (const char *path) {
+  const char *base = location_base (path);
   struct stat here, own;
   size_t digits = strspn (base, "0123456789");
   if (digits == 0 || digits > 9 || base[digits]) return -1;
   char *folder = pw_folder_of (path);
-  int is_own = folder && stat (folder, &here) == 0 && stat ("/dev/fd", &own) == 0 && place_same (&here, &own);
+  int is_own = folder && stat (folder, &here) == 0 && stat ("/dev/fd", &own) == 0 && location_same (&here, &own);
   free (folder);
   return is_own ? atoi (base) : -1;
 }
 
-/* Replaces the path of a link by where it leads; an errno value. */
-static int place_follow (pw_location *p) {
+/* Replaces the path of a link by its target.  0 or an errno value. */
+static int location_follow (pw_location *p) {
   char target[4096];
   ssize_t n = readlink (p->path, target, sizeof target - 1);
   if (n < 0) return errno;
@@ -60,12 +60,12 @@ static int place_follow (pw_location *p) {
 int pw_locate (pw_location *p, const char *path) {
   *p = (pw_location){ .path = strdup (path), .descriptor = strcmp (path, "-") == 0 ? STDOUT_FILENO : -1 };
   if (p->path == NULL) return ENOMEM;
-  for (int links = 0, why; links < PLACE_LINKS; links++) {
-    if (p->descriptor < 0) p->descriptor = place_descriptor (p->path);
+  for (int links = 0, why; links < LOCATION_LINKS; links++) {
+    if (p->descriptor < 0) p->descriptor = location_descriptor (p->path);
     p->exists = (p->descriptor >= 0 ? fstat (p->descriptor, &p->info) : lstat (p->path, &p->info)) == 0;
     if (!p->exists) return p->descriptor < 0 && errno == ENOENT ? 0 : errno;
     if (p->descriptor >= 0 || !S_ISLNK (p->info.st_mode)) return 0;
-    if ((why = place_follow (p)) != 0) return why;
+    if ((why = location_follow (p)) != 0) return why;
   }
   return ELOOP;
 }
@@ -74,24 +74,24 @@ int pw_locate (pw_location *p, const char *path) {
 
 typedef struct {
   const pw_use *use;
-  pw_location place;
-  struct stat folder; /* the one it is in */
-  int known;          /* 1: that was found */
-} place_use;
+  pw_location location;
+  struct stat folder; /* that contains it */
+  int known;          /* 1: the folder was found */
+} location_use;
 
-/* A file that cannot be found cannot be opened either; PW_RESOURCE without memory. */
-static int place_use_find (place_use *u, const pw_use *use) {
-  *u = (place_use){ .use = use };
-  int why = use->path ? pw_locate (&u->place, use->path) : ENOENT;
+/* Ignores files that cannot be located, since opening them fails, too.  PW_RESOURCE without memory. */
+static int location_use_find (location_use *u, const pw_use *use) {
+  *u = (location_use){ .use = use };
+  int why = use->path ? pw_locate (&u->location, use->path) : ENOENT;
   if (why) return why == ENOMEM ? PW_RESOURCE : PW_OK;
-  char *folder = pw_folder_of (u->place.path);
+  char *folder = pw_folder_of (u->location.path);
   u->known = folder && stat (folder, &u->folder) == 0;
   free (folder);
   return folder ? PW_OK : PW_RESOURCE;
 }
 
-/* Whether a name is another one with one of some endings. */
-static int place_ends (const char *name, const char *before, const char *const *ending) {
+/* Whether a name is `before` (NULL: any name) followed by one of the endings. */
+static int location_ends (const char *name, const char *before, const char *const *ending) {
   size_t n = before ? strlen (before) : 0, m = strlen (name);
   for (; *ending; ending++) {
     size_t e = strlen (*ending);
@@ -101,22 +101,24 @@ static int place_ends (const char *name, const char *before, const char *const *
   return 0;
 }
 
-/* Whether what writes `a` touches `b`: the same file, its temporary name, or one of the files that a folder gets. */
-static int place_touches (const place_use *a, const place_use *b) {
+/* Whether writing `a` affects `b`: the same file, a temporary file, or a file written into a folder. */
+static int location_conflicts (const location_use *a, const location_use *b) {
   static const char *const temporary[] = { ".part", ".sorted", ".next", NULL };
   struct stat null;
   if (a->use->how == PW_READS || !a->known || !b->known) return 0;
-  const char *name = place_base (b->place.path);
+  const char *name = location_base (b->location.path);
   if (a->use->how == PW_WRITES_INTO)
-    return a->place.exists && place_same (&a->place.info, &b->folder) && place_ends (name, NULL, a->use->names);
-  if (a->place.exists && b->place.exists && place_same (&a->place.info, &b->place.info))
-    return !(S_ISCHR (a->place.info.st_mode) && stat ("/dev/null", &null) == 0 &&
-             null.st_rdev == a->place.info.st_rdev);
-  if (a->place.descriptor >= 0 || b->place.descriptor >= 0 || !place_same (&a->folder, &b->folder)) return 0;
-  return strcmp (name, place_base (a->place.path)) == 0 || place_ends (name, place_base (a->place.path), temporary);
+    return a->location.exists && location_same (&a->location.info, &b->folder) &&
+           location_ends (name, NULL, a->use->names);
+  if (a->location.exists && b->location.exists && location_same (&a->location.info, &b->location.info))
+    return !(S_ISCHR (a->location.info.st_mode) && stat ("/dev/null", &null) == 0 &&
+             null.st_rdev == a->location.info.st_rdev);
+  if (a->location.descriptor >= 0 || b->location.descriptor >= 0 || !location_same (&a->folder, &b->folder)) return 0;
+  return strcmp (name, location_base (a->location.path)) == 0 ||
+         location_ends (name, location_base (a->location.path), temporary);
 }
 
-static int place_fail (const pw_use *a, const pw_use *b, pw_error *error) {
+static int location_fail (const pw_use *a, const pw_use *b, pw_error *error) {
   const char *path = strcmp (b->path, "-") == 0 ? "standard output (-)" : b->path;
   if (b->how == PW_WRITES && a->how == PW_WRITES)
     return pw_fail (error, PW_INPUT, "%s and %s cannot both write to %.300s", a->what, b->what, path);
@@ -124,14 +126,14 @@ static int place_fail (const pw_use *a, const pw_use *b, pw_error *error) {
 }
 
 int pw_check_paths (const pw_use *use, int count, pw_error *error) {
-  place_use *u = calloc ((size_t)count, sizeof *u);
+  location_use *u = calloc ((size_t)count, sizeof *u);
   int status = u ? PW_OK : PW_RESOURCE;
-  for (int i = 0; i < count && status == PW_OK; i++) status = place_use_find (u + i, use + i);
+  for (int i = 0; i < count && status == PW_OK; i++) status = location_use_find (u + i, use + i);
   if (status != PW_OK) pw_fail (error, status, "out of memory");
   for (int i = 0; i < count && status == PW_OK; i++)
     for (int k = 0; k < count && status == PW_OK; k++)
-      if (i != k && place_touches (u + i, u + k)) status = place_fail (u[i].use, u[k].use, error);
-  for (int i = 0; u && i < count; i++) free (u[i].place.path);
+      if (i != k && location_conflicts (u + i, u + k)) status = location_fail (u[i].use, u[k].use, error);
+  for (int i = 0; u && i < count; i++) free (u[i].location.path);
   free (u);
   return status;
 }

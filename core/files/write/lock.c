@@ -1,7 +1,7 @@
-/* Files and folders that belong to one process at a time.
+/* Files and folders that one process uses at a time.
  *
- * The lock counts, not the existence of the file: a lock ends with the process that holds it, so files that a killed process
- * left do not block others. */
+ * The lock counts, not the existence of the file: a lock ends with its process, so files left by a killed process do
+ * not block others. */
 #include <errno.h>
 #include <fcntl.h>
 #include <string.h>
@@ -9,9 +9,9 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { LOCK_TRIES = 100 }; /* one for each time another process has just released the file */
+enum { LOCK_TRIES = 100 }; /* retries when another process has just released the file */
 
-/* An errno value.  Some file systems have no locks: there nothing can be protected. */
+/* 0 or an errno value.  File systems without locks give no protection. */
 static int lock_take (int file) {
   while (flock (file, LOCK_EX | LOCK_NB) != 0) {
     if (errno == ENOLCK || errno == EOPNOTSUPP || errno == ENOSYS) return 0;
@@ -27,7 +27,7 @@ const char *pw_lock_reason (int why) {
                             : strerror (why);
 }
 
-/* Never follows a link; a new file must not exist already. */
+/* Does not follow links; a new file must not exist. */
 static int lock_open (const char *path, pw_lock_how how, int *created) {
   int file = -1;
   *created = 0;
@@ -39,7 +39,7 @@ static int lock_open (const char *path, pw_lock_how how, int *created) {
   return open (path, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
 }
 
-/* Locks what was opened.  0; an errno value, ESTALE if the path has come to mean another file meanwhile. */
+/* Locks the open file.  0 or an errno value; ESTALE if the path now means another file. */
 static int lock_opened (int file, const char *path) {
   struct stat info, now;
   if (fstat (file, &info) != 0) return errno;
@@ -71,7 +71,7 @@ int pw_lock_path (const char *path, pw_error *error) {
 int pw_lock_folder (const char *path, pw_error *error) {
   int file = open (path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   int why = file < 0 ? errno : lock_take (file);
-  if (why == EBADF) why = 0; /* NFS locks only what is open for writing, which no folder is */
+  if (why == EBADF) why = 0; /* NFS only locks files open for writing, never folders */
   if (why == 0) return file;
   if (file >= 0) close (file);
   pw_fail (error, PW_RESOURCE, "cannot write into %s: %s", path,

@@ -1,8 +1,8 @@
-/* Files that are complete or have a temporary name: written as NAME.part, renamed when complete.
+/* Output files: written as NAME.part, renamed when complete.
  *
  * The temporary file is locked from its opening until its folder is on the disk, so that two processes never write the
- * same output.  What is there already and is no regular file (a terminal, a pipe, /dev/null) is written directly, and so
- * are descriptors that the process has open. */
+ * same output.  Existing files that are not regular (a terminal, a pipe, /dev/null) and open descriptors of the process
+ * are written directly. */
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -11,14 +11,14 @@
 #include "files.h"
 
 struct pw_output {
-  FILE *stream;  /* NULL: closed, nothing but the name is missing */
+  FILE *stream;  /* NULL: closed, only the renaming is missing */
   char *path;    /* as the user knows it */
   char *real;    /* of the file itself, links followed */
   char *part;    /* its temporary name; NULL: written directly */
   int file;      /* keeps the temporary file locked; -1: written directly */
-  int folder;    /* the one it is in; -1: written directly */
-  int why;       /* errno of the first write that failed */
-  int continued; /* 1: continued: the file is not empty */
+  int folder;    /* that contains it; -1: written directly */
+  int why;       /* errno of the first failed write */
+  int continued; /* 1: continues a file that is not empty */
   int discard;   /* 1: an incomplete file is removed */
 };
 
@@ -43,7 +43,8 @@ static int output_fail (const pw_output *o, int why, int kept, pw_error *error) 
 
 /* ---- Opening ---- */
 
-/* A descriptor of the process, or a file that is not a regular file.  A FIFO waits for its reader, which a signal ends. */
+/* Opens a descriptor of the process or a file that is not regular.  A FIFO blocks until it has a reader or a signal
+ * arrives. */
 static int output_open_direct (pw_output *o, const pw_location *p) {
   int flags = p->descriptor < 0 ? O_WRONLY : fcntl (p->descriptor, F_GETFL);
   if (flags < 0) return errno;
@@ -61,7 +62,7 @@ static int output_open_direct (pw_output *o, const pw_location *p) {
   return why;
 }
 
-/* The mode and, as far as we may, the owner of the file that will be replaced. */
+/* Copies the mode and, if permitted, the owner of the file to be replaced. */
 static int output_inherit (int file, const struct stat *old) {
   struct stat now;
   mode_t mode = old->st_mode & 07777;
@@ -73,7 +74,7 @@ static int output_inherit (int file, const struct stat *old) {
   return 0;
 }
 
-/* The stream has a descriptor of its own, so that the lock outlives it. */
+/* The stream has a separate descriptor, so that the lock outlives it. */
 static int output_stream (pw_output *o) {
   int file = fcntl (o->file, F_DUPFD_CLOEXEC, 3);
   o->stream = file < 0 ? NULL : fdopen (file, "r+");
@@ -89,14 +90,14 @@ static int output_open_part (pw_output *o, pw_lock_how how) {
   char *folder = pw_folder_of (o->real);
   if (folder == NULL) return ENOMEM;
   o->folder = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  int why = o->folder < 0 && errno != EACCES ? errno : 0; /* what cannot be listed can be written into */
+  int why = o->folder < 0 && errno != EACCES ? errno : 0; /* a folder that cannot be listed may still be writable */
   free (folder);
   if (why) return why;
   o->file = pw_lock_file (o->part, how, &created);
   return o->file < 0 ? errno : 0;
 }
 
-/* Where it goes: into `p`, and o->part unless it is written directly. */
+/* Finds the location `p`, and o->part unless the file is written directly. */
 static int output_place (pw_output *o, pw_location *p, const char *ending) {
   int why = pw_locate (p, o->path);
   o->real = p->path;
@@ -187,7 +188,7 @@ int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error
 
 /* ---- Closing ---- */
 
-/* Writes the buffer to the file, and the file to the disk if it is one.  0, an errno value, or -1 if it is not known. */
+/* Flushes the stream and writes a regular file to the disk.  0, an errno value, or -1 for an unknown reason. */
 static int output_sync (pw_output *o) {
   int bad = ferror (o->stream);
   if (bad) return o->why ? o->why : -1;
@@ -211,12 +212,12 @@ int pw_output_ready (pw_output *o, pw_error *error) {
   return o->why ? output_fail (o, o->why, 1, error) : PW_OK;
 }
 
-/* Cuts the temporary file back to its last complete line. */
+/* Truncates the temporary file after its last complete line. */
 static void output_cut (pw_output *o) {
   char c;
   off_t end = lseek (o->file, 0, SEEK_END), keep = end;
   while (keep > 0 && pread (o->file, &c, 1, keep - 1) == 1 && c != '\n') keep--;
-  if (keep < end && ftruncate (o->file, keep) != 0) return; /* then it stays as it is */
+  if (keep < end && ftruncate (o->file, keep) != 0) return; /* keep the incomplete line */
 }
 
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
@@ -234,14 +235,14 @@ void pw_output_discard (pw_output *o) {
   output_free (o);
 }
 
-/* The folder knows the new name only when it is on the disk itself; some file systems refuse that, and need it not. */
+/* The new name is safe once the folder is on the disk; file systems that refuse this do not need it. */
 static int output_sync_folder (const pw_output *o, pw_error *error) {
   if (o->folder < 0 || fsync (o->folder) == 0 || errno == EINVAL || errno == EROFS || errno == ENOTSUP) return PW_OK;
   return pw_fail (error, PW_RESOURCE, "%s is written, but its folder cannot be brought to the disk: %s", o->path,
                   strerror (errno));
 }
 
-/* Renames all of them, or none. */
+/* Renames all files or none. */
 static int output_rename_all (pw_output *const *o, int count, pw_error *error) {
   for (int i = 0; i < count; i++) {
     if (o[i] == NULL || o[i]->part == NULL || rename (o[i]->part, o[i]->real) == 0) continue;
@@ -276,7 +277,7 @@ int pw_output_finish (pw_output *o, pw_error *error) {
   return pw_output_finish_all (&o, 1, error);
 }
 
-/* ---- Going on where another process was stopped ---- */
+/* ---- Continuation of an interrupted run ---- */
 
 unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size_t count) {
   const unsigned char *c = bytes;
@@ -284,7 +285,7 @@ unsigned long long pw_check_sum (unsigned long long sum, const void *bytes, size
   return sum;
 }
 
-/* The check sum of the last 64 kB before `length`; PW_RETRY if the file is shorter. */
+/* Checksum of the last 64 kB before `length`; PW_RETRY if the file is shorter. */
 static int output_check (int file, pw_mark *mark) {
   char bytes[4096];
   unsigned long long at = mark->length > 65536 ? mark->length - 65536 : 0;
@@ -314,13 +315,13 @@ int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "cannot read %s", o->part);
 }
 
-/* 1 if the temporary file begins with what was marked. */
+/* 1 if the temporary file begins with the marked contents. */
 static int output_is_marked (const pw_output *o, const pw_mark *mark) {
   pw_mark now = { .length = mark->length };
   return output_check (o->file, &now) == PW_OK && now.check == mark->check;
 }
 
-/* If a process was killed just after completing its table, the table has its final name. */
+/* A process killed just after completing its table leaves it under its final name. */
 static int output_take_back (pw_output *o, const pw_mark *mark) {
   int created, file = pw_lock_file (o->real, PW_LOCK_EXISTING, &created);
   if (file < 0) return errno;
