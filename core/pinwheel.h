@@ -248,6 +248,11 @@ int pw_model_refuse (pw_model *m, const char *format, ...);
 double pw_jacobi_am (double u, double m);
 double pw_elliptic_K (double m);
 
+/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; beyond, those of the C library. */
+void pw_sin_cos (double x, double *sine, double *cosine);
+double pw_sin (double x);
+double pw_cos (double x);
+
 /* ---- The element kinds: constraints on positions, on velocities, forces, and what has no effect ---- */
 
 /* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic rows. */

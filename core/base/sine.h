@@ -1,0 +1,59 @@
+/* Sine and cosine, to 0.8 ulp for |x| < PW_SINE_LIMIT, in lanes of vector registers.
+ *
+ * x = n pi/2 + y with pi/2 in three parts of 33 bits, whose products with n are exact, and a tail (Cody & Waite 1980).  The
+ * differences keep their round-off, so that y + lo is accurate next to multiples of pi/2 too.  Sine and cosine of y are the
+ * polynomials of fdlibm (Sun Microsystems 1993, k_sin.c and k_cos.c).  There are no branches, and nothing is fused, so that the
+ * bits do not depend on the C library, the compiler or the processor. */
+#ifndef PW_SINE_H
+#define PW_SINE_H
+
+#include <stdint.h>
+
+#ifdef __FAST_MATH__
+#error "-ffast-math and -Ofast break the argument reduction"
+#endif
+
+enum { PW_SINE_LANES = 2 };
+#define PW_SINE_LIMIT 1e6
+
+/* GNU C's vectors: operations work on all lanes. */
+typedef double pw_lanes __attribute__ ((vector_size (8 * PW_SINE_LANES)));
+typedef uint64_t pw_lane_bits __attribute__ ((vector_size (8 * PW_SINE_LANES)));
+
+static inline pw_lanes pw_sine_polynomial (pw_lanes y, pw_lanes lo) {
+  pw_lanes z = y * y, v = z * y;
+  pw_lanes r =
+      8.33333333332248946124e-03 +
+      z * (-1.98412698298579493134e-04 +
+           z * (2.75573137070700676789e-06 + z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)));
+  return y - ((z * (0.5 * lo - v * r) - lo) + v * 1.66666666666666324348e-01);
+}
+
+static inline pw_lanes pw_cosine_polynomial (pw_lanes y, pw_lanes lo) {
+  pw_lanes z = y * y, half = 0.5 * z, w = 1 - half;
+  pw_lanes r =
+      4.16666666666666019037e-02 +
+      z * (-1.38888888888741095749e-03 +
+           z * (2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 +
+                                                  z * (2.08757232129817482790e-09 + z * -1.13596475577881948265e-11))));
+  return w + (((1 - w) - half) + (z * (z * r) - y * lo));
+}
+
+/* For |angle| < PW_SINE_LIMIT in all lanes. */
+static inline void pw_sin_cos_lanes (pw_lanes angle, pw_lanes *sine, pw_lanes *cosine) {
+  const double integers = 6755399441055744.0; /* 1.5 x 2^52: a sum with it is rounded to an integer, its last bits */
+  pw_lane_bits sign = (pw_lane_bits)angle >> 63 << 63;
+  pw_lanes x = (pw_lanes)((pw_lane_bits)angle ^ sign);
+  pw_lanes shifted = x * 6.36619772367581382433e-01 + integers, n = shifted - integers;
+  /* Where a difference is smaller than what is subtracted, it is exact; else its round-off is (Dekker 1971). */
+  pw_lanes a = x - n * 1.57079632673412561417e+00, b = n * 6.07710050630396597660e-11,
+           c = n * 2.02226624871116645580e-21;
+  pw_lanes d = a - b, y = d - c, lo = (((a - d) - b) + ((d - y) - c)) - n * 8.47842766036889956997e-32;
+  pw_lane_bits quadrant = (pw_lane_bits)shifted, odd = 0 - (quadrant & 1);
+  pw_lane_bits s = (pw_lane_bits)pw_sine_polynomial (y, lo), k = (pw_lane_bits)pw_cosine_polynomial (y, lo),
+               swap = (s ^ k) & odd;
+  *sine = (pw_lanes)(s ^ swap ^ (quadrant >> 1 << 63) ^ sign);
+  *cosine = (pw_lanes)(k ^ swap ^ ((quadrant + 1) >> 1 << 63));
+}
+
+#endif
