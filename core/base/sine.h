@@ -39,11 +39,9 @@ static inline pw_lanes pw_cosine_polynomial (pw_lanes y, pw_lanes lo) {
   return w + (((1 - w) - half) + (z * (z * r) - y * lo));
 }
 
-/* For |angle| < PW_SINE_LIMIT in all lanes. */
-static inline void pw_sin_cos_lanes (pw_lanes angle, pw_lanes *sine, pw_lanes *cosine) {
+/* For |x| < PW_SINE_LIMIT in all lanes. */
+static inline void pw_sin_cos_lanes (pw_lanes x, pw_lanes *sine, pw_lanes *cosine) {
   const double integers = 6755399441055744.0; /* 1.5 x 2^52: a sum with it is rounded to an integer, its last bits */
-  pw_lane_bits sign = (pw_lane_bits)angle >> 63 << 63;
-  pw_lanes x = (pw_lanes)((pw_lane_bits)angle ^ sign);
   pw_lanes shifted = x * 6.36619772367581382433e-01 + integers, n = shifted - integers;
   /* Where a difference is smaller than what is subtracted, it is exact; else its round-off is (Dekker 1971). */
   pw_lanes a = x - n * 1.57079632673412561417e+00, b = n * 6.07710050630396597660e-11,
@@ -52,7 +50,7 @@ static inline void pw_sin_cos_lanes (pw_lanes angle, pw_lanes *sine, pw_lanes *c
   pw_lane_bits quadrant = (pw_lane_bits)shifted, odd = 0 - (quadrant & 1);
   pw_lane_bits s = (pw_lane_bits)pw_sine_polynomial (y, lo), k = (pw_lane_bits)pw_cosine_polynomial (y, lo),
                swap = (s ^ k) & odd;
-  *sine = (pw_lanes)(s ^ swap ^ (quadrant >> 1 << 63) ^ sign);
+  *sine = (pw_lanes)(s ^ swap ^ (quadrant >> 1 << 63));
   *cosine = (pw_lanes)(k ^ swap ^ ((quadrant + 1) >> 1 << 63));
 }
 
