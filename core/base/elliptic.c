@@ -36,6 +36,6 @@ double pw_jacobi_am (double u, double m) {
   if (!(m < 1)) return m == 1 ? 2 * atan (tanh (u / 2)) : NAN;
   int n = elliptic_mean (m, &a, ratio);
   double phi = ldexp (a * u, n);
-  while (n-- > 0) phi = (phi + asin (ratio[n] * sin (phi))) / 2;
+  while (n-- > 0) phi = (phi + asin (ratio[n] * pw_sin (phi))) / 2;
   return phi;
 }

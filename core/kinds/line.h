@@ -28,7 +28,7 @@ typedef struct {
 } line_axes;
 
 static inline line line_make (const double at[2][2], double heading) {
-  line k = { { at[0][0], at[0][1] }, { -sin (heading), cos (heading) }, 0, 0 };
+  line k = { { at[0][0], at[0][1] }, { -pw_sin (heading), pw_cos (heading) }, 0, 0 };
   k.c = k.n[0] * at[1][0] + k.n[1] * at[1][1];
   return k;
 }

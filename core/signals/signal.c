@@ -80,11 +80,12 @@ static int signal_function (const pw_source *source, double t, int derivatives, 
 
 /* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p); a force needs the value alone */
 static void signal_harmonic (const pw_signal *s, double t, int derivatives, double u[3]) {
-  double A = s->harmonic.amplitude, w = s->harmonic.omega, angle = w * t + s->harmonic.phase, c = A * cos (angle);
-  u[0] = s->harmonic.offset + c;
+  double A = s->harmonic.amplitude, w = s->harmonic.omega, sine, cosine;
+  pw_sin_cos (w * t + s->harmonic.phase, &sine, &cosine);
+  u[0] = s->harmonic.offset + A * cosine;
   if (!derivatives) return;
-  u[1] = -A * w * sin (angle);
-  u[2] = -w * w * c;
+  u[1] = -A * w * sine;
+  u[2] = -w * w * (A * cosine);
 }
 
 int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]) {

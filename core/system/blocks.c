@@ -78,8 +78,8 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
   double J[PW_MAX_ROWS * PW_MAX_COLS] = { 0 };
   memset (y, 0, PW_MAX_COLS * sizeof *y);
   for (int n = 0; n < kind->bodies; n++) {
-    one->configuration[n].cos = cos (one->configuration[n].phi);
-    one->configuration[n].sin = sin (one->configuration[n].phi);
+    pw_configuration *p = &one->configuration[n];
+    pw_sin_cos (p->phi, &p->sin, &p->cos);
   }
   if (below == NULL) return;
   if (blocks_table[block].product == BLOCKS_RAW) {

@@ -1,5 +1,6 @@
 /* Placing a state: the configurations of all bodies, the signals of all elements. */
 #include <math.h>
+#include "sine.h"
 #include "system.h"
 #include "signal.h"
 #include "unroll.h"
@@ -14,9 +15,18 @@ static void kinematics_own (pw_workspace *w, const double *q, const double *v) {
 
 static inline void kinematics_poses (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) kinematics_own (w, q, v);
-  for (pw_configuration *p = w->configuration, *end = p + w->s->bodies; p < end; p++, q += 3, v += 3) {
-    double phi = q[2];
-    *p = (pw_configuration){ q[0], q[1], phi, cos (phi), sin (phi), v[0], v[1], v[2] };
+  pw_configuration *p = w->configuration, *end = p + w->s->bodies;
+  for (; p + 1 < end; p += 2, q += 6, v += 6) {
+    pw_lanes c, s;
+    if (!(fabs (q[2]) < PW_SINE_LIMIT && fabs (q[5]) < PW_SINE_LIMIT)) break;
+    pw_sin_cos_lanes ((pw_lanes){ q[2], q[5] }, &s, &c);
+    p[0] = (pw_configuration){ q[0], q[1], q[2], c[0], s[0], v[0], v[1], v[2] };
+    p[1] = (pw_configuration){ q[3], q[4], q[5], c[1], s[1], v[3], v[4], v[5] };
+  }
+  for (; p < end; p++, q += 3, v += 3) {
+    double c, s;
+    pw_sin_cos (q[2], &s, &c);
+    *p = (pw_configuration){ q[0], q[1], q[2], c, s, v[0], v[1], v[2] };
   }
 }
 

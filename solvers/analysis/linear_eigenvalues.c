@@ -24,7 +24,7 @@ static void eigen_disturb (int n, double least, double *B) {
   for (int i = 0; i < n; i++, B += n) {
     double most = least;
     for (int k = 0; k < n; k++) most = fmax (most, fabs (B[k]));
-    for (int k = 0; k < n; k++) B[k] += EIGEN_ROUND * most * sin (1.7 + 2.39996 * (double)(i * n + k + 1));
+    for (int k = 0; k < n; k++) B[k] += EIGEN_ROUND * most * pw_sin (1.7 + 2.39996 * (double)(i * n + k + 1));
   }
 }
 

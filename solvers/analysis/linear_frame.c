@@ -145,7 +145,7 @@ int pw_linear_split (pw_linearisation *x, int k, double *B) {
 
 /* Rotates a vector of all coordinates with the frame. */
 static void linear_rotate (const pw_linearisation *x, double angle, const double *in, double *out) {
-  double c = cos (angle), s = sin (angle);
+  double c = pw_cos (angle), s = pw_sin (angle);
   memcpy (out, in, (size_t)x->n * sizeof *out);
   for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
     out[j] = c * in[j] - s * in[j + 1];
@@ -157,7 +157,7 @@ static void linear_rotate (const pw_linearisation *x, double angle, const double
  * Angles, internal coordinates, and all coordinates if the frame does not rotate, continue at constant velocity. */
 static void linear_later (const pw_linearisation *x, double time, double *q, double *v) {
   const pw_linear_frame *f = &x->frame;
-  double w = f->twist[2], c = cos (w * time), s = sin (w * time);
+  double w = f->twist[2], c = pw_cos (w * time), s = pw_sin (w * time);
   linear_rotate (x, w * time, x->r->v, v);
   for (int j = 0; j < x->n; j++) q[j] = x->r->q[j] + time * x->r->v[j];
   for (int j = 0; w != 0 && j < 3 * x->r->s->bodies; j += 3) {
@@ -202,7 +202,7 @@ static int linear_same (pw_linearisation *x, double time) {
 static void linear_probe (pw_linearisation *x) {
   memset (x->along, 0, 2 * (size_t)x->n * sizeof *x->along);
   for (int c = 0; c < x->size; c++) {
-    double weight = x->r->s->scale.length * sin (1.7 + 2.39996 * (c + 1));
+    double weight = x->r->s->scale.length * pw_sin (1.7 + 2.39996 * (c + 1));
     pw_linear_tangent (x, c);
     for (int j = 0; j < 2 * x->n; j++) x->along[j] += weight * x->x[j];
   }

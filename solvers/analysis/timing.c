@@ -219,7 +219,7 @@ static int profile_open (profile *p, pw_error *error) {
   p->before = nextafter (p->t, -INFINITY);
   memcpy (p->q, p->r->q, bytes);
   memcpy (p->v, p->r->v, bytes);
-  for (int j = 0; j < p->s->coords; j++) p->far[j] = p->q[j] + PROFILE_DISTANCE * p->s->scale.length * sin (j + 1);
+  for (int j = 0; j < p->s->coords; j++) p->far[j] = p->q[j] + PROFILE_DISTANCE * p->s->scale.length * pw_sin (j + 1);
   pw_update_kinematics (p->r->w, p->t, p->q, p->v);
   pw_evaluate_J (p->r->w);
   p->saddle = pw_saddle_open (p->r->w, p->s->mass, p->s->rows, p->r->active, error);

@@ -141,7 +141,7 @@ static int rank_search_open (rank_search *x, const pw_system *s) {
 static void rank_direction (const pw_system *s, const rank_search *x, int rank, const double *v, int number) {
   double most = 0;
   for (int j = 0; j < s->coords; j++)
-    x->motion[j] = number == 0 ? v[j] * pw_rank_unit (s, j) : sin (1.7 + 2.39996 * (j + 1) * number);
+    x->motion[j] = number == 0 ? v[j] * pw_rank_unit (s, j) : pw_sin (1.7 + 2.39996 * (j + 1) * number);
   rank_orthogonalise (x->motion, x->rows, x->kept, rank, s->coords);
   for (int j = 0; j < s->coords; j++) most = fmax (most, fabs (x->motion[j]));
   for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / pw_rank_unit (s, j);
@@ -321,7 +321,7 @@ double pw_rank_conditioning (pw_run *r) {
   memset (f, 0, (size_t)(s->coords + 3 + m) * sizeof *f);
   for (const pw_element_batch *b = r->w->batch; b < r->w->batch + s->constraints; b++)
     for (int n = 0; n < b->b.count * b->kind->rows; n++) {
-      double x = sin (2.39996 * (b->row + n + 1));
+      double x = pw_sin (2.39996 * (b->row + n + 1));
       if (!r->active[b->row + n]) rank_add_row (s, b, n, (x + copysign (1, x)) / 2, f);
     }
   pw_saddle_solve (r->saddle, f, nothing, f, c);

@@ -250,7 +250,7 @@ static void watchdog_look_around (pw_run *r) {
   const pw_system *s = r->s;
   pw_geometry *g = &r->geometry;
   for (int n = 1; n <= WATCHDOG_PLACES; n++) {
-    for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * sin (2.39996 * (j + 1) * n + n);
+    for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_sin (2.39996 * (j + 1) * n + n);
     if (pw_update_kinematics (r->w, r->t, g->q, r->v) != PW_OK) break;
     pw_evaluate_J (r->w);
     g->typical = fmax (g->typical, pw_watchdog_sine (r, NULL));

@@ -79,9 +79,9 @@ static long double evaluator_one (evaluator *e, const char *name, long double x)
   while (i < 14 && strcmp (name, names[i]) != 0) i++;
   switch (i) {
   case 0:
-    return BOTH (e, sin, x);
+    return e->wide ? sinl (x) : (long double)pw_sin ((double)x);
   case 1:
-    return BOTH (e, cos, x);
+    return e->wide ? cosl (x) : (long double)pw_cos ((double)x);
   case 2:
     return BOTH (e, tan, x);
   case 3:
@@ -285,17 +285,19 @@ static void expression_value (const pw_expression *x, const char *text, const do
   expression_differs ("value", variable, 0, value, e.tie ? after : expected);
 }
 
-/* A derivative by differences of two widths; 0 if they disagree, as they do near kinks. */
+/* A derivative by differences of three widths; 0 if they disagree, as they do near kinks, and where jumps of a rounded value
+ * look like a slope. */
 static int expression_difference (const char *text, const double *variable, int by, int order, long double *d,
                                   long double *error) {
-  long double u[2];
-  for (int i = 0; i < 2; i++) {
-    long double h = 1e-3L / (1 << i), a = evaluate_at (text, variable, by, -h), b = evaluate_at (text, variable, by, h);
+  long double u[3];
+  for (int i = 0; i < 3; i++) {
+    long double h = i < 2 ? 1e-3L / (1 << i) : 1e-6L, a = evaluate_at (text, variable, by, -h),
+                b = evaluate_at (text, variable, by, h);
     u[i] = order == 1 ? (b - a) / (2 * h) : (a - 2 * evaluate_at (text, variable, by, 0) + b) / (h * h);
   }
   *d = (4 * u[1] - u[0]) / 3;
   *error = fabsl (u[1] - u[0]);
-  return *error <= 1e-4L * (1 + fabsl (*d));
+  return *error <= 1e-4L * (1 + fabsl (*d)) && fabsl (u[2] - *d) <= 1e-3L * (1 + fabsl (*d));
 }
 
 static void expression_derivatives (const pw_expression *x, const char *text, const double *variable, int by) {

@@ -75,7 +75,7 @@ static void test_methods (void **state) {
   for (int i = 0; runs_method (i, name); i++) {
     int adaptive = runs_method (i, name)->adaptive;
     double with[24], without[24], step = adaptive ? 1e-6 : 0.01; /* inside the last step of any of them */
-    double bound = adaptive ? 1e-5 : 1e-10;                      /* 1e3 rtol; what galpha iterates to */
+    double bound = adaptive ? 1e-5 : 1e-9;                       /* 1e3 rtol; the tolerance of galpha's iteration */
     feedback_run (name, 1, step, with);
     feedback_run (name, 0, step, without);
     for (int j = 0; j < 24; j++)

@@ -57,7 +57,7 @@ static range range_sin (double lo, double hi, double shift) {
   const double turn = 2 * PW_PI, slack = 8 * DBL_EPSILON * (fabs (lo) + fabs (hi) + 1);
   range r = { -1, 1, 0, 0 };
   if (!(hi - lo < turn) || !(slack < 0.1)) return r;
-  double a = sin (lo + shift), b = sin (hi + shift);
+  double a = pw_sin (lo + shift), b = pw_sin (hi + shift);
   double top = PW_PI / 2 - shift, bottom = top - PW_PI;
   if (floor ((hi + slack - top) / turn) == floor ((lo - slack - top) / turn)) r.hi = fmin (1, fmax (a, b) + slack);
   if (floor ((hi + slack - bottom) / turn) == floor ((lo - slack - bottom) / turn))
@@ -77,8 +77,8 @@ static range range_tan (const range *x) {
 }
 
 static range range_smooth (const pw_expression_function *f, const range *x) {
-  if (f->one == sin) return range_sin (x->lo, x->hi, 0);
-  if (f->one == cos) return range_sin (x->lo, x->hi, PW_PI / 2);
+  if (f->one == pw_sin) return range_sin (x->lo, x->hi, 0);
+  if (f->one == pw_cos) return range_sin (x->lo, x->hi, PW_PI / 2);
   if (f->one == cosh) return range_even (x, cosh);
   if (f->one == tan) return range_tan (x);
   return f->trend == PW_RISES ? range_of (f->one (x->lo), f->one (x->hi)) : range_of (f->one (x->hi), f->one (x->lo));

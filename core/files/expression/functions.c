@@ -18,8 +18,8 @@ static pw_slopes slopes_of_one (double first, double second) {
     return slopes_of_one (first, second);                         \
   }
 
-ONE (sin, cos (x), -f)
-ONE (cos, -sin (x), -f)
+ONE (sin, pw_cos (x), -f)
+ONE (cos, -pw_sin (x), -f)
 ONE (tan, 1 + f * f, 2 * f * (1 + f * f))
 ONE (asin, 1 / sqrt ((1 - x) * (1 + x)), x / ((1 - x) * (1 + x) * sqrt ((1 - x) * (1 + x))))
 ONE (acos, -1 / sqrt ((1 - x) * (1 + x)), -x / ((1 - x) * (1 + x) * sqrt ((1 - x) * (1 + x))))
@@ -121,12 +121,12 @@ static pw_slopes slopes_K (double m, double y, double K) {
 
 /* With constant u, d (N/m)/dm = (dn d am/dm + u/2 - N / (2 m)) / m. */
 static pw_slopes slopes_am (double u, double m, double phi) {
-  double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS], s = sin (phi), c = cos (phi), dn = sqrt (1 - m * s * s);
+  double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS], s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
   int n = slopes_mean (m, &a, ratio, part, &R);
   double N = u * (0.5 - R), angle = ldexp (a * u, n), rest = 1 - m;
   for (; n > 0; n--) {
-    N += part[n - 1] * sin (angle);
-    angle = (angle + asin (ratio[n - 1] * sin (angle))) / 2;
+    N += part[n - 1] * pw_sin (angle);
+    angle = (angle + asin (ratio[n - 1] * pw_sin (angle))) / 2;
   }
   double F = N / (2 * rest) - s * c / (2 * rest * dn), by_m = -dn * F;
   double dn_m = -(s * s + 2 * m * s * c * by_m) / (2 * dn), N_m = (dn * by_m + u / 2 - N / 2) / m;
@@ -145,8 +145,8 @@ static pw_slopes slopes_am (double u, double m, double phi) {
   { name, op, 1, most, NULL, NULL, NULL, PW_OTHERWISE }
 
 const pw_expression_function pw_expression_functions[] = {
-  FUNCTION_OF_ONE (sin, PW_OTHERWISE),
-  FUNCTION_OF_ONE (cos, PW_OTHERWISE),
+  { "sin", PW_OP_ONE, 1, 1, pw_sin, NULL, slopes_sin, PW_OTHERWISE },
+  { "cos", PW_OP_ONE, 1, 1, pw_cos, NULL, slopes_cos, PW_OTHERWISE },
   FUNCTION_OF_ONE (tan, PW_OTHERWISE),
   FUNCTION_OF_ONE (asin, PW_RISES),
   FUNCTION_OF_ONE (acos, PW_FALLS),

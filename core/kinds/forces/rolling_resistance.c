@@ -26,7 +26,7 @@ static int resistance_prepare (const void *definition, const pw_body *const *bod
                                pw_error *error) {
   const pw_rolling_resistance *d = definition;
   resistance *k = element;
-  k->point = contact_make (d->at, d->heading, cos (d->heading), sin (d->heading));
+  k->point = contact_make (d->at, d->heading, pw_cos (d->heading), pw_sin (d->heading));
   (void)bodies, (void)own;
   return coulomb_make (0, d->limit, d->speed, &k->law, error);
 }

@@ -52,7 +52,7 @@ static tyre_slip tyre_at (const tyre *k, const pw_configuration *A) {
 static int tyre_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
   const pw_tyre *d = definition;
-  double c = cos (d->heading), s = sin (d->heading), along = d->at[0] * c + d->at[1] * s,
+  double c = pw_cos (d->heading), s = pw_sin (d->heading), along = d->at[0] * c + d->at[1] * s,
          aside = d->at[1] * c - d->at[0] * s;
   *(tyre *)element = (tyre){
     { d->at[0], d->at[1] }, c, s, along, aside, d->heading, d->stiffness, d->speed, d->friction * d->load,

@@ -31,13 +31,13 @@ typedef struct {
 /* The spin rate for rolling at the initial velocity of the body. */
 static double rolling_spin_rate (const rolling *k, const pw_body *body) {
   double angle = body->start[2] + k->heading;
-  return (cos (angle) * body->rate[0] + sin (angle) * body->rate[1] - k->aside * body->rate[2]) / k->radius;
+  return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] - k->aside * body->rate[2]) / k->radius;
 }
 
 static int rolling_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                             pw_error *error) {
   const pw_rolling_wheel *d = definition;
-  double c = cos (d->heading), s = sin (d->heading), along = d->at[0] * c + d->at[1] * s,
+  double c = pw_cos (d->heading), s = pw_sin (d->heading), along = d->at[0] * c + d->at[1] * s,
          aside = d->at[1] * c - d->at[0] * s;
   rolling *k = element;
   *k = (rolling){ { d->at[0], d->at[1] }, c, s, along, aside, d->radius, d->heading };

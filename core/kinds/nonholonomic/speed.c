@@ -12,7 +12,7 @@
 static int speed_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                           pw_error *error) {
   const pw_speed *d = definition;
-  *(contact *)element = contact_make (d->at, d->heading, cos (d->heading), sin (d->heading));
+  *(contact *)element = contact_make (d->at, d->heading, pw_cos (d->heading), pw_sin (d->heading));
   (void)bodies, (void)own, (void)error;
   return PW_OK;
 }

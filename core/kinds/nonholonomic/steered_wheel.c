@@ -22,7 +22,8 @@ typedef struct {
 } steered_state;
 
 static inline steered_state steered_at (const steered *k, const pw_configuration *A, const double *u) {
-  double c = cos (u[0]), s = sin (u[0]);
+  double c, s;
+  pw_sin_cos (u[0], &s, &c);
   return (steered_state){ .c = A->cos * c - A->sin * s,
                           .s = A->sin * c + A->cos * s,
                           .along = k->at[0] * c + k->at[1] * s,

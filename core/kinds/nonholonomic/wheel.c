@@ -11,7 +11,7 @@
 static int wheel_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                           pw_error *error) {
   const pw_wheel *d = definition;
-  *(contact *)element = contact_make (d->at, d->heading, -sin (d->heading), cos (d->heading));
+  *(contact *)element = contact_make (d->at, d->heading, -pw_sin (d->heading), pw_cos (d->heading));
   (void)bodies, (void)own, (void)error;
   return PW_OK;
 }
