@@ -305,7 +305,7 @@ static void expression_derivatives (const pw_expression *x, const char *text, co
   evaluator e;
   evaluate (text, variable, by, 0, 1, &e);
   pw_expression_derivatives (x, variable, by, u);
-  if (e.tie || e.bend || !(e.most < 1e4L) || !(e.least > 1e-2L)) return;
+  if (isnan (u[0]) || e.tie || e.bend || !(e.most < 1e4L) || !(e.least > 1e-2L)) return;
   for (int order = 1; order <= 2; order++) {
     long double d, error;
     if (!expression_difference (text, variable, by, order, &d, &error)) return;
