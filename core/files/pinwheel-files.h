@@ -1,4 +1,4 @@
-/* Pinwheel's files: models found by name, tables and summaries written. */
+/* Pinwheel's files: finds models, writes tables and summaries. */
 #ifndef PINWHEEL_FILES_H
 #define PINWHEEL_FILES_H
 
@@ -15,16 +15,16 @@ extern "C" {
 
 /* ---- Models ---- */
 
-/* A model file that is open: a plug-in loaded or a text model read, and its table. */
+/* An open model file: a loaded plug-in or a text model, with its table. */
 typedef struct pw_file pw_file;
 
-/* Opens a model by name or by path.
+/* Opens a model, given its name or path.
  *
- * A name ("ezyroller") is looked for as NAME.so, NAME.yaml in the folders of the environment variable PINWHEEL_MODELS
+ * A name ("ezyroller") is searched as NAME.so, NAME.yaml in the folders of the environment variable PINWHEEL_MODELS
  * (separated by ":"), then in those that belong to the running program and this library: models/ next to it or one
- * up, lib/pinwheel/models/ of the installation.  A path has a "/" or an ending: a .so is loaded, a .c compiled by $CC or cc
- * in a private temporary folder, its messages passed through on standard error; a .yaml is read (docs/model-format.md).
- * Nothing is taken from the current directory unless named by path.
+ * up, lib/pinwheel/models/ of the installation.  A path has a "/" or an ending: a .so is loaded, a .c compiled by $CC
+ * or cc in a private temporary folder, its messages passed through on standard error; a .yaml is read
+ * (docs/model-format.md). Files in the current directory must be given as paths.
  *
  * Errors: PW_INPUT for a model that is not found (with the nearest name), found twice (with both paths), does not
  * compile, is not a Pinwheel plug-in, has another ABI or parameters outside their structure or domain; PW_RESOURCE. */
@@ -49,7 +49,7 @@ char *pw_file_find (const char *model, pw_error *error);
 /* Calls `each` with the path of every table that a text model reads, until it returns non-zero, which is returned. */
 int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *path), void *context);
 
-/* Calls `each` with the name and path of every model on the search path, in order of name, until it returns non-zero. */
+/* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero. */
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error);
 
 /* ---- Numbers, the same in every locale ---- */
@@ -65,19 +65,19 @@ int pw_read_expression (const char *text, double *value);
 
 /* ---- Units in the headers of tables, "NAME [UNIT]" (units.c) ---- */
 
-/* Converts a unit to SI units; PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of `wanted` (NULL:
- * any). */
+/* Finds the factor from a unit to SI units; PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of
+ * `wanted` (NULL: any). */
 int pw_unit_factor (const char *unit, const char *wanted, double *factor);
 
-/* The bytes of the name in a header's cell; its unit goes to the buffer: what is between brackets at its end, or a known unit
- * between parentheses; "" if there is none, or it is - or 1. */
+/* The bytes of the name in a header's cell; its unit goes to the buffer: what is between brackets at its end, or a
+ * known unit between parentheses; "" without a unit, or if it is - or 1. */
 size_t pw_unit_split (const char *cell, char *unit, size_t size);
 
-/* The factor of a column by its header's cell, 1 without a unit.  PW_INPUT with what is wrong, column and unit named. */
+/* The factor of a column by its header's cell, 1 without a unit.  PW_INPUT with column, unit and reason. */
 int pw_unit_check (const char *cell, const char *wanted, double *factor, char *why, size_t size);
 
-/* Opens a regular file for reading, without waiting (a FIFO is refused).  NULL, with the reason in *why, if that fails or it is
- * another type of file; errno is ENOMEM if there was no memory. */
+/* Opens a regular file for reading, without waiting (a FIFO is refused).  NULL, with the reason in *why, if that fails
+ * or it is another type of file; errno is ENOMEM if there was no memory. */
 FILE *pw_open_input (const char *path, const char **why);
 
 /* ---- What a command reads and writes ---- */
@@ -90,7 +90,7 @@ typedef struct {
   const char *const *names; /* PW_WRITES_INTO a folder: endings of the names of the files it gets, NULL at the end */
 } pw_use;
 
-/* Refuses a file that is written and also read, or written twice, under whatever names: files are compared by device and
+/* Refuses a file that is both read and written, or written twice, under any name: files are compared by device and
  * inode, those that do not exist yet by that of their folder and their name.  PW_INPUT, PW_RESOURCE. */
 int pw_check_paths (const pw_use *use, int count, pw_error *error);
 
@@ -99,48 +99,48 @@ int pw_check_paths (const pw_use *use, int count, pw_error *error);
 /* A file written under a temporary name, NAME.part, and renamed when complete; "-" is standard output.
  *
  * The temporary file is new, locked against other processes, and never a symbolic link; if the name itself is one, the
- * file it leads to is replaced.  A file that is replaced passes on its mode and owner.  What is not a regular file (a pipe,
- * a device), and open descriptors (/dev/stdout, /dev/fd/N), are written directly. */
+ * file it leads to is replaced.  The replacement keeps mode and owner.  Files that are not regular (a pipe, a device)
+ * and open descriptors (/dev/stdout, /dev/fd/N), are written directly. */
 typedef struct pw_output pw_output;
 
 /* Errors: PW_RESOURCE with the path and the reason, also if another process is writing it. */
 pw_output *pw_output_open (const char *path, pw_error *error);
-/* The same with another ending of the temporary name than ".part"; what is incomplete is then removed. */
+/* The same with another ending than ".part"; incomplete files are removed. */
 pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *error);
 FILE *pw_output_stream (pw_output *o); /* stdout for "-", /dev/stdout, /dev/fd/1 */
-/* Whether it is a regular file of its own, not written directly. */
+/* Whether it is a regular file, not written directly. */
 int pw_output_is_file (const pw_output *o);
-/* Writes all to the disk and closes the stream, so that nothing but the name is missing.  PW_RESOURCE. */
+/* Writes all output to the disk and closes the stream; only the renaming is missing.  PW_RESOURCE. */
 int pw_output_ready (pw_output *o, pw_error *error);
 /* Completes and frees: the file is written to the disk, then renamed, then its folder is written to the disk.
  * PW_RESOURCE if anything failed: NAME.part remains and the text names it. */
 int pw_output_finish (pw_output *o, pw_error *error);
-/* The same for several outputs, NULL among them, which all become complete or all keep their temporary names. */
+/* The same for several outputs, some of which may be NULL: completes all, or leaves all under their temporary names. */
 int pw_output_finish_all (pw_output *const *o, int count, pw_error *error);
-/* Gives up and frees: NAME.part remains with complete lines.  Its path is written to the buffer, which is returned; NULL,
- * and "" in the buffer, if there is no such file (standard output, a device). */
+/* Gives up and frees: NAME.part remains with complete lines.  Its path is written to the buffer, which is returned;
+ * NULL, and "" in the buffer, if there is no such file (standard output, a device). */
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size);
 /* Gives up and frees, and removes NAME.part. */
 void pw_output_discard (pw_output *o);
 
 /* The path of a regular file to be written, links followed, for the caller to free.  NULL and PW_RESOURCE. */
 char *pw_output_path (const char *path, pw_error *error);
-/* Opens a file for reading and writing, creates it if there is none, and locks it until the descriptor that is returned is
- * closed.  A symbolic link is not followed.  -1 and PW_RESOURCE, also if another process has it. */
+/* Opens a file for reading and writing, creates it if there is none, and locks it until the descriptor that is returned
+ * is closed.  A symbolic link is not followed.  -1 and PW_RESOURCE, also if another process has it. */
 int pw_lock_path (const char *path, pw_error *error);
 /* Locks a folder for this process until the descriptor that is returned is closed.  -1 and PW_RESOURCE, also if another
  * process writes into it. */
 int pw_lock_folder (const char *path, pw_error *error);
 
-/* How far a file has come, for another process to go on from. */
+/* The position in a file from which another process continues. */
 typedef struct {
-  unsigned long long length, check; /* bytes; a check sum of the last of them */
+  unsigned long long length, check; /* bytes; checksum of the last ones */
 } pw_mark;
 
 /* Writes all output to the disk.  Errors: PW_RESOURCE; PW_INPUT if it is not a regular file. */
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error);
-/* Opens NAME.part once more and cuts off what was written after the mark.  A table goes on without a header.  PW_INPUT if it
- * is not there or not what was marked; PW_RESOURCE. */
+/* Reopens NAME.part and truncates it at the mark.  A table continues without a header.  PW_INPUT if the file is missing
+ * or differs from the marked contents; PW_RESOURCE. */
 pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error);
 
 /* ---- Checkpoints ----
@@ -154,13 +154,13 @@ pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *
 
 #define PW_CHECKPOINT_MAGIC "pinwheel checkpoint 1\n"
 
-/* Writes a checkpoint and completes the file, which is released in every case: there is always a complete one.  The head
- * begins with PW_CHECKPOINT_MAGIC and ends with "end\n".  Errors: PW_RESOURCE. */
+/* Writes a checkpoint and completes the file, which is released in every case; an existing one is replaced only then.
+ * The head begins with PW_CHECKPOINT_MAGIC and ends with "end\n".  Errors: PW_RESOURCE. */
 int pw_checkpoint_put (pw_output *o, const char *head, const pw_archive *state, pw_error *error);
 /* The same, to the file at a path. */
 int pw_checkpoint_write (const char *path, const char *head, const pw_archive *state, pw_error *error);
 
-/* One that was read: text up to `state`, which is ready to be loaded. */
+/* A checkpoint that was read: text up to `state`, which is ready for loading. */
 typedef struct {
   char *text;
   const char *head_end; /* after "end\n" */
@@ -175,7 +175,7 @@ void pw_checkpoint_free (pw_checkpoint *c);
 
 /* A CSV of samples: one header line "t [s],frame.x [m],...", then a line per sample with 17 digits: states, contact
  * points, reactions (-lambda), scaled residuals, and energies if the run keeps a ledger.  Non-finite is nan.  Writing
- * places the sample's state in the system.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
+ * updates the kinematics to the sample's state.  Errors: PW_RESOURCE; PW_METHOD if a signal of the model fails. */
 typedef struct pw_csv pw_csv;
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error);
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error);
@@ -183,12 +183,12 @@ void pw_csv_close (pw_csv *c);
 
 /* ---- JSON ---- */
 
-/* Writes JSON to a stream: numbers with 17 digits, null for what is not finite.  Begin with { .f = stream } and open one
- * container.  A key is NULL in lists and for the outermost container. */
+/* Writes JSON to a stream: numbers with 17 digits, null for what is not finite.  Begin with { .f = stream } and open
+ * one container.  A key is NULL in lists and for the outermost container. */
 typedef struct {
   FILE *f;
-  int lines;        /* levels whose items stand on lines of their own */
-  int line;         /* 1: so does the next item, or the end of the container */
+  int lines;        /* levels whose items have separate lines */
+  int line;         /* 1: so has the next item, or the end of the container */
   int depth, items; /* containers that are open; items of the innermost so far */
 } pw_json;
 void pw_json_open (pw_json *j, const char *key, char bracket); /* '{' or '[' */
@@ -199,8 +199,8 @@ void pw_json_flag (pw_json *j, const char *key, int value);
 
 /* ---- Summaries ---- */
 
-/* How far a run was from the reference: the largest coordinate and rate of lengths, angles, speeds [m/s] and angular rates; of
- * reactions relative to the largest one of the same unit.  NaN: not known. */
+/* The largest errors of a run against the reference: lengths, angles, velocities [m/s] and angular velocities;
+ * reactions relative to the largest one of the same unit.  NaN: unknown. */
 typedef struct {
   const char *source; /* "the model", or the path of a table */
   int samples;        /* compared */
@@ -214,12 +214,12 @@ typedef struct {
   const char *status; /* "ok", "input", "start", "method", "machine", "interrupted" */
   const char *reason;
   double cpu;                          /* [s], integration alone */
-  const char *const *redundant;        /* what is said about each redundant row, ended by NULL; may be NULL: none */
-  const pw_reference_error *reference; /* NULL: there is none to compare with */
+  const char *const *redundant;        /* a message per redundant constraint equation, ended by NULL; may be NULL */
+  const pw_reference_error *reference; /* NULL: no reference */
   double energy_defect;                /* relative, as pw_run_energy_defect says; NaN: not known */
 } pw_summary;
 
-/* Writes the JSON summary: whatever is not known (model and method too may be NULL) or not finite is null. */
+/* Writes the JSON summary; unknown (model and method may be NULL) and non-finite values become null. */
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error);
 

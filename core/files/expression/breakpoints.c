@@ -1,11 +1,11 @@
-/* When an expression of time jumps or bends.
+/* Breakpoints: times at which an expression jumps or has a kink.
  *
- * Enclosures of all values over an interval of time show that no comparison changes there, and no other operation that
- * breaks; otherwise the interval is halved, the earlier half first.  In what is left, a fraction of 2^-36 of the time, two
- * neighbouring numbers are found between which something changes: that is where steps have to end
+ * Interval arithmetic shows that no comparison or other discontinuous operation changes over a time interval; otherwise
+ * the interval is bisected, the earlier half first, down to a relative width of 2^-36.  Bisection then finds the two
+ * neighbouring numbers between which an operation changes: steps must end there
  * (Moore, Kearfott & Cloud 2009, Introduction to Interval Analysis, chapters 5 and 8).
- * Changes that cancel within such a fraction are ignored, and so are those of numbers that differ by round-off only.  Where two
- * numbers stay equal, the fraction grows with the time passed. */
+ * Changes that cancel within this width, and changes by round-off only, are ignored.  While two compared numbers stay
+ * equal, the width grows. */
 #include <float.h>
 #include <math.h>
 #include "expression_parts.h"
@@ -14,8 +14,8 @@
 /* Enclosure of a value over an interval of time. */
 typedef struct {
   double lo, hi;
-  int breaks; /* 1: it may jump or bend at a time that does not depend on states */
-  int states; /* 1: states may decide where it jumps or bends */
+  int breaks; /* 1: may break (jump or have a kink) at a time independent of states */
+  int states; /* 1: the time of a break may depend on states */
 } range;
 
 static const range range_any = { -INFINITY, INFINITY, 0, 0 };
@@ -34,7 +34,7 @@ static double range_quotient (double a, double b) {
   return a / b;
 }
 
-/* Between the least and the largest value of f at the corners, for an f that is monotonic in each argument. */
+/* The range of f at the corners, for an f monotonic in each argument. */
 static range range_corners (double (*f) (double, double), const range *x, const range *y) {
   double a = f (x->lo, y->lo), b = f (x->lo, y->hi), c = f (x->hi, y->lo), d = f (x->hi, y->hi);
   if (isnan (a) || isnan (b) || isnan (c) || isnan (d)) return range_any;
@@ -52,7 +52,7 @@ static range range_abs (const range *x) {
   return r;
 }
 
-/* Between the values at both ends, and 1 or -1 where an extreme lies between. */
+/* The values at both ends, extended to 1 or -1 if an extremum lies between them. */
 static range range_sin (double lo, double hi, double shift) {
   const double turn = 2 * PW_PI, slack = 8 * DBL_EPSILON * (fabs (lo) + fabs (hi) + 1);
   range r = { -1, 1, 0, 0 };
@@ -84,8 +84,8 @@ static range range_smooth (const pw_expression_function *f, const range *x) {
   return f->trend == PW_RISES ? range_of (f->one (x->lo), f->one (x->hi)) : range_of (f->one (x->hi), f->one (x->lo));
 }
 
-/* A whole power; that of an even one has its least value at 0. */
-static range range_whole_power (const range *x, double n) {
+/* An integer power; an even one has its minimum at 0. */
+static range range_integer_power (const range *x, double n) {
   int even = fmod (n, 2) == 0;
   if (n < 0 && x->lo <= 0 && x->hi >= 0) return range_any;
   range b = even ? range_abs (x) : *x;
@@ -95,7 +95,7 @@ static range range_whole_power (const range *x, double n) {
 
 static range range_power (const range *x, const range *y) {
   double n = rint (y->lo);
-  if (y->hi - y->lo < 1e-9 && fabs (y->lo - n) < 1e-9) return range_whole_power (x, n);
+  if (y->hi - y->lo < 1e-9 && fabs (y->lo - n) < 1e-9) return range_integer_power (x, n);
   return x->lo < 0 ? range_any : range_corners (pow, x, y);
 }
 
@@ -105,17 +105,17 @@ static range range_atan2 (const range *y, const range *x) {
   return range_corners (atan2, y, x);
 }
 
-/* hypot, or jacobi_am (x, y) with one y. */
+/* hypot, or jacobi_am (x, y) with constant y. */
 static range range_pair (const pw_expression_function *f, const range *x, const range *y) {
   range a = range_abs (x), b = range_abs (y);
   if (f->two == hypot) return range_of (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
   return y->hi - y->lo > 1e-12 ? range_any : range_of (f->two (x->lo, y->lo), f->two (x->hi, y->lo));
 }
 
-/* ---- Operations that jump or bend ---- */
+/* ---- Operations with jumps or kinks ---- */
 
-/* floor, ceil, round: one whole number, or a break.  Both ends belong to the interval, with the value just after a jump there,
- * whichever way it goes. */
+/* floor, ceil, round: one integer, or a break.  The interval is closed and includes the value just after a jump at
+ * either end, in either direction. */
 static range range_whole (int op, const range *x) {
   double shift = op == PW_OP_ROUND ? 0.5 : 0;
   range r = { ceil (x->lo + shift), floor (x->hi + shift), 0, 0 };
@@ -143,9 +143,9 @@ static range range_compare (int op, const range *x, const range *y) {
   return order == 2 ? either : pw_expression_compare (op, order) ? yes : no;
 }
 
-/* An operand that decides alone hides the breaks of the other one. */
+/* An operand that decides the result hides breaks of the other one. */
 static range range_logical (int op, const range *x, const range *y) {
-  double alone = op == PW_OP_OR; /* 1 decides an or, 0 an and */
+  double alone = op == PW_OP_OR; /* 1 decides ||, 0 decides && */
   const range *decides = x->lo == alone && x->hi == alone ? x : y->lo == alone && y->hi == alone ? y : NULL;
   if (decides) return *decides;
   return (range){ op == PW_OP_OR ? fmax (x->lo, y->lo) : fmin (x->lo, y->lo),
@@ -216,13 +216,13 @@ static range range_two (const pw_expression_code *c, const range *x, const range
   }
 }
 
-/* Operands that are single numbers are evaluated exactly, so that equal numbers stay equal. */
+/* Evaluates degenerate intervals exactly, so that equal numbers stay equal. */
 static range range_known (const pw_expression_code *c, const range *x, int operands) {
   double value = pw_expression_apply (c, x[0].lo, x[operands - 1].lo);
   return isnan (value) ? range_any : (range){ value, value, 0, 0 };
 }
 
-/* A break counts unless states decide about its time; a value that is one number over the interval has no breaks. */
+/* Ignores breaks whose time depends on states; a constant value has no breaks. */
 static range range_apply (const pw_expression_code *c, const range *x, int operands) {
   if (operands < 3 && x[0].lo == x[0].hi && x[operands - 1].lo == x[operands - 1].hi)
     return range_known (c, x, operands);
@@ -237,7 +237,7 @@ static range range_apply (const pw_expression_code *c, const range *x, int opera
   return r;
 }
 
-/* The value over an interval of time; operations that are noisy do not break. */
+/* The range over a time interval, ignoring breaks of noisy operations. */
 static range range_run (const pw_expression *x, const unsigned char *noisy, double lo, double hi) {
   range stack[PW_EXPRESSION_STACK], *top = stack;
   for (const pw_expression_code *c = x->code, *end = c + x->codes; c < end; c++) {
@@ -256,21 +256,21 @@ static range range_run (const pw_expression *x, const unsigned char *noisy, doub
   return top[-1];
 }
 
-/* ---- The first one ---- */
+/* ---- The first breakpoint ---- */
 
 typedef struct {
   const pw_expression *x;
   double from;
   int left;                                 /* remaining intervals */
-  int equal;                                /* narrow intervals without a change */
-  int patience;                             /* after this many of them `narrow` doubles */
-  double narrow;                            /* fraction of the time below which intervals are not halved */
-  double until;                             /* up to this time some operations are noisy; INFINITY: none */
-  unsigned char noisy[PW_EXPRESSION_CODES]; /* by operation: it changes again and again */
+  int equal;                                /* intervals of the least width without a change */
+  int patience;                             /* number of these after which `narrow` doubles */
+  double narrow;                            /* relative width below which intervals are not bisected */
+  double until;                             /* end of the noise; INFINITY without noisy operations */
+  unsigned char noisy[PW_EXPRESSION_CODES]; /* per operation: changes repeatedly */
 } search;
 
 /* Evaluates all discrete operations (comparisons and the like) at a time. */
-static void search_look (const search *s, double t, double *discrete) {
+static void search_evaluate (const search *s, double t, double *discrete) {
   double variable[PW_EXPRESSION_VARIABLES] = { t }, u[3];
   pw_expression_run_jet (s->x->code, s->x->codes, variable, 0, u, discrete);
 }
@@ -279,18 +279,18 @@ static int search_changed (double a, double b) {
   return a != b && !(isnan (a) && isnan (b));
 }
 
-/* Whether something changes between two times. */
+/* Whether an operation that is not noisy differs between two times. */
 static int search_differ (const search *s, double a, double b) {
   double before[PW_EXPRESSION_CODES], after[PW_EXPRESSION_CODES];
-  search_look (s, a, before);
-  search_look (s, b, after);
+  search_evaluate (s, a, before);
+  search_evaluate (s, b, after);
   for (int i = 0; i < s->x->codes; i++)
     if (!s->noisy[i] && search_changed (before[i], after[i])) return 1;
   return 0;
 }
 
-/* The first number at which something has changed, of two neighbours. */
-static double search_between (const search *s, double a, double b) {
+/* Bisects to neighbouring numbers; returns the first one after the change. */
+static double search_bisect (const search *s, double a, double b) {
   const double first = a;
   for (double middle = a + (b - a) / 2; middle > a && middle < b; middle = a + (b - a) / 2)
     if (search_differ (s, first, middle))
@@ -300,16 +300,16 @@ static double search_between (const search *s, double a, double b) {
   return b;
 }
 
-/* Notes the operations that change so often just after t that it is the round-off of numbers that ought to be equal, or too
- * fast for any step; returns whether there are any more. */
-static int search_noise (search *s, double t) {
+/* Marks operations as noisy that change so often just after t that the cause is round-off of equal numbers or the
+ * changes are too fast for any step; returns whether it marked any. */
+static int search_mark_noisy (search *s, double t) {
   const double width = 1e-6 * (1 + fabs (t));
   double value[2][PW_EXPRESSION_CODES];
   short changes[PW_EXPRESSION_CODES] = { 0 };
   int more = 0;
-  search_look (s, t, value[0]);
+  search_evaluate (s, t, value[0]);
   for (int k = 1; k <= 256; k++) {
-    search_look (s, t + width * (k / 256.0), value[k % 2]);
+    search_evaluate (s, t + width * (k / 256.0), value[k % 2]);
     for (int i = 0; i < s->x->codes; i++)
       if (search_changed (value[0][i], value[1][i]) && ++changes[i] > 8 && !s->noisy[i]) s->noisy[i] = 1, more = 1;
   }
@@ -321,7 +321,7 @@ static double search_first (search *s, double a, double b) {
   if (s->left-- <= 0) return fmax (a, nextafter (s->from, INFINITY));
   if (!range_run (s->x, s->noisy, a, b).breaks) return INFINITY;
   if (b - a <= s->narrow * fmax (fabs (a), fabs (b)) + 1e-18) {
-    if (search_differ (s, a, b)) return search_noise (s, b) ? search_first (s, a, b) : search_between (s, a, b);
+    if (search_differ (s, a, b)) return search_mark_noisy (s, b) ? search_first (s, a, b) : search_bisect (s, a, b);
     if (++s->equal % s->patience == 0) s->narrow *= 2;
     return INFINITY;
   }
@@ -329,12 +329,11 @@ static double search_first (search *s, double a, double b) {
   return first < INFINITY ? first : search_first (s, middle, b);
 }
 
-/* If the search reaches its limit or finds noise, it returns a time that is not a breakpoint, from which it continues later. */
+/* At the limit of the search, or with noise, returns a time that is not a breakpoint; the next call continues there. */
 double pw_expression_breakpoint (const pw_expression *x, double t) {
   const double latest = 1e18;
   search s = { .x = x, .from = t, .left = 400 + 4000000 / (100 + x->codes), .narrow = 0x1p-36, .until = INFINITY };
-  s.patience =
-      1 + s.left / 120; /* 36 doublings, of some two or three intervals each, before too much has been looked at */
+  s.patience = 1 + s.left / 120; /* 36 doublings, of two or three intervals each, before the limit */
   double a = t, found = INFINITY;
   if (!x->breaks) return INFINITY;
   for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {

@@ -1,11 +1,11 @@
-/* The values of expressions, and their exact derivatives.
+/* Values and exact derivatives of expressions.
  *
- * For derivatives, each operation passes on (value, first, second derivative) by the chain rule,
+ * For derivatives, each operation propagates (value, first, second derivative) by the chain rule,
  *
  *   f' = f_x x' + f_y y',   f'' = f_xx x'^2 + 2 f_xy x' y' + f_yy y'^2 + f_x x'' + f_y y''
  *
- * (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  If two numbers are equal now, the one whose first
- * derivative that differs is larger will be the larger: an expression that jumps has the value just after the jump. */
+ * (Griewank & Walther 2008, Evaluating Derivatives, chapter 13).  Derivatives decide comparisons of
+ * equal numbers, so that an expression has the value just after a jump. */
 #include <math.h>
 #include "expression_parts.h"
 #include "pinwheel.h"
@@ -26,7 +26,7 @@ static inline double value_jump (int op, double x, int *tie) {
   return y;
 }
 
-/* Of two numbers, the second being x; of one, x. */
+/* The value of an operation of x, or of a and x; *tie becomes 1 just before a jump. */
 static inline double value_of (const pw_expression_code *c, double a, double x, int *tie) {
   switch (c->op) {
   case PW_OP_NEGATE:
@@ -93,10 +93,10 @@ double pw_expression_run (const pw_expression_code *code, int codes, const doubl
 
 typedef struct {
   double v, d, dd;
-  int on; /* 1: it depends on the variable */
+  int on; /* 1: depends on the variable */
 } jet;
 
-/* Operands that do not depend on the variable do not contribute, even with an infinite slope. */
+/* Operands independent of the variable contribute nothing, even with an infinite slope. */
 static jet jet_chain (double f, const pw_slopes *s, const jet *x, const jet *y) {
   jet r = { f, 0, 0, x->on | y->on };
   if (x->on) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;
@@ -105,21 +105,21 @@ static jet jet_chain (double f, const pw_slopes *s, const jet *x, const jet *y) 
   return r;
 }
 
-/* ---- Derivatives of operations that jump or bend ---- */
+/* ---- Derivatives of operations with jumps or kinks ---- */
 
 static inline int jet_sign (const jet *x) {
   double first = x->v != 0 ? x->v : x->d != 0 ? x->d : x->dd;
   return (first > 0) - (first < 0);
 }
 
-/* How two numbers compare just after. */
+/* The order of two numbers just after the current time. */
 static int jet_order (const jet *x, const jet *y) {
   if (x->v != y->v) return x->v < y->v ? -1 : x->v > y->v ? 1 : 2;
   jet less = { 0, x->d - y->d, x->dd - y->dd, 1 };
   return jet_sign (&less);
 }
 
-/* floor, ceil, round just after; `way` it is going. */
+/* floor, ceil, round just after the current time; `way`: sign of the change. */
 static double jet_step (int op, double x, int way) {
   double low = floor (x);
   if (op == PW_OP_FLOOR) return x == low && way < 0 ? low - 1 : low;
@@ -138,7 +138,7 @@ static jet jet_plus (const jet *x, double factor, const jet *y) {
   return (jet){ x->v + factor * y->v, x->d + factor * y->d, x->dd + factor * y->dd, x->on | y->on };
 }
 
-/* x - q y; q is read off the remainder, so that both jump together. */
+/* x - q y; q is computed from the remainder, so that both jump together. */
 static jet jet_mod (const jet *x, const jet *y, double *q) {
   double r = pw_expression_mod (x->v, y->v);
   *q = rint ((x->v - r) / y->v);
@@ -182,7 +182,7 @@ static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y
   return jet_chain (value, &s, x, y);
 }
 
-/* It jumps where y, the first argument, changes sign at negative x. */
+/* Jumps where y, the first argument, changes sign at negative x. */
 static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
   jet r = jet_function (c, y, x);
   int sign = jet_sign (y);

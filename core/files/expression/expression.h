@@ -5,8 +5,8 @@
  *               jacobi_am (u, m), elliptic_K (m)
  *   constants   pi, e, deg = pi / 180
  *
- * An expression is read once, in a scope of names that stand for numbers; other names are its variables, of which the time
- * is the first.  An expression is immutable: any number of threads may evaluate it. */
+ * A scope defines names of numbers; other names are variables, the first of which is the time.  Expressions are
+ * immutable: any number of threads may evaluate them. */
 #ifndef PW_EXPRESSION_H
 #define PW_EXPRESSION_H
 
@@ -21,17 +21,17 @@ typedef struct {
 
 /* ---- Reading ---- */
 
-/* Names that stand for numbers. */
+/* Named numbers. */
 typedef struct pw_scope pw_scope;
 
 /* A scope with room for `names` names; NULL without memory. */
 pw_scope *pw_scope_open (int names);
 void pw_scope_close (pw_scope *s);
 
-/* Adds a name; its text must stay.  There must be room. */
+/* Adds a name, whose text must outlive the scope.  There must be room. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 
-/* One operation of an expression; its operands are what the operations before it leave on a stack. */
+/* One operation of an expression; its operands are on a stack. */
 typedef struct {
   short op;    /* pw_expression_op */
   short which; /* variable or function */
@@ -41,47 +41,48 @@ typedef struct {
 /* An expression: its syntax tree in postfix order. */
 typedef struct {
   int codes;
-  int breaks;       /* 1: it may have jumps or kinks in time */
-  const char *jump; /* a part of the text that may jump as states change, or NULL */
+  int breaks;       /* 1: may have jumps or kinks in time */
+  const char *jump; /* part of the text that may jump as states change, or NULL */
   int jump_size;
   pw_expression_code code[];
 } pw_expression;
 
-/* Bytes an expression takes; it may be copied. */
+/* Size of an expression in bytes; it may be copied. */
 size_t pw_expression_size (const pw_expression *x);
 
-/* Reads an expression over a scope and variables, names ended by NULL, into an arena.  PW_INPUT with the trouble if it is
- * not one; PW_RESOURCE. */
+/* Reads an expression over a scope and variables, names ended by NULL, into an arena.  PW_INPUT with the
+ * error; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **x, pw_expression_trouble *trouble);
 
-/* The value of an expression without variables, which may be non-finite; the scope may be NULL.  Returns the same. */
+/* The value of an expression without variables, which may be non-finite; the scope may be NULL.  Errors as above. */
 int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_trouble *trouble);
 
 /* ---- Values ---- */
 
-/* The value, which may be non-finite.  Where the expression jumps in time, it is that just after. */
+/* The value, which may be non-finite; at a jump in time, the value just after it. */
 double pw_expression_value (const pw_expression *x, const double *variable);
 
-/* The value and its first two derivatives by one variable; where they jump, those just after. */
+/* The value and its first two derivatives with respect to one variable; at a jump, those just after it. */
 void pw_expression_derivatives (const pw_expression *x, const double *variable, int by, double u[3]);
 
-/* The first time after t at which the value, or a derivative by time, may jump whatever the other variables are; or
- * INFINITY.  Jumps whose times depend on other variables are not found. */
+/* The first time after t at which the value, or a time derivative, may jump for any values of the other variables;
+ * or INFINITY.  Jumps whose times depend on other variables are not found. */
 double pw_expression_breakpoint (const pw_expression *x, double t);
 
 /* ---- Words ---- */
 
 /* Whether a text can be a name: a letter or _, then letters, digits and _; neither a function nor a constant. */
 int pw_expression_is_name (const char *text);
-/* Whether functions or constants have this name. */
+/* Whether a function or constant has this name. */
 int pw_expression_is_taken (const char *text);
 
-/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns that. */
+/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns that.
+ * */
 int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
                          void *context);
 
-/* Whether a text is nothing but a number; its value may overflow to infinity. */
+/* Whether a text is a single number; its value may overflow to infinity. */
 int pw_expression_number (const char *text, double *value);
 
 #endif

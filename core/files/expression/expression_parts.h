@@ -1,13 +1,13 @@
-/* Between the files of expressions. */
+/* Internal interface of the files of expressions. */
 #ifndef PW_EXPRESSION_PARTS_H
 #define PW_EXPRESSION_PARTS_H
 
 #include "expression.h"
 
-/* Numbers that wait for their operation, at most; variables; operations. */
+/* Limits: depth of the stack, variables, operations. */
 enum { PW_EXPRESSION_STACK = 1000, PW_EXPRESSION_VARIABLES = 32, PW_EXPRESSION_CODES = 8000 };
 
-/* In groups of operations without operands, of one, of two, of three. */
+/* Ordered by the number of operands: 0, 1, 2, 3. */
 typedef enum {
   PW_OP_CONSTANT,
   PW_OP_VARIABLE,
@@ -29,21 +29,21 @@ typedef enum {
   PW_OP_GREATER_EQUAL,
   PW_OP_EQUAL,
   PW_OP_UNEQUAL,
-  PW_OP_AND, /* of references: 1 or 0 */
+  PW_OP_AND, /* operands are 1 or 0 */
   PW_OP_OR,
   PW_OP_MOD,
   PW_OP_MIN,
   PW_OP_MAX,
   PW_OP_ATAN2,
   PW_OP_TWO,   /* a smooth function */
-  PW_OP_SELECT /* by a reference */
+  PW_OP_SELECT /* condition is 1 or 0 */
 } pw_expression_op;
 
 static inline int pw_expression_operands (int op) {
   return op >= PW_OP_SELECT ? 3 : op >= PW_OP_ADD ? 2 : op >= PW_OP_NEGATE ? 1 : 0;
 }
 
-/* Comparisons and the like jump from one value to another; abs, min and max only have kinks. */
+/* Operations with jumps; abs, min and max only have kinks. */
 static inline int pw_expression_jumps (int op) {
   return (op >= PW_OP_SIGN && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_UNEQUAL) || op == PW_OP_MOD ||
          op == PW_OP_ATAN2;
@@ -52,7 +52,7 @@ static inline int pw_expression_breaks (int op) {
   return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX;
 }
 
-/* How two numbers compare: -1, 0, 1; 2: one of them is not a number. */
+/* The value of a comparison of two numbers whose order is -1, 0 or 1; 2: one of them is NaN. */
 static inline int pw_expression_compare (int op, int order) {
   int equal = order == 0 && (op == PW_OP_LESS_EQUAL || op == PW_OP_GREATER_EQUAL || op == PW_OP_EQUAL);
   int less = order == -1 && (op == PW_OP_LESS || op == PW_OP_LESS_EQUAL);
@@ -62,17 +62,17 @@ static inline int pw_expression_compare (int op, int order) {
 
 /* ---- Functions (functions.c) ---- */
 
-/* Derivatives of f (x, y): by x, y, x x, x y, y y. */
+/* First and second partial derivatives of f (x, y). */
 typedef struct {
   double x, y, xx, xy, yy;
 } pw_slopes;
 
-/* How a function of one argument changes with it, for enclosures of its values. */
+/* Monotonicity of a function of one argument, for interval arithmetic. */
 typedef enum { PW_RISES, PW_FALLS, PW_OTHERWISE } pw_trend;
 
 typedef struct {
   const char *name;
-  short op;          /* PW_OP_ONE, PW_OP_TWO, or an operation of its own */
+  short op;          /* PW_OP_ONE, PW_OP_TWO, or a separate operation */
   short least, most; /* arguments; most = 0: any number */
   double (*one) (double);
   double (*two) (double, double);
@@ -85,14 +85,14 @@ typedef struct {
   double value;
 } pw_expression_constant_name;
 
-/* Both ended by a NULL name. */
+/* Both end with a NULL name. */
 extern const pw_expression_function pw_expression_functions[];
 extern const pw_expression_constant_name pw_expression_constants[];
 
 /* The index of a function, or -1. */
 int pw_expression_find (const char *name);
 
-/* x^y, and its derivatives; by x alone unless y varies. */
+/* x^y and its derivatives, with respect to x alone unless y varies. */
 double pw_expression_power (double x, double y);
 pw_slopes pw_expression_power_slopes (double x, double y, double f, int varies);
 /* The remainder with the sign of the divisor: an angle modulo 2 pi lies in [0, 2 pi). */
@@ -100,13 +100,14 @@ double pw_expression_mod (double x, double y);
 
 /* ---- Evaluation ---- */
 
-/* The value of operations; *tie becomes 1 where something is just about to jump. */
+/* The value of operations; *tie becomes 1 just before a jump. */
 double pw_expression_run (const pw_expression_code *code, int codes, const double *variable, int *tie);
 
-/* The value of an operation of one number x, or of a and x. */
+/* The value of an operation of x, or of a and x. */
 double pw_expression_apply (const pw_expression_code *c, double a, double x);
 
-/* The value and derivatives; unless it is NULL, discrete[codes] becomes what of each operation only changes at breakpoints. */
+/* The value and derivatives.  discrete[codes], unless NULL, receives the part of each operation that changes only at
+ * breakpoints. */
 void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
                             double *discrete);
 

@@ -1,4 +1,4 @@
-/* The functions and constants of expressions, with the derivatives of those that are smooth
+/* Functions and constants of expressions, with derivatives of the smooth functions
  * (Abramowitz & Stegun 1964, chapters 4 and 17). */
 #include <float.h>
 #include <math.h>
@@ -6,7 +6,7 @@
 #include "expression_parts.h"
 #include "pinwheel.h"
 
-/* ---- Of one argument: f', f'' ---- */
+/* ---- Functions of one argument: f', f'' ---- */
 
 static pw_slopes slopes_of_one (double first, double second) {
   return (pw_slopes){ .x = first, .xx = second };
@@ -32,7 +32,7 @@ ONE (log, 1 / x, -1 / (x * x))
 ONE (log10, 1 / (x * log (10)), -1 / (x * x * log (10)))
 ONE (sqrt, 0.5 / f, -0.25 / (f * x))
 
-/* ---- Of two ---- */
+/* ---- Functions of two arguments ---- */
 
 static pw_slopes slopes_atan2 (double y, double x, double f) {
   double r = x * x + y * y;
@@ -72,7 +72,8 @@ double pw_expression_mod (double x, double y) {
 
 /* ---- Elliptic functions ----
  *
- * With the arithmetic-geometric mean a, b, c of core/base/elliptic.c, R = sum of 2^(n-1) c_n^2 / m from n = 1, phi_n its angles,
+ * With the arithmetic-geometric mean a, b, c of core/base/elliptic.c, R = sum of 2^(n-1) c_n^2 / m from n = 1, phi_n
+ * its angles,
  *
  *   dK/dm = K (1/2 - R) / (2 (1 - m)),   m (1 - m) d2K/dm2 = K / 4 - (1 - 2 m) dK/dm
  *   N = E (phi) - (1 - m) u = m (u (1/2 - R) + sum of c_n / m sin phi_n)
@@ -80,7 +81,7 @@ double pw_expression_mod (double x, double y) {
 
 enum { SLOPES_MEANS = 12 };
 
-/* Steps of the mean: how many; c_n / a_n, c_n / m, and R. */
+/* Computes the mean *a, ratio = c_n / a_n, part = c_n / m and R; returns the number of steps. */
 static int slopes_mean (double m, double *a, double ratio[SLOPES_MEANS], double part[SLOPES_MEANS], double *R) {
   double b = sqrt (1 - m), c = m, p = 1, power = 1;
   int n = 0;
@@ -100,7 +101,7 @@ static int slopes_mean (double m, double *a, double ratio[SLOPES_MEANS], double 
   return n;
 }
 
-/* The second derivative of K by its series, where the difference above is small. */
+/* The second derivative of K by its series, for small m, where the formula above cancels. */
 static double slopes_K_series (double m) {
   double term = 1, sum = 0, power = 1;
   for (int n = 1; n < 40; n++) {

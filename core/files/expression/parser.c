@@ -1,11 +1,11 @@
-/* An expression becomes operations in postfix order, by recursive descent:
+/* Recursive-descent parser; converts an expression to operations in postfix order:
  *
  *   choice   = binary [? choice : choice]
- *   binary   = unary {operator unary}           by the strength of operators, from the left
+ *   binary   = unary {operator unary}           by precedence, left-associative
  *   unary    = + unary | - unary | operand [^ unary]
  *   operand  = number | name | function (choice, ...) | (choice)
  *
- * Parts without variables are computed at once.  Each mistake is reported at its place. */
+ * Parts without variables are evaluated immediately.  Errors are reported at their position. */
 #include <ctype.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -78,7 +78,7 @@ int pw_expression_names (const char *text, int (*each) (void *context, const cha
 enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_CODES = PW_EXPRESSION_CODES, PARSER_NAME = 100 };
 enum { ON_TIME = 1, ON_STATES = 2 };
 
-/* ---- Names that stand for numbers ---- */
+/* ---- Named numbers ---- */
 
 struct pw_scope {
   int names;
@@ -107,14 +107,14 @@ void pw_scope_add (pw_scope *s, const char *name, double value) {
   pw_names_add (&s->table, name, s->names++);
 }
 
-/* ---- Words ---- */
+/* ---- Tokens ---- */
 
 typedef struct {
   const char *name;
   short op, strength;
 } parser_operator;
 
-/* The longer ones first; the weakest has strength 1. */
+/* Longer ones first; strength: precedence, from 1. */
 static const parser_operator parser_operators[] = {
   { "||", PW_OP_OR, 1 },    { "&&", PW_OP_AND, 2 },     { "<=", PW_OP_LESS_EQUAL, 3 }, { ">=", PW_OP_GREATER_EQUAL, 3 },
   { "==", PW_OP_EQUAL, 3 }, { "!=", PW_OP_UNEQUAL, 3 }, { "<", PW_OP_LESS, 3 },        { ">", PW_OP_GREATER, 3 },
@@ -126,12 +126,12 @@ typedef struct {
   const pw_scope *scope;
   const char *const *variable;
   const char *text;
-  size_t at, size;             /* the word being looked at */
-  size_t before;               /* the last one began here */
-  size_t end;                  /* and ended here */
+  size_t at, size;             /* current token */
+  size_t before;               /* start of the previous token */
+  size_t end;                  /* end of the previous token */
   char type;                   /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
   const parser_operator *sign; /* of type 'o' */
-  int nested, waiting;         /* depth of the descent; numbers on the stack */
+  int nested, waiting;         /* recursion depth; stack depth */
   int status;
   pw_expression_trouble *trouble;
   int breaks;
@@ -141,7 +141,7 @@ typedef struct {
   pw_expression_code code[PARSER_CODES];
 } parser;
 
-/* A part that has been read: its offset in the text, its first operation, what it depends on, whether it is 1 or 0. */
+/* A parsed part: offset in the text, first operation, dependencies, whether its value is 1 or 0. */
 typedef struct {
   size_t from;
   int first, depends, reference;
@@ -149,7 +149,7 @@ typedef struct {
 
 static const parser_part parser_nothing = { 0 };
 
-/* The first mistake counts. */
+/* Only the first error is kept. */
 #ifdef __GNUC__
 __attribute__ ((format (printf, 3, 4)))
 #endif
@@ -174,7 +174,7 @@ static void parser_wrong_sign (parser *p) {
                   c & 0x80 ? "a letter without ASCII code" : shown);
 }
 
-/* Goes on to the next word. */
+/* Advances to the next token. */
 static void parser_next (parser *p) {
   const char *word = p->text + p->at + p->size;
   p->before = p->at;
@@ -216,7 +216,7 @@ static parser_part parser_leaf (parser *p, int op, int which, double value) {
   return part;
 }
 
-/* Adds an operation to its operands; what depends on nothing is replaced by its value. */
+/* Appends an operation; a constant result is replaced by its value. */
 static parser_part parser_emit (parser *p, parser_part part, int depends, int op, int which) {
   int tie = 0;
   part.depends |= depends;
@@ -229,7 +229,7 @@ static parser_part parser_emit (parser *p, parser_part part, int depends, int op
     p->code[part.first] = (pw_expression_code){ PW_OP_CONSTANT, 0, value };
   }
   if (pw_expression_breaks (op) && part.depends & ON_TIME) p->breaks = 1;
-  int point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* it jumps and jumps back */
+  int point = op == PW_OP_EQUAL || op == PW_OP_UNEQUAL; /* jumps and jumps back */
   if (pw_expression_jumps (op) && !point && part.depends & ON_STATES && p->jump == NULL) {
     p->jump = p->text + part.from;
     p->jump_size = (int)(p->end - part.from);
@@ -237,7 +237,7 @@ static parser_part parser_emit (parser *p, parser_part part, int depends, int op
   return part;
 }
 
-/* A condition is made 1 or 0. */
+/* Converts a condition to 1 or 0. */
 static parser_part parser_truth (parser *p, parser_part part) {
   if (part.reference) return part;
   parser_code (p, PW_OP_CONSTANT, 0, 0);
@@ -254,7 +254,7 @@ static int parser_deeper (parser *p) {
   return p->status == PW_OK;
 }
 
-/* Reports an unexpected word; `open`: the parenthesis (or ?) that is still open, or 0, and its offset. */
+/* Reports an unexpected token; `open`: the unclosed parenthesis or ?, or 0, and its offset. */
 static parser_part parser_unexpected (parser *p, char open, size_t at) {
   if (p->type == 'n' || p->type == '0' || p->type == '(')
     return parser_wrong (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });
@@ -282,11 +282,11 @@ static parser_part parser_unknown (parser *p, const char *name) {
   for (int i = 0; p->scope && i < p->scope->names; i++) pw_nearest_try (&near, p->scope->entry[i].name);
   for (const pw_expression_constant_name *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
   for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
-  if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, a name in some expressions only */
+  if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, defined in some expressions only */
   return parser_wrong (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* Whether the next word is an opening parenthesis. */
+/* Whether the next token is an opening parenthesis. */
 static int parser_is_call (const parser *p) {
   const char *after = p->text + p->at + p->size;
   return after[strspn (after, " \t\r\n")] == '(';
@@ -305,7 +305,7 @@ static parser_part parser_name (parser *p, const char *name) {
   return parser_leaf (p, PW_OP_CONSTANT, 0, known >= 0 ? p->scope->entry[known].value : c->value);
 }
 
-/* Of more arguments than it has, min and max take two at a time. */
+/* min and max combine more than two arguments pairwise. */
 static parser_part parser_call (parser *p, int which) {
   const pw_expression_function *f = &pw_expression_functions[which];
   parser_part part = { p->at, p->codes, 0, 0 };
@@ -407,7 +407,7 @@ static parser_part parser_choice (parser *p) {
   return parser_emit (p, part, depends, PW_OP_SELECT, 0);
 }
 
-/* ---- The whole ---- */
+/* ---- Whole expressions ---- */
 
 static int parser_read (parser *p) {
   p->trouble->at = 0;

@@ -1,5 +1,5 @@
-/* The head of a text model: version, line about it, run defaults, parameters.  They make a plug-in's table, so that
- * whatever takes a model of compiled C takes a text model too; its build function reads bodies and elements. */
+/* The head of a text model: version, description, default run settings, parameters.  They are stored in a plug-in's
+ * table, so that text models can be used like compiled ones; the build function reads bodies and elements. */
 #define _POSIX_C_SOURCE 200809L
 #include <ctype.h>
 #include <math.h>
@@ -11,7 +11,7 @@
 
 /* ---- Parameters ---- */
 
-/* A name that expressions can use and that nothing else has. */
+/* Reads a unique name that expressions can use. */
 static int yaml_new_name (const pw_yaml *y, const pw_node *node, const char *what, pw_names *names, pw_error *error) {
   const char *name;
   if (pw_yaml_text (y, node, what, &name, error) != PW_OK) return error->status;
@@ -46,20 +46,20 @@ static int yaml_domain (const pw_yaml *y, const pw_node *domain, const pw_node *
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* 40 with the unit deg would be 40 rad, 400 with the unit mm 400 m. */
+/* Refuses units other than SI units: 40 with the unit deg would mean 40 rad. */
 static int yaml_unit (const pw_yaml *y, const pw_node *node, const pw_node *value, const char **unit, pw_error *error) {
   if (pw_yaml_text (y, node, "unit", unit, error) != PW_OK) return error->status;
   for (const pw_unit_name *other = pw_unit_names; other->name; other++) {
     const char *at = strcmp (other->factor, "1") ? strstr (*unit, other->name) : NULL,
-               *behind = at ? at + strlen (other->name) : NULL;
+               *after = at ? at + strlen (other->name) : NULL;
     int number = value->type == PW_YAML_SCALAR && pw_expression_number (value->text, &(double){ 0 });
-    if (at == NULL || (at > *unit && isalpha ((unsigned char)at[-1])) || isalpha ((unsigned char)*behind)) continue;
+    if (at == NULL || (at > *unit && isalpha ((unsigned char)at[-1])) || isalpha ((unsigned char)*after)) continue;
     return pw_yaml_fail (
         y, node->at, error,
         "unit: numbers are in SI units, angles in radians, and no unit converts a value; write \"value: "
         "%.30s%c%s%.2s, unit: %.*s%s%.30s\"",
         number ? value->text : "(..)", at > *unit && at[-1] == '/' ? '/' : '*', other->factor,
-        *behind == '^' ? behind : "", (int)(at - *unit), *unit, other->si, behind);
+        *after == '^' ? after : "", (int)(at - *unit), *unit, other->si, after);
   }
   return PW_OK;
 }
@@ -77,7 +77,7 @@ static int yaml_is_parameter (void *context, const char *name, size_t length, si
   return length < sizeof text && pw_names_find (s->names, text) >= 0;
 }
 
-/* A default does not follow other parameters: --set would have to change it, too. */
+/* A default must not depend on other parameters: --set would have to change it, too. */
 static int yaml_default (const pw_yaml *y, const pw_node *node, const char *what, const pw_names *names,
                          pw_parameter *p, pw_error *error) {
   yaml_search s = { names, 0 };

@@ -1,12 +1,12 @@
-/* Text models: what the files of this folder share, each below using those above it.
+/* Text models: interface between the files of this folder, each of which uses those above it.
  *
- *   yaml_source.c      the text: reading it, refusing what is not text, messages with line, column and caret
- *   yaml_tree.c        libfyaml's events become a tree of scalars, lists and maps
+ *   yaml_source.c      reads and checks the text; messages with line, column and caret
+ *   yaml_tree.c        builds a tree of scalars, lists and maps from libfyaml's events
  *   yaml_read.c        keys, numbers and names from the tree
  *   yaml_expression.c  signals by expressions of time and states, the reference solution
  *   yaml_signal.c      other signals, points of tables
  *   yaml_build.c       bodies and elements, through the field tables of their types
- *   yaml.c             the head of a model: parameters and default run settings, which make a plug-in's table */
+ *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -19,7 +19,7 @@ typedef enum { PW_YAML_SCALAR, PW_YAML_LIST, PW_YAML_MAP } pw_yaml_type;
 
 /* A scalar, a list of nodes, or a map, whose nodes alternate between keys and values. */
 typedef struct pw_node {
-  struct pw_node *next; /* in the list or map it is in */
+  struct pw_node *next; /* in the same list or map */
   union {
     const char *text;      /* of a scalar */
     struct pw_node *first; /* of a list or map */
@@ -35,10 +35,10 @@ typedef struct pw_node {
 struct pw_yaml {
   pw_plugin_table table; /* first: a model's table leads to its file */
   char *path;            /* as messages show it */
-  char *folder;          /* it is in, links resolved */
+  char *folder;          /* of the file, links resolved */
   char *source;          /* the text, ended by a NUL */
   size_t size;
-  double ahead;   /* indicators that libfyaml may have before it makes something of them */
+  double ahead;   /* limit of indicators that libfyaml may read before an event */
   pw_arena arena; /* nodes and texts */
   const pw_node *root;
   const pw_node *bodies, *elements, *let, *reference; /* or NULL */
@@ -60,7 +60,7 @@ int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *form
 
 int pw_yaml_no_memory (const pw_yaml *y, pw_error *error);
 
-/* The line an offset is in, from 1. */
+/* The line of an offset, from 1. */
 int pw_yaml_line (const pw_yaml *y, size_t at);
 
 /* ---- The tree (yaml_tree.c) ---- */
@@ -90,10 +90,10 @@ int pw_yaml_text (const pw_yaml *y, const pw_node *node, const char *what, const
 int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, const pw_scope *x,
                     double *value, pw_error *error);
 
-/* Whether an expression depends on the time t or a state, BODY.phi, and where (at may be NULL). */
+/* Whether an expression depends on the time t or a state, BODY.phi, and at which offset (at may be NULL). */
 int pw_yaml_moves (const char *text, size_t *at);
 
-/* Where an offset into a scalar's text is in the source. */
+/* Converts an offset in a scalar's text to an offset in the source. */
 size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
 
 /* ---- Building (yaml_build.c) ---- */
@@ -111,8 +111,8 @@ typedef struct {
   pw_names bodies;              /* names of bodies, to their index */
   pw_names all;                 /* names of bodies and elements, to the index in nodes */
   pw_names elements;     /* once an expression asks for them: names of all elements, to the index of their kinds */
-  const pw_node **node;  /* where each was named */
-  const pw_field *field; /* the one that is read, and the definition it is of, with all fields before it */
+  const pw_node **node;  /* where each is named */
+  const pw_field *field; /* the current one, and its definition with all preceding fields */
   const char *definition;
   int named;
   double points; /* of tables, so far */
@@ -142,7 +142,7 @@ int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, 
 int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,
                     pw_error *error);
 
-/* Reads the reference solution, when bodies and elements are there (yaml_expression.c). */
+/* Reads the reference solution, after bodies and elements (yaml_expression.c). */
 int pw_yaml_reference (pw_yaml_builder *b, pw_error *error);
 
 #endif

@@ -1,13 +1,13 @@
-/* Bodies and elements: fills the definition structures through the field tables of their kinds, and hands them to
- * pw_add_body and pw_add as a build function in C does.  What a number, name or element may be is decided by the core,
- * whose messages get a place here. */
+/* Bodies and elements: fills the definition structures through the field tables of their kinds, and passes them to
+ * pw_add_body and pw_add, like a build function in C.  The core checks numbers, names and elements; this file adds a
+ * position to its messages. */
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
 
 /* ---- Names ---- */
 
-/* Bodies and elements share their names. */
+/* Bodies and elements share one set of names. */
 static int build_name (pw_yaml_builder *b, const pw_node *node, const char *what, const char **name, pw_error *error) {
   if (pw_yaml_text (b->y, node, what, name, error) != PW_OK) return error->status;
   int before = pw_names_add (&b->all, *name, b->named);
@@ -18,7 +18,7 @@ static int build_name (pw_yaml_builder *b, const pw_node *node, const char *what
   return PW_OK;
 }
 
-/* The core's message without its "model NAME: ", at a place. */
+/* The core's message without its prefix "model NAME: ", at a position. */
 static int build_refuse (const pw_yaml_builder *b, const pw_node *node, const pw_error *own, pw_error *error) {
   char prefix[200];
   int n = snprintf (prefix, sizeof prefix, "model %s: ", pw_model_name (b->m));
@@ -205,7 +205,7 @@ static int build_all (pw_yaml_builder *b, char *definition, pw_error *error) {
   return pw_yaml_reference (b, error);
 }
 
-/* Reads `let`: numbers defined from parameters and from those above them. */
+/* Reads `let`: numbers defined from parameters and preceding definitions. */
 static int build_let (pw_yaml_builder *b, pw_error *error) {
   char what[100];
   for (const pw_node *n = b->y->let ? b->y->let->first : NULL; n; n = n->next->next) {
@@ -229,7 +229,7 @@ static void build_free (void *arena) {
   free (arena);
 }
 
-/* What lives as long as the model: expressions, points of tables, the reference solution. */
+/* Data that live as long as the model: expressions, points of tables, the reference solution. */
 static int build_keep (pw_yaml_builder *b, pw_error *error) {
   b->arena = calloc (1, sizeof *b->arena);
   if (b->arena == NULL || pw_model_keep (b->m, b->arena, build_free) != PW_OK) return pw_yaml_no_memory (b->y, error);

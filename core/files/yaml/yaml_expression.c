@@ -1,15 +1,15 @@
 /* Expressions of time, and of states, in text models: signals by expressions, and the reference solution.
  *
- * Such a signal becomes a function signal.  Each compiled system has a copy, since it may outlive the model. */
+ * Such a signal becomes a function signal.  Each compiled system has a copy and may outlive the model. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 #include "yaml.h"
 
-enum { SIGNAL_STATES = 16, BREAKPOINTS_TRIED = 100 }; /* states that a signal depends on, at most */
+enum { SIGNAL_STATES = 16, BREAKPOINTS_TRIED = 100 }; /* most states per signal */
 
-/* An expression that is being read. */
+/* The expression currently read. */
 typedef struct {
   pw_yaml_builder *b;
   const pw_node *node;
@@ -55,7 +55,7 @@ static int state_kind (const char *name) {
   return -1;
 }
 
-/* All elements by name, including those not built yet, whose errors are reported later. */
+/* Indexes all elements, including those not built yet, whose errors are reported later. */
 static int state_elements (pw_yaml_builder *b, pw_error *error) {
   const pw_node *list = b->y->elements;
   if (b->elements.slot) return PW_OK;
@@ -96,7 +96,7 @@ static int state_of_element (const reading *r, const char *owner, const char *pa
                        part);
 }
 
-/* Checks a name with a dot, at an offset of the expression, to be that of a state. */
+/* Checks that a name with a dot, at an offset of the expression, names a state. */
 static int state_check (const reading *r, const char *name, size_t at) {
   static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega", NULL };
   char owner[100];
@@ -113,13 +113,13 @@ static int state_check (const reading *r, const char *name, size_t at) {
 
 typedef struct {
   const pw_expression *x[3];           /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                     /* by time that are needed: 0, 1, 2 */
-  int states;                          /* it depends on */
-  const char *name[SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; these serve reading only */
+  int derivatives;                     /* required time derivatives: 0, 1, 2 */
+  int states;                          /* number of states in it */
+  const char *name[SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; used for reading only */
   pw_signal_text text;
 } time_function;
 
-/* Each derivative that is not given is that of what is given below it. */
+/* Differentiates the highest derivative given to obtain those not given. */
 static void time_derivatives (const time_function *f, const double *variable, double u[3]) {
   pw_expression_derivatives (f->x[0], variable, 0, u);
   for (int i = 1; i <= f->derivatives; i++) {
@@ -142,7 +142,7 @@ static int time_eval (void *context, double t, const double *x, double value[3],
     value[0] = pw_expression_value (f->x[0], variable);
   for (int i = 0; gradient && i < f->states; i++) {
     pw_expression_derivatives (f->x[0], variable, 1 + i, u);
-    gradient[i] = isfinite (u[1]) ? u[1] : 0; /* |v| has none at rest; it only serves Newton's iteration */
+    gradient[i] = isfinite (u[1]) ? u[1] : 0; /* |v| has no derivative at rest; used by Newton's iteration only */
   }
   return isfinite (value[0]) && (f->derivatives == 0 || (isfinite (value[1]) && isfinite (value[2]))) ? 0 : -1;
 }
@@ -171,7 +171,7 @@ static void *time_open (void *context) {
   return copy;
 }
 
-/* Keeps the names that expressions may use, and their values, for `show`. */
+/* Stores the names that expressions may use, and their values, for `show`. */
 static int time_keep_names (pw_yaml_builder *b, pw_error *error) {
   pw_reference_text *t = b->reference;
   size_t names = (size_t)b->y->parameters + (size_t)b->lets;
@@ -218,7 +218,7 @@ static int time_add_state (void *context, const char *name, size_t length, size_
   return f->name[++f->states] ? PW_OK : reading_no_memory (&t->r);
 }
 
-/* Copies the part of the text that jumps as states change. */
+/* Copies the part of the text that may jump as states change. */
 static int time_jump (const time_reader *t, const pw_expression *x) {
   if (x->jump == NULL || t->f->text.jump) return PW_OK;
   char *text = pw_arena_take (t->r.b->arena, (size_t)x->jump_size + 1);
@@ -242,7 +242,7 @@ static int time_expression (time_reader *t, int i) {
   return time_jump (t, *x);
 }
 
-/* Compares a derivative that is given with the exact one, at some times. */
+/* Compares a given derivative with the exact one at some times. */
 static int time_check (const time_reader *r, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 };
   double given[3], exact[3][3], size = 0;
@@ -271,7 +271,7 @@ static double time_size (const time_function *f, double t, int i) {
   return size;
 }
 
-/* Refuses what a constraint cannot follow: a value that jumps, of positions a rate that does. */
+/* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative. */
 static int time_continuous (const time_reader *r, int levels) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
@@ -292,7 +292,7 @@ static int time_continuous (const time_reader *r, int levels) {
   return PW_OK;
 }
 
-/* Reads the value, and the derivatives as far as they are given. */
+/* Reads the value and the given derivatives. */
 static int time_all (time_reader *r, const pw_node *const v[3]) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
   for (int i = 0; i < 3; i++) {

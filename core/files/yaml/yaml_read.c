@@ -1,4 +1,4 @@
-/* Keys, lists, texts and numbers out of the tree. */
+/* Reads keys, lists, texts and numbers from the tree. */
 #include <string.h>
 #include "yaml.h"
 
@@ -12,7 +12,7 @@ static int read_empty (const pw_node *n) {
 
 /* ---- Maps ---- */
 
-/* A hint for a key that is more than a name, or "". */
+/* A hint for a key that is not a plain name, or "". */
 static const char *read_slip (const char *text, const char *const *key) {
   for (int i = 0; key[i]; i++) {
     size_t n = strlen (key[i]);

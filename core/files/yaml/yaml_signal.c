@@ -4,7 +4,7 @@
  *   {constant: 3}                                  the same
  *   {harmonic: {amplitude, omega, phase, offset}}  and the other forms made of numbers (signal_form.c)
  *   "M0 * cos (omega * t)"                         an expression of the time t; of states, BODY.phi, for forces
- *   {expression: .., rate: .., acceleration: ..}   the same for constraints, which need its derivatives by time
+ *   {expression: .., rate: .., acceleration: ..}   the same for constraints, which need time derivatives
  */
 #define _XOPEN_SOURCE 700 /* realpath */
 #include <errno.h>
@@ -54,7 +54,7 @@ static char *table_below (const char *folder, const char *name, const char **why
   return NULL;
 }
 
-/* A model that is passed on can read what is passed on with it, nothing else. */
+/* A model may only read files from its own folder. */
 static FILE *table_open (const pw_yaml *y, const char *name, const char **why) {
   *why = "a table lies in the model's own folder, so its path is relative and has no \"..\"";
   if (*name == '/' || table_climbs (name)) return NULL;
@@ -75,11 +75,11 @@ static int table_columns (pw_yaml_builder *b, const pw_node *list, const char *w
   return pw_yaml_text (b->y, list->first->next, text, &column[1], error);
 }
 
-/* The unit of the field that is read.  "m or rad" is that of the word a choice of the element has: an angle's, or not. */
+/* The unit of the current field.  For "m or rad" the element's choice decides: rad for an angle. */
 static const char *table_unit (const pw_yaml_builder *b) {
   if (b->field->unit == NULL || strcmp (b->field->unit, "m or rad") != 0) return b->field->unit;
   const pw_field *choice = b->field;
-  while (choice->type != PW_CHOICE) choice--; /* a field with two units has it before */
+  while (choice->type != PW_CHOICE) choice--; /* precedes a field with two units */
   int chosen = *(const int *)(const void *)(b->definition + choice->offset);
   return strcmp (choice->choices[chosen], "angle") == 0 ? "rad" : "m";
 }
@@ -113,7 +113,7 @@ static int table_read (pw_yaml_builder *b, const char *what, const pw_node *node
   return table_file (b, what, v[1], column, s, error);
 }
 
-/* Many tables may be read from one file. */
+/* Limits the total number of points, since many tables may read one file. */
 static int table_points (pw_yaml_builder *b, const char *what, const pw_node *node, const pw_node *const v[3],
                          pw_signal *s, pw_error *error) {
   int status = table_read (b, what, node, v, s, error);
@@ -125,7 +125,7 @@ static int table_points (pw_yaml_builder *b, const char *what, const pw_node *no
 
 /* ---- Forms made of numbers ---- */
 
-/* Reads what a form is made of; a table's points besides. */
+/* Reads the fields of a form, except a table's points. */
 static int signal_fields (pw_yaml_builder *b, const pw_signal_form *form, const char *what, const pw_node *node,
                           const pw_node *const *v, pw_signal *signal, pw_error *error) {
   char text[240];

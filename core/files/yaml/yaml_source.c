@@ -1,7 +1,7 @@
 /* The text of a model file, and messages that point into it.
  *
- * libfyaml 0.7.12 does not terminate on some lines that begin with %.  So the text is
- * checked first: its size, UTF-8, no control characters, no such line. */
+ * libfyaml 0.7.12 does not terminate on some lines that begin with %.  So the text is checked
+ * first: size, UTF-8, no control characters, no such line. */
 #include <errno.h>
 #include <stdarg.h>
 #include <string.h>

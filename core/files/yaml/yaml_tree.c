@@ -1,5 +1,5 @@
-/* libfyaml's events become a tree of ours: a third of the memory of its own, without its search for duplicate keys,
- * which takes quadratic time, and with whatever a model file must not contain refused where it stands. */
+/* Builds a tree from libfyaml's events.  It takes a third of the memory of libfyaml's tree, avoids its quadratic search
+ * for duplicate keys, and reports anything a model file must not contain at its position. */
 #include <errno.h>
 #include <libfyaml.h>
 #include <string.h>
@@ -11,23 +11,23 @@ typedef struct {
   pw_yaml *y;
   struct fy_parser *parser;
   struct fy_diag *diag;
-  struct fy_token_iter *text; /* through the pieces of a scalar */
-  pw_node *open[TREE_DEPTH];  /* lists and maps that have begun */
+  struct fy_token_iter *text; /* iterates over the pieces of a scalar */
+  pw_node *open[TREE_DEPTH];  /* open lists and maps */
   pw_node **tail[TREE_DEPTH]; /* where the next node of each goes */
   int depth;
   int documents;
-  /* what the parser has of the source beyond the last event */
-  size_t from, fed;     /* its bytes */
-  double marks, opened; /* indicators in it; brackets that open, less those that close */
-  int nested;           /* 1: there were too many brackets */
-  int far;              /* 1: there was too much of it */
+  /* source read by the parser since the last event */
+  size_t from, fed;     /* bytes */
+  double marks, opened; /* indicators; opening minus closing brackets */
+  int nested;           /* 1: too many brackets */
+  int far;              /* 1: too much source */
   int line, column;     /* of the last mark, from 0, and */
   size_t mark_at;       /* its offset */
-  unsigned at;          /* of the last node, for what has no place of its own */
+  unsigned at;          /* of the last node, for events without a position */
 } tree;
 
-/* The offset of a mark, from its line and its column, in characters: offsets of libfyaml 0.7.12 mean nothing once it is
- * fed.  Marks come in order, or nearly so. */
+/* The offset of a mark, from its line and its column, in characters: libfyaml 0.7.12 gives wrong offsets for
+ * input read in pieces.  Marks are nearly in order. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
   static const char sign[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
   const char *source = x->y->source, *end = source + x->y->size, *p = source + x->mark_at;
@@ -44,7 +44,7 @@ static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
   return (unsigned)x->mark_at;
 }
 
-static unsigned tree_place (tree *x, struct fy_event *e) {
+static unsigned tree_event_offset (tree *x, struct fy_event *e) {
   const struct fy_mark *mark = fy_event_start_mark (e);
   return mark && mark->line >= 0 ? tree_offset_of (x, mark) : x->at;
 }
@@ -69,8 +69,8 @@ static pw_node *tree_add (tree *x, pw_yaml_type type, unsigned at, pw_error *err
   return n;
 }
 
-/* Puts the pieces of a scalar one after the other, if there is room for them; their size, or -1.  (fy_token_get_text
- * would do, but libfyaml 0.7.12 loses 4 KB with every text of more than some ten pieces: escapes, lines.) */
+/* Joins the pieces of a scalar; returns their size, or -1 if they do not fit.  (fy_token_get_text of libfyaml 0.7.12
+ * leaks 4 KB for every text of more than about ten pieces: escapes, lines.) */
 static long tree_text (tree *x, struct fy_token *token, char *to) {
   const struct fy_iter_chunk *piece = NULL;
   long size = 0;
@@ -89,7 +89,7 @@ static int tree_scalar (tree *x, struct fy_event *e, pw_error *error) {
   struct fy_token *token = e->scalar.value;
   int quoted = token && (fy_token_scalar_style (token) == FYSS_SINGLE_QUOTED ||
                          fy_token_scalar_style (token) == FYSS_DOUBLE_QUOTED);
-  unsigned at = tree_place (x, e);
+  unsigned at = tree_event_offset (x, e);
   long size = tree_text (x, token, NULL);
   pw_node *n = tree_add (x, PW_YAML_SCALAR, at - (quoted && at > 0), error);
   char *text = n && size >= 0 ? pw_arena_take (&x->y->arena, (size_t)size + 1) : NULL;
@@ -97,7 +97,7 @@ static int tree_scalar (tree *x, struct fy_event *e, pw_error *error) {
   if (memchr (text, 0, (size_t)size))
     return pw_yaml_fail (x->y, n->at, error, "a text must not contain the character 0");
   text[size] = 0;
-  for (const char *p = text; *p; p++) /* escapes can make them */
+  for (const char *p = text; *p; p++) /* possible through escapes */
     if (pw_control (p))
       return pw_yaml_fail (x->y, n->at, error, "a text must not contain the control character of code %d",
                            pw_control (p));
@@ -107,7 +107,7 @@ static int tree_scalar (tree *x, struct fy_event *e, pw_error *error) {
 }
 
 static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type, pw_error *error) {
-  unsigned at = tree_place (x, e);
+  unsigned at = tree_event_offset (x, e);
   if (x->depth == TREE_DEPTH) return pw_yaml_fail (x->y, at, error, "nested too deeply");
   pw_node *n = tree_add (x, type, at, error);
   if (n == NULL) return PW_RESOURCE;
@@ -128,7 +128,7 @@ static int tree_marked (tree *x, struct fy_event *e, pw_error *error) {
   struct fy_token *token = e->type == FYET_ALIAS ? e->alias.anchor : anchor ? anchor : tag;
   if (token == NULL) return PW_OK;
   const struct fy_mark *mark = fy_token_start_mark (token);
-  size_t at = mark && mark->line >= 0 ? tree_offset_of (x, mark) : tree_place (x, e);
+  size_t at = mark && mark->line >= 0 ? tree_offset_of (x, mark) : tree_event_offset (x, e);
   const char *source = x->y->source;
   while (at > 0 && !strchr ("&*!", source[at]) && source[at - 1] != '\n') at--; /* marks may follow the sign */
   return pw_yaml_fail (x->y, at, error, "%s do not belong in a model file; use parameters",
@@ -140,11 +140,11 @@ static int tree_marked (tree *x, struct fy_event *e, pw_error *error) {
 /* ---- Input ---- */
 
 /* libfyaml cannot tell a list or map in brackets from a key before it has seen what follows the closing bracket, and
- * until then keeps some 350 bytes for each indicator.  So it gets the source piece by piece, and no more once it has asked
- * for too much of it without an event, or for too many brackets. */
+ * until then keeps some 350 bytes for each indicator.  So it receives the source in pieces, and none after too
+ * much source without an event, or too many brackets. */
 enum { TREE_NESTED = 10000 };
 
-/* Adds (1) or takes away (-1) the indicators from one offset to another. */
+/* Adds (1) or subtracts (-1) the indicators between two offsets. */
 static void tree_count (tree *x, size_t from, size_t to, int sign) {
   for (const char *p = x->y->source + from; p < x->y->source + to; p++) {
     int opens = *p == '[' || *p == '{', closes = *p == ']' || *p == '}';
@@ -162,7 +162,7 @@ static ssize_t tree_feed (void *user, void *to, size_t count) {
   x->fed += n;
   x->nested = x->opened > TREE_NESTED;
   x->far = x->marks > x->y->ahead;
-  return x->nested || x->far ? 0 : (ssize_t)n; /* libfyaml 0.7.12 takes an error for something to read again */
+  return x->nested || x->far ? 0 : (ssize_t)n; /* libfyaml 0.7.12 retries after an error */
 }
 
 static void tree_pass (tree *x, size_t at) {
@@ -174,12 +174,12 @@ static void tree_pass (tree *x, size_t at) {
 
 static int tree_take (tree *x, struct fy_event *e, pw_error *error) {
   int status = tree_marked (x, e, error);
-  tree_pass (x, tree_place (x, e));
+  tree_pass (x, tree_event_offset (x, e));
   if (status != PW_OK) return status;
   switch (e->type) {
   case FYET_DOCUMENT_START:
     if (x->documents++ == 0) return PW_OK;
-    return pw_yaml_fail (x->y, tree_place (x, e), error, "a second document; a file holds one model");
+    return pw_yaml_fail (x->y, tree_event_offset (x, e), error, "a second document; a file holds one model");
   case FYET_SCALAR:
     return tree_scalar (x, e, error);
   case FYET_SEQUENCE_START:
@@ -274,7 +274,7 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   errno = 0;
   x.diag = fy_diag_create (&quiet);
   if (x.diag == NULL) return pw_yaml_no_memory (y, error);
-  fy_diag_set_collect_errors (x.diag, true); /* nothing is printed */
+  fy_diag_set_collect_errors (x.diag, true); /* prints nothing */
   struct fy_parse_cfg how = { .flags = FYPCF_ALLOW_DUPLICATE_KEYS, .diag = x.diag };
   x.parser = fy_parser_create (&how);
   int status = PW_OK;
