@@ -1,8 +1,8 @@
 /* The program's commands, and what they share.
  *
- * A command is one file with one table, named in the list below.  Its function returns PW_OK, a negative status with the
- * error set, or a positive exit status if it has reported everything.  Exit statuses are 0 success, 1 resource error, 2
- * input, 3 initial conditions, 4 method, 130 interrupted, 141 closed pipe. */
+ * A command is one file with one table, named in the list below.  Its function returns PW_OK, a negative status with
+ * the error set, or a positive exit status if it has reported everything.  Exit statuses are 0 success, 1 resource
+ * error, 2 input, 3 initial conditions, 4 method, 130 interrupted, 141 closed pipe. */
 #ifndef PW_CLI_H
 #define PW_CLI_H
 
@@ -21,8 +21,8 @@ enum {
 /* All commands, in the order of `pinwheel --help`; pw_cli_list is the table of the first, and so on. */
 #define PW_COMMANDS(X) X (list) X (show) X (check) X (run) X (sweep) X (compare) X (drift) X (new)
 
-/* A command line: its arguments and the options that several commands share, NULL if they are not given.  The structure
- * of options of every command begins with one. */
+/* A command line: its arguments and the options shared by several commands, NULL if not given.  The structure of
+ * options of every command begins with one. */
 typedef struct {
   const char **argument; /* ended by NULL */
   int arguments;
@@ -32,7 +32,7 @@ typedef struct {
   /* private */
   poptContext popt;
   struct poptOption *table; /* a copy of the command's options, bound to its structure */
-  void **text;              /* what popt allocated for each of them */
+  void **text;              /* the text that popt allocated for each */
 } pw_cli_line;
 
 typedef struct {
@@ -49,8 +49,9 @@ typedef struct {
 #define PW_COMMAND(name) extern const pw_command pw_cli_##name;
 PW_COMMANDS (PW_COMMAND)
 
-/* Entries of a table of options: a text, a list of texts (the option may be repeated), a flag (an int).  They are zero if
- * the option is not given, and released with the command line.  `type` is the structure, `name` "every", `letter` 'e' or 0. */
+/* Entries of a table of options: a text, a list of texts (the option may be repeated), a flag (an int).  They are zero
+ * if the option is not given, and released with the command line.  `type` is the structure, `name` "every", `letter`
+ * 'e' or 0. */
 #define PW_TEXT_OPTION(type, member, name, letter, value, help) \
   { name, letter, POPT_ARG_STRING, (void *)offsetof (type, member), 0, help, value }
 #define PW_LIST_OPTION(type, member, name, letter, value, help) \
@@ -114,20 +115,21 @@ typedef struct {
 /* Opens the model file that a command line's first argument names, by name or path. */
 pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error);
 
-/* Opens, builds and compiles the model of a command line with its --set and --start.  Returns a status; close the model in
- * every case. */
+/* Opens, builds and compiles the model of a command line with its --set and --start.  Returns a status; close the model
+ * in every case. */
 int pw_cli_open (pw_cli_model *m, const pw_cli_line *l, pw_error *error);
 void pw_cli_close_model (pw_cli_model *m);
 
-/* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_model_set or pw_model_set_initial; `option` ("--set") is for
- * messages. */
+/* Applies every "NAME=VALUE" of a NULL-terminated list to a model by pw_model_set or pw_model_set_initial; `option`
+ * ("--set") is for messages. */
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
 
 /* A path, relative to the current directory if it lies below; it may be written to the buffer. */
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
 
-/* A model's own run settings, else 10 s of rk4+projection with steps of 1e-3 s; rtol is 0 if the model does not set it. */
+/* A model's own run settings, else 10 s of rk4+projection with steps of 1e-3 s; rtol is 0 if the model does not set
+ * it. */
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
 
 /* ---- Files ---- */
@@ -148,7 +150,8 @@ int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int cou
 #define PW_PRINTS(n)
 #endif
 
-/* Print to standard error, and to a stream; on a terminal control characters are escaped, since names may contain them. */
+/* Print to standard error, and to a stream; on a terminal control characters are escaped, since names may contain
+ * them. */
 void pw_cli_say (const char *format, ...) PW_PRINTS (1);
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTS (2);
 

@@ -1,4 +1,4 @@
-/* Command lines: options bound to a command's structure, help, and the values that options have. */
+/* Command lines: options bound to a command's structure, help, values of options. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <limits.h>
@@ -9,7 +9,7 @@
 #include "cli.h"
 #include "util.h"
 
-enum { COMMAND_HELP = 1000, COMMAND_WIDTH = 80 }; /* what popt returns for --help; for the others 1, 2, ... */
+enum { COMMAND_HELP = 1000, COMMAND_WIDTH = 80 }; /* popt returns this for --help; for other options 1, 2, ... */
 
 static int command_is_end (const struct poptOption *o) {
   return o->longName == NULL && o->descrip == NULL;
@@ -35,8 +35,8 @@ static int command_table (pw_cli_line *l, const struct poptOption *options) {
   return PW_OK;
 }
 
-/* popt allocates copies of texts, and lists of copies: records that of an option just read, to be released even if the variable
- * changes.  If an option is repeated, a text replaces the previous one, a list grows. */
+/* popt allocates copies of texts, and lists of copies: records that of an option just read, to be released even if the
+ * variable changes.  If an option is repeated, a text replaces the previous one, a list grows. */
 static void command_note (pw_cli_line *l, int i) {
   unsigned type = l->table[i].argInfo & POPT_ARG_MASK;
   if (type == POPT_ARG_STRING) free (l->text[i]);
@@ -101,7 +101,7 @@ int pw_cli_at_most (const pw_command *c, const pw_cli_line *l, int most, pw_erro
                   c->synopsis);
 }
 
-/* 1: help was asked for and has been printed. */
+/* Returns 1 if help was requested and has been printed. */
 static int command_read (const pw_command *c, pw_cli_line *l, int argc, const char **argv, pw_error *error) {
   errno = 0;
   if (command_table (l, c->options) == PW_OK) l->popt = poptGetContext (argv[0], argc, argv, l->table, 0);
@@ -109,7 +109,7 @@ static int command_read (const pw_command *c, pw_cli_line *l, int argc, const ch
   int got = poptGetNextOpt (l->popt);
   for (; got > 0 && got != COMMAND_HELP; got = poptGetNextOpt (l->popt)) command_note (l, got - 1);
   if (errno == ENOMEM)
-    return pw_fail (error, PW_RESOURCE, "out of memory"); /* popt leaves out what it has no room for */
+    return pw_fail (error, PW_RESOURCE, "out of memory"); /* popt omits texts that it cannot allocate */
   if (got == COMMAND_HELP) {
     command_help (c, l);
     return 1;

@@ -1,4 +1,4 @@
-/* The progress bar, and the lines in its place. */
+/* The progress bar, or lines of text without a terminal. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -34,7 +34,7 @@ void pw_progress_count (pw_progress *p, const char *what, const char *unit, doub
   p->from = from;
 }
 
-/* "0:07", "12:30", "3:05:00"; "-" where nothing can be said. */
+/* "0:07", "12:30", "3:05:00"; "-" if unknown. */
 static void progress_duration (double seconds, char *text, size_t size) {
   if (!(seconds < 3600.0 * 1000)) {
     snprintf (text, size, "-");

@@ -6,9 +6,9 @@
 
 typedef struct {
   const char *what; /* shown in front */
-  const char *unit; /* "s": it goes by time; else what is counted */
-  double from;      /* where it began; not 0 if a run or sweep is continued */
-  double t_end;     /* where it ends: time [s] or count */
+  const char *unit; /* "s" for time; else what is counted */
+  double from;      /* initial value; not 0 if a run or sweep is resumed */
+  double t_end;     /* final value: time [s] or count */
   double start;     /* clock when it started [s] */
   double next;      /* clock when it may be drawn or written again [s] */
   int shown;        /* 1: there is a bar to erase */

@@ -68,7 +68,7 @@ int pw_cli_end (const pw_error *error) {
   if (error->status == PW_OK) return 0;
   if (error->status == PW_RESOURCE && say_pipe_closed ()) return PW_CLOSED_PIPE;
   fflush (stdout);
-  int placed = strstr (error->text, ": error: ") != NULL; /* as compilers say it, so that editors find the place */
+  int placed = strstr (error->text, ": error: ") != NULL; /* the format of compilers, which editors recognise */
   pw_cli_say ("%s%s\n", placed ? "" : "pinwheel: ", error->text);
   return -error->status;
 }

@@ -45,7 +45,8 @@ void pw_limit_start (pw_limit *l) {
   l->start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
 }
 
-/* The thread's clock takes a system call, so it is asked only when a coarse one has moved: some 250 times a second. */
+/* Reading the thread's clock takes a system call, so it is read only when a coarse clock has advanced: about 250 times
+ * a second. */
 int pw_limit_over (void *limit) {
   pw_limit *l = limit;
   if (pw_stop) return 1;

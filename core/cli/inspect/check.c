@@ -1,5 +1,5 @@
-/* pinwheel check: mobility, redundant constraint equations, massless bodies, consistent initial conditions, derivatives of
- * every element type in use, and the linearised equations of motion. */
+/* pinwheel check: mobility, redundant constraint equations, massless bodies, consistent initial conditions, derivatives
+ * of every element type in use, and the linearised equations of motion. */
 #include <math.h>
 #include <stdarg.h>
 #include <stdlib.h>
@@ -126,7 +126,7 @@ static int check_list_kinds (pw_check *x, pw_error *error) {
   return PW_OK;
 }
 
-/* An inconsistent table is not tried in the scene. */
+/* An inconsistent table is not tested in the scene. */
 static int check_kinds (pw_check *x, pw_error *error) {
   const pw_system *s = x->m.system;
   double T = x->r ? pw_run_scale (x->r)->time : 1;

@@ -5,10 +5,7 @@
 #include "cli.h"
 #include "pinwheel-selftest.h"
 
-enum {
-  CHECK_MOST = 400 /* coordinates: above it nothing is computed that takes time as their cube */,
-  CHECK_DIGITS = 5
-};
+enum { CHECK_MOST = 400 /* coordinates: in larger scenes nothing of cubic cost is computed */, CHECK_DIGITS = 5 };
 
 /* The self-test of an element type in use. */
 typedef struct {
@@ -18,18 +15,18 @@ typedef struct {
   char untested[500];               /* why there is no test in random scenes, or "" */
 } pw_checked_kind;
 
-/* Messages: how many, and the first of them. */
+/* Messages: their number, and the first of them. */
 typedef struct {
   int count;
   char text[8][700];
 } pw_check_list;
 
-/* Problems make the model fail; findings do not: it can be run, but may not be what was intended. */
+/* Problems make the check fail; findings do not: the model can be run, but may not be what was intended. */
 typedef struct {
   pw_cli_line line;
   const char *json; /* path, or NULL */
   pw_cli_model m;
-  pw_run *r;              /* NULL: it cannot be started, for the reason in `start` */
+  pw_run *r;              /* NULL: initialisation failed, for the reason in `start` */
   pw_error start;         /* why */
   pw_linear linear;       /* zero without a run */
   const char **redundant; /* a description of each redundant constraint equation, ended by NULL; or NULL */

@@ -1,4 +1,5 @@
-/* The report of `pinwheel check`: a sequence of entries, each with its key in JSON, and its label and words in the text. */
+/* The report of `pinwheel check`: a sequence of entries, each with its key in JSON, and its label and words in the
+ * text. */
 #include <math.h>
 #include <stdarg.h>
 #include "check.h"
@@ -216,7 +217,7 @@ static char *report_eigenvalue (const pw_linear *l, int i, char buffer[100]) {
   return buffer;
 }
 
-/* How many eigenvalues from i on are the same. */
+/* Number of equal eigenvalues from i on. */
 static int report_same (const pw_linear *l, int i) {
   int k = i;
   while (k < l->unknowns && l->re[k] == l->re[i] && fabs (l->im[k]) == fabs (l->im[i]) && l->rigid[k] == l->rigid[i])

@@ -6,7 +6,7 @@
 
 /* ---- Rows in columns ---- */
 
-enum { LIST_ROWS = 40, LIST_WIDTH = 110 /* of a line, where the last column leaves room for it */ };
+enum { LIST_ROWS = 40, LIST_WIDTH = 110 /* of a line, if the last column leaves room */ };
 
 /* One row: "radius", "number [m]", "required", "radius of the wheel". */
 typedef struct {
@@ -73,16 +73,16 @@ static void list_print (list_table *x) {
   x->rows = 0;
 }
 
-/* ---- Descriptions by name ---- */
+/* ---- Descriptions of named items ---- */
 
-/* Something described by name: methods, element types. */
+/* A set of named items: methods, element types. */
 typedef struct {
   const char *what;            /* "element type" */
   const char *(*name) (int i); /* NULL at the end */
   void (*show) (int i);
 } list_things;
 
-/* Describes those that are named; "all" names all. */
+/* Describes the items given; "all" stands for all. */
 static int list_named (const list_things *x, int names, const char **name, pw_error *error) {
   char hint[100];
   int shown = 0;

@@ -115,7 +115,7 @@ static void show_element (const pw_element *e) {
 
 /* ---- Derivatives without a formula ---- */
 
-/* Blocks that element types leave to Pinwheel. */
+/* Derivative blocks that element types do not provide. */
 static void show_differences (const pw_system *s) {
   char text[300];
   int count = pw_system_differences (s);
@@ -157,7 +157,7 @@ static void show_sizes (const pw_system *s) {
           rows - holonomic);
 }
 
-/* The states that the reference solution of the model has. */
+/* The states given by the reference solution of the model. */
 static void show_reference (const pw_cli_model *m) {
   enum { MOST = 12 };
   int n = pw_system_coordinates (m->system), known = 0;

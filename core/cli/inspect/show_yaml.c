@@ -1,6 +1,6 @@
 /* pinwheel show --yaml: a model as text that runs to the same trajectory, to the bit.
  *
- * Numbers are written with 17 digits, and left out where they are what a model that does not say has: 0. */
+ * Numbers are written with 17 digits, and omitted if they are the default, 0. */
 #include <math.h>
 #include <stdio.h>
 #include "show.h"
@@ -10,12 +10,12 @@ static void yaml_number (double value) {
   fputs (pw_format (text, value, 17), stdout);
 }
 
-/* 1 for the default, 0; -0 is different. */
+/* 1 for the default, 0; -0 is not the default. */
 static int yaml_is_zero (double value) {
   return value == 0 && !signbit (value);
 }
 
-/* Names are made of letters, digits, _ and -; one that begins with - might be taken for an entry of a list. */
+/* Names are made of letters, digits, _ and -; one that begins with - could be read as an entry of a list. */
 static void yaml_name (const char *name) {
   printf (*name == '-' ? "\"%s\"" : "%s", name);
 }

@@ -1,4 +1,4 @@
-/* Animation of a run: a page for a browser that needs nothing else. */
+/* Animation of a run: a self-contained page for a browser. */
 #ifndef PW_ANIMATE_H
 #define PW_ANIMATE_H
 
@@ -8,8 +8,8 @@
 /* Whether a file of this name can be written: PW_INPUT unless it ends in .html. */
 int pw_animation_check (const char *path, pw_error *error);
 
-/* Writes what was kept of a run, with forces, to the output of that path, which the caller completes; `reason` says why
- * it did not reach its end, else "".  0 for a run too short, which is reported. */
+/* Writes the samples of a run, with forces, to the output of that path, which the caller completes; `reason`: why the
+ * run did not reach its end, or "".  Returns 0 and reports it if the run is too short. */
 int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *method, const char *reason);
 
 #endif

@@ -1,4 +1,4 @@
-/* A folder of figures: data files, gnuplot scripts made of templates (*.gp), and what gnuplot draws. */
+/* A folder of figures: data files, gnuplot scripts made of templates (*.gp), and the figures drawn by gnuplot. */
 #ifndef PW_FIGURE_H
 #define PW_FIGURE_H
 
@@ -29,14 +29,14 @@ void pw_figure_text (FILE *f, const char *variable, const char *value);
 /* Elements of an array: "array NAME[COUNT]" first, then each element as a variable "NAME[1]" .... */
 void pw_figure_array (FILE *f, const char *name, int count);
 void pw_figure_element (FILE *f, const char *name, int i, const char *value);
-/* Methods, with marks of their own if `spread`: the declaration first, then each from 1; a line that is no method has
- * method NULL. */
+/* Methods, with distinct marks if `spread`: the declaration first, then each from 1; method NULL for a line that is not
+ * a method. */
 void pw_figure_methods (FILE *f, int count, int spread);
 void pw_figure_method (FILE *f, int i, const char *label, const char *method);
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
 
-/* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported on
- * standard error.  PW_RESOURCE if gnuplot fails. */
+/* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported
+ * on standard error.  PW_RESOURCE if gnuplot fails. */
 int pw_figure_draw (const char *folder, const char *const *names, pw_error *error);
 
 #endif

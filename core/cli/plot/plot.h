@@ -1,4 +1,4 @@
-/* What figures and animations keep of a run, and the parts of them that they share. */
+/* The samples of a run for figures and animations, and their common parts. */
 #ifndef PW_PLOT_H
 #define PW_PLOT_H
 
@@ -19,12 +19,12 @@ enum {
   PLOT_FEWEST = 8         /* and at least */
 };
 
-/* What is kept of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each
- * wheel drawn, then the force of each link. */
+/* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
+ * then the force of each link. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
 
 /* Attachment points of a body, in its frame [m], and the convex outline of them and its centre of mass,
- * counter-clockwise; none if they lie on a line. */
+ * counter-clockwise; empty if they are collinear. */
 typedef struct {
   int count, corners;
   double at[PLOT_POINTS][2];
@@ -118,25 +118,25 @@ int pw_plot_body_of_wheel (const pw_plots *p, int wheel);
 /* Finds the attachment points of bodies and of the ground, from the points of elements' definitions. */
 int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error);
 
-/* Finds elements with points of the bodies drawn, at most as many as there is room for. */
+/* Finds elements with points on the bodies drawn, up to the available number. */
 void pw_plot_find_links (pw_plots *p, const pw_model *m);
 /* Their forces [N], x and y each. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 
-/* The smallest rectangle around all attachment points, centres of mass and wheels of samples 0 ... n - 1; around the paths of
- * the wheels (of the centres of mass if there are no wheels). */
+/* The smallest rectangle around all attachment points, centres of mass and wheels of samples 0 ... n - 1; around the
+ * paths of the wheels (of the centres of mass if there are no wheels). */
 pw_plot_box pw_plot_box_of (const pw_plots *p, int n);
 pw_plot_box pw_plot_box_of_paths (const pw_plots *p, int n);
 
-/* Largest dimension of the mechanism at the start [m]. */
+/* Largest dimension of the initial configuration [m]. */
 double pw_plot_size (const pw_plots *p);
 
 /* Blocks of the mechanism's data, and whether one has any content. */
 enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
 int pw_plot_has (const pw_plots *p, int block);
 
-/* Samples of the start that get a figure of their own, since the mechanism goes so far that it is small in a figure of the
- * whole run: those that fit a figure a few times its size; 0: none.  A single point has no size. */
+/* Number of initial samples shown in a separate figure, if the mechanism travels so far that it is small in a figure of
+ * the whole run: those that fit a figure a few times its size; 0: none.  A single point has no size. */
 int pw_plot_closeup (const pw_plots *p);
 
 /* Writes the data files. */

@@ -83,7 +83,7 @@ int pw_plot_closeup (const pw_plots *p) {
 
 /* ---- Files ---- */
 
-/* One block per curve: time, what is kept of the body or wheel, its number in the model. */
+/* One block per curve: time, the columns of the body or wheel, its number in the model. */
 static int data_curves (const pw_plots *p, const pw_figures *f, const pw_curves *c, pw_error *error) {
   pw_output *o = c->count ? pw_figure_data (f, c->file, error) : NULL;
   if (o == NULL) return c->count ? PW_RESOURCE : PW_OK;
@@ -177,8 +177,8 @@ static void data_wheel (FILE *f, const pw_plots *p, int i, int wheel, double hal
   fputs ("\n", f);
 }
 
-/* Samples from one snapshot to the next, of the first n: the body with the longest path moves by about a third of the size of
- * the mechanism. */
+/* Samples from one snapshot to the next, of the first n: the body with the longest path moves by about a third of the
+ * size of the mechanism. */
 static int data_stride (const pw_plots *p, int n) {
   double longest = 0;
   for (int b = 0; b < p->bodies; b++) {
@@ -194,8 +194,8 @@ static int data_stride (const pw_plots *p, int n) {
   return stride < 1 ? 1 : stride;
 }
 
-/* The head of a block, two blank lines after the one before.  gnuplot counts blocks with data only, so an empty one gets a
- * point that is not drawn. */
+/* The head of a block, two blank lines after the previous one.  gnuplot counts blocks with data only, so an empty one
+ * gets a point that is not drawn. */
 static void data_begin_block (FILE *f, const pw_plots *p, int block) {
   static const char *const titles[] = { "bodies", "wheels", "bodies without attachments" };
   fprintf (f, "%s# %s: x [m], y [m], t [s]\n", block == PLOT_BODIES ? "" : "\n\n", titles[block]);

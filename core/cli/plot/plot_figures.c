@@ -31,7 +31,7 @@ static void figures_curves (FILE *f, const pw_plots *p, pw_curves c) {
   pw_figure_number (f, "last", c.numbers + 2);
 }
 
-/* What the panels show: the whole run, and its start as well if it is drawn in detail. */
+/* The panels: the whole run, and its beginning if that is drawn in detail. */
 static void figures_panels (FILE *f, const pw_plots *p, int closeup, pw_plot_box (*box) (const pw_plots *p, int n)) {
   static const char *const side[] = { "x0", "x1", "y0", "y1" };
   char name[8];

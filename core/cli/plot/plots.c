@@ -1,4 +1,4 @@
-/* What figures keep of a run: equally spaced samples of as many bodies and wheels as can be distinguished. */
+/* Samples for figures: equally spaced, of as many bodies and wheels as can be distinguished. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +15,7 @@ static int plots_least (int a, int b) {
   return a < b ? a : b;
 }
 
-/* Elements with a contact point, evenly out of all. */
+/* Elements with a contact point, evenly chosen from all. */
 static void plots_choose_wheels (pw_plots *p) {
   int n = 0, i = 0;
   for (int e = 0; i < p->wheels; e++)
@@ -146,7 +146,7 @@ double pw_plots_next (const pw_plots *p) {
 
 static void plots_contacts (const pw_plots *p, const pw_sample *x, double *out) {
   if (pw_workspace_contact_points (p->workspace, x->t, x->q, x->v, p->contact, NULL) != PW_OK)
-    return; /* the run has been there */
+    return; /* already taken */
   for (int i = 0; i < p->wheels; i++, out += 3)
     memcpy (out, p->contact[pw_system_element (p->s, p->element[i]).contact], 3 * sizeof *out);
 }

@@ -1,7 +1,7 @@
 /* Checkpoints of a run: their contents, when they are due, and how a run continues from one.
  *
- * A checkpoint is saved after the step that reaches a multiple of the interval, when the step's rows are written.  The table
- * is brought to the disk first, so that a resumed run finds at least the rows that the checkpoint counts. */
+ * A checkpoint is saved after the step that reaches a multiple of the interval, when the step's rows are written.  The
+ * table is written to the disk first, so that a resumed run finds at least the rows that the checkpoint counts. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -12,7 +12,7 @@ static const char checkpoints_key[] = "checkpoint-every";
 
 /* ---- Before the run ---- */
 
-/* The interval of the file that is resumed. */
+/* The interval from the file that is resumed. */
 static void checkpoints_interval (pw_checkpoints *c) {
   char text[40];
   size_t size;
@@ -44,7 +44,7 @@ static int checkpoints_lock (pw_checkpoints *c, pw_error *error) {
                   c->path);
 }
 
-/* The head: everything that determines what is computed and written. */
+/* The head: everything that determines the results. */
 static int checkpoints_head (pw_run_command *x, pw_error *error) {
   const unsigned short order = 1;
   char numbers[60];
@@ -123,7 +123,7 @@ static void checkpoints_next (pw_checkpoints *c, double t) {
   c->due = n * c->every;
 }
 
-/* What the program adds to the state of the run. */
+/* Serialises the state of the program besides that of the run. */
 static void checkpoints_serialise (pw_run_command *x, pw_archive *a) {
   pw_archive_bytes (a, &x->row, sizeof x->row);
   pw_archive_bytes (a, &x->cpu, sizeof x->cpu);
@@ -131,7 +131,7 @@ static void checkpoints_serialise (pw_run_command *x, pw_archive *a) {
   pw_comparison_serialise (&x->comparison, a);
 }
 
-/* A checkpoint is within the run, and has the rows up to its time. */
+/* A checkpoint must lie within the run and have the rows up to its time. */
 static int checkpoints_plausible (const pw_run_command *x) {
   double t = pw_run_time (x->r), rows = x->csv && x->every > 0 ? floor (t / x->every) + 1 : (double)x->row;
   return t <= x->t_end && x->row >= 0 && fabs ((double)x->row - rows) <= 1 && isfinite (x->cpu) && x->cpu >= 0;

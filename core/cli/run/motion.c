@@ -57,8 +57,8 @@ int pw_motion_unit (const pw_system *s, int state) {
   return (rate ? MOTION_SPEED : MOTION_LENGTH) + angle;
 }
 
-/* NaN, once met, stays: what is not known at one time has no largest value.  A column that
- * the reference does not have is skipped instead. */
+/* The maximum that propagates NaN: a quantity unknown at one time has no maximum.  Columns missing in the reference are
+ * skipped. */
 static void motion_raise (double *most, double value) {
   if (!(value <= *most)) *most = isnan (*most) ? *most : value;
 }
@@ -76,7 +76,7 @@ static void motion_states (const pw_system *s, const pw_motion *reference, const
   }
 }
 
-/* The largest multiplier of the same unit as row i: forces and moments are not weighed against each other. */
+/* The largest multiplier of the same unit as row i: forces and moments are not compared with each other. */
 static double motion_load (const pw_system *s, const pw_motion *reference, int i) {
   double most = 0;
   for (int j = 0; j < pw_system_rows (s); j++)
@@ -87,10 +87,10 @@ static double motion_load (const pw_system *s, const pw_motion *reference, int i
 }
 
 static void motion_multipliers (const pw_system *s, const pw_motion *reference, const pw_motion *m, double *error) {
-  const char *unit = NULL; /* of neighbours it is mostly the same */
+  const char *unit = NULL; /* neighbours mostly have the same unit */
   double load = 1;
   int jumps[MOTION_SAMPLES],
-      smooth = 0; /* they have two values where they jump, and methods differ in which they show */
+      smooth = 0; /* at a jump they have two values, and methods differ in which one they report */
   for (int k = 0; k < m->samples; k++) smooth += !(jumps[k] = pw_system_jumps (s, reference->t[k]));
   if (smooth == 0) error[MOTION_LAMBDA] = NAN;
   for (int i = 0; i < pw_system_rows (s); i++) {

@@ -1,4 +1,4 @@
-/* A reference from a file: a table with the columns of `pinwheel run -o`; those that are missing are not compared. */
+/* A reference from a file: a table with the columns of `pinwheel run -o`; missing columns are not compared. */
 #include <errno.h>
 #include <math.h>
 #include <stdlib.h>
@@ -6,7 +6,7 @@
 #include <sys/types.h>
 #include "motion.h"
 
-#define FILE_SAME 1e-9 /* of the end: times that differ by less are the same */
+#define FILE_SAME 1e-9 /* relative to the end: smaller differences of times are ignored */
 
 typedef struct {
   const char *path;
@@ -15,9 +15,9 @@ typedef struct {
   size_t room;
   long number;   /* of the line */
   int failed;    /* errno of a line that could not be read */
-  int *place;    /* of each column after the first: in a motion, or -1 */
-  double *sign;  /* reactions are -lambda; times what its unit is in SI units */
-  double second; /* the same of the time */
+  int *place;    /* of each column after the first: its index in a motion, or -1 */
+  double *sign;  /* factor to SI units; negative for reactions, which are -lambda */
+  double second; /* unit of the time [s] */
   int columns, known;
 } file_reader;
 
@@ -63,7 +63,7 @@ static int file_line (file_reader *in) {
   return 0;
 }
 
-/* Cuts the next cell off. */
+/* Splits off the next cell. */
 static char *file_cell (char **rest) {
   char *cell = *rest, *comma = strchr (cell, ',');
   *rest = comma ? comma + 1 : cell + strlen (cell);
@@ -78,7 +78,7 @@ static int file_number (const file_reader *in, const char *cell, double *value, 
 
 /* ---- Columns ---- */
 
-/* "frame.x [m]" to its place in a motion, or -1. */
+/* The index in a motion of a column "frame.x [m]", or -1. */
 static int file_place (const pw_system *s, const char *name, size_t n, double *sign) {
   char known[300];
   int states = 2 * pw_system_coordinates (s);
@@ -171,8 +171,8 @@ static int file_row (file_reader *in, char *rest, double *x, int width, pw_error
   return PW_OK;
 }
 
-/* Takes as many rows as there are samples, evenly, the last one among them; times that are the end but for round-off are
- * it. */
+/* Selects as many rows as there are samples, evenly spaced and including the last one; times within round-off of the
+ * end are set to it. */
 static int file_rows (file_reader *in, int rows, double t_end, pw_motion *m, pw_error *error) {
   char *rest;
   double t;
@@ -216,7 +216,7 @@ int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *
   if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, why);
   pw_error own = { 0 };
   file_read (&in, m, s, t_end, whole, &own);
-  if (in.failed) own = (pw_error){ 0 }; /* what could not be read is neither empty nor incomplete */
+  if (in.failed) own = (pw_error){ 0 }; /* after a read error the file is not reported as empty or incomplete */
   if (in.failed) file_failed (&in, &own);
   if (own.status != PW_OK) pw_fail (error, own.status, "%s", own.text);
   fclose (in.f);

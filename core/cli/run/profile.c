@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include "profile.h"
 
-/* One decimal below 100, in any locale; nothing for what is not there. */
+/* One decimal below 100, in any locale; empty if there is no value. */
 static void profile_number (FILE *out, int there, double value, int width) {
   char text[40] = "";
   if (there && fabs (value) >= 99.95)
@@ -40,7 +40,7 @@ static void profile_kinds (const pw_profile *p, int bodies, FILE *out) {
   for (int i = 0; i < p->kinds; i++) profile_kind (&p->kind[i], p->evaluation, out);
 }
 
-/* One line of the stages; what is not positive is left out. */
+/* One line of the stages; omitted unless the time is positive. */
 static void profile_line (FILE *out, const char *name, double ns, double whole, double per_step, double step) {
   fprintf (out, "  %-14s", name);
   if (whole > 0) profile_number (out, 1, ns, 18);

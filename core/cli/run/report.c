@@ -13,7 +13,7 @@ static void report_more (FILE *f, int more, const char *hint) {
 
 /* ---- Settings ---- */
 
-/* Options without effect; that both steps and tolerances are given, as in scripts, is not reported. */
+/* Options without effect.  Giving both steps and tolerances, as scripts do, is not reported. */
 static void report_unused (const char *method, int adaptive, const pw_cli_line *l) {
   if (adaptive && l->step && !l->rtol && !l->atol)
     pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);

@@ -16,13 +16,14 @@ void pw_report_settings (pw_run *r, const pw_system *s, const char *method, cons
 /* Derivatives by differences, states changed by the consistent initialisation, redundant constraint equations. */
 void pw_report_initialisation (const pw_run *r, const pw_system *s, const char *const *redundant);
 
-/* After the run: a relative energy defect of more than 1 % (NaN: not known), speeds that grow out of all proportion. */
+/* After the run: a relative energy defect of more than 1 % (NaN: not known), speeds that grow beyond any plausible
+ * scale. */
 void pw_report_warnings (const pw_run *r, const pw_system *s, double defect);
 
 /* ---- Results ---- */
 
-/* Descriptions of the redundant constraint equations, ended by NULL, to be released as one; NULL if there are none, or no
- * memory. */
+/* Descriptions of the redundant constraint equations, ended by NULL, to be released as one; NULL if there are none, or
+ * no memory. */
 const char **pw_report_redundancies (pw_run *r);
 
 /* A table on standard output: last state, reactions, residuals, energies, cost. */

@@ -1,7 +1,7 @@
 /* pinwheel run: integrates a model and writes the results.
  *
- * Steps are taken in batches that end where a sample is due, so that between samples nothing but the method runs, and
- * only the method is on the clock. */
+ * Steps are taken in batches that end where a sample is due, so that between samples only the method runs, and only its
+ * time is measured. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -102,7 +102,8 @@ static int run_open (run *x, pw_error *error) {
 
 /* ---- The run ---- */
 
-/* When the next row is due; multiples are computed, not summed up, and the last one may be the end but for round-off. */
+/* When the next row is due; multiples are computed, not accumulated; the last one may differ from the end by
+ * round-off. */
 static double run_next_row (const run *x) {
   if (x->csv == NULL) return INFINITY;
   if (x->every == 0) return 0;
@@ -180,7 +181,8 @@ static int run_integrate (run *x, pw_error *error) {
 
 /* ---- After the run ---- */
 
-/* Writes the table to the disk, or keeps what exists of it as NAME.part; nothing is kept of a run that has not begun. */
+/* Writes the table to the disk, or keeps what exists of it as NAME.part; nothing is kept of a run that has not
+ * begun. */
 static void run_close_table (run *x, int good, pw_error *error) {
   pw_csv_close (x->csv);
   int is_file = x->csv_output ? pw_output_is_file (x->csv_output) : x->csv_path != NULL;
@@ -200,8 +202,8 @@ static void run_add_error (pw_error *error, const pw_error *own) {
     pw_cli_say ("pinwheel: %s\n", own->text);
 }
 
-/* The JSON summary, which is written however the run has ended.  A run that could not be resumed leaves the one before it
- * as it is. */
+/* The JSON summary, which is written however the run has ended.  A run that could not be resumed leaves the one before
+ * it as it is. */
 static void run_write_json (run *x, const pw_summary *summary, const pw_sample *sample, pw_error *error) {
   if (x->json_output == NULL) return;
   pw_error own = { 0 };
@@ -223,8 +225,8 @@ static void run_keep (pw_output **o, char *part, size_t size) {
   *o = NULL;
 }
 
-/* Table, summary and page become complete together, or keep their temporary names.  A failed run has
- * no complete table, which its summary reports. */
+/* Table, summary and page get their final names together, or keep their temporary ones.  The summary of a failed run
+ * reports that the table is incomplete. */
 static void run_complete (run *x, pw_error *error) {
   pw_error own = { 0 };
   char page_part[8];
@@ -256,7 +258,7 @@ static pw_summary run_summary (const run *x, const pw_error *error, char *reason
   return summary;
 }
 
-/* Figures and animation; who has stopped the run does not wait for gnuplot. */
+/* Figures and animation; after an interrupt gnuplot is not run. */
 static void run_draw (run *x, const char *reason, pw_error *error) {
   pw_error own = { 0 };
   int drawn = 0;
@@ -270,12 +272,12 @@ static void run_draw (run *x, const char *reason, pw_error *error) {
   run_add_error (error, &own);
 }
 
-/* 1: standard output is taken by a file. */
+/* 1 if an output file is standard output. */
 static int run_prints_file (const run *x) {
   return (x->csv_path && strcmp (x->csv_path, "-") == 0) || (x->json_path && strcmp (x->json_path, "-") == 0);
 }
 
-/* Everything that follows the last step: table, summary, figures, the last word. */
+/* Everything after the last step: table, summary, figures, final message. */
 static int run_finish (run *x, pw_error *error) {
   char reason[80] = "", t[32];
   int interrupted = error->status == PW_OK && pw_stop;

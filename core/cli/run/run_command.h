@@ -14,11 +14,11 @@ typedef struct {
   /* as understood */
   double every;       /* simulated time between two [s] */
   double due;         /* when the next one is to be saved [s]; INFINITY: never */
-  double saved;       /* time of the last one [s]; 0: there is none */
+  double saved;       /* time of the last one [s]; 0: none */
   pw_text head;       /* of the files */
   pw_archive state;   /* of the next one */
   pw_checkpoint from; /* what is resumed */
-  pw_output *lock;    /* FILE.part, empty, which keeps other processes out from the beginning to the end */
+  pw_output *lock;    /* FILE.part, empty, which locks out other processes during the whole run */
 } pw_checkpoints;
 
 typedef struct {

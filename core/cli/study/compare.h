@@ -1,4 +1,4 @@
-/* Comparisons: errors against a reference solution, and what they cost, over ladders of tolerances or steps. */
+/* Comparisons: errors against a reference solution and cost, over ladders of tolerances or steps. */
 #ifndef PW_COMPARE_H
 #define PW_COMPARE_H
 

@@ -10,7 +10,7 @@ static const char *const table_unit[MOTION_ERRORS] = { "m", "rad", "m/s", "rad/s
 
 /* ---- To read ---- */
 
-/* "1.2e-11", "<1.2e-11", "-" where nothing is known. */
+/* "1.2e-11", "<1.2e-11", "-" if unknown. */
 static const char *table_number (double value, int below, char text[32]) {
   if (isnan (value)) return "-";
   snprintf (text, 32, "%s%.1e", below ? "<" : "", value);
@@ -161,7 +161,7 @@ static int plot_write_script (const pw_study_figure *g, const pw_figures *figure
   return pw_figure_end (o, "work-precision", error);
 }
 
-/* A diagram of lengths and one of angles, as far as their errors are known. */
+/* A diagram of lengths and one of angles, if their errors are known. */
 int pw_compare_figures (pw_study *x, pw_error *error) {
   static const char *const names[] = { "work-precision", "work-precision-angles" };
   const pw_figures figures = { .folder = x->folder, .model = pw_file_name (x->m.file) };

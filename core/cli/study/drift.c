@@ -1,5 +1,5 @@
-/* pinwheel drift: how constraint residuals and the energy balance grow in a long run, by method and stabilisation, and how
- * that depends on Baumgarte's alpha and beta and on the metric and frequency of projections. */
+/* pinwheel drift: how constraint residuals and the energy balance grow in a long run, by method and stabilisation, and
+ * how that depends on Baumgarte's alpha and beta and on the metric and frequency of projections. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -38,7 +38,7 @@ static int drift_vary (pw_drift *x, const char *text, pw_error *error) {
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* The defaults, then what was given. */
+/* The defaults, then the options. */
 static int drift_axes (pw_drift *x, pw_error *error) {
   static const char *const usual[] = { "alpha=1,3,10,30,100,300,1000", "beta=1,10,100,1000", "every=1,2,5,10,20,50,100",
                                        NULL };

@@ -1,5 +1,6 @@
-/* The reference solution of a comparison: a table, the exact solution of the model, or else computed by methods that have
- * little in common, each at its tightest.  Of the two that agree best one is the reference; its uncertainty is their distance. */
+/* The reference solution of a comparison: a table, the exact solution of the model, or else computed by methods that
+ * have little in common, each at its tightest.  Of the two that agree best one is the reference; its uncertainty is
+ * their distance. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -84,7 +85,7 @@ static int reference_related (const candidate *a, const candidate *b) {
   return strncmp (a->row.method, b->row.method, n + 1) == 0;
 }
 
-/* The two that agree best, and how well; INFINITY if there are no two. */
+/* The two that agree best, and their distance; INFINITY if there are fewer than two. */
 static double reference_pair (const pw_system *s, const candidate *c, int related, int *best, int *with) {
   double least = INFINITY;
   for (int i = 0; i < REFERENCE_CANDIDATES; i++)
@@ -96,7 +97,7 @@ static double reference_pair (const pw_system *s, const candidate *c, int relate
   return least;
 }
 
-/* Two of one integrator are taken if there are no others; the first of the two is the reference. */
+/* Two methods with the same integrator are used only if there are no others; the first of the two is the reference. */
 static void reference_choose (pw_compare *x, candidate *c) {
   const pw_system *s = x->study.m.system;
   pw_reference *t = &x->reference;
@@ -141,7 +142,7 @@ static int reference_compute (pw_compare *x, pw_error *error) {
   return status;
 }
 
-/* The exact solution of the model holds for the initial conditions of the model. */
+/* The exact solution of the model holds only for its own initial conditions. */
 int pw_reference_find (pw_compare *x, pw_error *error) {
   pw_study *s = &x->study;
   pw_reference *t = &x->reference;

@@ -1,4 +1,4 @@
-/* What compare and drift share: see study.h. */
+/* Common parts of compare and drift; see study.h. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -103,7 +103,7 @@ static int study_width (const pw_study *x) {
   return (int)width;
 }
 
-/* The row just done. */
+/* Prints the completed row. */
 static int study_write (pw_study *x, pw_error *error) {
   const pw_row *r = &x->row[x->done];
   char t[32];
@@ -149,7 +149,7 @@ static int study_rows (pw_study *x, pw_error *error) {
   return status;
 }
 
-/* A CSV that is complete gets its name; the figures show all of its rows. */
+/* A complete CSV gets its final name; the figures show all of its rows. */
 static int study_finish (pw_study *x, int status, pw_error *error) {
   char part[FIGURE_PATH + 16] = "";
   pw_output *csv = x->csv;

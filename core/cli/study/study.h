@@ -1,6 +1,6 @@
-/* Studies: one model by several methods, a run for each row of a table, failures included.  This part opens the model and the
- * folder, makes the runs, reports progress, and writes the table and CSV as rows come; commands (compare.c, drift.c) state
- * which runs to make, what to measure, and the columns and figures. */
+/* Studies: one model by several methods, a run for each row of a table, failures included.  This part opens the model
+ * and the folder, makes the runs, reports progress, and writes the table and CSV as rows come; commands (compare.c,
+ * drift.c) state which runs to make, what to measure, and the columns and figures. */
 #ifndef PW_STUDY_H
 #define PW_STUDY_H
 
@@ -25,8 +25,8 @@ typedef struct {
   int count;
 } pw_study_methods;
 
-/* Reads --methods: names separated by commas; "all" stands for each integrator with each stabilisation, "rk4+all" for rk4
- * with each.  A method is taken once, however often it is named.  PW_INPUT with the nearest valid name. */
+/* Reads --methods: names separated by commas; "all" stands for each integrator with each stabilisation, "rk4+all" for
+ * rk4 with each.  A method named twice is used once.  PW_INPUT with the nearest valid name. */
 int pw_study_methods_read (pw_study_methods *list, const char *text, pw_error *error);
 
 /* ---- Rows ---- */
@@ -71,7 +71,7 @@ typedef struct {
 
 typedef struct pw_study pw_study;
 
-/* What a command states.  Functions return a status. */
+/* What each command provides.  Functions return a status. */
 typedef struct {
   const char *tables[2]; /* CSV files in the folder: that of the rows, and a further one */
   const char *unit;      /* of the progress: "rows" */
@@ -118,7 +118,7 @@ int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error);
 /* Allocates rows that are zero. */
 int pw_study_allocate (pw_study *x, int rows, pw_error *error);
 
-/* Is called after each step of a run that reaches time `due`, which it may change. */
+/* Called after each step of a run that reaches time `due`, which it may change. */
 typedef struct pw_study_visitor {
   double due;
   int (*visit) (struct pw_study_visitor *v, pw_run *run, pw_error *error);
@@ -128,8 +128,8 @@ typedef struct pw_study_visitor {
   int sample;        /* compare: the next one */
 } pw_study_visitor;
 
-/* One run of a row with the study's settings to the end or a limit: fills t, statistics, cpu, and state if it is stopped by
- * cpu_end; the visitor may be NULL.  PW_RETRY: stopped, or interrupted. */
+/* One run of a row with the study's settings to the end or a limit: fills t, statistics, cpu, and state if it is
+ * stopped by cpu_end; the visitor may be NULL.  PW_RETRY: stopped, or interrupted. */
 int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error);
 /* Puts a failure of pw_study_run into the row.  Returns PW_OK, or the status that ends the study. */
 int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error *error);

@@ -1,8 +1,8 @@
-/* pinwheel sweep: a table of runs, for all combinations of varied parameters and start values.
+/* pinwheel sweep: a table of runs, for all combinations of varied parameters and initial values.
  *
- * Every run has a model, a system and a method of its own and depends on nothing but its row of the grid; rows are kept
- * in a journal in the order in which they are finished, and put into the grid's order at the end.  So the table is
- * the same for any number of threads, and for any number of times the sweep was stopped and started again. */
+ * Every run has its own model, system and method and depends only on its row of the grid.  A journal keeps the rows in
+ * the order of completion; at the end they are sorted into the order of the grid.  So the table does not depend on the
+ * number of threads or on interruptions of the sweep. */
 #define _GNU_SOURCE /* sched_getaffinity */
 #include <errno.h>
 #include <limits.h>
@@ -25,7 +25,7 @@ typedef struct {
   int jobs;
   /* in progress; accessed by the thread that holds the lock */
   pthread_mutex_t lock;
-  long next; /* the row that is taken next */
+  long next; /* the next row to compute */
   pw_journal journal;
   pw_progress progress;
   pw_text scratch;
@@ -140,7 +140,7 @@ static void sweep_one (sweep *x, long k, pw_text *text) {
   pthread_mutex_unlock (&x->lock);
 }
 
-/* The next row that is not there yet; the number of rows if there is none. */
+/* The next missing row; the number of rows if there is none. */
 static long sweep_take (sweep *x) {
   pthread_mutex_lock (&x->lock);
   while (x->next < x->journal.rows && x->journal.line[x->next] != 0) x->next++;
@@ -157,7 +157,7 @@ static void *sweep_thread (void *context) {
   return NULL;
 }
 
-/* One of the threads is our own. */
+/* The main thread is one of them. */
 static void sweep_all (sweep *x) {
   long rows = x->journal.rows;
   if (x->jobs > rows) x->jobs = (int)rows;
@@ -185,13 +185,13 @@ static int sweep_run (sweep *x, pw_error *error) {
                      (double)x->journal.rows);
   sweep_all (x);
   pw_progress_end (&x->progress);
-  pw_stop_release (); /* what follows can be killed and done again */
+  pw_stop_release (); /* the rest can be interrupted and repeated */
   return error->status;
 }
 
 /* ---- The end ---- */
 
-/* Failed runs are rows; only if there is nothing else the sweep has failed.  A part leaves that to the merge. */
+/* Failed runs are rows; the sweep fails only if all runs failed.  A part leaves that to the merge. */
 static int sweep_verdict (const pw_tally *tally, int is_part, pw_error *error) {
   if (tally->failed == 0) return PW_OK;
   if (tally->failed == tally->rows && !is_part)

@@ -1,4 +1,4 @@
-/* Sweeps from inside: a grid of runs, one row for each, and the files the rows go to.
+/* Private to sweeps: a grid of runs, one row for each, and the files the rows go to.
  *
  * A grid's rows are numbered in the order of the table, the last varied quantity fastest.  A sweep computes all of
  * them, or those of one part: part i of n has the rows i - 1, i - 1 + n, i - 1 + 2 n, ... */
@@ -13,7 +13,7 @@
 
 /* ---- The grid (sweep_grid.c) ---- */
 
-#define PW_GRID_ROWS 1e8 /* more are refused */
+#define PW_GRID_ROWS 1e8 /* larger grids are refused */
 
 /* One varied quantity. */
 typedef struct {
@@ -66,20 +66,20 @@ typedef struct {
   pw_arena arena;      /* names */
   uint64_t tables;     /* a hash of the points of all tables of scenes built so far; 0: there are none */
   pw_text head;        /* the table's first line, without its end */
-  pw_text fingerprint; /* the first lines of a journal or part: all that decides what the rows are */
+  pw_text fingerprint; /* the first lines of a journal or part: everything that determines the rows */
 } pw_plan;
 
 /* Matches the ranges ("NAME=RANGE") to the model, whose file is open in p->file and stays the caller's, and finds the
- * columns by building scenes of the grid.  Errors: PW_INPUT, PW_RESOURCE.  Close the plan in
- * every case. */
+ * columns by building scenes of the grid.  Errors: PW_INPUT, PW_RESOURCE.  Close the plan in every case. */
 int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error);
 void pw_plan_close (pw_plan *p);
 
-/* A row's model, built and compiled, m->file left NULL; close it in every case.  May be called by several threads at once. */
+/* A row's model, built and compiled, m->file left NULL; close it in every case.  May be called by several threads at
+ * once. */
 int pw_plan_scene (const pw_plan *p, long row, pw_cli_model *m, pw_error *error);
 
-/* The i-th of a system's 2 pw_system_coordinates states in the order of a table: six of each body, then what elements
- * own. */
+/* The i-th of a system's 2 pw_system_coordinates states in the order of a table: six of each body, then internal
+ * coordinates of elements. */
 int pw_plan_state (const pw_system *s, int i);
 
 /* How many rows the plan's part has, and which in the grid its k-th one is. */
@@ -94,8 +94,8 @@ static inline long pw_plan_row (const pw_plan *p, long k) {
 
 /* ---- One run (sweep_row.c) ---- */
 
-/* Does a run from start to end and appends its cells, without the line's end.  Returns the run's own status, a row all
- * the same; PW_RETRY if pw_stop became non-zero on the way; PW_RESOURCE with the error if it could not be done.  May be
+/* Performs a run and appends its cells, without the end of the line.  Returns the status of the run, which has a row
+ * even if it failed; PW_RETRY if pw_stop became non-zero; PW_RESOURCE with the error if the run was impossible.  May be
  * called by several threads at once. */
 int pw_sweep_row (const pw_plan *p, long row, pw_text *text, pw_error *error);
 
@@ -107,18 +107,19 @@ typedef struct {
   char *part;  /* of the journal: path.part */
   int file;    /* the journal's, locked; -1: not open */
   int created; /* 1: by this process */
-  off_t *line; /* pw_plan_rows: where each row's line begins; 0: not there yet */
+  off_t *line; /* pw_plan_rows: offset of each row's line; 0: missing */
   long rows, done;
   off_t size;
 } pw_journal;
 
-/* Opens the journal of the table at `path`, or begins one.  Lines after the first that is not whole and sound are cut off.
- * Errors: PW_RESOURCE if it cannot be written, PW_INPUT if it belongs to another sweep or another process is at work. */
+/* Opens the journal of the table at `path`, or creates it.  It is truncated at the first incomplete or damaged line.
+ * Errors: PW_RESOURCE if it cannot be written, PW_INPUT if it belongs to another sweep or is in use by another
+ * process. */
 int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error);
-/* Appends row k of the part; `text` is scratch.  One thread at a time.  PW_RESOURCE: the journal keeps what it had. */
+/* Appends row k of the part; `text` is scratch.  One thread at a time.  PW_RESOURCE: the journal is unchanged. */
 int pw_journal_add (pw_journal *j, const pw_plan *p, long k, int status, const char *cells, pw_text *text,
                     pw_error *error);
-/* Without a row so far, a journal that was created here is removed. */
+/* Closes the journal; removes it if it was created here and has no rows. */
 void pw_journal_close (pw_journal *j);
 
 /* How the runs of a table ended. */

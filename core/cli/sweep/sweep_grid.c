@@ -80,7 +80,7 @@ static int grid_axis (pw_axis *a, char *text, pw_error *error) {
   return a->type == PW_AXIS_LIST ? grid_list (a, error) : grid_range (a, error);
 }
 
-/* The ends are exact, and so is what lies between wherever the numbers allow: lin:0:1:11 has 0.3 as its fourth value. */
+/* The ends are exact, and intermediate values where possible: the fourth value of lin:0:1:11 is 0.3. */
 double pw_axis_value (const pw_axis *a, long i) {
   if (a->type == PW_AXIS_LIST) return a->value[i];
   double n = (double)(a->count - 1), k = (double)i;

@@ -1,10 +1,10 @@
 /* Journals and parts of a sweep, and the table made of them.
  *
- * A journal has rows in the order in which they are finished, each appended by one write.  Whenever the program is killed,
- * what remains is the fingerprint, whole lines, and perhaps the beginning of one more, which the next start cuts off.  A lock
- * keeps a second process out; it ends with the process that holds it.  The table is written under another name in the order
- * of the grid and renamed, then the journal is removed: killed in between, the same command finds the journal complete and
- * writes the same bytes again.
+ * A journal has rows in the order of completion, each appended by one write.  If the program is killed, the fingerprint
+ * and complete lines remain, and perhaps an incomplete line, which the next start removes.  A lock excludes other
+ * processes; it ends with the process.  The table is written under another name in the order of the grid and renamed,
+ * then the journal is removed: killed in between, the same command finds the journal complete and writes the same bytes
+ * again.
  *
  *     pinwheel sweep 1              the fingerprint: lines "KEY = VALUE"
  *     ...
@@ -95,7 +95,7 @@ static int journal_write (pw_journal *j, const char *text, size_t size, pw_error
     ssize_t n = pwrite (j->file, text + done, size - done, j->size + (off_t)done);
     if (n <= 0) {
       const char *why = n < 0 ? strerror (errno) : "no bytes were taken";
-      if (done > 0 && ftruncate (j->file, j->size) != 0) why = "no room"; /* the next start cuts it off */
+      if (done > 0 && ftruncate (j->file, j->size) != 0) why = "no room"; /* the next start removes it */
       return pw_fail (error, PW_RESOURCE, "cannot write %s: %s; the same command will continue after its %ld rows",
                       j->part, why, j->done);
     }
@@ -105,7 +105,7 @@ static int journal_write (pw_journal *j, const char *text, size_t size, pw_error
   return PW_OK;
 }
 
-/* Notes each line that is whole, sound, of this part and not there already; stops at the first that is not. */
+/* Records each line; stops at the first that is incomplete, damaged, a duplicate or of another part. */
 static void journal_rows (pw_journal *j, const pw_plan *p, const journal_map *map, const char *at) {
   journal_line line;
   for (; journal_line_read (at, map->end, &line); at += line.bytes) {
@@ -123,7 +123,7 @@ static int journal_read (pw_journal *j, const pw_plan *p, const journal_map *map
   size_t size = (size_t)(map->end - map->at), magic = strlen (PW_SWEEP_MAGIC);
   const char *rows = pw_fingerprint_end (PW_SWEEP_MAGIC, map->at, map->end), *own = p->fingerprint.at;
   j->size = 0;
-  if (rows == NULL) { /* a beginning of a fingerprint has no rows to lose */
+  if (rows == NULL) { /* with an incomplete fingerprint there are no rows */
     if (memcmp (map->at, PW_SWEEP_MAGIC, size < magic ? size : magic) == 0) return PW_OK;
     return pw_fail (error, PW_INPUT, "%s is there already and is no journal of a sweep: remove it if it is not needed",
                     j->part);
@@ -256,7 +256,7 @@ int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error 
 typedef struct {
   const char *path;
   journal_map map;
-  const char *rows; /* where they begin */
+  const char *rows; /* the first one */
   const char *at;   /* the next one */
   int part, parts;
 } table_part;
@@ -307,7 +307,7 @@ static int table_match (table_part *x, int count, pw_error *error) {
   return PW_OK;
 }
 
-/* The rows in turn from each part: row r is the next one of part r mod n. */
+/* The rows, taken from the parts in turn: row r is the next one of part r mod n. */
 static int table_weave (table_part *x, int count, FILE *stream, pw_tally *tally, pw_error *error) {
   size_t size = 0;
   const char *value = pw_fingerprint_value (x->map.at, x->rows, "rows", &size);

@@ -4,11 +4,12 @@
 #include <string.h>
 #include "sweep.h"
 
-enum { PLAN_TRIES = 1000 }; /* scenes that cannot be built before the grid is given up */
+enum { PLAN_TRIES = 1000 }; /* failed scenes after which the grid is refused */
 
 /* ---- Scenes ---- */
 
-/* Sets what was asked for, then what is varied: parameters before the model is built, start values after. */
+/* Sets the values of the command line, then the varied ones: parameters before the model is built, initial values
+ * after. */
 static int plan_build (const pw_plan *p, long row, pw_model *m, pw_error *error) {
   int status = pw_cli_apply (m, "--set", p->sets, pw_model_set, error);
   for (int i = 0; i < p->grid.axes && status == PW_OK; i++)
@@ -68,7 +69,7 @@ int pw_plan_state (const pw_system *s, int i) {
   return i % 6 < 3 ? i / 6 * 3 + i % 6 : n + i / 6 * 3 + i % 6 - 3;
 }
 
-/* The table of names must not get full. */
+/* The hash table of names must not be full. */
 static int plan_grow (pw_plan *p) {
   if (p->columns < p->room) return PW_OK;
   int room = p->room ? 2 * p->room : 64;
@@ -82,7 +83,7 @@ static int plan_grow (pw_plan *p) {
   return PW_OK;
 }
 
-/* Adds the states of a scene that are not there yet, and the units of start values. */
+/* Adds the new states of a scene, and the units of varied initial values. */
 static int plan_columns_of (pw_plan *p, const pw_system *s, pw_error *error) {
   char name[300];
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
@@ -123,8 +124,8 @@ static int plan_scan_row (pw_plan *p, long row, plan_scan *x, pw_error *error) {
   return PW_OK;
 }
 
-/* Which bodies there are may depend on parameters that count something, so each value of these is built once, the others
- * as in the first row, and the last row; apart from them one scene will do, if it can be built. */
+/* The bodies may depend on integer parameters.  So one scene is built for each value of these, with the others as in
+ * the first row, and one for the last row; without such parameters a single scene suffices, if it can be built. */
 static int plan_columns (pw_plan *p, pw_error *error) {
   plan_scan x = { .built = 0 };
   int counts = 0, status = plan_scan_row (p, 0, &x, error);
@@ -156,7 +157,7 @@ static void plan_head (pw_plan *p) {
 
 /* ---- The fingerprint ---- */
 
-/* Parameters that are not varied, as they are after --set. */
+/* Parameters that are not varied, with --set applied. */
 static void plan_parameters (pw_plan *p, const pw_model *m) {
   for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++) {
     int varied = 0;

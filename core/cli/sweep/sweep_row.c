@@ -5,7 +5,7 @@
 #include "progress.h"
 #include "sweep.h"
 
-/* The result of a run; NaN where it is not known. */
+/* The result of a run; NaN if unknown. */
 typedef struct {
   double t, kinetic, position, velocity, steps, rhs, cpu;
   double *state; /* columns */
@@ -40,7 +40,7 @@ static int row_read (const pw_plan *p, const pw_system *s, pw_run *r, row_result
   return row_states (p, s, &sample, x->state, error);
 }
 
-/* The run itself; PW_RETRY if it was stopped.  A run that fails still reports how far it came. */
+/* The run itself; PW_RETRY if it was stopped.  A failed run still reports the time it reached. */
 static int row_run (const pw_plan *p, long row, row_result *x, pw_error *error) {
   pw_cli_model m;
   pw_limit limit = { .most = p->limit };
