@@ -1,4 +1,4 @@
-/* The list of integrators: the one line to add for a new file in solvers/. */
+/* The list of integrators: a new file in solvers/ needs one line here. */
 #ifndef PW_METHODS_H
 #define PW_METHODS_H
 
@@ -14,12 +14,12 @@
   PW_METHOD (galpha) \
   PW_METHOD (leapfrog)
 
-/* pw_method_parse that keeps the options, values has room for PW_MAX_OPTIONS, and looks through `own` methods, too (NULL: there
- * are none). */
+/* pw_method_parse that also returns the options, in values (PW_MAX_OPTIONS), and searches the caller's `own` methods
+ * (NULL: none), too. */
 int pw_parse_options (const char *text, const pw_method *const *own, const pw_method **method, int *stabilisation,
                       double *values, pw_error *error);
 
-/* Whether the run takes steps of the given size: its method, or an option of it, says so. */
+/* Sets r->fixed_steps from the method, or from its option `steps`. */
 void pw_choose_steps (pw_run *r);
 
 #endif

@@ -1,11 +1,12 @@
 /* Integration methods of your own, compiled against the installed headers (docs/method.c is one).
  *
- * A method is a const pw_method table (pinwheel-solvers.h).  A program hands its tables to runs in pw_settings.methods; their
- * names then work in pw_run_open as those of the built-in methods do, with stabilisations and options.  The run makes the start
- * consistent, calls `open`, and then `advance` for each step: one that ends at or before t_end and the next discontinuity.  It
- * evaluates the state reached, watches constraints and energy, and calls `restart` behind a discontinuity.
+ * A method is a const pw_method table (pinwheel-solvers.h).  A program passes its tables in pw_settings.methods;
+ * their names then work in pw_run_open like those of built-in methods, with stabilisations and options.  The run
+ * makes the initial state consistent, calls `open`, then `advance` for each step, which must not pass t_end or the
+ * next discontinuity.  It evaluates the state reached, monitors constraints and energy, and calls `restart` after a
+ * discontinuity.
  *
- * The functions below make a one-step method of a formula for the new state:
+ * The functions below turn a formula for the new state into a one-step method:
  *
  *     static int euler_open (pw_run *r, pw_error *error) { return pw_step_open (r, 2, error); }
  *
@@ -16,7 +17,8 @@
  *       return pw_step_accept (r, PW_OK, h, q, v, error);
  *     }
  *
- *     const pw_method euler = { .name = "euler", .open = euler_open, .advance = euler_advance, PW_STEP_FUNCTIONS, ... }; */
+ *     const pw_method euler = { .name = "euler", .open = euler_open, .advance = euler_advance,
+ *                               PW_STEP_FUNCTIONS, ... }; */
 #ifndef PINWHEEL_METHOD_H
 #define PINWHEEL_METHOD_H
 
@@ -35,18 +37,18 @@ typedef struct {
   const pw_system *system;
   const pw_settings *settings; /* with defaults filled in */
   double t;
-  double breakpoint;    /* the next discontinuity of a signal, at which a step has to end; INFINITY: there is none */
+  double breakpoint;    /* next discontinuity of a signal, at which a step must end; INFINITY: none */
   const double *q, *v;  /* coordinates and velocities */
   const double *a;      /* accelerations */
   const double *lambda; /* multipliers */
 } pw_state;
 pw_state pw_run_state (const pw_run *r);
 
-/* The value of an option of the method's table; of a choice its index; 0 if there is none. */
+/* The value of an option of the method's table; for a choice, its index; 0 if there is no such option. */
 double pw_run_option (const pw_run *r, const char *name);
 
-/* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the stabilisation is PW_BAUMGARTE and the table has the
- * options alpha and beta.  PW_RETRY in a singular configuration; PW_METHOD if a signal failed. */
+/* Accelerations and multipliers at (t, q, v), with Baumgarte's terms if the stabilisation is PW_BAUMGARTE and the
+ * table has the options alpha and beta.  PW_RETRY in a singular configuration; PW_METHOD if a signal failed. */
 int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda);
 
 /* The time of a stage: a step that ends at a discontinuity evaluates signals just before it. */
@@ -54,18 +56,20 @@ double pw_stage_time (const pw_run *r, double t);
 
 /* ---- One-step methods ---- */
 
-/* Opens what these functions keep for a run, with `arrays` arrays for the method.  Errors: PW_RESOURCE. */
+/* Allocates the data of these functions, with `arrays` arrays for the method.  Errors: PW_RESOURCE. */
 int pw_step_open (pw_run *r, int arrays, pw_error *error);
 
-/* Array i, the same in every step: room for coordinates or for constraint equations, whichever are more. */
+/* Array i, the same in every step; its length is the number of coordinates or of constraint equations, whichever is
+ * larger. */
 double *pw_step_array (pw_run *r, int i);
 
-/* The size of the next step: settings->step, less where the step would pass t_end or a discontinuity. */
+/* The size of the next step: settings->step, or less if it would pass t_end or a discontinuity. */
 double pw_step_size (pw_run *r, double t_end);
 
-/* Ends `advance`.  `status` is that of the stages; if it is PW_OK, (q, v) at t + h becomes the state reached: projected onto the
- * constraints if the stabilisation is PW_PROJECTION (in the metric of M), with accelerations and multipliers.  Work and losses
- * are integrated by the trapezoidal rule.  q and v are not those of the state reached.  Errors: PW_METHOD, with the reason. */
+/* Ends `advance`.  `status` is that of the stages; if it is PW_OK, (q, v) at t + h becomes the state reached:
+ * projected onto the constraints if the stabilisation is PW_PROJECTION (in the metric of M), with accelerations and
+ * multipliers.  Work and losses are integrated by the trapezoidal rule. q and v must not be the arrays of
+ * pw_run_state.  Errors: PW_METHOD, with the reason. */
 int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_error *error);
 
 /* The other functions of the table.  Samples between steps are interpolated by cubic polynomials: of order 4. */

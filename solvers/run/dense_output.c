@@ -1,5 +1,6 @@
-/* Between the ends of a step: positions and rates by cubic Hermite interpolation, of order 4, put onto the constraints
- * that the method has; multipliers and accelerations, of which the ends are good to h^2, and the ledger's rates, linearly. */
+/* Dense output: positions and velocities by cubic Hermite interpolation, of order 4, projected onto the constraints
+ * that the method enforces; accelerations, multipliers and the ledger's rates by linear interpolation, with errors
+ * of order h^2. */
 #include <stdlib.h>
 #include <string.h>
 #include "dense_output.h"
@@ -37,7 +38,7 @@ void pw_dense_output_count (pw_dense_output *b, pw_run *r) {
   for (int i = 0; i < r->s->entries; i++) r->ledger[i] += 0.5 * (r->t - b->t0) * (b->rate0[i] + r->rate[i]);
 }
 
-/* Cubic Hermite interpolation of y with slopes s between 0 and 1, the step h wide. */
+/* Cubic Hermite interpolation of y with slopes s at x in [0, 1], for a step of size h. */
 static double dense_hermite (double x, double h, double y0, double s0, double y1, double s1) {
   double up = x * x * (3 - 2 * x);
   return y0 + up * (y1 - y0) + h * x * (1 - x) * ((1 - x) * s0 - x * s1);

@@ -1,4 +1,4 @@
-/* Accelerations and multipliers, with Baumgarte's terms if asked for.
+/* Accelerations and multipliers, with Baumgarte's terms if selected.
  *
  *   J a = gamma - 2 alpha (J v - eta) - beta^2 g     for holonomic rows
  *   J a = gamma - alpha (J v - eta)                  for nonholonomic ones
@@ -18,21 +18,22 @@ static void dynamics_stabilise (pw_run *r, const double *v, double *gamma) {
   for (int i = 0; i < s->holonomic; i++) gamma[i] -= r->beta * r->beta * other[i];
 }
 
-/* Stabilises gamma and sums the forces at the placed configuration: in f, unless there are none but constant ones. */
-static inline const double *dynamics_right (pw_run *r, const double *v, double *f, double *gamma) {
+/* Stabilises gamma and returns the forces at the current configuration: f, or the constant ones if there are no
+ * others. */
+static inline const double *dynamics_right_side (pw_run *r, const double *v, double *f, double *gamma) {
   if (r->alpha + r->beta > 0) dynamics_stabilise (r, v, gamma);
   if (r->s->forces == 0) return r->s->constant;
   pw_evaluate_force (r->w, f);
   return f;
 }
 
-/* Iterative refinement (Wilkinson 1963): near a singular configuration, with s the sine of the smallest angle between rows, the
- * factorisation is good to eps / s^2 only, its residuals bring that to eps / s. */
+/* Iterative refinement (Wilkinson 1963): near a singular configuration, with s the sine of the smallest angle
+ * between rows, the factorisation has an error of eps / s^2; refinement reduces it to eps / s. */
 static void dynamics_refine (pw_run *r, const double *v, double *a, double *lambda) {
   const pw_system *s = r->s;
   double *f = r->scratch, *gamma = f + s->coords + 3, *da = r->w->scratch, *dl = da + s->coords + 3, *Ja = dl + s->rows;
   pw_evaluate_gamma (r->w, gamma);
-  if (dynamics_right (r, v, f, gamma) != f) pw_evaluate_force (r->w, f);
+  if (dynamics_right_side (r, v, f, gamma) != f) pw_evaluate_force (r->w, f);
   for (int j = 0; j < s->coords; j++) da[j] = a[j];
   for (int i = 0; i < s->rows; i++) dl[i] = lambda[i];
   for (int pass = 0; pass < 3; pass++) {
@@ -47,19 +48,19 @@ static void dynamics_refine (pw_run *r, const double *v, double *a, double *lamb
   }
 }
 
-/* In all of these lambda holds gamma first. */
+/* On entry to these functions lambda contains gamma. */
 
 void pw_run_accelerate_updated (pw_run *r, const double *v, double *a, double *lambda) {
   pw_evaluate_gamma (r->w, lambda);
-  const double *f = dynamics_right (r, v, r->scratch, lambda);
+  const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   pw_saddle_solve (r->saddle, f, lambda, a, lambda);
   if (pw_saddle_below (r->saddle, r->limits.refine)) dynamics_refine (r, v, a, lambda);
 }
 
-/* Factorises and solves; *near: 1 if a singular configuration is. */
+/* Factorises and solves; *near = 1 near a singular configuration. */
 static inline int dynamics_solve (pw_run *r, const double *v, double *a, double *lambda, int *near) {
-  const double *f = dynamics_right (r, v, r->scratch, lambda);
+  const double *f = dynamics_right_side (r, v, r->scratch, lambda);
   r->statistics.rhs++;
   r->statistics.factorisations++;
   int status = pw_saddle_factor_solve (r->saddle, f, lambda, a, lambda);

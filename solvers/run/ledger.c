@@ -1,22 +1,23 @@
-/* The energy of a run: how much of it moves, what its work and losses are to be accurate to, and what of it is unaccounted
- * for.  The ledger is kept in every run, since its error takes part in the choice of steps. */
+/* The energy of a run: energy exchanged, tolerance of work and losses, energy defect.  Every run keeps a ledger,
+ * since its error takes part in step-size control. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
 
-/* Kinetic energy of bodies that move by L and turn by 1 rad in the span of the run. */
-static double ledger_of_scene (const pw_run *r) {
+/* Kinetic energy of the scene moving by L and turning by 1 rad in the span of the run. */
+static double ledger_scene_energy (const pw_run *r) {
   const pw_system *s = r->s;
   double sum = 0;
   for (int j = 0; j < s->coords; j++) sum += 0.5 * s->mass[j] * pw_unit (s, j) * pw_unit (s, j);
   return sum / (r->settings.span * r->settings.span);
 }
 
-/* Where nothing has mass: the work and losses of a time T at irregular velocities of L / T and 1 / T, and the change of
- * potential energy by irregular displacements of L and 1 rad.  The system is placed at the state reached, here and behind. */
-static double ledger_of_massless (pw_run *r) {
+/* Energy scale of a massless scene: work and losses in a time T at irregular velocities of about L / T and 1 / T,
+ * and the change of potential energy by irregular displacements of about L and 1 rad.  Afterwards kinematics are
+ * those of the state reached. */
+static double ledger_massless_energy (pw_run *r) {
   const pw_system *s = r->s;
   double *q = r->scratch, *v = q + s->coords + 3, *lambda = v + s->coords + 3, T = r->w->scale.time, sum = 0;
   for (int j = 0; j < s->coords; j++) {
@@ -39,11 +40,11 @@ void pw_ledger_begin (pw_run *r) {
   r->potential0 = pw_potential (r->w);
   r->exchanged = pw_kinetic (r->s, r->v);
   r->energy0 = r->exchanged + r->potential0;
-  r->energy_scene = ledger_of_scene (r);
-  if (r->energy_scene == 0 && r->s->entries > 0) r->energy_scene = ledger_of_massless (r);
+  r->energy_scene = ledger_scene_energy (r);
+  if (r->energy_scene == 0 && r->s->entries > 0) r->energy_scene = ledger_massless_energy (r);
 }
 
-/* Every step at first, then a part of them: as a scale that is enough, and costs next to nothing. */
+/* Every step at first, then one in 16: enough for a scale, at negligible cost. */
 void pw_ledger_note (pw_run *r) {
   const long every = 16;
   double power = 0;
@@ -69,11 +70,11 @@ int pw_ledger_reacts (const pw_system *s) {
   return reacts;
 }
 
-/* Where motion takes hardly any energy, as of light bodies against friction, the work done so far is what counts, but not
- * that of more than the time T: it grows for ever. */
+/* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work
+ * done, limited to that of a time T: it grows without bound. */
 double pw_ledger_tolerance (const pw_run *r, double h) {
-  const double share = 5;         /* which a mean of squares allows to one of 25 states, too */
-  const double round_off = 1e-11; /* of rates, which is that of multipliers */
+  const double share = 5;         /* as a mean of squares over 25 states allows for one of them */
+  const double round_off = 1e-11; /* of the rates, from the multipliers */
   const pw_settings *set = &r->settings;
   double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);
   for (int i = 0; i < r->s->entries; i++) work += fabs (r->ledger[i]);
@@ -85,13 +86,13 @@ double pw_ledger_tolerance (const pw_run *r, double h) {
 double pw_run_energy_defect (const pw_run *r, const pw_sample *sample) {
   double off = sample->kinetic + sample->potential - r->energy0 - sample->work + sample->loss;
   double scale = fmax (r->exchanged, fmax (sample->kinetic, fabs (sample->potential - r->potential0)));
-  scale = fmax (scale, ledger_of_scene (r));
-  if (scale == 0) scale = fmax (fabs (sample->work), sample->loss); /* nothing has mass, nor stores energy */
+  scale = fmax (scale, ledger_scene_energy (r));
+  if (scale == 0) scale = fmax (fabs (sample->work), sample->loss); /* no masses, no stored energy */
   return off == 0 ? 0 : fabs (off) / scale;
 }
 
 const char *pw_run_energy_advice (const pw_run *r, double defect) {
-  const double limit = 1e-12, of_step = 10; /* times rtol: what a step may lose of the energy */
+  const double limit = 1e-12, of_step = 10; /* times rtol: acceptable defect per step */
   const pw_statistics *s = &r->statistics;
   int projects = pw_stabilised_by (r, PW_PROJECTION);
   if (!projects && fmax (s->position, s->velocity) > 0.1 * defect)

@@ -1,22 +1,24 @@
-/* What ends a run that would not end by itself: the caller's wish, the number of attempted steps, a state so far away that
- * numbers no longer resolve the scene.  And speeds that grow on and on, which are reported.
+/* Limits that end a run: the caller's request, the number of attempted steps, coordinates too large for double
+ * precision to resolve the scene.  Unbounded growth of velocities is reported.
  *
- * With the unit u of a coordinate (L, or 1 rad) and the round-off eps, q is known to eps |q|.  From eps |q| = 0.01 u on,
- * round-off alone violates a constraint by what counts as lost (1e-2, scaled), and turns a force or a heading by as much.
+ * With the unit u of a coordinate (L, or 1 rad) and the round-off eps, q has an error of eps |q|.  From eps |q| =
+ * 0.01 u on, round-off alone violates a constraint by the residual that counts as lost (1e-2, scaled), and turns
+ * forces as much.
  *
- * A constant torque or force that nothing opposes takes a scene from rest to the speed N u/T in the time N T, T being the time
- * scale of its accelerations at the start: an angle of N^2/2.  N = 1e3, some 80,000 turns, that still grows is reported.  It is
- * no failure, for it may be meant; but steps follow the turns, so that their number grows with the square of the time. */
+ * A constant torque or force that nothing opposes takes a scene from rest to the speed N u/T in the time N T, T
+ * being the time scale of its initial accelerations: an angle of N^2/2.  Growth beyond N = 1e3, some 80,000 turns,
+ * is reported.  It may be intended, so it is not an error; but the number of steps grows with that of the turns, the
+ * square of the time. */
 #include <float.h>
 #include <stdio.h>
 #include "method.h"
 
 #define LIMITS_RESOLVED 1e-2 /* of the unit: eps |q| beyond which a run fails */
 #define LIMITS_FAST 1e3      /* in u / T: speeds beyond which growth is reported */
-enum { LIMITS_LOOK = 16 };   /* steps between two looks at how large coordinates are, for most are small */
-#define LIMITS_GROWS 0.25    /* power of time from which on it is growth */
+enum { LIMITS_LOOK = 16 };   /* steps between checks of the size of coordinates */
+#define LIMITS_GROWS 0.25    /* exponent p of t^p above which a velocity counts as growing */
 
-/* The largest rate at the state reached, in units of the scene; *state: which. */
+/* The largest velocity at the state reached, in units of the scene; *state: its number. */
 static double limits_speed (const pw_run *r, int *state) {
   const pw_system *s = r->s;
   double most = 0;
@@ -34,7 +36,7 @@ double pw_run_growth (const pw_run *r, int *state, double *power) {
   return now > LIMITS_FAST && *power > LIMITS_GROWS ? now : 0;
 }
 
-/* Speeds at times that double: the one before the last mark is at most half of the run ago.  1: at such a time. */
+/* Records the largest speed whenever the elapsed time has doubled.  Returns 1 at such a time. */
 static int limits_mark (pw_run *r) {
   int state;
   double span = r->t - r->settings.t;
@@ -44,7 +46,7 @@ static int limits_mark (pw_run *r) {
   return 1;
 }
 
-static int limits_too_many (const pw_run *r, pw_error *error) {
+static int limits_fail_steps (const pw_run *r, pw_error *error) {
   const pw_statistics *s = &r->statistics;
   char name[120], grows[240] = "";
   int state;
@@ -62,7 +64,7 @@ static int limits_too_many (const pw_run *r, pw_error *error) {
 int pw_run_attempt (pw_run *r, pw_error *error) {
   if (pw_run_asked (r)) return PW_STOPPED;
   if (r->statistics.steps + r->statistics.rejected < r->settings.max_steps || pw_fixed_steps (r)) return PW_OK;
-  return limits_too_many (r, error);
+  return limits_fail_steps (r, error);
 }
 
 int pw_run_resolve (pw_run *r, pw_error *error) {

@@ -15,7 +15,7 @@ const pw_method *const pw_methods[] = {
       NULL
 };
 
-/* One part of the name: up to a + or :. */
+/* Reads one part of the name, up to + or :. */
 static int methods_part (char *part, size_t size, const char **text, const char *whole, pw_error *error) {
   size_t n = strcspn (*text, "+:");
   if (n >= size) return pw_fail (error, PW_INPUT, "method \"%.80s\": a name is too long", whole);
@@ -25,7 +25,7 @@ static int methods_part (char *part, size_t size, const char **text, const char 
   return PW_OK;
 }
 
-/* What a table lacks; "" if nothing. */
+/* Describes what a table lacks; "" if it is complete. */
 static const char *methods_lack (const pw_method *m) {
   int options = 0;
   while (m->options && m->options[options].name) options++;
@@ -84,7 +84,7 @@ static int methods_choice (const pw_option *o, const char *text, double *value, 
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* Decimal numbers without regard to the locale: digits, point, exponent. */
+/* Decimal numbers, independent of the locale: digits, point, exponent. */
 static int methods_number (const pw_option *o, const char *text, double *value, pw_error *error) {
   const char *p = text;
   double sign = *p == '-' ? -1 : 1, number = 0;
@@ -107,7 +107,8 @@ static int methods_number (const pw_option *o, const char *text, double *value, 
   return *expected ? pw_fail (error, PW_INPUT, "method option %s=%s: expected %s", o->name, text, expected) : PW_OK;
 }
 
-/* An option must exist for the integrator, and for this stabilisation; `given` has a bit for each there was. */
+/* Reads an option, which must exist for the integrator and this stabilisation; `given`: one bit for each option
+ * read. */
 static int methods_option (const pw_method *method, int stabilisation, char *part, double *values, unsigned *given,
                            pw_error *error) {
   char hint[100], *equals = strchr (part, '=');

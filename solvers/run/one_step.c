@@ -1,4 +1,4 @@
-/* What one-step methods of the user's are made of (pinwheel-method.h). */
+/* Building blocks of user-defined one-step methods (pinwheel-method.h). */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -11,8 +11,8 @@ struct pw_method_data {
   pw_projector projector; /* if the method projects */
   double base;            /* time from which steps are counted */
   long count;             /* steps since then */
-  double end;             /* of the step whose size was asked for */
-  int whole;              /* 1: it is of the given size */
+  double end;             /* of the step whose size was last requested */
+  int whole;              /* 1: it has the full step size */
   size_t length;          /* of an array */
   double *a, *lambda;     /* of the new state */
   double *array;
@@ -74,7 +74,7 @@ double pw_step_size (pw_run *r, double t_end) {
   return d->end - r->t;
 }
 
-/* Accelerations at the new state, which is projected first. */
+/* Projects the new state if the method does, and evaluates its accelerations. */
 static int step_evaluate (pw_run *r, double t, double *q, double *v) {
   struct pw_method_data *d = r->data;
   const pw_system *s = r->s;
@@ -100,7 +100,7 @@ static int step_fail (pw_run *r, int status, double h, pw_error *error) {
 int pw_step_accept (pw_run *r, int status, double h, double *q, double *v, pw_error *error) {
   struct pw_method_data *d = r->data;
   size_t n = (size_t)r->s->coords * sizeof *q;
-  int asked = fabs (r->t + h - d->end) <= 1e-9 * h; /* or a step of another size */
+  int asked = fabs (r->t + h - d->end) <= 1e-9 * h; /* 0: the caller chose another size */
   double t1 = asked ? d->end : r->t + h;
   if (status == PW_OK) status = step_evaluate (r, t1, q, v);
   if (status != PW_OK) return step_fail (r, status, h, error);

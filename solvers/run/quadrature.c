@@ -1,11 +1,11 @@
-/* Work and losses along the steps of a multistep method.  Its steps do not depend on them: a polynomial through the rates at
- * the states reached, of one order more than the step, costs next to nothing, and where that is not accurate enough
- * nodes inside the step are taken until they are.
+/* Work and losses along the steps of a multistep method: the integral of a polynomial through the rates at the
+ * states reached, one order above that of the step, at negligible cost; where that is not accurate enough, Gauss
+ * quadrature inside the step.
  *
  *   p (t) = sum_j [t_0 ... t_j] prod_(i < j) (t - t_i),   t_0 the end of the step, t_1 its beginning, ...
  *
- * Its last term is taken for its error.  Rates may vanish wherever a step ends and not between; so the energy, which the
- * states know, has to change by what the work and losses of the step say, too. */
+ * Its last term estimates its error.  Rates may vanish at the ends of all steps and not between them, so the work
+ * and losses of a step are also compared with the change of energy between the states. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,8 +42,8 @@ void pw_quadrature_restart (pw_quadrature *x, pw_run *r) {
 
 /* ---- The polynomial ---- */
 
-/* The integrals of prod_(i < j) (s - s_i), j <= k, from 0 to `end`, with s = 0 at the beginning of the step and 1 at its
- * end. */
+/* The integrals of prod_(i < j) (s - s_i), j <= k, from 0 to `end`, with s = 0 at the beginning of the step and 1 at
+ * its end. */
 static void quadrature_weights (const double *s, int k, double end, double *w) {
   double p[PW_QUADRATURE_POINTS + 1] = { 1 };
   for (int j = 0; j <= k; j++) {
@@ -55,7 +55,7 @@ static void quadrature_weights (const double *s, int k, double end, double *w) {
   }
 }
 
-/* The integrals up to `end`, into x->sum; returns the size of their last terms. */
+/* Stores the integrals up to `end` in x->sum; returns the norm of their last terms. */
 static double quadrature_polynomial (pw_quadrature *x, int entries, int k, double end) {
   double s[PW_QUADRATURE_POINTS], w[PW_QUADRATURE_POINTS], c[PW_QUADRATURE_POINTS], h = x->t[0] - x->t[1], last = 0;
   for (int i = 0; i <= k; i++) s[i] = (x->t[i] - x->t[1]) / h;
@@ -73,7 +73,7 @@ static double quadrature_polynomial (pw_quadrature *x, int entries, int k, doubl
 
 /* ---- Nodes inside the step ---- */
 
-/* The integrals over equal parts of a step, by Gauss' formula of order 8, into x->finer. */
+/* Stores the integrals over equal parts of a step in x->finer, by Gauss quadrature of order 8. */
 static int quadrature_parts (pw_quadrature *x, pw_run *r, double from, double to, int parts) {
   static const double node[] = { 0.8611363115940526, 0.3399810435848563 },
                       weight[] = { 0.3478548451374538, 0.6521451548625461 };
@@ -89,7 +89,7 @@ static int quadrature_parts (pw_quadrature *x, pw_run *r, double from, double to
   return PW_OK;
 }
 
-/* Halves the parts until the integrals, in x->sum, agree with those before; where rates cannot be evaluated they stay. */
+/* Halves the parts until the integrals, in x->sum, converge; leaves them if rates cannot be evaluated. */
 static void quadrature_refine (pw_quadrature *x, pw_run *r, double from, double to, double tolerance) {
   const int most = 64;
   double off = INFINITY;
@@ -108,13 +108,13 @@ static int quadrature_degree (const pw_quadrature *x, int order) {
   return order + 1 < x->points ? order + 1 : x->points - 1;
 }
 
-/* 1 if the step is much longer than all since the restart: then its polynomial knows its ends only. */
+/* 1 if the step is much longer than all since the restart together: its polynomial then depends on its ends alone. */
 static int quadrature_leaps (const pw_quadrature *x) {
   const double leap = 10;
   return x->points > 2 && x->t[0] - x->t[1] > leap * (x->t[1] - x->t[x->points - 1]);
 }
 
-/* How much the energy of a step differs from its work and losses. */
+/* Energy defect of a step: change of energy less work and losses. */
 static double quadrature_defect (pw_quadrature *x, pw_run *r) {
   double before = x->energy, off;
   x->energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
@@ -124,7 +124,7 @@ static double quadrature_defect (pw_quadrature *x, pw_run *r) {
 }
 
 int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
-  const double methods = 100; /* times the tolerance: what the method's own error in energy may be in a step */
+  const double methods = 100; /* times the tolerance: allowance for the method's own energy error in a step */
   int entries = r->s->entries, last = PW_QUADRATURE_POINTS - 1;
   double *oldest = x->rate[last], h = r->t - x->t[0];
   memcpy (x->ledger0, r->ledger, (size_t)entries * sizeof (double));

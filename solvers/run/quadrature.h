@@ -4,10 +4,10 @@
 
 #include "method.h"
 
-enum { PW_QUADRATURE_POINTS = 7 }; /* at most: of more the polynomial costs more than nodes where it is not enough */
+enum { PW_QUADRATURE_POINTS = 7 }; /* at most; beyond, the polynomial costs more than nodes inside the step */
 
-/* The rates of the ledger's entries at a time inside the last step, by the method's own interpolation; it leaves the run as
- * it is, but for the sample arrays and where the system is placed.  Returns as pw_update_kinematics. */
+/* The rates of the ledger's entries at a time inside the last step, by the method's interpolation; changes only the
+ * run's sample arrays and the kinematics.  Returns as pw_update_kinematics. */
 typedef int pw_velocities_at (pw_run *r, double t, double *rate);
 
 typedef struct {
@@ -26,14 +26,14 @@ typedef struct {
 int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_velocities_at *rates);
 void pw_quadrature_close (pw_quadrature *x);
 
-/* Begins anew at the state reached, where the system is placed, and the ledger and its rates are known. */
+/* Restarts at the state reached; kinematics, the ledger and its rates must be up to date. */
 void pw_quadrature_restart (pw_quadrature *x, pw_run *r);
 
-/* The ledger goes on to the state reached by a step of this order: the system is placed there, and r->rate is of there.  1 if
- * the system was placed elsewhere. */
+/* Integrates the ledger over the step, of this order, to the state reached, where kinematics and r->rate must be up
+ * to date.  Returns 1 if the kinematics were changed. */
 int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order);
 
-/* The ledger at a time inside the last step, into r->ledger_at. */
+/* Stores the ledger at a time inside the last step in r->ledger_at. */
 void pw_quadrature_at (pw_quadrature *x, pw_run *r, double t);
 
 #endif

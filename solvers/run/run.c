@@ -1,4 +1,4 @@
-/* A run: advanced step by step, looked into, put into another state, closed. */
+/* A run: advance, sample, restart, close. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -50,7 +50,7 @@ int pw_run_look_ahead (pw_run *r, pw_error *error) {
   }
   pw_failed_signal (r->w, signal, sizeof signal);
   r->w->failed = NULL;
-  return pw_fail (error, PW_METHOD, "t = %.17g s: %s: its breakpoint function tells a time that is not later", r->t,
+  return pw_fail (error, PW_METHOD, "t = %.17g s: %s: its breakpoint function returned a time that is not later", r->t,
                   signal);
 }
 
@@ -75,7 +75,7 @@ void pw_run_close (pw_run *r) {
   free (r);
 }
 
-/* Behind a discontinuity the accelerations are others, and a method starts anew. */
+/* Accelerations change at a discontinuity, and the method restarts. */
 static int run_pass_breakpoint (pw_run *r, pw_error *error) {
   int status = pw_run_look_ahead (r, error);
   if (status == PW_OK) status = pw_run_evaluate (r, error);
@@ -97,15 +97,15 @@ int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   return status;
 }
 
-/* Without its method, which memory did not suffice for, a run can only be closed. */
-static int run_is_lost (const pw_run *r, pw_error *error) {
+/* If memory did not suffice for its method, a run can only be closed. */
+static int run_has_no_method (const pw_run *r, pw_error *error) {
   if (r->data) return 0;
   pw_fail (error, PW_RESOURCE, "model %s: the run was given up at t = %.6g s for lack of memory", r->s->model, r->t);
   return 1;
 }
 
-/* The rows in use have become nearly dependent: if others are not, the method starts anew with them.  This waits for the
- * next step, so that the last one can be looked into, and cannot depend on whether it was. */
+/* The active rows have become nearly dependent: if another set is not, the method restarts with it.  Done before the
+ * next step, so that samples of the last one remain available, and independent of whether any were taken. */
 static int run_reselect (pw_run *r, pw_error *error) {
   pw_sample sample;
   r->reselect = r->grip / 2;
@@ -117,7 +117,7 @@ static int run_reselect (pw_run *r, pw_error *error) {
   return pw_run_renew (r, 1, error);
 }
 
-/* Libraries take steps below the round-off of time for ever where an evaluation fails just ahead. */
+/* If an evaluation fails just ahead, libraries take steps below the round-off of time for ever. */
 static int run_check_progress (pw_run *r, double before, pw_error *error) {
   r->stuck = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stuck + 1;
   if (r->stuck < r->limits.stalled) return PW_OK;
@@ -134,7 +134,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   double before = r->t;
   if (isnan (t_end)) return pw_fail (error, PW_INPUT, "t_end = nan: expected a time");
   if (!(r->t < t_end)) return PW_OK;
-  if (run_is_lost (r, error)) return PW_RESOURCE;
+  if (run_has_no_method (r, error)) return PW_RESOURCE;
   r->stopped = 0;
   status = pw_run_attempt (r, error);
   if (status != PW_OK) return status;
@@ -168,7 +168,7 @@ double pw_run_time (const pw_run *r) {
   return r->t;
 }
 
-/* Energies and the ledger of the state in the sample arrays, which is placed. */
+/* Energies and ledger of the sample, where kinematics are up to date. */
 static void run_account (pw_run *r, pw_sample *sample) {
   const pw_system *s = r->s;
   sample->kinetic = pw_kinetic (s, r->v_at);
@@ -182,7 +182,7 @@ static void run_account (pw_run *r, pw_sample *sample) {
 int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   pw_residuals now;
   if (pw_require (r, "a run", error) != PW_OK || pw_require (sample, "a sample", error) != PW_OK) return PW_INPUT;
-  if (run_is_lost (r, error)) return PW_RESOURCE;
+  if (run_has_no_method (r, error)) return PW_RESOURCE;
   if (isnan (t)) return pw_fail (error, PW_INPUT, "t = nan: expected a time inside the last step");
   r->stopped = 0;
   if (t < r->t && pw_run_asked (r)) return PW_STOPPED;
@@ -209,7 +209,7 @@ static int run_check_state (const pw_run *r, const double *x, int rates, pw_erro
   return PW_OK;
 }
 
-/* Takes values over, which may be those of a sample; the old ones go where samples are. */
+/* Copies `other`, which may be a sample array, to x; the old values go to `kept`, the sample array. */
 static void run_exchange (double *x, double *kept, const double *other, int n) {
   for (int j = 0; j < n; j++) {
     double old = x[j];
@@ -225,13 +225,13 @@ static int run_energy (pw_run *r, double *energy, pw_error *error) {
   return PW_OK;
 }
 
-/* What the caller changes of the energy is not the method's: it counts as energy at the start.  Functions of the caller's
- * may give other values, and other breakpoints, than before. */
+/* A change of energy by the caller is not the method's: it is added to the initial energy.  The caller's functions
+ * may return other values and breakpoints than before. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   int n = r->s->coords;
   double before = 0, after = 0;
-  if (run_is_lost (r, error)) return PW_RESOURCE;
+  if (run_has_no_method (r, error)) return PW_RESOURCE;
   if (run_check_state (r, q, 0, error) != PW_OK || run_check_state (r, v, 1, error) != PW_OK) return PW_INPUT;
   int status = run_energy (r, &before, error);
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
@@ -246,7 +246,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
     pw_watchdog_begin (r);
-    if (!r->near) pw_run_reference_level (r); /* near a singular configuration they tell nothing */
+    if (!r->near) pw_run_reference_level (r); /* near a singular configuration they mean nothing */
     r->energy0 += after - before;
     return r->method->restart (r, error);
   }

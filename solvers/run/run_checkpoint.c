@@ -1,13 +1,13 @@
 /* Checkpoints: the state of a run as bytes.
  *
- * Some of what a run has in memory depends on the way it came: which pivots its factorisations chose, the earlier
- * values of a multistep formula.  That is not saved: the run that is saved and the one that is loaded both build it anew
- * from the state reached, and so go on alike.  A method's `carry` adds what only it knows: step size, counts. */
+ * Data that depend on the history of a run, such as pivot choices and earlier values of a multistep formula, are not
+ * saved: the saved run and the loaded one both rebuild them from the state reached, and so continue alike.  A
+ * method's `carry` serialises the rest: step size, counts. */
 #include <math.h>
 #include "method.h"
 #include "rank.h"
 
-/* 1 if the archive is of a run of these sizes. */
+/* 1 if the archive is from a run of these sizes. */
 static int checkpoint_sizes (pw_run *r, pw_archive *a) {
   const int own[] = { r->s->coords, r->s->rows, r->s->entries, r->redundant };
   enum { SIZES = sizeof own / sizeof *own };
@@ -41,7 +41,7 @@ static void checkpoint_state (pw_run *r, pw_archive *a) {
   pw_rank_serialise (r, a);
 }
 
-/* A file may be whole and yet not have been written by a run. */
+/* A file may be intact and yet not have been written by a run. */
 static int checkpoint_plausible (const pw_run *r) {
   const pw_statistics *s = &r->statistics;
   int good = isfinite (r->t) && r->t >= 0 && s->steps >= 0 && s->rejected >= 0 && s->rhs >= 0;
@@ -49,8 +49,8 @@ static int checkpoint_plausible (const pw_run *r) {
   return good;
 }
 
-/* From the state in the run, in either of them; `a` is loading and has the method's own next, if there is any. */
-static int checkpoint_go_on (pw_run *r, pw_archive *a, pw_error *error) {
+/* Continues from the state in the run, after saving or loading; `a` is loading, at the method's own data, if any. */
+static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
   if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK)
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   pw_evaluate_J (r->w);
@@ -65,7 +65,7 @@ static int checkpoint_go_on (pw_run *r, pw_archive *a, pw_error *error) {
 int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   pw_sample sample;
   if (r->near) return PW_RETRY;
-  int status = pw_run_sample (r, r->t, &sample, error); /* evaluates what the method leaves to samples */
+  int status = pw_run_sample (r, r->t, &sample, error); /* some methods evaluate the state reached only here */
   if (status != PW_OK) return status;
   checkpoint_sizes (r, a);
   checkpoint_state (r, a);
@@ -74,7 +74,7 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   if (a->failed) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
   own.at = a->at;
   own.size = a->used;
-  return checkpoint_go_on (r, &own, error);
+  return checkpoint_continue (r, &own, error);
 }
 
 int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
@@ -85,5 +85,5 @@ int pw_run_load (pw_run *r, pw_archive *a, pw_error *error) {
     return pw_fail (
         error, PW_INPUT,
         "the saved state is not that of a run: its time, t = %g s, or a coordinate or velocity is impossible", r->t);
-  return checkpoint_go_on (r, a, error);
+  return checkpoint_continue (r, a, error);
 }

@@ -1,4 +1,4 @@
-/* Opening a run: settings, a consistent start, the accelerations there, the method. */
+/* Opening a run: settings, consistent initial state, accelerations there, method. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -53,7 +53,7 @@ static int run_allocate (pw_run *r) {
   return PW_OK;
 }
 
-/* T: the fastest of what the scene starts with, and its span. */
+/* T: the shortest time scale of the initial velocities, the accelerations and the span. */
 static double run_time_scale (const pw_run *r) {
   const pw_system *s = r->s;
   double fastest = 1 / r->settings.span;
@@ -64,10 +64,11 @@ static double run_time_scale (const pw_run *r) {
   return 1 / fastest;
 }
 
-/* Of a dependent row round-off leaves a pivot of 1e-8, and of 1e-5 behind others that hardly differ among themselves: as
- * large a one is looked into by a means that can tell, if the scene is small enough for it. */
-/* Opens the saddle at the consistent start and evaluates the accelerations there; if some rows hardly differ from
- * others, an independent set is chosen first. */
+/* Opens the saddle at the consistent initial state and evaluates the accelerations there; if some rows are nearly
+ * dependent, an independent set is selected first.
+ *
+ * Round-off leaves a dependent row a pivot of 1e-8, and of 1e-5 after others that are nearly dependent themselves:
+ * below `suspect` the rank is examined by orthogonalisation, if the scene is small enough. */
 static int run_first_evaluation (pw_run *r, pw_error *error) {
   int status = pw_run_open_saddle (r, error);
   if (status != PW_OK) return status;
@@ -85,7 +86,7 @@ static int run_first_evaluation (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* The state is consistent: energies, ledger and statistics begin here. */
+/* Initialises energies, ledger and statistics at the consistent state. */
 static int run_begin (pw_run *r, pw_error *error) {
   pw_run_reference_level (r);
   pw_ledger_begin (r);
@@ -94,8 +95,8 @@ static int run_begin (pw_run *r, pw_error *error) {
   return pw_run_look_ahead (r, error);
 }
 
-/* Accelerations that are not finite at the start are a kind's or a signal's fault, and told as such; or a mass's, which is
- * too small for its force. */
+/* Initial accelerations that are not finite come from an element or a signal, which is reported, or from a mass that
+ * is too small for its force. */
 static int run_check_finite (pw_run *r, pw_error *error) {
   char element[200];
   double sum = 0;
@@ -113,7 +114,7 @@ static int run_check_finite (pw_run *r, pw_error *error) {
                   pw_system_state_name (r->s, bad, element, sizeof element));
 }
 
-/* A method that uses derivatives would run with a wrong matrix where an element type leaves one out. */
+/* A missing derivative of an element type would give a method that uses it a wrong matrix. */
 static int run_check_derivatives (pw_run *r, const char *method, pw_error *error) {
   char block[200];
   if (!r->differentiates) return PW_OK;

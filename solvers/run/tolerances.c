@@ -1,17 +1,17 @@
-/* Forces that saturate, such as friction, beside tolerances and Newton matrices.
+/* Saturating forces, such as friction: bounds on tolerances and on the use of Newton matrices.
  *
- * A matrix from where such a force is steep, at rest, used where it has saturated, makes the corrections of Newton's iteration
- * about as small as what the force saturates within, however large the residual is: it would pass for converged with the
- * force of quite another state.  So tolerances stay below that, and a matrix serves only as long as no state has moved by
- * more than the forces saturated within where it was evaluated. */
+ * A Newton matrix evaluated where such a force is steep, at rest, and used where it has saturated, makes corrections
+ * about as small as the range of saturation, however large the residual is: the iteration would seem to converge
+ * with the force of another state.  So tolerances stay below that range, and a matrix is reused only while no state
+ * has moved by more than the range where it was evaluated. */
 #include <math.h>
 #include <string.h>
 #include "method.h"
 
 #define TOLERANCES_PART 0.1
 
-/* A tenth of what reverses a force, as the error of one state alone: the norm of n errors, each as large as its tolerance, is
- * 1, and one alone may be sqrt (n) times as large. */
+/* A tenth of the change that reverses a force, as the error of a single state: the norm of n errors equal to their
+ * tolerances is 1, so a single one may be sqrt (n) times its tolerance. */
 void pw_bound_tolerances (pw_run *r) {
   int coords = r->s->coords, n = 2 * coords;
   if (!r->s->saturates) return;

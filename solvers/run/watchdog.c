@@ -1,7 +1,7 @@
-/* The watchdog's thresholds, and how near the constraints are to a singular configuration; see watchdog.h.
+/* The watchdog's thresholds, and the distance of the constraints from singular configurations; see watchdog.h.
  *
- * The sine of the smallest angle between a row and those before it changes by at most about as much as bodies move, so it
- * is computed anew only when the motion since the last time could have brought it to 0. */
+ * The sine of the smallest angle between a row and those before it changes by at most about the motion of the
+ * bodies, so it is computed again only when the motion since could have brought it to 0. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -9,37 +9,38 @@
 #include "method.h"
 #include "rank.h"
 
-/* Residuals are scaled, sines are of angles between rows.  s: the sine over the largest one; d: what constraints are off by.
- * Where branches meet the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; those that are off by d are
- * x y = d, whose branches turn where s^2 = 2 d. */
+/* Residuals are scaled, sines are of angles between rows. s: the sine over the largest one; d: the constraint
+ * residual.  Where branches meet the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a
+ * residual d they are x y = d, whose branches turn where s^2 = 2 d. */
 const pw_watchdog pw_watchdog_limits = {
-  /* A hundredth of the scene is no longer its motion; without stabilisation some drift is what was asked for. */
+  /* With residuals of a hundredth of the scene the motion is wrong; without stabilisation some drift is expected. */
   .lost = 1e-2,
   .lost_unstabilised = 0.1,
 
-  /* A redundant row follows from the others to some 1e6 eps of round-off, or to what they are off by, magnified by a sine as
-   * small as 1e-4. */
+  /* A redundant row follows from the others to some 1e6 eps of round-off, or to their residuals, magnified by a sine
+   * as small as 1e-4. */
   .follows = 1e-9,
   .magnified = 1e4,
 
-  /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; 1e-6 is the sine below which accelerations, good to
-   * eps / s after refinement, are wrong by more than 1e-10 even so.  `suspect`: behind others that hardly differ, round-off
-   * leaves up to 1e-5; a hundred times that is looked into where it can be, `dependent` is refused where not. */
+  /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
+   * error of eps / s after refinement, are wrong by more than 1e-10.  `suspect`: after rows that are nearly
+   * dependent themselves, round-off leaves up to 1e-5; the rank is examined below a hundred times that, or refused
+   * below `dependent` if it cannot be. */
   .rank = 1e-6,
   .suspect = 1e-3,
   .dependent = 1e-5,
 
-  /* Rows of a consistent configuration are known to the 1e-8 that residuals of 1e-16 leave of a sine; ten times that. */
+  /* Residuals of 1e-16 leave an error of 1e-8 in a sine; ten times that. */
   .independent = 1e-7,
 
-  /* A stage of a step h is off by about h^2 / 8, which decides on the branch if s^2 is not large beside it: at 1e-3 s and a few
-   * rad/s for s of 0.02.  A factorisation is good to eps / s^2, 5e-13 at 0.02. */
+  /* A stage of a step h has a residual of about h^2 / 8, which decides on the branch unless s^2 is much larger: at
+   * 1e-3 s and a few rad/s for s of 0.02.  A factorisation has an error of eps / s^2, 5e-13 at 0.02. */
   .near = 0.02,
   .refine = 0.02,
 
-  /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest; accelerations
-   * have left their level by a factor of 3 when it is 0.02 to 0.07.  What is `regular` is no singular configuration, however
-   * large the drift. */
+  /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest;
+   * accelerations have grown by a factor of 3 when it is 0.02 to 0.07.  Above `regular` a configuration is not
+   * singular, however large the drift. */
   .regular = 0.6,
   .turn = 3,
   .least_turn = 0.1,
@@ -48,25 +49,26 @@ const pw_watchdog pw_watchdog_limits = {
   .drift_far = 1e-2,
   .drift_any = 0.1,
 
-  /* Nonholonomic rows: the motion passes a singular configuration calmly, a jump reaches 1 / near^1 times and more. */
+  /* Nonholonomic rows: accelerations do not grow when the motion passes a singular configuration; in a jump they reach
+   * 1 / near^1 times and more. */
   .jump = 100,
 
-  /* The direction of a row of length 1 turns by at most an angle of 1 per rad, that of the others too; step sizes of one
-   * step to the next. */
+  /* The direction of a row of length 1 turns by at most an angle of 1 per rad, that of the others too; step sizes of
+   * one step to the next. */
   .lipschitz = 2,
   .growth = 2,
 
-  /* Change points (change_point.c): a sine within a step that is below an eighth of those at its ends is that of a corner
-   * shorter than the step can know of; half of it shows that there may be one.  Strides of 0.3 s stay on a curve whose radius
-   * is s.  A stride that comes no nearer by a tenth of its length leads elsewhere. */
+  /* Change points (change_point.c): a sine within a step below an eighth of those at its ends belongs to a corner
+   * that the step cannot resolve; half of them indicates that there may be one.  Strides of 0.3 s stay on a curve
+   * whose radius is s.  A stride that gains less than a tenth of its length leads elsewhere. */
   .dip = 0.125,
   .sag = 0.5,
   .stride = 0.3,
   .progress = 0.1,
 
-  /* The projection leaves residuals of 1e-14, and with these the sine is known to 1e-7: what is below `floor`, ten times
-   * that, cannot be distinguished from 0 (`met`, with a stride's play).  Such a point is left straight on, at an angle below
-   * 60 degrees to where it was entered. */
+  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times
+   * that, it cannot be distinguished from 0 (`met`: with the tolerance of a stride).  Such a point must be left
+   * straight on, within 60 degrees of the direction in which it was entered. */
   .floor = 1e-6,
   .met = 2e-6,
   .ahead = 0.5,
@@ -74,8 +76,8 @@ const pw_watchdog pw_watchdog_limits = {
   /* Methods of order 2 leave (0.4)^2 / 12 = 1 % at a corner as long as 1 / 0.4 steps. */
   .resolved = 0.4,
 
-  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the error of
-   * a good step, 1e-7, do not agree. */
+  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the
+   * error of a good step, 1e-7, do not agree. */
   .agree = 1e-7,
   .agree_best = 1e-11,
 
@@ -83,15 +85,15 @@ const pw_watchdog pw_watchdog_limits = {
   .sample = 1e-2,
   .sample_best = 1e-9,
 
-  /* Least part of a set of rows that holds the others: another one is looked for at 0.6 of the grip there was, and where a
-   * coefficient exceeds 1 / 0.7. */
+  /* Conditioning of the active rows: another set is sought at 0.6 of the initial value, and where a coefficient exceeds
+   * 1 / 0.7. */
   .loosened = 0.6,
   .loose = 0.7,
 
-  /* Products of three masses must neither overflow nor vanish. */
+  /* Products of three masses must neither overflow nor underflow. */
   .extreme = 1e100,
 
-  /* Libraries reduce a step by 4 to 10 at a time, 25 times until nothing is left of it. */
+  /* Libraries reduce a step by factors of 4 to 10: 25 reductions until it is below round-off. */
   .stalled = 1000,
 };
 
@@ -104,7 +106,7 @@ static int watchdog_root (int *set, int b) {
   return b;
 }
 
-/* 1 if an element joins bodies that others join already (the ground is a body); -1 if memory does not suffice. */
+/* 1 if an element connects bodies that are already connected (the ground is a body); -1 if out of memory. */
 static int watchdog_has_loops (const pw_system *s) {
   int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
   if (set == NULL) return -1;
@@ -219,8 +221,8 @@ int pw_watchdog_check_values (const pw_system *s, const pw_watchdog *limits, pw_
 
 /* ---- Following the motion ---- */
 
-/* The largest change of a coordinate in the last step, since the last state. */
-static double watchdog_step (pw_run *r) {
+/* The largest change of a coordinate in the last step, scaled. */
+static double watchdog_step_length (pw_run *r) {
   const pw_system *s = r->s;
   double *last = r->geometry.q, length = 0, angle = 0;
   int n = 3 * s->bodies;
@@ -232,8 +234,8 @@ static double watchdog_step (pw_run *r) {
   return pw_larger (length / s->scale.length, angle);
 }
 
-/* The sine is that at the state reached. */
-static void watchdog_know (pw_run *r, double sine) {
+/* Records the sine at the state reached. */
+static void watchdog_record_sine (pw_run *r, double sine) {
   pw_geometry *g = &r->geometry;
   g->known = sine;
   g->moved = 0;
@@ -245,8 +247,8 @@ int pw_watchdog_reaches (const pw_run *r, double sine, double length) {
   return g->saddle && !(g->known - r->limits.lipschitz * g->typical * (g->moved + length) > sine);
 }
 
-/* What sines are like elsewhere: at configurations all over the place, which need not meet the constraints. */
-static void watchdog_look_around (pw_run *r) {
+/* Typical sines: at scattered configurations, which need not satisfy the constraints. */
+static void watchdog_sample_sines (pw_run *r) {
   const pw_system *s = r->s;
   pw_geometry *g = &r->geometry;
   for (int n = 1; n <= WATCHDOG_PLACES; n++) {
@@ -262,8 +264,8 @@ void pw_watchdog_begin (pw_run *r) {
   pw_geometry *g = &r->geometry;
   size_t n = (size_t)r->s->coords * sizeof (double);
   if (g->saddle == NULL) return;
-  if (g->typical == 0) watchdog_look_around (r);
-  watchdog_know (r, pw_watchdog_sine (r, NULL));
+  if (g->typical == 0) watchdog_sample_sines (r);
+  watchdog_record_sine (r, pw_watchdog_sine (r, NULL));
   g->t = r->t;
   g->begun = g->known;
   g->step = g->slope = 0;
@@ -278,13 +280,13 @@ int pw_watchdog_follow (pw_run *r, pw_error *error) {
   int status = PW_OK;
   size_t n = (size_t)r->s->coords * sizeof (double);
   if (g->saddle == NULL) return PW_OK;
-  g->step = watchdog_step (r);
+  g->step = watchdog_step_length (r);
   g->moved += g->step;
   double near = r->limits.near * g->typical;
   int now = pw_watchdog_reaches (r, near, r->limits.growth * g->step);
   if (now) {
     double last = g->moved == g->step ? g->known : NAN;
-    watchdog_know (r, pw_watchdog_sine (r, &g->row));
+    watchdog_record_sine (r, pw_watchdog_sine (r, &g->row));
     status = pw_change_point_check (r, g->known, error);
     if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
     g->before = last;

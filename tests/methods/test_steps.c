@@ -215,7 +215,7 @@ static void test_breakpoints_told (void **state) {
     pw_run *r = runs_open (s, "rk4", NULL);
     assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
     check_error (&error, PW_METHOD,
-                 "t = 0.125 s: torque T: value: its breakpoint function tells a time that is not later");
+                 "t = 0.125 s: torque T: value: its breakpoint function returned a time that is not later");
     wrong = (steps_wrong){ 0, told[i] };
     error = (pw_error){ 0 };
     assert_int_equal (pw_run_restart (r, NULL, NULL, &error), PW_METHOD);
@@ -223,7 +223,7 @@ static void test_breakpoints_told (void **state) {
     error = (pw_error){ 0 };
     if (told[i] > 0) continue;
     assert_null (pw_run_open (s, "rk4", NULL, &error));
-    check_error (&error, PW_METHOD, "t = 0 s: torque T: value: its breakpoint function tells a time that is not later");
+    check_error (&error, PW_METHOD, "t = 0 s: torque T: value: its breakpoint function returned a time that is not later");
   }
   pw_system_free (s);
 }
