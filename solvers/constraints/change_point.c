@@ -3,14 +3,13 @@
  * In suitable coordinates the constraints near one are x y = e, with the sine |(x, y)|.  For e = 0 the branches
  * cross and the motion goes straight on; for e != 0 it turns within a distance of sqrt (e), and a step that is
  * longer than that can go straight on to the other branch, where all constraints hold again.  Neither residuals nor
- * energies show this.
+ * energies reveal this.
  *
- * So where the sine can have had a minimum within a step, the way from its beginning to its end is walked on the
- * constraint manifold: towards the end in strides that are a part of the sine, each followed by a projection.  A
- * walk that stalls has found that the end is on another branch.  Where the sine falls below `floor` the branches
- * meet but for round-off; such a point is stepped over, and the motion must go straight on. (Following a solution
- * curve by predictor and projection: Allgower & Georg 2003, Introduction to numerical continuation methods, chapters
- * 2 and 8.) */
+ * So where the sine may have had a minimum within a step, a walk on the constraint manifold leads from its beginning
+ * to its end, in strides proportional to the sine, each followed by a projection.  If the walk stalls, the end is on
+ * another branch.  Where the sine falls below `floor` the branches meet to round-off; the walk steps over such a
+ * point, and the motion must continue straight on. (Following a solution curve by predictor and projection: Allgower
+ * & Georg 2003, Introduction to numerical continuation methods, chapters 2 and 8.) */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,10 +23,10 @@ typedef enum { CHANGE_SAME, CHANGE_OTHER, CHANGE_UNKNOWN } change_verdict;
 typedef struct {
   pw_run *r;
   pw_projector projector;
-  double t, *q, *next;       /* where the walk is, and may go to */
-  double *end, *in;          /* its end; a direction */
-  double sine, least, slope; /* at q; the smallest; the fastest it has changed */
-  int passed; /* 1: a point where branches meet is being stepped over; 2: it was, straight on; -1: not so */
+  double t, *q, *next;       /* position of the walk, and a candidate for the next */
+  double *end, *in;          /* end of the walk; direction in which a meeting point was entered */
+  double sine, least, slope; /* at q; the smallest; its fastest change */
+  int passed; /* 1: stepping over a point where branches meet; 2: passed straight on; -1: passed otherwise */
   int row;    /* where the sine was smallest */
 } change_walk;
 
@@ -45,8 +44,8 @@ static double change_distance (const pw_system *s, const double *a, const double
   return sqrt (change_dot (s, a, b, a, b));
 }
 
-/* Onto the constraints; the sine there. */
-static int change_land (change_walk *w, double t, double *q, double *sine) {
+/* Projects onto the constraints; the sine there. */
+static int change_project (change_walk *w, double t, double *q, double *sine) {
   pw_run *r = w->r;
   int row;
   double worst;
@@ -58,7 +57,7 @@ static int change_land (change_walk *w, double t, double *q, double *sine) {
   return PW_OK;
 }
 
-/* Takes note of where a point at which branches meet is entered; it must be left straight on. */
+/* Records where a point at which branches meet is entered; checks that it is left straight on. */
 static void change_straight (change_walk *w, double sine) {
   const pw_system *s = w->r->s;
   const double inside = w->r->limits.met;
@@ -74,14 +73,14 @@ static void change_straight (change_walk *w, double sine) {
   }
 }
 
-/* A stride to q + part (to - q), longer where there is nothing to land on; PW_RETRY if there is nothing at all. */
+/* A stride to q + part (to - q), longer where the projection fails; PW_RETRY if it fails for all lengths. */
 static int change_stride (change_walk *w, const double *to, double t1, double part) {
   const pw_system *s = w->r->s;
   double sine, t, *swap = w->next;
   for (int tries = 0; tries < CHANGE_TRIES; tries++, part *= 1.7) {
     for (int j = 0; j < s->coords; j++) w->next[j] = w->q[j] + part * (to[j] - w->q[j]);
     t = w->t + fmin (1, part) * (t1 - w->t);
-    if (change_land (w, t, w->next, &sine) != PW_OK) continue;
+    if (change_project (w, t, w->next, &sine) != PW_OK) continue;
     double length = change_distance (s, w->next, w->q);
     change_straight (w, sine);
     w->slope = fmax (w->slope, fabs (sine - w->sine) / fmax (length, w->r->limits.floor));
@@ -97,7 +96,7 @@ static double change_length (const change_walk *w) {
   return fmax (fmin (limit->stride * w->sine / w->slope, limit->stride), limit->floor);
 }
 
-static change_verdict change_go (change_walk *w) {
+static change_verdict change_follow (change_walk *w) {
   pw_run *r = w->r;
   const pw_geometry *g = &r->geometry;
   double sine, end = r->t;
@@ -106,7 +105,7 @@ static change_verdict change_go (change_walk *w) {
   w->slope = g->typical;
   memcpy (w->q, g->q, (size_t)r->s->coords * sizeof *w->q);
   memcpy (w->end, r->q, (size_t)r->s->coords * sizeof *w->q);
-  if (change_land (w, end, w->end, &sine) != PW_OK || change_land (w, w->t, w->q, &w->sine) != PW_OK)
+  if (change_project (w, end, w->end, &sine) != PW_OK || change_project (w, w->t, w->q, &w->sine) != PW_OK)
     return CHANGE_UNKNOWN;
   for (int i = 0; i < CHANGE_STRIDES; i++) {
     double distance = change_distance (r->s, w->q, w->end);
@@ -137,7 +136,7 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
   w->q = memory, w->next = w->q + n, w->end = w->next + n, w->in = w->end + n;
   for (int j = 0; j < s->coords; j++) w->in[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
   if (pw_projector_open (&w->projector, r, w->in, NULL, error) == PW_OK) {
-    verdict = change_go (w);
+    verdict = change_follow (w);
     pw_projector_close (&w->projector);
   }
   free (memory);
@@ -152,7 +151,7 @@ static double change_sine_at (pw_run *r, double t, const double *q) {
   return pw_watchdog_sine (r, NULL);
 }
 
-/* 1 if it is low somewhere on the straight line of a long step. */
+/* 1 if the sine is low somewhere on the straight line of a long step. */
 static int change_sags (pw_run *r, double length) {
   const pw_geometry *g = &r->geometry;
   int parts = (int)(length / r->limits.stride) + 1;
@@ -189,9 +188,9 @@ int pw_change_point_resolve (pw_run *r, double last, pw_error *error) {
   return change_fail (r, g->row, last / g->slope, "the step does not resolve it", g->step, error);
 }
 
-/* The verdict on a walk that went to its end. */
-static int change_judge (pw_run *r, const change_walk *w, change_verdict verdict, double sine, double length,
-                         pw_error *error) {
+/* Reports what a walk has found. */
+static int change_report (pw_run *r, const change_walk *w, change_verdict verdict, double sine, double length,
+                          pw_error *error) {
   pw_geometry *g = &r->geometry;
   double low = r->limits.dip * fmin (g->begun, sine);
   g->crossed |= verdict == CHANGE_UNKNOWN || w->least <= r->limits.met;
@@ -215,5 +214,5 @@ int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
     return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   pw_evaluate_J (r->w);
   if (why.status != PW_OK) return pw_fail (error, why.status, "%s", why.text);
-  return dips ? change_judge (r, &w, verdict, sine, length, error) : PW_OK;
+  return dips ? change_report (r, &w, verdict, sine, length, error) : PW_OK;
 }

@@ -1,9 +1,9 @@
 /* Consistent initial conditions: positions by Gauss-Newton, then velocities by one linear solve.
  *
- * What the user gave is prescribed, and so is what the model specifies and, if it can be, the position of whatever
- * has mass; the rest moves as little as possible in the metric.  If that fails, first the velocities that the model
- * specifies are released, then its positions, then the given positions, and then everything.  A state that is
- * consistent to round-off is left alone, to the bit. */
+ * States given by the user or specified by the model are prescribed, and so are, where possible, the positions of
+ * coordinates with mass; the rest moves as little as possible in the metric.  If that fails, first the velocities
+ * specified by the model are released, then its positions, then the given positions, then everything.  A state that is
+ * consistent to round-off is left unchanged, bit for bit. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -20,9 +20,8 @@ typedef struct {
   int placed; /* 1: it has found positions */
 } initial_failure;
 
-/* By how much to scale the metric of massless coordinates so that it is 1e-6 of the least entry of the mass matrix,
- * angles in units of L, instead of the mean: bodies that have nothing to do with them may be heavy.  As far as
- * round-off allows. */
+/* Scale factor for the metric of massless coordinates: 1e-6 of the least entry of the mass matrix, angles in units
+ * of L, instead of the mean, since unrelated bodies may be heavy; limited by round-off. */
 static double initial_massless_scale (const pw_system *s) {
   double least = INFINITY, most = 0, light = 0;
   for (int j = 0; j < s->coords; j++) {
@@ -35,8 +34,8 @@ static double initial_massless_scale (const pw_system *s) {
   return light > 0 && most > 0 ? fmax (1e-6 * least, 1e-12 * most) / light : 1;
 }
 
-/* The metric, and INFINITY for what is prescribed; true: the mass matrix, where massless velocities are determined
- * by the rows. */
+/* The metric, with INFINITY for prescribed coordinates.  If `metric` is the mass matrix, the constraint equations
+ * determine massless velocities. */
 static void initial_weights (const pw_system *s, const double *metric, const unsigned char *held, double *weight) {
   double light = initial_massless_scale (s);
   for (int j = 0; j < s->coords; j++)
@@ -55,7 +54,7 @@ static int initial_positions (pw_projector *p, pw_run *r, double *q, const doubl
   return status;
 }
 
-/* At placed positions and velocities.  Repeats the linear solve once, which removes the round-off of a large first
+/* Needs up-to-date kinematics.  Repeats the linear solve once, which removes the round-off of a large first
  * correction. */
 static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_failure *failure) {
   pw_residuals now;
@@ -72,8 +71,8 @@ static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_fa
   return PW_RETRY;
 }
 
-/* One attempt from the given state, with some of it prescribed.  The velocity metric is the mass matrix where that
- * determines everything, else the position metric. */
+/* One attempt from the given state, with some states prescribed.  The velocity metric is the mass matrix if that
+ * determines all velocities, else the position metric. */
 static int initial_attempt (pw_run *r, const unsigned char *held, initial_failure *failure, pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
@@ -149,8 +148,8 @@ static void initial_report (pw_run *r, int released, const pw_residuals *before)
                                  .velocity = before->velocity };
 }
 
-/* Redundant equations make the plain attempt fail: it is repeated with an independent set, found where the state was
- * given. Off the constraints redundant equations look independent, the more so the farther off: hence the
+/* If redundant equations make the plain attempt fail, it is repeated with an independent set, selected at the given
+ * state.  Off the constraints redundant equations appear independent, increasingly with distance: hence several
  * tolerances. */
 static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure *failure, pw_error *error) {
   static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
@@ -177,7 +176,7 @@ static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure
   return status;
 }
 
-/* Given velocities of which nothing is left: the wheels allow no motion. */
+/* Reports given velocities that have vanished entirely: the wheels allow no motion. */
 static int initial_locked (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   double given = 0, left = 0;
@@ -193,15 +192,15 @@ static int initial_locked (pw_run *r, pw_error *error) {
       snprintf (text + n, sizeof text - n, "%s%s", n ? ", " : "", strcpy (before, element));
   }
   return pw_fail (error, PW_INITIAL,
-                  "model %s: the given rates would have to be removed entirely: %s allow no such motion", s->model,
+                  "model %s: the given velocities would have to be removed entirely: %s allow no such motion", s->model,
                   text);
 }
 
-/* What is prescribed, in the order tried: positions and velocities by where they are from, and the positions of
- * whatever has mass. Where positions fail, the velocities are not tried. */
+/* Sets of prescribed states, in the order tried: positions and velocities by origin, and positions of coordinates with
+ * mass.  If the positions fail, the velocities are not tried. */
 static const struct initial_way {
   unsigned char q, v;
-  enum { INITIAL_FREE, INITIAL_MASS, INITIAL_MASS_PERHAPS } mass; /* the last: where some of them may be meant or not */
+  enum { INITIAL_FREE, INITIAL_MASS, INITIAL_MASS_PERHAPS } mass; /* PERHAPS: only if some of them may be unintended */
 } initial_ways[] = {
   { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, INITIAL_MASS },
   { PW_GIVEN | PW_SPECIFIED, PW_GIVEN, INITIAL_MASS },
@@ -218,7 +217,7 @@ static const struct initial_way {
   { 0, 0, INITIAL_FREE },
 };
 
-/* The mask of a way; 0 if it makes no sense here. */
+/* The mask of a set; 0 if it does not apply here. */
 static int initial_mask (const pw_system *s, const unsigned char *held, const struct initial_way *way,
                          unsigned char *mask) {
   int n = s->coords, light = 0, heavy = 0, perhaps = 0;
@@ -238,8 +237,8 @@ static int initial_released (const pw_system *s, const unsigned char *held, cons
   return released;
 }
 
-/* Redundant equations of larger scenes (rows times coordinates) are not looked for on behalf of what the model
- * specifies: sketches of linkages, of which all is specified, fail there as a rule. */
+/* For larger scenes (rows times coordinates) redundant equations are not sought while states specified by the model are
+ * prescribed: sketches of linkages, which specify all positions, usually fail there. */
 #define INITIAL_SMALL 1e4
 
 static int initial_try (pw_run *r, const unsigned char *held, initial_failure *failure, int *released,

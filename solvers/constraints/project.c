@@ -10,10 +10,10 @@
 #include <stdlib.h>
 #include "method.h"
 
-/* In the mass matrix massless coordinates take no part in what is smallest: the rows determine them, here as in the
- * accelerations, and coordinates with mass do not move because of them.  Where the holonomic equations do not
- * determine all of them, all equations do: the change of positions is then one that the nonholonomic equations
- * allow. */
+/* With the mass matrix as metric, massless coordinates do not contribute to the norm: the constraint equations
+ * determine them, as in the accelerations, and coordinates with mass do not move because of them.  If the holonomic
+ * equations do not determine all of them, all equations are used: the change of positions then satisfies the
+ * nonholonomic ones, too. */
 static pw_saddle *project_by_mass (pw_run *r, pw_error *error) {
   pw_error none = { 0 };
   pw_saddle *k = pw_saddle_open (r->w, r->s->mass, r->s->holonomic, r->active, &none);
@@ -38,7 +38,7 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
 
 const char *const pw_metrics[] = { "mass", "identity", NULL };
 
-/* The identity metric weighs metres and radians alike, as the plain pseudo-inverse does. */
+/* The identity metric weights metres and radians equally, as the plain pseudo-inverse does. */
 int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   if (pw_run_option (r, "metric") == 0) return pw_projector_open (p, r, NULL, NULL, error);
@@ -57,11 +57,11 @@ void pw_projector_close (pw_projector *p) {
   *p = (pw_projector){ 0 };
 }
 
-/* Scaled residuals: round-off of a row's few terms, and where it may end. */
+/* Scaled residuals: round-off of a row's few terms; accepted if the iteration stalls. */
 #define PROJECT_GOOD (4 * DBL_EPSILON)
 #define PROJECT_ENOUGH (64 * DBL_EPSILON)
 
-/* Redundant equations follow from the others but for round-off; a row that does not contradicts them.  It takes
+/* Redundant equations follow from the others to round-off; one that does not contradicts them, and its number goes to
  * *row. */
 static int project_others (pw_projector *p, const pw_system *s, double follows, const double *g, const double *size,
                            int *row) {
@@ -77,10 +77,10 @@ static int project_others (pw_projector *p, const pw_system *s, double follows, 
   return PW_RETRY;
 }
 
-/* As pw_project_positions, but for J. */
+/* pw_project_positions without the final evaluation of J. */
 static int project_positions (pw_projector *p, pw_run *r, double t, double *q, const double *v, int *row,
                               double *worst) {
-  const double slight = 1e-6; /* a correction that leaves the sizes as they are */
+  const double slight = 1e-6; /* corrections below this leave the sizes of the terms unchanged */
   const int most = 30;
   const pw_system *s = r->s;
   pw_residuals now = { 0 };
@@ -137,8 +137,8 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
   return pw_update_velocities (r->w, v);
 }
 
-/* 1 if the placed velocities need no correction, with J evaluated: they obey J v = eta to round-off.  Near a
- * singular configuration that does not say enough, and nor does it of redundant equations. */
+/* 1 if the velocities satisfy J v = eta to round-off and need no correction; J must be evaluated.  Near a singular
+ * configuration, or with redundant equations, that is not sufficient. */
 static int project_is_good (const pw_projector *p, pw_run *r) {
   r->known.velocity = NAN;
   if (p->own_velocity || p->active || r->near) return 0;

@@ -1,13 +1,14 @@
-/* Redundant equations: an independent set is selected, the others are watched.
+/* Redundant equations: an independent set is selected, the others are monitored.
  *
  * A redundant equation is J_i = sum_a c_ia J_a over active equations a.  Its coefficients come from the saddle
  * point: with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum c_ia e_a span the
  * multipliers that pull on nothing, so the least-norm ones are lambda + sum z_i n_i with z from a small
  * least-squares problem.
  *
- * The rank is found at consistent configurations off the singular set: at the start and at two configurations a
- * short motion away. In motion a set may turn bad where another one is good: then it is selected again. (Garcia de
- * Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass matrix.) */
+ * The rank is found at consistent configurations off the singular set: at the initial one and at two configurations
+ * a short motion away.  During the motion a set may become ill-conditioned where another one is not: then another is
+ * selected. (Garcia de Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass
+ * matrix.) */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -38,7 +39,7 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm) {
     }
 }
 
-/* Takes the kept rows' directions out of a row; its norm afterwards. */
+/* Orthogonalises a row against the kept ones; returns its norm afterwards. */
 static double rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n) {
   double norm = 0;
   for (int k = 0; k < rank; k++) {
@@ -51,7 +52,7 @@ static double rank_orthogonalise (double *row, const double *rows, const int *ke
   return sqrt (norm);
 }
 
-/* The next row to keep of rows first .. end - 1: the first one that has about the norm of the largest left. */
+/* The next row to keep of rows first .. end - 1: the first whose norm is at least 0.9 of the largest. */
 static int rank_pivot (const double *norm, const unsigned char *active, int first, int end) {
   double most = 0;
   for (int i = first; i < end; i++)
@@ -115,7 +116,7 @@ int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active) {
   return rank;
 }
 
-/* ---- Choosing ---- */
+/* ---- Selection ---- */
 
 typedef struct {
   double *rows, *q, *motion;
@@ -172,8 +173,9 @@ static int rank_nearby (pw_run *r, rank_search *x, int rank, int number) {
   return away;
 }
 
-/* The run's mask and the equations that it leaves out; work is shared only if one of these moves. */
-static void rank_take (pw_run *r) {
+/* Lists the equations that the run's mask omits; work needs least-norm multipliers only if one of these is
+ * rheonomic. */
+static void rank_list_redundant (pw_run *r) {
   const pw_system *s = r->s;
   double *shared = (double *)(void *)r->redundant_row - s->rows;
   r->redundant = 0;
@@ -194,7 +196,7 @@ static int rank_store (pw_run *r, const unsigned char *active, int redundant) {
   r->coefficient = (double *)(void *)r->rank_memory;
   r->redundant_row = (int *)(void *)(r->coefficient + numbers);
   r->active = memcpy (r->redundant_row + k, active, m);
-  rank_take (r);
+  rank_list_redundant (r);
   return PW_OK;
 }
 
@@ -225,7 +227,7 @@ int pw_rank_open (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* Constraints that have drifted are less dependent than they should be: as many rows are kept as before. */
+/* Drift reduces the dependence of equations: the rank is kept. */
 int pw_rank_reselect (pw_run *r) {
   const pw_system *s = r->s;
   rank_search x;
@@ -234,7 +236,7 @@ int pw_rank_reselect (pw_run *r) {
   for (int i = 0; i < s->holonomic; i++) holonomic += r->active[i];
   int rank = rank_basis_of (r->w, r->limits.independent, holonomic, all, x.rows, x.kept, x.active);
   int other = rank == all && memcmp (x.active, r->active, (size_t)s->rows) != 0;
-  if (other) memcpy (r->redundant_row + r->redundant, x.active, (size_t)s->rows), rank_take (r);
+  if (other) memcpy (r->redundant_row + r->redundant, x.active, (size_t)s->rows), rank_list_redundant (r);
   free (x.memory);
   return other;
 }
@@ -246,7 +248,7 @@ void pw_rank_serialise (pw_run *r, pw_archive *a) {
   pw_archive_bytes (a, mask, (size_t)r->s->rows);
   for (int i = 0; i < r->s->rows; i++) found += !mask[i];
   if (found == most)
-    rank_take (r);
+    rank_list_redundant (r);
   else
     a->failed = 1;
 }
@@ -258,7 +260,7 @@ void pw_rank_close (pw_run *r) {
   r->redundant = 0;
 }
 
-/* ---- Sharing ---- */
+/* ---- Least-norm multipliers ---- */
 
 /* f = J_i^T */
 static void rank_row (const pw_workspace *w, int row, double *f) {
@@ -313,7 +315,7 @@ static void rank_add_row (const pw_system *s, const pw_element_batch *k, int n, 
   }
 }
 
-/* A sum of the redundant equations, irregular so that nothing cancels, takes one solve however many they are. */
+/* An irregular sum of the redundant equations, in which nothing cancels, needs one solve for any number of them. */
 double pw_rank_conditioning (pw_run *r) {
   const pw_system *s = r->s;
   int m = s->rows, k = r->redundant;

@@ -1,4 +1,4 @@
-/* Which constraint equations are independent, and what the others follow from. */
+/* Independent constraint equations, and the redundant ones as combinations of them. */
 #ifndef PW_RANK_H
 #define PW_RANK_H
 
@@ -22,18 +22,18 @@ double pw_rank_unit (const pw_system *s, int j);
  * independent ones, in order where they are about equal.  Returns the rank, or PW_RESOURCE. */
 int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active);
 
-/* Selects r->active for the run at its consistent start: rows dependent there and at two configurations nearby.
- * Leaves it NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the start is a singular
- * configuration). */
+/* Selects r->active for the run at its consistent initial state: rows dependent there and at two configurations nearby.
+ * Leaves it NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial
+ * configuration is singular). */
 int pw_rank_open (struct pw_run *r, pw_error *error);
 
 /* Selects r->active again at the configuration J is evaluated at, if there is another set of the same rank: 1; 0 if
  * there is none.  The run's saddle and method then still have the old one.  Errors: PW_RESOURCE. */
 int pw_rank_reselect (struct pw_run *r);
 
-/* How well the active equations hold the others: 1 over the largest coefficient of one of them, rows of length 1, in
- * an irregular sum of the redundant ones.  What the active equations are off by, the others are off by that over
- * this.  J must be evaluated and the run's saddle factorised at the configuration. */
+/* Conditioning of the active equations: 1 over their largest coefficient, rows of length 1, in an irregular sum of
+ * the redundant ones.  Residuals of the redundant equations are those of the active ones divided by this.  J must be
+ * evaluated and the run's saddle factorised at the configuration. */
 double pw_rank_conditioning (struct pw_run *r);
 
 /* Saves or loads r->active, which has as many redundant equations as before.  Saddle and method then still have the

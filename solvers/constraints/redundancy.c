@@ -15,8 +15,8 @@ static size_t redundancy_name_row (const pw_system *s, int row, int whole, char 
   return n < size ? n : size - 1;
 }
 
-/* What two rows of equal reactions have in common: "lateral ", "" if there is no word for it. */
-static const char *redundancy_word (const char *a, const char *b) {
+/* The common direction of two rows with the same reaction: "lateral ", or "". */
+static const char *redundancy_direction (const char *a, const char *b) {
   static const char *const word[][2] = {
     { "N", "lateral " }, { "T", "rolling " }, { "Fx", "x " }, { "Fy", "y " }, { "M", "angular " }
   };
@@ -27,12 +27,12 @@ static const char *redundancy_word (const char *a, const char *b) {
 }
 
 /* "wheels left and right: the same lateral constraint" */
-static void redundancy_say_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
+static void redundancy_describe_pair (const pw_system *s, int one, int two, char *buffer, size_t size) {
   char a[120], b[120], x[120], y[120];
   pw_system_row_name (s, one, a, sizeof a);
   pw_system_row_name (s, two, b, sizeof b);
-  const char *word =
-      redundancy_word (pw_system_reaction_name (s, one, x, sizeof x), pw_system_reaction_name (s, two, y, sizeof y));
+  const char *word = redundancy_direction (pw_system_reaction_name (s, one, x, sizeof x),
+                                           pw_system_reaction_name (s, two, y, sizeof y));
   size_t kind = strcspn (a, " ");
   if (strcmp (a, b) == 0)
     snprintf (buffer, size, "%s: %s and %s are the same constraint", a, x, y);
@@ -65,6 +65,6 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
     if (elements++ < MOST) n = redundancy_name_row (s, a, 0, buffer, size, n);
   }
   if (partners == 0 && n + 1 < size) snprintf (buffer + n, size - n, " constrains nothing here");
-  if (partners == 1) redundancy_say_pair (s, last, row, buffer, size);
+  if (partners == 1) redundancy_describe_pair (s, last, row, buffer, size);
   return buffer;
 }

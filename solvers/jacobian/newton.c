@@ -32,13 +32,13 @@ static void newton_gather (const pw_system *s, const pw_element_batch *k, const 
     }
 }
 
-/* Where a constraint row goes. */
+/* Row of the matrix for a constraint equation. */
 static inline int newton_row (const pw_put *put, int row) {
   return put->map ? put->map[row] : row;
 }
 
 /* A pin's two rows +-r1 +-r2 + ... = 0 are functions of angles beyond the unit matrix in a body's x and y columns. */
-static int newton_turns (const pw_kind *kind) {
+static int newton_is_pin (const pw_kind *kind) {
   return kind == &pw_kind_pin;
 }
 
@@ -60,7 +60,7 @@ void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block
     if (!t->recording) pw_evaluate_block (w, k, block, n->block);
     const double *value = n->block;
     double factor = of_rows && k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
-    int angles = constraint && newton_turns (k->kind);
+    int angles = constraint && newton_is_pin (k->kind);
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < rows; r++) {
         if (angles && !of_rows && newton_is_length (k->kind, r)) {
@@ -79,14 +79,14 @@ void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block
   }
 }
 
-/* Calls over all entries of J: both directions share it. */
+/* Adds all entries of J, or of its transpose. */
 static void newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put, int transposed) {
   const pw_system *s = w->s;
   for (const pw_element_batch *k = w->batch; k < w->batch + s->batches && k->kind->rows > 0 && k->row < put->rows;
        k++) {
     const double *value = k->J;
     double factor = k->row >= s->holonomic ? put->factor_nonholonomic : put->factor;
-    int turns = newton_turns (k->kind);
+    int turns = newton_is_pin (k->kind);
     for (int e = 0; e < k->b.count; e++)
       for (int r = 0; r < k->kind->rows; r++) {
         int i = newton_row (put, k->row + e * k->kind->rows + r);

@@ -1,4 +1,5 @@
-/* The second-order blocks of a scene, put into a sparse matrix: what Newton matrices of implicit methods share. */
+/* Assembles the second-order blocks of a scene into a sparse matrix; shared by the Newton matrices of implicit
+ * methods. */
 #ifndef PW_NEWTON_H
 #define PW_NEWTON_H
 

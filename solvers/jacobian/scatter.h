@@ -1,5 +1,5 @@
 /* A sparse matrix filled again and again by the same sequence of contributions: the sequence is recorded once, laid out
- * in compressed columns, and from then on each contribution finds its place by its number. */
+ * in compressed columns, and from then on the number of a contribution gives its position. */
 #ifndef PW_SCATTER_H
 #define PW_SCATTER_H
 
@@ -11,7 +11,7 @@ typedef struct {
   size_t count, room; /* contributions, and room for them while recording */
   int *row, *col;     /* while recording */
   size_t *place;      /* of each contribution in the values */
-  size_t next;        /* contribution to come */
+  size_t next;        /* number of the next contribution */
   double *value;      /* while filling */
   int failed;         /* out of memory while recording */
 } pw_scatter_map;
@@ -21,7 +21,7 @@ void pw_scatter_record (pw_scatter_map *t);
 int pw_scatter_lay_out (pw_scatter_map *t, int n, int64_t **colptr, int64_t **rowind);
 void pw_scatter_close (pw_scatter_map *t);
 
-/* Begins a filling of the values, which the caller has zeroed. */
+/* Begins filling the values, which the caller has zeroed. */
 static inline void pw_scatter_begin (pw_scatter_map *t, double *value) {
   t->next = 0;
   t->value = value;

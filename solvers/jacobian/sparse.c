@@ -14,15 +14,15 @@ void pw_sparse_close (pw_sparse *k) {
   if (k->order) klu_l_free_symbolic (&k->order, &k->common);
 }
 
-/* With the pivots there are, if they are still good. */
-static int sparse_again (pw_sparse *k, double *value) {
+/* Refactorises with the present pivots, if they are still good. */
+static int sparse_refactor (pw_sparse *k, double *value) {
   if (k->factors == NULL) return 0;
   if (!klu_l_refactor (k->colptr, k->rowind, value, k->order, k->factors, &k->common)) return 0;
   return klu_l_rcond (k->order, k->factors, &k->common) && k->common.rcond > k->least;
 }
 
 int pw_sparse_factor (pw_sparse *k, double *value) {
-  if (sparse_again (k, value)) return PW_OK;
+  if (sparse_refactor (k, value)) return PW_OK;
   pw_sparse_forget (k);
   k->factors = klu_l_factor (k->colptr, k->rowind, value, k->order, &k->common);
   if (k->factors == NULL) return k->common.status == KLU_OUT_OF_MEMORY ? PW_RESOURCE : PW_RETRY;

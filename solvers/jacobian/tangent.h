@@ -1,4 +1,4 @@
-/* The equations of motion in the rows in use, differentiated: what Newton matrices of implicit methods have in common.
+/* Derivatives of the equations of motion with the active rows, shared by the Newton matrices of implicit methods.
  *
  *   kinematics      q' - v + D G^T mu                                       by (q, v, mu)
  *   momentum        M a + J^T lambda - f                                    by (q, v, a, lambda)
@@ -16,7 +16,7 @@ typedef struct {
   int rows, holonomic; /* in use */
   int *map;            /* all equations: number among those in use, or -1; NULL: all are in use */
   const int *row;      /* rows: its number among all */
-  double *lambda, *mu; /* all equations: values of the unknowns last looked at */
+  double *lambda, *mu; /* all equations: values of the unknowns last expanded */
   pw_newton newton;
   pw_scatter_map tape;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
@@ -25,25 +25,25 @@ typedef struct {
 int pw_tangent_open (pw_tangent *x, pw_run *r); /* PW_OK or PW_RESOURCE */
 void pw_tangent_close (pw_tangent *x);
 
-/* Values of all equations from those of the first `count` in use; `all` is there for them. */
+/* Values of all equations from those of the first `count` active ones; `all` is scratch for the result. */
 const double *pw_tangent_expand (const pw_tangent *x, const double *used, int count, double *all);
-/* From values of all equations those of the first `count` in use. */
+/* Values of the first `count` active equations from those of all. */
 void pw_tangent_compress (const pw_tangent *x, const double *all, int count, double *used);
 
-/* Where the parts go.  a may share its columns with v: its part comes times `of_a`, that of q' times `of_q` in those
- * of q, that of lambda and mu times `of_lambda`. */
+/* Positions of the parts in the matrix. a may share its columns with v: derivatives by a are multiplied by `of_a`,
+ * those by q' by `of_q` in the columns of q, those by lambda and mu by `of_lambda`. */
 typedef struct {
   int momentum, constraint; /* first row of each; that of the kinematics is 0 */
   int q, v, a, lambda, mu;  /* first column of each */
   double of_q, of_a, of_lambda;
 } pw_tangent_update;
 
-/* Puts these rows at the placed configuration with J evaluated; lambda and mu (NULL: there are none): all equations,
+/* Adds these rows at the current configuration with J evaluated; lambda and mu (NULL: there are none): all equations,
  * D, v and a: coords. */
 void pw_tangent_momentum (pw_tangent *x, const pw_tangent_update *to, const double *lambda);
 void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const double *mu, const double *D);
 void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_update *to, const double *v, const double *a);
-/* Holonomic rows times a factor: 0 leaves their place to the positions, which begin at a row of their choice. */
+/* Holonomic rows are multiplied by a factor: 0 leaves their rows to pw_tangent_positions, which starts at `row`. */
 void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const double *v, double of_holonomic);
 void pw_tangent_positions (pw_tangent *x, const pw_tangent_update *to, int row);
 

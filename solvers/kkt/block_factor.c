@@ -3,7 +3,7 @@
  *   for each body:      K_ab += J_a W^-1 J_b^T
  *   for each column j:  D = K_jj,  L_pj = K_pj D^-1,  K_pq -= L_pj K_qj^T  for all p >= q below j
  *
- * Right-looking, every place known in advance.  Of D its own factors are kept. */
+ * Right-looking, with all positions known in advance.  D is stored as its factors. */
 #include <string.h>
 #include "block_parts.h"
 #include "unroll.h"
@@ -18,7 +18,7 @@ PW_INLINE void block_couple (int kb, int ka, int width, double *K, const block_r
   if (ka == 2 && kb == 2) K[3] += block_product (width, R[1], B + step);
 }
 
-/* A contribution of ka rows with itself and with those that come after it; coupling: of this one and the next. */
+/* Products of a contribution of ka rows with itself and with those after it; coupling: where the latter go. */
 PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const pw_body_block *p,
                                  const pw_contribution *a, const int *coupling) {
   const double *A = a->J, *w = l->inverse + p->j;
@@ -33,8 +33,8 @@ PW_INLINE void block_contribute (int ka, int width, const pw_block_ldl *l, const
     BLOCK_SIZE (b->size, block_couple, ka, width, l->value + *coupling++, R, b->J, b->step);
 }
 
-/* A body that is not condensed: its mass, its columns of J, and what later equations would have on the diagonal if
- * it were. */
+/* An uncondensed body: its mass, its columns of J, and the diagonal that later equations would have if it were
+ * condensed. */
 static void block_keep (const pw_block_ldl *l, const pw_body_block *p) {
   const pw_contribution *own = l->contribution + p[1].first - 2;
   const double *w = l->inverse + p->j;

@@ -2,11 +2,11 @@
  * assembled body by body and factorised column by column (Duff, Erisman & Reid 2017, Direct Methods for Sparse
  * Matrices, chapters 5, 10 and 12).
  *
- * A node is a constraint equation, or two of one element.  A body block is what meets at a body (or an internal
- * coordinate): the contributions of the nodes that touch it, each being the node's columns there.  Any two
+ * A node is a constraint equation, or two of one element.  A body block collects the contributions of the nodes
+ * that touch a body (or an internal coordinate), each being the node's columns there.  Any two
  * contributions of a body block couple their nodes.
  *
- * Where very many nodes meet at a body, S would become dense.  Then the body is not condensed: its accelerations a_k
+ * Many nodes meeting at one body would make S dense.  Such a body is not condensed: its accelerations a_k
  * are unknowns too,
  *
  *     [ S    J_k ] [ lambda ]   [ J W^-1 f - gamma ]
@@ -23,7 +23,7 @@
  *   L = K D_c^-1,   D_(c+1) = K_(c+1)(c+1) - L K^T,   y_(c+1) -= L y_c
  *   backwards:   y_c = D_c^-1 (y_c - K^T y_(c+1)),   K^T y = +-m y + i (b . y) a
  *
- * where D and y are carried from pin to pin, and the factors of D alone are kept. */
+ * where D and y are passed from pin to pin, and only the factors of D are stored. */
 #ifndef PW_BLOCK_LDL_H
 #define PW_BLOCK_LDL_H
 
@@ -32,11 +32,11 @@
 enum { PW_BLOCK_NODE = 2, PW_BLOCK_RANKS = 3 }; /* most unknowns in a node; ranks */
 
 /* A node, in the order of elimination.  Its values follow one another: the lower triangle of the diagonal block by
- * rows, what the entries on the diagonal were before anything was eliminated, then the blocks below, each by rows. */
+ * rows, the diagonal entries before elimination, then the blocks below, each by rows. */
 typedef struct {
   int at;                 /* its values */
   int y;                  /* its first unknown in the right-hand side */
-  int first;              /* its rows below: from here to `first` of the next column */
+  int first;              /* its first row below; ends at `first` of the next column */
   unsigned char size;     /* unknowns */
   unsigned char in_chain; /* 1: within a chain, where it has no values */
 } pw_column;
@@ -55,13 +55,13 @@ typedef struct {
   int first;           /* its contributions in the order of their columns: to `first` of the next block */
   int coupling;        /* for each contribution a, for the contributions b after it: where K_ba is in the values */
   unsigned char width; /* columns: 3, or 1 of an internal coordinate */
-  unsigned char uncondensed; /* 1: its own two nodes are the last contributions; couplings are those with them alone */
+  unsigned char uncondensed; /* 1: its two nodes are the last contributions; couplings only with these */
 } pw_body_block;
 
-/* Places are those of the first body; the others' follow at equal distances. */
+/* Positions are those of the first body; the others follow at equal strides. */
 typedef struct {
   int column;                 /* its first pin's; those of the others follow */
-  int bodies;                 /* as many columns are eliminated here, the next one receives their last update */
+  int bodies;                 /* also the number of columns eliminated here; the next one receives their last update */
   const double *A, *B;        /* J of the first and of the second pin in the body's columns */
   int step;                   /* from row to row of J */
   int y;                      /* of the first pin in the right-hand side */
@@ -82,31 +82,31 @@ typedef struct {
   pw_body_block *body;   /* bodies + 1: the last one ends the ranges */
   pw_contribution *contribution;
   int *coupling;
-  pw_chain *chain;      /* chains + 1: the last one begins nowhere; their bodies have no block */
+  pw_chain *chain;      /* chains + 1: the last one is a sentinel; their bodies have no block */
   double *chain_factor; /* factors of D in the chains' columns */
   int bodies, chains;
   double pivot; /* smallest pivot of the last factorisation, relative to the diagonal entry it came from */
   int row;      /* its position in the right-hand side */
-  double least; /* a factorisation ends at the first pivot that is not larger: 0, but while it is planned */
+  double least; /* factorisation ends at the first pivot not above this: 0, except while planning */
   char *pattern, *memory;
 } pw_block_ldl;
 
 /* ---- Planning (block_order.c) ---- */
 
-/* nodes: how many; size: unknowns of each; y: where they are in the right-hand side; rank: those of a higher one
- * come later; pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the
- * diagonal not needed. The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy,
- * Davis & Duff 1996). NULL if memory is out. */
+/* nodes: their number; size: unknowns of each; y: their position in the right-hand side; rank: higher ones are
+ * eliminated later; pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times,
+ * the diagonal not needed.  The order is that of the nodes if it fills in no more than minimum degree does (AMD:
+ * Amestoy, Davis & Duff 1996).  NULL if out of memory. */
 pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l);
 
-/* Lays out the values.  PW_OK, or PW_RESOURCE if memory is out or there are 2^31 values or more. */
+/* Lays out the values.  PW_OK, or PW_RESOURCE if out of memory or there are 2^31 values or more. */
 int pw_block_lay_out (pw_block_ldl *l);
 
-/* Where the block of columns p > q is, rows those of p. */
+/* Position of the block of columns p > q, with the rows of p. */
 int pw_block_find (const pw_block_ldl *l, int p, int q);
 
-/* Values of a diagonal block: its lower triangle, and what the diagonal was. */
+/* Values of a diagonal block: its lower triangle, and the original diagonal. */
 static inline int pw_block_diagonal (int size) {
   return size * (size + 3) / 2;
 }
@@ -119,8 +119,8 @@ void pw_block_factor (pw_block_ldl *l);
 /* y, which holds gamma, becomes lambda; a = W^-1 (f - J^T lambda).  f and a may be the same; f NULL: zero. */
 void pw_block_solve (const pw_block_ldl *l, const double *f, double *y, double *a);
 
-/* The same for a chain, between the rest: elimination, which stops at a pivot that is not positive; the right-hand side
- * forwards; and backwards, with accelerations. */
+/* The same for a chain, called in the order of its columns: elimination, which stops at a pivot that is not
+ * positive; the right-hand side forwards; and backwards, with accelerations. */
 void pw_chain_factor (pw_block_ldl *l, const pw_chain *c);
 void pw_chain_forward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y);
 void pw_chain_backward (const pw_block_ldl *l, const pw_chain *c, const double *f, double *y, double *a);

@@ -86,7 +86,7 @@ static int order_by_degree (int nodes, const int *rank, long pairs, const int *p
   return status;
 }
 
-/* What the symbolic factorisation works with: the elimination tree as lists of children, and marks. */
+/* Scratch data of the symbolic factorisation: the elimination tree as lists of children, and marks. */
 typedef struct {
   int *mark, *child, *sibling;
   size_t room; /* of L's list */
@@ -106,7 +106,7 @@ static int order_tree_open (order_tree *t, int nodes, const order_lists *K, orde
   return PW_OK;
 }
 
-/* Room for the rows of a column, each perhaps several times. */
+/* Makes room for the rows of a column, including repetitions. */
 static int order_tree_grow (order_tree *t, int j, const order_lists *K, order_lists *L) {
   size_t most = (size_t)L->first[j] + (size_t)(K->first[j + 1] - K->first[j]);
   for (int c = t->child[j]; c >= 0; c = t->sibling[c]) most += (size_t)(L->first[c + 1] - L->first[c]);
@@ -157,7 +157,7 @@ static int order_try (int nodes, const int *rank, long pairs, const int *pair, i
   return status;
 }
 
-/* The better one of both orders. */
+/* The better of the two orders. */
 static int order_plan (int nodes, const int *rank, long pairs, const int *pair, int *order, int *place,
                        order_lists *L) {
   order_lists natural = { NULL, NULL };
@@ -190,7 +190,7 @@ int pw_block_find (const pw_block_ldl *l, int p, int q) {
   return at;
 }
 
-/* Where the blocks are.  Returns PW_RESOURCE if there are too many values. */
+/* Assigns the positions of the blocks.  Returns PW_RESOURCE if there are too many values. */
 static int order_place_columns (pw_block_ldl *l) {
   size_t at = 0;
   for (int j = 0; j < l->nodes; j++) {
@@ -234,7 +234,7 @@ static void order_place_targets (pw_block_ldl *l) {
   }
 }
 
-static int order_take (pw_block_ldl *l, const int *size, const int *y, const int *order, const order_lists *L) {
+static int order_carve (pw_block_ldl *l, const int *size, const int *y, const int *order, const order_lists *L) {
   size_t n = (size_t)l->nodes, below = (size_t)L->first[l->nodes], targets = order_count_targets (l->nodes, L);
   pw_layout lay = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
@@ -268,7 +268,7 @@ pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int
   int status = l && order && l->place ? order_plan (nodes, rank, pairs, pair, order, l->place, &L) : PW_RESOURCE;
   if (status == PW_OK) {
     l->nodes = nodes;
-    status = order_take (l, size, y, order, &L);
+    status = order_carve (l, size, y, order, &L);
   }
   order_lists_close (&L);
   free (order);

@@ -26,10 +26,9 @@ typedef struct {
   double xx, xy, yx, yy;
 } block_square;
 
-/* The smallest pivot relative to its diagonal entry, without dividing as long as it stays the smallest; what is not
- * a number is taken for smaller, and so is 0 out of 0.  `was` is not negative, or else a pivot below 0 could make up
- * for the one before it; that of an uncondensed body is, and does not count. */
-static inline void block_judge (pw_block_ldl *l, double pivot, double was, int y) {
+/* Updates the smallest pivot relative to its diagonal entry `was`, dividing only if it is smaller; NaN and 0 / 0
+ * count as smaller.  `was` is negative only for uncondensed bodies, which do not count. */
+static inline void block_track_pivot (pw_block_ldl *l, double pivot, double was, int y) {
   if (pivot > l->pivot * was || was < 0) return;
   l->pivot = pivot / was;
   l->row = y;
@@ -38,10 +37,10 @@ static inline void block_judge (pw_block_ldl *l, double pivot, double was, int y
 /* A diagonal block L D L^T in place of its lower triangle: 1 / d_1, l, 1 / d_2. */
 static inline void block_pivot (int k, double *D, pw_block_ldl *l, int y) {
   double a = D[0], b = D[1], minor = k == 2 ? a * D[2] - b * b : 0;
-  block_judge (l, a, D[k == 2 ? 3 : 1], y);
+  block_track_pivot (l, a, D[k == 2 ? 3 : 1], y);
   D[0] = 1 / a;
   if (k == 1) return;
-  block_judge (l, minor, fabs (a) * D[4], y + 1);
+  block_track_pivot (l, minor, fabs (a) * D[4], y + 1);
   D[1] = b * D[0], D[2] = a / minor;
 }
 

@@ -29,8 +29,8 @@ static void condense_element (pw_plan *c, const pw_element_batch *b, int e, int 
   c->nodes++;
 }
 
-/* 1 for an equation that stands for itself: not left out, not a component's, and not one that only prescribed
- * coordinates enter, which says nothing of the others. */
+/* 1 for an equation that becomes part of a node: active, not in a massless component, and not a function of prescribed
+ * coordinates alone. */
 static int condense_takes_part (const pw_plan *c, const pw_element_batch *b, int e, int r,
                                 const unsigned char *active) {
   const double *J = b->J + (e * b->kind->rows + r) * b->b.cols, *inverse = c->k->inverse;
@@ -57,7 +57,7 @@ static void condense_elements (pw_plan *c, int rows, const unsigned char *active
       }
 }
 
-/* The rows of a component that are not pivots; a multiplier of one that touches nothing stays 0. */
+/* Adds the rows of components that are not pivots; the multiplier of a row without contributions stays 0. */
 static void condense_components (pw_plan *c) {
   int schurs = 0;
   for (int n = 0; n < c->k->massless.components; n++) {
@@ -110,7 +110,7 @@ static void condense_fill_block (const pw_plan *c, pw_dense_block *b, const int 
   }
 }
 
-/* Coordinates that are all without weight need no block: their accelerations are found elsewhere. */
+/* Groups without any weight need no block: massless.c computes their accelerations. */
 static void condense_dense (const pw_plan *c, const double *weight, int unknowns, pw_dense_block *block) {
   pw_dense *dense = c->k->dense;
   int place[PW_DENSE], y = 0;
@@ -130,7 +130,7 @@ static void condense_dense (const pw_plan *c, const double *weight, int unknowns
 
 /* ---- */
 
-/* A body at which more nodes meet is not condensed; its weights must be finite. */
+/* A body at which more nodes than this meet is not condensed, if its weights are finite. */
 enum { CONDENSE_MEET = 8 };
 
 static int condense_is_crowded (const pw_plan *c, int b) {
@@ -158,7 +158,7 @@ static int condense_uncondensed (pw_plan *c) {
   return PW_OK;
 }
 
-/* The rows that are not simply rows of the right-hand side; nodes come in the order of their rows. */
+/* Lists inactive rows and Schur rows; nodes are in the order of their rows. */
 static void condense_fill_rows (pw_plan *c, int rows) {
   struct pw_saddle *k = c->k;
   int schurs = 0, inactives = 0, n = 0;
@@ -172,7 +172,7 @@ static void condense_fill_rows (pw_plan *c, int rows) {
       k->schur[schurs++] = (pw_schur_row){ c->node[n].y, c->node[n].gamma, c->node[n].lambda };
 }
 
-static pw_dense_block *condense_take (const pw_plan *c, pw_layout *l, int is_dense) {
+static pw_dense_block *condense_carve (const pw_plan *c, pw_layout *l, int is_dense) {
   struct pw_saddle *k = c->k;
   k->force = pw_take (l, k->massless.components ? (size_t)k->s->coords + 3 : 0, sizeof *k->force);
   k->y = pw_take (l, k->more ? (size_t)(k->s->rows + k->more) : 0, sizeof *k->y);
@@ -195,11 +195,11 @@ static int condense_lay_out (pw_plan *c, const double *weight, int rows) {
   if (!is_dense && condense_uncondensed (c) != PW_OK) return PW_RESOURCE;
   k->more = k->schurs + 3 * c->uncondenseds;
   pw_layout l = { NULL, 0 };
-  condense_take (c, &l, is_dense);
+  condense_carve (c, &l, is_dense);
   k->memory = malloc (l.used + 1);
   if (k->memory == NULL) return PW_RESOURCE;
   l = (pw_layout){ k->memory, 0 };
-  pw_dense_block *block = condense_take (c, &l, is_dense);
+  pw_dense_block *block = condense_carve (c, &l, is_dense);
   condense_fill_rows (c, rows);
   if (!is_dense) return pw_condense_block (c);
   condense_dense (c, weight, unknowns, block);

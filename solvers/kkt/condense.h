@@ -1,4 +1,4 @@
-/* How a scene's constraint equations are condensed: what saddle.c executes and condense*.c plan.
+/* Condensation of a scene's constraint equations, planned by condense*.c and executed by saddle.c.
  *
  * Equations are grouped into nodes of 1 or 2 of one element; a node contributes to each body or internal coordinate
  * with weight that it touches.  Two contributions to the same one make a block of S = J W^-1 J^T. */
@@ -24,19 +24,19 @@ struct pw_saddle {
   double *force;       /* coords: forces changed by `massless` */
   double *y;           /* s->rows and `more`: gamma and lambda where there are more unknowns than rows */
   int more;            /* Schur rows, and 3 for each uncondensed body */
-  pw_dense *dense;     /* a scene of few equations, */
-  pw_block_ldl *block; /* or one of many */
+  pw_dense *dense;     /* few equations; or NULL */
+  pw_block_ldl *block; /* many equations; or NULL */
   pw_schur_row *schur;
   int schurs;
-  int *inactive; /* rows that take no part */
+  int *inactive; /* rows that are not enforced */
   int inactives;
   double pivot; /* squared, of `massless` and of `block` when last factorised */
   int pivot_row;
-  double guard; /* squared: the least that is good */
+  double guard; /* squared: the least regular pivot */
   char *memory;
 };
 
-/* Plans everything but `massless`, which is there.  Errors: PW_RESOURCE. */
+/* Plans everything but `massless`, which must be open.  Errors: PW_RESOURCE. */
 int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsigned char *active);
 
 /* ---- Planning ---- */

@@ -134,7 +134,7 @@ static int condense_open (pw_plan *c) {
   return status;
 }
 
-/* The first node before the uncondensed bodies with a pivot of nearly nothing, or -1. */
+/* The first node before the uncondensed bodies with a nearly vanishing pivot, or -1. */
 static int condense_find_dependent (const pw_plan *c) {
   const double follows = 1e-8; /* squared sine */
   pw_block_ldl *l = c->k->block;
@@ -148,8 +148,8 @@ static int condense_find_dependent (const pw_plan *c) {
 }
 
 /* Before the uncondensed bodies, an equation may follow from others: two legs of a platform that stands on the
- * ground.  Such equations, as the present configuration shows them, come after the bodies, one by one; if they are
- * many, all equations that touch these bodies do, for what is left touches none. */
+ * ground.  Such equations, found at the present configuration, are moved after the bodies, one by one; if they are
+ * many, all equations that touch these bodies are moved. */
 int pw_condense_block (pw_plan *c) {
   const int most = 12;
   for (int attempt = 0;; attempt++) {

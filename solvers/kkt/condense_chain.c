@@ -2,8 +2,8 @@
 #include <stdlib.h>
 #include "condense.h"
 
-/* What is between a column and the next one: how much adds to their block of the matrix, bodies and columns eliminated
- * before, and a body that is alone in that, if it can be in a chain. */
+/* The block of a column and the next one: the number of bodies and eliminated columns that add to it, and the body, if
+ * it can be in a chain. */
 typedef struct {
   int sources;
   pw_chain link;
@@ -29,7 +29,7 @@ static int chain_link (const pw_plan *c, const pw_block_ldl *l, int body, pw_cha
   return column;
 }
 
-/* Adds the body after if its places follow at the same distances. */
+/* Appends the next body if its positions continue at the same strides. */
 static int chain_add (pw_chain *chain, const pw_chain *last, const pw_chain *link) {
   int next_J = (int)(link->A - last->A), next_j = link->j - last->j;
   if (link->B - last->B != next_J || link->next_y != chain->next_y) return 0;
@@ -60,7 +60,7 @@ static void chain_join (pw_plan *c, pw_block_ldl *l, const chain_between *betwee
   }
 }
 
-/* Counts what columns eliminated earlier leave between a column and the next one: both are below them. */
+/* Counts fill-in between a column and the next one from columns eliminated earlier, which have both below them. */
 static void chain_fill (const pw_block_ldl *l, chain_between *between) {
   for (int p = 0; p < l->nodes; p++)
     for (int i = l->column[p].first + 1; i < l->column[p + 1].first; i++)

@@ -59,7 +59,7 @@ PW_INLINE void dense_accelerate (const pw_dense_block *p, const double *f, const
 
 /* ---- L D L^T ---- */
 
-/* c = what is left of row i in the first m columns, L = its entries there. */
+/* c = the remainder of row i in the first m columns, L = its entries there. */
 PW_INLINE void dense_row (const double *S, double *L, double *c, int i, int m, int n) {
   PW_UNROLL for (int j = 0; j < m; j++) {
     double sum = S[i * n + j];
@@ -74,7 +74,7 @@ PW_INLINE double dense_left (double S, const double *L, const double *c, int m) 
   return S;
 }
 
-/* Returns 0 if a pivot is not above `least` times its diagonal entry; if it is 0, what comes after it is of no use. */
+/* Returns 0 if a pivot is not above `least` times its diagonal entry; after a zero pivot the factors are invalid. */
 PW_INLINE int dense_factor (const double *S, double *L, double least, int n) {
   int good = 1;
   PW_UNROLL for (int i = 0; i < n; i += 2) {

@@ -1,5 +1,5 @@
-/* Scenes of few constraint equations: the condensed matrix S = J W^-1 J^T is dense.  All loops are unrolled, by code
- * that is compiled for each number of equations. */
+/* Scenes of few constraint equations: the condensed matrix S = J W^-1 J^T is dense.  All loops are unrolled: the
+ * code is compiled for each number of equations. */
 #ifndef PW_DENSE_H
 #define PW_DENSE_H
 

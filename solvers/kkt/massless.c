@@ -8,7 +8,7 @@ PW_ONE_BY_ONE
 
 /* ---- P = L U; n, the number of pivots, is a constant where it is usual ---- */
 
-/* Returns 0 if a pivot has become too small, or is not a number. */
+/* Returns 0 if a pivot has become too small, or is NaN. */
 PW_INLINE int massless_lu (pw_component *c, int n) {
   int good = 1;
   double worst = 1, P[9], *LU = n == 3 ? P : c->P;
@@ -62,8 +62,8 @@ static double massless_add_run (pw_component *c, const pw_massive_block *x, int 
   return square;
 }
 
-/* Y and Z~ of the rows left over.  What should be nothing is round-off, of any direction: only its size tells, beside
- * Z, Y H, and K: of a row that touches no weight Y H may be round-off, too. */
+/* Y and Z~ of the unmatched rows.  A vanishing row leaves round-off of any direction, so its size is compared with
+ * those of Z, Y H, and K: for a row without weight, Y H may be round-off, too. */
 static void massless_left_over (pw_component *c) {
   const pw_massive_block *h = c->massive;
   c->left = 1;

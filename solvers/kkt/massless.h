@@ -2,7 +2,7 @@
  *
  * The rows and coordinates concerned fall apart into components (a massless body and the joints around it).  Within
  * one, the matched rows p are P in the coordinates without weight, square and regular, and H in the others, and the
- * rows i left over K and Z.  With  P = L U  and  Y = K P^-1,
+ * unmatched rows i are K and Z.  With  P = L U  and  Y = K P^-1,
  *
  *     mu = P^-T f_P,   f~ = f - H^T mu,   Z~ = Z - Y H,   gamma~_i = gamma_i - Y gamma_p
  *
@@ -36,10 +36,10 @@ typedef struct {
   int *row;          /* global row; the pivots first, in order */
   int *pivot;        /* local column of each pivot */
   int *massless_j;   /* global coordinate of each pivot */
-  double *scale;     /* makes a pivot relative to the largest entry its row had when they were matched */
-  double *least;     /* how small each of these may become before the rows are matched again */
+  double *scale;     /* scales a pivot by the largest entry of its row at the time of matching */
+  double *least;     /* scaled pivot below which the rows are matched again */
   double worst;      /* smallest pivot, relative, at most 1 */
-  double left;       /* smallest Z~ relative to what it is the difference of, at most 1; and its row */
+  double left;       /* smallest Z~ relative to its terms, at most 1; and its row */
   int left_row;
   int *global;               /* cols: global coordinate of a local column */
   unsigned char *massless;   /* cols: 1 for a coordinate without weight */
@@ -64,8 +64,8 @@ typedef struct {
   char *memory;
 } pw_massless;
 
-/* Finds the components and matches at the configuration J was evaluated at.  Errors: PW_RESOURCE, PW_INPUT (a
- * coordinate that no row determines, by name). */
+/* Finds the components and matches at the configuration J was evaluated at.  Errors: PW_RESOURCE, PW_INPUT (with the
+ * name of a coordinate that no row determines). */
 int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);
 void pw_massless_close (pw_massless *r);
@@ -75,7 +75,7 @@ void pw_massless_close (pw_massless *r);
 int pw_massless_match (pw_component *c);
 
 /* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was
- * matched. Returns the smallest pivot squared, relative to its row, or what is left of a row over, if that is less;
+ * matched. Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller;
  * 0 if singular. */
 double pw_massless_factor (pw_massless *r);
 
@@ -85,8 +85,8 @@ int pw_massless_weakest (const pw_massless *r);
 /* First half of a solve: f becomes f~ at the coordinates with weight, gamma~ is kept in the components. */
 void pw_massless_forward (pw_massless *r, const double *gamma, double *f);
 
-/* Second half, when a of the coordinates with weight and lambda of the rows left over are there: a of those without
- * (0 where it is stored so far), and lambda of the matched rows. */
+/* Second half, from a of the coordinates with weight and lambda of the unmatched rows: a of the coordinates without
+ * weight (0 on entry), and lambda of the matched rows. */
 void pw_massless_backward (pw_massless *r, double *a, double *lambda);
 
 #endif

@@ -1,4 +1,4 @@
-/* Which row determines which coordinate without weight, and where the entries of P, K, H and Z are; see massless.h. */
+/* Matches rows to coordinates without weight, and locates the entries of P, K, H and Z; see massless.h. */
 #include <math.h>
 #include "massless.h"
 
@@ -71,16 +71,16 @@ static void massless_measure (pw_component *c) {
   }
 }
 
-/* The p-th pivot and those after it were not found: rows have been swapped, but what is planned is for their places of
- * before.  Until they are matched again no pivot is large enough, and these are the smallest. */
+/* The p-th pivot and those after it were not found: rows have been swapped, but the plan is for their old positions.
+ * Until they are matched again no pivot counts as large enough, and these are the smallest. */
 static int massless_unmatched (pw_component *c, int p) {
   for (int i = 0; i < c->pivots; i++) c->least[i] = NAN;
   for (int i = p; i < c->pivots; i++) c->scale[i] = 0;
   return p;
 }
 
-/* Gaussian elimination; angles in units of length, rows scaled by the largest entry they had: what is left of a
- * dependent row is small. */
+/* Gaussian elimination; angles in units of length, rows scaled by their largest original entry: the remainder of
+ * a dependent row is small. */
 int pw_massless_match (pw_component *c) {
   const double guard = 0.1;
   massless_copy (c);

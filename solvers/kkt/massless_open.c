@@ -1,4 +1,4 @@
-/* Which rows and coordinates the elimination works on: the components, found by union-find; see massless.h. */
+/* Components of rows and massless coordinates, found by union-find; see massless.h. */
 #include <stdlib.h>
 #include "massless.h"
 #include "util.h"
@@ -90,7 +90,7 @@ static int massless_add_group (const pw_system *s, pw_component *c, int g) {
   return c->group_column[c->groups - 1];
 }
 
-/* Adds a row of the groups it touches to a component, or counts both, the groups with repetition. */
+/* Adds a row and the groups it touches to a component, or only counts them, groups with repetition. */
 static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *at,
                               const double *J) {
   if (c->block == NULL) {
@@ -173,7 +173,7 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
                   s->model, pw_system_state_name (s, j, name, sizeof name), lacking, lacking);
 }
 
-/* Marks the massless columns and says which of them no row determines. */
+/* Marks the massless columns and reports one that no row determines. */
 static int massless_check (pw_massless *r, const massless_plan *p, pw_error *error) {
   const pw_system *s = p->s;
   for (int i = 0; i < r->components; i++) {

@@ -4,7 +4,7 @@
  *
  * (Golub & Greif 2003, On solving block-structured indefinite linear systems.)  Equations that share no coordinate with
  * weight do not meet in S, so S has the pattern of the mechanism: a chain is block tridiagonal.  Coordinates without
- * weight are eliminated before, in massless.c. */
+ * weight are eliminated first, in massless.c. */
 #include <float.h>
 #include <math.h>
 #include <stdlib.h>
@@ -12,7 +12,7 @@
 #include "saddle.h"
 #include "condense.h"
 
-/* A pivot is 1 minus the square of a cosine: of a dependent row round-off leaves some eps. */
+/* A pivot is 1 minus a squared cosine: for a dependent row round-off leaves some eps. */
 #define SADDLE_ROUND_OFF (200 * DBL_EPSILON)
 
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
@@ -75,7 +75,7 @@ double pw_saddle_pivot (const pw_saddle *k, int *row) {
 
 /* ---- Solving ---- */
 
-/* gamma with the right-hand sides of the unknowns beyond the rows at its end. */
+/* Appends the right-hand sides of the unknowns beyond the rows to gamma. */
 static const double *saddle_extend (pw_saddle *k, const double *gamma) {
   memcpy (k->y, gamma, (size_t)k->rows * sizeof *gamma);
   memset (k->y + k->s->rows, 0, (size_t)k->more * sizeof *k->y);

@@ -2,7 +2,7 @@
  *
  * W is the mass matrix for accelerations and impulses, or a metric for projections.  An entry of W may be 0 (a
  * coordinate without mass: eliminated through a constraint row matched to it) or INFINITY (prescribed: it does not
- * move; a row that only prescribed ones enter takes no part, its multiplier is 0). Coordinates with weight are
+ * move; a row of prescribed coordinates alone is ignored, its multiplier is 0). Coordinates with weight are
  * condensed out exactly; the rows left are factorised as a sparse symmetric matrix whose order and pattern are laid
  * out once.  Nothing is allocated after opening. */
 #ifndef PW_SADDLE_H
@@ -19,7 +19,7 @@ pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, cons
                            pw_error *error);
 void pw_saddle_close (pw_saddle *k);
 
-/* Factorises with the J last evaluated.  Returns PW_OK, or PW_RETRY if the smallest pivot is what round-off leaves of a
+/* Factorises with the J last evaluated.  Returns PW_OK, or PW_RETRY if the smallest pivot is the round-off of a
  * dependent row. */
 int pw_saddle_factor (pw_saddle *k);
 
@@ -27,7 +27,7 @@ int pw_saddle_factor (pw_saddle *k);
  * the same, lambda and gamma too. */
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
-/* Both, faster than one after the other; without PW_OK a and lambda are of no use. */
+/* Both, faster than separately; a and lambda are valid only with PW_OK. */
 int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
 /* 1 if the smallest pivot of the last factorisation is below this sine. */

@@ -69,9 +69,9 @@ static void test_locked_start (void **state) {
     assert_null (pw_run_open (s, "rk4+projection", NULL, &error));
     check_error (&error, PW_INITIAL,
                  wheels == 3
-                     ? "model scene: the given rates would have to be removed entirely: wheel front, wheel left, "
+                     ? "model scene: the given velocities would have to be removed entirely: wheel front, wheel left, "
                        "wheel right allow no such motion"
-                     : "model scene: the given rates would have to be removed entirely: wheel front, wheel left, "
+                     : "model scene: the given velocities would have to be removed entirely: wheel front, wheel left, "
                        "wheel right, wheel rear allow no such motion");
     pw_system_free (s);
   }
@@ -95,7 +95,7 @@ static void test_locked_spin (void **state) {
   assert_null (pw_run_open (s, "rk4", NULL, &error));
   check_error (
       &error, PW_INITIAL,
-      "model scene: the given rates would have to be removed entirely: rolling-wheel wheel allow no such motion");
+      "model scene: the given velocities would have to be removed entirely: rolling-wheel wheel allow no such motion");
   pw_system_free (s);
 }
 
