@@ -1,16 +1,16 @@
 /* Pinwheel: planar multibody systems with pin joints and knife-edge wheels.
  *
- * This header is all that a model file includes.  It declares
- *   - the description: bodies, elements, signals and parameters a model is made of,
- *   - the element kinds that come with Pinwheel, and what a kind of your own has to provide,
+ * A model file includes only this header.  It declares
+ *   - the description of a model: bodies, elements, signals and parameters,
+ *   - the built-in element types, and what an element type of your own has to provide,
  *   - the compiled system that the solvers integrate.
  *
- * Units are SI, angles are radians, counter-clockwise.  The state is q = (x, y, phi) of each body's centre of
- * mass, then the coordinates that elements own, and v = dq/dt.  The equations are
+ * Units are SI, angles are radians, counter-clockwise.  The state consists of q, which is (x, y, phi) of each body's
+ * centre of mass followed by the internal coordinates of elements, and v = dq/dt.  The equations are
  *
  *     M a + J^T lambda = f(t, q, v),     g(q, t) = 0,     J v = eta(t, q),     J = [ G = dg/dq ; S(q, t) ]
  *
- * with the holonomic rows G first and the nonholonomic rows S after them; differentiated once more, J a = gamma. */
+ * The holonomic constraint equations G come first, then the nonholonomic ones S.  Differentiated: J a = gamma. */
 #ifndef PINWHEEL_H
 #define PINWHEEL_H
 
@@ -36,63 +36,65 @@ extern "C" {
 
 /* ---- Status and errors ---- */
 
-/* What a function returns: 0 good, > 0 not done but may be tried again, < 0 stop.  The negative of a
- * negative status is the exit status of the program. */
+/* Status returned by functions: 0 success, > 0 not done but the call can be repeated, < 0 failure.  The program
+ * exits with the negative of a negative status. */
 typedef enum {
-  PW_OK = 0,        /* good */
-  PW_RETRY = 1,     /* not usable, a smaller step may be */
-  PW_STOPPED = 2,   /* a run was asked to stop by pw_settings.stop: it is where it was, and can go on */
-  PW_RESOURCE = -1, /* out of memory, a file cannot be written */
+  PW_OK = 0,        /* success */
+  PW_RETRY = 1,     /* step rejected; a smaller one may succeed */
+  PW_STOPPED = 2,   /* pw_settings.stop stopped the run; its state is unchanged and it can continue */
+  PW_RESOURCE = -1, /* out of memory, or a file cannot be written */
   PW_INPUT = -2,    /* the description or an option is wrong */
-  PW_INITIAL = -3,  /* the start cannot be made consistent */
-  PW_METHOD = -4    /* the method failed on the way */
+  PW_INITIAL = -3,  /* no consistent initial state found */
+  PW_METHOD = -4    /* the method failed during the run */
 } pw_status;
 
-/* A caller-owned error, all zero at first: the first failure is kept, later ones do not overwrite it.  NULL in the place of
- * a file, model, system or run is one: what a call could not give may be passed on to the next. */
+/* An error, owned by the caller and zero-initialised.  It keeps the first failure; later ones do not overwrite it.
+ * Passing NULL for a file, model, system or run is an error as well, so the result of a failed call may be passed to
+ * the next call. */
 typedef struct {
-  int status;     /* a pw_status; 0: no error so far */
-  char text[500]; /* one line without a full stop: what was found, what was expected, the nearest valid name; for a text
-                     model "FILE:LINE:COLUMN: error: " before it, and the line with a caret below as two further lines */
+  int status; /* a pw_status; 0: no error yet */
+  char text
+      [500]; /* one line without a full stop: found value, expected value, nearest valid name.  Text models: preceded by
+                     "FILE:LINE:COLUMN: error: ", followed by the source line and a line with a caret */
 } pw_error;
 
-/* Records a failure and returns its status.  A NULL error is allowed; an error already set stays. */
+/* Records a failure unless one is already recorded, and returns `status`.  error may be NULL. */
 int pw_fail (pw_error *error, int status, const char *format, ...)
 #ifdef __GNUC__
     __attribute__ ((format (printf, 3, 4)))
 #endif
     ;
 
-/* ---- Signals: what a torque, drive or heading does over time ---- */
+/* ---- Signals: time histories of torques, drives, headings ---- */
 
 typedef enum { PW_CONSTANT, PW_HARMONIC, PW_FUNCTION, PW_RAMP, PW_SMOOTH_STEP, PW_PULSE, PW_TABLE } pw_signal_type;
 
-/* How a table goes from point to point, and how a cubic one begins and ends. */
+/* Interpolation of a table, and the end conditions of a cubic one. */
 enum { PW_LINEAR, PW_CUBIC };
 enum { PW_ENDS_FREE, PW_ENDS_REST };
 
-/* A function signal as a text model has it. */
+/* The source text of a function signal in a text model. */
 typedef struct {
   const char *part[3]; /* expressions of value, rate, acceleration; NULL: not given */
-  const char *jump;    /* a part that jumps when states change, where no step ends; or NULL */
+  const char *jump;    /* a part that jumps with the state, where no step ends; or NULL */
 } pw_signal_text;
 
-/* A signal computed by the caller.  `eval` stores the value and, if the signal serves a constraint, its first and
- * second time derivative in value[0..2]; x holds the states named in `reads`, in that order, and gradient (NULL
- * when not wanted) takes the derivative of value[0] by each of them.  A non-zero return stops the run.  For the same t
- * and x it must give the same values, but for changes between steps that pw_run_restart follows (a torque that a controller
- * of yours sets anew). */
+/* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its first
+ * and second time derivatives in value[1] and value[2].  x holds the states named in `reads`, in that order;
+ * gradient, unless NULL, receives the derivative of value[0] with respect to each.  A non-zero return stops the
+ * run.  Equal t and x must give equal values.  If they change between steps (a controller sets a new torque), call
+ * pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
-  void *context; /* passed to eval and breakpoint as it is; must outlive the systems, or what open makes of it does */
+  void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
   const char *const *reads; /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
   double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
-  void *(*open) (
-      void *context); /* each compiled system, and each workspace and run from the system's, gets a context of its
-                                     own, made from this one, or NULL without memory; threads may call it at the same time.
-                                     May be NULL: all share `context`, and eval must be safe in all threads that run them */
-  void (*close) (void *context); /* frees what open made, with the system or workspace; may be NULL */
-  const pw_signal_text *text;    /* NULL: it is not of a text model */
+  /* Returns a new context made from this one: each compiled system has one, and each workspace and run has one made
+   * from the system's.  Returns NULL if out of memory; must be thread-safe.  May be NULL: all share `context`, and
+   * eval must be thread-safe. */
+  void *(*open) (void *context);
+  void (*close) (void *context); /* frees a context made by open; may be NULL */
+  const pw_signal_text *text;    /* NULL unless it comes from a text model */
 } pw_function;
 
 /* offset + amplitude cos (omega t + phase) */
@@ -105,71 +107,71 @@ typedef struct {
 
 /* From one value to another. */
 typedef struct {
-  double from, to; /* before and behind; unit of the signal */
+  double from, to; /* values before and after; unit of the signal */
   double start;    /* [s] */
   double duration; /* [s], > 0 */
 } pw_ramp;
 
-/* offset + height from start to start + width, and each period again. */
+/* offset + height from start to start + width, repeated each period; offset otherwise. */
 typedef struct {
-  double height; /* while it lasts; unit of the signal */
+  double height; /* added to the offset during the pulse; unit of the signal */
   double start;  /* [s] */
-  double width;  /* how long it lasts [s]; 0: for ever */
-  double period; /* from one pulse to the next [s], > width; 0: there is one */
-  double offset; /* at all times, below the height; unit of the signal */
+  double width;  /* [s]; 0: the pulse never ends */
+  double period; /* between the beginnings of two pulses [s], > width; 0: one pulse only */
+  double offset; /* unit of the signal */
 } pw_pulse;
 
-/* Through points. */
+/* A table: an interpolation through points. */
 typedef struct {
-  const double *t;     /* times of its points, increasing [s]; pw_add and pw_model_set_signal copy the points */
-  const double *value; /* at these times; the first and the last are held outside */
-  int count;           /* of points: at least 2, of a cubic table with free ends 4 */
-  int interpolation;   /* PW_LINEAR, PW_CUBIC: a spline with continuous rate and acceleration */
-  int ends;            /* PW_ENDS_FREE: of a spline as its points ask for (not a knot); PW_ENDS_REST: at rate 0 */
-  double scale;        /* the signal is offset + scale value; 0: 1 */
+  const double *t;     /* count: times of the points, increasing [s]; pw_add and pw_model_set_signal copy the points */
+  const double *value; /* count: values of the points; constant before the first and after the last point */
+  int count;           /* number of points: >= 2; cubic with free ends: >= 4 */
+  int interpolation;   /* PW_LINEAR; PW_CUBIC: a spline with continuous first and second derivatives */
+  int ends;            /* of a spline: PW_ENDS_FREE: not-a-knot; PW_ENDS_REST: first derivative 0 */
+  double scale;        /* the signal is offset + scale value; 0 stands for 1 */
   double offset;       /* unit of the signal */
 } pw_points;
 
-/* A signal; all zero is the constant 0. */
+/* A signal; zero-initialised, it is the constant 0. */
 typedef struct {
-  pw_signal_type type; /* which member of the union holds */
+  pw_signal_type type; /* selects the member of the union */
   union {
     double constant;      /* PW_CONSTANT: the value */
     pw_harmonic harmonic; /* PW_HARMONIC */
     pw_function function; /* PW_FUNCTION */
-    pw_ramp ramp;         /* PW_RAMP: along a straight line; PW_SMOOTH_STEP: with continuous rate and acceleration */
+    pw_ramp ramp;         /* PW_RAMP: linear; PW_SMOOTH_STEP: with continuous first and second derivatives */
     pw_pulse pulse;       /* PW_PULSE */
     pw_points table;      /* PW_TABLE */
   };
 } pw_signal;
 
-/* A signal made of numbers: serves checks, text models, `show` and `list signals`. */
+/* A form of signal that is described by numbers: used by checks, text models, `show` and `list signals`. */
 typedef struct {
   const char *name; /* "ramp", as written in a model file */
   pw_signal_type type;
   const char *about;
-  const struct pw_field *fields; /* numbers and choices, their offsets those in pw_signal; ended by a NULL name */
+  const struct pw_field *fields; /* numbers and choices, with offsets in pw_signal; ends with a NULL name */
 } pw_signal_form;
 
-/* All forms, ended by a NULL name; constants and functions have none. */
+/* All forms; ends with a NULL name.  Constants and functions have no form. */
 extern const pw_signal_form pw_signal_forms[];
-const pw_signal_form *pw_signal_form_of (const pw_signal *s); /* or NULL */
+const pw_signal_form *pw_signal_form_of (const pw_signal *s); /* NULL if it has none */
 
 /* ---- The description ---- */
 
 typedef struct pw_model pw_model;
 
-/* A rigid body.  Its frame sits at its centre of mass.  Massless bodies are allowed. */
+/* A rigid body.  The origin of its frame is its centre of mass.  It may be massless. */
 typedef struct {
   const char *name;   /* unique among bodies and elements; "ground" is reserved */
   double mass;        /* [kg], >= 0 */
   double inertia;     /* about the centre of mass [kg m^2], >= 0 */
-  double start[3];    /* x, y [m], phi [rad] at the start */
-  double rate[3];     /* vx, vy [m/s], omega [rad/s] at the start */
-  unsigned specified; /* bits of PW_SPECIFIES_X, ...: these initial values, and no others; 0: those that are not 0 */
+  double start[3];    /* initial x, y [m], phi [rad] */
+  double rate[3];     /* initial vx, vy [m/s], omega [rad/s] */
+  unsigned specified; /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
 } pw_body;
 
-/* Which initial values a body specifies; others give way where the constraints ask for it.  NOTHING: none of them. */
+/* Initial values that a body specifies; the others may change to satisfy the constraints.  NOTHING: all may change. */
 enum {
   PW_SPECIFIES_X = 1,
   PW_SPECIFIES_Y = 2,
@@ -189,19 +191,19 @@ typedef enum {
   PW_FRACTION     /* from 0 to 1 */
 } pw_domain;
 
-/* A named parameter of a model; it lives as a double at `offset` in the model's own parameter structure. */
+/* A named parameter of a model; it is stored as a double at `offset` in the model's parameter structure. */
 typedef struct {
   const char *name;  /* as written after --set */
   size_t offset;     /* byte offset in the structure handed to build; PW_AT gives name and offset */
   double value;      /* default */
   const char *unit;  /* "m", "kg m^2", ... or "" */
   const char *about; /* what it means, in a few words */
-  pw_domain domain;  /* which values make sense */
+  pw_domain domain;  /* valid values */
 } pw_parameter;
 
 #define PW_AT(type, member) .name = #member, .offset = offsetof (type, member)
 
-/* How a model wants to be run when the user does not say; zeros leave Pinwheel's own choice. */
+/* Default run settings of a model; 0 or NULL: Pinwheel's default. */
 typedef struct {
   double t_end;       /* [s] */
   double step;        /* [s], fixed-step methods */
@@ -211,19 +213,19 @@ typedef struct {
 
 typedef struct pw_kind pw_kind;
 
-/* What a plug-in exports, under the name `pw_plugin`.  The parameters handed to its functions live as long as the model. */
+/* What a plug-in exports as `pw_plugin`.  The parameters passed to its functions live as long as the model. */
 typedef struct {
   unsigned abi;                                        /* PW_ABI */
   size_t size;                                         /* sizeof (pw_plugin_table) */
   const char *about;                                   /* one line: what the model is */
-  const pw_parameter *parameters;                      /* ended by a NULL name; may be NULL */
-  size_t parameters_size;                              /* bytes of the structure the parameters live in */
-  pw_run_defaults run;                                 /* how to run it by default */
+  const pw_parameter *parameters;                      /* ends with a NULL name; may be NULL */
+  size_t parameters_size;                              /* sizeof the parameter structure */
+  pw_run_defaults run;                                 /* default run settings */
   void (*build) (pw_model *m, const void *parameters); /* declares bodies and elements */
 
-  /* The motion from the described start, where it is known; may be NULL.  Stores what is known at time t of the
-   * coordinates, three for each body in the order they were added, then those that elements own, and of their rates; all
-   * of them are NaN, not known, before. */
+  /* The reference (exact) solution for the described initial conditions; may be NULL.  Stores the known entries of q
+   * and v at time t: three for each body in the order they were added, then the internal coordinates of elements.
+   * All entries are NaN (unknown) before the call. */
   void (*reference) (const void *parameters, double t, double *q, double *v);
 } pw_plugin_table;
 
@@ -232,37 +234,39 @@ typedef struct {
   extern PW_EXPORT const pw_plugin_table pw_plugin; \
   const pw_plugin_table pw_plugin = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), __VA_ARGS__ }
 
-/* Adds a body.  The model keeps a copy, the name included.  Returns PW_OK or the first error of the model, which
- * pw_model_build reports: a build function need not look at it. */
+/* Adds a body.  The model keeps a copy, including the name.  Returns PW_OK or the model's first error.  A build
+ * function need not check it: pw_model_build reports it. */
 int pw_add_body (pw_model *m, const pw_body *body);
 
-/* Adds an element of any kind; `definition` is the kind's definition structure, of which a copy is kept, names and
- * all.  Returns as pw_add_body. */
+/* Adds an element of any type; `definition` is the definition structure of that type.  The model keeps a copy,
+ * including names.  Returns as pw_add_body. */
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 
-/* Lets a build function refuse what it was given ("links: at most 1000").  Returns the status. */
+/* For build functions: rejects the model's parameters with a message ("links: at most 1000").  Returns PW_INPUT. */
 int pw_model_refuse (pw_model *m, const char *format, ...);
 
-/* Jacobi's amplitude am (u | m) and the complete elliptic integral K (m), m = k^2 <= 1 (NaN above): sn = sin (am).  A
- * pendulum let go at an angle A from its lowest point is at 2 asin (k sn (K - w t)), k = sin (A / 2). */
+/* Jacobi's amplitude am (u | m) and the complete elliptic integral K (m), m = k^2 <= 1 (NaN above): sn = sin (am).
+ * A pendulum released at rest at an angle A from its lowest point is at the angle 2 asin (k sn (K - w t)),
+ * k = sin (A / 2). */
 double pw_jacobi_am (double u, double m);
 double pw_elliptic_K (double m);
 
-/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; beyond, those of the C library. */
+/* Sine and cosine of an angle [rad] to 1 ulp, with the same bits on every machine for |x| < 1e6; for larger |x| those of
+ * the C library. */
 void pw_sin_cos (double x, double *sine, double *cosine);
 double pw_sin (double x);
 double pw_cos (double x);
 
-/* ---- The element kinds: constraints on positions, on velocities, forces, and what has no effect ---- */
+/* ---- The element types: position constraints, velocity constraints, forces, markers ---- */
 
-/* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic rows. */
+/* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic constraint equations. */
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
   double at[2][2];     /* the point in each body's frame [m]; on the ground: in the world */
 } pw_pin;
 
-/* Weld: body 2 is fixed to body 1.  Three holonomic rows. */
+/* Weld: body 2 is fixed to body 1.  Three holonomic constraint equations. */
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
@@ -270,7 +274,8 @@ typedef struct {
   double angle;        /* of body 2 relative to body 1: phi2 - phi1 [rad] */
 } pw_weld;
 
-/* Slider: a point of body 1 stays on a line of body 2, and body 1 does not turn against body 2.  Two holonomic rows. */
+/* Slider: a point of body 1 stays on a line of body 2, and body 1 does not rotate relative to body 2.  Two holonomic
+ * constraint equations. */
 typedef struct {
   const char *name;
   const char *body[2]; /* what slides, and what it slides on; "ground" for one of them */
@@ -279,15 +284,16 @@ typedef struct {
   double angle;        /* of body 1 relative to body 2: phi1 - phi2 [rad] */
 } pw_slider;
 
-/* Slot: a point of body 1 stays on a line of body 2.  One holonomic row. */
+/* Slot: a point of body 1 stays on a line of body 2.  One holonomic constraint equation. */
 typedef struct {
   const char *name;
-  const char *body[2]; /* the one with the point, and the one with the line; "ground" for one of them */
+  const char *body[2]; /* the body with the point, the body with the line; "ground" for one of them */
   double at[2][2];     /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
   double heading;      /* direction of the line in body 2's frame [rad] */
 } pw_slot;
 
-/* Rod: a massless bar keeps a point of body 1 and a point of body 2 at a distance.  One holonomic row. */
+/* Rod: a massless bar keeps a point of body 1 at a fixed distance from a point of body 2.  One holonomic constraint
+ * equation. */
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
@@ -295,32 +301,33 @@ typedef struct {
   double length;       /* [m], > 0 */
 } pw_rod;
 
-/* Where a gear takes its offset from. */
+/* Source of a gear's offset. */
 enum { PW_GEAR_START, PW_GEAR_OFFSET };
 
-/* Gear: the angles of two bodies, seen from a third, the carrier, keep a ratio: phi1 - phi3 = ratio (phi2 - phi3) +
- * offset.  One holonomic row. */
+/* Gear: the angles of two bodies relative to a third, the carrier, have a fixed ratio: phi1 - phi3 = ratio (phi2 -
+ * phi3) + offset.  One holonomic constraint equation. */
 typedef struct {
   const char *name;
   const char *body[3]; /* the two gears and their carrier; "ground" for one of them */
-  double ratio;        /* of their speeds on the carrier; negative: they turn against each other; not 0 */
-  int from;            /* PW_GEAR_START: the offset is that of the start as described; PW_GEAR_OFFSET: as given */
+  double ratio;        /* of their angular velocities relative to the carrier; negative: opposite directions; not 0 */
+  int from;            /* PW_GEAR_START: from the described initial angles; PW_GEAR_OFFSET: the field `offset` */
   double offset;       /* [rad] */
 } pw_gear;
 
 /* What a drive prescribes. */
 enum { PW_DRIVE_X, PW_DRIVE_Y, PW_DRIVE_ANGLE };
 
-/* Drive: where a point of body 1 is, seen from body 2, or how it is turned, follows a signal.  One holonomic row. */
+/* Drive: a coordinate of a point of body 1 relative to body 2, or the relative angle, follows a signal.  One
+ * holonomic constraint equation. */
 typedef struct {
   const char *name;
-  const char *body[2]; /* the driven body, and the one it is seen from; "ground" for one of them */
-  double at[2][2];     /* a point in each body's frame [m]; on the ground: in the world; without meaning for an angle */
+  const char *body[2]; /* the driven body, the reference body; "ground" for one of them */
+  double at[2][2];     /* a point in each body's frame [m]; on the ground: in the world; ignored for an angle */
   int what;        /* PW_DRIVE_X, PW_DRIVE_Y: from point 2 to point 1 in body 2's frame; PW_DRIVE_ANGLE: phi1 - phi2 */
   pw_signal value; /* with its first and second time derivative [m] or [rad] */
 } pw_drive;
 
-/* Wheel: a knife edge; the point does not move across the heading.  One nonholonomic row. */
+/* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name;
   const char *body;
@@ -328,8 +335,9 @@ typedef struct {
   double heading; /* rolling direction in the body's frame [rad] */
 } pw_wheel;
 
-/* Rolling wheel: the contact point moves neither across the heading nor along it other than by rolling.  Two
- * nonholonomic rows and a coordinate of its own, the spin angle, whose rate is positive rolling along the heading. */
+/* Rolling wheel: the contact point moves neither across the heading nor, except by rolling, along it.  Two
+ * nonholonomic constraint equations and an internal coordinate, the spin angle; its velocity is positive when
+ * rolling along the heading. */
 typedef struct {
   const char *name;
   const char *body;
@@ -337,12 +345,12 @@ typedef struct {
   double heading;   /* rolling direction in the body's frame [rad] */
   double radius;    /* [m], > 0 */
   double inertia;   /* about its axle [kg m^2], >= 0; its mass belongs to the body */
-  double start;     /* spin angle at the start [rad] */
-  double rate;      /* its rate at the start [rad/s]; 0: as the body's start makes it roll */
-  pw_signal torque; /* on the wheel about its axle [N m]; what it reacts on is out of the plane */
+  double start;     /* initial spin angle [rad] */
+  double rate;      /* initial spin velocity [rad/s]; 0: from rolling at the body's initial velocity */
+  pw_signal torque; /* on the wheel about its axle [N m]; its reaction is out of the plane */
 } pw_rolling_wheel;
 
-/* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic row. */
+/* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name;
   const char *body;
@@ -350,7 +358,8 @@ typedef struct {
   pw_signal heading; /* rolling direction in the body's frame, with its first time derivative [rad] */
 } pw_steered_wheel;
 
-/* Speed: the speed of a point along a direction fixed in its body follows a signal.  One nonholonomic row. */
+/* Speed: the speed of a point along a direction fixed in its body follows a signal.  One nonholonomic
+ * constraint equation. */
 typedef struct {
   const char *name;
   const char *body;
@@ -359,17 +368,17 @@ typedef struct {
   pw_signal value; /* with its first time derivative [m/s] */
 } pw_speed;
 
-/* Pfaffian: any linear relation between the velocities of two bodies, both along the axes of body 1:
- * a . (vx1, vy1, omega1) + b . (vx2, vy2, omega2) = value.  One nonholonomic row. */
+/* Pfaffian: a linear relation between the velocities of two bodies, both in the frame of body 1:
+ * a . (vx1, vy1, omega1) + b . (vx2, vy2, omega2) = value.  One nonholonomic constraint equation. */
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double a[3];         /* of body 1's velocity, x and y along its own axes, and of its rate */
-  double b[3];         /* of body 2's velocity, x and y along body 1's axes, and of its rate */
+  double a[3];         /* coefficients of vx1, vy1, omega1, in body 1's frame */
+  double b[3];         /* coefficients of vx2, vy2, omega2, in body 1's frame */
   pw_signal value;     /* with its first time derivative */
 } pw_pfaffian;
 
-/* Tyre: a wheel that gives way sideways; a lateral force grows with the slip instead of a row that forbids it. */
+/* Tyre: a wheel with side slip; a lateral force that grows with the slip replaces the constraint equation. */
 typedef struct {
   const char *name;
   const char *body;
@@ -377,21 +386,21 @@ typedef struct {
   double heading;   /* rolling direction in the body's frame [rad] */
   double stiffness; /* cornering stiffness: lateral force per slip [N], > 0 */
   double speed;     /* below about this rolling speed the slip is regularised [m/s], > 0 */
-  double load;      /* normal load that limits the force [N]; 0: linear, no limit */
-  double friction;  /* the limit is friction times load; > 0 if there is a load */
+  double load;      /* normal load, which limits the force [N]; 0: linear, no limit */
+  double friction;  /* friction coefficient, force limit over load; > 0 if load > 0 */
 } pw_tyre;
 
-/* Rolling resistance: a force along a heading, against the motion of its point along it. */
+/* Rolling resistance: a force along the heading that opposes the motion of its point. */
 typedef struct {
   const char *name;
   const char *body;
   double at[2];   /* contact point in the body's frame [m] */
   double heading; /* rolling direction in the body's frame [rad] */
-  double limit;   /* the force when it rolls: coefficient times normal load [N], >= 0 */
+  double limit;   /* the force while rolling: coefficient times normal load [N], >= 0 */
   double speed;   /* below about this speed the force is smoothed [m/s], > 0 */
 } pw_rolling_resistance;
 
-/* Spring: pulls a point of body 1 and a point of body 2 together along their line, with a damper beside it. */
+/* Spring: a spring and parallel damper between a point of body 1 and a point of body 2. */
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
@@ -401,7 +410,7 @@ typedef struct {
   double length;       /* free length [m], >= 0 */
 } pw_spring;
 
-/* Rotational spring: turns two bodies to an angle between them, with a damper beside it. */
+/* Rotational spring: a torsion spring and parallel damper between two bodies. */
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
@@ -410,17 +419,18 @@ typedef struct {
   double angle;        /* free angle, of body 1 relative to body 2: phi1 - phi2 [rad] */
 } pw_rotational_spring;
 
-/* Friction: a viscous and a Coulomb torque against the turning of body 1 on body 2, in a pin for instance. */
+/* Friction: a viscous and a Coulomb torque that oppose the rotation of body 1 relative to body 2, for example in a
+ * pin. */
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
   double viscous;      /* [N m s/rad], >= 0 */
   double limit;        /* Coulomb torque [N m], >= 0 */
-  double speed;        /* below about this rate the Coulomb torque is smoothed [rad/s]; > 0 if there is a limit */
+  double speed;        /* below about this velocity the Coulomb torque is smoothed [rad/s]; > 0 if limit > 0 */
 } pw_friction;
 
-/* Sliding friction: a viscous and a Coulomb force against the motion of a point of body 1 along a line of body 2, in a
- * slider or slot for instance. */
+/* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body
+ * 2, for example in a slider or slot. */
 typedef struct {
   const char *name;
   const char *body[2]; /* what slides, and what it slides on; "ground" for one of them */
@@ -428,10 +438,10 @@ typedef struct {
   double heading;      /* direction of the line in body 2's frame [rad] */
   double viscous;      /* [N s/m], >= 0 */
   double limit;        /* Coulomb force [N], >= 0 */
-  double speed;        /* below about this speed the Coulomb force is smoothed [m/s]; > 0 if there is a limit */
+  double speed;        /* below about this speed the Coulomb force is smoothed [m/s]; > 0 if limit > 0 */
 } pw_sliding_friction;
 
-/* Drag: air, at rest, slows down a body's centre of mass and its turning. */
+/* Drag: still air opposes the velocity of a body's centre of mass and its rotation. */
 typedef struct {
   const char *name;
   const char *body;
@@ -444,48 +454,48 @@ typedef struct {
 /* Gravity: the same acceleration for every body that has mass, in any direction of the plane. */
 typedef struct {
   const char *name;
-  double acceleration[2]; /* in the world, (0, -9.81) for a plane that stands upright [m/s^2] */
+  double acceleration[2]; /* in the world [m/s^2]; (0, -9.81) in a vertical plane */
 } pw_gravity;
 
 /* The axes along which a force is given. */
 enum { PW_AXES_WORLD, PW_AXES_BODY };
 
-/* Force: acts on a point of a body, from outside. */
+/* Force: an external force on a point of a body. */
 typedef struct {
   const char *name;
   const char *body;
-  double at[2]; /* where, in the body's frame [m] */
-  int axes;     /* PW_AXES_WORLD; PW_AXES_BODY: it turns with the body */
+  double at[2]; /* the point in the body's frame [m] */
+  int axes;     /* PW_AXES_WORLD, or PW_AXES_BODY: rotating with the body */
   pw_signal fx; /* [N] */
   pw_signal fy; /* [N] */
 } pw_force;
 
-/* Torque: acts on body 1, and its opposite on body 2. */
+/* Torque: acts on body 1; the opposite torque acts on body 2. */
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
   pw_signal value;     /* [N m] */
 } pw_torque;
 
-/* Motor: turns body 1 against body 2 to an angle that follows a signal, as a spring and damper of limited torque. */
+/* Motor: a spring and damper of limited torque that drive the angle of body 1 relative to body 2 to a signal. */
 typedef struct {
   const char *name;
-  const char *body[2]; /* what it turns, and what it reacts on; "ground" for one of them */
-  double stiffness;    /* torque per error of the angle [N m/rad], >= 0 */
-  double damping;      /* torque per error of the rate [N m s/rad], >= 0 */
-  double limit;        /* the torque saturates here [N m]; 0: no limit */
+  const char *body[2]; /* the driven body, the body that takes the reaction; "ground" for one of them */
+  double stiffness;    /* torque per angle error [N m/rad], >= 0 */
+  double damping;      /* torque per angular velocity error [N m s/rad], >= 0 */
+  double limit;        /* largest torque [N m]; 0: no limit */
   pw_signal angle;     /* target of phi1 - phi2 [rad] */
   pw_signal rate;      /* target of omega1 - omega2 [rad/s] */
 } pw_motor;
 
-/* Marker: a point of a body, followed in tables, figures and animations.  It has no effect. */
+/* Marker: a point of a body that appears in tables, figures and animations.  It has no effect on the motion. */
 typedef struct {
   const char *name;
   const char *body;
   double at[2]; /* the point in the body's frame [m] */
 } pw_marker;
 
-/* The list of kinds: the one line to add for a new file in a directory of core/kinds/. */
+/* The built-in element types: add one line for a new file in a directory of core/kinds/. */
 #define PW_KINDS               \
   PW_KIND (pin)                \
   PW_KIND (weld)               \
@@ -512,24 +522,24 @@ typedef struct {
   PW_KIND (motor)              \
   PW_KIND (marker)
 
-/* ---- What a kind provides ---- */
+/* ---- What an element type provides ---- */
 
 typedef enum { PW_NUMBER, PW_POINT, PW_VECTOR, PW_BODY, PW_SIGNAL, PW_CHOICE } pw_field_type;
 
-/* One field of a definition structure: serves validation, text models, `show`, `list kinds` and the manual. */
+/* One field of a definition structure: used by validation, text models, `show`, `list kinds` and the manual. */
 typedef struct pw_field {
   const char *name;           /* as written in a model file */
   size_t offset;              /* in the definition structure */
   pw_field_type type;         /* double, double[2], double[2], const char *, pw_signal, int */
-  int count;                  /* how many of them in a row; 0 means 1 */
-  const char *unit;           /* NULL where there is none */
-  int required;               /* a text model must write it */
+  int count;                  /* array length; 0 stands for 1 */
+  const char *unit;           /* NULL: no unit */
+  int required;               /* 1: required in a text model */
   pw_domain domain;           /* of a number */
   const char *const *choices; /* NULL-terminated names of a choice's values 0, 1, ... */
   const char *about;          /* meaning */
 } pw_field;
 
-/* Name and unit of a constraint row's reaction, or of an internal coordinate. */
+/* Name and unit of the reaction of a constraint equation, or of an internal coordinate. */
 typedef struct {
   const char *name;  /* "Fx" */
   const char *unit;  /* "N" */
@@ -537,117 +547,117 @@ typedef struct {
   const char *about; /* sign and meaning */
 } pw_quantity;
 
-/* A coordinate an element owns, as its kind's prepare describes it. */
+/* An internal coordinate of an element, as `prepare` describes it. */
 typedef struct {
-  double
-      mass; /* its entry of M [kg m^2], >= 0; an internal coordinate may be massless if the element's rows determine it */
-  double start;     /* its value at the start [rad] */
-  double rate;      /* its rate at the start [rad/s] */
-  int specified[2]; /* 1: start, rate are what the definition says, not a consequence of something else */
+  double mass;      /* its entry of M [kg m^2], >= 0; 0 only if the element's constraints determine the coordinate */
+  double start;     /* initial value [rad] */
+  double rate;      /* initial velocity [rad/s] */
+  int specified[2]; /* 1: the definition gives start, rate; 0: derived from other values */
 } pw_internal;
 
-/* Where a body is and how it moves; the ground is a body at rest at the origin. */
+/* Configuration and velocity of a body; the ground is at rest at the origin. */
 typedef struct {
   double x, y, phi;     /* centre of mass [m], angle [rad] */
   double cos, sin;      /* of phi */
   double vx, vy, omega; /* [m/s], [rad/s] */
 } pw_configuration;
 
-/* All elements of one kind in a scene, as its sweeps see them.  Element e has local coordinates: (x, y, phi) of each
- * of its bodies, then its own; there are `cols` of them.  Arrays are row-major, one element after the other. */
+/* All elements of one type in a scene, the argument of its functions.  The `cols` local coordinates of an element
+ * are (x, y, phi) of each of its bodies, then its internal coordinates.  Arrays are row-major, one element after the
+ * other. */
 typedef struct {
   int count;                             /* elements */
   int cols;                              /* 3 kind->bodies + kind->own */
   const void *element;                   /* count structures of kind->element bytes, made by kind->prepare */
   const int *body;                       /* count x kind->bodies indices into configuration */
-  const pw_configuration *configuration; /* of every body of the scene, and the ground */
+  const pw_configuration *configuration; /* of all bodies of the scene and the ground */
   const double *q;                       /* count x kind->own: internal coordinates */
-  const double *v;                       /* count x kind->own: their rates */
-  const double *u;                       /* count x kind->signals x 3: value, rate and acceleration of each signal */
-  const double *w;                       /* count x cols: the direction w, for jw_q only */
-  const double *lambda;                  /* count x kind->rows: the multipliers, for power and loss only */
+  const double *v;                       /* count x kind->own: their velocities */
+  const double *u;      /* count x kind->signals x 3: value, first and second time derivative of each signal */
+  const double *w;      /* count x cols: the vector w, for jw_q only */
+  const double *lambda; /* count x kind->rows: multipliers, for power and loss only */
 } pw_batch;
 
-/* Fills one array for the whole batch. */
+/* Fills one array for all elements of the batch. */
 typedef void pw_batch_function (const pw_batch *b, double *out);
 
-/* In a second-order block's place: asks the core to difference the function below it. */
+/* Placeholder for a second-order block: the core computes it by differences of the function whose derivative it is. */
 pw_batch_function pw_by_differences;
 #define PW_BY_DIFFERENCES pw_by_differences
 
 typedef enum {
-  PW_FORCE,       /* no rows */
-  PW_HOLONOMIC,   /* rows g (q, t) = 0 */
-  PW_NONHOLONOMIC /* rows S (q, t) v = eta (t, q) */
+  PW_FORCE,       /* no constraint equations */
+  PW_HOLONOMIC,   /* g (q, t) = 0 */
+  PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
 
-/* An element kind: one const table in one file.  A NULL sweep means identically zero; the self-test verifies it.
- * Sizes are given per element. */
+/* An element type: one const table in one file.  A NULL function is identically zero; the self-test verifies this.
+ * Sizes are per element. */
 struct pw_kind {
-  const char *name;              /* "pin" */
-  const char *about;             /* one line */
-  size_t definition;             /* bytes of the definition structure, whose first member is `const char *name` */
-  size_t element;                /* bytes of the prepared element */
-  const pw_field *fields;        /* ended by a NULL name; `name` itself is not listed */
-  int bodies;                    /* bodies an element touches: as many as its fields of type PW_BODY name */
-  int own;                       /* coordinates of its own */
-  int rows;                      /* constraint rows */
-  int signals;                   /* signals, in the order of its fields; they serve the force if there is a force_u */
-  int each_body;                 /* 1: no body is named; the element acts on every body that has mass */
-  int constant;                  /* 1: its force depends on nothing: evaluated once, when the scene is compiled */
-  pw_level level;                /* of its rows */
-  const pw_quantity *reaction;   /* one per row: what -lambda is */
-  const pw_quantity *coordinate; /* one per internal coordinate */
-  const char *(*reaction_unit) (const void *element, int row); /* where it depends on the element; may be NULL */
+  const char *name;       /* "pin" */
+  const char *about;      /* one line */
+  size_t definition;      /* bytes of the definition structure, whose first member is `const char *name` */
+  size_t element;         /* bytes of the prepared element */
+  const pw_field *fields; /* ends with a NULL name; the member `name` is not listed */
+  int bodies;             /* bodies of an element: the number of fields of type PW_BODY, or 1 if each_body */
+  int own;                /* internal coordinates */
+  int rows;               /* constraint equations */
+  int signals;    /* signals, in the order of the fields; of its force if force_u is set, else of its constraints */
+  int each_body;  /* 1: names no body; acts on every body with mass */
+  int constant;   /* 1: its force is constant and evaluated once, when the scene is compiled */
+  pw_level level; /* of its constraint equations */
+  const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
+  const pw_quantity *coordinate;                               /* own: the internal coordinates */
+  const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
 
-  /* Turns a checked definition into a prepared element; bodies are those it names or acts on, in order, the ground as
-   * a body without mass.  own takes mass and start of each internal coordinate, zero so far.  Returns a status. */
+  /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground
+   * is a body without mass.  own: receives mass and initial values of each internal coordinate; zero before.
+   * Returns a status. */
   int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                   pw_error *error);
 
-  pw_batch_function *g;       /* rows: residual of holonomic rows */
-  pw_batch_function *g_size;  /* rows: sum of the absolute values of the terms of g, the reference size of g */
-  pw_batch_function *eta;     /* rows: right-hand side of J v = eta; for holonomic rows -dg/dt */
+  pw_batch_function *g;       /* rows: residual of holonomic constraint equations */
+  pw_batch_function *g_size;  /* rows: sum of the absolute values of the terms of g, its reference size */
+  pw_batch_function *eta;     /* rows: right-hand side of J v = eta; holonomic: -dg/dt */
   pw_batch_function *J;       /* rows x cols */
   pw_batch_function *gamma;   /* rows: right-hand side of J a = gamma */
   pw_batch_function *force;   /* cols: generalised force */
-  pw_batch_function *force_u; /* cols x signals: derivative of the force by each signal's value */
-  pw_batch_function
-      *jw_q; /* rows x cols: derivative of J w by q, w given in the batch; that of J^T lambda follows from it */
+  pw_batch_function *force_u; /* cols x signals: derivative of the force with respect to the value of each signal */
+  pw_batch_function *jw_q;    /* rows x cols: derivative of J w with respect to q; also gives that of J^T lambda */
   pw_batch_function *eta_q;   /* rows x cols */
   pw_batch_function *gamma_q; /* rows x cols */
   pw_batch_function *gamma_v; /* rows x cols */
   pw_batch_function *force_q; /* cols x cols */
   pw_batch_function *force_v; /* cols x cols */
   pw_batch_function *energy;  /* 1: potential energy [J] */
-  pw_batch_function *power;   /* 1: power the element feeds into the system [W] */
-  pw_batch_function *loss;    /* 1: power it dissipates [W], >= 0 */
-  pw_batch_function *contact; /* 3: point on the ground [m] and heading [rad], for paths and pictures */
-  /* 2 cols: a force that saturates, such as friction; by how much each coordinate, then each velocity, may change until the
-   * force has changed by its own size.  INFINITY, already there, where it does not saturate.  NULL: nowhere. */
+  pw_batch_function *power;   /* 1: power supplied to the system [W] */
+  pw_batch_function *loss;    /* 1: dissipated power [W], >= 0 */
+  pw_batch_function *contact; /* 3: contact point on the ground [m] and heading [rad], for output */
+  /* 2 cols, for forces that saturate, such as friction: the change of each coordinate, then of each velocity, over
+   * which the force changes by its own magnitude.  Entries are INFINITY (no saturation) before the call. */
   pw_batch_function *saturation;
 };
 
-/* How many values a field stands for, and the bytes of one; 0: there is no such type. */
+/* The number of values of a field, and the bytes of one value; 0 bytes: invalid type. */
 static inline int pw_field_count (const pw_field *f) {
   return f->count > 0 ? f->count : 1;
 }
 size_t pw_field_bytes (pw_field_type type);
 
-/* The k-th value of a type in a definition, counting each of its fields' `count`; NULL if there are not as many. */
+/* The k-th value of a type in a definition, where a field counts `count` times; NULL if there are fewer. */
 const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_type type, int k);
 
-/* 1 if elements of the kind take part in the motion; a marker does not. */
+/* 1 if elements of the type influence the motion; 0 for markers. */
 static inline int pw_kind_acts (const pw_kind *kind) {
   return kind->rows > 0 || kind->own > 0 || kind->force != NULL;
 }
 
-/* 1 if its signals serve a force: they may depend on states, and need no derivatives. */
+/* 1 if its signals belong to a force: they may depend on states and need no time derivatives. */
 static inline int pw_kind_forced (const pw_kind *kind) {
   return kind->force_u != NULL;
 }
 
-/* Every kind k of the list: its table pw_kind_k, and pw_add_k, which is pw_add with that table. */
+/* For each built-in element type k: its table pw_kind_k, and pw_add_k, which is pw_add with that table. */
 #define PW_KIND(k)                                                       \
   extern const pw_kind pw_kind_##k;                                      \
   static inline int pw_add_##k (pw_model *m, const pw_##k *definition) { \
@@ -656,105 +666,106 @@ static inline int pw_kind_forced (const pw_kind *kind) {
 PW_KINDS
 #undef PW_KIND
 
-/* The built-in kinds, ended by NULL. */
+/* The built-in element types; ends with NULL. */
 extern const pw_kind *const pw_kinds[];
 
-/* ---- Models from outside a build function ---- */
+/* ---- Creating and modifying models ---- */
 
-/* A model with its parameters at their defaults, not built yet.  `name` is copied; the table must outlive the model.
- * NULL with the error filled if the table does not fit this library or memory is out. */
+/* Creates a model with default parameters; build it with pw_model_build.  `name` is copied; the table must outlive
+ * the model.  Returns NULL and sets the error if the table does not match this library or memory is exhausted. */
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error);
 void pw_model_free (pw_model *m);
 
-/* Sets a parameter before pw_model_build.  Errors: unknown name, value outside its domain. */
+/* Sets a parameter before pw_model_build.  Errors: PW_INPUT for an unknown name or a value outside its domain. */
 int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *error);
 
-/* Runs the model's build function.  Errors: whatever an added body or element is wrong about. */
+/* Runs the model's build function.  Errors: the first one of a body or element added. */
 int pw_model_build (pw_model *m, pw_error *error);
 
-/* Replaces a signal of a built model: pw_model_set_signal (m, "rider", "value", &signal, e).  Errors: PW_INPUT for an element or
- * field that does not exist, with the nearest name; whether the field can take the signal is pw_system_compile's to tell. */
+/* Replaces a signal of a built model: pw_model_set_signal (m, "rider", "value", &signal, e).  Errors: PW_INPUT for
+ * an unknown element or field, with the nearest name.  pw_system_compile checks whether the signal suits the field. */
 int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
 
-/* Gives a start value, "frame.vx" or "wheel.spin", which the consistent start then holds.  Errors: PW_INPUT for a value that
- * is not finite; whether there is such a state is pw_system_compile's to tell. */
+/* Prescribes the initial value of a state, "frame.vx" or "wheel.spin"; the consistent initial state keeps it if
+ * possible.  Errors: PW_INPUT for a value that is not finite.  pw_system_compile checks whether the state exists. */
 int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error *error);
 
-/* ---- What a model consists of ---- */
+/* ---- Contents of a model ---- */
 
 const char *pw_model_name (const pw_model *m);
 const pw_plugin_table *pw_model_table (const pw_model *m);
-double pw_model_parameter (const pw_model *m, const pw_parameter *p); /* its value; p: in the model's table */
+double pw_model_parameter (const pw_model *m, const pw_parameter *p); /* value of p, an entry of the model's table */
 
-/* Its bodies and elements in the order they were added, once it is built; they belong to the model, until more are added. */
+/* Bodies and elements of a built model in the order they were added.  They belong to the model; adding more
+ * invalidates the pointers. */
 typedef struct {
   const pw_kind *kind;
-  void *definition; /* kind->definition bytes, the first member its name */
+  void *definition; /* kind->definition bytes; the first member is its name */
 } pw_element;
 const pw_body *pw_model_bodies (const pw_model *m, int *count);
 const pw_element *pw_model_elements (const pw_model *m, int *count);
 static inline const char *pw_element_name (const pw_element *e) {
   return *(const char *const *)e->definition;
 }
-int pw_model_initial (const pw_model *m); /* how many values pw_model_set_initial has given */
+int pw_model_initial (const pw_model *m); /* number of values set by pw_model_set_initial */
 
-/* What a text model knows about its motion: expressions of the time for some states; and the values of the names in these
+/* Reference solution of a text model: expressions of time for some states, and the values of the names used in them
  * and in signals. */
 typedef struct {
-  int states;                 /* 0: nothing */
-  const char **state, **text; /* states: "bob.phi", and its expression */
+  int states;                 /* 0: no reference solution */
+  const char **state, **text; /* states: name, "bob.phi", and expression */
   int names;
   const char **name;                               /* names */
   double *value;                                   /* names */
-  double (*eval) (void *context, int i, double t); /* the value of expression i */
+  double (*eval) (void *context, int i, double t); /* value of expression i at time t */
   void *context;
 } pw_reference_text;
-const pw_reference_text *pw_model_reference (const pw_model *m); /* all zero: it knows nothing */
-void pw_model_set_reference (pw_model *m,
-                             const pw_reference_text *reference); /* which must live as long as the model */
+const pw_reference_text *pw_model_reference (const pw_model *m);               /* all zero if there is none */
+void pw_model_set_reference (pw_model *m, const pw_reference_text *reference); /* must outlive the model */
 
-/* ---- For build functions that read their models from elsewhere ---- */
+/* ---- For build functions that read models from other sources ---- */
 
-/* Frees an object with the model: memory of function signals, for instance.  PW_RESOURCE, and the object is released at once. */
+/* Frees an object, such as the context of a function signal, together with the model.  PW_RESOURCE: the object has
+ * been freed. */
 int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object));
 
-/* The first error of a model, which a build function may set. */
+/* The first error of a model; a build function may set it. */
 pw_error *pw_model_error (pw_model *m);
 
-/* What pw_system_compile would refuse in a body, and in an element, but for bodies that do not exist; errors begin with
- * "model NAME: ".  PW_INPUT. */
+/* Check a body and an element as pw_system_compile does, except whether the bodies of the element exist.  Errors:
+ * PW_INPUT, beginning with "model NAME: ". */
 int pw_model_check_body (const pw_model *m, const pw_body *body, pw_error *error);
 int pw_model_check_element (const pw_model *m, const pw_element *element, pw_error *error);
 
-/* What is wrong with a signal of a kind, written to the buffer, which is returned; "" if nothing is.  *point becomes the point
- * of a table that is meant, or -1. */
+/* Writes the fault of a signal used by an element type, or "", to the buffer and returns it.  *point: the faulty
+ * point of a table, or -1. */
 char *pw_signal_check (const pw_signal *s, const pw_kind *kind, int *point, char *buffer, size_t size);
 
-/* Checks a plug-in's table: its ABI, that it can build, its texts and parameters.  Errors: PW_INPUT, beginning with `what`, a path
- * or "model NAME". */
+/* Checks a plug-in's table: ABI, build function, texts and parameters.  Errors: PW_INPUT, beginning with `what`,
+ * which is a path or "model NAME". */
 int pw_plugin_check (const pw_plugin_table *table, const char *what, pw_error *error);
 
 /* ---- The compiled system ---- */
 
-/* A compiled system is never modified: any number of runs and threads may share it.  It does not refer to the model it was
- * compiled from, but to the element types and the function signals. */
+/* A compiled system is never modified: any number of runs and threads may share it.  It does not refer to the model
+ * it was compiled from; it does refer to element types and function signals. */
 typedef struct pw_system pw_system;
 
-/* What an evaluation modifies: configurations, J, values of signals, scratch memory.  A run has one; so does a program that
- * evaluates a system itself.  It belongs to one thread at a time, and the system must outlive it. */
+/* What an evaluation modifies: configurations, J, values of signals, scratch memory.  Each run has one; a program
+ * that evaluates a system itself creates one.  Use it from one thread at a time; the system must outlive it. */
 typedef struct pw_workspace pw_workspace;
 
-/* Checks and compiles a built model.  NULL with the error filled if it cannot be. */
+/* Checks and compiles a built model.  Returns NULL and sets the error on failure. */
 pw_system *pw_system_compile (const pw_model *m, pw_error *error);
 void pw_system_free (pw_system *s);
 
-/* 1 if a built model knows its motion (see pw_plugin_table), and what it knows at time t: q and v have as many entries as
- * the system compiled from it has coordinates; what is not known is NaN.  It holds for the described start, not for values
- * of pw_model_set_initial.  Errors: PW_INPUT for a state the system does not have. */
+/* Whether a built model has a reference solution (see pw_plugin_table), and its values at time t.  q and v:
+ * pw_system_coordinates entries each; unknown ones are NaN.  Valid for the described initial conditions, not for
+ * values of pw_model_set_initial.  Errors: PW_INPUT for a state the system does not have. */
 int pw_system_has_reference (const pw_model *m);
 int pw_system_reference (const pw_model *m, const pw_system *s, double t, double *q, double *v, pw_error *error);
 
-/* Sizes: bodies, coordinates (q and v have as many entries each), constraint rows, of which the first are holonomic. */
+/* Sizes: bodies; coordinates (entries of q and of v); constraint equations; the first of these, which are holonomic. */
 int pw_system_bodies (const pw_system *s);
 int pw_system_coordinates (const pw_system *s);
 int pw_system_rows (const pw_system *s);
@@ -763,26 +774,26 @@ int pw_system_holonomic (const pw_system *s);
 /* Index of a body by name, or -1. */
 int pw_system_find_body (const pw_system *s, const char *name);
 
-/* Index of a state by name: i for coordinate q[i], n + i for its rate v[i], n the number of coordinates.  PW_INPUT
- * and the error, with the nearest name, if there is no such state. */
+/* Index of a state by name: i for coordinate q[i], n + i for velocity v[i], where n is the number of coordinates.
+ * PW_INPUT and the error, with the nearest name, for an unknown state. */
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error);
 
-/* The name and unit of a state ("frame.vx", "m/s"); the name is written to the buffer, which is returned. */
+/* Name and unit of a state ("frame.vx", "m/s").  The name is written to the buffer, which is returned. */
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size);
 const char *pw_system_state_unit (const pw_system *s, int state);
 
-/* The name and unit of a row's reaction ("B.Fx", "N"), as pw_system_state_name. */
+/* Name and unit of the reaction of a constraint equation ("B.Fx", "N"), as pw_system_state_name. */
 char *pw_system_reaction_name (const pw_system *s, int row, char *buffer, size_t size);
 const char *pw_system_reaction_unit (const pw_system *s, int row);
 
-/* The row whose reaction has this name: its value is -lambda[row] of a sample.  PW_INPUT and the error, with the nearest
- * name, if there is none. */
+/* The constraint equation whose reaction has this name; the reaction is -lambda[row] of a sample.  PW_INPUT and the
+ * error, with the nearest name, if there is none. */
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error);
 
-/* The kind and name of a row's element ("wheel C"), as pw_system_state_name. */
+/* Type and name of the element of a constraint equation ("wheel C"), as pw_system_state_name. */
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size);
 
-/* Its name; the name of a body; the diagonal of M [kg], [kg m^2]: one number per coordinate; the length scale L [m]. */
+/* Name of the model; name of a body; diagonal of M, one entry per coordinate [kg], [kg m^2]; length scale L [m]. */
 const char *pw_system_name (const pw_system *s);
 const char *pw_system_body_name (const pw_system *s, int body);
 const double *pw_system_mass (const pw_system *s);
@@ -792,26 +803,27 @@ double pw_system_length (const pw_system *s);
 const double *pw_system_initial_q (const pw_system *s);
 const double *pw_system_initial_v (const pw_system *s);
 
-/* 1 if multipliers may jump at time t: the signal of a force jumps there, or any derivative of one that a constraint follows. */
+/* 1 if multipliers may jump at time t: the signal of a force, or a constraint's signal or one of its derivatives,
+ * jumps there. */
 int pw_system_jumps (const pw_system *s, double t);
 
-/* ---- Its elements, in the order of its constraint equations ---- */
+/* ---- Elements of a system, in the order of its constraint equations ---- */
 
-/* An element that acts on every body counts once for each. */
+/* An element that acts on every body appears once per body. */
 typedef struct {
   const char *name;
   const pw_kind *kind; /* kind->level is the type of its constraint equations */
-  const int *body;     /* kind->bodies indices; that of the ground is the number of bodies */
+  const int *body;     /* kind->bodies indices; the ground's index is the number of bodies */
   int row;             /* its first constraint equation, of kind->rows */
   int coordinate;      /* its first internal coordinate, of kind->own */
-  int contact;         /* index of its contact point; -1: it has none */
-  int force;           /* where its forces begin in pw_workspace_forces */
+  int contact;         /* index of its contact point; -1: no contact point */
+  int force;           /* index of its first force in pw_workspace_forces */
 } pw_element_info;
 int pw_system_elements (const pw_system *s);
 pw_element_info pw_system_element (const pw_system *s, int element);
 int pw_system_row_element (const pw_system *s, int row); /* the element of a constraint equation */
 
-/* A workspace for the functions below, which evaluate a state.  NULL and the error without memory. */
+/* A workspace for the functions below.  NULL and the error if out of memory. */
 pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error);
 void pw_workspace_free (pw_workspace *w);
 
@@ -822,27 +834,29 @@ int pw_system_contacts (const pw_system *s);
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error);
 
-/* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies, the ground's without
- * meaning: -J^T lambda and what it applies.  Constraint equations on velocities count alike. */
+/* The force (Fx, Fy [N], M [N m] about the centre of mass) of each element on each of its bodies: -J^T lambda plus
+ * the applied force, for holonomic and nonholonomic constraint equations alike.  Entries of the ground are
+ * meaningless. */
 int pw_system_force_size (const pw_system *s);
 int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
                          pw_error *error);
 
-/* The equations M a + J^T lambda = f,  J v = eta,  J a = gamma at a state.  J by its entries, those that are 0 here among
- * them, row by row of each element; there is at most one for each row and column. */
+/* The equations M a + J^T lambda = f,  J v = eta,  J a = gamma at a state.  J is sparse: the entries of each element
+ * row by row, including those that are 0 at this state, at most one for each row and column. */
 typedef struct {
   int coordinates, rows, holonomic, entries;
   double *mass, *force; /* coordinates: diagonal of M; f */
   double *g;            /* holonomic */
   double *eta, *gamma;  /* rows */
-  int *row, *column;    /* entries: where they are in J */
+  int *row, *column;    /* entries: indices in J */
   double *value;        /* entries */
 } pw_equations;
 int pw_system_equations (const pw_system *s, double t, const double *q, const double *v, pw_equations *out,
                          pw_error *error);
-void pw_equations_free (pw_equations *e); /* in every case */
+void pw_equations_free (pw_equations *e); /* required even after an error */
 
-/* Second-order blocks that are PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as pw_system_state_name. */
+/* Number of second-order blocks given as PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as
+ * pw_system_state_name. */
 int pw_system_differences (const pw_system *s);
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 

@@ -1,4 +1,4 @@
-/* Bytes that a state is saved to and loaded from. */
+/* Buffers that a state is saved to and loaded from. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>

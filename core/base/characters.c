@@ -1,4 +1,5 @@
-/* Characters of texts that come from outside: UTF-8, and none that move a terminal's cursor or colour its lines. */
+/* Checks of external texts: UTF-8 without control characters, which could move a terminal's cursor or change its
+ * colours. */
 #include <string.h>
 #include "util.h"
 

@@ -1,16 +1,16 @@
-/* Jacobi's elliptic functions, by which pendulums swing, through the arithmetic-geometric mean of 1 and sqrt (1 - m):
+/* Jacobi's elliptic functions (the exact motion of a pendulum) by the arithmetic-geometric mean of 1 and sqrt (1 - m):
  *
  *     a' = (a + b) / 2,   b' = sqrt (a b),   c' = (a - b) / 2,       K (m) = pi / (2 a)  in the limit,
  *
- * and am (u) from 2^N a u by descending  2 phi = phi' + asin (c' sin phi' / a').
+ * and am (u) from phi = 2^N a u by N steps of  2 phi = phi' + asin (c' sin phi' / a').
  * (Abramowitz & Stegun 1964, sections 16.4 and 17.6.) */
 #include <float.h>
 #include <math.h>
 #include "pinwheel.h"
 
-enum { ELLIPTIC_STEPS = 12 }; /* more than any m < 1 needs */
+enum { ELLIPTIC_STEPS = 12 }; /* sufficient for any m < 1 */
 
-/* The mean in a, c[i] / a[i] of the steps in `ratio`; how many there were. */
+/* Stores the mean in *a and c / a of each step in `ratio`.  Returns the number of steps. */
 static int elliptic_mean (double m, double *a, double ratio[ELLIPTIC_STEPS]) {
   double b = sqrt (1 - m);
   int n = 0;

@@ -1,4 +1,4 @@
-/* Errors with the nearest valid name. */
+/* Recording of errors. */
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>

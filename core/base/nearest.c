@@ -1,10 +1,11 @@
-/* The nearest valid name, and the domains of numbers. */
+/* Suggestions of valid names, and domains of numbers. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "util.h"
 
-/* Edit distance (Levenshtein 1966), by one row; names longer than the row count as far away. */
+/* Edit distance (Levenshtein 1966), keeping one row of the table; a candidate longer than the row has its length as
+ * distance. */
 static size_t nearest_distance (const char *a, const char *b) {
   size_t row[64], n = strlen (b);
   if (n >= sizeof row / sizeof *row) return n;
@@ -22,7 +23,8 @@ static size_t nearest_distance (const char *a, const char *b) {
   return row[n];
 }
 
-/* A name is near if less than half of it would have to change, up to half of a short one, or one begins or ends with the other. */
+/* Two names are near if less than half of the longer one has to change (half, if that is one or two characters), or
+ * if one begins or ends with the other. */
 static int nearest_is_near (const char *a, size_t n, const char *b, size_t m, size_t distance) {
   size_t longer = n > m ? n : m, shorter = n + m - longer;
   return 2 * distance < longer + (distance <= 2) ||
@@ -33,13 +35,13 @@ static int nearest_lower (char c) {
   return c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c;
 }
 
-/* Whether two names differ in capitals alone. */
+/* 1 if two names are equal except for capitals. */
 static int nearest_same (const char *a, const char *b) {
   while (*a && nearest_lower (*a) == nearest_lower (*b)) a++, b++;
   return *a == *b;
 }
 
-static void nearest_keep (pw_nearest *n, const char *candidate) {
+static void nearest_append (pw_nearest *n, const char *candidate) {
   size_t used = strlen (n->all), more = strlen (candidate);
   n->crowded |= used + more + 3 > sizeof n->all;
   if (n->crowded) return;
@@ -50,7 +52,7 @@ static void nearest_keep (pw_nearest *n, const char *candidate) {
 void pw_nearest_try (pw_nearest *n, const char *candidate) {
   size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
   size_t distance = nearest_same (n->sought, candidate) ? 0 : nearest_distance (n->sought, candidate);
-  nearest_keep (n, candidate);
+  nearest_append (n, candidate);
   if (n->best && distance * n->length >= n->distance * length) return;
   n->best = candidate;
   n->distance = distance;

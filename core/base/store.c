@@ -1,4 +1,4 @@
-/* Name tables, arenas and one-piece layouts. */
+/* Name tables, arenas, and layouts of one allocation. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -99,7 +99,7 @@ char *pw_take_arrays (const pw_array *array, size_t arrays) {
 }
 
 int pw_reserve (size_t bytes) {
-  void *volatile p = malloc (bytes); /* volatile: an unused allocation would be optimised away */
+  void *volatile p = malloc (bytes); /* volatile: keeps the compiler from removing the allocation */
   int status = p ? PW_OK : PW_RESOURCE;
   free (p);
   return status;

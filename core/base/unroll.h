@@ -1,31 +1,31 @@
-/* Functions written once for a constant size and compiled for each, so that their loops vanish. */
+/* Attributes and pragmas for functions that are compiled once per constant size, with unrolled loops. */
 #ifndef PW_UNROLL_H
 #define PW_UNROLL_H
 
-/* Before a loop whose length, at most 8, is a constant once its function is inlined.  Clang needs no telling. */
+/* Before a loop whose length, at most 8, is constant after inlining.  Clang unrolls it without a pragma. */
 #if defined(__GNUC__) && !defined(__clang__)
 #define PW_UNROLL _Pragma ("GCC unroll 8")
 #else
 #define PW_UNROLL
 #endif
 
-/* In the place of `static` of such a function. */
+/* Replaces `static` of such a function. */
 #if defined(__GNUC__)
 #define PW_INLINE static inline __attribute__ ((always_inline))
 #else
 #define PW_INLINE static inline
 #endif
 
-/* In the place of `static` of a function beside a shorter and more frequent way through its caller, which then need not save
- * what this one uses. */
+/* Replaces `static` of a rarely called function, so that the frequent path of its caller need not save its
+ * registers. */
 #if defined(__GNUC__)
 #define PW_NOINLINE static __attribute__ ((noinline))
 #else
 #define PW_NOINLINE static
 #endif
 
-/* At the top of a file that reads pairs of numbers which were stored one by one: read as one vector, they would have
- * to wait until the stores are done. */
+/* At the top of a file that reads pairs of numbers shortly after storing them one by one: a vector load would stall
+ * until both stores are complete. */
 #if defined(__GNUC__) && !defined(__clang__)
 #define PW_ONE_BY_ONE _Pragma ("GCC optimize (\"no-tree-slp-vectorize\")")
 #else

@@ -1,42 +1,42 @@
-/* Utilities: nearest names, texts, a table of names, arenas, layouts. */
+/* Utilities: nearest names, texts, name tables, arenas, layouts. */
 #ifndef PW_UTIL_H
 #define PW_UTIL_H
 
 #include <stddef.h>
 #include "pinwheel.h"
 
-/* Refuses NULL in the place of "a system", left by an earlier call whose error the caller need not have looked at. */
+/* PW_INPUT if object is NULL, the result of an earlier call that failed; what: "a system". */
 static inline int pw_require (const void *object, const char *what, pw_error *error) {
   return object ? PW_OK : pw_fail (error, PW_INPUT, "%s is missing", what);
 }
 
-/* Keeps the valid name nearest to one that was not found, as a share of the longer one's length; start with
- * { .sought = name }. */
+/* Collects valid names, and the one nearest to an unknown name: least distance over the length of the longer name.
+ * Start with { .sought = name }. */
 typedef struct {
   const char *sought;
   const char *best;
-  size_t distance, length; /* of the best from the name sought, and of the longer of the two */
-  int near;                /* 1: near enough to suggest it */
-  int crowded;             /* 1: there are more than all holds */
-  char all[88];            /* the valid names, while there is room for them */
+  size_t distance, length; /* distance of best from sought; length of the longer of the two */
+  int near;                /* 1: best is near enough to be suggested */
+  int crowded;             /* 1: the valid names do not fit in `all` */
+  char all[88];            /* the valid names, separated by commas */
 } pw_nearest;
 void pw_nearest_try (pw_nearest *n, const char *candidate);
-/* "; did you mean \"steer\"?", "; valid are x, y, z" if none of a few is near, "" if none of many is, written to the buffer,
- * which is returned. */
+/* Writes the hint to the buffer and returns it: "; did you mean \"steer\"?"; "; valid are x, y, z" if no name is
+ * near and all fit; else "". */
 char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size);
 
-/* ---- Texts (characters.c); they end with a 0 ---- */
+/* ---- Zero-terminated texts (characters.c) ---- */
 
-/* The bytes of the UTF-8 character that a text begins with; 0 if it begins with none. */
+/* Bytes of the UTF-8 character at the beginning of a text; 0 if invalid. */
 int pw_utf8_size (const char *text);
-/* The code of the control character that a text begins with, line ends and tabs excepted; 0 if it begins with none. */
+/* Code of the control character at the beginning of a text, except line ends and tabs; 0 if there is none. */
 int pw_control (const char *text);
 /* 1 if a text is UTF-8 without control characters. */
 int pw_is_text (const char *text);
-/* Makes it so: what is not becomes question marks. */
+/* Replaces control characters and invalid bytes by question marks. */
 void pw_make_text (char *text);
 
-/* Open-addressing table from names to numbers >= 0; it keeps the pointers, not copies. */
+/* Open-addressing table from names to numbers >= 0; it stores pointers to the names, not copies. */
 typedef struct {
   size_t size; /* a power of two */
   struct pw_name {
@@ -49,7 +49,7 @@ void pw_names_close (pw_names *n);
 int pw_names_add (pw_names *n, const char *name, int value); /* -1, or the value the name already has */
 int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
 
-/* A growing store that is released as a whole. */
+/* Memory that grows and is released as a whole. */
 typedef struct {
   struct pw_chunk *chunk;
 } pw_arena;
@@ -57,26 +57,26 @@ void *pw_arena_take (pw_arena *a, size_t bytes); /* zeroed, or NULL */
 char *pw_arena_text (pw_arena *a, const char *text);
 void pw_arena_free (pw_arena *a);
 
-/* Lays out one allocation: run the same takes twice, first with base NULL to learn the size. */
+/* Lays out one allocation: make the same calls of pw_take twice, first with base NULL to compute the size. */
 typedef struct {
   char *base;
   size_t used;
 } pw_layout;
 void *pw_take (pw_layout *l, size_t count, size_t size);
 
-/* An array of numbers: where its address goes, and how many. */
+/* An array of numbers: where its address is stored, and its length. */
 typedef struct {
   double **at;
   size_t count;
 } pw_array;
-/* Lays out arrays in one allocation, which is zeroed and returned; NULL if there is no memory. */
+/* Lays out arrays in one zeroed allocation and returns it; NULL if out of memory. */
 char *pw_take_arrays (const pw_array *array, size_t arrays);
 
-/* PW_OK if `bytes` can be allocated now, else PW_RESOURCE.  Used before calls of libraries that crash when an allocation
- * fails. */
+/* PW_OK if `bytes` can be allocated now, else PW_RESOURCE.  Used before calls of libraries that crash when an
+ * allocation fails. */
 int pw_reserve (size_t bytes);
 
-/* "" if a value lies in the domain, else what was expected (">= 0"). */
+/* "" if a value lies in the domain, else the expected one ("a number >= 0"). */
 const char *pw_domain_check (pw_domain domain, double value);
 
 #endif

@@ -1,5 +1,5 @@
-/* Element types: the list of built-in ones, the fields of a definition, and checks of a type's table.  A table is checked before
- * anything in it is used, so that a mistake in a plug-in is reported instead of crashing the program. */
+/* Element types: the list of built-in ones, the fields of a definition, and checks of a type's table.  A table is
+ * checked before use, so that a mistake in a plug-in is reported instead of crashing the program. */
 #include <stdio.h>
 #include <string.h>
 #include "model.h"
@@ -66,7 +66,7 @@ static const char *fault_fields (const pw_kind *k, char *buffer, size_t size) {
   return "";
 }
 
-static const char *fault_sweeps (const pw_kind *k) {
+static const char *fault_functions (const pw_kind *k) {
   pw_batch_function *const exact[] = { k->g,       k->g_size, k->eta,   k->J,    k->gamma,   k->force,
                                        k->force_u, k->energy, k->power, k->loss, k->contact, k->saturation };
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
@@ -113,5 +113,5 @@ const char *pw_kind_check (const pw_kind *k, char *buffer, size_t size) {
   if ((k->own > 0 || k->element > 0) && k->prepare == NULL) return "something to prepare, but no prepare function";
   const char *fault = fault_names (k);
   if (*fault == 0) fault = fault_fields (k, buffer, size);
-  return *fault ? fault : fault_sweeps (k);
+  return *fault ? fault : fault_functions (k);
 }

@@ -90,7 +90,7 @@ int pw_model_refuse (pw_model *m, const char *format, ...) {
   return pw_fail (&m->error, PW_INPUT, "model %s: %s", m->name, text);
 }
 
-/* Makes room for one more in a growing array. */
+/* Ensures room for one more entry in an array. */
 static int model_grow (pw_model *m, void *array, int count, int *room, size_t size) {
   if (count < *room) return PW_OK;
   int more = *room ? 2 * *room : 8;
@@ -101,7 +101,7 @@ static int model_grow (pw_model *m, void *array, int count, int *room, size_t si
   return PW_OK;
 }
 
-static const char *model_text (pw_model *m, const char *text) {
+static const char *model_copy_text (pw_model *m, const char *text) {
   if (text == NULL) return NULL;
   char *copy = pw_arena_text (&m->arena, text);
   if (copy == NULL) model_no_memory (m);
@@ -114,11 +114,11 @@ int pw_add_body (pw_model *m, const pw_body *body) {
     return m->error.status;
   pw_body *b = &m->body[m->bodies++];
   *b = *body;
-  b->name = model_text (m, body->name);
+  b->name = model_copy_text (m, body->name);
   return m->error.status;
 }
 
-static const double *model_numbers (pw_model *m, const double *from, int count) {
+static const double *model_copy_numbers (pw_model *m, const double *from, int count) {
   double *copy = pw_arena_take (&m->arena, (size_t)count * sizeof *copy);
   if (copy == NULL) {
     model_no_memory (m);
@@ -128,14 +128,14 @@ static const double *model_numbers (pw_model *m, const double *from, int count) 
 }
 
 /* Copies the points of a table; pw_system_compile reports invalid ones. */
-static void model_table (pw_model *m, pw_signal *s) {
+static void model_copy_table (pw_model *m, pw_signal *s) {
   if (s == NULL || s->type != PW_TABLE || s->table.count < 1 || s->table.t == NULL || s->table.value == NULL) return;
-  s->table.t = model_numbers (m, s->table.t, s->table.count);
-  s->table.value = model_numbers (m, s->table.value, s->table.count);
+  s->table.t = model_copy_numbers (m, s->table.t, s->table.count);
+  s->table.value = model_copy_numbers (m, s->table.value, s->table.count);
 }
 
-/* Checks an element type, unless the element before has the same. */
-static int model_kind (pw_model *m, const pw_kind *kind) {
+/* Checks an element type, unless the previous element has the same type. */
+static int model_check_kind (pw_model *m, const pw_kind *kind) {
   if (m->elements > 0 && m->element[m->elements - 1].kind == kind) return PW_OK;
   char buffer[200];
   const char *fault = kind ? pw_kind_check (kind, buffer, sizeof buffer) : "there is none";
@@ -145,7 +145,7 @@ static int model_kind (pw_model *m, const pw_kind *kind) {
 }
 
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
-  if (m->error.status != PW_OK || model_kind (m, kind) != PW_OK ||
+  if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK ||
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
   if (definition == NULL) return pw_model_refuse (m, "pw_add of kind %s without a definition", kind->name);
@@ -153,12 +153,12 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (copy == NULL) return model_no_memory (m);
   memcpy (copy, definition, kind->definition);
   const char **name = copy;
-  *name = model_text (m, *name);
+  *name = model_copy_text (m, *name);
   for (int i = 0; i < kind->bodies && !kind->each_body; i++) {
     const char **body = pw_field_in (kind, copy, PW_BODY, i);
-    *body = model_text (m, *body);
+    *body = model_copy_text (m, *body);
   }
-  for (int i = 0; i < kind->signals; i++) model_table (m, pw_field_in (kind, copy, PW_SIGNAL, i));
+  for (int i = 0; i < kind->signals; i++) model_copy_table (m, pw_field_in (kind, copy, PW_SIGNAL, i));
   m->element[m->elements++] = (pw_element){ kind, copy };
   return m->error.status;
 }
@@ -237,7 +237,7 @@ int pw_model_set_signal (pw_model *m, const char *element, const char *field, co
       pw_nearest_try (&fields, f->name);
       if (strcmp (f->name, field) != 0) continue;
       void *at = memcpy ((char *)e->definition + f->offset, signal, sizeof *signal);
-      model_table (m, at);
+      model_copy_table (m, at);
       return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
     }
     return pw_fail (error, PW_INPUT, "model %s: %s %s has no signal \"%s\"%s", m->name, e->kind->name, element, field,
@@ -254,7 +254,7 @@ int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error
   if (*expected)
     return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);
   if (model_grow (m, &m->given, m->givens, &m->given_room, sizeof *m->given) == PW_OK) {
-    m->given[m->givens] = (pw_given){ model_text (m, state), value };
+    m->given[m->givens] = (pw_given){ model_copy_text (m, state), value };
     if (m->given[m->givens].state) m->givens++;
   }
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);

@@ -1,10 +1,10 @@
-/* The description from inside: what pw_system_compile reads. */
+/* The model, as pw_system_compile reads it. */
 #ifndef PW_MODEL_H
 #define PW_MODEL_H
 
 #include "util.h"
 
-/* The most an element may have; plug-in kinds are checked against it. */
+/* Limits of an element, also for types from plug-ins. */
 enum {
   PW_MAX_BODIES = 4,
   PW_MAX_INTERNAL = 4,
@@ -32,20 +32,20 @@ struct pw_model {
   const pw_reference_text *reference;
   struct pw_kept *kept; /* released with the model */
   int built;
-  pw_error error; /* the first one */
+  pw_error error; /* the first error */
 };
 
-/* The most bytes in a name: "KIND ELEMENT" and "ELEMENT.REACTION" are to fit the 120 of a buffer. */
+/* The longest name [bytes]: "KIND ELEMENT" and "ELEMENT.REACTION" fit in a buffer of 120. */
 enum { PW_NAME_MOST = 50 };
 
-/* Checks every body and element against its field table: names, numbers, bodies' names, signals. */
+/* Checks every body and element: names, numbers, names of bodies, signals. */
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
 
-/* "" if the table of an element type is consistent, else its fault, perhaps in the buffer.  Other functions may crash on an
+/* Returns the fault of an element type's table (the buffer or a constant), or "".  Other functions may crash on an
  * inconsistent table. */
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 
-/* pw_field_at of a definition that is to be modified. */
+/* As pw_field_at, for a definition that will be modified. */
 static inline void *pw_field_in (const pw_kind *kind, void *definition, pw_field_type type, int k) {
   const char *at = pw_field_at (kind, definition, type, k);
   return at ? (char *)definition + (at - (const char *)definition) : NULL;

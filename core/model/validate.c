@@ -19,7 +19,7 @@ static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, con
                   expected);
 }
 
-/* Texts are UTF-8 without control characters, since they are printed and written to JSON. */
+/* Texts must be UTF-8 without control characters, since they are printed and written to JSON. */
 int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error) {
   if (t->abi != PW_ABI || t->size != sizeof *t)
     return pw_fail (error, PW_INPUT,
@@ -125,7 +125,7 @@ static int check_field (const pw_model *m, const pw_element *e, const pw_field *
   return PW_OK;
 }
 
-/* bodies NULL: any will do. */
+/* bodies NULL: names of bodies are not checked. */
 static int check_element (const pw_model *m, const pw_element *e, const pw_names *bodies, pw_error *error) {
   if (check_name (m, e->kind->name, pw_element_name (e), error) != PW_OK) return PW_INPUT;
   for (const pw_field *f = e->kind->fields; f->name; f++)

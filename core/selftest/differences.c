@@ -1,4 +1,4 @@
-/* Which second-order blocks of a scene are differenced because their kind has no formula for them; which are missing. */
+/* Second-order blocks of a scene that are computed by differences, and ones wrongly given as zero. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +9,7 @@ static const char *const differences_name[PW_BLOCKS] = {
   [PW_GAMMA_V] = "gamma_v", [PW_FORCE_Q] = "force_q", [PW_FORCE_V] = "force_v",
 };
 
-/* The batch and block of the i-th one; NULL if there are no more, and then *count how many there are. */
+/* The batch and block of the i-th block by differences; NULL, and their number in *count, if there are fewer. */
 static const pw_element_batch *differences_find (const pw_system *s, int i, pw_block *block, int *count) {
   *count = 0;
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++)
@@ -39,7 +39,7 @@ char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t
   return buffer;
 }
 
-/* ---- Missing ones ---- */
+/* ---- Missing blocks ---- */
 
 static int differences_built_in (const pw_kind *kind) {
   int i = 0;
@@ -47,8 +47,8 @@ static int differences_built_in (const pw_kind *kind) {
   return pw_kinds[i] != NULL;
 }
 
-/* Elements of the batch that are looked at: the first, the last, one between. */
-static int differences_missing (const pw_workspace *w, pw_element_batch *k, char *buffer, size_t size) {
+/* Tests the first, the last and a middle element of the batch. */
+static int differences_test (const pw_workspace *w, pw_element_batch *k, char *buffer, size_t size) {
   const int element[] = { 0, k->b.count - 1, k->b.count / 2 };
   for (int b = 0; b < PW_BLOCKS; b++)
     for (int i = 0; i < 3 && k->b.count > 0; i++) {
@@ -63,15 +63,15 @@ static void differences_random (pw_random *random, double *x, int n) {
   for (int i = 0; i < n; i++) x[i] = pw_random_between (random, -1, 1);
 }
 
-/* Directions, multipliers and signals of a batch are random. */
-static int differences_look (pw_workspace *w, pw_element_batch *k, pw_random *random, char *buffer, size_t size) {
+/* Searches a batch, with random w, multipliers and signals. */
+static int differences_search (pw_workspace *w, pw_element_batch *k, pw_random *random, char *buffer, size_t size) {
   int cols = k->b.count * k->b.cols, rows = k->b.count * k->kind->rows;
   double *x = malloc (((size_t)cols + (size_t)rows + 1) * sizeof *x);
   if (x == NULL) return PW_RESOURCE;
   differences_random (random, x, cols + rows);
   differences_random (random, k->u, 3 * k->b.count * k->kind->signals);
   k->b.w = x, k->b.lambda = x + cols;
-  int found = differences_missing (w, k, buffer, size);
+  int found = differences_test (w, k, buffer, size);
   k->b.w = k->b.lambda = NULL;
   free (x);
   return found;
@@ -80,20 +80,20 @@ static int differences_look (pw_workspace *w, pw_element_batch *k, pw_random *ra
 int pw_find_missing (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size) {
   const pw_system *s = w->s;
   pw_random random = { 1 };
-  int own = 0, found = 0;
-  for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) own += !differences_built_in (k->kind);
-  if (own == 0) return 0;
+  int not_built_in = 0, found = 0;
+  for (pw_element_batch *k = w->batch; k < w->batch + s->batches; k++) not_built_in += !differences_built_in (k->kind);
+  if (not_built_in == 0) return 0;
   double *state = malloc ((2 * (size_t)s->coords + 1) * sizeof *state);
   if (state == NULL) return PW_RESOURCE;
   for (int i = 0; i < 2 * s->coords; i++) {
-    int rate = i >= s->coords, j = rate ? i - s->coords : i;
-    double unit = pw_unit (s, j) / (rate ? w->scale.time : 1);
-    state[i] = (rate ? v[j] : q[j]) + 0.1 * unit * pw_random_between (&random, -1, 1);
+    int velocity = i >= s->coords, j = velocity ? i - s->coords : i;
+    double unit = pw_unit (s, j) / (velocity ? w->scale.time : 1);
+    state[i] = (velocity ? v[j] : q[j]) + 0.1 * unit * pw_random_between (&random, -1, 1);
   }
   pw_update_kinematics (w, t, state, state + s->coords);
   for (pw_element_batch *k = w->batch; found == 0 && k < w->batch + s->batches; k++)
-    if (!differences_built_in (k->kind)) found = differences_look (w, k, &random, buffer, size);
+    if (!differences_built_in (k->kind)) found = differences_search (w, k, &random, buffer, size);
   free (state);
-  pw_hold_signals (w, w->hold); /* signals are evaluated anew */
+  pw_hold_signals (w, w->hold); /* causes signals to be evaluated again */
   return found;
 }

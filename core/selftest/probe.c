@@ -1,4 +1,4 @@
-/* The self-test's instrument: a random state of a random scene, and slopes of whatever a kind computes there. */
+/* The self-test's probe: a random state of a random scene, and the slopes of an element type's functions there. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>

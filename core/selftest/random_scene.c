@@ -1,4 +1,4 @@
-/* Builds the self-test's scene from nothing but a kind's table. */
+/* Builds the self-test's scene from the table of an element type. */
 #include <math.h>
 #include <string.h>
 #include "model.h"
@@ -18,7 +18,7 @@ double pw_random_between (pw_random *r, double low, double high) {
 
 /* ---- Random definitions ---- */
 
-/* What the build function is handed. */
+/* The parameters of the build function. */
 typedef struct {
   const pw_kind *kind;
   pw_random *random;
@@ -47,7 +47,7 @@ static int scene_choice (pw_random *r, const pw_field *f) {
   return (int)floor (pw_random_between (r, 0, choices));
 }
 
-/* One value of a field.  Points stay near the centre of mass, so that bodies far apart keep their points apart. */
+/* One value of a field.  Points are near the centre of mass, so that points of distant bodies do not coincide. */
 static void scene_value (pw_random *r, const pw_field *f, void *at) {
   if (f->type == PW_NUMBER) *(double *)at = scene_number (r, f->domain);
   if (f->type == PW_SIGNAL) *(pw_signal *)at = scene_signal (r);
@@ -56,7 +56,7 @@ static void scene_value (pw_random *r, const pw_field *f, void *at) {
   for (int i = 0; i < 2 && f->type == PW_VECTOR; i++) ((double *)at)[i] = scene_number (r, PW_REAL);
 }
 
-/* Element e takes every body in turn, from another one on; the last element hangs on the ground. */
+/* Element e acts on bodies e, e + 1, ...; the last element also on the ground, if it has several bodies. */
 static const char *scene_body (const random_scene *x, int e, int n) {
   static const char *const name[PW_SCENE_BODIES] = { "b0", "b1", "b2", "b3" };
   int last = e == PW_SCENE_ELEMENTS - 1;
@@ -105,7 +105,7 @@ static pw_system *scene_try (const pw_kind *kind, pw_random *random, pw_error *e
 
 pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error) {
   pw_error why;
-  for (int i = 0; i < 50; i++) { /* a kind may refuse numbers that do not go together */
+  for (int i = 0; i < 50; i++) { /* the type may reject inconsistent numbers */
     why = (pw_error){ 0 };
     pw_system *s = scene_try (kind, random, &why);
     if (s) return s;

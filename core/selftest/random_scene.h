@@ -1,4 +1,4 @@
-/* A tiny scene of three elements of any one kind, at random, for the self-test. */
+/* A random scene of three elements of one type, for the self-test. */
 #ifndef PW_RANDOM_SCENE_H
 #define PW_RANDOM_SCENE_H
 
@@ -8,19 +8,18 @@
 enum {
   PW_SCENE_BODIES = 4,
   PW_SCENE_ELEMENTS = 3,
-  PW_SCENE_BATCH = 4 /* the most elements of the compiled scene: one on each body, or those described */
+  PW_SCENE_BATCH = 4 /* most elements of the compiled scene: one per body, or the described ones */
 };
 
 /* Random numbers, the same on every machine. */
 typedef struct {
-  uint64_t state; /* the seed, at first */
+  uint64_t state; /* initially the seed */
 } pw_random;
 double pw_random_between (pw_random *r, double low, double high);
 
-/* Compiles a scene of bodies b0 to b3 and elements e0 to e2, defined at random inside the domains of the kind's field
- * table; e2 hangs on the ground with one of its bodies if it has several.  A kind that acts on every body gets one
- * element only.  NULL and the error if the kind refuses every
- * such definition, or memory is out. */
+/* Compiles a scene of bodies b0 to b3 and elements e0 to e2, with random definitions within the domains of the
+ * type's fields.  If e2 has several bodies, one is the ground.  A type that acts on every body has one element only.
+ * NULL and the error if the type rejects 50 such definitions, or if out of memory. */
 pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error);
 
 #endif

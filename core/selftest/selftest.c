@@ -1,4 +1,4 @@
-/* The self-test of a kind: each check compares one sweep of its table with differences of another. */
+/* The self-test of an element type: each check compares one function of its table with differences of another. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -6,7 +6,7 @@
 #include "model.h"
 #include "probe.h"
 
-/* ---- What is differenced ---- */
+/* ---- Functions to be differenced ---- */
 
 static void selftest_g (pw_probe *x, double *out) {
   pw_probe_evaluate (x, x->kind->g, "g", x->elements * x->rows, out);
@@ -50,7 +50,7 @@ static void selftest_holonomic (pw_probe *x) {
 
   selftest_g (x, reference);
   pw_probe_evaluate (x, x->kind->g_size, "g_size", n, value);
-  for (int i = 0; i < n; i++) { /* what is large enough agrees with itself */
+  for (int i = 0; i < n; i++) { /* a sufficient g_size is its own reference */
     double size = fabs (reference[i]);
     reference[i] = fmax (value[i], size);
   }
@@ -84,7 +84,7 @@ static void selftest_force_u (pw_probe *x) {
   pw_probe_compare (x, "force_u", "force_u = d force/du", x->cols * signals, 1, value, reference);
 }
 
-/* A force that calls itself constant is the same after all else has changed. */
+/* A force declared constant does not change with time and state. */
 static void selftest_constant (pw_probe *x) {
   double before[PW_PROBE_OUT + PW_PROBE_GUARD], after[PW_PROBE_OUT + PW_PROBE_GUARD];
   int n = x->elements * x->cols, changed = 0;
@@ -101,11 +101,11 @@ static void selftest_constant (pw_probe *x) {
 static void selftest_block (pw_probe *x, pw_block block, const char *name, const char *about, double size) {
   double value[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT];
   int rows = pw_block_rows (x->kind, block);
-  pw_batch_function *sweep = pw_block_function (x->kind, block);
-  if (sweep == pw_by_differences)
+  pw_batch_function *function = pw_block_function (x->kind, block);
+  if (function == pw_by_differences)
     pw_evaluate_block (x->work, x->k, block, value);
   else
-    pw_probe_evaluate (x, sweep, name, x->elements * rows * x->cols, value);
+    pw_probe_evaluate (x, function, name, x->elements * rows * x->cols, value);
   for (int e = 0; e < x->elements; e++) pw_difference (x->work, x->k, e, block, reference + e * rows * x->cols);
   x->size = size;
   pw_probe_compare (x, name, about, rows, x->cols, value, reference);
@@ -132,7 +132,7 @@ static void selftest_blocks (pw_probe *x) {
   selftest_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", sf);
 }
 
-/* Near rest, where squares of speeds are 0 and their inverses infinite, all is finite still. */
+/* Near rest, squares of velocities underflow to 0 and their inverses are infinite; results must still be finite. */
 static void selftest_rest (pw_probe *x) {
   static const pw_block blocks[] = { PW_GAMMA_Q, PW_GAMMA_V, PW_FORCE_Q, PW_FORCE_V };
   double out[PW_PROBE_OUT + PW_PROBE_GUARD], v[PW_PROBE_COORDS];
@@ -143,16 +143,16 @@ static void selftest_rest (pw_probe *x) {
   pw_probe_evaluate (x, x->kind->force, "force near rest", x->elements * x->cols, out);
   pw_probe_evaluate (x, x->kind->loss, "loss near rest", x->elements, out);
   for (size_t i = 0; i < sizeof blocks / sizeof *blocks; i++) {
-    pw_batch_function *sweep = pw_block_function (x->kind, blocks[i]);
+    pw_batch_function *function = pw_block_function (x->kind, blocks[i]);
     int n = x->elements * pw_block_rows (x->kind, blocks[i]) * x->cols;
-    if (sweep != pw_by_differences) pw_probe_evaluate (x, sweep, "a derivative near rest", n, out);
+    if (function != pw_by_differences) pw_probe_evaluate (x, function, "a derivative near rest", n, out);
   }
   memcpy (x->v, v, sizeof v);
 }
 
 /* ---- Saturation ---- */
 
-/* By how much the force of element e changes from `rest` as local velocity c goes from 0 to v. */
+/* The change of the force of element e from `rest` when local velocity c changes from 0 to v. */
 static double selftest_change (pw_probe *x, int e, int c, double v, const double *rest) {
   double force[PW_PROBE_OUT + PW_PROBE_GUARD], change = 0;
   int j = pw_global (x->k, e, c);
@@ -164,8 +164,8 @@ static double selftest_change (pw_probe *x, int e, int c, double v, const double
   return change;
 }
 
-/* From rest, a hundredth of the velocity within which a force says to saturate, or of a large one if it says nothing, changes
- * it by a small part of what all of that velocity does. */
+/* From rest, a hundredth of the declared saturation velocity, or of a large velocity if none is declared, must
+ * change the force by less than half of what the whole velocity does. */
 static void selftest_saturation (pw_probe *x) {
   const double large = 1000;
   double out[PW_PROBE_OUT], rest[PW_PROBE_OUT + PW_PROBE_GUARD], v[PW_PROBE_COORDS];
@@ -189,8 +189,9 @@ static void selftest_saturation (pw_probe *x) {
 
 /* ---- Energy ---- */
 
-/* Changes v so that element e has J v = eta, by the least norm; returns 0 if its rows depend on each other. */
-static int selftest_obey (pw_probe *x, int e) {
+/* Changes v by the least norm to satisfy J v = eta of element e.  Returns 0 if its constraint equations are
+ * dependent. */
+static int selftest_satisfy (pw_probe *x, int e) {
   double J[PW_PROBE_OUT + PW_PROBE_GUARD], A[PW_MAX_ROWS][PW_MAX_ROWS] = { { 0 } }, b[PW_PROBE_OUT];
   int n = x->rows;
   pw_probe_update (x, PW_PROBE_TIME, 0);
@@ -221,8 +222,8 @@ static int selftest_obey (pw_probe *x, int e) {
   return 1;
 }
 
-/* The power the element's forces feed into the motion of element e, constraint forces -J^T lambda included, must be
- * what it takes from its energy and from outside, less its losses. */
+/* The power of the forces of element e, including constraint forces -J^T lambda, must equal the supplied power minus
+ * losses and the rate of its potential energy. */
 static void selftest_power_of (pw_probe *x, int e) {
   double force[PW_PROBE_OUT + PW_PROBE_GUARD], drift[PW_PROBE_OUT], eta[PW_PROBE_OUT + PW_PROBE_GUARD];
   double slope[PW_SCENE_BATCH], power[PW_SCENE_BATCH + PW_PROBE_GUARD], loss[PW_SCENE_BATCH + PW_PROBE_GUARD];
@@ -253,7 +254,7 @@ static void selftest_power (pw_probe *x) {
   if (!x->kind->force && !x->kind->energy && !x->kind->power && !x->kind->loss) return;
   memcpy (v, x->v, sizeof v);
   for (int e = 0; e < x->elements; e++) {
-    if (x->rows == 0 || selftest_obey (x, e)) selftest_power_of (x, e);
+    if (x->rows == 0 || selftest_satisfy (x, e)) selftest_power_of (x, e);
     memcpy (x->v, v, sizeof v);
   }
 }

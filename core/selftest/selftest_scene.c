@@ -1,8 +1,9 @@
-/* The self-test of a kind where a scene uses it: with its own elements, signals and numbers, at its own configuration.
+/* The self-test of an element type in a scene that uses it, with the scene's elements, signals, parameters and
+ * configuration.
  *
- * Everything moves at random around the configuration, in units of the scene.  The kind's derivatives along that motion are compared
- * with differences over steps from 2^-8 to 2^-20, of which the best counts for each entry: a right formula agrees with one
- * of them whatever its own scale is, a wrong one is off by about its size with all. */
+ * The scene moves randomly around the configuration, in its units.  The type's derivatives along that motion are
+ * compared with differences over steps from 2^-8 to 2^-20; for each entry the best one counts.  A correct formula
+ * agrees with one of them whatever its scale; a wrong one differs from all by about its magnitude. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -19,13 +20,13 @@ typedef struct {
   const pw_system *s;
   pw_workspace *work;
   pw_element_batch *k;
-  double t, tau;                      /* the time, and how far it may move */
+  double t, tau;                      /* the time, and its largest change */
   double *q, *v, *a, *dq, *dv, *w;    /* coords: the state and its motion; directions */
-  double *q_now, *v_now;              /* coords: as placed */
+  double *q_now, *v_now;              /* coords: the current state */
   double *local, *lambda;             /* count x cols: w; count x rows */
   double *J, *block;                  /* count x largest block */
   double *plus, *minus, *slope;       /* count x cols, or rows */
-  double *value, *terms, *off, *size; /* the same: what is tested, the sum of its terms, the least error, round-off */
+  double *value, *terms, *off, *size; /* the same: tested value, sum of |terms|, least error, reference size */
   pw_selftest_report *report;
   double *memory;
 } scene;
@@ -34,7 +35,7 @@ typedef void scene_function (scene *x, double *out);
 
 /* ---- Moving ---- */
 
-static void scene_place (const scene *x, scene_move move, double h) {
+static void scene_update (const scene *x, scene_move move, double h) {
   double step = move == SCENE_MOTION ? h * x->tau : 0;
   for (int j = 0; j < x->s->coords; j++) {
     x->q_now[j] = x->q[j] + step * (x->v[j] + step * x->a[j] / 2) + (move == SCENE_Q ? h * x->dq[j] : 0);
@@ -50,7 +51,7 @@ static double scene_local (const scene *x, const double *vector, int e, int c) {
   return j < x->s->coords ? vector[j] : 0;
 }
 
-/* out += factor x block x vector, element by element; terms, if given, += the absolute values of what is summed up. */
+/* out += factor x block x vector, element by element; terms, unless NULL, += absolute values of the terms. */
 static void scene_times (const scene *x, const double *block, int rows, const double *vector, double factor,
                          double *out, double *terms) {
   int cols = x->k->b.cols;
@@ -66,27 +67,27 @@ static void scene_zero (double *out, int n) {
   memset (out, 0, (size_t)n * sizeof *out);
 }
 
-static void scene_sweep (scene *x, pw_batch_function *sweep, int rows, double *out) {
+static void scene_evaluate (scene *x, pw_batch_function *function, int rows, double *out) {
   scene_zero (out, x->k->b.count * rows);
-  if (sweep) sweep (&x->k->b, out);
+  if (function) function (&x->k->b, out);
 }
 
 /* ---- Functions of the state ---- */
 
 static void scene_g (scene *x, double *out) {
-  scene_sweep (x, x->k->kind->g, x->k->kind->rows, out);
+  scene_evaluate (x, x->k->kind->g, x->k->kind->rows, out);
 }
 
 static void scene_eta (scene *x, double *out) {
-  scene_sweep (x, x->k->kind->eta, x->k->kind->rows, out);
+  scene_evaluate (x, x->k->kind->eta, x->k->kind->rows, out);
 }
 
 static void scene_gamma (scene *x, double *out) {
-  scene_sweep (x, x->k->kind->gamma, x->k->kind->rows, out);
+  scene_evaluate (x, x->k->kind->gamma, x->k->kind->rows, out);
 }
 
 static void scene_force (scene *x, double *out) {
-  scene_sweep (x, x->k->kind->force, x->k->b.cols, out);
+  scene_evaluate (x, x->k->kind->force, x->k->b.cols, out);
 }
 
 static void scene_J_times (scene *x, const double *vector, double *out) {
@@ -110,15 +111,15 @@ static void scene_drift (scene *x, double *out) {
 
 /* ---- Comparing ---- */
 
-/* The least error of each entry so far, with steps of size h. */
+/* Updates the least error of each entry by differences with step h. */
 static void scene_differences (scene *x, scene_function *f, scene_move move, int n, double h) {
   static const double weight[] = { 4. / 3, -1. / 3 }; /* extrapolated (Richardson) */
   scene_zero (x->slope, n);
   for (int i = 0; i < 2; i++) {
     double far = ldexp (h, i);
-    scene_place (x, move, far);
+    scene_update (x, move, far);
     f (x, x->plus);
-    scene_place (x, move, -far);
+    scene_update (x, move, -far);
     f (x, x->minus);
     for (int k = 0; k < n; k++) x->slope[k] += weight[i] * (x->plus[k] - x->minus[k]) / (2 * far);
   }
@@ -136,7 +137,7 @@ static void scene_compare (scene *x, const char *name, const char *about, int ro
   char where[120] = "";
   for (int k = 0; k < n; k++) x->off[k] = INFINITY;
   for (int power = -8; power >= -20; power -= 4) scene_differences (x, f, move, n, ldexp (1, power));
-  scene_place (x, SCENE_Q, 0);
+  scene_update (x, SCENE_Q, 0);
   for (int k = 0; k < n; k++)
     if (!(x->off[k] <= x->off[at])) at = k;
   if (n > 0)
@@ -151,8 +152,8 @@ static int scene_width (const scene *x) {
   return width > PW_MAX_SIGNALS ? width : PW_MAX_SIGNALS;
 }
 
-/* A new comparison: nothing in it yet. */
-static void scene_begin (scene *x) {
+/* Clears the arrays of a comparison. */
+static void scene_clear (scene *x) {
   int n = x->k->b.count * scene_width (x);
   scene_zero (x->value, n);
   scene_zero (x->terms, n);
@@ -161,12 +162,12 @@ static void scene_begin (scene *x) {
 
 static void scene_holonomic (scene *x) {
   int rows = x->k->kind->rows, n = x->k->b.count * rows;
-  scene_begin (x);
-  scene_sweep (x, x->k->kind->J, rows * x->k->b.cols, x->J);
+  scene_clear (x);
+  scene_evaluate (x, x->k->kind->J, rows * x->k->b.cols, x->J);
   scene_times (x, x->J, rows, x->dq, 1, x->value, x->terms);
-  scene_sweep (x, x->k->kind->g_size, rows, x->size);
+  scene_evaluate (x, x->k->kind->g_size, rows, x->size);
   scene_compare (x, "J", "J = dg/dq", rows, scene_g, SCENE_Q);
-  scene_begin (x);
+  scene_clear (x);
   scene_eta (x, x->value);
   for (int i = 0; i < n; i++) x->value[i] *= -x->tau;
   scene_compare (x, "eta", "eta = -dg/dt", rows, scene_g, SCENE_TIME);
@@ -174,9 +175,9 @@ static void scene_holonomic (scene *x) {
 
 static void scene_acceleration (scene *x) {
   int rows = x->k->kind->rows, n = x->k->b.count * rows;
-  scene_begin (x);
+  scene_clear (x);
   scene_gamma (x, x->slope);
-  scene_sweep (x, x->k->kind->J, rows * x->k->b.cols, x->J);
+  scene_evaluate (x, x->k->kind->J, rows * x->k->b.cols, x->J);
   scene_times (x, x->J, rows, x->a, x->tau, x->value, x->terms);
   for (int i = 0; i < n; i++) x->value[i] -= x->tau * x->slope[i], x->terms[i] += fabs (x->tau * x->slope[i]);
   scene_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", rows, scene_drift, SCENE_MOTION);
@@ -185,7 +186,7 @@ static void scene_acceleration (scene *x) {
 static void scene_block (scene *x, pw_block block, const char *name, const char *about, scene_function *f) {
   int rows = pw_block_rows (x->k->kind, block);
   scene_move move = block == PW_GAMMA_V || block == PW_FORCE_V ? SCENE_V : SCENE_Q;
-  scene_begin (x);
+  scene_clear (x);
   x->k->b.w = x->local;
   x->k->b.lambda = x->lambda;
   if (pw_evaluate_block (x->work, x->k, block, x->block))
@@ -201,13 +202,13 @@ static void scene_value (scene *x, double *out) {
 
 static void scene_gradients (scene *x, scene_move move) {
   int signals = x->k->kind->signals, n = x->k->b.count * signals;
-  scene_begin (x);
+  scene_clear (x);
   for (int i = 0; i < n; i++) {
     const pw_source *source = &x->k->source[i];
     for (int k = 0; k < source->reads; k++) {
-      int j = source->state[k], rate = j >= x->s->coords;
-      if (rate != (move == SCENE_V)) continue;
-      double term = source->x[source->reads + k] * (rate ? x->dv[j - x->s->coords] : x->dq[j]);
+      int j = source->state[k], velocity = j >= x->s->coords;
+      if (velocity != (move == SCENE_V)) continue;
+      double term = source->x[source->reads + k] * (velocity ? x->dv[j - x->s->coords] : x->dq[j]);
       x->value[i] += term, x->terms[i] += fabs (term);
     }
   }
@@ -216,7 +217,7 @@ static void scene_gradients (scene *x, scene_move move) {
 
 static void scene_all (scene *x) {
   const pw_kind *kind = x->k->kind;
-  scene_place (x, SCENE_Q, 0);
+  scene_update (x, SCENE_Q, 0);
   if (kind->level == PW_HOLONOMIC) scene_holonomic (x);
   if (kind->rows > 0) {
     scene_acceleration (x);
@@ -229,7 +230,7 @@ static void scene_all (scene *x) {
     scene_gradients (x, SCENE_Q);
     scene_gradients (x, SCENE_V);
   }
-  pw_hold_signals (x->work, 1); /* what signals make of the state is theirs */
+  pw_hold_signals (x->work, 1); /* force_q and force_v exclude the dependence of signals on the state */
   scene_block (x, PW_FORCE_Q, "force_q", "force_q = d force/dq", scene_force);
   scene_block (x, PW_FORCE_V, "force_v", "force_v = d force/dv", scene_force);
   pw_hold_signals (x->work, 0);
@@ -237,7 +238,7 @@ static void scene_all (scene *x) {
 
 /* ---- The motion ---- */
 
-static void scene_aim (scene *x, const double *q, const double *v, pw_random *r) {
+static void scene_randomise (scene *x, const double *q, const double *v, pw_random *r) {
   double T = x->work->scale.time;
   for (int j = 0; j < x->s->coords; j++) {
     double unit = pw_unit (x->s, j);
@@ -251,7 +252,7 @@ static void scene_aim (scene *x, const double *q, const double *v, pw_random *r)
   for (int i = 0; i < x->k->b.count * x->k->b.cols; i++)
     x->local[i] = scene_local (x, x->w, i / x->k->b.cols, i % x->k->b.cols);
   for (int i = 0; i < x->k->b.count * x->k->kind->rows; i++) x->lambda[i] = pw_random_between (r, -1, 1);
-  /* no signal breaks between the times tried */
+  /* no breakpoint of a signal between the times used */
   x->tau = fmin (T, pw_next_breakpoint (x->work, 0, x->t) - x->t) / 2;
   x->t += x->tau;
 }
@@ -305,7 +306,7 @@ int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double
     if (k->kind != kind || k->b.count == 0) continue;
     scene x = { .s = s, .work = w, .k = k, .t = t, .report = report };
     if (scene_open (&x) == PW_OK) {
-      scene_aim (&x, q, v, &random);
+      scene_randomise (&x, q, v, &random);
       scene_all (&x);
     } else
       status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);

@@ -1,8 +1,9 @@
-/* The independent verifier: plain loops over elements, rows and columns, nothing shared with the solvers but the kinds.
+/* The independent verifier: plain loops over elements, rows and columns; it shares only the element types with the
+ * solvers.
  *
- * Each residual is compared with the sum of the absolute values of its terms, and against what the scene's length L
- * and time T make of its unit, so that round-off is about 1e-16 whatever the units.  Forces are compared with the
- * largest in the scene, since those on a massless body may all be round-off themselves. */
+ * Each residual is divided by the sum of the absolute values of its terms, plus its unit formed from the scene's
+ * length L and time T, so that round-off is about 1e-16 in any units.  Forces are compared with the largest one in
+ * the scene, since those on a massless body may all be round-off. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,27 +16,27 @@ typedef struct {
   const pw_workspace *w;
   double *position, *velocity, *acceleration, *force;
   double *position_size, *velocity_size, *acceleration_size, *force_size;
-  double *block; /* what one kind's sweep fills */
+  double *block; /* results of one function of an element type */
 } verify;
 
-/* Adds a term to a sum and to its size. */
+/* Adds a term to a sum, and its absolute value to a size. */
 static void verify_add (double *sum, double *size, double term) {
   *sum += term;
   *size += fabs (term);
 }
 
-/* Fills the block by a sweep of n numbers, with zeros if there is none. */
-static const double *verify_sweep (verify *x, const pw_element_batch *k, pw_batch_function *f, int n) {
+/* Fills the block by a function of n numbers; NULL gives zeros. */
+static const double *verify_evaluate (verify *x, const pw_element_batch *k, pw_batch_function *f, int n) {
   memset (x->block, 0, (size_t)n * sizeof *x->block);
   if (f) f (&k->b, x->block);
   return x->block;
 }
 
-/* Sums up J v, J a and J^T lambda of a batch. */
+/* Adds J v, J a and J^T lambda of a batch. */
 static void verify_products (verify *x, const pw_element_batch *k, const double *v, const double *a,
                              const double *lambda) {
   int rows = k->kind->rows, cols = k->b.cols;
-  const double *J = verify_sweep (x, k, k->kind->J, k->b.count * rows * cols);
+  const double *J = verify_evaluate (x, k, k->kind->J, k->b.count * rows * cols);
   for (int e = 0; e < k->b.count; e++)
     for (int r = 0; r < rows; r++)
       for (int c = 0; c < cols; c++, J++) {
@@ -51,19 +52,19 @@ static void verify_rows (verify *x, const pw_element_batch *k, const double *v, 
   const pw_kind *kind = k->kind;
   int n = k->b.count * kind->rows, holonomic = kind->level == PW_HOLONOMIC;
   verify_products (x, k, v, a, lambda);
-  const double *y = verify_sweep (x, k, kind->eta, n);
+  const double *y = verify_evaluate (x, k, kind->eta, n);
   for (int i = 0; i < n; i++) verify_add (&x->velocity[k->row + i], &x->velocity_size[k->row + i], -y[i]);
-  y = verify_sweep (x, k, kind->gamma, n);
+  y = verify_evaluate (x, k, kind->gamma, n);
   for (int i = 0; i < n; i++) verify_add (&x->acceleration[k->row + i], &x->acceleration_size[k->row + i], -y[i]);
   if (!holonomic) return;
-  y = verify_sweep (x, k, kind->g, n);
+  y = verify_evaluate (x, k, kind->g, n);
   for (int i = 0; i < n; i++) x->position[k->row + i] = y[i];
-  y = verify_sweep (x, k, kind->g_size, n);
+  y = verify_evaluate (x, k, kind->g_size, n);
   for (int i = 0; i < n; i++) x->position_size[k->row + i] = fmax (y[i], x->s->scale.length);
 }
 
 static void verify_forces (verify *x, const pw_element_batch *k) {
-  const double *y = verify_sweep (x, k, k->kind->force, k->b.count * k->b.cols);
+  const double *y = verify_evaluate (x, k, k->kind->force, k->b.count * k->b.cols);
   for (int i = 0; i < k->b.count * k->b.cols; i++) {
     int j = pw_global (k, i / k->b.cols, i % k->b.cols);
     if (j < x->s->coords) verify_add (&x->force[j], &x->force_size[j], -y[i]);
@@ -72,8 +73,8 @@ static void verify_forces (verify *x, const pw_element_batch *k) {
 
 /* ---- Verdicts ---- */
 
-/* Gives every coordinate the size of the largest force in the scene, or of the largest moment; L makes one comparable
- * with the other.  Without any force, that of a mass times L / T^2. */
+/* Sets the size of every coordinate to the largest force in the scene, but at least the largest mass times L / T^2;
+ * moments are divided by L. */
 static void verify_force_sizes (verify *x) {
   const pw_system *s = x->s;
   double L = x->w->scale.length, T = x->w->scale.time, largest = 0;
@@ -86,8 +87,8 @@ static void verify_force_sizes (verify *x) {
 
 typedef char *verify_name (const pw_system *s, int i, char *buffer, size_t size);
 
-/* The worst of n residuals, none compared with less than `floor`. */
-static void verify_judge (const pw_system *s, int n, const double *residual, const double *size, double floor,
+/* The worst of n residuals; `floor` is added to each size. */
+static void verify_worst (const pw_system *s, int n, const double *residual, const double *size, double floor,
                           verify_name *name, int first, pw_verdict *verdict) {
   int worst = -1;
   *verdict = (pw_verdict){ 0 };
@@ -112,14 +113,14 @@ static void verify_all (verify *x, const double *v, const double *a, const doubl
     if (k->kind->force) verify_forces (x, k);
   }
   verify_force_sizes (x);
-  verify_judge (s, s->holonomic, x->position, x->position_size, 0, pw_system_reaction_name, 0, &result->position);
-  verify_judge (s, s->rows, x->velocity, x->velocity_size, L / T, pw_system_reaction_name, 0, &result->velocity);
-  verify_judge (s, s->rows, x->acceleration, x->acceleration_size, L / (T * T), pw_system_reaction_name, 0,
+  verify_worst (s, s->holonomic, x->position, x->position_size, 0, pw_system_reaction_name, 0, &result->position);
+  verify_worst (s, s->rows, x->velocity, x->velocity_size, L / T, pw_system_reaction_name, 0, &result->velocity);
+  verify_worst (s, s->rows, x->acceleration, x->acceleration_size, L / (T * T), pw_system_reaction_name, 0,
                 &result->acceleration);
-  verify_judge (s, s->coords, x->force, x->force_size, 0, pw_system_state_name, s->coords, &result->force);
+  verify_worst (s, s->coords, x->force, x->force_size, 0, pw_system_state_name, s->coords, &result->force);
 }
 
-/* The most numbers a sweep of any kind in use fills. */
+/* The largest array that a function of an element type in use fills. */
 static size_t verify_room (const pw_system *s) {
   size_t most = 1;
   for (int i = 0; i < s->batches; i++) {

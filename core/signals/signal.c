@@ -11,7 +11,7 @@ static void signal_ramp (const pw_signal *s, double x, double u[3]) {
   u[1] = rise / s->ramp.duration;
 }
 
-/* from + (to - from) (10 x^3 - 15 x^4 + 6 x^5): rate and acceleration begin and end with 0
+/* from + (to - from) (10 x^3 - 15 x^4 + 6 x^5): first and second derivative are 0 at both ends
  * (Flash & Hogan 1985, Journal of Neuroscience 5, 1688-1703). */
 static void signal_smooth_step (const pw_signal *s, double x, double u[3]) {
   double rise = s->ramp.to - s->ramp.from, T = s->ramp.duration;
@@ -35,7 +35,7 @@ static double signal_rise_breakpoint (const pw_signal *s, double t) {
   return t < s->ramp.start ? s->ramp.start : t < end ? end : INFINITY;
 }
 
-/* The beginning of the pulse period that contains t, and of the next one; t is not before the first. */
+/* The beginning of the pulse period that contains t, and of the next one, for t >= start. */
 static void signal_pulses (const pw_signal *s, double t, double *here, double *next) {
   double start = s->pulse.start, period = s->pulse.period;
   *here = start;
@@ -65,12 +65,12 @@ static double signal_pulse_breakpoint (const pw_signal *s, double t) {
   if (t < s->pulse.start) return s->pulse.start;
   signal_pulses (s, t, &here, &next);
   double end = signal_pulse_end (s, here);
-  return t < end ? end : next > t ? next : INFINITY; /* late enough, times no longer tell pulses apart */
+  return t < end ? end : next > t ? next : INFINITY; /* next == t if the period is below the resolution of t */
 }
 
 /* ---- All signals ---- */
 
-/* A value that is not finite is a failure, too. */
+/* A value that is not finite is a failure. */
 static int signal_function (const pw_source *source, double t, int derivatives, double u[3]) {
   const pw_function *f = &source->signal.function;
   int status = f->eval (f->context, t, source->x, u, source->reads ? source->x + source->reads : NULL);
@@ -78,7 +78,7 @@ static int signal_function (const pw_source *source, double t, int derivatives, 
   return !isfinite (u[0]) || (derivatives && !(isfinite (u[1]) && isfinite (u[2])));
 }
 
-/* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p); a force needs the value alone */
+/* offset + A cos (w t + p), -A w sin (w t + p), -A w^2 cos (w t + p); forces need only the value */
 static void signal_harmonic (const pw_signal *s, double t, int derivatives, double u[3]) {
   double A = s->harmonic.amplitude, w = s->harmonic.omega, sine, cosine;
   pw_sin_cos (w * t + s->harmonic.phase, &sine, &cosine);

@@ -1,27 +1,26 @@
-/* Evaluation of signals, and what they are made of. */
+/* Evaluation of signals. */
 #ifndef PW_SIGNAL_H
 #define PW_SIGNAL_H
 
 #include "util.h"
 
-/* A signal of one element, with the states it reads. */
+/* A signal of one element, and the states it reads. */
 typedef struct {
   pw_signal signal;
-  int reads;        /* how many states a function signal reads */
-  const int *state; /* their indices: coordinate j, or coordinates + j for a rate */
-  double *x;        /* reads: their values, then reads: the gradient */
-  double *spline;   /* of a table: rate, then acceleration at each of its points (table.c) */
-  double *u;        /* 3: where its values go */
-  int forced;       /* 1: it serves a force, which needs no derivatives */
+  int reads;        /* number of states a function signal reads */
+  const int *state; /* their indices: coordinate j, or coordinates + j for a velocity */
+  double *x;        /* 2 reads: values of these states, then the gradient */
+  double *spline;   /* of a table, 2 count: first derivative at each point, then second (table.c) */
+  double *u;        /* 3: destination of its values */
+  int forced;       /* 1: belongs to a force, which needs no derivatives */
 } pw_source;
 
-/* Value, rate and acceleration at time t (the last two only if derivatives are asked for); the states a function
- * reads are in source->x.  Returns what the user's function returned, or not 0 if its values are not finite: that stops the
- * run. */
+/* Value and, if `derivatives`, first and second time derivative at time t; the states a function reads are in
+ * source->x.  Returns non-zero, which stops the run, if the user's function did or if its values are not finite. */
 int pw_signal_eval (const pw_source *source, double t, int derivatives, double u[3]);
 
-/* First time after t at which the signal jumps or its rate or acceleration does, or INFINITY; with `knots` also where the
- * acceleration of a cubic table has a kink. */
+/* First time after t at which the signal or its first or second derivative jumps, or INFINITY; with `knots` also
+ * where the second derivative of a cubic table has a kink. */
 double pw_signal_breakpoint (const pw_signal *s, int knots, double t);
 
 /* ---- Tables (table.c) ---- */
@@ -32,7 +31,7 @@ static inline double pw_table_value (const pw_signal *s, int i) {
   return s->table.offset + scale * s->table.value[i];
 }
 
-/* Fills 2 count numbers: the spline of a table that has been checked. */
+/* Fills 2 count numbers: the spline of a checked table. */
 void pw_table_spline (const pw_signal *s, double *spline);
 void pw_table_eval (const pw_signal *s, const double *spline, double t, double u[3]);
 double pw_table_breakpoint (const pw_signal *s, int knots, double t);

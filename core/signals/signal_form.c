@@ -1,4 +1,4 @@
-/* The forms of a signal: the numbers each is made of, and what may be wrong with them. */
+/* The forms of a signal: their fields and checks. */
 #include <math.h>
 #include <stdio.h>
 #include "signal.h"
@@ -60,7 +60,7 @@ const pw_signal_form *pw_signal_form_of (const pw_signal *s) {
   return f->name ? f : NULL;
 }
 
-/* ---- Faults; each writes what is wrong, or leaves the text empty ---- */
+/* ---- Checks: each writes the fault to `text`, or leaves it empty ---- */
 
 static void form_numbers (const pw_signal *s, const pw_signal_form *form, char *text, size_t size) {
   for (const pw_field *f = form->fields; f->name && !*text; f++) {
@@ -101,7 +101,7 @@ static void form_points (const pw_signal *s, int *point, char *text, size_t size
   if (!*text) *point = -1;
 }
 
-/* How many time derivatives of a signal are continuous, at most those that matter; -1: it jumps. */
+/* Highest continuous time derivative of a signal, at most 2; -1: the signal jumps. */
 static int form_smoothness (const pw_signal *s, const char **what) {
   *what = "";
   if (s->type == PW_PULSE) return *what = "a pulse", -1;
@@ -112,7 +112,7 @@ static int form_smoothness (const pw_signal *s, const char **what) {
   return 1;
 }
 
-/* Positions that are prescribed must not have kinks, nor rates jumps: that takes an infinite force. */
+/* Kinks of prescribed positions and jumps of prescribed velocities would require infinite forces. */
 static void form_level (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
   const char *what;
   int smoothness = form_smoothness (s, &what);

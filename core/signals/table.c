@@ -2,36 +2,36 @@
  *
  *   u = y_i + b_i s + M_i s^2 / 2 + (M_j - M_i) s^3 / (6 h),   s = t - t_i,  j = i + 1,  h = t_j - t_i
  *
- * between two points; the first and the last value are constant outside.  Of a cubic table the accelerations M_i make the
- * rate continuous, too (de Boor 2001, A Practical Guide to Splines, chapter IV):
+ * between two points; outside, the signal is constant.  In a cubic table the second derivatives M_i make the first
+ * derivative continuous (de Boor 2001, A Practical Guide to Splines, chapter IV):
  *
  *   h_k M_k + 2 (h_k + h_i) M_i + h_i M_j = 6 ((y_j - y_i) / h_i - (y_i - y_k) / h_k),   k = i - 1
  *
- * With free ends the first two intervals share one cubic, and so are the last two ("not a knot"); with ends at rest b is 0
- * at both.  A linear table has M = 0. */
+ * With free ends the first two intervals share one cubic, and so do the last two ("not a knot"); with ends at rest
+ * the first derivative is 0 at both.  A linear table has M = 0. */
 #include <math.h>
 #include <string.h>
 #include "signal.h"
 
-/* Row i of the equations for M: the coefficients of the point before, of itself, of the point after, and the right side. */
+/* Row i of the equations for M: coefficients of M_k, M_i and M_j, and the right-hand side. */
 static void table_row (const double *t, const double *y, int n, int ends, int i, double row[4]) {
-  double before = i > 0 ? t[i] - t[i - 1] : 0, behind = i < n - 1 ? t[i + 1] - t[i] : 0;
-  double from = i > 0 ? (y[i] - y[i - 1]) / before : 0, to = i < n - 1 ? (y[i + 1] - y[i]) / behind : 0;
+  double before = i > 0 ? t[i] - t[i - 1] : 0, after = i < n - 1 ? t[i + 1] - t[i] : 0;
+  double from = i > 0 ? (y[i] - y[i - 1]) / before : 0, to = i < n - 1 ? (y[i + 1] - y[i]) / after : 0;
   row[0] = before;
-  row[1] = 2 * (before + behind);
-  row[2] = behind;
+  row[1] = 2 * (before + after);
+  row[2] = after;
   row[3] = 6 * (to - from);
   if (ends == PW_ENDS_REST) return;
-  if (i == 1) row[1] += before + before * (before / behind), row[2] -= before * (before / behind);
-  if (i == n - 2) row[1] += behind + behind * (behind / before), row[0] -= behind * (behind / before);
+  if (i == 1) row[1] += before + before * (before / after), row[2] -= before * (before / after);
+  if (i == n - 2) row[1] += after + after * (after / before), row[0] -= after * (after / before);
 }
 
-/* The M of a free end, on one line with the next two. */
+/* The M of a free end: linear extrapolation of the next two. */
 static double table_end (double t0, double t1, double t2, double M1, double M2) {
   return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
 }
 
-/* M by elimination; the rows are diagonally dominant.  `up` is scratch. */
+/* M by elimination without pivoting; the rows are diagonally dominant.  `up` is scratch. */
 static void table_accelerations (const double *t, const double *y, int n, int ends, double *M, double *up) {
   int first = ends == PW_ENDS_REST ? 0 : 1, last = n - 1 - first;
   double row[4];
@@ -59,7 +59,7 @@ void pw_table_spline (const pw_signal *s, double *spline) {
   }
 }
 
-/* How many points are not after t. */
+/* Number of points at or before t. */
 static int table_passed (const pw_signal *s, double t) {
   int low = 0, high = s->table.count;
   while (low < high) {
@@ -84,7 +84,8 @@ void pw_table_eval (const pw_signal *s, const double *spline, double t, double u
   u[2] = M + x * jerk;
 }
 
-/* A linear table has a kink at each point; a cubic one at its ends, and in its acceleration at each. */
+/* A linear table has a kink at each point; a cubic one at its ends, and a kink of its second derivative at each
+ * point. */
 double pw_table_breakpoint (const pw_signal *s, int knots, double t) {
   int n = s->table.count, next = table_passed (s, t);
   if (next == n) return INFINITY;

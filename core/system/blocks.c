@@ -1,4 +1,4 @@
-/* Second-order blocks, exact or by differences.
+/* Second-order blocks, by formulas or by differences.
  *
  * Central differences with step h = eps^(1/3) in units of the scene: truncation and round-off are both of the order
  * eps^(2/3) (Dennis & Schnabel 1983, section 5.6). */
@@ -6,12 +6,13 @@
 #include <string.h>
 #include "system.h"
 
-/* Each block: its place in the kind's table, the sweep it is the derivative of, and how to get from there to here. */
+/* Each block: its function in the type's table, the function it differentiates, and the product formed before
+ * differentiation. */
 static const struct {
-  size_t sweep, below;
+  size_t function, original;
   enum { BLOCKS_RAW, BLOCKS_J_W, BLOCKS_JT_LAMBDA } product;
-  int rates;   /* derivative by v instead of q */
-  int columns; /* as many rows as local columns, instead of kind->rows */
+  int velocity; /* derivative with respect to v instead of q */
+  int columns;  /* 1: it has as many rows as local columns; 0: kind->rows */
 } blocks_table[PW_BLOCKS] = {
   [PW_JW_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_J_W, 0, 0 },
   [PW_JTL_Q] = { offsetof (pw_kind, jw_q), offsetof (pw_kind, J), BLOCKS_JT_LAMBDA, 0, 1 },
@@ -27,14 +28,14 @@ static pw_batch_function *blocks_member (const pw_kind *kind, size_t offset) {
 }
 
 pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
-  return blocks_member (kind, blocks_table[block].sweep);
+  return blocks_member (kind, blocks_table[block].function);
 }
 
 int pw_block_rows (const pw_kind *kind, pw_block block) {
   return blocks_table[block].columns ? 3 * kind->bodies + kind->own : kind->rows;
 }
 
-/* A batch of one element with configurations of its own, which can be moved without moving its neighbours. */
+/* A batch of one element with a copy of its configurations, which can be changed without affecting other elements. */
 typedef struct {
   pw_batch b;
   int body[PW_MAX_BODIES];
@@ -64,16 +65,16 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
   if (k->b.lambda) one->b.lambda = k->b.lambda + e * kind->rows;
 }
 
-/* The number behind local column c. */
-static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, int rates) {
-  if (c >= 3 * kind->bodies) return (rates ? one->v : one->q) + c - 3 * kind->bodies;
+/* The coordinate or velocity of local column c. */
+static double *blocks_variable (const pw_kind *kind, blocks_single *one, int c, int velocity) {
+  if (c >= 3 * kind->bodies) return (velocity ? one->v : one->q) + c - 3 * kind->bodies;
   pw_configuration *p = &one->configuration[c / 3];
   double *const q[] = { &p->x, &p->y, &p->phi }, *const v[] = { &p->vx, &p->vy, &p->omega };
-  return rates ? v[c % 3] : q[c % 3];
+  return velocity ? v[c % 3] : q[c % 3];
 }
 
 static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *one, double *y) {
-  pw_batch_function *below = blocks_member (kind, blocks_table[block].below);
+  pw_batch_function *original = blocks_member (kind, blocks_table[block].original);
   int rows = kind->rows, cols = one->b.cols;
   double J[PW_MAX_ROWS * PW_MAX_COLS] = { 0 };
   memset (y, 0, PW_MAX_COLS * sizeof *y);
@@ -81,12 +82,12 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
     pw_configuration *p = &one->configuration[n];
     pw_sin_cos (p->phi, &p->sin, &p->cos);
   }
-  if (below == NULL) return;
+  if (original == NULL) return;
   if (blocks_table[block].product == BLOCKS_RAW) {
-    below (&one->b, y);
+    original (&one->b, y);
     return;
   }
-  below (&one->b, J);
+  original (&one->b, J);
   for (int r = 0; r < rows; r++)
     for (int c = 0; c < cols; c++) {
       if (blocks_table[block].product == BLOCKS_J_W)
@@ -97,27 +98,26 @@ static void blocks_value (const pw_kind *kind, pw_block block, blocks_single *on
 }
 
 /* The scene's unit of a local column, or of its velocity. */
-static double blocks_unit (const pw_workspace *w, const pw_kind *kind, int c, int rates) {
+static double blocks_unit (const pw_workspace *w, const pw_kind *kind, int c, int velocity) {
   double unit = c < 3 * kind->bodies && c % 3 < 2 ? w->scale.length : 1;
-  return rates ? unit / w->scale.time : unit;
+  return velocity ? unit / w->scale.time : unit;
 }
 
-/* A step in units of the scene, made exactly representable: where truncation, h^2 / unit^2, and the round-off of x, eps x / h,
- * are about the same. */
-static double blocks_step (const pw_workspace *w, const pw_kind *kind, int c, int rates, double x) {
-  double unit = blocks_unit (w, kind, c, rates);
+/* An exactly representable step that balances truncation, h^2 / unit^2, against the round-off of x, eps x / h. */
+static double blocks_step (const pw_workspace *w, const pw_kind *kind, int c, int velocity, double x) {
+  double unit = blocks_unit (w, kind, c, velocity);
   volatile double moved = x + unit * cbrt (2.3e-16 * fmax (1, fabs (x) / unit));
   return moved - x;
 }
 
 void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block, double *out) {
   const pw_kind *kind = k->kind;
-  int rates = blocks_table[block].rates, rows = pw_block_rows (kind, block), cols = k->b.cols;
+  int velocity = blocks_table[block].velocity, rows = pw_block_rows (kind, block), cols = k->b.cols;
   blocks_single one;
   blocks_isolate (k, e, &one);
   for (int c = 0; c < cols; c++) {
-    double plus[PW_MAX_COLS], minus[PW_MAX_COLS], *x = blocks_variable (kind, &one, c, rates), x0 = *x;
-    double h = blocks_step (w, kind, c, rates, x0);
+    double plus[PW_MAX_COLS], minus[PW_MAX_COLS], *x = blocks_variable (kind, &one, c, velocity), x0 = *x;
+    double h = blocks_step (w, kind, c, velocity, x0);
     *x = x0 + h;
     blocks_value (kind, block, &one, plus);
     *x = x0 - h;
@@ -128,7 +128,8 @@ void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_
   }
 }
 
-/* Differences of a function that does not depend on a variable are round-off of its value over the step: 4e-11. */
+/* Differences of a function that does not depend on a variable are round-off of its value divided by the step:
+ * 4e-11. */
 #define BLOCKS_ZERO 1e-6
 
 int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block) {
@@ -136,18 +137,18 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
   const pw_kind *kind = k->kind;
   int rows = pw_block_rows (kind, block), cols = k->b.cols;
   blocks_single one;
-  if (pw_block_function (kind, block) || blocks_member (kind, blocks_table[block].below) == NULL) return 0;
+  if (pw_block_function (kind, block) || blocks_member (kind, blocks_table[block].original) == NULL) return 0;
   blocks_isolate (k, e, &one);
   blocks_value (kind, block, &one, value);
   for (int r = 0; r < rows; r++) most = fmax (most, fabs (value[r]));
   pw_difference (w, k, e, block, slope);
   for (int i = 0; i < rows * cols; i++)
-    if (fabs (slope[i]) * blocks_unit (w, kind, i % cols, blocks_table[block].rates) > BLOCKS_ZERO * most) return 1;
+    if (fabs (slope[i]) * blocks_unit (w, kind, i % cols, blocks_table[block].velocity) > BLOCKS_ZERO * most) return 1;
   return 0;
 }
 
-/* d(J^T lambda)/dq of element e from its d(J w)/dq: entry (r, c) is sum_i lambda_i dJ_ir/dq_c, where w = e_r gives column r of
- * J. */
+/* d(J^T lambda)/dq of element e from its d(J w)/dq: entry (r, c) is sum_i lambda_i dJ_ir/dq_c, where w = e_r gives
+ * column r of J. */
 static void blocks_transpose (const pw_element_batch *k, int e, pw_batch_function *jw_q, double *out) {
   double w[PW_MAX_COLS] = { 0 }, slope[PW_MAX_ROWS * PW_MAX_COLS];
   int cols = k->b.cols;
@@ -165,17 +166,17 @@ static void blocks_transpose (const pw_element_batch *k, int e, pw_batch_functio
 }
 
 int pw_evaluate_block (const pw_workspace *w, const pw_element_batch *k, pw_block block, double *out) {
-  pw_batch_function *sweep = pw_block_function (k->kind, block);
-  if (sweep == NULL) return 0;
-  if (sweep != pw_by_differences && block != PW_JTL_Q) {
-    sweep (&k->b, out);
+  pw_batch_function *function = pw_block_function (k->kind, block);
+  if (function == NULL) return 0;
+  if (function != pw_by_differences && block != PW_JTL_Q) {
+    function (&k->b, out);
     return 1;
   }
   for (int e = 0, size = pw_block_rows (k->kind, block) * k->b.cols; e < k->b.count; e++, out += size)
-    if (sweep == pw_by_differences)
+    if (function == pw_by_differences)
       pw_difference (w, k, e, block, out);
     else
-      blocks_transpose (k, e, sweep, out);
+      blocks_transpose (k, e, function, out);
   return 1;
 }
 

@@ -1,7 +1,7 @@
-/* From the description to the compiled system: names become indices, elements become one batch per kind in use.
+/* Compiles a description: names become indices, elements become one batch per element type.
  *
- * compile_layout runs twice over the same takes, once to learn the size and once to place the arrays, so that one
- * allocation holds the system.  compile_fill.c fills it. */
+ * The system is one allocation.  compile_layout runs twice, first to compute its size, then to place the arrays;
+ * compile_fill.c fills them. */
 #include <limits.h>
 #include <stdlib.h>
 #include <string.h>
@@ -61,7 +61,7 @@ static int compile_kinds (pw_compilation *c, pw_error *error) {
   return c->prepared ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", m->name);
 }
 
-static int compile_accounts (const pw_kind *k) {
+static int compile_ledger_entries (const pw_kind *k) {
   return (k->power != NULL || (k->rows > 0 && k->eta != NULL)) + (k->loss != NULL);
 }
 
@@ -73,7 +73,7 @@ static int compile_count (pw_compilation *c, pw_error *error) {
     coords += (double)c->count[k] * c->kind[k]->own;
     rows += (double)c->count[k] * c->kind[k]->rows;
     if (c->kind[k]->level == PW_HOLONOMIC) c->size.holonomic += c->count[k] * c->kind[k]->rows;
-    entries += (double)c->count[k] * compile_accounts (c->kind[k]);
+    entries += (double)c->count[k] * compile_ledger_entries (c->kind[k]);
     c->size.sources += c->count[k] * c->kind[k]->signals;
   }
   if (coords > INT_MAX / 64 || rows > INT_MAX / 64) return pw_fail (error, PW_INPUT, "model %s is too large", m->name);
@@ -99,7 +99,7 @@ static int compile_count (pw_compilation *c, pw_error *error) {
 
 /* ---- One allocation ---- */
 
-static void compile_layout_slab (const pw_compilation *c, pw_layout *l, pw_element_batch *k, int i) {
+static void compile_layout_batch (const pw_compilation *c, pw_layout *l, pw_element_batch *k, int i) {
   const pw_kind *kind = c->kind[i];
   size_t n = (size_t)c->count[i], bodies = n * (size_t)kind->bodies;
   pw_batch_arrays *a = &c->array[i];
@@ -128,7 +128,7 @@ static void compile_layout (const pw_compilation *c, pw_layout *l, pw_system **s
   s->v0 = pw_take (l, coords, sizeof *s->v0);
   s->held = pw_take (l, 2 * coords, 1);
   s->entry = pw_take (l, (size_t)c->size.entries, sizeof *s->entry);
-  for (int i = 0; i < c->kinds; i++) compile_layout_slab (c, l, l->base ? s->batch + i : NULL, i);
+  for (int i = 0; i < c->kinds; i++) compile_layout_batch (c, l, l->base ? s->batch + i : NULL, i);
   pools->table = pw_take (l, 4 * c->points, sizeof (double));
   pools->state = pw_take (l, (size_t)c->size.reads, sizeof (int));
   pools->text = pw_take (l, c->text, 1);
@@ -157,7 +157,7 @@ pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return NULL;
   if (!m->built)
     pw_fail (error, PW_INPUT, "model %s: pw_system_compile before pw_model_build", m->name);
-  else if (m->error.status != PW_OK) /* of what was added behind pw_model_build */
+  else if (m->error.status != PW_OK) /* from something added after pw_model_build */
     pw_fail (error, m->error.status, "%s", m->error.text);
   else if (compile_names (&c, error) == PW_OK && compile_kinds (&c, error) == PW_OK &&
            compile_count (&c, error) == PW_OK)

@@ -10,7 +10,8 @@ static const char *compile_text (pw_pools *pools, const char *text) {
   return copy;
 }
 
-/* Where the initial value of a body's state (0 to 5) is from; a 0 of one that does not say is `perhaps`. */
+/* Origin of the initial value of a body's state (0 to 5); `perhaps` for a 0 of a body that does not say which it
+ * specifies. */
 static unsigned char compile_origin (const pw_body *b, double value, int state, unsigned char perhaps) {
   if (b->specified) return b->specified >> state & 1 ? PW_SPECIFIED : 0;
   return value != 0 ? PW_SPECIFIED : perhaps;
@@ -32,7 +33,7 @@ static void compile_bodies (const pw_compilation *c, pw_system *s, pw_pools *poo
   }
 }
 
-/* The points of a table, and what is between them. */
+/* Copies the points of a table and computes its spline. */
 static void compile_table (pw_source *source, pw_pools *pools) {
   pw_signal *s = &source->signal;
   size_t n = (size_t)s->table.count;
@@ -46,7 +47,7 @@ static void compile_table (pw_source *source, pw_pools *pools) {
   pw_table_spline (s, source->spline);
 }
 
-/* The states a function reads. */
+/* Converts the names of states a function reads to indices. */
 static int compile_reads (const pw_compilation *c, pw_system *s, pw_source *source, const char *const *reads,
                           pw_pools *pools, const char *element, pw_error *error) {
   source->state = pools->state;
@@ -76,7 +77,7 @@ static int compile_source (const pw_compilation *c, pw_system *s, pw_source *sou
   return compile_reads (c, s, source, signal->function.reads, pools, element, error);
 }
 
-/* Prepares an element beside the system, to see that it stays within its size, and puts it in. */
+/* Prepares an element in scratch memory, checks that `prepare` stays within its size, and copies it into the system. */
 static int compile_prepare (const pw_compilation *c, const pw_system *s, const pw_element_batch *k, int e,
                             const pw_element *from, const pw_body *const *bodies, pw_internal *own, pw_error *error) {
   const pw_kind *kind = k->kind;
@@ -94,7 +95,8 @@ static int compile_prepare (const pw_compilation *c, const pw_system *s, const p
   return PW_OK;
 }
 
-/* Puts element `e` of its batch where the kind will find it; `body` is the one an each_body kind acts on, or -1. */
+/* Stores element e of a batch: bodies, columns, prepared element, internal coordinates.  body: the one an each_body
+ * type acts on, or -1. */
 static int compile_element (const pw_compilation *c, pw_system *s, pw_element_batch *k, int e, const pw_element *from,
                             int body, pw_error *error) {
   static const pw_body ground = { .name = "ground" };
@@ -123,9 +125,9 @@ static int compile_element (const pw_compilation *c, pw_system *s, pw_element_ba
   return PW_OK;
 }
 
-/* Puts an element of the description, once or for every body with mass; *e counts the elements of the batch. */
-static int compile_put (const pw_compilation *c, pw_system *s, pw_element_batch *k, int *e, const pw_element *from,
-                        pw_pools *pools, pw_error *error) {
+/* Stores an element of the description, once or for every body with mass; *e counts the elements of the batch. */
+static int compile_copies (const pw_compilation *c, pw_system *s, pw_element_batch *k, int *e, const pw_element *from,
+                           pw_pools *pools, pw_error *error) {
   const char *name = compile_text (pools, pw_element_name (from));
   if (!k->kind->each_body) {
     k->name[*e] = name;
@@ -139,9 +141,9 @@ static int compile_put (const pw_compilation *c, pw_system *s, pw_element_batch 
   return PW_OK;
 }
 
-/* After the elements, whose internal coordinates a signal may read. */
+/* Runs after all elements are stored, because signals may read their internal coordinates. */
 static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
-  int *next = c->count; /* from now on counts the elements seen of each batch */
+  int *next = c->count; /* reused: counts the elements visited in each batch */
   memset (next, 0, (size_t)s->batches * sizeof *next);
   for (int n = 0; n < c->m->elements; n++) {
     const pw_element *from = &c->m->element[n];
@@ -160,7 +162,7 @@ static int compile_signals (const pw_compilation *c, pw_system *s, pw_pools *poo
   return PW_OK;
 }
 
-static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
+static int compile_batches (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
   int row = 0, own = 3 * s->bodies;
   pw_source *source = s->source;
   for (int i = 0; i < s->batches; i++) {
@@ -173,13 +175,14 @@ static int compile_slabs (const pw_compilation *c, pw_system *s, pw_pools *pools
     source += k->b.count * k->kind->signals;
     int e = 0;
     for (int n = 0; n < c->m->elements; n++)
-      if (c->slab_of[n] == i && compile_put (c, s, k, &e, &c->m->element[n], pools, error) != PW_OK) return PW_INPUT;
+      if (c->slab_of[n] == i && compile_copies (c, s, k, &e, &c->m->element[n], pools, error) != PW_OK) return PW_INPUT;
   }
   return compile_signals (c, s, pools, error);
 }
 
-/* 1 if an element may do work: it has power, or moves a constraint.  A position that is prescribed by constants rests. */
-static int compile_works (const pw_element_batch *k, int element) {
+/* 1 if an element may do work: it has power or a rheonomic constraint.  A position prescribed by constants does no
+ * work. */
+static int compile_has_work (const pw_element_batch *k, int element) {
   const pw_kind *kind = k->kind;
   int constants = 0;
   if (kind->power) return 1;
@@ -194,14 +197,14 @@ static void compile_entries (pw_system *s) {
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &s->batch[i];
     for (int e = 0; e < k->b.count; e++)
-      if (compile_works (k, e)) *entry++ = (pw_entry){ i, e, PW_WORK };
+      if (compile_has_work (k, e)) *entry++ = (pw_entry){ i, e, PW_WORK };
     for (int e = 0; k->kind->loss && e < k->b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
   }
   s->entries = (int)(entry - s->entry);
 }
 
-/* The values given from outside. */
-static int compile_given (const pw_compilation *c, pw_system *s, pw_error *error) {
+/* Values of pw_model_set_initial. */
+static int compile_initial (const pw_compilation *c, pw_system *s, pw_error *error) {
   for (int i = 0; i < c->m->givens; i++) {
     int state = pw_system_find_state (s, c->m->given[i].state, error);
     if (state < 0) return PW_INPUT;
@@ -230,8 +233,8 @@ static double compile_length (const pw_compilation *c) {
   return L > 0 ? L : 1;
 }
 
-/* M, and where it is zero 1e-6 of the mean of its entries, angles in units of L: the same in all units, and whether mass or
- * inertia is missing. */
+/* M with zeros replaced by 1e-6 of the mean of its other entries, angles in units of L.  This is independent of
+ * units, and of whether mass or inertia is zero. */
 static void compile_metric (pw_system *s) {
   double sum = 0, L2 = s->scale.length * s->scale.length;
   int massive = 0;
@@ -242,7 +245,7 @@ static void compile_metric (pw_system *s) {
     s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
 }
 
-/* The sum of the forces that never change, at any state. */
+/* The sum of the constant forces; the state does not matter. */
 static int compile_constant (pw_system *s, pw_error *error) {
   pw_workspace *w = pw_workspace_new (s, error);
   if (w == NULL) return PW_RESOURCE;
@@ -256,7 +259,7 @@ static int compile_constant (pw_system *s, pw_error *error) {
 int pw_compile_fill (const pw_compilation *c, pw_system *s, pw_pools *pools, pw_error *error) {
   int constant = 0;
   compile_bodies (c, s, pools);
-  if (compile_slabs (c, s, pools, error) != PW_OK || compile_given (c, s, error) != PW_OK) return PW_INPUT;
+  if (compile_batches (c, s, pools, error) != PW_OK || compile_initial (c, s, error) != PW_OK) return PW_INPUT;
   compile_entries (s);
   s->scale = (pw_scale){ compile_length (c), 1 };
   compile_metric (s);

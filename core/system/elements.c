@@ -1,4 +1,4 @@
-/* The elements of a compiled system one by one: what they are, their contact points, the forces in them, the equations. */
+/* Queries about elements: properties, contact points, forces; and the equations of motion. */
 #include <stdlib.h>
 #include <string.h>
 #include "system.h"
@@ -33,7 +33,7 @@ int pw_system_row_element (const pw_system *s, int row) {
   return element + (row - k->row) / k->kind->rows;
 }
 
-static int elements_place (pw_workspace *w, double t, const double *q, const double *v, pw_error *error) {
+static int elements_update (pw_workspace *w, double t, const double *q, const double *v, pw_error *error) {
   if (pw_update_kinematics (w, t, q, v) == PW_OK) return PW_OK;
   return pw_fail (error, PW_METHOD, "at t = %g s a signal of the model reports an error", t);
 }
@@ -48,7 +48,7 @@ int pw_system_contacts (const pw_system *s) {
 
 int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, const double *v, double (*out)[3],
                                  pw_error *error) {
-  int status = elements_place (w, t, q, v, error);
+  int status = elements_update (w, t, q, v, error);
   for (const pw_element_batch *k = w->batch; status == PW_OK && k < w->batch + w->s->batches; k++) {
     if (k->kind->contact == NULL) continue;
     k->kind->contact (&k->b, out[0]);
@@ -59,7 +59,7 @@ int pw_workspace_contact_points (pw_workspace *w, double t, const double *q, con
 
 /* ---- Forces ---- */
 
-/* F -= J^T lambda, the columns of the bodies. */
+/* F -= J^T lambda, only the columns of bodies. */
 static void elements_reactions (const pw_element_batch *k, const double *lambda, double *F) {
   const double *J = k->J;
   int bodies = 3 * k->kind->bodies;
@@ -83,7 +83,7 @@ int pw_system_force_size (const pw_system *s) {
 
 int pw_workspace_forces (pw_workspace *w, double t, const double *q, const double *v, const double *lambda, double *out,
                          pw_error *error) {
-  if (elements_place (w, t, q, v, error) != PW_OK) return PW_METHOD;
+  if (elements_update (w, t, q, v, error) != PW_OK) return PW_METHOD;
   memset (out, 0, (size_t)pw_system_force_size (w->s) * sizeof *out);
   pw_evaluate_J (w);
   for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
@@ -96,7 +96,7 @@ int pw_workspace_forces (pw_workspace *w, double t, const double *q, const doubl
 
 /* ---- Equations ---- */
 
-/* The entries of J, row by row: where each is, and its value; out NULL: they are counted only. */
+/* Stores indices and values of the entries of J, unless out is NULL.  Returns their number. */
 static int elements_jacobian (const pw_workspace *w, pw_equations *out) {
   const pw_system *s = w->s;
   int entries = 0;
@@ -118,12 +118,13 @@ static int elements_jacobian (const pw_workspace *w, pw_equations *out) {
 static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error *error) {
   const pw_system *s = w->s;
   size_t n = (size_t)s->coords, rows = (size_t)s->rows, entries = (size_t)elements_jacobian (w, NULL);
-  double *space = calloc (2 * n + 3 * rows + 2 * entries + 6, sizeof *space); /* two indices take a number */
+  double *space =
+      calloc (2 * n + 3 * rows + 2 * entries + 6, sizeof *space); /* row and column of an entry fit in one double */
   *out =
       (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };
   if (space == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   out->mass = space;
-  out->force = space + n; /* three more: the ground's */
+  out->force = space + n; /* three more entries: the ground's */
   out->g = out->force + n + 3;
   out->eta = out->g + rows;
   out->gamma = out->eta + rows;
@@ -135,7 +136,7 @@ static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error
 
 static int elements_evaluate (pw_workspace *w, double t, const double *q, const double *v, pw_equations *out,
                               pw_error *error) {
-  if (elements_place (w, t, q, v, error) != PW_OK) return PW_METHOD;
+  if (elements_update (w, t, q, v, error) != PW_OK) return PW_METHOD;
   pw_evaluate_J (w);
   elements_jacobian (w, out);
   memcpy (out->mass, w->s->mass, (size_t)w->s->coords * sizeof *out->mass);

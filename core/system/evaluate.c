@@ -1,21 +1,22 @@
-/* Sweeps over the kinds in use, and the products and sums that go with them. */
+/* Evaluation of all batches, and products with J. */
 #include <math.h>
 #include <string.h>
 #include "system.h"
 #include "unroll.h"
 
-/* The batches with rows come first. */
+/* Batches with constraint equations come first. */
 #define EACH_CONSTRAINT(k, w) for (pw_element_batch *k = (w)->batch, *end = k + (w)->s->constraints; k < end; k++)
 
 void pw_evaluate_J (pw_workspace *w) {
   EACH_CONSTRAINT (k, w) k->kind->J (&k->b, k->J);
 }
 
-/* One array over rows, filled by the same sweep of every kind; a kind without it leaves zeros. */
-static void evaluate_rows (pw_workspace *w, size_t sweep, int rows, double *out) {
+/* Fills an array over constraint equations by one function of every type, at offset `function` of its table; NULL
+ * gives zeros. */
+static void evaluate_rows (pw_workspace *w, size_t function, int rows, double *out) {
   EACH_CONSTRAINT (k, w) {
     if (k->row >= rows) break;
-    pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + sweep);
+    pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + function);
     if (f)
       f (&k->b, out + k->row);
     else
@@ -47,7 +48,7 @@ static inline const double *evaluate_add (double *to, const double *force) {
   return force + 3;
 }
 
-PW_NOINLINE void evaluate_add_own (const pw_element_batch *k, double *f) {
+PW_NOINLINE void evaluate_add_internal (const pw_element_batch *k, double *f) {
   const int own = k->kind->own, *column = k->column;
   const double *block = k->block;
   for (int e = 0; e < k->b.count; e++) {
@@ -59,7 +60,7 @@ PW_NOINLINE void evaluate_add_own (const pw_element_batch *k, double *f) {
 static inline void evaluate_add_force (const pw_element_batch *k, double *f) {
   k->kind->force (&k->b, k->block);
   if (k->kind->own > 0) {
-    evaluate_add_own (k, f);
+    evaluate_add_internal (k, f);
     return;
   }
   const double *block = k->block;
@@ -77,11 +78,11 @@ void pw_evaluate_constant (pw_workspace *w, double *f) {
     if (k->kind->force && k->kind->constant) evaluate_add_force (k, f);
 }
 
-/* Sum of one number per element over all kinds that have the sweep. */
-static double evaluate_total (pw_workspace *w, size_t sweep) {
+/* Sum over all elements of a function, at offset `function` of the table, with one value per element. */
+static double evaluate_total (pw_workspace *w, size_t function) {
   double sum = 0;
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
-    pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + sweep);
+    pw_batch_function *f = *(pw_batch_function *const *)(const void *)((const char *)k->kind + function);
     if (f == NULL) continue;
     f (&k->b, k->block);
     for (int e = 0; e < k->b.count; e++) sum += k->block[e];
@@ -100,17 +101,17 @@ double pw_kinetic (const pw_system *s, const double *v) {
 }
 
 void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
-  const pw_element_batch *swept = NULL;
+  const pw_element_batch *last = NULL;
   int type = -1;
   double *eta = w->scratch;
   for (int i = 0; i < w->s->entries; i++) {
     const pw_entry *entry = &w->s->entry[i];
     pw_element_batch *k = &w->batch[entry->batch];
     int drive = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL;
-    if (k != swept || (int)entry->type != type) {
+    if (k != last || (int)entry->type != type) {
       k->b.lambda = lambda + k->row;
       (drive ? k->kind->eta : entry->type == PW_WORK ? k->kind->power : k->kind->loss) (&k->b, drive ? eta : k->block);
-      swept = k;
+      last = k;
       type = (int)entry->type;
     }
     if (!drive) {
@@ -123,7 +124,7 @@ void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
   }
 }
 
-/* out = J w for a batch; the numbers of bodies and of internal coordinates are constants where it is inlined. */
+/* out = J w for a batch; `bodies` and `own` are constants after inlining. */
 PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, const double *w, double *out, int bodies,
                              int own) {
   static const double ground[3] = { 0, 0, 0 };
@@ -168,14 +169,13 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
   }
 }
 
-/* The worst row so far: its residual's share in the sum of its terms, and which row it is.  Nothing is worse than what is
- * not a number. */
+/* The worst constraint equation so far: largest residual, largest scaled residual, and its index.  NaN is the worst. */
 typedef struct {
   double most, scaled;
   int row;
 } evaluate_worst;
 
-static inline evaluate_worst evaluate_judge (evaluate_worst worst, int row, double residual, double size) {
+static inline evaluate_worst evaluate_update_worst (evaluate_worst worst, int row, double residual, double size) {
   double error = fabs (residual), scaled = error / size;
   worst.most = pw_larger (worst.most, error);
   if (!(scaled <= worst.scaled) && !isnan (worst.scaled)) worst.scaled = scaled, worst.row = row;
@@ -186,16 +186,16 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
                         pw_residuals *r) {
   evaluate_worst worst = { .row = -1 };
   for (int i = 0; i < s->holonomic; i++)
-    if (enforced == NULL || enforced[i]) worst = evaluate_judge (worst, i, g[i], size[i]);
+    if (enforced == NULL || enforced[i]) worst = evaluate_update_worst (worst, i, g[i], size[i]);
   r->position = worst.scaled;
   r->g = worst.most;
   r->row_position = worst.row;
 }
 
-/* Judges J v - eta of a batch at the placed rates, as evaluate_mul; eta NULL: zero. */
-PW_INLINE evaluate_worst evaluate_speeds_of (const pw_element_batch *k, const double *eta,
-                                             const unsigned char *enforced, double unit, evaluate_worst worst,
-                                             int bodies, int own) {
+/* Updates the worst residual J v - eta with a batch, at the velocities of the workspace; eta NULL: zero. */
+PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, const double *eta,
+                                                  const unsigned char *enforced, double unit, evaluate_worst worst,
+                                                  int bodies, int own) {
   const double *J = k->J, *y = k->b.v;
   const int *body = k->b.body;
   int i = k->row;
@@ -214,14 +214,15 @@ PW_INLINE evaluate_worst evaluate_speeds_of (const pw_element_batch *k, const do
         size += fabs (spin);
       }
       if (eta) sum -= eta[i], size += fabs (eta[i]);
-      if (enforced == NULL || enforced[i]) worst = evaluate_judge (worst, i, sum, size + unit);
+      if (enforced == NULL || enforced[i]) worst = evaluate_update_worst (worst, i, sum, size + unit);
     }
   return worst;
 }
 
-PW_NOINLINE evaluate_worst evaluate_speeds_of_any (const pw_element_batch *k, const double *eta,
-                                                   const unsigned char *enforced, double unit, evaluate_worst worst) {
-  return evaluate_speeds_of (k, eta, enforced, unit, worst, k->kind->bodies, k->kind->own);
+PW_NOINLINE evaluate_worst evaluate_worst_velocity_any (const pw_element_batch *k, const double *eta,
+                                                        const unsigned char *enforced, double unit,
+                                                        evaluate_worst worst) {
+  return evaluate_worst_velocity (k, eta, enforced, unit, worst, k->kind->bodies, k->kind->own);
 }
 
 void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
@@ -230,11 +231,11 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
   if (eta) pw_evaluate_eta (w, eta);
   EACH_CONSTRAINT (k, w) {
     if (k->kind->own == 0 && k->kind->bodies == 2)
-      worst = evaluate_speeds_of (k, eta, enforced, unit, worst, 2, 0);
+      worst = evaluate_worst_velocity (k, eta, enforced, unit, worst, 2, 0);
     else if (k->kind->own == 0 && k->kind->bodies == 1)
-      worst = evaluate_speeds_of (k, eta, enforced, unit, worst, 1, 0);
+      worst = evaluate_worst_velocity (k, eta, enforced, unit, worst, 1, 0);
     else
-      worst = evaluate_speeds_of_any (k, eta, enforced, unit, worst);
+      worst = evaluate_worst_velocity_any (k, eta, enforced, unit, worst);
   }
   r->velocity = worst.scaled;
   r->jv = worst.most;

@@ -1,9 +1,9 @@
-/* Whose numbers are not finite: for a message that names the element instead of the step. */
+/* Finds the element with non-finite values, for error messages. */
 #include <math.h>
 #include <stdio.h>
 #include "system.h"
 
-/* The first element among whose `each` numbers one is not finite, or -1. */
+/* The first element with a non-finite value among its `each` values, or -1. */
 static int finite_first (const double *x, int count, int each) {
   for (int i = 0; i < count * each; i++)
     if (!isfinite (x[i])) return i / each;

@@ -1,20 +1,20 @@
-/* Placing a state: the configurations of all bodies, the signals of all elements. */
+/* Kinematics of a state: configurations of all bodies, signals of all elements. */
 #include <math.h>
 #include "sine.h"
 #include "system.h"
 #include "signal.h"
 #include "unroll.h"
 
-/* Internal coordinates are read where the caller has them. */
-static void kinematics_own (pw_workspace *w, const double *q, const double *v) {
+/* Internal coordinates are not copied: batches point into q and v. */
+static void kinematics_internal (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (q) k->b.q = q + k->own;
     k->b.v = v + k->own;
   }
 }
 
-static inline void kinematics_poses (pw_workspace *w, const double *q, const double *v) {
-  if (w->s->coords > 3 * w->s->bodies) kinematics_own (w, q, v);
+static inline void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
+  if (w->s->coords > 3 * w->s->bodies) kinematics_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
   for (; p + 1 < end; p += 2, q += 6, v += 6) {
     pw_lanes c, s;
@@ -30,23 +30,24 @@ static inline void kinematics_poses (pw_workspace *w, const double *q, const dou
   }
 }
 
-/* The states a function reads; q NULL: positions stay as they were.  Returns how many were taken. */
+/* Copies the states a function reads; q NULL: only velocities.  Returns the number of states copied. */
 static int kinematics_reads (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
-  int taken = 0;
+  int copied = 0;
   for (int r = 0; r < source->reads; r++) {
     int j = source->state[r], velocity = j >= w->s->coords;
     if (q == NULL && !velocity) continue;
     source->x[r] = velocity ? v[j - w->s->coords] : q[j];
-    taken++;
+    copied++;
   }
-  return taken;
+  return copied;
 }
 
-/* Evaluates the signals that read states, of these only those of velocities if q is NULL; or those of time alone. */
-PW_INLINE int kinematics_sources (pw_workspace *w, int readers, double t, const double *q, const double *v) {
+/* Evaluates the state-dependent signals (q NULL: only those that read velocities), or those that depend only on
+ * time. */
+PW_INLINE int kinematics_sources (pw_workspace *w, int state_dependent, double t, const double *q, const double *v) {
   for (pw_source *i = w->source, *end = i + w->s->sources; i < end; i++) {
-    if ((i->reads > 0) != readers || (w->hold && i->forced)) continue;
-    if (readers && kinematics_reads (w, i, q, v) == 0) continue;
+    if ((i->reads > 0) != state_dependent || (w->hold && i->forced)) continue;
+    if (state_dependent && kinematics_reads (w, i, q, v) == 0) continue;
     if (pw_signal_eval (i, t, !i->forced, i->u) == 0) continue;
     w->failed = i;
     return PW_METHOD;
@@ -54,10 +55,10 @@ PW_INLINE int kinematics_sources (pw_workspace *w, int readers, double t, const 
   return PW_OK;
 }
 
-/* Signals of time alone are evaluated once per time: stages at the same time share them. */
+/* Signals of time only are evaluated once per time; stages at the same time share them. */
 static int kinematics_signals (pw_workspace *w, double t, const double *q, const double *v) {
   if (t != w->t_signal) {
-    w->t_signal = NAN; /* if one fails, others have changed */
+    w->t_signal = NAN; /* in case of failure, some have changed */
     if (kinematics_sources (w, 0, t, q, v) != PW_OK) return PW_METHOD;
     w->t_signal = t;
   }
@@ -65,7 +66,7 @@ static int kinematics_signals (pw_workspace *w, double t, const double *q, const
 }
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
-  kinematics_poses (w, q, v);
+  kinematics_configurations (w, q, v);
   return t == w->t_signal && w->s->readers == 0 ? PW_OK : kinematics_signals (w, t, q, v);
 }
 
@@ -76,7 +77,7 @@ int pw_update_velocities (pw_workspace *w, const double *v) {
     p->vy = from[1];
     p->omega = from[2];
   }
-  if (w->s->coords > 3 * w->s->bodies) kinematics_own (w, NULL, v);
+  if (w->s->coords > 3 * w->s->bodies) kinematics_internal (w, NULL, v);
   return w->s->readers > 0 ? kinematics_sources (w, 1, w->t_signal, NULL, v) : PW_OK;
 }
 
@@ -88,9 +89,9 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 double pw_next_breakpoint (pw_workspace *w, int knots, double t) {
   double next = INFINITY;
   for (const pw_source *i = w->source, *end = i + w->s->sources; i < end; i++) {
-    double own = pw_signal_breakpoint (&i->signal, knots && !i->forced, t);
-    if (own < next) next = own;
-    if (own > t) continue;
+    double breakpoint = pw_signal_breakpoint (&i->signal, knots && !i->forced, t);
+    if (breakpoint < next) next = breakpoint;
+    if (breakpoint > t) continue;
     w->failed = i;
     return NAN;
   }

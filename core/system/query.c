@@ -68,8 +68,8 @@ int pw_system_find_body (const pw_system *s, const char *name) {
   return -1;
 }
 
-/* The batch that owns a coordinate j >= 3 bodies, and the element's and quantity's numbers in it. */
-static const pw_element_batch *query_owner (const pw_system *s, int j, int *element, int *number) {
+/* The batch of internal coordinate j >= 3 bodies, its element, and the number of the coordinate in the element. */
+static const pw_element_batch *query_internal (const pw_system *s, int j, int *element, int *number) {
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
     int n = j - k->own;
     if (k->kind->own == 0 || n < 0 || n >= k->b.count * k->kind->own) continue;
@@ -81,26 +81,27 @@ static const pw_element_batch *query_owner (const pw_system *s, int j, int *elem
 }
 
 char *pw_system_state_name (const pw_system *s, int state, char *buffer, size_t size) {
-  int rate = state >= s->coords, j = rate ? state - s->coords : state, e, n;
+  int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
   if (j < 3 * s->bodies) {
-    snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_names[3 * rate + j % 3]);
+    snprintf (buffer, size, "%s.%s", s->body_name[j / 3], query_names[3 * velocity + j % 3]);
     return buffer;
   }
-  const pw_element_batch *k = query_owner (s, j, &e, &n);
-  if (k) snprintf (buffer, size, "%s.%s", k->name[e], rate ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
+  const pw_element_batch *k = query_internal (s, j, &e, &n);
+  if (k)
+    snprintf (buffer, size, "%s.%s", k->name[e], velocity ? k->kind->coordinate[n].rate : k->kind->coordinate[n].name);
   return buffer;
 }
 
 const char *pw_system_state_unit (const pw_system *s, int state) {
-  int rate = state >= s->coords, j = rate ? state - s->coords : state, e, n;
-  if (j < 3 * s->bodies) return query_units[3 * rate + j % 3];
-  const pw_element_batch *k = query_owner (s, j, &e, &n);
+  int velocity = state >= s->coords, j = velocity ? state - s->coords : state, e, n;
+  if (j < 3 * s->bodies) return query_units[3 * velocity + j % 3];
+  const pw_element_batch *k = query_internal (s, j, &e, &n);
   if (k == NULL) return "";
-  if (!rate) return k->kind->coordinate[n].unit;
+  if (!velocity) return k->kind->coordinate[n].unit;
   return strcmp (k->kind->coordinate[n].unit, "m") == 0 ? "m/s" : "rad/s";
 }
 
-/* "body.what" to an index; `near` collects what was meant. */
+/* Index of the state "body.x", or -1; *near: the nearest name if the body exists. */
 static int query_body_state (const pw_system *s, const char *name, pw_nearest *near, char *best, size_t size) {
   const char *dot = strrchr (name, '.');
   if (dot == NULL) return -1;
@@ -126,9 +127,9 @@ int pw_system_find_state (const pw_system *s, const char *name, pw_error *error)
   int state = query_body_state (s, name, &near, best, sizeof best);
   if (state >= 0) return state;
   for (int j = 3 * s->bodies; j < s->coords; j++)
-    for (int rate = 0; rate < 2; rate++)
-      if (strcmp (pw_system_state_name (s, j + rate * s->coords, text, sizeof text), name) == 0)
-        return j + rate * s->coords;
+    for (int velocity = 0; velocity < 2; velocity++)
+      if (strcmp (pw_system_state_name (s, j + velocity * s->coords, text, sizeof text), name) == 0)
+        return j + velocity * s->coords;
   int search = near.best == NULL;
   for (int i = 0; search && i < 2 * s->coords; i++) {
     pw_nearest_try (&near, pw_system_state_name (s, i, text, sizeof text));
@@ -138,7 +139,7 @@ int pw_system_find_state (const pw_system *s, const char *name, pw_error *error)
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* The batch of a row, and the element and the row's number in it. */
+/* The batch of a constraint equation, its element, and the number of the equation in the element. */
 static const pw_element_batch *query_row (const pw_system *s, int row, int *element, int *number) {
   const pw_element_batch *k = s->batch;
   while (row >= k->row + k->b.count * k->kind->rows) k++;

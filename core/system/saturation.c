@@ -1,9 +1,9 @@
-/* Within how small a change of positions and velocities forces that saturate, such as friction, reverse. */
+/* The changes of positions and velocities over which saturating forces, such as friction, reverse. */
 #include <math.h>
 #include <stdio.h>
 #include "system.h"
 
-/* Fills the batch's block, 2 cols for each element. */
+/* Fills the batch's block, 2 cols per element.  Returns the number of entries. */
 static int saturation_fill (const pw_element_batch *k) {
   int n = k->b.count * 2 * k->b.cols;
   for (int i = 0; i < n; i++) k->block[i] = INFINITY;
@@ -11,7 +11,7 @@ static int saturation_fill (const pw_element_batch *k) {
   return n;
 }
 
-/* The state, as pw_system_find_state numbers them, of entry i of the block; -1: the ground's. */
+/* The state of entry i of the block, numbered as in pw_system_find_state; -1: the ground's. */
 static int saturation_state (const pw_system *s, const pw_element_batch *k, int i) {
   int cols = k->b.cols, c = i % (2 * cols), j = pw_global (k, i / (2 * cols), c % cols);
   return j >= s->coords ? -1 : c < cols ? j : s->coords + j;

@@ -1,9 +1,9 @@
-/* Workspaces: what a run modifies, beside a compiled system that it only reads. */
+/* Workspaces: data that a run modifies. */
 #include <math.h>
 #include <stdlib.h>
 #include "system.h"
 
-/* A copy of the system's batch, with arrays of the workspace. */
+/* Copies a batch of the system, with arrays of the workspace. */
 static void workspace_batch (pw_layout *l, const pw_element_batch *from, const pw_workspace *w, pw_element_batch *k) {
   const pw_kind *kind = from->kind;
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
@@ -36,7 +36,7 @@ static void workspace_layout (pw_layout *l, pw_workspace *w) {
   }
 }
 
-/* Functions that have a context of their own get one for this workspace. */
+/* Opens a context of this workspace for each function signal with `open`. */
 static int workspace_open_signals (pw_workspace *w) {
   int status = PW_OK;
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++)
@@ -45,7 +45,7 @@ static int workspace_open_signals (pw_workspace *w) {
       k->source[i].u = k->u + 3 * i;
       if (k->source[i].signal.type != PW_FUNCTION || f->open == NULL) continue;
       f->context = status == PW_OK ? f->open (f->context) : NULL;
-      if (f->context == NULL) status = PW_RESOURCE, f->close = NULL; /* nor are those after it */
+      if (f->context == NULL) status = PW_RESOURCE, f->close = NULL; /* closes neither this nor the following ones */
     }
   return status;
 }
