@@ -416,6 +416,23 @@ static void test_accumulating (void **state) {
   }
 }
 
+/* Where enclosures never decide, jumps a thousandth of the time apart are found all the same. */
+static void test_undecided (void **state) {
+  static const char *const text[] = { "-0.5 - t > deg/((t < t) ? t - 1 : sin(t))",
+                                      "-jacobi_am(t, atan2(t, t))/(2*t) > deg/sin(t)" };
+  (void)state;
+  for (size_t i = 0; i < sizeof text / sizeof *text; i++) {
+    const pw_expression *x = expression_of (text[i]);
+    int found = 0;
+    double t = 0;
+    for (int steps = 0; t < 10 && steps < 100; steps++) {
+      t = pw_expression_breakpoint (x, t);
+      for (int k = 1; k <= 3; k++) found += fabs (t - k * PW_PI) < 1e-14;
+    }
+    assert_int_equal (found, 3);
+  }
+}
+
 /* A whole number that bisection meets exactly is a break, too, whichever way it is passed. */
 static void test_whole (void **state) {
   static const char *const jumping[] = { "ceil(t)",    "2*ceil(t)",      "floor(-t)", "3 - floor(-t)",
@@ -465,10 +482,10 @@ static int expression_teardown (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_values),       cmocka_unit_test (test_troubles),    cmocka_unit_test (test_limits),
-    cmocka_unit_test (test_truths),       cmocka_unit_test (test_derivatives), cmocka_unit_test (test_after),
-    cmocka_unit_test (test_breakpoints),  cmocka_unit_test (test_round_off),   cmocka_unit_test (test_whole),
-    cmocka_unit_test (test_accumulating), cmocka_unit_test (test_scanned),
+    cmocka_unit_test (test_values),      cmocka_unit_test (test_troubles),     cmocka_unit_test (test_limits),
+    cmocka_unit_test (test_truths),      cmocka_unit_test (test_derivatives),  cmocka_unit_test (test_after),
+    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_round_off),    cmocka_unit_test (test_undecided),
+    cmocka_unit_test (test_whole),       cmocka_unit_test (test_accumulating), cmocka_unit_test (test_scanned),
   };
   return cmocka_run_group_tests (tests, NULL, expression_teardown);
 }

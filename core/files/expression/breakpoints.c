@@ -320,9 +320,9 @@ static int search_mark_noisy (search *s, double t) {
 static double search_first (search *s, double a, double b) {
   if (s->left-- <= 0) return fmax (a, nextafter (s->from, INFINITY));
   if (!range_run (s->x, s->noisy, a, b).breaks) return INFINITY;
-  if (b - a <= s->narrow * fmax (fabs (a), fabs (b)) + 1e-18) {
+  if (b - a <= s->narrow * (fmax (fabs (a), fabs (b)) + s->narrow) + 1e-18) {
     if (search_differ (s, a, b)) return search_mark_noisy (s, b) ? search_first (s, a, b) : search_bisect (s, a, b);
-    if (++s->equal % s->patience == 0) s->narrow *= 2;
+    if (++s->equal % s->patience == 0) s->narrow = fmin (2 * s->narrow, 0x1p-10);
     return INFINITY;
   }
   double middle = a + (b - a) / 2, first = search_first (s, a, middle);
