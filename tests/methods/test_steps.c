@@ -223,7 +223,8 @@ static void test_breakpoints_told (void **state) {
     error = (pw_error){ 0 };
     if (told[i] > 0) continue;
     assert_null (pw_run_open (s, "rk4", NULL, &error));
-    check_error (&error, PW_METHOD, "t = 0 s: torque T: value: its breakpoint function returned a time that is not later");
+    check_error (&error, PW_METHOD,
+                 "t = 0 s: torque T: value: its breakpoint function returned a time that is not later");
   }
   pw_system_free (s);
 }
