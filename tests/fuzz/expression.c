@@ -46,6 +46,7 @@ static long double evaluator_mean (long double a, long double b) {
 }
 
 static long double evaluator_am (long double u, long double m) {
+  if (m == 1) return atanl (sinhl (u)); /* the means do not converge */
   long double a[40] = { 1 }, ratio[40] = { 0 }, b = sqrtl (1 - m), angle;
   int n = 0;
   for (; n < 39 && fabsl (a[n] - b) > 1e-19L * a[n]; n++) {
@@ -115,8 +116,8 @@ static long double evaluator_one (evaluator *e, const char *name, long double x)
 }
 
 static long double evaluator_two (evaluator *e, const char *name, long double x, long double y) {
+  e->bend |= x == y; /* hypot bends at 0, 0 */
   if (strcmp (name, "hypot") == 0) return BOTH_OF_TWO (e, hypot, x, y);
-  e->bend |= x == y;
   if (strcmp (name, "min") == 0) return fminl (x, y);
   if (strcmp (name, "max") == 0) return fmaxl (x, y);
   if (strcmp (name, "jacobi_am") == 0)
