@@ -10,7 +10,7 @@ mkdir "$tree" && cp -R Makefile .ci core solvers models docs "$tree" && cd "$tre
 "$pinwheel" new models/arm.c >"$work/log" 2>&1
 
 sed 's/torque/twist/g' core/kinds/forces/torque.c >core/kinds/forces/twist.c
-sed -e '/^\/\* The list of element types\|^\/\* The list of kinds/i typedef struct {\n  const char *name;\n  const char *body[2];\n  pw_signal value;\n} pw_twist;\n' \
+sed -e '/^#define PW_KINDS/i typedef struct {\n  const char *name;\n  const char *body[2];\n  pw_signal value;\n} pw_twist;\n' \
   -e 's/PW_KIND (torque) /PW_KIND (torque) PW_KIND (twist) /' core/pinwheel.h >"$work/h" && mv "$work/h" core/pinwheel.h
 
 # Kutta's 3/8 rule (1901).

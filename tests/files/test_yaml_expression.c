@@ -355,6 +355,7 @@ static void test_breakpoints (void **state) {
     { "t > 2 ? frame.phi : 0", 2, 0 },
     { "frame.phi > t", 0, 0 },
     { "atan2(sin(t), cos(t))", 3.1415926535897931, 9.4247779607693793 },
+    { "atan2(floor(t/100), t - 1)", 1, 100 },
     { "sin(t) > 2", 0, 0 },
     { "max(0, min(t, 1) - min(t, 1)) + (t > 5)", 1, 5 },
     { "max(sin(t), sin(t)) + (t > 0.1)", 0.1, -1 }, /* what stays equal hides nothing near */

@@ -182,11 +182,11 @@ static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y
   return jet_chain (value, &s, x, y);
 }
 
-/* Jumps where y, the first argument, changes sign at negative x. */
+/* Jumps where y, the first argument, changes sign at negative x, and where x does while y is 0. */
 static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
   jet r = jet_function (c, y, x);
   int sign = jet_sign (y);
-  *discrete = x->v < 0 && sign < 0;
+  *discrete = x->v < 0 ? (sign < 0) + 2 * (sign == 0) : 0;
   if (y->v == 0 && x->v < 0 && sign != 0) r.v = sign * PW_PI;
   return r;
 }
