@@ -434,6 +434,14 @@ static void test_undecided (void **state) {
   }
 }
 
+/* am (u | m) = u - m (u - sin u cos u)/4 + ... (Abramowitz & Stegun 16.13.4): the slope by m where the means have converged. */
+static void test_amplitude (void **state) {
+  double u[3], small = 2;
+  (void)state;
+  pw_expression_derivatives (expression_of ("jacobi_am(2, t)"), (double[]){ 0, 0 }, 0, u);
+  check_close ("d am/dm", u[1], -(small - sin (small) * cos (small)) / 4, 4 * CHECK_EPS, "round-off");
+}
+
 /* A whole number that bisection meets exactly is a break, too, whichever way it is passed. */
 static void test_whole (void **state) {
   static const char *const jumping[] = { "ceil(t)",    "2*ceil(t)",      "floor(-t)", "3 - floor(-t)",
@@ -483,10 +491,11 @@ static int expression_teardown (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_values),      cmocka_unit_test (test_troubles),     cmocka_unit_test (test_limits),
-    cmocka_unit_test (test_truths),      cmocka_unit_test (test_derivatives),  cmocka_unit_test (test_after),
-    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_round_off),    cmocka_unit_test (test_undecided),
-    cmocka_unit_test (test_whole),       cmocka_unit_test (test_accumulating), cmocka_unit_test (test_scanned),
+    cmocka_unit_test (test_values),      cmocka_unit_test (test_troubles),    cmocka_unit_test (test_limits),
+    cmocka_unit_test (test_truths),      cmocka_unit_test (test_derivatives), cmocka_unit_test (test_after),
+    cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_round_off),   cmocka_unit_test (test_amplitude),
+    cmocka_unit_test (test_undecided),   cmocka_unit_test (test_whole),       cmocka_unit_test (test_accumulating),
+    cmocka_unit_test (test_scanned),
   };
   return cmocka_run_group_tests (tests, NULL, expression_teardown);
 }

@@ -226,7 +226,7 @@ static int report_same (const pw_linear *l, int i) {
 }
 
 static void report_eigenvalues (const pw_linear *l) {
-  char text[100], times[30];
+  char text[100];
   for (int i = 0, lines = 0, same; i < l->unknowns; i += same, lines++) {
     if (lines == REPORT_EIGENVALUES) {
       printf ("    and %d more\n", l->unknowns - i);
@@ -234,7 +234,8 @@ static void report_eigenvalues (const pw_linear *l) {
     }
     same = report_same (l, i);
     int multiplicity = l->im[i] != 0 ? same / 2 : same;
-    snprintf (times, sizeof times, multiplicity > 1 ? ", %d times" : "", multiplicity);
+    char times[30] = "";
+    if (multiplicity > 1) snprintf (times, sizeof times, ", %d times", multiplicity);
     report_entry (NULL, NULL, 0, i == 0 ? "eigenvalues, rightmost first" : "", "%s%s%s", report_eigenvalue (l, i, text),
                   times, l->rigid[i] ? ": rigid displacement" : "");
   }

@@ -87,7 +87,7 @@ static int slopes_mean (double m, double *a, double ratio[SLOPES_MEANS], double 
   int n = 0;
   *a = 1;
   *R = 0;
-  while (n < SLOPES_MEANS && fabs (*a - b) > 4 * DBL_EPSILON * *a) {
+  while (n == 0 || (n < SLOPES_MEANS && fabs (*a - b) > 4 * DBL_EPSILON * *a)) {
     double mean = (*a + b) / 2;
     p = n == 0 ? 1 / (2 * (1 + b)) : c * p / (4 * mean);
     c = m * p;
