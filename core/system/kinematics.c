@@ -13,9 +13,11 @@ static void kinematics_internal (pw_workspace *w, const double *q, const double 
   }
 }
 
+/* Sines and cosines of two bodies at a time; the rest, and angles beyond the limit, one by one. */
 static inline void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) kinematics_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
+  _Static_assert(PW_SINE_LANES == 2, "bodies are taken in pairs");
   for (; p + 1 < end; p += 2, q += 6, v += 6) {
     pw_lanes c, s;
     if (!(fabs (q[2]) < PW_SINE_LIMIT && fabs (q[5]) < PW_SINE_LIMIT)) break;

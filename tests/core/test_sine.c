@@ -97,7 +97,7 @@ static void random_angles (void **unused) {
       hash = (hash ^ bits) * 1099511628211u;
     }
   }
-  assert_true (hash == 2139304563643676396u);
+  assert_true (hash == 2139304563643676396u); /* by gcc and clang, -O0 to -O3, x86-64 and x86-64-v3 */
 }
 
 /* A body's angle may lie in any lane. */
