@@ -15,6 +15,12 @@ extern "C" {
 
 #define PW_MAX_STEPS 10000000 /* default limit of attempted steps of adaptive methods */
 
+/* The initial value of a state, numbered as in pw_system_find_state. */
+typedef struct {
+  int state;
+  double value;
+} pw_initial_value;
+
 /* How to integrate; zeros select the defaults. */
 typedef struct {
   double t;    /* initial time [s] */
@@ -30,6 +36,10 @@ typedef struct {
    * returns non-zero, the call returns PW_STOPPED.  May be NULL. */
   int (*stop) (void *context);
   void *stop_context; /* passed to stop */
+
+  /* Initial values in place of the system's, as by pw_model_set_initial; only read by pw_run_open. */
+  const pw_initial_value *initial;
+  int initials;
 
   const struct pw_method *const *methods; /* methods besides the built-in ones, ending with NULL; or NULL */
 } pw_settings;
@@ -81,6 +91,7 @@ typedef struct {
   const double *q_given, *v_given; /* the described state */
   const double *q, *v;             /* the initial state of the run; valid until it advances */
   int moved;                       /* states that differ by more than round-off */
+  const unsigned char *origin;     /* for pw_initial_specified */
   int released;                    /* 1: some of the user's values could not be kept */
   int changed;                     /* those of the moved states that the model specifies */
   double position, velocity;       /* scaled residuals of the described state */

@@ -66,6 +66,7 @@ struct pw_run {
   double *matrix_state, *matrix_range; /* 2 coords: where the Newton matrix was evaluated; range in which it is valid */
   int outdated;                        /* 1: the state reached is outside that range */
   double *q_given, *v_given;
+  unsigned char *origin; /* 2 coords: of initial values, as in pw_system */
   pw_initial_report start;
   pw_statistics statistics;
   pw_method_data *data; /* private to the integrator */

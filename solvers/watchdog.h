@@ -65,7 +65,7 @@ int pw_watchdog_near_state (struct pw_run *r);
 
 /* Rejects initial values and, in scenes with constraints, masses and inertias whose products overflow.  Errors:
  * PW_INPUT. */
-int pw_watchdog_check_values (const pw_system *s, const pw_watchdog *limits, pw_error *error);
+int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
 
 /* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
 int pw_watchdog_reaches (const struct pw_run *r, double sine, double length);

@@ -128,12 +128,12 @@ void pw_run_count_moved (pw_run *r) {
   for (int j = 0; j < 2 * r->s->coords; j++) {
     if (!pw_initial_moved (r->s, &r->start, j)) continue;
     r->start.moved++;
-    r->start.changed += (r->s->held[j] & (PW_GIVEN | PW_SPECIFIED)) == PW_SPECIFIED;
+    r->start.changed += (r->origin[j] & (PW_GIVEN | PW_SPECIFIED)) == PW_SPECIFIED;
   }
 }
 
-int pw_initial_specified (const pw_system *s, int state) {
-  return (s->held[state] & (PW_GIVEN | PW_SPECIFIED)) != 0;
+int pw_initial_specified (const pw_initial_report *report, int state) {
+  return (report->origin[state] & (PW_GIVEN | PW_SPECIFIED)) != 0;
 }
 
 /* Fills the report; the state given is in q_given, the new one in q. */
@@ -143,6 +143,7 @@ static void initial_report (pw_run *r, int released, const pw_residuals *before)
                                  .v_given = r->v_given,
                                  .q = r->q,
                                  .v = r->v,
+                                 .origin = r->origin,
                                  .released = released,
                                  .position = before->position,
                                  .velocity = before->velocity };

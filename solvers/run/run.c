@@ -72,6 +72,7 @@ void pw_run_close (pw_run *r) {
   pw_rank_close (r);
   pw_workspace_free (r->w);
   free (r->memory);
+  free (r->origin);
   free (r);
 }
 

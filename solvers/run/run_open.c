@@ -44,13 +44,30 @@ static int run_allocate (pw_run *r) {
     { &r->matrix_state, 2 * n }, { &r->matrix_range, 2 * n },
   };
   r->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (r->memory == NULL) return PW_RESOURCE;
+  r->origin = malloc (2 * n);
+  if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
   for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = r->matrix_range[j] = INFINITY;
+  return PW_OK;
+}
+
+/* The system's initial values, and those of the settings in their place. */
+static int run_initial_values (pw_run *r, const pw_settings *settings, pw_error *error) {
+  const pw_system *s = r->s;
   memcpy (r->q, s->q0, (size_t)s->coords * sizeof (double));
   memcpy (r->v, s->v0, (size_t)s->coords * sizeof (double));
-  return PW_OK;
+  memcpy (r->origin, s->held, 2 * (size_t)s->coords);
+  for (int i = 0; i < settings->initials; i++) {
+    const pw_initial_value *x = &settings->initial[i];
+    if (x->state < 0 || x->state >= 2 * s->coords || !isfinite (x->value))
+      return pw_fail (error, PW_INPUT,
+                      "setting initial: state %d = %g: expected a state from 0 to %d and a finite value", x->state,
+                      x->value, 2 * s->coords - 1);
+    *(x->state < s->coords ? r->q + x->state : r->v + x->state - s->coords) = x->value;
+    r->origin[x->state] |= PW_GIVEN;
+  }
+  return pw_watchdog_check_values (r, error);
 }
 
 /* T: the shortest time scale of the initial velocities, the accelerations and the span. */
@@ -130,22 +147,21 @@ static int run_check_derivatives (pw_run *r, const char *method, pw_error *error
 }
 
 static int run_open (pw_run *r, const char *method, const pw_settings *settings, pw_error *error) {
-  pw_settings none = { 0 };
+  const pw_settings none = { 0 };
+  if (settings == NULL) settings = &none;
   r->limits = pw_watchdog_limits;
   r->refuse = r->limits.rank;
-  if (pw_watchdog_check_values (r->s, &r->limits, error) != PW_OK) return PW_INPUT;
-  if (pw_parse_options (method, settings ? settings->methods : NULL, &r->method, &r->stabilisation, r->option, error) !=
-      PW_OK)
+  if (run_allocate (r) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (run_initial_values (r, settings, error) != PW_OK ||
+      pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)
     return PW_INPUT;
   pw_choose_steps (r);
-  int status = run_settings (&r->settings, settings ? settings : &none, r->method, error);
-  if (status == PW_OK && run_allocate (r) != PW_OK)
-    status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  int status = run_settings (&r->settings, settings, r->method, error);
   if (status != PW_OK) return status;
   r->t = r->t_at = r->settings.t;
   pw_hold_signals (r->w, 0);
   r->w->scale.time = r->settings.span;
-  status = pw_run_make_consistent (r, r->s->held, error);
+  status = pw_run_make_consistent (r, r->origin, error);
   if (status == PW_OK) status = run_first_evaluation (r, error);
   if (status == PW_OK) status = run_check_finite (r, error);
   if (status != PW_OK) return status;

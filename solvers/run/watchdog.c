@@ -199,9 +199,11 @@ int pw_watchdog_near_state (pw_run *r) {
   return pw_watchdog_near (r);
 }
 
-int pw_watchdog_check_values (const pw_system *s, const pw_watchdog *limits, pw_error *error) {
+int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  const pw_watchdog *limits = &r->limits;
   for (int i = 0; i < 2 * s->coords; i++) {
-    double value = i < s->coords ? s->q0[i] : s->v0[i - s->coords];
+    double value = i < s->coords ? r->q[i] : r->v[i - s->coords];
     char name[120];
     if (!(fabs (value) < limits->extreme))
       return pw_fail (error, PW_INPUT, "model %s: values too extreme: %s is initially %g: expected less than %g",

@@ -89,6 +89,28 @@ static void test_cpu (void **state) {
   assert_string_equal (cli_out, "rhs,cpu [s],reason\n");
 }
 
+/* ---- Compiled systems ---- */
+
+/* A model that counts how often it is built: once for the columns, then once for each of two lengths, whichever
+ * quantity varies fastest.  One worker, so that the second length is not compiled while the first is still in use. */
+static void test_shared (void **state) {
+  (void)state;
+  cli_write ("counted.c",
+             "#include <stdio.h>\n#include <stdlib.h>\n#include \"pinwheel.h\"\n"
+             "static const pw_parameter p[] = { { \"l\", 0, 1, \"m\", \"length\", PW_POSITIVE }, { 0 } };\n"
+             "static void build (pw_model *m, const void *l) {\n"
+             "  FILE *f = fopen (getenv (\"COUNTED\"), \"a\");\n"
+             "  fputs (\"x\\n\", f), fclose (f);\n"
+             "  pw_add_body (m, &(pw_body){ .name = \"b\", .mass = 1, .inertia = *(const double *)l });\n}\n"
+             "PW_MODEL (.about = \"\", .parameters = p, .parameters_size = sizeof (double), .build = build);\n");
+  cli_shell ("export COUNTED=@/counted; s='pinwheel sweep @/counted.c --t-end 0.01'\n"
+             "for v in '--vary l=1,2 --vary b.omega=0,1,2' '--vary b.omega=0,1,2 --vary l=1,2'; do rm -f @/counted\n"
+             "$s $v -j 1 -o @/one.csv && wc -l <@/counted && $s $v -j 3 -o @/three.csv && cmp @/one.csv @/three.csv || "
+             "exit 1\n"
+             "done");
+  assert_string_equal (cli_out, "3\n3\n");
+}
+
 /* ---- Runs that fail ---- */
 
 static void test_failures (void **state) {
@@ -178,11 +200,10 @@ static void test_bad_input (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_order),        cmocka_unit_test (test_ranges),   cmocka_unit_test (test_row_is_run),
-    cmocka_unit_test (test_start_values), cmocka_unit_test (test_counts),   cmocka_unit_test (test_cpu),
-    cmocka_unit_test (test_failures),     cmocka_unit_test (test_all_fail), cmocka_unit_test (test_fails_late),
-    cmocka_unit_test (test_bad_input),
-
+    cmocka_unit_test (test_order),        cmocka_unit_test (test_ranges),    cmocka_unit_test (test_row_is_run),
+    cmocka_unit_test (test_start_values), cmocka_unit_test (test_counts),    cmocka_unit_test (test_cpu),
+    cmocka_unit_test (test_shared),       cmocka_unit_test (test_failures),  cmocka_unit_test (test_all_fail),
+    cmocka_unit_test (test_fails_late),   cmocka_unit_test (test_bad_input),
   };
   return cmocka_run_group_tests_name ("sweeps", tests, cli_setup, cli_teardown);
 }

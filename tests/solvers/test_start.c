@@ -31,6 +31,50 @@ static void start_close (pw_run *r, pw_system *s) {
   pw_system_free (s);
 }
 
+/* ---- Initial values of the settings ---- */
+
+/* They replace the system's for this run alone, as if the model had them, to the bit. */
+static void test_settings (void **state) {
+  static const char *const name[] = { "frame.omega", "steer.phi", NULL };
+  static const double value[] = { 0.3, 0.2 };
+  pw_system *own, *shared;
+  pw_error error = { 0 };
+  (void)state;
+  pw_run *expected = start_open (&own, name, value), *plain = start_open (&shared, NULL, NULL);
+  pw_initial_value initial[2];
+  for (int i = 0; i < 2; i++)
+    initial[i] = (pw_initial_value){ pw_system_find_state (shared, name[i], &error), value[i] };
+  pw_run *r = runs_open (shared, "rk4", &(pw_settings){ .initial = initial, .initials = 2 });
+  const pw_initial_report *a = pw_run_initial (r), *b = pw_run_initial (expected);
+  check_bits ("positions", a->q, b->q, 6);
+  check_bits ("velocities", a->v, b->v, 6);
+  assert_true (a->moved == b->moved && a->changed == b->changed && a->released == b->released && a->moved > 0);
+  for (int i = 0; i < 12; i++) assert_int_equal (pw_initial_specified (a, i), pw_initial_specified (b, i));
+  assert_true (pw_initial_specified (a, initial[0].state) && !pw_initial_specified (pw_run_initial (plain), 2));
+  pw_run_close (r);
+  pw_run_close (plain);
+  pw_run *again = runs_open (shared, "rk4", NULL);
+  check_bits ("the system's", pw_run_initial (again)->q, shared->q0, 6);
+  start_close (again, shared);
+  start_close (expected, own);
+}
+
+static void test_bad_settings (void **state) {
+  static const pw_initial_value bad[] = { { -1, 0 }, { 12, 0 }, { 0, NAN }, { 0, 1e200 } };
+  static const char *const expected[] = { "state -1 = 0: expected a state from 0 to 11", "state 12 = 0: expected",
+                                          "state 0 = nan: expected",
+                                          "values too extreme: frame.x is initially 1e+200" };
+  (void)state;
+  pw_system *s = scene_compile (scene_model (&scene_ezyroller, NULL));
+  for (int i = 0; i < 4; i++) {
+    pw_error error = { 0 };
+    assert_null (pw_run_open (s, "rk4", &(pw_settings){ .initial = bad + i, .initials = 1 }, &error));
+    assert_int_equal (error.status, PW_INPUT);
+    assert_non_null (strstr (error.text, expected[i]));
+  }
+  pw_system_free (s);
+}
+
 /* ---- Nothing to do ---- */
 
 static void test_no_harm (void **state) {
@@ -136,7 +180,7 @@ static void test_specified (void **state) {
   assert_true (start->q[2] == PW_PI / 6 && start->v[2] == 2 && start->moved == 4 && start->changed == 0);
   check_close ("x", start->q[0], 0.5 * cos (PW_PI / 6), START_ROUND_OFF, start_reason);
   check_close ("vy", start->v[1], cos (PW_PI / 6), START_ROUND_OFF, start_reason);
-  assert_true (pw_initial_specified (s, 2) && pw_initial_specified (s, 5) && !pw_initial_specified (s, 0));
+  assert_true (pw_initial_specified (start, 2) && pw_initial_specified (start, 5) && !pw_initial_specified (start, 0));
   start_close (r, s);
 }
 
@@ -427,6 +471,8 @@ static void test_impossible (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_settings),
+    cmocka_unit_test (test_bad_settings),
     cmocka_unit_test (test_no_harm),
     cmocka_unit_test (test_little),
     cmocka_unit_test (test_round_off),

@@ -51,7 +51,7 @@ static void check_given (pw_check *x) {
     if (!pw_initial_moved (s, pw_run_initial (x->r), i)) continue;
     pw_check_state (x, i, name, sizeof name, &from, &to);
     if (fabs (to) < 1e-12 * fabs (from)) to = 0;
-    if (pw_initial_specified (s, i))
+    if (pw_initial_specified (pw_run_initial (x->r), i))
       check_add (&x->finding, "the model specifies %s = %s %s, but the constraints require %s %s", name,
                  pw_format (a, from, 10), pw_system_state_unit (s, i), pw_format (b, to, 10),
                  pw_system_state_unit (s, i));

@@ -113,7 +113,7 @@ static void report_start (const pw_system *s, const pw_initial_report *start) {
     if (!pw_initial_moved (s, start, i)) continue;
     pw_cli_say ("  %s from %s to %s %s%s\n", pw_system_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
                 pw_format (b, to, 10), pw_system_state_unit (s, i),
-                start->changed && pw_initial_specified (s, i) ? " (specified)" : "");
+                start->changed && pw_initial_specified (start, i) ? " (specified)" : "");
     listed++;
   }
   report_more (stderr, moved - listed, "");

@@ -3,7 +3,7 @@
 #define PW_DRIFT_H
 
 #include "study.h"
-#include "sweep.h"
+#include "sweep_grid.h"
 
 enum { DRIFT_PARTS = 200 }; /* of a run: each has a point in the figures */
 

@@ -1,8 +1,8 @@
 /* pinwheel sweep: a table of runs, for all combinations of varied parameters and initial values.
  *
- * Every run has its own model, system and method and depends only on its row of the grid.  A journal keeps the rows in
- * the order of completion; at the end they are sorted into the order of the grid.  So the table does not depend on the
- * number of threads or on interruptions of the sweep. */
+ * Every run depends only on its row of the grid.  A journal keeps the rows in the order of completion; at the end they
+ * are sorted into the order of the grid.  So the table does not depend on the number of threads or on interruptions of
+ * the sweep. */
 #define _GNU_SOURCE /* sched_getaffinity */
 #include <errno.h>
 #include <limits.h>
@@ -12,7 +12,18 @@
 #include <string.h>
 #include <unistd.h>
 #include "progress.h"
-#include "sweep.h"
+#include "sweep_journal.h"
+#include "sweep_row.h"
+
+/* A compiled system that several threads use. */
+typedef struct shared_system {
+  long parameters; /* pw_grid_parameters of its rows */
+  int users;       /* threads */
+  int ready;       /* 0: one of them is compiling it */
+  pw_sweep_system system;
+  pw_error error; /* why it could not be compiled */
+  struct shared_system *next;
+} shared_system;
 
 typedef struct {
   /* as given */
@@ -25,7 +36,9 @@ typedef struct {
   int jobs;
   /* in progress; accessed by the thread that holds the lock */
   pthread_mutex_t lock;
-  long next; /* the next row to compute */
+  pthread_cond_t compiled;
+  shared_system *shared;
+  long next; /* the next row to compute, as in pw_grid_ordered */
   pw_journal journal;
   pw_progress progress;
   pw_text scratch;
@@ -87,7 +100,7 @@ static int sweep_jobs (sweep *x, pw_error *error) {
   return status;
 }
 
-static int sweep_settle (sweep *x, pw_error *error) {
+static int sweep_settings (sweep *x, pw_error *error) {
   pw_plan *p = &x->plan;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
   p->model = x->line.argument[0];
@@ -106,7 +119,7 @@ static int sweep_open (sweep *x, pw_error *error) {
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->path, PW_WRITES, NULL } };
   x->plan.file = pw_cli_file (&x->line, error);
   if (x->plan.file == NULL) return error->status;
-  int status = sweep_settle (x, error);
+  int status = sweep_settings (x, error);
   if (status == PW_OK) status = pw_plan_open (&x->plan, x->ranges, error);
   if (status == PW_OK && x->plan.parts > x->plan.grid.rows)
     status = pw_fail (error, PW_INPUT, "--part %s: the grid has only %ld rows", x->part_text, x->plan.grid.rows);
@@ -119,40 +132,84 @@ static int sweep_open (sweep *x, pw_error *error) {
   return PW_OK;
 }
 
+/* ---- Compiled systems; the caller holds the lock ---- */
+
+/* Ends the use of a system; the last user frees it. */
+static void sweep_release (sweep *x, shared_system *s) {
+  shared_system **at = &x->shared;
+  if (s == NULL || --s->users > 0) return;
+  while (*at != s) at = &(*at)->next;
+  *at = s->next;
+  pw_sweep_system_close (&s->system);
+  free (s);
+}
+
+/* The system of a row in place of the one used so far: shared with other threads, or compiled without the lock.  NULL
+ * if out of memory. */
+static shared_system *sweep_share (sweep *x, shared_system *last, long row) {
+  long parameters = pw_grid_parameters (&x->plan.grid, row);
+  if (last && last->parameters == parameters) return last;
+  sweep_release (x, last);
+  shared_system *s = x->shared;
+  while (s && s->parameters != parameters) s = s->next;
+  if (s) {
+    s->users++;
+    while (!s->ready) pthread_cond_wait (&x->compiled, &x->lock);
+    return s;
+  }
+  if ((s = calloc (1, sizeof *s)) == NULL) return NULL;
+  *s = (shared_system){ .parameters = parameters, .users = 1, .next = x->shared };
+  x->shared = s;
+  pthread_mutex_unlock (&x->lock);
+  pw_sweep_system_open (&s->system, &x->plan, row, &s->error);
+  pthread_mutex_lock (&x->lock);
+  s->ready = 1;
+  pthread_cond_broadcast (&x->compiled);
+  return s;
+}
+
 /* ---- The sweep ---- */
 
 /* Keeps a row, or the first error, which stops the sweep. */
-static void sweep_keep (sweep *x, long k, int status, const pw_text *text, const pw_error *own) {
+static void sweep_keep (sweep *x, long row, int status, const pw_text *text, const pw_error *own) {
+  if (status == PW_RETRY || x->error->status != PW_OK) return;
   if (status == PW_RESOURCE)
-    pw_fail (x->error, status, "%s", own->text);
-  else if (pw_journal_add (&x->journal, &x->plan, k, -status, text->at, &x->scratch, x->error) == PW_OK)
+    pw_fail (x->error, status, "row %ld of the grid: %s", row + 1, own->text);
+  else if (pw_journal_add (&x->journal, &x->plan, row, -status, text->at, &x->scratch, x->error) == PW_OK)
     pw_progress_at (&x->progress, (double)x->journal.done);
   if (x->error->status != PW_OK && pw_stop == 0) pw_stop = 1;
 }
 
-static void sweep_one (sweep *x, long k, pw_text *text) {
-  pw_error own = { 0 };
-  pw_text_clear (text);
-  int status = pw_sweep_row (&x->plan, pw_plan_row (&x->plan, k), text, &own);
-  if (status == PW_RETRY) return;
-  pthread_mutex_lock (&x->lock);
-  if (x->error->status == PW_OK) sweep_keep (x, k, status, text, &own);
-  pthread_mutex_unlock (&x->lock);
-}
-
-/* The next missing row; the number of rows if there is none. */
+/* The next missing row of the part; -1 if there is none. */
 static long sweep_take (sweep *x) {
-  pthread_mutex_lock (&x->lock);
-  while (x->next < x->journal.rows && x->journal.line[x->next] != 0) x->next++;
-  long k = pw_stop == 0 ? x->next++ : x->journal.rows;
-  pthread_mutex_unlock (&x->lock);
-  return k;
+  const pw_plan *p = &x->plan;
+  while (pw_stop == 0 && x->next < p->grid.rows) {
+    long row = pw_grid_ordered (&p->grid, x->next++);
+    if (row % p->parts == p->part - 1 && x->journal.line[row / p->parts] == 0) return row;
+  }
+  return -1;
 }
 
 static void *sweep_thread (void *context) {
   sweep *x = context;
   pw_text text = { .at = NULL };
-  for (long k; (k = sweep_take (x)) < x->journal.rows;) sweep_one (x, k, &text);
+  shared_system *s = NULL;
+  pthread_mutex_lock (&x->lock);
+  for (long row; (row = sweep_take (x)) >= 0;) {
+    s = sweep_share (x, s, row);
+    pw_error own = { 0 };
+    if (s)
+      own = s->error;
+    else
+      pw_fail (&own, PW_RESOURCE, "out of memory");
+    pthread_mutex_unlock (&x->lock);
+    pw_text_clear (&text);
+    int status = pw_sweep_row (&x->plan, s ? &s->system : NULL, row, &text, &own);
+    pthread_mutex_lock (&x->lock);
+    sweep_keep (x, row, status, &text, &own);
+  }
+  sweep_release (x, s);
+  pthread_mutex_unlock (&x->lock);
   pw_text_free (&text);
   return NULL;
 }
@@ -164,16 +221,18 @@ static void sweep_all (sweep *x) {
   pthread_t *thread = calloc ((size_t)x->jobs, sizeof *thread);
   int started = 1, why = thread ? 0 : ENOMEM;
   pthread_mutex_init (&x->lock, NULL);
+  pthread_cond_init (&x->compiled, NULL);
   pthread_mutex_lock (&x->lock);
   while (why == 0 && started < x->jobs && (why = pthread_create (thread + started, NULL, sweep_thread, x)) == 0)
     started++;
   if (why)
     pw_fail (x->error, PW_RESOURCE, "cannot start %d runs at a time, only %d: %s; try --jobs %d", x->jobs, started,
              strerror (why), started);
-  if (why) x->next = rows;
+  if (why) x->next = x->plan.grid.rows;
   pthread_mutex_unlock (&x->lock);
   sweep_thread (x);
   while (--started > 0) pthread_join (thread[started], NULL);
+  pthread_cond_destroy (&x->compiled);
   pthread_mutex_destroy (&x->lock);
   free (thread);
 }

@@ -2,7 +2,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "sweep.h"
+#include "pinwheel-files.h"
+#include "sweep_grid.h"
+#include "util.h"
 
 /* ---- Ranges ---- */
 
@@ -15,8 +17,13 @@ static int grid_number (const char *text, size_t size, double *value) {
   return pw_read_expression (number, value) == PW_OK && isfinite (*value) ? PW_OK : PW_INPUT;
 }
 
-/* "v1,v2,..." */
+static int grid_fail (const pw_axis *a, const char *why, pw_error *error) {
+  return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: %s", a->name, a->range, why);
+}
+
+/* "V1,V2,..." */
 static int grid_list (pw_axis *a, pw_error *error) {
+  char why[140];
   a->count = 1;
   for (const char *c = a->range; *c; c++) a->count += *c == ',';
   a->value = calloc ((size_t)a->count, sizeof *a->value);
@@ -24,43 +31,39 @@ static int grid_list (pw_axis *a, pw_error *error) {
   const char *c = a->range;
   for (long i = 0; i < a->count; i++) {
     size_t n = strcspn (c, ",");
-    if (grid_number (c, n, a->value + i) != PW_OK)
-      return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: \"%.*s\" is not a finite number", a->name, a->range,
-                      n < 100 ? (int)n : 100, c);
+    snprintf (why, sizeof why, "\"%.*s\" is not a finite number", n < 100 ? (int)n : 100, c);
+    if (grid_number (c, n, a->value + i) != PW_OK) return grid_fail (a, why, error);
     c += n + 1;
   }
   return PW_OK;
 }
 
+/* Reads "A:B:N"; 0 if it is something else. */
+static int grid_three (const char *c, double number[3]) {
+  for (int i = 0; i < 3; i++) {
+    size_t n = strcspn (c, ":");
+    if (grid_number (c, n, number + i) != PW_OK || (c[n] == ':') != (i < 2)) return 0;
+    c += n + 1;
+  }
+  return 1;
+}
+
 /* "A:B:N" after "lin:" or "log:" */
 static int grid_range (pw_axis *a, pw_error *error) {
-  double number[3] = { 0 };
-  const char *c = a->range + 4;
-  int read = 0, colons = 0;
-  for (const char *k = c; *k; k++) colons += *k == ':';
-  while (colons == 2 && read < 3) {
-    size_t n = strcspn (c, ":");
-    if (grid_number (c, n, number + read) != PW_OK) break;
-    c += n + 1;
-    read++;
-  }
-  if (read < 3)
-    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected %.3s:FIRST:LAST:COUNT, three numbers", a->name,
-                    a->range, a->range);
+  double number[3];
+  char why[80];
+  snprintf (why, sizeof why, "expected %.3s:FIRST:LAST:COUNT, three numbers", a->range);
+  if (!grid_three (a->range + 4, number)) return grid_fail (a, why, error);
   a->first = number[0];
   a->last = number[1];
   if (*pw_domain_check (PW_COUNT, number[2]))
-    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: expected a count that is a whole number >= 1", a->name,
-                    a->range);
-  if (number[2] > PW_GRID_ROWS)
-    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: too many values: at most 1e8 rows", a->name, a->range);
+    return grid_fail (a, "expected a count that is a whole number >= 1", error);
+  if (number[2] > PW_GRID_ROWS) return grid_fail (a, "too many values: at most 1e8 rows", error);
   a->count = (long)number[2];
   if (a->count == 1 && a->first != a->last)
-    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: a range with two different ends has at least 2 values",
-                    a->name, a->range);
+    return grid_fail (a, "a range with two different ends has at least 2 values", error);
   if (a->type == PW_AXIS_LOG && !(a->first > 0 && a->last > 0))
-    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: the ends of a logarithmic range must be > 0", a->name,
-                    a->range);
+    return grid_fail (a, "the ends of a logarithmic range must be > 0", error);
   return PW_OK;
 }
 
@@ -76,7 +79,7 @@ static int grid_axis (pw_axis *a, char *text, pw_error *error) {
             : strncmp (a->range, "log:", 4) == 0 ? PW_AXIS_LOG
                                                  : PW_AXIS_LIST;
   if (a->type == PW_AXIS_LIST && strchr (a->range, ':'))
-    return pw_fail (error, PW_INPUT, "--vary %.100s=%.100s: a range begins with lin: or log:", a->name, a->range);
+    return grid_fail (a, "a range begins with lin: or log:", error);
   return a->type == PW_AXIS_LIST ? grid_list (a, error) : grid_range (a, error);
 }
 
@@ -92,7 +95,29 @@ double pw_axis_value (const pw_axis *a, long i) {
 
 /* ---- The grid ---- */
 
-/* The last varies fastest. */
+double pw_grid_value (const pw_grid *g, int axis, long row) {
+  const pw_axis *a = g->axis + axis;
+  return pw_axis_value (a, row / a->stride % a->count);
+}
+
+long pw_grid_ordered (const pw_grid *g, long k) {
+  long row = 0;
+  for (int parameters = 0; parameters < 2; parameters++)
+    for (const pw_axis *a = g->axis + g->axes; a-- > g->axis;) {
+      if ((a->parameter != NULL) != parameters) continue;
+      row += k % a->count * a->stride;
+      k /= a->count;
+    }
+  return row;
+}
+
+long pw_grid_parameters (const pw_grid *g, long row) {
+  long number = 0;
+  for (const pw_axis *a = g->axis; a < g->axis + g->axes; a++)
+    if (a->parameter) number = number * a->count + row / a->stride % a->count;
+  return number;
+}
+
 static int grid_count (pw_grid *g, pw_error *error) {
   double rows = 1;
   for (int i = 0; i < g->axes; i++) rows *= (double)g->axis[i].count;

@@ -11,14 +11,15 @@
  *     part = 2/4
  *     end
  *     17 0 83c1f0a2 1.5,0.05,ok,... a row's number, its run's exit status, a check sum, its line of the table */
-#define _POSIX_C_SOURCE 200809L
+#define _GNU_SOURCE /* asprintf */
 #include <errno.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
-#include "sweep.h"
+#include "fingerprint.h"
+#include "sweep_journal.h"
 
 typedef struct {
   long row;
@@ -154,24 +155,22 @@ int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error
   *j = (pw_journal){ .file = -1, .rows = pw_plan_rows (p) };
   j->path = pw_output_path (path, error);
   if (j->path == NULL) return error->status;
-  size_t size = strlen (j->path) + sizeof ".part";
-  j->part = malloc (size);
+  if (asprintf (&j->part, "%s.part", j->path) < 0) j->part = NULL;
   j->line = calloc ((size_t)j->rows + 1, sizeof *j->line);
   if (j->part == NULL || j->line == NULL)
     return pw_fail (error, PW_RESOURCE, "out of memory for a sweep of %ld rows", j->rows);
-  snprintf (j->part, size, "%s.part", j->path);
   j->file = pw_lock_path (j->part, error);
   return j->file >= 0 ? journal_begin (j, p, error) : error->status;
 }
 
-int pw_journal_add (pw_journal *j, const pw_plan *p, long k, int status, const char *cells, pw_text *text,
+int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_text *text,
                     pw_error *error) {
   off_t at = j->size;
   pw_text_clear (text);
-  journal_line_add (text, pw_plan_row (p, k), status, cells);
+  journal_line_add (text, row, status, cells);
   if (text->failed) return pw_fail (error, PW_RESOURCE, "out of memory");
   if (journal_write (j, text->at, text->used, error) != PW_OK) return error->status;
-  j->line[k] = at;
+  j->line[row / p->parts] = at;
   j->done++;
   return PW_OK;
 }
@@ -199,12 +198,16 @@ static void table_reason (const journal_line *line, char *reason, size_t size) {
   reason[n] = 0;
 }
 
-static void table_count (pw_tally *tally, const journal_line *line) {
+/* Writes the line of a row, to a part the whole line, and returns its bytes; 0 if it is not there. */
+static size_t table_row (FILE *stream, const char *at, const char *end, long row, int whole, pw_tally *tally) {
+  journal_line line;
+  if (!journal_line_read (at, end, &line) || line.row != row) return 0;
+  fwrite (whole ? at : line.text, 1, whole ? line.bytes : line.size, stream);
   tally->rows++;
-  if (line->status == 0) return;
-  if (tally->failed++ > 0) return;
-  tally->status = line->status;
-  table_reason (line, tally->reason, sizeof tally->reason);
+  if (line.status == 0 || tally->failed++ > 0) return line.bytes;
+  tally->status = line.status;
+  table_reason (&line, tally->reason, sizeof tally->reason);
+  return line.bytes;
 }
 
 /* Completes the file if all went well so far, else removes it. */
@@ -217,17 +220,12 @@ static int table_close (pw_output *o, pw_error *error) {
 
 static int table_write (const pw_journal *j, const pw_plan *p, const journal_map *map, FILE *stream, pw_tally *tally,
                         pw_error *error) {
-  const char *head = p->parts > 1 ? p->fingerprint.at : p->head.at;
-  fputs (head, stream);
-  if (p->parts == 1) putc ('\n', stream);
-  for (long k = 0; k < j->rows; k++) {
-    journal_line line;
-    const char *at = map->at + j->line[k];
-    if (!journal_line_read (at, map->end, &line))
+  int is_part = p->parts > 1;
+  fputs (is_part ? p->fingerprint.at : p->head.at, stream);
+  if (!is_part) putc ('\n', stream);
+  for (long k = 0; k < j->rows; k++)
+    if (!table_row (stream, map->at + j->line[k], map->end, p->part - 1 + k * p->parts, is_part, tally))
       return pw_fail (error, PW_RESOURCE, "%s was changed by another program", j->part);
-    fwrite (p->parts > 1 ? at : line.text, 1, p->parts > 1 ? line.bytes : line.size, stream);
-    table_count (tally, &line);
-  }
   return PW_OK;
 }
 
@@ -241,14 +239,12 @@ int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error 
   if (o) table_write (j, p, &map, pw_output_stream (o), tally, &own);
   if (o) table_close (o, &own);
   journal_map_close (&map);
-  int status = own.status;
-  if (status != PW_OK)
-    pw_fail (error, status, "%.300s; all rows are in %.150s, so the same command has only to sort them", own.text,
-             j->part);
-  if (status == PW_OK && unlink (j->part) != 0)
-    return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", j->path, j->part,
-                    strerror (errno));
-  return status;
+  if (own.status != PW_OK)
+    return pw_fail (error, own.status, "%.300s; all rows are in %.150s, so the same command has only to sort them",
+                    own.text, j->part);
+  if (unlink (j->part) == 0) return PW_OK;
+  return pw_fail (error, PW_RESOURCE, "%s is complete, but %s cannot be removed: %s", j->path, j->part,
+                  strerror (errno));
 }
 
 /* ---- The table of all parts ---- */
@@ -272,10 +268,8 @@ static int table_open_part (table_part *x, const char *path, pw_error *error) {
   if (status != PW_OK) return pw_fail (error, PW_INPUT, "cannot read the part %s: %s", path, strerror (why));
   x->rows = x->at = pw_fingerprint_end (PW_SWEEP_MAGIC, x->map.at, x->map.end);
   const char *part = x->rows ? pw_fingerprint_value (x->map.at, x->rows, "part", &size) : NULL;
-  char *rest = NULL;
-  if (part) x->part = (int)strtol (part, &rest, 10);
-  if (rest && *rest == '/') x->parts = (int)strtol (rest + 1, NULL, 10);
-  if (x->parts < 1 || x->part < 1 || x->part > x->parts)
+  if (part == NULL || sscanf (part, "%9d/%9d", &x->part, &x->parts) != 2 || x->parts < 1 || x->part < 1 ||
+      x->part > x->parts)
     return pw_fail (error, PW_INPUT, "%s is no part of a sweep: parts are written by --part I/N", path);
   return PW_OK;
 }
@@ -317,17 +311,15 @@ static int table_weave (table_part *x, int count, FILE *stream, pw_tally *tally,
   fwrite (head, 1, size, stream);
   putc ('\n', stream);
   for (long r = 0; r < rows; r++) {
-    journal_line line;
     table_part *from = x + r % count;
-    if (!journal_line_read (from->at, from->map.end, &line) || line.row != r)
+    size_t bytes = table_row (stream, from->at, from->map.end, r, 0, tally);
+    if (bytes == 0)
       return pw_fail (error, PW_INPUT, "%s is not complete: row %ld is missing; finish that part first", from->path,
                       r + 1);
-    fwrite (line.text, 1, line.size, stream);
-    from->at += line.bytes;
-    table_count (tally, &line);
+    from->at += bytes;
   }
   for (int i = 0; i < count; i++)
-    if (x[i].at != x[i].map.end) return pw_fail (error, PW_INPUT, "%s has rows too many: it was changed", x[i].path);
+    if (x[i].at != x[i].map.end) return pw_fail (error, PW_INPUT, "%s has too many rows: it was changed", x[i].path);
   return PW_OK;
 }
 

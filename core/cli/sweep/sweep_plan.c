@@ -1,31 +1,58 @@
-/* The plan of a sweep, which all runs share: the model, the grid, the columns. */
+/* The plan of a sweep: the model, the grid, the columns, the compiled systems. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "sweep.h"
+#include "fingerprint.h"
+#include "sweep_plan.h"
 
-enum { PLAN_TRIES = 1000 }; /* failed scenes after which the grid is refused */
+enum { PLAN_TRIES = 1000 }; /* models that cannot be built, after which the grid is refused */
 
-/* ---- Scenes ---- */
+/* ---- Compiled systems ---- */
 
-/* Sets the values of the command line, then the varied ones: parameters before the model is built, initial values
- * after. */
+/* Sets the parameters of a row, and the initial values of the command line. */
 static int plan_build (const pw_plan *p, long row, pw_model *m, pw_error *error) {
   int status = pw_cli_apply (m, "--set", p->sets, pw_model_set, error);
   for (int i = 0; i < p->grid.axes && status == PW_OK; i++)
     if (p->grid.axis[i].parameter)
       status = pw_model_set (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
   if (status == PW_OK) status = pw_cli_apply (m, "--start", p->starts, pw_model_set_initial, error);
-  for (int i = 0; i < p->grid.axes && status == PW_OK; i++)
-    if (p->grid.axis[i].parameter == NULL)
-      status = pw_model_set_initial (m, p->grid.axis[i].name, pw_grid_value (&p->grid, i, row), error);
   return status == PW_OK ? pw_model_build (m, error) : status;
 }
 
-int pw_plan_scene (const pw_plan *p, long row, pw_cli_model *m, pw_error *error) {
-  *m = (pw_cli_model){ .model = pw_file_model (p->file, error) };
-  if (m->model && plan_build (p, row, m->model, error) == PW_OK) m->system = pw_system_compile (m->model, error);
-  return m->system ? PW_OK : error->status;
+static int plan_compile (pw_sweep_system *x, const pw_plan *p, long row, pw_error *error) {
+  *x = (pw_sweep_system){ .m = { .model = pw_file_model (p->file, error) } };
+  if (x->m.model && plan_build (p, row, x->m.model, error) == PW_OK)
+    x->m.system = pw_system_compile (x->m.model, error);
+  if (x->m.system == NULL) return error->status;
+  x->state = malloc (((size_t)p->grid.axes + 1) * sizeof *x->state);
+  if (x->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < p->grid.axes; i++) {
+    const pw_axis *a = p->grid.axis + i;
+    x->state[i] = a->parameter ? -1 : pw_system_find_state (x->m.system, a->name, error);
+    if (a->parameter == NULL && x->state[i] < 0) return PW_INPUT;
+  }
+  return PW_OK;
+}
+
+int pw_sweep_system_open (pw_sweep_system *x, const pw_plan *p, long row, pw_error *error) {
+  char name[300];
+  if (plan_compile (x, p, row, error) != PW_OK) return error->status;
+  int states = 2 * pw_system_coordinates (x->m.system);
+  x->column = malloc ((size_t)states * sizeof *x->column);
+  if (x->column == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < states; i++) {
+    x->column[i] = pw_names_find (&p->index, pw_system_state_name (x->m.system, i, name, sizeof name));
+    if (x->column[i] < 0)
+      return pw_fail (error, PW_INPUT,
+                      "%s has no column: the number of bodies may only depend on parameters that are counts", name);
+  }
+  return PW_OK;
+}
+
+void pw_sweep_system_close (pw_sweep_system *x) {
+  pw_cli_close_model (&x->m);
+  free (x->column);
+  free (x->state);
 }
 
 /* ---- Axes ---- */
@@ -63,7 +90,8 @@ static int plan_axes (pw_plan *p, pw_model *m, pw_error *error) {
 
 /* ---- Columns ---- */
 
-int pw_plan_state (const pw_system *s, int i) {
+/* The i-th state in the order of the table: six of each body, then internal coordinates and their velocities. */
+static int plan_state (const pw_system *s, int i) {
   int n = pw_system_coordinates (s), bodies = pw_system_bodies (s), k = i - 6 * bodies;
   if (k >= 0) return 3 * bodies + k / 2 + k % 2 * n;
   return i % 6 < 3 ? i / 6 * 3 + i % 6 : n + i / 6 * 3 + i % 6 - 3;
@@ -83,11 +111,12 @@ static int plan_grow (pw_plan *p) {
   return PW_OK;
 }
 
-/* Adds the new states of a scene, and the units of varied initial values. */
-static int plan_columns_of (pw_plan *p, const pw_system *s, pw_error *error) {
+/* Adds the new states of a system, and the units of varied initial values. */
+static int plan_columns_of (pw_plan *p, const pw_sweep_system *x, pw_error *error) {
+  const pw_system *s = x->m.system;
   char name[300];
   for (int i = 0; i < 2 * pw_system_coordinates (s); i++) {
-    int state = pw_plan_state (s, i);
+    int state = plan_state (s, i);
     pw_system_state_name (s, state, name, sizeof name);
     if (p->room && pw_names_find (&p->index, name) >= 0) continue;
     const char *copy = pw_arena_text (&p->arena, name);
@@ -95,37 +124,32 @@ static int plan_columns_of (pw_plan *p, const pw_system *s, pw_error *error) {
     p->column[p->columns] = (struct pw_column){ copy, pw_system_state_unit (s, state) };
     pw_names_add (&p->index, copy, p->columns++);
   }
-  for (pw_axis *a = p->grid.axis; a < p->grid.axis + p->grid.axes; a++) {
-    int state = a->parameter == NULL ? pw_system_find_state (s, a->name, NULL) : -1;
-    if (state >= 0) a->unit = pw_system_state_unit (s, state);
-  }
+  for (int i = 0; i < p->grid.axes; i++)
+    if (x->state[i] >= 0) p->grid.axis[i].unit = pw_system_state_unit (s, x->state[i]);
   return PW_OK;
 }
 
-/* The results of building scenes. */
+/* The models tried. */
 typedef struct {
   int built, refused;
-  pw_error first; /* why a scene could not be built */
+  pw_error first; /* why a model could not be built */
 } plan_scan;
 
-static int plan_scan_row (pw_plan *p, long row, plan_scan *x, pw_error *error) {
-  pw_cli_model m;
+static int plan_scan_row (pw_plan *p, long row, plan_scan *scan, pw_error *error) {
+  pw_sweep_system x;
   pw_error own = { 0 };
-  int status = pw_plan_scene (p, row, &m, &own);
-  if (status == PW_OK) p->tables = pw_check_tables (p->tables, m.model);
-  if (status == PW_OK) status = plan_columns_of (p, m.system, &own);
-  pw_cli_close_model (&m);
-  if (status == PW_OK)
-    x->built = 1;
-  else if (status == PW_RESOURCE)
-    return pw_fail (error, status, "%s", own.text);
-  else if (x->refused++ == 0)
-    x->first = own;
+  int status = plan_compile (&x, p, row, &own);
+  if (status == PW_OK) p->tables = pw_check_tables (p->tables, x.m.model);
+  if (status == PW_OK) status = plan_columns_of (p, &x, &own);
+  pw_sweep_system_close (&x);
+  if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
+  scan->built |= status == PW_OK;
+  if (status != PW_OK && scan->refused++ == 0) scan->first = own;
   return PW_OK;
 }
 
-/* The bodies may depend on integer parameters.  So one scene is built for each value of these, with the others as in
- * the first row, and one for the last row; without such parameters a single scene suffices, if it can be built. */
+/* The bodies may depend on integer parameters.  So one model is built for each value of these, with the others as in
+ * the first row, and one for the last row; without such parameters one that can be built suffices. */
 static int plan_columns (pw_plan *p, pw_error *error) {
   plan_scan x = { .built = 0 };
   int counts = 0, status = plan_scan_row (p, 0, &x, error);

@@ -1,9 +1,9 @@
-/* One run of a sweep, from the model to the cells of its row. */
+/* One run of a sweep, and the cells of its row. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
 #include "progress.h"
-#include "sweep.h"
+#include "sweep_row.h"
 
 /* The result of a run; NaN if unknown. */
 typedef struct {
@@ -11,24 +11,10 @@ typedef struct {
   double *state; /* columns */
 } row_result;
 
-/* States go to the columns of their names. */
-static int row_states (const pw_plan *p, const pw_system *s, const pw_sample *sample, double *state, pw_error *error) {
-  char name[300];
-  int n = pw_system_coordinates (s);
-  for (int i = 0; i < 2 * n; i++) {
-    int from = pw_plan_state (s, i);
-    int column = pw_names_find (&p->index, pw_system_state_name (s, from, name, sizeof name));
-    if (column < 0)
-      return pw_fail (error, PW_INPUT,
-                      "%s has no column: the number of bodies may only depend on parameters that are counts", name);
-    state[column] = from < n ? sample->q[from] : sample->v[from - n];
-  }
-  return PW_OK;
-}
-
-static int row_read (const pw_plan *p, const pw_system *s, pw_run *r, row_result *x, pw_error *error) {
+static int row_read (const pw_sweep_system *s, pw_run *r, row_result *x, pw_error *error) {
   pw_sample sample;
   const pw_statistics *statistics = pw_run_statistics (r);
+  int n = pw_system_coordinates (s->m.system);
   x->t = pw_run_time (r);
   x->position = statistics->position;
   x->velocity = statistics->velocity;
@@ -37,31 +23,40 @@ static int row_read (const pw_plan *p, const pw_system *s, pw_run *r, row_result
   int status = pw_run_sample (r, x->t, &sample, error);
   if (status != PW_OK) return status;
   x->kinetic = sample.kinetic;
-  return row_states (p, s, &sample, x->state, error);
+  for (int i = 0; i < n; i++) x->state[s->column[i]] = sample.q[i], x->state[s->column[n + i]] = sample.v[i];
+  return PW_OK;
 }
 
 /* The run itself; PW_RETRY if it was stopped.  A failed run still reports the time it reached. */
-static int row_run (const pw_plan *p, long row, row_result *x, pw_error *error) {
-  pw_cli_model m;
+static int row_run (const pw_plan *p, const pw_sweep_system *s, const pw_settings *settings, row_result *x,
+                    pw_error *error) {
+  pw_run *r = pw_run_open (s->m.system, p->method, settings, error);
+  int status = r ? PW_OK : error->status;
+  while (status == PW_OK && pw_run_time (r) < p->t_end) status = pw_run_advance (r, p->t_end, error);
+  if (status == PW_STOPPED) status = pw_limit_fail (settings->stop_context, pw_run_time (r), error);
+  if (r == NULL) return status;
+  int read = row_read (s, r, x, status == PW_OK ? error : &(pw_error){ 0 });
+  pw_run_close (r);
+  return status == PW_OK ? read : status;
+}
+
+/* With the initial values of the row. */
+static int row_start (const pw_plan *p, const pw_sweep_system *s, long row, row_result *x, pw_error *error) {
   pw_limit limit = { .most = p->limit };
   pw_settings settings = p->settings;
+  pw_initial_value *initial = malloc (((size_t)p->grid.axes + 1) * sizeof *initial);
+  if (initial == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < p->grid.axes; i++)
+    if (s->state[i] >= 0)
+      initial[settings.initials++] = (pw_initial_value){ s->state[i], pw_grid_value (&p->grid, i, row) };
+  settings.initial = initial;
   settings.stop = pw_limit_over;
   settings.stop_context = &limit;
   pw_limit_start (&limit);
   double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
-  pw_run *r = NULL;
-  int status = pw_plan_scene (p, row, &m, error);
-  if (status == PW_OK && (r = pw_run_open (m.system, p->method, &settings, error)) == NULL) status = error->status;
-  while (status == PW_OK && pw_run_time (r) < p->t_end) status = pw_run_advance (r, p->t_end, error);
-  if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_run_time (r), error);
-  if (r) {
-    pw_error *own = &(pw_error){ 0 };
-    int read = row_read (p, m.system, r, x, status == PW_OK ? error : own);
-    if (status == PW_OK) status = read;
-    pw_run_close (r);
-  }
-  pw_cli_close_model (&m);
+  int status = row_run (p, s, &settings, x, error);
   x->cpu = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
+  free (initial);
   return status > 0 && pw_stop == 0 ? pw_fail (error, PW_METHOD, "the method gave up") : status;
 }
 
@@ -71,25 +66,18 @@ static void row_write (const pw_plan *p, long row, int status, const row_result 
   pw_text_cell (t, word[-status]);
   pw_text_number (t, x->t);
   for (int i = 0; i < p->columns; i++) pw_text_number (t, x->state[i]);
-  pw_text_number (t, x->kinetic);
-  pw_text_number (t, x->position);
-  pw_text_number (t, x->velocity);
-  pw_text_number (t, x->steps);
-  pw_text_number (t, x->rhs);
-  if (p->cpu) pw_text_number (t, x->cpu);
+  const double rest[] = { x->kinetic, x->position, x->velocity, x->steps, x->rhs, x->cpu };
+  for (int i = 0; i < (p->cpu ? 6 : 5); i++) pw_text_number (t, rest[i]);
   pw_text_quoted (t, reason);
 }
 
-int pw_sweep_row (const pw_plan *p, long row, pw_text *text, pw_error *error) {
-  pw_error own = { 0 };
-  row_result x = { NAN, NAN, NAN, NAN, NAN, NAN, NAN, NULL };
+int pw_sweep_row (const pw_plan *p, const pw_sweep_system *s, long row, pw_text *text, pw_error *error) {
+  row_result x = { NAN, NAN, NAN, NAN, NAN, NAN, 0, NULL };
   x.state = malloc (((size_t)p->columns + 1) * sizeof *x.state);
   if (x.state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   for (int i = 0; i < p->columns; i++) x.state[i] = NAN;
-  int status = row_run (p, row, &x, &own);
-  if (status == PW_RESOURCE) pw_fail (error, status, "row %ld of the grid: %s", row + 1, own.text);
-  if (status != PW_RETRY && status != PW_RESOURCE) row_write (p, row, status, &x, own.text, text);
+  int status = error->status == PW_OK ? row_start (p, s, row, &x, error) : error->status;
+  if (status != PW_RETRY && status != PW_RESOURCE) row_write (p, row, status, &x, error->text, text);
   free (x.state);
-  if (text->failed) return pw_fail (error, PW_RESOURCE, "out of memory");
-  return status;
+  return text->failed ? pw_fail (error, PW_RESOURCE, "out of memory") : status;
 }

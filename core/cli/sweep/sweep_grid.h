@@ -1,0 +1,41 @@
+/* The grid of a sweep: varied quantities and their values.  Its rows are numbered in the order of the table, the last
+ * quantity fastest. */
+#ifndef PW_SWEEP_GRID_H
+#define PW_SWEEP_GRID_H
+
+#include "pinwheel.h"
+
+#define PW_GRID_ROWS 1e8 /* larger grids are refused */
+
+/* One varied quantity. */
+typedef struct {
+  char *name;
+  const char *range; /* "lin:1:10:100", as written */
+  enum { PW_AXIS_LIST, PW_AXIS_LIN, PW_AXIS_LOG } type;
+  double first, last; /* of PW_AXIS_LIN and PW_AXIS_LOG */
+  double *value;      /* PW_AXIS_LIST: count */
+  long count;
+  long stride;                   /* rows between two of its values */
+  const pw_parameter *parameter; /* NULL: it is the initial value of a state */
+  const char *unit;
+} pw_axis;
+
+typedef struct {
+  pw_axis *axis;
+  int axes;
+  long rows;
+} pw_grid;
+
+/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT with the text that is wrong and what was expected, also for
+ * too many rows.  Free the grid in every case. */
+int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error);
+void pw_grid_free (pw_grid *g);
+double pw_axis_value (const pw_axis *a, long i);
+double pw_grid_value (const pw_grid *g, int axis, long row);
+
+/* The k-th row in the order in which runs are started: rows with the same parameters follow each other. */
+long pw_grid_ordered (const pw_grid *g, long k);
+/* The number of a row's combination of parameters. */
+long pw_grid_parameters (const pw_grid *g, long row);
+
+#endif

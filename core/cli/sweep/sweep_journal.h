@@ -1,0 +1,41 @@
+/* The files of a sweep: a journal while it runs, then its table or part. */
+#ifndef PW_SWEEP_JOURNAL_H
+#define PW_SWEEP_JOURNAL_H
+
+#include <sys/types.h>
+#include "sweep_plan.h"
+
+/* Rows in the order of completion, in a file next to the table, from which a sweep that was stopped continues. */
+typedef struct {
+  char *path;  /* of the table, links followed */
+  char *part;  /* of the journal: path.part */
+  int file;    /* the journal's, locked; -1: not open */
+  int created; /* 1: by this process */
+  off_t *line; /* pw_plan_rows: offset of each row's line; 0: missing */
+  long rows, done;
+  off_t size;
+} pw_journal;
+
+/* Opens the journal of the table at `path`, or creates it.  It is truncated at the first incomplete or damaged line.
+ * Errors: PW_RESOURCE if it cannot be written, PW_INPUT if it belongs to another sweep or is in use by another
+ * process. */
+int pw_journal_open (pw_journal *j, const pw_plan *p, const char *path, pw_error *error);
+/* Appends a row of the grid; `text` is scratch.  One thread at a time.  PW_RESOURCE: the journal is unchanged. */
+int pw_journal_add (pw_journal *j, const pw_plan *p, long row, int status, const char *cells, pw_text *text,
+                    pw_error *error);
+/* Closes the journal; removes it if it was created here and has no rows. */
+void pw_journal_close (pw_journal *j);
+
+/* How the runs of a table ended. */
+typedef struct {
+  long rows, failed;
+  int status;       /* exit status of the first that failed */
+  char reason[300]; /* from its row */
+} pw_tally;
+
+/* Writes the table of a complete journal, or its part, and removes the journal. */
+int pw_table_finish (pw_journal *j, const pw_plan *p, pw_tally *tally, pw_error *error);
+/* Writes the table at `path` from all parts of a sweep. */
+int pw_table_merge (const char *const *parts, int count, const char *path, pw_tally *tally, pw_error *error);
+
+#endif

@@ -1,0 +1,60 @@
+/* The plan of a sweep: all that its runs share.
+ *
+ * A sweep computes all rows of the grid, or those of one part: part i of n has the rows i - 1, i - 1 + n, ... */
+#ifndef PW_SWEEP_PLAN_H
+#define PW_SWEEP_PLAN_H
+
+#include <stdint.h>
+#include "cli.h"
+#include "sweep_grid.h"
+#include "text.h"
+#include "util.h"
+
+#define PW_SWEEP_MAGIC "pinwheel sweep 1\n" /* the first line of a fingerprint */
+
+typedef struct {
+  /* from the command line; read only */
+  const char *model, *method;
+  const char **sets, **starts;
+  pw_settings settings;
+  double t_end; /* [s] */
+  double limit; /* of each run's processor time [s]; INFINITY: none */
+  int cpu;      /* 1: a column with each run's processor time */
+  int part, parts;
+  /* set by pw_plan_open */
+  pw_file *file;
+  pw_grid grid;
+  struct pw_column {
+    const char *name, *unit;
+  } * column; /* columns: the states of all bodies and elements */
+  int columns, room;
+  pw_names index;      /* from a state's name to its column */
+  pw_arena arena;      /* names */
+  uint64_t tables;     /* a hash of the points of all tables of models built so far; 0: there are none */
+  pw_text head;        /* the table's first line, without its end */
+  pw_text fingerprint; /* the first lines of a journal or part: everything that determines the rows */
+} pw_plan;
+
+/* Matches the ranges ("NAME=RANGE") to the model, whose file is open in p->file and stays the caller's, and finds the
+ * columns by compiling models of the grid.  Errors: PW_INPUT, PW_RESOURCE.  Close the plan in every case. */
+int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error);
+void pw_plan_close (pw_plan *p);
+
+/* Rows of the plan's part. */
+static inline long pw_plan_rows (const pw_plan *p) {
+  return p->grid.rows / p->parts + (p->grid.rows % p->parts >= p->part);
+}
+
+/* ---- Compiled systems: one for all rows with the same parameters ---- */
+
+typedef struct {
+  pw_cli_model m; /* m.file is NULL */
+  int *column;    /* 2 pw_system_coordinates: of each state */
+  int *state;     /* grid.axes: whose initial value an axis varies; -1: it is a parameter */
+} pw_sweep_system;
+
+/* Builds and compiles the model of a row.  Close the system in every case.  May be called by several threads at once. */
+int pw_sweep_system_open (pw_sweep_system *x, const pw_plan *p, long row, pw_error *error);
+void pw_sweep_system_close (pw_sweep_system *x);
+
+#endif
