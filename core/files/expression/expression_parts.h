@@ -78,6 +78,7 @@ typedef struct {
   double (*two) (double, double);
   pw_slopes (*slopes) (double x, double y, double f);
   pw_trend trend;
+  double from, to; /* domain of a function of one argument, NaN outside */
 } pw_expression_function;
 
 typedef struct {

@@ -112,7 +112,7 @@ static double slopes_K_series (double m) {
   return PW_PI / 2 * sum;
 }
 
-static pw_slopes slopes_K (double m, double y, double K) {
+static pw_slopes slopes_elliptic_K (double m, double y, double K) {
   double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS];
   (void)y;
   slopes_mean (m, &a, ratio, part, &R);
@@ -121,7 +121,7 @@ static pw_slopes slopes_K (double m, double y, double K) {
 }
 
 /* With constant u, d (N/m)/dm = (dn d am/dm + u/2 - N / (2 m)) / m. */
-static pw_slopes slopes_am (double u, double m, double phi) {
+static pw_slopes slopes_jacobi_am (double u, double m, double phi) {
   double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS], s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
   int n = slopes_mean (m, &a, ratio, part, &R);
   double N = u * (0.5 - R), angle = ldexp (a * u, n), rest = 1 - m;
@@ -138,39 +138,39 @@ static pw_slopes slopes_am (double u, double m, double phi) {
 
 /* ---- List of functions and constants ---- */
 
-#define FUNCTION_OF_ONE(name, trend) \
-  { #name, PW_OP_ONE, 1, 1, name, NULL, slopes_##name, trend }
-#define FUNCTION_OF_TWO(name) \
-  { #name, PW_OP_TWO, 2, 2, NULL, name, slopes_##name, PW_OTHERWISE }
-#define FUNCTION_THAT_BREAKS(name, op, most) \
-  { name, op, 1, most, NULL, NULL, NULL, PW_OTHERWISE }
+#define FUNCTION_OF_ONE(name, f, trend, from, to) \
+  { #name, PW_OP_ONE, 1, 1, f, NULL, slopes_##name, trend, from, to }
+#define FUNCTION_OF_TWO(name, op, f) \
+  { #name, op, 2, 2, NULL, f, slopes_##name, PW_OTHERWISE, 0, 0 }
+#define FUNCTION_THAT_BREAKS(name, op, least, most) \
+  { #name, op, least, most, NULL, NULL, NULL, PW_OTHERWISE, 0, 0 }
 
 const pw_expression_function pw_expression_functions[] = {
-  { "sin", PW_OP_ONE, 1, 1, pw_sin, NULL, slopes_sin, PW_OTHERWISE },
-  { "cos", PW_OP_ONE, 1, 1, pw_cos, NULL, slopes_cos, PW_OTHERWISE },
-  FUNCTION_OF_ONE (tan, PW_OTHERWISE),
-  FUNCTION_OF_ONE (asin, PW_RISES),
-  FUNCTION_OF_ONE (acos, PW_FALLS),
-  FUNCTION_OF_ONE (atan, PW_RISES),
-  FUNCTION_OF_ONE (sinh, PW_RISES),
-  FUNCTION_OF_ONE (cosh, PW_OTHERWISE),
-  FUNCTION_OF_ONE (tanh, PW_RISES),
-  FUNCTION_OF_ONE (exp, PW_RISES),
-  FUNCTION_OF_ONE (log, PW_RISES),
-  FUNCTION_OF_ONE (log10, PW_RISES),
-  FUNCTION_OF_ONE (sqrt, PW_RISES),
-  FUNCTION_THAT_BREAKS ("abs", PW_OP_ABS, 1),
-  FUNCTION_THAT_BREAKS ("floor", PW_OP_FLOOR, 1),
-  FUNCTION_THAT_BREAKS ("ceil", PW_OP_CEIL, 1),
-  FUNCTION_THAT_BREAKS ("round", PW_OP_ROUND, 1),
-  FUNCTION_THAT_BREAKS ("sign", PW_OP_SIGN, 1),
-  { "atan2", PW_OP_ATAN2, 2, 2, NULL, atan2, slopes_atan2, PW_OTHERWISE },
-  FUNCTION_OF_TWO (hypot),
-  { "jacobi_am", PW_OP_TWO, 2, 2, NULL, pw_jacobi_am, slopes_am, PW_OTHERWISE },
-  { "elliptic_K", PW_OP_ONE, 1, 1, pw_elliptic_K, NULL, slopes_K, PW_RISES },
-  { "mod", PW_OP_MOD, 2, 2, NULL, NULL, NULL, PW_OTHERWISE },
-  FUNCTION_THAT_BREAKS ("min", PW_OP_MIN, 0),
-  FUNCTION_THAT_BREAKS ("max", PW_OP_MAX, 0),
+  FUNCTION_OF_ONE (sin, pw_sin, PW_OTHERWISE, -DBL_MAX, DBL_MAX),
+  FUNCTION_OF_ONE (cos, pw_cos, PW_OTHERWISE, -DBL_MAX, DBL_MAX),
+  FUNCTION_OF_ONE (tan, tan, PW_OTHERWISE, -DBL_MAX, DBL_MAX),
+  FUNCTION_OF_ONE (asin, asin, PW_RISES, -1, 1),
+  FUNCTION_OF_ONE (acos, acos, PW_FALLS, -1, 1),
+  FUNCTION_OF_ONE (atan, atan, PW_RISES, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (sinh, sinh, PW_RISES, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (cosh, cosh, PW_OTHERWISE, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (tanh, tanh, PW_RISES, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (exp, exp, PW_RISES, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (log, log, PW_RISES, 0, INFINITY),
+  FUNCTION_OF_ONE (log10, log10, PW_RISES, 0, INFINITY),
+  FUNCTION_OF_ONE (sqrt, sqrt, PW_RISES, 0, INFINITY),
+  FUNCTION_THAT_BREAKS (abs, PW_OP_ABS, 1, 1),
+  FUNCTION_THAT_BREAKS (floor, PW_OP_FLOOR, 1, 1),
+  FUNCTION_THAT_BREAKS (ceil, PW_OP_CEIL, 1, 1),
+  FUNCTION_THAT_BREAKS (round, PW_OP_ROUND, 1, 1),
+  FUNCTION_THAT_BREAKS (sign, PW_OP_SIGN, 1, 1),
+  FUNCTION_OF_TWO (atan2, PW_OP_ATAN2, atan2),
+  FUNCTION_OF_TWO (hypot, PW_OP_TWO, hypot),
+  FUNCTION_OF_TWO (jacobi_am, PW_OP_TWO, pw_jacobi_am),
+  FUNCTION_OF_ONE (elliptic_K, pw_elliptic_K, PW_RISES, -INFINITY, 1),
+  FUNCTION_THAT_BREAKS (mod, PW_OP_MOD, 2, 2),
+  FUNCTION_THAT_BREAKS (min, PW_OP_MIN, 1, 0),
+  FUNCTION_THAT_BREAKS (max, PW_OP_MAX, 1, 0),
   { .name = NULL },
 };
 
