@@ -10,7 +10,7 @@
 #define PW_CONTACT_H
 
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 /* Transforms a contact point and its heading from the body's frame to (x, y, angle) in the world frame, for output and
  * figures. */
@@ -27,48 +27,46 @@ typedef struct {
   double heading; /* [rad] */
 } contact;
 
+/* A contact in the current state: its direction (dx, dy) in the world. */
+typedef struct {
+  const contact *k;
+  const pw_configuration *A;
+  const double *w;
+  double dx, dy;
+} contact_state;
+
 static inline contact contact_make (const double at[2], double heading, double a, double b) {
   return (contact){ a, b, at[0] * b - at[1] * a, { at[0], at[1] }, heading };
 }
 
-#define CONTACT_PARTS                                        \
-  const contact *k = (const contact *)b->element + e;        \
-  const pw_configuration *A = &b->configuration[b->body[e]]; \
-  const double x = A->cos * k->a - A->sin * k->b, y = A->sin * k->a + A->cos * k->b
-
-static inline void contact_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    CONTACT_PARTS;
-    out[0] = x, out[1] = y, out[2] = k->arm;
-  }
+static inline contact_state contact_turn (const contact *k, const pw_configuration *A) {
+  return (contact_state){ k, A, NULL, A->cos * k->a - A->sin * k->b, A->sin * k->a + A->cos * k->b };
 }
 
-static inline void contact_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    CONTACT_PARTS;
-    out[e] = A->omega * (y * A->vx - x * A->vy);
-  }
+static inline contact_state contact_at (const pw_batch *b, int e) {
+  contact_state x = contact_turn ((const contact *)b->element + e, &b->configuration[b->body[e]]);
+  x.w = batch_w (b, e);
+  return x;
 }
 
-static inline void contact_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    CONTACT_PARTS;
-    out[0] = out[1] = 0, out[2] = x * b->w[3 * e + 1] - y * b->w[3 * e];
-  }
+PER_ELEMENT (contact_J, contact, 3) {
+  out[0] = x.dx, out[1] = x.dy, out[2] = x.k->arm;
 }
 
-static inline void contact_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    CONTACT_PARTS;
-    out[0] = out[1] = 0, out[2] = A->omega * (x * A->vx + y * A->vy);
-  }
+PER_ELEMENT (contact_gamma, contact, 1) {
+  *out = x.A->omega * (x.dy * x.A->vx - x.dx * x.A->vy);
 }
 
-static inline void contact_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    CONTACT_PARTS;
-    out[0] = A->omega * y, out[1] = -A->omega * x, out[2] = y * A->vx - x * A->vy;
-  }
+PER_ELEMENT (contact_jw_q, contact, 3) {
+  out[0] = out[1] = 0, out[2] = x.dx * x.w[1] - x.dy * x.w[0];
+}
+
+PER_ELEMENT (contact_gamma_q, contact, 3) {
+  out[0] = out[1] = 0, out[2] = x.A->omega * (x.dx * x.A->vx + x.dy * x.A->vy);
+}
+
+PER_ELEMENT (contact_gamma_v, contact, 3) {
+  out[0] = x.A->omega * x.dy, out[1] = -x.A->omega * x.dx, out[2] = x.dy * x.A->vx - x.dx * x.A->vy;
 }
 
 #endif

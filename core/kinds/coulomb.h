@@ -9,7 +9,7 @@
 #define PW_COULOMB_H
 
 #include <math.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double viscous, limit; /* c, L */

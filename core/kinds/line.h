@@ -12,7 +12,7 @@
 
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double s1[2]; /* the point in body 1's frame [m] */
@@ -21,11 +21,14 @@ typedef struct {
   double angle; /* slider: phi1 - phi2 [rad]; drive: 1 if it prescribes an angle (then n = 0), else 0 */
 } line;
 
-/* A line in the current configuration: n, t, the arm a = (X, Y) and D in world axes, and their dot products. */
+/* A line in the current state: n, t, the arm a = (X, Y) and D in world axes, and their dot products. */
 typedef struct {
+  const line *k;
+  const pw_configuration *A, *B;
+  const double *w, *u;
   double nx, ny, tx, ty, X, Y, Dx, Dy;
   double na, nD, ta, tD;
-} line_axes;
+} line_state;
 
 static inline line line_make (const double at[2][2], double heading) {
   line k = { { at[0][0], at[0][1] }, { -pw_sin (heading), pw_cos (heading) }, 0, 0 };
@@ -33,8 +36,9 @@ static inline line line_make (const double at[2][2], double heading) {
   return k;
 }
 
-static inline line_axes line_turn (const line *k, const pw_configuration *A, const pw_configuration *B) {
-  line_axes s = { .nx = B->cos * k->n[0] - B->sin * k->n[1], .ny = B->sin * k->n[0] + B->cos * k->n[1] };
+static inline line_state line_turn (const line *k, const pw_configuration *A, const pw_configuration *B) {
+  line_state s = { .k = k, .A = A, .B = B };
+  s.nx = B->cos * k->n[0] - B->sin * k->n[1], s.ny = B->sin * k->n[0] + B->cos * k->n[1];
   s.tx = s.ny, s.ty = -s.nx;
   s.X = A->cos * k->s1[0] - A->sin * k->s1[1], s.Y = A->sin * k->s1[0] + A->cos * k->s1[1];
   s.Dx = A->x + s.X - B->x, s.Dy = A->y + s.Y - B->y;
@@ -43,27 +47,34 @@ static inline line_axes line_turn (const line *k, const pw_configuration *A, con
   return s;
 }
 
-static inline double line_g (const line *k, const line_axes *s) {
-  return s->nD - k->c;
+static inline line_state line_at (const pw_batch *b, int e) {
+  line_state s = line_turn ((const line *)b->element + e, &b->configuration[b->body[2 * e]],
+                            &b->configuration[b->body[2 * e + 1]]);
+  s.w = batch_w (b, e);
+  s.u = b->u + 3 * e;
+  return s;
 }
 
-static inline double line_g_size (const line *k, const line_axes *s, const pw_configuration *A,
-                                  const pw_configuration *B) {
-  return fabs (s->nx) * (fabs (A->x) + fabs (s->X) + fabs (B->x)) +
-         fabs (s->ny) * (fabs (A->y) + fabs (s->Y) + fabs (B->y)) + fabs (k->c);
+static inline double line_g (const line_state *s) {
+  return s->nD - s->k->c;
 }
 
-static inline void line_J (const line_axes *s, double *out) {
+static inline double line_g_size (const line_state *s) {
+  return fabs (s->nx) * (fabs (s->A->x) + fabs (s->X) + fabs (s->B->x)) +
+         fabs (s->ny) * (fabs (s->A->y) + fabs (s->Y) + fabs (s->B->y)) + fabs (s->k->c);
+}
+
+static inline void line_J (const line_state *s, double *out) {
   out[0] = s->nx, out[1] = s->ny, out[2] = s->ta, out[3] = -s->nx, out[4] = -s->ny, out[5] = -s->tD;
 }
 
-static inline double line_gamma (const line_axes *s, const pw_configuration *A, const pw_configuration *B) {
-  double w1 = A->omega, w2 = B->omega, tV = s->tx * (A->vx - B->vx) + s->ty * (A->vy - B->vy);
+static inline double line_gamma (const line_state *s) {
+  double w1 = s->A->omega, w2 = s->B->omega, tV = s->tx * (s->A->vx - s->B->vx) + s->ty * (s->A->vy - s->B->vy);
   return 2 * w2 * tV + w1 * (w1 - 2 * w2) * s->na + w2 * w2 * s->nD;
 }
 
 /* out = factor H w */
-static inline void line_curve (const line_axes *s, double factor, const double w[6], double *out) {
+static inline void line_curve (const line_state *s, double factor, const double w[6], double *out) {
   out[0] = -factor * s->tx * w[5];
   out[1] = -factor * s->ty * w[5];
   out[2] = factor * s->na * (w[5] - w[2]);
@@ -73,16 +84,15 @@ static inline void line_curve (const line_axes *s, double factor, const double w
 }
 
 /* out = l H, 6 x 6 */
-static inline void line_jtl_q (const line_axes *s, double l, double *out) {
+static inline void line_jtl_q (const line_state *s, double l, double *out) {
   memset (out, 0, 36 * sizeof *out);
   out[5] = out[30] = -l * s->tx, out[11] = out[31] = -l * s->ty;
   out[23] = out[33] = l * s->tx, out[29] = out[34] = l * s->ty;
   out[14] = -l * s->na, out[17] = out[32] = l * s->na, out[35] = -l * s->nD;
 }
 
-static inline void line_gamma_q (const line_axes *s, const pw_configuration *A, const pw_configuration *B,
-                                 double *out) {
-  double w1 = A->omega, w2 = B->omega, nV = s->nx * (A->vx - B->vx) + s->ny * (A->vy - B->vy);
+static inline void line_gamma_q (const line_state *s, double *out) {
+  double w1 = s->A->omega, w2 = s->B->omega, nV = s->nx * (s->A->vx - s->B->vx) + s->ny * (s->A->vy - s->B->vy);
   out[0] = w2 * w2 * s->nx;
   out[1] = w2 * w2 * s->ny;
   out[2] = (w1 - w2) * (w1 - w2) * s->ta;
@@ -91,38 +101,23 @@ static inline void line_gamma_q (const line_axes *s, const pw_configuration *A, 
   out[5] = 2 * w2 * nV - w1 * (w1 - 2 * w2) * s->ta - w2 * w2 * s->tD;
 }
 
-static inline void line_gamma_v (const line_axes *s, const pw_configuration *A, const pw_configuration *B,
-                                 double *out) {
-  const double v[6] = { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega };
+static inline void line_gamma_v (const line_state *s, double *out) {
+  const double v[6] = { s->A->vx, s->A->vy, s->A->omega, s->B->vx, s->B->vy, s->B->omega };
   line_curve (s, -2, v, out);
 }
 
 /* ---- Batches of elements with one line equation each ---- */
 
-#define LINE_PARTS                                                                                           \
-  const line *k = (const line *)b->element + e;                                                              \
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
-  const line_axes s = line_turn (k, A, B)
-
-static inline void lines_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    LINE_PARTS;
-    line_curve (&s, 1, b->w + 6 * e, out);
-  }
+PER_ELEMENT (lines_jw_q, line, 6) {
+  line_curve (&x, 1, x.w, out);
 }
 
-static inline void lines_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    LINE_PARTS;
-    line_gamma_q (&s, A, B, out);
-  }
+PER_ELEMENT (lines_gamma_q, line, 6) {
+  line_gamma_q (&x, out);
 }
 
-static inline void lines_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    LINE_PARTS;
-    line_gamma_v (&s, A, B, out);
-  }
+PER_ELEMENT (lines_gamma_v, line, 6) {
+  line_gamma_v (&x, out);
 }
 
 #endif

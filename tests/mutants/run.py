@@ -68,7 +68,7 @@ def apply(mutation, files):
         if mutation["function"] not in text:
             continue
         for header, start, end in [(path, 0, len(text))] if path == "Makefile" else definitions(text):
-            if name.search(header.strip()):
+            if name.search(re.sub(r"^(PER_ELEMENT|PREPARE) \((\w+).*", r"\2 (", header.strip(), flags=re.S)):
                 places += 1
                 for m in pattern(mutation["expression"]).finditer(text, start, end):
                     found.append((path, text[:m.start()] + mutation["replacement"] + text[m.end():]))

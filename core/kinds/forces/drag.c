@@ -7,53 +7,48 @@
  * (Batchelor 1967, An Introduction to Fluid Dynamics, sections 4.9 and 5.11: low and high Reynolds numbers.) */
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double c1, c2; /* [N s/m], [N s^2/m^2] */
   double d1, d2; /* [N m s/rad], [N m s^2/rad^2] */
 } drag;
 
-/* Element e: speed, force per speed, moment per angular velocity. */
-#define DRAG_PARTS                                           \
-  const drag *k = (const drag *)b->element + e;              \
-  const pw_configuration *A = &b->configuration[b->body[e]]; \
-  const double v = hypot (A->vx, A->vy), c = k->c1 + k->c2 * v, d = k->d1 + k->d2 * fabs (A->omega)
+/* An element in the current state: speed, force per speed, moment per angular velocity. */
+typedef struct {
+  const drag *k;
+  const pw_configuration *A;
+  double v, c, d;
+} drag_state;
 
-static int drag_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                         pw_error *error) {
-  const pw_drag *d = definition;
-  *(drag *)element = (drag){ d->linear, d->quadratic, d->turning, d->turning_quadratic };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+static inline drag_state drag_at (const pw_batch *b, int e) {
+  const drag *k = (const drag *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[e]];
+  double v = hypot (A->vx, A->vy);
+  return (drag_state){ k, A, v, k->c1 + k->c2 * v, k->d1 + k->d2 * fabs (A->omega) };
 }
 
-static void drag_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    DRAG_PARTS;
-    out[0] = -c * A->vx, out[1] = -c * A->vy, out[2] = -d * A->omega;
-    (void)v;
-  }
+PREPARE (drag_prepare, pw_drag, drag) {
+  *k = (drag){ d->linear, d->quadratic, d->turning, d->turning_quadratic };
+}
+
+PER_ELEMENT (drag_force, drag, 3) {
+  out[0] = -x.c * x.A->vx, out[1] = -x.c * x.A->vy, out[2] = -x.d * x.A->omega;
 }
 
 /* d(|v| v)/dv = |v| 1 + v v^T / |v|, zero at rest. */
-static void drag_force_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    DRAG_PARTS;
-    double x = v > 0 ? A->vx / v : 0, y = v > 0 ? A->vy / v : 0; /* direction; not v_x * (1 / v), which may overflow */
-    memset (out, 0, 9 * sizeof *out);
-    out[0] = -c - k->c2 * A->vx * x;
-    out[1] = out[3] = -k->c2 * A->vx * y;
-    out[4] = -c - k->c2 * A->vy * y;
-    out[8] = -d - k->d2 * fabs (A->omega);
-  }
+PER_ELEMENT (drag_force_v, drag, 9) {
+  double ex = x.v > 0 ? x.A->vx / x.v : 0,
+         ey = x.v > 0 ? x.A->vy / x.v : 0; /* direction; not v_x * (1 / v), which may overflow */
+  memset (out, 0, 9 * sizeof *out);
+  out[0] = -x.c - x.k->c2 * x.A->vx * ex;
+  out[1] = out[3] = -x.k->c2 * x.A->vx * ey;
+  out[4] = -x.c - x.k->c2 * x.A->vy * ey;
+  out[8] = -x.d - x.k->d2 * fabs (x.A->omega);
 }
 
-static void drag_loss (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    DRAG_PARTS;
-    out[e] = c * v * v + d * A->omega * A->omega;
-  }
+PER_ELEMENT (drag_loss, drag, 1) {
+  *out = x.c * x.v * x.v + x.d * x.A->omega * x.A->omega;
 }
 
 static const pw_field drag_fields[] = {

@@ -6,72 +6,56 @@
  *
  * (Shabana 2001, Computational Dynamics, section 5.3.) It has no reaction on another body. */
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double at[2]; /* in the body's frame [m] */
   int turns;    /* 1: components along the body's axes */
 } force;
 
-/* A force in the current state: world components and moment; c, s: cosine and sine of the angle of its axes. */
+/* A force in the current state: cosine and sine of the angle of its axes, arm, world components, moment. */
 typedef struct {
-  double c, s, X, Y, Fx, Fy, M;
+  const force *k;
+  const pw_configuration *A;
+  double cos, sin, X, Y, Fx, Fy, M;
 } force_state;
 
-static inline force_state force_at (const force *k, const pw_configuration *A, const double *u) {
-  force_state x = { .c = k->turns ? A->cos : 1, .s = k->turns ? A->sin : 0 };
+static inline force_state force_at (const pw_batch *b, int e) {
+  const force *k = (const force *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[e]];
+  const double *u = b->u + 6 * e;
+  force_state x = { k, A, .cos = k->turns ? A->cos : 1, .sin = k->turns ? A->sin : 0 };
   x.X = A->cos * k->at[0] - A->sin * k->at[1], x.Y = A->sin * k->at[0] + A->cos * k->at[1];
-  x.Fx = x.c * u[0] - x.s * u[3], x.Fy = x.s * u[0] + x.c * u[3];
+  x.Fx = x.cos * u[0] - x.sin * u[3], x.Fy = x.sin * u[0] + x.cos * u[3];
   x.M = x.X * x.Fy - x.Y * x.Fx;
   return x;
 }
 
-#define FORCE_PARTS                                          \
-  const force *k = (const force *)b->element + e;            \
-  const pw_configuration *A = &b->configuration[b->body[e]]; \
-  const force_state x = force_at (k, A, b->u + 6 * e)
-
-static int force_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                          pw_error *error) {
-  const pw_force *d = definition;
-  *(force *)element = (force){ { d->at[0], d->at[1] }, d->axes == PW_AXES_BODY };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (force_prepare, pw_force, force) {
+  *k = (force){ { d->at[0], d->at[1] }, d->axes == PW_AXES_BODY };
 }
 
-static void force_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    FORCE_PARTS;
-    out[0] = x.Fx, out[1] = x.Fy, out[2] = x.M;
-  }
+PER_ELEMENT (force_force, force, 3) {
+  out[0] = x.Fx, out[1] = x.Fy, out[2] = x.M;
 }
 
-static void force_force_u (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    FORCE_PARTS;
-    out[0] = x.c, out[1] = -x.s;
-    out[2] = x.s, out[3] = x.c;
-    out[4] = x.X * x.s - x.Y * x.c, out[5] = x.X * x.c + x.Y * x.s;
-  }
+PER_ELEMENT (force_force_u, force, 6) {
+  out[0] = x.cos, out[1] = -x.sin;
+  out[2] = x.sin, out[3] = x.cos;
+  out[4] = x.X * x.sin - x.Y * x.cos, out[5] = x.X * x.cos + x.Y * x.sin;
 }
 
 /* A force that turns with the body has a constant moment. */
-static void force_force_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    FORCE_PARTS;
-    memset (out, 0, 9 * sizeof *out);
-    if (k->turns)
-      out[2] = -x.Fy, out[5] = x.Fx;
-    else
-      out[8] = -x.X * x.Fx - x.Y * x.Fy;
-  }
+PER_ELEMENT (force_force_q, force, 9) {
+  memset (out, 0, 9 * sizeof *out);
+  if (x.k->turns)
+    out[2] = -x.Fy, out[5] = x.Fx;
+  else
+    out[8] = -x.X * x.Fx - x.Y * x.Fy;
 }
 
-static void force_power (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    FORCE_PARTS;
-    out[e] = x.Fx * A->vx + x.Fy * A->vy + x.M * A->omega;
-  }
+PER_ELEMENT (force_power, force, 1) {
+  *out = x.Fx * x.A->vx + x.Fy * x.A->vy + x.M * x.A->omega;
 }
 
 static const char *const force_axes[] = { "world", "body", NULL };

@@ -6,9 +6,16 @@
 #include <string.h>
 #include "coulomb.h"
 
-#define FRICTION_PARTS                                \
-  const coulomb *k = (const coulomb *)b->element + e; \
-  const double w = b->configuration[b->body[2 * e]].omega - b->configuration[b->body[2 * e + 1]].omega
+/* Friction in the current state: its law and the relative angular velocity. */
+typedef struct {
+  const coulomb *k;
+  double w;
+} friction_state;
+
+static inline friction_state friction_at (const pw_batch *b, int e) {
+  return (friction_state){ (const coulomb *)b->element + e,
+                           b->configuration[b->body[2 * e]].omega - b->configuration[b->body[2 * e + 1]].omega };
+}
 
 static int friction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                              pw_error *error) {
@@ -17,35 +24,23 @@ static int friction_prepare (const void *definition, const pw_body *const *bodie
   return coulomb_make (d->viscous, d->limit, d->speed, element, error);
 }
 
-static void friction_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    FRICTION_PARTS;
-    double T = coulomb_force (k, w);
-    out[0] = out[1] = out[3] = out[4] = 0, out[2] = -T, out[5] = T;
-  }
+PER_ELEMENT (friction_force, friction, 6) {
+  double T = coulomb_force (x.k, x.w);
+  out[0] = out[1] = out[3] = out[4] = 0, out[2] = -T, out[5] = T;
 }
 
-static void friction_force_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    FRICTION_PARTS;
-    double slope = coulomb_slope (k, w);
-    memset (out, 0, 36 * sizeof *out);
-    out[14] = out[35] = -slope, out[17] = out[32] = slope;
-  }
+PER_ELEMENT (friction_force_v, friction, 36) {
+  double slope = coulomb_slope (x.k, x.w);
+  memset (out, 0, 36 * sizeof *out);
+  out[14] = out[35] = -slope, out[17] = out[32] = slope;
 }
 
-static void friction_saturation (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    FRICTION_PARTS;
-    out[8] = out[11] = coulomb_range (k, w, 1);
-  }
+PER_ELEMENT (friction_saturation, friction, 12) {
+  out[8] = out[11] = coulomb_range (x.k, x.w, 1);
 }
 
-static void friction_loss (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    FRICTION_PARTS;
-    out[e] = coulomb_force (k, w) * w;
-  }
+PER_ELEMENT (friction_loss, friction, 1) {
+  *out = coulomb_force (x.k, x.w) * x.w;
 }
 
 static const pw_field friction_fields[] = {

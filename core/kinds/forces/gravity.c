@@ -1,11 +1,20 @@
 /* gravity: the same acceleration a for every body that has mass.
  *
  *   f = (m ax, m ay, 0),  V = -m (ax x + ay y)                    (V = 0 at the origin) */
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double fx, fy; /* weight [N] */
 } gravity;
+
+typedef struct {
+  const gravity *k;
+  const pw_configuration *A;
+} gravity_state;
+
+static inline gravity_state gravity_at (const pw_batch *b, int e) {
+  return (gravity_state){ (const gravity *)b->element + e, &b->configuration[b->body[e]] };
+}
 
 static int gravity_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                             pw_error *error) {
@@ -16,19 +25,12 @@ static int gravity_prepare (const void *definition, const pw_body *const *bodies
   return PW_OK;
 }
 
-static void gravity_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    const gravity *k = (const gravity *)b->element + e;
-    out[0] = k->fx, out[1] = k->fy, out[2] = 0;
-  }
+PER_ELEMENT (gravity_force, gravity, 3) {
+  out[0] = x.k->fx, out[1] = x.k->fy, out[2] = 0;
 }
 
-static void gravity_energy (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    const gravity *k = (const gravity *)b->element + e;
-    const pw_configuration *A = &b->configuration[b->body[e]];
-    out[e] = -k->fx * A->x - k->fy * A->y;
-  }
+PER_ELEMENT (gravity_energy, gravity, 1) {
+  *out = -x.k->fx * x.A->x - x.k->fy * x.A->y;
 }
 
 static const pw_field gravity_fields[] = {

@@ -5,23 +5,12 @@
  * Tables contain its position; figures and animations show its path, for example a coupler curve. */
 #include "contact.h"
 
-typedef struct {
-  double at[2]; /* in the body's frame [m] */
-} marker;
-
-static int marker_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                           pw_error *error) {
-  const pw_marker *d = definition;
-  *(marker *)element = (marker){ { d->at[0], d->at[1] } };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (marker_prepare, pw_marker, contact) {
+  *k = contact_make (d->at, 0, 1, 0);
 }
 
-static void marker_contact (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    const marker *k = (const marker *)b->element + e;
-    contact_to_world (&b->configuration[b->body[e]], k->at, 0, out);
-  }
+PER_ELEMENT (marker_contact, contact, 3) {
+  contact_to_world (x.A, x.k->at, 0, out);
 }
 
 static const pw_field marker_fields[] = {
@@ -34,7 +23,7 @@ const pw_kind pw_kind_marker = {
   .name = "marker",
   .about = "a point of a body whose place and path are shown in tables, figures and animations",
   .definition = sizeof (pw_marker),
-  .element = sizeof (marker),
+  .element = sizeof (contact),
   .fields = marker_fields,
   .bodies = 1,
   .level = PW_FORCE,

@@ -9,53 +9,42 @@
  * All of its power counts as work, not as loss or potential energy; it is negative when the motor brakes. */
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double k, c;  /* [N m/rad], [N m s/rad] */
   double limit; /* L [N m]; 0: no limit */
 } motor;
 
-/* The torque, its slope dT/dy, and y. */
+/* A motor in the current state: the torque, its slope dT/dy, and y. */
 typedef struct {
+  const motor *k;
+  const pw_configuration *A, *B;
   double T, slope, y;
 } motor_state;
 
-static inline motor_state motor_at (const motor *k, const pw_configuration *A, const pw_configuration *B,
-                                    const double *u) {
+static inline motor_state motor_at (const pw_batch *b, int e) {
+  const motor *k = (const motor *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  const double *u = b->u + 6 * e;
   double y = k->k * (u[0] - A->phi + B->phi) + k->c * (u[3] - A->omega + B->omega);
-  if (k->limit == 0) return (motor_state){ y, 1, y };
-  double x = tanh (y / k->limit);
-  return (motor_state){ k->limit * x, 1 - x * x, y };
+  if (k->limit == 0) return (motor_state){ k, A, B, y, 1, y };
+  double tanh_y = tanh (y / k->limit);
+  return (motor_state){ k, A, B, k->limit * tanh_y, 1 - tanh_y * tanh_y, y };
 }
 
-#define MOTOR_PARTS                                                                                          \
-  const motor *k = (const motor *)b->element + e;                                                            \
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
-  const motor_state x = motor_at (k, A, B, b->u + 6 * e)
-
-static int motor_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                          pw_error *error) {
-  const pw_motor *d = definition;
-  *(motor *)element = (motor){ d->stiffness, d->damping, d->limit };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (motor_prepare, pw_motor, motor) {
+  *k = (motor){ d->stiffness, d->damping, d->limit };
 }
 
-static void motor_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    MOTOR_PARTS;
-    out[0] = out[1] = out[3] = out[4] = 0, out[2] = x.T, out[5] = -x.T;
-  }
+PER_ELEMENT (motor_force, motor, 6) {
+  out[0] = out[1] = out[3] = out[4] = 0, out[2] = x.T, out[5] = -x.T;
 }
 
-static void motor_force_u (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    MOTOR_PARTS;
-    memset (out, 0, 12 * sizeof *out);
-    out[4] = x.slope * k->k, out[5] = x.slope * k->c;
-    out[10] = -out[4], out[11] = -out[5];
-  }
+PER_ELEMENT (motor_force_u, motor, 12) {
+  memset (out, 0, 12 * sizeof *out);
+  out[4] = x.slope * x.k->k, out[5] = x.slope * x.k->c;
+  out[10] = -out[4], out[11] = -out[5];
 }
 
 /* The four angle entries of a 6 x 6 block. */
@@ -64,33 +53,21 @@ static inline void motor_block (double *out, double x) {
   out[14] = out[35] = -x, out[17] = out[32] = x;
 }
 
-static void motor_force_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    MOTOR_PARTS;
-    motor_block (out, x.slope * k->k);
-  }
+PER_ELEMENT (motor_force_q, motor, 36) {
+  motor_block (out, x.slope * x.k->k);
 }
 
-static void motor_force_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    MOTOR_PARTS;
-    motor_block (out, x.slope * k->c);
-  }
+PER_ELEMENT (motor_force_v, motor, 36) {
+  motor_block (out, x.slope * x.k->c);
 }
 
-static void motor_saturation (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    MOTOR_PARTS;
-    if (k->limit > 0 && k->k > 0) out[2] = out[5] = (k->limit + fabs (x.y)) / k->k;
-    if (k->limit > 0 && k->c > 0) out[8] = out[11] = (k->limit + fabs (x.y)) / k->c;
-  }
+PER_ELEMENT (motor_saturation, motor, 12) {
+  if (x.k->limit > 0 && x.k->k > 0) out[2] = out[5] = (x.k->limit + fabs (x.y)) / x.k->k;
+  if (x.k->limit > 0 && x.k->c > 0) out[8] = out[11] = (x.k->limit + fabs (x.y)) / x.k->c;
 }
 
-static void motor_power (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    MOTOR_PARTS;
-    out[e] = x.T * (A->omega - B->omega);
-  }
+PER_ELEMENT (motor_power, motor, 1) {
+  *out = x.T * (x.A->omega - x.B->omega);
 }
 
 static const pw_field motor_fields[] = {

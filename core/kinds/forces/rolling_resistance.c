@@ -14,13 +14,20 @@ typedef struct {
   coulomb law;
 } resistance;
 
-/* Element e: E and the speed along it. */
-#define RESISTANCE_PARTS                                                                        \
-  const resistance *k = (const resistance *)b->element + e;                                     \
-  const contact *P = &k->point;                                                                 \
-  const pw_configuration *A = &b->configuration[b->body[e]];                                    \
-  const double E[3] = { A->cos * P->a - A->sin * P->b, A->sin * P->a + A->cos * P->b, P->arm }; \
-  const double ve = E[0] * A->vx + E[1] * A->vy + E[2] * A->omega
+/* An element in the current state: E and the speed along it. */
+typedef struct {
+  const resistance *k;
+  const pw_configuration *A;
+  double E[3], ve;
+} resistance_state;
+
+static inline resistance_state resistance_at (const pw_batch *b, int e) {
+  const resistance *k = (const resistance *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[e]];
+  contact_state d = contact_turn (&k->point, A);
+  return (
+      resistance_state){ k, A, { d.dx, d.dy, k->point.arm }, d.dx * A->vx + d.dy * A->vy + k->point.arm * A->omega };
+}
 
 static int resistance_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                                pw_error *error) {
@@ -31,47 +38,33 @@ static int resistance_prepare (const void *definition, const pw_body *const *bod
   return coulomb_make (0, d->limit, d->speed, &k->law, error);
 }
 
-static void resistance_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    RESISTANCE_PARTS;
-    double F = -coulomb_force (&k->law, ve);
-    for (int i = 0; i < 3; i++) out[i] = F * E[i];
-  }
+PER_ELEMENT (resistance_force, resistance, 3) {
+  double F = -coulomb_force (&x.k->law, x.ve);
+  for (int i = 0; i < 3; i++) out[i] = F * x.E[i];
 }
 
 /* d(F E)/dphi with dE/dphi = (-s, c, 0) and dv_e/dphi = c vy - s vx. */
-static void resistance_force_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    RESISTANCE_PARTS;
-    double F = -coulomb_force (&k->law, ve), turn = -coulomb_slope (&k->law, ve) * (E[0] * A->vy - E[1] * A->vx);
-    memset (out, 0, 9 * sizeof *out);
-    out[2] = turn * E[0] - F * E[1];
-    out[5] = turn * E[1] + F * E[0];
-    out[8] = turn * E[2];
-  }
+PER_ELEMENT (resistance_force_q, resistance, 9) {
+  double F = -coulomb_force (&x.k->law, x.ve),
+         turn = -coulomb_slope (&x.k->law, x.ve) * (x.E[0] * x.A->vy - x.E[1] * x.A->vx);
+  memset (out, 0, 9 * sizeof *out);
+  out[2] = turn * x.E[0] - F * x.E[1];
+  out[5] = turn * x.E[1] + F * x.E[0];
+  out[8] = turn * x.E[2];
 }
 
-static void resistance_force_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    RESISTANCE_PARTS;
-    double slope = -coulomb_slope (&k->law, ve);
-    for (int i = 0; i < 9; i++) out[i] = slope * E[i / 3] * E[i % 3];
-  }
+PER_ELEMENT (resistance_force_v, resistance, 9) {
+  double slope = -coulomb_slope (&x.k->law, x.ve);
+  for (int i = 0; i < 9; i++) out[i] = slope * x.E[i / 3] * x.E[i % 3];
 }
 
-static void resistance_saturation (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    RESISTANCE_PARTS;
-    out[2] = coulomb_range (&k->law, ve, E[0] * A->vy - E[1] * A->vx);
-    for (int i = 0; i < 3; i++) out[3 + i] = coulomb_range (&k->law, ve, E[i]);
-  }
+PER_ELEMENT (resistance_saturation, resistance, 6) {
+  out[2] = coulomb_range (&x.k->law, x.ve, x.E[0] * x.A->vy - x.E[1] * x.A->vx);
+  for (int i = 0; i < 3; i++) out[3 + i] = coulomb_range (&x.k->law, x.ve, x.E[i]);
 }
 
-static void resistance_loss (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    RESISTANCE_PARTS;
-    out[e] = coulomb_force (&k->law, ve) * ve;
-  }
+PER_ELEMENT (resistance_loss, resistance, 1) {
+  *out = coulomb_force (&x.k->law, x.ve) * x.ve;
 }
 
 static const pw_field resistance_fields[] = {

@@ -7,32 +7,31 @@
  * (Shabana 2001, Computational Dynamics, section 6.5.)
  * Angles accumulate over full turns. */
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double k, c, beta; /* stiffness [N m/rad], damping [N m s/rad], free angle [rad] */
 } twist;
 
-#define TWIST_PARTS                                                                                          \
-  const twist *k = (const twist *)b->element + e;                                                            \
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
-  const double angle = A->phi - B->phi - k->beta, rate = A->omega - B->omega;                                \
-  (void)angle, (void)rate
+/* A spring in the current state: twist and its rate. */
+typedef struct {
+  const twist *k;
+  double angle, rate;
+} twist_state;
 
-static int twist_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                          pw_error *error) {
-  const pw_rotational_spring *d = definition;
-  *(twist *)element = (twist){ d->stiffness, d->damping, d->angle };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+static inline twist_state twist_at (const pw_batch *b, int e) {
+  const twist *k = (const twist *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  return (twist_state){ k, A->phi - B->phi - k->beta, A->omega - B->omega };
 }
 
-static void twist_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    TWIST_PARTS;
-    double T = k->k * angle + k->c * rate;
-    out[0] = out[1] = out[3] = out[4] = 0, out[2] = -T, out[5] = T;
-  }
+PREPARE (twist_prepare, pw_rotational_spring, twist) {
+  *k = (twist){ d->stiffness, d->damping, d->angle };
+}
+
+PER_ELEMENT (twist_force, twist, 6) {
+  double T = x.k->k * x.angle + x.k->c * x.rate;
+  out[0] = out[1] = out[3] = out[4] = 0, out[2] = -T, out[5] = T;
 }
 
 /* The four angle entries of a 6 x 6 block. */
@@ -41,26 +40,20 @@ static inline void twist_block (double *out, double x) {
   out[14] = out[35] = -x, out[17] = out[32] = x;
 }
 
-static void twist_force_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) twist_block (out + 36 * e, ((const twist *)b->element + e)->k);
+PER_ELEMENT (twist_force_q, twist, 36) {
+  twist_block (out, x.k->k);
 }
 
-static void twist_force_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) twist_block (out + 36 * e, ((const twist *)b->element + e)->c);
+PER_ELEMENT (twist_force_v, twist, 36) {
+  twist_block (out, x.k->c);
 }
 
-static void twist_energy (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    TWIST_PARTS;
-    out[e] = k->k * angle * angle / 2;
-  }
+PER_ELEMENT (twist_energy, twist, 1) {
+  *out = x.k->k * x.angle * x.angle / 2;
 }
 
-static void twist_loss (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    TWIST_PARTS;
-    out[e] = k->c * rate * rate;
-  }
+PER_ELEMENT (twist_loss, twist, 1) {
+  *out = x.k->c * x.rate * x.rate;
 }
 
 static const pw_field twist_fields[] = {

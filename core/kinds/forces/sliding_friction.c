@@ -13,15 +13,21 @@ typedef struct {
   coulomb law;
 } sliding;
 
-/* Element e: parameters, both configurations, axes, E and w. */
-#define SLIDING_PARTS                                                                                        \
-  const sliding *k = (const sliding *)b->element + e;                                                        \
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
-  const line_axes s = line_turn (&k->across, A, B);                                                          \
-  const double v[6] = { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega };                                    \
-  double E[6], w = 0;                                                                                        \
-  line_J (&s, E);                                                                                            \
-  for (int i = 0; i < 6; i++) w += E[i] * v[i]
+/* An element in the current state: the line, velocities, E and w. */
+typedef struct {
+  const sliding *k;
+  line_state s;
+  double v[6], E[6], w;
+} sliding_state;
+
+static inline sliding_state sliding_at (const pw_batch *b, int e) {
+  const sliding *k = (const sliding *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  sliding_state x = { k, line_turn (&k->across, A, B), { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega }, .w = 0 };
+  line_J (&x.s, x.E);
+  for (int i = 0; i < 6; i++) x.w += x.E[i] * x.v[i];
+  return x;
+}
 
 static int sliding_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                             pw_error *error) {
@@ -32,49 +38,34 @@ static int sliding_prepare (const void *definition, const pw_body *const *bodies
   return coulomb_make (d->viscous, d->limit, d->speed, &k->law, error);
 }
 
-static void sliding_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    SLIDING_PARTS;
-    double F = coulomb_force (&k->law, w);
-    for (int i = 0; i < 6; i++) out[i] = -F * E[i];
+PER_ELEMENT (sliding_force, sliding, 6) {
+  double F = coulomb_force (&x.k->law, x.w);
+  for (int i = 0; i < 6; i++) out[i] = -F * x.E[i];
+}
+
+PER_ELEMENT (sliding_force_q, sliding, 36) {
+  double slope = coulomb_slope (&x.k->law, x.w), Hv[6];
+  line_jtl_q (&x.s, -coulomb_force (&x.k->law, x.w), out);
+  line_curve (&x.s, 1, x.v, Hv);
+  for (int i = 0; i < 36; i++) out[i] -= slope * x.E[i / 6] * Hv[i % 6];
+}
+
+PER_ELEMENT (sliding_force_v, sliding, 36) {
+  double slope = coulomb_slope (&x.k->law, x.w);
+  for (int i = 0; i < 36; i++) out[i] = -slope * x.E[i / 6] * x.E[i % 6];
+}
+
+PER_ELEMENT (sliding_saturation, sliding, 12) {
+  double Hv[6];
+  line_curve (&x.s, 1, x.v, Hv);
+  for (int i = 0; i < 6; i++) {
+    out[i] = coulomb_range (&x.k->law, x.w, Hv[i]);
+    out[6 + i] = coulomb_range (&x.k->law, x.w, x.E[i]);
   }
 }
 
-static void sliding_force_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    SLIDING_PARTS;
-    double slope = coulomb_slope (&k->law, w), Hv[6];
-    line_jtl_q (&s, -coulomb_force (&k->law, w), out);
-    line_curve (&s, 1, v, Hv);
-    for (int i = 0; i < 36; i++) out[i] -= slope * E[i / 6] * Hv[i % 6];
-  }
-}
-
-static void sliding_force_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    SLIDING_PARTS;
-    double slope = coulomb_slope (&k->law, w);
-    for (int i = 0; i < 36; i++) out[i] = -slope * E[i / 6] * E[i % 6];
-  }
-}
-
-static void sliding_saturation (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    SLIDING_PARTS;
-    double Hv[6];
-    line_curve (&s, 1, v, Hv);
-    for (int i = 0; i < 6; i++) {
-      out[i] = coulomb_range (&k->law, w, Hv[i]);
-      out[6 + i] = coulomb_range (&k->law, w, E[i]);
-    }
-  }
-}
-
-static void sliding_loss (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    SLIDING_PARTS;
-    out[e] = coulomb_force (&k->law, w) * w;
-  }
+PER_ELEMENT (sliding_loss, sliding, 1) {
+  *out = coulomb_force (&x.k->law, x.w) * x.w;
 }
 
 static const pw_field sliding_fields[] = {

@@ -9,7 +9,7 @@
  * If l = 0, or 1 / l overflows, the direction is undefined: e = 0 and the force is zero.  For l0 = 0 this is the limit
  * of the smooth spring force k d; for l0 > 0 the ends should not meet. */
 #include <math.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double s1[2], s2[2]; /* ends in the bodies' frames [m] */
@@ -18,6 +18,8 @@ typedef struct {
 
 /* A spring in the current state. */
 typedef struct {
+  const spring *k;
+  const pw_configuration *A, *B;
   double X1, Y1, X2, Y2; /* arms in world axes */
   double d[2], rate[2];  /* from end 2 to end 1, and its velocity */
   double e[2], l, il;    /* direction, length, 1 / length; direction and 1 / length are 0 if the length is */
@@ -25,11 +27,12 @@ typedef struct {
   double F[2];           /* pull */
 } spring_state;
 
-static inline spring_state spring_at (const spring *k, const pw_configuration *A, const pw_configuration *B) {
-  spring_state s = { .X1 = A->cos * k->s1[0] - A->sin * k->s1[1],
-                     .Y1 = A->sin * k->s1[0] + A->cos * k->s1[1],
-                     .X2 = B->cos * k->s2[0] - B->sin * k->s2[1],
-                     .Y2 = B->sin * k->s2[0] + B->cos * k->s2[1] };
+static inline spring_state spring_at (const pw_batch *b, int e) {
+  const spring *k = (const spring *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  spring_state s = { .k = k, .A = A, .B = B };
+  s.X1 = A->cos * k->s1[0] - A->sin * k->s1[1], s.Y1 = A->sin * k->s1[0] + A->cos * k->s1[1];
+  s.X2 = B->cos * k->s2[0] - B->sin * k->s2[1], s.Y2 = B->sin * k->s2[0] + B->cos * k->s2[1];
   s.d[0] = A->x + s.X1 - B->x - s.X2, s.d[1] = A->y + s.Y1 - B->y - s.Y2;
   s.rate[0] = A->vx - A->omega * s.Y1 - B->vx + B->omega * s.Y2;
   s.rate[1] = A->vy + A->omega * s.X1 - B->vy - B->omega * s.X2;
@@ -42,27 +45,13 @@ static inline spring_state spring_at (const spring *k, const pw_configuration *A
   return s;
 }
 
-#define SPRING_PARTS                                \
-  const spring *k = (const spring *)b->element + e; \
-  const spring_state s = spring_at (k, &b->configuration[b->body[2 * e]], &b->configuration[b->body[2 * e + 1]])
-
-static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                           pw_error *error) {
-  const pw_spring *d = definition;
-  *(spring *)element = (spring){
-    { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->stiffness, d->damping, d->length,
-  };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (spring_prepare, pw_spring, spring) {
+  *k = (spring){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->stiffness, d->damping, d->length };
 }
 
-static void spring_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    SPRING_PARTS;
-    (void)k;
-    out[0] = -s.F[0], out[1] = -s.F[1], out[2] = s.F[0] * s.Y1 - s.F[1] * s.X1;
-    out[3] = s.F[0], out[4] = s.F[1], out[5] = s.F[1] * s.X2 - s.F[0] * s.Y2;
-  }
+PER_ELEMENT (spring_force, spring, 6) {
+  out[0] = -x.F[0], out[1] = -x.F[1], out[2] = x.F[0] * x.Y1 - x.F[1] * x.X1;
+  out[3] = x.F[0], out[4] = x.F[1], out[5] = x.F[1] * x.X2 - x.F[0] * x.Y2;
 }
 
 /* out = -D^T K W, 6 x 6; K = dF/dd or dF/dd', W = Jacobian of d or d'. */
@@ -73,15 +62,9 @@ static void spring_product (double *out, const double D[2][6], const double K[2]
   }
 }
 
-#define SPRING_D                    \
-  {                                 \
-    { 1, 0, -s.Y1, -1, 0, s.Y2 }, { \
-      0, 1, s.X1, 0, -1, -s.X2      \
-    }                               \
-  }
-
 /* dF/dd = (k (1 - l0/l) + c l'/l) (1 - e e^T) + k e e^T + (c/l) e (d' - l' e)^T */
-static void spring_slope (const spring *k, const spring_state *s, double K[2][2]) {
+static void spring_slope (const spring_state *s, double K[2][2]) {
+  const spring *k = s->k;
   double across = s->il > 0 ? k->k * (1 - k->l0 * s->il) + k->c * s->speed * s->il : k->k;
   for (int i = 0; i < 2; i++)
     for (int j = 0; j < 2; j++)
@@ -90,46 +73,33 @@ static void spring_slope (const spring *k, const spring_state *s, double K[2][2]
 }
 
 /* Includes the rotation of the arms: d^2d/dphi1^2 = -(X1, Y1), d^2d/dphi2^2 = (X2, Y2), dd'/dphi = -w (X, Y). */
-static void spring_force_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    SPRING_PARTS;
-    double w1 = b->configuration[b->body[2 * e]].omega, w2 = b->configuration[b->body[2 * e + 1]].omega;
-    double K[2][2], turn[2] = { -w1 * (s.e[0] * s.X1 + s.e[1] * s.Y1), w2 * (s.e[0] * s.X2 + s.e[1] * s.Y2) };
-    const double D[2][6] = SPRING_D;
-    spring_slope (k, &s, K);
-    spring_product (out, D, (const double (*)[2])K, D);
-    for (int i = 0; i < 6; i++) {
-      double along = k->c * (D[0][i] * s.e[0] + D[1][i] * s.e[1]);
-      out[6 * i + 2] -= along * turn[0];
-      out[6 * i + 5] -= along * turn[1];
-    }
-    out[14] += s.F[0] * s.X1 + s.F[1] * s.Y1;
-    out[35] -= s.F[0] * s.X2 + s.F[1] * s.Y2;
+PER_ELEMENT (spring_force_q, spring, 36) {
+  double w1 = x.A->omega, w2 = x.B->omega;
+  double K[2][2], turn[2] = { -w1 * (x.e[0] * x.X1 + x.e[1] * x.Y1), w2 * (x.e[0] * x.X2 + x.e[1] * x.Y2) };
+  const double D[2][6] = { { 1, 0, -x.Y1, -1, 0, x.Y2 }, { 0, 1, x.X1, 0, -1, -x.X2 } };
+  spring_slope (&x, K);
+  spring_product (out, D, (const double (*)[2])K, D);
+  for (int i = 0; i < 6; i++) {
+    double along = x.k->c * (D[0][i] * x.e[0] + D[1][i] * x.e[1]);
+    out[6 * i + 2] -= along * turn[0];
+    out[6 * i + 5] -= along * turn[1];
   }
+  out[14] += x.F[0] * x.X1 + x.F[1] * x.Y1;
+  out[35] -= x.F[0] * x.X2 + x.F[1] * x.Y2;
 }
 
-static void spring_force_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 36) {
-    SPRING_PARTS;
-    const double D[2][6] = SPRING_D, c = k->c;
-    const double K[2][2] = { { c * s.e[0] * s.e[0], c * s.e[0] * s.e[1] },
-                             { c * s.e[1] * s.e[0], c * s.e[1] * s.e[1] } };
-    spring_product (out, D, K, D);
-  }
+PER_ELEMENT (spring_force_v, spring, 36) {
+  const double D[2][6] = { { 1, 0, -x.Y1, -1, 0, x.Y2 }, { 0, 1, x.X1, 0, -1, -x.X2 } }, c = x.k->c;
+  const double K[2][2] = { { c * x.e[0] * x.e[0], c * x.e[0] * x.e[1] }, { c * x.e[1] * x.e[0], c * x.e[1] * x.e[1] } };
+  spring_product (out, D, K, D);
 }
 
-static void spring_energy (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    SPRING_PARTS;
-    out[e] = k->k * (s.l - k->l0) * (s.l - k->l0) / 2;
-  }
+PER_ELEMENT (spring_energy, spring, 1) {
+  *out = x.k->k * (x.l - x.k->l0) * (x.l - x.k->l0) / 2;
 }
 
-static void spring_loss (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    SPRING_PARTS;
-    out[e] = k->c * s.speed * s.speed;
-  }
+PER_ELEMENT (spring_loss, spring, 1) {
+  *out = x.k->c * x.speed * x.speed;
 }
 
 static const pw_field spring_fields[] = {

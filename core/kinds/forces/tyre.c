@@ -24,12 +24,16 @@ typedef struct {
 
 /* The slip of one tyre: directions, speeds, the force and its derivatives. */
 typedef struct {
+  const tyre *k;
+  const pw_configuration *A;
   double c, s, ve, vn, F; /* heading in the world; speeds of P; force along n */
   double F_ve, F_vn;      /* derivatives of F */
-} tyre_slip;
+} tyre_state;
 
-static tyre_slip tyre_at (const tyre *k, const pw_configuration *A) {
-  tyre_slip x = { .c = A->cos * k->cos - A->sin * k->sin, .s = A->sin * k->cos + A->cos * k->sin };
+static inline tyre_state tyre_at (const pw_batch *b, int e) {
+  const tyre *k = (const tyre *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[e]];
+  tyre_state x = { k, A, .c = A->cos * k->cos - A->sin * k->sin, .s = A->sin * k->cos + A->cos * k->sin };
   x.ve = x.c * A->vx + x.s * A->vy - k->aside * A->omega;
   x.vn = x.c * A->vy - x.s * A->vx + k->along * A->omega;
   double R = sqrt (x.ve * x.ve + k->speed * k->speed), sigma = x.vn / R, slope = -k->stiffness;
@@ -43,11 +47,6 @@ static tyre_slip tyre_at (const tyre *k, const pw_configuration *A) {
   x.F_ve = -slope * sigma * x.ve / (R * R);
   return x;
 }
-
-#define TYRE_PARTS                                           \
-  const tyre *k = (const tyre *)b->element + e;              \
-  const pw_configuration *A = &b->configuration[b->body[e]]; \
-  const tyre_slip x = tyre_at (k, A)
 
 static int tyre_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                          pw_error *error) {
@@ -64,60 +63,42 @@ static int tyre_prepare (const void *definition, const pw_body *const *bodies, v
   return PW_OK;
 }
 
-static void tyre_force (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    TYRE_PARTS;
-    out[0] = -x.F * x.s, out[1] = x.F * x.c, out[2] = x.F * k->along;
-  }
+PER_ELEMENT (tyre_force, tyre, 3) {
+  out[0] = -x.F * x.s, out[1] = x.F * x.c, out[2] = x.F * x.k->along;
 }
 
 /* d(F S)/dphi with dS/dphi = -(c, s, 0), dv_n/dphi = -(c, s) . v, dv_e/dphi = (-s, c) . v, v: velocity of the body. */
-static void tyre_force_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    TYRE_PARTS;
-    double slope = -x.F_vn * (x.c * A->vx + x.s * A->vy) + x.F_ve * (x.c * A->vy - x.s * A->vx);
-    memset (out, 0, 9 * sizeof *out);
-    out[2] = -x.F * x.c - slope * x.s;
-    out[5] = -x.F * x.s + slope * x.c;
-    out[8] = slope * k->along;
-  }
+PER_ELEMENT (tyre_force_q, tyre, 9) {
+  double slope = -x.F_vn * (x.c * x.A->vx + x.s * x.A->vy) + x.F_ve * (x.c * x.A->vy - x.s * x.A->vx);
+  memset (out, 0, 9 * sizeof *out);
+  out[2] = -x.F * x.c - slope * x.s;
+  out[5] = -x.F * x.s + slope * x.c;
+  out[8] = slope * x.k->along;
 }
 
-static void tyre_force_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    TYRE_PARTS;
-    const double S[3] = { -x.s, x.c, k->along }, E[3] = { x.c, x.s, -k->aside };
-    for (int i = 0; i < 9; i++) out[i] = S[i / 3] * (x.F_vn * S[i % 3] + x.F_ve * E[i % 3]);
-  }
+PER_ELEMENT (tyre_force_v, tyre, 9) {
+  const double S[3] = { -x.s, x.c, x.k->along }, E[3] = { x.c, x.s, -x.k->aside };
+  for (int i = 0; i < 9; i++) out[i] = S[i / 3] * (x.F_vn * S[i % 3] + x.F_ve * E[i % 3]);
 }
 
 /* Velocity scales: R along the heading, over which the slip varies near rest; laterally, if there is a limit, the
  * change that reverses a saturated force. */
-static void tyre_saturation (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    TYRE_PARTS;
-    double R = sqrt (x.ve * x.ve + k->speed * k->speed), across = k->limit / k->stiffness * R + fabs (x.vn);
-    double vc = x.c * A->vx + x.s * A->vy, vs = x.c * A->vy - x.s * A->vx;
-    const double E[6] = { 0, 0, vs, x.c, x.s, -k->aside }, S[6] = { 0, 0, -vc, -x.s, x.c, k->along };
-    for (int i = 0; i < 6; i++) {
-      if (E[i] != 0) out[i] = R / fabs (E[i]);
-      if (S[i] != 0 && k->limit > 0) out[i] = fmin (out[i], across / fabs (S[i]));
-    }
+PER_ELEMENT (tyre_saturation, tyre, 6) {
+  double R = sqrt (x.ve * x.ve + x.k->speed * x.k->speed), across = x.k->limit / x.k->stiffness * R + fabs (x.vn);
+  double vc = x.c * x.A->vx + x.s * x.A->vy, vs = x.c * x.A->vy - x.s * x.A->vx;
+  const double E[6] = { 0, 0, vs, x.c, x.s, -x.k->aside }, S[6] = { 0, 0, -vc, -x.s, x.c, x.k->along };
+  for (int i = 0; i < 6; i++) {
+    if (E[i] != 0) out[i] = R / fabs (E[i]);
+    if (S[i] != 0 && x.k->limit > 0) out[i] = fmin (out[i], across / fabs (S[i]));
   }
 }
 
-static void tyre_loss (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    TYRE_PARTS;
-    out[e] = -x.F * x.vn;
-  }
+PER_ELEMENT (tyre_loss, tyre, 1) {
+  *out = -x.F * x.vn;
 }
 
-static void tyre_contact (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    const tyre *k = (const tyre *)b->element + e;
-    contact_to_world (&b->configuration[b->body[e]], k->at, k->heading, out);
-  }
+PER_ELEMENT (tyre_contact, tyre, 3) {
+  contact_to_world (x.A, x.k->at, x.k->heading, out);
 }
 
 static const pw_field tyre_fields[] = {

@@ -10,50 +10,32 @@
  * body 1 with -lambda: along e at its point, or as a moment; on body 2 with the opposite. */
 #include "line.h"
 
-static int drive_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                          pw_error *error) {
-  const pw_drive *d = definition;
-  line k = { .s1 = { d->at[0][0], d->at[0][1] }, .angle = d->what == PW_DRIVE_ANGLE };
-  if (d->what != PW_DRIVE_ANGLE) {
-    k.n[d->what] = 1;
-    k.c = d->at[1][d->what];
-  }
-  *(line *)element = k;
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (drive_prepare, pw_drive, line) {
+  *k = (line){ .s1 = { d->at[0][0], d->at[0][1] }, .angle = d->what == PW_DRIVE_ANGLE };
+  if (d->what == PW_DRIVE_ANGLE) return;
+  k->n[d->what] = 1;
+  k->c = d->at[1][d->what];
 }
 
-static void drive_g (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    LINE_PARTS;
-    out[e] = line_g (k, &s) + k->angle * (A->phi - B->phi) - b->u[3 * e];
-  }
+PER_ELEMENT (drive_g, line, 1) {
+  *out = line_g (&x) + x.k->angle * (x.A->phi - x.B->phi) - x.u[0];
 }
 
-static void drive_g_size (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    LINE_PARTS;
-    out[e] = line_g_size (k, &s, A, B) + k->angle * (fabs (A->phi) + fabs (B->phi)) + fabs (b->u[3 * e]);
-  }
+PER_ELEMENT (drive_g_size, line, 1) {
+  *out = line_g_size (&x) + x.k->angle * (fabs (x.A->phi) + fabs (x.B->phi)) + fabs (x.u[0]);
 }
 
 static void drive_eta (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e + 1];
 }
 
-static void drive_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    LINE_PARTS;
-    line_J (&s, out);
-    out[2] += k->angle, out[5] -= k->angle;
-  }
+PER_ELEMENT (drive_J, line, 6) {
+  line_J (&x, out);
+  out[2] += x.k->angle, out[5] -= x.k->angle;
 }
 
-static void drive_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    LINE_PARTS;
-    out[e] = b->u[3 * e + 2] + line_gamma (&s, A, B);
-  }
+PER_ELEMENT (drive_gamma, line, 1) {
+  *out = x.u[2] + line_gamma (&x);
 }
 
 static const char *const drive_what[] = { "x", "y", "angle", NULL };

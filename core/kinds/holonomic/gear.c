@@ -8,7 +8,7 @@
  * carrier. */
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double ratio;  /* i */
@@ -27,31 +27,28 @@ static int gear_prepare (const void *definition, const pw_body *const *bodies, v
   return PW_OK;
 }
 
-#define GEAR_PARTS                                                                                           \
-  const gear *k = (const gear *)b->element + e;                                                              \
-  const double phi1 = b->configuration[b->body[3 * e]].phi, phi2 = b->configuration[b->body[3 * e + 1]].phi; \
-  const double phi3 = b->configuration[b->body[3 * e + 2]].phi
+typedef struct {
+  const gear *k;
+  double phi1, phi2, phi3;
+} gear_state;
 
-static void gear_g (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    GEAR_PARTS;
-    out[e] = phi1 - phi3 - k->ratio * (phi2 - phi3) - k->offset;
-  }
+static inline gear_state gear_at (const pw_batch *b, int e) {
+  const int *body = b->body + 3 * e;
+  const pw_configuration *p = b->configuration;
+  return (gear_state){ (const gear *)b->element + e, p[body[0]].phi, p[body[1]].phi, p[body[2]].phi };
 }
 
-static void gear_g_size (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    GEAR_PARTS;
-    out[e] = fabs (phi1) + fabs (phi3) + fabs (k->ratio) * (fabs (phi2) + fabs (phi3)) + fabs (k->offset);
-  }
+PER_ELEMENT (gear_g, gear, 1) {
+  *out = x.phi1 - x.phi3 - x.k->ratio * (x.phi2 - x.phi3) - x.k->offset;
 }
 
-static void gear_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 9) {
-    const gear *k = (const gear *)b->element + e;
-    memset (out, 0, 9 * sizeof *out);
-    out[2] = 1, out[5] = -k->ratio, out[8] = k->ratio - 1;
-  }
+PER_ELEMENT (gear_g_size, gear, 1) {
+  *out = fabs (x.phi1) + fabs (x.phi3) + fabs (x.k->ratio) * (fabs (x.phi2) + fabs (x.phi3)) + fabs (x.k->offset);
+}
+
+PER_ELEMENT (gear_J, gear, 9) {
+  memset (out, 0, 9 * sizeof *out);
+  out[2] = 1, out[5] = -x.k->ratio, out[8] = x.k->ratio - 1;
 }
 
 static const char *const gear_from[] = { "start", "offset", NULL };

@@ -8,67 +8,51 @@
  * (Haug 1989, Computer Aided Kinematics and Dynamics of Mechanical Systems, section 3.3.)
  * The force in world axes is -lambda on body 1, lambda on body 2. */
 #include <math.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double s1[2], s2[2]; /* arms in the bodies' frames [m] */
 } pin;
 
-/* Both arms in world axes. */
+/* A pin in the current state: both arms in world axes. */
 typedef struct {
+  const pw_configuration *A, *B;
+  const double *w;
   double X1, Y1, X2, Y2;
-} pin_arms;
+} pin_state;
 
-static inline pin_arms pin_turn (const pin *p, const pw_configuration *A, const pw_configuration *B) {
-  return (pin_arms){ A->cos * p->s1[0] - A->sin * p->s1[1], A->sin * p->s1[0] + A->cos * p->s1[1],
-                     B->cos * p->s2[0] - B->sin * p->s2[1], B->sin * p->s2[0] + B->cos * p->s2[1] };
+static inline pin_state pin_at (const pw_batch *b, int e) {
+  const pin *k = (const pin *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  pin_state x = { .A = A, .B = B, .w = batch_w (b, e) };
+  x.X1 = A->cos * k->s1[0] - A->sin * k->s1[1], x.Y1 = A->sin * k->s1[0] + A->cos * k->s1[1];
+  x.X2 = B->cos * k->s2[0] - B->sin * k->s2[1], x.Y2 = B->sin * k->s2[0] + B->cos * k->s2[1];
+  return x;
 }
 
-/* Element e: both configurations and arms. */
-#define PIN_PARTS                                                                                            \
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
-  const pin_arms s = pin_turn ((const pin *)b->element + e, A, B);                                           \
-  (void)A, (void)B, (void)s
-
-static int pin_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                        pw_error *error) {
-  const pw_pin *d = definition;
-  *(pin *)element = (pin){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] } };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (pin_prepare, pw_pin, pin) {
+  *k = (pin){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] } };
 }
 
-static void pin_g (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 2) {
-    PIN_PARTS;
-    out[0] = A->x + s.X1 - B->x - s.X2;
-    out[1] = A->y + s.Y1 - B->y - s.Y2;
-  }
+PER_ELEMENT (pin_g, pin, 2) {
+  out[0] = x.A->x + x.X1 - x.B->x - x.X2;
+  out[1] = x.A->y + x.Y1 - x.B->y - x.Y2;
 }
 
-static void pin_g_size (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 2) {
-    PIN_PARTS;
-    out[0] = fabs (A->x) + fabs (s.X1) + fabs (B->x) + fabs (s.X2);
-    out[1] = fabs (A->y) + fabs (s.Y1) + fabs (B->y) + fabs (s.Y2);
-  }
+PER_ELEMENT (pin_g_size, pin, 2) {
+  out[0] = fabs (x.A->x) + fabs (x.X1) + fabs (x.B->x) + fabs (x.X2);
+  out[1] = fabs (x.A->y) + fabs (x.Y1) + fabs (x.B->y) + fabs (x.Y2);
 }
 
-static void pin_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    PIN_PARTS;
-    out[0] = 1, out[1] = 0, out[2] = -s.Y1, out[3] = -1, out[4] = 0, out[5] = s.Y2;
-    out[6] = 0, out[7] = 1, out[8] = s.X1, out[9] = 0, out[10] = -1, out[11] = -s.X2;
-  }
+PER_ELEMENT (pin_J, pin, 12) {
+  out[0] = 1, out[1] = 0, out[2] = -x.Y1, out[3] = -1, out[4] = 0, out[5] = x.Y2;
+  out[6] = 0, out[7] = 1, out[8] = x.X1, out[9] = 0, out[10] = -1, out[11] = -x.X2;
 }
 
-static void pin_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 2) {
-    PIN_PARTS;
-    double w1 = A->omega * A->omega, w2 = B->omega * B->omega;
-    out[0] = s.X1 * w1 - s.X2 * w2;
-    out[1] = s.Y1 * w1 - s.Y2 * w2;
-  }
+PER_ELEMENT (pin_gamma, pin, 2) {
+  double w1 = x.A->omega * x.A->omega, w2 = x.B->omega * x.B->omega;
+  out[0] = x.X1 * w1 - x.X2 * w2;
+  out[1] = x.Y1 * w1 - x.Y2 * w2;
 }
 
 /* Sets the two angle columns of a 2 x 6 block, the others to zero. */
@@ -77,28 +61,19 @@ static inline void pin_angles (double *out, double x1, double y1, double x2, dou
   out[2] = x1, out[8] = y1, out[5] = x2, out[11] = y2;
 }
 
-static void pin_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    PIN_PARTS;
-    double w1 = b->w[6 * e + 2], w2 = b->w[6 * e + 5];
-    pin_angles (out, -s.X1 * w1, -s.Y1 * w1, s.X2 * w2, s.Y2 * w2);
-  }
+PER_ELEMENT (pin_jw_q, pin, 12) {
+  double w1 = x.w[2], w2 = x.w[5];
+  pin_angles (out, -x.X1 * w1, -x.Y1 * w1, x.X2 * w2, x.Y2 * w2);
 }
 
-static void pin_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    PIN_PARTS;
-    double w1 = A->omega * A->omega, w2 = B->omega * B->omega;
-    pin_angles (out, -s.Y1 * w1, s.X1 * w1, s.Y2 * w2, -s.X2 * w2);
-  }
+PER_ELEMENT (pin_gamma_q, pin, 12) {
+  double w1 = x.A->omega * x.A->omega, w2 = x.B->omega * x.B->omega;
+  pin_angles (out, -x.Y1 * w1, x.X1 * w1, x.Y2 * w2, -x.X2 * w2);
 }
 
-static void pin_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    PIN_PARTS;
-    double w1 = 2 * A->omega, w2 = 2 * B->omega;
-    pin_angles (out, s.X1 * w1, s.Y1 * w1, -s.X2 * w2, -s.Y2 * w2);
-  }
+PER_ELEMENT (pin_gamma_v, pin, 12) {
+  double w1 = 2 * x.A->omega, w2 = 2 * x.B->omega;
+  pin_angles (out, x.X1 * w1, x.Y1 * w1, -x.X2 * w2, -x.Y2 * w2);
 }
 
 static const pw_field pin_fields[] = {

@@ -8,7 +8,7 @@
  * 2 L: near the constraint g is the distance minus L, without a square root.)
  * The force on body 1 is -lambda d / L, away from body 2; body 2 receives the opposite. */
 #include <math.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double s1[2], s2[2]; /* ends in the bodies' frames [m] */
@@ -17,6 +17,9 @@ typedef struct {
 
 /* A rod in the current state. */
 typedef struct {
+  const rod *k;
+  const pw_configuration *A, *B;
+  const double *w;
   double D[2][6];
   double S1[2], S2[2];  /* arms in world axes */
   double d[2], rate[2]; /* from end 2 to end 1, and its velocity */
@@ -24,8 +27,10 @@ typedef struct {
   double L;
 } rod_state;
 
-static inline rod_state rod_at (const rod *k, const pw_configuration *A, const pw_configuration *B) {
-  rod_state s = { .w1 = A->omega, .w2 = B->omega, .L = k->length };
+static inline rod_state rod_at (const pw_batch *b, int e) {
+  const rod *k = (const rod *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  rod_state s = { k, A, B, batch_w (b, e), .w1 = A->omega, .w2 = B->omega, .L = k->length };
   s.S1[0] = A->cos * k->s1[0] - A->sin * k->s1[1], s.S1[1] = A->sin * k->s1[0] + A->cos * k->s1[1];
   s.S2[0] = B->cos * k->s2[0] - B->sin * k->s2[1], s.S2[1] = B->sin * k->s2[0] + B->cos * k->s2[1];
   s.D[0][0] = s.D[1][1] = 1, s.D[0][3] = s.D[1][4] = -1;
@@ -36,11 +41,6 @@ static inline rod_state rod_at (const rod *k, const pw_configuration *A, const p
   return s;
 }
 
-#define ROD_PARTS                                                                                            \
-  const rod *k = (const rod *)b->element + e;                                                                \
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
-  const rod_state s = rod_at (k, A, B)
-
 static inline double rod_dot (const double *a, const double *b) {
   return a[0] * b[0] + a[1] * b[1];
 }
@@ -50,79 +50,53 @@ static inline void rod_through (const rod_state *s, const double x[2], double *o
   for (int j = 0; j < 6; j++) out[j] = (x[0] * s->D[0][j] + x[1] * s->D[1][j]) / s->L;
 }
 
-static int rod_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                        pw_error *error) {
-  const pw_rod *d = definition;
-  *(rod *)element = (rod){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->length };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (rod_prepare, pw_rod, rod) {
+  *k = (rod){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->length };
 }
 
-static void rod_g (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    ROD_PARTS;
-    out[e] = (rod_dot (s.d, s.d) - s.L * s.L) / (2 * s.L);
-  }
+PER_ELEMENT (rod_g, rod, 1) {
+  *out = (rod_dot (x.d, x.d) - x.L * x.L) / (2 * x.L);
 }
 
-static void rod_g_size (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    ROD_PARTS;
-    double x = fabs (A->x) + fabs (s.S1[0]) + fabs (B->x) + fabs (s.S2[0]);
-    double y = fabs (A->y) + fabs (s.S1[1]) + fabs (B->y) + fabs (s.S2[1]);
-    out[e] = (fabs (s.d[0]) * x + fabs (s.d[1]) * y) / s.L + s.L / 2;
-  }
+PER_ELEMENT (rod_g_size, rod, 1) {
+  double dx = fabs (x.A->x) + fabs (x.S1[0]) + fabs (x.B->x) + fabs (x.S2[0]);
+  double dy = fabs (x.A->y) + fabs (x.S1[1]) + fabs (x.B->y) + fabs (x.S2[1]);
+  *out = (fabs (x.d[0]) * dx + fabs (x.d[1]) * dy) / x.L + x.L / 2;
 }
 
-static void rod_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    ROD_PARTS;
-    rod_through (&s, s.d, out);
-  }
+PER_ELEMENT (rod_J, rod, 6) {
+  rod_through (&x, x.d, out);
 }
 
-static void rod_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    ROD_PARTS;
-    double turn = s.w1 * s.w1 * rod_dot (s.d, s.S1) - s.w2 * s.w2 * rod_dot (s.d, s.S2);
-    out[e] = (turn - rod_dot (s.rate, s.rate)) / s.L;
-  }
+PER_ELEMENT (rod_gamma, rod, 1) {
+  double turn = x.w1 * x.w1 * rod_dot (x.d, x.S1) - x.w2 * x.w2 * rod_dot (x.d, x.S2);
+  *out = (turn - rod_dot (x.rate, x.rate)) / x.L;
 }
 
 /* ((D w)^T D + d^T d(D w)/dq) / L with d(D w)/dphi1 = -(X1, Y1) w(phi1), d(D w)/dphi2 = (X2, Y2) w(phi2). */
-static void rod_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    ROD_PARTS;
-    const double *w = b->w + 6 * e;
-    double Dw[2] = { 0, 0 };
-    for (int j = 0; j < 6; j++) Dw[0] += s.D[0][j] * w[j], Dw[1] += s.D[1][j] * w[j];
-    rod_through (&s, Dw, out);
-    out[2] -= rod_dot (s.d, s.S1) * w[2] / s.L;
-    out[5] += rod_dot (s.d, s.S2) * w[5] / s.L;
-  }
+PER_ELEMENT (rod_jw_q, rod, 6) {
+  double Dw[2] = { 0, 0 };
+  for (int j = 0; j < 6; j++) Dw[0] += x.D[0][j] * x.w[j], Dw[1] += x.D[1][j] * x.w[j];
+  rod_through (&x, Dw, out);
+  out[2] -= rod_dot (x.d, x.S1) * x.w[2] / x.L;
+  out[5] += rod_dot (x.d, x.S2) * x.w[5] / x.L;
 }
 
 /* dd'/dphi1 = -w1 (X1, Y1), dd'/dphi2 = w2 (X2, Y2); the derivatives of the arms are columns of D, for arm 2 negated.
  * */
-static void rod_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    ROD_PARTS;
-    double w1 = s.w1 * s.w1, w2 = s.w2 * s.w2;
-    const double turn[2] = { s.S1[0] * w1 - s.S2[0] * w2, s.S1[1] * w1 - s.S2[1] * w2 };
-    rod_through (&s, turn, out);
-    out[2] += (w1 * (s.d[0] * s.D[0][2] + s.d[1] * s.D[1][2]) + 2 * s.w1 * rod_dot (s.rate, s.S1)) / s.L;
-    out[5] += (w2 * (s.d[0] * s.D[0][5] + s.d[1] * s.D[1][5]) - 2 * s.w2 * rod_dot (s.rate, s.S2)) / s.L;
-  }
+PER_ELEMENT (rod_gamma_q, rod, 6) {
+  double w1 = x.w1 * x.w1, w2 = x.w2 * x.w2;
+  const double turn[2] = { x.S1[0] * w1 - x.S2[0] * w2, x.S1[1] * w1 - x.S2[1] * w2 };
+  rod_through (&x, turn, out);
+  out[2] += (w1 * (x.d[0] * x.D[0][2] + x.d[1] * x.D[1][2]) + 2 * x.w1 * rod_dot (x.rate, x.S1)) / x.L;
+  out[5] += (w2 * (x.d[0] * x.D[0][5] + x.d[1] * x.D[1][5]) - 2 * x.w2 * rod_dot (x.rate, x.S2)) / x.L;
 }
 
-static void rod_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    ROD_PARTS;
-    const double twice[2] = { -2 * s.rate[0], -2 * s.rate[1] };
-    rod_through (&s, twice, out);
-    out[2] += 2 * s.w1 * rod_dot (s.d, s.S1) / s.L;
-    out[5] -= 2 * s.w2 * rod_dot (s.d, s.S2) / s.L;
-  }
+PER_ELEMENT (rod_gamma_v, rod, 6) {
+  const double twice[2] = { -2 * x.rate[0], -2 * x.rate[1] };
+  rod_through (&x, twice, out);
+  out[2] += 2 * x.w1 * rod_dot (x.d, x.S1) / x.L;
+  out[5] -= 2 * x.w2 * rod_dot (x.d, x.S2) / x.L;
 }
 
 static const pw_field rod_fields[] = {

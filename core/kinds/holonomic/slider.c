@@ -7,70 +7,44 @@
  * -lambda(2) act on body 1; the opposites act on body 2. */
 #include "line.h"
 
-static int slider_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                           pw_error *error) {
-  const pw_slider *d = definition;
-  line *k = element;
+PREPARE (slider_prepare, pw_slider, line) {
   *k = line_make (d->at, d->heading);
   k->angle = d->angle;
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
 }
 
-static void slider_g (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 2) {
-    LINE_PARTS;
-    out[0] = line_g (k, &s);
-    out[1] = A->phi - B->phi - k->angle;
-  }
+PER_ELEMENT (slider_g, line, 2) {
+  out[0] = line_g (&x);
+  out[1] = x.A->phi - x.B->phi - x.k->angle;
 }
 
-static void slider_g_size (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 2) {
-    LINE_PARTS;
-    out[0] = line_g_size (k, &s, A, B);
-    out[1] = fabs (A->phi) + fabs (B->phi) + fabs (k->angle);
-  }
+PER_ELEMENT (slider_g_size, line, 2) {
+  out[0] = line_g_size (&x);
+  out[1] = fabs (x.A->phi) + fabs (x.B->phi) + fabs (x.k->angle);
 }
 
-static void slider_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    LINE_PARTS;
-    line_J (&s, out);
-    out[6] = out[7] = out[9] = out[10] = 0, out[8] = 1, out[11] = -1;
-  }
+PER_ELEMENT (slider_J, line, 12) {
+  line_J (&x, out);
+  out[6] = out[7] = out[9] = out[10] = 0, out[8] = 1, out[11] = -1;
 }
 
-static void slider_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 2) {
-    LINE_PARTS;
-    out[0] = line_gamma (&s, A, B);
-    out[1] = 0;
-  }
+PER_ELEMENT (slider_gamma, line, 2) {
+  out[0] = line_gamma (&x);
+  out[1] = 0;
 }
 
-static void slider_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    LINE_PARTS;
-    line_curve (&s, 1, b->w + 6 * e, out);
-    memset (out + 6, 0, 6 * sizeof *out);
-  }
+PER_ELEMENT (slider_jw_q, line, 12) {
+  line_curve (&x, 1, x.w, out);
+  memset (out + 6, 0, 6 * sizeof *out);
 }
 
-static void slider_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    LINE_PARTS;
-    line_gamma_q (&s, A, B, out);
-    memset (out + 6, 0, 6 * sizeof *out);
-  }
+PER_ELEMENT (slider_gamma_q, line, 12) {
+  line_gamma_q (&x, out);
+  memset (out + 6, 0, 6 * sizeof *out);
 }
 
-static void slider_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 12) {
-    LINE_PARTS;
-    line_gamma_v (&s, A, B, out);
-    memset (out + 6, 0, 6 * sizeof *out);
-  }
+PER_ELEMENT (slider_gamma_v, line, 12) {
+  line_gamma_v (&x, out);
+  memset (out + 6, 0, 6 * sizeof *out);
 }
 
 static const pw_field slider_fields[] = {

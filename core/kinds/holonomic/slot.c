@@ -5,40 +5,24 @@
  * line.h has the derivatives.  The force on body 1 is -lambda along n, at its point; body 2 receives the opposite. */
 #include "line.h"
 
-static int slot_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                         pw_error *error) {
-  const pw_slot *d = definition;
-  *(line *)element = line_make (d->at, d->heading);
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (slot_prepare, pw_slot, line) {
+  *k = line_make (d->at, d->heading);
 }
 
-static void slot_g (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    LINE_PARTS;
-    out[e] = line_g (k, &s);
-  }
+PER_ELEMENT (slot_g, line, 1) {
+  *out = line_g (&x);
 }
 
-static void slot_g_size (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    LINE_PARTS;
-    out[e] = line_g_size (k, &s, A, B);
-  }
+PER_ELEMENT (slot_g_size, line, 1) {
+  *out = line_g_size (&x);
 }
 
-static void slot_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    LINE_PARTS;
-    line_J (&s, out);
-  }
+PER_ELEMENT (slot_J, line, 6) {
+  line_J (&x, out);
 }
 
-static void slot_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    LINE_PARTS;
-    out[e] = line_gamma (&s, A, B);
-  }
+PER_ELEMENT (slot_gamma, line, 1) {
+  *out = line_gamma (&x);
 }
 
 static const pw_field slot_fields[] = {

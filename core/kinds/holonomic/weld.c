@@ -11,62 +11,56 @@
  * act on body 2. */
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double s1[2], s2[2]; /* arms in the bodies' frames [m] */
   double beta;         /* phi2 - phi1 [rad] */
 } weld;
 
-/* Element e: both configurations, and both arms in world axes. */
-#define WELD_PARTS                                                                                           \
-  const weld *k = (const weld *)b->element + e;                                                              \
-  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]]; \
-  const double X1 = A->cos * k->s1[0] - A->sin * k->s1[1], Y1 = A->sin * k->s1[0] + A->cos * k->s1[1];       \
-  const double X2 = B->cos * k->s2[0] - B->sin * k->s2[1], Y2 = B->sin * k->s2[0] + B->cos * k->s2[1];
+/* A weld in the current state: both arms in world axes. */
+typedef struct {
+  const weld *k;
+  const pw_configuration *A, *B;
+  const double *w;
+  double X1, Y1, X2, Y2;
+} weld_state;
 
-static int weld_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                         pw_error *error) {
-  const pw_weld *d = definition;
-  *(weld *)element = (weld){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->angle };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+static inline weld_state weld_at (const pw_batch *b, int e) {
+  const weld *k = (const weld *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
+  weld_state x = { .k = k, .A = A, .B = B, .w = batch_w (b, e) };
+  x.X1 = A->cos * k->s1[0] - A->sin * k->s1[1], x.Y1 = A->sin * k->s1[0] + A->cos * k->s1[1];
+  x.X2 = B->cos * k->s2[0] - B->sin * k->s2[1], x.Y2 = B->sin * k->s2[0] + B->cos * k->s2[1];
+  return x;
 }
 
-static void weld_g (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    WELD_PARTS
-    out[0] = A->x + X1 - B->x - X2;
-    out[1] = A->y + Y1 - B->y - Y2;
-    out[2] = A->phi - B->phi + k->beta;
-  }
+PREPARE (weld_prepare, pw_weld, weld) {
+  *k = (weld){ { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] }, d->angle };
 }
 
-static void weld_g_size (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    WELD_PARTS
-    out[0] = fabs (A->x) + fabs (X1) + fabs (B->x) + fabs (X2);
-    out[1] = fabs (A->y) + fabs (Y1) + fabs (B->y) + fabs (Y2);
-    out[2] = fabs (A->phi) + fabs (B->phi) + fabs (k->beta);
-  }
+PER_ELEMENT (weld_g, weld, 3) {
+  out[0] = x.A->x + x.X1 - x.B->x - x.X2;
+  out[1] = x.A->y + x.Y1 - x.B->y - x.Y2;
+  out[2] = x.A->phi - x.B->phi + x.k->beta;
 }
 
-static void weld_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 18) {
-    WELD_PARTS
-    const double J[18] = { 1, 0, -Y1, -1, 0, Y2, 0, 1, X1, 0, -1, -X2, 0, 0, 1, 0, 0, -1 };
-    memcpy (out, J, sizeof J);
-  }
+PER_ELEMENT (weld_g_size, weld, 3) {
+  out[0] = fabs (x.A->x) + fabs (x.X1) + fabs (x.B->x) + fabs (x.X2);
+  out[1] = fabs (x.A->y) + fabs (x.Y1) + fabs (x.B->y) + fabs (x.Y2);
+  out[2] = fabs (x.A->phi) + fabs (x.B->phi) + fabs (x.k->beta);
 }
 
-static void weld_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    WELD_PARTS
-    double w1 = A->omega * A->omega, w2 = B->omega * B->omega;
-    out[0] = X1 * w1 - X2 * w2;
-    out[1] = Y1 * w1 - Y2 * w2;
-    out[2] = 0;
-  }
+PER_ELEMENT (weld_J, weld, 18) {
+  const double J[18] = { 1, 0, -x.Y1, -1, 0, x.Y2, 0, 1, x.X1, 0, -1, -x.X2, 0, 0, 1, 0, 0, -1 };
+  memcpy (out, J, sizeof J);
+}
+
+PER_ELEMENT (weld_gamma, weld, 3) {
+  double w1 = x.A->omega * x.A->omega, w2 = x.B->omega * x.B->omega;
+  out[0] = x.X1 * w1 - x.X2 * w2;
+  out[1] = x.Y1 * w1 - x.Y2 * w2;
+  out[2] = 0;
 }
 
 /* Sets the angle columns of the first two equations in a 3 x 6 block, all other entries to zero. */
@@ -75,28 +69,19 @@ static inline void weld_angles (double *out, double x1, double y1, double x2, do
   out[2] = x1, out[8] = y1, out[5] = x2, out[11] = y2;
 }
 
-static void weld_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 18) {
-    WELD_PARTS
-    double w1 = b->w[6 * e + 2], w2 = b->w[6 * e + 5];
-    weld_angles (out, -X1 * w1, -Y1 * w1, X2 * w2, Y2 * w2);
-  }
+PER_ELEMENT (weld_jw_q, weld, 18) {
+  double w1 = x.w[2], w2 = x.w[5];
+  weld_angles (out, -x.X1 * w1, -x.Y1 * w1, x.X2 * w2, x.Y2 * w2);
 }
 
-static void weld_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 18) {
-    WELD_PARTS
-    double w1 = A->omega * A->omega, w2 = B->omega * B->omega;
-    weld_angles (out, -Y1 * w1, X1 * w1, Y2 * w2, -X2 * w2);
-  }
+PER_ELEMENT (weld_gamma_q, weld, 18) {
+  double w1 = x.A->omega * x.A->omega, w2 = x.B->omega * x.B->omega;
+  weld_angles (out, -x.Y1 * w1, x.X1 * w1, x.Y2 * w2, -x.X2 * w2);
 }
 
-static void weld_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 18) {
-    WELD_PARTS
-    double w1 = 2 * A->omega, w2 = 2 * B->omega;
-    weld_angles (out, X1 * w1, Y1 * w1, -X2 * w2, -Y2 * w2);
-  }
+PER_ELEMENT (weld_gamma_v, weld, 18) {
+  double w1 = 2 * x.A->omega, w2 = 2 * x.B->omega;
+  weld_angles (out, x.X1 * w1, x.Y1 * w1, -x.X2 * w2, -x.Y2 * w2);
 }
 
 static const pw_field weld_fields[] = {

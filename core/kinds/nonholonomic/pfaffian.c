@@ -9,18 +9,28 @@
  * two need not balance; the difference is an external force.  The power is F u. */
 #include <math.h>
 #include <string.h>
-#include "pinwheel.h"
+#include "batch.h"
 
 typedef struct {
   double a[3], b[3];
 } pfaffian;
 
-#define PFAFFIAN_PARTS                                                                                       \
-  const pfaffian *k = (const pfaffian *)b->element + e;                                                      \
-  const pw_configuration *P = &b->configuration[b->body[2 * e]], *Q = &b->configuration[b->body[2 * e + 1]]; \
-  const double Ax = P->cos * k->a[0] - P->sin * k->a[1], Ay = P->sin * k->a[0] + P->cos * k->a[1];           \
-  const double Bx = P->cos * k->b[0] - P->sin * k->b[1], By = P->sin * k->b[0] + P->cos * k->b[1];           \
-  (void)Q
+/* A relation in the current state: A and B in world axes. */
+typedef struct {
+  const pfaffian *k;
+  const pw_configuration *P, *Q;
+  const double *w, *u;
+  double Ax, Ay, Bx, By;
+} pfaffian_state;
+
+static inline pfaffian_state pfaffian_at (const pw_batch *b, int e) {
+  const pfaffian *k = (const pfaffian *)b->element + e;
+  const pw_configuration *P = &b->configuration[b->body[2 * e]], *Q = &b->configuration[b->body[2 * e + 1]];
+  pfaffian_state x = { .k = k, .P = P, .Q = Q, .w = batch_w (b, e), .u = b->u + 3 * e };
+  x.Ax = P->cos * k->a[0] - P->sin * k->a[1], x.Ay = P->sin * k->a[0] + P->cos * k->a[1];
+  x.Bx = P->cos * k->b[0] - P->sin * k->b[1], x.By = P->sin * k->b[0] + P->cos * k->b[1];
+  return x;
+}
 
 static int pfaffian_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
                              pw_error *error) {
@@ -39,44 +49,28 @@ static void pfaffian_eta (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e];
 }
 
-static void pfaffian_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    PFAFFIAN_PARTS;
-    out[0] = Ax, out[1] = Ay, out[2] = k->a[2], out[3] = Bx, out[4] = By, out[5] = k->b[2];
-  }
+PER_ELEMENT (pfaffian_J, pfaffian, 6) {
+  out[0] = x.Ax, out[1] = x.Ay, out[2] = x.k->a[2], out[3] = x.Bx, out[4] = x.By, out[5] = x.k->b[2];
 }
 
-static void pfaffian_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    PFAFFIAN_PARTS;
-    out[e] = b->u[3 * e + 1] - P->omega * (Ax * P->vy - Ay * P->vx + Bx * Q->vy - By * Q->vx);
-  }
+PER_ELEMENT (pfaffian_gamma, pfaffian, 1) {
+  *out = x.u[1] - x.P->omega * (x.Ax * x.P->vy - x.Ay * x.P->vx + x.Bx * x.Q->vy - x.By * x.Q->vx);
 }
 
-static void pfaffian_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    PFAFFIAN_PARTS;
-    const double *w = b->w + 6 * e;
-    memset (out, 0, 6 * sizeof *out);
-    out[2] = Ax * w[1] - Ay * w[0] + Bx * w[4] - By * w[3];
-  }
+PER_ELEMENT (pfaffian_jw_q, pfaffian, 6) {
+  memset (out, 0, 6 * sizeof *out);
+  out[2] = x.Ax * x.w[1] - x.Ay * x.w[0] + x.Bx * x.w[4] - x.By * x.w[3];
 }
 
-static void pfaffian_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    PFAFFIAN_PARTS;
-    memset (out, 0, 6 * sizeof *out);
-    out[2] = P->omega * (Ax * P->vx + Ay * P->vy + Bx * Q->vx + By * Q->vy);
-  }
+PER_ELEMENT (pfaffian_gamma_q, pfaffian, 6) {
+  memset (out, 0, 6 * sizeof *out);
+  out[2] = x.P->omega * (x.Ax * x.P->vx + x.Ay * x.P->vy + x.Bx * x.Q->vx + x.By * x.Q->vy);
 }
 
-static void pfaffian_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 6) {
-    PFAFFIAN_PARTS;
-    double w = P->omega;
-    out[0] = w * Ay, out[1] = -w * Ax, out[2] = Ay * P->vx - Ax * P->vy + By * Q->vx - Bx * Q->vy;
-    out[3] = w * By, out[4] = -w * Bx, out[5] = 0;
-  }
+PER_ELEMENT (pfaffian_gamma_v, pfaffian, 6) {
+  double w = x.P->omega;
+  out[0] = w * x.Ay, out[1] = -w * x.Ax, out[2] = x.Ay * x.P->vx - x.Ax * x.P->vy + x.By * x.Q->vx - x.Bx * x.Q->vy;
+  out[3] = w * x.By, out[4] = -w * x.Bx, out[5] = 0;
 }
 
 static const pw_field pfaffian_fields[] = {

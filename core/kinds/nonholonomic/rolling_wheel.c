@@ -21,12 +21,19 @@ typedef struct {
   double heading;      /* [rad] */
 } rolling;
 
-/* Element e: configuration of the body and rolling direction (c, s). */
-#define ROLLING_PARTS                                                                        \
-  const rolling *k = (const rolling *)b->element + e;                                        \
-  const pw_configuration *A = &b->configuration[b->body[e]];                                 \
-  const double c = A->cos * k->cos - A->sin * k->sin, s = A->sin * k->cos + A->cos * k->sin; \
-  (void)k, (void)A, (void)c, (void)s
+/* A wheel in the current state: rolling direction (c, s) in the world. */
+typedef struct {
+  const rolling *k;
+  const pw_configuration *A;
+  const double *w;
+  double c, s;
+} rolling_state;
+
+static inline rolling_state rolling_at (const pw_batch *b, int e) {
+  const rolling *k = (const rolling *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[e]];
+  return (rolling_state){ k, A, batch_w (b, e), A->cos * k->cos - A->sin * k->sin, A->sin * k->cos + A->cos * k->sin };
+}
 
 /* The spin rate for rolling at the initial velocity of the body. */
 static double rolling_spin_rate (const rolling *k, const pw_body *body) {
@@ -48,20 +55,14 @@ static int rolling_prepare (const void *definition, const pw_body *const *bodies
   return PW_OK;
 }
 
-static void rolling_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 8) {
-    ROLLING_PARTS;
-    out[0] = -s, out[1] = c, out[2] = k->along, out[3] = 0;
-    out[4] = c, out[5] = s, out[6] = -k->aside, out[7] = -k->radius;
-  }
+PER_ELEMENT (rolling_J, rolling, 8) {
+  out[0] = -x.s, out[1] = x.c, out[2] = x.k->along, out[3] = 0;
+  out[4] = x.c, out[5] = x.s, out[6] = -x.k->aside, out[7] = -x.k->radius;
 }
 
-static void rolling_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 2) {
-    ROLLING_PARTS;
-    out[0] = A->omega * (c * A->vx + s * A->vy);
-    out[1] = A->omega * (s * A->vx - c * A->vy);
-  }
+PER_ELEMENT (rolling_gamma, rolling, 2) {
+  out[0] = x.A->omega * (x.c * x.A->vx + x.s * x.A->vy);
+  out[1] = x.A->omega * (x.s * x.A->vx - x.c * x.A->vy);
 }
 
 static void rolling_force (const pw_batch *b, double *out) {
@@ -82,34 +83,22 @@ static inline void rolling_angle (double *out, double first, double second) {
   out[2] = first, out[6] = second;
 }
 
-static void rolling_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 8) {
-    ROLLING_PARTS;
-    double x = b->w[4 * e], y = b->w[4 * e + 1];
-    rolling_angle (out, -c * x - s * y, c * y - s * x);
-  }
+PER_ELEMENT (rolling_jw_q, rolling, 8) {
+  double wx = x.w[0], wy = x.w[1];
+  rolling_angle (out, -x.c * wx - x.s * wy, x.c * wy - x.s * wx);
 }
 
-static void rolling_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 8) {
-    ROLLING_PARTS;
-    rolling_angle (out, A->omega * (c * A->vy - s * A->vx), A->omega * (c * A->vx + s * A->vy));
-  }
+PER_ELEMENT (rolling_gamma_q, rolling, 8) {
+  rolling_angle (out, x.A->omega * (x.c * x.A->vy - x.s * x.A->vx), x.A->omega * (x.c * x.A->vx + x.s * x.A->vy));
 }
 
-static void rolling_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 8) {
-    ROLLING_PARTS;
-    out[0] = A->omega * c, out[1] = A->omega * s, out[2] = c * A->vx + s * A->vy, out[3] = 0;
-    out[4] = A->omega * s, out[5] = -A->omega * c, out[6] = s * A->vx - c * A->vy, out[7] = 0;
-  }
+PER_ELEMENT (rolling_gamma_v, rolling, 8) {
+  out[0] = x.A->omega * x.c, out[1] = x.A->omega * x.s, out[2] = x.c * x.A->vx + x.s * x.A->vy, out[3] = 0;
+  out[4] = x.A->omega * x.s, out[5] = -x.A->omega * x.c, out[6] = x.s * x.A->vx - x.c * x.A->vy, out[7] = 0;
 }
 
-static void rolling_contact (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    const rolling *k = (const rolling *)b->element + e;
-    contact_to_world (&b->configuration[b->body[e]], k->at, k->heading, out);
-  }
+PER_ELEMENT (rolling_contact, rolling, 3) {
+  contact_to_world (x.A, x.k->at, x.k->heading, out);
 }
 
 static const pw_field rolling_fields[] = {

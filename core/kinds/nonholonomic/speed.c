@@ -9,12 +9,8 @@
 #include <math.h>
 #include "contact.h"
 
-static int speed_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                          pw_error *error) {
-  const pw_speed *d = definition;
-  *(contact *)element = contact_make (d->at, d->heading, pw_cos (d->heading), pw_sin (d->heading));
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (speed_prepare, pw_speed, contact) {
+  *k = contact_make (d->at, d->heading, pw_cos (d->heading), pw_sin (d->heading));
 }
 
 static void speed_eta (const pw_batch *b, double *out) {

@@ -16,15 +16,25 @@ typedef struct {
 
 /* A wheel in the current state. */
 typedef struct {
+  const steered *k;
+  const pw_configuration *A;
+  const double *w, *u;
   double c, s;         /* heading in the world */
   double along, aside; /* l, m */
   double turn, rate;   /* u' and w + u' */
 } steered_state;
 
-static inline steered_state steered_at (const steered *k, const pw_configuration *A, const double *u) {
+static inline steered_state steered_at (const pw_batch *b, int e) {
+  const steered *k = (const steered *)b->element + e;
+  const pw_configuration *A = &b->configuration[b->body[e]];
+  const double *u = b->u + 3 * e;
   double c, s;
   pw_sin_cos (u[0], &s, &c);
-  return (steered_state){ .c = A->cos * c - A->sin * s,
+  return (steered_state){ k,
+                          A,
+                          batch_w (b, e),
+                          u,
+                          .c = A->cos * c - A->sin * s,
                           .s = A->sin * c + A->cos * s,
                           .along = k->at[0] * c + k->at[1] * s,
                           .aside = k->at[1] * c - k->at[0] * s,
@@ -32,59 +42,32 @@ static inline steered_state steered_at (const steered *k, const pw_configuration
                           .rate = A->omega + u[1] };
 }
 
-#define STEERED_PARTS                                        \
-  const steered *k = (const steered *)b->element + e;        \
-  const pw_configuration *A = &b->configuration[b->body[e]]; \
-  const steered_state x = steered_at (k, A, b->u + 3 * e)
-
-static int steered_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                            pw_error *error) {
-  const pw_steered_wheel *d = definition;
-  *(steered *)element = (steered){ { d->at[0], d->at[1] } };
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (steered_prepare, pw_steered_wheel, steered) {
+  *k = (steered){ { d->at[0], d->at[1] } };
 }
 
-static void steered_J (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    STEERED_PARTS;
-    out[0] = -x.s, out[1] = x.c, out[2] = x.along;
-  }
+PER_ELEMENT (steered_J, steered, 3) {
+  out[0] = -x.s, out[1] = x.c, out[2] = x.along;
 }
 
-static void steered_gamma (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) {
-    STEERED_PARTS;
-    out[e] = x.rate * (x.c * A->vx + x.s * A->vy) - x.turn * x.aside * A->omega;
-  }
+PER_ELEMENT (steered_gamma, steered, 1) {
+  *out = x.rate * (x.c * x.A->vx + x.s * x.A->vy) - x.turn * x.aside * x.A->omega;
 }
 
-static void steered_jw_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    STEERED_PARTS;
-    out[0] = out[1] = 0, out[2] = -x.c * b->w[3 * e] - x.s * b->w[3 * e + 1];
-  }
+PER_ELEMENT (steered_jw_q, steered, 3) {
+  out[0] = out[1] = 0, out[2] = -x.c * x.w[0] - x.s * x.w[1];
 }
 
-static void steered_gamma_q (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    STEERED_PARTS;
-    out[0] = out[1] = 0, out[2] = x.rate * (x.c * A->vy - x.s * A->vx);
-  }
+PER_ELEMENT (steered_gamma_q, steered, 3) {
+  out[0] = out[1] = 0, out[2] = x.rate * (x.c * x.A->vy - x.s * x.A->vx);
 }
 
-static void steered_gamma_v (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    STEERED_PARTS;
-    out[0] = x.rate * x.c, out[1] = x.rate * x.s, out[2] = x.c * A->vx + x.s * A->vy - x.turn * x.aside;
-  }
+PER_ELEMENT (steered_gamma_v, steered, 3) {
+  out[0] = x.rate * x.c, out[1] = x.rate * x.s, out[2] = x.c * x.A->vx + x.s * x.A->vy - x.turn * x.aside;
 }
 
-static void steered_contact (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    const steered *k = (const steered *)b->element + e;
-    contact_to_world (&b->configuration[b->body[e]], k->at, b->u[3 * e], out);
-  }
+PER_ELEMENT (steered_contact, steered, 3) {
+  contact_to_world (x.A, x.k->at, x.u[0], out);
 }
 
 static const pw_field steered_fields[] = {

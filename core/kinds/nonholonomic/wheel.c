@@ -8,19 +8,12 @@
 #include <math.h>
 #include "contact.h"
 
-static int wheel_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                          pw_error *error) {
-  const pw_wheel *d = definition;
-  *(contact *)element = contact_make (d->at, d->heading, -pw_sin (d->heading), pw_cos (d->heading));
-  (void)bodies, (void)own, (void)error;
-  return PW_OK;
+PREPARE (wheel_prepare, pw_wheel, contact) {
+  *k = contact_make (d->at, d->heading, -pw_sin (d->heading), pw_cos (d->heading));
 }
 
-static void wheel_contact (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++, out += 3) {
-    const contact *k = (const contact *)b->element + e;
-    contact_to_world (&b->configuration[b->body[e]], k->at, k->heading, out);
-  }
+PER_ELEMENT (wheel_contact, contact, 3) {
+  contact_to_world (x.A, x.k->at, x.k->heading, out);
 }
 
 static const pw_field wheel_fields[] = {

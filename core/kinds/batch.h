@@ -1,0 +1,33 @@
+/* Batch functions and `prepare` functions of element types, written for one element. */
+#ifndef PW_BATCH_H
+#define PW_BATCH_H
+
+#include "pinwheel.h"
+
+/* PER_ELEMENT (pin_J, pin, 12) { ... } defines the batch function pin_J.  The body fills `out`, the 12 numbers of one
+ * element, from `x`, a pin_state: the element in its current state, as pin_at (b, e) returns it. */
+#define PER_ELEMENT(function, type, size)                                                   \
+  static inline void function##_one (type##_state x, double *out);                          \
+  static inline void function (const pw_batch *b, double *out) {                            \
+    for (int e = 0; e < b->count; e++, out += size) function##_one (type##_at (b, e), out); \
+  }                                                                                         \
+  static inline void function##_one (type##_state x, double *out)
+
+/* PREPARE (pin_prepare, pw_pin, pin) { ... } defines a `prepare` that cannot fail: it fills `k`, a pin, from the
+ * definition `d`. */
+#define PREPARE(function, definition_type, type)                                                              \
+  static inline void function##_one (const definition_type *d, type *k);                                      \
+  static int function (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own, \
+                       pw_error *error) {                                                                     \
+    (void)bodies, (void)own, (void)error;                                                                     \
+    function##_one (definition, element);                                                                     \
+    return PW_OK;                                                                                             \
+  }                                                                                                           \
+  static inline void function##_one (const definition_type *d, type *k)
+
+/* The vector w of an element; NULL where the batch has none. */
+static inline const double *batch_w (const pw_batch *b, int e) {
+  return b->w ? b->w + e * b->cols : NULL;
+}
+
+#endif
