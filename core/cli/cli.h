@@ -58,6 +58,9 @@ PW_COMMANDS (PW_COMMAND)
   { name, letter, POPT_ARG_ARGV, (void *)offsetof (type, member), 0, help, value }
 #define PW_FLAG_OPTION(type, member, name, help) \
   { name, 0, POPT_ARG_NONE, (void *)offsetof (type, member), 0, help, NULL }
+/* Another name of a text option, without help. */
+#define PW_ALIAS_OPTION(type, member, name) \
+  { name, 0, POPT_ARG_STRING, (void *)offsetof (type, member), 0, NULL, NULL }
 /* A heading of the options that follow. */
 #define PW_OPTION_GROUP(title) \
   { NULL, 0, POPT_ARG_NONE, NULL, 0, title, NULL }

@@ -65,7 +65,7 @@ static void command_help (const pw_command *c, const pw_cli_line *l) {
   for (const struct poptOption *o = c->options; !command_is_end (o); o++)
     if (o->longName == NULL)
       printf ("\n%s:\n", o->descrip);
-    else
+    else if (o->descrip)
       command_option (o);
   const struct poptOption *help = l->table;
   while (help->val != COMMAND_HELP) help++;
@@ -80,7 +80,8 @@ static int command_unknown (const pw_command *c, const pw_cli_line *l, const cha
   const char *name = bad + strspn (bad, "-");
   snprintf (sought, sizeof sought, "%.*s", (int)strcspn (name, "="), name);
   pw_nearest near = { .sought = sought };
-  for (const struct poptOption *o = l->table; o->longName; o++) pw_nearest_try (&near, o->longName);
+  for (const struct poptOption *o = l->table; o->longName; o++)
+    if (o->descrip) pw_nearest_try (&near, o->longName);
   if (near.near)
     snprintf (hint, sizeof hint, "did you mean \"--%s\"?", near.best);
   else

@@ -10,7 +10,7 @@
 enum {
   METHOD,
   LADDER,
-  RUNG,
+  LEVEL,
   STATUS,
   TIME,
   END,
@@ -33,7 +33,7 @@ enum {
 };
 
 /* Rows are run once on the clock, and errors taken against the table that compare_setup makes, where neither matters. */
-#define ONCE " --repeats 1 --truth @/known.csv "
+#define ONCE " --repeats 1 --reference @/known.csv "
 #define SHORT "--repeats 1 --t-end 2 --step-ladder 0.1:0.02 --rtol-ladder 1e-5:1e-7"
 
 /* The cell of a row, from 0, of compare.csv in a folder; no text in quotes comes before it. */
@@ -128,7 +128,7 @@ static void test_uncertain_order (void **state) {
  * second, more repeats follow anyway.) */
 static void test_repeats (void **state) {
   (void)state;
-  cli_good ("pinwheel compare ezyroller --methods rk4+projection -t 2 --truth @/known.csv --step-ladder 4e-6:4e-6 "
+  cli_good ("pinwheel compare ezyroller --methods rk4+projection -t 2 --reference @/known.csv --step-ladder 4e-6:4e-6 "
             "--limit 1000 "
             "-o @/long >@/table");
   assert_true (compare_number ("long/compare.csv", 0, REPEATS) >= 3);
@@ -143,7 +143,7 @@ static void test_row_is_run (void **state) {
     char command[600];
     snprintf (command, sizeof command,
               "pinwheel compare ezyroller --methods %s --t-end 2 --rtol-ladder 1e-6 --step-ladder 0.01 --repeats 2 "
-              "--truth @/known.csv -o @/as-run "
+              "--reference @/known.csv -o @/as-run "
               ">@/table\npinwheel run ezyroller --method %s --t-end 2 --rtol 1e-6 --step 0.01 --json -",
               method[m], method[m]);
     cli_good (command);
@@ -160,12 +160,12 @@ static void test_row_is_run (void **state) {
   }
 }
 
-/* A run's own table as reference: the same method and rung has no error but round-off; another one has that between them. */
-static void test_truth (void **state) {
+/* A run's own table as reference: the same method and level has no error but round-off; another one has that between them. */
+static void test_reference (void **state) {
   (void)state;
-  cli_good (
-      "pinwheel compare ezyroller --methods rk4+projection --truth @/known.csv --repeats 1 --step-ladder 0.05:0.025 "
-      "-o @/t");
+  cli_good ("pinwheel compare ezyroller --methods rk4+projection --reference @/known.csv --repeats 1 --step-ladder "
+            "0.05:0.025 "
+            "-o @/t");
   assert_non_null (strstr (cli_out, "as if it were exact"));
   assert_true (compare_number ("t/compare.csv", 0, TIME) == 2);
   assert_true (compare_number ("t/compare.csv", 0, MOST) > 1e-8);
@@ -173,11 +173,11 @@ static void test_truth (void **state) {
   assert_true (below > 0 && below < 16 * CHECK_EPS); /* an error is no less than is known of it */
   assert_non_null (strstr (compare_cell ("t/compare.csv", 1, BELOW), "largest.length largest.angle"));
   /* a table with some columns compares these alone */
-  cli_good ("cut -d, -f1,4 @/known.csv >@/few.csv && pinwheel compare ezyroller --methods rk4 --truth @/few.csv "
+  cli_good ("cut -d, -f1,4 @/known.csv >@/few.csv && pinwheel compare ezyroller --methods rk4 --reference @/few.csv "
             "--repeats 1 --t-end "
             "1 --step-ladder 0.05 -o @/few");
   cli_good (
-      "cp @/few.csv @/few && pinwheel compare ezyroller --methods rk4 --truth @/few/few.csv --repeats 1 --t-end 1 "
+      "cp @/few.csv @/few && pinwheel compare ezyroller --methods rk4 --reference @/few/few.csv --repeats 1 --t-end 1 "
       "--step-ladder 0.05 -o @/few >@/table"); /* a file of the folder that is not written */
   assert_string_equal (compare_cell ("few/compare.csv", 0, END), "nan");
   assert_true (compare_number ("few/compare.csv", 0, END + 1) > 0);
@@ -216,7 +216,7 @@ static void test_multiplier_scale (void **state) {
 }
 
 /* The reference of its own making agrees with digits computed in quadruple precision (tests/reference) as far as it claims. */
-static void test_own_truth (void **state) {
+static void test_own_reference (void **state) {
   (void)state;
   const double x[3] = { 0.122485077560987708, -0.0509563103339871023, -0.0717230785643341303 };
   cli_good ("pinwheel compare ezyroller --methods rk4 --step-ladder 0.1 --t-end 2 --repeats 1 -o @/own >@/table && "
@@ -244,6 +244,18 @@ static void test_all (void **state) {
   int methods = 0, rows = 0;
   assert_int_equal (sscanf (cli_out, "%d %d", &methods, &rows), 2);
   assert_int_equal (methods, rows);
+}
+
+/* The former name of an option still works, but is not documented. */
+static void test_alias (void **state) {
+  (void)state;
+  cli_good ("pinwheel compare ezyroller --methods rk4 --truth @/known.csv --repeats 1 --step-ladder 0.1");
+  assert_non_null (strstr (cli_out, "known.csv, as if it were exact"));
+  cli_good ("pinwheel run ezyroller -t 2 --truth @/known.csv --json - | grep known.csv");
+  cli_good ("pinwheel compare --help && pinwheel run --help");
+  assert_non_null (strstr (cli_out, "--reference=FILE.csv"));
+  assert_null (strstr (cli_out, "--truth"));
+  cli_bad ("pinwheel compare ezyroller --truht x", 2, "compare has no option \"--truht\"; see pinwheel compare --help");
 }
 
 static void test_limit (void **state) {
@@ -304,14 +316,14 @@ static void test_bad (void **state) {
     { "ezyroller --step-ladder 0:1", "--step-ladder 0: expected a number > 0" },
     { "ezyroller --step-ladder 1:1e-40", "--step-ladder 1:1e-40: too long a ladder" },
     { "ezyroller --set m=1", "model ezyroller has no parameter \"m\"; did you mean \"m1\"?" },
-    { "ezyroller --truth @/none.csv", "--truth @/none.csv: cannot be read: No such file or directory" },
-    { "ezyroller --truth @/empty.csv", "--truth @/empty.csv: the file is empty" },
-    { "ezyroller --truth @/x.csv", "--truth @/x.csv: the first column is \"x\", expected \"t [s]\"" },
-    { "ezyroller --truth @/y.csv", "--truth @/y.csv: no column is a state of this model, such as \"frame.x\"" },
-    { "ezyroller --truth @/z.csv", "--truth @/z.csv: line 2: \"one\" is not a number" },
-    { "ezyroller --truth @/back.csv", "--truth @/back.csv: line 3: times must increase" },
-    { "ezyroller --truth @/short.csv --t-end 2",
-      "--truth @/short.csv: no row at the final time, t = 2 s; the last one before it is at 1 s" },
+    { "ezyroller --reference @/none.csv", "--reference @/none.csv: cannot be read: No such file or directory" },
+    { "ezyroller --reference @/empty.csv", "--reference @/empty.csv: the file is empty" },
+    { "ezyroller --reference @/x.csv", "--reference @/x.csv: the first column is \"x\", expected \"t [s]\"" },
+    { "ezyroller --reference @/y.csv", "--reference @/y.csv: no column is a state of this model, such as \"frame.x\"" },
+    { "ezyroller --reference @/z.csv", "--reference @/z.csv: line 2: \"one\" is not a number" },
+    { "ezyroller --reference @/back.csv", "--reference @/back.csv: line 3: times must increase" },
+    { "ezyroller --reference @/short.csv --t-end 2",
+      "--reference @/short.csv: no row at the final time, t = 2 s; the last one before it is at 1 s" },
   };
   cli_write ("empty.csv", "");
   cli_write ("x.csv", "x,t\n0,0\n");
@@ -332,14 +344,14 @@ static int compare_setup (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_rows),     cmocka_unit_test (test_orders),
-    cmocka_unit_test (test_no_order), cmocka_unit_test (test_uncertain_order),
-    cmocka_unit_test (test_repeats),  cmocka_unit_test (test_row_is_run),
-    cmocka_unit_test (test_truth),    cmocka_unit_test (test_own_truth),
-    cmocka_unit_test (test_jump),     cmocka_unit_test (test_multiplier_scale),
-    cmocka_unit_test (test_all),      cmocka_unit_test (test_limit),
-    cmocka_unit_test (test_failure),  cmocka_unit_test (test_interrupt),
-    cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_rows),      cmocka_unit_test (test_orders),
+    cmocka_unit_test (test_no_order),  cmocka_unit_test (test_uncertain_order),
+    cmocka_unit_test (test_repeats),   cmocka_unit_test (test_row_is_run),
+    cmocka_unit_test (test_reference), cmocka_unit_test (test_own_reference),
+    cmocka_unit_test (test_jump),      cmocka_unit_test (test_multiplier_scale),
+    cmocka_unit_test (test_all),       cmocka_unit_test (test_limit),
+    cmocka_unit_test (test_failure),   cmocka_unit_test (test_interrupt),
+    cmocka_unit_test (test_bad),       cmocka_unit_test (test_alias),
   };
   return cmocka_run_group_tests (tests, compare_setup, cli_teardown);
 }

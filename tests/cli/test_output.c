@@ -37,9 +37,9 @@ static void test_uses (void **state) {
     { "run ./car.yaml --checkpoint hard.csv", "--checkpoint hard.csv would overwrite the model, @/u/car.yaml" },
     { "run ./table.yaml -o M.csv", "-o M.csv would overwrite a table of the model, @/u/M.csv" },
     { "run ./table.yaml --json ./M.csv", "--json ./M.csv would overwrite a table of the model, @/u/M.csv" },
-    { "run ezyroller -o M.csv --truth ./M.csv", "-o M.csv would overwrite --truth, ./M.csv" },
+    { "run ezyroller -o M.csv --reference ./M.csv", "-o M.csv would overwrite --reference, ./M.csv" },
     { "run ezyroller --plots D --json D/energy.dat", "--plots D would overwrite --json, D/energy.dat" },
-    { "compare ezyroller -o D --truth D/compare.csv", "-o D would overwrite --truth, D/compare.csv" },
+    { "compare ezyroller -o D --reference D/compare.csv", "-o D would overwrite --reference, D/compare.csv" },
     { "sweep ./car.yaml --vary m=1,2 -o car.yaml", "-o car.yaml would overwrite the model, @/u/car.yaml" },
     { "sweep ./table.yaml --vary a.x=1,2 -o M.csv", "-o M.csv would overwrite a table of the model, @/u/M.csv" },
     { "sweep --merge M.csv -o ./M.csv", "-o ./M.csv would overwrite the part, M.csv" },
@@ -243,10 +243,10 @@ static void test_types (void **state) {
     { "run @/r/z.yaml", "cannot open the model file @/r/z.yaml" OUTPUT_ZERO },
     { "run @/r/D", "cannot open the model file @/r/D" OUTPUT_FOLDER },
     { "run /dev/zero", "cannot open the model file /dev/zero" OUTPUT_ZERO },
-    { "run ezyroller -t 1 --truth @/r/pipe", "--truth @/r/pipe: cannot be read" OUTPUT_PIPE },
-    { "run ezyroller -t 1 --truth @/r/pipe --checkpoint @/r/c", "cannot read @/r/pipe" OUTPUT_PIPE },
-    { "run ezyroller -t 1 --truth /dev/zero", "--truth /dev/zero: cannot be read" OUTPUT_ZERO },
-    { "run ezyroller -t 1 --truth @/r/D", "--truth @/r/D: cannot be read" OUTPUT_FOLDER },
+    { "run ezyroller -t 1 --reference @/r/pipe", "--reference @/r/pipe: cannot be read" OUTPUT_PIPE },
+    { "run ezyroller -t 1 --reference @/r/pipe --checkpoint @/r/c", "cannot read @/r/pipe" OUTPUT_PIPE },
+    { "run ezyroller -t 1 --reference /dev/zero", "--reference /dev/zero: cannot be read" OUTPUT_ZERO },
+    { "run ezyroller -t 1 --reference @/r/D", "--reference @/r/D: cannot be read" OUTPUT_FOLDER },
     { "run ezyroller -t 1 --resume @/r/pipe", "cannot read the checkpoint @/r/pipe" OUTPUT_PIPE },
     { "sweep --merge @/r/pipe -o @/r/m.csv", "cannot open the part @/r/pipe" OUTPUT_PIPE },
     { "sweep --merge /dev/zero -o @/r/m.csv", "cannot open the part /dev/zero" OUTPUT_ZERO },
@@ -278,10 +278,10 @@ static void test_bounded (void **state) {
   assert_non_null (strstr (cli_err, "nested too deeply"));
   assert_int_equal (cli_run (OUTPUT_LESS "show @/wide.yaml"), 2);
   assert_non_null (strstr (cli_err, "wide.yaml:1:1: error: a list or map in brackets with more than 1e+06 commas"));
-  cli_bad (OUTPUT_LESS "run ezyroller --truth @/line.csv", 2,
-           "--truth @/line.csv: cannot be read: line 1 has more than 16 MB");
-  cli_bad ("pinwheel run ezyroller --truth @/zero.csv", 2,
-           "--truth @/zero.csv: cannot be read: a table is text, and this has a byte 0");
+  cli_bad (OUTPUT_LESS "run ezyroller --reference @/line.csv", 2,
+           "--reference @/line.csv: cannot be read: line 1 has more than 16 MB");
+  cli_bad ("pinwheel run ezyroller --reference @/zero.csv", 2,
+           "--reference @/zero.csv: cannot be read: a table is text, and this has a byte 0");
   cli_bad ("ulimit -v 2000000; pinwheel sweep pendulum -t 0.1 --vary l=lin:1:2:9999 --jobs 9999 -o @/many.csv "
            "2>@/err9; s=$?; "
            "sed 's/only [0-9]*/only N/; s/jobs [0-9]*/jobs N/; s/N: .*;/N;/' @/err9 >&2; exit $s",

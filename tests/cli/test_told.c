@@ -26,7 +26,7 @@ static void test_roller (void **state) {
 static void test_reactions (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.5 -o @/truth.csv >@/log && "
-                             "pinwheel run pendulum --t-end 0.5 --step 2e-3 --truth @/truth.csv"),
+                             "pinwheel run pendulum --t-end 0.5 --step 2e-3 --reference @/truth.csv"),
                     0);
   told_shows ("\n  reactions ");
   told_shows (" of the largest\n");

@@ -82,7 +82,7 @@ static void test_run (void **state) {
   mode_t before = umask (027); /* the file that is replaced has another mode than a new one */
   faults_from ("cp @/whole/a.csv @/start/a.csv", "run ezyroller --t-end 0.02 -o @/o/a.csv");
   umask (before);
-  faults_from ("cp @/whole/a.csv @/truth.csv", "run ezyroller --t-end 0.02 --truth @/truth.csv");
+  faults_from ("cp @/whole/a.csv @/truth.csv", "run ezyroller --t-end 0.02 --reference @/truth.csv");
 }
 
 #define FAULTS_RUN "run ezyroller --t-end 0.01 --step 0.001 --checkpoint-every 0.005 -o @/o/a.csv "

@@ -144,34 +144,34 @@ static void test_table (void **state) {
   truth_write_c ("0");
   cli_write ("table.csv", "t [s],one.x [m],two.phi [rad],nothing\n0,0,0,0\n0.25,0.5,0,0\n0.5,1.125,0,0\n0.75,1.5,0,0\n"
                           "3,6,0,0\n");
-  cli_good ("pinwheel run @/particles.c --truth @/table.csv --json -");
+  cli_good ("pinwheel run @/particles.c --reference @/table.csv --json -");
   check_close ("samples", cli_number (cli_out, "truth", "samples", NULL), 3, 0, "exact");
   check_close ("last", cli_number (cli_out, "truth", "t", NULL), 0.75, 0, "exact");
   check_close ("largest", truth_error ("largest", "length"), 0.125, 1e-14, "round-off");
   check_close ("end", truth_error ("end", "length"), 0, 1e-14, "round-off");
   check_close ("angle", truth_error ("largest", "angle"), 0, 0, "exact");
-  cli_good ("pinwheel run @/particles.c --truth @/table.csv");
+  cli_good ("pinwheel run @/particles.c --reference @/table.csv");
   truth_shows ("table.csv, at 3 times\n");
   cli_write ("units.csv", "t [ms],one.x [mm],two.phi[deg]\n250,500,0\n500,1125,0\n750,1500,0\n");
-  cli_good ("pinwheel run @/particles.c --truth @/units.csv --json -");
+  cli_good ("pinwheel run @/particles.c --reference @/units.csv --json -");
   check_close ("last", cli_number (cli_out, "truth", "t", NULL), 0.75, 0, "exact");
   check_close ("largest", truth_error ("largest", "length"), 0.125, 1e-14, "round-off");
   cli_write ("unit.csv", "t [s],one.x [deg]\n1,0\n");
-  cli_bad (
-      "pinwheel run @/particles.c --truth @/unit.csv", 2,
-      "--truth @/unit.csv: column \"one.x [deg]\": the unit \"deg\" does not measure what m does, which is expected");
+  cli_bad ("pinwheel run @/particles.c --reference @/unit.csv", 2,
+           "--reference @/unit.csv: column \"one.x [deg]\": the unit \"deg\" does not measure what m does, which is "
+           "expected");
   cli_write ("unit.csv", "t [s],one.x [cubit]\n1,0\n");
-  cli_bad ("pinwheel compare @/particles.c --methods rk4 --truth @/unit.csv", 2,
-           "--truth @/unit.csv: column \"one.x [cubit]\": the unit \"cubit\" is not known; expected m, or one that "
+  cli_bad ("pinwheel compare @/particles.c --methods rk4 --reference @/unit.csv", 2,
+           "--reference @/unit.csv: column \"one.x [cubit]\": the unit \"cubit\" is not known; expected m, or one that "
            "converts to it");
   cli_write ("unit.csv", "t [m],one.x\n1,0\n");
-  cli_bad ("pinwheel run @/particles.c --truth @/unit.csv", 2,
-           "--truth @/unit.csv: column \"t [m]\": the unit \"m\" does not measure what s does, which is expected");
+  cli_bad ("pinwheel run @/particles.c --reference @/unit.csv", 2,
+           "--reference @/unit.csv: column \"t [m]\": the unit \"m\" does not measure what s does, which is expected");
   cli_write ("late.csv", "t,one.x\n3,6\n");
-  cli_bad ("pinwheel run @/particles.c --truth @/late.csv", 2,
-           "--truth @/late.csv: no row between 0 and the final time, t = 1 s");
-  cli_bad ("pinwheel run @/particles.c --truth @/none.csv", 2,
-           "--truth @/none.csv: cannot be read: No such file or directory");
+  cli_bad ("pinwheel run @/particles.c --reference @/late.csv", 2,
+           "--reference @/late.csv: no row between 0 and the final time, t = 1 s");
+  cli_bad ("pinwheel run @/particles.c --reference @/none.csv", 2,
+           "--reference @/none.csv: cannot be read: No such file or directory");
 }
 
 /* Models of the gallery, with parameters of their own as well: what they know is what they do, to the method's order. */
@@ -223,7 +223,7 @@ static void test_elliptic (void **state) {
 /* Digits at one time: Andrews' squeezer against the table in tests/reference (Hairer & Wanner 1996, section VII.7). */
 static void test_digits (void **state) {
   (void)state;
-  cli_good ("pinwheel run andrews-squeezer --truth tests/reference/andrews-squeezer.csv --json -");
+  cli_good ("pinwheel run andrews-squeezer --reference tests/reference/andrews-squeezer.csv --json -");
   check_close ("samples", cli_number (cli_out, "truth", "samples", NULL), 1, 0, "one row");
   check_below ("angles", truth_error ("end", "angle"), 1e-6, "100 (h w)^4 at h = 10 us and w = 1000 rad/s");
 }

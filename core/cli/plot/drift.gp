@@ -2,6 +2,10 @@
 # ---- Drift: residuals and energy balance, a panel each ----
 
 data = name.'.dat'
+logarithmic = name ne 'drift'
+title = name eq 'drift' ? 'drift of the constraints and the energy' : name eq 'drift-baumgarte' ? \
+  "largest drift by Baumgarte's parameters" : 'largest drift by the interval between projections'
+label_of_x = name eq 'drift' ? 't [s]' : name eq 'drift-baumgarte' ? 'alpha [1/s]' : 'steps per projection (every)'
 left = 104.0
 columns = max(1, int((width - left - right + 8)/(80 + 8.0*max(longest, 15))))
 top = 46 + 22*((methods + columns - 1)/columns)

@@ -102,21 +102,6 @@ void pw_figure_element (FILE *f, const char *name, int i, const char *value) {
   pw_figure_text (f, variable, value);
 }
 
-void pw_figure_methods (FILE *f, int count, int spread) {
-  pw_figure_number (f, "methods", count);
-  pw_figure_number (f, "spread", spread);
-  pw_figure_array (f, "label", count);
-  pw_figure_array (f, "stabilisation", count);
-}
-
-void pw_figure_method (FILE *f, int i, const char *label, const char *method) {
-  const pw_method *integrator;
-  int stabilisation;
-  int known = method && pw_method_parse (method, &integrator, &stabilisation, NULL) == PW_OK;
-  pw_figure_element (f, "label", i, label);
-  pw_figure_element (f, "stabilisation", i, known ? integrator->stabilisations[stabilisation].name : "");
-}
-
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error) {
   int k = 0;
   while (strcmp (figure_template[k].name, template_name) != 0) k++;

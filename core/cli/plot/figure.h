@@ -29,10 +29,6 @@ void pw_figure_text (FILE *f, const char *variable, const char *value);
 /* Elements of an array: "array NAME[COUNT]" first, then each element as a variable "NAME[1]" .... */
 void pw_figure_array (FILE *f, const char *name, int count);
 void pw_figure_element (FILE *f, const char *name, int i, const char *value);
-/* Methods, with distinct marks if `spread`: the declaration first, then each from 1; method NULL for a line that is not
- * a method. */
-void pw_figure_methods (FILE *f, int count, int spread);
-void pw_figure_method (FILE *f, int i, const char *label, const char *method);
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
 
 /* Runs gnuplot on NAME.gp for each of at most FIGURE_SCRIPTS names, a list ended by NULL; a missing gnuplot is reported

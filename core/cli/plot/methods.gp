@@ -1,7 +1,9 @@
 
 # ---- Methods: a colour and a mark for each integrator, a dash for each stabilisation ----
-# With `spread`, a mark for each method, at points of its own.  Lines that are no methods have no stabilisation: each is unlike
+# Against time, a mark for each method, at points of its own.  Lines that are no methods have no stabilisation: each is unlike
 # the others.
+
+spread = name eq 'drift'
 
 array number[methods]
 numbers = 0

@@ -2,6 +2,10 @@
 # ---- Work-precision diagram: error against CPU time and against evaluations, a line for each method ----
 
 data = 'work-precision.dat'
+angles = name eq 'work-precision-angles'
+title = 'work-precision diagram'.(angles ? ' of angles' : '')
+label_of_error = angles ? 'largest error of an angle [rad]' : 'largest error of a coordinate [m]'
+column_of_error = angles ? 5 : 4
 width = 1000.0
 left = 84.0
 columns = max(1, int((width - left)/(76 + 8.0*longest)))

@@ -73,7 +73,7 @@ static char *file_cell (char **rest) {
 
 static int file_number (const file_reader *in, const char *cell, double *value, pw_error *error) {
   if (pw_read_number (cell, value) == PW_OK) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--truth %s: line %ld: \"%.60s\" is not a number", in->path, in->number, cell);
+  return pw_fail (error, PW_INPUT, "--reference %s: line %ld: \"%.60s\" is not a number", in->path, in->number, cell);
 }
 
 /* ---- Columns ---- */
@@ -95,7 +95,7 @@ static int file_place (const pw_system *s, const char *name, size_t n, double *s
 static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
   char example[300], unit[260], *rest;
   int n = pw_system_coordinates (s);
-  if (!file_line (in)) return pw_fail (error, PW_INPUT, "--truth %s: the file is empty", in->path);
+  if (!file_line (in)) return pw_fail (error, PW_INPUT, "--reference %s: the file is empty", in->path);
   for (const char *c = in->line; *c; c++) in->columns += *c == ',';
   in->place = calloc ((size_t)in->columns + 1, sizeof *in->place);
   in->sign = calloc ((size_t)in->columns + 1, sizeof *in->sign);
@@ -103,9 +103,10 @@ static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
   rest = in->line;
   const char *first = file_cell (&rest);
   if (pw_unit_split (first, unit, sizeof unit) != 1 || *first != 't')
-    return pw_fail (error, PW_INPUT, "--truth %s: the first column is \"%.60s\", expected \"t [s]\"", in->path, first);
+    return pw_fail (error, PW_INPUT, "--reference %s: the first column is \"%.60s\", expected \"t [s]\"", in->path,
+                    first);
   if (pw_unit_check (first, "s", &in->second, unit, sizeof unit) != PW_OK)
-    return pw_fail (error, PW_INPUT, "--truth %s: %s", in->path, unit);
+    return pw_fail (error, PW_INPUT, "--reference %s: %s", in->path, unit);
   for (int i = 0; i < in->columns; i++) {
     const char *cell = file_cell (&rest);
     double factor = 1;
@@ -115,11 +116,11 @@ static int file_columns (file_reader *in, const pw_system *s, pw_error *error) {
                          : in->place[i] < 2 * n ? pw_system_state_unit (s, in->place[i])
                                                 : pw_system_reaction_unit (s, in->place[i] - 2 * n);
     if (in->place[i] >= 0 && pw_unit_check (cell, wanted, &factor, unit, sizeof unit) != PW_OK)
-      return pw_fail (error, PW_INPUT, "--truth %s: %s", in->path, unit);
+      return pw_fail (error, PW_INPUT, "--reference %s: %s", in->path, unit);
     in->sign[i] *= factor;
   }
   if (in->known) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--truth %s: no column is a state of this model, such as \"%s\"", in->path,
+  return pw_fail (error, PW_INPUT, "--reference %s: no column is a state of this model, such as \"%s\"", in->path,
                   pw_system_state_name (s, 0, example, sizeof example));
 }
 
@@ -141,7 +142,7 @@ static int file_count (file_reader *in, double *t_end, int whole, int *rows, pw_
   int status;
   for (*rows = 0; (status = file_time (in, &rest, &t, error)) == PW_OK;) {
     if (!(t > before))
-      return pw_fail (error, PW_INPUT, "--truth %s: line %ld: times must increase", in->path, in->number);
+      return pw_fail (error, PW_INPUT, "--reference %s: line %ld: times must increase", in->path, in->number);
     before = t;
     if (t <= 0 || (*t_end > 0 && t > *t_end * (1 + FILE_SAME))) continue;
     last = t;
@@ -151,11 +152,12 @@ static int file_count (file_reader *in, double *t_end, int whole, int *rows, pw_
   if (*t_end == 0) *t_end = last;
   char end[32], reached[32];
   if (*rows == 0 && !whole)
-    return pw_fail (error, PW_INPUT, "--truth %s: no row between 0 and the final time, t = %s s", in->path,
+    return pw_fail (error, PW_INPUT, "--reference %s: no row between 0 and the final time, t = %s s", in->path,
                     pw_format (end, *t_end, 9));
   if (*rows > 0 && (!whole || fabs (last - *t_end) <= FILE_SAME * *t_end)) return PW_OK;
-  return pw_fail (error, PW_INPUT, "--truth %s: no row at the final time, t = %s s; the last one before it is at %s s",
-                  in->path, pw_format (end, *t_end, 9), pw_format (reached, last, 9));
+  return pw_fail (error, PW_INPUT,
+                  "--reference %s: no row at the final time, t = %s s; the last one before it is at %s s", in->path,
+                  pw_format (end, *t_end, 9), pw_format (reached, last, 9));
 }
 
 static int file_row (file_reader *in, char *rest, double *x, int width, pw_error *error) {
@@ -201,9 +203,9 @@ static int file_read (file_reader *in, pw_motion *m, const pw_system *s, double 
 
 static int file_failed (const file_reader *in, pw_error *error) {
   char line[60];
-  if (in->failed == ENOMEM) return pw_fail (error, PW_RESOURCE, "--truth %s: out of memory", in->path);
+  if (in->failed == ENOMEM) return pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", in->path);
   snprintf (line, sizeof line, "line %ld has more than %d MB", in->number + 1, FILE_LINE >> 20);
-  return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", in->path,
+  return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: %s", in->path,
                   in->failed == EOVERFLOW ? line
                   : in->failed == EILSEQ  ? "a table is text, and this has a byte 0"
                                           : strerror (in->failed));
@@ -212,8 +214,8 @@ static int file_failed (const file_reader *in, pw_error *error) {
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error) {
   const char *why;
   file_reader in = { .path = path, .f = pw_open_input (path, &why) };
-  if (in.f == NULL && errno == ENOMEM) return pw_fail (error, PW_RESOURCE, "--truth %s: out of memory", path);
-  if (in.f == NULL) return pw_fail (error, PW_INPUT, "--truth %s: cannot be read: %s", path, why);
+  if (in.f == NULL && errno == ENOMEM) return pw_fail (error, PW_RESOURCE, "--reference %s: out of memory", path);
+  if (in.f == NULL) return pw_fail (error, PW_INPUT, "--reference %s: cannot be read: %s", path, why);
   pw_error own = { 0 };
   file_read (&in, m, s, t_end, whole, &own);
   if (in.failed) own = (pw_error){ 0 }; /* after a read error the file is not reported as empty or incomplete */

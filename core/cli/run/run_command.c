@@ -23,7 +23,7 @@ static int run_uses (run *x, pw_error *error) {
   const pw_checkpoints *c = &x->check;
   int alike = c->resume && c->path && strcmp (c->resume, c->path) == 0;
   pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "--truth", x->reference_path, PW_READS, NULL },
+                   { "--reference", x->reference_path, PW_READS, NULL },
                    { "--resume", alike ? NULL : c->resume, c->path ? PW_READS : PW_WRITES, NULL },
                    { "--checkpoint", c->path, PW_WRITES, NULL },
                    { "-o", x->csv_path, PW_WRITES, NULL },
@@ -331,8 +331,9 @@ static const struct poptOption run_options[] = {
   PW_TEXT_OPTION (run, plots_path, "plots", 0, "DIR", "Draw figures into a folder"),
   PW_TEXT_OPTION (run, animate_path, "animate", 0, "FILE.html", "Write an animation as a page for web browsers"),
   PW_FLAG_OPTION (run, energy, "energy", "Show energies, work and losses"),
-  PW_TEXT_OPTION (run, reference_path, "truth", 0, "FILE.csv",
+  PW_TEXT_OPTION (run, reference_path, "reference", 0, "FILE.csv",
                   "Measure errors against this table, with columns as in -o, instead of the model's exact solution"),
+  PW_ALIAS_OPTION (run, reference_path, "truth"),
   PW_FLAG_OPTION (run, profile, "profile", "Measure the cost of each element type and each stage after the run"),
   PW_OPTION_GROUP ("Checkpoints"),
   PW_TEXT_OPTION (run, check.path, "checkpoint", 0, "FILE", "Save the state regularly, so that the run can be resumed"),

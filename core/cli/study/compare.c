@@ -3,13 +3,102 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "compare.h"
+#include "reference.h"
 
+enum { COMPARE_REPEATS = 99 };
 #define COMPARE_FEW 3      /* timed runs at least, unless the limit forbids it; */
 #define COMPARE_ENOUGH 0.5 /* more until they have taken this long [s] */
 #define COMPARE_FINER 1.2  /* ratio of the numbers of steps that shows an order */
 #define COMPARE_CLEAR 10   /* times the reference's uncertainty: halved steps then show an order to log2 1.1 = 0.14 */
 #define COMPARE_AGREE 0.1  /* of an order: the largest difference of the last two in the asymptotic range */
+
+typedef struct {
+  pw_study study;
+  const char *rtol_text, *step_text, *repeats_text;
+  double finest_step; /* of the ladder [s] */
+  double repeats;     /* timed runs of a row, at most */
+  pw_reference reference;
+  pw_motion scratch; /* of the row being measured */
+} pw_compare;
+
+/* ---- Columns ---- */
+
+enum {
+  COLUMN_LEVEL = 2,
+  COLUMN_T = 4,
+  COLUMN_ERROR,
+  COLUMN_ORDER = COLUMN_ERROR + MOTION_ERRORS + 1,
+  COLUMN_COST,
+  COLUMN_REPEATS = COLUMN_COST + 11
+};
+
+static const char *compare_ladder (const pw_row *r, char text[STUDY_NAME]) {
+  (void)text;
+  return r->adaptive ? "rtol" : "step";
+}
+
+static const char *compare_below (const pw_row *r, char text[STUDY_NAME]);
+
+static const pw_study_column compare_columns[] = {
+  { "method", .text = pw_study_method },
+  { "ladder", .text = compare_ladder },
+  { "rung", NULL, "or step", 10, .format = "%.4g" },
+  { "status", .text = pw_study_status },
+  { "t", .unit = "s" },
+  { "end.length", "m", "m", 10, .format = "%.1e" },
+  { "end.angle", "rad", "rad", 10, .format = "%.1e" },
+  { "end.speed", .unit = "m/s" },
+  { "end.rate", .unit = "rad/s" },
+  { "largest.length", "m", "m", 10, .format = "%.1e" },
+  { "largest.angle", "rad", "rad", 10, .format = "%.1e" },
+  { "largest.speed", .unit = "m/s" },
+  { "largest.rate", .unit = "rad/s" },
+  { "multiplier", NULL, "multipl.", 10, .format = "%.1e" },
+  { "below", .text = compare_below },
+  { "order", NULL, "order", 6, .format = "%.1f" },
+  { "residual.position", NULL, "position", 10, .format = "%.1e" },
+  { "residual.velocity", NULL, "velocity", 9, .format = "%.1e" },
+  { "balance", "J", "energy J", 10, .format = "%.1e" },
+  { "steps", NULL, "steps", 10, .format = "%.0f" },
+  { .name = "rejected" },
+  { "rhs", NULL, "evaluat.", 10, .format = "%.0f" },
+  { "jacobians", NULL, "Jacob.", 8, .format = "%.0f" },
+  { "factorisations", NULL, "factor.", 9, .format = "%.0f" },
+  { "cpu", "s", "median s", 10, .format = "%.2e" },
+  { "spread", .unit = "s" },
+  { NULL, NULL, "spread", 7, .format = "%.0f %%" },
+  { .name = "repeats" },
+  { .name = NULL },
+};
+
+/* The names of errors below the uncertainty of the reference. */
+static const char *compare_below (const pw_row *r, char text[STUDY_NAME]) {
+  *text = 0;
+  for (int i = COLUMN_ERROR; i < COLUMN_ERROR + MOTION_ERRORS; i++)
+    if (r->below >> i & 1) strcat (strcat (text, *text ? " " : ""), compare_columns[i].name);
+  return text;
+}
+
+/* Fills the columns that are known of every row that has been run, and its point in the figures. */
+static void compare_fill (pw_row *r) {
+  const pw_statistics *s = &r->statistics;
+  const double *error = &r->value[COLUMN_ERROR];
+  const double cost[] = { s->position,
+                          s->velocity,
+                          r->balance,
+                          (double)s->steps,
+                          (double)s->rejected,
+                          (double)s->rhs,
+                          (double)s->jacobians,
+                          (double)s->factorisations,
+                          r->cpu };
+  r->value[COLUMN_T] = r->t;
+  memcpy (&r->value[COLUMN_COST], cost, sizeof cost);
+  if (r->state != ROW_DONE) return;
+  const double point[STUDY_COORDINATES] = { r->level, r->cpu, (double)s->rhs, error[MOTION_MOST + MOTION_LENGTH],
+                                            error[MOTION_MOST + MOTION_ANGLE] };
+  memcpy (r->point, point, sizeof point);
+}
 
 /* ---- Ladders ---- */
 
@@ -44,20 +133,22 @@ static double ladder_level (ladder l, int adaptive, int i) {
 
 /* A row for each level of each method. */
 static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) {
-  int levels[2] = { 0, 0 }, rows = 0;
-  for (int k = 0; k < 2; k++)
-    while (ladder_level (of[k], k, levels[k]) > 0) levels[k]++;
-  for (int i = 0; i < x->methods.count; i++) rows += levels[x->methods.method[i].adaptive];
-  int status = pw_study_allocate (x, rows, error);
-  for (int i = 0; status == PW_OK && i < x->methods.count; i++) {
-    const pw_study_method *m = &x->methods.method[i];
-    for (int k = 0; k < levels[m->adaptive]; k++) {
-      pw_row *r = &x->row[x->rows++];
-      *r = (pw_row){ .line = i, .adaptive = m->adaptive, .level = ladder_level (of[m->adaptive], m->adaptive, k) };
-      strcpy (r->method, m->name);
+  const pw_method *integrator;
+  int stabilisation;
+  for (int i = 0; i < x->methods; i++) {
+    int adaptive = pw_method_parse (x->method[i], &integrator, &stabilisation, NULL) == PW_OK &&
+                   pw_cli_adaptive (integrator, x->method[i]);
+    double level;
+    for (int k = 0; (level = ladder_level (of[adaptive], adaptive, k)) > 0; k++) {
+      pw_row *r = pw_study_add (x, x->method[i], 1, error);
+      if (r == NULL) return PW_RESOURCE;
+      r->line = i;
+      r->adaptive = adaptive;
+      r->level = r->value[COLUMN_LEVEL] = level;
+      r->value[COLUMN_REPEATS] = 0;
     }
   }
-  return status;
+  return PW_OK;
 }
 
 static int compare_plan (pw_study *s, pw_error *error) {
@@ -72,7 +163,7 @@ static int compare_plan (pw_study *s, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--repeats", x->repeats_text, PW_COUNT, &x->repeats, error);
   if (status == PW_OK && x->repeats > COMPARE_REPEATS)
     return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", x->repeats_text, COMPARE_REPEATS);
-  if (status == PW_OK) status = pw_study_methods_read (&s->methods, s->methods_text ? s->methods_text : "all", error);
+  if (status == PW_OK) status = pw_study_read_methods (s, s->methods_text ? s->methods_text : "all", error);
   if (status == PW_OK) status = ladder_read ("--step-ladder", x->step_text, &of[0], error);
   if (status == PW_OK) status = ladder_read ("--rtol-ladder", x->rtol_text, &of[1], error);
   x->finest_step = of[0].to;
@@ -81,21 +172,17 @@ static int compare_plan (pw_study *s, pw_error *error) {
 
 /* ---- A row ---- */
 
-static void compare_unknown (pw_row *r) {
-  for (int i = 0; i < MOTION_ERRORS; i++) r->error[i] = NAN;
-  r->balance = r->spread = r->order = NAN;
-}
-
 /* An error below the uncertainty of the reference is no larger than that. */
 static void compare_errors (pw_compare *x, pw_row *r) {
   const pw_reference *reference = &x->reference;
+  double *error = &r->value[COLUMN_ERROR];
   if (!reference->known) return;
-  pw_motion_distance (x->study.m.system, &reference->motion, &x->scratch, r->error);
+  pw_motion_distance (x->study.m.system, &reference->motion, &x->scratch, error);
   for (int i = 0; i < MOTION_ERRORS; i++) {
-    if (reference->uncertainty[i] == 0) r->error[i] = NAN;
-    if (!(r->error[i] <= reference->uncertainty[i])) continue;
-    r->error[i] = reference->uncertainty[i];
-    r->below |= 1u << i;
+    if (reference->uncertainty[i] == 0) error[i] = NAN;
+    if (!(error[i] <= reference->uncertainty[i])) continue;
+    error[i] = reference->uncertainty[i];
+    r->below |= 1u << (COLUMN_ERROR + i);
   }
 }
 
@@ -103,12 +190,13 @@ static void compare_errors (pw_compare *x, pw_row *r) {
  * than a tenth, and where the numbers of steps are much the same. */
 static double compare_order_of (const pw_compare *x, const pw_row *r) {
   const pw_row *before = r - 1;
-  int i = isnan (r->error[MOTION_MOST]) ? MOTION_MOST + MOTION_ANGLE : MOTION_MOST;
+  const double *error = &r->value[COLUMN_ERROR];
+  int i = isnan (error[MOTION_MOST]) ? MOTION_MOST + MOTION_ANGLE : MOTION_MOST;
   int known =
-      before->state == ROW_DONE && r->state == ROW_DONE && r->error[i] > COMPARE_CLEAR * x->reference.uncertainty[i];
+      before->state == ROW_DONE && r->state == ROW_DONE && error[i] > COMPARE_CLEAR * x->reference.uncertainty[i];
   double finer =
       r->adaptive ? (double)r->statistics.steps / (double)before->statistics.steps : before->level / r->level;
-  return known && finer > COMPARE_FINER ? log (before->error[i] / r->error[i]) / log (finer) : NAN;
+  return known && finer > COMPARE_FINER ? log (before->value[COLUMN_ERROR + i] / error[i]) / log (finer) : NAN;
 }
 
 /* The observed order of convergence of a row with `before` levels of its method before it: only in the asymptotic range,
@@ -127,15 +215,17 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
   double cpu[COMPARE_REPEATS], sum = 0;
   int n = 0;
   while (n < x->repeats && !(n >= COMPARE_FEW && sum > COMPARE_ENOUGH) && sum <= x->study.cpu_end) {
-    int status = pw_compare_run (x, r, NULL, error);
+    int status = pw_motion_run (&x->study, r, NULL, error);
     if (status != PW_OK) return status;
     sum += cpu[n++] = r->cpu;
     pw_progress_at (&x->study.progress, x->study.done + (n + 1.0) / (x->repeats + 1));
   }
   qsort (cpu, (size_t)n, sizeof *cpu, compare_numbers);
-  r->repeats = n;
   r->cpu = n % 2 ? cpu[n / 2] : (cpu[n / 2 - 1] + cpu[n / 2]) / 2;
-  r->spread = n > 1 ? cpu[n - 1] - cpu[0] : NAN;
+  r->value[COLUMN_REPEATS] = n;
+  if (n < 2) return PW_OK;
+  r->value[COLUMN_REPEATS - 2] = cpu[n - 1] - cpu[0];
+  r->value[COLUMN_REPEATS - 1] = 100 * r->value[COLUMN_REPEATS - 2] / r->cpu;
   return PW_OK;
 }
 
@@ -157,41 +247,98 @@ static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
   int before = 0;
   while (r - before > s->row && r[-before - 1].line == r->line) before++;
   double predicted = compare_predict (r, before);
-  compare_unknown (r);
   s->share = 1 / (x->repeats + 1);
+  pw_format (limit, s->cpu_end, 4);
   if (predicted > s->cpu_end) {
     r->state = ROW_SKIPPED;
     if (isfinite (predicted)) snprintf (text, sizeof text, ", about %.2g s", predicted);
-    snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", text, pw_format (limit, s->cpu_end, 4));
+    snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", text, limit);
     return PW_OK;
   }
-  int status = pw_compare_run (x, r, &x->scratch, &own);
+  r->balance = NAN;
+  int status = pw_motion_run (s, r, &x->scratch, &own);
   if (status == PW_OK) {
     compare_errors (x, r);
     status = compare_times (x, r, &own);
   }
   if (r->state == ROW_STOPPED)
-    snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s",
-              pw_format (limit, s->cpu_end, 4), pw_format (text, r->t, 4));
+    snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
+              pw_format (text, r->t, 4));
   status = pw_study_outcome (r, status, &own, error);
-  r->order = compare_order (x, r, before);
+  compare_fill (r);
+  r->value[COLUMN_ORDER] = compare_order (x, r, before);
   return status;
+}
+
+/* ---- The reference ---- */
+
+static void compare_print_reference (const pw_compare *x) {
+  const pw_reference *t = &x->reference;
+  if (!t->known) {
+    puts ("no two methods reach the end, so errors are unknown; --reference FILE.csv provides a reference\n");
+    return;
+  }
+  pw_cli_print (stdout, "errors are measured against %s%s\n", t->about,
+                x->study.reference_path ? ", as if it were exact" : "");
+  for (int i = 0; i < t->partners; i++)
+    printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", t->partner[i].about,
+            t->partner[i].error[MOTION_MOST + MOTION_LENGTH], t->partner[i].error[MOTION_MOST + MOTION_ANGLE],
+            i == 0 ? ": the uncertainty of the reference" : "");
+  putchar ('\n');
+}
+
+/* DIR/truth.csv: the uncertainty of the reference, and its distances from other solutions. */
+static int compare_write_reference (const pw_compare *x, pw_error *error) {
+  const pw_reference *r = &x->reference;
+  pw_output *o = pw_study_open (&x->study, "truth.csv", error);
+  if (o == NULL) return error->status;
+  FILE *f = pw_output_stream (o);
+  pw_text t = { .at = NULL };
+  pw_text_cell (&t, "truth,against");
+  for (int k = 0; k < MOTION_ERRORS; k++)
+    pw_text_name (&t, compare_columns[COLUMN_ERROR + k].name, compare_columns[COLUMN_ERROR + k].unit);
+  int status = pw_text_line (&t, f, x->study.folder, error);
+  for (int i = -1; status == PW_OK && r->known && i < r->partners; i++) {
+    pw_text_quoted (&t, r->about);
+    pw_text_quoted (&t, i < 0 ? "uncertainty" : r->partner[i].about);
+    for (int k = 0; k < MOTION_ERRORS; k++) pw_text_number (&t, i < 0 ? r->uncertainty[k] : r->partner[i].error[k]);
+    status = pw_text_line (&t, f, x->study.folder, error);
+  }
+  return pw_text_end (o, status, error);
 }
 
 /* ---- The command ---- */
 
 static int compare_begin (pw_study *s, pw_error *error) {
   pw_compare *x = (pw_compare *)s;
-  int status = pw_reference_find (x, error);
-  if (status == PW_OK && s->folder) status = pw_compare_write_reference (x, error);
+  int status = pw_reference_find (&x->reference, s, x->finest_step, error);
+  if (status == PW_OK && s->folder) status = compare_write_reference (x, error);
   const pw_motion *motion = &x->reference.motion;
   int samples = x->reference.known ? motion->samples : MOTION_SAMPLES;
   if (status == PW_OK) status = pw_motion_open (&x->scratch, s->m.system, samples, error);
   if (status != PW_OK) return status;
   pw_motion_times (&x->scratch, s->t_end);
   if (x->reference.known) memcpy (x->scratch.t, motion->t, (size_t)samples * sizeof *motion->t);
-  pw_compare_print_reference (x, stdout);
+  compare_print_reference (x);
   return PW_OK;
+}
+
+/* Work-precision diagrams of lengths and of angles, if their errors are known. */
+static int compare_figures (pw_study *x, pw_error *error) {
+  static const char *const name[] = { "work-precision", "work-precision-angles" };
+  const pw_reference *reference = &((pw_compare *)x)->reference;
+  int status = pw_study_write_data (x, 0, name[0],
+                                    "tolerance or step, CPU time [s], right-hand side evaluations, largest error of "
+                                    "lengths [m] and angles [rad]",
+                                    STUDY_COORDINATES, error);
+  for (int unit = 0; status == PW_OK && unit < 2; unit++) {
+    char variables[100];
+    snprintf (variables, sizeof variables, "uncertainty = %.9g\nsize_of_motion = %.9g\n",
+              reference->uncertainty[MOTION_MOST + unit], reference->size[unit]);
+    if (pw_study_positive (x, 0, 3 + unit))
+      status = pw_study_write_script (x, 0, name[unit], "work-precision", variables, error);
+  }
+  return status;
 }
 
 static void compare_close (pw_study *s) {
@@ -201,17 +348,20 @@ static void compare_close (pw_study *s) {
 }
 
 static int compare_command (void *options, pw_error *error) {
-  static const pw_study_type type = { .tables = { "compare.csv", "truth.csv" },
-                                      .unit = "rows",
-                                      .plan = compare_plan,
-                                      .begin = compare_begin,
-                                      .measure = compare_measure,
-                                      .head = pw_compare_head,
-                                      .line = pw_compare_line,
-                                      .names = pw_compare_names,
-                                      .cells = pw_compare_cells,
-                                      .figures = pw_compare_figures,
-                                      .close = compare_close };
+  static const char *const group[] = { "" };
+  static const pw_study_type type = {
+    .tables = { "compare.csv", "truth.csv" },
+    .unit = "rows",
+    .group = group,
+    .above = "      rtol  error at the end    largest error       error of        residual of        error of     "
+             "                                  CPU time",
+    .column = compare_columns,
+    .plan = compare_plan,
+    .begin = compare_begin,
+    .measure = compare_measure,
+    .figures = compare_figures,
+    .close = compare_close
+  };
   return pw_study_command (options, &type, error);
 }
 
@@ -232,9 +382,10 @@ static const struct poptOption compare_options[] = {
       "fit into half a second)"),
   PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
   PW_TEXT_OPTION (
-      pw_study, reference_path, "truth", 0, "FILE.csv",
+      pw_study, reference_path, "reference", 0, "FILE.csv",
       "Measure errors against this table, with columns as in run -o, instead of the model's exact solution or a "
       "computed reference"),
+  PW_ALIAS_OPTION (pw_study, reference_path, "truth"),
   PW_TEXT_OPTION (pw_study, folder, "output", 'o', "DIR", "Write tables and work-precision diagrams into a folder"),
   PW_MODEL_OPTIONS,
   POPT_TABLEEND,

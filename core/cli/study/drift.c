@@ -1,10 +1,60 @@
 /* pinwheel drift: how constraint residuals and the energy balance grow in a long run, by method and stabilisation, and
  * how that depends on Baumgarte's alpha and beta and on the metric and frequency of projections. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
-#include "drift.h"
+#include "study.h"
+#include "sweep_grid.h"
 #include "util.h"
+
+#define DRIFT_ROUND_OFF 1e-14                   /* scaled residuals below have no meaningful growth */
+enum { DRIFT_PARTS = 200, DRIFT_MOST = 10000 }; /* parts of a run, each a point in the figures; rows */
+
+enum { DRIFT_POSITION, DRIFT_VELOCITY, DRIFT_BALANCE, DRIFT_QUANTITIES };
+
+/* The methods, then the effect of the options of two stabilisations. */
+enum { DRIFT_METHODS, DRIFT_BAUMGARTE, DRIFT_PROJECTION, DRIFT_GROUPS };
+static const char *const drift_group[DRIFT_GROUPS] = { "methods", "baumgarte", "projection" };
+
+typedef struct {
+  pw_study study;
+  const char **vary;
+  int only_methods;
+  pw_grid alpha, beta, every; /* one axis each */
+} pw_drift;
+
+/* ---- Columns: of each quantity the largest value of all steps and of the last part, and the growth ---- */
+
+enum { COLUMN_ALPHA = 2, COLUMN_BETA, COLUMN_EVERY, COLUMN_T = 6, COLUMN_QUANTITY, COLUMN_STEPS = 16 };
+
+static const char *drift_group_name (const pw_row *r, char text[STUDY_NAME]) {
+  (void)text;
+  return drift_group[r->group];
+}
+
+static const pw_study_column drift_columns[] = {
+  { "group", .text = drift_group_name },
+  { "method", .text = pw_study_method },
+  { "alpha", .unit = "1/s" },
+  { "beta", .unit = "1/s" },
+  { "every", .unit = "steps" },
+  { "status", .text = pw_study_status },
+  { "t", .unit = "s" },
+  { "largest.position", NULL, "largest", 9, .format = "%.1e" },
+  { "last.position", NULL, "last", 9, .format = "%.1e" },
+  { "growth.position", NULL, "growth", 7, .format = "t^%.1f" },
+  { "largest.velocity", NULL, "largest", 9, .format = "%.1e" },
+  { "last.velocity", NULL, "last", 9, .format = "%.1e" },
+  { "growth.velocity", NULL, "growth", 7, .format = "t^%.1f" },
+  { "largest.balance", "J", "largest", 9, .format = "%.1e" },
+  { "last.balance", "J", "last", 9, .format = "%.1e" },
+  { "growth.balance", NULL, "growth", 7, .format = "t^%.1f" },
+  { "steps", NULL, "steps", 10, .format = "%.0f" },
+  { .name = "rejected" },
+  { "rhs", NULL, "evaluat.", 10, .format = "%.0f" },
+  { .name = "jacobians" },
+  { "factorisations", NULL, "factor.", 9, .format = "%.0f" },
+  { .name = NULL },
+};
 
 /* ---- What is varied ---- */
 
@@ -50,83 +100,91 @@ static int drift_axes (pw_drift *x, pw_error *error) {
 
 /* ---- Rows ---- */
 
-static int drift_has_option (const pw_method *method, const char *name) {
-  for (const pw_option *o = method->options; o && o->name; o++)
-    if (strcmp (o->name, name) == 0) return 1;
-  return 0;
-}
-
 /* The first integrator in the list that has an option; rk4 if none has. */
-static const char *drift_integrator (const pw_drift *x, const char *option) {
-  for (int i = 0; i < x->study.methods.count; i++) {
-    const pw_method *method;
-    int stabilisation;
-    if (pw_method_parse (x->study.methods.method[i].name, &method, &stabilisation, NULL) == PW_OK &&
-        drift_has_option (method, option))
-      return method->name;
-  }
+static const char *drift_integrator (const pw_study *x, const char *option) {
+  const pw_method *method;
+  int stabilisation;
+  for (int i = 0; i < x->methods; i++)
+    if (pw_method_parse (x->method[i], &method, &stabilisation, NULL) == PW_OK)
+      for (const pw_option *o = method->options; o && o->name; o++)
+        if (strcmp (o->name, option) == 0) return method->name;
   return "rk4";
 }
 
-static void drift_plan_baumgarte (pw_drift *x) {
-  const char *integrator = drift_integrator (x, "alpha");
-  char a[32], b[32];
+/* Pairs of alpha and beta; a line of the figure for each beta. */
+static int drift_plan_baumgarte (pw_drift *x, pw_error *error) {
+  const char *integrator = drift_integrator (&x->study, "alpha");
+  char a[32], b[32], method[STUDY_NAME];
   for (long j = 0; j < x->beta.rows; j++)
     for (long i = 0; i < x->alpha.rows; i++) {
-      pw_row *r = &x->study.row[x->study.rows++];
-      *r = (pw_row){ .group = DRIFT_BAUMGARTE,
-                     .line = (int)j,
-                     .along = pw_grid_value (&x->alpha, 0, i),
-                     .beta = pw_grid_value (&x->beta, 0, j) };
-      snprintf (r->method, sizeof r->method, "%s+baumgarte:alpha=%s:beta=%s", integrator, pw_format (a, r->along, 9),
-                pw_format (b, r->beta, 9));
+      double alpha = pw_grid_value (&x->alpha, 0, i), beta = pw_grid_value (&x->beta, 0, j);
+      snprintf (method, sizeof method, "%s+baumgarte:alpha=%s:beta=%s", integrator, pw_format (a, alpha, 9),
+                pw_format (b, beta, 9));
+      pw_row *r = pw_study_add (&x->study, method, 1, error);
+      if (r == NULL) return PW_RESOURCE;
+      r->group = DRIFT_BAUMGARTE;
+      r->line = (int)j;
+      r->point[0][0] = r->value[COLUMN_ALPHA] = alpha;
+      r->value[COLUMN_BETA] = beta;
+      snprintf (r->label, sizeof r->label, "beta = %s /s", pw_format (b, beta, 6));
     }
+  return PW_OK;
 }
 
-static void drift_plan_projection (pw_drift *x) {
-  static const char *const metric[] = { "mass", "identity" };
-  const char *integrator = drift_integrator (x, "every");
+/* Intervals between projections, in both metrics. */
+static int drift_plan_projection (pw_drift *x, pw_error *error) {
+  static const char *const metric[] = { "metric=mass", "metric=identity" };
+  const char *integrator = drift_integrator (&x->study, "every");
+  char method[STUDY_NAME];
   for (int j = 0; j < 2; j++)
     for (long i = 0; i < x->every.rows; i++) {
-      pw_row *r = &x->study.row[x->study.rows++];
-      *r = (pw_row){ .group = DRIFT_PROJECTION, .line = j, .along = pw_grid_value (&x->every, 0, i), .beta = NAN };
-      snprintf (r->method, sizeof r->method, "%s+projection:metric=%s:every=%.0f", integrator, metric[j], r->along);
+      double every = pw_grid_value (&x->every, 0, i);
+      snprintf (method, sizeof method, "%s+projection:%s:every=%.0f", integrator, metric[j], every);
+      pw_row *r = pw_study_add (&x->study, method, 1, error);
+      if (r == NULL) return PW_RESOURCE;
+      r->group = DRIFT_PROJECTION;
+      r->line = j;
+      r->point[0][0] = r->value[COLUMN_EVERY] = every;
+      strcpy (r->label, metric[j]);
     }
+  return PW_OK;
 }
 
-/* The methods have the parts of a run, too, for figures against time. */
 static int drift_plan_rows (pw_drift *x, pw_error *error) {
   pw_study *s = &x->study;
-  double most = s->methods.count + (double)x->alpha.rows * (double)x->beta.rows + 2 * (double)x->every.rows;
-  if (most > 10000) return pw_fail (error, PW_INPUT, "%.0f runs are too many; vary less", most);
-  if (pw_study_allocate (s, (int)most, error) != PW_OK) return error->status;
-  for (int i = 0; i < s->methods.count; i++) {
-    pw_row *r = &s->row[s->rows++];
-    *r = (pw_row){ .group = DRIFT_METHODS, .line = i, .along = NAN, .beta = NAN };
-    strcpy (r->method, s->methods.method[i].name);
-    r->part = calloc (DRIFT_PARTS, sizeof *r->part);
-    if (r->part == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  double most = s->methods + (double)x->alpha.rows * (double)x->beta.rows + 2 * (double)x->every.rows;
+  if (most > DRIFT_MOST) return pw_fail (error, PW_INPUT, "%.0f runs are too many; vary less", most);
+  for (int i = 0; i < s->methods; i++) {
+    pw_row *r = pw_study_add (s, s->method[i], DRIFT_PARTS, error);
+    if (r == NULL) return PW_RESOURCE;
+    r->line = i;
+    for (int k = 0; k < DRIFT_PARTS; k++) r->point[k][0] = s->t_end * (k + 1) / DRIFT_PARTS;
   }
   if (x->only_methods) return PW_OK;
-  drift_plan_baumgarte (x);
-  drift_plan_projection (x);
-  return PW_OK;
+  int status = drift_plan_baumgarte (x, error);
+  return status == PW_OK ? drift_plan_projection (x, error) : status;
 }
 
 static int drift_plan (pw_study *s, pw_error *error) {
   pw_drift *x = (pw_drift *)s;
-  const char *methods = s->methods_text ? s->methods_text : "rk4+all,ida+all,galpha+all";
   pw_run_defaults d = pw_cli_defaults (pw_file_table (s->m.file));
   if (d.rtol == 0) d.rtol = 1e-6;
   int status = pw_cli_settings (&s->line, &d, &s->t_end, &s->settings, &s->limit, error);
   s->settings.ledger = 1;
-  if (status == PW_OK) status = pw_study_methods_read (&s->methods, methods, error);
+  if (status == PW_OK)
+    status = pw_study_read_methods (s, s->methods_text ? s->methods_text : "rk4+all,ida+all,galpha+all", error);
   if (status == PW_OK) status = drift_axes (x, error);
   return status == PW_OK ? drift_plan_rows (x, error) : status;
 }
 
 /* ---- Runs ---- */
 
+typedef struct {
+  pw_study_visitor base;
+  double early[DRIFT_QUANTITIES]; /* largest values in the first half of the time */
+} drift_visitor;
+
+/* The larger of both, NaN if one is. */
 static void drift_raise (double *most, double value) {
   if (!(value <= *most)) *most = value;
 }
@@ -143,53 +201,108 @@ static int drift_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
   pw_sample sample;
   int status = pw_run_sample (run, pw_run_time (run), &sample, error), k = drift_part (v->study, pw_run_time (run));
   if (status != PW_OK) return status;
-  const double value[DRIFT_QUANTITIES] = { sample.position, sample.velocity, fabs (sample.balance) };
+  const double now[DRIFT_QUANTITIES] = { sample.position, sample.velocity, fabs (sample.balance) };
   for (int i = 0; i < DRIFT_QUANTITIES; i++) {
-    drift_raise (&r->most[i], value[i]);
-    if (k < DRIFT_PARTS / 2) drift_raise (&r->early[i], value[i]);
-    if (k == DRIFT_PARTS - 1) r->end[i] = fmax (r->end[i], value[i]);
-    if (r->part) r->part[k][i] = fmax (r->part[k][i], value[i]);
+    double *value = &r->value[COLUMN_QUANTITY + 3 * i];
+    drift_raise (&value[0], now[i]);
+    if (k < DRIFT_PARTS / 2) drift_raise (&((drift_visitor *)v)->early[i], now[i]);
+    if (k == DRIFT_PARTS - 1) value[1] = fmax (value[1], now[i]);
+    if (r->points > 1) r->point[k][1 + i] = fmax (r->point[k][1 + i], now[i]);
   }
   return PW_OK;
 }
 
+/* The largest value, if there is one, and the exponent of time with which it grows from the middle of the run to its
+ * end: 0 if it is bounded; NaN if there is only round-off. */
+static void drift_finish (pw_row *r, int quantity, double early) {
+  double *value = &r->value[COLUMN_QUANTITY + 3 * quantity];
+  int known = quantity == DRIFT_BALANCE || value[0] > DRIFT_ROUND_OFF;
+  if (r->state == ROW_DONE && known && early > 0) value[2] = log2 (value[0] / early);
+  if (r->state == ROW_DONE && r->points == 1) r->point[0][1 + quantity] = value[0];
+  if (r->t == 0) value[0] = NAN;
+}
+
 static int drift_measure (pw_study *x, pw_row *r, pw_error *error) {
   pw_error own = { 0 };
-  pw_study_visitor v = { .visit = drift_visit, .study = x, .row = r };
-  for (int i = 0; i < DRIFT_QUANTITIES; i++) {
-    r->end[i] = NAN;
-    for (int k = 0; r->part && k < DRIFT_PARTS; k++) r->part[k][i] = NAN;
-  }
-  return pw_study_outcome (r, pw_study_run (x, r, &v, &own), &own, error);
+  drift_visitor v = { .base = { .visit = drift_visit, .study = x, .row = r } };
+  for (int i = 0; i < DRIFT_QUANTITIES; i++) r->value[COLUMN_QUANTITY + 3 * i] = 0;
+  int status = pw_study_outcome (r, pw_study_run (x, r, &v.base, &own), &own, error);
+  const pw_statistics *s = &r->statistics;
+  const double count[] = { (double)s->steps, (double)s->rejected, (double)s->rhs, (double)s->jacobians,
+                           (double)s->factorisations };
+  for (int i = 0; i < DRIFT_QUANTITIES; i++) drift_finish (r, i, v.early[i]);
+  r->value[COLUMN_T] = r->t;
+  memcpy (&r->value[COLUMN_STEPS], count, sizeof count);
+  return status;
 }
 
 /* ---- The command ---- */
 
 static int drift_begin (pw_study *x, pw_error *error) {
+  char t[32], h[32], rtol[32];
   (void)error;
-  pw_drift_print_title (x);
+  printf (
+      "%s, %s s, steps of %s s or rtol %s: the largest value of all steps and of the last %g %%, and its growth\n\n",
+      pw_file_name (x->m.file), pw_format (t, x->t_end, 6), pw_format (h, x->settings.step, 6),
+      pw_format (rtol, x->settings.rtol, 6), 100.0 / DRIFT_PARTS);
   return PW_OK;
+}
+
+/* DIR/drift-time.csv: the largest values in each part of the runs of methods. */
+static int drift_write_times (const pw_study *x, pw_error *error) {
+  pw_output *o = pw_study_open (x, "drift-time.csv", error);
+  if (o == NULL) return error->status;
+  pw_text t = { .at = NULL };
+  pw_text_cell (&t, "method,t [s],position,velocity,balance [J]");
+  int status = pw_text_line (&t, pw_output_stream (o), x->folder, error);
+  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
+    for (int k = 0; status == PW_OK && r->points > 1 && k < r->points; k++) {
+      if (isnan (r->point[k][1 + DRIFT_VELOCITY])) continue;
+      pw_text_cell (&t, r->method);
+      for (int i = 0; i <= DRIFT_QUANTITIES; i++) pw_text_number (&t, r->point[k][i]);
+      status = pw_text_line (&t, pw_output_stream (o), x->folder, error);
+    }
+  return pw_text_end (o, status, error);
+}
+
+/* A panel for each quantity that is not zero throughout, as the residual of position is without pins: against time,
+ * alpha, or the interval between projections. */
+static int drift_figures (pw_study *x, pw_error *error) {
+  static const char *const name[] = { "drift", "drift-baumgarte", "drift-projection" };
+  static const char *const axis[] = { "t [s]", "alpha [1/s]", "steps per projection (every)" };
+  int status = drift_write_times (x, error);
+  for (int group = 0; status == PW_OK && group < DRIFT_GROUPS; group++) {
+    char variables[40] = "quantities = '", heading[160];
+    for (int i = 1; i <= DRIFT_QUANTITIES; i++)
+      if (pw_study_positive (x, group, i)) sprintf (strchr (variables, 0), "%d ", i);
+    if (variables[strlen (variables) - 1] == '\'') continue;
+    strcat (variables, "'\n");
+    snprintf (heading, sizeof heading, "%s, largest scaled residuals of position and velocity, energy balance [J]",
+              axis[group]);
+    status = pw_study_write_data (x, group, name[group], heading, 1 + DRIFT_QUANTITIES, error);
+    if (status == PW_OK) status = pw_study_write_script (x, group, name[group], "drift", variables, error);
+  }
+  return status;
 }
 
 static void drift_close (pw_study *s) {
   pw_drift *x = (pw_drift *)s;
-  for (int i = 0; i < s->rows; i++) free (s->row[i].part);
   pw_grid_free (&x->alpha);
   pw_grid_free (&x->beta);
   pw_grid_free (&x->every);
 }
 
 static int drift_command (void *options, pw_error *error) {
+  static const char *const group[] = { "methods", "alpha and beta of Baumgarte", "metric and frequency of projection" };
   static const pw_study_type type = { .tables = { "drift.csv", "drift-time.csv" },
                                       .unit = "runs",
+                                      .group = group,
+                                      .above = "  residual of position     residual of velocity     energy balance [J]",
+                                      .column = drift_columns,
                                       .plan = drift_plan,
                                       .begin = drift_begin,
                                       .measure = drift_measure,
-                                      .head = pw_drift_head,
-                                      .line = pw_drift_line,
-                                      .names = pw_drift_names,
-                                      .cells = pw_drift_cells,
-                                      .figures = pw_drift_figures,
+                                      .figures = drift_figures,
                                       .close = drift_close };
   return pw_study_command (options, &type, error);
 }

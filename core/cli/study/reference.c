@@ -1,23 +1,46 @@
-/* The reference solution of a comparison: a table, the exact solution of the model, or else computed by methods that
- * have little in common, each at its tightest.  Of the two that agree best one is the reference; its uncertainty is
- * their distance. */
+/* Reference solutions of comparisons. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
-#include "compare.h"
+#include "reference.h"
 
-enum { REFERENCE_CANDIDATES = COMPARE_PARTNERS + 1 };
 #define REFERENCE_LIMIT 10     /* CPU time of a candidate, at least [s] */
 #define REFERENCE_LOOSEST 1e-9 /* tolerances are loosened up to this if a method fails, */
 #define REFERENCE_FEWEST 1000  /* fixed steps up to t_end over this, */
-#define REFERENCE_STEPS 1e5    /* from t_end over this, or the last one of the ladder */
+#define REFERENCE_STEPS 1e5    /* from t_end over this, or the smallest step of the comparison */
 #define REFERENCE_ROUND_OFF 8  /* eps of the largest number: the smallest uncertainty */
 
+/* ---- Runs ---- */
+
 typedef struct {
-  pw_row row;
-  int good;
-  pw_motion motion;
-} candidate;
+  pw_study_visitor base;
+  pw_motion *motion;
+  int next; /* sample */
+} sampler;
+
+/* Takes the samples that the last step has reached. */
+static int sampler_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
+  sampler *x = (sampler *)v;
+  const pw_motion *m = x->motion;
+  pw_sample sample;
+  for (; x->next < m->samples && m->t[x->next] <= pw_run_time (run); x->next++) {
+    int status = pw_run_sample (run, m->t[x->next], &sample, error);
+    if (status != PW_OK) return status;
+    pw_motion_take (x->motion, v->study->m.system, x->next, &sample);
+    v->row->balance = fmax (v->row->balance, fabs (sample.balance));
+  }
+  v->due = x->next < m->samples ? m->t[x->next] : INFINITY;
+  return PW_OK;
+}
+
+int pw_motion_run (pw_study *x, pw_row *r, pw_motion *motion, pw_error *error) {
+  sampler v = { { .visit = sampler_visit, .study = x, .row = r }, motion, 0 };
+  x->settings =
+      (pw_settings){ .span = x->t_end, .ledger = motion != NULL, .stop = pw_limit_over, .stop_context = &x->limit };
+  *(r->adaptive ? &x->settings.rtol : &x->settings.step) = r->level;
+  if (motion) r->balance = 0;
+  return pw_study_run (x, r, motion ? &v.base : NULL, error);
+}
 
 /* ---- Uncertainty ---- */
 
@@ -41,21 +64,26 @@ static void reference_floor (const pw_system *s, pw_reference *t) {
 
 /* ---- Candidates ---- */
 
+typedef struct {
+  pw_row row;
+  int good;
+  pw_motion motion;
+} candidate;
+
 /* Runs one; a tolerance or step that proves too small is increased.  PW_RETRY: interrupted. */
-static int reference_run (pw_compare *x, candidate *c, pw_error *error) {
-  pw_study *s = &x->study;
-  double limit = s->cpu_end, loosest = c->row.adaptive ? REFERENCE_LOOSEST : s->t_end / REFERENCE_FEWEST;
+static int reference_run (pw_study *x, candidate *c, pw_error *error) {
+  double limit = x->cpu_end, loosest = c->row.adaptive ? REFERENCE_LOOSEST : x->t_end / REFERENCE_FEWEST;
   pw_error own = { 0 };
   int status = PW_RETRY;
-  s->cpu_end = fmax (s->cpu_end, REFERENCE_LIMIT);
+  x->cpu_end = fmax (x->cpu_end, REFERENCE_LIMIT);
   while (status != PW_OK && c->row.level <= loosest) {
     own = (pw_error){ 0 };
-    status = pw_compare_run (x, &c->row, &c->motion, &own);
+    status = pw_motion_run (x, &c->row, &c->motion, &own);
     if (status == PW_OK || pw_stop || c->row.state == ROW_STOPPED || status == PW_RESOURCE || status == PW_INITIAL)
       break;
     c->row.level *= 10;
   }
-  s->cpu_end = limit;
+  x->cpu_end = limit;
   c->good = status == PW_OK;
   return c->good ? PW_OK : pw_study_outcome (&c->row, status, &own, error);
 }
@@ -98,9 +126,7 @@ static double reference_pair (const pw_system *s, const candidate *c, int relate
 }
 
 /* Two methods with the same integrator are used only if there are no others; the first of the two is the reference. */
-static void reference_choose (pw_compare *x, candidate *c) {
-  const pw_system *s = x->study.m.system;
-  pw_reference *t = &x->reference;
+static void reference_choose (pw_reference *t, const pw_system *s, candidate *c) {
   int best = -1, with = -1;
   if (isinf (reference_pair (s, c, 0, &best, &with)) && isinf (reference_pair (s, c, 1, &best, &with))) return;
   t->known = 1;
@@ -118,45 +144,41 @@ static void reference_choose (pw_compare *x, candidate *c) {
   reference_floor (s, t);
 }
 
-static int reference_compute (pw_compare *x, pw_error *error) {
-  pw_study *s = &x->study;
-  double step = fmin (x->finest_step, s->t_end / REFERENCE_STEPS);
+static int reference_compute (pw_reference *t, pw_study *x, double step, pw_error *error) {
   candidate c[REFERENCE_CANDIDATES] = {
     { .row = { .method = "erk8+projection", .adaptive = 1, .level = 3e-14 } },
-    { .row = { .method = "rk4+projection", .adaptive = 0, .level = step } },
+    { .row = { .method = "rk4+projection", .level = fmin (step, x->t_end / REFERENCE_STEPS) } },
     { .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
     { .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
   int status = PW_OK;
-  pw_progress_count (&s->progress, "reference", "methods", 0, REFERENCE_CANDIDATES);
-  for (s->done = 0; status == PW_OK && s->done < REFERENCE_CANDIDATES; s->done++) {
-    status = pw_motion_open (&c[s->done].motion, s->m.system, MOTION_SAMPLES, error);
+  pw_progress_count (&x->progress, "reference", "methods", 0, REFERENCE_CANDIDATES);
+  for (x->done = 0; status == PW_OK && x->done < REFERENCE_CANDIDATES; x->done++) {
+    status = pw_motion_open (&c[x->done].motion, x->m.system, MOTION_SAMPLES, error);
     if (status != PW_OK) break;
-    pw_motion_times (&c[s->done].motion, s->t_end);
-    status = reference_run (x, &c[s->done], error);
+    pw_motion_times (&c[x->done].motion, x->t_end);
+    status = reference_run (x, &c[x->done], error);
   }
-  pw_progress_end (&s->progress);
-  s->done = 0;
-  if (status == PW_OK) reference_choose (x, c);
+  pw_progress_end (&x->progress);
+  x->done = 0;
+  if (status == PW_OK) reference_choose (t, x->m.system, c);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) pw_motion_close (&c[i].motion);
   return status;
 }
 
 /* The exact solution of the model holds only for its own initial conditions. */
-int pw_reference_find (pw_compare *x, pw_error *error) {
-  pw_study *s = &x->study;
-  pw_reference *t = &x->reference;
-  double t_end = s->line.t_end ? s->t_end : 0; /* 0: that of the table */
-  int status, exact = s->reference_path == NULL && pw_system_has_reference (s->m.model) && s->line.starts == NULL;
-  if (s->reference_path == NULL && !exact) return reference_compute (x, error);
-  snprintf (t->about, sizeof t->about, "%s", exact ? "the exact solution of the model" : s->reference_path);
+int pw_reference_find (pw_reference *t, pw_study *x, double step, pw_error *error) {
+  double t_end = x->line.t_end ? x->t_end : 0; /* 0: that of the table */
+  int status, exact = x->reference_path == NULL && pw_system_has_reference (x->m.model) && x->line.starts == NULL;
+  if (x->reference_path == NULL && !exact) return reference_compute (t, x, step, error);
+  snprintf (t->about, sizeof t->about, "%s", exact ? "the exact solution of the model" : x->reference_path);
   if (exact)
-    status = pw_motion_reference (&t->motion, s->m.model, s->m.system, s->t_end, error);
+    status = pw_motion_reference (&t->motion, x->m.model, x->m.system, x->t_end, error);
   else
-    status = pw_motion_read (&t->motion, s->m.system, s->reference_path, &t_end, 1, error);
+    status = pw_motion_read (&t->motion, x->m.system, x->reference_path, &t_end, 1, error);
   if (status != PW_OK) return status;
-  if (!exact) s->t_end = t_end;
+  if (!exact) x->t_end = t_end;
   t->known = 1;
-  reference_floor (s->m.system, t);
+  reference_floor (x->m.system, t);
   return PW_OK;
 }

@@ -1,15 +1,84 @@
-/* Common parts of compare and drift; see study.h. */
+/* The common parts of compare and drift: methods, runs, the course of the command. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "figure.h"
 #include "study.h"
 
 #define STUDY_SHORT 0.005 /* batches of steps that took less CPU time [s] become longer */
 #define STUDY_LONG 0.02   /* and those that took more become shorter */
 
-/* ---- A run ---- */
+/* ---- Methods ---- */
+
+static int methods_add (pw_study *x, const char *name, pw_error *error) {
+  const pw_method *integrator;
+  int stabilisation, status = pw_method_parse (name, &integrator, &stabilisation, error);
+  if (status != PW_OK) return status;
+  for (int i = 0; i < x->methods; i++)
+    if (strcmp (x->method[i], name) == 0) return PW_OK;
+  void *more = realloc (x->method, (size_t)(x->methods + 1) * sizeof *x->method);
+  if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->method = more;
+  strcpy (x->method[x->methods++], name);
+  return PW_OK;
+}
+
+/* Every stabilisation of an integrator, or of all of them: NULL. */
+static int methods_add_all (pw_study *x, const pw_method *integrator, pw_error *error) {
+  char name[STUDY_NAME];
+  int status = PW_OK;
+  for (int i = 0; pw_methods[i]; i++)
+    for (const pw_stabilisation *s = pw_methods[i]->stabilisations; status == PW_OK && s->name; s++) {
+      if (integrator && integrator != pw_methods[i]) continue;
+      snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, s->name);
+      status = methods_add (x, name, error);
+    }
+  return status;
+}
+
+/* "all", "INTEGRATOR+all", or a method. */
+static int methods_add_item (pw_study *x, char *item, pw_error *error) {
+  const pw_method *integrator;
+  int stabilisation;
+  char *plus = item + strcspn (item, "+:");
+  if (strcmp (item, "all") == 0) return methods_add_all (x, NULL, error);
+  if (strcmp (plus, "+all") != 0) return methods_add (x, item, error);
+  *plus = 0;
+  int status = pw_method_parse (item, &integrator, &stabilisation, error);
+  return status == PW_OK ? methods_add_all (x, integrator, error) : status;
+}
+
+int pw_study_read_methods (pw_study *x, const char *text, pw_error *error) {
+  int status = PW_OK;
+  for (const char *at = text; status == PW_OK; at++) {
+    char item[STUDY_NAME];
+    size_t n = strcspn (at, ",");
+    if (n == 0 || n >= sizeof item)
+      return pw_fail (error, PW_INPUT, "--methods \"%.80s\": %s", text, n ? "too long a name" : "a name is missing");
+    snprintf (item, sizeof item, "%.*s", (int)n, at);
+    status = methods_add_item (x, item, error);
+    at += n;
+    if (*at == 0) break;
+  }
+  return status;
+}
+
+/* ---- Rows ---- */
+
+pw_row *pw_study_add (pw_study *x, const char *method, int points, pw_error *error) {
+  pw_row *more = realloc (x->row, (size_t)(x->rows + 1) * sizeof *x->row), *r = more ? more + x->rows : NULL;
+  if (more) x->row = more;
+  if (r) *r = (pw_row){ .points = points, .point = malloc ((size_t)points * sizeof *r->point) };
+  if (r == NULL || r->point == NULL) {
+    pw_fail (error, PW_RESOURCE, "out of memory");
+    return NULL;
+  }
+  snprintf (r->method, sizeof r->method, "%s", method);
+  for (int i = 0; i < STUDY_COLUMNS; i++) r->value[i] = NAN;
+  for (int k = 0; k < points * STUDY_COORDINATES; k++) r->point[0][k] = NAN;
+  x->rows++;
+  return r;
+}
 
 /* In batches, so that clocks are read seldom. */
 static int study_steps (pw_study *x, pw_row *r, pw_run *run, pw_study_visitor *v, pw_error *error) {
@@ -57,77 +126,22 @@ int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error
   return PW_OK;
 }
 
-int pw_study_allocate (pw_study *x, int rows, pw_error *error) {
-  x->row = calloc ((size_t)rows + 1, sizeof *x->row);
-  return x->row ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-}
+/* ---- The command ---- */
 
-/* ---- The tables ---- */
-
-pw_output *pw_study_open (const pw_study *x, const char *name, pw_error *error) {
-  char path[FIGURE_PATH + 16];
-  snprintf (path, sizeof path, "%s/%s", x->folder, name);
-  return pw_output_open (path, error);
-}
-
-const char *pw_study_status (const pw_row *r) {
-  static const char *const status[] = { "ok", "failed", "refused", "stopped", "not run" };
-  return status[r->state];
-}
-
-/* The CSV gets rows as they come, under the name NAME.part, which it keeps if the study is stopped. */
 static int study_open_folder (pw_study *x, pw_error *error) {
   const char *const *tables = x->type->tables;
   const char *const names[] = { ".dat", ".gp", ".svg", ".png", tables[0], tables[1], NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
-                   { "--truth", x->reference_path, PW_READS, NULL },
+                   { "--reference", x->reference_path, PW_READS, NULL },
                    { "-o", x->folder, PW_WRITES_INTO, names } };
   if (x->folder == NULL) return PW_OK;
   if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
   x->lock = pw_figure_folder (x->folder, error);
-  if (x->lock < 0) return error->status;
-  x->csv = pw_study_open (x, tables[0], error);
-  if (x->csv == NULL) return error->status;
-  pw_text t = { .at = NULL };
-  x->type->names (&t);
-  pw_text_cell (&t, "reason");
-  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
+  return x->lock < 0 ? error->status : pw_table_open (x, error);
 }
-
-static int study_width (const pw_study *x) {
-  size_t width = 6;
-  for (int i = 0; i < x->rows; i++) {
-    size_t n = strlen (x->row[i].method);
-    if (n > width) width = n;
-  }
-  return (int)width;
-}
-
-/* Prints the completed row. */
-static int study_write (pw_study *x, pw_error *error) {
-  const pw_row *r = &x->row[x->done];
-  char t[32];
-  int width = study_width (x);
-  if (x->done == 0 || r->group != r[-1].group) x->type->head (x, r->group, width, stdout);
-  printf ("%-*s", width, r->method);
-  x->type->line (x, r, stdout);
-  if (r->state != ROW_DONE) {
-    printf ("  %s", pw_study_status (r));
-    if (r->state == ROW_FAILED && strncmp (r->reason, "t = ", 4) != 0) printf (" at t = %s s", pw_format (t, r->t, 4));
-    printf (": %s", r->reason);
-  }
-  putchar ('\n');
-  fflush (stdout);
-  if (x->csv == NULL) return PW_OK;
-  pw_text cells = { .at = NULL };
-  x->type->cells (x, r, &cells);
-  pw_text_quoted (&cells, r->reason);
-  return pw_text_line (&cells, pw_output_stream (x->csv), x->folder, error);
-}
-
-/* ---- The command ---- */
 
 static int study_open (pw_study *x, pw_error *error) {
+  x->lock = -1;
   x->share = 1;
   x->cpu_end = INFINITY;
   int status = pw_cli_open (&x->m, &x->line, error);
@@ -142,27 +156,27 @@ static int study_rows (pw_study *x, pw_error *error) {
   for (x->done = 0; status == PW_OK && x->done < x->rows; x->done++) {
     status = x->type->measure (x, &x->row[x->done], error);
     pw_progress_end (&x->progress);
-    if (status == PW_OK) status = study_write (x, error);
+    if (status == PW_OK) status = pw_table_row (x, error);
     if (status != PW_OK) break;
   }
   pw_stop_release ();
   return status;
 }
 
-/* A complete CSV gets its final name; the figures show all of its rows. */
+/* A complete CSV file gets its final name; the figures show all of its rows. */
 static int study_finish (pw_study *x, int status, pw_error *error) {
   char part[FIGURE_PATH + 16] = "";
-  pw_output *csv = x->csv;
-  if (csv && status == PW_OK)
-    status = pw_output_finish (csv, error);
-  else if (csv)
-    pw_text_abandon (csv, x->done, part, sizeof part);
+  if (x->csv && status == PW_OK)
+    status = pw_output_finish (x->csv, error);
+  else if (x->csv)
+    pw_text_abandon (x->csv, x->done, part, sizeof part);
   if (status == PW_RETRY && pw_stop) {
     pw_cli_say ("pinwheel: interrupted; %d of %d %s are done%s%s\n", x->done, x->rows, x->type->unit,
                 *part ? ", and kept in " : "", part);
     return PW_INTERRUPTED;
   }
-  return csv && status == PW_OK ? x->type->figures (x, error) : status;
+  if (x->csv && status == PW_OK) status = x->type->figures (x, error);
+  return status == PW_OK && x->drawn[0] ? pw_figure_draw (x->folder, x->drawn, error) : status;
 }
 
 /* A study in which no run has reached the end is a failure. */
@@ -178,15 +192,15 @@ static int study_verdict (const pw_study *x, pw_error *error) {
 
 int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error) {
   x->type = type;
-  x->lock = -1;
   int status = study_open (x, error);
   if (status == PW_OK) status = study_rows (x, error);
   status = study_finish (x, status, error);
   if (status == PW_OK) status = study_verdict (x, error);
   if (x->lock >= 0) close (x->lock);
   type->close (x);
+  for (int i = 0; i < x->rows; i++) free (x->row[i].point);
   free (x->row);
-  free (x->methods.method);
+  free (x->method);
   pw_cli_close_model (&x->m);
   return status == PW_INTERRUPTED ? status : error->status;
 }

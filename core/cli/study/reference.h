@@ -1,0 +1,32 @@
+/* Reference solutions of comparisons: a table, the exact solution of the model, or else computed by methods that have
+ * little in common, each at its tightest.  Of the two that agree best one is the reference; its uncertainty is their
+ * distance. */
+#ifndef PW_REFERENCE_H
+#define PW_REFERENCE_H
+
+#include "motion.h"
+#include "study.h"
+
+enum { REFERENCE_CANDIDATES = 4 };
+
+typedef struct {
+  pw_motion motion;
+  int known;                         /* 0: there is none */
+  double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
+  double size[MOTION_UNITS];         /* largest coordinate or velocity */
+  char about[300];                   /* "erk8+projection, rtol 3e-14" or the file's name */
+  int partners;                      /* methods it was compared with, and their distances from it */
+  struct {
+    char about[100];
+    double error[MOTION_ERRORS];
+  } partner[REFERENCE_CANDIDATES - 1];
+} pw_reference;
+
+/* One run of a row at its level; with a motion its samples are taken, and the ledger is kept.  As pw_study_run. */
+int pw_motion_run (pw_study *x, pw_row *r, pw_motion *motion, pw_error *error);
+
+/* Finds the reference; `step` is the smallest of the comparison.  The end of a table is that of the comparison unless
+ * --t-end is given.  Close its motion in every case. */
+int pw_reference_find (pw_reference *t, pw_study *x, double step, pw_error *error);
+
+#endif

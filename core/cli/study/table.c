@@ -1,0 +1,184 @@
+/* Tables and figures of studies: rows on the terminal and in a CSV file, points of figures in data files. */
+#include <math.h>
+#include <string.h>
+#include "study.h"
+
+const char *pw_study_method (const pw_row *r, char text[STUDY_NAME]) {
+  (void)text;
+  return r->method;
+}
+
+const char *pw_study_status (const pw_row *r, char text[STUDY_NAME]) {
+  static const char *const status[] = { "ok", "failed", "refused", "stopped", "not run" };
+  (void)text;
+  return status[r->state];
+}
+
+static int table_is_end (const pw_study_column *c) {
+  return c->name == NULL && c->head == NULL;
+}
+
+/* ---- CSV ---- */
+
+pw_output *pw_study_open (const pw_study *x, const char *name, pw_error *error) {
+  char path[FIGURE_PATH + 16];
+  snprintf (path, sizeof path, "%s/%s", x->folder, name);
+  return pw_output_open (path, error);
+}
+
+/* The file gets rows as they come, under the name NAME.part, which it keeps if the study is stopped. */
+int pw_table_open (pw_study *x, pw_error *error) {
+  pw_text t = { .at = NULL };
+  x->csv = pw_study_open (x, x->type->tables[0], error);
+  if (x->csv == NULL) return error->status;
+  for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
+    if (c->name) pw_text_name (&t, c->name, c->unit);
+  pw_text_cell (&t, "reason");
+  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
+}
+
+static int table_write (const pw_study *x, const pw_row *r, pw_error *error) {
+  pw_text t = { .at = NULL };
+  char text[STUDY_NAME];
+  for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
+    if (c->text)
+      pw_text_cell (&t, c->text (r, text));
+    else if (c->name)
+      pw_text_number (&t, r->value[c - x->type->column]);
+  pw_text_quoted (&t, r->reason);
+  return pw_text_line (&t, pw_output_stream (x->csv), x->folder, error);
+}
+
+/* ---- Terminal ---- */
+
+static int table_width (const pw_study *x) {
+  size_t width = 6;
+  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
+    if (strlen (r->method) > width) width = strlen (r->method);
+  return (int)width;
+}
+
+static void table_heading (const pw_study *x, int group) {
+  int width = table_width (x);
+  printf ("%s%-*s%s\n%-*s", group ? "\n" : "", width, x->type->group[group], x->type->above, width, "method");
+  for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
+    if (c->head) printf ("%*s", c->width, c->head);
+  putchar ('\n');
+}
+
+static void table_number (const pw_row *r, const pw_study_column *c, int i) {
+  char text[32] = "<", *at = text + (r->below >> i & 1);
+  snprintf (at, sizeof text - 1, isnan (r->value[i]) ? "-" : c->format, r->value[i]);
+  printf ("%*s", c->width, text);
+}
+
+/* Columns after the status are printed of rows that are done. */
+static void table_print (const pw_study *x, const pw_row *r) {
+  char t[32];
+  int shown = 1;
+  printf ("%-*s", table_width (x), r->method);
+  for (const pw_study_column *c = x->type->column; shown && !table_is_end (c); c++) {
+    if (c->head) table_number (r, c, (int)(c - x->type->column));
+    if (c->text == pw_study_status) shown = r->state == ROW_DONE;
+  }
+  if (r->state != ROW_DONE) {
+    printf ("  %s", pw_study_status (r, NULL));
+    if (r->state == ROW_FAILED && strncmp (r->reason, "t = ", 4) != 0) printf (" at t = %s s", pw_format (t, r->t, 4));
+    printf (": %s", r->reason);
+  }
+  putchar ('\n');
+  fflush (stdout);
+}
+
+int pw_table_row (pw_study *x, pw_error *error) {
+  const pw_row *r = &x->row[x->done];
+  if (x->done == 0 || r->group != r[-1].group) table_heading (x, r->group);
+  table_print (x, r);
+  return x->csv ? table_write (x, r, error) : PW_OK;
+}
+
+/* ---- Figures ---- */
+
+/* The points of a line of which a coordinate is positive, or, if it is negative, which are defined. */
+static int table_points (const pw_study *x, int group, int line, int coordinate) {
+  int count = 0;
+  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
+    for (int k = 0; r->group == group && r->line == line && k < r->points; k++)
+      count += !isnan (r->point[k][2]) &&
+               (coordinate < 0 || (r->point[k][coordinate] > 0 && isfinite (r->point[k][coordinate])));
+  return count;
+}
+
+static int table_lines (const pw_study *x, int group) {
+  int lines = 0;
+  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
+    if (r->group == group && r->line >= lines) lines = r->line + 1;
+  return lines;
+}
+
+int pw_study_positive (const pw_study *x, int group, int coordinate) {
+  int count = 0;
+  for (int line = 0; line < table_lines (x, group); line++) count += table_points (x, group, line, coordinate);
+  return count > 0;
+}
+
+static const char *table_label (const pw_study *x, int group, int line) {
+  const pw_row *r = x->row;
+  while (r->group != group || r->line != line) r++;
+  return *r->label ? r->label : r->method;
+}
+
+static void table_write_line (const pw_study *x, int group, int line, int count, FILE *f) {
+  char text[32];
+  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
+    for (int k = 0; r->group == group && r->line == line && k < r->points; k++) {
+      if (isnan (r->point[k][2])) continue;
+      for (int i = 0; i < count; i++) /* only positive numbers have logarithms */
+        fprintf (f, "%s%s", i ? " " : "", r->point[k][i] > 0 ? pw_format (text, r->point[k][i], 9) : "NaN");
+      fputc ('\n', f);
+    }
+}
+
+int pw_study_write_data (const pw_study *x, int group, const char *name, const char *heading, int count,
+                         pw_error *error) {
+  char file[40];
+  snprintf (file, sizeof file, "%s.dat", name);
+  pw_output *o = pw_study_open (x, file, error);
+  if (o == NULL) return PW_RESOURCE;
+  FILE *f = pw_output_stream (o);
+  fprintf (f, "# %s\n", heading);
+  for (int line = 0, block = 0; line < table_lines (x, group); line++) {
+    if (table_points (x, group, line, -1) == 0) continue;
+    fprintf (f, "%s# %s\n", block++ ? "\n\n" : "", table_label (x, group, line));
+    table_write_line (x, group, line, count, f);
+  }
+  return pw_output_finish (o, error);
+}
+
+/* Labels that are not names of methods have no stabilisation. */
+static void table_write_labels (const pw_study *x, int group, FILE *f) {
+  const pw_method *integrator;
+  int stabilisation, drawn = 0, lines = table_lines (x, group);
+  for (int line = 0; line < lines; line++) drawn += table_points (x, group, line, -1) > 0;
+  fprintf (f, "methods = %d\narray label[%d]\narray stabilisation[%d]\n", drawn, drawn, drawn);
+  for (int line = 0, n = 0; line < lines; line++) {
+    if (table_points (x, group, line, -1) == 0) continue;
+    const char *label = table_label (x, group, line);
+    int known = pw_method_parse (label, &integrator, &stabilisation, NULL) == PW_OK;
+    pw_figure_element (f, "label", ++n, label);
+    pw_figure_element (f, "stabilisation", n, known ? integrator->stabilisations[stabilisation].name : "");
+  }
+}
+
+int pw_study_write_script (pw_study *x, int group, const char *name, const char *template_name, const char *variables,
+                           pw_error *error) {
+  const pw_figures figures = { .folder = x->folder, .model = pw_file_name (x->m.file) };
+  pw_output *o = pw_figure_begin (&figures, name, error);
+  int drawn = 0;
+  if (o == NULL) return PW_RESOURCE;
+  fputs (variables, pw_output_stream (o));
+  table_write_labels (x, group, pw_output_stream (o));
+  while (x->drawn[drawn]) drawn++;
+  x->drawn[drawn] = name;
+  return pw_figure_end (o, template_name, error);
+}
