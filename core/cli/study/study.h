@@ -116,7 +116,7 @@ int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error);
 /* Puts a failure of pw_study_run into the row.  Returns PW_OK, or the status that ends the study. */
 int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error *error);
 
-/* ---- Tables and figures (table.c) ---- */
+/* ---- Tables and figures (study_table.c) ---- */
 
 /* Opens the CSV file with its first line. */
 int pw_table_open (pw_study *x, pw_error *error);
