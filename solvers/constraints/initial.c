@@ -71,9 +71,10 @@ static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_fa
   return PW_RETRY;
 }
 
-/* One attempt from the given state, with some states prescribed.  The velocity metric is the mass matrix if that
+/* One attempt from these positions and the given velocities, with some states prescribed.  The velocity metric is the mass matrix if that
  * determines all velocities, else the position metric. */
-static int initial_attempt (pw_run *r, const unsigned char *held, initial_failure *failure, pw_error *error) {
+static int initial_attempt (pw_run *r, const unsigned char *held, const double *from, initial_failure *failure,
+                            pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   double *weight = malloc (2 * bytes);
@@ -83,7 +84,7 @@ static int initial_attempt (pw_run *r, const unsigned char *held, initial_failur
   for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
     pw_projector p;
     pw_error none = { 0 };
-    memcpy (r->q, r->q_given, bytes);
+    memcpy (r->q, from, bytes);
     memcpy (r->v, r->v_given, bytes);
     status = pw_update_kinematics (r->w, r->t, r->q, r->v);
     if (status != PW_OK) break;
@@ -149,31 +150,42 @@ static void initial_report (pw_run *r, int released, const pw_residuals *before)
                                  .velocity = before->velocity };
 }
 
-/* If redundant equations make the plain attempt fail, it is repeated with an independent set, selected at the given
- * state.  Off the constraints redundant equations appear independent, increasingly with distance: hence several
- * tolerances. */
+/* If redundant equations make the plain attempt fail, it is repeated with an independent set: one selected at the given
+ * positions, then one selected where an attempt that prescribes nothing ends, from there.  Off the constraints redundant
+ * equations appear independent, increasingly with distance: hence several tolerances, and the second positions. */
 static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure *failure, pw_error *error) {
   static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
+  enum { TOLERANCES = sizeof tolerance / sizeof *tolerance };
   const pw_system *s = r->s;
   const unsigned char *before = r->active;
-  int status = initial_attempt (r, held, failure, error), rank = s->rows;
+  size_t n = (size_t)s->coords, m = (size_t)s->rows;
+  initial_failure later;
+  int status = initial_attempt (r, held, r->q_given, failure, error), rank = s->rows;
   if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
-  unsigned char *active = malloc ((size_t)s->rows + 1);
-  if (active == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
-  for (size_t i = 0; i < sizeof tolerance / sizeof *tolerance && status == PW_RETRY; i++) {
-    if (pw_update_kinematics (r->w, r->t, r->q_given, r->v_given) != PW_OK) break;
+  double *at = malloc (2 * n * sizeof *at + m), *from = at + n;
+  if (at == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  unsigned char *active = (unsigned char *)(from + n);
+  memcpy (at, r->q_given, n * sizeof *at);
+  memcpy (from, at, n * sizeof *at);
+  for (int i = 0; i < 2 * TOLERANCES && status == PW_RETRY; i++) {
+    if (i == TOLERANCES) {
+      if (initial_attempt (r, NULL, r->q_given, &later, error) == PW_RESOURCE) status = PW_RESOURCE;
+      for (size_t j = 0; j < n; j++) at[j] = r->q[j], from[j] = held && held[j] ? from[j] : r->q[j];
+      rank = s->rows;
+    }
+    if (status != PW_RETRY || pw_update_kinematics (r->w, r->t, at, r->v_given) != PW_OK) continue;
     pw_evaluate_J (r->w);
-    int now = pw_rank_select (r->w, tolerance[i], active);
+    int now = pw_rank_select (r->w, tolerance[i % TOLERANCES], active);
     if (now < 0) status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
     if (now < 0 || now == rank) continue;
     rank = now;
     r->active = active;
-    initial_failure later = { .row = -1 };
-    status = initial_attempt (r, held, &later, error);
+    later = (initial_failure){ .row = -1 };
+    status = initial_attempt (r, held, from, &later, error);
     r->active = before;
     failure->placed |= later.placed;
   }
-  free (active);
+  free (at);
   return status;
 }
 
@@ -255,7 +267,7 @@ static int initial_try (pw_run *r, const unsigned char *held, initial_failure *f
     int ranked = small || !((way->q | way->v) & PW_SPECIFIED);
     if (ranked == before && memcmp (mask, last, placed ? 2 * n : n) == 0) continue;
     initial_failure now = { .row = -1 };
-    status = (ranked ? initial_ranked : initial_attempt) (r, mask, &now, error);
+    status = ranked ? initial_ranked (r, mask, &now, error) : initial_attempt (r, mask, r->q_given, &now, error);
     memcpy (last, mask, 2 * n);
     before = ranked, placed = now.placed;
     if (now.row >= 0) *failure = now;

@@ -115,18 +115,24 @@ static void test_parallelogram_twins (void **state) {
 /* One crank is given at another angle than the others: off the constraints all rows are independent, more or less. */
 static void test_parallelogram_start (void **state) {
   static const char *const crank[] = { "crank1.phi", "crank2.phi", "crank3.phi" };
-  static const double off[] = { 1e-5, 1e-3, 0.1 };
+  static const double off[] = { 1e-5, 1e-3, 0.1, 0.4, 0.6, 1.0 };
   (void)state;
   for (int i = 0; i < 3; i++)
-    for (int k = 0; k < 3; k++) {
+    for (int k = 0; k < 6; k++) {
       pw_error error = { 0 };
       double phi = off[k] - PW_PI / 4;
       pw_model *m = scene_model (&redundant_parallelogram, NULL);
       check_ok (pw_model_set_initial (m, crank[i], phi, &error), &error);
       pw_system *s = scene_compile (m);
       pw_run *r = runs_open (s, "rk4+projection", NULL);
-      assert_int_equal (pw_run_initial (r)->released, 0);
       pw_sample x = runs_to (r, 0);
+      check_below ("initial residual", x.position, 64 * CHECK_EPS, "64 eps: what initial positions are good to");
+      if (off[k] == 1.0) { /* beyond the change point at 0: Newton's iteration may not keep the given angle */
+        pw_run_close (r);
+        pw_system_free (s);
+        continue;
+      }
+      assert_int_equal (pw_run_initial (r)->released, 0);
       for (int j = 0; j < 3; j++)
         check_close (crank[j], trial_state (s, &x, crank[j]), phi, 64 * CHECK_EPS, "64 eps: what a start is good to");
       pw_run_close (r);
