@@ -152,12 +152,26 @@ double pw_first_step (const pw_run *r);
  * pivots are taken from this state; otherwise they are kept. */
 int pw_run_renew (pw_run *r, int fresh, pw_error *error);
 
+static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
+  return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+}
+static inline int pw_fail_signal (double t, pw_error *error) {
+  return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+}
+
+/* Updates kinematics and evaluates J at a state; returns as pw_update_kinematics. */
+static inline int pw_evaluate_J_at (pw_workspace *w, double t, const double *q, const double *v) {
+  int status = pw_update_kinematics (w, t, q, v);
+  if (status == PW_OK) pw_evaluate_J (w);
+  return status;
+}
+
 /* The larger of two values; NaN if either is NaN. */
 static inline double pw_largest (double most, double x) {
   return x > most || isnan (x) ? x : most;
 }
 
-/* Norm of the accelerations at the state reached, in units of L / T^2 (branch.c). */
+/* Norm of the accelerations at the state reached, in units of L / T^2 (watchdog.c). */
 double pw_run_acceleration_norm (const pw_run *r);
 /* Checks the state reached.  PW_METHOD if constraints are lost or contradict each other, or if the motion has jumped to
  * another branch. */
@@ -214,7 +228,7 @@ int pw_run_accelerate_evaluated (pw_run *r, const double *v, double *a, double *
 void pw_show_reached (pw_run *r);
 
 /* Reports why the J last evaluated is unusable at time t: rank lost or nearly lost, or values too extreme
- * (watchdog.c). */
+ * (singular.c). */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
 /* Adds the residuals of the state just evaluated to r->known and the statistics; those that a projection has

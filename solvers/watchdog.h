@@ -10,7 +10,7 @@
 
 struct pw_run;
 
-/* The thresholds; a run has a copy.  Values and derivations are in watchdog.c. */
+/* The thresholds; a run has a copy.  Values and derivations are in singular.c. */
 typedef struct {
   double lost, lost_unstabilised;  /* residuals above which constraints count as lost */
   double follows, magnified;       /* residual of a redundant row: round-off; ratio to those of the others */
@@ -67,15 +67,8 @@ int pw_watchdog_near_state (struct pw_run *r);
  * PW_INPUT. */
 int pw_watchdog_check_values (const struct pw_run *r, pw_error *error);
 
-/* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
-int pw_watchdog_reaches (const struct pw_run *r, double sine, double length);
-
 /* 1 if the J last evaluated is near a singular configuration; geometry.sine is then its sine. */
 int pw_watchdog_near (struct pw_run *r);
-
-/* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has passed a change point without
- * resolving it. */
-int pw_watchdog_follow (struct pw_run *r, pw_error *error);
 
 /* Checks that the motion has come from geometry.q to the state reached without leaving its branch (change_point.c). */
 int pw_change_point_check (struct pw_run *r, double sine, pw_error *error);

@@ -256,7 +256,7 @@ int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
   linear_close (&x);
   r->statistics = before;
   r->near = near;
-  return status == PW_RESOURCE ? pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model) : status;
+  return status == PW_RESOURCE ? pw_fail_memory (r->s, error) : status;
 }
 
 void pw_linear_free (pw_linear *l) {

@@ -130,7 +130,7 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
   change_verdict verdict = CHANGE_UNKNOWN;
   *w = (change_walk){ .r = r, .row = -1 };
   if (memory == NULL) {
-    pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+    pw_fail_memory (s, error);
     return verdict;
   }
   w->q = memory, w->next = w->q + n, w->end = w->next + n, w->in = w->end + n;
@@ -146,8 +146,7 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
 }
 
 static double change_sine_at (pw_run *r, double t, const double *q) {
-  if (pw_update_kinematics (r->w, t, q, r->v) != PW_OK) return 0;
-  pw_evaluate_J (r->w);
+  if (pw_evaluate_J_at (r->w, t, q, r->v) != PW_OK) return 0;
   return pw_watchdog_sine (r, NULL);
 }
 
@@ -210,9 +209,7 @@ int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   if (isnan (g->begun)) g->begun = change_sine_at (r, g->t, g->q);
   int dips = change_dips (r, g->begun, sine, length);
   change_verdict verdict = dips ? change_walk_there (r, &w, &why) : CHANGE_UNKNOWN;
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_evaluate_J (r->w);
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (why.status != PW_OK) return pw_fail (error, why.status, "%s", why.text);
   return dips ? change_report (r, &w, verdict, sine, length, error) : PW_OK;
 }

@@ -78,7 +78,7 @@ static int initial_attempt (pw_run *r, const unsigned char *held, const double *
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   double *weight = malloc (2 * bytes);
-  if (weight == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  if (weight == NULL) return pw_fail_memory (s, error);
   initial_weights (s, s->metric, held, weight);
   int status = PW_OK;
   for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
@@ -163,7 +163,7 @@ static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure
   int status = initial_attempt (r, held, r->q_given, failure, error), rank = s->rows;
   if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
   double *at = malloc (2 * n * sizeof *at + m), *from = at + n;
-  if (at == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  if (at == NULL) return pw_fail_memory (s, error);
   unsigned char *active = (unsigned char *)(from + n);
   memcpy (at, r->q_given, n * sizeof *at);
   memcpy (from, at, n * sizeof *at);
@@ -176,7 +176,7 @@ static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure
     if (status != PW_RETRY || pw_update_kinematics (r->w, r->t, at, r->v_given) != PW_OK) continue;
     pw_evaluate_J (r->w);
     int now = pw_rank_select (r->w, tolerance[i % TOLERANCES], active);
-    if (now < 0) status = pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+    if (now < 0) status = pw_fail_memory (s, error);
     if (now < 0 || now == rank) continue;
     rank = now;
     r->active = active;
@@ -260,7 +260,7 @@ static int initial_try (pw_run *r, const unsigned char *held, initial_failure *f
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords;
   unsigned char *mask = malloc (4 * n + 1), *last = mask + 2 * n;
-  if (mask == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  if (mask == NULL) return pw_fail_memory (s, error);
   int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, placed = 0;
   for (const struct initial_way *way = initial_ways; way < initial_ways + ways && status == PW_RETRY; way++) {
     if (!initial_mask (s, held, way, mask)) continue;
@@ -286,13 +286,13 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *held, pw_error *erro
   memcpy (r->q_given, r->q, bytes);
   memcpy (r->v_given, r->v, bytes);
   int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
-  if (status != PW_OK) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status != PW_OK) return pw_fail_signal (r->t, error);
   pw_evaluate_J (r->w);
   pw_evaluate_residuals (r->w, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
     status = initial_try (r, held, &failure, &released, error);
   initial_report (r, released, &before);
   if (status == PW_OK) status = initial_locked (r, error);
-  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   return status == PW_RETRY ? initial_fail (r, &failure, error) : status;
 }

@@ -27,7 +27,7 @@ int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const
     .own_velocity = weight_v != NULL, .velocity = weight_v ? NULL : r->saddle, .active = r->active, .against = -1
   };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
-  if (p->scratch == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  if (p->scratch == NULL) return pw_fail_memory (s, error);
   p->position = weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
   p->own_position = p->position != r->saddle;
   if (p->own_velocity) p->velocity = pw_saddle_open (r->w, weight_v, s->rows, r->active, error);
@@ -43,7 +43,7 @@ int pw_projector_open_asked (pw_projector *p, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   if (pw_run_option (r, "metric") == 0) return pw_projector_open (p, r, NULL, NULL, error);
   double *one = malloc ((size_t)s->coords * sizeof *one);
-  if (one == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  if (one == NULL) return pw_fail_memory (s, error);
   for (int j = 0; j < s->coords; j++) one[j] = 1;
   int status = pw_projector_open (p, r, one, one, error);
   free (one);

@@ -17,6 +17,20 @@ void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 /* Length of a unit of coordinate j in them: they are the derivatives by q[j] times this. */
 double pw_rank_unit (const pw_system *s, int j);
 
+/* Orthogonalises a row of length n against the `rank` kept ones, of length 1; returns its norm afterwards. */
+double pw_rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n);
+
+/* Numbers in the `rows` of pw_rank_basis: rows x coords, and a norm for each. */
+static inline size_t pw_rank_room (const pw_system *s) {
+  return (size_t)s->rows * ((size_t)s->coords + 1) + 1;
+}
+
+/* pw_rank_select for at most `holonomic` holonomic equations and `all` in all.  The kept rows become an orthonormal
+ * basis of the range of J^T, their numbers go to `kept`.  Holonomic equations come first, since a nonholonomic one must
+ * not take the place of a position. */
+int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
+                   unsigned char *active);
+
 /* Rows kept by Gram-Schmidt on the evaluated J, lengths and angles in units of the scene: active[i] = 1 for a row
  * whose part independent of those kept before exceeds tol of it; holonomic equations first, of these the most
  * independent ones, in order where they are about equal.  Returns the rank, or PW_RESOURCE. */
@@ -47,8 +61,5 @@ double pw_rank_multiplier_unit (const pw_workspace *w, int row);
 /* Multipliers of all equations from those of the active ones: the smallest (forces in units of 1, moments of L) with
  * the same J^T lambda.  J must be evaluated and the run's saddle factorised at the configuration. */
 void pw_rank_least_norm (struct pw_run *r, double *lambda);
-
-/* Frees what pw_rank_open allocated. */
-void pw_rank_close (struct pw_run *r);
 
 #endif

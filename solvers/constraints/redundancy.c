@@ -1,8 +1,108 @@
-/* Describes which equations a redundant one follows from. */
+/* Redundant equations as combinations of the active ones, least-norm multipliers, and their description.
+ *
+ * A redundant equation is J_i = sum_a c_ia J_a over active equations a.  Its coefficients come from the saddle
+ * point: with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum c_ia e_a span the
+ * multipliers that pull on nothing, so the least-norm ones are lambda + sum z_i n_i with z from a small
+ * least-squares problem. */
+#include <lapacke.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include "method.h"
 #include "rank.h"
+
+/* The batch of an equation; *n: its number there. */
+static const pw_element_batch *redundancy_find (const pw_workspace *w, int row, int *n) {
+  const pw_element_batch *k = w->batch;
+  while (row >= k->row + k->b.count * k->kind->rows) k++;
+  *n = row - k->row;
+  return k;
+}
+
+double pw_rank_multiplier_unit (const pw_workspace *w, int row) {
+  int n;
+  const pw_element_batch *k = redundancy_find (w, row, &n);
+  const double *J = k->J + n * k->b.cols;
+  for (int b = 0; b < k->kind->bodies; b++)
+    if (J[3 * b] != 0 || J[3 * b + 1] != 0) return 1;
+  return w->scale.length;
+}
+
+static double redundancy_length (const pw_workspace *w, int row) {
+  int n;
+  double square = 0;
+  const pw_element_batch *k = redundancy_find (w, row, &n);
+  for (int c = 0; c < k->b.cols; c++) {
+    int j = pw_global (k, n / k->kind->rows, c);
+    double x = j < w->s->coords ? k->J[n * k->b.cols + c] / pw_rank_unit (w->s, j) : 0;
+    square += x * x;
+  }
+  return sqrt (square);
+}
+
+/* f += weight J_i^T */
+static void redundancy_add_row (const pw_workspace *w, int row, double weight, double *f) {
+  int n;
+  const pw_element_batch *k = redundancy_find (w, row, &n);
+  for (int c = 0; c < k->b.cols; c++) {
+    int j = pw_global (k, n / k->kind->rows, c);
+    if (j < w->s->coords) f[j] += weight * k->J[n * k->b.cols + c];
+  }
+}
+
+/* Solves for multipliers with the right side f = J^T c, in the run's scratch: c. */
+static void redundancy_solve (pw_run *r, double *f, double *c) {
+  double *nothing = f + r->s->coords + 3;
+  memset (nothing, 0, (size_t)r->s->rows * sizeof *nothing);
+  pw_saddle_solve (r->saddle, f, nothing, f, c);
+}
+
+/* Room for f in the run's scratch, zeroed. */
+static double *redundancy_force (pw_run *r) {
+  int m = r->s->rows, k = r->redundant;
+  double *f = r->coefficient + k * m + k * k + k;
+  return memset (f, 0, (size_t)r->s->coords * sizeof *f);
+}
+
+void pw_rank_coefficients (pw_run *r, int i) {
+  double *f = redundancy_force (r);
+  redundancy_add_row (r->w, r->redundant_row[i], 1, f);
+  redundancy_solve (r, f, r->coefficient + i * r->s->rows);
+}
+
+/* An irregular sum of the redundant equations, in which nothing cancels, needs one solve for any number of them. */
+double pw_rank_conditioning (pw_run *r) {
+  double *c = r->coefficient, *f = redundancy_force (r), most = 0;
+  for (int i = 0; i < r->redundant; i++) {
+    int row = r->redundant_row[i];
+    double x = pw_sin (2.39996 * (row + 1)), length = redundancy_length (r->w, row);
+    if (length > 0) redundancy_add_row (r->w, row, (x + copysign (1, x)) / 2 / length, f);
+  }
+  redundancy_solve (r, f, c);
+  for (int row = 0; row < r->s->rows; row++)
+    if (r->active[row]) most = pw_largest (most, fabs (c[row]) * redundancy_length (r->w, row));
+  return isnan (most) ? 0 : 1 / most;
+}
+
+void pw_rank_least_norm (pw_run *r, double *lambda) {
+  int m = r->s->rows, k = r->redundant;
+  double *c = r->coefficient, *A = c + k * m, *z = A + k * k;
+  for (int i = 0; i < k; i++) pw_rank_coefficients (r, i);
+  memset (A, 0, (size_t)(k * k + k) * sizeof *A);
+  for (int row = 0; row < m; row++) { /* minimise sum ((lambda + N z) / size)^2, N = [e_i - c_i] */
+    double size = pw_rank_multiplier_unit (r->w, row), weight = 1 / (size * size);
+    for (int i = 0; i < k; i++) {
+      double n = (r->redundant_row[i] == row) - c[i * m + row];
+      z[i] -= weight * n * lambda[row];
+      for (int j = 0; j <= i; j++) A[i * k + j] += weight * n * ((r->redundant_row[j] == row) - c[j * m + row]);
+    }
+  }
+  LAPACKE_dposv_work (LAPACK_COL_MAJOR, 'U', k, 1, A, k, z, k);
+  for (int row = 0; row < m; row++)
+    for (int i = 0; i < k; i++) lambda[row] += z[i] * ((r->redundant_row[i] == row) - c[i * m + row]);
+}
+
+/* ---- Description ---- */
 
 /* Names a row's element after what is in the buffer: "pin B" or, with its row, "pin B (B.Fx)"; the new length. */
 static size_t redundancy_name_row (const pw_system *s, int row, int whole, char *buffer, size_t size, size_t n) {
@@ -47,8 +147,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
   const pw_system *s = r->s;
   int row = r->redundant_row[i], partners = 0, last = -1, elements = 0;
   size_t n = redundancy_name_row (s, row, 1, buffer, size, 0);
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
-  pw_evaluate_J (r->w);
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return buffer;
   if (pw_saddle_factor (r->saddle) != PW_OK) return buffer;
   pw_rank_coefficients (r, i);
   const double *c = r->coefficient + i * s->rows;

@@ -13,7 +13,7 @@ int pw_dense_output_open (pw_dense_output *b, pw_run *r, int rates, pw_error *er
     { &b->q0, n }, { &b->v0, n }, { &b->a0, n }, { &b->lambda0, rows }, { &b->ledger0, entries }, { &b->rate0, entries }
   };
   b->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (b->memory == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (b->memory == NULL) return pw_fail_memory (r->s, error);
   return pw_projector_open (&b->projector, r, NULL, NULL, error);
 }
 
@@ -81,7 +81,7 @@ int pw_dense_output_at (pw_dense_output *b, pw_run *r, double t, pw_error *error
   int status = dense_inside (b, r, t);
   r->statistics = keep;
   if (status == PW_OK) return PW_OK;
-  if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", t);
+  if (status == PW_METHOD) return pw_fail_signal (t, error);
   if (r->near) return pw_fail_singular (r, t, error);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: no state near the one between steps meets the constraints; "

@@ -44,7 +44,7 @@ int pw_step_open (pw_run *r, int arrays, pw_error *error) {
   if (d) d->length = n > rows ? n : rows;
   const pw_array array[] = { { &d->a, n }, { &d->lambda, rows }, { &d->array, (size_t)arrays * (d ? d->length : 0) } };
   if (d) d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
-  if (d == NULL || d->memory == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (d == NULL || d->memory == NULL) return pw_fail_memory (r->s, error);
   int status = pw_dense_output_open (&d->last, r, projects ? 1 : -1, error);
   if (status == PW_OK && projects) status = pw_projector_open (&d->projector, r, NULL, NULL, error);
   return status == PW_OK ? pw_step_restart (r, error) : status;
@@ -90,7 +90,7 @@ static int step_evaluate (pw_run *r, double t, double *q, double *v) {
 }
 
 static int step_fail (pw_run *r, int status, double h, pw_error *error) {
-  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status < 0) return pw_fail_signal (r->t, error);
   if (pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
   return pw_fail (error, PW_METHOD,
                   "t = %.6g s: the step of %.6g s is too large: its end cannot be evaluated, or not be projected", r->t,

@@ -28,7 +28,7 @@ int pw_run_open_saddle (pw_run *r, pw_error *error) {
 int pw_run_evaluate (pw_run *r, pw_error *error) {
   int status = pw_run_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
   if (status > 0) return pw_fail_singular (r, r->t, error);
-  if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (status < 0) return pw_fail_signal (r->t, error);
   pw_ledger_rates (r, r->lambda, r->rate);
   pw_bound_tolerances (r);
   return PW_OK;
@@ -69,7 +69,7 @@ void pw_run_close (pw_run *r) {
   run_drop_method (r);
   pw_saddle_close (r->saddle);
   pw_watchdog_close (r);
-  pw_rank_close (r);
+  free (r->rank_memory);
   pw_workspace_free (r->w);
   free (r->memory);
   free (r->origin);
@@ -113,7 +113,7 @@ static int run_reselect (pw_run *r, pw_error *error) {
   int status = pw_run_sample (r, r->t, &sample, error);
   if (status != PW_OK) return status;
   int other = pw_rank_reselect (r);
-  if (other < 0) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (other < 0) return pw_fail_memory (r->s, error);
   if (other == 0) return PW_OK;
   return pw_run_renew (r, 1, error);
 }
@@ -220,8 +220,7 @@ static void run_exchange (double *x, double *kept, const double *other, int n) {
 }
 
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   *energy = pw_kinetic (r->s, r->v) + pw_potential (r->w);
   return PW_OK;
 }

@@ -51,9 +51,7 @@ static int checkpoint_plausible (const pw_run *r) {
 
 /* Continues from the state in the run, after saving or loading; `a` is loading, at the method's own data, if any. */
 static int checkpoint_continue (pw_run *r, pw_archive *a, pw_error *error) {
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
-  pw_evaluate_J (r->w);
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   r->near = 0;
   if (r->method->carry == NULL) r->statistics.restarts++;
   int status = pw_run_renew (r, 0, error);
@@ -71,7 +69,7 @@ int pw_run_save (pw_run *r, pw_archive *a, pw_error *error) {
   checkpoint_state (r, a);
   pw_archive own = { .used = a->used, .loading = 1 };
   if (r->method->carry) r->method->carry (r, a);
-  if (a->failed) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (a->failed) return pw_fail_memory (r->s, error);
   own.at = a->at;
   own.size = a->used;
   return checkpoint_continue (r, &own, error);

@@ -136,7 +136,7 @@ static int run_check_derivatives (pw_run *r, const char *method, pw_error *error
   char block[200];
   if (!r->differentiates) return PW_OK;
   int found = pw_find_missing (r->w, r->t, r->q, r->v, block, sizeof block);
-  if (found == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (found == PW_RESOURCE) return pw_fail_memory (r->s, error);
   if (found == 0)
     return pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK
                                                                   : pw_fail (error, PW_METHOD, "a signal failed");
@@ -151,7 +151,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   if (settings == NULL) settings = &none;
   r->limits = pw_watchdog_limits;
   r->refuse = r->limits.rank;
-  if (run_allocate (r) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
+  if (run_allocate (r) != PW_OK) return pw_fail_memory (r->s, error);
   if (run_initial_values (r, settings, error) != PW_OK ||
       pw_parse_options (method, settings->methods, &r->method, &r->stabilisation, r->option, error) != PW_OK)
     return PW_INPUT;
@@ -177,7 +177,7 @@ pw_run *pw_run_open (const pw_system *s, const char *method, const pw_settings *
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
   pw_run *r = calloc (1, sizeof *r);
   if (r == NULL) {
-    pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+    pw_fail_memory (s, error);
     return NULL;
   }
   r->s = s;

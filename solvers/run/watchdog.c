@@ -1,240 +1,36 @@
-/* The watchdog's thresholds, and the distance of the constraints from singular configurations; see watchdog.h.
+/* Checks that the state reached is still on the motion: constraints lost or contradictory, a jump to another branch
+ * at a singular configuration.
  *
  * The sine of the smallest angle between a row and those before it changes by at most about the motion of the
  * bodies, so it is computed again only when the motion since could have brought it to 0. */
-#include <float.h>
-#include <math.h>
-#include <stdlib.h>
+#include <stdio.h>
 #include <string.h>
 #include "method.h"
-#include "rank.h"
 
-/* Residuals are scaled, sines are of angles between rows. s: the sine over the largest one; d: the constraint
- * residual.  Where branches meet the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a
- * residual d they are x y = d, whose branches turn where s^2 = 2 d. */
-const pw_watchdog pw_watchdog_limits = {
-  /* With residuals of a hundredth of the scene the motion is wrong; without stabilisation some drift is expected. */
-  .lost = 1e-2,
-  .lost_unstabilised = 0.1,
-
-  /* A redundant row follows from the others to some 1e6 eps of round-off, or to their residuals, magnified by a sine
-   * as small as 1e-4. */
-  .follows = 1e-9,
-  .magnified = 1e4,
-
-  /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
-   * error of eps / s after refinement, are wrong by more than 1e-10.  `suspect`: after rows that are nearly
-   * dependent themselves, round-off leaves up to 1e-5; the rank is examined below a hundred times that, or refused
-   * below `dependent` if it cannot be. */
-  .rank = 1e-6,
-  .suspect = 1e-3,
-  .dependent = 1e-5,
-
-  /* Residuals of 1e-16 leave an error of 1e-8 in a sine; ten times that. */
-  .independent = 1e-7,
-
-  /* A stage of a step h has a residual of about h^2 / 8, which decides on the branch unless s^2 is much larger: at
-   * 1e-3 s and a few rad/s for s of 0.02.  A factorisation has an error of eps / s^2, 5e-13 at 0.02. */
-  .near = 0.02,
-  .refine = 0.02,
-
-  /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest;
-   * accelerations have grown by a factor of 3 when it is 0.02 to 0.07.  Above `regular` a configuration is not
-   * singular, however large the drift. */
-  .regular = 0.6,
-  .turn = 3,
-  .least_turn = 0.1,
-  .drift_turn = 0.02,
-  .drift_near = 0.01,
-  .drift_far = 1e-2,
-  .drift_any = 0.1,
-
-  /* Nonholonomic rows: accelerations do not grow when the motion passes a singular configuration; in a jump they reach
-   * 1 / near^1 times and more. */
-  .jump = 100,
-
-  /* The direction of a row of length 1 turns by at most an angle of 1 per rad, that of the others too; step sizes of
-   * one step to the next. */
-  .lipschitz = 2,
-  .growth = 2,
-
-  /* Change points (change_point.c): a sine within a step below an eighth of those at its ends belongs to a corner
-   * that the step cannot resolve; half of them indicates that there may be one.  Strides of 0.3 s stay on a curve
-   * whose radius is s.  A stride that gains less than a tenth of its length leads elsewhere. */
-  .dip = 0.125,
-  .sag = 0.5,
-  .stride = 0.3,
-  .progress = 0.1,
-
-  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times
-   * that, it cannot be distinguished from 0 (`met`: with the tolerance of a stride).  Such a point must be left
-   * straight on, within 60 degrees of the direction in which it was entered. */
-  .floor = 1e-6,
-  .met = 2e-6,
-  .ahead = 0.5,
-
-  /* Methods of order 2 leave (0.4)^2 / 12 = 1 % at a corner as long as 1 / 0.4 steps. */
-  .resolved = 0.4,
-
-  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the
-   * error of a good step, 1e-7, do not agree. */
-  .agree = 1e-7,
-  .agree_best = 1e-11,
-
-  /* A sample does not go into the next step: one that is seen to be good to a hundredth is worth showing. */
-  .sample = 1e-2,
-  .sample_best = 1e-9,
-
-  /* Conditioning of the active rows: another set is sought at 0.6 of the initial value, and where a coefficient exceeds
-   * 1 / 0.7. */
-  .loosened = 0.6,
-  .loose = 0.7,
-
-  /* Products of three masses must neither overflow nor underflow. */
-  .extreme = 1e100,
-
-  /* Libraries reduce a step by factors of 4 to 10: 25 reductions until it is below round-off. */
-  .stalled = 1000,
-};
-
-enum { WATCHDOG_PLACES = 4 };
-
-/* ---- Opening ---- */
-
-static int watchdog_root (int *set, int b) {
-  while (set[b] != b) b = set[b] = set[set[b]];
-  return b;
-}
-
-/* 1 if an element connects bodies that are already connected (the ground is a body); -1 if out of memory. */
-static int watchdog_has_loops (const pw_system *s) {
-  int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
-  if (set == NULL) return -1;
-  for (int b = 0; b <= s->bodies; b++) set[b] = b;
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints && k->row < s->holonomic; k++)
-    for (int e = 0; e < k->b.count; e++)
-      for (int n = 1; n < k->kind->bodies; n++) {
-        const int *column = k->column + e * k->kind->bodies;
-        int a = watchdog_root (set, column[0] < 3 * s->bodies ? column[0] / 3 : s->bodies);
-        int b = watchdog_root (set, column[n] < 3 * s->bodies ? column[n] / 3 : s->bodies);
-        loops |= a == b;
-        set[b] = a;
-      }
-  free (set);
-  return loops;
-}
-
-/* The rows of a tree of bodies cannot become dependent, whatever its configuration. */
-int pw_watchdog_open (pw_run *r, pw_error *error) {
+double pw_run_acceleration_norm (const pw_run *r) {
   const pw_system *s = r->s;
-  pw_geometry *g = &r->geometry;
-  size_t n = (size_t)s->coords + 3;
-  g->loops = watchdog_has_loops (s);
-  if (g->loops < 0) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
-  g->fixed = pw_fixed_steps (r);
-  if (g->loops == 0 && s->rows == s->holonomic) return PW_OK;
-  pw_saddle_close (g->saddle);
-  if (g->q == NULL) g->q = malloc (n * sizeof *g->q);
-  double *weight = malloc (n * sizeof *weight);
-  g->saddle = NULL;
-  if (g->q && weight) {
-    for (int j = 0; j < s->coords; j++) weight[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
-    g->saddle = pw_saddle_open (r->w, weight, s->rows, r->active, error);
+  const double *a = r->a, *internal = a + 3 * s->bodies;
+  double linear = 0, angular = 0, per = r->w->scale.time * r->w->scale.time;
+  for (; a < internal; a += 3) {
+    linear = pw_largest (pw_largest (linear, fabs (a[0])), fabs (a[1]));
+    angular = pw_largest (angular, fabs (a[2]));
   }
-  free (weight);
-  return g->saddle ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  for (; a < r->a + s->coords; a++) angular = pw_largest (angular, fabs (*a));
+  return pw_largest (linear * (per / s->scale.length), angular * per);
 }
 
-void pw_watchdog_close (pw_run *r) {
-  pw_saddle_close (r->geometry.saddle);
-  free (r->geometry.q);
-  r->geometry = (pw_geometry){ 0 };
-}
-
-/* ---- Sines ---- */
-
-double pw_watchdog_sine (pw_run *r, int *row) {
-  int which;
-  pw_saddle *k = r->geometry.saddle;
-  if (k == NULL) return 1;
-  int status = pw_saddle_factor (k);
-  double sine = pw_saddle_pivot (k, &which);
-  if (row) *row = which;
-  return status == PW_OK && !isnan (sine) ? sine : 0;
-}
-
-int pw_watchdog_near (pw_run *r) {
-  pw_geometry *g = &r->geometry;
-  if (!g->alert || g->saddle == NULL) return 0;
-  if (!g->fixed && !pw_saddle_below (r->saddle, r->limits.refine)) return 0;
-  g->sine = pw_watchdog_sine (r, NULL);
-  return g->sine < r->limits.near * g->typical;
-}
-
-int pw_fail_singular (pw_run *r, double t, pw_error *error) {
-  char element[120] = "a constraint";
-  int row = -1;
-  double sine = pw_watchdog_sine (r, &row);
-  if (sine > r->limits.near * r->geometry.typical)
-    return pw_fail (
-        error, PW_METHOD,
-        "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
-        "cannot be solved; the configuration is not singular",
-        t);
-  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
-  if (sine <= r->limits.rank)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s says what other constraints say already",
-                    t, element);
-  return pw_fail (
-      error, PW_METHOD,
-      "t = %.6g s: near a singular configuration: %s says almost what other constraints say (sine %.2g); the next "
-      "step cannot be computed",
-      t, element, sine);
-}
-
-int pw_watchdog_near_state (pw_run *r) {
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) != PW_OK) return 0;
-  pw_evaluate_J (r->w);
-  r->geometry.alert = 1;
-  return pw_watchdog_near (r);
-}
-
-int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
-  const pw_system *s = r->s;
-  const pw_watchdog *limits = &r->limits;
-  for (int i = 0; i < 2 * s->coords; i++) {
-    double value = i < s->coords ? r->q[i] : r->v[i - s->coords];
-    char name[120];
-    if (!(fabs (value) < limits->extreme))
-      return pw_fail (error, PW_INPUT, "model %s: values too extreme: %s is initially %g: expected less than %g",
-                      s->model, pw_system_state_name (s, i, name, sizeof name), value, limits->extreme);
+/* The largest change of a body's coordinate in the last step, scaled. */
+static double watchdog_step_length (const pw_run *r) {
+  const double *last = r->geometry.q, *q = r->q;
+  double length = 0, angle = 0;
+  for (int j = 0; j < 3 * r->s->bodies; j += 3) {
+    length = pw_larger (fabs (q[j] - last[j]), pw_larger (fabs (q[j + 1] - last[j + 1]), length));
+    angle = pw_larger (fabs (q[j + 2] - last[j + 2]), angle);
   }
-  for (int j = 0; s->rows > 0 && j < s->coords; j++) {
-    double mass = s->mass[j] / (pw_is_angle (s, j) ? s->scale.length * s->scale.length : 1);
-    char name[120];
-    if (mass == 0 || (mass < limits->extreme && mass > 1 / limits->extreme)) continue;
-    return pw_fail (
-        error, PW_INPUT,
-        "model %s: values too extreme: the mass or inertia that goes with %s is %g: expected 0, or %g to %g", s->model,
-        pw_system_state_name (s, j, name, sizeof name), s->mass[j], 1 / limits->extreme, limits->extreme);
-  }
-  return PW_OK;
+  return pw_larger (length / r->s->scale.length, angle);
 }
 
 /* ---- Following the motion ---- */
-
-/* The largest change of a coordinate in the last step, scaled. */
-static double watchdog_step_length (pw_run *r) {
-  const pw_system *s = r->s;
-  double *last = r->geometry.q, length = 0, angle = 0;
-  int n = 3 * s->bodies;
-  for (int j = 0; j < n; j += 3) {
-    length = pw_larger (fabs (r->q[j] - last[j]), length);
-    length = pw_larger (fabs (r->q[j + 1] - last[j + 1]), length);
-    angle = pw_larger (fabs (r->q[j + 2] - last[j + 2]), angle);
-  }
-  return pw_larger (length / s->scale.length, angle);
-}
 
 /* Records the sine at the state reached. */
 static void watchdog_record_sine (pw_run *r, double sine) {
@@ -244,7 +40,8 @@ static void watchdog_record_sine (pw_run *r, double sine) {
   g->typical = fmax (g->typical, sine);
 }
 
-int pw_watchdog_reaches (const pw_run *r, double sine, double length) {
+/* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
+static int watchdog_reaches (const pw_run *r, double sine, double length) {
   const pw_geometry *g = &r->geometry;
   return g->saddle && !(g->known - r->limits.lipschitz * g->typical * (g->moved + length) > sine);
 }
@@ -253,18 +50,16 @@ int pw_watchdog_reaches (const pw_run *r, double sine, double length) {
 static void watchdog_sample_sines (pw_run *r) {
   const pw_system *s = r->s;
   pw_geometry *g = &r->geometry;
-  for (int n = 1; n <= WATCHDOG_PLACES; n++) {
+  for (int n = 1; n <= 4; n++) {
     for (int j = 0; j < s->coords; j++) g->q[j] = r->q[j] + 0.5 * pw_unit (s, j) * pw_sin (2.39996 * (j + 1) * n + n);
-    if (pw_update_kinematics (r->w, r->t, g->q, r->v) != PW_OK) break;
-    pw_evaluate_J (r->w);
+    if (pw_evaluate_J_at (r->w, r->t, g->q, r->v) != PW_OK) break;
     g->typical = fmax (g->typical, pw_watchdog_sine (r, NULL));
   }
-  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK) pw_evaluate_J (r->w);
+  (void)pw_evaluate_J_at (r->w, r->t, r->q, r->v);
 }
 
 void pw_watchdog_begin (pw_run *r) {
   pw_geometry *g = &r->geometry;
-  size_t n = (size_t)r->s->coords * sizeof (double);
   if (g->saddle == NULL) return;
   if (g->typical == 0) watchdog_sample_sines (r);
   watchdog_record_sine (r, pw_watchdog_sine (r, NULL));
@@ -274,18 +69,19 @@ void pw_watchdog_begin (pw_run *r) {
   g->before = NAN;
   g->crossed = 0;
   g->alert = 1;
-  memcpy (g->q, r->q, n);
+  memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
 }
 
-int pw_watchdog_follow (pw_run *r, pw_error *error) {
+/* Checks the step to the state reached, where J is evaluated.  PW_METHOD if it has passed a change point without
+ * resolving it. */
+static int watchdog_follow (pw_run *r, pw_error *error) {
   pw_geometry *g = &r->geometry;
   int status = PW_OK;
-  size_t n = (size_t)r->s->coords * sizeof (double);
   if (g->saddle == NULL) return PW_OK;
   g->step = watchdog_step_length (r);
   g->moved += g->step;
-  double near = r->limits.near * g->typical;
-  int now = pw_watchdog_reaches (r, near, r->limits.growth * g->step);
+  double near = r->limits.near * g->typical, ahead = r->limits.growth * g->step;
+  int now = watchdog_reaches (r, near, ahead);
   if (now) {
     double last = g->moved == g->step ? g->known : NAN;
     watchdog_record_sine (r, pw_watchdog_sine (r, &g->row));
@@ -295,9 +91,112 @@ int pw_watchdog_follow (pw_run *r, pw_error *error) {
   } else
     g->before = NAN, g->slope = 0, g->crossed = 0;
   if (now && g->known < near) r->near = 1;
-  g->alert = now && pw_watchdog_reaches (r, near, r->limits.growth * g->step);
+  g->alert = now && watchdog_reaches (r, near, ahead);
   g->t = r->t;
   g->begun = now ? g->known : NAN;
-  memcpy (g->q, r->q, n);
+  memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
   return status;
+}
+
+/* ---- Lost constraints ---- */
+
+static int watchdog_fail_lost (pw_run *r, pw_error *error) {
+  pw_residuals now;
+  char element[120] = "a constraint", cause[60] = "constraint drift";
+  pw_evaluate_residuals (r->w, NULL, &now);
+  int row = now.position > now.velocity ? now.row_position : now.row_velocity;
+  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
+  const char *advice = "";
+  if (row >= 0 && r->active && !r->active[row])
+    snprintf (cause, sizeof cause, "constraints contradict each other");
+  else if (pw_stabilised_by (r, PW_UNSTABILISED))
+    advice = pw_fixed_steps (r) ? "; a smaller step or a stabilisation reduces it"
+                                : "; a smaller tolerance or a stabilisation reduces it";
+  else if (pw_fixed_steps (r))
+    snprintf (cause, sizeof cause, "the step of %.6g s is too large", r->settings.step);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: %s: %s is violated by %.3g in position and %.3g in rate (scaled)%s",
+                  r->t, cause, element, now.position, now.velocity, advice);
+}
+
+static int watchdog_exceeds (double position, double velocity, double limit) {
+  return !(position <= limit && velocity <= limit);
+}
+
+/* 1 if a redundant row is violated by more than the residuals of the others explain: it contradicts them. */
+static int watchdog_contradicts (pw_run *r) {
+  pw_residuals all, enforced;
+  pw_evaluate_residuals (r->w, NULL, &all);
+  if (!watchdog_exceeds (all.position, all.velocity, r->limits.follows)) return 0;
+  pw_evaluate_residuals (r->w, r->active, &enforced);
+  double explained = r->limits.follows + r->limits.magnified * fmax (enforced.position, enforced.velocity);
+  return watchdog_exceeds (all.position, all.velocity, explained);
+}
+
+/* ---- Branches ---- */
+
+/* The constraint residual, in units of the scene. */
+static double watchdog_residual (const pw_run *r) {
+  return pw_larger (r->known.position, r->known.g / r->s->scale.length);
+}
+
+/* 1 if a constraint residual `off` may decide which branch is followed: if the sine s of the smallest angle between
+ * rows, below its regular value, is not much larger than the square root of the residual.
+ *
+ * Where two branches of a motion cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|.  With
+ * a residual d they are x y = d: the branches do not cross but turn into each other, where s^2 is about 2 d.  A
+ * method that follows the drifted constraints follows the turn, however small its steps. */
+static int watchdog_unresolved (pw_run *r, double off, double part) {
+  int row;
+  double bound = fmin (sqrt (off / part), r->limits.regular * r->geometry.typical);
+  return bound > r->limits.rank && watchdog_reaches (r, bound, 0) && pw_watchdog_sine (r, &row) < bound &&
+         row < r->s->holonomic;
+}
+
+/* Such a turn is a rounded corner, the wider the larger the residual: its accelerations need not jump. */
+static int watchdog_check_turn (pw_run *r, double now, pw_error *error) {
+  const pw_watchdog *limit = &r->limits;
+  double off = watchdog_residual (r), before = fmax (r->before, limit->least_turn);
+  if (!(now <= limit->turn * before) && watchdog_unresolved (r, off, limit->drift_turn))
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) may lead to "
+                    "another branch, with %.3g times the accelerations of before; methods with projection pass",
+                    r->t, r->known.position, now / before);
+  if (!(off <= limit->drift_far) && watchdog_unresolved (r, off, limit->drift_any))
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) tell no branch "
+                    "from another; methods with projection pass",
+                    r->t, r->known.position);
+  return PW_OK;
+}
+
+/* 1 near a singular configuration of nonholonomic rows, or if the state is not finite. */
+static int watchdog_near_rows (pw_run *r, double norm) {
+  int row;
+  if (!r->near) return 0;
+  pw_watchdog_sine (r, &row);
+  return row < 0 || row >= r->s->holonomic || !isfinite (norm);
+}
+
+/* Accelerations of the physical motion do not grow at a singular configuration; in a jump to another branch they do. */
+static int watchdog_check_jump (pw_run *r, pw_error *error) {
+  double now = pw_run_acceleration_norm (r);
+  if (watchdog_near_rows (r, now) && !(now <= r->limits.jump * r->reference_level))
+    return pw_fail (error, PW_METHOD,
+                    "t = %.6g s: lost at a singular configuration: the accelerations are %.3g times those before", r->t,
+                    now / r->reference_level);
+  if (r->near || watchdog_unresolved (r, watchdog_residual (r), r->limits.drift_near))
+    return watchdog_check_turn (r, now, error);
+  r->reference_level = pw_larger (now, r->reference_level);
+  r->before = now;
+  return PW_OK;
+}
+
+int pw_run_watchdog (pw_run *r, pw_error *error) {
+  const pw_statistics *s = &r->statistics;
+  pw_note_residuals (r);
+  double lost = pw_stabilised_by (r, PW_UNSTABILISED) ? r->limits.lost_unstabilised : r->limits.lost;
+  if (watchdog_exceeds (s->position, s->velocity, lost) || (r->redundant && watchdog_contradicts (r)))
+    return watchdog_fail_lost (r, error);
+  int status = watchdog_follow (r, error);
+  return status == PW_OK ? watchdog_check_jump (r, error) : status;
 }

@@ -93,7 +93,7 @@ void pw_show_reached (pw_run *r) {
   memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
   memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
   r->projected_at = r->projected;
-  if (pw_update_kinematics (r->w, r->t, r->q_at, r->v_at) == PW_OK) pw_evaluate_J (r->w);
+  (void)pw_evaluate_J_at (r->w, r->t, r->q_at, r->v_at);
 }
 
 void pw_note_residuals (pw_run *r) {

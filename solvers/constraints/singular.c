@@ -1,0 +1,215 @@
+/* The watchdog's thresholds, and the distance of the constraints from singular configurations; see watchdog.h. */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "method.h"
+#include "rank.h"
+
+/* Residuals are scaled, sines are of angles between rows. s: the sine over the largest one; d: the constraint
+ * residual.  Where branches meet the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a
+ * residual d they are x y = d, whose branches turn where s^2 = 2 d. */
+const pw_watchdog pw_watchdog_limits = {
+  /* With residuals of a hundredth of the scene the motion is wrong; without stabilisation some drift is expected. */
+  .lost = 1e-2,
+  .lost_unstabilised = 0.1,
+
+  /* A redundant row follows from the others to some 1e6 eps of round-off, or to their residuals, magnified by a sine
+   * as small as 1e-4. */
+  .follows = 1e-9,
+  .magnified = 1e4,
+
+  /* Round-off leaves sqrt (eps) = 1.5e-8 of a row that depends on others; below the sine 1e-6 accelerations, with an
+   * error of eps / s after refinement, are wrong by more than 1e-10.  `suspect`: after rows that are nearly
+   * dependent themselves, round-off leaves up to 1e-5; the rank is examined below a hundred times that, or refused
+   * below `dependent` if it cannot be. */
+  .rank = 1e-6,
+  .suspect = 1e-3,
+  .dependent = 1e-5,
+
+  /* Residuals of 1e-16 leave an error of 1e-8 in a sine; ten times that. */
+  .independent = 1e-7,
+
+  /* A stage of a step h has a residual of about h^2 / 8, which decides on the branch unless s^2 is much larger: at
+   * 1e-3 s and a few rad/s for s of 0.02.  A factorisation has an error of eps / s^2, 5e-13 at 0.02. */
+  .near = 0.02,
+  .refine = 0.02,
+
+  /* Drift: measured on four-bar linkages and slider-cranks, d / s^2 is 0.08 to 0.34 where the turn is sharpest;
+   * accelerations have grown by a factor of 3 when it is 0.02 to 0.07.  Above `regular` a configuration is not
+   * singular, however large the drift. */
+  .regular = 0.6,
+  .turn = 3,
+  .least_turn = 0.1,
+  .drift_turn = 0.02,
+  .drift_near = 0.01,
+  .drift_far = 1e-2,
+  .drift_any = 0.1,
+
+  /* Nonholonomic rows: accelerations do not grow when the motion passes a singular configuration; in a jump they reach
+   * 1 / near^1 times and more. */
+  .jump = 100,
+
+  /* The direction of a row of length 1 turns by at most an angle of 1 per rad, that of the others too; step sizes of
+   * one step to the next. */
+  .lipschitz = 2,
+  .growth = 2,
+
+  /* Change points (change_point.c): a sine within a step below an eighth of those at its ends belongs to a corner
+   * that the step cannot resolve; half of them indicates that there may be one.  Strides of 0.3 s stay on a curve
+   * whose radius is s.  A stride that gains less than a tenth of its length leads elsewhere. */
+  .dip = 0.125,
+  .sag = 0.5,
+  .stride = 0.3,
+  .progress = 0.1,
+
+  /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times
+   * that, it cannot be distinguished from 0 (`met`: with the tolerance of a stride).  Such a point must be left
+   * straight on, within 60 degrees of the direction in which it was entered. */
+  .floor = 1e-6,
+  .met = 2e-6,
+  .ahead = 0.5,
+
+  /* Methods of order 2 leave (0.4)^2 / 12 = 1 % at a corner as long as 1 / 0.4 steps. */
+  .resolved = 0.4,
+
+  /* Divisions of a step near a singular configuration mostly agree to 1e-11; those that differ by more than the
+   * error of a good step, 1e-7, do not agree. */
+  .agree = 1e-7,
+  .agree_best = 1e-11,
+
+  /* A sample does not go into the next step: one that is seen to be good to a hundredth is worth showing. */
+  .sample = 1e-2,
+  .sample_best = 1e-9,
+
+  /* Conditioning of the active rows: another set is sought at 0.6 of the initial value, and where a coefficient exceeds
+   * 1 / 0.7. */
+  .loosened = 0.6,
+  .loose = 0.7,
+
+  /* Products of three masses must neither overflow nor underflow. */
+  .extreme = 1e100,
+
+  /* Libraries reduce a step by factors of 4 to 10: 25 reductions until it is below round-off. */
+  .stalled = 1000,
+};
+
+/* ---- Opening ---- */
+
+static int singular_root (int *set, int b) {
+  while (set[b] != b) b = set[b] = set[set[b]];
+  return b;
+}
+
+/* 1 if an element connects bodies that are already connected (the ground is a body); -1 if out of memory. */
+static int singular_has_loops (const pw_system *s) {
+  int loops = 0, *set = malloc (((size_t)s->bodies + 1) * sizeof *set);
+  if (set == NULL) return -1;
+  for (int b = 0; b <= s->bodies; b++) set[b] = b;
+  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints && k->row < s->holonomic; k++)
+    for (int e = 0; e < k->b.count; e++)
+      for (int n = 1; n < k->kind->bodies; n++) {
+        const int *column = k->column + e * k->kind->bodies;
+        int a = singular_root (set, column[0] < 3 * s->bodies ? column[0] / 3 : s->bodies);
+        int b = singular_root (set, column[n] < 3 * s->bodies ? column[n] / 3 : s->bodies);
+        loops |= a == b;
+        set[b] = a;
+      }
+  free (set);
+  return loops;
+}
+
+/* The rows of a tree of bodies cannot become dependent, whatever its configuration. */
+int pw_watchdog_open (pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  pw_geometry *g = &r->geometry;
+  size_t n = (size_t)s->coords + 3;
+  g->loops = singular_has_loops (s);
+  if (g->loops < 0) return pw_fail_memory (s, error);
+  g->fixed = pw_fixed_steps (r);
+  if (g->loops == 0 && s->rows == s->holonomic) return PW_OK;
+  pw_saddle_close (g->saddle);
+  if (g->q == NULL) g->q = malloc (n * sizeof *g->q);
+  double *weight = malloc (n * sizeof *weight);
+  g->saddle = NULL;
+  if (g->q && weight) {
+    for (int j = 0; j < s->coords; j++) weight[j] = pw_rank_unit (s, j) * pw_rank_unit (s, j);
+    g->saddle = pw_saddle_open (r->w, weight, s->rows, r->active, error);
+  }
+  free (weight);
+  return g->saddle ? PW_OK : pw_fail_memory (s, error);
+}
+
+void pw_watchdog_close (pw_run *r) {
+  pw_saddle_close (r->geometry.saddle);
+  free (r->geometry.q);
+  r->geometry = (pw_geometry){ 0 };
+}
+
+/* ---- Sines ---- */
+
+double pw_watchdog_sine (pw_run *r, int *row) {
+  int which;
+  pw_saddle *k = r->geometry.saddle;
+  if (k == NULL) return 1;
+  int status = pw_saddle_factor (k);
+  double sine = pw_saddle_pivot (k, &which);
+  if (row) *row = which;
+  return status == PW_OK && !isnan (sine) ? sine : 0;
+}
+
+int pw_watchdog_near (pw_run *r) {
+  pw_geometry *g = &r->geometry;
+  if (!g->alert || g->saddle == NULL) return 0;
+  if (!g->fixed && !pw_saddle_below (r->saddle, r->limits.refine)) return 0;
+  g->sine = pw_watchdog_sine (r, NULL);
+  return g->sine < r->limits.near * g->typical;
+}
+
+int pw_fail_singular (pw_run *r, double t, pw_error *error) {
+  char element[120] = "a constraint";
+  int row = -1;
+  double sine = pw_watchdog_sine (r, &row);
+  if (sine > r->limits.near * r->geometry.typical)
+    return pw_fail (
+        error, PW_METHOD,
+        "t = %.6g s: values too extreme: masses and inertias differ by so much that the equations of motion "
+        "cannot be solved; the configuration is not singular",
+        t);
+  if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
+  if (sine <= r->limits.rank)
+    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s says what other constraints say already",
+                    t, element);
+  return pw_fail (
+      error, PW_METHOD,
+      "t = %.6g s: near a singular configuration: %s says almost what other constraints say (sine %.2g); the next "
+      "step cannot be computed",
+      t, element, sine);
+}
+
+int pw_watchdog_near_state (pw_run *r) {
+  if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return 0;
+  r->geometry.alert = 1;
+  return pw_watchdog_near (r);
+}
+
+int pw_watchdog_check_values (const pw_run *r, pw_error *error) {
+  const pw_system *s = r->s;
+  const double extreme = r->limits.extreme;
+  char name[120];
+  for (int i = 0; i < 2 * s->coords; i++) {
+    double value = i < s->coords ? r->q[i] : r->v[i - s->coords];
+    if (!(fabs (value) < extreme))
+      return pw_fail (error, PW_INPUT, "model %s: values too extreme: %s is initially %g: expected less than %g",
+                      s->model, pw_system_state_name (s, i, name, sizeof name), value, extreme);
+  }
+  for (int j = 0; s->rows > 0 && j < s->coords; j++) {
+    double mass = s->mass[j] / (pw_rank_unit (s, j) * pw_rank_unit (s, j));
+    if (mass != 0 && !(mass < extreme && mass > 1 / extreme))
+      return pw_fail (
+          error, PW_INPUT,
+          "model %s: values too extreme: the mass or inertia that goes with %s is %g: expected 0, or %g to %g",
+          s->model, pw_system_state_name (s, j, name, sizeof name), s->mass[j], 1 / extreme, extreme);
+  }
+  return PW_OK;
+}
