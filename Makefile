@@ -409,7 +409,7 @@ MAN  := docs/pinwheel.1 docs/pinwheel-model.5
 DOCS := README.md $(wildcard docs/*.md) docs/CITATION.cff
 FIGURES  := $(wildcard docs/figures/*)
 EXAMPLES := $(EMBED) $(wildcard models/*.c) core/kinds/forces/torque.c \
-            $(addprefix core/kinds/,contact.h holonomic/gear.c nonholonomic/rolling_wheel.c)
+            $(addprefix core/kinds/,batch.h contact.h holonomic/gear.c nonholonomic/rolling_wheel.c)
 
 define PKGCONFIG
 prefix=$(PREFIX)

@@ -1,34 +1,67 @@
 /* Compiles a description: names become indices, elements become one batch per element type.
  *
- * The system is one allocation.  compile_layout runs twice, first to compute its size, then to place the arrays;
- * compile_fill.c fills them. */
+ * All arrays of the system are in its arena.  Data needed only during compilation are in `scratch`. */
 #include <limits.h>
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "compile.h"
+#include "system.h"
+
+/* Guard bytes after an element; prepare must not change them. */
+enum { COMPILE_GUARD = 64, COMPILE_MARK = 0xa5 };
+
+typedef struct {
+  const pw_model *m;
+  pw_system *s;
+  pw_error *error;
+  pw_arena scratch;
+  pw_names body, element;
+  const pw_kind **kind;    /* element types in use, in the order of the batches */
+  int *count;              /* elements of each of them */
+  int *batch_of;           /* elements of the description: index of the batch */
+  size_t room;             /* bytes of the largest element and its guard */
+  unsigned char *prepared; /* room bytes, in which an element is prepared */
+} compilation;
+
+static int compile_no_memory (const compilation *c) {
+  return pw_fail (c->error, PW_RESOURCE, "model %s: out of memory", c->m->name);
+}
+
+/* Memory that belongs to the system.  NULL and the error if out of memory. */
+static void *compile_take (const compilation *c, size_t count, size_t size) {
+  void *p = pw_arena_take (&c->s->arena, count * size);
+  if (p == NULL) compile_no_memory (c);
+  return p;
+}
+
+static const char *compile_text (const compilation *c, const char *text) {
+  char *copy = compile_take (c, strlen (text) + 1, 1);
+  return copy ? strcpy (copy, text) : NULL;
+}
 
 /* ---- Counting ---- */
 
-static int compile_names (pw_compilation *c, pw_error *error) {
+static int compile_names (compilation *c) {
   const pw_model *m = c->m;
   if (pw_names_open (&c->body, (size_t)m->bodies) != PW_OK || pw_names_open (&c->element, (size_t)m->elements) != PW_OK)
-    return pw_fail (error, PW_RESOURCE, "model %s: out of memory", m->name);
+    return compile_no_memory (c);
   for (int i = 0; i < m->bodies; i++)
     if (m->body[i].name && pw_names_add (&c->body, m->body[i].name, i) >= 0)
-      return pw_fail (error, PW_INPUT, "model %s: two bodies are named \"%s\"", m->name, m->body[i].name);
+      return pw_fail (c->error, PW_INPUT, "model %s: two bodies are named \"%s\"", m->name, m->body[i].name);
   for (int i = 0; i < m->elements; i++) {
     const char *name = pw_element_name (&m->element[i]);
     if (name == NULL) continue;
     if (pw_names_find (&c->body, name) >= 0)
-      return pw_fail (error, PW_INPUT, "model %s: a body and a %s are both named \"%s\"", m->name,
+      return pw_fail (c->error, PW_INPUT, "model %s: a body and a %s are both named \"%s\"", m->name,
                       m->element[i].kind->name, name);
     if (pw_names_add (&c->element, name, i) >= 0)
-      return pw_fail (error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
+      return pw_fail (c->error, PW_INPUT, "model %s: two elements are named \"%s\"", m->name, name);
   }
-  return pw_check_model (m, &c->body, error);
+  return pw_check_model (m, &c->body, c->error);
 }
 
-int pw_compile_copies (const pw_model *m, const pw_kind *kind) {
+/* Number of elements of the system created from an element of the description. */
+static int compile_copies (const pw_model *m, const pw_kind *kind) {
   int massive = 0;
   if (!kind->each_body) return 1;
   for (int i = 0; i < m->bodies; i++) massive += m->body[i].mass > 0;
@@ -36,155 +69,363 @@ int pw_compile_copies (const pw_model *m, const pw_kind *kind) {
 }
 
 /* Batches: holonomic types in order of appearance, then nonholonomic ones, then forces. */
-static int compile_kinds (pw_compilation *c, pw_error *error) {
+static int compile_types (compilation *c) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
   const pw_model *m = c->m;
   size_t room = (size_t)m->elements + 1;
-  c->kind = malloc (room * sizeof *c->kind);
-  c->count = calloc (room, sizeof *c->count);
-  c->slab_of = malloc (room * sizeof *c->slab_of);
-  c->array = calloc (room, sizeof *c->array);
-  if (c->kind == NULL || c->count == NULL || c->slab_of == NULL || c->array == NULL)
-    return pw_fail (error, PW_RESOURCE, "model %s: out of memory", m->name);
+  c->kind = pw_arena_take (&c->scratch, room * sizeof *c->kind);
+  c->count = pw_arena_take (&c->scratch, room * sizeof *c->count);
+  c->batch_of = pw_arena_take (&c->scratch, room * sizeof *c->batch_of);
+  if (c->kind == NULL || c->count == NULL || c->batch_of == NULL) return compile_no_memory (c);
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
       const pw_kind *kind = m->element[i].kind;
       if (kind->level != order[l]) continue;
       int k = 0;
-      while (k < c->kinds && c->kind[k] != kind) k++;
-      if (k == c->kinds) c->kind[c->kinds++] = kind;
-      c->count[k] += pw_compile_copies (m, kind);
-      c->slab_of[i] = k;
-      if (c->room < kind->element + PW_COMPILE_GUARD) c->room = kind->element + PW_COMPILE_GUARD;
+      while (k < c->s->batches && c->kind[k] != kind) k++;
+      if (k == c->s->batches) c->kind[c->s->batches++] = kind;
+      c->count[k] += compile_copies (m, kind);
+      c->batch_of[i] = k;
+      if (c->room < kind->element + COMPILE_GUARD) c->room = kind->element + COMPILE_GUARD;
     }
-  c->prepared = malloc (c->room + 1);
-  return c->prepared ? PW_OK : pw_fail (error, PW_RESOURCE, "model %s: out of memory", m->name);
+  c->prepared = pw_arena_take (&c->scratch, c->room);
+  return c->prepared ? PW_OK : compile_no_memory (c);
 }
 
-static int compile_ledger_entries (const pw_kind *k) {
-  return (k->power != NULL || (k->rows > 0 && k->eta != NULL)) + (k->loss != NULL);
-}
-
-static int compile_count (pw_compilation *c, pw_error *error) {
+static int compile_count (const compilation *c) {
   const pw_model *m = c->m;
-  double coords = 3.0 * m->bodies, rows = 0, entries = 0;
-  if (m->bodies == 0) return pw_fail (error, PW_INPUT, "model %s has no body", m->name);
-  for (int k = 0; k < c->kinds; k++) {
+  pw_system *s = c->s;
+  double coords = 3.0 * m->bodies, rows = 0;
+  if (m->bodies == 0) return pw_fail (c->error, PW_INPUT, "model %s has no body", m->name);
+  for (int k = 0; k < s->batches; k++) {
     coords += (double)c->count[k] * c->kind[k]->own;
     rows += (double)c->count[k] * c->kind[k]->rows;
-    if (c->kind[k]->level == PW_HOLONOMIC) c->size.holonomic += c->count[k] * c->kind[k]->rows;
-    entries += (double)c->count[k] * compile_ledger_entries (c->kind[k]);
-    c->size.sources += c->count[k] * c->kind[k]->signals;
   }
-  if (coords > INT_MAX / 64 || rows > INT_MAX / 64) return pw_fail (error, PW_INPUT, "model %s is too large", m->name);
-  c->size.bodies = m->bodies;
-  c->size.coords = (int)coords;
-  c->size.rows = (int)rows;
-  c->size.entries = (int)entries;
-  c->size.batches = c->kinds;
-  c->text = strlen (m->name) + 1;
-  for (int i = 0; i < m->bodies; i++) c->text += strlen (m->body[i].name) + 1;
-  for (int i = 0; i < m->elements; i++) {
-    const pw_element *e = &m->element[i];
-    c->text += strlen (pw_element_name (e)) + 1;
-    for (int u = 0; u < e->kind->signals; u++) {
-      const pw_signal *signal = pw_field_at (e->kind, e->definition, PW_SIGNAL, u);
-      if (signal->type == PW_TABLE) c->points += (size_t)signal->table.count * (size_t)pw_compile_copies (m, e->kind);
-      if (signal->type != PW_FUNCTION || signal->function.reads == NULL) continue;
-      for (const char *const *r = signal->function.reads; *r; r++) c->size.reads += pw_compile_copies (m, e->kind);
+  if (coords > INT_MAX / 64 || rows > INT_MAX / 64)
+    return pw_fail (c->error, PW_INPUT, "model %s is too large", m->name);
+  s->bodies = m->bodies;
+  s->coords = (int)coords;
+  s->rows = (int)rows;
+  for (int k = 0; k < s->batches; k++) {
+    if (c->kind[k]->level == PW_HOLONOMIC) s->holonomic += c->count[k] * c->kind[k]->rows;
+    s->entries += c->count[k] * pw_ledger_most (c->kind[k]);
+    s->sources += c->count[k] * c->kind[k]->signals;
+  }
+  return PW_OK;
+}
+
+static int compile_arrays (const compilation *c) {
+  pw_system *s = c->s;
+  size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
+  s->batch = compile_take (c, (size_t)s->batches, sizeof *s->batch);
+  s->source = compile_take (c, (size_t)s->sources, sizeof *s->source);
+  s->body_name = compile_take (c, bodies, sizeof *s->body_name);
+  s->mass = compile_take (c, coords, sizeof *s->mass);
+  s->metric = compile_take (c, coords, sizeof *s->metric);
+  s->constant = compile_take (c, coords + 3, sizeof *s->constant);
+  s->q0 = compile_take (c, coords, sizeof *s->q0);
+  s->v0 = compile_take (c, coords, sizeof *s->v0);
+  s->held = compile_take (c, 2 * coords, 1);
+  s->entry = compile_take (c, (size_t)s->entries, sizeof *s->entry);
+  int complete = s->batch && s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
+  return complete && s->held && s->entry ? PW_OK : PW_RESOURCE;
+}
+
+/* ---- Bodies and elements ---- */
+
+/* Origin of the initial value of a body's state (0 to 5); `perhaps` for a 0 of a body that does not say which it
+ * specifies. */
+static unsigned char compile_origin (const pw_body *b, double value, int state, unsigned char perhaps) {
+  if (b->specified) return b->specified >> state & 1 ? PW_SPECIFIED : 0;
+  return value != 0 ? PW_SPECIFIED : perhaps;
+}
+
+static int compile_bodies (const compilation *c) {
+  pw_system *s = c->s;
+  s->model = compile_text (c, c->m->name);
+  for (int i = 0; i < s->bodies; i++) {
+    const pw_body *b = &c->m->body[i];
+    s->body_name[i] = compile_text (c, b->name);
+    if (s->body_name[i] == NULL) return PW_RESOURCE;
+    s->mass[3 * i] = s->mass[3 * i + 1] = b->mass;
+    s->mass[3 * i + 2] = b->inertia;
+    memcpy (s->q0 + 3 * i, b->start, sizeof b->start);
+    memcpy (s->v0 + 3 * i, b->rate, sizeof b->rate);
+    for (int k = 0; k < 3; k++) {
+      s->held[3 * i + k] = compile_origin (b, b->start[k], k, PW_PERHAPS);
+      s->held[s->coords + 3 * i + k] = compile_origin (b, b->rate[k], 3 + k, 0);
+    }
+  }
+  return s->model ? PW_OK : PW_RESOURCE;
+}
+
+/* Prepares an element in scratch memory, checks that `prepare` stays within its size, and copies it. */
+static int compile_prepare (const compilation *c, const pw_element *from, const pw_body *const *bodies,
+                            pw_internal *internal, void *element) {
+  const pw_kind *kind = from->kind;
+  size_t size = kind->element;
+  pw_error why = { 0 };
+  memset (c->prepared, 0, size);
+  memset (c->prepared + size, COMPILE_MARK, COMPILE_GUARD);
+  if (kind->prepare (from->definition, bodies, c->prepared, internal, &why) != PW_OK)
+    return pw_fail (c->error, PW_INPUT, "model %s: %s %s: %s", c->m->name, kind->name, pw_element_name (from),
+                    why.text);
+  for (size_t i = 0; i < COMPILE_GUARD; i++)
+    if (c->prepared[size + i] != COMPILE_MARK)
+      return pw_fail (c->error, PW_INPUT,
+                      "model %s: element type %s: prepare writes more than the %zu bytes of .element", c->m->name,
+                      kind->name, size);
+  memcpy (element, c->prepared, size);
+  return PW_OK;
+}
+
+/* The arrays of a batch while they are filled. */
+typedef struct {
+  char *element;
+  int *body, *column;
+  const char **name;
+} batch_arrays;
+
+/* Stores element e of a batch: bodies, columns, prepared element, internal coordinates.  body: the one an each_body
+ * type acts on, or -1. */
+static int compile_element (const compilation *c, const pw_element_batch *k, const batch_arrays *a, int e,
+                            const pw_element *from, int body) {
+  static const pw_body ground = { .name = "ground" };
+  const pw_kind *kind = k->kind;
+  pw_system *s = c->s;
+  const pw_body *bodies[PW_MAX_BODIES];
+  for (int n = 0; n < kind->bodies; n++) {
+    int index = body >= 0
+                    ? body
+                    : pw_names_find (&c->body, *(const char *const *)pw_field_at (kind, from->definition, PW_BODY, n));
+    bodies[n] = index < 0 ? &ground : &c->m->body[index];
+    a->body[e * kind->bodies + n] = index < 0 ? s->bodies : index;
+    a->column[e * kind->bodies + n] = index < 0 ? s->coords : 3 * index;
+  }
+  if (kind->prepare == NULL) return PW_OK;
+  pw_internal internal[PW_MAX_INTERNAL] = { { 0 } };
+  if (compile_prepare (c, from, bodies, internal, a->element + (size_t)e * kind->element) != PW_OK) return PW_INPUT;
+  for (int n = 0, j = k->own + e * kind->own; n < kind->own; n++, j++) {
+    s->mass[j] = internal[n].mass;
+    s->q0[j] = internal[n].start;
+    s->v0[j] = internal[n].rate;
+    s->held[j] = internal[n].specified[0] ? PW_SPECIFIED : 0;
+    s->held[s->coords + j] = internal[n].specified[1] ? PW_SPECIFIED : 0;
+  }
+  return PW_OK;
+}
+
+/* Stores the elements of batch i, those of an each_body type once for every body with mass. */
+static int compile_batch (const compilation *c, int i, const batch_arrays *a) {
+  const pw_element_batch *k = &c->s->batch[i];
+  int e = 0;
+  for (int n = 0; n < c->m->elements; n++) {
+    if (c->batch_of[n] != i) continue;
+    const pw_element *from = &c->m->element[n];
+    const char *name = compile_text (c, pw_element_name (from));
+    if (name == NULL) return PW_RESOURCE;
+    for (int b = k->kind->each_body ? 0 : -1; b < (k->kind->each_body ? c->s->bodies : 0); b++) {
+      if (b >= 0 && !(c->m->body[b].mass > 0)) continue;
+      a->name[e] = name;
+      if (compile_element (c, k, a, e++, from, b) != PW_OK) return PW_INPUT;
     }
   }
   return PW_OK;
 }
 
-/* ---- One allocation ---- */
-
-static void compile_layout_batch (const pw_compilation *c, pw_layout *l, pw_element_batch *k, int i) {
-  const pw_kind *kind = c->kind[i];
-  size_t n = (size_t)c->count[i], bodies = n * (size_t)kind->bodies;
-  pw_batch_arrays *a = &c->array[i];
-  a->element = pw_take (l, n, kind->element);
-  a->body = pw_take (l, bodies, sizeof *a->body);
-  a->column = pw_take (l, bodies, sizeof *a->column);
-  void *name = pw_take (l, n, sizeof (char *));
-  if (l->base == NULL) return;
-  *k = (pw_element_batch){ .kind = kind, .column = a->column, .name = name };
-  k->b =
-      (pw_batch){ .count = c->count[i], .cols = 3 * kind->bodies + kind->own, .element = a->element, .body = a->body };
-}
-
-static void compile_layout (const pw_compilation *c, pw_layout *l, pw_system **system, pw_pools *pools) {
-  size_t coords = (size_t)c->size.coords, bodies = (size_t)c->size.bodies;
-  pw_system *s = pw_take (l, 1, sizeof *s), none;
-  if (l->base == NULL) s = &none;
-  *s = c->size;
-  s->batch = pw_take (l, (size_t)c->size.batches + 1, sizeof *s->batch);
-  s->source = pw_take (l, (size_t)c->size.sources, sizeof *s->source);
-  s->body_name = pw_take (l, bodies, sizeof *s->body_name);
-  s->mass = pw_take (l, coords, sizeof *s->mass);
-  s->metric = pw_take (l, coords, sizeof *s->metric);
-  s->constant = pw_take (l, coords + 3, sizeof *s->constant);
-  s->q0 = pw_take (l, coords, sizeof *s->q0);
-  s->v0 = pw_take (l, coords, sizeof *s->v0);
-  s->held = pw_take (l, 2 * coords, 1);
-  s->entry = pw_take (l, (size_t)c->size.entries, sizeof *s->entry);
-  for (int i = 0; i < c->kinds; i++) compile_layout_batch (c, l, l->base ? s->batch + i : NULL, i);
-  pools->table = pw_take (l, 4 * c->points, sizeof (double));
-  pools->state = pw_take (l, (size_t)c->size.reads, sizeof (int));
-  pools->text = pw_take (l, c->text, 1);
-  *system = s;
-}
-
-static pw_system *compile_allocate (const pw_compilation *c, pw_pools *pools, pw_error *error) {
-  pw_layout l = { NULL, 0 };
-  pw_system *s = NULL;
-  compile_layout (c, &l, &s, pools);
-  l = (pw_layout){ calloc (1, l.used), 0 };
-  if (l.base == NULL) {
-    pw_fail (error, PW_RESOURCE, "model %s: out of memory", c->m->name);
-    return NULL;
+static int compile_batches (const compilation *c) {
+  pw_system *s = c->s;
+  int row = 0, own = 3 * s->bodies;
+  pw_source *source = s->source;
+  for (int i = 0; i < s->batches; i++) {
+    const pw_kind *kind = c->kind[i];
+    size_t n = (size_t)c->count[i], bodies = n * (size_t)kind->bodies;
+    batch_arrays a = { compile_take (c, n, kind->element), compile_take (c, bodies, sizeof (int)),
+                       compile_take (c, bodies, sizeof (int)), compile_take (c, n, sizeof (char *)) };
+    if (!a.element || !a.body || !a.column || !a.name) return PW_RESOURCE;
+    pw_element_batch *k = &s->batch[i];
+    *k = (pw_element_batch){
+      .kind = kind, .row = row, .own = own, .column = a.column, .name = a.name, .source = source
+    };
+    k->b = (pw_batch){ c->count[i], 3 * kind->bodies + kind->own, .element = a.element, .body = a.body };
+    row += c->count[i] * kind->rows;
+    own += c->count[i] * kind->own;
+    source += c->count[i] * kind->signals;
+    if (compile_batch (c, i, &a) != PW_OK) return PW_INPUT;
   }
-  compile_layout (c, &l, &s, pools);
-  return s;
+  return PW_OK;
+}
+
+/* ---- Signals ---- */
+
+/* Copies the points of a table and computes its spline. */
+static int compile_table (const compilation *c, pw_source *source) {
+  pw_signal *s = &source->signal;
+  size_t n = (size_t)s->table.count;
+  double *t = compile_take (c, 4 * n, sizeof *t), *value = t + n;
+  if (t == NULL) return PW_RESOURCE;
+  memcpy (t, s->table.t, n * sizeof *t);
+  for (size_t i = 0; i < n; i++) value[i] = pw_table_value (s, (int)i);
+  s->table.t = t;
+  s->table.value = value;
+  s->table.scale = s->table.offset = 0;
+  source->spline = value + n;
+  pw_table_spline (s, source->spline);
+  return PW_OK;
+}
+
+/* Converts the names of states a function reads to indices. */
+static int compile_reads (const compilation *c, pw_source *source, const char *element) {
+  const char *const *reads = source->signal.function.reads;
+  int count = 0;
+  while (reads && reads[count]) count++;
+  int *state = compile_take (c, (size_t)count, sizeof *state);
+  if (state == NULL) return PW_RESOURCE;
+  for (int i = 0; i < count; i++) {
+    pw_error why = { 0 };
+    state[i] = pw_system_find_state (c->s, reads[i], &why);
+    if (state[i] < 0)
+      return pw_fail (c->error, PW_INPUT, "model %s: element %s reads a state: %s", c->m->name, element, why.text);
+  }
+  source->state = state;
+  source->reads = count;
+  c->s->reads += count;
+  c->s->readers += count > 0;
+  return PW_OK;
+}
+
+static int compile_source (const compilation *c, pw_source *source, const pw_signal *signal, const char *element) {
+  void *context =
+      signal->type == PW_FUNCTION && signal->function.open ? signal->function.open (signal->function.context) : NULL;
+  if (signal->type == PW_FUNCTION && signal->function.open && context == NULL) return compile_no_memory (c);
+  source->signal = *signal;
+  if (context) source->signal.function.context = context;
+  if (signal->type == PW_TABLE) return compile_table (c, source);
+  return signal->type == PW_FUNCTION ? compile_reads (c, source, element) : PW_OK;
+}
+
+/* Runs after all elements are stored, because signals may read their internal coordinates. */
+static int compile_signals (const compilation *c) {
+  int *next = c->count; /* reused: counts the elements visited in each batch */
+  memset (next, 0, (size_t)c->s->batches * sizeof *next);
+  for (int n = 0; n < c->m->elements; n++) {
+    const pw_element *from = &c->m->element[n];
+    const pw_element_batch *k = &c->s->batch[c->batch_of[n]];
+    for (int copy = compile_copies (c->m, k->kind); copy > 0; copy--) {
+      int e = next[c->batch_of[n]]++;
+      for (int u = 0; u < k->kind->signals; u++) {
+        pw_source *source = &k->source[e * k->kind->signals + u];
+        source->forced = pw_kind_forced (k->kind);
+        if (compile_source (c, source, pw_field_at (k->kind, from->definition, PW_SIGNAL, u), k->name[e]) != PW_OK)
+          return PW_INPUT;
+      }
+    }
+  }
+  return PW_OK;
+}
+
+/* ---- Initial values, scales ---- */
+
+/* Values of pw_model_set_initial. */
+static int compile_initial (const compilation *c) {
+  pw_system *s = c->s;
+  for (int i = 0; i < c->m->givens; i++) {
+    int state = pw_system_find_state (s, c->m->given[i].state, c->error);
+    if (state < 0) return PW_INPUT;
+    s->held[state] |= PW_GIVEN;
+    *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = c->m->given[i].value;
+  }
+  return PW_OK;
+}
+
+static double compile_length (const compilation *c) {
+  const pw_model *m = c->m;
+  double L = 0;
+  for (int i = 0; i < m->elements; i++) {
+    const pw_element *e = &m->element[i];
+    if (!pw_kind_acts (e->kind)) continue;
+    for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
+      const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
+      const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n);
+      if (at && strcmp (body, "ground") != 0) L = fmax (L, hypot (at[0], at[1]));
+    }
+  }
+  for (int i = 0; i < m->bodies && L == 0; i++)
+    if (m->body[i].mass > 0) L = sqrt (m->body[i].inertia / m->body[i].mass);
+  return L > 0 ? L : 1;
+}
+
+/* M with zeros replaced by 1e-6 of the mean of its other entries, angles in units of L.  This is independent of
+ * units, and of whether mass or inertia is zero. */
+static void compile_metric (pw_system *s) {
+  double sum = 0, L2 = s->scale.length * s->scale.length;
+  int massive = 0;
+  for (int j = 0; j < s->coords; j++)
+    if (s->mass[j] > 0) sum += s->mass[j] / (pw_is_angle (s, j) ? L2 : 1), massive++;
+  double weight = massive ? 1e-6 * sum / massive : 1;
+  for (int j = 0; j < s->coords; j++)
+    s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
+}
+
+/* Sums that concern whole batches, and the constant forces, which do not depend on the state. */
+static int compile_totals (const compilation *c) {
+  pw_system *s = c->s;
+  int constant = 0;
+  for (int i = 0; i < s->batches; i++) {
+    const pw_kind *kind = s->batch[i].kind;
+    s->constraints += kind->rows > 0;
+    s->moving += kind->eta != NULL;
+    s->forces += kind->force && !kind->constant;
+    constant |= kind->force && kind->constant;
+    s->saturates |= kind->saturation != NULL;
+  }
+  if (!constant) return PW_OK;
+  pw_workspace *w = pw_workspace_new (s, c->error);
+  if (w == NULL) return PW_RESOURCE;
+  pw_evaluate_constant (w, s->constant);
+  pw_workspace_free (w);
+  return PW_OK;
 }
 
 /* ---- */
 
-pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
-  pw_compilation c = { .m = m };
-  pw_pools pools;
-  pw_system *s = NULL;
-  if (pw_require (m, "a model", error) != PW_OK) return NULL;
-  if (!m->built)
-    pw_fail (error, PW_INPUT, "model %s: pw_system_compile before pw_model_build", m->name);
-  else if (m->error.status != PW_OK) /* from something added after pw_model_build */
-    pw_fail (error, m->error.status, "%s", m->error.text);
-  else if (compile_names (&c, error) == PW_OK && compile_kinds (&c, error) == PW_OK &&
-           compile_count (&c, error) == PW_OK)
-    s = compile_allocate (&c, &pools, error);
-  if (s && pw_compile_fill (&c, s, &pools, error) != PW_OK) {
-    pw_system_free (s);
-    s = NULL;
-  }
-  pw_names_close (&c.body);
-  pw_names_close (&c.element);
-  free (c.kind);
-  free (c.count);
-  free (c.slab_of);
-  free (c.array);
-  free (c.prepared);
-  return s;
+static int compile_all (compilation *c) {
+  int status = compile_names (c);
+  if (status == PW_OK) status = compile_types (c);
+  if (status == PW_OK) status = compile_count (c);
+  if (status == PW_OK) status = compile_arrays (c);
+  if (status == PW_OK) status = compile_bodies (c);
+  if (status == PW_OK) status = compile_batches (c);
+  if (status == PW_OK) status = compile_signals (c);
+  if (status == PW_OK) status = compile_initial (c);
+  if (status != PW_OK) return status;
+  pw_ledger_fill (c->s);
+  c->s->scale = (pw_scale){ compile_length (c), 1 };
+  compile_metric (c->s);
+  return compile_totals (c);
 }
 
-void pw_close_signals (const pw_source *source, int count) {
-  for (int i = 0; i < count; i++) {
-    const pw_signal *signal = &source[i].signal;
-    if (signal->type == PW_FUNCTION && signal->function.open && signal->function.close)
-      signal->function.close (signal->function.context);
-  }
+pw_system *pw_system_compile (const pw_model *m, pw_error *error) {
+  if (pw_require (m, "a model", error) != PW_OK) return NULL;
+  compilation c = { .m = m, .s = calloc (1, sizeof *c.s), .error = error };
+  int status = PW_OK;
+  if (!m->built)
+    status = pw_fail (error, PW_INPUT, "model %s: pw_system_compile before pw_model_build", m->name);
+  else if (m->error.status != PW_OK) /* from something added after pw_model_build */
+    status = pw_fail (error, m->error.status, "%s", m->error.text);
+  else
+    status = c.s ? compile_all (&c) : compile_no_memory (&c);
+  pw_names_close (&c.body);
+  pw_names_close (&c.element);
+  pw_arena_free (&c.scratch);
+  if (status == PW_OK) return c.s;
+  pw_system_free (c.s);
+  return NULL;
 }
 
 void pw_system_free (pw_system *s) {
-  if (s) pw_close_signals (s->source, s->sources);
+  if (s == NULL) return;
+  pw_close_signals (s->source, s->source ? s->sources : 0);
+  pw_arena_free (&s->arena);
   free (s);
 }

@@ -100,30 +100,6 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
-  const pw_element_batch *last = NULL;
-  int type = -1;
-  double *eta = w->scratch;
-  for (int i = 0; i < w->s->entries; i++) {
-    const pw_entry *entry = &w->s->entry[i];
-    pw_element_batch *k = &w->batch[entry->batch];
-    int drive = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL;
-    if (k != last || (int)entry->type != type) {
-      k->b.lambda = lambda + k->row;
-      (drive ? k->kind->eta : entry->type == PW_WORK ? k->kind->power : k->kind->loss) (&k->b, drive ? eta : k->block);
-      last = k;
-      type = (int)entry->type;
-    }
-    if (!drive) {
-      rate[i] = k->block[entry->element];
-      continue;
-    }
-    rate[i] = 0; /* the constraint force -J^T lambda does the work -lambda . J v = -lambda . eta */
-    for (int r = 0, n = k->kind->rows; r < n; r++)
-      rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
-  }
-}
-
 /* out = J w for a batch; `bodies` and `own` are constants after inlining. */
 PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, const double *w, double *out, int bodies,
                              int own) {

@@ -26,10 +26,6 @@ int pw_system_holonomic (const pw_system *s) {
   return s->holonomic;
 }
 
-int pw_system_ledger_entries (const pw_system *s) {
-  return s->entries;
-}
-
 const char *pw_system_name (const pw_system *s) {
   return s->model;
 }
@@ -197,16 +193,5 @@ char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
     }
     snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[i / signals], f->name ? f->name : "signal");
   }
-  return buffer;
-}
-
-char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
-  const pw_entry *x = &s->entry[entry];
-  const pw_element_batch *k = &s->batch[x->batch];
-  const char *what = x->type == PW_WORK ? "work" : "loss";
-  if (k->kind->each_body)
-    snprintf (buffer, size, "%s.%s.%s", k->name[x->element], s->body_name[k->b.body[x->element]], what);
-  else
-    snprintf (buffer, size, "%s.%s", k->name[x->element], what);
   return buffer;
 }

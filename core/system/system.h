@@ -1,6 +1,6 @@
 /* The compiled system and the workspace of a run, for core/ and solvers/, not for models.
  *
- * Each is one allocation.  Index names: body b, batch k, element e of a batch, local column c of an element, global
+ * Index names: body b, batch k, element e of a batch, local column c of an element, global
  * coordinate j, constraint equation (row) i.  Arrays that elements add to have three additional entries after the
  * coordinates: those of the ground, which are never read. */
 #ifndef PW_SYSTEM_H
@@ -34,6 +34,7 @@ typedef struct {
 
 /* Constant after pw_system_compile: any number of runs and threads may share it. */
 struct pw_system {
+  pw_arena arena; /* contains all arrays */
   const char *model;
   int bodies, coords, rows, holonomic, batches, entries;
   int constraints;         /* batches with constraint equations */
@@ -68,6 +69,10 @@ struct pw_workspace {
   double t_signal;                 /* time of the last evaluation of signals; NaN: evaluate them again */
   const pw_source *failed;         /* the last signal that failed, or NULL */
 };
+
+/* The most entries that an element may have in the ledger; fills the entries of a system with signals. */
+int pw_ledger_most (const pw_kind *kind);
+void pw_ledger_fill (pw_system *s);
 
 /* Closes the contexts made by `open`; signals not opened yet are all zero. */
 void pw_close_signals (const pw_source *source, int count);

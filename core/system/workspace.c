@@ -50,6 +50,14 @@ static int workspace_open_signals (pw_workspace *w) {
   return status;
 }
 
+void pw_close_signals (const pw_source *source, int count) {
+  for (int i = 0; i < count; i++) {
+    const pw_signal *signal = &source[i].signal;
+    if (signal->type == PW_FUNCTION && signal->function.open && signal->function.close)
+      signal->function.close (signal->function.context);
+  }
+}
+
 pw_workspace *pw_workspace_new (const pw_system *s, pw_error *error) {
   pw_layout l = { NULL, 0 };
   workspace_layout (&l, &(pw_workspace){ .s = s });

@@ -175,7 +175,7 @@ static void test_bad_prepare (void **state) {
   pw_kind kind = messages_kind;
   kind.prepare = messages_prepare;
   kind.element = sizeof (messages_chooser) - 8;
-  BAD (": kind chooser: prepare writes more than the 16 bytes of .element",
+  BAD (": element type chooser: prepare writes more than the 16 bytes of .element",
        pw_add (m, &kind, &(messages_chooser){ "c", "frame", 1 }));
 }
 

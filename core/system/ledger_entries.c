@@ -1,0 +1,69 @@
+/* The ledger: which elements do work or dissipate energy, and their power. */
+#include <stdio.h>
+#include "system.h"
+
+int pw_ledger_most (const pw_kind *k) {
+  return (k->power != NULL || (k->rows > 0 && k->eta != NULL)) + (k->loss != NULL);
+}
+
+/* 1 if an element may do work: it has power or a rheonomic constraint.  A position prescribed by constants does no
+ * work. */
+static int ledger_has_work (const pw_element_batch *k, int element) {
+  const pw_kind *kind = k->kind;
+  int constants = 0;
+  if (kind->power) return 1;
+  if (kind->rows == 0 || kind->eta == NULL) return 0;
+  for (int u = 0; u < kind->signals; u++)
+    constants += k->source[element * kind->signals + u].signal.type == PW_CONSTANT;
+  return kind->level != PW_HOLONOMIC || constants < kind->signals;
+}
+
+void pw_ledger_fill (pw_system *s) {
+  pw_entry *entry = s->entry;
+  for (int i = 0; i < s->batches; i++) {
+    const pw_element_batch *k = &s->batch[i];
+    for (int e = 0; e < k->b.count; e++)
+      if (ledger_has_work (k, e)) *entry++ = (pw_entry){ i, e, PW_WORK };
+    for (int e = 0; k->kind->loss && e < k->b.count; e++) *entry++ = (pw_entry){ i, e, PW_LOSS };
+  }
+  s->entries = (int)(entry - s->entry);
+}
+
+int pw_system_ledger_entries (const pw_system *s) {
+  return s->entries;
+}
+
+char *pw_system_ledger_name (const pw_system *s, int entry, char *buffer, size_t size) {
+  const pw_entry *x = &s->entry[entry];
+  const pw_element_batch *k = &s->batch[x->batch];
+  const char *what = x->type == PW_WORK ? "work" : "loss";
+  if (k->kind->each_body)
+    snprintf (buffer, size, "%s.%s.%s", k->name[x->element], s->body_name[k->b.body[x->element]], what);
+  else
+    snprintf (buffer, size, "%s.%s", k->name[x->element], what);
+  return buffer;
+}
+
+void pw_evaluate_ledger (pw_workspace *w, const double *lambda, double *rate) {
+  const pw_element_batch *last = NULL;
+  int type = -1;
+  double *eta = w->scratch;
+  for (int i = 0; i < w->s->entries; i++) {
+    const pw_entry *entry = &w->s->entry[i];
+    pw_element_batch *k = &w->batch[entry->batch];
+    int drive = k->kind->rows > 0 && entry->type == PW_WORK && k->kind->power == NULL;
+    if (k != last || (int)entry->type != type) {
+      k->b.lambda = lambda + k->row;
+      (drive ? k->kind->eta : entry->type == PW_WORK ? k->kind->power : k->kind->loss) (&k->b, drive ? eta : k->block);
+      last = k;
+      type = (int)entry->type;
+    }
+    if (!drive) {
+      rate[i] = k->block[entry->element];
+      continue;
+    }
+    rate[i] = 0; /* the constraint force -J^T lambda does the work -lambda . J v = -lambda . eta */
+    for (int r = 0, n = k->kind->rows; r < n; r++)
+      rate[i] -= k->b.lambda[entry->element * n + r] * eta[entry->element * n + r];
+  }
+}
