@@ -297,7 +297,7 @@ typedef struct {
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double at[2][2];     /* the ends in each body's frame [m]; on the ground: in the world */
+  double at[2][2];     /* the end points in the bodies' frames [m]; on the ground: in the world */
   double length;       /* [m], > 0 */
 } pw_rod;
 
@@ -404,7 +404,7 @@ typedef struct {
 typedef struct {
   const char *name;
   const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double at[2][2];     /* the ends in each body's frame [m]; on the ground: in the world */
+  double at[2][2];     /* the end points in the bodies' frames [m]; on the ground: in the world */
   double stiffness;    /* [N/m], >= 0 */
   double damping;      /* [N s/m], >= 0 */
   double length;       /* free length [m], >= 0 */
@@ -855,7 +855,7 @@ int pw_system_equations (const pw_system *s, double t, const double *q, const do
                          pw_error *error);
 void pw_equations_free (pw_equations *e); /* required even after an error */
 
-/* Number of second-order blocks given as PW_BY_DIFFERENCES, and the name of one ("force_q of kind drag"), as
+/* Number of second-order blocks given as PW_BY_DIFFERENCES, and the name of one ("force_q of element type drag"), as
  * pw_system_state_name. */
 int pw_system_differences (const pw_system *s);
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);

@@ -73,6 +73,6 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_torque (m, &(pw_torque){ .name = "motor", .body = { "K1", "ground" }, .value = { .constant = p->mom } });
 }
 
-PW_MODEL (.about = "Andrews' squeezer: seven bodies whirled by a constant torque", .parameters = parameters,
+PW_MODEL (.about = "Andrews' squeezer: seven bodies driven by a constant torque", .parameters = parameters,
           .parameters_size = sizeof (squeezer), .run = { .t_end = 0.03, .step = 1e-5, .method = "rk4+projection" },
           .build = build);

@@ -207,6 +207,6 @@ static void build (pw_model *m, const void *parameter) {
           &(wire){ .name = "orbit", .body = "bead", .centre = { -p->a * p->e, 0 }, .axis = { p->a, b } });
 }
 
-PW_MODEL (.about = "bead on an elliptic wire that at a planet's speed carries nothing; two kinds of its own",
+PW_MODEL (.about = "bead on an elliptic wire, attracted by a focus; defines two element types",
           .parameters = parameters, .parameters_size = sizeof (model),
           .run = { .t_end = 6, .step = 1e-3, .method = "rk4+projection" }, .build = build);

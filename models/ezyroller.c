@@ -35,6 +35,6 @@ static void build (pw_model *m, const void *parameter) {
                                   .value = { PW_HARMONIC, .harmonic = { .amplitude = p->M0, .omega = p->omega } } });
 }
 
-PW_MODEL (.about = "two-segment ride-on that moves because its rider swings the steering hinge",
-          .parameters = parameters, .parameters_size = sizeof (ezyroller),
-          .run = { .t_end = 100, .step = 1e-3, .method = "rk4+projection" }, .build = build);
+PW_MODEL (.about = "two-segment ride-on propelled by swinging the steering hinge", .parameters = parameters,
+          .parameters_size = sizeof (ezyroller), .run = { .t_end = 100, .step = 1e-3, .method = "rk4+projection" },
+          .build = build);

@@ -60,6 +60,6 @@ static void reference (const void *parameter, double t, double *q, double *v) {
   }
 }
 
-PW_MODEL (.about = "three cranks carry one coupler: one constraint row too many", .parameters = parameters,
+PW_MODEL (.about = "three cranks with one coupler: one redundant constraint equation", .parameters = parameters,
           .parameters_size = sizeof (parallelogram), .run = { .t_end = 10, .step = 1e-3, .method = "rk4+projection" },
           .build = build, .reference = reference);

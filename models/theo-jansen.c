@@ -110,6 +110,6 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_marker (m, &(pw_marker){ .name = "foot", .body = "shin", .at = { (F.x - V.x) * u, (F.y - V.y) * u } });
 }
 
-PW_MODEL (.about = "Theo Jansen's walking leg on a crank of constant speed", .parameters = parameters,
+PW_MODEL (.about = "Theo Jansen's walking leg, driven by a crank at constant speed", .parameters = parameters,
           .parameters_size = sizeof (leg), .run = { .t_end = 2, .step = 1e-3, .method = "rk4+projection" },
           .build = build);

@@ -60,7 +60,7 @@ static const char *fault_fields (const pw_kind *k, char *buffer, size_t size) {
     if (f->type == PW_SIGNAL) signals += pw_field_count (f);
   }
   if (k->each_body && (bodies > 0 || k->bodies != 1))
-    return "a kind that acts on each body has one body and names none";
+    return "an element type that acts on each body has one body and no body fields";
   if (!k->each_body && bodies != k->bodies) return "bodies is not the number of fields of type PW_BODY";
   if (signals != k->signals) return "signals is not the number of fields of type PW_SIGNAL";
   return "";
@@ -70,11 +70,12 @@ static const char *fault_functions (const pw_kind *k) {
   pw_batch_function *const exact[] = { k->g,       k->g_size, k->eta,   k->J,    k->gamma,   k->force,
                                        k->force_u, k->energy, k->power, k->loss, k->contact, k->saturation };
   for (size_t i = 0; i < sizeof exact / sizeof *exact; i++)
-    if (exact[i] == pw_by_differences) return "PW_BY_DIFFERENCES stands in another place than a second-order block's";
-  if (k->constant && (k->force == NULL || k->signals > 0)) return "a constant force that is none, or has signals";
-  if (k->rows > 0 && k->J == NULL) return "constraint rows without J";
-  if (k->level == PW_HOLONOMIC && k->g == NULL) return "holonomic rows without g";
-  if (k->level != PW_HOLONOMIC && k->g) return "g, but no holonomic rows";
+    if (exact[i] == pw_by_differences) return "PW_BY_DIFFERENCES is permitted only for second-order blocks";
+  if (k->constant && (k->force == NULL || k->signals > 0))
+    return "declared constant, but it has no force, or has signals";
+  if (k->rows > 0 && k->J == NULL) return "constraint equations without J";
+  if (k->level == PW_HOLONOMIC && k->g == NULL) return "holonomic constraint equations without g";
+  if (k->level != PW_HOLONOMIC && k->g) return "g, but no holonomic constraint equations";
   return "";
 }
 
@@ -85,7 +86,7 @@ static int fault_is_long (const char *name) {
 static const char *fault_names (const pw_kind *k) {
   for (int i = 0; i < k->rows; i++)
     if (k->reaction == NULL || k->reaction[i].name == NULL || k->reaction[i].unit == NULL)
-      return "constraint rows without names of their reactions";
+      return "constraint equations without names of their reactions";
     else if (fault_is_long (k->reaction[i].name))
       return "a reaction's name of more than 50 bytes";
   for (int i = 0; i < k->own; i++)
@@ -103,14 +104,15 @@ const char *pw_kind_check (const pw_kind *k, char *buffer, size_t size) {
   if (k->definition < sizeof (char *)) return "the definition has no room for its name";
   if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->own < 0 || k->own > PW_MAX_INTERNAL || k->rows < 0 ||
       k->rows > PW_MAX_ROWS || k->signals < 0 || k->signals > PW_MAX_SIGNALS) {
-    snprintf (buffer, size, "at most %d bodies, %d internal coordinates, %d rows and %d signals", PW_MAX_BODIES,
-              PW_MAX_INTERNAL, PW_MAX_ROWS, PW_MAX_SIGNALS);
+    snprintf (buffer, size, "at most %d bodies, %d internal coordinates, %d constraint equations and %d signals",
+              PW_MAX_BODIES, PW_MAX_INTERNAL, PW_MAX_ROWS, PW_MAX_SIGNALS);
     return buffer;
   }
-  if (k->bodies + k->own == 0) return "neither a body nor a coordinate of its own";
+  if (k->bodies + k->own == 0) return "neither a body nor an internal coordinate";
   if (k->level < PW_FORCE || k->level > PW_NONHOLONOMIC || (k->rows > 0) != (k->level != PW_FORCE))
-    return "rows and level contradict each other";
-  if ((k->own > 0 || k->element > 0) && k->prepare == NULL) return "something to prepare, but no prepare function";
+    return "rows and level are inconsistent";
+  if ((k->own > 0 || k->element > 0) && k->prepare == NULL)
+    return "an element or internal coordinates, but no prepare function";
   const char *fault = fault_names (k);
   if (*fault == 0) fault = fault_fields (k, buffer, size);
   return *fault ? fault : fault_functions (k);

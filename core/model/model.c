@@ -75,7 +75,7 @@ int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *er
 
 int pw_model_build (pw_model *m, pw_error *error) {
   if (pw_require (m, "a model", error) != PW_OK) return PW_INPUT;
-  if (m->built) return pw_fail (error, PW_INPUT, "model %s: pw_model_build for the second time", m->name);
+  if (m->built) return pw_fail (error, PW_INPUT, "model %s: pw_model_build called twice", m->name);
   m->table->build (m, m->parameters);
   m->built = 1;
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
@@ -138,9 +138,9 @@ static void model_copy_table (pw_model *m, pw_signal *s) {
 static int model_check_kind (pw_model *m, const pw_kind *kind) {
   if (m->elements > 0 && m->element[m->elements - 1].kind == kind) return PW_OK;
   char buffer[200];
-  const char *fault = kind ? pw_kind_check (kind, buffer, sizeof buffer) : "there is none";
+  const char *fault = kind ? pw_kind_check (kind, buffer, sizeof buffer) : "the table is NULL";
   if (*fault == 0) return PW_OK;
-  return pw_fail (&m->error, PW_INPUT, "model %s: kind %s: %s", m->name,
+  return pw_fail (&m->error, PW_INPUT, "model %s: element type %s: %s", m->name,
                   kind && kind->name && *kind->name ? kind->name : "(unnamed)", fault);
 }
 
@@ -148,7 +148,7 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK ||
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
-  if (definition == NULL) return pw_model_refuse (m, "pw_add of kind %s without a definition", kind->name);
+  if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);
   void *copy = pw_arena_take (&m->arena, kind->definition);
   if (copy == NULL) return model_no_memory (m);
   memcpy (copy, definition, kind->definition);

@@ -8,7 +8,7 @@ static int check_parameter (const pw_plugin_table *t, const pw_parameter *p, con
   const char *expected = pw_domain_check (p->domain, p->value);
   if (!pw_is_text (p->name) || (p->unit && !pw_is_text (p->unit)) || (p->about && !pw_is_text (p->about)))
     return pw_fail (error, PW_INPUT,
-                    "%s: name, unit or meaning of parameter %s is no text: expected UTF-8 without control characters",
+                    "%s: name, unit or meaning of parameter %s is not text: expected UTF-8 without control characters",
                     what, p->name);
   if (p->offset + sizeof (double) > t->parameters_size)
     return pw_fail (error, PW_INPUT,
@@ -24,19 +24,19 @@ int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error
   if (t->abi != PW_ABI || t->size != sizeof *t)
     return pw_fail (error, PW_INPUT,
                     "%s was compiled for another Pinwheel (ABI %u, this one has %u; table of %zu bytes, here %zu): "
-                    "compile it anew",
+                    "recompile it",
                     what, t->abi, (unsigned)PW_ABI, t->size, sizeof *t);
   if (t->build == NULL)
     return pw_fail (error, PW_INPUT, "%s has no build function: PW_MODEL (...) at its end must set .build", what);
   if (t->about && !pw_is_text (t->about))
-    return pw_fail (error, PW_INPUT, "%s: .about is no text: expected UTF-8 without control characters", what);
+    return pw_fail (error, PW_INPUT, "%s: .about is not text: expected UTF-8 without control characters", what);
   for (const pw_parameter *p = t->parameters; p && p->name; p++)
     if (check_parameter (t, p, what, error) != PW_OK) return PW_INPUT;
   return PW_OK;
 }
 
 static int check_name (const pw_model *m, const char *what, const char *name, pw_error *error) {
-  if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s has no name", m->name, what);
+  if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s without a name", m->name, what);
   if (strlen (name) > PW_NAME_MOST)
     return pw_fail (error, PW_INPUT, "model %s: %s \"%.*s...\": a name has at most %d bytes, this one %zu", m->name,
                     what, PW_NAME_MOST, name, PW_NAME_MOST, strlen (name));
@@ -44,8 +44,8 @@ static int check_name (const pw_model *m, const char *what, const char *name, pw
     return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, what);
   for (const char *c = name; *c; c++)
     if (!isalnum ((unsigned char)*c) && *c != '_' && *c != '-' && !(*c & 0x80))
-      return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name is made of letters, digits, _ and -", m->name, what,
-                      name);
+      return pw_fail (error, PW_INPUT, "model %s: %s \"%s\": a name consists of letters, digits, _ and -", m->name,
+                      what, name);
   return PW_OK;
 }
 
@@ -82,8 +82,8 @@ static int check_body_name (const pw_model *m, const pw_element *e, const char *
                             pw_error *error) {
   const char *kind = e->kind->name, *name = pw_element_name (e);
   if (body == NULL || *body == 0)
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: a body is missing; the ground is written \"ground\"", m->name,
-                    kind, name);
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: a body is missing (the ground is \"ground\")", m->name, kind,
+                    name);
   if (strcmp (body, "ground") == 0 || bodies == NULL || pw_names_find (bodies, body) >= 0) return PW_OK;
   pw_nearest near = { .sought = body };
   for (int i = 0; i < m->bodies; i++) pw_nearest_try (&near, m->body[i].name);
@@ -135,13 +135,13 @@ static int check_element (const pw_model *m, const pw_element *e, const pw_names
     const char *body = *(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, i);
     for (int n = 0; n < i; n++)
       if (strcmp (*(const char *const *)pw_field_at (e->kind, e->definition, PW_BODY, n), body) == 0)
-        return pw_fail (error, PW_INPUT, "model %s: %s %s: %s of its bodies are \"%s\"", m->name, e->kind->name,
-                        pw_element_name (e), e->kind->bodies > 2 ? "two" : "both", body);
+        return pw_fail (error, PW_INPUT, "model %s: %s %s: %s of its bodies are \"%s\": expected different ones",
+                        m->name, e->kind->name, pw_element_name (e), e->kind->bodies > 2 ? "two" : "both", body);
     first = body;
   }
   if (e->kind->bodies == 1 && first && strcmp (first, "ground") == 0)
-    return pw_fail (error, PW_INPUT, "model %s: %s %s: the ground does not move, so it cannot carry one", m->name,
-                    e->kind->name, pw_element_name (e));
+    return pw_fail (error, PW_INPUT, "model %s: %s %s: expected a body other than the ground, which does not move",
+                    m->name, e->kind->name, pw_element_name (e));
   return PW_OK;
 }
 

@@ -33,7 +33,7 @@ char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t
   int count;
   const pw_element_batch *k = differences_find (s, i, &block, &count);
   if (k)
-    snprintf (buffer, size, "%s of kind %s", differences_name[block], k->kind->name);
+    snprintf (buffer, size, "%s of element type %s", differences_name[block], k->kind->name);
   else
     snprintf (buffer, size, "%s", "");
   return buffer;

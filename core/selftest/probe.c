@@ -85,7 +85,7 @@ void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int
   for (int i = n; i < n + PW_PROBE_GUARD; i++) beyond += !isnan (out[i]);
   snprintf (where, sizeof where, "%s: %d of %d entries missing or not finite, %d written beyond", name, untouched, n,
             beyond);
-  pw_probe_note (x->report, "size", "each sweep fills its array and no more", untouched + beyond, 0, "exact", where);
+  pw_probe_note (x->report, "size", "each function fills exactly its array", untouched + beyond, 0, "exact", where);
 }
 
 void pw_probe_update (pw_probe *x, int j, double h) {

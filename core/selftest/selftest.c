@@ -181,7 +181,7 @@ static void selftest_saturation (pw_probe *x) {
     double far = out[i + (e + 1) * x->cols], all = selftest_change (x, e, c, isfinite (far) ? far : large, rest);
     double part = selftest_change (x, e, c, (isfinite (far) ? far : large) / 100, rest);
     if (all < 1e-9 * (1 + pw_probe_largest (x->elements * x->cols, rest))) continue;
-    pw_probe_note (x->report, "saturation", "a force that saturates says within which velocity", part / all, 0.5,
+    pw_probe_note (x->report, "saturation", "saturation velocity of a saturating force", part / all, 0.5,
                    "a hundredth of the velocity, half of the change", x->k->name[e]);
   }
   memcpy (x->v, v, sizeof v);
@@ -278,7 +278,7 @@ static void selftest_all (pw_probe *x) {
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error) {
   char buffer[200];
   const char *fault = pw_kind_check (kind, buffer, sizeof buffer);
-  pw_probe_note (report, "table", "sizes, fields and sweeps go together", *fault != 0, 0, "exact", fault);
+  pw_probe_note (report, "table", "consistent sizes, fields and functions", *fault != 0, 0, "exact", fault);
   if (*fault) return PW_OK;
   pw_random random = { seed };
   pw_system *s = pw_random_scene (kind, &random, error);

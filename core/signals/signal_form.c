@@ -9,27 +9,26 @@ static const pw_field form_harmonic[] = {
   { FORM_AT (harmonic, amplitude), PW_NUMBER, .required = 1, .about = "amplitude" },
   { FORM_AT (harmonic, omega), PW_NUMBER, .unit = "rad/s", .required = 1, .about = "angular frequency" },
   { FORM_AT (harmonic, phase), PW_NUMBER, .unit = "rad", .about = "phase at t = 0" },
-  { FORM_AT (harmonic, offset), PW_NUMBER, .about = "what it oscillates about" },
+  { FORM_AT (harmonic, offset), PW_NUMBER, .about = "mean value" },
   { .name = NULL },
 };
 
 static const pw_field form_ramp[] = {
-  { FORM_AT (ramp, from), PW_NUMBER, .about = "value up to the start" },
-  { FORM_AT (ramp, to), PW_NUMBER, .required = 1, .about = "value after it" },
-  { FORM_AT (ramp, start), PW_NUMBER, .unit = "s", .about = "time at which it begins" },
-  { FORM_AT (ramp, duration), PW_NUMBER, .unit = "s", .required = 1, .domain = PW_POSITIVE,
-    .about = "how long it takes" },
+  { FORM_AT (ramp, from), PW_NUMBER, .about = "value before the start" },
+  { FORM_AT (ramp, to), PW_NUMBER, .required = 1, .about = "value after the end" },
+  { FORM_AT (ramp, start), PW_NUMBER, .unit = "s", .about = "start time" },
+  { FORM_AT (ramp, duration), PW_NUMBER, .unit = "s", .required = 1, .domain = PW_POSITIVE, .about = "duration" },
   { .name = NULL },
 };
 
 static const pw_field form_pulse[] = {
-  { FORM_AT (pulse, height), PW_NUMBER, .required = 1, .about = "of the pulse, above the offset" },
-  { FORM_AT (pulse, start), PW_NUMBER, .unit = "s", .about = "time at which the first one begins" },
+  { FORM_AT (pulse, height), PW_NUMBER, .required = 1, .about = "height above the offset" },
+  { FORM_AT (pulse, start), PW_NUMBER, .unit = "s", .about = "start time of the first pulse" },
   { FORM_AT (pulse, width), PW_NUMBER, .unit = "s", .domain = PW_NONNEGATIVE,
-    .about = "how long it lasts; 0: for ever" },
+    .about = "duration of a pulse; 0: it never ends" },
   { FORM_AT (pulse, period), PW_NUMBER, .unit = "s", .domain = PW_NONNEGATIVE,
-    .about = "from one pulse to the next; 0: there is one" },
-  { FORM_AT (pulse, offset), PW_NUMBER, .about = "value without a pulse" },
+    .about = "time between the starts of two pulses; 0: a single pulse" },
+  { FORM_AT (pulse, offset), PW_NUMBER, .about = "value outside the pulses" },
   { .name = NULL },
 };
 
@@ -37,20 +36,23 @@ static const char *const form_interpolation[] = { "linear", "cubic", NULL }, *co
                                                                                                     NULL };
 
 static const pw_field form_table[] = {
-  { FORM_AT (table, interpolation), PW_CHOICE, .choices = form_interpolation, .about = "between the points" },
+  { FORM_AT (table, interpolation), PW_CHOICE, .choices = form_interpolation,
+    .about = "interpolation interpolation between the points" },
   { FORM_AT (table, ends), PW_CHOICE, .choices = form_ends,
-    .about = "of a cubic table: as its points ask for, or with rate 0" },
-  { FORM_AT (table, scale), PW_NUMBER, .about = "factor of the values; left out: 1" },
-  { FORM_AT (table, offset), PW_NUMBER, .about = "what is added to the values times the factor" },
+    .about = "end conditions of a cubic table: free (not-a-knot), or at rest (zero slope)" },
+  { FORM_AT (table, scale), PW_NUMBER, .about = "factor of the values; 0 or omitted: 1" },
+  { FORM_AT (table, offset), PW_NUMBER, .about = "added to the scaled values" },
   { .name = NULL },
 };
 
 const pw_signal_form pw_signal_forms[] = {
   { "harmonic", PW_HARMONIC, "offset + amplitude cos (omega t + phase)", form_harmonic },
   { "ramp", PW_RAMP, "from one value to another along a straight line", form_ramp },
-  { "smooth-step", PW_SMOOTH_STEP, "from one value to another with continuous rate and acceleration", form_ramp },
-  { "pulse", PW_PULSE, "a jump up and back down, once or each period", form_pulse },
-  { "table", PW_TABLE, "through points (time, value); the first and the last value are constant outside", form_table },
+  { "smooth-step", PW_SMOOTH_STEP, "from one value to another with continuous first and second derivatives",
+    form_ramp },
+  { "pulse", PW_PULSE, "a rectangular pulse, once or periodically", form_pulse },
+  { "table", PW_TABLE, "interpolation of points (time, value); constant before the first and after the last",
+    form_table },
   { .name = NULL },
 };
 

@@ -323,7 +323,7 @@ static void test_list (void **state) {
   cli_good ("pinwheel list kinds rolling-wheel drive");
   static const char *const told[] = { "- {rolling-wheel: NAME, body: BODY, at: [X, Y], radius: NUMBER}",
                                       "  radius   number [m]       required (> 0)  radius of the wheel",
-                                      "  inertia  number [kg m^2]  0 (>= 0)        about its axle",
+                                      "  inertia  number [kg m^2]  0 (>= 0)        moment of inertia about the axle",
                                       "states such as BODY.phi",
                                       "  spin  rad  spin_rate  ",
                                       "- {drive: NAME, body: [BODY, BODY], what: x, value: SIGNAL}",

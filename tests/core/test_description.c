@@ -100,7 +100,7 @@ static void test_bad_tables (void **state) {
   assert_null (pw_model_new ("cart", &table, &error));
   snprintf (text, sizeof text,
             "model cart was compiled for another Pinwheel (ABI %d, this one has %d; table of %zu bytes, here %zu): "
-            "compile it anew",
+            "recompile it",
             PW_ABI + 6, PW_ABI, sizeof table, sizeof table);
   check_error (&error, PW_INPUT, text);
   table = description_table;
@@ -122,7 +122,7 @@ static void test_order_of_calls (void **state) {
   check_error (&error, PW_INPUT, "model cart: parameter length: pw_model_set after pw_model_build");
   error.status = PW_OK;
   assert_int_equal (pw_model_build (m, &error), PW_INPUT);
-  check_error (&error, PW_INPUT, "model cart: pw_model_build for the second time");
+  check_error (&error, PW_INPUT, "model cart: pw_model_build called twice");
   pw_model_free (m);
 }
 
@@ -155,7 +155,7 @@ static void test_missing_definitions (void **state) {
   static void (*const build[]) (pw_model * m, const void *parameters) = { description_add_nothing,
                                                                           description_add_nameless };
   static const char *const text[] = { "model cart: pw_add_body without a body",
-                                      "model cart: pw_add of kind pin without a definition" };
+                                      "model cart: pw_add of element type pin without a definition" };
   for (int i = 0; i < 2; i++) {
     pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = build[i] };
     pw_error error = { 0 };

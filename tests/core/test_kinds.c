@@ -181,12 +181,12 @@ static void test_faults (void **state) {
   } while (0)
   KINDS_FAULT (name, NULL, "no name");
   KINDS_FAULT (definition, 0, "the definition has no room for its name");
-  KINDS_FAULT (bodies, 5, "at most 4 bodies, 4 internal coordinates, 6 rows and 4 signals");
-  KINDS_FAULT (bodies, 0, "neither a body nor a coordinate of its own");
-  KINDS_FAULT (level, PW_FORCE, "rows and level contradict each other");
-  KINDS_FAULT (reaction, NULL, "constraint rows without names of their reactions");
+  KINDS_FAULT (bodies, 5, "at most 4 bodies, 4 internal coordinates, 6 constraint equations and 4 signals");
+  KINDS_FAULT (bodies, 0, "neither a body nor an internal coordinate");
+  KINDS_FAULT (level, PW_FORCE, "rows and level are inconsistent");
+  KINDS_FAULT (reaction, NULL, "constraint equations without names of their reactions");
   KINDS_FAULT (own, 1, "internal coordinates without names");
-  KINDS_FAULT (prepare, NULL, "something to prepare, but no prepare function");
+  KINDS_FAULT (prepare, NULL, "an element or internal coordinates, but no prepare function");
   KINDS_FAULT (fields, NULL, "no table of fields");
   KINDS_FAULT (fields, kinds_typeless, "field mode: its type does not exist");
   KINDS_FAULT (definition, 16,
@@ -194,12 +194,12 @@ static void test_faults (void **state) {
   KINDS_FAULT (fields, kinds_choice, "field mode: a choice without choices");
   KINDS_FAULT (bodies, 3, "bodies is not the number of fields of type PW_BODY");
   KINDS_FAULT (signals, 1, "signals is not the number of fields of type PW_SIGNAL");
-  KINDS_FAULT (each_body, 1, "a kind that acts on each body has one body and names none");
-  KINDS_FAULT (constant, 1, "a constant force that is none, or has signals");
-  KINDS_FAULT (J, pw_by_differences, "PW_BY_DIFFERENCES stands in another place than a second-order block's");
-  KINDS_FAULT (J, NULL, "constraint rows without J");
-  KINDS_FAULT (g, NULL, "holonomic rows without g");
-  KINDS_FAULT (level, PW_NONHOLONOMIC, "g, but no holonomic rows");
+  KINDS_FAULT (each_body, 1, "an element type that acts on each body has one body and no body fields");
+  KINDS_FAULT (constant, 1, "declared constant, but it has no force, or has signals");
+  KINDS_FAULT (J, pw_by_differences, "PW_BY_DIFFERENCES is permitted only for second-order blocks");
+  KINDS_FAULT (J, NULL, "constraint equations without J");
+  KINDS_FAULT (g, NULL, "holonomic constraint equations without g");
+  KINDS_FAULT (level, PW_NONHOLONOMIC, "g, but no holonomic constraint equations");
 #undef KINDS_FAULT
 }
 

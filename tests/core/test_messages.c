@@ -39,13 +39,13 @@ static void messages_refused (pw_model *m, const char *text) {
 
 static void test_bad_names (void **state) {
   (void)state;
-  BAD (": a body has no name", BODY (.mass = 1));
-  BAD (": a body has no name", BODY (.name = ""));
-  BAD (": a pin has no name", PIN (.body = { "frame", "steer" }));
+  BAD (": a body without a name", BODY (.mass = 1));
+  BAD (": a body without a name", BODY (.name = ""));
+  BAD (": a pin without a name", PIN (.body = { "frame", "steer" }));
   BAD (": body \"ground\": this name is reserved for the ground", BODY (.name = "ground"));
   BAD (": wheel \"ground\": this name is reserved for the ground", WHEEL (.name = "ground", .body = "frame"));
-  BAD (": body \"rear axle\": a name is made of letters, digits, _ and -", BODY (.name = "rear axle"));
-  BAD (": body \"a.b\": a name is made of letters, digits, _ and -", BODY (.name = "a.b"));
+  BAD (": body \"rear axle\": a name consists of letters, digits, _ and -", BODY (.name = "rear axle"));
+  BAD (": body \"a.b\": a name consists of letters, digits, _ and -", BODY (.name = "a.b"));
   BAD (": body \"" MESSAGES_50 "...\": a name has at most 50 bytes, this one 51", BODY (.name = MESSAGES_50 "x"));
   BAD (": wheel \"" MESSAGES_50 "...\": a name has at most 50 bytes, this one 150",
        WHEEL (.name = MESSAGES_50 MESSAGES_50 MESSAGES_50, .body = "frame"));
@@ -72,11 +72,11 @@ static void test_bad_references (void **state) {
   BAD (": pin B: there is no body \"ster\"; did you mean \"steer\"?", PIN (.name = "B", .body = { "frame", "ster" }));
   BAD (": pin B: there is no body \"Ground\"; did you mean \"ground\"?",
        PIN (.name = "B", .body = { "frame", "Ground" }));
-  BAD (": pin B: a body is missing; the ground is written \"ground\"", PIN (.name = "B", .body = { "frame" }));
-  BAD (": wheel A: a body is missing; the ground is written \"ground\"", WHEEL (.name = "A", .body = ""));
-  BAD (": pin B: both of its bodies are \"frame\"", PIN (.name = "B", .body = { "frame", "frame" }));
-  BAD (": pin B: both of its bodies are \"ground\"", PIN (.name = "B", .body = { "ground", "ground" }));
-  BAD (": wheel A: the ground does not move, so it cannot carry one", WHEEL (.name = "A", .body = "ground"));
+  BAD (": pin B: a body is missing (the ground is \"ground\")", PIN (.name = "B", .body = { "frame" }));
+  BAD (": wheel A: a body is missing (the ground is \"ground\")", WHEEL (.name = "A", .body = ""));
+  BAD (": pin B: both of its bodies are \"frame\": expected different ones", PIN (.name = "B", .body = { "frame", "frame" }));
+  BAD (": pin B: both of its bodies are \"ground\": expected different ones", PIN (.name = "B", .body = { "ground", "ground" }));
+  BAD (": wheel A: expected a body other than the ground, which does not move", WHEEL (.name = "A", .body = "ground"));
 }
 
 static void test_bad_numbers (void **state) {
@@ -152,14 +152,14 @@ static void test_bad_kinds (void **state) {
   (void)state;
   pw_kind kind = messages_kind;
   kind.rows = 1; /* rows, but no constraint */
-  BAD (": kind chooser: rows and level contradict each other",
+  BAD (": element type chooser: rows and level are inconsistent",
        pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
   kind = messages_kind;
   kind.fields = NULL;
-  BAD (": kind chooser: no table of fields", pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
+  BAD (": element type chooser: no table of fields", pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
   kind.name = NULL;
-  BAD (": kind (unnamed): no name", pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
-  BAD (": kind (unnamed): there is none", pw_add (m, NULL, &(messages_chooser){ "c", "frame", 0 }));
+  BAD (": element type (unnamed): no name", pw_add (m, &kind, &(messages_chooser){ "c", "frame", 0 }));
+  BAD (": element type (unnamed): the table is NULL", pw_add (m, NULL, &(messages_chooser){ "c", "frame", 0 }));
 }
 
 /* Writes as much as its definition has, whatever room there is. */

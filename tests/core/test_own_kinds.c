@@ -10,7 +10,7 @@
 #include "system.h"
 #include "trial.h"
 
-#define OWN_NOTICE "pinwheel: derivatives by differences: force_q of kind attraction\n"
+#define OWN_NOTICE "pinwheel: derivatives by differences: force_q of element type attraction\n"
 
 static const double own_e = 0.6, own_b = 0.8; /* eccentricity and short semi-axis; the long one is 1, and so is mu */
 
@@ -209,7 +209,7 @@ static void test_notice (void **state) {
     snprintf (line, sizeof line, "pinwheel run elliptic-wire --t-end 0.5 -m %s --json @/wire.json", method[i]);
     assert_int_equal (cli_run (line), 0);
     assert_string_equal (cli_err, OWN_NOTICE);
-    assert_non_null (strstr (cli_file ("wire.json"), "\"force_q of kind attraction\""));
+    assert_non_null (strstr (cli_file ("wire.json"), "\"force_q of element type attraction\""));
   }
   cli_good ("pinwheel run ezyroller --t-end 0.1 --json @/none.json");
   assert_non_null (strstr (cli_file ("none.json"), "\"differences\": []"));
@@ -220,7 +220,7 @@ static void test_show (void **state) {
   cli_good ("pinwheel show elliptic-wire");
   assert_non_null (strstr (cli_out, "attraction sun: body bead, ground; strength 1 N m^2"));
   assert_non_null (strstr (cli_out, "Derivatives by differences"));
-  assert_non_null (strstr (cli_out, "  force_q of kind attraction\n"));
+  assert_non_null (strstr (cli_out, "  force_q of element type attraction\n"));
   cli_good ("pinwheel show elliptic-wire --matrices");
   assert_non_null (strstr (cli_out, "orbit.N [N]"));
   cli_bad ("pinwheel show elliptic-wire --yaml", 2,

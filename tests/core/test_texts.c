@@ -85,10 +85,10 @@ static void texts_model (const char *about, const char *unit, const char *body, 
 
 static void test_model (void **state) {
   (void)state;
-  texts_model ("\\033[31m", "m", "a", "@/own.c: .about is no text: expected UTF-8 without control characters");
+  texts_model ("\\033[31m", "m", "a", "@/own.c: .about is not text: expected UTF-8 without control characters");
   texts_model ("good", "\\377", "a",
-               "@/own.c: name, unit or meaning of parameter a is no text: expected UTF-8 without control characters");
-  texts_model ("good", "m", "a\\033[31m", "model own: body \"a?[31m\": a name is made of letters, digits, _ and -");
+               "@/own.c: name, unit or meaning of parameter a is not text: expected UTF-8 without control characters");
+  texts_model ("good", "m", "a\\033[31m", "model own: body \"a?[31m\": a name consists of letters, digits, _ and -");
 }
 
 static void test_file_name (void **state) {

@@ -100,7 +100,7 @@ static void test_refused (void **state) {
   error = (pw_error){ 0 };
   m = scene_model (&twice, NULL);
   assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT, "model scene: gear gear: two of its bodies are \"a\"");
+  check_error (&error, PW_INPUT, "model scene: gear gear: two of its bodies are \"a\": expected different ones");
   pw_model_free (m);
 }
 

@@ -52,19 +52,20 @@ PER_ELEMENT (drag_loss, drag, 1) {
 }
 
 static const pw_field drag_fields[] = {
-  { PW_AT (pw_drag, body), PW_BODY, .required = 1, .about = "the body it slows down" },
+  { PW_AT (pw_drag, body), PW_BODY, .required = 1, .about = "the body on which it acts" },
   { PW_AT (pw_drag, linear), PW_NUMBER, .unit = "N s/m", .domain = PW_NONNEGATIVE, .about = "force per speed" },
   { PW_AT (pw_drag, quadratic), PW_NUMBER, .unit = "N s^2/m^2", .domain = PW_NONNEGATIVE,
     .about = "force per square of the speed: half density times area times coefficient" },
-  { PW_AT (pw_drag, turning), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE, .about = "moment per rate" },
+  { PW_AT (pw_drag, turning), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
+    .about = "moment per angular velocity" },
   { PW_AT (pw_drag, turning_quadratic), PW_NUMBER, .unit = "N m s^2/rad^2", .domain = PW_NONNEGATIVE,
-    .about = "moment per square of the rate" },
+    .about = "moment per square of the angular velocity" },
   { .name = NULL },
 };
 
 const pw_kind pw_kind_drag = {
   .name = "drag",
-  .about = "the resistance of air at rest, linear and quadratic, to a body's motion and turning",
+  .about = "linear and quadratic resistance of still air to the translation and rotation of a body",
   .definition = sizeof (pw_drag),
   .element = sizeof (drag),
   .fields = drag_fields,

@@ -61,10 +61,10 @@ PER_ELEMENT (force_power, force, 1) {
 static const char *const force_axes[] = { "world", "body", NULL };
 
 static const pw_field force_fields[] = {
-  { PW_AT (pw_force, body), PW_BODY, .required = 1, .about = "the body it acts on" },
-  { PW_AT (pw_force, at), PW_POINT, .unit = "m", .about = "where it acts, in the body's frame" },
+  { PW_AT (pw_force, body), PW_BODY, .required = 1, .about = "the body on which it acts" },
+  { PW_AT (pw_force, at), PW_POINT, .unit = "m", .about = "point of application in the body's frame" },
   { PW_AT (pw_force, axes), PW_CHOICE, .choices = force_axes,
-    .about = "the axes its components are along; the body's turn with it" },
+    .about = "axes of the components; body axes rotate with the body" },
   { PW_AT (pw_force, fx), PW_SIGNAL, .unit = "N", .about = "component along x" },
   { PW_AT (pw_force, fy), PW_SIGNAL, .unit = "N", .about = "component along y" },
   { .name = NULL },
@@ -72,7 +72,7 @@ static const pw_field force_fields[] = {
 
 const pw_kind pw_kind_force = {
   .name = "force",
-  .about = "a force from outside on a point of a body, along world or body axes",
+  .about = "an external force on a point of a body, given along world or body axes",
   .definition = sizeof (pw_force),
   .element = sizeof (force),
   .fields = force_fields,

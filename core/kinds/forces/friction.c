@@ -44,19 +44,18 @@ PER_ELEMENT (friction_loss, friction, 1) {
 }
 
 static const pw_field friction_fields[] = {
-  { PW_AT (pw_friction, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the two bodies, or ground for one of them" },
+  { PW_AT (pw_friction, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
   { PW_AT (pw_friction, viscous), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
-    .about = "torque per rate" },
+    .about = "torque per angular velocity" },
   { PW_AT (pw_friction, limit), PW_NUMBER, .unit = "N m", .domain = PW_NONNEGATIVE, .about = "Coulomb torque" },
   { PW_AT (pw_friction, speed), PW_NUMBER, .unit = "rad/s", .domain = PW_NONNEGATIVE,
-    .about = "below about this rate the Coulomb torque is smoothed; needed with a limit" },
+    .about = "below about this angular velocity the Coulomb torque is smoothed; required with a limit" },
   { .name = NULL },
 };
 
 const pw_kind pw_kind_friction = {
   .name = "friction",
-  .about = "a viscous and a Coulomb torque against the turning of a body on another",
+  .about = "a viscous and a Coulomb torque that oppose the rotation of one body relative to another",
   .definition = sizeof (pw_friction),
   .element = sizeof (coulomb),
   .fields = friction_fields,

@@ -35,7 +35,7 @@ PER_ELEMENT (gravity_energy, gravity, 1) {
 
 static const pw_field gravity_fields[] = {
   { PW_AT (pw_gravity, acceleration), PW_VECTOR, .unit = "m/s^2", .required = 1,
-    .about = "in the world; (0, -9.81) for a plane that stands upright" },
+    .about = "in the world frame; (0, -9.81) in a vertical plane" },
   { .name = NULL },
 };
 

@@ -21,7 +21,7 @@ static const pw_field marker_fields[] = {
 
 const pw_kind pw_kind_marker = {
   .name = "marker",
-  .about = "a point of a body whose place and path are shown in tables, figures and animations",
+  .about = "a point of a body whose path is shown in tables, figures and animations",
   .definition = sizeof (pw_marker),
   .element = sizeof (contact),
   .fields = marker_fields,

@@ -72,21 +72,23 @@ PER_ELEMENT (motor_power, motor, 1) {
 
 static const pw_field motor_fields[] = {
   { PW_AT (pw_motor, body), PW_BODY, .count = 2, .required = 1,
-    .about = "what it turns, and what it reacts on; ground for one of them" },
+    .about = "the driven body and the body that takes the reaction; one may be ground" },
   { PW_AT (pw_motor, stiffness), PW_NUMBER, .unit = "N m/rad", .domain = PW_NONNEGATIVE,
-    .about = "torque per error of the angle; 0: the rate alone counts" },
+    .about = "torque per angle error; 0: only the angular velocity is controlled" },
   { PW_AT (pw_motor, damping), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
-    .about = "torque per error of the rate" },
+    .about = "torque per angular velocity error" },
   { PW_AT (pw_motor, limit), PW_NUMBER, .unit = "N m", .domain = PW_NONNEGATIVE,
-    .about = "the torque saturates here; 0: no limit" },
-  { PW_AT (pw_motor, angle), PW_SIGNAL, .unit = "rad", .about = "target angle, of the first body from the second" },
-  { PW_AT (pw_motor, rate), PW_SIGNAL, .unit = "rad/s", .about = "target rate, of the first body from the second" },
+    .about = "largest torque; 0: no limit" },
+  { PW_AT (pw_motor, angle), PW_SIGNAL, .unit = "rad",
+    .about = "target angle of the first body relative to the second" },
+  { PW_AT (pw_motor, rate), PW_SIGNAL, .unit = "rad/s",
+    .about = "target angular velocity of the first body relative to the second" },
   { .name = NULL },
 };
 
 const pw_kind pw_kind_motor = {
   .name = "motor",
-  .about = "a torque of limited size that turns a body against another to an angle and a rate",
+  .about = "a limited torque that drives the relative angle and angular velocity of two bodies to target values",
   .definition = sizeof (pw_motor),
   .element = sizeof (motor),
   .fields = motor_fields,

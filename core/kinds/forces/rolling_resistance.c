@@ -74,7 +74,7 @@ static const pw_field resistance_fields[] = {
   { PW_AT (pw_rolling_resistance, heading), PW_NUMBER, .unit = "rad",
     .about = "rolling direction in the body's frame; 0: along its x" },
   { PW_AT (pw_rolling_resistance, limit), PW_NUMBER, .unit = "N", .required = 1, .domain = PW_NONNEGATIVE,
-    .about = "the force when it rolls: coefficient times normal load" },
+    .about = "the force while rolling: coefficient times normal load" },
   { PW_AT (pw_rolling_resistance, speed), PW_NUMBER, .unit = "m/s", .required = 1, .domain = PW_POSITIVE,
     .about = "below about this speed the force is smoothed" },
   { .name = NULL },
@@ -82,7 +82,7 @@ static const pw_field resistance_fields[] = {
 
 const pw_kind pw_kind_rolling_resistance = {
   .name = "rolling-resistance",
-  .about = "a force of given size along a heading against the motion of its point",
+  .about = "a force of given magnitude that opposes the motion of a point along a heading",
   .definition = sizeof (pw_rolling_resistance),
   .element = sizeof (resistance),
   .fields = resistance_fields,

@@ -58,11 +58,11 @@ PER_ELEMENT (twist_loss, twist, 1) {
 
 static const pw_field twist_fields[] = {
   { PW_AT (pw_rotational_spring, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the two bodies, or ground for one of them" },
+    .about = "the two bodies; one may be ground" },
   { PW_AT (pw_rotational_spring, stiffness), PW_NUMBER, .unit = "N m/rad", .required = 1, .domain = PW_NONNEGATIVE,
     .about = "torque per angle" },
   { PW_AT (pw_rotational_spring, damping), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,
-    .about = "torque per rate" },
+    .about = "torque per angular velocity" },
   { PW_AT (pw_rotational_spring, angle), PW_NUMBER, .unit = "rad",
     .about = "free angle, of the first body relative to the second" },
   { .name = NULL },
@@ -70,7 +70,7 @@ static const pw_field twist_fields[] = {
 
 const pw_kind pw_kind_rotational_spring = {
   .name = "rotational-spring",
-  .about = "a spring, with a damper beside it, between the angles of two bodies",
+  .about = "a torsion spring and a parallel damper between two bodies",
   .definition = sizeof (pw_rotational_spring),
   .element = sizeof (twist),
   .fields = twist_fields,

@@ -70,7 +70,7 @@ PER_ELEMENT (sliding_loss, sliding, 1) {
 
 static const pw_field sliding_fields[] = {
   { PW_AT (pw_sliding_friction, body), PW_BODY, .count = 2, .required = 1,
-    .about = "what slides, and what it slides on; ground for one of them" },
+    .about = "the sliding body and the body with the line; one may be ground" },
   { PW_AT (pw_sliding_friction, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the point, and a point of the line, in each body's frame" },
   { PW_AT (pw_sliding_friction, heading), PW_NUMBER, .unit = "rad",
@@ -79,13 +79,13 @@ static const pw_field sliding_fields[] = {
     .about = "force per speed" },
   { PW_AT (pw_sliding_friction, limit), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE, .about = "Coulomb force" },
   { PW_AT (pw_sliding_friction, speed), PW_NUMBER, .unit = "m/s", .domain = PW_NONNEGATIVE,
-    .about = "below about this speed the Coulomb force is smoothed; needed with a limit" },
+    .about = "below about this speed the Coulomb force is smoothed; required with a limit" },
   { .name = NULL },
 };
 
 const pw_kind pw_kind_sliding_friction = {
   .name = "sliding-friction",
-  .about = "a viscous and a Coulomb force against the motion of a point along a line of another body",
+  .about = "a viscous and a Coulomb force that oppose the motion of a point along a line of another body",
   .definition = sizeof (pw_sliding_friction),
   .element = sizeof (sliding),
   .fields = sliding_fields,

@@ -103,19 +103,20 @@ PER_ELEMENT (spring_loss, spring, 1) {
 }
 
 static const pw_field spring_fields[] = {
-  { PW_AT (pw_spring, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies, or ground for one of them" },
-  { PW_AT (pw_spring, at), PW_POINT, .count = 2, .unit = "m", .required = 1, .about = "the ends in each body's frame" },
+  { PW_AT (pw_spring, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
+  { PW_AT (pw_spring, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
+    .about = "the end points in the bodies' frames" },
   { PW_AT (pw_spring, stiffness), PW_NUMBER, .unit = "N/m", .required = 1, .domain = PW_NONNEGATIVE,
-    .about = "force per length" },
+    .about = "force per elongation" },
   { PW_AT (pw_spring, damping), PW_NUMBER, .unit = "N s/m", .domain = PW_NONNEGATIVE,
-    .about = "force per speed, along the line" },
+    .about = "force per rate of elongation" },
   { PW_AT (pw_spring, length), PW_NUMBER, .unit = "m", .domain = PW_NONNEGATIVE, .about = "free length" },
   { .name = NULL },
 };
 
 const pw_kind pw_kind_spring = {
   .name = "spring",
-  .about = "a spring, with a damper beside it, between a point of one body and a point of another",
+  .about = "a spring and a parallel damper between a point of one body and a point of another",
   .definition = sizeof (pw_spring),
   .element = sizeof (spring),
   .fields = spring_fields,

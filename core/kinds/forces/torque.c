@@ -21,14 +21,14 @@ static void torque_power (const pw_batch *b, double *out) {
 
 static const pw_field torque_fields[] = {
   { PW_AT (pw_torque, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the body it acts on, and the one it reacts on; ground for one of them" },
+    .about = "the body on which it acts and the body that takes the reaction; one may be ground" },
   { PW_AT (pw_torque, value), PW_SIGNAL, .unit = "N m", .required = 1, .about = "torque on the first body" },
   { .name = NULL },
 };
 
 const pw_kind pw_kind_torque = {
   .name = "torque",
-  .about = "a torque on one body and its opposite on another",
+  .about = "a torque on one body and the opposite torque on another",
   .definition = sizeof (pw_torque),
   .fields = torque_fields,
   .bodies = 2,

@@ -113,13 +113,13 @@ static const pw_field tyre_fields[] = {
   { PW_AT (pw_tyre, load), PW_NUMBER, .unit = "N", .domain = PW_NONNEGATIVE,
     .about = "normal load that limits the force; 0: no limit" },
   { PW_AT (pw_tyre, friction), PW_NUMBER, .domain = PW_NONNEGATIVE,
-    .about = "the limit is friction times load; needed with a load" },
+    .about = "the limit is friction times load; required with a load" },
   { .name = NULL },
 };
 
 const pw_kind pw_kind_tyre = {
   .name = "tyre",
-  .about = "a wheel that gives way sideways, with a lateral force that grows with its slip",
+  .about = "a wheel with lateral slip; the lateral force increases with the slip",
   .definition = sizeof (pw_tyre),
   .element = sizeof (tyre),
   .fields = tyre_fields,

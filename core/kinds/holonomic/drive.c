@@ -42,19 +42,18 @@ static const char *const drive_what[] = { "x", "y", "angle", NULL };
 
 static const pw_field drive_fields[] = {
   { PW_AT (pw_drive, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the driven body, and the one it is seen from; ground for one of them" },
+    .about = "the driven body and the reference body; one may be ground" },
   { PW_AT (pw_drive, at), PW_POINT, .count = 2, .unit = "m",
-    .about = "a point in each body's frame; without meaning for an angle" },
+    .about = "a point in each body's frame; ignored for an angle" },
   { PW_AT (pw_drive, what), PW_CHOICE, .required = 1, .choices = drive_what,
-    .about = "from the second point to the first in the second body's frame, or from body to body" },
+    .about = "the coordinate, from point 2 to point 1 in the frame of body 2, or the relative angle" },
   { PW_AT (pw_drive, value), PW_SIGNAL, .unit = "m or rad", .required = 1,
-    .about = "its value over time, with two derivatives" },
+    .about = "value as a function of time, with two derivatives" },
   { .name = NULL },
 };
 
 static const pw_quantity drive_reaction[] = {
-  { "F", "N or N m", NULL,
-    "force on the first body at its point, along what is prescribed; moment on it for an angle" },
+  { "F", "N or N m", NULL, "force on the first body at its point along the prescribed coordinate, or moment on it" },
 };
 
 static const char *drive_unit (const void *element, int row) {

@@ -55,13 +55,14 @@ static const char *const gear_from[] = { "start", "offset", NULL };
 
 static const pw_field gear_fields[] = {
   { PW_AT (pw_gear, body), PW_BODY, .count = 3, .required = 1,
-    .about = "the two gears and their carrier; ground for one of them" },
+    .about = "the two gears and their carrier; one may be ground" },
   { PW_AT (pw_gear, ratio), PW_NUMBER, .required = 1,
-    .about = "of the first's speed to the second's, both on the carrier; negative: they turn against each other" },
+    .about =
+        "angular velocity of the first over that of the second, relative to the carrier; negative: opposite rotation" },
   { PW_AT (pw_gear, from), PW_CHOICE, .choices = gear_from,
-    .about = "whether the offset is that of the described start, or given" },
+    .about = "whether the offset follows from the initial angles or is given" },
   { PW_AT (pw_gear, offset), PW_NUMBER, .unit = "rad",
-    .about = "of the first's angle from ratio times the second's, both on the carrier" },
+    .about = "angle of the first minus ratio times that of the second, relative to the carrier" },
   { .name = NULL },
 };
 
@@ -69,7 +70,7 @@ static const pw_quantity gear_reaction[] = { { "M", "N m", NULL, "moment on the 
 
 const pw_kind pw_kind_gear = {
   .name = "gear",
-  .about = "the angles of two bodies, seen from a third, keep a ratio",
+  .about = "the angles of two bodies relative to a third have a fixed ratio",
   .definition = sizeof (pw_gear),
   .element = sizeof (gear),
   .fields = gear_fields,

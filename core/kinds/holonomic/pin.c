@@ -77,7 +77,7 @@ PER_ELEMENT (pin_gamma_v, pin, 12) {
 }
 
 static const pw_field pin_fields[] = {
-  { PW_AT (pw_pin, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies, or ground for one of them" },
+  { PW_AT (pw_pin, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
   { PW_AT (pw_pin, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the common point in each body's frame" },
   { .name = NULL },

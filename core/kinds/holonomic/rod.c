@@ -100,20 +100,21 @@ PER_ELEMENT (rod_gamma_v, rod, 6) {
 }
 
 static const pw_field rod_fields[] = {
-  { PW_AT (pw_rod, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies, or ground for one of them" },
-  { PW_AT (pw_rod, at), PW_POINT, .count = 2, .unit = "m", .required = 1, .about = "the ends in each body's frame" },
+  { PW_AT (pw_rod, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
+  { PW_AT (pw_rod, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
+    .about = "the end points in the bodies' frames" },
   { PW_AT (pw_rod, length), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE,
-    .about = "distance of the ends" },
+    .about = "distance between the end points" },
   { .name = NULL },
 };
 
 static const pw_quantity rod_reaction[] = {
-  { "F", "N", NULL, "force on the first body, away from the second: negative where the rod is pulled" },
+  { "F", "N", NULL, "force on the first body, away from the second; negative: tension" },
 };
 
 const pw_kind pw_kind_rod = {
   .name = "rod",
-  .about = "a massless bar keeps a point of one body and a point of another at a distance",
+  .about = "a massless bar keeps a point of one body at a fixed distance from a point of another",
   .definition = sizeof (pw_rod),
   .element = sizeof (rod),
   .fields = rod_fields,

@@ -49,7 +49,7 @@ PER_ELEMENT (slider_gamma_v, line, 12) {
 
 static const pw_field slider_fields[] = {
   { PW_AT (pw_slider, body), PW_BODY, .count = 2, .required = 1,
-    .about = "what slides, and what it slides on; ground for one of them" },
+    .about = "the sliding body and the body with the line; one may be ground" },
   { PW_AT (pw_slider, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the point, and a point of the line, in each body's frame" },
   { PW_AT (pw_slider, heading), PW_NUMBER, .unit = "rad",
@@ -65,7 +65,7 @@ static const pw_quantity slider_reaction[] = {
 
 const pw_kind pw_kind_slider = {
   .name = "slider",
-  .about = "a body slides along a line of another and does not turn against it (prismatic joint)",
+  .about = "a body slides along a line of another without rotating relative to it (prismatic joint)",
   .definition = sizeof (pw_slider),
   .element = sizeof (line),
   .fields = slider_fields,

@@ -27,7 +27,7 @@ PER_ELEMENT (slot_gamma, line, 1) {
 
 static const pw_field slot_fields[] = {
   { PW_AT (pw_slot, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the one with the point, and the one with the line; ground for one of them" },
+    .about = "the body with the point and the body with the line; one may be ground" },
   { PW_AT (pw_slot, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the point, and a point of the line, in each body's frame" },
   { PW_AT (pw_slot, heading), PW_NUMBER, .unit = "rad",

@@ -85,7 +85,7 @@ PER_ELEMENT (weld_gamma_v, weld, 18) {
 }
 
 static const pw_field weld_fields[] = {
-  { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies, or ground for one of them" },
+  { PW_AT (pw_weld, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
   { PW_AT (pw_weld, at), PW_POINT, .count = 2, .unit = "m", .required = 1,
     .about = "the common point in each body's frame" },
   { PW_AT (pw_weld, angle), PW_NUMBER, .unit = "rad", .about = "of the second body relative to the first" },
@@ -95,7 +95,7 @@ static const pw_field weld_fields[] = {
 static const pw_quantity weld_reaction[] = {
   { "Fx", "N", NULL, "force on the first body, world x" },
   { "Fy", "N", NULL, "force on the first body, world y" },
-  { "M", "N m", NULL, "moment on the first body, the force acting at the common point" },
+  { "M", "N m", NULL, "moment on the first body about the common point" },
 };
 
 const pw_kind pw_kind_weld = {

@@ -41,7 +41,7 @@ static int pfaffian_prepare (const void *definition, const pw_body *const *bodie
   memcpy (k->b, d->b, sizeof k->b);
   for (int i = 0; i < 3; i++) size = fmax (size, fmax (fabs (d->a[i]), fabs (d->b[i])));
   (void)bodies, (void)own;
-  if (size == 0) return pw_fail (error, PW_INPUT, "a and b are all zero: that relates nothing");
+  if (size == 0) return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
   return PW_OK;
 }
 
@@ -74,23 +74,22 @@ PER_ELEMENT (pfaffian_gamma_v, pfaffian, 6) {
 }
 
 static const pw_field pfaffian_fields[] = {
-  { PW_AT (pw_pfaffian, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the two bodies, or ground for one of them" },
+  { PW_AT (pw_pfaffian, body), PW_BODY, .count = 2, .required = 1, .about = "the two bodies; one may be ground" },
   { PW_AT (pw_pfaffian, a), PW_NUMBER, .count = 3, .required = 1,
-    .about = "coefficients of the first body's velocity, x and y along its own axes, and of its rate" },
+    .about = "coefficients of vx, vy and omega of the first body, in its frame" },
   { PW_AT (pw_pfaffian, b), PW_NUMBER, .count = 3,
-    .about = "coefficients of the second body's velocity, x and y along the first's axes, and of its rate" },
-  { PW_AT (pw_pfaffian, value), PW_SIGNAL, .about = "what the sum is over time, with its derivative" },
+    .about = "coefficients of vx, vy and omega of the second body, in the frame of the first" },
+  { PW_AT (pw_pfaffian, value), PW_SIGNAL, .about = "value of the sum as a function of time, with its derivative" },
   { .name = NULL },
 };
 
 static const pw_quantity pfaffian_reaction[] = {
-  { "F", "N", NULL, "times a and b: force and moment on the two bodies, along the first one's axes" },
+  { "F", "N", NULL, "F a and F b are force and moment on the two bodies, in the frame of the first" },
 };
 
 const pw_kind pw_kind_pfaffian = {
   .name = "pfaffian",
-  .about = "a linear relation between the velocities of one or two bodies, stated by its coefficients",
+  .about = "a linear relation, given by its coefficients, between the velocities of one or two bodies",
   .definition = sizeof (pw_pfaffian),
   .element = sizeof (pfaffian),
   .fields = pfaffian_fields,

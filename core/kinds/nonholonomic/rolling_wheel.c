@@ -109,12 +109,12 @@ static const pw_field rolling_fields[] = {
   { PW_AT (pw_rolling_wheel, radius), PW_NUMBER, .unit = "m", .required = 1, .domain = PW_POSITIVE,
     .about = "radius of the wheel" },
   { PW_AT (pw_rolling_wheel, inertia), PW_NUMBER, .unit = "kg m^2", .domain = PW_NONNEGATIVE,
-    .about = "about its axle; the wheel's mass belongs to the body" },
-  { PW_AT (pw_rolling_wheel, start), PW_NUMBER, .unit = "rad", .about = "spin angle at the start" },
+    .about = "moment of inertia about the axle; the wheel's mass belongs to the body" },
+  { PW_AT (pw_rolling_wheel, start), PW_NUMBER, .unit = "rad", .about = "initial spin angle" },
   { PW_AT (pw_rolling_wheel, rate), PW_NUMBER, .unit = "rad/s",
-    .about = "spin rate at the start; 0: as the body's start makes it roll" },
+    .about = "initial spin velocity; 0: from rolling at the body's initial velocity" },
   { PW_AT (pw_rolling_wheel, torque), PW_SIGNAL, .unit = "N m",
-    .about = "on the wheel about its axle; positive drives along the heading" },
+    .about = "torque on the wheel about its axle; positive: drives along the heading" },
   { .name = NULL },
 };
 
@@ -124,7 +124,7 @@ static const pw_quantity rolling_reaction[] = {
 };
 
 static const pw_quantity rolling_coordinate[] = {
-  { "spin", "rad", "spin_rate", "angle about the axle, growing along the heading" },
+  { "spin", "rad", "spin_rate", "angle about the axle; increases when rolling along the heading" },
 };
 
 const pw_kind pw_kind_rolling_wheel = {

@@ -23,11 +23,11 @@ static void speed_gamma (const pw_batch *b, double *out) {
 }
 
 static const pw_field speed_fields[] = {
-  { PW_AT (pw_speed, body), PW_BODY, .required = 1, .about = "the body that is moved" },
+  { PW_AT (pw_speed, body), PW_BODY, .required = 1, .about = "the body with the point" },
   { PW_AT (pw_speed, at), PW_POINT, .unit = "m", .about = "the point in the body's frame" },
   { PW_AT (pw_speed, heading), PW_NUMBER, .unit = "rad", .about = "the direction in the body's frame; 0: along its x" },
   { PW_AT (pw_speed, value), PW_SIGNAL, .unit = "m/s", .required = 1,
-    .about = "speed of the point along the direction over time, with its derivative" },
+    .about = "velocity component as a function of time, with its derivative" },
   { .name = NULL },
 };
 
@@ -35,7 +35,7 @@ static const pw_quantity speed_reaction[] = { { "F", "N", NULL, "force on the bo
 
 const pw_kind pw_kind_speed = {
   .name = "speed",
-  .about = "the speed of a point along a direction fixed in its body follows a signal of time",
+  .about = "the velocity component of a point along a direction fixed in its body follows a signal of time",
   .definition = sizeof (pw_speed),
   .element = sizeof (contact),
   .fields = speed_fields,
