@@ -1,9 +1,7 @@
-/* Planning of the condensed matrix: its nodes, and the dense path; see condense.h. */
+/* Planning of the condensed matrix: its nodes; see condense.h. */
 #include <stdlib.h>
 #include "condense.h"
 #include "util.h"
-
-enum { CONDENSE_DENSE_COORDS = 36 }; /* beyond, equations rarely share a body and S is better kept sparse */
 
 /* ---- Nodes ---- */
 
@@ -97,38 +95,7 @@ static int condense_allocate (pw_plan *c, int rows, const unsigned char *active)
   return PW_OK;
 }
 
-/* ---- The dense path ---- */
-
-/* The equations that touch a group, in order. */
-static void condense_fill_block (const pw_plan *c, pw_dense_block *b, const int *place) {
-  for (int x = c->start[b->j]; x < c->start[b->j + 1]; x++) {
-    const pw_plan_contribution *p = &c->contribution[c->list[x]];
-    for (int r = 0; r < c->node[p->node].size; r++) {
-      b->at[b->rows] = place[p->node] + r;
-      b->J[b->rows++] = p->J + r * p->step;
-    }
-  }
-}
-
-/* Groups without any weight need no block: massless.c computes their accelerations. */
-static void condense_dense (const pw_plan *c, const double *weight, int unknowns, pw_dense_block *block) {
-  pw_dense *dense = c->k->dense;
-  int place[PW_DENSE], y = 0;
-  *dense = (pw_dense){ .n = unknowns, .block = block, .end = block, .guard = c->k->guard };
-  for (int n = 0; n < c->nodes; n++) {
-    place[n] = y;
-    for (int r = 0; r < c->node[n].size; r++) dense->row[y++] = c->node[n].y + r;
-  }
-  for (int n = 0; n < c->groups; n++) {
-    int j = pw_plan_group (c, n), width = pw_plan_width (c, j), has_weight = 0;
-    for (int i = 0; i < width; i++) has_weight |= weight[j + i] != 0;
-    if (!has_weight) continue;
-    *dense->end = (pw_dense_block){ .w = c->k->inverse + j, .j = j, .width = width };
-    condense_fill_block (c, dense->end++, place);
-  }
-}
-
-/* ---- */
+/* ---- Unknowns beyond the rows ---- */
 
 /* A body at which more nodes than this meet is not condensed, if its weights are finite. */
 enum { CONDENSE_MEET = 8 };
@@ -172,38 +139,29 @@ static void condense_fill_rows (pw_plan *c, int rows) {
       k->schur[schurs++] = (pw_schur_row){ c->node[n].y, c->node[n].gamma, c->node[n].lambda };
 }
 
-static pw_dense_block *condense_carve (const pw_plan *c, pw_layout *l, int is_dense) {
+static int condense_lay_out (pw_plan *c, int rows) {
   struct pw_saddle *k = c->k;
-  k->force = pw_take (l, k->massless.components ? (size_t)k->s->coords + 3 : 0, sizeof *k->force);
-  k->y = pw_take (l, k->more ? (size_t)(k->s->rows + k->more) : 0, sizeof *k->y);
-  k->schur = pw_take (l, (size_t)k->schurs, sizeof *k->schur);
-  k->inactive = pw_take (l, (size_t)k->inactives, sizeof *k->inactive);
-  k->dense = is_dense ? pw_take (l, 1, sizeof *k->dense) : NULL;
-  return is_dense ? pw_take (l, (size_t)c->groups, sizeof (pw_dense_block)) : NULL;
-}
-
-static int condense_lay_out (pw_plan *c, const double *weight, int rows) {
-  struct pw_saddle *k = c->k;
-  int unknowns = 0;
+  k->inactives = rows;
   for (int n = 0; n < c->nodes; n++) {
-    unknowns += c->node[n].size;
     k->schurs += c->node[n].row == PW_PLAN_SCHUR;
+    if (c->node[n].row >= 0) k->inactives -= c->node[n].size;
   }
-  for (int i = 0; i < rows; i++) k->inactives += k->massless.component_of_row[i] < 0;
-  k->inactives -= unknowns - k->schurs;
-  int is_dense = unknowns <= PW_DENSE_MOST && k->s->coords <= CONDENSE_DENSE_COORDS;
-  if (!is_dense && condense_uncondensed (c) != PW_OK) return PW_RESOURCE;
+  for (int i = 0; i < rows; i++) k->inactives -= k->massless.component_of_row[i] >= 0;
+  if (condense_uncondensed (c) != PW_OK) return PW_RESOURCE;
   k->more = k->schurs + 3 * c->uncondenseds;
   pw_layout l = { NULL, 0 };
-  condense_carve (c, &l, is_dense);
-  k->memory = malloc (l.used + 1);
-  if (k->memory == NULL) return PW_RESOURCE;
-  l = (pw_layout){ k->memory, 0 };
-  pw_dense_block *block = condense_carve (c, &l, is_dense);
+  for (int pass = 0; pass < 2; pass++) {
+    k->force = pw_take (&l, k->massless.components ? (size_t)k->s->coords + 3 : 0, sizeof *k->force);
+    k->y = pw_take (&l, k->more ? (size_t)(k->s->rows + k->more) : 0, sizeof *k->y);
+    k->schur = pw_take (&l, (size_t)k->schurs, sizeof *k->schur);
+    k->inactive = pw_take (&l, (size_t)k->inactives, sizeof *k->inactive);
+    if (pass == 1) break;
+    k->memory = malloc (l.used + 1);
+    if (k->memory == NULL) return PW_RESOURCE;
+    l = (pw_layout){ k->memory, 0 };
+  }
   condense_fill_rows (c, rows);
-  if (!is_dense) return pw_condense_block (c);
-  condense_dense (c, weight, unknowns, block);
-  return PW_OK;
+  return pw_condense_block (c);
 }
 
 int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsigned char *active) {
@@ -213,7 +171,7 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
   if (k->inverse == NULL) return PW_RESOURCE;
   for (int j = 0; j < k->s->coords; j++) k->inverse[j] = weight[j] > 0 ? 1 / weight[j] : 0;
   int status = condense_allocate (&c, rows, active);
-  if (status == PW_OK) status = condense_lay_out (&c, weight, rows);
+  if (status == PW_OK) status = condense_lay_out (&c, rows);
   free (c.node);
   free (c.contribution);
   free (c.start);

@@ -6,7 +6,6 @@
 #define PW_CONDENSE_H
 
 #include "block_ldl.h"
-#include "dense.h"
 #include "massless.h"
 
 /* A row of the Schur complement that eliminating massless coordinates leaves: its position and its values. */
@@ -24,8 +23,7 @@ struct pw_saddle {
   double *force;       /* coords: forces changed by `massless` */
   double *y;           /* s->rows and `more`: gamma and lambda where there are more unknowns than rows */
   int more;            /* Schur rows, and 3 for each uncondensed body */
-  pw_dense *dense;     /* few equations; or NULL */
-  pw_block_ldl *block; /* many equations; or NULL */
+  pw_block_ldl *block;
   pw_schur_row *schur;
   int schurs;
   int *inactive; /* rows that are not enforced */

@@ -45,7 +45,6 @@ int pw_saddle_factor (pw_saddle *k) {
   k->pivot_row = -1;
   k->pivot = k->massless.components ? pw_massless_factor (&k->massless) : INFINITY;
   if (!(k->pivot > k->guard)) return PW_RETRY;
-  if (k->dense) return pw_dense_factor (k->dense) ? PW_OK : PW_RETRY;
   pw_block_factor (k->block);
   if (!(k->block->pivot >= k->pivot)) {
     k->pivot = k->block->pivot;
@@ -55,22 +54,12 @@ int pw_saddle_factor (pw_saddle *k) {
 }
 
 int pw_saddle_below (const pw_saddle *k, double sine) {
-  int row;
-  if (k->dense && !k->dense->low && sine * sine <= PW_DENSE_WATCH) return k->pivot < sine * sine;
-  return pw_saddle_pivot (k, &row) < sine;
+  return !(k->pivot >= sine * sine);
 }
 
 double pw_saddle_pivot (const pw_saddle *k, int *row) {
-  double pivot = k->pivot;
   *row = k->pivot_row < 0 && k->massless.components ? pw_massless_weakest (&k->massless) : k->pivot_row;
-  if (k->dense && pivot > k->guard) {
-    int place;
-    double dense = pw_dense_pivot (k->dense, &place);
-    if (dense >= pivot) return sqrt (fmin (pivot, 1));
-    pivot = dense;
-    *row = place < 0 || k->dense->row[place] >= k->s->rows ? -1 : k->dense->row[place];
-  }
-  return pivot > 0 ? sqrt (fmin (pivot, 1)) : 0;
+  return k->pivot > 0 ? sqrt (fmin (k->pivot, 1)) : 0;
 }
 
 /* ---- Solving ---- */
@@ -99,12 +88,8 @@ void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double
     pw_massless_forward (&k->massless, gamma, k->force);
   }
   if (k->more) gamma = saddle_extend (k, gamma);
-  if (k->dense)
-    pw_dense_solve (k->dense, f, gamma, a, l);
-  else {
-    if (l != gamma) memcpy (l, gamma, (size_t)k->rows * sizeof *l);
-    pw_block_solve (k->block, f, l, a);
-  }
+  if (l != gamma) memcpy (l, gamma, (size_t)k->rows * sizeof *l);
+  pw_block_solve (k->block, f, l, a);
   if (k->more) saddle_shorten (k, lambda);
   for (int i = 0; i < k->inactives; i++) lambda[k->inactive[i]] = 0;
   if (k->massless.components) pw_massless_backward (&k->massless, a, lambda);

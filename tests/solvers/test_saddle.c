@@ -13,7 +13,6 @@
 #include "rk_state.h"
 #include "runs.h"
 #include "scene.h"
-#include "dense.h"
 
 typedef struct {
   pw_run *run;
@@ -270,7 +269,7 @@ static pw_saddle *saddle_turned (pw_workspace *w, int body, int held) {
   const pw_system *s = w->s;
   double weight[SADDLE_COORDS], q[SADDLE_COORDS];
   pw_error error = { 0 };
-  assert_true (s->coords == SADDLE_COORDS && s->rows <= 2 * SADDLE_LINKS && s->rows > PW_DENSE);
+  assert_true (s->coords == SADDLE_COORDS && s->rows <= 2 * SADDLE_LINKS);
   memcpy (weight, s->mass, sizeof weight);
   for (int j = 3 * body; j < 3 * body + held; j++) weight[j] = INFINITY;
   for (int j = 0; j < SADDLE_COORDS; j++) q[j] = s->q0[j] + (j % 3 == 2 ? j : 0);
