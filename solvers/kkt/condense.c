@@ -7,7 +7,7 @@
 
 static void condense_contribute (pw_plan *c, const double *J, int step, int j, int is_pin) {
   int weight = 0;
-  for (int n = 0; n < pw_plan_width (c, j); n++) weight |= c->k->inverse[j + n] > 0;
+  for (int n = 0; n < pw_group_width (c->k->s, j); n++) weight |= c->k->inverse[j + n] > 0;
   if (!weight) return;
   if (c->contribution) c->contribution[c->contributions] = (pw_plan_contribution){ J, c->nodes, step, j, is_pin };
   c->contributions++;
@@ -27,32 +27,40 @@ static void condense_element (pw_plan *c, const pw_element_batch *b, int e, int 
   c->nodes++;
 }
 
-/* 1 for an equation that becomes part of a node: active, not in a massless component, and not a function of prescribed
- * coordinates alone. */
-static int condense_takes_part (const pw_plan *c, const pw_element_batch *b, int e, int r,
-                                const unsigned char *active) {
-  const double *J = b->J + (e * b->kind->rows + r) * b->b.cols, *inverse = c->k->inverse;
-  int i = b->row + e * b->kind->rows + r, prescribed = 0;
+/* 1 for row n of a batch that becomes part of a node: active, not in a massless component, and not a function of
+ * prescribed coordinates alone. */
+static int condense_takes_part (const pw_plan *c, const pw_element_batch *b, int n, const unsigned char *active) {
+  const double *J = b->J + n * b->b.cols, *inverse = c->k->inverse;
+  int i = b->row + n, prescribed = 0;
   if ((active && !active[i]) || c->k->massless.component_of_row[i] >= 0) return 0;
-  for (int n = 0; n < b->b.cols; n++) {
-    int j = pw_global (b, e, n);
-    if (j < c->k->s->coords && inverse[j] > 0 && J[n] != 0) return 1;
+  for (int x = 0; x < b->b.cols; x++) {
+    int j = pw_global (b, n / b->kind->rows, x);
+    if (j < c->k->s->coords && inverse[j] > 0 && J[x] != 0) return 1;
     prescribed |= j < c->k->s->coords && inverse[j] == 0;
   }
   return !prescribed;
 }
 
-/* Runs of such equations of an element. */
+/* 1 if rows n and n + 1 of a batch may share a node: rows of one element, or of elements of one row with the same
+ * columns, such as two wheels of a body. */
+static int condense_joins (const pw_element_batch *b, int n) {
+  int e = n / b->kind->rows, next = (n + 1) / b->kind->rows;
+  if (e == next) return 1;
+  for (int x = 0; x < b->b.cols; x++)
+    if (b->kind->rows > 1 || pw_global (b, e, x) != pw_global (b, next, x)) return 0;
+  return 1;
+}
+
+/* Runs of such equations. */
 static void condense_elements (pw_plan *c, int rows, const unsigned char *active) {
   const pw_system *s = c->k->s;
   for (const pw_element_batch *b = c->k->w->batch;
        b < c->k->w->batch + s->batches && b->kind->rows > 0 && b->row < rows; b++)
-    for (int e = 0; e < b->b.count; e++)
-      for (int r = 0, size; r<b->kind->rows; r += size> 0 ? size : 1) {
-        for (size = 0; r + size < b->kind->rows && size < PW_BLOCK_NODE; size++)
-          if (!condense_takes_part (c, b, e, r + size, active)) break;
-        if (size > 0) condense_element (c, b, e, r, size);
-      }
+    for (int n = 0, end = b->b.count * b->kind->rows, size; n<end; n += size> 0 ? size : 1) {
+      for (size = 0; n + size < end && size < PW_BLOCK_NODE; size++)
+        if (!condense_takes_part (c, b, n + size, active) || (size > 0 && !condense_joins (b, n))) break;
+      if (size > 0) condense_element (c, b, n / b->kind->rows, n % b->kind->rows, size);
+    }
 }
 
 /* Adds the rows of components that are not pivots; the multiplier of a row without contributions stays 0. */
@@ -63,12 +71,14 @@ static void condense_components (pw_plan *c) {
     for (int i = p->pivots; i < p->rows; i++) {
       int before = c->contributions;
       for (int g = 0; g < p->groups; g++)
-        condense_contribute (c, p->Z + i * p->cols + p->group_column[g], p->cols, p->group[g], 0);
+        condense_contribute (c, p->A + i * p->stride + p->group[g].column, p->stride, p->group[g].j, 0);
       if (c->contributions == before) continue;
       if (c->node)
-        c->node[c->nodes] = (pw_plan_node){
-          .size = 1, .row = PW_PLAN_SCHUR, .y = c->k->s->rows + schurs++, .gamma = p->gamma + i, .lambda = p->lambda + i
-        };
+        c->node[c->nodes] = (pw_plan_node){ .size = 1,
+                                            .row = PW_PLAN_SCHUR,
+                                            .y = c->k->s->rows + schurs++,
+                                            .gamma = &p->row[i].gamma,
+                                            .lambda = &p->row[i].lambda };
       c->nodes++;
     }
   }
@@ -165,7 +175,7 @@ static int condense_lay_out (pw_plan *c, int rows) {
 }
 
 int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsigned char *active) {
-  pw_plan c = { .k = k, .groups = k->s->coords - 2 * k->s->bodies };
+  pw_plan c = { .k = k, .weight = weight, .groups = pw_groups (k->s) };
   k->rows = rows;
   k->inverse = calloc ((size_t)k->s->coords + 3, sizeof *k->inverse);
   if (k->inverse == NULL) return PW_RESOURCE;

@@ -19,10 +19,10 @@ struct pw_saddle {
   const pw_workspace *w; /* where J is */
   int rows;
   pw_massless massless;
-  double *inverse;     /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight; the ground's 0 */
-  double *force;       /* coords: forces changed by `massless` */
-  double *y;           /* s->rows and `more`: gamma and lambda where there are more unknowns than rows */
-  int more;            /* Schur rows, and 3 for each uncondensed body */
+  double *inverse; /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight; the ground's 0 */
+  double *force;   /* coords: forces changed by `massless` */
+  double *y;       /* s->rows and `more`: gamma and lambda where there are more unknowns than rows */
+  int more;        /* Schur rows, and 3 for each uncondensed body */
   pw_block_ldl *block;
   pw_schur_row *schur;
   int schurs;
@@ -59,6 +59,7 @@ typedef struct {
 /* Nodes and contributions; while the arrays are NULL they are only counted. */
 typedef struct {
   struct pw_saddle *k;
+  const double *weight;
   pw_plan_node *node;
   pw_plan_contribution *contribution;
   int nodes, contributions;
@@ -71,17 +72,6 @@ typedef struct {
   unsigned char *is_linked; /* groups: 1 for a body in a chain */
   long pairs;               /* of nodes that meet */
 } pw_plan;
-
-/* The first coordinate of a group: bodies, then internal coordinates. */
-static inline int pw_plan_group (const pw_plan *c, int n) {
-  int bodies = c->k->s->bodies;
-  return n < bodies ? 3 * n : n + 2 * bodies;
-}
-
-/* 3 columns of a body, 1 of an internal coordinate. */
-static inline int pw_plan_width (const pw_plan *c, int j) {
-  return j < 3 * c->k->s->bodies ? 3 : 1;
-}
 
 /* Makes k->block.  Errors: PW_RESOURCE. */
 int pw_condense_block (pw_plan *c);

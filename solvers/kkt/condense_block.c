@@ -20,7 +20,7 @@ static void condense_note_pair (pw_plan *c, int *pair, int a, int b) {
 static void condense_pairs (pw_plan *c, int *pair) {
   c->pairs = 0;
   for (int n = 0; n < c->groups; n++) {
-    int j = pw_plan_group (c, n), own = condense_own_nodes (c, j);
+    int j = pw_group_first (c->k->s, n), own = condense_own_nodes (c, j);
     for (int x = c->start[j]; x < c->start[j + 1]; x++) {
       int a = c->contribution[c->list[x]].node;
       if (own >= 0) condense_note_pair (c, pair, a, own), condense_note_pair (c, pair, a, own + 1);
@@ -49,7 +49,7 @@ static pw_block_ldl *condense_pattern (pw_plan *c) {
 /* The contributions of each group in the order of their columns (few: by insertion). */
 static void condense_sort (const pw_plan *c, const int *place) {
   for (int n = 0; n < c->groups; n++) {
-    int j = pw_plan_group (c, n), *list = c->list + c->start[j], count = c->start[j + 1] - c->start[j];
+    int j = pw_group_first (c->k->s, n), *list = c->list + c->start[j], count = c->start[j + 1] - c->start[j];
     for (int x = 1; x < count; x++)
       for (int y = x; y > 0; y--) {
         int a = list[y - 1], b = list[y];
@@ -73,7 +73,7 @@ static void condense_body (const pw_plan *c, pw_block_ldl *l, int j, pw_body_blo
   *p = (pw_body_block){ .j = j,
                         .first = *contributions,
                         .coupling = *couplings,
-                        .width = (unsigned char)pw_plan_width (c, j),
+                        .width = (unsigned char)pw_group_width (c->k->s, j),
                         .uncondensed = own >= 0 };
   for (int x = c->start[j]; x < c->start[j + 1]; x++) {
     const pw_plan_contribution *a = &c->contribution[c->list[x]];
@@ -100,11 +100,18 @@ static void condense_take_block (const pw_plan *c, pw_layout *lay, pw_block_ldl 
   l->chain_factor = pw_take (lay, 3 * (size_t)c->linked, sizeof *l->chain_factor);
 }
 
+/* 0 for a body of a chain, and for a group without mass, whose accelerations massless.c computes. */
+static int condense_has_block (const pw_plan *c, int n) {
+  int j = pw_group_first (c->k->s, n), width = pw_group_width (c->k->s, j), has_weight = 0;
+  for (int i = 0; i < width; i++) has_weight |= c->weight[j + i] != 0;
+  return has_weight && !c->is_linked[n];
+}
+
 static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
   int contributions = 0, couplings = 0, body = 0;
   pw_layout lay = { NULL, 0 };
   l->inverse = c->k->inverse;
-  l->bodies = c->groups - c->linked;
+  for (int n = 0; n < c->groups; n++) l->bodies += condense_has_block (c, n);
   l->chains = c->chains;
   condense_take_block (c, &lay, l);
   l->memory = malloc (lay.used + 1);
@@ -114,7 +121,8 @@ static int condense_fill (const pw_plan *c, pw_block_ldl *l) {
   memcpy (l->chain, c->chain, (size_t)c->chains * sizeof *l->chain);
   l->chain[l->chains] = (pw_chain){ .column = l->nodes + 1 };
   for (int n = 0; n < c->groups; n++)
-    if (!c->is_linked[n]) condense_body (c, l, pw_plan_group (c, n), &l->body[body++], &contributions, &couplings);
+    if (condense_has_block (c, n))
+      condense_body (c, l, pw_group_first (c->k->s, n), &l->body[body++], &contributions, &couplings);
   l->body[body] = (pw_body_block){ .first = contributions, .coupling = couplings };
   return PW_OK;
 }

@@ -11,7 +11,7 @@ typedef struct {
 
 /* A body that links a column to the next one, which alone is below it; returns the column, or -1. */
 static int chain_link (const pw_plan *c, const pw_block_ldl *l, int body, pw_chain *link) {
-  int j = pw_plan_group (c, body);
+  int j = pw_group_first (c->k->s, body);
   const int *list = c->list + c->start[j];
   if (c->start[j + 1] - c->start[j] != 2) return -1;
   const pw_plan_contribution *a = &c->contribution[list[0]], *b = &c->contribution[list[1]];
@@ -69,7 +69,7 @@ static void chain_fill (const pw_block_ldl *l, chain_between *between) {
 
 /* Counts a body; its contributions are in the order of their columns. */
 static void chain_count (const pw_plan *c, const pw_block_ldl *l, int body, chain_between *between) {
-  int j = pw_plan_group (c, body);
+  int j = pw_group_first (c->k->s, body);
   for (int x = c->start[j] + 1; x < c->start[j + 1]; x++) {
     int column = l->place[c->contribution[c->list[x - 1]].node];
     if (l->place[c->contribution[c->list[x]].node] == column + 1) between[column].sources++;

@@ -1,153 +1,170 @@
 /* Elimination of coordinates without weight; see massless.h. */
 #include <math.h>
-#include <string.h>
 #include "massless.h"
 #include "unroll.h"
 
-PW_ONE_BY_ONE
+/* ---- Elimination ---- */
 
-/* ---- P = L U; n, the number of pivots, is a constant where it is usual ---- */
+static void massless_copy (pw_component *c) {
+  const pw_massless_group *end = c->group + c->groups;
+  double *row = c->A;
+  for (const pw_massless_row *r = c->row; r < c->row + c->rows; r++, row += c->stride) {
+    const double **from = r->from;
+    for (const pw_massless_group *g = c->group; g < end; g++) {
+      const double *J = *from++;
+      double *A = row + g->column;
+      A[0] = J[0];
+      if (g->width == 3) A[1] = J[1], A[2] = J[2];
+    }
+  }
+}
 
-/* Returns 0 if a pivot has become too small, or is NaN. */
-PW_INLINE int massless_lu (pw_component *c, int n) {
-  int good = 1;
-  double worst = 1, P[9], *LU = n == 3 ? P : c->P;
-  PW_UNROLL for (int i = 0; i < n * n; i++) LU[i] = *c->from[i];
+/* The sum of the squares of a row's entries times `weight`. */
+static double massless_square (const pw_component *c, int i, const double *weight) {
+  const double *A = c->A + i * c->stride;
+  double sum = 0;
+  for (int n = 0; n < c->cols; n++) sum += weight[n] * A[n] * A[n];
+  return sum;
+}
+
+static void massless_swap (pw_component *c, int a, int b) {
+  if (a == b) return;
+  pw_massless_row row = c->row[a];
+  c->row[a] = c->row[b];
+  c->row[b] = row;
+  for (int n = 0; n < c->stride; n++) {
+    double x = c->A[a * c->stride + n];
+    c->A[a * c->stride + n] = c->A[b * c->stride + n];
+    c->A[b * c->stride + n] = x;
+  }
+}
+
+/* Moves the row with the largest entry in a massless column to p, each row scaled by its largest original entry, so
+ * that the remainder of a dependent row is small.  Returns 0 if all are round-off: until it is matched again, no pivot
+ * of the component is large enough. */
+static int massless_choose (pw_component *c, int p) {
+  const double guard = 0.1;
+  int row = -1, column = -1;
+  double best = 1e-12;
+  for (int i = p; i < c->rows; i++)
+    for (int n = 0; n < c->cols; n++) {
+      double scaled = c->massless[n] ? sqrt (c->square[n]) * fabs (c->A[i * c->stride + n]) / c->row[i].size : 0;
+      if (scaled > best) best = scaled, row = i, column = n;
+    }
+  for (int i = 0; row < 0 && i < c->pivots; i++) c->row[i].least = NAN;
+  if (row < 0) return 0;
+  massless_swap (c, p, row);
+  c->row[p].pivot = column;
+  c->row[p].scale = sqrt (c->square[column]) / c->row[p].size;
+  c->row[p].least = guard * best;
+  return 1;
+}
+
+/* Subtracts row p from those after it, by pairs of columns.  `terms` of an unmatched row grows by the square of what is
+ * subtracted. */
+PW_INLINE void massless_eliminate (pw_component *c, int p, int n) {
+  const int pivot = c->row[p].pivot, cols = c->cols;
+  double *P = c->A + p * c->stride, inverse = 1 / P[pivot];
+  double square = c->rows > n ? massless_square (c, p, c->massive_square) : 0;
+  for (int i = p + 1; i < c->rows; i++) {
+    double *A = c->A + i * c->stride, l = A[pivot] * inverse;
+    A[c->lower + p] = l;
+    if (l == 0) continue;
+    for (int k = 0; k < cols; k += 2) {
+      double even = A[k] - l * P[k], odd = A[k + 1] - l * P[k + 1];
+      A[k] = even, A[k + 1] = odd;
+    }
+    A[pivot] = 0;
+    c->row[i].terms += l * l * square;
+  }
+  P[pivot] = inverse;
+}
+
+/* Eliminates with the pivots matched before, or matches them (with `search`).  Returns the number of good pivots. */
+PW_INLINE int massless_reduce (pw_component *c, int search, int n) {
+  massless_copy (c);
+  c->least = INFINITY;
+  for (int i = search ? 0 : n; i < c->rows; i++) c->row[i].terms = massless_square (c, i, c->square);
+  for (int i = 0; search && i < c->rows; i++) {
+    c->row[i].size = 0;
+    for (int k = 0; k < c->cols; k++)
+      c->row[i].size = fmax (c->row[i].size, sqrt (c->square[k]) * fabs (c->A[i * c->stride + k]));
+  }
   PW_UNROLL for (int p = 0; p < n; p++) {
-    double relative = fabs (LU[p * n + p]) * c->scale[p], inverse = 1 / LU[p * n + p];
-    good &= relative >= c->least[p];
-    if (!(relative >= worst)) worst = relative;
-    LU[p * n + p] = inverse;
-    PW_UNROLL for (int i = p + 1; i < n; i++) {
-      double l = LU[i * n + p] *= inverse;
-      PW_UNROLL for (int j = p + 1; j < n; j++) LU[i * n + j] -= l * LU[p * n + j];
-    }
+    if (search && !massless_choose (c, p)) return p;
+    const pw_massless_row *row = &c->row[p];
+    double pivot = fabs (c->A[p * c->stride + row->pivot]) * row->scale;
+    if (!(pivot >= c->least)) c->least = pivot, c->least_row = row->row;
+    if (!search && !(pivot >= row->least)) return p;
+    massless_eliminate (c, p, n);
   }
-  if (LU != c->P) memcpy (c->P, LU, sizeof P);
-  c->worst = worst;
-  return good;
+  return n;
 }
 
-/* x = P^-1 x */
-PW_INLINE void massless_solve (const double *P, double *x, int n) {
-  PW_UNROLL for (int i = 1; i < n; i++) {
-    PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[i * n + j] * x[j];
-  }
-  PW_UNROLL for (int i = n - 1; i >= 0; i--) {
-    PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[i * n + j] * x[j];
-    x[i] *= P[i * n + i];
-  }
-}
-
-/* x = P^-T x */
-PW_INLINE void massless_solve_transposed (const double *P, double *x, int n) {
-  PW_UNROLL for (int i = 0; i < n; i++) {
-    PW_UNROLL for (int j = 0; j < i; j++) x[i] -= P[j * n + i] * x[j];
-    x[i] *= P[i * n + i];
-  }
-  PW_UNROLL for (int i = n - 2; i >= 0; i--) {
-    PW_UNROLL for (int j = i + 1; j < n; j++) x[i] -= P[j * n + i] * x[j];
-  }
-}
-
-/* Adds factor J to row i of Z~; returns the square of what it adds, angles in units of length, where there is
- * weight. */
-static double massless_add_run (pw_component *c, const pw_massive_block *x, int i, double factor) {
-  double square = 0;
-  for (int n = 0; n < x->width; n++) {
-    double add = factor * x->J[n], scaled = add / c->unit[x->column + n];
-    c->Z[i * c->cols + x->column + n] += add;
-    if (!c->massless[x->column + n]) square += scaled * scaled;
-  }
-  return square;
-}
-
-/* Y and Z~ of the unmatched rows.  A vanishing row leaves round-off of any direction, so its size is compared with
- * those of Z, Y H, and K: for a row without weight, Y H may be round-off, too. */
-static void massless_left_over (pw_component *c) {
-  const pw_massive_block *h = c->massive;
-  c->left = 1;
-  for (int i = c->pivots; i < c->rows; i++) {
-    double *Y = c->Y + i * c->pivots, *Z = c->Z + i * c->cols, all = 0, left = 0;
-    for (int p = 0; p < c->pivots; p++) {
-      double scaled = *c->from[i * c->pivots + p] / c->unit[c->pivot[p]];
-      Y[p] = *c->from[i * c->pivots + p];
-      all += scaled * scaled;
-    }
-    massless_solve_transposed (c->P, Y, c->pivots);
-    for (int n = 0; n < c->cols; n++) Z[n] = 0;
-    for (const pw_massive_block *x = h + c->massives_h; x < h + c->massives; x++)
-      if (x->slot == i) all += massless_add_run (c, x, i, 1);
-    for (const pw_massive_block *x = h; x < h + c->massives_h; x++) all += massless_add_run (c, x, i, -Y[x->slot]);
-    for (int n = 0; n < c->cols; n++)
-      if (!c->massless[n]) left += Z[n] * Z[n] / (c->unit[n] * c->unit[n]);
-    left = all > 0 ? sqrt (left / all) : 0;
-    if (!(left >= c->left)) c->left = left, c->left_row = i;
-  }
-}
-
-int pw_massless_weakest (const pw_massless *r) {
-  double least = INFINITY;
-  int row = -1;
-  for (const pw_component *c = r->component; c < r->end; c++) {
-    for (int p = 0; p < c->pivots; p++) {
-      double pivot = c->scale[p] / fabs (c->P[p * (c->pivots + 1)]);
-      if (!(pivot >= least)) least = pivot, row = c->row[p];
-    }
-    if (c->rows > c->pivots && !(c->left >= least)) least = c->left, row = c->row[c->left_row];
-  }
-  return row;
+int pw_massless_match (pw_component *c) {
+  return massless_reduce (c, 1, c->pivots);
 }
 
 double pw_massless_factor (pw_massless *r) {
-  double least = 1;
-  for (pw_component *c = r->component, *end = r->end; c < end; c++) {
-    for (int again = 0; !(c->pivots == 3 ? massless_lu (c, 3) : massless_lu (c, c->pivots)); again = 1)
-      if (again || pw_massless_match (c) < c->pivots) return 0;
-    if (c->rows > c->pivots) massless_left_over (c);
-    if (!(c->worst >= least)) least = c->worst;
-    if (c->rows > c->pivots && !(c->left >= least)) least = c->left;
+  double least = INFINITY;
+  for (pw_component *c = r->component; c < r->end; c++) {
+    if ((c->pivots == 3 ? massless_reduce (c, 0, 3) : massless_reduce (c, 0, c->pivots)) < c->pivots) {
+      int found = pw_massless_match (c);
+      if (found < c->pivots) return r->least_row = c->row[found].row, 0;
+    }
+    for (int i = c->pivots; i < c->rows; i++) {
+      double left = c->row[i].terms > 0 ? sqrt (massless_square (c, i, c->massive_square) / c->row[i].terms) : 0;
+      if (!(left >= c->least)) c->least = left, c->least_row = c->row[i].row;
+    }
+    if (!(c->least >= least)) least = c->least, r->least_row = c->least_row;
   }
-  return least * least;
+  return least > 1 ? 1 : least * least;
 }
 
-/* ---- Solving ---- */
+/* ---- Solving; n, the number of pivots, is a constant where it is usual ---- */
 
 PW_INLINE void massless_forward (pw_component *c, const double *gamma, double *f, int n) {
-  double *mu = c->lambda;
-  PW_UNROLL for (int p = 0; p < n; p++) c->gamma[p] = gamma[c->row[p]], mu[p] = f[c->massless_j[p]];
-  for (int i = n; i < c->rows; i++) {
-    c->gamma[i] = gamma[c->row[i]];
-    for (int p = 0; p < n; p++) c->gamma[i] -= c->Y[i * n + p] * c->gamma[p];
+  pw_massless_row *row = c->row;
+  for (int i = 0; i < c->rows; i++) {
+    const double *L = c->A + i * c->stride + c->lower;
+    row[i].gamma = gamma[row[i].row];
+    PW_UNROLL for (int p = 0; p < n; p++) row[i].gamma -= p < i ? L[p] * row[p].gamma : 0;
   }
-  massless_solve_transposed (c->P, mu, n);
-  for (const pw_massive_block *h = c->massive, *end = h + c->massives_h; h < end; h++) { /* f -= H^T mu */
-    double *to = f + h->j, l = mu[h->slot];
-    to[0] -= h->J[0] * l;
-    if (h->width == 3) to[1] -= h->J[1] * l, to[2] -= h->J[2] * l;
+  PW_UNROLL for (int p = 0; p < n; p++) {
+    double w = f[c->global[row[p].pivot]];
+    PW_UNROLL for (int q = 0; q < p; q++) w -= c->A[q * c->stride + row[p].pivot] * row[q].lambda;
+    row[p].lambda = w * c->A[p * c->stride + row[p].pivot];
+  }
+  for (const int *m = c->massive; m < c->massive + c->massives; m++) {
+    double change = 0;
+    PW_UNROLL for (int p = 0; p < n; p++) change += c->A[p * c->stride + *m] * row[p].lambda;
+    f[c->global[*m]] -= change;
   }
 }
 
 void pw_massless_forward (pw_massless *r, const double *gamma, double *f) {
-  for (pw_component *c = r->component, *end = r->end; c < end; c++)
+  for (pw_component *c = r->component; c < r->end; c++)
     c->pivots == 3 ? massless_forward (c, gamma, f, 3) : massless_forward (c, gamma, f, c->pivots);
 }
 
-PW_INLINE void massless_backward (pw_component *c, double *rates, double *lambda, int n) {
-  double *x = c->gamma;
-  for (const pw_massive_block *h = c->massive, *end = h + c->massives_h; h < end; h++) { /* x -= H a */
-    const double *a = rates + h->j;
-    x[h->slot] -= h->width == 3 ? h->J[0] * a[0] + h->J[1] * a[1] + h->J[2] * a[2] : h->J[0] * a[0];
+PW_INLINE void massless_backward (pw_component *c, double *a, double *lambda, int n) {
+  pw_massless_row *row = c->row;
+  for (const int *m = c->massive; m < c->massive + c->massives; m++) {
+    double x = a[c->global[*m]];
+    PW_UNROLL for (int p = 0; p < n; p++) row[p].gamma -= c->A[p * c->stride + *m] * x;
   }
-  massless_solve (c->P, x, n);
-  for (int i = n; i < c->rows; i++) {
-    lambda[c->row[i]] = c->lambda[i];
-    for (int p = 0; p < n; p++) c->lambda[p] -= c->Y[i * n + p] * c->lambda[i];
+  for (int i = n; i < c->rows; i++) lambda[row[i].row] = row[i].lambda;
+  PW_UNROLL for (int p = n - 1; p >= 0; p--) {
+    const double *A = c->A + p * c->stride;
+    double x = row[p].gamma;
+    PW_UNROLL for (int q = p + 1; q < n; q++) x -= A[row[q].pivot] * a[c->global[row[q].pivot]];
+    a[c->global[row[p].pivot]] = x * A[row[p].pivot];
+    for (int i = p + 1; i < c->rows; i++) row[p].lambda -= c->A[i * c->stride + c->lower + p] * row[i].lambda;
+    lambda[row[p].row] = row[p].lambda;
   }
-  PW_UNROLL for (int p = 0; p < n; p++) rates[c->massless_j[p]] = x[p], lambda[c->row[p]] = c->lambda[p];
 }
 
 void pw_massless_backward (pw_massless *r, double *a, double *lambda) {
-  for (pw_component *c = r->component, *end = r->end; c < end; c++)
+  for (pw_component *c = r->component; c < r->end; c++)
     c->pivots == 3 ? massless_backward (c, a, lambda, 3) : massless_backward (c, a, lambda, c->pivots);
 }

@@ -1,66 +1,74 @@
 /* Elimination of coordinates without weight: each is matched to a constraint row and substituted out of the others.
  *
- * The rows and coordinates concerned fall apart into components (a massless body and the joints around it).  Within
- * one, the matched rows p are P in the coordinates without weight, square and regular, and H in the others, and the
- * unmatched rows i are K and Z.  With  P = L U  and  Y = K P^-1,
+ * The rows and coordinates concerned fall apart into components (a massless body and the joints around it).  In each,
+ * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
  *
- *     mu = P^-T f_P,   f~ = f - H^T mu,   Z~ = Z - Y H,   gamma~_i = gamma_i - Y gamma_p
+ *     [ P H ]   [ L 0 ] [ U H' ]       P, H: matched rows in the massless and in the massive columns
+ *     [ K Z ] = [ M 1 ] [ 0 Z' ]       K, Z: unmatched rows i
  *
- * make a system without these coordinates; from its solution follow
+ * With  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; M 1 ]^-1 gamma,  the rows Z' and the massive coordinates make
+ * a system without the massless ones; from its solution follow
  *
- *     lambda_p = mu - Y^T lambda_i,       a_P = P^-1 (gamma_p - H a). */
+ *     a_P = U^-1 (gamma~_p - H' a),       lambda_p = L^-T (w - M^T lambda_i). */
 #ifndef PW_MASSLESS_H
 #define PW_MASSLESS_H
 
 #include "system.h"
 
-/* A body's three columns of one row, or an internal coordinate's one. */
-typedef struct {
-  const double *J; /* in the batch */
-  int column;      /* local, in the component */
-  int width;
-} pw_massless_block;
-
-/* The same where some of these columns are massive. */
-typedef struct {
-  const double *J;
-  int slot, j; /* which row; global coordinate */
-  int width, column;
-} pw_massive_block;
-
-typedef struct {
-  int rows, cols, pivots;
-  int groups;        /* bodies and internal coordinates touched */
-  int *group;        /* first global coordinate of each */
-  int *group_column; /* first local column of each */
-  int *row;          /* global row; the pivots first, in order */
-  int *pivot;        /* local column of each pivot */
-  int *massless_j;   /* global coordinate of each pivot */
-  double *scale;     /* scales a pivot by the largest entry of its row at the time of matching */
-  double *least;     /* scaled pivot below which the rows are matched again */
-  double worst;      /* smallest pivot, relative, at most 1 */
-  double left;       /* smallest Z~ relative to its terms, at most 1; and its row */
-  int left_row;
-  int *global;               /* cols: global coordinate of a local column */
-  unsigned char *massless;   /* cols: 1 for a coordinate without weight */
-  double *unit;              /* cols: length scale of an angle, 1 of a length */
-  pw_massless_block *block;  /* rows x PW_MASSLESS_BLOCKS; width 0 ends a row's */
-  const double **from;       /* rows x pivots: the entries of P and K in the batches */
-  pw_massive_block *massive; /* those of H, then those of Z */
-  int massives, massives_h;  /* all, and those of H */
-  double *P;                 /* pivots x pivots: L below the diagonal, U above it, the inverse of U's diagonal on it */
-  double *Y;                 /* rows x pivots; from row `pivots` on */
-  double *Z;                 /* rows x cols: Z~ from row `pivots` on; scratch while matching */
-  double *gamma;             /* rows: of the pivots as given, then gamma~ */
-  double *lambda;            /* rows: mu of the pivots, then lambda of the others */
-} pw_component;
-
 enum { PW_MASSLESS_BLOCKS = PW_MAX_BODIES + PW_MAX_INTERNAL };
+
+/* Groups of coordinates: bodies, then internal coordinates.  The number of groups; that of a coordinate; the first
+ * coordinate of a group; and the coordinates of the group that begins with j. */
+static inline int pw_groups (const pw_system *s) {
+  return s->coords - 2 * s->bodies;
+}
+static inline int pw_group_of (const pw_system *s, int j) {
+  return j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies;
+}
+static inline int pw_group_first (const pw_system *s, int n) {
+  return n < s->bodies ? 3 * n : n + 2 * s->bodies;
+}
+static inline int pw_group_width (const pw_system *s, int j) {
+  return j < 3 * s->bodies ? 3 : 1;
+}
+
+typedef struct {
+  int j, width; /* first global coordinate; 3 of a body, or 1 */
+  int column;   /* first local column */
+} pw_massless_group;
+
+typedef struct {
+  int row;             /* global */
+  int pivot;           /* matched rows: the local column of the coordinate */
+  double size;         /* largest entry when last matched, angles in units of length */
+  double scale;        /* matched rows: of the pivot, to make it relative to `size` */
+  double least;        /* matched rows: the pivot, relative to `size`, below which the component is matched again */
+  double terms;        /* unmatched rows: sum of the squares of the terms whose sum is the row of Z' */
+  double gamma;        /* gamma~ */
+  double lambda;       /* matched rows: w; then the multiplier */
+  const double **from; /* groups: its entries in the batch, or zeros */
+} pw_massless_row;
+
+typedef struct {
+  int rows, cols, pivots, groups;
+  pw_massless_group *group;
+  int *global;             /* cols: global coordinate */
+  unsigned char *massless; /* cols: 1 for a coordinate without weight */
+  int *massive, massives;  /* local columns of the others */
+  double *square;          /* cols: 1, or for an angle 1 / L^2 */
+  double *massive_square;  /* cols: the same, 0 for a massless coordinate */
+  pw_massless_row *row;    /* the matched ones first, in the order of elimination */
+  double *A;               /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or M */
+  int lower, stride;       /* where L begins, cols rounded up to an even number; from row to row of A */
+  double least;            /* smallest pivot relative to its row, or row of Z' relative to its terms */
+  int least_row;           /* and its row, global */
+} pw_component;
 
 typedef struct {
   int components;
   pw_component *component, *end;
   int *component_of_row; /* -1: untouched */
+  int least_row;         /* of the smallest pivot last found */
   char *memory;
 } pw_massless;
 
@@ -71,22 +79,19 @@ int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int
 void pw_massless_close (pw_massless *r);
 
 /* Matches a component's massless coordinates to rows at the J last evaluated, with complete pivoting over their
- * columns. Returns how many pivots were found.  For massless.c and massless_open.c alone. */
+ * columns, and eliminates them.  Returns how many pivots were found. */
 int pw_massless_match (pw_component *c);
 
 /* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was
- * matched. Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller;
+ * matched.  Returns the smallest pivot squared, relative to its row, or of an unmatched row its remainder, if smaller;
  * 0 if singular. */
 double pw_massless_factor (pw_massless *r);
 
-/* The row of that smallest pivot. */
-int pw_massless_weakest (const pw_massless *r);
-
-/* First half of a solve: f becomes f~ at the coordinates with weight, gamma~ is kept in the components. */
+/* First half of a solve: f becomes f~ at the massive coordinates; gamma~ is kept in the components. */
 void pw_massless_forward (pw_massless *r, const double *gamma, double *f);
 
-/* Second half, from a of the coordinates with weight and lambda of the unmatched rows: a of the coordinates without
- * weight (0 on entry), and lambda of the matched rows. */
+/* Second half, from a of the massive coordinates and lambda of the unmatched rows: a of the massless coordinates, and
+ * lambda of the matched rows. */
 void pw_massless_backward (pw_massless *r, double *a, double *lambda);
 
 #endif

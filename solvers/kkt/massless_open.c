@@ -16,25 +16,9 @@ typedef struct {
   int *member; /* groups: component number of a root; -1: no active row touches it */
 } massless_plan;
 
-static int massless_groups (const pw_system *s) {
-  return s->bodies + s->coords - 3 * s->bodies;
-}
-
-static int massless_group_of (const pw_system *s, int j) {
-  return j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies;
-}
-
-static int massless_group_first (const pw_system *s, int g) {
-  return g < s->bodies ? 3 * g : g + 2 * s->bodies;
-}
-
-static int massless_group_width (const pw_system *s, int g) {
-  return g < s->bodies ? 3 : 1;
-}
-
 static int massless_in (const massless_plan *p, int g) {
-  int j = massless_group_first (p->s, g);
-  for (int n = 0; n < massless_group_width (p->s, g); n++)
+  int j = pw_group_first (p->s, g);
+  for (int n = 0; n < pw_group_width (p->s, j); n++)
     if (p->weight[j + n] == 0) return 1;
   return 0;
 }
@@ -51,11 +35,11 @@ static int massless_touched (const pw_system *s, const pw_element_batch *k, int 
     int j = k->column[e * k->kind->bodies + b];
     if (j >= s->coords) continue;
     at[n] = 3 * b;
-    group[n++] = massless_group_of (s, j);
+    group[n++] = pw_group_of (s, j);
   }
   for (int o = 0; o < k->kind->own; o++) {
     at[n] = 3 * k->kind->bodies + o;
-    group[n++] = massless_group_of (s, k->own + e * k->kind->own + o);
+    group[n++] = pw_group_of (s, k->own + e * k->kind->own + o);
   }
   return n;
 }
@@ -80,31 +64,24 @@ static void massless_unite (massless_plan *p) {
     }
 }
 
+/* The number of a group within a component, to which it is added. */
 static int massless_add_group (const pw_system *s, pw_component *c, int g) {
-  int j = massless_group_first (s, g);
+  int j = pw_group_first (s, g), width = pw_group_width (s, j);
   for (int i = 0; i < c->groups; i++)
-    if (c->group[i] == j) return c->group_column[i];
-  c->group[c->groups] = j;
-  c->group_column[c->groups++] = c->cols;
-  for (int n = 0; n < massless_group_width (s, g); n++) c->global[c->cols++] = j + n;
-  return c->group_column[c->groups - 1];
+    if (c->group[i].j == j) return i;
+  c->group[c->groups] = (pw_massless_group){ j, width, c->cols };
+  for (int n = 0; n < width; n++) c->global[c->cols++] = j + n;
+  return c->groups++;
 }
 
 /* Adds a row and the groups it touches to a component, or only counts them, groups with repetition. */
 static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *at,
                               const double *J) {
-  if (c->block == NULL) {
-    c->rows++;
-    c->groups += n;
-    return;
-  }
-  pw_massless_block *block = c->block + c->rows * PW_MASSLESS_BLOCKS;
-  for (int i = 0; i < PW_MASSLESS_BLOCKS; i++) block[i].width = 0;
-  for (int i = 0; i < n; i++) {
-    int column = massless_add_group (s, c, group[i]);
-    block[i] = (pw_massless_block){ J + at[i], column, massless_group_width (s, group[i]) };
-  }
-  c->row[c->rows++] = row;
+  pw_massless_row *to = c->row ? &c->row[c->rows] : NULL;
+  c->rows++;
+  if (to == NULL) c->groups += n;
+  for (int i = 0; to && i < n; i++) to->from[massless_add_group (s, c, group[i])] = J + at[i];
+  if (to) to->row = row;
 }
 
 /* Every active row of every element that touches a massless group, to the component of this group. */
@@ -124,42 +101,31 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
 
 /* ---- Layout ---- */
 
-static void massless_lay_out_component (pw_layout *l, pw_component *c, int rows, int groups) {
-  size_t n = (size_t)rows, m = 3 * (size_t)groups, pivots = n < m ? n : m;
-  c->group = pw_take (l, (size_t)groups, sizeof (int));
-  c->group_column = pw_take (l, (size_t)groups, sizeof (int));
-  c->row = pw_take (l, n, sizeof (int));
-  c->pivot = pw_take (l, m, sizeof (int));
-  c->massless_j = pw_take (l, m, sizeof (int));
-  c->global = pw_take (l, m, sizeof (int));
-  c->least = pw_take (l, m, sizeof (double));
-  c->scale = pw_take (l, m, sizeof (double));
-  c->massless = pw_take (l, m, 1);
-  c->unit = pw_take (l, m, sizeof (double));
-  c->block = pw_take (l, n * PW_MASSLESS_BLOCKS, sizeof (pw_massless_block));
-  c->from = pw_take (l, n * pivots, sizeof (double *));
-  c->massive = pw_take (l, n * PW_MASSLESS_BLOCKS, sizeof (pw_massive_block));
-  c->P = pw_take (l, pivots * pivots, sizeof (double));
-  c->Y = pw_take (l, n * pivots, sizeof (double));
-  c->Z = pw_take (l, n * m, sizeof (double));
-  c->gamma = pw_take (l, n, sizeof (double));
-  c->lambda = pw_take (l, n, sizeof (double));
-}
-
-/* Groups of a component are at most those its rows touch, counted with repetition, and at most all. */
+/* Groups of a component are at most those its rows touch, counted with repetition, and at most all; a row has at most
+ * as many pivots as there are rows. */
 static int massless_lay_out (pw_massless *r, const massless_plan *p) {
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
-    for (int i = 0; i < r->components; i++) {
-      pw_component *c = &r->component[i];
-      massless_lay_out_component (&l, c, c->rows, c->groups < p->groups ? c->groups : p->groups);
+    for (pw_component *c = r->component; c < r->end; c++) {
+      size_t rows = (size_t)c->rows, groups = (size_t)(c->groups < p->groups ? c->groups : p->groups),
+             cols = 3 * groups;
+      c->group = pw_take (&l, groups, sizeof *c->group);
+      c->global = pw_take (&l, cols, sizeof *c->global);
+      c->massless = pw_take (&l, cols, 1);
+      c->massive = pw_take (&l, cols, sizeof *c->massive);
+      c->square = pw_take (&l, cols, sizeof *c->square);
+      c->massive_square = pw_take (&l, cols, sizeof *c->massive_square);
+      c->row = pw_take (&l, rows, sizeof *c->row);
+      c->A = pw_take (&l, rows * (cols + rows + 1), sizeof *c->A);
+      const double **from = pw_take (&l, rows * groups, sizeof *from);
+      for (size_t i = 0; pass == 1 && i < rows; i++) c->row[i].from = from + i * groups;
+      if (pass == 1) c->rows = c->groups = 0;
     }
     if (pass == 1) break;
     r->memory = calloc (1, l.used + 1);
     if (r->memory == NULL) return PW_RESOURCE;
     l = (pw_layout){ r->memory, 0 };
   }
-  for (int i = 0; i < r->components; i++) r->component[i].rows = r->component[i].groups = 0;
   return PW_OK;
 }
 
@@ -175,21 +141,27 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
 
 /* Marks the massless columns and reports one that no row determines. */
 static int massless_check (pw_massless *r, const massless_plan *p, pw_error *error) {
+  static const double zero[3] = { 0 };
   const pw_system *s = p->s;
-  for (int i = 0; i < r->components; i++) {
-    pw_component *c = &r->component[i];
+  for (pw_component *c = r->component; c < r->end; c++) {
     c->pivots = 0;
     for (int n = 0; n < c->cols; n++) {
       int j = c->global[n];
-      c->unit[n] = pw_is_angle (s, j) ? s->scale.length : 1;
+      c->square[n] = pw_is_angle (s, j) ? 1 / (s->scale.length * s->scale.length) : 1;
       c->massless[n] = p->weight[j] == 0;
+      c->massive_square[n] = c->massless[n] ? 0 : c->square[n];
+      if (!c->massless[n]) c->massive[c->massives++] = n;
       c->pivots += c->massless[n];
     }
+    c->lower = c->cols + c->cols % 2;
+    c->stride = c->lower + c->pivots;
+    for (int i = 0; i < c->rows * c->groups; i++)
+      if (c->row[i / c->groups].from[i % c->groups] == NULL) c->row[i / c->groups].from[i % c->groups] = zero;
     int found = c->pivots <= c->rows ? pw_massless_match (c) : 0;
     if (found == c->pivots) continue;
     for (int n = 0; n < c->cols; n++) {
       int used = 0;
-      for (int q = 0; q < found; q++) used |= c->pivot[q] == n;
+      for (int q = 0; q < found; q++) used |= c->row[q].pivot == n;
       if (c->massless[n] && !used) return massless_undetermined (s, c->global[n], error);
     }
   }
@@ -200,7 +172,7 @@ static int massless_check (pw_massless *r, const massless_plan *p, pw_error *err
 static int massless_number (pw_massless *r, massless_plan *p, pw_error *error) {
   for (int g = 0; g < p->groups; g++) {
     if (!massless_in (p, g)) continue;
-    int j = massless_group_first (p->s, g);
+    int j = pw_group_first (p->s, g);
     while (p->weight[j] != 0) j++;
     if (p->member[g] < 0) return massless_undetermined (p->s, j, error);
     if (massless_root (p, g) == g) p->member[g] = r->components++;
@@ -224,7 +196,7 @@ static int massless_fill (pw_massless *r, massless_plan *p, pw_error *error) {
 int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error) {
   const pw_system *s = w->s;
-  int groups = massless_groups (s), status = PW_RESOURCE;
+  int groups = pw_groups (s), status = PW_RESOURCE;
   *r = (pw_massless){ 0 };
   massless_plan p = { .s = s, .w = w, .weight = weight, .active = active, .rows = rows, .groups = groups };
   p.parent = malloc (((size_t)groups + 1) * sizeof *p.parent);

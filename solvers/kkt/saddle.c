@@ -58,7 +58,7 @@ int pw_saddle_below (const pw_saddle *k, double sine) {
 }
 
 double pw_saddle_pivot (const pw_saddle *k, int *row) {
-  *row = k->pivot_row < 0 && k->massless.components ? pw_massless_weakest (&k->massless) : k->pivot_row;
+  *row = k->pivot_row < 0 && k->massless.components ? k->massless.least_row : k->pivot_row;
   return k->pivot > 0 ? sqrt (fmin (k->pivot, 1)) : 0;
 }
 
