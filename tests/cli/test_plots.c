@@ -77,7 +77,7 @@ static void test_outline (void **state) {
   plots_write ("@/plate.yaml --t-end 1 --animate @/plate.html");
   const char *data = cli_file ("written/mechanism.dat");
   const char *drawn = "-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n-1 -1 0\n\n0 0 0\n0.5 0.2 0\n\n"
-                      "11 1 0\n9 0 0\n7 -1 0\n9 0 0\n10 0.5 0\n\n";
+                      "9 0 0\n11 1 0\n\n9 0 0\n7 -1 0\n\n9 0 0\n10 0.5 0\n\n";
   assert_int_equal (strncmp (strchr (data, '\n') + 1, drawn, strlen (drawn)), 0);
   const char *page = cli_file ("plate.html");
   assert_non_null (strstr (page, "spokes:[[0.5,0.2]],outline:[[-1,-1],[1,-1],[1,1],[-1,1]]}"));

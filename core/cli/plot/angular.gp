@@ -2,6 +2,17 @@
 # ---- Angular velocities; where they oscillate often, the end of the run in detail as well ----
 
 stats data using 7 name 'omega' nooutput
+turns = 0 # the largest number of extrema of a curve; round-off does not count
+do for [i = 1:curves] {
+  stats data index i - 1 using 7 name 'one' nooutput
+  limit = 1e-6*max(abs(one_min), abs(one_max))
+  extrema = 0
+  before = 0
+  old = NaN
+  stats data index i - 1 using (change = $7 - old, old = $7, now = (change > limit) - (change < -limit), \
+    extrema = extrema + (now*before < 0), before = now ? now : before, extrema) name 'one' nooutput
+  turns = max(turns, extrema)
+}
 detail = turns < 30 ? 0 : turns*0.2 <= 12 ? 0.2 : turns*0.1 <= 12 ? 0.1 : turns*0.05 <= 12 ? 0.05 : 0.02
 title = 'angular velocities'.(detail > 0 ? ', and their last part in detail' : '')
 high = detail > 0 ? 235.0 : 340.0

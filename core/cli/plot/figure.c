@@ -78,11 +78,6 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
   return o;
 }
 
-void pw_figure_number (FILE *f, const char *variable, double value) {
-  char text[32];
-  fprintf (f, "%s = %s\n", variable, pw_format (text, value, 9));
-}
-
 void pw_figure_text (FILE *f, const char *variable, const char *value) {
   fprintf (f, "%s = '", variable);
   for (; *value; value++) {
@@ -90,10 +85,6 @@ void pw_figure_text (FILE *f, const char *variable, const char *value) {
     fputc ((unsigned char)*value < ' ' ? ' ' : *value, f);
   }
   fputs ("'\n", f);
-}
-
-void pw_figure_array (FILE *f, const char *name, int count) {
-  fprintf (f, "array %s[%d]\n", name, count);
 }
 
 void pw_figure_element (FILE *f, const char *name, int i, const char *value) {
@@ -128,32 +119,16 @@ static int gnuplot_cd (const char *folder, char *text, size_t size) {
   return *folder == 0;
 }
 
-/* The environment, but in a locale that has all characters the scripts use.  A malloced list, or NULL. */
-static char **gnuplot_environment (void) {
-  static char locale[] = "LC_ALL=C.UTF-8";
-  size_t n = 0, kept = 0;
-  while (environ[n]) n++;
-  char **list = malloc ((n + 2) * sizeof *list);
-  for (size_t i = 0; list && i < n; i++)
-    if (strncmp (environ[i], "LC_ALL=", 7) != 0) list[kept++] = environ[i];
-  if (list) list[kept] = locale, list[kept + 1] = NULL;
-  return list;
-}
-
-/* Starts it without input and with its output on standard error.  An errno value. */
+/* Starts it without input and with its output on standard error, in a locale that has all characters the scripts use; the
+ * program itself uses none.  An errno value. */
 static int gnuplot_start (char *const *argv, pid_t *child) {
   posix_spawn_file_actions_t actions;
-  char **environment = gnuplot_environment ();
-  int failed = environment ? posix_spawn_file_actions_init (&actions) : ENOMEM;
-  if (failed) {
-    free (environment);
-    return failed;
-  }
+  int failed = setenv ("LC_ALL", "C.UTF-8", 1) == 0 ? posix_spawn_file_actions_init (&actions) : ENOMEM;
+  if (failed) return failed;
   failed = posix_spawn_file_actions_addopen (&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
   if (!failed) failed = posix_spawn_file_actions_adddup2 (&actions, STDERR_FILENO, STDOUT_FILENO);
-  if (!failed) failed = posix_spawnp (child, argv[0], &actions, NULL, argv, environment);
+  if (!failed) failed = posix_spawnp (child, argv[0], &actions, NULL, argv, environ);
   posix_spawn_file_actions_destroy (&actions);
-  free (environment);
   return failed;
 }
 
@@ -194,10 +169,8 @@ int pw_figure_draw (const char *folder, const char *const *names, pw_error *erro
   if (WIFEXITED (status) && WEXITSTATUS (status) == GNUPLOT_ABSENT) return gnuplot_absent (folder);
   if (WIFEXITED (status) && WEXITSTATUS (status) == 0) return PW_OK;
   gnuplot_remove_figures (folder, names);
-  if (WIFSIGNALED (status))
-    return pw_fail (error, PW_RESOURCE, "gnuplot was ended by signal %d; data and scripts are in %s", WTERMSIG (status),
-                    folder);
-  return pw_fail (error, PW_RESOURCE,
-                  "gnuplot failed with exit status %d; its message is above, data and scripts are in %s",
-                  WEXITSTATUS (status), folder);
+  int ended = WIFSIGNALED (status);
+  return pw_fail (error, PW_RESOURCE, "gnuplot %s %d; its message is above, data and scripts are in %s",
+                  ended ? "was ended by signal" : "failed with exit status",
+                  ended ? WTERMSIG (status) : WEXITSTATUS (status), folder);
 }

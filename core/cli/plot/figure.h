@@ -24,10 +24,8 @@ pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *erro
 
 /* Opens NAME.gp.  Assign the variables of its template, then end it; PW_RESOURCE if a file cannot be written. */
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error);
-void pw_figure_number (FILE *f, const char *variable, double value);
 void pw_figure_text (FILE *f, const char *variable, const char *value);
-/* Elements of an array: "array NAME[COUNT]" first, then each element as a variable "NAME[1]" .... */
-void pw_figure_array (FILE *f, const char *name, int count);
+/* The variable "NAME[1]" .... */
 void pw_figure_element (FILE *f, const char *name, int i, const char *value);
 int pw_figure_end (pw_output *o, const char *template_name, pw_error *error);
 

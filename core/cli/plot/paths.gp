@@ -1,6 +1,8 @@
 
 # ---- Paths of wheels and markers, or of the centres of mass ----
 
+title = 'paths of the '.(what eq 'body' ? 'centres of mass' : words(markers) == 0 ? 'wheels' : \
+  words(markers) < curves ? 'wheels and markers' : 'markers')
 do for [form in 'svg png'] {
   eval page(form)
   set xlabel 'x [m]'

@@ -3,10 +3,26 @@
 # Panel i shows x0[i] to x1[i] and y0[i] to y1[i], at px0[i] to px1[i] and py0[i] to py1[i] of the page.
 
 if (name eq 'mechanism') { bottom = bottom + 94 } # room for a colour bar
+panels = t_detail > 0 ? 2 : 1
 array px0[2]
 array px1[2]
 array py0[2]
 array py1[2]
+array x0[2] = [1e300, 1e300]
+array x1[2] = [-1e300, -1e300]
+array y0[2] = [1e300, 1e300]
+array y1[2] = [-1e300, -1e300]
+side(i, z, what, k) = sprintf('stats %s using %s nooutput; ', what, k). \
+  sprintf('%s0[%d] = min(%s0[%d], STATS_min); %s1[%d] = max(%s1[%d], STATS_max); ', z, i, z, i, z, i, z, i)
+extend(i, what, x, y) = side(i, 'x', what, x).side(i, 'y', what, y)
+during(i, k) = i == 1 ? sprintf('%d', k) : sprintf('($1 <= 1.000001*t_detail ? $%d : NaN)', k)
+do for [i = 1:panels] {
+  if (name eq 'mechanism') {
+    eval extend(i, i == 1 ? "'mechanism.dat'" : "'mechanism-start.dat'", '1', '2')
+    if (ground) { eval extend(i, "'ground.dat'", '1', '2') }
+    do for [k in markers] { eval extend(i, sprintf("'wheels.dat' index %s", k), during(i, 2), during(i, 3)) }
+  } else { eval extend(i, 'data', during(i, 2), during(i, 3)) }
+}
 do for [i = 1:panels] {
   edge = 0.05*max(x1[i] - x0[i], y1[i] - y0[i])
   if (edge == 0) { edge = 1 }

@@ -1,11 +1,44 @@
-/* The samples of a run for figures and animations, and their common parts. */
+/* Figures and animations of a run: the samples kept for them; paths, velocities, energies and snapshots of the motion drawn
+ * by gnuplot; a page for web browsers.
+ *
+ * The folder of figures gets data files (*.dat), gnuplot scripts (*.gp) and their output (*.svg, *.png).  A script can
+ * be edited and run again there: gnuplot FILE.gp. */
 #ifndef PW_PLOT_H
 #define PW_PLOT_H
 
-#include <stdio.h>
 #include "cli.h"
-#include "figure.h"
-#include "plots.h"
+#include "util.h"
+
+typedef struct pw_plots pw_plots;
+
+/* Endings of the names of the folder's data files, scripts and pictures. */
+extern const char *const pw_plot_names[];
+
+/* Prepares figures of a run from 0 to t_end in a folder, which is created if necessary; NULL: without figures.  With
+ * `forces`, those of elements with points are kept as well.  System and texts must outlive them.  PW_RESOURCE if the
+ * folder cannot be written or memory is exhausted. */
+pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
+                         pw_error *error);
+void pw_plots_close (pw_plots *p);
+
+/* The time of the next sample [s]; INFINITY after the last one. */
+double pw_plots_next (const pw_plots *p);
+/* Takes a sample with the ledger. */
+void pw_plots_add (pw_plots *p, const pw_sample *sample);
+/* Saves or loads the samples taken so far. */
+void pw_plots_serialise (pw_plots *p, pw_archive *a);
+
+/* Does nothing without a folder.  Writes data and scripts and, if `draw`, runs gnuplot; a missing gnuplot is reported
+ * on standard error, but not an error.  PW_RESOURCE if a file cannot be written or gnuplot fails. */
+int pw_plots_finish (pw_plots *p, int draw, pw_error *error);
+
+/* Whether an animation of this name can be written: PW_INPUT unless it ends in .html. */
+int pw_animation_check (const char *path, pw_error *error);
+/* Writes the samples of a run, with forces, to the output of that path, which the caller completes; `reason`: why the
+ * run did not reach its end, or "".  Returns 0 and reports it if the run is too short. */
+int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *method, const char *reason);
+
+/* ---- Private to this folder ---- */
 
 enum {
   PLOT_SAMPLES = 1600,    /* of a small scene */
@@ -13,15 +46,20 @@ enum {
   PLOT_NUMBERS = 8000000, /* kept in all, unless that is less than PLOT_FEW samples */
   PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be distinguished */
   PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
-  PLOT_CURVES = 60,       /* bodies or wheels that get a curve, at most */
-  PLOT_NAMED = 12,        /* curves that get a name each; more are coloured by number */
-  PLOT_IMAGES = 60,       /* snapshots of the mechanism, at most */
-  PLOT_FEWEST = 8         /* and at least */
+  PLOT_CURVES = 60        /* bodies or wheels that get a curve, at most */
 };
 
 /* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
  * then the force of each link. */
 enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTION, PLOT_BALANCE, PLOT_FIRST };
+
+/* Bodies, or wheels, to which markers belong. */
+typedef struct {
+  const char *file, *columns, *what; /* data file, its columns after the time, "body" */
+  int numbers, offset;               /* of each in a sample, from which column on */
+  int all, shown, curves;            /* in the system; drawn; that get a curve */
+  int *index;                        /* those drawn: bodies or elements of the system */
+} pw_tracks;
 
 /* Attachment points of a body, in its frame [m], and the convex outline of them and its centre of mass,
  * counter-clockwise; empty if they are collinear. */
@@ -30,9 +68,6 @@ typedef struct {
   double at[PLOT_POINTS][2];
   double corner[PLOT_POINTS + 1][2];
 } pw_plot_body;
-
-/* 1 if attachment point k is not a corner of the outline. */
-int pw_plot_inside (const pw_plot_body *shape, int k);
 
 /* An element with points: what it connects, and on which of its ends the force is shown. */
 typedef struct {
@@ -45,46 +80,31 @@ typedef struct {
   int force, column; /* end, and the first column of its body */
 } pw_plot_link;
 
-/* A rectangle [m]. */
-typedef struct {
-  double x0, x1, y0, y1;
-} pw_plot_box;
-
 struct pw_plots {
   const char *folder, *model;
   int lock; /* of the folder; -1: none */
   const pw_system *s;
   pw_workspace *workspace; /* for contact points and forces */
   double t_end;
-  int samples, wanted;  /* taken so far; planned */
-  int width;            /* numbers per sample */
-  int bodies, wheels;   /* drawn; markers are among the wheels */
-  int links;            /* elements whose forces are kept */
-  int grounds;          /* points of the ground */
-  int all_wheels;       /* in the system */
-  int *body;            /* bodies: index in the system */
-  int *element;         /* wheels: which of the system's */
+  int samples, wanted; /* taken so far; planned */
+  int width;           /* numbers per sample */
+  pw_tracks bodies, wheels;
+  int links, grounds;   /* elements whose forces are kept; points of the ground */
   pw_plot_body *shape;  /* bodies */
   double (*ground)[2];  /* grounds [m] */
   double *data;         /* wanted x width */
-  double (*contact)[3]; /* scratch: all_wheels */
+  double (*contact)[3]; /* scratch: wheels of the system */
   pw_plot_link *link;   /* links */
   double *forces;       /* scratch: of all elements */
+  pw_arena arena;       /* of these arrays */
 };
 
-/* Sample i, and the parts of one. */
+/* Sample i, and the numbers of track k in it. */
 static inline double *pw_plot_sample (const pw_plots *p, int i) {
   return p->data + (size_t)i * (size_t)p->width;
 }
-static inline double *pw_plot_motion (const pw_plots *p, int i, int body) {
-  return pw_plot_sample (p, i) + PLOT_FIRST + 6 * body;
-}
-static inline double *pw_plot_wheel (const pw_plots *p, int i, int wheel) {
-  return pw_plot_sample (p, i) + PLOT_FIRST + 6 * p->bodies + 3 * wheel;
-}
-
-static inline double *pw_plot_force (const pw_plots *p, int i, int link) {
-  return pw_plot_sample (p, i) + PLOT_FIRST + 6 * p->bodies + 3 * p->wheels + 2 * link;
+static inline double *pw_plot_track (const pw_plots *p, int i, const pw_tracks *t, int k) {
+  return pw_plot_sample (p, i) + t->offset + t->numbers * k;
 }
 
 /* Index of item i of `shown` items chosen at equal distances from `all`. */
@@ -92,54 +112,21 @@ static inline int pw_plot_pick (int i, int shown, int all) {
   return (int)((long long)i * all / shown);
 }
 
-/* A family of curves, one per body or wheel; above a dozen they are coloured by number instead of named. */
-typedef struct {
-  const char *file;      /* a block for each: time, numbers, number in the model */
-  const char *columns;   /* "x [m], ..." */
-  const char *what;      /* "body", for the colour bar */
-  int count, shown, all; /* curves; bodies or wheels kept; in the system */
-  int numbers;           /* kept of each */
-  const char *(*name) (const pw_plots *p, int shown);
-  double *(*at) (const pw_plots *p, int i, int shown); /* its numbers in sample i */
-} pw_curves;
-
-pw_curves pw_plot_bodies (const pw_plots *p);
-pw_curves pw_plot_wheels (const pw_plots *p);
-
-const char *pw_plot_body_name (const pw_plots *p, int body);
-const char *pw_plot_wheel_name (const pw_plots *p, int wheel);
-/* 1 for a wheel, 0 for a marker, which is kept among the wheels. */
+const char *pw_plot_name (const pw_plots *p, const pw_tracks *t, int k);
+/* 1 for a wheel, 0 for a marker. */
 int pw_plot_rolls (const pw_plots *p, int wheel);
-/* Title of the paths drawn: "paths of the wheels and markers". */
-const char *pw_plot_followed (const pw_plots *p);
-/* The body a wheel belongs to, among those drawn; -1: the ground, -2: none of them. */
-int pw_plot_body_of_wheel (const pw_plots *p, int wheel);
+/* Largest dimension of the initial configuration [m]. */
+double pw_plot_size (const pw_plots *p);
 
 /* Finds the attachment points of bodies and of the ground, from the points of elements' definitions. */
 int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error);
-
+/* 1 if attachment point k is not a corner of the outline. */
+int pw_plot_inside (const pw_plot_body *shape, int k);
+/* The number of a system's body among those drawn; -1: the ground, -2: none of them. */
+int pw_plot_shown (const pw_plots *p, int body);
 /* Finds elements with points on the bodies drawn, up to the available number. */
 void pw_plot_find_links (pw_plots *p, const pw_model *m);
 /* Their forces [N], x and y each. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
-
-/* The smallest rectangle around all attachment points, centres of mass and wheels of samples 0 ... n - 1; around the
- * paths of the wheels (of the centres of mass if there are no wheels). */
-pw_plot_box pw_plot_box_of (const pw_plots *p, int n);
-pw_plot_box pw_plot_box_of_paths (const pw_plots *p, int n);
-
-/* Largest dimension of the initial configuration [m]. */
-double pw_plot_size (const pw_plots *p);
-
-/* Blocks of the mechanism's data, and whether one has any content. */
-enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
-int pw_plot_has (const pw_plots *p, int block);
-
-/* Number of initial samples shown in a separate figure, if the mechanism travels so far that it is small in a figure of
- * the whole run: those that fit a figure a few times its size; 0: none.  A single point has no size. */
-int pw_plot_closeup (const pw_plots *p);
-
-/* Writes the data files. */
-int pw_plot_write_data (const pw_plots *p, const pw_figures *f, int closeup, pw_error *error);
 
 #endif

@@ -1,64 +1,221 @@
-/* The figures of a run: its data files, and the values of the variables of its scripts. */
+/* The figures of a run: data files, plain columns with a comment line of names and units at the top, and scripts. */
 #include <math.h>
+#include "figure.h"
 #include "plot.h"
 
-/* The largest number of extrema of the angular velocity of a body; round-off does not count. */
-static int figures_turns (const pw_plots *p) {
-  int most = 0;
-  for (int b = 0; b < p->bodies; b++) {
-    double largest = 0;
-    for (int i = 0; i < p->samples; i++) largest = fmax (largest, fabs (pw_plot_motion (p, i, b)[5]));
-    int turns = 0, before = 0;
-    for (int i = 1; i < p->samples; i++) {
-      double change = pw_plot_motion (p, i, b)[5] - pw_plot_motion (p, i - 1, b)[5];
-      int now = (change > 1e-6 * largest) - (change < -1e-6 * largest);
-      turns += now * before < 0;
-      if (now) before = now;
-    }
-    if (turns > most) most = turns;
-  }
-  return most;
+enum { PLOT_NAMED = 12, PLOT_IMAGES = 60, PLOT_FEWEST = 8 }; /* curves with a name each; snapshots at most, and least */
+
+/* Blocks of the mechanism's data. */
+enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
+
+/* Numbers separated by spaces, then an end. */
+static void data_row (FILE *f, const double *value, int count, const char *end) {
+  char text[32];
+  for (int i = 0; i < count; i++) fprintf (f, "%s%s", i ? " " : "", pw_format (text, value[i], 10));
+  fputs (end, f);
 }
 
-/* The data, and a label for each curve unless there are too many, which are coloured by number. */
-static void figures_curves (FILE *f, const pw_plots *p, pw_curves c) {
-  pw_figure_text (f, "data", c.file);
-  pw_figure_number (f, "curves", c.count);
-  pw_figure_array (f, "label", c.count);
-  for (int i = 0; i < c.count && c.count <= PLOT_NAMED; i++) pw_figure_element (f, "label", i + 1, c.name (p, i));
-  pw_figure_text (f, "what", c.what);
-  pw_figure_number (f, "numbers", c.all);
-  pw_figure_number (f, "last", c.numbers + 2);
+/* ---- Size ---- */
+
+/* A rectangle [m]. */
+typedef struct {
+  double x0, x1, y0, y1;
+} box;
+
+/* A point of a body in the inertial frame. */
+static void data_point (const double *motion, const double *at, double out[2]) {
+  double c = cos (motion[2]), s = sin (motion[2]);
+  out[0] = motion[0] + c * at[0] - s * at[1];
+  out[1] = motion[1] + s * at[0] + c * at[1];
 }
 
-/* The panels: the whole run, and its beginning if that is drawn in detail. */
-static void figures_panels (FILE *f, const pw_plots *p, int closeup, pw_plot_box (*box) (const pw_plots *p, int n)) {
-  static const char *const side[] = { "x0", "x1", "y0", "y1" };
-  char name[8];
-  int panels = closeup > 0 ? 2 : 1;
-  pw_figure_number (f, "panels", panels);
-  if (closeup > 0) pw_figure_number (f, "t_detail", pw_plot_sample (p, closeup - 1)[PLOT_T]);
-  for (int k = 0; k < 4; k++) pw_figure_array (f, side[k], panels);
-  for (int i = 0; i < panels; i++) {
-    pw_plot_box b = box (p, i ? closeup : p->samples);
-    const double value[] = { b.x0, b.x1, b.y0, b.y1 };
-    for (int k = 0; k < 4; k++) {
-      snprintf (name, sizeof name, "%s[%d]", side[k], i + 1);
-      pw_figure_number (f, name, b.x1 >= b.x0 ? value[k] : 0);
+static void box_extend (box *b, const double *point) {
+  if (!isfinite (point[0]) || !isfinite (point[1])) return;
+  *b = (box){ fmin (b->x0, point[0]), fmax (b->x1, point[0]), fmin (b->y0, point[1]), fmax (b->y1, point[1]) };
+}
+
+/* All attachment points, centres of mass and wheels of a sample. */
+static void box_extend_sample (const pw_plots *p, int i, box *b) {
+  for (int k = 0; k < p->bodies.shown; k++) {
+    const double *motion = pw_plot_track (p, i, &p->bodies, k);
+    box_extend (b, motion);
+    for (int n = 0; n < p->shape[k].count; n++) {
+      double point[2];
+      data_point (motion, p->shape[k].at[n], point);
+      box_extend (b, point);
     }
   }
+  for (int w = 0; w < p->wheels.shown; w++) box_extend (b, pw_plot_track (p, i, &p->wheels, w));
 }
 
-/* Blocks of the mechanism's data that are not empty, and those of the markers among the wheels. */
-static void figures_mechanism (FILE *f, const pw_plots *p) {
-  pw_curves c = pw_plot_wheels (p);
-  fputs ("blocks = '", f);
-  for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++)
-    if (pw_plot_has (p, block)) fprintf (f, "%d ", block);
-  fputs ("'\nmarkers = '", f);
-  for (int k = 0; k < c.count; k++)
-    if (!pw_plot_rolls (p, pw_plot_pick (k, c.count, c.shown))) fprintf (f, "%d ", k);
-  fprintf (f, "'\nground = %d\n", p->grounds > 0);
+/* The diagonal of the smallest rectangle around the first n samples and, unless `most` is given, the ground; *n becomes the
+ * number of samples for which it is less than `most`. */
+static double box_diagonal (const pw_plots *p, int *n, double most) {
+  box b = { INFINITY, -INFINITY, INFINITY, -INFINITY };
+  double diagonal = 0;
+  for (int g = 0; g < p->grounds && isinf (most); g++) box_extend (&b, p->ground[g]);
+  for (int i = 0; i < *n; i++) {
+    box_extend_sample (p, i, &b);
+    diagonal = b.x1 >= b.x0 ? hypot (b.x1 - b.x0, b.y1 - b.y0) : 0;
+    if (diagonal > most) *n = i;
+  }
+  return diagonal;
+}
+
+double pw_plot_size (const pw_plots *p) {
+  int n = 1;
+  double size = box_diagonal (p, &n, INFINITY);
+  return size > 0 ? size : pw_system_length (p->s);
+}
+
+/* 1 if a block has any content. */
+static int data_has (const pw_plots *p, int block) {
+  int b = 0, w = 0;
+  while (w < p->wheels.shown && !pw_plot_rolls (p, w)) w++;
+  if (block == PLOT_WHEELS) return w < p->wheels.shown;
+  while (b < p->bodies.shown && (p->shape[b].count == 0) != (block == PLOT_CENTRES)) b++;
+  return b < p->bodies.shown;
+}
+
+/* Number of initial samples shown in a separate panel, if the mechanism travels so far that it is small in a figure of
+ * the whole run: those that fit a figure a few times its size; 0: none.  A single point has no size. */
+static int data_closeup (const pw_plots *p) {
+  int all = p->samples, n = p->samples;
+  double size = pw_plot_size (p);
+  if (p->wheels.shown == 0 && !data_has (p, PLOT_BODIES)) return 0;
+  if (box_diagonal (p, &all, INFINITY) < 10 * size) return 0;
+  box_diagonal (p, &n, 4 * size);
+  return n < 12 ? 0 : n;
+}
+
+/* ---- Files ---- */
+
+/* One block per curve: time, the numbers of the body or wheel, its number in the model. */
+static int data_tracks (const pw_plots *p, const pw_figures *f, const pw_tracks *t, pw_error *error) {
+  pw_output *o = t->curves ? pw_figure_data (f, t->file, error) : NULL;
+  if (o == NULL) return t->curves ? PW_RESOURCE : PW_OK;
+  FILE *out = pw_output_stream (o);
+  for (int c = 0; c < t->curves; c++) {
+    int k = pw_plot_pick (c, t->curves, t->shown);
+    fprintf (out, "%s# %s: %s, number\n", c ? "\n\n" : "", pw_plot_name (p, t, k), t->columns);
+    for (int i = 0; i < p->samples; i++) {
+      data_row (out, pw_plot_sample (p, i), 1, " ");
+      data_row (out, pw_plot_track (p, i, t, k), t->numbers, " ");
+      fprintf (out, "%d\n", pw_plot_pick (k, t->shown, t->all) + 1);
+    }
+  }
+  return pw_output_finish (o, error);
+}
+
+/* The first numbers of equal rows. */
+static int data_table (const pw_figures *f, const char *name, const char *heading, const double *row, int width,
+                       int count, int rows, pw_error *error) {
+  pw_output *o = rows ? pw_figure_data (f, name, error) : NULL;
+  if (o == NULL) return rows ? PW_RESOURCE : PW_OK;
+  fprintf (pw_output_stream (o), "# %s\n", heading);
+  for (int i = 0; i < rows; i++, row += width) data_row (pw_output_stream (o), row, count, "\n");
+  return pw_output_finish (o, error);
+}
+
+/* ---- The mechanism: lines of "x y t", blank lines between polygons ---- */
+
+static void data_vertex (FILE *f, double x, double y, double t, const char *end) {
+  data_row (f, (const double[]){ x, y, t }, 3, end);
+}
+
+/* A body: its outline, and lines from the centre of mass to the attachment points inside, which without an outline are all. */
+static void data_body (FILE *f, const pw_plot_body *shape, const double *motion, double t) {
+  double point[2];
+  for (int k = 0; k <= shape->corners && shape->corners; k++) {
+    data_point (motion, shape->corner[k % shape->corners], point);
+    data_vertex (f, point[0], point[1], t, k < shape->corners ? "\n" : "\n\n");
+  }
+  for (int k = 0; k < shape->count; k++) {
+    if (!pw_plot_inside (shape, k)) continue;
+    data_point (motion, shape->at[k], point);
+    data_vertex (f, motion[0], motion[1], t, "\n");
+    data_vertex (f, point[0], point[1], t, "\n\n");
+  }
+}
+
+static void data_wheel (FILE *f, const double *contact, double half, double t) {
+  double c = half * cos (contact[2]), s = half * sin (contact[2]);
+  data_vertex (f, contact[0] - c, contact[1] - s, t, "\n");
+  data_vertex (f, contact[0] + c, contact[1] + s, t, "\n\n");
+}
+
+/* Samples from one snapshot to the next, of the first n: the body with the longest path moves by about a third of the
+ * size of the mechanism. */
+static int data_stride (const pw_plots *p, int n) {
+  double longest = 0;
+  for (int b = 0; b < p->bodies.shown; b++) {
+    double path = 0;
+    for (int i = 1; i < n; i++) {
+      const double *from = pw_plot_track (p, i - 1, &p->bodies, b), *to = pw_plot_track (p, i, &p->bodies, b);
+      path += hypot (to[0] - from[0], to[1] - from[1]);
+    }
+    longest = fmax (longest, path);
+  }
+  double images = fmin (fmax (3 * longest / pw_plot_size (p), PLOT_FEWEST), PLOT_IMAGES);
+  int stride = (int)((n - 1) / images);
+  return stride < 1 ? 1 : stride;
+}
+
+static void data_block (FILE *f, const pw_plots *p, int i, int block, double half) {
+  double t = pw_plot_sample (p, i)[PLOT_T];
+  for (int w = 0; w < p->wheels.shown && block == PLOT_WHEELS; w++)
+    if (pw_plot_rolls (p, w)) data_wheel (f, pw_plot_track (p, i, &p->wheels, w), half, t);
+  for (int b = 0; b < p->bodies.shown && block != PLOT_WHEELS; b++) {
+    const double *motion = pw_plot_track (p, i, &p->bodies, b);
+    if (block == PLOT_BODIES)
+      data_body (f, &p->shape[b], motion, t);
+    else
+      data_vertex (f, motion[0], motion[1], t, "\n");
+  }
+}
+
+/* A block each of bodies, wheels, and bodies without attachments: snapshots out of the first n samples.  gnuplot counts
+ * blocks with data only, so an empty one gets a point that is not drawn. */
+static int data_mechanism (const pw_plots *p, const pw_figures *f, const char *name, int n, pw_error *error) {
+  static const char *const title[] = { "bodies", "wheels", "bodies without attachments" };
+  pw_output *o = pw_figure_data (f, name, error);
+  if (o == NULL) return PW_RESOURCE;
+  FILE *out = pw_output_stream (o);
+  int stride = data_stride (p, n);
+  double half_wheel = 0.06 * pw_plot_size (p);
+  for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
+    fprintf (out, "%s# %s: x [m], y [m], t [s]\n", block == PLOT_BODIES ? "" : "\n\n", title[block]);
+    if (!data_has (p, block)) fputs ("nan nan nan\n", out);
+    for (int i = 0; i < n; i += stride) data_block (out, p, i, block, half_wheel);
+  }
+  return pw_output_finish (o, error);
+}
+
+static int data_write (const pw_plots *p, const pw_figures *f, int closeup, pw_error *error) {
+  static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
+  int status = data_tracks (p, f, &p->bodies, error);
+  if (status == PW_OK) status = data_tracks (p, f, &p->wheels, error);
+  if (status == PW_OK) status = data_table (f, "energy.dat", energy, p->data, p->width, PLOT_FIRST, p->samples, error);
+  if (status == PW_OK)
+    status = data_table (f, "ground.dat", "points of the ground: x [m], y [m]", *p->ground, 2, 2, p->grounds, error);
+  if (status == PW_OK) status = data_mechanism (p, f, "mechanism.dat", p->samples, error);
+  if (status == PW_OK && closeup > 0) status = data_mechanism (p, f, "mechanism-start.dat", closeup, error);
+  return status;
+}
+
+/* ---- Scripts: values of the templates' variables ---- */
+
+/* Curves, with a label each unless there are too many, and which of them are paths of markers. */
+static void figures_curves (FILE *f, const pw_plots *p, const pw_tracks *t) {
+  pw_figure_text (f, "data", t->file);
+  pw_figure_text (f, "what", t->what);
+  fprintf (f, "curves = %d\nnumbers = %d\nlast = %d\narray label[%d]\n", t->curves, t->all, t->numbers + 2, t->curves);
+  for (int i = 0; i < t->curves && t->curves <= PLOT_NAMED; i++)
+    pw_figure_element (f, "label", i + 1, pw_plot_name (p, t, i));
+  fputs ("markers = '", f);
+  for (int i = 0; i < t->curves && t == &p->wheels; i++)
+    if (!pw_plot_rolls (p, pw_plot_pick (i, t->curves, t->shown))) fprintf (f, "%d ", i);
+  fputs ("'\n", f);
 }
 
 static int figures_write (const pw_plots *p, const pw_figures *figures, const char *name, int closeup,
@@ -66,22 +223,14 @@ static int figures_write (const pw_plots *p, const pw_figures *figures, const ch
   pw_output *o = pw_figure_begin (figures, name, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
-  pw_figure_number (f, "t_end", pw_plot_sample (p, p->samples - 1)[PLOT_T]);
-  switch (*name) {
-  case 'p': /* paths */
-    pw_figure_text (f, "title", pw_plot_followed (p));
-    figures_curves (f, p, p->wheels > 0 ? pw_plot_wheels (p) : pw_plot_bodies (p));
-    figures_panels (f, p, closeup, pw_plot_box_of_paths);
-    break;
-  case 'a':                                           /* angular */
-    pw_figure_number (f, "turns", figures_turns (p)); /* fall through */
-  case 'v':                                           /* velocities */
-    figures_curves (f, p, pw_plot_bodies (p));
-    break;
-  case 'm': /* mechanism */
-    figures_mechanism (f, p);
-    figures_panels (f, p, closeup, pw_plot_box_of);
-  }
+  int paths = *name == 'p' || *name == 'm'; /* paths, mechanism */
+  fprintf (f, "t_end = %.9g\nt_detail = %.9g\n", pw_plot_sample (p, p->samples - 1)[PLOT_T],
+           closeup > 0 ? pw_plot_sample (p, closeup - 1)[PLOT_T] : 0);
+  figures_curves (f, p, paths && p->wheels.shown ? &p->wheels : &p->bodies);
+  fprintf (f, "ground = %d\nblocks = '", p->grounds > 0);
+  for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++)
+    if (data_has (p, block)) fprintf (f, "%d ", block);
+  fputs ("'\n", f);
   return pw_figure_end (o, name, error);
 }
 
@@ -97,7 +246,7 @@ int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   if (p->samples < p->wanted)
     snprintf (figures.incomplete, sizeof figures.incomplete, ", incomplete: up to t = %s s of %s s",
               pw_format (t, pw_plot_sample (p, p->samples - 1)[PLOT_T], 4), pw_format (end, p->t_end, 4));
-  int closeup = pw_plot_closeup (p), status = pw_plot_write_data (p, &figures, closeup, error);
+  int closeup = data_closeup (p), status = data_write (p, &figures, closeup, error);
   for (const char *const *name = names; status == PW_OK && *name; name++)
     status = figures_write (p, &figures, *name, closeup, error);
   return status == PW_OK && draw ? pw_figure_draw (p->folder, names, error) : status;

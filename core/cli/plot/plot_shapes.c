@@ -2,7 +2,6 @@
 #include <math.h>
 #include <string.h>
 #include "plot.h"
-#include "util.h"
 
 /* ---- Outlines ---- */
 
@@ -57,8 +56,9 @@ int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
   pw_names shown;
   int elements;
   const pw_element *e = pw_model_elements (m, &elements);
-  if (pw_names_open (&shown, (size_t)p->bodies) != PW_OK) return pw_fail (error, PW_RESOURCE, "plots: out of memory");
-  for (int i = 0; i < p->bodies; i++) pw_names_add (&shown, pw_system_body_name (p->s, p->body[i]), i);
+  if (pw_names_open (&shown, (size_t)p->bodies.shown) != PW_OK)
+    return pw_fail (error, PW_RESOURCE, "plots: out of memory");
+  for (int i = 0; i < p->bodies.shown; i++) pw_names_add (&shown, pw_plot_name (p, &p->bodies, i), i);
   for (const pw_element *end = e + elements; e < end; e++)
     for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
       const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
@@ -68,24 +68,19 @@ int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
       if (at && strcmp (body, "ground") == 0 && p->grounds < PLOT_SHOWN)
         memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
     }
-  for (int b = 0; b < p->bodies; b++) shapes_outline (&p->shape[b]);
+  for (int b = 0; b < p->bodies.shown; b++) shapes_outline (&p->shape[b]);
   pw_names_close (&shown);
   return PW_OK;
 }
 
 /* ---- Links ---- */
 
-/* The number of a system's body among those shown, -1 for the ground, -2 for one that is not shown. */
-static int shapes_shown (const pw_plots *p, int body) {
-  if (body >= pw_system_bodies (p->s)) return -1;
-  int b = (int)((long long)body * p->bodies / pw_system_bodies (p->s));
+int pw_plot_shown (const pw_plots *p, int body) {
+  if (body >= p->bodies.all) return -1;
+  int b = (int)((long long)body * p->bodies.shown / p->bodies.all);
   for (int near = b - 1; near <= b + 1; near++)
-    if (near >= 0 && near < p->bodies && p->body[near] == body) return near;
+    if (near >= 0 && near < p->bodies.shown && p->bodies.index[near] == body) return near;
   return -2;
-}
-
-int pw_plot_body_of_wheel (const pw_plots *p, int wheel) {
-  return shapes_shown (p, pw_system_element (p->s, p->element[wheel]).body[0]);
 }
 
 /* Fills a link; 0 if the element has no point, or a body that is not shown. */
@@ -94,7 +89,7 @@ static int shapes_fill (const pw_plots *p, const pw_element *e, int element, pw_
   *link = (pw_plot_link){ .element = element, .force = -1 };
   for (int n = 0; n < e->kind->bodies && link->ends < 2; n++) {
     const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
-    int body = shapes_shown (p, bodies[n]);
+    int body = pw_plot_shown (p, bodies[n]);
     if (at == NULL) continue;
     if (body == -2) return 0;
     if (link->force < 0 && body >= 0) link->force = link->ends, link->column = 3 * n;

@@ -5,7 +5,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "animate.h"
 #include "profile.h"
 #include "report.h"
 #include "run_command.h"

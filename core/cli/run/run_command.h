@@ -4,7 +4,7 @@
 
 #include "cli.h"
 #include "motion.h"
-#include "plots.h"
+#include "plot.h"
 #include "progress.h"
 #include "text.h"
 
