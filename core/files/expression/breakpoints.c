@@ -22,9 +22,7 @@ typedef struct {
 
 static const range range_nan = { INFINITY, -INFINITY, 0, 0, 1 };
 
-static range range_any (int nan) {
-  return (range){ -INFINITY, INFINITY, 0, 0, nan };
-}
+static const range range_any = { -INFINITY, INFINITY, 0, 0, 1 };
 
 static int range_holds (const range *x, double value) {
   return x->lo <= value && value <= x->hi;
@@ -40,7 +38,7 @@ static int range_unbounded (const range *x) {
 
 /* Round-off of an operation: a few units in the last place, also of infinite bounds. */
 static range range_of (double lo, double hi) {
-  if (isnan (lo) || isnan (hi)) return range_any (1);
+  if (isnan (lo) || isnan (hi)) return range_any;
   return (range){ lo - fmin (4 * DBL_EPSILON * fabs (lo), DBL_MAX) - DBL_MIN,
                   hi + fmin (4 * DBL_EPSILON * fabs (hi), DBL_MAX) + DBL_MIN, 0, 0, 0 };
 }
@@ -56,7 +54,7 @@ static double range_quotient (double a, double b) {
 /* The range of f at the corners, for an f monotonic in each argument. */
 static range range_corners (double (*f) (double, double), const range *x, const range *y) {
   double a = f (x->lo, y->lo), b = f (x->lo, y->hi), c = f (x->hi, y->lo), d = f (x->hi, y->hi);
-  if (isnan (a) || isnan (b) || isnan (c) || isnan (d)) return range_any (1);
+  if (isnan (a) || isnan (b) || isnan (c) || isnan (d)) return range_any;
   return range_of (fmin (fmin (a, b), fmin (c, d)), fmax (fmax (a, b), fmax (c, d)));
 }
 
@@ -74,9 +72,14 @@ static range range_multiply (const range *x, const range *y) {
   return r;
 }
 
+/* All numbers, with a jump at a pole. */
+static range range_pole (int jumps, int nan) {
+  return (range){ -INFINITY, INFINITY, jumps, 0, nan };
+}
+
 /* 0/0 is NaN. */
 static range range_divide (const range *x, const range *y) {
-  return range_holds (y, 0) ? range_any (range_holds (x, 0)) : range_corners (range_quotient, x, y);
+  return range_holds (y, 0) ? range_pole (y->lo < y->hi, range_holds (x, 0)) : range_corners (range_quotient, x, y);
 }
 
 static range range_abs (const range *x) {
@@ -106,7 +109,7 @@ static range range_even (const range *x, double (*f) (double)) {
 
 static range range_tan (const range *x) {
   const double slack = 8 * DBL_EPSILON * (fabs (x->lo) + fabs (x->hi) + 1);
-  if (floor ((x->lo - slack) / PW_PI + 0.5) != floor ((x->hi + slack) / PW_PI + 0.5)) return range_any (0);
+  if (floor ((x->lo - slack) / PW_PI + 0.5) != floor ((x->hi + slack) / PW_PI + 0.5)) return range_pole (1, 0);
   return range_of (tan (x->lo), tan (x->hi));
 }
 
@@ -130,7 +133,7 @@ static range range_smooth (const pw_expression_function *f, const range *x) {
 /* An integer power; an even one has its minimum at 0. */
 static range range_integer_power (const range *x, double n) {
   int even = fmod (n, 2) == 0;
-  if (n < 0 && range_holds (x, 0)) return range_any (0);
+  if (n < 0 && range_holds (x, 0)) return range_pole (!even, 0);
   range b = even ? range_abs (x) : *x;
   if (even) b.lo = fmax (0, b.lo);
   return range_corners (pow, &b, &(range){ n, n, 0, 0, 0 });
@@ -139,7 +142,7 @@ static range range_integer_power (const range *x, double n) {
 /* Powers of negative numbers are NaN unless the exponent is an integer. */
 static range range_power (const range *x, const range *y) {
   if (range_is (y, rint (y->lo))) return range_integer_power (x, y->lo);
-  if (x->lo < 0 && y->lo < y->hi) return range_any (1);
+  if (x->lo < 0 && y->lo < y->hi) return range_any;
   if (x->hi < 0) return range_nan;
   range r = range_corners (pow, &(range){ fmax (0, x->lo), x->hi, 0, 0, 0 }, y);
   r.nan |= x->lo < 0;
@@ -248,6 +251,7 @@ static range range_one (const pw_expression_code *c, const range *x) {
     return range_abs (x);
   case PW_OP_SIGN:
     return range_sign (x);
+  case PW_OP_TAN:
   case PW_OP_ONE:
     return range_smooth (&pw_expression_functions[c->which], x);
   default:

@@ -33,6 +33,7 @@ static inline double value_of (const pw_expression_code *c, double a, double x, 
     return -x;
   case PW_OP_ABS:
     return fabs (x);
+  case PW_OP_TAN:
   case PW_OP_ONE:
     return pw_expression_functions[c->which].one (x);
   case PW_OP_ADD:
@@ -42,8 +43,10 @@ static inline double value_of (const pw_expression_code *c, double a, double x, 
   case PW_OP_MULTIPLY:
     return a * x;
   case PW_OP_DIVIDE:
+    if (x == 0) *tie = 1;
     return a / x;
   case PW_OP_POWER:
+    if (a == 0 && x < 0) *tie = 1;
     return pw_expression_power (a, x);
   case PW_OP_AND:
     return a != 0 && x != 0;
@@ -155,7 +158,8 @@ static jet jet_mod (const jet *x, const jet *y, double *q) {
 static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete) {
   static const jet none = { 0 };
   if (c->op == PW_OP_NEGATE) return (jet){ -x->v, -x->d, -x->dd, x->on };
-  if (c->op == PW_OP_ONE) {
+  if (c->op == PW_OP_ONE || c->op == PW_OP_TAN) {
+    if (c->op == PW_OP_TAN) *discrete = floor (x->v / PW_PI + 0.5);
     const pw_expression_function *f = &pw_expression_functions[c->which];
     double value = f->one (x->v);
     pw_slopes s = f->slopes (x->v, 0, value);
@@ -192,6 +196,8 @@ static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, d
 }
 
 static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, double *discrete) {
+  jet after = c->op == PW_OP_DIVIDE ? *y : *x; /* with the sign of a 0 just after the current time, for poles */
+  if (after.v == 0) after.v = copysign (0, jet_sign (&after));
   switch (c->op) {
   case PW_OP_ADD:
     return jet_plus (x, 1, y);
@@ -200,8 +206,11 @@ static jet jet_two (const pw_expression_code *c, const jet *x, const jet *y, dou
   case PW_OP_MULTIPLY:
     return jet_product (x, y);
   case PW_OP_DIVIDE:
-    return jet_quotient (x, y);
+    *discrete = jet_sign (y);
+    return jet_quotient (x, &after);
   case PW_OP_POWER:
+    *discrete = y->v < 0 && fabs (fmod (y->v, 2)) == 1 ? jet_sign (x) : 0;
+    return jet_function (c, &after, y);
   case PW_OP_TWO:
     return jet_function (c, x, y);
   case PW_OP_ATAN2:

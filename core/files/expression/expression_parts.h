@@ -17,6 +17,7 @@ typedef enum {
   PW_OP_FLOOR,
   PW_OP_CEIL,
   PW_OP_ROUND,
+  PW_OP_TAN,
   PW_OP_ONE, /* a smooth function */
   PW_OP_ADD,
   PW_OP_SUBTRACT,
@@ -43,13 +44,14 @@ static inline int pw_expression_operands (int op) {
   return op >= PW_OP_SELECT ? 3 : op >= PW_OP_ADD ? 2 : op >= PW_OP_NEGATE ? 1 : 0;
 }
 
-/* Operations with jumps; abs, min and max only have kinks. */
+/* Operations with jumps between finite values; others jump at poles, or only have kinks. */
 static inline int pw_expression_jumps (int op) {
   return (op >= PW_OP_SIGN && op <= PW_OP_ROUND) || (op >= PW_OP_LESS && op <= PW_OP_UNEQUAL) || op == PW_OP_MOD ||
          op == PW_OP_ATAN2;
 }
 static inline int pw_expression_breaks (int op) {
-  return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX;
+  return pw_expression_jumps (op) || op == PW_OP_ABS || op == PW_OP_MIN || op == PW_OP_MAX || op == PW_OP_TAN ||
+         op == PW_OP_DIVIDE || op == PW_OP_POWER;
 }
 
 /* The value of a comparison of two numbers whose order is -1, 0 or 1; 2: one of them is NaN. */

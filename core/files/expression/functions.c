@@ -148,7 +148,7 @@ static pw_slopes slopes_jacobi_am (double u, double m, double phi) {
 const pw_expression_function pw_expression_functions[] = {
   FUNCTION_OF_ONE (sin, pw_sin, PW_OTHERWISE, -DBL_MAX, DBL_MAX),
   FUNCTION_OF_ONE (cos, pw_cos, PW_OTHERWISE, -DBL_MAX, DBL_MAX),
-  FUNCTION_OF_ONE (tan, tan, PW_OTHERWISE, -DBL_MAX, DBL_MAX),
+  { "tan", PW_OP_TAN, 1, 1, tan, NULL, slopes_tan, PW_OTHERWISE, -DBL_MAX, DBL_MAX },
   FUNCTION_OF_ONE (asin, asin, PW_RISES, -1, 1),
   FUNCTION_OF_ONE (acos, acos, PW_FALLS, -1, 1),
   FUNCTION_OF_ONE (atan, atan, PW_RISES, -INFINITY, INFINITY),
