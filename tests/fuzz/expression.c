@@ -324,13 +324,18 @@ static long double expression_slope (const char *text, double t, long double h) 
   return fabsl (u[0] - u[1]) < 1e-3L * (1 + fabsl (u[0])) ? u[1] : NAN;
 }
 
-/* Whether there are a jump or a kink between two neighbouring numbers: values and slopes on both sides that differ. */
+/* Whether there is a jump or kink between two neighbouring numbers: values and slopes on both sides that differ. */
 static int expression_broken (const char *text, double a, double b) {
   long double left = expression_slope (text, a, -1e-5L), right = expression_slope (text, b, 1e-5L);
   long double before = evaluate_at (text, (double[]){ a, 0 }, 0, 0),
               after = evaluate_at (text, (double[]){ b, 0 }, 0, 0);
+  evaluator e;
+  double jump =
+      (double)(evaluate (text, (double[]){ b, 0 }, 0, 0, 0, &e) - evaluate (text, (double[]){ a, 0 }, 0, 0, 0, &e));
   if (isnan (left) || isnan (right)) return 0;
-  return fabsl (after - before) > 1e-2L * (1 + fabsl (after)) || fabsl (left - right) > 0.1L * (1 + fabsl (left));
+  if (fabsl (after - before) > 1e-2L * (1 + fabsl (after)))
+    return jump != 0; /* else in long double alone: tanh (x) >= 1 */
+  return fabsl (left - right) > 0.1L * (1 + fabsl (left));
 }
 
 /* Which way the expression has taken: its deviation from a straight line tells where to look. */

@@ -6,14 +6,15 @@
  *   yaml_expression.c  signals by expressions of time and states, the reference solution
  *   yaml_signal.c      other signals, points of tables
  *   yaml_build.c       bodies and elements, through the field tables of their types
- *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table */
+ *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table
+ *
+ * Functions with a reader return the status of its error, which is that of the first error; after one they do nothing.
+ * So a sequence of calls needs no check after each.  A node that is NULL is absent, and nothing is read. */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
 #include "expression.h"
 #include "files.h"
-
-/* ---- The tree ---- */
 
 typedef enum { PW_YAML_SCALAR, PW_YAML_LIST, PW_YAML_MAP } pw_yaml_type;
 
@@ -30,8 +31,6 @@ typedef struct pw_node {
   unsigned char quoted;
 } pw_node;
 
-/* ---- A model file ---- */
-
 struct pw_yaml {
   pw_plugin_table table; /* first: a model's table leads to its file */
   char *path;            /* as messages show it */
@@ -46,19 +45,46 @@ struct pw_yaml {
   int parameters;
 };
 
+/* What reads a file, or builds a model from it. */
+typedef struct {
+  const pw_yaml *y;
+  pw_error *error;
+  pw_scope *x; /* parameters and what `let` defines, or NULL */
+  /* for building */
+  pw_model *m;
+  pw_arena *arena;              /* lives as long as the model */
+  pw_reference_text *reference; /* the model's */
+  const double *parameter;      /* their values */
+  double *let;                  /* values of what `let` defines */
+  int lets;                     /* so far */
+  pw_names bodies;              /* names of bodies, to their index */
+  pw_names all;                 /* names of bodies and elements, to the index in nodes */
+  pw_names elements;     /* once an expression asks for them: names of all elements, to the index of their kinds */
+  const pw_node **node;  /* where each is named */
+  const pw_field *field; /* the current one, and its definition with all preceding fields */
+  char *definition;
+  int named;
+  double points; /* of tables, so far */
+  double codes;  /* of signals by expressions, so far */
+} pw_reader;
+
+/* Limits of one model, about 1 GB each, so that a small file cannot use all memory: bodies, elements, parameters or
+ * definitions, of each; points of all tables; operations of all signals by expressions. */
+enum { PW_YAML_ITEMS = 1000000, PW_YAML_POINTS = 20000000, PW_YAML_CODES = 30000000 };
+
 /* ---- The text (yaml_source.c) ---- */
 
 /* Reads a file of at most `largest` bytes into y->source and y->size. */
 int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error *error);
 
 /* Fails with "PATH:LINE:COLUMN: error: TEXT", the line of the source at an offset, and a caret below. */
-int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *format, ...)
+int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...)
 #ifdef __GNUC__
-    __attribute__ ((format (printf, 4, 5)))
+    __attribute__ ((format (printf, 3, 4)))
 #endif
     ;
 
-int pw_yaml_no_memory (const pw_yaml *y, pw_error *error);
+int pw_yaml_no_memory (const pw_reader *r);
 
 /* The line of an offset, from 1. */
 int pw_yaml_line (const pw_yaml *y, size_t at);
@@ -73,22 +99,22 @@ enum { PW_YAML_KEYS = 40 }; /* at most, in a map of fixed keys */
 
 /* Finds known keys (ended by NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
  * are skipped.  Other keys, repeated keys and empty values are refused; `what` ("a body") is for messages. */
-int pw_yaml_keys (const pw_yaml *y, const pw_node *map, int skip, const char *const *key, const char *what,
-                  const pw_node **value, pw_error *error);
+int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *what,
+                  const pw_node **value);
 
 /* "a list", "a map", "text" */
 const char *pw_yaml_found (const pw_node *node);
 
 /* Refuses anything but a list; if `count` >= 0, a list of `count` entries, `items` ("bodies"). */
-int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, const char *items,
-                  pw_error *error);
+int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *what, int count, const char *items);
 
 /* A scalar's text, not empty. */
-int pw_yaml_text (const pw_yaml *y, const pw_node *node, const char *what, const char **text, pw_error *error);
+int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *what, const char **text);
 
-/* A scalar as a number of a domain: an expression over a scope, which may be NULL. */
-int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, const pw_scope *x,
-                    double *value, pw_error *error);
+/* A scalar as a number of a domain: an expression over r->x; a list [x, y] of them; one of several words, ended by NULL. */
+int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value);
+int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value);
+int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value);
 
 /* Whether an expression depends on the time t or a state, BODY.phi, and at which offset (at may be NULL). */
 int pw_yaml_moves (const char *text, size_t *at);
@@ -96,53 +122,21 @@ int pw_yaml_moves (const char *text, size_t *at);
 /* Converts an offset in a scalar's text to an offset in the source. */
 size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
 
-/* ---- Building (yaml_build.c) ---- */
-
-/* State of the build function. */
-typedef struct {
-  const pw_yaml *y;
-  pw_model *m;
-  pw_arena *arena;              /* lives as long as the model */
-  pw_reference_text *reference; /* the model's */
-  const double *parameter;      /* their values */
-  double *let;                  /* values of what `let` defines */
-  int lets;                     /* so far */
-  pw_scope *x;                  /* both */
-  pw_names bodies;              /* names of bodies, to their index */
-  pw_names all;                 /* names of bodies and elements, to the index in nodes */
-  pw_names elements;     /* once an expression asks for them: names of all elements, to the index of their kinds */
-  const pw_node **node;  /* where each is named */
-  const pw_field *field; /* the current one, and its definition with all preceding fields */
-  const char *definition;
-  int named;
-  double points; /* of tables, so far */
-  double codes;  /* of signals by expressions, so far */
-} pw_yaml_builder;
-
-/* Limits of one model, about 1 GB each, so that a small file cannot use all memory. */
-enum { PW_YAML_ITEMS = 1000000 };   /* bodies, elements, parameters or definitions, of each */
-enum { PW_YAML_POINTS = 20000000 }; /* of all tables */
-enum { PW_YAML_CODES = 30000000 };  /* operations of all signals by expressions */
-
-void pw_yaml_build (pw_model *m, const void *parameters);
-
-/* [x, y], and one of several words. */
-int pw_yaml_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error);
-int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices, int *value,
-                    pw_error *error);
-
 /* Adds the names of all bodies so far. */
-void pw_yaml_try_bodies (const pw_yaml_builder *b, pw_nearest *near);
+void pw_yaml_try_bodies (const pw_reader *r, pw_nearest *near);
+
+/* ---- Building ---- */
 
 /* Makes a signal of up to three expressions of time: value, rate, acceleration; NULL: not given (yaml_expression.c). */
-int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
-                     pw_signal *signal, pw_error *error);
+int pw_yaml_of_time (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3], pw_signal *signal);
 
 /* Reads a signal of a kind into a field (yaml_signal.c). */
-int pw_yaml_signal (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal,
-                    pw_error *error);
+int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal);
 
 /* Reads the reference solution, after bodies and elements (yaml_expression.c). */
-int pw_yaml_reference (pw_yaml_builder *b, pw_error *error);
+int pw_yaml_reference (pw_reader *r);
+
+/* The build function (yaml_build.c). */
+void pw_yaml_build (pw_model *m, const void *parameters);
 
 #endif

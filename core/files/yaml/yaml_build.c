@@ -5,115 +5,109 @@
 #include <string.h>
 #include "yaml.h"
 
-/* ---- Names ---- */
-
 /* Bodies and elements share one set of names. */
-static int build_name (pw_yaml_builder *b, const pw_node *node, const char *what, const char **name, pw_error *error) {
-  if (pw_yaml_text (b->y, node, what, name, error) != PW_OK) return error->status;
-  int before = pw_names_add (&b->all, *name, b->named);
+static int build_name (pw_reader *r, const pw_node *node, const char *what, const char **name) {
+  if (pw_yaml_text (r, node, what, name) != PW_OK) return r->error->status;
+  int before = pw_names_add (&r->all, *name, r->named);
   if (before >= 0)
-    return pw_yaml_fail (b->y, node->at, error, "%s \"%.60s\": line %d has given this name already", what, *name,
-                         pw_yaml_line (b->y, b->node[before]->at));
-  b->node[b->named++] = node;
+    return pw_yaml_fail (r, node->at, "%s \"%.60s\": line %d has given this name already", what, *name,
+                         pw_yaml_line (r->y, r->node[before]->at));
+  r->node[r->named++] = node;
   return PW_OK;
 }
 
 /* The core's message without its prefix "model NAME: ", at a position. */
-static int build_refuse (const pw_yaml_builder *b, const pw_node *node, const pw_error *own, pw_error *error) {
+static int build_refuse (const pw_reader *r, const pw_node *node, const pw_error *own) {
   char prefix[200];
-  int n = snprintf (prefix, sizeof prefix, "model %s: ", pw_model_name (b->m));
+  int n = snprintf (prefix, sizeof prefix, "model %s: ", pw_model_name (r->m));
   const char *text = own->text;
   if (n > 0 && strncmp (text, prefix, (size_t)n) == 0) text += n;
-  return own->status == PW_RESOURCE ? pw_fail (error, own->status, "%s", own->text)
-                                    : pw_yaml_fail (b->y, node->at, error, "%s", text);
+  return own->status == PW_RESOURCE ? pw_fail (r->error, own->status, "%s", own->text)
+                                    : pw_yaml_fail (r, node->at, "%s", text);
 }
 
 /* ---- Bodies ---- */
 
-static int build_triple (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const key[4],
-                         double value[3], unsigned *specified, int first, pw_error *error) {
+static void build_triple (const pw_reader *r, const pw_node *node, const char *what, const char *const key[4],
+                          double value[3], unsigned *specified, int first) {
   const pw_node *v[4];
   char name[200];
-  if (node == NULL) return PW_OK;
-  if (pw_yaml_keys (b->y, node, 0, key, what, v, error) != PW_OK) return error->status;
+  pw_yaml_keys (r, node, 0, key, what, v);
   for (int i = 0; i < 3; i++) {
+    if (v[i] == NULL) continue;
     snprintf (name, sizeof name, "%s: %s", what, key[i]);
-    if (v[i] && pw_yaml_number (b->y, v[i], name, PW_REAL, b->x, &value[i], error) != PW_OK) return error->status;
-    if (v[i]) *specified |= 1u << (first + i);
+    pw_yaml_number (r, v[i], name, PW_REAL, &value[i]);
+    *specified |= 1u << (first + i);
   }
-  return PW_OK;
 }
 
-static int build_body (pw_yaml_builder *b, const pw_node *node, pw_error *error) {
+static int build_body (pw_reader *r, const pw_node *node) {
   static const char *const key[] = { "name", "mass", "inertia", "start", "rate", NULL };
   static const char *const start[] = { "x", "y", "phi", NULL }, *const rate[] = { "vx", "vy", "omega", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
-  char what[3][160];
-  if (pw_yaml_keys (b->y, node, 0, key, "a body", v, error) != PW_OK) return error->status;
-  if (v[0] == NULL) return pw_yaml_fail (b->y, node->at, error, "a body needs a name");
-  if (build_name (b, v[0], "body", &body.name, error) != PW_OK) return error->status;
-  for (int i = 0; i < 2; i++) {
-    snprintf (what[i], sizeof what[i], "body %.60s: %s", body.name, key[1 + i]);
-    if (v[1 + i] &&
-        pw_yaml_number (b->y, v[1 + i], what[i], PW_NONNEGATIVE, b->x, i ? &body.inertia : &body.mass, error) != PW_OK)
-      return error->status;
-  }
-  snprintf (what[0], sizeof what[0], "start of body %.60s", body.name);
-  snprintf (what[1], sizeof what[1], "rate of body %.60s", body.name);
-  if (build_triple (b, v[3], what[0], start, body.start, &body.specified, 0, error) != PW_OK ||
-      build_triple (b, v[4], what[1], rate, body.rate, &body.specified, 3, error) != PW_OK)
-    return error->status;
   pw_error own = { 0 };
-  if (pw_model_check_body (b->m, &body, &own) != PW_OK) return build_refuse (b, v[0], &own, error);
-  pw_names_add (&b->bodies, body.name, 0);
-  return pw_add_body (b->m, &body);
+  char what[160];
+  if (pw_yaml_keys (r, node, 0, key, "a body", v) != PW_OK) return r->error->status;
+  if (v[0] == NULL) return pw_yaml_fail (r, node->at, "a body needs a name");
+  if (build_name (r, v[0], "body", &body.name) != PW_OK) return r->error->status;
+  for (int i = 0; i < 2; i++) {
+    snprintf (what, sizeof what, "body %.60s: %s", body.name, key[1 + i]);
+    pw_yaml_number (r, v[1 + i], what, PW_NONNEGATIVE, i ? &body.inertia : &body.mass);
+  }
+  snprintf (what, sizeof what, "start of body %.60s", body.name);
+  build_triple (r, v[3], what, start, body.start, &body.specified, 0);
+  snprintf (what, sizeof what, "rate of body %.60s", body.name);
+  build_triple (r, v[4], what, rate, body.rate, &body.specified, 3);
+  if (r->error->status != PW_OK) return r->error->status;
+  if (pw_model_check_body (r->m, &body, &own) != PW_OK) return build_refuse (r, v[0], &own);
+  pw_names_add (&r->bodies, body.name, 0);
+  return pw_add_body (r->m, &body);
 }
 
 /* ---- Fields ---- */
 
-static int build_body_name (pw_yaml_builder *b, const pw_node *node, const char *what, const char **name,
-                            pw_error *error) {
+static int build_body_name (const pw_reader *r, const pw_node *node, const char *what, const char **name) {
   char hint[100];
-  if (pw_yaml_text (b->y, node, what, name, error) != PW_OK) return error->status;
-  if (strcmp (*name, "ground") == 0 || pw_names_find (&b->bodies, *name) >= 0) return PW_OK;
+  if (pw_yaml_text (r, node, what, name) != PW_OK) return r->error->status;
+  if (strcmp (*name, "ground") == 0 || pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
-  pw_yaml_try_bodies (b, &near);
+  pw_yaml_try_bodies (r, &near);
   pw_nearest_try (&near, "ground");
-  return pw_yaml_fail (b->y, node->at, error, "%s: there is no body \"%.60s\"%s", what, *name,
+  return pw_yaml_fail (r, node->at, "%s: there is no body \"%.60s\"%s", what, *name,
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 
-static int build_value (pw_yaml_builder *b, const pw_kind *kind, const pw_field *f, const pw_node *node,
-                        const char *what, void *at, pw_error *error) {
+static int build_value (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *what,
+                        void *at) {
   switch (f->type) {
   case PW_NUMBER:
-    return pw_yaml_number (b->y, node, what, f->domain, b->x, at, error);
+    return pw_yaml_number (r, node, what, f->domain, at);
   case PW_POINT:
   case PW_VECTOR:
-    return pw_yaml_pair (b, node, what, at, error);
+    return pw_yaml_pair (r, node, what, at);
   case PW_BODY:
-    return build_body_name (b, node, what, at, error);
+    return build_body_name (r, node, what, at);
   case PW_SIGNAL:
-    return pw_yaml_signal (b, kind, what, node, at, error);
+    return pw_yaml_signal (r, kind, what, node, at);
   case PW_CHOICE:
-    return pw_yaml_choice (b, node, what, f->choices, at, error);
+    return pw_yaml_choice (r, node, what, f->choices, at);
   }
-  return pw_yaml_fail (b->y, node->at, error, "%s cannot be given in a text model", what);
+  return pw_yaml_fail (r, node->at, "%s cannot be given in a text model", what);
 }
 
-static int build_field (pw_yaml_builder *b, const pw_kind *kind, const pw_field *f, const pw_node *node,
-                        const char *element, char *at, pw_error *error) {
+static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, const pw_node *node, const char *element,
+                        char *at) {
   static const char *const plural[] = { "numbers", "points, each [x, y],", "vectors, each [x, y],", "bodies", "signals",
                                         "choices" };
   char what[200];
   int count = pw_field_count (f);
   snprintf (what, sizeof what, "%s %.60s: %s", kind->name, element, f->name);
-  if (count == 1) return build_value (b, kind, f, node, what, at, error);
-  if (pw_yaml_list (b->y, node, what, count, plural[f->type], error) != PW_OK) return error->status;
+  if (count == 1) return build_value (r, kind, f, node, what, at);
+  if (pw_yaml_list (r, node, what, count, plural[f->type]) != PW_OK) return r->error->status;
   for (const pw_node *n = node->first; n; n = n->next, at += pw_field_bytes (f->type))
-    if (build_value (b, kind, f, n, what, at, error) != PW_OK) return error->status;
-  return PW_OK;
+    build_value (r, kind, f, n, what, at);
+  return r->error->status;
 }
 
 /* ---- Elements ---- */
@@ -135,93 +129,81 @@ static const char *build_later_kind (const pw_node *first) {
   return NULL;
 }
 
-static const pw_kind *build_kind (const pw_yaml_builder *b, const pw_node *node, pw_error *error) {
+static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   char hint[100];
   const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
-  if (first == NULL || first->type != PW_YAML_SCALAR) {
-    pw_yaml_fail (b->y, node->at, error, "expected an element {KIND: NAME, ...}, found %s", pw_yaml_found (node));
-    return NULL;
-  }
+  if (first == NULL || first->type != PW_YAML_SCALAR)
+    return pw_yaml_fail (r, node->at, "expected an element {KIND: NAME, ...}, found %s", pw_yaml_found (node)), NULL;
   pw_nearest near = { .sought = first->text };
   for (const pw_kind *const *k = pw_kinds; *k; k++) {
     if (strcmp ((*k)->name, first->text) == 0) return *k;
     pw_nearest_try (&near, (*k)->name);
   }
   const char *kind = build_later_kind (first);
-  if (kind) {
-    pw_yaml_fail (b->y, first->at, error, "an element begins with its kind: write {%s: NAME, ...}", kind);
-    return NULL;
-  }
+  if (kind) pw_yaml_fail (r, first->at, "an element begins with its kind: write {%s: NAME, ...}", kind);
   for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
     if (build_says ((*k)->about, first->text)) near.best = (*k)->name, near.near = 1;
-  pw_yaml_fail (b->y, first->at, error, "an element begins with its kind, and there is no kind \"%.60s\"%s",
-                first->text, near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");
+  pw_yaml_fail (r, first->at, "an element begins with its kind, and there is no kind \"%.60s\"%s", first->text,
+                near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");
   return NULL;
 }
 
-static int build_fields (pw_yaml_builder *b, const pw_kind *kind, const pw_node *node, const char *name,
-                         char *definition, pw_error *error) {
+static int build_fields (pw_reader *r, const pw_kind *kind, const pw_node *node, const char *name) {
   const char *key[PW_YAML_KEYS + 1];
   const pw_node *v[PW_YAML_KEYS + 1];
-  char what[100], text[160];
+  char what[100];
   int n = 0;
   for (const pw_field *f = kind->fields; f->name && n < PW_YAML_KEYS; f++) key[n++] = f->name;
   key[n] = NULL;
   snprintf (what, sizeof what, "a %s", kind->name);
-  if (pw_yaml_keys (b->y, node, 1, key, what, v, error) != PW_OK) return error->status;
-  for (int i = 0; i < n; i++) {
-    const pw_field *f = &kind->fields[i];
-    snprintf (text, sizeof text, "%s %.60s", kind->name, name);
-    if (v[i] == NULL && (f->required || f->type == PW_BODY))
-      return pw_yaml_fail (b->y, node->first->at, error, "%s needs \"%s\": %s", text, f->name,
-                           f->about ? f->about : "");
-    b->field = f, b->definition = definition;
-    if (v[i] && build_field (b, kind, f, v[i], name, definition + f->offset, error) != PW_OK) return error->status;
+  if (pw_yaml_keys (r, node, 1, key, what, v) != PW_OK) return r->error->status;
+  for (int i = 0; i < n && r->error->status == PW_OK; i++) {
+    const pw_field *f = r->field = &kind->fields[i];
+    if (v[i])
+      build_field (r, kind, f, v[i], name, r->definition + f->offset);
+    else if (f->required || f->type == PW_BODY)
+      pw_yaml_fail (r, node->first->at, "%s %.60s needs \"%s\": %s", kind->name, name, f->name,
+                    f->about ? f->about : "");
   }
-  return PW_OK;
+  return r->error->status;
 }
 
-static int build_element (pw_yaml_builder *b, const pw_node *node, char *definition, pw_error *error) {
+static int build_element (pw_reader *r, const pw_node *node) {
   const char *name;
   pw_error own = { 0 };
-  const pw_kind *kind = build_kind (b, node, error);
-  if (kind == NULL || build_name (b, node->first->next, kind->name, &name, error) != PW_OK) return error->status;
-  memset (definition, 0, kind->definition);
-  memcpy (definition, &name, sizeof name);
-  if (build_fields (b, kind, node, name, definition, error) != PW_OK) return error->status;
-  pw_element e = { kind, definition };
-  if (pw_model_check_element (b->m, &e, &own) != PW_OK) return build_refuse (b, node->first->next, &own, error);
-  return pw_add (b->m, kind, definition);
+  const pw_kind *kind = build_kind (r, node);
+  if (kind == NULL || build_name (r, node->first->next, kind->name, &name) != PW_OK) return r->error->status;
+  memset (r->definition, 0, kind->definition);
+  memcpy (r->definition, &name, sizeof name);
+  if (build_fields (r, kind, node, name) != PW_OK) return r->error->status;
+  pw_element e = { kind, r->definition };
+  if (pw_model_check_element (r->m, &e, &own) != PW_OK) return build_refuse (r, node->first->next, &own);
+  return pw_add (r->m, kind, r->definition);
 }
 
 /* ---- The model ---- */
 
-static int build_all (pw_yaml_builder *b, char *definition, pw_error *error) {
-  const pw_yaml *y = b->y;
-  for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
-    if (build_body (b, n, error) != PW_OK) return error->status;
-  for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
-    if (build_element (b, n, definition, error) != PW_OK) return error->status;
-  return pw_yaml_reference (b, error);
-}
-
 /* Reads `let`: numbers defined from parameters and preceding definitions. */
-static int build_let (pw_yaml_builder *b, pw_error *error) {
+static int build_let (pw_reader *r) {
+  const pw_yaml *y = r->y;
   char what[100];
-  for (const pw_node *n = b->y->let ? b->y->let->first : NULL; n; n = n->next->next) {
+  for (int i = 0; i < y->parameters; i++) pw_scope_add (r->x, y->parameter[i].name, r->parameter[i]);
+  for (const pw_node *n = y->let ? y->let->first : NULL; n; n = n->next->next) {
     snprintf (what, sizeof what, "let %s", n->text);
-    if (pw_yaml_number (b->y, n->next, what, PW_REAL, b->x, &b->let[b->lets], error) != PW_OK) return error->status;
-    pw_scope_add (b->x, n->text, b->let[b->lets++]);
+    if (pw_yaml_number (r, n->next, what, PW_REAL, &r->let[r->lets]) != PW_OK) return r->error->status;
+    pw_scope_add (r->x, n->text, r->let[r->lets++]);
   }
   return PW_OK;
 }
 
-static int build_names (pw_yaml_builder *b, const double *value, pw_error *error) {
-  const pw_yaml *y = b->y;
-  b->x = pw_scope_open (y->parameters + (y->let ? y->let->count : 0));
-  if (b->x == NULL) return pw_yaml_no_memory (y, error);
-  for (int i = 0; i < y->parameters; i++) pw_scope_add (b->x, y->parameter[i].name, value[i]);
-  return build_let (b, error);
+static int build_all (pw_reader *r) {
+  const pw_yaml *y = r->y;
+  if (build_let (r) != PW_OK) return r->error->status;
+  for (const pw_node *n = y->bodies ? y->bodies->first : NULL; n; n = n->next)
+    if (build_body (r, n) != PW_OK) return r->error->status;
+  for (const pw_node *n = y->elements ? y->elements->first : NULL; n; n = n->next)
+    if (build_element (r, n) != PW_OK) return r->error->status;
+  return pw_yaml_reference (r);
 }
 
 static void build_free (void *arena) {
@@ -229,46 +211,38 @@ static void build_free (void *arena) {
   free (arena);
 }
 
-/* Data that live as long as the model: expressions, points of tables, the reference solution. */
-static int build_keep (pw_yaml_builder *b, pw_error *error) {
-  b->arena = calloc (1, sizeof *b->arena);
-  if (b->arena == NULL || pw_model_keep (b->m, b->arena, build_free) != PW_OK) return pw_yaml_no_memory (b->y, error);
-  b->reference = pw_arena_take (b->arena, sizeof *b->reference);
-  pw_model_set_reference (b->m, b->reference);
-  return b->reference ? PW_OK : pw_yaml_no_memory (b->y, error);
-}
-
-static int build_open (pw_yaml_builder *b, char **definition, pw_error *error) {
-  const pw_yaml *y = b->y;
-  if ((y->bodies && pw_yaml_list (y, y->bodies, "bodies", -1, "", error) != PW_OK) ||
-      (y->elements && pw_yaml_list (y, y->elements, "elements", -1, "", error) != PW_OK))
-    return error->status;
-  size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0;
+/* Allocates what serves building, and what lives as long as the model: expressions, points of tables, the reference
+ * solution. */
+static int build_open (pw_reader *r) {
+  const pw_yaml *y = r->y;
+  size_t largest = 1, bodies = y->bodies ? (size_t)y->bodies->count : 0, lets = y->let ? (size_t)y->let->count : 0;
   size_t all = bodies + (y->elements ? (size_t)y->elements->count : 0);
   for (const pw_kind *const *k = pw_kinds; *k; k++)
     if ((*k)->definition > largest) largest = (*k)->definition;
-  *definition = malloc (largest);
-  b->node = malloc ((all + 1) * sizeof *b->node);
-  b->let = malloc (((y->let ? (size_t)y->let->count : 0) + 1) * sizeof *b->let);
-  if (*definition == NULL || b->node == NULL || b->let == NULL || pw_names_open (&b->bodies, bodies) != PW_OK ||
-      pw_names_open (&b->all, all) != PW_OK)
-    return pw_yaml_no_memory (y, error);
-  return PW_OK;
+  r->arena = calloc (1, sizeof *r->arena);
+  if (r->arena == NULL || pw_model_keep (r->m, r->arena, build_free) != PW_OK) return pw_yaml_no_memory (r);
+  r->reference = pw_arena_take (r->arena, sizeof *r->reference);
+  pw_model_set_reference (r->m, r->reference);
+  r->definition = malloc (largest);
+  r->node = malloc ((all + 1) * sizeof *r->node);
+  r->let = malloc ((lets + 1) * sizeof *r->let);
+  r->x = pw_scope_open (y->parameters + (int)lets);
+  if (r->reference && r->definition && r->node && r->let && r->x && pw_names_open (&r->bodies, bodies) == PW_OK &&
+      pw_names_open (&r->all, all) == PW_OK)
+    return PW_OK;
+  return pw_yaml_no_memory (r);
 }
 
 void pw_yaml_build (pw_model *m, const void *parameters) {
   const void *table = pw_model_table (m);
-  pw_yaml_builder b = { .y = table, .m = m, .parameter = parameters };
-  pw_error *error = pw_model_error (m);
-  char *definition = NULL;
-  if (build_keep (&b, error) == PW_OK && build_open (&b, &definition, error) == PW_OK &&
-      build_names (&b, parameters, error) == PW_OK)
-    build_all (&b, definition, error);
-  pw_scope_close (b.x);
-  pw_names_close (&b.bodies);
-  pw_names_close (&b.all);
-  pw_names_close (&b.elements);
-  free (b.node);
-  free (b.let);
-  free (definition);
+  pw_reader r = { .y = table, .m = m, .parameter = parameters, .error = pw_model_error (m) };
+  pw_yaml_list (&r, r.y->bodies, "bodies", -1, "");
+  if (pw_yaml_list (&r, r.y->elements, "elements", -1, "") == PW_OK && build_open (&r) == PW_OK) build_all (&r);
+  pw_scope_close (r.x);
+  pw_names_close (&r.bodies);
+  pw_names_close (&r.all);
+  pw_names_close (&r.elements);
+  free (r.node);
+  free (r.let);
+  free (r.definition);
 }

@@ -9,108 +9,7 @@
 
 enum { SIGNAL_STATES = 16, BREAKPOINTS_TRIED = 100 }; /* most states per signal */
 
-/* The expression currently read. */
-typedef struct {
-  pw_yaml_builder *b;
-  const pw_node *node;
-  const char *what; /* "torque T: value", for messages */
-  pw_error *error;
-} reading;
-
-/* Reports an error at an offset of the expression. */
-#ifdef __GNUC__
-__attribute__ ((format (printf, 3, 4)))
-#endif
-static int
-reading_fail (const reading *r, size_t at, const char *format, ...) {
-  char text[300];
-  va_list arguments;
-  va_start (arguments, format);
-  vsnprintf (text, sizeof text, format, arguments);
-  va_end (arguments);
-  return pw_yaml_fail (r->b->y, pw_yaml_place (r->b->y, r->node, at), r->error, "%s: %s", r->what, text);
-}
-
-static int reading_no_memory (const reading *r) {
-  return pw_yaml_no_memory (r->b->y, r->error);
-}
-
-/* Reads an expression of variables, which end with NULL. */
-static int reading_expression (const reading *r, const char *const *variable, const char **text,
-                               const pw_expression **x) {
-  pw_expression_trouble trouble;
-  if (pw_yaml_text (r->b->y, r->node, r->what, text, r->error) != PW_OK) return r->error->status;
-  int status = pw_expression_read (r->b->x, variable, *text, r->b->arena, x, &trouble);
-  return status == PW_OK      ? PW_OK
-         : status == PW_INPUT ? reading_fail (r, trouble.at, "%s", trouble.text)
-                              : reading_no_memory (r);
-}
-
-/* ---- States: BODY.phi, ELEMENT.spin ---- */
-
-/* The index of an element type in pw_kinds, or -1. */
-static int state_kind (const char *name) {
-  for (int i = 0; pw_kinds[i]; i++)
-    if (strcmp (pw_kinds[i]->name, name) == 0) return i;
-  return -1;
-}
-
-/* Indexes all elements, including those not built yet, whose errors are reported later. */
-static int state_elements (pw_yaml_builder *b, pw_error *error) {
-  const pw_node *list = b->y->elements;
-  if (b->elements.slot) return PW_OK;
-  if (pw_names_open (&b->elements, list ? (size_t)list->count : 0) != PW_OK) return pw_yaml_no_memory (b->y, error);
-  for (const pw_node *n = list ? list->first : NULL; n; n = n->next) {
-    const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
-    int kind = key && key->type == PW_YAML_SCALAR && key->next->type == PW_YAML_SCALAR ? state_kind (key->text) : -1;
-    if (kind >= 0) pw_names_add (&b->elements, key->next->text, kind);
-  }
-  return PW_OK;
-}
-
-static int state_no_owner (const reading *r, const char *owner, size_t at) {
-  char hint[200];
-  pw_nearest near = { .sought = owner };
-  pw_yaml_try_bodies (r->b, &near);
-  for (size_t i = 0; i < r->b->elements.size; i++) {
-    const struct pw_name *e = &r->b->elements.slot[i];
-    if (e->name && pw_kinds[e->value]->own > 0) pw_nearest_try (&near, e->name);
-  }
-  return reading_fail (r, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near, hint, sizeof hint));
-}
-
-static int state_of_element (const reading *r, const char *owner, const char *part, size_t at) {
-  char list[200] = "";
-  if (state_elements (r->b, r->error) != PW_OK) return r->error->status;
-  int found = pw_names_find (&r->b->elements, owner);
-  if (found < 0) return state_no_owner (r, owner, at);
-  const pw_kind *kind = pw_kinds[found];
-  if (kind->own == 0) return reading_fail (r, at, "%s %s has no states of its own", kind->name, owner);
-  for (int i = 0; i < kind->own; i++) {
-    const pw_quantity *own = &kind->coordinate[i];
-    if (strcmp (part, own->name) == 0 || strcmp (part, own->rate) == 0) return PW_OK;
-    size_t n = strlen (list);
-    snprintf (list + n, sizeof list - n, "%s%s, %s", i ? ", " : "", own->name, own->rate);
-  }
-  return reading_fail (r, at + strlen (owner) + 1, "the states of %s %s are %s, not \"%.30s\"", kind->name, owner, list,
-                       part);
-}
-
-/* Checks that a name with a dot, at an offset of the expression, names a state. */
-static int state_check (const reading *r, const char *name, size_t at) {
-  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega", NULL };
-  char owner[100];
-  size_t n = strcspn (name, ".");
-  int i = 0;
-  snprintf (owner, sizeof owner, "%.*s", (int)n, name);
-  if (pw_names_find (&r->b->bodies, owner) < 0) return state_of_element (r, owner, name + n + 1, at);
-  while (part[i] && strcmp (part[i], name + n + 1) != 0) i++;
-  if (part[i]) return PW_OK;
-  return reading_fail (r, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"", name + n + 1);
-}
-
-/* ---- Signals ---- */
-
+/* A signal by expressions. */
 typedef struct {
   const pw_expression *x[3];           /* value, rate, acceleration; NULL: not given, differentiated instead */
   int derivatives;                     /* required time derivatives: 0, 1, 2 */
@@ -118,6 +17,99 @@ typedef struct {
   const char *name[SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; used for reading only */
   pw_signal_text text;
 } time_function;
+
+/* The expression currently read. */
+typedef struct {
+  pw_reader *r;
+  const pw_node *node;
+  const char *what; /* "torque T: value", for messages */
+  /* of a signal */
+  time_function *f;
+  int forced;
+  pw_function *signal;
+} reading;
+
+/* Reports an error at an offset of the expression. */
+#ifdef __GNUC__
+__attribute__ ((format (printf, 3, 4)))
+#endif
+static int
+reading_fail (const reading *x, size_t at, const char *format, ...) {
+  char text[300];
+  va_list arguments;
+  va_start (arguments, format);
+  vsnprintf (text, sizeof text, format, arguments);
+  va_end (arguments);
+  return pw_yaml_fail (x->r, pw_yaml_place (x->r->y, x->node, at), "%s: %s", x->what, text);
+}
+
+/* Reads an expression of variables, which end with NULL. */
+static int reading_expression (const reading *x, const char *const *variable, const char **text,
+                               const pw_expression **expression) {
+  pw_expression_trouble trouble;
+  if (pw_yaml_text (x->r, x->node, x->what, text) != PW_OK) return x->r->error->status;
+  int status = pw_expression_read (x->r->x, variable, *text, x->r->arena, expression, &trouble);
+  if (status == PW_INPUT) return reading_fail (x, trouble.at, "%s", trouble.text);
+  return status == PW_OK ? PW_OK : pw_yaml_no_memory (x->r);
+}
+
+/* ---- States: BODY.phi, ELEMENT.spin ---- */
+
+/* Indexes all elements, including those not built yet, whose errors are reported later. */
+static int state_elements (pw_reader *r) {
+  const pw_node *list = r->y->elements;
+  if (r->elements.slot) return PW_OK;
+  if (pw_names_open (&r->elements, list ? (size_t)list->count : 0) != PW_OK) return pw_yaml_no_memory (r);
+  for (const pw_node *n = list ? list->first : NULL; n; n = n->next) {
+    const pw_node *key = n->type == PW_YAML_MAP ? n->first : NULL;
+    if (key == NULL || key->type != PW_YAML_SCALAR || key->next->type != PW_YAML_SCALAR) continue;
+    for (int i = 0; pw_kinds[i]; i++)
+      if (strcmp (pw_kinds[i]->name, key->text) == 0) pw_names_add (&r->elements, key->next->text, i);
+  }
+  return PW_OK;
+}
+
+static int state_no_owner (const reading *x, const char *owner, size_t at) {
+  char hint[200];
+  pw_nearest near = { .sought = owner };
+  pw_yaml_try_bodies (x->r, &near);
+  for (size_t i = 0; i < x->r->elements.size; i++) {
+    const struct pw_name *e = &x->r->elements.slot[i];
+    if (e->name && pw_kinds[e->value]->own > 0) pw_nearest_try (&near, e->name);
+  }
+  return reading_fail (x, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near, hint, sizeof hint));
+}
+
+static int state_of_element (const reading *x, const char *owner, const char *part, size_t at) {
+  char list[200] = "";
+  if (state_elements (x->r) != PW_OK) return x->r->error->status;
+  int found = pw_names_find (&x->r->elements, owner);
+  if (found < 0) return state_no_owner (x, owner, at);
+  const pw_kind *kind = pw_kinds[found];
+  if (kind->own == 0) return reading_fail (x, at, "%s %s has no states of its own", kind->name, owner);
+  for (int i = 0; i < kind->own; i++) {
+    const pw_quantity *own = &kind->coordinate[i];
+    if (strcmp (part, own->name) == 0 || strcmp (part, own->rate) == 0) return PW_OK;
+    size_t n = strlen (list);
+    snprintf (list + n, sizeof list - n, "%s%s, %s", i ? ", " : "", own->name, own->rate);
+  }
+  return reading_fail (x, at + strlen (owner) + 1, "the states of %s %s are %s, not \"%.30s\"", kind->name, owner, list,
+                       part);
+}
+
+/* Checks that a name with a dot, at an offset of the expression, names a state. */
+static int state_check (const reading *x, const char *name, size_t at) {
+  static const char *const part[] = { "x", "y", "phi", "vx", "vy", "omega" };
+  char owner[100];
+  size_t n = strcspn (name, ".");
+  snprintf (owner, sizeof owner, "%.*s", (int)n, name);
+  if (pw_names_find (&x->r->bodies, owner) < 0) return state_of_element (x, owner, name + n + 1, at);
+  for (int i = 0; i < 6; i++)
+    if (strcmp (part[i], name + n + 1) == 0) return PW_OK;
+  return reading_fail (x, at + n + 1, "a body's states are x, y, phi, vx, vy and omega, not \"%.30s\"", name + n + 1);
+}
+
+/* ---- Evaluation of signals ---- */
 
 /* Differentiates the highest derivative given to obtain those not given. */
 static void time_derivatives (const time_function *f, const double *variable, double u[3]) {
@@ -163,100 +155,81 @@ static void *time_open (void *context) {
   if (copy == NULL) return NULL;
   *copy = *f;
   char *at = (char *)(copy + 1);
-  for (int i = 0; i < 3; i++) {
-    if (f->x[i] == NULL) continue;
-    copy->x[i] = memcpy (at, f->x[i], pw_expression_size (f->x[i]));
-    at += pw_expression_size (f->x[i]);
-  }
+  for (int i = 0; i < 3; i++)
+    if (f->x[i]) copy->x[i] = memcpy (at, f->x[i], pw_expression_size (f->x[i])), at += pw_expression_size (f->x[i]);
   return copy;
-}
-
-/* Stores the names that expressions may use, and their values, for `show`. */
-static int time_keep_names (pw_yaml_builder *b, pw_error *error) {
-  pw_reference_text *t = b->reference;
-  size_t names = (size_t)b->y->parameters + (size_t)b->lets;
-  if (t->name) return PW_OK;
-  t->name = pw_arena_take (b->arena, (names + 1) * sizeof *t->name);
-  t->value = pw_arena_take (b->arena, (names + 1) * sizeof *t->value);
-  if (t->name == NULL || t->value == NULL) return pw_yaml_no_memory (b->y, error);
-  for (int i = 0; i < b->y->parameters; i++, t->names++) {
-    t->name[t->names] = b->y->parameter[i].name;
-    t->value[t->names] = b->parameter[i];
-  }
-  const pw_node *n = b->y->let ? b->y->let->first : NULL;
-  for (int i = 0; i < b->lets; i++, n = n->next->next, t->names++) {
-    t->name[t->names] = n->text;
-    t->value[t->names] = b->let[i];
-  }
-  return PW_OK;
 }
 
 /* ---- Reading of signals ---- */
 
-typedef struct {
-  reading r; /* first */
-  time_function *f;
-  int forced;
-  pw_function *signal;
-} time_reader;
+/* Stores the names that expressions may use, and their values, for `show`. */
+static int time_keep_names (pw_reader *r) {
+  pw_reference_text *t = r->reference;
+  size_t names = (size_t)r->y->parameters + (size_t)r->lets;
+  if (t->name) return PW_OK;
+  t->name = pw_arena_take (r->arena, (names + 1) * sizeof *t->name);
+  t->value = pw_arena_take (r->arena, (names + 1) * sizeof *t->value);
+  if (t->name == NULL || t->value == NULL) return pw_yaml_no_memory (r);
+  const pw_node *n = r->y->let ? r->y->let->first : NULL;
+  for (int i = 0; i < (int)names; i++, t->names++) {
+    int own = i < r->y->parameters;
+    t->name[i] = own ? r->y->parameter[i].name : n->text;
+    t->value[i] = own ? r->parameter[i] : r->let[i - r->y->parameters];
+    if (!own) n = n->next->next;
+  }
+  return PW_OK;
+}
 
 /* Adds a state that the expression depends on. */
 static int time_add_state (void *context, const char *name, size_t length, size_t at) {
-  const time_reader *t = context;
-  time_function *f = t->f;
+  const reading *x = context;
+  time_function *f = x->f;
   char text[100];
   if (memchr (name, '.', length) == NULL) return PW_OK;
   snprintf (text, sizeof text, "%.*s", (int)length, name);
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], text) == 0) return PW_OK;
-  if (!t->forced)
-    return reading_fail (&t->r, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
-  if (state_check (&t->r, text, at) != PW_OK) return t->r.error->status;
+  if (!x->forced) return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
+  if (state_check (x, text, at) != PW_OK) return x->r->error->status;
   if (f->states == SIGNAL_STATES || length >= sizeof text)
-    return reading_fail (&t->r, at, "more than %d states", SIGNAL_STATES);
-  f->name[f->states + 1] = pw_arena_text (t->r.b->arena, text);
-  return f->name[++f->states] ? PW_OK : reading_no_memory (&t->r);
+    return reading_fail (x, at, "more than %d states", SIGNAL_STATES);
+  f->name[f->states + 1] = pw_arena_text (x->r->arena, text);
+  return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (x->r);
 }
 
-/* Copies the part of the text that may jump as states change. */
-static int time_jump (const time_reader *t, const pw_expression *x) {
-  if (x->jump == NULL || t->f->text.jump) return PW_OK;
-  char *text = pw_arena_take (t->r.b->arena, (size_t)x->jump_size + 1);
-  if (text == NULL) return reading_no_memory (&t->r);
-  t->f->text.jump = memcpy (text, x->jump, (size_t)x->jump_size);
-  return PW_OK;
-}
-
-static int time_expression (time_reader *t, int i) {
-  const reading *r = &t->r;
-  const pw_expression **x = &t->f->x[i];
-  if (r->node->type == PW_YAML_SCALAR && pw_expression_names (r->node->text, time_add_state, t) != PW_OK)
+static int time_expression (reading *x, int i) {
+  pw_reader *r = x->r;
+  time_function *f = x->f;
+  if (x->node->type == PW_YAML_SCALAR && pw_expression_names (x->node->text, time_add_state, x) != PW_OK)
     return r->error->status;
-  if (reading_expression (r, t->f->name, &t->f->text.part[i], x) != PW_OK) return r->error->status;
-  if ((*x)->breaks) t->signal->breakpoint = time_breakpoint;
-  if ((r->b->codes += (*x)->codes) > PW_YAML_CODES)
-    return pw_yaml_fail (r->b->y, r->node->at, r->error,
+  if (reading_expression (x, f->name, &f->text.part[i], &f->x[i]) != PW_OK) return r->error->status;
+  const pw_expression *made = f->x[i];
+  if (made->breaks) x->signal->breakpoint = time_breakpoint;
+  if ((r->codes += made->codes) > PW_YAML_CODES)
+    return pw_yaml_fail (r, x->node->at,
                          "%s: the signals by expressions up to here have more than %d operations, which need more "
                          "memory than a model may have",
-                         r->what, PW_YAML_CODES);
-  return time_jump (t, *x);
+                         x->what, PW_YAML_CODES);
+  if (made->jump == NULL || f->text.jump) return PW_OK;
+  char *jump = pw_arena_take (r->arena, (size_t)made->jump_size + 1);
+  f->text.jump = jump ? memcpy (jump, made->jump, (size_t)made->jump_size) : NULL;
+  return jump ? PW_OK : pw_yaml_no_memory (r);
 }
 
 /* Compares a given derivative with the exact one at some times. */
-static int time_check (const time_reader *r, int i, const char *name) {
+static int time_check (const reading *x, int i, const char *name) {
   static const double time[] = { 0.3, 1.7, 4.1 };
   double given[3], exact[3][3], size = 0;
   for (int k = 0; k < 3; k++) {
-    given[k] = pw_expression_value (r->f->x[i], &time[k]);
-    pw_expression_derivatives (r->f->x[i - 1], &time[k], 0, exact[k]);
+    given[k] = pw_expression_value (x->f->x[i], &time[k]);
+    pw_expression_derivatives (x->f->x[i - 1], &time[k], 0, exact[k]);
     if (isfinite (given[k]) && isfinite (exact[k][1]))
       size = fmax (size, fabs (given[k]) + fabs (exact[k][1]) + 1e-6 * fabs (exact[k][0]));
   }
   for (int k = 0; k < 3; k++)
     if (isfinite (given[k]) && isfinite (exact[k][1]) && fabs (given[k] - exact[k][1]) > 1e-6 * size)
-      return pw_yaml_fail (r->r.b->y, r->r.node->at, r->r.error,
-                           "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", r->r.what, name, time[k],
-                           given[k], exact[k][1]);
+      return pw_yaml_fail (x->r, x->node->at, "%s: the %s at t = %g s is %.6g, but the derivative is %.6g", x->what,
+                           name, time[k], given[k], exact[k][1]);
   return PW_OK;
 }
 
@@ -272,96 +245,93 @@ static double time_size (const time_function *f, double t, int i) {
 }
 
 /* Refuses signals that a constraint cannot follow: a jump of the value or, for positions, of its derivative. */
-static int time_continuous (const time_reader *r, int levels) {
+static int time_continuous (const reading *x, int levels) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
-  for (int k = 0; k < BREAKPOINTS_TRIED && r->signal->breakpoint; k++) {
-    t = time_breakpoint (r->f, t);
+  for (int k = 0; k < BREAKPOINTS_TRIED && x->signal->breakpoint; k++) {
+    t = time_breakpoint (x->f, t);
     if (t == INFINITY) return PW_OK;
-    time_derivatives (r->f, &(double){ nextafter (t, -INFINITY) }, before);
-    time_derivatives (r->f, &t, after);
+    time_derivatives (x->f, &(double){ nextafter (t, -INFINITY) }, before);
+    time_derivatives (x->f, &t, after);
     double between = t - nextafter (t, -INFINITY);
     for (int i = 0; i < levels; i++)
       if (fabs (after[i] - before[i]) >
-          1e-9 * time_size (r->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
-        return pw_yaml_fail (r->r.b->y, r->r.node->at, r->r.error,
-                             "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not", r->r.what,
-                             name[i], before[i], after[i], t,
+          1e-9 * time_size (x->f, t, i) + 2 * between * (fabs (after[i + 1]) + fabs (before[i + 1])))
+        return pw_yaml_fail (x->r, x->node->at, "%s: %s jumps from %.6g to %.6g at t = %.9g s, and that of %s must not",
+                             x->what, name[i], before[i], after[i], t,
                              levels > 1 ? "a prescribed position" : "a velocity constraint");
   }
   return PW_OK;
 }
 
 /* Reads the value and the given derivatives. */
-static int time_all (time_reader *r, const pw_node *const v[3]) {
+static int time_all (reading *x, const pw_node *const v[3]) {
   static const char *const key[] = { "expression", "rate", "acceleration" };
   for (int i = 0; i < 3; i++) {
-    if (v[i] == NULL) continue;
-    r->r.node = v[i];
-    if (time_expression (r, i) != PW_OK) return r->r.error->status;
-    if (i > 0 && r->f->x[i - 1] && !r->f->states && time_check (r, i, key[i]) != PW_OK) return r->r.error->status;
+    if ((x->node = v[i]) == NULL) continue;
+    if (time_expression (x, i) != PW_OK) return x->r->error->status;
+    if (i > 0 && x->f->x[i - 1] && !x->f->states && time_check (x, i, key[i]) != PW_OK) return x->r->error->status;
   }
-  r->r.node = v[0];
-  return r->forced ? PW_OK : time_continuous (r, r->f->derivatives);
+  x->node = v[0];
+  return x->forced ? PW_OK : time_continuous (x, x->f->derivatives);
 }
 
-int pw_yaml_of_time (pw_yaml_builder *b, const pw_kind *kind, const char *what, const pw_node *const v[3],
-                     pw_signal *signal, pw_error *error) {
-  time_function *f = pw_arena_take (b->arena, sizeof *f);
-  if (f == NULL) return pw_yaml_no_memory (b->y, error);
-  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = time_eval, .context = f } };
+int pw_yaml_of_time (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
+                     pw_signal *signal) {
+  time_function *f = pw_arena_take (r->arena, sizeof *f);
+  if (f == NULL) return pw_yaml_no_memory (r);
   f->name[0] = "t";
   f->derivatives = pw_kind_forced (kind) ? 0 : kind->level == PW_HOLONOMIC ? 2 : 1;
+  *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = time_eval, .context = f } };
   signal->function.open = time_open;
   signal->function.close = free;
   signal->function.text = &f->text;
-  time_reader reader = { { b, NULL, what, error }, f, pw_kind_forced (kind), &signal->function };
-  if (time_keep_names (b, error) != PW_OK || time_all (&reader, v) != PW_OK) return error->status;
+  reading x = { r, NULL, what, f, pw_kind_forced (kind), &signal->function };
+  if (time_keep_names (r) != PW_OK || time_all (&x, v) != PW_OK) return r->error->status;
   if (f->states) signal->function.reads = f->name + 1;
   return PW_OK;
 }
 
-/* ---- Reference solution: `reference`, a map of states to expressions of time ---- */
+/* ---- Reference solution: `truth`, a map of states to expressions of time ---- */
 
-static double truth_eval (void *context, int i, double t) {
+static double reference_eval (void *context, int i, double t) {
   const pw_expression *const *x = context;
   return pw_expression_value (x[i], &t);
 }
 
-static int truth_entries (pw_yaml_builder *b, pw_reference_text *t, pw_names *seen, pw_error *error) {
+static int reference_entry (pw_reader *r, const pw_node *n, pw_names *seen) {
   static const char *const time[] = { "t", NULL };
+  pw_reference_text *t = r->reference;
   const pw_expression **x = t->context;
   char what[100];
-  for (const pw_node *n = b->y->reference->first; n; n = n->next->next) {
-    if (strchr (n->text, '.') == NULL)
-      return pw_yaml_fail (b->y, n->at, error, "truth: expected a state such as BODY.phi, found \"%.60s\"", n->text);
-    const reading state = { b, n, "truth", error }, value = { b, n->next, what, error };
-    if (state_check (&state, n->text, 0) != PW_OK) return error->status;
-    if (pw_names_add (seen, n->text, 0) >= 0)
-      return pw_yaml_fail (b->y, n->at, error, "truth: a second \"%s\"", n->text);
-    snprintf (what, sizeof what, "truth of %.60s", n->text);
-    if (reading_expression (&value, time, &t->text[t->states], &x[t->states]) != PW_OK) return error->status;
-    t->state[t->states++] = n->text;
-  }
-  return PW_OK;
+  const char *name;
+  if (pw_yaml_text (r, n, "truth", &name) != PW_OK) return r->error->status;
+  if (strchr (name, '.') == NULL)
+    return pw_yaml_fail (r, n->at, "truth: expected a state such as BODY.phi, found \"%.60s\"", name);
+  if (state_check (&(reading){ r, n, "truth", NULL, 0, NULL }, n->text, 0) != PW_OK) return r->error->status;
+  if (pw_names_add (seen, n->text, 0) >= 0) return pw_yaml_fail (r, n->at, "truth: a second \"%s\"", n->text);
+  snprintf (what, sizeof what, "truth of %.60s", n->text);
+  const reading value = { r, n->next, what, NULL, 0, NULL };
+  t->state[t->states] = n->text;
+  int status = reading_expression (&value, time, &t->text[t->states], &x[t->states]);
+  t->states += status == PW_OK;
+  return status;
 }
 
-int pw_yaml_reference (pw_yaml_builder *b, pw_error *error) {
-  const pw_node *map = b->y->reference;
-  pw_reference_text *t = b->reference;
+int pw_yaml_reference (pw_reader *r) {
+  const pw_node *map = r->y->reference;
+  pw_reference_text *t = r->reference;
   pw_names seen = { .size = 0 };
-  if (map == NULL) return PW_OK;
+  if (map == NULL || time_keep_names (r) != PW_OK) return r->error->status;
   if (map->type != PW_YAML_MAP)
-    return pw_yaml_fail (b->y, map->at, error, "truth: expected a map {STATE: EXPRESSION, ...}, found %s",
-                         pw_yaml_found (map));
-  if (time_keep_names (b, error) != PW_OK) return error->status;
-  t->state = pw_arena_take (b->arena, ((size_t)map->count + 1) * sizeof *t->state);
-  t->text = pw_arena_take (b->arena, ((size_t)map->count + 1) * sizeof *t->text);
-  t->context = pw_arena_take (b->arena, ((size_t)map->count + 1) * sizeof (pw_expression *));
-  if (t->state == NULL || t->text == NULL || t->context == NULL) return pw_yaml_no_memory (b->y, error);
-  t->eval = truth_eval;
-  int status = pw_names_open (&seen, (size_t)map->count) == PW_OK ? PW_OK : pw_yaml_no_memory (b->y, error);
-  if (status == PW_OK) status = truth_entries (b, t, &seen, error);
+    return pw_yaml_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_yaml_found (map));
+  t->state = pw_arena_take (r->arena, ((size_t)map->count + 1) * sizeof *t->state);
+  t->text = pw_arena_take (r->arena, ((size_t)map->count + 1) * sizeof *t->text);
+  t->context = pw_arena_take (r->arena, ((size_t)map->count + 1) * sizeof (pw_expression *));
+  t->eval = reference_eval;
+  if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_open (&seen, (size_t)map->count) != PW_OK)
+    return pw_yaml_no_memory (r);
+  for (const pw_node *n = map->first; n && r->error->status == PW_OK; n = n->next->next) reference_entry (r, n, &seen);
   pw_names_close (&seen);
-  return status;
+  return r->error->status;
 }

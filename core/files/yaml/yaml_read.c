@@ -6,10 +6,6 @@ const char *pw_yaml_found (const pw_node *node) {
   return node->type == PW_YAML_LIST ? "a list" : node->type == PW_YAML_MAP ? "a map" : "text";
 }
 
-static int read_empty (const pw_node *n) {
-  return n->type == PW_YAML_SCALAR && !n->quoted && *n->text == 0;
-}
-
 /* ---- Maps ---- */
 
 /* A hint for a key that is not a plain name, or "". */
@@ -24,69 +20,58 @@ static const char *read_slip (const char *text, const char *const *key) {
   return "";
 }
 
-static int read_key (const pw_yaml *y, const pw_node *node, const char *const *key, const char *what,
-                     const pw_node **value, pw_error *error) {
+static int read_key (const pw_reader *r, const pw_node *node, const char *const *key, const char *what,
+                     const pw_node **value) {
   char hint[100];
   if (node->type != PW_YAML_SCALAR)
-    return pw_yaml_fail (y, node->at, error, "expected a key of %s, found %s", what, pw_yaml_found (node));
+    return pw_yaml_fail (r, node->at, "expected a key of %s, found %s", what, pw_yaml_found (node));
   pw_nearest near = { .sought = node->text };
   for (int i = 0; key[i]; i++) {
     pw_nearest_try (&near, key[i]);
     if (strcmp (key[i], node->text) != 0) continue;
-    if (value[i]) return pw_yaml_fail (y, node->at, error, "\"%s\" is there twice", key[i]);
-    if (read_empty (node->next)) return pw_yaml_fail (y, node->at, error, "\"%s\" has no value", key[i]);
+    if (value[i]) return pw_yaml_fail (r, node->at, "\"%s\" is there twice", key[i]);
     value[i] = node->next;
-    return PW_OK;
+    int empty = node->next->type == PW_YAML_SCALAR && !node->next->quoted && *node->next->text == 0;
+    return empty ? pw_yaml_fail (r, node->at, "\"%s\" has no value", key[i]) : PW_OK;
   }
   const char *slip = read_slip (node->text, key);
-  return pw_yaml_fail (y, node->at, error, "%s has no \"%.60s\"%s", what, node->text,
+  return pw_yaml_fail (r, node->at, "%s has no \"%.60s\"%s", what, node->text,
                        *slip ? slip : pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* "{x: .., y: ..}" */
-static void read_form (const char *const *key, char *text, size_t size) {
-  size_t used = 0;
-  for (int i = 0; key[i] && used < size; i++)
-    used += (size_t)snprintf (text + used, size - used, "%s%s: ..", i ? ", " : "{", key[i]);
-  if (used < size) snprintf (text + used, size - used, "}");
-}
-
-int pw_yaml_keys (const pw_yaml *y, const pw_node *map, int skip, const char *const *key, const char *what,
-                  const pw_node **value, pw_error *error) {
-  if (map->type != PW_YAML_MAP) {
-    char form[100];
-    read_form (key, form, sizeof form);
-    return pw_yaml_fail (y, map->at, error, "expected a map %s for %s, found %s", form, what, pw_yaml_found (map));
-  }
+int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *what,
+                  const pw_node **value) {
   for (int i = 0; key[i]; i++) value[i] = NULL;
-  const pw_node *n = map->first;
-  while (n && skip-- > 0) n = n->next->next;
-  for (; n; n = n->next->next)
-    if (read_key (y, n, key, what, value, error) != PW_OK) return error->status;
-  return PW_OK;
+  if (map && map->type != PW_YAML_MAP) {
+    char form[100] = "{";
+    for (size_t i = 0, n = 1; key[i]; i++, n = strlen (form))
+      snprintf (form + n, sizeof form - n, "%s: ..%s", key[i], key[i + 1] ? ", " : "}");
+    return pw_yaml_fail (r, map->at, "expected a map %s for %s, found %s", form, what, pw_yaml_found (map));
+  }
+  for (const pw_node *n = map ? map->first : NULL; n && r->error->status == PW_OK; n = n->next->next)
+    if (skip-- <= 0) read_key (r, n, key, what, value);
+  return r->error->status;
 }
 
-int pw_yaml_list (const pw_yaml *y, const pw_node *node, const char *what, int count, const char *items,
-                  pw_error *error) {
-  if (node->type != PW_YAML_LIST && count >= 0)
-    return pw_yaml_fail (y, node->at, error, "%s: expected a list of %d %s, found %s", what, count, items,
-                         pw_yaml_found (node));
-  if (node->type != PW_YAML_LIST)
-    return pw_yaml_fail (y, node->at, error, "%s: expected a list, found %s", what, pw_yaml_found (node));
-  if (count >= 0 && node->count != count)
-    return pw_yaml_fail (y, node->at, error, "%s: expected a list of %d %s, found one of %d", what, count, items,
-                         node->count);
-  return PW_OK;
+int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *what, int count, const char *items) {
+  char number[100] = "", found[40] = "one";
+  if (count >= 0) snprintf (number, sizeof number, " of %d %s", count, items);
+  if (node && node->type == PW_YAML_LIST) snprintf (found, sizeof found, "one of %d", node->count);
+  if (node && (node->type != PW_YAML_LIST || (count >= 0 && node->count != count)))
+    pw_yaml_fail (r, node->at, "%s: expected a list%s, found %s", what, number,
+                  node->type == PW_YAML_LIST ? found : pw_yaml_found (node));
+  return r->error->status;
 }
 
 /* ---- Scalars ---- */
 
-int pw_yaml_text (const pw_yaml *y, const pw_node *node, const char *what, const char **text, pw_error *error) {
-  if (node->type != PW_YAML_SCALAR)
-    return pw_yaml_fail (y, node->at, error, "%s: expected text, found %s", what, pw_yaml_found (node));
-  if (*node->text == 0) return pw_yaml_fail (y, node->at, error, "%s: expected text, found none", what);
+int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *what, const char **text) {
+  if (node == NULL) return r->error->status;
+  if (node->type != PW_YAML_SCALAR || *node->text == 0)
+    return pw_yaml_fail (r, node->at, "%s: expected text, found %s", what,
+                         node->type == PW_YAML_SCALAR ? "none" : pw_yaml_found (node));
   *text = node->text;
-  return PW_OK;
+  return r->error->status;
 }
 
 size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset) {
@@ -104,57 +89,47 @@ int pw_yaml_moves (const char *text, size_t *at) {
   return pw_expression_names (text, read_moves, at);
 }
 
-/* Reports why an expression is not a number. */
-static int read_trouble (const pw_yaml *y, const pw_node *node, const char *what, const pw_expression_trouble *trouble,
-                         pw_error *error) {
-  size_t at;
-  if (pw_yaml_moves (node->text, &at) && at == trouble->at)
-    return pw_yaml_fail (y, pw_yaml_place (y, node, at), error,
-                         "%s: only the value of a signal may depend on the time t or on states", what);
-  return pw_yaml_fail (y, pw_yaml_place (y, node, trouble->at), error, "%s: %s", what, trouble->text);
-}
-
-int pw_yaml_number (const pw_yaml *y, const pw_node *node, const char *what, pw_domain domain, const pw_scope *x,
-                    double *value, pw_error *error) {
+int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value) {
   pw_expression_trouble trouble;
+  size_t at;
+  if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
-    return pw_yaml_fail (y, node->at, error, "%s: expected a number, found %s", what, pw_yaml_found (node));
+    return pw_yaml_fail (r, node->at, "%s: expected a number, found %s", what, pw_yaml_found (node));
   int status =
-      pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (x, node->text, value, &trouble);
-  if (status == PW_RESOURCE) return pw_yaml_no_memory (y, error);
-  if (status != PW_OK) return read_trouble (y, node, what, &trouble, error);
+      pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (r->x, node->text, value, &trouble);
+  if (status == PW_RESOURCE) return pw_yaml_no_memory (r);
+  if (status != PW_OK)
+    return pw_yaml_fail (r, pw_yaml_place (r->y, node, trouble.at), "%s: %s", what,
+                         pw_yaml_moves (node->text, &at) && at == trouble.at
+                             ? "only the value of a signal may depend on the time t or on states"
+                             : trouble.text);
   const char *expected = pw_domain_check (domain, *value);
-  if (*expected) return pw_yaml_fail (y, node->at, error, "%s = %g: expected %s", what, *value, expected);
-  return PW_OK;
+  return *expected ? pw_yaml_fail (r, node->at, "%s = %g: expected %s", what, *value, expected) : PW_OK;
 }
 
 /* ---- Pairs, choices, bodies ---- */
 
-int pw_yaml_pair (pw_yaml_builder *b, const pw_node *node, const char *what, double *value, pw_error *error) {
-  if (pw_yaml_list (b->y, node, what, 2, "numbers, [x, y]", error) != PW_OK ||
-      pw_yaml_number (b->y, node->first, what, PW_REAL, b->x, value, error) != PW_OK)
-    return error->status;
-  return pw_yaml_number (b->y, node->first->next, what, PW_REAL, b->x, value + 1, error);
+int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value) {
+  if (node == NULL || pw_yaml_list (r, node, what, 2, "numbers, [x, y]") != PW_OK) return r->error->status;
+  pw_yaml_number (r, node->first, what, PW_REAL, value);
+  return pw_yaml_number (r, node->first->next, what, PW_REAL, value + 1);
 }
 
-int pw_yaml_choice (pw_yaml_builder *b, const pw_node *node, const char *what, const char *const *choices, int *value,
-                    pw_error *error) {
+int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value) {
   char hint[100];
   const char *text;
-  if (pw_yaml_text (b->y, node, what, &text, error) != PW_OK) return error->status;
+  if (node == NULL || pw_yaml_text (r, node, what, &text) != PW_OK) return r->error->status;
   pw_nearest near = { .sought = text };
   for (int i = 0; choices[i]; i++) {
     pw_nearest_try (&near, choices[i]);
-    if (strcmp (choices[i], text) != 0) continue;
-    *value = i;
-    return PW_OK;
+    if (strcmp (choices[i], text) == 0) return *value = i, PW_OK;
   }
-  return pw_yaml_fail (b->y, node->at, error, "%s: there is no choice \"%.60s\"%s", what, text,
+  return pw_yaml_fail (r, node->at, "%s: there is no choice \"%.60s\"%s", what, text,
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 
-void pw_yaml_try_bodies (const pw_yaml_builder *b, pw_nearest *near) {
+void pw_yaml_try_bodies (const pw_reader *r, pw_nearest *near) {
   int bodies;
-  const pw_body *body = pw_model_bodies (b->m, &bodies);
+  const pw_body *body = pw_model_bodies (r->m, &bodies);
   for (int i = 0; i < bodies; i++) pw_nearest_try (near, body[i].name);
 }

@@ -7,7 +7,7 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { SOURCE_LARGEST = 64 << 20, SOURCE_SHOWN = 84 }; /* bytes of a file; of a line in a message */
+enum { SOURCE_SHOWN = 84 }; /* bytes of a line in a message */
 
 /* ---- Messages ---- */
 
@@ -45,7 +45,8 @@ static void source_clean (char *text) {
   }
 }
 
-int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *format, ...) {
+int pw_yaml_fail (const pw_reader *r, size_t at, const char *format, ...) {
+  const pw_yaml *y = r->y;
   char text[220], shown[SOURCE_SHOWN + 4];
   const char *begin, *from, *to;
   va_list arguments;
@@ -57,29 +58,27 @@ int pw_yaml_fail (const pw_yaml *y, size_t at, pw_error *error, const char *form
   snprintf (shown, sizeof shown, "%s%.*s", from > begin ? "..." : "", (int)(to - from), from);
   source_clean (shown);
   size_t n = strlen (y->path);
-  return pw_fail (error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
+  return pw_fail (r->error, PW_INPUT, "%s%s:%d:%d: error: %s\n  %s\n  %*s^", n > 100 ? "..." : "",
                   n > 100 ? y->path + n - 97 : y->path, pw_yaml_line (y, at), 1 + source_count (begin, y->source + at),
                   text, shown, source_count (from, y->source + at) + 3 * (from > begin), "");
 }
 
-int pw_yaml_no_memory (const pw_yaml *y, pw_error *error) {
-  return pw_fail (error, PW_RESOURCE, "%s: out of memory", y->path);
+int pw_yaml_no_memory (const pw_reader *r) {
+  return pw_fail (r->error, PW_RESOURCE, "%s: out of memory", r->y->path);
 }
 
 /* ---- Checks of the text ---- */
 
-static int source_check (const pw_yaml *y, pw_error *error) {
-  const char *begin = y->source, *p = begin, *end = begin + y->size;
+static int source_check (const pw_reader *r) {
+  const char *begin = r->y->source, *p = begin, *end = begin + r->y->size;
   while (p < end) {
     size_t at = (size_t)(p - begin);
     int n = pw_utf8_size (p);
-    if (n == 0)
-      return pw_yaml_fail (y, at, error, "byte %02X is no UTF-8; a model file is text in UTF-8", (unsigned char)*p);
+    if (n == 0) return pw_yaml_fail (r, at, "byte %02X is no UTF-8; a model file is text in UTF-8", (unsigned char)*p);
     if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
-      return pw_yaml_fail (y, at, error, "a control character, code %d, does not belong in a model file",
-                           pw_control (p));
+      return pw_yaml_fail (r, at, "a control character, code %d, does not belong in a model file", pw_control (p));
     if (*p == '%' && (at == 0 || p[-1] == '\n'))
-      return pw_yaml_fail (y, at, error, "a line of a model file must not begin with %%");
+      return pw_yaml_fail (r, at, "a line of a model file must not begin with %%");
     p += n;
   }
   return PW_OK;
@@ -93,5 +92,5 @@ int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error 
   int status = pw_read_rest (f, largest, y->path, "the most a model may have unless --max-file says more", &y->source,
                              &y->size, error);
   fclose (f);
-  return status == PW_OK ? source_check (y, error) : status;
+  return status == PW_OK ? source_check (&(pw_reader){ .y = y, .error = error }) : status;
 }

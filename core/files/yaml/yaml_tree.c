@@ -8,7 +8,8 @@
 enum { TREE_DEPTH = 30, TREE_PIECE = 4096 };
 
 typedef struct {
-  pw_yaml *y;
+  pw_reader r;
+  pw_yaml *y; /* r.y, which gets the nodes */
   struct fy_parser *parser;
   struct fy_diag *diag;
   struct fy_token_iter *text; /* iterates over the pieces of a scalar */
@@ -51,12 +52,9 @@ static unsigned tree_event_offset (tree *x, struct fy_event *e) {
 
 /* ---- Nodes ---- */
 
-static pw_node *tree_add (tree *x, pw_yaml_type type, unsigned at, pw_error *error) {
+static pw_node *tree_add (tree *x, pw_yaml_type type, unsigned at) {
   pw_node *n = pw_arena_take (&x->y->arena, sizeof *n);
-  if (n == NULL) {
-    pw_yaml_no_memory (x->y, error);
-    return NULL;
-  }
+  if (n == NULL) return pw_yaml_no_memory (&x->r), NULL;
   n->type = (unsigned char)type;
   n->at = x->at = at;
   if (x->depth == 0) {
@@ -85,45 +83,38 @@ static long tree_text (tree *x, struct fy_token *token, char *to) {
   return error ? -1 : size;
 }
 
-static int tree_scalar (tree *x, struct fy_event *e, pw_error *error) {
+static int tree_scalar (tree *x, struct fy_event *e) {
   struct fy_token *token = e->scalar.value;
   int quoted = token && (fy_token_scalar_style (token) == FYSS_SINGLE_QUOTED ||
                          fy_token_scalar_style (token) == FYSS_DOUBLE_QUOTED);
   unsigned at = tree_event_offset (x, e);
   long size = tree_text (x, token, NULL);
-  pw_node *n = tree_add (x, PW_YAML_SCALAR, at - (quoted && at > 0), error);
+  pw_node *n = tree_add (x, PW_YAML_SCALAR, at - (quoted && at > 0));
   char *text = n && size >= 0 ? pw_arena_take (&x->y->arena, (size_t)size + 1) : NULL;
-  if (text == NULL || tree_text (x, token, text) != size) return pw_yaml_no_memory (x->y, error);
-  if (memchr (text, 0, (size_t)size))
-    return pw_yaml_fail (x->y, n->at, error, "a text must not contain the character 0");
+  if (text == NULL || tree_text (x, token, text) != size) return pw_yaml_no_memory (&x->r);
+  if (memchr (text, 0, (size_t)size)) return pw_yaml_fail (&x->r, n->at, "a text must not contain the character 0");
   text[size] = 0;
   for (const char *p = text; *p; p++) /* possible through escapes */
     if (pw_control (p))
-      return pw_yaml_fail (x->y, n->at, error, "a text must not contain the control character of code %d",
-                           pw_control (p));
+      return pw_yaml_fail (&x->r, n->at, "a text must not contain the control character of code %d", pw_control (p));
   n->text = text;
   n->quoted = quoted || (token && fy_token_scalar_style (token) != FYSS_PLAIN);
   return PW_OK;
 }
 
-static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type, pw_error *error) {
+static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
   unsigned at = tree_event_offset (x, e);
-  if (x->depth == TREE_DEPTH) return pw_yaml_fail (x->y, at, error, "nested too deeply");
-  pw_node *n = tree_add (x, type, at, error);
+  if (x->depth == TREE_DEPTH) return pw_yaml_fail (&x->r, at, "nested too deeply");
+  pw_node *n = tree_add (x, type, at);
   if (n == NULL) return PW_RESOURCE;
   x->open[x->depth] = n;
   x->tail[x->depth++] = &n->first;
   return PW_OK;
 }
 
-static void tree_end (tree *x) {
-  pw_node *n = x->open[--x->depth];
-  if (n->type == PW_YAML_MAP) n->count /= 2;
-}
-
 /* ---- Events ---- */
 
-static int tree_marked (tree *x, struct fy_event *e, pw_error *error) {
+static int tree_marked (tree *x, struct fy_event *e) {
   struct fy_token *anchor = fy_event_get_anchor_token (e), *tag = fy_event_get_tag_token (e);
   struct fy_token *token = e->type == FYET_ALIAS ? e->alias.anchor : anchor ? anchor : tag;
   if (token == NULL) return PW_OK;
@@ -131,7 +122,7 @@ static int tree_marked (tree *x, struct fy_event *e, pw_error *error) {
   size_t at = mark && mark->line >= 0 ? tree_offset_of (x, mark) : tree_event_offset (x, e);
   const char *source = x->y->source;
   while (at > 0 && !strchr ("&*!", source[at]) && source[at - 1] != '\n') at--; /* marks may follow the sign */
-  return pw_yaml_fail (x->y, at, error, "%s do not belong in a model file; use parameters",
+  return pw_yaml_fail (&x->r, at, "%s do not belong in a model file; use parameters",
                        e->type == FYET_ALIAS ? "aliases (*)"
                        : anchor              ? "anchors (&)"
                                              : "tags (!)");
@@ -165,30 +156,25 @@ static ssize_t tree_feed (void *user, void *to, size_t count) {
   return x->nested || x->far ? 0 : (ssize_t)n; /* libfyaml 0.7.12 retries after an error */
 }
 
-static void tree_pass (tree *x, size_t at) {
+static int tree_take (tree *x, struct fy_event *e) {
+  if (tree_marked (x, e) != PW_OK) return PW_INPUT;
+  size_t at = tree_event_offset (x, e);
   if (at > x->fed) at = x->fed;
-  if (at <= x->from) return;
-  tree_count (x, x->from, at, -1);
-  x->from = at;
-}
-
-static int tree_take (tree *x, struct fy_event *e, pw_error *error) {
-  int status = tree_marked (x, e, error);
-  tree_pass (x, tree_event_offset (x, e));
-  if (status != PW_OK) return status;
+  if (at > x->from) tree_count (x, x->from, at, -1), x->from = at;
   switch (e->type) {
   case FYET_DOCUMENT_START:
     if (x->documents++ == 0) return PW_OK;
-    return pw_yaml_fail (x->y, tree_event_offset (x, e), error, "a second document; a file holds one model");
+    return pw_yaml_fail (&x->r, tree_event_offset (x, e), "a second document; a file holds one model");
   case FYET_SCALAR:
-    return tree_scalar (x, e, error);
+    return tree_scalar (x, e);
   case FYET_SEQUENCE_START:
-    return tree_begin (x, e, PW_YAML_LIST, error);
+    return tree_begin (x, e, PW_YAML_LIST);
   case FYET_MAPPING_START:
-    return tree_begin (x, e, PW_YAML_MAP, error);
+    return tree_begin (x, e, PW_YAML_MAP);
   case FYET_SEQUENCE_END:
   case FYET_MAPPING_END:
-    tree_end (x);
+    x->depth--;
+    if (e->type == FYET_MAPPING_END) x->open[x->depth]->count /= 2;
     return PW_OK;
   default:
     return PW_OK;
@@ -196,13 +182,6 @@ static int tree_take (tree *x, struct fy_event *e, pw_error *error) {
 }
 
 /* ---- Syntax ---- */
-
-static size_t tree_offset (const pw_yaml *y, int line, int column) {
-  const char *p = y->source, *end = p + y->size;
-  for (; line > 1 && p < end; p++) line -= *p == '\n';
-  for (; column > 1 && p < end && *p != '\n'; column--) p += pw_utf8_size (p);
-  return (size_t)(p - y->source);
-}
 
 /* A hint for a frequent mistake, from the line and the message of libfyaml, or "". */
 static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) {
@@ -226,39 +205,40 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
 }
 
 /* Reports an unterminated node at its start. */
-static int tree_syntax (const tree *x, pw_error *error) {
+static int tree_syntax (const tree *x) {
   void *first = NULL;
   struct fy_diag_error *e = fy_diag_errors_iterate (x->diag, &first);
-  if (e == NULL) return pw_yaml_fail (x->y, x->at, error, "this is no YAML");
-  size_t at = tree_offset (x->y, e->line, e->column);
-  size_t rest = at < x->y->size ? strspn (x->y->source + at, " \t\r\n") : 0;
-  const char *source = x->y->source;
-  if (at + rest == x->y->size && x->depth > 0) {
+  if (e == NULL) return pw_yaml_fail (&x->r, x->at, "this is no YAML");
+  const char *source = x->y->source, *p = source, *end = source + x->y->size;
+  for (int line = e->line; line > 1 && p < end; p++) line -= *p == '\n';
+  for (int column = e->column; column > 1 && p < end && *p != '\n'; column--) p += pw_utf8_size (p);
+  size_t at = (size_t)(p - source);
+  if (p + strspn (p, " \t\r\n") == end && x->depth > 0) {
     size_t begin = x->open[x->depth - 1]->at;
     if (source[begin] == '[' || source[begin] == '{') at = begin;
   }
   const char *message = e->msg ? e->msg : "this is no YAML";
-  return pw_yaml_fail (x->y, at, error, "%s%s", message, tree_hint (x->y, at, message));
+  return pw_yaml_fail (&x->r, at, "%s%s", message, tree_hint (x->y, at, message));
 }
 
-static int tree_refused (const tree *x, pw_error *error) {
-  if (x->nested) return pw_yaml_fail (x->y, x->from, error, "nested too deeply");
+static int tree_refused (const tree *x) {
+  if (x->nested) return pw_yaml_fail (&x->r, x->from, "nested too deeply");
   return pw_yaml_fail (
-      x->y, x->from, error,
+      &x->r, x->from,
       "a list or map in brackets with more than %g commas, colons and brackets, which takes much memory: "
       "write its entries on lines of their own, after \"- \" or \"key: \"",
       x->y->ahead);
 }
 
-static int tree_parse (tree *x, pw_error *error) {
+static int tree_parse (tree *x) {
   struct fy_event *e;
   int status = PW_OK;
   while (status == PW_OK && (e = fy_parser_parse (x->parser)) != NULL) {
-    status = x->far ? tree_refused (x, error) : tree_take (x, e, error);
+    status = x->far ? tree_refused (x) : tree_take (x, e);
     fy_parser_event_free (x->parser, e);
   }
-  if (status == PW_OK && (x->nested || x->far)) return tree_refused (x, error);
-  return status == PW_OK && fy_parser_get_stream_error (x->parser) ? tree_syntax (x, error) : status;
+  if (status == PW_OK && (x->nested || x->far)) return tree_refused (x);
+  return status == PW_OK && fy_parser_get_stream_error (x->parser) ? tree_syntax (x) : status;
 }
 
 /* Without memory libfyaml reports a syntax error, drops a part of the text, or crashes when it opens. */
@@ -267,26 +247,24 @@ enum { TREE_RESERVE = 1 << 16 };
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
   pw_error wrong = { 0 };
   struct fy_diag_cfg quiet;
+  tree x = { .r = { .y = y, .error = &wrong }, .y = y };
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
-  tree x = { .y = y };
-  if (pw_reserve (TREE_RESERVE) != PW_OK) return pw_yaml_no_memory (y, error);
   errno = 0;
-  x.diag = fy_diag_create (&quiet);
-  if (x.diag == NULL) return pw_yaml_no_memory (y, error);
-  fy_diag_set_collect_errors (x.diag, true); /* prints nothing */
-  struct fy_parse_cfg how = { .flags = FYPCF_ALLOW_DUPLICATE_KEYS, .diag = x.diag };
-  x.parser = fy_parser_create (&how);
-  int status = PW_OK;
-  x.text = fy_token_iter_create (NULL);
-  if (x.parser == NULL || x.text == NULL || fy_parser_set_input_callback (x.parser, &x, tree_feed) != 0)
-    status = pw_yaml_no_memory (y, error);
+  x.diag = pw_reserve (TREE_RESERVE) == PW_OK ? fy_diag_create (&quiet) : NULL;
+  if (x.diag) {
+    fy_diag_set_collect_errors (x.diag, true); /* prints nothing */
+    struct fy_parse_cfg how = { .flags = FYPCF_ALLOW_DUPLICATE_KEYS, .diag = x.diag };
+    x.parser = fy_parser_create (&how);
+    x.text = fy_token_iter_create (NULL);
+  }
+  if (x.parser && x.text && fy_parser_set_input_callback (x.parser, &x, tree_feed) == 0)
+    tree_parse (&x);
   else
-    status = tree_parse (&x, &wrong);
-  if (errno == ENOMEM) status = pw_yaml_no_memory (y, error);
-  if (status != PW_OK) pw_fail (error, status, "%s", wrong.text);
+    pw_yaml_no_memory (&x.r);
+  if (errno == ENOMEM) wrong.status = PW_OK, pw_yaml_no_memory (&x.r);
   fy_token_iter_destroy (x.text);
   if (x.parser) fy_parser_destroy (x.parser);
-  fy_diag_destroy (x.diag);
-  return status;
+  if (x.diag) fy_diag_destroy (x.diag);
+  return wrong.status == PW_OK ? PW_OK : pw_fail (error, wrong.status, "%s", wrong.text);
 }
