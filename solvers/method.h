@@ -42,7 +42,7 @@ struct pw_run {
   /* The state reached, always with its accelerations and multipliers. */
   double t;
   double *q, *v, *a; /* coords + 3 each */
-  double *lambda;    /* rows; contiguous with q, v, a */
+  double *lambda;    /* rows; contiguous with q, v, a: pw_state_length numbers */
   double *ledger;    /* entries: work and losses up to t */
   double *rate;      /* entries: their rates at t */
   double projected;  /* energy added by projections up to t; only with settings.ledger */
@@ -148,9 +148,34 @@ extern const char *const pw_metrics[];
  * saturating forces depend on change by at most their tolerance. */
 double pw_first_step (const pw_run *r);
 
+/* ---- Parts of opening and advancing a run (run.c) ---- */
+
+/* Adds the name of the signal that failed in the last attempted step, if any, to the error.  Returns status. */
+int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
+
+/* Replaces the saddle by one for the active rows.  PW_OK or PW_RESOURCE. */
+int pw_run_open_saddle (pw_run *r, pw_error *error);
+
+/* Evaluates accelerations, multipliers and the ledger's rates at the state reached; errors have the reason. */
+int pw_run_evaluate (pw_run *r, pw_error *error);
+
+/* Sets reference values for nearness to a singular configuration at the state reached, which must be regular. */
+void pw_run_watch (pw_run *r);
+
+/* Finds the next discontinuity after the state reached. */
+int pw_run_look_ahead (pw_run *r, pw_error *error);
+
+/* Makes the accelerations of this state the reference level for later ones. */
+void pw_run_reference_level (pw_run *r);
+
 /* Plans the linear algebra at the state reached, where J is evaluated, and reopens the method. fresh: reference
  * pivots are taken from this state; otherwise they are kept. */
 int pw_run_renew (pw_run *r, int fresh, pw_error *error);
+
+/* Numbers in q, v, a and lambda of a state. */
+static inline size_t pw_state_length (const pw_system *s) {
+  return 3 * ((size_t)s->coords + 3) + (size_t)s->rows;
+}
 
 static inline int pw_fail_memory (const pw_system *s, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);

@@ -1,155 +1,9 @@
-/* The equations of motion linearised on the constraints, in a frame that moves with the motion: degrees of freedom,
- * eigenvalues, the step RK4 can take.
- *
- * A state obeys g (q, t) = 0 and J v = eta, so that variations obey  G dq = 0,  J dv = -B dq,  B = (J v)_q - eta_q.
- * With orthonormal bases N_q of the null space of G and N_v of that of J (both from one QR factorisation of J^T,
- * holonomic equations first, in units of the scene) they are
- *
- *     dq = N_q z,   dv = N_v u / T - J^+ B N_q z,
- *
- * with T the time scale of the scene; z and u are minimal coordinates of the neighbouring states.  The variations of
- * the accelerations follow from the saddle-point system
- *
- *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv,  (gamma_q - (J a)_q) dq + gamma_v dv ),
- *
- * at constant time.  In a steady motion every body moves with the twist (vx, vy, w) of one frame, in which the state
- * and the constraint manifold are at rest.  The components of vectors in that frame rotate at -w, hence
- *
- *     z' = N_q^T (dv - W dq),   u' = T N_v^T (da - W dv),   W (x, y, phi) = w (-y, x, 0) for each body.
- *
- * The eigenvalues of this matrix A are the exponents of disturbances of a steady motion; linear_frame.c finds the
- * frame, and whether the motion is steady.  (Null-space form: Garcia de Jalon & Bayo 1994, Kinematic and Dynamic
- * Simulation of Multibody Systems.  Relative equilibria: Marsden & Ratiu 1999, Introduction to Mechanics and
- * Symmetry.) */
-#include <lapacke.h>
+/* Mobility and linearisation of a run at the state reached; equations in linear_variation.c. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "linear.h"
-#include "rank.h"
 #include "util.h"
-
-/* ---- Derivatives ---- */
-
-/* Rows of the derivatives: -F = (J^T lambda)_q - f_q, -f_v; gamma_q - (J a)_q, gamma_v; B. */
-static void linear_put (pw_linearisation *x, const double *v) {
-  pw_run *r = x->r;
-  int n = x->n;
-  pw_put put = { .rows = x->m, .factor = 1, .factor_nonholonomic = 1, .lambda = x->lambda };
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_JTL_Q, &put);
-  put.factor = -1;
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_FORCE_Q, &put);
-  put.col = n;
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_FORCE_V, &put);
-  pw_newton_signals (&x->newton, r->w, &x->tape, 0, 0, n);
-  put = (pw_put){ .row = n, .rows = x->m, .factor = 1, .factor_nonholonomic = 1 };
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_Q, &put);
-  put.col = n;
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_V, &put);
-  put = (pw_put){ .row = n, .rows = x->m, .factor = -1, .factor_nonholonomic = -1, .w = x->a };
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
-  put = (pw_put){ .row = n + x->m, .rows = x->m, .factor = 1, .factor_nonholonomic = 1, .w = v };
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
-  put = (pw_put){ .row = n + x->m, .rows = x->m, .factor = -1, .factor_nonholonomic = -1 };
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_ETA_Q, &put);
-}
-
-static int linear_derivatives (pw_linearisation *x) {
-  if (pw_newton_open (&x->newton, x->r->s) != PW_OK) return PW_RESOURCE;
-  pw_scatter_record (&x->tape);
-  linear_put (x, x->r->v);
-  int size = 2 * x->n > x->n + 2 * x->m ? 2 * x->n : x->n + 2 * x->m;
-  if (pw_scatter_lay_out (&x->tape, size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
-  x->value = calloc ((size_t)x->colptr[size] + 1, sizeof *x->value);
-  return x->value ? PW_OK : PW_RESOURCE;
-}
-
-int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v) {
-  int status = pw_run_accelerate (x->r, t, q, v, x->a, x->lambda);
-  if (status != PW_OK) return status;
-  memset (x->value, 0, ((size_t)x->colptr[2 * x->n] + 1) * sizeof *x->value);
-  pw_scatter_begin (&x->tape, x->value);
-  linear_put (x, v);
-  return PW_OK;
-}
-
-void pw_linear_vary (pw_linearisation *x) {
-  memset (x->y, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->y);
-  for (int j = 0; j < 2 * x->n; j++)
-    for (int64_t i = x->colptr[j]; i < x->colptr[j + 1]; i++) x->y[x->rowind[i]] += x->value[i] * x->x[j];
-  for (int j = 0; j < x->n; j++) x->da[j] = -x->y[j];
-  pw_saddle_solve (x->r->saddle, x->da, x->y + x->n, x->da, x->z);
-}
-
-/* ---- Bases ---- */
-
-static double *linear_column (const pw_linearisation *x, int j) {
-  return x->Q + (size_t)j * (size_t)x->n;
-}
-
-static int linear_stride (int n) {
-  return n > 1 ? n : 1; /* LAPACK refuses 0 */
-}
-
-/* J^T = Q R of the independent constraint equations; returns the smallest singular value of J. */
-static double linear_bases (pw_linearisation *x) {
-  int n = x->n, rank = x->rank;
-  double least = INFINITY, *tau = x->da;
-  pw_rank_rows (x->r->w, x->R, x->norm);
-  for (int k = 0; k < rank; k++)
-    memcpy (linear_column (x, k), x->R + (size_t)x->row[k] * (size_t)n, (size_t)n * sizeof *x->R);
-  memcpy (x->R, x->Q, (size_t)rank * (size_t)n * sizeof *x->R);
-  int failed = rank && LAPACKE_dgesvj_work (LAPACK_COL_MAJOR, 'G', 'N', 'N', n, rank, x->R, n, x->c, 0, NULL, 1, x->z,
-                                            n + x->m + 3) != 0;
-  for (int k = 0; k < rank; k++) least = fmin (least, x->z[0] * x->c[k]);
-  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, rank, x->Q, n, tau, x->z, n);
-  for (int k = 0; k < rank; k++)
-    memcpy (x->R + (size_t)k * (size_t)rank, linear_column (x, k), (size_t)(k + 1) * sizeof *x->R);
-  LAPACKE_dorgqr_work (LAPACK_COL_MAJOR, n, n, rank, x->Q, n, tau, x->z, n);
-  return rank && !failed ? least : NAN;
-}
-
-/* ---- The reduced system ---- */
-
-/* dv -= J^+ B dq: solves R^T b = B dq, dv -= Q b. */
-static void linear_follow (pw_linearisation *x) {
-  double *b = x->c;
-  int stride = linear_stride (x->rank);
-  for (int i = 0; i < x->rank; i++) b[i] = x->y[x->n + x->m + x->row[i]] / x->norm[x->row[i]];
-  LAPACKE_dtrtrs_work (LAPACK_COL_MAJOR, 'U', 'T', 'N', x->rank, 1, x->R, stride, b, stride);
-  for (int i = 0; i < x->rank; i++)
-    for (int j = 0; j < x->n; j++) x->x[x->n + j] -= b[i] * linear_column (x, i)[j] / pw_rank_unit (x->r->s, j);
-}
-
-void pw_linear_tangent (pw_linearisation *x, int c) {
-  int velocity = c >= x->positions, column = velocity ? x->rank + c - x->positions : x->holonomic + c;
-  double T = x->r->w->scale.time;
-  memset (x->x, 0, 2 * (size_t)x->n * sizeof *x->x);
-  for (int j = 0; j < x->n; j++)
-    x->x[velocity ? x->n + j : j] = linear_column (x, column)[j] / pw_rank_unit (x->r->s, j) / (velocity ? T : 1);
-  if (velocity) return;
-  pw_linear_vary (x);
-  linear_follow (x);
-}
-
-/* Component of a vector over the coordinates along a column of Q. */
-static double linear_along (const pw_linearisation *x, int column, const double *vector) {
-  double sum = 0;
-  for (int j = 0; j < x->n; j++) sum += linear_column (x, column)[j] * vector[j] * pw_rank_unit (x->r->s, j);
-  return sum;
-}
-
-void pw_linear_coordinates (const pw_linearisation *x, const double *dq, const double *dv, int stride, double *out) {
-  for (int i = 0; i < x->positions; i++, out += stride) *out = linear_along (x, x->holonomic + i, dq);
-  for (int i = 0; i < x->velocities; i++, out += stride) *out = linear_along (x, x->rank + i, dv) * x->r->w->scale.time;
-}
-
-void pw_linear_turn (const pw_linearisation *x, double w, const double *in, double *out) {
-  for (int j = 0; j < 3 * x->r->s->bodies; j += 3) {
-    out[j] -= w * in[j + 1];
-    out[j + 1] += w * in[j];
-  }
-}
 
 /* Column c of A: the effect of a variation along minimal coordinate c. */
 static void linear_unknown (pw_linearisation *x, int c) {
@@ -160,8 +14,6 @@ static void linear_unknown (pw_linearisation *x, int c) {
   pw_linear_turn (x, -w, dq, dv);
   pw_linear_coordinates (x, dv, x->da, x->size, x->A + c);
 }
-
-/* ---- Opening and closing ---- */
 
 static int linear_open (pw_linearisation *x, int all) {
   size_t n = (size_t)x->n, m = (size_t)x->m, size = (size_t)x->size;
@@ -190,7 +42,7 @@ static int linear_open (pw_linearisation *x, int all) {
 
 static void linear_close (pw_linearisation *x) {
   pw_newton_close (&x->newton);
-  pw_scatter_close (&x->tape);
+  pw_scatter_close (&x->scatter);
   free (x->colptr);
   free (x->rowind);
   free (x->value);
@@ -226,11 +78,11 @@ static int linear_results (const pw_linearisation *x, pw_linear *l) {
 /* The current state is evaluated last, so that the workspace is left there. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
-  if (linear_derivatives (x) != PW_OK) return PW_RESOURCE;
+  if (pw_linear_derivatives (x) != PW_OK) return PW_RESOURCE;
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error) : pw_fail (error, PW_METHOD, "a signal failed");
-  l->least = linear_bases (x);
+  l->least = pw_linear_bases (x);
   pw_linear_choose_frame (x);
   for (int c = 0; c < x->size; c++) linear_unknown (x, c);
   l->symmetries = pw_linear_symmetries (x);

@@ -35,12 +35,21 @@ typedef struct {
   double *a0, *along, *response; /* n, 2 n, n: accelerations, a variation and its da at the current state */
   double *there;                 /* 2 n: a later state */
   pw_newton newton;
-  pw_scatter_map tape;
+  pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as y */
   double *value;
   char *memory;
 } pw_linearisation;
 
+/* Round-off of derivatives of moderate size, relative to them. */
+#define PW_LINEAR_SYMMETRIC 1e-9
+
+/* ---- linear_variation.c ---- */
+
+/* Records the scatter map of the derivatives.  PW_OK or PW_RESOURCE. */
+int pw_linear_derivatives (pw_linearisation *x);
+/* J^T = Q R of the independent constraint equations; returns the smallest singular value of J. */
+double pw_linear_bases (pw_linearisation *x);
 /* Evaluates accelerations and derivatives at a state; kinematics are left there.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
 /* Computes y and da from the variation x. */
@@ -66,9 +75,6 @@ void pw_linear_choose_frame (pw_linearisation *x);
 /* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; their
  * directions go to S. */
 int pw_linear_symmetries (pw_linearisation *x);
-/* Transforms B, stored as A, by reflections that map the first k vectors of S to the first k unit vectors.  Returns 1
- * if they span an invariant subspace: the lower left block is then 0. */
-int pw_linear_split (pw_linearisation *x, int k, double *B);
 /* Whether A is constant along the motion; see pw_linear.  Leaves the workspace at the current state. */
 pw_steadiness pw_linear_steady (pw_linearisation *x);
 

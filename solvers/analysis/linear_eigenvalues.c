@@ -98,13 +98,28 @@ static void eigen_sort (pw_linear *l) {
     }
 }
 
+/* Transforms B, stored as A, by reflections that map the first k vectors of S to the first k unit vectors.  Returns 1
+ * if they span an invariant subspace: the lower left block is then 0. */
+static int eigen_split (pw_linearisation *x, int k, double *B) {
+  int n = x->size;
+  double off = 0, tau[3], *work = x->x; /* at least n */
+  if (k == 0 || k > n) return k == 0;
+  double size = LAPACKE_dlange_work (LAPACK_COL_MAJOR, 'F', n, n, B, n, work);
+  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, k, x->S, n, tau, work, n);
+  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'T', n, n, k, x->S, n, tau, B, n, work, n);
+  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'R', 'N', n, n, k, x->S, n, tau, B, n, work, n);
+  for (int i = k; i < n; i++)
+    for (int c = 0; c < k; c++) off = pw_largest (off, fabs (B[i * n + c]));
+  return off <= PW_LINEAR_SYMMETRIC * size;
+}
+
 int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
   int n = l->unknowns, k = l->symmetries;
   size_t cells = (size_t)n * (size_t)n;
   double *B = malloc ((2 * cells + 7 * (size_t)n + 1) * sizeof *B);
   if (B == NULL) return PW_RESOURCE;
   memcpy (B, x->A, cells * sizeof *B);
-  if (!pw_linear_split (x, k, B)) {
+  if (!eigen_split (x, k, B)) {
     memcpy (B, x->A, cells * sizeof *B);
     k = l->symmetries = 0;
   }

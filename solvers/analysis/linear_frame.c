@@ -14,8 +14,8 @@
  *
  * LINEAR_STEADY: below it the linearisation changes by that fraction within the time scale T, less than the accuracy of
  * initial values with 6 digits.  LINEAR_EXACT: round-off of accelerations, for which a rotating frame must not be
- * chosen.  LINEAR_SYMMETRIC: round-off of derivatives of moderate size, and 1e4 times its growth with their size. */
-static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13, LINEAR_SYMMETRIC = 1e-9;
+ * chosen. */
+static const double LINEAR_STEADY = 1e-6, LINEAR_EXACT = 1e-13;
 
 static double linear_unit (const pw_linearisation *x) {
   const pw_scale *s = &x->r->w->scale;
@@ -101,12 +101,12 @@ static void linear_change (pw_linearisation *x, int k, double *out) {
   for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_rank_unit (x->r->s, j) / linear_unit (x);
 }
 
-/* Round-off grows with the derivatives of the accelerations. */
+/* Round-off grows with the derivatives of the accelerations, by 1e-4 of their size. */
 static double linear_tolerance (const pw_linearisation *x) {
   double most = 0, T = x->r->w->scale.time;
   for (int i = x->positions; i < x->size; i++)
     for (int k = 0; k < x->size; k++) most = pw_largest (most, fabs (x->A[i * x->size + k]) * T);
-  return LINEAR_SYMMETRIC + 1e-4 * LINEAR_SYMMETRIC * most;
+  return PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * most;
 }
 
 /* The null space of the changes, from their singular value decomposition; S becomes a basis of it. */
@@ -126,19 +126,6 @@ int pw_linear_symmetries (pw_linearisation *x) {
     for (int k = 0; k < left; k++) x->S[k * x->size + c] = V[2 - k] * S[0] + V[5 - k] * S[1] + V[8 - k] * S[2];
   }
   return left;
-}
-
-int pw_linear_split (pw_linearisation *x, int k, double *B) {
-  int n = x->size;
-  double off = 0, tau[3], *work = x->x; /* at least n */
-  if (k == 0 || k > n) return k == 0;
-  double size = LAPACKE_dlange_work (LAPACK_COL_MAJOR, 'F', n, n, B, n, work);
-  LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, k, x->S, n, tau, work, n);
-  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'T', n, n, k, x->S, n, tau, B, n, work, n);
-  LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'R', 'N', n, n, k, x->S, n, tau, B, n, work, n);
-  for (int i = k; i < n; i++)
-    for (int c = 0; c < k; c++) off = pw_largest (off, fabs (B[i * n + c]));
-  return off <= LINEAR_SYMMETRIC * size;
 }
 
 /* ---- Steadiness ---- */

@@ -9,16 +9,33 @@
 #include "method.h"
 #include "util.h"
 
-enum { PROFILE_BATCHES = 5, PROFILE_PIECES = 6 };
+enum { PROFILE_BATCHES = 5 };
 #define PROFILE_BATCH 0.005    /* minimum processor time of a batch [s] */
 #define PROFILE_DISTANCE 1e-10 /* displacement off the constraints before a projection, in units of the length scale */
+
+/* What is measured: stages of an evaluation, then others. */
+typedef enum {
+  PROFILE_KINEMATICS,
+  PROFILE_EQUATIONS,
+  PROFILE_STABILISE, /* the work for Baumgarte's terms */
+  PROFILE_FACTOR,
+  PROFILE_SOLVE,
+  PROFILE_EVALUATION,
+  PROFILE_STAGES,
+  PROFILE_CONFIGURATIONS,
+  PROFILE_PROJECT, /* a projection from p->from and the evaluation after it, which reuses J and its factors */
+  PROFILE_SIGNALS, /* the following: of one batch */
+  PROFILE_J_GAMMA,
+  PROFILE_FORCE,
+  PROFILE_G
+} profile_work;
 
 typedef struct {
   pw_run *r;
   const pw_system *s;
   pw_saddle *saddle;         /* as that of the run */
   pw_projector projector;    /* if the method projects */
-  const pw_element_batch *k; /* the kind being measured */
+  const pw_element_batch *k; /* the batch being measured */
   pw_statistics done;        /* counts of the run, before the measurements */
   double t, before;          /* two times, so that signals are evaluated each time */
   double *q, *v, *far;       /* the last state, and positions off the constraints */
@@ -29,82 +46,58 @@ typedef struct {
   char *memory;
 } profile;
 
-/* ---- Pieces of work, done n times ---- */
-
-typedef void profile_work (profile *p, long n);
-
-static void profile_configurations (profile *p, long n) {
-  for (; n > 0; n--) pw_update_kinematics (p->r->w, p->t, p->q, p->v);
-}
-
-static void profile_kinematics (profile *p, long n) {
-  for (; n > 0; n--) pw_update_kinematics (p->r->w, n % 2 ? p->t : p->before, p->q, p->v);
-}
-
-static void profile_signals (profile *p, long n) {
-  const pw_element_batch *k = p->k;
-  int derivatives = !pw_kind_forced (k->kind), count = k->b.count * k->kind->signals;
-  for (; n > 0; n--)
-    for (int i = 0; i < count; i++) pw_signal_eval (&k->source[i], p->t, derivatives, k->u + 3 * i);
-}
-
-static void profile_J_gamma (profile *p, long n) {
+/* Work on one batch of elements. */
+static void profile_elements (profile *p, profile_work work) {
   const pw_element_batch *k = p->k;
   const pw_kind *kind = k->kind;
-  for (; n > 0; n--) {
+  if (work == PROFILE_SIGNALS)
+    for (int i = 0; i < k->b.count * kind->signals; i++)
+      pw_signal_eval (&k->source[i], p->t, !pw_kind_forced (kind), k->u + 3 * i);
+  else if (work == PROFILE_J_GAMMA) {
     kind->J (&k->b, k->J);
     if (kind->gamma) kind->gamma (&k->b, p->gamma + k->row);
+  } else if (work == PROFILE_FORCE)
+    kind->force (&k->b, k->block);
+  else {
+    kind->g (&k->b, p->eta + k->row);
+    if (kind->g_size) kind->g_size (&k->b, p->jv + k->row);
   }
 }
 
-static void profile_force (profile *p, long n) {
-  for (; n > 0; n--) p->k->kind->force (&p->k->b, p->k->block);
-}
-
-static void profile_g (profile *p, long n) {
-  const pw_element_batch *k = p->k;
-  for (; n > 0; n--) {
-    k->kind->g (&k->b, p->eta + k->row);
-    if (k->kind->g_size) k->kind->g_size (&k->b, p->jv + k->row);
-  }
-}
-
-static void profile_equations (profile *p, long n) {
-  for (; n > 0; n--) {
-    pw_evaluate_J (p->r->w);
-    pw_evaluate_gamma (p->r->w, p->gamma);
-    pw_evaluate_force (p->r->w, p->f);
-  }
-}
-
-/* The work for Baumgarte's terms. */
-static void profile_stabilise (profile *p, long n) {
-  for (; n > 0; n--) {
-    pw_mul_J (p->r->w, p->v, p->jv);
-    pw_evaluate_eta (p->r->w, p->eta);
-    pw_evaluate_g (p->r->w, p->eta);
-  }
-}
-
-static void profile_factor (profile *p, long n) {
-  for (; n > 0; n--) pw_saddle_factor (p->saddle);
-}
-
-static void profile_solve (profile *p, long n) {
-  for (; n > 0; n--) pw_saddle_solve (p->saddle, p->f, p->gamma, p->a, p->lambda);
-}
-
-static void profile_evaluation (profile *p, long n) {
-  for (; n > 0; n--) pw_run_accelerate (p->r, n % 2 ? p->t : p->before, p->q, p->v, p->a, p->lambda);
-}
-
-/* A projection from p->from and the evaluation after it, which reuses J and its factors. */
-static void profile_project (profile *p, long n) {
+static void profile_do (profile *p, profile_work work, double t) {
+  pw_workspace *w = p->r->w;
   size_t bytes = (size_t)p->s->coords * sizeof (double);
-  for (; n > 0; n--) {
+  switch (work) {
+  case PROFILE_CONFIGURATIONS:
+  case PROFILE_KINEMATICS:
+    pw_update_kinematics (w, work == PROFILE_KINEMATICS ? t : p->t, p->q, p->v);
+    break;
+  case PROFILE_EQUATIONS:
+    pw_evaluate_J (w);
+    pw_evaluate_gamma (w, p->gamma);
+    pw_evaluate_force (w, p->f);
+    break;
+  case PROFILE_STABILISE:
+    pw_mul_J (w, p->v, p->jv);
+    pw_evaluate_eta (w, p->eta);
+    pw_evaluate_g (w, p->eta);
+    break;
+  case PROFILE_FACTOR:
+    pw_saddle_factor (p->saddle);
+    break;
+  case PROFILE_SOLVE:
+    pw_saddle_solve (p->saddle, p->f, p->gamma, p->a, p->lambda);
+    break;
+  case PROFILE_EVALUATION:
+    pw_run_accelerate (p->r, t, p->q, p->v, p->a, p->lambda);
+    break;
+  case PROFILE_PROJECT:
     memcpy (p->f, p->from, bytes);
     memcpy (p->y, p->v, bytes);
-    pw_project_state (&p->projector, p->r, n % 2 ? p->t : p->before, p->f, p->y, p->a, p->lambda);
+    pw_project_state (&p->projector, p->r, t, p->f, p->y, p->a, p->lambda);
+    break;
+  default:
+    profile_elements (p, work);
   }
 }
 
@@ -121,30 +114,30 @@ static double profile_clock (void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-static double profile_batch (profile *p, profile_work *work, long n) {
-  double start = profile_clock ();
-  work (p, n);
-  return profile_clock () - start;
+static double profile_batch (profile *p, profile_work work, long n) {
+  double begun = profile_clock ();
+  for (; n > 0; n--) profile_do (p, work, n % 2 ? p->t : p->before);
+  return profile_clock () - begun;
 }
 
-/* The median time [ns] of each kind of work; the kinds take turns, so that a temporary slowdown of the machine affects
- * all of them.  0 for NULL. */
-static void profile_times (profile *p, profile_work *const *work, int count, double *ns) {
-  double time[PROFILE_PIECES][PROFILE_BATCHES];
-  long n[PROFILE_PIECES];
+/* The median time [ns] of each kind of work from `first` on; the kinds take turns, so that a temporary slowdown of the
+ * machine affects all of them. */
+static void profile_times (profile *p, profile_work first, int count, double *ns) {
+  double time[PROFILE_STAGES][PROFILE_BATCHES];
+  long n[PROFILE_STAGES];
   for (int i = 0; i < count; i++)
-    for (n[i] = 1; work[i] && profile_batch (p, work[i], n[i]) < PROFILE_BATCH;) n[i] *= 2;
+    for (n[i] = 1; profile_batch (p, first + (profile_work)i, n[i]) < PROFILE_BATCH;) n[i] *= 2;
   for (int j = 0; j < PROFILE_BATCHES; j++)
-    for (int i = 0; i < count; i++) time[i][j] = work[i] ? profile_batch (p, work[i], n[i]) : 0;
+    for (int i = 0; i < count; i++) time[i][j] = profile_batch (p, first + (profile_work)i, n[i]);
   for (int i = 0; i < count; i++) {
     qsort (time[i], PROFILE_BATCHES, sizeof **time, profile_order);
     ns[i] = 1e9 * time[i][PROFILE_BATCHES / 2] / (double)n[i];
   }
 }
 
-static double profile_time (profile *p, profile_work *work) {
+static double profile_time (profile *p, profile_work work) {
   double ns;
-  profile_times (p, &work, 1, &ns);
+  profile_times (p, work, 1, &ns);
   return ns;
 }
 
@@ -153,23 +146,19 @@ static double profile_time (profile *p, profile_work *work) {
 static void profile_kind (profile *p, pw_profile_kind *x) {
   const pw_kind *kind = p->k->kind;
   *x = (pw_profile_kind){ .kind = kind, .elements = p->k->b.count };
-  if (kind->signals) x->signals = profile_time (p, profile_signals);
-  if (kind->rows) x->constraints = profile_time (p, profile_J_gamma);
-  if (kind->force && !kind->constant) x->force = profile_time (p, profile_force);
-  if (kind->g) x->positions = profile_time (p, profile_g);
+  if (kind->signals) x->signals = profile_time (p, PROFILE_SIGNALS);
+  if (kind->rows) x->constraints = profile_time (p, PROFILE_J_GAMMA);
+  if (kind->force && !kind->constant) x->force = profile_time (p, PROFILE_FORCE);
+  if (kind->g) x->positions = profile_time (p, PROFILE_G);
 }
 
 static void profile_stages (profile *p, pw_profile *x) {
-  int stabilised = p->r->alpha != 0 || p->r->beta != 0;
-  profile_work *const work[PROFILE_PIECES] = {
-    profile_kinematics, profile_equations, stabilised ? profile_stabilise : NULL,
-    profile_factor,     profile_solve,     profile_evaluation
-  };
-  double ns[PROFILE_PIECES];
-  profile_equations (p, 1);
-  profile_times (p, work, PROFILE_PIECES, ns);
-  x->kinematics = ns[0], x->equations = ns[1], x->stabilisation = ns[2];
-  x->factorisation = ns[3], x->solution = ns[4], x->evaluation = ns[5];
+  double ns[PROFILE_STAGES];
+  profile_do (p, PROFILE_EQUATIONS, p->t);
+  profile_times (p, 0, PROFILE_STAGES, ns);
+  x->kinematics = ns[PROFILE_KINEMATICS], x->equations = ns[PROFILE_EQUATIONS];
+  x->stabilisation = p->r->alpha != 0 || p->r->beta != 0 ? ns[PROFILE_STABILISE] : 0;
+  x->factorisation = ns[PROFILE_FACTOR], x->solution = ns[PROFILE_SOLVE], x->evaluation = ns[PROFILE_EVALUATION];
 }
 
 /* The cost of a projection with the average number of iterations of the run, interpolated between none and some. */
@@ -179,9 +168,9 @@ static void profile_projection (profile *p, pw_profile *x) {
   double others = (double)p->done.rhs + (p->projector.own_velocity ? x->projections * steps : 0);
   x->iterations = fmax (0, (double)p->done.factorisations - others) / (x->projections * steps);
   p->from = p->q;
-  none = profile_time (p, profile_project);
+  none = profile_time (p, PROFILE_PROJECT);
   p->from = p->far;
-  some = profile_time (p, profile_project);
+  some = profile_time (p, PROFILE_PROJECT);
   int count = p->projector.iterations;
   x->projection = none + (count > 0 ? fmax (0, some - none) / count * x->iterations : 0);
 }
@@ -193,7 +182,7 @@ static void profile_measure (profile *p, pw_profile *x) {
     if (p->projector.position) profile_projection (p, x);
     x->evaluations = (double)p->done.rhs / (double)p->done.steps - x->projections;
   }
-  x->configurations = profile_time (p, profile_configurations);
+  x->configurations = profile_time (p, PROFILE_CONFIGURATIONS);
   for (; x->kinds < p->s->batches; x->kinds++) {
     p->k = &p->r->w->batch[x->kinds];
     profile_kind (p, &x->kind[x->kinds]);
@@ -220,8 +209,7 @@ static int profile_open (profile *p, pw_error *error) {
   memcpy (p->q, p->r->q, bytes);
   memcpy (p->v, p->r->v, bytes);
   for (int j = 0; j < p->s->coords; j++) p->far[j] = p->q[j] + PROFILE_DISTANCE * p->s->scale.length * pw_sin (j + 1);
-  pw_update_kinematics (p->r->w, p->t, p->q, p->v);
-  pw_evaluate_J (p->r->w);
+  (void)pw_evaluate_J_at (p->r->w, p->t, p->q, p->v);
   p->saddle = pw_saddle_open (p->r->w, p->s->mass, p->s->rows, p->r->active, error);
   if (p->saddle == NULL) return PW_RESOURCE;
   return pw_stabilised_by (p->r, PW_PROJECTION) ? pw_projector_open_asked (&p->projector, p->r, error) : PW_OK;

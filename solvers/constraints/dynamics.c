@@ -86,11 +86,7 @@ int pw_run_accelerate (pw_run *r, double t, const double *q, const double *v, do
 }
 
 void pw_show_reached (pw_run *r) {
-  size_t n = (size_t)r->s->coords * sizeof (double);
-  memcpy (r->q_at, r->q, n);
-  memcpy (r->v_at, r->v, n);
-  memcpy (r->a_at, r->a, n);
-  memcpy (r->lambda_at, r->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *r->q);
   memcpy (r->ledger_at, r->ledger, (size_t)r->s->entries * sizeof (double));
   r->projected_at = r->projected;
   (void)pw_evaluate_J_at (r->w, r->t, r->q_at, r->v_at);

@@ -51,6 +51,17 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
   for (int i = 0; i < count; i++) used[i] = all[x->map ? x->row[i] : i];
 }
 
+/* Contributions of the equations in use, at this row and column. */
+static pw_put tangent_put (const pw_tangent *x, int row, int col, double factor) {
+  return (pw_put){
+    .row = row, .col = col, .rows = x->run->s->rows, .factor = factor, .factor_nonholonomic = factor, .map = x->map
+  };
+}
+
+static void tangent_block (pw_tangent *x, pw_block block, const pw_put *put) {
+  pw_newton_block (&x->newton, x->run->w, &x->tape, block, put);
+}
+
 /* of_q I + D (G^T mu)_q, -I, D G^T */
 void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const double *mu, const double *D) {
   const pw_system *s = x->run->s;
@@ -59,8 +70,9 @@ void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const do
     pw_scatter_add (&x->tape, j, to->v + j, -1);
   }
   if (mu == NULL) return;
-  pw_put put = { .col = to->q, .rows = s->holonomic, .factor = 1, .row_scale = D, .map = x->map, .lambda = mu };
-  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_JTL_Q, &put);
+  pw_put put = tangent_put (x, 0, to->q, 1);
+  put.rows = s->holonomic, put.row_scale = D, put.lambda = mu;
+  tangent_block (x, PW_JTL_Q, &put);
   put.col = to->mu;
   put.factor = to->of_lambda;
   pw_newton_JT (x->run->w, &x->tape, &put);
@@ -68,17 +80,11 @@ void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const do
 
 /* (J v)_q - eta_q, J */
 void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const double *v, double of_holonomic) {
-  const pw_system *s = x->run->s;
-  pw_put put = { .row = to->constraint,
-                 .col = to->q,
-                 .rows = s->rows,
-                 .factor = of_holonomic,
-                 .factor_nonholonomic = 1,
-                 .map = x->map,
-                 .w = v };
-  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_JW_Q, &put);
+  pw_put put = tangent_put (x, to->constraint, to->q, 1);
+  put.w = v, put.factor = of_holonomic;
+  tangent_block (x, PW_JW_Q, &put);
   put.factor = -of_holonomic, put.factor_nonholonomic = -1;
-  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_ETA_Q, &put);
+  tangent_block (x, PW_ETA_Q, &put);
   put.factor = of_holonomic, put.factor_nonholonomic = 1;
   put.col = to->v;
   pw_newton_J (x->run->w, &x->tape, &put);
@@ -86,26 +92,21 @@ void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const do
 
 /* G */
 void pw_tangent_positions (pw_tangent *x, const pw_tangent_update *to, int row) {
-  const pw_system *s = x->run->s;
-  pw_newton_J (x->run->w, &x->tape,
-               &(pw_put){ .row = row, .col = to->q, .rows = s->holonomic, .factor = 1, .map = x->map });
+  pw_put put = tangent_put (x, row, to->q, 1);
+  put.rows = x->run->s->holonomic;
+  pw_newton_J (x->run->w, &x->tape, &put);
 }
 
 /* (J^T lambda)_q - f_q, -f_v, M, J^T */
 void pw_tangent_momentum (pw_tangent *x, const pw_tangent_update *to, const double *lambda) {
   const pw_system *s = x->run->s;
-  pw_put put = { .row = to->momentum,
-                 .col = to->q,
-                 .rows = s->rows,
-                 .factor = 1,
-                 .factor_nonholonomic = 1,
-                 .map = x->map,
-                 .lambda = lambda };
-  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_JTL_Q, &put);
+  pw_put put = tangent_put (x, to->momentum, to->q, 1);
+  put.lambda = lambda;
+  tangent_block (x, PW_JTL_Q, &put);
   put.factor = -1;
-  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_FORCE_Q, &put);
+  tangent_block (x, PW_FORCE_Q, &put);
   put.col = to->v;
-  pw_newton_block (&x->newton, x->run->w, &x->tape, PW_FORCE_V, &put);
+  tangent_block (x, PW_FORCE_V, &put);
   pw_newton_signals (&x->newton, x->run->w, &x->tape, to->momentum, to->q, to->v);
   for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->tape, to->momentum + j, to->a + j, to->of_a * s->mass[j]);
   put.factor = put.factor_nonholonomic = to->of_lambda;
@@ -118,19 +119,18 @@ void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_update *to, const
   pw_run *r = x->run;
   const pw_system *s = r->s;
   double alpha = r->alpha, with_v = to->a == to->v ? to->of_a : 0;
-  pw_put put = {
-    .row = to->constraint, .col = to->q, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map, .w = a
-  };
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
+  pw_put put = tangent_put (x, to->constraint, to->q, 1);
+  put.w = a;
+  tangent_block (x, PW_JW_Q, &put);
   put.w = v;
   put.factor = 2 * alpha, put.factor_nonholonomic = alpha;
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
+  tangent_block (x, PW_JW_Q, &put);
   put.factor = -2 * alpha, put.factor_nonholonomic = -alpha;
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_ETA_Q, &put);
+  tangent_block (x, PW_ETA_Q, &put);
   put.factor = put.factor_nonholonomic = -1;
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_Q, &put);
+  tangent_block (x, PW_GAMMA_Q, &put);
   put.col = to->v;
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_GAMMA_V, &put);
+  tangent_block (x, PW_GAMMA_V, &put);
   put.factor = with_v + 2 * alpha, put.factor_nonholonomic = with_v + alpha;
   pw_newton_J (r->w, &x->tape, &put);
   put.col = to->q;

@@ -7,11 +7,9 @@
 #include "util.h"
 
 int pw_dense_output_open (pw_dense_output *b, pw_run *r, int rates, pw_error *error) {
-  size_t n = (size_t)r->s->coords, rows = (size_t)r->s->rows, entries = (size_t)r->s->entries;
+  size_t entries = (size_t)r->s->entries;
   *b = (pw_dense_output){ .t0 = r->t, .rates = rates };
-  const pw_array array[] = {
-    { &b->q0, n }, { &b->v0, n }, { &b->a0, n }, { &b->lambda0, rows }, { &b->ledger0, entries }, { &b->rate0, entries }
-  };
+  const pw_array array[] = { { &b->q0, pw_state_length (r->s) }, { &b->ledger0, entries }, { &b->rate0, entries } };
   b->memory = pw_take_arrays (array, sizeof array / sizeof *array);
   if (b->memory == NULL) return pw_fail_memory (r->s, error);
   return pw_projector_open (&b->projector, r, NULL, NULL, error);
@@ -23,12 +21,9 @@ void pw_dense_output_close (pw_dense_output *b) {
 }
 
 void pw_dense_output_keep (pw_dense_output *b, const pw_run *r) {
-  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
+  size_t entries = (size_t)r->s->entries * sizeof (double);
   b->t0 = r->t;
-  memcpy (b->q0, r->q, n);
-  memcpy (b->v0, r->v, n);
-  memcpy (b->a0, r->a, n);
-  memcpy (b->lambda0, r->lambda, (size_t)r->s->rows * sizeof (double));
+  memcpy (b->q0, r->q, pw_state_length (r->s) * sizeof *r->q);
   memcpy (b->ledger0, r->ledger, entries);
   memcpy (b->rate0, r->rate, entries);
 }
@@ -46,21 +41,18 @@ static double dense_hermite (double x, double h, double y0, double s0, double y1
 
 static int dense_inside (pw_dense_output *b, pw_run *r, double t) {
   const pw_system *s = r->s;
+  const double *q0 = b->q0, *v0 = q0 + (r->v - r->q), *a0 = q0 + (r->a - r->q), *lambda0 = q0 + (r->lambda - r->q);
   double h = r->t - b->t0, x = (t - b->t0) / h, worst;
   int row;
   for (int j = 0; j < s->coords; j++) {
-    r->q_at[j] = dense_hermite (x, h, b->q0[j], b->v0[j], r->q[j], r->v[j]);
-    r->v_at[j] = dense_hermite (x, h, b->v0[j], b->a0[j], r->v[j], r->a[j]);
-    r->a_at[j] = (1 - x) * b->a0[j] + x * r->a[j];
+    r->q_at[j] = dense_hermite (x, h, q0[j], v0[j], r->q[j], r->v[j]);
+    r->v_at[j] = dense_hermite (x, h, v0[j], a0[j], r->v[j], r->a[j]);
+    r->a_at[j] = (1 - x) * a0[j] + x * r->a[j];
   }
-  for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * b->lambda0[i] + x * r->lambda[i];
+  for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * lambda0[i] + x * r->lambda[i];
   for (int i = 0; i < s->entries; i++)
     r->ledger_at[i] = b->ledger0[i] + h * x * (b->rate0[i] + 0.5 * x * (r->rate[i] - b->rate0[i]));
-  if (b->rates < 0) {
-    int placed = pw_update_kinematics (r->w, t, r->q_at, r->v_at);
-    if (placed == PW_OK) pw_evaluate_J (r->w);
-    return placed;
-  }
+  if (b->rates < 0) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
   int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at, &row, &worst);
   return status == PW_OK && b->rates ? pw_project_velocities (&b->projector, r, r->v_at) : status;
 }

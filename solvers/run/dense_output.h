@@ -5,9 +5,9 @@
 #include "method.h"
 
 typedef struct {
-  double t0;                                        /* the beginning of the last step */
-  double *q0, *v0, *a0, *lambda0, *ledger0, *rate0; /* the state there; lambda: all rows */
-  int rates;                                        /* 1: project velocities; 0: positions only; -1: neither */
+  double t0;                    /* the beginning of the last step */
+  double *q0, *ledger0, *rate0; /* the state there, laid out as in pw_run */
+  int rates;                    /* 1: project velocities; 0: positions only; -1: neither */
   pw_projector projector;
   char *memory;
 } pw_dense_output;

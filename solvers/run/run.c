@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "rank.h"
-#include "run_parts.h"
+#include "method.h"
 #include "util.h"
 
 int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {

@@ -5,7 +5,7 @@
 #include <string.h>
 #include "methods.h"
 #include "rank.h"
-#include "run_parts.h"
+#include "method.h"
 #include "util.h"
 
 #define RUN_LEAST_RTOL (100 * DBL_EPSILON)
@@ -38,10 +38,17 @@ static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
   const pw_array array[] = {
-    { &r->q, 3 * n + rows },     { &r->ledger, entries },     { &r->rate, entries },
-    { &r->q_at, 3 * n + rows },  { &r->ledger_at, entries },  { &r->scratch, 2 * n + 3 * rows },
-    { &r->q_given, n },          { &r->v_given, n },          { &r->saturation, 2 * n },
-    { &r->matrix_state, 2 * n }, { &r->matrix_range, 2 * n },
+    { &r->q, pw_state_length (s) },
+    { &r->ledger, entries },
+    { &r->rate, entries },
+    { &r->q_at, pw_state_length (s) },
+    { &r->ledger_at, entries },
+    { &r->scratch, 2 * n + 3 * rows },
+    { &r->q_given, n },
+    { &r->v_given, n },
+    { &r->saturation, 2 * n },
+    { &r->matrix_state, 2 * n },
+    { &r->matrix_range, 2 * n },
   };
   r->memory = pw_take_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
