@@ -23,21 +23,21 @@ struct pw_run {
   int redundant;               /* number of redundant rows */
   int *redundant_row;          /* their indices */
   double *coefficient;         /* redundant x rows: each as a combination of the active rows; then scratch */
-  double *shared;              /* rows: least-norm multipliers for the ledger; NULL: no redundant row moves */
+  double *least_norm;          /* rows: least-norm multipliers for the ledger; NULL: no redundant row moves */
   char *rank_memory;
-  double grip,
-      reselect; /* conditioning of the active rows at the state reached (rank.h); value below which others are tried */
+  double conditioning;    /* of the active rows at the state reached (rank.h) */
+  double reselect;        /* its value below which other rows are tried */
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refuse;          /* sine at which an evaluation is refused */
   int near;               /* 1 once an evaluation was near a singular configuration */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
-  double before;          /* those of the last such state */
+  double previous_norm;   /* acceleration norm of the last such state */
   int differentiates;     /* 1: the method uses the derivatives of the equations (tangent.h) */
   double alpha, beta;     /* Baumgarte's, used by pw_run_accelerate; 0: none */
   double breakpoint;      /* first discontinuity of a signal after t */
-  int stuck;              /* consecutive steps that did not advance */
-  pw_residuals known;     /* of the state reached; NaN: not computed */
+  int stalled;            /* consecutive steps that did not advance */
+  pw_residuals residuals; /* of the state reached; NaN: not computed */
 
   /* The state reached, always with its accelerations and multipliers. */
   double t;
@@ -67,7 +67,7 @@ struct pw_run {
   int outdated;                        /* 1: the state reached is outside that range */
   double *q_given, *v_given;
   unsigned char *origin; /* 2 coords: of initial values, as in pw_system */
-  pw_initial_report start;
+  pw_initial_report initial;
   pw_statistics statistics;
   pw_method_data *data; /* private to the integrator */
   char *memory;
@@ -256,11 +256,11 @@ void pw_show_reached (pw_run *r);
  * (singular.c). */
 int pw_fail_singular (pw_run *r, double t, pw_error *error);
 
-/* Adds the residuals of the state just evaluated to r->known and the statistics; those that a projection has
+/* Adds the residuals of the state just evaluated to r->residuals and the statistics; those that a projection has
  * computed are reused. */
 void pw_note_residuals (pw_run *r);
 static inline void pw_forget_residuals (pw_run *r) {
-  r->known.position = r->known.velocity = NAN;
+  r->residuals.position = r->residuals.velocity = NAN;
 }
 
 /* Coefficients of the i-th redundant row in the active ones, where J is evaluated and the saddle factorised. */
@@ -305,8 +305,8 @@ void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
 
 /* ---- Initial conditions ---- */
 
-/* Makes r->q, r->v consistent at r->t and fills the report; held: prescribed states.  Errors: PW_INITIAL. */
-int pw_run_make_consistent (pw_run *r, const unsigned char *held, pw_error *error);
+/* Makes r->q, r->v consistent at r->t and fills the report; prescribed: origins of states that are kept if possible.  Errors: PW_INITIAL. */
+int pw_run_make_consistent (pw_run *r, const unsigned char *prescribed, pw_error *error);
 /* Counts the states that moved, in the report; needs the scales. */
 void pw_run_count_moved (pw_run *r);
 

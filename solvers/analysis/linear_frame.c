@@ -200,13 +200,13 @@ static void linear_probe (pw_linearisation *x) {
 }
 
 pw_steadiness pw_linear_steady (pw_linearisation *x) {
-  static const double share[] = { 0.0123, 0.31, 0.77, 1 };
+  static const double fraction[] = { 0.0123, 0.31, 0.77, 1 };
   pw_run *r = x->r;
   double span = r->settings.span > 0 ? r->settings.span : r->w->scale.time;
   if (!(x->frame.residual <= LINEAR_STEADY)) return PW_ACCELERATED;
   if (!(pw_next_breakpoint (r->w, 0, r->t) > r->t + span)) return PW_CHANGING;
   linear_probe (x);
   int same = linear_same (x, 0.137 * fmin (r->w->scale.time, span));
-  for (size_t i = 0; same && i < sizeof share / sizeof *share; i++) same = linear_same (x, share[i] * span);
+  for (size_t i = 0; same && i < sizeof fraction / sizeof *fraction; i++) same = linear_same (x, fraction[i] * span);
   return pw_linear_evaluate (x, r->t, r->q, r->v) == PW_OK && same ? PW_STEADY : PW_CHANGING;
 }

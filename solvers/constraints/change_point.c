@@ -125,7 +125,7 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3;
   double *memory = malloc (6 * n * sizeof *memory);
-  const pw_residuals known = r->known;
+  const pw_residuals known = r->residuals;
   const pw_statistics statistics = r->statistics;
   change_verdict verdict = CHANGE_UNKNOWN;
   *w = (change_walk){ .r = r, .row = -1 };
@@ -140,7 +140,7 @@ static change_verdict change_walk_there (pw_run *r, change_walk *w, pw_error *er
     pw_projector_close (&w->projector);
   }
   free (memory);
-  r->known = known;
+  r->residuals = known;
   r->statistics = statistics;
   return verdict;
 }

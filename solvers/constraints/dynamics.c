@@ -93,7 +93,7 @@ void pw_show_reached (pw_run *r) {
 }
 
 void pw_note_residuals (pw_run *r) {
-  pw_residuals *now = &r->known;
+  pw_residuals *now = &r->residuals;
   pw_statistics *s = &r->statistics;
   if (isnan (now->position)) pw_evaluate_position_residual (r->w, NULL, now);
   if (isnan (now->velocity)) pw_evaluate_velocity_residual (r->w, NULL, now);

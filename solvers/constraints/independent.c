@@ -71,12 +71,12 @@ static int independent_nearby (pw_run *r, independent_search *x, int rank, int n
 static void independent_list_redundant (pw_run *r) {
   const pw_system *s = r->s;
   r->redundant = 0;
-  r->shared = NULL;
+  r->least_norm = NULL;
   for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
     for (int i = k->row; i < k->row + k->b.count * k->kind->rows; i++) {
       if (r->active[i]) continue;
       r->redundant_row[r->redundant++] = i;
-      if (k->kind->eta) r->shared = (double *)(void *)r->redundant_row - s->rows;
+      if (k->kind->eta) r->least_norm = (double *)(void *)r->redundant_row - s->rows;
     }
 }
 
@@ -106,8 +106,8 @@ int pw_rank_open (pw_run *r, pw_error *error) {
   if (best > rank)
     status = pw_fail (
         error, PW_INITIAL,
-        "model %s: the start is a singular configuration: %d constraint rows are independent there, %d nearby; "
-        "start a little off it",
+        "model %s: the initial configuration is singular: %d constraint equations are independent there, %d nearby; "
+        "begin slightly off it",
         s->model, rank, best);
   else if (best < s->rows && independent_store (r, x.best, s->rows - best) != PW_OK)
     status = pw_fail_memory (s, error);

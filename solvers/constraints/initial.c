@@ -15,39 +15,40 @@
 /* Where an attempt stopped. */
 typedef struct {
   int row;
-  int rates; /* 0: positions, 1: velocities */
+  int velocities; /* 0: positions, 1: velocities */
   double off;
-  int placed; /* 1: it has found positions */
+  int assembled; /* 1: it has found positions */
 } initial_failure;
 
 /* Scale factor for the metric of massless coordinates: 1e-6 of the least entry of the mass matrix, angles in units
- * of L, instead of the mean, since unrelated bodies may be heavy; limited by round-off. */
+ * of L, instead of the mean, since unrelated bodies may be massive; limited by round-off. */
 static double initial_massless_scale (const pw_system *s) {
-  double least = INFINITY, most = 0, light = 0;
+  double least = INFINITY, most = 0, massless = 0;
   for (int j = 0; j < s->coords; j++) {
     double unit = pw_is_angle (s, j) ? s->scale.length : 1, entry = s->metric[j] / (unit * unit);
     if (s->mass[j] > 0)
       least = fmin (least, entry), most = fmax (most, entry);
     else
-      light = entry;
+      massless = entry;
   }
-  return light > 0 && most > 0 ? fmax (1e-6 * least, 1e-12 * most) / light : 1;
+  return massless > 0 && most > 0 ? fmax (1e-6 * least, 1e-12 * most) / massless : 1;
 }
 
 /* The metric, with INFINITY for prescribed coordinates.  If `metric` is the mass matrix, the constraint equations
  * determine massless velocities. */
-static void initial_weights (const pw_system *s, const double *metric, const unsigned char *held, double *weight) {
-  double light = initial_massless_scale (s);
+static void initial_weights (const pw_system *s, const double *metric, const unsigned char *prescribed,
+                             double *weight) {
+  double massless = initial_massless_scale (s);
   for (int j = 0; j < s->coords; j++)
-    weight[j] = held && held[j] ? INFINITY : s->mass[j] > 0 ? metric[j] : light * metric[j];
+    weight[j] = prescribed && prescribed[j] ? INFINITY : s->mass[j] > 0 ? metric[j] : massless * metric[j];
 }
 
-static int initial_positions (pw_projector *p, pw_run *r, double *q, const double *v, initial_failure *failure) {
+static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failure) {
   int row = -1;
   double worst;
-  int status = pw_project_positions (p, r, r->t, q, v, &row, &worst);
+  int status = pw_project_positions (p, r, r->t, r->q, r->v, &row, &worst);
   if (status == PW_OK) return PW_OK;
-  if (pw_update_kinematics (r->w, r->t, q, v) == PW_OK && row >= 0) {
+  if (pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK && row >= 0) {
     pw_evaluate_g (r->w, p->scratch);
     *failure = (initial_failure){ row, 0, fabs (p->scratch[row]), 0 };
   }
@@ -71,32 +72,32 @@ static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_fa
   return PW_RETRY;
 }
 
-/* One attempt from these positions and the given velocities, with some states prescribed.  The velocity metric is the mass matrix if that
- * determines all velocities, else the position metric. */
-static int initial_attempt (pw_run *r, const unsigned char *held, const double *from, initial_failure *failure,
+/* One attempt from these positions and the given velocities, with some states prescribed.  The velocity metric is the
+ * mass matrix if that determines all velocities, else the position metric. */
+static int initial_attempt (pw_run *r, const unsigned char *prescribed, const double *from, initial_failure *failure,
                             pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   double *weight = malloc (2 * bytes);
   if (weight == NULL) return pw_fail_memory (s, error);
-  initial_weights (s, s->metric, held, weight);
+  initial_weights (s, s->metric, prescribed, weight);
   int status = PW_OK;
   for (int choice = 0; choice < 2 && status == PW_OK; choice++) {
     pw_projector p;
     pw_error none = { 0 };
     memcpy (r->q, from, bytes);
     memcpy (r->v, r->v_given, bytes);
-    status = pw_update_kinematics (r->w, r->t, r->q, r->v);
+    status = pw_evaluate_J_at (r->w, r->t, r->q, r->v);
     if (status != PW_OK) break;
-    pw_evaluate_J (r->w);
-    initial_weights (s, choice == 0 ? s->mass : s->metric, held ? held + s->coords : NULL, weight + s->coords);
+    initial_weights (s, choice == 0 ? s->mass : s->metric, prescribed ? prescribed + s->coords : NULL,
+                     weight + s->coords);
     status = pw_projector_open (&p, r, weight, weight + s->coords, choice == 0 ? &none : error);
     if (status == PW_OK) {
-      status = initial_positions (&p, r, r->q, r->v, failure);
-      failure->placed |= status == PW_OK;
+      status = initial_positions (&p, r, failure);
+      failure->assembled |= status == PW_OK;
       if (status == PW_OK) status = initial_velocities (&p, r, r->v, failure);
       pw_projector_close (&p);
-      if (status != PW_RETRY || !failure->rates) break;
+      if (status != PW_RETRY || !failure->velocities) break;
     }
     if (none.status == PW_RESOURCE) status = pw_fail (error, PW_RESOURCE, "%s", none.text);
     if (choice == 0 && none.status != PW_RESOURCE) status = PW_OK;
@@ -108,12 +109,12 @@ static int initial_attempt (pw_run *r, const unsigned char *held, const double *
 static int initial_fail (pw_run *r, const initial_failure *failure, pw_error *error) {
   char element[120];
   if (failure->row < 0)
-    return pw_fail (error, PW_INITIAL, "model %s: the start cannot be made consistent", r->s->model);
+    return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent", r->s->model);
   pw_system_row_name (r->s, failure->row, element, sizeof element);
   int angle = strcmp (pw_system_reaction_unit (r->s, failure->row), "N m") == 0;
-  return pw_fail (error, PW_INITIAL, "model %s: the start cannot be made consistent: %s is %s by %.6g %s%s",
-                  r->s->model, element, failure->rates ? "violated" : "open", failure->off, angle ? "rad" : "m",
-                  failure->rates ? "/s" : "; if it can close, begin nearer to where it does");
+  return pw_fail (error, PW_INITIAL, "model %s: the initial state cannot be made consistent: %s is %s by %.6g %s%s",
+                  r->s->model, element, failure->velocities ? "violated" : "open", failure->off, angle ? "rad" : "m",
+                  failure->velocities ? "/s" : "; if it can close, begin nearer to where it does");
 }
 
 int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int state) {
@@ -124,12 +125,12 @@ int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int s
 }
 
 void pw_run_count_moved (pw_run *r) {
-  r->start.moved = r->start.changed = 0;
-  r->start.time = r->w->scale.time;
+  r->initial.moved = r->initial.changed = 0;
+  r->initial.time = r->w->scale.time;
   for (int j = 0; j < 2 * r->s->coords; j++) {
-    if (!pw_initial_moved (r->s, &r->start, j)) continue;
-    r->start.moved++;
-    r->start.changed += (r->origin[j] & (PW_GIVEN | PW_SPECIFIED)) == PW_SPECIFIED;
+    if (!pw_initial_moved (r->s, &r->initial, j)) continue;
+    r->initial.moved++;
+    r->initial.changed += (r->origin[j] & (PW_GIVEN | PW_SPECIFIED)) == PW_SPECIFIED;
   }
 }
 
@@ -137,30 +138,17 @@ int pw_initial_specified (const pw_initial_report *report, int state) {
   return (report->origin[state] & (PW_GIVEN | PW_SPECIFIED)) != 0;
 }
 
-/* Fills the report; the state given is in q_given, the new one in q. */
-static void initial_report (pw_run *r, int released, const pw_residuals *before) {
-  pw_initial_report *report = &r->start;
-  *report = (pw_initial_report){ .q_given = r->q_given,
-                                 .v_given = r->v_given,
-                                 .q = r->q,
-                                 .v = r->v,
-                                 .origin = r->origin,
-                                 .released = released,
-                                 .position = before->position,
-                                 .velocity = before->velocity };
-}
-
 /* If redundant equations make the plain attempt fail, it is repeated with an independent set: one selected at the given
  * positions, then one selected where an attempt that prescribes nothing ends, from there.  Off the constraints redundant
  * equations appear independent, increasingly with distance: hence several tolerances, and the second positions. */
-static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure *failure, pw_error *error) {
+static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_failure *failure, pw_error *error) {
   static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
   enum { TOLERANCES = sizeof tolerance / sizeof *tolerance };
   const pw_system *s = r->s;
   const unsigned char *before = r->active;
   size_t n = (size_t)s->coords, m = (size_t)s->rows;
   initial_failure later;
-  int status = initial_attempt (r, held, r->q_given, failure, error), rank = s->rows;
+  int status = initial_attempt (r, prescribed, r->q_given, failure, error), rank = s->rows;
   if (status != PW_RETRY || before || (double)s->rows * s->coords > PW_RANK_MOST) return status;
   double *at = malloc (2 * n * sizeof *at + m), *from = at + n;
   if (at == NULL) return pw_fail_memory (s, error);
@@ -170,7 +158,7 @@ static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure
   for (int i = 0; i < 2 * TOLERANCES && status == PW_RETRY; i++) {
     if (i == TOLERANCES) {
       if (initial_attempt (r, NULL, r->q_given, &later, error) == PW_RESOURCE) status = PW_RESOURCE;
-      for (size_t j = 0; j < n; j++) at[j] = r->q[j], from[j] = held && held[j] ? from[j] : r->q[j];
+      for (size_t j = 0; j < n; j++) at[j] = r->q[j], from[j] = prescribed && prescribed[j] ? from[j] : r->q[j];
       rank = s->rows;
     }
     if (status != PW_RETRY || pw_update_kinematics (r->w, r->t, at, r->v_given) != PW_OK) continue;
@@ -181,9 +169,9 @@ static int initial_ranked (pw_run *r, const unsigned char *held, initial_failure
     rank = now;
     r->active = active;
     later = (initial_failure){ .row = -1 };
-    status = initial_attempt (r, held, from, &later, error);
+    status = initial_attempt (r, prescribed, from, &later, error);
     r->active = before;
-    failure->placed |= later.placed;
+    failure->assembled |= later.assembled;
   }
   free (at);
   return status;
@@ -211,10 +199,10 @@ static int initial_locked (pw_run *r, pw_error *error) {
 
 /* Sets of prescribed states, in the order tried: positions and velocities by origin, and positions of coordinates with
  * mass.  If the positions fail, the velocities are not tried. */
-static const struct initial_way {
+static const struct initial_set {
   unsigned char q, v;
   enum { INITIAL_FREE, INITIAL_MASS, INITIAL_MASS_PERHAPS } mass; /* PERHAPS: only if some of them may be unintended */
-} initial_ways[] = {
+} initial_sets[] = {
   { PW_GIVEN | PW_SPECIFIED, PW_GIVEN | PW_SPECIFIED, INITIAL_MASS },
   { PW_GIVEN | PW_SPECIFIED, PW_GIVEN, INITIAL_MASS },
   { PW_GIVEN, PW_GIVEN | PW_SPECIFIED, INITIAL_MASS_PERHAPS },
@@ -231,22 +219,23 @@ static const struct initial_way {
 };
 
 /* The mask of a set; 0 if it does not apply here. */
-static int initial_mask (const pw_system *s, const unsigned char *held, const struct initial_way *way,
+static int initial_mask (const pw_system *s, const unsigned char *prescribed, const struct initial_set *set,
                          unsigned char *mask) {
-  int n = s->coords, light = 0, heavy = 0, perhaps = 0;
+  int n = s->coords, massless = 0, massive = 0, perhaps = 0;
   for (int j = 0; j < n; j++) {
-    int q = held ? held[j] : 0, v = held ? held[n + j] : 0, keep = way->mass && s->mass[j] > 0 && !(q & way->q);
-    mask[j] = (q & way->q) != 0 || keep;
-    mask[n + j] = (v & way->v) != 0;
-    light += s->mass[j] == 0 && !mask[j], heavy += keep, perhaps += keep && q & PW_PERHAPS;
+    int q = prescribed ? prescribed[j] : 0, v = prescribed ? prescribed[n + j] : 0;
+    int keep = set->mass && s->mass[j] > 0 && !(q & set->q);
+    mask[j] = (q & set->q) != 0 || keep;
+    mask[n + j] = (v & set->v) != 0;
+    massless += s->mass[j] == 0 && !mask[j], massive += keep, perhaps += keep && q & PW_PERHAPS;
   }
-  return !way->mass || (light > 0 && heavy > 0 && (way->mass == INITIAL_MASS || perhaps > 0));
+  return !set->mass || (massless > 0 && massive > 0 && (set->mass == INITIAL_MASS || perhaps > 0));
 }
 
 /* 1 if some of what the user gave is not in the mask. */
-static int initial_released (const pw_system *s, const unsigned char *held, const unsigned char *mask) {
+static int initial_released (const pw_system *s, const unsigned char *prescribed, const unsigned char *mask) {
   int released = 0;
-  for (int j = 0; held && j < 2 * s->coords; j++) released |= held[j] & PW_GIVEN && !mask[j];
+  for (int j = 0; prescribed && j < 2 * s->coords; j++) released |= prescribed[j] & PW_GIVEN && !mask[j];
   return released;
 }
 
@@ -254,30 +243,30 @@ static int initial_released (const pw_system *s, const unsigned char *held, cons
  * prescribed: sketches of linkages, which specify all positions, usually fail there. */
 #define INITIAL_SMALL 1e4
 
-static int initial_try (pw_run *r, const unsigned char *held, initial_failure *failure, int *released,
+static int initial_try (pw_run *r, const unsigned char *prescribed, initial_failure *failure, int *released,
                         pw_error *error) {
-  const int ways = sizeof initial_ways / sizeof *initial_ways;
+  const int sets = sizeof initial_sets / sizeof *initial_sets;
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords;
   unsigned char *mask = malloc (4 * n + 1), *last = mask + 2 * n;
   if (mask == NULL) return pw_fail_memory (s, error);
-  int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, placed = 0;
-  for (const struct initial_way *way = initial_ways; way < initial_ways + ways && status == PW_RETRY; way++) {
-    if (!initial_mask (s, held, way, mask)) continue;
-    int ranked = small || !((way->q | way->v) & PW_SPECIFIED);
-    if (ranked == before && memcmp (mask, last, placed ? 2 * n : n) == 0) continue;
+  int status = PW_RETRY, small = (double)s->rows * s->coords < INITIAL_SMALL, before = -1, assembled = 0;
+  for (const struct initial_set *set = initial_sets; set < initial_sets + sets && status == PW_RETRY; set++) {
+    if (!initial_mask (s, prescribed, set, mask)) continue;
+    int ranked = small || !((set->q | set->v) & PW_SPECIFIED);
+    if (ranked == before && memcmp (mask, last, assembled ? 2 * n : n) == 0) continue;
     initial_failure now = { .row = -1 };
     status = ranked ? initial_ranked (r, mask, &now, error) : initial_attempt (r, mask, r->q_given, &now, error);
     memcpy (last, mask, 2 * n);
-    before = ranked, placed = now.placed;
+    before = ranked, assembled = now.assembled;
     if (now.row >= 0) *failure = now;
   }
-  *released = initial_released (s, held, mask);
+  *released = initial_released (s, prescribed, mask);
   free (mask);
   return status;
 }
 
-int pw_run_make_consistent (pw_run *r, const unsigned char *held, pw_error *error) {
+int pw_run_make_consistent (pw_run *r, const unsigned char *prescribed, pw_error *error) {
   const pw_system *s = r->s;
   size_t bytes = (size_t)s->coords * sizeof (double);
   pw_residuals before;
@@ -290,8 +279,15 @@ int pw_run_make_consistent (pw_run *r, const unsigned char *held, pw_error *erro
   pw_evaluate_J (r->w);
   pw_evaluate_residuals (r->w, NULL, &before);
   if (!(before.position <= 8 * DBL_EPSILON && before.velocity <= 8 * DBL_EPSILON))
-    status = initial_try (r, held, &failure, &released, error);
-  initial_report (r, released, &before);
+    status = initial_try (r, prescribed, &failure, &released, error);
+  r->initial = (pw_initial_report){ .q_given = r->q_given,
+                                    .v_given = r->v_given,
+                                    .q = r->q,
+                                    .v = r->v,
+                                    .origin = r->origin,
+                                    .released = released,
+                                    .position = before.position,
+                                    .velocity = before.velocity };
   if (status == PW_OK) status = initial_locked (r, error);
   if (status == PW_METHOD) return pw_fail_signal (r->t, error);
   return status == PW_RETRY ? initial_fail (r, &failure, error) : status;

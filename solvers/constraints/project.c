@@ -104,7 +104,7 @@ static int project_positions (pw_projector *p, pw_run *r, double t, double *q, c
     pw_saddle_solve (p->position, NULL, g, dq, mu);
     for (int j = 0; j < s->coords; j++) q[j] += dq[j];
   }
-  if (p->active == NULL) r->known.position = now.position, r->known.g = now.g;
+  if (p->active == NULL) r->residuals.position = now.position, r->residuals.g = now.g;
   return project_others (p, s, r->limits.follows, g, size, row);
 }
 
@@ -140,12 +140,12 @@ int pw_project_velocities (pw_projector *p, pw_run *r, double *v) {
 /* 1 if the velocities satisfy J v = eta to round-off and need no correction; J must be evaluated.  Near a singular
  * configuration, or with redundant equations, that is not sufficient. */
 static int project_is_good (const pw_projector *p, pw_run *r) {
-  r->known.velocity = NAN;
+  r->residuals.velocity = NAN;
   if (p->own_velocity || p->active || r->near) return 0;
   pw_residuals now;
   pw_evaluate_velocity_residual (r->w, NULL, &now);
   if (!(now.velocity <= PROJECT_GOOD)) return 0;
-  r->known.velocity = now.velocity, r->known.jv = now.jv;
+  r->residuals.velocity = now.velocity, r->residuals.jv = now.jv;
   return 1;
 }
 

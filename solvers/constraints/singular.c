@@ -178,11 +178,11 @@ int pw_fail_singular (pw_run *r, double t, pw_error *error) {
         t);
   if (row >= 0) pw_system_row_name (r->s, row, element, sizeof element);
   if (sine <= r->limits.rank)
-    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s says what other constraints say already",
-                    t, element);
+    return pw_fail (error, PW_METHOD, "t = %.6g s: singular configuration: %s depends on other constraints", t,
+                    element);
   return pw_fail (
       error, PW_METHOD,
-      "t = %.6g s: near a singular configuration: %s says almost what other constraints say (sine %.2g); the next "
+      "t = %.6g s: near a singular configuration: %s nearly depends on other constraints (sine %.2g); the next "
       "step cannot be computed",
       t, element, sine);
 }

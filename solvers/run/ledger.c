@@ -56,10 +56,10 @@ void pw_ledger_note (pw_run *r) {
 }
 
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate) {
-  if (r->redundant && r->shared && pw_saddle_factor (r->saddle) == PW_OK) {
-    memcpy (r->shared, lambda, (size_t)r->s->rows * sizeof *lambda);
-    pw_rank_least_norm (r, r->shared);
-    lambda = r->shared;
+  if (r->redundant && r->least_norm && pw_saddle_factor (r->saddle) == PW_OK) {
+    memcpy (r->least_norm, lambda, (size_t)r->s->rows * sizeof *lambda);
+    pw_rank_least_norm (r, r->least_norm);
+    lambda = r->least_norm;
   }
   pw_evaluate_ledger (r->w, lambda, rate);
 }

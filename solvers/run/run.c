@@ -37,8 +37,8 @@ int pw_run_evaluate (pw_run *r, pw_error *error) {
 void pw_run_watch (pw_run *r) {
   pw_watchdog_begin (r);
   if (r->redundant == 0) return;
-  r->grip = pw_rank_conditioning (r);
-  r->reselect = fmin (r->limits.loosened * r->grip, r->limits.loose);
+  r->conditioning = pw_rank_conditioning (r);
+  r->reselect = fmin (r->limits.loosened * r->conditioning, r->limits.loose);
 }
 
 int pw_run_look_ahead (pw_run *r, pw_error *error) {
@@ -55,8 +55,8 @@ int pw_run_look_ahead (pw_run *r, pw_error *error) {
 }
 
 void pw_run_reference_level (pw_run *r) {
-  r->before = pw_run_acceleration_norm (r);
-  r->reference_level = fmax (1, r->before);
+  r->previous_norm = pw_run_acceleration_norm (r);
+  r->reference_level = fmax (1, r->previous_norm);
 }
 
 static void run_drop_method (pw_run *r) {
@@ -109,7 +109,7 @@ static int run_has_no_method (const pw_run *r, pw_error *error) {
  * next step, so that samples of the last one remain available, and independent of whether any were taken. */
 static int run_reselect (pw_run *r, pw_error *error) {
   pw_sample sample;
-  r->reselect = r->grip / 2;
+  r->reselect = r->conditioning / 2;
   int status = pw_run_sample (r, r->t, &sample, error);
   if (status != PW_OK) return status;
   int other = pw_rank_reselect (r);
@@ -120,8 +120,8 @@ static int run_reselect (pw_run *r, pw_error *error) {
 
 /* If an evaluation fails just ahead, libraries take steps below the round-off of time for ever. */
 static int run_check_progress (pw_run *r, double before, pw_error *error) {
-  r->stuck = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stuck + 1;
-  if (r->stuck < r->limits.stalled) return PW_OK;
+  r->stalled = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stalled + 1;
+  if (r->stalled < r->limits.stalled) return PW_OK;
   return pw_fail (
       error, PW_METHOD,
       "t = %.6g s: no step gets any further, however small: what comes next cannot be evaluated, or not within "
@@ -143,7 +143,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   r->w->failed = NULL;
   if (r->t >= r->breakpoint || r->interrupted) status = run_pass_breakpoint (r, error);
   r->interrupted = 0;
-  if (status == PW_OK && r->redundant && r->grip < r->reselect) status = run_reselect (r, error);
+  if (status == PW_OK && r->redundant && r->conditioning < r->reselect) status = run_reselect (r, error);
   if (status == PW_OK) status = r->method->advance (r, t_end, error);
   if (status == PW_STOPPED) return status;
   if (status == PW_OK) status = pw_run_watchdog (r, error);
@@ -152,7 +152,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   if (status == PW_OK) status = run_check_progress (r, before, error);
   if (status != PW_OK) return pw_run_annotate_error (r, status, error);
   if (r->redundant == 0) return PW_OK;
-  r->grip = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_conditioning (r) : 0;
+  r->conditioning = pw_saddle_factor (r->saddle) == PW_OK ? pw_rank_conditioning (r) : 0;
   return PW_OK;
 }
 
@@ -265,7 +265,7 @@ const pw_statistics *pw_run_statistics (const pw_run *r) {
 }
 
 const pw_initial_report *pw_run_initial (const pw_run *r) {
-  return &r->start;
+  return &r->initial;
 }
 
 const pw_scale *pw_run_scale (const pw_run *r) {

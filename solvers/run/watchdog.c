@@ -136,7 +136,7 @@ static int watchdog_contradicts (pw_run *r) {
 
 /* The constraint residual, in units of the scene. */
 static double watchdog_residual (const pw_run *r) {
-  return pw_larger (r->known.position, r->known.g / r->s->scale.length);
+  return pw_larger (r->residuals.position, r->residuals.g / r->s->scale.length);
 }
 
 /* 1 if a constraint residual `off` may decide which branch is followed: if the sine s of the smallest angle between
@@ -155,17 +155,17 @@ static int watchdog_unresolved (pw_run *r, double off, double part) {
 /* Such a turn is a rounded corner, the wider the larger the residual: its accelerations need not jump. */
 static int watchdog_check_turn (pw_run *r, double now, pw_error *error) {
   const pw_watchdog *limit = &r->limits;
-  double off = watchdog_residual (r), before = fmax (r->before, limit->least_turn);
+  double off = watchdog_residual (r), before = fmax (r->previous_norm, limit->least_turn);
   if (!(now <= limit->turn * before) && watchdog_unresolved (r, off, limit->drift_turn))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) may lead to "
                     "another branch, with %.3g times the accelerations of before; methods with projection pass",
-                    r->t, r->known.position, now / before);
+                    r->t, r->residuals.position, now / before);
   if (!(off <= limit->drift_far) && watchdog_unresolved (r, off, limit->drift_any))
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: lost at a singular configuration: constraints off by %.2g (scaled) tell no branch "
                     "from another; methods with projection pass",
-                    r->t, r->known.position);
+                    r->t, r->residuals.position);
   return PW_OK;
 }
 
@@ -187,7 +187,7 @@ static int watchdog_check_jump (pw_run *r, pw_error *error) {
   if (r->near || watchdog_unresolved (r, watchdog_residual (r), r->limits.drift_near))
     return watchdog_check_turn (r, now, error);
   r->reference_level = pw_larger (now, r->reference_level);
-  r->before = now;
+  r->previous_norm = now;
   return PW_OK;
 }
 

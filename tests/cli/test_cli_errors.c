@@ -114,7 +114,7 @@ static void test_bad_models (void **state) {
                  "  pw_add_pin (m, &(pw_pin){ .name = \"right\", .body = { \"rod\", \"ground\" }, .at = { { 0.5, 0 }, "
                  "{ 3, 0 } } });\n"));
   cli_bad ("pinwheel run @/torn.c --json @/torn.json", 3,
-           "model torn: the start cannot be made consistent: pin left is open by 1 m; if it can close, begin nearer to "
+           "model torn: the initial state cannot be made consistent: pin left is open by 1 m; if it can close, begin nearer to "
            "where it does");
   assert_true (cli_says (cli_file ("torn.json"), "status", "start"));
 

@@ -32,9 +32,9 @@ static void project_try (const char *model, const char *parameter, double value,
   check_bits ("positions", q, x.q, n);
   if (off == 0) {
     check_bits ("rates", v, x.v, n);
-    check_close ("what is known", r->known.velocity, now.velocity, 0, "the same sweep");
+    check_close ("what is known", r->residuals.velocity, now.velocity, 0, "the same sweep");
   } else
-    assert_true (fabs (v[1] - x.v[1]) < fabs (off) && isnan (r->known.velocity));
+    assert_true (fabs (v[1] - x.v[1]) < fabs (off) && isnan (r->residuals.velocity));
   assert_int_equal (pw_run_accelerate (r, x.t, q, v, other, mu), PW_OK);
   for (int j = 0; j < n; j++) most = fmax (most, fabs (other[j]));
   for (int j = 0; j < n; j++) check_close (model, a[j], other[j], 256 * CHECK_EPS * most, "round-off, condition");

@@ -463,10 +463,10 @@ static void start_refused (void (*build) (pw_model *, const void *), const char 
 
 static void test_impossible (void **state) {
   (void)state;
-  start_refused (start_impossible, "model scene: the start cannot be made consistent: pin left is open by 1 m; if it "
+  start_refused (start_impossible, "model scene: the initial state cannot be made consistent: pin left is open by 1 m; if it "
                                    "can close, begin nearer to where it does");
   start_refused (start_torn,
-                 "model scene: the start cannot be made consistent: drive other is violated by 1.26221 rad/s");
+                 "model scene: the initial state cannot be made consistent: drive other is violated by 1.26221 rad/s");
 }
 
 int main (void) {
