@@ -40,19 +40,19 @@ static void test_tables (void **state) {
   profile_has ("pin", 1, 2, 2);
   profile_has ("wheel", 2, 2, 2);
   profile_has ("torque", 1, 0, 0);
-  static const char *const stages[] = { "place", "sweep", "factor", "solve", "all in one go" };
+  static const char *const stages[] = { "kinematics", "equations", "factorisation", "solution", "together" };
   double value[4], all[4];
-  assert_int_equal (profile_row ("all in one go", all, 4), 4);
+  assert_int_equal (profile_row ("together", all, 4), 4);
   for (int i = 0; i < 5; i++) {
     assert_int_equal (profile_row (stages[i], value, 4), 4);
     assert_true (value[0] > 0 && value[2] > value[0]); /* three evaluations a step, and that after the projection */
   }
-  assert_int_equal (profile_row ("project", value, 2), 2);
+  assert_int_equal (profile_row ("projection", value, 2), 2);
   assert_true (value[0] > 0 && all[2] > all[0]);
-  assert_null (strstr (cli_out, "stabilise"));
+  assert_null (strstr (cli_out, "stabilisation"));
   cli_good ("pinwheel run ezyroller --t-end 0.5 --method rk4+baumgarte --profile");
-  assert_int_equal (profile_row ("stabilise", value, 4), 4);
-  assert_int_equal (profile_row ("project", value, 4), -1);
+  assert_int_equal (profile_row ("stabilisation", value, 4), 4);
+  assert_int_equal (profile_row ("projection", value, 4), -1);
 }
 
 /* An implicit method's steps are not made of evaluations of the accelerations. */
@@ -60,8 +60,8 @@ static void test_implicit (void **state) {
   (void)state;
   double value[4];
   cli_good ("pinwheel run ezyroller --t-end 0.5 --method ida+ggl --profile");
-  assert_int_equal (profile_row ("solve", value, 4), 2);
-  assert_int_equal (profile_row ("project", value, 4), -1);
+  assert_int_equal (profile_row ("solution", value, 4), 2);
+  assert_int_equal (profile_row ("projection", value, 4), -1);
 }
 
 #define PROFILE_OTHER "pinwheel run ezyroller -t 0.5 -m rk4+projection:metric=identity --energy --every 0.1 -o -"
@@ -74,7 +74,7 @@ static void test_unnoticed (void **state) {
   memcpy (table, cli_out, sizeof table);
   assert_int_equal (cli_run (PROFILE_OTHER " --profile"), 0);
   assert_string_equal (cli_out, table);
-  assert_non_null (strstr (cli_err, "all in one go"));
+  assert_non_null (strstr (cli_err, "together"));
 }
 
 int main (void) {

@@ -13,10 +13,10 @@ static void told_shows (const char *text) {
 static void test_roller (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --energy"), 0);
-  told_shows ("\n  left.spin                  2.5 rad   left.spin_rate               5 rad/s\n");
-  told_shows ("\n  right.spin                3.75 rad   right.spin_rate            7.5 rad/s\n");
+  told_shows ("\n  left.spin             2.5  rad  left.spin_rate               5  rad/s\n");
+  told_shows ("\n  right.spin           3.75  rad  right.spin_rate            7.5  rad/s\n");
   told_shows ("\n  energy\n  kinetic ");
-  told_shows ("\n  dissipated                0 J\n");
+  told_shows ("\n  dissipated              0  J\n");
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --json @/roller.json"), 0);
   check_close ("spin", cli_number (cli_file ("roller.json"), "elements", "right", "spin", NULL), 3.75, 1e-12,
                "4096 eps");
@@ -35,11 +35,11 @@ static void test_reactions (void **state) {
 static void test_signals (void **state) {
   (void)state;
   cli_good ("pinwheel show tests/models/signals.yaml");
-  told_shows ("heading ramp (from 0.1, to -0.2, start 0.333333, duration 0.7) rad\n");
-  told_shows ("value table (interpolation linear, ends free, 4 points from 0 to 3.14159 s) m/s\n");
-  told_shows ("value pulse (height 0.142857, start 0.1, width 0.2, period 0.7, offset -0.01) N m\n");
-  told_shows ("fx 0.2 cos (3 t + 0.1) N; fy 0.1 N\n");
-  told_shows ("rate smooth-step (from 0.3, to 0, start 0, duration 2) rad/s\n");
+  told_shows ("heading {ramp: {from: 0.1, to: -0.2, start: 0.333333, duration: 0.7}} rad\n");
+  told_shows ("value {table: {points: 4 from 0 to 3.14159 s}} m/s\n");
+  told_shows ("value {pulse: {height: 0.142857, start: 0.1, width: 0.2, period: 0.7, offset: -0.01}} N m\n");
+  told_shows ("fx {harmonic: {amplitude: 0.2, omega: 3, phase: 0.1}} N; fy 0.1 N\n");
+  told_shows ("rate {smooth-step: {from: 0.3, to: 0, duration: 2}} rad/s\n");
 }
 
 /* A free body whose turning is driven by its own rate, 2 1/s: it grows, and no step of RK4 is too large for that. */

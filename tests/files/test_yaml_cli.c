@@ -85,8 +85,9 @@ static void test_expressions (void **state) {
   (void)state;
   cli_write ("e.yaml", cli_expressions);
   cli_good ("pinwheel show @/e.yaml");
-  assert_non_null (strstr (cli_out, "torque T: body a, ground; value t > 0.05 ? A*sin(w*t) : -b.omega N m\n"));
-  assert_non_null (strstr (cli_out, "value A*t^2, rate 2*A*t m or rad\n"));
+  assert_non_null (
+      strstr (cli_out, "torque T: body [a, ground]; value {expression: \"t > 0.05 ? A*sin(w*t) : -b.omega\"} N m\n"));
+  assert_non_null (strstr (cli_out, "value {expression: \"A*t^2\", rate: \"2*A*t\"} m or rad\n"));
   assert_int_equal (
       cli_run ("pinwheel show @/e.yaml --yaml >@/again.yaml && pinwheel run @/e.yaml -t 0.2 -o @/e.csv >/dev/null && "
                "pinwheel run @/again.yaml -t 0.2 -o @/again.csv >/dev/null && cmp @/e.csv @/again.csv"),
@@ -105,7 +106,7 @@ static void test_no_text (void **state) {
   cli_bad ("pinwheel show ezyroller --yaml --start frame.vx=1", 2,
            "--yaml: initial values of --start have no place in a text model; give them to run");
   cli_good ("pinwheel show @/f.c");
-  assert_non_null (strstr (cli_out, "torque T: body a, ground; value f (t) N m"));
+  assert_non_null (strstr (cli_out, "torque T: body [a, ground]; value f (t) N m"));
 }
 
 static void test_max_file (void **state) {

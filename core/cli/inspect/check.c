@@ -4,7 +4,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
-#include "check.h"
+#include "check_report.h"
 #include "report.h"
 
 enum { CHECK_SEEDS = 5 };
@@ -32,14 +32,6 @@ static void check_open (pw_check *x) {
     check_add (&x->problem, "%s", x->start.text);
   else
     x->redundant = pw_report_redundancies (x->r);
-}
-
-void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to) {
-  const pw_initial_report *start = pw_run_initial (x->r);
-  int n = pw_system_coordinates (x->m.system);
-  pw_system_state_name (x->m.system, i, name, size);
-  *from = i < n ? start->q_given[i] : start->v_given[i - n];
-  *to = i < n ? start->q[i] : start->v[i - n];
 }
 
 /* Initial values given by the model or the user that the consistent initialisation has changed. */
@@ -93,35 +85,22 @@ static int check_alone (pw_checked_kind *k, pw_error *error) {
   return PW_OK;
 }
 
-static int check_first_failed (const pw_selftest_report *report) {
-  int i = 0;
-  while (i < report->checks && !report->check[i].failed) i++;
-  return i;
-}
-
 /* The first check that fails, or NULL. */
-static const pw_selftest_check *check_fault (const pw_checked_kind *k) {
-  const pw_selftest_report *report = k->alone.failed ? &k->alone : &k->inside;
-  return report->failed ? &report->check[check_first_failed (report)] : NULL;
+static const pw_selftest_check *check_fault (const pw_selftest_report *report) {
+  for (int i = 0; i < report->checks; i++)
+    if (report->check[i].failed) return &report->check[i];
+  return NULL;
 }
 
 /* Elements of one type are consecutive in a system. */
 static int check_list_kinds (pw_check *x, pw_error *error) {
   const pw_system *s = x->m.system;
-  int elements = pw_system_elements (s);
-  const pw_kind *last = NULL;
-  for (int pass = 0; pass < 2; pass++) {
-    x->kinds = 0;
-    for (int i = 0; i < elements; i++) {
-      const pw_kind *kind = pw_system_element (s, i).kind;
-      x->kinds += kind != last;
-      if (x->kind) x->kind[x->kinds - 1].kind = kind, x->kind[x->kinds - 1].count++;
-      last = kind;
-    }
-    if (x->kind) break;
-    last = NULL;
-    x->kind = calloc ((size_t)x->kinds + 1, sizeof *x->kind);
-    if (x->kind == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->kind = calloc ((size_t)pw_system_elements (s) + 1, sizeof *x->kind);
+  if (x->kind == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < pw_system_elements (s); i++) {
+    const pw_kind *kind = pw_system_element (s, i).kind;
+    if (x->kinds == 0 || x->kind[x->kinds - 1].kind != kind) x->kind[x->kinds++].kind = kind;
+    x->kind[x->kinds - 1].count++;
   }
   return PW_OK;
 }
@@ -136,9 +115,10 @@ static int check_kinds (pw_check *x, pw_error *error) {
   for (pw_checked_kind *k = x->kind; status == PW_OK && k < x->kind + x->kinds; k++) {
     status = check_alone (k, error);
     if (status != PW_OK) break;
-    if (k->alone.failed == 0 || strcmp (k->alone.check[check_first_failed (&k->alone)].name, "table") != 0)
+    const pw_selftest_check *fault = check_fault (&k->alone);
+    if (fault == NULL || strcmp (fault->name, "table") != 0)
       status = pw_selftest_scene (s, T, k->kind, 0, q, v, 1, &k->inside, error);
-    const pw_selftest_check *fault = check_fault (k);
+    if (fault == NULL) fault = check_fault (&k->inside);
     if (fault)
       check_add (&x->problem, "element type %s fails its self-test: %s (%s)", k->kind->name, fault->about,
                  fault->where);

@@ -2,31 +2,19 @@
 #include <stdio.h>
 #include <string.h>
 #include "cli.h"
+#include "print_table.h"
 #include "util.h"
 
-/* ---- Rows in columns ---- */
+enum { LIST_WIDTH = 110 /* of a line, if the last column leaves room */ };
 
-enum { LIST_ROWS = 40, LIST_WIDTH = 110 /* of a line, if the last column leaves room */ };
-
-/* One row: "radius", "number [m]", "required", "radius of the wheel". */
-typedef struct {
-  char name[32], type[40], given[80];
-  const char *about;
-} list_row;
-
-typedef struct {
-  list_row row[LIST_ROWS];
-  int rows;
-} list_table;
-
-/* Copies all texts except the last. */
-static void list_add (list_table *x, const char *name, const char *type, const char *given, const char *about) {
-  if (x->rows == LIST_ROWS) return;
-  list_row *r = &x->row[x->rows++];
-  snprintf (r->name, sizeof r->name, "%s", name);
-  snprintf (r->type, sizeof r->type, "%s", type);
-  snprintf (r->given, sizeof r->given, "%s", given);
-  r->about = about;
+/* A row such as "radius  number [m]  required  radius of the wheel". */
+static void list_row (pw_table *t, const char *name, const char *type, const char *given, const char *about) {
+  t->pad = t->indent = 4;
+  pw_cell (t, -1, name);
+  pw_cell (t, -1, type);
+  pw_cell (t, 0, given);
+  if (pw_cell (t, 0, "")) pw_cli_wrap (about, t->indent, LIST_WIDTH);
+  t->column = t->pad = 0;
 }
 
 /* "required" or the default; the domain of a number; the alternatives of a choice. */
@@ -41,7 +29,7 @@ static void list_given (const pw_field *f, char *text, size_t size) {
   }
 }
 
-static void list_fields (list_table *x, const pw_field *fields) {
+static void list_fields (pw_table *t, const pw_field *fields) {
   static const char *const types[] = { "number", "point", "vector", "body", "signal", "choice" };
   for (const pw_field *f = fields; f->name; f++) {
     char type[60], given[80], times[16] = "";
@@ -49,28 +37,8 @@ static void list_fields (list_table *x, const pw_field *fields) {
     snprintf (type, sizeof type, "%s%s%s%s%s", times, types[f->type], f->unit ? " [" : "", f->unit ? f->unit : "",
               f->unit ? "]" : "");
     list_given (f, given, sizeof given);
-    list_add (x, f->name, type, given, f->about ? f->about : "");
+    list_row (t, f->name, type, given, f->about ? f->about : "");
   }
-}
-
-static void list_wider (int *width, const char *text) {
-  if (*width < (int)strlen (text)) *width = (int)strlen (text);
-}
-
-/* Prints the rows, indented by six, and removes them. */
-static void list_print (list_table *x) {
-  int name = 0, type = 0, given = 0;
-  for (const list_row *r = x->row; r < x->row + x->rows; r++) {
-    list_wider (&name, r->name);
-    list_wider (&type, r->type);
-    list_wider (&given, r->given);
-  }
-  for (const list_row *r = x->row; r < x->row + x->rows; r++) {
-    int indent = printf ("      %-*s  %-*s  ", name, r->name, type, r->type);
-    if (given) indent += printf ("%-*s  ", given, r->given);
-    pw_cli_wrap (r->about, indent, LIST_WIDTH);
-  }
-  x->rows = 0;
 }
 
 /* ---- Descriptions of named items ---- */
@@ -106,8 +74,9 @@ static int list_named (const list_things *x, int names, const char **name, pw_er
 /* ---- Models ---- */
 
 static int list_width (void *context, const char *name, const char *path) {
+  int *width = context, n = (int)strlen (name);
   (void)path;
-  list_wider (context, name);
+  if (*width < n) *width = n;
   return 0;
 }
 
@@ -195,23 +164,20 @@ static void list_example (const pw_kind *k) {
 }
 
 static void list_quantities (const char *title, const pw_quantity *q, int count) {
-  list_table rows = { .rows = 0 };
   if (count > 0) printf ("    %s\n", title);
-  for (int i = 0; i < count; i++) list_add (&rows, q[i].name, q[i].unit, q[i].rate ? q[i].rate : "", q[i].about);
-  list_print (&rows);
+  for (pw_table t = { 0 }; pw_table_pass (&t);)
+    for (int i = 0; i < count; i++) list_row (&t, q[i].name, q[i].unit, q[i].rate ? q[i].rate : "", q[i].about);
 }
 
 static void list_kind_show (int i) {
   static const char *const level[] = { "force", "constraint on positions", "constraint on velocities" };
   const pw_kind *k = pw_kinds[i];
-  list_table rows = { .rows = 0 };
   printf ("%s: %s\n    %s", k->name, k->about, pw_kind_acts (k) ? level[k->level] : "without effect");
   if (k->rows) printf (", %d constraint equation%s per element", k->rows, k->rows == 1 ? "" : "s");
   puts (k->each_body ? ", acts on every body that has mass" : "");
   list_example (k);
   puts ("    fields");
-  list_fields (&rows, k->fields);
-  list_print (&rows);
+  for (pw_table t = { 0 }; pw_table_pass (&t);) list_fields (&t, k->fields);
   if (k->signals)
     printf ("    a signal: a number, an expression of t%s, or see `pinwheel list signals`\n",
             pw_kind_forced (k) ? " and of states such as BODY.phi" : "");
@@ -243,19 +209,20 @@ static int list_kinds (int names, const char **name, pw_error *error) {
 
 /* ---- Signals ---- */
 
+static void list_signal (pw_table *t, const pw_signal_form *s) {
+  list_fields (t, s->fields);
+  if (s->type != PW_TABLE) return;
+  list_row (t, "points", "list", "", "[[TIME, VALUE], ...]; in a text model, or");
+  list_row (t, "file", "text", "", "a CSV file in the model's folder, and");
+  list_row (t, "columns", "2 x text", "[1, 2]", "its columns of times and values, names or numbers");
+}
+
 static int list_signals (int names, const char **name, pw_error *error) {
-  list_table rows = { .rows = 0 };
   (void)names, (void)name, (void)error;
   puts ("Signals: a number, an expression of time (in C a function), or one of");
   for (const pw_signal_form *s = pw_signal_forms; s->name; s++) {
     printf ("  %s: %s\n", s->name, s->about);
-    list_fields (&rows, s->fields);
-    if (s->type == PW_TABLE) {
-      list_add (&rows, "points", "list", "", "[[TIME, VALUE], ...]; in a text model, or");
-      list_add (&rows, "file", "text", "", "a CSV file in the model's folder, and");
-      list_add (&rows, "columns", "2 x text", "[1, 2]", "its columns of times and values, names or numbers");
-    }
-    list_print (&rows);
+    for (pw_table t = { 0 }; pw_table_pass (&t);) list_signal (&t, s);
   }
   return PW_OK;
 }

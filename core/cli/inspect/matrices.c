@@ -2,69 +2,72 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "print_table.h"
 #include "show.h"
 
 enum { MATRICES_DIGITS = 7, MATRICES_PANEL = 6 /* columns of J side by side */ };
 
-static void matrices_number (double value) {
-  char text[32];
-  printf (" %14s", pw_format (text, value, MATRICES_DIGITS));
-}
-
-/* "name [unit]" in a column of its own. */
-static void matrices_name (const char *name, const char *unit) {
-  char text[300];
-  snprintf (text, sizeof text, "%s [%s]", name, unit);
-  printf ("  %-22s", text);
+static void matrices_head (pw_table *t, const char *const *head) {
+  for (pw_cell (t, -22, ""); *head; head++) pw_cell (t, 13, *head);
+  pw_row_end (t);
 }
 
 static void matrices_coordinates (const pw_system *s, const pw_equations *k, const pw_sample *x) {
+  static const char *const head[] = { "M", "f", "q", "v", "a", NULL };
   char name[300];
-  printf ("\nM (diagonal), forces and state by coordinate; SI units\n  %-22s %14s %14s %14s %14s %14s\n", "", "M", "f",
-          "q", "v", "a");
-  for (int j = 0; j < k->coordinates; j++) {
-    matrices_name (pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
-    const double value[] = { k->mass[j], k->force[j], x->q[j], x->v[j], x->a[j] };
-    for (int i = 0; i < 5; i++) matrices_number (value[i]);
-    putchar ('\n');
+  puts ("\nM (diagonal), forces and state by coordinate; SI units");
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    matrices_head (&t, head);
+    for (int j = 0; j < k->coordinates; j++) {
+      const double value[] = { k->mass[j], k->force[j], x->q[j], x->v[j], x->a[j] };
+      pw_cell_unit (&t, -22, pw_system_state_name (s, j, name, sizeof name), pw_system_state_unit (s, j));
+      for (int i = 0; i < 5; i++) pw_cell_number (&t, 13, value[i], MATRICES_DIGITS);
+      pw_row_end (&t);
+    }
   }
 }
 
 static void matrices_rows (const pw_system *s, const pw_equations *k, const pw_sample *x) {
+  static const char *const head[] = { "gamma", "eta", "g", "lambda", NULL };
   char name[300];
-  printf ("\ngamma, eta, g and lambda by constraint equation, named after its reaction, which is -lambda\n"
-          "  %-22s %14s %14s %14s %14s\n",
-          "", "gamma", "eta", "g", "lambda");
-  for (int i = 0; i < k->rows; i++) {
-    matrices_name (pw_system_reaction_name (s, i, name, sizeof name), pw_system_reaction_unit (s, i));
-    matrices_number (k->gamma[i]);
-    matrices_number (k->eta[i]);
-    if (i < k->holonomic)
-      matrices_number (k->g[i]);
-    else
-      printf (" %14s", "-");
-    matrices_number (x->lambda[i]);
-    putchar ('\n');
+  puts ("\ngamma, eta, g and lambda by constraint equation, named after its reaction, which is -lambda");
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    matrices_head (&t, head);
+    for (int i = 0; i < k->rows; i++) {
+      pw_cell_unit (&t, -22, pw_system_reaction_name (s, i, name, sizeof name), pw_system_reaction_unit (s, i));
+      pw_cell_number (&t, 13, k->gamma[i], MATRICES_DIGITS);
+      pw_cell_number (&t, 13, k->eta[i], MATRICES_DIGITS);
+      if (i < k->holonomic)
+        pw_cell_number (&t, 13, k->g[i], MATRICES_DIGITS);
+      else
+        pw_cell (&t, 13, "-");
+      pw_cell_number (&t, 13, x->lambda[i], MATRICES_DIGITS);
+      pw_row_end (&t);
+    }
   }
 }
 
 /* A few columns of J, with scratch memory for them; in a large scene only the rows that are not zero there. */
 static void matrices_panel (const pw_system *s, const pw_equations *k, int first, int columns, double *J) {
   char name[300];
-  printf ("\n  %-22s", "J");
-  for (int c = 0; c < columns; c++) printf (" %14s", pw_system_state_name (s, first + c, name, sizeof name));
-  putchar ('\n');
   memset (J, 0, (size_t)k->rows * MATRICES_PANEL * sizeof *J);
   for (int i = 0; i < k->entries; i++)
     if (k->column[i] >= first && k->column[i] < first + columns)
       J[k->row[i] * MATRICES_PANEL + k->column[i] - first] = k->value[i] + 0; /* not -0 */
-  for (int i = 0; i < k->rows; i++, J += MATRICES_PANEL) {
-    int used = k->coordinates <= 2 * MATRICES_PANEL;
-    for (int c = 0; c < columns; c++) used |= J[c] != 0;
-    if (!used) continue;
-    printf ("  %-22s", pw_system_reaction_name (s, i, name, sizeof name));
-    for (int c = 0; c < columns; c++) matrices_number (J[c]);
-    putchar ('\n');
+  putchar ('\n');
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_cell (&t, -22, "J");
+    for (int c = 0; c < columns; c++) pw_cell (&t, 13, pw_system_state_name (s, first + c, name, sizeof name));
+    pw_row_end (&t);
+    for (int i = 0; i < k->rows; i++) {
+      const double *row = J + (size_t)i * MATRICES_PANEL;
+      int used = k->coordinates <= 2 * MATRICES_PANEL;
+      for (int c = 0; c < columns; c++) used |= row[c] != 0;
+      if (!used) continue;
+      pw_cell (&t, -22, pw_system_reaction_name (s, i, name, sizeof name));
+      for (int c = 0; c < columns; c++) pw_cell_number (&t, 13, row[c], MATRICES_DIGITS);
+      pw_row_end (&t);
+    }
   }
 }
 

@@ -3,117 +3,38 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "print_table.h"
 #include "show.h"
 
 enum { SHOW_DIGITS = 6 };
 
-static void show_number (double value) {
-  char text[32];
-  fputs (pw_format (text, value, SHOW_DIGITS), stdout);
-}
-
-/* "(1, 2, 3)", padded to a column. */
-static void show_tuple (const double *value, int count, int width) {
-  char text[200] = "(", number[32];
-  for (int i = 0; i < count; i++) {
-    size_t used = strlen (text);
-    snprintf (text + used, sizeof text - used, "%s%s", i ? ", " : "", pw_format (number, value[i], SHOW_DIGITS));
+static void show_bodies (const pw_system *s) {
+  static const char *const heads[] = { "",          "mass [kg]", "inertia [kg m^2]", "x [m]",        "y [m]",
+                                       "phi [rad]", "vx [m/s]",  "vy [m/s]",         "omega [rad/s]" };
+  puts ("\nBodies and their initial conditions");
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    for (int i = 0; i < 9; i++) pw_cell (&t, i ? 9 : -1, heads[i]);
+    pw_row_end (&t);
+    for (int b = 0; b < pw_system_bodies (s); b++) {
+      const double *M = pw_system_mass (s) + 3 * b, *q = pw_system_initial_q (s) + 3 * b,
+                   *v = pw_system_initial_v (s) + 3 * b;
+      const double value[] = { M[0], M[2], q[0], q[1], q[2], v[0], v[1], v[2] };
+      pw_cell (&t, -1, pw_system_body_name (s, b));
+      for (int i = 0; i < 8; i++) pw_cell_number (&t, 1, value[i], SHOW_DIGITS);
+      pw_row_end (&t);
+    }
   }
-  printf ("%s)%*s", text, width > (int)strlen (text) ? width - (int)strlen (text) : 0, "");
-}
-
-/* ---- Bodies ---- */
-
-static void show_bodies (const pw_cli_model *m) {
-  const pw_system *s = m->system;
-  char mass[32], inertia[32];
-  printf ("\nBodies\n  %-12s %-10s %-18s %-26s %s\n", "", "mass [kg]", "inertia [kg m^2]",
-          "initial x, y [m], phi [rad]", "initial vx, vy [m/s], omega [rad/s]");
-  for (int b = 0; b < pw_system_bodies (s); b++) {
-    const double *M = pw_system_mass (s) + 3 * b;
-    printf ("  %-12s %-10s %-18s ", pw_system_body_name (s, b), pw_format (mass, M[0], SHOW_DIGITS),
-            pw_format (inertia, M[2], SHOW_DIGITS));
-    show_tuple (pw_system_initial_q (s) + 3 * b, 3, 26);
-    putchar (' ');
-    show_tuple (pw_system_initial_v (s) + 3 * b, 3, 0);
-    putchar ('\n');
-  }
-}
-
-/* ---- Elements ---- */
-
-static void show_harmonic (const pw_signal *s) {
-  if (s->harmonic.offset != 0) show_number (s->harmonic.offset), printf (" + ");
-  show_number (s->harmonic.amplitude);
-  printf (" cos (");
-  show_number (s->harmonic.omega);
-  printf (" t");
-  if (s->harmonic.phase != 0) printf (" + "), show_number (s->harmonic.phase);
-  printf (")");
-}
-
-/* An expression as it was written, or f (t, states). */
-static void show_function (const pw_signal *s) {
-  static const char *const part[] = { "", ", rate ", ", acceleration " };
-  const pw_signal_text *text = s->function.text;
-  for (int i = 0; text && i < 3; i++)
-    if (text->part[i]) printf ("%s%s", part[i], text->part[i]);
-  if (text) return;
-  printf ("f (t");
-  for (const char *const *r = s->function.reads; r && *r; r++) printf (", %s", *r);
-  printf (")");
-}
-
-/* ramp (from 0, to 1, start 2, duration 3) */
-static void show_form (const pw_signal *s) {
-  const pw_signal_form *form = pw_signal_form_of (s);
-  printf ("%s (", form->name);
-  for (const pw_field *f = form->fields; f->name; f++) {
-    const void *at = (const char *)s + f->offset;
-    if (s->type == PW_TABLE && f->type == PW_NUMBER && *(const double *)at == 0) continue; /* no scale, no offset */
-    printf ("%s%s ", f == form->fields ? "" : ", ", f->name);
-    if (f->type == PW_NUMBER) show_number (*(const double *)at);
-    if (f->type == PW_CHOICE) printf ("%s", f->choices[*(const int *)at]);
-  }
-  if (s->type == PW_TABLE) {
-    printf (", %d points from ", s->table.count), show_number (s->table.t[0]);
-    printf (" to "), show_number (s->table.t[s->table.count - 1]), printf (" s");
-  }
-  printf (")");
-}
-
-static void show_signal (const pw_signal *s) {
-  if (s->type == PW_CONSTANT)
-    show_number (s->constant);
-  else if (s->type == PW_FUNCTION)
-    show_function (s);
-  else
-    (s->type == PW_HARMONIC ? show_harmonic : show_form) (s);
-}
-
-static void show_value (const pw_field *f, const char *at) {
-  const void *p = at;
-  if (f->type == PW_NUMBER) show_number (*(const double *)p);
-  if (f->type == PW_POINT || f->type == PW_VECTOR) show_tuple (p, 2, 0);
-  if (f->type == PW_BODY) printf ("%s", *(const char *const *)p);
-  if (f->type == PW_SIGNAL) show_signal (p);
-  if (f->type == PW_CHOICE) printf ("%s", f->choices[*(const int *)p]);
 }
 
 static void show_element (const pw_element *e) {
   printf ("  %s %s: ", e->kind->name, pw_element_name (e));
   for (const pw_field *f = e->kind->fields; f->name; f++) {
     printf ("%s%s ", f == e->kind->fields ? "" : "; ", f->name);
-    for (int i = 0; i < pw_field_count (f); i++) {
-      if (i) printf (", ");
-      show_value (f, (const char *)e->definition + f->offset + (size_t)i * pw_field_bytes (f->type));
-    }
+    pw_show_field (f, (const char *)e->definition + f->offset, SHOW_DIGITS);
     if (f->unit) printf (" %s", f->unit);
   }
   putchar ('\n');
 }
-
-/* ---- Derivatives without a formula ---- */
 
 /* Derivative blocks that element types do not provide. */
 static void show_differences (const pw_system *s) {
@@ -123,30 +44,33 @@ static void show_differences (const pw_system *s) {
   for (int i = 0; i < count; i++) printf ("  %s\n", pw_system_difference_name (s, i, text, sizeof text));
 }
 
-/* ---- Parameters and the rest ---- */
-
 static void show_parameters (const pw_model *m) {
   static const char *const domain[] = { "", ">= 0", "> 0", "1, 2, ..." };
-  const pw_parameter *p = pw_model_table (m)->parameters;
-  if (p == NULL || p->name == NULL) return;
+  const pw_parameter *parameters = pw_model_table (m)->parameters;
+  if (parameters == NULL || parameters->name == NULL) return;
   puts ("\nParameters, changed with --set NAME=VALUE");
-  for (; p->name; p++) {
-    double value = pw_model_parameter (m, p);
-    char text[32], with_unit[64];
-    snprintf (with_unit, sizeof with_unit, "%s %s", pw_format (text, value, SHOW_DIGITS), p->unit ? p->unit : "");
-    printf ("  %-12s %-18s %-10s %s", p->name, with_unit, domain[p->domain], p->about ? p->about : "");
-    if (value != p->value) printf (" (default %s)", pw_format (text, p->value, SHOW_DIGITS));
-    putchar ('\n');
-  }
+  for (pw_table t = { 0 }; pw_table_pass (&t);)
+    for (const pw_parameter *p = parameters; p->name; p++) {
+      double value = pw_model_parameter (m, p);
+      char text[32], original[60] = "";
+      pw_cell (&t, -1, p->name);
+      pw_cell_number (&t, 1, value, SHOW_DIGITS);
+      pw_cell (&t, -1, p->unit ? p->unit : "");
+      pw_cell (&t, -1, domain[p->domain]);
+      pw_cell (&t, -1, p->about ? p->about : "");
+      if (value != p->value)
+        snprintf (original, sizeof original, "default %s", pw_format (text, p->value, SHOW_DIGITS));
+      if (*original) pw_cell (&t, -1, original);
+      pw_row_end (&t);
+    }
 }
 
 static void show_defaults (const pw_plugin_table *table) {
   pw_run_defaults d = pw_cli_defaults (table);
-  printf ("\nRuns by default for ");
-  show_number (d.t_end);
-  printf (" s with %s, --step ", d.method);
-  show_number (d.step);
-  if (d.rtol != 0) printf (", --rtol "), show_number (d.rtol);
+  char t_end[32], step[32], rtol[32];
+  printf ("\nRuns by default for %s s with %s, --step %s", pw_format (t_end, d.t_end, SHOW_DIGITS), d.method,
+          pw_format (step, d.step, SHOW_DIGITS));
+  if (d.rtol != 0) printf (", --rtol %s", pw_format (rtol, d.rtol, SHOW_DIGITS));
   putchar ('\n');
 }
 
@@ -180,7 +104,7 @@ static void show_model (const pw_cli_model *m) {
   const pw_element *e = pw_model_elements (m->model, &elements);
   printf ("%s: %s\n%s\n", pw_model_name (m->model), table->about ? table->about : "",
           pw_cli_short_path (pw_file_path (m->file), folder, sizeof folder));
-  show_bodies (m);
+  show_bodies (m->system);
   if (elements) puts ("\nElements");
   for (int i = 0; i < elements; i++) show_element (&e[i]);
   show_differences (m->system);

@@ -5,9 +5,11 @@
 #include <stdio.h>
 #include "show.h"
 
-static void yaml_number (double value) {
+enum { YAML_DIGITS = 17 };
+
+static void yaml_number (double value, int digits) {
   char text[32];
-  fputs (pw_format (text, value, 17), stdout);
+  fputs (pw_format (text, value, digits), stdout);
 }
 
 /* 1 for the default, 0; -0 is not the default. */
@@ -32,7 +34,92 @@ static void yaml_text (const char *text) {
   putchar ('"');
 }
 
-/* ---- Bodies ---- */
+/* ---- Values ---- */
+
+/* "[1, 2]" */
+static void yaml_pair (const double value[2], int digits) {
+  putchar ('['), yaml_number (value[0], digits);
+  printf (", "), yaml_number (value[1], digits);
+  putchar (']');
+}
+
+/* {expression: "t^2", rate: "2*t"}, or f (t, a.phi) for a function of a C model */
+static void yaml_function (const pw_signal *s) {
+  static const char *const key[] = { "{expression: ", ", rate: ", ", acceleration: " };
+  const pw_signal_text *text = s->function.text;
+  for (int i = 0; text && i < 3; i++)
+    if (text->part[i]) fputs (key[i], stdout), yaml_text (text->part[i]);
+  printf (text ? "}" : "f (t");
+  for (const char *const *r = s->function.reads; text == NULL && r && *r; r++) printf (", %s", *r);
+  if (text == NULL) putchar (')');
+}
+
+/* The points of a table, or with few digits how many there are. */
+static void yaml_points (const pw_signal *s, int digits) {
+  const double *t = s->table.t;
+  int count = s->table.count;
+  if (digits < YAML_DIGITS) {
+    printf ("%d from ", count), yaml_number (t[0], digits);
+    printf (" to "), yaml_number (t[count - 1], digits), printf (" s");
+    return;
+  }
+  for (int i = 0; i < count; i++) {
+    fputs (i ? ", " : "[", stdout);
+    yaml_pair ((const double[]){ t[i], s->table.value[i] }, digits);
+  }
+  putchar (']');
+}
+
+static int yaml_is_default (const pw_field *f, const void *at) {
+  if (f->required || f->type == PW_BODY) return 0;
+  size_t size = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
+  for (size_t i = 0; i < size; i++)
+    if (((const char *)at)[i]) return 0;
+  return 1;
+}
+
+/* {ramp: {to: 1, duration: 2}} */
+static void yaml_signal (const pw_signal *s, int digits) {
+  const pw_signal_form *form = pw_signal_form_of (s);
+  const char *glue = "";
+  if (s->type == PW_FUNCTION) {
+    yaml_function (s);
+    return;
+  }
+  if (form == NULL) {
+    yaml_number (s->constant, digits);
+    return;
+  }
+  printf ("{%s: {", form->name);
+  for (const pw_field *f = form->fields; f->name; f++) {
+    const void *at = (const char *)s + f->offset;
+    if (yaml_is_default (f, at)) continue;
+    printf ("%s%s: ", glue, f->name), glue = ", ";
+    pw_show_field (f, at, digits);
+  }
+  if (s->type == PW_TABLE) printf ("%spoints: ", glue), yaml_points (s, digits);
+  printf ("}}");
+}
+
+static void yaml_value (const pw_field *f, const void *at, int digits) {
+  if (f->type == PW_NUMBER) yaml_number (*(const double *)at, digits);
+  if (f->type == PW_POINT || f->type == PW_VECTOR) yaml_pair (at, digits);
+  if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
+  if (f->type == PW_SIGNAL) yaml_signal (at, digits);
+  if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
+}
+
+void pw_show_field (const pw_field *f, const void *at, int digits) {
+  int count = pw_field_count (f);
+  if (count > 1) putchar ('[');
+  for (int i = 0; i < count; i++) {
+    if (i) printf (", ");
+    yaml_value (f, (const char *)at + (size_t)i * pw_field_bytes (f->type), digits);
+  }
+  if (count > 1) putchar (']');
+}
+
+/* ---- Bodies and elements ---- */
 
 static void yaml_triple (const char *what, const char *const name[3], const double value[3], unsigned specified) {
   int written = 0;
@@ -40,7 +127,7 @@ static void yaml_triple (const char *what, const char *const name[3], const doub
     if (yaml_is_zero (value[i]) && !(specified >> i & 1)) continue;
     if (written++ == 0) printf (", %s: {", what);
     printf ("%s%s: ", written > 1 ? ", " : "", name[i]);
-    yaml_number (value[i]);
+    yaml_number (value[i], YAML_DIGITS);
   }
   if (written) putchar ('}');
 }
@@ -48,103 +135,25 @@ static void yaml_triple (const char *what, const char *const name[3], const doub
 static void yaml_body (const pw_body *b) {
   static const char *const start[] = { "x", "y", "phi" }, *const rate[] = { "vx", "vy", "omega" };
   printf ("  - {name: "), yaml_name (b->name);
-  if (!yaml_is_zero (b->mass)) printf (", mass: "), yaml_number (b->mass);
-  if (!yaml_is_zero (b->inertia)) printf (", inertia: "), yaml_number (b->inertia);
+  if (!yaml_is_zero (b->mass)) printf (", mass: "), yaml_number (b->mass, YAML_DIGITS);
+  if (!yaml_is_zero (b->inertia)) printf (", inertia: "), yaml_number (b->inertia, YAML_DIGITS);
   yaml_triple ("start", start, b->start, b->specified);
   yaml_triple ("rate", rate, b->rate, b->specified >> 3);
   puts ("}");
-}
-
-/* ---- Elements ---- */
-
-static void yaml_pair (const double value[2]) {
-  putchar ('['), yaml_number (value[0]);
-  printf (", "), yaml_number (value[1]);
-  putchar (']');
-}
-
-static int yaml_form_is_default (const pw_field *f, const void *at) {
-  if (f->required) return 0;
-  return f->type == PW_CHOICE ? *(const int *)at == 0 : yaml_is_zero (*(const double *)at);
-}
-
-/* {ramp: {to: 1, duration: 2}} */
-static void yaml_expression (const pw_signal_text *t) {
-  static const char *const key[] = { "{expression: ", ", rate: ", ", acceleration: " };
-  for (int i = 0; i < 3; i++)
-    if (t->part[i]) fputs (key[i], stdout), yaml_text (t->part[i]);
-  putchar ('}');
-}
-
-static void yaml_signal (const pw_signal *s) {
-  const pw_signal_form *form = pw_signal_form_of (s);
-  const char *glue = "";
-  if (s->type == PW_FUNCTION) {
-    yaml_expression (s->function.text);
-    return;
-  }
-  if (form == NULL) {
-    yaml_number (s->constant);
-    return;
-  }
-  printf ("{%s: {", form->name);
-  for (const pw_field *f = form->fields; f->name; f++) {
-    const void *at = (const char *)s + f->offset;
-    if (yaml_form_is_default (f, at)) continue;
-    printf ("%s%s: ", glue, f->name), glue = ", ";
-    if (f->type == PW_CHOICE)
-      fputs (f->choices[*(const int *)at], stdout);
-    else
-      yaml_number (*(const double *)at);
-  }
-  if (s->type == PW_TABLE) printf ("%spoints: [", glue);
-  for (int i = 0; s->type == PW_TABLE && i < s->table.count; i++) {
-    if (i) printf (", ");
-    yaml_pair ((const double[]){ s->table.t[i], s->table.value[i] });
-  }
-  printf (s->type == PW_TABLE ? "]}}" : "}}");
-}
-
-static void yaml_value (const pw_field *f, const void *at) {
-  if (f->type == PW_NUMBER) yaml_number (*(const double *)at);
-  if (f->type == PW_POINT || f->type == PW_VECTOR) yaml_pair (at);
-  if (f->type == PW_BODY) yaml_name (*(const char *const *)at);
-  if (f->type == PW_SIGNAL) yaml_signal (at);
-  if (f->type == PW_CHOICE) fputs (f->choices[*(const int *)at], stdout);
-}
-
-/* Optional fields that are all zero are omitted. */
-static int yaml_is_default (const pw_field *f, const char *at) {
-  size_t size = pw_field_bytes (f->type) * (size_t)pw_field_count (f);
-  if (f->required || f->type == PW_BODY) return 0;
-  for (size_t i = 0; i < size; i++)
-    if (at[i]) return 0;
-  return 1;
 }
 
 static void yaml_element (const pw_element *e) {
   printf ("  - {%s: ", e->kind->name), yaml_name (pw_element_name (e));
   for (const pw_field *f = e->kind->fields; f->name; f++) {
     const char *at = (const char *)e->definition + f->offset;
-    int count = pw_field_count (f);
     if (yaml_is_default (f, at)) continue;
-    printf (", %s: %s", f->name, count > 1 ? "[" : "");
-    for (int i = 0; i < count; i++, at += pw_field_bytes (f->type)) {
-      if (i) printf (", ");
-      yaml_value (f, at);
-    }
-    if (count > 1) putchar (']');
+    printf (", %s: ", f->name);
+    pw_show_field (f, at, YAML_DIGITS);
   }
   puts ("}");
 }
 
 /* ---- What cannot be written as text ---- */
-
-static int yaml_is_built_in (const pw_kind *kind) {
-  const pw_kind *const *k = pw_kinds;
-  while (*k && *k != kind) k++;
-  return *k != NULL;
-}
 
 static int yaml_refuse (const pw_model *m, pw_error *error) {
   int elements;
@@ -152,9 +161,12 @@ static int yaml_refuse (const pw_model *m, pw_error *error) {
   const pw_element *e = pw_model_elements (m, &elements);
   for (const pw_element *end = e + elements; e < end; e++) {
     const char *kind = e->kind->name, *name = pw_element_name (e);
-    if (!yaml_is_built_in (e->kind))
-      return pw_fail (error, PW_INPUT, "model %s cannot be written as text: %s %s is of a kind of the model's own",
-                      model, kind, name);
+    const pw_kind *const *k = pw_kinds;
+    while (*k && *k != e->kind) k++;
+    if (*k == NULL)
+      return pw_fail (error, PW_INPUT,
+                      "model %s cannot be written as text: %s %s has an element type of the model's own", model, kind,
+                      name);
     for (const pw_field *f = e->kind->fields; f->name; f++) {
       const pw_signal *s = (const void *)((const char *)e->definition + f->offset);
       for (int i = 0; f->type == PW_SIGNAL && i < pw_field_count (f); i++)
@@ -173,27 +185,23 @@ static int yaml_refuse (const pw_model *m, pw_error *error) {
 /* ---- The model ---- */
 
 static void yaml_run (const pw_run_defaults *run) {
-  const struct {
-    const char *name;
-    double value;
-  } number[] = { { "t_end", run->t_end }, { "step", run->step }, { "rtol", run->rtol } };
-  int written = 0;
-  for (int i = 0; i < 3; i++) {
-    if (number[i].value == 0) continue;
-    printf ("%s%s: ", written++ ? ", " : "run: {", number[i].name);
-    yaml_number (number[i].value);
-  }
-  if (run->method) printf ("%smethod: ", written++ ? ", " : "run: {"), yaml_text (run->method);
-  if (written) puts ("}");
+  const char *const name[] = { "t_end", "step", "rtol" };
+  const double value[] = { run->t_end, run->step, run->rtol };
+  const char *glue = "run: {";
+  for (int i = 0; i < 3; i++)
+    if (value[i] != 0) printf ("%s%s: ", glue, name[i]), yaml_number (value[i], YAML_DIGITS), glue = ", ";
+  if (run->method) printf ("%smethod: ", glue), yaml_text (run->method), glue = ", ";
+  if (*glue == ',') puts ("}");
 }
 
 /* Expressions keep their names, whose values stand under `let`. */
 static void yaml_names (const pw_reference_text *t) {
   if (t->names) puts ("let:");
-  for (int i = 0; i < t->names; i++) printf ("  %s: ", t->name[i]), yaml_number (t->value[i]), putchar ('\n');
+  for (int i = 0; i < t->names; i++)
+    printf ("  %s: ", t->name[i]), yaml_number (t->value[i], YAML_DIGITS), putchar ('\n');
 }
 
-static void yaml_truth (const pw_model *m) {
+static void yaml_reference (const pw_model *m) {
   const pw_reference_text *t = pw_model_reference (m);
   if (pw_model_table (m)->reference)
     puts ("# The reference solution of the model (truth) is a function in C, which cannot be written as text.");
@@ -216,6 +224,6 @@ int pw_show_yaml (const pw_cli_model *x, pw_error *error) {
   for (int i = 0; i < bodies; i++) yaml_body (&b[i]);
   if (elements) puts ("elements:");
   for (int i = 0; i < elements; i++) yaml_element (&e[i]);
-  yaml_truth (m);
+  yaml_reference (m);
   return PW_OK;
 }

@@ -1,70 +1,88 @@
 /* Where the time of a run goes: two tables. */
 #include <math.h>
 #include <stdlib.h>
+#include "print_table.h"
 #include "profile.h"
 
-/* One decimal below 100, in any locale; empty if there is no value. */
-static void profile_number (FILE *out, int there, double value, int width) {
-  char text[40] = "";
-  if (there && fabs (value) >= 99.95)
-    snprintf (text, sizeof text, "%.0f", value);
-  else if (there)
-    snprintf (text, sizeof text, "%d.%d", (int)round (10 * value) / 10, abs ((int)round (10 * value)) % 10);
-  fprintf (out, "%*s", width, text);
+/* One decimal below 100; empty if there is no value. */
+static void profile_cell (pw_table *t, int there, double value) {
+  pw_cell_number (t, 8, !there ? NAN : fabs (value) >= 99.95 ? round (value) : round (10 * value) / 10, 15);
 }
 
-static void profile_share (FILE *out, double part, double whole) {
-  fprintf (out, "%8.0f %%", 100 * part / whole);
+static void profile_share (pw_table *t, double part, double whole) {
+  char text[40];
+  snprintf (text, sizeof text, "%.0f %%", 100 * part / whole);
+  pw_cell (t, 8, whole > 0 ? text : "");
 }
 
-static void profile_kind (const pw_profile_kind *x, double whole, FILE *out) {
+static void profile_head (pw_table *t, const char *const *head) {
+  pw_cell (t, -14, *head++);
+  for (; *head; head++) pw_cell (t, 8, *head);
+  pw_row_end (t);
+}
+
+/* The counts of a kind, or of the bodies. */
+static void profile_counts (pw_table *t, const char *name, int elements, int rows, int unknowns) {
+  pw_cell (t, -14, name);
+  const int count[] = { elements, rows, unknowns };
+  for (int i = 0; i < 3; i++) pw_cell_number (t, 7, count[i], 15);
+}
+
+static void profile_kind (pw_table *t, const pw_profile_kind *x, double whole) {
   int rows = x->elements * x->kind->rows;
   double sum = x->signals + x->constraints + x->force;
-  fprintf (out, "  %-14s%9d%9d%9d", x->kind->name, x->elements, rows, rows + x->elements * x->kind->own);
-  profile_number (out, x->kind->signals > 0, x->signals, 10);
-  profile_number (out, rows > 0, x->constraints, 10);
-  profile_number (out, x->kind->force && !x->kind->constant, x->force, 10);
-  profile_number (out, 1, sum, 10);
-  profile_share (out, sum, whole);
-  if (x->kind->g) profile_number (out, 1, x->positions, 10);
-  fprintf (out, "\n");
+  profile_counts (t, x->kind->name, x->elements, rows, rows + x->elements * x->kind->own);
+  profile_cell (t, x->kind->signals > 0, x->signals);
+  profile_cell (t, rows > 0, x->constraints);
+  profile_cell (t, x->kind->force && !x->kind->constant, x->force);
+  profile_cell (t, 1, sum);
+  profile_share (t, sum, whole);
+  if (x->kind->g) profile_cell (t, 1, x->positions);
+  pw_row_end (t);
 }
 
 static void profile_kinds (const pw_profile *p, int bodies, FILE *out) {
-  fprintf (out, "  %-14s%9s%9s%9s%10s%10s%10s%10s%10s%10s\n", "kind", "elements", "rows", "unknowns", "signals",
-           "J, gamma", "force", "sum", "share", "g");
-  fprintf (out, "  %-14s%9d%9d%9d%30s", "(bodies)", bodies, 0, 3 * bodies, "");
-  profile_number (out, 1, p->configurations, 10);
-  profile_share (out, p->configurations, p->evaluation);
-  fprintf (out, "\n");
-  for (int i = 0; i < p->kinds; i++) profile_kind (&p->kind[i], p->evaluation, out);
+  static const char *const head[] = { "type",  "elements", "rows",  "unknowns", "signals", "J, gamma",
+                                      "force", "sum",      "share", "g",        NULL };
+  for (pw_table t = { .f = out }; pw_table_pass (&t);) {
+    profile_head (&t, head);
+    profile_counts (&t, "(bodies)", bodies, 0, 3 * bodies);
+    for (int i = 0; i < 3; i++) pw_cell (&t, 8, "");
+    profile_cell (&t, 1, p->configurations);
+    profile_share (&t, p->configurations, p->evaluation);
+    pw_row_end (&t);
+    for (int i = 0; i < p->kinds; i++) profile_kind (&t, &p->kind[i], p->evaluation);
+  }
 }
 
-/* One line of the stages; omitted unless the time is positive. */
-static void profile_line (FILE *out, const char *name, double ns, double whole, double per_step, double step) {
-  fprintf (out, "  %-14s", name);
-  if (whole > 0) profile_number (out, 1, ns, 18);
-  if (whole > 0) profile_share (out, ns, whole);
-  if (step > 0) {
-    profile_number (out, 1, ns * per_step, whole > 0 ? 14 : 42);
-    profile_share (out, ns * per_step, step);
-  }
-  fprintf (out, "\n");
+/* A row of the stages; omitted unless the time is positive.  `whole`, `step`: 0 leaves their columns empty. */
+static void profile_stage (pw_table *t, const char *name, double ns, double whole, double per_step, double step) {
+  if (!(ns > 0)) return;
+  pw_cell (t, -14, name);
+  profile_cell (t, whole > 0, ns);
+  profile_share (t, ns, whole);
+  if (step > 0) profile_cell (t, 1, ns * per_step);
+  if (step > 0) profile_share (t, ns * per_step, step);
+  pw_row_end (t);
 }
 
 static void profile_stages (const pw_profile *p, FILE *out) {
+  static const char *const head[] = { "stage", "per evaluation", "share", "per step", "share", NULL },
+                           *const no_steps[] = { "stage", "per evaluation", "share", NULL };
   const struct {
     const char *name;
     double ns;
-  } stage[] = { { "place", p->kinematics },     { "sweep", p->equations }, { "stabilise", p->stabilisation },
-                { "factor", p->factorisation }, { "solve", p->solution },  { "all in one go", p->evaluation } };
+  } stage[] = { { "kinematics", p->kinematics },       { "equations", p->equations },
+                { "stabilisation", p->stabilisation }, { "factorisation", p->factorisation },
+                { "solution", p->solution },           { "together", p->evaluation } };
   double all = p->evaluations * p->evaluation + p->projections * p->projection;
-  fprintf (out, "\n  %-14s%18s%10s", "stage", "per evaluation", "share");
-  if (all > 0) fprintf (out, "%14s%10s", "per step", "share");
-  fprintf (out, "\n");
-  for (size_t i = 0; i < sizeof stage / sizeof *stage; i++)
-    if (stage[i].ns > 0) profile_line (out, stage[i].name, stage[i].ns, p->evaluation, p->evaluations, all);
-  if (p->projections > 0) profile_line (out, "project", p->projection, 0, p->projections, all);
+  fputc ('\n', out);
+  for (pw_table t = { .f = out }; pw_table_pass (&t);) {
+    profile_head (&t, all > 0 ? head : no_steps);
+    for (size_t i = 0; i < sizeof stage / sizeof *stage; i++)
+      profile_stage (&t, stage[i].name, stage[i].ns, p->evaluation, p->evaluations, all);
+    if (p->projections > 0) profile_stage (&t, "projection", p->projection, 0, p->projections, all);
+  }
 }
 
 static void profile_print (const pw_system *s, const pw_run *r, const pw_profile *p, double cpu, FILE *out) {

@@ -3,6 +3,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include "print_table.h"
 #include "report.h"
 
 enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300, REPORT_TEXT = 400 };
@@ -145,46 +146,18 @@ const char **pw_report_redundancies (pw_run *r) {
 
 /* ---- Results ---- */
 
-/* Characters in a UTF-8 text, for columns that line up. */
-static int report_length (const char *text) {
-  int n = 0;
-  for (; *text; text++) n += ((unsigned char)*text & 0xC0) != 0x80;
-  return n;
-}
-
-static void report_left (const char *text, int width) {
-  printf ("%s%*s", text, width > report_length (text) ? width - report_length (text) : 0, "");
-}
-
-static void report_number (double value, int digits, int width) {
-  char text[32];
-  printf ("%*s", width, pw_format (text, value, digits));
-}
-
-/* "frame" of "frame.x". */
-static void report_element (char *name) {
-  char *dot = strrchr (name, '.');
-  if (dot) *dot = 0;
-}
-
 static void report_bodies (const pw_system *s, const pw_sample *last) {
   static const char *const heads[] = { "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
-  int bodies = pw_system_bodies (s), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES, width = 5;
-  char name[REPORT_NAME];
-  for (int b = 0; b < shown; b++) {
-    report_element (pw_system_state_name (s, 3 * b, name, sizeof name));
-    if (report_length (name) > width) width = report_length (name);
-  }
-  printf ("  ");
-  report_left ("body", width);
-  for (int k = 0; k < 6; k++) printf ("%15s", heads[k]);
-  printf ("\n");
-  for (int b = 0; b < shown; b++) {
-    report_element (pw_system_state_name (s, 3 * b, name, sizeof name));
-    printf ("  ");
-    report_left (name, width);
-    for (int k = 0; k < 6; k++) report_number (k < 3 ? last->q[3 * b + k] : last->v[3 * b + k - 3], 8, 15);
-    printf ("\n");
+  int bodies = pw_system_bodies (s), shown = bodies < REPORT_BODIES ? bodies : REPORT_BODIES;
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_cell (&t, -5, "body");
+    for (int k = 0; k < 6; k++) pw_cell (&t, 13, heads[k]);
+    pw_row_end (&t);
+    for (int b = 0; b < shown; b++) {
+      pw_cell (&t, -5, pw_system_body_name (s, b));
+      for (int k = 0; k < 6; k++) pw_cell_number (&t, 13, k < 3 ? last->q[3 * b + k] : last->v[3 * b + k - 3], 8);
+      pw_row_end (&t);
+    }
   }
   report_more (stdout, bodies - shown, ": -o FILE.csv writes them all");
 }
@@ -194,41 +167,29 @@ static void report_internal (const pw_system *s, const pw_sample *last) {
   int first = 3 * pw_system_bodies (s), n = pw_system_coordinates (s),
       end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
   char name[REPORT_NAME];
-  int width = 0, unit = 0; /* widest name of a velocity, widest unit of a coordinate */
-  for (int j = first; j < end; j++) {
-    int long_name = report_length (pw_system_state_name (s, n + j, name, sizeof name)),
-        long_unit = report_length (pw_system_state_unit (s, j));
-    width = long_name > width ? long_name : width;
-    unit = long_unit > unit ? long_unit : unit;
-  }
-  for (int j = first; j < end; j++) {
-    printf ("  ");
-    report_left (pw_system_state_name (s, j, name, sizeof name), width);
-    report_number (last->q[j], 8, 15);
-    printf (" ");
-    report_left (pw_system_state_unit (s, j), unit);
-    printf ("   ");
-    report_left (pw_system_state_name (s, n + j, name, sizeof name), width);
-    report_number (last->v[j], 8, 15);
-    printf (" %s\n", pw_system_state_unit (s, n + j));
-  }
+  for (pw_table t = { 0 }; pw_table_pass (&t);)
+    for (int j = first; j < end; j++) {
+      for (int state = j; state < 2 * n; state += n) {
+        pw_cell (&t, -1, pw_system_state_name (s, state, name, sizeof name));
+        pw_cell_number (&t, 13, state < n ? last->q[j] : last->v[j], 8);
+        pw_cell (&t, -1, pw_system_state_unit (s, state));
+      }
+      pw_row_end (&t);
+    }
   report_more (stdout, n - end, "");
 }
 
 static void report_reactions (const pw_system *s, const pw_sample *last) {
-  int rows = pw_system_rows (s), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS, width = 8;
+  int rows = pw_system_rows (s), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS;
   char name[REPORT_NAME];
-  for (int i = 0; i < shown; i++) {
-    int n = report_length (pw_system_reaction_name (s, i, name, sizeof name));
-    if (n > width) width = n;
-  }
   if (rows > 0) printf ("\n  reaction\n");
-  for (int i = 0; i < shown; i++) {
-    printf ("  ");
-    report_left (pw_system_reaction_name (s, i, name, sizeof name), width);
-    report_number (0 - last->lambda[i], 8, 15);
-    printf (" %s\n", pw_system_reaction_unit (s, i));
-  }
+  for (pw_table t = { 0 }; pw_table_pass (&t);)
+    for (int i = 0; i < shown; i++) {
+      pw_cell (&t, -8, pw_system_reaction_name (s, i, name, sizeof name));
+      pw_cell_number (&t, 13, 0 - last->lambda[i], 8);
+      pw_cell (&t, -1, pw_system_reaction_unit (s, i));
+      pw_row_end (&t);
+    }
   report_more (stdout, rows - shown, ": -o FILE.csv writes them all");
 }
 
@@ -239,32 +200,41 @@ static void report_energy (const pw_sample *last) {
   } row[] = { { "kinetic", last->kinetic }, { "potential", last->potential },   { "work", last->work },
               { "dissipated", last->loss }, { "projection", last->projection }, { "balance", last->balance } };
   printf ("\n  energy\n");
-  for (int i = 0; i < 6; i++) {
-    printf ("  %-10s", row[i].name);
-    report_number (row[i].value, 8, 17);
-    printf (" J\n");
-  }
+  for (pw_table t = { 0 }; pw_table_pass (&t);)
+    for (int i = 0; i < 6; i++) {
+      pw_cell (&t, -10, row[i].name);
+      pw_cell_number (&t, 13, row[i].value, 8);
+      pw_cell (&t, -1, "J");
+      pw_row_end (&t);
+    }
+}
+
+/* A row of errors, unless both are unknown. */
+static void report_error (pw_table *t, const char *name, double end, double largest, const char *unit) {
+  if (isnan (end) && isnan (largest)) return;
+  pw_cell (t, -10, name);
+  pw_cell_number (t, 13, end, 3);
+  pw_cell_number (t, 13, largest, 3);
+  pw_cell (t, -1, unit);
+  pw_row_end (t);
 }
 
 static void report_errors (const pw_reference_error *e) {
   static const char *const name[] = { "length", "angle", "speed", "rate" }, *const unit[] = { "m", "rad", "m/s",
                                                                                               "rad/s" };
-  char t[32], at[40];
+  char time[32], at[40];
   if (e == NULL) return;
-  snprintf (at, sizeof at, "at %s s", pw_format (t, e->t, 6));
-  pw_cli_print (stdout, "\n  error against the reference solution of %s, at %d time%s\n  %27s%17s\n", e->source,
-                e->samples, e->samples == 1 ? "" : "s", at, "largest");
-  for (int i = 0; i < 4; i++) {
-    if (isnan (e->end[i]) && isnan (e->most[i])) continue;
-    printf ("  %-10s", name[i]);
-    report_number (e->end[i], 3, 17);
-    report_number (e->most[i], 3, 17);
-    printf (" %s\n", unit[i]);
+  snprintf (at, sizeof at, "at %s s", pw_format (time, e->t, 6));
+  pw_cli_print (stdout, "\n  error against the reference solution of %s, at %d time%s\n", e->source, e->samples,
+                e->samples == 1 ? "" : "s");
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_cell (&t, -10, "");
+    pw_cell (&t, 13, at);
+    pw_cell (&t, 13, "largest");
+    pw_row_end (&t);
+    for (int i = 0; i < 4; i++) report_error (&t, name[i], e->end[i], e->most[i], unit[i]);
+    report_error (&t, "reactions", NAN, e->reactions, "of the largest");
   }
-  if (isnan (e->reactions)) return;
-  printf ("  %-10s%17s", "reactions", "");
-  report_number (e->reactions, 3, 17);
-  printf (" of the largest\n");
 }
 
 void pw_report_warnings (const pw_run *r, const pw_system *s, double defect) {

@@ -1,6 +1,6 @@
-/* The results of `pinwheel check`. */
-#ifndef PW_CHECK_H
-#define PW_CHECK_H
+/* The results of `pinwheel check`, and their report. */
+#ifndef PW_CHECK_REPORT_H
+#define PW_CHECK_REPORT_H
 
 #include "cli.h"
 #include "pinwheel-selftest.h"
@@ -40,10 +40,10 @@ typedef struct {
   pw_check_list problem, finding;
 } pw_check;
 
-/* A state that the consistent initialisation has changed: its name, and the values before and after. */
+/* The name of a state, and its values before and after the consistent initialisation. */
 void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to);
 
-/* Writes the report: as JSON to j, or as text to standard output if j is NULL (check_report.c). */
+/* Writes the report: as JSON to j, or as text to standard output if j is NULL. */
 void pw_check_report (const pw_check *x, pw_json *j);
 
 #endif
