@@ -16,7 +16,7 @@ static void test_roller (void **state) {
   told_shows ("\n  left.spin             2.5  rad  left.spin_rate               5  rad/s\n");
   told_shows ("\n  right.spin           3.75  rad  right.spin_rate            7.5  rad/s\n");
   told_shows ("\n  energy\n  kinetic ");
-  told_shows ("\n  dissipated              0  J\n");
+  told_shows ("\n  dissipated               0  J\n");
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --json @/roller.json"), 0);
   check_close ("spin", cli_number (cli_file ("roller.json"), "elements", "right", "spin", NULL), 3.75, 1e-12,
                "4096 eps");

@@ -5,8 +5,8 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include "checkpoints.h"
 #include "fingerprint.h"
-#include "run_command.h"
 
 static const char checkpoints_key[] = "checkpoint-every";
 

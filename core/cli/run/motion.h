@@ -1,4 +1,4 @@
-/* Motions: states and multipliers at some times; the errors of one motion relative to a reference; those of a run. */
+/* Motions: states and multipliers at some times; the errors of one motion relative to another. */
 #ifndef PW_MOTION_H
 #define PW_MOTION_H
 
@@ -36,27 +36,5 @@ int pw_motion_reference (pw_motion *m, const pw_model *model, const pw_system *s
 /* Opens a motion from a table with columns as `pinwheel run -o` writes them; rows are thinned to MOTION_SAMPLES, those after
  * t_end are skipped.  *t_end 0: that of the last row.  `whole`: there must be a row at the end (motion_file.c).  PW_INPUT with line. */
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error);
-
-/* ---- A run compared with a reference ---- */
-
-typedef struct {
-  int on; /* 0: there is no reference */
-  pw_motion reference, motion;
-  int next; /* the sample due next */
-  pw_reference_error error;
-} pw_comparison;
-
-/* Opens the reference of a run up to t_end: the table at `path`, or else the model's own reference solution, unless `started`
- * says that the run has other initial values.  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
-int pw_comparison_open (pw_comparison *c, const pw_cli_model *m, const char *path, int started, double t_end,
-                        pw_error *error);
-void pw_comparison_close (pw_comparison *c);
-/* When the next sample is due, or INFINITY. */
-double pw_comparison_next (const pw_comparison *c);
-void pw_comparison_take (pw_comparison *c, const pw_system *s, const pw_sample *sample);
-/* Saves or loads the samples of a checkpoint. */
-void pw_comparison_serialise (pw_comparison *c, pw_archive *a);
-/* The errors of the samples taken; NULL if there are none. */
-const pw_reference_error *pw_comparison_errors (pw_comparison *c, const pw_system *s);
 
 #endif

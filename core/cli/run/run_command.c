@@ -5,9 +5,9 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "checkpoints.h"
 #include "profile.h"
 #include "report.h"
-#include "run_command.h"
 
 #define RUN_SHORT 0.01 /* a batch that took less processor time [s] may be longer the next time */
 #define RUN_LONG 0.04  /* one that took more must be shorter: Ctrl-C and the progress bar wait for its end */

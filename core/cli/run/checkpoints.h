@@ -1,9 +1,9 @@
-/* The command `pinwheel run`, and its checkpoints. */
-#ifndef PW_RUN_COMMAND_H
-#define PW_RUN_COMMAND_H
+/* A run as the command `pinwheel run` makes it, and its checkpoints. */
+#ifndef PW_CHECKPOINTS_H
+#define PW_CHECKPOINTS_H
 
 #include "cli.h"
-#include "motion.h"
+#include "comparison.h"
 #include "plot.h"
 #include "progress.h"
 #include "text.h"
