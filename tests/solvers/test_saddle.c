@@ -12,106 +12,8 @@
 #include "method.h"
 #include "rk_state.h"
 #include "runs.h"
+#include "saddle_scene.h"
 #include "scene.h"
-
-typedef struct {
-  pw_run *run;
-  const double *weight;
-  int rows;
-  unsigned random;
-} trial;
-
-/* Numbers in [-1, 1], the same on every machine. */
-static double saddle_number (unsigned *random) {
-  *random = *random * 1664525U + 1013904223U;
-  return (double)(*random >> 8) / 8388608.0 - 1;
-}
-
-/* The error of the second equation relative to what its terms are, that of the first likewise. */
-static double saddle_error (const trial *x, const double *f, const double *gamma, const double *a,
-                            const double *lambda) {
-  const pw_system *s = x->run->s;
-  double most = 0, size = 0, *left = calloc ((size_t)(s->coords + 3 + s->rows), sizeof *left);
-  double *Ja = left + s->coords + 3;
-  pw_add_JT (x->run->w, lambda, left);
-  for (int j = 0; j < s->coords; j++) size = fmax (size, fabs (left[j]) + fabs (x->weight[j] * a[j]));
-  for (int j = 0; j < s->coords; j++)
-    most = fmax (most, fabs (left[j] + x->weight[j] * a[j] - (f ? f[j] : 0)) / (1 + size));
-  pw_mul_J (x->run->w, a, Ja);
-  size = 0;
-  for (int i = 0; i < x->rows; i++) size = fmax (size, fabs (gamma[i]));
-  for (int j = 0; j < s->coords; j++) size = fmax (size, fabs (a[j]));
-  for (int i = 0; i < x->rows; i++)
-    if (x->run->active == NULL || x->run->active[i]) most = fmax (most, fabs (Ja[i] - gamma[i]) / size);
-  free (left);
-  return most;
-}
-
-/* Factorises at a configuration of which some angles are no numbers, as a step that is far too large leaves it, and comes back. */
-static void saddle_spoil (trial *x, pw_saddle *k, unsigned *random) {
-  pw_run *r = x->run;
-  size_t coords = (size_t)r->s->coords;
-  double *q = malloc (coords * sizeof *q);
-  for (size_t j = 0; j < coords; j++) q[j] = r->q[j] + saddle_number (random);
-  for (size_t j = 2; j < 3 * (size_t)r->s->bodies; j += 3)
-    if (saddle_number (random) > 0.3) q[j] = NAN;
-  assert_int_equal (pw_update_kinematics (r->w, r->t, q, r->v), PW_OK);
-  pw_evaluate_J (r->w);
-  pw_saddle_factor (k);
-  assert_int_equal (pw_update_kinematics (r->w, r->t, r->q, r->v), PW_OK);
-  pw_evaluate_J (r->w);
-  free (q);
-}
-
-/* Solves in each way; the rows that take no part get no multiplier. */
-static double saddle_solve (trial *x) {
-  const pw_system *s = x->run->s;
-  size_t coords = (size_t)s->coords + 3, rows = (size_t)s->rows;
-  double *f = calloc (3 * coords + 3 * rows + 1, sizeof *f), *a = f + coords, *gamma = a + coords;
-  double *lambda = gamma + rows, worst = 0;
-  pw_error error = { 0 };
-  pw_saddle *k = pw_saddle_open (x->run->w, x->weight, x->rows, x->run->active, &error);
-  check_ok (k ? PW_OK : error.status, &error);
-  for (int way = 0; way < 4; way++) {
-    const double *force = way & 1 ? f : NULL;
-    if (way > 0) saddle_spoil (x, k, &x->random);
-    for (int j = 0; j < s->coords; j++) f[j] = saddle_number (&x->random);
-    for (int i = 0; i < s->rows; i++) gamma[i] = saddle_number (&x->random), lambda[i] = 0;
-    if (way & 2) {
-      assert_int_equal (pw_saddle_factor (k), PW_OK);
-      pw_saddle_solve (k, force, gamma, a, lambda);
-    } else
-      assert_int_equal (pw_saddle_factor_solve (k, force, gamma, a, lambda), PW_OK);
-    worst = fmax (worst, saddle_error (x, force, gamma, a, lambda));
-  }
-  pw_saddle_close (k);
-  free (f);
-  return worst;
-}
-
-/* All saddle-point systems of a scene at its start, and some way into the motion; or those with mass alone.  -1 if it
- * cannot start. */
-static double saddle_scene (pw_system *s, double t_end, int all) {
-  pw_error error = { 0 };
-  pw_run *r = pw_run_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 }, &error);
-  double worst = r ? 0 : -1;
-  for (int moment = 0; r && moment < 2; moment++) {
-    if (moment > 0) check_ok (pw_run_advance_to (r, t_end, t_end, &error), &error);
-    assert_int_equal (pw_update_kinematics (r->w, r->t, r->q, r->v), PW_OK);
-    pw_evaluate_J (r->w);
-    for (int which = 0; which < 4; which += all ? 1 : 2) {
-      trial x = { .run = r, .weight = which & 1 ? s->metric : s->mass, .random = (unsigned)(7 * which + moment) };
-      x.rows = which & 2 ? s->holonomic : s->rows;
-      int massless = 0;
-      for (int j = 0; j < s->coords; j++) massless |= x.weight[j] == 0;
-      if (massless && x.rows < s->rows) continue; /* not determined by these rows */
-      worst = fmax (worst, saddle_solve (&x));
-    }
-  }
-  if (r) pw_run_close (r);
-  pw_system_free (s);
-  return worst;
-}
 
 static void test_models (void **state) {
   static const struct {
@@ -130,116 +32,6 @@ static void test_models (void **state) {
     assert_true (e >= 0);
     check_below (scene[i].model, e, 1e7 * CHECK_EPS, "round-off, weights over a range of 1e6");
   }
-}
-
-/* ---- Linkages: trees of pinned bars, some of them closed to loops, some on the ground ---- */
-
-enum { LINKAGE_MOST = 40 };
-
-typedef struct {
-  double seed;
-} linkage;
-
-/* A pin at a point of the world between two bars that have been placed, or a bar and the ground (-1). */
-static void linkage_pin (pw_model *m, const double (*at)[3], int number, int a, int b, double x, double y) {
-  char name[3][16];
-  pw_pin pin = { .name = name[2], .body = { name[0], name[1] } };
-  snprintf (name[2], sizeof name[2], "p%d", number);
-  for (int side = 0; side < 2; side++) {
-    int i = side ? b : a;
-    snprintf (name[side], sizeof name[side], i < 0 ? "ground" : "b%d", i);
-    double dx = i < 0 ? x : x - at[i][0], dy = i < 0 ? y : y - at[i][1];
-    double c = i < 0 ? 1 : cos (at[i][2]), n = i < 0 ? 0 : sin (at[i][2]);
-    pin.at[side][0] = c * dx + n * dy, pin.at[side][1] = c * dy - n * dx;
-  }
-  pw_add_pin (m, &pin);
-}
-
-/* Most bars hang from the end of the one before, so that there are chains. */
-static void linkage_build (pw_model *m, const void *parameters) {
-  unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
-  double at[LINKAGE_MOST][3] = { { 0 } };
-  int n = 6 + (int)((LINKAGE_MOST - 6) * fabs (saddle_number (&random))), loops = n / 5;
-  for (int i = 0; i < n; i++) {
-    int from = saddle_number (&random) < 0.6 ? i - 1 : (int)(i * fabs (saddle_number (&random)));
-    double x = 0, y = 0;
-    if (i > 0) x = at[from][0] + 0.5 * cos (at[from][2]), y = at[from][1] + 0.5 * sin (at[from][2]);
-    at[i][2] = 3 * saddle_number (&random);
-    at[i][0] = x + 0.5 * cos (at[i][2]), at[i][1] = y + 0.5 * sin (at[i][2]);
-    char name[12];
-    snprintf (name, sizeof name, "b%d", i);
-    pw_add_body (
-        m, &(pw_body){ .name = name, .mass = 1 + 0.1 * i, .inertia = 0.1, .start = { at[i][0], at[i][1], at[i][2] } });
-    linkage_pin (m, (const double (*)[3])at, i, i > 0 ? from : -1, i, x, y);
-  }
-  while (loops-- > 0) {
-    int a = (int)(n * fabs (saddle_number (&random))), b = (int)(n * fabs (saddle_number (&random)));
-    double x = 2 * saddle_number (&random), y = 2 * saddle_number (&random);
-    if (a == b) b = -1;
-    linkage_pin (m, (const double (*)[3])at, n + loops, a, b, x, y);
-  }
-}
-
-/* Bars with mass, and between them links without: one with a wheel, one that is a rod, or two in a row. */
-static void linkage_build_light (pw_model *m, const void *parameters) {
-  unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
-  double at[LINKAGE_MOST][3] = { { 0 } };
-  const double (*there)[3] = (const double (*)[3])at;
-  int heavy = 2 + (int)(2 * fabs (saddle_number (&random))), links = 1 + (int)(5 * fabs (saddle_number (&random)));
-  int bodies = heavy + 2 * links, pins = 0;
-  for (int i = 0; i < bodies; i++)
-    for (int k = 0; k < 3; k++) at[i][k] = 3 * saddle_number (&random);
-  for (int i = 0, next = heavy; i < heavy + links; i++) {
-    double x = at[i][0] + saddle_number (&random), y = at[i][1] + saddle_number (&random), mass = i < heavy ? 1 + i : 0;
-    int a = (int)(heavy * fabs (saddle_number (&random))), b = (int)(heavy * fabs (saddle_number (&random)));
-    int what = i < heavy ? -1 : (int)(3 * fabs (saddle_number (&random))), body = i < heavy ? i : next++;
-    char name[12], wheel[12];
-    for (int n = body; n <= body + (what == 2); n++) {
-      snprintf (name, sizeof name, "b%d", n);
-      pw_add_body (
-          m,
-          &(pw_body){ .name = name, .mass = mass, .inertia = 0.1 * mass, .start = { at[n][0], at[n][1], at[n][2] } });
-    }
-    if (what >= 0) linkage_pin (m, there, pins++, body, a, x, y);
-    snprintf (wheel, sizeof wheel, "w%d", body);
-    if (what == 0) pw_add_wheel (m, &(pw_wheel){ .name = wheel, .body = name, .at = { 0.3, 0.1 * y }, .heading = x });
-    if (what == 1) linkage_pin (m, there, pins++, body, b, 1 - 0.7 * y, 1.3 * x * y);
-    if (what == 2) {
-      linkage_pin (m, there, pins++, body, next, x + y, x - y);
-      linkage_pin (m, there, pins++, next++, b, 1 - 0.7 * y, 1.3 * x * y);
-    }
-  }
-}
-
-static const pw_parameter linkage_list[] = {
-  { PW_AT (linkage, seed), .domain = PW_NONNEGATIVE, .about = "which one" },
-  { .name = NULL },
-};
-
-static const pw_plugin_table linkage_table = { .abi = PW_ABI,
-                                               .size = sizeof (pw_plugin_table),
-                                               .parameters = linkage_list,
-                                               .parameters_size = sizeof (linkage),
-                                               .build = linkage_build };
-
-static const pw_plugin_table linkage_light_table = { .abi = PW_ABI,
-                                                     .size = sizeof (pw_plugin_table),
-                                                     .parameters = linkage_list,
-                                                     .parameters_size = sizeof (linkage),
-                                                     .build = linkage_build_light };
-
-static void linkage_each (const char *what, const pw_plugin_table *table, int seeds, int all) {
-  for (int seed = 1; seed <= seeds; seed++) {
-    double e = saddle_scene (scene_system (table, "seed", (double)seed, NULL), 0, all);
-    assert_true (e >= 0);
-    check_below (what, e, 1e6 * CHECK_EPS, "round-off, rows nearly dependent");
-  }
-}
-
-static void test_linkages (void **state) {
-  (void)state;
-  linkage_each ("a linkage", &linkage_table, 200, 1);
-  linkage_each ("a linkage with massless links", &linkage_light_table, 300, 0);
 }
 
 /* ---- Rows without anything to give way ---- */
@@ -487,9 +279,9 @@ static void test_not_a_number (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_models), cmocka_unit_test (test_linkages),     cmocka_unit_test (test_held),
-    cmocka_unit_test (test_empty),  cmocka_unit_test (test_dependent),    cmocka_unit_test (test_sine),
-    cmocka_unit_test (test_random), cmocka_unit_test (test_not_a_number),
+    cmocka_unit_test (test_models),       cmocka_unit_test (test_held), cmocka_unit_test (test_empty),
+    cmocka_unit_test (test_dependent),    cmocka_unit_test (test_sine), cmocka_unit_test (test_random),
+    cmocka_unit_test (test_not_a_number),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,0 +1,157 @@
+/* Redundant constraint equations of bodies without mass. */
+#include <math.h>
+#include "check.h"
+#include "redundant.h"
+#include "scene.h"
+#include "trial.h"
+
+/* ---- A bracket without mass, bolted twice to a hull that turns, and pulled by a load ----
+ *
+ * One row of the bolts follows from the others, which one changes as the hull turns: where the bolts lie above each other
+ * their x rows are the same.  A weld holds the bracket alike. */
+
+static void redundant_tow (pw_model *m, int bolts) {
+  pw_add_body (m,
+               &(pw_body){ .name = "hull", .mass = 1, .inertia = 0.1, .start = { 0, 0, 0.3 }, .rate = { 0.3, 0, 1 } });
+  pw_add_body (m, &(pw_body){ .name = "load", .mass = 2, .inertia = 0.2, .start = { 3, 0, 0 }, .rate = { 0, 0.2, 0 } });
+  pw_add_body (m, &(pw_body){ .name = "bracket", .start = { 0, 0, 1 }, .rate = { 0.3, 0, 1 } });
+  const double at[2][2] = { { 0.37, 0.23 }, { 1.51, -0.77 } }, c = cos (0.7), s = sin (0.7);
+  for (int i = 0; i < bolts; i++)
+    pw_add_pin (
+        m, &(pw_pin){ .name = i ? "second" : "first",
+                      .body = { "hull", "bracket" },
+                      .at = { { at[i][0] * c - at[i][1] * s, at[i][0] * s + at[i][1] * c }, { at[i][0], at[i][1] } } });
+  if (bolts == 0) pw_add_weld (m, &(pw_weld){ .name = "weld", .body = { "hull", "bracket" }, .angle = 0.7 });
+  pw_add_spring (
+      m, &(pw_spring){
+             .name = "rope", .body = { "bracket", "load" }, .at = { { 0.2, 0 } }, .stiffness = 10, .length = 2 });
+}
+
+static void redundant_towed (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_tow (m, 2);
+}
+
+static void redundant_towed_plainly (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_tow (m, 0);
+}
+
+static const pw_plugin_table redundant_towed_table = TRIAL_TABLE (redundant_towed);
+static const pw_plugin_table redundant_towed_plainly_table = TRIAL_TABLE (redundant_towed_plainly);
+
+static void test_bracket (void **state) {
+  (void)state;
+  static const char *const name[] = { "hull.x", "hull.phi", "load.x", "load.y", "bracket.phi", "hull.omega", NULL };
+  double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
+  redundant_twins (&redundant_towed_table, &redundant_towed_plainly_table, 1, 2e-4, name); /* past one change of rows */
+  trial (&redundant_towed_table, 1);
+  redundant_end (&redundant_towed_table, "rk4+projection", 0, 5, name, a, 1e-3);
+  redundant_end (&redundant_towed_plainly_table, "rk4+projection", 0, 5, name, b, 1e-3);
+  check_below ("past many changes", redundant_off (a, b, 6), 1e-10, "round-off of 5 s, magnified by the motion");
+}
+
+/* ---- The same with a caster of short trail under the load ----
+ *
+ * The wheel is the weakest row throughout, so that nothing of the bolts shows in the smallest pivot until it is too late. */
+
+static void redundant_caster (pw_model *m) {
+  pw_add_body (m, &(pw_body){ .name = "fork", .start = { 3, 0, PW_PI / 2 }, .rate = { 0, 0.2 } });
+  pw_add_pin (m, &(pw_pin){ .name = "head", .body = { "load", "fork" } });
+  pw_add_wheel (m, &(pw_wheel){ .name = "wheel", .body = "fork", .at = { -0.08, 0 } });
+}
+
+static void redundant_towed_on_caster (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_tow (m, 2);
+  redundant_caster (m);
+}
+
+static void redundant_towed_on_caster_plainly (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_tow (m, 0);
+  redundant_caster (m);
+}
+
+static const pw_plugin_table redundant_on_caster_table = TRIAL_TABLE (redundant_towed_on_caster);
+static const pw_plugin_table redundant_on_caster_plainly_table = TRIAL_TABLE (redundant_towed_on_caster_plainly);
+
+static void test_caster (void **state) {
+  (void)state;
+  static const char *const name[] = { "hull.x", "hull.phi", "load.x", "load.y", "bracket.phi", "fork.phi", NULL };
+  static const char *const method[] = { "erk8+projection", "erk5+projection", "erk8+baumgarte", "ida+ggl", NULL };
+  double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS], exact[REDUNDANT_COORDS];
+  redundant_end (&redundant_on_caster_plainly_table, "erk8+projection", 1e-12, 3, name, exact, 0);
+  for (int i = 0; method[i]; i++) {
+    redundant_end (&redundant_on_caster_table, method[i], 1e-9, 3, name, a, 0);
+    redundant_end (&redundant_on_caster_plainly_table, method[i], 1e-9, 3, name, b, 0);
+    check_below (method[i], redundant_off (a, exact, 6), 1e-9 + 10 * redundant_off (b, exact, 6),
+                 "rtol, and 10 times the twin's own error");
+  }
+}
+
+/* Bolts that drift apart are four independent rows: even so three are kept, and the wheel. */
+static void test_drifting_bolts (void **state) {
+  (void)state;
+  static const char *const name[] = { "hull.x", "hull.y", "hull.phi", "load.x", "load.y", "fork.phi", NULL };
+  double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
+  redundant_end (&redundant_on_caster_table, "rk4+none", 0, 3, name, a, 0.004);
+  redundant_end (&redundant_on_caster_plainly_table, "rk4+none", 0, 3, name, b, 0.004);
+  check_below ("the bolted bracket", redundant_off (a, b, 6), 1e-3, "drift");
+}
+
+/* ---- A cart on two casters, their forks without mass, with two wheels on each axle ----
+ *
+ * The rows of the second wheels touch no mass: what the elimination leaves of them is nothing but round-off. */
+
+static void redundant_casters (pw_model *m, int wheels) {
+  static const char *const fork[] = { "fork1", "fork2" }, *const head[] = { "A1", "A2" };
+  static const char *const wheel[][2] = { { "left1", "right1" }, { "left2", "right2" } };
+  static const double heading[] = { 0.23, -0.3 };
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = 0.5, .inertia = 0.3, .rate = { 0.9, 0.1, 0.2 } });
+  for (int i = 0; i < 2; i++) {
+    const double x = 0.7, y = i ? 0.4 : -0.4, c = cos (heading[i]), s = sin (heading[i]);
+    pw_add_body (m, &(pw_body){ .name = fork[i], .start = { x, y, i ? 0.1 : -0.2 } });
+    pw_add_pin (m, &(pw_pin){ .name = head[i], .body = { "cart", fork[i] }, .at = { { x, y } } });
+    for (int n = 0; n < wheels; n++)
+      pw_add_wheel (m, &(pw_wheel){ .name = wheel[i][n],
+                                    .body = fork[i],
+                                    .at = { -0.37 * c - 0.35 * n * s, -0.37 * s + 0.35 * n * c },
+                                    .heading = heading[i] });
+  }
+  pw_add_torque (m, &(pw_torque){ .name = "swing",
+                                  .body = { "cart", "fork1" },
+                                  .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.1, .omega = 2 } } });
+}
+
+static void redundant_four_wheels (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_casters (m, 2);
+}
+
+static void redundant_two_wheels (pw_model *m, const void *parameter) {
+  (void)parameter;
+  redundant_casters (m, 1);
+}
+
+static const pw_plugin_table redundant_four_wheels_table = TRIAL_TABLE (redundant_four_wheels);
+static const pw_plugin_table redundant_two_wheels_table = TRIAL_TABLE (redundant_two_wheels);
+
+static void test_casters (void **state) {
+  (void)state;
+  static const char *const name[] = { "cart.x", "cart.y", "cart.phi", "fork1.phi", "fork2.phi", "cart.omega", NULL };
+  static const char *const wheels[] = { "wheels left1 and right1: the same lateral constraint",
+                                        "wheels left2 and right2: the same lateral constraint", NULL };
+  redundant_says (&redundant_four_wheels_table, wheels);
+  redundant_twins (&redundant_four_wheels_table, &redundant_two_wheels_table, 1, 1e-3, name);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_bracket),
+    cmocka_unit_test (test_caster),
+    cmocka_unit_test (test_drifting_bolts),
+    cmocka_unit_test (test_casters),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

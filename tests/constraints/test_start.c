@@ -1,0 +1,221 @@
+/* The consistent start: what is given stays, what is consistent is left alone, what cannot be is named. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "model.h"
+#include "runs.h"
+#include "scene.h"
+#include "system.h"
+#include "toys.h"
+#include "start.h"
+
+/* ---- Initial values of the settings ---- */
+
+/* They replace the system's for this run alone, as if the model had them, to the bit. */
+static void test_settings (void **state) {
+  static const char *const name[] = { "frame.omega", "steer.phi", NULL };
+  static const double value[] = { 0.3, 0.2 };
+  pw_system *own, *shared;
+  pw_error error = { 0 };
+  (void)state;
+  pw_run *expected = start_open (&own, name, value), *plain = start_open (&shared, NULL, NULL);
+  pw_initial_value initial[2];
+  for (int i = 0; i < 2; i++)
+    initial[i] = (pw_initial_value){ pw_system_find_state (shared, name[i], &error), value[i] };
+  pw_run *r = runs_open (shared, "rk4", &(pw_settings){ .initial = initial, .initials = 2 });
+  const pw_initial_report *a = pw_run_initial (r), *b = pw_run_initial (expected);
+  check_bits ("positions", a->q, b->q, 6);
+  check_bits ("velocities", a->v, b->v, 6);
+  assert_true (a->moved == b->moved && a->changed == b->changed && a->released == b->released && a->moved > 0);
+  for (int i = 0; i < 12; i++) assert_int_equal (pw_initial_specified (a, i), pw_initial_specified (b, i));
+  assert_true (pw_initial_specified (a, initial[0].state) && !pw_initial_specified (pw_run_initial (plain), 2));
+  pw_run_close (r);
+  pw_run_close (plain);
+  pw_run *again = runs_open (shared, "rk4", NULL);
+  check_bits ("the system's", pw_run_initial (again)->q, shared->q0, 6);
+  start_close (again, shared);
+  start_close (expected, own);
+}
+
+static void test_bad_settings (void **state) {
+  static const pw_initial_value bad[] = { { -1, 0 }, { 12, 0 }, { 0, NAN }, { 0, 1e200 } };
+  static const char *const expected[] = { "state -1 = 0: expected a state from 0 to 11", "state 12 = 0: expected",
+                                          "state 0 = nan: expected",
+                                          "values too extreme: frame.x is initially 1e+200" };
+  (void)state;
+  pw_system *s = scene_compile (scene_model (&scene_ezyroller, NULL));
+  for (int i = 0; i < 4; i++) {
+    pw_error error = { 0 };
+    assert_null (pw_run_open (s, "rk4", &(pw_settings){ .initial = bad + i, .initials = 1 }, &error));
+    assert_int_equal (error.status, PW_INPUT);
+    assert_non_null (strstr (error.text, expected[i]));
+  }
+  pw_system_free (s);
+}
+
+/* ---- Nothing to do ---- */
+
+static void test_no_harm (void **state) {
+  (void)state;
+  pw_system *s;
+  pw_run *r = start_open (&s, NULL, NULL);
+  const pw_initial_report *start = pw_run_initial (r);
+  assert_true (start->moved == 0 && start->released == 0);
+  check_bits ("positions", start->q, s->q0, 6);
+  check_bits ("rates", start->v, s->v0, 6);
+  start_close (r, s);
+}
+
+/* What is off by more than round-off is moved, however little that is. */
+static void test_little (void **state) {
+  static const char *const name[] = { "steer.x", "frame.vy", NULL };
+  static const double value[] = { 0.375 + 1e-10, 1e-10 };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_system *s;
+    const char *const one[] = { name[i], NULL };
+    pw_run *r = start_open (&s, one, value + i);
+    assert_true (pw_run_initial (r)->moved > 0);
+    start_close (r, s);
+  }
+}
+
+/* Round-off is put right, but nothing is said of it. */
+static void test_round_off (void **state) {
+  static const char *const name[] = { "steer.x", NULL };
+  static const double value[] = { 0.375 + 12 * CHECK_EPS };
+  (void)state;
+  pw_system *s;
+  pw_run *r = start_open (&s, name, value);
+  const pw_initial_report *start = pw_run_initial (r);
+  int changed = 0;
+  for (int j = 0; j < 6; j++) changed += start->q[j] != start->q_given[j];
+  assert_true (changed > 0 && start->moved == 0);
+  start_close (r, s);
+}
+
+/* A state on the way is as consistent as it can be: it is not touched, either. */
+static void test_no_harm_on_the_way (void **state) {
+  (void)state;
+  for (double t = 0.25; t <= 2; t += 0.25) {
+    double q[6], v[6];
+    pw_error error = { 0 };
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    pw_run *r = runs_open (s, "rk4+projection", NULL);
+    pw_sample now = runs_to (r, t);
+    memcpy (q, now.q, sizeof q);
+    memcpy (v, now.v, sizeof v);
+    check_ok (pw_run_restart (r, q, v, &error), &error);
+    assert_int_equal (pw_run_initial (r)->moved, 0);
+    now = runs_to (r, t);
+    check_bits ("positions", now.q, q, 6);
+    check_bits ("rates", now.v, v, 6);
+    start_close (r, s);
+  }
+}
+
+/* ---- What is specified stays, too ---- */
+
+/* A rod on a pin, of which one state or two are specified. */
+static void start_rod (pw_model *m, const void *parameters) {
+  const double *p = parameters;
+  pw_add_body (m, &(pw_body){ .name = "rod",
+                              .mass = 1,
+                              .inertia = 1. / 12,
+                              .start = { p[1], 0, p[0] },
+                              .rate = { 0, p[3], p[2] },
+                              .specified = (unsigned)p[4] });
+  pw_add_pin (m, &(pw_pin){ .name = "O", .body = { "ground", "rod" }, .at = { { 0 }, { -0.5, 0 } } });
+}
+
+static const pw_parameter start_rod_list[] = { { .name = "phi" },
+                                               { .name = "x", .offset = 8 },
+                                               { .name = "omega", .offset = 16 },
+                                               { .name = "vy", .offset = 24 },
+                                               { .name = "specified", .offset = 32 },
+                                               { .name = NULL } };
+static const pw_plugin_table start_rod_table = { .abi = PW_ABI,
+                                                 .size = sizeof (pw_plugin_table),
+                                                 .parameters = start_rod_list,
+                                                 .parameters_size = 40,
+                                                 .build = start_rod };
+
+static const pw_initial_report *start_of_rod (pw_system **s, pw_run **r, double phi, double x, double omega, double vy,
+                                              double specified) {
+  *s = scene_system (&start_rod_table, "phi", phi, "x", x, "omega", omega, "vy", vy, "specified", specified, NULL);
+  *r = runs_open (*s, "rk4", NULL);
+  check_below ("position", runs_to (*r, 0).position, START_ROUND_OFF, START_REASON);
+  check_below ("velocity", runs_to (*r, 0).velocity, START_ROUND_OFF, START_REASON);
+  return pw_run_initial (*r);
+}
+
+/* An angle and a rate that are specified stay to the bit; what is left out follows. */
+static void test_specified (void **state) {
+  pw_system *s;
+  pw_run *r;
+  (void)state;
+  const pw_initial_report *start = start_of_rod (&s, &r, PW_PI / 6, 0, 2, 0, 0);
+  assert_true (start->q[2] == PW_PI / 6 && start->v[2] == 2 && start->moved == 4 && start->changed == 0);
+  check_close ("x", start->q[0], 0.5 * cos (PW_PI / 6), START_ROUND_OFF, START_REASON);
+  check_close ("vy", start->v[1], cos (PW_PI / 6), START_ROUND_OFF, START_REASON);
+  assert_true (pw_initial_specified (start, 2) && pw_initial_specified (start, 5) && !pw_initial_specified (start, 0));
+  start_close (r, s);
+}
+
+/* A 0 that is meant, and x in its place: the angle follows from x = 0.5 cos phi, omega from vy = 0.5 omega cos phi. */
+static void test_specified_zero (void **state) {
+  pw_system *s;
+  pw_run *r;
+  (void)state;
+  const pw_initial_report *start = start_of_rod (&s, &r, 1.5, 0, 0, 0, PW_SPECIFIES_X);
+  assert_true (start->q[0] == 0 && start->changed == 0);
+  check_close ("phi", start->q[2], PW_PI / 2, START_ROUND_OFF, START_REASON);
+  start_close (r, s);
+  start = start_of_rod (&s, &r, PW_PI / 3, 0, 0, 0.75, 0);
+  assert_true (start->q[2] == PW_PI / 3 && start->v[1] == 0.75 && start->changed == 0);
+  check_close ("omega", start->v[2], 3, START_ROUND_OFF, START_REASON);
+  start_close (r, s);
+}
+
+/* More than the pin allows: as little as possible moves, and the report has what was specified; the rates stay none the less. */
+static void test_specified_too_much (void **state) {
+  pw_system *s;
+  pw_run *r;
+  (void)state;
+  const pw_initial_report *start = start_of_rod (&s, &r, PW_PI / 6, 0.5, 2, 0, 0);
+  assert_true (start->released == 0 && start->changed == 2 && start->v[2] == 2);
+  assert_true (start->q[2] > 0.1 && start->q[2] < PW_PI / 6 && start->q[0] < 0.5);
+  start_close (r, s);
+}
+
+/* What the user gives has the last word. */
+static void test_given_before_specified (void **state) {
+  pw_error error = { 0 };
+  (void)state;
+  pw_model *m = scene_model (&start_rod_table, "phi", PW_PI / 6, NULL);
+  check_ok (pw_model_set_initial (m, "rod.y", 0.4, &error), &error);
+  pw_system *s = scene_compile (m);
+  pw_run *r = runs_open (s, "rk4", NULL);
+  const pw_initial_report *start = pw_run_initial (r);
+  assert_true (start->q[1] == 0.4 && start->released == 0 && start->changed == 1);
+  check_close ("phi", start->q[2], asin (0.8), START_ROUND_OFF, START_REASON);
+  start_close (r, s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_settings),
+    cmocka_unit_test (test_bad_settings),
+    cmocka_unit_test (test_no_harm),
+    cmocka_unit_test (test_little),
+    cmocka_unit_test (test_round_off),
+    cmocka_unit_test (test_no_harm_on_the_way),
+    cmocka_unit_test (test_specified),
+    cmocka_unit_test (test_specified_zero),
+    cmocka_unit_test (test_specified_too_much),
+    cmocka_unit_test (test_given_before_specified),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

@@ -1,0 +1,209 @@
+/* The watchdog's thresholds: each one decides something. */
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include "bars.h"
+#include "check.h"
+#include "method.h"
+#include "runs.h"
+#include "scene.h"
+#include "trial.h"
+
+/* What is compared of a run with a threshold and of one with another. */
+typedef enum { WATCHDOG_EARLIER, WATCHDOG_LATER, WATCHDOG_FEWER, WATCHDOG_MORE } watchdog_effect;
+
+#define WATCHDOG_LIMIT(x) #x, offsetof(pw_watchdog, x)
+
+/* EARLIER, LATER: stops at; FEWER, MORE: rejected steps. */
+static const struct {
+  const char *name;
+  size_t at;
+  double factor;
+  watchdog_effect effect;
+  const char *model, *parameter;
+  double value;
+  const char *method;
+  double tolerance, t;
+} watchdog_limit[] = {
+  { WATCHDOG_LIMIT (lost), 4, WATCHDOG_LATER, "slider-crank", NULL, 0, "ida+ggl", 1e-2, 4 },
+  { WATCHDOG_LIMIT (lost_unstabilised), 0.5, WATCHDOG_EARLIER, "pendulum", NULL, 0, "ida+none", 1e-3, 100 },
+  { WATCHDOG_LIMIT (magnified), 0, WATCHDOG_EARLIER, "redundant-parallelogram", NULL, 0, "adams+none", 1e-4, 2 },
+  { WATCHDOG_LIMIT (follows), 0, WATCHDOG_EARLIER, "redundant-parallelogram", NULL, 0, "rk4+projection", 1e-2, 2 },
+  { WATCHDOG_LIMIT (near), 2, WATCHDOG_MORE, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 2 },
+  { WATCHDOG_LIMIT (growth), 0, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-2, 2 },
+  { WATCHDOG_LIMIT (agree_best), 1e5, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 4 },
+  { WATCHDOG_LIMIT (agree), 1e-6, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 4 },
+  { WATCHDOG_LIMIT (regular), 0, WATCHDOG_LATER, "n-four-bar", "N", 1, "erk8+none", 1e-5, 4 },
+  { WATCHDOG_LIMIT (turn), 4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
+  { WATCHDOG_LIMIT (least_turn), 1e4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
+  { WATCHDOG_LIMIT (drift_turn), 1e3, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
+  { WATCHDOG_LIMIT (drift_near), 1e3, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
+  { WATCHDOG_LIMIT (drift_far), 0.5, WATCHDOG_EARLIER, "n-four-bar", "N", 1, "adams+none", 1e-3, 4 },
+  { WATCHDOG_LIMIT (drift_any), 0.5, WATCHDOG_EARLIER, "n-four-bar", "N", 1, "adams+none", 1e-3, 4 },
+  { WATCHDOG_LIMIT (lipschitz), 0, WATCHDOG_LATER, "slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4 },
+  { WATCHDOG_LIMIT (sag), 0, WATCHDOG_LATER, "slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4 },
+  { WATCHDOG_LIMIT (dip), 8, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "ida+ggl", 1e-4, 4 },
+  { WATCHDOG_LIMIT (stride), 30, WATCHDOG_LATER, "slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4 },
+  { WATCHDOG_LIMIT (floor), 100, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "bdf+projection", 1e-4, 4 },
+  { WATCHDOG_LIMIT (progress), 20, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "rk4+projection", 1e-2, 4 },
+  { WATCHDOG_LIMIT (met), 0, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "leapfrog", 1e-2, 4 },
+  { WATCHDOG_LIMIT (ahead), 2.1, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "rk4+projection", 1e-2, 4 },
+  { WATCHDOG_LIMIT (resolved), 8, WATCHDOG_LATER, "slider-crank", "l2", 1.001, "leapfrog", 1e-2, 4 },
+};
+
+/* When a run stops, and how many steps it has rejected. */
+static void watchdog_measure (int i, double factor, double *t, long *rejected) {
+  pw_error error = { 0 };
+  const char *parameter = watchdog_limit[i].parameter;
+  double value = watchdog_limit[i].value;
+  pw_system *s = watchdog_limit[i].model ? scene_named (watchdog_limit[i].model, parameter, value)
+                                         : scene_system (&bars_table, parameter, value, NULL);
+  pw_run *r = runs_open (s, watchdog_limit[i].method,
+                         &(pw_settings){ .rtol = watchdog_limit[i].tolerance,
+                                         .step = watchdog_limit[i].tolerance,
+                                         .span = watchdog_limit[i].t });
+  *(double *)(void *)((char *)&r->limits + watchdog_limit[i].at) *= factor;
+  pw_run_advance_to (r, watchdog_limit[i].t, watchdog_limit[i].t, &error);
+  *t = pw_run_time (r);
+  *rejected = pw_run_statistics (r)->rejected;
+  print_message ("%s times %g: t = %g, %ld rejected: %s\n", watchdog_limit[i].name, factor, *t, *rejected, error.text);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
+static void test_limits (void **state) {
+  int bad = 0;
+  (void)state;
+  for (size_t i = 0; i < sizeof watchdog_limit / sizeof *watchdog_limit; i++) {
+    double t[2];
+    long rejected[2];
+    watchdog_measure ((int)i, 1, &t[0], &rejected[0]);
+    watchdog_measure ((int)i, watchdog_limit[i].factor, &t[1], &rejected[1]);
+    int good[] = { t[1]<t[0], t[1]> t[0], rejected[1]<rejected[0], rejected[1]> rejected[0] };
+    if (!good[watchdog_limit[i].effect]) print_error ("%s decides nothing\n", watchdog_limit[i].name), bad++;
+  }
+  assert_int_equal (bad, 0);
+}
+
+/* Thresholds that no run shows by when it stops. */
+
+/* A rhombus of bars of 1 m at this angle, in r->q, with rates of its own. */
+static void watchdog_bend (pw_run *r, double angle) {
+  double c = cos (angle), n = sin (angle);
+  const double q[] = { 0.5 * c, 0.5 * n, angle, 0.5 + c, n, 0, 1 + 0.5 * c, 0.5 * n, angle };
+  const double v[] = { -0.5 * n, 0.5 * c, 1, -n, c, 0, -0.5 * n, 0.5 * c, 1 };
+  memcpy (r->q, q, sizeof q);
+  memcpy (r->v, v, sizeof v);
+  r->geometry.alert = 1;
+}
+
+/* How far J a is from gamma after an evaluation at this angle. */
+static double watchdog_residual (pw_run *r, double angle) {
+  double gamma[8], Ja[8], most = 0;
+  watchdog_bend (r, angle);
+  assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_OK);
+  pw_evaluate_gamma (r->w, gamma);
+  pw_mul_J (r->w, r->a, Ja);
+  for (int i = 0; i < r->s->rows; i++) most = fmax (most, fabs (Ja[i] - gamma[i]));
+  return most;
+}
+
+/* How far J v is from 0 after irregular velocities have been projected at this angle. */
+static double watchdog_projected (pw_run *r, double angle) {
+  pw_projector p;
+  pw_error error = { 0 };
+  double v[9], Jv[8], most = 0;
+  check_ok (pw_projector_open (&p, r, NULL, NULL, &error), &error);
+  watchdog_bend (r, angle);
+  for (int j = 0; j < 9; j++) v[j] = sin (1 + j);
+  assert_int_equal (pw_update_kinematics (r->w, 0, r->q, v), PW_OK);
+  pw_evaluate_J (r->w);
+  assert_int_equal (pw_project_velocities (&p, r, v), PW_OK);
+  pw_mul_J (r->w, v, Jv);
+  for (int i = 0; i < r->s->rows; i++) most = fmax (most, fabs (Jv[i]));
+  pw_projector_close (&p);
+  return most;
+}
+
+static void test_evaluations (void **state) {
+  (void)state;
+  pw_system *s = scene_system (&bars_table, NULL);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  const double angle = 1e-4;
+  double refined = watchdog_residual (r, angle), sine = r->geometry.sine, projected = watchdog_projected (r, angle);
+  r->limits.refine = 0;
+  check_below ("projected", projected, 0.1 * watchdog_projected (r, angle), "eps / s instead of eps / s^2");
+  check_below ("refined", refined, 0.1 * watchdog_residual (r, angle), "eps / s instead of eps / s^2");
+  r->refuse = 2 * sine;
+  watchdog_bend (r, angle);
+  assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_RETRY);
+  r->refuse = 0.5 * sine;
+  assert_int_equal (pw_run_accelerate (r, 0, r->q, r->v, r->a, r->lambda), PW_OK);
+  assert_true (r->limits.rank == pw_watchdog_limits.rank);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
+static void test_jump (void **state) {
+  (void)state;
+  pw_system *s = scene_named ("chaplygin-sleigh", NULL, 0);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  pw_error error = { 0 };
+  r->near = 1;
+  r->a[0] = 1.5 * r->limits.jump * r->reference_level * s->scale.length / (r->w->scale.time * r->w->scale.time);
+  assert_int_equal (pw_run_watchdog (r, &error), PW_METHOD);
+  assert_non_null (strstr (error.text, "lost at a singular configuration: the accelerations are 150 times"));
+  r->limits.jump *= 2;
+  error = (pw_error){ 0 };
+  r->near = 1;
+  check_ok (pw_run_watchdog (r, &error), &error);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
+static void test_masses (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = scene_named ("n-four-bar", "m", 0.7 * pw_watchdog_limits.extreme);
+  pw_run *r = runs_open (s, "rk4+projection", NULL);
+  assert_int_equal (pw_watchdog_check_values (r, &error), PW_OK);
+  r->limits.extreme /= 2;
+  assert_int_equal (pw_watchdog_check_values (r, &error), PW_INPUT);
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
+/* Accelerations are judged in units of the scene: under another torque a disc turns as before, faster. */
+static void watchdog_build_disc (pw_model *m, const void *parameter) {
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
+  pw_add_pin (m, &(pw_pin){ .name = "hub", .body = { "disc", "ground" } });
+  pw_add_torque (m, &(pw_torque){ .name = "motor",
+                                  .body = { "disc", "ground" },
+                                  .value = { .constant = *(const double *)parameter } });
+}
+
+static void test_agitation (void **state) {
+  static const pw_parameter list[] = { { .name = "torque", .value = 1 }, { .name = NULL } };
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof (pw_plugin_table),
+                                         .parameters = list,
+                                         .parameters_size = sizeof (double),
+                                         .build = watchdog_build_disc };
+  (void)state;
+  for (int k = 0; k <= 6; k += 2) {
+    pw_system *s = scene_system (&table, "torque", pow (10, k), NULL);
+    pw_run *r = runs_open (s, "rk4+projection", NULL);
+    check_close ("agitation", pw_run_acceleration_norm (r), 1, 16 * CHECK_EPS, "round-off");
+    pw_run_close (r);
+    pw_system_free (s);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_limits),    cmocka_unit_test (test_evaluations), cmocka_unit_test (test_jump),
+    cmocka_unit_test (test_agitation), cmocka_unit_test (test_masses),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

@@ -1,0 +1,267 @@
+/* The watchdog: singular configurations independent of masses and of the initial one, change points, drift, extreme values;
+ * and what each of its thresholds decides. */
+#include <math.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include "bars.h"
+#include "check.h"
+#include "method.h"
+#include "runs.h"
+#include "scene.h"
+#include "trial.h"
+
+/* ---- Scenes ---- */
+
+/* A point mass of 1 kg on a rod of 1 m, horizontal at the start, below a cart that weighs hardly anything. */
+typedef struct {
+  double cart, scale, phi;
+} watchdog_cart;
+
+static const pw_parameter watchdog_cart_list[] = {
+  { PW_AT (watchdog_cart, cart), 1e-6, "kg", "mass of the cart", PW_POSITIVE },
+  { PW_AT (watchdog_cart, scale), 1, "", "times all masses", PW_POSITIVE },
+  { PW_AT (watchdog_cart, phi), 0, "rad", "angle of the rod", PW_REAL },
+  { .name = NULL },
+};
+
+static void watchdog_build_cart (pw_model *m, const void *parameter) {
+  const watchdog_cart *p = parameter;
+  double cart = p->cart * p->scale;
+  pw_add_body (m, &(pw_body){ .name = "cart", .mass = cart, .inertia = cart });
+  pw_add_body (m, &(pw_body){ .name = "bob", .mass = p->scale, .start = { cos (p->phi), sin (p->phi), p->phi } });
+  pw_add_slider (m, &(pw_slider){ .name = "rail", .body = { "cart", "ground" } });
+  pw_add_pin (m, &(pw_pin){ .name = "hinge", .body = { "bob", "cart" }, .at = { { -1, 0 }, { 0, 0 } } });
+  pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
+}
+
+static const pw_plugin_table watchdog_cart_table = { .abi = PW_ABI,
+                                                     .size = sizeof (pw_plugin_table),
+                                                     .parameters = watchdog_cart_list,
+                                                     .parameters_size = sizeof (watchdog_cart),
+                                                     .build = watchdog_build_cart };
+
+/* ---- Regular scenes with bodies of very different masses ---- */
+
+/* The angle of the rod, 0 to pi and back, at time t: with e = m / (m + 1), theta'^2 (cos^2 + e sin^2) = 2 g sin, since the
+ * centre of mass moves straight down; t by Simpson's rule over the root of theta, from which the angle is found. */
+static long double watchdog_time (long double e, long double theta) {
+  const int n = 200000;
+  long double h = sqrtl (theta) / n, sum = 0;
+  for (int i = 0; i <= n; i++) {
+    long double u = h * i, x = u * u, c = cosl (x), s = sinl (x);
+    long double f = 2 * sqrtl ((c * c + e * s * s) / (2 * 9.81L * (i == 0 ? 1 : s / x)));
+    sum += f * (i == 0 || i == n ? 1 : i % 2 ? 4 : 2);
+  }
+  return sum * h / 3;
+}
+
+static double watchdog_angle (double cart, double t) {
+  long double e = cart / (1 + (long double)cart), pi = 3.14159265358979323846L, quarter = watchdog_time (e, pi / 2);
+  long double left = fmodl (t, 4 * quarter), low = 0, high = pi / 2;
+  if (left > 2 * quarter) left = 4 * quarter - left;
+  long double rest = left > quarter ? 2 * quarter - left : left;
+  for (int i = 0; i < 45; i++) {
+    long double middle = (low + high) / 2;
+    *(watchdog_time (e, middle) < rest ? &low : &high) = middle;
+  }
+  return (double)(left > quarter ? pi - low : low);
+}
+
+static void watchdog_try_cart (const char *method, double cart, double scale, double exact, double bound) {
+  pw_system *s = scene_system (&watchdog_cart_table, "cart", cart, "scale", scale, NULL);
+  pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = 1e-9, .span = 10 });
+  pw_sample x = runs_to (r, 10);
+  check_close (method, trial_state (s, &x, "cart.x"), (1 - cos (exact)) / (1 + cart), bound, "1e4 rtol");
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
+static void test_light_cart (void **state) {
+  static const char *const method[] = { "erk5+projection", "erk8+projection", "erk8+nullspace", "ida+ggl",
+                                        "bdf+projection" };
+  static const double cart[] = { 1e-6, 1e-3 };
+  (void)state;
+  check_close ("quadrature", (double)watchdog_time (1e-6L / (1 + 1e-6L), 1.57079632679489661923L), 0.45152453568165885,
+               1e-12, "QUADPACK");
+  for (size_t k = 0; k < sizeof cart / sizeof *cart; k++) {
+    double exact = watchdog_angle (cart[k], 10);
+    for (size_t i = 0; i < sizeof method / sizeof *method; i++) watchdog_try_cart (method[i], cart[k], 1, exact, 1e-5);
+    watchdog_try_cart ("erk8+projection", cart[k], 1e6, exact, 1e-5);
+  }
+  watchdog_try_cart ("erk8+projection", 1e-9, 1, watchdog_angle (1e-9, 10), 1e-5);
+}
+
+/* The sine is a property of J: masses do not enter, nor does the configuration at the start. */
+static void test_sine (void **state) {
+  (void)state;
+  double sine[3];
+  static const double mass[] = { 1, 1e-8, 1e8 };
+  for (int i = 0; i < 3; i++) {
+    pw_system *s = scene_named ("slider-crank", "ms", mass[i]);
+    pw_run *r = runs_open (s, "rk4+projection", NULL);
+    sine[i] = pw_watchdog_sine (r, NULL);
+    check_close ("largest", r->geometry.typical, sine[i], 0.3, "at any configuration but a singular one");
+    pw_run_close (r);
+    pw_system_free (s);
+  }
+  check_bits ("sine", sine, sine + 1, 2);
+}
+
+/* ---- Change points ---- */
+
+/* What a run comes to: a status, and how far it is off, of all angles. */
+static int watchdog_run (pw_system *s, const char *method, double tolerance, double t, double *phi, pw_error *error) {
+  const pw_method *m;
+  char name[40];
+  int adaptive = 1, status;
+  for (int i = 0; (m = runs_method (i, name)) != NULL; i++)
+    if (strcmp (name, method) == 0) adaptive = m->adaptive;
+  pw_run *r = runs_open (s, method, &(pw_settings){ .rtol = adaptive ? tolerance : 0, .step = tolerance, .span = t });
+  status = pw_run_advance_to (r, t, t, error);
+  for (int j = 2; status == PW_OK && j < s->coords; j += 3) phi[j / 3] = r->q[j];
+  pw_run_close (r);
+  return status;
+}
+
+static const struct {
+  const char *method;
+  double tolerance;
+} watchdog_runs[] = {
+  { "bdf+projection", 1e-3 },  { "bdf+projection", 1e-5 },  { "bdf+projection", 1e-6 },  { "erk5+projection", 1e-3 },
+  { "erk5+projection", 1e-4 }, { "erk5+projection", 1e-6 }, { "erk8+projection", 1e-3 }, { "erk8+projection", 1e-4 },
+  { "erk8+projection", 1e-6 }, { "erk8+nullspace", 1e-3 },  { "ida+ggl", 1e-3 },         { "ida+ggl", 1e-6 },
+  { "galpha+ggl", 1e-2 },      { "galpha+ggl", 1e-3 },      { "galpha+index3", 1e-2 },   { "leapfrog", 1e-2 },
+  { "leapfrog", 1e-3 },        { "rk4+projection", 1e-2 },  { "rk4+projection", 1e-3 },  { "erk8+none", 1e-3 },
+  { "erk5+baumgarte", 1e-3 },
+};
+
+enum { WATCHDOG_RUNS = sizeof watchdog_runs / sizeof *watchdog_runs };
+
+/* On its own branch the rod of a slider-crank that is longer than the crank never points backwards. */
+static void test_near_slider_crank (void **state) {
+  static const double l2[] = { 1.00000001, 1.000003, 1.00001, 1.0001 };
+  int reported = 0, finished = 0;
+  (void)state;
+  for (size_t k = 0; k < sizeof l2 / sizeof *l2; k++)
+    for (int i = 0; i < WATCHDOG_RUNS; i++) {
+      pw_error error = { 0 };
+      double phi[3];
+      pw_system *s = scene_named ("slider-crank", "l2", l2[k]);
+      int status = watchdog_run (s, watchdog_runs[i].method, watchdog_runs[i].tolerance, 1.5, phi, &error);
+      if (status == PW_OK) assert_true (cos (phi[1]) > 0);
+      if (status != PW_OK) assert_int_equal (status, PW_METHOD);
+      reported += strstr (error.text, "change point") != NULL;
+      finished += status == PW_OK;
+      pw_system_free (s);
+    }
+  assert_true (reported > 30 && finished > 15);
+}
+
+/* By others the answer is that of a run of high accuracy, or the run stops. */
+static void test_near_four_bar (void **state) {
+  static const struct {
+    double a, b, c, d, g;
+  } bars[] = { { 1, 1.00001, 1, 1, 0 },
+               { 1, 0.99999, 1, 1, 9.81 },
+               { 1, 2, 1, 2.00001, 0 },
+               { 1, 1, 2.0001, 2, 0 },
+               { 2, 1, 2.00001, 1, 9.81 } };
+  int reported = 0;
+  (void)state;
+  for (size_t k = 0; k < sizeof bars / sizeof *bars; k++) {
+    pw_error none = { 0 };
+    double exact[3];
+    pw_system *s = scene_system (&bars_table, "a", bars[k].a, "b", bars[k].b, "c", bars[k].c, "d", bars[k].d, "g",
+                                 bars[k].g, NULL);
+    check_ok (watchdog_run (s, "erk8+projection", 1e-12, 2, exact, &none), &none);
+    for (int i = 0; i < WATCHDOG_RUNS; i++) {
+      pw_error error = { 0 };
+      double phi[3], off = 0;
+      int status = watchdog_run (s, watchdog_runs[i].method, watchdog_runs[i].tolerance, 2, phi, &error);
+      for (int j = 0; status == PW_OK && j < 3; j++) off = fmax (off, fabs (remainder (phi[j] - exact[j], 2 * PW_PI)));
+      check_below (watchdog_runs[i].method, off, 0.5, "other branches are off by 1 and more");
+      reported += strstr (error.text, "change point") != NULL;
+    }
+    pw_system_free (s);
+  }
+  assert_true (reported > 30);
+}
+
+/* Where branches meet, and where none are near, nothing is reported. */
+static void test_no_change_point (void **state) {
+  static const struct { double a, b, c, d; } bars[] = { { 1, 1, 1, 1 }, { 1, 2, 1, 2 }, { 1, 2.5, 2, 2 } };
+  (void)state;
+  for (size_t k = 0; k < sizeof bars / sizeof *bars; k++) {
+    pw_system *s = scene_system (&bars_table, "a", bars[k].a, "b", bars[k].b, "c", bars[k].c, "d", bars[k].d, NULL);
+    for (int i = 0; i < WATCHDOG_RUNS - 2; i++) {
+      pw_error error = { 0 };
+      double phi[3];
+      check_ok (watchdog_run (s, watchdog_runs[i].method, watchdog_runs[i].tolerance, 2, phi, &error), &error);
+    }
+    pw_system_free (s);
+  }
+}
+
+/* ---- Messages ---- */
+
+static void watchdog_says (const char *model, const char *parameter, double value, const char *method, double tolerance,
+                           double t, const char *text) {
+  pw_error error = { 0 };
+  double phi[30];
+  pw_system *s = scene_named (model, parameter, value);
+  int status = watchdog_run (s, method, tolerance, t, phi, &error);
+  if (text) assert_int_equal (status, PW_METHOD);
+  if (text && strstr (error.text, text) == NULL) print_error ("%s\n", error.text);
+  if (text) assert_non_null (strstr (error.text, text));
+  assert_null (strstr (error.text, text && strstr (text, "singular") ? "drift" : "singular"));
+  pw_system_free (s);
+}
+
+static void test_messages (void **state) {
+  static const char *const drifting[] = { "ida+none", "adams+none", "bdf+none", "erk5+none", "adams+baumgarte" };
+  (void)state;
+  for (size_t i = 0; i < sizeof drifting / sizeof *drifting; i++)
+    for (double rtol = 1e-3; rtol > 5e-6; rtol /= 10)
+      watchdog_says ("pendulum", NULL, 0, drifting[i], rtol, 100, rtol > 5e-4 && i < 4 ? "constraint drift" : NULL);
+  watchdog_says ("slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4, "change point");
+  watchdog_says ("slider-crank", "l2", 1.00001, "galpha+ggl", 1e-2, 4, "change point");
+  watchdog_says ("slider-crank", "l2", 1.000003, "erk8+projection", 1e-3, 4, "change point");
+  watchdog_says ("slider-crank", NULL, 0, "galpha+ggl", 1e-4, 4, "near a singular configuration");
+}
+
+static void test_extreme (void **state) {
+  static const double mass[] = { 1e200, 1e-200 };
+  pw_error error = { 0 }, beyond = { 0 };
+  (void)state;
+  pw_system *far = scene_system (&watchdog_cart_table, "phi", 1e308, NULL);
+  assert_null (pw_run_open (far, "bdf", NULL, &beyond));
+  check_error (&beyond, PW_INPUT,
+               "model scene: values too extreme: bob.phi is initially 1e+308: expected less than 1e+100");
+  pw_system_free (far);
+  for (int i = 0; i < 2; i++) {
+    pw_error refused = { 0 };
+    pw_system *s = scene_named ("n-four-bar", "m", mass[i]);
+    assert_null (pw_run_open (s, "rk4+projection", NULL, &refused));
+    assert_int_equal (refused.status, PW_INPUT);
+    assert_non_null (strstr (refused.text, "values too extreme: the mass or inertia that goes with crank0.x is"));
+    pw_system_free (s);
+  }
+  pw_system *s = scene_system (&watchdog_cart_table, "cart", 1e-15, "phi", -PW_PI / 2, NULL);
+  pw_run *r = pw_run_open (s, "rk4+projection", NULL, &error);
+  if (r) pw_run_advance_to (r, 1, 1, &error);
+  assert_int_equal (error.status, PW_METHOD);
+  assert_non_null (strstr (error.text, "values too extreme: masses and inertias differ"));
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_light_cart),        cmocka_unit_test (test_sine),
+    cmocka_unit_test (test_near_slider_crank), cmocka_unit_test (test_near_four_bar),
+    cmocka_unit_test (test_no_change_point),   cmocka_unit_test (test_messages),
+    cmocka_unit_test (test_extreme),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}

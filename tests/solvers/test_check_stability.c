@@ -1,0 +1,65 @@
+/* What `check` writes about stability. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+static void stability_shows (const char *text) {
+  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
+}
+
+static void test_text (void **state) {
+  (void)state;
+  cli_good ("pinwheel check pendulum --set I=2 --set theta=1.5707963267948966");
+  stability_shows ("  stability                          unstable, doubles in 0.38331 s\n");
+  stability_shows ("\n1 finding\n  the motion is unstable: a perturbation doubles in 0.38331 s\n");
+  assert_null (strstr (cli_out, "No problems found"));
+  cli_good ("pinwheel check n-trailer");
+  stability_shows ("  co-moving frame                    turns at 1 rad/s\n");
+  stability_shows ("rightmost first       0 +- 1 i 1/s: rigid displacement\n");
+  stability_shows (" -2.3344 1/s\n");
+  stability_shows ("\nNo problems found\n");
+  cli_good ("pinwheel check pendulum");
+  stability_shows ("not steady: accelerations of 9.81 m/s^2 in the co-moving frame\n");
+  stability_shows ("the eigenvalues are not stability exponents\n");
+  cli_good ("pinwheel check pendulum --set I=2 --set theta=1.5707963267948966 --json -");
+  stability_shows ("\"motion\": \"steady\"");
+  check_close ("doubling", cli_number (cli_out, "linearisation", "doubling_time", NULL), log (2) / sqrt (9.81 / 3),
+               1e-12, "1e4 eps");
+}
+
+/* A start whose given angle cannot be kept, and one whose omitted ones follow. */
+static void test_finding (void **state) {
+  static const char *const body =
+      "pinwheel: 1\nbodies:\n  - {name: rod, mass: 1, inertia: 1, start: {%s}, rate: {%s}}\n"
+      "elements:\n  - {pin: P, body: [rod, ground], at: [[-1, 0], [0, 0]]}\n";
+  char text[400];
+  (void)state;
+  snprintf (text, sizeof text, body, "x: 1", "vy: 3, vx: 0.25, omega: 3");
+  cli_write ("rod.yaml", text);
+  cli_good ("pinwheel check @/rod.yaml");
+  stability_shows ("\n1 finding\n  the model specifies rod.vx = 0.25 m/s, but the constraints require 0 m/s\n");
+  cli_good ("pinwheel check @/rod.yaml --json -");
+  stability_shows ("\"findings\": [\"the model specifies rod.vx");
+  snprintf (text, sizeof text, body, "x: 1", "vy: 3, omega: 3");
+  cli_write ("rod.yaml", text);
+  cli_good ("pinwheel check @/rod.yaml");
+  stability_shows ("\nNo problems found\n");
+}
+
+/* Hundreds of defective zeros, which round-off spreads over a circle: the QR algorithm converges, and they are 0. */
+static void test_many_zeros (void **state) {
+  (void)state;
+  cli_good ("pinwheel check chain --set n=130");
+  stability_shows ("  eigenvalues                        all 0: nothing vibrates, grows or decays\n");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_text),
+    cmocka_unit_test (test_finding),
+    cmocka_unit_test (test_many_zeros),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
