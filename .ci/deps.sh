@@ -4,7 +4,7 @@
 #   deps.sh [fresh] [style] [browser] [slurm] [reference]
 #
 # fresh: do not trust the last result; style: clang and clang-format too; browser: one that can run without a screen, for
-# the tests of animations; slurm: for tests/cli/slurm.sh; reference: Python's numpy and scipy, for tests/reference/reference.sh.
+# the tests of animations; slurm: for tests/scripts/slurm.sh; reference: Python's numpy and scipy, for tests/reference/reference.sh.
 #
 # Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
 

@@ -1,5 +1,5 @@
-/* What tests/cli/animate.sh puts at the end of an animation: it uses the page as a person would and writes down what it
- * finds as the text of an element "verdict", "ok" if all is well.  Frames come from tests/cli/animate.sh's own clock. */
+/* What tests/scripts/animate.sh puts at the end of an animation: it uses the page as a person would and writes down what it
+ * finds as the text of an element "verdict", "ok" if all is well.  Frames come from tests/scripts/animate.sh's own clock. */
 (async () => {
   const failures = [], root = document.documentElement.dataset, time = () => Number(root.time);
   const expect = (what, good) => { if (!good) failures.push(what); };

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Animations: whole files of the right kind; in a browser without a screen, if there is one, the page loads, plays and
-# scrubs as tests/cli/animate.js asks, without a message on its console.  Reads PINWHEEL, BROWSER.
+# scrubs as tests/scripts/animate.js asks, without a message on its console.  Reads PINWHEEL, BROWSER.
 
 . "$(dirname "$0")/../support/report.sh"
 here=$(cd "$(dirname "$0")" && pwd)

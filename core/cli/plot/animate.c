@@ -34,12 +34,12 @@ static void page_numbers (FILE *f, const double *x, int count, int digits) {
 }
 
 /* Points, of the ground or of a body; with a shape those inside of it. */
-static void page_points (FILE *f, const char *before, const double (*at)[2], int count, const pw_plot_body *shape) {
+static void page_points (FILE *f, const char *before, const double *at, int count, const pw_plot_body *shape) {
   fprintf (f, "%s[", before);
   for (int k = 0, n = 0; k < count; k++) {
     if (shape && !pw_plot_inside (shape, k)) continue;
     fputs (n++ ? ",[" : "[", f);
-    page_numbers (f, at[k], 2, 9);
+    page_numbers (f, at + 2 * k, 2, 9);
     fputc (']', f);
   }
   fputc (']', f);
@@ -52,12 +52,12 @@ static void page_bodies (FILE *f, const pw_plots *p) {
   for (int b = 0; b < p->bodies.shown; b++) {
     const pw_plot_body *shape = &p->shape[b];
     page_text (f, b ? ",\n{name:" : "\n{name:", pw_plot_name (p, &p->bodies, b));
-    page_points (f, ",at:", shape->at, shape->count, NULL);
-    page_points (f, ",spokes:", shape->at, shape->count, shape);
-    page_points (f, ",outline:", shape->corner, shape->corners, NULL);
+    page_points (f, ",at:", *shape->at, shape->count, NULL);
+    page_points (f, ",spokes:", *shape->at, shape->count, shape);
+    page_points (f, ",outline:", *shape->corner, shape->corners, NULL);
     fputc ('}', f);
   }
-  page_points (f, "],\nground:", p->ground, p->grounds, NULL);
+  page_points (f, "],\nground:", *p->ground, p->grounds, NULL);
   fputs (",\nwheels:[", f);
   for (int w = 0; w < p->wheels.shown; w++) {
     int body = pw_plot_shown (p, pw_system_element (p->s, p->wheels.index[w]).body[0]);

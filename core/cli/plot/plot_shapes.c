@@ -1,5 +1,6 @@
 /* The shapes of bodies in figures and animations, and the links between them: elements with points, and their forces. */
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 #include "plot.h"
 
@@ -10,32 +11,27 @@ static double shapes_turn (const double *a, const double *b, const double *c) {
   return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
 }
 
-/* Whether p comes before the best next corner: further to the right, or farther in the same direction. */
-static int shapes_before (const double *from, const double *best, const double *p, double flat) {
-  double turn = shapes_turn (from, best, p);
-  if (fabs (turn) > flat) return turn < 0;
-  return hypot (p[0] - from[0], p[1] - from[1]) > hypot (best[0] - from[0], best[1] - from[1]);
+static int shapes_order (const void *a, const void *b) {
+  const double *p = a, *q = b;
+  return p[0] != q[0] ? (p[0] > q[0]) - (p[0] < q[0]) : (p[1] > q[1]) - (p[1] < q[1]);
 }
 
-/* Gift wrapping (Jarvis 1973). */
+/* The convex hull by monotone chains (Andrew 1979): below from left to right, then above from right to left. */
 static void shapes_outline (pw_plot_body *shape) {
-  double p[PLOT_POINTS + 1][2] = { { 0, 0 } }, size = 0;
-  int n = shape->count + 1, at = 0;
+  double p[PLOT_POINTS + 1][2] = { { 0, 0 } }, hull[2 * PLOT_POINTS + 2][2], size = 0;
+  int n = shape->count + 1, corners = 0;
   memcpy (p + 1, shape->at, (size_t)shape->count * sizeof *p);
-  for (int i = 0; i < n; i++) {
-    size = fmax (size, hypot (p[i][0], p[i][1]));
-    if (p[i][0] < p[at][0] || (p[i][0] == p[at][0] && p[i][1] < p[at][1])) at = i;
+  qsort (p, (size_t)n, sizeof *p, shapes_order);
+  for (int i = 0; i < n; i++) size = fmax (size, hypot (p[i][0], p[i][1]));
+  for (int i = 0, least = 2; i < 2 * n - 1; i++) {
+    const double *next = p[i < n ? i : 2 * n - 2 - i];
+    if (i == n) least = corners + 1;
+    while (corners >= least && shapes_turn (hull[corners - 2], hull[corners - 1], next) <= 1e-9 * size * size)
+      corners--;
+    if (i < 2 * n - 2) memcpy (hull[corners++], next, sizeof *hull);
   }
-  const int first = at;
-  shape->corners = 0;
-  do {
-    int next = at == 0 ? 1 : 0;
-    memcpy (shape->corner[shape->corners++], p[at], sizeof *p);
-    for (int i = 0; i < n && n > 1; i++)
-      if (i != at && i != next && shapes_before (p[at], p[next], p[i], 1e-9 * size * size)) next = i;
-    at = n > 1 ? next : first;
-  } while (at != first && shape->corners < n);
-  if (shape->corners < 3) shape->corners = 0;
+  shape->corners = corners < 3 ? 0 : corners;
+  memcpy (shape->corner, hull, (size_t)shape->corners * sizeof *hull);
 }
 
 int pw_plot_inside (const pw_plot_body *shape, int k) {

@@ -28,8 +28,14 @@ enum {
   COLUMN_T = 4,
   COLUMN_ERROR,
   COLUMN_ORDER = COLUMN_ERROR + MOTION_ERRORS + 1,
-  COLUMN_COST,
-  COLUMN_REPEATS = COLUMN_COST + 11
+  COLUMN_POSITION,
+  COLUMN_VELOCITY,
+  COLUMN_BALANCE,
+  COLUMN_STEPS,
+  COLUMN_CPU = COLUMN_STEPS + 5,
+  COLUMN_SPREAD,
+  COLUMN_PERCENT,
+  COLUMN_REPEATS
 };
 
 static const char *compare_ladder (const pw_row *r, char text[STUDY_NAME]) {
@@ -79,27 +85,6 @@ static const char *compare_below (const pw_row *r, char text[STUDY_NAME]) {
   return text;
 }
 
-/* Fills the columns that are known of every row that has been run, and its point in the figures. */
-static void compare_fill (pw_row *r) {
-  const pw_statistics *s = &r->statistics;
-  const double *error = &r->value[COLUMN_ERROR];
-  const double cost[] = { s->position,
-                          s->velocity,
-                          r->balance,
-                          (double)s->steps,
-                          (double)s->rejected,
-                          (double)s->rhs,
-                          (double)s->jacobians,
-                          (double)s->factorisations,
-                          r->cpu };
-  r->value[COLUMN_T] = r->t;
-  memcpy (&r->value[COLUMN_COST], cost, sizeof cost);
-  if (r->state != ROW_DONE) return;
-  const double point[STUDY_COORDINATES] = { r->level, r->cpu, (double)s->rhs, error[MOTION_MOST + MOTION_LENGTH],
-                                            error[MOTION_MOST + MOTION_ANGLE] };
-  memcpy (r->point, point, sizeof point);
-}
-
 /* ---- Ladders ---- */
 
 typedef struct {
@@ -140,9 +125,8 @@ static int compare_plan_rows (pw_study *x, const ladder of[2], pw_error *error) 
                    pw_cli_adaptive (integrator, x->method[i]);
     double level;
     for (int k = 0; (level = ladder_level (of[adaptive], adaptive, k)) > 0; k++) {
-      pw_row *r = pw_study_add (x, x->method[i], 1, error);
+      pw_row *r = pw_study_add (x, 0, i, x->method[i], 1, error);
       if (r == NULL) return PW_RESOURCE;
-      r->line = i;
       r->adaptive = adaptive;
       r->level = r->value[COLUMN_LEVEL] = level;
       r->value[COLUMN_REPEATS] = 0;
@@ -224,8 +208,8 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
   r->cpu = n % 2 ? cpu[n / 2] : (cpu[n / 2 - 1] + cpu[n / 2]) / 2;
   r->value[COLUMN_REPEATS] = n;
   if (n < 2) return PW_OK;
-  r->value[COLUMN_REPEATS - 2] = cpu[n - 1] - cpu[0];
-  r->value[COLUMN_REPEATS - 1] = 100 * r->value[COLUMN_REPEATS - 2] / r->cpu;
+  r->value[COLUMN_SPREAD] = cpu[n - 1] - cpu[0];
+  r->value[COLUMN_PERCENT] = 100 * r->value[COLUMN_SPREAD] / r->cpu;
   return PW_OK;
 }
 
@@ -264,9 +248,16 @@ static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
   if (r->state == ROW_STOPPED)
     snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
               pw_format (text, r->t, 4));
-  status = pw_study_outcome (r, status, &own, error);
-  compare_fill (r);
+  status = pw_study_outcome (s, r, status, &own, error);
   r->value[COLUMN_ORDER] = compare_order (x, r, before);
+  r->value[COLUMN_POSITION] = r->statistics.position;
+  r->value[COLUMN_VELOCITY] = r->statistics.velocity;
+  r->value[COLUMN_BALANCE] = r->balance;
+  r->value[COLUMN_CPU] = r->cpu;
+  const double *error_of = &r->value[COLUMN_ERROR + MOTION_MOST];
+  const double point[STUDY_COORDINATES] = { r->level, r->cpu, (double)r->statistics.rhs, error_of[MOTION_LENGTH],
+                                            error_of[MOTION_ANGLE] };
+  if (r->state == ROW_DONE) memcpy (r->point, point, sizeof point);
   return status;
 }
 
@@ -356,6 +347,8 @@ static int compare_command (void *options, pw_error *error) {
     .above = "      rtol  error at the end    largest error       error of        residual of        error of     "
              "                                  CPU time",
     .column = compare_columns,
+    .time = COLUMN_T,
+    .steps = COLUMN_STEPS,
     .plan = compare_plan,
     .begin = compare_begin,
     .measure = compare_measure,

@@ -111,43 +111,46 @@ static const char *drift_integrator (const pw_study *x, const char *option) {
   return "rk4";
 }
 
-/* Pairs of alpha and beta; a line of the figure for each beta. */
-static int drift_plan_baumgarte (pw_drift *x, pw_error *error) {
-  const char *integrator = drift_integrator (&x->study, "alpha");
-  char a[32], b[32], method[STUDY_NAME];
-  for (long j = 0; j < x->beta.rows; j++)
-    for (long i = 0; i < x->alpha.rows; i++) {
-      double alpha = pw_grid_value (&x->alpha, 0, i), beta = pw_grid_value (&x->beta, 0, j);
-      snprintf (method, sizeof method, "%s+baumgarte:alpha=%s:beta=%s", integrator, pw_format (a, alpha, 9),
-                pw_format (b, beta, 9));
-      pw_row *r = pw_study_add (&x->study, method, 1, error);
-      if (r == NULL) return PW_RESOURCE;
-      r->group = DRIFT_BAUMGARTE;
-      r->line = (int)j;
-      r->point[0][0] = r->value[COLUMN_ALPHA] = alpha;
-      r->value[COLUMN_BETA] = beta;
-      snprintf (r->label, sizeof r->label, "beta = %s /s", pw_format (b, beta, 6));
-    }
+/* The row of a value of an option, with its place on the axis of the figure. */
+static int drift_add (pw_drift *x, int group, int line, const char *method, const char *label, int column, double value,
+                      pw_error *error) {
+  pw_row *r = pw_study_add (&x->study, group, line, method, 1, error);
+  if (r == NULL) return PW_RESOURCE;
+  snprintf (r->label, sizeof r->label, "%s", label);
+  r->point[0][0] = r->value[column] = value;
+  if (group == DRIFT_BAUMGARTE) r->value[COLUMN_BETA] = pw_grid_value (&x->beta, 0, line);
   return PW_OK;
 }
 
-/* Intervals between projections, in both metrics. */
+/* Pairs of alpha and beta, a line of the figure for each beta. */
+static int drift_plan_baumgarte (pw_drift *x, pw_error *error) {
+  const char *integrator = drift_integrator (&x->study, "alpha");
+  char a[32], b[32], method[STUDY_NAME], label[60];
+  int status = PW_OK;
+  for (long j = 0; j < x->beta.rows; j++)
+    for (long i = 0; i < x->alpha.rows && status == PW_OK; i++) {
+      double alpha = pw_grid_value (&x->alpha, 0, i), beta = pw_grid_value (&x->beta, 0, j);
+      snprintf (label, sizeof label, "beta = %s /s", pw_format (b, beta, 6));
+      snprintf (method, sizeof method, "%s+baumgarte:alpha=%s:beta=%s", integrator, pw_format (a, alpha, 9),
+                pw_format (b, beta, 9));
+      status = drift_add (x, DRIFT_BAUMGARTE, (int)j, method, label, COLUMN_ALPHA, alpha, error);
+    }
+  return status;
+}
+
+/* Intervals between projections, a line for each metric. */
 static int drift_plan_projection (pw_drift *x, pw_error *error) {
   static const char *const metric[] = { "metric=mass", "metric=identity" };
   const char *integrator = drift_integrator (&x->study, "every");
   char method[STUDY_NAME];
+  int status = PW_OK;
   for (int j = 0; j < 2; j++)
-    for (long i = 0; i < x->every.rows; i++) {
+    for (long i = 0; i < x->every.rows && status == PW_OK; i++) {
       double every = pw_grid_value (&x->every, 0, i);
       snprintf (method, sizeof method, "%s+projection:%s:every=%.0f", integrator, metric[j], every);
-      pw_row *r = pw_study_add (&x->study, method, 1, error);
-      if (r == NULL) return PW_RESOURCE;
-      r->group = DRIFT_PROJECTION;
-      r->line = j;
-      r->point[0][0] = r->value[COLUMN_EVERY] = every;
-      strcpy (r->label, metric[j]);
+      status = drift_add (x, DRIFT_PROJECTION, j, method, metric[j], COLUMN_EVERY, every, error);
     }
-  return PW_OK;
+  return status;
 }
 
 static int drift_plan_rows (pw_drift *x, pw_error *error) {
@@ -155,9 +158,8 @@ static int drift_plan_rows (pw_drift *x, pw_error *error) {
   double most = s->methods + (double)x->alpha.rows * (double)x->beta.rows + 2 * (double)x->every.rows;
   if (most > DRIFT_MOST) return pw_fail (error, PW_INPUT, "%.0f runs are too many; vary less", most);
   for (int i = 0; i < s->methods; i++) {
-    pw_row *r = pw_study_add (s, s->method[i], DRIFT_PARTS, error);
+    pw_row *r = pw_study_add (s, DRIFT_METHODS, i, s->method[i], DRIFT_PARTS, error);
     if (r == NULL) return PW_RESOURCE;
-    r->line = i;
     for (int k = 0; k < DRIFT_PARTS; k++) r->point[k][0] = s->t_end * (k + 1) / DRIFT_PARTS;
   }
   if (x->only_methods) return PW_OK;
@@ -226,13 +228,8 @@ static int drift_measure (pw_study *x, pw_row *r, pw_error *error) {
   pw_error own = { 0 };
   drift_visitor v = { .base = { .visit = drift_visit, .study = x, .row = r } };
   for (int i = 0; i < DRIFT_QUANTITIES; i++) r->value[COLUMN_QUANTITY + 3 * i] = 0;
-  int status = pw_study_outcome (r, pw_study_run (x, r, &v.base, &own), &own, error);
-  const pw_statistics *s = &r->statistics;
-  const double count[] = { (double)s->steps, (double)s->rejected, (double)s->rhs, (double)s->jacobians,
-                           (double)s->factorisations };
+  int status = pw_study_outcome (x, r, pw_study_run (x, r, &v.base, &own), &own, error);
   for (int i = 0; i < DRIFT_QUANTITIES; i++) drift_finish (r, i, v.early[i]);
-  r->value[COLUMN_T] = r->t;
-  memcpy (&r->value[COLUMN_STEPS], count, sizeof count);
   return status;
 }
 
@@ -299,6 +296,8 @@ static int drift_command (void *options, pw_error *error) {
                                       .group = group,
                                       .above = "  residual of position     residual of velocity     energy balance [J]",
                                       .column = drift_columns,
+                                      .time = COLUMN_T,
+                                      .steps = COLUMN_STEPS,
                                       .plan = drift_plan,
                                       .begin = drift_begin,
                                       .measure = drift_measure,

@@ -85,7 +85,7 @@ static int reference_run (pw_study *x, candidate *c, pw_error *error) {
   }
   x->cpu_end = limit;
   c->good = status == PW_OK;
-  return c->good ? PW_OK : pw_study_outcome (&c->row, status, &own, error);
+  return c->good ? PW_OK : pw_study_outcome (x, &c->row, status, &own, error);
 }
 
 /* The distance of two motions relative to the size of the motion. */

@@ -65,10 +65,12 @@ int pw_study_read_methods (pw_study *x, const char *text, pw_error *error) {
 
 /* ---- Rows ---- */
 
-pw_row *pw_study_add (pw_study *x, const char *method, int points, pw_error *error) {
+pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int points, pw_error *error) {
   pw_row *more = realloc (x->row, (size_t)(x->rows + 1) * sizeof *x->row), *r = more ? more + x->rows : NULL;
   if (more) x->row = more;
-  if (r) *r = (pw_row){ .points = points, .point = malloc ((size_t)points * sizeof *r->point) };
+  if (r)
+    *r =
+        (pw_row){ .group = group, .line = line, .points = points, .point = malloc ((size_t)points * sizeof *r->point) };
   if (r == NULL || r->point == NULL) {
     pw_fail (error, PW_RESOURCE, "out of memory");
     return NULL;
@@ -117,7 +119,11 @@ int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error) 
   return status;
 }
 
-int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error *error) {
+int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *run_error, pw_error *error) {
+  const pw_statistics *s = &r->statistics;
+  const long count[] = { s->steps, s->rejected, s->rhs, s->jacobians, s->factorisations };
+  for (int i = 0; i < 5; i++) r->value[x->type->steps + i] = (double)count[i];
+  r->value[x->type->time] = r->t;
   if (status == PW_OK || r->state == ROW_STOPPED) return PW_OK;
   if (status == PW_RESOURCE || status == PW_INITIAL) return pw_fail (error, status, "%s", run_error->text);
   if (pw_stop) return PW_RETRY;

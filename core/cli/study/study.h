@@ -57,6 +57,7 @@ typedef struct {
   const char *const *group;      /* headings of the groups */
   const char *above;             /* line above the heads of columns */
   const pw_study_column *column; /* ended by one without name and head; those before "status" are shown of every row */
+  int time, steps;               /* columns of the time reached, and of the first of the counts of a run */
   /* Reads options, once the model is open; adds the rows. */
   int (*plan) (pw_study *x, pw_error *error);
   /* Before the first row, with signals caught: writes what precedes the table. */
@@ -99,8 +100,8 @@ int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error);
  * rk4 with each.  A method named twice is used once.  PW_INPUT with the nearest valid name. */
 int pw_study_read_methods (pw_study *x, const char *text, pw_error *error);
 
-/* Adds a row without numbers, whose label is its method unless it is set.  NULL and PW_RESOURCE. */
-pw_row *pw_study_add (pw_study *x, const char *method, int points, pw_error *error);
+/* Adds a row of a line of a group, without numbers.  Its label is its method unless it is set; rows of a line follow each other.  NULL and PW_RESOURCE. */
+pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int points, pw_error *error);
 
 /* Called after each step of a run that reaches time `due`, which it may change. */
 typedef struct pw_study_visitor {
@@ -113,8 +114,8 @@ typedef struct pw_study_visitor {
 /* One run of a row with the study's settings to the end or a limit: fills t, statistics, cpu, and state if it is
  * stopped by cpu_end; the visitor may be NULL.  PW_RETRY: stopped, or interrupted. */
 int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error);
-/* Puts a failure of pw_study_run into the row.  Returns PW_OK, or the status that ends the study. */
-int pw_study_outcome (pw_row *r, int status, const pw_error *run_error, pw_error *error);
+/* Fills the time and the counts of the row, and a failure of pw_study_run.  Returns PW_OK, or the status that ends the study. */
+int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *run_error, pw_error *error);
 
 /* ---- Tables and figures (study_table.c) ---- */
 

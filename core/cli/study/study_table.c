@@ -99,85 +99,71 @@ int pw_table_row (pw_study *x, pw_error *error) {
 
 /* ---- Figures ---- */
 
-/* The points of a line of which a coordinate is positive, or, if it is negative, which are defined. */
-static int table_points (const pw_study *x, int group, int line, int coordinate) {
-  int count = 0;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    for (int k = 0; r->group == group && r->line == line && k < r->points; k++)
-      count += !isnan (r->point[k][2]) &&
-               (coordinate < 0 || (r->point[k][coordinate] > 0 && isfinite (r->point[k][coordinate])));
-  return count;
-}
-
-static int table_lines (const pw_study *x, int group) {
-  int lines = 0;
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    if (r->group == group && r->line >= lines) lines = r->line + 1;
-  return lines;
+/* The next defined point of a group, after point *k of *r; NULL after the last one. */
+static const double *table_next (const pw_study *x, int group, const pw_row **r, int *k) {
+  for (; *r < x->row + x->rows; ++*r, *k = -1)
+    while ((*r)->group == group && ++*k < (*r)->points)
+      if (!isnan ((*r)->point[*k][2])) return (*r)->point[*k];
+  return NULL;
 }
 
 int pw_study_positive (const pw_study *x, int group, int coordinate) {
-  int count = 0;
-  for (int line = 0; line < table_lines (x, group); line++) count += table_points (x, group, line, coordinate);
-  return count > 0;
-}
-
-static const char *table_label (const pw_study *x, int group, int line) {
   const pw_row *r = x->row;
-  while (r->group != group || r->line != line) r++;
-  return *r->label ? r->label : r->method;
+  const double *point;
+  int k = -1;
+  while ((point = table_next (x, group, &r, &k)) != NULL)
+    if (point[coordinate] > 0 && isfinite (point[coordinate])) return 1;
+  return 0;
 }
 
-static void table_write_line (const pw_study *x, int group, int line, int count, FILE *f) {
-  char text[32];
-  for (const pw_row *r = x->row; r < x->row + x->rows; r++)
-    for (int k = 0; r->group == group && r->line == line && k < r->points; k++) {
-      if (isnan (r->point[k][2])) continue;
-      for (int i = 0; i < count; i++) /* only positive numbers have logarithms */
-        fprintf (f, "%s%s", i ? " " : "", r->point[k][i] > 0 ? pw_format (text, r->point[k][i], 9) : "NaN");
-      fputc ('\n', f);
-    }
+static const char *table_label (const pw_row *r) {
+  return *r->label ? r->label : r->method;
 }
 
 int pw_study_write_data (const pw_study *x, int group, const char *name, const char *heading, int count,
                          pw_error *error) {
-  char file[40];
+  char file[40], text[32];
   snprintf (file, sizeof file, "%s.dat", name);
   pw_output *o = pw_study_open (x, file, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
+  const pw_row *r = x->row;
+  const double *point;
   fprintf (f, "# %s\n", heading);
-  for (int line = 0, block = 0; line < table_lines (x, group); line++) {
-    if (table_points (x, group, line, -1) == 0) continue;
-    fprintf (f, "%s# %s\n", block++ ? "\n\n" : "", table_label (x, group, line));
-    table_write_line (x, group, line, count, f);
+  for (int k = -1, line = -1; (point = table_next (x, group, &r, &k)) != NULL; line = r->line) {
+    if (r->line != line) fprintf (f, "%s# %s\n", line < 0 ? "" : "\n\n", table_label (r));
+    for (int i = 0; i < count; i++) /* only positive numbers have logarithms */
+      fprintf (f, "%s%s", i ? " " : "", point[i] > 0 ? pw_format (text, point[i], 9) : "NaN");
+    fputc ('\n', f);
   }
   return pw_output_finish (o, error);
 }
 
-/* Labels that are not names of methods have no stabilisation. */
-static void table_write_labels (const pw_study *x, int group, FILE *f) {
+/* The labels of the lines that have points, with stabilisations if they are methods; with f NULL returns their number. */
+static int table_labels (const pw_study *x, int group, FILE *f) {
+  const pw_row *r = x->row;
   const pw_method *integrator;
-  int stabilisation, drawn = 0, lines = table_lines (x, group);
-  for (int line = 0; line < lines; line++) drawn += table_points (x, group, line, -1) > 0;
-  fprintf (f, "methods = %d\narray label[%d]\narray stabilisation[%d]\n", drawn, drawn, drawn);
-  for (int line = 0, n = 0; line < lines; line++) {
-    if (table_points (x, group, line, -1) == 0) continue;
-    const char *label = table_label (x, group, line);
-    int known = pw_method_parse (label, &integrator, &stabilisation, NULL) == PW_OK;
-    pw_figure_element (f, "label", ++n, label);
+  int stabilisation, n = 0;
+  for (int k = -1, line = -1; table_next (x, group, &r, &k) != NULL; line = r->line) {
+    if (r->line == line) continue;
+    n++;
+    if (f == NULL) continue;
+    int known = pw_method_parse (table_label (r), &integrator, &stabilisation, NULL) == PW_OK;
+    pw_figure_element (f, "label", n, table_label (r));
     pw_figure_element (f, "stabilisation", n, known ? integrator->stabilisations[stabilisation].name : "");
   }
+  return n;
 }
 
 int pw_study_write_script (pw_study *x, int group, const char *name, const char *template_name, const char *variables,
                            pw_error *error) {
   const pw_figures figures = { .folder = x->folder, .model = pw_file_name (x->m.file) };
   pw_output *o = pw_figure_begin (&figures, name, error);
-  int drawn = 0;
+  int drawn = 0, lines = table_labels (x, group, NULL);
   if (o == NULL) return PW_RESOURCE;
-  fputs (variables, pw_output_stream (o));
-  table_write_labels (x, group, pw_output_stream (o));
+  FILE *f = pw_output_stream (o);
+  fprintf (f, "%smethods = %d\narray label[%d]\narray stabilisation[%d]\n", variables, lines, lines, lines);
+  table_labels (x, group, f);
   while (x->drawn[drawn]) drawn++;
   x->drawn[drawn] = name;
   return pw_figure_end (o, template_name, error);
