@@ -5,13 +5,7 @@
 
 #include "run.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-#ifdef __GNUC__
-#pragma GCC visibility push(default)
-#endif
+PW_BEGIN
 
 enum { PW_SELFTEST_CHECKS = 24 };
 
@@ -65,12 +59,6 @@ typedef struct {
 int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double *q, const double *v, const double *a,
                const double *lambda, pw_verification *result);
 
-#ifdef __GNUC__
-#pragma GCC visibility pop
-#endif
-
-#ifdef __cplusplus
-}
-#endif
+PW_END
 
 #endif

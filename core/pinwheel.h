@@ -16,23 +16,32 @@
 
 #include <stddef.h>
 
-#ifdef __cplusplus
-extern "C" {
+#ifdef __GNUC__
+#define PW_EXPORT __attribute__ ((visibility ("default")))
+#define PW_PRINTF(text, first) __attribute__ ((format (printf, text, first)))
+#define PW_VISIBILITY(change) _Pragma (change)
+#else
+#define PW_EXPORT
+#define PW_PRINTF(text, first)
+#define PW_VISIBILITY(change)
 #endif
 
-#ifdef __GNUC__
-#pragma GCC visibility push(default)
+/* Around the declarations of a public header: exported from the library, with C linkage. */
+#ifdef __cplusplus
+#define PW_BEGIN PW_VISIBILITY ("GCC visibility push(default)") extern "C" {
+#define PW_END \
+  }            \
+  PW_VISIBILITY ("GCC visibility pop")
+#else
+#define PW_BEGIN PW_VISIBILITY ("GCC visibility push(default)")
+#define PW_END PW_VISIBILITY ("GCC visibility pop")
 #endif
+
+PW_BEGIN
 
 #define PW_VERSION "0.1.0"
 #define PW_ABI 1 /* raised, once 0.1.0 is out, when a plug-in compiled against an older header could be misread */
 #define PW_PI 3.14159265358979323846
-
-#ifdef __GNUC__
-#define PW_EXPORT __attribute__ ((visibility ("default")))
-#else
-#define PW_EXPORT
-#endif
 
 /* ---- Status and errors ---- */
 
@@ -48,22 +57,17 @@ typedef enum {
   PW_METHOD = -4    /* the method failed during the run */
 } pw_status;
 
-/* An error, owned by the caller and zero-initialised.  It keeps the first failure; later ones do not overwrite it.
- * Passing NULL for a file, model, system or run is an error as well, so the result of a failed call may be passed to
- * the next call. */
+/* An error, owned by the caller and zero-initialised.  It keeps the first failure.  NULL in place of a file, model,
+ * system or run is an error too, so that the result of a failed call may be passed to the next call. */
 typedef struct {
   int status; /* a pw_status; 0: no error yet */
-  char text
-      [500]; /* one line without a full stop: found value, expected value, nearest valid name.  Text models: preceded by
-                     "FILE:LINE:COLUMN: error: ", followed by the source line and a line with a caret */
+  /* One line without a full stop: found value, expected value, nearest valid name.  Text models: preceded by
+   * "FILE:LINE:COLUMN: error: ", followed by the source line and a line with a caret. */
+  char text[500];
 } pw_error;
 
 /* Records a failure unless one is already recorded, and returns `status`.  error may be NULL. */
-int pw_fail (pw_error *error, int status, const char *format, ...)
-#ifdef __GNUC__
-    __attribute__ ((format (printf, 3, 4)))
-#endif
-    ;
+int pw_fail (pw_error *error, int status, const char *format, ...) PW_PRINTF (3, 4);
 
 /* ---- Signals: time histories of torques, drives, headings ---- */
 
@@ -79,19 +83,17 @@ typedef struct {
   const char *jump;    /* a part that jumps with the state, where no step ends; or NULL */
 } pw_signal_text;
 
-/* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its first
- * and second time derivatives in value[1] and value[2].  x holds the states named in `reads`, in that order;
- * gradient, unless NULL, receives the derivative of value[0] with respect to each.  A non-zero return stops the
- * run.  Equal t and x must give equal values.  If they change between steps (a controller sets a new torque), call
- * pw_run_restart. */
+/* A signal computed by the caller.  `eval` stores the value in value[0] and, for a signal of a constraint, its time
+ * derivatives in value[1] and value[2].  x contains the states named in `reads`; gradient, unless NULL, receives the
+ * derivatives of value[0] with respect to them.  A non-zero return stops the run.  Equal t and x must give equal values;
+ * if they change between steps (a controller sets a new torque), call pw_run_restart. */
 typedef struct {
   int (*eval) (void *context, double t, const double *x, double value[3], double *gradient);
   void *context;            /* passed to eval and breakpoint; must outlive the systems, unless open replaces it */
   const char *const *reads; /* NULL-terminated "BODY.phi", "BODY.vx", ...; forces only; may be NULL */
   double (*breakpoint) (void *context, double t); /* first discontinuity after t, or INFINITY; may be NULL */
-  /* Returns a new context made from this one: each compiled system has one, and each workspace and run has one made
-   * from the system's.  Returns NULL if out of memory; must be thread-safe.  May be NULL: all share `context`, and
-   * eval must be thread-safe. */
+  /* Returns a new context made from this one, for a compiled system, a workspace or a run; NULL if out of memory.
+   * Must be thread-safe.  May be NULL: all share `context`, and eval must be thread-safe. */
   void *(*open) (void *context);
   void (*close) (void *context); /* frees a context made by open; may be NULL */
   const pw_signal_text *text;    /* NULL unless it comes from a text model */
@@ -99,17 +101,13 @@ typedef struct {
 
 /* offset + amplitude cos (omega t + phase) */
 typedef struct {
-  double amplitude; /* unit of the signal */
-  double omega;     /* angular frequency [rad/s] */
-  double phase;     /* [rad] */
-  double offset;    /* unit of the signal */
+  double amplitude, omega, phase, offset; /* omega [rad/s], phase [rad], others: unit of the signal */
 } pw_harmonic;
 
 /* From one value to another. */
 typedef struct {
-  double from, to; /* values before and after; unit of the signal */
-  double start;    /* [s] */
-  double duration; /* [s], > 0 */
+  double from, to;        /* values before and after; unit of the signal */
+  double start, duration; /* [s]; duration > 0 */
 } pw_ramp;
 
 /* offset + height from start to start + width, repeated each period; offset otherwise. */
@@ -163,12 +161,11 @@ typedef struct pw_model pw_model;
 
 /* A rigid body.  The origin of its frame is its centre of mass.  It may be massless. */
 typedef struct {
-  const char *name;   /* unique among bodies and elements; "ground" is reserved */
-  double mass;        /* [kg], >= 0 */
-  double inertia;     /* about the centre of mass [kg m^2], >= 0 */
-  double start[3];    /* initial x, y [m], phi [rad] */
-  double rate[3];     /* initial vx, vy [m/s], omega [rad/s] */
-  unsigned specified; /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
+  const char *name;     /* unique among bodies and elements; "ground" is reserved */
+  double mass, inertia; /* [kg], about the centre of mass [kg m^2], >= 0 */
+  double start[3];      /* initial x, y [m], phi [rad] */
+  double rate[3];       /* initial vx, vy [m/s], omega [rad/s] */
+  unsigned specified;   /* PW_SPECIFIES_X | ...: which initial values are specified; 0: those that are not 0 */
 } pw_body;
 
 /* Initial values that a body specifies; the others may change to satisfy the constraints.  NOTHING: all may change. */
@@ -242,7 +239,7 @@ int pw_add_body (pw_model *m, const pw_body *body);
  * including names.  Returns as pw_add_body. */
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition);
 
-/* For build functions: rejects the model's parameters with a message ("links: at most 1000").  Returns PW_INPUT. */
+/* For build functions: rejects the parameters with a message ("links: at most 1000").  Returns PW_INPUT. */
 int pw_model_refuse (pw_model *m, const char *format, ...);
 
 /* Jacobi's amplitude am (u | m) and the complete elliptic integral K (m), m = k^2 <= 1 (NaN above): sn = sin (am).
@@ -261,44 +258,39 @@ double pw_cos (double x);
 
 /* Pin: a point of body 1 and a point of body 2 coincide.  Two holonomic constraint equations. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double at[2][2];     /* the point in each body's frame [m]; on the ground: in the world */
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];            /* the point in each body's frame [m]; on the ground: in the world */
 } pw_pin;
 
 /* Weld: body 2 is fixed to body 1.  Three holonomic constraint equations. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double at[2][2];     /* the common point in each body's frame [m]; on the ground: in the world */
-  double angle;        /* of body 2 relative to body 1: phi2 - phi1 [rad] */
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];            /* the common point in each body's frame [m]; on the ground: in the world */
+  double angle;               /* of body 2 relative to body 1: phi2 - phi1 [rad] */
 } pw_weld;
 
 /* Slider: a point of body 1 stays on a line of body 2, and body 1 does not rotate relative to body 2.  Two holonomic
  * constraint equations. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* what slides, and what it slides on; "ground" for one of them */
-  double at[2][2];     /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
-  double heading;      /* direction of the line in body 2's frame [rad] */
-  double angle;        /* of body 1 relative to body 2: phi1 - phi2 [rad] */
+  const char *name, *body[2]; /* what slides, and what it slides on; "ground" for one of them */
+  double at[2][2]; /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
+  double heading;  /* direction of the line in body 2's frame [rad] */
+  double angle;    /* of body 1 relative to body 2: phi1 - phi2 [rad] */
 } pw_slider;
 
 /* Slot: a point of body 1 stays on a line of body 2.  One holonomic constraint equation. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the body with the point, the body with the line; "ground" for one of them */
-  double at[2][2];     /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
-  double heading;      /* direction of the line in body 2's frame [rad] */
+  const char *name, *body[2]; /* the body with the point, the body with the line; "ground" for one of them */
+  double at[2][2]; /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
+  double heading;  /* direction of the line in body 2's frame [rad] */
 } pw_slot;
 
 /* Rod: a massless bar keeps a point of body 1 at a fixed distance from a point of body 2.  One holonomic constraint
  * equation. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double at[2][2];     /* the end points in the bodies' frames [m]; on the ground: in the world */
-  double length;       /* [m], > 0 */
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  double at[2][2];            /* the end points in the bodies' frames [m]; on the ground: in the world */
+  double length;              /* [m], > 0 */
 } pw_rod;
 
 /* Source of a gear's offset. */
@@ -307,11 +299,10 @@ enum { PW_GEAR_START, PW_GEAR_OFFSET };
 /* Gear: the angles of two bodies relative to a third, the carrier, have a fixed ratio: phi1 - phi3 = ratio (phi2 -
  * phi3) + offset.  One holonomic constraint equation. */
 typedef struct {
-  const char *name;
-  const char *body[3]; /* the two gears and their carrier; "ground" for one of them */
-  double ratio;        /* of their angular velocities relative to the carrier; negative: opposite directions; not 0 */
-  int from;            /* PW_GEAR_START: from the described initial angles; PW_GEAR_OFFSET: the field `offset` */
-  double offset;       /* [rad] */
+  const char *name, *body[3]; /* the two gears and their carrier; "ground" for one of them */
+  double ratio;  /* of their angular velocities relative to the carrier; negative: opposite directions; not 0 */
+  int from;      /* PW_GEAR_START: from the described initial angles; PW_GEAR_OFFSET: the field `offset` */
+  double offset; /* [rad] */
 } pw_gear;
 
 /* What a drive prescribes. */
@@ -320,17 +311,15 @@ enum { PW_DRIVE_X, PW_DRIVE_Y, PW_DRIVE_ANGLE };
 /* Drive: a coordinate of a point of body 1 relative to body 2, or the relative angle, follows a signal.  One
  * holonomic constraint equation. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the driven body, the reference body; "ground" for one of them */
-  double at[2][2];     /* a point in each body's frame [m]; on the ground: in the world; ignored for an angle */
+  const char *name, *body[2]; /* the driven body, the reference body; "ground" for one of them */
+  double at[2][2];            /* a point in each body's frame [m]; on the ground: in the world; ignored for an angle */
   int what;        /* PW_DRIVE_X, PW_DRIVE_Y: from point 2 to point 1 in body 2's frame; PW_DRIVE_ANGLE: phi1 - phi2 */
   pw_signal value; /* with its first and second time derivative [m] or [rad] */
 } pw_drive;
 
 /* Wheel: a knife edge; the contact point does not move across the heading.  One nonholonomic constraint equation. */
 typedef struct {
-  const char *name;
-  const char *body;
+  const char *name, *body;
   double at[2];   /* contact point in the body's frame [m] */
   double heading; /* rolling direction in the body's frame [rad] */
 } pw_wheel;
@@ -339,21 +328,18 @@ typedef struct {
  * nonholonomic constraint equations and an internal coordinate, the spin angle; its velocity is positive when
  * rolling along the heading. */
 typedef struct {
-  const char *name;
-  const char *body;
-  double at[2];     /* contact point in the body's frame [m] */
-  double heading;   /* rolling direction in the body's frame [rad] */
-  double radius;    /* [m], > 0 */
-  double inertia;   /* about its axle [kg m^2], >= 0; its mass belongs to the body */
-  double start;     /* initial spin angle [rad] */
-  double rate;      /* initial spin velocity [rad/s]; 0: from rolling at the body's initial velocity */
-  pw_signal torque; /* on the wheel about its axle [N m]; its reaction is out of the plane */
+  const char *name, *body;
+  double at[2];       /* contact point in the body's frame [m] */
+  double heading;     /* rolling direction in the body's frame [rad] */
+  double radius;      /* [m], > 0 */
+  double inertia;     /* about its axle [kg m^2], >= 0; its mass belongs to the body */
+  double start, rate; /* initial spin angle [rad] and velocity [rad/s]; 0: from rolling at the body's velocity */
+  pw_signal torque;   /* on the wheel about its axle [N m]; its reaction is out of the plane */
 } pw_rolling_wheel;
 
 /* Steered wheel: a wheel whose heading in the body follows a signal.  One nonholonomic constraint equation. */
 typedef struct {
-  const char *name;
-  const char *body;
+  const char *name, *body;
   double at[2];      /* contact point in the body's frame [m] */
   pw_signal heading; /* rolling direction in the body's frame, with its first time derivative [rad] */
 } pw_steered_wheel;
@@ -361,8 +347,7 @@ typedef struct {
 /* Speed: the speed of a point along a direction fixed in its body follows a signal.  One nonholonomic
  * constraint equation. */
 typedef struct {
-  const char *name;
-  const char *body;
+  const char *name, *body;
   double at[2];    /* the point in the body's frame [m] */
   double heading;  /* the direction in the body's frame [rad] */
   pw_signal value; /* with its first time derivative [m/s] */
@@ -371,17 +356,14 @@ typedef struct {
 /* Pfaffian: a linear relation between the velocities of two bodies, both in the frame of body 1:
  * a . (vx1, vy1, omega1) + b . (vx2, vy2, omega2) = value.  One nonholonomic constraint equation. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double a[3];         /* coefficients of vx1, vy1, omega1, in body 1's frame */
-  double b[3];         /* coefficients of vx2, vy2, omega2, in body 1's frame */
-  pw_signal value;     /* with its first time derivative */
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  double a[3], b[3];          /* coefficients of the velocities of body 1 and body 2, in body 1's frame */
+  pw_signal value;            /* with its first time derivative */
 } pw_pfaffian;
 
 /* Tyre: a wheel with side slip; a lateral force that grows with the slip replaces the constraint equation. */
 typedef struct {
-  const char *name;
-  const char *body;
+  const char *name, *body;
   double at[2];     /* contact point in the body's frame [m] */
   double heading;   /* rolling direction in the body's frame [rad] */
   double stiffness; /* cornering stiffness: lateral force per slip [N], > 0 */
@@ -392,8 +374,7 @@ typedef struct {
 
 /* Rolling resistance: a force along the heading that opposes the motion of its point. */
 typedef struct {
-  const char *name;
-  const char *body;
+  const char *name, *body;
   double at[2];   /* contact point in the body's frame [m] */
   double heading; /* rolling direction in the body's frame [rad] */
   double limit;   /* the force while rolling: coefficient times normal load [N], >= 0 */
@@ -402,53 +383,41 @@ typedef struct {
 
 /* Spring: a spring and parallel damper between a point of body 1 and a point of body 2. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double at[2][2];     /* the end points in the bodies' frames [m]; on the ground: in the world */
-  double stiffness;    /* [N/m], >= 0 */
-  double damping;      /* [N s/m], >= 0 */
-  double length;       /* free length [m], >= 0 */
+  const char *name, *body[2];        /* the two bodies, or "ground" for one of them */
+  double at[2][2];                   /* the end points in the bodies' frames [m]; on the ground: in the world */
+  double stiffness, damping, length; /* [N/m], [N s/m], free length [m]; >= 0 */
 } pw_spring;
 
 /* Rotational spring: a torsion spring and parallel damper between two bodies. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double stiffness;    /* [N m/rad], >= 0 */
-  double damping;      /* [N m s/rad], >= 0 */
-  double angle;        /* free angle, of body 1 relative to body 2: phi1 - phi2 [rad] */
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  double stiffness, damping;  /* [N m/rad], [N m s/rad], >= 0 */
+  double angle;               /* free angle, of body 1 relative to body 2: phi1 - phi2 [rad] */
 } pw_rotational_spring;
 
 /* Friction: a viscous and a Coulomb torque that oppose the rotation of body 1 relative to body 2, for example in a
  * pin. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  double viscous;      /* [N m s/rad], >= 0 */
-  double limit;        /* Coulomb torque [N m], >= 0 */
-  double speed;        /* below about this velocity the Coulomb torque is smoothed [rad/s]; > 0 if limit > 0 */
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  double viscous, limit;      /* [N m s/rad]; Coulomb torque [N m]; >= 0 */
+  double speed;               /* below about this velocity the Coulomb torque is smoothed [rad/s]; > 0 if limit > 0 */
 } pw_friction;
 
 /* Sliding friction: a viscous and a Coulomb force that oppose the motion of a point of body 1 along a line of body
  * 2, for example in a slider or slot. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* what slides, and what it slides on; "ground" for one of them */
-  double at[2][2];     /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
-  double heading;      /* direction of the line in body 2's frame [rad] */
-  double viscous;      /* [N s/m], >= 0 */
-  double limit;        /* Coulomb force [N], >= 0 */
-  double speed;        /* below about this speed the Coulomb force is smoothed [m/s]; > 0 if limit > 0 */
+  const char *name, *body[2]; /* what slides, and what it slides on; "ground" for one of them */
+  double at[2][2];       /* the point, and a point of the line, in each body's frame [m]; on the ground: in the world */
+  double heading;        /* direction of the line in body 2's frame [rad] */
+  double viscous, limit; /* [N s/m]; Coulomb force [N]; >= 0 */
+  double speed;          /* below about this speed the Coulomb force is smoothed [m/s]; > 0 if limit > 0 */
 } pw_sliding_friction;
 
 /* Drag: still air opposes the velocity of a body's centre of mass and its rotation. */
 typedef struct {
-  const char *name;
-  const char *body;
-  double linear;            /* [N s/m], >= 0 */
-  double quadratic;         /* half density times area times coefficient [N s^2/m^2], >= 0 */
-  double turning;           /* [N m s/rad], >= 0 */
-  double turning_quadratic; /* [N m s^2/rad^2], >= 0 */
+  const char *name, *body;
+  double linear, quadratic;          /* [N s/m]; half density times area times coefficient [N s^2/m^2]; >= 0 */
+  double turning, turning_quadratic; /* [N m s/rad], [N m s^2/rad^2], >= 0 */
 } pw_drag;
 
 /* Gravity: the same acceleration for every body that has mass, in any direction of the plane. */
@@ -462,36 +431,29 @@ enum { PW_AXES_WORLD, PW_AXES_BODY };
 
 /* Force: an external force on a point of a body. */
 typedef struct {
-  const char *name;
-  const char *body;
-  double at[2]; /* the point in the body's frame [m] */
-  int axes;     /* PW_AXES_WORLD, or PW_AXES_BODY: rotating with the body */
-  pw_signal fx; /* [N] */
-  pw_signal fy; /* [N] */
+  const char *name, *body;
+  double at[2];     /* the point in the body's frame [m] */
+  int axes;         /* PW_AXES_WORLD, or PW_AXES_BODY: rotating with the body */
+  pw_signal fx, fy; /* [N] */
 } pw_force;
 
 /* Torque: acts on body 1; the opposite torque acts on body 2. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the two bodies, or "ground" for one of them */
-  pw_signal value;     /* [N m] */
+  const char *name, *body[2]; /* the two bodies, or "ground" for one of them */
+  pw_signal value;            /* [N m] */
 } pw_torque;
 
 /* Motor: a spring and damper of limited torque that drive the angle of body 1 relative to body 2 to a signal. */
 typedef struct {
-  const char *name;
-  const char *body[2]; /* the driven body, the body that takes the reaction; "ground" for one of them */
-  double stiffness;    /* torque per angle error [N m/rad], >= 0 */
-  double damping;      /* torque per angular velocity error [N m s/rad], >= 0 */
-  double limit;        /* largest torque [N m]; 0: no limit */
-  pw_signal angle;     /* target of phi1 - phi2 [rad] */
-  pw_signal rate;      /* target of omega1 - omega2 [rad/s] */
+  const char *name, *body[2]; /* the driven body, the body that takes the reaction; "ground" for one of them */
+  double stiffness, damping;  /* torque per error of angle [N m/rad], of angular velocity [N m s/rad]; >= 0 */
+  double limit;               /* largest torque [N m]; 0: no limit */
+  pw_signal angle, rate;      /* targets of phi1 - phi2 [rad], of omega1 - omega2 [rad/s] */
 } pw_motor;
 
 /* Marker: a point of a body that appears in tables, figures and animations.  It has no effect on the motion. */
 typedef struct {
-  const char *name;
-  const char *body;
+  const char *name, *body;
   double at[2]; /* the point in the body's frame [m] */
 } pw_marker;
 
@@ -586,7 +548,7 @@ pw_batch_function pw_by_differences;
 #define PW_BY_DIFFERENCES pw_by_differences
 
 typedef enum {
-  PW_FORCE,       /* no constraint equations */
+  PW_FORCE,       /* no constraint equations; the default */
   PW_HOLONOMIC,   /* g (q, t) = 0 */
   PW_NONHOLONOMIC /* S (q, t) v = eta (t, q) */
 } pw_level;
@@ -624,15 +586,12 @@ struct pw_kind {
   pw_batch_function *force;   /* cols: generalised force */
   pw_batch_function *force_u; /* cols x signals: derivative of the force with respect to the value of each signal */
   pw_batch_function *jw_q;    /* rows x cols: derivative of J w with respect to q; also gives that of J^T lambda */
-  pw_batch_function *eta_q;   /* rows x cols */
-  pw_batch_function *gamma_q; /* rows x cols */
-  pw_batch_function *gamma_v; /* rows x cols */
-  pw_batch_function *force_q; /* cols x cols */
-  pw_batch_function *force_v; /* cols x cols */
-  pw_batch_function *energy;  /* 1: potential energy [J] */
-  pw_batch_function *power;   /* 1: power supplied to the system [W] */
-  pw_batch_function *loss;    /* 1: dissipated power [W], >= 0 */
-  pw_batch_function *contact; /* 3: contact point on the ground [m] and heading [rad], for output */
+  pw_batch_function *eta_q, *gamma_q, *gamma_v; /* rows x cols */
+  pw_batch_function *force_q, *force_v;         /* cols x cols */
+  pw_batch_function *energy;                    /* 1: potential energy [J] */
+  pw_batch_function *power;                     /* 1: power supplied to the system [W] */
+  pw_batch_function *loss;                      /* 1: dissipated power [W], >= 0 */
+  pw_batch_function *contact;                   /* 3: contact point on the ground [m] and heading [rad], for output */
   /* 2 cols, for forces that saturate, such as friction: the change of each coordinate, then of each velocity, over
    * which the force changes by its own magnitude.  Entries are INFINITY (no saturation) before the call. */
   pw_batch_function *saturation;
@@ -671,8 +630,8 @@ extern const pw_kind *const pw_kinds[];
 
 /* ---- Creating and modifying models ---- */
 
-/* Creates a model with default parameters; build it with pw_model_build.  `name` is copied; the table must outlive
- * the model.  Returns NULL and sets the error if the table does not match this library or memory is exhausted. */
+/* Creates a model with default parameters.  `name` is copied; the table must outlive the model.  NULL and the error if
+ * the table does not match this library, or if out of memory. */
 pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error *error);
 void pw_model_free (pw_model *m);
 
@@ -682,12 +641,12 @@ int pw_model_set (pw_model *m, const char *parameter, double value, pw_error *er
 /* Runs the model's build function.  Errors: the first one of a body or element added. */
 int pw_model_build (pw_model *m, pw_error *error);
 
-/* Replaces a signal of a built model: pw_model_set_signal (m, "rider", "value", &signal, e).  Errors: PW_INPUT for
- * an unknown element or field, with the nearest name.  pw_system_compile checks whether the signal suits the field. */
+/* Replaces a signal of a built model; pw_system_compile checks it.  Errors: PW_INPUT for an unknown element or field,
+ * with the nearest name. */
 int pw_model_set_signal (pw_model *m, const char *element, const char *field, const pw_signal *signal, pw_error *error);
 
-/* Prescribes the initial value of a state, "frame.vx" or "wheel.spin"; the consistent initial state keeps it if
- * possible.  Errors: PW_INPUT for a value that is not finite.  pw_system_compile checks whether the state exists. */
+/* Prescribes the initial value of a state, "frame.vx" or "wheel.spin", which the consistent initial state keeps if
+ * possible; pw_system_compile checks the name.  Errors: PW_INPUT for a value that is not finite. */
 int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error *error);
 
 /* ---- Contents of a model ---- */
@@ -696,8 +655,7 @@ const char *pw_model_name (const pw_model *m);
 const pw_plugin_table *pw_model_table (const pw_model *m);
 double pw_model_parameter (const pw_model *m, const pw_parameter *p); /* value of p, an entry of the model's table */
 
-/* Bodies and elements of a built model in the order they were added.  They belong to the model; adding more
- * invalidates the pointers. */
+/* Bodies and elements of a built model, in the order added; valid until more are added. */
 typedef struct {
   const pw_kind *kind;
   void *definition; /* kind->definition bytes; the first member is its name */
@@ -725,8 +683,7 @@ void pw_model_set_reference (pw_model *m, const pw_reference_text *reference); /
 
 /* ---- For build functions that read models from other sources ---- */
 
-/* Frees an object, such as the context of a function signal, together with the model.  PW_RESOURCE: the object has
- * been freed. */
+/* Frees an object together with the model.  PW_RESOURCE: it has been freed. */
 int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object));
 
 /* The first error of a model; a build function may set it. */
@@ -751,8 +708,8 @@ int pw_plugin_check (const pw_plugin_table *table, const char *what, pw_error *e
  * it was compiled from; it does refer to element types and function signals. */
 typedef struct pw_system pw_system;
 
-/* What an evaluation modifies: configurations, J, values of signals, scratch memory.  Each run has one; a program
- * that evaluates a system itself creates one.  Use it from one thread at a time; the system must outlive it. */
+/* What an evaluation modifies: configurations, J, values of signals, scratch memory.  Each run has one.  Use it from
+ * one thread at a time; the system must outlive it. */
 typedef struct pw_workspace pw_workspace;
 
 /* Checks and compiles a built model.  Returns NULL and sets the error on failure. */
@@ -860,12 +817,6 @@ void pw_equations_free (pw_equations *e); /* required even after an error */
 int pw_system_differences (const pw_system *s);
 char *pw_system_difference_name (const pw_system *s, int i, char *buffer, size_t size);
 
-#ifdef __GNUC__
-#pragma GCC visibility pop
-#endif
-
-#ifdef __cplusplus
-}
-#endif
+PW_END
 
 #endif

@@ -5,13 +5,7 @@
 
 #include "pinwheel.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-#ifdef __GNUC__
-#pragma GCC visibility push(default)
-#endif
+PW_BEGIN
 
 #define PW_MAX_STEPS 10000000 /* default limit of attempted steps of adaptive methods */
 
@@ -116,12 +110,6 @@ void pw_archive_count (pw_archive *a,
 void pw_archive_clear (pw_archive *a); /* rewinds */
 void pw_archive_free (pw_archive *a);
 
-#ifdef __GNUC__
-#pragma GCC visibility pop
-#endif
-
-#ifdef __cplusplus
-}
-#endif
+PW_END
 
 #endif

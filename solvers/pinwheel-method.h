@@ -24,13 +24,7 @@
 
 #include "pinwheel-solvers.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-#ifdef __GNUC__
-#pragma GCC visibility push(default)
-#endif
+PW_BEGIN
 
 /* The state reached.  The arrays belong to the run and change when a step is accepted. */
 typedef struct {
@@ -80,12 +74,6 @@ void pw_step_serialise (pw_run *r, pw_archive *a);
 #define PW_STEP_FUNCTIONS \
   .at = pw_step_at, .restart = pw_step_restart, .close = pw_step_close, .carry = pw_step_serialise
 
-#ifdef __GNUC__
-#pragma GCC visibility pop
-#endif
-
-#ifdef __cplusplus
-}
-#endif
+PW_END
 
 #endif

@@ -11,13 +11,7 @@
 
 #include "run.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-#ifdef __GNUC__
-#pragma GCC visibility push(default)
-#endif
+PW_BEGIN
 
 typedef struct pw_run pw_run;
 typedef struct pw_method pw_method;
@@ -216,12 +210,6 @@ int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int s
 int pw_initial_specified (const pw_initial_report *report, int state);
 const pw_scale *pw_run_scale (const pw_run *r);
 
-#ifdef __GNUC__
-#pragma GCC visibility pop
-#endif
-
-#ifdef __cplusplus
-}
-#endif
+PW_END
 
 #endif

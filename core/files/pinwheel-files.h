@@ -5,13 +5,7 @@
 #include <stdio.h>
 #include "run.h"
 
-#ifdef __cplusplus
-extern "C" {
-#endif
-
-#ifdef __GNUC__
-#pragma GCC visibility push(default)
-#endif
+PW_BEGIN
 
 /* ---- Models ---- */
 
@@ -223,12 +217,6 @@ typedef struct {
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
                    const pw_statistics *statistics, pw_output *o, pw_error *error);
 
-#ifdef __GNUC__
-#pragma GCC visibility pop
-#endif
-
-#ifdef __cplusplus
-}
-#endif
+PW_END
 
 #endif

@@ -1,4 +1,4 @@
-/* Batch functions and `prepare` functions of element types, written for one element. */
+/* Batch functions and `prepare` functions of element types, written for one element; members of their tables. */
 #ifndef PW_BATCH_H
 #define PW_BATCH_H
 
@@ -24,6 +24,10 @@
     return PW_OK;                                                                                             \
   }                                                                                                           \
   static inline void function##_one (const definition_type *d, type *k)
+
+/* Members of a type's table. */
+#define DEFINITION(type, table) .definition = sizeof (type), .fields = table
+#define ELEMENT(type, function) .element = sizeof (type), .prepare = function
 
 /* The vector w of an element; NULL where the batch has none. */
 static inline const double *batch_w (const pw_batch *b, int e) {

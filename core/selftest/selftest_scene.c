@@ -28,7 +28,7 @@ typedef struct {
   double *plus, *minus, *slope;       /* count x cols, or rows */
   double *value, *terms, *off, *size; /* the same: tested value, sum of |terms|, least error, reference size */
   pw_selftest_report *report;
-  double *memory;
+  char *memory;
 } scene;
 
 typedef void scene_function (scene *x, double *out);
@@ -258,11 +258,8 @@ static void scene_randomise (scene *x, const double *q, const double *v, pw_rand
 }
 
 static int scene_open (scene *x) {
-  size_t n = (size_t)x->s->coords, count = (size_t)x->k->b.count, cols = (size_t)scene_width (x);
-  const struct {
-    double **array;
-    size_t count;
-  } array[] = {
+  size_t n = (size_t)x->s->coords, width = (size_t)scene_width (x), each = (size_t)x->k->b.count * width;
+  const pw_array array[] = {
     { &x->q, n },
     { &x->v, n },
     { &x->a, n },
@@ -271,28 +268,20 @@ static int scene_open (scene *x) {
     { &x->w, n },
     { &x->q_now, n },
     { &x->v_now, n },
-    { &x->local, count * cols },
-    { &x->lambda, count * cols },
-    { &x->J, count * cols * cols },
-    { &x->block, count * cols * cols },
-    { &x->plus, count * cols },
-    { &x->minus, count * cols },
-    { &x->slope, count * cols },
-    { &x->value, count * cols },
-    { &x->terms, count * cols },
-    { &x->off, count * cols },
-    { &x->size, count * cols },
+    { &x->local, each },
+    { &x->lambda, each },
+    { &x->J, each * width },
+    { &x->block, each * width },
+    { &x->plus, each },
+    { &x->minus, each },
+    { &x->slope, each },
+    { &x->value, each },
+    { &x->terms, each },
+    { &x->off, each },
+    { &x->size, each },
   };
-  size_t total = 1;
-  for (size_t i = 0; i < sizeof array / sizeof *array; i++) total += array[i].count;
-  x->memory = calloc (total, sizeof *x->memory);
-  if (x->memory == NULL) return PW_RESOURCE;
-  double *at = x->memory;
-  for (size_t i = 0; i < sizeof array / sizeof *array; i++) {
-    *array[i].array = at;
-    at += array[i].count;
-  }
-  return PW_OK;
+  x->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  return x->memory ? PW_OK : PW_RESOURCE;
 }
 
 int pw_selftest_scene (const pw_system *s, double T, const pw_kind *kind, double t, const double *q, const double *v,

@@ -134,24 +134,22 @@ static size_t verify_room (const pw_system *s) {
 int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double *q, const double *v, const double *a,
                const double *lambda, pw_verification *result) {
   size_t rows = (size_t)s->rows, coords = (size_t)s->coords;
-  double *room = calloc (6 * rows + 2 * coords + verify_room (s), sizeof *room);
-  pw_workspace *w = room ? pw_workspace_new (s, NULL) : NULL;
+  verify x = { .s = s };
+  const pw_array array[] = {
+    { &x.position, rows },          { &x.velocity, rows },      { &x.acceleration, rows },
+    { &x.force, coords },           { &x.position_size, rows }, { &x.velocity_size, rows },
+    { &x.acceleration_size, rows }, { &x.force_size, coords },  { &x.block, verify_room (s) },
+  };
+  char *memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  pw_workspace *w = memory ? pw_workspace_new (s, NULL) : NULL;
   int status = PW_RESOURCE;
   if (w) {
-    verify x = { .s = s, .w = w, .position = room };
-    x.velocity = x.position + rows;
-    x.acceleration = x.velocity + rows;
-    x.position_size = x.acceleration + rows;
-    x.velocity_size = x.position_size + rows;
-    x.acceleration_size = x.velocity_size + rows;
-    x.force = x.acceleration_size + rows;
-    x.force_size = x.force + coords;
-    x.block = x.force_size + coords;
+    x.w = w;
     w->scale = *scale;
     status = pw_update_kinematics (w, t, q, v);
     if (status == PW_OK) verify_all (&x, v, a, lambda, result);
   }
   pw_workspace_free (w);
-  free (room);
+  free (memory);
   return status;
 }

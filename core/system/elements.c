@@ -118,18 +118,15 @@ static int elements_jacobian (const pw_workspace *w, pw_equations *out) {
 static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error *error) {
   const pw_system *s = w->s;
   size_t n = (size_t)s->coords, rows = (size_t)s->rows, entries = (size_t)elements_jacobian (w, NULL);
-  double *space =
-      calloc (2 * n + 3 * rows + 2 * entries + 6, sizeof *space); /* row and column of an entry fit in one double */
+  double *indices;
+  const pw_array array[] = { { &out->mass, n },        { &out->force, n + 3 }, /* three more entries: the ground's */
+                             { &out->g, rows },        { &out->eta, rows },    { &out->gamma, rows },
+                             { &out->value, entries }, { &indices, entries } }; /* two indices fit in one double */
   *out =
       (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };
-  if (space == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
-  out->mass = space;
-  out->force = space + n; /* three more entries: the ground's */
-  out->g = out->force + n + 3;
-  out->eta = out->g + rows;
-  out->gamma = out->eta + rows;
-  out->value = out->gamma + rows;
-  out->row = (int *)(void *)(out->value + entries);
+  if (pw_take_arrays (array, sizeof array / sizeof *array) == NULL)
+    return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
+  out->row = (int *)(void *)indices;
   out->column = out->row + entries;
   return PW_OK;
 }

@@ -42,14 +42,11 @@ static const pw_field gravity_fields[] = {
 const pw_kind pw_kind_gravity = {
   .name = "gravity",
   .about = "the same acceleration for every body that has mass",
-  .definition = sizeof (pw_gravity),
-  .element = sizeof (gravity),
-  .fields = gravity_fields,
+  DEFINITION (pw_gravity, gravity_fields),
+  ELEMENT (gravity, gravity_prepare),
   .bodies = 1,
   .each_body = 1,
   .constant = 1,
-  .level = PW_FORCE,
-  .prepare = gravity_prepare,
   .force = gravity_force,
   .energy = gravity_energy,
 };

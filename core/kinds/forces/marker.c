@@ -22,11 +22,8 @@ static const pw_field marker_fields[] = {
 const pw_kind pw_kind_marker = {
   .name = "marker",
   .about = "a point of a body whose path is shown in tables, figures and animations",
-  .definition = sizeof (pw_marker),
-  .element = sizeof (contact),
-  .fields = marker_fields,
+  DEFINITION (pw_marker, marker_fields),
+  ELEMENT (contact, marker_prepare),
   .bodies = 1,
-  .level = PW_FORCE,
-  .prepare = marker_prepare,
   .contact = marker_contact,
 };

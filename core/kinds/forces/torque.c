@@ -33,7 +33,6 @@ const pw_kind pw_kind_torque = {
   .fields = torque_fields,
   .bodies = 2,
   .signals = 1,
-  .level = PW_FORCE,
   .force = torque_force,
   .force_u = torque_force_u,
   .power = torque_power,
