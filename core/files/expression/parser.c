@@ -6,7 +6,6 @@
  *   operand  = number | name | function (choice, ...) | (choice)
  *
  * Parts without variables are evaluated immediately.  Errors are reported at their position. */
-#include <ctype.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -17,35 +16,22 @@
 
 /* ---- Names and numbers in a text ---- */
 
-static int lexer_begins_name (char c) {
-  return isalpha ((unsigned char)c) || c == '_';
-}
+#define DIGITS "0123456789"
+#define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_"
 
 /* The length of the name at p, which may contain dots (frame.phi); 0 if there is none. */
 static size_t lexer_name_size (const char *p) {
-  size_t n = 0;
-  if (lexer_begins_name (*p))
-    while (lexer_begins_name (p[n]) || isdigit ((unsigned char)p[n]) || (n && p[n] == '.')) n++;
-  return n;
-}
-
-static size_t lexer_digits (const char *p) {
-  return strspn (p, "0123456789");
+  return strspn (p, LETTERS) ? strspn (p, LETTERS DIGITS ".") : 0;
 }
 
 /* Digits, perhaps with a decimal point and an exponent; 0 if there is no number. */
 static size_t lexer_number_size (const char *p) {
-  size_t whole = lexer_digits (p), n = whole;
-  if (p[n] == '.') {
-    size_t part = lexer_digits (p + n + 1);
-    if (whole + part == 0) return 0;
-    n += 1 + part;
-  }
-  if (n && (p[n] == 'e' || p[n] == 'E')) {
-    size_t sign = p[n + 1] == '+' || p[n + 1] == '-', power = lexer_digits (p + n + 1 + sign);
-    if (power) n += 1 + sign + power;
-  }
-  return n;
+  size_t n = strspn (p, DIGITS), part = p[n] == '.' ? strspn (p + n + 1, DIGITS) : 0;
+  if (n + part == 0) return 0;
+  n += p[n] == '.' ? 1 + part : 0;
+  size_t sign = n + 1 + (p[n] != 0 && (p[n + 1] == '+' || p[n + 1] == '-'));
+  size_t power = p[n] == 'e' || p[n] == 'E' ? strspn (p + sign, DIGITS) : 0;
+  return power ? sign + power : n;
 }
 
 int pw_expression_number (const char *text, double *value) {
@@ -53,10 +39,14 @@ int pw_expression_number (const char *text, double *value) {
   return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
 }
 
-int pw_expression_is_taken (const char *text) {
+static const pw_expression_constant_name *lexer_constant (const char *name) {
   const pw_expression_constant_name *c = pw_expression_constants;
-  while (c->name && strcmp (c->name, text) != 0) c++;
-  return c->name || pw_expression_find (text) >= 0;
+  while (c->name && strcmp (c->name, name) != 0) c++;
+  return c->name ? c : NULL;
+}
+
+int pw_expression_is_taken (const char *text) {
+  return lexer_constant (text) || pw_expression_find (text) >= 0;
 }
 
 int pw_expression_is_name (const char *text) {
@@ -75,7 +65,7 @@ int pw_expression_names (const char *text, int (*each) (void *context, const cha
   return 0;
 }
 
-enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_CODES = PW_EXPRESSION_CODES, PARSER_NAME = 100 };
+enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_NAME = 100 };
 enum { ON_TIME = 1, ON_STATES = 2 };
 
 /* ---- Named numbers ---- */
@@ -138,13 +128,13 @@ typedef struct {
   const char *jump;
   int jump_size;
   int codes;
-  pw_expression_code code[PARSER_CODES];
+  pw_expression_code code[PW_EXPRESSION_CODES];
 } parser;
 
 /* A parsed part: offset in the text, first operation, dependencies, whether its value is 1 or 0. */
 typedef struct {
   size_t from;
-  int first, depends, reference;
+  int first, depends, condition;
 } parser_part;
 
 static const parser_part parser_nothing = { 0 };
@@ -165,15 +155,6 @@ parser_wrong (parser *p, size_t at, const char *format, ...) {
   return parser_nothing;
 }
 
-static void parser_wrong_sign (parser *p) {
-  char c = p->text[p->at], shown[2] = { c, 0 };
-  if (c == '=')
-    parser_wrong (p, p->at, "\"=\" would assign; equality is written ==");
-  else
-    parser_wrong (p, p->at, "\"%s\" does not belong in an expression",
-                  c & 0x80 ? "a letter without ASCII code" : shown);
-}
-
 /* Advances to the next token. */
 static void parser_next (parser *p) {
   const char *word = p->text + p->at + p->size;
@@ -189,8 +170,11 @@ static void parser_next (parser *p) {
   for (const parser_operator *o = parser_operators; o->name && !p->sign; o++)
     if (strncmp (word, o->name, strlen (o->name)) == 0) p->sign = o;
   p->type = 'o';
-  if (p->sign == NULL)
-    parser_wrong_sign (p);
+  if (p->sign == NULL && *word == '=')
+    parser_wrong (p, p->at, "\"=\" would assign; equality is written ==");
+  else if (p->sign == NULL)
+    parser_wrong (p, p->at, "\"%s\" does not belong in an expression",
+                  *word & 0x80 ? "a letter without ASCII code" : (char[2]){ *word, 0 });
   else if (word[0] == '*' && word[1] == '*')
     parser_wrong (p, p->at, "a power is written with ^");
   else
@@ -202,7 +186,7 @@ static void parser_next (parser *p) {
 static void parser_code (parser *p, int op, int which, double value) {
   if (p->status != PW_OK) return;
   p->waiting += 1 - pw_expression_operands (op);
-  if (p->waiting > PW_EXPRESSION_STACK || p->codes == PARSER_CODES)
+  if (p->waiting > PW_EXPRESSION_STACK || p->codes == PW_EXPRESSION_CODES)
     parser_wrong (p, p->at, "too much is nested here");
   else
     p->code[p->codes++] = (pw_expression_code){ (short)op, (short)which, value };
@@ -220,7 +204,7 @@ static parser_part parser_leaf (parser *p, int op, int which, double value) {
 static parser_part parser_emit (parser *p, parser_part part, int depends, int op, int which) {
   int tie = 0;
   part.depends |= depends;
-  part.reference = op >= PW_OP_LESS && op <= PW_OP_OR;
+  part.condition = op >= PW_OP_LESS && op <= PW_OP_OR;
   parser_code (p, op, which, 0);
   if (p->status != PW_OK) return part;
   if (part.depends == 0) {
@@ -238,8 +222,8 @@ static parser_part parser_emit (parser *p, parser_part part, int depends, int op
 }
 
 /* Converts a condition to 1 or 0. */
-static parser_part parser_truth (parser *p, parser_part part) {
-  if (part.reference) return part;
+static parser_part parser_condition (parser *p, parser_part part) {
+  if (part.condition) return part;
   parser_code (p, PW_OP_CONSTANT, 0, 0);
   return parser_emit (p, part, 0, PW_OP_UNEQUAL, 0);
 }
@@ -270,8 +254,8 @@ static parser_part parser_missing (parser *p) {
   if (p->status != PW_OK) return parser_nothing;
   snprintf (last, sizeof last, "%.*s", (int)(p->end - p->before), p->text + p->before);
   if (p->type == 0 && p->end == 0) return parser_wrong (p, 0, "an expression is missing");
-  if (p->type == 0) return parser_wrong (p, p->before, "something is missing after \"%s\"", last);
-  if (p->type == ')' && p->end) return parser_wrong (p, p->before, "something is missing after \"%s\"", last);
+  if (p->type == 0 || (p->type == ')' && p->end))
+    return parser_wrong (p, p->before, "something is missing after \"%s\"", last);
   return parser_wrong (p, p->at, "this does not belong here");
 }
 
@@ -293,12 +277,11 @@ static int parser_is_call (const parser *p) {
 }
 
 static parser_part parser_name (parser *p, const char *name) {
-  const pw_expression_constant_name *c = pw_expression_constants;
+  const pw_expression_constant_name *c = lexer_constant (name);
   int i = 0, known = p->scope ? pw_names_find (&p->scope->table, name) : -1;
   while (p->variable && p->variable[i] && strcmp (p->variable[i], name) != 0) i++;
-  while (c->name && strcmp (c->name, name) != 0) c++;
   int variable = p->variable && p->variable[i];
-  if (!variable && known < 0 && c->name == NULL) return parser_unknown (p, name);
+  if (!variable && known < 0 && c == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
     return parser_wrong (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
   if (variable) return parser_leaf (p, PW_OP_VARIABLE, i, 0);
@@ -342,21 +325,16 @@ static parser_part parser_group (parser *p) {
   return part;
 }
 
-static parser_part parser_number (parser *p) {
-  char digits[PARSER_LONGEST + 1];
-  double value = 0;
-  snprintf (digits, sizeof digits, "%.*s", (int)p->size, p->text + p->at);
-  if (pw_read_number (digits, &value) != PW_OK && p->status == PW_OK) p->status = PW_RESOURCE;
-  return parser_leaf (p, PW_OP_CONSTANT, 0, value);
-}
-
 static parser_part parser_operand (parser *p) {
-  char name[PARSER_NAME];
+  char name[PARSER_LONGEST + 1];
+  double value = 0;
   if (p->status != PW_OK) return parser_nothing;
-  if (p->type == '0') return parser_number (p);
+  snprintf (name, sizeof name, "%.*s", (int)p->size, p->text + p->at);
+  if (p->type == '0' && pw_read_number (name, &value) != PW_OK) p->status = PW_RESOURCE;
+  if (p->type == '0') return parser_leaf (p, PW_OP_CONSTANT, 0, value);
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);
-  snprintf (name, sizeof name, "%.*s", (int)p->size, p->text + p->at);
+  name[PARSER_NAME - 1] = 0;
   int which = pw_expression_find (name);
   if (which < 0) return parser_name (p, name);
   if (parser_is_call (p)) return parser_call (p, which);
@@ -384,10 +362,10 @@ static parser_part parser_binary (parser *p, int strength) {
   while (p->status == PW_OK && p->sign && p->sign->strength >= strength) {
     const parser_operator *o = p->sign;
     int logical = o->op == PW_OP_AND || o->op == PW_OP_OR;
-    if (logical) part = parser_truth (p, part);
+    if (logical) part = parser_condition (p, part);
     parser_next (p);
     parser_part right = parser_binary (p, o->strength + 1);
-    if (logical) right = parser_truth (p, right);
+    if (logical) right = parser_condition (p, right);
     part = parser_emit (p, part, right.depends, o->op, 0);
   }
   return part;
@@ -397,7 +375,7 @@ static parser_part parser_choice (parser *p) {
   parser_part part = parser_binary (p, 1);
   size_t mark = p->at;
   if (p->status != PW_OK || p->type != '?' || !parser_deeper (p)) return part;
-  part = parser_truth (p, part);
+  part = parser_condition (p, part);
   parser_next (p);
   int depends = parser_choice (p).depends;
   if (p->status == PW_OK && p->type != ':') return parser_unexpected (p, '?', mark);
@@ -409,9 +387,12 @@ static parser_part parser_choice (parser *p) {
 
 /* ---- Whole expressions ---- */
 
-static int parser_read (parser *p) {
-  p->trouble->at = 0;
-  if (strlen (p->text) > PARSER_LONGEST)
+static int parser_read (parser *p, const pw_scope *s, const char *const *variable, const char *text,
+                        pw_expression_trouble *trouble) {
+  memset (p, 0, offsetof (parser, code));
+  p->scope = s, p->variable = variable, p->text = text, p->trouble = trouble;
+  trouble->at = 0;
+  if (strlen (text) > PARSER_LONGEST)
     return parser_wrong (p, 0, "an expression of more than %d characters", PARSER_LONGEST), p->status;
   parser_next (p);
   parser_choice (p);
@@ -426,9 +407,7 @@ size_t pw_expression_size (const pw_expression *x) {
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **x, pw_expression_trouble *trouble) {
   parser p;
-  memset (&p, 0, offsetof (parser, code));
-  p.scope = s, p.variable = variable, p.text = text, p.trouble = trouble;
-  if (parser_read (&p) != PW_OK) return p.status;
+  if (parser_read (&p, s, variable, text, trouble) != PW_OK) return p.status;
   pw_expression head = { p.codes, p.breaks, p.jump, p.jump_size },
                 *made = pw_arena_take (arena, pw_expression_size (&head));
   if (made == NULL) return PW_RESOURCE;
@@ -440,9 +419,7 @@ int pw_expression_read (const pw_scope *s, const char *const *variable, const ch
 
 int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_trouble *trouble) {
   parser p;
-  memset (&p, 0, offsetof (parser, code));
-  p.scope = s, p.text = text, p.trouble = trouble;
-  if (parser_read (&p) == PW_OK) *value = p.code[0].value;
+  if (parser_read (&p, s, NULL, text, trouble) == PW_OK) *value = p.code[0].value;
   return p.status;
 }
 

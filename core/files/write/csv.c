@@ -1,61 +1,36 @@
 /* Tables of samples, one line each, readable by Octave, Python and gnuplot.
  *
  *   t [s] | states of each body, of each internal coordinate | contact points | reactions | residuals | energies */
+#include <errno.h>
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 #include "files.h"
 
 struct pw_csv {
   pw_output *output;
+  FILE *f;
+  int cells;               /* of the current line, so far */
   pw_workspace *workspace; /* for contact points; NULL if the system has none */
   int ledger;
   double (*contact)[3]; /* contact points of the system */
-  char *line;           /* grows as needed */
-  size_t used, room;
-  int failed; /* out of memory */
 };
-
-/* ---- Lines ---- */
-
-static void csv_text (pw_csv *c, const char *text) {
-  size_t n = strlen (text);
-  if (c->used + n + 1 > c->room) {
-    size_t room = 2 * (c->used + n + 1) + 1000;
-    char *more = realloc (c->line, room);
-    if (more == NULL) {
-      c->failed = 1;
-      return;
-    }
-    c->line = more;
-    c->room = room;
-  }
-  memcpy (c->line + c->used, text, n + 1);
-  c->used += n;
-}
 
 static void csv_number (pw_csv *c, double value) {
   char text[32];
-  if (c->used) csv_text (c, ",");
-  csv_text (c, isfinite (value) ? pw_format (text, value, 17) : "nan");
+  if (c->cells++) fputc (',', c->f);
+  fputs (isfinite (value) ? pw_format (text, value, 17) : "nan", c->f);
 }
 
 static void csv_name (pw_csv *c, const char *name, const char *unit) {
-  if (c->used) csv_text (c, ",");
-  csv_text (c, name);
-  if (unit == NULL || *unit == 0) return;
-  csv_text (c, " [");
-  csv_text (c, unit);
-  csv_text (c, "]");
+  int has_unit = unit && *unit;
+  fprintf (c->f, "%s%s%s%s%s", c->cells++ ? "," : "", name, has_unit ? " [" : "", has_unit ? unit : "",
+           has_unit ? "]" : "");
 }
 
-/* Writes whole lines. */
 static int csv_end (pw_csv *c, pw_error *error) {
-  csv_text (c, "\n");
-  size_t used = c->used;
-  c->used = 0;
-  if (c->failed) return pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
-  return pw_output_text (c->output, c->line, used, error);
+  c->cells = 0;
+  fputc ('\n', c->f);
+  return pw_output_check (c->output, error);
 }
 
 /* ---- The header ---- */
@@ -97,6 +72,7 @@ static void csv_name_ledger (pw_csv *c, const pw_system *s) {
 
 static int csv_header (pw_csv *c, const pw_system *s, pw_error *error) {
   char name[300];
+  errno = 0;
   csv_name (c, "t", "s");
   csv_name_states (c, s);
   csv_name_contacts (c, s);
@@ -111,17 +87,13 @@ static int csv_header (pw_csv *c, const pw_system *s, pw_error *error) {
 pw_csv *pw_csv_open (const pw_system *s, int ledger, pw_output *o, pw_error *error) {
   pw_csv *c = calloc (1, sizeof *c);
   if (c) c->contact = calloc ((size_t)pw_system_contacts (s) + 1, sizeof *c->contact);
-  if (c == NULL || c->contact == NULL) {
-    pw_csv_close (c);
-    pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
-    return NULL;
+  if (c && c->contact) {
+    c->output = o, c->f = pw_output_stream (o), c->ledger = ledger;
+    if (pw_system_contacts (s) > 0) c->workspace = pw_workspace_new (s, error);
+    if ((c->workspace || pw_system_contacts (s) == 0) && (pw_output_continued (o) || csv_header (c, s, error) == PW_OK))
+      return c;
   }
-  c->output = o;
-  c->ledger = ledger;
-  int status = PW_OK;
-  if (pw_system_contacts (s) > 0 && (c->workspace = pw_workspace_new (s, error)) == NULL) status = PW_RESOURCE;
-  if (status == PW_OK && !pw_output_continued (o)) status = csv_header (c, s, error);
-  if (status == PW_OK) return c;
+  pw_fail (error, PW_RESOURCE, "out of memory while writing a table");
   pw_csv_close (c);
   return NULL;
 }
@@ -130,7 +102,6 @@ void pw_csv_close (pw_csv *c) {
   if (c == NULL) return;
   pw_workspace_free (c->workspace);
   free (c->contact);
-  free (c->line);
   free (c);
 }
 
@@ -148,14 +119,11 @@ static void csv_states (pw_csv *c, const pw_system *s, const pw_sample *x) {
   }
 }
 
-static int csv_contacts (pw_csv *c, const pw_system *s, const pw_sample *x, pw_error *error) {
-  if (c->workspace == NULL) return PW_OK;
-  int status = pw_workspace_contact_points (c->workspace, x->t, x->q, x->v, c->contact, error);
-  for (int i = 0; status == PW_OK && i < pw_system_contacts (s); i++) {
+static void csv_contacts (pw_csv *c, const pw_system *s) {
+  for (int i = 0; i < pw_system_contacts (s); i++) {
     csv_number (c, c->contact[i][0]);
     csv_number (c, c->contact[i][1]);
   }
-  return status;
 }
 
 static void csv_ledger (pw_csv *c, const pw_system *s, const pw_sample *x) {
@@ -167,13 +135,14 @@ static void csv_ledger (pw_csv *c, const pw_system *s, const pw_sample *x) {
 }
 
 int pw_csv_write (pw_csv *c, const pw_system *s, const pw_sample *sample, pw_error *error) {
+  int status = PW_OK;
+  if (c->workspace)
+    status = pw_workspace_contact_points (c->workspace, sample->t, sample->q, sample->v, c->contact, error);
+  if (status != PW_OK) return status;
+  errno = 0;
   csv_number (c, sample->t);
   csv_states (c, s, sample);
-  int status = csv_contacts (c, s, sample, error);
-  if (status != PW_OK) {
-    c->used = 0;
-    return status;
-  }
+  csv_contacts (c, s);
   for (int i = 0; i < pw_system_rows (s); i++) csv_number (c, 0 - sample->lambda[i]); /* avoids -0 */
   csv_number (c, sample->position);
   csv_number (c, sample->velocity);

@@ -1,7 +1,74 @@
-/* The summary of a run as JSON. */
+/* Writes JSON item by item, and the summary of a run. */
 #include <errno.h>
+#include <math.h>
 #include <string.h>
 #include "files.h"
+
+/* ---- Items ---- */
+
+/* Writes the separator before an item or the end of a container. */
+static void json_space (pw_json *j, int depth, const char *otherwise) {
+  if (j->depth <= j->lines || j->line)
+    fprintf (j->f, "\n%*s", 2 * depth, "");
+  else
+    fputs (otherwise, j->f);
+  j->line = 0;
+}
+
+/* Bytes that are not UTF-8 become U+FFFD, the replacement character. */
+static void json_string (FILE *f, const char *text) {
+  fputc ('"', f);
+  for (int n; *text; text += n ? n : 1) {
+    n = pw_utf8_size (text);
+    if (*text == '"' || *text == '\\')
+      fprintf (f, "\\%c", *text);
+    else if (*text == '\n')
+      fputs ("\\n", f);
+    else if ((unsigned char)*text < ' ')
+      fprintf (f, "\\u%04X", (unsigned)*text);
+    else
+      fwrite (n ? text : "\xEF\xBF\xBD", 1, (size_t)(n ? n : 3), f);
+  }
+  fputc ('"', f);
+}
+
+static void json_item (pw_json *j, const char *key) {
+  if (j->items++ > 0) fputc (',', j->f);
+  if (j->depth > 0) json_space (j, j->depth, j->items > 1 ? " " : "");
+  if (key == NULL) return;
+  json_string (j->f, key);
+  fputs (": ", j->f);
+}
+
+void pw_json_open (pw_json *j, const char *key, char bracket) {
+  json_item (j, key);
+  fputc (bracket, j->f);
+  j->depth++;
+  j->items = 0;
+}
+
+void pw_json_close (pw_json *j, char bracket) {
+  if (j->items > 0 || j->line) json_space (j, j->depth - 1, "");
+  fputc (bracket, j->f);
+  if (--j->depth == 0) fputc ('\n', j->f);
+  j->items = 1;
+}
+
+void pw_json_text (pw_json *j, const char *key, const char *text) {
+  json_item (j, key);
+  text ? json_string (j->f, text) : (void)fputs ("null", j->f);
+}
+
+void pw_json_number (pw_json *j, const char *key, double value) {
+  char text[32];
+  json_item (j, key);
+  fputs (isfinite (value) ? pw_format (text, value, 17) : "null", j->f);
+}
+
+void pw_json_flag (pw_json *j, const char *key, int value) {
+  json_item (j, key);
+  fputs (value ? "true" : "false", j->f);
+}
 
 /* ---- The final state ---- */
 
@@ -45,8 +112,12 @@ static void json_reactions (pw_json *j, const pw_system *s, const pw_sample *x) 
   pw_json_close (j, '}');
 }
 
-/* An object of numbers. */
+/* An object of numbers; null without values. */
 static void json_numbers (pw_json *j, const char *key, const char *const *name, const double *value, int count) {
+  if (value == NULL) {
+    pw_json_text (j, key, NULL);
+    return;
+  }
   pw_json_open (j, key, '{');
   for (int i = 0; i < count; i++) pw_json_number (j, name[i], value[i]);
   pw_json_close (j, '}');
@@ -64,10 +135,7 @@ static void json_sample (pw_json *j, const pw_system *s, const pw_sample *x, int
   json_elements (j, s, x);
   json_reactions (j, s, x);
   const double energy[] = { x->kinetic, x->potential, x->work, x->loss, x->projection, x->balance };
-  if (ledger)
-    json_numbers (j, "energy", names, energy, 6);
-  else
-    pw_json_text (j, "energy", NULL);
+  json_numbers (j, "energy", names, ledger ? energy : NULL, 6);
 }
 
 /* ---- The run ---- */
@@ -103,20 +171,16 @@ static void json_statistics (pw_json *j, const pw_statistics *n, double cpu) {
   static const char *const residuals[] = { "position", "velocity" }, *const names[] = {
     "steps", "rejected", "rhs", "jacobians", "factorisations", "restarts", "cpu_s"
   };
-  if (n == NULL) {
-    pw_json_text (j, "residual", NULL);
-    pw_json_text (j, "statistics", NULL);
-    return;
-  }
-  json_numbers (j, "residual", residuals, (const double[]){ n->position, n->velocity }, 2);
-  const double value[] = { (double)n->steps,
-                           (double)n->rejected,
-                           (double)n->rhs,
-                           (double)n->jacobians,
-                           (double)n->factorisations,
-                           (double)n->restarts,
+  json_numbers (j, "residual", residuals, n ? (const double[]){ n->position, n->velocity } : NULL, 2);
+  const pw_statistics x = n ? *n : (pw_statistics){ 0 };
+  const double value[] = { (double)x.steps,
+                           (double)x.rejected,
+                           (double)x.rhs,
+                           (double)x.jacobians,
+                           (double)x.factorisations,
+                           (double)x.restarts,
                            cpu };
-  json_numbers (j, "statistics", names, value, 7);
+  json_numbers (j, "statistics", names, n ? value : NULL, 7);
 }
 
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
