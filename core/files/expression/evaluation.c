@@ -61,7 +61,7 @@ static inline double value_of (const pw_expression_code *c, double a, double x, 
     if (a == 0) *tie = 1;
     return a;
   case PW_OP_ATAN2:
-    if (a == 0 && x < 0) *tie = 1;
+    if (a == 0 && x <= 0) *tie = 1;
     return atan2 (a, x);
   case PW_OP_TWO:
     return pw_expression_functions[c->which].two (a, x);
@@ -186,12 +186,14 @@ static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y
   return jet_chain (value, &s, x, y);
 }
 
-/* Jumps where y, the first argument, changes sign at negative x, and where x does while y is 0. */
+/* Jumps where y, the first argument, changes sign at x <= 0, and where x does while y is 0.  At the origin the angle just
+ * after is that of the velocity. */
 static jet jet_atan2 (const pw_expression_code *c, const jet *y, const jet *x, double *discrete) {
   jet r = jet_function (c, y, x);
   int sign = jet_sign (y);
-  *discrete = x->v < 0 ? (sign < 0) + 2 * (sign == 0) : 0;
+  *discrete = x->v <= 0 ? (sign < 0) + 2 * (sign == 0) : 0;
   if (y->v == 0 && x->v < 0 && sign != 0) r.v = sign * PW_PI;
+  if (y->v == 0 && x->v == 0) r.v = y->d != 0 || x->d != 0 ? atan2 (y->d, x->d) : atan2 (y->dd, x->dd);
   return r;
 }
 

@@ -92,8 +92,23 @@ typedef struct {
 extern const pw_expression_function pw_expression_functions[];
 extern const pw_expression_constant_name pw_expression_constants[];
 
-/* The index of a function, or -1. */
+/* The index of a function, or -1; a constant, or NULL. */
 int pw_expression_find (const char *name);
+const pw_expression_constant_name *pw_expression_find_constant (const char *name);
+
+/* The length of the name at p, which may contain dots (frame.phi), or of the number: digits, perhaps with a decimal
+ * point and an exponent; 0 if there is none (words.c). */
+size_t pw_expression_name_size (const char *p);
+size_t pw_expression_number_size (const char *p);
+
+struct pw_scope {
+  int names;
+  pw_names table;
+  struct {
+    const char *name;
+    double value;
+  } entry[];
+};
 
 /* x^y and its derivatives, with respect to x alone unless y varies. */
 double pw_expression_power (double x, double y);
@@ -113,5 +128,18 @@ double pw_expression_apply (const pw_expression_code *c, double a, double x);
  * breakpoints. */
 void pw_expression_run_jet (const pw_expression_code *code, int codes, const double *variable, int by, double u[3],
                             double *discrete);
+
+/* ---- Enclosures (range.c) ---- */
+
+/* Enclosure of a value over an interval of time. */
+typedef struct {
+  double lo, hi; /* of the numbers among the values; lo > hi: all are NaN */
+  int breaks;    /* 1: may break (jump or have a kink) at a time independent of states */
+  int states;    /* 1: the time of a break may depend on states */
+  int nan;       /* 1: the value may be NaN */
+} pw_range;
+
+/* The range over a time interval, ignoring breaks of noisy operations (one flag each). */
+pw_range pw_expression_range (const pw_expression *x, const unsigned char *noisy, double lo, double hi);
 
 #endif

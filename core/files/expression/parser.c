@@ -14,88 +14,8 @@
 #include "pinwheel.h"
 #include "pinwheel-files.h"
 
-/* ---- Names and numbers in a text ---- */
-
-#define DIGITS "0123456789"
-#define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_"
-
-/* The length of the name at p, which may contain dots (frame.phi); 0 if there is none. */
-static size_t lexer_name_size (const char *p) {
-  return strspn (p, LETTERS) ? strspn (p, LETTERS DIGITS ".") : 0;
-}
-
-/* Digits, perhaps with a decimal point and an exponent; 0 if there is no number. */
-static size_t lexer_number_size (const char *p) {
-  size_t n = strspn (p, DIGITS), part = p[n] == '.' ? strspn (p + n + 1, DIGITS) : 0;
-  if (n + part == 0) return 0;
-  n += p[n] == '.' ? 1 + part : 0;
-  size_t sign = n + 1 + (p[n] != 0 && (p[n + 1] == '+' || p[n + 1] == '-'));
-  size_t power = p[n] == 'e' || p[n] == 'E' ? strspn (p + sign, DIGITS) : 0;
-  return power ? sign + power : n;
-}
-
-int pw_expression_number (const char *text, double *value) {
-  size_t sign = *text == '+' || *text == '-', n = lexer_number_size (text + sign);
-  return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
-}
-
-static const pw_expression_constant_name *lexer_constant (const char *name) {
-  const pw_expression_constant_name *c = pw_expression_constants;
-  while (c->name && strcmp (c->name, name) != 0) c++;
-  return c->name ? c : NULL;
-}
-
-int pw_expression_is_taken (const char *text) {
-  return lexer_constant (text) || pw_expression_find (text) >= 0;
-}
-
-int pw_expression_is_name (const char *text) {
-  size_t n = lexer_name_size (text);
-  return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
-}
-
-int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
-                         void *context) {
-  for (const char *p = text; *p;) {
-    size_t n = lexer_name_size (p), number = n ? 0 : lexer_number_size (p);
-    int stop = n ? each (context, p, n, (size_t)(p - text)) : 0;
-    if (stop) return stop;
-    p += n ? n : number ? number : 1;
-  }
-  return 0;
-}
-
 enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_NAME = 100 };
 enum { ON_TIME = 1, ON_STATES = 2 };
-
-/* ---- Named numbers ---- */
-
-struct pw_scope {
-  int names;
-  pw_names table;
-  struct {
-    const char *name;
-    double value;
-  } entry[];
-};
-
-pw_scope *pw_scope_open (int names) {
-  pw_scope *s = calloc (1, sizeof *s + (size_t)names * sizeof *s->entry);
-  if (s && pw_names_open (&s->table, (size_t)names + 1) == PW_OK) return s;
-  free (s);
-  return NULL;
-}
-
-void pw_scope_close (pw_scope *s) {
-  if (s) pw_names_close (&s->table);
-  free (s);
-}
-
-void pw_scope_add (pw_scope *s, const char *name, double value) {
-  s->entry[s->names].name = name;
-  s->entry[s->names].value = value;
-  pw_names_add (&s->table, name, s->names++);
-}
 
 /* ---- Tokens ---- */
 
@@ -163,7 +83,7 @@ static void parser_next (parser *p) {
   word += strspn (word, " \t\r\n");
   p->at = (size_t)(word - p->text);
   p->sign = NULL;
-  size_t name = lexer_name_size (word), number = lexer_number_size (word);
+  size_t name = pw_expression_name_size (word), number = pw_expression_number_size (word);
   p->size = name ? name : number ? number : *word != 0;
   p->type = name ? 'n' : number ? '0' : *word;
   if (name || number || *word == 0 || strchr ("(),?:", *word)) return;
@@ -277,7 +197,7 @@ static int parser_is_call (const parser *p) {
 }
 
 static parser_part parser_name (parser *p, const char *name) {
-  const pw_expression_constant_name *c = lexer_constant (name);
+  const pw_expression_constant_name *c = pw_expression_find_constant (name);
   int i = 0, known = p->scope ? pw_names_find (&p->scope->table, name) : -1;
   while (p->variable && p->variable[i] && strcmp (p->variable[i], name) != 0) i++;
   int variable = p->variable && p->variable[i];
@@ -325,16 +245,21 @@ static parser_part parser_group (parser *p) {
   return part;
 }
 
-static parser_part parser_operand (parser *p) {
-  char name[PARSER_LONGEST + 1];
+static parser_part parser_number (parser *p) {
+  char digits[PARSER_LONGEST + 1];
   double value = 0;
+  snprintf (digits, sizeof digits, "%.*s", (int)p->size, p->text + p->at);
+  if (pw_read_number (digits, &value) != PW_OK) p->status = PW_RESOURCE;
+  return parser_leaf (p, PW_OP_CONSTANT, 0, value);
+}
+
+static parser_part parser_operand (parser *p) {
+  char name[PARSER_NAME];
   if (p->status != PW_OK) return parser_nothing;
-  snprintf (name, sizeof name, "%.*s", (int)p->size, p->text + p->at);
-  if (p->type == '0' && pw_read_number (name, &value) != PW_OK) p->status = PW_RESOURCE;
-  if (p->type == '0') return parser_leaf (p, PW_OP_CONSTANT, 0, value);
+  if (p->type == '0') return parser_number (p);
   if (p->type == '(') return parser_group (p);
   if (p->type != 'n') return parser_missing (p);
-  name[PARSER_NAME - 1] = 0;
+  snprintf (name, sizeof name, "%.*s", (int)p->size, p->text + p->at);
   int which = pw_expression_find (name);
   if (which < 0) return parser_name (p, name);
   if (parser_is_call (p)) return parser_call (p, which);

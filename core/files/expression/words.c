@@ -1,0 +1,72 @@
+/* Names and numbers in a text, and named numbers. */
+#include <stdlib.h>
+#include <string.h>
+#include "expression_parts.h"
+#include "pinwheel-files.h"
+
+#define DIGITS "0123456789"
+#define LETTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_"
+
+size_t pw_expression_name_size (const char *p) {
+  return strspn (p, LETTERS) ? strspn (p, LETTERS DIGITS ".") : 0;
+}
+
+size_t pw_expression_number_size (const char *p) {
+  size_t n = strspn (p, DIGITS), part = p[n] == '.' ? strspn (p + n + 1, DIGITS) : 0;
+  if (n + part == 0) return 0;
+  n += p[n] == '.' ? 1 + part : 0;
+  size_t sign = n + 1 + (p[n] != 0 && (p[n + 1] == '+' || p[n + 1] == '-'));
+  size_t power = p[n] == 'e' || p[n] == 'E' ? strspn (p + sign, DIGITS) : 0;
+  return power ? sign + power : n;
+}
+
+int pw_expression_number (const char *text, double *value) {
+  size_t sign = *text == '+' || *text == '-', n = pw_expression_number_size (text + sign);
+  return n && text[sign + n] == 0 && pw_read_number (text, value) == PW_OK;
+}
+
+const pw_expression_constant_name *pw_expression_find_constant (const char *name) {
+  const pw_expression_constant_name *c = pw_expression_constants;
+  while (c->name && strcmp (c->name, name) != 0) c++;
+  return c->name ? c : NULL;
+}
+
+int pw_expression_is_taken (const char *text) {
+  return pw_expression_find_constant (text) || pw_expression_find (text) >= 0;
+}
+
+int pw_expression_is_name (const char *text) {
+  size_t n = pw_expression_name_size (text);
+  return n && text[n] == 0 && n < 64 && strchr (text, '.') == NULL;
+}
+
+int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
+                         void *context) {
+  for (const char *p = text; *p;) {
+    size_t n = pw_expression_name_size (p), number = n ? 0 : pw_expression_number_size (p);
+    int stop = n ? each (context, p, n, (size_t)(p - text)) : 0;
+    if (stop) return stop;
+    p += n ? n : number ? number : 1;
+  }
+  return 0;
+}
+
+/* ---- Named numbers ---- */
+
+pw_scope *pw_scope_open (int names) {
+  pw_scope *s = calloc (1, sizeof *s + (size_t)names * sizeof *s->entry);
+  if (s && pw_names_open (&s->table, (size_t)names + 1) == PW_OK) return s;
+  free (s);
+  return NULL;
+}
+
+void pw_scope_close (pw_scope *s) {
+  if (s) pw_names_close (&s->table);
+  free (s);
+}
+
+void pw_scope_add (pw_scope *s, const char *name, double value) {
+  s->entry[s->names].name = name;
+  s->entry[s->names].value = value;
+  pw_names_add (&s->table, name, s->names++);
+}
