@@ -123,7 +123,7 @@ static long double evaluator_two (evaluator *e, const char *name, long double x,
   if (strcmp (name, "jacobi_am") == 0)
     return !e->wide ? pw_jacobi_am ((double)x, (double)y) : y <= 1 ? evaluator_am (x, y) : NAN;
   if (strcmp (name, "atan2") == 0) {
-    e->tie |= x == 0 && y < 0;
+    e->tie |= x == 0 && y <= 0;
     return BOTH_OF_TWO (e, atan2, x, y);
   }
   long double r = BOTH_OF_TWO (e, fmod, x, y); /* mod */
