@@ -68,7 +68,7 @@ static void test_text (void **state) {
   truth_shows ("error against the reference solution of the model, at 100 times\n");
   truth_shows ("  length ");
   cli_good ("pinwheel show @/block.yaml");
-  truth_shows ("\nReference solution (truth): block.x\n");
+  truth_shows ("\nReference solution: block.x\n");
 }
 
 /* Errors do not change the run: table and end are the same to the bit. */
@@ -111,7 +111,7 @@ static void test_round_trip (void **state) {
             "grep -q largest @/a && cmp @/a @/b");
   truth_write_c ("0");
   cli_good ("pinwheel show @/particles.c --yaml");
-  truth_shows ("# The reference solution of the model (truth) is a function in C, which cannot be written as text.\n");
+  truth_shows ("# The reference solution of the model is a function in C, which cannot be written as text.\n");
 }
 
 static void test_function (void **state) {
@@ -120,7 +120,7 @@ static void test_function (void **state) {
   cli_good ("pinwheel run @/particles.c --set u=3 --json - && pinwheel show @/particles.c");
   check_below ("length", truth_error ("largest", "length"), 1e-14, "round-off");
   check_below ("angle", truth_error ("largest", "angle"), 1e-14, "round-off");
-  truth_shows ("Reference solution (truth): one.x, one.phi, two.x, one.vx\n");
+  truth_shows ("Reference solution: one.x, one.phi, two.x, one.vx\n");
   cli_good ("pinwheel check @/particles.c");
   truth_shows ("  compared with the reference solution of the model in 4 states\n");
   truth_write_c ("0.25");

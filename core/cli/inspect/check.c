@@ -27,9 +27,9 @@ static void check_open (pw_check *x) {
   pw_settings settings = { .span = d.t_end, .step = d.step };
   x->step = d.step;
   x->explicit_rk4 = strncmp (d.method, "rk4", 3) == 0;
-  x->r = pw_run_open (x->m.system, "rk4+projection", &settings, &x->start);
+  x->r = pw_run_open (x->m.system, "rk4+projection", &settings, &x->failure);
   if (x->r == NULL)
-    check_add (&x->problem, "%s", x->start.text);
+    check_add (&x->problem, "%s", x->failure.text);
   else
     x->redundant = pw_report_redundancies (x->r);
 }
@@ -38,10 +38,10 @@ static void check_open (pw_check *x) {
 static void check_given (pw_check *x) {
   const pw_system *s = x->m.system;
   for (int i = 0; x->r && i < 2 * pw_system_coordinates (s); i++) {
-    char name[300], a[32], b[32];
+    char name[PW_STATE_NAME], a[32], b[32];
     double from, to;
     if (!pw_initial_moved (s, pw_run_initial (x->r), i)) continue;
-    pw_check_state (x, i, name, sizeof name, &from, &to);
+    pw_report_state (x->m.system, pw_run_initial (x->r), i, name, &from, &to);
     if (fabs (to) < 1e-12 * fabs (from)) to = 0;
     if (pw_initial_specified (pw_run_initial (x->r), i))
       check_add (&x->finding, "the model specifies %s = %s %s, but the constraints require %s %s", name,
@@ -58,11 +58,11 @@ static int check_reference (pw_check *x, int started, pw_error *error) {
   if (reference == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   int status = pw_system_reference (x->m.model, x->m.system, 0, reference, reference + n, error);
   for (int i = 0; i < 2 * n && status == PW_OK; i++) {
-    char name[300], a[32], b[32];
+    char name[PW_STATE_NAME], a[32], b[32];
     double from, to;
     if (isnan (reference[i])) continue;
     x->known++;
-    pw_check_state (x, i, name, sizeof name, &from, &to);
+    pw_report_state (x->m.system, pw_run_initial (x->r), i, name, &from, &to);
     if (!(fabs (reference[i] - to) <= 1e-9 * (1 + fabs (to))))
       check_add (&x->problem, "the model's reference solution does not hold initially: %s is %s, not %s", name,
                  pw_format (a, to, 9), pw_format (b, reference[i], 9));
@@ -105,7 +105,7 @@ static int check_list_kinds (pw_check *x, pw_error *error) {
   return PW_OK;
 }
 
-/* An inconsistent table is not tested in the scene. */
+/* An inconsistent table is not tested in the model. */
 static int check_kinds (pw_check *x, pw_error *error) {
   const pw_system *s = x->m.system;
   double T = x->r ? pw_run_scale (x->r)->time : 1;
@@ -173,7 +173,7 @@ static int check_model (pw_check *x, int started, pw_error *error) {
 /* The exit status is that of the initialisation if it failed, else that of a faulty model. */
 static void check_verdict (const pw_check *x, pw_error *error) {
   if (x->problem.count == 0) return;
-  pw_fail (error, x->start.status ? x->start.status : PW_INPUT, "%s%s", x->problem.text[0],
+  pw_fail (error, x->failure.status ? x->failure.status : PW_INPUT, "%s%s", x->problem.text[0],
            x->problem.count > 1 ? "; and more, see above" : "");
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include "check_report.h"
+#include "report.h"
 
 enum { REPORT_LISTED = 8, REPORT_EIGENVALUES = 60 };
 
@@ -118,7 +119,7 @@ static void report_mobility (pw_json *j, const pw_check *x) {
 
 static void report_mass (pw_json *j, const pw_check *x) {
   static const char *const lack[] = { NULL, "no mass", "no inertia", "neither mass nor inertia" };
-  const char *matrix = x->r ? "regular" : x->start.status == PW_INPUT ? "singular" : NULL;
+  const char *matrix = x->r ? "regular" : x->failure.status == PW_INPUT ? "singular" : NULL;
   const pw_system *s = x->m.system;
   const double *M = pw_system_mass (s);
   int lacking = 0, listed = 0;
@@ -142,18 +143,10 @@ static void report_mass (pw_json *j, const pw_check *x) {
 
 /* ---- Initial conditions ---- */
 
-void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to) {
-  const pw_initial_report *start = pw_run_initial (x->r);
-  int n = pw_system_coordinates (x->m.system);
-  pw_system_state_name (x->m.system, i, name, size);
-  *from = i < n ? start->q_given[i] : start->v_given[i - n];
-  *to = i < n ? start->q[i] : start->v[i - n];
-}
-
 static void report_change (pw_json *j, const pw_check *x, int i, int *listed) {
-  char name[300], line[500], a[32], b[32], c[32];
+  char name[PW_STATE_NAME], line[500], a[32], b[32], c[32];
   double from, to;
-  pw_check_state (x, i, name, sizeof name, &from, &to);
+  pw_report_state (x->m.system, pw_run_initial (x->r), i, name, &from, &to);
   report_open (j, NULL, '{');
   report_text (j, "state", name);
   report_number (j, "from", from);
@@ -170,21 +163,21 @@ static void report_initial (pw_json *j, const pw_check *x) {
   if (x->r == NULL) {
     report_line (j);
     report_text (j, "start", NULL);
-    report_say (j, "\n%s\n  FAILED: %s\n", title, x->start.text);
+    report_say (j, "\n%s\n  FAILED: %s\n", title, x->failure.text);
     return;
   }
-  const pw_initial_report *start = pw_run_initial (x->r);
+  const pw_initial_report *initial = pw_run_initial (x->r);
   report_section (j, "start", '{', title);
-  report_number (j, "moved", start->moved);
-  if (j) pw_json_flag (j, "freed", start->released);
+  report_number (j, "moved", initial->moved);
+  if (j) pw_json_flag (j, "freed", initial->released);
   report_open (j, "changes", '[');
-  if (start->moved == 0)
+  if (initial->moved == 0)
     report_say (j, "  consistent as described\n");
   else
-    report_say (j, "  %d value%s changed%s\n", start->moved, start->moved == 1 ? " was" : "s were",
-                start->released ? ", including given ones: they cannot all be satisfied" : "");
+    report_say (j, "  %d value%s changed%s\n", initial->moved, initial->moved == 1 ? " was" : "s were",
+                initial->released ? ", including given ones: they cannot all be satisfied" : "");
   for (int i = 0; i < 2 * n; i++)
-    if (pw_initial_moved (x->m.system, start, i)) report_change (j, x, i, &listed);
+    if (pw_initial_moved (x->m.system, initial, i)) report_change (j, x, i, &listed);
   report_end_list (j, listed);
   report_close (j, '}');
   if (x->known)

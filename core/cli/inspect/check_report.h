@@ -26,11 +26,11 @@ typedef struct {
   pw_cli_line line;
   const char *json; /* path, or NULL */
   pw_cli_model m;
-  pw_run *r;              /* NULL: initialisation failed, for the reason in `start` */
-  pw_error start;         /* why */
+  pw_run *r; /* NULL: initialisation failed, for the reason in `failure` */
+  pw_error failure;
   pw_linear linear;       /* zero without a run */
   const char **redundant; /* a description of each redundant constraint equation, ended by NULL; or NULL */
-  pw_checked_kind *kind;  /* of the scene */
+  pw_checked_kind *kind;  /* kinds: the element types in use */
   int kinds;
   int known;          /* states of the model's reference solution, compared with the initial state */
   double step, limit; /* the model's step, and the largest with which RK4 is stable [s]; 0 and INFINITY: none */
@@ -39,9 +39,6 @@ typedef struct {
   double doubling; /* time in which the fastest growing perturbation of a steady motion doubles [s]; INFINITY: none */
   pw_check_list problem, finding;
 } pw_check;
-
-/* The name of a state, and its values before and after the consistent initialisation. */
-void pw_check_state (const pw_check *x, int i, char *name, size_t size, double *from, double *to);
 
 /* Writes the report: as JSON to j, or as text to standard output if j is NULL. */
 void pw_check_report (const pw_check *x, pw_json *j);

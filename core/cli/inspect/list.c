@@ -43,29 +43,24 @@ static void list_fields (pw_table *t, const pw_field *fields) {
 
 /* ---- Descriptions of named items ---- */
 
-/* A set of named items: methods, element types. */
-typedef struct {
-  const char *what;            /* "element type" */
-  const char *(*name) (int i); /* NULL at the end */
-  void (*show) (int i);
-} list_things;
-
-/* Describes the items given; "all" stands for all. */
-static int list_named (const list_things *x, int names, const char **name, pw_error *error) {
+/* Describes the items given by name; "all" stands for all.  `item` ends with NULL; the first member of each is its
+ * name.  `what`: "element type". */
+static int list_named (const char *what, const void *const *item, void (*show) (const void *item), const char **name,
+                       pw_error *error) {
   char hint[100];
-  int shown = 0;
-  for (int k = 0; k < names; k++) {
-    int all = strcmp (name[k], "all") == 0, found = all;
-    pw_nearest near = { .sought = name[k] };
-    for (int i = 0; x->name (i); i++) {
-      pw_nearest_try (&near, x->name (i));
-      if (!all && strcmp (x->name (i), name[k]) != 0) continue;
+  for (int shown = 0; *name; name++) {
+    int all = strcmp (*name, "all") == 0, found = all;
+    pw_nearest near = { .sought = *name };
+    for (const void *const *i = item; *i; i++) {
+      const char *known = *(const char *const *)*i;
+      pw_nearest_try (&near, known);
+      if (!all && strcmp (known, *name) != 0) continue;
       if (shown++ > 0) putchar ('\n');
-      x->show (i);
+      show (*i);
       found = 1;
     }
     if (!found)
-      return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", x->what, name[k],
+      return pw_fail (error, PW_INPUT, "there is no %s \"%s\"%s", what, *name,
                       pw_nearest_text (&near, hint, sizeof hint));
   }
   return PW_OK;
@@ -93,9 +88,9 @@ static int list_model (void *context, const char *name, const char *path) {
   return 0;
 }
 
-static int list_models (int names, const char **name, pw_error *error) {
+static int list_models (const char **name, pw_error *error) {
   int width = 0;
-  (void)names, (void)name;
+  (void)name;
   puts ("Models");
   int status = pw_file_list (list_width, &width, error);
   if (status == PW_OK) status = pw_file_list (list_model, &width, error);
@@ -124,18 +119,14 @@ static void list_method (const pw_method *m) {
   for (const pw_stabilisation *s = m->refused; s && s->name; s++) printf ("    no %s: %s\n", s->name, s->about);
 }
 
-static const char *list_method_name (int i) {
-  return pw_methods[i] ? pw_methods[i]->name : NULL;
+static void list_method_options (const void *item) {
+  const pw_method *m = item;
+  list_method (m);
+  for (const pw_option *o = m->options; o && o->name; o++) list_option (o);
 }
 
-static void list_method_show (int i) {
-  list_method (pw_methods[i]);
-  for (const pw_option *o = pw_methods[i]->options; o && o->name; o++) list_option (o);
-}
-
-static int list_methods (int names, const char **name, pw_error *error) {
-  static const list_things methods = { "integrator", list_method_name, list_method_show };
-  if (names) return list_named (&methods, names, name, error);
+static int list_methods (const char **name, pw_error *error) {
+  if (*name) return list_named ("integrator", (const void *const *)pw_methods, list_method_options, name, error);
   puts ("Methods, written INTEGRATOR[+STABILISATION][:OPTION=VALUE]...");
   for (const pw_method *const *m = pw_methods; *m; m++) list_method (*m);
   puts ("`pinwheel list methods NAME...` shows the options of a method, `pinwheel list methods all` those of all");
@@ -143,10 +134,6 @@ static int list_methods (int names, const char **name, pw_error *error) {
 }
 
 /* ---- Element types ---- */
-
-static const char *list_kind_name (int i) {
-  return pw_kinds[i] ? pw_kinds[i]->name : NULL;
-}
 
 /* The shortest element of the type in a text model. */
 static void list_example (const pw_kind *k) {
@@ -169,9 +156,9 @@ static void list_quantities (const char *title, const pw_quantity *q, int count)
     for (int i = 0; i < count; i++) list_row (&t, q[i].name, q[i].unit, q[i].rate ? q[i].rate : "", q[i].about);
 }
 
-static void list_kind_show (int i) {
+static void list_kind (const void *item) {
   static const char *const level[] = { "force", "constraint on positions", "constraint on velocities" };
-  const pw_kind *k = pw_kinds[i];
+  const pw_kind *k = item;
   printf ("%s: %s\n    %s", k->name, k->about, pw_kind_acts (k) ? level[k->level] : "without effect");
   if (k->rows) printf (", %d constraint equation%s per element", k->rows, k->rows == 1 ? "" : "s");
   puts (k->each_body ? ", acts on every body that has mass" : "");
@@ -182,11 +169,10 @@ static void list_kind_show (int i) {
     printf ("    a signal: a number, an expression of t%s, or see `pinwheel list signals`\n",
             pw_kind_forced (k) ? " and of states such as BODY.phi" : "");
   list_quantities ("reactions", k->reaction, k->rows);
-  list_quantities ("internal coordinates, and their rates", k->coordinate, k->own);
+  list_quantities ("internal coordinates, and their velocities", k->coordinate, k->own);
 }
 
-static int list_kinds (int names, const char **name, pw_error *error) {
-  static const list_things kinds = { "element type", list_kind_name, list_kind_show };
+static int list_kinds (const char **name, pw_error *error) {
   static const struct {
     int acts;
     pw_level level;
@@ -195,7 +181,7 @@ static int list_kinds (int names, const char **name, pw_error *error) {
                { 1, PW_NONHOLONOMIC, "constraints on velocities" },
                { 1, PW_FORCE, "forces" },
                { 0, PW_FORCE, "without effect" } };
-  if (names) return list_named (&kinds, names, name, error);
+  if (*name) return list_named ("element type", (const void *const *)pw_kinds, list_kind, name, error);
   puts ("Element types (kinds)");
   for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
     printf ("  %s\n", part[i].name);
@@ -217,8 +203,8 @@ static void list_signal (pw_table *t, const pw_signal_form *s) {
   list_row (t, "columns", "2 x text", "[1, 2]", "its columns of times and values, names or numbers");
 }
 
-static int list_signals (int names, const char **name, pw_error *error) {
-  (void)names, (void)name, (void)error;
+static int list_signals (const char **name, pw_error *error) {
+  (void)name, (void)error;
   puts ("Signals: a number, an expression of time (in C a function), or one of");
   for (const pw_signal_form *s = pw_signal_forms; s->name; s++) {
     printf ("  %s: %s\n", s->name, s->about);
@@ -232,23 +218,23 @@ static int list_signals (int names, const char **name, pw_error *error) {
 static int list_command (void *options, pw_error *error) {
   static const struct {
     const char *name;
-    int (*list) (int names, const char **name, pw_error *error);
+    int (*list) (const char **name, pw_error *error);
     int named; /* 1: accepts names */
   } part[] = { { "models", list_models, 0 },
                { "methods", list_methods, 1 },
                { "kinds", list_kinds, 1 },
                { "signals", list_signals, 0 } };
   const pw_cli_line *l = options;
-  const char *const sought = l->arguments ? l->argument[0] : NULL;
+  const char *none = NULL, *const sought = l->arguments ? l->argument[0] : NULL;
   pw_nearest near = { .sought = sought ? sought : "" };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
     if (sought == NULL) {
       if (i > 0) putchar ('\n');
-      if (part[i].list (0, NULL, error) != PW_OK) return error->status;
+      if (part[i].list (&none, error) != PW_OK) return error->status;
     } else if (strcmp (sought, part[i].name) == 0) {
       if (l->arguments > 1 && !part[i].named)
         return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel list %s", l->argument[1], sought);
-      return part[i].list (l->arguments - 1, l->argument + 1, error);
+      return part[i].list (l->argument + 1, error);
     }
     pw_nearest_try (&near, part[i].name);
   }

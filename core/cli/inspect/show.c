@@ -90,8 +90,8 @@ static void show_reference (const pw_cli_model *m) {
   if (x && pw_system_reference (m->model, m->system, 0, x, x + n, NULL) == PW_OK)
     for (int i = 0; i < 2 * n; i++)
       if (!isnan (x[i]) && ++known <= MOST)
-        printf ("%s%s", known > 1 ? ", " : "\nReference solution (truth): ",
-                pw_system_state_name (m->system, i, name, sizeof name));
+        printf ("%s%s",
+                known > 1 ? ", " : "\nReference solution: ", pw_system_state_name (m->system, i, name, sizeof name));
   if (known > MOST) printf (", and %d more", known - MOST);
   if (known) putchar ('\n');
   free (x);

@@ -204,7 +204,7 @@ static void yaml_names (const pw_reference_text *t) {
 static void yaml_reference (const pw_model *m) {
   const pw_reference_text *t = pw_model_reference (m);
   if (pw_model_table (m)->reference)
-    puts ("# The reference solution of the model (truth) is a function in C, which cannot be written as text.");
+    puts ("# The reference solution of the model is a function in C, which cannot be written as text.");
   if (t->states) puts ("truth:");
   for (int i = 0; i < t->states; i++) printf ("  %s: ", t->state[i]), yaml_text (t->text[i]), putchar ('\n');
 }

@@ -67,8 +67,8 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
   pw_print_line (t, "plots", NULL, x->plots_path ? "drawn" : "not drawn");
   pw_print_line (t, "animation", NULL, x->animate_path ? "written" : "not written");
   if (x->reference_path == NULL)
-    pw_print_line (t, "truth", NULL, "the model's");
-  else if (pw_print_file (t, "truth", x->reference_path, x->reference_path, error) != PW_OK)
+    pw_print_line (t, "reference", NULL, "the model's");
+  else if (pw_print_file (t, "reference", x->reference_path, x->reference_path, error) != PW_OK)
     return error->status;
   pw_print_number (t, checkpoints_key, NULL, x->check.every);
   snprintf (numbers, sizeof numbers, "%s endian, %zu bytes", *(const unsigned char *)&order ? "little" : "big",

@@ -6,7 +6,7 @@
 #include "print_table.h"
 #include "report.h"
 
-enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_NAME = 300, REPORT_TEXT = 400 };
+enum { REPORT_MOVED = 8, REPORT_BODIES = 20, REPORT_ROWS = 24, REPORT_TEXT = 400 };
 
 static void report_more (FILE *f, int more, const char *hint) {
   if (more > 0) fprintf (f, "  and %d more%s\n", more, hint);
@@ -37,7 +37,7 @@ static void report_step (const pw_run *r, double step) {
 
 /* An absolute tolerance within which a force saturates. */
 static void report_atol (pw_run *r, const pw_system *s, double atol) {
-  char a[32], speed[32], element[REPORT_NAME];
+  char a[32], speed[32], element[PW_STATE_NAME];
   double least;
   int state = atol > 0 ? pw_run_saturation (r, &least, element, sizeof element) : -1;
   if (state >= 0 && atol > least)
@@ -99,22 +99,31 @@ void pw_report_model (const pw_model *m) {
 
 /* ---- Initialisation ---- */
 
+void pw_report_state (const pw_system *s, const pw_initial_report *x, int i, char name[PW_STATE_NAME], double *from,
+                      double *to) {
+  int n = pw_system_coordinates (s);
+  *from = i < n ? x->q_given[i] : x->v_given[i - n];
+  *to = i < n ? x->q[i] : x->v[i - n];
+  pw_system_state_name (s, i, name, PW_STATE_NAME);
+}
+
 /* States that the consistent initialisation has changed. */
-static void report_start (const pw_system *s, const pw_initial_report *start) {
-  int n = pw_system_coordinates (s), moved = start->moved, listed = 0;
+static void report_initial (const pw_system *s, const pw_initial_report *initial) {
+  int n = pw_system_coordinates (s), moved = initial->moved, listed = 0;
   char changed[80] = "";
   if (moved == 0) return;
-  if (start->changed) snprintf (changed, sizeof changed, ", %d of them specified by the model", start->changed);
+  if (initial->changed) snprintf (changed, sizeof changed, ", %d of them specified by the model", initial->changed);
   pw_cli_say ("pinwheel: the initial values did not satisfy the constraints; %d of them %s changed%s%s:\n", moved,
               moved == 1 ? "was" : "were",
-              start->released ? ", including given ones, which cannot all be satisfied" : "", changed);
+              initial->released ? ", including given ones, which cannot all be satisfied" : "", changed);
   for (int i = 0; i < 2 * n && listed < REPORT_MOVED; i++) {
-    double from = i < n ? start->q_given[i] : start->v_given[i - n], to = i < n ? start->q[i] : start->v[i - n];
-    char name[REPORT_NAME], a[32], b[32];
-    if (!pw_initial_moved (s, start, i)) continue;
-    pw_cli_say ("  %s from %s to %s %s%s\n", pw_system_state_name (s, i, name, sizeof name), pw_format (a, from, 10),
-                pw_format (b, to, 10), pw_system_state_unit (s, i),
-                start->changed && pw_initial_specified (start, i) ? " (specified)" : "");
+    double from, to;
+    char name[PW_STATE_NAME], a[32], b[32];
+    if (!pw_initial_moved (s, initial, i)) continue;
+    pw_report_state (s, initial, i, name, &from, &to);
+    pw_cli_say ("  %s from %s to %s %s%s\n", name, pw_format (a, from, 10), pw_format (b, to, 10),
+                pw_system_state_unit (s, i),
+                initial->changed && pw_initial_specified (initial, i) ? " (specified)" : "");
     listed++;
   }
   report_more (stderr, moved - listed, "");
@@ -122,11 +131,11 @@ static void report_start (const pw_system *s, const pw_initial_report *start) {
 
 void pw_report_initialisation (const pw_run *r, const pw_system *s, const char *const *redundant) {
   int n = pw_system_differences (s), count = 0;
-  char name[REPORT_NAME];
+  char name[PW_STATE_NAME];
   for (int i = 0; i < n && i < REPORT_MOVED; i++)
     pw_cli_say ("pinwheel: derivatives by differences: %s\n", pw_system_difference_name (s, i, name, sizeof name));
   report_more (stderr, n - REPORT_MOVED, "");
-  report_start (s, pw_run_initial (r));
+  report_initial (s, pw_run_initial (r));
   for (; redundant && redundant[count]; count++)
     if (count < REPORT_MOVED) pw_cli_say ("pinwheel: redundant: %s\n", redundant[count]);
   report_more (stderr, count - REPORT_MOVED, "");
@@ -166,7 +175,7 @@ static void report_bodies (const pw_system *s, const pw_sample *last) {
 static void report_internal (const pw_system *s, const pw_sample *last) {
   int first = 3 * pw_system_bodies (s), n = pw_system_coordinates (s),
       end = n - first > REPORT_ROWS ? first + REPORT_ROWS : n;
-  char name[REPORT_NAME];
+  char name[PW_STATE_NAME];
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (int j = first; j < end; j++) {
       for (int state = j; state < 2 * n; state += n) {
@@ -181,7 +190,7 @@ static void report_internal (const pw_system *s, const pw_sample *last) {
 
 static void report_reactions (const pw_system *s, const pw_sample *last) {
   int rows = pw_system_rows (s), shown = rows < REPORT_ROWS ? rows : REPORT_ROWS;
-  char name[REPORT_NAME];
+  char name[PW_STATE_NAME];
   if (rows > 0) printf ("\n  reaction\n");
   for (pw_table t = { 0 }; pw_table_pass (&t);)
     for (int i = 0; i < shown; i++) {
@@ -240,7 +249,7 @@ static void report_errors (const pw_reference_error *e) {
 void pw_report_warnings (const pw_run *r, const pw_system *s, double defect) {
   int state;
   double power, growth = pw_run_growth (r, &state, &power);
-  char name[REPORT_NAME], times[32], grows[32], percent[32];
+  char name[PW_STATE_NAME], times[32], grows[32], percent[32];
   if (defect > 0.01)
     pw_cli_say ("pinwheel: the energy does not balance: %s %% of it is unaccounted for; %s\n",
                 pw_format (percent, 100 * defect, 2), pw_run_energy_advice (r, defect));

@@ -22,6 +22,11 @@ void pw_report_warnings (const pw_run *r, const pw_system *s, double defect);
 
 /* ---- Results ---- */
 
+enum { PW_STATE_NAME = 300 };
+/* The name of a state, and its values before and after the consistent initialisation. */
+void pw_report_state (const pw_system *s, const pw_initial_report *x, int i, char name[PW_STATE_NAME], double *from,
+                      double *to);
+
 /* Descriptions of the redundant constraint equations, ended by NULL, to be released as one; NULL if there are none, or
  * no memory. */
 const char **pw_report_redundancies (pw_run *r);
