@@ -100,10 +100,11 @@ int pw_checkpoints_prepare (pw_run_command *x, pw_error *error) {
   if (status == PW_OK) status = checkpoints_match (c, error);
   if (status != PW_OK || x->csv_path == NULL) return status;
   pw_mark mark = { 0 };
-  if (c->resume == NULL) return pw_output_mark (x->csv_output, &mark, error); /* fails if it cannot be continued */
+  if (c->resume == NULL)
+    return pw_output_mark (x->output[PW_RUN_TABLE], &mark, error); /* fails if it cannot be continued */
   pw_archive_bytes (&c->from.state, &mark, sizeof mark);
-  x->csv_output = pw_output_continue (x->csv_path, &mark, error);
-  return x->csv_output ? PW_OK : error->status;
+  x->output[PW_RUN_TABLE] = pw_output_continue (x->csv_path, &mark, error);
+  return x->output[PW_RUN_TABLE] ? PW_OK : error->status;
 }
 
 void pw_checkpoints_close (pw_checkpoints *c) {
@@ -160,9 +161,9 @@ int pw_checkpoints_save (pw_run_command *x, pw_error *error) {
   double t = pw_run_time (x->r);
   pw_mark mark = { 0 };
   if (t >= x->t_end) return PW_OK;
-  if (x->csv_output && pw_output_mark (x->csv_output, &mark, error) != PW_OK) return error->status;
+  if (x->output[PW_RUN_TABLE] && pw_output_mark (x->output[PW_RUN_TABLE], &mark, error) != PW_OK) return error->status;
   pw_archive_clear (&c->state);
-  if (x->csv_output) pw_archive_bytes (&c->state, &mark, sizeof mark);
+  if (x->output[PW_RUN_TABLE]) pw_archive_bytes (&c->state, &mark, sizeof mark);
   checkpoints_serialise (x, &c->state);
   int status = pw_run_save (x->r, &c->state, error);
   if (status != PW_OK) return status > 0 ? PW_OK : status;

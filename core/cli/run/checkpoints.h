@@ -21,6 +21,8 @@ typedef struct {
   pw_output *lock;    /* FILE.part, empty, which locks out other processes during the whole run */
 } pw_checkpoints;
 
+enum { PW_RUN_TABLE, PW_RUN_PAGE, PW_RUN_SUMMARY, PW_RUN_OUTPUTS };
+
 typedef struct {
   /* as given */
   pw_cli_line line;
@@ -35,7 +37,7 @@ typedef struct {
   pw_limit limit;
   double t_end, every; /* [s]; every 0: each accepted step is a row */
   /* open */
-  pw_output *csv_output, *json_output, *page_output;
+  pw_output *output[PW_RUN_OUTPUTS]; /* NULL: not written */
   pw_csv *csv;
   pw_plots *plots;
   pw_comparison comparison;
@@ -43,14 +45,13 @@ typedef struct {
   const char **redundant; /* a description of each redundant constraint equation; NULL: there are none */
   pw_progress progress;
   /* in progress */
-  long row;             /* rows written */
-  int limited;          /* 1: --limit or --max-steps has stopped it */
-  int resumed;          /* 1: the state of the checkpoint has been loaded */
-  long batch;           /* steps to take before samples, signals and progress are considered */
-  double cpu;           /* of the method [s] */
-  char part[4200];      /* path of the unfinished table, or "" */
-  char json_part[4200]; /* likewise of the summary */
-  int lost;             /* 1: the table or the summary could not be written */
+  long row;                        /* rows written */
+  int limited;                     /* 1: --limit or --max-steps has stopped it */
+  int resumed;                     /* 1: the state of the checkpoint has been loaded */
+  long batch;                      /* steps to take before samples, signals and progress are considered */
+  double cpu;                      /* of the method [s] */
+  char part[PW_RUN_OUTPUTS][4200]; /* paths of the incomplete files that are kept, or "" */
+  int lost;                        /* 1: the table or the summary could not be written */
 } pw_run_command;
 
 /* Before anything is written: reads the checkpoint that is resumed, verifies that it belongs to this run, and opens its

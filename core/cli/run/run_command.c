@@ -32,26 +32,35 @@ static int run_uses (run *x, pw_error *error) {
   return pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
 }
 
-/* Opens the output files before anything is computed. */
+/* Opens an output file; a path of standard output becomes "-". */
+static int run_open_output (run *x, int which, const char **path, pw_error *error) {
+  if (*path == NULL) return PW_OK;
+  x->output[which] = pw_output_open (*path, error);
+  if (x->output[which] && pw_output_stream (x->output[which]) == stdout) *path = "-";
+  return x->output[which] ? PW_OK : error->status;
+}
+
+/* Opens the output files before anything is computed.  A table that is continued is opened once the checkpoint is
+ * verified. */
 static int run_open_outputs (run *x, pw_error *error) {
-  if (x->animate_path && pw_animation_check (x->animate_path, error) != PW_OK) return error->status;
-  if (run_uses (x, error) != PW_OK) return error->status;
-  if (x->json_path && (x->json_output = pw_output_open (x->json_path, error)) == NULL) return error->status;
-  if (x->json_output && pw_output_stream (x->json_output) == stdout) x->json_path = "-";
-  if (x->animate_path && (x->page_output = pw_output_open (x->animate_path, error)) == NULL) return error->status;
-  if (x->csv_path == NULL || x->check.resume)
-    return PW_OK; /* a table that is continued is opened once the checkpoint is verified */
-  if ((x->csv_output = pw_output_open (x->csv_path, error)) == NULL) return error->status;
-  if (pw_output_stream (x->csv_output) == stdout) x->csv_path = "-";
-  return PW_OK;
+  int status = x->animate_path ? pw_animation_check (x->animate_path, error) : PW_OK;
+  if (status == PW_OK) status = run_uses (x, error);
+  if (status == PW_OK) status = run_open_output (x, PW_RUN_SUMMARY, &x->json_path, error);
+  if (status == PW_OK) status = run_open_output (x, PW_RUN_PAGE, &x->animate_path, error);
+  if (status != PW_OK || x->check.resume) return status;
+  return run_open_output (x, PW_RUN_TABLE, &x->csv_path, error);
+}
+
+static void run_discard (run *x, int which) {
+  if (x->output[which]) pw_output_discard (x->output[which]);
+  x->output[which] = NULL;
 }
 
 /* A summary is written of every run, but not over a table that the model reads. */
 static int run_open_model (run *x, pw_error *error) {
   int status = pw_cli_open (&x->m, &x->line, error);
   if (x->m.file == NULL || run_uses (x, status == PW_OK ? error : &(pw_error){ 0 }) == PW_OK) return status;
-  if (x->json_output) pw_output_discard (x->json_output);
-  x->json_output = NULL;
+  run_discard (x, PW_RUN_SUMMARY);
   return error->status;
 }
 
@@ -94,9 +103,8 @@ static int run_open (run *x, pw_error *error) {
   pw_report_model (x->m.model);
   pw_report_settings (x->r, x->m.system, x->method, &x->line, &x->settings);
   pw_report_initialisation (x->r, x->m.system, x->redundant);
-  if (x->csv_output && (x->csv = pw_csv_open (x->m.system, x->energy, x->csv_output, error)) == NULL)
-    return error->status;
-  return pw_checkpoints_resume (x, error);
+  if (x->output[PW_RUN_TABLE]) x->csv = pw_csv_open (x->m.system, x->energy, x->output[PW_RUN_TABLE], error);
+  return x->output[PW_RUN_TABLE] && x->csv == NULL ? error->status : pw_checkpoints_resume (x, error);
 }
 
 /* ---- The run ---- */
@@ -183,14 +191,14 @@ static int run_integrate (run *x, pw_error *error) {
 /* Writes the table to the disk, or keeps what exists of it as NAME.part; nothing is kept of a run that has not
  * begun. */
 static void run_close_table (run *x, int good, pw_error *error) {
+  pw_output **o = &x->output[PW_RUN_TABLE];
   pw_csv_close (x->csv);
-  int is_file = x->csv_output ? pw_output_is_file (x->csv_output) : x->csv_path != NULL;
-  if (x->csv_output && good && pw_output_ready (x->csv_output, error) == PW_OK) return;
+  int is_file = *o ? pw_output_is_file (*o) : x->csv_path != NULL;
+  if (*o && good && pw_output_ready (*o, error) == PW_OK) return;
   x->lost = is_file && error->status == PW_RESOURCE;
-  if (x->csv_output == NULL) return;
-  pw_text_abandon (x->csv_output, x->check.resume ? 1 : x->row, x->part, sizeof x->part);
-  x->csv_output = NULL;
-  if (good) *x->part = 0; /* the error names it */
+  if (*o) pw_text_abandon (*o, x->check.resume ? 1 : x->row, x->part[PW_RUN_TABLE], sizeof *x->part);
+  if (good) *x->part[PW_RUN_TABLE] = 0; /* the error names it */
+  *o = NULL;
 }
 
 /* The run's own failure decides the exit status. */
@@ -204,38 +212,25 @@ static void run_add_error (pw_error *error, const pw_error *own) {
 /* The JSON summary, which is written however the run has ended.  A run that could not be resumed leaves the one before
  * it as it is. */
 static void run_write_json (run *x, const pw_summary *summary, const pw_sample *sample, pw_error *error) {
-  if (x->json_output == NULL) return;
+  pw_output *o = x->output[PW_RUN_SUMMARY];
   pw_error own = { 0 };
-  const pw_statistics *statistics = x->r ? pw_run_statistics (x->r) : NULL;
-  if (x->check.resume && !x->resumed) {
-    pw_output_discard (x->json_output);
-    x->json_output = NULL;
-    return;
-  }
-  if (pw_json_write (summary, x->m.system, sample, x->energy, statistics, x->json_output, &own) == PW_OK) return;
-  x->lost |= pw_output_is_file (x->json_output);
+  if (x->check.resume && !x->resumed) run_discard (x, PW_RUN_SUMMARY);
+  if (x->output[PW_RUN_SUMMARY] == NULL) return;
+  if (pw_json_write (summary, x->m.system, sample, x->energy, x->r ? pw_run_statistics (x->r) : NULL, o, &own) != PW_OK)
+    x->lost |= pw_output_is_file (o);
   run_add_error (error, &own);
-}
-
-/* Leaves a file under its temporary name, which goes to the buffer. */
-static void run_keep (pw_output **o, char *part, size_t size) {
-  if (*o == NULL || !pw_output_is_file (*o)) return;
-  pw_output_abandon (*o, part, size);
-  *o = NULL;
 }
 
 /* Table, summary and page get their final names together, or keep their temporary ones.  The summary of a failed run
  * reports that the table is incomplete. */
 static void run_complete (run *x, pw_error *error) {
   pw_error own = { 0 };
-  char page_part[8];
-  if (x->lost) {
-    run_keep (&x->csv_output, x->part, sizeof x->part);
-    run_keep (&x->json_output, x->json_part, sizeof x->json_part);
-    run_keep (&x->page_output, page_part, sizeof page_part);
+  for (int i = 0; x->lost && i < PW_RUN_OUTPUTS; i++) {
+    if (x->output[i] == NULL || !pw_output_is_file (x->output[i])) continue;
+    pw_output_abandon (x->output[i], x->part[i], sizeof x->part[i]);
+    x->output[i] = NULL;
   }
-  pw_output *const all[] = { x->csv_output, x->page_output, x->json_output };
-  pw_output_finish_all (all, sizeof all / sizeof *all, &own);
+  pw_output_finish_all (x->output, PW_RUN_OUTPUTS, &own);
   run_add_error (error, &own);
 }
 
@@ -262,12 +257,9 @@ static void run_draw (run *x, const char *reason, pw_error *error) {
   pw_error own = { 0 };
   int drawn = 0;
   if (x->plots && x->r) pw_plots_finish (x->plots, !pw_stop, &own);
-  if (x->plots && x->r && x->page_output)
-    drawn = pw_animate (x->plots, x->animate_path, x->page_output, x->method, reason);
-  if (x->page_output && !drawn) {
-    pw_output_discard (x->page_output);
-    x->page_output = NULL;
-  }
+  if (x->plots && x->r && x->output[PW_RUN_PAGE])
+    drawn = pw_animate (x->plots, x->animate_path, x->output[PW_RUN_PAGE], x->method, reason);
+  if (!drawn) run_discard (x, PW_RUN_PAGE);
   run_add_error (error, &own);
 }
 
@@ -297,8 +289,8 @@ static int run_finish (run *x, pw_error *error) {
   if (interrupted) pw_cli_say ("pinwheel: %s\n", reason);
   int status = pw_cli_end (error);
   error->status = PW_OK;
-  if (*x->part) pw_cli_say ("pinwheel: the table until then is kept in %s\n", x->part);
-  if (*x->json_part) pw_cli_say ("pinwheel: the summary is kept in %s\n", x->json_part);
+  if (*x->part[PW_RUN_TABLE]) pw_cli_say ("pinwheel: the table until then is kept in %s\n", x->part[PW_RUN_TABLE]);
+  if (*x->part[PW_RUN_SUMMARY]) pw_cli_say ("pinwheel: the summary is kept in %s\n", x->part[PW_RUN_SUMMARY]);
   if (x->check.saved > 0 && (interrupted || x->limited || status == -PW_RESOURCE))
     pw_cli_say ("pinwheel: --resume %s continues from t = %s s\n", x->check.path, pw_format (t, x->check.saved, 6));
   return interrupted && status == 0 ? PW_INTERRUPTED : status;
