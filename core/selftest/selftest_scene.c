@@ -226,7 +226,7 @@ static void scene_all (scene *x) {
     scene_block (x, PW_GAMMA_Q, "gamma_q", "gamma_q = d gamma/dq", scene_gamma);
     scene_block (x, PW_GAMMA_V, "gamma_v", "gamma_v = d gamma/dv", scene_gamma);
   }
-  if (kind->force_u && x->s->readers) {
+  if (kind->force_u && x->s->state_dependent) {
     scene_gradients (x, SCENE_Q);
     scene_gradients (x, SCENE_V);
   }

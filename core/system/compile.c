@@ -125,10 +125,10 @@ static int compile_arrays (const compilation *c) {
   s->constant = compile_take (c, coords + 3, sizeof *s->constant);
   s->q0 = compile_take (c, coords, sizeof *s->q0);
   s->v0 = compile_take (c, coords, sizeof *s->v0);
-  s->held = compile_take (c, 2 * coords, 1);
+  s->origin = compile_take (c, 2 * coords, 1);
   s->entry = compile_take (c, (size_t)s->entries, sizeof *s->entry);
   int complete = s->batch && s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
-  return complete && s->held && s->entry ? PW_OK : PW_RESOURCE;
+  return complete && s->origin && s->entry ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Bodies and elements ---- */
@@ -152,8 +152,8 @@ static int compile_bodies (const compilation *c) {
     memcpy (s->q0 + 3 * i, b->start, sizeof b->start);
     memcpy (s->v0 + 3 * i, b->rate, sizeof b->rate);
     for (int k = 0; k < 3; k++) {
-      s->held[3 * i + k] = compile_origin (b, b->start[k], k, PW_PERHAPS);
-      s->held[s->coords + 3 * i + k] = compile_origin (b, b->rate[k], 3 + k, 0);
+      s->origin[3 * i + k] = compile_origin (b, b->start[k], k, PW_PERHAPS);
+      s->origin[s->coords + 3 * i + k] = compile_origin (b, b->rate[k], 3 + k, 0);
     }
   }
   return s->model ? PW_OK : PW_RESOURCE;
@@ -209,8 +209,8 @@ static int compile_element (const compilation *c, const pw_element_batch *k, con
     s->mass[j] = internal[n].mass;
     s->q0[j] = internal[n].start;
     s->v0[j] = internal[n].rate;
-    s->held[j] = internal[n].specified[0] ? PW_SPECIFIED : 0;
-    s->held[s->coords + j] = internal[n].specified[1] ? PW_SPECIFIED : 0;
+    s->origin[j] = internal[n].specified[0] ? PW_SPECIFIED : 0;
+    s->origin[s->coords + j] = internal[n].specified[1] ? PW_SPECIFIED : 0;
   }
   return PW_OK;
 }
@@ -290,7 +290,7 @@ static int compile_reads (const compilation *c, pw_source *source, const char *e
   source->state = state;
   source->reads = count;
   c->s->reads += count;
-  c->s->readers += count > 0;
+  c->s->state_dependent += count > 0;
   return PW_OK;
 }
 
@@ -332,7 +332,7 @@ static int compile_initial (const compilation *c) {
   for (int i = 0; i < c->m->givens; i++) {
     int state = pw_system_find_state (s, c->m->given[i].state, c->error);
     if (state < 0) return PW_INPUT;
-    s->held[state] |= PW_GIVEN;
+    s->origin[state] |= PW_GIVEN;
     *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = c->m->given[i].value;
   }
   return PW_OK;
@@ -374,7 +374,7 @@ static int compile_totals (const compilation *c) {
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = s->batch[i].kind;
     s->constraints += kind->rows > 0;
-    s->moving += kind->eta != NULL;
+    s->rheonomic += kind->eta != NULL;
     s->forces += kind->force && !kind->constant;
     constant |= kind->force && kind->constant;
     s->saturates |= kind->saturation != NULL;

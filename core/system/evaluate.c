@@ -202,7 +202,7 @@ PW_NOINLINE evaluate_worst evaluate_worst_velocity_any (const pw_element_batch *
 }
 
 void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
-  double *eta = w->s->moving ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
+  double *eta = w->s->rheonomic ? w->scratch : NULL, unit = w->scale.length / w->scale.time;
   evaluate_worst worst = { .row = -1 };
   if (eta) pw_evaluate_eta (w, eta);
   EACH_CONSTRAINT (k, w) {

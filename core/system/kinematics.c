@@ -64,12 +64,12 @@ static int kinematics_signals (pw_workspace *w, double t, const double *q, const
     if (kinematics_sources (w, 0, t, q, v) != PW_OK) return PW_METHOD;
     w->t_signal = t;
   }
-  return w->s->readers > 0 ? kinematics_sources (w, 1, t, q, v) : PW_OK;
+  return w->s->state_dependent > 0 ? kinematics_sources (w, 1, t, q, v) : PW_OK;
 }
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
   kinematics_configurations (w, q, v);
-  return t == w->t_signal && w->s->readers == 0 ? PW_OK : kinematics_signals (w, t, q, v);
+  return t == w->t_signal && w->s->state_dependent == 0 ? PW_OK : kinematics_signals (w, t, q, v);
 }
 
 int pw_update_velocities (pw_workspace *w, const double *v) {
@@ -80,7 +80,7 @@ int pw_update_velocities (pw_workspace *w, const double *v) {
     p->omega = from[2];
   }
   if (w->s->coords > 3 * w->s->bodies) kinematics_internal (w, NULL, v);
-  return w->s->readers > 0 ? kinematics_sources (w, 1, w->t_signal, NULL, v) : PW_OK;
+  return w->s->state_dependent > 0 ? kinematics_sources (w, 1, w->t_signal, NULL, v) : PW_OK;
 }
 
 void pw_hold_signals (pw_workspace *w, int hold) {

@@ -41,16 +41,16 @@ struct pw_system {
   int forces;              /* batches with a force that is not constant */
   int saturates;           /* 1: some of these have a function `saturation` */
   int sources;             /* signals */
-  int readers;             /* state-dependent signals */
+  int state_dependent;     /* of these, state-dependent */
   int reads;               /* total number of states they read */
-  int moving;              /* batches with an eta (rheonomic constraints) */
+  int rheonomic;           /* batches with an eta (rheonomic constraints) */
   pw_scale scale;          /* the time is 1 s here; a run's is in its workspace */
   const char **body_name;  /* bodies */
   double *mass;            /* coords: diagonal of M */
   double *constant;        /* coords + 3: sum of the constant forces */
   double *metric;          /* coords: M, and small weights where M is zero */
   double *q0, *v0;         /* coords: the described initial state */
-  unsigned char *held;     /* 2 coords: origin of initial values: PW_GIVEN | ... */
+  unsigned char *origin;   /* 2 coords: origin of initial values: PW_GIVEN | ... */
   pw_element_batch *batch; /* batches: holonomic types, then nonholonomic ones, then forces */
   pw_source *source;       /* sources, ordered by batch */
   pw_entry *entry;         /* entries */

@@ -120,8 +120,8 @@ static int project_once (pw_projector *p, pw_run *r, double *v, int fresh) {
   double *right = p->scratch, *eta = right + s->rows, *mu = eta + s->rows, *dv = mu + s->rows;
   int status = PW_OK;
   pw_mul_J (r->w, v, right);
-  if (s->moving) pw_evaluate_eta (r->w, eta);
-  for (int i = 0; i < s->rows; i++) right[i] = (s->moving ? eta[i] : 0) - right[i];
+  if (s->rheonomic) pw_evaluate_eta (r->w, eta);
+  for (int i = 0; i < s->rows; i++) right[i] = (s->rheonomic ? eta[i] : 0) - right[i];
   if (fresh)
     status = pw_saddle_factor_solve (p->velocity, NULL, right, dv, mu);
   else

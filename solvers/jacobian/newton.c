@@ -112,7 +112,7 @@ void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_put *put) 
 
 void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v) {
   const pw_system *s = w->s;
-  for (pw_element_batch *k = w->batch; s->readers > 0 && k < w->batch + s->batches; k++) {
+  for (pw_element_batch *k = w->batch; s->state_dependent > 0 && k < w->batch + s->batches; k++) {
     int signals = k->kind->signals, cols = k->b.cols;
     if (signals == 0 || k->kind->force_u == NULL) continue;
     if (!t->recording) k->kind->force_u (&k->b, n->block);

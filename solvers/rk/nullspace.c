@@ -130,7 +130,7 @@ static void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w) {
   int m = b->rows;
   memset (b->K, 0, (size_t)m * (size_t)m * sizeof *b->K);
   memset (b->mu, 0, (size_t)m * sizeof *b->mu);
-  if (r->s->moving) {
+  if (r->s->rheonomic) {
     pw_evaluate_eta (r->w, b->eta);
     for (int i = 0; i < r->s->rows; i++)
       if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i];

@@ -64,7 +64,7 @@ static int run_initial_values (pw_run *r, const pw_settings *settings, pw_error 
   const pw_system *s = r->s;
   memcpy (r->q, s->q0, (size_t)s->coords * sizeof (double));
   memcpy (r->v, s->v0, (size_t)s->coords * sizeof (double));
-  memcpy (r->origin, s->held, 2 * (size_t)s->coords);
+  memcpy (r->origin, s->origin, 2 * (size_t)s->coords);
   for (int i = 0; i < settings->initials; i++) {
     const pw_initial_value *x = &settings->initial[i];
     if (x->state < 0 || x->state >= 2 * s->coords || !isfinite (x->value))

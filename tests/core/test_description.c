@@ -198,9 +198,9 @@ static void test_start (void **state) {
   check_ok (pw_model_set_initial (m, "frame.phi", 0.5, &error), &error);
   check_ok (pw_model_set_initial (m, "steer.vy", -2, &error), &error);
   pw_system *s = scene_compile (m);
-  assert_true (s->q0[2] == 0.5 && s->v0[4] == -2 && s->held[2] && s->held[6 + 4]);
+  assert_true (s->q0[2] == 0.5 && s->v0[4] == -2 && s->origin[2] && s->origin[6 + 4]);
   int held = 0;
-  for (int i = 0; i < 12; i++) held += s->held[i] & PW_GIVEN;
+  for (int i = 0; i < 12; i++) held += s->origin[i] & PW_GIVEN;
   assert_int_equal (held, 2);
   pw_system_free (s);
 }
