@@ -305,7 +305,8 @@ void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
 
 /* ---- Initial conditions ---- */
 
-/* Makes r->q, r->v consistent at r->t and fills the report; prescribed: origins of states that are kept if possible.  Errors: PW_INITIAL. */
+/* Makes r->q, r->v consistent at r->t and fills the report; prescribed (or NULL): origins of states, of which those given
+ * or specified are kept if possible.  Errors: PW_INITIAL. */
 int pw_run_make_consistent (pw_run *r, const unsigned char *prescribed, pw_error *error);
 /* Counts the states that moved, in the report; needs the scales. */
 void pw_run_count_moved (pw_run *r);

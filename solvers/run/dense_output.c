@@ -6,9 +6,9 @@
 #include "dense_output.h"
 #include "util.h"
 
-int pw_dense_output_open (pw_dense_output *b, pw_run *r, int rates, pw_error *error) {
+int pw_dense_output_open (pw_dense_output *b, pw_run *r, int velocities, pw_error *error) {
   size_t entries = (size_t)r->s->entries;
-  *b = (pw_dense_output){ .t0 = r->t, .rates = rates };
+  *b = (pw_dense_output){ .t0 = r->t, .velocities = velocities };
   const pw_array array[] = { { &b->q0, pw_state_length (r->s) }, { &b->ledger0, entries }, { &b->rate0, entries } };
   b->memory = pw_take_arrays (array, sizeof array / sizeof *array);
   if (b->memory == NULL) return pw_fail_memory (r->s, error);
@@ -52,9 +52,9 @@ static int dense_inside (pw_dense_output *b, pw_run *r, double t) {
   for (int i = 0; i < s->rows; i++) r->lambda_at[i] = (1 - x) * lambda0[i] + x * r->lambda[i];
   for (int i = 0; i < s->entries; i++)
     r->ledger_at[i] = b->ledger0[i] + h * x * (b->rate0[i] + 0.5 * x * (r->rate[i] - b->rate0[i]));
-  if (b->rates < 0) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
+  if (b->velocities < 0) return pw_evaluate_J_at (r->w, t, r->q_at, r->v_at);
   int status = pw_project_positions (&b->projector, r, t, r->q_at, r->v_at, &row, &worst);
-  return status == PW_OK && b->rates ? pw_project_velocities (&b->projector, r, r->v_at) : status;
+  return status == PW_OK && b->velocities ? pw_project_velocities (&b->projector, r, r->v_at) : status;
 }
 
 int pw_fail_outside (const pw_run *r, double t0, double t, pw_error *error) {

@@ -7,13 +7,13 @@
 typedef struct {
   double t0;                    /* the beginning of the last step */
   double *q0, *ledger0, *rate0; /* the state there, laid out as in pw_run */
-  int rates;                    /* 1: project velocities; 0: positions only; -1: neither */
+  int velocities;               /* 1: project velocities; 0: positions only; -1: neither */
   pw_projector projector;
   char *memory;
 } pw_dense_output;
 
-/* rates: as in pw_dense_output.  Errors: PW_RESOURCE. */
-int pw_dense_output_open (pw_dense_output *b, pw_run *r, int rates, pw_error *error);
+/* velocities: as in pw_dense_output.  Errors: PW_RESOURCE. */
+int pw_dense_output_open (pw_dense_output *b, pw_run *r, int velocities, pw_error *error);
 void pw_dense_output_close (pw_dense_output *b);
 
 /* Stores the state reached as the beginning of a step. */

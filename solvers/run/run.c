@@ -140,7 +140,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   status = pw_run_attempt (r, error);
   if (status != PW_OK) return status;
   pw_forget_residuals (r);
-  r->w->failed = NULL;
+  if (r->stalled == 0) r->w->failed = NULL; /* else the signal that stops the run is still the last one that failed */
   if (r->t >= r->breakpoint || r->interrupted) status = run_pass_breakpoint (r, error);
   r->interrupted = 0;
   if (status == PW_OK && r->redundant && r->conditioning < r->reselect) status = run_reselect (r, error);
@@ -201,22 +201,25 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
 
 /* ---- Another state ---- */
 
-static int run_check_state (const pw_run *r, const double *x, int rates, pw_error *error) {
+static int run_check_state (const pw_run *r, const double *x, int velocities, pw_error *error) {
   char name[120];
   for (int j = 0, n = r->s->coords; x && j < n; j++)
     if (!(fabs (x[j]) < r->limits.extreme))
       return pw_fail (error, PW_INPUT, "model %s: restart with %s = %g: expected a finite number", r->s->model,
-                      pw_system_state_name (r->s, j + rates * n, name, sizeof name), x[j]);
+                      pw_system_state_name (r->s, j + velocities * n, name, sizeof name), x[j]);
   return PW_OK;
 }
 
-/* Copies `other`, which may be a sample array, to x; the old values go to `kept`, the sample array. */
-static void run_exchange (double *x, double *kept, const double *other, int n) {
-  for (int j = 0; j < n; j++) {
-    double old = x[j];
-    if (other) x[j] = other[j];
-    kept[j] = old;
-  }
+/* Copies this state (NULL: unchanged), which may be in the sample arrays, to the state reached; the old one goes to the
+ * sample arrays. */
+static void run_exchange (pw_run *r, const double *q, const double *v) {
+  size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
+  double *other = r->scratch;
+  memcpy (other, q ? q : r->q, bytes);
+  memcpy (other + n, v ? v : r->v, bytes);
+  memcpy (r->q_at, r->q, pw_state_length (r->s) * sizeof *q);
+  memcpy (r->q, other, bytes);
+  memcpy (r->v, other + n, bytes);
 }
 
 static int run_energy (pw_run *r, double *energy, pw_error *error) {
@@ -229,7 +232,6 @@ static int run_energy (pw_run *r, double *energy, pw_error *error) {
  * may return other values and breakpoints than before. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
-  int n = r->s->coords;
   double before = 0, after = 0;
   if (run_has_no_method (r, error)) return PW_RESOURCE;
   if (run_check_state (r, q, 0, error) != PW_OK || run_check_state (r, v, 1, error) != PW_OK) return PW_INPUT;
@@ -237,8 +239,7 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (status == PW_OK) status = pw_run_look_ahead (r, error);
   if (status != PW_OK) return status;
   r->w->t_signal = NAN;
-  run_exchange (r->q, r->q_at, q, n);
-  run_exchange (r->v, r->v_at, v, n);
+  run_exchange (r, q, v);
   r->near = 0;
   r->geometry.alert = 1;
   status = pw_run_make_consistent (r, NULL, error);
@@ -246,12 +247,11 @@ int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error
   if (status == PW_OK) status = run_energy (r, &after, error);
   if (status == PW_OK) {
     pw_watchdog_begin (r);
-    if (!r->near) pw_run_reference_level (r); /* near a singular configuration they mean nothing */
+    if (!r->near) pw_run_reference_level (r); /* accelerations near a singular configuration are no reference */
     r->energy0 += after - before;
     return r->method->restart (r, error);
   }
-  memcpy (r->q, r->q_at, (size_t)n * sizeof (double));
-  memcpy (r->v, r->v_at, (size_t)n * sizeof (double));
+  memcpy (r->q, r->q_at, pw_state_length (r->s) * sizeof *r->q);
   pw_run_evaluate (r, NULL);
   return status;
 }
