@@ -7,14 +7,39 @@
 #define PW_CLI_H
 
 #include <popt.h>
+#include <signal.h>
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
-#include "stop.h"
 
 enum {
   PW_INTERRUPTED = 130,
   PW_CLOSED_PIPE = 141
 }; /* exit statuses after Ctrl-C, and when the output pipe is closed */
+
+/* ---- Requests to stop, by Ctrl-C or a limit of processor time, which commands check between steps (stop.c) ---- */
+
+extern volatile sig_atomic_t pw_stop; /* requests so far */
+
+/* Counts signals from here on.  The first requests a stop after the current step; since some senders signal a program
+ * and its group as well, only the third ends the program, in case that step never ends. */
+void pw_stop_catch (void);
+/* Lets signals end the program again. */
+void pw_stop_release (void);
+
+/* The limit of a run's processor time, measured by the clock of its thread. */
+typedef struct {
+  double most;   /* [s]; INFINITY: no limit */
+  double start;  /* of the thread's clock [s] */
+  double looked; /* coarse clock when the thread's clock was last read [s] */
+} pw_limit;
+
+/* Starts the clock; call it when the run begins. */
+void pw_limit_start (pw_limit *l);
+/* 1 if the limit is exceeded or a signal has requested a stop.  For pw_settings.stop; the context is the limit. */
+int pw_limit_over (void *limit);
+/* The status of a run that was stopped (PW_STOPPED) at time t: PW_RETRY after a signal; else PW_METHOD with the
+ * limit. */
+int pw_limit_fail (const pw_limit *l, double t, pw_error *error);
 
 /* ---- Commands ---- */
 
@@ -115,7 +140,7 @@ typedef struct {
   pw_system *system;
 } pw_cli_model;
 
-/* Opens the model file that a command line's first argument names, by name or path. */
+/* Opens the model file of a command line, whose first argument is its name or path. */
 pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error);
 
 /* Opens, builds and compiles the model of a command line with its --set and --start.  Returns a status; close the model

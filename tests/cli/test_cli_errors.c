@@ -63,7 +63,7 @@ static void test_bad_lines (void **state) {
   cli_bad_each ("", bad, sizeof bad / sizeof *bad);
 }
 
-/* A tolerance that the method does not follow, a step it does not take; who gives both is not told. */
+/* A tolerance that the method does not follow, a step it does not take; if both are given there is no message. */
 static void test_useless_options (void **state) {
   static const char step[] = "pinwheel: --step has no effect: erk5+projection chooses its steps by --rtol, --atol\n",
                     rtol[] = "pinwheel: --rtol has no effect: rk4+none takes steps of --step\n",
@@ -114,7 +114,8 @@ static void test_bad_models (void **state) {
                  "  pw_add_pin (m, &(pw_pin){ .name = \"right\", .body = { \"rod\", \"ground\" }, .at = { { 0.5, 0 }, "
                  "{ 3, 0 } } });\n"));
   cli_bad ("pinwheel run @/torn.c --json @/torn.json", 3,
-           "model torn: the initial state cannot be made consistent: pin left is open by 1 m; if it can close, begin nearer to "
+           "model torn: the initial state cannot be made consistent: pin left is open by 1 m; if it can close, begin "
+           "nearer to "
            "where it does");
   assert_true (cli_says (cli_file ("torn.json"), "status", "start"));
 

@@ -46,7 +46,7 @@ static double drift_number (const char *file, const char *method, int column) {
   return strtod (drift_cell (file, method, column), NULL);
 }
 
-/* A conservative pendulum's accelerations alone: rates drift linearly, positions quadratically; projected they stay at
+/* A conservative pendulum's accelerations alone: velocities drift linearly, positions quadratically; projected they stay at
  * round-off, and with feedback within bounds. */
 static void test_growth (void **state) {
   (void)state;
@@ -79,8 +79,8 @@ static void test_row_is_run (void **state) {
     const int column[2] = { POSITION, VELOCITY };
     const char *const key[2] = { "position", "velocity" };
     for (int i = 0; i < 2; i++) {
-      double told = cli_number (cli_out, "residual", key[i], NULL);
-      check_close (key[i], drift_number ("as/drift.csv", method[m], column[i]), told, 1e-14,
+      double reported = cli_number (cli_out, "residual", key[i], NULL);
+      check_close (key[i], drift_number ("as/drift.csv", method[m], column[i]), reported, 1e-14,
                    "a sample of ida's polynomial, round-off away from its step's end");
     }
     assert_true (drift_number ("as/drift.csv", method[m], STEPS) == cli_number (cli_out, "statistics", "steps", NULL));

@@ -13,7 +13,7 @@ static const char *const limits_adaptive[] = { "erk5+projection", "erk8+projecti
 
 /* ---- Attempted steps ---- */
 
-/* The run ends where so many were attempted, and says so; SUNDIALS finishes the step it is in. */
+/* The run ends after that many attempted steps, with a message; SUNDIALS finishes the step it is in. */
 static void test_max_steps (void **state) {
   (void)state;
   for (const char *const *method = limits_adaptive; *method; method++) {

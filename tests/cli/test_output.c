@@ -172,7 +172,7 @@ static void test_whole_lines (void **state) {
   cli_good ("rm @/cut.csv.part");
 }
 
-/* ---- What is no file of its own ---- */
+/* ---- Outputs that are not regular files ---- */
 
 static void test_direct (void **state) {
   (void)state;

@@ -116,7 +116,7 @@ static void test_refusals (void **state) {
   cli_write ("file", "in the way");
   cli_bad ("pinwheel run ezyroller --t-end 1 --plots @/file >/dev/null", 1,
            "cannot write into @/file: Not a directory");
-  cli_bad ("pinwheel run ezyroller --t-end 1 --plots ''", 2, "the folder \"\" for plots: no such name can be used");
+  cli_bad ("pinwheel run ezyroller --t-end 1 --plots ''", 2, "\"\" cannot be the name of a folder");
 }
 
 int main (void) {

@@ -8,7 +8,7 @@
 #define RESUME_RUN "run ezyroller --t-end 30 --energy --every 0.01 --checkpoint-every 0.5 "
 #define RESUME_PROGRAM "${PINWHEEL:-build/pinwheel} "
 
-/* Kills the run again and again until it gets through: with SIGKILL, after so many seconds. */
+/* Kills the run again and again until it gets through: with SIGKILL, after the given number of seconds. */
 static void resume_killed (const char *method) {
   char command[2000];
   snprintf (command, sizeof command,

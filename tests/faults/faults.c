@@ -11,7 +11,6 @@
 #include "faults.h"
 #include "pinwheel-files.h"
 #include "cli/cli.h"
-#include "cli/stop.h"
 
 /* ---- Files ---- */
 

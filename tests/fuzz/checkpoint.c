@@ -8,7 +8,6 @@
 #include "fuzz.h"
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
-#include "stop.h"
 
 static const char *const checkpoint_methods[] = { "rk4+projection", "erk8+projection", "ida+ggl",
                                                   "bdf+projection", "galpha+ggl",      "adams",

@@ -13,7 +13,6 @@ int command_main (int argc, char **argv);
 #include "main.c"
 #undef main
 #include "fuzz.h"
-#include "stop.h"
 
 enum { COMMAND_WORDS = 24 };
 

@@ -16,7 +16,7 @@ static int figure_make_folder (const char *folder, pw_error *error) {
   char path[FIGURE_PATH];
   size_t n = strlen (folder);
   if (n == 0 || n >= sizeof path - 32)
-    return pw_fail (error, PW_INPUT, "the folder \"%s\" for plots: no such name can be used", folder);
+    return pw_fail (error, PW_INPUT, "\"%s\" cannot be the name of a folder", folder);
   memcpy (path, folder, n + 1);
   for (size_t i = 1; i <= n; i++) {
     if (path[i] != '/' && path[i] != 0) continue;

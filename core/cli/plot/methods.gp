@@ -1,7 +1,7 @@
 
 # ---- Methods: a colour and a mark for each integrator, a dash for each stabilisation ----
-# Against time, a mark for each method, at points of its own.  Lines that are no methods have no stabilisation: each is unlike
-# the others.
+# Against time, a mark for each method, at points of its own.  Labels that are not methods have no stabilisation: each
+# line differs from the others.
 
 spread = name eq 'drift'
 

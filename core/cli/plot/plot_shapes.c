@@ -54,7 +54,7 @@ int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
   const pw_element *e = pw_model_elements (m, &elements);
   if (pw_names_open (&shown, (size_t)p->bodies.shown) != PW_OK)
     return pw_fail (error, PW_RESOURCE, "plots: out of memory");
-  for (int i = 0; i < p->bodies.shown; i++) pw_names_add (&shown, pw_plot_name (p, &p->bodies, i), i);
+  for (int i = 0; i < p->bodies.shown; i++) pw_names_add (&shown, pw_system_body_name (p->s, p->bodies.index[i]), i);
   for (const pw_element *end = e + elements; e < end; e++)
     for (int n = 0; n < e->kind->bodies && !e->kind->each_body; n++) {
       const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);

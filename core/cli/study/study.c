@@ -128,7 +128,8 @@ int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *
   if (status == PW_RESOURCE || status == PW_INITIAL) return pw_fail (error, status, "%s", run_error->text);
   if (pw_stop) return PW_RETRY;
   r->state = status == PW_INPUT ? ROW_REFUSED : ROW_FAILED;
-  snprintf (r->reason, sizeof r->reason, "%s", run_error->status ? run_error->text : "the method gave up");
+  snprintf (r->reason, sizeof r->reason, "%s",
+            run_error->status ? run_error->text : "the method failed without a reason");
   return PW_OK;
 }
 

@@ -1,11 +1,11 @@
-/* What the program tells of models that are rare: with coordinates of their own, without constraints, with any signal, with
- * names and texts that JSON and YAML would take for something else, and of runs that hardly begin. */
+/* What the program reports about unusual models: with internal coordinates, without constraints, with any signal, with
+ * names and texts that JSON and YAML would take for something else; and about runs that hardly begin. */
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
 #include "cli.h"
 
-static void told_shows (const char *text) {
+static void reports_shows (const char *text) {
   if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
 }
 
@@ -13,10 +13,10 @@ static void told_shows (const char *text) {
 static void test_roller (void **state) {
   (void)state;
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --energy"), 0);
-  told_shows ("\n  left.spin             2.5  rad  left.spin_rate               5  rad/s\n");
-  told_shows ("\n  right.spin           3.75  rad  right.spin_rate            7.5  rad/s\n");
-  told_shows ("\n  energy\n  kinetic ");
-  told_shows ("\n  dissipated               0  J\n");
+  reports_shows ("\n  left.spin             2.5  rad  left.spin_rate               5  rad/s\n");
+  reports_shows ("\n  right.spin           3.75  rad  right.spin_rate            7.5  rad/s\n");
+  reports_shows ("\n  energy\n  kinetic ");
+  reports_shows ("\n  dissipated               0  J\n");
   assert_int_equal (cli_run ("pinwheel run differential-drive --t-end 0.5 --json @/roller.json"), 0);
   check_close ("spin", cli_number (cli_file ("roller.json"), "elements", "right", "spin", NULL), 3.75, 1e-12,
                "4096 eps");
@@ -28,18 +28,18 @@ static void test_reactions (void **state) {
   assert_int_equal (cli_run ("pinwheel run pendulum --t-end 0.5 -o @/truth.csv >@/log && "
                              "pinwheel run pendulum --t-end 0.5 --step 2e-3 --reference @/truth.csv"),
                     0);
-  told_shows ("\n  reactions ");
-  told_shows (" of the largest\n");
+  reports_shows ("\n  reactions ");
+  reports_shows (" of the largest\n");
 }
 
 static void test_signals (void **state) {
   (void)state;
   cli_good ("pinwheel show tests/models/signals.yaml");
-  told_shows ("heading {ramp: {from: 0.1, to: -0.2, start: 0.333333, duration: 0.7}} rad\n");
-  told_shows ("value {table: {points: 4 from 0 to 3.14159 s}} m/s\n");
-  told_shows ("value {pulse: {height: 0.142857, start: 0.1, width: 0.2, period: 0.7, offset: -0.01}} N m\n");
-  told_shows ("fx {harmonic: {amplitude: 0.2, omega: 3, phase: 0.1}} N; fy 0.1 N\n");
-  told_shows ("rate {smooth-step: {from: 0.3, to: 0, duration: 2}} rad/s\n");
+  reports_shows ("heading {ramp: {from: 0.1, to: -0.2, start: 0.333333, duration: 0.7}} rad\n");
+  reports_shows ("value {table: {points: 4 from 0 to 3.14159 s}} m/s\n");
+  reports_shows ("value {pulse: {height: 0.142857, start: 0.1, width: 0.2, period: 0.7, offset: -0.01}} N m\n");
+  reports_shows ("fx {harmonic: {amplitude: 0.2, omega: 3, phase: 0.1}} N; fy 0.1 N\n");
+  reports_shows ("rate {smooth-step: {from: 0.3, to: 0, duration: 2}} rad/s\n");
 }
 
 /* A free body whose turning is driven by its own rate, 2 1/s: it grows, and no step of RK4 is too large for that. */
@@ -49,15 +49,15 @@ static void test_unbound (void **state) {
                           "  - {name: a, mass: 1, inertia: 1}\nelements:\n"
                           "  - {torque: T, body: [a, ground], value: 2*a.omega}\n");
   cli_good ("pinwheel show @/free.yaml --matrices");
-  told_shows ("\nThe model has no constraints: no J, no gamma\n");
+  reports_shows ("\nThe model has no constraints: no J, no gamma\n");
   cli_good ("pinwheel check @/free.yaml");
-  told_shows ("  fastest eigenvalue                 2 1/s\n");
-  told_shows ("  it grows by e in                   0.5 s\n");
-  told_shows ("  RK4 is stable                      with any step: the fast modes grow\n");
+  reports_shows ("  fastest eigenvalue                 2 1/s\n");
+  reports_shows ("  it grows by e in                   0.5 s\n");
+  reports_shows ("  RK4 is stable                      with any step: the fast modes grow\n");
   cli_good ("sed '/elements/,$d' @/free.yaml >@/alone.yaml && pinwheel show @/alone.yaml --yaml");
-  told_shows ("about: \"says \\\"so\\\", \\\\ and a\\x09tab\"\n");
+  reports_shows ("about: \"says \\\"so\\\", \\\\ and a\\x09tab\"\n");
   cli_good ("pinwheel show @/alone.yaml --yaml >@/again.yaml && pinwheel show @/again.yaml");
-  told_shows ("again: says \"so\", \\ and a\ttab\n");
+  reports_shows ("again: says \"so\", \\ and a\ttab\n");
 }
 
 /* Texts that are null, true or a number without their quotes. */
@@ -75,7 +75,7 @@ static void test_literals (void **state) {
 }
 
 /* A model whose signal fails at times between two. */
-static void told_write_gap (void) {
+static void reports_write_gap (void) {
   cli_write ("gap.c",
              "#include \"pinwheel.h\"\n"
              "typedef struct { double from, to; } gap;\n"
@@ -98,17 +98,17 @@ static void told_write_gap (void) {
 /* A run that ends before its first step has nothing to draw, and leaves nothing. */
 static void test_nothing (void **state) {
   (void)state;
-  told_write_gap ();
+  reports_write_gap ();
   assert_int_equal (cli_run ("pinwheel run @/gap.c --plots @/none --animate @/none.html"), 4);
   assert_non_null (strstr (cli_err, ": the run is too short for figures: none are drawn in "));
   assert_non_null (strstr (cli_err, "pinwheel: the run is too short for an animation: "));
   assert_null (cli_file ("none.html"));
 }
 
-/* Where more than one thing fails, each is told; the run's own failure decides. */
+/* If several things fail, each is reported; the failure of the run determines the exit status. */
 static void test_failures (void **state) {
   (void)state;
-  told_write_gap ();
+  reports_write_gap ();
   assert_int_equal (cli_run ("pinwheel run @/gap.c --json /dev/full"), 4);
   assert_non_null (strstr (cli_err, "pinwheel: cannot write /dev/full: No space left on device\n"));
   assert_non_null (strstr (cli_err, ": a signal"));
@@ -167,9 +167,9 @@ static void test_contradiction (void **state) {
                          "  - {pin: P, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
                          "  - {pin: Q, body: [a, ground], at: [[0, 0], [1, 0]]}\n");
   assert_int_equal (cli_run ("pinwheel check @/two.yaml --json -"), 3);
-  told_shows ("\"saddle_point\": null");
-  told_shows ("\"start\": null");
-  told_shows ("\"linearisation\": null");
+  reports_shows ("\"saddle_point\": null");
+  reports_shows ("\"start\": null");
+  reports_shows ("\"linearisation\": null");
 }
 
 /* A program alone, without models or headers around it. */
@@ -177,7 +177,7 @@ static void test_alone (void **state) {
   (void)state;
   cli_good ("mkdir @/bin && cp \"${PINWHEEL:-build/pinwheel}\" ${BUILD:-build}/libpinwheel*.so.* @/bin");
   cli_good ("PINWHEEL_MODELS= @/bin/pinwheel list");
-  told_shows ("  none found; folders named in the environment variable PINWHEEL_MODELS are searched\n");
+  reports_shows ("  none found; folders named in the environment variable PINWHEEL_MODELS are searched\n");
   assert_int_equal (cli_run ("PINWHEEL_MODELS= @/bin/pinwheel run pendulum"), 2);
   assert_non_null (strstr (cli_err, "pinwheel: there is no model \"pendulum\", nor any other in the folders of "));
   assert_int_equal (cli_run ("pinwheel new @/own.c >@/log && @/bin/pinwheel run @/own.c"), 2);
