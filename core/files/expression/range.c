@@ -228,7 +228,9 @@ static pw_range range_select (const pw_range *condition, const pw_range *x, cons
 
 /* ---- Operations ---- */
 
-static pw_range range_one (const pw_expression_code *c, const pw_range *x) {
+/* x: one or two operands. */
+static pw_range range_operation (const pw_expression_code *c, const pw_range *x) {
+  const pw_range *y = x + 1;
   switch (c->op) {
   case PW_OP_NEGATE:
     return range_negative (x);
@@ -236,16 +238,13 @@ static pw_range range_one (const pw_expression_code *c, const pw_range *x) {
     return range_abs (x);
   case PW_OP_SIGN:
     return range_sign (x);
+  case PW_OP_FLOOR:
+  case PW_OP_CEIL:
+  case PW_OP_ROUND:
+    return range_whole (c->op, x);
   case PW_OP_TAN:
   case PW_OP_ONE:
     return range_smooth (&pw_expression_functions[c->which], x);
-  default:
-    return range_whole (c->op, x);
-  }
-}
-
-static pw_range range_two (const pw_expression_code *c, const pw_range *x, const pw_range *y) {
-  switch (c->op) {
   case PW_OP_ADD:
     return range_sum (x, y);
   case PW_OP_SUBTRACT:
@@ -271,20 +270,17 @@ static pw_range range_constant (double value) {
   return isnan (value) ? range_nan : (pw_range){ value, value, 0, 0, 0 };
 }
 
-/* Evaluates degenerate intervals exactly, so that equal numbers stay equal. */
-static pw_range range_known (const pw_expression_code *c, const pw_range *x, int operands) {
-  return range_constant (pw_expression_apply (c, x[0].lo, x[operands - 1].lo));
-}
-
-/* The result of an operation of one or two operands without their breaks.  NaN stays NaN, except in comparisons, in
+/* The result of an operation of one or two operands without their breaks.  Degenerate intervals are evaluated exactly,
+ * so that equal numbers stay equal.  NaN stays NaN, except in comparisons, in
  * sign, and in x^0 and 1^y. */
 static pw_range range_result (const pw_expression_code *c, const pw_range *x, int operands) {
   const pw_range *last = x + operands - 1;
-  if (range_is (x, x->lo) && range_is (last, last->lo)) return range_known (c, x, operands);
+  if (range_is (x, x->lo) && range_is (last, last->lo))
+    return range_constant (pw_expression_apply (c, x->lo, last->lo));
   if (c->op == PW_OP_POWER && (range_is (x, 1) || range_is (last, 0))) return (pw_range){ 1, 1, 0, 0, 0 };
   int keeps = c->op != PW_OP_SIGN && !(c->op >= PW_OP_LESS && c->op <= PW_OP_UNEQUAL);
   if (keeps && (x->lo > x->hi || last->lo > last->hi)) return range_nan;
-  pw_range r = operands == 1 ? range_one (c, x) : range_two (c, x, last);
+  pw_range r = range_operation (c, x);
   r.nan |= keeps && (x->nan || last->nan);
   return r;
 }

@@ -18,42 +18,35 @@ enum { BUILD_WORDS = 40 };
 typedef struct {
   char *text; /* a copy of CC, split into words */
   char *word[BUILD_WORDS];
-  int words;
 } build_command;
 
-static void build_word (build_command *c, const char *word) {
-  if (c->words < BUILD_WORDS - 1) c->word[c->words++] = (char *)(size_t)word;
-}
-
 /* CC may be more than one word ("ccache gcc"); half of the array is reserved for our options. */
-static int build_compiler (build_command *c) {
+static int build_words (build_command *c, const char *include, const char *source, const char *object) {
+  const char *const options[] = { "-std=c11",
+                                  "-O2",
+                                  "-ffp-contract=off",
+#ifdef __APPLE__
+                                  "-undefined",
+                                  "dynamic_lookup", /* the plug-in links to no library */
+#endif
+                                  "-fPIC",
+                                  "-shared",
+                                  "-Wall",
+                                  "-I",
+                                  include,
+                                  "-o",
+                                  object,
+                                  source,
+                                  "-lm" };
   const char *cc = getenv ("CC");
+  char *rest = NULL;
+  int words = 0;
   c->text = strdup (cc && cc[strspn (cc, " \t")] ? cc : "cc");
   if (c->text == NULL) return PW_RESOURCE;
-  char *rest = NULL;
-  for (char *w = strtok_r (c->text, " \t", &rest); w && c->words < BUILD_WORDS / 2; w = strtok_r (NULL, " \t", &rest))
-    build_word (c, w);
+  for (char *w = strtok_r (c->text, " \t", &rest); w && words < BUILD_WORDS / 2; w = strtok_r (NULL, " \t", &rest))
+    c->word[words++] = w;
+  memcpy (c->word + words, options, sizeof options);
   return PW_OK;
-}
-
-static void build_options (build_command *c, const char *include, const char *source, const char *object) {
-  static const char *const options[] = { "-std=c11",
-                                         "-O2",
-                                         "-ffp-contract=off",
-#ifdef __APPLE__
-                                         "-undefined",
-                                         "dynamic_lookup", /* the plug-in links to no library */
-#endif
-                                         "-fPIC",
-                                         "-shared",
-                                         "-Wall" };
-  for (size_t i = 0; i < sizeof options / sizeof *options; i++) build_word (c, options[i]);
-  build_word (c, "-I");
-  build_word (c, include);
-  build_word (c, "-o");
-  build_word (c, object);
-  build_word (c, source);
-  build_word (c, "-lm");
 }
 
 /* Starts the compiler with its messages on standard error and default signal handling. */
@@ -109,7 +102,7 @@ static char *build_folder (pw_error *error) {
 
 /* The compiler with everything it needs. */
 static int build_object (const char *path, const char *object, const sigset_t *before, pw_error *error) {
-  build_command c = { .words = 0 };
+  build_command c = { .text = NULL };
   char *include;
   int status = pw_search_include (&include, error);
   if (status == PW_OK && include == NULL)
@@ -117,12 +110,9 @@ static int build_object (const char *path, const char *object, const sigset_t *b
                       "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
                       "\"../include/pinwheel\"",
                       path);
-  else if (status == PW_OK && build_compiler (&c) != PW_OK)
+  else if (status == PW_OK && build_words (&c, include, path, object) != PW_OK)
     status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) {
-    build_options (&c, include, path, object);
-    status = build_run (&c, path, before, error);
-  }
+  if (status == PW_OK) status = build_run (&c, path, before, error);
   free (c.text);
   free (include);
   return status;

@@ -71,18 +71,10 @@ static int columns_names (const columns *c, const char *line) {
 
 /* ---- Which columns ---- */
 
-/* Whether a cell of the first line names the requested column, with or without its unit. */
-static int columns_is (const char *cell, const char *name) {
-  char unit[100];
-  size_t n = strlen (name);
-  return strcmp (cell, name) == 0 || (pw_unit_split (cell, unit, sizeof unit) == n && strncmp (cell, name, n) == 0);
-}
-
-/* Finds a column from its name in the first line or from its number. */
+/* Finds a column from its name in the first line, with or without its unit, or from its number. */
 static int columns_find (const columns *c, const char *first, int named, const char *name, int *place) {
-  char cell[100], unit[100], best[100] = "", hint[200];
+  char cell[100], unit[100], best[100] = "", hint[200], *end;
   pw_nearest near = { .sought = name };
-  char *end;
   long number = strtol (name, &end, 10);
   if (*end == 0 && number >= 1 && number <= c->cells) return *place = (int)number - 1, PW_OK;
   if (*end == 0)
@@ -90,48 +82,18 @@ static int columns_find (const columns *c, const char *first, int named, const c
                          c->cells == 1 ? "" : "s");
   *place = -1;
   for (int i = 0; named && i < c->cells; i++) {
-    int here = columns_is (columns_cell (c, first, i, cell, sizeof cell), name);
+    int here = strcmp (columns_cell (c, first, i, cell, sizeof cell), name) == 0;
     cell[pw_unit_split (cell, unit, sizeof unit)] = 0;
+    here |= strcmp (cell, name) == 0;
     pw_nearest_try (&near, cell);
     if (near.best == cell) near.best = strcpy (best, cell);
-    if (!here) continue;
-    if (*place >= 0) return columns_fail (c, "columns %d and %d are both named \"%.60s\"", *place + 1, i + 1, name);
-    *place = i;
+    if (here && *place >= 0)
+      return columns_fail (c, "columns %d and %d are both named \"%.60s\"", *place + 1, i + 1, name);
+    if (here) *place = i;
   }
   if (*place >= 0) return PW_OK;
   if (!named) return columns_fail (c, "there are no names of columns before the numbers, so no \"%.60s\"", name);
   return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
-}
-
-/* ---- Numbers ---- */
-
-static int columns_numbers (const columns *c, const char *line, const int place[2], const double factor[2],
-                            double value[2]) {
-  char cell[100];
-  for (int k = 0; k < 2; k++) {
-    columns_cell (c, line, place[k], cell, sizeof cell);
-    if (pw_read_number (cell, &value[k]) != PW_OK || !isfinite (value[k]))
-      return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", place[k] + 1, cell);
-    value[k] *= factor[k];
-    if (!isfinite (value[k]))
-      return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", place[k] + 1, cell);
-  }
-  return PW_OK;
-}
-
-static int columns_rows (columns *c, char *line, const int place[2], const double factor[2], double *value[2],
-                         int *count) {
-  for (; line; line = columns_line (c)) {
-    double x[2];
-    int cells = columns_count (c, line);
-    if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
-    if (columns_numbers (c, line, place, factor, x) != PW_OK) return PW_INPUT;
-    if (*count > 0 && !(x[0] > value[0][*count - 1]))
-      return columns_fail (c, "%.9g comes after %.9g: expected increasing times", x[0], value[0][*count - 1]);
-    value[0][*count] = x[0];
-    value[1][(*count)++] = x[1];
-  }
-  return PW_OK;
 }
 
 /* Finds a column and its conversion factor. */
@@ -140,24 +102,42 @@ static int columns_open (const columns *c, const char *first, int named, const c
   char cell[100], why[260];
   *factor = 1;
   if (columns_find (c, first, named, name, place) != PW_OK) return PW_INPUT;
-  if (!named ||
-      pw_unit_check (columns_cell (c, first, *place, cell, sizeof cell), unit, factor, why, sizeof why) == PW_OK)
-    return PW_OK;
+  columns_cell (c, first, *place, cell, sizeof cell);
+  if (!named || pw_unit_check (cell, unit, factor, why, sizeof why) == PW_OK) return PW_OK;
   return columns_fail (c, "%s", why);
 }
 
-/* The largest number of lines. */
-static size_t columns_lines (const char *text) {
-  size_t n = 1;
-  while ((text = strchr (text, '\n')) != NULL) text++, n++;
-  return n;
+/* ---- Numbers ---- */
+
+static int columns_number (const columns *c, const char *line, int place, double factor, double *value) {
+  char cell[100];
+  columns_cell (c, line, place, cell, sizeof cell);
+  if (pw_read_number (cell, value) != PW_OK || !isfinite (*value))
+    return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", place + 1, cell);
+  *value *= factor;
+  if (isfinite (*value)) return PW_OK;
+  return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", place + 1, cell);
+}
+
+static int columns_rows (columns *c, char *line, const int place[2], const double factor[2], double *value[2],
+                         int *count) {
+  for (int n = 0; line; line = columns_line (c), *count = ++n) {
+    int cells = columns_count (c, line);
+    if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
+    for (int k = 0; k < 2; k++)
+      if (columns_number (c, line, place[k], factor[k], &value[k][n]) != PW_OK) return PW_INPUT;
+    if (n > 0 && !(value[0][n] > value[0][n - 1]))
+      return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[0][n], value[0][n - 1]);
+  }
+  return PW_OK;
 }
 
 static int columns_all (columns *c, const char *const column[2], const char *const unit[2], pw_arena *arena,
                         double *value[2], int *count) {
   int place[2];
   double factor[2];
-  size_t lines = columns_lines (c->rest);
+  size_t lines = 1;
+  for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL; p++) lines++;
   char *line = columns_line (c);
   if (line == NULL) return columns_fail (c, "the file is empty");
   if (lines > COLUMNS_MOST) return columns_fail (c, "more than %d lines", COLUMNS_MOST);

@@ -54,13 +54,6 @@ static int plugin_foreign (const char *name) {
   return pw_ends_in (name, ".cpp") || pw_ends_in (name, ".cc") || pw_ends_in (name, ".cxx") || pw_ends_in (name, ".C");
 }
 
-static int plugin_read (pw_file *f, const char *shown, pw_error *error) {
-  f->yaml = pw_yaml_open (f->path, shown, f->largest, error);
-  if (f->yaml == NULL) return error->status;
-  f->table = pw_yaml_table (f->yaml);
-  return PW_OK;
-}
-
 /* Opens the file at f->path, which exists; `shown` is its path as the user knows it. */
 static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   const char *base = strrchr (f->path, '/');
@@ -75,7 +68,11 @@ static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   f->name = strdup (base);
   if (f->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   f->name[strlen (base) - strlen (plugin_endings[ending])] = 0;
-  if (ending == PLUGIN_YAML) return plugin_read (f, shown, error);
+  if (ending == PLUGIN_YAML) {
+    f->yaml = pw_yaml_open (f->path, shown, f->largest, error);
+    if (f->yaml) f->table = pw_yaml_table (f->yaml);
+    return f->yaml ? PW_OK : error->status;
+  }
   return ending == PLUGIN_C ? pw_compile_file (f->path, plugin_load, f, error) : plugin_load (f, f->path, error);
 }
 
@@ -111,33 +108,25 @@ static int plugin_unknown (const pw_search *s, const char *name, pw_error *error
 static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
   pw_search s;
   int status = pw_search_open (&s, error), first = 0;
-  if (status == PW_OK && s.count == 0)
+  while (first < s.count && strcmp (s.found[first].name, name) != 0) first++;
+  const pw_found *found = s.found + first;
+  if (status == PW_OK && first == s.count)
     status = plugin_unknown (&s, name, error);
-  else if (status == PW_OK) {
-    while (first < s.count && strcmp (s.found[first].name, name) != 0) first++;
-    const pw_found *found = s.found + first;
-    if (first == s.count)
-      status = plugin_unknown (&s, name, error);
-    else if (first + 1 < s.count && strcmp (found[1].name, name) == 0)
-      status =
-          pw_fail (error, PW_INPUT, "two files answer to the model \"%s\": %s and %s; name one of them by its path",
-                   name, found[0].path, found[1].path);
-    else if ((f->path = strdup (found->path)) == NULL)
-      status = pw_fail (error, PW_RESOURCE, "out of memory");
-  }
+  else if (status == PW_OK && first + 1 < s.count && strcmp (found[1].name, name) == 0)
+    status = pw_fail (error, PW_INPUT, "two files answer to the model \"%s\": %s and %s; name one of them by its path",
+                      name, found[0].path, found[1].path);
+  else if (status == PW_OK && (f->path = strdup (found->path)) == NULL)
+    status = pw_fail (error, PW_RESOURCE, "out of memory");
   pw_search_close (&s);
   return status;
 }
 
 /* Finds the file; `*shown` is its path as the user knows it. */
 static pw_file *plugin_find (const char *model, const char **shown, pw_error *error) {
-  if (model == NULL || *model == 0) {
-    pw_fail (error, PW_INPUT, "a model's name or path is missing");
-    return NULL;
-  }
-  pw_file *f = calloc (1, sizeof *f);
+  int named = model && *model;
+  pw_file *f = named ? calloc (1, sizeof *f) : NULL;
   if (f == NULL) {
-    pw_fail (error, PW_RESOURCE, "out of memory");
+    pw_fail (error, named ? PW_RESOURCE : PW_INPUT, named ? "out of memory" : "a model's name or path is missing");
     return NULL;
   }
   int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS || plugin_foreign (model);

@@ -50,6 +50,26 @@ static int search_anchor (int which, char **folder, pw_error *error) {
   return *folder ? PW_OK : search_no_memory (error);
 }
 
+/* Folders relative to that of the program, and to that of the library. */
+typedef const char *const search_where[2][3];
+
+/* Visits these folders, which need not exist. */
+static int search_places (search_where where, int (*visit) (void *context, const char *folder, pw_error *error),
+                          void *context, pw_error *error) {
+  int status = PW_OK;
+  for (int which = 0; which < 2 && status == PW_OK; which++) {
+    char *anchor;
+    status = search_anchor (which, &anchor, error);
+    for (int i = 0; anchor && status == PW_OK && i < 3; i++) {
+      char *folder = pw_join (anchor, where[which][i], "");
+      status = folder ? visit (context, folder, error) : search_no_memory (error);
+      free (folder);
+    }
+    free (anchor);
+  }
+  return status;
+}
+
 /* ---- Model files ---- */
 
 /* Adds a model file, unless it is in the list already. */
@@ -99,7 +119,8 @@ static int search_note (pw_search *s, const char *real) {
 }
 
 /* Skips missing and inaccessible folders, as for PATH; other failures are errors. */
-static int search_folder (pw_search *s, const char *folder, pw_error *error) {
+static int search_folder (void *context, const char *folder, pw_error *error) {
+  pw_search *s = context;
   char *real = realpath (folder, NULL);
   if (real == NULL && errno == ENOMEM) return search_no_memory (error);
   int fresh = real && search_note (s, real);
@@ -127,20 +148,6 @@ static int search_environment (pw_search *s, pw_error *error) {
   return status;
 }
 
-static int search_beside (pw_search *s, int which, pw_error *error) {
-  static const char *const where[2][3] = { { "models", "../models", "../lib/pinwheel/models" },
-                                           { "models", "../models", "pinwheel/models" } };
-  char *anchor;
-  int status = search_anchor (which, &anchor, error);
-  for (int i = 0; anchor && status == PW_OK && i < 3; i++) {
-    char *folder = pw_join (anchor, where[which][i], "");
-    status = folder ? search_folder (s, folder, error) : search_no_memory (error);
-    free (folder);
-  }
-  free (anchor);
-  return status;
-}
-
 static int search_order (const void *a, const void *b) {
   const pw_found *f = a, *g = b;
   int names = strcmp (f->name, g->name);
@@ -148,9 +155,11 @@ static int search_order (const void *a, const void *b) {
 }
 
 int pw_search_open (pw_search *s, pw_error *error) {
+  static const search_where where = { { "models", "../models", "../lib/pinwheel/models" },
+                                      { "models", "../models", "pinwheel/models" } };
   *s = (pw_search){ .count = 0 };
   int status = search_environment (s, error);
-  for (int which = 0; status == PW_OK && which < 2; which++) status = search_beside (s, which, error);
+  if (status == PW_OK) status = search_places (where, search_folder, s, error);
   if (s->count > 1) qsort (s->found, (size_t)s->count, sizeof *s->found, search_order);
   return status;
 }
@@ -162,28 +171,17 @@ void pw_search_close (pw_search *s) {
 
 /* ---- The header ---- */
 
-/* Searches one folder; leaves *include unchanged if it has no header. */
-static int search_header (const char *anchor, const char *where, char **include, pw_error *error) {
-  char *folder = pw_join (anchor, where, ""), *header = folder ? pw_join (folder, "pinwheel.h", "") : NULL;
-  int status = header ? PW_OK : search_no_memory (error);
-  if (header && access (header, R_OK) == 0)
-    *include = folder;
-  else
-    free (folder);
+static int search_header (void *context, const char *folder, pw_error *error) {
+  char **include = context, *header = pw_join (folder, "pinwheel.h", "");
+  int there = header && access (header, R_OK) == 0;
+  if (there && *include == NULL) *include = strdup (folder);
   free (header);
-  return status;
+  return header == NULL || (there && *include == NULL) ? search_no_memory (error) : PW_OK;
 }
 
 int pw_search_include (char **include, pw_error *error) {
-  static const char *const where[] = { "include", "../include", "../include/pinwheel" };
-  int status = PW_OK;
+  static const search_where where = { { "include", "../include", "../include/pinwheel" },
+                                      { "include", "../include", "../include/pinwheel" } };
   *include = NULL;
-  for (int which = 0; which < 2 && status == PW_OK && *include == NULL; which++) {
-    char *anchor;
-    status = search_anchor (which, &anchor, error);
-    for (int i = 0; anchor && i < 3 && status == PW_OK && *include == NULL; i++)
-      status = search_header (anchor, where[i], include, error);
-    free (anchor);
-  }
-  return status;
+  return search_places (where, search_header, include, error);
 }

@@ -43,6 +43,15 @@ static int output_fail (const pw_output *o, int why, int kept, pw_error *error) 
 
 /* ---- Opening ---- */
 
+/* Makes a stream of a descriptor, which may be -1.  0 or an errno value. */
+static int output_stream_of (pw_output *o, int file, const char *mode) {
+  o->stream = file < 0 ? NULL : fdopen (file, mode);
+  if (o->stream) return 0;
+  int why = errno;
+  if (file >= 0) close (file);
+  return why;
+}
+
 /* Opens a descriptor of the process or a file that is not regular.  A FIFO blocks until it has a reader or a signal
  * arrives. */
 static int output_open_direct (pw_output *o, const pw_location *p) {
@@ -55,11 +64,7 @@ static int output_open_direct (pw_output *o, const pw_location *p) {
   }
   int file =
       p->descriptor < 0 ? open (p->path, O_WRONLY | O_NOCTTY | O_CLOEXEC) : fcntl (p->descriptor, F_DUPFD_CLOEXEC, 3);
-  o->stream = file < 0 ? NULL : fdopen (file, "w");
-  if (o->stream) return 0;
-  int why = errno;
-  if (file >= 0) close (file);
-  return why;
+  return output_stream_of (o, file, "w");
 }
 
 /* Copies the mode and, if permitted, the owner of the file to be replaced. */
@@ -76,12 +81,7 @@ static int output_inherit (int file, const struct stat *old) {
 
 /* The stream has a separate descriptor, so that the lock outlives it. */
 static int output_stream (pw_output *o) {
-  int file = fcntl (o->file, F_DUPFD_CLOEXEC, 3);
-  o->stream = file < 0 ? NULL : fdopen (file, "r+");
-  if (o->stream) return 0;
-  int why = errno;
-  if (file >= 0) close (file);
-  return why;
+  return output_stream_of (o, fcntl (o->file, F_DUPFD_CLOEXEC, 3), "r+");
 }
 
 /* Opens the folder and locks the temporary file. */
@@ -140,10 +140,8 @@ static pw_output *output_new (const char *path, pw_error *error) {
   if (o) o->file = o->folder = -1;
   if (o) o->path = strdup (path);
   if (o && o->path && *path) return o;
-  if (o && o->path)
-    pw_fail (error, PW_INPUT, "the name of a file to write is empty");
-  else
-    pw_fail (error, PW_RESOURCE, "out of memory");
+  int empty = o && o->path;
+  pw_fail (error, empty ? PW_INPUT : PW_RESOURCE, empty ? "the name of a file to write is empty" : "out of memory");
   output_free (o);
   return NULL;
 }
@@ -154,10 +152,8 @@ pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *er
   o->discard = strcmp (ending, ".part") != 0;
   int why = output_open_file (o, ending);
   if (why == 0) return o;
-  if (why == ENOMEM)
-    pw_fail (error, PW_RESOURCE, "cannot write %s: out of memory", path);
-  else
-    output_fail (o, why, 0, error);
+  if (why == ENOMEM) pw_fail (error, PW_RESOURCE, "cannot write %s: out of memory", path);
+  output_fail (o, why, 0, error);
   output_free (o);
   return NULL;
 }
@@ -190,8 +186,7 @@ int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error
 
 /* Flushes the stream and writes a regular file to the disk.  0, an errno value, or -1 for an unknown reason. */
 static int output_sync (pw_output *o) {
-  int bad = ferror (o->stream);
-  if (bad) return o->why ? o->why : -1;
+  if (ferror (o->stream)) return o->why ? o->why : -1;
   errno = 0;
   if (fflush (o->stream) == 0 && (o->file < 0 || fsync (o->file) == 0)) return 0;
   return errno ? errno : -1;
@@ -207,8 +202,7 @@ static int output_close (pw_output *o, int why) {
 }
 
 int pw_output_ready (pw_output *o, pw_error *error) {
-  if (o->stream == NULL) return o->why ? output_fail (o, o->why, 1, error) : PW_OK;
-  o->why = output_close (o, output_sync (o));
+  if (o->stream) o->why = output_close (o, output_sync (o));
   return o->why ? output_fail (o, o->why, 1, error) : PW_OK;
 }
 
