@@ -72,7 +72,7 @@ typedef struct {
 
 extern const pw_unit_name pw_unit_names[]; /* ended by a NULL name */
 
-/* ---- Reading (slurp.c) ---- */
+/* ---- Reading (read.c) ---- */
 
 /* Reads the rest of a file of at most `most` bytes into *text, malloced, with a 0 after it; free it in every case. */
 int pw_read_rest (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error);

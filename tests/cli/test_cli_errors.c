@@ -129,7 +129,7 @@ static void test_bad_models (void **state) {
 
   cli_write ("none.c", "int nothing;\n");
   assert_int_equal (cli_run ("pinwheel run @/none.c"), 2);
-  assert_non_null (strstr (cli_err, "is no Pinwheel model: a model file ends with PW_MODEL (...)"));
+  assert_non_null (strstr (cli_err, "is not a Pinwheel model: a model file ends with PW_MODEL (...)"));
 
   cli_write ("broken.c", "#include \"pinwheel.h\"\nnonsense (;\n");
   assert_int_equal (cli_run ("pinwheel run @/broken.c"), 2);

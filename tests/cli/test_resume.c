@@ -112,8 +112,8 @@ static void test_other_run (void **state) {
 static void test_other_file (void **state) {
   (void)state;
   resume_bad ("rm @/b.ck", "", "cannot read the checkpoint @/b.ck: No such file or directory");
-  resume_bad ("echo hello >@/b.ck", "", "@/b.ck is no checkpoint of Pinwheel");
-  resume_bad (": >@/b.ck", "", "@/b.ck is no checkpoint of Pinwheel");
+  resume_bad ("echo hello >@/b.ck", "", "@/b.ck is not a checkpoint of Pinwheel");
+  resume_bad (": >@/b.ck", "", "@/b.ck is not a checkpoint of Pinwheel");
   resume_bad ("rm @/b.ck; mkdir @/b.ck", "",
               "cannot read the checkpoint @/b.ck: it is a directory, not a regular file");
   cli_good ("rmdir @/b.ck");
@@ -128,7 +128,7 @@ static void test_other_file (void **state) {
 /* A run that cannot be resumed leaves the summary of the one before it. */
 static void test_summary (void **state) {
   (void)state;
-  resume_bad ("echo old >@/b.json; echo hello >@/b.ck", "--json @/b.json", "@/b.ck is no checkpoint of Pinwheel");
+  resume_bad ("echo old >@/b.json; echo hello >@/b.ck", "--json @/b.json", "@/b.ck is not a checkpoint of Pinwheel");
   assert_string_equal (cli_file ("b.json"), "old\n");
   cli_good ("test ! -e @/b.json.part");
 }
@@ -169,7 +169,7 @@ static void test_options (void **state) {
   cli_bad ("pinwheel run ezyroller --checkpoint @/c.ck -o -", 2,
            "--checkpoint: a table on standard output cannot be continued; write it to a file");
   cli_bad ("pinwheel run ezyroller --checkpoint @/c.ck -o /dev/null", 2,
-           "/dev/null cannot be continued: it is no regular file");
+           "/dev/null cannot be continued: it is not a regular file");
   cli_bad ("pinwheel run ezyroller --checkpoint @/none/c.ck", 1, "cannot write @/none/c.ck: No such file or directory");
 }
 

@@ -34,7 +34,7 @@ static int plugin_load (void *context, const char *object, pw_error *error) {
   if (f->handle == NULL) return pw_fail (error, PW_INPUT, "cannot load %s: %s", f->path, plugin_reason (object));
   f->table = dlsym (f->handle, "pw_plugin");
   if (f->table == NULL)
-    return pw_fail (error, PW_INPUT, "%s is no Pinwheel model: a model file ends with PW_MODEL (...)", f->path);
+    return pw_fail (error, PW_INPUT, "%s is not a Pinwheel model: a model file ends with PW_MODEL (...)", f->path);
   return pw_plugin_check (f->table, f->path, error);
 }
 

@@ -103,10 +103,10 @@ static int units_read (const char *text, units_value *u) {
     size_t n = (degree ? 2 : 0) + strcspn (p + (degree ? 2 : 0), ends);
     if (n == 0 && *p == '1') n = 1;
     if (n > 0) {
-      const char *behind = units_power (p + n, &power);
+      const char *after = units_power (p + n, &power);
       if (power == 0 || units_name (p, n, over ? -power : power, u) != PW_OK) return PW_INPUT;
       over = 0;
-      p = behind;
+      p = after;
     }
     n = strspn (p, " *");
     if (*(p += n) == '/' && !over)

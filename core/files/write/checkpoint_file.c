@@ -47,7 +47,7 @@ static int checkpoint_load (const char *path, char **text, size_t *size, pw_erro
 static int checkpoint_version (const char *path, const char *text, pw_error *error) {
   static const char magic[] = PW_CHECKPOINT_MAGIC;
   size_t word = strcspn (magic, "0123456789");
-  if (strncmp (text, magic, word) != 0) return pw_fail (error, PW_INPUT, "%s is no checkpoint of Pinwheel", path);
+  if (strncmp (text, magic, word) != 0) return pw_fail (error, PW_INPUT, "%s is not a checkpoint of Pinwheel", path);
   if (strncmp (text, magic, sizeof magic - 1) == 0) return PW_OK;
   return pw_fail (error, PW_INPUT, "%s is a checkpoint of format %.*s; this Pinwheel reads format %d", path,
                   (int)strspn (text + word, "0123456789"), text + word, atoi (magic + word));

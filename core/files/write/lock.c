@@ -12,7 +12,7 @@
 enum { LOCK_TRIES = 100 }; /* retries when another process has just released the file */
 
 /* 0 or an errno value.  File systems without locks give no protection. */
-static int lock_take (int file) {
+static int lock_acquire (int file) {
   while (flock (file, LOCK_EX | LOCK_NB) != 0) {
     if (errno == ENOLCK || errno == EOPNOTSUPP || errno == ENOSYS) return 0;
     if (errno != EINTR) return errno;
@@ -44,7 +44,7 @@ static int lock_opened (int file, const char *path) {
   struct stat info, now;
   if (fstat (file, &info) != 0) return errno;
   if (!S_ISREG (info.st_mode)) return ENODEV;
-  int why = lock_take (file);
+  int why = lock_acquire (file);
   if (why) return why;
   return lstat (path, &now) == 0 && now.st_dev == info.st_dev && now.st_ino == info.st_ino ? 0 : ESTALE;
 }
@@ -70,7 +70,7 @@ int pw_lock_path (const char *path, pw_error *error) {
 
 int pw_lock_folder (const char *path, pw_error *error) {
   int file = open (path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  int why = file < 0 ? errno : lock_take (file);
+  int why = file < 0 ? errno : lock_acquire (file);
   if (why == EBADF) why = 0; /* NFS only locks files open for writing, never folders */
   if (why == 0) return file;
   if (file >= 0) close (file);

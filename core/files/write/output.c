@@ -300,7 +300,7 @@ int pw_output_continued (const pw_output *o) {
 
 int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
   if (o->part == NULL)
-    return pw_fail (error, PW_INPUT, "%s cannot be continued: it is no regular file",
+    return pw_fail (error, PW_INPUT, "%s cannot be continued: it is not a regular file",
                     o->stream == stdout ? "standard output" : o->path);
   int why = output_sync (o);
   if (why) return output_fail (o, why, 0, error);
@@ -327,7 +327,7 @@ static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
   pw_location p;
   int why = output_place (o, &p, ".part");
   if (why) return output_fail (o, why, 0, error);
-  if (o->part == NULL) return pw_fail (error, PW_INPUT, "cannot continue %s: it is no regular file", o->path);
+  if (o->part == NULL) return pw_fail (error, PW_INPUT, "cannot continue %s: it is not a regular file", o->path);
   why = output_open_part (o, PW_LOCK_EXISTING);
   int absent = why == ENOENT;
   if (absent) why = output_take_back (o, mark);

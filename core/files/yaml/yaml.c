@@ -68,7 +68,7 @@ static int yaml_default (const pw_reader *r, const pw_node *node, const char *wh
                          pw_parameter *p) {
   yaml_search s = { names, 0 };
   if (node->type == PW_YAML_SCALAR && pw_expression_names (node->text, yaml_is_parameter, &s))
-    return pw_yaml_fail (r, pw_yaml_place (r->y, node, s.at),
+    return pw_yaml_fail (r, pw_yaml_offset (r->y, node, s.at),
                          "%s: a default is made of numbers; what follows from parameters belongs in let", what);
   return pw_yaml_number (r, node, what, p->domain, &p->value);
 }

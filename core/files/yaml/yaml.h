@@ -117,13 +117,13 @@ int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, dou
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value);
 
 /* Whether an expression depends on the time t or a state, BODY.phi, and at which offset (at may be NULL). */
-int pw_yaml_moves (const char *text, size_t *at);
+int pw_yaml_varies (const char *text, size_t *at);
 
 /* Converts an offset in a scalar's text to an offset in the source. */
-size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset);
+size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset);
 
 /* Adds the names of all bodies so far. */
-void pw_yaml_try_bodies (const pw_reader *r, pw_nearest *near);
+void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near);
 
 /* ---- Building ---- */
 

@@ -72,7 +72,7 @@ static int build_body_name (const pw_reader *r, const pw_node *node, const char 
   if (pw_yaml_text (r, node, what, name) != PW_OK) return r->error->status;
   if (strcmp (*name, "ground") == 0 || pw_names_find (&r->bodies, *name) >= 0) return PW_OK;
   pw_nearest near = { .sought = *name };
-  pw_yaml_try_bodies (r, &near);
+  pw_yaml_suggest_bodies (r, &near);
   pw_nearest_try (&near, "ground");
   return pw_yaml_fail (r, node->at, "%s: there is no body \"%.60s\"%s", what, *name,
                        pw_nearest_text (&near, hint, sizeof hint));
@@ -113,7 +113,7 @@ static int build_field (pw_reader *r, const pw_kind *kind, const pw_field *f, co
 /* ---- Elements ---- */
 
 /* Whether a text contains a word. */
-static int build_says (const char *text, const char *word) {
+static int build_contains_word (const char *text, const char *word) {
   const char *at = strlen (word) < 3 ? NULL : strstr (text, word);
   return at != NULL && (at == text || strchr (" (", at[-1]));
 }
@@ -122,9 +122,9 @@ static int build_says (const char *text, const char *word) {
 static const char *build_later_kind (const pw_node *first) {
   for (const pw_node *n = first; n; n = n->next->next) {
     int named = n->type == PW_YAML_SCALAR && (strcmp (n->text, "kind") == 0 || strcmp (n->text, "type") == 0);
-    const pw_node *said = named ? n->next : n;
-    for (const pw_kind *const *k = pw_kinds; *k && said->type == PW_YAML_SCALAR; k++)
-      if (strcmp ((*k)->name, said->text) == 0) return (*k)->name;
+    const pw_node *kind = named ? n->next : n;
+    for (const pw_kind *const *k = pw_kinds; *k && kind->type == PW_YAML_SCALAR; k++)
+      if (strcmp ((*k)->name, kind->text) == 0) return (*k)->name;
   }
   return NULL;
 }
@@ -142,7 +142,7 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   const char *kind = build_later_kind (first);
   if (kind) pw_yaml_fail (r, first->at, "an element begins with its kind: write {%s: NAME, ...}", kind);
   for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
-    if (build_says ((*k)->about, first->text)) near.best = (*k)->name, near.near = 1;
+    if (build_contains_word ((*k)->about, first->text)) near.best = (*k)->name, near.near = 1;
   pw_yaml_fail (r, first->at, "an element begins with its kind, and there is no kind \"%.60s\"%s", first->text,
                 near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");
   return NULL;

@@ -40,7 +40,7 @@ reading_fail (const reading *x, size_t at, const char *format, ...) {
   va_start (arguments, format);
   vsnprintf (text, sizeof text, format, arguments);
   va_end (arguments);
-  return pw_yaml_fail (x->r, pw_yaml_place (x->r->y, x->node, at), "%s: %s", x->what, text);
+  return pw_yaml_fail (x->r, pw_yaml_offset (x->r->y, x->node, at), "%s: %s", x->what, text);
 }
 
 /* Reads an expression of variables, which end with NULL. */
@@ -72,7 +72,7 @@ static int state_elements (pw_reader *r) {
 static int state_no_owner (const reading *x, const char *owner, size_t at) {
   char hint[200];
   pw_nearest near = { .sought = owner };
-  pw_yaml_try_bodies (x->r, &near);
+  pw_yaml_suggest_bodies (x->r, &near);
   for (size_t i = 0; i < x->r->elements.size; i++) {
     const struct pw_name *e = &x->r->elements.slot[i];
     if (e->name && pw_kinds[e->value]->own > 0) pw_nearest_try (&near, e->name);

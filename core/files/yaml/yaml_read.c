@@ -9,7 +9,7 @@ const char *pw_yaml_found (const pw_node *node) {
 /* ---- Maps ---- */
 
 /* A hint for a key that is not a plain name, or "". */
-static const char *read_slip (const char *text, const char *const *key) {
+static const char *read_key_hint (const char *text, const char *const *key) {
   for (int i = 0; key[i]; i++) {
     size_t n = strlen (key[i]);
     if (strncmp (text, key[i], n) == 0 && text[n] == ':') return "; a space goes after the colon";
@@ -34,9 +34,9 @@ static int read_key (const pw_reader *r, const pw_node *node, const char *const 
     int empty = node->next->type == PW_YAML_SCALAR && !node->next->quoted && *node->next->text == 0;
     return empty ? pw_yaml_fail (r, node->at, "\"%s\" has no value", key[i]) : PW_OK;
   }
-  const char *slip = read_slip (node->text, key);
+  const char *mistake = read_key_hint (node->text, key);
   return pw_yaml_fail (r, node->at, "%s has no \"%.60s\"%s", what, node->text,
-                       *slip ? slip : pw_nearest_text (&near, hint, sizeof hint));
+                       *mistake ? mistake : pw_nearest_text (&near, hint, sizeof hint));
 }
 
 int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *what,
@@ -74,19 +74,19 @@ int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *what, con
   return r->error->status;
 }
 
-size_t pw_yaml_place (const pw_yaml *y, const pw_node *node, size_t offset) {
+size_t pw_yaml_offset (const pw_yaml *y, const pw_node *node, size_t offset) {
   size_t at = node->at + (node->quoted != 0), n = strlen (node->text);
   return at + n <= y->size && strncmp (y->source + at, node->text, n) == 0 ? at + offset : node->at;
 }
 
-static int read_moves (void *context, const char *name, size_t length, size_t at) {
+static int read_varies (void *context, const char *name, size_t length, size_t at) {
   if ((length != 1 || *name != 't') && memchr (name, '.', length) == NULL) return 0;
   if (context) *(size_t *)context = at;
   return 1;
 }
 
-int pw_yaml_moves (const char *text, size_t *at) {
-  return pw_expression_names (text, read_moves, at);
+int pw_yaml_varies (const char *text, size_t *at) {
+  return pw_expression_names (text, read_varies, at);
 }
 
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value) {
@@ -99,8 +99,8 @@ int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, p
       pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (r->x, node->text, value, &trouble);
   if (status == PW_RESOURCE) return pw_yaml_no_memory (r);
   if (status != PW_OK)
-    return pw_yaml_fail (r, pw_yaml_place (r->y, node, trouble.at), "%s: %s", what,
-                         pw_yaml_moves (node->text, &at) && at == trouble.at
+    return pw_yaml_fail (r, pw_yaml_offset (r->y, node, trouble.at), "%s: %s", what,
+                         pw_yaml_varies (node->text, &at) && at == trouble.at
                              ? "only the value of a signal may depend on the time t or on states"
                              : trouble.text);
   const char *expected = pw_domain_check (domain, *value);
@@ -128,7 +128,7 @@ int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, c
                        pw_nearest_text (&near, hint, sizeof hint));
 }
 
-void pw_yaml_try_bodies (const pw_reader *r, pw_nearest *near) {
+void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near) {
   int bodies;
   const pw_body *body = pw_model_bodies (r->m, &bodies);
   for (int i = 0; i < bodies; i++) pw_nearest_try (near, body[i].name);

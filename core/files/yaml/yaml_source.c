@@ -74,7 +74,7 @@ static int source_check (const pw_reader *r) {
   while (p < end) {
     size_t at = (size_t)(p - begin);
     int n = pw_utf8_size (p);
-    if (n == 0) return pw_yaml_fail (r, at, "byte %02X is no UTF-8; a model file is text in UTF-8", (unsigned char)*p);
+    if (n == 0) return pw_yaml_fail (r, at, "byte %02X is not UTF-8; a model file is text in UTF-8", (unsigned char)*p);
     if ((*p == 0 || pw_control (p)) && !(*p == '\r' && p[1] == '\n'))
       return pw_yaml_fail (r, at, "a control character, code %d, does not belong in a model file", pw_control (p));
     if (*p == '%' && (at == 0 || p[-1] == '\n'))

@@ -208,7 +208,7 @@ static const char *tree_hint (const pw_yaml *y, size_t at, const char *message) 
 static int tree_syntax (const tree *x) {
   void *first = NULL;
   struct fy_diag_error *e = fy_diag_errors_iterate (x->diag, &first);
-  if (e == NULL) return pw_yaml_fail (&x->r, x->at, "this is no YAML");
+  if (e == NULL) return pw_yaml_fail (&x->r, x->at, "this is not YAML");
   const char *source = x->y->source, *p = source, *end = source + x->y->size;
   for (int line = e->line; line > 1 && p < end; p++) line -= *p == '\n';
   for (int column = e->column; column > 1 && p < end && *p != '\n'; column--) p += pw_utf8_size (p);
@@ -217,7 +217,7 @@ static int tree_syntax (const tree *x) {
     size_t begin = x->open[x->depth - 1]->at;
     if (source[begin] == '[' || source[begin] == '{') at = begin;
   }
-  const char *message = e->msg ? e->msg : "this is no YAML";
+  const char *message = e->msg ? e->msg : "this is not YAML";
   return pw_yaml_fail (&x->r, at, "%s%s", message, tree_hint (x->y, at, message));
 }
 
