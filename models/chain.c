@@ -14,7 +14,7 @@ static const pw_parameter parameters[] = {
   { PW_AT (chain, m), 0.1, "kg", "mass of a link, a uniform rod", PW_POSITIVE },
   { PW_AT (chain, l), 0.1, "m", "length of a link", PW_POSITIVE },
   { PW_AT (chain, g), 9.81, "m/s^2", "gravity", PW_REAL },
-  { PW_AT (chain, theta), 0, "rad", "angle against the horizontal at the start", PW_REAL },
+  { PW_AT (chain, theta), 0, "rad", "initial angle to the horizontal", PW_REAL },
   { .name = NULL },
 };
 

@@ -182,10 +182,10 @@ typedef struct {
 
 static const pw_parameter parameters[] = {
   { PW_AT (model, m), 1, "kg", "mass of the bead", PW_POSITIVE },
-  { PW_AT (model, mu), 1, "m^3/s^2", "strength of the attraction over the mass", PW_POSITIVE },
+  { PW_AT (model, mu), 1, "m^3/s^2", "strength of the attraction divided by the mass", PW_POSITIVE },
   { PW_AT (model, a), 1, "m", "long semi-axis of the wire", PW_POSITIVE },
   { PW_AT (model, e), 0.6, "", "its eccentricity, below 1", PW_NONNEGATIVE },
-  { PW_AT (model, factor), 1, "", "speed at the start over that of a planet", PW_REAL },
+  { PW_AT (model, factor), 1, "", "initial speed divided by that of a planet", PW_REAL },
   { .name = NULL },
 };
 

@@ -10,10 +10,12 @@ typedef struct {
 } ezyroller;
 
 static const pw_parameter parameters[] = {
-  { PW_AT (ezyroller, a), 0.5, "m", "wheel A behind the centre of mass of the frame", PW_NONNEGATIVE },
-  { PW_AT (ezyroller, b), 0.5, "m", "hinge B ahead of the centre of mass of the frame", PW_NONNEGATIVE },
-  { PW_AT (ezyroller, c), 0.125, "m", "wheel C from the centre of mass of the steering assembly", PW_NONNEGATIVE },
-  { PW_AT (ezyroller, d), 0.125, "m", "hinge B from the centre of mass of the steering assembly", PW_NONNEGATIVE },
+  { PW_AT (ezyroller, a), 0.5, "m", "distance from the frame's centre of mass to wheel A", PW_NONNEGATIVE },
+  { PW_AT (ezyroller, b), 0.5, "m", "distance from the frame's centre of mass to hinge B", PW_NONNEGATIVE },
+  { PW_AT (ezyroller, c), 0.125, "m", "distance from the steering assembly's centre of mass to wheel C",
+    PW_NONNEGATIVE },
+  { PW_AT (ezyroller, d), 0.125, "m", "distance from the steering assembly's centre of mass to hinge B",
+    PW_NONNEGATIVE },
   { PW_AT (ezyroller, m1), 1, "kg", "mass of the frame with its rider", PW_POSITIVE },
   { PW_AT (ezyroller, I1), 0.1, "kg m^2", "inertia of the frame about its centre of mass", PW_POSITIVE },
   { PW_AT (ezyroller, m2), 0, "kg", "mass of the steering assembly", PW_NONNEGATIVE },

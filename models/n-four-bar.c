@@ -17,7 +17,7 @@ static const pw_parameter parameters[] = {
   { PW_AT (four_bar, m), 1, "kg", "mass of a bar, a uniform rod", PW_POSITIVE },
   { PW_AT (four_bar, l), 1, "m", "length of a bar", PW_POSITIVE },
   { PW_AT (four_bar, g), 9.81, "m/s^2", "gravity", PW_REAL },
-  { PW_AT (four_bar, speed), -1, "rad/s", "angular velocity of the cranks at the start", PW_REAL },
+  { PW_AT (four_bar, speed), -1, "rad/s", "initial angular velocity of the cranks", PW_REAL },
   { .name = NULL },
 };
 

@@ -13,14 +13,15 @@ typedef struct {
 
 static const pw_parameter parameters[] = {
   { PW_AT (trailers, n), 2, "", "number of trailers", PW_COUNT },
-  { PW_AT (trailers, R), 2, "m", "radius the tractor turns on", PW_POSITIVE },
-  { PW_AT (trailers, w), 1, "rad/s", "rate of the turn", PW_REAL },
+  { PW_AT (trailers, R), 2, "m", "turning radius of the tractor", PW_POSITIVE },
+  { PW_AT (trailers, w), 1, "rad/s", "angular velocity of the turn", PW_REAL },
   { PW_AT (trailers, m0), 1, "kg", "mass of the tractor", PW_POSITIVE },
   { PW_AT (trailers, I0), 0.1, "kg m^2", "inertia of the tractor", PW_POSITIVE },
   { PW_AT (trailers, L), 0.6, "m", "length of the first trailer, from hitch to axle", PW_POSITIVE },
-  { PW_AT (trailers, longer), 0.2, "m", "how much longer each further trailer is", PW_NONNEGATIVE },
+  { PW_AT (trailers, longer), 0.2, "m", "additional length of each further trailer", PW_NONNEGATIVE },
   { PW_AT (trailers, m), 2, "kg", "mass of the first trailer", PW_POSITIVE },
-  { PW_AT (trailers, ratio), 0.25, "", "mass of each further trailer over that of the one before", PW_POSITIVE },
+  { PW_AT (trailers, ratio), 0.25, "", "mass of each further trailer divided by that of the previous one",
+    PW_POSITIVE },
   { PW_AT (trailers, rho), 0.2, "m", "radius of gyration of the trailers", PW_POSITIVE },
   { .name = NULL },
 };

@@ -14,7 +14,7 @@ static const pw_parameter parameters[] = {
   { PW_AT (inversor, a), 0.4, "m", "length of the crank, and distance of its pivot from O", PW_POSITIVE },
   { PW_AT (inversor, L), 1, "m", "length of the two arms", PW_POSITIVE },
   { PW_AT (inversor, s), 0.5, "m", "side of the rhombus", PW_POSITIVE },
-  { PW_AT (inversor, density), 1, "kg/m", "mass of the bars over their length", PW_POSITIVE },
+  { PW_AT (inversor, density), 1, "kg/m", "mass per length of the bars", PW_POSITIVE },
   { PW_AT (inversor, swing), 1.2, "rad", "amplitude of the crank", PW_REAL },
   { PW_AT (inversor, omega), PW_PI, "rad/s", "angular frequency of the crank", PW_REAL },
   { .name = NULL },

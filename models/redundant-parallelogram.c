@@ -17,7 +17,7 @@ static const pw_parameter parameters[] = {
   { PW_AT (parallelogram, l), 1, "m", "length of a crank, and distance of their pivots", PW_POSITIVE },
   { PW_AT (parallelogram, mc), 2, "kg", "mass of the coupler, a uniform rod", PW_POSITIVE },
   { PW_AT (parallelogram, g), 9.81, "m/s^2", "gravity", PW_REAL },
-  { PW_AT (parallelogram, theta), -PW_PI / 4, "rad", "angle of the cranks at the start", PW_REAL },
+  { PW_AT (parallelogram, theta), -PW_PI / 4, "rad", "initial angle of the cranks", PW_REAL },
   { .name = NULL },
 };
 

@@ -18,9 +18,9 @@ static const pw_parameter parameters[] = {
   { PW_AT (slider_crank, m1), 1, "kg", "mass of the crank, a uniform rod", PW_POSITIVE },
   { PW_AT (slider_crank, m2), 1, "kg", "mass of the rod, uniform", PW_POSITIVE },
   { PW_AT (slider_crank, ms), 1, "kg", "mass of the slider", PW_NONNEGATIVE },
-  { PW_AT (slider_crank, theta), PW_PI / 4, "rad", "angle of the crank at the start", PW_REAL },
-  { PW_AT (slider_crank, omega), 2, "rad/s", "angular velocity of the crank at the start", PW_REAL },
-  { PW_AT (slider_crank, g), 0, "m/s^2", "gravity, down along y", PW_REAL },
+  { PW_AT (slider_crank, theta), PW_PI / 4, "rad", "initial angle of the crank", PW_REAL },
+  { PW_AT (slider_crank, omega), 2, "rad/s", "initial angular velocity of the crank", PW_REAL },
+  { PW_AT (slider_crank, g), 0, "m/s^2", "gravity, along -y", PW_REAL },
   { .name = NULL },
 };
 

@@ -12,9 +12,9 @@ typedef struct {
 
 static const pw_parameter parameters[] = {
   { PW_AT (leg, size), 0.01, "m", "unit of the lengths", PW_POSITIVE },
-  { PW_AT (leg, density), 0.5, "kg/m", "mass of the bars over their length", PW_POSITIVE },
+  { PW_AT (leg, density), 0.5, "kg/m", "mass per length of the bars", PW_POSITIVE },
   { PW_AT (leg, omega), -PW_PI, "rad/s", "angular velocity of the crank", PW_REAL },
-  { PW_AT (leg, load), 0, "N", "force on the foot, up", PW_REAL },
+  { PW_AT (leg, load), 0, "N", "upward force on the foot", PW_REAL },
   { .name = NULL },
 };
 

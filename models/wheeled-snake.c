@@ -18,9 +18,9 @@ static const pw_parameter parameters[] = {
   { PW_AT (snake, l), 0.2, "m", "length of a link", PW_POSITIVE },
   { PW_AT (snake, amplitude), 0.4, "rad", "amplitude of the joints", PW_REAL },
   { PW_AT (snake, omega), PW_PI, "rad/s", "angular frequency of the wave", PW_REAL },
-  { PW_AT (snake, lag), 0.8, "rad", "phase by which each joint lags the one ahead", PW_REAL },
-  { PW_AT (snake, stiffness), 5, "N m/rad", "of the motors", PW_NONNEGATIVE },
-  { PW_AT (snake, damping), 0.5, "N m s/rad", "of the motors", PW_NONNEGATIVE },
+  { PW_AT (snake, lag), 0.8, "rad", "phase lag of each joint behind the one ahead", PW_REAL },
+  { PW_AT (snake, stiffness), 5, "N m/rad", "stiffness of the motors", PW_NONNEGATIVE },
+  { PW_AT (snake, damping), 0.5, "N m s/rad", "damping of the motors", PW_NONNEGATIVE },
   { .name = NULL },
 };
 
