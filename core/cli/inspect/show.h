@@ -8,7 +8,7 @@
  * default method. */
 int pw_show_matrices (const pw_cli_model *m, double t, pw_error *error);
 
-/* Prints the values of a field at an address as a text model has them, with so many digits.  With less than 17, tables
+/* Prints the values of a field at an address as a text model has them, with this number of digits.  With fewer than 17, tables
  * are abridged. */
 void pw_show_field (const pw_field *f, const void *at, int digits);
 
