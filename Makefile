@@ -124,7 +124,7 @@ deps:
 # ---- Objects; each folder sees only what it may include (-iquote: core/signals/signal.h is not <signal.h>) ----
 
 layer = $(addprefix -iquote ,$(1))
-CORE_LAYERS   := core $(addprefix core/,base signals model system selftest)
+CORE_LAYERS   := core $(addprefix core/,base signals model system selftest specialise)
 SOLVER_LAYERS := $(patsubst %/,%,$(wildcard solvers/ solvers/*/))
 FILE_LAYERS   := $(patsubst %/,%,$(wildcard core/files/ core/files/*/))
 CLI_LAYERS    := $(patsubst %/,%,$(wildcard core/cli/ core/cli/*/))
@@ -141,6 +141,8 @@ $(call obj,core/cli/plot/animate.c core/cli/plot/figure.c core/cli/inspect/new.c
 $(call obj,core/cli/inspect/new.c): $(BUILD)/obj/core/cli/inspect/new.inc
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
+$(call obj,core/specialise/sources.c): $(BUILD)/obj/core/specialise/sources.inc
+$(call obj,core/specialise/sources.c): INCLUDE += -iquote $(BUILD)/obj/core/specialise
 $(call obj,core/cli/sweep/sweep.c) $(BUILD)/pinwheel: private THREADS = -pthread
 ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 # Libraries below call functions that tests wrap.
@@ -177,6 +179,16 @@ $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp)
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const figure_$$(basename $$f .gp | tr - _)[] = {"; \
 	  $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
+
+# Texts of the sources that specialised scenes contain.
+SPECIALISED := core/specialise/scene.h core/base/sine.h $(wildcard core/specialise/template/*.c core/kinds/*.h core/kinds/*/*.c)
+$(BUILD)/obj/core/specialise/sources.inc: $(SPECIALISED)
+	@mkdir -p $(@D)
+	@for f in $^; do echo "static const char *const source_$$(basename $$f | tr .- __)[] = {"; \
+	  sed 's/^const pw_kind pw_kind_/static const pw_kind scene_/' $$f | $(AS_STRINGS); echo 'NULL };'; done >$@
+	@echo 'const pw_source_text pw_source_texts[] = {' >>$@
+	@for f in $^; do n=$$(basename $$f); echo "{ \"$$n\", source_$$(echo $$n | tr .- __) },"; done >>$@
+	@echo '{ NULL, NULL } };' >>$@
 
 # ---- Libraries, headers, models, programs ----
 

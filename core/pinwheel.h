@@ -764,6 +764,10 @@ const double *pw_system_initial_v (const pw_system *s);
  * jumps there. */
 int pw_system_jumps (const pw_system *s, double t);
 
+/* C code for this scene alone, which evaluates and projects it faster than the library (pw_settings.specialised).  NULL
+ * and the error if there is none: redundant constraints, or too many constraint equations.  Free the text. */
+char *pw_system_source (const pw_system *s, pw_error *error);
+
 /* ---- Elements of a system, in the order of its constraint equations ---- */
 
 /* An element that acts on every body appears once per body. */

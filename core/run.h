@@ -35,6 +35,9 @@ typedef struct {
   const pw_initial_value *initial;
   int initials;
 
+  /* Specialised code of the system, from compiling pw_system_source; or NULL.  It must outlive the run. */
+  const struct pw_specialised *specialised;
+
   const struct pw_method *const *methods; /* methods besides the built-in ones, ending with NULL; or NULL */
 } pw_settings;
 

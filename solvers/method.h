@@ -27,6 +27,9 @@ struct pw_run {
   char *rank_memory;
   double conditioning;    /* of the active rows at the state reached (rank.h) */
   double reselect;        /* its value below which other rows are tried */
+  const struct pw_specialised *specialised; /* code in use, or NULL */
+  struct pw_scene *scene; /* its data */
+  void *scene_memory;
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refuse;          /* sine at which an evaluation is refused */
@@ -277,6 +280,7 @@ typedef struct {
   int iterations;              /* of the last position projection */
   const unsigned char *active; /* rows that are enforced; NULL: all */
   int alone;                   /* 1: inactive rows are not checked */
+  int by_mass;                 /* 1: both metrics are the mass matrix */
   int against;                 /* redundant row violated after the last position projection, or -1 */
 } pw_projector;
 
@@ -302,6 +306,19 @@ int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v
 /* Removes from an error of positions or velocities the part that a projection onto the first `rows` equations
  * removes, in the metric of the saddle `k` (all rows), which must be factorised at the current configuration. */
 void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
+
+/* ---- Specialised code (specialised.c) ---- */
+
+/* Opens the settings' specialised code, if any.  Errors: PW_INPUT, PW_RESOURCE. */
+int pw_specialised_open (pw_run *r, pw_error *error);
+void pw_specialised_close (pw_run *r);
+
+/* As pw_run_accelerate and pw_project_state, if specialised code can do it: 1; 0 if not.  With `rate`, which receives
+ * the ledger's rates, the workspace keeps its state; otherwise kinematics and J are those of the new one. */
+int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda,
+                             double *rate);
+int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
+                            double *lambda);
 
 /* ---- Initial conditions ---- */
 

@@ -6,7 +6,7 @@
 #include "unroll.h"
 
 /* Internal coordinates are not copied: batches point into q and v. */
-static void kinematics_internal (pw_workspace *w, const double *q, const double *v) {
+void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     if (q) k->b.q = q + k->own;
     k->b.v = v + k->own;
@@ -15,7 +15,7 @@ static void kinematics_internal (pw_workspace *w, const double *q, const double 
 
 /* Sines and cosines of two bodies at a time; the rest, and angles beyond the limit, one by one. */
 static inline void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
-  if (w->s->coords > 3 * w->s->bodies) kinematics_internal (w, q, v);
+  if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
   _Static_assert(PW_SINE_LANES == 2, "bodies are taken in pairs");
   for (; p + 1 < end; p += 2, q += 6, v += 6) {
@@ -58,7 +58,7 @@ PW_INLINE int kinematics_sources (pw_workspace *w, int state_dependent, double t
 }
 
 /* Signals of time only are evaluated once per time; stages at the same time share them. */
-static int kinematics_signals (pw_workspace *w, double t, const double *q, const double *v) {
+int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
   if (t != w->t_signal) {
     w->t_signal = NAN; /* in case of failure, some have changed */
     if (kinematics_sources (w, 0, t, q, v) != PW_OK) return PW_METHOD;
@@ -69,7 +69,7 @@ static int kinematics_signals (pw_workspace *w, double t, const double *q, const
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
   kinematics_configurations (w, q, v);
-  return t == w->t_signal && w->s->state_dependent == 0 ? PW_OK : kinematics_signals (w, t, q, v);
+  return t == w->t_signal && w->s->state_dependent == 0 ? PW_OK : pw_update_signals (w, t, q, v);
 }
 
 int pw_update_velocities (pw_workspace *w, const double *v) {
@@ -79,7 +79,7 @@ int pw_update_velocities (pw_workspace *w, const double *v) {
     p->vy = from[1];
     p->omega = from[2];
   }
-  if (w->s->coords > 3 * w->s->bodies) kinematics_internal (w, NULL, v);
+  if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, NULL, v);
   return w->s->state_dependent > 0 ? kinematics_sources (w, 1, w->t_signal, NULL, v) : PW_OK;
 }
 

@@ -62,6 +62,7 @@ struct pw_workspace {
   pw_element_batch *batch;         /* batches: copies of the system's, with arrays of this workspace */
   pw_element_batch **force;        /* those with a force that is not constant */
   pw_source *source;               /* sources */
+  double *u, *J;                   /* those of all batches: sources x 3; entries of J, element by element */
   pw_configuration *configuration; /* bodies + 1; the last is the ground */
   double *scratch;                 /* rows x 3 + coords + 3 */
   pw_scale scale;                  /* the run's */
@@ -105,6 +106,11 @@ static inline double pw_larger (double a, double b) {
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v);
 /* Updates velocities, and signals that read them, at unchanged time and positions.  Returns as pw_update_kinematics. */
 int pw_update_velocities (pw_workspace *w, const double *v);
+
+/* Evaluates signals that have changed; non-zero if one fails. */
+int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v);
+/* Configurations have been stored by specialised code: points the batches to internal coordinates. */
+void pw_point_to_internal (pw_workspace *w, const double *q, const double *v);
 
 /* 1: the signals of forces keep their current values; 0: they are evaluated again. */
 void pw_hold_signals (pw_workspace *w, int hold);

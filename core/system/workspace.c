@@ -3,14 +3,20 @@
 #include <stdlib.h>
 #include "system.h"
 
+static size_t workspace_entries (const pw_system *s) {
+  size_t entries = 0;
+  for (int i = 0; i < s->batches; i++)
+    entries += (size_t)s->batch[i].b.count * (size_t)(s->batch[i].kind->rows * s->batch[i].b.cols);
+  return entries;
+}
+
 /* Copies a batch of the system, with arrays of the workspace. */
-static void workspace_batch (pw_layout *l, const pw_element_batch *from, const pw_workspace *w, pw_element_batch *k) {
+static void workspace_batch (pw_layout *l, const pw_element_batch *from, const pw_workspace *w, double *u, double *J,
+                             pw_element_batch *k) {
   const pw_kind *kind = from->kind;
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
   size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3;
   int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
-  double *u = pw_take (l, n * (size_t)kind->signals * 3, sizeof *u);
-  double *J = pw_take (l, n * (size_t)kind->rows * cols, sizeof *J);
   double *space = pw_take (l, scratch ? n * block : 0, sizeof *space);
   if (l->base == NULL) return;
   *k = *from;
@@ -28,7 +34,16 @@ static void workspace_layout (pw_layout *l, pw_workspace *w) {
   w->source = pw_take (l, (size_t)s->sources, sizeof *w->source);
   w->configuration = pw_take (l, (size_t)s->bodies + 1, sizeof *w->configuration);
   w->scratch = pw_take (l, (size_t)(3 * s->rows + s->coords) + 3, sizeof *w->scratch);
-  for (int i = 0; i < s->batches; i++) workspace_batch (l, &s->batch[i], w, l->base ? &w->batch[i] : NULL);
+  w->u = pw_take (l, 3 * (size_t)s->sources, sizeof *w->u);
+  w->J = pw_take (l, workspace_entries (s), sizeof *w->J);
+  double *u = w->u, *J = w->J;
+  for (int i = 0; i < s->batches; i++) {
+    const pw_element_batch *k = &s->batch[i];
+    workspace_batch (l, k, w, u, J, l->base ? &w->batch[i] : NULL);
+    if (l->base == NULL) continue;
+    u += 3 * k->b.count * k->kind->signals;
+    J += (size_t)k->b.count * (size_t)(k->kind->rows * k->b.cols);
+  }
   double *x = pw_take (l, 2 * (size_t)s->reads, sizeof *x);
   for (int i = 0; l->base && i < s->sources; x += 2 * s->source[i++].reads) {
     w->source[i] = s->source[i];

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include "method.h"
+#include "scene.h"
 
 /* With the mass matrix as metric, massless coordinates do not contribute to the norm: the constraint equations
  * determine them, as in the accelerations, and coordinates with mass do not move because of them.  If the holonomic
@@ -23,9 +24,11 @@ static pw_saddle *project_by_mass (pw_run *r, pw_error *error) {
 
 int pw_projector_open (pw_projector *p, pw_run *r, const double *weight_q, const double *weight_v, pw_error *error) {
   const pw_system *s = r->s;
-  *p = (pw_projector){
-    .own_velocity = weight_v != NULL, .velocity = weight_v ? NULL : r->saddle, .active = r->active, .against = -1
-  };
+  *p = (pw_projector){ .own_velocity = weight_v != NULL,
+                       .velocity = weight_v ? NULL : r->saddle,
+                       .active = r->active,
+                       .against = -1,
+                       .by_mass = weight_q == NULL && weight_v == NULL };
   p->scratch = malloc (((size_t)(3 * s->rows + s->coords) + 4) * sizeof *p->scratch);
   if (p->scratch == NULL) return pw_fail_memory (s, error);
   p->position = weight_q ? pw_saddle_open (r->w, weight_q, s->holonomic, r->active, error) : project_by_mass (r, error);
@@ -151,7 +154,12 @@ static int project_is_good (const pw_projector *p, pw_run *r) {
 
 int pw_project_state (pw_projector *p, pw_run *r, double t, double *q, double *v, double *a, double *lambda) {
   double worst;
-  int row, status = project_positions (p, r, t, q, v, &row, &worst);
+  int row, status;
+  if (pw_specialised_project (p, r, t, q, v, a, lambda)) {
+    p->iterations = r->scene->iterations, p->against = -1;
+    return PW_OK;
+  }
+  status = project_positions (p, r, t, q, v, &row, &worst);
   if (status != PW_OK) return status;
   pw_evaluate_J (r->w);
   pw_evaluate_gamma (r->w, lambda);

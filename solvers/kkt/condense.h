@@ -18,6 +18,7 @@ struct pw_saddle {
   const pw_system *s;
   const pw_workspace *w; /* where J is */
   int rows;
+  double postponed; /* 0, or: J has been evaluated but not factorised, and its pivots are not below this */
   pw_massless massless;
   double *inverse; /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight; the ground's 0 */
   double *force;   /* coords: forces changed by `massless` */

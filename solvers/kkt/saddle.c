@@ -41,7 +41,12 @@ void pw_saddle_close (pw_saddle *k) {
 
 /* ---- Factorising ---- */
 
+void pw_saddle_postpone (pw_saddle *k, double pivot) {
+  k->postponed = pivot;
+}
+
 int pw_saddle_factor (pw_saddle *k) {
+  k->postponed = 0;
   k->pivot_row = -1;
   k->pivot = k->massless.components ? pw_massless_factor (&k->massless) : INFINITY;
   if (!(k->pivot > k->guard)) return PW_RETRY;
@@ -53,11 +58,14 @@ int pw_saddle_factor (pw_saddle *k) {
   return k->pivot > k->guard ? PW_OK : PW_RETRY;
 }
 
-int pw_saddle_below (const pw_saddle *k, double sine) {
+int pw_saddle_below (pw_saddle *k, double sine) {
+  if (sine * sine <= k->postponed) return 0;
+  if (k->postponed > 0) pw_saddle_factor (k);
   return !(k->pivot >= sine * sine);
 }
 
-double pw_saddle_pivot (const pw_saddle *k, int *row) {
+double pw_saddle_pivot (pw_saddle *k, int *row) {
+  if (k->postponed > 0) pw_saddle_factor (k);
   *row = k->pivot_row < 0 && k->massless.components ? k->massless.least_row : k->pivot_row;
   return k->pivot > 0 ? sqrt (fmin (k->pivot, 1)) : 0;
 }
@@ -78,6 +86,7 @@ static void saddle_shorten (pw_saddle *k, double *lambda) {
 }
 
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda) {
+  if (k->postponed > 0) pw_saddle_factor (k);
   double *l = k->more ? k->y : lambda;
   if (k->massless.components) {
     if (f)

@@ -23,6 +23,10 @@ void pw_saddle_close (pw_saddle *k);
  * dependent row. */
 int pw_saddle_factor (pw_saddle *k);
 
+/* J has been evaluated by specialised code, which found pivots of at least `pivot`, a squared sine: it is factorised
+ * when it is needed. */
+void pw_saddle_postpone (pw_saddle *k, double pivot);
+
 /* Solves for a (coords) and lambda (rows; inactive ones get 0).  f may be NULL: zero.  a and f may be
  * the same, lambda and gamma too. */
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
@@ -31,10 +35,10 @@ void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double
 int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
 /* 1 if the smallest pivot of the last factorisation is below this sine. */
-int pw_saddle_below (const pw_saddle *k, double sine);
+int pw_saddle_below (pw_saddle *k, double sine);
 
 /* The smallest pivot of the last factorisation, as the sine of the angle between a row and those before it, and that
  * row: small near a singular configuration. */
-double pw_saddle_pivot (const pw_saddle *k, int *row);
+double pw_saddle_pivot (pw_saddle *k, int *row);
 
 #endif

@@ -186,12 +186,19 @@ void pw_rk_ledger (const pw_run *r, double *out, const double *y, double h) {
   }
 }
 
-/* Accelerations of a stage at the positions d->q. */
-static inline int rk_stage (pw_run *r, double t, double *v, double *a) {
+/* Accelerations and rates of the ledger of a stage at the positions d->q. */
+static inline int rk_stage (pw_run *r, double t, double *v, double *a, double *rate) {
   struct pw_method_data *d = r->data;
-  if (!d->minimal) return pw_run_accelerate (r, t, d->q, v, a, d->lambda);
-  int status = pw_nullspace_velocities (&d->nullspace, r, t, d->q, v);
-  return status == PW_OK ? pw_nullspace_accelerate (r, v, a, d->lambda) : status;
+  int status;
+  if (d->minimal) {
+    status = pw_nullspace_velocities (&d->nullspace, r, t, d->q, v);
+    if (status == PW_OK) status = pw_nullspace_accelerate (r, v, a, d->lambda);
+  } else {
+    if (pw_specialised_evaluate (r, t, d->q, v, a, d->lambda, rate)) return PW_OK;
+    status = pw_run_accelerate (r, t, d->q, v, a, d->lambda);
+  }
+  if (status == PW_OK) pw_ledger_rates (r, d->lambda, rate);
+  return status;
 }
 
 /* Zero-order hold: signals of forces keep their values at the beginning of the step.  Kinematics are updated first,
@@ -211,8 +218,7 @@ static int rk_stages (pw_run *r, double h) {
   for (int i = 1; i < b->stages && status == PW_OK; i++) {
     rk_combine (r, d->q, d->V[i], &d->row[i], h);
     double t = pw_before_breakpoint (r, r->t + b->c[i] * h);
-    status = rk_stage (r, t, d->V[i], d->A[i]);
-    if (status == PW_OK) pw_ledger_rates (r, d->lambda, d->R[i]);
+    status = rk_stage (r, t, d->V[i], d->A[i], d->R[i]);
   }
   if (d->held) pw_hold_signals (r->w, 0);
   return status;

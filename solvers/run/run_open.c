@@ -176,6 +176,7 @@ static int run_open (pw_run *r, const char *method, const pw_settings *settings,
   pw_run_count_moved (r);
   status = run_begin (r, error);
   if (status == PW_OK) pw_read_baumgarte (r);
+  if (status == PW_OK) status = pw_specialised_open (r, error);
   if (status == PW_OK) status = r->method->open (r, error);
   return status == PW_OK ? run_check_derivatives (r, method, error) : status;
 }

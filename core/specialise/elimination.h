@@ -1,0 +1,30 @@
+/* Symbolic elimination of the saddle-point system [ M J^T ; J 0 ] of a scene, in an order fixed when the code is
+ * generated: massless coordinates with the constraint equations that determine them, coordinates with mass, constraint
+ * equations by least fill-in (Duff, Erisman & Reid 2017, chapters 5 and 7). */
+#ifndef PW_ELIMINATION_H
+#define PW_ELIMINATION_H
+
+#include "symbolic.h"
+#include "system.h"
+
+typedef struct {
+  int coordinates, n;   /* unknowns: the coordinates, then the constraint equations */
+  pw_term *K, *L;       /* n x n: column p has its values when p was eliminated; multipliers */
+  pw_term *inverse;     /* n: reciprocal pivots */
+  int *order, *partner; /* n: unknowns in their order; partner of a 2 x 2 pivot, or -1 */
+  int *step;            /* n: position in the order; n + 1: takes no part */
+  int pivots, factors;  /* unknowns in the order; entries of F */
+  void *memory;
+} pw_elimination;
+
+/* K: n x n terms of the lower triangle and their mirror image, n = coordinates + rows; takes_part[i] = 0 for an
+ * equation that is ignored.  Writes the statements of the factorisation, which end with what the solution needs in F.
+ * PW_RETRY if a massless coordinate is determined by no equation, or an equation has no pivot.  Errors: PW_RESOURCE. */
+int pw_elimination_open (pw_elimination *x, const pw_system *s, const pw_term *K, const unsigned char *takes_part,
+                         pw_emitter *e);
+void pw_elimination_close (pw_elimination *x);
+
+/* Writes the statements that solve it; right: n terms, replaced by those of the solution. */
+void pw_elimination_solve (const pw_elimination *x, pw_emitter *e, pw_term *right);
+
+#endif

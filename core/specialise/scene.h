@@ -1,0 +1,49 @@
+/* The interface between a run and a specialised scene.  A generated file contains this header as it is; the tag
+ * PW_SCENE_ABI changes with it. */
+#ifndef PW_SCENE_H
+#define PW_SCENE_H
+
+#include "pinwheel.h"
+
+#define PW_SCENE_ABI 1
+#define PW_SCENE_PIVOT 4e-4 /* least pivot of a constraint equation relative to its diagonal entry: a squared sine */
+
+/* A run's data for specialised code.  Arrays over coordinates have `coordinates` entries, those over constraint
+ * equations `rows`. */
+typedef struct pw_scene {
+  const void *const *element;     /* batches: prepared elements */
+  const pw_kind *const *kind;     /* batches: element types */
+  const pw_signal *const *signal; /* signals */
+  const double *mass;             /* coordinates: diagonal of M */
+  const double *force;            /* coordinates: sum of the constant forces */
+  double *u;                      /* signals x 3: values and derivatives */
+  double *constant;               /* what `prepare` computes */
+  double *t_signal;               /* time of the last evaluation of u; NaN: none */
+  int (*update) (void *workspace, double t, const double *q, const double *v); /* evaluates u; non-zero: failed */
+  void *workspace;
+  double length, speed; /* scales of residuals [m], [m/s] */
+
+  /* Results of `project`: iterations; scaled and absolute residuals of positions and velocities. */
+  int iterations;
+  double position, g, velocity, jv;
+} pw_scene;
+
+/* Functions return 0, or 1 if the general engine has to do the work: an angle beyond the range of the own sine, a small
+ * pivot, values that are not finite, a signal that failed.  Nothing but c, J and u is modified then. */
+typedef struct pw_specialised {
+  int abi, constants;
+  unsigned long shape;          /* pw_system_shape of the system */
+  int (*prepare) (pw_scene *s); /* 1: a constant pivot is too small */
+  /* Accelerations and multipliers at a state; c (bodies + 1), J (entries of all elements), and the ledger's rates are
+   * stored unless NULL. */
+  int (*evaluate) (pw_scene *s, double t, const double *q, const double *v, double *a, double *lambda, double *rate,
+                   pw_configuration *c, double *J);
+  /* Projects a state onto the constraints in the metric of M, then as evaluate. */
+  int (*project) (pw_scene *s, double t, double *q, double *v, double *a, double *lambda, pw_configuration *c,
+                  double *J);
+} pw_specialised;
+
+/* Hash of what the generated text depends on besides the library's version. */
+unsigned long pw_system_shape (const pw_system *s);
+
+#endif

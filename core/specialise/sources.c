@@ -1,0 +1,4 @@
+/* Texts of the sources that generated code contains. */
+#include <stddef.h>
+#include "sources.h"
+#include "sources.inc"

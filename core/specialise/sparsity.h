@@ -1,0 +1,18 @@
+/* The sparsity of J and of the force of an element type, found at random states of random scenes. */
+#ifndef PW_SPARSITY_H
+#define PW_SPARSITY_H
+
+#include "system.h"
+
+/* An entry: 0 or +-1 for every definition; constant during a motion; or variable. */
+typedef enum { PW_ENTRY_ZERO, PW_ENTRY_ONE, PW_ENTRY_MINUS_ONE, PW_ENTRY_CONSTANT, PW_ENTRY_VARIABLE } pw_entry_type;
+
+typedef struct {
+  unsigned char J[PW_MAX_ROWS * PW_MAX_COLS]; /* rows x cols: pw_entry_type */
+  unsigned char force[PW_MAX_COLS];           /* cols: ZERO or VARIABLE */
+} pw_sparsity;
+
+/* A type that rejects random definitions has variable entries only.  Returns PW_OK or PW_RESOURCE. */
+int pw_sparsity_find (const pw_kind *kind, pw_sparsity *out);
+
+#endif

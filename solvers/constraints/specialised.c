@@ -1,0 +1,91 @@
+/* Specialised code in place of the general evaluation and projection.  It refuses states at which a pivot is small or a
+ * value extreme; the general engine evaluates these. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "method.h"
+#include "scene.h"
+
+static int specialised_update (void *workspace, double t, const double *q, const double *v) {
+  return pw_update_signals (workspace, t, q, v);
+}
+
+/* Pointers to elements, types and signals, and the constants: one block. */
+static int specialised_allocate (pw_run *r, int constants) {
+  const pw_system *s = r->s;
+  size_t k = (size_t)s->batches, n = (size_t)s->sources;
+  const void **element = r->scene_memory =
+      malloc ((2 * k + n + 1) * sizeof *element + (size_t)constants * sizeof (double));
+  if (element == NULL) return PW_RESOURCE;
+  const pw_kind **kind = (const pw_kind **)(void *)(element + k);
+  const pw_signal **signal = (const pw_signal **)(void *)(kind + k);
+  for (int i = 0; i < s->batches; i++) element[i] = s->batch[i].b.element, kind[i] = s->batch[i].kind;
+  for (int i = 0; i < s->sources; i++) signal[i] = &r->w->source[i].signal;
+  *r->scene = (pw_scene){ .element = element,
+                          .kind = kind,
+                          .signal = signal,
+                          .constant = (double *)(void *)(signal + n),
+                          .mass = s->mass,
+                          .force = s->constant,
+                          .u = r->w->u,
+                          .t_signal = &r->w->t_signal,
+                          .update = specialised_update,
+                          .workspace = r->w };
+  return PW_OK;
+}
+
+int pw_specialised_open (pw_run *r, pw_error *error) {
+  const pw_specialised *code = r->settings.specialised;
+  if (code == NULL) return PW_OK;
+  if (code->abi != PW_SCENE_ABI || code->shape != pw_system_shape (r->s))
+    return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
+  r->scene = malloc (sizeof *r->scene);
+  if (r->scene == NULL || specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
+  r->specialised = code->prepare (r->scene) == 0 && r->active == NULL ? code : NULL;
+  return PW_OK;
+}
+
+void pw_specialised_close (pw_run *r) {
+  free (r->scene);
+  free (r->scene_memory);
+}
+
+/* 1 where the general engine has more to do than to evaluate. */
+static int specialised_is_unsuitable (pw_run *r) {
+  return r->specialised == NULL || r->active || (r->geometry.alert && r->geometry.saddle) || r->near || r->w->hold ||
+         r->alpha + r->beta > 0;
+}
+
+static void specialised_evaluated (pw_run *r, const double *q, const double *v) {
+  pw_point_to_internal (r->w, q, v);
+  pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
+  r->statistics.rhs++;
+  r->statistics.factorisations++;
+}
+
+int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double *v, double *a, double *lambda,
+                             double *rate) {
+  if (specialised_is_unsuitable (r)) return 0;
+  if (rate) {
+    if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, rate, NULL, NULL)) return 0;
+    r->statistics.rhs++;
+    r->statistics.factorisations++;
+    return 1;
+  }
+  if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, NULL, r->w->configuration, r->w->J)) return 0;
+  specialised_evaluated (r, q, v);
+  return 1;
+}
+
+int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *q, double *v, double *a,
+                            double *lambda) {
+  pw_scene *s = r->scene;
+  if (!p->by_mass || p->alone || specialised_is_unsuitable (r)) return 0;
+  s->length = r->w->scale.length;
+  s->speed = s->length / r->w->scale.time;
+  if (r->specialised->project (s, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
+  specialised_evaluated (r, q, v);
+  r->statistics.factorisations += s->iterations;
+  r->residuals = (pw_residuals){ .position = s->position, .g = s->g, .velocity = s->velocity, .jv = s->jv };
+  return 1;
+}
