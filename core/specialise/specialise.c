@@ -398,9 +398,9 @@ static int specialise_write (specialise_scene *x) {
   specialise_ledger (x);
   specialise_product (x);
   int status = specialise_algebra (x);
-  specialise_source (x->out, "scene_head.c", done, &count);
+  specialise_source (x->out, "scene_head.inc", done, &count);
   specialise_signals (x);
-  specialise_source (x->out, "scene_tail.c", done, &count);
+  specialise_source (x->out, "scene_tail.inc", done, &count);
 
   fprintf (x->out,
            "\nstatic int prepare (pw_scene *s) {\n  const double *const M = s->mass;\n  double *const C = s->constant, "
