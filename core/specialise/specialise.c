@@ -202,7 +202,7 @@ static void specialise_ledger (const specialise_scene *x) {
 
 static void specialise_signals (const specialise_scene *x) {
   const pw_system *s = x->s;
-  int simple = 1, reads = s->readers;
+  int simple = 1, reads = s->state_dependent;
   for (int i = 0; i < s->sources; i++)
     simple &= s->source[i].signal.type == PW_CONSTANT || s->source[i].signal.type == PW_HARMONIC;
   fputs ("\nINLINE int signals (pw_scene *s, double t, const double *q, const double *v) {\n  (void)q, (void)v;\n",
@@ -337,7 +337,7 @@ static void specialise_constants (const specialise_scene *x) {
            "\n/* ---- The scene ---- */\n\nenum { BODIES = %d, N = %d, ROWS = %d, HOLONOMIC = %d, INTERNAL = %d,\n"
            "  ENTRIES = %d, LEDGER = %d, RHEONOMIC = %d, READERS = %d };\n",
            s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, x->entries, s->entries,
-           s->moving > 0, s->readers > 0);
+           s->rheonomic > 0, s->state_dependent > 0);
   fprintf (x->out, "\n#define INLINE static inline%s\n\n",
            s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
   for (int b = 0; b < s->bodies; b++) {
@@ -436,7 +436,7 @@ static void specialise_hash (uint64_t *h, const void *bytes, size_t size) {
 
 unsigned long pw_system_shape (const pw_system *s) {
   uint64_t h = 14695981039346656037u;
-  const int counts[] = { s->bodies, s->coords, s->rows, s->holonomic, s->batches, s->entries, s->sources, s->moving };
+  const int counts[] = { s->bodies, s->coords, s->rows, s->holonomic, s->batches, s->entries, s->sources, s->rheonomic };
   specialise_hash (&h, counts, sizeof counts);
   for (int j = 0; j < s->coords; j++) specialise_hash (&h, &(char){ s->mass[j] > 0 }, 1);
   for (int k = 0; k < s->batches; k++) {
