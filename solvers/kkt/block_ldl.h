@@ -93,11 +93,20 @@ typedef struct {
 
 /* ---- Planning (block_order.c) ---- */
 
-/* nodes: their number; size: unknowns of each; y: their position in the right-hand side; rank: higher ones are
- * eliminated later; pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times,
- * the diagonal not needed.  The order is that of the nodes if it fills in no more than minimum degree does (AMD:
- * Amestoy, Davis & Duff 1996).  NULL if out of memory. */
-pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair);
+enum { PW_PLAN_SCHUR = -1, PW_PLAN_UNCONDENSED = -2 };
+
+typedef struct {
+  int size;               /* unknowns */
+  int row;                /* the first global one, or PW_PLAN_SCHUR, PW_PLAN_UNCONDENSED */
+  int rank;               /* higher ones are eliminated later */
+  int y;                  /* their position in the right-hand side */
+  double *gamma, *lambda; /* of a Schur row */
+} pw_plan_node;
+
+/* pair: 2 x pairs node numbers with a block between them, each unordered pair any number of times, the diagonal not
+ * needed.  The order is that of the nodes if it fills in no more than minimum degree does (AMD: Amestoy, Davis & Duff
+ * 1996).  NULL if out of memory. */
+pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair);
 void pw_block_close (pw_block_ldl *l);
 
 /* Lays out the values.  PW_OK, or PW_RESOURCE if out of memory or there are 2^31 values or more. */

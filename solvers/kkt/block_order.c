@@ -8,27 +8,32 @@
 
 /* ---- Pattern ---- */
 
-/* Lists of places: the pattern of each column, first of K, then of L. */
+/* Neighbours of each node, with repetition; or rows of each column, ascending. */
 typedef struct {
-  int *first, *list;
+  int *first, *list; /* those of c: list[first[c]] .. list[first[c + 1]] */
 } order_lists;
 
-static int order_compare (const void *a, const void *b) {
-  int x = *(const int *)a, y = *(const int *)b;
-  return (x > y) - (x < y);
+/* An order of elimination. */
+typedef struct {
+  int *order, *place; /* node at each place; place of each node */
+  order_lists L;      /* rows below the diagonal of each column, by place */
+} order_variant;
+
+static void order_lists_close (order_lists *l) {
+  free (l->first);
+  free (l->list);
 }
 
-/* Sorted lists without repetition of the rows of each column, from pairs; `place` renumbers and may be NULL; `lower`
- * keeps rows below the diagonal only.  The lists are allocated here. */
-static int order_collect (int nodes, long pairs, const int *pair, const int *place, int lower, order_lists *lists) {
-  int *first = lists->first = calloc ((size_t)nodes + 2, sizeof (int));
-  int *list = lists->list = malloc ((size_t)(2 * pairs + 1) * sizeof (int));
+/* The graph of the nodes of at most this rank. */
+static int order_graph (int nodes, const pw_plan_node *node, int rank, long pairs, const int *pair,
+                        order_lists *graph) {
+  int *first = graph->first = calloc ((size_t)nodes + 2, sizeof *first);
+  int *list = graph->list = malloc ((size_t)(2 * pairs + 1) * sizeof *list);
   if (first == NULL || list == NULL) return PW_RESOURCE;
-  for (int pass = 0; pass < 2; pass++) { /* counts column c in first[c + 2], then fills through first[c + 1] */
+  for (int pass = 0; pass < 2; pass++) { /* counts node c in first[c + 2], then fills through first[c + 1] */
     for (long i = 0; i < 2 * pairs; i++) {
       int c = pair[i], r = pair[i ^ 1];
-      if (place) c = place[c], r = place[r];
-      if (c == r || (lower && r < c)) continue;
+      if (c == r || node[c].rank > rank || node[r].rank > rank) continue;
       if (pass == 0)
         first[c + 2]++;
       else
@@ -36,149 +41,85 @@ static int order_collect (int nodes, long pairs, const int *pair, const int *pla
     }
     for (int c = 0; pass == 0 && c < nodes; c++) first[c + 2] += first[c + 1];
   }
-  int to = 0, from = 0;
-  for (int c = 0; c < nodes; c++) {
-    int end = first[c + 1], previous = -1;
-    qsort (list + from, (size_t)(end - from), sizeof (int), order_compare);
-    first[c] = to;
-    for (int i = from; i < end; i++)
-      if (list[i] != previous) list[to++] = previous = list[i];
-    from = end;
-  }
-  first[nodes] = to;
   return PW_OK;
 }
 
-static void order_lists_close (order_lists *l) {
-  free (l->first);
-  free (l->list);
-  l->first = l->list = NULL;
-}
-
-/* Puts higher ranks later, without changing the order otherwise; place: of each node. */
-static int order_sort_ranks (int nodes, const int *rank, int *order, int *place) {
-  int at = 0, *old = malloc (((size_t)nodes + 1) * sizeof *old);
-  if (old == NULL) return PW_RESOURCE;
-  memcpy (old, order, (size_t)nodes * sizeof *old);
-  for (int r = 0; r < PW_BLOCK_RANKS; r++)
-    for (int j = 0; j < nodes; j++)
-      if (rank[old[j]] == r) order[place[old[j]] = at++] = old[j];
-  free (old);
-  return PW_OK;
-}
-
-/* Minimum degree order of the graph of the nodes of rank 0. */
-static int order_by_degree (int nodes, const int *rank, long pairs, const int *pair, int *order) {
+/* Minimum degree order of the nodes of rank 0. */
+static int order_by_degree (int nodes, const pw_plan_node *node, long pairs, const int *pair, int *order) {
   order_lists graph = { NULL, NULL };
-  int *inner = malloc ((size_t)(2 * pairs + 1) * sizeof *inner);
-  if (inner == NULL) return PW_RESOURCE;
-  long inners = 0;
-  for (long i = 0; i < pairs; i++) {
-    if (rank[pair[2 * i]] > 0 || rank[pair[2 * i + 1]] > 0) continue;
-    inner[2 * inners] = pair[2 * i];
-    inner[2 * inners++ + 1] = pair[2 * i + 1];
-  }
-  int status = order_collect (nodes, inners, inner, NULL, 0, &graph);
+  int status = order_graph (nodes, node, 0, pairs, pair, &graph);
   if (status == PW_OK && nodes > 0 && amd_order (nodes, graph.first, graph.list, order, NULL, NULL) < 0)
     status = PW_RESOURCE;
   order_lists_close (&graph);
-  free (inner);
   return status;
 }
 
-/* Scratch data of the symbolic factorisation: the elimination tree as lists of children, and marks. */
-typedef struct {
-  int *mark, *child, *sibling;
-  size_t room; /* of L's list */
-} order_tree;
-
-static int order_tree_open (order_tree *t, int nodes, const order_lists *K, order_lists *L) {
-  size_t n = (size_t)nodes + 1;
-  t->room = (size_t)K->first[nodes] + 16;
-  t->mark = malloc (3 * n * sizeof *t->mark);
-  L->first = malloc (n * sizeof *L->first);
-  L->list = malloc (t->room * sizeof *L->list);
-  if (t->mark == NULL || L->first == NULL || L->list == NULL) return PW_RESOURCE;
-  t->child = t->mark + n;
-  t->sibling = t->child + n;
-  for (int j = 0; j < nodes; j++) t->mark[j] = t->child[j] = -1;
-  L->first[0] = 0;
-  return PW_OK;
-}
-
-/* Makes room for the rows of a column, including repetitions. */
-static int order_tree_grow (order_tree *t, int j, const order_lists *K, order_lists *L) {
-  size_t most = (size_t)L->first[j] + (size_t)(K->first[j + 1] - K->first[j]);
-  for (int c = t->child[j]; c >= 0; c = t->sibling[c]) most += (size_t)(L->first[c + 1] - L->first[c]);
-  if (most <= t->room) return PW_OK;
-  if (most > INT_MAX / 2) return PW_RESOURCE;
-  int *more = realloc (L->list, 2 * most * sizeof *more);
-  if (more == NULL) return PW_RESOURCE;
-  L->list = more;
-  t->room = 2 * most;
-  return PW_OK;
-}
-
-/* Columns of L: those of K, and those of the children in the elimination tree without the child's parent.  PW_RETRY
- * if there are more than `most` blocks. */
-static int order_fill (int nodes, const order_lists *K, int most, order_lists *L) {
-  order_tree t = { NULL, NULL, NULL, 0 };
-  int status = order_tree_open (&t, nodes, K, L);
-  for (int j = 0; j < nodes && status == PW_OK; j++) {
-    status = order_tree_grow (&t, j, K, L);
-    if (status != PW_OK) break;
-    int used = L->first[j], *list = L->list;
-    t.mark[j] = j;
-    for (int i = K->first[j]; i < K->first[j + 1]; i++) t.mark[list[used++] = K->list[i]] = j;
-    for (int c = t.child[j]; c >= 0; c = t.sibling[c])
-      for (int i = L->first[c]; i < L->first[c + 1]; i++)
-        if (t.mark[list[i]] != j) t.mark[list[used++] = list[i]] = j;
-    L->first[j + 1] = used;
-    if (used > most) status = PW_RETRY;
-    if (used == L->first[j]) continue;
-    qsort (list + L->first[j], (size_t)(used - L->first[j]), sizeof *list, order_compare);
-    int parent = list[L->first[j]];
-    t.sibling[j] = t.child[parent];
-    t.child[parent] = j;
+/* Passes through the rows of L: row i has entries in the columns on the paths of the elimination tree from those of K to
+ * i (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2] and makes the tree, the second
+ * one lists them.  PW_RETRY if there are more than `most`. */
+static int order_pass (int nodes, const order_lists *K, int most, order_variant *v, int *parent, int *mark) {
+  long count = 0;
+  for (int i = 0; i < nodes; i++) mark[i] = -1;
+  for (int i = 0; i < nodes && count <= most; i++) {
+    mark[i] = i;
+    for (int x = K->first[v->order[i]]; x < K->first[v->order[i] + 1]; x++)
+      for (int j = v->place[K->list[x]]; j < i && mark[j] != i; j = parent[j]) {
+        if (parent[j] < 0) parent[j] = i;
+        mark[j] = i;
+        count++;
+        if (v->L.list)
+          v->L.list[v->L.first[j + 1]++] = i;
+        else
+          v->L.first[j + 2]++;
+      }
   }
-  free (t.mark);
-  return status;
+  return count <= most ? PW_OK : PW_RETRY;
 }
 
-/* Orders by rank, else as it is or by minimum degree, and lists the rows of each column in L.  PW_RETRY if there are
- * more than `most` blocks. */
-static int order_try (int nodes, const int *rank, long pairs, const int *pair, int most, int *order, int *place,
-                      order_lists *L) {
-  order_lists K = { NULL, NULL };
-  int status = order_sort_ranks (nodes, rank, order, place);
-  if (status == PW_OK) status = order_collect (nodes, pairs, pair, place, 1, &K);
-  if (status == PW_OK) status = order_fill (nodes, &K, most, L);
-  order_lists_close (&K);
-  return status;
-}
-
-/* The better of the two orders. */
-static int order_plan (int nodes, const int *rank, long pairs, const int *pair, int *order, int *place,
-                       order_lists *L) {
-  order_lists natural = { NULL, NULL };
-  int *other = malloc ((2 * (size_t)nodes + 1) * sizeof *other);
-  int status = other ? order_by_degree (nodes, rank, pairs, pair, order) : PW_RESOURCE;
-  if (status == PW_OK) status = order_try (nodes, rank, pairs, pair, INT_MAX, order, place, L);
-  for (int j = 0; j < nodes && status == PW_OK; j++) other[j] = j;
+static int order_fill (int nodes, const order_lists *K, int most, order_variant *v) {
+  int *parent = malloc (2 * ((size_t)nodes + 1) * sizeof *parent), *first = NULL;
+  v->L.first = first = calloc ((size_t)nodes + 2, sizeof *first);
+  int status = parent && first ? PW_OK : PW_RESOURCE;
+  for (int j = 0; j < nodes && status == PW_OK; j++) parent[j] = -1;
+  if (status == PW_OK) status = order_pass (nodes, K, most, v, parent, parent + nodes);
   if (status == PW_OK) {
-    status = order_try (nodes, rank, pairs, pair, L->first[nodes], other, other + nodes, &natural);
-    if (status == PW_OK) {
-      order_lists worse = *L;
-      *L = natural;
-      natural = worse;
-      memcpy (order, other, (size_t)nodes * sizeof *order);
-      memcpy (place, other + nodes, (size_t)nodes * sizeof *place);
-    } else if (status == PW_RETRY)
-      status = PW_OK;
+    for (int j = 0; j < nodes; j++) first[j + 2] += first[j + 1];
+    v->L.list = malloc (((size_t)first[nodes + 1] + 1) * sizeof *v->L.list);
+    status = v->L.list ? order_pass (nodes, K, most, v, parent, parent + nodes) : PW_RESOURCE;
   }
-  order_lists_close (&natural);
-  free (other);
+  free (parent);
   return status;
+}
+
+/* Puts higher ranks later, without changing the order otherwise, and lists the rows of each column. */
+static int order_try (int nodes, const pw_plan_node *node, const order_lists *K, int most, order_variant *v) {
+  int at = 0;
+  for (int rank = 0; rank < PW_BLOCK_RANKS; rank++)
+    for (int j = 0; j < nodes; j++)
+      if (node[v->order[j]].rank == rank) v->place[v->order[j]] = at++;
+  for (int n = 0; n < nodes; n++) v->order[v->place[n]] = n;
+  return order_fill (nodes, K, most, v);
+}
+
+/* The better of the two orders goes to v[0]. */
+static int order_plan (int nodes, const pw_plan_node *node, long pairs, const int *pair, order_variant *v) {
+  order_lists K = { NULL, NULL };
+  for (int i = 0; i < 2; i++) {
+    v[i].order = malloc (((size_t)nodes + 1) * sizeof *v[i].order);
+    v[i].place = malloc (((size_t)nodes + 1) * sizeof *v[i].place);
+    if (v[i].order == NULL || v[i].place == NULL) return PW_RESOURCE;
+  }
+  for (int n = 0; n < nodes; n++) v[1].order[n] = n;
+  int status = order_by_degree (nodes, node, pairs, pair, v[0].order);
+  if (status == PW_OK) status = order_graph (nodes, node, PW_BLOCK_RANKS, pairs, pair, &K);
+  if (status == PW_OK && order_try (nodes, node, &K, INT_MAX / 2, &v[0]) != PW_OK) status = PW_RESOURCE;
+  if (status == PW_OK) {
+    status = order_try (nodes, node, &K, v[0].L.first[nodes], &v[1]);
+    order_variant other = v[0];
+    if (status == PW_OK) v[0] = v[1], v[1] = other;
+  }
+  order_lists_close (&K);
+  return status == PW_RETRY ? PW_OK : status;
 }
 
 /* ---- Layout ---- */
@@ -234,7 +175,7 @@ static void order_place_targets (pw_block_ldl *l) {
   }
 }
 
-static int order_carve (pw_block_ldl *l, const int *size, const int *y, const int *order, const order_lists *L) {
+static int order_carve (pw_block_ldl *l, const pw_plan_node *node, const int *order, const order_lists *L) {
   size_t n = (size_t)l->nodes, below = (size_t)L->first[l->nodes], targets = order_count_targets (l->nodes, L);
   pw_layout lay = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
@@ -248,7 +189,8 @@ static int order_carve (pw_block_ldl *l, const int *size, const int *y, const in
   }
   memcpy (l->below, L->list, below * sizeof (int));
   for (int j = 0; j < l->nodes; j++)
-    l->column[j] = (pw_column){ .y = y[order[j]], .first = L->first[j], .size = (unsigned char)size[order[j]] };
+    l->column[j] =
+        (pw_column){ .y = node[order[j]].y, .first = L->first[j], .size = (unsigned char)node[order[j]].size };
   l->column[l->nodes] = (pw_column){ .first = L->first[l->nodes] };
   return PW_OK;
 }
@@ -260,18 +202,21 @@ int pw_block_lay_out (pw_block_ldl *l) {
   return l->value ? PW_OK : PW_RESOURCE;
 }
 
-pw_block_ldl *pw_block_open (int nodes, const int *size, const int *y, const int *rank, long pairs, const int *pair) {
+pw_block_ldl *pw_block_open (int nodes, const pw_plan_node *node, long pairs, const int *pair) {
   pw_block_ldl *l = calloc (1, sizeof *l);
-  int *order = malloc (((size_t)nodes + 1) * sizeof *order);
-  order_lists L = { NULL, NULL };
-  if (l) l->place = malloc (((size_t)nodes + 1) * sizeof *l->place);
-  int status = l && order && l->place ? order_plan (nodes, rank, pairs, pair, order, l->place, &L) : PW_RESOURCE;
+  order_variant v[2] = { { 0 } };
+  int status = l ? order_plan (nodes, node, pairs, pair, v) : PW_RESOURCE;
   if (status == PW_OK) {
     l->nodes = nodes;
-    status = order_carve (l, size, y, order, &L);
+    l->place = v[0].place;
+    v[0].place = NULL;
+    status = order_carve (l, node, v[0].order, &v[0].L);
   }
-  order_lists_close (&L);
-  free (order);
+  for (int i = 0; i < 2; i++) {
+    order_lists_close (&v[i].L);
+    free (v[i].order);
+    free (v[i].place);
+  }
   if (status == PW_OK) return l;
   pw_block_close (l);
   return NULL;

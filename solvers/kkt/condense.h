@@ -40,22 +40,12 @@ int pw_condense (struct pw_saddle *k, const double *weight, int rows, const unsi
 
 /* ---- Planning ---- */
 
-enum { PW_PLAN_SCHUR = -1, PW_PLAN_UNCONDENSED = -2 };
-
 /* A node's columns at a body. */
 typedef struct {
   const double *J;
   int node, step, j;
   int is_pin; /* 1: both rows of a pin, whose x and y columns are a multiple of the unit matrix */
 } pw_plan_contribution;
-
-typedef struct {
-  int size;               /* rows */
-  int row;                /* the first global one, or PW_PLAN_SCHUR, PW_PLAN_UNCONDENSED */
-  int rank;               /* order of elimination */
-  int y;                  /* in the right-hand side */
-  double *gamma, *lambda; /* of a Schur row */
-} pw_plan_node;
 
 /* Nodes and contributions; while the arrays are NULL they are only counted. */
 typedef struct {

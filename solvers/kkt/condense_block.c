@@ -32,17 +32,10 @@ static void condense_pairs (pw_plan *c, int *pair) {
 
 static pw_block_ldl *condense_pattern (pw_plan *c) {
   condense_pairs (c, NULL);
-  int *pair = malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair),
-      *size = malloc ((3 * (size_t)c->nodes + 1) * sizeof *size);
-  pw_block_ldl *l = NULL;
-  if (pair && size) {
-    int *y = size + c->nodes, *rank = y + c->nodes;
-    condense_pairs (c, pair);
-    for (int n = 0; n < c->nodes; n++) size[n] = c->node[n].size, y[n] = c->node[n].y, rank[n] = c->node[n].rank;
-    l = pw_block_open (c->nodes, size, y, rank, c->pairs, pair);
-  }
+  int *pair = malloc ((size_t)(2 * c->pairs + 1) * sizeof *pair);
+  if (pair) condense_pairs (c, pair);
+  pw_block_ldl *l = pair ? pw_block_open (c->nodes, c->node, c->pairs, pair) : NULL;
   free (pair);
-  free (size);
   return l;
 }
 
