@@ -16,59 +16,28 @@
  * well conditioned; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of mechanical
  * system dynamics.)
  *
- * J is evaluated in body blocks: the constraint equations that involve one body or internal coordinate.  At the
- * beginning of the step K is symmetric positive definite, and its factorisation needs no pivoting; it is repeated with
- * pivoting if a pivot becomes small. */
+ * At the beginning of the step K is symmetric positive definite, and its factorisation needs no pivoting; it is
+ * repeated with pivoting if a pivot becomes small. */
 #include <lapacke.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "nullspace.h"
-#include "unroll.h"
 #include "util.h"
 
 /* ---- Opening ---- */
 
-/* Appends the entries of equation `row` at the coordinates from j on to their body block; counts them if J is NULL. */
-static void nullspace_add_piece (pw_nullspace *b, const pw_system *s, int j, int row, const double *J) {
-  if (j >= s->coords || row < 0) return;
-  int n = j < 3 * s->bodies ? j / 3 : j - 2 * s->bodies;
-  if (J)
-    b->piece[b->panel[n + 1].first++] = (pw_nullspace_piece){ .row = row, .J = J };
-  else
-    b->panel[n + 2].first++;
-}
-
-/* Fills in the entries of every body block, or counts them, those of block n in panel[n + 2].first. */
-static void nullspace_list_pieces (pw_nullspace *b, const pw_workspace *w, int fill) {
-  const pw_system *s = w->s;
-  for (const pw_element_batch *k = w->batch; k < w->batch + s->constraints; k++)
-    for (int e = 0; e < k->b.count; e++)
-      for (int i = 0, n = e * k->kind->rows; i < k->kind->rows; i++, n++) {
-        const double *J = k->J + n * k->b.cols;
-        int row = b->place[k->row + n], bodies = k->kind->bodies, own = k->kind->own;
-        for (int c = 0; c < bodies; c++)
-          nullspace_add_piece (b, s, k->column[e * bodies + c], row, fill ? J + 3 * c : NULL);
-        for (int c = 0; c < own; c++)
-          nullspace_add_piece (b, s, k->own + e * own + c, row, fill ? J + 3 * bodies + c : NULL);
-      }
-}
-
 static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
-  size_t m = (size_t)b->rows, all = (size_t)s->rows, panels = (size_t)b->panels + 2, pieces = 0;
-  for (const pw_element_batch *k = s->batch; k < s->batch + s->constraints; k++)
-    pieces += (size_t)(k->b.count * k->kind->rows * (k->kind->bodies + k->kind->own));
+  size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
-    b->place = pw_take (&l, all, sizeof (int));
-    b->pivot = pw_take (&l, m, sizeof (int));
-    b->panel = pw_take (&l, panels, sizeof *b->panel);
-    b->piece = pw_take (&l, pieces, sizeof *b->piece);
-    b->K = pw_take (&l, m * m, sizeof (double));
-    b->inverse = pw_take (&l, (size_t)s->coords, sizeof (double));
-    b->mu = pw_take (&l, m, sizeof (double));
-    b->eta = pw_take (&l, all, sizeof (double));
-    b->v = pw_take (&l, (size_t)s->coords + 3, sizeof (double));
+    b->place = pw_take (&l, all, sizeof *b->place);
+    b->pivot = pw_take (&l, m, sizeof *b->pivot);
+    b->reference = pw_take (&l, n * m, sizeof *b->reference);
+    b->K = pw_take (&l, m * m, sizeof *b->K);
+    b->mu = pw_take (&l, m, sizeof *b->mu);
+    b->eta = pw_take (&l, all, sizeof *b->eta);
+    b->v = pw_take (&l, n + 3, sizeof *b->v);
     if (pass == 1) break;
     b->memory = calloc (1, l.used + 1);
     if (b->memory == NULL) return PW_RESOURCE;
@@ -77,21 +46,9 @@ static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
   return PW_OK;
 }
 
-/* The entries of panel n are those from its `first` up to the `first` of panel n + 1. */
-static void nullspace_plan (pw_nullspace *b, const pw_workspace *w) {
-  const pw_system *s = w->s;
-  nullspace_list_pieces (b, w, 0);
-  for (int n = 0; n <= b->panels; n++) b->panel[n + 1].first += b->panel[n].first;
-  nullspace_list_pieces (b, w, 1);
-  for (int n = 0; n < b->panels; n++) {
-    b->panel[n].j = n < s->bodies ? 3 * n : n + 2 * s->bodies;
-    b->panel[n].width = n < s->bodies ? 3 : 1;
-  }
-}
-
 int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
-  *b = (pw_nullspace){ .rows = s->rows - r->redundant, .panels = s->coords - 2 * s->bodies };
+  *b = (pw_nullspace){ .rows = s->rows - r->redundant };
   if (b->rows > PW_NULLSPACE_MOST)
     return pw_fail (error, PW_INPUT,
                     "model %s: stabilisation nullspace works with dense matrices, for up to %d constraint rows, and "
@@ -99,8 +56,6 @@ int pw_nullspace_open (pw_nullspace *b, pw_run *r, pw_error *error) {
                     s->model, PW_NULLSPACE_MOST, b->rows, r->method->name);
   if (nullspace_allocate (b, s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   for (int i = 0, n = 0; i < s->rows; i++) b->place[i] = r->active && !r->active[i] ? -1 : n++;
-  nullspace_plan (b, r->w);
-  for (int j = 0; j < s->coords; j++) b->inverse[j] = 1 / s->metric[j];
   return PW_OK;
 }
 
@@ -111,35 +66,39 @@ void pw_nullspace_close (pw_nullspace *b) {
 
 /* ---- K mu = eta - J w ---- */
 
-PW_INLINE double nullspace_dot (const double *x, const double *y, int width) {
-  return width == 1 ? x[0] * y[0] : x[0] * y[0] + x[1] * y[1] + x[2] * y[2];
+/* K_i += J_i (W^-1 J0^T), mu_i -= J_i w, with the entries of row i in `width` columns from j on: 3 of a body, or 1. */
+static void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w) {
+  const int m = b->rows;
+  double *restrict K = b->K + i * m, sum = 0;
+  const double *restrict x = b->reference + j * m, J0 = J[0], J1 = width == 3 ? J[1] : 0, J2 = width == 3 ? J[2] : 0;
+  for (int n = 0; width == 3 && n < m; n++) K[n] += J0 * x[n] + J1 * x[m + n] + J2 * x[2 * m + n];
+  for (int n = 0; width == 1 && n < m; n++) K[n] += J0 * x[n];
+  for (int c = 0; c < width; c++) sum += J[c] * w[j + c];
+  b->mu[i] -= sum;
 }
 
-/* K += J W^-1 J0^T, mu -= J w for one panel; `width` is a constant in each inlined copy. */
-PW_INLINE void nullspace_gather (pw_nullspace *b, const pw_nullspace_block *p, const double *w, int width) {
-  const pw_nullspace_piece *from = b->piece + p->first, *end = b->piece + p[1].first;
-  for (const pw_nullspace_piece *x = from; x < end; x++) {
-    double J[3] = { x->J[0], width > 1 ? x->J[1] : 0, width > 1 ? x->J[2] : 0 }, *K = b->K + x->row * b->rows;
-    for (const pw_nullspace_piece *y = from; y < end; y++) K[y->row] += nullspace_dot (J, y->reference, width);
-    b->mu[x->row] -= nullspace_dot (J, w + p->j, width);
-  }
+/* Assembles K and the right-hand side, or, without w, W^-1 J0^T, from the J last evaluated. */
+static void nullspace_assemble (pw_nullspace *b, const pw_run *r, const double *w) {
+  const pw_system *s = r->s;
+  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
+    for (int n = 0; n < k->b.count * k->kind->rows; n++)
+      for (int c = 0, i = b->place[k->row + n], width; i >= 0 && c < k->b.cols; c += width) {
+        int j = pw_global (k, n / k->kind->rows, c);
+        const double *J = k->J + n * k->b.cols + c;
+        width = c < 3 * k->kind->bodies ? 3 : 1;
+        if (w && j < s->coords) nullspace_gather (b, i, j, width, J, w);
+        for (int x = 0; w == NULL && j < s->coords && x < width; x++)
+          b->reference[(j + x) * b->rows + i] = J[x] / s->metric[j + x];
+      }
 }
 
-/* Assembles K, and the right-hand side in mu. */
-static void nullspace_assemble (pw_nullspace *b, pw_run *r, const double *w) {
-  int m = b->rows;
-  memset (b->K, 0, (size_t)m * (size_t)m * sizeof *b->K);
-  memset (b->mu, 0, (size_t)m * sizeof *b->mu);
-  if (r->s->rheonomic) {
-    pw_evaluate_eta (r->w, b->eta);
-    for (int i = 0; i < r->s->rows; i++)
-      if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i];
-  }
-  for (const pw_nullspace_block *p = b->panel, *end = p + b->panels; p < end; p++)
-    if (p->width == 3)
-      nullspace_gather (b, p, w, 3);
-    else
-      nullspace_gather (b, p, w, 1);
+/* Sets K to 0 and mu to eta, and assembles. */
+static void nullspace_equations (pw_nullspace *b, pw_run *r, const double *w) {
+  memset (b->K, 0, (size_t)(b->rows * b->rows) * sizeof *b->K);
+  if (r->s->rheonomic) pw_evaluate_eta (r->w, b->eta); /* else it stays 0 */
+  for (int i = 0; i < r->s->rows; i++)
+    if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i];
+  nullspace_assemble (b, r, w);
 }
 
 /* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 if a pivot is smaller than `least` times its
@@ -193,26 +152,27 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   pw_evaluate_J (r->w);
-  for (const pw_nullspace_block *p = b->panel, *end = p + b->panels; p < end; p++)
-    for (pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
-      for (int c = 0; c < p->width; c++) x->reference[c] = x->J[c] * b->inverse[p->j + c];
+  nullspace_assemble (b, r, NULL);
   return PW_OK;
 }
 
 /* Solves K mu = eta - J w; PW_RETRY if K is singular. */
 static int nullspace_multipliers (pw_nullspace *b, pw_run *r, const double *w) {
-  nullspace_assemble (b, r, w);
+  nullspace_equations (b, r, w);
   if (nullspace_eliminate (b->K, b->mu, b->rows)) return PW_OK;
-  nullspace_assemble (b, r, w);
+  nullspace_equations (b, r, w);
   return nullspace_pivot (b);
 }
 
 /* Velocities at the current kinematics; J must be up to date. */
 static int nullspace_correct (pw_nullspace *b, pw_run *r, double *v) {
   if (nullspace_multipliers (b, r, v) != PW_OK) return PW_RETRY;
-  for (const pw_nullspace_block *p = b->panel, *end = p + b->panels; p < end; p++)
-    for (const pw_nullspace_piece *x = b->piece + p->first; x < b->piece + p[1].first; x++)
-      for (int c = 0; c < p->width; c++) v[p->j + c] += x->reference[c] * b->mu[x->row];
+  const double *reference = b->reference;
+  for (int j = 0; j < r->s->coords; j++, reference += b->rows) {
+    double sum = 0;
+    for (int n = 0; n < b->rows; n++) sum += reference[n] * b->mu[n];
+    v[j] += sum;
+  }
   return pw_update_velocities (r->w, v);
 }
 

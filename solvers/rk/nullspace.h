@@ -6,30 +6,15 @@
 
 enum { PW_NULLSPACE_MOST = 256 }; /* constraint equations: their matrix is dense */
 
-/* The entries of a constraint equation at one body or internal coordinate. */
 typedef struct {
-  int row;             /* index among the active equations */
-  const double *J;     /* as last evaluated */
-  double reference[3]; /* of W^-1 J0^T */
-} pw_nullspace_piece;
-
-typedef struct {
-  int j, width; /* first coordinate, number of coordinates */
-  int first;    /* index of its first piece; it ends at the next panel's first */
-} pw_nullspace_block;
-
-typedef struct {
-  int rows;                  /* active ones */
-  int *place;                /* all equations: index among the active ones, or -1 */
-  int panels;                /* bodies and internal coordinates */
-  pw_nullspace_block *panel; /* panels + 2 */
-  pw_nullspace_piece *piece;
-  double *K;       /* rows x rows: J W^-1 J0^T, factorised in place */
-  double *inverse; /* coords: of W */
-  double *mu;      /* rows */
-  double *eta;     /* all equations */
-  double *v;       /* coords + 3: scratch */
-  int *pivot;      /* rows */
+  int rows;          /* active ones */
+  int *place;        /* all equations: index among the active ones, or -1 */
+  double *reference; /* coords x rows: W^-1 J0^T */
+  double *K;         /* rows x rows: J W^-1 J0^T, factorised in place */
+  double *mu;        /* rows */
+  double *eta;       /* all equations */
+  double *v;         /* coords + 3: scratch */
+  int *pivot;        /* rows */
   char *memory;
 } pw_nullspace;
 
