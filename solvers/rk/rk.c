@@ -306,19 +306,6 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
                                       : "a stage of it lands in a singular configuration");
 }
 
-void pw_rk_revert (pw_run *r) {
-  struct pw_method_data *d = r->data;
-  size_t n = (size_t)r->s->coords * sizeof (double), entries = (size_t)r->s->entries * sizeof (double);
-  r->t = d->t0;
-  memcpy (r->q, d->q0, n);
-  memcpy (r->v, d->v0, n);
-  pw_run_accelerate (r, r->t, r->q, r->v, r->a, r->lambda);
-  memcpy (r->a, d->a0, n);
-  memcpy (r->ledger, d->ledger0, entries);
-  memcpy (r->rate, d->rate0, entries);
-  r->projected = d->projected0;
-}
-
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
   return r->data->adaptive ? pw_rk_advance_adaptive (r, t_end, error) : pw_rk_advance_fixed (r, t_end, error);
 }

@@ -1,5 +1,5 @@
-/* Private to the Runge-Kutta driver: stages and steps (rk.c), fixed steps (rk_fixed.c), step-size control (rk_adapt.c),
- * samples (rk_sample.c). */
+/* Private to the Runge-Kutta driver: stages and steps (rk.c), step-size control (rk_adapt.c), fixed steps and samples
+ * (rk_divide.c). */
 #ifndef PW_RK_STATE_H
 #define PW_RK_STATE_H
 
@@ -41,9 +41,6 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added);
 
 /* Makes the new state the current one. */
 void pw_rk_accept (pw_run *r, double h, double t1, double added);
-
-/* Back to the beginning of the step just accepted. */
-void pw_rk_revert (pw_run *r);
 
 /* Size in bytes of the block of q, v, a, which has the layout of the run's; with `multipliers` including lambda. */
 static inline size_t pw_rk_block (const pw_run *r, int multipliers) {
