@@ -11,6 +11,7 @@
   PW_METHOD (adams)  \
   PW_METHOD (bdf)    \
   PW_METHOD (ida)    \
+  PW_METHOD (radau)  \
   PW_METHOD (galpha) \
   PW_METHOD (leapfrog)
 

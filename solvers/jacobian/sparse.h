@@ -1,5 +1,5 @@
-/* A square sparse matrix factorised again and again (KLU: Davis & Palamadai Natarajan 2010): ordered once, its
- * pivots kept while they are good. */
+/* A square sparse matrix, real or complex, factorised again and again (KLU: Davis & Palamadai Natarajan 2010): ordered
+ * once, its pivots kept while they are good.  Complex numbers are pairs of doubles. */
 #ifndef PW_SPARSE_H
 #define PW_SPARSE_H
 
@@ -7,6 +7,7 @@
 #include <klu.h>
 
 typedef struct {
+  const struct pw_sparse_field *field; /* KLU's functions for real or complex numbers */
   klu_l_common common;
   klu_l_symbolic *order;
   klu_l_numeric *factors;
@@ -16,15 +17,14 @@ typedef struct {
 
 /* n columns in compressed form.  PW_OK or PW_RESOURCE. */
 int pw_sparse_open (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind);
+int pw_sparse_open_complex (pw_sparse *k, int n, int64_t *colptr, int64_t *rowind);
 void pw_sparse_close (pw_sparse *k);
 
 /* PW_OK, PW_RETRY if the matrix is singular, PW_RESOURCE. */
 int pw_sparse_factor (pw_sparse *k, double *value);
 
 /* The next factorisation chooses its pivots again. */
-static inline void pw_sparse_forget (pw_sparse *k) {
-  if (k->factors) klu_l_free_numeric (&k->factors, &k->common);
-}
+void pw_sparse_forget (pw_sparse *k);
 
 /* x = A^-1 x.  PW_OK or PW_RESOURCE. */
 int pw_sparse_solve (pw_sparse *k, double *x);
