@@ -147,9 +147,6 @@ void pw_read_baumgarte (pw_run *r);
   }
 extern const char *const pw_metrics[];
 
-/* The scale of forces: from the masses, else from the multipliers, else 1. */
-double pw_force_scale (const pw_run *r);
-
 /* Initial step size for methods that begin with order 1: the error h^2 / T^2 equals the tolerance; states that
  * saturating forces depend on change by at most their tolerance. */
 double pw_first_step (const pw_run *r);

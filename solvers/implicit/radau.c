@@ -29,14 +29,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include "dense_output.h"
-#include "rank.h"
 #include "sparse.h"
 #include "tangent.h"
 #include "util.h"
 
 enum { STAGES = 3 };
 
-#define RADAU_KEEP 1e-3  /* contraction rate below which F_y is kept */
+#define RADAU_KEEP 1e-2  /* contraction rate below which F_y is kept */
 #define RADAU_LONGER 1.2 /* factor of the step below which the matrices are kept */
 
 static const double radau_c[STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };
@@ -91,10 +90,12 @@ struct pw_method_data {
   long count;              /* steps since then */
   double h, before, error; /* the next step; size and error of the last one, 0: none */
   double factored;         /* step for which the matrices are factorised; 0: none */
+  int forget;              /* 1: select pivots anew */
   int current, outdated;   /* F_y was evaluated at y; it must be evaluated again */
   double rate, left;       /* of the last iteration: contraction rate, remaining error over the last correction */
   double shorter;          /* factor of the step if the iteration does not converge */
   int iterations;
+  int near; /* 1: the state reached is near a singular configuration */
   pw_projector projector;
   char *memory;
 };
@@ -211,6 +212,8 @@ static int radau_factor (pw_run *r, double h) {
   radau *d = r->data;
   if (d->factored == h) return PW_OK;
   d->factored = 0;
+  if (d->forget) pw_sparse_forget (&d->real), pw_sparse_forget (&d->complex);
+  d->forget = 0;
   radau_scale (r, h);
   radau_shift (d, 1, radau_gamma / h, 0);
   int status = pw_sparse_factor (&d->real, d->value);
@@ -246,20 +249,18 @@ static double radau_rtol (const pw_run *r) {
   return 0.1 * cbrt (r->settings.rtol * r->settings.rtol);
 }
 
-/* Sets the tolerances for a step of size h: of the error test, of Newton's corrections, and their round-off. */
+/* Sets the tolerances for a step of size h: of the error test, of Newton's corrections, and their round-off, which in
+ * index3 is that of positions over h. */
 static void radau_weigh (pw_run *r, double h) {
   radau *d = r->data;
   const pw_settings *set = &r->settings;
   int n = d->n, third = !d->velocities && d->tangent.holonomic > 0;
-  double rtol = radau_rtol (r), relax = fmax (1, r->w->scale.time / h), round_off = 8 * DBL_EPSILON;
-  double newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
-  for (int i = 0; i < d->size; i++) {
-    double size = fabs (d->now.y[i]), least = i < 2 * n && set->atol > 0 ? set->atol / set->rtol : d->unit[i];
-    int power = i < n ? 0 : i < 2 * n ? third : i < 2 * n + d->tangent.holonomic ? 1 + third : 1;
-    double by = power == 0 ? 1 : power == 1 ? relax : relax * relax;
-    d->tolerance[i] = by * rtol * (size + least);
-    if (i < 2 * n) d->tolerance[i] = fmin (d->tolerance[i], r->saturation[i]);
-    d->floor[i] = by * round_off * (size + d->unit[i]);
+  double rtol = radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
+  for (int i = 0; i < 2 * n; i++) {
+    double size = fabs (d->now.y[i]), least = set->atol > 0 ? set->atol / set->rtol : d->unit[i];
+    double unit = third && i >= n ? fmax (d->unit[i], d->unit[i - n] / h) : d->unit[i];
+    d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
+    d->floor[i] = 8 * DBL_EPSILON * (size + unit);
     d->enough[i] = d->fixed ? d->floor[i] : fmax (newton * d->tolerance[i], d->floor[i]);
   }
 }
@@ -328,12 +329,13 @@ static int radau_correct (pw_run *r, double h, double t1, double *size, double *
   }
   if (radau_solve_real (d, F[0]) != PW_OK || radau_solve_complex (d, F[1], F[2]) != PW_OK) return PW_RESOURCE;
   *size = *rough = 0;
-  for (int i = 0; i < d->size; i++) {
+  for (int i = 0; i < 2 * d->n; i++) {
     double most = pw_largest (pw_largest (fabs (F[0][i]), fabs (F[1][i])), fabs (F[2][i]));
     *size = pw_largest (*size, most / d->enough[i]);
     *rough = pw_largest (*rough, most / d->floor[i]);
-    for (int k = 0; k < STAGES; k++) W[k][i] += F[k][i];
   }
+  for (int k = 0; k < STAGES; k++)
+    for (int i = 0; i < d->size; i++) W[k][i] += F[k][i];
   radau_combine (d, radau_T, W, d->now.Z);
   return PW_OK;
 }
@@ -352,7 +354,7 @@ static int radau_converged (pw_run *r, int done, double size, double before, dou
   }
   double rate = size / before;
   d->rate = done == 1 ? rate : sqrt (rate * d->rate);
-  if (rate > 0.3 && rough <= 64) return 1;
+  if (rate > 0.3 && rough <= (d->near ? 1e7 : 64)) return 1;
   d->left = d->rate < 0.99 ? d->rate / (1 - d->rate) : 100;
   if (d->left * size <= 1) return 1;
   if (d->fixed && done < most && (done < 4 || d->rate < 1)) return 0;
@@ -371,7 +373,8 @@ static int radau_iterate (pw_run *r, double h, double t1) {
     before = size;
     int status = radau_correct (r, h, t1, &size, &rough);
     if (status != PW_OK) return status;
-    if (getenv("DBG")) fprintf (stderr, "  h %g it %d size %.2e rough %.2e rate %.2e\n", h, done, size, rough, size/before);
+    if (getenv ("DBG"))
+      fprintf (stderr, "  h %g it %d size %.2e rough %.2e rate %.2e\n", h, done, size, rough, size / before);
     int good = radau_converged (r, done, size, before, rough);
     d->iterations = done + 1;
     if (good) return good > 0 ? PW_OK : PW_RETRY;
@@ -388,6 +391,7 @@ static int radau_solve (pw_run *r, double h, double t1) {
     int status = d->outdated ? radau_linearise (r) : PW_OK;
     if (status == PW_OK) status = radau_factor (r, h);
     if (status == PW_OK) status = radau_iterate (r, h, t1);
+    d->forget = status == PW_RETRY;
     if (status != PW_RETRY || d->current) return status;
     d->outdated = 1;
   }
@@ -398,7 +402,7 @@ static int radau_solve (pw_run *r, double h, double t1) {
 /* Root of the sum of the squares of errors in units of the tolerances, over the number of states. */
 static double radau_norm (const radau *d, const double *e) {
   double sum = 0;
-  for (int i = 0; i < d->size; i++) sum += e[i] * e[i] / (d->tolerance[i] * d->tolerance[i]);
+  for (int i = 0; i < 2 * d->n; i++) sum += e[i] * e[i] / (d->tolerance[i] * d->tolerance[i]);
   return sqrt (sum / (2 * d->n));
 }
 
@@ -426,7 +430,7 @@ static int radau_estimate (pw_run *r, double h, int again, double *error) {
 /* Work and losses up to the stages, and their error. */
 static int radau_work (pw_run *r, double h, double t1, double *error) {
   radau *d = r->data;
-  int entries = r->s->entries;
+  int entries = r->s->entries, again = !d->velocities && pw_ledger_reacts (r->s);
   double sum = 0;
   for (int k = 0; k < STAGES; k++) memset (d->now.w[k], 0, (size_t)entries * sizeof (double));
   for (int k = 0; k < STAGES; k++) {
@@ -435,7 +439,12 @@ static int radau_work (pw_run *r, double h, double t1, double *error) {
     int status = pw_update_kinematics (r->w, t, d->Y, d->Y + d->n);
     if (status != PW_OK) return status;
     pw_evaluate_J (r->w);
-    pw_ledger_rates (r, pw_tangent_expand (&d->tangent, d->Y + 2 * d->n, d->rows, d->tangent.lambda), d->rates);
+    const double *lambda = pw_tangent_expand (&d->tangent, d->Y + 2 * d->n, d->rows, d->tangent.lambda);
+    if (again && pw_saddle_factor (r->saddle) == PW_OK) {
+      pw_run_accelerate_updated (r, d->Y + d->n, r->a_at, r->lambda_at);
+      lambda = r->lambda_at;
+    }
+    pw_ledger_rates (r, lambda, d->rates);
     for (int i = 0; i < STAGES; i++)
       for (int e = 0; e < entries; e++) d->now.w[i][e] += h * radau_A[i][k] * d->rates[e];
   }
@@ -514,18 +523,13 @@ static void radau_constants (pw_run *r) {
   radau *d = r->data;
   const pw_system *s = r->s;
   int n = d->n;
-  double L = s->scale.length, T = r->w->scale.time, force = pw_force_scale (r);
+  double L = s->scale.length, T = r->w->scale.time;
   for (int j = 0; j < n; j++) {
     d->D[j] = pw_is_angle (s, j) ? 1 / (L * L) : 1;
     d->B[j] = 1;
     d->B[n + j] = s->mass[j];
     d->unit[j] = pw_unit (s, j);
     d->unit[n + j] = d->unit[j] / T;
-  }
-  for (int i = 0; i < d->rows; i++) {
-    double unit = pw_rank_multiplier_unit (r->w, d->tangent.map ? d->tangent.row[i] : i);
-    d->unit[2 * n + i] = force * unit;
-    if (i < d->mus) d->unit[2 * n + d->rows + i] = L / T * unit;
   }
 }
 
@@ -587,7 +591,7 @@ static void radau_finish (pw_run *r, double h) {
   radau *d = r->data;
   double *const *Z = d->last.Z, *end = d->now.y + 2 * d->n;
   int status = pw_saddle_factor (r->saddle);
-  r->near = status != PW_OK || pw_watchdog_near (r);
+  d->near = r->near = status != PW_OK || pw_watchdog_near (r);
   if (status == PW_OK)
     pw_run_accelerate_updated (r, r->v, r->a, r->lambda);
   else

@@ -36,15 +36,6 @@ void pw_matrix_evaluated (pw_run *r, const double *q, const double *v) {
   pw_evaluate_saturation (r->w, r->matrix_range);
 }
 
-double pw_force_scale (const pw_run *r) {
-  const pw_system *s = r->s;
-  double L = s->scale.length, T = r->w->scale.time, force = 0;
-  for (int j = 0; j < s->coords; j++) force = fmax (force, s->mass[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
-  if (force > 0) return force;
-  for (int i = 0; i < s->rows; i++) force = fmax (force, fabs (r->lambda[i]));
-  return force > 0 ? force : 1;
-}
-
 double pw_first_step (const pw_run *r) {
   double T = r->w->scale.time, h = 0.5 * T * sqrt (r->settings.rtol);
   for (int j = 0, n = r->s->coords; j < n; j++) {

@@ -21,6 +21,16 @@ static double ida_leading (const ida_data *d) {
   return fmax (c, 1 / r->w->scale.time);
 }
 
+/* The scale of forces: from the masses, else from the multipliers, else 1. */
+static double ida_force (const pw_run *r) {
+  const pw_system *s = r->s;
+  double L = s->scale.length, T = r->w->scale.time, force = 0;
+  for (int j = 0; j < s->coords; j++) force = fmax (force, s->mass[j] / (T * T) * (pw_is_angle (s, j) ? 1 / L : L));
+  if (force > 0) return force;
+  for (int i = 0; i < s->rows; i++) force = fmax (force, fabs (r->lambda[i]));
+  return force > 0 ? force : 1;
+}
+
 /* Error weights.  Those of the multipliers use the scales of forces and velocities, times L for moments and angles.
  *
  * As unknowns the multipliers are not in the error test, and their corrections are those of v or q divided by the step:
@@ -32,7 +42,7 @@ static int ida_weigh (N_Vector vy, N_Vector weights, void *user) {
   const pw_settings *set = &r->settings;
   const double *y = N_VGetArrayPointer (vy);
   int stiff = d->velocities && !d->impulses;
-  double *w = N_VGetArrayPointer (weights), force = pw_force_scale (r);
+  double *w = N_VGetArrayPointer (weights), force = ida_force (r);
   double L = r->s->scale.length, T = r->w->scale.time, c = stiff ? ida_leading (d) : 1 / T;
   double relax = d->impulses ? T : c * T, mu = (set->atol > 0 ? set->atol : set->rtol * L / T) * relax;
   pw_sun_weigh (&d->sun, y, w);
