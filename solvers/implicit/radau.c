@@ -25,7 +25,6 @@
  * are more accurate than the multipliers of the stages.  Work and losses are integrated with the stages. */
 #include <float.h>
 #include <math.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include "dense_output.h"
@@ -35,8 +34,9 @@
 
 enum { STAGES = 3 };
 
-#define RADAU_KEEP 1e-2  /* contraction rate below which F_y is kept */
-#define RADAU_LONGER 1.2 /* factor of the step below which the matrices are kept */
+#define RADAU_KEEP 1e-2   /* contraction rate below which F_y is kept */
+#define RADAU_SIGNAL 1e-4 /* of the time scale: step below which a signal that fails ends the run */
+#define RADAU_LONGER 1.2  /* factor of the step below which the matrices are kept */
 
 static const double radau_c[STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };
 static const double radau_A[STAGES][STAGES] = {
@@ -217,12 +217,11 @@ static int radau_factor (pw_run *r, double h) {
   radau_scale (r, h);
   radau_shift (d, 1, radau_gamma / h, 0);
   int status = pw_sparse_factor (&d->real, d->value);
-  if (status != PW_OK) return status;
   radau_shift (d, 2, radau_alpha / h, radau_beta / h);
-  status = pw_sparse_factor (&d->complex, d->value);
+  if (status == PW_OK) status = pw_sparse_factor (&d->complex, d->value);
   r->statistics.factorisations += 2;
   if (status == PW_OK) d->factored = h;
-  return status;
+  return status > 0 ? PW_INPUT : status;
 }
 
 /* x = (gamma/h B - F_y)^-1 x */
@@ -373,8 +372,6 @@ static int radau_iterate (pw_run *r, double h, double t1) {
     before = size;
     int status = radau_correct (r, h, t1, &size, &rough);
     if (status != PW_OK) return status;
-    if (getenv ("DBG"))
-      fprintf (stderr, "  h %g it %d size %.2e rough %.2e rate %.2e\n", h, done, size, rough, size / before);
     int good = radau_converged (r, done, size, before, rough);
     d->iterations = done + 1;
     if (good) return good > 0 ? PW_OK : PW_RETRY;
@@ -565,19 +562,13 @@ static void radau_close (pw_run *r) {
   free (d);
 }
 
-static void radau_serialise (pw_run *r, pw_archive *a) {
-  radau *d = r->data;
-  double *const number[] = { &d->base, &d->h, &d->before, &d->error, &d->left };
-  for (size_t i = 0; i < sizeof number / sizeof *number; i++) pw_archive_bytes (a, number[i], sizeof (double));
-  pw_archive_count (a, &d->count);
-}
-
 /* ---- Advancing ---- */
 
 static int radau_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status == PW_METHOD) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (status == PW_RESOURCE) return pw_fail (error, PW_RESOURCE, "t = %.6g s: out of memory in KLU", r->t);
   if (r->near || pw_watchdog_near_state (r)) return pw_fail_singular (r, r->t, error);
+  if (status == PW_INPUT) return pw_fail (error, PW_METHOD, "t = %.6g s: the Newton matrix is singular", r->t);
   if (r->data->fixed)
     return pw_fail (error, PW_METHOD,
                     "t = %.6g s: the iteration does not converge; the step of %.6g s may be too large", r->t, h);
@@ -698,7 +689,8 @@ static int radau_advance (pw_run *r, double t_end, pw_error *error) {
     status = radau_try (r, h, t1, rejected > 0 || d->before == 0, &off);
     if (status == PW_OK && off < 1) status = radau_accept_adaptive (r, h, t1, off, rejected, cut);
     if (status == PW_OK && off < 1) return PW_OK;
-    if (status == PW_RESOURCE) return radau_fail (r, status, h, error);
+    int signal = status == PW_METHOD && h < RADAU_SIGNAL * r->w->scale.time;
+    if (status == PW_RESOURCE || status == PW_INPUT || signal) return radau_fail (r, status, h, error);
     r->statistics.rejected++;
     d->outdated = !d->current;
     d->h = status == PW_OK ? fmin (0.9 * h, radau_next (d, h, off, 1)) : h * (status == PW_RETRY ? d->shorter : 0.25);
@@ -817,5 +809,4 @@ const pw_method pw_method_radau = {
   .at = radau_at,
   .restart = radau_restart,
   .close = radau_close,
-  .carry = radau_serialise,
 };

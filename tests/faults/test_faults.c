@@ -102,6 +102,14 @@ FAULT_KLU (0, klu_l_refactor,
 FAULT_KLU (0, klu_l_rcond, (klu_l_symbolic * s, klu_l_numeric *f, klu_l_common *c), (s, f, c))
 FAULT_KLU (0, klu_l_solve, (klu_l_symbolic * s, klu_l_numeric *f, int64_t n, int64_t d, double b[], klu_l_common *c),
            (s, f, n, d, b, c))
+FAULT_ADDRESS (klu_l_numeric *, klu_zl_factor,
+               (int64_t p[], int64_t i[], double x[], klu_l_symbolic *s, klu_l_common *c), (p, i, x, s, c))
+FAULT_KLU (0, klu_zl_refactor,
+           (int64_t p[], int64_t i[], double x[], klu_l_symbolic *s, klu_l_numeric *f, klu_l_common *c),
+           (p, i, x, s, f, c))
+FAULT_KLU (0, klu_zl_rcond, (klu_l_symbolic * s, klu_l_numeric *f, klu_l_common *c), (s, f, c))
+FAULT_KLU (0, klu_zl_solve, (klu_l_symbolic * s, klu_l_numeric *f, int64_t n, int64_t d, double b[], klu_l_common *c),
+           (s, f, n, d, b, c))
 /* clang-format on */
 
 /* A run with samples inside steps, a checkpoint, a restart and a discontinuity, as far as it gets. */
@@ -124,7 +132,8 @@ static int fault_run (pw_system *s, const char *method, pw_error *error) {
 
 /* Calls whose failure the integrators may repair by themselves, with a smaller step or other pivots. */
 static int fault_may_pass (void) {
-  static const char *const name[] = { "SUNLinSolSetup", "SUNLinSolSolve", "klu_l_refactor", "klu_l_rcond" };
+  static const char *const name[] = { "SUNLinSolSetup", "SUNLinSolSolve",  "klu_l_refactor",
+                                      "klu_l_rcond",    "klu_zl_refactor", "klu_zl_rcond" };
   for (size_t i = 0; i < sizeof name / sizeof *name; i++)
     if (strcmp (fault.name, name[i]) == 0) return 1;
   return 0;
