@@ -17,7 +17,7 @@
  *
  *   err = (gamma/h B - F_y)^-1 (F (t, y) + B sum_i e_i Z_i / h)            of order h^4
  *
- * in units of tolerances of 0.1 rtol^(2/3), which makes the error of order 5 about proportional to rtol.  Errors of
+ * in units of tolerances of 0.05 rtol^(2/3), which makes the error of order 5 about proportional to rtol.  Errors of
  * lambda and mu are multiplied by h/T, in index3 those of v and lambda by h/T and (h/T)^2, with the time scale T: they
  * are larger by that power.  The step follows from the errors of this and the previous step (Gustafsson 1994).
  *
@@ -245,7 +245,7 @@ static int radau_solve_complex (radau *d, double *re, double *im) {
 
 /* The relative tolerance of the error estimate, whose order is 3. */
 static double radau_rtol (const pw_run *r) {
-  return 0.1 * cbrt (r->settings.rtol * r->settings.rtol);
+  return 0.05 * cbrt (r->settings.rtol * r->settings.rtol);
 }
 
 /* Sets the tolerances for a step of size h: of the error test, of Newton's corrections, and their round-off, which in
@@ -257,7 +257,8 @@ static void radau_weigh (pw_run *r, double h) {
   double rtol = radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
   for (int i = 0; i < 2 * n; i++) {
     double size = fabs (d->now.y[i]), least = set->atol > 0 ? set->atol / set->rtol : d->unit[i];
-    double unit = third && i >= n ? fmax (d->unit[i], d->unit[i - n] / h) : d->unit[i];
+    int second = third && i >= n && isinf (r->saturation[i]); /* a difference of positions over h */
+    double unit = second ? fmax (d->unit[i], (fabs (d->now.y[i - n]) + d->unit[i - n]) / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
     d->floor[i] = 8 * DBL_EPSILON * (size + unit);
     d->enough[i] = d->fixed ? d->floor[i] : fmax (newton * d->tolerance[i], d->floor[i]);

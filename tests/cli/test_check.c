@@ -123,7 +123,7 @@ static void test_broken_kind (void **state) {
   check_shows ("{\"check\": \"force_q\", \"in\": \"random scenes\", \"expected\": \"force_q = d force/dq\"");
   check_shows ("{\"check\": \"force_q\", \"in\": \"this model\"");
   check_shows ("\"status\": \"failed\"");
-  static const char *const implicit[] = { "ida+ggl", "bdf", "galpha+ggl", "leapfrog" };
+  static const char *const implicit[] = { "ida+ggl", "bdf", "radau", "galpha+ggl", "leapfrog" };
   char command[100], message[300];
   for (size_t i = 0; i < sizeof implicit / sizeof *implicit; i++) {
     snprintf (command, sizeof command, "pinwheel run @/broken.c --method %s --t-end 0.1", implicit[i]);

@@ -10,8 +10,8 @@ static const char *const redundant_fixed[] = { "rk4+none",       "rk4+baumgarte"
                                                "rk4+nullspace",  NULL };
 static const char *const redundant_second[] = { "galpha+index3", "galpha+ggl", "leapfrog", NULL }; /* of order 2 */
 static const char *const redundant_adaptive[] = {
-  "ida+none",        "ida+baumgarte", "ida+ggl",       "ida+index2",     "ida+si1", "adams+none",
-  "adams+baumgarte", "bdf+none",      "bdf+baumgarte", "bdf+projection", NULL
+  "ida+none",     "ida+baumgarte", "ida+ggl",         "ida+index2", "ida+si1",       "adams+none",     "radau+ggl",
+  "radau+index2", "radau+index3",  "adams+baumgarte", "bdf+none",   "bdf+baumgarte", "bdf+projection", NULL
 };
 
 void redundant_end (const pw_plugin_table *table, const char *method, double rtol, double t, const char *const *name,

@@ -42,7 +42,7 @@ static void test_locked (void **state) {
     "ida+none",       "ida+baumgarte", "ida+ggl",        "ida+index2",
     "ida+si1",        "adams+none",    "bdf+none",       "bdf+baumgarte",
     "bdf+projection", "rk4+nullspace", "galpha+index3",  "galpha+ggl",
-    "leapfrog"
+    "leapfrog",       "radau+ggl",     "radau+index2",   "radau+index3"
   };
   (void)state;
   for (int wheels = 3; wheels <= 4; wheels++)
@@ -148,7 +148,8 @@ static void test_locks_in_motion (void **state) {
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",  "rk4+none",      "ida+baumgarte",
                                         "ida+ggl",        "rk4+nullspace",  "galpha+index3", "galpha+ggl",
                                         "adams+none",     "ida+si1",        "ida+index2",    "adams+baumgarte",
-                                        "bdf+baumgarte",  "bdf+projection", "leapfrog" };
+                                        "bdf+baumgarte",  "bdf+projection", "leapfrog",      "radau+ggl",
+                                        "radau+index2",   "radau+index3" };
   (void)state;
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
     pw_error error = { 0 };

@@ -17,10 +17,19 @@ static const struct {
   { "tests/scenes/zoo.c", NULL, 0, 0.4 },         { "tests/scenes/chain.c", "links", 5, 0.4 },
   { "tests/scenes/chain.c", "links", 150, 0.02 }, { "tests/scenes/feedback.yaml", NULL, 0, 0.4 },
 };
-static const char *const same_methods[] = { "rk4+none",      "rk4+projection", "rk4+projection:metric=identity",
-                                            "ida+none",      "ida+ggl",        "rk4+projection:every=3",
-                                            "ida+baumgarte", "ida+index2",     "ida+si1",
-                                            "adams+none",    "bdf+projection", "rk4+baumgarte:inputs=held" };
+static const char *const same_methods[] = { "rk4+none",
+                                            "rk4+projection",
+                                            "rk4+projection:metric=identity",
+                                            "ida+none",
+                                            "ida+ggl",
+                                            "radau+ggl",
+                                            "rk4+projection:every=3",
+                                            "ida+baumgarte",
+                                            "ida+index2",
+                                            "ida+si1",
+                                            "adams+none",
+                                            "bdf+projection",
+                                            "rk4+baumgarte:inputs=held" };
 
 enum {
   SAME_SCENES = sizeof same_scenes / sizeof *same_scenes,

@@ -75,7 +75,7 @@ static void test_held (void **state) {
 }
 
 static void test_tolerances (void **state) {
-  static const char *const method[] = { "erk5+projection", "erk8+projection", "ida+ggl", "ida+baumgarte" };
+  static const char *const method[] = { "erk5+projection", "erk8+projection", "ida+ggl", "ida+baumgarte", "radau+ggl" };
   (void)state;
   for (int i = 0; i < DRIVEN_TORQUES; i++) {
     double exact[6];

@@ -117,7 +117,8 @@ static void saturation_stops (int scene, const char *method, double rtol, double
 }
 
 static const char *const saturation_methods[] = { "bdf+none",   "bdf+projection", "ida+none",
-                                                  "ida+index2", "ida+ggl",        "ida+si1" };
+                                                  "ida+index2", "ida+ggl",        "ida+si1",
+                                                  "radau+ggl",  "radau+index2",   "radau+index3" };
 enum { SATURATION_METHODS = sizeof saturation_methods / sizeof *saturation_methods };
 
 /* The sweep that found it: twelve speeds, of which with bdf+projection all went wrong, without a word. */

@@ -78,6 +78,9 @@ static const struct {
                       { "rk4+projection:metric=identity", 0 },
                       { "rk4+projection:every=5", 0 },
                       { "ida+ggl", 1e3 },
+                      { "radau+ggl", 1e3 },
+                      { "radau+index2", 1e3 },
+                      { "radau+index3", 1e3 },
                       { "ida+baumgarte", 1e3 },
                       { "ida+none", 1e3 },
                       { "ida+index2", 1e3 },
@@ -115,12 +118,13 @@ static void test_integrators (void **state) {
 
 /* Every energy is accounted for, and keeping the account changes no bit of the run. */
 static void test_ledger (void **state) {
-  static const char *const method[] = { "rk4+projection", "rk4+none",      "rk4+baumgarte", "ida+ggl",
-                                        "ida+baumgarte",  "ida+index2",    "ida+si1",       "adams+baumgarte",
-                                        "bdf+none",       "bdf+baumgarte", "bdf+projection" };
+  static const char *const method[] = { "rk4+projection", "rk4+none",      "rk4+baumgarte",  "ida+ggl",
+                                        "ida+baumgarte",  "ida+index2",    "ida+si1",        "adams+baumgarte",
+                                        "bdf+none",       "bdf+baumgarte", "bdf+projection", "radau+ggl",
+                                        "radau+index2",   "radau+index3" };
   (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
-    for (int i = 0; i < 11; i++) {
+    for (size_t i = 0; i < sizeof method / sizeof *method; i++) {
       pw_system *s = agree_scene (scene);
       pw_settings with = { .step = 1e-3, .rtol = 1e-9, .span = 3, .ledger = 1 }, without = with;
       without.ledger = 0;
@@ -152,11 +156,11 @@ static void test_ledger (void **state) {
 
 /* Looking into the steps at any time changes no bit of the run; what is seen obeys the constraints as the run does. */
 static void test_sampling (void **state) {
-  static const char *const method[] = { "rk4+projection", "bdf+projection", "ida+ggl",    "ida+si1",
+  static const char *const method[] = { "rk4+projection", "bdf+projection", "ida+ggl",    "radau+ggl",    "ida+si1",
                                         "rk4+none",       "ida+baumgarte",  "adams+none", "bdf+baumgarte" };
   (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < 9; i++) {
       pw_system *s = agree_scene (scene);
       pw_settings settings = { .step = 1e-2, .rtol = 1e-7, .span = 2, .ledger = 1 };
       double q[AGREE_MOST], v[AGREE_MOST];
@@ -170,7 +174,7 @@ static void test_sampling (void **state) {
         check_ok (pw_run_advance_to (r, t, 2, &error), &error);
         check_ok (pw_run_sample (r, t, &now, &error), &error);
         assert_true (now.t == t);
-        if (i > 3) continue;
+        if (i > 4) continue;
         check_below ("position of a sample", now.position, i < 2 ? 16 * CHECK_EPS : 1e-6,
                      i < 2 ? "projected: round-off" : "10 rtol");
         check_below ("velocity of a sample", now.velocity, i < 2 ? 16 * CHECK_EPS : 1e-5,
@@ -188,10 +192,10 @@ static void test_sampling (void **state) {
 
 /* Samples inside a step are as good as the steps. */
 static void test_dense (void **state) {
-  static const char *const method[] = { "rk4+projection", "ida+ggl" };
+  static const char *const method[] = { "rk4+projection", "ida+ggl", "radau+ggl" };
   (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
-    for (int i = 0; i < 2; i++) {
+    for (int i = 0; i < 3; i++) {
       pw_system *s = agree_scene (scene);
       int n = pw_system_coordinates (s);
       pw_run *fine = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-4, .span = 1 });
@@ -262,11 +266,12 @@ static void test_verifier (void **state) {
     { "rk4+projection", 16 * CHECK_EPS, 16 * CHECK_EPS, 64 * CHECK_EPS, 64 * CHECK_EPS,
       "round-off of the projection and of one solve" },
     { "rk4+none", 1e-10, 1e-10, 64 * CHECK_EPS, 64 * CHECK_EPS, "drift of order h^4; round-off of one solve" },
+    { "radau+ggl", 1e-8, 1e-8, 64 * CHECK_EPS, 64 * CHECK_EPS, "10 rtol; round-off of one solve" },
     { "ida+ggl", 1e-8, 1e-8, 1e-4, 1e-4, "10 rtol; accelerations are one derivative up: 1e5 rtol" },
   };
   (void)state;
   for (int scene = 0; scene < AGREE_SCENES; scene++)
-    for (int i = 0; i < 3; i++) agree_verify (scene, &bounds[i]);
+    for (int i = 0; i < 4; i++) agree_verify (scene, &bounds[i]);
 }
 
 /* The verifier notices: each of its four residuals, one number wrong at a time. */
@@ -302,9 +307,10 @@ static void test_verifier_notices (void **state) {
 static void test_units (void **state) {
   (void)state;
   const double L = 1024, m = 8, I = L * L * m;
-  static const char *const method[] = { "rk4+projection", "rk4+none", "rk4+baumgarte", "ida+ggl", "ida+baumgarte" };
+  static const char *const method[] = { "rk4+projection", "rk4+none",  "rk4+baumgarte", "ida+ggl",
+                                        "ida+baumgarte",  "radau+ggl", "radau+index3" };
   for (int massive = 0; massive < 2; massive++)
-    for (int i = 0; i < 5; i++) {
+    for (int i = 0; i < 7; i++) {
       double m2 = 0.1 * massive, I2 = 0.01 * massive, q[6], v[6], Q[6], V[6];
       pw_system *s = scene_system (&scene_ezyroller, "m2", m2, "I2", I2, NULL);
       pw_system *S = scene_system (&scene_ezyroller, "a", 0.5 * L, "b", 0.5 * L, "c", 0.125 * L, "d", 0.125 * L, "m1",
@@ -342,9 +348,9 @@ static void agree_swing (pw_model *m, const void *parameters) {
 
 static void test_units_of_moments (void **state) {
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = agree_swing };
-  static const char *const method[] = { "ida+si1", "ida+ggl", "ida+baumgarte" };
+  static const char *const method[] = { "ida+si1", "ida+ggl", "ida+baumgarte", "radau+ggl" };
   (void)state;
-  for (int i = 0; i < 3; i++) {
+  for (int i = 0; i < 4; i++) {
     pw_settings settings = { .rtol = 1e-8, .span = 1 };
     double q[6], v[6], Q[6], V[6];
     pw_statistics cost, Cost;

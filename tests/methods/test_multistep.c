@@ -110,8 +110,8 @@ static pw_statistics multi_cost (pw_system *s, const char *method, double t, dou
 
 /* Explicit methods have to resolve what has long died out; these step over it, to the same end. */
 static void test_stiff (void **state) {
-  static const char *const method[] = { "ida+ggl",  "ida+si1",       "ida+index2",
-                                        "bdf+none", "bdf+baumgarte", "bdf+projection" };
+  static const char *const method[] = { "ida+ggl",      "ida+si1",  "ida+index2",    "radau+ggl",     "radau+index2",
+                                        "radau+index3", "bdf+none", "bdf+baumgarte", "bdf+projection" };
   (void)state;
   double exact[20], q[20];
   pw_system *s = multi_steering ();

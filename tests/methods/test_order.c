@@ -88,10 +88,9 @@ static void test_switched (void **state) {
   double coarse = order_switched_error ("rk4+projection", 0.04), fine = order_switched_error ("rk4+projection", 0.02);
   check_below ("error at h = 0.02", fine, coarse / 8, "order 4 has 1/16; a step that sees behind the switch has 1/2");
   check_below ("error at h = 0.02", fine, 1e-5, "h^4 (torque / inertia)^2, about 8e-7");
-  static const char *const ida[] = {
-    "ida+ggl", "ida+baumgarte", "ida+si1", "adams+none", "bdf+none", "bdf+projection"
-  };
-  for (int i = 0; i < 6; i++) {
+  static const char *const ida[] = { "ida+ggl",        "ida+baumgarte", "ida+si1",      "adams+none",  "bdf+none",
+                                     "bdf+projection", "radau+ggl",     "radau+index2", "radau+index3" };
+  for (int i = 0; i < 9; i++) {
     double q[2][6], v[6];
     pw_statistics cost;
     order_switched_run (ida[i], &(pw_settings){ .rtol = 1e-8, .span = 1 }, q[0], v, &cost);

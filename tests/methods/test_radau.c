@@ -1,25 +1,223 @@
+/* radau: orders of its three forms, published digits, breakpoints, stiff scenes, samples, matrices. */
 #include <math.h>
 #include <stdio.h>
-#include <stdlib.h>
+#include <string.h>
 #include "check.h"
 #include "ladder.h"
-static void test_x (void **state) {
+#include "scene.h"
+#include "system.h"
+#include "trial.h"
+
+/* ---- Orders ---- */
+
+static const struct {
+  const char *model;
+  double h, t;
+  ladder_depth depth; /* without multipliers where they depend on prescribed motions alone */
+} radau_scene[] = { { "ezyroller", 0.1, 2, LADDER_LAMBDA },
+                    { "n-trailer", 0.1, 1, LADDER_LAMBDA },
+                    { "pendulum", 0.05, 1, LADDER_LAMBDA },
+                    { "n-four-bar", 0.05, 0.4, LADDER_LAMBDA },
+                    { "arm", 0.05, 1, LADDER_LAMBDA },
+                    { "tractor", 0.1, 1, LADDER_V },
+                    { "snakeboard", 0.1, 1, LADDER_LAMBDA },
+                    { "redundant-parallelogram", 0.05, 0.5, LADDER_LAMBDA },
+                    { "chaplygin-sleigh", 0.4, 4, LADDER_LAMBDA } };
+enum { RADAU_SCENES = sizeof radau_scene / sizeof *radau_scene };
+
+/* Order 5 of positions and velocities in index 2 (Hairer, Lubich & Roche 1989: 2 s - 1 with s = 3 stages); multipliers
+ * are computed from these. */
+static void test_order (void **state) {
   (void)state;
-  static const struct { const char *m; double h, t; } sc[] = { { "ezyroller", 0.2, 2 }, { "n-trailer", 0.1, 1 }, { "pendulum", 0.1, 1 }, { "n-four-bar", 0.1, 0.4 }, { "arm", 0.1, 1 }, { "tractor", 0.1, 1 }, { "snakeboard", 0.1, 1 }, { "redundant-parallelogram", 0.05, 0.5 }, {"chaplygin-sleigh",.4,4}};
-  static const char *const f[] = { "radau+ggl:steps=fixed", "radau+index2:steps=fixed", "radau+index3:steps=fixed" };
-  for (int k = 0; k < 3; k++)
-  for (int i = 0; i < 9; i++) {
-    printf ("%s %s\n", f[k], sc[i].m);
-    ladder_error e[5];
-    for (int j = 0; j < 5; j++) {
-      e[j] = ladder_run (sc[i].m, f[k], ldexp (sc[i].h, -j), sc[i].t);
-      printf ("  %8.1e %8.1e %8.1e", e[j].q, e[j].v, e[j].lambda);
-      if (j) printf ("   %5.2f %5.2f %5.2f", log2 (e[j-1].q/e[j].q), log2 (e[j-1].v/e[j].v), log2 (e[j-1].lambda/e[j].lambda));
-      printf ("  rhs/step %.1f pos %.1e vel %.1e bal\n", (double)e[j].cost.rhs / e[j].cost.steps, e[j].cost.position, e[j].cost.velocity);
-    }
+  for (int i = 0; i < RADAU_SCENES; i++) {
+    ladder_expect (radau_scene[i].model, "radau+ggl:steps=fixed", radau_scene[i].h, radau_scene[i].t, 5, 0.5,
+                   radau_scene[i].depth);
+    ladder_expect (radau_scene[i].model, "radau+index2:steps=fixed", radau_scene[i].h, radau_scene[i].t, 5, 0.5,
+                   radau_scene[i].depth);
   }
 }
+
+/* Index 3: positions 2 s - 1 = 5, velocities s = 3, and so the multipliers computed from both; without holonomic
+ * constraints it is index 2. */
+static void test_order_index3 (void **state) {
+  (void)state;
+  for (int i = 0; i < RADAU_SCENES; i++) {
+    const char *model = radau_scene[i].model, *method = "radau+index3:steps=fixed";
+    int second = strcmp (model, "tractor") == 0 || strcmp (model, "chaplygin-sleigh") == 0;
+    double h = radau_scene[i].h, t = radau_scene[i].t;
+    if (second) {
+      ladder_expect (model, method, h, t, 5, 0.5, LADDER_V);
+      continue;
+    }
+    ladder_error first = ladder_run (model, method, h, t), coarse = ladder_run (model, method, h / 2, t),
+                 fine = ladder_run (model, method, h / 4, t);
+    check_below (model, fine.q, first.q / pow (4, 4.5), "positions: order 5 has 4^-5, order 4 has 4^-4");
+    check_close (model, log2 (coarse.v / fine.v), 3, 0.3, "velocities: the order 3, and the next power of h");
+    check_below (model, fine.lambda, first.lambda / pow (4, 2.5), "multipliers: order 3 has 4^-3, order 2 has 4^-2");
+    check_below (model, fine.cost.position, 64 * CHECK_EPS, "positions enforced to round-off");
+  }
+}
+
+/* What each form enforces. */
+static void test_residuals (void **state) {
+  (void)state;
+  for (int i = 0; i < RADAU_SCENES; i++) {
+    const char *model = radau_scene[i].model;
+    double h = radau_scene[i].h / 4, t = radau_scene[i].t;
+    pw_statistics ggl = ladder_run (model, "radau+ggl:steps=fixed", h, t).cost;
+    pw_statistics index2 = ladder_run (model, "radau+index2:steps=fixed", h, t).cost;
+    check_below (model, ggl.position, 64 * CHECK_EPS, "round-off");
+    check_below (model, fmax (ggl.velocity, index2.velocity), 1e3 * CHECK_EPS, "round-off of the iteration");
+    double drift = ladder_run (model, "radau+index2:steps=fixed", h / 2, t).cost.position;
+    check_below (model, drift, index2.position / 16 + 64 * CHECK_EPS, "a drift of order 5 has 1/32");
+  }
+}
+
+/* ---- Tolerances ---- */
+
+static const char *const radau_forms[] = { "radau+ggl", "radau+index2", "radau+index3" };
+
+static void test_digits (void **state) {
+  static const char *const name[] = { "K1.phi", "K3.phi", "K5.phi", "K7.phi" };
+  static const double digits[] = { 15.8107711951537, 0.0408222401196458, 0.524409965879954, 1.04808074104194 };
+  double table[4 * 6], q[6], v[6];
+  (void)state;
+  assert_int_equal (runs_reference ("tests/reference/ezyroller.txt", 4, 6, table), 4);
+  const double *x = table + 3 * 6;
+  for (int i = 0; i < 3; i++) {
+    pw_system *s = scene_system (&scene_ezyroller, NULL);
+    runs_state (s, radau_forms[i], &(pw_settings){ .rtol = 1e-10, .span = 10 }, 10, q, v, NULL);
+    double off[] = { q[0] - x[1], q[1] - x[2], q[2] - x[3], q[5] - x[4] };
+    for (int j = 0; j < 4; j++) check_close (radau_forms[i], off[j], 0, 1e3 * 1e-10, "1e3 rtol");
+    pw_system_free (s);
+    s = ladder_open ("andrews-squeezer");
+    pw_run *r = runs_open (s, radau_forms[i], &(pw_settings){ .rtol = 1e-10, .span = 0.03 });
+    pw_sample end = runs_to (r, 0.03);
+    for (int j = 0; j < 4; j++)
+      check_close (name[j], trial_state (s, &end, name[j]), digits[j], 1e4 * 1e-10, "1e4 rtol");
+    pw_run_close (r);
+    pw_system_free (s);
+  }
+}
+
+/* Errors follow the tolerance, and matrices are not factorised more often than they change. */
+static void test_tolerances (void **state) {
+  static const char *const model[] = { "ezyroller", "pendulum", "arm", "snakeboard" };
+  (void)state;
+  for (int i = 0; i < 4; i++)
+    for (int k = 0; k < 3; k++)
+      for (int digits = 4; digits <= 10; digits += 3) {
+        double rtol = pow (10, -digits);
+        ladder_error e = ladder_solve (model[i], radau_forms[k], &(pw_settings){ .rtol = rtol, .span = 2 }, 2);
+        pw_statistics n = e.cost;
+        check_below (model[i], e.q, 1e3 * rtol, "1e3 rtol");
+        if (k < 2) check_below (model[i], e.v, 1e3 * rtol, "1e3 rtol");
+        check_below ("factorisations", (double)n.factorisations, 2.0 * (double)(n.steps + n.rejected + n.jacobians),
+                     "a real and a complex one for a step size, and for a Jacobian");
+        check_below ("Jacobians", (double)n.jacobians, (double)(n.steps + n.rejected) + 1, "one for a step");
+        check_below ("evaluations of a step", (double)n.rhs, 21.0 * (double)(n.steps + n.rejected),
+                     "seven iterations at most, of three stages each");
+      }
+}
+
+/* ---- Breakpoints ---- */
+
+static int radau_switched (void *context, double t, const double *x, double value[3], double *gradient) {
+  (void)context, (void)x, (void)gradient;
+  value[0] = t < 1. / 3 ? 0.1 : -0.2;
+  return 0;
+}
+
+static double radau_breakpoint (void *context, double t) {
+  (void)context;
+  return t < 1. / 3 ? 1. / 3 : INFINITY;
+}
+
+static void radau_switched_run (const char *method, pw_settings settings, double *x) {
+  pw_error error = { 0 };
+  pw_signal torque = { PW_FUNCTION, .function = { .eval = radau_switched, .breakpoint = radau_breakpoint } };
+  pw_model *m = scene_model (&scene_ezyroller, NULL);
+  check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
+  pw_system *s = scene_compile (m);
+  runs_state (s, method, &settings, 1. / 3 + 0.3, x, x + 6, NULL);
+  pw_system_free (s);
+}
+
+/* Steps end where the torque is switched, and have the full order from there on. */
+static void test_switched (void **state) {
+  (void)state;
+  double exact[12], x[12], off[2] = { 0 };
+  radau_switched_run ("erk8+projection", (pw_settings){ .rtol = 1e-13, .span = 1 }, exact);
+  for (int k = 0; k < 2; k++) {
+    radau_switched_run ("radau:steps=fixed", (pw_settings){ .step = k ? 0.05 : 0.1, .span = 1 }, x);
+    for (int j = 0; j < 12; j++) off[k] = fmax (off[k], fabs (x[j] - exact[j]));
+  }
+  check_below ("error at h = 0.05", off[1], off[0] / 20, "order 5 has 1/32, a step across the switch 1/2");
+  check_below ("error at h = 0.1", off[0], 1e-5, "h^5");
+}
+
+/* ---- Stiff scenes ---- */
+
+static void radau_stiff (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "rotor", .mass = 1, .inertia = 1, .start = { 0, 0, 0.01 } });
+  pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "rotor", "ground" }, .stiffness = 1e8 });
+}
+
+/* A vibration of 1e4 rad/s at a step of 0.01 s: y = 100, of which a step leaves |R (i y)| -> 3 / y. */
+static void test_damping (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = radau_stiff };
+  (void)state;
+  pw_system *s = scene_system (&table, NULL);
+  pw_run *r = runs_open (s, "radau:steps=fixed", &(pw_settings){ .step = 0.01, .span = 1 });
+  double phi = runs_to (r, 0.04).q[2];
+  check_below ("angle after four steps", fabs (phi), 0.01 * pow (6. / 100, 4), "twice 3 / y in each step");
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
+/* Samples where the steps do not resolve a decay: a wheel brake of 1e8 /s stays between its values at the ends. */
+static void radau_brake (pw_model *m, const void *parameters) {
+  (void)parameters;
+  pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .rate = { 0, 0, 1 } });
+  pw_add_friction (m, &(pw_friction){ .name = "f", .body = { "disc", "ground" }, .viscous = 1e8 });
+}
+
+static void test_unresolved_samples (void **state) {
+  static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = radau_brake };
+  static const char *const method[] = { "radau", "radau:steps=fixed" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    pw_system *s = scene_system (&table, NULL);
+    pw_run *r = runs_open (s, method[i], &(pw_settings){ .step = 0.01, .span = 1 });
+    for (int k = 1; k <= 200; k++) {
+      pw_sample x = runs_to (r, 0.0005 * k);
+      check_close ("angle", x.q[2], 0, 2e-3, "1e-8 rad, and the step of 0.01 s that is too long at first");
+      check_close ("angular velocity", x.v[2], 0, 1, "not above the initial one");
+    }
+    pw_run_close (r);
+    pw_system_free (s);
+  }
+}
+
+/* ---- Large steps ---- */
+
+static void test_large_steps (void **state) {
+  (void)state;
+  pw_error error = { 0 };
+  pw_system *s = ladder_open ("pendulum");
+  pw_run *r = runs_open (s, "radau:steps=fixed", &(pw_settings){ .step = 3, .span = 100 });
+  assert_int_equal (pw_run_advance_to (r, 100, 100, &error), PW_METHOD);
+  check_error (&error, PW_METHOD, "t = 0 s: the iteration does not converge; the step of 3 s may be too large");
+  pw_run_close (r);
+  pw_system_free (s);
+}
+
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_x) };
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_order),   cmocka_unit_test (test_order_index3),       cmocka_unit_test (test_residuals),
+    cmocka_unit_test (test_digits),  cmocka_unit_test (test_tolerances),         cmocka_unit_test (test_switched),
+    cmocka_unit_test (test_damping), cmocka_unit_test (test_unresolved_samples), cmocka_unit_test (test_large_steps),
+  };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

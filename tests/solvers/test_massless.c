@@ -23,11 +23,21 @@ static const pw_parameter massless_list[] = {
     .parameters_size = sizeof (massless), .build = f                              \
   }
 
-static const char *const massless_methods[] = {
-  "rk4+projection", "rk4+nullspace",  "erk5+projection",        "erk5+projection:metric=identity", "erk8+projection",
-  "erk8+nullspace", "bdf+projection", "bdf+projection:every=3", "bdf+projection:metric=identity",  "ida+ggl",
-  "galpha+ggl",     "leapfrog+rattle"
-};
+static const char *const massless_methods[] = { "rk4+projection",
+                                                "rk4+nullspace",
+                                                "erk5+projection",
+                                                "erk5+projection:metric=identity",
+                                                "erk8+projection",
+                                                "erk8+nullspace",
+                                                "bdf+projection",
+                                                "bdf+projection:every=3",
+                                                "bdf+projection:metric=identity",
+                                                "ida+ggl",
+                                                "radau+ggl",
+                                                "radau+index2",
+                                                "radau+index3",
+                                                "galpha+ggl",
+                                                "leapfrog+rattle" };
 
 static void massless_other (pw_model *m, const massless *p) {
   if (p->other > 0)

@@ -83,6 +83,8 @@ void trial (const pw_plugin_table *table, double t_end) {
   pw_run_close (r);
   trial_implicit (s, "ida+ggl", 1e3, t_end, reference, size);
   trial_implicit (s, "ida+baumgarte", 1e3, t_end, reference, size);
+  trial_implicit (s, "radau+ggl", 1e3, t_end, reference, size);
+  trial_implicit (s, "radau+index3", 1e3, t_end, reference, size);
   trial_implicit (s, "ida+si1", 1e3, t_end, reference, size);
   trial_implicit (s, "bdf+projection", 1e4, t_end, reference, size);
   trial_implicit (s, "bdf+baumgarte", 1e4, t_end, reference, size);
