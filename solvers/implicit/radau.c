@@ -255,10 +255,12 @@ static void radau_weigh (pw_run *r, double h) {
   const pw_settings *set = &r->settings;
   int n = d->n, third = !d->velocities && d->tangent.holonomic > 0;
   double rtol = radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
+  double large = 1; /* the largest coordinate: its round-off may affect others */
+  for (int j = 0; j < n; j++) large = fmax (large, fabs (d->now.y[j]) / d->unit[j]);
   for (int i = 0; i < 2 * n; i++) {
     double size = fabs (d->now.y[i]), least = set->atol > 0 ? set->atol / set->rtol : d->unit[i];
     int second = third && i >= n && isinf (r->saturation[i]); /* a difference of positions over h */
-    double unit = second ? fmax (d->unit[i], (fabs (d->now.y[i - n]) + d->unit[i - n]) / h) : d->unit[i];
+    double unit = second ? fmax (d->unit[i], large * d->unit[i - n] / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
     d->floor[i] = 8 * DBL_EPSILON * (size + unit);
     d->enough[i] = d->fixed ? d->floor[i] : fmax (newton * d->tolerance[i], d->floor[i]);
