@@ -271,8 +271,7 @@ static pw_range range_constant (double value) {
 }
 
 /* The result of an operation of one or two operands without their breaks.  Degenerate intervals are evaluated exactly,
- * so that equal numbers stay equal.  NaN stays NaN, except in comparisons, in
- * sign, and in x^0 and 1^y. */
+ * so that equal numbers stay equal.  NaN stays NaN, except in comparisons, in sign, and in x^0 and 1^y. */
 static pw_range range_result (const pw_expression_code *c, const pw_range *x, int operands) {
   const pw_range *last = x + operands - 1;
   if (range_is (x, x->lo) && range_is (last, last->lo))
