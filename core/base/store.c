@@ -42,37 +42,41 @@ int pw_names_find (const pw_names *n, const char *name) {
   return slot->name ? slot->value : -1;
 }
 
-struct pw_chunk {
-  struct pw_chunk *next;
-  size_t used, size;
-  char data[];
-};
-
 #define STORE_ALIGN 16
 #define STORE_CHUNK 65536
 
-static size_t store_round (size_t bytes) {
-  return (bytes + STORE_ALIGN - 1) / STORE_ALIGN * STORE_ALIGN;
+struct pw_chunk {
+  struct pw_chunk *next;
+  size_t used, size;
+  _Alignas(STORE_ALIGN) char data[];
+};
+
+static size_t store_round (size_t bytes, size_t align) {
+  return (bytes + align - 1) / align * align;
 }
 
-void *pw_arena_take (pw_arena *a, size_t bytes) {
-  bytes = store_round (bytes);
-  if (a->chunk == NULL || a->chunk->size - a->chunk->used < bytes) {
+static void *store_take (pw_arena *a, size_t bytes, size_t align) {
+  size_t used = a->chunk ? store_round (a->chunk->used, align) : 0;
+  if (a->chunk == NULL || a->chunk->size < used || a->chunk->size - used < bytes) {
     size_t size = bytes > STORE_CHUNK ? bytes : STORE_CHUNK;
     struct pw_chunk *c = calloc (1, sizeof *c + size);
     if (c == NULL) return NULL;
     c->next = a->chunk;
     c->size = size;
     a->chunk = c;
+    used = 0;
   }
-  void *p = a->chunk->data + a->chunk->used;
-  a->chunk->used += bytes;
-  return p;
+  a->chunk->used = used + bytes;
+  return a->chunk->data + used;
+}
+
+void *pw_arena_take (pw_arena *a, size_t bytes) {
+  return store_take (a, bytes, STORE_ALIGN);
 }
 
 char *pw_arena_text (pw_arena *a, const char *text) {
   size_t n = strlen (text) + 1;
-  char *copy = pw_arena_take (a, n);
+  char *copy = store_take (a, n, 1);
   return copy ? memcpy (copy, text, n) : NULL;
 }
 
@@ -86,7 +90,7 @@ void pw_arena_free (pw_arena *a) {
 
 void *pw_take (pw_layout *l, size_t count, size_t size) {
   void *p = l->base ? l->base + l->used : NULL;
-  l->used += store_round (count * size);
+  l->used += store_round (count * size, STORE_ALIGN);
   return p;
 }
 

@@ -35,8 +35,9 @@ static void *compile_take (const compilation *c, size_t count, size_t size) {
 }
 
 static const char *compile_text (const compilation *c, const char *text) {
-  char *copy = compile_take (c, strlen (text) + 1, 1);
-  return copy ? strcpy (copy, text) : NULL;
+  const char *copy = pw_arena_text (&c->s->arena, text);
+  if (copy == NULL) compile_no_memory (c);
+  return copy;
 }
 
 /* ---- Counting ---- */

@@ -54,7 +54,10 @@ static void test_arena (void **state) {
   for (int i = 0; i < PIECES; i++)
     for (size_t b = 0; b < size[i]; b++) assert_int_equal (piece[i][b], i + 1);
   assert_string_equal (pw_arena_text (&arena, "steer"), "steer");
-  assert_string_equal (pw_arena_text (&arena, ""), "");
+  const char *first = pw_arena_text (&arena, "B"), *second = pw_arena_text (&arena, "");
+  assert_string_equal (second, "");
+  assert_ptr_equal (second, first + 2); /* texts are packed, arrays after them aligned */
+  assert_int_equal ((uintptr_t)pw_arena_take (&arena, sizeof (double)) % 16, 0);
   pw_arena_free (&arena);
   assert_null (arena.chunk);
 }
