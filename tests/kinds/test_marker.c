@@ -49,15 +49,15 @@ static void test_place (void **state) {
 static void test_figures (void **state) {
   (void)state;
   cli_write ("arm.yaml", MARKER_ARM MARKER_TIP);
-  assert_int_equal (cli_run ("PATH=/none pinwheel run @/arm.yaml -t 1 --plots @/plots --animate @/arm.html"), 0);
-  assert_non_null (strstr (cli_file ("plots/paths.gp"), "title = 'paths of the markers'"));
+  assert_int_equal (cli_run ("pinwheel run @/arm.yaml -t 1 --plots @/plots --animate @/arm.html"), 0);
+  assert_non_null (strstr (cli_file ("plots/paths.svg"), "paths of the markers<"));
   assert_non_null (strstr (cli_file ("plots/mechanism.gp"), "\nmarkers = '0 '\n"));
   assert_non_null (strstr (cli_file ("plots/mechanism.gp"), "\nblocks = '0 '\n"));
   assert_non_null (strstr (cli_file ("plots/mechanism.dat"), "# wheels: x [m], y [m], t [s]\nnan nan nan\n"));
   assert_non_null (strstr (cli_file ("arm.html"), "{name:\"tip\",body:0,rolls:0}"));
   cli_write ("arm.yaml", MARKER_ARM MARKER_TIP "  - {tyre: T, body: arm, at: [0.3, 0], stiffness: 1, speed: 0.1}\n");
-  assert_int_equal (cli_run ("PATH=/none pinwheel run @/arm.yaml -t 1 --plots @/plots --animate @/arm.html"), 0);
-  assert_non_null (strstr (cli_file ("plots/paths.gp"), "title = 'paths of the wheels and markers'"));
+  assert_int_equal (cli_run ("pinwheel run @/arm.yaml -t 1 --plots @/plots --animate @/arm.html"), 0);
+  assert_non_null (strstr (cli_file ("plots/paths.svg"), "paths of the wheels and markers<"));
   assert_non_null (strstr (cli_file ("plots/mechanism.gp"), "\nblocks = '0 1 '\n"));
   assert_non_null (strstr (cli_file ("arm.html"), "{name:\"T\",body:0,rolls:1}"));
 }

@@ -33,14 +33,14 @@ int pw_figure_folder (const char *folder, pw_error *error) {
   return figure_make_folder (folder, error) == PW_OK ? pw_lock_folder (folder, error) : -1;
 }
 
-static pw_output *figure_open (const pw_figures *f, const char *name, const char *ending, pw_error *error) {
-  char path[FIGURE_PATH + 8];
-  snprintf (path, sizeof path, "%s/%s%s", f->folder, name, ending);
+pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error) {
+  char path[FIGURE_PATH + 40];
+  snprintf (path, sizeof path, "%s/%s", folder, name);
   return pw_output_open (path, error);
 }
 
 pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error) {
-  pw_output *o = figure_open (f, name, "", error);
+  pw_output *o = pw_figure_open (f->folder, name, error);
   if (o && *f->incomplete) fprintf (pw_output_stream (o), "# %s\n", f->incomplete + 2);
   return o;
 }
@@ -65,7 +65,9 @@ static const struct {
 };
 
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error) {
-  pw_output *o = figure_open (f, name, ".gp", error);
+  char script[40];
+  snprintf (script, sizeof script, "%s.gp", name);
+  pw_output *o = pw_figure_open (f->folder, script, error);
   if (o == NULL) return NULL;
   FILE *out = pw_output_stream (o);
   fprintf (out,

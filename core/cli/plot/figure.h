@@ -19,7 +19,8 @@ typedef struct {
  * PW_RESOURCE. */
 int pw_figure_folder (const char *folder, pw_error *error);
 
-/* Opens a data file.  NULL and PW_RESOURCE. */
+/* Opens a file of a folder; a data file, with a comment if the run is incomplete.  NULL and PW_RESOURCE. */
+pw_output *pw_figure_open (const char *folder, const char *name, pw_error *error);
 pw_output *pw_figure_data (const pw_figures *f, const char *name, pw_error *error);
 
 /* Opens NAME.gp.  Assign the variables of its template, then end it; PW_RESOURCE if a file cannot be written. */

@@ -281,7 +281,7 @@ static void compare_print_reference (const pw_compare *x) {
 /* DIR/truth.csv: the uncertainty of the reference, and its distances from other solutions. */
 static int compare_write_reference (const pw_compare *x, pw_error *error) {
   const pw_reference *r = &x->reference;
-  pw_output *o = pw_study_open (&x->study, "truth.csv", error);
+  pw_output *o = pw_figure_open (x->study.folder, "truth.csv", error);
   if (o == NULL) return error->status;
   FILE *f = pw_output_stream (o);
   pw_text t = { .at = NULL };

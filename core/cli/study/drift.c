@@ -247,7 +247,7 @@ static int drift_begin (pw_study *x, pw_error *error) {
 
 /* DIR/drift-time.csv: the largest values in each part of the runs of methods. */
 static int drift_write_times (const pw_study *x, pw_error *error) {
-  pw_output *o = pw_study_open (x, "drift-time.csv", error);
+  pw_output *o = pw_figure_open (x->folder, "drift-time.csv", error);
   if (o == NULL) return error->status;
   pw_text t = { .at = NULL };
   pw_text_cell (&t, "method,t [s],position,velocity,balance [J]");

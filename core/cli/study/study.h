@@ -123,8 +123,6 @@ int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *
 int pw_table_open (pw_study *x, pw_error *error);
 /* Prints the row that is done, and writes it into the CSV file. */
 int pw_table_row (pw_study *x, pw_error *error);
-/* Opens a file of the folder; NULL and PW_RESOURCE. */
-pw_output *pw_study_open (const pw_study *x, const char *name, pw_error *error);
 
 /* 1 if a coordinate of the points of a group is positive somewhere. */
 int pw_study_positive (const pw_study *x, int group, int coordinate);

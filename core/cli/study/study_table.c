@@ -20,16 +20,10 @@ static int table_is_end (const pw_study_column *c) {
 
 /* ---- CSV ---- */
 
-pw_output *pw_study_open (const pw_study *x, const char *name, pw_error *error) {
-  char path[FIGURE_PATH + 16];
-  snprintf (path, sizeof path, "%s/%s", x->folder, name);
-  return pw_output_open (path, error);
-}
-
 /* The file gets rows as they come, under the name NAME.part, which it keeps if the study is stopped. */
 int pw_table_open (pw_study *x, pw_error *error) {
   pw_text t = { .at = NULL };
-  x->csv = pw_study_open (x, x->type->tables[0], error);
+  x->csv = pw_figure_open (x->folder, x->type->tables[0], error);
   if (x->csv == NULL) return error->status;
   for (const pw_study_column *c = x->type->column; !table_is_end (c); c++)
     if (c->name) pw_text_name (&t, c->name, c->unit);
@@ -124,7 +118,7 @@ int pw_study_write_data (const pw_study *x, int group, const char *name, const c
                          pw_error *error) {
   char file[40], text[32];
   snprintf (file, sizeof file, "%s.dat", name);
-  pw_output *o = pw_study_open (x, file, error);
+  pw_output *o = pw_figure_open (x->folder, file, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);
   const pw_row *r = x->row;
