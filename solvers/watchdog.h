@@ -19,8 +19,8 @@ typedef struct {
   double near, refine;     /* sines: near a singular configuration, relative to the largest; solutions are refined */
   double regular;          /* sine that counts as regular, relative to the largest */
   double turn, least_turn; /* growth of the accelerations in a turn; least reference level */
-  double drift_turn, drift_near, drift_far,
-      drift_any;                     /* residual over squared sine; drift_any applies above drift_far */
+  double drift_turn, drift_near;     /* residual over squared sine */
+  double drift_far, drift_any;       /* the same, above the residual drift_far: drift_any */
   double jump;                       /* growth of the accelerations in a jump */
   double lipschitz, growth;          /* change of the sine per unit of motion; of step sizes */
   double dip, sag, stride, progress; /* walks past a change point */

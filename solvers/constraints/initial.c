@@ -138,9 +138,10 @@ int pw_initial_specified (const pw_initial_report *report, int state) {
   return (report->origin[state] & (PW_GIVEN | PW_SPECIFIED)) != 0;
 }
 
-/* If redundant equations make the plain attempt fail, it is repeated with an independent set: one selected at the given
- * positions, then one selected where an attempt that prescribes nothing ends, from there.  Off the constraints redundant
- * equations appear independent, increasingly with distance: hence several tolerances, and the second positions. */
+/* If redundant equations make an attempt with all equations fail, it is repeated with an independent set, selected at
+ * the given positions, or else at those that an attempt reaches which prescribes nothing, and begun there.  Off the
+ * constraints redundant equations appear independent, the more the larger the residuals: hence several tolerances, and
+ * the second positions. */
 static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_failure *failure, pw_error *error) {
   static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
   enum { TOLERANCES = sizeof tolerance / sizeof *tolerance };

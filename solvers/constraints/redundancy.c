@@ -97,7 +97,7 @@ void pw_rank_least_norm (pw_run *r, double *lambda) {
       for (int j = 0; j <= i; j++) A[i * k + j] += weight * n * ((r->redundant_row[j] == row) - c[j * m + row]);
     }
   }
-  LAPACKE_dposv_work (LAPACK_COL_MAJOR, 'U', k, 1, A, k, z, k);
+  if (LAPACKE_dposv_work (LAPACK_COL_MAJOR, 'U', k, 1, A, k, z, k) != 0) z[0] = NAN; /* then no multiplier is known */
   for (int row = 0; row < m; row++)
     for (int i = 0; i < k; i++) lambda[row] += z[i] * ((r->redundant_row[i] == row) - c[i * m + row]);
 }
