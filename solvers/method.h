@@ -25,10 +25,10 @@ struct pw_run {
   double *coefficient;         /* redundant x rows: each as a combination of the active rows; then scratch */
   double *least_norm;          /* rows: least-norm multipliers for the ledger; NULL: no redundant row moves */
   char *rank_memory;
-  double conditioning;    /* of the active rows at the state reached (rank.h) */
-  double reselect;        /* its value below which other rows are tried */
+  double conditioning;                      /* of the active rows at the state reached (rank.h) */
+  double reselect;                          /* its value below which other rows are tried */
   const struct pw_specialised *specialised; /* code in use, or NULL */
-  struct pw_scene *scene; /* its data */
+  struct pw_scene *scene;                   /* its data */
   void *scene_memory;
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
