@@ -74,8 +74,10 @@ static void test_bad_references (void **state) {
        PIN (.name = "B", .body = { "frame", "Ground" }));
   BAD (": pin B: a body is missing (the ground is \"ground\")", PIN (.name = "B", .body = { "frame" }));
   BAD (": wheel A: a body is missing (the ground is \"ground\")", WHEEL (.name = "A", .body = ""));
-  BAD (": pin B: both of its bodies are \"frame\": expected different ones", PIN (.name = "B", .body = { "frame", "frame" }));
-  BAD (": pin B: both of its bodies are \"ground\": expected different ones", PIN (.name = "B", .body = { "ground", "ground" }));
+  BAD (": pin B: both of its bodies are \"frame\": expected different ones",
+       PIN (.name = "B", .body = { "frame", "frame" }));
+  BAD (": pin B: both of its bodies are \"ground\": expected different ones",
+       PIN (.name = "B", .body = { "ground", "ground" }));
   BAD (": wheel A: expected a body other than the ground, which does not move", WHEEL (.name = "A", .body = "ground"));
 }
 

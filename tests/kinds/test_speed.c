@@ -135,7 +135,8 @@ static void test_refused (void **state) {
   pw_error error = { 0 };
   pw_model *m = scene_model (&nothing, NULL);
   assert_null (pw_system_compile (m, &error));
-  check_error (&error, PW_INPUT, "model scene: pfaffian none: a and b are all zero: expected at least one other number");
+  check_error (&error, PW_INPUT,
+               "model scene: pfaffian none: a and b are all zero: expected at least one other number");
   pw_model_free (m);
 }
 
