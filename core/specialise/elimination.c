@@ -1,8 +1,8 @@
 /* Symbolic elimination; see elimination.h. */
-#include "elimination.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "elimination.h"
 
 static const pw_term elimination_one = { PW_TERM_ONE, 1, "1", 1 };
 
@@ -22,6 +22,17 @@ static int elimination_degree (const pw_elimination *x, int p) {
   int degree = 0;
   for (int i = 0; i < x->n; i++) degree += elimination_couples (x, i, p);
   return degree;
+}
+
+/* A comment with the names of the unknowns. */
+static void elimination_comment (const pw_elimination *x, pw_emitter *e, int p, int partner) {
+  char name[120];
+  for (int k = 0, i = p; k < 1 + (partner >= 0); k++, i = partner) {
+    fputs (k ? " by " : "  /* ", e->code);
+    pw_emit_name (e->code, i < x->coordinates ? pw_system_state_name (x->s, x->coordinates + i, name, sizeof name)
+                                              : pw_system_reaction_name (x->s, i - x->coordinates, name, sizeof name));
+  }
+  fputs (" */\n", e->code);
 }
 
 static void elimination_place (pw_elimination *x, int p, int partner) {
@@ -69,6 +80,7 @@ static void elimination_update (pw_elimination *x, pw_emitter *e, int i, int j, 
 }
 
 static void elimination_pivot (pw_elimination *x, pw_emitter *e, int p, pw_term inverse) {
+  elimination_comment (x, e, p, -1);
   elimination_place (x, p, -1);
   x->inverse[p] = inverse;
   for (int i = 0; i < x->n; i++)
@@ -80,6 +92,7 @@ static void elimination_pivot (pw_elimination *x, pw_emitter *e, int p, pw_term 
 
 /* The pivot [ 0 p ; p 0 ] of a massless coordinate c and an equation r. */
 static void elimination_pair (pw_elimination *x, pw_emitter *e, int c, int r) {
+  elimination_comment (x, e, c, r);
   elimination_place (x, c, r);
   x->inverse[c] = pw_emit_quotient (e, elimination_one, AT (r, c));
   for (int k = 0; k < x->n; k++) {
@@ -193,7 +206,7 @@ static int elimination_allocate (pw_elimination *x, const pw_term *K) {
 
 int pw_elimination_open (pw_elimination *x, const pw_system *s, const pw_term *K, const unsigned char *takes_part,
                          pw_emitter *e) {
-  *x = (pw_elimination){ .coordinates = s->coords, .n = s->coords + s->rows };
+  *x = (pw_elimination){ .s = s, .coordinates = s->coords, .n = s->coords + s->rows };
   if (elimination_allocate (x, K) != PW_OK) return PW_RESOURCE;
   for (int i = 0; i < x->n; i++) x->step[i] = i < s->coords || takes_part[i - s->coords] ? x->n : x->n + 1;
   for (int c, r; elimination_next_pair (x, s->mass, &c, &r);) {

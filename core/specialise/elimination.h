@@ -8,6 +8,7 @@
 #include "system.h"
 
 typedef struct {
+  const pw_system *s;
   int coordinates, n;   /* unknowns: the coordinates, then the constraint equations */
   pw_term *K, *L;       /* n x n: column p has its values when p was eliminated; multipliers */
   pw_term *inverse;     /* n: reciprocal pivots */

@@ -1,7 +1,6 @@
 /* Writes a compiled system as C code for this scene alone: the sources of its element types, called for one element at a
  * time with constant indices, and a factorisation without loops. */
 #define _POSIX_C_SOURCE 200809L
-#include <ctype.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -30,11 +29,6 @@ typedef struct {
 } specialise_scene;
 
 /* ---- Text ---- */
-
-/* A name in a comment. */
-static void specialise_name (FILE *out, const char *name) {
-  for (; *name; name++) fputc (isalnum ((unsigned char)*name) || strchr (" _-.[]()", *name) ? *name : '?', out);
-}
 
 static int specialise_is_built_in (const pw_kind *kind) {
   for (const pw_kind *const *k = pw_kinds; *k; k++)
@@ -89,13 +83,13 @@ static void specialise_sources (const specialise_scene *x) {
 
 /* ---- Elements ---- */
 
-/* Opens a block with a batch of one element. */
-static void specialise_batch (const specialise_scene *x, int k, int e) {
+/* Opens a block with a batch of one element, `more` at the end of its initialiser. */
+static void specialise_batch (const specialise_scene *x, int k, int e, const char *more) {
   const pw_element_batch *b = &x->s->batch[k];
   fputs ("  { /* ", x->out);
-  specialise_name (x->out, b->kind->name);
+  pw_emit_name (x->out, b->kind->name);
   fputc (' ', x->out);
-  specialise_name (x->out, b->name[e]);
+  pw_emit_name (x->out, b->name[e]);
   fputs (" */\n    static const int body[] = { ", x->out);
   for (int n = 0; n < b->kind->bodies; n++) fprintf (x->out, "%s%d", n ? ", " : "", b->b.body[e * b->kind->bodies + n]);
   fprintf (x->out, "%s };\n    const pw_batch b = { .count = 1, .cols = %d, .body = body, .configuration = c,\n",
@@ -104,7 +98,7 @@ static void specialise_batch (const specialise_scene *x, int k, int e) {
   if (b->kind->own)
     fprintf (x->out, ", .q = q + %d, .v = v + %d", b->own + e * b->kind->own, b->own + e * b->kind->own);
   if (b->kind->signals) fprintf (x->out, ", .u = s->u + %d", 3 * (x->u[k] + e * b->kind->signals));
-  fputs (" };\n", x->out);
+  fprintf (x->out, "%s };\n", more);
 }
 
 /* The call of a function of its type, as text. */
@@ -132,7 +126,7 @@ static void specialise_rows (const specialise_scene *x, const char *name, const 
       int row = b->row + e * b->kind->rows;
       for (int r = 0; !has && r < b->kind->rows; r++) fprintf (x->out, "  out[%d] = 0;\n", row + r);
       if (!has) continue;
-      specialise_batch (x, k, e);
+      specialise_batch (x, k, e, "");
       snprintf (to, sizeof to, "out + %d", row);
       specialise_call (x, k, function, to);
       fputs ("  }\n", x->out);
@@ -147,7 +141,7 @@ static void specialise_jacobian (const specialise_scene *x) {
   for (int k = 0; k < x->s->constraints; k++) {
     const pw_element_batch *b = &x->s->batch[k];
     for (int e = 0; e < b->b.count; e++) {
-      specialise_batch (x, k, e);
+      specialise_batch (x, k, e, "");
       snprintf (to, sizeof to, "out + %d", x->J[k] + e * b->kind->rows * b->b.cols);
       specialise_call (x, k, "J", to);
       fputs ("  }\n", x->out);
@@ -164,7 +158,7 @@ static void specialise_forces (const specialise_scene *x) {
   for (int k = 0; k < s->batches; k++) {
     const pw_element_batch *b = &s->batch[k];
     for (int e = 0; b->kind->force && !b->kind->constant && e < b->b.count; e++) {
-      specialise_batch (x, k, e);
+      specialise_batch (x, k, e, "");
       fprintf (x->out, "    double f[%d];\n", b->b.cols);
       specialise_call (x, k, "force", "f");
       for (int c = 0; c < b->b.cols; c++)
@@ -179,6 +173,7 @@ static void specialise_forces (const specialise_scene *x) {
 /* The ledger's rates, as pw_evaluate_ledger. */
 static void specialise_ledger (const specialise_scene *x) {
   const pw_system *s = x->s;
+  char more[40];
   fputs ("\nINLINE void ledger (const pw_scene *s, const pw_configuration *c, const double *q, const double *v,\n"
          "                           const double *lambda, double *out) {\n" UNUSED "  (void)lambda;\n",
          x->out);
@@ -186,11 +181,11 @@ static void specialise_ledger (const specialise_scene *x) {
     const pw_element_batch *b = &s->batch[s->entry[i].batch];
     int k = s->entry[i].batch, e = s->entry[i].element, rows = b->kind->rows, row = b->row + e * rows;
     int drive = rows > 0 && s->entry[i].type == PW_WORK && b->kind->power == NULL;
-    specialise_batch (x, k, e);
-    fprintf (x->out, "    double y[%d];\n    pw_batch with = b;\n    with.lambda = lambda + %d;\n#define b with\n",
-             rows + 1, row);
+    snprintf (more, sizeof more, ", .lambda = lambda + %d", row);
+    specialise_batch (x, k, e, more);
+    fprintf (x->out, "    double y[%d];\n", rows > 0 ? rows : 1);
     specialise_call (x, k, drive ? "eta" : s->entry[i].type == PW_WORK ? "power" : "loss", "y");
-    fprintf (x->out, "#undef b\n    out[%d] = ", i);
+    fprintf (x->out, "    out[%d] = ", i);
     if (!drive) fputs ("y[0]", x->out);
     for (int r = 0; drive && r < rows; r++) fprintf (x->out, "%s - lambda[%d] * y[%d]", r ? "" : "0", row + r, r);
     fputs (";\n  }\n", x->out);
@@ -312,20 +307,35 @@ static int specialise_factor (const specialise_scene *x, pw_elimination *m, pw_e
 
 /* ---- Products with J ---- */
 
-/* out = J w, and with sizes the sum of the absolute values of its terms. */
-static void specialise_product (const specialise_scene *x) {
-  fputs ("\nINLINE void product (const double *J, const double *w, double *out, double *size) {\n  (void)J;\n", x->out);
-  int row = -1;
-  char text[24];
-  EACH_ENTRY (k, e, r, c) {
-    pw_term a = specialise_entry (x, k, e, r, c);
-    int i = x->s->batch[k].row + e * x->s->batch[k].kind->rows + r, j = pw_global (&x->s->batch[k], e, c);
-    for (; row < i; row++) fprintf (x->out, "  out[%d] = size[%d] = 0;\n", row + 1, row + 1);
+/* Row r of element e times w, or the sum of the absolute values of its terms. */
+static void specialise_row_product (const specialise_scene *x, int k, int e, int r, int absolute) {
+  const char *plus = "";
+  for (int c = 0; c < x->s->batch[k].b.cols; c++) {
+    int j = pw_global (&x->s->batch[k], e, c);
+    pw_term a = j < x->s->coords ? specialise_entry (x, k, e, r, c) : pw_term_zero ();
     if (a.type == PW_TERM_ZERO) continue;
-    fprintf (x->out, "  { const double x = %s * w[%d]; out[%d] += x, size[%d] += fabs (x); }\n", pw_term_text (a, text),
-             j, i, i);
+    fprintf (x->out, "%s%s", absolute || a.sign > 0 ? plus : *plus ? " - " : "-", absolute ? "fabs (" : "");
+    if (a.type != PW_TERM_ONE) fprintf (x->out, "%s * ", a.name);
+    fprintf (x->out, "w[%d]%s", j, absolute ? ")" : "");
+    plus = " + ";
   }
-  for (; row < x->s->rows - 1; row++) fprintf (x->out, "  out[%d] = size[%d] = 0;\n", row + 1, row + 1);
+  fputs (*plus ? ";\n" : "0;\n", x->out);
+}
+
+/* out = J w, and size = the sums of the absolute values of its terms. */
+static void specialise_product (const specialise_scene *x) {
+  fputs ("\nINLINE void product (const double *J, const double *w, double *out, double *size) {\n  (void)J, (void)w, "
+         "(void)out, (void)size;\n",
+         x->out);
+  for (int k = 0; k < x->s->constraints; k++)
+    for (int e = 0; e < x->s->batch[k].b.count; e++)
+      for (int r = 0; r < x->s->batch[k].kind->rows; r++) {
+        int i = x->s->batch[k].row + e * x->s->batch[k].kind->rows + r;
+        fprintf (x->out, "  out[%d] = ", i);
+        specialise_row_product (x, k, e, r, 0);
+        fprintf (x->out, "  size[%d] = ", i);
+        specialise_row_product (x, k, e, r, 1);
+      }
   fputs ("}\n", x->out);
 }
 
@@ -342,13 +352,13 @@ static void specialise_constants (const specialise_scene *x) {
            s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
   for (int b = 0; b < s->bodies; b++) {
     fprintf (x->out, "/* body %d: ", b);
-    specialise_name (x->out, s->body_name[b]);
+    pw_emit_name (x->out, s->body_name[b]);
     fputs (" */\n", x->out);
   }
   for (int i = 0; i < s->rows; i++) {
     char name[120];
     fprintf (x->out, "/* equation %d: ", i);
-    specialise_name (x->out, pw_system_reaction_name (s, i, name, sizeof name));
+    pw_emit_name (x->out, pw_system_reaction_name (s, i, name, sizeof name));
     fputs (" */\n", x->out);
   }
 }
@@ -385,7 +395,7 @@ static int specialise_write (specialise_scene *x) {
   const pw_source_text *done[SPECIALISE_SOURCES];
   int count = 0;
   fputs ("/* Generated by Pinwheel for the scene \"", x->out);
-  specialise_name (x->out, x->s->model);
+  pw_emit_name (x->out, x->s->model);
   fputs ("\".  Compile with: cc -std=c11 -O2 -ffp-contract=off -fPIC -shared */\n", x->out);
   specialise_sources (x);
   specialise_constants (x);
@@ -436,7 +446,9 @@ static void specialise_hash (uint64_t *h, const void *bytes, size_t size) {
 
 unsigned long pw_system_shape (const pw_system *s) {
   uint64_t h = 14695981039346656037u;
-  const int counts[] = { s->bodies, s->coords, s->rows, s->holonomic, s->batches, s->entries, s->sources, s->rheonomic };
+  const int counts[] = {
+    s->bodies, s->coords, s->rows, s->holonomic, s->batches, s->entries, s->sources, s->rheonomic
+  };
   specialise_hash (&h, counts, sizeof counts);
   for (int j = 0; j < s->coords; j++) specialise_hash (&h, &(char){ s->mass[j] > 0 }, 1);
   for (int k = 0; k < s->batches; k++) {

@@ -1,6 +1,7 @@
 /* Symbolic values and the statements that compute them; see symbolic.h. */
-#include "symbolic.h"
+#include <ctype.h>
 #include <string.h>
+#include "symbolic.h"
 
 pw_term pw_term_named (int type, const char *array, int i, double value) {
   pw_term a = { type, 1, "", value };
@@ -64,4 +65,8 @@ pw_term pw_emit_quotient (pw_emitter *e, pw_term a, pw_term b) {
   FILE *to = emit_begin (e, emit_is_constant (a) && emit_is_constant (b), a.sign * b.sign, a.value / b.value, &out);
   fprintf (to, "%s / %s;\n", a.type == PW_TERM_ONE ? "1" : a.name, b.name);
   return out;
+}
+
+void pw_emit_name (FILE *out, const char *name) {
+  for (; *name; name++) fputc (isalnum ((unsigned char)*name) || strchr (" _-.[]()", *name) ? *name : '?', out);
 }

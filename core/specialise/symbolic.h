@@ -32,6 +32,9 @@ pw_term pw_emit_product (pw_emitter *e, pw_term a, pw_term b);               /* 
 pw_term pw_emit_difference (pw_emitter *e, pw_term a, pw_term b, pw_term c); /* a - b c */
 pw_term pw_emit_quotient (pw_emitter *e, pw_term a, pw_term b);              /* a / b */
 
+/* A name as part of a comment. */
+void pw_emit_name (FILE *out, const char *name);
+
 /* "-x3": the term with its sign, in the buffer. */
 const char *pw_term_text (pw_term a, char buffer[24]);
 
