@@ -259,10 +259,9 @@ static void radau_weigh (pw_run *r, double h) {
   for (int j = 0; j < n; j++) large = fmax (large, fabs (d->now.y[j]) / d->unit[j]);
   for (int i = 0; i < 2 * n; i++) {
     double size = fabs (d->now.y[i]), least = set->atol > 0 ? set->atol / set->rtol : d->unit[i];
-    int second = third && i >= n && isinf (r->saturation[i]); /* a difference of positions over h */
-    double unit = second ? fmax (d->unit[i], large * d->unit[i - n] / h) : d->unit[i];
+    double unit = third && i >= n ? fmax (d->unit[i], large * d->unit[i - n] / h) : d->unit[i];
     d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
-    d->floor[i] = 8 * DBL_EPSILON * (size + unit);
+    d->floor[i] = fmin (8 * DBL_EPSILON * (size + unit), 0.1 * r->saturation[i]);
     d->enough[i] = d->fixed ? d->floor[i] : fmax (newton * d->tolerance[i], d->floor[i]);
   }
 }
@@ -462,6 +461,7 @@ static int radau_work (pw_run *r, double h, double t1, double *error) {
 
 static int radau_restart (pw_run *r, pw_error *error) {
   radau *d = r->data;
+  double T = r->w->scale.time;
   (void)error;
   d->base = d->last.t = r->t;
   d->count = 0;
@@ -470,7 +470,7 @@ static int radau_restart (pw_run *r, pw_error *error) {
   d->outdated = 1;
   d->current = 0;
   d->h = pw_first_step (r);
-  if (!r->s->saturates) d->h = fmax (d->h, 0.1 * r->w->scale.time * sqrt (sqrt (radau_rtol (r))));
+  if (d->h >= 0.5 * T * sqrt (r->settings.rtol)) d->h = fmax (d->h, 0.1 * T * sqrt (sqrt (radau_rtol (r))));
   memcpy (d->now.y, r->q, (size_t)d->n * sizeof (double));
   memcpy (d->now.y + d->n, r->v, (size_t)d->n * sizeof (double));
   memset (d->now.y + 2 * d->n, 0, (size_t)(d->rows + d->mus) * sizeof (double));
