@@ -10,8 +10,8 @@
 #include "pinwheel-solvers.h"
 
 static const char *const checkpoint_methods[] = { "rk4+projection", "erk8+projection", "ida+ggl",
-                                                  "bdf+projection", "galpha+ggl",      "adams",
-                                                  "rk4+baumgarte",  "erk5+nullspace" };
+                                                  "bdf+projection", "radau+ggl",       "galpha+ggl",
+                                                  "adams",          "rk4+baumgarte",   "erk5+nullspace" };
 enum { CHECKPOINT_METHODS = sizeof checkpoint_methods / sizeof *checkpoint_methods };
 
 /* The bytes as a state, whatever they are. */

@@ -24,14 +24,14 @@ static void model_run (pw_system *s, const char *method) {
 }
 
 int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
-  static const char *const methods[] = { "rk4+projection", "ida+ggl", "erk5+nullspace", "galpha+ggl",
-                                         "bdf+projection" };
+  static const char *const methods[] = { "rk4+projection", "ida+ggl",   "erk5+nullspace",
+                                         "galpha+ggl",     "radau+ggl", "bdf+projection" };
   pw_error error = { 0 };
   pw_file *file = pw_file_open (fuzz_file (data, size, ".yaml"), &error);
   pw_model *m = file ? pw_file_model (file, &error) : NULL;
   pw_system *s = m && pw_model_build (m, &error) == PW_OK ? pw_system_compile (m, &error) : NULL;
   if (s == NULL && error.status >= 0) abort (); /* what fails says so */
-  if (s) model_run (s, methods[size % 5]);
+  if (s) model_run (s, methods[size % (sizeof methods / sizeof *methods)]);
   pw_system_free (s);
   pw_model_free (m);
   pw_file_close (file);

@@ -15,7 +15,7 @@ import transform
 from mechanisms import SPAN, random_mechanism
 
 # One method of each kind; their settings, which go with the unit of time.
-METHODS = ["erk8+projection", "rk4+projection", "bdf+projection", "ida+ggl", "galpha+ggl", "leapfrog+rattle",
+METHODS = ["erk8+projection", "rk4+projection", "bdf+projection", "ida+ggl", "galpha+ggl", "radau+ggl", "leapfrog+rattle",
            "erk5+nullspace", "adams+baumgarte"]
 
 

@@ -1,0 +1,379 @@
+/* The stages of a step of radau: equations, matrices, Newton's iteration, error estimates; see radau.c.  A, T and the
+ * eigenvalues of A^-1 were computed with 60 digits from the nodes c. */
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "radau_state.h"
+
+enum { STAGES = PW_RADAU_STAGES };
+
+static const double radau_c[STAGES] = { 0.15505102572168219018, 0.64494897427831780982, 1 };
+static const double radau_A[STAGES][STAGES] = {
+  { 0.19681547722366042587, -0.06553542585019838811, 0.02377097434822015242 },
+  { 0.39442431473908727700, 0.29207341166522846302, -0.04154875212599793020 },
+  { 0.37640306270046727505, 0.51248582618842161384, 0.11111111111111111111 },
+};
+static const double radau_T[STAGES][STAGES] = {
+  { 0.09443876248897524149, -0.14125529502095420843, -0.03002919410514742449 },
+  { 0.25021312296533331138, 0.20412935229379993200, 0.38294211275726193780 },
+  { 1, 1, 0 },
+};
+static const double radau_inverse_T[STAGES][STAGES] = {
+  { 4.17871859155190472735, 0.32768282076106238708, 0.52337644549944954804 },
+  { -4.17871859155190472735, -0.32768282076106238708, 0.47662355450055045196 },
+  { -0.50287263494578687595, 2.57192694985560542919, -0.59603920482822492497 },
+};
+static const double radau_gamma = 3.63783425274449573221, radau_alpha = 2.68108287362775213390,
+                    radau_beta = 3.05043019924741056943;
+static const double radau_e[STAGES] = { -10.04880939982741556, 1.38214273316074889, -1. / 3 };
+
+/* ---- Equations ---- */
+
+/* F (t, y); leaves kinematics and J there. */
+static int radau_evaluate (pw_run *r, double t, const double *y, double *F) {
+  radau *d = r->data;
+  int n = d->n;
+  int status = pw_update_kinematics (r->w, pw_before_breakpoint (r, t), y, y + n);
+  if (status != PW_OK) return status;
+  pw_evaluate_J (r->w);
+  r->statistics.rhs++;
+  memset (d->pull, 0, (size_t)n * sizeof *d->pull);
+  if (d->mus) pw_add_JT (r->w, pw_tangent_expand (&d->tangent, y + 2 * n + d->rows, d->mus, d->tangent.mu), d->pull);
+  for (int j = 0; j < n; j++) F[j] = y[n + j] - d->D[j] * d->pull[j];
+  memset (d->pull, 0, (size_t)n * sizeof *d->pull);
+  pw_add_JT (r->w, pw_tangent_expand (&d->tangent, y + 2 * n, d->rows, d->tangent.lambda), d->pull);
+  pw_evaluate_force (r->w, d->f);
+  for (int j = 0; j < n; j++) F[n + j] = d->f[j] - d->pull[j];
+  pw_mul_J (r->w, y + n, d->jv);
+  pw_evaluate_eta (r->w, d->eta);
+  for (int i = 0; i < r->s->rows; i++) d->jv[i] = d->eta[i] - d->jv[i];
+  if (d->mus || !d->velocities) pw_evaluate_g (r->w, d->eta);
+  for (int i = 0; i < r->s->holonomic; i++) {
+    if (!d->velocities) d->jv[i] = -d->eta[i];
+    d->eta[i] = -d->eta[i];
+  }
+  pw_tangent_compress (&d->tangent, d->jv, d->rows, F + 2 * n);
+  pw_tangent_compress (&d->tangent, d->eta, d->mus, F + 2 * n + d->rows);
+  return PW_OK;
+}
+
+/* ---- Matrices ---- */
+
+static void radau_fill (radau *d) {
+  int n = d->n, mu = 2 * n + d->rows;
+  const double *y = d->now.y;
+  const pw_tangent_update to = {
+    .momentum = n, .constraint = 2 * n, .v = n, .a = n, .lambda = 2 * n, .mu = mu, .of_lambda = 1
+  };
+  const double *mus = d->mus ? pw_tangent_expand (&d->tangent, y + mu, d->mus, d->tangent.mu) : NULL;
+  pw_tangent_kinematics (&d->tangent, &to, mus, d->D);
+  pw_tangent_momentum (&d->tangent, &to, pw_tangent_expand (&d->tangent, y + 2 * n, d->rows, d->tangent.lambda));
+  pw_tangent_velocities (&d->tangent, &to, y + n, d->velocities);
+  if (d->mus || !d->velocities) pw_tangent_positions (&d->tangent, &to, d->velocities ? mu : 2 * n);
+}
+
+int pw_radau_open_matrices (pw_run *r) {
+  radau *d = r->data;
+  pw_tangent *x = &d->tangent;
+  pw_scatter_record (&x->tape);
+  radau_fill (d);
+  if (pw_scatter_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
+  size_t nonzeros = (size_t)x->colptr[d->size] + 1;
+  d->matrix = malloc (nonzeros * sizeof *d->matrix);
+  d->value = malloc (2 * nonzeros * sizeof *d->value);
+  d->diagonal = malloc (((size_t)(2 * d->n) + 1) * sizeof *d->diagonal);
+  if (!d->matrix || !d->value || !d->diagonal) return PW_RESOURCE;
+  for (int j = 0; j < 2 * d->n; j++)
+    for (d->diagonal[j] = x->colptr[j]; x->rowind[d->diagonal[j]] != j;) d->diagonal[j]++;
+  int status = pw_sparse_open (&d->real, d->size, x->colptr, x->rowind);
+  return status == PW_OK ? pw_sparse_open_complex (&d->complex, d->size, x->colptr, x->rowind) : status;
+}
+
+/* Evaluates F_y at the beginning of the step. */
+static int radau_linearise (pw_run *r) {
+  radau *d = r->data;
+  const double *y = d->now.y;
+  int status = pw_update_kinematics (r->w, r->t, y, y + d->n);
+  if (status != PW_OK) return status;
+  pw_evaluate_J (r->w);
+  memset (d->matrix, 0, (size_t)d->tangent.colptr[d->size] * sizeof *d->matrix);
+  pw_scatter_begin (&d->tangent.tape, d->matrix);
+  radau_fill (d);
+  pw_matrix_evaluated (r, y, y + d->n);
+  r->statistics.jacobians++;
+  d->current = 1;
+  d->outdated = 0;
+  d->factored = 0;
+  return PW_OK;
+}
+
+/* Scales of rows and columns for a step of size h, as in galpha. */
+static void radau_scale (const pw_run *r, double h) {
+  radau *d = r->data;
+  int n = d->n, third = d->velocities ? 0 : d->tangent.holonomic;
+  double c = radau_gamma / h, mass = 0;
+  for (int j = 0; j < n; j++) mass = fmax (mass, r->s->mass[j]);
+  if (mass == 0) mass = 1;
+  for (int j = 0; j < n; j++) {
+    d->row[j] = 1 / c, d->column[j] = 1;
+    d->row[n + j] = 1 / (c * c * mass), d->column[n + j] = c;
+  }
+  for (int i = 0; i < d->rows; i++) d->row[2 * n + i] = i < third ? 1 : 1 / c, d->column[2 * n + i] = c * c * mass;
+  for (int i = 2 * n + d->rows; i < d->size; i++) d->row[i] = 1, d->column[i] = c;
+}
+
+/* Stores -F_y + re B in every stride-th value, scaled, and im B in the value after it. */
+static void radau_shift (radau *d, int stride, double re, double im) {
+  const int64_t *colptr = d->tangent.colptr, *rowind = d->tangent.rowind;
+  for (int c = 0; c < d->size; c++)
+    for (int64_t i = colptr[c]; i < colptr[c + 1]; i++) {
+      double scale = d->row[rowind[i]] * d->column[c], b = c < 2 * d->n && i == d->diagonal[c] ? d->B[c] : 0;
+      d->value[stride * i] = scale * (d->matrix[i] + re * b);
+      if (stride == 2) d->value[2 * i + 1] = scale * im * b;
+    }
+}
+
+static int radau_factor (pw_run *r, double h) {
+  radau *d = r->data;
+  if (d->factored == h) return PW_OK;
+  d->factored = 0;
+  if (d->forget) pw_sparse_forget (&d->real), pw_sparse_forget (&d->complex);
+  d->forget = 0;
+  radau_scale (r, h);
+  radau_shift (d, 1, radau_gamma / h, 0);
+  int status = pw_sparse_factor (&d->real, d->value);
+  radau_shift (d, 2, radau_alpha / h, radau_beta / h);
+  if (status == PW_OK) status = pw_sparse_factor (&d->complex, d->value);
+  r->statistics.factorisations += 2;
+  if (status == PW_OK) d->factored = h;
+  return status > 0 ? PW_INPUT : status;
+}
+
+/* x = (gamma/h B - F_y)^-1 x */
+static int radau_solve_real (radau *d, double *x) {
+  for (int i = 0; i < d->size; i++) x[i] *= d->row[i];
+  int status = pw_sparse_solve (&d->real, x);
+  for (int i = 0; i < d->size; i++) x[i] *= d->column[i];
+  return status;
+}
+
+/* The same with the complex matrix, for re + i im. */
+static int radau_solve_complex (radau *d, double *re, double *im) {
+  double *x = d->x;
+  for (int i = 0; i < d->size; i++) x[2 * i] = d->row[i] * re[i], x[2 * i + 1] = d->row[i] * im[i];
+  int status = pw_sparse_solve (&d->complex, x);
+  for (int i = 0; i < d->size; i++) re[i] = d->column[i] * x[2 * i], im[i] = d->column[i] * x[2 * i + 1];
+  return status;
+}
+
+/* ---- Tolerances ---- */
+
+double pw_radau_rtol (const pw_run *r) {
+  return 0.05 * cbrt (r->settings.rtol * r->settings.rtol);
+}
+
+/* Sets the tolerances for a step of size h: of the error test, of Newton's corrections, and their round-off, which in
+ * index3 is that of positions over h. */
+static void radau_weigh (pw_run *r, double h) {
+  radau *d = r->data;
+  const pw_settings *set = &r->settings;
+  int n = d->n, third = !d->velocities && d->tangent.holonomic > 0;
+  double rtol = pw_radau_rtol (r), newton = fmax (10 * DBL_EPSILON / rtol, fmin (0.03, sqrt (rtol)));
+  double large = 1; /* the largest coordinate: its round-off may affect others */
+  for (int j = 0; j < n; j++) large = fmax (large, fabs (d->now.y[j]) / d->unit[j]);
+  for (int i = 0; i < 2 * n; i++) {
+    double size = fabs (d->now.y[i]), least = set->atol > 0 ? set->atol / set->rtol : d->unit[i];
+    double unit = third && i >= n ? fmax (d->unit[i], large * d->unit[i - n] / h) : d->unit[i];
+    d->tolerance[i] = fmin (rtol * (size + least), r->saturation[i]);
+    d->floor[i] = fmin (8 * DBL_EPSILON * (size + unit), 0.1 * r->saturation[i]);
+    d->enough[i] = d->fixed ? d->floor[i] : fmax (newton * d->tolerance[i], d->floor[i]);
+  }
+}
+
+/* ---- Newton's iteration ---- */
+
+void pw_radau_basis (double x, double *weight) {
+  for (int i = 0; i < STAGES; i++) {
+    weight[i] = x / radau_c[i];
+    for (int k = 0; k < STAGES; k++)
+      if (k != i) weight[i] *= (x - radau_c[k]) / (radau_c[i] - radau_c[k]);
+  }
+}
+
+static void radau_combine (radau *d, const double by[STAGES][STAGES], double *const *from, double *const *to) {
+  for (int i = 0; i < d->size; i++) {
+    double a = from[0][i], b = from[1][i], c = from[2][i];
+    for (int k = 0; k < STAGES; k++) to[k][i] = by[k][0] * a + by[k][1] * b + by[k][2] * c;
+  }
+}
+
+/* Starting values: the polynomial of the last step, or else constant accelerations and multipliers. */
+static void radau_predict (pw_run *r, double h) {
+  radau *d = r->data;
+  const radau_step *last = &d->last;
+  double weight[STAGES];
+  for (int k = 0; k < STAGES; k++) {
+    double *Z = d->now.Z[k], ch = radau_c[k] * h;
+    if (last->h > 0) {
+      pw_radau_basis (1 + ch / last->h, weight);
+      for (int i = 0; i < d->size; i++)
+        Z[i] = last->y[i] - d->now.y[i] + weight[0] * last->Z[0][i] + weight[1] * last->Z[1][i] +
+               weight[2] * last->Z[2][i];
+      continue;
+    }
+    memset (Z, 0, (size_t)d->size * sizeof *Z);
+    for (int j = 0; j < d->n; j++) Z[j] = ch * (r->v[j] + 0.5 * ch * r->a[j]), Z[d->n + j] = ch * r->a[j];
+  }
+  radau_combine (d, radau_inverse_T, d->now.Z, d->W);
+}
+
+void pw_radau_stage (const radau *d, int k) {
+  for (int i = 0; i < d->size; i++) d->Y[i] = d->now.y[i] + d->now.Z[k][i];
+}
+
+static double radau_time (const pw_run *r, int k, double h, double t1) {
+  return k == STAGES - 1 ? t1 : r->t + radau_c[k] * h;
+}
+
+/* One correction; *size, *rough: the largest in units of `enough` and of round-off. */
+static int radau_correct (pw_run *r, double h, double t1, double *size, double *rough) {
+  radau *d = r->data;
+  double *const *W = d->W, *const *F = d->F;
+  for (int k = 0; k < STAGES; k++) {
+    pw_radau_stage (d, k);
+    int status = radau_evaluate (r, radau_time (r, k, h, t1), d->Y, F[k]);
+    if (status != PW_OK) return status;
+  }
+  radau_combine (d, radau_inverse_T, F, F);
+  for (int i = 0; i < 2 * d->n; i++) {
+    double b = d->B[i] / h;
+    F[0][i] -= b * radau_gamma * W[0][i];
+    F[1][i] -= b * (radau_alpha * W[1][i] - radau_beta * W[2][i]);
+    F[2][i] -= b * (radau_beta * W[1][i] + radau_alpha * W[2][i]);
+  }
+  if (radau_solve_real (d, F[0]) != PW_OK || radau_solve_complex (d, F[1], F[2]) != PW_OK) return PW_RESOURCE;
+  *size = *rough = 0;
+  for (int i = 0; i < 2 * d->n; i++) {
+    double most = pw_largest (pw_largest (fabs (F[0][i]), fabs (F[1][i])), fabs (F[2][i]));
+    *size = pw_largest (*size, most / d->enough[i]);
+    *rough = pw_largest (*rough, most / d->floor[i]);
+  }
+  for (int k = 0; k < STAGES; k++)
+    for (int i = 0; i < d->size; i++) W[k][i] += F[k][i];
+  radau_combine (d, radau_T, W, d->now.Z);
+  return PW_OK;
+}
+
+/* 1: converged; 0: continue; -1: it will not converge in time.  size: of the correction, before: of the previous one. */
+static int radau_converged (pw_run *r, int done, double size, double before, double rough) {
+  radau *d = r->data;
+  const int most = d->fixed ? 50 : 7;
+  d->shorter = 0.5;
+  if (!isfinite (size)) return -1;
+  if (size == 0) return 1;
+  if (done == 0) {
+    if (d->fixed || r->s->saturates) return 0;
+    d->left = pow (fmax (d->left, DBL_EPSILON), 0.8);
+    return d->left * size <= 1;
+  }
+  double rate = size / before;
+  d->rate = done == 1 ? rate : sqrt (rate * d->rate);
+  if (rate > 0.3 && rough <= (d->near ? 1e7 : 64)) return 1;
+  d->left = d->rate < 0.99 ? d->rate / (1 - d->rate) : 100;
+  if (d->left * size <= 1) return 1;
+  if (d->fixed && done < most && (done < 4 || d->rate < 1)) return 0;
+  if (!(d->rate < 0.99)) return -1;
+  double end = d->left * size * pow (d->rate, most - 1 - done);
+  if (done < most && end < 1) return 0;
+  d->shorter = 0.8 * pow (fmax (1e-4, fmin (20, end)), -1. / (most + 3 - done));
+  return -1;
+}
+
+static int radau_iterate (pw_run *r, double h, double t1) {
+  radau *d = r->data;
+  double size = 0, before, rough;
+  radau_predict (r, h);
+  for (int done = 0;; done++) {
+    before = size;
+    int status = radau_correct (r, h, t1, &size, &rough);
+    if (status != PW_OK) return status;
+    int good = radau_converged (r, done, size, before, rough);
+    d->iterations = done + 1;
+    if (good) return good > 0 ? PW_OK : PW_RETRY;
+  }
+}
+
+int pw_radau_solve (pw_run *r, double h, double t1) {
+  radau *d = r->data;
+  if (!d->current && d->outdated) d->factored = 0;
+  radau_weigh (r, h);
+  d->shorter = 0.5;
+  for (;;) {
+    int status = d->outdated ? radau_linearise (r) : PW_OK;
+    if (status == PW_OK) status = radau_factor (r, h);
+    if (status == PW_OK) status = radau_iterate (r, h, t1);
+    d->forget = status == PW_RETRY;
+    if (status != PW_RETRY || d->current) return status;
+    d->outdated = 1;
+  }
+}
+
+/* ---- Errors ---- */
+
+/* Root of the sum of the squares of errors in units of the tolerances, over the number of states. */
+static double radau_norm (const radau *d, const double *e) {
+  double sum = 0;
+  for (int i = 0; i < 2 * d->n; i++) sum += e[i] * e[i] / (d->tolerance[i] * d->tolerance[i]);
+  return sqrt (sum / (2 * d->n));
+}
+
+int pw_radau_estimate (pw_run *r, double h, int again, double *error) {
+  radau *d = r->data;
+  int n = d->n;
+  double *e = d->F[0], *rest = d->F[1];
+  double *const *Z = d->now.Z;
+  for (int i = 0; i < d->size; i++) {
+    rest[i] = i < 2 * n ? d->B[i] / h * (radau_e[0] * Z[0][i] + radau_e[1] * Z[1][i] + radau_e[2] * Z[2][i]) : 0;
+    e[i] = rest[i] + (i < n ? r->v[i] : i < 2 * n ? d->B[i] * r->a[i - n] : 0);
+  }
+  if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
+  *error = radau_norm (d, e);
+  if (!again || *error < 1) return PW_OK;
+  for (int i = 0; i < d->size; i++) d->Y[i] = d->now.y[i] + e[i];
+  if (radau_evaluate (r, r->t, d->Y, e) != PW_OK) return PW_OK;
+  for (int i = 0; i < d->size; i++) e[i] += rest[i];
+  if (radau_solve_real (d, e) != PW_OK) return PW_RESOURCE;
+  *error = radau_norm (d, e);
+  return PW_OK;
+}
+
+int pw_radau_work (pw_run *r, double h, double t1, double *error) {
+  radau *d = r->data;
+  int entries = r->s->entries, again = !d->velocities && pw_ledger_reacts (r->s);
+  double sum = 0;
+  for (int k = 0; k < STAGES; k++) memset (d->now.w[k], 0, (size_t)entries * sizeof (double));
+  for (int k = 0; k < STAGES; k++) {
+    pw_radau_stage (d, k);
+    double t = pw_before_breakpoint (r, radau_time (r, k, h, t1));
+    int status = pw_update_kinematics (r->w, t, d->Y, d->Y + d->n);
+    if (status != PW_OK) return status;
+    pw_evaluate_J (r->w);
+    const double *lambda = pw_tangent_expand (&d->tangent, d->Y + 2 * d->n, d->rows, d->tangent.lambda);
+    if (again && pw_saddle_factor (r->saddle) == PW_OK) {
+      pw_run_accelerate_updated (r, d->Y + d->n, r->a_at, r->lambda_at);
+      lambda = r->lambda_at;
+    }
+    pw_ledger_rates (r, lambda, d->rates);
+    for (int i = 0; i < STAGES; i++)
+      for (int e = 0; e < entries; e++) d->now.w[i][e] += h * radau_A[i][k] * d->rates[e];
+  }
+  for (int e = 0; e < entries; e++) {
+    double off = h * r->rate[e];
+    for (int k = 0; k < STAGES; k++) off += radau_e[k] * d->now.w[k][e];
+    sum += off * off;
+  }
+  double tolerance = pw_ledger_tolerance (r, h) * fmax (1, pw_radau_rtol (r) / r->settings.rtol);
+  *error = fmax (*error, sqrt (sum) / radau_gamma / tolerance);
+  return PW_OK;
+}
