@@ -768,6 +768,11 @@ int pw_system_jumps (const pw_system *s, double t);
  * and the error if there is none: redundant constraints, or too many constraint equations.  Free the text. */
 char *pw_system_source (const pw_system *s, pw_error *error);
 
+/* Whether compiled code is of this version and of a system with the same structure: parameters and initial values may
+ * differ. */
+typedef struct pw_specialised pw_specialised;
+int pw_specialised_fits (const pw_specialised *code, const pw_system *s);
+
 /* ---- Elements of a system, in the order of its constraint equations ---- */
 
 /* An element that acts on every body appears once per body. */

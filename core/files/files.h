@@ -43,6 +43,25 @@ typedef int pw_object_user (void *context, const char *object, pw_error *error);
  * compile or there is no compiler; PW_RESOURCE; or what `use` returns. */
 int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error);
 
+/* Compiles generated code with all messages in a log.  PW_INPUT: no compiler; PW_METHOD: it does not compile; PW_RESOURCE. */
+int pw_compile_scene (const char *path, const char *object, const char *log, pw_error *error);
+/* Its further option: gcc 12.2 fuses operations when it vectorises straight code, see the Makefile. */
+#define PW_SCENE_FLAG "-fno-tree-slp-vectorize"
+
+/* The words of the C compiler: CC in the environment, else "cc". */
+const char *pw_compiler (void);
+
+/* A new folder in TMPDIR that only the user can use, malloced; NULL and PW_RESOURCE. */
+char *pw_temporary_folder (pw_error *error);
+
+/* ---- The cache (cache.c) ---- */
+
+/* The cache's folder, made if it does not exist, malloced; NULL if there is none, with a notice in the buffer if one
+ * exists but others could have written to it, or it cannot be used. */
+char *pw_cache_folder (char *notice, size_t size);
+/* Deletes the files that have not been used for longest until the rest is within the limit. */
+void pw_cache_trim (const char *folder);
+
 /* ---- Models in YAML (yaml.c) ---- */
 
 /* A text model in memory, with a plug-in's table.  `shown` is the path in messages, `largest` the limit in bytes.

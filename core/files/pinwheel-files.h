@@ -46,6 +46,24 @@ int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *pa
 /* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero. */
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error);
 
+/* ---- Specialised scenes ---- */
+
+/* Loaded code of a system. */
+typedef struct pw_scene_code pw_scene_code;
+
+/* Loads what $CC or cc makes of the text of pw_system_source: from the cache, pinwheel/ below $XDG_CACHE_HOME or
+ * ~/.cache, or compiled; without a cache in a temporary folder.  Systems of the same structure share code
+ * (pw_specialised_fits).  Processes may do so at the same time.
+ *
+ * NULL and PW_RETRY if it would have to be compiled but `compile` is 0; PW_INPUT if there is no compiler; PW_METHOD if
+ * the text does not compile, with the path at which it is kept; PW_RESOURCE. */
+pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, int compile, pw_error *error);
+/* For pw_settings.specialised; NULL of NULL. */
+const pw_specialised *pw_scene_code_table (const pw_scene_code *c);
+/* A line about a cache that was ignored, or ""; lives as long as the code. */
+const char *pw_scene_code_notice (const pw_scene_code *c);
+void pw_scene_code_close (pw_scene_code *c);
+
 /* ---- Numbers, the same in every locale ---- */
 
 /* "%.17g" (or fewer digits) with a decimal point; non-finite as nan, inf, -inf.  Returns the buffer. */

@@ -465,6 +465,10 @@ unsigned long pw_system_shape (const pw_system *s) {
   return (unsigned long)h;
 }
 
+int pw_specialised_fits (const pw_specialised *code, const pw_system *s) {
+  return code->abi == PW_SCENE_ABI && code->shape == pw_system_shape (s);
+}
+
 char *pw_system_source (const pw_system *s, pw_error *error) {
   char *text = NULL;
   size_t size = 0;

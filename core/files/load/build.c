@@ -1,7 +1,8 @@
-/* Compiles a model file in C to a shared object: runs the user's compiler without a shell, in a folder that only the
- * user can write to. */
+/* Compiles C to a shared object: runs the user's compiler without a shell, in a folder that only the user can write
+ * to. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
+#include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
 #include <stdlib.h>
@@ -20,8 +21,13 @@ typedef struct {
   char *word[BUILD_WORDS];
 } build_command;
 
+const char *pw_compiler (void) {
+  const char *cc = getenv ("CC");
+  return cc && cc[strspn (cc, " \t")] ? cc : "cc";
+}
+
 /* CC may be more than one word ("ccache gcc"); half of the array is reserved for our options. */
-static int build_words (build_command *c, const char *include, const char *source, const char *object) {
+static int build_words (build_command *c, const char *include, const char *source, const char *object, int generated) {
   const char *const options[] = { "-std=c11",
                                   "-O2",
                                   "-ffp-contract=off",
@@ -31,17 +37,16 @@ static int build_words (build_command *c, const char *include, const char *sourc
 #endif
                                   "-fPIC",
                                   "-shared",
-                                  "-Wall",
+                                  generated ? PW_SCENE_FLAG : "-Wall",
                                   "-I",
                                   include,
                                   "-o",
                                   object,
                                   source,
                                   "-lm" };
-  const char *cc = getenv ("CC");
   char *rest = NULL;
   int words = 0;
-  c->text = strdup (cc && cc[strspn (cc, " \t")] ? cc : "cc");
+  c->text = strdup (pw_compiler ());
   if (c->text == NULL) return PW_RESOURCE;
   for (char *w = strtok_r (c->text, " \t", &rest); w && words < BUILD_WORDS / 2; w = strtok_r (NULL, " \t", &rest))
     c->word[words++] = w;
@@ -49,8 +54,8 @@ static int build_words (build_command *c, const char *include, const char *sourc
   return PW_OK;
 }
 
-/* Starts the compiler with its messages on standard error and default signal handling. */
-static int build_spawn (const build_command *c, const sigset_t *before, pid_t *child) {
+/* Starts the compiler with its messages on standard error, or in a log, and default signal handling. */
+static int build_spawn (const build_command *c, const char *log, const sigset_t *before, pid_t *child) {
   posix_spawn_file_actions_t files;
   posix_spawnattr_t attributes;
   sigset_t pipe;
@@ -60,7 +65,10 @@ static int build_spawn (const build_command *c, const sigset_t *before, pid_t *c
   if (why) return why;
   why = posix_spawnattr_init (&attributes);
   if (why == 0) {
-    why = posix_spawn_file_actions_adddup2 (&files, STDERR_FILENO, STDOUT_FILENO);
+    if (log)
+      why = posix_spawn_file_actions_addopen (&files, STDERR_FILENO, log, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW,
+                                              0600);
+    if (why == 0) why = posix_spawn_file_actions_adddup2 (&files, STDERR_FILENO, STDOUT_FILENO);
     posix_spawnattr_setsigmask (&attributes, before);
     posix_spawnattr_setsigdefault (&attributes, &pipe);
     posix_spawnattr_setflags (&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
@@ -71,9 +79,10 @@ static int build_spawn (const build_command *c, const sigset_t *before, pid_t *c
   return why;
 }
 
-static int build_run (const build_command *c, const char *source, const sigset_t *before, pw_error *error) {
+static int build_run (const build_command *c, const char *source, const char *log, const sigset_t *before,
+                      pw_error *error) {
   pid_t child;
-  int outcome = 0, why = build_spawn (c, before, &child);
+  int outcome = 0, why = build_spawn (c, log, before, &child);
   while (why == 0 && waitpid (child, &outcome, 0) < 0)
     if (errno != EINTR) why = errno;
   if (why != 0 && why != ENOENT && why != EACCES)
@@ -81,16 +90,19 @@ static int build_run (const build_command *c, const char *source, const sigset_t
   if (why != 0 || (WIFEXITED (outcome) && WEXITSTATUS (outcome) == 127))
     return pw_fail (
         error, PW_INPUT,
-        "cannot run the C compiler \"%s\" that the model file %s needs (%s): install one, or name another in the "
-        "environment variable CC",
-        c->word[0], source, why ? strerror (why) : "not found");
+        "cannot run the C compiler \"%s\" that %s%s needs (%s): install one, or name another in the environment "
+        "variable CC",
+        c->word[0], log ? "specialised code" : "the model file ", log ? "" : source,
+        why ? strerror (why) : "not found");
+  if ((!WIFEXITED (outcome) || WEXITSTATUS (outcome) != 0) && log)
+    return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, c->word[0], log);
   if (!WIFEXITED (outcome) || WEXITSTATUS (outcome) != 0)
     return pw_fail (error, PW_INPUT, "the model file %s does not compile; the messages of %s are above", source,
                     c->word[0]);
   return PW_OK;
 }
 
-static char *build_folder (pw_error *error) {
+char *pw_temporary_folder (pw_error *error) {
   const char *tmp = getenv ("TMPDIR");
   if (tmp == NULL || *tmp == 0) tmp = "/tmp";
   char *folder = pw_join (tmp, "pinwheel-XXXXXX", "");
@@ -101,7 +113,8 @@ static char *build_folder (pw_error *error) {
 }
 
 /* The compiler with everything it needs. */
-static int build_object (const char *path, const char *object, const sigset_t *before, pw_error *error) {
+static int build_object (const char *path, const char *object, const char *log, const sigset_t *before,
+                         pw_error *error) {
   build_command c = { .text = NULL };
   char *include;
   int status = pw_search_include (&include, error);
@@ -110,37 +123,44 @@ static int build_object (const char *path, const char *object, const sigset_t *b
                       "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
                       "\"../include/pinwheel\"",
                       path);
-  else if (status == PW_OK && build_words (&c, include, path, object) != PW_OK)
+  else if (status == PW_OK && build_words (&c, include, path, object, log != NULL) != PW_OK)
     status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = build_run (&c, path, before, error);
+  if (status == PW_OK) status = build_run (&c, path, log, before, error);
   free (c.text);
   free (include);
   return status;
 }
 
-static int build_in_folder (const char *path, const sigset_t *before, pw_object_user *use, void *context,
-                            pw_error *error) {
-  char *folder = build_folder (error);
-  if (folder == NULL) return PW_RESOURCE;
-  char *object = pw_join (folder, "model.so", "");
-  int status = object ? build_object (path, object, before, error) : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = use (context, object, error);
-  if (object) unlink (object);
-  rmdir (folder);
-  free (object);
-  free (folder);
-  return status;
-}
-
-/* Defers Ctrl-C, which also reaches the compiler, until the folder is removed. */
-int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error) {
-  sigset_t stop, before;
+/* Defers Ctrl-C, which also reaches the compiler, until the caller's files are removed. */
+static void build_defer (sigset_t *before) {
+  sigset_t stop;
   sigemptyset (&stop);
   sigaddset (&stop, SIGINT);
   sigaddset (&stop, SIGTERM);
   sigaddset (&stop, SIGHUP);
-  pthread_sigmask (SIG_BLOCK, &stop, &before);
-  int status = build_in_folder (path, &before, use, context, error);
+  pthread_sigmask (SIG_BLOCK, &stop, before);
+}
+
+int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error) {
+  sigset_t before;
+  build_defer (&before);
+  char *folder = pw_temporary_folder (error), *object = folder ? pw_join (folder, "model.so", "") : NULL;
+  int status = object   ? build_object (path, object, NULL, &before, error)
+               : folder ? pw_fail (error, PW_RESOURCE, "out of memory")
+                        : PW_RESOURCE;
+  if (status == PW_OK) status = use (context, object, error);
+  if (object) unlink (object);
+  if (folder) rmdir (folder);
+  free (object);
+  free (folder);
+  pthread_sigmask (SIG_SETMASK, &before, NULL);
+  return status;
+}
+
+int pw_compile_scene (const char *path, const char *object, const char *log, pw_error *error) {
+  sigset_t before;
+  build_defer (&before);
+  int status = build_object (path, object, log, &before, error);
   pthread_sigmask (SIG_SETMASK, &before, NULL);
   return status;
 }

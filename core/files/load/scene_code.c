@@ -1,0 +1,282 @@
+/* Loads the code of specialised scenes: compiles it, or takes the object from the cache.
+ *
+ * An object in the cache, KEY.so, is followed by the text it was compiled from, how, and a check sum, which are compared
+ * before it is loaded.  KEY.c is locked while it is compiled; it is only kept, with the messages in KEY.log, if that
+ * fails. */
+#define _POSIX_C_SOURCE 200809L
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+#include "files.h"
+
+enum { CODE_LARGEST = 64 << 20, CODE_KEY = 33, CODE_WAIT = 3000 }; /* bytes; characters; times 20 ms */
+
+struct pw_scene_code {
+  void *handle;
+  const pw_specialised *table;
+  char notice[600];
+};
+
+/* At the end of an object. */
+typedef struct {
+  char magic[16];
+  unsigned long long object, text, how, check; /* bytes of each part; sum of all of them */
+} code_end;
+
+static const char code_magic[16] = "pinwheel scene\n";
+
+typedef struct {
+  const pw_system *system;
+  const char *text;
+  char how[2000]; /* versions, compiler and options */
+  char key[CODE_KEY];
+  char *folder, *source, *log, *part, *object;
+  pw_scene_code *code;
+} code_job;
+
+/* ---- Identity ---- */
+
+/* The file that a command means, as PATH has it. */
+static int code_find_program (const char *word, struct stat *info) {
+  const char *list = getenv ("PATH");
+  if (strchr (word, '/')) return stat (word, info) == 0;
+  for (const char *p = list; p && *p; p += strcspn (p, ":"), p += *p == ':') {
+    char path[1000];
+    snprintf (path, sizeof path, "%.*s/%s", (int)strcspn (p, ":"), p, word);
+    if (stat (path, info) == 0 && S_ISREG (info->st_mode) && access (path, X_OK) == 0) return 1;
+  }
+  return 0;
+}
+
+static void code_add (code_job *x, const char *text) {
+  size_t used = strlen (x->how);
+  snprintf (x->how + used, sizeof x->how - used, "%s\n", text);
+}
+
+/* The words of the compiler; of programs among them ("ccache gcc") also size and date. */
+static void code_add_compiler (code_job *x) {
+  char text[200], *copy = strdup (pw_compiler ()), *rest = NULL;
+  for (char *w = copy ? strtok_r (copy, " \t", &rest) : NULL; w; w = strtok_r (NULL, " \t", &rest)) {
+    struct stat info;
+    code_add (x, w);
+    if (!code_find_program (w, &info)) continue;
+    snprintf (text, sizeof text, "%lld %lld %ld %llu", (long long)info.st_size, (long long)info.st_mtim.tv_sec,
+              (long)info.st_mtim.tv_nsec, (unsigned long long)info.st_ino);
+    code_add (x, text);
+  }
+  free (copy);
+}
+
+static int code_read (const char *path, char **text, size_t *size, pw_error *error) {
+  const char *why;
+  FILE *f = pw_open_input (path, &why);
+  *text = NULL;
+  if (f == NULL) return pw_fail (error, errno == ENOENT ? PW_RETRY : PW_INPUT, "%s", why);
+  int status = pw_read_rest (f, CODE_LARGEST, path, "the most an object may have", text, size, error);
+  fclose (f);
+  return status;
+}
+
+static int code_identify (code_job *x, pw_error *error) {
+  char *include, *header = NULL, *text = NULL, sum[40] = "";
+  size_t size;
+  code_add (x, "pinwheel " PW_VERSION " -std=c11 -O2 -ffp-contract=off " PW_SCENE_FLAG);
+  code_add_compiler (x);
+  int status = pw_search_include (&include, error);
+  if (include) header = pw_join (include, "pinwheel.h", "");
+  if (header && code_read (header, &text, &size, NULL) == PW_OK)
+    snprintf (sum, sizeof sum, "%016llx", pw_check_sum (PW_CHECK, text, size));
+  code_add (x, sum);
+  for (unsigned long long i = 0, h = PW_CHECK; i < 2; i++) {
+    h = pw_check_sum (pw_check_sum (h ^ (i << 40), x->text, strlen (x->text)), x->how, strlen (x->how));
+    snprintf (x->key + 16 * i, CODE_KEY - 16 * i, "%016llx", h);
+  }
+  free (include);
+  free (header);
+  free (text);
+  return status;
+}
+
+static int code_paths (code_job *x, pw_error *error) {
+  char **const path[] = { &x->source, &x->log, &x->part, &x->object };
+  static const char *const ending[] = { ".c", ".log", ".part", ".so" };
+  int status = PW_OK;
+  for (int i = 0; i < 4; i++) {
+    free (*path[i]);
+    *path[i] = pw_join (x->folder, x->key, ending[i]);
+    if (*path[i] == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  }
+  return status;
+}
+
+/* ---- Loading ---- */
+
+static unsigned long long code_sum (const char *bytes, size_t size) {
+  return pw_check_sum (PW_CHECK, bytes, size);
+}
+
+/* Compares an object with what it should be.  PW_RETRY: there is none, or it is another scene's; PW_INPUT: damaged. */
+static int code_check (const code_job *x, pw_error *error) {
+  char *bytes;
+  size_t size = 0, text = strlen (x->text), how = strlen (x->how);
+  code_end end;
+  int status = code_read (x->object, &bytes, &size, error);
+  if (status == PW_OK && size >= sizeof end) memcpy (&end, bytes + size - sizeof end, sizeof end);
+  if (status == PW_OK &&
+      (size < sizeof end || memcmp (end.magic, code_magic, sizeof code_magic) != 0 || end.object > size ||
+       end.text > size || end.how > size || end.object + end.text + end.how + sizeof end != size ||
+       code_sum (bytes, size - sizeof end) != end.check))
+    status = pw_fail (error, PW_INPUT, "it is damaged");
+  if (status == PW_OK && (end.text != text || end.how != how || memcmp (bytes + end.object, x->text, text) != 0 ||
+                          memcmp (bytes + end.object + text, x->how, how) != 0))
+    status = PW_RETRY;
+  free (bytes);
+  return status;
+}
+
+static int code_load (code_job *x, pw_error *error) {
+  void *handle = dlopen (x->object, RTLD_NOW | RTLD_LOCAL);
+  const char *why = handle ? NULL : dlerror ();
+  if (handle == NULL) return pw_fail (error, PW_INPUT, "it cannot be loaded: %s", why ? why : "unknown reason");
+  const pw_specialised *table = dlsym (handle, "pw_specialised_scene");
+  if (table && pw_specialised_fits (table, x->system)) {
+    x->code->handle = handle;
+    x->code->table = table;
+    return PW_OK;
+  }
+  dlclose (handle);
+  return pw_fail (error, PW_INPUT, "it belongs to another scene or version");
+}
+
+/* From the cache.  PW_RETRY: compile it. */
+static int code_load_cached (code_job *x) {
+  pw_error why = { 0 };
+  int status = code_check (x, &why);
+  if (status == PW_OK) status = code_load (x, &why);
+  if (status == PW_OK) utimensat (AT_FDCWD, x->object, NULL, 0); /* the oldest are deleted first */
+  if (status != PW_OK && status != PW_RETRY)
+    snprintf (x->code->notice, sizeof x->code->notice, "the cached object %s is replaced: %s", x->object, why.text);
+  return status == PW_OK ? PW_OK : PW_RETRY;
+}
+
+/* ---- Compiling ---- */
+
+/* Completes an object for the cache. */
+static int code_seal (const code_job *x, pw_error *error) {
+  char *bytes;
+  code_end end = { .text = strlen (x->text), .how = strlen (x->how) };
+  size_t size;
+  int status = code_read (x->part, &bytes, &size, error);
+  FILE *f = status == PW_OK ? fopen (x->part, "ab") : NULL;
+  if (f) {
+    memcpy (end.magic, code_magic, sizeof code_magic);
+    end.object = size;
+    end.check = pw_check_sum (pw_check_sum (code_sum (bytes, size), x->text, end.text), x->how, end.how);
+    fwrite (x->text, 1, end.text, f);
+    fwrite (x->how, 1, end.how, f);
+    fwrite (&end, sizeof end, 1, f);
+    int failed = ferror (f);
+    if (fclose (f) != 0 || failed || rename (x->part, x->object) != 0) f = NULL;
+  }
+  if (status == PW_OK && f == NULL)
+    status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->object, strerror (errno));
+  free (bytes);
+  return status;
+}
+
+/* Compiles KEY.c, which this process has locked. */
+static int code_compile (code_job *x, FILE *source, pw_error *error) {
+  int status = PW_OK;
+  if (fputs (x->text, source) < 0 || fflush (source) != 0)
+    status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->source, strerror (errno));
+  if (status == PW_OK) status = pw_compile_scene (x->source, x->part, x->log, error);
+  int keep = status == PW_METHOD;
+  if (status == PW_OK) status = code_seal (x, error);
+  if (status == PW_OK) status = code_load (x, error);
+  unlink (x->part);
+  if (!keep) unlink (x->source), unlink (x->log);
+  return status;
+}
+
+/* Waits while another process compiles the same.  NULL if that takes too long, or the folder is gone. */
+static FILE *code_lock (const code_job *x) {
+  const struct timespec pause = { .tv_nsec = 20000000 };
+  int created, file = pw_lock_file (x->source, PW_LOCK_NEW, &created);
+  for (int i = 0; file < 0 && errno == EWOULDBLOCK && i < CODE_WAIT; i++) {
+    nanosleep (&pause, NULL);
+    file = pw_lock_file (x->source, PW_LOCK_NEW, &created);
+  }
+  FILE *f = file >= 0 ? fdopen (file, "wb") : NULL;
+  if (f == NULL && file >= 0) close (file);
+  return f;
+}
+
+/* PW_RETRY: the cache cannot be used, or was deleted meanwhile. */
+static int code_compile_cached (code_job *x, pw_error *error) {
+  pw_error own = { 0 };
+  FILE *source = code_lock (x);
+  if (source == NULL) return PW_RETRY;
+  int status = code_check (x, NULL) == PW_OK ? code_load (x, NULL) : PW_RETRY; /* another process was faster */
+  if (status != PW_OK)
+    status = code_compile (x, source, &own);
+  else
+    unlink (x->source);
+  fclose (source);
+  if (status == PW_OK) pw_cache_trim (x->folder);
+  if (status == PW_METHOD && access (x->source, F_OK) == 0) return pw_fail (error, status, "%s", own.text);
+  return status == PW_OK ? PW_OK : PW_RETRY;
+}
+
+static int code_compile_apart (code_job *x, pw_error *error) {
+  free (x->folder);
+  x->folder = pw_temporary_folder (error);
+  if (x->folder == NULL || code_paths (x, error) != PW_OK) return PW_RESOURCE;
+  FILE *source = code_lock (x);
+  int status =
+      source ? code_compile (x, source, error) : pw_fail (error, PW_RESOURCE, "cannot write into %s", x->folder);
+  if (source) fclose (source);
+  unlink (x->object);
+  rmdir (x->folder); /* unless it keeps the source */
+  return status;
+}
+
+static int code_open (code_job *x, int compile, pw_error *error) {
+  int status = code_identify (x, error);
+  x->folder = pw_cache_folder (x->code->notice, sizeof x->code->notice);
+  if (status == PW_OK && x->folder) {
+    status = code_paths (x, error);
+    if (status == PW_OK) status = code_load_cached (x);
+    if (status == PW_RETRY && compile) status = code_compile_cached (x, error);
+    if (status != PW_RETRY) return status;
+  }
+  if (status == PW_OK || status == PW_RETRY)
+    status = compile ? code_compile_apart (x, error) : pw_fail (error, PW_RETRY, "not compiled yet");
+  return status;
+}
+
+pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, int compile, pw_error *error) {
+  code_job x = { .system = s, .text = text, .code = calloc (1, sizeof *x.code) };
+  int status = x.code ? code_open (&x, compile, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  char *const path[] = { x.folder, x.source, x.log, x.part, x.object };
+  for (int i = 0; i < 5; i++) free (path[i]);
+  if (status == PW_OK) return x.code;
+  free (x.code);
+  return NULL;
+}
+
+const pw_specialised *pw_scene_code_table (const pw_scene_code *c) {
+  return c ? c->table : NULL;
+}
+
+const char *pw_scene_code_notice (const pw_scene_code *c) {
+  return c->notice;
+}
+
+void pw_scene_code_close (pw_scene_code *c) {
+  if (c) dlclose (c->handle);
+  free (c);
+}
