@@ -55,6 +55,7 @@ typedef struct {
   long jacobians;      /* evaluations of an iteration matrix */
   long factorisations; /* of any matrix */
   long restarts;       /* of a multistep method, at checkpoints */
+  long specialised;    /* of the evaluations, by specialised code */
   double position;     /* worst scaled residual of g = 0 */
   double velocity;     /* worst scaled residual of J v = eta */
   double g;            /* worst |g| [m] or [rad] */

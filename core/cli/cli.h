@@ -53,7 +53,7 @@ typedef struct {
   int arguments;
   const char **sets, **starts; /* "NAME=VALUE"; ended by NULL */
   const char *max_file;
-  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit;
+  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise;
   /* private */
   poptContext popt;
   struct poptOption *table; /* a copy of the command's options, bound to its structure */
@@ -105,7 +105,13 @@ PW_COMMANDS (PW_COMMAND)
       PW_TEXT_OPTION (pw_cli_line, max_steps, "max-steps", 0, "N",                                  \
                       "Stop adaptive methods after this many attempted steps (default 1e7)"),       \
       PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS",                                    \
-                      "Stop a run after this much processor time (default unlimited)")
+                      "Stop a run after this much processor time (default unlimited)"),             \
+      PW_ENGINE_OPTION
+#define PW_ENGINE_OPTION                                                                                    \
+  PW_TEXT_OPTION (                                                                                          \
+      pw_cli_line, specialise, "specialise", 0, "WHEN",                                                     \
+      "Compile code for this scene alone, which runs faster: auto (if the runs are long enough, default), " \
+      "always or never")
 #define PW_METHOD_OPTIONS                                                           \
   PW_OPTION_GROUP ("Integration"),                                                  \
       PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",                 \
@@ -159,6 +165,30 @@ const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
 /* A model's own run settings, else 10 s of rk4+projection with steps of 1e-3 s; rtol is 0 if the model does not set
  * it. */
 pw_run_defaults pw_cli_defaults (const pw_plugin_table *table);
+
+/* ---- The engine of runs (engine.c) ---- */
+
+typedef enum { PW_SPECIALISE_AUTO, PW_SPECIALISE_ALWAYS, PW_SPECIALISE_NEVER } pw_specialise;
+
+typedef struct {
+  pw_specialise when;
+  pw_scene_code *code; /* NULL: the general engine */
+  char why[200];       /* the general engine is used */
+} pw_cli_engine;
+
+/* Reads the value of --specialise, NULL if it is not given. */
+int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error);
+
+#define PW_ENGINE_LONG 1e6 /* steps that repay the compilation */
+
+/* Steps of a run, roughly. */
+double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defaults *model, double t_end);
+
+/* Chooses the engine for runs of so many steps in all, and loads or compiles the code; prints notices. */
+void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
+void pw_cli_engine_close (pw_cli_engine *e);
+const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e); /* for pw_settings.specialised */
+const char *pw_cli_engine_name (const pw_cli_engine *e);           /* "specialised", "general" */
 
 /* ---- Files ---- */
 

@@ -228,6 +228,7 @@ typedef struct {
   double cpu;                          /* [s], integration alone */
   const char *const *redundant;        /* a message per redundant constraint equation, ended by NULL; may be NULL */
   const pw_reference_error *reference; /* NULL: no reference */
+  const char *general;                 /* why the general engine was used; "": it was not; NULL: no run */
   double energy_defect;                /* relative, as pw_run_energy_defect says; NaN: not known */
 } pw_summary;
 

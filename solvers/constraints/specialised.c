@@ -60,6 +60,7 @@ static void specialised_evaluated (pw_run *r, const double *q, const double *v) 
   pw_point_to_internal (r->w, q, v);
   pw_saddle_postpone (r->saddle, PW_SCENE_PIVOT);
   r->statistics.rhs++;
+  r->statistics.specialised++;
   r->statistics.factorisations++;
 }
 
@@ -69,6 +70,7 @@ int pw_specialised_evaluate (pw_run *r, double t, const double *q, const double 
   if (rate) {
     if (r->specialised->evaluate (r->scene, t, q, v, a, lambda, rate, NULL, NULL)) return 0;
     r->statistics.rhs++;
+    r->statistics.specialised++;
     r->statistics.factorisations++;
     return 1;
   }

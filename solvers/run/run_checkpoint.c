@@ -21,7 +21,8 @@ static int checkpoint_sizes (pw_run *r, pw_archive *a) {
 }
 
 static void checkpoint_statistics (pw_statistics *s, pw_archive *a) {
-  long *const count[] = { &s->steps, &s->rejected, &s->rhs, &s->jacobians, &s->factorisations, &s->restarts };
+  long *const count[] = { &s->steps,          &s->rejected, &s->rhs,        &s->jacobians,
+                          &s->factorisations, &s->restarts, &s->specialised };
   double *const worst[] = { &s->position, &s->velocity, &s->g, &s->jv };
   for (size_t i = 0; i < sizeof count / sizeof *count; i++) pw_archive_count (a, count[i]);
   for (size_t i = 0; i < sizeof worst / sizeof *worst; i++) pw_archive_bytes (a, worst[i], sizeof (double));

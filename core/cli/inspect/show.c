@@ -116,9 +116,16 @@ static void show_model (const pw_cli_model *m) {
 
 typedef struct {
   pw_cli_line line;
-  int matrices, yaml;
+  int matrices, yaml, code;
   const char *at;
 } show;
+
+static int show_code (const pw_cli_model *m, pw_error *error) {
+  char *text = pw_system_source (m->system, error);
+  if (text) fputs (text, stdout);
+  free (text);
+  return text ? PW_OK : error->status;
+}
 
 static int show_command (void *options, pw_error *error) {
   const show *x = options;
@@ -126,7 +133,9 @@ static int show_command (void *options, pw_error *error) {
   double t = 0;
   int status = pw_cli_number ("--at", x->at, PW_NONNEGATIVE, &t, error);
   if (status == PW_OK) status = pw_cli_open (&m, &x->line, error);
-  if (status == PW_OK && x->yaml)
+  if (status == PW_OK && x->code)
+    status = show_code (&m, error);
+  else if (status == PW_OK && x->yaml)
     status = pw_show_yaml (&m, error);
   else if (status == PW_OK && (x->matrices || x->at))
     status = pw_show_matrices (&m, t, error);
@@ -140,6 +149,7 @@ static const struct poptOption show_options[] = {
   PW_OPTION_GROUP ("Output"),
   PW_FLAG_OPTION (show, matrices, "matrices", "Show M, J and gamma at the initial state instead"),
   PW_TEXT_OPTION (show, at, "at", 0, "T", "Show M, J and gamma at time T [s] of a run with the model's default method"),
+  PW_FLAG_OPTION (show, code, "c", "Write the C code of the specialised scene, as --specialise compiles it"),
   PW_FLAG_OPTION (show, yaml, "yaml", "Write the model as a text model with the same trajectory"),
   PW_MODEL_OPTIONS,
   POPT_TABLEEND

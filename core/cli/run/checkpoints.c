@@ -8,7 +8,7 @@
 #include "checkpoints.h"
 #include "fingerprint.h"
 
-static const char checkpoints_key[] = "checkpoint-every";
+static const char checkpoints_key[] = "checkpoint-every", checkpoints_engine[] = "engine";
 
 /* ---- Before the run ---- */
 
@@ -23,8 +23,8 @@ static void checkpoints_interval (pw_checkpoints *c) {
   if (pw_read_number (text, &c->every) != PW_OK || !(c->every > 0)) c->every = 0;
 }
 
-/* Reads the options and the file to be resumed, and locks the file.  Without checkpoints `every` stays 0. */
-static int checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error) {
+/* Reads the options and the file to be resumed.  Without checkpoints `every` stays 0. */
+static int checkpoints_read (pw_checkpoints *c, double t_end, pw_error *error) {
   c->due = INFINITY;
   if (c->resume && c->path == NULL) c->path = c->resume;
   if (c->path == NULL && c->every_text == NULL) return PW_OK;
@@ -34,6 +34,16 @@ static int checkpoints_open (pw_checkpoints *c, double t_end, pw_error *error) {
   c->every = t_end / 10;
   if (c->resume) checkpoints_interval (c);
   return pw_cli_number ("--checkpoint-every", c->every_text, PW_POSITIVE, &c->every, error);
+}
+
+int pw_checkpoints_open (pw_run_command *x, pw_specialise *when, pw_error *error) {
+  pw_checkpoints *c = &x->check;
+  size_t size;
+  int status = checkpoints_read (c, x->t_end, error);
+  if (status == PW_OK && c->resume && *when == PW_SPECIALISE_AUTO)
+    *when = pw_fingerprint_value (c->from.text, c->from.head_end, checkpoints_engine, &size) ? PW_SPECIALISE_ALWAYS
+                                                                                             : PW_SPECIALISE_NEVER;
+  return status;
 }
 
 static int checkpoints_lock (pw_checkpoints *c, pw_error *error) {
@@ -58,6 +68,7 @@ static int checkpoints_head (pw_run_command *x, pw_error *error) {
   pw_print_number (t, "step", NULL, x->settings.step);
   pw_print_number (t, "rtol", NULL, x->settings.rtol);
   pw_print_number (t, "atol", NULL, x->settings.atol);
+  if (x->engine.code) pw_print_line (t, checkpoints_engine, NULL, pw_cli_engine_name (&x->engine));
   for (const pw_parameter *q = pw_model_table (m)->parameters; q && q->name; q++)
     pw_print_number (t, "parameter", q->name, pw_model_parameter (m, q));
   pw_print_initial (t, x->line.starts);
@@ -90,12 +101,11 @@ static int checkpoints_match (const pw_checkpoints *c, pw_error *error) {
 
 int pw_checkpoints_prepare (pw_run_command *x, pw_error *error) {
   pw_checkpoints *c = &x->check;
-  int status = checkpoints_open (c, x->t_end, error);
-  if (status != PW_OK || c->path == NULL) return status;
+  if (c->path == NULL) return PW_OK;
   if (x->csv_path && strcmp (x->csv_path, "-") == 0)
     return pw_fail (error, PW_INPUT,
                     "--checkpoint: a table on standard output cannot be continued; write it to a file");
-  status = checkpoints_lock (c, error);
+  int status = checkpoints_lock (c, error);
   if (status == PW_OK) status = checkpoints_head (x, error);
   if (status == PW_OK) status = checkpoints_match (c, error);
   if (status != PW_OK || x->csv_path == NULL) return status;
@@ -128,6 +138,8 @@ static void checkpoints_next (pw_checkpoints *c, double t) {
 static void checkpoints_serialise (pw_run_command *x, pw_archive *a) {
   pw_archive_bytes (a, &x->row, sizeof x->row);
   pw_archive_bytes (a, &x->cpu, sizeof x->cpu);
+  pw_archive_bytes (a, x->engine.why, sizeof x->engine.why);
+  x->engine.why[sizeof x->engine.why - 1] = 0;
   if (x->plots) pw_plots_serialise (x->plots, a);
   pw_comparison_serialise (&x->comparison, a);
 }

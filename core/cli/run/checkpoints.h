@@ -32,6 +32,7 @@ typedef struct {
   pw_checkpoints check;
   /* as understood */
   pw_cli_model m;
+  pw_cli_engine engine;
   const char *method;
   pw_settings settings;
   pw_limit limit;
@@ -54,8 +55,9 @@ typedef struct {
   int lost;                        /* 1: the table or the summary could not be written */
 } pw_run_command;
 
-/* Before anything is written: reads the checkpoint that is resumed, verifies that it belongs to this run, and opens its
- * table. */
+/* Reads the options and the checkpoint that is resumed, whose engine is used unless --specialise names one. */
+int pw_checkpoints_open (pw_run_command *x, pw_specialise *when, pw_error *error);
+/* Before anything is written: verifies that the checkpoint belongs to this run, and opens its table. */
 int pw_checkpoints_prepare (pw_run_command *x, pw_error *error);
 /* When all is open: brings the run to the checkpoint's state, if one is resumed. */
 int pw_checkpoints_resume (pw_run_command *x, pw_error *error);

@@ -275,6 +275,10 @@ void pw_report_end (const pw_summary *summary, const pw_system *s, const pw_samp
       "  %ld steps, %ld rejected, %ld right-hand sides, %ld Jacobians, %ld factorisations, %s s of processor time\n",
       statistics->steps, statistics->rejected, statistics->rhs, statistics->jacobians, statistics->factorisations,
       pw_format (a, summary->cpu, 3));
+  if (*summary->general)
+    pw_cli_print (stdout, "  general engine: %s\n", summary->general);
+  else
+    printf ("  code specialised for this scene: %ld evaluations\n", statistics->specialised);
   if (statistics->restarts > 0) printf ("  restarted at %ld checkpoints\n", statistics->restarts);
   if (*summary->reason) printf ("  ended early: %s\n", summary->reason);
 }

@@ -84,10 +84,30 @@ static int run_settings (run *x, pw_error *error) {
   return status;
 }
 
+/* Compiled code counts as part of the setting: a resumed run goes on with it. */
+static int run_engine (run *x, pw_error *error) {
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
+  pw_specialise when;
+  int status = pw_cli_specialise (x->line.specialise, &when, error);
+  if (status == PW_OK) status = pw_checkpoints_open (x, &when, error);
+  if (status != PW_OK) return status;
+  pw_cli_engine_open (&x->engine, x->m.system, when, pw_cli_steps (x->method, &x->settings, &d, x->t_end));
+  x->settings.specialised = pw_cli_engine_code (&x->engine);
+  return PW_OK;
+}
+
+/* Why the run does not use the code it has. */
+static const char *run_unspecialised (const run *x) {
+  if (x->engine.code == NULL) return x->engine.why;
+  if (x->redundant) return "redundant constraints";
+  return pw_run_statistics (x->r)->specialised ? "" : "the method does not use specialised code";
+}
+
 static int run_open (run *x, pw_error *error) {
   int status = run_open_outputs (x, error);
   if (status == PW_OK) status = run_open_model (x, error);
   if (status == PW_OK) status = run_settings (x, error);
+  if (status == PW_OK) status = run_engine (x, error);
   if (status == PW_OK) status = pw_checkpoints_prepare (x, error);
   if (status != PW_OK) return status;
   if ((x->plots_path || x->animate_path) &&
@@ -103,6 +123,8 @@ static int run_open (run *x, pw_error *error) {
   pw_report_model (x->m.model);
   pw_report_settings (x->r, x->m.system, x->method, &x->line, &x->settings);
   pw_report_initialisation (x->r, x->m.system, x->redundant);
+  if (x->redundant && x->engine.code && x->engine.when == PW_SPECIALISE_ALWAYS)
+    pw_cli_say ("pinwheel: general engine: redundant constraints\n");
   if (x->output[PW_RUN_TABLE]) x->csv = pw_csv_open (x->m.system, x->energy, x->output[PW_RUN_TABLE], error);
   return x->output[PW_RUN_TABLE] && x->csv == NULL ? error->status : pw_checkpoints_resume (x, error);
 }
@@ -276,6 +298,7 @@ static int run_finish (run *x, pw_error *error) {
   if (x->r && pw_run_sample (x->r, pw_run_time (x->r), &sample, NULL) == PW_OK) last = &sample;
   run_close_table (x, error->status == PW_OK && !interrupted, error);
   pw_summary summary = run_summary (x, error, reason, sizeof reason);
+  if (x->r) summary.general = run_unspecialised (x);
   if (x->r) summary.reference = pw_comparison_errors (&x->comparison, x->m.system);
   if (last) summary.energy_defect = pw_run_energy_defect (x->r, last);
   if (last && x->csv_path == NULL && x->json_path == NULL)
@@ -302,6 +325,7 @@ static void run_close (run *x) {
   pw_comparison_close (&x->comparison);
   if (x->r) pw_run_close (x->r);
   free (x->redundant);
+  pw_cli_engine_close (&x->engine);
   pw_cli_close_model (&x->m);
 }
 

@@ -347,6 +347,7 @@ static int compare_command (void *options, pw_error *error) {
     .above = "      rtol  error at the end    largest error       error of        residual of        error of     "
              "                                  CPU time",
     .column = compare_columns,
+    .runs = 9,
     .time = COLUMN_T,
     .steps = COLUMN_STEPS,
     .plan = compare_plan,
@@ -374,6 +375,7 @@ static const struct poptOption compare_options[] = {
       "Timed repetitions of each run, at most 99, of which the median is reported (default 9, or those that "
       "fit into half a second)"),
   PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
+  PW_ENGINE_OPTION,
   PW_TEXT_OPTION (
       pw_study, reference_path, "reference", 0, "FILE.csv",
       "Measure errors against this table, with columns as in run -o, instead of the model's exact solution or a "

@@ -296,6 +296,7 @@ static int drift_command (void *options, pw_error *error) {
                                       .group = group,
                                       .above = "  residual of position     residual of velocity     energy balance [J]",
                                       .column = drift_columns,
+                                      .runs = 1,
                                       .time = COLUMN_T,
                                       .steps = COLUMN_STEPS,
                                       .plan = drift_plan,

@@ -110,6 +110,7 @@ static int study_steps (pw_study *x, pw_row *r, pw_run *run, pw_study_visitor *v
 int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error) {
   r->cpu = 0;
   pw_limit_start (&x->limit);
+  x->settings.specialised = pw_cli_engine_code (&x->engine);
   pw_run *run = pw_run_open (x->m.system, r->method, &x->settings, error);
   if (run == NULL) return error->status;
   int status = study_steps (x, r, run, v, error);
@@ -147,18 +148,41 @@ static int study_open_folder (pw_study *x, pw_error *error) {
   return x->lock < 0 ? error->status : pw_table_open (x, error);
 }
 
+/* Steps of all rows, each by `repeats` runs. */
+static double study_work (const pw_study *x) {
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
+  double steps = 0;
+  for (const pw_row *r = x->row; r < x->row + x->rows; r++) {
+    pw_settings s = x->settings;
+    if (r->level > 0) s.step = s.rtol = r->level;
+    steps += x->type->runs * pw_cli_steps (r->method, &s, &d, x->t_end);
+  }
+  return steps;
+}
+
+/* One engine for all runs, since their times are compared. */
+static int study_engine (pw_study *x, pw_error *error) {
+  pw_specialise when;
+  int status = pw_cli_specialise (x->line.specialise, &when, error);
+  if (status == PW_OK) pw_cli_engine_open (&x->engine, x->m.system, when, study_work (x));
+  return status;
+}
+
 static int study_open (pw_study *x, pw_error *error) {
   x->lock = -1;
   x->share = 1;
   x->cpu_end = INFINITY;
   int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = x->type->plan (x, error);
+  if (status == PW_OK) status = study_engine (x, error);
   return status == PW_OK ? study_open_folder (x, error) : status;
 }
 
 static int study_rows (pw_study *x, pw_error *error) {
   pw_stop_catch ();
   int status = x->type->begin (x, error);
+  if (status == PW_OK && x->engine.code) puts ("all runs use code specialised for this scene where the method can\n");
+  if (status == PW_OK && x->engine.code == NULL) printf ("all runs use the general engine: %s\n\n", x->engine.why);
   if (status == PW_OK) pw_progress_count (&x->progress, pw_file_name (x->m.file), x->type->unit, 0, x->rows);
   for (x->done = 0; status == PW_OK && x->done < x->rows; x->done++) {
     status = x->type->measure (x, &x->row[x->done], error);
@@ -208,6 +232,7 @@ int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error) {
   for (int i = 0; i < x->rows; i++) free (x->row[i].point);
   free (x->row);
   free (x->method);
+  pw_cli_engine_close (&x->engine);
   pw_cli_close_model (&x->m);
   return status == PW_INTERRUPTED ? status : error->status;
 }

@@ -57,6 +57,7 @@ typedef struct {
   const char *const *group;      /* headings of the groups */
   const char *above;             /* line above the heads of columns */
   const pw_study_column *column; /* ended by one without name and head; those before "status" are shown of every row */
+  int runs;                      /* of a row, about */
   int time, steps;               /* columns of the time reached, and of the first of the counts of a run */
   /* Reads options, once the model is open; adds the rows. */
   int (*plan) (pw_study *x, pw_error *error);
@@ -74,7 +75,8 @@ struct pw_study {
   const char *methods_text, *reference_path, *folder;
   /* read */
   const pw_study_type *type;
-  pw_cli_model m; /* the system is shared by all runs */
+  pw_cli_engine engine; /* of all runs */
+  pw_cli_model m;       /* the system is shared by all runs */
   char (*method)[STUDY_NAME];
   int methods;
   pw_settings settings;

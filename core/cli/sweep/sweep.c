@@ -25,6 +25,14 @@ typedef struct shared_system {
   struct shared_system *next;
 } shared_system;
 
+/* Code of systems whose structure is not that of the first one. */
+typedef struct sweep_code {
+  char *text;
+  int ready; /* 0: a thread is compiling it */
+  pw_scene_code *code;
+  struct sweep_code *next;
+} sweep_code;
+
 typedef struct {
   /* as given */
   pw_cli_line line;
@@ -38,6 +46,7 @@ typedef struct {
   pthread_mutex_t lock;
   pthread_cond_t compiled;
   shared_system *shared;
+  sweep_code *codes;
   long next; /* the next row to compute, as in pw_grid_ordered */
   pw_journal journal;
   pw_progress progress;
@@ -59,10 +68,11 @@ static int sweep_read (const sweep *x, pw_error *error) {
 /* The first option that has no effect on parts; NULL if there is none. */
 static const char *sweep_ignored (const sweep *x) {
   const pw_cli_line *l = &x->line;
-  const void *given[] = { x->ranges, l->method,    l->t_end,  l->step,      l->rtol,      l->atol,          l->limit,
-                          l->sets,   l->max_steps, l->starts, x->jobs_text, x->part_text, x->cpu ? x : NULL };
-  static const char *const name[] = { "--vary", "--method",    "--t-end", "--step", "--rtol", "--atol", "--limit",
-                                      "--set",  "--max-steps", "--start", "--jobs", "--part", "--cpu" };
+  const void *given[] = { x->ranges,     l->method,    l->t_end,     l->step,          l->rtol,
+                          l->atol,       l->limit,     l->sets,      l->max_steps,     l->starts,
+                          l->specialise, x->jobs_text, x->part_text, x->cpu ? x : NULL };
+  static const char *const name[] = { "--vary", "--method",    "--t-end", "--step",       "--rtol", "--atol", "--limit",
+                                      "--set",  "--max-steps", "--start", "--specialise", "--jobs", "--part", "--cpu" };
   for (size_t i = 0; i < sizeof given / sizeof *given; i++)
     if (given[i]) return name[i];
   return NULL;
@@ -111,6 +121,7 @@ static int sweep_settings (sweep *x, pw_error *error) {
   pw_limit limit;
   int status = pw_cli_settings (&x->line, &d, &p->t_end, &p->settings, &limit, error);
   p->limit = limit.most;
+  if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &p->specialise, error);
   if (status == PW_OK) status = sweep_jobs (x, error);
   return status == PW_OK ? sweep_part (x, error) : status;
 }
@@ -130,6 +141,46 @@ static int sweep_open (sweep *x, pw_error *error) {
     pw_cli_say ("pinwheel: continuing with %s: %ld of %ld runs are done\n", x->journal.part, x->journal.done,
                 x->journal.rows);
   return PW_OK;
+}
+
+/* ---- Specialised code ---- */
+
+/* The code of a text, compiled by the first thread that needs it; the caller holds the lock. */
+static const pw_specialised *sweep_compile (sweep *x, char *text, const pw_system *s, pw_error *error) {
+  sweep_code *c = x->codes;
+  while (c && strcmp (c->text, text) != 0) c = c->next;
+  if (c) free (text);
+  if (c) {
+    while (!c->ready) pthread_cond_wait (&x->compiled, &x->lock);
+    return pw_scene_code_table (c->code);
+  }
+  if ((c = malloc (sizeof *c)) == NULL) return free (text), NULL;
+  *c = (sweep_code){ .text = text, .next = x->codes };
+  x->codes = c;
+  pthread_mutex_unlock (&x->lock);
+  c->code = pw_scene_code_open (text, s, 1, error);
+  pthread_mutex_lock (&x->lock);
+  c->ready = 1;
+  pthread_cond_broadcast (&x->compiled);
+  return pw_scene_code_table (c->code);
+}
+
+/* The code of a new system: that of the first row, or of its own text, so that it does not depend on the order of runs. */
+static void sweep_specialise (sweep *x, pw_sweep_system *s, pw_error *error) {
+  const pw_specialised *first = pw_cli_engine_code (&x->plan.engine);
+  pw_error own = { 0 };
+  if (first == NULL || error->status != PW_OK) return;
+  if (pw_specialised_fits (first, s->m.system)) {
+    s->code = first;
+    return;
+  }
+  char *text = pw_system_source (s->m.system, NULL);
+  if (text == NULL) return;
+  pthread_mutex_lock (&x->lock);
+  s->code = sweep_compile (x, text, s->m.system, &own);
+  pthread_mutex_unlock (&x->lock);
+  if (own.status != PW_OK && pw_stop == 0) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
+  if (s->code == NULL && pw_stop) error->status = PW_RETRY; /* Ctrl-C has stopped the compiler too */
 }
 
 /* ---- Compiled systems; the caller holds the lock ---- */
@@ -162,6 +213,7 @@ static shared_system *sweep_share (sweep *x, shared_system *last, long row) {
   x->shared = s;
   pthread_mutex_unlock (&x->lock);
   pw_sweep_system_open (&s->system, &x->plan, row, &s->error);
+  sweep_specialise (x, &s->system, &s->error);
   pthread_mutex_lock (&x->lock);
   s->ready = 1;
   pthread_cond_broadcast (&x->compiled);
@@ -284,6 +336,12 @@ static int sweep_finish (sweep *x, pw_error *error) {
 }
 
 static void sweep_close (sweep *x) {
+  for (sweep_code *c = x->codes, *next; c; c = next) {
+    next = c->next;
+    pw_scene_code_close (c->code);
+    free (c->text);
+    free (c);
+  }
   pw_journal_close (&x->journal);
   pw_plan_close (&x->plan);
   pw_file_close (x->plan.file);

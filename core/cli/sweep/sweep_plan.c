@@ -135,12 +135,20 @@ typedef struct {
   pw_error first; /* why a model could not be built */
 } plan_scan;
 
+/* Whether code is compiled depends on the whole sweep alone, not on the cache: rows are the same whenever they are run. */
+static void plan_engine (pw_plan *p, const pw_system *s) {
+  pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
+  double steps = (double)p->grid.rows * pw_cli_steps (p->method, &p->settings, &d, p->t_end);
+  pw_cli_engine_open (&p->engine, s, p->specialise, steps >= PW_ENGINE_LONG ? steps : 0);
+}
+
 static int plan_scan_row (pw_plan *p, long row, plan_scan *scan, pw_error *error) {
   pw_sweep_system x;
   pw_error own = { 0 };
   int status = plan_compile (&x, p, row, &own);
   if (status == PW_OK) p->tables = pw_check_tables (p->tables, x.m.model);
   if (status == PW_OK) status = plan_columns_of (p, &x, &own);
+  if (status == PW_OK && !scan->built) plan_engine (p, x.m.system);
   pw_sweep_system_close (&x);
   if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
   scan->built |= status == PW_OK;
@@ -215,6 +223,7 @@ static int plan_fingerprint (pw_plan *p, const pw_model *m, pw_error *error) {
   if (p->settings.max_steps != PW_MAX_STEPS)
     pw_print_number (&p->fingerprint, "max-steps", NULL, (double)p->settings.max_steps);
   if (isfinite (p->limit)) pw_print_number (&p->fingerprint, "limit", NULL, p->limit);
+  if (p->engine.code) pw_print_line (&p->fingerprint, "engine", NULL, pw_cli_engine_name (&p->engine));
   plan_parameters (p, m);
   plan_grid (p);
   pw_print_number (&p->fingerprint, "rows", NULL, (double)p->grid.rows);
@@ -244,6 +253,7 @@ int pw_plan_open (pw_plan *p, const char **ranges, pw_error *error) {
 }
 
 void pw_plan_close (pw_plan *p) {
+  pw_cli_engine_close (&p->engine);
   pw_grid_free (&p->grid);
   pw_names_close (&p->index);
   pw_arena_free (&p->arena);

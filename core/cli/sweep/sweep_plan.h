@@ -21,9 +21,11 @@ typedef struct {
   double limit; /* of each run's processor time [s]; INFINITY: none */
   int cpu;      /* 1: a column with each run's processor time */
   int part, parts;
+  pw_specialise specialise;
   /* set by pw_plan_open */
   pw_file *file;
   pw_grid grid;
+  pw_cli_engine engine; /* of the first row that can be built, so that it does not depend on the part */
   struct pw_column {
     const char *name, *unit;
   } * column; /* columns: the states of all bodies and elements */
@@ -48,9 +50,10 @@ static inline long pw_plan_rows (const pw_plan *p) {
 /* ---- Compiled systems: one for all rows with the same parameters ---- */
 
 typedef struct {
-  pw_cli_model m; /* m.file is NULL */
-  int *column;    /* 2 pw_system_coordinates: of each state */
-  int *state;     /* grid.axes: whose initial value an axis varies; -1: it is a parameter */
+  pw_cli_model m;             /* m.file is NULL */
+  int *column;                /* 2 pw_system_coordinates: of each state */
+  int *state;                 /* grid.axes: whose initial value an axis varies; -1: it is a parameter */
+  const pw_specialised *code; /* for its runs; NULL: the general engine */
 } pw_sweep_system;
 
 /* Builds and compiles the model of a row.  Close the system in every case.  May be called by several threads at once. */

@@ -50,6 +50,7 @@ static int row_start (const pw_plan *p, const pw_sweep_system *s, long row, row_
     if (s->state[i] >= 0)
       initial[settings.initials++] = (pw_initial_value){ s->state[i], pw_grid_value (&p->grid, i, row) };
   settings.initial = initial;
+  settings.specialised = s->code;
   settings.stop = pw_limit_over;
   settings.stop_context = &limit;
   pw_limit_start (&limit);

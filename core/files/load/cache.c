@@ -32,7 +32,7 @@ static void cache_make (char *path) {
 static const char *cache_defect (const char *path, int own) {
   struct stat info;
   if ((own ? lstat : stat) (path, &info) != 0) return strerror (errno);
-  if (!S_ISDIR (info.st_mode)) return pw_not_regular (info.st_mode);
+  if (!S_ISDIR (info.st_mode)) return "it is not a folder";
   if (info.st_uid != geteuid () && (own || info.st_uid != 0)) return "it belongs to another user";
   if (info.st_mode & 022 && (own || !(info.st_mode & S_ISVTX))) return "others can write to it";
   return own && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;

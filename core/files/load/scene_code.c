@@ -102,8 +102,9 @@ static int code_identify (code_job *x, pw_error *error) {
 }
 
 static int code_paths (code_job *x, pw_error *error) {
-  char **const path[] = { &x->source, &x->log, &x->part, &x->object };
-  static const char *const ending[] = { ".c", ".log", ".part", ".so" };
+  char **const path[] = { &x->source, &x->log, &x->part, &x->object }, part[40];
+  const char *const ending[] = { ".c", ".log", part, ".so" };
+  snprintf (part, sizeof part, ".%ld.part", (long)getpid ()); /* the compiler of a killed process may still run */
   int status = PW_OK;
   for (int i = 0; i < 4; i++) {
     free (*path[i]);
@@ -141,7 +142,7 @@ static int code_check (const code_job *x, pw_error *error) {
 static int code_load (code_job *x, pw_error *error) {
   void *handle = dlopen (x->object, RTLD_NOW | RTLD_LOCAL);
   const char *why = handle ? NULL : dlerror ();
-  if (handle == NULL) return pw_fail (error, PW_INPUT, "it cannot be loaded: %s", why ? why : "unknown reason");
+  if (handle == NULL) return pw_fail (error, PW_RESOURCE, "it cannot be loaded: %s", why ? why : "unknown reason");
   const pw_specialised *table = dlsym (handle, "pw_specialised_scene");
   if (table && pw_specialised_fits (table, x->system)) {
     x->code->handle = handle;
@@ -149,7 +150,7 @@ static int code_load (code_job *x, pw_error *error) {
     return PW_OK;
   }
   dlclose (handle);
-  return pw_fail (error, PW_INPUT, "it belongs to another scene or version");
+  return pw_fail (error, PW_RESOURCE, "it belongs to another scene or version");
 }
 
 /* From the cache.  PW_RETRY: compile it. */
@@ -170,7 +171,8 @@ static int code_seal (const code_job *x, pw_error *error) {
   char *bytes;
   code_end end = { .text = strlen (x->text), .how = strlen (x->how) };
   size_t size;
-  int status = code_read (x->part, &bytes, &size, error);
+  int status = code_read (x->part, &bytes, &size, NULL);
+  if (status != PW_OK) status = pw_fail (error, PW_RESOURCE, "the compiler has written no object");
   FILE *f = status == PW_OK ? fopen (x->part, "ab") : NULL;
   if (f) {
     memcpy (end.magic, code_magic, sizeof code_magic);
@@ -196,7 +198,7 @@ static int code_compile (code_job *x, FILE *source, pw_error *error) {
   if (status == PW_OK) status = pw_compile_scene (x->source, x->part, x->log, error);
   int keep = status == PW_METHOD;
   if (status == PW_OK) status = code_seal (x, error);
-  if (status == PW_OK) status = code_load (x, error);
+  if (status == PW_OK && (status = code_load (x, error)) != PW_OK) unlink (x->object);
   unlink (x->part);
   if (!keep) unlink (x->source), unlink (x->log);
   return status;

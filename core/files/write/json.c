@@ -169,18 +169,13 @@ static void json_reference (pw_json *j, const pw_reference_error *e) {
 
 static void json_statistics (pw_json *j, const pw_statistics *n, double cpu) {
   static const char *const residuals[] = { "position", "velocity" }, *const names[] = {
-    "steps", "rejected", "rhs", "jacobians", "factorisations", "restarts", "cpu_s"
+    "steps", "rejected", "rhs", "jacobians", "factorisations", "restarts", "specialised", "cpu_s"
   };
   json_numbers (j, "residual", residuals, n ? (const double[]){ n->position, n->velocity } : NULL, 2);
   const pw_statistics x = n ? *n : (pw_statistics){ 0 };
-  const double value[] = { (double)x.steps,
-                           (double)x.rejected,
-                           (double)x.rhs,
-                           (double)x.jacobians,
-                           (double)x.factorisations,
-                           (double)x.restarts,
-                           cpu };
-  json_numbers (j, "statistics", names, n ? value : NULL, 7);
+  const double value[] = { (double)x.steps,          (double)x.rejected, (double)x.rhs,         (double)x.jacobians,
+                           (double)x.factorisations, (double)x.restarts, (double)x.specialised, cpu };
+  json_numbers (j, "statistics", names, n ? value : NULL, 8);
 }
 
 int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sample *sample, int ledger,
@@ -193,6 +188,8 @@ int pw_json_write (const pw_summary *summary, const pw_system *s, const pw_sampl
   pw_json_text (&j, "method", summary->method);
   pw_json_text (&j, "status", summary->status);
   pw_json_text (&j, "reason", summary->reason);
+  pw_json_text (&j, "engine", summary->general == NULL ? NULL : *summary->general ? "general" : "specialised");
+  pw_json_text (&j, "engine_reason", summary->general);
   json_sample (&j, s, sample, ledger);
   pw_json_number (&j, "unbalanced", summary->energy_defect);
   json_lists (&j, summary->redundant, s);

@@ -1,0 +1,79 @@
+/* Which engine runs use: the general one, or code compiled for the scene. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "cli.h"
+#include "util.h"
+
+#define ENGINE_SHORT 1e4    /* steps that repay looking into the cache */
+#define ENGINE_ADAPTIVE 20. /* an adaptive method's step at rtol 1e-6 over the model's fixed one, roughly */
+
+double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defaults *model, double t_end) {
+  const pw_method *integrator;
+  int stabilisation;
+  if (pw_method_parse (method, &integrator, &stabilisation, NULL) != PW_OK) return 0;
+  if (!pw_cli_adaptive (integrator, method)) return t_end / (s->step > 0 ? s->step : model->step);
+  return t_end / (ENGINE_ADAPTIVE * model->step) * pow (1e-6 / (s->rtol > 0 ? s->rtol : 1e-6), 1. / 6);
+}
+
+int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error) {
+  static const char *const name[] = { "auto", "always", "never" };
+  char hint[100];
+  pw_nearest near = { .sought = text };
+  *when = PW_SPECIALISE_AUTO;
+  for (int i = 0; i < 3; i++) {
+    if (text == NULL || strcmp (text, name[i]) == 0) return *when = text ? (pw_specialise)i : *when, PW_OK;
+    pw_nearest_try (&near, name[i]);
+  }
+  return pw_fail (error, PW_INPUT, "--specialise \"%.60s\": expected auto, always or never%s", text,
+                  pw_nearest_text (&near, hint, sizeof hint));
+}
+
+/* A short reason why there is no code. */
+static void engine_general (pw_cli_engine *e, const pw_system *s, int has_text, const pw_error *why) {
+  char model[300];
+  size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
+  const char *text = why->text + (strncmp (why->text, model, n) == 0 ? n : 0);
+  if (has_text)
+    text = why->status == PW_RETRY    ? "short run"
+           : why->status == PW_INPUT  ? "no C compiler"
+           : why->status == PW_METHOD ? "the generated code does not compile"
+                                      : "the compiled code cannot be loaded";
+  snprintf (e->why, sizeof e->why, "%.190s", text);
+}
+
+/* Loads code for the system; compiles it if that pays. */
+static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise when, int pays) {
+  pw_error own = { 0 };
+  char *text = pw_system_source (s, &own);
+  int has_text = text != NULL, quiet = has_text ? 0 : when == PW_SPECIALISE_AUTO;
+  if (text) e->code = pw_scene_code_open (text, s, pays || when == PW_SPECIALISE_ALWAYS, &own);
+  free (text);
+  if (e->code && *pw_scene_code_notice (e->code)) pw_cli_say ("pinwheel: %s\n", pw_scene_code_notice (e->code));
+  if (e->code) return;
+  engine_general (e, s, has_text, &own);
+  if (own.status != PW_RETRY && !quiet) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
+}
+
+void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps) {
+  *e = (pw_cli_engine){ .when = when };
+  if (when == PW_SPECIALISE_NEVER)
+    strcpy (e->why, "--specialise never");
+  else if (when == PW_SPECIALISE_AUTO && !(steps >= ENGINE_SHORT))
+    strcpy (e->why, "short run");
+  else
+    engine_load (e, s, when, steps >= PW_ENGINE_LONG);
+}
+
+const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e) {
+  return pw_scene_code_table (e->code);
+}
+
+const char *pw_cli_engine_name (const pw_cli_engine *e) {
+  return e->code ? "specialised" : "general";
+}
+
+void pw_cli_engine_close (pw_cli_engine *e) {
+  pw_scene_code_close (e->code);
+  e->code = NULL;
+}
