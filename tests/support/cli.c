@@ -1,3 +1,4 @@
+#define _POSIX_C_SOURCE 200809L
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -122,7 +123,7 @@ int cli_says (const char *json, const char *key, const char *value) {
 
 int cli_setup (void **state) {
   (void)state;
-  return mkdtemp (cli_folder) ? 0 : -1;
+  return mkdtemp (cli_folder) && setenv ("XDG_CACHE_HOME", cli_folder, 1) == 0 ? 0 : -1;
 }
 
 int cli_teardown (void **state) {
