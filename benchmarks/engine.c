@@ -28,6 +28,32 @@ static engine_case engine_cases[] = {
     engine_close_ezy, .massless = 1, .calls = 1000 },
   { "step-light", "  massless (right) against massive (left), both Pinwheel", "step", 1, engine_open_light_step,
     engine_close_ezy, .calls = 1000 },
+  { "special-rhs", "EzyRoller, specialised, one evaluation", "evaluation", 1, engine_open_rhs, engine_close_ezy,
+    .specialised = 1, .calls = 640 },
+  { "special-rhs-massless", "EzyRoller, specialised, massless steering, one evaluation", "evaluation", 1,
+    engine_open_rhs, engine_close_ezy, .massless = 1, .specialised = 1, .calls = 640 },
+  { "special-step", "EzyRoller, specialised, one step of rk4+projection", "step", 1, engine_open_step, engine_close_ezy,
+    .specialised = 1, .calls = 1000 },
+  { "special-step-massless", "EzyRoller, specialised, massless steering, one step", "step", 1, engine_open_step,
+    engine_close_ezy, .massless = 1, .specialised = 1, .calls = 1000 },
+#define SPECIALISED(name, limit)                                                                      \
+  { "special-" name,                                                                                  \
+    name ", one evaluation, specialised (right) against general",                                     \
+    "evaluation",                                                                                     \
+    limit,                                                                                            \
+    engine_open_specialised,                                                                          \
+    engine_close_specialised,                                                                         \
+    .model = name,                                                                                    \
+    .calls = 640 },                                                                                   \
+  {                                                                                                   \
+    "special-" name "-step", "  one step of rk4+projection", "step", 0, engine_open_specialised_step, \
+        engine_close_specialised, .model = name, .calls = 100                                         \
+  }
+  SPECIALISED ("snakeboard", 0.4),
+  SPECIALISED ("n-trailer", 0),
+  SPECIALISED ("roller-racer", 0),
+  SPECIALISED ("theo-jansen", 0.4),
+  SPECIALISED ("andrews-squeezer", 0),
   { "chain-10", "chain of 10, one evaluation, per body", "body", 1.6, engine_open_chain, engine_close_chain,
     .links = 10, .calls = 10 },
   { "chain-100", "chain of 100", "body", 1.6, engine_open_chain, engine_close_chain, .links = 100, .calls = 4 },

@@ -21,6 +21,8 @@ struct engine_case {
   long calls;                               /* how many of them */
   int links;                                /* chain: bodies */
   int massless;                             /* EzyRoller: steering without mass */
+  int specialised;                          /* EzyRoller: specialised code */
+  const char *model;                        /* a scene of the gallery */
   double rtol;                              /* IDA */
 
   timing_work base, ours;                                    /* base.run NULL: nothing to compare with */
@@ -41,6 +43,9 @@ pw_system *engine_grid (int cells);  /* cells x cells squares of pinned bars, 2 
 pw_run *engine_open (pw_system *s, const char *method, const pw_settings *settings);
 pw_model *engine_describe_chain (int links); /* the chain's description, built */
 
+/* Specialised code of a system. */
+struct pw_scene_code *engine_specialise (const pw_system *s);
+
 /* A consistent configuration and rates of the chain or snake with bent joints; arrays of 3 links (+ 3). */
 void engine_bend (int links, int free, double *q, double *v);
 
@@ -55,6 +60,9 @@ void engine_open_minimal (engine_case *c); /* against minimal coordinates by han
 void engine_open_step (engine_case *c);    /* a step of rk4+projection */
 void engine_open_light_step (engine_case *c);
 void engine_close_ezy (engine_case *c);
+void engine_open_specialised (engine_case *c); /* a scene of the gallery, general against specialised: an evaluation */
+void engine_open_specialised_step (engine_case *c); /* a step of rk4+projection */
+void engine_close_specialised (engine_case *c);
 void engine_open_chain (engine_case *c); /* one evaluation, per body */
 void engine_close_chain (engine_case *c);
 void engine_open_ida (engine_case *c); /* a step of ida+ggl */

@@ -1,0 +1,121 @@
+/* Specialised code of scenes of the gallery against the general engine. */
+#include <stdlib.h>
+#include <string.h>
+#include "engine.h"
+#include "pinwheel-files.h"
+
+enum { SPECIALISED_POOL = 64, SPECIALISED_SPACING = 40 };
+
+/* The general engine and specialised code, with states of a motion to evaluate. */
+typedef struct {
+  pw_system *system;
+  pw_scene_code *code;
+  pw_run *run[2];
+  int n, rows, side;
+  double t[SPECIALISED_POOL], *q, *v; /* pool x coordinates */
+  double *a, *lambda;
+} specialised_data;
+
+typedef struct {
+  specialised_data *d;
+  int side;
+} specialised_side;
+
+pw_scene_code *engine_specialise (const pw_system *s) {
+  pw_error error = { 0 };
+  char *text = pw_system_source (s, &error);
+  pw_scene_code *code = text ? pw_scene_code_open (text, s, 1, &error) : NULL;
+  if (code == NULL) engine_die (pw_system_name (s), error.text);
+  free (text);
+  return code;
+}
+
+static pw_system *specialised_system (const char *name) {
+  pw_error error = { 0 };
+  pw_file *file = pw_file_open (name, &error);
+  pw_model *m = pw_file_model (file, &error);
+  pw_model_build (m, &error);
+  pw_system *s = pw_system_compile (m, &error);
+  if (s == NULL) engine_die (name, error.text);
+  pw_model_free (m);
+  return s; /* the file stays open: it holds the functions of the model */
+}
+
+/* States of a motion. */
+static void specialised_pool (specialised_data *d) {
+  pw_error error = { 0 };
+  for (int k = 0; k < SPECIALISED_POOL; k++) {
+    for (int i = 0; i < SPECIALISED_SPACING; i++) pw_run_advance (d->run[0], 1e9, &error);
+    d->t[k] = d->run[0]->t;
+    memcpy (d->q + k * d->n, d->run[0]->q, (size_t)d->n * sizeof (double));
+    memcpy (d->v + k * d->n, d->run[0]->v, (size_t)d->n * sizeof (double));
+  }
+  pw_run_advance (d->run[1], 1e9, &error); /* the watchdog evaluates more at the beginning */
+  if (error.status != PW_OK) engine_die (d->system->model, error.text);
+}
+
+static long specialised_evaluate (void *context, long n) {
+  specialised_side *x = context;
+  specialised_data *d = x->d;
+  for (long i = 0; i < n; i++) {
+    int k = (int)(i % SPECIALISED_POOL);
+    pw_run_accelerate (d->run[x->side], d->t[k], d->q + k * d->n, d->v + k * d->n, d->a, d->lambda);
+  }
+  return n;
+}
+
+static long specialised_step (void *context, long n) {
+  specialised_side *x = context;
+  pw_error error = { 0 };
+  for (long i = 0; i < n; i++) pw_run_advance (x->d->run[x->side], 1e9, &error);
+  if (error.status != PW_OK) engine_die (x->d->system->model, error.text);
+  return n;
+}
+
+static void specialised_open (engine_case *c, const char *method) {
+  static specialised_side side[2];
+  specialised_data *d = c->data = calloc (1, sizeof *d);
+  if (d == NULL) engine_die (c->key, "out of memory");
+  d->system = specialised_system (c->model);
+  d->code = engine_specialise (d->system);
+  d->n = pw_system_coordinates (d->system), d->rows = pw_system_rows (d->system);
+  d->q = calloc ((size_t)(2 * SPECIALISED_POOL * d->n + d->n + d->rows) + 4, sizeof (double));
+  if (d->q == NULL) engine_die (c->key, "out of memory");
+  d->v = d->q + SPECIALISED_POOL * d->n, d->a = d->v + SPECIALISED_POOL * d->n, d->lambda = d->a + d->n + 3;
+  for (int i = 0; i < 2; i++) {
+    pw_settings set = { .step = 1e-4, .span = 100, .specialised = i ? pw_scene_code_table (d->code) : NULL };
+    d->run[i] = engine_open (d->system, method, &set);
+    side[i] = (specialised_side){ d, i };
+  }
+  specialised_pool (d);
+  c->base.context = &side[0], c->ours.context = &side[1];
+}
+
+void engine_open_specialised (engine_case *c) {
+  specialised_open (c, "rk4+projection");
+  specialised_data *d = c->data;
+  c->base.run = c->ours.run = specialised_evaluate;
+  c->base_function = c->our_function = "pw_run_accelerate";
+  for (long n = 1; n <= SPECIALISED_POOL; n++) {
+    double a[300];
+    c->base.run (c->base.context, n);
+    memcpy (a, d->a, (size_t)d->n * sizeof *a);
+    c->ours.run (c->ours.context, n);
+    c->difference = fmax (c->difference, engine_difference (a, d->a, d->n));
+  }
+}
+
+void engine_open_specialised_step (engine_case *c) {
+  specialised_open (c, "rk4+projection");
+  c->base.run = c->ours.run = specialised_step;
+  c->base_function = c->our_function = "pw_run_advance";
+}
+
+void engine_close_specialised (engine_case *c) {
+  specialised_data *d = c->data;
+  for (int i = 0; i < 2; i++) pw_run_close (d->run[i]);
+  pw_scene_code_close (d->code);
+  pw_system_free (d->system);
+  free (d->q);
+  free (d);
+}
