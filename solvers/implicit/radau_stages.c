@@ -313,7 +313,7 @@ int pw_radau_solve (pw_run *r, double h, double t1) {
     int status = d->outdated ? radau_linearise (r) : PW_OK;
     if (status == PW_OK) status = radau_factor (r, h);
     if (status == PW_OK) status = radau_iterate (r, h, t1);
-    d->forget = status == PW_RETRY;
+    d->forget = status == PW_RETRY && d->near;
     if (status != PW_RETRY || d->current) return status;
     d->outdated = 1;
   }
