@@ -455,7 +455,8 @@ unsigned long pw_system_shape (const pw_system *s) {
     const pw_element_batch *b = &s->batch[k];
     specialise_hash (&h, b->kind->name, strlen (b->kind->name) + 1);
     specialise_hash (&h, b->b.body, (size_t)(b->b.count * b->kind->bodies) * sizeof *b->b.body);
-    specialise_hash (&h, &b->b.count, sizeof b->b.count);
+    const int sizes[] = { b->b.count, (int)b->kind->element, b->kind->rows, b->kind->own, b->kind->signals };
+    specialise_hash (&h, sizes, sizeof sizes);
   }
   for (int i = 0; i < s->sources; i++)
     specialise_hash (&h, (int[]){ (int)s->source[i].signal.type, s->source[i].forced, s->source[i].reads },
