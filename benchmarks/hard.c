@@ -1,8 +1,8 @@
 /* hard: every method on every hard case, a matrix of verdicts against what is expected.
  *
- *     hard [-j CELLS] [-c CASE] [-m METHOD] [-v] [-o PAGE] FOLDER
+ *     hard [-j CELLS] [-c CASE] [-m METHOD] [-s] [-v] [-o PAGE] FOLDER
  *
- * Writes PAGE.md and PAGE.csv.  FOLDER holds cases/ and models/; CASE and METHOD are patterns.  Each cell runs in its own process with a limit
+ * Writes PAGE.md and PAGE.csv.  FOLDER holds cases/ and models/; CASE and METHOD are patterns; -s: specialised scenes.  Each cell runs in its own process with a limit
  * of processor time, so that a crash or a hang becomes a verdict.  Exit status: 0 if all verdicts are as expected and none
  * is wrong, 1 if not, 2 for a mistake in the cases. */
 #define _XOPEN_SOURCE 700
@@ -20,7 +20,7 @@ enum { HARD_SLOTS = 64, HARD_ELAPSED = 10 /* limit of elapsed time, relative to 
 
 typedef struct {
   const char *folder, *only_case, *only_method, *page;
-  int slots, verbose;
+  int slots, verbose, specialised;
   hard_case *cases;
   int count, methods, done; /* cases, methods, finished cells */
   char method[HARD_METHODS][48];
@@ -74,13 +74,13 @@ static void hard_list_methods (hard *x) {
 /* ---- Cells ---- */
 
 /* In the child process: sets the limits, runs, sends the result. */
-static void hard_cell (const hard_case *c, const char *method, int to) {
+static void hard_cell (const hard_case *c, const char *method, int specialised, int to) {
   hard_result r;
   struct rlimit limit = { (rlim_t)c->seconds, (rlim_t)c->seconds + 5 }, none = { 0, 0 };
   setrlimit (RLIMIT_CPU, &limit);
   setrlimit (RLIMIT_CORE, &none);
   alarm ((unsigned)(HARD_ELAPSED * c->seconds));
-  hard_run (c, method, &r);
+  hard_run (c, method, specialised, &r);
   _exit (write (to, &r, sizeof r) == (ssize_t)sizeof r ? 0 : 1);
 }
 
@@ -94,7 +94,7 @@ static void hard_start (hard *x, hard_child *child, int cell) {
   child->cell = cell;
   child->from = end[0];
   child->pid = fork ();
-  if (child->pid == 0) hard_cell (&x->cases[cell / x->methods], x->method[cell % x->methods], end[1]);
+  if (child->pid == 0) hard_cell (&x->cases[cell / x->methods], x->method[cell % x->methods], x->specialised, end[1]);
   close (end[1]);
   if (child->pid > 0) return;
   perror ("fork");
@@ -166,13 +166,13 @@ static void hard_write (const hard *x, const char *suffix, const hard_matrix *m,
 }
 
 static int hard_usage (void) {
-  fputs ("hard [-j CELLS] [-c CASE] [-m METHOD] [-v] [-o PAGE] FOLDER\n", stderr);
+  fputs ("hard [-j CELLS] [-c CASE] [-m METHOD] [-s] [-v] [-o PAGE] FOLDER\n", stderr);
   return 2;
 }
 
 int main (int argc, char **argv) {
   hard x = { .slots = 2 };
-  for (int option; (option = getopt (argc, argv, "j:c:m:o:v")) != -1;) switch (option) {
+  for (int option; (option = getopt (argc, argv, "j:c:m:o:sv")) != -1;) switch (option) {
     case 'j':
       x.slots = atoi (optarg);
       break;
@@ -184,6 +184,9 @@ int main (int argc, char **argv) {
       break;
     case 'o':
       x.page = optarg;
+      break;
+    case 's':
+      x.specialised = 1;
       break;
     case 'v':
       x.verbose = 1;

@@ -74,7 +74,7 @@ typedef struct {
 int hard_read (const char *path, const char *models, hard_case *cases, int count);
 
 /* Runs one cell in this process, without a verdict. */
-void hard_run (const hard_case *c, const char *method, hard_result *r);
+void hard_run (const hard_case *c, const char *method, int specialised, hard_result *r);
 
 /* The verdict of a run that ended by itself. */
 hard_verdict hard_verdict_of (const hard_case *c, const hard_result *r);

@@ -13,13 +13,22 @@ typedef struct {
   pw_file *file;
   pw_model *model;
   pw_system *system;
+  pw_scene_code *code; /* or NULL */
   pw_run *run;
 } run_cell;
 
 /* ---- Opening ---- */
 
-static int run_open (const hard_case *c, const char *method, run_cell *x, pw_error *error) {
-  const pw_settings settings = { .span = c->t_end, .step = c->step, .rtol = c->rtol, .ledger = 1 };
+/* Specialised code, if the scene has one. */
+static void run_specialise (run_cell *x, pw_error *error) {
+  pw_error none = { 0 };
+  char *text = pw_system_source (x->system, &none);
+  if (text) x->code = pw_scene_code_open (text, x->system, 1, error);
+  free (text);
+}
+
+static int run_open (const hard_case *c, const char *method, int specialised, run_cell *x, pw_error *error) {
+  pw_settings settings = { .span = c->t_end, .step = c->step, .rtol = c->rtol, .ledger = 1 };
   x->file = pw_file_open (c->model, error);
   x->model = x->file ? pw_file_model (x->file, error) : NULL;
   for (int i = 0; x->model && i < c->sets; i++) pw_model_set (x->model, c->set[i].name, c->set[i].value, error);
@@ -27,12 +36,15 @@ static int run_open (const hard_case *c, const char *method, run_cell *x, pw_err
   for (int i = 0; error->status == PW_OK && i < c->initials; i++)
     pw_model_set_initial (x->model, c->initial[i].name, c->initial[i].value, error);
   if (error->status == PW_OK) x->system = pw_system_compile (x->model, error);
-  if (x->system) x->run = pw_run_open (x->system, method, &settings, error);
+  if (x->system && specialised) run_specialise (x, error);
+  settings.specialised = pw_scene_code_table (x->code);
+  if (x->system && error->status == PW_OK) x->run = pw_run_open (x->system, method, &settings, error);
   return error->status;
 }
 
 static void run_close (run_cell *x) {
   if (x->run) pw_run_close (x->run);
+  pw_scene_code_close (x->code);
   pw_system_free (x->system);
   pw_model_free (x->model);
   if (x->file) pw_file_close (x->file);
@@ -93,12 +105,12 @@ static int run_through (const hard_case *c, const run_cell *x, hard_result *r, p
   return PW_OK;
 }
 
-void hard_run (const hard_case *c, const char *method, hard_result *r) {
+void hard_run (const hard_case *c, const char *method, int specialised, hard_result *r) {
   pw_error error = { 0 };
   run_cell x = { .file = NULL };
   *r = (hard_result){ .t = 0 };
   for (int k = 0; k < HARD_MEASURES; k++) r->measure[k] = NAN;
-  r->status = run_open (c, method, &x, &error);
+  r->status = run_open (c, method, specialised, &x, &error);
   if (r->status == PW_OK) r->status = run_through (c, &x, r, &error);
   if (x.run) r->t = pw_run_time (x.run);
   r->cpu = (double)clock () / CLOCKS_PER_SEC;
