@@ -5,7 +5,6 @@
 #include "cli.h"
 #include "util.h"
 
-#define ENGINE_SHORT 1e4    /* steps that repay looking into the cache */
 #define ENGINE_ADAPTIVE 20. /* an adaptive method's step at rtol 1e-6 over the model's fixed one, roughly */
 
 double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defaults *model, double t_end) {
@@ -42,12 +41,12 @@ static void engine_general (pw_cli_engine *e, const pw_system *s, int has_text, 
   snprintf (e->why, sizeof e->why, "%.190s", text);
 }
 
-/* Loads code for the system; compiles it if that pays. */
-static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise when, int pays) {
+/* Loads code for the system. */
+static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise when) {
   pw_error own = { 0 };
   char *text = pw_system_source (s, &own);
   int has_text = text != NULL, quiet = has_text ? 0 : when == PW_SPECIALISE_AUTO;
-  if (text) e->code = pw_scene_code_open (text, s, pays || when == PW_SPECIALISE_ALWAYS, &own);
+  if (text) e->code = pw_scene_code_open (text, s, 1, &own);
   free (text);
   if (e->code && *pw_scene_code_notice (e->code)) pw_cli_say ("pinwheel: %s\n", pw_scene_code_notice (e->code));
   if (e->code) return;
@@ -59,10 +58,10 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
   *e = (pw_cli_engine){ .when = when };
   if (when == PW_SPECIALISE_NEVER)
     strcpy (e->why, "--specialise never");
-  else if (when == PW_SPECIALISE_AUTO && !(steps >= ENGINE_SHORT))
-    strcpy (e->why, "short run");
+  else if (when == PW_SPECIALISE_AUTO && !(steps >= PW_ENGINE_LONG))
+    strcpy (e->why, "short run"); /* whatever the cache contains: the same command has the same result */
   else
-    engine_load (e, s, when, steps >= PW_ENGINE_LONG);
+    engine_load (e, s, when);
 }
 
 const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e) {
