@@ -4,11 +4,18 @@
 
 #include "pinwheel.h"
 
+/* Inlines all calls in a function, so that it computes no more of a state than it uses. */
+#if defined(__GNUC__)
+#define FLATTEN __attribute__ ((flatten))
+#else
+#define FLATTEN
+#endif
+
 /* PER_ELEMENT (pin_J, pin, 12) { ... } defines the batch function pin_J.  The body fills `out`, the 12 numbers of one
  * element, from `x`, a pin_state: the element in its current state, as pin_at (b, e) returns it. */
 #define PER_ELEMENT(function, type, size)                                                   \
   static inline void function##_one (type##_state x, double *out);                          \
-  static inline void function (const pw_batch *b, double *out) {                            \
+  FLATTEN static inline void function (const pw_batch *b, double *out) {                    \
     for (int e = 0; e < b->count; e++, out += size) function##_one (type##_at (b, e), out); \
   }                                                                                         \
   static inline void function##_one (type##_state x, double *out)
