@@ -24,7 +24,7 @@
  * without e6 the error may then be many times the tolerances and remain undetected. */
 #include <float.h>
 #include <math.h>
-#include "rk_state.h"
+#include "rk_step.h"
 
 void pw_rk_begin_adaptive (pw_run *r) {
   struct pw_method_data *d = r->data;

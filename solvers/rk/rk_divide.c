@@ -6,7 +6,7 @@
 #include <math.h>
 #include <string.h>
 #include "dense_output.h"
-#include "rk_state.h"
+#include "rk_step.h"
 
 /* A state from which a step can begin, with the run's layout. */
 typedef struct {

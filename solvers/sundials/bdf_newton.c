@@ -13,7 +13,13 @@
 #include <stdlib.h>
 #include <string.h>
 #include <cvodes/cvodes.h>
-#include "multistep.h"
+#include "bdf_newton.h"
+
+int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
+  pw_run *r = d->sun.run;
+  int status = pw_run_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
+  return status == PW_OK ? 0 : status > 0 ? 1 : -1;
+}
 
 /* Columns of T: q, v, a, lambda. */
 static void newton_fill (multistep_data *d) {

@@ -8,7 +8,7 @@
 #include <string.h>
 #include <idas/idas.h>
 #include "dense_output.h"
-#include "ida.h"
+#include "ida_equations.h"
 #include "rank.h"
 
 /* ---- Error weights ---- */

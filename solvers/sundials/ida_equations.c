@@ -8,7 +8,7 @@
  * with D = 1 for lengths and 1/L^2 for angles, so that mu has one unit (Baumgarte 1972; Gear, Gupta & Leimkuhler 1985;
  * Gear 1988).  In si1 the unknowns lambda and mu are the integrals of the multipliers. */
 #include <string.h>
-#include "ida.h"
+#include "ida_equations.h"
 
 int pw_ida_update (ida_data *d, double t, const double *y) {
   int status = pw_update_kinematics (d->sun.run->w, pw_before_breakpoint (d->sun.run, t), y, y + d->n);

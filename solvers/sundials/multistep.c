@@ -12,8 +12,8 @@
 #include <string.h>
 #include <cvodes/cvodes.h>
 #include <sunnonlinsol/sunnonlinsol_fixedpoint.h>
+#include "bdf_newton.h"
 #include "dense_output.h"
-#include "multistep.h"
 #include "util.h"
 
 /* Convergence coefficient of the Newton iteration if the error test sees only the projected error, or forces saturate:
@@ -21,12 +21,6 @@
 #define MULTISTEP_ITERATED 0.01
 
 /* ---- Callbacks ---- */
-
-int pw_multistep_accelerate (multistep_data *d, double t, const double *y) {
-  pw_run *r = d->sun.run;
-  int status = pw_run_accelerate (r, pw_before_breakpoint (r, t), y, y + d->n, d->a, d->lambda);
-  return status == PW_OK ? 0 : status > 0 ? 1 : -1;
-}
 
 static int multistep_derivative (pw_real t, N_Vector vy, N_Vector derivative, void *data) {
   multistep_data *d = data;

@@ -10,7 +10,7 @@
 #include "check.h"
 #include "mechanism.h"
 #include "method.h"
-#include "rk_state.h"
+#include "rk_step.h"
 #include "runs.h"
 #include "saddle_scene.h"
 #include "scene.h"

@@ -1,11 +1,11 @@
-/* Private to the driver of CVODES (multistep.c) and its Newton matrix (bdf_newton.c). */
-#ifndef PW_MULTISTEP_H
-#define PW_MULTISTEP_H
+/* Newton matrix of BDF, and the data it shares with the driver of CVODES, multistep.c. */
+#ifndef PW_BDF_NEWTON_H
+#define PW_BDF_NEWTON_H
 
 #include "sundials.h"
 #include "tangent.h"
 
-/* Newton's iteration of BDF; see bdf_newton.c. */
+/* Newton's iteration; see bdf_newton.c. */
 typedef struct {
   pw_tangent tangent;  /* its matrix is T */
   double *value;       /* of T */

@@ -1,7 +1,7 @@
-/* Private to the Runge-Kutta driver: stages and steps (rk.c), step-size control (rk_adapt.c), fixed steps and samples
+/* Private to Runge-Kutta methods: stages and steps (rk_step.c), step-size control (rk_adapt.c), fixed steps and samples
  * (rk_divide.c). */
-#ifndef PW_RK_STATE_H
-#define PW_RK_STATE_H
+#ifndef PW_RK_STEP_H
+#define PW_RK_STEP_H
 
 #include "nullspace.h"
 #include "rk.h"

@@ -5,139 +5,9 @@
  * The ledger's rates are integrated with the same stages.  After each step the state may be projected; its
  * accelerations are evaluated immediately, as the first stage of the next step, so that they are always available. */
 #include <math.h>
-#include <stdlib.h>
 #include <string.h>
-#include "rk_state.h"
+#include "rk_step.h"
 #include "unroll.h"
-#include "util.h"
-
-static const char *const rk_steps[] = { "adaptive", "fixed", NULL };
-static const char *const rk_positions[] = { "projected", "drift", NULL };
-static const char *const rk_inputs[] = { "stage", "held", NULL };
-
-const pw_stabilisation pw_rk_stabilisations[] = {
-  PW_ACCELERATION_STABILISATIONS,
-  { "projection", "coordinate projection onto positions and velocities after each step (Lubich 1991, Eich 1993)",
-    PW_PROJECTION },
-  { "nullspace",
-    "minimal velocities in a basis of the null space of J: velocities obey all constraints at every stage "
-    "(Kim & Vanderploeg 1986)",
-    PW_NULLSPACE },
-  { .name = NULL },
-};
-
-const pw_option pw_rk_options[] = {
-  { .name = "steps", .choices = rk_steps, .about = "steps that follow the tolerances, or of the given size" },
-  { .name = "inputs",
-    .choices = rk_inputs,
-    .about = "signals of forces at stage times, or held from the step's start (first order)" },
-  PW_BAUMGARTE_OPTIONS,
-  PW_PROJECTION_OPTIONS,
-  { .name = "positions",
-    .with = "nullspace",
-    .choices = rk_positions,
-    .about = "positions projected after each step, or left to drift at the order of the method" },
-  { .name = NULL },
-};
-
-/* ---- Opening ---- */
-
-static pw_rk_row rk_list_row (const double *weight, int stages) {
-  pw_rk_row row = { 0 };
-  for (int j = 0; j < stages; j++)
-    if (weight[j] != 0) {
-      row.stage[row.count] = j;
-      row.weight[row.count++] = weight[j];
-    }
-  return row;
-}
-
-static void rk_list_weights (struct pw_method_data *d) {
-  const double *A = d->tableau->A;
-  d->row[0] = rk_list_row (d->tableau->b, d->tableau->stages);
-  for (int i = 1; i < d->tableau->stages; A += i++) d->row[i] = rk_list_row (A, i);
-  if (d->tableau->e) d->estimate[0] = rk_list_row (d->tableau->e, d->tableau->stages + 1);
-  if (d->tableau->e3) d->estimate[1] = rk_list_row (d->tableau->e3, d->tableau->stages + 1);
-  if (d->tableau->e6) d->estimate[2] = rk_list_row (d->tableau->e6, d->tableau->stages + 1);
-}
-
-static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
-  size_t n = (size_t)s->coords + 3, entries = (size_t)s->entries;
-  pw_layout l = { NULL, 0 };
-  for (int pass = 0; pass < 2; pass++) {
-    for (int i = 1; i < d->tableau->stages; i++) {
-      d->V[i] = pw_take (&l, n, sizeof (double));
-      d->A[i] = pw_take (&l, n, sizeof (double));
-      d->R[i] = pw_take (&l, entries, sizeof (double));
-    }
-    d->R[d->tableau->stages] = pw_take (&l, entries, sizeof (double)); /* at the new state, for the error */
-    d->q = pw_take (&l, 3 * n + (size_t)s->rows, sizeof (double));
-    d->q0 = pw_take (&l, 3 * n, sizeof (double));
-    d->weight = pw_take (&l, 2 * n, sizeof (double));
-    d->ledger0 = pw_take (&l, entries, sizeof (double));
-    d->rate0 = pw_take (&l, entries, sizeof (double));
-    d->middle = pw_take (&l, 3 * n, sizeof (double));
-    d->ledger_middle = pw_take (&l, entries, sizeof (double));
-    d->rate_middle = pw_take (&l, entries, sizeof (double));
-    if (pass == 1) break;
-    d->memory = calloc (1, l.used);
-    if (d->memory == NULL) return PW_RESOURCE;
-    l = (pw_layout){ d->memory, 0 };
-  }
-  d->v = d->q + n, d->a = d->v + n, d->lambda = d->a + n;
-  d->v0 = d->q0 + n, d->a0 = d->v0 + n;
-  return PW_OK;
-}
-
-int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
-  struct pw_method_data *d = r->data = calloc (1, sizeof *d);
-  if (d == NULL) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
-  d->tableau = tableau;
-  rk_list_weights (d);
-  d->adaptive = tableau->e != NULL && pw_run_option (r, "steps") == 0;
-  d->held = pw_run_option (r, "inputs") != 0;
-  d->projects = pw_stabilised_by (r, PW_PROJECTION);
-  d->minimal = pw_stabilised_by (r, PW_NULLSPACE);
-  d->closes = d->minimal && pw_run_option (r, "positions") == 0;
-  d->every = (int)pw_run_option (r, "every");
-  if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
-  int status = d->projects || d->closes ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
-  if (status == PW_OK && d->minimal) status = pw_nullspace_open (&d->nullspace, r, error);
-  return status == PW_OK ? pw_rk_restart (r, error) : status;
-}
-
-void pw_rk_close (pw_run *r) {
-  pw_projector_close (&r->data->projector);
-  pw_nullspace_close (&r->data->nullspace);
-  free (r->data->memory);
-  free (r->data);
-}
-
-int pw_rk_restart (pw_run *r, pw_error *error) {
-  struct pw_method_data *d = r->data;
-  size_t entries = (size_t)r->s->entries * sizeof (double);
-  (void)error;
-  d->base = d->t0 = r->t;
-  d->count = 0;
-  d->split = 0;
-  if (d->adaptive) pw_rk_begin_adaptive (r);
-  memcpy (d->q0, r->q, pw_rk_block (r, 0));
-  memcpy (d->ledger0, r->ledger, entries);
-  memcpy (d->rate0, r->rate, entries);
-  d->projected0 = r->projected;
-  return PW_OK;
-}
-
-void pw_rk_serialise (pw_run *r, pw_archive *a) {
-  struct pw_method_data *d = r->data;
-  pw_archive_bytes (a, &d->base, sizeof d->base);
-  pw_archive_count (a, &d->count);
-  pw_archive_bytes (a, &d->split, sizeof d->split);
-  pw_archive_bytes (a, &d->h, sizeof d->h);
-  pw_archive_bytes (a, &d->before, sizeof d->before);
-}
-
-/* ---- A step ---- */
 
 /* Entries i and i + 1 of y + sum_j f_j k_j. */
 PW_INLINE void rk_two (double *restrict out, const double *y, double *const *k, const double *f, int m, long i) {
@@ -304,8 +174,4 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
                   : r->data->minimal  ? "the velocities' basis does not last"
                   : r->data->projects ? "the projection does not converge"
                                       : "a stage of it lands in a singular configuration");
-}
-
-int pw_rk_advance (pw_run *r, double t_end, pw_error *error) {
-  return r->data->adaptive ? pw_rk_advance_adaptive (r, t_end, error) : pw_rk_advance_fixed (r, t_end, error);
 }

@@ -1,6 +1,6 @@
-/* Private to ida: the equations (ida_equations.c) and the driver (ida.c). */
-#ifndef PW_IDA_H
-#define PW_IDA_H
+/* Equations of ida, and the data they share with its driver, ida.c. */
+#ifndef PW_IDA_EQUATIONS_H
+#define PW_IDA_EQUATIONS_H
 
 #include "sundials.h"
 #include "tangent.h"
