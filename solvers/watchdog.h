@@ -19,18 +19,18 @@ typedef struct {
   double near, refine;     /* sines: near a singular configuration, relative to the largest; solutions are refined */
   double regular;          /* sine that counts as regular, relative to the largest */
   double turn, least_turn; /* growth of the accelerations in a turn; least reference level */
-  double drift_turn, drift_near;     /* residual over squared sine */
-  double drift_far, drift_any;       /* the same, above the residual drift_far: drift_any */
-  double jump;                       /* growth of the accelerations in a jump */
-  double lipschitz, growth;          /* change of the sine per unit of motion; of step sizes */
-  double dip, sag, stride, progress; /* walks past a change point */
-  double floor, met, ahead;          /* sines where branches meet; cosine of the angle */
-  double resolved;                   /* step over the distance of branches */
-  double agree, agree_best;          /* difference between two divisions of a step */
-  double sample, sample_best;        /* the same for a sample inside a step */
-  double loosened, loose;            /* conditioning of the active rows */
-  double extreme;                    /* the largest mass, and one over the smallest [kg]; the largest initial value */
-  double stalled;                    /* consecutive steps that do not advance */
+  double drift_turn, drift_near;            /* residual over squared sine */
+  double drift_far, drift_any;              /* the same, above the residual drift_far: drift_any */
+  double jump;                              /* growth of the accelerations in a jump */
+  double lipschitz, growth;                 /* change of the sine per unit of motion; of step sizes */
+  double unresolved, low, stride, progress; /* walks past a change point */
+  double floor, crossing, straight;         /* sines where branches cross; cosine of the angle of a straight passage */
+  double resolved;                          /* step over the distance of branches */
+  double agree, agree_best;                 /* difference between two divisions of a step */
+  double sample, sample_best;               /* the same for a sample inside a step */
+  double loosened, loose;                   /* conditioning of the active rows */
+  double extreme; /* the largest mass, and one over the smallest [kg]; the largest initial value */
+  double stalled; /* consecutive steps that do not advance */
 } pw_watchdog;
 
 extern const pw_watchdog pw_watchdog_limits;
@@ -41,13 +41,15 @@ typedef struct {
   int fixed;            /* 1: fixed step size, so stages matter */
   int loops;            /* 1: bodies form closed loops, whose branches can meet */
   double sine, typical; /* the last sine computed; the largest at a state reached */
-  double known, moved;  /* sine at the last state for which it was computed; motion since then [units of L, rad] */
+  double state_sine;    /* the sine at the last accepted state for which it was computed */
+  double moved;         /* motion since then [units of L, rad] */
   int alert;            /* 1: a singular configuration may be within the next step */
   double step;          /* length of the last step, in the units of `moved` */
-  double t, begun, *q;  /* the previous state: time, sine (NaN: not computed), coordinates */
-  double before, slope; /* the sine one state earlier, or NaN; its fastest recent change */
+  double t, start_sine; /* the previous state: time, sine (NaN: not computed) */
+  double *q;            /* and coordinates */
+  double before, slope; /* the sine one state before `state_sine`, or NaN; its fastest recent change */
   int row;              /* the row that is most nearly dependent */
-  int crossed;          /* 1: meeting branches were crossed recently */
+  int crossed;          /* 1: a point where branches cross was passed recently */
 } pw_geometry;
 
 int pw_watchdog_open (struct pw_run *r, pw_error *error);

@@ -1,4 +1,4 @@
-/* The program's commands, and what they share.
+/* The program's commands and their common functions.
  *
  * A command is one file with one table, named in the list below.  Its function returns PW_OK, a negative status with
  * the error set, or a positive exit status if it has reported everything.  Exit statuses are 0 success, 1 resource
@@ -16,21 +16,21 @@ enum {
   PW_CLOSED_PIPE = 141
 }; /* exit statuses after Ctrl-C, and when the output pipe is closed */
 
-/* ---- Requests to stop, by Ctrl-C or a limit of processor time, which commands check between steps (stop.c) ---- */
+/* ---- Requests to stop, by Ctrl-C or a limit of processor time; commands check them between steps (stop.c) ---- */
 
 extern volatile sig_atomic_t pw_stop; /* requests so far */
 
-/* Counts signals from here on.  The first requests a stop after the current step; since some senders signal a program
- * and its group as well, only the third ends the program, in case that step never ends. */
+/* Counts signals from now on.  The first requests a stop after the current step.  The third ends the program, in case
+ * that step never ends; the second does not, since some senders signal a program and its group as well. */
 void pw_stop_catch (void);
 /* Lets signals end the program again. */
 void pw_stop_release (void);
 
-/* The limit of a run's processor time, measured by the clock of its thread. */
+/* A limit of the processor time of a run, measured by the clock of its thread. */
 typedef struct {
-  double most;   /* [s]; INFINITY: no limit */
-  double start;  /* of the thread's clock [s] */
-  double looked; /* coarse clock when the thread's clock was last read [s] */
+  double most;  /* [s]; INFINITY: no limit */
+  double start; /* of the thread's clock [s] */
+  double read;  /* coarse clock when the thread's clock was last read [s] */
 } pw_limit;
 
 /* Starts the clock; call it when the run begins. */
@@ -43,7 +43,7 @@ int pw_limit_fail (const pw_limit *l, double t, pw_error *error);
 
 /* ---- Commands ---- */
 
-/* All commands, in the order of `pinwheel --help`; pw_cli_list is the table of the first, and so on. */
+/* All commands, in the order of `pinwheel --help`; the table of `list` is pw_cli_list. */
 #define PW_COMMANDS(X) X (list) X (show) X (check) X (run) X (sweep) X (compare) X (drift) X (new)
 
 /* A command line: its arguments and the options shared by several commands, NULL if not given.  The structure of
@@ -57,7 +57,7 @@ typedef struct {
   /* private */
   poptContext popt;
   struct poptOption *table; /* a copy of the command's options, bound to its structure */
-  void **text;              /* the text that popt allocated for each */
+  void **text;              /* the text that popt allocated for each option */
 } pw_cli_line;
 
 typedef struct {
@@ -65,10 +65,10 @@ typedef struct {
   const char *synopsis; /* "MODEL [OPTION...]" */
   const char *summary;  /* one line, for `pinwheel --help` */
   const char *help;     /* sentences for `pinwheel run --help` */
-  int least, most;      /* number of arguments; most 0: any */
+  int least, most;      /* smallest and largest number of arguments; most 0: any number */
   size_t size;          /* of the structure of options */
   int (*function) (void *options, pw_error *error);
-  const struct poptOption *options; /* made of the entries below, ended by POPT_TABLEEND */
+  const struct poptOption *options; /* entries defined below, ended by POPT_TABLEEND */
 } pw_command;
 
 #define PW_COMMAND(name) extern const pw_command pw_cli_##name;
@@ -86,11 +86,11 @@ PW_COMMANDS (PW_COMMAND)
 /* Another name of a text option, without help. */
 #define PW_ALIAS_OPTION(type, member, name) \
   { name, 0, POPT_ARG_STRING, (void *)offsetof (type, member), 0, NULL, NULL }
-/* A heading of the options that follow. */
+/* A heading for the options after it. */
 #define PW_OPTION_GROUP(title) \
   { NULL, 0, POPT_ARG_NONE, NULL, 0, title, NULL }
 
-/* Options of commands that open a model; that integrate with methods of their own choice; with one method. */
+/* Options of all commands that open a model; of those that integrate; of those that integrate with one method. */
 #define PW_MODEL_OPTIONS                                                                                       \
   PW_OPTION_GROUP ("Model"),                                                                                   \
       PW_LIST_OPTION (pw_cli_line, sets, "set", 0, "PARAM=VALUE",                                              \
@@ -126,15 +126,15 @@ int pw_cli_main (const pw_command *c, int argc, const char **argv);
 /* Refuses more than `most` arguments. */
 int pw_cli_at_most (const pw_command *c, const pw_cli_line *l, int most, pw_error *error);
 
-/* Reads the value of an option ("--step") in any locale; a NULL text leaves *value.  PW_INPUT if it is not a number in
- * the domain. */
+/* Reads the value of an option ("--step") in any locale; a NULL text leaves *value unchanged.  PW_INPUT if it is not a
+ * number in the domain. */
 int pw_cli_number (const char *option, const char *text, pw_domain domain, double *value, pw_error *error);
 
 /* The model's defaults overridden by options: t_end, settings except the ledger, and the limit, which stops the run. */
 int pw_cli_settings (const pw_cli_line *l, const pw_run_defaults *model, double *t_end, pw_settings *settings,
                      pw_limit *limit, pw_error *error);
 
-/* 1 if the step size of a method follows a tolerance; 0 if it is fixed, by nature or by an option of the method. */
+/* 1 if a method controls its step size; 0 if steps are fixed, by the integrator or by the option steps=fixed. */
 int pw_cli_adaptive (const pw_method *integrator, const char *method);
 
 /* ---- Models ---- */
@@ -159,7 +159,7 @@ void pw_cli_close_model (pw_cli_model *m);
 int pw_cli_apply (pw_model *m, const char *option, const char **list,
                   int (*set) (pw_model *m, const char *name, double value, pw_error *error), pw_error *error);
 
-/* A path, relative to the current directory if it lies below; it may be written to the buffer. */
+/* A path, relative to the current directory if that contains it; the result may be in `buffer`. */
 const char *pw_cli_short_path (const char *path, char *buffer, size_t size);
 
 /* A model's own run settings, else 10 s of rk4+projection with steps of 1e-3 s; rtol is 0 if the model does not set
@@ -173,18 +173,18 @@ typedef enum { PW_SPECIALISE_AUTO, PW_SPECIALISE_ALWAYS, PW_SPECIALISE_NEVER } p
 typedef struct {
   pw_specialise when;
   pw_scene_code *code; /* NULL: the general engine */
-  char why[200];       /* the general engine is used */
+  char why[200];       /* reason for the general engine */
 } pw_cli_engine;
 
 /* Reads the value of --specialise, NULL if it is not given. */
 int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error);
 
-#define PW_ENGINE_LONG 1e6 /* steps that repay the compilation */
+#define PW_ENGINE_LONG 1e6 /* number of steps from which compilation saves time */
 
-/* Steps of a run, roughly. */
+/* Estimated number of steps of a run. */
 double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defaults *model, double t_end);
 
-/* Chooses the engine for runs of so many steps in all, and loads or compiles the code; prints notices. */
+/* Chooses the engine for runs with this total number of steps; loads or compiles the code, and prints notices. */
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
 void pw_cli_engine_close (pw_cli_engine *e);
 const pw_specialised *pw_cli_engine_code (const pw_cli_engine *e); /* for pw_settings.specialised */
@@ -192,12 +192,12 @@ const char *pw_cli_engine_name (const pw_cli_engine *e);           /* "specialis
 
 /* ---- Files ---- */
 
-/* The first entry of a command's list for pw_cli_uses. */
+/* First entry of the list of files passed to pw_cli_uses. */
 #define PW_CLI_MODEL_USE \
   { "the model", NULL, PW_READS, NULL }
 
-/* Refuses files that a command would read and write, or write twice.  The list begins with PW_CLI_MODEL_USE, which
- * stands for the model of the command line and, once its file is open, for the tables it reads; `file` may be NULL. */
+/* Refuses files that a command would read and write, or write twice.  The list begins with PW_CLI_MODEL_USE: the model
+ * of the command line and, if its file is open (`file` is not NULL), the tables that it reads. */
 int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int count, pw_error *error);
 
 /* ---- Messages ---- */
@@ -213,11 +213,11 @@ int pw_cli_uses (const pw_cli_line *l, const pw_file *file, pw_use *use, int cou
 void pw_cli_say (const char *format, ...) PW_PRINTS (1);
 void pw_cli_print (FILE *f, const char *format, ...) PW_PRINTS (2);
 
-/* Prints a line of text, broken between words, after something `indent` characters wide. */
+/* Prints text broken into lines of `width` characters; the first line continues at column `indent`. */
 void pw_cli_wrap (const char *text, int indent, int width);
 
-/* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, or as it is if it names a place in a file;
- * returns the exit status. */
+/* Prints an error, if there is one, as "pinwheel: TEXT" on standard error, without "pinwheel:" if TEXT begins with a
+ * file and line; returns the exit status. */
 int pw_cli_end (const pw_error *error);
 
 #endif

@@ -9,7 +9,10 @@
 #include "cli.h"
 #include "util.h"
 
-enum { COMMAND_HELP = 1000, COMMAND_WIDTH = 80 }; /* popt returns this for --help; for other options 1, 2, ... */
+enum {
+  COMMAND_HELP = 1000,
+  COMMAND_WIDTH = 80
+}; /* popt's value for --help (for other options 1, 2, ...); columns of help */
 
 static int command_is_end (const struct poptOption *o) {
   return o->longName == NULL && o->descrip == NULL;
@@ -35,8 +38,8 @@ static int command_table (pw_cli_line *l, const struct poptOption *options) {
   return PW_OK;
 }
 
-/* popt allocates copies of texts, and lists of copies: records that of an option just read, to be released even if the
- * variable changes.  If an option is repeated, a text replaces the previous one, a list grows. */
+/* Records the text or list that popt has allocated for an option, to release it even if the variable changes.  If an
+ * option is repeated, a text replaces the previous one, a list grows. */
 static void command_note (pw_cli_line *l, int i) {
   unsigned type = l->table[i].argInfo & POPT_ARG_MASK;
   if (type == POPT_ARG_STRING) free (l->text[i]);

@@ -52,8 +52,8 @@ int pw_limit_over (void *limit) {
   if (pw_stop) return 1;
   if (isinf (l->most)) return 0;
   double now = pw_seconds (STOP_CHEAP);
-  if (now == l->looked) return 0;
-  l->looked = now;
+  if (now == l->read) return 0;
+  l->read = now;
   return pw_seconds (CLOCK_THREAD_CPUTIME_ID) - l->start > l->most;
 }
 

@@ -1,4 +1,4 @@
-/* Change points: configurations at which branches of a motion meet, or nearly do.
+/* Change points: configurations at which branches of a motion cross, or nearly do.
  *
  * In suitable coordinates the constraints near one are x y = e, with the sine |(x, y)|.  For e = 0 the branches
  * cross and the motion goes straight on; for e != 0 it turns within a distance of sqrt (e), and a step that is
@@ -7,8 +7,8 @@
  *
  * So where the sine may have had a minimum within a step, a walk on the constraint manifold leads from its beginning
  * to its end, in strides proportional to the sine, each followed by a projection.  If the walk stalls, the end is on
- * another branch.  Where the sine falls below `floor` the branches meet to round-off; the walk steps over such a
- * point, and the motion must continue straight on. (Following a solution curve by predictor and projection: Allgower
+ * another branch.  Where the sine falls below `floor`, the branches cross to round-off: the walk steps over such a
+ * point, and the motion must continue straight on.  (Following a solution curve by predictor and projection: Allgower
  * & Georg 2003, Introduction to numerical continuation methods, chapters 2 and 8.) */
 #include <math.h>
 #include <stdlib.h>
@@ -24,10 +24,10 @@ typedef struct {
   pw_run *r;
   pw_projector projector;
   double t, *q, *next;       /* position of the walk, and a candidate for the next */
-  double *end, *in;          /* end of the walk; direction in which a meeting point was entered */
-  double sine, least, slope; /* at q; the smallest; its fastest change */
-  int passed; /* 1: stepping over a point where branches meet; 2: passed straight on; -1: passed otherwise */
-  int row;    /* where the sine was smallest */
+  double *end, *in;          /* end of the walk; direction in which a crossing was entered */
+  double sine, least, slope; /* sine at q; smallest sine; its fastest change */
+  int passed;                /* 1: stepping over a crossing of branches; 2: passed straight on; -1: passed otherwise */
+  int row;                   /* where the sine was smallest */
 } change_walk;
 
 /* (a - b) . (c - d), lengths in units of L. */
@@ -44,7 +44,7 @@ static double change_distance (const pw_system *s, const double *a, const double
   return sqrt (change_dot (s, a, b, a, b));
 }
 
-/* Projects onto the constraints; the sine there. */
+/* Projects q onto the constraints; *sine: the sine there. */
 static int change_project (change_walk *w, double t, double *q, double *sine) {
   pw_run *r = w->r;
   int row;
@@ -57,10 +57,10 @@ static int change_project (change_walk *w, double t, double *q, double *sine) {
   return PW_OK;
 }
 
-/* Records where a point at which branches meet is entered; checks that it is left straight on. */
+/* Records where a crossing of branches is entered; checks that it is left straight on. */
 static void change_straight (change_walk *w, double sine) {
   const pw_system *s = w->r->s;
-  const double inside = w->r->limits.met;
+  const double inside = w->r->limits.crossing;
   size_t n = (size_t)s->coords * sizeof (double);
   if (w->passed == 0 && sine < inside) {
     memcpy (w->in, w->q, n);
@@ -69,11 +69,12 @@ static void change_straight (change_walk *w, double sine) {
   } else if (w->passed == 1 && sine >= inside) {
     const double *from = w->in, *to = from + s->coords;
     double dot = change_dot (s, to, from, w->next, w->q);
-    w->passed = dot > w->r->limits.ahead * change_distance (s, to, from) * change_distance (s, w->next, w->q) ? 2 : -1;
+    w->passed =
+        dot > w->r->limits.straight * change_distance (s, to, from) * change_distance (s, w->next, w->q) ? 2 : -1;
   }
 }
 
-/* A stride to q + part (to - q), longer where the projection fails; PW_RETRY if it fails for all lengths. */
+/* Steps to q + part (to - q), projected; tries longer strides if that fails.  PW_RETRY if all fail. */
 static int change_stride (change_walk *w, const double *to, double t1, double part) {
   const pw_system *s = w->r->s;
   double sine, t, *swap = w->next;
@@ -113,7 +114,7 @@ static change_verdict change_follow (change_walk *w) {
     double part = fmin (1, change_length (w) / distance);
     if (change_stride (w, w->end, end, part) != PW_OK) return CHANGE_UNKNOWN;
     if (change_distance (r->s, w->q, w->end) <= distance * (1 - r->limits.progress * part)) continue;
-    if (w->least > r->limits.sag * g->typical) return CHANGE_UNKNOWN;
+    if (w->least > r->limits.low * g->typical) return CHANGE_UNKNOWN;
     return CHANGE_OTHER;
   }
   return CHANGE_UNKNOWN;
@@ -150,23 +151,23 @@ static double change_sine_at (pw_run *r, double t, const double *q) {
   return pw_watchdog_sine (r, NULL);
 }
 
-/* 1 if the sine is low somewhere on the straight line of a long step. */
-static int change_sags (pw_run *r, double length) {
+/* 1 if the sine is low somewhere on the straight line between the ends of a long step. */
+static int change_low_between (pw_run *r, double length) {
   const pw_geometry *g = &r->geometry;
   int parts = (int)(length / r->limits.stride) + 1;
   for (int i = 1; i < parts; i++) {
     double x = (double)i / parts;
     for (int j = 0; j < r->s->coords; j++) r->q_at[j] = g->q[j] + x * (r->q[j] - g->q[j]);
-    if (change_sine_at (r, g->t + x * (r->t - g->t), r->q_at) < r->limits.sag * g->typical) return 1;
+    if (change_sine_at (r, g->t + x * (r->t - g->t), r->q_at) < r->limits.low * g->typical) return 1;
   }
   return 0;
 }
 
 /* 1 if the sine may have a minimum within the step that is low enough to matter. */
-static int change_dips (pw_run *r, double begun, double sine, double length) {
-  double low = r->limits.sag * fmin (begun, sine);
-  if (begun + sine - r->limits.lipschitz * r->geometry.typical * length > 2 * low) return 0;
-  return length <= r->limits.stride || change_sags (r, length);
+static int change_may_be_low (pw_run *r, double start_sine, double sine, double length) {
+  double low = r->limits.low * fmin (start_sine, sine);
+  if (start_sine + sine - r->limits.lipschitz * r->geometry.typical * length > 2 * low) return 0;
+  return length <= r->limits.stride || change_low_between (r, length);
 }
 
 static int change_fail (pw_run *r, int row, double least, const char *what, double length, pw_error *error) {
@@ -181,18 +182,18 @@ static int change_fail (pw_run *r, int row, double least, const char *what, doub
 int pw_change_point_resolve (pw_run *r, double last, pw_error *error) {
   pw_geometry *g = &r->geometry;
   if (isnan (last) || g->step == 0) return PW_OK;
-  g->slope = fmax (g->slope, fabs (g->known - last) / g->step);
+  g->slope = fmax (g->slope, fabs (g->state_sine - last) / g->step);
   if (!g->loops || !pw_fixed_steps (r) || g->crossed || g->row >= r->s->holonomic) return PW_OK;
-  if (!(last < g->before && last < g->known) || g->step * g->slope <= r->limits.resolved * last) return PW_OK;
+  if (!(last < g->before && last < g->state_sine) || g->step * g->slope <= r->limits.resolved * last) return PW_OK;
   return change_fail (r, g->row, last / g->slope, "the step does not resolve it", g->step, error);
 }
 
-/* Reports what a walk has found. */
+/* Reports the result of a walk. */
 static int change_report (pw_run *r, const change_walk *w, change_verdict verdict, double sine, double length,
                           pw_error *error) {
   pw_geometry *g = &r->geometry;
-  double low = r->limits.dip * fmin (g->begun, sine);
-  g->crossed |= verdict == CHANGE_UNKNOWN || w->least <= r->limits.met;
+  double low = r->limits.unresolved * fmin (g->start_sine, sine);
+  g->crossed |= verdict == CHANGE_UNKNOWN || w->least <= r->limits.crossing;
   if (verdict == CHANGE_OTHER)
     return change_fail (r, w->row, w->least, "the motion has left its branch", length, error);
   if (verdict == CHANGE_SAME && !g->crossed && w->least < low)
@@ -206,10 +207,10 @@ int pw_change_point_check (pw_run *r, double sine, pw_error *error) {
   pw_error why = { 0 };
   double length = change_distance (r->s, r->q, g->q);
   if (!g->loops || length == 0) return PW_OK;
-  if (isnan (g->begun)) g->begun = change_sine_at (r, g->t, g->q);
-  int dips = change_dips (r, g->begun, sine, length);
-  change_verdict verdict = dips ? change_walk_there (r, &w, &why) : CHANGE_UNKNOWN;
+  if (isnan (g->start_sine)) g->start_sine = change_sine_at (r, g->t, g->q);
+  int suspect = change_may_be_low (r, g->start_sine, sine, length);
+  change_verdict verdict = suspect ? change_walk_there (r, &w, &why) : CHANGE_UNKNOWN;
   if (pw_evaluate_J_at (r->w, r->t, r->q, r->v) != PW_OK) return pw_fail_signal (r->t, error);
   if (why.status != PW_OK) return pw_fail (error, why.status, "%s", why.text);
-  return dips ? change_report (r, &w, verdict, sine, length, error) : PW_OK;
+  return suspect ? change_report (r, &w, verdict, sine, length, error) : PW_OK;
 }

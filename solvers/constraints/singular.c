@@ -7,14 +7,14 @@
 #include "rank.h"
 
 /* Residuals are scaled, sines are of angles between rows. s: the sine over the largest one; d: the constraint
- * residual.  Where branches meet the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a
+ * residual.  Where branches cross, the constraints are x y = 0 in suitable coordinates, and s = |(x, y)|; with a
  * residual d they are x y = d, whose branches turn where s^2 = 2 d. */
 const pw_watchdog pw_watchdog_limits = {
-  /* With residuals of a hundredth of the scene the motion is wrong; without stabilisation some drift is expected. */
+  /* A motion with residuals of 1 % is wrong; without stabilisation some drift is expected. */
   .lost = 1e-2,
   .lost_unstabilised = 0.1,
 
-  /* A redundant row follows from the others to some 1e6 eps of round-off, or to their residuals, magnified by a sine
+  /* A redundant row follows from the others up to a round-off of 1e6 eps, or up to their residuals divided by a sine
    * as small as 1e-4. */
   .follows = 1e-9,
   .magnified = 1e4,
@@ -58,17 +58,17 @@ const pw_watchdog pw_watchdog_limits = {
   /* Change points (change_point.c): a sine within a step below an eighth of those at its ends belongs to a corner
    * that the step cannot resolve; half of them indicates that there may be one.  Strides of 0.3 s stay on a curve
    * whose radius is s.  A stride that gains less than a tenth of its length leads elsewhere. */
-  .dip = 0.125,
-  .sag = 0.5,
+  .unresolved = 0.125,
+  .low = 0.5,
   .stride = 0.3,
   .progress = 0.1,
 
   /* The projection leaves residuals of 1e-14, which leave an error of 1e-7 in the sine: below `floor`, ten times
-   * that, it cannot be distinguished from 0 (`met`: with the tolerance of a stride).  Such a point must be left
+   * that, it cannot be distinguished from 0 (`crossing`: with the tolerance of a stride).  Such a point must be left
    * straight on, within 60 degrees of the direction in which it was entered. */
   .floor = 1e-6,
-  .met = 2e-6,
-  .ahead = 0.5,
+  .crossing = 2e-6,
+  .straight = 0.5,
 
   /* Methods of order 2 leave (0.4)^2 / 12 = 1 % at a corner as long as 1 / 0.4 steps. */
   .resolved = 0.4,
@@ -78,7 +78,7 @@ const pw_watchdog pw_watchdog_limits = {
   .agree = 1e-7,
   .agree_best = 1e-11,
 
-  /* A sample does not go into the next step: one that is seen to be good to a hundredth is worth showing. */
+  /* A sample does not affect the next step: an error of a hundredth is acceptable. */
   .sample = 1e-2,
   .sample_best = 1e-9,
 

@@ -19,7 +19,7 @@ static void massless_copy (pw_component *c) {
   }
 }
 
-/* The sum of the squares of a row's entries times `weight`. */
+/* The weighted sum of the squares of a row's entries. */
 static double massless_square (const pw_component *c, int i, const double *weight) {
   const double *A = c->A + i * c->stride;
   double sum = 0;
@@ -40,9 +40,9 @@ static void massless_swap (pw_component *c, int a, int b) {
 }
 
 /* Moves the row with the largest entry in a massless column to p, each row scaled by its largest original entry, so
- * that the remainder of a dependent row is small.  Returns 0 if all are round-off: until it is matched again, no pivot
- * of the component is large enough. */
-static int massless_choose (pw_component *c, int p) {
+ * that the remainder of a dependent row is small.  Returns 0 if all are round-off; the component is then matched again
+ * at the next factorisation. */
+static int massless_select_pivot (pw_component *c, int p) {
   const double guard = 0.1;
   int row = -1, column = -1;
   double best = 1e-12;
@@ -80,7 +80,7 @@ PW_INLINE void massless_eliminate (pw_component *c, int p, int n) {
   P[pivot] = inverse;
 }
 
-/* Eliminates with the pivots matched before, or matches them (with `search`).  Returns the number of good pivots. */
+/* Eliminates with the pivots matched before, or matches them (with `search`).  Returns the number of pivots that are large enough. */
 PW_INLINE int massless_reduce (pw_component *c, int search, int n) {
   massless_copy (c);
   c->least = INFINITY;
@@ -91,7 +91,7 @@ PW_INLINE int massless_reduce (pw_component *c, int search, int n) {
       c->row[i].size = fmax (c->row[i].size, sqrt (c->square[k]) * fabs (c->A[i * c->stride + k]));
   }
   PW_UNROLL for (int p = 0; p < n; p++) {
-    if (search && !massless_choose (c, p)) return p;
+    if (search && !massless_select_pivot (c, p)) return p;
     const pw_massless_row *row = &c->row[p];
     double pivot = fabs (c->A[p * c->stride + row->pivot]) * row->scale;
     if (!(pivot >= c->least)) c->least = pivot, c->least_row = row->row;
@@ -113,15 +113,15 @@ double pw_massless_factor (pw_massless *r) {
       if (found < c->pivots) return r->least_row = c->row[found].row, 0;
     }
     for (int i = c->pivots; i < c->rows; i++) {
-      double left = c->row[i].terms > 0 ? sqrt (massless_square (c, i, c->massive_square) / c->row[i].terms) : 0;
-      if (!(left >= c->least)) c->least = left, c->least_row = c->row[i].row;
+      double remainder = c->row[i].terms > 0 ? sqrt (massless_square (c, i, c->massive_square) / c->row[i].terms) : 0;
+      if (!(remainder >= c->least)) c->least = remainder, c->least_row = c->row[i].row;
     }
     if (!(c->least >= least)) least = c->least, r->least_row = c->least_row;
   }
   return least > 1 ? 1 : least * least;
 }
 
-/* ---- Solving; n, the number of pivots, is a constant where it is usual ---- */
+/* ---- Solving; n: the number of pivots, a constant 3 in most calls, so that loops are unrolled ---- */
 
 PW_INLINE void massless_forward (pw_component *c, const double *gamma, double *f, int n) {
   pw_massless_row *row = c->row;

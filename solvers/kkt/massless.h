@@ -1,13 +1,13 @@
 /* Elimination of coordinates without weight: each is matched to a constraint row and substituted out of the others.
  *
- * The rows and coordinates concerned fall apart into components (a massless body and the joints around it).  In each,
+ * The rows and coordinates concerned form independent components (a massless body and its joints).  In each,
  * Gaussian elimination of the massless columns, with the matched rows p as pivot rows, leaves
  *
  *     [ P H ]   [ L 0 ] [ U H' ]       P, H: matched rows in the massless and in the massive columns
  *     [ K Z ] = [ M 1 ] [ 0 Z' ]       K, Z: unmatched rows i
  *
- * With  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; M 1 ]^-1 gamma,  the rows Z' and the massive coordinates make
- * a system without the massless ones; from its solution follow
+ * With  w = U^-T f_P,  f~ = f - H'^T w,  gamma~ = [ L 0 ; M 1 ]^-1 gamma,  the rows Z' and the massive coordinates form
+ * a system without the massless ones.  Its solution yields
  *
  *     a_P = U^-1 (gamma~_p - H' a),       lambda_p = L^-T (w - M^T lambda_i). */
 #ifndef PW_MASSLESS_H
@@ -17,8 +17,8 @@
 
 enum { PW_MASSLESS_BLOCKS = PW_MAX_BODIES + PW_MAX_INTERNAL };
 
-/* Groups of coordinates: bodies, then internal coordinates.  The number of groups; that of a coordinate; the first
- * coordinate of a group; and the coordinates of the group that begins with j. */
+/* Groups of coordinates: bodies, then internal coordinates.  The number of groups; the group of a coordinate; the
+ * first coordinate of a group; the number of coordinates in the group that begins with coordinate j. */
 static inline int pw_groups (const pw_system *s) {
   return s->coords - 2 * s->bodies;
 }
@@ -41,7 +41,7 @@ typedef struct {
   int row;             /* global */
   int pivot;           /* matched rows: the local column of the coordinate */
   double size;         /* largest entry when last matched, angles in units of length */
-  double scale;        /* matched rows: of the pivot, to make it relative to `size` */
+  double scale;        /* matched rows: factor of the pivot that makes it relative to `size` */
   double least;        /* matched rows: the pivot, relative to `size`, below which the component is matched again */
   double terms;        /* unmatched rows: sum of the squares of the terms whose sum is the row of Z' */
   double gamma;        /* gamma~ */
@@ -59,27 +59,27 @@ typedef struct {
   double *massive_square;  /* cols: the same, 0 for a massless coordinate */
   pw_massless_row *row;    /* the matched ones first, in the order of elimination */
   double *A;               /* rows x stride: U, with inverses on its diagonal, and H', or 0 and Z'; then L, or M */
-  int lower, stride;       /* where L begins, cols rounded up to an even number; from row to row of A */
+  int lower, stride;       /* first column of L: cols rounded up to an even number; distance between rows of A */
   double least;            /* smallest pivot relative to its row, or row of Z' relative to its terms */
-  int least_row;           /* and its row, global */
+  int least_row;           /* its global row */
 } pw_component;
 
 typedef struct {
   int components;
   pw_component *component, *end;
-  int *component_of_row; /* -1: untouched */
-  int least_row;         /* of the smallest pivot last found */
+  int *component_of_row; /* -1: without massless coordinates */
+  int least_row;         /* row of the smallest pivot at the last factorisation */
   char *memory;
 } pw_massless;
 
-/* Finds the components and matches at the configuration J was evaluated at.  Errors: PW_RESOURCE, PW_INPUT (with the
+/* Finds the components and matches them with the J last evaluated.  Errors: PW_RESOURCE, PW_INPUT (with the
  * name of a coordinate that no row determines). */
 int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                       pw_error *error);
 void pw_massless_close (pw_massless *r);
 
 /* Matches a component's massless coordinates to rows at the J last evaluated, with complete pivoting over their
- * columns, and eliminates them.  Returns how many pivots were found. */
+ * columns, and eliminates them.  Returns the number of pivots found. */
 int pw_massless_match (pw_component *c);
 
 /* Eliminates with the J last evaluated, and matches again if a pivot has become much smaller than when it was

@@ -5,7 +5,7 @@
 
 /* ---- Components ---- */
 
-/* Union-find over groups, bodies and internal coordinates, that have columns without weight. */
+/* Union-find over the groups (bodies, internal coordinates) that contain massless coordinates. */
 typedef struct {
   const pw_system *s;
   const pw_workspace *w;
@@ -13,10 +13,10 @@ typedef struct {
   const unsigned char *active;
   int rows, groups;
   int *parent; /* groups */
-  int *member; /* groups: component number of a root; -1: no active row touches it */
+  int *member; /* groups: at a root, the number of its component; -1: in no active row */
 } massless_plan;
 
-static int massless_in (const massless_plan *p, int g) {
+static int massless_contains (const massless_plan *p, int g) {
   int j = pw_group_first (p->s, g);
   for (int n = 0; n < pw_group_width (p->s, j); n++)
     if (p->weight[j + n] == 0) return 1;
@@ -28,8 +28,8 @@ static int massless_root (const massless_plan *p, int g) {
   return g;
 }
 
-/* The groups an element touches, the ground left out; their first local columns go to `at`. */
-static int massless_touched (const pw_system *s, const pw_element_batch *k, int e, int *group, int *at) {
+/* The groups of an element's coordinates, without the ground, and their first local columns. */
+static int massless_element_groups (const pw_system *s, const pw_element_batch *k, int e, int *group, int *at) {
   int n = 0;
   for (int b = 0; b < k->kind->bodies; b++) {
     int j = k->column[e * k->kind->bodies + b];
@@ -48,15 +48,15 @@ static int massless_is_active (const massless_plan *p, int row) {
   return row < p->rows && (p->active == NULL || p->active[row]);
 }
 
-/* Massless groups that share an active row belong together; marks them as touched. */
+/* Unites massless groups that share an active row, and marks them as members. */
 static void massless_unite (massless_plan *p) {
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
-      int any = 0, last = -1, n = massless_touched (p->s, k, e, group, at);
+      int any = 0, last = -1, n = massless_element_groups (p->s, k, e, group, at);
       for (int i = 0; i < k->kind->rows; i++) any |= massless_is_active (p, k->row + e * k->kind->rows + i);
       for (int i = 0; any && i < n; i++) {
-        if (!massless_in (p, group[i])) continue;
+        if (!massless_contains (p, group[i])) continue;
         p->member[group[i]] = 0;
         if (last >= 0) p->parent[massless_root (p, group[i])] = massless_root (p, last);
         last = group[i];
@@ -64,7 +64,7 @@ static void massless_unite (massless_plan *p) {
     }
 }
 
-/* The number of a group within a component, to which it is added. */
+/* The index of a group in a component; adds it if it is not there. */
 static int massless_add_group (const pw_system *s, pw_component *c, int g) {
   int j = pw_group_first (s, g), width = pw_group_width (s, j);
   for (int i = 0; i < c->groups; i++)
@@ -74,7 +74,7 @@ static int massless_add_group (const pw_system *s, pw_component *c, int g) {
   return c->groups++;
 }
 
-/* Adds a row and the groups it touches to a component, or only counts them, groups with repetition. */
+/* Adds a row and its groups to a component, or, before the layout, only counts them (groups with repetition). */
 static void massless_add_row (const pw_system *s, pw_component *c, int row, int n, const int *group, const int *at,
                               const double *J) {
   pw_massless_row *to = c->row ? &c->row[c->rows] : NULL;
@@ -84,13 +84,13 @@ static void massless_add_row (const pw_system *s, pw_component *c, int row, int 
   if (to) to->row = row;
 }
 
-/* Every active row of every element that touches a massless group, to the component of this group. */
+/* Adds each active row with a massless group to the component of this group. */
 static void massless_add_rows (massless_plan *p, pw_massless *r) {
   int group[PW_MASSLESS_BLOCKS], at[PW_MASSLESS_BLOCKS];
   for (const pw_element_batch *k = p->w->batch; k < p->w->batch + p->s->constraints; k++)
     for (int e = 0; e < k->b.count; e++) {
-      int n = massless_touched (p->s, k, e, group, at), first = 0;
-      while (first < n && !massless_in (p, group[first])) first++;
+      int n = massless_element_groups (p->s, k, e, group, at), first = 0;
+      while (first < n && !massless_contains (p, group[first])) first++;
       for (int i = e * k->kind->rows; first < n && i < (e + 1) * k->kind->rows; i++) {
         if (!massless_is_active (p, k->row + i)) continue;
         int component = r->component_of_row[k->row + i] = p->member[massless_root (p, group[first])];
@@ -101,8 +101,8 @@ static void massless_add_rows (massless_plan *p, pw_massless *r) {
 
 /* ---- Layout ---- */
 
-/* Groups of a component are at most those its rows touch, counted with repetition, and at most all; a row has at most
- * as many pivots as there are rows. */
+/* Allocates the components.  The number of groups is bounded by that counted with repetition, and by that of the scene;
+ * the number of pivots by that of rows. */
 static int massless_lay_out (pw_massless *r, const massless_plan *p) {
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
@@ -139,7 +139,7 @@ static int massless_undetermined (const pw_system *s, int j, pw_error *error) {
                   s->model, pw_system_state_name (s, j, name, sizeof name), lacking, lacking);
 }
 
-/* Marks the massless columns and reports one that no row determines. */
+/* Marks the massless columns and matches them; reports a column that no row determines. */
 static int massless_check (pw_massless *r, const massless_plan *p, pw_error *error) {
   static const double zero[3] = { 0 };
   const pw_system *s = p->s;
@@ -168,10 +168,10 @@ static int massless_check (pw_massless *r, const massless_plan *p, pw_error *err
   return PW_OK;
 }
 
-/* Numbers the components by their roots; a massless group that no active row touches is an error. */
-static int massless_number (pw_massless *r, massless_plan *p, pw_error *error) {
+/* Numbers the components; a massless group in no active row is an error. */
+static int massless_number_components (pw_massless *r, massless_plan *p, pw_error *error) {
   for (int g = 0; g < p->groups; g++) {
-    if (!massless_in (p, g)) continue;
+    if (!massless_contains (p, g)) continue;
     int j = pw_group_first (p->s, g);
     while (p->weight[j] != 0) j++;
     if (p->member[g] < 0) return massless_undetermined (p->s, j, error);
@@ -180,9 +180,9 @@ static int massless_number (pw_massless *r, massless_plan *p, pw_error *error) {
   return PW_OK;
 }
 
-static int massless_fill (pw_massless *r, massless_plan *p, pw_error *error) {
+static int massless_build (pw_massless *r, massless_plan *p, pw_error *error) {
   massless_unite (p);
-  int status = massless_number (r, p, error);
+  int status = massless_number_components (r, p, error);
   if (status != PW_OK || r->components == 0) return status;
   r->component = calloc ((size_t)r->components, sizeof *r->component);
   if (r->component == NULL) return PW_RESOURCE;
@@ -205,7 +205,7 @@ int pw_massless_open (pw_massless *r, pw_workspace *w, const double *weight, int
   if (p.parent && p.member && r->component_of_row) {
     for (int g = 0; g < groups; g++) p.parent[g] = g, p.member[g] = -1;
     for (int i = 0; i < s->rows; i++) r->component_of_row[i] = -1;
-    status = massless_fill (r, &p, error);
+    status = massless_build (r, &p, error);
   }
   free (p.parent);
   free (p.member);

@@ -1,4 +1,4 @@
-/* Minimal velocities u = B^T W v.  The columns of B are a basis of ker J0, with J0 the constraint matrix at the
+/* Null-space velocities u = B^T W v.  The columns of B are a basis of ker J0, with J0 the constraint matrix at the
  * beginning of the step, constant over the step.  W is the metric of positions: the mass matrix, with small weights for
  * massless coordinates.  The equations integrated are
  *
@@ -11,7 +11,7 @@
  *   v = w + W^-1 J0^T mu,    K mu = eta - J w,    K = J W^-1 J0^T
  *
  * The next step uses another basis; v, and with it the motion, does not change.  With this W a body made of two welded
- * parts moves like one body, to round-off, and massless coordinates follow the massive ones. (Kim & Vanderploeg 1986,
+ * parts moves like one body, up to round-off, and massless coordinates follow the massive ones.  (Kim & Vanderploeg 1986,
  * QR decomposition for state space representation of constrained mechanical dynamic systems: a basis kept while it is
  * well conditioned; Mani, Haug & Atkinson 1985, Application of singular value decomposition for analysis of mechanical
  * system dynamics.)
@@ -66,7 +66,7 @@ void pw_nullspace_close (pw_nullspace *b) {
 
 /* ---- K mu = eta - J w ---- */
 
-/* K_i += J_i (W^-1 J0^T), mu_i -= J_i w, with the entries of row i in `width` columns from j on: 3 of a body, or 1. */
+/* K_i += J_i (W^-1 J0^T), mu_i -= J_i w, for the entries of row i in columns j to j + width - 1: 3 of a body, or 1. */
 static void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w) {
   const int m = b->rows;
   double *restrict K = b->K + i * m, sum = 0;
@@ -93,7 +93,7 @@ static void nullspace_assemble (pw_nullspace *b, const pw_run *r, const double *
 }
 
 /* Sets K to 0 and mu to eta, and assembles. */
-static void nullspace_equations (pw_nullspace *b, pw_run *r, const double *w) {
+static void nullspace_assemble_system (pw_nullspace *b, pw_run *r, const double *w) {
   memset (b->K, 0, (size_t)(b->rows * b->rows) * sizeof *b->K);
   if (r->s->rheonomic) pw_evaluate_eta (r->w, b->eta); /* else it stays 0 */
   for (int i = 0; i < r->s->rows; i++)
@@ -122,8 +122,8 @@ static int nullspace_eliminate (double *K, double *mu, int m) {
   return 1;
 }
 
-/* The same with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint equations. */
-static int nullspace_pivot (pw_nullspace *b) {
+/* The same by LAPACK, with scaled rows and pivoting.  PW_RETRY if a pivot is round-off: dependent constraint equations. */
+static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   const double least = 1e-13;
   int m = b->rows;
   double *K = b->K;
@@ -158,14 +158,14 @@ int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
 
 /* Solves K mu = eta - J w; PW_RETRY if K is singular. */
 static int nullspace_multipliers (pw_nullspace *b, pw_run *r, const double *w) {
-  nullspace_equations (b, r, w);
+  nullspace_assemble_system (b, r, w);
   if (nullspace_eliminate (b->K, b->mu, b->rows)) return PW_OK;
-  nullspace_equations (b, r, w);
-  return nullspace_pivot (b);
+  nullspace_assemble_system (b, r, w);
+  return nullspace_eliminate_pivoted (b);
 }
 
-/* Velocities at the current kinematics; J must be up to date. */
-static int nullspace_correct (pw_nullspace *b, pw_run *r, double *v) {
+/* v += W^-1 J0^T mu at the J last evaluated. */
+static int nullspace_correct_velocities (pw_nullspace *b, pw_run *r, double *v) {
   if (nullspace_multipliers (b, r, v) != PW_OK) return PW_RETRY;
   const double *reference = b->reference;
   for (int j = 0; j < r->s->coords; j++, reference += b->rows) {
@@ -180,7 +180,7 @@ int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double 
   int status = pw_update_kinematics (r->w, t, q, v);
   if (status != PW_OK) return status;
   pw_evaluate_J (r->w);
-  return nullspace_correct (b, r, v);
+  return nullspace_correct_velocities (b, r, v);
 }
 
 int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lambda) {
@@ -190,7 +190,7 @@ int pw_nullspace_accelerate (pw_run *r, const double *v, double *a, double *lamb
   return status;
 }
 
-/* The energy at (t, q) with the minimal velocities of w. */
+/* The energy at (t, q) with the null-space velocities of w. */
 static int nullspace_energy (pw_nullspace *b, pw_run *r, double t, const double *q, const double *w, double *energy) {
   const pw_system *s = r->s;
   memcpy (b->v, w, (size_t)s->coords * sizeof *w);
@@ -206,7 +206,7 @@ int pw_nullspace_finalise (pw_nullspace *b, pw_projector *p, pw_run *r, double t
   if (p == NULL || s->holonomic == 0) return pw_nullspace_velocities (b, r, t, q, v);
   if (added) status = nullspace_energy (b, r, t, q, v, &before);
   if (status == PW_OK) status = pw_project_positions (p, r, t, q, v, &row, &worst);
-  if (status == PW_OK) status = nullspace_correct (b, r, v);
+  if (status == PW_OK) status = nullspace_correct_velocities (b, r, v);
   if (status == PW_OK && added) *added += pw_kinetic (s, v) + pw_potential (r->w) - before;
   return status;
 }

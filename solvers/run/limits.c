@@ -5,20 +5,20 @@
  * 0.01 u on, round-off alone violates a constraint by the residual that counts as lost (1e-2, scaled), and turns
  * forces as much.
  *
- * A constant torque or force that nothing opposes takes a scene from rest to the speed N u/T in the time N T, T
- * being the time scale of its initial accelerations: an angle of N^2/2.  Growth beyond N = 1e3, some 80,000 turns,
- * is reported.  It may be intended, so it is not an error; but the number of steps grows with that of the turns, the
- * square of the time. */
+ * A constant torque or force that nothing opposes accelerates a scene from rest to the speed N u/T in the time N T (T:
+ * the time scale of its initial accelerations), and turns it by N^2/2.  Growth beyond N = 1e3, some 80,000 turns,
+ * is reported.  It may be intended, so it is not an error; but the number of steps grows with the number of turns, like
+ * the square of the time. */
 #include <float.h>
 #include <stdio.h>
 #include "method.h"
 
-#define LIMITS_RESOLVED 1e-2 /* of the unit: eps |q| beyond which a run fails */
-#define LIMITS_FAST 1e3      /* in u / T: speeds beyond which growth is reported */
-enum { LIMITS_LOOK = 16 };   /* steps between checks of the size of coordinates */
-#define LIMITS_GROWS 0.25    /* exponent p of t^p above which a velocity counts as growing */
+#define LIMITS_RESOLVED 1e-2   /* of the unit: eps |q| beyond which a run fails */
+#define LIMITS_FAST 1e3        /* in u / T: speeds beyond which growth is reported */
+enum { LIMITS_INTERVAL = 16 }; /* steps between checks of the size of coordinates */
+#define LIMITS_GROWTH 0.25     /* exponent p of t^p above which a velocity counts as growing */
 
-/* The largest velocity at the state reached, in units of the scene; *state: its number. */
+/* The largest velocity at the state reached, in units of the scene; *state: index of that velocity. */
 static double limits_speed (const pw_run *r, int *state) {
   const pw_system *s = r->s;
   double most = 0;
@@ -33,7 +33,7 @@ static double limits_speed (const pw_run *r, int *state) {
 double pw_run_growth (const pw_run *r, int *state, double *power) {
   double now = limits_speed (r, state), span = r->t - r->settings.t;
   *power = r->earlier > 0 && r->speed > 0 ? log (now / r->speed) / log (span / r->earlier) : 0;
-  return now > LIMITS_FAST && *power > LIMITS_GROWS ? now : 0;
+  return now > LIMITS_FAST && *power > LIMITS_GROWTH ? now : 0;
 }
 
 /* Records the largest speed whenever the elapsed time has doubled.  Returns 1 at such a time. */
@@ -70,7 +70,7 @@ int pw_run_attempt (pw_run *r, pw_error *error) {
 int pw_run_resolve (pw_run *r, pw_error *error) {
   const pw_system *s = r->s;
   char name[120];
-  if (!limits_mark (r) && r->statistics.steps % LIMITS_LOOK != 0) return PW_OK;
+  if (!limits_mark (r) && r->statistics.steps % LIMITS_INTERVAL != 0) return PW_OK;
   for (int j = 0; j < s->coords; j++) {
     double known = fabs (r->q[j]) * DBL_EPSILON;
     if (!(known > LIMITS_RESOLVED * pw_unit (s, j))) continue;

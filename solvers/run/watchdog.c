@@ -35,7 +35,7 @@ static double watchdog_step_length (const pw_run *r) {
 /* Records the sine at the state reached. */
 static void watchdog_record_sine (pw_run *r, double sine) {
   pw_geometry *g = &r->geometry;
-  g->known = sine;
+  g->state_sine = sine;
   g->moved = 0;
   g->typical = fmax (g->typical, sine);
 }
@@ -43,7 +43,7 @@ static void watchdog_record_sine (pw_run *r, double sine) {
 /* 1 if the sine may be below this value at the state reached or after a motion of this length from there. */
 static int watchdog_reaches (const pw_run *r, double sine, double length) {
   const pw_geometry *g = &r->geometry;
-  return g->saddle && !(g->known - r->limits.lipschitz * g->typical * (g->moved + length) > sine);
+  return g->saddle && !(g->state_sine - r->limits.lipschitz * g->typical * (g->moved + length) > sine);
 }
 
 /* Typical sines: at scattered configurations, which need not satisfy the constraints. */
@@ -64,7 +64,7 @@ void pw_watchdog_begin (pw_run *r) {
   if (g->typical == 0) watchdog_sample_sines (r);
   watchdog_record_sine (r, pw_watchdog_sine (r, NULL));
   g->t = r->t;
-  g->begun = g->known;
+  g->start_sine = g->state_sine;
   g->step = g->slope = 0;
   g->before = NAN;
   g->crossed = 0;
@@ -83,17 +83,17 @@ static int watchdog_follow (pw_run *r, pw_error *error) {
   double near = r->limits.near * g->typical, ahead = r->limits.growth * g->step;
   int now = watchdog_reaches (r, near, ahead);
   if (now) {
-    double last = g->moved == g->step ? g->known : NAN;
+    double last = g->moved == g->step ? g->state_sine : NAN;
     watchdog_record_sine (r, pw_watchdog_sine (r, &g->row));
-    status = pw_change_point_check (r, g->known, error);
+    status = pw_change_point_check (r, g->state_sine, error);
     if (status == PW_OK) status = pw_change_point_resolve (r, last, error);
     g->before = last;
   } else
     g->before = NAN, g->slope = 0, g->crossed = 0;
-  if (now && g->known < near) r->near = 1;
+  if (now && g->state_sine < near) r->near = 1;
   g->alert = now && watchdog_reaches (r, near, ahead);
   g->t = r->t;
-  g->begun = now ? g->known : NAN;
+  g->start_sine = now ? g->state_sine : NAN;
   memcpy (g->q, r->q, (size_t)r->s->coords * sizeof *g->q);
   return status;
 }

@@ -1,6 +1,6 @@
 /* Serial vectors for SUNDIALS with faster operations.  A step of high order adds dozens of vectors of a dozen entries,
- * by library functions that a distribution may have built without optimisation; here these are plain loops, and the
- * fused operations for several vectors are provided as well.
+ * in libraries that distributions may build without optimisation.  These operations are plain loops, including
+ * the fused operations on several vectors.
  *
  * Linear sums are identical to those of SUNDIALS to the bit; norms add even and odd entries separately. */
 #include <math.h>
@@ -18,7 +18,7 @@ PW_INLINE void vectors_sum (sunindextype n, double a, const double *x, double b,
   for (; i < n; i++) z[i] = a * x[i] + b * y[i];
 }
 
-/* A factor of 1 is eliminated by inlining. */
+/* Inlining removes multiplications by 1. */
 static void vectors_sum_by (sunindextype n, double a, const double *x, double b, const double *y, double *z) {
   if (a == 1 && b == 1)
     vectors_sum (n, 1, x, 1, y, z);

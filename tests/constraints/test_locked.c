@@ -1,4 +1,4 @@
-/* Wheels that lock hold still; what contradicts itself is named. */
+/* Wheels that lock a body, and constraints that contradict each other: refused, with the names of the elements. */
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
@@ -12,13 +12,13 @@ typedef struct {
 } locked_cart;
 
 static const pw_parameter locked_cart_list[] = {
-  { PW_AT (locked_cart, wheels), 3, "", "wheels, no two of which roll alike", PW_COUNT },
-  { PW_AT (locked_cart, speed), 0, "m/s", "at the start", PW_REAL },
+  { PW_AT (locked_cart, wheels), 3, "", "number of wheels, no two on one axle", PW_COUNT },
+  { PW_AT (locked_cart, speed), 0, "m/s", "initial speed", PW_REAL },
   { PW_AT (locked_cart, torque), 2, "N m", "on the body", PW_REAL },
   { .name = NULL },
 };
 
-static void locked_locked (pw_model *m, const void *parameter) {
+static void locked_build_cart (pw_model *m, const void *parameter) {
   static const char *const name[] = { "front", "left", "right", "rear" };
   static const double at[][3] = { { 0.5, 0, 0.3 }, { 0, 0.4, -0.2 }, { 0, -0.4, 0.1 }, { -0.5, 0.1, 0.7 } };
   const locked_cart *p = parameter;
@@ -33,9 +33,9 @@ static const pw_plugin_table locked_cart_table = { .abi = PW_ABI,
                                                    .size = sizeof (pw_plugin_table),
                                                    .parameters = locked_cart_list,
                                                    .parameters_size = sizeof (locked_cart),
-                                                   .build = locked_locked };
+                                                   .build = locked_build_cart };
 
-/* It stays where it is, to the bit, whatever pushes it. */
+/* The cart stays at rest under a torque. */
 static void test_locked (void **state) {
   static const char *const method[] = {
     "rk4+none",       "rk4+baumgarte", "rk4+projection", "rk4+projection:metric=identity",
@@ -61,7 +61,7 @@ static void test_locked (void **state) {
     }
 }
 
-static void test_locked_start (void **state) {
+static void test_locked_with_velocity (void **state) {
   (void)state;
   for (int wheels = 3; wheels <= 4; wheels++) {
     pw_error error = { 0 };
@@ -77,7 +77,7 @@ static void test_locked_start (void **state) {
   }
 }
 
-/* A body that is to be at rest while its wheel, without inertia, is to turn: its two rows are one element. */
+/* A body specified at rest with a wheel that is given a spin: both rows belong to one element. */
 static void locked_spin (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "cart",
@@ -87,7 +87,7 @@ static void locked_spin (pw_model *m, const void *parameters) {
   pw_add_rolling_wheel (m, &(pw_rolling_wheel){ .name = "wheel", .body = "cart", .radius = 1, .rate = 1 });
 }
 
-static void test_locked_spin (void **state) {
+static void test_spinning_wheel_locked (void **state) {
   static const pw_plugin_table table = TRIAL_TABLE (locked_spin);
   (void)state;
   pw_error error = { 0 };
@@ -99,26 +99,26 @@ static void test_locked_spin (void **state) {
   pw_system_free (s);
 }
 
-/* Rates of which the wheels leave but a little are no such case: a hundredth of them goes ahead. */
-static void locked_skidding (pw_model *m, const void *parameter) {
+/* Velocities that the constraints reduce to a hundredth are accepted. */
+static void locked_build_skidding (pw_model *m, const void *parameter) {
   (void)parameter;
   pw_add_body (m, &(pw_body){ .name = "skate", .mass = 1, .inertia = 1, .rate = { 0.01, 1, 0 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "skate" });
 }
 
 static void test_skidding (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (locked_skidding);
+  static const pw_plugin_table table = TRIAL_TABLE (locked_build_skidding);
   (void)state;
   pw_system *s = scene_system (&table, NULL);
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_sample x = runs_to (r, 1);
-  check_close ("ahead", x.v[0], 0.01, 16 * CHECK_EPS, "the part that the wheel allows");
-  check_close ("aside", x.v[1], 0, 16 * CHECK_EPS, "the part that it does not");
+  check_close ("longitudinal", x.v[0], 0.01, 16 * CHECK_EPS, "the part that the wheel allows");
+  check_close ("lateral", x.v[1], 0, 16 * CHECK_EPS, "the wheel does not slip");
   pw_run_close (r);
   pw_system_free (s);
 }
 
-/* Three axles that meet in one point at the start, until the third wheel is steered away. */
+/* Three axles that initially meet in one point, until the third wheel is steered. */
 static int locked_steer (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)x, (void)gradient;
   value[0] = 0.5 * t * t;
@@ -127,7 +127,7 @@ static int locked_steer (void *context, double t, const double *x, double value[
   return 0;
 }
 
-static void locked_steered (pw_model *m, const void *parameters) {
+static void locked_build_steered (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = 3, .inertia = 0.2, .rate = { 1, 0, 0 } });
   pw_add_body (m,
@@ -142,9 +142,9 @@ static void locked_steered (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "front", .body = "fork" });
 }
 
-/* A locking that arises on the way stops the run and names a wheel. */
+/* Wheels that lock during the motion stop the run with the name of a wheel. */
 static void test_locks_in_motion (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (locked_steered);
+  static const pw_plugin_table table = TRIAL_TABLE (locked_build_steered);
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",  "rk4+none",      "ida+baumgarte",
                                         "ida+ggl",        "rk4+nullspace",  "galpha+index3", "galpha+ggl",
                                         "adams+none",     "ida+si1",        "ida+index2",    "adams+baumgarte",
@@ -160,16 +160,16 @@ static void test_locks_in_motion (void **state) {
     assert_true (status == PW_METHOD || status == PW_INITIAL);
     assert_non_null (strstr (error.text, "wheel "));
     /* the heading is t^2 / 2: within 20 steps of 1e-3 s, or when it is above what the tolerance leaves of the others */
-    if (r) check_below ("time", pw_run_time (r), 0.05, "told at once");
+    if (r) check_below ("time", pw_run_time (r), 0.05, "reported within 50 steps");
     if (r) pw_run_close (r);
     pw_system_free (s);
   }
 }
 
-/* ---- What contradicts itself ---- */
+/* ---- Contradictory constraints ---- */
 
-/* Two bodies hang from pivots 10 m apart, and are to be welded at their ends, 1 m from each. */
-static void locked_gap (pw_model *m, const void *parameters) {
+/* Two bodies at pivots 10 m apart, with a weld between their ends, 1 m from the pivots. */
+static void locked_build_gap (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "left", .mass = 1, .inertia = 0.1, .start = { 0.5, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "right", .mass = 1, .inertia = 0.1, .start = { 9.5, 0, 0 } });
@@ -178,8 +178,8 @@ static void locked_gap (pw_model *m, const void *parameters) {
   pw_add_weld (m, &(pw_weld){ .name = "joint", .body = { "left", "right" }, .at = { { 0.5, 0 }, { -0.5, 0 } } });
 }
 
-static void test_gap (void **state) {
-  static const pw_plugin_table table = TRIAL_TABLE (locked_gap);
+static void test_open_weld (void **state) {
+  static const pw_plugin_table table = TRIAL_TABLE (locked_build_gap);
   (void)state;
   pw_error error = { 0 };
   double open = 0;
@@ -198,12 +198,12 @@ typedef struct {
 } locked_offset;
 
 static const pw_parameter locked_offset_list[] = {
-  { PW_AT (locked_offset, offset), 0, "rad", "of the second drive at the start", PW_REAL },
+  { PW_AT (locked_offset, offset), 0, "rad", "initial angle of the second drive", PW_REAL },
   { .name = NULL },
 };
 
-/* Two drives turn one body; the second one would like another angle. */
-static void locked_drives (pw_model *m, const void *parameter) {
+/* Two drives prescribe different angles of one body. */
+static void locked_build_drives (pw_model *m, const void *parameter) {
   const locked_offset *p = parameter;
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 0.1 });
   pw_add_pin (m, &(pw_pin){ .name = "hub", .body = { "disc", "ground" } });
@@ -217,9 +217,9 @@ static const pw_plugin_table locked_drives_table = { .abi = PW_ABI,
                                                      .size = sizeof (pw_plugin_table),
                                                      .parameters = locked_offset_list,
                                                      .parameters_size = sizeof (locked_offset),
-                                                     .build = locked_drives };
+                                                     .build = locked_build_drives };
 
-static void test_drives (void **state) {
+static void test_contradictory_drives (void **state) {
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",    "ida+baumgarte",
                                         "rk4+nullspace",  "galpha+index3",   "galpha+ggl", "ida+si1",
                                         "bdf+projection", "adams+baumgarte", "leapfrog" };
@@ -246,9 +246,13 @@ static void test_drives (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_locked),      cmocka_unit_test (test_locked_start),    cmocka_unit_test (test_skidding),
-    cmocka_unit_test (test_locked_spin), cmocka_unit_test (test_locks_in_motion), cmocka_unit_test (test_gap),
-    cmocka_unit_test (test_drives),
+    cmocka_unit_test (test_locked),
+    cmocka_unit_test (test_locked_with_velocity),
+    cmocka_unit_test (test_skidding),
+    cmocka_unit_test (test_spinning_wheel_locked),
+    cmocka_unit_test (test_locks_in_motion),
+    cmocka_unit_test (test_open_weld),
+    cmocka_unit_test (test_contradictory_drives),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,4 +1,4 @@
-/* Initial conditions: what is prescribed stays, the rest changes as little as possible. */
+/* Initial conditions: given values are kept, the others change as little as possible. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,9 +11,9 @@
 #include "toys.h"
 #include "start.h"
 
-/* ---- What is given stays ---- */
+/* ---- Given values are kept ---- */
 
-static void test_held (void **state) {
+static void test_given_values_kept (void **state) {
   (void)state;
   static const char *const name[] = { "frame.phi", "steer.phi", "frame.vx", NULL };
   static const double value[] = { 0.3, 2, 1.5 };
@@ -30,8 +30,8 @@ static void test_held (void **state) {
   start_close (r, s);
 }
 
-/* Everything about the frame is given, though wheel A then has nothing left to move: its row holds as it is. */
-static void test_held_row (void **state) {
+/* All states of the frame are given; they satisfy the row of wheel A, which has no other coordinates. */
+static void test_given_body_kept (void **state) {
   (void)state;
   static const char *const name[] = { "frame.x",  "frame.y",     "frame.phi", "frame.vx",
                                       "frame.vy", "frame.omega", "steer.phi", NULL };
@@ -44,12 +44,12 @@ static void test_held_row (void **state) {
   check_bits ("frame", start->q, q, 3);
   check_bits ("frame", start->v, v, 3);
   for (int j = 3; j < 6; j++) check_close ("steer", start->q[j], q[j], 8 * CHECK_EPS, "8 eps: round-off");
-  /* C does not move across its heading: vx2 = vx1 - d cos(phi2) w.. with phi2 = pi/2: vx_C = vx2 - c w2 = 0 */
+  /* wheel C does not slip: at phi = pi/2 its lateral velocity is vx - 0.125 omega = 0 */
   check_close ("the steering turns", start->v[5], (start->v[3]) / 0.125, 64 * CHECK_EPS, "64 eps: round-off");
   start_close (r, s);
 }
 
-/* A chain of so many links, the second of which is a little off, with a gear between the first and the third. */
+/* A chain whose second link is displaced, with a gear between the first and the third. */
 static void start_chain (pw_model *m, const void *parameters) {
   static char link[16][16], pin[16][16];
   for (int i = 0; i < *(const double *)parameters; i++) {
@@ -64,9 +64,9 @@ static void start_chain (pw_model *m, const void *parameters) {
   pw_add_gear (m, &(pw_gear){ .name = "gear", .body = { "link0", "link2", "ground" }, .ratio = 1 });
 }
 
-/* Values that leave a constraint nothing to move, and obey it, are held in scenes of any size: all of a body that is pinned
- * to the ground, and both angles of a gear. */
-static void test_held_rows (void **state) {
+/* Given values are kept if they satisfy a constraint without other coordinates, in scenes of any size: all coordinates of
+ * a body pinned to the ground, both angles of a gear. */
+static void test_given_satisfied_rows (void **state) {
   static const char *const name[] = { "link0.x", "link0.y", "link0.phi", "link2.phi" };
   static const double value[] = { 0.5, 0, 0, 0 };
   static const pw_parameter list[] = { { .name = "links", .value = 3 }, { .name = NULL } };
@@ -89,8 +89,8 @@ static void test_held_rows (void **state) {
   }
 }
 
-/* The steering assembly, which has no mass, turns on the hinge: the frame stays where it is, to the bit. */
-static void test_mass_stays (void **state) {
+/* A given angle of the massless steering assembly does not move the frame. */
+static void test_massive_body_kept (void **state) {
   (void)state;
   static const char *const name[] = { "steer.phi", NULL };
   static const double value[] = { 2 };
@@ -104,7 +104,7 @@ static void test_mass_stays (void **state) {
   start_close (r, s);
 }
 
-/* The same where an angle is specified, and rates that the wheel does not allow: these are changed, no position is. */
+/* An angle is specified, with velocities that violate a wheel's constraint: these change, positions do not. */
 static void start_slips (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 1, .inertia = 0.1, .rate = { 1, 0.3, 0.2 } });
@@ -114,7 +114,7 @@ static void start_slips (pw_model *m, const void *parameters) {
   pw_add_wheel (m, &(pw_wheel){ .name = "C", .body = "steer" });
 }
 
-static void test_rates_yield (void **state) {
+static void test_velocities_change (void **state) {
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = start_slips };
   (void)state;
   pw_system *s = scene_system (&table, NULL);
@@ -126,8 +126,8 @@ static void test_rates_yield (void **state) {
   start_close (r, s);
 }
 
-/* Positions that cannot all be held do not free the rates. */
-static void test_rates_stay (void **state) {
+/* If given positions are released, given velocities are kept. */
+static void test_velocities_kept (void **state) {
   (void)state;
   static const char *const name[] = { "frame.x", "steer.x", "steer.vy", NULL };
   static const double value[] = { 0, 5.375, 5 };
@@ -139,8 +139,8 @@ static void test_rates_stay (void **state) {
   start_close (r, s);
 }
 
-/* Given values that contradict each other: all move, with a notice. */
-static void test_freed (void **state) {
+/* Given values that contradict each other are all released. */
+static void test_released (void **state) {
   (void)state;
   static const char *const name[] = { "frame.x", "frame.y", "frame.phi", "steer.x", NULL };
   static const double value[] = { 0, 0, 0, 3 };
@@ -151,7 +151,7 @@ static void test_freed (void **state) {
   start_close (r, s);
 }
 
-/* ---- The least change: M-orthogonal to all that the constraints allow ---- */
+/* ---- The smallest change: M-orthogonal to all admissible velocities ---- */
 
 static void start_massive (pw_model *m, const void *parameters) {
   const double *rate = parameters;
@@ -184,18 +184,19 @@ static void test_least_change (void **state) {
     for (int j = 0; j < 6; j++) change[i][j] = v[i][j] - s->v0[j];
     pw_run_close (r);
   }
-  for (int i = 1; i < 6; i++) { /* differences of consistent rates are what the constraints allow */
+  for (int i = 1; i < 6; i++) { /* differences of consistent velocities are admissible */
     double sum = 0, size = 0;
     for (int j = 0; j < 6; j++) {
       sum += (v[i][j] - v[0][j]) * s->mass[j] * change[0][j];
       size += fabs ((v[i][j] - v[0][j]) * s->mass[j] * change[0][j]);
     }
-    check_close ("motion allowed . M . change", sum, 0, 64 * CHECK_EPS * (1 + size), "64 eps of the terms: round-off");
+    check_close ("admissible velocity . M . change", sum, 0, 64 * CHECK_EPS * (1 + size),
+                 "64 eps of the terms: round-off");
   }
   pw_system_free (s);
 }
 
-/* ---- A signal that moves a constraint ---- */
+/* ---- A constraint with a signal ---- */
 
 static void start_driven (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -206,7 +207,7 @@ static void start_driven (pw_model *m, const void *parameters) {
                         .angle = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 2, .phase = 1 } } });
 }
 
-static void test_drive (void **state) {
+static void test_driven_constraint (void **state) {
   (void)state;
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = start_driven };
   pw_system *s = scene_system (&table, NULL);
@@ -219,17 +220,17 @@ static void test_drive (void **state) {
   start_close (r, s);
 }
 
-/* ---- What cannot be ---- */
+/* ---- Inconsistent initial conditions ---- */
 
-static void start_impossible (pw_model *m, const void *parameters) {
+static void start_too_far (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "rod", .mass = 1, .inertia = 1, .start = { 1.5, 0, 0 } });
   pw_add_pin (m, &(pw_pin){ .name = "left", .body = { "rod", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
   pw_add_pin (m, &(pw_pin){ .name = "right", .body = { "rod", "ground" }, .at = { { 0.5, 0 }, { 3, 0 } } });
 }
 
-/* Two motors turn one disc at different rates. */
-static void start_torn (pw_model *m, const void *parameters) {
+/* Two drives turn one disc at different speeds. */
+static void start_contradictory (pw_model *m, const void *parameters) {
   (void)parameters;
   start_driven (m, NULL);
   m->body[0].start[2] = 0.5 * cos (1);
@@ -239,7 +240,7 @@ static void start_torn (pw_model *m, const void *parameters) {
                         .angle = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 3, .phase = 1 } } });
 }
 
-static void start_refused (void (*build) (pw_model *, const void *), const char *text) {
+static void start_expect_error (void (*build) (pw_model *, const void *), const char *text) {
   const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof table, .build = build };
   pw_error error = { 0 };
   pw_system *s = scene_system (&table, NULL);
@@ -248,21 +249,23 @@ static void start_refused (void (*build) (pw_model *, const void *), const char 
   pw_system_free (s);
 }
 
-static void test_impossible (void **state) {
+static void test_inconsistent (void **state) {
   (void)state;
-  start_refused (start_impossible,
-                 "model scene: the initial state cannot be made consistent: pin left is open by 1 m; if it "
-                 "can close, begin nearer to where it does");
-  start_refused (start_torn,
-                 "model scene: the initial state cannot be made consistent: drive other is violated by 1.26221 rad/s");
+  start_expect_error (start_too_far,
+                      "model scene: the initial state cannot be made consistent: pin left is open by 1 m; if it "
+                      "can close, begin nearer to where it does");
+  start_expect_error (
+      start_contradictory,
+      "model scene: the initial state cannot be made consistent: drive other is violated by 1.26221 rad/s");
 }
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_held),       cmocka_unit_test (test_held_row),     cmocka_unit_test (test_held_rows),
-    cmocka_unit_test (test_freed),      cmocka_unit_test (test_mass_stays),   cmocka_unit_test (test_rates_yield),
-    cmocka_unit_test (test_rates_stay), cmocka_unit_test (test_least_change), cmocka_unit_test (test_drive),
-    cmocka_unit_test (test_impossible),
+    cmocka_unit_test (test_given_values_kept),    cmocka_unit_test (test_given_body_kept),
+    cmocka_unit_test (test_given_satisfied_rows), cmocka_unit_test (test_released),
+    cmocka_unit_test (test_massive_body_kept),    cmocka_unit_test (test_velocities_change),
+    cmocka_unit_test (test_velocities_kept),      cmocka_unit_test (test_least_change),
+    cmocka_unit_test (test_driven_constraint),    cmocka_unit_test (test_inconsistent),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

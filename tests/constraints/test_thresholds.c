@@ -1,4 +1,4 @@
-/* The watchdog's thresholds: each one decides something. */
+/* The watchdog: a change of each threshold changes a result. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -10,12 +10,12 @@
 #include "scene.h"
 #include "trial.h"
 
-/* What is compared of a run with a threshold and of one with another. */
+/* Effect of a changed threshold on a run. */
 typedef enum { WATCHDOG_EARLIER, WATCHDOG_LATER, WATCHDOG_FEWER, WATCHDOG_MORE } watchdog_effect;
 
 #define WATCHDOG_LIMIT(x) #x, offsetof(pw_watchdog, x)
 
-/* EARLIER, LATER: stops at; FEWER, MORE: rejected steps. */
+/* EARLIER, LATER: time at which the run stops; FEWER, MORE: rejected steps. */
 static const struct {
   const char *name;
   size_t at;
@@ -42,17 +42,17 @@ static const struct {
   { WATCHDOG_LIMIT (drift_far), 0.5, WATCHDOG_EARLIER, "n-four-bar", "N", 1, "adams+none", 1e-3, 4 },
   { WATCHDOG_LIMIT (drift_any), 0.5, WATCHDOG_EARLIER, "n-four-bar", "N", 1, "adams+none", 1e-3, 4 },
   { WATCHDOG_LIMIT (lipschitz), 0, WATCHDOG_LATER, "slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4 },
-  { WATCHDOG_LIMIT (sag), 0, WATCHDOG_LATER, "slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4 },
-  { WATCHDOG_LIMIT (dip), 8, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "ida+ggl", 1e-4, 4 },
+  { WATCHDOG_LIMIT (low), 0, WATCHDOG_LATER, "slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4 },
+  { WATCHDOG_LIMIT (unresolved), 8, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "ida+ggl", 1e-4, 4 },
   { WATCHDOG_LIMIT (stride), 30, WATCHDOG_LATER, "slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4 },
   { WATCHDOG_LIMIT (floor), 100, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "bdf+projection", 1e-4, 4 },
   { WATCHDOG_LIMIT (progress), 20, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "rk4+projection", 1e-2, 4 },
-  { WATCHDOG_LIMIT (met), 0, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "leapfrog", 1e-2, 4 },
-  { WATCHDOG_LIMIT (ahead), 2.1, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "rk4+projection", 1e-2, 4 },
+  { WATCHDOG_LIMIT (crossing), 0, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "leapfrog", 1e-2, 4 },
+  { WATCHDOG_LIMIT (straight), 2.1, WATCHDOG_EARLIER, "slider-crank", NULL, 0, "rk4+projection", 1e-2, 4 },
   { WATCHDOG_LIMIT (resolved), 8, WATCHDOG_LATER, "slider-crank", "l2", 1.001, "leapfrog", 1e-2, 4 },
 };
 
-/* When a run stops, and how many steps it has rejected. */
+/* The time at which a run stops, and its rejected steps. */
 static void watchdog_measure (int i, double factor, double *t, long *rejected) {
   pw_error error = { 0 };
   const char *parameter = watchdog_limit[i].parameter;
@@ -81,14 +81,14 @@ static void test_limits (void **state) {
     watchdog_measure ((int)i, 1, &t[0], &rejected[0]);
     watchdog_measure ((int)i, watchdog_limit[i].factor, &t[1], &rejected[1]);
     int good[] = { t[1]<t[0], t[1]> t[0], rejected[1]<rejected[0], rejected[1]> rejected[0] };
-    if (!good[watchdog_limit[i].effect]) print_error ("%s decides nothing\n", watchdog_limit[i].name), bad++;
+    if (!good[watchdog_limit[i].effect]) print_error ("%s has no effect\n", watchdog_limit[i].name), bad++;
   }
   assert_int_equal (bad, 0);
 }
 
-/* Thresholds that no run shows by when it stops. */
+/* ---- Thresholds without effect on the end of a run ---- */
 
-/* A rhombus of bars of 1 m at this angle, in r->q, with rates of its own. */
+/* Sets the state of r to a rhombus of bars of 1 m at this angle, in motion. */
 static void watchdog_bend (pw_run *r, double angle) {
   double c = cos (angle), n = sin (angle);
   const double q[] = { 0.5 * c, 0.5 * n, angle, 0.5 + c, n, 0, 1 + 0.5 * c, 0.5 * n, angle };
@@ -98,7 +98,7 @@ static void watchdog_bend (pw_run *r, double angle) {
   r->geometry.alert = 1;
 }
 
-/* How far J a is from gamma after an evaluation at this angle. */
+/* Residual |J a - gamma| of accelerations evaluated at this angle. */
 static double watchdog_residual (pw_run *r, double angle) {
   double gamma[8], Ja[8], most = 0;
   watchdog_bend (r, angle);
@@ -109,7 +109,7 @@ static double watchdog_residual (pw_run *r, double angle) {
   return most;
 }
 
-/* How far J v is from 0 after irregular velocities have been projected at this angle. */
+/* Residual |J v| of arbitrary velocities after projection at this angle. */
 static double watchdog_projected (pw_run *r, double angle) {
   pw_projector p;
   pw_error error = { 0 };
@@ -174,7 +174,7 @@ static void test_masses (void **state) {
   pw_system_free (s);
 }
 
-/* Accelerations are judged in units of the scene: under another torque a disc turns as before, faster. */
+/* The acceleration norm is in units of the scene: independent of the torque on a disc. */
 static void watchdog_build_disc (pw_model *m, const void *parameter) {
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
   pw_add_pin (m, &(pw_pin){ .name = "hub", .body = { "disc", "ground" } });
@@ -183,7 +183,7 @@ static void watchdog_build_disc (pw_model *m, const void *parameter) {
                                   .value = { .constant = *(const double *)parameter } });
 }
 
-static void test_agitation (void **state) {
+static void test_acceleration_norm (void **state) {
   static const pw_parameter list[] = { { .name = "torque", .value = 1 }, { .name = NULL } };
   static const pw_plugin_table table = { .abi = PW_ABI,
                                          .size = sizeof (pw_plugin_table),
@@ -194,7 +194,7 @@ static void test_agitation (void **state) {
   for (int k = 0; k <= 6; k += 2) {
     pw_system *s = scene_system (&table, "torque", pow (10, k), NULL);
     pw_run *r = runs_open (s, "rk4+projection", NULL);
-    check_close ("agitation", pw_run_acceleration_norm (r), 1, 16 * CHECK_EPS, "round-off");
+    check_close ("acceleration norm", pw_run_acceleration_norm (r), 1, 16 * CHECK_EPS, "round-off");
     pw_run_close (r);
     pw_system_free (s);
   }
@@ -202,8 +202,9 @@ static void test_agitation (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_limits),    cmocka_unit_test (test_evaluations), cmocka_unit_test (test_jump),
-    cmocka_unit_test (test_agitation), cmocka_unit_test (test_masses),
+    cmocka_unit_test (test_limits), cmocka_unit_test (test_evaluations),
+    cmocka_unit_test (test_jump),   cmocka_unit_test (test_acceleration_norm),
+    cmocka_unit_test (test_masses),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -1,5 +1,5 @@
-/* The watchdog: singular configurations independent of masses and of the initial one, change points, drift, extreme values;
- * and what each of its thresholds decides. */
+/* The watchdog: singular configurations (whatever the masses and the initial configuration), change points, drift,
+ * extreme values. */
 #include <math.h>
 #include <stddef.h>
 #include <stdio.h>
@@ -13,14 +13,14 @@
 
 /* ---- Scenes ---- */
 
-/* A point mass of 1 kg on a rod of 1 m, horizontal at the start, below a cart that weighs hardly anything. */
+/* A mass of 1 kg at a rod of 1 m, initially horizontal, pinned to a cart with almost no mass. */
 typedef struct {
   double cart, scale, phi;
 } watchdog_cart;
 
 static const pw_parameter watchdog_cart_list[] = {
   { PW_AT (watchdog_cart, cart), 1e-6, "kg", "mass of the cart", PW_POSITIVE },
-  { PW_AT (watchdog_cart, scale), 1, "", "times all masses", PW_POSITIVE },
+  { PW_AT (watchdog_cart, scale), 1, "", "factor of all masses", PW_POSITIVE },
   { PW_AT (watchdog_cart, phi), 0, "rad", "angle of the rod", PW_REAL },
   { .name = NULL },
 };
@@ -41,10 +41,10 @@ static const pw_plugin_table watchdog_cart_table = { .abi = PW_ABI,
                                                      .parameters_size = sizeof (watchdog_cart),
                                                      .build = watchdog_build_cart };
 
-/* ---- Regular scenes with bodies of very different masses ---- */
+/* ---- Regular scenes with very different masses ---- */
 
-/* The angle of the rod, 0 to pi and back, at time t: with e = m / (m + 1), theta'^2 (cos^2 + e sin^2) = 2 g sin, since the
- * centre of mass moves straight down; t by Simpson's rule over the root of theta, from which the angle is found. */
+/* The time at which the rod has turned by theta: with e = m / (m + 1), theta'^2 (cos^2 + e sin^2) = 2 g sin, since the
+ * centre of mass moves straight down.  Simpson's rule over the square root of theta. */
 static long double watchdog_time (long double e, long double theta) {
   const int n = 200000;
   long double h = sqrtl (theta) / n, sum = 0;
@@ -77,7 +77,7 @@ static void watchdog_try_cart (const char *method, double cart, double scale, do
   pw_system_free (s);
 }
 
-static void test_light_cart (void **state) {
+static void test_nearly_massless_cart (void **state) {
   static const char *const method[] = { "erk5+projection", "erk8+projection", "erk8+nullspace", "ida+ggl",
                                         "bdf+projection" };
   static const double cart[] = { 1e-6, 1e-3 };
@@ -92,7 +92,7 @@ static void test_light_cart (void **state) {
   watchdog_try_cart ("erk8+projection", 1e-9, 1, watchdog_angle (1e-9, 10), 1e-5);
 }
 
-/* The sine is a property of J: masses do not enter, nor does the configuration at the start. */
+/* The sine is a property of J: it depends neither on masses nor on the initial configuration. */
 static void test_sine (void **state) {
   (void)state;
   double sine[3];
@@ -110,7 +110,7 @@ static void test_sine (void **state) {
 
 /* ---- Change points ---- */
 
-/* What a run comes to: a status, and how far it is off, of all angles. */
+/* Runs to time t; returns the status and the angles of all bodies. */
 static int watchdog_run (pw_system *s, const char *method, double tolerance, double t, double *phi, pw_error *error) {
   const pw_method *m;
   char name[40];
@@ -138,8 +138,8 @@ static const struct {
 
 enum { WATCHDOG_RUNS = sizeof watchdog_runs / sizeof *watchdog_runs };
 
-/* On its own branch the rod of a slider-crank that is longer than the crank never points backwards. */
-static void test_near_slider_crank (void **state) {
+/* The rod of a slider-crank, if longer than the crank, points backwards only on the wrong branch. */
+static void test_close_branches_slider_crank (void **state) {
   static const double l2[] = { 1.00000001, 1.000003, 1.00001, 1.0001 };
   int reported = 0, finished = 0;
   (void)state;
@@ -158,8 +158,8 @@ static void test_near_slider_crank (void **state) {
   assert_true (reported > 30 && finished > 15);
 }
 
-/* By others the answer is that of a run of high accuracy, or the run stops. */
-static void test_near_four_bar (void **state) {
+/* Each run agrees with one of high accuracy, or stops. */
+static void test_close_branches_four_bar (void **state) {
   static const struct {
     double a, b, c, d, g;
   } bars[] = { { 1, 1.00001, 1, 1, 0 },
@@ -188,7 +188,7 @@ static void test_near_four_bar (void **state) {
   assert_true (reported > 30);
 }
 
-/* Where branches meet, and where none are near, nothing is reported. */
+/* Nothing is reported where branches cross, or where they are far apart. */
 static void test_no_change_point (void **state) {
   static const struct { double a, b, c, d; } bars[] = { { 1, 1, 1, 1 }, { 1, 2, 1, 2 }, { 1, 2.5, 2, 2 } };
   (void)state;
@@ -205,8 +205,8 @@ static void test_no_change_point (void **state) {
 
 /* ---- Messages ---- */
 
-static void watchdog_says (const char *model, const char *parameter, double value, const char *method, double tolerance,
-                           double t, const char *text) {
+static void watchdog_expect (const char *model, const char *parameter, double value, const char *method,
+                             double tolerance, double t, const char *text) {
   pw_error error = { 0 };
   double phi[30];
   pw_system *s = scene_named (model, parameter, value);
@@ -223,11 +223,11 @@ static void test_messages (void **state) {
   (void)state;
   for (size_t i = 0; i < sizeof drifting / sizeof *drifting; i++)
     for (double rtol = 1e-3; rtol > 5e-6; rtol /= 10)
-      watchdog_says ("pendulum", NULL, 0, drifting[i], rtol, 100, rtol > 5e-4 && i < 4 ? "constraint drift" : NULL);
-  watchdog_says ("slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4, "change point");
-  watchdog_says ("slider-crank", "l2", 1.00001, "galpha+ggl", 1e-2, 4, "change point");
-  watchdog_says ("slider-crank", "l2", 1.000003, "erk8+projection", 1e-3, 4, "change point");
-  watchdog_says ("slider-crank", NULL, 0, "galpha+ggl", 1e-4, 4, "near a singular configuration");
+      watchdog_expect ("pendulum", NULL, 0, drifting[i], rtol, 100, rtol > 5e-4 && i < 4 ? "constraint drift" : NULL);
+  watchdog_expect ("slider-crank", "l2", 1.00001, "bdf+projection", 1e-6, 4, "change point");
+  watchdog_expect ("slider-crank", "l2", 1.00001, "galpha+ggl", 1e-2, 4, "change point");
+  watchdog_expect ("slider-crank", "l2", 1.000003, "erk8+projection", 1e-3, 4, "change point");
+  watchdog_expect ("slider-crank", NULL, 0, "galpha+ggl", 1e-4, 4, "near a singular configuration");
 }
 
 static void test_extreme (void **state) {
@@ -258,9 +258,12 @@ static void test_extreme (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_light_cart),        cmocka_unit_test (test_sine),
-    cmocka_unit_test (test_near_slider_crank), cmocka_unit_test (test_near_four_bar),
-    cmocka_unit_test (test_no_change_point),   cmocka_unit_test (test_messages),
+    cmocka_unit_test (test_nearly_massless_cart),
+    cmocka_unit_test (test_sine),
+    cmocka_unit_test (test_close_branches_slider_crank),
+    cmocka_unit_test (test_close_branches_four_bar),
+    cmocka_unit_test (test_no_change_point),
+    cmocka_unit_test (test_messages),
     cmocka_unit_test (test_extreme),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

@@ -1,4 +1,4 @@
-/* erk5 and erk8: orders with fixed steps, errors that follow the tolerances, and how a run ends that cannot go on. */
+/* erk5 and erk8: orders with fixed steps, errors proportional to tolerances, step-size control, failing runs. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -77,7 +77,7 @@ static void test_tolerances (void **state) {
   }
 }
 
-/* The work grows by the root of the method's order, so the higher one is the cheaper, the more so the closer. */
+/* The work grows with rtol^(-1/order): erk8 becomes cheaper relative to erk5 at tight tolerances. */
 static void test_work (void **state) {
   (void)state;
   const double rtol[] = { 1e-6, 1e-9, 1e-12 };
@@ -92,9 +92,9 @@ static void test_work (void **state) {
   }
 }
 
-/* ---- Where stability sets the steps ----
+/* ---- Steps limited by stability ----
  *
- * One body follows a force through a stiff damper, m v' = k (cos w t - v), another swings on a spring that asks for steps
+ * One body follows a force through a stiff damper, m v' = k (cos w t - v), another swings on a spring whose accuracy needs steps
  * near the damper's limit of stability, 6.4 / k:  v = (k^2 cos w t + k w sin w t) / (k^2 + w^2) */
 
 enum { ADAPTIVE_DAMPING = 400, ADAPTIVE_DRIVE = 2 };
@@ -145,7 +145,7 @@ static void test_edge (void **state) {
   }
 }
 
-/* ---- The control of steps, measured where errors are known ---- */
+/* ---- Step-size control, with known error estimates ---- */
 
 /* The pair of Dormand & Prince: times, stages, weights of the estimate (Hairer, Norsett & Wanner 1993, table II.5.2). */
 static const double adaptive_c[] = { 0, 1. / 5, 3. / 10, 4. / 5, 8. / 9, 1, 1 };
@@ -179,7 +179,7 @@ static int adaptive_bump (void *context, double t, const double *x, double value
   return 0;
 }
 
-/* Its motion across makes the kinetic energy so large that, at first, errors of the work count less than those of the state. */
+/* The transverse motion makes the kinetic energy so large that, at first, errors of the state dominate those of work. */
 static void adaptive_pushed (pw_model *m, int (*eval) (void *, double, const double *, double *, double *)) {
   pw_add_body (m, &(pw_body){ .name = "puck", .mass = 1, .inertia = 1, .rate = { 3, 30, 0 } });
   pw_add_force (m, &(pw_force){ .name = "push", .body = "puck", .fx = { PW_FUNCTION, .function = { .eval = eval } } });
@@ -209,8 +209,8 @@ static double adaptive_step (pw_run *r, double t_end) {
   return pw_run_time (r) - before;
 }
 
-/* The error of a step under the force 1e5 t^4 by its definition: the root of the mean square, over 6 numbers, of the estimates
- * in units of rtol (|q| + L) and rtol (|v| + L / T). */
+/* The error estimate of a step under the force 1e5 t^4: root mean square over 6 states, relative to |q| + L and
+ * |v| + L / T. */
 static double adaptive_estimate (double t, double h, const pw_sample *x, const pw_scale *scale) {
   double v = 0, q = 0;
   for (int i = 0; i < 7; i++) {
@@ -224,7 +224,8 @@ static double adaptive_estimate (double t, double h, const pw_sample *x, const p
   return sqrt ((q * q + v * v) / 6);
 }
 
-/* h_new / h = 0.9 err^-(1/5 - 3/4 0.04) err_before^0.04, but where the error of the work is larger than the state's. */
+/* h_new / h = 0.9 err^-(1/5 - 3/4 0.04) err_before^0.04, unless the error of the work is larger than that of the state
+ * (Hairer, Norsett & Wanner 1993, section II.4). */
 static void test_norm (void **state) {
   (void)state;
   const double rtol = 1e-8, round_off = 1e-6;
@@ -244,13 +245,13 @@ static void test_norm (void **state) {
     predicted = h * fmin (5, fmax (0.2, 0.9 * pow (now, -(0.2 - 0.03)) * pow (before, 0.04)));
     before = fmax (now, 1e-4);
   }
-  print_message ("%d steps are equal to what the norm predicts\n", equal);
-  check_below ("equal steps", 10, equal, "of 40; another norm or other weights leave none");
+  print_message ("%d steps are as predicted by the norm\n", equal);
+  check_below ("equal steps", 10, equal, "of 40; with another norm or other weights, no step is equal");
   pw_run_close (r);
   pw_system_free (s);
 }
 
-/* A narrow bump takes rejections, which may shrink a step far more than needed: the step right behind them is not longer. */
+/* A narrow bump causes rejected steps, after which a step may be far smaller than needed: the next one is not longer. */
 static void test_after_rejection (void **state) {
   (void)state;
   int found = 0;
@@ -261,7 +262,7 @@ static void test_after_rejection (void **state) {
       long rejected = pw_run_statistics (r)->rejected;
       double h = adaptive_step (r, 2);
       int none = pw_run_statistics (r)->rejected == rejected;
-      if (none) check_below ("step behind a rejection", h, last * (1 + 1e-9), "no growth; round-off of the times");
+      if (none) check_below ("step after a rejection", h, last * (1 + 1e-9), "no growth; round-off of the times");
       found += !none;
       last = none ? INFINITY : h;
     }
@@ -271,7 +272,7 @@ static void test_after_rejection (void **state) {
   check_below ("bumps", 10, found, "one for each of 19 bumps, a third as wide as the steps before them");
 }
 
-/* A step that was cut short does not make those behind it short. */
+/* A step shortened at the requested time does not shorten later steps. */
 static void test_after_cut (void **state) {
   (void)state;
   pw_system *s = scene_system (&scene_ezyroller, NULL);
@@ -279,15 +280,16 @@ static void test_after_cut (void **state) {
   double h = 0;
   while (pw_run_time (r) < 2) h = adaptive_step (r, 10);
   adaptive_step (r, pw_run_time (r) + 1e-6 * h);
-  check_below ("the step before the cut", 0.5 * h, adaptive_step (r, 10), "the motion is as smooth as before");
+  check_below ("half the step before the shortened one", 0.5 * h, adaptive_step (r, 10),
+               "the motion is as smooth as before");
   pw_run_close (r);
   pw_system_free (s);
 }
 
 /* ---- Motion along the constraints ----
  *
- * All of the motion is prescribed, of a body without mass, which takes no work, so that a projection takes the whole error
- * away: only its size limits the steps, at rtol^(3/4).  An estimate of h^5 then gives steps that grow as rtol^(3/20). */
+ * The motion of a massless body is prescribed, so that there is no work and projection removes the whole error: only the
+ * size of the projection limits steps, at rtol^(3/4).  With an estimate of order h^5, h is proportional to rtol^(3/20). */
 
 static void adaptive_turned (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -317,10 +319,10 @@ static void test_prescribed (void **state) {
   double few = adaptive_steps ("erk5+projection", 1e-4, 50), many = adaptive_steps ("erk5+projection", 1e-10, 50);
   check_close ("growth of steps", log10 (many / few) / 6, 0.15, 0.02, "rtol^(3/20); rtol^(1/10) without the root");
   check_below ("steps of bdf+projection", 300, adaptive_steps ("bdf+projection", 1e-4, 50),
-               "less than half of what they are; a projection that hides the error lets them grow for ever");
+               "half the measured number; if projection hid the error, h would grow without limit");
 }
 
-/* ---- Runs that cannot go on ---- */
+/* ---- Failing runs ---- */
 
 /* omega' = omega^2, omega = 1 / (1 - t). */
 static int adaptive_square (void *context, double t, const double *x, double value[3], double *gradient) {
@@ -330,7 +332,7 @@ static int adaptive_square (void *context, double t, const double *x, double val
   return 0;
 }
 
-/* Not there any more after 0.7 s. */
+/* Fails after 0.7 s. */
 static int adaptive_failing (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)x, (void)gradient;
   value[0] = 1;
@@ -359,7 +361,7 @@ static const pw_plugin_table adaptive_tables[] = {
   { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = adaptive_ending },
 };
 
-/* Fails with the time reached, at most `last`, where the state can still be looked at. */
+/* The run fails with the time reached, at most `last`; the state there can be sampled. */
 static void adaptive_stops (const char *method, const pw_plugin_table *table, double last, const char *cause) {
   char text[60];
   pw_error error = { 0 }, none = { 0 };
@@ -370,7 +372,7 @@ static void adaptive_stops (const char *method, const pw_plugin_table *table, do
   snprintf (text, sizeof text, "t = %.6g s: ", pw_run_time (r));
   assert_memory_equal (error.text, text, strlen (text));
   assert_non_null (strstr (error.text, cause));
-  check_below ("time reached", pw_run_time (r), last, "no state behind the point where the motion ends");
+  check_below ("time reached", pw_run_time (r), last, "no state after the end of the motion");
   pw_sample now;
   check_ok (pw_run_sample (r, pw_run_time (r), &now, &none), &none);
   assert_true (isfinite (now.q[2]) && isfinite (now.v[2]));
@@ -386,7 +388,7 @@ static void test_stops (void **state) {
   }
 }
 
-/* Tolerances that let everything pass: the run ends, with finite numbers or with a reason. */
+/* Tolerances that accept everything: the run ends at t_end, or with an error. */
 static void test_useless_tolerances (void **state) {
   static const double atol[] = { 0, 1e6 };
   (void)state;

@@ -1,6 +1,6 @@
-/* Random mechanisms.  Poses come first, at random; a joint is put at a point in the world and described in the frames of
- * its bodies, so that every loop is closed where it starts.  Rates are random too: the consistent start takes what the
- * constraints allow of them. */
+/* Random mechanisms.  Configurations are random; each joint is at a random world point, transformed to the frames of its
+ * bodies, so that all loops are closed initially.  Velocities are random too; the initial conditions make them
+ * consistent. */
 #include "mechanism.h"
 #include <math.h>
 #include <string.h>
@@ -13,7 +13,7 @@ static const char *const mechanism_name[MECHANISM_ELEMENTS] = {
   "e28", "e29", "e30", "e31", "e32", "e33", "e34", "e35", "e36", "e37", "e38", "e39"
 };
 
-/* The state of the making. */
+/* A mechanism under construction. */
 typedef struct {
   mechanism *x;
   pw_random random;
@@ -29,7 +29,7 @@ static int make_choice (make *k, int n) {
   return i < n ? i : n - 1;
 }
 
-/* A body with mass other than `not`, or -1, the ground, if it may be. */
+/* A random body with mass, other than `not`; -1: the ground, if `ground` is 1. */
 static int make_partner (make *k, int below, int not, int ground) {
   for (int tries = 0; tries < 50; tries++) {
     int i = make_choice (k, below + ground) - ground;
@@ -46,7 +46,7 @@ static double make_angle (const make *k, int body) {
   return body < 0 ? 0 : k->x->body[body].start[2];
 }
 
-/* A world point in the frame of a body. */
+/* A world point in coordinates of a body's frame. */
 static void make_local (const make *k, int body, const double world[2], double at[2]) {
   const double ground[3] = { 0 }, *p = body < 0 ? ground : k->x->body[body].start;
   double c = cos (p[2]), s = sin (p[2]), dx = world[0] - p[0], dy = world[1] - p[1];
@@ -54,14 +54,14 @@ static void make_local (const make *k, int body, const double world[2], double a
   at[1] = c * dy - s * dx;
 }
 
-/* A point of the world near a body. */
+/* A random world point near a body. */
 static void make_near (make *k, int body, double world[2]) {
   const double *p = k->x->body[body].start;
   world[0] = p[0] + make_number (k, -0.7, 0.7);
   world[1] = p[1] + make_number (k, -0.7, 0.7);
 }
 
-/* An element with so many rows, its name filled in; more are refused where they would take the last freedom. */
+/* A new element with a name; NULL if its rows would remove the last degree of freedom. */
 static mechanism_element *make_element (make *k, const pw_kind *kind, int rows) {
   mechanism *x = k->x;
   if (x->elements == MECHANISM_ELEMENTS || x->free - rows < 1) return NULL;
@@ -82,7 +82,7 @@ static pw_signal make_signal (make *k, double size) {
 
 /* ---- Joints between two bodies ---- */
 
-/* The members all joints begin with: two bodies, and a point in each one's frame. */
+/* The first members of all joints: two bodies, and a point in the frame of each. */
 static void make_ends (make *k, int one, int two, const char *body[2], double at[2][2]) {
   double world[2];
   make_near (k, one, world);
@@ -137,7 +137,7 @@ static void make_gear (make *k, int one, int two) {
   e->gear.ratio = make_number (k, 0.4, 2) * (make_choice (k, 2) ? 1 : -1);
 }
 
-/* It begins at the angle there is. */
+/* The drive begins at the initial angle. */
 static void make_drive (make *k, int one, int two) {
   mechanism_element *e = make_element (k, &pw_kind_drive, 1);
   if (e == NULL) return;
@@ -155,7 +155,7 @@ static void make_joint (make *k, int one, int two, int dice) {
   joints[dice](k, one, two);
 }
 
-/* ---- What stands on the ground ---- */
+/* ---- Wheels and nonholonomic constraints ---- */
 
 static void make_at (make *k, double at[2]) {
   at[0] = make_number (k, -0.5, 0.5);
@@ -177,7 +177,7 @@ static void make_wheel (make *k, int body) {
 }
 
 static void make_rolling_wheel (make *k, int body) {
-  mechanism_element *e = make_element (k, &pw_kind_rolling_wheel, 1); /* two rows, a coordinate of its own */
+  mechanism_element *e = make_element (k, &pw_kind_rolling_wheel, 1); /* two rows, an internal coordinate */
   if (e == NULL) return;
   e->rolling_wheel.body = make_name (body);
   make_at (k, e->rolling_wheel.at);
@@ -255,7 +255,7 @@ static void make_force_of_one (make *k, int dice) {
   if (dice != 1) make_at (k, e->force.at);                           /* the third of all but drag */
   if (dice == 0) {
     e->force.axes = make_choice (k, 2) ? PW_AXES_BODY : PW_AXES_WORLD;
-    e->force.fx = e->force.fy = make_signal (k, 1); /* of one phase, so that it can be turned */
+    e->force.fx = e->force.fy = make_signal (k, 1); /* equal phases, so that the force can be rotated */
     e->force.fy.harmonic.amplitude *= 0.6, e->force.fy.harmonic.offset *= 0.6;
   }
   if (dice == 1) e->drag.linear = make_number (k, 0, 0.5), e->drag.quadratic = 0.2, e->drag.turning = 0.1;
@@ -263,7 +263,7 @@ static void make_force_of_one (make *k, int dice) {
   if (dice == 3) e->rolling_resistance.limit = 0.2, e->rolling_resistance.speed = 0.2;
 }
 
-/* ---- All of it ---- */
+/* ---- Mechanisms ---- */
 
 static void make_body (make *k, int i) {
   pw_body *b = &k->x->body[i];
@@ -276,7 +276,7 @@ static void make_body (make *k, int i) {
   k->x->free += 3;
 }
 
-/* A body without mass on a wheel, pinned to another: the pin and the wheel determine it. */
+/* A massless body with a wheel, pinned to another body: pin and wheel determine its motion. */
 static void make_steer (make *k, int i) {
   make_body (k, i);
   k->x->body[i].mass = k->x->body[i].inertia = 0;

@@ -1,5 +1,5 @@
-/* Random mechanisms: trees and loops of bodies with elements of all kinds, closed where they start, and the same seen
- * from elsewhere, in a mirror, or described in another order. */
+/* Random mechanisms: trees and loops of bodies with elements of all types, consistent initially; displaced, rotated,
+ * mirrored, or described in another order. */
 #ifndef MECHANISM_H
 #define MECHANISM_H
 
@@ -7,7 +7,7 @@
 
 enum { MECHANISM_BODIES = 9, MECHANISM_ELEMENTS = 40 };
 
-/* An element: its definition, under the kind whose table is given. */
+/* An element: its type and its definition. */
 typedef struct {
   const pw_kind *kind;
   union {
@@ -38,29 +38,29 @@ typedef struct {
 
 typedef struct {
   int bodies, elements;
-  int free; /* coordinates less rows */
+  int free; /* coordinates minus rows */
   pw_body body[MECHANISM_BODIES];
   mechanism_element element[MECHANISM_ELEMENTS];
 } mechanism;
 
-/* Where it is seen from: mirrored (y becomes -y), then turned, then moved; and the order it is described in. */
+/* A transformation: mirrored (y becomes -y), then rotated, then displaced; 1: reversed order of bodies and elements. */
 typedef struct {
   int mirror;
   double angle, x, y;
   int backwards;
 } mechanism_view;
 
-/* The mechanism of a seed, the same on every machine. */
+/* The mechanism with this seed, the same on every machine. */
 void mechanism_make (unsigned seed, mechanism *x);
 
-/* The same mechanism as it is seen, compiled.  NULL and the error if it cannot be. */
+/* Compiles the transformed mechanism; NULL and an error if that fails. */
 pw_system *mechanism_compile (const mechanism *x, const mechanism_view *view, pw_error *error);
 
-/* A body's start and rate as they are seen. */
-void mechanism_see (const mechanism_view *view, pw_body *b);
+/* Transforms the initial values of a body. */
+void mechanism_transform (const mechanism_view *view, pw_body *b);
 
-/* Runs the mechanisms of so many seeds: invariants, symmetries, another method.  Fails the test if any is violated, or if
- * more than a few are refused. */
-void mechanism_try (unsigned first, unsigned count);
+/* Runs the mechanisms of `count` seeds and checks invariants, symmetries, another method.  Fails if one is violated, or
+ * if more than 5 % of the runs are refused. */
+void mechanism_test (unsigned first, unsigned count);
 
 #endif

@@ -1,5 +1,5 @@
-/* Random mechanisms, tried: energy is accounted for, the constraints hold, the independent verifier agrees, and neither
- * where one looks from, nor the order of the description, nor the method matters. */
+/* Runs of random mechanisms: the energy balances, the constraints and the independent verifier's equations are satisfied,
+ * and the motion depends neither on the frame, nor on the order of the description, nor on the method. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,10 +8,10 @@
 #include "runs.h"
 #include "pinwheel-selftest.h"
 
-#define TRY_SPAN 0.5   /* [s]: short enough for a chaotic motion to remember where it started */
+#define TRY_SPAN 0.5   /* [s]: short enough for chaotic motions */
 #define TRY_RTOL 1e-10 /* of erk8, the method the others are compared with */
 
-/* Where a run has come to. */
+/* The end of a run. */
 typedef struct {
   int status;
   double balance, energy; /* worst balance, largest energy [J] */
@@ -54,16 +54,16 @@ static void try_run (pw_system *s, const char *method, double rtol, double step,
   pw_run_close (r);
 }
 
-/* Says what is wrong with a seed, unless it is not more than the bound. */
+/* Counts and prints a value above its bound. */
 static void try_bound (try_count *n, const char *what, double value, double bound) {
   if (value <= bound) return;
   print_message ("seed %u: %s %.3g, at most %.3g\n", n->seed, what, value, bound);
   n->failed++;
 }
 
-/* ---- The same from elsewhere ---- */
+/* ---- Symmetries ---- */
 
-/* How far a state is from another, which is seen in some way. */
+/* Largest difference between the transformed state x of system a and the state y of system b. */
 static double try_distance (pw_system *a, const try_end *x, pw_system *b, const try_end *y, const mechanism *m,
                             const mechanism_view *view) {
   double worst = 0;
@@ -73,7 +73,7 @@ static double try_distance (pw_system *a, const try_end *x, pw_system *b, const 
     int ja = 3 * pw_system_find_body (a, m->body[i].name), jb = 3 * pw_system_find_body (b, m->body[i].name);
     memcpy (now.start, x->q + ja, sizeof now.start);
     memcpy (now.rate, x->v + ja, sizeof now.rate);
-    mechanism_see (view, &now);
+    mechanism_transform (view, &now);
     for (int k = 0; k < 3; k++)
       worst = fmax (worst, fmax (fabs (now.start[k] - y->q[jb + k]), fabs (now.rate[k] - y->v[jb + k])));
   }
@@ -84,15 +84,16 @@ static double try_distance (pw_system *a, const try_end *x, pw_system *b, const 
   return worst;
 }
 
-/* Rates give the size of a mechanism's motion: its errors grow with them. */
+/* The largest velocity: errors grow with it. */
 static double try_size (pw_system *s, const try_end *x) {
   double size = 1;
   for (int j = 0; j < pw_system_coordinates (s); j++) size = fmax (size, fabs (x->v[j]));
   return size;
 }
 
-/* The motion passes a singular configuration so closely that its rates grow a thousandfold: round-off tells whether it can. */
-static int try_whips (pw_system *s, const try_end *x) {
+/* 1 if the motion passes a singular configuration so closely that velocities exceed 1e3: round-off decides whether the
+ * run can continue. */
+static int try_is_nearly_singular (pw_system *s, const try_end *x) {
   return try_size (s, x) > 1e3;
 }
 
@@ -114,15 +115,15 @@ static void try_views (try_count *n, const mechanism *m, pw_system *s, const try
     } else {
       print_message ("seed %u, %s: %s\n", n->seed, views[i].name, y.error.text);
       n->refused++;
-      if (y.status != PW_METHOD || !try_whips (s, x)) n->failed++;
+      if (y.status != PW_METHOD || !try_is_nearly_singular (s, x)) n->failed++;
     }
     pw_system_free (other);
   }
 }
 
-/* ---- By another method ---- */
+/* ---- Other methods ---- */
 
-/* The methods that hold the constraints take turns, those of order 2 with steps ten times finer.  Returns the order. */
+/* The name of a stabilised method, a different one for each `turn`; returns its order. */
 static int try_method (unsigned turn, char name[40]) {
   const pw_method *m;
   for (;;)
@@ -143,9 +144,9 @@ static void try_other (try_count *n, const mechanism *m, pw_system *s, const try
     print_message ("seed %u, %s: %s\n", n->seed, method, y.error.text);
 }
 
-/* ---- All of it ---- */
+/* ---- One mechanism ---- */
 
-/* 1 if something is driven, which the rest may forbid. */
+/* 1 if a motion is prescribed, which other constraints may contradict. */
 static int try_prescribed (const mechanism *m) {
   for (int i = 0; i < m->elements; i++)
     if (m->element[i].kind == &pw_kind_drive || m->element[i].kind == &pw_kind_speed) return 1;
@@ -153,12 +154,12 @@ static int try_prescribed (const mechanism *m) {
 }
 
 static void try_seed (try_count *n) {
-  static const mechanism_view as_it_is = { .mirror = 0 };
+  static const mechanism_view unchanged = { .mirror = 0 };
   mechanism m;
   try_end x;
   pw_error error = { 0 };
   mechanism_make (n->seed, &m);
-  pw_system *s = mechanism_compile (&m, &as_it_is, &error);
+  pw_system *s = mechanism_compile (&m, &unchanged, &error);
   if (s == NULL) fail_msg ("seed %u: %s", n->seed, error.text);
   try_run (s, "erk8+projection", TRY_RTOL, 0, &x);
   n->tried++;
@@ -175,15 +176,15 @@ static void try_seed (try_count *n) {
   } else {
     print_message ("seed %u: %s\n", n->seed, x.error.text);
     n->refused++;
-    if (x.status == PW_INITIAL && !try_prescribed (&m)) n->failed++; /* it could always be at rest */
+    if (x.status == PW_INITIAL && !try_prescribed (&m)) n->failed++; /* rest is always consistent */
   }
   pw_system_free (s);
 }
 
-void mechanism_try (unsigned first, unsigned count) {
+void mechanism_test (unsigned first, unsigned count) {
   try_count n = { .seed = first };
   for (; n.seed < first + count; n.seed++) try_seed (&n);
   print_message ("%u mechanisms, %u refused\n", n.tried, n.refused);
   assert_int_equal (n.failed, 0);
-  check_below ("refused", n.refused, 0.05 * n.tried, "what is put together at random may contradict itself");
+  check_below ("refused", n.refused, 0.05 * n.tried, "random constraints may be contradictory");
 }

@@ -1,5 +1,5 @@
-/* The same mechanism seen from elsewhere.  In the mirror points of a body keep their x and lose the sign of their y, as
- * angles and torques do; what hangs on the ground is turned and moved with everything else. */
+/* Transformed mechanisms.  Mirroring changes the sign of y of points on bodies, of angles and of torques; attachments to
+ * the ground are rotated and displaced with the bodies. */
 #include <math.h>
 #include <string.h>
 #include "mechanism.h"
@@ -23,12 +23,12 @@ static void view_point (const mechanism_view *w, const char *body, double x[2]) 
   x[0] += w->x, x[1] += w->y;
 }
 
-/* An angle of the frame of a body, which has the sign of a rotation. */
+/* An angle in a body's frame. */
 static double view_angle (const mechanism_view *w, const char *body, double angle) {
   return (w->mirror ? -angle : angle) + (view_ground (body) ? w->angle : 0);
 }
 
-/* The angle of one body seen from another: the ground does not turn. */
+/* The angle between two bodies; that of the ground does not change. */
 static double view_between (const mechanism_view *w, const char *one, const char *two, double angle) {
   return (w->mirror ? -angle : angle) + (view_ground (two) ? w->angle : 0) - (view_ground (one) ? w->angle : 0);
 }
@@ -53,7 +53,7 @@ static void view_pfaffian (const mechanism_view *w, pw_pfaffian *p) {
 }
 
 /* Joints and forces between two bodies. */
-static void view_of_two (const mechanism_view *w, mechanism_element *e) {
+static void view_two_bodies (const mechanism_view *w, mechanism_element *e) {
   const pw_kind *k = e->kind;
   const char *one = e->pin.body[0], *two = e->pin.body[1];
   if (k == &pw_kind_pin || k == &pw_kind_weld || k == &pw_kind_slider || k == &pw_kind_slot || k == &pw_kind_rod ||
@@ -76,8 +76,8 @@ static void view_of_two (const mechanism_view *w, mechanism_element *e) {
   if (k == &pw_kind_motor) view_signal (w, &e->motor.angle, turned);
 }
 
-/* What touches one body. */
-static void view_of_one (const mechanism_view *w, mechanism_element *e) {
+/* Elements at one body. */
+static void view_one_body (const mechanism_view *w, mechanism_element *e) {
   const pw_kind *k = e->kind;
   double *heading = k == &pw_kind_wheel                ? &e->wheel.heading
                     : k == &pw_kind_rolling_wheel      ? &e->rolling_wheel.heading
@@ -95,28 +95,28 @@ static void view_element (const mechanism_view *w, mechanism_element *e) {
   if (e->kind == &pw_kind_gravity)
     view_vector (w, e->gravity.acceleration);
   else if (e->kind->bodies == 1)
-    view_of_one (w, e);
+    view_one_body (w, e);
   else if (e->kind->bodies == 2)
-    view_of_two (w, e);
+    view_two_bodies (w, e);
 }
 
-void mechanism_see (const mechanism_view *w, pw_body *b) {
+void mechanism_transform (const mechanism_view *w, pw_body *b) {
   view_point (w, "ground", b->start);
   b->start[2] = view_angle (w, "ground", b->start[2]);
   view_vector (w, b->rate);
   if (w->mirror) b->rate[2] = -b->rate[2];
 }
 
-/* ---- Into a model ---- */
+/* ---- Compilation ---- */
 
-static const mechanism *view_of; /* what the build function below describes, and how */
+static const mechanism *view_of; /* arguments of view_build */
 static const mechanism_view *view_from;
 
 static void view_build (pw_model *m, const void *parameters) {
   (void)parameters;
   for (int i = 0; i < view_of->bodies; i++) {
     pw_body b = view_of->body[view_from->backwards ? view_of->bodies - 1 - i : i];
-    mechanism_see (view_from, &b);
+    mechanism_transform (view_from, &b);
     pw_add_body (m, &b);
   }
   for (int i = 0; i < view_of->elements; i++) {

@@ -4,7 +4,7 @@
 
 static void test_random (void **state) {
   (void)state;
-  mechanism_try (1, 1000);
+  mechanism_test (1, 1000);
 }
 
 int main (void) {

@@ -1,6 +1,5 @@
-/* Bodies where many elements meet: a carousel's hub, a table on many legs, a platform on casters.  A large scene keeps
- * such a body in its condensed matrix; what comes out obeys the equations as the independent verifier sees them, and does
- * not depend on the place of the body among the others. */
+/* Bodies with many elements: a carousel's hub, a table on many legs, a platform on casters.  In large scenes such a body
+ * is not condensed.  Results satisfy the independent verifier, and do not depend on the index of that body. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -11,14 +10,14 @@
 enum { HUB_ARMS = 14 };
 
 typedef struct {
-  double place; /* how many arms come before the hub */
+  double place; /* number of arms before the hub */
 } hub_parameters;
 
 static void hub_body (pw_model *m) {
   pw_add_body (m, &(pw_body){ .name = "hub", .mass = 3, .inertia = 0.7, .rate = { 0.2, 0.1, 0.5 } });
 }
 
-/* The arms, each with what `add` gives it, and the hub before that of the number `place`. */
+/* Adds the arms by `add`, and the hub before the arm with index `place`. */
 static void hub_build (pw_model *m, const hub_parameters *p,
                        void (*add) (pw_model *m, const char *arm, double x, double y, double angle)) {
   for (int i = 0; i < HUB_ARMS; i++) {
@@ -58,14 +57,14 @@ static void hub_leg (pw_model *m, const char *arm, double x, double y, double an
   pw_add_pin (m, &(pw_pin){ .name = foot, .body = { arm, "ground" }, .at = { { 0, -0.5 }, { x, -1 } } });
 }
 
-/* Parallel legs: of the rows of each leg but two, one follows from the others. */
+/* Parallel legs: each leg beyond two adds a redundant row. */
 static void hub_table (pw_model *m, const void *parameters) {
   const hub_parameters *p = parameters;
   hub_build (m, p, hub_leg);
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-/* The same at an angle of 0.1 place: what follows does so but for round-off. */
+/* The same at an angle of 0.1 place: rows are redundant up to round-off. */
 static void hub_leaning (pw_model *m, const void *parameters) {
   const double angle = 0.1 * ((const hub_parameters *)parameters)->place, c = cos (angle), s = sin (angle);
   for (int i = 0; i < HUB_ARMS; i++) {
@@ -97,14 +96,14 @@ static void hub_platform (pw_model *m, const void *parameters) {
   pw_add_force (m, &(pw_force){ .name = "push", .body = "hub", .at = { 0.1, 0.4 }, .fx = { .constant = 2 } });
 }
 
-/* Joins two bodies that are not turned at a point of the world. */
+/* Attachment points of a joint at a world point, for bodies at angle 0. */
 static void hub_join (double at[2][2], const double *one, const double *two, double x, double y) {
   at[0][0] = x - one[0], at[0][1] = y - one[1];
   at[1][0] = x - two[0], at[1][1] = y - two[1];
 }
 
-/* A frame whose parts are joined to it and to each other.  With the frame held, as it is where they are eliminated before
- * it, several of their rows follow from others. */
+/* A frame whose parts are joined to it and to each other.  For a prescribed frame, which is what their elimination
+ * before the frame amounts to, several of their rows are dependent. */
 static void hub_frame (pw_model *m, const void *parameters) {
   const double hub[] = { 1.33, 0.32 }, rail[] = { 1.07, 1.8 }, bar[] = { 1.99, 1.23 }, tail[] = { 0.87, -0.78 };
   const double side[] = { 0.57, 1.86 }, world[] = { 0, 0 };
@@ -154,9 +153,9 @@ static const pw_parameter hub_list[] = {
     .parameters_size = sizeof (hub_parameters), .build = f                   \
   }
 
-/* ---- What holds ---- */
+/* ---- Tests ---- */
 
-/* A short run of the scene with the hub in some place: verified, and the hub's motion at its end. */
+/* Verifies a short run with the hub at index `place`; returns the hub's final state. */
 static void hub_run (const pw_plugin_table *table, double place, double hub[6]) {
   static const char *const name[] = { "hub.x", "hub.y", "hub.phi", "hub.vx", "hub.vy", "hub.omega" };
   pw_system *s = scene_system (table, "place", place, NULL);
@@ -175,7 +174,7 @@ static void hub_everywhere (const pw_plugin_table *table) {
     hub_run (table, i ? HUB_ARMS : HUB_ARMS / 2, other);
     for (int k = 0; k < 6; k++) check_close ("the hub's motion", other[k], first[k], 1e-10, "1e6 eps, over 20 steps");
   }
-  assert_true (hypot (first[3], first[4]) > 1e-3); /* it does move */
+  assert_true (hypot (first[3], first[4]) > 1e-3); /* it moves */
 }
 
 static void test_carousel (void **state) {
@@ -190,7 +189,7 @@ static void test_table (void **state) {
   hub_everywhere (&table);
 }
 
-/* The rows of each leg but two, however many digits round-off takes. */
+/* Redundant rows are found at every angle, whatever the round-off. */
 static void test_leaning (void **state) {
   static const pw_plugin_table table = HUB_TABLE (hub_leaning);
   double hub[6];

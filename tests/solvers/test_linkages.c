@@ -1,4 +1,4 @@
-/* Saddle points of random linkages, with masses and without. */
+/* Solutions of the saddle-point system for random linkages, with and without massless links. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,7 +11,7 @@
 #include "saddle_scene.h"
 #include "scene.h"
 
-/* ---- Linkages: trees of pinned bars, some of them closed to loops, some on the ground ---- */
+/* ---- Linkages: trees of pinned bars, with further pins that close loops ---- */
 
 enum { LINKAGE_MOST = 40 };
 
@@ -19,7 +19,7 @@ typedef struct {
   double seed;
 } linkage;
 
-/* A pin at a point of the world between two bars that have been placed, or a bar and the ground (-1). */
+/* Adds a pin at the world point (x, y) between two bars at known positions, or a bar and the ground (-1). */
 static void linkage_pin (pw_model *m, const double (*at)[3], int number, int a, int b, double x, double y) {
   char name[3][16];
   pw_pin pin = { .name = name[2], .body = { name[0], name[1] } };
@@ -34,7 +34,7 @@ static void linkage_pin (pw_model *m, const double (*at)[3], int number, int a, 
   pw_add_pin (m, &pin);
 }
 
-/* Most bars hang from the end of the one before, so that there are chains. */
+/* Most bars are pinned to the end of the previous one, so that there are chains. */
 static void linkage_build (pw_model *m, const void *parameters) {
   unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
   double at[LINKAGE_MOST][3] = { { 0 } };
@@ -59,19 +59,20 @@ static void linkage_build (pw_model *m, const void *parameters) {
   }
 }
 
-/* Bars with mass, and between them links without: one with a wheel, one that is a rod, or two in a row. */
-static void linkage_build_light (pw_model *m, const void *parameters) {
+/* Bars with mass, connected by massless links: one with a wheel, one as a rod, or two in series. */
+static void linkage_build_massless (pw_model *m, const void *parameters) {
   unsigned random = (unsigned)((const linkage *)parameters)->seed * 2654435761U;
   double at[LINKAGE_MOST][3] = { { 0 } };
   const double (*there)[3] = (const double (*)[3])at;
-  int heavy = 2 + (int)(2 * fabs (saddle_number (&random))), links = 1 + (int)(5 * fabs (saddle_number (&random)));
-  int bodies = heavy + 2 * links, pins = 0;
+  int massive = 2 + (int)(2 * fabs (saddle_number (&random))), links = 1 + (int)(5 * fabs (saddle_number (&random)));
+  int bodies = massive + 2 * links, pins = 0;
   for (int i = 0; i < bodies; i++)
     for (int k = 0; k < 3; k++) at[i][k] = 3 * saddle_number (&random);
-  for (int i = 0, next = heavy; i < heavy + links; i++) {
-    double x = at[i][0] + saddle_number (&random), y = at[i][1] + saddle_number (&random), mass = i < heavy ? 1 + i : 0;
-    int a = (int)(heavy * fabs (saddle_number (&random))), b = (int)(heavy * fabs (saddle_number (&random)));
-    int what = i < heavy ? -1 : (int)(3 * fabs (saddle_number (&random))), body = i < heavy ? i : next++;
+  for (int i = 0, next = massive; i < massive + links; i++) {
+    double x = at[i][0] + saddle_number (&random), y = at[i][1] + saddle_number (&random),
+           mass = i < massive ? 1 + i : 0;
+    int a = (int)(massive * fabs (saddle_number (&random))), b = (int)(massive * fabs (saddle_number (&random)));
+    int what = i < massive ? -1 : (int)(3 * fabs (saddle_number (&random))), body = i < massive ? i : next++;
     char name[12], wheel[12];
     for (int n = body; n <= body + (what == 2); n++) {
       snprintf (name, sizeof name, "b%d", n);
@@ -91,7 +92,7 @@ static void linkage_build_light (pw_model *m, const void *parameters) {
 }
 
 static const pw_parameter linkage_list[] = {
-  { PW_AT (linkage, seed), .domain = PW_NONNEGATIVE, .about = "which one" },
+  { PW_AT (linkage, seed), .domain = PW_NONNEGATIVE, .about = "number of the linkage" },
   { .name = NULL },
 };
 
@@ -101,11 +102,11 @@ static const pw_plugin_table linkage_table = { .abi = PW_ABI,
                                                .parameters_size = sizeof (linkage),
                                                .build = linkage_build };
 
-static const pw_plugin_table linkage_light_table = { .abi = PW_ABI,
-                                                     .size = sizeof (pw_plugin_table),
-                                                     .parameters = linkage_list,
-                                                     .parameters_size = sizeof (linkage),
-                                                     .build = linkage_build_light };
+static const pw_plugin_table linkage_massless_table = { .abi = PW_ABI,
+                                                        .size = sizeof (pw_plugin_table),
+                                                        .parameters = linkage_list,
+                                                        .parameters_size = sizeof (linkage),
+                                                        .build = linkage_build_massless };
 
 static void linkage_each (const char *what, const pw_plugin_table *table, int seeds, int all) {
   for (int seed = 1; seed <= seeds; seed++) {
@@ -118,7 +119,7 @@ static void linkage_each (const char *what, const pw_plugin_table *table, int se
 static void test_linkages (void **state) {
   (void)state;
   linkage_each ("a linkage", &linkage_table, 200, 1);
-  linkage_each ("a linkage with massless links", &linkage_light_table, 300, 0);
+  linkage_each ("a linkage with massless links", &linkage_massless_table, 300, 0);
 }
 
 int main (void) {

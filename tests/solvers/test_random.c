@@ -4,7 +4,7 @@
 
 static void test_random (void **state) {
   (void)state;
-  mechanism_try (1, 120);
+  mechanism_test (1, 120);
 }
 
 int main (void) {

@@ -1,6 +1,6 @@
-/* Solutions of the saddle-point system obey it, whatever path they take: with mass and with the metric of projections, all
- * rows and those on positions alone, factorised apart or at once, with forces and without, and behind configurations where they
- * cannot be factorised.
+/* Solutions of the saddle-point system satisfy it: with masses and the metric of projections as weights, with all rows
+ * and holonomic rows only, factorised separately or with the solution, with and without forces, and after configurations
+ * where the factorisation fails.
  *
  *   W a + J^T lambda = f,   J a = gamma */
 #include <math.h>
@@ -34,11 +34,11 @@ static void test_models (void **state) {
   }
 }
 
-/* ---- Rows without anything to give way ---- */
+/* ---- Rows without coordinates that can move ---- */
 
 enum { SADDLE_LINKS = 26, SADDLE_COORDS = 3 * SADDLE_LINKS };
 
-/* Rods instead of the chain's pins. */
+/* A chain with rods instead of pins. */
 static void saddle_rods (pw_model *m, const void *parameters) {
   char name[20], rod[20], before[20] = "ground";
   (void)parameters;
@@ -55,8 +55,8 @@ static const pw_plugin_table saddle_rods_table = { .abi = PW_ABI,
                                                    .size = sizeof (pw_plugin_table),
                                                    .build = saddle_rods };
 
-/* The saddle of a scene whose bodies are turned so that nothing is in line, with so many coordinates held from those of a
- * body on. */
+/* The saddle-point system of a scene in a configuration without aligned bodies; `held` coordinates are prescribed,
+ * beginning with those of a body. */
 static pw_saddle *saddle_turned (pw_workspace *w, int body, int held) {
   const pw_system *s = w->s;
   double weight[SADDLE_COORDS], q[SADDLE_COORDS];
@@ -72,11 +72,11 @@ static pw_saddle *saddle_turned (pw_workspace *w, int body, int held) {
   return k;
 }
 
-/* A pin between two bodies that are both held, or between one and the ground, says nothing of the others, which obey
- * theirs. */
-static void test_held (void **state) {
+/* Pins between two prescribed bodies, or one and the ground, are inactive; all others are satisfied. */
+static void test_prescribed_bodies (void **state) {
   (void)state;
-  for (int body = 0; body + 1 < SADDLE_LINKS; body += body > 0 ? 1 : 2) { /* fewer than two links cannot give way */
+  for (int body = 0; body + 1 < SADDLE_LINKS;
+       body += body > 0 ? 1 : 2) { /* one link between a prescribed body and the ground could not move */
     double a[SADDLE_COORDS + 3], lambda[2 * SADDLE_LINKS], Ja[2 * SADDLE_LINKS], gamma[2 * SADDLE_LINKS];
     pw_system *s = scene_named ("chain", "n", SADDLE_LINKS);
     pw_workspace *w = pw_workspace_new (s, NULL);
@@ -86,9 +86,9 @@ static void test_held (void **state) {
     pw_mul_J (w, a, Ja);
     for (int j = 3 * body; j < 3 * body + 6; j++) assert_true (a[j] == 0);
     for (int i = 0; i < s->rows; i++) {
-      int pin = i / 2, idle = pin == body + 1 || (pin == 0 && body == 0);
-      assert_int_equal (lambda[i] == 0, idle);
-      if (!idle) check_close ("J a", Ja[i], gamma[i], 1e4 * CHECK_EPS, "round-off of a chain");
+      int pin = i / 2, inactive = pin == body + 1 || (pin == 0 && body == 0);
+      assert_int_equal (lambda[i] == 0, inactive);
+      if (!inactive) check_close ("J a", Ja[i], gamma[i], 1e4 * CHECK_EPS, "round-off of a chain");
     }
     pw_saddle_close (k);
     pw_workspace_free (w);
@@ -96,8 +96,8 @@ static void test_held (void **state) {
   }
 }
 
-/* A row without entries is singular, wherever it is in the order: 0 out of 0 is no pivot. */
-static void test_empty (void **state) {
+/* A row without entries is singular at every place in the order: 0/0 is not a pivot. */
+static void test_empty_row (void **state) {
   (void)state;
   for (int rod = 0; rod < SADDLE_LINKS; rod++) {
     double a[SADDLE_COORDS + 3], lambda[2 * SADDLE_LINKS], gamma[2 * SADDLE_LINKS] = { 1 };
@@ -114,10 +114,10 @@ static void test_empty (void **state) {
   }
 }
 
-/* ---- Rows that follow from others ---- */
+/* ---- Redundant rows ---- */
 
 typedef struct {
-  double angle, mass; /* of the first plate; of its partner */
+  double angle, mass; /* angle of the first plate; mass of partners */
 } bolted;
 
 static const pw_parameter bolted_list[] = {
@@ -126,28 +126,29 @@ static const pw_parameter bolted_list[] = {
   { .name = NULL },
 };
 
-/* Pairs of plates about the same centre, bolted to each other, and welded or, without mass, bolted again; each pair is pinned to
- * the one before. */
+/* Pairs of plates with the same centre, connected by a pin and a weld or, if massless, by two pins; each pair is pinned
+ * to the previous one. */
 static void bolted_build (pw_model *m, const bolted *p, int pairs) {
   const double turn = 0.7, c = cos (turn), s = sin (turn);
-  char heavy[20], light[20], before[20] = "", name[3][20];
+  char plate[20], partner[20], before[20] = "", name[3][20];
   double x = 0.3, y = -0.2;
   for (int i = 0; i < pairs; i++) {
     double angle = p->angle + i;
-    snprintf (heavy, sizeof heavy, "heavy%d", i);
-    snprintf (light, sizeof light, "light%d", i);
+    snprintf (plate, sizeof plate, "plate%d", i);
+    snprintf (partner, sizeof partner, "partner%d", i);
     for (int k = 0; k < 3; k++) snprintf (name[k], sizeof name[k], "%c%d", "abp"[k], i);
-    pw_add_body (m, &(pw_body){ .name = heavy, .mass = 1, .inertia = 0.1, .start = { x, y, angle } });
+    pw_add_body (m, &(pw_body){ .name = plate, .mass = 1, .inertia = 0.1, .start = { x, y, angle } });
     pw_add_body (
-        m, &(pw_body){ .name = light, .mass = p->mass, .inertia = 0.1 * p->mass, .start = { x, y, angle + turn } });
-    pw_add_pin (m, &(pw_pin){ .name = name[0], .body = { heavy, light }, .at = { { 0.7 * c, 0.7 * s }, { 0.7, 0 } } });
+        m, &(pw_body){ .name = partner, .mass = p->mass, .inertia = 0.1 * p->mass, .start = { x, y, angle + turn } });
+    pw_add_pin (m,
+                &(pw_pin){ .name = name[0], .body = { plate, partner }, .at = { { 0.7 * c, 0.7 * s }, { 0.7, 0 } } });
     if (p->mass > 0)
-      pw_add_weld (m, &(pw_weld){ .name = name[1], .body = { heavy, light }, .angle = turn });
+      pw_add_weld (m, &(pw_weld){ .name = name[1], .body = { plate, partner }, .angle = turn });
     else
-      pw_add_pin (m,
-                  &(pw_pin){ .name = name[1], .body = { heavy, light }, .at = { { -0.9 * s, 0.9 * c }, { 0, 0.9 } } });
-    if (*before) pw_add_pin (m, &(pw_pin){ .name = name[2], .body = { before, heavy }, .at = { { 0.5, 0.1 } } });
-    memcpy (before, heavy, sizeof before);
+      pw_add_pin (
+          m, &(pw_pin){ .name = name[1], .body = { plate, partner }, .at = { { -0.9 * s, 0.9 * c }, { 0, 0.9 } } });
+    if (*before) pw_add_pin (m, &(pw_pin){ .name = name[2], .body = { before, plate }, .at = { { 0.5, 0.1 } } });
+    memcpy (before, plate, sizeof before);
     x += 0.5 * cos (angle) - 0.1 * sin (angle), y += 0.5 * sin (angle) + 0.1 * cos (angle);
   }
 }
@@ -166,8 +167,8 @@ static void bolted_many (pw_model *m, const void *parameters) {
     .build = f                                                                                                      \
   }
 
-/* What round-off leaves of them is no pivot, whatever the angle; of rows on coordinates without mass alike. */
-static void test_dependent (void **state) {
+/* Round-off of a dependent row is not accepted as a pivot at any angle, with and without massless coordinates. */
+static void test_dependent_rows (void **state) {
   static const pw_plugin_table table[] = { BOLTED_TABLE (bolted_pair), BOLTED_TABLE (bolted_many) };
   (void)state;
   for (int i = 0; i < 60; i++)
@@ -186,7 +187,7 @@ static void test_dependent (void **state) {
     }
 }
 
-/* Bars pinned to each other in pairs, of which one does not know of the others. */
+/* Independent pairs of bars, pinned to each other. */
 static void pairs_build (pw_model *m, double angle, int pairs) {
   char a[20], b[20], pin[20];
   for (int i = 0; i < pairs; i++) {
@@ -254,7 +255,7 @@ static void test_random (void **state) {
                "round-off, weights over a range of 1e6, rows nearly dependent");
 }
 
-/* A size that is not a number is not forgotten over those behind it. */
+/* Norms are NaN if any entry is NaN. */
 static void test_not_a_number (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -279,8 +280,9 @@ static void test_not_a_number (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_models),       cmocka_unit_test (test_held), cmocka_unit_test (test_empty),
-    cmocka_unit_test (test_dependent),    cmocka_unit_test (test_sine), cmocka_unit_test (test_random),
+    cmocka_unit_test (test_models),       cmocka_unit_test (test_prescribed_bodies),
+    cmocka_unit_test (test_empty_row),    cmocka_unit_test (test_dependent_rows),
+    cmocka_unit_test (test_sine),         cmocka_unit_test (test_random),
     cmocka_unit_test (test_not_a_number),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

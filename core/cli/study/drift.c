@@ -6,8 +6,8 @@
 #include "sweep_grid.h"
 #include "util.h"
 
-#define DRIFT_ROUND_OFF 1e-14                   /* scaled residuals below have no meaningful growth */
-enum { DRIFT_PARTS = 200, DRIFT_MOST = 10000 }; /* parts of a run, each a point in the figures; rows */
+#define DRIFT_ROUND_OFF 1e-14                   /* the growth of smaller scaled residuals means nothing */
+enum { DRIFT_PARTS = 200, DRIFT_MOST = 10000 }; /* parts of a run, each a point in the figures; limit of rows */
 
 enum { DRIFT_POSITION, DRIFT_VELOCITY, DRIFT_BALANCE, DRIFT_QUANTITIES };
 
@@ -22,7 +22,7 @@ typedef struct {
   pw_grid alpha, beta, every; /* one axis each */
 } pw_drift;
 
-/* ---- Columns: of each quantity the largest value of all steps and of the last part, and the growth ---- */
+/* ---- Columns: for each quantity the largest value of all steps and of the last part, and the growth ---- */
 
 enum { COLUMN_ALPHA = 2, COLUMN_BETA, COLUMN_EVERY, COLUMN_T = 6, COLUMN_QUANTITY, COLUMN_STEPS = 16 };
 
@@ -56,7 +56,7 @@ static const pw_study_column drift_columns[] = {
   { .name = NULL },
 };
 
-/* ---- What is varied ---- */
+/* ---- Values of options ---- */
 
 /* Reads one "NAME=RANGE" into a grid of one axis. */
 static int drift_axis (pw_grid *g, const char *text, pw_error *error) {
@@ -100,7 +100,7 @@ static int drift_axes (pw_drift *x, pw_error *error) {
 
 /* ---- Rows ---- */
 
-/* The first integrator in the list that has an option; rk4 if none has. */
+/* The first integrator in the list that has this option; rk4 if none has it. */
 static const char *drift_integrator (const pw_study *x, const char *option) {
   const pw_method *method;
   int stabilisation;
@@ -111,7 +111,7 @@ static const char *drift_integrator (const pw_study *x, const char *option) {
   return "rk4";
 }
 
-/* The row of a value of an option, with its place on the axis of the figure. */
+/* Adds a row for a value of an option, which is also its abscissa in the figure. */
 static int drift_add (pw_drift *x, int group, int line, const char *method, const char *label, int column, double value,
                       pw_error *error) {
   pw_row *r = pw_study_add (&x->study, group, line, method, 1, error);
@@ -122,7 +122,7 @@ static int drift_add (pw_drift *x, int group, int line, const char *method, cons
   return PW_OK;
 }
 
-/* Pairs of alpha and beta, a line of the figure for each beta. */
+/* Pairs of alpha and beta; the figure has a line for each beta. */
 static int drift_plan_baumgarte (pw_drift *x, pw_error *error) {
   const char *integrator = drift_integrator (&x->study, "alpha");
   char a[32], b[32], method[STUDY_NAME], label[60];
@@ -138,7 +138,7 @@ static int drift_plan_baumgarte (pw_drift *x, pw_error *error) {
   return status;
 }
 
-/* Intervals between projections, a line for each metric. */
+/* Intervals between projections; the figure has a line for each metric. */
 static int drift_plan_projection (pw_drift *x, pw_error *error) {
   static const char *const metric[] = { "metric=mass", "metric=identity" };
   const char *integrator = drift_integrator (&x->study, "every");
@@ -197,7 +197,7 @@ static int drift_part (const pw_study *x, double t) {
   return k < 0 ? 0 : k < DRIFT_PARTS ? k : DRIFT_PARTS - 1;
 }
 
-/* After every accepted step, since between steps a projected method shows nothing of what it corrects. */
+/* Called after every accepted step: samples inside a step of a method with projection show no drift. */
 static int drift_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
   pw_row *r = v->row;
   pw_sample sample;
@@ -214,8 +214,8 @@ static int drift_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
   return PW_OK;
 }
 
-/* The largest value, if there is one, and the exponent of time with which it grows from the middle of the run to its
- * end: 0 if it is bounded; NaN if there is only round-off. */
+/* The largest value, and the exponent of time with which it grows from the middle of the run to its end: 0 if it is
+ * bounded; NaN if there is only round-off. */
 static void drift_finish (pw_row *r, int quantity, double early) {
   double *value = &r->value[COLUMN_QUANTITY + 3 * quantity];
   int known = quantity == DRIFT_BALANCE || value[0] > DRIFT_ROUND_OFF;
@@ -262,8 +262,7 @@ static int drift_write_times (const pw_study *x, pw_error *error) {
   return pw_text_end (o, status, error);
 }
 
-/* A panel for each quantity that is not zero throughout, as the residual of position is without pins: against time,
- * alpha, or the interval between projections. */
+/* A panel for each quantity that is not always zero, against time, alpha, or the interval between projections. */
 static int drift_figures (pw_study *x, pw_error *error) {
   static const char *const name[] = { "drift", "drift-baumgarte", "drift-projection" };
   static const char *const axis[] = { "t [s]", "alpha [1/s]", "steps per projection (every)" };
