@@ -529,12 +529,12 @@ typedef struct {
  * other. */
 typedef struct {
   int count;                             /* elements */
-  int cols;                              /* 3 kind->bodies + kind->own */
+  int cols;                              /* 3 kind->bodies + kind->internal */
   const void *element;                   /* count structures of kind->element bytes, made by kind->prepare */
   const int *body;                       /* count x kind->bodies indices into configuration */
   const pw_configuration *configuration; /* of all bodies of the scene and the ground */
-  const double *q;                       /* count x kind->own: internal coordinates */
-  const double *v;                       /* count x kind->own: their velocities */
+  const double *q;                       /* count x kind->internal: internal coordinates */
+  const double *v;                       /* count x kind->internal: their velocities */
   const double *u;      /* count x kind->signals x 3: value, first and second time derivative of each signal */
   const double *w;      /* count x cols: the vector w, for jw_q only */
   const double *lambda; /* count x kind->rows: multipliers, for power and loss only */
@@ -562,20 +562,20 @@ struct pw_kind {
   size_t element;         /* bytes of the prepared element */
   const pw_field *fields; /* ends with a NULL name; the member `name` is not listed */
   int bodies;             /* bodies of an element: the number of fields of type PW_BODY, or 1 if each_body */
-  int own;                /* internal coordinates */
+  int internal;           /* internal coordinates */
   int rows;               /* constraint equations */
   int signals;    /* signals, in the order of the fields; of its force if force_u is set, else of its constraints */
   int each_body;  /* 1: names no body; acts on every body with mass */
   int constant;   /* 1: its force is constant and evaluated once, when the scene is compiled */
   pw_level level; /* of its constraint equations */
   const pw_quantity *reaction;                                 /* rows: meaning of each -lambda */
-  const pw_quantity *coordinate;                               /* own: the internal coordinates */
+  const pw_quantity *coordinate;                               /* internal: the internal coordinates */
   const char *(*reaction_unit) (const void *element, int row); /* if it depends on the element; may be NULL */
 
   /* Converts a checked definition into a prepared element.  bodies: those it names or acts on, in order; the ground
-   * is a body without mass.  own: receives mass and initial values of each internal coordinate; zero before.
+   * is a body without mass.  internal: receives mass and initial values of each internal coordinate; zero before.
    * Returns a status. */
-  int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+  int (*prepare) (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                   pw_error *error);
 
   pw_batch_function *g;       /* rows: residual of holonomic constraint equations */
@@ -608,7 +608,7 @@ const void *pw_field_at (const pw_kind *kind, const void *definition, pw_field_t
 
 /* 1 if elements of the type influence the motion; 0 for markers. */
 static inline int pw_kind_acts (const pw_kind *kind) {
-  return kind->rows > 0 || kind->own > 0 || kind->force != NULL;
+  return kind->rows > 0 || kind->internal > 0 || kind->force != NULL;
 }
 
 /* 1 if its signals belong to a force: they may depend on states and need no time derivatives. */
@@ -781,7 +781,7 @@ typedef struct {
   const pw_kind *kind; /* kind->level is the type of its constraint equations */
   const int *body;     /* kind->bodies indices; the ground's index is the number of bodies */
   int row;             /* its first constraint equation, of kind->rows */
-  int coordinate;      /* its first internal coordinate, of kind->own */
+  int coordinate;      /* its first internal coordinate, of kind->internal */
   int contact;         /* index of its contact point; -1: no contact point */
   int force;           /* index of its first force in pw_workspace_forces */
 } pw_element_info;

@@ -25,9 +25,9 @@ static const pw_field attraction_fields[] = {
   { .name = NULL },
 };
 
-static int attraction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                               pw_error *error) {
-  (void)bodies, (void)own, (void)error;
+static int attraction_prepare (const void *definition, const pw_body *const *bodies, void *element,
+                               pw_internal *internal, pw_error *error) {
+  (void)bodies, (void)internal, (void)error;
   *(double *)element = ((const attraction *)definition)->strength;
   return PW_OK;
 }
@@ -93,11 +93,11 @@ typedef struct {
   double x, y, a, p, r;
 } wire_element;
 
-static int wire_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int wire_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                          pw_error *error) {
   const wire *d = definition;
   double a = d->axis[0], b = d->axis[1];
-  (void)bodies, (void)own, (void)error;
+  (void)bodies, (void)internal, (void)error;
   *(wire_element *)element = (wire_element){ d->centre[0], d->centre[1], a, 1 / a, a / (b * b) };
   return PW_OK;
 }

@@ -1,4 +1,4 @@
-/* Name tables, arenas, and layouts of one allocation. */
+/* Tables of names, arenas, and arrays in one allocation. */
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
@@ -55,7 +55,7 @@ static size_t store_round (size_t bytes, size_t align) {
   return (bytes + align - 1) / align * align;
 }
 
-static void *store_take (pw_arena *a, size_t bytes, size_t align) {
+static void *arena_alloc (pw_arena *a, size_t bytes, size_t align) {
   size_t used = a->chunk ? store_round (a->chunk->used, align) : 0;
   if (a->chunk == NULL || a->chunk->size < used || a->chunk->size - used < bytes) {
     size_t size = bytes > STORE_CHUNK ? bytes : STORE_CHUNK;
@@ -70,13 +70,13 @@ static void *store_take (pw_arena *a, size_t bytes, size_t align) {
   return a->chunk->data + used;
 }
 
-void *pw_arena_take (pw_arena *a, size_t bytes) {
-  return store_take (a, bytes, STORE_ALIGN);
+void *pw_arena_alloc (pw_arena *a, size_t bytes) {
+  return arena_alloc (a, bytes, STORE_ALIGN);
 }
 
-char *pw_arena_text (pw_arena *a, const char *text) {
+char *pw_arena_copy (pw_arena *a, const char *text) {
   size_t n = strlen (text) + 1;
-  char *copy = store_take (a, n, 1);
+  char *copy = arena_alloc (a, n, 1);
   return copy ? memcpy (copy, text, n) : NULL;
 }
 
@@ -88,17 +88,17 @@ void pw_arena_free (pw_arena *a) {
   }
 }
 
-void *pw_take (pw_layout *l, size_t count, size_t size) {
+void *pw_layout_alloc (pw_layout *l, size_t count, size_t size) {
   void *p = l->base ? l->base + l->used : NULL;
   l->used += store_round (count * size, STORE_ALIGN);
   return p;
 }
 
-char *pw_take_arrays (const pw_array *array, size_t arrays) {
+char *pw_alloc_arrays (const pw_array *array, size_t arrays) {
   pw_layout l = { NULL, 0 };
-  for (size_t i = 0; i < arrays; i++) pw_take (&l, array[i].count, sizeof (double));
+  for (size_t i = 0; i < arrays; i++) pw_layout_alloc (&l, array[i].count, sizeof (double));
   l = (pw_layout){ calloc (1, l.used + 1), 0 };
-  for (size_t i = 0; i < arrays && l.base; i++) *array[i].at = pw_take (&l, array[i].count, sizeof (double));
+  for (size_t i = 0; i < arrays && l.base; i++) *array[i].at = pw_layout_alloc (&l, array[i].count, sizeof (double));
   return l.base;
 }
 

@@ -53,16 +53,16 @@ int pw_names_find (const pw_names *n, const char *name);     /* -1 if absent */
 typedef struct {
   struct pw_chunk *chunk;
 } pw_arena;
-void *pw_arena_take (pw_arena *a, size_t bytes); /* zeroed, or NULL */
-char *pw_arena_text (pw_arena *a, const char *text);
+void *pw_arena_alloc (pw_arena *a, size_t bytes); /* zeroed, or NULL */
+char *pw_arena_copy (pw_arena *a, const char *text);
 void pw_arena_free (pw_arena *a);
 
-/* Lays out one allocation: make the same calls of pw_take twice, first with base NULL to compute the size. */
+/* Lays out one allocation: make the same calls of pw_layout_alloc twice, first with base NULL to compute the size. */
 typedef struct {
   char *base;
   size_t used;
 } pw_layout;
-void *pw_take (pw_layout *l, size_t count, size_t size);
+void *pw_layout_alloc (pw_layout *l, size_t count, size_t size);
 
 /* An array of numbers: where its address is stored, and its length. */
 typedef struct {
@@ -70,7 +70,7 @@ typedef struct {
   size_t count;
 } pw_array;
 /* Lays out arrays in one zeroed allocation and returns it; NULL if out of memory. */
-char *pw_take_arrays (const pw_array *array, size_t arrays);
+char *pw_alloc_arrays (const pw_array *array, size_t arrays);
 
 /* PW_OK if `bytes` can be allocated now, else PW_RESOURCE.  Used before calls of libraries that crash when an
  * allocation fails. */

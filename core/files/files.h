@@ -17,7 +17,7 @@ typedef struct {
 typedef struct {
   pw_arena arena;
   pw_found *found;
-  int count, room;
+  int count, capacity;
   char folders[400]; /* the existing folders, "/first:/second", for messages */
 } pw_search;
 
@@ -29,10 +29,10 @@ void pw_search_close (pw_search *s);
 int pw_search_include (char **include, pw_error *error);
 
 /* folder + "/" + name + ending, malloced; NULL without memory. */
-char *pw_join (const char *folder, const char *name, const char *ending);
+char *pw_path_join (const char *folder, const char *name, const char *ending);
 
 /* Whether a name ends in ".so" or the like, with at least one character before it. */
-int pw_ends_in (const char *name, const char *ending);
+int pw_ends_with (const char *name, const char *ending);
 
 /* ---- Model files in C (build.c) ---- */
 

@@ -22,14 +22,14 @@
 
 /* PREPARE (pin_prepare, pw_pin, pin) { ... } defines a `prepare` that cannot fail: it fills `k`, a pin, from the
  * definition `d`. */
-#define PREPARE(function, definition_type, type)                                                              \
-  static inline void function##_one (const definition_type *d, type *k);                                      \
-  static int function (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own, \
-                       pw_error *error) {                                                                     \
-    (void)bodies, (void)own, (void)error;                                                                     \
-    function##_one (definition, element);                                                                     \
-    return PW_OK;                                                                                             \
-  }                                                                                                           \
+#define PREPARE(function, definition_type, type)                                                                   \
+  static inline void function##_one (const definition_type *d, type *k);                                           \
+  static int function (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal, \
+                       pw_error *error) {                                                                          \
+    (void)bodies, (void)internal, (void)error;                                                                     \
+    function##_one (definition, element);                                                                          \
+    return PW_OK;                                                                                                  \
+  }                                                                                                                \
   static inline void function##_one (const definition_type *d, type *k)
 
 /* Members of a type's table. */

@@ -80,7 +80,7 @@ static const char *fault_functions (const pw_kind *k) {
 }
 
 static int fault_is_long (const char *name) {
-  return strlen (name) > PW_NAME_MOST;
+  return strlen (name) > PW_NAME_MAX;
 }
 
 static const char *fault_names (const pw_kind *k) {
@@ -89,7 +89,7 @@ static const char *fault_names (const pw_kind *k) {
       return "constraint equations without names of their reactions";
     else if (fault_is_long (k->reaction[i].name))
       return "a reaction's name of more than 50 bytes";
-  for (int i = 0; i < k->own; i++)
+  for (int i = 0; i < k->internal; i++)
     if (k->coordinate == NULL || k->coordinate[i].name == NULL || k->coordinate[i].rate == NULL ||
         k->coordinate[i].unit == NULL)
       return "internal coordinates without names";
@@ -102,16 +102,16 @@ const char *pw_kind_check (const pw_kind *k, char *buffer, size_t size) {
   if (k->name == NULL || *k->name == 0) return "no name";
   if (fault_is_long (k->name)) return "a name of more than 50 bytes";
   if (k->definition < sizeof (char *)) return "the definition has no room for its name";
-  if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->own < 0 || k->own > PW_MAX_INTERNAL || k->rows < 0 ||
+  if (k->bodies < 0 || k->bodies > PW_MAX_BODIES || k->internal < 0 || k->internal > PW_MAX_INTERNAL || k->rows < 0 ||
       k->rows > PW_MAX_ROWS || k->signals < 0 || k->signals > PW_MAX_SIGNALS) {
     snprintf (buffer, size, "at most %d bodies, %d internal coordinates, %d constraint equations and %d signals",
               PW_MAX_BODIES, PW_MAX_INTERNAL, PW_MAX_ROWS, PW_MAX_SIGNALS);
     return buffer;
   }
-  if (k->bodies + k->own == 0) return "neither a body nor an internal coordinate";
+  if (k->bodies + k->internal == 0) return "neither a body nor an internal coordinate";
   if (k->level < PW_FORCE || k->level > PW_NONHOLONOMIC || (k->rows > 0) != (k->level != PW_FORCE))
     return "rows and level are inconsistent";
-  if ((k->own > 0 || k->element > 0) && k->prepare == NULL)
+  if ((k->internal > 0 || k->element > 0) && k->prepare == NULL)
     return "an element or internal coordinates, but no prepare function";
   const char *fault = fault_names (k);
   if (*fault == 0) fault = fault_fields (k, buffer, size);

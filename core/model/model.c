@@ -27,8 +27,8 @@ pw_model *pw_model_new (const char *name, const pw_plugin_table *table, pw_error
   pw_model *m = calloc (1, sizeof *m);
   if (m) {
     m->table = table;
-    m->name = pw_arena_text (&m->arena, name);
-    m->parameters = pw_arena_take (&m->arena, table->parameters_size + 1);
+    m->name = pw_arena_copy (&m->arena, name);
+    m->parameters = pw_arena_alloc (&m->arena, table->parameters_size + 1);
   }
   if (m == NULL || m->name == NULL || m->parameters == NULL) {
     pw_model_free (m);
@@ -103,7 +103,7 @@ static int model_grow (pw_model *m, void *array, int count, int *room, size_t si
 
 static const char *model_copy_text (pw_model *m, const char *text) {
   if (text == NULL) return NULL;
-  char *copy = pw_arena_text (&m->arena, text);
+  char *copy = pw_arena_copy (&m->arena, text);
   if (copy == NULL) model_no_memory (m);
   return copy;
 }
@@ -119,7 +119,7 @@ int pw_add_body (pw_model *m, const pw_body *body) {
 }
 
 static const double *model_copy_numbers (pw_model *m, const double *from, int count) {
-  double *copy = pw_arena_take (&m->arena, (size_t)count * sizeof *copy);
+  double *copy = pw_arena_alloc (&m->arena, (size_t)count * sizeof *copy);
   if (copy == NULL) {
     model_no_memory (m);
     return NULL;
@@ -149,7 +149,7 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
       model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
     return m->error.status;
   if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);
-  void *copy = pw_arena_take (&m->arena, kind->definition);
+  void *copy = pw_arena_alloc (&m->arena, kind->definition);
   if (copy == NULL) return model_no_memory (m);
   memcpy (copy, definition, kind->definition);
   const char **name = copy;
@@ -201,7 +201,7 @@ void pw_model_set_reference (pw_model *m, const pw_reference_text *reference) {
 }
 
 int pw_model_keep (pw_model *m, void *object, void (*free_object) (void *object)) {
-  struct pw_kept *k = pw_arena_take (&m->arena, sizeof *k);
+  struct pw_kept *k = pw_arena_alloc (&m->arena, sizeof *k);
   if (k == NULL) {
     free_object (object);
     return model_no_memory (m);

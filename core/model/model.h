@@ -36,7 +36,7 @@ struct pw_model {
 };
 
 /* The longest name [bytes]: "KIND ELEMENT" and "ELEMENT.REACTION" fit in a buffer of 120. */
-enum { PW_NAME_MOST = 50 };
+enum { PW_NAME_MAX = 50 };
 
 /* Checks every body and element: names, numbers, names of bodies, signals. */
 int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);

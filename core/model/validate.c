@@ -37,9 +37,9 @@ int pw_plugin_check (const pw_plugin_table *t, const char *what, pw_error *error
 
 static int check_name (const pw_model *m, const char *what, const char *name, pw_error *error) {
   if (name == NULL || *name == 0) return pw_fail (error, PW_INPUT, "model %s: a %s without a name", m->name, what);
-  if (strlen (name) > PW_NAME_MOST)
+  if (strlen (name) > PW_NAME_MAX)
     return pw_fail (error, PW_INPUT, "model %s: %s \"%.*s...\": a name has at most %d bytes, this one %zu", m->name,
-                    what, PW_NAME_MOST, name, PW_NAME_MOST, strlen (name));
+                    what, PW_NAME_MAX, name, PW_NAME_MAX, strlen (name));
   if (strcmp (name, "ground") == 0)
     return pw_fail (error, PW_INPUT, "model %s: %s \"ground\": this name is reserved for the ground", m->name, what);
   for (const char *c = name; *c; c++)

@@ -1,4 +1,4 @@
-/* Second-order blocks of a scene that are computed by differences, and ones wrongly given as zero. */
+/* Second-order blocks of a scene that are computed by differences, and non-zero ones that are NULL in the table. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -77,7 +77,7 @@ static int differences_search (pw_workspace *w, pw_element_batch *k, pw_random *
   return found;
 }
 
-int pw_find_missing (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size) {
+int pw_find_missing_block (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size) {
   const pw_system *s = w->s;
   pw_random random = { 1 };
   int not_built_in = 0, found = 0;

@@ -1,4 +1,4 @@
-/* The self-test's probe: a random state of a random scene, and the slopes of an element type's functions there. */
+/* The self-test's probe: a random state of a random scene, and the derivatives of an element type's functions there. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -16,8 +16,8 @@ double pw_probe_bound (void) {
   return 100 * cbrt (DBL_EPSILON) * cbrt (DBL_EPSILON);
 }
 
-void pw_probe_note (pw_selftest_report *r, const char *name, const char *about, double error, double bound,
-                    const char *reason, const char *where) {
+void pw_probe_record (pw_selftest_report *r, const char *name, const char *about, double error, double bound,
+                      const char *reason, const char *where) {
   pw_selftest_check *c = r->check;
   while (c < r->check + r->checks && strcmp (c->name, name) != 0) c++;
   if (c == r->check + r->checks) {
@@ -49,7 +49,7 @@ void pw_probe_compare (pw_probe *x, const char *name, const char *about, int row
   char where[120];
   snprintf (where, sizeof where, "%s, row %d, column %d: %.9g for %.9g", x->k->name[at / (rows * cols)],
             at / cols % rows, at % cols, value[at], reference[at]);
-  pw_probe_note (x->report, name, about, worst, pw_probe_bound (), pw_probe_reason, where);
+  pw_probe_record (x->report, name, about, worst, pw_probe_bound (), pw_probe_reason, where);
 }
 
 /* ---- The state ---- */
@@ -73,7 +73,7 @@ void pw_probe_randomise (pw_probe *x, pw_random *r) {
   x->k->b.lambda = x->lambda;
 }
 
-/* ---- Functions of the state, and their slopes ---- */
+/* ---- Functions of the state, and their derivatives ---- */
 
 void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int n, double *out) {
   for (int i = 0; i < n + PW_PROBE_GUARD; i++) out[i] = f ? NAN : 0;
@@ -85,7 +85,7 @@ void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int
   for (int i = n; i < n + PW_PROBE_GUARD; i++) beyond += !isnan (out[i]);
   snprintf (where, sizeof where, "%s: %d of %d entries missing or not finite, %d written beyond", name, untouched, n,
             beyond);
-  pw_probe_note (x->report, "size", "each function fills exactly its array", untouched + beyond, 0, "exact", where);
+  pw_probe_record (x->report, "size", "each function fills exactly its array", untouched + beyond, 0, "exact", where);
 }
 
 void pw_probe_update (pw_probe *x, int j, double h) {
@@ -101,7 +101,7 @@ double pw_probe_local (const pw_probe *x, const double *vector, int e, int c) {
   return pw_probe_ground (x, e, c) ? 0 : vector[pw_global (x->k, e, c)];
 }
 
-void pw_probe_times (pw_probe *x, const double *w, double *out) {
+void pw_probe_multiply_J (pw_probe *x, const double *w, double *out) {
   double J[PW_PROBE_OUT + PW_PROBE_GUARD];
   pw_probe_evaluate (x, x->kind->J, "J", x->elements * x->rows * x->cols, J);
   for (int i = 0; i < x->elements * x->rows; i++) {
@@ -116,13 +116,13 @@ double pw_probe_largest (int n, const double *y) {
   return most;
 }
 
-void pw_probe_slope (pw_probe *x, pw_probe_function *f, int j, int n, double *slope) {
+void pw_probe_derivative (pw_probe *x, pw_probe_function *f, int j, int n, double *derivative) {
   double plus[PW_PROBE_OUT + PW_PROBE_GUARD], minus[PW_PROBE_OUT + PW_PROBE_GUARD];
-  pw_probe_update (x, j, PW_PROBE_H);
+  pw_probe_update (x, j, PW_PROBE_STEP);
   f (x, plus);
-  pw_probe_update (x, j, -PW_PROBE_H);
+  pw_probe_update (x, j, -PW_PROBE_STEP);
   f (x, minus);
   pw_probe_update (x, j, 0);
   x->size = pw_probe_largest (n, plus);
-  for (int i = 0; i < n; i++) slope[i] = (plus[i] - minus[i]) / (2 * PW_PROBE_H);
+  for (int i = 0; i < n; i++) derivative[i] = (plus[i] - minus[i]) / (2 * PW_PROBE_STEP);
 }

@@ -1,6 +1,6 @@
-/* The self-test's probe: a random state of a random scene, and the slopes of an element type's functions there. */
-#ifndef PW_PROBE_INCLUDED
-#define PW_PROBE_INCLUDED
+/* The self-test's probe: a random state of a random scene, and the derivatives of an element type's functions there. */
+#ifndef PW_PROBE_H
+#define PW_PROBE_H
 
 #include "pinwheel-selftest.h"
 #include "random_scene.h"
@@ -13,7 +13,7 @@ enum {
   PW_PROBE_TIME = -2
 };
 
-#define PW_PROBE_H 0x1p-17 /* step of the differences, near eps^(1/3) = 6e-6 */
+#define PW_PROBE_STEP 0x1p-17 /* step of the differences, near eps^(1/3) = 6e-6 */
 
 /* The scene, the state and the report of the test. */
 typedef struct {
@@ -42,11 +42,11 @@ void pw_probe_update (pw_probe *x, int j, double h);
 /* Calls a function that fills n numbers; NULL gives zeros.  Reports a function that writes more or fewer. */
 void pw_probe_evaluate (pw_probe *x, pw_batch_function *f, const char *name, int n, double *out);
 
-/* Slopes of n values of f along a move (see pw_probe_update). */
-void pw_probe_slope (pw_probe *x, pw_probe_function *f, int j, int n, double *slope);
+/* Derivatives of n values of f along a move (see pw_probe_update). */
+void pw_probe_derivative (pw_probe *x, pw_probe_function *f, int j, int n, double *derivative);
 
 /* out = J w, element by element; w: over all coordinates. */
-void pw_probe_times (pw_probe *x, const double *w, double *out);
+void pw_probe_multiply_J (pw_probe *x, const double *w, double *out);
 
 int pw_probe_ground (const pw_probe *x, int e, int c); /* 1: local column c of element e belongs to the ground */
 double pw_probe_local (const pw_probe *x, const double *vector, int e,
@@ -58,8 +58,8 @@ double pw_probe_bound (void);
 extern const char pw_probe_reason[];
 
 /* Records the result of a check, keeping the worst. */
-void pw_probe_note (pw_selftest_report *r, const char *name, const char *about, double error, double bound,
-                    const char *reason, const char *where);
+void pw_probe_record (pw_selftest_report *r, const char *name, const char *about, double error, double bound,
+                      const char *reason, const char *where);
 
 /* Compares elements x rows x cols entries, except the meaningless columns of the ground. */
 void pw_probe_compare (pw_probe *x, const char *name, const char *about, int rows, int cols, const double *value,

@@ -66,7 +66,7 @@ static const char *scene_body (const random_scene *x, int e, int n) {
 
 static void scene_element (pw_model *m, const random_scene *x, int e) {
   static const char *const name[PW_SCENE_ELEMENTS] = { "e0", "e1", "e2" };
-  char *definition = pw_arena_take (&m->arena, x->kind->definition);
+  char *definition = pw_arena_alloc (&m->arena, x->kind->definition);
   if (definition == NULL) {
     pw_fail (&m->error, PW_RESOURCE, "model %s: out of memory", m->name);
     return;

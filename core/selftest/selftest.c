@@ -24,26 +24,26 @@ static void selftest_force (pw_probe *x, double *out) {
 static void selftest_drift (pw_probe *x, double *out) {
   double eta[PW_PROBE_OUT + PW_PROBE_GUARD];
   pw_probe_evaluate (x, x->kind->eta, "eta", x->elements * x->rows, eta);
-  pw_probe_times (x, x->v_now, out);
+  pw_probe_multiply_J (x, x->v_now, out);
   for (int i = 0; i < x->elements * x->rows; i++) out[i] -= eta[i];
 }
 
 /* ---- First-order checks ---- */
 
 static void selftest_holonomic (pw_probe *x) {
-  double value[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT], slope[PW_PROBE_OUT];
+  double value[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT], derivative[PW_PROBE_OUT];
   int n = x->elements * x->rows;
   for (int j = 0; j < x->s->coords; j++) {
-    pw_probe_slope (x, selftest_g, j, n, slope);
+    pw_probe_derivative (x, selftest_g, j, n, derivative);
     for (int i = 0; i < n * x->cols; i++)
-      if (pw_global (x->k, i / (x->rows * x->cols), i % x->cols) == j) reference[i] = slope[i / x->cols];
+      if (pw_global (x->k, i / (x->rows * x->cols), i % x->cols) == j) reference[i] = derivative[i / x->cols];
   }
   for (int i = 0; i < n * x->cols; i++)
     if (pw_probe_ground (x, i / (x->rows * x->cols), i % x->cols)) reference[i] = 0;
   pw_probe_evaluate (x, x->kind->J, "J", n * x->cols, value);
   pw_probe_compare (x, "J", "J = dg/dq", x->rows, x->cols, value, reference);
 
-  pw_probe_slope (x, selftest_g, PW_PROBE_TIME, n, reference);
+  pw_probe_derivative (x, selftest_g, PW_PROBE_TIME, n, reference);
   for (int i = 0; i < n; i++) reference[i] = -reference[i];
   pw_probe_evaluate (x, x->kind->eta, "eta", n, value);
   pw_probe_compare (x, "eta", "eta = -dg/dt", x->rows, 1, value, reference);
@@ -60,8 +60,8 @@ static void selftest_holonomic (pw_probe *x) {
 static void selftest_gamma (pw_probe *x) {
   double value[PW_PROBE_OUT], gamma[PW_PROBE_OUT + PW_PROBE_GUARD], reference[PW_PROBE_OUT];
   int n = x->elements * x->rows;
-  pw_probe_slope (x, selftest_drift, PW_PROBE_MOTION, n, reference);
-  pw_probe_times (x, x->a, value);
+  pw_probe_derivative (x, selftest_drift, PW_PROBE_MOTION, n, reference);
+  pw_probe_multiply_J (x, x->a, value);
   pw_probe_evaluate (x, x->kind->gamma, "gamma", n, gamma);
   for (int i = 0; i < n; i++) value[i] -= gamma[i];
   pw_probe_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", x->rows, 1, value, reference);
@@ -72,12 +72,12 @@ static void selftest_force_u (pw_probe *x) {
       minus[PW_PROBE_OUT + PW_PROBE_GUARD];
   int signals = x->kind->signals, n = x->elements * x->cols;
   for (int u = 0; u < signals; u++) {
-    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] += PW_PROBE_H;
+    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] += PW_PROBE_STEP;
     selftest_force (x, plus);
-    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] -= 2 * PW_PROBE_H;
+    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] -= 2 * PW_PROBE_STEP;
     selftest_force (x, minus);
-    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] += PW_PROBE_H;
-    for (int i = 0; i < n; i++) reference[i * signals + u] = (plus[i] - minus[i]) / (2 * PW_PROBE_H);
+    for (int e = 0; e < x->elements; e++) x->k->u[3 * (e * signals + u)] += PW_PROBE_STEP;
+    for (int i = 0; i < n; i++) reference[i * signals + u] = (plus[i] - minus[i]) / (2 * PW_PROBE_STEP);
   }
   x->size = pw_probe_largest (n, plus);
   pw_probe_evaluate (x, x->kind->force_u, "force_u", n * signals, value);
@@ -93,7 +93,7 @@ static void selftest_constant (pw_probe *x) {
   selftest_force (x, after);
   pw_probe_update (x, PW_PROBE_MOTION, 0);
   for (int i = 0; i < n; i++) changed += before[i] != after[i];
-  pw_probe_note (x->report, "constant", "a constant force does not change", changed, 0, "exact", "");
+  pw_probe_record (x->report, "constant", "a constant force does not change", changed, 0, "exact", "");
 }
 
 /* ---- Second-order blocks ---- */
@@ -181,8 +181,8 @@ static void selftest_saturation (pw_probe *x) {
     double far = out[i + (e + 1) * x->cols], all = selftest_change (x, e, c, isfinite (far) ? far : large, rest);
     double part = selftest_change (x, e, c, (isfinite (far) ? far : large) / 100, rest);
     if (all < 1e-9 * (1 + pw_probe_largest (x->elements * x->cols, rest))) continue;
-    pw_probe_note (x->report, "saturation", "saturation velocity of a saturating force", part / all, 0.5,
-                   "a hundredth of the velocity, half of the change", x->k->name[e]);
+    pw_probe_record (x->report, "saturation", "saturation velocity of a saturating force", part / all, 0.5,
+                     "a hundredth of the velocity, half of the change", x->k->name[e]);
   }
   memcpy (x->v, v, sizeof v);
 }
@@ -226,27 +226,27 @@ static int selftest_satisfy (pw_probe *x, int e) {
  * losses and the rate of its potential energy. */
 static void selftest_power_of (pw_probe *x, int e) {
   double force[PW_PROBE_OUT + PW_PROBE_GUARD], drift[PW_PROBE_OUT], eta[PW_PROBE_OUT + PW_PROBE_GUARD];
-  double slope[PW_SCENE_BATCH], power[PW_SCENE_BATCH + PW_PROBE_GUARD], loss[PW_SCENE_BATCH + PW_PROBE_GUARD];
-  pw_probe_slope (x, selftest_energy, PW_PROBE_MOTION, x->elements, slope);
+  double derivative[PW_SCENE_BATCH], power[PW_SCENE_BATCH + PW_PROBE_GUARD], loss[PW_SCENE_BATCH + PW_PROBE_GUARD];
+  pw_probe_derivative (x, selftest_energy, PW_PROBE_MOTION, x->elements, derivative);
   selftest_force (x, force);
   pw_probe_evaluate (x, x->kind->power, "power", x->elements, power);
   pw_probe_evaluate (x, x->kind->loss, "loss", x->elements, loss);
   double fed = 0, size = fmax (x->size, fmax (fabs (power[e]), fabs (loss[e])));
   for (int c = 0; c < x->cols; c++) fed += force[e * x->cols + c] * pw_probe_local (x, x->v, e, c);
   if (x->rows > 0) {
-    pw_probe_times (x, x->v, drift);
+    pw_probe_multiply_J (x, x->v, drift);
     pw_probe_evaluate (x, x->kind->eta, "eta", x->elements * x->rows, eta);
   }
   for (int r = e * x->rows; r < (e + 1) * x->rows; r++) {
     fed -= x->lambda[r] * drift[r];
     if (x->kind->power == NULL) power[e] -= x->lambda[r] * eta[r];
   }
-  double error = fabs (fed + slope[e] - power[e] + loss[e]) / (1 + size + fabs (fed));
+  double error = fabs (fed + derivative[e] - power[e] + loss[e]) / (1 + size + fabs (fed));
   char where[120];
-  snprintf (where, sizeof where, "%s: %.9g for %.9g", x->k->name[e], fed, power[e] - loss[e] - slope[e]);
-  pw_probe_note (x->report, "power", "force . v = power - loss - d energy/dt", error, pw_probe_bound (),
-                 pw_probe_reason, where);
-  if (x->kind->loss) pw_probe_note (x->report, "loss", "loss >= 0", fmax (-loss[e], 0), 0, "exact", where);
+  snprintf (where, sizeof where, "%s: %.9g for %.9g", x->k->name[e], fed, power[e] - loss[e] - derivative[e]);
+  pw_probe_record (x->report, "power", "force . v = power - loss - d energy/dt", error, pw_probe_bound (),
+                   pw_probe_reason, where);
+  if (x->kind->loss) pw_probe_record (x->report, "loss", "loss >= 0", fmax (-loss[e], 0), 0, "exact", where);
 }
 
 static void selftest_power (pw_probe *x) {
@@ -278,7 +278,7 @@ static void selftest_all (pw_probe *x) {
 int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report, pw_error *error) {
   char buffer[200];
   const char *fault = pw_kind_check (kind, buffer, sizeof buffer);
-  pw_probe_note (report, "table", "consistent sizes, fields and functions", *fault != 0, 0, "exact", fault);
+  pw_probe_record (report, "table", "consistent sizes, fields and functions", *fault != 0, 0, "exact", fault);
   if (*fault) return PW_OK;
   pw_random random = { seed };
   pw_system *s = pw_random_scene (kind, &random, error);
@@ -292,8 +292,8 @@ int pw_selftest (const pw_kind *kind, unsigned seed, pw_selftest_report *report,
   x.elements = s->batch->b.count;
   x.cols = s->batch->b.cols;
   for (int j = 3 * s->bodies; j < s->coords; j++)
-    pw_probe_note (report, "table", "", !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
-                   "inertia of an internal coordinate");
+    pw_probe_record (report, "table", "", !(s->mass[j] >= 0 && isfinite (s->mass[j])), 0, "exact",
+                     "inertia of an internal coordinate");
   pw_probe_randomise (&x, &random);
   selftest_all (&x);
   pw_workspace_free (w);

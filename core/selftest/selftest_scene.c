@@ -25,7 +25,7 @@ typedef struct {
   double *q_now, *v_now;              /* coords: the current state */
   double *local, *lambda;             /* count x cols: w; count x rows */
   double *J, *block;                  /* count x largest block */
-  double *plus, *minus, *slope;       /* count x cols, or rows */
+  double *plus, *minus, *derivative;  /* count x cols, or rows */
   double *value, *terms, *off, *size; /* the same: tested value, sum of |terms|, least error, reference size */
   pw_selftest_report *report;
   char *memory;
@@ -114,23 +114,24 @@ static void scene_drift (scene *x, double *out) {
 /* Updates the least error of each entry by differences with step h. */
 static void scene_differences (scene *x, scene_function *f, scene_move move, int n, double h) {
   static const double weight[] = { 4. / 3, -1. / 3 }; /* extrapolated (Richardson) */
-  scene_zero (x->slope, n);
+  scene_zero (x->derivative, n);
   for (int i = 0; i < 2; i++) {
     double far = ldexp (h, i);
     scene_update (x, move, far);
     f (x, x->plus);
     scene_update (x, move, -far);
     f (x, x->minus);
-    for (int k = 0; k < n; k++) x->slope[k] += weight[i] * (x->plus[k] - x->minus[k]) / (2 * far);
+    for (int k = 0; k < n; k++) x->derivative[k] += weight[i] * (x->plus[k] - x->minus[k]) / (2 * far);
   }
   for (int k = 0; k < n; k++) {
     double noise = 256 * DBL_EPSILON * (fabs (x->plus[k]) + x->size[k]) / h;
-    double off = fmax (0, fabs (x->value[k] - x->slope[k]) - noise) / (x->terms[k] + fabs (x->slope[k]) + DBL_MIN);
+    double off =
+        fmax (0, fabs (x->value[k] - x->derivative[k]) - noise) / (x->terms[k] + fabs (x->derivative[k]) + DBL_MIN);
     if (!(off >= x->off[k])) x->off[k] = off;
   }
 }
 
-/* Compares x->value, rows per element, with the slope of f; x->terms and x->size stand beside it. */
+/* Compares x->value, rows per element, with the derivative of f; x->terms and x->size stand beside it. */
 static void scene_compare (scene *x, const char *name, const char *about, int rows, scene_function *f,
                            scene_move move) {
   int n = x->k->b.count * rows, at = 0;
@@ -142,8 +143,8 @@ static void scene_compare (scene *x, const char *name, const char *about, int ro
     if (!(x->off[k] <= x->off[at])) at = k;
   if (n > 0)
     snprintf (where, sizeof where, "%s %s, row %d: %.9g for %.9g", x->k->kind->name, x->k->name[at / rows], at % rows,
-              x->value[at], x->slope[at]);
-  pw_probe_note (x->report, name, about, n > 0 ? x->off[at] : 0, SCENE_BOUND, scene_reason, where);
+              x->value[at], x->derivative[at]);
+  pw_probe_record (x->report, name, about, n > 0 ? x->off[at] : 0, SCENE_BOUND, scene_reason, where);
 }
 
 /* The most numbers of an element in any comparison. */
@@ -176,10 +177,10 @@ static void scene_holonomic (scene *x) {
 static void scene_acceleration (scene *x) {
   int rows = x->k->kind->rows, n = x->k->b.count * rows;
   scene_clear (x);
-  scene_gamma (x, x->slope);
+  scene_gamma (x, x->derivative);
   scene_evaluate (x, x->k->kind->J, rows * x->k->b.cols, x->J);
   scene_times (x, x->J, rows, x->a, x->tau, x->value, x->terms);
-  for (int i = 0; i < n; i++) x->value[i] -= x->tau * x->slope[i], x->terms[i] += fabs (x->tau * x->slope[i]);
+  for (int i = 0; i < n; i++) x->value[i] -= x->tau * x->derivative[i], x->terms[i] += fabs (x->tau * x->derivative[i]);
   scene_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", rows, scene_drift, SCENE_MOTION);
 }
 
@@ -274,13 +275,13 @@ static int scene_open (scene *x) {
     { &x->block, each * width },
     { &x->plus, each },
     { &x->minus, each },
-    { &x->slope, each },
+    { &x->derivative, each },
     { &x->value, each },
     { &x->terms, each },
     { &x->off, each },
     { &x->size, each },
   };
-  x->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 

@@ -140,7 +140,7 @@ int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double
     { &x.force, coords },           { &x.position_size, rows }, { &x.velocity_size, rows },
     { &x.acceleration_size, rows }, { &x.force_size, coords },  { &x.block, verify_room (s) },
   };
-  char *memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   pw_workspace *w = memory ? pw_workspace_new (s, NULL) : NULL;
   int status = PW_RESOURCE;
   if (w) {

@@ -37,7 +37,7 @@ static const char *const form_interpolation[] = { "linear", "cubic", NULL }, *co
 
 static const pw_field form_table[] = {
   { FORM_AT (table, interpolation), PW_CHOICE, .choices = form_interpolation,
-    .about = "interpolation interpolation between the points" },
+    .about = "interpolation between the points" },
   { FORM_AT (table, ends), PW_CHOICE, .choices = form_ends,
     .about = "end conditions of a cubic table: free (not-a-knot), or at rest (zero slope)" },
   { FORM_AT (table, scale), PW_NUMBER, .about = "factor of the values; 0 or omitted: 1" },
@@ -77,7 +77,7 @@ static void form_numbers (const pw_signal *s, const pw_signal_form *form, char *
 static void form_pulses (const pw_signal *s, char *text, size_t size) {
   double width = s->pulse.width, period = s->pulse.period;
   if (period > 0 && !(width > 0 && width < period))
-    snprintf (text, size, "a pulse each %g s: expected a width > 0 and < %g s, found %g s", period, period, width);
+    snprintf (text, size, "a pulse every %g s: expected a width > 0 and < %g s, found %g s", period, period, width);
 }
 
 static void form_points (const pw_signal *s, int *point, char *text, size_t size) {
@@ -94,8 +94,8 @@ static void form_points (const pw_signal *s, int *point, char *text, size_t size
     if (!isfinite (t[i]) || !isfinite (s->table.value[i]))
       snprintf (text, size, "point %d is (%g, %g): expected finite numbers", i + 1, t[i], s->table.value[i]);
     else if (!isfinite (pw_table_value (s, i)))
-      snprintf (text, size, "point %d: %g times %g, and %g added: expected a finite number", i + 1, s->table.value[i],
-                s->table.scale, s->table.offset);
+      snprintf (text, size, "point %d: %g * %g + %g: expected a finite value", i + 1, s->table.value[i], s->table.scale,
+                s->table.offset);
     else if (i > 0 && !(t[i] > t[i - 1]))
       snprintf (text, size, "point %d is at t = %.9g s, after one at %.9g s: expected increasing times", i + 1, t[i],
                 t[i - 1]);

@@ -1,4 +1,4 @@
-/* Tables: signals through given points (t_i, y_i).
+/* Tables: signals that interpolate points (t_i, y_i).
  *
  *   u = y_i + b_i s + M_i s^2 / 2 + (M_j - M_i) s^3 / (6 h),   s = t - t_i,  j = i + 1,  h = t_j - t_i
  *
@@ -16,32 +16,32 @@
 /* Row i of the equations for M: coefficients of M_k, M_i and M_j, and the right-hand side. */
 static void table_row (const double *t, const double *y, int n, int ends, int i, double row[4]) {
   double before = i > 0 ? t[i] - t[i - 1] : 0, after = i < n - 1 ? t[i + 1] - t[i] : 0;
-  double from = i > 0 ? (y[i] - y[i - 1]) / before : 0, to = i < n - 1 ? (y[i + 1] - y[i]) / after : 0;
+  double slope_before = i > 0 ? (y[i] - y[i - 1]) / before : 0, slope_after = i < n - 1 ? (y[i + 1] - y[i]) / after : 0;
   row[0] = before;
   row[1] = 2 * (before + after);
   row[2] = after;
-  row[3] = 6 * (to - from);
+  row[3] = 6 * (slope_after - slope_before);
   if (ends == PW_ENDS_REST) return;
   if (i == 1) row[1] += before + before * (before / after), row[2] -= before * (before / after);
   if (i == n - 2) row[1] += after + after * (after / before), row[0] -= after * (after / before);
 }
 
-/* The M of a free end: linear extrapolation of the next two. */
+/* M at a free end, extrapolated linearly from the next two points. */
 static double table_end (double t0, double t1, double t2, double M1, double M2) {
   return M1 + (M1 - M2) * ((t1 - t0) / (t2 - t1));
 }
 
-/* M by elimination without pivoting; the rows are diagonally dominant.  `up` is scratch. */
-static void table_accelerations (const double *t, const double *y, int n, int ends, double *M, double *up) {
+/* Solves the tridiagonal equations for M without pivoting; they are diagonally dominant.  `upper`: n scratch numbers. */
+static void table_second_derivatives (const double *t, const double *y, int n, int ends, double *M, double *upper) {
   int first = ends == PW_ENDS_REST ? 0 : 1, last = n - 1 - first;
   double row[4];
   for (int i = first; i <= last; i++) {
     table_row (t, y, n, ends, i, row);
-    double pivot = row[1] - (i > first ? row[0] * up[i - 1] : 0);
-    up[i] = row[2] / pivot;
+    double pivot = row[1] - (i > first ? row[0] * upper[i - 1] : 0);
+    upper[i] = row[2] / pivot;
     M[i] = (row[3] - (i > first ? row[0] * M[i - 1] : 0)) / pivot;
   }
-  for (int i = last - 1; i >= first; i--) M[i] -= up[i] * M[i + 1];
+  for (int i = last - 1; i >= first; i--) M[i] -= upper[i] * M[i + 1];
   if (ends == PW_ENDS_REST) return;
   M[0] = table_end (t[0], t[1], t[2], M[1], M[2]);
   M[n - 1] = table_end (t[n - 1], t[n - 2], t[n - 3], M[n - 2], M[n - 3]);
@@ -52,7 +52,7 @@ void pw_table_spline (const pw_signal *s, double *spline) {
   int n = s->table.count;
   double *b = spline, *M = spline + n;
   memset (spline, 0, 2 * (size_t)n * sizeof *spline);
-  if (s->table.interpolation == PW_CUBIC) table_accelerations (t, y, n, s->table.ends, M, b);
+  if (s->table.interpolation == PW_CUBIC) table_second_derivatives (t, y, n, s->table.ends, M, b);
   for (int i = 0; i < n - 1; i++) {
     double h = t[i + 1] - t[i];
     b[i] = (y[i + 1] - y[i]) / h - h * (2 * M[i] + M[i + 1]) / 6;
@@ -78,10 +78,10 @@ void pw_table_eval (const pw_signal *s, const double *spline, double t, double u
   u[1] = u[2] = 0;
   if (passed == 0 || passed == n) return;
   double x = t - s->table.t[i], b = spline[i], M = spline[n + i];
-  double jerk = (spline[n + i + 1] - M) / (s->table.t[i + 1] - s->table.t[i]);
-  u[0] += x * (b + x * (M / 2 + x * (jerk / 6)));
-  u[1] = b + x * (M + x * (jerk / 2));
-  u[2] = M + x * jerk;
+  double third = (spline[n + i + 1] - M) / (s->table.t[i + 1] - s->table.t[i]);
+  u[0] += x * (b + x * (M / 2 + x * (third / 6)));
+  u[1] = b + x * (M + x * (third / 2));
+  u[2] = M + x * third;
 }
 
 /* A linear table has a kink at each point; a cubic one at its ends, and a kink of its second derivative at each

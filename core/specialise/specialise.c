@@ -95,8 +95,9 @@ static void specialise_batch (const specialise_scene *x, int k, int e, const cha
   fprintf (x->out, "%s };\n    const pw_batch b = { .count = 1, .cols = %d, .body = body, .configuration = c,\n",
            b->kind->bodies ? "" : "0", b->b.cols);
   fprintf (x->out, "      .element = (const char *)s->element[%d] + %zu", k, (size_t)e * b->kind->element);
-  if (b->kind->own)
-    fprintf (x->out, ", .q = q + %d, .v = v + %d", b->own + e * b->kind->own, b->own + e * b->kind->own);
+  if (b->kind->internal)
+    fprintf (x->out, ", .q = q + %d, .v = v + %d", b->internal + e * b->kind->internal,
+             b->internal + e * b->kind->internal);
   if (b->kind->signals) fprintf (x->out, ", .u = s->u + %d", 3 * (x->u[k] + e * b->kind->signals));
   fprintf (x->out, "%s };\n", more);
 }
@@ -455,7 +456,7 @@ unsigned long pw_system_shape (const pw_system *s) {
     const pw_element_batch *b = &s->batch[k];
     specialise_hash (&h, b->kind->name, strlen (b->kind->name) + 1);
     specialise_hash (&h, b->b.body, (size_t)(b->b.count * b->kind->bodies) * sizeof *b->b.body);
-    const int sizes[] = { b->b.count, (int)b->kind->element, b->kind->rows, b->kind->own, b->kind->signals };
+    const int sizes[] = { b->b.count, (int)b->kind->element, b->kind->rows, b->kind->internal, b->kind->signals };
     specialise_hash (&h, sizes, sizeof sizes);
   }
   for (int i = 0; i < s->sources; i++)

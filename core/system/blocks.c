@@ -32,7 +32,7 @@ pw_batch_function *pw_block_function (const pw_kind *kind, pw_block block) {
 }
 
 int pw_block_rows (const pw_kind *kind, pw_block block) {
-  return blocks_table[block].columns ? 3 * kind->bodies + kind->own : kind->rows;
+  return blocks_table[block].columns ? 3 * kind->bodies + kind->internal : kind->rows;
 }
 
 /* A batch of one element with a copy of its configurations, which can be changed without affecting other elements. */
@@ -52,9 +52,9 @@ static void blocks_isolate (const pw_element_batch *k, int e, blocks_single *one
     one->configuration[n] = k->b.configuration[k->b.body[e * kind->bodies + n]];
     one->body[n] = n;
   }
-  for (int n = 0; n < kind->own; n++) {
-    one->q[n] = k->b.q[e * kind->own + n];
-    one->v[n] = k->b.v[e * kind->own + n];
+  for (int n = 0; n < kind->internal; n++) {
+    one->q[n] = k->b.q[e * kind->internal + n];
+    one->v[n] = k->b.v[e * kind->internal + n];
   }
   one->b.body = one->body;
   one->b.configuration = one->configuration;

@@ -19,8 +19,8 @@ typedef struct {
   const pw_kind **kind;    /* element types in use, in the order of the batches */
   int *count;              /* elements of each of them */
   int *batch_of;           /* elements of the description: index of the batch */
-  size_t room;             /* bytes of the largest element and its guard */
-  unsigned char *prepared; /* room bytes, in which an element is prepared */
+  size_t bytes;            /* of the largest element and its guard */
+  unsigned char *prepared; /* bytes: memory in which an element is prepared */
 } compilation;
 
 static int compile_no_memory (const compilation *c) {
@@ -28,14 +28,14 @@ static int compile_no_memory (const compilation *c) {
 }
 
 /* Memory that belongs to the system.  NULL and the error if out of memory. */
-static void *compile_take (const compilation *c, size_t count, size_t size) {
-  void *p = pw_arena_take (&c->s->arena, count * size);
+static void *compile_alloc (const compilation *c, size_t count, size_t size) {
+  void *p = pw_arena_alloc (&c->s->arena, count * size);
   if (p == NULL) compile_no_memory (c);
   return p;
 }
 
 static const char *compile_text (const compilation *c, const char *text) {
-  const char *copy = pw_arena_text (&c->s->arena, text);
+  const char *copy = pw_arena_copy (&c->s->arena, text);
   if (copy == NULL) compile_no_memory (c);
   return copy;
 }
@@ -73,10 +73,10 @@ static int compile_copies (const pw_model *m, const pw_kind *kind) {
 static int compile_types (compilation *c) {
   static const pw_level order[] = { PW_HOLONOMIC, PW_NONHOLONOMIC, PW_FORCE };
   const pw_model *m = c->m;
-  size_t room = (size_t)m->elements + 1;
-  c->kind = pw_arena_take (&c->scratch, room * sizeof *c->kind);
-  c->count = pw_arena_take (&c->scratch, room * sizeof *c->count);
-  c->batch_of = pw_arena_take (&c->scratch, room * sizeof *c->batch_of);
+  size_t types = (size_t)m->elements + 1;
+  c->kind = pw_arena_alloc (&c->scratch, types * sizeof *c->kind);
+  c->count = pw_arena_alloc (&c->scratch, types * sizeof *c->count);
+  c->batch_of = pw_arena_alloc (&c->scratch, types * sizeof *c->batch_of);
   if (c->kind == NULL || c->count == NULL || c->batch_of == NULL) return compile_no_memory (c);
   for (int l = 0; l < 3; l++)
     for (int i = 0; i < m->elements; i++) {
@@ -87,9 +87,9 @@ static int compile_types (compilation *c) {
       if (k == c->s->batches) c->kind[c->s->batches++] = kind;
       c->count[k] += compile_copies (m, kind);
       c->batch_of[i] = k;
-      if (c->room < kind->element + COMPILE_GUARD) c->room = kind->element + COMPILE_GUARD;
+      if (c->bytes < kind->element + COMPILE_GUARD) c->bytes = kind->element + COMPILE_GUARD;
     }
-  c->prepared = pw_arena_take (&c->scratch, c->room);
+  c->prepared = pw_arena_alloc (&c->scratch, c->bytes);
   return c->prepared ? PW_OK : compile_no_memory (c);
 }
 
@@ -99,7 +99,7 @@ static int compile_count (const compilation *c) {
   double coords = 3.0 * m->bodies, rows = 0;
   if (m->bodies == 0) return pw_fail (c->error, PW_INPUT, "model %s has no body", m->name);
   for (int k = 0; k < s->batches; k++) {
-    coords += (double)c->count[k] * c->kind[k]->own;
+    coords += (double)c->count[k] * c->kind[k]->internal;
     rows += (double)c->count[k] * c->kind[k]->rows;
   }
   if (coords > INT_MAX / 64 || rows > INT_MAX / 64)
@@ -109,7 +109,7 @@ static int compile_count (const compilation *c) {
   s->rows = (int)rows;
   for (int k = 0; k < s->batches; k++) {
     if (c->kind[k]->level == PW_HOLONOMIC) s->holonomic += c->count[k] * c->kind[k]->rows;
-    s->entries += c->count[k] * pw_ledger_most (c->kind[k]);
+    s->entries += c->count[k] * pw_ledger_max_entries (c->kind[k]);
     s->sources += c->count[k] * c->kind[k]->signals;
   }
   return PW_OK;
@@ -118,27 +118,27 @@ static int compile_count (const compilation *c) {
 static int compile_arrays (const compilation *c) {
   pw_system *s = c->s;
   size_t coords = (size_t)s->coords, bodies = (size_t)s->bodies;
-  s->batch = compile_take (c, (size_t)s->batches, sizeof *s->batch);
-  s->source = compile_take (c, (size_t)s->sources, sizeof *s->source);
-  s->body_name = compile_take (c, bodies, sizeof *s->body_name);
-  s->mass = compile_take (c, coords, sizeof *s->mass);
-  s->metric = compile_take (c, coords, sizeof *s->metric);
-  s->constant = compile_take (c, coords + 3, sizeof *s->constant);
-  s->q0 = compile_take (c, coords, sizeof *s->q0);
-  s->v0 = compile_take (c, coords, sizeof *s->v0);
-  s->origin = compile_take (c, 2 * coords, 1);
-  s->entry = compile_take (c, (size_t)s->entries, sizeof *s->entry);
+  s->batch = compile_alloc (c, (size_t)s->batches, sizeof *s->batch);
+  s->source = compile_alloc (c, (size_t)s->sources, sizeof *s->source);
+  s->body_name = compile_alloc (c, bodies, sizeof *s->body_name);
+  s->mass = compile_alloc (c, coords, sizeof *s->mass);
+  s->metric = compile_alloc (c, coords, sizeof *s->metric);
+  s->constant = compile_alloc (c, coords + 3, sizeof *s->constant);
+  s->q0 = compile_alloc (c, coords, sizeof *s->q0);
+  s->v0 = compile_alloc (c, coords, sizeof *s->v0);
+  s->origin = compile_alloc (c, 2 * coords, 1);
+  s->entry = compile_alloc (c, (size_t)s->entries, sizeof *s->entry);
   int complete = s->batch && s->source && s->body_name && s->mass && s->metric && s->constant && s->q0 && s->v0;
   return complete && s->origin && s->entry ? PW_OK : PW_RESOURCE;
 }
 
 /* ---- Bodies and elements ---- */
 
-/* Origin of the initial value of a body's state (0 to 5); `perhaps` for a 0 of a body that does not say which it
- * specifies. */
-static unsigned char compile_origin (const pw_body *b, double value, int state, unsigned char perhaps) {
+/* Origin of the initial value of a body's state (0 to 5); `zero` for a 0 in a body without
+ * `specified`. */
+static unsigned char compile_origin (const pw_body *b, double value, int state, unsigned char zero) {
   if (b->specified) return b->specified >> state & 1 ? PW_SPECIFIED : 0;
-  return value != 0 ? PW_SPECIFIED : perhaps;
+  return value != 0 ? PW_SPECIFIED : zero;
 }
 
 static int compile_bodies (const compilation *c) {
@@ -153,7 +153,7 @@ static int compile_bodies (const compilation *c) {
     memcpy (s->q0 + 3 * i, b->start, sizeof b->start);
     memcpy (s->v0 + 3 * i, b->rate, sizeof b->rate);
     for (int k = 0; k < 3; k++) {
-      s->origin[3 * i + k] = compile_origin (b, b->start[k], k, PW_PERHAPS);
+      s->origin[3 * i + k] = compile_origin (b, b->start[k], k, PW_UNSPECIFIED);
       s->origin[s->coords + 3 * i + k] = compile_origin (b, b->rate[k], 3 + k, 0);
     }
   }
@@ -165,12 +165,12 @@ static int compile_prepare (const compilation *c, const pw_element *from, const 
                             pw_internal *internal, void *element) {
   const pw_kind *kind = from->kind;
   size_t size = kind->element;
-  pw_error why = { 0 };
+  pw_error cause = { 0 };
   memset (c->prepared, 0, size);
   memset (c->prepared + size, COMPILE_MARK, COMPILE_GUARD);
-  if (kind->prepare (from->definition, bodies, c->prepared, internal, &why) != PW_OK)
+  if (kind->prepare (from->definition, bodies, c->prepared, internal, &cause) != PW_OK)
     return pw_fail (c->error, PW_INPUT, "model %s: %s %s: %s", c->m->name, kind->name, pw_element_name (from),
-                    why.text);
+                    cause.text);
   for (size_t i = 0; i < COMPILE_GUARD; i++)
     if (c->prepared[size + i] != COMPILE_MARK)
       return pw_fail (c->error, PW_INPUT,
@@ -206,7 +206,7 @@ static int compile_element (const compilation *c, const pw_element_batch *k, con
   if (kind->prepare == NULL) return PW_OK;
   pw_internal internal[PW_MAX_INTERNAL] = { { 0 } };
   if (compile_prepare (c, from, bodies, internal, a->element + (size_t)e * kind->element) != PW_OK) return PW_INPUT;
-  for (int n = 0, j = k->own + e * kind->own; n < kind->own; n++, j++) {
+  for (int n = 0, j = k->internal + e * kind->internal; n < kind->internal; n++, j++) {
     s->mass[j] = internal[n].mass;
     s->q0[j] = internal[n].start;
     s->v0[j] = internal[n].rate;
@@ -236,21 +236,21 @@ static int compile_batch (const compilation *c, int i, const batch_arrays *a) {
 
 static int compile_batches (const compilation *c) {
   pw_system *s = c->s;
-  int row = 0, own = 3 * s->bodies;
+  int row = 0, internal = 3 * s->bodies;
   pw_source *source = s->source;
   for (int i = 0; i < s->batches; i++) {
     const pw_kind *kind = c->kind[i];
     size_t n = (size_t)c->count[i], bodies = n * (size_t)kind->bodies;
-    batch_arrays a = { compile_take (c, n, kind->element), compile_take (c, bodies, sizeof (int)),
-                       compile_take (c, bodies, sizeof (int)), compile_take (c, n, sizeof (char *)) };
+    batch_arrays a = { compile_alloc (c, n, kind->element), compile_alloc (c, bodies, sizeof (int)),
+                       compile_alloc (c, bodies, sizeof (int)), compile_alloc (c, n, sizeof (char *)) };
     if (!a.element || !a.body || !a.column || !a.name) return PW_RESOURCE;
     pw_element_batch *k = &s->batch[i];
     *k = (pw_element_batch){
-      .kind = kind, .row = row, .own = own, .column = a.column, .name = a.name, .source = source
+      .kind = kind, .row = row, .internal = internal, .column = a.column, .name = a.name, .source = source
     };
-    k->b = (pw_batch){ c->count[i], 3 * kind->bodies + kind->own, .element = a.element, .body = a.body };
+    k->b = (pw_batch){ c->count[i], 3 * kind->bodies + kind->internal, .element = a.element, .body = a.body };
     row += c->count[i] * kind->rows;
-    own += c->count[i] * kind->own;
+    internal += c->count[i] * kind->internal;
     source += c->count[i] * kind->signals;
     if (compile_batch (c, i, &a) != PW_OK) return PW_INPUT;
   }
@@ -263,7 +263,7 @@ static int compile_batches (const compilation *c) {
 static int compile_table (const compilation *c, pw_source *source) {
   pw_signal *s = &source->signal;
   size_t n = (size_t)s->table.count;
-  double *t = compile_take (c, 4 * n, sizeof *t), *value = t + n;
+  double *t = compile_alloc (c, 4 * n, sizeof *t), *value = t + n;
   if (t == NULL) return PW_RESOURCE;
   memcpy (t, s->table.t, n * sizeof *t);
   for (size_t i = 0; i < n; i++) value[i] = pw_table_value (s, (int)i);
@@ -280,13 +280,13 @@ static int compile_reads (const compilation *c, pw_source *source, const char *e
   const char *const *reads = source->signal.function.reads;
   int count = 0;
   while (reads && reads[count]) count++;
-  int *state = compile_take (c, (size_t)count, sizeof *state);
+  int *state = compile_alloc (c, (size_t)count, sizeof *state);
   if (state == NULL) return PW_RESOURCE;
   for (int i = 0; i < count; i++) {
-    pw_error why = { 0 };
-    state[i] = pw_system_find_state (c->s, reads[i], &why);
+    pw_error cause = { 0 };
+    state[i] = pw_system_find_state (c->s, reads[i], &cause);
     if (state[i] < 0)
-      return pw_fail (c->error, PW_INPUT, "model %s: element %s reads a state: %s", c->m->name, element, why.text);
+      return pw_fail (c->error, PW_INPUT, "model %s: element %s reads a state: %s", c->m->name, element, cause.text);
   }
   source->state = state;
   source->reads = count;
@@ -368,7 +368,7 @@ static void compile_metric (pw_system *s) {
     s->metric[j] = s->mass[j] > 0 ? s->mass[j] : weight * (pw_is_angle (s, j) ? L2 : 1);
 }
 
-/* Sums that concern whole batches, and the constant forces, which do not depend on the state. */
+/* Numbers of batches by property, and the constant forces. */
 static int compile_totals (const compilation *c) {
   pw_system *s = c->s;
   int constant = 0;

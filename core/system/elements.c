@@ -20,7 +20,7 @@ pw_element_info pw_system_element (const pw_system *s, int element) {
   x.name = k->name[element];
   x.body = k->b.body + element * k->kind->bodies;
   x.row = k->row + element * k->kind->rows;
-  x.coordinate = k->own + element * k->kind->own;
+  x.coordinate = k->internal + element * k->kind->internal;
   x.contact = k->kind->contact ? x.contact + element : -1;
   x.force += 3 * element * k->kind->bodies;
   return x;
@@ -124,7 +124,7 @@ static int elements_allocate (const pw_workspace *w, pw_equations *out, pw_error
                              { &out->value, entries }, { &indices, entries } }; /* two indices fit in one double */
   *out =
       (pw_equations){ .coordinates = s->coords, .rows = s->rows, .holonomic = s->holonomic, .entries = (int)entries };
-  if (pw_take_arrays (array, sizeof array / sizeof *array) == NULL)
+  if (pw_alloc_arrays (array, sizeof array / sizeof *array) == NULL)
     return pw_fail (error, PW_RESOURCE, "model %s: out of memory", s->model);
   out->row = (int *)(void *)indices;
   out->column = out->row + entries;

@@ -49,17 +49,17 @@ static inline const double *evaluate_add (double *to, const double *force) {
 }
 
 PW_NOINLINE void evaluate_add_internal (const pw_element_batch *k, double *f) {
-  const int own = k->kind->own, *column = k->column;
+  const int internal = k->kind->internal, *column = k->column;
   const double *block = k->block;
   for (int e = 0; e < k->b.count; e++) {
     for (int n = 0; n < k->kind->bodies; n++) block = evaluate_add (f + *column++, block);
-    for (int n = 0; n < own; n++) f[k->own + e * own + n] += *block++;
+    for (int n = 0; n < internal; n++) f[k->internal + e * internal + n] += *block++;
   }
 }
 
 static inline void evaluate_add_force (const pw_element_batch *k, double *f) {
   k->kind->force (&k->b, k->block);
-  if (k->kind->own > 0) {
+  if (k->kind->internal > 0) {
     evaluate_add_internal (k, f);
     return;
   }
@@ -100,18 +100,18 @@ double pw_kinetic (const pw_system *s, const double *v) {
   return sum / 2;
 }
 
-/* out = J w for a batch; `bodies` and `own` are constants after inlining. */
+/* out = J w for a batch; `bodies` and `internal` are constants after inlining. */
 PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, const double *w, double *out, int bodies,
-                             int own) {
+                             int internal) {
   static const double ground[3] = { 0, 0, 0 };
-  const double *J = k->J, *x[PW_MAX_BODIES] = { 0 }, *y = w + k->own;
+  const double *J = k->J, *x[PW_MAX_BODIES] = { 0 }, *y = w + k->internal;
   const int *column = k->column;
-  for (int e = 0; e < k->b.count; e++, column += bodies, y += own) {
+  for (int e = 0; e < k->b.count; e++, column += bodies, y += internal) {
     PW_UNROLL for (int n = 0; n < bodies; n++) x[n] = column[n] < s->coords ? w + column[n] : ground;
     for (int r = 0; r < k->kind->rows; r++) {
       double sum = 0;
       PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) sum += J[0] * x[n][0] + J[1] * x[n][1] + J[2] * x[n][2];
-      for (int n = 0; n < own; n++) sum += *J++ * y[n];
+      for (int n = 0; n < internal; n++) sum += *J++ * y[n];
       *out++ = sum;
     }
   }
@@ -120,12 +120,12 @@ PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, cons
 void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
   for (const pw_element_batch *k = w->batch, *end = k + w->s->constraints; k < end; k++) {
     double *to = out + k->row;
-    if (k->kind->own == 0 && k->kind->bodies == 2)
+    if (k->kind->internal == 0 && k->kind->bodies == 2)
       evaluate_mul (w->s, k, x, to, 2, 0);
-    else if (k->kind->own == 0 && k->kind->bodies == 1)
+    else if (k->kind->internal == 0 && k->kind->bodies == 1)
       evaluate_mul (w->s, k, x, to, 1, 0);
     else
-      evaluate_mul (w->s, k, x, to, k->kind->bodies, k->kind->own);
+      evaluate_mul (w->s, k, x, to, k->kind->bodies, k->kind->internal);
   }
 }
 
@@ -140,7 +140,7 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
           to[1] += J[1] * *lambda;
           to[2] += J[2] * *lambda;
         }
-        for (int n = 0; n < k->kind->own; n++) out[k->own + e * k->kind->own + n] += *J++ * *lambda;
+        for (int n = 0; n < k->kind->internal; n++) out[k->internal + e * k->kind->internal + n] += *J++ * *lambda;
       }
   }
 }
@@ -171,11 +171,11 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
 /* Updates the worst residual J v - eta with a batch, at the velocities of the workspace; eta NULL: zero. */
 PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, const double *eta,
                                                   const unsigned char *enforced, double unit, evaluate_worst worst,
-                                                  int bodies, int own) {
+                                                  int bodies, int internal) {
   const double *J = k->J, *y = k->b.v;
   const int *body = k->b.body;
   int i = k->row;
-  for (int e = 0; e < k->b.count; e++, body += bodies, y += own)
+  for (int e = 0; e < k->b.count; e++, body += bodies, y += internal)
     for (int r = 0; r < k->kind->rows; r++, i++) {
       double sum = 0, size = 0;
       PW_UNROLL for (int n = 0; n < bodies; n++, J += 3) {
@@ -184,7 +184,7 @@ PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, con
         sum += vx + vy + w;
         size += fabs (vx) + fabs (vy) + fabs (w);
       }
-      for (int n = 0; n < own; n++) {
+      for (int n = 0; n < internal; n++) {
         double spin = *J++ * y[n];
         sum += spin;
         size += fabs (spin);
@@ -198,7 +198,7 @@ PW_INLINE evaluate_worst evaluate_worst_velocity (const pw_element_batch *k, con
 PW_NOINLINE evaluate_worst evaluate_worst_velocity_any (const pw_element_batch *k, const double *eta,
                                                         const unsigned char *enforced, double unit,
                                                         evaluate_worst worst) {
-  return evaluate_worst_velocity (k, eta, enforced, unit, worst, k->kind->bodies, k->kind->own);
+  return evaluate_worst_velocity (k, eta, enforced, unit, worst, k->kind->bodies, k->kind->internal);
 }
 
 void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforced, pw_residuals *r) {
@@ -206,9 +206,9 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
   evaluate_worst worst = { .row = -1 };
   if (eta) pw_evaluate_eta (w, eta);
   EACH_CONSTRAINT (k, w) {
-    if (k->kind->own == 0 && k->kind->bodies == 2)
+    if (k->kind->internal == 0 && k->kind->bodies == 2)
       worst = evaluate_worst_velocity (k, eta, enforced, unit, worst, 2, 0);
-    else if (k->kind->own == 0 && k->kind->bodies == 1)
+    else if (k->kind->internal == 0 && k->kind->bodies == 1)
       worst = evaluate_worst_velocity (k, eta, enforced, unit, worst, 1, 0);
     else
       worst = evaluate_worst_velocity_any (k, eta, enforced, unit, worst);

@@ -8,8 +8,8 @@
 /* Internal coordinates are not copied: batches point into q and v. */
 void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
   for (pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
-    if (q) k->b.q = q + k->own;
-    k->b.v = v + k->own;
+    if (q) k->b.q = q + k->internal;
+    k->b.v = v + k->internal;
   }
 }
 

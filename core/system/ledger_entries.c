@@ -2,7 +2,7 @@
 #include <stdio.h>
 #include "system.h"
 
-int pw_ledger_most (const pw_kind *k) {
+int pw_ledger_max_entries (const pw_kind *k) {
   return (k->power != NULL || (k->rows > 0 && k->eta != NULL)) + (k->loss != NULL);
 }
 

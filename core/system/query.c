@@ -67,10 +67,10 @@ int pw_system_find_body (const pw_system *s, const char *name) {
 /* The batch of internal coordinate j >= 3 bodies, its element, and the number of the coordinate in the element. */
 static const pw_element_batch *query_internal (const pw_system *s, int j, int *element, int *number) {
   for (const pw_element_batch *k = s->batch; k < s->batch + s->batches; k++) {
-    int n = j - k->own;
-    if (k->kind->own == 0 || n < 0 || n >= k->b.count * k->kind->own) continue;
-    *element = n / k->kind->own;
-    *number = n % k->kind->own;
+    int n = j - k->internal;
+    if (k->kind->internal == 0 || n < 0 || n >= k->b.count * k->kind->internal) continue;
+    *element = n / k->kind->internal;
+    *number = n % k->kind->internal;
     return k;
   }
   return NULL;

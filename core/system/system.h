@@ -17,7 +17,7 @@ typedef struct {
   pw_batch b; /* the argument of the type's functions */
   const pw_kind *kind;
   int row;           /* global index of its first constraint equation */
-  int own;           /* global index of its first internal coordinate */
+  int internal;      /* global index of its first internal coordinate */
   const int *column; /* count x bodies: first coordinate of each body; s->coords for the ground */
   const char **name; /* count */
   double *J;         /* count x rows x cols */
@@ -72,7 +72,7 @@ struct pw_workspace {
 };
 
 /* The most entries that an element may have in the ledger; fills the entries of a system with signals. */
-int pw_ledger_most (const pw_kind *kind);
+int pw_ledger_max_entries (const pw_kind *kind);
 void pw_ledger_fill (pw_system *s);
 
 /* Closes the contexts made by `open`; signals not opened yet are all zero. */
@@ -80,7 +80,7 @@ void pw_close_signals (const pw_source *source, int count);
 
 /* Origin of an initial value: given by the user, which takes precedence; specified by the model; a position 0 of a
  * model that does not say whether it is specified.  0: unspecified. */
-enum { PW_GIVEN = 1, PW_SPECIFIED = 2, PW_PERHAPS = 4 };
+enum { PW_GIVEN = 1, PW_SPECIFIED = 2, PW_UNSPECIFIED = 4 };
 
 /* Writes the last signal that failed, "torque T: value", or "", to the buffer and returns it. */
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size);
@@ -142,7 +142,7 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out);
 /* Global coordinate of a local column; >= coords for the ground. */
 static inline int pw_global (const pw_element_batch *k, int e, int c) {
   int n = 3 * k->kind->bodies;
-  return c < n ? k->column[e * k->kind->bodies + c / 3] + c % 3 : k->own + e * k->kind->own + c - n;
+  return c < n ? k->column[e * k->kind->bodies + c / 3] + c % 3 : k->internal + e * k->kind->internal + c - n;
 }
 
 /* Worst residuals after an update of kinematics and J: scaled and absolute. */
@@ -188,7 +188,7 @@ int pw_block_missing (const pw_workspace *w, const pw_element_batch *k, int e, p
 /* Searches for such a block near the state q, v at time t, in a few elements of each type that is not built-in
  * (built-in ones pass the self-test).  Returns 1 and writes its name ("force_q of element type well") to the buffer;
  * 0 if there is none; PW_RESOURCE.  Update the kinematics afterwards. */
-int pw_find_missing (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size);
+int pw_find_missing_block (pw_workspace *w, double t, const double *q, const double *v, char *buffer, size_t size);
 
 /* A block of element e by central differences, whatever the type provides; also for the self-test. */
 void pw_difference (const pw_workspace *w, const pw_element_batch *k, int e, pw_block block, double *out);

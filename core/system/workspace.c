@@ -17,25 +17,25 @@ static void workspace_batch (pw_layout *l, const pw_element_batch *from, const p
   size_t n = (size_t)from->b.count, cols = (size_t)from->b.cols;
   size_t block = kind->saturation ? 2 * cols : cols > 3 ? cols : 3;
   int scratch = kind->force || kind->energy || kind->power || kind->loss || kind->contact;
-  double *space = pw_take (l, scratch ? n * block : 0, sizeof *space);
+  double *space = pw_layout_alloc (l, scratch ? n * block : 0, sizeof *space);
   if (l->base == NULL) return;
   *k = *from;
   k->J = J, k->block = space, k->b.u = k->u = u;
   k->b.configuration = w->configuration;
-  k->b.q = w->s->q0 + k->own, k->b.v = w->s->v0 + k->own;
+  k->b.q = w->s->q0 + k->internal, k->b.v = w->s->v0 + k->internal;
   k->source = w->source + (from->source - w->s->source);
 }
 
 static void workspace_layout (pw_layout *l, pw_workspace *w) {
   const pw_system *s = w->s;
-  pw_take (l, 1, sizeof *w);
-  w->batch = pw_take (l, (size_t)s->batches, sizeof *w->batch);
-  w->force = pw_take (l, (size_t)s->forces, sizeof *w->force);
-  w->source = pw_take (l, (size_t)s->sources, sizeof *w->source);
-  w->configuration = pw_take (l, (size_t)s->bodies + 1, sizeof *w->configuration);
-  w->scratch = pw_take (l, (size_t)(3 * s->rows + s->coords) + 3, sizeof *w->scratch);
-  w->u = pw_take (l, 3 * (size_t)s->sources, sizeof *w->u);
-  w->J = pw_take (l, workspace_entries (s), sizeof *w->J);
+  pw_layout_alloc (l, 1, sizeof *w);
+  w->batch = pw_layout_alloc (l, (size_t)s->batches, sizeof *w->batch);
+  w->force = pw_layout_alloc (l, (size_t)s->forces, sizeof *w->force);
+  w->source = pw_layout_alloc (l, (size_t)s->sources, sizeof *w->source);
+  w->configuration = pw_layout_alloc (l, (size_t)s->bodies + 1, sizeof *w->configuration);
+  w->scratch = pw_layout_alloc (l, (size_t)(3 * s->rows + s->coords) + 3, sizeof *w->scratch);
+  w->u = pw_layout_alloc (l, 3 * (size_t)s->sources, sizeof *w->u);
+  w->J = pw_layout_alloc (l, workspace_entries (s), sizeof *w->J);
   double *u = w->u, *J = w->J;
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &s->batch[i];
@@ -44,7 +44,7 @@ static void workspace_layout (pw_layout *l, pw_workspace *w) {
     u += 3 * k->b.count * k->kind->signals;
     J += (size_t)k->b.count * (size_t)(k->kind->rows * k->b.cols);
   }
-  double *x = pw_take (l, 2 * (size_t)s->reads, sizeof *x);
+  double *x = pw_layout_alloc (l, 2 * (size_t)s->reads, sizeof *x);
   for (int i = 0; l->base && i < s->sources; x += 2 * s->source[i++].reads) {
     w->source[i] = s->source[i];
     w->source[i].x = x;

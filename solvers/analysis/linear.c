@@ -36,7 +36,7 @@ static int linear_open (pw_linearisation *x, int all) {
     { &x->response, n },
     { &x->residual, 4 * (2 * m + n) + 15 },
   };
-  x->memory = pw_take_arrays (array, all ? sizeof array / sizeof *array : 0);
+  x->memory = pw_alloc_arrays (array, all ? sizeof array / sizeof *array : 0);
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 

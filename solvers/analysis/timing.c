@@ -196,7 +196,7 @@ static int profile_allocate (profile *p, pw_error *error) {
   const pw_array array[] = { { &p->q, n },     { &p->v, n },        { &p->far, n },      { &p->a, n },
                              { &p->f, n },     { &p->y, n },        { &p->gamma, rows }, { &p->eta, rows },
                              { &p->jv, rows }, { &p->lambda, rows } };
-  p->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  p->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return p->memory ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 

@@ -228,7 +228,7 @@ static int initial_mask (const pw_system *s, const unsigned char *prescribed, co
     int keep = set->mass && s->mass[j] > 0 && !(q & set->q);
     mask[j] = (q & set->q) != 0 || keep;
     mask[n + j] = (v & set->v) != 0;
-    massless += s->mass[j] == 0 && !mask[j], massive += keep, perhaps += keep && q & PW_PERHAPS;
+    massless += s->mass[j] == 0 && !mask[j], massive += keep, perhaps += keep && q & PW_UNSPECIFIED;
   }
   return !set->mass || (massless > 0 && massive > 0 && (set->mass == INITIAL_MASS || perhaps > 0));
 }

@@ -10,7 +10,7 @@ static pw_implicit *implicit_of (pw_run *r) {
 /* ---- Opening ---- */
 
 int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t count) {
-  x->memory = pw_take_arrays (array, count);
+  x->memory = pw_alloc_arrays (array, count);
   return x->memory ? pw_tangent_open (&x->tangent, r) : PW_RESOURCE;
 }
 

@@ -96,7 +96,7 @@ static int radau_allocate (pw_run *r) {
     array[count++] = (pw_array){ &d->W[k], size };
     array[count++] = (pw_array){ &d->F[k], size };
   }
-  d->memory = pw_take_arrays (array, count);
+  d->memory = pw_alloc_arrays (array, count);
   return d->memory ? PW_OK : PW_RESOURCE;
 }
 

@@ -179,9 +179,9 @@ static int order_carve (pw_block_ldl *l, const pw_plan_node *node, const int *or
   size_t n = (size_t)l->nodes, below = (size_t)L->first[l->nodes], targets = order_count_targets (l->nodes, L);
   pw_layout lay = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
-    l->column = pw_take (&lay, n + 1, sizeof *l->column);
-    l->below = pw_take (&lay, below, sizeof *l->below);
-    l->target = pw_take (&lay, targets, sizeof *l->target);
+    l->column = pw_layout_alloc (&lay, n + 1, sizeof *l->column);
+    l->below = pw_layout_alloc (&lay, below, sizeof *l->below);
+    l->target = pw_layout_alloc (&lay, targets, sizeof *l->target);
     if (pass == 1) break;
     l->pattern = malloc (lay.used);
     if (l->pattern == NULL) return PW_RESOURCE;

@@ -22,8 +22,8 @@ static void condense_element (pw_plan *c, const pw_element_batch *b, int e, int 
     int j = b->column[e * kind->bodies + n];
     if (j < c->k->s->coords) condense_contribute (c, J + 3 * n, b->b.cols, j, kind == &pw_kind_pin && size == 2);
   }
-  for (int n = 0; n < kind->own; n++)
-    condense_contribute (c, J + 3 * kind->bodies + n, b->b.cols, b->own + e * kind->own + n, 0);
+  for (int n = 0; n < kind->internal; n++)
+    condense_contribute (c, J + 3 * kind->bodies + n, b->b.cols, b->internal + e * kind->internal + n, 0);
   c->nodes++;
 }
 
@@ -161,10 +161,10 @@ static int condense_lay_out (pw_plan *c, int rows) {
   k->more = k->schurs + 3 * c->uncondenseds;
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
-    k->force = pw_take (&l, k->massless.components ? (size_t)k->s->coords + 3 : 0, sizeof *k->force);
-    k->y = pw_take (&l, k->more ? (size_t)(k->s->rows + k->more) : 0, sizeof *k->y);
-    k->schur = pw_take (&l, (size_t)k->schurs, sizeof *k->schur);
-    k->inactive = pw_take (&l, (size_t)k->inactives, sizeof *k->inactive);
+    k->force = pw_layout_alloc (&l, k->massless.components ? (size_t)k->s->coords + 3 : 0, sizeof *k->force);
+    k->y = pw_layout_alloc (&l, k->more ? (size_t)(k->s->rows + k->more) : 0, sizeof *k->y);
+    k->schur = pw_layout_alloc (&l, (size_t)k->schurs, sizeof *k->schur);
+    k->inactive = pw_layout_alloc (&l, (size_t)k->inactives, sizeof *k->inactive);
     if (pass == 1) break;
     k->memory = malloc (l.used + 1);
     if (k->memory == NULL) return PW_RESOURCE;

@@ -37,9 +37,9 @@ static int massless_element_groups (const pw_system *s, const pw_element_batch *
     at[n] = 3 * b;
     group[n++] = pw_group_of (s, j);
   }
-  for (int o = 0; o < k->kind->own; o++) {
+  for (int o = 0; o < k->kind->internal; o++) {
     at[n] = 3 * k->kind->bodies + o;
-    group[n++] = pw_group_of (s, k->own + e * k->kind->own + o);
+    group[n++] = pw_group_of (s, k->internal + e * k->kind->internal + o);
   }
   return n;
 }
@@ -109,15 +109,15 @@ static int massless_lay_out (pw_massless *r, const massless_plan *p) {
     for (pw_component *c = r->component; c < r->end; c++) {
       size_t rows = (size_t)c->rows, groups = (size_t)(c->groups < p->groups ? c->groups : p->groups),
              cols = 3 * groups;
-      c->group = pw_take (&l, groups, sizeof *c->group);
-      c->global = pw_take (&l, cols, sizeof *c->global);
-      c->massless = pw_take (&l, cols, 1);
-      c->massive = pw_take (&l, cols, sizeof *c->massive);
-      c->square = pw_take (&l, cols, sizeof *c->square);
-      c->massive_square = pw_take (&l, cols, sizeof *c->massive_square);
-      c->row = pw_take (&l, rows, sizeof *c->row);
-      c->A = pw_take (&l, rows * (cols + rows + 1), sizeof *c->A);
-      const double **from = pw_take (&l, rows * groups, sizeof *from);
+      c->group = pw_layout_alloc (&l, groups, sizeof *c->group);
+      c->global = pw_layout_alloc (&l, cols, sizeof *c->global);
+      c->massless = pw_layout_alloc (&l, cols, 1);
+      c->massive = pw_layout_alloc (&l, cols, sizeof *c->massive);
+      c->square = pw_layout_alloc (&l, cols, sizeof *c->square);
+      c->massive_square = pw_layout_alloc (&l, cols, sizeof *c->massive_square);
+      c->row = pw_layout_alloc (&l, rows, sizeof *c->row);
+      c->A = pw_layout_alloc (&l, rows * (cols + rows + 1), sizeof *c->A);
+      const double **from = pw_layout_alloc (&l, rows * groups, sizeof *from);
       for (size_t i = 0; pass == 1 && i < rows; i++) c->row[i].from = from + i * groups;
       if (pass == 1) c->rows = c->groups = 0;
     }

@@ -31,13 +31,13 @@ static int nullspace_allocate (pw_nullspace *b, const pw_system *s) {
   size_t m = (size_t)b->rows, all = (size_t)s->rows, n = (size_t)s->coords;
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
-    b->place = pw_take (&l, all, sizeof *b->place);
-    b->pivot = pw_take (&l, m, sizeof *b->pivot);
-    b->reference = pw_take (&l, n * m, sizeof *b->reference);
-    b->K = pw_take (&l, m * m, sizeof *b->K);
-    b->mu = pw_take (&l, m, sizeof *b->mu);
-    b->eta = pw_take (&l, all, sizeof *b->eta);
-    b->v = pw_take (&l, n + 3, sizeof *b->v);
+    b->place = pw_layout_alloc (&l, all, sizeof *b->place);
+    b->pivot = pw_layout_alloc (&l, m, sizeof *b->pivot);
+    b->reference = pw_layout_alloc (&l, n * m, sizeof *b->reference);
+    b->K = pw_layout_alloc (&l, m * m, sizeof *b->K);
+    b->mu = pw_layout_alloc (&l, m, sizeof *b->mu);
+    b->eta = pw_layout_alloc (&l, all, sizeof *b->eta);
+    b->v = pw_layout_alloc (&l, n + 3, sizeof *b->v);
     if (pass == 1) break;
     b->memory = calloc (1, l.used + 1);
     if (b->memory == NULL) return PW_RESOURCE;

@@ -60,19 +60,19 @@ static int rk_allocate (struct pw_method_data *d, const pw_system *s) {
   pw_layout l = { NULL, 0 };
   for (int pass = 0; pass < 2; pass++) {
     for (int i = 1; i < d->tableau->stages; i++) {
-      d->V[i] = pw_take (&l, n, sizeof (double));
-      d->A[i] = pw_take (&l, n, sizeof (double));
-      d->R[i] = pw_take (&l, entries, sizeof (double));
+      d->V[i] = pw_layout_alloc (&l, n, sizeof (double));
+      d->A[i] = pw_layout_alloc (&l, n, sizeof (double));
+      d->R[i] = pw_layout_alloc (&l, entries, sizeof (double));
     }
-    d->R[d->tableau->stages] = pw_take (&l, entries, sizeof (double)); /* at the new state, for the error */
-    d->q = pw_take (&l, 3 * n + (size_t)s->rows, sizeof (double));
-    d->q0 = pw_take (&l, 3 * n, sizeof (double));
-    d->weight = pw_take (&l, 2 * n, sizeof (double));
-    d->ledger0 = pw_take (&l, entries, sizeof (double));
-    d->rate0 = pw_take (&l, entries, sizeof (double));
-    d->middle = pw_take (&l, 3 * n, sizeof (double));
-    d->ledger_middle = pw_take (&l, entries, sizeof (double));
-    d->rate_middle = pw_take (&l, entries, sizeof (double));
+    d->R[d->tableau->stages] = pw_layout_alloc (&l, entries, sizeof (double)); /* at the new state, for the error */
+    d->q = pw_layout_alloc (&l, 3 * n + (size_t)s->rows, sizeof (double));
+    d->q0 = pw_layout_alloc (&l, 3 * n, sizeof (double));
+    d->weight = pw_layout_alloc (&l, 2 * n, sizeof (double));
+    d->ledger0 = pw_layout_alloc (&l, entries, sizeof (double));
+    d->rate0 = pw_layout_alloc (&l, entries, sizeof (double));
+    d->middle = pw_layout_alloc (&l, 3 * n, sizeof (double));
+    d->ledger_middle = pw_layout_alloc (&l, entries, sizeof (double));
+    d->rate_middle = pw_layout_alloc (&l, entries, sizeof (double));
     if (pass == 1) break;
     d->memory = calloc (1, l.used);
     if (d->memory == NULL) return PW_RESOURCE;

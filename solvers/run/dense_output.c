@@ -10,7 +10,7 @@ int pw_dense_output_open (pw_dense_output *b, pw_run *r, int velocities, pw_erro
   size_t entries = (size_t)r->s->entries;
   *b = (pw_dense_output){ .t0 = r->t, .velocities = velocities };
   const pw_array array[] = { { &b->q0, pw_state_length (r->s) }, { &b->ledger0, entries }, { &b->rate0, entries } };
-  b->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (b->memory == NULL) return pw_fail_memory (r->s, error);
   return pw_projector_open (&b->projector, r, NULL, NULL, error);
 }

@@ -43,7 +43,7 @@ int pw_step_open (pw_run *r, int arrays, pw_error *error) {
   int projects = pw_stabilised_by (r, PW_PROJECTION);
   if (d) d->length = n > rows ? n : rows;
   const pw_array array[] = { { &d->a, n }, { &d->lambda, rows }, { &d->array, (size_t)arrays * (d ? d->length : 0) } };
-  if (d) d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  if (d) d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d == NULL || d->memory == NULL) return pw_fail_memory (r->s, error);
   int status = pw_dense_output_open (&d->last, r, projects ? 1 : -1, error);
   if (status == PW_OK && projects) status = pw_projector_open (&d->projector, r, NULL, NULL, error);

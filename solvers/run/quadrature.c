@@ -19,7 +19,7 @@ int pw_quadrature_open (pw_quadrature *x, pw_run *r, pw_velocities_at *rates) {
   };
   for (int i = 0; i < PW_QUADRATURE_POINTS; i++) array[4 + i] = (pw_array){ &x->rate[i], entries };
   x->rates = rates;
-  x->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (x->memory == NULL) return PW_RESOURCE;
   pw_quadrature_restart (x, r);
   return PW_OK;

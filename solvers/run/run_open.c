@@ -50,7 +50,7 @@ static int run_allocate (pw_run *r) {
     { &r->matrix_state, 2 * n },
     { &r->matrix_range, 2 * n },
   };
-  r->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
   if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
@@ -142,7 +142,7 @@ static int run_check_finite (pw_run *r, pw_error *error) {
 static int run_check_derivatives (pw_run *r, const char *method, pw_error *error) {
   char block[200];
   if (!r->differentiates) return PW_OK;
-  int found = pw_find_missing (r->w, r->t, r->q, r->v, block, sizeof block);
+  int found = pw_find_missing_block (r->w, r->t, r->q, r->v, block, sizeof block);
   if (found == PW_RESOURCE) return pw_fail_memory (r->s, error);
   if (found == 0)
     return pw_update_kinematics (r->w, r->t, r->q, r->v) == PW_OK ? PW_OK

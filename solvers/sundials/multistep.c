@@ -121,7 +121,7 @@ static int multistep_open_arrays (multistep_data *d, pw_run *r) {
   size_t n = (size_t)d->n + 3, rows = (size_t)r->s->rows;
   const pw_array array[] = { { &d->q, n }, { &d->v, n }, { &d->a, n }, { &d->error, 2 * n }, { &d->lambda, rows } };
   if (pw_sun_open (&d->sun, r, 2 * d->n) != PW_OK) return PW_RESOURCE;
-  d->memory = pw_take_arrays (array, sizeof array / sizeof *array);
+  d->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   if (d->memory == NULL) return PW_RESOURCE;
   memcpy (d->v, r->v, (size_t)d->n * sizeof *d->v);
   memcpy (d->a, r->a, (size_t)d->n * sizeof *d->a);

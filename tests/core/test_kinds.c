@@ -185,7 +185,7 @@ static void test_faults (void **state) {
   KINDS_FAULT (bodies, 0, "neither a body nor an internal coordinate");
   KINDS_FAULT (level, PW_FORCE, "rows and level are inconsistent");
   KINDS_FAULT (reaction, NULL, "constraint equations without names of their reactions");
-  KINDS_FAULT (own, 1, "internal coordinates without names");
+  KINDS_FAULT (internal, 1, "internal coordinates without names");
   KINDS_FAULT (prepare, NULL, "an element or internal coordinates, but no prepare function");
   KINDS_FAULT (fields, NULL, "no table of fields");
   KINDS_FAULT (fields, kinds_typeless, "field mode: its type does not exist");
@@ -217,17 +217,17 @@ static void test_wheel_contact (void **state) {
     pw_probe x = { .kind = &pw_kind_wheel, .s = s, .work = w, .k = w->batch, .elements = 3, .rows = 1, .cols = 3 };
     double plus[9 + PW_PROBE_GUARD], minus[9], contact[9], speed[3];
     pw_probe_randomise (&x, &random);
-    pw_probe_update (&x, PW_PROBE_MOTION, PW_PROBE_H);
+    pw_probe_update (&x, PW_PROBE_MOTION, PW_PROBE_STEP);
     x.kind->contact (&x.k->b, plus);
-    pw_probe_update (&x, PW_PROBE_MOTION, -PW_PROBE_H);
+    pw_probe_update (&x, PW_PROBE_MOTION, -PW_PROBE_STEP);
     x.kind->contact (&x.k->b, minus);
     pw_probe_update (&x, PW_PROBE_MOTION, 0);
     x.kind->contact (&x.k->b, contact);
     x.kind->J (&x.k->b, x.k->J);
     pw_mul_J (w, x.v, speed);
     for (int e = 0; e < 3; e++) {
-      double vx = (plus[3 * e] - minus[3 * e]) / (2 * PW_PROBE_H),
-             vy = (plus[3 * e + 1] - minus[3 * e + 1]) / (2 * PW_PROBE_H);
+      double vx = (plus[3 * e] - minus[3 * e]) / (2 * PW_PROBE_STEP),
+             vy = (plus[3 * e + 1] - minus[3 * e + 1]) / (2 * PW_PROBE_STEP);
       double across = cos (contact[3 * e + 2]) * vy - sin (contact[3 * e + 2]) * vx;
       check_close ("speed across the heading", speed[e], across, 10 * pw_probe_bound (),
                    "central differences, terms up to 10");
@@ -238,9 +238,9 @@ static void test_wheel_contact (void **state) {
 }
 
 /* A kind that refuses every definition its table allows says so. */
-static int kinds_refuse (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int kinds_refuse (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                          pw_error *error) {
-  (void)definition, (void)bodies, (void)element, (void)own;
+  (void)definition, (void)bodies, (void)element, (void)internal;
   return pw_fail (error, PW_INPUT, "nothing suits me");
 }
 

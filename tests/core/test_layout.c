@@ -88,7 +88,7 @@ LAYOUT_AT (pw_kind, definition, 16);
 LAYOUT_AT (pw_kind, element, 24);
 LAYOUT_AT (pw_kind, fields, 32);
 LAYOUT_AT (pw_kind, bodies, 40);
-LAYOUT_AT (pw_kind, own, 44);
+LAYOUT_AT (pw_kind, internal, 44);
 LAYOUT_AT (pw_kind, rows, 48);
 LAYOUT_AT (pw_kind, signals, 52);
 LAYOUT_AT (pw_kind, each_body, 56);

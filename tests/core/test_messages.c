@@ -165,9 +165,9 @@ static void test_bad_kinds (void **state) {
 }
 
 /* Writes as much as its definition has, whatever room there is. */
-static int messages_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int messages_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                              pw_error *error) {
-  (void)bodies, (void)own, (void)error;
+  (void)bodies, (void)internal, (void)error;
   memcpy (element, definition, sizeof (messages_chooser));
   return PW_OK;
 }

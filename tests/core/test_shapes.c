@@ -292,7 +292,7 @@ static void test_faults (void **state) {
   shapes_refused (SHAPES_FORCE, (pw_signal){ PW_PULSE, .pulse = { .height = 1, .width = -1 } },
                   FAULT "width = -1: expected a number >= 0");
   shapes_refused (SHAPES_FORCE, (pw_signal){ PW_PULSE, .pulse = { .height = 1, .width = 2, .period = 2 } },
-                  FAULT "a pulse each 2 s: expected a width > 0 and < 2 s, found 2 s");
+                  FAULT "a pulse every 2 s: expected a width > 0 and < 2 s, found 2 s");
 }
 
 int main (void) {

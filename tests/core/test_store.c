@@ -45,7 +45,7 @@ static void test_arena (void **state) {
   pw_arena arena = { NULL };
   char *piece[PIECES];
   for (int i = 0; i < PIECES; i++) {
-    piece[i] = pw_arena_take (&arena, size[i]);
+    piece[i] = pw_arena_alloc (&arena, size[i]);
     assert_non_null (piece[i]);
     assert_int_equal ((uintptr_t)piece[i] % sizeof (double), 0);
     for (size_t b = 0; b < size[i]; b++) assert_int_equal (piece[i][b], 0);
@@ -53,11 +53,11 @@ static void test_arena (void **state) {
   }
   for (int i = 0; i < PIECES; i++)
     for (size_t b = 0; b < size[i]; b++) assert_int_equal (piece[i][b], i + 1);
-  assert_string_equal (pw_arena_text (&arena, "steer"), "steer");
-  const char *first = pw_arena_text (&arena, "B"), *second = pw_arena_text (&arena, "");
+  assert_string_equal (pw_arena_copy (&arena, "steer"), "steer");
+  const char *first = pw_arena_copy (&arena, "B"), *second = pw_arena_copy (&arena, "");
   assert_string_equal (second, "");
   assert_ptr_equal (second, first + 2); /* texts are packed, arrays after them aligned */
-  assert_int_equal ((uintptr_t)pw_arena_take (&arena, sizeof (double)) % 16, 0);
+  assert_int_equal ((uintptr_t)pw_arena_alloc (&arena, sizeof (double)) % 16, 0);
   pw_arena_free (&arena);
   assert_null (arena.chunk);
 }
@@ -67,10 +67,11 @@ static void test_layout (void **state) {
   (void)state;
   _Alignas(max_align_t) char room[256];
   pw_layout size = { NULL, 0 }, place = { room, 0 };
-  assert_null (pw_take (&size, 3, 5));
-  assert_null (pw_take (&size, 0, 8));
-  assert_null (pw_take (&size, 2, sizeof (double)));
-  char *a = pw_take (&place, 3, 5), *b = pw_take (&place, 0, 8), *c = pw_take (&place, 2, sizeof (double));
+  assert_null (pw_layout_alloc (&size, 3, 5));
+  assert_null (pw_layout_alloc (&size, 0, 8));
+  assert_null (pw_layout_alloc (&size, 2, sizeof (double)));
+  char *a = pw_layout_alloc (&place, 3, 5), *b = pw_layout_alloc (&place, 0, 8),
+       *c = pw_layout_alloc (&place, 2, sizeof (double));
   assert_true (a == room && b >= a + 15 && c >= b && (uintptr_t)c % sizeof (double) == 0);
   assert_true (place.used == size.used && c + 2 * sizeof (double) <= room + size.used);
 }

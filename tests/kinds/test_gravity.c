@@ -92,17 +92,17 @@ static void test_pendulum (void **state) {
   pw_system_free (s);
 }
 
-/* ---- A kind of one's own that acts on every body: drag, f = -c v on each centre of mass ---- */
+/* ---- An element type of the user's that acts on every body: drag, f = -c v on each centre of mass ---- */
 
 typedef struct {
   const char *name;
   double c; /* [N s/m] */
 } gravity_drag;
 
-static int gravity_drag_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                                 pw_error *error) {
+static int gravity_drag_prepare (const void *definition, const pw_body *const *bodies, void *element,
+                                 pw_internal *internal, pw_error *error) {
   *(double *)element = ((const gravity_drag *)definition)->c;
-  (void)bodies, (void)own, (void)error;
+  (void)bodies, (void)internal, (void)error;
   return PW_OK;
 }
 

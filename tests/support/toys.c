@@ -31,12 +31,12 @@ static spring_state spring_at (const pw_batch *b, int e) {
   return s;
 }
 
-static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int spring_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                            pw_error *error) {
   const toy_spring *d = definition;
   *(spring *)element =
       (spring){ { { d->at[0][0], d->at[0][1] }, { d->at[1][0], d->at[1][1] } }, d->stiffness, d->length, d->damping };
-  (void)bodies, (void)own;
+  (void)bodies, (void)internal;
   if (d->length > 1.2) return pw_fail (error, PW_INPUT, "a length of %g is too long", d->length);
   return PW_OK;
 }
@@ -160,11 +160,11 @@ typedef struct {
   double at[2], r;
 } roller;
 
-static int roller_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int roller_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                            pw_error *error) {
   const toy_roller *d = definition;
   *(roller *)element = (roller){ { d->at[0], d->at[1] }, d->radius };
-  own[0].mass = d->inertia;
+  internal[0].mass = d->inertia;
   (void)bodies, (void)error;
   return PW_OK;
 }
@@ -208,7 +208,7 @@ const pw_kind toy_kind_roller = {
   .element = sizeof (roller),
   .fields = roller_fields,
   .bodies = 1,
-  .own = 1,
+  .internal = 1,
   .rows = 2,
   .level = PW_NONHOLONOMIC,
   .reaction = roller_reaction,
@@ -227,11 +227,11 @@ typedef struct {
   double f[2];
 } weight;
 
-static int weight_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int weight_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                            pw_error *error) {
   const toy_weight *d = definition;
   *(weight *)element = (weight){ { bodies[0]->mass * d->g[0], bodies[0]->mass * d->g[1] } };
-  (void)own, (void)error;
+  (void)internal, (void)error;
   return PW_OK;
 }
 

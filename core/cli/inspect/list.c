@@ -169,7 +169,7 @@ static void list_kind (const void *item) {
     printf ("    a signal: a number, an expression of t%s, or see `pinwheel list signals`\n",
             pw_kind_forced (k) ? " and of states such as BODY.phi" : "");
   list_quantities ("reactions", k->reaction, k->rows);
-  list_quantities ("internal coordinates, and their velocities", k->coordinate, k->own);
+  list_quantities ("internal coordinates, and their velocities", k->coordinate, k->internal);
 }
 
 static int list_kinds (const char **name, pw_error *error) {

@@ -28,7 +28,7 @@ static int plot_tracks (pw_plots *p, pw_tracks *t, int all) {
   t->curves = plot_least (t->shown, PLOT_CURVES);
   t->offset = p->width;
   p->width += t->numbers * t->shown;
-  t->index = pw_arena_take (&p->arena, (size_t)t->shown * sizeof *t->index);
+  t->index = pw_arena_alloc (&p->arena, (size_t)t->shown * sizeof *t->index);
   return t->index != NULL;
 }
 
@@ -47,12 +47,12 @@ static int plot_allocate (pw_plots *p, int elements) {
   p->width += 2 * p->links;
   p->wanted = PLOT_NUMBERS / p->width;
   p->wanted = 1 + (p->wanted < PLOT_FEW ? PLOT_FEW : plot_least (p->wanted, PLOT_SAMPLES)); /* both ends */
-  p->shape = pw_arena_take (&p->arena, (size_t)p->bodies.shown * sizeof *p->shape);
-  p->ground = pw_arena_take (&p->arena, PLOT_SHOWN * sizeof *p->ground);
-  p->data = pw_arena_take (&p->arena, (size_t)p->wanted * (size_t)p->width * sizeof *p->data);
-  p->contact = pw_arena_take (&p->arena, (size_t)p->wheels.all * sizeof *p->contact);
-  p->link = pw_arena_take (&p->arena, links * sizeof *p->link);
-  p->forces = pw_arena_take (&p->arena, links ? (size_t)pw_system_force_size (p->s) * sizeof *p->forces : 0);
+  p->shape = pw_arena_alloc (&p->arena, (size_t)p->bodies.shown * sizeof *p->shape);
+  p->ground = pw_arena_alloc (&p->arena, PLOT_SHOWN * sizeof *p->ground);
+  p->data = pw_arena_alloc (&p->arena, (size_t)p->wanted * (size_t)p->width * sizeof *p->data);
+  p->contact = pw_arena_alloc (&p->arena, (size_t)p->wheels.all * sizeof *p->contact);
+  p->link = pw_arena_alloc (&p->arena, links * sizeof *p->link);
+  p->forces = pw_arena_alloc (&p->arena, links ? (size_t)pw_system_force_size (p->s) * sizeof *p->forces : 0);
   return p->shape && p->ground && p->data && p->contact && p->link && p->forces;
 }
 

@@ -31,7 +31,7 @@ static void profile_counts (pw_table *t, const char *name, int elements, int row
 static void profile_kind (pw_table *t, const pw_profile_kind *x, double whole) {
   int rows = x->elements * x->kind->rows;
   double sum = x->signals + x->constraints + x->force;
-  profile_counts (t, x->kind->name, x->elements, rows, rows + x->elements * x->kind->own);
+  profile_counts (t, x->kind->name, x->elements, rows, rows + x->elements * x->kind->internal);
   profile_cell (t, x->kind->signals > 0, x->signals);
   profile_cell (t, rows > 0, x->constraints);
   profile_cell (t, x->kind->force && !x->kind->constant, x->force);

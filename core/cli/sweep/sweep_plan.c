@@ -119,7 +119,7 @@ static int plan_columns_of (pw_plan *p, const pw_sweep_system *x, pw_error *erro
     int state = plan_state (s, i);
     pw_system_state_name (s, state, name, sizeof name);
     if (p->room && pw_names_find (&p->index, name) >= 0) continue;
-    const char *copy = pw_arena_text (&p->arena, name);
+    const char *copy = pw_arena_copy (&p->arena, name);
     if (copy == NULL || plan_grow (p) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
     p->column[p->columns] = (struct pw_column){ copy, pw_system_state_unit (s, state) };
     pw_names_add (&p->index, copy, p->columns++);

@@ -334,7 +334,7 @@ int pw_expression_read (const pw_scope *s, const char *const *variable, const ch
   parser p;
   if (parser_read (&p, s, variable, text, trouble) != PW_OK) return p.status;
   pw_expression head = { p.codes, p.breaks, p.jump, p.jump_size },
-                *made = pw_arena_take (arena, pw_expression_size (&head));
+                *made = pw_arena_alloc (arena, pw_expression_size (&head));
   if (made == NULL) return PW_RESOURCE;
   *made = head;
   memcpy (made->code, p.code, (size_t)p.codes * sizeof *p.code);

@@ -105,7 +105,7 @@ static int build_run (const build_command *c, const char *source, const char *lo
 char *pw_temporary_folder (pw_error *error) {
   const char *tmp = getenv ("TMPDIR");
   if (tmp == NULL || *tmp == 0) tmp = "/tmp";
-  char *folder = pw_join (tmp, "pinwheel-XXXXXX", "");
+  char *folder = pw_path_join (tmp, "pinwheel-XXXXXX", "");
   if (folder && mkdtemp (folder)) return folder; /* mkdtemp gives mode 0700 */
   pw_fail (error, PW_RESOURCE, "cannot make a temporary folder in %s: %s", tmp, strerror (errno));
   free (folder);
@@ -144,7 +144,7 @@ static void build_defer (sigset_t *before) {
 int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error) {
   sigset_t before;
   build_defer (&before);
-  char *folder = pw_temporary_folder (error), *object = folder ? pw_join (folder, "model.so", "") : NULL;
+  char *folder = pw_temporary_folder (error), *object = folder ? pw_path_join (folder, "model.so", "") : NULL;
   int status = object   ? build_object (path, object, NULL, &before, error)
                : folder ? pw_fail (error, PW_RESOURCE, "out of memory")
                         : PW_RESOURCE;

@@ -15,7 +15,7 @@ enum { CACHE_LARGEST = 64 << 20, CACHE_FILES = 4096 }; /* bytes, files */
 static char *cache_parent (void) {
   const char *cache = getenv ("XDG_CACHE_HOME"), *home = getenv ("HOME");
   if (cache && *cache == '/') return strdup (cache);
-  return home && *home == '/' ? pw_join (home, ".cache", "") : NULL;
+  return home && *home == '/' ? pw_path_join (home, ".cache", "") : NULL;
 }
 
 /* Makes a folder and those above it. */
@@ -39,7 +39,7 @@ static const char *cache_defect (const char *path, int own) {
 }
 
 char *pw_cache_folder (char *notice, size_t size) {
-  char *parent = cache_parent (), *path = parent ? pw_join (parent, "pinwheel", "") : NULL;
+  char *parent = cache_parent (), *path = parent ? pw_path_join (parent, "pinwheel", "") : NULL;
   const char *shown = parent, *defect = NULL;
   if (path) {
     cache_make (path);
@@ -72,7 +72,7 @@ static int cache_list (const char *folder, cache_file *file) {
   for (struct dirent *e; dir && count < CACHE_FILES && (e = readdir (dir)) != NULL;) {
     struct stat info;
     char *path =
-        e->d_name[0] == '.' || strlen (e->d_name) >= sizeof file->name ? NULL : pw_join (folder, e->d_name, "");
+        e->d_name[0] == '.' || strlen (e->d_name) >= sizeof file->name ? NULL : pw_path_join (folder, e->d_name, "");
     if (path && lstat (path, &info) == 0 && S_ISREG (info.st_mode)) {
       file[count] = (cache_file){ .used = info.st_mtim, .size = info.st_size };
       strcpy (file[count++].name, e->d_name);
@@ -90,7 +90,7 @@ void pw_cache_trim (const char *folder) {
   if (count) qsort (file, (size_t)count, sizeof *file, cache_order);
   for (int i = 0; i < count; i++) sum += file[i].size;
   for (int i = 0; i < count && (sum > CACHE_LARGEST || (over && i < CACHE_FILES / 2)); i++) {
-    char *path = pw_join (folder, file[i].name, "");
+    char *path = pw_path_join (folder, file[i].name, "");
     if (path) unlink (path);
     sum -= file[i].size;
     free (path);

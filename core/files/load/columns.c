@@ -146,7 +146,7 @@ static int columns_all (columns *c, const char *const column[2], const char *con
   int named = columns_names (c, line);
   for (int k = 0; k < 2; k++) {
     if (columns_open (c, line, named, column[k], unit[k], &place[k], &factor[k]) != PW_OK) return PW_INPUT;
-    value[k] = pw_arena_take (arena, lines * sizeof (double));
+    value[k] = pw_arena_alloc (arena, lines * sizeof (double));
     if (value[k] == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
   }
   return columns_rows (c, named ? columns_line (c) : line, place, factor, value, count);

@@ -45,13 +45,14 @@ enum { PLUGIN_SO, PLUGIN_C, PLUGIN_YAML, PLUGIN_ENDINGS };
 
 static int plugin_ending (const char *name) {
   int i = 0;
-  while (i < PLUGIN_ENDINGS && !pw_ends_in (name, plugin_endings[i])) i++;
+  while (i < PLUGIN_ENDINGS && !pw_ends_with (name, plugin_endings[i])) i++;
   return i;
 }
 
 /* C++ */
 static int plugin_foreign (const char *name) {
-  return pw_ends_in (name, ".cpp") || pw_ends_in (name, ".cc") || pw_ends_in (name, ".cxx") || pw_ends_in (name, ".C");
+  return pw_ends_with (name, ".cpp") || pw_ends_with (name, ".cc") || pw_ends_with (name, ".cxx") ||
+         pw_ends_with (name, ".C");
 }
 
 /* Opens the file at f->path, which exists; `shown` is its path as the user knows it. */

@@ -87,7 +87,7 @@ static int code_identify (code_job *x, pw_error *error) {
   code_add (x, "pinwheel " PW_VERSION " -std=c11 -O2 -ffp-contract=off " PW_SCENE_FLAG);
   code_add_compiler (x);
   int status = pw_search_include (&include, error);
-  if (include) header = pw_join (include, "pinwheel.h", "");
+  if (include) header = pw_path_join (include, "pinwheel.h", "");
   if (header && code_read (header, &text, &size, NULL) == PW_OK)
     snprintf (sum, sizeof sum, "%016llx", pw_check_sum (PW_CHECK, text, size));
   code_add (x, sum);
@@ -108,7 +108,7 @@ static int code_paths (code_job *x, pw_error *error) {
   int status = PW_OK;
   for (int i = 0; i < 4; i++) {
     free (*path[i]);
-    *path[i] = pw_join (x->folder, x->key, ending[i]);
+    *path[i] = pw_path_join (x->folder, x->key, ending[i]);
     if (*path[i] == NULL) status = pw_fail (error, PW_RESOURCE, "out of memory");
   }
   return status;

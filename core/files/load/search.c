@@ -13,14 +13,14 @@
 #include <unistd.h>
 #include "files.h"
 
-char *pw_join (const char *folder, const char *name, const char *ending) {
+char *pw_path_join (const char *folder, const char *name, const char *ending) {
   size_t size = strlen (folder) + strlen (name) + strlen (ending) + 2;
   char *path = malloc (size);
   if (path) snprintf (path, size, "%s/%s%s", folder, name, ending);
   return path;
 }
 
-int pw_ends_in (const char *name, const char *ending) {
+int pw_ends_with (const char *name, const char *ending) {
   size_t n = strlen (name), e = strlen (ending);
   return n > e && strcmp (name + n - e, ending) == 0;
 }
@@ -50,18 +50,18 @@ static int search_anchor (int which, char **folder, pw_error *error) {
   return *folder ? PW_OK : search_no_memory (error);
 }
 
-/* Folders relative to that of the program, and to that of the library. */
-typedef const char *const search_where[2][3];
+/* Folders relative to the program, and to the library. */
+typedef const char *const search_folders[2][3];
 
-/* Visits these folders, which need not exist. */
-static int search_places (search_where where, int (*visit) (void *context, const char *folder, pw_error *error),
-                          void *context, pw_error *error) {
+/* Visits these folders; they may not exist. */
+static int search_visit (search_folders where, int (*visit) (void *context, const char *folder, pw_error *error),
+                         void *context, pw_error *error) {
   int status = PW_OK;
   for (int which = 0; which < 2 && status == PW_OK; which++) {
     char *anchor;
     status = search_anchor (which, &anchor, error);
     for (int i = 0; anchor && status == PW_OK && i < 3; i++) {
-      char *folder = pw_join (anchor, where[which][i], "");
+      char *folder = pw_path_join (anchor, where[which][i], "");
       status = folder ? visit (context, folder, error) : search_no_memory (error);
       free (folder);
     }
@@ -73,21 +73,21 @@ static int search_places (search_where where, int (*visit) (void *context, const
 /* ---- Model files ---- */
 
 /* Adds a model file, unless it is in the list already. */
-static int search_keep (pw_search *s, const char *name, size_t length, const char *path, pw_error *error) {
+static int search_add_file (pw_search *s, const char *name, size_t length, const char *path, pw_error *error) {
   for (int i = 0; i < s->count; i++)
     if (strcmp (s->found[i].path, path) == 0 && strncmp (s->found[i].name, name, length) == 0 &&
         s->found[i].name[length] == 0)
       return PW_OK;
-  if (s->count == s->room) {
-    int room = s->room ? 2 * s->room : 32;
-    pw_found *more = realloc (s->found, (size_t)room * sizeof *more);
+  if (s->count == s->capacity) {
+    int capacity = s->capacity ? 2 * s->capacity : 32;
+    pw_found *more = realloc (s->found, (size_t)capacity * sizeof *more);
     if (more == NULL) return search_no_memory (error);
     s->found = more;
-    s->room = room;
+    s->capacity = capacity;
   }
   pw_found *f = &s->found[s->count];
-  f->path = pw_arena_text (&s->arena, path);
-  f->name = pw_arena_text (&s->arena, name);
+  f->path = pw_arena_copy (&s->arena, path);
+  f->name = pw_arena_copy (&s->arena, name);
   if (f->path == NULL || f->name == NULL) return search_no_memory (error);
   f->name[length] = 0;
   s->count++;
@@ -95,22 +95,22 @@ static int search_keep (pw_search *s, const char *name, size_t length, const cha
 }
 
 static int search_entry (pw_search *s, const char *folder, const char *entry, pw_error *error) {
-  const char *ending = pw_ends_in (entry, ".so") ? ".so" : pw_ends_in (entry, ".yaml") ? ".yaml" : NULL;
+  const char *ending = pw_ends_with (entry, ".so") ? ".so" : pw_ends_with (entry, ".yaml") ? ".yaml" : NULL;
   if (ending == NULL || entry[0] == '.' || !pw_is_text (entry)) return PW_OK;
-  char *path = pw_join (folder, entry, "");
+  char *path = pw_path_join (folder, entry, "");
   if (path == NULL) return search_no_memory (error);
   char *real = realpath (path, NULL);
   struct stat info;
   int status = real || errno != ENOMEM ? PW_OK : search_no_memory (error);
   if (real && stat (real, &info) == 0 && S_ISREG (info.st_mode))
-    status = search_keep (s, entry, strlen (entry) - strlen (ending), real, error);
+    status = search_add_file (s, entry, strlen (entry) - strlen (ending), real, error);
   free (real);
   free (path);
   return status;
 }
 
 /* Adds a folder to "/first:/second"; 0 if it was searched before. */
-static int search_note (pw_search *s, const char *real) {
+static int search_add_folder (pw_search *s, const char *real) {
   size_t n = strlen (real), used = strlen (s->folders);
   for (const char *p = s->folders; *p; p += strcspn (p, ":"), p += *p == ':')
     if (strcspn (p, ":") == n && strncmp (p, real, n) == 0) return 0;
@@ -123,7 +123,7 @@ static int search_folder (void *context, const char *folder, pw_error *error) {
   pw_search *s = context;
   char *real = realpath (folder, NULL);
   if (real == NULL && errno == ENOMEM) return search_no_memory (error);
-  int fresh = real && search_note (s, real);
+  int fresh = real && search_add_folder (s, real);
   free (real);
   DIR *dir = fresh ? opendir (folder) : NULL;
   if (fresh && dir == NULL && (errno == ENOMEM || errno == EMFILE || errno == ENFILE))
@@ -155,11 +155,11 @@ static int search_order (const void *a, const void *b) {
 }
 
 int pw_search_open (pw_search *s, pw_error *error) {
-  static const search_where where = { { "models", "../models", "../lib/pinwheel/models" },
-                                      { "models", "../models", "pinwheel/models" } };
+  static const search_folders where = { { "models", "../models", "../lib/pinwheel/models" },
+                                        { "models", "../models", "pinwheel/models" } };
   *s = (pw_search){ .count = 0 };
   int status = search_environment (s, error);
-  if (status == PW_OK) status = search_places (where, search_folder, s, error);
+  if (status == PW_OK) status = search_visit (where, search_folder, s, error);
   if (s->count > 1) qsort (s->found, (size_t)s->count, sizeof *s->found, search_order);
   return status;
 }
@@ -172,16 +172,16 @@ void pw_search_close (pw_search *s) {
 /* ---- The header ---- */
 
 static int search_header (void *context, const char *folder, pw_error *error) {
-  char **include = context, *header = pw_join (folder, "pinwheel.h", "");
-  int there = header && access (header, R_OK) == 0;
-  if (there && *include == NULL) *include = strdup (folder);
+  char **include = context, *header = pw_path_join (folder, "pinwheel.h", "");
+  int exists = header && access (header, R_OK) == 0;
+  if (exists && *include == NULL) *include = strdup (folder);
   free (header);
-  return header == NULL || (there && *include == NULL) ? search_no_memory (error) : PW_OK;
+  return header == NULL || (exists && *include == NULL) ? search_no_memory (error) : PW_OK;
 }
 
 int pw_search_include (char **include, pw_error *error) {
-  static const search_where where = { { "include", "../include", "../include/pinwheel" },
-                                      { "include", "../include", "../include/pinwheel" } };
+  static const search_folders where = { { "include", "../include", "../include/pinwheel" },
+                                        { "include", "../include", "../include/pinwheel" } };
   *include = NULL;
-  return search_places (where, search_header, include, error);
+  return search_visit (where, search_header, include, error);
 }

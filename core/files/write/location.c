@@ -50,7 +50,7 @@ static int location_follow (pw_location *p) {
   if (n < 0) return errno;
   target[n] = 0;
   char *folder = *target == '/' ? NULL : pw_folder_of (p->path);
-  char *path = folder ? pw_join (folder, target, "") : strdup (target);
+  char *path = folder ? pw_path_join (folder, target, "") : strdup (target);
   free (folder);
   free (p->path);
   p->path = path;

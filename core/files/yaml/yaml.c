@@ -93,7 +93,7 @@ static int yaml_parameter (const pw_reader *r, const pw_node *node, pw_names *na
 static int yaml_parameters (pw_yaml *y, const pw_reader *r, const pw_node *list, pw_names *names) {
   if (pw_yaml_list (r, list, "parameters", -1, "") != PW_OK) return r->error->status;
   int count = list ? list->count : 0;
-  pw_parameter *p = y->parameter = pw_arena_take (&y->arena, ((size_t)count + 1) * sizeof *p);
+  pw_parameter *p = y->parameter = pw_arena_alloc (&y->arena, ((size_t)count + 1) * sizeof *p);
   if (p == NULL) return pw_yaml_no_memory (r);
   for (const pw_node *n = list ? list->first : NULL; n; n = n->next, p++) {
     if (yaml_parameter (r, n, names, p) != PW_OK) return r->error->status;
@@ -194,7 +194,7 @@ static int yaml_each_table (const pw_yaml *y, const pw_node *node, int (*each) (
   for (const pw_node *n = node->type == PW_YAML_SCALAR ? NULL : node->first; n && !stop; n = n->next) {
     const pw_node *value = node->type == PW_YAML_MAP ? n->next : NULL;
     if (value && n->type == PW_YAML_SCALAR && strcmp (n->text, "file") == 0 && value->type == PW_YAML_SCALAR) {
-      char *path = pw_join (y->folder, value->text, "");
+      char *path = pw_path_join (y->folder, value->text, "");
       stop = path ? each (context, path) : PW_RESOURCE;
       free (path);
     }

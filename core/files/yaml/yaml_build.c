@@ -1,4 +1,4 @@
-/* Bodies and elements: fills the definition structures through the field tables of their kinds, and passes them to
+/* Bodies and elements: fills the definition structures through the field tables of their types, and passes them to
  * pw_add_body and pw_add, like a build function in C.  The core checks numbers, names and elements; this file adds a
  * position to its messages. */
 #include <stdlib.h>
@@ -10,20 +10,20 @@ static int build_name (pw_reader *r, const pw_node *node, const char *what, cons
   if (pw_yaml_text (r, node, what, name) != PW_OK) return r->error->status;
   int before = pw_names_add (&r->all, *name, r->named);
   if (before >= 0)
-    return pw_yaml_fail (r, node->at, "%s \"%.60s\": line %d has given this name already", what, *name,
+    return pw_yaml_fail (r, node->at, "%s \"%.60s\": line %d already uses this name", what, *name,
                          pw_yaml_line (r->y, r->node[before]->at));
   r->node[r->named++] = node;
   return PW_OK;
 }
 
 /* The core's message without its prefix "model NAME: ", at a position. */
-static int build_refuse (const pw_reader *r, const pw_node *node, const pw_error *own) {
+static int build_fail (const pw_reader *r, const pw_node *node, const pw_error *cause) {
   char prefix[200];
   int n = snprintf (prefix, sizeof prefix, "model %s: ", pw_model_name (r->m));
-  const char *text = own->text;
+  const char *text = cause->text;
   if (n > 0 && strncmp (text, prefix, (size_t)n) == 0) text += n;
-  return own->status == PW_RESOURCE ? pw_fail (r->error, own->status, "%s", own->text)
-                                    : pw_yaml_fail (r, node->at, "%s", text);
+  return cause->status == PW_RESOURCE ? pw_fail (r->error, cause->status, "%s", cause->text)
+                                      : pw_yaml_fail (r, node->at, "%s", text);
 }
 
 /* ---- Bodies ---- */
@@ -46,7 +46,7 @@ static int build_body (pw_reader *r, const pw_node *node) {
   static const char *const start[] = { "x", "y", "phi", NULL }, *const rate[] = { "vx", "vy", "omega", NULL };
   const pw_node *v[sizeof key / sizeof *key];
   pw_body body = { .specified = PW_SPECIFIES_NOTHING };
-  pw_error own = { 0 };
+  pw_error cause = { 0 };
   char what[160];
   if (pw_yaml_keys (r, node, 0, key, "a body", v) != PW_OK) return r->error->status;
   if (v[0] == NULL) return pw_yaml_fail (r, node->at, "a body needs a name");
@@ -60,7 +60,7 @@ static int build_body (pw_reader *r, const pw_node *node) {
   snprintf (what, sizeof what, "rate of body %.60s", body.name);
   build_triple (r, v[4], what, rate, body.rate, &body.specified, 3);
   if (r->error->status != PW_OK) return r->error->status;
-  if (pw_model_check_body (r->m, &body, &own) != PW_OK) return build_refuse (r, v[0], &own);
+  if (pw_model_check_body (r->m, &body, &cause) != PW_OK) return build_fail (r, v[0], &cause);
   pw_names_add (&r->bodies, body.name, 0);
   return pw_add_body (r->m, &body);
 }
@@ -119,7 +119,7 @@ static int build_contains_word (const char *text, const char *word) {
 }
 
 /* The element type that appears later in an element, as a key or as {kind: wheel, ...}; NULL if there is none. */
-static const char *build_later_kind (const pw_node *first) {
+static const char *build_later_type (const pw_node *first) {
   for (const pw_node *n = first; n; n = n->next->next) {
     int named = n->type == PW_YAML_SCALAR && (strcmp (n->text, "kind") == 0 || strcmp (n->text, "type") == 0);
     const pw_node *kind = named ? n->next : n;
@@ -133,17 +133,17 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
   char hint[100];
   const pw_node *first = node->type == PW_YAML_MAP ? node->first : NULL;
   if (first == NULL || first->type != PW_YAML_SCALAR)
-    return pw_yaml_fail (r, node->at, "expected an element {KIND: NAME, ...}, found %s", pw_yaml_found (node)), NULL;
+    return pw_yaml_fail (r, node->at, "expected an element {TYPE: NAME, ...}, found %s", pw_yaml_found (node)), NULL;
   pw_nearest near = { .sought = first->text };
   for (const pw_kind *const *k = pw_kinds; *k; k++) {
     if (strcmp ((*k)->name, first->text) == 0) return *k;
     pw_nearest_try (&near, (*k)->name);
   }
-  const char *kind = build_later_kind (first);
-  if (kind) pw_yaml_fail (r, first->at, "an element begins with its kind: write {%s: NAME, ...}", kind);
+  const char *kind = build_later_type (first);
+  if (kind) pw_yaml_fail (r, first->at, "an element begins with its type: write {%s: NAME, ...}", kind);
   for (const pw_kind *const *k = pw_kinds; *k && !near.near; k++) /* "revolute", "hinge" */
     if (build_contains_word ((*k)->about, first->text)) near.best = (*k)->name, near.near = 1;
-  pw_yaml_fail (r, first->at, "an element begins with its kind, and there is no kind \"%.60s\"%s", first->text,
+  pw_yaml_fail (r, first->at, "an element begins with its type, and there is no type \"%.60s\"%s", first->text,
                 near.near ? pw_nearest_text (&near, hint, sizeof hint) : ": see pinwheel list kinds");
   return NULL;
 }
@@ -170,14 +170,14 @@ static int build_fields (pw_reader *r, const pw_kind *kind, const pw_node *node,
 
 static int build_element (pw_reader *r, const pw_node *node) {
   const char *name;
-  pw_error own = { 0 };
+  pw_error cause = { 0 };
   const pw_kind *kind = build_kind (r, node);
   if (kind == NULL || build_name (r, node->first->next, kind->name, &name) != PW_OK) return r->error->status;
   memset (r->definition, 0, kind->definition);
   memcpy (r->definition, &name, sizeof name);
   if (build_fields (r, kind, node, name) != PW_OK) return r->error->status;
   pw_element e = { kind, r->definition };
-  if (pw_model_check_element (r->m, &e, &own) != PW_OK) return build_refuse (r, node->first->next, &own);
+  if (pw_model_check_element (r->m, &e, &cause) != PW_OK) return build_fail (r, node->first->next, &cause);
   return pw_add (r->m, kind, r->definition);
 }
 
@@ -211,7 +211,7 @@ static void build_free (void *arena) {
   free (arena);
 }
 
-/* Allocates what serves building, and what lives as long as the model: expressions, points of tables, the reference
+/* Allocates the memory for building and the arena of the model: expressions, points of tables, the reference
  * solution. */
 static int build_open (pw_reader *r) {
   const pw_yaml *y = r->y;
@@ -221,7 +221,7 @@ static int build_open (pw_reader *r) {
     if ((*k)->definition > largest) largest = (*k)->definition;
   r->arena = calloc (1, sizeof *r->arena);
   if (r->arena == NULL || pw_model_keep (r->m, r->arena, build_free) != PW_OK) return pw_yaml_no_memory (r);
-  r->reference = pw_arena_take (r->arena, sizeof *r->reference);
+  r->reference = pw_arena_alloc (r->arena, sizeof *r->reference);
   pw_model_set_reference (r->m, r->reference);
   r->definition = malloc (largest);
   r->node = malloc ((all + 1) * sizeof *r->node);

@@ -75,7 +75,7 @@ static int state_no_owner (const reading *x, const char *owner, size_t at) {
   pw_yaml_suggest_bodies (x->r, &near);
   for (size_t i = 0; i < x->r->elements.size; i++) {
     const struct pw_name *e = &x->r->elements.slot[i];
-    if (e->name && pw_kinds[e->value]->own > 0) pw_nearest_try (&near, e->name);
+    if (e->name && pw_kinds[e->value]->internal > 0) pw_nearest_try (&near, e->name);
   }
   return reading_fail (x, at, "there is no body \"%s\"%s", owner, pw_nearest_text (&near, hint, sizeof hint));
 }
@@ -86,8 +86,8 @@ static int state_of_element (const reading *x, const char *owner, const char *pa
   int found = pw_names_find (&x->r->elements, owner);
   if (found < 0) return state_no_owner (x, owner, at);
   const pw_kind *kind = pw_kinds[found];
-  if (kind->own == 0) return reading_fail (x, at, "%s %s has no states of its own", kind->name, owner);
-  for (int i = 0; i < kind->own; i++) {
+  if (kind->internal == 0) return reading_fail (x, at, "%s %s has no states of its own", kind->name, owner);
+  for (int i = 0; i < kind->internal; i++) {
     const pw_quantity *own = &kind->coordinate[i];
     if (strcmp (part, own->name) == 0 || strcmp (part, own->rate) == 0) return PW_OK;
     size_t n = strlen (list);
@@ -167,8 +167,8 @@ static int time_keep_names (pw_reader *r) {
   pw_reference_text *t = r->reference;
   size_t names = (size_t)r->y->parameters + (size_t)r->lets;
   if (t->name) return PW_OK;
-  t->name = pw_arena_take (r->arena, (names + 1) * sizeof *t->name);
-  t->value = pw_arena_take (r->arena, (names + 1) * sizeof *t->value);
+  t->name = pw_arena_alloc (r->arena, (names + 1) * sizeof *t->name);
+  t->value = pw_arena_alloc (r->arena, (names + 1) * sizeof *t->value);
   if (t->name == NULL || t->value == NULL) return pw_yaml_no_memory (r);
   const pw_node *n = r->y->let ? r->y->let->first : NULL;
   for (int i = 0; i < (int)names; i++, t->names++) {
@@ -193,7 +193,7 @@ static int time_add_state (void *context, const char *name, size_t length, size_
   if (state_check (x, text, at) != PW_OK) return x->r->error->status;
   if (f->states == SIGNAL_STATES || length >= sizeof text)
     return reading_fail (x, at, "more than %d states", SIGNAL_STATES);
-  f->name[f->states + 1] = pw_arena_text (x->r->arena, text);
+  f->name[f->states + 1] = pw_arena_copy (x->r->arena, text);
   return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (x->r);
 }
 
@@ -211,7 +211,7 @@ static int time_expression (reading *x, int i) {
                          "memory than a model may have",
                          x->what, PW_YAML_CODES);
   if (made->jump == NULL || f->text.jump) return PW_OK;
-  char *jump = pw_arena_take (r->arena, (size_t)made->jump_size + 1);
+  char *jump = pw_arena_alloc (r->arena, (size_t)made->jump_size + 1);
   f->text.jump = jump ? memcpy (jump, made->jump, (size_t)made->jump_size) : NULL;
   return jump ? PW_OK : pw_yaml_no_memory (r);
 }
@@ -278,7 +278,7 @@ static int time_all (reading *x, const pw_node *const v[3]) {
 
 int pw_yaml_of_time (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
                      pw_signal *signal) {
-  time_function *f = pw_arena_take (r->arena, sizeof *f);
+  time_function *f = pw_arena_alloc (r->arena, sizeof *f);
   if (f == NULL) return pw_yaml_no_memory (r);
   f->name[0] = "t";
   f->derivatives = pw_kind_forced (kind) ? 0 : kind->level == PW_HOLONOMIC ? 2 : 1;
@@ -325,9 +325,9 @@ int pw_yaml_reference (pw_reader *r) {
   if (map == NULL || time_keep_names (r) != PW_OK) return r->error->status;
   if (map->type != PW_YAML_MAP)
     return pw_yaml_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_yaml_found (map));
-  t->state = pw_arena_take (r->arena, ((size_t)map->count + 1) * sizeof *t->state);
-  t->text = pw_arena_take (r->arena, ((size_t)map->count + 1) * sizeof *t->text);
-  t->context = pw_arena_take (r->arena, ((size_t)map->count + 1) * sizeof (pw_expression *));
+  t->state = pw_arena_alloc (r->arena, ((size_t)map->count + 1) * sizeof *t->state);
+  t->text = pw_arena_alloc (r->arena, ((size_t)map->count + 1) * sizeof *t->text);
+  t->context = pw_arena_alloc (r->arena, ((size_t)map->count + 1) * sizeof (pw_expression *));
   t->eval = reference_eval;
   if (t->state == NULL || t->text == NULL || t->context == NULL || pw_names_open (&seen, (size_t)map->count) != PW_OK)
     return pw_yaml_no_memory (r);

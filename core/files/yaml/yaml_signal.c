@@ -18,7 +18,7 @@ static int table_list (pw_reader *r, const char *what, const pw_node *list, pw_s
   char text[240];
   if (pw_yaml_list (r, list, what, -1, "") != PW_OK) return r->error->status;
   size_t bytes = (size_t)list->count * sizeof (double);
-  double *t = pw_arena_take (r->arena, bytes), *value = pw_arena_take (r->arena, bytes);
+  double *t = pw_arena_alloc (r->arena, bytes), *value = pw_arena_alloc (r->arena, bytes);
   if (t == NULL || value == NULL) return pw_yaml_no_memory (r);
   s->table.t = t;
   s->table.value = value;
@@ -43,7 +43,7 @@ static int table_climbs (const char *name) {
 
 /* The file's own path if it lies below the folder, links resolved; malloced. */
 static char *table_below (const char *folder, const char *name, const char **why) {
-  char *joined = pw_join (folder, name, ""), *path = joined ? realpath (joined, NULL) : NULL;
+  char *joined = pw_path_join (folder, name, ""), *path = joined ? realpath (joined, NULL) : NULL;
   size_t n = strcmp (folder, "/") == 0 ? 0 : strlen (folder);
   *why = joined == NULL ? "out of memory" : strerror (errno);
   free (joined);

@@ -53,7 +53,7 @@ static unsigned tree_event_offset (tree *x, struct fy_event *e) {
 /* ---- Nodes ---- */
 
 static pw_node *tree_add (tree *x, pw_yaml_type type, unsigned at) {
-  pw_node *n = pw_arena_take (&x->y->arena, sizeof *n);
+  pw_node *n = pw_arena_alloc (&x->y->arena, sizeof *n);
   if (n == NULL) return pw_yaml_no_memory (&x->r), NULL;
   n->type = (unsigned char)type;
   n->at = x->at = at;
@@ -90,7 +90,7 @@ static int tree_scalar (tree *x, struct fy_event *e) {
   unsigned at = tree_event_offset (x, e);
   long size = tree_text (x, token, NULL);
   pw_node *n = tree_add (x, PW_YAML_SCALAR, at - (quoted && at > 0));
-  char *text = n && size >= 0 ? pw_arena_take (&x->y->arena, (size_t)size + 1) : NULL;
+  char *text = n && size >= 0 ? pw_arena_alloc (&x->y->arena, (size_t)size + 1) : NULL;
   if (text == NULL || tree_text (x, token, text) != size) return pw_yaml_no_memory (&x->r);
   if (memchr (text, 0, (size_t)size)) return pw_yaml_fail (&x->r, n->at, "a text must not contain the character 0");
   text[size] = 0;

@@ -17,10 +17,10 @@ static inline friction_state friction_at (const pw_batch *b, int e) {
                            b->configuration[b->body[2 * e]].omega - b->configuration[b->body[2 * e + 1]].omega };
 }
 
-static int friction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int friction_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                              pw_error *error) {
   const pw_friction *d = definition;
-  (void)bodies, (void)own;
+  (void)bodies, (void)internal;
   return coulomb_make (d->viscous, d->limit, d->speed, element, error);
 }
 

@@ -16,12 +16,12 @@ static inline gravity_state gravity_at (const pw_batch *b, int e) {
   return (gravity_state){ (const gravity *)b->element + e, &b->configuration[b->body[e]] };
 }
 
-static int gravity_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int gravity_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                             pw_error *error) {
   const pw_gravity *d = definition;
   double m = bodies[0]->mass;
   *(gravity *)element = (gravity){ m * d->acceleration[0], m * d->acceleration[1] };
-  (void)own, (void)error;
+  (void)internal, (void)error;
   return PW_OK;
 }
 

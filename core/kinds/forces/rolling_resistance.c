@@ -29,12 +29,12 @@ static inline resistance_state resistance_at (const pw_batch *b, int e) {
       resistance_state){ k, A, { d.dx, d.dy, k->point.arm }, d.dx * A->vx + d.dy * A->vy + k->point.arm * A->omega };
 }
 
-static int resistance_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
-                               pw_error *error) {
+static int resistance_prepare (const void *definition, const pw_body *const *bodies, void *element,
+                               pw_internal *internal, pw_error *error) {
   const pw_rolling_resistance *d = definition;
   resistance *k = element;
   k->point = contact_make (d->at, d->heading, pw_cos (d->heading), pw_sin (d->heading));
-  (void)bodies, (void)own;
+  (void)bodies, (void)internal;
   return coulomb_make (0, d->limit, d->speed, &k->law, error);
 }
 

@@ -29,12 +29,12 @@ static inline sliding_state sliding_at (const pw_batch *b, int e) {
   return x;
 }
 
-static int sliding_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int sliding_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                             pw_error *error) {
   const pw_sliding_friction *d = definition;
   sliding *k = element;
   k->across = line_make (d->at, d->heading - PW_PI / 2);
-  (void)bodies, (void)own;
+  (void)bodies, (void)internal;
   return coulomb_make (d->viscous, d->limit, d->speed, &k->law, error);
 }
 

@@ -48,7 +48,7 @@ static inline tyre_state tyre_at (const pw_batch *b, int e) {
   return x;
 }
 
-static int tyre_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int tyre_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                          pw_error *error) {
   const pw_tyre *d = definition;
   double c = pw_cos (d->heading), s = pw_sin (d->heading), along = d->at[0] * c + d->at[1] * s,
@@ -56,7 +56,7 @@ static int tyre_prepare (const void *definition, const pw_body *const *bodies, v
   *(tyre *)element = (tyre){
     { d->at[0], d->at[1] }, c, s, along, aside, d->heading, d->stiffness, d->speed, d->friction * d->load,
   };
-  (void)bodies, (void)own;
+  (void)bodies, (void)internal;
   if (d->load > 0 && !(d->friction > 0))
     return pw_fail (error, PW_INPUT, "friction = %g: expected > 0, since a load limits the force to friction x load",
                     d->friction);

@@ -15,14 +15,14 @@ typedef struct {
   double offset; /* c [rad] */
 } gear;
 
-static int gear_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int gear_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                          pw_error *error) {
   const pw_gear *d = definition;
   double phi[3];
   for (int n = 0; n < 3; n++) phi[n] = bodies[n]->start[2];
   double start = phi[0] - phi[2] - d->ratio * (phi[1] - phi[2]);
   *(gear *)element = (gear){ d->ratio, d->from == PW_GEAR_START ? start : d->offset };
-  (void)own;
+  (void)internal;
   if (d->ratio == 0) return pw_fail (error, PW_INPUT, "ratio = 0: expected another number, positive or negative");
   return PW_OK;
 }

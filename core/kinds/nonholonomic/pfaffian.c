@@ -32,7 +32,7 @@ static inline pfaffian_state pfaffian_at (const pw_batch *b, int e) {
   return x;
 }
 
-static int pfaffian_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int pfaffian_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                              pw_error *error) {
   const pw_pfaffian *d = definition;
   pfaffian *k = element;
@@ -40,7 +40,7 @@ static int pfaffian_prepare (const void *definition, const pw_body *const *bodie
   memcpy (k->a, d->a, sizeof k->a);
   memcpy (k->b, d->b, sizeof k->b);
   for (int i = 0; i < 3; i++) size = fmax (size, fmax (fabs (d->a[i]), fabs (d->b[i])));
-  (void)bodies, (void)own;
+  (void)bodies, (void)internal;
   if (size == 0) return pw_fail (error, PW_INPUT, "a and b are all zero: expected at least one other number");
   return PW_OK;
 }

@@ -41,14 +41,14 @@ static double rolling_spin_rate (const rolling *k, const pw_body *body) {
   return (pw_cos (angle) * body->rate[0] + pw_sin (angle) * body->rate[1] - k->aside * body->rate[2]) / k->radius;
 }
 
-static int rolling_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *own,
+static int rolling_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
                             pw_error *error) {
   const pw_rolling_wheel *d = definition;
   double c = pw_cos (d->heading), s = pw_sin (d->heading), along = d->at[0] * c + d->at[1] * s,
          aside = d->at[1] * c - d->at[0] * s;
   rolling *k = element;
   *k = (rolling){ { d->at[0], d->at[1] }, c, s, along, aside, d->radius, d->heading };
-  own[0] = (pw_internal){
+  internal[0] = (pw_internal){
     d->inertia, d->start, d->rate != 0 ? d->rate : rolling_spin_rate (k, bodies[0]), { d->start != 0, d->rate != 0 }
   };
   (void)error;
@@ -133,7 +133,7 @@ const pw_kind pw_kind_rolling_wheel = {
   DEFINITION (pw_rolling_wheel, rolling_fields),
   ELEMENT (rolling, rolling_prepare),
   .bodies = 1,
-  .own = 1,
+  .internal = 1,
   .rows = 2,
   .signals = 1,
   .level = PW_NONHOLONOMIC,
