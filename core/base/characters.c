@@ -28,7 +28,7 @@ int pw_is_text (const char *text) {
   return 1;
 }
 
-void pw_make_text (char *text) {
+void pw_text_sanitise (char *text) {
   for (int n; *text; text += n) {
     n = pw_utf8_size (text);
     int bad = n == 0 || pw_control (text);

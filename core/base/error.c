@@ -11,7 +11,7 @@ int pw_fail (pw_error *error, int status, const char *format, ...) {
   va_start (arguments, format);
   vsnprintf (error->text, sizeof error->text, format, arguments);
   va_end (arguments);
-  pw_make_text (error->text);
+  pw_text_sanitise (error->text);
   error->status = status;
   return status;
 }

@@ -36,22 +36,22 @@ static int nearest_lower (char c) {
 }
 
 /* 1 if two names are equal except for capitals. */
-static int nearest_same (const char *a, const char *b) {
+static int nearest_equal (const char *a, const char *b) {
   while (*a && nearest_lower (*a) == nearest_lower (*b)) a++, b++;
   return *a == *b;
 }
 
 static void nearest_append (pw_nearest *n, const char *candidate) {
   size_t used = strlen (n->all), more = strlen (candidate);
-  n->crowded |= used + more + 3 > sizeof n->all;
-  if (n->crowded) return;
+  n->overflow |= used + more + 3 > sizeof n->all;
+  if (n->overflow) return;
   if (used) memcpy (n->all + used, ", ", 2), used += 2;
   memcpy (n->all + used, candidate, more + 1);
 }
 
 void pw_nearest_try (pw_nearest *n, const char *candidate) {
   size_t a = strlen (n->sought), b = strlen (candidate), length = a > b ? a : b;
-  size_t distance = nearest_same (n->sought, candidate) ? 0 : nearest_distance (n->sought, candidate);
+  size_t distance = nearest_equal (n->sought, candidate) ? 0 : nearest_distance (n->sought, candidate);
   nearest_append (n, candidate);
   if (n->best && distance * n->length >= n->distance * length) return;
   n->best = candidate;
@@ -64,7 +64,7 @@ char *pw_nearest_text (const pw_nearest *n, char *buffer, size_t size) {
   buffer[0] = 0;
   if (n->best && n->near)
     snprintf (buffer, size, "; did you mean \"%s\"?", n->best);
-  else if (n->best && !n->crowded)
+  else if (n->best && !n->overflow)
     snprintf (buffer, size, "; valid %s %s", strchr (n->all, ',') ? "are" : "is", n->all);
   return buffer;
 }

@@ -16,8 +16,8 @@ typedef struct {
   const char *sought;
   const char *best;
   size_t distance, length; /* distance of best from sought; length of the longer of the two */
-  int near;                /* 1: best is near enough to be suggested */
-  int crowded;             /* 1: the valid names do not fit in `all` */
+  int near;                /* 1: best is near enough to suggest */
+  int overflow;            /* 1: `all` is too small for the valid names */
   char all[88];            /* the valid names, separated by commas */
 } pw_nearest;
 void pw_nearest_try (pw_nearest *n, const char *candidate);
@@ -34,7 +34,7 @@ int pw_control (const char *text);
 /* 1 if a text is UTF-8 without control characters. */
 int pw_is_text (const char *text);
 /* Replaces control characters and invalid bytes by question marks. */
-void pw_make_text (char *text);
+void pw_text_sanitise (char *text);
 
 /* Open-addressing table from names to numbers >= 0; it stores pointers to the names, not copies. */
 typedef struct {

@@ -36,7 +36,7 @@ static inline line line_make (const double at[2][2], double heading) {
   return k;
 }
 
-static inline line_state line_turn (const line *k, const pw_configuration *A, const pw_configuration *B) {
+static inline line_state line_rotate (const line *k, const pw_configuration *A, const pw_configuration *B) {
   line_state s = { .k = k, .A = A, .B = B };
   s.nx = B->cos * k->n[0] - B->sin * k->n[1], s.ny = B->sin * k->n[0] + B->cos * k->n[1];
   s.tx = s.ny, s.ty = -s.nx;
@@ -48,8 +48,8 @@ static inline line_state line_turn (const line *k, const pw_configuration *A, co
 }
 
 static inline line_state line_at (const pw_batch *b, int e) {
-  line_state s = line_turn ((const line *)b->element + e, &b->configuration[b->body[2 * e]],
-                            &b->configuration[b->body[2 * e + 1]]);
+  line_state s = line_rotate ((const line *)b->element + e, &b->configuration[b->body[2 * e]],
+                              &b->configuration[b->body[2 * e + 1]]);
   s.w = batch_w (b, e);
   s.u = b->u + 3 * e;
   return s;
@@ -74,7 +74,7 @@ static inline double line_gamma (const line_state *s) {
 }
 
 /* out = factor H w */
-static inline void line_curve (const line_state *s, double factor, const double w[6], double *out) {
+static inline void line_multiply_H (const line_state *s, double factor, const double w[6], double *out) {
   out[0] = -factor * s->tx * w[5];
   out[1] = -factor * s->ty * w[5];
   out[2] = factor * s->na * (w[5] - w[2]);
@@ -103,13 +103,13 @@ static inline void line_gamma_q (const line_state *s, double *out) {
 
 static inline void line_gamma_v (const line_state *s, double *out) {
   const double v[6] = { s->A->vx, s->A->vy, s->A->omega, s->B->vx, s->B->vy, s->B->omega };
-  line_curve (s, -2, v, out);
+  line_multiply_H (s, -2, v, out);
 }
 
 /* ---- Batches of elements with one line equation each ---- */
 
 PER_ELEMENT (lines_jw_q, line, 6) {
-  line_curve (&x, 1, x.w, out);
+  line_multiply_H (&x, 1, x.w, out);
 }
 
 PER_ELEMENT (lines_gamma_q, line, 6) {

@@ -46,7 +46,7 @@ void pw_model_free (pw_model *m) {
   pw_arena_free (&m->arena);
   free (m->body);
   free (m->element);
-  free (m->given);
+  free (m->initial);
   free (m);
 }
 
@@ -90,14 +90,14 @@ int pw_model_refuse (pw_model *m, const char *format, ...) {
   return pw_fail (&m->error, PW_INPUT, "model %s: %s", m->name, text);
 }
 
-/* Ensures room for one more entry in an array. */
-static int model_grow (pw_model *m, void *array, int count, int *room, size_t size) {
-  if (count < *room) return PW_OK;
-  int more = *room ? 2 * *room : 8;
+/* Enlarges an array, if necessary, for one more entry of an array. */
+static int model_grow (pw_model *m, void *array, int count, int *capacity, size_t size) {
+  if (count < *capacity) return PW_OK;
+  int more = *capacity ? 2 * *capacity : 8;
   void *p = realloc (*(void **)array, (size_t)more * size);
   if (p == NULL) return model_no_memory (m);
   *(void **)array = p;
-  *room = more;
+  *capacity = more;
   return PW_OK;
 }
 
@@ -110,7 +110,7 @@ static const char *model_copy_text (pw_model *m, const char *text) {
 
 int pw_add_body (pw_model *m, const pw_body *body) {
   if (body == NULL) return pw_model_refuse (m, "pw_add_body without a body");
-  if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_room, sizeof *m->body) != PW_OK)
+  if (m->error.status != PW_OK || model_grow (m, &m->body, m->bodies, &m->body_capacity, sizeof *m->body) != PW_OK)
     return m->error.status;
   pw_body *b = &m->body[m->bodies++];
   *b = *body;
@@ -146,7 +146,7 @@ static int model_check_kind (pw_model *m, const pw_kind *kind) {
 
 int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   if (m->error.status != PW_OK || model_check_kind (m, kind) != PW_OK ||
-      model_grow (m, &m->element, m->elements, &m->element_room, sizeof *m->element) != PW_OK)
+      model_grow (m, &m->element, m->elements, &m->element_capacity, sizeof *m->element) != PW_OK)
     return m->error.status;
   if (definition == NULL) return pw_model_refuse (m, "pw_add of element type %s without a definition", kind->name);
   void *copy = pw_arena_alloc (&m->arena, kind->definition);
@@ -188,7 +188,7 @@ const pw_element *pw_model_elements (const pw_model *m, int *count) {
 }
 
 int pw_model_initial (const pw_model *m) {
-  return m->givens;
+  return m->initials;
 }
 
 const pw_reference_text *pw_model_reference (const pw_model *m) {
@@ -253,9 +253,9 @@ int pw_model_set_initial (pw_model *m, const char *state, double value, pw_error
   const char *expected = pw_domain_check (PW_REAL, value);
   if (*expected)
     return pw_fail (error, PW_INPUT, "model %s: start %s = %g: expected %s", m->name, state, value, expected);
-  if (model_grow (m, &m->given, m->givens, &m->given_room, sizeof *m->given) == PW_OK) {
-    m->given[m->givens] = (pw_given){ model_copy_text (m, state), value };
-    if (m->given[m->givens].state) m->givens++;
+  if (model_grow (m, &m->initial, m->initials, &m->initial_capacity, sizeof *m->initial) == PW_OK) {
+    m->initial[m->initials] = (pw_initial_setting){ model_copy_text (m, state), value };
+    if (m->initial[m->initials].state) m->initials++;
   }
   return m->error.status == PW_OK ? PW_OK : pw_fail (error, m->error.status, "%s", m->error.text);
 }

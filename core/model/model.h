@@ -16,7 +16,7 @@ enum {
 typedef struct {
   const char *state;
   double value;
-} pw_given;
+} pw_initial_setting;
 
 struct pw_model {
   const char *name;
@@ -24,11 +24,11 @@ struct pw_model {
   char *parameters; /* table->parameters_size bytes */
   pw_arena arena;   /* strings and definitions */
   pw_body *body;
-  int bodies, body_room;
+  int bodies, body_capacity;
   pw_element *element;
-  int elements, element_room;
-  pw_given *given;
-  int givens, given_room;
+  int elements, element_capacity;
+  pw_initial_setting *initial;
+  int initials, initial_capacity;
   const pw_reference_text *reference;
   struct pw_kept *kept; /* released with the model */
   int built;

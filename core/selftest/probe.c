@@ -47,7 +47,7 @@ void pw_probe_compare (pw_probe *x, const char *name, const char *about, int row
     if (error > worst) worst = error, at = i;
   }
   char where[120];
-  snprintf (where, sizeof where, "%s, row %d, column %d: %.9g for %.9g", x->k->name[at / (rows * cols)],
+  snprintf (where, sizeof where, "%s, row %d, column %d: %.9g, expected %.9g", x->k->name[at / (rows * cols)],
             at / cols % rows, at % cols, value[at], reference[at]);
   pw_probe_record (x->report, name, about, worst, pw_probe_bound (), pw_probe_reason, where);
 }

@@ -243,7 +243,7 @@ static void selftest_power_of (pw_probe *x, int e) {
   }
   double error = fabs (fed + derivative[e] - power[e] + loss[e]) / (1 + size + fabs (fed));
   char where[120];
-  snprintf (where, sizeof where, "%s: %.9g for %.9g", x->k->name[e], fed, power[e] - loss[e] - derivative[e]);
+  snprintf (where, sizeof where, "%s: %.9g, expected %.9g", x->k->name[e], fed, power[e] - loss[e] - derivative[e]);
   pw_probe_record (x->report, "power", "force . v = power - loss - d energy/dt", error, pw_probe_bound (),
                    pw_probe_reason, where);
   if (x->kind->loss) pw_probe_record (x->report, "loss", "loss >= 0", fmax (-loss[e], 0), 0, "exact", where);

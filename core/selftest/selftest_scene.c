@@ -20,13 +20,13 @@ typedef struct {
   const pw_system *s;
   pw_workspace *work;
   pw_element_batch *k;
-  double t, tau;                      /* the time, and its largest change */
-  double *q, *v, *a, *dq, *dv, *w;    /* coords: the state and its motion; directions */
-  double *q_now, *v_now;              /* coords: the current state */
-  double *local, *lambda;             /* count x cols: w; count x rows */
-  double *J, *block;                  /* count x largest block */
-  double *plus, *minus, *derivative;  /* count x cols, or rows */
-  double *value, *terms, *off, *size; /* the same: tested value, sum of |terms|, least error, reference size */
+  double t, tau;                        /* the time, and its largest change */
+  double *q, *v, *a, *dq, *dv, *w;      /* coords: the state and its motion; directions */
+  double *q_now, *v_now;                /* coords: the current state */
+  double *local, *lambda;               /* count x cols: w; count x rows */
+  double *J, *block;                    /* count x largest block */
+  double *plus, *minus, *derivative;    /* count x cols, or rows */
+  double *value, *terms, *error, *size; /* the same: tested value, sum of |terms|, least error, reference size */
   pw_selftest_report *report;
   char *memory;
 } scene;
@@ -52,8 +52,8 @@ static double scene_local (const scene *x, const double *vector, int e, int c) {
 }
 
 /* out += factor x block x vector, element by element; terms, unless NULL, += absolute values of the terms. */
-static void scene_times (const scene *x, const double *block, int rows, const double *vector, double factor,
-                         double *out, double *terms) {
+static void scene_multiply (const scene *x, const double *block, int rows, const double *vector, double factor,
+                            double *out, double *terms) {
   int cols = x->k->b.cols;
   for (int i = 0; i < x->k->b.count * rows; i++)
     for (int c = 0; c < cols; c++) {
@@ -90,21 +90,21 @@ static void scene_force (scene *x, double *out) {
   scene_evaluate (x, x->k->kind->force, x->k->b.cols, out);
 }
 
-static void scene_J_times (scene *x, const double *vector, double *out) {
+static void scene_multiply_J (scene *x, const double *vector, double *out) {
   x->k->kind->J (&x->k->b, x->J);
   scene_zero (out, x->k->b.count * x->k->kind->rows);
-  scene_times (x, x->J, x->k->kind->rows, vector, 1, out, NULL);
+  scene_multiply (x, x->J, x->k->kind->rows, vector, 1, out, NULL);
 }
 
 static void scene_Jw (scene *x, double *out) {
-  scene_J_times (x, x->w, out);
+  scene_multiply_J (x, x->w, out);
 }
 
 /* J v - eta */
 static void scene_drift (scene *x, double *out) {
   int rows = x->k->kind->rows;
   double *eta = x->block;
-  scene_J_times (x, x->v_now, out);
+  scene_multiply_J (x, x->v_now, out);
   scene_eta (x, eta);
   for (int i = 0; i < x->k->b.count * rows; i++) out[i] -= eta[i];
 }
@@ -125,37 +125,37 @@ static void scene_differences (scene *x, scene_function *f, scene_move move, int
   }
   for (int k = 0; k < n; k++) {
     double noise = 256 * DBL_EPSILON * (fabs (x->plus[k]) + x->size[k]) / h;
-    double off =
+    double error =
         fmax (0, fabs (x->value[k] - x->derivative[k]) - noise) / (x->terms[k] + fabs (x->derivative[k]) + DBL_MIN);
-    if (!(off >= x->off[k])) x->off[k] = off;
+    if (!(error >= x->error[k])) x->error[k] = error;
   }
 }
 
-/* Compares x->value, rows per element, with the derivative of f; x->terms and x->size stand beside it. */
+/* Compares x->value, rows per element, with the derivative of f; x->terms and x->size belong to it. */
 static void scene_compare (scene *x, const char *name, const char *about, int rows, scene_function *f,
                            scene_move move) {
   int n = x->k->b.count * rows, at = 0;
   char where[120] = "";
-  for (int k = 0; k < n; k++) x->off[k] = INFINITY;
+  for (int k = 0; k < n; k++) x->error[k] = INFINITY;
   for (int power = -8; power >= -20; power -= 4) scene_differences (x, f, move, n, ldexp (1, power));
   scene_update (x, SCENE_Q, 0);
   for (int k = 0; k < n; k++)
-    if (!(x->off[k] <= x->off[at])) at = k;
+    if (!(x->error[k] <= x->error[at])) at = k;
   if (n > 0)
-    snprintf (where, sizeof where, "%s %s, row %d: %.9g for %.9g", x->k->kind->name, x->k->name[at / rows], at % rows,
-              x->value[at], x->derivative[at]);
-  pw_probe_record (x->report, name, about, n > 0 ? x->off[at] : 0, SCENE_BOUND, scene_reason, where);
+    snprintf (where, sizeof where, "%s %s, row %d: %.9g, expected %.9g", x->k->kind->name, x->k->name[at / rows],
+              at % rows, x->value[at], x->derivative[at]);
+  pw_probe_record (x->report, name, about, n > 0 ? x->error[at] : 0, SCENE_BOUND, scene_reason, where);
 }
 
-/* The most numbers of an element in any comparison. */
-static int scene_width (const scene *x) {
+/* Most values per element in any comparison. */
+static int scene_max_values (const scene *x) {
   int width = x->k->b.cols > x->k->kind->rows ? x->k->b.cols : x->k->kind->rows;
   return width > PW_MAX_SIGNALS ? width : PW_MAX_SIGNALS;
 }
 
 /* Clears the arrays of a comparison. */
 static void scene_clear (scene *x) {
-  int n = x->k->b.count * scene_width (x);
+  int n = x->k->b.count * scene_max_values (x);
   scene_zero (x->value, n);
   scene_zero (x->terms, n);
   scene_zero (x->size, n);
@@ -165,7 +165,7 @@ static void scene_holonomic (scene *x) {
   int rows = x->k->kind->rows, n = x->k->b.count * rows;
   scene_clear (x);
   scene_evaluate (x, x->k->kind->J, rows * x->k->b.cols, x->J);
-  scene_times (x, x->J, rows, x->dq, 1, x->value, x->terms);
+  scene_multiply (x, x->J, rows, x->dq, 1, x->value, x->terms);
   scene_evaluate (x, x->k->kind->g_size, rows, x->size);
   scene_compare (x, "J", "J = dg/dq", rows, scene_g, SCENE_Q);
   scene_clear (x);
@@ -179,7 +179,7 @@ static void scene_acceleration (scene *x) {
   scene_clear (x);
   scene_gamma (x, x->derivative);
   scene_evaluate (x, x->k->kind->J, rows * x->k->b.cols, x->J);
-  scene_times (x, x->J, rows, x->a, x->tau, x->value, x->terms);
+  scene_multiply (x, x->J, rows, x->a, x->tau, x->value, x->terms);
   for (int i = 0; i < n; i++) x->value[i] -= x->tau * x->derivative[i], x->terms[i] += fabs (x->tau * x->derivative[i]);
   scene_compare (x, "gamma", "J a - gamma = d(J v - eta)/dt", rows, scene_drift, SCENE_MOTION);
 }
@@ -191,7 +191,7 @@ static void scene_block (scene *x, pw_block block, const char *name, const char 
   x->k->b.w = x->local;
   x->k->b.lambda = x->lambda;
   if (pw_evaluate_block (x->work, x->k, block, x->block))
-    scene_times (x, x->block, rows, move == SCENE_V ? x->dv : x->dq, 1, x->value, x->terms);
+    scene_multiply (x, x->block, rows, move == SCENE_V ? x->dv : x->dq, 1, x->value, x->terms);
   scene_compare (x, name, about, rows, f, move);
 }
 
@@ -259,7 +259,7 @@ static void scene_randomise (scene *x, const double *q, const double *v, pw_rand
 }
 
 static int scene_open (scene *x) {
-  size_t n = (size_t)x->s->coords, width = (size_t)scene_width (x), each = (size_t)x->k->b.count * width;
+  size_t n = (size_t)x->s->coords, width = (size_t)scene_max_values (x), each = (size_t)x->k->b.count * width;
   const pw_array array[] = {
     { &x->q, n },
     { &x->v, n },
@@ -278,7 +278,7 @@ static int scene_open (scene *x) {
     { &x->derivative, each },
     { &x->value, each },
     { &x->terms, each },
-    { &x->off, each },
+    { &x->error, each },
     { &x->size, each },
   };
   x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);

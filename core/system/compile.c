@@ -330,11 +330,11 @@ static int compile_signals (const compilation *c) {
 /* Values of pw_model_set_initial. */
 static int compile_initial (const compilation *c) {
   pw_system *s = c->s;
-  for (int i = 0; i < c->m->givens; i++) {
-    int state = pw_system_find_state (s, c->m->given[i].state, c->error);
+  for (int i = 0; i < c->m->initials; i++) {
+    int state = pw_system_find_state (s, c->m->initial[i].state, c->error);
     if (state < 0) return PW_INPUT;
     s->origin[state] |= PW_GIVEN;
-    *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = c->m->given[i].value;
+    *(state < s->coords ? s->q0 + state : s->v0 + state - s->coords) = c->m->initial[i].value;
   }
   return PW_OK;
 }

@@ -101,8 +101,8 @@ double pw_kinetic (const pw_system *s, const double *v) {
 }
 
 /* out = J w for a batch; `bodies` and `internal` are constants after inlining. */
-PW_INLINE void evaluate_mul (const pw_system *s, const pw_element_batch *k, const double *w, double *out, int bodies,
-                             int internal) {
+PW_INLINE void evaluate_multiply_J (const pw_system *s, const pw_element_batch *k, const double *w, double *out,
+                                    int bodies, int internal) {
   static const double ground[3] = { 0, 0, 0 };
   const double *J = k->J, *x[PW_MAX_BODIES] = { 0 }, *y = w + k->internal;
   const int *column = k->column;
@@ -121,11 +121,11 @@ void pw_mul_J (const pw_workspace *w, const double *x, double *out) {
   for (const pw_element_batch *k = w->batch, *end = k + w->s->constraints; k < end; k++) {
     double *to = out + k->row;
     if (k->kind->internal == 0 && k->kind->bodies == 2)
-      evaluate_mul (w->s, k, x, to, 2, 0);
+      evaluate_multiply_J (w->s, k, x, to, 2, 0);
     else if (k->kind->internal == 0 && k->kind->bodies == 1)
-      evaluate_mul (w->s, k, x, to, 1, 0);
+      evaluate_multiply_J (w->s, k, x, to, 1, 0);
     else
-      evaluate_mul (w->s, k, x, to, k->kind->bodies, k->kind->internal);
+      evaluate_multiply_J (w->s, k, x, to, k->kind->bodies, k->kind->internal);
   }
 }
 
@@ -147,13 +147,13 @@ void pw_add_JT (const pw_workspace *w, const double *lambda, double *out) {
 
 /* The worst constraint equation so far: largest residual, largest scaled residual, and its index.  NaN is the worst. */
 typedef struct {
-  double most, scaled;
+  double largest, scaled;
   int row;
 } evaluate_worst;
 
 static inline evaluate_worst evaluate_update_worst (evaluate_worst worst, int row, double residual, double size) {
   double error = fabs (residual), scaled = error / size;
-  worst.most = pw_larger (worst.most, error);
+  worst.largest = pw_larger (worst.largest, error);
   if (!(scaled <= worst.scaled) && !isnan (worst.scaled)) worst.scaled = scaled, worst.row = row;
   return worst;
 }
@@ -164,7 +164,7 @@ void pw_worst_position (const pw_system *s, const double *g, const double *size,
   for (int i = 0; i < s->holonomic; i++)
     if (enforced == NULL || enforced[i]) worst = evaluate_update_worst (worst, i, g[i], size[i]);
   r->position = worst.scaled;
-  r->g = worst.most;
+  r->g = worst.largest;
   r->row_position = worst.row;
 }
 
@@ -214,7 +214,7 @@ void pw_evaluate_velocity_residual (pw_workspace *w, const unsigned char *enforc
       worst = evaluate_worst_velocity_any (k, eta, enforced, unit, worst);
   }
   r->velocity = worst.scaled;
-  r->jv = worst.most;
+  r->jv = worst.largest;
   r->row_velocity = worst.row;
 }
 

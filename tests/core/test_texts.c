@@ -37,7 +37,7 @@ static void test_controls (void **state) {
   (void)state;
   assert_int_equal (pw_is_text ("a line\n\tand another: \303\266"), 1);
   assert_int_equal (pw_is_text (text), 0);
-  pw_make_text (text);
+  pw_text_sanitise (text);
   assert_string_equal (text, "a?[31m\n\tb????\303\266");
   assert_int_equal (pw_is_text (text), 1);
 }

@@ -10,7 +10,7 @@ static const char *const expression_names[] = { "t", "frame.phi", NULL };
 static pw_arena expression_arena;
 
 /* Reads over the parameter a = 3 and two variables. */
-static int expression_read (const char *text, const pw_expression **x, pw_expression_trouble *trouble) {
+static int expression_read (const char *text, const pw_expression **x, pw_expression_error *trouble) {
   pw_scope *s = pw_scope_open (1);
   assert_non_null (s);
   pw_scope_add (s, "a", 3);
@@ -22,7 +22,7 @@ static int expression_read (const char *text, const pw_expression **x, pw_expres
 /* What must be an expression. */
 static const pw_expression *expression_of (const char *text) {
   const pw_expression *x = NULL;
-  pw_expression_trouble trouble;
+  pw_expression_error trouble;
   if (expression_read (text, &x, &trouble) != PW_OK) print_error ("%s: %s\n", text, trouble.text);
   assert_non_null (x);
   return x;
@@ -121,7 +121,7 @@ static void test_troubles (void **state) {
     { "_pi", 0, "there is no \"_pi\"; did you mean \"pi\"?" },
   };
   const pw_expression *x;
-  pw_expression_trouble trouble;
+  pw_expression_error trouble;
   (void)state;
   for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
     assert_int_equal (expression_read (bad[i].text, &x, &trouble), PW_INPUT);
@@ -141,7 +141,7 @@ static void test_limits (void **state) {
                { "*t", 0, PW_INPUT },   { "-", 150, PW_INPUT },   { "0||t<", 700, PW_INPUT }, { "+t||t", 700, PW_OK } };
   char source[6000];
   const pw_expression *x;
-  pw_expression_trouble trouble;
+  pw_expression_error trouble;
   double value = 0;
   (void)state;
   for (size_t i = 0; i < sizeof text / sizeof *text; i++) {

@@ -390,7 +390,7 @@ int LLVMFuzzerTestOneInput (const uint8_t *data, size_t size) {
   static const char *const variable[] = { "x", "speed", NULL };
   char *text = fuzz_text (data, size);
   pw_arena arena = { 0 };
-  pw_expression_trouble trouble = { 0 };
+  pw_expression_error trouble = { 0 };
   const pw_expression *x;
   double value;
   if (pw_expression_read (NULL, variable, text, &arena, &x, &trouble) == PW_OK)

@@ -17,7 +17,7 @@
 typedef struct {
   size_t at; /* offset in bytes */
   char text[240];
-} pw_expression_trouble;
+} pw_expression_error;
 
 /* ---- Reading ---- */
 
@@ -53,10 +53,10 @@ size_t pw_expression_size (const pw_expression *x);
 /* Reads an expression over a scope and variables, names ended by NULL, into an arena.  PW_INPUT with the
  * error; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
-                        const pw_expression **x, pw_expression_trouble *trouble);
+                        const pw_expression **x, pw_expression_error *error);
 
 /* The value of an expression without variables, which may be non-finite; the scope may be NULL.  Errors as above. */
-int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_trouble *trouble);
+int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error);
 
 /* ---- Values ---- */
 

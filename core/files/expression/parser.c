@@ -14,17 +14,17 @@
 #include "pinwheel.h"
 #include "pinwheel-files.h"
 
-enum { PARSER_LONGEST = 4000, PARSER_DEEPEST = 200, PARSER_NAME = 100 };
+enum { PARSER_MAX_LENGTH = 4000, PARSER_MAX_DEPTH = 200, PARSER_NAME = 100 };
 enum { ON_TIME = 1, ON_STATES = 2 };
 
 /* ---- Tokens ---- */
 
 typedef struct {
   const char *name;
-  short op, strength;
+  short op, precedence;
 } parser_operator;
 
-/* Longer ones first; strength: precedence, from 1. */
+/* Longer ones first; precedence 1 binds least. */
 static const parser_operator parser_operators[] = {
   { "||", PW_OP_OR, 1 },    { "&&", PW_OP_AND, 2 },     { "<=", PW_OP_LESS_EQUAL, 3 }, { ">=", PW_OP_GREATER_EQUAL, 3 },
   { "==", PW_OP_EQUAL, 3 }, { "!=", PW_OP_UNEQUAL, 3 }, { "<", PW_OP_LESS, 3 },        { ">", PW_OP_GREATER, 3 },
@@ -41,9 +41,9 @@ typedef struct {
   size_t end;                  /* end of the previous token */
   char type;                   /* 'n' name, '0' number, 'o' operator, 0 the end; or ( ) , ? : itself */
   const parser_operator *sign; /* of type 'o' */
-  int nested, waiting;         /* recursion depth; stack depth */
+  int depth, stacked;          /* depth of the recursion, of the stack */
   int status;
-  pw_expression_trouble *trouble;
+  pw_expression_error *error;
   int breaks;
   const char *jump;
   int jump_size;
@@ -64,13 +64,13 @@ static const parser_part parser_nothing = { 0 };
 __attribute__ ((format (printf, 3, 4)))
 #endif
 static parser_part
-parser_wrong (parser *p, size_t at, const char *format, ...) {
+parser_fail (parser *p, size_t at, const char *format, ...) {
   if (p->status != PW_OK) return parser_nothing;
   p->status = PW_INPUT;
-  p->trouble->at = at;
+  p->error->at = at;
   va_list arguments;
   va_start (arguments, format);
-  vsnprintf (p->trouble->text, sizeof p->trouble->text, format, arguments);
+  vsnprintf (p->error->text, sizeof p->error->text, format, arguments);
   va_end (arguments);
   return parser_nothing;
 }
@@ -91,23 +91,23 @@ static void parser_next (parser *p) {
     if (strncmp (word, o->name, strlen (o->name)) == 0) p->sign = o;
   p->type = 'o';
   if (p->sign == NULL && *word == '=')
-    parser_wrong (p, p->at, "\"=\" would assign; equality is written ==");
+    parser_fail (p, p->at, "\"=\" would assign; equality is written ==");
   else if (p->sign == NULL)
-    parser_wrong (p, p->at, "\"%s\" does not belong in an expression",
-                  *word & 0x80 ? "a letter without ASCII code" : (char[2]){ *word, 0 });
+    parser_fail (p, p->at, "\"%s\" does not belong in an expression",
+                 *word & 0x80 ? "a non-ASCII character" : (char[2]){ *word, 0 });
   else if (word[0] == '*' && word[1] == '*')
-    parser_wrong (p, p->at, "a power is written with ^");
+    parser_fail (p, p->at, "a power is written with ^");
   else
     p->size = strlen (p->sign->name);
 }
 
-/* ---- Codes ---- */
+/* ---- Operations ---- */
 
-static void parser_code (parser *p, int op, int which, double value) {
+static void parser_append (parser *p, int op, int which, double value) {
   if (p->status != PW_OK) return;
-  p->waiting += 1 - pw_expression_operands (op);
-  if (p->waiting > PW_EXPRESSION_STACK || p->codes == PW_EXPRESSION_CODES)
-    parser_wrong (p, p->at, "too much is nested here");
+  p->stacked += 1 - pw_expression_operands (op);
+  if (p->stacked > PW_EXPRESSION_STACK || p->codes == PW_EXPRESSION_CODES)
+    parser_fail (p, p->at, "the nesting is too deep here");
   else
     p->code[p->codes++] = (pw_expression_code){ (short)op, (short)which, value };
 }
@@ -115,7 +115,7 @@ static void parser_code (parser *p, int op, int which, double value) {
 static parser_part parser_leaf (parser *p, int op, int which, double value) {
   parser_part part = { p->at, p->codes, 0, 0 };
   if (op == PW_OP_VARIABLE) part.depends = which == 0 ? ON_TIME : ON_STATES;
-  parser_code (p, op, which, value);
+  parser_append (p, op, which, value);
   parser_next (p);
   return part;
 }
@@ -125,7 +125,7 @@ static parser_part parser_emit (parser *p, parser_part part, int depends, int op
   int tie = 0;
   part.depends |= depends;
   part.condition = op >= PW_OP_LESS && op <= PW_OP_OR;
-  parser_code (p, op, which, 0);
+  parser_append (p, op, which, 0);
   if (p->status != PW_OK) return part;
   if (part.depends == 0) {
     double value = pw_expression_run (p->code + part.first, p->codes - part.first, NULL, &tie);
@@ -144,7 +144,7 @@ static parser_part parser_emit (parser *p, parser_part part, int depends, int op
 /* Converts a condition to 1 or 0. */
 static parser_part parser_condition (parser *p, parser_part part) {
   if (part.condition) return part;
-  parser_code (p, PW_OP_CONSTANT, 0, 0);
+  parser_append (p, PW_OP_CONSTANT, 0, 0);
   return parser_emit (p, part, 0, PW_OP_UNEQUAL, 0);
 }
 
@@ -152,31 +152,31 @@ static parser_part parser_condition (parser *p, parser_part part) {
 
 static parser_part parser_choice (parser *p);
 
-static int parser_deeper (parser *p) {
-  if (++p->nested > PARSER_DEEPEST)
-    parser_wrong (p, p->at, "%s", p->type == '(' ? "too many parentheses" : "too much is nested here");
+static int parser_enter (parser *p) {
+  if (++p->depth > PARSER_MAX_DEPTH)
+    parser_fail (p, p->at, "%s", p->type == '(' ? "too many parentheses" : "the nesting is too deep here");
   return p->status == PW_OK;
 }
 
 /* Reports an unexpected token; `open`: the unclosed parenthesis or ?, or 0, and its offset. */
 static parser_part parser_unexpected (parser *p, char open, size_t at) {
   if (p->type == 'n' || p->type == '0' || p->type == '(')
-    return parser_wrong (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });
-  if (open == '?') return parser_wrong (p, at, "there is no \":\" for this \"?\"");
-  if (p->type == ',') return parser_wrong (p, p->at, "a comma belongs between the arguments of a function");
-  if (p->type == ')') return parser_wrong (p, p->at, "there is no \"(\" for this \")\"");
-  if (open && p->type == 0) return parser_wrong (p, at, "there is no \")\" for this \"(\"");
-  return parser_wrong (p, p->at, "this does not belong here");
+    return parser_fail (p, p->at, "an operator such as * is missing before \"%s\"", (char[2]){ p->text[p->at], 0 });
+  if (open == '?') return parser_fail (p, at, "there is no \":\" for this \"?\"");
+  if (p->type == ',') return parser_fail (p, p->at, "a comma belongs between the arguments of a function");
+  if (p->type == ')') return parser_fail (p, p->at, "there is no \"(\" for this \")\"");
+  if (open && p->type == 0) return parser_fail (p, at, "there is no \")\" for this \"(\"");
+  return parser_fail (p, p->at, "this does not belong here");
 }
 
 static parser_part parser_missing (parser *p) {
   char last[PARSER_NAME];
   if (p->status != PW_OK) return parser_nothing;
   snprintf (last, sizeof last, "%.*s", (int)(p->end - p->before), p->text + p->before);
-  if (p->type == 0 && p->end == 0) return parser_wrong (p, 0, "an expression is missing");
+  if (p->type == 0 && p->end == 0) return parser_fail (p, 0, "an expression is missing");
   if (p->type == 0 || (p->type == ')' && p->end))
-    return parser_wrong (p, p->before, "something is missing after \"%s\"", last);
-  return parser_wrong (p, p->at, "this does not belong here");
+    return parser_fail (p, p->before, "something is missing after \"%s\"", last);
+  return parser_fail (p, p->at, "this does not belong here");
 }
 
 static parser_part parser_unknown (parser *p, const char *name) {
@@ -187,7 +187,7 @@ static parser_part parser_unknown (parser *p, const char *name) {
   for (const pw_expression_constant_name *c = pw_expression_constants; c->name; c++) pw_nearest_try (&near, c->name);
   for (const pw_expression_function *f = pw_expression_functions; f->name; f++) pw_nearest_try (&near, f->name);
   if (strcmp (name, "T") == 0) pw_nearest_try (&near, "t"); /* the time, defined in some expressions only */
-  return parser_wrong (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
+  return parser_fail (p, p->at, "there is no \"%s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
 }
 
 /* Whether the next token is an opening parenthesis. */
@@ -203,7 +203,7 @@ static parser_part parser_name (parser *p, const char *name) {
   int variable = p->variable && p->variable[i];
   if (!variable && known < 0 && c == NULL) return parser_unknown (p, name);
   if (parser_is_call (p))
-    return parser_wrong (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
+    return parser_fail (p, p->at, "\"%s\" is a number, not a function; a product is written with *", name);
   if (variable) return parser_leaf (p, PW_OP_VARIABLE, i, 0);
   return parser_leaf (p, PW_OP_CONSTANT, 0, known >= 0 ? p->scope->entry[known].value : c->value);
 }
@@ -216,28 +216,28 @@ static parser_part parser_call (parser *p, int which) {
   parser_next (p);
   size_t open = p->at;
   do {
-    if (!parser_deeper (p)) return part;
+    if (!parser_enter (p)) return part;
     parser_next (p);
     if (p->type == ')' && arguments == 0) break;
     int on = parser_choice (p).depends;
-    p->nested--;
+    p->depth--;
     if (f->most == 0 && arguments) part = parser_emit (p, part, on, f->op, which);
     part.depends |= on, arguments++;
   } while (p->type == ',' && p->status == PW_OK);
   if (p->status != PW_OK) return part;
   if (p->type != ')') return parser_unexpected (p, '(', open);
-  if (arguments < f->least) return parser_wrong (p, p->at, "too few arguments");
-  if (f->most && arguments > f->most) return parser_wrong (p, p->at, "too many arguments");
+  if (arguments < f->least) return parser_fail (p, p->at, "too few arguments");
+  if (f->most && arguments > f->most) return parser_fail (p, p->at, "too many arguments");
   parser_next (p);
   return f->most ? parser_emit (p, part, part.depends, f->op, which) : part;
 }
 
 static parser_part parser_group (parser *p) {
   size_t open = p->at;
-  if (!parser_deeper (p)) return parser_nothing;
+  if (!parser_enter (p)) return parser_nothing;
   parser_next (p);
   parser_part part = parser_choice (p);
-  p->nested--;
+  p->depth--;
   part.from = open;
   if (p->status != PW_OK) return part;
   if (p->type != ')') return parser_unexpected (p, '(', open);
@@ -246,7 +246,7 @@ static parser_part parser_group (parser *p) {
 }
 
 static parser_part parser_number (parser *p) {
-  char digits[PARSER_LONGEST + 1];
+  char digits[PARSER_MAX_LENGTH + 1];
   double value = 0;
   snprintf (digits, sizeof digits, "%.*s", (int)p->size, p->text + p->at);
   if (pw_read_number (digits, &value) != PW_OK) p->status = PW_RESOURCE;
@@ -263,7 +263,7 @@ static parser_part parser_operand (parser *p) {
   int which = pw_expression_find (name);
   if (which < 0) return parser_name (p, name);
   if (parser_is_call (p)) return parser_call (p, which);
-  return parser_wrong (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
+  return parser_fail (p, p->at, "\"%s\" is a function: write its argument in parentheses", name);
 }
 
 /* ---- Operators ---- */
@@ -274,22 +274,22 @@ static parser_part parser_unary (parser *p) {
   int sign = op == PW_OP_ADD || op == PW_OP_SUBTRACT;
   if (!sign) part = parser_operand (p);
   if (!sign && (p->sign == NULL || p->sign->op != PW_OP_POWER)) return part;
-  if (!parser_deeper (p)) return part;
+  if (!parser_enter (p)) return part;
   parser_next (p);
   part.depends |= parser_unary (p).depends;
-  p->nested--;
+  p->depth--;
   if (op == PW_OP_ADD) return part;
   return parser_emit (p, part, part.depends, sign ? PW_OP_NEGATE : PW_OP_POWER, 0);
 }
 
-static parser_part parser_binary (parser *p, int strength) {
+static parser_part parser_binary (parser *p, int precedence) {
   parser_part part = parser_unary (p);
-  while (p->status == PW_OK && p->sign && p->sign->strength >= strength) {
+  while (p->status == PW_OK && p->sign && p->sign->precedence >= precedence) {
     const parser_operator *o = p->sign;
     int logical = o->op == PW_OP_AND || o->op == PW_OP_OR;
     if (logical) part = parser_condition (p, part);
     parser_next (p);
-    parser_part right = parser_binary (p, o->strength + 1);
+    parser_part right = parser_binary (p, o->precedence + 1);
     if (logical) right = parser_condition (p, right);
     part = parser_emit (p, part, right.depends, o->op, 0);
   }
@@ -299,26 +299,26 @@ static parser_part parser_binary (parser *p, int strength) {
 static parser_part parser_choice (parser *p) {
   parser_part part = parser_binary (p, 1);
   size_t mark = p->at;
-  if (p->status != PW_OK || p->type != '?' || !parser_deeper (p)) return part;
+  if (p->status != PW_OK || p->type != '?' || !parser_enter (p)) return part;
   part = parser_condition (p, part);
   parser_next (p);
   int depends = parser_choice (p).depends;
   if (p->status == PW_OK && p->type != ':') return parser_unexpected (p, '?', mark);
   parser_next (p);
   depends |= parser_choice (p).depends;
-  p->nested--;
+  p->depth--;
   return parser_emit (p, part, depends, PW_OP_SELECT, 0);
 }
 
 /* ---- Whole expressions ---- */
 
 static int parser_read (parser *p, const pw_scope *s, const char *const *variable, const char *text,
-                        pw_expression_trouble *trouble) {
+                        pw_expression_error *error) {
   memset (p, 0, offsetof (parser, code));
-  p->scope = s, p->variable = variable, p->text = text, p->trouble = trouble;
-  trouble->at = 0;
-  if (strlen (text) > PARSER_LONGEST)
-    return parser_wrong (p, 0, "an expression of more than %d characters", PARSER_LONGEST), p->status;
+  p->scope = s, p->variable = variable, p->text = text, p->error = error;
+  error->at = 0;
+  if (strlen (text) > PARSER_MAX_LENGTH)
+    return parser_fail (p, 0, "an expression of more than %d characters", PARSER_MAX_LENGTH), p->status;
   parser_next (p);
   parser_choice (p);
   if (p->status == PW_OK && p->type != 0) parser_unexpected (p, 0, 0);
@@ -330,26 +330,26 @@ size_t pw_expression_size (const pw_expression *x) {
 }
 
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
-                        const pw_expression **x, pw_expression_trouble *trouble) {
+                        const pw_expression **x, pw_expression_error *error) {
   parser p;
-  if (parser_read (&p, s, variable, text, trouble) != PW_OK) return p.status;
+  if (parser_read (&p, s, variable, text, error) != PW_OK) return p.status;
   pw_expression head = { p.codes, p.breaks, p.jump, p.jump_size },
-                *made = pw_arena_alloc (arena, pw_expression_size (&head));
-  if (made == NULL) return PW_RESOURCE;
-  *made = head;
-  memcpy (made->code, p.code, (size_t)p.codes * sizeof *p.code);
-  *x = made;
+                *copy = pw_arena_alloc (arena, pw_expression_size (&head));
+  if (copy == NULL) return PW_RESOURCE;
+  *copy = head;
+  memcpy (copy->code, p.code, (size_t)p.codes * sizeof *p.code);
+  *x = copy;
   return PW_OK;
 }
 
-int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_trouble *trouble) {
+int pw_expression_constant (const pw_scope *s, const char *text, double *value, pw_expression_error *error) {
   parser p;
-  if (parser_read (&p, s, NULL, text, trouble) == PW_OK) *value = p.code[0].value;
+  if (parser_read (&p, s, NULL, text, error) == PW_OK) *value = p.code[0].value;
   return p.status;
 }
 
 int pw_read_expression (const char *text, double *value) {
-  pw_expression_trouble trouble;
+  pw_expression_error error;
   if (pw_read_number (text, value) == PW_OK) return PW_OK;
-  return pw_expression_constant (NULL, text, value, &trouble);
+  return pw_expression_constant (NULL, text, value, &error);
 }

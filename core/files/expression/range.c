@@ -7,9 +7,9 @@
 
 static const pw_range range_nan = { INFINITY, -INFINITY, 0, 0, 1 };
 
-static const pw_range range_any = { -INFINITY, INFINITY, 0, 0, 1 };
+static const pw_range range_all = { -INFINITY, INFINITY, 0, 0, 1 };
 
-static int range_holds (const pw_range *x, double value) {
+static int range_contains (const pw_range *x, double value) {
   return x->lo <= value && value <= x->hi;
 }
 
@@ -22,8 +22,8 @@ static int range_unbounded (const pw_range *x) {
 }
 
 /* Round-off of an operation: a few units in the last place, also of infinite bounds. */
-static pw_range range_of (double lo, double hi) {
-  if (isnan (lo) || isnan (hi)) return range_any;
+static pw_range range_rounded (double lo, double hi) {
+  if (isnan (lo) || isnan (hi)) return range_all;
   return (pw_range){ lo - fmin (4 * DBL_EPSILON * fabs (lo), DBL_MAX) - DBL_MIN,
                      hi + fmin (4 * DBL_EPSILON * fabs (hi), DBL_MAX) + DBL_MIN, 0, 0, 0 };
 }
@@ -39,13 +39,13 @@ static double range_quotient (double a, double b) {
 /* The range of f at the corners, for an f monotonic in each argument. */
 static pw_range range_corners (double (*f) (double, double), const pw_range *x, const pw_range *y) {
   double a = f (x->lo, y->lo), b = f (x->lo, y->hi), c = f (x->hi, y->lo), d = f (x->hi, y->hi);
-  if (isnan (a) || isnan (b) || isnan (c) || isnan (d)) return range_any;
-  return range_of (fmin (fmin (a, b), fmin (c, d)), fmax (fmax (a, b), fmax (c, d)));
+  if (isnan (a) || isnan (b) || isnan (c) || isnan (d)) return range_all;
+  return range_rounded (fmin (fmin (a, b), fmin (c, d)), fmax (fmax (a, b), fmax (c, d)));
 }
 
 /* infinity - infinity is NaN. */
 static pw_range range_sum (const pw_range *x, const pw_range *y) {
-  pw_range r = range_of (x->lo + y->lo, x->hi + y->hi);
+  pw_range r = range_rounded (x->lo + y->lo, x->hi + y->hi);
   r.nan |= (x->lo == -INFINITY && y->hi == INFINITY) || (x->hi == INFINITY && y->lo == -INFINITY);
   return r;
 }
@@ -53,7 +53,7 @@ static pw_range range_sum (const pw_range *x, const pw_range *y) {
 /* 0 times infinity is NaN. */
 static pw_range range_multiply (const pw_range *x, const pw_range *y) {
   pw_range r = range_corners (range_product, x, y);
-  r.nan |= (range_holds (x, 0) && range_unbounded (y)) || (range_unbounded (x) && range_holds (y, 0));
+  r.nan |= (range_contains (x, 0) && range_unbounded (y)) || (range_unbounded (x) && range_contains (y, 0));
   return r;
 }
 
@@ -64,12 +64,13 @@ static pw_range range_pole (int jumps, int nan) {
 
 /* 0/0 is NaN. */
 static pw_range range_divide (const pw_range *x, const pw_range *y) {
-  return range_holds (y, 0) ? range_pole (y->lo < y->hi, range_holds (x, 0)) : range_corners (range_quotient, x, y);
+  return range_contains (y, 0) ? range_pole (y->lo < y->hi, range_contains (x, 0))
+                               : range_corners (range_quotient, x, y);
 }
 
 static pw_range range_abs (const pw_range *x) {
-  if (x->lo >= 0) return range_of (x->lo, x->hi);
-  pw_range r = x->hi <= 0 ? range_of (-x->hi, -x->lo) : range_of (0, fmax (-x->lo, x->hi));
+  if (x->lo >= 0) return range_rounded (x->lo, x->hi);
+  pw_range r = x->hi <= 0 ? range_rounded (-x->hi, -x->lo) : range_rounded (0, fmax (-x->lo, x->hi));
   r.breaks = x->hi > 0;
   return r;
 }
@@ -89,13 +90,13 @@ static pw_range range_sin (double lo, double hi, double shift) {
 
 static pw_range range_even (const pw_range *x, double (*f) (double)) {
   pw_range r = range_abs (x);
-  return range_of (f (fmax (0, r.lo)), f (r.hi));
+  return range_rounded (f (fmax (0, r.lo)), f (r.hi));
 }
 
 static pw_range range_tan (const pw_range *x) {
   const double slack = 8 * DBL_EPSILON * (fabs (x->lo) + fabs (x->hi) + 1);
   if (floor ((x->lo - slack) / PW_PI + 0.5) != floor ((x->hi + slack) / PW_PI + 0.5)) return range_pole (1, 0);
-  return range_of (tan (x->lo), tan (x->hi));
+  return range_rounded (tan (x->lo), tan (x->hi));
 }
 
 static pw_range range_monotonic (const pw_expression_function *f, const pw_range *x) {
@@ -103,7 +104,8 @@ static pw_range range_monotonic (const pw_expression_function *f, const pw_range
   if (f->one == pw_cos) return range_sin (x->lo, x->hi, PW_PI / 2);
   if (f->one == cosh) return range_even (x, cosh);
   if (f->one == tan) return range_tan (x);
-  return f->trend == PW_RISES ? range_of (f->one (x->lo), f->one (x->hi)) : range_of (f->one (x->hi), f->one (x->lo));
+  return f->trend == PW_RISES ? range_rounded (f->one (x->lo), f->one (x->hi))
+                              : range_rounded (f->one (x->hi), f->one (x->lo));
 }
 
 /* NaN outside the domain. */
@@ -118,7 +120,7 @@ static pw_range range_smooth (const pw_expression_function *f, const pw_range *x
 /* An integer power; an even one has its minimum at 0. */
 static pw_range range_integer_power (const pw_range *x, double n) {
   int even = fmod (n, 2) == 0;
-  if (n < 0 && range_holds (x, 0)) return range_pole (!even, 0);
+  if (n < 0 && range_contains (x, 0)) return range_pole (!even, 0);
   pw_range b = even ? range_abs (x) : *x;
   if (even) b.lo = fmax (0, b.lo);
   return range_corners (pow, &b, &(pw_range){ n, n, 0, 0, 0 });
@@ -127,7 +129,7 @@ static pw_range range_integer_power (const pw_range *x, double n) {
 /* Powers of negative numbers are NaN unless the exponent is an integer. */
 static pw_range range_power (const pw_range *x, const pw_range *y) {
   if (range_is (y, rint (y->lo))) return range_integer_power (x, y->lo);
-  if (x->lo < 0 && y->lo < y->hi) return range_any;
+  if (x->lo < 0 && y->lo < y->hi) return range_all;
   if (x->hi < 0) return range_nan;
   pw_range r = range_corners (pow, &(pw_range){ fmax (0, x->lo), x->hi, 0, 0, 0 }, y);
   r.nan |= x->lo < 0;
@@ -141,9 +143,9 @@ static pw_range range_atan2 (const pw_range *y, const pw_range *x) {
 }
 
 /* hypot, or jacobi_am (x, y), which is monotonic in each argument, and NaN for y > 1. */
-static pw_range range_pair (const pw_expression_function *f, const pw_range *x, const pw_range *y) {
+static pw_range range_two_arguments (const pw_expression_function *f, const pw_range *x, const pw_range *y) {
   pw_range a = range_abs (x), b = range_abs (y), below = { y->lo, fmin (y->hi, 1), 0, 0, 0 };
-  if (f->two == hypot) return range_of (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
+  if (f->two == hypot) return range_rounded (hypot (fmax (0, a.lo), fmax (0, b.lo)), hypot (a.hi, b.hi));
   if (y->lo > 1) return range_nan;
   pw_range r = range_corners (f->two, x, &below);
   r.nan |= y->hi > 1;
@@ -154,7 +156,7 @@ static pw_range range_pair (const pw_expression_function *f, const pw_range *x, 
 
 /* floor, ceil, round: one integer, or a break.  The interval is closed and includes the value just after a jump at
  * either end, in either direction. */
-static pw_range range_whole (int op, const pw_range *x) {
+static pw_range range_integer (int op, const pw_range *x) {
   double shift = op == PW_OP_ROUND ? 0.5 : 0;
   pw_range r = { ceil (x->lo + shift), floor (x->hi + shift), 0, 0, 0 };
   *(op == PW_OP_CEIL ? &r.hi : &r.lo) += op == PW_OP_CEIL ? 1 : -1;
@@ -165,19 +167,19 @@ static pw_range range_whole (int op, const pw_range *x) {
 /* The sign of NaN is 0. */
 static pw_range range_sign (const pw_range *x) {
   if (x->lo > x->hi) return (pw_range){ .nan = 0 };
-  return (pw_range){ x->lo > 0 ? 1 - x->nan : -1, x->hi < 0 ? x->nan - 1 : 1, range_holds (x, 0) || x->nan, 0, 0 };
+  return (pw_range){ x->lo > 0 ? 1 - x->nan : -1, x->hi < 0 ? x->nan - 1 : 1, range_contains (x, 0) || x->nan, 0, 0 };
 }
 
 static pw_range range_mod (const pw_range *x, const pw_range *y) {
-  pw_range q = range_divide (x, y), n = range_whole (PW_OP_FLOOR, &q);
+  pw_range q = range_divide (x, y), n = range_integer (PW_OP_FLOOR, &q);
   double most = fmax (fabs (y->lo), fabs (y->hi));
-  int nan = range_holds (y, 0) || range_unbounded (x);
+  int nan = range_contains (y, 0) || range_unbounded (x);
   if (n.breaks) return (pw_range){ y->lo < 0 ? -most : 0, y->hi > 0 ? most : 0, 1, 0, nan };
   pw_range part = range_corners (range_product, &n, y);
-  return range_of (x->lo - part.hi, x->hi - part.lo);
+  return range_rounded (x->lo - part.hi, x->hi - part.lo);
 }
 
-/* Comparisons with NaN have the value for the order 2. */
+/* order: -1, 0, 1, or 2 if an operand is NaN; 3: unknown. */
 static pw_range range_compare (int op, const pw_range *x, const pw_range *y) {
   static const pw_range either = { 0, 1, 1, 0, 0 };
   int nan = x->nan | y->nan, empty = x->lo > x->hi || y->lo > y->hi;
@@ -202,7 +204,7 @@ static pw_range range_logical (int op, const pw_range *x, const pw_range *y) {
 }
 
 /* The minimum of NaN and a number is the number. */
-static pw_range range_least (const pw_range *x, const pw_range *y) {
+static pw_range range_min (const pw_range *x, const pw_range *y) {
   if (y->lo > y->hi || (x->hi < y->lo && !x->nan)) return *x;
   if (x->lo > x->hi || (y->hi < x->lo && !y->nan)) return *y;
   int states = x->states | y->states;
@@ -214,8 +216,8 @@ static pw_range range_negative (const pw_range *x) {
   return (pw_range){ -x->hi, -x->lo, x->breaks, x->states, x->nan };
 }
 
-static pw_range range_most (const pw_range *x, const pw_range *y) {
-  pw_range a = range_negative (x), b = range_negative (y), r = range_least (&a, &b);
+static pw_range range_max (const pw_range *x, const pw_range *y) {
+  pw_range a = range_negative (x), b = range_negative (y), r = range_min (&a, &b);
   return range_negative (&r);
 }
 
@@ -241,7 +243,7 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
   case PW_OP_FLOOR:
   case PW_OP_CEIL:
   case PW_OP_ROUND:
-    return range_whole (c->op, x);
+    return range_integer (c->op, x);
   case PW_OP_TAN:
   case PW_OP_ONE:
     return range_smooth (&pw_expression_functions[c->which], x);
@@ -260,7 +262,7 @@ static pw_range range_operation (const pw_expression_code *c, const pw_range *x)
   case PW_OP_ATAN2:
     return range_atan2 (x, y);
   case PW_OP_TWO:
-    return range_pair (&pw_expression_functions[c->which], x, y);
+    return range_two_arguments (&pw_expression_functions[c->which], x, y);
   default:
     return range_compare (c->op, x, y);
   }
@@ -287,7 +289,7 @@ static pw_range range_result (const pw_expression_code *c, const pw_range *x, in
 /* Ignores breaks whose time depends on states; a constant value has no breaks. */
 static pw_range range_apply (const pw_expression_code *c, const pw_range *x, int operands) {
   if (c->op == PW_OP_AND || c->op == PW_OP_OR) return range_logical (c->op, x, x + 1);
-  if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_least : range_most) (x, x + 1);
+  if (c->op == PW_OP_MIN || c->op == PW_OP_MAX) return (c->op == PW_OP_MIN ? range_min : range_max) (x, x + 1);
   if (c->op == PW_OP_SELECT) return range_select (x, x + 1, x + 2);
   pw_range r = range_result (c, x, operands);
   if (r.lo > r.hi) return r;

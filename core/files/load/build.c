@@ -61,39 +61,39 @@ static int build_spawn (const build_command *c, const char *log, const sigset_t 
   sigset_t pipe;
   sigemptyset (&pipe);
   sigaddset (&pipe, SIGPIPE);
-  int why = posix_spawn_file_actions_init (&files);
-  if (why) return why;
-  why = posix_spawnattr_init (&attributes);
-  if (why == 0) {
+  int code = posix_spawn_file_actions_init (&files);
+  if (code) return code;
+  code = posix_spawnattr_init (&attributes);
+  if (code == 0) {
     if (log)
-      why = posix_spawn_file_actions_addopen (&files, STDERR_FILENO, log, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW,
-                                              0600);
-    if (why == 0) why = posix_spawn_file_actions_adddup2 (&files, STDERR_FILENO, STDOUT_FILENO);
+      code = posix_spawn_file_actions_addopen (&files, STDERR_FILENO, log, O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW,
+                                               0600);
+    if (code == 0) code = posix_spawn_file_actions_adddup2 (&files, STDERR_FILENO, STDOUT_FILENO);
     posix_spawnattr_setsigmask (&attributes, before);
     posix_spawnattr_setsigdefault (&attributes, &pipe);
     posix_spawnattr_setflags (&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF);
-    if (why == 0) why = posix_spawnp (child, c->word[0], &files, &attributes, c->word, environ);
+    if (code == 0) code = posix_spawnp (child, c->word[0], &files, &attributes, c->word, environ);
     posix_spawnattr_destroy (&attributes);
   }
   posix_spawn_file_actions_destroy (&files);
-  return why;
+  return code;
 }
 
 static int build_run (const build_command *c, const char *source, const char *log, const sigset_t *before,
                       pw_error *error) {
   pid_t child;
-  int outcome = 0, why = build_spawn (c, log, before, &child);
-  while (why == 0 && waitpid (child, &outcome, 0) < 0)
-    if (errno != EINTR) why = errno;
-  if (why != 0 && why != ENOENT && why != EACCES)
-    return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", c->word[0], strerror (why));
-  if (why != 0 || (WIFEXITED (outcome) && WEXITSTATUS (outcome) == 127))
+  int outcome = 0, code = build_spawn (c, log, before, &child);
+  while (code == 0 && waitpid (child, &outcome, 0) < 0)
+    if (errno != EINTR) code = errno;
+  if (code != 0 && code != ENOENT && code != EACCES)
+    return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", c->word[0], strerror (code));
+  if (code != 0 || (WIFEXITED (outcome) && WEXITSTATUS (outcome) == 127))
     return pw_fail (
         error, PW_INPUT,
         "cannot run the C compiler \"%s\" that %s%s needs (%s): install one, or name another in the environment "
         "variable CC",
         c->word[0], log ? "specialised code" : "the model file ", log ? "" : source,
-        why ? strerror (why) : "not found");
+        code ? strerror (code) : "not found");
   if ((!WIFEXITED (outcome) || WEXITSTATUS (outcome) != 0) && log)
     return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, c->word[0], log);
   if (!WIFEXITED (outcome) || WEXITSTATUS (outcome) != 0)
@@ -112,7 +112,7 @@ char *pw_temporary_folder (pw_error *error) {
   return NULL;
 }
 
-/* The compiler with everything it needs. */
+/* Compiles a file with the folder of pinwheel.h. */
 static int build_object (const char *path, const char *object, const char *log, const sigset_t *before,
                          pw_error *error) {
   build_command c = { .text = NULL };

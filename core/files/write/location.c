@@ -34,13 +34,14 @@ static int location_same (const struct stat *a, const struct stat *b) {
 /* The descriptor of this process that a path in /dev/fd or /proc/self/fd means, or -1. */
 static int location_descriptor (const char *path) {
   const char *base = location_base (path);
-  struct stat here, own;
+  struct stat here, descriptors;
   size_t digits = strspn (base, "0123456789");
   if (digits == 0 || digits > 9 || base[digits]) return -1;
   char *folder = pw_folder_of (path);
-  int is_own = folder && stat (folder, &here) == 0 && stat ("/dev/fd", &own) == 0 && location_same (&here, &own);
+  int found =
+      folder && stat (folder, &here) == 0 && stat ("/dev/fd", &descriptors) == 0 && location_same (&here, &descriptors);
   free (folder);
-  return is_own ? atoi (base) : -1;
+  return found ? atoi (base) : -1;
 }
 
 /* Replaces the path of a link by its target.  0 or an errno value. */
@@ -60,17 +61,17 @@ static int location_follow (pw_location *p) {
 int pw_locate (pw_location *p, const char *path) {
   *p = (pw_location){ .path = strdup (path), .descriptor = strcmp (path, "-") == 0 ? STDOUT_FILENO : -1 };
   if (p->path == NULL) return ENOMEM;
-  for (int links = 0, why; links < LOCATION_LINKS; links++) {
+  for (int links = 0, code; links < LOCATION_LINKS; links++) {
     if (p->descriptor < 0) p->descriptor = location_descriptor (p->path);
     p->exists = (p->descriptor >= 0 ? fstat (p->descriptor, &p->info) : lstat (p->path, &p->info)) == 0;
     if (!p->exists) return p->descriptor < 0 && errno == ENOENT ? 0 : errno;
     if (p->descriptor >= 0 || !S_ISLNK (p->info.st_mode)) return 0;
-    if ((why = location_follow (p)) != 0) return why;
+    if ((code = location_follow (p)) != 0) return code;
   }
   return ELOOP;
 }
 
-/* ---- What a command reads and writes ---- */
+/* ---- Files that a command reads and writes ---- */
 
 typedef struct {
   const pw_use *use;
@@ -79,11 +80,11 @@ typedef struct {
   int known;          /* 1: the folder was found */
 } location_use;
 
-/* Ignores files that cannot be located, since opening them fails, too.  PW_RESOURCE without memory. */
+/* Ignores files that cannot be located, since opening them reports it.  PW_RESOURCE if out of memory. */
 static int location_use_find (location_use *u, const pw_use *use) {
   *u = (location_use){ .use = use };
-  int why = use->path ? pw_locate (&u->location, use->path) : ENOENT;
-  if (why) return why == ENOMEM ? PW_RESOURCE : PW_OK;
+  int code = use->path ? pw_locate (&u->location, use->path) : ENOENT;
+  if (code) return code == ENOMEM ? PW_RESOURCE : PW_OK;
   char *folder = pw_folder_of (u->location.path);
   u->known = folder && stat (folder, &u->folder) == 0;
   free (folder);

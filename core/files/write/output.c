@@ -1,6 +1,6 @@
 /* Output files: written as NAME.part, renamed when complete.
  *
- * The temporary file is locked from its opening until its folder is on the disk, so that two processes never write the
+ * The temporary file is locked until its folder is written to the disk, so that two processes never write the
  * same output.  Existing files that are not regular (a terminal, a pipe, /dev/null) and open descriptors of the process
  * are written directly. */
 #include <errno.h>
@@ -11,13 +11,13 @@
 #include "files.h"
 
 struct pw_output {
-  FILE *stream;  /* NULL: closed, only the renaming is missing */
+  FILE *stream;  /* NULL: closed, but not renamed yet */
   char *path;    /* as the user knows it */
   char *real;    /* of the file itself, links followed */
   char *part;    /* its temporary name; NULL: written directly */
   int file;      /* keeps the temporary file locked; -1: written directly */
   int folder;    /* that contains it; -1: written directly */
-  int why;       /* errno of the first failed write */
+  int code;      /* errno of the first failed write */
   int continued; /* 1: continues a file that is not empty */
   int discard;   /* 1: an incomplete file is removed */
 };
@@ -32,9 +32,9 @@ static void output_free (pw_output *o) {
   free (o);
 }
 
-static int output_fail (const pw_output *o, int why, int kept, pw_error *error) {
+static int output_fail (const pw_output *o, int code, int kept, pw_error *error) {
   const char *what = strcmp (o->path, "-") == 0 ? "standard output" : o->path;
-  const char *reason = why > 0 ? pw_lock_reason (why) : "a write failed";
+  const char *reason = code > 0 ? pw_lock_reason (code) : "a write failed";
   if (o->part && kept && !o->discard)
     return pw_fail (error, PW_RESOURCE, "cannot write %.200s: %s; what was written is in %.200s", what, reason,
                     o->part);
@@ -47,9 +47,9 @@ static int output_fail (const pw_output *o, int why, int kept, pw_error *error) 
 static int output_stream_of (pw_output *o, int file, const char *mode) {
   o->stream = file < 0 ? NULL : fdopen (file, mode);
   if (o->stream) return 0;
-  int why = errno;
+  int code = errno;
   if (file >= 0) close (file);
-  return why;
+  return code;
 }
 
 /* Opens a descriptor of the process or a file that is not regular.  A FIFO blocks until it has a reader or a signal
@@ -90,18 +90,18 @@ static int output_open_part (pw_output *o, pw_lock_how how) {
   char *folder = pw_folder_of (o->real);
   if (folder == NULL) return ENOMEM;
   o->folder = open (folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  int why = o->folder < 0 && errno != EACCES ? errno : 0; /* a folder that cannot be listed may still be writable */
+  int code = o->folder < 0 && errno != EACCES ? errno : 0; /* a folder that cannot be listed may still be writable */
   free (folder);
-  if (why) return why;
+  if (code) return code;
   o->file = pw_lock_file (o->part, how, &created);
   return o->file < 0 ? errno : 0;
 }
 
 /* Finds the location `p`, and o->part unless the file is written directly. */
-static int output_place (pw_output *o, pw_location *p, const char *ending) {
-  int why = pw_locate (p, o->path);
+static int output_locate (pw_output *o, pw_location *p, const char *ending) {
+  int code = pw_locate (p, o->path);
   o->real = p->path;
-  if (why) return why;
+  if (code) return code;
   if (p->exists && S_ISDIR (p->info.st_mode)) return EISDIR;
   if (p->descriptor >= 0 || (p->exists && !S_ISREG (p->info.st_mode))) return 0;
   if (p->exists && access (p->path, W_OK) != 0) return errno;
@@ -115,24 +115,24 @@ static int output_place (pw_output *o, pw_location *p, const char *ending) {
 char *pw_output_path (const char *path, pw_error *error) {
   pw_location p;
   pw_output o = { .path = (char *)(size_t)path };
-  int why = output_place (&o, &p, "");
-  if (why == 0 && o.part) free (o.real);
-  if (why == 0 && o.part) return o.part;
-  pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, why ? strerror (why) : pw_not_regular (p.info.st_mode));
+  int code = output_locate (&o, &p, "");
+  if (code == 0 && o.part) free (o.real);
+  if (code == 0 && o.part) return o.part;
+  pw_fail (error, PW_RESOURCE, "cannot write %s: %s", path, code ? strerror (code) : pw_not_regular (p.info.st_mode));
   free (o.real);
   return NULL;
 }
 
 static int output_open_file (pw_output *o, const char *ending) {
   pw_location p;
-  int why = output_place (o, &p, ending);
-  if (why) return why;
+  int code = output_locate (o, &p, ending);
+  if (code) return code;
   if (o->part == NULL) return output_open_direct (o, &p);
-  why = output_open_part (o, PW_LOCK_NEW);
-  if (why == 0 && p.exists) why = output_inherit (o->file, &p.info);
-  if (why == 0) why = output_stream (o);
-  if (why && o->file >= 0) unlink (o->part);
-  return why;
+  code = output_open_part (o, PW_LOCK_NEW);
+  if (code == 0 && p.exists) code = output_inherit (o->file, &p.info);
+  if (code == 0) code = output_stream (o);
+  if (code && o->file >= 0) unlink (o->part);
+  return code;
 }
 
 static pw_output *output_new (const char *path, pw_error *error) {
@@ -150,10 +150,10 @@ pw_output *pw_output_open_as (const char *path, const char *ending, pw_error *er
   pw_output *o = output_new (path, error);
   if (o == NULL) return NULL;
   o->discard = strcmp (ending, ".part") != 0;
-  int why = output_open_file (o, ending);
-  if (why == 0) return o;
-  if (why == ENOMEM) pw_fail (error, PW_RESOURCE, "cannot write %s: out of memory", path);
-  output_fail (o, why, 0, error);
+  int code = output_open_file (o, ending);
+  if (code == 0) return o;
+  if (code == ENOMEM) pw_fail (error, PW_RESOURCE, "cannot write %s: out of memory", path);
+  output_fail (o, code, 0, error);
   output_free (o);
   return NULL;
 }
@@ -172,8 +172,8 @@ int pw_output_is_file (const pw_output *o) {
 
 int pw_output_check (pw_output *o, pw_error *error) {
   if (!ferror (o->stream)) return PW_OK;
-  if (o->why == 0) o->why = errno;
-  return output_fail (o, o->why, 0, error);
+  if (o->code == 0) o->code = errno;
+  return output_fail (o, o->code, 0, error);
 }
 
 int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error) {
@@ -186,28 +186,28 @@ int pw_output_text (pw_output *o, const char *text, size_t size, pw_error *error
 
 /* Flushes the stream and writes a regular file to the disk.  0, an errno value, or -1 for an unknown reason. */
 static int output_sync (pw_output *o) {
-  if (ferror (o->stream)) return o->why ? o->why : -1;
+  if (ferror (o->stream)) return o->code ? o->code : -1;
   errno = 0;
   if (fflush (o->stream) == 0 && (o->file < 0 || fsync (o->file) == 0)) return 0;
   return errno ? errno : -1;
 }
 
 /* Closes the stream; standard output stays open. */
-static int output_close (pw_output *o, int why) {
+static int output_close (pw_output *o, int code) {
   FILE *f = o->stream;
   o->stream = NULL;
   errno = 0;
-  if (f == NULL || f == stdout || fclose (f) == 0 || why) return why;
+  if (f == NULL || f == stdout || fclose (f) == 0 || code) return code;
   return errno ? errno : -1;
 }
 
 int pw_output_ready (pw_output *o, pw_error *error) {
-  if (o->stream) o->why = output_close (o, output_sync (o));
-  return o->why ? output_fail (o, o->why, 1, error) : PW_OK;
+  if (o->stream) o->code = output_close (o, output_sync (o));
+  return o->code ? output_fail (o, o->code, 1, error) : PW_OK;
 }
 
 /* Truncates the temporary file after its last complete line. */
-static void output_cut (pw_output *o) {
+static void output_truncate (pw_output *o) {
   char c;
   off_t end = lseek (o->file, 0, SEEK_END), keep = end;
   while (keep > 0 && pread (o->file, &c, 1, keep - 1) == 1 && c != '\n') keep--;
@@ -217,7 +217,7 @@ static void output_cut (pw_output *o) {
 char *pw_output_abandon (pw_output *o, char *buffer, size_t size) {
   if (o->stream) output_close (o, fflush (o->stream));
   buffer[0] = 0;
-  if (o->part) output_cut (o);
+  if (o->part) output_truncate (o);
   if (o->part) snprintf (buffer, size, "%s", o->part);
   output_free (o);
   return *buffer ? buffer : NULL;
@@ -302,8 +302,8 @@ int pw_output_mark (pw_output *o, pw_mark *mark, pw_error *error) {
   if (o->part == NULL)
     return pw_fail (error, PW_INPUT, "%s cannot be continued: it is not a regular file",
                     o->stream == stdout ? "standard output" : o->path);
-  int why = output_sync (o);
-  if (why) return output_fail (o, why, 0, error);
+  int code = output_sync (o);
+  if (code) return output_fail (o, code, 0, error);
   mark->length = (unsigned long long)ftello (o->stream);
   if (output_check (o->file, mark) == PW_OK) return PW_OK;
   return pw_fail (error, PW_RESOURCE, "cannot read %s", o->part);
@@ -316,7 +316,7 @@ static int output_is_marked (const pw_output *o, const pw_mark *mark) {
 }
 
 /* A process killed just after completing its table leaves it under its final name. */
-static int output_take_back (pw_output *o, const pw_mark *mark) {
+static int output_restore_part (pw_output *o, const pw_mark *mark) {
   int created, file = pw_lock_file (o->real, PW_LOCK_EXISTING, &created);
   if (file < 0) return errno;
   o->file = file;
@@ -325,22 +325,22 @@ static int output_take_back (pw_output *o, const pw_mark *mark) {
 
 static int output_reopen (pw_output *o, const pw_mark *mark, pw_error *error) {
   pw_location p;
-  int why = output_place (o, &p, ".part");
-  if (why) return output_fail (o, why, 0, error);
+  int code = output_locate (o, &p, ".part");
+  if (code) return output_fail (o, code, 0, error);
   if (o->part == NULL) return pw_fail (error, PW_INPUT, "cannot continue %s: it is not a regular file", o->path);
-  why = output_open_part (o, PW_LOCK_EXISTING);
-  int absent = why == ENOENT;
-  if (absent) why = output_take_back (o, mark);
-  if (why == ENOENT) return pw_fail (error, PW_INPUT, "cannot continue %s: there is no %s", o->path, o->part);
-  if (why) return output_fail (o, why, 0, error);
+  code = output_open_part (o, PW_LOCK_EXISTING);
+  int absent = code == ENOENT;
+  if (absent) code = output_restore_part (o, mark);
+  if (code == ENOENT) return pw_fail (error, PW_INPUT, "cannot continue %s: there is no %s", o->path, o->part);
+  if (code) return output_fail (o, code, 0, error);
   if (!output_is_marked (o, mark))
     return pw_fail (error, PW_INPUT, "cannot continue %s: %s is not the table that the checkpoint belongs to", o->path,
                     absent ? "it" : o->part);
-  why = output_stream (o);
-  if (why == 0 &&
+  code = output_stream (o);
+  if (code == 0 &&
       (fseeko (o->stream, (off_t)mark->length, SEEK_SET) != 0 || ftruncate (o->file, (off_t)mark->length) != 0))
-    why = errno;
-  return why ? pw_fail (error, PW_RESOURCE, "cannot write %s: %s", o->part, strerror (why)) : PW_OK;
+    code = errno;
+  return code ? pw_fail (error, PW_RESOURCE, "cannot write %s: %s", o->part, strerror (code)) : PW_OK;
 }
 
 pw_output *pw_output_continue (const char *path, const pw_mark *mark, pw_error *error) {

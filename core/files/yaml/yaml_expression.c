@@ -1,4 +1,4 @@
-/* Expressions of time, and of states, in text models: signals by expressions, and the reference solution.
+/* Expressions of time, and of states, in text models: signals, and the reference solution.
  *
  * Such a signal becomes a function signal.  Each compiled system has a copy and may outlive the model. */
 #include <math.h>
@@ -7,18 +7,18 @@
 #include <string.h>
 #include "yaml.h"
 
-enum { SIGNAL_STATES = 16, BREAKPOINTS_TRIED = 100 }; /* most states per signal */
+enum { MAX_SIGNAL_STATES = 16, MAX_BREAKPOINTS = 100 }; /* most states per signal */
 
-/* A signal by expressions. */
+/* A signal defined by expressions. */
 typedef struct {
-  const pw_expression *x[3];           /* value, rate, acceleration; NULL: not given, differentiated instead */
-  int derivatives;                     /* required time derivatives: 0, 1, 2 */
-  int states;                          /* number of states in it */
-  const char *name[SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; used for reading only */
+  const pw_expression *x[3];               /* value, rate, acceleration; NULL: not given, differentiated instead */
+  int derivatives;                         /* required time derivatives: 0, 1, 2 */
+  int states;                              /* number of states in it */
+  const char *name[MAX_SIGNAL_STATES + 2]; /* "t", then states, "BODY.phi"; used for reading only */
   pw_signal_text text;
 } time_function;
 
-/* The expression currently read. */
+/* The expression being read. */
 typedef struct {
   pw_reader *r;
   const pw_node *node;
@@ -46,16 +46,16 @@ reading_fail (const reading *x, size_t at, const char *format, ...) {
 /* Reads an expression of variables, which end with NULL. */
 static int reading_expression (const reading *x, const char *const *variable, const char **text,
                                const pw_expression **expression) {
-  pw_expression_trouble trouble;
+  pw_expression_error error;
   if (pw_yaml_text (x->r, x->node, x->what, text) != PW_OK) return x->r->error->status;
-  int status = pw_expression_read (x->r->x, variable, *text, x->r->arena, expression, &trouble);
-  if (status == PW_INPUT) return reading_fail (x, trouble.at, "%s", trouble.text);
+  int status = pw_expression_read (x->r->x, variable, *text, x->r->arena, expression, &error);
+  if (status == PW_INPUT) return reading_fail (x, error.at, "%s", error.text);
   return status == PW_OK ? PW_OK : pw_yaml_no_memory (x->r);
 }
 
 /* ---- States: BODY.phi, ELEMENT.spin ---- */
 
-/* Indexes all elements, including those not built yet, whose errors are reported later. */
+/* Indexes all elements, including those not built yet; their errors are reported later. */
 static int state_elements (pw_reader *r) {
   const pw_node *list = r->y->elements;
   if (r->elements.slot) return PW_OK;
@@ -69,7 +69,7 @@ static int state_elements (pw_reader *r) {
   return PW_OK;
 }
 
-static int state_no_owner (const reading *x, const char *owner, size_t at) {
+static int state_unknown_owner (const reading *x, const char *owner, size_t at) {
   char hint[200];
   pw_nearest near = { .sought = owner };
   pw_yaml_suggest_bodies (x->r, &near);
@@ -84,14 +84,14 @@ static int state_of_element (const reading *x, const char *owner, const char *pa
   char list[200] = "";
   if (state_elements (x->r) != PW_OK) return x->r->error->status;
   int found = pw_names_find (&x->r->elements, owner);
-  if (found < 0) return state_no_owner (x, owner, at);
+  if (found < 0) return state_unknown_owner (x, owner, at);
   const pw_kind *kind = pw_kinds[found];
-  if (kind->internal == 0) return reading_fail (x, at, "%s %s has no states of its own", kind->name, owner);
+  if (kind->internal == 0) return reading_fail (x, at, "%s %s has no states", kind->name, owner);
   for (int i = 0; i < kind->internal; i++) {
-    const pw_quantity *own = &kind->coordinate[i];
-    if (strcmp (part, own->name) == 0 || strcmp (part, own->rate) == 0) return PW_OK;
+    const pw_quantity *state = &kind->coordinate[i];
+    if (strcmp (part, state->name) == 0 || strcmp (part, state->rate) == 0) return PW_OK;
     size_t n = strlen (list);
-    snprintf (list + n, sizeof list - n, "%s%s, %s", i ? ", " : "", own->name, own->rate);
+    snprintf (list + n, sizeof list - n, "%s%s, %s", i ? ", " : "", state->name, state->rate);
   }
   return reading_fail (x, at + strlen (owner) + 1, "the states of %s %s are %s, not \"%.30s\"", kind->name, owner, list,
                        part);
@@ -126,7 +126,7 @@ static void time_derivatives (const time_function *f, const double *variable, do
 
 static int time_eval (void *context, double t, const double *x, double value[3], double *gradient) {
   const time_function *f = context;
-  double variable[SIGNAL_STATES + 1] = { t }, u[3];
+  double variable[MAX_SIGNAL_STATES + 1] = { t }, u[3];
   if (f->states) memcpy (variable + 1, x, (size_t)f->states * sizeof *x);
   if (f->derivatives)
     time_derivatives (f, variable, value);
@@ -163,7 +163,7 @@ static void *time_open (void *context) {
 /* ---- Reading of signals ---- */
 
 /* Stores the names that expressions may use, and their values, for `show`. */
-static int time_keep_names (pw_reader *r) {
+static int time_store_names (pw_reader *r) {
   pw_reference_text *t = r->reference;
   size_t names = (size_t)r->y->parameters + (size_t)r->lets;
   if (t->name) return PW_OK;
@@ -172,10 +172,10 @@ static int time_keep_names (pw_reader *r) {
   if (t->name == NULL || t->value == NULL) return pw_yaml_no_memory (r);
   const pw_node *n = r->y->let ? r->y->let->first : NULL;
   for (int i = 0; i < (int)names; i++, t->names++) {
-    int own = i < r->y->parameters;
-    t->name[i] = own ? r->y->parameter[i].name : n->text;
-    t->value[i] = own ? r->parameter[i] : r->let[i - r->y->parameters];
-    if (!own) n = n->next->next;
+    int parameter = i < r->y->parameters;
+    t->name[i] = parameter ? r->y->parameter[i].name : n->text;
+    t->value[i] = parameter ? r->parameter[i] : r->let[i - r->y->parameters];
+    if (!parameter) n = n->next->next;
   }
   return PW_OK;
 }
@@ -191,8 +191,8 @@ static int time_add_state (void *context, const char *name, size_t length, size_
     if (strcmp (f->name[i], text) == 0) return PW_OK;
   if (!x->forced) return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
   if (state_check (x, text, at) != PW_OK) return x->r->error->status;
-  if (f->states == SIGNAL_STATES || length >= sizeof text)
-    return reading_fail (x, at, "more than %d states", SIGNAL_STATES);
+  if (f->states == MAX_SIGNAL_STATES || length >= sizeof text)
+    return reading_fail (x, at, "more than %d states", MAX_SIGNAL_STATES);
   f->name[f->states + 1] = pw_arena_copy (x->r->arena, text);
   return f->name[++f->states] ? PW_OK : pw_yaml_no_memory (x->r);
 }
@@ -207,7 +207,7 @@ static int time_expression (reading *x, int i) {
   if (made->breaks) x->signal->breakpoint = time_breakpoint;
   if ((r->codes += made->codes) > PW_YAML_CODES)
     return pw_yaml_fail (r, x->node->at,
-                         "%s: the signals by expressions up to here have more than %d operations, which need more "
+                         "%s: the expressions up to here have more than %d operations, which need more "
                          "memory than a model may have",
                          x->what, PW_YAML_CODES);
   if (made->jump == NULL || f->text.jump) return PW_OK;
@@ -248,7 +248,7 @@ static double time_size (const time_function *f, double t, int i) {
 static int time_continuous (const reading *x, int levels) {
   static const char *const name[] = { "its value", "its rate" };
   double t = 0, before[3], after[3];
-  for (int k = 0; k < BREAKPOINTS_TRIED && x->signal->breakpoint; k++) {
+  for (int k = 0; k < MAX_BREAKPOINTS && x->signal->breakpoint; k++) {
     t = time_breakpoint (x->f, t);
     if (t == INFINITY) return PW_OK;
     time_derivatives (x->f, &(double){ nextafter (t, -INFINITY) }, before);
@@ -287,7 +287,7 @@ int pw_yaml_of_time (pw_reader *r, const pw_kind *kind, const char *what, const 
   signal->function.close = free;
   signal->function.text = &f->text;
   reading x = { r, NULL, what, f, pw_kind_forced (kind), &signal->function };
-  if (time_keep_names (r) != PW_OK || time_all (&x, v) != PW_OK) return r->error->status;
+  if (time_store_names (r) != PW_OK || time_all (&x, v) != PW_OK) return r->error->status;
   if (f->states) signal->function.reads = f->name + 1;
   return PW_OK;
 }
@@ -322,7 +322,7 @@ int pw_yaml_reference (pw_reader *r) {
   const pw_node *map = r->y->reference;
   pw_reference_text *t = r->reference;
   pw_names seen = { .size = 0 };
-  if (map == NULL || time_keep_names (r) != PW_OK) return r->error->status;
+  if (map == NULL || time_store_names (r) != PW_OK) return r->error->status;
   if (map->type != PW_YAML_MAP)
     return pw_yaml_fail (r, map->at, "truth: expected a map {STATE: EXPRESSION, ...}, found %s", pw_yaml_found (map));
   t->state = pw_arena_alloc (r->arena, ((size_t)map->count + 1) * sizeof *t->state);

@@ -90,19 +90,19 @@ int pw_yaml_varies (const char *text, size_t *at) {
 }
 
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value) {
-  pw_expression_trouble trouble;
+  pw_expression_error error;
   size_t at;
   if (node == NULL || r->error->status != PW_OK) return r->error->status;
   if (node->type != PW_YAML_SCALAR)
     return pw_yaml_fail (r, node->at, "%s: expected a number, found %s", what, pw_yaml_found (node));
   int status =
-      pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (r->x, node->text, value, &trouble);
+      pw_expression_number (node->text, value) ? PW_OK : pw_expression_constant (r->x, node->text, value, &error);
   if (status == PW_RESOURCE) return pw_yaml_no_memory (r);
   if (status != PW_OK)
-    return pw_yaml_fail (r, pw_yaml_offset (r->y, node, trouble.at), "%s: %s", what,
-                         pw_yaml_varies (node->text, &at) && at == trouble.at
+    return pw_yaml_fail (r, pw_yaml_offset (r->y, node, error.at), "%s: %s", what,
+                         pw_yaml_varies (node->text, &at) && at == error.at
                              ? "only the value of a signal may depend on the time t or on states"
-                             : trouble.text);
+                             : error.text);
   const char *expected = pw_domain_check (domain, *value);
   return *expected ? pw_yaml_fail (r, node->at, "%s = %g: expected %s", what, *value, expected) : PW_OK;
 }

@@ -9,7 +9,7 @@ enum { TREE_DEPTH = 30, TREE_PIECE = 4096 };
 
 typedef struct {
   pw_reader r;
-  pw_yaml *y; /* r.y, which gets the nodes */
+  pw_yaml *y; /* r.y; receives the nodes */
   struct fy_parser *parser;
   struct fy_diag *diag;
   struct fy_token_iter *text; /* iterates over the pieces of a scalar */
@@ -20,24 +20,24 @@ typedef struct {
   /* source read by the parser since the last event */
   size_t from, fed;     /* bytes */
   double marks, opened; /* indicators; opening minus closing brackets */
-  int nested;           /* 1: too many brackets */
-  int far;              /* 1: too much source */
-  int line, column;     /* of the last mark, from 0, and */
-  size_t mark_at;       /* its offset */
+  int too_deep;         /* 1: too many brackets */
+  int too_long;         /* 1: too much source */
+  int line, column;     /* of the last mark, from 0 */
+  size_t mark_at;       /* offset of the last mark */
   unsigned at;          /* of the last node, for events without a position */
 } tree;
 
-/* The offset of a mark, from its line and its column, in characters: libfyaml 0.7.12 gives wrong offsets for
+/* The offset of a mark, from its line and its column, in characters: libfyaml 0.7.12 gives cause offsets for
  * input read in pieces.  Marks are nearly in order. */
 static unsigned tree_offset_of (tree *x, const struct fy_mark *mark) {
-  static const char sign[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
+  static const char bom[] = "\xEF\xBB\xBF"; /* byte order mark, not counted as a column */
   const char *source = x->y->source, *end = source + x->y->size, *p = source + x->mark_at;
   if (x->line != mark->line) {
     for (; x->line < mark->line && p < end; p++) x->line += *p == '\n';
     for (; p > source && (x->line > mark->line || p[-1] != '\n'); p--) x->line -= p[-1] == '\n';
     x->column = 0;
   }
-  if (p == source && strncmp (p, sign, 3) == 0) p += 3;
+  if (p == source && strncmp (p, bom, 3) == 0) p += 3;
   for (; x->column < mark->column && p < end; x->column++) p += pw_utf8_size (p);
   for (; x->column > mark->column && p > source; x->column--)
     for (p--; p > source && (*p & 0xC0) == 0x80;) p--;
@@ -114,7 +114,7 @@ static int tree_begin (tree *x, struct fy_event *e, pw_yaml_type type) {
 
 /* ---- Events ---- */
 
-static int tree_marked (tree *x, struct fy_event *e) {
+static int tree_refuse_marks (tree *x, struct fy_event *e) {
   struct fy_token *anchor = fy_event_get_anchor_token (e), *tag = fy_event_get_tag_token (e);
   struct fy_token *token = e->type == FYET_ALIAS ? e->alias.anchor : anchor ? anchor : tag;
   if (token == NULL) return PW_OK;
@@ -151,20 +151,20 @@ static ssize_t tree_feed (void *user, void *to, size_t count) {
   memcpy (to, x->y->source + x->fed, n);
   tree_count (x, x->fed, x->fed + n, 1);
   x->fed += n;
-  x->nested = x->opened > TREE_NESTED;
-  x->far = x->marks > x->y->ahead;
-  return x->nested || x->far ? 0 : (ssize_t)n; /* libfyaml 0.7.12 retries after an error */
+  x->too_deep = x->opened > TREE_NESTED;
+  x->too_long = x->marks > x->y->ahead;
+  return x->too_deep || x->too_long ? 0 : (ssize_t)n; /* libfyaml 0.7.12 retries after an error */
 }
 
-static int tree_take (tree *x, struct fy_event *e) {
-  if (tree_marked (x, e) != PW_OK) return PW_INPUT;
+static int tree_event (tree *x, struct fy_event *e) {
+  if (tree_refuse_marks (x, e) != PW_OK) return PW_INPUT;
   size_t at = tree_event_offset (x, e);
   if (at > x->fed) at = x->fed;
   if (at > x->from) tree_count (x, x->from, at, -1), x->from = at;
   switch (e->type) {
   case FYET_DOCUMENT_START:
     if (x->documents++ == 0) return PW_OK;
-    return pw_yaml_fail (&x->r, tree_event_offset (x, e), "a second document; a file holds one model");
+    return pw_yaml_fail (&x->r, tree_event_offset (x, e), "a second document; a file contains one model");
   case FYET_SCALAR:
     return tree_scalar (x, e);
   case FYET_SEQUENCE_START:
@@ -222,11 +222,11 @@ static int tree_syntax (const tree *x) {
 }
 
 static int tree_refused (const tree *x) {
-  if (x->nested) return pw_yaml_fail (&x->r, x->from, "nested too deeply");
+  if (x->too_deep) return pw_yaml_fail (&x->r, x->from, "nested too deeply");
   return pw_yaml_fail (
       &x->r, x->from,
       "a list or map in brackets with more than %g commas, colons and brackets, which takes much memory: "
-      "write its entries on lines of their own, after \"- \" or \"key: \"",
+      "write its entries on separate lines, after \"- \" or \"key: \"",
       x->y->ahead);
 }
 
@@ -234,20 +234,20 @@ static int tree_parse (tree *x) {
   struct fy_event *e;
   int status = PW_OK;
   while (status == PW_OK && (e = fy_parser_parse (x->parser)) != NULL) {
-    status = x->far ? tree_refused (x) : tree_take (x, e);
+    status = x->too_long ? tree_refused (x) : tree_event (x, e);
     fy_parser_event_free (x->parser, e);
   }
-  if (status == PW_OK && (x->nested || x->far)) return tree_refused (x);
+  if (status == PW_OK && (x->too_deep || x->too_long)) return tree_refused (x);
   return status == PW_OK && fy_parser_get_stream_error (x->parser) ? tree_syntax (x) : status;
 }
 
-/* Without memory libfyaml reports a syntax error, drops a part of the text, or crashes when it opens. */
+/* Out of memory, libfyaml reports a syntax error, drops a part of the text, or crashes when it opens. */
 enum { TREE_RESERVE = 1 << 16 };
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
-  pw_error wrong = { 0 };
+  pw_error cause = { 0 };
   struct fy_diag_cfg quiet;
-  tree x = { .r = { .y = y, .error = &wrong }, .y = y };
+  tree x = { .r = { .y = y, .error = &cause }, .y = y };
   fy_diag_cfg_default (&quiet);
   quiet.fp = NULL;
   errno = 0;
@@ -262,9 +262,9 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
     tree_parse (&x);
   else
     pw_yaml_no_memory (&x.r);
-  if (errno == ENOMEM) wrong.status = PW_OK, pw_yaml_no_memory (&x.r);
+  if (errno == ENOMEM) cause.status = PW_OK, pw_yaml_no_memory (&x.r);
   fy_token_iter_destroy (x.text);
   if (x.parser) fy_parser_destroy (x.parser);
   if (x.diag) fy_diag_destroy (x.diag);
-  return wrong.status == PW_OK ? PW_OK : pw_fail (error, wrong.status, "%s", wrong.text);
+  return cause.status == PW_OK ? PW_OK : pw_fail (error, cause.status, "%s", cause.text);
 }

@@ -14,7 +14,7 @@ PER_ELEMENT (marker_contact, contact, 3) {
 }
 
 static const pw_field marker_fields[] = {
-  { PW_AT (pw_marker, body), PW_BODY, .required = 1, .about = "the body that carries the point" },
+  { PW_AT (pw_marker, body), PW_BODY, .required = 1, .about = "the body with the point" },
   { PW_AT (pw_marker, at), PW_POINT, .unit = "m", .required = 1, .about = "the point in the body's frame" },
   { .name = NULL },
 };

@@ -23,7 +23,7 @@ typedef struct {
 static inline sliding_state sliding_at (const pw_batch *b, int e) {
   const sliding *k = (const sliding *)b->element + e;
   const pw_configuration *A = &b->configuration[b->body[2 * e]], *B = &b->configuration[b->body[2 * e + 1]];
-  sliding_state x = { k, line_turn (&k->across, A, B), { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega }, .w = 0 };
+  sliding_state x = { k, line_rotate (&k->across, A, B), { A->vx, A->vy, A->omega, B->vx, B->vy, B->omega }, .w = 0 };
   line_J (&x.s, x.E);
   for (int i = 0; i < 6; i++) x.w += x.E[i] * x.v[i];
   return x;
@@ -46,7 +46,7 @@ PER_ELEMENT (sliding_force, sliding, 6) {
 PER_ELEMENT (sliding_force_q, sliding, 36) {
   double slope = coulomb_slope (&x.k->law, x.w), Hv[6];
   line_jtl_q (&x.s, -coulomb_force (&x.k->law, x.w), out);
-  line_curve (&x.s, 1, x.v, Hv);
+  line_multiply_H (&x.s, 1, x.v, Hv);
   for (int i = 0; i < 36; i++) out[i] -= slope * x.E[i / 6] * Hv[i % 6];
 }
 
@@ -57,7 +57,7 @@ PER_ELEMENT (sliding_force_v, sliding, 36) {
 
 PER_ELEMENT (sliding_saturation, sliding, 12) {
   double Hv[6];
-  line_curve (&x.s, 1, x.v, Hv);
+  line_multiply_H (&x.s, 1, x.v, Hv);
   for (int i = 0; i < 6; i++) {
     out[i] = coulomb_range (&x.k->law, x.w, Hv[i]);
     out[6 + i] = coulomb_range (&x.k->law, x.w, x.E[i]);

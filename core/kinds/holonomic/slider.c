@@ -33,7 +33,7 @@ PER_ELEMENT (slider_gamma, line, 2) {
 }
 
 PER_ELEMENT (slider_jw_q, line, 12) {
-  line_curve (&x, 1, x.w, out);
+  line_multiply_H (&x, 1, x.w, out);
   memset (out + 6, 0, 6 * sizeof *out);
 }
 

@@ -71,7 +71,7 @@ PER_ELEMENT (steered_contact, steered, 3) {
 }
 
 static const pw_field steered_fields[] = {
-  { PW_AT (pw_steered_wheel, body), PW_BODY, .required = 1, .about = "the body that carries the wheel" },
+  { PW_AT (pw_steered_wheel, body), PW_BODY, .required = 1, .about = "the body with the wheel" },
   { PW_AT (pw_steered_wheel, at), PW_POINT, .unit = "m", .required = 1, .about = "contact point in the body's frame" },
   { PW_AT (pw_steered_wheel, heading), PW_SIGNAL, .unit = "rad", .required = 1,
     .about = "rolling direction in the body's frame as a function of time, with its derivative; 0: along its x" },
