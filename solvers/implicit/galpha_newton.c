@@ -99,7 +99,7 @@ static void galpha_fill (pw_run *r, double h) {
 
 int pw_galpha_open_matrix (pw_run *r) {
   galpha *d = r->data;
-  pw_scatter_record (&d->work.tangent.tape);
+  pw_scatter_record (&d->work.tangent.scatter);
   galpha_fill (r, 1);
   return pw_implicit_lay_out (&d->work, d->size);
 }

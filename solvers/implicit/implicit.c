@@ -16,7 +16,7 @@ int pw_implicit_open (pw_implicit *x, pw_run *r, const pw_array *array, size_t c
 
 int pw_implicit_lay_out (pw_implicit *x, int size) {
   pw_tangent *t = &x->tangent;
-  if (pw_scatter_lay_out (&t->tape, size, &t->colptr, &t->rowind) != PW_OK) return PW_RESOURCE;
+  if (pw_scatter_lay_out (&t->scatter, size, &t->colptr, &t->rowind) != PW_OK) return PW_RESOURCE;
   x->value = malloc (((size_t)t->colptr[size] + 1) * sizeof *x->value);
   return x->value ? pw_sparse_open (&x->sparse, size, t->colptr, t->rowind) : PW_RESOURCE;
 }
@@ -50,7 +50,7 @@ int pw_implicit_restart (pw_run *r, pw_error *error) {
 
 void pw_implicit_fill (pw_implicit *x, int size) {
   memset (x->value, 0, (size_t)x->tangent.colptr[size] * sizeof *x->value);
-  pw_scatter_begin (&x->tangent.tape, x->value);
+  pw_scatter_begin (&x->tangent.scatter, x->value);
 }
 
 /* Reports a failed step; the reason may be a singular configuration at its beginning. */

@@ -95,8 +95,8 @@ static void drift_positions (pw_run *r, double h) {
 static void drift_put_momentum (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
   const pw_system *s = r->s;
-  for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->tape, j, j, s->mass[j]);
-  pw_newton_JT (r->w, &x->tape,
+  for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, j, j, s->mass[j]);
+  pw_newton_JT (r->w, &x->scatter,
                 &(pw_put){ .col = s->coords, .rows = s->rows, .factor = 1, .factor_nonholonomic = 1, .map = x->map });
 }
 
@@ -105,22 +105,23 @@ static void drift_put_middle (pw_run *r, double h) {
   pw_tangent *x = &r->data->work.tangent;
   const pw_system *s = r->s;
   pw_put put = { .row = s->coords, .rows = s->rows, .factor_nonholonomic = 0.5 * h, .map = x->map, .w = r->data->u };
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_JW_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->scatter, PW_JW_Q, &put);
   put.factor_nonholonomic = -0.5 * h;
-  pw_newton_block (&x->newton, r->w, &x->tape, PW_ETA_Q, &put);
+  pw_newton_block (&x->newton, r->w, &x->scatter, PW_ETA_Q, &put);
   put.factor_nonholonomic = 1;
-  pw_newton_J (r->w, &x->tape, &put);
+  pw_newton_J (r->w, &x->scatter, &put);
 }
 
 /* G at the end; kinematics must be those of the end. */
 static void drift_put_end (pw_run *r) {
   pw_tangent *x = &r->data->work.tangent;
-  pw_newton_J (r->w, &x->tape, &(pw_put){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
+  pw_newton_J (r->w, &x->scatter,
+               &(pw_put){ .row = r->s->coords, .rows = r->s->holonomic, .factor = 1, .map = x->map });
 }
 
 static int drift_open_matrix (pw_run *r) {
   leapfrog *d = r->data;
-  pw_scatter_record (&d->work.tangent.tape);
+  pw_scatter_record (&d->work.tangent.scatter);
   drift_put_momentum (r);
   drift_put_middle (r, 1);
   drift_put_end (r);

@@ -76,9 +76,9 @@ static void radau_fill (radau *d) {
 int pw_radau_open_matrices (pw_run *r) {
   radau *d = r->data;
   pw_tangent *x = &d->tangent;
-  pw_scatter_record (&x->tape);
+  pw_scatter_record (&x->scatter);
   radau_fill (d);
-  if (pw_scatter_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
+  if (pw_scatter_lay_out (&x->scatter, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
   size_t nonzeros = (size_t)x->colptr[d->size] + 1;
   d->matrix = malloc (nonzeros * sizeof *d->matrix);
   d->value = malloc (2 * nonzeros * sizeof *d->value);
@@ -98,7 +98,7 @@ static int radau_linearise (pw_run *r) {
   if (status != PW_OK) return status;
   pw_evaluate_J (r->w);
   memset (d->matrix, 0, (size_t)d->tangent.colptr[d->size] * sizeof *d->matrix);
-  pw_scatter_begin (&d->tangent.tape, d->matrix);
+  pw_scatter_begin (&d->tangent.scatter, d->matrix);
   radau_fill (d);
   pw_matrix_evaluated (r, y, y + d->n);
   r->statistics.jacobians++;

@@ -33,7 +33,7 @@ int pw_tangent_open (pw_tangent *x, pw_run *r) {
 }
 
 void pw_tangent_close (pw_tangent *x) {
-  pw_scatter_close (&x->tape);
+  pw_scatter_close (&x->scatter);
   pw_newton_close (&x->newton);
   free (x->map);
   free (x->lambda);
@@ -59,15 +59,15 @@ static pw_put tangent_put (const pw_tangent *x, int row, int col, double factor)
 }
 
 static void tangent_block (pw_tangent *x, pw_block block, const pw_put *put) {
-  pw_newton_block (&x->newton, x->run->w, &x->tape, block, put);
+  pw_newton_block (&x->newton, x->run->w, &x->scatter, block, put);
 }
 
 /* of_q I + D (G^T mu)_q, -I, D G^T */
 void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const double *mu, const double *D) {
   const pw_system *s = x->run->s;
   for (int j = 0; j < s->coords; j++) {
-    pw_scatter_add (&x->tape, j, to->q + j, to->of_q);
-    pw_scatter_add (&x->tape, j, to->v + j, -1);
+    pw_scatter_add (&x->scatter, j, to->q + j, to->of_q);
+    pw_scatter_add (&x->scatter, j, to->v + j, -1);
   }
   if (mu == NULL) return;
   pw_put put = tangent_put (x, 0, to->q, 1);
@@ -75,7 +75,7 @@ void pw_tangent_kinematics (pw_tangent *x, const pw_tangent_update *to, const do
   tangent_block (x, PW_JTL_Q, &put);
   put.col = to->mu;
   put.factor = to->of_lambda;
-  pw_newton_JT (x->run->w, &x->tape, &put);
+  pw_newton_JT (x->run->w, &x->scatter, &put);
 }
 
 /* (J v)_q - eta_q, J */
@@ -87,14 +87,14 @@ void pw_tangent_velocities (pw_tangent *x, const pw_tangent_update *to, const do
   tangent_block (x, PW_ETA_Q, &put);
   put.factor = of_holonomic, put.factor_nonholonomic = 1;
   put.col = to->v;
-  pw_newton_J (x->run->w, &x->tape, &put);
+  pw_newton_J (x->run->w, &x->scatter, &put);
 }
 
 /* G */
 void pw_tangent_positions (pw_tangent *x, const pw_tangent_update *to, int row) {
   pw_put put = tangent_put (x, row, to->q, 1);
   put.rows = x->run->s->holonomic;
-  pw_newton_J (x->run->w, &x->tape, &put);
+  pw_newton_J (x->run->w, &x->scatter, &put);
 }
 
 /* (J^T lambda)_q - f_q, -f_v, M, J^T */
@@ -107,11 +107,11 @@ void pw_tangent_momentum (pw_tangent *x, const pw_tangent_update *to, const doub
   tangent_block (x, PW_FORCE_Q, &put);
   put.col = to->v;
   tangent_block (x, PW_FORCE_V, &put);
-  pw_newton_signals (&x->newton, x->run->w, &x->tape, to->momentum, to->q, to->v);
-  for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->tape, to->momentum + j, to->a + j, to->of_a * s->mass[j]);
+  pw_newton_signals (&x->newton, x->run->w, &x->scatter, to->momentum, to->q, to->v);
+  for (int j = 0; j < s->coords; j++) pw_scatter_add (&x->scatter, to->momentum + j, to->a + j, to->of_a * s->mass[j]);
   put.factor = put.factor_nonholonomic = to->of_lambda;
   put.col = to->lambda;
-  pw_newton_JT (x->run->w, &x->tape, &put);
+  pw_newton_JT (x->run->w, &x->scatter, &put);
 }
 
 /* (J a)_q - gamma_q + 2 alpha ((J v)_q - eta_q) + beta^2 G, 2 alpha J - gamma_v, J */
@@ -132,14 +132,14 @@ void pw_tangent_accelerations (pw_tangent *x, const pw_tangent_update *to, const
   put.col = to->v;
   tangent_block (x, PW_GAMMA_V, &put);
   put.factor = with_v + 2 * alpha, put.factor_nonholonomic = with_v + alpha;
-  pw_newton_J (r->w, &x->tape, &put);
+  pw_newton_J (r->w, &x->scatter, &put);
   put.col = to->q;
   put.rows = s->holonomic;
   put.factor = r->beta * r->beta;
-  pw_newton_J (r->w, &x->tape, &put);
+  pw_newton_J (r->w, &x->scatter, &put);
   if (to->a == to->v) return;
   put.col = to->a;
   put.rows = s->rows;
   put.factor = put.factor_nonholonomic = to->of_a;
-  pw_newton_J (r->w, &x->tape, &put);
+  pw_newton_J (r->w, &x->scatter, &put);
 }

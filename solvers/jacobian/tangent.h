@@ -18,7 +18,7 @@ typedef struct {
   const int *row;      /* rows: its number among all */
   double *lambda, *mu; /* all equations: values of the unknowns last expanded */
   pw_newton newton;
-  pw_scatter_map tape;
+  pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the pattern, in compressed columns */
 } pw_tangent;
 

@@ -25,7 +25,7 @@ void pw_nullspace_close (pw_nullspace *b);
 /* Begins a step at the current state of the run.  PW_METHOD if a signal failed. */
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r);
 
-/* Replaces v by the velocities at (t, q) with the same minimal velocities; updates kinematics and J.  PW_RETRY if the
+/* Replaces v by the velocities at (t, q) with the same null-space velocities; updates kinematics and J.  PW_RETRY if the
  * step is too large for its basis, or the configuration is singular. */
 int pw_nullspace_velocities (pw_nullspace *b, pw_run *r, double t, const double *q, double *v);
 

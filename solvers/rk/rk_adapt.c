@@ -81,8 +81,8 @@ static double adapt_whole (pw_run *r, const pw_rk_row *e) {
 
 static double adapt_left (pw_run *r, double whole, int projected) {
   struct pw_method_data *d = r->data;
-  if (!projected && !d->minimal) return whole;
-  if (projected || d->closes) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
+  if (!projected && !d->null_space) return whole;
+  if (projected || d->projects_positions) pw_project_error (r, r->saddle, r->q_at, r->s->holonomic);
   pw_project_error (r, r->saddle, r->v_at, r->s->rows);
   return adapt_norm (r, r->q_at, r->v_at) + sqrt (r->settings.rtol) * whole;
 }

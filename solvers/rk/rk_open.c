@@ -14,7 +14,7 @@ const pw_stabilisation pw_rk_stabilisations[] = {
   { "projection", "coordinate projection onto positions and velocities after each step (Lubich 1991, Eich 1993)",
     PW_PROJECTION },
   { "nullspace",
-    "minimal velocities in a basis of the null space of J: velocities obey all constraints at every stage "
+    "velocities in a basis of the null space of J: velocities obey all constraints at every stage "
     "(Kim & Vanderploeg 1986)",
     PW_NULLSPACE },
   { .name = NULL },
@@ -91,12 +91,12 @@ int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error) {
   d->adaptive = tableau->e != NULL && pw_run_option (r, "steps") == 0;
   d->held = pw_run_option (r, "inputs") != 0;
   d->projects = pw_stabilised_by (r, PW_PROJECTION);
-  d->minimal = pw_stabilised_by (r, PW_NULLSPACE);
-  d->closes = d->minimal && pw_run_option (r, "positions") == 0;
+  d->null_space = pw_stabilised_by (r, PW_NULLSPACE);
+  d->projects_positions = d->null_space && pw_run_option (r, "positions") == 0;
   d->every = (int)pw_run_option (r, "every");
   if (rk_allocate (d, r->s) != PW_OK) return pw_fail (error, PW_RESOURCE, "model %s: out of memory", r->s->model);
-  int status = d->projects || d->closes ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
-  if (status == PW_OK && d->minimal) status = pw_nullspace_open (&d->nullspace, r, error);
+  int status = d->projects || d->projects_positions ? pw_projector_open_asked (&d->projector, r, error) : PW_OK;
+  if (status == PW_OK && d->null_space) status = pw_nullspace_open (&d->nullspace, r, error);
   return status == PW_OK ? pw_rk_restart (r, error) : status;
 }
 

@@ -60,7 +60,7 @@ void pw_rk_ledger (const pw_run *r, double *out, const double *y, double h) {
 static inline int rk_stage (pw_run *r, double t, double *v, double *a, double *rate) {
   struct pw_method_data *d = r->data;
   int status;
-  if (d->minimal) {
+  if (d->null_space) {
     status = pw_nullspace_velocities (&d->nullspace, r, t, d->q, v);
     if (status == PW_OK) status = pw_nullspace_accelerate (r, v, a, d->lambda);
   } else {
@@ -119,14 +119,14 @@ static int rk_finite (const pw_run *r, const double *q, const double *v) {
 /* From the state reached to its successor at t1 = t + h, in d->q, d->v, d->a, d->lambda. */
 int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   struct pw_method_data *d = r->data;
-  int status = d->minimal ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
+  int status = d->null_space ? pw_nullspace_begin (&d->nullspace, r) : PW_OK;
   if (status == PW_OK) status = rk_stages (r, h);
   if (status != PW_OK) return status;
   rk_combine (r, d->q, d->v, &d->row[0], h);
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) return rk_project (r, t1, added);
-  if (!d->minimal) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
-  status = pw_nullspace_finalise (&d->nullspace, d->closes ? &d->projector : NULL, r, t1, d->q, d->v, added);
+  if (!d->null_space) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
+  status = pw_nullspace_finalise (&d->nullspace, d->projects_positions ? &d->projector : NULL, r, t1, d->q, d->v, added);
   return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
@@ -159,7 +159,7 @@ double pw_rk_distance (const pw_run *r) {
 
 int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   int finite = rk_finite (r, r->data->q, r->data->v) && rk_finite (r, r->q, r->v);
-  int against = (r->data->projects || r->data->closes) && finite ? r->data->projector.against : -1;
+  int against = (r->data->projects || r->data->projects_positions) && finite ? r->data->projector.against : -1;
   char element[120];
   if (status < 0) return pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", r->t);
   if (against >= 0) /* a redundant equation contradicts the others */
@@ -171,7 +171,7 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", r->t, h,
                   r->data->split      ? "near a singular configuration no two divisions of it agree"
                   : !finite           ? "the state is no longer finite"
-                  : r->data->minimal  ? "the velocities' basis does not last"
+                  : r->data->null_space  ? "the velocities' basis does not last"
                   : r->data->projects ? "the projection does not converge"
                                       : "a stage of it lands in a singular configuration");
 }

@@ -18,7 +18,7 @@ struct pw_method_data {
   pw_rk_row estimate[3];       /* error estimates; the last weight is that of the new state's derivative */
   int adaptive;                /* 1: step-size control; 0: fixed steps */
   int projects, held, every;   /* projection; signals constant over the step; steps between projections */
-  int minimal, closes;         /* nullspace: minimal velocities; positions are projected as well */
+  int null_space, projects_positions; /* stabilisation nullspace; it projects positions too */
   pw_projector projector;
   pw_nullspace nullspace;
   double base; /* time from which fixed steps are counted */

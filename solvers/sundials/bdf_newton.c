@@ -38,7 +38,7 @@ static void newton_combine (pw_bdf_newton *w, int n) {
   for (int c = 0; c < 3 * n + x->rows; c++) {
     int part = c < 2 * n ? c / n : 2, to = c < 2 * n ? c % n : c - 2 * n;
     for (int64_t i = x->colptr[c]; i < x->colptr[c + 1]; i++)
-      pw_scatter_add (&w->tape, (int)x->rowind[i], to, w->value ? power[part] * w->value[i] : 0);
+      pw_scatter_add (&w->scatter, (int)x->rowind[i], to, w->value ? power[part] * w->value[i] : 0);
   }
 }
 
@@ -56,14 +56,14 @@ static int newton_set_up (pw_real t, N_Vector y, N_Vector derivative, SUNMatrix 
     if (status != 0) return status;
     memcpy (d->v, N_VGetArrayPointer (y) + d->n, (size_t)d->n * sizeof *d->v);
     memset (w->value, 0, (size_t)x->colptr[columns] * sizeof *w->value);
-    pw_scatter_begin (&w->tangent.tape, w->value);
+    pw_scatter_begin (&w->tangent.scatter, w->value);
     newton_fill (d);
     pw_matrix_evaluated (d->sun.run, N_VGetArrayPointer (y), d->v);
     d->sun.run->statistics.jacobians++;
   }
   w->gamma = gamma;
   pw_sun_clear (matrix, w->colptr, w->rowind);
-  pw_scatter_begin (&w->tape, SUNSparseMatrix_Data (matrix));
+  pw_scatter_begin (&w->scatter, SUNSparseMatrix_Data (matrix));
   newton_combine (w, d->n);
   d->sun.run->statistics.factorisations++; /* CVODES factorises next */
   return 0;
@@ -107,12 +107,12 @@ static int newton_lay_out (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   pw_tangent *x = &w->tangent;
   int columns = 3 * d->n + x->rows, size = d->n + x->rows;
-  pw_scatter_record (&x->tape);
+  pw_scatter_record (&x->scatter);
   newton_fill (d);
-  if (pw_scatter_lay_out (&x->tape, columns, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
-  pw_scatter_record (&w->tape);
+  if (pw_scatter_lay_out (&x->scatter, columns, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
+  pw_scatter_record (&w->scatter);
   newton_combine (w, d->n);
-  if (pw_scatter_lay_out (&w->tape, size, &w->colptr, &w->rowind) != PW_OK) return PW_RESOURCE;
+  if (pw_scatter_lay_out (&w->scatter, size, &w->colptr, &w->rowind) != PW_OK) return PW_RESOURCE;
   w->value = calloc ((size_t)x->colptr[columns] + 1, sizeof *w->value);
   return w->value ? PW_OK : PW_RESOURCE;
 }
@@ -135,7 +135,7 @@ void pw_bdf_close_newton (multistep_data *d) {
   pw_bdf_newton *w = &d->newton;
   if (w->right) N_VDestroy (w->right);
   if (w->change) N_VDestroy (w->change);
-  pw_scatter_close (&w->tape);
+  pw_scatter_close (&w->scatter);
   pw_tangent_close (&w->tangent);
   free (w->value);
   free (w->colptr);

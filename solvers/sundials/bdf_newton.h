@@ -7,10 +7,10 @@
 
 /* Newton's iteration; see bdf_newton.c. */
 typedef struct {
-  pw_tangent tangent;  /* its matrix is T */
-  double *value;       /* of T */
-  double gamma;        /* of the matrix last set up */
-  pw_scatter_map tape; /* from the entries of T, in order, to the matrix */
+  pw_tangent tangent;     /* its matrix is T */
+  double *value;          /* of T */
+  double gamma;           /* of the matrix last set up */
+  pw_scatter_map scatter; /* from the entries of T, in order, to the matrix */
   int64_t *colptr, *rowind;
   N_Vector right, change; /* coords and independent equations */
 } pw_bdf_newton;

@@ -118,7 +118,7 @@ int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector res
   (void)residual, (void)t1, (void)t2, (void)t3;
   if (pw_ida_update (d, t, y) != 0) return -1;
   pw_sun_clear (matrix, d->tangent.colptr, d->tangent.rowind);
-  pw_scatter_begin (&d->tangent.tape, SUNSparseMatrix_Data (matrix));
+  pw_scatter_begin (&d->tangent.scatter, SUNSparseMatrix_Data (matrix));
   ida_matrix_fill (d, y, yp, c);
   pw_matrix_evaluated (d->sun.run, y, y + d->n);
   return 0;
@@ -126,8 +126,8 @@ int pw_ida_matrix (pw_real t, pw_real c, N_Vector vy, N_Vector vyp, N_Vector res
 
 int pw_ida_open_matrix (ida_data *d) {
   pw_tangent *x = &d->tangent;
-  pw_scatter_record (&x->tape);
+  pw_scatter_record (&x->scatter);
   ida_matrix_fill (d, N_VGetArrayPointer (d->sun.y), N_VGetArrayPointer (d->yp), 1);
-  if (pw_scatter_lay_out (&x->tape, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
+  if (pw_scatter_lay_out (&x->scatter, d->size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
   return pw_sun_open_matrix (&d->sun, d->size, x->colptr, x->rowind);
 }

@@ -57,7 +57,7 @@ void redundant_twins (const pw_plugin_table *table, const pw_plugin_table *twin,
   }
 }
 
-void redundant_says (const pw_plugin_table *table, const char *const *text) {
+void redundant_expect_reports (const pw_plugin_table *table, const char *const *text) {
   char buffer[500];
   int n = 0;
   while (text[n]) n++;

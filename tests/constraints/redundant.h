@@ -20,6 +20,6 @@ void redundant_twins (const pw_plugin_table *table, const pw_plugin_table *twin,
                       const char *const *name);
 
 /* Compares the descriptions of a run's redundant equations with these, NULL-terminated. */
-void redundant_says (const pw_plugin_table *table, const char *const *text);
+void redundant_expect_reports (const pw_plugin_table *table, const char *const *text);
 
 #endif

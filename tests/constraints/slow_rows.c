@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include "check.h"
 
-/* The largest memory of the program [kB] while it writes so many rows. */
+/* The largest memory of the program [kB] while it writes this number of rows. */
 static long rows_memory (long rows, const char *method) {
   const char *program = getenv ("PINWHEEL");
   char t_end[30];

@@ -1,4 +1,4 @@
-/* Methods without projection at every tolerance, through singular configurations: right, or told. */
+/* Methods without projection at every tolerance, through singular configurations: correct, or stopped with a message. */
 #include "check.h"
 #include "turns.h"
 

@@ -1,11 +1,11 @@
-/* A parallelogram with a crank too many: digits of its motion and equal shares of the load, by every method. */
+/* A parallelogram with a redundant crank: its motion, and equal reactions of the cranks, by every method. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
 #include "scene.h"
 #include "trial.h"
 
-/* What a run of 1 s is held against, within a bound that follows from the method. */
+/* Expected results of a run of 1 s, within a bound that follows from the method. */
 typedef void parallelogram_check (pw_system *s, pw_run *r, double bound, const char *reason);
 
 static void parallelogram_try (const char *method, parallelogram_check *check, double bound, const char *reason) {
@@ -43,7 +43,7 @@ static void test_digits (void **state) {
   parallelogram_every_method (parallelogram_digits, 1e-7, "1e3 rtol");
 }
 
-/* ---- Shares: by symmetry the least reactions are equal; in IDA the smallest also of the approximate ones ---- */
+/* ---- Reactions: by symmetry those of least norm are equal ---- */
 
 static void parallelogram_shares (pw_system *s, pw_run *r, double bound, const char *reason) {
   static const char *const name[] = { "B1.Fx", "B2.Fx", "B3.Fx", "B1.Fy", "B2.Fy", "B3.Fy" };
@@ -63,7 +63,7 @@ static void test_shares (void **state) {
   parallelogram_every_method (parallelogram_shares, 1e-6, "1e4 rtol");
 }
 
-/* ---- What is said: a row with many partners names their elements; a short buffer cuts the text ---- */
+/* ---- Messages: the dependence of a row names all elements; a short buffer truncates the text ---- */
 
 static void test_partners (void **state) {
   (void)state;

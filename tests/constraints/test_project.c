@@ -1,5 +1,5 @@
-/* A projected state and its accelerations: what is consistent stays as it is, what is not is moved, and the accelerations
- * are those of the state that comes out. */
+/* Projection of states: consistent states are unchanged, others are corrected, and accelerations are those of the projected
+ * state. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
@@ -9,7 +9,7 @@
 
 enum { PROJECT_MOST = 24 };
 
-/* The state after a third of a second with one rate off by so much, projected. */
+/* The state at 1/3 s with a perturbed velocity, projected. */
 static void project_try (const char *model, const char *parameter, double value, const char *method, double off) {
   pw_system *s = scene_named (model, parameter, value);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3 });
@@ -31,8 +31,8 @@ static void project_try (const char *model, const char *parameter, double value,
   check_below (model, now.velocity, 4 * CHECK_EPS, "round-off");
   check_bits ("positions", q, x.q, n);
   if (off == 0) {
-    check_bits ("rates", v, x.v, n);
-    check_close ("what is known", r->residuals.velocity, now.velocity, 0, "the same sweep");
+    check_bits ("velocities", v, x.v, n);
+    check_close ("stored residual", r->residuals.velocity, now.velocity, 0, "same evaluation");
   } else
     assert_true (fabs (v[1] - x.v[1]) < fabs (off) && isnan (r->residuals.velocity));
   assert_int_equal (pw_run_accelerate (r, x.t, q, v, other, mu), PW_OK);
@@ -59,7 +59,7 @@ static void test_off (void **state) {
   project_try ("n-trailer", NULL, 0, "rk4+projection", 1e-3);
 }
 
-/* The length of the correction of a rate that is off. */
+/* The length of the correction of a perturbed velocity. */
 static double project_length (const char *method) {
   pw_system *s = scene_named ("ezyroller", "m2", 0.1);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3 });
@@ -81,7 +81,7 @@ static double project_length (const char *method) {
   return sqrt (square);
 }
 
-/* In the identity metric the correction is the shortest one.  A third of its components and more have other weights in the mass
+/* In the identity metric the correction is the shortest one; a third of its components have other weights in the mass
  * matrix. */
 static void test_metric (void **state) {
   (void)state;
@@ -90,7 +90,7 @@ static void test_metric (void **state) {
   check_below ("correction", identity, 0.999 * mass, "the mass matrix has entries from 0.1 to 1");
 }
 
-/* A residual that is not a number is the worst of all, whichever row's it is. */
+/* A residual that is NaN is the largest, in whichever row it is. */
 static void test_wild_residual (void **state) {
   (void)state;
   double size[PROJECT_MOST];

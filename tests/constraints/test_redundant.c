@@ -1,5 +1,5 @@
-/* Redundant rows: the motion is that of the same scene without them, the reactions are the smallest, and what follows
- * from what is named. */
+/* Redundant constraint equations: the motion is that of the scene without them, reactions have the least norm, and messages
+ * name the elements. */
 #include <math.h>
 #include "check.h"
 #include "redundant.h"
@@ -10,9 +10,9 @@
 #include "../../models/redundant-parallelogram.c"
 #undef pw_plugin
 
-/* ---- Three cranks carry one coupler ---- */
+/* ---- Three cranks with one coupler ---- */
 
-/* The third crank carries only across: along y the other two do.  Independent while the cranks are not horizontal. */
+/* The third crank only adds a force along x: the others determine y.  Independent while the cranks are not horizontal. */
 static void redundant_slotted (pw_model *m, const void *parameter) {
   (void)parameter;
   double c = cos (-PW_PI / 4), s = sin (-PW_PI / 4);
@@ -42,7 +42,7 @@ static void test_parallelogram_twins (void **state) {
   redundant_twins (&redundant_parallelogram, &redundant_slotted_table, 1, 1e-3, redundant_cranks);
 }
 
-/* One crank is given at another angle than the others: off the constraints all rows are independent, more or less. */
+/* The initial angle of one crank differs from the others: off the constraints, all rows are independent. */
 static void test_parallelogram_start (void **state) {
   static const char *const crank[] = { "crank1.phi", "crank2.phi", "crank3.phi" };
   static const double off[] = { 1e-5, 1e-3, 0.1, 0.4, 0.6, 1.0 };
@@ -56,15 +56,16 @@ static void test_parallelogram_start (void **state) {
       pw_system *s = scene_compile (m);
       pw_run *r = runs_open (s, "rk4+projection", NULL);
       pw_sample x = runs_to (r, 0);
-      check_below ("initial residual", x.position, 64 * CHECK_EPS, "64 eps: what initial positions are good to");
-      if (off[k] == 1.0) { /* beyond the change point at 0: Newton's iteration may not keep the given angle */
+      check_below ("initial residual", x.position, 64 * CHECK_EPS, "64 eps: accuracy of initial positions");
+      if (off[k] == 1.0) { /* beyond the change point at 0: Newton's iteration may change the given angle */
         pw_run_close (r);
         pw_system_free (s);
         continue;
       }
       assert_int_equal (pw_run_initial (r)->released, 0);
       for (int j = 0; j < 3; j++)
-        check_close (crank[j], trial_state (s, &x, crank[j]), phi, 64 * CHECK_EPS, "64 eps: what a start is good to");
+        check_close (crank[j], trial_state (s, &x, crank[j]), phi, 64 * CHECK_EPS,
+                     "64 eps: accuracy of initial positions");
       pw_run_close (r);
       pw_system_free (s);
     }
@@ -98,7 +99,7 @@ static void redundant_two (pw_model *m, const void *parameter) {
 static const pw_plugin_table redundant_three_table = TRIAL_TABLE (redundant_three);
 static const pw_plugin_table redundant_two_table = TRIAL_TABLE (redundant_two);
 
-/* Two equal drives turn a crank against its weight: each has half of the reaction and does half of the work. */
+/* Two equal drives turn a crank against its weight: each has half of the reaction and half of the work. */
 static void redundant_drives (pw_model *m, const void *parameter) {
   (void)parameter;
   const pw_signal turn = { PW_SMOOTH_STEP, .ramp = { .to = 1, .duration = 1 } };
@@ -135,7 +136,7 @@ static void test_axle (void **state) {
   trial (&redundant_three_table, 2);
 }
 
-/* Twin wheels carry half each of what one would. */
+/* Twin wheels have half of the reaction of a single wheel each. */
 static void test_axle_forces (void **state) {
   (void)state;
   pw_system *s = scene_system (&redundant_three_table, NULL), *twin = scene_system (&redundant_two_table, NULL);
@@ -153,14 +154,14 @@ static void test_axle_forces (void **state) {
   pw_system_free (twin);
 }
 
-/* ---- Two bodies joined by a weld and two pins, hanging from the ground ---- */
+/* ---- Two bodies connected by a weld and two pins, pinned to the ground ---- */
 
 static void redundant_frame (pw_model *m, int pins) {
   pw_add_body (m, &(pw_body){ .name = "left", .mass = 2, .inertia = 0.3, .start = { 0.5, 0, 0 } });
   pw_add_body (m, &(pw_body){ .name = "right", .mass = 1, .inertia = 0.1, .start = { 1.3, 0.2, 0.4 } });
   double c = cos (0.4), s = sin (0.4);
   pw_add_pin (m, &(pw_pin){ .name = "hook", .body = { "left", "ground" }, .at = { { -0.5, 0 }, { 0, 0 } } });
-  /* the point (dx, dy) from the centre of `right`, in its own frame */
+  /* the point (dx, dy) from the centre of `right`, in its frame */
 #define REDUNDANT_SEEN(dx, dy) { c * (dx) + s * (dy), c * (dy)-s * (dx) }
   pw_add_weld (m, &(pw_weld){ .name = "plate",
                               .body = { "left", "right" },
@@ -199,21 +200,21 @@ static void test_frame (void **state) {
   trial (&redundant_bolted_table, 2);
 }
 
-/* ---- What is said ---- */
+/* ---- Messages ---- */
 
 static void test_names (void **state) {
   (void)state;
   static const char *const axle[] = { "wheels rear_left and rear_right: the same lateral constraint", NULL };
   static const char *const none[] = { NULL };
-  redundant_says (&redundant_three_table, axle);
-  redundant_says (&redundant_two_table, none);
+  redundant_expect_reports (&redundant_three_table, axle);
+  redundant_expect_reports (&redundant_two_table, none);
 }
 
-/* ---- Which rows are kept, and what they are called ---- */
+/* ---- Selection of independent rows ---- */
 
-/* A disc on a rod and a drive cannot move.  Of its three rows at the centre the wheel's is farther from the drive's than the
- * rod's is, but a position must not be given up for a velocity. */
-static void redundant_held (pw_model *m, const void *parameter) {
+/* A disc on a rod and a drive cannot move.  The wheel's row has a larger angle to the drive's row than the rod's row has,
+ * but holonomic rows are selected first. */
+static void redundant_fixed_disc (pw_model *m, const void *parameter) {
   (void)parameter;
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .start = { 1, 1, 0 }, .rate = { 0, 0, 1 } });
   pw_add_drive (
@@ -222,8 +223,8 @@ static void redundant_held (pw_model *m, const void *parameter) {
   pw_add_wheel (m, &(pw_wheel){ .name = "edge", .body = "disc" });
 }
 
-/* Of the drive along it the wheel's row has only a two-hundredth. */
-static void redundant_askew (pw_model *m, const void *parameter) {
+/* The cosine between the wheel's row and that of the drive along it is 1/200. */
+static void redundant_oblique_drive (pw_model *m, const void *parameter) {
   (void)parameter;
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1 });
   pw_add_drive (m, &(pw_drive){ .name = "ahead", .body = { "disc", "ground" }, .what = PW_DRIVE_X });
@@ -233,15 +234,15 @@ static void redundant_askew (pw_model *m, const void *parameter) {
 
 static void test_kept (void **state) {
   (void)state;
-  static const pw_plugin_table held = TRIAL_TABLE (redundant_held), askew = TRIAL_TABLE (redundant_askew);
-  static const char *const of_held[] = { "wheel edge (edge.N) follows from drive across, rod rod", NULL };
-  static const char *const of_askew[] = { "wheel edge (edge.N) follows from drive ahead, drive aside", NULL };
-  redundant_says (&held, of_held);
-  redundant_says (&askew, of_askew);
+  static const pw_plugin_table fixed = TRIAL_TABLE (redundant_fixed_disc), oblique = TRIAL_TABLE (redundant_oblique_drive);
+  static const char *const of_fixed[] = { "wheel edge (edge.N) follows from drive across, rod rod", NULL };
+  static const char *const of_oblique[] = { "wheel edge (edge.N) follows from drive ahead, drive aside", NULL };
+  redundant_expect_reports (&fixed, of_fixed);
+  redundant_expect_reports (&oblique, of_oblique);
 }
 
-/* A body hangs from a weld at its centre and a pin at the distance d: of the weight W the pin carries p, where
- * p^2 + (W - p)^2 + (d p / L)^2 is least, moments in units of force times the scene's length. */
+/* A body with a weld at its centre and a pin at the distance d.  The pin has the part p of the weight W that minimises p^2
+ * + (W - p)^2 + (d p / L)^2, moments in units of force times the scene's length. */
 static void redundant_hung (pw_model *m, const void *parameter) {
   (void)parameter;
   pw_add_body (m, &(pw_body){ .name = "sign", .mass = 3, .inertia = 2 });
@@ -257,7 +258,7 @@ static void test_moments (void **state) {
   pw_run *r = runs_open (s, "rk4+projection", NULL);
   pw_sample x = runs_to (r, 0);
   double L = pw_run_scale (r)->length, W = 30, d = 4, p = W / (2 + d * d / (L * L));
-  check_below ("the scene's length is not 1", 0.1, fabs (L - 1), "or nothing is said of units");
+  check_below ("the scene's length is not 1", 0.1, fabs (L - 1), "otherwise units are not tested");
   check_close ("pin", trial_reaction (s, &x, "pin.Fy"), p, 1e-12 * W, "round-off");
   check_close ("weld", trial_reaction (s, &x, "weld.Fy"), W - p, 1e-12 * W, "round-off");
   check_close ("moment", fabs (trial_reaction (s, &x, "weld.M")), d * p, 1e-12 * W * d, "round-off");

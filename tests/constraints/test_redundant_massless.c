@@ -1,14 +1,14 @@
-/* Redundant constraint equations of bodies without mass. */
+/* Redundant constraint equations of massless bodies. */
 #include <math.h>
 #include "check.h"
 #include "redundant.h"
 #include "scene.h"
 #include "trial.h"
 
-/* ---- A bracket without mass, bolted twice to a hull that turns, and pulled by a load ----
+/* ---- A massless bracket with two pins on a turning hull, pulled by a load ----
  *
- * One row of the bolts follows from the others, which one changes as the hull turns: where the bolts lie above each other
- * their x rows are the same.  A weld holds the bracket alike. */
+ * One row of the pins is redundant, a different one as the hull turns: where one pin is above the other, their x
+ * rows are equal.  A weld instead of the pins gives the same motion. */
 
 static void redundant_tow (pw_model *m, int bolts) {
   pw_add_body (m,
@@ -44,7 +44,8 @@ static void test_bracket (void **state) {
   (void)state;
   static const char *const name[] = { "hull.x", "hull.phi", "load.x", "load.y", "bracket.phi", "hull.omega", NULL };
   double a[REDUNDANT_COORDS], b[REDUNDANT_COORDS];
-  redundant_twins (&redundant_towed_table, &redundant_towed_plainly_table, 1, 2e-4, name); /* past one change of rows */
+  redundant_twins (&redundant_towed_table, &redundant_towed_plainly_table, 1, 2e-4,
+                   name); /* past one reselection of rows */
   trial (&redundant_towed_table, 1);
   redundant_end (&redundant_towed_table, "rk4+projection", 0, 5, name, a, 1e-3);
   redundant_end (&redundant_towed_plainly_table, "rk4+projection", 0, 5, name, b, 1e-3);
@@ -53,7 +54,8 @@ static void test_bracket (void **state) {
 
 /* ---- The same with a caster of short trail under the load ----
  *
- * The wheel is the weakest row throughout, so that nothing of the bolts shows in the smallest pivot until it is too late. */
+ * The wheel's row has the smallest pivot throughout, which therefore does not show that the selection of the
+ * bracket's rows becomes ill-conditioned. */
 
 static void redundant_caster (pw_model *m) {
   pw_add_body (m, &(pw_body){ .name = "fork", .start = { 3, 0, PW_PI / 2 }, .rate = { 0, 0.2 } });
@@ -90,7 +92,7 @@ static void test_caster (void **state) {
   }
 }
 
-/* Bolts that drift apart are four independent rows: even so three are kept, and the wheel. */
+/* Pins at points that do not coincide have four independent rows; three of them are selected, and the wheel's row. */
 static void test_drifting_bolts (void **state) {
   (void)state;
   static const char *const name[] = { "hull.x", "hull.y", "hull.phi", "load.x", "load.y", "fork.phi", NULL };
@@ -100,9 +102,9 @@ static void test_drifting_bolts (void **state) {
   check_below ("the bolted bracket", redundant_off (a, b, 6), 1e-3, "drift");
 }
 
-/* ---- A cart on two casters, their forks without mass, with two wheels on each axle ----
+/* ---- A cart on two casters with massless forks, with two wheels on each axle ----
  *
- * The rows of the second wheels touch no mass: what the elimination leaves of them is nothing but round-off. */
+ * The rows of the second wheels contain no massive coordinates: elimination leaves only round-off of them. */
 
 static void redundant_casters (pw_model *m, int wheels) {
   static const char *const fork[] = { "fork1", "fork2" }, *const head[] = { "A1", "A2" };
@@ -142,7 +144,7 @@ static void test_casters (void **state) {
   static const char *const name[] = { "cart.x", "cart.y", "cart.phi", "fork1.phi", "fork2.phi", "cart.omega", NULL };
   static const char *const wheels[] = { "wheels left1 and right1: the same lateral constraint",
                                         "wheels left2 and right2: the same lateral constraint", NULL };
-  redundant_says (&redundant_four_wheels_table, wheels);
+  redundant_expect_reports (&redundant_four_wheels_table, wheels);
   redundant_twins (&redundant_four_wheels_table, &redundant_two_wheels_table, 1, 1e-3, name);
 }
 

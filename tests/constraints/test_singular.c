@@ -1,4 +1,4 @@
-/* Singular configurations are passed or told. */
+/* Singular configurations: runs pass them or stop with a message. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -8,9 +8,9 @@
 #include "trial.h"
 #include "turns.h"
 
-/* ---- Through singular configurations ---- */
+/* ---- Passing singular configurations ---- */
 
-/* Two four-bar linkages: all cranks pass through the horizontal ten times in 10 s. */
+/* Two four-bar linkages; all cranks pass the horizontal ten times in 10 s. */
 static void test_four_bar (void **state) {
   (void)state;
   pw_system *s = scene_named ("n-four-bar", NULL, 0);
@@ -36,14 +36,14 @@ static void test_four_bar (void **state) {
   check_close ("vy", c * w, -0.4948688454870429590, 1e-9, "published digits");
   check_below ("energy, worst of the run", energy, 1e-9, "kept over ten passes");
   check_close ("balance at the end", x.balance, 0, 1e-9, "kept over ten passes");
-  /* between passes the balance swings by 1.01e-9 J, which falls with the fourth power of the step: relative to 36 J */
+  /* between passes the energy defect oscillates by 1.01e-9 J, of order h^4: relative to 36 J */
   check_below ("balance, worst of the run", balance, 1e-9 * start, "kept over ten passes, of the energy there is");
   assert_true (pw_run_statistics (r)->rejected > 0);
   pw_run_close (r);
   pw_system_free (s);
 }
 
-/* Steps that end on a singular configuration are passed by a longer one, however small they are. */
+/* A step that ends on a singular configuration is replaced by a longer one, at every step size. */
 static void test_steps_on_it (void **state) {
   static const struct { double cranks, step, t; } steps[] = { { 2, 7.75e-4, 10 }, { 5, 1e-4, 1 }, { 40, 3.1e-4, 1.5 } };
   (void)state;
@@ -78,7 +78,7 @@ static void test_slider_crank (void **state) {
   }
 }
 
-/* An adaptive method passes, or stops with its reason: it never ends well with a wrong answer. */
+/* An adaptive method passes or stops with a message; it never ends with status ok and a wrong result. */
 static void singular_or_told (const char *model, const char *method, double rtol, const char *name, double t,
                               double exact, double period) {
   pw_error error = { 0 };
@@ -101,7 +101,7 @@ static void singular_or_told (const char *model, const char *method, double rtol
   pw_system_free (s);
 }
 
-/* All of these ended with status ok on another branch before drifted constraints were watched. */
+/* Without the watchdog's criteria for drift, all of these end on another branch with status ok. */
 static void test_turned (void **state) {
   static const struct {
     const char *method;
@@ -111,10 +111,10 @@ static void test_turned (void **state) {
     { "bdf+baumgarte", 2, 1e-5 }, { "adams+none", 2, 1e-5 }, { "ida+none", 1, 1e-5 },  { "ida+baumgarte", 1, 3e-4 },
     { "ida+index2", 1, 1e-4 },    { "erk8+none", 1, 1e-5 },  { "erk8+none", 2, 3e-5 }, { "erk5+none", 1, 3e-4 },
   };
-  int told = 0, count = sizeof turns / sizeof *turns;
+  int reported = 0, count = sizeof turns / sizeof *turns;
   (void)state;
-  for (int i = 0; i < count; i++) told += turns_try (turns[i].method, turns[i].rtol, "n-four-bar", turns[i].cranks);
-  assert_true (2 * told > count);
+  for (int i = 0; i < count; i++) reported += turns_try (turns[i].method, turns[i].rtol, "n-four-bar", turns[i].cranks);
+  assert_true (2 * reported > count);
 }
 
 static void test_ida (void **state) {
@@ -127,7 +127,7 @@ static void test_ida (void **state) {
   }
 }
 
-/* A four-bar linkage that starts flat could open two ways. */
+/* A four-bar linkage that is initially flat has two branches. */
 static void singular_flat (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m,
@@ -157,7 +157,7 @@ static void test_flat_start (void **state) {
   }
 }
 
-/* ---- Put into one ---- */
+/* ---- Restarts in a singular configuration ---- */
 
 typedef struct {
   double angle;
@@ -168,7 +168,7 @@ static const pw_parameter singular_angle_list[] = {
   { .name = NULL },
 };
 
-/* A parallelogram of bars 1 m long. */
+/* A parallelogram of bars of 1 m. */
 static void singular_rhombus (pw_model *m, const void *parameter) {
   const singular_angle *p = parameter;
   double c = cos (p->angle), n = sin (p->angle);
@@ -182,7 +182,7 @@ static void singular_rhombus (pw_model *m, const void *parameter) {
   pw_add_pin (m, &(pw_pin){ .name = "D", .body = { "right", "ground" }, .at = { { -0.5, 0 }, { 1, 0 } } });
 }
 
-/* A run that is put into a singular configuration says so, with the name of a pin, and goes on from where it was. */
+/* A restart in a singular configuration is refused with the name of a pin; the run continues from its former state. */
 static void test_restarted_in (void **state) {
   static const pw_plugin_table table = { .abi = PW_ABI,
                                          .size = sizeof (pw_plugin_table),
@@ -210,11 +210,11 @@ static void test_restarted_in (void **state) {
   }
 }
 
-/* What is an outburst of accelerations follows from those behind a restart: a linkage that is sped up just before a singular
- * configuration passes it as one that came as fast. */
-static void test_sped_up (void **state) {
+/* After a restart, the reference level of accelerations is that of the new state: a linkage accelerated just before a
+ * singular configuration passes it like one that arrives at the same speed. */
+static void test_accelerated_by_restart (void **state) {
   static const char *const method[] = { "rk4", "leapfrog", "galpha+index3" };
-  const double slow = 1.4908, fast = 40, end = 1.5; /* at 0.08 rad from it; a step is 0.08 rad then */
+  const double slow = 1.4908, fast = 40, end = 1.5; /* 0.08 rad before it, which is the length of a step at `fast` */
   (void)state;
   for (int i = 0; i < 3; i++) {
     pw_error error = { 0 };
@@ -232,8 +232,8 @@ static void test_sped_up (void **state) {
   }
 }
 
-/* Numbers that are none are not forgotten over those behind them. */
-static void test_not_numbers (void **state) {
+/* A norm is NaN if any entry is NaN. */
+static void test_nan (void **state) {
   (void)state;
   pw_system *s = scene_named ("n-four-bar", NULL, 0);
   pw_run *r = runs_open (s, "rk4", NULL);
@@ -260,11 +260,16 @@ static void test_not_numbers (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_four_bar),    cmocka_unit_test (test_slider_crank), cmocka_unit_test (test_ida),
-    cmocka_unit_test (test_flat_start),  cmocka_unit_test (test_restarted_in),
+    cmocka_unit_test (test_four_bar),
+    cmocka_unit_test (test_slider_crank),
+    cmocka_unit_test (test_ida),
+    cmocka_unit_test (test_flat_start),
+    cmocka_unit_test (test_restarted_in),
 
-    cmocka_unit_test (test_steps_on_it), cmocka_unit_test (test_turned),       cmocka_unit_test (test_sped_up),
-    cmocka_unit_test (test_not_numbers),
+    cmocka_unit_test (test_steps_on_it),
+    cmocka_unit_test (test_turned),
+    cmocka_unit_test (test_accelerated_by_restart),
+    cmocka_unit_test (test_nan),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

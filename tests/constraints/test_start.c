@@ -1,4 +1,4 @@
-/* The consistent start: what is given stays, what is consistent is left alone, what cannot be is named. */
+/* Consistent initial conditions: given values are kept, consistent ones unchanged, impossible ones refused. */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -13,7 +13,7 @@
 
 /* ---- Initial values of the settings ---- */
 
-/* They replace the system's for this run alone, as if the model had them, to the bit. */
+/* Initial values of the settings replace those of the system for this run, with the same result as in the model. */
 static void test_settings (void **state) {
   static const char *const name[] = { "frame.omega", "steer.phi", NULL };
   static const double value[] = { 0.3, 0.2 };
@@ -57,19 +57,19 @@ static void test_bad_settings (void **state) {
 
 /* ---- Nothing to do ---- */
 
-static void test_no_harm (void **state) {
+static void test_consistent_unchanged (void **state) {
   (void)state;
   pw_system *s;
   pw_run *r = start_open (&s, NULL, NULL);
   const pw_initial_report *start = pw_run_initial (r);
   assert_true (start->moved == 0 && start->released == 0);
   check_bits ("positions", start->q, s->q0, 6);
-  check_bits ("rates", start->v, s->v0, 6);
+  check_bits ("velocities", start->v, s->v0, 6);
   start_close (r, s);
 }
 
-/* What is off by more than round-off is moved, however little that is. */
-static void test_little (void **state) {
+/* Deviations above round-off are corrected, however small. */
+static void test_small_deviation (void **state) {
   static const char *const name[] = { "steer.x", "frame.vy", NULL };
   static const double value[] = { 0.375 + 1e-10, 1e-10 };
   (void)state;
@@ -82,7 +82,7 @@ static void test_little (void **state) {
   }
 }
 
-/* Round-off is put right, but nothing is said of it. */
+/* Deviations of round-off are corrected without a report. */
 static void test_round_off (void **state) {
   static const char *const name[] = { "steer.x", NULL };
   static const double value[] = { 0.375 + 12 * CHECK_EPS };
@@ -96,8 +96,8 @@ static void test_round_off (void **state) {
   start_close (r, s);
 }
 
-/* A state on the way is as consistent as it can be: it is not touched, either. */
-static void test_no_harm_on_the_way (void **state) {
+/* A restart does not change a state reached by a run. */
+static void test_reached_state_unchanged (void **state) {
   (void)state;
   for (double t = 0.25; t <= 2; t += 0.25) {
     double q[6], v[6];
@@ -111,14 +111,14 @@ static void test_no_harm_on_the_way (void **state) {
     assert_int_equal (pw_run_initial (r)->moved, 0);
     now = runs_to (r, t);
     check_bits ("positions", now.q, q, 6);
-    check_bits ("rates", now.v, v, 6);
+    check_bits ("velocities", now.v, v, 6);
     start_close (r, s);
   }
 }
 
-/* ---- What is specified stays, too ---- */
+/* ---- Specified values are kept ---- */
 
-/* A rod on a pin, of which one state or two are specified. */
+/* A rod on a pin with one or two specified states. */
 static void start_rod (pw_model *m, const void *parameters) {
   const double *p = parameters;
   pw_add_body (m, &(pw_body){ .name = "rod",
@@ -151,7 +151,7 @@ static const pw_initial_report *start_of_rod (pw_system **s, pw_run **r, double 
   return pw_run_initial (*r);
 }
 
-/* An angle and a rate that are specified stay to the bit; what is left out follows. */
+/* A specified angle and angular velocity are unchanged; omitted values follow. */
 static void test_specified (void **state) {
   pw_system *s;
   pw_run *r;
@@ -164,7 +164,8 @@ static void test_specified (void **state) {
   start_close (r, s);
 }
 
-/* A 0 that is meant, and x in its place: the angle follows from x = 0.5 cos phi, omega from vy = 0.5 omega cos phi. */
+/* A specified 0, and x instead of the angle: the angle follows from x = 0.5 cos phi, omega from vy = 0.5 omega cos
+ * phi. */
 static void test_specified_zero (void **state) {
   pw_system *s;
   pw_run *r;
@@ -179,8 +180,9 @@ static void test_specified_zero (void **state) {
   start_close (r, s);
 }
 
-/* More than the pin allows: as little as possible moves, and the report has what was specified; the rates stay none the less. */
-static void test_specified_too_much (void **state) {
+/* Specified positions that contradict the pin change as little as possible and are reported; specified velocities
+ * are kept. */
+static void test_overspecified (void **state) {
   pw_system *s;
   pw_run *r;
   (void)state;
@@ -190,7 +192,7 @@ static void test_specified_too_much (void **state) {
   start_close (r, s);
 }
 
-/* What the user gives has the last word. */
+/* Given values take precedence over specified ones. */
 static void test_given_before_specified (void **state) {
   pw_error error = { 0 };
   (void)state;
@@ -208,13 +210,13 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_settings),
     cmocka_unit_test (test_bad_settings),
-    cmocka_unit_test (test_no_harm),
-    cmocka_unit_test (test_little),
+    cmocka_unit_test (test_consistent_unchanged),
+    cmocka_unit_test (test_small_deviation),
     cmocka_unit_test (test_round_off),
-    cmocka_unit_test (test_no_harm_on_the_way),
+    cmocka_unit_test (test_reached_state_unchanged),
     cmocka_unit_test (test_specified),
     cmocka_unit_test (test_specified_zero),
-    cmocka_unit_test (test_specified_too_much),
+    cmocka_unit_test (test_overspecified),
     cmocka_unit_test (test_given_before_specified),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

@@ -30,7 +30,7 @@ int turns_try (const char *method, double rtol, const char *model, double value)
     apart = fmax (apart, turns_apart (s, &x, four_bars));
   }
   print_message ("%s %g, %s, rtol %g: %s\n", model, value, method, rtol, status == PW_OK ? "passed" : error.text);
-  check_below (method, apart, 0.3, "on the branch of the start, or told before it is left");
+  check_below (method, apart, 0.3, "on the initial branch, or stopped before leaving it");
   pw_run_close (r);
   pw_system_free (s);
   return status == PW_METHOD && strstr (error.text, "methods with projection pass") != NULL;

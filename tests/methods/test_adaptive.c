@@ -62,7 +62,7 @@ static void test_tolerances (void **state) {
       double rtol = pow (10, -k);
       error[k] = adaptive_error (adaptive_methods[i], (pw_settings){ .rtol = rtol }, &cost);
       snprintf (what, sizeof what, "%s, rtol %g, error at 10 s", adaptive_methods[i], rtol);
-      check_below (what, error[k], 100 * rtol, "100 rtol: errors of the steps grow with the motion's nearby ones");
+      check_below (what, error[k], 100 * rtol, "100 rtol: errors of steps grow as neighbouring motions diverge");
       if (k > 4) check_below (what, error[k], error[k - 1], "less than with ten times the tolerance");
       assert_true (cost.steps > steps);
       check_below ("rejected", (double)cost.rejected, (double)cost.steps / 3 + 5, "a third of the steps");

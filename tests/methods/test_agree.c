@@ -1,5 +1,5 @@
-/* Runs agree: one integrator with another, with and without the ledger, sampled or not, in other units; and each with
- * the equations, which the verifier evaluates by itself. */
+/* Runs agree: between integrators, with and without ledger and samples, in other units; the independent verifier's
+ * residuals are small. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -9,10 +9,10 @@
 #include "toys.h"
 #include "pinwheel-selftest.h"
 
-/* ---- Scenes: between them, all that a kind may have ---- */
+/* ---- Scenes, which together use all features of element types ---- */
 
-/* A cart on a rolling wheel with its internal coordinate, tied to the ground by a damped spring, with an arm that swings as
- * its motor says and a free pendulum at the arm's end. */
+/* A cart on a rolling wheel with an internal coordinate, with a damped spring to the ground, an arm driven by a
+ * motor, and a free pendulum at its end. */
 static void agree_cart (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = 2, .inertia = 0.3, .rate = { 0.5, 0, 0.4 } });
@@ -36,7 +36,7 @@ static void agree_cart (pw_model *m, const void *parameters) {
   pw_add_pin (m, &(pw_pin){ .name = "Q", .body = { "arm", "bob" }, .at = { { 0.3, 0 }, { -0.2, 0 } } });
 }
 
-/* A torque that reads states: a steering that is sprung and damped. */
+/* A torque that depends on states: a steering with spring and damper. */
 static int agree_steering (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context;
   value[0] = 0.1 * cos (PW_PI * t) + 0.02 * (x[1] - x[0] - PW_PI) + 0.01 * (x[3] - x[2]);
@@ -46,8 +46,8 @@ static int agree_steering (void *context, double t, const double *x, double valu
 
 static const pw_plugin_table agree_table = { .abi = PW_ABI, .size = sizeof agree_table, .build = agree_cart };
 
-enum { AGREE_MASSLESS, AGREE_MASSIVE, AGREE_READER, AGREE_CART, AGREE_SCENES };
-static const char *const agree_names[] = { "massless", "massive", "reader", "cart" };
+enum { AGREE_MASSLESS, AGREE_MASSIVE, AGREE_STATE_TORQUE, AGREE_CART, AGREE_SCENES };
+static const char *const agree_names[] = { "massless", "massive", "state-dependent torque", "cart" };
 
 static pw_system *agree_scene (int scene) {
   static const char *const reads[] = { "frame.phi", "steer.phi", "frame.omega", "steer.omega", NULL };
@@ -56,23 +56,23 @@ static pw_system *agree_scene (int scene) {
   if (scene == AGREE_MASSLESS) return scene_system (&scene_ezyroller, NULL);
   pw_model *m = scene_model (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
   pw_signal torque = { PW_FUNCTION, .function = { .eval = agree_steering, .reads = reads } };
-  if (scene == AGREE_READER) check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
+  if (scene == AGREE_STATE_TORQUE) check_ok (pw_model_set_signal (m, "rider", "value", &torque, &error), &error);
   return scene_compile (m);
 }
 
 enum { AGREE_MOST = 10 };
 
-/* The scenes' fastest frequency is about 3/s: what a method of order 4 leaves after a few seconds. */
+/* The largest frequency of the scenes is about 3/s: error of a method of order 4 after a few seconds. */
 static double agree_order_4 (double h) {
   return pow (3 * h, 4);
 }
 static const char agree_reason[] = "(h omega)^4, omega = 3/s";
 
-/* ---- One integrator with another ---- */
+/* ---- Comparison of integrators ---- */
 
 static const struct {
   const char *name;
-  double factor; /* its error, in units of rtol */
+  double factor; /* error in units of rtol */
 } agree_methods[] = { { "rk4+none", 0 },
                       { "rk4+baumgarte", 0 },
                       { "rk4+projection:metric=identity", 0 },
@@ -116,7 +116,7 @@ static void test_integrators (void **state) {
 
 /* ---- The ledger ---- */
 
-/* Every energy is accounted for, and keeping the account changes no bit of the run. */
+/* The energy balances, and the ledger does not change the run. */
 static void test_ledger (void **state) {
   static const char *const method[] = { "rk4+projection", "rk4+none",      "rk4+baumgarte",  "ida+ggl",
                                         "ida+baumgarte",  "ida+index2",    "ida+si1",        "adams+baumgarte",
@@ -146,7 +146,7 @@ static void test_ledger (void **state) {
       double Q[AGREE_MOST], V[AGREE_MOST];
       runs_state (s, method[i], &without, 3, Q, V, &other);
       check_bits ("positions without a ledger", Q, q, pw_system_coordinates (s));
-      check_bits ("rates without a ledger", V, v, pw_system_coordinates (s));
+      check_bits ("velocities without a ledger", V, v, pw_system_coordinates (s));
       assert_true (cost.steps == other.steps && cost.rejected == other.rejected && cost.rhs == other.rhs);
       pw_system_free (s);
     }
@@ -154,7 +154,7 @@ static void test_ledger (void **state) {
 
 /* ---- Sampling ---- */
 
-/* Looking into the steps at any time changes no bit of the run; what is seen obeys the constraints as the run does. */
+/* Samples at any time do not change the run, and satisfy the constraints as accurately as its steps. */
 static void test_sampling (void **state) {
   static const char *const method[] = { "rk4+projection", "bdf+projection", "ida+ggl",    "radau+ggl",    "ida+si1",
                                         "rk4+none",       "ida+baumgarte",  "adams+none", "bdf+baumgarte" };
@@ -182,7 +182,7 @@ static void test_sampling (void **state) {
       }
       now = runs_to (r, 2);
       check_bits ("positions", now.q, q, pw_system_coordinates (s));
-      check_bits ("rates", now.v, v, pw_system_coordinates (s));
+      check_bits ("velocities", now.v, v, pw_system_coordinates (s));
       assert_int_equal (pw_run_statistics (r)->steps, plain.steps);
       assert_int_equal (pw_run_statistics (r)->rhs, plain.rhs);
       pw_run_close (r);
@@ -190,7 +190,7 @@ static void test_sampling (void **state) {
     }
 }
 
-/* Samples inside a step are as good as the steps. */
+/* Samples inside steps are as accurate as the ends of steps. */
 static void test_dense (void **state) {
   static const char *const method[] = { "rk4+projection", "ida+ggl", "radau+ggl" };
   (void)state;
@@ -230,9 +230,9 @@ typedef struct {
   const char *method;
   double position, velocity, acceleration, force;
   const char *reason;
-} agree_verdict;
+} agree_bound;
 
-static void agree_verify (int scene, const agree_verdict *bound) {
+static void agree_verify (int scene, const agree_bound *bound) {
   pw_system *s = agree_scene (scene);
   pw_run *r = runs_open (s, bound->method, &(pw_settings){ .step = 1e-3, .rtol = 1e-9, .span = 2 });
   for (int k = 0; k <= 20; k++) {
@@ -262,7 +262,7 @@ static void agree_verify (int scene, const agree_verdict *bound) {
 }
 
 static void test_verifier (void **state) {
-  static const agree_verdict bounds[] = {
+  static const agree_bound bounds[] = {
     { "rk4+projection", 16 * CHECK_EPS, 16 * CHECK_EPS, 64 * CHECK_EPS, 64 * CHECK_EPS,
       "round-off of the projection and of one solve" },
     { "rk4+none", 1e-10, 1e-10, 64 * CHECK_EPS, 64 * CHECK_EPS, "drift of order h^4; round-off of one solve" },
@@ -274,8 +274,8 @@ static void test_verifier (void **state) {
     for (int i = 0; i < 4; i++) agree_verify (scene, &bounds[i]);
 }
 
-/* The verifier notices: each of its four residuals, one number wrong at a time. */
-static void test_verifier_notices (void **state) {
+/* The verifier detects an error of 1e-6 in any number. */
+static void test_verifier_detects_errors (void **state) {
   (void)state;
   pw_system *s = agree_scene (AGREE_CART);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1 });
@@ -303,7 +303,7 @@ static void test_verifier_notices (void **state) {
 
 /* ---- Units ---- */
 
-/* The EzyRoller in units of 1/1024 m and 1/8 kg: every number is the same, with another exponent. */
+/* The EzyRoller in units of 1/1024 m and 1/8 kg: all numbers differ only in the exponent. */
 static void test_units (void **state) {
   (void)state;
   const double L = 1024, m = 8, I = L * L * m;
@@ -333,7 +333,7 @@ static void test_units (void **state) {
     }
 }
 
-/* The same with moments among the multipliers: two welded bodies swing, one of them a point, in units of 1/1024 m. */
+/* The same with moments among the multipliers: two welded bodies, one a point mass, swing, in units of 1/1024 m. */
 static double agree_length;
 
 static void agree_swing (pw_model *m, const void *parameters) {
@@ -371,7 +371,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_integrators), cmocka_unit_test (test_ledger),
     cmocka_unit_test (test_sampling),    cmocka_unit_test (test_dense),
-    cmocka_unit_test (test_verifier),    cmocka_unit_test (test_verifier_notices),
+    cmocka_unit_test (test_verifier),    cmocka_unit_test (test_verifier_detects_errors),
     cmocka_unit_test (test_units),       cmocka_unit_test (test_units_of_moments),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

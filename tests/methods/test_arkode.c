@@ -1,5 +1,5 @@
-/* erk5 against ARKODE of SUNDIALS: the same tableau from another source, another program's steps, on the same
- * accelerations. */
+/* erk5, compared with ARKODE of SUNDIALS: the same tableau in an independent program, with the same accelerations.
+ * */
 #include <math.h>
 #include <string.h>
 #include <arkode/arkode_arkstep.h>
@@ -11,7 +11,7 @@
 
 enum { ARKODE_MOST = 12 };
 
-/* (q, v)' = (v, a), by a run that serves for nothing else. */
+/* (q, v)' = (v, a), evaluated by a separate run. */
 static int arkode_slope (pw_real t, N_Vector y, N_Vector slope, void *run) {
   pw_run *r = run;
   int n = r->s->coords;
@@ -26,7 +26,7 @@ static int arkode_slope (pw_real t, N_Vector y, N_Vector slope, void *run) {
   return 0;
 }
 
-/* From the start of a run to t_end in steps of h, by ARKODE. */
+/* Integrates from the initial state of a run to t_end in steps of h, by ARKODE. */
 static void arkode_run (pw_run *r, double h, double t_end, double *y_end) {
   SUNContext context;
   int n = r->s->coords;

@@ -1,4 +1,5 @@
-/* A run loaded from a checkpoint goes on, bit for bit, as the one that was saved: every method, every stabilisation. */
+/* A run loaded from a checkpoint continues like the one that was saved, bit for bit: every method, every
+ * stabilisation. */
 #include <limits.h>
 #include <math.h>
 #include <stdio.h>
@@ -53,7 +54,7 @@ static pw_run *saved_open (pw_system *s, int scene, const char *method) {
                     &(pw_settings){ .step = 1e-3, .rtol = 1e-6, .span = saved_scenes[scene].t_end, .ledger = 1 });
 }
 
-/* What a run ends with: every number and count. */
+/* The final state and all counts of a run. */
 typedef struct {
   int size;
   double number[SAVED_MOST];
@@ -65,7 +66,7 @@ static void saved_keep (saved_end *e, const double *x, int n) {
   e->size += n;
 }
 
-/* On to the end; at each of the moments still ahead the run is saved to an archive of the list. */
+/* Advances to the end, and saves the run to the next archive of the list at each time not yet passed. */
 static void saved_finish (pw_run *r, pw_system *s, int scene, pw_archive *archive, int moment, saved_end *e) {
   pw_error error = { 0 };
   double t_end = saved_scenes[scene].t_end;
@@ -93,7 +94,7 @@ static void saved_finish (pw_run *r, pw_system *s, int scene, pw_archive *archiv
               6);
 }
 
-/* A method that carries its step size and counts takes the same steps as if it had not been saved. */
+/* A method whose step size and counts are saved takes the same steps as without saving. */
 static void saved_undisturbed (int scene, const char *method, const pw_method *integrator, const pw_statistics *n) {
   double t_end = saved_scenes[scene].t_end;
   if (integrator->carry == NULL) return;
@@ -110,7 +111,7 @@ static void saved_undisturbed (int scene, const char *method, const pw_method *i
   pw_system_free (s);
 }
 
-/* The run that is saved, then one loaded from each of its archives. */
+/* Compares the run that is saved with runs loaded from each of its archives. */
 static void saved_compare (int scene, const char *method) {
   pw_error error = { 0 };
   pw_archive archive[SAVED_MOMENTS] = { { .at = NULL } };
@@ -158,7 +159,7 @@ static void test_options (void **state) {
   for (size_t i = 0; i < sizeof method / sizeof *method; i++) saved_compare (1, method[i]);
 }
 
-/* What a kick has done to the energy is known behind a checkpoint, too. */
+/* After a checkpoint, the energy added by a change of velocities is still known. */
 static void test_kicked (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -181,7 +182,7 @@ static void test_kicked (void **state) {
   pw_system_free (s);
 }
 
-/* Counts from which none can go on, wherever in the state they stand, are refused or of no harm. */
+/* Invalid counts anywhere in the saved state are refused, or have no effect. */
 static void test_counts (void **state) {
   (void)state;
   static const char *const method[] = { "rk4+projection", "leapfrog", "ida+ggl" };
@@ -211,7 +212,7 @@ static void test_counts (void **state) {
   }
 }
 
-/* Archives of other runs, and what is left of one cut anywhere, are refused. */
+/* Archives of other runs, and truncated ones, are refused. */
 static void test_other (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -239,7 +240,7 @@ static void test_other (void **state) {
   pw_system_free (other);
 }
 
-/* The ledger has all work done before the run was saved: by any method, the energy is accounted for to the accuracy of the run. */
+/* The ledger includes work done before the run was saved: the energy balances to the accuracy of each method. */
 static void test_ledger (void **state) {
   static const char *const method[] = { "rk4+projection", "erk8+projection", "adams",
                                         "bdf+projection", "ida+ggl",         "galpha" };

@@ -1,6 +1,6 @@
-/* The EzyRoller against published digits, closed forms, and equations of its own.
+/* The EzyRoller, compared with published digits, closed forms, and a second formulation.
  *
- * Run from the top folder: the digits are in tests/reference/. */
+ * Run from the top directory: the digits are in tests/reference/. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -9,12 +9,12 @@
 
 enum { EZY_LINES = 4, EZY_COLUMNS = 6 };
 
-/* The EzyRoller's torque at its defaults [N m]. */
+/* The EzyRoller's torque for default parameters [N m]. */
 static double ezy_torque (double t) {
   return 0.1 * cos (PW_PI * t);
 }
 
-/* The four states of the table, and positions of the other body that follow from them. */
+/* The four states of the table, and the position of the other body, which follows from them. */
 static void ezy_compare (const pw_sample *s, const double *line, double bound, const char *reason) {
   char what[60];
   const double *x = line + 1;
@@ -26,7 +26,7 @@ static void ezy_compare (const pw_sample *s, const double *line, double bound, c
   }
 }
 
-/* ---- The digits, by each method ---- */
+/* ---- Published digits, by each method ---- */
 
 typedef struct {
   double state, energy, g, jv;
@@ -100,7 +100,7 @@ static void test_ida_none (void **state) {
 
 /* ---- Multipliers ---- */
 
-/* Body 2 has no mass, so its moments balance: wheel C carries M / (c + d), and the hinge the same. */
+/* Body 2 is massless, so its moments balance: the forces at wheel C and at the hinge are M / (c + d). */
 static void ezy_multiplier (const char *method, double bound, const char *reason) {
   pw_system *s = scene_system (&scene_ezyroller, NULL);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = 1e-3, .rtol = 1e-8, .span = 2 });

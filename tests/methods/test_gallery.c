@@ -1,4 +1,4 @@
-/* The models of the gallery against the reference each of them has. */
+/* Models of the gallery, compared with their reference solutions. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -56,7 +56,7 @@ static void test_pendulum (void **state) {
   gallery_close (r, s);
 }
 
-/* The steady turn of n trailers: nothing changes but the angle, to round-off and what it adds up to. */
+/* The steady turn of n trailers: only the angle changes, up to accumulated round-off. */
 static void gallery_turn (int n, double longer, double ratio) {
   char name[32];
   pw_system *s = gallery_open ("n-trailer", "n", (double)n, "longer", longer, "ratio", ratio, NULL);
@@ -146,7 +146,7 @@ static void test_peaucellier (void **state) {
   gallery_close (r, s);
 }
 
-/* The loops stay closed, and after a turn the leg is where it was. */
+/* The loops stay closed, and after one revolution the leg is back at its initial position. */
 static void test_theo_jansen (void **state) {
   (void)state;
   pw_system *s = gallery_open ("theo-jansen", NULL);
@@ -163,9 +163,9 @@ static void test_theo_jansen (void **state) {
   gallery_close (r, s);
 }
 
-/* ---- All of them ---- */
+/* ---- All models ---- */
 
-/* A model runs as it says it wants to be run; its start, made consistent, is the one described. */
+/* A model runs with its default settings; the consistent initial state is the one described. */
 static int gallery_default (void *context, const char *model, const char *path) {
   pw_error error = { 0 };
   pw_verification off;

@@ -1,4 +1,5 @@
-/* galpha: order 2 in positions, rates and multipliers, from the first step on; residuals; small steps; samples. */
+/* galpha: order 2 in positions, velocities and multipliers from the first step on; residuals; small steps; samples.
+ * */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,7 +12,7 @@
 static const struct {
   const char *model;
   double h, t;
-  ladder_depth depth; /* without multipliers where the motion is prescribed, and with it they */
+  ladder_depth depth; /* without multipliers where the motion is prescribed */
 } galpha_scene[] = {
   { "ezyroller", 0.01, 2, LADDER_LAMBDA },  { "n-trailer", 0.01, 1, LADDER_LAMBDA },
   { "pendulum", 0.01, 1, LADDER_LAMBDA },   { "n-four-bar", 0.01, 0.4, LADDER_LAMBDA },
@@ -30,7 +31,7 @@ static void test_order (void **state) {
   ladder_expect ("ezyroller", "galpha+ggl:rho=1", 0.01, 2, 2, 0.2, LADDER_LAMBDA);
 }
 
-/* After three steps, before the start has died away. */
+/* After three steps, before the effect of the initial values has decayed. */
 static void test_start (void **state) {
   static const char *const model[] = { "n-trailer", "n-four-bar", "arm", "snakeboard", "redundant-parallelogram" };
   (void)state;
@@ -42,7 +43,7 @@ static void test_start (void **state) {
   }
 }
 
-/* The last step is shortened: the one before says little about it, and the order stays. */
+/* The last step is shortened; the order is unchanged. */
 static void test_cut (void **state) {
   (void)state;
   for (int i = 0; i < 2; i++)
@@ -66,9 +67,9 @@ static void test_residuals (void **state) {
     pw_statistics fine = ladder_run (galpha_scene[i].model, "galpha+index3", h / 2, t).cost;
     pw_statistics ggl = ladder_run (galpha_scene[i].model, "galpha+ggl", h, t).cost;
     check_below ("index3: position", coarse.position, 64 * CHECK_EPS, "round-off");
-    check_below ("index3: rates", fine.velocity, coarse.velocity / 3 + 64 * CHECK_EPS, "order 2 has 1/4");
+    check_below ("index3: velocities", fine.velocity, coarse.velocity / 3 + 64 * CHECK_EPS, "order 2 has 1/4");
     check_below ("ggl: position", ggl.position, 64 * CHECK_EPS, "round-off");
-    check_below ("ggl: rates", ggl.velocity, 1e4 * CHECK_EPS,
+    check_below ("ggl: velocities", ggl.velocity, 1e4 * CHECK_EPS,
                  "Newton's iteration to round-off of the positions over h");
     check_below ("evaluations of a step", (double)ggl.rhs / (double)ggl.steps, 4, "Newton's iteration converges");
   }
@@ -76,8 +77,8 @@ static void test_residuals (void **state) {
                64 * CHECK_EPS, "round-off");
 }
 
-/* Neither the iteration nor the multipliers suffer from a small step, but for what round-off of positions, eps L, makes
- * of them in index 3: eps L / (beta h^2) of an acceleration. */
+/* Small steps impair neither the iteration nor the multipliers, except for the round-off eps L of positions in
+ * index 3, an acceleration of eps L / (beta h^2). */
 static void test_small_steps (void **state) {
   static const char *const model[] = { "ezyroller", "n-four-bar", "arm", "n-trailer" };
   (void)state;
@@ -93,7 +94,7 @@ static void test_small_steps (void **state) {
     }
 }
 
-/* The condition of Newton's matrix after some steps of size h, as KLU estimates it. */
+/* The condition number of Newton's matrix after some steps of size h, as estimated by KLU. */
 static double galpha_condition (const char *model, const char *method, double h) {
   pw_system *s = ladder_open (model);
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = h, .span = 1 });
@@ -134,9 +135,10 @@ static void test_large_steps (void **state) {
   galpha_stops ("pendulum", "galpha+index3", 1, "the step of 1 s is too large: pin pivot is violated");
 }
 
-/* ---- Samples, as leapfrog has them too ---- */
+/* ---- Samples, also of leapfrog ---- */
 
-/* Inside of steps: as accurate as at their ends, on the constraints; the ledger closes, and asking changes nothing. */
+/* Samples inside steps are as accurate as the ends of steps and satisfy the constraints; the energy balances, and
+ * sampling changes nothing. */
 static void test_samples (void **state) {
   static const char *const method[] = { "galpha+index3", "galpha+ggl", "leapfrog" };
   (void)state;
@@ -153,7 +155,7 @@ static void test_samples (void **state) {
         check_ok (pw_run_advance_to (r, t, 1, &error), &error);
         check_ok (pw_run_sample (r, t, &x, &error), &error);
         check_below ("sample's position", x.position, 64 * CHECK_EPS, "round-off");
-        check_below ("sample's rates", x.velocity, i ? 64 * CHECK_EPS : h * h * 100, "round-off; 100 (h/s)^2");
+        check_below ("velocities of a sample", x.velocity, i ? 64 * CHECK_EPS : h * h * 100, "round-off; 100 (h/s)^2");
         balance[k] = fmax (balance[k], fabs (x.balance));
         for (int j = 0; j < 6; j++) off[k] = fmax (off[k], fmax (fabs (x.q[j] - y.q[j]), fabs (x.v[j] - y.v[j])));
         for (int j = 0; j < 5; j++) force[k] = fmax (force[k], fabs (x.lambda[j] - y.lambda[j]));
@@ -175,7 +177,7 @@ static void test_samples (void **state) {
   }
 }
 
-/* A torque that is switched at 1/3 s: a step ends there, and the order stays. */
+/* A torque that jumps at 1/3 s: a step ends there, and the order is unchanged. */
 static int galpha_switched (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)x, (void)gradient;
   value[0] = t < 1. / 3 ? 0.1 : -0.2;
@@ -228,7 +230,8 @@ static void galpha_stiff (pw_model *m, const void *parameters) {
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "rotor", "ground" }, .stiffness = 1e8 });
 }
 
-/* A vibration of 1e4 rad/s at a step of 0.01 s: each step leaves about rho of it; with rho = 1 it stays. */
+/* A vibration of 1e4 rad/s at a step of 0.01 s is reduced to about rho by each step; with rho = 1 it is not damped.
+ * */
 static void test_damping (void **state) {
   static const pw_plugin_table table = { .abi = PW_ABI, .size = sizeof (pw_plugin_table), .build = galpha_stiff };
   static const double rho[] = { 0.2, 0.6, 1 };
@@ -244,13 +247,13 @@ static void test_damping (void **state) {
       energy[k] = x.kinetic + x.potential;
     }
     if (rho[i] < 1) check_below (method, energy[1], energy[0] * pow (rho[i], 20), "rho^2 in energy, of 20 steps one");
-    if (rho[i] == 1) check_close (method, energy[1] / energy[0], 1, 0.1, "nothing is damped");
+    if (rho[i] == 1) check_close (method, energy[1] / energy[0], 1, 0.1, "no damping");
     pw_run_close (r);
   }
   pw_system_free (s);
 }
 
-/* ---- A vibration a thousand times too fast for the step ---- */
+/* ---- A vibration of 1000 times the frequency that the step resolves ---- */
 
 static void galpha_fast (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -258,7 +261,7 @@ static void galpha_fast (pw_model *m, const void *parameters) {
   pw_add_rotational_spring (m, &(pw_rotational_spring){ .name = "k", .body = { "arm", "ground" }, .stiffness = 1e10 });
 }
 
-/* It never grows beyond what it starts with, and rho is what each step leaves of it in the end. */
+/* It never exceeds its initial size, and in the end each step reduces it to rho. */
 static void test_no_overshoot (void **state) {
   static const char *const method[] = { "galpha+ggl:rho=0.3", "galpha+ggl:rho=0.5", "galpha+index3:rho=0.8",
                                         "galpha+ggl:rho=1" };

@@ -1,4 +1,4 @@
-/* leapfrog: order 2, the way back, energy in long runs, residuals, samples, and what stops it. */
+/* leapfrog: order 2, reversibility, energy in long runs, residuals, samples, errors. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
@@ -24,7 +24,7 @@ static void test_order (void **state) {
   for (int i = 0; i < LEAPFROG_SCENES; i++)
     ladder_expect (leapfrog_scene[i].model, "leapfrog", leapfrog_scene[i].h, leapfrog_scene[i].t, 2, 0.25,
                    LADDER_LAMBDA);
-  ladder_expect ("tractor", "leapfrog", 0.01, 1, 2, 0.25, LADDER_Q); /* its motion is prescribed */
+  ladder_expect ("tractor", "leapfrog", 0.01, 1, 2, 0.25, LADDER_Q); /* prescribed motion */
 }
 
 static void test_residuals (void **state) {
@@ -40,8 +40,8 @@ static void test_residuals (void **state) {
 
 /* ---- Conservative scenes ---- */
 
-/* A board on two skewed knife edges held by springs, whose rider's spring swings: three nonholonomic rows, five pins, light
- * trucks, nothing driven, nothing lost. */
+/* A board on two skewed knife edges held by springs, with a sprung rider: three nonholonomic rows, five pins, light
+ * trucks, conservative. */
 static void leapfrog_board (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "board", .mass = 6, .inertia = 0.1, .rate = { 1, 0, 0 } });
@@ -63,7 +63,7 @@ static void leapfrog_board (pw_model *m, const void *parameters) {
       m, &(pw_rotational_spring){ .name = "kr", .body = { "rear", "board" }, .stiffness = 3, .angle = -0.1 });
 }
 
-/* An EzyRoller whose steering a spring turns; its steering assembly has no mass. */
+/* An EzyRoller steered by a spring; its steering assembly is massless. */
 static void leapfrog_roller (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "frame", .mass = 10, .inertia = 2, .rate = { 1, 0, 0 } });
@@ -83,8 +83,9 @@ static pw_system *leapfrog_open (const char *model) {
   return ladder_open (model);
 }
 
-/* n steps, rates turned round, n steps: how far the end is from the start, in units of the scene. */
-static double leapfrog_way_back (const char *model, const char *method, double h, int n) {
+/* n steps forwards and, with reversed velocities, n steps backwards: distance from the initial state, in units of
+ * the scene. */
+static double leapfrog_reversed_error (const char *model, const char *method, double h, int n) {
   pw_error error = { 0 };
   double q[LEAPFROG_COORDS], v[LEAPFROG_COORDS], off = 0;
   pw_system *s = leapfrog_open (model);
@@ -111,11 +112,13 @@ static const struct {
   const char *model;
   double h;
   int steps;
-} leapfrog_conservative[] = { { "board", 0.02, 100 },
-                              { "roller", 0.05, 10 }, /* it straightens itself: the way back leads away from that */
-                              { "pendulum", 0.1, 100 },
-                              { "redundant-parallelogram", 0.05, 100 },
-                              { "chaplygin-sleigh", 0.1, 50 } };
+} leapfrog_conservative[] = {
+  { "board", 0.02, 100 },
+  { "roller", 0.05, 10 }, /* the motion decays to straight running, so that round-off grows on the way back */
+  { "pendulum", 0.1, 100 },
+  { "redundant-parallelogram", 0.05, 100 },
+  { "chaplygin-sleigh", 0.1, 50 }
+};
 enum { LEAPFROG_CONSERVATIVE = sizeof leapfrog_conservative / sizeof *leapfrog_conservative };
 
 static void test_way_back (void **state) {
@@ -123,13 +126,15 @@ static void test_way_back (void **state) {
   for (int i = 0; i < LEAPFROG_CONSERVATIVE; i++) {
     const char *model = leapfrog_conservative[i].model;
     double h = leapfrog_conservative[i].h, n = leapfrog_conservative[i].steps;
-    double off = leapfrog_way_back (model, "leapfrog", h, (int)n);
+    double off = leapfrog_reversed_error (model, "leapfrog", h, (int)n);
     check_below (model, off, 1000 * n * CHECK_EPS, "round-off of each step");
-    check_below (model, 1e4 * off, leapfrog_way_back (model, "rk4+projection", h, (int)n), "rk4 is not reversible");
+    check_below (model, 1e4 * off, leapfrog_reversed_error (model, "rk4+projection", h, (int)n),
+                 "rk4 is not reversible");
   }
 }
 
-/* How far the mean error in energy moves from the first quarter of a run to the last, over its largest at first. */
+/* Change of the mean energy error from the first quarter of a run to the last, relative to its largest value in the
+ * first. */
 static double leapfrog_drift_of (const char *model, const char *method, double h, int steps) {
   double mean[4] = { 0 }, most = 0;
   pw_error error = { 0 };
@@ -161,10 +166,10 @@ static void test_energy (void **state) {
                leapfrog_drift_of ("board", "rk4+projection", 0.02, 2000), "it drifts");
 }
 
-/* ---- What it depends on ---- */
+/* ---- Step sizes and settings ---- */
 
-/* The last step is shortened, and the order stays. */
-static void test_cut (void **state) {
+/* The last step is shortened; the order is unchanged. */
+static void test_last_step (void **state) {
   static const char *const model[] = { "arm", "n-four-bar", "ezyroller" };
   (void)state;
   for (int k = 0; k < 3; k++) {
@@ -203,7 +208,7 @@ static void test_large_steps (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_order),  cmocka_unit_test (test_residuals), cmocka_unit_test (test_way_back),
-    cmocka_unit_test (test_energy), cmocka_unit_test (test_cut),       cmocka_unit_test (test_large_steps),
+    cmocka_unit_test (test_energy), cmocka_unit_test (test_last_step), cmocka_unit_test (test_large_steps),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

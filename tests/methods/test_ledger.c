@@ -1,4 +1,5 @@
-/* Work, losses and the energy defect: closed forms with every method, whether or not the ledger is asked for. */
+/* Work, losses and the energy defect, compared with closed forms for every method, with and without the option
+ * `ledger`. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,14 +12,14 @@
     PW_SMOOTH_STEP, .ramp = {.to = 1, .start = 0.3, .duration = 1 } \
   }
 
-/* The smooth step and its rate. */
+/* The smooth step and its derivative. */
 static double ledger_step (double t, double *rate) {
   double s = fmin (fmax (t - 0.3, 0), 1);
   *rate = 30 * s * s * (1 - s) * (1 - s);
   return s * s * s * (10 - 15 * s + 6 * s * s);
 }
 
-/* ---- Scenes: what they have done and lost at t, and the energy they move ---- */
+/* ---- Scenes, their work and losses until t, and the energy they exchange ---- */
 
 static void ledger_turned (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -26,7 +27,7 @@ static void ledger_turned (pw_model *m, const void *parameters) {
   pw_add_drive (m, &(pw_drive){ .name = "d", .body = { "b", "ground" }, .what = PW_DRIVE_ANGLE, .value = LEDGER_STEP });
 }
 
-static void ledger_turned_truth (double t, double *work, double *loss) {
+static void ledger_turned_exact (double t, double *work, double *loss) {
   double rate;
   ledger_step (t, &rate);
   *work = rate * rate / 2, *loss = 0;
@@ -39,7 +40,7 @@ static void ledger_lifted (pw_model *m, const void *parameters) {
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
 }
 
-static void ledger_lifted_truth (double t, double *work, double *loss) {
+static void ledger_lifted_exact (double t, double *work, double *loss) {
   double rate, y = ledger_step (t, &rate);
   *work = rate * rate + 2 * 9.81 * y, *loss = 0;
 }
@@ -53,11 +54,11 @@ static void ledger_shaken (pw_model *m, const void *parameters) {
                                 .value = { PW_HARMONIC, .harmonic = { .amplitude = 0.5, .omega = 3 } } });
 }
 
-static void ledger_shaken_truth (double t, double *work, double *loss) {
+static void ledger_shaken_exact (double t, double *work, double *loss) {
   *work = pow (1.5 * sin (3 * t), 2), *loss = 0;
 }
 
-/* All of its work is lost at once: its energy stays 0, whatever is wrong. */
+/* All work is dissipated at once: the energy is always 0. */
 static void ledger_massless (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "b" });
@@ -66,13 +67,13 @@ static void ledger_massless (pw_model *m, const void *parameters) {
   pw_add_friction (m, &(pw_friction){ .name = "f", .body = { "b", "ground" }, .viscous = 3 });
 }
 
-/* 3 times the integral of the rate's square */
-static void ledger_massless_truth (double t, double *work, double *loss) {
+/* 3 times the integral of the squared velocity */
+static void ledger_massless_exact (double t, double *work, double *loss) {
   double s = fmin (fmax (t - 0.3, 0), 1);
   *work = *loss = 2700 * pow (s, 5) * (1. / 5 - s * (4. / 6 - s * (6. / 7 - s * (4. / 8 - s / 9))));
 }
 
-/* A constant speed against air that slows the motion across. */
+/* A constant speed against drag, which also slows the transverse motion. */
 static void ledger_towed (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "b", .mass = 1, .inertia = 1, .rate = { 2, 1 } });
@@ -80,11 +81,11 @@ static void ledger_towed (pw_model *m, const void *parameters) {
   pw_add_drag (m, &(pw_drag){ .name = "f", .body = "b", .linear = 3 });
 }
 
-static void ledger_towed_truth (double t, double *work, double *loss) {
+static void ledger_towed_exact (double t, double *work, double *loss) {
   *work = 12 * t, *loss = 12 * t + (1 - exp (-6 * t)) / 2;
 }
 
-/* Turned by a torque that reads its rate, 2 - omega, against a damper: omega = 1 - exp (-2 t). */
+/* A torque 2 - omega, a function of the state, against a damper: omega = 1 - exp (-2 t). */
 static int ledger_limited (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)t;
   value[0] = 2 - x[0];
@@ -102,14 +103,14 @@ static void ledger_driven (pw_model *m, const void *parameters) {
   pw_add_friction (m, &(pw_friction){ .name = "f", .body = { "b", "ground" }, .viscous = 1 });
 }
 
-static void ledger_driven_truth (double t, double *work, double *loss) {
+static void ledger_driven_exact (double t, double *work, double *loss) {
   double e = exp (-2 * t), one = t - (1 - e) / 2, square = t - (1 - e) + (1 - e * e) / 4;
   *work = 2 * one - square, *loss = square;
 }
 
 #define LEDGER_SCENE(what, moved)                                                \
   {                                                                              \
-    .name = #what, .reference = ledger_##what##_truth, .size = moved, .table = { \
+    .name = #what, .reference = ledger_##what##_exact, .size = moved, .table = { \
       .abi = PW_ABI,                                                             \
       .size = sizeof (pw_plugin_table),                                          \
       .build = ledger_##what                                                     \
@@ -120,7 +121,7 @@ static const struct {
   const char *name;
   pw_plugin_table table;
   void (*reference) (double t, double *work, double *loss);
-  double size; /* the energy it moves [J] */
+  double size; /* energy exchanged [J] */
 } ledger_scene[] = { LEDGER_SCENE (turned, 2),   LEDGER_SCENE (lifted, 25), LEDGER_SCENE (shaken, 3),
                      LEDGER_SCENE (massless, 5), LEDGER_SCENE (towed, 12),  LEDGER_SCENE (driven, 2) };
 enum { LEDGER_SCENES = sizeof ledger_scene / sizeof *ledger_scene };
@@ -135,7 +136,7 @@ static void ledger_compare (int scene, const char *method, const pw_sample *x, d
   check_close (what, x->loss, loss, bound, reason);
 }
 
-/* At 0.8 s the power of `turned` is as little as at 0.3 s, where it began. */
+/* At 0.8 s the power of `turned` is as large as at 0.3 s. */
 static void ledger_run (int scene, const char *method, const pw_settings *settings, double bound, const char *reason) {
   static const double t[] = { 0.2, 0.55, 0.8, 1, 1.7 };
   pw_system *s = scene_system (&ledger_scene[scene].table, NULL);
@@ -169,12 +170,12 @@ static void test_closed_forms (void **state) {
       for (int k = 6; k <= 9; k += 3) {
         double rtol = pow (10, -k);
         ledger_run (scene, name, &(pw_settings){ .rtol = rtol, .span = 2 }, 1e3 * rtol * size,
-                    "1e3 rtol of the energy that moves, as of states");
+                    "1e3 rtol of the energy exchanged, as for states");
       }
     }
 }
 
-/* Whether the ledger is asked for or not, a run has the same work, losses and defect, to the bit. */
+/* Work, losses and energy defect of a run are bit-identical with and without the option `ledger`. */
 static void test_always_kept (void **state) {
   char name[40];
   (void)state;
@@ -192,14 +193,13 @@ static void test_always_kept (void **state) {
         pw_run_close (r);
         pw_system_free (s);
       }
-      check_bits (name, kept[0], kept[1],
-                  2 + 7 * (scene != 3)); /* of what adds up to nothing there is only round-off */
+      check_bits (name, kept[0], kept[1], 2 + 7 * (scene != 3)); /* `massless` has only round-off */
     }
 }
 
 /* ---- The energy defect ---- */
 
-/* It is measured against the energy that moves, not against 1200 J of losses. */
+/* The defect is relative to the energy exchanged, not to 1200 J of losses. */
 static void test_exchanged (void **state) {
   (void)state;
   pw_system *s = scene_system (&ledger_scene[4].table, NULL);
@@ -212,7 +212,7 @@ static void test_exchanged (void **state) {
   pw_system_free (s);
 }
 
-/* A position that is prescribed by a constant does no work, and has no account. */
+/* A position prescribed by a constant does no work and has no account. */
 static void test_constant_drive (void **state) {
   (void)state;
   pw_system *s = scene_named ("slider-crank", "l2", 1);
@@ -234,7 +234,7 @@ static void ledger_advise (const char *model, const char *method, double rtol, d
   pw_system_free (s);
 }
 
-/* A smaller tolerance is recommended where it helps. */
+/* The advice recommends a smaller tolerance only where it helps. */
 static void test_advice (void **state) {
   (void)state;
   ledger_advise ("n-four-bar", "rk4+projection", 0, 0.1, "a smaller step");

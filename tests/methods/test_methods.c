@@ -1,4 +1,4 @@
-/* Method names, options and settings: what is accepted, and what those are told that are not. */
+/* Method names, options and settings: accepted ones, and messages for others. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -60,7 +60,7 @@ static void test_parse (void **state) {
   check_ok (pw_method_parse ("rk4+projection:metric=identity:inputs=held:every=3", &m, &stabilisation, &error), &error);
 }
 
-/* The text may go on where it ends in "..." */
+/* A text that ends in "..." matches longer messages. */
 static void methods_refused (const char *name, const char *text) {
   const pw_method *m;
   int stabilisation;

@@ -1,5 +1,5 @@
-/* The multistep methods of SUNDIALS: tolerances are kept, multipliers too, the work grows as their orders say, stiff
- * scenes are theirs. */
+/* The multistep methods of SUNDIALS: errors of states and multipliers proportional to tolerances, numbers of steps
+ * as their orders predict, stiff scenes. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -23,7 +23,7 @@ static ladder_error multi_error (int scene, const char *method, double rtol) {
   return ladder_solve (multi_scenes[scene].model, method, &(pw_settings){ .rtol = rtol, .span = t }, t);
 }
 
-/* Errors are in proportion to the tolerance, whatever the constraints. */
+/* Errors are proportional to the tolerance, with all constraint types. */
 static void test_tolerances (void **state) {
   (void)state;
   for (int i = 0; i < SCENES; i++)
@@ -34,8 +34,8 @@ static void test_tolerances (void **state) {
         char what[100];
         e[k] = multi_error (i, multi_methods[m], rtol);
         snprintf (what, sizeof what, "%s, %s, rtol %g: positions", multi_scenes[i].model, multi_methods[m], rtol);
-        check_below (what, e[k].q, 3e3 * rtol, "3000 rtol: the errors of some hundred steps, and what they grow to");
-        snprintf (what, sizeof what, "%s, %s, rtol %g: rates", multi_scenes[i].model, multi_methods[m], rtol);
+        check_below (what, e[k].q, 3e3 * rtol, "3000 rtol: errors of some hundred steps, and their growth");
+        snprintf (what, sizeof what, "%s, %s, rtol %g: velocities", multi_scenes[i].model, multi_methods[m], rtol);
         check_below (what, e[k].v, 3e3 * rtol, "3000 rtol");
       }
       check_below (multi_methods[m], e[1].q, e[0].q / 100, "four decades of tolerance give two of error at the least");
@@ -47,7 +47,7 @@ static void test_orders (void **state) {
   (void)state;
   static const struct {
     const char *method;
-    double slowest, fastest; /* orders that this is like */
+    double slowest, fastest; /* orders with equal growth */
   } of[] = {
     { "bdf+projection", 3.5, 6.5 }, { "ida+si1", 3.5, 6.5 }, { "ida+index2", 3.5, 6.5 }, { "adams+none", 6, 12 }
   };
@@ -59,7 +59,8 @@ static void test_orders (void **state) {
   }
 }
 
-/* What each form holds: index2 the rates, ggl and si1 the positions too, at the tolerance; a projection to round-off. */
+/* Constraints enforced by each form: velocities by index2, positions too by ggl and si1, to the tolerance;
+ * projection to round-off. */
 static void test_residuals (void **state) {
   (void)state;
   const double rtol = 1e-8;
@@ -76,12 +77,12 @@ static void test_residuals (void **state) {
                multi_error (0, "ida+index2", rtol).cost.position, "index2 lets positions drift");
 }
 
-/* The multipliers of si1 are rates of unknowns, and as good as those that are unknowns themselves. */
+/* The multipliers of si1 are derivatives of unknowns, and as accurate as multipliers that are unknowns. */
 static void test_multipliers (void **state) {
   (void)state;
   double ratio = 0;
   int count = 0;
-  for (int i = 0; i < SCENES - 1; i++) /* prescribed motion: not those of the tractor */
+  for (int i = 0; i < SCENES - 1; i++) /* not the tractor's, whose motion is prescribed */
     for (int k = 6; k <= 10; k += 2, count++) {
       double rtol = pow (10, -k), si1 = multi_error (i, "ida+si1", rtol).lambda;
       ratio += log (si1 / multi_error (i, "ida+ggl", rtol).lambda);
@@ -92,7 +93,8 @@ static void test_multipliers (void **state) {
 
 /* ---- Stiff scenes ---- */
 
-/* The EzyRoller with a steering so stiff that it creeps back at 20/s and a wrong rate dies out at about 1e4/s. */
+/* The EzyRoller with a steering so stiff that it creeps back at 20/s, and that perturbed velocities decay at about
+ * 1e4/s. */
 static pw_system *multi_steering (void) {
   pw_model *m = scene_model (&scene_ezyroller, "m2", 0.1, "I2", 0.01, NULL);
   pw_add_rotational_spring (
@@ -108,7 +110,7 @@ static pw_statistics multi_cost (pw_system *s, const char *method, double t, dou
   return cost;
 }
 
-/* Explicit methods have to resolve what has long died out; these step over it, to the same end. */
+/* Explicit methods must resolve modes that have decayed; implicit ones step over them, with the same result. */
 static void test_stiff (void **state) {
   static const char *const method[] = { "ida+ggl",      "ida+si1",  "ida+index2",    "radau+ggl",     "radau+index2",
                                         "radau+index3", "bdf+none", "bdf+baumgarte", "bdf+projection" };
@@ -124,7 +126,7 @@ static void test_stiff (void **state) {
   pw_system_free (s);
 }
 
-/* A matrix serves many steps; the functional iteration has none. */
+/* Several steps use the same matrix; functional iteration has none. */
 static void test_cost (void **state) {
   (void)state;
   pw_statistics bdf = multi_error (0, "bdf+projection", 1e-8).cost, adams = multi_error (0, "adams+none", 1e-8).cost;

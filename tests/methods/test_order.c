@@ -48,7 +48,7 @@ static void test_held (void **state) {
   order_expect ("rk4+none:inputs=held", step, 2, 0.1, "order 1: 2, and the next power of h");
 }
 
-/* ---- A torque that is switched ---- */
+/* ---- A torque that jumps ---- */
 
 static int order_switched (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)x, (void)gradient;
@@ -81,12 +81,12 @@ static double order_switched_error (const char *method, double step) {
   return worst;
 }
 
-/* A step ends where a signal is switched, sees what it was before, and the next one begins with what it is behind:
- * the order stays 4, and tolerances are kept. */
+/* A step ends where a signal jumps and uses its value before; the next one begins with the value after the jump:
+ * the order stays 4, errors follow the tolerances. */
 static void test_switched (void **state) {
   (void)state;
   double coarse = order_switched_error ("rk4+projection", 0.04), fine = order_switched_error ("rk4+projection", 0.02);
-  check_below ("error at h = 0.02", fine, coarse / 8, "order 4 has 1/16; a step that sees behind the switch has 1/2");
+  check_below ("error at h = 0.02", fine, coarse / 8, "order 4 has 1/16; with the value after the jump it has 1/2");
   check_below ("error at h = 0.02", fine, 1e-5, "h^4 (torque / inertia)^2, about 8e-7");
   static const char *const ida[] = { "ida+ggl",        "ida+baumgarte", "ida+si1",      "adams+none",  "bdf+none",
                                      "bdf+projection", "radau+ggl",     "radau+index2", "radau+index3" };

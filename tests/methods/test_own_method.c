@@ -51,7 +51,7 @@ static pw_system *own_system (const pw_signal *torque) {
   return scene_compile (m);
 }
 
-/* Projection keeps the constraints to round-off, feedback keeps them nearer than nothing does. */
+/* Projection keeps residuals at round-off; feedback reduces them. */
 static void test_stabilisations (void **state) {
   (void)state;
   static const char *const method[] = { "euler", "euler+baumgarte:alpha=50:beta=50", "euler+projection" };
@@ -70,7 +70,7 @@ static void test_stabilisations (void **state) {
   assert_true (off[0] > 1e-6);
 }
 
-/* Steps are cut at a discontinuity and at t_end, and are multiples of the given size from there. */
+/* Steps end at a discontinuity and at t_end; steps after it are multiples of the given size. */
 static void test_breakpoint (void **state) {
   (void)state;
   const pw_signal pulse = { PW_PULSE, .pulse = { .height = 0.1, .start = 0.0104, .width = 0.02 } };
@@ -80,7 +80,7 @@ static void test_breakpoint (void **state) {
   int met = 0;
   check_ok (pw_run_advance (r, 0.0005, &error), &error);
   check_ok (pw_run_advance (r, 0.02, &error), &error);
-  check_close ("a step behind one that was cut", pw_run_time (r), 0.0015, 1e-15, "a rounding");
+  check_close ("a step after a shortened one", pw_run_time (r), 0.0015, 1e-15, "a rounding");
   while (pw_run_time (r) < 0.02) {
     check_ok (pw_run_advance (r, 0.02, &error), &error);
     if (pw_run_time (r) == 0.0104) met = 1;
@@ -92,7 +92,7 @@ static void test_breakpoint (void **state) {
   pw_system_free (s);
 }
 
-/* A sample inside a step meets the constraints, and lies between the ends as a cubic does. */
+/* A sample inside a step satisfies the constraints, and lies between the ends like a cubic. */
 static void test_sample (void **state) {
   (void)state;
   pw_system *s = own_system (NULL);
@@ -111,7 +111,7 @@ static void test_sample (void **state) {
   pw_system_free (s);
 }
 
-/* A saved run goes on to the bit. */
+/* A run resumed from a checkpoint continues bit-identically. */
 static void test_checkpoint (void **state) {
   (void)state;
   pw_archive a = { 0 };

@@ -14,7 +14,7 @@
 static const struct {
   const char *model;
   double h, t;
-  ladder_depth depth; /* without multipliers where they depend on prescribed motions alone */
+  ladder_depth depth; /* without multipliers where they depend only on prescribed motions */
 } radau_scene[] = { { "ezyroller", 0.1, 2, LADDER_LAMBDA },
                     { "n-trailer", 0.1, 1, LADDER_LAMBDA },
                     { "pendulum", 0.05, 1, LADDER_LAMBDA },
@@ -59,7 +59,7 @@ static void test_order_index3 (void **state) {
   }
 }
 
-/* What each form enforces. */
+/* Constraints enforced by each form. */
 static void test_residuals (void **state) {
   (void)state;
   for (int i = 0; i < RADAU_SCENES; i++) {
@@ -101,7 +101,7 @@ static void test_digits (void **state) {
   }
 }
 
-/* Errors follow the tolerance, and matrices are not factorised more often than they change. */
+/* Errors are proportional to the tolerance, and matrices are factorised no more often than they change. */
 static void test_tolerances (void **state) {
   static const char *const model[] = { "ezyroller", "pendulum", "arm", "snakeboard" };
   (void)state;
@@ -144,7 +144,7 @@ static void radau_switched_run (const char *method, pw_settings settings, double
   pw_system_free (s);
 }
 
-/* Steps end where the torque is switched, and have the full order from there on. */
+/* Steps end where the torque jumps; the order is unchanged after it. */
 static void test_switched (void **state) {
   (void)state;
   double exact[12], x[12], off[2] = { 0 };
@@ -177,7 +177,7 @@ static void test_damping (void **state) {
   pw_system_free (s);
 }
 
-/* Samples where the steps do not resolve a decay of 1e8 /s stay between the values at the ends. */
+/* Samples stay between the values at the ends of steps that do not resolve a decay of 1e8 /s. */
 static void radau_brake (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "disc", .mass = 1, .inertia = 1, .rate = { 0, 0, 1 } });
@@ -204,8 +204,8 @@ static void test_unresolved_samples (void **state) {
   }
 }
 
-/* A block pulled by a little more than dry friction holds, smoothed over 1e-8 m/s, slides at the right moment: while it
- * rests, corrections are small for lack of a good matrix, not of a residual. */
+/* A block pulled by slightly more than dry friction, smoothed over 1e-8 m/s, begins to slide at the right time:
+ * while it rests, corrections are small because of an inaccurate matrix, not of a small residual. */
 static double radau_pulled (double pull, double rtol) {
   pw_error error = { 0 };
   pw_file *f = pw_file_open ("benchmarks/hard/models/sliding-block.yaml", &error);
@@ -233,7 +233,7 @@ static void test_pulled (void **state) {
 
 /* ---- Samples ---- */
 
-/* The largest error of states and balance at times inside steps of the arm. */
+/* The largest error of states and energy balance at times inside steps of the arm. */
 static void radau_sampled (const char *method, double h, double *q, double *v, double *lambda, double *balance) {
   pw_system *s = ladder_open ("arm"), *S = ladder_open ("arm");
   pw_run *r = runs_open (s, method, &(pw_settings){ .step = h, .span = 1, .ledger = 1 });
@@ -256,7 +256,7 @@ static void radau_sampled (const char *method, double h, double *q, double *v, d
   pw_system_free (S);
 }
 
-/* Inside of steps states are as accurate as at their ends; work is integrated with an error of order h^4. */
+/* Samples inside steps are as accurate as ends of steps; work is integrated with an error of order h^4. */
 static void test_samples (void **state) {
   static const char *const method[] = { "radau+ggl:steps=fixed", "radau+index2:steps=fixed" };
   (void)state;

@@ -1,11 +1,11 @@
-/* Restarts: a run goes on from where it was, or from a state and with signals that the caller has changed. */
+/* Restarts: a run continues from its state, or from a state and with signals that the caller has changed. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
 #include "runs.h"
 #include "scene.h"
 
-/* A restart from the state a run has reached goes on as if nothing had been; from another state it goes on from there. */
+/* A restart from the state reached changes nothing; from another state, the run continues there. */
 static void test_onwards (void **state) {
   static const char *const method[] = { "rk4+projection", "rk4+baumgarte",   "ida+ggl",       "ida+baumgarte",
                                         "ida+si1",        "adams+baumgarte", "bdf+baumgarte", "bdf+projection" };
@@ -37,7 +37,7 @@ static void test_onwards (void **state) {
   }
 }
 
-/* Rates changed from outside change the power: the first step behind must count with the new one. */
+/* Changed velocities change the power: the first step after a restart must use the new one. */
 static void test_slower (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -54,7 +54,7 @@ static void test_slower (void **state) {
   pw_system_free (s);
 }
 
-/* A restart that is refused leaves the run where it was, to the bit. */
+/* A refused restart leaves the run unchanged, to the bit. */
 static void test_refused (void **state) {
   (void)state;
   pw_system *s = scene_system (&scene_ezyroller, NULL), *same = scene_system (&scene_ezyroller, NULL);
@@ -79,7 +79,8 @@ static void test_refused (void **state) {
   pw_system_free (s), pw_system_free (same);
 }
 
-/* A kick is the caller's: the balance tells the method's error only, before and behind it. */
+/* Energy added by the caller is not an error of the method: the balance contains only the latter, before and after.
+ * */
 static void test_kick (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -97,7 +98,7 @@ static void test_kick (void **state) {
   pw_system_free (s);
 }
 
-/* Nor is it taken for the method's where nothing but the energy itself is known. */
+/* The same where only the total energy is known. */
 static void test_kick_unkept (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -115,7 +116,7 @@ static void test_kick_unkept (void **state) {
   pw_system_free (s);
 }
 
-/* ---- A torque that the caller sets anew between steps, as a controller does ---- */
+/* ---- A torque that the caller changes between steps, as a controller does ---- */
 
 static int restart_held (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)t, (void)x, (void)gradient;
@@ -142,7 +143,7 @@ static double restart_controlled (const char *method, double step) {
   return phi;
 }
 
-/* Behind a restart a function's new value counts at once: the method keeps its order. */
+/* After a restart, the method uses the new value of a function: its order is unchanged. */
 static void test_controlled (void **state) {
   static const char *const method[] = { "rk4+projection", "galpha+ggl", "leapfrog" };
   static const double order[] = { 4, 2, 2 };

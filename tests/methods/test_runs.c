@@ -1,4 +1,5 @@
-/* Runs on the way: failures and what is left of them, scenes without rows, looking back, stopping. */
+/* Runs: failures and the state after them, scenes without constraints, systems shared by runs, samples, stopping.
+ * */
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -8,7 +9,7 @@
 #include "scene.h"
 #include "toys.h"
 
-/* ---- Failures on the way ---- */
+/* ---- Failures during a run ---- */
 
 typedef struct {
   double until;
@@ -29,7 +30,7 @@ static pw_system *runs_fused (runs_fuse *fuse) {
   return scene_compile (m);
 }
 
-/* A signal that fails stops the run; the error tells the time reached, which the run is still at. */
+/* A failing signal stops the run; the error contains the time reached, at which the run can still be sampled. */
 static void test_signal_fails (void **state) {
   static const char *const method[] = { "rk4+projection", "rk4+none", "ida+ggl", "ida+baumgarte" };
   (void)state;
@@ -48,7 +49,7 @@ static void test_signal_fails (void **state) {
     error.status = PW_OK;
     check_ok (pw_run_sample (r, t, &sample, &error), &error);
     pw_run_close (r);
-    assert_null (pw_run_open (s, "rk5", NULL, &error)); /* another run of the system has nothing to do with it */
+    assert_null (pw_run_open (s, "rk5", NULL, &error)); /* other runs of the system are not affected */
     assert_null (strstr (error.text, "finite"));
     pw_system_free (s);
   }
@@ -64,7 +65,7 @@ static void test_signal_fails_at_once (void **state) {
   pw_system_free (s);
 }
 
-/* A spring too stiff for the step. */
+/* A spring too stiff for the step size. */
 static void runs_stiff (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .start = { 2, 0, 0 } });
@@ -88,7 +89,7 @@ static void test_too_large_a_step (void **state) {
   pw_system_free (s);
 }
 
-/* ---- A body that nothing determines ---- */
+/* ---- An undetermined body ---- */
 
 static void runs_loose (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -107,7 +108,7 @@ static void test_massless (void **state) {
   pw_system_free (s);
 }
 
-/* ---- Scenes without some sort of rows, or all ---- */
+/* ---- Scenes without holonomic or nonholonomic rows, or both ---- */
 
 static void runs_free (pw_model *m, const void *parameters) {
   const double *with = parameters;
@@ -144,7 +145,7 @@ static void test_few_rows (void **state) {
   }
 }
 
-/* ---- Constraints that say the same twice ---- */
+/* ---- Redundant constraints ---- */
 
 static void runs_twice (pw_model *m, const void *parameters) {
   (void)parameters;
@@ -168,7 +169,7 @@ static void test_twice (void **state) {
 
 /* ---- Runs that share a system ---- */
 
-/* Runs that take turns on one system do not notice each other: each ends where it does by itself. */
+/* Runs advanced alternately on one system have the same results as alone. */
 static void test_shared (void **state) {
   static const char *const method[] = { "rk4+projection", "ida+ggl", "bdf+projection", "galpha+ggl",
                                         "rk4:inputs=held" };
@@ -216,7 +217,7 @@ static void test_missing (void **state) {
   pw_system_free (s);
 }
 
-/* ---- Looking into a run ---- */
+/* ---- Sampling ---- */
 
 static void test_outside (void **state) {
   static const char *const method[] = { "rk4+projection", "ida+ggl" };
@@ -236,7 +237,7 @@ static void test_outside (void **state) {
   }
 }
 
-/* A run does not pass t_end, and may be given a later one. */
+/* A run does not pass t_end; t_end can be increased. */
 static void test_t_end (void **state) {
   static const char *const method[] = { "rk4+projection", "ida+ggl" };
   (void)state;
@@ -255,7 +256,7 @@ static void test_t_end (void **state) {
   }
 }
 
-/* ---- A torque that is no number from some time on ---- */
+/* ---- A torque that becomes NaN ---- */
 
 static int runs_wild (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)x, (void)gradient;
@@ -271,7 +272,7 @@ static pw_system *runs_wild_system (double *from) {
   return scene_compile (m);
 }
 
-/* Every method stops in front of it; none takes smaller and smaller steps for ever. */
+/* Every method stops before it; none takes ever smaller steps without end. */
 static void test_wild (void **state) {
   static const char *const method[] = { "rk4+projection", "erk5+projection", "erk8",       "adams",   "bdf+projection",
                                         "ida+ggl",        "ida+baumgarte",   "galpha+ggl", "leapfrog" };
@@ -288,7 +289,7 @@ static void test_wild (void **state) {
   }
 }
 
-/* A force that is beyond all numbers at the start. */
+/* A force that is initially infinite. */
 static void runs_strong (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "a", .mass = 1, .inertia = 1, .start = { 100, 0, 0 } });

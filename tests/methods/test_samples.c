@@ -1,4 +1,4 @@
-/* Samples inside the steps of erk5 and erk8, and where steps end: at breakpoints, and where they are asked to. */
+/* Samples inside the steps of erk5 and erk8; steps that end at breakpoints and at requested times. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
@@ -11,7 +11,7 @@ enum { SAMPLES_METHODS = sizeof samples_methods / sizeof *samples_methods };
 
 /* ---- Samples ---- */
 
-/* Takes a sample in two places of every step up to t_end if asked to; the state at t_end. */
+/* Runs to t_end, optionally with two samples in every step; returns the state at t_end. */
 static void samples_state (const char *method, double rtol, int look, double *q, double *v, double *ledger,
                            pw_statistics *cost) {
   const double t_end = 3;
@@ -56,13 +56,13 @@ static void test_samples (void **state) {
       for (int look = 0; look < 2; look++)
         samples_state (samples_methods[i], pow (10, -k), look, q[look], v[look], ledger[look], &cost[look]);
       check_bits ("positions without samples", q[0], q[1], 6);
-      check_bits ("rates without samples", v[0], v[1], 6);
+      check_bits ("velocities without samples", v[0], v[1], 6);
       check_bits ("work without samples", ledger[0], ledger[1], 1);
       assert_true (cost[0].steps == cost[1].steps && cost[0].rejected == cost[1].rejected);
     }
 }
 
-/* A sample is, to the bit, what a run has that ends there: both make that last step. */
+/* A sample is bit-identical to the end of a run that ends at its time: both make that last step. */
 static void test_bits (void **state) {
   static const char *const method[] = { "erk5+none", "erk5+projection" };
   (void)state;
@@ -78,9 +78,9 @@ static void test_bits (void **state) {
       check_ok (pw_run_sample (r, t = 0.4 * t0 + 0.6 * pw_run_time (r), &now, &error), &error);
       runs_state (S, method[i], &settings, t, q, v, NULL);
       check_bits ("positions of a run that ends there", now.q, q, 6);
-      check_bits ("rates of a run that ends there", now.v, v, 6);
+      check_bits ("velocities of a run that ends there", now.v, v, 6);
     }
-    assert_int_equal (pw_run_statistics (r)->rejected, 0); /* a run that ends there might not be told to retreat */
+    assert_int_equal (pw_run_statistics (r)->rejected, 0); /* a run that ends there could have rejected a step */
     pw_run_close (r);
     pw_system_free (s);
     pw_system_free (S);
@@ -89,7 +89,7 @@ static void test_bits (void **state) {
 
 /* ---- Ends of steps ---- */
 
-/* A torque that is switched at 1/3 s. */
+/* A torque that jumps at 1/3 s. */
 static int samples_switched (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)x, (void)gradient;
   value[0] = t < 1. / 3 ? 0.1 : -0.2;
@@ -109,7 +109,7 @@ static pw_system *samples_switched_scene (void) {
   return scene_compile (m);
 }
 
-/* One step ends where the torque is switched, and the switch costs no rejections. */
+/* A step ends where the torque jumps, and the jump causes no rejections. */
 static void test_breakpoint (void **state) {
   (void)state;
   const double rtol = 1e-8;
@@ -140,7 +140,7 @@ static void test_breakpoint (void **state) {
   }
 }
 
-/* Samples go on over a step that ends there: it can be looked into. */
+/* A step that ends at the jump can be sampled. */
 static void test_across (void **state) {
   static const char *const method[] = { "erk5+none",       "erk5+projection", "erk8+none",
                                         "erk8+projection", "rk4+projection",  "ida+ggl" };
@@ -159,7 +159,7 @@ static void test_across (void **state) {
       pw_sample there = runs_to (exact, t);
       for (int j = 0; j < 6; j++)
         check_close (method[i], now.q[j], there.q[j], 1e3 * rtol, "1e3 rtol; rk4 at its step");
-      if (k != 8) /* where they jump */
+      if (k != 8) /* except where they jump */
         for (int j = 0; j < 6; j++)
           check_close ("acceleration", now.a[j], there.a[j], 1e5 * rtol, "1e5 rtol: one derivative up");
     }
@@ -170,7 +170,7 @@ static void test_across (void **state) {
   }
 }
 
-/* An end within round-off of the time reached is reached, and the next step is as long as if it had not been. */
+/* An end within round-off of the time reached counts as reached and does not change the next step. */
 static void test_short_end (void **state) {
   (void)state;
   for (int i = 0; i < SAMPLES_METHODS; i++) {

@@ -1,5 +1,5 @@
-/* Where steps begin and end, by every method: looks into a step, its beginning, ends an infinite time away or hardly behind
- * it, discontinuities that follow each other at once, and those a function of the caller's does not tell well. */
+/* Beginnings and ends of steps, by every method: samples inside steps and at their beginning; ends at infinity or
+ * just after the time reached; coincident discontinuities; bad breakpoints from functions. */
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -11,7 +11,7 @@
 
 enum { STEPS_NAME = 80 };
 
-/* Every integrator with every stabilisation, and where inputs can be held, with these: the i-th one's name, or NULL. */
+/* The name of the i-th combination of integrator, stabilisation and inputs=held; NULL after the last one. */
 static const char *steps_method (int i, char name[STEPS_NAME]) {
   for (int m = 0; pw_methods[m]; m++)
     for (const pw_stabilisation *x = pw_methods[m]->stabilisations; x->name; x++)
@@ -24,7 +24,7 @@ static const char *steps_method (int i, char name[STEPS_NAME]) {
   return NULL;
 }
 
-/* A pendulum that starts hanging; its torque is as given. */
+/* A pendulum, initially hanging, with a given torque. */
 static pw_signal steps_torque[2];
 
 static void steps_build (pw_model *m, const void *parameters) {
@@ -45,7 +45,7 @@ static pw_system *steps_open (pw_signal one, pw_signal two) {
 
 static const pw_signal steps_swing = { PW_HARMONIC, .harmonic = { .amplitude = 1, .omega = 30 } };
 
-/* ---- Looks ---- */
+/* ---- Samples ---- */
 
 static void steps_run (pw_system *s, const char *method, int looks, double q[3], double v[3]) {
   pw_error error = { 0 };
@@ -63,7 +63,7 @@ static void steps_run (pw_system *s, const char *method, int looks, double q[3],
   pw_run_close (r);
 }
 
-/* However often a run is looked into, it stays the same. */
+/* Samples do not change a run, however many there are. */
 static void test_looks (void **state) {
   char name[STEPS_NAME];
   (void)state;
@@ -73,14 +73,14 @@ static void test_looks (void **state) {
     steps_run (s, name, 0, q, v);
     steps_run (s, name, 2, q_seen, v_seen);
     check_bits ("positions", q_seen, q, 3);
-    check_bits ("rates", v_seen, v, 3);
+    check_bits ("velocities", v_seen, v, 3);
   }
   pw_system_free (s);
 }
 
-/* Held signals have within a step the values of its beginning, which a look may have gone behind: the angle of the step
- * itself is T t^2 / (2 I), T of its beginning. */
-static void test_held_inside (void **state) {
+/* Inside a step, held signals have the values of its beginning, also if a later time has been sampled: the angle of
+ * the step is T t^2 / (2 I), T at its beginning. */
+static void test_held_signal_sampled (void **state) {
   (void)state;
   pw_error error = { 0 };
   pw_sample sample;
@@ -96,7 +96,7 @@ static void test_held_inside (void **state) {
   pw_system_free (s);
 }
 
-/* The beginning of a step is inside it. */
+/* The beginning of a step can be sampled. */
 static void test_beginning (void **state) {
   char name[STEPS_NAME];
   (void)state;
@@ -115,9 +115,9 @@ static void test_beginning (void **state) {
   pw_system_free (s);
 }
 
-/* ---- Ends ---- */
+/* ---- Ends of runs ---- */
 
-/* A run without an end takes the steps of one whose end is far. */
+/* A run without an end takes the same steps as one with a distant end. */
 static void test_endless (void **state) {
   char name[STEPS_NAME];
   (void)state;
@@ -136,8 +136,8 @@ static void test_endless (void **state) {
   pw_system_free (s);
 }
 
-/* Two pulses begin at times that differ by the last digit, and the run ends by as little behind them, or later. */
-static void test_hardly_apart (void **state) {
+/* Two pulses begin at times that differ in the last digit; the run ends one digit later, or further on. */
+static void test_adjacent_breakpoints (void **state) {
   char name[STEPS_NAME];
   (void)state;
   const double one = 0.3, two = 0.1 + 0.2;
@@ -154,7 +154,7 @@ static void test_hardly_apart (void **state) {
   pw_system_free (s);
 }
 
-/* ---- Functions of the caller's ---- */
+/* ---- User functions ---- */
 
 static int steps_breaks (void *context, double t, const double *x, double value[3], double *gradient) {
   const double *until = context;
@@ -163,7 +163,7 @@ static int steps_breaks (void *context, double t, const double *x, double value[
   return 0;
 }
 
-/* What a function gives that is not a number ends the run by name, and is in no sample. */
+/* A function value that is not finite stops the run with the name of the element, and is in no sample. */
 static void test_not_a_number (void **state) {
   char name[STEPS_NAME];
   double until = 0.25;
@@ -185,10 +185,10 @@ static void test_not_a_number (void **state) {
   pw_system_free (s);
 }
 
-/* Where a function tells the next breakpoint from. */
+/* Where a function computes the next breakpoint from. */
 typedef struct {
-  double from, told;
-} steps_wrong;
+  double from, returned;
+} steps_breakpoint;
 
 static int steps_still (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)t, (void)x, (void)gradient;
@@ -196,32 +196,33 @@ static int steps_still (void *context, double t, const double *x, double value[3
   return 0;
 }
 
-static double steps_told (void *context, double t) {
-  const steps_wrong *w = context;
-  return t < w->from ? w->from : w->told;
+static double steps_bad_breakpoint (void *context, double t) {
+  const steps_breakpoint *w = context;
+  return t < w->from ? w->from : w->returned;
 }
 
-/* A breakpoint that does not lie behind the time it is asked for would let the run stand still, or go back. */
+/* A function must return a breakpoint after the given time; otherwise the run would not advance. */
 static void test_breakpoints_told (void **state) {
-  static const double told[] = { 0.125, 0, -INFINITY, NAN };
-  steps_wrong wrong;
+  static const double returned[] = { 0.125, 0, -INFINITY, NAN };
+  steps_breakpoint wrong;
   (void)state;
   pw_system *s = steps_open (
-      (pw_signal){ PW_FUNCTION, .function = { .eval = steps_still, .breakpoint = steps_told, .context = &wrong } },
+      (pw_signal){ PW_FUNCTION,
+                   .function = { .eval = steps_still, .breakpoint = steps_bad_breakpoint, .context = &wrong } },
       (pw_signal){ 0 });
   for (int i = 0; i < 4; i++) {
     pw_error error = { 0 };
-    wrong = (steps_wrong){ 0.125, told[i] };
+    wrong = (steps_breakpoint){ 0.125, returned[i] };
     pw_run *r = runs_open (s, "rk4", NULL);
     assert_int_equal (pw_run_advance_to (r, 1, 1, &error), PW_METHOD);
     check_error (&error, PW_METHOD,
                  "t = 0.125 s: torque T: value: its breakpoint function returned a time that is not later");
-    wrong = (steps_wrong){ 0, told[i] };
+    wrong = (steps_breakpoint){ 0, returned[i] };
     error = (pw_error){ 0 };
     assert_int_equal (pw_run_restart (r, NULL, NULL, &error), PW_METHOD);
     pw_run_close (r);
     error = (pw_error){ 0 };
-    if (told[i] > 0) continue;
+    if (returned[i] > 0) continue;
     assert_null (pw_run_open (s, "rk4", NULL, &error));
     check_error (&error, PW_METHOD,
                  "t = 0 s: torque T: value: its breakpoint function returned a time that is not later");
@@ -232,10 +233,10 @@ static void test_breakpoints_told (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_looks),
-    cmocka_unit_test (test_held_inside),
+    cmocka_unit_test (test_held_signal_sampled),
     cmocka_unit_test (test_beginning),
     cmocka_unit_test (test_endless),
-    cmocka_unit_test (test_hardly_apart),
+    cmocka_unit_test (test_adjacent_breakpoints),
     cmocka_unit_test (test_not_a_number),
     cmocka_unit_test (test_breakpoints_told),
   };

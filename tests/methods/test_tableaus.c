@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include "check.h"
 
-/* The methods' own files, under other names than those of the library. */
+/* The sources of the methods, with other names than in the library. */
 #define pw_method_rk4 tableaus_rk4
 #define pw_method_erk5 tableaus_erk5
 #define pw_method_erk8 tableaus_erk8
@@ -18,7 +18,7 @@
 static const struct {
   const char *name;
   const pw_tableau *b;
-  int order_e, order_e3; /* of the methods that the estimates compare with */
+  int order_e, order_e3; /* orders of the methods whose difference is the estimate */
 } tableaus[] = {
   { "rk4", &rk4_tableau, 0, 0 },
   { "erk5", &erk5_tableau, 4, 0 },
@@ -30,7 +30,7 @@ static double tableaus_power (double c, int k) {
   return k == 0 ? 1 : pow (c, k);
 }
 
-/* sum_j A_ij c_j^k of a stage, and in `size` what is summed up without signs. */
+/* sum_j A_ij c_j^k of a stage; `size`: the sum of absolute values. */
 static double tableaus_row (const pw_tableau *b, int i, int k, double *size) {
   const double *A = b->A + i * (i - 1) / 2;
   double sum = 0;
@@ -92,7 +92,7 @@ static void test_two_levels (void **state) {
   }
 }
 
-/* An estimate is zero for whatever both methods solve exactly, and not for the next power. */
+/* An estimate is zero where both methods are exact, and nonzero for the next power. */
 static void tableaus_estimate (const char *name, const pw_tableau *b, const double *e, int order) {
   for (int k = 0; k <= order; k++) {
     double sum = 0, size = 0;

@@ -1,4 +1,4 @@
-/* Vehicles of the gallery against the reference each of them has. */
+/* Vehicles of the gallery, compared with their reference solutions. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -12,7 +12,7 @@ static void test_wheeled_snake (void **state) {
     gallery_energy (gallery_open ("wheeled-snake", "n", n, NULL), 5e-4, 4, 1e6 * H4, 1);
 }
 
-/* The circle on which a point of a body goes: it starts at (x0, 0), along x, with the centre to its left. */
+/* The circle on which a point of a body moves: it begins at (x0, 0) in x direction, with the centre to its left. */
 static void gallery_circle (const pw_system *s, const pw_sample *x, const char *body, double along, double x0, double R,
                             double bound, const char *reason) {
   char name[32];
@@ -38,7 +38,7 @@ static void test_car (void **state) {
   gallery_close (r, s);
 }
 
-/* Steered while it drives: all four wheels agree at every moment, and so the car turns at u T / L. */
+/* Steered while driving: the four wheels are consistent at all times, and the car turns at u T / L. */
 static void test_ackermann_car (void **state) {
   (void)state;
   const double L = 2.6, k = tan (PW_PI * 25 / 180), w = 0.2 * PW_PI;
@@ -61,7 +61,7 @@ static void test_ackermann_car (void **state) {
   gallery_close (r, s);
 }
 
-/* The headings of the two front wheels, as the model's expressions give them: cot (outer) - cot (inner) = track / L. */
+/* The headings of both front wheels, from the model's expressions: cot (outer) - cot (inner) = track / L. */
 static void test_ackermann_angles (void **state) {
   (void)state;
   pw_system *s = gallery_open ("ackermann-car", NULL);
@@ -79,7 +79,7 @@ static void test_ackermann_angles (void **state) {
   pw_system_free (s);
 }
 
-/* In a steady turn each axle ends on a circle that Pythagoras gives, and the hitches carry nothing. */
+/* In a steady turn each axle moves on a circle given by Pythagoras, without forces in the hitches. */
 static void test_car_two_trailers (void **state) {
   static const char *const body[] = { "car", "trailer1", "trailer2" };
   (void)state;
@@ -90,14 +90,14 @@ static void test_car_two_trailers (void **state) {
   for (int i = 0; i < 3; i++, R2 -= 9) {
     double P[2];
     gallery_point (s, &x, body[i], 0, P);
-    check_close (body[i], hypot (P[0], P[1] - R), sqrt (R2), 1e3 * H4, "1000 h^4: the way back grows with the time");
+    check_close (body[i], hypot (P[0], P[1] - R), sqrt (R2), 1e3 * H4, "1000 h^4: errors grow with time");
   }
-  check_close ("hitch1", trial_reaction (s, &x, "hitch1.Fx") / 1e3, 0, 100 * H4, "hitches carry nothing");
-  check_close ("hitch2", trial_reaction (s, &x, "hitch2.Fy") / 1e3, 0, 100 * H4, "hitches carry nothing");
+  check_close ("hitch1", trial_reaction (s, &x, "hitch1.Fx") / 1e3, 0, 100 * H4, "no force in the hitches");
+  check_close ("hitch2", trial_reaction (s, &x, "hitch2.Fy") / 1e3, 0, 100 * H4, "no force in the hitches");
   gallery_close (r, s);
 }
 
-/* The radius the middle of the rear axle ends on. */
+/* The final radius of the middle of the rear axle. */
 static double gallery_tyres (double stiffness) {
   pw_system *s = gallery_open ("car-tyres", "stiffness", stiffness, NULL);
   pw_run *r = gallery_run (s, 1e-3, 10);
@@ -106,7 +106,7 @@ static double gallery_tyres (double stiffness) {
   double radius =
       hypot (trial_state (s, &x, "car.vx") + 1.4 * w * sin (phi), trial_state (s, &x, "car.vy") - 1.4 * w * cos (phi)) /
       w;
-  check_below ("dissipated", -x.loss, 0, "tyres that slip take energy");
+  check_below ("dissipated", -x.loss, 0, "slip dissipates energy");
   gallery_close (r, s);
   return radius;
 }
@@ -117,7 +117,7 @@ static void test_car_tyres (void **state) {
   double off[4], stiffness = 4e4;
   for (int i = 0; i < 4; i++, stiffness *= 2) off[i] = gallery_tyres (stiffness) - R;
   for (int i = 1; i < 4; i++) check_close ("order in 1 / C", log2 (off[i - 1] / off[i]), 1, 0.1, "first order");
-  check_close ("extrapolated", 2 * off[3] - off[2], 0, fabs (off[3]) / 20, "what is left is of second order");
+  check_close ("extrapolated", 2 * off[3] - off[2], 0, fabs (off[3]) / 20, "the remainder is of second order");
 }
 
 static void test_differential_drive (void **state) {

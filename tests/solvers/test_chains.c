@@ -1,6 +1,5 @@
-/* Chains of pinned bodies in a large scene: they are eliminated in a way of their own, which has to find them and their
- * ends however the scene is described.  What comes out obeys the equations as the independent verifier sees them, and does
- * not depend on the description. */
+/* Chains of pinned bodies in large scenes, which have their own elimination: it must find chains and their ends in
+ * any description.  Results satisfy the independent verifier and do not depend on the description. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -10,18 +9,18 @@
 
 enum { CHAINS_LINKS = 14 };
 
-/* A zigzag of bars that hangs from the ground: the same described in other ways, then with something more. */
+/* A zigzag of bars that hangs from the ground: in different descriptions, then with a further element. */
 enum {
   CHAINS_PLAIN,
-  CHAINS_TURNED,    /* the two bars of every third pin swapped */
+  CHAINS_TURNED,    /* order of the two bars of every third pin exchanged */
   CHAINS_BARS_BACK, /* the last bar first */
   CHAINS_PINS_BACK, /* the last pin first */
-  CHAINS_SHUFFLED,  /* pins in no order */
+  CHAINS_SHUFFLED,  /* pins in random order */
   CHAINS_OTHERS,
-  CHAINS_BRIDGE = CHAINS_OTHERS, /* the last bar on the ground too */
-  CHAINS_BRANCH,                 /* a second chain hangs from a bar within */
-  CHAINS_WHEEL,                  /* a bar within has a wheel */
-  CHAINS_LIGHT,                  /* a bar within has no mass */
+  CHAINS_BRIDGE = CHAINS_OTHERS, /* the last bar pinned to the ground too */
+  CHAINS_BRANCH,                 /* a second chain hangs from an inner bar */
+  CHAINS_WHEEL,                  /* an inner bar has a wheel */
+  CHAINS_LIGHT,                  /* an inner bar is massless */
   CHAINS_ALL
 };
 
@@ -33,7 +32,7 @@ static double chains_angle (int bar) {
   return bar % 2 ? 0.4 : -0.7;
 }
 
-/* Bar i of a chain that begins at (x, y): half a metre to either end. */
+/* Bar i of a chain from (x, y) on, half a metre to either end. */
 static void chains_bar (pw_model *m, const char *chain, int i, double x, double y, int light) {
   char name[20];
   double c = 0, s = 0;
@@ -48,7 +47,7 @@ static void chains_bar (pw_model *m, const char *chain, int i, double x, double 
                               .start = { x + c, y + s, chains_angle (i) } });
 }
 
-/* The pin before bar i, on what it hangs from. */
+/* The pin between bar i and the previous bar, or the ground. */
 static void chains_pin (pw_model *m, const char *chain, int i, const char *from, double at, int turned) {
   char name[20], bar[20], before[20];
   snprintf (name, sizeof name, "%s-pin%d", chain, i);
@@ -98,9 +97,9 @@ static const pw_plugin_table chains_table = { .abi = PW_ABI,
                                               .parameters_size = sizeof (chains_parameters),
                                               .build = chains_build };
 
-/* ---- What holds ---- */
+/* ---- Tests ---- */
 
-/* A short run, verified; the motion of some bars at its end, and the force in a pin. */
+/* Verifies a short run; returns final states of some bars, and the force in a pin. */
 static void chains_run (int how, double end[8]) {
   static const char *const name[] = { "bar0.phi", "bar6.x", "bar6.omega", "bar7.phi", "bar13.x", "bar13.vy" };
   pw_system *s = scene_system (&chains_table, "how", (double)how, NULL);
@@ -118,7 +117,7 @@ static void test_same (void **state) {
   double first[8], other[8];
   (void)state;
   chains_run (CHAINS_PLAIN, first);
-  assert_true (fabs (first[5]) > 0.1); /* it does move */
+  assert_true (fabs (first[5]) > 0.1); /* it moves */
   for (int how = CHAINS_PLAIN + 1; how < CHAINS_OTHERS; how++) {
     chains_run (how, other);
     for (int i = 0; i < 8; i++)

@@ -1,4 +1,4 @@
-/* What `check` writes about stability. */
+/* The stability part of the report of `check`. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -29,7 +29,7 @@ static void test_text (void **state) {
                1e-12, "1e4 eps");
 }
 
-/* A start whose given angle cannot be kept, and one whose omitted ones follow. */
+/* Initial conditions whose given angle cannot be kept, and others whose omitted values follow. */
 static void test_finding (void **state) {
   static const char *const body =
       "pinwheel: 1\nbodies:\n  - {name: rod, mass: 1, inertia: 1, start: {%s}, rate: {%s}}\n"
@@ -48,7 +48,8 @@ static void test_finding (void **state) {
   stability_shows ("\nNo problems found\n");
 }
 
-/* Hundreds of defective zeros, which round-off spreads over a circle: the QR algorithm converges, and they are 0. */
+/* Hundreds of defective zeros, which round-off spreads over a circle: the QR algorithm converges, and they are
+ * shown as 0. */
 static void test_many_zeros (void **state) {
   (void)state;
   cli_good ("pinwheel check chain --set n=130");

@@ -1,4 +1,4 @@
-/* The linearisation of scenes whose vibrations are known. */
+/* Linearisation of scenes with known frequencies. */
 #include <math.h>
 #include "check.h"
 #include "runs.h"
@@ -63,7 +63,7 @@ static void test_oscillator (void **state) {
   pw_linear_free (&l);
 }
 
-/* A link pinned to an arm that turns steadily swings about the radius: w^2 = m R l W^2 / (I + m l^2). */
+/* A link pinned to an arm that turns steadily oscillates about the radius: w^2 = m R l W^2 / (I + m l^2). */
 static void linear_rotor (pw_model *m, const void *parameters) {
   const double R = 0.9, l = 0.4, W = 7;
   (void)parameters;
@@ -89,7 +89,7 @@ static void test_rotor (void **state) {
   pw_linear_free (&l);
 }
 
-/* The Chaplygin sleigh runs straight, mass behind: (I + m a^2) w' = -m a u w grows. */
+/* The Chaplygin sleigh runs straight, centre of mass behind the wheel: (I + m a^2) w' = -m a u w grows. */
 static void linear_sleigh (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "sleigh", .mass = 3, .inertia = 0.5, .start = { 0, 0, 0.3 } });
@@ -108,7 +108,7 @@ static void test_sleigh (void **state) {
   pw_linear_free (&l);
 }
 
-/* Twin wheels are one row; of massless bodies nothing is left over. */
+/* Twin wheels count as one row; massless bodies add no eigenvalues. */
 static void linear_twins (pw_model *m, const void *parameters) {
   (void)parameters;
   pw_add_body (m, &(pw_body){ .name = "axle", .mass = 1, .inertia = 1 });

@@ -1,5 +1,5 @@
-/* Coordinates without mass follow the constraints: projections leave those with mass alone, whatever the units, and whatever
- * else has mass. */
+/* Massless coordinates follow the constraints: projections do not move massive coordinates instead, whatever the
+ * units and the masses of other bodies. */
 #include <math.h>
 #include <stdio.h>
 #include "check.h"
@@ -7,7 +7,7 @@
 #include "scene.h"
 
 typedef struct {
-  double length, mass, other; /* units; the mass of a body that has nothing to do with the others, 0: none */
+  double length, mass, other; /* units; mass of an unconnected body, 0: there is none */
 } massless;
 
 static const pw_parameter massless_list[] = {
@@ -44,7 +44,7 @@ static void massless_other (pw_model *m, const massless *p) {
     pw_add_body (m, &(pw_body){ .name = "other", .mass = p->other, .inertia = p->other, .rate = { 0, 0, 0.1 } });
 }
 
-/* A disc on a massless arm turns at 1 rad/s for ever. */
+/* A disc on a massless arm turns at 1 rad/s. */
 static void massless_disc (pw_model *m, const void *parameters) {
   const massless *p = parameters;
   double L = p->length;
@@ -72,7 +72,7 @@ static void test_disc (void **state) {
                    1e-4, "100 rtol: the errors of some 30 steps");
 }
 
-/* By mass, where nothing changes but the angle, linearly, there is no error. */
+/* With the mass metric there is no error, since only the angle changes, linearly. */
 static void test_exact (void **state) {
   (void)state;
   check_below ("bdf+projection", massless_turned ("bdf+projection", 1, 1, 0), 16 * CHECK_EPS, "round-off");
@@ -112,7 +112,7 @@ static void massless_car (pw_model *m, const void *parameters) {
   massless_other (m, p);
 }
 
-/* Lengths of q and v in their unit. */
+/* Norms of q and v in units of the scene. */
 static void massless_state (const pw_plugin_table *table, const char *method, double rtol, double length, double mass,
                             double other, double *q, double *v) {
   pw_system *s = scene_system (table, "length", length, "mass", mass, "other", other, NULL);
@@ -130,7 +130,7 @@ static void massless_agree (const pw_plugin_table *table, const char *method) {
     massless_state (table, method, 1e-7, units[k][0], units[k][1], units[k][2], q, v);
     double worst = 0;
     for (int i = 0; i < 9; i++) worst = fmax (worst, fmax (fabs (q[i] - q0[i]), fabs (v[i] - v0[i])));
-    check_below (method, worst, 3e-4, "3000 rtol: the errors of some hundred steps, and what they grow to");
+    check_below (method, worst, 3e-4, "3000 rtol: errors of some hundred steps, and their growth");
   }
 }
 

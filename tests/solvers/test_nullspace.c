@@ -1,4 +1,5 @@
-/* Minimal velocities: rows on the level of rates hold exactly, the order is the method's, and the basis is not felt. */
+/* The null-space method: velocity constraints satisfied to round-off, order of the integrator, independence of the
+ * basis. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -15,7 +16,7 @@ static void test_order (void **state) {
   static const struct {
     const char *model;
     double h, t;
-    ladder_depth depth; /* without multipliers where the motion is prescribed, and with it they */
+    ladder_depth depth; /* without multipliers where the motion is prescribed */
   } scene[] = { { "ezyroller", 0.04, 4, LADDER_LAMBDA }, { "n-trailer", 0.04, 2, LADDER_LAMBDA },
                 { "pendulum", 0.01, 1, LADDER_LAMBDA },  { "n-four-bar", 0.01, 0.4, LADDER_LAMBDA },
                 { "arm", 0.01, 1, LADDER_LAMBDA },       { "tractor", 0.04, 2, LADDER_V } };
@@ -27,7 +28,8 @@ static void test_order (void **state) {
   ladder_expect ("ezyroller", "erk8+nullspace:steps=fixed", 0.2, 10, 8, 1, LADDER_Q);
 }
 
-/* Rates obey every row at round-off however large the step; positions drift at the order of the method, or not. */
+/* Velocities satisfy every row to round-off at any step size; positions are projected, or drift with the order of
+ * the method. */
 static void test_residuals (void **state) {
   (void)state;
   static const char *const model[] = {
@@ -61,7 +63,8 @@ static void test_tolerances (void **state) {
     }
 }
 
-/* The work of drives and what the closing of positions adds are accounted for, and asking changes nothing. */
+/* The energy balances, including the work of drives and the energy added by projections; the ledger does not change
+ * the run. */
 static void test_ledger (void **state) {
   (void)state;
   double q[2][6], v[2][6];
@@ -77,10 +80,10 @@ static void test_ledger (void **state) {
     pw_system_free (s);
   }
   check_bits ("positions without ledger", q[0], q[1], 6);
-  check_bits ("rates without ledger", v[0], v[1], 6);
+  check_bits ("velocities without ledger", v[0], v[1], 6);
 }
 
-/* ---- What it refuses ---- */
+/* ---- Refused scenes ---- */
 
 static void nullspace_chain (pw_model *m, const void *parameters) {
   static char body[200][8], pin[200][8];
@@ -108,7 +111,7 @@ static void test_refused (void **state) {
   pw_system_free (s);
 }
 
-/* A step over which the motion turns away from its basis: a reason, not a number. */
+/* A step over which the null space turns too far fails with a message. */
 static void test_large_step (void **state) {
   (void)state;
   pw_error error = { 0 };
@@ -121,10 +124,10 @@ static void test_large_step (void **state) {
   pw_system_free (s);
 }
 
-/* ---- What is without mass, and how a body is divided, makes no difference ---- */
+/* ---- Massless coordinates and welded bodies ---- */
 
-/* A cart on a wheel with an arm, of which a spring pulls at the tip; the arm in one piece, or in two that are welded, the
- * spring at a bracket without mass that is bolted to the second. */
+/* A cart on a wheel with an arm and a spring at its tip; the arm in one piece, or in two welded pieces with the
+ * spring at a massless bracket pinned twice to the second. */
 static void nullspace_cart (pw_model *m, int parts) {
   pw_add_body (m, &(pw_body){ .name = "cart", .mass = 2, .inertia = 0.3, .rate = { 1, 0, 0 } });
   pw_add_wheel (m, &(pw_wheel){ .name = "wheel", .body = "cart", .at = { -0.4, 0 } });
@@ -171,7 +174,7 @@ static void test_parts (void **state) {
   runs_state (twin, "rk4+nullspace", &(pw_settings){ .step = 0.01, .span = 1 }, 1, Q, V, NULL);
   for (int j = 0; j < 6; j++) {
     check_close ("positions", Q[j], q[j], 1e-10, "round-off of 100 steps, magnified by small weights");
-    check_close ("rates", V[j], v[j], 1e-10, "round-off of 100 steps, magnified by small weights");
+    check_close ("velocities", V[j], v[j], 1e-10, "round-off of 100 steps, magnified by small weights");
   }
   pw_system_free (s), pw_system_free (twin);
 }

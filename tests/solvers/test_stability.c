@@ -1,4 +1,5 @@
-/* Exponents of disturbances of steady motions, against closed forms and disturbed runs; what is not steady is reported. */
+/* Exponents of perturbations of steady motions, compared with closed forms and perturbed runs; unsteady motions are
+ * reported. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -21,7 +22,7 @@ static pw_linear stability_of (void (*build) (pw_model *, const void *)) {
   return l;
 }
 
-/* An eigenvalue is among those that are no displacements of the whole, and so is its conjugate. */
+/* An eigenvalue that is not a rigid displacement, and its conjugate, are found. */
 static void stability_has (const pw_linear *l, double re, double im, double bound, const char *reason) {
   double nearest = INFINITY, other = INFINITY;
   for (int i = 0; i < l->unknowns; i++) {
@@ -39,7 +40,8 @@ static int stability_zeros (const pw_linear *l) {
   return zeros;
 }
 
-/* ---- A tractor of given speed and rate of turn, and trailers hitched on axles: -w R_i / L_i, straight -u / L_i ---- */
+/* ---- A tractor with prescribed speed and turn rate, and trailers hitched on axles: -w R_i / L_i, straight -u /
+ * L_i ---- */
 
 enum { WHEEL, TWINS, ROLLING, LIGHT };
 
@@ -62,7 +64,7 @@ static void stability_axle (pw_model *m, const char *body, int i) {
   }
 }
 
-/* With LIGHT trailers the mass is that of a load welded to the axle of each. */
+/* With LIGHT trailers, the mass is in a load welded to each axle. */
 static void stability_vehicle (pw_model *m, int i, const double start[3]) {
   double w = train.w, R = w != 0 ? train.u / w : 0;
   char name[20], load[20], weld[20];
@@ -129,7 +131,7 @@ static void test_trailers (void **state) {
     }
 }
 
-/* Trailers of one length straight ahead: a defective eigenvalue, which round-off would split. */
+/* Trailers of equal length, straight ahead: a defective eigenvalue, which round-off would split. */
 static void test_defective (void **state) {
   (void)state;
   train.axle = WHEEL, train.u = 2, train.w = 0;
@@ -200,14 +202,14 @@ static void test_car (void **state) {
   }
 }
 
-/* ---- Symmetries and what breaks them; motions that are not steady ---- */
+/* ---- Symmetries and elements that break them; unsteady motions ---- */
 
 static struct {
   int pinned, gravity, spring, torque, drag;
   double phi, v, omega;
 } scene;
 
-/* A torque that reads where the body is. */
+/* A torque that depends on the position of the body. */
 static int stability_reader (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context, (void)t;
   value[0] = -2 * x[0];
@@ -215,7 +217,7 @@ static int stability_reader (void *context, double t, const double *x, double va
   return 0;
 }
 
-/* The same, of a stiffness that changes with time: at phi = 0 no acceleration tells (Mathieu's equation). */
+/* The same with a time-dependent stiffness: at phi = 0 there is no acceleration (Mathieu's equation). */
 static int stability_mathieu (void *context, double t, const double *x, double value[3], double *gradient) {
   (void)context;
   value[0] = -(2 + sin (t)) * x[0];
@@ -261,7 +263,7 @@ static void test_scenes (void **state) {
     double phi, v, omega;
     pw_steadiness steady;
     int symmetries;
-    double square; /* of the fastest eigenvalue if it is a frequency (negative) or one that grows */
+    double square; /* square of the fastest eigenvalue: negative for a frequency, positive for growth */
   } each[] = {
     { .phi = 0.3, .v = 2, .steady = PW_STEADY, .symmetries = 3 },
     { .pinned = 1, .phi = 0.3, .omega = 5, .steady = PW_STEADY, .symmetries = 1 },
@@ -293,9 +295,9 @@ static void test_scenes (void **state) {
   }
 }
 
-/* ---- n-trailer, disturbed: two hinges, which come to rest with two exponents ---- */
+/* ---- n-trailer, perturbed: two hinges, which come to rest with two exponents ---- */
 
-/* The angles of both hinges at equal times; positions of the trailers follow from the hinges. */
+/* The angles of both hinges at equal time intervals; they determine the positions of the trailers. */
 static void stability_hinges (double disturbance, double out[2][5]) {
   const pw_settings settings = { .rtol = 1e-12 };
   pw_error error = { 0 };
@@ -316,8 +318,8 @@ static void stability_hinges (double disturbance, double out[2][5]) {
   pw_system_free (s);
 }
 
-/* Differences of runs disturbed to both sides follow  d'' - s d' + p d = 0  over steps of time, s and p the sum and the product
- * of both exponentials; what the disturbance changes for good drops out of the differences (Prony 1795). */
+/* Differences of runs with opposite perturbations satisfy d'' - s d' + p d = 0 over equal time intervals, with s
+ * and p the sum and the product of both exponentials; permanent changes cancel in the differences (Prony 1795). */
 static void test_disturbed (void **state) {
   double up[2][5], down[2][5], d[2][4];
   pw_error error = { 0 };
