@@ -764,9 +764,10 @@ const double *pw_system_initial_v (const pw_system *s);
  * jumps there. */
 int pw_system_jumps (const pw_system *s, double t);
 
-/* C code for this scene alone, which evaluates and projects it faster than the library (pw_settings.specialised).  NULL
- * and the error if there is none: redundant constraints, or too many constraint equations.  Free the text. */
-char *pw_system_source (const pw_system *s, pw_error *error);
+/* C code for this scene alone, which evaluates and projects it faster than the library (pw_settings.specialised).
+ * independent: rows, 0 for redundant constraint equations (pw_run_source); NULL: none is redundant.  NULL and the error if
+ * there is no such code, as for too many constraint equations.  Free the text. */
+char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error);
 
 /* Whether compiled code is of this version and of a system with the same structure: parameters and initial values may
  * differ. */

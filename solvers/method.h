@@ -30,6 +30,7 @@ struct pw_run {
   const struct pw_specialised *specialised; /* code in use, or NULL */
   struct pw_scene *scene;                   /* its data */
   void *scene_memory;
+  int scene_ready; /* 1: its constants have been computed */
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refuse;          /* sine at which an evaluation is refused */
@@ -312,6 +313,8 @@ void pw_project_error (pw_run *r, pw_saddle *k, double *e, int rows);
 /* Opens the settings' specialised code, if any.  Errors: PW_INPUT, PW_RESOURCE. */
 int pw_specialised_open (pw_run *r, pw_error *error);
 void pw_specialised_close (pw_run *r);
+/* Uses it if it has the run's independent equations. */
+void pw_specialised_select (pw_run *r);
 
 /* As pw_run_accelerate and pw_project_state, if specialised code can do it: 1; 0 if not.  With `rate`, which receives
  * the ledger's rates, the workspace keeps its state; otherwise kinematics and J are those of the new one. */

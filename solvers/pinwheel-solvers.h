@@ -210,6 +210,9 @@ int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int s
 int pw_initial_specified (const pw_initial_report *report, int state);
 const pw_scale *pw_run_scale (const pw_run *r);
 
+/* pw_system_source with the redundant constraint equations of the run. */
+char *pw_run_source (const pw_run *r, pw_error *error);
+
 PW_END
 
 #endif

@@ -19,12 +19,16 @@ typedef struct {
 
 /* ---- Opening ---- */
 
-/* Specialised code, if the scene has one. */
-static void run_specialise (run_cell *x, pw_error *error) {
+/* Specialised code, if the scene has one, and a run that uses it. */
+static void run_specialise (run_cell *x, const char *method, pw_settings *settings, pw_error *error) {
   pw_error none = { 0 };
-  char *text = pw_system_source (x->system, &none);
+  char *text = pw_run_source (x->run, &none);
   if (text) x->code = pw_scene_code_open (text, x->system, 1, error);
   free (text);
+  if (x->code == NULL) return;
+  settings->specialised = pw_scene_code_table (x->code);
+  pw_run_close (x->run);
+  x->run = pw_run_open (x->system, method, settings, error);
 }
 
 static int run_open (const hard_case *c, const char *method, int specialised, run_cell *x, pw_error *error) {
@@ -36,9 +40,8 @@ static int run_open (const hard_case *c, const char *method, int specialised, ru
   for (int i = 0; error->status == PW_OK && i < c->initials; i++)
     pw_model_set_initial (x->model, c->initial[i].name, c->initial[i].value, error);
   if (error->status == PW_OK) x->system = pw_system_compile (x->model, error);
-  if (x->system && specialised) run_specialise (x, error);
-  settings.specialised = pw_scene_code_table (x->code);
-  if (x->system && error->status == PW_OK) x->run = pw_run_open (x->system, method, &settings, error);
+  if (x->system) x->run = pw_run_open (x->system, method, &settings, error);
+  if (x->run && specialised) run_specialise (x, method, &settings, error);
   return error->status;
 }
 

@@ -184,6 +184,9 @@ int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error);
 /* Estimated number of steps of a run. */
 double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defaults *model, double t_end);
 
+/* The text of specialised code, without the constraint equations that are redundant at the initial state.  NULL and the
+ * error if there is none.  Free it. */
+char *pw_cli_source (const pw_system *s, pw_error *error);
 /* Chooses the engine for runs with this total number of steps; loads or compiles the code, and prints notices. */
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps);
 void pw_cli_engine_close (pw_cli_engine *e);

@@ -41,10 +41,17 @@ static void engine_general (pw_cli_engine *e, const pw_system *s, int has_text, 
   snprintf (e->why, sizeof e->why, "%.190s", text);
 }
 
+char *pw_cli_source (const pw_system *s, pw_error *error) {
+  pw_run *r = pw_run_open (s, "rk4+none", NULL, NULL);
+  char *text = r ? pw_run_source (r, error) : pw_system_source (s, NULL, error);
+  pw_run_close (r);
+  return text;
+}
+
 /* Loads code for the system. */
 static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise when) {
   pw_error own = { 0 };
-  char *text = pw_system_source (s, &own);
+  char *text = pw_cli_source (s, &own);
   int has_text = text != NULL, quiet = has_text ? 0 : when == PW_SPECIALISE_AUTO;
   if (text) e->code = pw_scene_code_open (text, s, 1, &own);
   free (text);

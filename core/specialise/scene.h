@@ -22,6 +22,7 @@ typedef struct pw_scene {
   int (*update) (void *workspace, double t, const double *q, const double *v); /* evaluates u; non-zero: failed */
   void *workspace;
   double length, speed; /* scales of residuals [m], [m/s] */
+  double follows;       /* largest scaled residual of redundant equations */
 
   /* Results of `project`: iterations; scaled and absolute residuals of positions and velocities. */
   int iterations;
@@ -32,8 +33,9 @@ typedef struct pw_scene {
  * pivot, values that are not finite, a signal that failed.  Nothing but c, J and u is modified then. */
 typedef struct pw_specialised {
   int abi, constants;
-  unsigned long shape;          /* pw_system_shape of the system */
-  int (*prepare) (pw_scene *s); /* 1: a constant pivot is too small */
+  unsigned long shape;              /* pw_system_shape of the system */
+  const unsigned char *independent; /* rows: 0 for redundant equations, which have the multiplier 0 */
+  int (*prepare) (pw_scene *s);     /* 1: a constant pivot is too small */
   /* Accelerations and multipliers at a state; c (bodies + 1), J (entries of all elements), and the ledger's rates are
    * stored unless NULL. */
   int (*evaluate) (pw_scene *s, double t, const double *q, const double *v, double *a, double *lambda, double *rate,

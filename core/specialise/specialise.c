@@ -16,6 +16,7 @@ enum {
 
 typedef struct {
   const pw_system *s;
+  const unsigned char *independent; /* or NULL */
   FILE *out;
   pw_workspace *w;       /* at the initial state */
   pw_sparsity *sparsity; /* batches */
@@ -224,6 +225,10 @@ static void specialise_signals (const specialise_scene *x) {
 
 /* ---- Linear algebra ---- */
 
+static int specialise_is_independent (const specialise_scene *x, int row) {
+  return x->independent == NULL || x->independent[row];
+}
+
 static pw_term specialise_entry (const specialise_scene *x, int k, int e, int r, int c) {
   const pw_element_batch *b = &x->s->batch[k];
   unsigned char type = x->sparsity[k].J[r * b->b.cols + c];
@@ -271,6 +276,7 @@ static int specialise_solve (const specialise_scene *x, const pw_elimination *m,
     int row = i - s->coords, force = row < 0 && what == SPECIALISE_ACCELERATE;
     right[i] = row >= 0 ? pw_term_named (PW_TERM_VARIABLE, "g", row, 1) : pw_term_zero ();
     if (force) right[i] = pw_term_named (PW_TERM_VARIABLE, "f", i, 1);
+    if (row >= 0 && !specialise_is_independent (x, row)) right[i] = pw_term_zero ();
     if (what == SPECIALISE_POSITION && row >= s->holonomic) right[i] = pw_term_zero ();
   }
   fprintf (x->out,
@@ -290,7 +296,7 @@ static int specialise_solve (const specialise_scene *x, const pw_elimination *m,
 static int specialise_factor (const specialise_scene *x, pw_elimination *m, pw_emitter *e, const pw_term *K,
                               const char *name, int rows) {
   unsigned char takes_part[SPECIALISE_ROWS + 1];
-  for (int i = 0; i < x->s->rows; i++) takes_part[i] = i < rows;
+  for (int i = 0; i < x->s->rows; i++) takes_part[i] = i < rows && specialise_is_independent (x, i);
   char *text = NULL;
   size_t size = 0;
   FILE *out = e->code = open_memstream (&text, &size);
@@ -346,9 +352,9 @@ static void specialise_constants (const specialise_scene *x) {
   const pw_system *s = x->s;
   fprintf (x->out,
            "\n/* ---- The scene ---- */\n\nenum { BODIES = %d, N = %d, ROWS = %d, HOLONOMIC = %d, INTERNAL = %d,\n"
-           "  ENTRIES = %d, LEDGER = %d, RHEONOMIC = %d, READERS = %d };\n",
-           s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, x->entries, s->entries,
-           s->rheonomic > 0, s->state_dependent > 0);
+           "  ENTRIES = %d, REDUNDANT = %d, LEDGER = %d, RHEONOMIC = %d, READERS = %d };\n",
+           s->bodies, s->coords, s->rows, s->holonomic, s->coords - 3 * s->bodies, x->entries, x->independent != NULL,
+           s->entries, s->rheonomic > 0, s->state_dependent > 0);
   fprintf (x->out, "\n#define INLINE static inline%s\n\n",
            s->rows <= SPECIALISE_INLINE ? " __attribute__ ((always_inline))" : "");
   for (int b = 0; b < s->bodies; b++) {
@@ -362,6 +368,9 @@ static void specialise_constants (const specialise_scene *x) {
     pw_emit_name (x->out, pw_system_reaction_name (s, i, name, sizeof name));
     fputs (" */\n", x->out);
   }
+  fputs ("\nstatic const unsigned char independent[] = { ", x->out);
+  for (int i = 0; i < s->rows; i++) fprintf (x->out, "%d, ", specialise_is_independent (x, i));
+  fputs ("0 };\n", x->out);
 }
 
 /* Factorisations and solutions; prepare's statements are collected. */
@@ -471,7 +480,7 @@ int pw_specialised_fits (const pw_specialised *code, const pw_system *s) {
   return code->abi == PW_SCENE_ABI && code->shape == pw_system_shape (s);
 }
 
-char *pw_system_source (const pw_system *s, pw_error *error) {
+char *pw_system_source (const pw_system *s, const unsigned char *independent, pw_error *error) {
   char *text = NULL;
   size_t size = 0;
   if (pw_require (s, "a system", error) != PW_OK) return NULL;
@@ -480,13 +489,13 @@ char *pw_system_source (const pw_system *s, pw_error *error) {
              SPECIALISE_ROWS);
     return NULL;
   }
-  specialise_scene x = { .s = s, .out = open_memstream (&text, &size) };
+  specialise_scene x = { .s = s, .independent = independent, .out = open_memstream (&text, &size) };
   int status = x.out ? specialise_open (&x) : PW_RESOURCE;
   if (status == PW_OK) status = specialise_write (&x);
   if (status == PW_OK) {
     fprintf (x.out,
              "\nPW_EXPORT const pw_specialised pw_specialised_scene = {\n"
-             "  PW_SCENE_ABI, %d, %luu, prepare, evaluate, project\n};\n",
+             "  PW_SCENE_ABI, %d, %luu, independent, prepare, evaluate, project\n};\n",
              x.constants + 1, pw_system_shape (s));
   }
   if (x.out && fclose (x.out) != 0) status = PW_RESOURCE;

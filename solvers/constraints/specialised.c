@@ -41,8 +41,17 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   r->scene = malloc (sizeof *r->scene);
   if (r->scene == NULL || specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
-  r->specialised = code->prepare (r->scene) == 0 && r->active == NULL ? code : NULL;
+  r->scene->follows = r->limits.follows;
+  r->scene_ready = code->prepare (r->scene) == 0;
+  pw_specialised_select (r);
   return PW_OK;
+}
+
+void pw_specialised_select (pw_run *r) {
+  const pw_specialised *code = r->settings.specialised;
+  int same = r->scene_ready;
+  for (int i = 0; same && i < r->s->rows; i++) same = code->independent[i] == (r->active == NULL || r->active[i]);
+  r->specialised = same ? code : NULL;
 }
 
 void pw_specialised_close (pw_run *r) {
@@ -52,8 +61,8 @@ void pw_specialised_close (pw_run *r) {
 
 /* 1 where the general engine has more to do than to evaluate. */
 static int specialised_is_unsuitable (pw_run *r) {
-  return r->specialised == NULL || r->active || (r->geometry.alert && r->geometry.saddle) || r->near || r->w->hold ||
-         r->alpha + r->beta > 0;
+  return r->specialised == NULL || r->least_norm || (r->geometry.alert && r->geometry.saddle) || r->near ||
+         r->w->hold || r->alpha + r->beta > 0;
 }
 
 static void specialised_evaluated (pw_run *r, const double *q, const double *v) {
@@ -88,6 +97,9 @@ int pw_specialised_project (const pw_projector *p, pw_run *r, double t, double *
   if (r->specialised->project (s, t, q, v, a, lambda, r->w->configuration, r->w->J)) return 0;
   specialised_evaluated (r, q, v);
   r->statistics.factorisations += s->iterations;
-  r->residuals = (pw_residuals){ .position = s->position, .g = s->g, .velocity = s->velocity, .jv = s->jv };
+  if (r->active)
+    pw_forget_residuals (r);
+  else
+    r->residuals = (pw_residuals){ .position = s->position, .g = s->g, .velocity = s->velocity, .jv = s->jv };
   return 1;
 }

@@ -22,6 +22,7 @@ int pw_run_open_saddle (pw_run *r, pw_error *error) {
   pw_saddle_close (r->saddle);
   r->saddle = pw_saddle_open (r->w, r->s->mass, r->s->rows, r->active, error);
   if (r->saddle == NULL) return error ? error->status : PW_RESOURCE;
+  pw_specialised_select (r);
   return pw_watchdog_open (r, error);
 }
 
@@ -62,6 +63,10 @@ void pw_run_reference_level (pw_run *r) {
 static void run_drop_method (pw_run *r) {
   if (r->data) r->method->close (r);
   r->data = NULL;
+}
+
+char *pw_run_source (const pw_run *r, pw_error *error) {
+  return pw_require (r, "a run", error) == PW_OK ? pw_system_source (r->s, r->active, error) : NULL;
 }
 
 void pw_run_close (pw_run *r) {

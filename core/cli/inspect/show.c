@@ -121,7 +121,7 @@ typedef struct {
 } show;
 
 static int show_code (const pw_cli_model *m, pw_error *error) {
-  char *text = pw_system_source (m->system, error);
+  char *text = pw_cli_source (m->system, error);
   if (text) fputs (text, stdout);
   free (text);
   return text ? PW_OK : error->status;

@@ -99,8 +99,7 @@ static int run_engine (run *x, pw_error *error) {
 /* Why the run does not use the code it has. */
 static const char *run_unspecialised (const run *x) {
   if (x->engine.code == NULL) return x->engine.why;
-  if (x->redundant) return "redundant constraints";
-  return pw_run_statistics (x->r)->specialised ? "" : "the method does not use specialised code";
+  return pw_run_statistics (x->r)->specialised ? "" : "the method, its options or redundant drives do not permit specialised code";
 }
 
 static int run_open (run *x, pw_error *error) {
@@ -123,8 +122,6 @@ static int run_open (run *x, pw_error *error) {
   pw_report_model (x->m.model);
   pw_report_settings (x->r, x->m.system, x->method, &x->line, &x->settings);
   pw_report_initialisation (x->r, x->m.system, x->redundant);
-  if (x->redundant && x->engine.code && x->engine.when == PW_SPECIALISE_ALWAYS)
-    pw_cli_say ("pinwheel: general engine: redundant constraints\n");
   if (x->output[PW_RUN_TABLE]) x->csv = pw_csv_open (x->m.system, x->energy, x->output[PW_RUN_TABLE], error);
   return x->output[PW_RUN_TABLE] && x->csv == NULL ? error->status : pw_checkpoints_resume (x, error);
 }

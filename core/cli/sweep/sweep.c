@@ -174,7 +174,7 @@ static void sweep_specialise (sweep *x, pw_sweep_system *s, pw_error *error) {
     s->code = first;
     return;
   }
-  char *text = pw_system_source (s->m.system, NULL);
+  char *text = pw_cli_source (s->m.system, NULL);
   if (text == NULL) return;
   pthread_mutex_lock (&x->lock);
   s->code = sweep_compile (x, text, s->m.system, &own);
