@@ -612,7 +612,7 @@ static inline int pw_kind_acts (const pw_kind *kind) {
 }
 
 /* 1 if its signals belong to a force: they may depend on states and need no time derivatives. */
-static inline int pw_kind_forced (const pw_kind *kind) {
+static inline int pw_kind_signals_force (const pw_kind *kind) {
   return kind->force_u != NULL;
 }
 

@@ -23,8 +23,8 @@ int pw_cli_apply (pw_model *m, const char *option, const char **list,
 }
 
 pw_file *pw_cli_file (const pw_cli_line *l, pw_error *error) {
-  const double most = PW_FILE_MOST >> 20;
-  double size = PW_FILE_LARGEST >> 20;
+  const double most = PW_FILE_MAX_BYTES >> 20;
+  double size = PW_FILE_DEFAULT_BYTES >> 20;
   if (pw_cli_number ("--max-file", l->max_file, PW_POSITIVE, &size, error) != PW_OK) return NULL;
   if (size <= most) return pw_file_open_limited (l->argument[0], (size_t)(size * (1 << 20)), error);
   pw_fail (error, PW_INPUT, "--max-file %s: expected at most %g MB", l->max_file, most);

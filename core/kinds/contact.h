@@ -39,12 +39,12 @@ static inline contact contact_make (const double at[2], double heading, double a
   return (contact){ a, b, at[0] * b - at[1] * a, { at[0], at[1] }, heading };
 }
 
-static inline contact_state contact_turn (const contact *k, const pw_configuration *A) {
+static inline contact_state contact_rotate (const contact *k, const pw_configuration *A) {
   return (contact_state){ k, A, NULL, A->cos * k->a - A->sin * k->b, A->sin * k->a + A->cos * k->b };
 }
 
 static inline contact_state contact_at (const pw_batch *b, int e) {
-  contact_state x = contact_turn ((const contact *)b->element + e, &b->configuration[b->body[e]]);
+  contact_state x = contact_rotate ((const contact *)b->element + e, &b->configuration[b->body[e]]);
   x.w = batch_w (b, e);
   return x;
 }

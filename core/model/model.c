@@ -155,10 +155,10 @@ int pw_add (pw_model *m, const pw_kind *kind, const void *definition) {
   const char **name = copy;
   *name = model_copy_text (m, *name);
   for (int i = 0; i < kind->bodies && !kind->each_body; i++) {
-    const char **body = pw_field_in (kind, copy, PW_BODY, i);
+    const char **body = pw_field_mutable (kind, copy, PW_BODY, i);
     *body = model_copy_text (m, *body);
   }
-  for (int i = 0; i < kind->signals; i++) model_copy_table (m, pw_field_in (kind, copy, PW_SIGNAL, i));
+  for (int i = 0; i < kind->signals; i++) model_copy_table (m, pw_field_mutable (kind, copy, PW_SIGNAL, i));
   m->element[m->elements++] = (pw_element){ kind, copy };
   return m->error.status;
 }

@@ -46,7 +46,7 @@ int pw_check_model (const pw_model *m, const pw_names *bodies, pw_error *error);
 const char *pw_kind_check (const pw_kind *kind, char *buffer, size_t size);
 
 /* As pw_field_at, for a definition that will be modified. */
-static inline void *pw_field_in (const pw_kind *kind, void *definition, pw_field_type type, int k) {
+static inline void *pw_field_mutable (const pw_kind *kind, void *definition, pw_field_type type, int k) {
   const char *at = pw_field_at (kind, definition, type, k);
   return at ? (char *)definition + (at - (const char *)definition) : NULL;
 }

@@ -76,7 +76,7 @@ static void scene_element (pw_model *m, const random_scene *x, int e) {
     for (int i = 0; i < pw_field_count (f); i++)
       scene_value (x->random, f, definition + f->offset + (size_t)i * pw_field_bytes (f->type));
   for (int n = 0; n < x->kind->bodies && !x->kind->each_body; n++)
-    *(const char **)pw_field_in (x->kind, definition, PW_BODY, n) = scene_body (x, e, n);
+    *(const char **)pw_field_mutable (x->kind, definition, PW_BODY, n) = scene_body (x, e, n);
   pw_add (m, x->kind, definition);
 }
 
@@ -104,13 +104,13 @@ static pw_system *scene_try (const pw_kind *kind, pw_random *random, pw_error *e
 }
 
 pw_system *pw_random_scene (const pw_kind *kind, pw_random *random, pw_error *error) {
-  pw_error why;
+  pw_error cause;
   for (int i = 0; i < 50; i++) { /* the type may reject inconsistent numbers */
-    why = (pw_error){ 0 };
-    pw_system *s = scene_try (kind, random, &why);
+    cause = (pw_error){ 0 };
+    pw_system *s = scene_try (kind, random, &cause);
     if (s) return s;
-    if (why.status != PW_INPUT) break;
+    if (cause.status != PW_INPUT) break;
   }
-  pw_fail (error, why.status, "%s", why.text);
+  pw_fail (error, cause.status, "%s", cause.text);
   return NULL;
 }

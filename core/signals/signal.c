@@ -36,35 +36,35 @@ static double signal_rise_breakpoint (const pw_signal *s, double t) {
 }
 
 /* The beginning of the pulse period that contains t, and of the next one, for t >= start. */
-static void signal_pulses (const pw_signal *s, double t, double *here, double *next) {
+static void signal_pulses (const pw_signal *s, double t, double *begin, double *next) {
   double start = s->pulse.start, period = s->pulse.period;
-  *here = start;
+  *begin = start;
   *next = INFINITY;
   if (period == 0) return;
   double k = floor ((t - start) / period);
   if (start + k * period > t) k--; /* the quotient was rounded */
   if (start + (k + 1) * period <= t) k++;
-  *here = start + k * period;
+  *begin = start + k * period;
   *next = start + (k + 1) * period;
 }
 
-static double signal_pulse_end (const pw_signal *s, double here) {
-  return s->pulse.width > 0 ? here + s->pulse.width : INFINITY;
+static double signal_pulse_end (const pw_signal *s, double begin) {
+  return s->pulse.width > 0 ? begin + s->pulse.width : INFINITY;
 }
 
 static void signal_pulse (const pw_signal *s, double t, double u[3]) {
-  double here, next;
+  double begin, next;
   u[0] = s->pulse.offset;
   if (t < s->pulse.start) return;
-  signal_pulses (s, t, &here, &next);
-  if (t < signal_pulse_end (s, here)) u[0] += s->pulse.height;
+  signal_pulses (s, t, &begin, &next);
+  if (t < signal_pulse_end (s, begin)) u[0] += s->pulse.height;
 }
 
 static double signal_pulse_breakpoint (const pw_signal *s, double t) {
-  double here, next;
+  double begin, next;
   if (t < s->pulse.start) return s->pulse.start;
-  signal_pulses (s, t, &here, &next);
-  double end = signal_pulse_end (s, here);
+  signal_pulses (s, t, &begin, &next);
+  double end = signal_pulse_end (s, begin);
   return t < end ? end : next > t ? next : INFINITY; /* next == t if the period is below the resolution of t */
 }
 

@@ -12,7 +12,7 @@ typedef struct {
   double *x;        /* 2 reads: values of these states, then the gradient */
   double *spline;   /* of a table, 2 count: first derivative at each point, then second (table.c) */
   double *u;        /* 3: destination of its values */
-  int forced;       /* 1: belongs to a force, which needs no derivatives */
+  int of_force;     /* 1: belongs to a force, which needs no derivatives */
 } pw_source;
 
 /* Value and, if `derivatives`, first and second time derivative at time t; the states a function reads are in

@@ -118,7 +118,7 @@ static int form_smoothness (const pw_signal *s, const char **what) {
 static void form_level (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
   const char *what;
   int smoothness = form_smoothness (s, &what);
-  if (pw_kind_forced (kind)) return;
+  if (pw_kind_signals_force (kind)) return;
   if (kind->level == PW_HOLONOMIC && smoothness < 1)
     snprintf (text, size,
               "%s has %s, and a prescribed position must not: use a smooth-step, a cubic table with ends at rest, a "
@@ -132,7 +132,7 @@ static void form_level (const pw_signal *s, const pw_kind *kind, char *text, siz
 static void form_function (const pw_signal *s, const pw_kind *kind, char *text, size_t size) {
   if (s->function.eval == NULL)
     snprintf (text, size, "a function signal without eval");
-  else if (s->function.reads && !pw_kind_forced (kind))
+  else if (s->function.reads && !pw_kind_signals_force (kind))
     snprintf (text, size, "a constraint's signal may depend on time only");
 }
 

@@ -212,10 +212,10 @@ static void specialise_signals (const specialise_scene *x) {
     for (int i = 0; i < s->sources; i++) {
       if (s->source[i].signal.type == PW_CONSTANT) {
         fprintf (x->out, "  s->u[%d] = s->signal[%d]->constant;\n", 3 * i, i);
-        if (!s->source[i].forced) fprintf (x->out, "  s->u[%d] = s->u[%d] = 0;\n", 3 * i + 1, 3 * i + 2);
+        if (!s->source[i].of_force) fprintf (x->out, "  s->u[%d] = s->u[%d] = 0;\n", 3 * i + 1, 3 * i + 2);
       } else
         fprintf (x->out, "  if (harmonic (&s->signal[%d]->harmonic, t, %d, s->u + %d)) return 1;\n", i,
-                 !s->source[i].forced, 3 * i);
+                 !s->source[i].of_force, 3 * i);
     }
     fputs ("  *s->t_signal = t;\n  return 0;\n", x->out);
   } else
@@ -469,7 +469,7 @@ unsigned long pw_system_shape (const pw_system *s) {
     specialise_hash (&h, sizes, sizeof sizes);
   }
   for (int i = 0; i < s->sources; i++)
-    specialise_hash (&h, (int[]){ (int)s->source[i].signal.type, s->source[i].forced, s->source[i].reads },
+    specialise_hash (&h, (int[]){ (int)s->source[i].signal.type, s->source[i].of_force, s->source[i].reads },
                      3 * sizeof (int));
   for (int i = 0; i < s->entries; i++)
     specialise_hash (&h, (int[]){ s->entry[i].batch, s->entry[i].element, (int)s->entry[i].type }, 3 * sizeof (int));

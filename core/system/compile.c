@@ -316,7 +316,7 @@ static int compile_signals (const compilation *c) {
       int e = next[c->batch_of[n]]++;
       for (int u = 0; u < k->kind->signals; u++) {
         pw_source *source = &k->source[e * k->kind->signals + u];
-        source->forced = pw_kind_forced (k->kind);
+        source->of_force = pw_kind_signals_force (k->kind);
         if (compile_source (c, source, pw_field_at (k->kind, from->definition, PW_SIGNAL, u), k->name[e]) != PW_OK)
           return PW_INPUT;
       }

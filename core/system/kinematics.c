@@ -17,7 +17,7 @@ void pw_point_to_internal (pw_workspace *w, const double *q, const double *v) {
 static inline void kinematics_configurations (pw_workspace *w, const double *q, const double *v) {
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, q, v);
   pw_configuration *p = w->configuration, *end = p + w->s->bodies;
-  _Static_assert(PW_SINE_LANES == 2, "bodies are taken in pairs");
+  _Static_assert(PW_SINE_LANES == 2, "bodies are evaluated in pairs");
   for (; p + 1 < end; p += 2, q += 6, v += 6) {
     pw_lanes c, s;
     if (!(fabs (q[2]) < PW_SINE_LIMIT && fabs (q[5]) < PW_SINE_LIMIT)) break;
@@ -33,7 +33,7 @@ static inline void kinematics_configurations (pw_workspace *w, const double *q, 
 }
 
 /* Copies the states a function reads; q NULL: only velocities.  Returns the number of states copied. */
-static int kinematics_reads (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
+static int kinematics_copy_states (const pw_workspace *w, const pw_source *source, const double *q, const double *v) {
   int copied = 0;
   for (int r = 0; r < source->reads; r++) {
     int j = source->state[r], velocity = j >= w->s->coords;
@@ -46,25 +46,26 @@ static int kinematics_reads (const pw_workspace *w, const pw_source *source, con
 
 /* Evaluates the state-dependent signals (q NULL: only those that read velocities), or those that depend only on
  * time. */
-PW_INLINE int kinematics_sources (pw_workspace *w, int state_dependent, double t, const double *q, const double *v) {
+PW_INLINE int kinematics_evaluate_signals (pw_workspace *w, int state_dependent, double t, const double *q,
+                                           const double *v) {
   for (pw_source *i = w->source, *end = i + w->s->sources; i < end; i++) {
-    if ((i->reads > 0) != state_dependent || (w->hold && i->forced)) continue;
-    if (state_dependent && kinematics_reads (w, i, q, v) == 0) continue;
-    if (pw_signal_eval (i, t, !i->forced, i->u) == 0) continue;
+    if ((i->reads > 0) != state_dependent || (w->hold && i->of_force)) continue;
+    if (state_dependent && kinematics_copy_states (w, i, q, v) == 0) continue;
+    if (pw_signal_eval (i, t, !i->of_force, i->u) == 0) continue;
     w->failed = i;
     return PW_METHOD;
   }
   return PW_OK;
 }
 
-/* Signals of time only are evaluated once per time; stages at the same time share them. */
+/* Signals that depend on time only are evaluated once per time, also for several stages. */
 int pw_update_signals (pw_workspace *w, double t, const double *q, const double *v) {
   if (t != w->t_signal) {
-    w->t_signal = NAN; /* in case of failure, some have changed */
-    if (kinematics_sources (w, 0, t, q, v) != PW_OK) return PW_METHOD;
+    w->t_signal = NAN; /* if a signal fails, others have changed already */
+    if (kinematics_evaluate_signals (w, 0, t, q, v) != PW_OK) return PW_METHOD;
     w->t_signal = t;
   }
-  return w->s->state_dependent > 0 ? kinematics_sources (w, 1, t, q, v) : PW_OK;
+  return w->s->state_dependent > 0 ? kinematics_evaluate_signals (w, 1, t, q, v) : PW_OK;
 }
 
 int pw_update_kinematics (pw_workspace *w, double t, const double *q, const double *v) {
@@ -80,7 +81,7 @@ int pw_update_velocities (pw_workspace *w, const double *v) {
     p->omega = from[2];
   }
   if (w->s->coords > 3 * w->s->bodies) pw_point_to_internal (w, NULL, v);
-  return w->s->state_dependent > 0 ? kinematics_sources (w, 1, w->t_signal, NULL, v) : PW_OK;
+  return w->s->state_dependent > 0 ? kinematics_evaluate_signals (w, 1, w->t_signal, NULL, v) : PW_OK;
 }
 
 void pw_hold_signals (pw_workspace *w, int hold) {
@@ -91,7 +92,7 @@ void pw_hold_signals (pw_workspace *w, int hold) {
 double pw_next_breakpoint (pw_workspace *w, int knots, double t) {
   double next = INFINITY;
   for (const pw_source *i = w->source, *end = i + w->s->sources; i < end; i++) {
-    double breakpoint = pw_signal_breakpoint (&i->signal, knots && !i->forced, t);
+    double breakpoint = pw_signal_breakpoint (&i->signal, knots && !i->of_force, t);
     if (breakpoint < next) next = breakpoint;
     if (breakpoint > t) continue;
     w->failed = i;

@@ -53,7 +53,7 @@ const double *pw_system_initial_v (const pw_system *s) {
 int pw_system_jumps (const pw_system *s, double t) {
   double near = 8 * DBL_EPSILON * fabs (t);
   for (const pw_source *i = s->source, *end = i + s->sources; i < end; i++)
-    if (!i->forced || i->signal.type == PW_PULSE || i->signal.type == PW_FUNCTION)
+    if (!i->of_force || i->signal.type == PW_PULSE || i->signal.type == PW_FUNCTION)
       if (pw_signal_breakpoint (&i->signal, 0, t - near) <= t + near) return 1;
   return 0;
 }

@@ -13,7 +13,7 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error) {
   if (status == PW_OK || error == NULL || *pw_failed_signal (r->w, signal, sizeof signal) == 0) return status;
   size_t n = strlen (error->text);
   const char *glue = strstr (error->text, "a signal failed") ? ":" : "; ahead";
-  const char *either = r->w->failed->forced ? "" : ", or a derivative of it,";
+  const char *either = r->w->failed->of_force ? "" : ", or a derivative of it,";
   snprintf (error->text + n, sizeof error->text - n, "%s %s%s is not a finite number", glue, signal, either);
   return status;
 }

@@ -207,7 +207,7 @@ static void test_found_twice (void **state) {
   cli_expand ("@/two/twin.so", two, sizeof two);
   assert_non_null (strstr (cli_err, one));
   assert_non_null (strstr (cli_err, two));
-  assert_non_null (strstr (cli_err, "two files answer to the model \"twin\": "));
+  assert_non_null (strstr (cli_err, "two files match the model \"twin\": "));
   cli_good ("PINWHEEL_MODELS=@/one pinwheel run twin --t-end 0.1 --json -");
   assert_true (cli_says (cli_out, "model", "twin"));
 }

@@ -123,12 +123,12 @@ static void test_size (void **state) {
   assert_int_equal (truncate (bad_path, (64L << 20) + 1), 0);
   pw_error error = bad_open (bad_path);
   snprintf (expected, sizeof expected,
-            "%s: the file has more than 64 MB, the most a model may have unless --max-file says more", bad_path);
+            "%s: the file has more than 64 MB, the limit for a model unless --max-file raises it", bad_path);
   check_error (&error, PW_INPUT, expected);
   error = (pw_error){ 0 };
   assert_null (pw_file_open_limited (bad_path, 1 << 19, &error));
   snprintf (expected, sizeof expected,
-            "%s: the file has more than 0.5 MB, the most a model may have unless --max-file says more", bad_path);
+            "%s: the file has more than 0.5 MB, the limit for a model unless --max-file raises it", bad_path);
   check_error (&error, PW_INPUT, expected);
 }
 

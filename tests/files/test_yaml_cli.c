@@ -113,7 +113,7 @@ static void test_max_file (void **state) {
   (void)state;
   cli_good ("{ cat " TEXT "; yes '# nothing' | head -c 300000; } >@/long.yaml");
   cli_bad ("pinwheel show @/long.yaml --max-file 0.25", 2,
-           "@/long.yaml: the file has more than 0.25 MB, the most a model may have unless --max-file says more");
+           "@/long.yaml: the file has more than 0.25 MB, the limit for a model unless --max-file raises it");
   cli_good ("pinwheel show @/long.yaml --max-file 0.5 >/dev/null");
   cli_bad ("pinwheel run @/long.yaml --max-file 1e4", 2, "--max-file 1e4: expected at most 2000 MB");
   cli_bad ("pinwheel sweep @/long.yaml --max-file x --vary a=1,2 -o @/x.csv", 2, "--max-file: \"x\" is not a number");
@@ -126,7 +126,7 @@ static void test_names (void **state) {
   assert_int_equal (cli_run ("cp ${BUILD:-build}/models/ezyroller.so @/models/roller.so && "
                              "PINWHEEL_MODELS=@/models pinwheel show roller"),
                     2);
-  assert_non_null (strstr (cli_err, "two files answer to the model \"roller\": "));
+  assert_non_null (strstr (cli_err, "two files match the model \"roller\": "));
   assert_non_null (strstr (cli_err, "/models/roller.so and "));
   assert_non_null (strstr (cli_err, "/models/roller.yaml; name one of them by its path\n"));
 }

@@ -268,7 +268,7 @@ static void test_limits (void **state) {
   (void)state;
   table_write ("model/large.csv", "0,1\n", 4);
   assert_int_equal (truncate (table_in ("model/large.csv"), (64L << 20) + 1), 0);
-  table_bad ("{file: large.csv}", "large.csv: the file has more than 64 MB, the most a table may have");
+  table_bad ("{file: large.csv}", "large.csv: the file has more than 64 MB, the limit for a table");
   FILE *f = fopen (table_in ("model/long.csv"), "w");
   assert_non_null (f);
   for (int i = 0; i < 1000001; i++) fputs ("1\n", f);

@@ -167,7 +167,7 @@ static void list_kind (const void *item) {
   for (pw_table t = { 0 }; pw_table_pass (&t);) list_fields (&t, k->fields);
   if (k->signals)
     printf ("    a signal: a number, an expression of t%s, or see `pinwheel list signals`\n",
-            pw_kind_forced (k) ? " and of states such as BODY.phi" : "");
+            pw_kind_signals_force (k) ? " and of states such as BODY.phi" : "");
   list_quantities ("reactions", k->reaction, k->rows);
   list_quantities ("internal coordinates, and their velocities", k->coordinate, k->internal);
 }

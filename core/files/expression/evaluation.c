@@ -99,8 +99,8 @@ typedef struct {
   int on; /* 1: depends on the variable */
 } jet;
 
-/* Operands independent of the variable contribute nothing, even with an infinite slope. */
-static jet jet_chain (double f, const pw_slopes *s, const jet *x, const jet *y) {
+/* Operands independent of the variable contribute nothing, even with an infinite derivative. */
+static jet jet_chain (double f, const pw_partials *s, const jet *x, const jet *y) {
   jet r = { f, 0, 0, x->on | y->on };
   if (x->on) r.d += s->x * x->d, r.dd += s->xx * x->d * x->d + s->x * x->dd;
   if (y->on) r.d += s->y * y->d, r.dd += s->yy * y->d * y->d + s->y * y->dd;
@@ -122,15 +122,15 @@ static int jet_order (const jet *x, const jet *y) {
   return jet_sign (&less);
 }
 
-/* floor, ceil, round just after the current time; `way`: sign of the change. */
-static double jet_step (int op, double x, int way) {
+/* floor, ceil, round just after the current time; `direction`: sign of the change. */
+static double jet_step (int op, double x, int direction) {
   double low = floor (x);
-  if (op == PW_OP_FLOOR) return x == low && way < 0 ? low - 1 : low;
-  if (op == PW_OP_CEIL) return x == low ? low + (way > 0) : ceil (x);
-  return x - low == 0.5 && way != 0 ? low + (way > 0) : round (x);
+  if (op == PW_OP_FLOOR) return x == low && direction < 0 ? low - 1 : low;
+  if (op == PW_OP_CEIL) return x == low ? low + (direction > 0) : ceil (x);
+  return x - low == 0.5 && direction != 0 ? low + (direction > 0) : round (x);
 }
 
-static jet jet_broken (int op, const jet *x, double *discrete) {
+static jet jet_discontinuous (int op, const jet *x, double *discrete) {
   const jet change = { 0, x->d, x->dd, x->on };
   int sign = jet_sign (x);
   *discrete = op == PW_OP_ABS || op == PW_OP_SIGN ? sign : jet_step (op, x->v, jet_sign (&change));
@@ -162,10 +162,10 @@ static jet jet_one (const pw_expression_code *c, const jet *x, double *discrete)
     if (c->op == PW_OP_TAN) *discrete = floor (x->v / PW_PI + 0.5);
     const pw_expression_function *f = &pw_expression_functions[c->which];
     double value = f->one (x->v);
-    pw_slopes s = f->slopes (x->v, 0, value);
+    pw_partials s = f->partials (x->v, 0, value);
     return jet_chain (value, &s, x, &none);
   }
-  return jet_broken (c->op, x, discrete);
+  return jet_discontinuous (c->op, x, discrete);
 }
 
 static jet jet_product (const jet *x, const jet *y) {
@@ -182,7 +182,7 @@ static jet jet_function (const pw_expression_code *c, const jet *x, const jet *y
   const pw_expression_function *f = &pw_expression_functions[c->which];
   int power = c->op == PW_OP_POWER;
   double value = power ? pw_expression_power (x->v, y->v) : f->two (x->v, y->v);
-  pw_slopes s = power ? pw_expression_power_slopes (x->v, y->v, value, y->on) : f->slopes (x->v, y->v, value);
+  pw_partials s = power ? pw_expression_power_partials (x->v, y->v, value, y->on) : f->partials (x->v, y->v, value);
   return jet_chain (value, &s, x, y);
 }
 

@@ -75,7 +75,7 @@ double pw_expression_breakpoint (const pw_expression *x, double t);
 /* Whether a text can be a name: a letter or _, then letters, digits and _; neither a function nor a constant. */
 int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
-int pw_expression_is_taken (const char *text);
+int pw_expression_is_reserved (const char *text);
 
 /* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns that.
  * */

@@ -67,10 +67,10 @@ static inline int pw_expression_compare (int op, int order) {
 /* First and second partial derivatives of f (x, y). */
 typedef struct {
   double x, y, xx, xy, yy;
-} pw_slopes;
+} pw_partials;
 
 /* Monotonicity of a function of one argument, for interval arithmetic. */
-typedef enum { PW_RISES, PW_FALLS, PW_OTHERWISE } pw_trend;
+typedef enum { PW_INCREASING, PW_DECREASING, PW_NOT_MONOTONIC } pw_trend;
 
 typedef struct {
   const char *name;
@@ -78,7 +78,7 @@ typedef struct {
   short least, most; /* arguments; most = 0: any number */
   double (*one) (double);
   double (*two) (double, double);
-  pw_slopes (*slopes) (double x, double y, double f);
+  pw_partials (*partials) (double x, double y, double f);
   pw_trend trend;
   double from, to; /* domain of a function of one argument, NaN outside */
 } pw_expression_function;
@@ -112,7 +112,7 @@ struct pw_scope {
 
 /* x^y and its derivatives, with respect to x alone unless y varies. */
 double pw_expression_power (double x, double y);
-pw_slopes pw_expression_power_slopes (double x, double y, double f, int varies);
+pw_partials pw_expression_power_partials (double x, double y, double f, int varies);
 /* The remainder with the sign of the divisor: an angle modulo 2 pi lies in [0, 2 pi). */
 double pw_expression_mod (double x, double y);
 

@@ -8,14 +8,14 @@
 
 /* ---- Functions of one argument: f', f'' ---- */
 
-static pw_slopes slopes_of_one (double first, double second) {
-  return (pw_slopes){ .x = first, .xx = second };
+static pw_partials partials_of_one (double first, double second) {
+  return (pw_partials){ .x = first, .xx = second };
 }
 
-#define ONE(name, first, second)                                  \
-  static pw_slopes slopes_##name (double x, double y, double f) { \
-    (void)x, (void)y, (void)f;                                    \
-    return slopes_of_one (first, second);                         \
+#define ONE(name, first, second)                                      \
+  static pw_partials partials_##name (double x, double y, double f) { \
+    (void)x, (void)y, (void)f;                                        \
+    return partials_of_one (first, second);                           \
   }
 
 ONE (sin, pw_cos (x), -f)
@@ -34,15 +34,15 @@ ONE (sqrt, 0.5 / f, -0.25 / (f * x))
 
 /* ---- Functions of two arguments ---- */
 
-static pw_slopes slopes_atan2 (double y, double x, double f) {
+static pw_partials partials_atan2 (double y, double x, double f) {
   double r = x * x + y * y;
   (void)f;
-  return (pw_slopes){ x / r, -y / r, -2 * x * y / (r * r), (y * y - x * x) / (r * r), 2 * x * y / (r * r) };
+  return (pw_partials){ x / r, -y / r, -2 * x * y / (r * r), (y * y - x * x) / (r * r), 2 * x * y / (r * r) };
 }
 
-static pw_slopes slopes_hypot (double x, double y, double f) {
+static pw_partials partials_hypot (double x, double y, double f) {
   double c = x / f, s = y / f;
-  return (pw_slopes){ c, s, s * s / f, -c * s / f, c * c / f };
+  return (pw_partials){ c, s, s * s / f, -c * s / f, c * c / f };
 }
 
 double pw_expression_power (double x, double y) {
@@ -50,18 +50,18 @@ double pw_expression_power (double x, double y) {
 }
 
 /* 0 if a is 0, even if b is infinite. */
-static double slopes_product (double a, double b) {
+static double partials_product (double a, double b) {
   return a == 0 ? 0 : a * b;
 }
 
-pw_slopes pw_expression_power_slopes (double x, double y, double f, int varies) {
-  pw_slopes s = { .x = slopes_product (y, pw_expression_power (x, y - 1)),
-                  .xx = slopes_product (y * (y - 1), pw_expression_power (x, y - 2)) };
+pw_partials pw_expression_power_partials (double x, double y, double f, int varies) {
+  pw_partials s = { .x = partials_product (y, pw_expression_power (x, y - 1)),
+                    .xx = partials_product (y * (y - 1), pw_expression_power (x, y - 2)) };
   if (!varies) return s;
   double l = log (x);
-  s.y = slopes_product (f, l);
-  s.xy = slopes_product (s.x, l) + pow (x, y - 1);
-  s.yy = slopes_product (f, l * l);
+  s.y = partials_product (f, l);
+  s.xy = partials_product (s.x, l) + pow (x, y - 1);
+  s.yy = partials_product (f, l * l);
   return s;
 }
 
@@ -79,15 +79,15 @@ double pw_expression_mod (double x, double y) {
  *   N = E (phi) - (1 - m) u = m (u (1/2 - R) + sum of c_n / m sin phi_n)
  *   d am/du = dn,   d am/dm = -dn (N / m - sin cos / dn) / (2 (1 - m)) */
 
-enum { SLOPES_MEANS = 12 };
+enum { MAX_MEANS = 12 };
 
 /* Computes the mean *a, ratio = c_n / a_n, part = c_n / m and R; returns the number of steps. */
-static int slopes_mean (double m, double *a, double ratio[SLOPES_MEANS], double part[SLOPES_MEANS], double *R) {
+static int partials_mean (double m, double *a, double ratio[MAX_MEANS], double part[MAX_MEANS], double *R) {
   double b = sqrt (1 - m), c = m, p = 1, power = 1;
   int n = 0;
   *a = 1;
   *R = 0;
-  while (n == 0 || (n < SLOPES_MEANS && fabs (*a - b) > 4 * DBL_EPSILON * *a)) {
+  while (n == 0 || (n < MAX_MEANS && fabs (*a - b) > 4 * DBL_EPSILON * *a)) {
     double mean = (*a + b) / 2;
     p = n == 0 ? 1 / (2 * (1 + b)) : c * p / (4 * mean);
     c = m * p;
@@ -102,7 +102,7 @@ static int slopes_mean (double m, double *a, double ratio[SLOPES_MEANS], double 
 }
 
 /* The second derivative of K by its series, for small m, where the formula above cancels. */
-static double slopes_K_series (double m) {
+static double partials_K_series (double m) {
   double term = 1, sum = 0, power = 1;
   for (int n = 1; n < 40; n++) {
     double k = (2.0 * n - 1) / (2.0 * n);
@@ -112,18 +112,19 @@ static double slopes_K_series (double m) {
   return PW_PI / 2 * sum;
 }
 
-static pw_slopes slopes_elliptic_K (double m, double y, double K) {
-  double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS];
+static pw_partials partials_elliptic_K (double m, double y, double K) {
+  double a, R, ratio[MAX_MEANS], part[MAX_MEANS];
   (void)y;
-  slopes_mean (m, &a, ratio, part, &R);
+  partials_mean (m, &a, ratio, part, &R);
   double first = K * (0.5 - R) / (2 * (1 - m));
-  return slopes_of_one (first, fabs (m) < 0.2 ? slopes_K_series (m) : (K / 4 - (1 - 2 * m) * first) / (m * (1 - m)));
+  return partials_of_one (first,
+                          fabs (m) < 0.2 ? partials_K_series (m) : (K / 4 - (1 - 2 * m) * first) / (m * (1 - m)));
 }
 
 /* With constant u, d (N/m)/dm = (dn d am/dm + u/2 - N / (2 m)) / m. */
-static pw_slopes slopes_jacobi_am (double u, double m, double phi) {
-  double a, R, ratio[SLOPES_MEANS], part[SLOPES_MEANS], s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
-  int n = slopes_mean (m, &a, ratio, part, &R);
+static pw_partials partials_jacobi_am (double u, double m, double phi) {
+  double a, R, ratio[MAX_MEANS], part[MAX_MEANS], s = pw_sin (phi), c = pw_cos (phi), dn = sqrt (1 - m * s * s);
+  int n = partials_mean (m, &a, ratio, part, &R);
   double N = u * (0.5 - R), angle = ldexp (a * u, n), rest = 1 - m;
   for (; n > 0; n--) {
     N += part[n - 1] * pw_sin (angle);
@@ -133,44 +134,44 @@ static pw_slopes slopes_jacobi_am (double u, double m, double phi) {
   double dn_m = -(s * s + 2 * m * s * c * by_m) / (2 * dn), N_m = (dn * by_m + u / 2 - N / 2) / m;
   double sc_m = ((c * c - s * s) * by_m - s * c * dn_m / dn) / dn;
   double F_m = (N_m - sc_m) / (2 * rest) + F / rest;
-  return (pw_slopes){ dn, by_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
+  return (pw_partials){ dn, by_m, -m * s * c, dn_m, -(dn_m * F + dn * F_m) };
 }
 
 /* ---- List of functions and constants ---- */
 
 #define FUNCTION_OF_ONE(name, f, trend, from, to) \
-  { #name, PW_OP_ONE, 1, 1, f, NULL, slopes_##name, trend, from, to }
+  { #name, PW_OP_ONE, 1, 1, f, NULL, partials_##name, trend, from, to }
 #define FUNCTION_OF_TWO(name, op, f) \
-  { #name, op, 2, 2, NULL, f, slopes_##name, PW_OTHERWISE, 0, 0 }
-#define FUNCTION_THAT_BREAKS(name, op, least, most) \
-  { #name, op, least, most, NULL, NULL, NULL, PW_OTHERWISE, 0, 0 }
+  { #name, op, 2, 2, NULL, f, partials_##name, PW_NOT_MONOTONIC, 0, 0 }
+#define FUNCTION_WITH_BREAKPOINTS(name, op, least, most) \
+  { #name, op, least, most, NULL, NULL, NULL, PW_NOT_MONOTONIC, 0, 0 }
 
 const pw_expression_function pw_expression_functions[] = {
-  FUNCTION_OF_ONE (sin, pw_sin, PW_OTHERWISE, -DBL_MAX, DBL_MAX),
-  FUNCTION_OF_ONE (cos, pw_cos, PW_OTHERWISE, -DBL_MAX, DBL_MAX),
-  { "tan", PW_OP_TAN, 1, 1, tan, NULL, slopes_tan, PW_OTHERWISE, -DBL_MAX, DBL_MAX },
-  FUNCTION_OF_ONE (asin, asin, PW_RISES, -1, 1),
-  FUNCTION_OF_ONE (acos, acos, PW_FALLS, -1, 1),
-  FUNCTION_OF_ONE (atan, atan, PW_RISES, -INFINITY, INFINITY),
-  FUNCTION_OF_ONE (sinh, sinh, PW_RISES, -INFINITY, INFINITY),
-  FUNCTION_OF_ONE (cosh, cosh, PW_OTHERWISE, -INFINITY, INFINITY),
-  FUNCTION_OF_ONE (tanh, tanh, PW_RISES, -INFINITY, INFINITY),
-  FUNCTION_OF_ONE (exp, exp, PW_RISES, -INFINITY, INFINITY),
-  FUNCTION_OF_ONE (log, log, PW_RISES, 0, INFINITY),
-  FUNCTION_OF_ONE (log10, log10, PW_RISES, 0, INFINITY),
-  FUNCTION_OF_ONE (sqrt, sqrt, PW_RISES, 0, INFINITY),
-  FUNCTION_THAT_BREAKS (abs, PW_OP_ABS, 1, 1),
-  FUNCTION_THAT_BREAKS (floor, PW_OP_FLOOR, 1, 1),
-  FUNCTION_THAT_BREAKS (ceil, PW_OP_CEIL, 1, 1),
-  FUNCTION_THAT_BREAKS (round, PW_OP_ROUND, 1, 1),
-  FUNCTION_THAT_BREAKS (sign, PW_OP_SIGN, 1, 1),
+  FUNCTION_OF_ONE (sin, pw_sin, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX),
+  FUNCTION_OF_ONE (cos, pw_cos, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX),
+  { "tan", PW_OP_TAN, 1, 1, tan, NULL, partials_tan, PW_NOT_MONOTONIC, -DBL_MAX, DBL_MAX },
+  FUNCTION_OF_ONE (asin, asin, PW_INCREASING, -1, 1),
+  FUNCTION_OF_ONE (acos, acos, PW_DECREASING, -1, 1),
+  FUNCTION_OF_ONE (atan, atan, PW_INCREASING, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (sinh, sinh, PW_INCREASING, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (cosh, cosh, PW_NOT_MONOTONIC, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (tanh, tanh, PW_INCREASING, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (exp, exp, PW_INCREASING, -INFINITY, INFINITY),
+  FUNCTION_OF_ONE (log, log, PW_INCREASING, 0, INFINITY),
+  FUNCTION_OF_ONE (log10, log10, PW_INCREASING, 0, INFINITY),
+  FUNCTION_OF_ONE (sqrt, sqrt, PW_INCREASING, 0, INFINITY),
+  FUNCTION_WITH_BREAKPOINTS (abs, PW_OP_ABS, 1, 1),
+  FUNCTION_WITH_BREAKPOINTS (floor, PW_OP_FLOOR, 1, 1),
+  FUNCTION_WITH_BREAKPOINTS (ceil, PW_OP_CEIL, 1, 1),
+  FUNCTION_WITH_BREAKPOINTS (round, PW_OP_ROUND, 1, 1),
+  FUNCTION_WITH_BREAKPOINTS (sign, PW_OP_SIGN, 1, 1),
   FUNCTION_OF_TWO (atan2, PW_OP_ATAN2, atan2),
   FUNCTION_OF_TWO (hypot, PW_OP_TWO, hypot),
   FUNCTION_OF_TWO (jacobi_am, PW_OP_TWO, pw_jacobi_am),
-  FUNCTION_OF_ONE (elliptic_K, pw_elliptic_K, PW_RISES, -INFINITY, 1),
-  FUNCTION_THAT_BREAKS (mod, PW_OP_MOD, 2, 2),
-  FUNCTION_THAT_BREAKS (min, PW_OP_MIN, 1, 0),
-  FUNCTION_THAT_BREAKS (max, PW_OP_MAX, 1, 0),
+  FUNCTION_OF_ONE (elliptic_K, pw_elliptic_K, PW_INCREASING, -INFINITY, 1),
+  FUNCTION_WITH_BREAKPOINTS (mod, PW_OP_MOD, 2, 2),
+  FUNCTION_WITH_BREAKPOINTS (min, PW_OP_MIN, 1, 0),
+  FUNCTION_WITH_BREAKPOINTS (max, PW_OP_MAX, 1, 0),
   { .name = NULL },
 };
 

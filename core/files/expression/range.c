@@ -104,8 +104,8 @@ static pw_range range_monotonic (const pw_expression_function *f, const pw_range
   if (f->one == pw_cos) return range_sin (x->lo, x->hi, PW_PI / 2);
   if (f->one == cosh) return range_even (x, cosh);
   if (f->one == tan) return range_tan (x);
-  return f->trend == PW_RISES ? range_rounded (f->one (x->lo), f->one (x->hi))
-                              : range_rounded (f->one (x->hi), f->one (x->lo));
+  return f->trend == PW_INCREASING ? range_rounded (f->one (x->lo), f->one (x->hi))
+                                   : range_rounded (f->one (x->hi), f->one (x->lo));
 }
 
 /* NaN outside the domain. */

@@ -9,7 +9,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { CACHE_LARGEST = 64 << 20, CACHE_FILES = 4096 }; /* bytes, files */
+enum { CACHE_MAX_BYTES = 64 << 20, CACHE_MAX_FILES = 4096 }; /* bytes, files */
 
 /* $XDG_CACHE_HOME or $HOME/.cache, malloced; NULL if neither is an absolute path. */
 static char *cache_parent (void) {
@@ -29,13 +29,13 @@ static void cache_make (char *path) {
 }
 
 /* NULL if only the user, or the system, can replace the folder's entries; else what is wrong with it. */
-static const char *cache_defect (const char *path, int own) {
+static const char *cache_defect (const char *path, int is_cache) {
   struct stat info;
-  if ((own ? lstat : stat) (path, &info) != 0) return strerror (errno);
+  if ((is_cache ? lstat : stat) (path, &info) != 0) return strerror (errno);
   if (!S_ISDIR (info.st_mode)) return "it is not a folder";
-  if (info.st_uid != geteuid () && (own || info.st_uid != 0)) return "it belongs to another user";
-  if (info.st_mode & 022 && (own || !(info.st_mode & S_ISVTX))) return "others can write to it";
-  return own && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;
+  if (info.st_uid != geteuid () && (is_cache || info.st_uid != 0)) return "it belongs to another user";
+  if (info.st_mode & 022 && (is_cache || !(info.st_mode & S_ISVTX))) return "others can write to it";
+  return is_cache && access (path, R_OK | W_OK | X_OK) != 0 ? strerror (errno) : NULL;
 }
 
 char *pw_cache_folder (char *notice, size_t size) {
@@ -69,7 +69,7 @@ static int cache_order (const void *a, const void *b) {
 static int cache_list (const char *folder, cache_file *file) {
   int count = 0;
   DIR *dir = opendir (folder);
-  for (struct dirent *e; dir && count < CACHE_FILES && (e = readdir (dir)) != NULL;) {
+  for (struct dirent *e; dir && count < CACHE_MAX_FILES && (e = readdir (dir)) != NULL;) {
     struct stat info;
     char *path =
         e->d_name[0] == '.' || strlen (e->d_name) >= sizeof file->name ? NULL : pw_path_join (folder, e->d_name, "");
@@ -84,12 +84,12 @@ static int cache_list (const char *folder, cache_file *file) {
 }
 
 void pw_cache_trim (const char *folder) {
-  cache_file *file = malloc (CACHE_FILES * sizeof *file);
+  cache_file *file = malloc (CACHE_MAX_FILES * sizeof *file);
   long long sum = 0;
-  int count = file ? cache_list (folder, file) : 0, over = count == CACHE_FILES;
+  int count = file ? cache_list (folder, file) : 0, over = count == CACHE_MAX_FILES;
   if (count) qsort (file, (size_t)count, sizeof *file, cache_order);
   for (int i = 0; i < count; i++) sum += file[i].size;
-  for (int i = 0; i < count && (sum > CACHE_LARGEST || (over && i < CACHE_FILES / 2)); i++) {
+  for (int i = 0; i < count && (sum > CACHE_MAX_BYTES || (over && i < CACHE_MAX_FILES / 2)); i++) {
     char *path = pw_path_join (folder, file[i].name, "");
     if (path) unlink (path);
     sum -= file[i].size;

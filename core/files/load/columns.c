@@ -9,7 +9,7 @@
 #include <string.h>
 #include "files.h"
 
-enum { COLUMNS_LARGEST = 64 << 20, COLUMNS_MOST = 1000000 }; /* bytes; lines of numbers */
+enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MOST = 1000000 }; /* bytes; lines of numbers */
 
 typedef struct {
   const char *shown; /* path for messages */
@@ -158,7 +158,7 @@ int pw_columns_read (FILE *f, const char *shown, const char *const column[2], co
   char *text;
   size_t size;
   *count = 0;
-  int status = pw_read_rest (f, COLUMNS_LARGEST, shown, "the most a table may have", &text, &size, error);
+  int status = pw_read_rest (f, COLUMNS_MAX_BYTES, shown, "the limit for a table", &text, &size, error);
   columns c = { .shown = shown, .rest = text, .error = error };
   if (status == PW_OK && strlen (text) != size)
     status = pw_fail (error, PW_INPUT, "%.80s: a table is text, and this has a byte 0", shown);

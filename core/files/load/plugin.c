@@ -11,7 +11,7 @@ struct pw_file {
   char *name, *path;
   void *handle;  /* of dlopen, or */
   pw_yaml *yaml; /* of a text model */
-  size_t largest;
+  size_t max_bytes;
   const pw_plugin_table *table;
 };
 
@@ -19,10 +19,10 @@ struct pw_file {
 
 /* Removes the path that dlerror puts before its reason. */
 static const char *plugin_reason (const char *object) {
-  const char *why = dlerror ();
-  if (why == NULL) return "unknown reason";
+  const char *reason = dlerror ();
+  if (reason == NULL) return "unknown reason";
   size_t n = strlen (object);
-  return strncmp (why, object, n) == 0 && strncmp (why + n, ": ", 2) == 0 ? why + n + 2 : why;
+  return strncmp (reason, object, n) == 0 && strncmp (reason + n, ": ", 2) == 0 ? reason + n + 2 : reason;
 }
 
 static int plugin_load (void *context, const char *object, pw_error *error) {
@@ -50,7 +50,7 @@ static int plugin_ending (const char *name) {
 }
 
 /* C++ */
-static int plugin_foreign (const char *name) {
+static int plugin_is_cpp (const char *name) {
   return pw_ends_with (name, ".cpp") || pw_ends_with (name, ".cc") || pw_ends_with (name, ".cxx") ||
          pw_ends_with (name, ".C");
 }
@@ -60,7 +60,7 @@ static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   const char *base = strrchr (f->path, '/');
   base = base ? base + 1 : f->path;
   int ending = plugin_ending (base);
-  if (plugin_foreign (base))
+  if (plugin_is_cpp (base))
     return pw_fail (error, PW_INPUT,
                     "%s: a model is compiled as C, not as C++: write it in C, in a file that ends in .c", f->path);
   if (ending == PLUGIN_ENDINGS) return pw_fail (error, PW_INPUT, "%s: a model file ends in .c, .so or .yaml", f->path);
@@ -70,7 +70,7 @@ static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
   if (f->name == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   f->name[strlen (base) - strlen (plugin_endings[ending])] = 0;
   if (ending == PLUGIN_YAML) {
-    f->yaml = pw_yaml_open (f->path, shown, f->largest, error);
+    f->yaml = pw_yaml_open (f->path, shown, f->max_bytes, error);
     if (f->yaml) f->table = pw_yaml_table (f->yaml);
     return f->yaml ? PW_OK : error->status;
   }
@@ -114,7 +114,7 @@ static int plugin_find_name (pw_file *f, const char *name, pw_error *error) {
   if (status == PW_OK && first == s.count)
     status = plugin_unknown (&s, name, error);
   else if (status == PW_OK && first + 1 < s.count && strcmp (found[1].name, name) == 0)
-    status = pw_fail (error, PW_INPUT, "two files answer to the model \"%s\": %s and %s; name one of them by its path",
+    status = pw_fail (error, PW_INPUT, "two files match the model \"%s\": %s and %s; name one of them by its path",
                       name, found[0].path, found[1].path);
   else if (status == PW_OK && (f->path = strdup (found->path)) == NULL)
     status = pw_fail (error, PW_RESOURCE, "out of memory");
@@ -130,7 +130,7 @@ static pw_file *plugin_find (const char *model, const char **shown, pw_error *er
     pw_fail (error, named ? PW_RESOURCE : PW_INPUT, named ? "out of memory" : "a model's name or path is missing");
     return NULL;
   }
-  int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS || plugin_foreign (model);
+  int by_path = strchr (model, '/') || plugin_ending (model) < PLUGIN_ENDINGS || plugin_is_cpp (model);
   if ((by_path ? plugin_find_path (f, model, error) : plugin_find_name (f, model, error)) == PW_OK) {
     *shown = by_path ? model : f->path;
     return f;
@@ -149,14 +149,14 @@ char *pw_file_find (const char *model, pw_error *error) {
 }
 
 pw_file *pw_file_open (const char *model, pw_error *error) {
-  return pw_file_open_limited (model, PW_FILE_LARGEST, error);
+  return pw_file_open_limited (model, PW_FILE_DEFAULT_BYTES, error);
 }
 
-pw_file *pw_file_open_limited (const char *model, size_t largest, pw_error *error) {
+pw_file *pw_file_open_limited (const char *model, size_t max_bytes, pw_error *error) {
   const char *shown;
   pw_file *f = plugin_find (model, &shown, error);
   if (f == NULL) return NULL;
-  f->largest = largest < PW_FILE_MOST ? largest : PW_FILE_MOST;
+  f->max_bytes = max_bytes < PW_FILE_MAX_BYTES ? max_bytes : PW_FILE_MAX_BYTES;
   if (plugin_open_path (f, shown, error) == PW_OK) return f;
   pw_file_close (f);
   return NULL;

@@ -1,6 +1,6 @@
-/* Loads the code of specialised scenes: compiles it, or takes the object from the cache.
+/* Loads the code of specialised scenes: compiles it, or loads it from the cache.
  *
- * An object in the cache, KEY.so, is followed by the text it was compiled from, how, and a check sum, which are compared
+ * An object in the cache, KEY.so, is followed by the text it was compiled from, the compiler and options, and a checksum; they are compared
  * before it is loaded.  KEY.c is locked while it is compiled; it is only kept, with the messages in KEY.log, if that
  * fails. */
 #define _POSIX_C_SOURCE 200809L
@@ -13,7 +13,7 @@
 #include <unistd.h>
 #include "files.h"
 
-enum { CODE_LARGEST = 64 << 20, CODE_KEY = 33, CODE_WAIT = 3000 }; /* bytes; characters; times 20 ms */
+enum { CODE_MAX_BYTES = 64 << 20, CODE_KEY = 33, CODE_MAX_WAITS = 3000 }; /* bytes; characters; times 20 ms */
 
 struct pw_scene_code {
   void *handle;
@@ -21,11 +21,11 @@ struct pw_scene_code {
   char notice[600];
 };
 
-/* At the end of an object. */
+/* The end of a cached object. */
 typedef struct {
   char magic[16];
   unsigned long long object, text, how, check; /* bytes of each part; sum of all of them */
-} code_end;
+} code_trailer;
 
 static const char code_magic[16] = "pinwheel scene\n";
 
@@ -40,7 +40,7 @@ typedef struct {
 
 /* ---- Identity ---- */
 
-/* The file that a command means, as PATH has it. */
+/* Finds the file of a command on PATH. */
 static int code_find_program (const char *word, struct stat *info) {
   const char *list = getenv ("PATH");
   if (strchr (word, '/')) return stat (word, info) == 0;
@@ -76,7 +76,7 @@ static int code_read (const char *path, char **text, size_t *size, pw_error *err
   FILE *f = pw_open_input (path, &why);
   *text = NULL;
   if (f == NULL) return pw_fail (error, errno == ENOENT ? PW_RETRY : PW_INPUT, "%s", why);
-  int status = pw_read_rest (f, CODE_LARGEST, path, "the most an object may have", text, size, error);
+  int status = pw_read_rest (f, CODE_MAX_BYTES, path, "the limit for an object", text, size, error);
   fclose (f);
   return status;
 }
@@ -120,11 +120,11 @@ static unsigned long long code_sum (const char *bytes, size_t size) {
   return pw_check_sum (PW_CHECK, bytes, size);
 }
 
-/* Compares an object with what it should be.  PW_RETRY: there is none, or it is another scene's; PW_INPUT: damaged. */
+/* Checks a cached object.  PW_RETRY: missing, or of another scene; PW_INPUT: damaged. */
 static int code_check (const code_job *x, pw_error *error) {
   char *bytes;
   size_t size = 0, text = strlen (x->text), how = strlen (x->how);
-  code_end end;
+  code_trailer end;
   int status = code_read (x->object, &bytes, &size, error);
   if (status == PW_OK && size >= sizeof end) memcpy (&end, bytes + size - sizeof end, sizeof end);
   if (status == PW_OK &&
@@ -153,23 +153,23 @@ static int code_load (code_job *x, pw_error *error) {
   return pw_fail (error, PW_RESOURCE, "it belongs to another scene or version");
 }
 
-/* From the cache.  PW_RETRY: compile it. */
+/* Loads the object from the cache.  PW_RETRY: it must be compiled. */
 static int code_load_cached (code_job *x) {
-  pw_error why = { 0 };
-  int status = code_check (x, &why);
-  if (status == PW_OK) status = code_load (x, &why);
+  pw_error cause = { 0 };
+  int status = code_check (x, &cause);
+  if (status == PW_OK) status = code_load (x, &cause);
   if (status == PW_OK) utimensat (AT_FDCWD, x->object, NULL, 0); /* the oldest are deleted first */
   if (status != PW_OK && status != PW_RETRY)
-    snprintf (x->code->notice, sizeof x->code->notice, "the cached object %s is replaced: %s", x->object, why.text);
+    snprintf (x->code->notice, sizeof x->code->notice, "the cached object %s is replaced: %s", x->object, cause.text);
   return status == PW_OK ? PW_OK : PW_RETRY;
 }
 
 /* ---- Compiling ---- */
 
-/* Completes an object for the cache. */
-static int code_seal (const code_job *x, pw_error *error) {
+/* Appends text, options and checksum to an object, and renames it. */
+static int code_add_trailer (const code_job *x, pw_error *error) {
   char *bytes;
-  code_end end = { .text = strlen (x->text), .how = strlen (x->how) };
+  code_trailer end = { .text = strlen (x->text), .how = strlen (x->how) };
   size_t size;
   int status = code_read (x->part, &bytes, &size, NULL);
   if (status != PW_OK) status = pw_fail (error, PW_RESOURCE, "the compiler has written no object");
@@ -197,18 +197,18 @@ static int code_compile (code_job *x, FILE *source, pw_error *error) {
     status = pw_fail (error, PW_RESOURCE, "cannot write %s: %s", x->source, strerror (errno));
   if (status == PW_OK) status = pw_compile_scene (x->source, x->part, x->log, error);
   int keep = status == PW_METHOD;
-  if (status == PW_OK) status = code_seal (x, error);
+  if (status == PW_OK) status = code_add_trailer (x, error);
   if (status == PW_OK && (status = code_load (x, error)) != PW_OK) unlink (x->object);
   unlink (x->part);
   if (!keep) unlink (x->source), unlink (x->log);
   return status;
 }
 
-/* Waits while another process compiles the same.  NULL if that takes too long, or the folder is gone. */
+/* Waits while another process compiles the scene.  NULL after a minute, or if the folder was removed. */
 static FILE *code_lock (const code_job *x) {
   const struct timespec pause = { .tv_nsec = 20000000 };
   int created, file = pw_lock_file (x->source, PW_LOCK_NEW, &created);
-  for (int i = 0; file < 0 && errno == EWOULDBLOCK && i < CODE_WAIT; i++) {
+  for (int i = 0; file < 0 && errno == EWOULDBLOCK && i < CODE_MAX_WAITS; i++) {
     nanosleep (&pause, NULL);
     file = pw_lock_file (x->source, PW_LOCK_NEW, &created);
   }
@@ -219,21 +219,21 @@ static FILE *code_lock (const code_job *x) {
 
 /* PW_RETRY: the cache cannot be used, or was deleted meanwhile. */
 static int code_compile_cached (code_job *x, pw_error *error) {
-  pw_error own = { 0 };
+  pw_error cause = { 0 };
   FILE *source = code_lock (x);
   if (source == NULL) return PW_RETRY;
   int status = code_check (x, NULL) == PW_OK ? code_load (x, NULL) : PW_RETRY; /* another process was faster */
   if (status != PW_OK)
-    status = code_compile (x, source, &own);
+    status = code_compile (x, source, &cause);
   else
     unlink (x->source);
   fclose (source);
   if (status == PW_OK) pw_cache_trim (x->folder);
-  if (status == PW_METHOD && access (x->source, F_OK) == 0) return pw_fail (error, status, "%s", own.text);
+  if (status == PW_METHOD && access (x->source, F_OK) == 0) return pw_fail (error, status, "%s", cause.text);
   return status == PW_OK ? PW_OK : PW_RETRY;
 }
 
-static int code_compile_apart (code_job *x, pw_error *error) {
+static int code_compile_temporary (code_job *x, pw_error *error) {
   free (x->folder);
   x->folder = pw_temporary_folder (error);
   if (x->folder == NULL || code_paths (x, error) != PW_OK) return PW_RESOURCE;
@@ -256,7 +256,7 @@ static int code_open (code_job *x, int compile, pw_error *error) {
     if (status != PW_RETRY) return status;
   }
   if (status == PW_OK || status == PW_RETRY)
-    status = compile ? code_compile_apart (x, error) : pw_fail (error, PW_RETRY, "not compiled yet");
+    status = compile ? code_compile_temporary (x, error) : pw_fail (error, PW_RETRY, "not compiled yet");
   return status;
 }
 

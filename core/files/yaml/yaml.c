@@ -17,7 +17,7 @@ static int yaml_new_name (const pw_reader *r, const pw_node *node, const char *w
   if (pw_yaml_text (r, node, what, &name) != PW_OK) return r->error->status;
   if (!pw_expression_is_name (name))
     return pw_yaml_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _", what, name);
-  if (strcmp (name, "t") == 0 || pw_expression_is_taken (name))
+  if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
     return pw_yaml_fail (r, node->at, "%s \"%s\": this name is taken: %s", what, name,
                          *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
   return pw_names_add (names, name, 0) >= 0 ? pw_yaml_fail (r, node->at, "a second %s \"%s\"", what, name) : PW_OK;
@@ -141,8 +141,8 @@ static int yaml_head (pw_yaml *y, const pw_reader *r) {
   pw_yaml_text (r, v[1], "about", &y->table.about);
   yaml_run (y, r, v[2]);
   for (int i = 3; key[i]; i++) {
-    if (v[i] && v[i]->count > PW_YAML_ITEMS)
-      pw_yaml_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, PW_YAML_ITEMS);
+    if (v[i] && v[i]->count > PW_YAML_MAX_ITEMS)
+      pw_yaml_fail (r, v[i]->at, "%s: %d entries; a model may have %d", key[i], v[i]->count, PW_YAML_MAX_ITEMS);
     count += v[i] && i < 5 ? (size_t)v[i]->count : 0;
   }
   y->let = v[4], y->bodies = v[5], y->elements = v[6], y->reference = v[7];
@@ -165,7 +165,7 @@ pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_e
     pw_yaml_close (y);
     return NULL;
   }
-  y->ahead = YAML_AHEAD * fmax (1, (double)largest / PW_FILE_LARGEST);
+  y->ahead = YAML_AHEAD * fmax (1, (double)largest / PW_FILE_DEFAULT_BYTES);
   y->table = (pw_plugin_table){ .abi = PW_ABI, .size = sizeof y->table, .build = pw_yaml_build };
   if (pw_yaml_read_source (y, path, largest, error) == PW_OK && pw_yaml_read_tree (y, error) == PW_OK &&
       yaml_head (y, &(pw_reader){ .y = y, .error = error }) == PW_OK)

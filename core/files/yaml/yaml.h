@@ -3,13 +3,13 @@
  *   yaml_source.c      reads and checks the text; messages with line, column and caret
  *   yaml_tree.c        builds a tree of scalars, lists and maps from libfyaml's events
  *   yaml_read.c        keys, numbers and names from the tree
- *   yaml_expression.c  signals by expressions of time and states, the reference solution
+ *   yaml_expression.c  signals that are expressions of time and states; the reference solution
  *   yaml_signal.c      other signals, points of tables
  *   yaml_build.c       bodies and elements, through the field tables of their types
  *   yaml.c             the head of a model: parameters and default run settings, stored in a plug-in's table
  *
- * Functions with a reader return the status of its error, which is that of the first error; after one they do nothing.
- * So a sequence of calls needs no check after each.  A node that is NULL is absent, and nothing is read. */
+ * Functions with a reader return the status of its error, the first one; after an error they do nothing.
+ * A sequence of calls needs one check.  A NULL node is absent; nothing is read. */
 #ifndef PW_YAML_H
 #define PW_YAML_H
 
@@ -32,8 +32,8 @@ typedef struct pw_node {
 } pw_node;
 
 struct pw_yaml {
-  pw_plugin_table table; /* first: a model's table leads to its file */
-  char *path;            /* as messages show it */
+  pw_plugin_table table; /* first: a model's table is the address of its file */
+  char *path;            /* as shown in messages */
   char *folder;          /* of the file, links resolved */
   char *source;          /* the text, ended by a NUL */
   size_t size;
@@ -45,7 +45,7 @@ struct pw_yaml {
   int parameters;
 };
 
-/* What reads a file, or builds a model from it. */
+/* The state while a file is read or a model is built from it. */
 typedef struct {
   const pw_yaml *y;
   pw_error *error;
@@ -59,18 +59,18 @@ typedef struct {
   int lets;                     /* so far */
   pw_names bodies;              /* names of bodies, to their index */
   pw_names all;                 /* names of bodies and elements, to the index in nodes */
-  pw_names elements;     /* once an expression asks for them: names of all elements, to the index of their kinds */
+  pw_names elements;     /* once an expression asks for them: names of all elements, to the index of their types */
   const pw_node **node;  /* where each is named */
   const pw_field *field; /* the current one, and its definition with all preceding fields */
   char *definition;
   int named;
   double points; /* of tables, so far */
-  double codes;  /* of signals by expressions, so far */
+  double codes;  /* operations of all expressions so far */
 } pw_reader;
 
 /* Limits of one model, about 1 GB each, so that a small file cannot use all memory: bodies, elements, parameters or
- * definitions, of each; points of all tables; operations of all signals by expressions. */
-enum { PW_YAML_ITEMS = 1000000, PW_YAML_POINTS = 20000000, PW_YAML_CODES = 30000000 };
+ * definitions, of each; points of all tables; operations of all expressions. */
+enum { PW_YAML_MAX_ITEMS = 1000000, PW_YAML_MAX_POINTS = 20000000, PW_YAML_MAX_OPERATIONS = 30000000 };
 
 /* ---- The text (yaml_source.c) ---- */
 
@@ -95,7 +95,7 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
 /* ---- Reading the tree (yaml_read.c) ---- */
 
-enum { PW_YAML_KEYS = 40 }; /* at most, in a map of fixed keys */
+enum { PW_YAML_MAX_KEYS = 40 }; /* at most, in a map of fixed keys */
 
 /* Finds known keys (ended by NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
  * are skipped.  Other keys, repeated keys and empty values are refused; `what` ("a body") is for messages. */
@@ -128,9 +128,10 @@ void pw_yaml_suggest_bodies (const pw_reader *r, pw_nearest *near);
 /* ---- Building ---- */
 
 /* Makes a signal of up to three expressions of time: value, rate, acceleration; NULL: not given (yaml_expression.c). */
-int pw_yaml_of_time (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3], pw_signal *signal);
+int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
+                         pw_signal *signal);
 
-/* Reads a signal of a kind into a field (yaml_signal.c). */
+/* Reads a signal of an element type into a field (yaml_signal.c). */
 int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal);
 
 /* Reads the reference solution, after bodies and elements (yaml_expression.c). */

@@ -149,11 +149,11 @@ static const pw_kind *build_kind (const pw_reader *r, const pw_node *node) {
 }
 
 static int build_fields (pw_reader *r, const pw_kind *kind, const pw_node *node, const char *name) {
-  const char *key[PW_YAML_KEYS + 1];
-  const pw_node *v[PW_YAML_KEYS + 1];
+  const char *key[PW_YAML_MAX_KEYS + 1];
+  const pw_node *v[PW_YAML_MAX_KEYS + 1];
   char what[100];
   int n = 0;
-  for (const pw_field *f = kind->fields; f->name && n < PW_YAML_KEYS; f++) key[n++] = f->name;
+  for (const pw_field *f = kind->fields; f->name && n < PW_YAML_MAX_KEYS; f++) key[n++] = f->name;
   key[n] = NULL;
   snprintf (what, sizeof what, "a %s", kind->name);
   if (pw_yaml_keys (r, node, 1, key, what, v) != PW_OK) return r->error->status;

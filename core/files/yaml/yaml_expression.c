@@ -25,7 +25,7 @@ typedef struct {
   const char *what; /* "torque T: value", for messages */
   /* of a signal */
   time_function *f;
-  int forced;
+  int of_force;
   pw_function *signal;
 } reading;
 
@@ -189,7 +189,7 @@ static int time_add_state (void *context, const char *name, size_t length, size_
   snprintf (text, sizeof text, "%.*s", (int)length, name);
   for (int i = 1; i <= f->states; i++)
     if (strcmp (f->name[i], text) == 0) return PW_OK;
-  if (!x->forced) return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
+  if (!x->of_force) return reading_fail (x, at, "\"%s\": the signal of a constraint depends on the time t alone", text);
   if (state_check (x, text, at) != PW_OK) return x->r->error->status;
   if (f->states == MAX_SIGNAL_STATES || length >= sizeof text)
     return reading_fail (x, at, "more than %d states", MAX_SIGNAL_STATES);
@@ -205,11 +205,11 @@ static int time_expression (reading *x, int i) {
   if (reading_expression (x, f->name, &f->text.part[i], &f->x[i]) != PW_OK) return r->error->status;
   const pw_expression *made = f->x[i];
   if (made->breaks) x->signal->breakpoint = time_breakpoint;
-  if ((r->codes += made->codes) > PW_YAML_CODES)
+  if ((r->codes += made->codes) > PW_YAML_MAX_OPERATIONS)
     return pw_yaml_fail (r, x->node->at,
                          "%s: the expressions up to here have more than %d operations, which need more "
                          "memory than a model may have",
-                         x->what, PW_YAML_CODES);
+                         x->what, PW_YAML_MAX_OPERATIONS);
   if (made->jump == NULL || f->text.jump) return PW_OK;
   char *jump = pw_arena_alloc (r->arena, (size_t)made->jump_size + 1);
   f->text.jump = jump ? memcpy (jump, made->jump, (size_t)made->jump_size) : NULL;
@@ -273,20 +273,20 @@ static int time_all (reading *x, const pw_node *const v[3]) {
     if (i > 0 && x->f->x[i - 1] && !x->f->states && time_check (x, i, key[i]) != PW_OK) return x->r->error->status;
   }
   x->node = v[0];
-  return x->forced ? PW_OK : time_continuous (x, x->f->derivatives);
+  return x->of_force ? PW_OK : time_continuous (x, x->f->derivatives);
 }
 
-int pw_yaml_of_time (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
-                     pw_signal *signal) {
+int pw_yaml_time_signal (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *const v[3],
+                         pw_signal *signal) {
   time_function *f = pw_arena_alloc (r->arena, sizeof *f);
   if (f == NULL) return pw_yaml_no_memory (r);
   f->name[0] = "t";
-  f->derivatives = pw_kind_forced (kind) ? 0 : kind->level == PW_HOLONOMIC ? 2 : 1;
+  f->derivatives = pw_kind_signals_force (kind) ? 0 : kind->level == PW_HOLONOMIC ? 2 : 1;
   *signal = (pw_signal){ PW_FUNCTION, .function = { .eval = time_eval, .context = f } };
   signal->function.open = time_open;
   signal->function.close = free;
   signal->function.text = &f->text;
-  reading x = { r, NULL, what, f, pw_kind_forced (kind), &signal->function };
+  reading x = { r, NULL, what, f, pw_kind_signals_force (kind), &signal->function };
   if (time_store_names (r) != PW_OK || time_all (&x, v) != PW_OK) return r->error->status;
   if (f->states) signal->function.reads = f->name + 1;
   return PW_OK;

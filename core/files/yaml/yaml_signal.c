@@ -102,9 +102,9 @@ static int table_points (pw_reader *r, const char *what, const pw_node *node, co
   if (v[0] && v[2]) return pw_yaml_fail (r, v[2]->at, "%s: columns belong to a file", what);
   int status = v[0] ? table_list (r, what, v[0], s) : table_file (r, what, v[1], v[2], s);
   if (status == PW_OK) r->points += s->table.count;
-  if (status != PW_OK || r->points <= PW_YAML_POINTS) return status;
+  if (status != PW_OK || r->points <= PW_YAML_MAX_POINTS) return status;
   return pw_yaml_fail (r, node->at, "%s: the tables up to here have more than %d points, the most of a model", what,
-                       PW_YAML_POINTS);
+                       PW_YAML_MAX_POINTS);
 }
 
 /* ---- Forms made of numbers ---- */
@@ -140,9 +140,9 @@ static int signal_fault (pw_reader *r, const pw_kind *kind, const char *what, co
 static int signal_form (pw_reader *r, const pw_kind *kind, const pw_signal_form *form, const char *what,
                         const pw_node *node, pw_signal *signal) {
   static const char *const table[] = { "points", "file", "columns" };
-  const char *key[PW_YAML_KEYS];
+  const char *key[PW_YAML_MAX_KEYS];
   char about[100];
-  const pw_node *v[PW_YAML_KEYS];
+  const pw_node *v[PW_YAML_MAX_KEYS];
   int fields = 0, n, is_table = form->type == PW_TABLE;
   *signal = (pw_signal){ .type = form->type };
   for (const pw_field *f = form->fields; f->name; f++) key[fields++] = f->name;
@@ -166,8 +166,8 @@ static char *signal_list (const char *const *key, char *buffer, size_t size) {
 
 /* {TYPE: ..} */
 static int signal_map (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node, pw_signal *signal) {
-  const char *key[PW_YAML_KEYS] = { "constant", "expression", "rate", "acceleration" };
-  const pw_node *v[PW_YAML_KEYS];
+  const char *key[PW_YAML_MAX_KEYS] = { "constant", "expression", "rate", "acceleration" };
+  const pw_node *v[PW_YAML_MAX_KEYS];
   char list[100];
   int n = SIGNAL_FORMS, given = 0, form = -1;
   for (const pw_signal_form *f = pw_signal_forms; f->name; f++) key[n++] = f->name;
@@ -183,7 +183,7 @@ static int signal_map (pw_reader *r, const pw_kind *kind, const char *what, cons
   if (!v[SIGNAL_EXPRESSION] && (v[SIGNAL_RATE] || v[SIGNAL_ACCELERATION]))
     return pw_yaml_fail (r, node->at, "%s: a rate or acceleration belongs to an expression", what);
   if (v[SIGNAL_CONSTANT]) return pw_yaml_number (r, v[SIGNAL_CONSTANT], what, PW_REAL, &signal->constant);
-  if (v[SIGNAL_EXPRESSION]) return pw_yaml_of_time (r, kind, what, v + SIGNAL_EXPRESSION, signal);
+  if (v[SIGNAL_EXPRESSION]) return pw_yaml_time_signal (r, kind, what, v + SIGNAL_EXPRESSION, signal);
   return signal_form (r, kind, &pw_signal_forms[form - SIGNAL_FORMS], what, v[form], signal);
 }
 
@@ -191,6 +191,6 @@ int pw_yaml_signal (pw_reader *r, const pw_kind *kind, const char *what, const p
   const pw_node *const v[3] = { node, NULL, NULL };
   if (node->type == PW_YAML_MAP) return signal_map (r, kind, what, node, signal);
   if (node->type == PW_YAML_SCALAR && pw_yaml_varies (node->text, NULL))
-    return pw_yaml_of_time (r, kind, what, v, signal);
+    return pw_yaml_time_signal (r, kind, what, v, signal);
   return pw_yaml_number (r, node, what, PW_REAL, &signal->constant);
 }

@@ -89,7 +89,7 @@ int pw_yaml_read_source (pw_yaml *y, const char *path, size_t largest, pw_error 
   FILE *f = pw_open_input (path, &why);
   if (f == NULL)
     return pw_fail (error, errno == ENOMEM ? PW_RESOURCE : PW_INPUT, "cannot open the model file %s: %s", y->path, why);
-  int status = pw_read_rest (f, largest, y->path, "the most a model may have unless --max-file says more", &y->source,
+  int status = pw_read_rest (f, largest, y->path, "the limit for a model unless --max-file raises it", &y->source,
                              &y->size, error);
   fclose (f);
   return status == PW_OK ? source_check (&(pw_reader){ .y = y, .error = error }) : status;

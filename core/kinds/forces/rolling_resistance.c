@@ -24,7 +24,7 @@ typedef struct {
 static inline resistance_state resistance_at (const pw_batch *b, int e) {
   const resistance *k = (const resistance *)b->element + e;
   const pw_configuration *A = &b->configuration[b->body[e]];
-  contact_state d = contact_turn (&k->point, A);
+  contact_state d = contact_rotate (&k->point, A);
   return (
       resistance_state){ k, A, { d.dx, d.dy, k->point.arm }, d.dx * A->vx + d.dy * A->vy + k->point.arm * A->omega };
 }
