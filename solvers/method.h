@@ -21,20 +21,20 @@ struct pw_run {
   pw_saddle *saddle;           /* mass matrix, all constraint equations: accelerations, impulses */
   const unsigned char *active; /* rows: 0 for redundant ones; NULL: none is redundant */
   int redundant;               /* number of redundant rows */
-  int *redundant_row;          /* their indices */
-  double *coefficient;         /* redundant x rows: each as a combination of the active rows; then scratch */
+  int *redundant_row;          /* indices of these rows */
+  double *coefficient;         /* redundant x rows: each redundant row as a combination of active rows; then scratch */
   double *least_norm;          /* rows: least-norm multipliers for the ledger; NULL: no redundant row moves */
   char *rank_memory;
   double conditioning;                      /* of the active rows at the state reached (rank.h) */
-  double reselect;                          /* its value below which other rows are tried */
-  const struct pw_specialised *specialised; /* code in use, or NULL */
-  struct pw_scene *scene;                   /* its data */
+  double reselect;                          /* conditioning below which other rows are tried */
+  const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
+  struct pw_scene *scene;                   /* data of that code */
   void *scene_memory;
   int scene_ready; /* 1: its constants have been computed */
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refuse;          /* sine at which an evaluation is refused */
-  int near;               /* 1 once an evaluation was near a singular configuration */
+  int near;               /* 1 after an evaluation near a singular configuration */
   double reference_level; /* largest acceleration norm away from singular configurations, in units of L / T^2; >= 1 */
   double previous_norm;   /* acceleration norm of the last such state */
   int differentiates;     /* 1: the method uses the derivatives of the equations (tangent.h) */
@@ -48,12 +48,12 @@ struct pw_run {
   double *q, *v, *a; /* coords + 3 each */
   double *lambda;    /* rows; contiguous with q, v, a: pw_state_length numbers */
   double *ledger;    /* entries: work and losses up to t */
-  double *rate;      /* entries: their rates at t */
+  double *rate;      /* entries: powers at t */
   double projected;  /* energy added by projections up to t; only with settings.ledger */
 
   /* The state requested from pw_run_sample. */
   double t_at;
-  double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* laid out likewise */
+  double *q_at, *v_at, *a_at, *lambda_at, *ledger_at; /* same layout */
   double projected_at;
 
   int stopped;           /* 1: settings.stop requested it */
@@ -67,7 +67,7 @@ struct pw_run {
   double energy_scene; /* kinetic energy at the velocities L and 1 rad per span; for a massless scene see ledger.c */
   double *scratch;     /* 2 (coords + 3) + 3 rows */
   double *saturation;  /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
-  double *matrix_state, *matrix_range; /* 2 coords: where the Newton matrix was evaluated; range in which it is valid */
+  double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated; its valid range */
   int outdated;                        /* 1: the state reached is outside that range */
   double *q_given, *v_given;
   unsigned char *origin; /* 2 coords: of initial values, as in pw_system */
@@ -91,8 +91,8 @@ void pw_bound_tolerances (pw_run *r);
 double pw_saturation_range (const pw_run *r, int state);
 /* Records the state at which the Newton matrix was evaluated; kinematics must be up to date there. */
 void pw_matrix_evaluated (pw_run *r, const double *q, const double *v);
-/* Tolerances of coordinate j and of its velocity at a given value, for iterative methods: bounded by the range in
- * which a force saturates, or an iteration could converge anywhere between the force and its opposite. */
+/* Tolerances of coordinate j and of its velocity at a given value, for iterative methods.  They are bounded by the range
+ * in which a force saturates; otherwise an iteration could converge to any value of the force. */
 static inline double pw_tolerance (const pw_run *r, int j, double q) {
   return fmin (r->settings.rtol * fabs (q) + pw_atol (r, j), r->saturation[j]);
 }
@@ -160,10 +160,10 @@ int pw_run_annotate_error (const pw_run *r, int status, pw_error *error);
 /* Replaces the saddle by one for the active rows.  PW_OK or PW_RESOURCE. */
 int pw_run_open_saddle (pw_run *r, pw_error *error);
 
-/* Evaluates accelerations, multipliers and the ledger's rates at the state reached; errors have the reason. */
+/* Evaluates accelerations, multipliers and the ledger's powers at the state reached; errors contain the reason. */
 int pw_run_evaluate (pw_run *r, pw_error *error);
 
-/* Sets reference values for nearness to a singular configuration at the state reached, which must be regular. */
+/* Sets the reference values of the watchdog at the state reached, which must be regular. */
 void pw_run_watch (pw_run *r);
 
 /* Finds the next discontinuity after the state reached. */
@@ -172,8 +172,8 @@ int pw_run_look_ahead (pw_run *r, pw_error *error);
 /* Makes the accelerations of this state the reference level for later ones. */
 void pw_run_reference_level (pw_run *r);
 
-/* Plans the linear algebra at the state reached, where J is evaluated, and reopens the method. fresh: reference
- * pivots are taken from this state; otherwise they are kept. */
+/* Plans the linear algebra at the state reached, where J is evaluated, and reopens the method.  fresh: reference
+ * pivots are those of this state; otherwise they are unchanged. */
 int pw_run_renew (pw_run *r, int fresh, pw_error *error);
 
 /* Numbers in q, v, a and lambda of a state. */
@@ -226,11 +226,11 @@ int pw_run_resolve (pw_run *r, pw_error *error);
 void pw_ledger_begin (pw_run *r);
 void pw_ledger_note (pw_run *r);
 
-/* Rates of the ledger's entries [W] from the active rows' multipliers, where kinematics are up to date and J is
- * evaluated.  Redundant drives share their work as they share their reactions. */
+/* Powers of the ledger's entries [W] from the multipliers of the active rows, where kinematics are up to date and J is
+ * evaluated.  Work is divided between redundant drives like their least-norm reactions. */
 void pw_ledger_rates (pw_run *r, const double *lambda, double *rate);
 
-/* 1 if work or losses follow from multipliers. */
+/* 1 if work or losses depend on multipliers. */
 int pw_ledger_reacts (const pw_system *s);
 
 /* Tolerance of the total work and loss of a step of size h [J]: rtol times the energy exchanged so far, at least

@@ -1,8 +1,8 @@
 /* Redundant equations: an independent set is selected, the others are monitored.
  *
- * The rank is found at consistent configurations off the singular set: at the initial one and at two configurations
- * a short motion away.  During the motion a set may become ill-conditioned where another one is not: then another is
- * selected. (Garcia de Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass
+ * The rank is computed at consistent configurations: at the initial one and at up to three configurations a short
+ * motion away.  During the motion a set may become ill-conditioned while another one is not; then that is
+ * selected.  (Garcia de Jalon & Gutierrez-Lopez 2013, Multibody dynamics with redundant constraints and singular mass
  * matrix.) */
 #include <math.h>
 #include <stdlib.h>
@@ -32,7 +32,7 @@ static int independent_rank (pw_run *r, independent_search *x) {
   return pw_rank_basis (r->w, r->limits.independent, r->s->rows, r->s->rows, x->rows, x->kept, x->active);
 }
 
-/* A direction that the rows allow, of size 1 in units of the scene: the given velocities, or a fixed irregular one. */
+/* An admissible direction of size 1 in units of the scene: the given velocities, or a projected arbitrary vector. */
 static void independent_direction (const pw_system *s, const independent_search *x, int rank, const double *v,
                                    int number) {
   double most = 0;
@@ -43,8 +43,7 @@ static void independent_direction (const pw_system *s, const independent_search 
   for (int j = 0; most > 0 && j < s->coords; j++) x->motion[j] *= s->scale.length / most / pw_rank_unit (s, j);
 }
 
-/* The rank a short motion away, with the rows that are independent there in x->active; 0 if there is no such
- * configuration. */
+/* The rank a short motion away; x->active: the independent rows there.  0 if no such configuration is found. */
 static int independent_nearby (pw_run *r, independent_search *x, int rank, int number) {
   const pw_system *s = r->s;
   pw_projector p;
@@ -66,8 +65,7 @@ static int independent_nearby (pw_run *r, independent_search *x, int rank, int n
   return away;
 }
 
-/* Lists the equations that the run's mask omits; work needs least-norm multipliers only if one of these is
- * rheonomic. */
+/* Lists the redundant equations; work needs least-norm multipliers only if one of them is rheonomic. */
 static void independent_list_redundant (pw_run *r) {
   const pw_system *s = r->s;
   r->redundant = 0;
@@ -116,7 +114,7 @@ int pw_rank_open (pw_run *r, pw_error *error) {
   return status;
 }
 
-/* Drift reduces the dependence of equations: the rank is kept. */
+/* The rank is not computed again, since drift makes dependent equations independent. */
 int pw_rank_reselect (pw_run *r) {
   const pw_system *s = r->s;
   independent_search x;

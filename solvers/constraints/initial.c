@@ -12,12 +12,12 @@
 #include "method.h"
 #include "rank.h"
 
-/* Where an attempt stopped. */
+/* Where an attempt failed. */
 typedef struct {
   int row;
   int velocities; /* 0: positions, 1: velocities */
   double off;
-  int assembled; /* 1: it has found positions */
+  int assembled; /* 1: positions were found */
 } initial_failure;
 
 /* Scale factor for the metric of massless coordinates: 1e-6 of the least entry of the mass matrix, angles in units
@@ -55,7 +55,7 @@ static int initial_positions (pw_projector *p, pw_run *r, initial_failure *failu
   return status;
 }
 
-/* Needs up-to-date kinematics.  Repeats the linear solve once, which removes the round-off of a large first
+/* Projects velocities; kinematics must be up to date.  A second linear solve removes the round-off of a large first
  * correction. */
 static int initial_velocities (pw_projector *p, pw_run *r, double *v, initial_failure *failure) {
   pw_residuals now;
@@ -139,9 +139,9 @@ int pw_initial_specified (const pw_initial_report *report, int state) {
 }
 
 /* If redundant equations make an attempt with all equations fail, it is repeated with an independent set, selected at
- * the given positions, or else at those that an attempt reaches which prescribes nothing, and begun there.  Off the
- * constraints redundant equations appear independent, the more the larger the residuals: hence several tolerances, and
- * the second positions. */
+ * the given positions or, failing that, at those reached by an attempt without prescribed values, from which it then
+ * starts.  Off the constraints redundant equations appear independent, the more the larger the residuals: hence several
+ * tolerances. */
 static int initial_ranked (pw_run *r, const unsigned char *prescribed, initial_failure *failure, pw_error *error) {
   static const double tolerance[] = { 1e-7, 1e-4, 1e-2, 0.1 };
   enum { TOLERANCES = sizeof tolerance / sizeof *tolerance };
@@ -219,7 +219,7 @@ static const struct initial_set {
   { 0, 0, INITIAL_FREE },
 };
 
-/* The mask of a set; 0 if it does not apply here. */
+/* The mask of a set of prescribed states; returns 0 if the set does not apply. */
 static int initial_mask (const pw_system *s, const unsigned char *prescribed, const struct initial_set *set,
                          unsigned char *mask) {
   int n = s->coords, massless = 0, massive = 0, perhaps = 0;
@@ -233,15 +233,15 @@ static int initial_mask (const pw_system *s, const unsigned char *prescribed, co
   return !set->mass || (massless > 0 && massive > 0 && (set->mass == INITIAL_MASS || perhaps > 0));
 }
 
-/* 1 if some of what the user gave is not in the mask. */
+/* 1 if a value given by the user is not prescribed by the mask. */
 static int initial_released (const pw_system *s, const unsigned char *prescribed, const unsigned char *mask) {
   int released = 0;
   for (int j = 0; prescribed && j < 2 * s->coords; j++) released |= prescribed[j] & PW_GIVEN && !mask[j];
   return released;
 }
 
-/* For larger scenes (rows times coordinates) redundant equations are not sought while states specified by the model are
- * prescribed: sketches of linkages, which specify all positions, usually fail there. */
+/* Rows times coordinates above which redundant equations are not sought while states specified by the model are
+ * prescribed: that usually fails for sketches of linkages, which specify all positions. */
 #define INITIAL_SMALL 1e4
 
 static int initial_try (pw_run *r, const unsigned char *prescribed, initial_failure *failure, int *released,

@@ -7,27 +7,27 @@
 
 struct pw_run;
 
-/* The largest rows x coordinates that is examined densely. */
+/* Limit of rows x coordinates for dense matrices. */
 #define PW_RANK_MOST 4e7
 
-/* All rows of the evaluated J, dense (rows x coords), lengths and angles in units of the scene and each of length 1;
- * `norm` (rows, or NULL) takes what they were divided by; empty rows stay 0. */
+/* All rows of the evaluated J, dense (rows x coords), in units of the scene and normalised to length 1; `norm` (rows, or
+ * NULL): their former lengths; empty rows stay 0. */
 void pw_rank_rows (const pw_workspace *w, double *rows, double *norm);
 
-/* Length of a unit of coordinate j in them: they are the derivatives by q[j] times this. */
+/* Unit of coordinate j in these rows, which are derivatives by q[j] times this unit. */
 double pw_rank_unit (const pw_system *s, int j);
 
 /* Orthogonalises a row of length n against the `rank` kept ones, of length 1; returns its norm afterwards. */
 double pw_rank_orthogonalise (double *row, const double *rows, const int *kept, int rank, int n);
 
-/* Numbers in the `rows` of pw_rank_basis: rows x coords, and a norm for each. */
+/* Size of `rows` of pw_rank_basis: rows x coords, and a norm for each row. */
 static inline size_t pw_rank_room (const pw_system *s) {
   return (size_t)s->rows * ((size_t)s->coords + 1) + 1;
 }
 
-/* pw_rank_select for at most `holonomic` holonomic equations and `all` in all.  The kept rows become an orthonormal
- * basis of the range of J^T, their numbers go to `kept`.  Holonomic equations come first, since a nonholonomic one must
- * not take the place of a position. */
+/* pw_rank_select for at most `holonomic` holonomic equations and `all` equations.  The selected rows become an
+ * orthonormal basis of the range of J^T; `kept`: their indices.  Holonomic equations come first, since a nonholonomic
+ * one must not replace a holonomic one. */
 int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, double *rows, int *kept,
                    unsigned char *active);
 
@@ -37,29 +37,29 @@ int pw_rank_basis (const pw_workspace *w, double tol, int holonomic, int all, do
 int pw_rank_select (const pw_workspace *w, double tol, unsigned char *active);
 
 /* Selects r->active for the run at its consistent initial state: rows dependent there and at two configurations nearby.
- * Leaves it NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial
+ * It stays NULL if all equations are independent.  Errors: PW_RESOURCE, PW_INITIAL (the initial
  * configuration is singular). */
 int pw_rank_open (struct pw_run *r, pw_error *error);
 
-/* Selects r->active again at the configuration J is evaluated at, if there is another set of the same rank: 1; 0 if
- * there is none.  The run's saddle and method then still have the old one.  Errors: PW_RESOURCE. */
+/* Selects r->active again with the J last evaluated.  Returns 1 if another set has the same rank, else 0.  Saddle and
+ * method of the run still use the previous set.  Errors: PW_RESOURCE. */
 int pw_rank_reselect (struct pw_run *r);
 
-/* Conditioning of the active equations: 1 over their largest coefficient, rows of length 1, in an irregular sum of
- * the redundant ones.  Residuals of the redundant equations are those of the active ones divided by this.  J must be
+/* Conditioning of the active equations: 1 over their largest coefficient in a sum of the redundant ones with irregular
+ * weights (rows of length 1).  Residuals of the redundant equations are those of the active ones divided by this.  J must be
  * evaluated and the run's saddle factorised at the configuration. */
 double pw_rank_conditioning (struct pw_run *r);
 
-/* Saves or loads r->active, which has as many redundant equations as before.  Saddle and method then still have the
- * old one. */
+/* Saves or loads r->active; the number of redundant equations must not change.  Saddle and method still use the previous
+ * set. */
 void pw_rank_serialise (struct pw_run *r, pw_archive *a);
 
-/* The unit of a row's multiplier, as J is evaluated: 1 of a force, L of a moment, which a row without x and y
- * columns has. */
+/* The unit of a row's multiplier, from the J last evaluated: 1 for a force, L for a moment (a row without entries in x
+ * and y columns). */
 double pw_rank_multiplier_unit (const pw_workspace *w, int row);
 
-/* Multipliers of all equations from those of the active ones: the smallest (forces in units of 1, moments of L) with
- * the same J^T lambda.  J must be evaluated and the run's saddle factorised at the configuration. */
+/* Multipliers of all equations from those of the active ones: those of least norm (moments divided by L) with the same
+ * J^T lambda.  J must be evaluated and the run's saddle factorised at the configuration. */
 void pw_rank_least_norm (struct pw_run *r, double *lambda);
 
 #endif

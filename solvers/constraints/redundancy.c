@@ -2,7 +2,7 @@
  *
  * A redundant equation is J_i = sum_a c_ia J_a over active equations a.  Its coefficients come from the saddle
  * point: with f = J_i^T and gamma = 0 the multipliers are c_i.  The vectors n_i = e_i - sum c_ia e_a span the
- * multipliers that pull on nothing, so the least-norm ones are lambda + sum z_i n_i with z from a small
+ * multipliers without force, J^T n_i = 0, so the least-norm ones are lambda + sum z_i n_i with z from a small
  * least-squares problem. */
 #include <lapacke.h>
 #include <math.h>
@@ -11,7 +11,7 @@
 #include "method.h"
 #include "rank.h"
 
-/* The batch of an equation; *n: its number there. */
+/* The batch of an equation; *n: its index in the batch. */
 static const pw_element_batch *redundancy_find (const pw_workspace *w, int row, int *n) {
   const pw_element_batch *k = w->batch;
   while (row >= k->row + k->b.count * k->kind->rows) k++;
@@ -50,14 +50,14 @@ static void redundancy_add_row (const pw_workspace *w, int row, double weight, d
   }
 }
 
-/* Solves for multipliers with the right side f = J^T c, in the run's scratch: c. */
+/* Solves f = J^T c for the multipliers c; f is in the scratch memory of the run. */
 static void redundancy_solve (pw_run *r, double *f, double *c) {
   double *nothing = f + r->s->coords + 3;
   memset (nothing, 0, (size_t)r->s->rows * sizeof *nothing);
   pw_saddle_solve (r->saddle, f, nothing, f, c);
 }
 
-/* Room for f in the run's scratch, zeroed. */
+/* A zero f in the scratch memory of the run. */
 static double *redundancy_force (pw_run *r) {
   int m = r->s->rows, k = r->redundant;
   double *f = r->coefficient + k * m + k * k + k;
@@ -70,7 +70,7 @@ void pw_rank_coefficients (pw_run *r, int i) {
   redundancy_solve (r, f, r->coefficient + i * r->s->rows);
 }
 
-/* An irregular sum of the redundant equations, in which nothing cancels, needs one solve for any number of them. */
+/* A sum of the redundant equations with irregular weights, so that terms do not cancel, needs one solution only. */
 double pw_rank_conditioning (pw_run *r) {
   double *c = r->coefficient, *f = redundancy_force (r), most = 0;
   for (int i = 0; i < r->redundant; i++) {
@@ -97,14 +97,14 @@ void pw_rank_least_norm (pw_run *r, double *lambda) {
       for (int j = 0; j <= i; j++) A[i * k + j] += weight * n * ((r->redundant_row[j] == row) - c[j * m + row]);
     }
   }
-  if (LAPACKE_dposv_work (LAPACK_COL_MAJOR, 'U', k, 1, A, k, z, k) != 0) z[0] = NAN; /* then no multiplier is known */
+  if (LAPACKE_dposv_work (LAPACK_COL_MAJOR, 'U', k, 1, A, k, z, k) != 0) z[0] = NAN; /* multipliers become NaN */
   for (int row = 0; row < m; row++)
     for (int i = 0; i < k; i++) lambda[row] += z[i] * ((r->redundant_row[i] == row) - c[i * m + row]);
 }
 
 /* ---- Description ---- */
 
-/* Names a row's element after what is in the buffer: "pin B" or, with its row, "pin B (B.Fx)"; the new length. */
+/* Appends the element of a row to the buffer: "pin B" or, with its row, "pin B (B.Fx)"; returns the new length. */
 static size_t redundancy_name_row (const pw_system *s, int row, int whole, char *buffer, size_t size, size_t n) {
   char element[120], reaction[120];
   if (n + 1 >= size) return n;
@@ -163,7 +163,7 @@ char *pw_run_redundancy (pw_run *r, int i, char *buffer, size_t size) {
     n += (size_t)snprintf (buffer + n, size - n, "%s", glue);
     if (elements++ < MOST) n = redundancy_name_row (s, a, 0, buffer, size, n);
   }
-  if (partners == 0 && n + 1 < size) snprintf (buffer + n, size - n, " constrains nothing here");
+  if (partners == 0 && n + 1 < size) snprintf (buffer + n, size - n, " has no effect in this configuration");
   if (partners == 1) redundancy_describe_pair (s, last, row, buffer, size);
   return buffer;
 }

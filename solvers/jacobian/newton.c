@@ -1,4 +1,4 @@
-/* Second-order blocks into sparse matrices; see newton.h. */
+/* Assembly of second-order blocks into sparse matrices; see newton.h. */
 #include <stdlib.h>
 #include "newton.h"
 
@@ -37,7 +37,7 @@ static inline int newton_row (const pw_put *put, int row) {
   return put->map ? put->map[row] : row;
 }
 
-/* A pin's two rows +-r1 +-r2 + ... = 0 are functions of angles beyond the unit matrix in a body's x and y columns. */
+/* A pin's second-order blocks are zero in x and y columns, where its rows of J are unit vectors. */
 static int newton_is_pin (const pw_kind *kind) {
   return kind == &pw_kind_pin;
 }

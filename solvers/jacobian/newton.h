@@ -15,25 +15,25 @@ typedef struct {
 int pw_newton_open (pw_newton *n, const pw_system *s); /* PW_OK or PW_RESOURCE */
 void pw_newton_close (pw_newton *n);
 
-/* Puts factor x block of every batch: rows from `row` on (constraint equations for blocks with as many rows, else
- * coordinates; row_scale, if given, multiplies each), columns from `col` on.  w is the direction of jw_q (coords),
- * lambda the multipliers of jtl_q (rows); `rows` limits the constraint equations that take part. */
+/* Where and how a block is added: factor x block of every batch, rows from `row` on (constraint equations or
+ * coordinates; row_scale, if given, multiplies each), columns from `col` on.  w: direction of jw_q (coords); lambda:
+ * multipliers of jtl_q (rows); `rows`: number of constraint equations included. */
 typedef struct {
   int row, col, rows;
   double factor; /* of holonomic equations, and of coordinates */
   double factor_nonholonomic;
   const double *row_scale;
-  const int *map; /* rows: place of each constraint row, or -1: it is left out; NULL: as they are */
+  const int *map; /* rows: index of each constraint row in the matrix, or -1: omitted; NULL: unchanged indices */
   const double *w, *lambda;
 } pw_put;
 void pw_newton_block (pw_newton *n, pw_workspace *w, pw_scatter_map *t, pw_block block, const pw_put *put);
 
-/* Puts factor x J, or its transpose, with the J last evaluated. */
+/* Adds factor x J, or its transpose, with the J last evaluated. */
 void pw_newton_J (const pw_workspace *w, pw_scatter_map *t, const pw_put *put);
 void pw_newton_JT (const pw_workspace *w, pw_scatter_map *t, const pw_put *put);
 
-/* Puts -(force by signal) x (signal by the states it reads): rows from `row` on, q in columns from `col` on, v in
- * columns from `col_v` on. */
+/* Adds -(derivative of the force by signals) x (derivative of signals by states): rows from `row` on, q in columns from
+ * `col` on, v in columns from `col_v` on. */
 void pw_newton_signals (pw_newton *n, pw_workspace *w, pw_scatter_map *t, int row, int col, int col_v);
 
 #endif

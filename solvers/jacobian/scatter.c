@@ -25,7 +25,7 @@ void pw_scatter_note (pw_scatter_map *t, int row, int col) {
   t->col[t->count++] = col;
 }
 
-/* Sorts contributions by a key in [0, n), stably: their numbers go to `order`, the ranges to `start` (n + 1). */
+/* Sorts contributions by a key in [0, n), stably; `order`: their indices, `start` (n + 1): the range of each key. */
 static void scatter_sort (const int *key, const size_t *from, size_t count, int n, size_t *start, size_t *order) {
   memset (start, 0, ((size_t)n + 2) * sizeof *start);
   for (size_t i = 0; i < count; i++) start[key[i] + 2]++;

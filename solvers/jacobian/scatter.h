@@ -1,5 +1,5 @@
-/* A sparse matrix filled again and again by the same sequence of contributions: the sequence is recorded once, laid out
- * in compressed columns, and from then on the number of a contribution gives its position. */
+/* Repeated assembly of a sparse matrix by the same sequence of contributions: the sequence is recorded once and laid out
+ * in compressed columns; from then on the number of a contribution determines its position. */
 #ifndef PW_SCATTER_H
 #define PW_SCATTER_H
 
@@ -8,9 +8,9 @@
 
 typedef struct {
   int recording;
-  size_t count, room; /* contributions, and room for them while recording */
+  size_t count, room; /* number of contributions; allocated number while recording */
   int *row, *col;     /* while recording */
-  size_t *place;      /* of each contribution in the values */
+  size_t *place;      /* index in `value` of each contribution */
   size_t next;        /* number of the next contribution */
   double *value;      /* while filling */
   int failed;         /* out of memory while recording */

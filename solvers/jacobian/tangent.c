@@ -51,7 +51,7 @@ void pw_tangent_compress (const pw_tangent *x, const double *all, int count, dou
   for (int i = 0; i < count; i++) used[i] = all[x->map ? x->row[i] : i];
 }
 
-/* Contributions of the equations in use, at this row and column. */
+/* Contributions of the active equations, at this row and column. */
 static pw_put tangent_put (const pw_tangent *x, int row, int col, double factor) {
   return (pw_put){
     .row = row, .col = col, .rows = x->run->s->rows, .factor = factor, .factor_nonholonomic = factor, .map = x->map

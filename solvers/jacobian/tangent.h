@@ -13,9 +13,9 @@
 
 typedef struct {
   pw_run *run;
-  int rows, holonomic; /* in use */
-  int *map;            /* all equations: number among those in use, or -1; NULL: all are in use */
-  const int *row;      /* rows: its number among all */
+  int rows, holonomic; /* active equations */
+  int *map;            /* all equations: index among the active ones, or -1; NULL: all are active */
+  const int *row;      /* rows: index among all equations */
   double *lambda, *mu; /* all equations: values of the unknowns last expanded */
   pw_newton newton;
   pw_scatter_map scatter;

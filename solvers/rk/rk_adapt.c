@@ -3,9 +3,9 @@
  *   h_new = 0.9 h err^-(k - 3 m / 4) err_before^m,  limited to h/5 ... 5 h
  *
  * with k the tableau's exponent and m its memory (Gustafsson 1991; Hairer, Norsett & Wanner 1993, section II.4).  The
- * error e is that of positions and velocities in units of the tolerances.  A projection leaves e', the part of the
- * error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small share of the whole is
- * added:
+ * error e is that of positions and velocities in units of the tolerances.  After a projection there remains e', the part of the
+ * error tangential to the constraints (Eich 1993; Hindmarsh et al., CVODE), to which a small part of the whole error
+ * is added:
  *
  *   e = sqrt (e'^2 + rtol^(1/2) e_before^2)      so that the displacement, e_before rtol, is at most rtol^(3/4)
  *
@@ -71,7 +71,7 @@ static double adapt_norm (const pw_run *r, const double *eq, const double *ev) {
   return sum / (2 * coords);
 }
 
-/* The error of an estimate, before and after projection. */
+/* The error of an estimate before projection. */
 static double adapt_whole (pw_run *r, const pw_rk_row *e) {
   struct pw_method_data *d = r->data;
   adapt_estimate (e, d->V, r->s->coords, r->q_at);
@@ -175,7 +175,7 @@ static int adapt_step (pw_run *r, double h, double t1, int project, double *adde
   return status;
 }
 
-/* A step that was cut short does not reduce the next one: that gets at least the size planned before. */
+/* A shortened step does not reduce the next one, which gets at least the size planned before. */
 static void adapt_accept (pw_run *r, double h, double t1, double added, double off, double most, int cut) {
   struct pw_method_data *d = r->data;
   double next = h * fmin (most, adapt_factor (d, off));
@@ -188,7 +188,7 @@ static void adapt_accept (pw_run *r, double h, double t1, double added, double o
 
 static int adapt_fail (pw_run *r, int status, double h, pw_error *error) {
   if (status != PW_OK) return pw_rk_fail (r, status, h, error);
-  return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances ask for a step below %.3g s", r->t, h);
+  return pw_fail (error, PW_METHOD, "t = %.6g s: the tolerances require a step below %.3g s", r->t, h);
 }
 
 int pw_rk_advance_adaptive (pw_run *r, double t_end, pw_error *error) {

@@ -14,9 +14,9 @@ static double ledger_scene_energy (const pw_run *r) {
   return sum / (r->settings.span * r->settings.span);
 }
 
-/* Energy scale of a massless scene: work and losses in a time T at irregular velocities of about L / T and 1 / T,
- * and the change of potential energy by irregular displacements of about L and 1 rad.  Afterwards kinematics are
- * those of the state reached. */
+/* Energy scale of a massless scene: work and losses in a time T at arbitrary velocities of about L / T and 1 / T, and
+ * the change of potential energy by arbitrary displacements of about L and 1 rad.  Afterwards kinematics are those of
+ * the state reached. */
 static double ledger_massless_energy (pw_run *r) {
   const pw_system *s = r->s;
   double *q = r->scratch, *v = q + s->coords + 3, *lambda = v + s->coords + 3, T = r->w->scale.time, sum = 0;
@@ -44,7 +44,7 @@ void pw_ledger_begin (pw_run *r) {
   if (r->energy_scene == 0 && r->s->entries > 0) r->energy_scene = ledger_massless_energy (r);
 }
 
-/* Every step at first, then one in 16: enough for a scale, at negligible cost. */
+/* Samples the first 16 steps and every 16th: sufficient for a scale, at negligible cost. */
 void pw_ledger_note (pw_run *r) {
   const long every = 16;
   double power = 0;
@@ -71,10 +71,10 @@ int pw_ledger_reacts (const pw_system *s) {
 }
 
 /* If kinetic and potential energies are negligible, as for light bodies against friction, the scale is the work
- * done, limited to that of a time T: it grows without bound. */
+ * done, limited to that of a time T since it grows without bound. */
 double pw_ledger_tolerance (const pw_run *r, double h) {
-  const double share = 5;         /* as a mean of squares over 25 states allows for one of them */
-  const double round_off = 1e-11; /* of the rates, from the multipliers */
+  const double share = 5;         /* allows for one of 25 states in a root mean square */
+  const double round_off = 1e-11; /* of powers, due to multipliers */
   const pw_settings *set = &r->settings;
   double work = 0, rtol = fmax (set->rtol, set->atol > 0 ? set->atol / fmax (r->s->scale.length, 1) : 0);
   for (int i = 0; i < r->s->entries; i++) work += fabs (r->ledger[i]);
@@ -96,7 +96,7 @@ const char *pw_run_energy_advice (const pw_run *r, double defect) {
   const pw_statistics *s = &r->statistics;
   int projects = pw_stabilised_by (r, PW_PROJECTION);
   if (!projects && fmax (s->position, s->velocity) > 0.1 * defect)
-    return "the constraints have drifted; a method with projection keeps them";
+    return "the constraints have drifted; a method with projection satisfies them";
   if (pw_fixed_steps (r)) return "a smaller step, or another method, follows the motion better";
   if (r->settings.rtol <= limit) return "the tolerance cannot be much smaller; compare with another method";
   if (defect > of_step * r->settings.rtol * (double)s->steps)

@@ -4,8 +4,8 @@
  *
  *   p (t) = sum_j [t_0 ... t_j] prod_(i < j) (t - t_i),   t_0 the end of the step, t_1 its beginning, ...
  *
- * Its last term estimates its error.  Rates may vanish at the ends of all steps and not between them, so the work
- * and losses of a step are also compared with the change of energy between the states. */
+ * Its last term estimates its error.  Powers may vanish at the ends of all steps but not between them, so the work
+ * and losses of a step are also compared with the change of energy. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -89,7 +89,7 @@ static int quadrature_parts (pw_quadrature *x, pw_run *r, double from, double to
   return PW_OK;
 }
 
-/* Halves the parts until the integrals, in x->sum, converge; leaves them if rates cannot be evaluated. */
+/* Halves the parts until the integrals, in x->sum, converge; stops if powers cannot be evaluated. */
 static void quadrature_refine (pw_quadrature *x, pw_run *r, double from, double to, double tolerance) {
   const int most = 64;
   double off = INFINITY;
@@ -108,7 +108,7 @@ static int quadrature_degree (const pw_quadrature *x, int order) {
   return order + 1 < x->points ? order + 1 : x->points - 1;
 }
 
-/* 1 if the step is much longer than all since the restart together: its polynomial then depends on its ends alone. */
+/* 1 if the step is much longer than all previous ones since the restart: its polynomial then depends on its ends only. */
 static int quadrature_leaps (const pw_quadrature *x) {
   const double leap = 10;
   return x->points > 2 && x->t[0] - x->t[1] > leap * (x->t[1] - x->t[x->points - 1]);
@@ -124,7 +124,7 @@ static double quadrature_defect (pw_quadrature *x, pw_run *r) {
 }
 
 int pw_quadrature_step (pw_quadrature *x, pw_run *r, int order) {
-  const double methods = 100; /* times the tolerance: allowance for the method's own energy error in a step */
+  const double methods = 100; /* times the tolerance: energy error of the method in a step */
   int entries = r->s->entries, last = PW_QUADRATURE_POINTS - 1;
   double *oldest = x->rate[last], h = r->t - x->t[0];
   memcpy (x->ledger0, r->ledger, (size_t)entries * sizeof (double));

@@ -104,15 +104,15 @@ int pw_run_renew (pw_run *r, int fresh, pw_error *error) {
   return status;
 }
 
-/* If memory did not suffice for its method, a run can only be closed. */
+/* 1 if memory did not suffice to reopen the method: the run can only be closed. */
 static int run_has_no_method (const pw_run *r, pw_error *error) {
   if (r->data) return 0;
-  pw_fail (error, PW_RESOURCE, "model %s: the run was given up at t = %.6g s for lack of memory", r->s->model, r->t);
+  pw_fail (error, PW_RESOURCE, "model %s: the run ended at t = %.6g s: out of memory", r->s->model, r->t);
   return 1;
 }
 
-/* The active rows have become nearly dependent: if another set is not, the method restarts with it.  Done before the
- * next step, so that samples of the last one remain available, and independent of whether any were taken. */
+/* The active rows have become nearly dependent: if another set is not, the method restarts with it.  This is done before
+ * the next step, so that the last one can be sampled, and does not depend on samples. */
 static int run_reselect (pw_run *r, pw_error *error) {
   pw_sample sample;
   r->reselect = r->conditioning / 2;
@@ -124,14 +124,13 @@ static int run_reselect (pw_run *r, pw_error *error) {
   return pw_run_renew (r, 1, error);
 }
 
-/* If an evaluation fails just ahead, libraries take steps below the round-off of time for ever. */
+/* If an evaluation fails at the next time, libraries repeat steps below the round-off of time endlessly. */
 static int run_check_progress (pw_run *r, double before, pw_error *error) {
   r->stalled = r->t - before > 64 * DBL_EPSILON * fabs (r->t) ? 0 : r->stalled + 1;
   if (r->stalled < r->limits.stalled) return PW_OK;
   return pw_fail (
       error, PW_METHOD,
-      "t = %.6g s: no step gets any further, however small: what comes next cannot be evaluated, or not within "
-      "the tolerances",
+      "t = %.6g s: no step succeeds, however small: the next states cannot be evaluated, or not within the tolerances",
       r->t);
 }
 
@@ -146,7 +145,7 @@ int pw_run_advance (pw_run *r, double t_end, pw_error *error) {
   status = pw_run_attempt (r, error);
   if (status != PW_OK) return status;
   pw_forget_residuals (r);
-  if (r->stalled == 0) r->w->failed = NULL; /* else the signal that stops the run is still the last one that failed */
+  if (r->stalled == 0) r->w->failed = NULL; /* otherwise it is the signal that stops the run */
   if (r->t >= r->breakpoint || r->interrupted) status = run_pass_breakpoint (r, error);
   r->interrupted = 0;
   if (status == PW_OK && r->redundant && r->conditioning < r->reselect) status = run_reselect (r, error);
@@ -205,7 +204,7 @@ int pw_run_sample (pw_run *r, double t, pw_sample *sample, pw_error *error) {
   return PW_OK;
 }
 
-/* ---- Another state ---- */
+/* ---- Restart ---- */
 
 static int run_check_state (const pw_run *r, const double *x, int velocities, pw_error *error) {
   char name[120];
@@ -216,8 +215,8 @@ static int run_check_state (const pw_run *r, const double *x, int velocities, pw
   return PW_OK;
 }
 
-/* Copies this state (NULL: unchanged), which may be in the sample arrays, to the state reached; the old one goes to the
- * sample arrays. */
+/* Makes (q, v) (NULL: unchanged), which may be in the sample arrays, the state reached, and copies the previous one to
+ * the sample arrays. */
 static void run_exchange (pw_run *r, const double *q, const double *v) {
   size_t n = (size_t)r->s->coords, bytes = n * sizeof *q;
   double *other = r->scratch;
@@ -234,8 +233,8 @@ static int run_energy (pw_run *r, double *energy, pw_error *error) {
   return PW_OK;
 }
 
-/* A change of energy by the caller is not the method's: it is added to the initial energy.  The caller's functions
- * may return other values and breakpoints than before. */
+/* A change of energy by the caller is not an error of the method: it is added to the initial energy.  The caller's
+ * functions may return other values and breakpoints than before. */
 int pw_run_restart (pw_run *r, const double *q, const double *v, pw_error *error) {
   if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   double before = 0, after = 0;

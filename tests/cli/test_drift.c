@@ -175,7 +175,7 @@ static void test_bad (void **state) {
   int status =
       cli_run ("pinwheel drift ezyroller --t-end 2 --step 0.02 --methods rk4+baumgarte:alpha=1000 --only-methods");
   assert_int_equal (status, 4);
-  assert_non_null (strstr (cli_err, "pinwheel: no method has reached the end; the last of them: t = "));
+  assert_non_null (strstr (cli_err, "pinwheel: no method has reached the end; the last error: t = "));
 }
 
 int main (void) {

@@ -383,7 +383,7 @@ static void adaptive_stops (const char *method, const pw_plugin_table *table, do
 static void test_stops (void **state) {
   (void)state;
   for (int i = 0; i < ADAPT_METHODS; i++) {
-    adaptive_stops (adaptive_methods[i], &adaptive_tables[0], 1 + 100 * 1e-8, "the tolerances ask for a step below ");
+    adaptive_stops (adaptive_methods[i], &adaptive_tables[0], 1 + 100 * 1e-8, "the tolerances require a step below ");
     adaptive_stops (adaptive_methods[i], &adaptive_tables[1], 0.7, "a signal failed");
   }
 }

@@ -1,16 +1,16 @@
-/* pinwheel compare: the accuracy and the cost of methods.  A row for each method and level of its ladder of tolerances or
- * steps: one run with samples and the ledger, then timed runs of the method alone. */
+/* pinwheel compare: accuracy and cost of methods.  A row for each method and each tolerance or step: one run with samples
+ * and ledger, then timed runs without. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "reference.h"
 
 enum { COMPARE_REPEATS = 99 };
-#define COMPARE_FEW 3      /* timed runs at least, unless the limit forbids it; */
-#define COMPARE_ENOUGH 0.5 /* more until they have taken this long [s] */
+#define COMPARE_FEW 3      /* smallest number of timed runs within the limit */
+#define COMPARE_ENOUGH 0.5 /* total time [s] after which no further run is timed */
 #define COMPARE_FINER 1.2  /* ratio of the numbers of steps that shows an order */
-#define COMPARE_CLEAR 10   /* times the reference's uncertainty: halved steps then show an order to log2 1.1 = 0.14 */
-#define COMPARE_AGREE 0.1  /* of an order: the largest difference of the last two in the asymptotic range */
+#define COMPARE_CLEAR 10   /* error over uncertainty of the reference, for orders accurate to log2 1.1 = 0.14 */
+#define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
 
 typedef struct {
   pw_study study;
@@ -156,7 +156,7 @@ static int compare_plan (pw_study *s, pw_error *error) {
 
 /* ---- A row ---- */
 
-/* An error below the uncertainty of the reference is no larger than that. */
+/* Errors below the uncertainty of the reference are replaced by it, and marked. */
 static void compare_errors (pw_compare *x, pw_row *r) {
   const pw_reference *reference = &x->reference;
   double *error = &r->value[COLUMN_ERROR];
@@ -170,8 +170,8 @@ static void compare_errors (pw_compare *x, pw_row *r) {
   }
 }
 
-/* log (error before / error) over log (steps / steps before); NaN where an error is unknown or may be the reference's by more
- * than a tenth, and where the numbers of steps are much the same. */
+/* log (error before / error) over log (steps / steps before); NaN if an error is unknown or below ten times the
+ * uncertainty of the reference, or if the numbers of steps are nearly equal. */
 static double compare_order_of (const pw_compare *x, const pw_row *r) {
   const pw_row *before = r - 1;
   const double *error = &r->value[COLUMN_ERROR];

@@ -18,7 +18,7 @@ typedef struct {
   int next; /* sample */
 } sampler;
 
-/* Takes the samples that the last step has reached. */
+/* Stores the samples up to the time reached. */
 static int sampler_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
   sampler *x = (sampler *)v;
   const pw_motion *m = x->motion;
@@ -44,7 +44,7 @@ int pw_motion_run (pw_study *x, pw_row *r, pw_motion *motion, pw_error *error) {
 
 /* ---- Uncertainty ---- */
 
-/* Agreement to the bit, where columns are compared, is no better than round-off. */
+/* Sizes of coordinates and velocities; raises uncertainties to round-off. */
 static void reference_floor (const pw_system *s, pw_reference *t) {
   int n = pw_system_coordinates (s), loads = 0;
   for (int k = 0; k < t->motion.samples; k++)
@@ -70,7 +70,7 @@ typedef struct {
   pw_motion motion;
 } candidate;
 
-/* Runs one; a tolerance or step that proves too small is increased.  PW_RETRY: interrupted. */
+/* Runs a candidate; increases a tolerance or step that is too small.  PW_RETRY: interrupted. */
 static int reference_run (pw_study *x, candidate *c, pw_error *error) {
   double limit = x->cpu_end, loosest = c->row.adaptive ? REFERENCE_LOOSEST : x->t_end / REFERENCE_FEWEST;
   pw_error own = { 0 };
@@ -88,7 +88,7 @@ static int reference_run (pw_study *x, candidate *c, pw_error *error) {
   return c->good ? PW_OK : pw_study_outcome (x, &c->row, status, &own, error);
 }
 
-/* The distance of two motions relative to the size of the motion. */
+/* The distance of two motions, relative to their size. */
 static double reference_distance (const pw_system *s, const candidate *a, const candidate *b) {
   double error[MOTION_ERRORS], most = 0;
   pw_reference t = { .motion = a->motion };
@@ -107,13 +107,13 @@ static void reference_name (const candidate *c, char *text, size_t size) {
             pw_format (level, c->row.level, 4), c->row.adaptive ? "" : " s");
 }
 
-/* Whether two methods share their integrator. */
+/* 1 if two methods have the same integrator. */
 static int reference_related (const candidate *a, const candidate *b) {
   size_t n = strcspn (a->row.method, "+");
   return strncmp (a->row.method, b->row.method, n + 1) == 0;
 }
 
-/* The two that agree best, and their distance; INFINITY if there are fewer than two. */
+/* The two candidates with the smallest distance, which is returned; INFINITY if there are fewer than two. */
 static double reference_pair (const pw_system *s, const candidate *c, int related, int *best, int *with) {
   double least = INFINITY;
   for (int i = 0; i < REFERENCE_CANDIDATES; i++)
@@ -125,7 +125,7 @@ static double reference_pair (const pw_system *s, const candidate *c, int relate
   return least;
 }
 
-/* Two methods with the same integrator are used only if there are no others; the first of the two is the reference. */
+/* Selects the reference: the first of the two candidates that agree best, with different integrators if possible. */
 static void reference_choose (pw_reference *t, const pw_system *s, candidate *c) {
   int best = -1, with = -1;
   if (isinf (reference_pair (s, c, 0, &best, &with)) && isinf (reference_pair (s, c, 1, &best, &with))) return;

@@ -1,6 +1,6 @@
-/* Reference solutions of comparisons: a table, the exact solution of the model, or else computed by methods that have
- * little in common, each at its tightest.  Of the two that agree best one is the reference; its uncertainty is their
- * distance. */
+/* Reference solutions of comparisons: a table, the exact solution of the model, or else computed by independent
+ * methods at tight tolerances.  Of the two that agree best, the first is the reference; their distance is its
+ * uncertainty. */
 #ifndef PW_REFERENCE_H
 #define PW_REFERENCE_H
 
@@ -11,7 +11,7 @@ enum { REFERENCE_CANDIDATES = 4 };
 
 typedef struct {
   pw_motion motion;
-  int known;                         /* 0: there is none */
+  int known;                         /* 0: there is no reference */
   double uncertainty[MOTION_ERRORS]; /* 0 where nothing is compared */
   double size[MOTION_UNITS];         /* largest coordinate or velocity */
   char about[300];                   /* "erk8+projection, rtol 3e-14" or the file's name */

@@ -1,12 +1,12 @@
-/* The common parts of compare and drift: methods, runs, the course of the command. */
+/* Common functions of compare and drift: methods, runs, the sequence of a command. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "study.h"
 
-#define STUDY_SHORT 0.005 /* batches of steps that took less CPU time [s] become longer */
-#define STUDY_LONG 0.02   /* and those that took more become shorter */
+#define STUDY_SHORT 0.005 /* CPU time [s] of a batch of steps below which batches become longer */
+#define STUDY_LONG 0.02   /* and above which they become shorter */
 
 /* ---- Methods ---- */
 
@@ -23,7 +23,7 @@ static int methods_add (pw_study *x, const char *name, pw_error *error) {
   return PW_OK;
 }
 
-/* Every stabilisation of an integrator, or of all of them: NULL. */
+/* Adds every stabilisation of an integrator; NULL: of all integrators. */
 static int methods_add_all (pw_study *x, const pw_method *integrator, pw_error *error) {
   char name[STUDY_NAME];
   int status = PW_OK;
@@ -82,7 +82,7 @@ pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int 
   return r;
 }
 
-/* In batches, so that clocks are read seldom. */
+/* Advances in batches of steps, so that clocks are read rarely. */
 static int study_steps (pw_study *x, pw_row *r, pw_run *run, pw_study_visitor *v, pw_error *error) {
   int status = PW_OK;
   long batch = 8;
@@ -148,7 +148,7 @@ static int study_open_folder (pw_study *x, pw_error *error) {
   return x->lock < 0 ? error->status : pw_table_open (x, error);
 }
 
-/* Steps of all rows, each by `repeats` runs. */
+/* Estimated number of steps of all runs. */
 static double study_work (const pw_study *x) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   double steps = 0;
@@ -160,7 +160,7 @@ static double study_work (const pw_study *x) {
   return steps;
 }
 
-/* One engine for all runs, since their times are compared. */
+/* All runs use the same engine, since their times are compared. */
 static int study_engine (pw_study *x, pw_error *error) {
   pw_specialise when;
   int status = pw_cli_specialise (x->line.specialise, &when, error);
@@ -217,7 +217,7 @@ static int study_verdict (const pw_study *x, pw_error *error) {
     if (r->state == ROW_DONE) return PW_OK;
     if (r->state == ROW_FAILED || r->state == ROW_REFUSED) failed = r;
   }
-  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last of them: %s", failed->reason)
+  return failed ? pw_fail (error, PW_METHOD, "no method has reached the end; the last error: %s", failed->reason)
                 : pw_fail (error, PW_METHOD, "no method has reached the end within the limit; see --limit");
 }
 

@@ -15,13 +15,13 @@ enum {
   STUDY_COORDINATES = 5 /* of a point in a figure, at most */
 };
 
-/* Done; failed; refused when the run was opened; stopped at the time limit; not run since it would reach that. */
+/* Done; failed; refused when the run was opened; stopped at the time limit; not run, since it would exceed the limit. */
 typedef enum { ROW_DONE, ROW_FAILED, ROW_REFUSED, ROW_STOPPED, ROW_SKIPPED } pw_row_state;
 
 typedef struct {
   char method[STUDY_NAME]; /* with options */
-  char label[STUDY_NAME];  /* of its line in the figure */
-  int group, line;         /* of the table, and of the group's figure, from 0 */
+  char label[STUDY_NAME];  /* label of its line in the figure */
+  int group, line;         /* group of rows in the table; line in the figure of the group */
   int adaptive;            /* 1: the step size follows a tolerance */
   double level;            /* of compare: tolerance, or step size [s] */
   pw_row_state state;
@@ -32,7 +32,7 @@ typedef struct {
   char reason[500];
   double value[STUDY_COLUMNS]; /* NaN: unknown */
   unsigned below;              /* bit i: value i is an upper bound */
-  int points;                  /* in the figure; undefined ones have a NaN */
+  int points;                  /* number of points in the figure; undefined ones are NaN */
   double (*point)[STUDY_COORDINATES];
 } pw_row;
 
@@ -40,11 +40,11 @@ typedef struct pw_study pw_study;
 
 /* A column of the table, which is in the CSV file, on the terminal, or both. */
 typedef struct {
-  const char *name, *unit;                                      /* in the file; NULL: not there, without unit */
+  const char *name, *unit;                                      /* in the CSV file; NULL: not there; without unit */
   const char *head;                                             /* on the terminal; NULL: not there */
-  int width;                                                    /* on the terminal, spaces on its left included */
-  const char *format;                                           /* of its number on the terminal: "%.1e" */
-  const char *(*text) (const pw_row *r, char text[STUDY_NAME]); /* or its text; NULL: it has a number */
+  int width;                                                    /* on the terminal, including spaces before it */
+  const char *format;                                           /* of numbers on the terminal: "%.1e" */
+  const char *(*text) (const pw_row *r, char text[STUDY_NAME]); /* the text; NULL: the column contains numbers */
 } pw_study_column;
 
 const char *pw_study_method (const pw_row *r, char text[STUDY_NAME]);
@@ -52,18 +52,19 @@ const char *pw_study_status (const pw_row *r, char text[STUDY_NAME]); /* "ok", "
 
 /* What a command provides.  Functions return a status. */
 typedef struct {
-  const char *tables[2];         /* CSV files in the folder: that of the rows, and a further one */
-  const char *unit;              /* of the progress: "rows" */
-  const char *const *group;      /* headings of the groups */
-  const char *above;             /* line above the heads of columns */
-  const pw_study_column *column; /* ended by one without name and head; those before "status" are shown of every row */
-  int runs;                      /* of a row, about */
-  int time, steps;               /* columns of the time reached, and of the first of the counts of a run */
+  const char *tables[2];    /* CSV files in the folder: rows, and a further one or NULL */
+  const char *unit;         /* of the progress: "rows" */
+  const char *const *group; /* headings of the groups */
+  const char *above;        /* line above the heads of columns */
+  const pw_study_column
+      *column;     /* ended by one without name and head; those up to "status" are printed for every row */
+  int runs;        /* approximate number per row */
+  int time, steps; /* columns of the time reached, and of the first count of a run */
   /* Reads options, once the model is open; adds the rows. */
   int (*plan) (pw_study *x, pw_error *error);
-  /* Before the first row, with signals caught: writes what precedes the table. */
+  /* Before the first row, with signals caught: prints the text above the table. */
   int (*begin) (pw_study *x, pw_error *error);
-  /* Measures a row by pw_study_run; pw_study_outcome makes a method's failure a row. */
+  /* Measures a row by pw_study_run; pw_study_outcome records a failure of the method in the row. */
   int (*measure) (pw_study *x, pw_row *r, pw_error *error);
   /* After the last row, if there is a folder: further tables, data and scripts of figures. */
   int (*figures) (pw_study *x, pw_error *error);
@@ -83,12 +84,12 @@ struct pw_study {
   pw_limit limit; /* of settings.stop */
   double t_end;   /* [s] */
   double cpu_end; /* CPU time of a run after which it is stopped between steps [s] */
-  /* under way */
+  /* progress */
   int lock; /* of the folder; -1: none */
   pw_row *row;
   int rows, done;
   pw_progress progress;
-  double share;                          /* of a run in the progress of its row */
+  double share;                          /* part of a run in the progress of its row */
   pw_output *csv;                        /* NULL: none */
   const char *drawn[FIGURE_SCRIPTS + 1]; /* scripts */
 };

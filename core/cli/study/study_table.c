@@ -20,7 +20,7 @@ static int table_is_end (const pw_study_column *c) {
 
 /* ---- CSV ---- */
 
-/* The file gets rows as they come, under the name NAME.part, which it keeps if the study is stopped. */
+/* Rows are written as they finish, to NAME.part, which remains if the study is stopped. */
 int pw_table_open (pw_study *x, pw_error *error) {
   pw_text t = { .at = NULL };
   x->csv = pw_figure_open (x->folder, x->type->tables[0], error);
@@ -66,7 +66,7 @@ static void table_number (const pw_row *r, const pw_study_column *c, int i) {
   printf ("%*s", c->width, text);
 }
 
-/* Columns after the status are printed of rows that are done. */
+/* Columns after the status are printed only for finished rows. */
 static void table_print (const pw_study *x, const pw_row *r) {
   char t[32];
   int shown = 1;
