@@ -22,6 +22,7 @@ typedef struct pw_scene {
   int (*update) (void *workspace, double t, const double *q, const double *v); /* evaluates u; non-zero: failed */
   void *workspace;
   double length, speed; /* scales of residuals [m], [m/s] */
+  double alpha, beta;   /* Baumgarte's [1/s]; 0: none */
   double follows;       /* largest scaled residual of redundant equations */
 
   /* Results of `project`: iterations; scaled and absolute residuals of positions and velocities. */

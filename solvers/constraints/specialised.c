@@ -42,6 +42,7 @@ int pw_specialised_open (pw_run *r, pw_error *error) {
   r->scene = malloc (sizeof *r->scene);
   if (r->scene == NULL || specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);
   r->scene->follows = r->limits.follows;
+  r->scene->alpha = r->alpha, r->scene->beta = r->beta;
   r->scene_ready = code->prepare (r->scene) == 0;
   pw_specialised_select (r);
   return PW_OK;
@@ -62,7 +63,7 @@ void pw_specialised_close (pw_run *r) {
 /* 1 where the general engine has more to do than to evaluate. */
 static int specialised_is_unsuitable (pw_run *r) {
   return r->specialised == NULL || r->least_norm || (r->geometry.alert && r->geometry.saddle) || r->near ||
-         r->w->hold || r->alpha + r->beta > 0;
+         r->w->hold;
 }
 
 static void specialised_evaluated (pw_run *r, const double *q, const double *v) {
