@@ -5,7 +5,7 @@
 
 /* ---- Elimination ---- */
 
-static void massless_copy (pw_component *c) {
+PW_INLINE void massless_copy (pw_component *c) {
   const pw_massless_group *end = c->group + c->groups;
   double *row = c->A;
   for (const pw_massless_row *r = c->row; r < c->row + c->rows; r++, row += c->stride) {

@@ -23,6 +23,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "nullspace.h"
+#include "unroll.h"
 #include "util.h"
 
 /* ---- Opening ---- */
@@ -64,59 +65,64 @@ void pw_nullspace_close (pw_nullspace *b) {
   *b = (pw_nullspace){ 0 };
 }
 
-/* ---- K mu = eta - J w ---- */
+/* ---- K mu = eta - J w; m, the number of rows, is a constant where it is usual ---- */
 
 /* K_i += J_i (W^-1 J0^T), mu_i -= J_i w, for the entries of row i in columns j to j + width - 1: 3 of a body, or 1. */
-static void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w) {
-  const int m = b->rows;
-  double *restrict K = b->K + i * m, sum = 0;
-  const double *restrict x = b->reference + j * m, J0 = J[0], J1 = width == 3 ? J[1] : 0, J2 = width == 3 ? J[2] : 0;
-  for (int n = 0; width == 3 && n < m; n++) K[n] += J0 * x[n] + J1 * x[m + n] + J2 * x[2 * m + n];
-  for (int n = 0; width == 1 && n < m; n++) K[n] += J0 * x[n];
-  for (int c = 0; c < width; c++) sum += J[c] * w[j + c];
-  b->mu[i] -= sum;
+PW_INLINE void nullspace_gather (pw_nullspace *b, int i, int j, int width, const double *J, const double *w, int m) {
+  double *restrict K = b->K + i * m;
+  const double *restrict x = b->reference + j * m, *restrict y = x + m, *restrict z = y + m, a = J[0];
+  if (width == 1) {
+    PW_UNROLL for (int n = 0; n < m; n++) K[n] += a * x[n];
+    b->mu[i] -= a * w[j];
+  } else {
+    const double c = J[1], d = J[2];
+    PW_UNROLL for (int n = 0; n < m; n++) K[n] += a * x[n] + c * y[n] + d * z[n];
+    b->mu[i] -= a * w[j] + c * w[j + 1] + d * w[j + 2];
+  }
 }
 
 /* Assembles K and the right-hand side, or, without w, W^-1 J0^T, from the J last evaluated. */
-static void nullspace_assemble (pw_nullspace *b, const pw_run *r, const double *w) {
+PW_INLINE void nullspace_assemble (pw_nullspace *b, const pw_run *r, const double *w, int m) {
   const pw_system *s = r->s;
-  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++)
-    for (int n = 0; n < k->b.count * k->kind->rows; n++)
-      for (int c = 0, i = b->place[k->row + n], width; i >= 0 && c < k->b.cols; c += width) {
+  for (const pw_element_batch *k = r->w->batch; k < r->w->batch + s->constraints; k++) {
+    const int cols = k->b.cols, of_bodies = 3 * k->kind->bodies;
+    const double *J = k->J;
+    for (int n = 0; n < k->b.count * k->kind->rows; n++, J += cols)
+      for (int i = b->place[k->row + n], c = i < 0 ? cols : 0, width; c < cols; c += width) {
         int j = pw_global (k, n / k->kind->rows, c);
-        const double *J = k->J + n * k->b.cols + c;
-        width = c < 3 * k->kind->bodies ? 3 : 1;
-        if (w && j < s->coords) nullspace_gather (b, i, j, width, J, w);
+        width = c < of_bodies ? 3 : 1;
+        if (w && j < s->coords) nullspace_gather (b, i, j, width, J + c, w, m);
         for (int x = 0; w == NULL && j < s->coords && x < width; x++)
-          b->reference[(j + x) * b->rows + i] = J[x] / s->metric[j + x];
+          b->reference[(j + x) * m + i] = J[c + x] / s->metric[j + x];
       }
+  }
 }
 
 /* Sets K to 0 and mu to eta, and assembles. */
-static void nullspace_assemble_system (pw_nullspace *b, pw_run *r, const double *w) {
-  memset (b->K, 0, (size_t)(b->rows * b->rows) * sizeof *b->K);
+PW_INLINE void nullspace_assemble_system (pw_nullspace *b, pw_run *r, const double *w, int m) {
+  memset (b->K, 0, (size_t)(m * m) * sizeof *b->K);
   if (r->s->rheonomic) pw_evaluate_eta (r->w, b->eta); /* else it stays 0 */
   for (int i = 0; i < r->s->rows; i++)
     if (b->place[i] >= 0) b->mu[b->place[i]] = b->eta[i];
-  nullspace_assemble (b, r, w);
+  nullspace_assemble (b, r, w, m);
 }
 
 /* mu = K^-1 mu without pivoting; K is factorised in place.  Returns 0 if a pivot is smaller than `least` times its
  * diagonal entry. */
-static int nullspace_eliminate (double *K, double *mu, int m) {
+PW_INLINE int nullspace_eliminate (double *restrict K, double *restrict mu, int m) {
   const double least = 0.01;
-  for (int p = 0; p < m; p++) {
+  PW_UNROLL for (int p = 0; p < m; p++) {
     double diagonal = K[p * m + p];
-    for (int i = 0; i < p; i++) {
+    PW_UNROLL for (int i = 0; i < p; i++) {
       double f = K[p * m + i] * K[i * m + i];
-      for (int j = i + 1; j < m; j++) K[p * m + j] -= f * K[i * m + j];
+      PW_UNROLL for (int j = i + 1; j < m; j++) K[p * m + j] -= f * K[i * m + j];
       mu[p] -= f * mu[i];
     }
     if (!(K[p * m + p] > least * diagonal)) return 0;
     K[p * m + p] = 1 / K[p * m + p];
   }
-  for (int i = m - 1; i >= 0; i--) {
-    for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
+  PW_UNROLL for (int i = m - 1; i >= 0; i--) {
+    PW_UNROLL for (int j = i + 1; j < m; j++) mu[i] -= K[i * m + j] * mu[j];
     mu[i] *= K[i * m + i];
   }
   return 1;
@@ -146,32 +152,41 @@ static int nullspace_eliminate_pivoted (pw_nullspace *b) {
   return PW_OK;
 }
 
+/* v += W^-1 J0^T mu */
+PW_INLINE void nullspace_add (const pw_nullspace *b, int coords, double *v, int m) {
+  const double *reference = b->reference;
+  for (int j = 0; j < coords; j++, reference += m) {
+    double sum = 0;
+    PW_UNROLL for (int n = 0; n < m; n++) sum += reference[n] * b->mu[n];
+    v[j] += sum;
+  }
+}
+
 /* ---- A step ---- */
 
 int pw_nullspace_begin (pw_nullspace *b, pw_run *r) {
   int status = pw_update_kinematics (r->w, r->t, r->q, r->v);
   if (status != PW_OK) return status;
   pw_evaluate_J (r->w);
-  nullspace_assemble (b, r, NULL);
+  nullspace_assemble (b, r, NULL, b->rows);
   return PW_OK;
 }
 
-/* Solves K mu = eta - J w; PW_RETRY if K is singular. */
-static int nullspace_multipliers (pw_nullspace *b, pw_run *r, const double *w) {
-  nullspace_assemble_system (b, r, w);
-  if (nullspace_eliminate (b->K, b->mu, b->rows)) return PW_OK;
-  nullspace_assemble_system (b, r, w);
-  return nullspace_eliminate_pivoted (b);
+/* v += W^-1 J0^T mu, with mu found without pivoting; returns 0 if a pivot is too small. */
+PW_INLINE int nullspace_solve (pw_nullspace *b, pw_run *r, double *v, int m) {
+  nullspace_assemble_system (b, r, v, m);
+  if (!nullspace_eliminate (b->K, b->mu, m)) return 0;
+  nullspace_add (b, r->s->coords, v, m);
+  return 1;
 }
 
-/* v += W^-1 J0^T mu at the J last evaluated. */
+/* v += W^-1 J0^T mu at the J last evaluated.  PW_RETRY if K is singular. */
 static int nullspace_correct_velocities (pw_nullspace *b, pw_run *r, double *v) {
-  if (nullspace_multipliers (b, r, v) != PW_OK) return PW_RETRY;
-  const double *reference = b->reference;
-  for (int j = 0; j < r->s->coords; j++, reference += b->rows) {
-    double sum = 0;
-    for (int n = 0; n < b->rows; n++) sum += reference[n] * b->mu[n];
-    v[j] += sum;
+  const int m = b->rows;
+  if (!(m == 4 ? nullspace_solve (b, r, v, 4) : nullspace_solve (b, r, v, m))) {
+    nullspace_assemble_system (b, r, v, m);
+    if (nullspace_eliminate_pivoted (b) != PW_OK) return PW_RETRY;
+    nullspace_add (b, r->s->coords, v, m);
   }
   return pw_update_velocities (r->w, v);
 }
