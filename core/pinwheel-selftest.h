@@ -44,13 +44,13 @@ typedef struct {
   double scaled;   /* worst residual over the sum of the absolute values of its terms; inf: NaN */
   double absolute; /* largest residual, in the units of its equation */
   char name[80];   /* the equation with the worst scaled residual: "B.Fx", "frame.vx" */
-} pw_verdict;
+} pw_worst_residual;
 
 typedef struct {
-  pw_verdict position;     /* g (q, t) = 0 */
-  pw_verdict velocity;     /* J v = eta */
-  pw_verdict acceleration; /* J a = gamma */
-  pw_verdict force;        /* M a + J^T lambda = f; absolute in N or N m */
+  pw_worst_residual position;     /* g (q, t) = 0 */
+  pw_worst_residual velocity;     /* J v = eta */
+  pw_worst_residual acceleration; /* J a = gamma */
+  pw_worst_residual force;        /* M a + J^T lambda = f; absolute in N or N m */
 } pw_verification;
 
 /* Recomputes all four residuals at a state, element by element, without any solver code.  q, v and a:

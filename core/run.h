@@ -104,7 +104,7 @@ typedef struct {
   size_t used; /* bytes saved or loaded so far */
   size_t size; /* saving: capacity; loading: bytes available */
   int loading; /* 1: loading, 0: saving */
-  int failed;  /* 1: out of memory, or the data end too early or are invalid */
+  int failed;  /* 1: out of memory, or the data are truncated or invalid */
 } pw_archive;
 
 /* Saves or loads bytes, so that one function that lists the parts of a state does both. */

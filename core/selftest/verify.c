@@ -71,7 +71,7 @@ static void verify_forces (verify *x, const pw_element_batch *k) {
   }
 }
 
-/* ---- Verdicts ---- */
+/* ---- Worst residuals ---- */
 
 /* Sets the size of every coordinate to the largest force in the scene, but at least the largest mass times L / T^2;
  * moments are divided by L. */
@@ -89,18 +89,18 @@ typedef char *verify_name (const pw_system *s, int i, char *buffer, size_t size)
 
 /* The worst of n residuals; `floor` is added to each size. */
 static void verify_worst (const pw_system *s, int n, const double *residual, const double *size, double floor,
-                          verify_name *name, int first, pw_verdict *verdict) {
+                          verify_name *name, int first, pw_worst_residual *worst_residual) {
   int worst = -1;
-  *verdict = (pw_verdict){ 0 };
+  *worst_residual = (pw_worst_residual){ 0 };
   for (int i = 0; i < n; i++) {
     double error = fabs (residual[i]), scaled = error > 0 ? error / (size[i] + floor) : error;
     if (isnan (error)) error = scaled = INFINITY;
-    verdict->absolute = fmax (verdict->absolute, error);
-    if (worst >= 0 && scaled <= verdict->scaled) continue;
-    verdict->scaled = scaled;
+    worst_residual->absolute = fmax (worst_residual->absolute, error);
+    if (worst >= 0 && scaled <= worst_residual->scaled) continue;
+    worst_residual->scaled = scaled;
     worst = i;
   }
-  if (worst >= 0) name (s, first + worst, verdict->name, sizeof verdict->name);
+  if (worst >= 0) name (s, first + worst, worst_residual->name, sizeof worst_residual->name);
 }
 
 static void verify_all (verify *x, const double *v, const double *a, const double *lambda, pw_verification *result) {
@@ -121,14 +121,14 @@ static void verify_all (verify *x, const double *v, const double *a, const doubl
 }
 
 /* The largest array that a function of an element type in use fills. */
-static size_t verify_room (const pw_system *s) {
-  size_t most = 1;
+static size_t verify_block_size (const pw_system *s) {
+  size_t largest = 1;
   for (int i = 0; i < s->batches; i++) {
     const pw_element_batch *k = &s->batch[i];
     size_t n = (size_t)k->b.count * (size_t)k->b.cols * (size_t)(k->kind->rows > 0 ? k->kind->rows : 1);
-    if (n > most) most = n;
+    if (n > largest) largest = n;
   }
-  return most;
+  return largest;
 }
 
 int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double *q, const double *v, const double *a,
@@ -138,7 +138,7 @@ int pw_verify (const pw_system *s, const pw_scale *scale, double t, const double
   const pw_array array[] = {
     { &x.position, rows },          { &x.velocity, rows },      { &x.acceleration, rows },
     { &x.force, coords },           { &x.position_size, rows }, { &x.velocity_size, rows },
-    { &x.acceleration_size, rows }, { &x.force_size, coords },  { &x.block, verify_room (s) },
+    { &x.acceleration_size, rows }, { &x.force_size, coords },  { &x.block, verify_block_size (s) },
   };
   char *memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   pw_workspace *w = memory ? pw_workspace_new (s, NULL) : NULL;

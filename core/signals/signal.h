@@ -25,7 +25,7 @@ double pw_signal_breakpoint (const pw_signal *s, int knots, double t);
 
 /* ---- Tables (table.c) ---- */
 
-/* The signal at a point. */
+/* The signal at point i of a table. */
 static inline double pw_table_value (const pw_signal *s, int i) {
   double scale = s->table.scale == 0 ? 1 : s->table.scale;
   return s->table.offset + scale * s->table.value[i];

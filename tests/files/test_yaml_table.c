@@ -218,7 +218,7 @@ static void test_scale (void **state) {
   pw_error error = table_build ("{file: data.csv, scale: 2*deg, offset: -1}", &s, point);
   check_ok (error.status, &error);
   assert_true (s.table.scale == 2 * (PW_PI / 180) && s.table.offset == -1 && point[1][1] == 3);
-  table_bad ("{points: [[0, 1], [1, 2]], scale: 0}", "scale: 0 would leave nothing of the table");
+  table_bad ("{points: [[0, 1], [1, 2]], scale: 0}", "scale: 0 makes the table zero");
   table_bad ("{points: [[0, 1], [1, 1e300]], scale: 1e300}", "point 2: 1e+300 * 1e+300 + 0");
 }
 
@@ -238,7 +238,7 @@ static void test_places (void **state) {
   (void)state;
   table_write ("data.csv", "0,1\n1,2\n", 8);
   snprintf (outside, sizeof outside, "{file: %s/data.csv}", table_folder);
-#define OWN "a table lies in the model's own folder, so its path is relative and has no \"..\""
+#define OWN "a table must be in the model's folder: its path is relative and has no \"..\""
 #define LINK "it is a link that leads out of the model's folder"
   table_bad (outside, OWN);
   table_bad ("{file: ../data.csv}", OWN);

@@ -242,7 +242,7 @@ static void agree_verify (int scene, const agree_bound *bound) {
     char what[120];
     const struct {
       const char *name;
-      const pw_verdict *verdict;
+      const pw_worst_residual *verdict;
       double bound;
     } each[] = { { "g", &v.position, bound->position },
                  { "J v", &v.velocity, bound->velocity },

@@ -15,11 +15,11 @@
 typedef struct {
   const pw_expression *x;
   double from;
-  int left;                                 /* remaining intervals */
+  int remaining;                            /* intervals that may still be tested */
   int equal;                                /* intervals of the least width without a change */
-  int patience;                             /* number of these after which `narrow` doubles */
-  double narrow;                            /* relative width below which intervals are not bisected */
-  double until;                             /* end of the noise; INFINITY without noisy operations */
+  int max_equal;                            /* number of these after which `min_width` doubles */
+  double min_width;                         /* relative width below which intervals are not bisected */
+  double noise_end;                         /* end of the noise; INFINITY without noisy operations */
   unsigned char noisy[PW_EXPRESSION_CODES]; /* per operation: changes repeatedly */
 } search;
 
@@ -60,23 +60,23 @@ static int search_mark_noisy (search *s, double a, double b) {
   const double width = 1e-6 * (1 + fabs (b));
   double value[2][PW_EXPRESSION_CODES];
   short changes[PW_EXPRESSION_CODES] = { 0 };
-  int more = 0;
+  int marked = 0;
   search_evaluate (s, a, value[0]);
   for (int k = 1; k <= 512; k++) {
     search_evaluate (s, k <= 256 ? a + (b - a) * (k / 256.0) : b + width * (k / 256.0 - 1), value[k % 2]);
     for (int i = 0; i < s->x->codes; i++)
-      if (search_changed (value[0][i], value[1][i]) && ++changes[i] > 8 && !s->noisy[i]) s->noisy[i] = 1, more = 1;
+      if (search_changed (value[0][i], value[1][i]) && ++changes[i] > 8 && !s->noisy[i]) s->noisy[i] = 1, marked = 1;
   }
-  if (more) s->until = fmin (s->until, b + 1e-2 * (1 + fabs (b)));
-  return more;
+  if (marked) s->noise_end = fmin (s->noise_end, b + 1e-2 * (1 + fabs (b)));
+  return marked;
 }
 
 static double search_first (search *s, double a, double b) {
-  if (s->left-- <= 0) return fmax (a, nextafter (s->from, INFINITY));
+  if (s->remaining-- <= 0) return fmax (a, nextafter (s->from, INFINITY));
   if (!pw_expression_range (s->x, s->noisy, a, b).breaks) return INFINITY;
-  if (b - a <= s->narrow * (fmax (fabs (a), fabs (b)) + s->narrow) + 1e-18) {
+  if (b - a <= s->min_width * (fmax (fabs (a), fabs (b)) + s->min_width) + 1e-18) {
     if (search_differ (s, a, b)) return search_mark_noisy (s, a, b) ? search_first (s, a, b) : search_bisect (s, a, b);
-    if (++s->equal % s->patience == 0) s->narrow = fmin (2 * s->narrow, 0x1p-10);
+    if (++s->equal % s->max_equal == 0) s->min_width = fmin (2 * s->min_width, 0x1p-10);
     return INFINITY;
   }
   double middle = a + (b - a) / 2, first = search_first (s, a, middle);
@@ -86,14 +86,16 @@ static double search_first (search *s, double a, double b) {
 /* At the limit of the search, or with noise, returns a time that is not a breakpoint; the next call continues there. */
 double pw_expression_breakpoint (const pw_expression *x, double t) {
   const double latest = 1e18;
-  search s = { .x = x, .from = t, .left = 400 + 4000000 / (100 + x->codes), .narrow = 0x1p-36, .until = INFINITY };
-  s.patience = 1 + s.left / 120; /* 36 doublings, of two or three intervals each, before the limit */
+  search s = {
+    .x = x, .from = t, .remaining = 400 + 4000000 / (100 + x->codes), .min_width = 0x1p-36, .noise_end = INFINITY
+  };
+  s.max_equal = 1 + s.remaining / 120; /* 36 doublings, of two or three intervals each, before the limit */
   double a = t, found = INFINITY;
   if (!x->breaks) return INFINITY;
   for (double w = 1e-9 * (1 + fabs (t)); a < latest && found == INFINITY; w *= 2) {
-    if (a >= s.until || (s.until == INFINITY && !pw_expression_range (x, s.noisy, a, latest).breaks)) break;
+    if (a >= s.noise_end || (s.noise_end == INFINITY && !pw_expression_range (x, s.noisy, a, latest).breaks)) break;
     found = search_first (&s, a, a + w);
     a += w;
   }
-  return fmin (found, s.until);
+  return fmin (found, s.noise_end);
 }

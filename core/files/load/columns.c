@@ -9,7 +9,7 @@
 #include <string.h>
 #include "files.h"
 
-enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MOST = 1000000 }; /* bytes; lines of numbers */
+enum { COLUMNS_MAX_BYTES = 64 << 20, COLUMNS_MAX_LINES = 1000000 }; /* bytes; lines of numbers */
 
 typedef struct {
   const char *shown; /* path for messages */
@@ -69,63 +69,63 @@ static int columns_names (const columns *c, const char *line) {
   return 1;
 }
 
-/* ---- Which columns ---- */
+/* ---- Selection of columns ---- */
 
 /* Finds a column from its name in the first line, with or without its unit, or from its number. */
-static int columns_find (const columns *c, const char *first, int named, const char *name, int *place) {
+static int columns_find (const columns *c, const char *first, int named, const char *name, int *index) {
   char cell[100], unit[100], best[100] = "", hint[200], *end;
   pw_nearest near = { .sought = name };
   long number = strtol (name, &end, 10);
-  if (*end == 0 && number >= 1 && number <= c->cells) return *place = (int)number - 1, PW_OK;
+  if (*end == 0 && number >= 1 && number <= c->cells) return *index = (int)number - 1, PW_OK;
   if (*end == 0)
     return columns_fail (c, "there is no column %.20s: the line has %d cell%s", name, c->cells,
                          c->cells == 1 ? "" : "s");
-  *place = -1;
+  *index = -1;
   for (int i = 0; named && i < c->cells; i++) {
-    int here = strcmp (columns_cell (c, first, i, cell, sizeof cell), name) == 0;
+    int matches = strcmp (columns_cell (c, first, i, cell, sizeof cell), name) == 0;
     cell[pw_unit_split (cell, unit, sizeof unit)] = 0;
-    here |= strcmp (cell, name) == 0;
+    matches |= strcmp (cell, name) == 0;
     pw_nearest_try (&near, cell);
     if (near.best == cell) near.best = strcpy (best, cell);
-    if (here && *place >= 0)
-      return columns_fail (c, "columns %d and %d are both named \"%.60s\"", *place + 1, i + 1, name);
-    if (here) *place = i;
+    if (matches && *index >= 0)
+      return columns_fail (c, "columns %d and %d are both named \"%.60s\"", *index + 1, i + 1, name);
+    if (matches) *index = i;
   }
-  if (*place >= 0) return PW_OK;
+  if (*index >= 0) return PW_OK;
   if (!named) return columns_fail (c, "there are no names of columns before the numbers, so no \"%.60s\"", name);
   return columns_fail (c, "there is no column \"%.60s\"%s", name, pw_nearest_text (&near, hint, sizeof hint));
 }
 
 /* Finds a column and its conversion factor. */
-static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit, int *place,
+static int columns_open (const columns *c, const char *first, int named, const char *name, const char *unit, int *index,
                          double *factor) {
-  char cell[100], why[260];
+  char cell[100], reason[260];
   *factor = 1;
-  if (columns_find (c, first, named, name, place) != PW_OK) return PW_INPUT;
-  columns_cell (c, first, *place, cell, sizeof cell);
-  if (!named || pw_unit_check (cell, unit, factor, why, sizeof why) == PW_OK) return PW_OK;
-  return columns_fail (c, "%s", why);
+  if (columns_find (c, first, named, name, index) != PW_OK) return PW_INPUT;
+  columns_cell (c, first, *index, cell, sizeof cell);
+  if (!named || pw_unit_check (cell, unit, factor, reason, sizeof reason) == PW_OK) return PW_OK;
+  return columns_fail (c, "%s", reason);
 }
 
 /* ---- Numbers ---- */
 
-static int columns_number (const columns *c, const char *line, int place, double factor, double *value) {
+static int columns_number (const columns *c, const char *line, int index, double factor, double *value) {
   char cell[100];
-  columns_cell (c, line, place, cell, sizeof cell);
+  columns_cell (c, line, index, cell, sizeof cell);
   if (pw_read_number (cell, value) != PW_OK || !isfinite (*value))
-    return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", place + 1, cell);
+    return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", index + 1, cell);
   *value *= factor;
   if (isfinite (*value)) return PW_OK;
-  return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", place + 1, cell);
+  return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", index + 1, cell);
 }
 
-static int columns_rows (columns *c, char *line, const int place[2], const double factor[2], double *value[2],
+static int columns_rows (columns *c, char *line, const int index[2], const double factor[2], double *value[2],
                          int *count) {
   for (int n = 0; line; line = columns_line (c), *count = ++n) {
     int cells = columns_count (c, line);
     if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
     for (int k = 0; k < 2; k++)
-      if (columns_number (c, line, place[k], factor[k], &value[k][n]) != PW_OK) return PW_INPUT;
+      if (columns_number (c, line, index[k], factor[k], &value[k][n]) != PW_OK) return PW_INPUT;
     if (n > 0 && !(value[0][n] > value[0][n - 1]))
       return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[0][n], value[0][n - 1]);
   }
@@ -134,22 +134,22 @@ static int columns_rows (columns *c, char *line, const int place[2], const doubl
 
 static int columns_all (columns *c, const char *const column[2], const char *const unit[2], pw_arena *arena,
                         double *value[2], int *count) {
-  int place[2];
+  int index[2];
   double factor[2];
   size_t lines = 1;
   for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL; p++) lines++;
   char *line = columns_line (c);
   if (line == NULL) return columns_fail (c, "the file is empty");
-  if (lines > COLUMNS_MOST) return columns_fail (c, "more than %d lines", COLUMNS_MOST);
+  if (lines > COLUMNS_MAX_LINES) return columns_fail (c, "more than %d lines", COLUMNS_MAX_LINES);
   c->separator = strchr (line, ',') ? ',' : strchr (line, ';') ? ';' : '\t';
   c->cells = columns_count (c, line);
   int named = columns_names (c, line);
   for (int k = 0; k < 2; k++) {
-    if (columns_open (c, line, named, column[k], unit[k], &place[k], &factor[k]) != PW_OK) return PW_INPUT;
+    if (columns_open (c, line, named, column[k], unit[k], &index[k], &factor[k]) != PW_OK) return PW_INPUT;
     value[k] = pw_arena_alloc (arena, lines * sizeof (double));
     if (value[k] == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
   }
-  return columns_rows (c, named ? columns_line (c) : line, place, factor, value, count);
+  return columns_rows (c, named ? columns_line (c) : line, index, factor, value, count);
 }
 
 int pw_columns_read (FILE *f, const char *shown, const char *const column[2], const char *const unit[2],

@@ -9,7 +9,7 @@
 struct pw_csv {
   pw_output *output;
   FILE *f;
-  int cells;               /* of the current line, so far */
+  int cells;               /* written in the current line */
   pw_workspace *workspace; /* for contact points; NULL if the system has none */
   int ledger;
   double (*contact)[3]; /* contact points of the system */

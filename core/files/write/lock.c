@@ -20,11 +20,11 @@ static int lock_acquire (int file) {
   return 0;
 }
 
-const char *pw_lock_reason (int why) {
-  return why == EWOULDBLOCK ? "another process is writing it"
-         : why == ELOOP     ? "its temporary name is a symbolic link"
-         : why == ENODEV    ? "its temporary name is not that of a regular file"
-                            : strerror (why);
+const char *pw_lock_reason (int code) {
+  return code == EWOULDBLOCK ? "another process is writing it"
+         : code == ELOOP     ? "its temporary name is a symbolic link"
+         : code == ENODEV    ? "its temporary name is not that of a regular file"
+                             : strerror (code);
 }
 
 /* Does not follow links; a new file must not exist. */
@@ -39,25 +39,25 @@ static int lock_open (const char *path, pw_lock_how how, int *created) {
   return open (path, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY | O_CLOEXEC);
 }
 
-/* Locks the open file.  0 or an errno value; ESTALE if the path now means another file. */
+/* Locks the open file.  0 or an errno value; ESTALE if the path now names another file. */
 static int lock_opened (int file, const char *path) {
   struct stat info, now;
   if (fstat (file, &info) != 0) return errno;
   if (!S_ISREG (info.st_mode)) return ENODEV;
-  int why = lock_acquire (file);
-  if (why) return why;
+  int code = lock_acquire (file);
+  if (code) return code;
   return lstat (path, &now) == 0 && now.st_dev == info.st_dev && now.st_ino == info.st_ino ? 0 : ESTALE;
 }
 
 int pw_lock_file (const char *path, pw_lock_how how, int *created) {
   for (int tries = 0; tries < LOCK_TRIES; tries++) {
-    int file = lock_open (path, how, created), why = file < 0 ? errno : lock_opened (file, path);
-    if (why == 0 && (*created || how != PW_LOCK_NEW)) return file;
-    if (why == 0 && unlink (path) != 0) why = errno; /* left by a killed process */
-    if (*created && why != 0 && why != ESTALE) unlink (path);
+    int file = lock_open (path, how, created), code = file < 0 ? errno : lock_opened (file, path);
+    if (code == 0 && (*created || how != PW_LOCK_NEW)) return file;
+    if (code == 0 && unlink (path) != 0) code = errno; /* left by a killed process */
+    if (*created && code != 0 && code != ESTALE) unlink (path);
     if (file >= 0) close (file);
-    errno = why;
-    if (why != 0 && why != ESTALE && (why != ENOENT || how == PW_LOCK_EXISTING)) return -1;
+    errno = code;
+    if (code != 0 && code != ESTALE && (code != ENOENT || how == PW_LOCK_EXISTING)) return -1;
   }
   return -1;
 }
@@ -70,11 +70,11 @@ int pw_lock_path (const char *path, pw_error *error) {
 
 int pw_lock_folder (const char *path, pw_error *error) {
   int file = open (path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  int why = file < 0 ? errno : lock_acquire (file);
-  if (why == EBADF) why = 0; /* NFS only locks files open for writing, never folders */
-  if (why == 0) return file;
+  int code = file < 0 ? errno : lock_acquire (file);
+  if (code == EBADF) code = 0; /* NFS only locks files open for writing, never folders */
+  if (code == 0) return file;
   if (file >= 0) close (file);
   pw_fail (error, PW_RESOURCE, "cannot write into %s: %s", path,
-           why == EWOULDBLOCK ? "another process is writing into it" : strerror (why));
+           code == EWOULDBLOCK ? "another process is writing into it" : strerror (code));
   return -1;
 }

@@ -29,7 +29,7 @@ static int read_key (const pw_reader *r, const pw_node *node, const char *const 
   for (int i = 0; key[i]; i++) {
     pw_nearest_try (&near, key[i]);
     if (strcmp (key[i], node->text) != 0) continue;
-    if (value[i]) return pw_yaml_fail (r, node->at, "\"%s\" is there twice", key[i]);
+    if (value[i]) return pw_yaml_fail (r, node->at, "\"%s\" appears twice", key[i]);
     value[i] = node->next;
     int empty = node->next->type == PW_YAML_SCALAR && !node->next->quoted && *node->next->text == 0;
     return empty ? pw_yaml_fail (r, node->at, "\"%s\" has no value", key[i]) : PW_OK;

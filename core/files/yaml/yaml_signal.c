@@ -33,32 +33,32 @@ static int table_list (pw_reader *r, const char *what, const pw_node *list, pw_s
   return PW_OK;
 }
 
-/* ---- Points of tables: two columns of a file in the model's own folder ---- */
+/* ---- Points of tables: two columns of a file in the model's folder ---- */
 
-static int table_climbs (const char *name) {
+static int table_leaves_folder (const char *name) {
   for (const char *part = name; part; part = strchr (part, '/'), part = part ? part + 1 : NULL)
     if (strncmp (part, "..", 2) == 0 && (part[2] == '/' || part[2] == 0)) return 1;
   return 0;
 }
 
-/* The file's own path if it lies below the folder, links resolved; malloced. */
-static char *table_below (const char *folder, const char *name, const char **why) {
+/* The real path of the file if it is below the folder; malloced. */
+static char *table_path_in_folder (const char *folder, const char *name, const char **reason) {
   char *joined = pw_path_join (folder, name, ""), *path = joined ? realpath (joined, NULL) : NULL;
   size_t n = strcmp (folder, "/") == 0 ? 0 : strlen (folder);
-  *why = joined == NULL ? "out of memory" : strerror (errno);
+  *reason = joined == NULL ? "out of memory" : strerror (errno);
   free (joined);
   if (path == NULL || (strncmp (path, folder, n) == 0 && (path[n] == '/' || path[n] == 0))) return path;
-  *why = "it is a link that leads out of the model's folder";
+  *reason = "it is a link that leads out of the model's folder";
   free (path);
   return NULL;
 }
 
-/* A model may only read files from its own folder. */
-static FILE *table_open (const pw_yaml *y, const char *name, const char **why) {
-  *why = "a table lies in the model's own folder, so its path is relative and has no \"..\"";
-  if (*name == '/' || table_climbs (name)) return NULL;
-  char *path = table_below (y->folder, name, why);
-  FILE *f = path ? pw_open_input (path, why) : NULL;
+/* A model may only read files in its folder. */
+static FILE *table_open (const pw_yaml *y, const char *name, const char **reason) {
+  *reason = "a table must be in the model's folder: its path is relative and has no \"..\"";
+  if (*name == '/' || table_leaves_folder (name)) return NULL;
+  char *path = table_path_in_folder (y->folder, name, reason);
+  FILE *f = path ? pw_open_input (path, reason) : NULL;
   free (path);
   return f;
 }
@@ -73,9 +73,9 @@ static const char *table_unit (const pw_reader *r) {
 }
 
 static int table_file (pw_reader *r, const char *what, const pw_node *node, const pw_node *columns, pw_signal *s) {
-  const char *name, *why, *column[2] = { "1", "2" }, *const unit[2] = { "s", table_unit (r) };
+  const char *name, *reason, *column[2] = { "1", "2" }, *const unit[2] = { "s", table_unit (r) };
   double *value[2];
-  pw_error own = { 0 };
+  pw_error cause = { 0 };
   char text[240];
   snprintf (text, sizeof text, "%s: columns", what);
   if (pw_yaml_list (r, columns, text, 2, "columns, [time, value]") != PW_OK) return r->error->status;
@@ -83,14 +83,14 @@ static int table_file (pw_reader *r, const char *what, const pw_node *node, cons
   pw_yaml_text (r, columns ? columns->first->next : NULL, text, &column[1]);
   if (pw_yaml_text (r, node, what, &name) != PW_OK) return r->error->status;
   errno = 0;
-  FILE *f = table_open (r->y, name, &why);
+  FILE *f = table_open (r->y, name, &reason);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (r);
-  if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", what, name, why);
-  int status = pw_columns_read (f, name, column, unit, r->arena, value, &s->table.count, &own);
+  if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", what, name, reason);
+  int status = pw_columns_read (f, name, column, unit, r->arena, value, &s->table.count, &cause);
   fclose (f);
   s->table.t = value[0];
   s->table.value = value[1];
-  if (status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", what, own.text);
+  if (status == PW_INPUT) return pw_yaml_fail (r, node->at, "%s: %s", what, cause.text);
   return status == PW_OK ? PW_OK : pw_yaml_no_memory (r);
 }
 
@@ -103,7 +103,7 @@ static int table_points (pw_reader *r, const char *what, const pw_node *node, co
   int status = v[0] ? table_list (r, what, v[0], s) : table_file (r, what, v[1], v[2], s);
   if (status == PW_OK) r->points += s->table.count;
   if (status != PW_OK || r->points <= PW_YAML_MAX_POINTS) return status;
-  return pw_yaml_fail (r, node->at, "%s: the tables up to here have more than %d points, the most of a model", what,
+  return pw_yaml_fail (r, node->at, "%s: the tables up to here have more than %d points, the limit for a model", what,
                        PW_YAML_MAX_POINTS);
 }
 
@@ -121,12 +121,12 @@ static int signal_fields (pw_reader *r, const pw_signal_form *form, const char *
     if (f->type == PW_NUMBER) pw_yaml_number (r, v[i], text, f->domain, at);
     if (f->type == PW_CHOICE) pw_yaml_choice (r, v[i], text, f->choices, at);
     if (v[i] && form->type == PW_TABLE && strcmp (f->name, "scale") == 0 && signal->table.scale == 0)
-      pw_yaml_fail (r, v[i]->at, "%s: 0 would leave nothing of the table", text);
+      pw_yaml_fail (r, v[i]->at, "%s: 0 makes the table zero", text);
   }
   return r->error->status;
 }
 
-/* Checks the signal as a whole; reports an error at the point of the table concerned, or at the signal. */
+/* Checks the signal as a whole; reports an error at the faulty point of a table, or at the signal. */
 static int signal_fault (pw_reader *r, const pw_kind *kind, const char *what, const pw_node *node,
                          const pw_node *points, const pw_signal *signal) {
   char fault[300];

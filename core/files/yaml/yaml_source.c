@@ -26,14 +26,14 @@ static int source_count (const char *from, const char *to) {
 
 /* Long lines are shown around the caret, cut between characters. */
 static void source_window (const pw_yaml *y, size_t at, const char **begin, const char **from, const char **to) {
-  const char *here = y->source + at, *end = y->source + y->size;
-  *begin = here;
+  const char *caret = y->source + at, *end = y->source + y->size;
+  *begin = caret;
   while (*begin > y->source && (*begin)[-1] != '\n') --*begin;
-  *from = here - *begin > SOURCE_SHOWN / 2 ? here - SOURCE_SHOWN / 2 : *begin;
-  while (*from < here && (**from & 0xC0) == 0x80) ++*from;
+  *from = caret - *begin > SOURCE_SHOWN / 2 ? caret - SOURCE_SHOWN / 2 : *begin;
+  while (*from < caret && (**from & 0xC0) == 0x80) ++*from;
   *to = *from;
   while (*to < end && **to != '\n' && **to != '\r' && *to - *from < SOURCE_SHOWN) ++*to;
-  while (*to > here && (**to & 0xC0) == 0x80) --*to;
+  while (*to > caret && (**to & 0xC0) == 0x80) --*to;
 }
 
 /* Shows invalid bytes as ?, control characters as blanks. */
