@@ -58,7 +58,7 @@ static void code_add (code_job *x, const char *text) {
 }
 
 /* The words of the compiler; of programs among them ("ccache gcc") also size and date. */
-static void code_add_compiler (code_job *x) {
+static int code_add_compiler (code_job *x) {
   char text[200], *copy = strdup (pw_compiler ()), *rest = NULL;
   for (char *w = copy ? strtok_r (copy, " \t", &rest) : NULL; w; w = strtok_r (NULL, " \t", &rest)) {
     struct stat info;
@@ -69,6 +69,7 @@ static void code_add_compiler (code_job *x) {
     code_add (x, text);
   }
   free (copy);
+  return copy && strlen (x->how) < sizeof x->how - 50 ? PW_OK : PW_RESOURCE;
 }
 
 static int code_read (const char *path, char **text, size_t *size, pw_error *error) {
@@ -85,7 +86,7 @@ static int code_identify (code_job *x, pw_error *error) {
   char *include, *header = NULL, *text = NULL, sum[40] = "";
   size_t size;
   code_add (x, "pinwheel " PW_VERSION " -std=c11 -O2 -ffp-contract=off " PW_SCENE_FLAG);
-  code_add_compiler (x);
+  if (code_add_compiler (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory, or CC is too long");
   int status = pw_search_include (&include, error);
   if (include) header = pw_path_join (include, "pinwheel.h", "");
   if (header && code_read (header, &text, &size, NULL) == PW_OK)

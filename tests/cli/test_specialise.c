@@ -1,0 +1,404 @@
+/* --specialise: compiled code of scenes, its cache, and what happens without one or without a compiler. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "check.h"
+#include "cli.h"
+#include "pinwheel-files.h"
+
+#define RUN "pinwheel run chaplygin-sleigh -t 0.1 --specialise always "
+
+/* A compiler that counts its calls in @/calls, and a cache that is empty. */
+#define FRESH                                                                                               \
+  "rm -rf @/c @/calls @/tmp; mkdir @/tmp; printf '#!/bin/sh\\necho call >>@/calls\\nexec cc $*\\n' >@/cc\n" \
+  "chmod +x @/cc; export CC=@/cc XDG_CACHE_HOME=@/c TMPDIR=@/tmp\n"
+#define CACHED "export CC=@/cc XDG_CACHE_HOME=@/c TMPDIR=@/tmp\n"
+#define CALLS "if [ -e @/calls ]; then wc -l <@/calls; else echo 0; fi\n"
+
+static void specialise_says (const char *engine) {
+  if (strstr (cli_out, engine) == NULL) print_error ("%s\nexpected %s\n", cli_out, engine);
+  assert_non_null (strstr (cli_out, engine));
+}
+
+/* ---- The cache ---- */
+
+/* Compiled once, then loaded; nothing but the object remains, and it is private. */
+static void test_cached (void **state) {
+  (void)state;
+  cli_good (FRESH RUN
+            "--json @/1.json >@/1\n" RUN "--json @/2.json >@/2\n" CALLS
+            "stat -c %a @/c/pinwheel; ls @/c/pinwheel | sed 's/.*[.]//'; ls @/tmp; grep -v cpu_s @/1.json >@/a\n"
+            "grep -v cpu_s @/2.json | cmp @/a -");
+  assert_string_equal (cli_out, "1\n700\nso\n");
+  assert_true (cli_says (cli_file ("2.json"), "engine", "specialised"));
+  assert_true (cli_number (cli_file ("2.json"), "statistics", "specialised", NULL) > 300);
+}
+
+/* An object that is not what was written is replaced; the run has its code all the same. */
+static void test_damaged (void **state) {
+  static const char *const damage[] = {
+    "s=$(wc -c <$f); head -c $((s / 2)) $f >@/x; cat @/x >$f",
+    "printf X | dd of=$f bs=1 seek=5000 conv=notrunc 2>/dev/null",
+    ": >$f",
+    "echo 'int x;' >$f",
+    "s=$(wc -c <$f); head -c 1000000 /dev/zero | head -c $s >$f",
+  };
+  (void)state;
+  cli_good (FRESH RUN ">/dev/null");
+  for (size_t i = 0; i < sizeof damage / sizeof *damage; i++) {
+    char command[900];
+    snprintf (command, sizeof command, CACHED "f=$(echo @/c/pinwheel/*.so); %s\n" RUN, damage[i]);
+    cli_shell (command);
+    specialise_says ("code specialised for this scene");
+    assert_non_null (strstr (cli_err, ".so is replaced: it is damaged\n"));
+    assert_ptr_equal (strchr (cli_err, '\n'), cli_err + strlen (cli_err) - 1);
+    cli_good (CACHED RUN);
+  }
+}
+
+/* Objects under names of others are never used. */
+static void test_foreign_object (void **state) {
+  (void)state;
+  cli_good (FRESH RUN ">/dev/null; f=$(echo @/c/pinwheel/*.so); cp $f @/one\n"
+                      "pinwheel run snakeboard -t 0.1 --specialise always >/dev/null\n"
+                      "for g in @/c/pinwheel/*.so; do [ $g = $f ] || cp $g $f; done; cmp -s $f @/one && exit 9\n" RUN
+                      "| grep specialised; cmp $f @/one && " CALLS);
+  assert_string_equal (strchr (cli_out, '\n') + 1, "3\n");
+}
+
+/* A cache to which others can write, or that is no folder, is left alone; without one the code is made apart. */
+static void test_unusable (void **state) {
+  static const struct {
+    const char *make, *notice;
+  } cache[] = {
+    { "mkdir -p @/c/pinwheel; chmod 777 @/c/pinwheel", "@/c/pinwheel is not used: others can write to it" },
+    { "mkdir -p @/c/pinwheel; chmod 770 @/c/pinwheel", "@/c/pinwheel is not used: others can write to it" },
+    { "mkdir -p @/c; chmod 777 @/c", "@/c is not used: others can write to it" },
+    { "mkdir @/c @/elsewhere; ln -s @/elsewhere @/c/pinwheel", "@/c/pinwheel is not used: it is not a folder" },
+    { "mkdir @/c; : >@/c/pinwheel", "@/c/pinwheel is not used: it is not a folder" },
+    { "mkdir -p @/c/pinwheel; chown 12345 @/c/pinwheel", "@/c/pinwheel is not used: it belongs to another user" },
+    { "export XDG_CACHE_HOME=/proc/none", "/proc/none is not used: No such file or directory" }
+  };
+  (void)state;
+  for (size_t i = 0; i < sizeof cache / sizeof *cache; i++) {
+    char command[900], notice[300], expected[600];
+    if (strstr (cache[i].make, "chown") && geteuid () != 0) continue;
+    snprintf (command, sizeof command,
+              FRESH "%s\n" RUN "&& ls @/tmp; ls -A @/c/pinwheel 2>/dev/null | grep so; rm -rf @/elsewhere",
+              cache[i].make);
+    snprintf (notice, sizeof notice, "pinwheel: the cache %s\n", cache[i].notice);
+    cli_expand (notice, expected, sizeof expected);
+    cli_shell (command);
+    specialise_says ("code specialised for this scene");
+    assert_null (strstr (cli_out, ".so"));
+    assert_null (strstr (cli_out, "pinwheel-"));
+    assert_string_equal (cli_err, expected);
+  }
+  cli_good (FRESH "unset HOME XDG_CACHE_HOME\n" RUN "| grep -c specialised; ls @/tmp");
+  assert_string_equal (cli_out, "1\n");
+}
+
+/* The folder may go at any time, even while the compiler runs. */
+static void test_deleted (void **state) {
+  (void)state;
+  cli_good (FRESH "printf '#!/bin/sh\\nrm -rf @/c/pinwheel\\nexec cc $*\\n' >@/cc\n" RUN
+                  "| grep -c specialised; ls @/tmp; ls @/c");
+  assert_string_equal (cli_out, "1\n");
+}
+
+/* Processes that need the same code wait for the first one. */
+static void test_concurrent (void **state) {
+  (void)state;
+  cli_good (FRESH
+            "printf '#!/bin/sh\\necho call >>@/calls\\nsleep 0.3\\nexec cc $*\\n' >@/cc\n"
+            "for i in 1 2 3 4 5; do " RUN "-o @/$i.csv --json @/$i & done; wait\n"
+            "cat @/[1-5] | grep -c 'engine\": \"specialised'; for i in 2 3 4 5; do cmp @/1.csv @/$i.csv; done\n" CALLS
+            "ls @/c/pinwheel | wc -l");
+  assert_string_equal (cli_out, "5\n1\n1\n");
+}
+
+/* A killed compilation neither blocks nor damages the next one, though its compiler may still run. */
+static void test_killed (void **state) {
+  (void)state;
+  cli_good (
+      FRESH
+      "printf '#!/bin/sh\\necho call >>@/calls\\n[ -e @/go ] || { : >@/on; sleep 0.6; }\\nexec cc $*\\n' >@/cc\n"
+      "rm -f @/go @/on; ${PINWHEEL:-build/pinwheel} run chaplygin-sleigh -t 0.1 --specialise always >/dev/null 2>&1 &\n"
+      "while [ ! -e @/on ]; do sleep 0.02; done; kill -9 $!; wait $! 2>/dev/null; : >@/go\n" RUN
+      "| grep -c specialised; sleep 1; " RUN "| grep -c specialised; " CALLS "ls @/c/pinwheel/*.c 2>/dev/null || :");
+  assert_string_equal (cli_out, "1\n1\n2\n");
+}
+
+/* The oldest files go. */
+static void test_size (void **state) {
+  (void)state;
+  cli_good (FRESH "mkdir -p -m 700 @/c @/c/pinwheel; for i in 1 2 3; do truncate -s 30M @/c/pinwheel/$i.so\n"
+                  "touch -d \"$((4 - i)) days ago\" @/c/pinwheel/$i.so; done\n" RUN
+                  ">/dev/null; cd @/c/pinwheel; ls ?.so; ls | wc -l");
+  assert_string_equal (cli_out, "2.so\n3.so\n3\n");
+}
+
+/* ---- Without a compiler ---- */
+
+static void test_no_compiler (void **state) {
+  (void)state;
+  cli_good (FRESH "pinwheel run chaplygin-sleigh -t 0.1 --specialise never -o @/never.csv >/dev/null");
+  cli_shell (FRESH "export CC=/nonexistent\n" RUN "-o @/none.csv --json @/none.json; cmp @/never.csv @/none.csv");
+  assert_string_equal (
+      cli_err, "pinwheel: general engine: cannot run the C compiler \"/nonexistent\" that specialised code "
+               "needs (No such file or directory): install one, or name another in the environment variable CC\n");
+  assert_true (cli_says (cli_file ("none.json"), "engine", "general"));
+  assert_true (cli_says (cli_file ("none.json"), "engine_reason", "no C compiler"));
+}
+
+/* What does not compile is kept, with the messages; the run goes on. */
+static void test_bad_compiler (void **state) {
+  static const char *const bad[] = { "echo message >&2; exit 1", "kill -9 $$" };
+  (void)state;
+  for (int i = 0; i < 2; i++) {
+    char command[900];
+    snprintf (command, sizeof command,
+              FRESH "printf '#!/bin/sh\\n%s\\n' >@/cc\n" RUN "&& head -c 3 @/c/pinwheel/*.c && cat @/c/pinwheel/*.log",
+              bad[i]);
+    cli_shell (command);
+    specialise_says ("general engine: the generated code does not compile\n");
+    specialise_says (i == 0 ? "/* message\n" : "/* ");
+    assert_non_null (strstr (cli_err, "pinwheel: general engine: "));
+    assert_non_null (strstr (cli_err, ".c does not compile; the messages of "));
+    assert_ptr_equal (strchr (cli_err, '\n'), cli_err + strlen (cli_err) - 1);
+  }
+  cli_shell (CACHED "export CC=cc\n" RUN "; rm -rf @/c; unset HOME XDG_CACHE_HOME; export CC=false\n" RUN
+                    "; ls @/tmp/*/*.c | wc -l");
+  specialise_says ("general engine: the generated code does not compile\n1\n");
+}
+
+/* Neither does a compiler that writes something else, or nothing, stop a run; and its object is not kept. */
+static void test_strange_compiler (void **state) {
+  static const struct {
+    const char *does, *notice;
+  } strange[] = {
+    { "while [ \"$1\" != -o ]; do shift; done; echo rubbish >$2", "it cannot be loaded: " },
+    { "exit 0", "the compiler has written no object\n" },
+    { "while [ \"$1\" != -o ]; do shift; done; echo \"int pw_specialised_scene[9];\" | cc -shared -xc - -o $2",
+      "it belongs to another scene or version\n" }
+  };
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    char command[900];
+    snprintf (command, sizeof command, FRESH "cat >@/cc <<'X'\n#!/bin/sh\n%s\nX\n" RUN "&& ls @/c/pinwheel @/tmp",
+              strange[i].does);
+    cli_shell (command);
+    specialise_says ("general engine: the compiled code cannot be loaded\n");
+    assert_null (strstr (cli_out, ".so\n"));
+    assert_non_null (strstr (cli_err, strange[i].notice));
+  }
+}
+
+/* ---- When code is used ---- */
+
+static void test_when (void **state) {
+  (void)state;
+  cli_good (FRESH "pinwheel run chaplygin-sleigh -t 1 --step 1e-3 | grep -c 'general engine: short run'\n" CALLS
+                  "pinwheel run chaplygin-sleigh -t 20 --step 1e-3 | grep -c 'general engine: short run'\n" CALLS
+                  "pinwheel run chaplygin-sleigh -t 11 --step 1e-5 --specialise never | grep -c 'engine: --specialise "
+                  "never'\n" CALLS "pinwheel run chaplygin-sleigh -t 11 --step 1e-5 | grep -c specialised\n" CALLS
+                  "pinwheel run chaplygin-sleigh -t 20 --step 1e-3 | grep -c specialised\n"
+                  "pinwheel run chaplygin-sleigh -t 1 --step 1e-3 | grep -c 'general engine: short run'\n" CALLS);
+  assert_string_equal (cli_out, "1\n0\n1\n0\n1\n0\n1\n1\n1\n1\n1\n");
+  cli_bad ("pinwheel run pendulum --specialise allways", 2,
+           "--specialise \"allways\": expected auto, always or never; did you mean \"always\"?");
+  cli_bad ("pinwheel sweep --merge a b -o @/x.csv --specialise always", 2,
+           "--specialise cannot be combined with --merge: the parts define the sweep");
+}
+
+/* Scenes without code run in the general engine: `always` says so, `auto` does not. */
+static void test_not_possible (void **state) {
+  (void)state;
+  cli_good (
+      FRESH
+      "pinwheel run chain --set n=40 -t 0.1 --step 1e-7 --limit 0.05 >/dev/null 2>&1; pinwheel run chain --set n=40 -t "
+      "0.01 | grep general; " CALLS);
+  assert_string_equal (cli_out, "  general engine: short run\n0\n");
+  cli_shell (FRESH "pinwheel run chain --set n=40 -t 0.01 --specialise always | grep general; " CALLS);
+  assert_string_equal (cli_out, "  general engine: 80 constraint equations: specialised code has at most 60\n0\n");
+  assert_string_equal (
+      cli_err, "pinwheel: general engine: model chain: 80 constraint equations: specialised code has at most 60\n");
+  cli_shell (FRESH "pinwheel run redundant-parallelogram -t 0.01 --specialise always | grep general");
+  assert_string_equal (cli_out, "  general engine: redundant constraints\n");
+}
+
+/* A study uses one engine, and says which. */
+static void test_studies (void **state) {
+  (void)state;
+  cli_good (
+      FRESH
+      "pinwheel compare chaplygin-sleigh -m rk4+projection --step-ladder 0.1 -t 1 --repeats 1 --specialise always "
+      "| grep -c '^all runs use code specialised'\n"
+      "pinwheel compare chaplygin-sleigh -m rk4+projection --step-ladder 0.1 -t 1 --repeats 1 --specialise never "
+      "| grep -c '^all runs use the general engine: --specialise never'\n"
+      "pinwheel drift chaplygin-sleigh -m rk4+projection --only-methods -t 1 --specialise always "
+      "| grep -c '^all runs use code specialised'\n" CALLS);
+  assert_string_equal (cli_out, "1\n1\n1\n1\n");
+}
+
+/* ---- Sweeps ---- */
+
+/* The structure depends on n; rows are the same for any number of workers, in parts, and without a cache. */
+static void test_sweep (void **state) {
+  (void)state;
+  cli_good (
+      FRESH
+      "s='pinwheel sweep n-trailer --vary n=1,2,3 --vary L=0.5,0.6 -t 0.5 --specialise always'\n"
+      "for j in 1 2 4; do $s -j $j -o @/s$j.csv || exit 1; done; cmp @/s1.csv @/s2.csv; cmp @/s1.csv @/s4.csv\n" CALLS
+      "for p in 1 2; do $s --part $p/2 -o @/p$p.csv || exit 1; done\n"
+      "pinwheel sweep --merge @/p1.csv @/p2.csv -o @/m.csv; cmp @/s1.csv @/m.csv\n"
+      "unset HOME XDG_CACHE_HOME; $s -j 2 -o @/none.csv; cmp @/s1.csv @/none.csv; ls @/tmp\n" CALLS
+      "pinwheel sweep n-trailer --vary n=1,2,3 --vary L=0.5,0.6 -t 0.5 -o @/never.csv; cmp -s @/s1.csv @/never.csv || "
+      "echo other");
+  assert_string_equal (cli_out, "3\n6\nother\n");
+}
+
+/* Rows of different engines are not mixed. */
+static void test_sweep_engine (void **state) {
+  (void)state;
+  cli_good (FRESH
+            "s='pinwheel sweep n-trailer --vary L=0.5,0.6 -t 0.5'; $s --part 1/2 -o @/p1.csv --specialise always\n"
+            "$s --part 2/2 -o @/p2.csv --specialise never; pinwheel sweep --merge @/p1.csv @/p2.csv -o @/m.csv "
+            "2>@/said; echo $?\n"
+            "grep -c 'engine is' @/said");
+  assert_string_equal (cli_out, "2\n1\n");
+}
+
+/* ---- Results ---- */
+
+/* Compares the states of two tables, the columns before forces; *most is the largest difference relative to 1 + |value|. */
+static int specialise_compare (const char *a, const char *b, double *most) {
+  char x[200000], *line = x, *rest, *other;
+  const char *text = cli_file (a);
+  int columns = 0;
+  *most = 0;
+  snprintf (x, sizeof x, "%s", text ? text : "");
+  const char *y = cli_file (b), *force = strstr (x, " [N");
+  for (const char *c = x; *c && *c != '\n' && (force == NULL || c < force); c++) columns += *c == ',';
+  while (y && (line = strchr (line, '\n')) != NULL && (y = strchr (y, '\n')) != NULL && line[1]) {
+    for (int i = 0; i < columns; i++, line = rest, y = other) {
+      double u = strtod (line + 1, &rest), w = strtod (y + 1, &other);
+      if (rest == line + 1 || other == y + 1) return 0;
+      *most = fmax (*most, fabs (u - w) / (1 + fabs (u)));
+    }
+  }
+  return columns > 6;
+}
+
+static void specialise_agree (const char *model, const char *method, double bound) {
+  char command[900];
+  double most;
+  const char *t = strcmp (model, "andrews-squeezer") == 0 ? "0.02" : "0.5";
+  snprintf (command, sizeof command,
+            "rm -f @/?.csv; pinwheel run %s -m %s -t %s --every 0.01 -o @/a.csv --specialise always >/dev/null; a=$?\n"
+            "pinwheel run %s -m %s -t %s --every 0.01 -o @/b.csv --specialise never >/dev/null; b=$?\n"
+            "[ $a = $b ] && echo $a",
+            model, method, t, model, method, t);
+  if (cli_run (command) != 0) print_error ("%s, %s: other exit status\n%s", model, method, cli_err);
+  assert_true (*cli_out);
+  if (strcmp (cli_out, "0\n") != 0) return;
+  if (!specialise_compare ("a.csv", "b.csv", &most) || !(most <= bound))
+    print_error ("%s, %s: %g\n", model, method, most);
+  assert_true (most <= bound);
+}
+
+/* Every model of the gallery, a short time, in which round-off does not grow to the bound.  Steps of adaptive methods amplify
+ * it up to the errors they allow, those of multistep methods to about 1000 tolerances. */
+static void test_gallery (void **state) {
+  static const struct {
+    const char *name;
+    double bound;
+  } method[] = { { "rk4+projection", 1e-10 },
+                 { "rk4", 1e-10 },
+                 { "rk4+baumgarte", 1e-10 },
+                 { "rk4+nullspace", 1e-10 },
+                 { "erk8+projection --rtol 1e-11", 1e-10 },
+                 { "erk5+projection --rtol 1e-11", 1e-10 },
+                 { "bdf+projection --rtol 1e-9", 1e-6 },
+                 { "ida+ggl --rtol 1e-9", 1e-6 },
+                 { "galpha", 1e-10 },
+                 { "leapfrog", 1e-10 } };
+  static char list[20000];
+  (void)state;
+  cli_good ("pinwheel list models | awk '/^  [a-z]/ { print $1 }'");
+  snprintf (list, sizeof list, "%.19999s", cli_out);
+  assert_true (strlen (list) > 100);
+  for (char *rest, *m = strtok_r (list, "\n", &rest); m; m = strtok_r (NULL, "\n", &rest))
+    for (size_t i = 0; i < sizeof method / sizeof *method; i++) specialise_agree (m, method[i].name, method[i].bound);
+}
+
+/* ---- The text ---- */
+
+/* Names in the text end no comment and are no code; those of bodies and elements have no such characters to begin with. */
+static void test_names (void **state) {
+  static const char *const name[] = { "*/ int x; /*", "\\n#include <y>",    "x\\",
+                                      "?\?/",         "gr\xC3\xBC\xC3\x9F", "a\" \"%s%n" };
+  pw_error error = { 0 };
+  pw_file *f = pw_file_open ("pendulum", &error);
+  (void)state;
+  for (size_t i = 0; i < sizeof name / sizeof *name; i++) {
+    pw_model *m = pw_model_new (name[i], pw_file_table (f), &error);
+    check_ok (m ? pw_model_build (m, &error) : error.status, &error);
+    pw_system *s = pw_system_compile (m, &error);
+    char *text = pw_system_source (s, &error);
+    assert_non_null (text);
+    assert_null (strstr (text, name[i]));
+    const char *first = strstr (text, "*/\n");
+    assert_true (first && strcspn (text, "\n") == (size_t)(first - text) + 2);
+    for (const char *c = text; *c; c++) assert_true ((*c >= ' ' && *c <= '~') || *c == '\n' || *c == '\t');
+    cli_write ("names.c", text);
+    cli_good ("cc -std=c11 -Wall -Wno-unused -Werror -I${BUILD:-build}/include -c @/names.c -o @/names.o");
+    free (text);
+    pw_system_free (s);
+    pw_model_free (m);
+  }
+  pw_file_close (f);
+  cli_good (
+      FRESH
+      "cp models/pendulum.yaml '@/*\\ #\"$(kill $$)`kill $$`;&.yaml'\n"
+      "pinwheel run '@/*\\ #\"$(kill $$)`kill $$`;&.yaml' -t 0.01 --specialise always | grep -c 'code specialised'");
+  assert_string_equal (cli_out, "1\n");
+}
+
+/* The text is that of the model with its parameters. */
+static void test_show (void **state) {
+  (void)state;
+  cli_good ("pinwheel show n-trailer --set n=3 --c >@/3.c; pinwheel show n-trailer --c >@/2.c\n"
+            "grep -c 'body 3: trailer3 ' @/3.c; grep -c 'body 3' @/2.c; cc -std=c11 -Wall -Wno-unused -Werror -O0 "
+            "-I${BUILD:-build}/include -c @/3.c -o @/3.o");
+  assert_string_equal (cli_out, "1\n0\n");
+  cli_bad ("pinwheel show chain --set n=40 --c", 2,
+           "model chain: 80 constraint equations: specialised code has at most 60");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_cached),
+    cmocka_unit_test (test_damaged),
+    cmocka_unit_test (test_foreign_object),
+    cmocka_unit_test (test_unusable),
+    cmocka_unit_test (test_deleted),
+    cmocka_unit_test (test_concurrent),
+    cmocka_unit_test (test_killed),
+    cmocka_unit_test (test_size),
+    cmocka_unit_test (test_no_compiler),
+    cmocka_unit_test (test_bad_compiler),
+    cmocka_unit_test (test_strange_compiler),
+    cmocka_unit_test (test_when),
+    cmocka_unit_test (test_not_possible),
+    cmocka_unit_test (test_studies),
+    cmocka_unit_test (test_sweep),
+    cmocka_unit_test (test_sweep_engine),
+    cmocka_unit_test (test_gallery),
+    cmocka_unit_test (test_names),
+    cmocka_unit_test (test_show),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
