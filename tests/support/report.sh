@@ -11,6 +11,7 @@ case $pinwheel in /*) ;; *) pinwheel=$PWD/$pinwheel ;; esac
 work=$(mktemp -d) || exit 1
 trap 'rm -rf "$work"' EXIT
 trap 'exit 130' INT TERM
+export XDG_CACHE_HOME="$work/cache" # not the user's
 bad=0
 seed=${SEED:-$$}
 
