@@ -24,7 +24,7 @@ typedef struct {
 pw_scene_code *engine_specialise (const pw_system *s) {
   pw_error error = { 0 };
   char *text = pw_system_source (s, NULL, &error);
-  pw_scene_code *code = text ? pw_scene_code_open (text, s, 1, &error) : NULL;
+  pw_scene_code *code = text ? pw_scene_code_open (text, s, &error) : NULL;
   if (code == NULL) engine_die (pw_system_name (s), error.text);
   free (text);
   return code;

@@ -23,7 +23,7 @@ typedef struct {
 static void run_specialise (run_cell *x, const char *method, pw_settings *settings, pw_error *error) {
   pw_error none = { 0 };
   char *text = pw_run_source (x->run, &none);
-  if (text) x->code = pw_scene_code_open (text, x->system, 1, error);
+  if (text) x->code = pw_scene_code_open (text, x->system, error);
   free (text);
   if (x->code == NULL) return;
   settings->specialised = pw_scene_code_table (x->code);

@@ -34,8 +34,7 @@ static void engine_general (pw_cli_engine *e, const pw_system *s, int has_text, 
   size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
   const char *text = why->text + (strncmp (why->text, model, n) == 0 ? n : 0);
   if (has_text)
-    text = why->status == PW_RETRY    ? "short run"
-           : why->status == PW_INPUT  ? "no C compiler"
+    text = why->status == PW_INPUT    ? "no C compiler"
            : why->status == PW_METHOD ? "the generated code does not compile"
                                       : "the compiled code cannot be loaded";
   snprintf (e->why, sizeof e->why, "%.190s", text);
@@ -53,12 +52,12 @@ static void engine_load (pw_cli_engine *e, const pw_system *s, pw_specialise whe
   pw_error own = { 0 };
   char *text = pw_cli_source (s, &own);
   int has_text = text != NULL, quiet = has_text ? 0 : when == PW_SPECIALISE_AUTO;
-  if (text) e->code = pw_scene_code_open (text, s, 1, &own);
+  if (text) e->code = pw_scene_code_open (text, s, &own);
   free (text);
   if (e->code && *pw_scene_code_notice (e->code)) pw_cli_say ("pinwheel: %s\n", pw_scene_code_notice (e->code));
   if (e->code) return;
   engine_general (e, s, has_text, &own);
-  if (own.status != PW_RETRY && !quiet) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
+  if (!quiet) pw_cli_say ("pinwheel: general engine: %s\n", own.text);
 }
 
 void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise when, double steps) {

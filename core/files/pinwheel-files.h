@@ -55,9 +55,9 @@ typedef struct pw_scene_code pw_scene_code;
  * ~/.cache, or compiled; without a cache in a temporary folder.  Systems of the same structure share code
  * (pw_specialised_fits).  Processes may do so at the same time.
  *
- * NULL and PW_RETRY if it would have to be compiled but `compile` is 0; PW_INPUT if there is no compiler; PW_METHOD if
+ * NULL and PW_INPUT if there is no compiler; PW_METHOD if
  * the text does not compile, with the path at which it is kept; PW_RESOURCE. */
-pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, int compile, pw_error *error);
+pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error);
 /* For pw_settings.specialised; NULL of NULL. */
 const pw_specialised *pw_scene_code_table (const pw_scene_code *c);
 /* A line about a cache that was ignored, or ""; lives as long as the code. */

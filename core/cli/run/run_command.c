@@ -101,7 +101,9 @@ static int run_engine (run *x, pw_error *error) {
 /* Why the run does not use the code it has. */
 static const char *run_unspecialised (const run *x) {
   if (x->engine.code == NULL) return x->engine.why;
-  return pw_run_statistics (x->r)->specialised ? "" : "the method, its options or redundant drives do not permit specialised code";
+  return pw_run_statistics (x->r)->specialised
+             ? ""
+             : "the method, its options or redundant drives do not permit specialised code";
 }
 
 static int run_open (run *x, pw_error *error) {

@@ -158,7 +158,7 @@ static const pw_specialised *sweep_compile (sweep *x, char *text, const pw_syste
   *c = (sweep_code){ .text = text, .next = x->codes };
   x->codes = c;
   pthread_mutex_unlock (&x->lock);
-  c->code = pw_scene_code_open (text, s, 1, error);
+  c->code = pw_scene_code_open (text, s, error);
   pthread_mutex_lock (&x->lock);
   c->ready = 1;
   pthread_cond_broadcast (&x->compiled);

@@ -135,11 +135,11 @@ typedef struct {
   pw_error first; /* why a model could not be built */
 } plan_scan;
 
-/* Whether code is compiled depends on the whole sweep alone, not on the cache: rows are the same whenever they are run. */
+/* The engine depends on the whole sweep, not on its part. */
 static void plan_engine (pw_plan *p, const pw_system *s) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
   double steps = (double)p->grid.rows * pw_cli_steps (p->method, &p->settings, &d, p->t_end);
-  pw_cli_engine_open (&p->engine, s, p->specialise, steps >= PW_ENGINE_LONG ? steps : 0);
+  pw_cli_engine_open (&p->engine, s, p->specialise, steps);
 }
 
 static int plan_scan_row (pw_plan *p, long row, plan_scan *scan, pw_error *error) {

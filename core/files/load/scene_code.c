@@ -247,23 +247,21 @@ static int code_compile_temporary (code_job *x, pw_error *error) {
   return status;
 }
 
-static int code_open (code_job *x, int compile, pw_error *error) {
+static int code_open (code_job *x, pw_error *error) {
   int status = code_identify (x, error);
   x->folder = pw_cache_folder (x->code->notice, sizeof x->code->notice);
   if (status == PW_OK && x->folder) {
     status = code_paths (x, error);
     if (status == PW_OK) status = code_load_cached (x);
-    if (status == PW_RETRY && compile) status = code_compile_cached (x, error);
+    if (status == PW_RETRY) status = code_compile_cached (x, error);
     if (status != PW_RETRY) return status;
   }
-  if (status == PW_OK || status == PW_RETRY)
-    status = compile ? code_compile_temporary (x, error) : pw_fail (error, PW_RETRY, "not compiled yet");
-  return status;
+  return status == PW_OK || status == PW_RETRY ? code_compile_temporary (x, error) : status;
 }
 
-pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, int compile, pw_error *error) {
+pw_scene_code *pw_scene_code_open (const char *text, const pw_system *s, pw_error *error) {
   code_job x = { .system = s, .text = text, .code = calloc (1, sizeof *x.code) };
-  int status = x.code ? code_open (&x, compile, error) : pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = x.code ? code_open (&x, error) : pw_fail (error, PW_RESOURCE, "out of memory");
   char *const path[] = { x.folder, x.source, x.log, x.part, x.object };
   for (int i = 0; i < 5; i++) free (path[i]);
   if (status == PW_OK) return x.code;
