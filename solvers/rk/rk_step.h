@@ -14,10 +14,10 @@ typedef struct {
 
 struct pw_method_data {
   const pw_tableau *tableau;
-  pw_rk_row row[PW_RK_STAGES]; /* [i] stage i > 0; [0] the new state, as stage 0 needs no weights */
-  pw_rk_row estimate[3];       /* error estimates; the last weight is that of the new state's derivative */
-  int adaptive;                /* 1: step-size control; 0: fixed steps */
-  int projects, held, every;   /* projection; signals constant over the step; steps between projections */
+  pw_rk_row row[PW_RK_STAGES];        /* [i] stage i > 0; [0] the new state, as stage 0 needs no weights */
+  pw_rk_row estimate[3];              /* error estimates; the last weight is that of the new state's derivative */
+  int adaptive;                       /* 1: step-size control; 0: fixed steps */
+  int projects, held, every;          /* projection; signals constant over the step; steps between projections */
   int null_space, projects_positions; /* stabilisation nullspace; it projects positions too */
   pw_projector projector;
   pw_nullspace nullspace;

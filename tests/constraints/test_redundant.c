@@ -234,7 +234,8 @@ static void redundant_oblique_drive (pw_model *m, const void *parameter) {
 
 static void test_kept (void **state) {
   (void)state;
-  static const pw_plugin_table fixed = TRIAL_TABLE (redundant_fixed_disc), oblique = TRIAL_TABLE (redundant_oblique_drive);
+  static const pw_plugin_table fixed = TRIAL_TABLE (redundant_fixed_disc),
+                               oblique = TRIAL_TABLE (redundant_oblique_drive);
   static const char *const of_fixed[] = { "wheel edge (edge.N) follows from drive across, rod rod", NULL };
   static const char *const of_oblique[] = { "wheel edge (edge.N) follows from drive ahead, drive aside", NULL };
   redundant_expect_reports (&fixed, of_fixed);
