@@ -1,11 +1,11 @@
-/* Which engine runs use: the general one, or code compiled for the scene. */
+/* Choice of the engine of runs: general, or code compiled for the scene. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "cli.h"
 #include "util.h"
 
-#define ENGINE_ADAPTIVE 20. /* an adaptive method's step at rtol 1e-6 over the model's fixed one, roughly */
+#define ENGINE_ADAPTIVE 20. /* typical ratio of an adaptive step at rtol 1e-6 to the model's fixed step */
 
 double pw_cli_steps (const char *method, const pw_settings *s, const pw_run_defaults *model, double t_end) {
   const pw_method *integrator;
@@ -28,7 +28,7 @@ int pw_cli_specialise (const char *text, pw_specialise *when, pw_error *error) {
                   pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* A short reason why there is no code. */
+/* A short reason for the general engine. */
 static void engine_general (pw_cli_engine *e, const pw_system *s, int has_text, const pw_error *why) {
   char model[300];
   size_t n = (size_t)snprintf (model, sizeof model, "model %s: ", pw_system_name (s));
@@ -65,7 +65,7 @@ void pw_cli_engine_open (pw_cli_engine *e, const pw_system *s, pw_specialise whe
   if (when == PW_SPECIALISE_NEVER)
     strcpy (e->why, "--specialise never");
   else if (when == PW_SPECIALISE_AUTO && !(steps >= PW_ENGINE_LONG))
-    strcpy (e->why, "short run"); /* whatever the cache contains: the same command has the same result */
+    strcpy (e->why, "short run"); /* independent of the cache: the same command has the same result */
   else
     engine_load (e, s, when);
 }

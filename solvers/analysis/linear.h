@@ -75,7 +75,7 @@ void pw_linear_choose_frame (pw_linearisation *x);
 /* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; their
  * directions go to S. */
 int pw_linear_symmetries (pw_linearisation *x);
-/* Whether A is constant along the motion; see pw_linear.  Leaves the workspace at the current state. */
+/* Determines whether A is constant along the motion; see pw_linear.  Leaves the workspace at the current state. */
 pw_steadiness pw_linear_steady (pw_linearisation *x);
 
 #endif

@@ -13,7 +13,7 @@
  *   (gamma/h B - F_y) dW_1 = r_1,    ((alpha + i beta)/h B - F_y) (dW_2 + i dW_3) = r_2 + i r_3
  *
  * with F_y at y: a real and a complex sparse matrix.  F_y is kept while the iteration contracts by a factor below 1e-2,
- * the factors while in addition the step would hardly change.
+ * the factors while in addition the step size nearly stays the same.
  *
  *   err = (gamma/h B - F_y)^-1 (F (t, y) + B sum_i e_i Z_i / h)            of order h^4
  *
@@ -32,7 +32,7 @@
 
 enum { STAGES = PW_RADAU_STAGES };
 
-#define RADAU_KEEP 1e-2   /* contraction rate below which F_y is kept */
+#define RADAU_KEEP 1e-2   /* contraction rate below which F_y is reused */
 #define RADAU_SIGNAL 1e-4 /* of the time scale: step below which a signal that fails ends the run */
 #define RADAU_LONGER 1.2  /* factor of the step below which the matrices are kept */
 
@@ -249,7 +249,7 @@ static int radau_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   return PW_OK;
 }
 
-/* A step that was cut short does not reduce the next one. */
+/* A shortened step does not reduce the next one. */
 static int radau_accept_adaptive (pw_run *r, double h, double t1, double error, int rejected, int cut) {
   radau *d = r->data;
   double next = radau_next (d, h, error, rejected);

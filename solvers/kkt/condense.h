@@ -1,7 +1,7 @@
 /* Condensation of a scene's constraint equations, planned by condense*.c and executed by saddle.c.
  *
- * Equations are grouped into nodes of 1 or 2 of one element; a node contributes to each body or internal coordinate
- * with weight that it touches.  Two contributions to the same one make a block of S = J W^-1 J^T. */
+ * Equations are grouped into nodes of 1 or 2 of one element; a node contributes to the bodies and internal coordinates
+ * with weight in its equations.  Two contributions to the same one make a block of S = J W^-1 J^T. */
 #ifndef PW_CONDENSE_H
 #define PW_CONDENSE_H
 
@@ -16,9 +16,9 @@ typedef struct {
 
 struct pw_saddle {
   const pw_system *s;
-  const pw_workspace *w; /* where J is */
+  const pw_workspace *w; /* contains J */
   int rows;
-  double postponed; /* 0, or: J has been evaluated but not factorised, and its pivots are not below this */
+  double postponed; /* > 0: J has been evaluated but not factorised; lower bound of its pivots */
   pw_massless massless;
   double *inverse; /* coords + 3: 1 / weight; 0 for prescribed ones and those without weight; the ground's 0 */
   double *force;   /* coords: forces changed by `massless` */
@@ -56,12 +56,12 @@ typedef struct {
   int nodes, contributions;
   int *start, *list; /* contributions by coordinate: list[start[j]] .. list[start[j + 1]] */
   int groups;        /* bodies, then internal coordinates */
-  int *uncondensed;  /* bodies: the first of the two nodes of one that is not condensed, or -1 */
+  int *uncondensed;  /* bodies: first of the two nodes of an uncondensed body, or -1 */
   int uncondenseds;
   pw_chain *chain;
-  int chains, linked;       /* of these; bodies in them */
+  int chains, linked;       /* number of chains; number of bodies in them */
   unsigned char *is_linked; /* groups: 1 for a body in a chain */
-  long pairs;               /* of nodes that meet */
+  long pairs;               /* of nodes with a common coordinate */
 } pw_plan;
 
 /* Makes k->block.  Errors: PW_RESOURCE. */

@@ -12,8 +12,8 @@
 
 typedef struct pw_saddle pw_saddle;
 
-/* rows: how many rows of J take part (all, or the holonomic ones), of these those with active[i] != 0 if
- * active is given; the system's J must be evaluated at a typical configuration.  weight: coords, copied.
+/* rows: number of rows of J included (all, or the holonomic ones); of these only those with active[i] != 0 if active is
+ * given.  J must be evaluated at a typical configuration.  weight: coords, copied.
  * Errors: PW_RESOURCE; PW_INPUT if a coordinate without weight is determined by no row. */
 pw_saddle *pw_saddle_open (pw_workspace *w, const double *weight, int rows, const unsigned char *active,
                            pw_error *error);
@@ -31,7 +31,7 @@ void pw_saddle_postpone (pw_saddle *k, double pivot);
  * the same, lambda and gamma too. */
 void pw_saddle_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
-/* Both, faster than separately; a and lambda are valid only with PW_OK. */
+/* Factorises and solves, faster than separately; a and lambda are valid only with PW_OK. */
 int pw_saddle_factor_solve (pw_saddle *k, const double *f, const double *gamma, double *a, double *lambda);
 
 /* 1 if the smallest pivot of the last factorisation is below this sine. */

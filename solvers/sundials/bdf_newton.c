@@ -42,7 +42,7 @@ static void newton_combine (pw_bdf_newton *w, int n) {
   }
 }
 
-/* Called by CVODES: evaluates T unless the current one is still good, then forms the matrix with gamma. */
+/* Called by CVODES: evaluates T unless the current one is still valid, then forms the matrix with gamma. */
 static int newton_set_up (pw_real t, N_Vector y, N_Vector derivative, SUNMatrix matrix, booleantype good,
                           booleantype *fresh, pw_real gamma, void *data, N_Vector t1, N_Vector t2, N_Vector t3) {
   multistep_data *d = data;
@@ -69,7 +69,7 @@ static int newton_set_up (pw_real t, N_Vector y, N_Vector derivative, SUNMatrix 
   return 0;
 }
 
-/* ---- The linear solver that CVODES sees ---- */
+/* ---- The linear solver of CVODES ---- */
 
 /* right = - T_q (b_q + gamma b_v) - T_v b_v */
 static void newton_right (const multistep_data *d, const double *b, double *right) {

@@ -34,7 +34,7 @@ typedef struct pw_method_data multistep_data;
  * failed. */
 int pw_multistep_accelerate (multistep_data *d, double t, const double *y);
 
-/* Opens the Newton matrix and hands it to CVODES.  PW_OK or PW_RESOURCE. */
+/* Opens the Newton matrix and attaches it to CVODES.  PW_OK or PW_RESOURCE. */
 int pw_bdf_open_newton (multistep_data *d);
 void pw_bdf_close_newton (multistep_data *d);
 

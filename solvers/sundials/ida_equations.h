@@ -30,7 +30,7 @@ static inline const double *pw_ida_lambda (const ida_data *d, const double *y, c
   return (d->impulses ? yp : y) + 2 * d->n;
 }
 
-/* What IDA calls: F (t, y, y') and dF/dy + c dF/dy'. */
+/* Called by IDA: F (t, y, y') and dF/dy + c dF/dy'. */
 int pw_ida_residual (pw_real t, N_Vector y, N_Vector yp, N_Vector out, void *data);
 int pw_ida_matrix (pw_real t, pw_real c, N_Vector y, N_Vector yp, N_Vector residual, SUNMatrix matrix, void *data,
                    N_Vector t1, N_Vector t2, N_Vector t3);

@@ -50,8 +50,8 @@ static int multistep_project (multistep_data *d, double t, double *q, double *v)
   return status == PW_OK ? pw_project_velocities (&d->projector, r, v) : status;
 }
 
-/* Keeps the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
- * share of the whole as in rk_adapt.c: large displacements off the constraints have tangential effects that the
+/* Leaves the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
+ * part of the whole error as in rk_adapt.c: large displacements off the constraints have tangential effects that the
  * estimate misses. */
 static void multistep_project_error (multistep_data *d, double *e) {
   pw_run *r = d->sun.run;
@@ -62,7 +62,7 @@ static void multistep_project_error (multistep_data *d, double *e) {
   for (int j = 0; j < 2 * d->n; j++) e[j] += little * (whole[j] - e[j]);
 }
 
-/* The projection as CVODES calls it. */
+/* The projection function of CVODES. */
 static int multistep_correct (pw_real t, N_Vector vy, N_Vector change, pw_real enough, N_Vector error, void *data) {
   multistep_data *d = data;
   const double *y = N_VGetArrayPointer (vy);
@@ -330,7 +330,7 @@ static const pw_stabilisation adams_stabilisations[] = { PW_ACCELERATION_STABILI
  * within evaluations does not stop the drift of y, and made errors 7 times larger on a pendulum. */
 static const pw_stabilisation adams_refused[] = {
   { .name = "projection",
-    .about = "CVODES projects with bdf only, and restarts behind each projection would leave order 1; "
+    .about = "CVODES projects with bdf only, and restarts after each projection would leave order 1; "
              "take bdf+projection or erk8+projection" },
   { .name = NULL },
 };

@@ -123,7 +123,7 @@ static void test_bad_models (void **state) {
                                   "(m, &(pw_body){ .name = \"fram\" });\n"));
   cli_write ("wish.yaml", "pinwheel: 1\nrun: {method: rk4+projektion}\nbodies:\n  - {name: a, mass: 1, inertia: 1}\n");
   cli_bad ("pinwheel run @/wish.yaml", 2,
-           "model wish: the method it asks for: integrator rk4 has no stabilisation \"projektion\"; did you mean "
+           "model wish: its default method: integrator rk4 has no stabilisation \"projektion\"; did you mean "
            "\"projection\"?");
   cli_bad ("pinwheel run @/lost.c", 2, "model lost: wheel A: there is no body \"frame\"; did you mean \"fram\"?");
 

@@ -2,7 +2,7 @@
 #include <math.h>
 #include "bars.h"
 
-/* A four-bar linkage, its crank and its rocker parallel at the start, so that it is consistent if a = c and b = d. */
+/* A four-bar linkage with initially parallel crank and rocker, consistent if a = c and b = d. */
 typedef struct {
   double a, b, c, d, g;
 } bars;

@@ -204,7 +204,8 @@ static void test_restarted_in (void **state) {
                       1);
     assert_true (pin >= 'A' && pin <= 'D');
     pw_sample now = runs_to (r, 0.01);
-    for (int j = 0; j < 9; j++) check_close ("it has hardly moved", now.q[j], start[j], 0.1, "from rest, in 10 ms");
+    for (int j = 0; j < 9; j++)
+      check_close ("displacement after restart", now.q[j], start[j], 0.1, "from rest, in 10 ms");
     pw_run_close (r);
     pw_system_free (s);
   }

@@ -1,4 +1,4 @@
-/* Drifted constraints turn one branch of a motion into another, smoothly, by accelerations that are no outburst. */
+/* Drifted constraints turn one branch of a motion into another, smoothly, without a jump of the accelerations. */
 #include <math.h>
 #include <string.h>
 #include "check.h"
@@ -6,12 +6,12 @@
 #include "scene.h"
 #include "turns.h"
 
-/* How far the cranks of four-bar linkages are from parallel and the couplers from level, or crank and rod of equal
- * lengths from opposite angles [rad]. */
+/* Deviation from the initial branch [rad]: cranks of four-bar linkages parallel and couplers horizontal, or crank
+ * and rod of equal lengths at opposite angles. */
 static double turns_apart (const pw_system *s, const pw_sample *x, int four_bars) {
   double most = 0, first = x->q[2];
   if (!four_bars) return fabs (remainder (x->q[5] + first, 2 * PW_PI));
-  for (int j = 5; j < pw_system_coordinates (s); j += 3) /* a crank, then coupler and crank in turn */
+  for (int j = 5; j < pw_system_coordinates (s); j += 3) /* alternately coupler and crank */
     most = fmax (most, fabs (remainder (x->q[j] - (j / 3 % 2 == 0 ? 0 : first), 2 * PW_PI)));
   return most;
 }

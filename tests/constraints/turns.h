@@ -2,8 +2,8 @@
 #ifndef TURNS_H
 #define TURNS_H
 
-/* Runs n-four-bar with `value` couplers, or slider-crank with gravity `value`, for 10 s, and fails the test if it leaves
- * the branch of its start without saying so.  1: it has stopped because drifted constraints lead to another one. */
+/* Runs n-four-bar with `value` couplers, or slider-crank with gravity `value`, for 10 s; the test fails if the run
+ * leaves its initial branch without an error.  Returns 1 if the run has stopped because of drifted constraints. */
 int turns_try (const char *method, double rtol, const char *model, double value);
 
 #endif

@@ -26,7 +26,7 @@ static void test_onwards (void **state) {
     double bound = i < 2 ? 1e-12 : 1e-5;
     for (int j = 0; j < 6; j++)
       check_close (method[i], now.q[j], q[j], bound, i < 2 ? "a step of the same size: round-off" : "1e4 rtol");
-    check_close ("balance", now.balance, 0, i < 2 ? 1e-10 : 1e-5, "the ledger goes on");
+    check_close ("balance", now.balance, 0, i < 2 ? 1e-10 : 1e-5, "the ledger continues");
     double moved[6];
     for (int j = 0; j < 6; j++) moved[j] = now.q[j] + (j % 3 == 0 ? 10 : 0); /* both bodies 10 m to the side */
     check_ok (pw_run_restart (r, moved, NULL, &error), &error);

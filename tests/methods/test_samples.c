@@ -127,7 +127,7 @@ static void test_breakpoint (void **state) {
     }
     assert_int_equal (there, 1);
     check_below ("steps just before the switch", before, 2, "no approach in small steps");
-    check_below ("rejected", (double)pw_run_statistics (r)->rejected, 4, "hardly any");
+    check_below ("rejected", (double)pw_run_statistics (r)->rejected, 4, "at most a few");
     pw_sample now = runs_to (r, 1);
     for (int j = 0; j < 6; j++) {
       check_close (samples_methods[i], now.q[j], q[j], 100 * rtol, "100 rtol");
@@ -183,7 +183,7 @@ static void test_short_end (void **state) {
     runs_to (r, 0.1 * 3);
     assert_int_equal (pw_run_statistics (r)->steps, steps + 1);
     check_ok (pw_run_advance (r, 2, &error), &error);
-    check_below ("half of a usual step of erk5", 0.03, pw_run_time (r) - 0.3, "steps go on as they were");
+    check_below ("half of a usual step of erk5", 0.03, pw_run_time (r) - 0.3, "step sizes are unchanged");
     pw_run_close (r);
     pw_system_free (s);
   }

@@ -19,7 +19,7 @@ double saddle_number (unsigned *random) {
   return (double)(*random >> 8) / 8388608.0 - 1;
 }
 
-/* The error of the second equation relative to what its terms are, that of the first likewise. */
+/* The errors of both equations, relative to their terms. */
 static double saddle_error (const trial *x, const double *f, const double *gamma, const double *a,
                             const double *lambda) {
   const pw_system *s = x->run->s;
@@ -39,7 +39,8 @@ static double saddle_error (const trial *x, const double *f, const double *gamma
   return most;
 }
 
-/* Factorises at a configuration of which some angles are no numbers, as a step that is far too large leaves it, and comes back. */
+/* Factorises at a configuration with NaN angles, as after a far too large step, and returns to the former
+ * configuration. */
 static void saddle_spoil (trial *x, pw_saddle *k, unsigned *random) {
   pw_run *r = x->run;
   size_t coords = (size_t)r->s->coords;
@@ -55,7 +56,7 @@ static void saddle_spoil (trial *x, pw_saddle *k, unsigned *random) {
   free (q);
 }
 
-/* Solves in each way; the rows that take no part get no multiplier. */
+/* Solves in each way; multipliers of inactive rows are 0. */
 static double saddle_solve (trial *x) {
   const pw_system *s = x->run->s;
   size_t coords = (size_t)s->coords + 3, rows = (size_t)s->rows;

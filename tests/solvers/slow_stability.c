@@ -1,4 +1,4 @@
-/* Eigenvalues of a scene near the limit of `check`: 780 of a net of springs, many nearly equal pairs among them. */
+/* 780 eigenvalues of a net of springs, near the limit of `check`, with many nearly equal pairs. */
 #include <stdio.h>
 #include <string.h>
 #include "check.h"
@@ -6,7 +6,7 @@
 
 enum { NET = 130 };
 
-/* The QR algorithm converges; exceptional shifts after every tenth step would throw it back again and again. */
+/* The QR algorithm converges; exceptional shifts after every tenth step would prevent that. */
 static void test_net (void **state) {
   static char text[40000];
   size_t n = (size_t)snprintf (text, sizeof text, "pinwheel: 1\nbodies:\n");

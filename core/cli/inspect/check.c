@@ -21,7 +21,7 @@ static void check_add (pw_check_list *l, const char *format, ...) {
 
 /* ---- Initial conditions ---- */
 
-/* The method is always the same: the model is checked, not the method it selects. */
+/* Opens a run by rk4+projection, whatever method the model selects. */
 static void check_open (pw_check *x) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   pw_settings settings = { .span = d.t_end, .step = d.step };
@@ -73,7 +73,7 @@ static int check_reference (pw_check *x, int started, pw_error *error) {
 
 /* ---- Element types ---- */
 
-/* An element type for which no random scene can be made stays untested, with the reason. */
+/* Tests an element type in random scenes; records the reason if none can be generated. */
 static int check_alone (pw_checked_kind *k, pw_error *error) {
   int status = PW_OK;
   for (unsigned seed = 1; status == PW_OK && seed <= CHECK_SEEDS; seed++) {
@@ -105,7 +105,7 @@ static int check_list_kinds (pw_check *x, pw_error *error) {
   return PW_OK;
 }
 
-/* An inconsistent table is not tested in the model. */
+/* Tests the element types in use; in the model only if their tables are consistent. */
 static int check_kinds (pw_check *x, pw_error *error) {
   const pw_system *s = x->m.system;
   double T = x->r ? pw_run_scale (x->r)->time : 1;
@@ -170,7 +170,7 @@ static int check_model (pw_check *x, int started, pw_error *error) {
   return status == PW_OK ? check_kinds (x, error) : status;
 }
 
-/* The exit status is that of the initialisation if it failed, else that of a faulty model. */
+/* The exit status is that of a failed initialisation, otherwise that of bad input. */
 static void check_verdict (const pw_check *x, pw_error *error) {
   if (x->problem.count == 0) return;
   pw_fail (error, x->failure.status ? x->failure.status : PW_INPUT, "%s%s", x->problem.text[0],

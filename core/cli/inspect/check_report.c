@@ -1,5 +1,4 @@
-/* The report of `pinwheel check`: a sequence of entries, each with its key in JSON, and its label and words in the
- * text. */
+/* The report of `pinwheel check`: a sequence of entries, each with a key in JSON, a label and words in text. */
 #include <math.h>
 #include <stdarg.h>
 #include "check_report.h"
@@ -25,7 +24,7 @@ static void report_text (pw_json *j, const char *key, const char *text) {
   if (j) pw_json_text (j, key, text);
 }
 
-/* The next item is on a line of its own. */
+/* Begins a line for the next item. */
 static void report_line (pw_json *j) {
   if (j) j->line = 1;
 }
@@ -36,7 +35,7 @@ static void report_section (pw_json *j, const char *key, char bracket, const cha
   report_open (j, key, bracket);
 }
 
-/* Text alone. */
+/* Prints in the text only. */
 static void report_say (pw_json *j, const char *format, ...) PW_PRINTS (2);
 
 static void report_say (pw_json *j, const char *format, ...) {
@@ -61,7 +60,7 @@ static void report_entry (pw_json *j, const char *key, double value, const char 
   putchar ('\n');
 }
 
-/* An item of a list, of which the text has the first few; the same number counts them. */
+/* An item of a list, of which the text shows the first few; `shown` counts them. */
 static void report_item (pw_json *j, int *listed, const char *text, const char *line) {
   if (text) report_text (j, NULL, text);
   if ((*listed)++ < REPORT_LISTED) report_say (j, "    %s\n", line);

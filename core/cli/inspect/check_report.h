@@ -5,17 +5,17 @@
 #include "cli.h"
 #include "pinwheel-selftest.h"
 
-enum { CHECK_MOST = 400 /* coordinates: in larger scenes nothing of cubic cost is computed */, CHECK_DIGITS = 5 };
+enum { CHECK_MOST = 400 /* coordinates above which computations of cubic cost are omitted */, CHECK_DIGITS = 5 };
 
 /* The self-test of an element type in use. */
 typedef struct {
   const pw_kind *kind;
   int count;                        /* elements */
-  pw_selftest_report alone, inside; /* in random scenes; in this model */
+  pw_selftest_report alone, inside; /* results in random scenes; in this model */
   char untested[500];               /* why there is no test in random scenes, or "" */
 } pw_checked_kind;
 
-/* Messages: their number, and the first of them. */
+/* Number of messages, and the first ones. */
 typedef struct {
   int count;
   char text[8][700];
@@ -33,7 +33,7 @@ typedef struct {
   pw_checked_kind *kind;  /* kinds: the element types in use */
   int kinds;
   int known;          /* states of the model's reference solution, compared with the initial state */
-  double step, limit; /* the model's step, and the largest with which RK4 is stable [s]; 0 and INFINITY: none */
+  double step, limit; /* the model's step, or 0; the largest stable step of RK4, or INFINITY [s] */
   int explicit_rk4;   /* 1: the model selects rk4 */
   int fastest;        /* the eigenvalue of largest modulus except rigid displacements; -1: all are 0 */
   double doubling; /* time in which the fastest growing perturbation of a steady motion doubles [s]; INFINITY: none */

@@ -21,7 +21,7 @@ static int new_name (const char *path, char *name, size_t size, const char **end
   return PW_OK;
 }
 
-/* Each % stands for the model's name. */
+/* Writes a template with the model's name in place of each %. */
 static void new_print (FILE *f, const char *name, const char *const *line) {
   for (; *line; line++)
     for (const char *c = *line; *c; c++)

@@ -8,12 +8,12 @@
  * default method. */
 int pw_show_matrices (const pw_cli_model *m, double t, pw_error *error);
 
-/* Prints the values of a field at an address as a text model has them, with this number of digits.  With fewer than 17, tables
- * are abridged. */
+/* Prints the values of a field as in a text model, with this number of digits.  With fewer than 17, tables are
+ * abridged. */
 void pw_show_field (const pw_field *f, const void *at, int digits);
 
-/* Writes a built model to standard output as text, with 17 digits.  PW_INPUT for what a text model cannot express: function
- * signals, element types of the model's own. */
+/* Writes a built model to standard output as text, with 17 digits.  PW_INPUT if a text model cannot express it: function
+ * signals, element types of a plug-in. */
 int pw_show_yaml (const pw_cli_model *m, pw_error *error);
 
 #endif

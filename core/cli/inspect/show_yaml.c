@@ -1,4 +1,4 @@
-/* pinwheel show --yaml: a model as text that runs to the same trajectory, to the bit.
+/* pinwheel show --yaml: a model as text with a bit-identical trajectory.
  *
  * Numbers are written with 17 digits, and omitted if they are the default, 0. */
 #include <math.h>
@@ -54,7 +54,7 @@ static void yaml_function (const pw_signal *s) {
   if (text == NULL) putchar (')');
 }
 
-/* The points of a table, or with few digits how many there are. */
+/* The points of a table; with few digits only their number. */
 static void yaml_points (const pw_signal *s, int digits) {
   const double *t = s->table.t;
   int count = s->table.count;
@@ -153,7 +153,7 @@ static void yaml_element (const pw_element *e) {
   puts ("}");
 }
 
-/* ---- What cannot be written as text ---- */
+/* ---- Contents that a text model cannot express ---- */
 
 static int yaml_refuse (const pw_model *m, pw_error *error) {
   int elements;
@@ -194,7 +194,7 @@ static void yaml_run (const pw_run_defaults *run) {
   if (*glue == ',') puts ("}");
 }
 
-/* Expressions keep their names, whose values stand under `let`. */
+/* Expressions contain names, whose values are written under `let`. */
 static void yaml_names (const pw_reference_text *t) {
   if (t->names) puts ("let:");
   for (int i = 0; i < t->names; i++)

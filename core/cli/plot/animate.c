@@ -14,7 +14,7 @@ static const char page_mark[] = "/* DATA */";
 
 /* ---- JavaScript literals ---- */
 
-/* Text before, then a text between quotes that is safe inside a script element. */
+/* Writes `before`, then a text in quotes, safe inside a script element. */
 static void page_text (FILE *f, const char *before, const char *text) {
   fprintf (f, "%s\"", before);
   for (; *text; text++) {
@@ -33,7 +33,7 @@ static void page_numbers (FILE *f, const double *x, int count, int digits) {
     fprintf (f, "%s%s", i ? "," : "", isfinite (x[i]) ? pw_format (text, x[i], digits) : "NaN");
 }
 
-/* Points, of the ground or of a body; with a shape those inside of it. */
+/* Writes points of the ground or of a body; with a shape only those inside it. */
 static void page_points (FILE *f, const char *before, const double *at, int count, const pw_plot_body *shape) {
   fprintf (f, "%s[", before);
   for (int k = 0, n = 0; k < count; k++) {

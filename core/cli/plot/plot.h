@@ -32,7 +32,7 @@ void pw_plots_serialise (pw_plots *p, pw_archive *a);
  * on standard error, but not an error.  PW_RESOURCE if a file cannot be written or gnuplot fails. */
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error);
 
-/* Whether an animation of this name can be written: PW_INPUT unless it ends in .html. */
+/* PW_INPUT unless the name of an animation ends in .html. */
 int pw_animation_check (const char *path, pw_error *error);
 /* Writes the samples of a run, with forces, to the output of that path, which the caller completes; `reason`: why the
  * run did not reach its end, or "".  Returns 0 and reports it if the run is too short. */
@@ -41,12 +41,12 @@ int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *m
 /* ---- Private to this folder ---- */
 
 enum {
-  PLOT_SAMPLES = 1600,    /* of a small scene */
-  PLOT_FEW = 240,         /* of a large one, at least */
-  PLOT_NUMBERS = 8000000, /* kept in all, unless that is less than PLOT_FEW samples */
+  PLOT_SAMPLES = 1600,    /* samples of a small scene */
+  PLOT_FEW = 240,         /* fewest samples of a large scene */
+  PLOT_NUMBERS = 8000000, /* numbers stored, unless that is less than PLOT_FEW samples */
   PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be distinguished */
   PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
-  PLOT_CURVES = 60        /* bodies or wheels that get a curve, at most */
+  PLOT_CURVES = 60        /* bodies or wheels with a curve, at most */
 };
 
 /* Columns of a sample: these, then x, y, phi, vx, vy, omega of each body drawn, then x, y, heading of each wheel drawn,
@@ -56,9 +56,9 @@ enum { PLOT_T, PLOT_KINETIC, PLOT_POTENTIAL, PLOT_WORK, PLOT_LOSS, PLOT_PROJECTI
 /* Bodies, or wheels, to which markers belong. */
 typedef struct {
   const char *file, *columns, *what; /* data file, its columns after the time, "body" */
-  int numbers, offset;               /* of each in a sample, from which column on */
-  int all, shown, curves;            /* in the system; drawn; that get a curve */
-  int *index;                        /* those drawn: bodies or elements of the system */
+  int numbers, offset;               /* numbers of each in a sample; first column */
+  int all, shown, curves;            /* number in the system; drawn; with a curve */
+  int *index;                        /* indices in the system of those drawn */
 } pw_tracks;
 
 /* Attachment points of a body, in its frame [m], and the convex outline of them and its centre of mass,
@@ -69,7 +69,7 @@ typedef struct {
   double corner[PLOT_POINTS + 1][2];
 } pw_plot_body;
 
-/* An element with points: what it connects, and on which of its ends the force is shown. */
+/* An element with points: the bodies it connects, and the end at which its force is drawn. */
 typedef struct {
   int element; /* of the system */
   int ends;    /* 1 or 2 */
@@ -122,11 +122,11 @@ double pw_plot_size (const pw_plots *p);
 int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error);
 /* 1 if attachment point k is not a corner of the outline. */
 int pw_plot_inside (const pw_plot_body *shape, int k);
-/* The number of a system's body among those drawn; -1: the ground, -2: none of them. */
+/* The index of a body among those drawn; -1: the ground, -2: not drawn. */
 int pw_plot_shown (const pw_plots *p, int body);
 /* Finds elements with points on the bodies drawn, up to the available number. */
 void pw_plot_find_links (pw_plots *p, const pw_model *m);
-/* Their forces [N], x and y each. */
+/* Forces of these elements [N], x and y each. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 
 #endif

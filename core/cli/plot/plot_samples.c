@@ -1,4 +1,4 @@
-/* Samples for figures: equally spaced, of as many bodies and wheels as can be distinguished. */
+/* Samples for figures: equally spaced in time, for a limited number of bodies and wheels. */
 #include "plot.h"
 #include <math.h>
 #include <stdlib.h>

@@ -40,7 +40,7 @@ int pw_plot_inside (const pw_plot_body *shape, int k) {
   return 1;
 }
 
-/* Adds an attachment point unless the body has it already; its centre of mass is drawn anyway. */
+/* Adds an attachment point unless it is there already; the centre of mass is always drawn. */
 static void shapes_add_point (pw_plot_body *shape, const double *at) {
   if (shape->count == PLOT_POINTS || (at[0] == 0 && at[1] == 0)) return;
   for (int i = 0; i < shape->count; i++)

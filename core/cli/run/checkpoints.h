@@ -13,11 +13,11 @@ typedef struct {
   const char *path, *every_text, *resume;
   /* as understood */
   double every;       /* simulated time between two [s] */
-  double due;         /* when the next one is to be saved [s]; INFINITY: never */
+  double due;         /* time of the next checkpoint [s]; INFINITY: never */
   double saved;       /* time of the last one [s]; 0: none */
   pw_text head;       /* of the files */
-  pw_archive state;   /* of the next one */
-  pw_checkpoint from; /* what is resumed */
+  pw_archive state;   /* state in the next checkpoint */
+  pw_checkpoint from; /* the checkpoint resumed */
   pw_output *lock;    /* FILE.part, empty, which locks out other processes during the whole run */
 } pw_checkpoints;
 
@@ -49,7 +49,7 @@ typedef struct {
   long row;                        /* rows written */
   int limited;                     /* 1: --limit or --max-steps has stopped it */
   int resumed;                     /* 1: the state of the checkpoint has been loaded */
-  long batch;                      /* steps to take before samples, signals and progress are considered */
+  long batch;                      /* steps between checks of signals and progress */
   double cpu;                      /* of the method [s] */
   char part[PW_RUN_OUTPUTS][4200]; /* paths of the incomplete files that are kept, or "" */
   int lost;                        /* 1: the table or the summary could not be written */
@@ -59,9 +59,9 @@ typedef struct {
 int pw_checkpoints_open (pw_run_command *x, pw_specialise *when, pw_error *error);
 /* Before anything is written: verifies that the checkpoint belongs to this run, and opens its table. */
 int pw_checkpoints_prepare (pw_run_command *x, pw_error *error);
-/* When all is open: brings the run to the checkpoint's state, if one is resumed. */
+/* After everything is open: loads the state of the checkpoint that is resumed, if any. */
 int pw_checkpoints_resume (pw_run_command *x, pw_error *error);
-/* Saves a checkpoint that is due, unless the configuration is near singular; then it stays due. */
+/* Saves a checkpoint that is due; near a singular configuration it is postponed. */
 int pw_checkpoints_save (pw_run_command *x, pw_error *error);
 void pw_checkpoints_close (pw_checkpoints *c);
 

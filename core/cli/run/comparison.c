@@ -46,14 +46,14 @@ void pw_comparison_serialise (pw_comparison *c, pw_archive *a) {
   pw_archive_bytes (a, c->motion.x, (size_t)next * (size_t)c->motion.width * sizeof *c->motion.x);
 }
 
-/* 1 if state or multiplier j is known at some time. */
+/* 1 if state or multiplier j is known at any time. */
 static int motion_knows (const pw_motion *m, int j) {
   int known = 0;
   for (int k = 0; k < m->samples; k++) known |= !isnan (m->x[k * m->width + j]);
   return known;
 }
 
-/* Errors in a unit are not known if the reference has no such state. */
+/* Errors of a unit are unknown if the reference contains no state with that unit. */
 static void comparison_unknown (pw_comparison *c, const pw_system *s) {
   int n = pw_system_coordinates (s), known[MOTION_UNITS] = { 0 }, reactions = 0;
   for (int j = 0; j < 2 * n; j++) known[pw_motion_unit (s, j)] |= motion_knows (&c->reference, j);

@@ -7,16 +7,16 @@
 typedef struct {
   int on; /* 0: there is no reference */
   pw_motion reference, motion;
-  int next; /* the sample due next */
+  int next; /* index of the next sample */
   pw_reference_error error;
 } pw_comparison;
 
-/* Opens the reference of a run up to t_end: the table at `path`, or else the model's own reference solution, unless `started`
- * says that the run has other initial values.  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
+/* Opens the reference of a run up to t_end: the table at `path`, otherwise the model's reference solution unless the run
+ * has other initial values (`started`).  Close it in every case.  Errors: PW_INPUT, PW_RESOURCE. */
 int pw_comparison_open (pw_comparison *c, const pw_cli_model *m, const char *path, int started, double t_end,
                         pw_error *error);
 void pw_comparison_close (pw_comparison *c);
-/* When the next sample is due, or INFINITY. */
+/* The time of the next sample, or INFINITY. */
 double pw_comparison_next (const pw_comparison *c);
 void pw_comparison_take (pw_comparison *c, const pw_system *s, const pw_sample *sample);
 /* Saves or loads the samples of a checkpoint. */

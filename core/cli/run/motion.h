@@ -20,21 +20,22 @@ typedef struct {
 
 int pw_motion_open (pw_motion *m, const pw_system *s, int samples, pw_error *error);
 void pw_motion_close (pw_motion *m);
-/* Sets sample i. */
+/* Stores a sample as number i. */
 void pw_motion_take (pw_motion *m, const pw_system *s, int i, const pw_sample *sample);
 /* Samples evenly spaced, the last one at t_end. */
 void pw_motion_times (pw_motion *m, double t_end);
 /* The errors of a motion relative to a reference at the same times. */
 void pw_motion_distance (const pw_system *s, const pw_motion *reference, const pw_motion *m,
                          double error[MOTION_ERRORS]);
-/* Which kind of unit a state has. */
+/* The unit of a state: MOTION_LENGTH, ... */
 int pw_motion_unit (const pw_system *s, int state);
 
 /* Opens a motion with the model's own reference solution up to t_end. */
 int pw_motion_reference (pw_motion *m, const pw_model *model, const pw_system *s, double t_end, pw_error *error);
 
-/* Opens a motion from a table with columns as `pinwheel run -o` writes them; rows are thinned to MOTION_SAMPLES, those after
- * t_end are skipped.  *t_end 0: that of the last row.  `whole`: there must be a row at the end (motion_file.c).  PW_INPUT with line. */
+/* Opens a motion from a table with columns as `pinwheel run -o` writes them; MOTION_SAMPLES rows
+ * are selected, rows after t_end skipped.  *t_end = 0: set to the time of the last row.  `whole`: a row at the end is
+ * required.  PW_INPUT with the line. */
 int pw_motion_read (pw_motion *m, const pw_system *s, const char *path, double *t_end, int whole, pw_error *error);
 
 #endif

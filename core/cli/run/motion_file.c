@@ -14,8 +14,8 @@ typedef struct {
   char *line;
   size_t room;
   long number;   /* of the line */
-  int failed;    /* errno of a line that could not be read */
-  int *place;    /* of each column after the first: its index in a motion, or -1 */
+  int failed;    /* errno of a failed read */
+  int *place;    /* columns after the first: index in a motion, or -1 */
   double *sign;  /* factor to SI units; negative for reactions, which are -lambda */
   double second; /* unit of the time [s] */
   int columns, known;
@@ -135,7 +135,7 @@ static int file_time (file_reader *in, char **rest, double *t, pw_error *error) 
   return status;
 }
 
-/* Rows after the start and up to the end; without an end, the last row's time is it. */
+/* Rows from the start to the end, which is the time of the last row if it is not given. */
 static int file_count (file_reader *in, double *t_end, int whole, int *rows, pw_error *error) {
   double t, last = 0, before = -INFINITY;
   char *rest;

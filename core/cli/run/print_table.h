@@ -12,7 +12,7 @@ typedef struct {
   FILE *f; /* NULL: standard output */
   int pass;
   int column, width[12];
-  int pad;    /* blanks due before the next cell */
+  int pad;    /* blanks before the next cell */
   int indent; /* characters of the row so far, with those blanks */
 } pw_table;
 

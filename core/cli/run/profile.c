@@ -1,4 +1,4 @@
-/* Where the time of a run goes: two tables. */
+/* Time of a run by element types and by stages: two tables. */
 #include <math.h>
 #include <stdlib.h>
 #include "print_table.h"

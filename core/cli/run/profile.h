@@ -6,8 +6,8 @@
 #include "pinwheel-files.h"
 #include "pinwheel-solvers.h"
 
-/* Measures a run that is over (pw_run_profile) and prints two tables: what each kind of element and what each stage of an
- * evaluation costs.  `cpu` is the run's processor time [s].  Errors: PW_RESOURCE. */
+/* Measures a finished run (pw_run_profile) and prints the cost of each element type and of each stage of an evaluation.
+ * cpu: processor time of the run [s].  Errors: PW_RESOURCE. */
 int pw_print_profile (const pw_system *s, pw_run *r, double cpu, FILE *out, pw_error *error);
 
 #endif

@@ -14,7 +14,7 @@ static void report_more (FILE *f, int more, const char *hint) {
 
 /* ---- Settings ---- */
 
-/* Options without effect.  Giving both steps and tolerances, as scripts do, is not reported. */
+/* Options without effect.  Steps together with tolerances, common in scripts, are not reported. */
 static void report_unused (const char *method, int adaptive, const pw_cli_line *l) {
   if (adaptive && l->step && !l->rtol && !l->atol)
     pw_cli_say ("pinwheel: --step has no effect: %s chooses its steps by --rtol, --atol\n", method);
@@ -71,7 +71,7 @@ static void report_angle (const char *kind, const char *name, const char *what, 
               kind, name, what, value, degrees, value);
 }
 
-/* Expressions that may jump as states change, where no step ends. */
+/* Expressions that may jump when states change; steps do not end at such jumps. */
 static void report_jump (const pw_element *e, const char *field, const pw_signal *s) {
   if (s->type == PW_FUNCTION && s->function.text && s->function.text->jump)
     pw_cli_say (

@@ -27,8 +27,8 @@ enum { PW_STATE_NAME = 300 };
 void pw_report_state (const pw_system *s, const pw_initial_report *x, int i, char name[PW_STATE_NAME], double *from,
                       double *to);
 
-/* Descriptions of the redundant constraint equations, ended by NULL, to be released as one; NULL if there are none, or
- * no memory. */
+/* Descriptions of the redundant constraint equations, ended by NULL; release them with one free.  NULL if there are none
+ * or memory is exhausted. */
 const char **pw_report_redundancies (pw_run *r);
 
 /* A table on standard output: last state, reactions, residuals, energies, cost. */

@@ -9,15 +9,15 @@
 #include "profile.h"
 #include "report.h"
 
-#define RUN_SHORT 0.01 /* a batch that took less processor time [s] may be longer the next time */
-#define RUN_LONG 0.04  /* one that took more must be shorter: Ctrl-C and the progress bar wait for its end */
+#define RUN_SHORT 0.01 /* processor time of a batch [s] below which the next one is longer */
+#define RUN_LONG 0.04  /* above which it is shorter: Ctrl-C and the progress bar wait for its end */
 enum { RUN_BATCH = 4096 };
 
 typedef pw_run_command run;
 
 /* ---- Before the run ---- */
 
-/* No file is used twice; before the model is open, and then with the tables that it reads. */
+/* Refuses files used twice: called before the model is open, and then with the tables that it reads. */
 static int run_uses (run *x, pw_error *error) {
   const pw_checkpoints *c = &x->check;
   int alike = c->resume && c->path && strcmp (c->resume, c->path) == 0;
@@ -71,7 +71,7 @@ static int run_own_method (const run *x, pw_error *error) {
   pw_error why = { 0 };
   int status = pw_method_parse (x->method, &method, &stabilisation, &why);
   if (status == PW_OK) return PW_OK;
-  return pw_fail (error, status, "model %s: the method it asks for: %s", pw_file_name (x->m.file), why.text);
+  return pw_fail (error, status, "model %s: its default method: %s", pw_file_name (x->m.file), why.text);
 }
 
 static int run_settings (run *x, pw_error *error) {
@@ -84,7 +84,7 @@ static int run_settings (run *x, pw_error *error) {
   return status;
 }
 
-/* Compiled code counts as part of the setting: a resumed run goes on with it. */
+/* The engine is part of the settings: a resumed run uses the same one. */
 static int run_engine (run *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   pw_specialise when;
@@ -98,7 +98,7 @@ static int run_engine (run *x, pw_error *error) {
   return PW_OK;
 }
 
-/* Why the run does not use the code it has. */
+/* Reports why a run does not use the compiled code. */
 static const char *run_unspecialised (const run *x) {
   if (x->engine.code == NULL) return x->engine.why;
   return pw_run_statistics (x->r)->specialised
@@ -132,7 +132,7 @@ static int run_open (run *x, pw_error *error) {
 
 /* ---- The run ---- */
 
-/* When the next row is due; multiples are computed, not accumulated; the last one may differ from the end by
+/* The time of the next row: computed as a multiple, not accumulated; the last one may differ from the end by
  * round-off. */
 static double run_next_row (const run *x) {
   if (x->csv == NULL) return INFINITY;
@@ -141,7 +141,7 @@ static double run_next_row (const run *x) {
   return fabs (t - x->t_end) <= 1e-9 * x->every ? x->t_end : t;
 }
 
-/* Writes the rows and keeps the samples that the last step has reached. */
+/* Writes rows and stores samples up to the time reached. */
 static int run_take_samples (run *x, pw_error *error) {
   double now = pw_run_time (x->r);
   pw_sample sample;
@@ -165,7 +165,7 @@ static int run_take_samples (run *x, pw_error *error) {
   return status;
 }
 
-/* Steps until a sample is due, the batch is over, or it is time to stop. */
+/* Advances to the next sample, the end of the batch, or a request to stop. */
 static int run_batch (run *x, pw_error *error) {
   double due =
       fmin (fmin (run_next_row (x), x->plots ? pw_plots_next (x->plots) : INFINITY), fmin (x->check.due, x->t_end));
@@ -211,8 +211,7 @@ static int run_integrate (run *x, pw_error *error) {
 
 /* ---- After the run ---- */
 
-/* Writes the table to the disk, or keeps what exists of it as NAME.part; nothing is kept of a run that has not
- * begun. */
+/* Completes the table, or keeps its rows as NAME.part; a run without steps leaves no file. */
 static void run_close_table (run *x, int good, pw_error *error) {
   pw_output **o = &x->output[PW_RUN_TABLE];
   pw_csv_close (x->csv);
@@ -232,8 +231,8 @@ static void run_add_error (pw_error *error, const pw_error *own) {
     pw_cli_say ("pinwheel: %s\n", own->text);
 }
 
-/* The JSON summary, which is written however the run has ended.  A run that could not be resumed leaves the one before
- * it as it is. */
+/* The JSON summary, written however the run has ended, except that a failed resumption does not replace the previous
+ * summary. */
 static void run_write_json (run *x, const pw_summary *summary, const pw_sample *sample, pw_error *error) {
   pw_output *o = x->output[PW_RUN_SUMMARY];
   pw_error own = { 0 };

@@ -19,7 +19,7 @@
 typedef struct shared_system {
   long parameters; /* pw_grid_parameters of its rows */
   int users;       /* threads */
-  int ready;       /* 0: one of them is compiling it */
+  int ready;       /* 0: a thread is compiling it */
   pw_sweep_system system;
   pw_error error; /* why it could not be compiled */
   struct shared_system *next;
@@ -195,8 +195,8 @@ static void sweep_release (sweep *x, shared_system *s) {
   free (s);
 }
 
-/* The system of a row in place of the one used so far: shared with other threads, or compiled without the lock.  NULL
- * if out of memory. */
+/* Replaces a thread's system by that of a row, shared with other threads, or compiled without the lock.  NULL if out of
+ * memory. */
 static shared_system *sweep_share (sweep *x, shared_system *last, long row) {
   long parameters = pw_grid_parameters (&x->plan.grid, row);
   if (last && last->parameters == parameters) return last;
@@ -222,7 +222,7 @@ static shared_system *sweep_share (sweep *x, shared_system *last, long row) {
 
 /* ---- The sweep ---- */
 
-/* Keeps a row, or the first error, which stops the sweep. */
+/* Stores a row, or the first error, which stops the sweep. */
 static void sweep_keep (sweep *x, long row, int status, const pw_text *text, const pw_error *own) {
   if (status == PW_RETRY || x->error->status != PW_OK) return;
   if (status == PW_RESOURCE)

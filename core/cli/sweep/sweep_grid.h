@@ -26,16 +26,16 @@ typedef struct {
   long rows;
 } pw_grid;
 
-/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT with the text that is wrong and what was expected, also for
+/* Reads a NULL-terminated list of "NAME=RANGE".  PW_INPUT with the wrong text and the expected one, also for
  * too many rows.  Free the grid in every case. */
 int pw_grid_read (pw_grid *g, const char *const *ranges, pw_error *error);
 void pw_grid_free (pw_grid *g);
 double pw_axis_value (const pw_axis *a, long i);
 double pw_grid_value (const pw_grid *g, int axis, long row);
 
-/* The k-th row in the order in which runs are started: rows with the same parameters follow each other. */
+/* The k-th row in the order of execution, in which rows with the same parameters are consecutive. */
 long pw_grid_ordered (const pw_grid *g, long k);
-/* The number of a row's combination of parameters. */
+/* The index of a row's combination of parameters. */
 long pw_grid_parameters (const pw_grid *g, long row);
 
 #endif

@@ -5,7 +5,7 @@
 #include "fingerprint.h"
 #include "sweep_plan.h"
 
-enum { PLAN_TRIES = 1000 }; /* models that cannot be built, after which the grid is refused */
+enum { PLAN_TRIES = 1000 }; /* number of failed models after which the grid is refused */
 
 /* ---- Compiled systems ---- */
 
@@ -129,7 +129,7 @@ static int plan_columns_of (pw_plan *p, const pw_sweep_system *x, pw_error *erro
   return PW_OK;
 }
 
-/* The models tried. */
+/* Models built to find the columns. */
 typedef struct {
   int built, refused;
   pw_error first; /* why a model could not be built */

@@ -1,4 +1,4 @@
-/* The plan of a sweep: all that its runs share.
+/* The plan of a sweep: data shared by its runs.
  *
  * A sweep computes all rows of the grid, or those of one part: part i of n has the rows i - 1, i - 1 + n, ... */
 #ifndef PW_SWEEP_PLAN_H
@@ -52,7 +52,7 @@ static inline long pw_plan_rows (const pw_plan *p) {
 typedef struct {
   pw_cli_model m;             /* m.file is NULL */
   int *column;                /* 2 pw_system_coordinates: of each state */
-  int *state;                 /* grid.axes: whose initial value an axis varies; -1: it is a parameter */
+  int *state;                 /* grid.axes: state whose initial value an axis varies; -1: it varies a parameter */
   const pw_specialised *code; /* for its runs; NULL: the general engine */
 } pw_sweep_system;
 
