@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "reference.h"
+#include "conclusion.h"
 
 enum { COMPARE_REPEATS = 99 };
 #define COMPARE_FEW 3      /* smallest number of timed runs within the limit */
@@ -12,8 +12,14 @@ enum { COMPARE_REPEATS = 99 };
 #define COMPARE_CLEAR 10   /* error over uncertainty of the reference, for orders accurate to log2 1.1 = 0.14 */
 #define COMPARE_AGREE 0.1  /* largest relative difference of the last two orders in the asymptotic range */
 
+/* Explicit and implicit, one-step and multistep methods, each with the stabilisation that suits it. */
+static const char compare_usual[] = "rk4+projection,erk5+projection,erk8+projection,bdf+projection,"
+                                    "ida+baumgarte,ida+ggl,radau+ggl,galpha+index3";
+
 typedef struct {
   pw_study study;
+  int table;     /* --table */
+  int concludes; /* errors of coordinates are known */
   const char *rtol_text, *step_text, *repeats_text;
   double finest_step; /* of the ladder [s] */
   double repeats;     /* timed runs of a row, at most */
@@ -147,7 +153,7 @@ static int compare_plan (pw_study *s, pw_error *error) {
   if (status == PW_OK) status = pw_cli_number ("--repeats", x->repeats_text, PW_COUNT, &x->repeats, error);
   if (status == PW_OK && x->repeats > COMPARE_REPEATS)
     return pw_fail (error, PW_INPUT, "--repeats %s: at most %d", x->repeats_text, COMPARE_REPEATS);
-  if (status == PW_OK) status = pw_study_read_methods (s, s->methods_text ? s->methods_text : "all", error);
+  if (status == PW_OK) status = pw_study_read_methods (s, s->methods_text ? s->methods_text : compare_usual, error);
   if (status == PW_OK) status = ladder_read ("--step-ladder", x->step_text, &of[0], error);
   if (status == PW_OK) status = ladder_read ("--rtol-ladder", x->rtol_text, &of[1], error);
   x->finest_step = of[0].to;
@@ -271,7 +277,7 @@ static void compare_print_reference (const pw_compare *x) {
   }
   pw_cli_print (stdout, "errors are measured against %s%s\n", t->about,
                 x->study.reference_path ? ", as if it were exact" : "");
-  for (int i = 0; i < t->partners; i++)
+  for (int i = 0; i < (x->table ? t->partners : t->partners > 0); i++)
     printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", t->partner[i].about,
             t->partner[i].error[MOTION_MOST + MOTION_LENGTH], t->partner[i].error[MOTION_MOST + MOTION_ANGLE],
             i == 0 ? ": the uncertainty of the reference" : "");
@@ -310,8 +316,17 @@ static int compare_begin (pw_study *s, pw_error *error) {
   if (status != PW_OK) return status;
   pw_motion_times (&x->scratch, s->t_end);
   if (x->reference.known) memcpy (x->scratch.t, motion->t, (size_t)samples * sizeof *motion->t);
+  const double *largest = x->reference.uncertainty + MOTION_MOST;
+  x->concludes = x->reference.known && (largest[MOTION_LENGTH] > 0 || largest[MOTION_ANGLE] > 0);
+  s->quiet = x->concludes && !x->table;
   compare_print_reference (x);
   return PW_OK;
+}
+
+static void compare_conclude (const pw_study *s) {
+  const pw_compare *x = (const pw_compare *)s;
+  if (x->concludes && x->table) putchar ('\n');
+  if (x->concludes) pw_conclusion_print (s, &x->reference, COLUMN_ERROR + MOTION_MOST);
 }
 
 /* Work-precision diagrams of lengths and of angles, if their errors are known. */
@@ -353,6 +368,7 @@ static int compare_command (void *options, pw_error *error) {
     .plan = compare_plan,
     .begin = compare_begin,
     .measure = compare_measure,
+    .conclude = compare_conclude,
     .figures = compare_figures,
     .close = compare_close
   };
@@ -363,7 +379,9 @@ static const struct poptOption compare_options[] = {
   PW_OPTION_GROUP ("Comparison"),
   PW_TEXT_OPTION (
       pw_study, methods_text, "methods", 'm', "A,B,...|all",
-      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all: of every integrator (default)"),
+      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with ggl; all: "
+      "every method (default: eight representative ones)"),
+  PW_FLAG_OPTION (pw_compare, table, "table", "Print every run, not only the conclusion"),
   PW_TEXT_OPTION (pw_compare, rtol_text, "rtol-ladder", 0, "FROM:TO",
                   "Tolerances of adaptive methods, by decades (default 1e-3:1e-12)"),
   PW_TEXT_OPTION (pw_compare, step_text, "step-ladder", 0, "FROM:TO",

@@ -310,8 +310,8 @@ static const struct poptOption drift_options[] = {
   PW_OPTION_GROUP ("Comparison"),
   PW_TEXT_OPTION (
       pw_study, methods_text, "methods", 'm', "A,B,...|all",
-      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all: of every integrator (default "
-      "rk4+all,ida+all,galpha+all)"),
+      "Methods, separated by commas; rk4+all: every stabilisation of rk4; all+ggl: every integrator with ggl; all: "
+      "every method (default rk4+all,ida+all,galpha+all)"),
   PW_STEP_OPTIONS,
   PW_LIST_OPTION (
       pw_drift, vary, "vary", 'v', "OPTION=RANGE",

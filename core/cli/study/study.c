@@ -4,6 +4,7 @@
 #include <string.h>
 #include <unistd.h>
 #include "study.h"
+#include "util.h"
 
 #define STUDY_SHORT 0.005 /* CPU time [s] of a batch of steps below which batches become longer */
 #define STUDY_LONG 0.02   /* and above which they become shorter */
@@ -23,29 +24,36 @@ static int methods_add (pw_study *x, const char *name, pw_error *error) {
   return PW_OK;
 }
 
-/* Adds every stabilisation of an integrator; NULL: of all integrators. */
-static int methods_add_all (pw_study *x, const pw_method *integrator, pw_error *error) {
-  char name[STUDY_NAME];
-  int status = PW_OK;
+/* Adds an integrator, or all of them (NULL), with a stabilisation, or all of them (NULL). */
+static int methods_add_all (pw_study *x, const pw_method *integrator, const char *stabilisation, pw_error *error) {
+  char name[STUDY_NAME], hint[100];
+  pw_nearest near = { .sought = stabilisation };
+  int status = PW_OK, found = 0;
   for (int i = 0; pw_methods[i]; i++)
     for (const pw_stabilisation *s = pw_methods[i]->stabilisations; status == PW_OK && s->name; s++) {
       if (integrator && integrator != pw_methods[i]) continue;
+      if (stabilisation) pw_nearest_try (&near, s->name);
+      if (stabilisation && strcmp (stabilisation, s->name) != 0) continue;
       snprintf (name, sizeof name, "%s+%s", pw_methods[i]->name, s->name);
       status = methods_add (x, name, error);
+      found = 1;
     }
-  return status;
+  if (status != PW_OK || found) return status;
+  return pw_fail (error, PW_INPUT, "--methods all+%.60s: no integrator has this stabilisation%s", stabilisation,
+                  pw_nearest_text (&near, hint, sizeof hint));
 }
 
-/* "all", "INTEGRATOR+all", or a method. */
+/* "all", "INTEGRATOR+all", "all+STABILISATION", or a method. */
 static int methods_add_item (pw_study *x, char *item, pw_error *error) {
   const pw_method *integrator;
   int stabilisation;
   char *plus = item + strcspn (item, "+:");
-  if (strcmp (item, "all") == 0) return methods_add_all (x, NULL, error);
+  if (strcmp (item, "all") == 0 || strcmp (item, "all+all") == 0) return methods_add_all (x, NULL, NULL, error);
+  if (strncmp (item, "all+", 4) == 0) return methods_add_all (x, NULL, item + 4, error);
   if (strcmp (plus, "+all") != 0) return methods_add (x, item, error);
   *plus = 0;
   int status = pw_method_parse (item, &integrator, &stabilisation, error);
-  return status == PW_OK ? methods_add_all (x, integrator, error) : status;
+  return status == PW_OK ? methods_add_all (x, integrator, NULL, error) : status;
 }
 
 int pw_study_read_methods (pw_study *x, const char *text, pw_error *error) {
@@ -190,6 +198,7 @@ static int study_rows (pw_study *x, pw_error *error) {
     if (status == PW_OK) status = pw_table_row (x, error);
     if (status != PW_OK) break;
   }
+  if (status == PW_OK && x->type->conclude) x->type->conclude (x);
   pw_stop_release ();
   return status;
 }

@@ -66,6 +66,8 @@ typedef struct {
   int (*begin) (pw_study *x, pw_error *error);
   /* Measures a row by pw_study_run; pw_study_outcome records a failure of the method in the row. */
   int (*measure) (pw_study *x, pw_row *r, pw_error *error);
+  /* After the last row: prints the conclusion; NULL: none. */
+  void (*conclude) (const pw_study *x);
   /* After the last row, if there is a folder: further tables, data and scripts of figures. */
   int (*figures) (pw_study *x, pw_error *error);
   void (*close) (pw_study *x);
@@ -85,7 +87,8 @@ struct pw_study {
   double t_end;   /* [s] */
   double cpu_end; /* CPU time of a run after which it is stopped between steps [s] */
   /* progress */
-  int lock; /* of the folder; -1: none */
+  int lock;  /* of the folder; -1: none */
+  int quiet; /* 1: rows are not printed */
   pw_row *row;
   int rows, done;
   pw_progress progress;
@@ -100,7 +103,7 @@ struct pw_study {
 int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error);
 
 /* Reads --methods: names separated by commas; "all" stands for each integrator with each stabilisation, "rk4+all" for
- * rk4 with each.  A method named twice is used once.  PW_INPUT with the nearest valid name. */
+ * rk4 with each, "all+ggl" for each integrator that has ggl.  A method named twice is used once.  PW_INPUT with the nearest valid name. */
 int pw_study_read_methods (pw_study *x, const char *text, pw_error *error);
 
 /* Adds a row of a line of a group, without numbers.  Its label is its method unless it is set; rows of a line follow each other.  NULL and PW_RESOURCE. */
@@ -124,7 +127,7 @@ int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *
 
 /* Opens the CSV file with its first line. */
 int pw_table_open (pw_study *x, pw_error *error);
-/* Prints the row that is done, and writes it into the CSV file. */
+/* Prints the row that is done unless the study is quiet, and writes it into the CSV file. */
 int pw_table_row (pw_study *x, pw_error *error);
 
 /* 1 if a coordinate of the points of a group is positive somewhere. */

@@ -86,8 +86,8 @@ static void table_print (const pw_study *x, const pw_row *r) {
 
 int pw_table_row (pw_study *x, pw_error *error) {
   const pw_row *r = &x->row[x->done];
-  if (x->done == 0 || r->group != r[-1].group) table_heading (x, r->group);
-  table_print (x, r);
+  if (!x->quiet && (x->done == 0 || r->group != r[-1].group)) table_heading (x, r->group);
+  if (!x->quiet) table_print (x, r);
   return x->csv ? table_write (x, r, error) : PW_OK;
 }
 
