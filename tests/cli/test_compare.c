@@ -252,7 +252,7 @@ static void test_conclusion (void **state) {
   assert_string_equal (compare_word ("ida+ggl", 3), "not");
   cli_good ("pinwheel compare pendulum --methods rk4+projection --table --t-end 1 --step-ladder 0.1:0.05 --repeats 1");
   assert_non_null (strstr (cli_out, "residual of"));
-  assert_non_null (strstr (cli_out, "\nrk4+projection     0.05 "));
+  assert_non_null (strstr (cli_out, "\nrk4+projection      0.05 "));
   assert_non_null (strstr (cli_out, "\ncheapest "));
 }
 
