@@ -6,9 +6,9 @@
 #include <unistd.h>
 #include "progress.h"
 
-#define PROGRESS_FIRST 0.5 /* no bar before this [s]: a short run should not flash */
-#define PROGRESS_EVERY 0.1 /* between two drawings [s] */
-#define PROGRESS_LINES 60  /* between two lines [s] */
+#define PROGRESS_FIRST 0.5 /* time before the bar appears [s], so that short runs show none */
+#define PROGRESS_EVERY 0.1 /* interval of updates [s] */
+#define PROGRESS_LINES 60  /* interval of lines without a terminal [s] */
 #define PROGRESS_WIDTH 30  /* characters of a full bar */
 
 double pw_seconds (clockid_t id) {

@@ -1,4 +1,4 @@
-/* The co-moving frame of a linearisation; the symmetries of the whole; whether the motion is steady.
+/* The co-moving frame of a linearisation, symmetries of the system, steadiness of the motion.
  *
  * A frame with the origin r, the velocity u and the angular velocity w sees a body at rest if its velocity is u + w
  * (-(y - r_y), x - r_x) and its acceleration W v = w (-v_y, v_x, 0).  A motion relative to the frame with constant
@@ -24,7 +24,7 @@ static double linear_unit (const pw_linearisation *x) {
 
 /* ---- The frame ---- */
 
-/* The largest |a - W v|, and |W d| of motions relative to the frame. */
+/* The largest |a - W v| and, for motions relative to the frame, |W d|. */
 static double linear_residual (const pw_linearisation *x, const pw_linear_frame *f) {
   const double *q = x->r->q, *v = x->r->v, *a = x->a, w = f->twist[2];
   double most = 0;
@@ -90,7 +90,7 @@ static double *linear_violation (pw_linearisation *x, double *out) {
   return out;
 }
 
-/* All changes caused by a rigid displacement of the whole. */
+/* All changes caused by a rigid displacement of the system. */
 static void linear_change (pw_linearisation *x, int k, double *out) {
   const double *dq = x->x, *dv = x->x + x->n;
   linear_displace (x, k);
@@ -101,7 +101,7 @@ static void linear_change (pw_linearisation *x, int k, double *out) {
   for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_rank_unit (x->r->s, j) / linear_unit (x);
 }
 
-/* Round-off grows with the derivatives of the accelerations, by 1e-4 of their size. */
+/* Tolerance of symmetries: round-off grows with the derivatives of the accelerations, by 1e-4 of their size. */
 static double linear_tolerance (const pw_linearisation *x) {
   double most = 0, T = x->r->w->scale.time;
   for (int i = x->positions; i < x->size; i++)

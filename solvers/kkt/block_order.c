@@ -10,7 +10,7 @@
 
 /* Neighbours of each node, with repetition; or rows of each column, ascending. */
 typedef struct {
-  int *first, *list; /* those of c: list[first[c]] .. list[first[c + 1]] */
+  int *first, *list; /* of node or column c: list[first[c]] to list[first[c + 1] - 1] */
 } order_lists;
 
 /* An order of elimination. */
@@ -55,7 +55,7 @@ static int order_by_degree (int nodes, const pw_plan_node *node, long pairs, con
 }
 
 /* Passes through the rows of L: row i has entries in the columns on the paths of the elimination tree from those of K to
- * i (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2] and makes the tree, the second
+ * i (Davis 2005, Algorithm 849: LDL).  The first pass counts them in first[column + 2] and builds the tree, the second
  * one lists them.  PW_RETRY if there are more than `most`. */
 static int order_pass (int nodes, const order_lists *K, int most, order_variant *v, int *parent, int *mark) {
   long count = 0;
@@ -91,7 +91,7 @@ static int order_fill (int nodes, const order_lists *K, int most, order_variant 
   return status;
 }
 
-/* Puts higher ranks later, without changing the order otherwise, and lists the rows of each column. */
+/* Moves nodes of higher rank to the end, otherwise in the same order, and lists the rows of each column. */
 static int order_try (int nodes, const pw_plan_node *node, const order_lists *K, int most, order_variant *v) {
   int at = 0;
   for (int rank = 0; rank < PW_BLOCK_RANKS; rank++)
@@ -101,7 +101,7 @@ static int order_try (int nodes, const pw_plan_node *node, const order_lists *K,
   return order_fill (nodes, K, most, v);
 }
 
-/* The better of the two orders goes to v[0]. */
+/* Stores in v[0] the order with less fill-in: minimum degree, or the natural order. */
 static int order_plan (int nodes, const pw_plan_node *node, long pairs, const int *pair, order_variant *v) {
   order_lists K = { NULL, NULL };
   for (int i = 0; i < 2; i++) {

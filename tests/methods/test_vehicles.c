@@ -49,7 +49,7 @@ static void test_ackermann_car (void **state) {
     pw_sample x = runs_to (r, t);
     check_close ("turned", trial_state (s, &x, "car.phi"), 5 * k * sin (w * t) / (L * w), 10 * H4, "10 h^4");
     check_close ("rate", trial_state (s, &x, "car.omega"), 5 * k * cos (w * t) / L, 64 * CHECK_EPS, "round-off");
-    check_below ("all four wheels", x.velocity, 64 * CHECK_EPS, "round-off: redundant rows count, too");
+    check_below ("all four wheels", x.velocity, 64 * CHECK_EPS, "round-off, including redundant rows");
   }
   gallery_close (r, s);
   s = gallery_open ("ackermann-car", "w", 0., "track", 2.4, NULL);

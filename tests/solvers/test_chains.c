@@ -25,7 +25,7 @@ enum {
 };
 
 typedef struct {
-  double how;
+  double variant;
 } chains_parameters;
 
 static double chains_angle (int bar) {
@@ -33,7 +33,7 @@ static double chains_angle (int bar) {
 }
 
 /* Bar i of a chain from (x, y) on, half a metre to either end. */
-static void chains_bar (pw_model *m, const char *chain, int i, double x, double y, int light) {
+static void chains_bar (pw_model *m, const char *chain, int i, double x, double y, int massless) {
   char name[20];
   double c = 0, s = 0;
   for (int k = 0; k <= i; k++) {
@@ -42,8 +42,8 @@ static void chains_bar (pw_model *m, const char *chain, int i, double x, double 
   }
   snprintf (name, sizeof name, "%s%d", chain, i);
   pw_add_body (m, &(pw_body){ .name = name,
-                              .mass = light ? 0 : 1 + 0.1 * i,
-                              .inertia = light ? 0 : 0.1 + 0.01 * i,
+                              .mass = massless ? 0 : 1 + 0.1 * i,
+                              .inertia = massless ? 0 : 0.1 + 0.01 * i,
                               .start = { x + c, y + s, chains_angle (i) } });
 }
 
@@ -59,14 +59,14 @@ static void chains_pin (pw_model *m, const char *chain, int i, const char *from,
   pw_add_pin (m, &pin);
 }
 
-static void chains_more (pw_model *m, int how) {
+static void chains_add_element (pw_model *m, int variant) {
   const int n = CHAINS_LINKS;
   const double x = n / 2 * (cos (chains_angle (0)) + cos (chains_angle (1)));
   const double y = n / 2 * (sin (chains_angle (0)) + sin (chains_angle (1)));
-  if (how == CHAINS_BRIDGE)
+  if (variant == CHAINS_BRIDGE)
     pw_add_pin (m, &(pw_pin){ .name = "end", .body = { "bar13", "ground" }, .at = { { 0.5, 0 }, { x, y } } });
-  if (how == CHAINS_WHEEL) pw_add_wheel (m, &(pw_wheel){ .name = "wheel", .body = "bar7", .at = { 0.1, 0 } });
-  if (how != CHAINS_BRANCH) return;
+  if (variant == CHAINS_WHEEL) pw_add_wheel (m, &(pw_wheel){ .name = "wheel", .body = "bar7", .at = { 0.1, 0 } });
+  if (variant != CHAINS_BRANCH) return;
   double from = (n / 2 - 1) / 2 * (cos (chains_angle (0)) + cos (chains_angle (1)));
   double up = (n / 2 - 1) / 2 * (sin (chains_angle (0)) + sin (chains_angle (1)));
   from += 0.5 * cos (chains_angle (0)), up += 0.5 * sin (chains_angle (0)); /* the middle of bar 6 */
@@ -75,19 +75,19 @@ static void chains_more (pw_model *m, int how) {
 }
 
 static void chains_build (pw_model *m, const void *parameters) {
-  const int how = (int)((const chains_parameters *)parameters)->how, n = CHAINS_LINKS;
+  const int variant = (int)((const chains_parameters *)parameters)->variant, n = CHAINS_LINKS;
   pw_add_gravity (m, &(pw_gravity){ .name = "g", .acceleration = { 0, -9.81 } });
   for (int i = 0; i < n; i++)
-    chains_bar (m, "bar", how == CHAINS_BARS_BACK ? n - 1 - i : i, 0, 0, how == CHAINS_LIGHT && i == 7);
+    chains_bar (m, "bar", variant == CHAINS_BARS_BACK ? n - 1 - i : i, 0, 0, variant == CHAINS_LIGHT && i == 7);
   for (int i = 0; i < n; i++) {
-    int pin = how == CHAINS_PINS_BACK ? n - 1 - i : how == CHAINS_SHUFFLED ? 5 * i % n : i;
-    chains_pin (m, "bar", pin, "ground", 0, how == CHAINS_TURNED && i % 3 == 0);
+    int pin = variant == CHAINS_PINS_BACK ? n - 1 - i : variant == CHAINS_SHUFFLED ? 5 * i % n : i;
+    chains_pin (m, "bar", pin, "ground", 0, variant == CHAINS_TURNED && i % 3 == 0);
   }
-  chains_more (m, how);
+  chains_add_element (m, variant);
 }
 
 static const pw_parameter chains_list[] = {
-  { PW_AT (chains_parameters, how), .domain = PW_NONNEGATIVE, .about = "which of the scenes" },
+  { PW_AT (chains_parameters, variant), .domain = PW_NONNEGATIVE, .about = "number of the scene" },
   { .name = NULL },
 };
 
@@ -100,9 +100,9 @@ static const pw_plugin_table chains_table = { .abi = PW_ABI,
 /* ---- Tests ---- */
 
 /* Verifies a short run; returns final states of some bars, and the force in a pin. */
-static void chains_run (int how, double end[8]) {
+static void chains_run (int variant, double end[8]) {
   static const char *const name[] = { "bar0.phi", "bar6.x", "bar6.omega", "bar7.phi", "bar13.x", "bar13.vy" };
-  pw_system *s = scene_system (&chains_table, "how", (double)how, NULL);
+  pw_system *s = scene_system (&chains_table, "variant", (double)variant, NULL);
   pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .step = 0.01, .span = 0.2 });
   pw_sample x = runs_to (r, 0.2);
   trial_verify (s, r, &x, 1e4 * CHECK_EPS, "round-off of a projected state");
@@ -118,8 +118,8 @@ static void test_same (void **state) {
   (void)state;
   chains_run (CHAINS_PLAIN, first);
   assert_true (fabs (first[5]) > 0.1); /* it moves */
-  for (int how = CHAINS_PLAIN + 1; how < CHAINS_OTHERS; how++) {
-    chains_run (how, other);
+  for (int variant = CHAINS_PLAIN + 1; variant < CHAINS_OTHERS; variant++) {
+    chains_run (variant, other);
     for (int i = 0; i < 8; i++)
       check_close ("end", other[i], first[i], 1e-10 * (1 + fabs (first[i])), "1e6 eps, over 20 steps");
   }
@@ -128,7 +128,7 @@ static void test_same (void **state) {
 static void test_others (void **state) {
   double end[8];
   (void)state;
-  for (int how = CHAINS_OTHERS; how < CHAINS_ALL; how++) chains_run (how, end);
+  for (int variant = CHAINS_OTHERS; variant < CHAINS_ALL; variant++) chains_run (variant, end);
 }
 
 int main (void) {
