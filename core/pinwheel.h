@@ -445,7 +445,7 @@ typedef struct {
 
 /* Motor: a spring and damper of limited torque that drive the angle of body 1 relative to body 2 to a signal. */
 typedef struct {
-  const char *name, *body[2]; /* the driven body, the body that takes the reaction; "ground" for one of them */
+  const char *name, *body[2]; /* the driven body, the body with the reaction; "ground" for one of them */
   double stiffness, damping;  /* torque per error of angle [N m/rad], of angular velocity [N m s/rad]; >= 0 */
   double limit;               /* largest torque [N m]; 0: no limit */
   pw_signal angle, rate;      /* targets of phi1 - phi2 [rad], of omega1 - omega2 [rad/s] */

@@ -1,6 +1,6 @@
 /* EzyRoller: a ride-on of two segments that moves because its rider swings the steering hinge.
  *
- * The frame carries the rider and a wheel A at the rear; the steering assembly carries a wheel C in front and is
+ * The frame has the rider and a wheel A at the rear; the steering assembly has a wheel C in front and is
  * hinged to the frame at B; a torque acts between the two.  By default the steering assembly is massless.
  * (TU Delft ME41055, Multibody Dynamics B, 2018, homework 8.) */
 #include "pinwheel.h"

@@ -1,4 +1,4 @@
-/* Redundant parallelogram: three equal cranks carry one rigid coupler; two suffice.
+/* Redundant parallelogram: three equal cranks support one rigid coupler; two would suffice.
  *
  * Of the 12 constraint equations, 11 are independent: the distribution of the cranks' reactions along the coupler is
  * not determined by rigid-body mechanics.  The angle theta of the cranks against the horizontal obeys

@@ -28,7 +28,7 @@ void pw_search_close (pw_search *s);
 /* The folder with pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
 int pw_search_include (char **include, pw_error *error);
 
-/* folder + "/" + name + ending, malloced; NULL without memory. */
+/* folder + "/" + name + ending, malloced; NULL if out of memory. */
 char *pw_path_join (const char *folder, const char *name, const char *ending);
 
 /* Whether a name ends in ".so" or the like, with at least one character before it. */
@@ -39,16 +39,16 @@ int pw_ends_with (const char *name, const char *ending);
 /* Uses a shared object, which may be deleted afterwards. */
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
-/* Compiles a C file in a private temporary folder, hands the object to `use` and removes both.  PW_INPUT if it does not
+/* Compiles a C file in a private temporary folder, calls `use` with the object, and removes both.  PW_INPUT if it does not
  * compile or there is no compiler; PW_RESOURCE; or what `use` returns. */
 int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error);
 
 /* Compiles generated code with all messages in a log.  PW_INPUT: no compiler; PW_METHOD: it does not compile; PW_RESOURCE. */
 int pw_compile_scene (const char *path, const char *object, const char *log, pw_error *error);
-/* Its further option: gcc 12.2 fuses operations when it vectorises straight code, see the Makefile. */
+/* A further option for generated code: gcc 12.2 fuses operations when it vectorises straight code, see the Makefile. */
 #define PW_SCENE_FLAG "-fno-tree-slp-vectorize"
 
-/* The words of the C compiler: CC in the environment, else "cc". */
+/* The command of the C compiler: CC in the environment, else "cc". */
 const char *pw_compiler (void);
 
 /* A new folder in TMPDIR that only the user can use, malloced; NULL and PW_RESOURCE. */
@@ -56,18 +56,18 @@ char *pw_temporary_folder (pw_error *error);
 
 /* ---- The cache (cache.c) ---- */
 
-/* The cache's folder, made if it does not exist, malloced; NULL if there is none, with a notice in the buffer if one
+/* Creates the cache's folder if it does not exist, and returns its path, malloced; NULL if there is none, with a notice in the buffer if one
  * exists but others could have written to it, or it cannot be used. */
 char *pw_cache_folder (char *notice, size_t size);
-/* Deletes the files that have not been used for longest until the rest is within the limit. */
+/* Deletes the least recently used files until the rest is within the limit. */
 void pw_cache_trim (const char *folder);
 
 /* ---- Models in YAML (yaml.c) ---- */
 
-/* A text model in memory, with a plug-in's table.  `shown` is the path in messages, `largest` the limit in bytes.
+/* A text model in memory, with a plug-in's table.  `shown` is the path in messages, `max_bytes` the limit.
  * PW_INPUT with the position of the error; PW_RESOURCE.  Bodies and elements are read when a model is built. */
 typedef struct pw_yaml pw_yaml;
-pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t largest, pw_error *error);
+pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
 void pw_yaml_close (pw_yaml *y);
 const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
 /* As pw_file_tables. */
@@ -89,25 +89,26 @@ typedef struct {
   const char *name, *factor, *si; /* the factor is an expression; "1": an SI unit */
 } pw_unit_name;
 
-extern const pw_unit_name pw_unit_names[]; /* ended by a NULL name */
+extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 
 /* ---- Reading (read.c) ---- */
 
-/* Reads the rest of a file of at most `most` bytes into *text, malloced, with a 0 after it; free it in every case. */
-int pw_read_rest (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size, pw_error *error);
+/* Reads the rest of a file of at most `max_bytes` bytes into *text, malloced, zero-terminated; free it in every case. */
+int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what, char **text, size_t *size,
+                  pw_error *error);
 
 /* ---- Names of files (location.c) ---- */
 
 /* "it is a directory, not a regular file" */
 const char *pw_not_regular (mode_t mode);
 
-/* The folder of the file at a path, malloced; NULL without memory. */
+/* The folder of the file at a path, malloced; NULL if out of memory. */
 char *pw_folder_of (const char *path);
 
 /* The location of an existing or future file, links followed. */
 typedef struct {
   char *path;     /* of the file itself; malloced */
-  int descriptor; /* descriptor of this process that the path means ("-", /dev/stdout, /dev/fd/3), or -1 */
+  int descriptor; /* descriptor of this process that the path names ("-", /dev/stdout, /dev/fd/3), or -1 */
   int exists;     /* 1: `info` is known */
   struct stat info;
 } pw_location;
@@ -123,10 +124,10 @@ typedef enum {
   PW_LOCK_EXISTING /* the existing file; ENOENT if there is none */
 } pw_lock_how;
 
-/* Opens a regular file for reading and writing and locks it until it is closed; *created is 1 for an empty one made
- * here. A symbolic link is not followed.  -1 and errno, for pw_lock_reason. */
+/* Opens a regular file for reading and writing and locks it until it is closed; *created is 1 for a new file;
+ * a symbolic link is not followed.  -1 and errno, for pw_lock_reason. */
 int pw_lock_file (const char *path, pw_lock_how how, int *created);
-const char *pw_lock_reason (int why);
+const char *pw_lock_reason (int code);
 
 /* ---- Outputs (output.c) ---- */
 

@@ -179,7 +179,7 @@ typedef struct {
   pw_archive state;     /* its bytes belong to the text */
 } pw_checkpoint;
 
-/* PW_INPUT if it is not a checkpoint, of another version, cut off or damaged; PW_RESOURCE.  Free it in every case. */
+/* PW_INPUT if it is not a checkpoint, of another version, truncated or damaged; PW_RESOURCE.  Free it in every case. */
 int pw_checkpoint_read (const char *path, pw_checkpoint *c, pw_error *error);
 void pw_checkpoint_free (pw_checkpoint *c);
 

@@ -33,7 +33,7 @@ static inline double coulomb_slope (const coulomb *k, double w) {
 }
 
 /* The change of a variable that reverses the force, `per` being dw/d(variable); INFINITY without a limit. */
-static inline double coulomb_range (const coulomb *k, double w, double per) {
+static inline double coulomb_saturation (const coulomb *k, double w, double per) {
   return per != 0 && k->inverse > 0 ? (1 / k->inverse + fabs (w)) / fabs (per) : INFINITY;
 }
 

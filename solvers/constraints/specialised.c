@@ -62,8 +62,7 @@ void pw_specialised_close (pw_run *r) {
 
 /* 1 where the general engine has more to do than to evaluate. */
 static int specialised_is_unsuitable (pw_run *r) {
-  return r->specialised == NULL || r->least_norm || (r->geometry.alert && r->geometry.saddle) || r->near ||
-         r->w->hold;
+  return r->specialised == NULL || r->least_norm || (r->geometry.alert && r->geometry.saddle) || r->near || r->w->hold;
 }
 
 static void specialised_evaluated (pw_run *r, const double *q, const double *v) {

@@ -126,7 +126,8 @@ int pw_rk_step (pw_run *r, double h, double t1, int project, double *added) {
   if (!rk_finite (r, d->q, d->v)) return PW_RETRY;
   if (project) return rk_project (r, t1, added);
   if (!d->null_space) return pw_run_accelerate (r, t1, d->q, d->v, d->a, d->lambda);
-  status = pw_nullspace_finalise (&d->nullspace, d->projects_positions ? &d->projector : NULL, r, t1, d->q, d->v, added);
+  status =
+      pw_nullspace_finalise (&d->nullspace, d->projects_positions ? &d->projector : NULL, r, t1, d->q, d->v, added);
   return status == PW_OK ? pw_nullspace_accelerate (r, d->v, d->a, d->lambda) : status;
 }
 
@@ -169,9 +170,9 @@ int pw_rk_fail (pw_run *r, int status, double h, pw_error *error) {
   if (!finite && h < 1e-12 * fabs (r->t))
     return pw_fail (error, PW_METHOD, "t = %.6g s: the state is not finite behind it, however small the step", r->t);
   return pw_fail (error, PW_METHOD, "t = %.6g s: the step of %.6g s is too large: %s", r->t, h,
-                  r->data->split      ? "near a singular configuration no two divisions of it agree"
-                  : !finite           ? "the state is no longer finite"
-                  : r->data->null_space  ? "the velocities' basis does not last"
-                  : r->data->projects ? "the projection does not converge"
-                                      : "a stage of it lands in a singular configuration");
+                  r->data->split        ? "near a singular configuration no two divisions of it agree"
+                  : !finite             ? "the state is no longer finite"
+                  : r->data->null_space ? "the velocities' basis does not last"
+                  : r->data->projects   ? "the projection does not converge"
+                                        : "a stage of it lands in a singular configuration");
 }

@@ -118,7 +118,7 @@ static void test_other_file (void **state) {
               "cannot read the checkpoint @/b.ck: it is a directory, not a regular file");
   cli_good ("rmdir @/b.ck");
   resume_bad ("sed 1s/1/7/ @/good.ck >@/b.ck", "", "@/b.ck is a checkpoint of format 7; this Pinwheel reads format 1");
-  resume_bad ("printf x >>@/b.ck", "", "the checkpoint @/b.ck is damaged: its check sum is wrong");
+  resume_bad ("printf x >>@/b.ck", "", "the checkpoint @/b.ck is damaged: its checksum is wrong");
   resume_bad ("rm @/b.csv.part; echo >@/b.csv.part", "",
               "cannot continue @/b.csv: @/b.csv.part is not the table that the checkpoint belongs to");
   resume_bad ("sed -i '$s/1/2/' @/b.csv.part; sed -i '1500s/1/2/' @/b.csv.part", "",

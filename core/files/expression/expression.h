@@ -24,11 +24,11 @@ typedef struct {
 /* Named numbers. */
 typedef struct pw_scope pw_scope;
 
-/* A scope with room for `names` names; NULL without memory. */
+/* A scope with room for `names` names; NULL if out of memory. */
 pw_scope *pw_scope_open (int names);
 void pw_scope_close (pw_scope *s);
 
-/* Adds a name, whose text must outlive the scope.  There must be room. */
+/* Adds a name, whose text must outlive the scope.  At most `names` of pw_scope_open. */
 void pw_scope_add (pw_scope *s, const char *name, double value);
 
 /* One operation of an expression; its operands are on a stack. */
@@ -50,7 +50,7 @@ typedef struct {
 /* Size of an expression in bytes; it may be copied. */
 size_t pw_expression_size (const pw_expression *x);
 
-/* Reads an expression over a scope and variables, names ended by NULL, into an arena.  PW_INPUT with the
+/* Reads an expression over a scope and variables, an array of names that ends with NULL, into an arena.  PW_INPUT with the
  * error; PW_RESOURCE. */
 int pw_expression_read (const pw_scope *s, const char *const *variable, const char *text, pw_arena *arena,
                         const pw_expression **x, pw_expression_error *error);
@@ -77,7 +77,7 @@ int pw_expression_is_name (const char *text);
 /* Whether a function or constant has this name. */
 int pw_expression_is_reserved (const char *text);
 
-/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns that.
+/* Calls `each` with every name in an expression, functions and constants too, until it returns non-zero; returns its result.
  * */
 int pw_expression_names (const char *text, int (*each) (void *context, const char *name, size_t length, size_t at),
                          void *context);

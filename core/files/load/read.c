@@ -18,21 +18,22 @@ FILE *pw_open_input (const char *path, const char **why) {
   return NULL;
 }
 
-int pw_read_rest (FILE *f, size_t most, const char *path, const char *what, char **text, size_t *size,
+int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what, char **text, size_t *size,
                   pw_error *error) {
-  size_t room = 1 << 16;
+  size_t capacity = 1 << 16;
   *size = 0;
-  *text = malloc (room + 1);
+  *text = malloc (capacity + 1);
   for (size_t n = 1; *text && n > 0; *size += n) {
-    if (*size == room) {
-      char *more = realloc (*text, (room *= 2) + 1);
+    if (*size == capacity) {
+      char *more = realloc (*text, (capacity *= 2) + 1);
       if (more == NULL) return pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
       *text = more;
     }
-    n = fread (*text + *size, 1, room - *size, f);
+    n = fread (*text + *size, 1, capacity - *size, f);
     (*text)[*size + n] = 0;
-    if (*size + n > most)
-      return pw_fail (error, PW_INPUT, "%s: the file has more than %g MB, %s", path, (double)(most >> 10) / 1024, what);
+    if (*size + n > max_bytes)
+      return pw_fail (error, PW_INPUT, "%s: the file has more than %g MB, %s", path, (double)(max_bytes >> 10) / 1024,
+                      what);
   }
   if (*text == NULL) return pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
   return ferror (f) ? pw_fail (error, PW_INPUT, "cannot read %s: %s", path, strerror (errno)) : PW_OK;

@@ -38,7 +38,7 @@ static int checkpoint_load (const char *path, char **text, size_t *size, pw_erro
   FILE *f = pw_open_input (path, &why);
   if (f == NULL && errno == ENOMEM) return pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
   if (f == NULL) return pw_fail (error, PW_INPUT, "cannot read the checkpoint %s: %s", path, why);
-  int status = pw_read_rest (f, SIZE_MAX / 4, path, "the most of a checkpoint", text, size, error);
+  int status = pw_read_rest (f, SIZE_MAX / 4, path, "the limit for a checkpoint", text, size, error);
   fclose (f);
   return status;
 }
@@ -62,14 +62,14 @@ static int checkpoint_parse (const char *path, pw_checkpoint *c, size_t size, pw
   c->head_end = end ? end + 1 + sizeof CHECKPOINT_LAST - 1 : NULL;
   if (end == NULL || sscanf (c->head_end, "state = %zu bytes, check sum %16llx%n", &bytes, &check, &n) != 2 ||
       c->head_end[n] != '\n')
-    return pw_fail (error, PW_INPUT, "the checkpoint %s is cut off or damaged", path);
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated or damaged", path);
   const char *state = c->head_end + n + 1;
-  size_t there = size - (size_t)(state - c->text), head = (size_t)(c->head_end - c->text);
-  if (there < bytes)
-    return pw_fail (error, PW_INPUT, "the checkpoint %s is cut off: %zu bytes of %zu are there", path, size,
-                    size - there + bytes);
-  if (there > bytes || checkpoint_check (c->text, head, state, bytes) != check)
-    return pw_fail (error, PW_INPUT, "the checkpoint %s is damaged: its check sum is wrong", path);
+  size_t found = size - (size_t)(state - c->text), head = (size_t)(c->head_end - c->text);
+  if (found < bytes)
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is truncated: found %zu bytes of %zu", path, size,
+                    size - found + bytes);
+  if (found > bytes || checkpoint_check (c->text, head, state, bytes) != check)
+    return pw_fail (error, PW_INPUT, "the checkpoint %s is damaged: its checksum is wrong", path);
   c->state = (pw_archive){ .at = (unsigned char *)c->text + (state - c->text), .size = bytes, .loading = 1 };
   return PW_OK;
 }

@@ -7,7 +7,7 @@
 /* ---- Items ---- */
 
 /* Writes the separator before an item or the end of a container. */
-static void json_space (pw_json *j, int depth, const char *otherwise) {
+static void json_separator (pw_json *j, int depth, const char *otherwise) {
   if (j->depth <= j->lines || j->line)
     fprintf (j->f, "\n%*s", 2 * depth, "");
   else
@@ -34,7 +34,7 @@ static void json_string (FILE *f, const char *text) {
 
 static void json_item (pw_json *j, const char *key) {
   if (j->items++ > 0) fputc (',', j->f);
-  if (j->depth > 0) json_space (j, j->depth, j->items > 1 ? " " : "");
+  if (j->depth > 0) json_separator (j, j->depth, j->items > 1 ? " " : "");
   if (key == NULL) return;
   json_string (j->f, key);
   fputs (": ", j->f);
@@ -48,7 +48,7 @@ void pw_json_open (pw_json *j, const char *key, char bracket) {
 }
 
 void pw_json_close (pw_json *j, char bracket) {
-  if (j->items > 0 || j->line) json_space (j, j->depth - 1, "");
+  if (j->items > 0 || j->line) json_separator (j, j->depth - 1, "");
   fputc (bracket, j->f);
   if (--j->depth == 0) fputc ('\n', j->f);
   j->items = 1;

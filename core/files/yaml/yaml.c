@@ -18,7 +18,7 @@ static int yaml_new_name (const pw_reader *r, const pw_node *node, const char *w
   if (!pw_expression_is_name (name))
     return pw_yaml_fail (r, node->at, "%s \"%.60s\": expected a letter, then letters, digits and _", what, name);
   if (strcmp (name, "t") == 0 || pw_expression_is_reserved (name))
-    return pw_yaml_fail (r, node->at, "%s \"%s\": this name is taken: %s", what, name,
+    return pw_yaml_fail (r, node->at, "%s \"%s\": this name is reserved: %s", what, name,
                          *name == 't' && name[1] == 0 ? "it is the time" : "a function or constant");
   return pw_names_add (names, name, 0) >= 0 ? pw_yaml_fail (r, node->at, "a second %s \"%s\"", what, name) : PW_OK;
 }

@@ -35,13 +35,13 @@ struct pw_yaml {
   pw_plugin_table table; /* first: a model's table is the address of its file */
   char *path;            /* as shown in messages */
   char *folder;          /* of the file, links resolved */
-  char *source;          /* the text, ended by a NUL */
+  char *source;          /* the text, zero-terminated */
   size_t size;
   double ahead;   /* limit of indicators that libfyaml may read before an event */
   pw_arena arena; /* nodes and texts */
   const pw_node *root;
   const pw_node *bodies, *elements, *let, *reference; /* or NULL */
-  pw_parameter *parameter;                            /* ended by a NULL name */
+  pw_parameter *parameter;                            /* ends with a NULL name */
   int parameters;
 };
 
@@ -97,7 +97,7 @@ int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
 
 enum { PW_YAML_MAX_KEYS = 40 }; /* at most, in a map of fixed keys */
 
-/* Finds known keys (ended by NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
+/* Finds known keys (ending with NULL) in a map: value[i] becomes the value of key[i], or NULL.  The first `skip` pairs
  * are skipped.  Other keys, repeated keys and empty values are refused; `what` ("a body") is for messages. */
 int pw_yaml_keys (const pw_reader *r, const pw_node *map, int skip, const char *const *key, const char *what,
                   const pw_node **value);
@@ -111,7 +111,7 @@ int pw_yaml_list (const pw_reader *r, const pw_node *node, const char *what, int
 /* A scalar's text, not empty. */
 int pw_yaml_text (const pw_reader *r, const pw_node *node, const char *what, const char **text);
 
-/* A scalar as a number of a domain: an expression over r->x; a list [x, y] of them; one of several words, ended by NULL. */
+/* A scalar as a number of a domain: an expression over r->x; a list [x, y] of them; one of several words, ending with NULL. */
 int pw_yaml_number (const pw_reader *r, const pw_node *node, const char *what, pw_domain domain, double *value);
 int pw_yaml_pair (const pw_reader *r, const pw_node *node, const char *what, double *value);
 int pw_yaml_choice (const pw_reader *r, const pw_node *node, const char *what, const char *const *choices, int *value);

@@ -36,7 +36,7 @@ PER_ELEMENT (friction_force_v, friction, 36) {
 }
 
 PER_ELEMENT (friction_saturation, friction, 12) {
-  out[8] = out[11] = coulomb_range (x.k, x.w, 1);
+  out[8] = out[11] = coulomb_saturation (x.k, x.w, 1);
 }
 
 PER_ELEMENT (friction_loss, friction, 1) {

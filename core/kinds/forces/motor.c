@@ -72,7 +72,7 @@ PER_ELEMENT (motor_power, motor, 1) {
 
 static const pw_field motor_fields[] = {
   { PW_AT (pw_motor, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the driven body and the body that takes the reaction; one may be ground" },
+    .about = "the driven body and the body with the reaction; one may be ground" },
   { PW_AT (pw_motor, stiffness), PW_NUMBER, .unit = "N m/rad", .domain = PW_NONNEGATIVE,
     .about = "torque per angle error; 0: only the angular velocity is controlled" },
   { PW_AT (pw_motor, damping), PW_NUMBER, .unit = "N m s/rad", .domain = PW_NONNEGATIVE,

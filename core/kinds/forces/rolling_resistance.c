@@ -59,8 +59,8 @@ PER_ELEMENT (resistance_force_v, resistance, 9) {
 }
 
 PER_ELEMENT (resistance_saturation, resistance, 6) {
-  out[2] = coulomb_range (&x.k->law, x.ve, x.E[0] * x.A->vy - x.E[1] * x.A->vx);
-  for (int i = 0; i < 3; i++) out[3 + i] = coulomb_range (&x.k->law, x.ve, x.E[i]);
+  out[2] = coulomb_saturation (&x.k->law, x.ve, x.E[0] * x.A->vy - x.E[1] * x.A->vx);
+  for (int i = 0; i < 3; i++) out[3 + i] = coulomb_saturation (&x.k->law, x.ve, x.E[i]);
 }
 
 PER_ELEMENT (resistance_loss, resistance, 1) {

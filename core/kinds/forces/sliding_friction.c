@@ -59,8 +59,8 @@ PER_ELEMENT (sliding_saturation, sliding, 12) {
   double Hv[6];
   line_multiply_H (&x.s, 1, x.v, Hv);
   for (int i = 0; i < 6; i++) {
-    out[i] = coulomb_range (&x.k->law, x.w, Hv[i]);
-    out[6 + i] = coulomb_range (&x.k->law, x.w, x.E[i]);
+    out[i] = coulomb_saturation (&x.k->law, x.w, Hv[i]);
+    out[6 + i] = coulomb_saturation (&x.k->law, x.w, x.E[i]);
   }
 }
 

@@ -21,7 +21,7 @@ static void torque_power (const pw_batch *b, double *out) {
 
 static const pw_field torque_fields[] = {
   { PW_AT (pw_torque, body), PW_BODY, .count = 2, .required = 1,
-    .about = "the body on which it acts and the body that takes the reaction; one may be ground" },
+    .about = "the body on which it acts and the body with the reaction; one may be ground" },
   { PW_AT (pw_torque, value), PW_SIGNAL, .unit = "N m", .required = 1, .about = "torque on the first body" },
   { .name = NULL },
 };
