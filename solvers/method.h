@@ -30,7 +30,7 @@ struct pw_run {
   const struct pw_specialised *specialised; /* compiled code of the scene in use, or NULL */
   struct pw_scene *scene;                   /* data of that code */
   void *scene_memory;
-  int scene_ready; /* 1: its constants have been computed */
+  int scene_ready;        /* 1: its constants have been computed */
   pw_watchdog limits;     /* thresholds */
   pw_geometry geometry;   /* distance of the constraints from a singular configuration */
   double refuse;          /* sine at which an evaluation is refused */
