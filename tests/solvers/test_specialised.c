@@ -1,0 +1,188 @@
+/* Specialised code against the general engine: single evaluations and projections, and what it leaves to that engine. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "gallery.h"
+#include "method.h"
+#include "pinwheel-files.h"
+#include "runs.h"
+#include "scene.h"
+
+#define ROUND_OFF 1e-11
+#define WHY "round-off of a factorisation in another order, angles between rows above 0.02"
+
+/* A system with a run of the general engine and one with specialised code. */
+typedef struct {
+  pw_system *s;
+  pw_scene_code *code;
+  pw_run *general, *special;
+} both;
+
+static void both_open (both *x, pw_system *s, const char *method, const pw_settings *settings) {
+  pw_error error = { 0 };
+  pw_settings set = settings ? *settings : (pw_settings){ .step = 1e-4, .span = 1 };
+  *x = (both){ .s = s, .general = runs_open (s, method, &set) };
+  char *text = pw_run_source (x->general, &error);
+  check_ok (error.status, &error);
+  x->code = pw_scene_code_open (text, s, &error);
+  free (text);
+  check_ok (error.status, &error);
+  set.specialised = pw_scene_code_table (x->code);
+  x->special = runs_open (s, method, &set);
+}
+
+static void both_close (both *x) {
+  pw_run_close (x->special);
+  pw_run_close (x->general);
+  pw_scene_code_close (x->code);
+  pw_system_free (x->s);
+}
+
+static double both_scale (const double *a, int n) {
+  double most = 1;
+  for (int i = 0; i < n; i++) most = fmax (most, fabs (a[i]));
+  return most;
+}
+
+static void both_compare (const char *what, const double *a, const double *b, int n) {
+  double scale = both_scale (a, n);
+  for (int i = 0; i < n; i++) check_close (what, b[i] / scale, a[i] / scale, ROUND_OFF, WHY);
+}
+
+/* Both after the same time: state, accelerations, multipliers, ledger. */
+static void both_run (both *x, double t) {
+  pw_sample a = runs_to (x->general, t), b = runs_to (x->special, t);
+  int n = pw_system_coordinates (x->s), rows = pw_system_rows (x->s);
+  both_compare ("positions", a.q, b.q, n);
+  both_compare ("velocities", a.v, b.v, n);
+  both_compare ("accelerations", a.a, b.a, n);
+  both_compare ("multipliers", a.lambda, b.lambda, rows);
+  check_close ("work", b.work, a.work, ROUND_OFF * fmax (1, fabs (a.work)), WHY);
+  check_close ("loss", b.loss, a.loss, ROUND_OFF * fmax (1, a.loss), WHY);
+}
+
+static long both_specialised (const both *x) {
+  return pw_run_statistics (x->special)->specialised;
+}
+
+/* Every model without element types of its own (test_specialise has these): 100 steps of 1e-4 s, nearly all of them by specialised code. */
+static void test_gallery (void **state) {
+  static const char *const model[] = { "ackermann-car",
+                                       "andrews-squeezer",
+                                       "car",
+                                       "car-two-trailers",
+                                       "car-tyres",
+                                       "chain",
+                                       "chaplygin-sleigh",
+                                       "ezyroller",
+                                       "hatchet-planimeter",
+                                       "n-trailer",
+                                       "differential-drive",
+                                       "n-four-bar",
+                                       "redundant-parallelogram",
+                                       "pendulum",
+                                       "knife-edge-incline",
+                                       "peaucellier",
+                                       "roller-racer",
+                                       "slider-crank",
+                                       "snakeboard",
+                                       "theo-jansen",
+                                       "wheeled-snake" };
+  static const char *const method[] = { "rk4+projection", "rk4+baumgarte", "erk5:steps=fixed" };
+  (void)state;
+  for (size_t i = 0; i < sizeof model / sizeof *model; i++)
+    for (size_t k = 0; k < sizeof method / sizeof *method; k++) {
+      both x;
+      both_open (&x, scene_named (model[i], NULL, 0), method[k], NULL);
+      both_run (&x, 0.01);
+      if (both_specialised (&x) < 350) print_error ("%s, %s: %ld\n", model[i], method[k], both_specialised (&x));
+      assert_true (both_specialised (&x) >= 350);
+      both_close (&x);
+    }
+}
+
+/* Residuals and counts that a projection reports are those of the general engine. */
+static void test_report (void **state) {
+  both x;
+  (void)state;
+  both_open (&x, scene_named ("snakeboard", NULL, 0), "rk4+projection", NULL);
+  both_run (&x, 0.05);
+  const pw_statistics *a = pw_run_statistics (x.general), *b = pw_run_statistics (x.special);
+  assert_int_equal (a->rhs, b->rhs);
+  check_below ("difference of factorisations", fabs ((double)(a->factorisations - b->factorisations)), 20,
+               "an iteration more or less where a residual is at round-off");
+  check_below ("position", b->position, 4 * a->position + 4 * CHECK_EPS, "both at round-off");
+  check_below ("velocity", b->velocity, 4 * a->velocity + 4 * CHECK_EPS, "both at round-off");
+  assert_true (b->velocity > 0);
+  both_close (&x);
+}
+
+/* Angles beyond the range of the own sine are evaluated by the general engine: the same bits. */
+static void test_angles (void **state) {
+  both x;
+  (void)state;
+  pw_system *s = scene_named ("chaplygin-sleigh", NULL, 0);
+  const pw_initial_value far = { pw_system_find_state (s, "sleigh.phi", NULL), 2e6 };
+  assert_true (far.state >= 0);
+  both_open (&x, s, "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 1, .initial = &far, .initials = 1 });
+  pw_sample a = runs_to (x.general, 0.1), b = runs_to (x.special, 0.1);
+  check_bits ("velocities", a.v, b.v, pw_system_coordinates (s));
+  assert_int_equal (both_specialised (&x), 0);
+  both_close (&x);
+}
+
+/* Passing singular configurations, the guards leave some evaluations to the general engine, and the result is right. */
+static void test_singular (void **state) {
+  both x;
+  (void)state;
+  both_open (&x, scene_named ("n-four-bar", "N", 2), "rk4+projection", &(pw_settings){ .step = 1e-3, .span = 10 });
+  pw_sample b = runs_to (x.special, 3);
+  const pw_statistics *count = pw_run_statistics (x.special);
+  assert_true (count->specialised > count->rhs / 2 && count->specialised < count->rhs - 10);
+  pw_sample a = runs_to (x.general, 3);
+  for (int j = 0; j < pw_system_coordinates (x.s); j++)
+    check_close ("q", b.q[j], a.q[j], 1e-6, "round-off grows where branches meet");
+  both_close (&x);
+}
+
+/* A code with all equations does not suit a run with redundant ones, nor one for another scene at all. */
+static void test_another (void **state) {
+  pw_error error = { 0 };
+  (void)state;
+  pw_system *s = scene_named ("redundant-parallelogram", NULL, 0), *other = scene_named ("pendulum", NULL, 0);
+  char *text = pw_system_source (s, NULL, &error);
+  pw_scene_code *code = text ? pw_scene_code_open (text, s, &error) : NULL;
+  check_ok (error.status, &error);
+  pw_settings set = { .step = 1e-3, .specialised = pw_scene_code_table (code) };
+  pw_run *r = runs_open (s, "rk4+projection", &set);
+  runs_to (r, 0.1);
+  assert_int_equal (pw_run_statistics (r)->specialised, 0);
+  pw_run_close (r);
+  assert_null (pw_run_open (other, "rk4+projection", &set, &error));
+  check_error (&error, PW_INPUT, "model pendulum: the specialised code belongs to another scene");
+  pw_scene_code_close (code);
+  free (text);
+  pw_system_free (s);
+  pw_system_free (other);
+}
+
+/* Scenes without a fixed order of elimination are refused with the reason. */
+static void test_refused (void **state) {
+  pw_error error = { 0 };
+  (void)state;
+  pw_system *s = scene_named ("chain", "n", 40);
+  assert_null (pw_system_source (s, NULL, &error));
+  check_error (&error, PW_INPUT, "model chain: 80 constraint equations: specialised code has at most 60");
+  pw_system_free (s);
+  assert_null (pw_system_source (NULL, NULL, &(pw_error){ 0 }));
+  assert_null (pw_run_source (NULL, &(pw_error){ 0 }));
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_gallery),  cmocka_unit_test (test_report),  cmocka_unit_test (test_angles),
+    cmocka_unit_test (test_singular), cmocka_unit_test (test_another), cmocka_unit_test (test_refused),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
