@@ -4,7 +4,7 @@
 #include <string.h>
 #include "conclusion.h"
 
-enum { CONCLUSION_LEVELS = 3, CONCLUSION_WIDTH = 14, CONCLUSION_REASON = 90 };
+enum { CONCLUSION_LEVELS = 3, CONCLUSION_WIDTH = 14, CONCLUSION_REASON = 70 };
 static const int conclusion_digits[CONCLUSION_LEVELS] = { 3, 6, 9 };
 
 typedef struct {
