@@ -747,6 +747,17 @@ const char *pw_system_reaction_unit (const pw_system *s, int row);
  * error, with the nearest name, if there is none. */
 int pw_system_find_reaction (const pw_system *s, const char *name, pw_error *error);
 
+/* The number of signals; name and unit of one ("rider.value", "N m"), as pw_system_state_name; 1 if it belongs to a
+ * force. */
+int pw_system_signals (const pw_system *s);
+char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size);
+const char *pw_system_signal_unit (const pw_system *s, int signal);
+int pw_system_signal_forced (const pw_system *s, int signal);
+
+/* The signal of this name; that of an element is enough if it has no other signal.  PW_INPUT and the error, with the
+ * nearest name, if there is none. */
+int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error);
+
 /* Type and name of the element of a constraint equation ("wheel C"), as pw_system_state_name. */
 char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size);
 

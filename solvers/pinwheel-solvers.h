@@ -155,11 +155,21 @@ typedef struct {
   pw_steadiness steady;
   double twist[3];     /* velocity of the frame [m/s, m/s, rad/s] */
   double acceleration; /* the largest in that frame; angles in units of the length scale [m/s^2] */
+  /* Of pw_run_linear_modes, otherwise NULL; axes are those of the frame, which are the world's at this moment. */
+  double *B;     /* unknowns x signals, by rows: x' = A x + B u, u added to the signals of forces [1/s m per unit of the
+                    signal]; NaN for signals of constraints, which enter with their derivatives */
+  double *basis; /* 2 coordinates x unknowns, by rows: perturbation of the states, numbered as in pw_system_find_state,
+                    per m of x (angles in units of L, velocities of 1/T times that) */
+  double *shape; /* unknowns x 2 coordinates complex numbers (re, im): the perturbation of the states in each mode; the
+                    largest of the positions, angles times L, is 1 m; 0 for rigid displacements and for eigenvalues 0,
+                    of which it is not unique */
 } pw_linear;
 
 /* Linearises at the state reached.  With more than `most` coordinates only the integers are filled: the cost of the
  * rest is cubic.  Free the result in every case.  Errors: PW_RESOURCE, PW_METHOD. */
 int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error);
+/* The same with B, basis and shape, at about three times the cost. */
+int pw_run_linear_modes (pw_run *r, int most, pw_linear *l, pw_error *error);
 void pw_linear_free (pw_linear *l);
 
 /* The largest h such that the classical Runge-Kutta method damps x' = (re + i im) x with every step up to h;

@@ -179,18 +179,78 @@ char *pw_system_row_name (const pw_system *s, int row, char *buffer, size_t size
   return buffer;
 }
 
+/* The field of the n-th signal of an element type; *n becomes the index of its value. */
+static const pw_field *query_signal_field (const pw_kind *kind, int *n) {
+  const pw_field *f = kind->fields;
+  for (; f->name; f++) {
+    if (f->type != PW_SIGNAL) continue;
+    if (*n < pw_field_count (f)) break;
+    *n -= pw_field_count (f);
+  }
+  return f;
+}
+
+/* The batch of a signal; *n becomes its number among those of the batch. */
+static const pw_element_batch *query_signal (const pw_system *s, int *n) {
+  const pw_element_batch *k = s->batch;
+  for (; *n >= k->b.count * k->kind->signals; k++) *n -= k->b.count * k->kind->signals;
+  return k;
+}
+
+int pw_system_signals (const pw_system *s) {
+  return s->sources;
+}
+
+int pw_system_signal_forced (const pw_system *s, int signal) {
+  return pw_kind_signals_force (query_signal (s, &signal)->kind);
+}
+
+char *pw_system_signal_name (const pw_system *s, int signal, char *buffer, size_t size) {
+  const pw_element_batch *k = query_signal (s, &signal);
+  int n = signal % k->kind->signals;
+  const pw_field *f = query_signal_field (k->kind, &n);
+  int length = snprintf (buffer, size, "%s.%s", k->name[signal / k->kind->signals], f->name ? f->name : "signal");
+  if (f->name && pw_field_count (f) > 1 && (size_t)length < size)
+    snprintf (buffer + length, size - (size_t)length, "[%d]", n);
+  return buffer;
+}
+
+const char *pw_system_signal_unit (const pw_system *s, int signal) {
+  const pw_kind *kind = query_signal (s, &signal)->kind;
+  int n = signal % kind->signals;
+  const pw_field *f = query_signal_field (kind, &n);
+  return f->name && f->unit ? f->unit : "";
+}
+
+/* 1 if the signal has this name, or is the only one of the element of this name. */
+static int query_is_signal (const pw_system *s, int signal, const char *name) {
+  char text[120];
+  if (strcmp (pw_system_signal_name (s, signal, text, sizeof text), name) == 0) return 1;
+  const pw_element_batch *k = query_signal (s, &signal);
+  return k->kind->signals == 1 && strcmp (k->name[signal], name) == 0;
+}
+
+int pw_system_find_signal (const pw_system *s, const char *name, pw_error *error) {
+  if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a signal is missing", s->model);
+  char best[120], text[120], hint[160];
+  pw_nearest near = { .sought = name };
+  for (int i = 0; i < s->sources; i++)
+    if (query_is_signal (s, i, name)) return i;
+  for (int i = 0; i < s->sources; i++) {
+    pw_nearest_try (&near, pw_system_signal_name (s, i, text, sizeof text));
+    if (near.best == text) near.best = strcpy (best, text);
+  }
+  return pw_fail (error, PW_INPUT, "model %s has no signal \"%s\"%s", s->model, name,
+                  pw_nearest_text (&near, hint, sizeof hint));
+}
+
 char *pw_failed_signal (const pw_workspace *w, char *buffer, size_t size) {
   buffer[0] = 0;
   for (const pw_element_batch *k = w->batch; k < w->batch + w->s->batches; k++) {
     int signals = k->kind->signals;
     if (w->failed == NULL || w->failed < k->source || w->failed >= k->source + k->b.count * signals) continue;
     int i = (int)(w->failed - k->source), n = i % signals;
-    const pw_field *f = k->kind->fields;
-    for (; f->name; f++) {
-      if (f->type != PW_SIGNAL) continue;
-      if (n < pw_field_count (f)) break;
-      n -= pw_field_count (f);
-    }
+    const pw_field *f = query_signal_field (k->kind, &n);
     snprintf (buffer, size, "%s %.60s: %s", k->kind->name, k->name[i / signals], f->name ? f->name : "signal");
   }
   return buffer;

@@ -35,6 +35,8 @@ static int linear_open (pw_linearisation *x, int all) {
     { &x->along, 2 * n },
     { &x->response, n },
     { &x->residual, 4 * (2 * m + n) + 15 },
+    { &x->left, x->modes ? size * size + size : 0 },
+    { &x->top, 4 * size },
   };
   x->memory = pw_alloc_arrays (array, all ? sizeof array / sizeof *array : 0);
   return x->memory ? PW_OK : PW_RESOURCE;
@@ -85,6 +87,7 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   l->least = pw_linear_bases (x);
   pw_linear_choose_frame (x);
   for (int c = 0; c < x->size; c++) linear_unknown (x, c);
+  if (x->modes && pw_linear_matrices (x, l) != PW_OK) return PW_RESOURCE;
   l->symmetries = pw_linear_symmetries (x);
   if (linear_results (x, l) != PW_OK) return PW_RESOURCE;
   memcpy (l->twist, x->frame.twist, sizeof l->twist);
@@ -94,8 +97,8 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   return status;
 }
 
-int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
-  pw_linearisation x = { .r = r, .n = r->s->coords, .m = r->s->rows };
+static int linear_run (pw_run *r, int most, int modes, pw_linear *l, pw_error *error) {
+  pw_linearisation x = { .r = r, .n = r->s->coords, .m = r->s->rows, .modes = modes };
   pw_statistics before = r->statistics;
   int near = r->near, status = linear_rows (&x), all = x.n <= most;
   *l = (pw_linear){ .coordinates = x.n, .least = NAN };
@@ -111,10 +114,21 @@ int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
   return status == PW_RESOURCE ? pw_fail_memory (r->s, error) : status;
 }
 
+int pw_run_linearise (pw_run *r, int most, pw_linear *l, pw_error *error) {
+  return linear_run (r, most, 0, l, error);
+}
+
+int pw_run_linear_modes (pw_run *r, int most, pw_linear *l, pw_error *error) {
+  return linear_run (r, most, 1, l, error);
+}
+
 void pw_linear_free (pw_linear *l) {
+  free (l->B);
+  free (l->basis);
+  free (l->shape);
   free (l->A);
   free (l->re);
   free (l->rigid);
-  l->A = l->re = l->im = NULL;
+  l->A = l->re = l->im = l->B = l->basis = l->shape = NULL;
   l->rigid = NULL;
 }

@@ -39,6 +39,10 @@ typedef struct {
   int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as y */
   double *value;
   char *memory;
+  int modes; /* 1: with B, basis, shapes */
+  double *left, *top,
+      tau[3]; /* size^2 + size: eigenvectors of the split matrix, then imaginary parts; 4 x size: its upper
+                                 rows; scalars of the reflections in S */
 } pw_linearisation;
 
 /* Round-off of derivatives of moderate size, relative to them. */
@@ -67,6 +71,13 @@ void pw_linear_turn (const pw_linearisation *x, double w, const double *in, doub
  * displaced motion rotates at -w), so that they do not cause defective zeros; then computes the other eigenvalues.
  * Into l, sorted. */
 int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error);
+
+/* ---- linear_modes.c ---- */
+
+/* Fills B and basis. */
+int pw_linear_matrices (pw_linearisation *x, pw_linear *l);
+/* Fills the shapes after k rigid displacements have been split off; eigenvalues are not yet sorted. */
+int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 
 /* ---- linear_frame.c ---- */
 

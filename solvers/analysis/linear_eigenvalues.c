@@ -11,11 +11,13 @@
  * counts as nonzero if it exceeds this multiple of the shift they cause. */
 static const double EIGEN_ROUND = 100 * DBL_EPSILON, EIGEN_CERTAIN = 10;
 
-/* The n eigenvalues of A (destroyed), conjugate pairs adjacent, im > 0 first; `work` has 4 n entries. */
-static int eigen_values (int n, double *A, double *re, double *im, double *work) {
+/* The n eigenvalues of A (destroyed), conjugate pairs adjacent, im > 0 first, and its left eigenvectors unless `left` is
+ * NULL; `work` has 4 n entries. */
+static int eigen_values (int n, double *A, double *re, double *im, double *left, double *work) {
   for (int i = 0; i < n * n; i++)
     if (!isfinite (A[i])) return PW_RETRY;
-  int failed = n && LAPACKE_dgeev_work (LAPACK_COL_MAJOR, 'N', 'N', n, A, n, re, im, NULL, 1, NULL, 1, work, 4 * n);
+  int failed = n && LAPACKE_dgeev_work (LAPACK_COL_MAJOR, left ? 'V' : 'N', 'N', n, A, n, re, im, left, left ? n : 1,
+                                        NULL, 1, work, 4 * n);
   return failed ? PW_RETRY : PW_OK;
 }
 
@@ -75,7 +77,9 @@ static int eigen_certain (const pw_linearisation *x, int n, double *B, double *r
   if (n) LAPACKE_dgebal_work (LAPACK_COL_MAJOR, 'S', n, other, n, &first, &last, work);
   for (int i = 0; i < cells; i++) most = fmax (most, fabs (other[i]));
   eigen_disturb (n, most, other);
-  if (eigen_values (n, B, re, im, work) != PW_OK || eigen_values (n, other, re2, im2, work) != PW_OK) return PW_RETRY;
+  if (eigen_values (n, B, re, im, x->modes ? x->left : NULL, work) != PW_OK) return PW_RETRY;
+  if (x->modes) memcpy (x->left + cells, im, (size_t)n * sizeof *im);
+  if (eigen_values (n, other, re2, im2, NULL, work) != PW_OK) return PW_RETRY;
   eigen_shift (n, re, im, re2, im2, EIGEN_ROUND * most, shift);
   eigen_clean (n, re, im, shift);
   return PW_OK;
@@ -88,6 +92,17 @@ static int eigen_before (const pw_linear *l, int i, int k) {
   return l->im[i] > l->im[k];
 }
 
+/* Exchanges the shapes i and i - 1. */
+static void eigen_swap_shapes (pw_linear *l, int i) {
+  int length = 4 * l->coordinates;
+  double *one = l->shape + (size_t)i * (size_t)length, *other = one - length;
+  for (int k = 0; k < length; k++) {
+    double kept = one[k];
+    one[k] = other[k];
+    other[k] = kept;
+  }
+}
+
 static void eigen_sort (pw_linear *l) {
   for (int i = 1; i < l->unknowns; i++)
     for (int j = i; j > 0 && eigen_before (l, j, j - 1); j--) {
@@ -95,6 +110,7 @@ static void eigen_sort (pw_linear *l) {
       unsigned char rigid = l->rigid[j];
       l->re[j] = l->re[j - 1], l->im[j] = l->im[j - 1], l->rigid[j] = l->rigid[j - 1];
       l->re[j - 1] = re, l->im[j - 1] = im, l->rigid[j - 1] = rigid;
+      if (l->shape) eigen_swap_shapes (l, j);
     }
 }
 
@@ -102,7 +118,7 @@ static void eigen_sort (pw_linear *l) {
  * if they span an invariant subspace: the lower left block is then 0. */
 static int eigen_split (pw_linearisation *x, int k, double *B) {
   int n = x->size;
-  double off = 0, tau[3], *work = x->x; /* at least n */
+  double off = 0, *tau = x->tau, *work = x->x; /* at least n */
   if (k == 0 || k > n) return k == 0;
   double size = LAPACKE_dlange_work (LAPACK_COL_MAJOR, 'F', n, n, B, n, work);
   LAPACKE_dgeqrf_work (LAPACK_COL_MAJOR, n, k, x->S, n, tau, work, n);
@@ -123,12 +139,15 @@ int pw_linear_eigenvalues (pw_linearisation *x, pw_linear *l, pw_error *error) {
     memcpy (B, x->A, cells * sizeof *B);
     k = l->symmetries = 0;
   }
+  memcpy (x->top, B, (size_t)(k * n) * sizeof *B);
   for (int i = k; k > 0 && i < n; i++)
     memmove (B + (size_t)(i - k) * (size_t)(n - k), B + (size_t)i * (size_t)n + k, (size_t)(n - k) * sizeof *B);
   memset (l->rigid, 1, (size_t)k);
   if (k >= 2) l->im[0] = fabs (l->twist[2]), l->im[1] = -l->im[0];
   int status = eigen_certain (x, n - k, B, l->re + k, l->im + k);
   free (B);
+  if (status == PW_OK && x->modes) status = pw_linear_shapes (x, k, l);
+  if (status == PW_RESOURCE) return status;
   eigen_sort (l);
   if (status == PW_OK) return PW_OK;
   return pw_fail (error, PW_METHOD, "t = %.6g s: the eigenvalues of the linearisation cannot be computed", x->r->t);

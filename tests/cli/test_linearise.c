@@ -1,0 +1,105 @@
+/* `pinwheel linearise`: text, files, bad input. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+static void linearise_shows (const char *text) {
+  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
+}
+
+static const char *const linearise_block =
+    "pinwheel: 1\nbodies:\n  - {name: block, mass: 1.5, inertia: 0.1, start: {x: 0.8}}\n"
+    "elements:\n  - {slider: rail, body: [block, ground], at: [[0, 0], [0, 0]], heading: 0}\n"
+    "  - {spring: s, body: [block, ground], at: [[0, 0], [0, 0]], stiffness: 60, damping: 2.4, length: 0.8}\n"
+    "  - {force: F, body: block, at: [0, 0]}\n";
+
+/* An oscillator: c = 0.8/s, m = 1.5 kg, k = 60 N/m. */
+static void test_oscillator (void **state) {
+  double x[4], y[4];
+  char head[100], rows[3][40];
+  (void)state;
+  cli_write ("block.yaml", linearise_block);
+  cli_good ("pinwheel linearise @/block.yaml --input F.fx --output block.x -o @/block");
+  linearise_shows ("The motion is steady\n");
+  linearise_shows (
+      "  mode    real [1/s]  imaginary [1/s]  frequency [Hz]       damping  doubles in [s]  halves in [s]\n"
+      "     1          -0.8           6.2738          0.9985       0.12649                        0.86643\n");
+  linearise_shows ("  block           1 at 0 deg             0             0\n");
+  assert_int_equal (sscanf (cli_file ("block.csv"), "%99[^\n] %39[^,],%lf,%lf,%lf %39[^,],%lf,%lf,%lf %39[^,],%lf,%lf",
+                            head, rows[0], &x[0], &x[1], &x[2], rows[1], &y[0], &y[1], &y[2], rows[2], &x[3], &y[3]),
+                    12);
+  assert_string_equal (head, "row,x1 [m],x2 [m],F.fx [N]");
+  assert_string_equal (rows[2], "block.x [m]");
+  check_close ("trace", x[0] + y[1], -2.4 / 1.5, 1e-14, "round-off");
+  check_close ("determinant", x[0] * y[1] - x[1] * y[0], 60 / 1.5, 1e-13, "round-off");
+  check_close ("static response", (x[3] * x[1] * y[2] - y[3] * x[0] * y[2]) / (x[1] * y[0]), -1.0 / 60, 1e-16,
+               "C A^-1 B = -1/k");
+  const char *json = cli_file ("block.json");
+  check_close ("damping", cli_number (json, "eigenvalues", "damping", NULL), 0.8 / sqrt (40), 1e-14, "round-off");
+  check_close ("frequency", cli_number (json, "eigenvalues", "frequency_hz", NULL), sqrt (40 - 0.64) / (2 * PW_PI),
+               1e-14, "round-off");
+  check_close ("halves", cli_number (json, "eigenvalues", "halving_time", NULL), log (2) / 0.8, 1e-14, "round-off");
+  assert_true (cli_says (json, "motion", "steady"));
+  assert_non_null (strstr (json, "\"doubling_time\": null"));
+}
+
+/* The eigenvalues are those of `check`; a steady motion has them at every time; the inverted pendulum grows. */
+static void test_times (void **state) {
+  (void)state;
+  cli_good ("pinwheel check n-trailer");
+  linearise_shows (" -3.2056 1/s\n");
+  cli_good ("pinwheel linearise n-trailer");
+  linearise_shows ("     7       -3.2056");
+  cli_good ("pinwheel linearise n-trailer --at 0.7");
+  linearise_shows ("n-trailer at t = 0.7 s: 7 minimal coordinates, 5 of positions and 2 of velocities\n"
+                   "The frame turns at 1 rad/s\nThe motion is steady\n");
+  linearise_shows ("     7       -3.2056");
+  cli_good ("pinwheel linearise pendulum --set I=2 --set theta=1.5707963267948966");
+  linearise_shows ("     1        1.8083");
+  linearise_shows ("0.38331");
+  cli_good ("pinwheel linearise ezyroller --at 0.3");
+  linearise_shows ("the eigenvalues are not stability exponents\n");
+}
+
+static void test_bad (void **state) {
+  static const cli_wrong each[] = {
+    { "n-trailer --output tractor.q",
+      "model n-trailer has no state \"tractor.q\"; valid are x, y, phi, vx, vy, omega" },
+    { "ezyroller --input ride", "model ezyroller has no signal \"ride\"; did you mean \"rider.value\"?" },
+    { "n-trailer --input rider", "model n-trailer has no signal \"rider\"" },
+    { "n-trailer --output tracto.x", "model n-trailer has no state \"tracto.x\"; did you mean \"tractor.x\"?" },
+    { "hatchet-planimeter --input x",
+      "--input x.value is the signal of a constraint; only signals of forces can be inputs" },
+    { "ezyroller --at -1", "--at -1: expected a number >= 0" },
+    { "ezyroller --at soon", "--at: \"soon\" is not a number" },
+    { "peaucellier -o @/none", "peaucellier has no degrees of freedom: there is nothing to linearise" },
+    { "chain --set n=200", "chain has 600 coordinates; linearise takes at most 400" },
+  };
+  (void)state;
+  cli_bad_each ("linearise", each, sizeof each / sizeof *each);
+  assert_null (cli_file ("none.json"));
+  assert_null (cli_file ("none.csv"));
+  assert_null (cli_file ("none.json.part"));
+  cli_write ("fails.yaml", "pinwheel: 1\nbodies:\n  - {name: rod, mass: 1, inertia: 1}\nelements:\n"
+                           "  - {pin: P, body: [rod, ground], at: [[0, 0], [0, 0]]}\n"
+                           "  - {torque: T, body: [rod, ground], value: {expression: \"1/(1 - t)\"}}\n");
+  cli_bad ("pinwheel linearise @/fails.yaml --at 1.5 -o @/none", 4,
+           "t = 0.999 s: a signal failed: torque T: value is not a finite number");
+  assert_null (cli_file ("none.csv"));
+  cli_bad ("pinwheel linearise slider-crank --set theta=pi/2", 3,
+           "model slider-crank: the initial configuration is singular: 7 constraint equations are independent there, 8 "
+           "nearby; begin slightly off it");
+  cli_write ("block.yaml", linearise_block);
+  cli_bad ("pinwheel linearise @/block.yaml -o @/no/such", 1, "cannot write @/no/such.json: No such file or directory");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_oscillator),
+    cmocka_unit_test (test_times),
+    cmocka_unit_test (test_bad),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
