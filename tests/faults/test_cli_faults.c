@@ -127,6 +127,7 @@ static void test_reading (void **state) {
   faults_from (":", "show @/own.c");
   faults_most = 20;
   faults_from (":", "check pendulum --json @/o/a.json");
+  faults_from (":", "linearise ezyroller --at 0.1 -o @/o/a");
 }
 
 /* The file that was opened is another process's complete one by the time it is locked: it is left alone. */
