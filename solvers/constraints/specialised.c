@@ -37,7 +37,7 @@ static int specialised_allocate (pw_run *r, int constants) {
 int pw_specialised_open (pw_run *r, pw_error *error) {
   const pw_specialised *code = r->settings.specialised;
   if (code == NULL) return PW_OK;
-  if (code->abi != PW_SCENE_ABI || code->shape != pw_system_shape (r->s))
+  if (!pw_specialised_fits (code, r->s))
     return pw_fail (error, PW_INPUT, "model %s: the specialised code belongs to another scene", r->s->model);
   r->scene = malloc (sizeof *r->scene);
   if (r->scene == NULL || specialised_allocate (r, code->constants) != PW_OK) return pw_fail_memory (r->s, error);

@@ -146,6 +146,41 @@ static void test_singular (void **state) {
   both_close (&x);
 }
 
+/* At a singular configuration, a crank and a rod of equal lengths above the slider, evaluation and projection refuse. */
+static void test_guard (void **state) {
+  const double up = PW_PI / 2;
+  double q[12] = { 0, 0.5, up, 0, 0.5, -up, 0, 0, 0 }, v[12] = { 0 }, a[12], lambda[12];
+  both x;
+  (void)state;
+  both_open (&x, scene_named ("slider-crank", NULL, 0), "rk4+projection", NULL);
+  const pw_specialised *code = pw_scene_code_table (x.code);
+  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, NULL, NULL, NULL), 1);
+  assert_int_equal (code->project (x.special->scene, 0, q, v, a, lambda, NULL, NULL), 1);
+  q[2] = 1, q[5] = -1, q[0] = 0.5 * cos (1), q[3] = 1.5 * cos (1), q[1] = q[4] = 0.5 * sin (1), q[6] = 2 * cos (1);
+  assert_int_equal (code->evaluate (x.special->scene, 0, q, v, a, lambda, NULL, NULL, NULL), 0);
+  both_close (&x);
+}
+
+/* Code without an equation that the run enforces is not used. */
+static void test_independent (void **state) {
+  pw_error error = { 0 };
+  unsigned char independent[40];
+  (void)state;
+  pw_system *s = scene_named ("snakeboard", NULL, 0);
+  memset (independent, 1, sizeof independent);
+  independent[pw_system_rows (s) - 1] = 0;
+  char *text = pw_system_source (s, independent, &error);
+  pw_scene_code *code = text ? pw_scene_code_open (text, s, &error) : NULL;
+  check_ok (error.status, &error);
+  pw_run *r = runs_open (s, "rk4+projection", &(pw_settings){ .specialised = pw_scene_code_table (code) });
+  runs_to (r, 0.1);
+  assert_int_equal (pw_run_statistics (r)->specialised, 0);
+  pw_run_close (r);
+  pw_scene_code_close (code);
+  free (text);
+  pw_system_free (s);
+}
+
 /* A code with all equations does not suit a run with redundant ones, nor one for another scene at all. */
 static void test_another (void **state) {
   pw_error error = { 0 };
@@ -183,6 +218,7 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_gallery),  cmocka_unit_test (test_report),  cmocka_unit_test (test_angles),
     cmocka_unit_test (test_singular), cmocka_unit_test (test_another), cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_guard),    cmocka_unit_test (test_independent),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
