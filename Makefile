@@ -181,7 +181,7 @@ $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp)
 	  $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
 
 # Texts of the sources that specialised scenes contain.
-SPECIALISED := core/specialise/scene.h core/base/sine.h $(wildcard core/specialise/*.inc core/kinds/*.h core/kinds/*/*.c)
+SPECIALISED := core/specialise/specialised.h core/base/sine.h $(wildcard core/specialise/*.inc core/kinds/*.h core/kinds/*/*.c)
 $(BUILD)/obj/core/specialise/sources.inc: $(SPECIALISED)
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const source_$$(basename $$f | tr .- __)[] = {"; \

@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "elimination.h"
-#include "scene.h"
+#include "specialised.h"
 #include "sparsity.h"
 #include "sources.h"
 
@@ -73,7 +73,7 @@ static void specialise_sources (const specialise_scene *x) {
   char name[80], file[90];
   int count = 0;
   fputs ("#include <math.h>\n#include <string.h>\n#include \"pinwheel.h\"\n", x->out);
-  specialise_source (x->out, "scene.h", done, &count);
+  specialise_source (x->out, "specialised.h", done, &count);
   specialise_source (x->out, "sine.h", done, &count);
   for (int k = 0; k < x->s->batches; k++) {
     if (!specialise_is_built_in (x->s->batch[k].kind)) continue;

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include "method.h"
-#include "scene.h"
+#include "specialised.h"
 
 /* With the mass matrix as metric, massless coordinates do not contribute to the norm: the constraint equations
  * determine them, as in the accelerations, and coordinates with mass do not move because of them.  If the holonomic

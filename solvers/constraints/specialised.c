@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "method.h"
-#include "scene.h"
+#include "specialised.h"
 
 static int specialised_update (void *workspace, double t, const double *q, const double *v) {
   return pw_update_signals (workspace, t, q, v);

@@ -8,6 +8,7 @@
 #include "pinwheel-files.h"
 #include "runs.h"
 #include "scene.h"
+#include "specialised.h"
 
 #define ROUND_OFF 1e-11
 #define WHY "round-off of a factorisation in another order, angles between rows above 0.02"
@@ -216,8 +217,8 @@ static void test_refused (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_gallery),  cmocka_unit_test (test_report),  cmocka_unit_test (test_angles),
-    cmocka_unit_test (test_singular), cmocka_unit_test (test_another), cmocka_unit_test (test_refused),
+    cmocka_unit_test (test_gallery),  cmocka_unit_test (test_report),      cmocka_unit_test (test_angles),
+    cmocka_unit_test (test_singular), cmocka_unit_test (test_another),     cmocka_unit_test (test_refused),
     cmocka_unit_test (test_guard),    cmocka_unit_test (test_independent),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);

@@ -1,7 +1,7 @@
 /* The interface between a run and a specialised scene.  A generated file contains this header as it is; the tag
  * PW_SCENE_ABI changes with it. */
-#ifndef PW_SCENE_H
-#define PW_SCENE_H
+#ifndef PW_SPECIALISED_H
+#define PW_SPECIALISED_H
 
 #include "pinwheel.h"
 
