@@ -45,6 +45,28 @@ static void test_oscillator (void **state) {
   assert_non_null (strstr (json, "\"doubling_time\": null"));
 }
 
+/* The archive begins with A.npy, whose 128 bytes of head describe a 2 x 2 matrix: trace and determinant as above. */
+static void test_npz (void **state) {
+  char path[300], head[30 + 5 + 128];
+  double A[4];
+  (void)state;
+  cli_write ("block.yaml", linearise_block);
+  cli_good ("pinwheel linearise @/block.yaml -o @/block");
+  cli_expand ("@/block.npz", path, sizeof path);
+  FILE *f = fopen (path, "rb");
+  assert_non_null (f);
+  assert_int_equal (fread (head, sizeof head, 1, f), 1);
+  assert_int_equal (fread (A, sizeof A, 1, f), 1);
+  fclose (f);
+  assert_memory_equal (head, "PK\3\4", 4);
+  assert_memory_equal (head + 30, "A.npy\x93NUMPY\1\0\x76\0{'descr': '", 5 + 10 + 11);
+  assert_memory_equal (head + 30 + 5 + 22, "f8', 'fortran_order': False, 'shape': (2, 2), }", 46);
+  check_close ("trace", A[0] + A[3], -2.4 / 1.5, 1e-14, "round-off");
+  check_close ("determinant", A[0] * A[3] - A[1] * A[2], 60 / 1.5, 1e-13, "round-off");
+  cli_shell ("! command -v python3 >@/log || python3 -m zipfile -t @/block.npz >@/log");
+  assert_null (strstr (cli_file ("log"), "corrupt"));
+}
+
 /* The eigenvalues are those of `check`; a steady motion has them at every time; the inverted pendulum grows. */
 static void test_times (void **state) {
   (void)state;
@@ -82,6 +104,7 @@ static void test_bad (void **state) {
   assert_null (cli_file ("none.json"));
   assert_null (cli_file ("none.csv"));
   assert_null (cli_file ("none.json.part"));
+  assert_null (cli_file ("none.npz.part"));
   cli_write ("fails.yaml", "pinwheel: 1\nbodies:\n  - {name: rod, mass: 1, inertia: 1}\nelements:\n"
                            "  - {pin: P, body: [rod, ground], at: [[0, 0], [0, 0]]}\n"
                            "  - {torque: T, body: [rod, ground], value: {expression: \"1/(1 - t)\"}}\n");
@@ -98,6 +121,7 @@ static void test_bad (void **state) {
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_oscillator),
+    cmocka_unit_test (test_npz),
     cmocka_unit_test (test_times),
     cmocka_unit_test (test_bad),
   };

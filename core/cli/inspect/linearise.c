@@ -96,27 +96,33 @@ static int linearise_compute (pw_linearise *x, pw_error *error) {
 
 /* ---- Files ---- */
 
-/* Opens NAME.json and NAME.csv before anything is computed. */
-static int linearise_open_files (const pw_linearise *x, pw_output *file[2], pw_error *error) {
-  char path[2][4096];
-  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", path[0], PW_WRITES, NULL }, { "-o", path[1], PW_WRITES, NULL } };
+enum { LINEARISE_FILES = 3 };
+
+/* Opens NAME.json, .csv, .npz before anything is computed. */
+static int linearise_open_files (const pw_linearise *x, pw_output **file, pw_error *error) {
+  static const char *const ending[LINEARISE_FILES] = { "json", "csv", "npz" };
+  char path[LINEARISE_FILES][4096];
+  pw_use use[1 + LINEARISE_FILES] = { PW_CLI_MODEL_USE };
   if (x->name == NULL) return PW_OK;
-  for (int i = 0; i < 2; i++)
-    if (snprintf (path[i], sizeof path[i], "%s.%s", x->name, i ? "csv" : "json") >= (int)sizeof path[i])
+  for (int i = 0; i < LINEARISE_FILES; i++) {
+    if (snprintf (path[i], sizeof path[i], "%s.%s", x->name, ending[i]) >= (int)sizeof path[i])
       return pw_fail (error, PW_INPUT, "-o: the name is too long");
-  if (pw_cli_uses (&x->line, x->m.file, use, 3, error) != PW_OK) return error->status;
-  for (int i = 0; i < 2; i++)
+    use[1 + i] = (pw_use){ "-o", path[i], PW_WRITES, NULL };
+  }
+  if (pw_cli_uses (&x->line, x->m.file, use, 1 + LINEARISE_FILES, error) != PW_OK) return error->status;
+  for (int i = 0; i < LINEARISE_FILES; i++)
     if ((file[i] = pw_output_open (path[i], error)) == NULL) return error->status;
   return PW_OK;
 }
 
-static int linearise_write (const pw_linearise *x, pw_output *file[2], pw_error *error) {
+static int linearise_write (const pw_linearise *x, pw_output **file, pw_error *error) {
   if (x->name == NULL) return PW_OK;
   pw_linearise_json (x, &(pw_json){ .f = pw_output_stream (file[0]), .lines = 1 });
   int status = pw_linearise_csv (x, pw_output_stream (file[1]), error);
+  if (status == PW_OK) status = pw_linearise_npz (x, pw_output_stream (file[2]), error);
   if (status != PW_OK) return status;
-  status = pw_output_finish_all (file, 2, error);
-  file[0] = file[1] = NULL;
+  status = pw_output_finish_all (file, LINEARISE_FILES, error);
+  for (int i = 0; i < LINEARISE_FILES; i++) file[i] = NULL;
   return status;
 }
 
@@ -130,7 +136,7 @@ static void linearise_close (pw_linearise *x) {
 
 static int linearise_command (void *options, pw_error *error) {
   pw_linearise *x = options;
-  pw_output *file[2] = { NULL, NULL };
+  pw_output *file[LINEARISE_FILES] = { NULL };
   int status = pw_cli_number ("--at", x->at, PW_NONNEGATIVE, &x->t, error);
   if (status == PW_OK) status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = linearise_select (x, error);
@@ -139,7 +145,7 @@ static int linearise_command (void *options, pw_error *error) {
   if (status == PW_OK) status = linearise_compute (x, error);
   if (status == PW_OK) pw_linearise_print (x);
   if (status == PW_OK) status = linearise_write (x, file, error);
-  for (int i = 0; i < 2; i++)
+  for (int i = 0; i < LINEARISE_FILES; i++)
     if (file[i]) pw_output_discard (file[i]);
   linearise_close (x);
   if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted\n");
@@ -154,7 +160,7 @@ static const struct poptOption linearise_options[] = {
   PW_LIST_OPTION (pw_linearise, output_names, "output", 0, "STATE",
                   "Output y: a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable (default all)"),
   PW_TEXT_OPTION (pw_linearise, name, "name", 'o', "NAME",
-                  "Write NAME.json (everything) and NAME.csv (the matrix [A B; C D])"),
+                  "Write NAME.json (everything), NAME.csv (the matrix [A B; C D]) and NAME.npz for NumPy"),
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };

@@ -22,5 +22,7 @@ void pw_linearise_print (const pw_linearise *x);
 /* Writes everything as JSON; [ A B ; C D ] as a table.  A status. */
 void pw_linearise_json (const pw_linearise *x, pw_json *j);
 int pw_linearise_csv (const pw_linearise *x, FILE *f, pw_error *error);
+/* Writes A, B, C, D and the eigenvalues as a NumPy archive.  A status. */
+int pw_linearise_npz (const pw_linearise *x, FILE *f, pw_error *error);
 
 #endif

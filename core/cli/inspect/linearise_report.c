@@ -1,6 +1,8 @@
 /* The reports of `pinwheel linearise`. */
 #include <math.h>
+#include <stdlib.h>
 #include "linearise.h"
+#include "npz.h"
 #include "print_table.h"
 #include "text.h"
 
@@ -236,4 +238,23 @@ int pw_linearise_csv (const pw_linearise *x, FILE *f, pw_error *error) {
     status = pw_text_line (&t, f, x->name, error);
   }
   return status;
+}
+
+int pw_linearise_npz (const pw_linearise *x, FILE *f, pw_error *error) {
+  const pw_linear *l = &x->linear;
+  int n = l->unknowns;
+  pw_npz z = { .f = f };
+  double *value = malloc (((size_t)(n + x->outputs) * (size_t)(n + x->inputs) + 2 * (size_t)n) * sizeof *value);
+  if (value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int m = 0; m < 4; m++) {
+    int first = m / 2 ? n : 0, left = m % 2 ? n : 0, rows = m / 2 ? x->outputs : n, columns = m % 2 ? x->inputs : n;
+    for (int i = 0; i < rows; i++)
+      for (int c = 0; c < columns; c++) value[i * columns + c] = linearise_entry (x, first + i, left + c);
+    pw_npz_add (&z, (const char *[]){ "A", "B", "C", "D" }[m], rows, columns, 1, value);
+  }
+  for (int i = 0; i < n; i++) value[2 * i] = l->re[i], value[2 * i + 1] = l->im[i];
+  pw_npz_add (&z, "eigenvalues", n, 1, 2, value);
+  pw_npz_end (&z);
+  free (value);
+  return PW_OK;
 }
