@@ -43,6 +43,13 @@ static void test_oscillator (void **state) {
   check_close ("halves", cli_number (json, "eigenvalues", "halving_time", NULL), log (2) / 0.8, 1e-14, "round-off");
   assert_true (cli_says (json, "motion", "steady"));
   assert_non_null (strstr (json, "\"doubling_time\": null"));
+  cli_good ("pinwheel linearise @/block.yaml --input F.fy --input F.fx --output block.x -o @/both");
+  assert_int_equal (sscanf (cli_file ("both.csv"), "%99[^\n] %39[^,],%*f,%*f,%*f,%*f %39[^,],%*f,%*f,%lf,%lf", head,
+                            rows[0], rows[1], &x[0], &x[1]),
+                    5);
+  assert_string_equal (head, "row,x1 [m],x2 [m],F.fy [N],F.fx [N]");
+  check_close ("across", x[0], 0, 1e-15, "the rail takes it");
+  check_close ("along", x[1], y[2], 0, "the same input");
 }
 
 /* The archive begins with A.npy, whose 128 bytes of head describe a 2 x 2 matrix: trace and determinant as above. */
