@@ -67,7 +67,8 @@ struct pw_run {
   double energy_scene; /* kinetic energy at the velocities L and 1 rad per span; for a massless scene see ledger.c */
   double *scratch;     /* 2 (coords + 3) + 3 rows */
   double *saturation;  /* 2 coords: upper bounds of tolerances; INFINITY: unbounded */
-  double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated; its valid range */
+  double *matrix_state, *matrix_range; /* 2 coords: state at which the Newton matrix was evaluated; its
+                                           valid range; only if the system `saturates` */
   int outdated;                        /* 1: the state reached is outside that range */
   double *q_given, *v_given;
   unsigned char *origin; /* 2 coords: of initial values, as in pw_system */

@@ -37,6 +37,7 @@ static int run_settings (pw_settings *to, const pw_settings *from, const pw_meth
 static int run_allocate (pw_run *r) {
   const pw_system *s = r->s;
   size_t n = (size_t)s->coords + 3, rows = (size_t)s->rows, entries = (size_t)s->entries;
+  size_t states = s->saturates ? 2 * n : 0;
   const pw_array array[] = {
     { &r->q, pw_state_length (s) },
     { &r->ledger, entries },
@@ -47,15 +48,16 @@ static int run_allocate (pw_run *r) {
     { &r->q_given, n },
     { &r->v_given, n },
     { &r->saturation, 2 * n },
-    { &r->matrix_state, 2 * n },
-    { &r->matrix_range, 2 * n },
+    { &r->matrix_state, states },
+    { &r->matrix_range, states },
   };
   r->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   r->origin = malloc (2 * n);
   if (r->memory == NULL || r->origin == NULL) return PW_RESOURCE;
   r->v = r->q + n, r->a = r->v + n, r->lambda = r->a + n;
   r->v_at = r->q_at + n, r->a_at = r->v_at + n, r->lambda_at = r->a_at + n;
-  for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = r->matrix_range[j] = INFINITY;
+  for (size_t j = 0; j < 2 * n; j++) r->saturation[j] = INFINITY;
+  for (size_t j = 0; j < states; j++) r->matrix_range[j] = INFINITY;
   return PW_OK;
 }
 
