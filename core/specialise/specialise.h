@@ -1,0 +1,45 @@
+/* Parts of the generator of specialised code. */
+#ifndef PW_SPECIALISE_H
+#define PW_SPECIALISE_H
+
+#include <stdio.h>
+#include "elimination.h"
+#include "sparsity.h"
+#include "specialised.h"
+
+enum {
+  SPECIALISE_ROWS = 60, /* beyond, code without loops becomes too long */
+  SPECIALISE_INLINE = 8 /* up to this, everything is inlined, so that common parts are computed once */
+};
+
+typedef struct {
+  const pw_system *s;
+  const unsigned char *independent; /* or NULL */
+  FILE *out;
+  pw_workspace *w;       /* at the initial state */
+  pw_sparsity *sparsity; /* batches */
+  int *J;                /* batches: first entry of J */
+  int *u;                /* batches: first signal */
+  int entries;           /* of J */
+  int holonomic_only;    /* 1: positions are projected by the holonomic equations alone */
+  char *prepare;         /* text of prepare's statements */
+  size_t prepared;
+  int constants;
+} pw_specialise_scene;
+
+int pw_specialise_is_built_in (const pw_kind *kind);
+/* "rolling_wheel", in the buffer, which is returned. */
+char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size);
+static inline int pw_specialise_is_independent (const pw_specialise_scene *x, int row) {
+  return x->independent == NULL || x->independent[row];
+}
+
+/* Write the functions of elements: Jacobian, right-hand sides, forces, ledger; and that of the signals. */
+void pw_specialise_elements (const pw_specialise_scene *x);
+void pw_specialise_signals (const pw_specialise_scene *x);
+
+/* Writes products with J, factorisations and solutions; prepare's statements are collected.  PW_RETRY if there is no
+ * fixed order of elimination; PW_RESOURCE. */
+int pw_specialise_algebra (pw_specialise_scene *x);
+
+#endif

@@ -1,0 +1,153 @@
+/* Specialised code: products with J, factorisations, solutions. */
+#define _POSIX_C_SOURCE 200809L
+#include <stdlib.h>
+#include "specialise.h"
+
+/* ---- Linear algebra ---- */
+
+static pw_term specialise_entry (const pw_specialise_scene *x, int k, int e, int r, int c) {
+  const pw_element_batch *b = &x->s->batch[k];
+  unsigned char type = x->sparsity[k].J[r * b->b.cols + c];
+  int at = x->J[k] + (e * b->kind->rows + r) * b->b.cols + c;
+  if (type == PW_ENTRY_ZERO) return pw_term_zero ();
+  if (type == PW_ENTRY_ONE || type == PW_ENTRY_MINUS_ONE)
+    return (pw_term){ PW_TERM_ONE, type == PW_ENTRY_ONE ? 1 : -1, "1", type == PW_ENTRY_ONE ? 1 : -1 };
+  return pw_term_named (type == PW_ENTRY_CONSTANT ? PW_TERM_CONSTANT : PW_TERM_VARIABLE, "J", at, x->w->J[at]);
+}
+
+/* Calls f for each entry of J that is not always 0. */
+#define EACH_ENTRY(k, e, r, c)                            \
+  for (int k = 0; k < x->s->constraints; k++)             \
+    for (int e = 0; e < x->s->batch[k].b.count; e++)      \
+      for (int r = 0; r < x->s->batch[k].kind->rows; r++) \
+        for (int c = 0; c < x->s->batch[k].b.cols; c++)   \
+          if (pw_global (&x->s->batch[k], e, c) < x->s->coords)
+
+static pw_term *specialise_matrix (const pw_specialise_scene *x) {
+  const pw_system *s = x->s;
+  size_t n = (size_t)(s->coords + s->rows);
+  pw_term *K = malloc ((n * n + 1) * sizeof *K);
+  if (K == NULL) return NULL;
+  for (size_t i = 0; i < n * n; i++) K[i] = pw_term_zero ();
+  for (int j = 0; j < s->coords; j++)
+    if (s->mass[j] > 0) K[(size_t)j * n + (size_t)j] = pw_term_named (PW_TERM_CONSTANT, "M", j, s->mass[j]);
+  EACH_ENTRY (k, e, r, c) {
+    size_t i = (size_t)(s->coords + s->batch[k].row + e * s->batch[k].kind->rows + r);
+    size_t j = (size_t)pw_global (&s->batch[k], e, c);
+    K[i * n + j] = K[j * n + i] = specialise_entry (x, k, e, r, c);
+  }
+  return K;
+}
+
+enum { SPECIALISE_ACCELERATE, SPECIALISE_VELOCITY, SPECIALISE_POSITION };
+
+/* solve...: a and lambda of forces f and right-hand sides g; velocities and positions have no forces. */
+static int specialise_solve (const pw_specialise_scene *x, const pw_elimination *m, pw_emitter *e, int what) {
+  static const char *const name[] = { "solve", "solve_velocity", "solve_position" };
+  const pw_system *s = x->s;
+  char text[24];
+  pw_term *right = malloc ((size_t)m->n * sizeof *right + 1);
+  if (right == NULL) return PW_RESOURCE;
+  for (int i = 0; i < m->n; i++) {
+    int row = i - s->coords, force = row < 0 && what == SPECIALISE_ACCELERATE;
+    right[i] = row >= 0 ? pw_term_named (PW_TERM_VARIABLE, "g", row, 1) : pw_term_zero ();
+    if (force) right[i] = pw_term_named (PW_TERM_VARIABLE, "f", i, 1);
+    if (row >= 0 && !pw_specialise_is_independent (x, row)) right[i] = pw_term_zero ();
+    if (what == SPECIALISE_POSITION && row >= s->holonomic) right[i] = pw_term_zero ();
+  }
+  fprintf (x->out,
+           "\nINLINE void %s (const double *C, const double *J, const double *F, %sconst double *g, double *a%s) {\n"
+           "  (void)C, (void)J, (void)F, (void)g, (void)a;\n",
+           name[what], what == SPECIALISE_ACCELERATE ? "const double *f, " : "",
+           what == SPECIALISE_ACCELERATE ? ", double *lambda" : "");
+  pw_elimination_solve (m, e, right);
+  for (int j = 0; j < s->coords; j++) fprintf (x->out, "  a[%d] = %s;\n", j, pw_term_text (right[j], text));
+  for (int i = 0; i < s->rows && what == SPECIALISE_ACCELERATE; i++)
+    fprintf (x->out, "  lambda[%d] = %s;\n", i, pw_term_text (right[s->coords + i], text));
+  fputs ("}\n", x->out);
+  free (right);
+  return PW_OK;
+}
+
+static int specialise_factor (const pw_specialise_scene *x, pw_elimination *m, pw_emitter *e, const pw_term *K,
+                              const char *name, int rows) {
+  unsigned char takes_part[SPECIALISE_ROWS + 1];
+  for (int i = 0; i < x->s->rows; i++) takes_part[i] = i < rows && pw_specialise_is_independent (x, i);
+  char *text = NULL;
+  size_t size = 0;
+  FILE *out = e->code = open_memstream (&text, &size);
+  int status = out ? pw_elimination_open (m, x->s, K, takes_part, e) : PW_RESOURCE;
+  if (out && fclose (out) != 0) status = PW_RESOURCE;
+  e->code = x->out;
+  if (status == PW_OK)
+    fprintf (x->out,
+             "\nINLINE int %s (const double *M, const double *C, const double *J, double *F) {\n"
+             "  (void)M, (void)C, (void)J, (void)F;\n%s  return 0;\n}\n",
+             name, text);
+  free (text);
+  return status;
+}
+
+/* ---- Products with J ---- */
+
+/* Row r of element e times w, or the sum of the absolute values of its terms. */
+static void specialise_row_product (const pw_specialise_scene *x, int k, int e, int r, int absolute) {
+  const char *plus = "";
+  for (int c = 0; c < x->s->batch[k].b.cols; c++) {
+    int j = pw_global (&x->s->batch[k], e, c);
+    pw_term a = j < x->s->coords ? specialise_entry (x, k, e, r, c) : pw_term_zero ();
+    if (a.type == PW_TERM_ZERO) continue;
+    fprintf (x->out, "%s%s", absolute || a.sign > 0 ? plus : *plus ? " - " : "-", absolute ? "fabs (" : "");
+    if (a.type != PW_TERM_ONE) fprintf (x->out, "%s * ", a.name);
+    fprintf (x->out, "w[%d]%s", j, absolute ? ")" : "");
+    plus = " + ";
+  }
+  fputs (*plus ? ";\n" : "0;\n", x->out);
+}
+
+/* out = J w, and size = the sums of the absolute values of its terms. */
+static void specialise_product (const pw_specialise_scene *x) {
+  fputs ("\nINLINE void product (const double *J, const double *w, double *out, double *size) {\n  (void)J, (void)w, "
+         "(void)out, (void)size;\n",
+         x->out);
+  for (int k = 0; k < x->s->constraints; k++)
+    for (int e = 0; e < x->s->batch[k].b.count; e++)
+      for (int r = 0; r < x->s->batch[k].kind->rows; r++) {
+        int i = x->s->batch[k].row + e * x->s->batch[k].kind->rows + r;
+        fprintf (x->out, "  out[%d] = ", i);
+        specialise_row_product (x, k, e, r, 0);
+        fprintf (x->out, "  size[%d] = ", i);
+        specialise_row_product (x, k, e, r, 1);
+      }
+  fputs ("}\n", x->out);
+}
+
+/* ---- All of it ---- */
+
+int pw_specialise_algebra (pw_specialise_scene *x) {
+  const pw_system *s = x->s;
+  pw_elimination all = { 0 }, position = { 0 };
+  pw_emitter e = { .prepare = open_memstream (&x->prepare, &x->prepared), .code = x->out };
+  specialise_product (x);
+  pw_term *K = specialise_matrix (x);
+  int status = K && e.prepare ? specialise_factor (x, &all, &e, K, "factor", s->rows) : PW_RESOURCE;
+  if (status == PW_OK) status = specialise_solve (x, &all, &e, SPECIALISE_ACCELERATE);
+  if (status == PW_OK) status = specialise_solve (x, &all, &e, SPECIALISE_VELOCITY);
+  x->holonomic_only = 1;
+  if (status == PW_OK) {
+    status = specialise_factor (x, &position, &e, K, "factor_position", s->holonomic);
+    if (status == PW_RETRY) {
+      x->holonomic_only = 0;
+      status = specialise_solve (x, &all, &e, SPECIALISE_POSITION);
+    } else if (status == PW_OK)
+      status = specialise_solve (x, &position, &e, SPECIALISE_POSITION);
+  }
+  x->constants = e.constants;
+  fprintf (x->out, "\nenum { FACTORS = %d };\n", 1 + (all.factors > position.factors ? all.factors : position.factors));
+  if (!x->holonomic_only) fputs ("#define factor_position factor\n", x->out);
+  if (e.prepare && fclose (e.prepare) != 0) status = PW_RESOURCE;
+  pw_elimination_close (&all);
+  pw_elimination_close (&position);
+  free (K);
+  return status;
+}

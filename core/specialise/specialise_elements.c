@@ -1,0 +1,168 @@
+/* Specialised code: functions of elements and signals. */
+#include <stddef.h>
+#include <string.h>
+#include "specialise.h"
+
+int pw_specialise_is_built_in (const pw_kind *kind) {
+  for (const pw_kind *const *k = pw_kinds; *k; k++)
+    if (*k == kind) return 1;
+  return 0;
+}
+
+char *pw_specialise_identifier (const pw_kind *kind, char *buffer, size_t size) {
+  snprintf (buffer, size, "%s", kind->name);
+  for (char *c = buffer; *c; c++)
+    if (*c == '-') *c = '_';
+  return buffer;
+}
+
+/* ---- Elements ---- */
+
+/* Opens a block with a batch of one element, `more` at the end of its initialiser. */
+static void specialise_batch (const pw_specialise_scene *x, int k, int e, const char *more) {
+  const pw_element_batch *b = &x->s->batch[k];
+  fputs ("  { /* ", x->out);
+  pw_emit_name (x->out, b->kind->name);
+  fputc (' ', x->out);
+  pw_emit_name (x->out, b->name[e]);
+  fputs (" */\n    static const int body[] = { ", x->out);
+  for (int n = 0; n < b->kind->bodies; n++) fprintf (x->out, "%s%d", n ? ", " : "", b->b.body[e * b->kind->bodies + n]);
+  fprintf (x->out, "%s };\n    const pw_batch b = { .count = 1, .cols = %d, .body = body, .configuration = c,\n",
+           b->kind->bodies ? "" : "0", b->b.cols);
+  fprintf (x->out, "      .element = (const char *)s->element[%d] + %zu", k, (size_t)e * b->kind->element);
+  if (b->kind->internal)
+    fprintf (x->out, ", .q = q + %d, .v = v + %d", b->internal + e * b->kind->internal,
+             b->internal + e * b->kind->internal);
+  if (b->kind->signals) fprintf (x->out, ", .u = s->u + %d", 3 * (x->u[k] + e * b->kind->signals));
+  fprintf (x->out, "%s };\n", more);
+}
+
+/* The call of a function of its type, as text. */
+static void specialise_call (const pw_specialise_scene *x, int k, const char *function, const char *to) {
+  char name[80];
+  const pw_kind *kind = x->s->batch[k].kind;
+  if (pw_specialise_is_built_in (kind))
+    fprintf (x->out, "    scene_%s.%s (&b, %s);\n", pw_specialise_identifier (kind, name, sizeof name), function, to);
+  else
+    fprintf (x->out, "    s->kind[%d]->%s (&b, %s);\n", k, function, to);
+}
+
+#define ARGUMENTS "const pw_scene *s, const pw_configuration *c, const double *q, const double *v, double *out"
+#define UNUSED "  (void)s, (void)c, (void)q, (void)v, (void)out;\n"
+
+/* A function over constraint equations; `function` is at `offset` of the table; NULL: zeros. */
+static void specialise_rows (const pw_specialise_scene *x, const char *name, const char *function, size_t offset,
+                             int rows) {
+  char to[40];
+  fprintf (x->out, "\nINLINE void %s (" ARGUMENTS ") {\n" UNUSED, name);
+  for (int k = 0; k < x->s->constraints && x->s->batch[k].row < rows; k++) {
+    const pw_element_batch *b = &x->s->batch[k];
+    int has = *(pw_batch_function *const *)(const void *)((const char *)b->kind + offset) != NULL;
+    for (int e = 0; e < b->b.count; e++) {
+      int row = b->row + e * b->kind->rows;
+      for (int r = 0; !has && r < b->kind->rows; r++) fprintf (x->out, "  out[%d] = 0;\n", row + r);
+      if (!has) continue;
+      specialise_batch (x, k, e, "");
+      snprintf (to, sizeof to, "out + %d", row);
+      specialise_call (x, k, function, to);
+      fputs ("  }\n", x->out);
+    }
+  }
+  fputs ("}\n", x->out);
+}
+
+static void specialise_jacobian (const pw_specialise_scene *x) {
+  char to[40];
+  fputs ("\nINLINE void jacobian (" ARGUMENTS ") {\n" UNUSED, x->out);
+  for (int k = 0; k < x->s->constraints; k++) {
+    const pw_element_batch *b = &x->s->batch[k];
+    for (int e = 0; e < b->b.count; e++) {
+      specialise_batch (x, k, e, "");
+      snprintf (to, sizeof to, "out + %d", x->J[k] + e * b->kind->rows * b->b.cols);
+      specialise_call (x, k, "J", to);
+      fputs ("  }\n", x->out);
+    }
+  }
+  fputs ("}\n", x->out);
+}
+
+static void specialise_forces (const pw_specialise_scene *x) {
+  const pw_system *s = x->s;
+  fprintf (x->out,
+           "\nINLINE void forces (" ARGUMENTS ") {\n" UNUSED "  for (int j = 0; j < %d; j++) out[j] = s->force[j];\n",
+           s->coords);
+  for (int k = 0; k < s->batches; k++) {
+    const pw_element_batch *b = &s->batch[k];
+    for (int e = 0; b->kind->force && !b->kind->constant && e < b->b.count; e++) {
+      specialise_batch (x, k, e, "");
+      fprintf (x->out, "    double f[%d];\n", b->b.cols);
+      specialise_call (x, k, "force", "f");
+      for (int c = 0; c < b->b.cols; c++)
+        if (x->sparsity[k].force[c] != PW_ENTRY_ZERO && pw_global (b, e, c) < s->coords)
+          fprintf (x->out, "    out[%d] += f[%d];\n", pw_global (b, e, c), c);
+      fputs ("  }\n", x->out);
+    }
+  }
+  fputs ("}\n", x->out);
+}
+
+/* The ledger's rates, as pw_evaluate_ledger. */
+static void specialise_ledger (const pw_specialise_scene *x) {
+  const pw_system *s = x->s;
+  char more[40];
+  fputs ("\nINLINE void ledger (const pw_scene *s, const pw_configuration *c, const double *q, const double *v,\n"
+         "                           const double *lambda, double *out) {\n" UNUSED "  (void)lambda;\n",
+         x->out);
+  for (int i = 0; i < s->entries; i++) {
+    const pw_element_batch *b = &s->batch[s->entry[i].batch];
+    int k = s->entry[i].batch, e = s->entry[i].element, rows = b->kind->rows, row = b->row + e * rows;
+    int drive = rows > 0 && s->entry[i].type == PW_WORK && b->kind->power == NULL;
+    snprintf (more, sizeof more, ", .lambda = lambda + %d", row);
+    specialise_batch (x, k, e, more);
+    fprintf (x->out, "    double y[%d];\n", rows > 0 ? rows : 1);
+    specialise_call (x, k, drive ? "eta" : s->entry[i].type == PW_WORK ? "power" : "loss", "y");
+    fprintf (x->out, "    out[%d] = ", i);
+    if (!drive) fputs ("y[0]", x->out);
+    for (int r = 0; drive && r < rows; r++) fprintf (x->out, "%s - lambda[%d] * y[%d]", r ? "" : "0", row + r, r);
+    fputs (";\n  }\n", x->out);
+  }
+  fputs ("}\n", x->out);
+}
+
+void pw_specialise_elements (const pw_specialise_scene *x) {
+  specialise_jacobian (x);
+  specialise_rows (x, "constraints", "g", offsetof (pw_kind, g), x->s->holonomic);
+  specialise_rows (x, "sizes", "g_size", offsetof (pw_kind, g_size), x->s->holonomic);
+  specialise_rows (x, "right_sides", "eta", offsetof (pw_kind, eta), x->s->rows);
+  specialise_rows (x, "gammas", "gamma", offsetof (pw_kind, gamma), x->s->rows);
+  specialise_forces (x);
+  specialise_ledger (x);
+}
+
+/* ---- Signals ---- */
+
+void pw_specialise_signals (const pw_specialise_scene *x) {
+  const pw_system *s = x->s;
+  int simple = 1, reads = s->state_dependent;
+  for (int i = 0; i < s->sources; i++)
+    simple &= s->source[i].signal.type == PW_CONSTANT || s->source[i].signal.type == PW_HARMONIC;
+  fputs ("\nINLINE int signals (pw_scene *s, double t, const double *q, const double *v) {\n  (void)q, (void)v;\n",
+         x->out);
+  if (s->sources && !simple)
+    fprintf (x->out, "  %sreturn s->update (s->workspace, t, q, v);\n%s", reads ? "" : "if (t != *s->t_signal) ",
+             reads ? "" : "  return 0;\n");
+  else if (s->sources) {
+    fputs ("  if (t == *s->t_signal) return 0;\n", x->out);
+    for (int i = 0; i < s->sources; i++) {
+      if (s->source[i].signal.type == PW_CONSTANT) {
+        fprintf (x->out, "  s->u[%d] = s->signal[%d]->constant;\n", 3 * i, i);
+        if (!s->source[i].of_force) fprintf (x->out, "  s->u[%d] = s->u[%d] = 0;\n", 3 * i + 1, 3 * i + 2);
+      } else
+        fprintf (x->out, "  if (harmonic (&s->signal[%d]->harmonic, t, %d, s->u + %d)) return 1;\n", i,
+                 !s->source[i].of_force, 3 * i);
+    }
+    fputs ("  *s->t_signal = t;\n  return 0;\n", x->out);
+  } else
+    fputs ("  *s->t_signal = t;\n  return 0;\n", x->out);
+  fputs ("}\n", x->out);
+}
