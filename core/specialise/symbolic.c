@@ -3,7 +3,7 @@
 #include <string.h>
 #include "symbolic.h"
 
-pw_term pw_term_named (int type, const char *array, int i, double value) {
+pw_term pw_term_named (pw_term_type type, const char *array, int i, double value) {
   pw_term a = { type, 1, "", value };
   snprintf (a.name, sizeof a.name, "%s[%d]", array, i);
   return a;

@@ -4,9 +4,11 @@
 
 #include <stdio.h>
 
+typedef enum { PW_TERM_ZERO, PW_TERM_ONE, PW_TERM_CONSTANT, PW_TERM_VARIABLE } pw_term_type;
+
 /* sign times 0, 1, constant number `id` (computed once), or variable number `id`. */
 typedef struct {
-  enum { PW_TERM_ZERO, PW_TERM_ONE, PW_TERM_CONSTANT, PW_TERM_VARIABLE } type;
+  pw_term_type type;
   int sign;
   char name[20]; /* as printed without the sign: "C[3]", "x12", "J[7]" */
   double value;  /* with the sign, at the initial state */
@@ -26,7 +28,7 @@ static inline pw_term pw_term_negative (pw_term a) {
   a.value = -a.value;
   return a;
 }
-pw_term pw_term_named (int type, const char *array, int i, double value); /* array[i] */
+pw_term pw_term_named (pw_term_type type, const char *array, int i, double value); /* array[i] */
 
 pw_term pw_emit_product (pw_emitter *e, pw_term a, pw_term b);               /* a b */
 pw_term pw_emit_difference (pw_emitter *e, pw_term a, pw_term b, pw_term c); /* a - b c */

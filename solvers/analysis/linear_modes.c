@@ -94,7 +94,7 @@ static void modes_reflect (pw_linearisation *x, int k, double complex *y) {
   for (int imaginary = 0; k > 0 && imaginary < 2; imaginary++) {
     for (int i = 0; i < x->size; i++) part[i] = imaginary ? cimag (y[i]) : creal (y[i]);
     LAPACKE_dormqr_work (LAPACK_COL_MAJOR, 'L', 'N', x->size, 1, k, x->S, x->size, x->tau, part, x->size, work, 1);
-    for (int i = 0; i < x->size; i++) y[i] = imaginary ? creal (y[i]) + I * part[i] : CMPLX (part[i], cimag (y[i]));
+    for (int i = 0; i < x->size; i++) y[i] = imaginary ? creal (y[i]) + I * part[i] : part[i] + I * cimag (y[i]);
   }
 }
 
@@ -117,7 +117,7 @@ int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l) {
     if (l->re[i] == 0 && l->im[i] == 0) continue;
     double complex *shape = (double complex *)l->shape + (size_t)i * (size_t)states;
     modes_vector (x, k, i - k, y);
-    modes_rigid_part (x, k, CMPLX (l->re[i], l->im[i]), y);
+    modes_rigid_part (x, k, l->re[i] + I * l->im[i], y);
     modes_reflect (x, k, y);
     for (int j = 0; j < states; j++)
       for (int c = 0; c < size; c++) shape[j] += l->basis[(size_t)j * (size_t)size + (size_t)c] * y[c];

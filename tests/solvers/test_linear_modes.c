@@ -163,7 +163,7 @@ static void modes_decay (pw_system *s, int modes_expected) {
   int seen = 0;
   modes x = modes_of (s);
   for (int i = 0; i < x.l.unknowns; i++) {
-    const double complex *shape = (const double complex *)x.l.shape + 2 * x.n * i, mu = CMPLX (x.l.re[i], x.l.im[i]);
+    const double complex *shape = (const double complex *)x.l.shape + 2 * x.n * i, mu = (x.l.re[i] + I * x.l.im[i]);
     double start[MOST], plus[MOST], minus[MOST], most = 0;
     for (int j = 0; j < 2 * x.n; j++) start[j] = creal (shape[j]);
     for (int j = 0; j < x.n; j++) most = fmax (most, cabs (shape[j]) * (j % 3 == 2 ? x.length : 1));
@@ -244,11 +244,11 @@ static void test_transfer (void **state) {
     check_below ("omega", cabs (modes_transfer (&x.l, w, 5) / (I * w * expected) - 1), 1e-11, "closed form, round-off");
   }
   double complex mu = -d / (2 * J) + I * sqrt (k / J - d * d / (4 * J * J));
-  check_below ("eigenvalue", cabs (CMPLX (x.l.re[0], x.l.im[0]) - mu), 1e-11, "closed form, round-off");
+  check_below ("eigenvalue", cabs ((x.l.re[0] + I * x.l.im[0]) - mu), 1e-11, "closed form, round-off");
   for (int i = 0; i < 2; i++) {
     const double *phi = x.l.shape + 2 * (6 * i + 2), *omega = phi + 6;
-    double complex rate = CMPLX (omega[0], omega[1]) / CMPLX (phi[0], phi[1]);
-    check_below ("shape", cabs (rate - CMPLX (x.l.re[i], x.l.im[i])), 1e-11, "omega = mu phi");
+    double complex rate = (omega[0] + I * omega[1]) / (phi[0] + I * phi[1]);
+    check_below ("shape", cabs (rate - (x.l.re[i] + I * x.l.im[i])), 1e-11, "omega = mu phi");
   }
   modes_close (&x);
 }

@@ -62,7 +62,10 @@ static void table_heading (const pw_study *x, int group) {
 
 static void table_number (const pw_row *r, const pw_study_column *c, int i) {
   char text[32] = "<", *at = text + (r->below >> i & 1);
-  snprintf (at, sizeof text - 1, isnan (r->value[i]) ? "-" : c->format, r->value[i]);
+  if (isnan (r->value[i]))
+    strcpy (at, "-");
+  else
+    snprintf (at, sizeof text - 1, c->format, r->value[i]);
   printf ("%*s", c->width, text);
 }
 
