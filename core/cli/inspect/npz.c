@@ -19,7 +19,7 @@ static void npz_bytes (pw_npz *z, const void *data, size_t size) {
   z->at += size;
 }
 
-/* A number of so many bytes, the lowest first. */
+/* A number of `bytes` bytes, the lowest first. */
 static void npz_number (pw_npz *z, unsigned long value, int bytes) {
   for (; bytes > 0; bytes--, value >>= 8) npz_bytes (z, &(unsigned char){ (unsigned char)value }, 1);
 }
