@@ -85,7 +85,8 @@ pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int 
   }
   snprintf (r->method, sizeof r->method, "%s", method);
   for (int i = 0; i < STUDY_COLUMNS; i++) r->value[i] = NAN;
-  for (int k = 0; k < points * STUDY_COORDINATES; k++) r->point[0][k] = NAN;
+  for (int k = 0; k < points; k++)
+    for (int i = 0; i < STUDY_COORDINATES; i++) r->point[k][i] = NAN;
   x->rows++;
   return r;
 }
