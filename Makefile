@@ -56,7 +56,7 @@ ENGINE  := $(wildcard benchmarks/engine/*.c benchmarks/baseline/*.c)
 HARD    := $(wildcard benchmarks/hard/*.c)
 EMBED   := $(wildcard docs/*.c)
 
-HEADERS := core/pinwheel.h core/run.h core/pinwheel-selftest.h solvers/pinwheel-solvers.h solvers/pinwheel-method.h core/files/pinwheel-files.h
+HEADERS := core/pinwheel.h core/run.h core/pinwheel-selftest.h solvers/pinwheel-solvers.h solvers/pinwheel-analysis.h solvers/pinwheel-method.h core/files/pinwheel-files.h
 INCLUDES := $(addprefix $(BUILD)/include/,$(notdir $(HEADERS)))
 
 LIB       := $(BUILD)/libpinwheel.so

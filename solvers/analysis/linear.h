@@ -4,6 +4,7 @@
 #define PW_LINEAR_H
 
 #include "method.h"
+#include "pinwheel-analysis.h"
 #include "newton.h"
 
 /* The co-moving frame, at a reference body, at rest or with the twist of the body. */

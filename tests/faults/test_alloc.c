@@ -8,7 +8,7 @@
 #include "alloc.h"
 #include "check.h"
 #include "pinwheel-files.h"
-#include "pinwheel-solvers.h"
+#include "pinwheel-analysis.h"
 #include "runs.h"
 #include "scene.h"
 #include "pinwheel-selftest.h"

@@ -6,7 +6,7 @@
 #include "fuzz.h"
 #include "model.h"
 #include "pinwheel-files.h"
-#include "pinwheel-solvers.h"
+#include "pinwheel-analysis.h"
 #include "system.h"
 
 /* A few steps: what a description can do to the solvers. */

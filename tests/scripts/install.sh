@@ -67,7 +67,7 @@ fi
 if command -v c++ >/dev/null; then
   cat >"$work/plus.cc" <<'EOF'
 #include "pinwheel-files.h"
-#include "pinwheel-solvers.h"
+#include "pinwheel-analysis.h"
 int main (int count, char **argument) {
   pw_error e = {};
   pw_settings settings = {};

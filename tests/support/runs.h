@@ -2,7 +2,7 @@
 #ifndef RUNS_H
 #define RUNS_H
 
-#include "pinwheel-solvers.h"
+#include "pinwheel-analysis.h"
 
 pw_run *runs_open (pw_system *s, const char *method, const pw_settings *settings);
 

@@ -3,6 +3,7 @@
 #define PW_CHECK_REPORT_H
 
 #include "cli.h"
+#include "pinwheel-analysis.h"
 #include "pinwheel-selftest.h"
 
 enum { CHECK_MOST = 400 /* coordinates above which computations of cubic cost are omitted */, CHECK_DIGITS = 5 };

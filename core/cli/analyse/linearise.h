@@ -3,6 +3,7 @@
 #define PW_LINEARISE_H
 
 #include "cli.h"
+#include "pinwheel-analysis.h"
 
 typedef struct {
   pw_cli_line line;
