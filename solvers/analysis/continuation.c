@@ -1,0 +1,216 @@
+#include "continuation.h"
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "util.h"
+
+/* NEWTON_MOST: iterations of a solution, of a point of a branch.  BRANCH_TURN: cosine of the largest angle between the
+ * tangents of successive points; BRANCH_APART: largest correction of a predictor, relative to the step. */
+enum { NEWTON_MOST = 60, BRANCH_MOST = 8, NEWTON_HALVINGS = 10, LOCATE_MOST = 60 };
+static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_GROW = 1.5;
+
+int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error) {
+  size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + 1, large = n > m ? n : m;
+  *b = (pw_branch){ .of = *of, .room = (int)(8 * large + 200) };
+  if (!(b->of.rank > 0)) b->of.rank = 1e-9;
+  const pw_array array[] = {
+    { &b->at.u, n },   { &b->at.tangent, n },   { &b->before.u, n },  { &b->before.tangent, n },
+    { &b->next.u, n }, { &b->next.tangent, n }, { &b->F, large },     { &b->J, m * n },
+    { &b->du, large }, { &b->trial, n },        { &b->condition, n }, { &b->work, (size_t)b->room + 34 * large }
+  };
+  b->room += (int)(34 * large);
+  b->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  b->pivot = malloc (n * sizeof *b->pivot);
+  return b->memory && b->pivot ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+}
+
+void pw_branch_close (pw_branch *b) {
+  free (b->memory);
+  free (b->pivot);
+  b->memory = NULL;
+  b->pivot = NULL;
+}
+
+/* ---- Newton's method ---- */
+
+/* The largest |F_i|; NaN if one is not finite. */
+static double branch_size (const pw_branch *b) {
+  double most = 0;
+  for (int i = 0; i < b->of.equations; i++)
+    if (fabs (b->F[i]) > most || isnan (b->F[i])) most = fabs (b->F[i]);
+  return most;
+}
+
+static double branch_norm (int n, const double *x) {
+  double sum = 0;
+  for (int i = 0; i < n; i++) sum += x[i] * x[i];
+  return sqrt (sum);
+}
+
+static int branch_evaluate (pw_branch *b, const double *u, int derivatives, pw_error *error) {
+  size_t m = (size_t)b->of.equations, n = (size_t)b->of.unknowns + 1;
+  memset (b->F, 0, m * sizeof *b->F);
+  if (derivatives) memset (b->J, 0, m * n * sizeof *b->J);
+  return b->of.evaluate (b->of.context, u, b->F, derivatives ? b->J : NULL, error);
+}
+
+/* du = the shortest least-squares solution of J du = right (equations) and c du = last, where c is a row over all n + 1
+ * unknowns; without c, p is constant.  J is destroyed. */
+static int branch_linear (pw_branch *b, const double *right, const double *c, double last) {
+  int m = b->of.equations, n = b->of.unknowns + (c != NULL), rows = m + (c != NULL), large = rows > n ? rows : n;
+  for (int j = n - 1; c && j >= 0; j--) {
+    memmove (b->J + (size_t)j * (size_t)rows, b->J + (size_t)j * (size_t)m, (size_t)m * sizeof *b->J);
+    b->J[(size_t)j * (size_t)rows + (size_t)m] = c[j];
+  }
+  for (int i = 0; i < large; i++) b->du[i] = i < m ? right[i] : 0;
+  if (c) b->du[m] = last;
+  for (int i = 0; i < rows * n; i++)
+    if (!isfinite (b->J[i])) return PW_RETRY;
+  memset (b->pivot, 0, (size_t)n * sizeof *b->pivot);
+  if (LAPACKE_dgelsy_work (LAPACK_COL_MAJOR, rows, n, 1, b->J, rows, b->du, large, b->pivot, b->of.rank, &b->rank,
+                           b->work, b->room))
+    return PW_RETRY;
+  if (!c) b->du[n] = 0;
+  return PW_OK;
+}
+
+/* Moves u along du, by the largest of the factors 1, 1/2, ... with which F decreases. */
+static int branch_descend (pw_branch *b, double *u, pw_error *error) {
+  int n = b->of.unknowns + 1;
+  double before = branch_norm (b->of.equations, b->F), factor = 1;
+  for (int i = 0; i < NEWTON_HALVINGS; i++, factor /= 2) {
+    for (int j = 0; j < n; j++) b->trial[j] = u[j] + factor * b->du[j];
+    int status = branch_evaluate (b, b->trial, 0, error);
+    if (status != PW_OK && status != PW_RETRY) return status;
+    if (status != PW_OK || !(branch_norm (b->of.equations, b->F) < before * (1 - factor / 10))) continue;
+    memcpy (u, b->trial, (size_t)n * sizeof *u);
+    return PW_OK;
+  }
+  return PW_RETRY;
+}
+
+/* Iterates at constant c u, or constant p.  Damped only without c: on a branch a short step is the better remedy. */
+static int branch_iterate (pw_branch *b, double *u, const double *c, pw_error *error) {
+  int n = b->of.unknowns + 1, status;
+  double before = INFINITY;
+  for (b->iterations = 0;; b->iterations++) {
+    status = branch_evaluate (b, u, 1, error);
+    if (status != PW_OK) return status;
+    b->residual = branch_size (b);
+    int stalled = b->residual > before / 4;
+    if (b->residual <= b->of.tolerance && (stalled || b->residual <= b->of.tolerance * 1e-4)) return PW_OK;
+    if (b->iterations >= (c ? BRANCH_MOST : NEWTON_MOST) || !isfinite (b->residual)) return PW_RETRY;
+    before = b->residual;
+    for (int i = 0; i < b->of.equations; i++) b->F[i] = -b->F[i];
+    status = branch_linear (b, b->F, c, 0);
+    if (status != PW_OK) return status;
+    if (!c && b->residual > b->of.tolerance)
+      status = branch_descend (b, u, error);
+    else
+      for (int j = 0; j < n; j++) u[j] += b->du[j];
+    if (status != PW_OK) return status;
+  }
+}
+
+int pw_branch_solve (pw_branch *b, double *u, pw_error *error) {
+  return branch_iterate (b, u, NULL, error);
+}
+
+/* ---- Branches ---- */
+
+/* The unit tangent at u in the direction of c. */
+static int branch_tangent (pw_branch *b, const double *u, const double *c, double *tangent, pw_error *error) {
+  int n = b->of.unknowns + 1;
+  double dot = 0;
+  int status = branch_evaluate (b, u, 1, error);
+  if (status != PW_OK) return status;
+  memset (b->F, 0, (size_t)b->of.equations * sizeof *b->F);
+  status = branch_linear (b, b->F, c, 1);
+  if (status != PW_OK) return status;
+  double norm = branch_norm (n, b->du);
+  for (int j = 0; j < n; j++) tangent[j] = b->du[j] / norm, dot += b->du[j] * c[j];
+  return isfinite (norm) && norm > 0 && fabs (dot - 1) < 1e-3 ? PW_OK : PW_RETRY;
+}
+
+int pw_branch_start (pw_branch *b, const double *u, double direction, pw_error *error) {
+  size_t n = (size_t)b->of.unknowns + 1;
+  memset (b->condition, 0, n * sizeof *b->condition);
+  b->condition[n - 1] = direction > 0 ? 1 : -1;
+  b->folded = 0;
+  memmove (b->at.u, u, n * sizeof *u);
+  return branch_tangent (b, b->at.u, b->condition, b->at.tangent, error);
+}
+
+/* The point near `from` + h tangent, on the plane perpendicular to the tangent; its own tangent. */
+static int branch_correct (pw_branch *b, const pw_branch_point *from, double h, pw_branch_point *to, pw_error *error) {
+  int n = b->of.unknowns + 1;
+  double away = 0;
+  memcpy (b->condition, from->tangent, (size_t)n * sizeof *b->condition);
+  for (int j = 0; j < n; j++) to->u[j] = from->u[j] + h * from->tangent[j];
+  int status = branch_iterate (b, to->u, b->condition, error);
+  if (status != PW_OK) return status;
+  for (int j = 0; j < n; j++) away += pow (to->u[j] - from->u[j] - h * from->tangent[j], 2);
+  if (sqrt (away) > BRANCH_APART * fabs (h)) return PW_RETRY;
+  return branch_tangent (b, to->u, b->condition, to->tangent, error);
+}
+
+static int branch_try (pw_branch *b, pw_error *error) {
+  double dot = 0;
+  int status = branch_correct (b, &b->at, b->step, &b->next, error);
+  for (int j = 0; j <= b->of.unknowns; j++) dot += b->at.tangent[j] * b->next.tangent[j];
+  return status == PW_OK && dot < BRANCH_TURN ? PW_RETRY : status;
+}
+
+int pw_branch_step (pw_branch *b, pw_error *error) {
+  int n = b->of.unknowns;
+  b->step = fmin (b->step, b->most / fmax (fabs (b->at.tangent[n]), 1e-3));
+  for (int status; (status = branch_try (b, error)) != PW_OK; b->step /= 2)
+    if (status != PW_RETRY || b->step < 2 * b->least) return status;
+  pw_branch_point oldest = b->before;
+  b->before = b->at;
+  b->at = b->next;
+  b->next = oldest;
+  b->folded = b->before.tangent[n] * b->at.tangent[n] < 0;
+  if (b->iterations <= BRANCH_MOST / 2) b->step *= BRANCH_GROW;
+  return PW_OK;
+}
+
+int pw_branch_between (pw_branch *b, double s, pw_branch_point *point, pw_error *error) {
+  double h = 0;
+  for (int j = 0; j <= b->of.unknowns; j++) h += (b->at.u[j] - b->before.u[j]) * b->before.tangent[j];
+  return branch_correct (b, &b->before, s * h, point, error);
+}
+
+int pw_branch_fold (void *context, const pw_branch_point *point, double *value, pw_error *error) {
+  const pw_branch *b = context;
+  (void)error;
+  *value = point->tangent[b->of.unknowns];
+  return PW_OK;
+}
+
+/* The Illinois variant of regula falsi (Dowell & Jarratt 1971). */
+int pw_branch_locate (pw_branch *b,
+                      int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
+                      void *context, double accuracy, pw_branch_point *point, pw_error *error) {
+  double s0 = 0, s1 = 1, f0, f1, f, s;
+  int status = test (context, &b->before, &f0, error), side = 0;
+  if (status == PW_OK) status = test (context, &b->at, &f1, error);
+  for (int i = 0; i < LOCATE_MOST && status == PW_OK && (i == 0 || fabs (s1 - s0) > accuracy); i++) {
+    s = f1 != f0 && isfinite (f1 - f0) ? s1 - f1 * (s1 - s0) / (f1 - f0) : (s0 + s1) / 2;
+    if (i % 4 == 3) s = (s0 + s1) / 2;
+    status = pw_branch_between (b, s, point, error);
+    if (status == PW_OK) status = test (context, point, &f, error);
+    if (status != PW_OK || f == 0) break;
+    if ((f > 0) == (f1 > 0)) {
+      s1 = s, f1 = f;
+      if (side == 1) f0 /= 2;
+      side = 1;
+    } else {
+      s0 = s, f0 = f;
+      if (side == -1) f1 /= 2;
+      side = -1;
+    }
+  }
+  return status;
+}

@@ -1,0 +1,151 @@
+/* Continuation of branches that are known in closed form. */
+#include <math.h>
+#include <string.h>
+#include "check.h"
+#include "continuation.h"
+
+/* p = x^3 - x, with the first equation twice and an unknown z whose value is arbitrary but for its symmetry's
+ * condition. */
+static int cubic (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  double x = u[0], p = u[2];
+  (void)error;
+  ++*(int *)context;
+  if (x > 5) return PW_RETRY;
+  F[0] = x * x * x - x - p;
+  F[1] = 2 * F[0];
+  if (dF == NULL) return PW_OK;
+  dF[0] = 3 * x * x - 1, dF[1] = 2 * dF[0];
+  dF[5] = 1;
+  dF[6] = -1, dF[7] = -2;
+  return PW_OK;
+}
+
+static int cubic_calls;
+static const pw_branch_equations cubic_equations = {
+  .unknowns = 2, .equations = 3, .tolerance = 1e-12, .evaluate = cubic, .context = &cubic_calls
+};
+
+static void continuation_open (pw_branch *b, const pw_branch_equations *of) {
+  pw_error error = { 0 };
+  check_ok (pw_branch_open (b, of, &error), &error);
+  b->step = 0.05, b->most = 0.1, b->least = 1e-6;
+}
+
+/* The branch passes both folds, at p = +- 2 / sqrt (27), x = -+ 1 / sqrt (3). */
+static void test_folds (void **state) {
+  double at[2][3], tangent[3], u[3] = { -2, 0.7, -5 }, next = 1;
+  pw_branch_point fold = { at[0], tangent };
+  pw_error error = { 0 };
+  pw_branch b;
+  int folds = 0, points = 0;
+  (void)state;
+  continuation_open (&b, &cubic_equations);
+  check_ok (pw_branch_solve (&b, u, &error), &error);
+  check_close ("x", u[0] * u[0] * u[0] - u[0], -5, 1e-12, "the tolerance");
+  check_close ("z", u[1], 0.7, 1e-15, "it stays by its condition");
+  check_ok (pw_branch_start (&b, u, 1, &error), &error);
+  for (; b.at.u[2] < 1 || b.at.u[0] < 1; points++) {
+    assert_true (points < 1000);
+    check_ok (pw_branch_step (&b, &error), &error);
+    check_close ("p", b.at.u[2], pow (b.at.u[0], 3) - b.at.u[0], 1e-12, "the tolerance");
+    assert_true (fabs (b.at.u[2] - b.before.u[2]) < 0.2); /* predicted: 0.1 */
+    assert_true (b.at.u[0] > b.before.u[0]);
+    if (!b.folded) continue;
+    fold.u = at[folds];
+    check_ok (pw_branch_locate (&b, pw_branch_fold, &b, 1e-10, &fold, &error), &error);
+    check_close ("x", fold.u[0], -next / sqrt (3), 1e-9, "10 times the accuracy asked, steps < 1");
+    check_close ("p", fold.u[2], next * 2 / sqrt (27), 1e-12, "quadratic at the fold");
+    folds++, next = -1;
+  }
+  assert_int_equal (folds, 2);
+  pw_branch_close (&b);
+}
+
+/* With p decreasing from the same point x decreases, and steps grow without curvature. */
+static void test_direction (void **state) {
+  double u[3] = { -2, 0, -6 };
+  pw_error error = { 0 };
+  pw_branch b;
+  (void)state;
+  continuation_open (&b, &cubic_equations);
+  check_ok (pw_branch_start (&b, u, -1, &error), &error);
+  check_ok (pw_branch_step (&b, &error), &error);
+  assert_true (b.at.u[2] < -6 && b.at.u[0] < -2);
+  pw_branch_close (&b);
+}
+
+/* dF/dx vanishes at a fold: the branch cannot start there by its parameter. */
+static void test_start_at_fold (void **state) {
+  double u[3] = { -1 / sqrt (3), 0, 2 / sqrt (27) };
+  pw_error error = { 0 };
+  pw_branch b;
+  (void)state;
+  continuation_open (&b, &cubic_equations);
+  assert_int_equal (pw_branch_start (&b, u, 1, &error), PW_RETRY);
+  pw_branch_close (&b);
+}
+
+/* Where F cannot be evaluated, the branch ends with PW_RETRY, just before. */
+static void test_end (void **state) {
+  double u[3] = { 4.8, 0, 4.8 * 4.8 * 4.8 - 4.8 };
+  pw_error error = { 0 };
+  pw_branch b;
+  int status = PW_OK;
+  (void)state;
+  continuation_open (&b, &cubic_equations);
+  b.most = 100;
+  check_ok (pw_branch_start (&b, u, 1, &error), &error);
+  while (status == PW_OK) status = pw_branch_step (&b, &error);
+  assert_int_equal (status, PW_RETRY);
+  check_close ("x", b.at.u[0], 5, 1e-6, "the least step, of which x has a part");
+  pw_branch_close (&b);
+}
+
+static int without_solution (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  (void)context, (void)error;
+  F[0] = u[0] * u[0] + 1;
+  if (dF) dF[0] = 2 * u[0];
+  return PW_OK;
+}
+
+/* No solution: the residual where it stopped is that of the nearest miss. */
+static void test_without_solution (void **state) {
+  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = without_solution };
+  double u[2] = { 3, 0 };
+  pw_error error = { 0 };
+  pw_branch b;
+  (void)state;
+  continuation_open (&b, &of);
+  assert_int_equal (pw_branch_solve (&b, u, &error), PW_RETRY);
+  assert_true (b.residual >= 1 && b.residual < 2);
+  pw_branch_close (&b);
+}
+
+/* Far from the solution a full step diverges: atan (x - p). */
+static int steep (void *context, const double *u, double *F, double *dF, pw_error *error) {
+  double y = u[0] - u[1];
+  (void)context, (void)error;
+  F[0] = atan (y);
+  if (dF) dF[0] = 1 / (1 + y * y), dF[1] = -dF[0];
+  return PW_OK;
+}
+
+static void test_damping (void **state) {
+  const pw_branch_equations of = { .unknowns = 1, .equations = 1, .tolerance = 1e-12, .evaluate = steep };
+  double u[2] = { 5, 0.5 };
+  pw_error error = { 0 };
+  pw_branch b;
+  (void)state;
+  continuation_open (&b, &of);
+  check_ok (pw_branch_solve (&b, u, &error), &error);
+  check_close ("x", u[0], 0.5, 1e-12, "the tolerance; slope 1");
+  pw_branch_close (&b);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_folds), cmocka_unit_test (test_direction),        cmocka_unit_test (test_start_at_fold),
+    cmocka_unit_test (test_end),   cmocka_unit_test (test_without_solution), cmocka_unit_test (test_damping)
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
