@@ -35,6 +35,7 @@ SYSTEM := -isystem $(SUITESPARSE)
 SOLVER_LIBS := -lsundials_idas -lsundials_cvodes -lsundials_nvecserial -lsundials_sunlinsolklu \
                -lsundials_sunmatrixsparse -lklu -lamd -llapacke -lm
 FILES_LIBS  := -lfyaml -ldl -lm
+CLI_LIBS    := -lpopt -lgsl -lgslcblas -lnlopt
 LINK         = $(CC) $(CFLAGS) $(SAN) $(LDFLAGS) -Wl,--as-needed
 SHARED       = $(LINK) -shared -Wl,--no-undefined
 
@@ -148,6 +149,7 @@ ALL_LAYERS := $(CORE_LAYERS) $(FILE_LAYERS) $(SOLVER_LAYERS)
 # Libraries below call functions that tests wrap.
 $(BUILD)/obj/tests/%.o:      STRICT += -fvisibility=default
 $(BUILD)/obj/tests/%.o:      INCLUDE := $(call layer,tests/support tests/faults tests/solvers $(ALL_LAYERS)) $(SYSTEM)
+$(BUILD)/obj/tests/cli/test_outcome.o: INCLUDE := $(call layer,tests/support $(ALL_LAYERS) core/cli/analyse)
 $(BUILD)/obj/tests/fuzz/%.o: INCLUDE := $(call layer,tests/fuzz $(ALL_LAYERS) $(CLI_LAYERS))
 $(BUILD)/obj/benchmarks/%.o: INCLUDE := -I$(BUILD)/include
 $(BUILD)/obj/benchmarks/engine.o $(addprefix $(BUILD)/obj/benchmarks/,eighth.o effects.o peers.o) $(BUILD)/obj/benchmarks/engine/%.o $(BUILD)/obj/benchmarks/baseline/%.o: INCLUDE := $(call layer,$(ALL_LAYERS) benchmarks) $(SYSTEM)
@@ -234,7 +236,7 @@ HOUSE_LIBS = -L$(BUILD) -lpinwheel-files -lpinwheel
 
 $(PROGRAM): $(CLI_OBJ) $(BASE_OBJ) $(LIB) $(FILES_LIB)
 	$(call say,LINK)
-	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(BASE_OBJ) $(HOUSE_LIBS) -lpopt -lm
+	$(Q)$(LINK) $(THREADS) -Wl,-rpath,'$$ORIGIN:$$ORIGIN/../lib' -o $@ $(CLI_OBJ) $(BASE_OBJ) $(HOUSE_LIBS) $(CLI_LIBS) -lm
 
 # Benchmarks that look inside have the libraries whole, as tests do.
 WHOLE := -Wl,--whole-archive $(FILES_LIB:.so=.a) $(LIB:.so=.a) -Wl,--no-whole-archive $(FILES_LIBS) $(SOLVER_LIBS)
@@ -264,7 +266,7 @@ $(TESTS) $(SLOWS): $(BUILD)/tests/%: $$(call test_obj,$$*) $(BUILD)/libtests.a $
 	@mkdir -p $(@D)
 	$(call say,LINK)
 	$(Q)$(LINK) $(WRAP) -rdynamic -Wl,-u,limit_begin -o $@ $(filter %.o,$^) $(BUILD)/libtests.a \
-	  $(WHOLE) -lcmocka -lpopt
+	  $(WHOLE) -lcmocka $(CLI_LIBS)
 
 $(BUILD)/tests/test_embed: | $(BUILD)/docs/embed
 
@@ -280,6 +282,7 @@ $(BUILD)/tests/test_cli_faults: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$
 $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: WRAP = -pthread $(addprefix -Wl$(comma)--wrap=,$(ALLOC_WRAP))
 $(BUILD)/tests/test_cli_faults $(BUILD)/tests/test_memory $(BUILD)/tests/slow_memory: $(filter-out %/main.o,$(CLI_OBJ))
 $(BUILD)/tests/test_cli_limits: $(call obj,core/cli/progress.c)
+$(BUILD)/tests/test_outcome: $(call obj,core/cli/analyse/outcome.c core/cli/analyse/functional.c core/cli/stop.c core/cli/progress.c)
 # This every call of the libraries below.
 $(BUILD)/tests/test_faults: WRAP = $(shell sed -n 's/^FAULT_[A-Z]* .[^,]*, \([A-Za-z_]*\),.*/-Wl,--wrap=\1/p' tests/faults/test_faults.c)
 # A part of SUNDIALS that Pinwheel does not use, to compare with.
@@ -290,7 +293,7 @@ $(FUZZERS): $(BUILD)/fuzz/%: $(BUILD)/obj/tests/fuzz/%.o $(call obj,$(FUZZ_SHARE
 	@mkdir -p $(@D)
 	$(call say,LINK)
 	$(Q)$(LINK) -pthread -rdynamic -o $@ $(filter %.o,$^) -Wl,--whole-archive $(filter %.a,$^) -Wl,--no-whole-archive \
-	  $(FILES_LIBS) $(SOLVER_LIBS) -lpopt
+	  $(FILES_LIBS) $(SOLVER_LIBS) $(CLI_LIBS)
 
 # ---- Running things ----
 

@@ -11,7 +11,7 @@
 CC=${CC:-cc} BUILD=${BUILD:-build}
 [ -z "$NO_DEPS" ] || { echo "deps: skipped (NO_DEPS=$NO_DEPS)"; exit 0; }
 
-fresh= needs='cc sundials suitesparse lapacke libfyaml popt cmocka gnuplot'
+fresh= needs='cc sundials suitesparse lapacke libfyaml popt gsl nlopt cmocka gnuplot'
 for word; do
   case $word in
   fresh) fresh=1 ;;
@@ -63,6 +63,14 @@ C
 #include <popt.h>
 int try_popt (void) { return poptGetContext && poptGetNextOpt; }
 C
+  gsl) cat <<'C' ;;
+#include <gsl/gsl_multifit_nlinear.h>
+int try_gsl (void) { return gsl_multifit_nlinear_alloc && gsl_multifit_nlinear_default_parameters; }
+C
+  nlopt) cat <<'C' ;;
+#include <nlopt.h>
+int try_nlopt (void) { return nlopt_create && nlopt_optimize; }
+C
   cmocka) cat <<'C' ;;
 #include <stdarg.h>
 #include <stddef.h>
@@ -79,6 +87,7 @@ libs_of () {
   sundials) echo -lsundials_idas -lsundials_cvodes -lsundials_arkode -lsundials_nvecserial -lsundials_sunlinsolklu -lsundials_sunmatrixsparse ;;
   suitesparse) echo -lklu -lamd ;;
   libfyaml) echo -lfyaml ;;
+  gsl) echo -lgsl -lgslcblas ;;
   *) echo "-l$1" ;;
   esac
 }
@@ -128,6 +137,7 @@ package_of () {
   # unverified from here on
   dnf-cc) echo gcc ;;
   dnf-lapacke) echo lapack-devel ;;
+  dnf-nlopt) echo NLopt-devel ;;
   dnf-cmocka) echo libcmocka-devel ;;
   dnf-gnuplot) echo gnuplot ;;
   dnf-clang) echo clang ;;

@@ -75,6 +75,19 @@ int pw_read_number (const char *text, double *value);
 /* The same, and expressions of numbers as in text models: "30*deg", "2*pi/3". */
 int pw_read_expression (const char *text, double *value);
 
+/* ---- Formulas: expressions of named numbers, the same language (formula.c) ---- */
+
+typedef struct pw_formula pw_formula;
+
+/* Reads an expression of the names, which end with NULL, at most PW_FORMULA_NAMES.  NULL and PW_INPUT with the reason, or
+ * PW_RESOURCE. */
+#define PW_FORMULA_NAMES 32
+pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error);
+/* The value, which may be non-finite, for values of the names; its derivative with respect to name `by`. */
+double pw_formula_value (const pw_formula *f, const double *value);
+double pw_formula_derivative (const pw_formula *f, const double *value, int by);
+void pw_formula_close (pw_formula *f);
+
 /* ---- Units in the headers of tables, "NAME [UNIT]" (units.c) ---- */
 
 /* Finds the factor from a unit to SI units; PW_INPUT if it is unknown, PW_RETRY if its dimension is not that of

@@ -1,0 +1,99 @@
+/* The OUTPUT of analyses: a number that a run yields.
+ *
+ *   OUTPUT   an expression of [final:|max:|min:|mean:|integral:|rms:]COLUMN, such as "frame.x / rider.work"
+ *   COLUMN   a column of the table of `run`, or the total work or loss
+ *
+ * A column's final value, greatest value or mean over the run is a functional of it.  Its accuracy is that of the run:
+ * extrema and integrals are evaluated inside the steps. */
+#ifndef PW_OUTCOME_H
+#define PW_OUTCOME_H
+
+#include "pinwheel-files.h"
+#include "pinwheel-solvers.h"
+
+/* Columns of the table of `run`. */
+typedef enum {
+  PW_COLUMN_TIME,
+  PW_COLUMN_STATE,
+  PW_COLUMN_CONTACT,
+  PW_COLUMN_REACTION,
+  PW_COLUMN_POSITION, /* residuals */
+  PW_COLUMN_VELOCITY,
+  PW_COLUMN_KINETIC, /* energies; those after PW_COLUMN_POTENTIAL need pw_settings.ledger */
+  PW_COLUMN_POTENTIAL,
+  PW_COLUMN_LEDGER,
+  PW_COLUMN_PROJECTION,
+  PW_COLUMN_BALANCE,
+  PW_COLUMN_WORK, /* totals; not in the table */
+  PW_COLUMN_LOSS,
+  PW_COLUMN_TYPES
+} pw_column_type;
+
+typedef struct {
+  pw_column_type type;
+  int index; /* state, contact (2 i for x), constraint equation, entry of the ledger */
+} pw_column;
+
+/* The column of this name; `what` begins the message ("--of max:B.Fx").  PW_INPUT with the nearest name. */
+int pw_column_find (const pw_system *s, const char *name, const char *what, pw_column *c, pw_error *error);
+const char *pw_column_unit (const pw_system *s, pw_column c);
+/* Its value in a sample, or its derivative if the sample contains derivatives: columns are linear in the sample, except
+ * contact points, for which it is NaN. */
+double pw_column_value (const pw_system *s, pw_column c, const pw_sample *sample);
+
+typedef enum { PW_FINAL, PW_MAX, PW_MIN, PW_MEAN, PW_INTEGRAL, PW_RMS } pw_functional_type;
+
+#define PW_FUNCTIONAL_TIMES 9
+
+/* A functional of a column.  Its derivative is the sum of weight x derivative of the column at the nodes. */
+typedef struct {
+  pw_functional_type type;
+  pw_column column;
+  double value; /* so far; after pw_outcomes_end that of the run */
+  double t;     /* time of the extremum, or of the end [s] */
+  int nodes, room;
+  struct pw_node {
+    double t, weight;
+  } * node;                       /* in the order of time; integrals only with `record` */
+  double at[PW_FUNCTIONAL_TIMES]; /* private: the column in the last step */
+} pw_functional;
+
+typedef struct {
+  const char *text;
+  pw_formula *formula; /* of the functionals term[0], term[1], ...; NULL: term[0] itself */
+  int term[PW_FORMULA_NAMES], terms;
+} pw_outcome;
+
+typedef struct {
+  const pw_system *system;
+  pw_outcome *outcome;
+  int outcomes;
+  pw_functional *functional; /* each once */
+  int functionals;
+  int ledger; /* 1: runs need pw_settings.ledger */
+  int record; /* set by the caller: keep the nodes of integrals */
+  /* private */
+  double t0, t;
+  pw_workspace *workspace; /* for contact points */
+  double (*contact)[3];
+} pw_outcomes;
+
+/* Reads texts for a system, which must outlive them like the texts; option: "--of".  Close them in every case.
+ * PW_INPUT for an unknown column, with the nearest name, or an invalid expression; PW_RESOURCE. */
+int pw_outcomes_open (pw_outcomes *x, const pw_system *s, const char *option, const char *const *text, int count,
+                      pw_error *error);
+void pw_outcomes_close (pw_outcomes *x);
+
+/* Call them after opening a run, after each step, and at the end.  Statuses of pw_run_sample. */
+int pw_outcomes_start (pw_outcomes *x, pw_run *r, pw_error *error);
+int pw_outcomes_step (pw_outcomes *x, pw_run *r, pw_error *error);
+int pw_outcomes_end (pw_outcomes *x, pw_run *r, pw_error *error);
+/* All of it: a run to t_end.  A run that was stopped fails as pw_limit_fail says; settings.stop_context is a pw_limit. */
+int pw_outcomes_run (pw_outcomes *x, const char *method, const pw_settings *settings, double t_end, pw_error *error);
+
+/* The value after the end.  gradient, unless NULL, receives its derivatives with respect to all functionals. */
+double pw_outcome_value (const pw_outcomes *x, int outcome, double *gradient);
+/* Its unit, in the buffer; "" of expressions. */
+const char *pw_outcome_unit (const pw_outcomes *x, int outcome, char *buffer, size_t size);
+
+#endif

@@ -1,0 +1,40 @@
+/* Formulas: expressions for programs, which read them from a command line. */
+#include <stdlib.h>
+#include "expression.h"
+#include "pinwheel-files.h"
+
+struct pw_formula {
+  pw_arena arena;
+  const pw_expression *expression;
+};
+
+pw_formula *pw_formula_open (const char *text, const char *const *names, pw_error *error) {
+  pw_expression_error why;
+  int status = PW_RESOURCE, count = 0;
+  while (names[count]) count++;
+  if (count > PW_FORMULA_NAMES) {
+    pw_fail (error, PW_INPUT, "more than %d names", PW_FORMULA_NAMES);
+    return NULL;
+  }
+  pw_formula *f = calloc (1, sizeof *f);
+  if (f) status = pw_expression_read (NULL, names, text, &f->arena, &f->expression, &why);
+  if (status == PW_OK) return f;
+  pw_fail (error, status, "%s", status == PW_INPUT ? why.text : "out of memory");
+  pw_formula_close (f);
+  return NULL;
+}
+
+double pw_formula_value (const pw_formula *f, const double *value) {
+  return pw_expression_value (f->expression, value);
+}
+
+double pw_formula_derivative (const pw_formula *f, const double *value, int by) {
+  double u[3];
+  pw_expression_derivatives (f->expression, value, by, u);
+  return u[1];
+}
+
+void pw_formula_close (pw_formula *f) {
+  if (f) pw_arena_free (&f->arena);
+  free (f);
+}

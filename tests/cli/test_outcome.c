@@ -1,0 +1,156 @@
+/* Outputs of analyses: functionals of columns against closed forms, with methods of short and long steps; their texts. */
+#include <math.h>
+#include "check.h"
+#include "cli.h"
+#include "outcome.h"
+
+/* A wheel turned by cos (w t): phi = (1 - cos (w t)) / w^2, omega = sin (w t) / w.  A slider on which a force acts that
+ * grows and drops: the reaction is -t until t = 0.7, then 0. */
+static const char model[] = "pinwheel: 1\n"
+                            "about: functionals with closed forms\n"
+                            "parameters: [{name: w, value: 3}]\n"
+                            "bodies: [{name: wheel, mass: 1, inertia: 1}, {name: block-a, mass: 1, inertia: 1}]\n"
+                            "elements:\n"
+                            "  - {pin: P, body: [wheel, ground], at: [[0, 0], [0, 0]]}\n"
+                            "  - {pin: Q, body: [block-a, ground], at: [[0, 0], [0, 0]]}\n"
+                            "  - {torque: motor-1, body: [wheel, ground], value: {expression: cos(w*t)}}\n"
+                            "  - {force: push, body: block-a, at: [0, 0],\n"
+                            "     fx: {expression: 't < 0.7 ? t : 0'}}\n";
+
+static pw_file *file;
+static pw_model *built;
+static pw_system *s;
+
+static int outcome_setup (void **state) {
+  char path[4096];
+  pw_error error = { 0 };
+  if (cli_setup (state) != 0) return 1;
+  cli_write ("functionals.yaml", model);
+  cli_expand ("@/functionals.yaml", path, sizeof path);
+  file = pw_file_open (path, &error);
+  built = file ? pw_file_model (file, &error) : NULL;
+  if (built && pw_model_build (built, &error) == PW_OK) s = pw_system_compile (built, &error);
+  if (s == NULL) print_message ("%s\n", error.text);
+  return s == NULL;
+}
+
+static int outcome_teardown (void **state) {
+  pw_system_free (s);
+  pw_model_free (built);
+  pw_file_close (file);
+  return cli_teardown (state);
+}
+
+static double outcome_run (const char *text, const char *method, double step, double rtol, double t_end) {
+  pw_outcomes x;
+  pw_error error = { 0 };
+  check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, &error), &error);
+  pw_settings settings = { .step = step, .rtol = rtol, .span = t_end, .ledger = x.ledger };
+  check_ok (pw_outcomes_run (&x, method, &settings, t_end, &error), &error);
+  double value = pw_outcome_value (&x, 0, NULL);
+  pw_outcomes_close (&x);
+  return value;
+}
+
+/* ---- Values ---- */
+
+/* At t = 4, w = 3. */
+static void test_functionals (void **state) {
+  (void)state;
+  const double w = 3, t = 4, phi = (1 - cos (w * t)) / (w * w), area = (t - sin (w * t) / w) / (w * w);
+  const struct {
+    const char *text;
+    double value;
+  } expected[] = {
+    { "wheel.phi", phi },
+    { "final:wheel.phi", phi },
+    { "max:wheel.phi", 2 / (w * w) },
+    { "min:wheel.omega", -1 / w },
+    { "max:wheel.omega", 1 / w },
+    { "max:t", t },
+    { "integral:wheel.phi", area },
+    { "mean:wheel.phi", area / t },
+    { "rms:wheel.omega", sqrt ((t / 2 - sin (2 * w * t) / (4 * w)) / t) / w },
+    { "max:motor-1.work", 1 / (2 * w * w) },
+    { "work", pow (sin (w * t) / w, 2) / 2 },
+    { "wheel.phi/max:wheel.phi - 2*sin(pi/6)", phi / (2 / (w * w)) - 1 },
+    { "max(wheel.phi, 7) + max:wheel.phi-wheel.phi", 7 + 2 / (w * w) - phi },
+    { "2e-1*motor-1.work", 0.1 * pow (sin (w * t) / w, 2) },
+  };
+  static const struct {
+    const char *method;
+    double step, rtol, bound;
+    const char *reason;
+  } way[] = {
+    { "rk4", 0.01, 0, 1e-7, "(w h)^4, 0.8e-6, times the constant 1/120 of the method and a few periods" },
+    { "erk8", 0, 1e-12, 1e-10, "100 rtol, and 3e-11 of quadratures" },
+    { "radau", 0, 1e-9, 1e-7, "100 rtol" },
+    { "bdf", 0, 1e-8, 1e-5, "error of 1000 steps" },
+  };
+  for (size_t k = 0; k < sizeof way / sizeof *way; k++)
+    for (size_t i = 0; i < sizeof expected / sizeof *expected; i++)
+      check_close (expected[i].text, outcome_run (expected[i].text, way[k].method, way[k].step, way[k].rtol, t),
+                   expected[i].value, way[k].bound, way[k].reason);
+}
+
+/* Each step ends at the jump, where the value has its limit from the right. */
+static void test_jump (void **state) {
+  (void)state;
+  static const char *const method[] = { "rk4", "erk8", "radau" };
+  for (int i = 0; i < 3; i++) {
+    check_close ("least reaction", outcome_run ("min:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7, 1e-9, "1e-12 of a step");
+    check_close ("mean reaction", outcome_run ("mean:Q.Fx", method[i], 0.03, 1e-9, 2), -0.7 * 0.35 / 2, 1e-9, "exact");
+  }
+}
+
+/* The weights give the integral of another column. */
+static void test_nodes (void **state) {
+  (void)state;
+  const char *text = "integral:wheel.phi * 2 + max:wheel.phi";
+  pw_outcomes x;
+  pw_error error = { 0 };
+  double gradient[2];
+  check_ok (pw_outcomes_open (&x, s, "--of", &text, 1, &error), &error);
+  x.record = 1;
+  check_ok (pw_outcomes_run (&x, "erk8", &(pw_settings){ .rtol = 1e-10, .span = 2 }, 2, &error), &error);
+  assert_int_equal (x.functionals, 2);
+  pw_outcome_value (&x, 0, gradient);
+  check_close ("derivative", gradient[0], 2, 0, "exact");
+  check_close ("derivative", gradient[1], 1, 0, "exact");
+  const pw_functional *f = x.functional;
+  double sum = 0;
+  for (int i = 0; i < f->nodes; i++) sum += f->node[i].weight * sin (f->node[i].t);
+  check_close ("weights", sum, 1 - cos (2), 1e-11, "formula of degree 9");
+  assert_int_equal (f[1].nodes, 1);
+  check_close ("time of the maximum", f[1].node[0].t, PW_PI / 3, 1e-7, "sqrt (eps) and the error of the run");
+  pw_outcomes_close (&x);
+}
+
+/* ---- Texts ---- */
+
+static void test_bad (void **state) {
+  (void)state;
+  static const struct {
+    const char *text, *message;
+  } bad[] = {
+    { "", "--of is empty: expected a column, such as frame.x" },
+    { "wheel.phy", "--of wheel.phy: no column \"wheel.phy\"; did you mean \"wheel.phi\"?" },
+    { "max:motor-2.work", "--of max:motor-2.work: no column \"motor-2.work\"; did you mean \"motor-1.work\"?" },
+    { "wheel.phi/works", "--of wheel.phi/works: no column \"works\"; did you mean \"work\"?" },
+    { "maxi:wheel.phi", "--of maxi:wheel.phi: no \"maxi:\"; valid are final:, max:, min:, mean:, integral: and rms:" },
+    { "wheel.phi +", "--of wheel.phi +: something is missing after \"+\"" },
+  };
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    pw_outcomes x;
+    pw_error error = { 0 };
+    assert_int_equal (pw_outcomes_open (&x, s, "--of", &bad[i].text, 1, &error), PW_INPUT);
+    check_error (&error, PW_INPUT, bad[i].message);
+    pw_outcomes_close (&x);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_functionals), cmocka_unit_test (test_jump),
+                                      cmocka_unit_test (test_nodes), cmocka_unit_test (test_bad) };
+  return cmocka_run_group_tests (tests, outcome_setup, outcome_teardown);
+}
