@@ -72,6 +72,9 @@ TESTS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK)))
 SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
+# The engine of interactive pages, if there are tools to compile it.
+WASM_CC   ?= clang
+PAGE      := $(if $(and $(shell command -v $(WASM_CC)),$(shell command -v wasm-ld),$(wildcard /usr/include/wasm32-wasi/stdio.h)),$(addprefix $(BUILD)/page/,libpinwheel-page.a pinwheel.wasm))
 
 # Targets of fuzzing; with replay.c they are programs that take files.
 FUZZ_SHARE := tests/fuzz/fuzz.c $(if $(FUZZING),,tests/fuzz/replay.c)
@@ -83,7 +86,7 @@ FUZZERS    := $(FUZZ:tests/fuzz/%.c=$(BUILD)/fuzz/%)
 .DELETE_ON_ERROR:
 .SECONDARY:
 
-all: $(LIB) $(FILES_LIB) $(LIB:.so=.a) $(FILES_LIB:.so=.a) $(INCLUDES) $(PLUGINS) $(PROGRAM)
+all: $(LIB) $(FILES_LIB) $(LIB:.so=.a) $(FILES_LIB:.so=.a) $(INCLUDES) $(PLUGINS) $(PROGRAM) $(PAGE)
 
 everything: all $(TESTS) $(SLOWS) $(PROGRAMS) $(FUZZERS)
 
@@ -91,6 +94,7 @@ help:
 	@echo 'make                  the libraries, the program and the models, into $(BUILD)/; everything: tests and benchmarks too'
 	@echo 'make deps             install the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
+	@echo 'make gallery          pages that simulate the models in a browser, in $(BUILD)/site/'
 	@echo 'make test             the tests; test-all: the slow ones too'
 	@echo 'make bench            everything that is measured, about seven minutes; goes on where it was stopped'
 	@echo 'make bench-quick      what a run costs on this machine'
@@ -140,6 +144,8 @@ $(BUILD)/obj/core/files/expression/%.o: INCLUDE := $(call layer,core core/base c
 $(BUILD)/obj/core/cli/%.o:   INCLUDE := $(call layer,core core/base core/files solvers $(CLI_LAYERS))
 $(call obj,core/cli/plot/animate.c core/cli/plot/figure.c core/cli/inspect/new.c): INCLUDE += $(addprefix -iquote $(BUILD)/obj/core/cli/,plot inspect)
 $(call obj,core/cli/inspect/new.c): $(BUILD)/obj/core/cli/inspect/new.inc
+$(call obj,core/cli/page/page.c): $(BUILD)/obj/core/cli/page/page.inc
+$(call obj,core/cli/page/page.c): INCLUDE += -iquote $(BUILD)/obj/core/cli/page
 $(call obj,core/cli/plot/animate.c): $(BUILD)/obj/core/cli/plot/animate.inc
 $(call obj,core/cli/plot/figure.c): $(BUILD)/obj/core/cli/plot/templates.inc
 $(call obj,core/specialise/sources.c): $(BUILD)/obj/core/specialise/sources.inc
@@ -177,10 +183,38 @@ $(BUILD)/obj/core/cli/inspect/new.inc: $(wildcard core/cli/inspect/*.in)
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const $$(basename $$f .in | tr .- _)[] = {"; $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
 
+$(BUILD)/obj/core/cli/page/page.inc: core/cli/page/page.html core/cli/page/page.js
+	@mkdir -p $(@D)
+	@for f in $^; do echo "static const char *const $$(basename $$f | tr .- __)[] = {"; $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
+
 $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp)
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const figure_$$(basename $$f .gp | tr - _)[] = {"; \
 	  $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
+
+# The engine of interactive pages, WebAssembly: what integrates with rk4, erk5 and erk8, without libraries.
+WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \
+  -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8)' \
+  $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
+WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/implicit/% solvers/sundials/%,$(CORE) $(SOLVERS)) \
+  $(filter-out core/files/yaml/yaml_tree.c,$(wildcard core/files/expression/*.c core/files/yaml/*.c)) \
+  $(addprefix core/files/,number.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_figures.c animate.c) \
+  $(wildcard core/cli/page/engine/*.c)
+WASM_OBJ   := $(WASM:%.c=$(BUILD)/wasm/%.o)
+
+$(BUILD)/wasm/%.o: %.c $(BUILD)/obj/core/cli/plot/animate.inc $(BUILD)/obj/core/specialise/sources.inc | $(FIRST)
+	@mkdir -p $(@D)
+	$(call say,WASM)
+	$(Q)$(WASM_CC) $(WASM_FLAGS) -MMD -MP -c $< -o $@
+$(BUILD)/wasm/core/specialise/%.o: WASM_FLAGS += -iquote $(BUILD)/obj/core/specialise
+-include $(WASM_OBJ:.o=.d)
+
+$(BUILD)/page/libpinwheel-page.a: $(WASM_OBJ)
+	@mkdir -p $(@D)
+	@rm -f $@
+	$(Q)$(AR) rcs $@ $^
+$(BUILD)/page/pinwheel.wasm: $(BUILD)/page/libpinwheel-page.a
+	$(Q)$(WASM_CC) $(WASM_FLAGS) -mexec-model=reactor -Wl,--gc-sections,--allow-undefined,--strip-all,-z,stack-size=1048576,--whole-archive $< -Wl,--no-whole-archive -o $@
 
 # Texts of the sources that specialised scenes contain.
 SPECIALISED := core/specialise/specialised.h core/base/sine.h $(wildcard core/specialise/*.inc core/kinds/*.h core/kinds/*/*.c)
@@ -311,6 +345,9 @@ demo: all $(BUILD)/benchmarks/demo
 	@$(PROGRAM) run ezyroller --energy --every 0.02 -o $(BUILD)/demo/ezyroller.csv --json $(BUILD)/demo/ezyroller.json \
 	  --plots $(BUILD)/demo
 	@echo 'figures and data: $(BUILD)/demo/'
+
+gallery: all
+	@sh core/cli/page/gallery.sh $(PROGRAM) models $(BUILD)/site
 
 bench: all basic $(addprefix $(BUILD)/benchmarks/,eighth peers engine effects)
 	@sh benchmarks/suite.sh $(BUILD)
@@ -452,6 +489,7 @@ install: all
 	  install -m 644 $(BUILD)/$$l.a "$(D)/lib" || exit 1; done
 	install -m 644 $(HEADERS) "$(D)/include/pinwheel"
 	install -m 644 $(PLUGINS) "$(D)/lib/pinwheel/models"
+	for f in $(PAGE); do install -Dm 644 $$f "$(D)/lib/pinwheel/page/$${f##*/}" || exit 1; done
 	for m in $(MAN); do install -m 644 $$m "$(D)/share/man/man$${m##*.}" || exit 1; done
 	echo "$$PKGCONFIG" >"$(D)/lib/pkgconfig/pinwheel.pc"
 	install -m 644 README.md "$(D)/$(share)"
@@ -462,10 +500,10 @@ install: all
 # Removes what install put there and the directories that only Pinwheel uses, if they are empty.
 uninstall:
 	[ ! -d "$(D)" ] || { cd "$(D)" && rm -f bin/pinwheel lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc \
-	  $(addprefix include/pinwheel/,$(notdir $(HEADERS))) $(addprefix lib/pinwheel/models/,$(notdir $(PLUGINS))) \
+	  $(addprefix include/pinwheel/,$(notdir $(HEADERS))) $(addprefix lib/pinwheel/models/,$(notdir $(PLUGINS))) $(addprefix lib/pinwheel/page/,$(notdir $(PAGE))) \
 	  $(foreach m,$(MAN),share/man/man$(subst .,,$(suffix $(m)))/$(notdir $(m))) \
 	  $(addprefix $(share)/,$(DOCS) $(FIGURES)) $(addprefix $(share)/examples/,$(notdir $(EXAMPLES))) && \
-	  { rmdir include/pinwheel lib/pinwheel/models lib/pinwheel $(share)/docs/figures $(share)/docs $(share)/examples \
+	  { rmdir include/pinwheel lib/pinwheel/models lib/pinwheel/page lib/pinwheel $(share)/docs/figures $(share)/docs $(share)/examples \
 	    $(share) 2>/dev/null || true; }; }
 
 clean:

@@ -1,10 +1,11 @@
 #!/bin/sh
 # Checks what Pinwheel needs and installs only what is missing, with the system's package manager.
 #
-#   deps.sh [fresh] [style] [browser] [slurm] [reference]
+#   deps.sh [fresh] [style] [browser] [slurm] [reference] [page]
 #
 # fresh: do not trust the last result; style: clang and clang-format too; browser: one that can run without a screen, for
-# the tests of animations; slurm: for tests/scripts/slurm.sh; reference: Python's numpy and scipy, for tests/reference/reference.sh.
+# the tests of animations; slurm: for tests/scripts/slurm.sh; reference: Python's numpy and scipy, for tests/reference/reference.sh; page: a compiler for
+# WebAssembly, for interactive pages.
 #
 # Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
 
@@ -19,6 +20,7 @@ for word; do
   browser) needs="$needs chromium" ;;
   slurm) needs="$needs slurmctld munged" ;;
   reference) needs="$needs python3-numpy python3-scipy" ;;
+  page) needs="$needs clang wasm-ld wasi-libc wasi-builtins" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
   esac
 done
@@ -110,7 +112,9 @@ look () {
   for n in $needs; do
     case $n in
     cc) links || missing="$missing $n" ;;
-    gnuplot | clang | clang-format | chromium) command -v "$n" >/dev/null || missing="$missing $n" ;;
+    gnuplot | clang | clang-format | chromium | wasm-ld) command -v "$n" >/dev/null || missing="$missing $n" ;;
+    wasi-libc) [ -f /usr/include/wasm32-wasi/stdio.h ] || missing="$missing $n" ;;
+    wasi-builtins) ls /usr/lib/llvm-*/lib/clang/*/lib/wasi/libclang_rt.builtins-wasm32.a >/dev/null 2>&1 || missing="$missing $n" ;;
     slurmctld | munged) [ -x "/usr/sbin/$n" ] || missing="$missing $n" ;;
     python3-*) "${PYTHON:-/usr/bin/python3}" -c "import ${n#python3-}" 2>/dev/null || missing="$missing $n" ;;
     *) libraries="$libraries $n" ;;
@@ -129,6 +133,9 @@ package_of () {
   apt-suitesparse) echo libsuitesparse-dev ;;
   apt-gnuplot) echo gnuplot-nox ;;
   apt-clang | apt-clang-format | apt-chromium | apt-python3-*) echo "$1" ;;
+  apt-wasm-ld) echo lld ;;
+  apt-wasi-libc) echo wasi-libc ;;
+  apt-wasi-builtins) echo libclang-rt-14-dev-wasm32 ;;
   apt-libfyaml) echo libfyaml-dev ;;
   apt-slurmctld) echo slurm-wlm ;;
   apt-munged) echo munge ;;

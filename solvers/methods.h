@@ -4,6 +4,7 @@
 
 #include "pinwheel-solvers.h"
 
+#ifndef PW_METHODS /* interactive pages have fewer */
 #define PW_METHODS   \
   PW_METHOD (rk4)    \
   PW_METHOD (erk5)   \
@@ -14,6 +15,7 @@
   PW_METHOD (radau)  \
   PW_METHOD (galpha) \
   PW_METHOD (leapfrog)
+#endif
 
 /* pw_method_parse that also returns the options, in values (PW_MAX_OPTIONS), and searches the caller's `own` methods
  * (NULL: none), too. */

@@ -25,11 +25,10 @@ typedef struct {
 int pw_search_open (pw_search *s, pw_error *error);
 void pw_search_close (pw_search *s);
 
-/* The folder with pinwheel.h that belongs to this library, malloced; NULL if there is none.  PW_OK or PW_RESOURCE. */
+/* The folder that belongs to this library and contains pinwheel.h, or this file of the engine of pages, malloced; NULL
+ * if there is none.  PW_OK or PW_RESOURCE. */
 int pw_search_include (char **include, pw_error *error);
-
-/* folder + "/" + name + ending, malloced; NULL if out of memory. */
-char *pw_path_join (const char *folder, const char *name, const char *ending);
+int pw_search_page (const char *file, char **path, pw_error *error);
 
 /* Whether a name ends in ".so" or the like, with at least one character before it. */
 int pw_ends_with (const char *name, const char *ending);
@@ -39,9 +38,11 @@ int pw_ends_with (const char *name, const char *ending);
 /* Uses a shared object, which may be deleted afterwards. */
 typedef int pw_object_user (void *context, const char *object, pw_error *error);
 
-/* Compiles a C file in a private temporary folder, calls `use` with the object, and removes both.  PW_INPUT if it does not
- * compile or there is no compiler; PW_RESOURCE; or what `use` returns. */
-int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error);
+/* Compiles a C file in a private temporary folder, calls `use` with the object, and removes both: a shared object, or
+ * WebAssembly linked with the object `page`.  PW_INPUT if it does not compile or there is no compiler; PW_RESOURCE; or what
+ * `use` returns. */
+int pw_compile_file (const char *path, const char *page, pw_object_user *use, void *context, pw_error *error);
+#define PW_PAGE_TOOLS "clang, lld, wasi-libc and libclang-rt-14-dev-wasm32 (make deps TOOLS=page)"
 
 /* Compiles generated code with all messages in a log.  PW_INPUT: no compiler; PW_METHOD: it does not compile; PW_RESOURCE. */
 int pw_compile_scene (const char *path, const char *object, const char *log, pw_error *error);
@@ -70,8 +71,14 @@ typedef struct pw_yaml pw_yaml;
 pw_yaml *pw_yaml_open (const char *path, const char *shown, size_t max_bytes, pw_error *error);
 void pw_yaml_close (pw_yaml *y);
 const pw_plugin_table *pw_yaml_table (const pw_yaml *y);
+const char *pw_yaml_text_of (const pw_yaml *y, size_t *size);
+/* Writes the tree as bytes, for programs without libfyaml (yaml_stored.c). */
+void pw_yaml_write_tree (const pw_yaml *y, FILE *f);
 /* As pw_file_tables. */
 int pw_yaml_tables (const pw_yaml *y, int (*each) (void *context, const char *path), void *context);
+
+/* The text model of a file; NULL for a compiled one. */
+const pw_yaml *pw_file_yaml (const pw_file *f);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
@@ -92,6 +99,9 @@ typedef struct {
 extern const pw_unit_name pw_unit_names[]; /* ends with a NULL name */
 
 /* ---- Reading (read.c) ---- */
+
+/* folder + "/" + name + ending, malloced; NULL if out of memory. */
+char *pw_path_join (const char *folder, const char *name, const char *ending);
 
 /* Reads the rest of a file of at most `max_bytes` bytes into *text, malloced, zero-terminated; free it in every case. */
 int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what, char **text, size_t *size,

@@ -46,6 +46,23 @@ int pw_file_tables (const pw_file *f, int (*each) (void *context, const char *pa
 /* Calls `each` with the name and path of every model on the search path, sorted by name, until it returns non-zero. */
 int pw_file_list (int (*each) (void *context, const char *name, const char *path), void *context, pw_error *error);
 
+/* ---- Interactive pages ---- */
+
+/* What a page needs to simulate a model in the browser, as bytes.  Errors: PW_INPUT if the model is a .so without its
+ * source, does not compile to WebAssembly, or tools for that are missing, with the command that installs them;
+ * PW_RESOURCE. */
+typedef struct {
+  char *name; /* "engine", "model", "tree", or the path of a table relative to the model */
+  char *bytes;
+  size_t size;
+} pw_page_file;
+typedef struct {
+  pw_page_file *file;
+  int files;
+} pw_page;
+int pw_page_open (pw_page *p, const pw_file *f, pw_error *error);
+void pw_page_close (pw_page *p); /* in every case */
+
 /* ---- Specialised scenes ---- */
 
 /* Loaded code of a system. */

@@ -10,8 +10,6 @@ static const char *const page_lines[] = {
   NULL
 };
 
-static const char page_mark[] = "/* DATA */";
-
 /* ---- JavaScript literals ---- */
 
 /* Writes `before`, then a text in quotes, safe inside a script element. */
@@ -48,35 +46,35 @@ static void page_points (FILE *f, const char *before, const double *at, int coun
 /* ---- Shapes ---- */
 
 static void page_bodies (FILE *f, const pw_plots *p) {
-  fputs ("bodies:[", f);
+  fputs ("\"bodies\":[", f);
   for (int b = 0; b < p->bodies.shown; b++) {
     const pw_plot_body *shape = &p->shape[b];
-    page_text (f, b ? ",\n{name:" : "\n{name:", pw_plot_name (p, &p->bodies, b));
-    page_points (f, ",at:", *shape->at, shape->count, NULL);
-    page_points (f, ",spokes:", *shape->at, shape->count, shape);
-    page_points (f, ",outline:", *shape->corner, shape->corners, NULL);
+    page_text (f, b ? ",\n{\"name\":" : "\n{\"name\":", pw_plot_name (p, &p->bodies, b));
+    page_points (f, ",\"at\":", *shape->at, shape->count, NULL);
+    page_points (f, ",\"spokes\":", *shape->at, shape->count, shape);
+    page_points (f, ",\"outline\":", *shape->corner, shape->corners, NULL);
     fputc ('}', f);
   }
-  page_points (f, "],\nground:", *p->ground, p->grounds, NULL);
-  fputs (",\nwheels:[", f);
+  page_points (f, "],\n\"ground\":", *p->ground, p->grounds, NULL);
+  fputs (",\n\"wheels\":[", f);
   for (int w = 0; w < p->wheels.shown; w++) {
     int body = pw_plot_shown (p, pw_system_element (p->s, p->wheels.index[w]).body[0]);
-    page_text (f, w ? ",\n{name:" : "\n{name:", pw_plot_name (p, &p->wheels, w));
-    fprintf (f, ",body:%d,rolls:%d}", body, pw_plot_rolls (p, w));
+    page_text (f, w ? ",\n{\"name\":" : "\n{\"name\":", pw_plot_name (p, &p->wheels, w));
+    fprintf (f, ",\"body\":%d,\"rolls\":%d}", body, pw_plot_rolls (p, w));
   }
   fputs ("],\n", f);
 }
 
 static void page_links (FILE *f, const pw_plots *p) {
-  fputs ("links:[", f);
+  fputs ("\"links\":[", f);
   for (int i = 0; i < p->links; i++) {
     const pw_plot_link *link = &p->link[i];
     const pw_element_info e = pw_system_element (p->s, link->element);
-    page_text (f, i ? ",\n{name:" : "\n{name:", e.name);
-    page_text (f, ",kind:", e.kind->name);
-    fprintf (f, ",force:%d,ends:[", link->force);
+    page_text (f, i ? ",\n{\"name\":" : "\n{\"name\":", e.name);
+    page_text (f, ",\"kind\":", e.kind->name);
+    fprintf (f, ",\"force\":%d,\"ends\":[", link->force);
     for (int n = 0; n < link->ends; n++) {
-      fprintf (f, "%s{body:%d,at:[", n ? "," : "", link->end[n].body);
+      fprintf (f, "%s{\"body\":%d,\"at\":[", n ? "," : "", link->end[n].body);
       page_numbers (f, link->end[n].at, 2, 9);
       fputs ("]}", f);
     }
@@ -97,23 +95,54 @@ static void page_array (FILE *f, const pw_plots *p, const char *key, int offset,
   fputs ("],\n", f);
 }
 
-static void page_data (FILE *f, const pw_plots *p, const char *method, const char *reason) {
-  int wheels = 3 * p->wheels.shown;
+void pw_animation_scene (FILE *f, const pw_plots *p) {
   const double size = pw_plot_size (p);
-  page_text (f, "{\nmodel:", p->model);
-  page_text (f, ",\nmethod:", method);
-  page_text (f, ",\nreason:", reason);
-  fputs (",\nsize:", f);
+  fputs ("\"size\":", f);
   page_numbers (f, &size, 1, 9);
   fputs (",\n", f);
   page_bodies (f, p);
   page_links (f, p);
+}
+
+static void page_data (FILE *f, const pw_plots *p, const char *method, const char *reason) {
+  int wheels = 3 * p->wheels.shown;
+  page_text (f, "{\nmodel:", p->model);
+  page_text (f, ",\nmethod:", method);
+  page_text (f, ",\nreason:", reason);
+  fputs (",\n", f);
+  pw_animation_scene (f, p);
   page_array (f, p, "t", PLOT_T, 1, 10);
   page_array (f, p, "motion", p->bodies.offset, 6 * p->bodies.shown, 9);
   page_array (f, p, "contact", p->wheels.offset, wheels, 9);
   page_array (f, p, "force", p->wheels.offset + wheels, 2 * p->links, 6);
   page_array (f, p, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
   fputs ("}", f);
+}
+
+void pw_animation_page (FILE *f, pw_page_insert *insert, const void *context) {
+  static const char *const mark[] = { "<!-- PANEL -->", "/* BEGIN */" };
+  for (const char *const *line = page_lines; *line; line++) {
+    int i = 0;
+    while (i < 2 && strncmp (*line, mark[i], strlen (mark[i])) != 0) i++;
+    if (i < 2)
+      insert (f, (pw_page_part)i, context);
+    else
+      fputs (*line, f);
+  }
+}
+
+/* The page of one run has no panel. */
+typedef struct {
+  const pw_plots *p;
+  const char *method, *reason;
+} pw_animation;
+
+static void page_insert (FILE *f, pw_page_part part, const void *context) {
+  const pw_animation *x = context;
+  if (part != PW_PAGE_BEGIN) return;
+  fputs ("begin(", f);
+  page_data (f, x->p, x->method, x->reason);
+  fputs (");\n", f);
 }
 
 int pw_animation_check (const char *path, pw_error *error) {
@@ -128,16 +157,7 @@ int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *m
     pw_cli_say ("pinwheel: the run is too short for an animation: %s is not written\n", path);
     return 0;
   }
-  FILE *f = pw_output_stream (o);
-  for (const char *const *line = page_lines; *line; line++) {
-    const char *mark = strstr (*line, page_mark);
-    if (mark == NULL) {
-      fputs (*line, f);
-      continue;
-    }
-    fprintf (f, "%.*s", (int)(mark - *line), *line);
-    page_data (f, p, method, reason);
-    fputs (mark + sizeof page_mark - 1, f);
-  }
+  const pw_animation x = { p, method, reason };
+  pw_animation_page (pw_output_stream (o), page_insert, &x);
   return 1;
 }

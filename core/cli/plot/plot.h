@@ -38,6 +38,14 @@ int pw_animation_check (const char *path, pw_error *error);
  * run did not reach its end, or "".  Returns 0 and reports it if the run is too short. */
 int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *method, const char *reason);
 
+/* Writes what does not change in time as members of a JavaScript object: shapes, names, links. */
+void pw_animation_scene (FILE *f, const pw_plots *p);
+/* Writes animate.html; `insert` writes the parts that differ between pages: the panel of controls, and the statements
+ * that call begin() with a run. */
+typedef enum { PW_PAGE_PANEL, PW_PAGE_BEGIN } pw_page_part;
+typedef void pw_page_insert (FILE *f, pw_page_part part, const void *context);
+void pw_animation_page (FILE *f, pw_page_insert *insert, const void *context);
+
 /* ---- Private to this folder ---- */
 
 enum {

@@ -15,9 +15,9 @@ extern char **environ;
 
 enum { BUILD_WORDS = 40 };
 
-/* The command line: the words of CC, then our options. */
+/* The command line: the words of a compiler's command, then our options. */
 typedef struct {
-  char *text; /* a copy of CC, split into words */
+  char *text; /* a copy of the command, split into words */
   char *word[BUILD_WORDS];
 } build_command;
 
@@ -26,31 +26,17 @@ const char *pw_compiler (void) {
   return cc && cc[strspn (cc, " \t")] ? cc : "cc";
 }
 
-/* CC may be more than one word ("ccache gcc"); half of the array is reserved for our options. */
-static int build_words (build_command *c, const char *include, const char *source, const char *object, int generated) {
-  const char *const options[] = { "-std=c11",
-                                  "-O2",
-                                  "-ffp-contract=off",
-#ifdef __APPLE__
-                                  "-undefined",
-                                  "dynamic_lookup", /* the plug-in links to no library */
-#endif
-                                  "-fPIC",
-                                  "-shared",
-                                  generated ? PW_SCENE_FLAG : "-Wall",
-                                  "-I",
-                                  include,
-                                  "-o",
-                                  object,
-                                  source,
-                                  "-lm" };
+/* The command may be more than one word ("ccache gcc"); half of the array is reserved for our options, which end with
+ * NULL. */
+static int build_words (build_command *c, const char *compiler, const char *const *options) {
   char *rest = NULL;
   int words = 0;
-  c->text = strdup (pw_compiler ());
+  c->text = strdup (compiler);
   if (c->text == NULL) return PW_RESOURCE;
   for (char *w = strtok_r (c->text, " \t", &rest); w && words < BUILD_WORDS / 2; w = strtok_r (NULL, " \t", &rest))
     c->word[words++] = w;
-  memcpy (c->word + words, options, sizeof options);
+  do memcpy (&c->word[words++], options, sizeof *options);
+  while (*options++);
   return PW_OK;
 }
 
@@ -89,11 +75,9 @@ static int build_run (const build_command *c, const char *source, const char *lo
     return pw_fail (error, PW_RESOURCE, "cannot run the C compiler \"%s\": %s", c->word[0], strerror (code));
   if (code != 0 || (WIFEXITED (outcome) && WEXITSTATUS (outcome) == 127))
     return pw_fail (
-        error, PW_INPUT,
-        "cannot run the C compiler \"%s\" that %s%s needs (%s): install one, or name another in the environment "
-        "variable CC",
-        c->word[0], log ? "specialised code" : "the model file ", log ? "" : source,
-        code ? strerror (code) : "not found");
+        error, PW_INPUT, "cannot run the C compiler \"%s\" that %s%s needs (%s): install %s", c->word[0],
+        log ? "specialised code" : "the model file ", log ? "" : source, code ? strerror (code) : "not found",
+        strcmp (c->word[0], "clang") ? "one, or name another in the environment variable CC" : PW_PAGE_TOOLS);
   if ((!WIFEXITED (outcome) || WEXITSTATUS (outcome) != 0) && log)
     return pw_fail (error, PW_METHOD, "%s does not compile; the messages of %s are in %s", source, c->word[0], log);
   if (!WIFEXITED (outcome) || WEXITSTATUS (outcome) != 0)
@@ -112,21 +96,75 @@ char *pw_temporary_folder (pw_error *error) {
   return NULL;
 }
 
-/* Compiles a file with the folder of pinwheel.h. */
-static int build_object (const char *path, const char *object, const char *log, const sigset_t *before,
-                         pw_error *error) {
+static int build_object (const char *path, const char *compiler, const char *const *options, const char *log,
+                         const sigset_t *before, pw_error *error) {
   build_command c = { .text = NULL };
-  char *include;
-  int status = pw_search_include (&include, error);
-  if (status == PW_OK && include == NULL)
-    status = pw_fail (error, PW_INPUT,
-                      "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
-                      "\"../include/pinwheel\"",
-                      path);
-  else if (status == PW_OK && build_words (&c, include, path, object, log != NULL) != PW_OK)
-    status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) status = build_run (&c, path, log, before, error);
+  int status = build_words (&c, compiler, options);
+  if (status == PW_OK)
+    status = build_run (&c, path, log, before, error);
+  else
+    pw_fail (error, status, "out of memory");
   free (c.text);
+  return status;
+}
+
+/* The folder of pinwheel.h, malloced. */
+static int build_include (const char *path, char **include, pw_error *error) {
+  int status = pw_search_include (include, error);
+  if (status != PW_OK || *include) return status;
+  return pw_fail (error, PW_INPUT,
+                  "cannot compile %s: pinwheel.h is neither in \"include\" next to the program nor in "
+                  "\"../include/pinwheel\"",
+                  path);
+}
+
+static int build_shared (const char *path, const char *object, const char *log, const sigset_t *before,
+                         pw_error *error) {
+  char *include = NULL;
+  int status = build_include (path, &include, error);
+  const char *const options[] = { "-std=c11",
+                                  "-O2",
+                                  "-ffp-contract=off",
+#ifdef __APPLE__
+                                  "-undefined",
+                                  "dynamic_lookup", /* the plug-in links to no library */
+#endif
+                                  "-fPIC",
+                                  "-shared",
+                                  log ? PW_SCENE_FLAG : "-Wall",
+                                  "-I",
+                                  include,
+                                  "-o",
+                                  object,
+                                  path,
+                                  "-lm",
+                                  NULL };
+  if (status == PW_OK) status = build_object (path, pw_compiler (), options, log, before, error);
+  free (include);
+  return status;
+}
+
+static int build_page (const char *path, const char *engine, const char *object, const sigset_t *before,
+                       pw_error *error) {
+  char *include = NULL;
+  int status = build_include (path, &include, error);
+  const char *const options[] = {
+    "--target=wasm32-wasi",
+    "-mexec-model=reactor",
+    "-std=c11",
+    "-O2",
+    "-ffp-contract=off",
+    "-Wl,--gc-sections,--allow-undefined,--strip-all,-z,stack-size=1048576,--whole-archive",
+    "-I",
+    include,
+    "-o",
+    object,
+    path,
+    engine,
+    "-Wl,--no-whole-archive",
+    NULL
+  };
+  if (status == PW_OK) status = build_object (path, "clang", options, NULL, before, error);
   free (include);
   return status;
 }
@@ -141,13 +179,14 @@ static void build_defer (sigset_t *before) {
   pthread_sigmask (SIG_BLOCK, &stop, before);
 }
 
-int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_error *error) {
+int pw_compile_file (const char *path, const char *page, pw_object_user *use, void *context, pw_error *error) {
   sigset_t before;
   build_defer (&before);
   char *folder = pw_temporary_folder (error), *object = folder ? pw_path_join (folder, "model.so", "") : NULL;
-  int status = object   ? build_object (path, object, NULL, &before, error)
-               : folder ? pw_fail (error, PW_RESOURCE, "out of memory")
-                        : PW_RESOURCE;
+  int status = !folder   ? PW_RESOURCE
+               : !object ? pw_fail (error, PW_RESOURCE, "out of memory")
+               : page    ? build_page (path, page, object, &before, error)
+                         : build_shared (path, object, NULL, &before, error);
   if (status == PW_OK) status = use (context, object, error);
   if (object) unlink (object);
   if (folder) rmdir (folder);
@@ -160,7 +199,7 @@ int pw_compile_file (const char *path, pw_object_user *use, void *context, pw_er
 int pw_compile_scene (const char *path, const char *object, const char *log, pw_error *error) {
   sigset_t before;
   build_defer (&before);
-  int status = build_object (path, object, log, &before, error);
+  int status = build_shared (path, object, log, &before, error);
   pthread_sigmask (SIG_SETMASK, &before, NULL);
   return status;
 }

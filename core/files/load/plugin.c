@@ -74,7 +74,7 @@ static int plugin_open_path (pw_file *f, const char *shown, pw_error *error) {
     if (f->yaml) f->table = pw_yaml_table (f->yaml);
     return f->yaml ? PW_OK : error->status;
   }
-  return ending == PLUGIN_C ? pw_compile_file (f->path, plugin_load, f, error) : plugin_load (f, f->path, error);
+  return ending == PLUGIN_C ? pw_compile_file (f->path, NULL, plugin_load, f, error) : plugin_load (f, f->path, error);
 }
 
 static int plugin_find_path (pw_file *f, const char *path, pw_error *error) {
@@ -179,6 +179,10 @@ pw_model *pw_file_model (const pw_file *f, pw_error *error) {
 
 const pw_plugin_table *pw_file_table (const pw_file *f) {
   return f->table;
+}
+
+const pw_yaml *pw_file_yaml (const pw_file *f) {
+  return f->yaml;
 }
 
 const char *pw_file_name (const pw_file *f) {

@@ -1,21 +1,14 @@
-/* Reads regular files up to a limit. */
+/* Paths; reading up to a limit. */
 #include <errno.h>
-#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 #include "files.h"
 
-FILE *pw_open_input (const char *path, const char **why) {
-  struct stat info = { .st_mode = S_IFREG };
-  int file = open (path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC); /* does not block on a FIFO */
-  FILE *f = file >= 0 && fstat (file, &info) == 0 && S_ISREG (info.st_mode) ? fdopen (file, "rb") : NULL;
-  if (f) return f;
-  int number = S_ISREG (info.st_mode) ? errno : 0;
-  *why = number ? strerror (number) : pw_not_regular (info.st_mode);
-  if (file >= 0) close (file);
-  errno = number;
-  return NULL;
+char *pw_path_join (const char *folder, const char *name, const char *ending) {
+  size_t size = strlen (folder) + strlen (name) + strlen (ending) + 2;
+  char *path = malloc (size);
+  if (path) snprintf (path, size, "%s/%s%s", folder, name, ending);
+  return path;
 }
 
 int pw_read_rest (FILE *f, size_t max_bytes, const char *path, const char *what, char **text, size_t *size,

@@ -13,13 +13,6 @@
 #include <unistd.h>
 #include "files.h"
 
-char *pw_path_join (const char *folder, const char *name, const char *ending) {
-  size_t size = strlen (folder) + strlen (name) + strlen (ending) + 2;
-  char *path = malloc (size);
-  if (path) snprintf (path, size, "%s/%s%s", folder, name, ending);
-  return path;
-}
-
 int pw_ends_with (const char *name, const char *ending) {
   size_t n = strlen (name), e = strlen (ending);
   return n > e && strcmp (name + n - e, ending) == 0;
@@ -169,19 +162,38 @@ void pw_search_close (pw_search *s) {
   free (s->found);
 }
 
-/* ---- The header ---- */
+/* ---- Other files ---- */
 
-static int search_header (void *context, const char *folder, pw_error *error) {
-  char **include = context, *header = pw_path_join (folder, "pinwheel.h", "");
-  int exists = header && access (header, R_OK) == 0;
-  if (exists && *include == NULL) *include = strdup (folder);
-  free (header);
-  return header == NULL || (exists && *include == NULL) ? search_no_memory (error) : PW_OK;
+typedef struct {
+  const char *file;
+  char *folder; /* the first that contains it */
+} search_file;
+
+static int search_find_file (void *context, const char *folder, pw_error *error) {
+  search_file *x = context;
+  char *path = pw_path_join (folder, x->file, "");
+  int exists = path && access (path, R_OK) == 0;
+  if (exists && x->folder == NULL) x->folder = strdup (folder);
+  free (path);
+  return path == NULL || (exists && x->folder == NULL) ? search_no_memory (error) : PW_OK;
 }
 
 int pw_search_include (char **include, pw_error *error) {
   static const search_folders where = { { "include", "../include", "../include/pinwheel" },
                                         { "include", "../include", "../include/pinwheel" } };
-  *include = NULL;
-  return search_visit (where, search_header, include, error);
+  search_file x = { "pinwheel.h", NULL };
+  int status = search_visit (where, search_find_file, &x, error);
+  *include = x.folder;
+  return status;
+}
+
+int pw_search_page (const char *file, char **path, pw_error *error) {
+  static const search_folders where = { { "page", "../page", "../lib/pinwheel/page" },
+                                        { "page", "../page", "pinwheel/page" } };
+  search_file x = { file, NULL };
+  int status = search_visit (where, search_find_file, &x, error);
+  *path = x.folder ? pw_path_join (x.folder, file, "") : NULL;
+  if (x.folder && *path == NULL) status = search_no_memory (error);
+  free (x.folder);
+  return status;
 }

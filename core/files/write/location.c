@@ -1,9 +1,22 @@
 /* Locations of files: follows links, also to files that do not exist yet, and detects names of the same file. */
 #include <errno.h>
+#include <fcntl.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 #include "files.h"
+
+FILE *pw_open_input (const char *path, const char **why) {
+  struct stat info = { .st_mode = S_IFREG };
+  int file = open (path, O_RDONLY | O_NONBLOCK | O_NOCTTY | O_CLOEXEC); /* does not block on a FIFO */
+  FILE *f = file >= 0 && fstat (file, &info) == 0 && S_ISREG (info.st_mode) ? fdopen (file, "rb") : NULL;
+  if (f) return f;
+  int number = S_ISREG (info.st_mode) ? errno : 0;
+  *why = number ? strerror (number) : pw_not_regular (info.st_mode);
+  if (file >= 0) close (file);
+  errno = number;
+  return NULL;
+}
 
 enum { LOCATION_LINKS = 40 }; /* a longer chain counts as a cycle */
 

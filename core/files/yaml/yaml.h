@@ -2,6 +2,7 @@
  *
  *   yaml_source.c      reads and checks the text; messages with line, column and caret
  *   yaml_tree.c        builds a tree of scalars, lists and maps from libfyaml's events
+ *   yaml_stored.c      the tree as bytes
  *   yaml_read.c        keys, numbers and names from the tree
  *   yaml_expression.c  signals that are expressions of time and states; the reference solution
  *   yaml_signal.c      other signals, points of tables
@@ -92,6 +93,9 @@ int pw_yaml_line (const pw_yaml *y, size_t at);
 /* ---- The tree (yaml_tree.c) ---- */
 
 int pw_yaml_read_tree (pw_yaml *y, pw_error *error);
+
+/* Loads what pw_yaml_write_tree wrote (yaml_stored.c).  PW_INPUT if it is incomplete. */
+int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *error);
 
 /* ---- Reading the tree (yaml_read.c) ---- */
 

@@ -9,6 +9,11 @@
 
 enum { SOURCE_SHOWN = 84 }; /* bytes of a line in a message */
 
+const char *pw_yaml_text_of (const pw_yaml *y, size_t *size) {
+  *size = y->size;
+  return y->source;
+}
+
 /* ---- Messages ---- */
 
 int pw_yaml_line (const pw_yaml *y, size_t at) {

@@ -1,0 +1,211 @@
+/* The engine of interactive pages: models, methods and samples for figures, compiled to WebAssembly.  Its functions are
+ * called by page.js.  Files are in memory; there is one model at a time. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "plot.h"
+#include "yaml.h"
+
+#define PAGE_EXPORT(name) __attribute__ ((export_name (#name)))
+
+/* Of the page: the clock [ms]. */
+__attribute__ ((import_module ("page"), import_name ("now"))) double pw_page_now (void);
+
+/* ---- Files ---- */
+
+enum { PAGE_FILES = 64 };
+
+static struct {
+  const char *name, *bytes;
+  size_t size;
+} page_file[PAGE_FILES];
+static int page_files;
+
+PAGE_EXPORT (allocate) void *page_allocate (size_t size) {
+  return calloc (1, size);
+}
+
+/* The name and bytes belong to the engine from now on. */
+PAGE_EXPORT (file) void page_add_file (const char *name, const char *bytes, size_t size) {
+  if (page_files < PAGE_FILES) {
+    page_file[page_files].name = name;
+    page_file[page_files].bytes = bytes;
+    page_file[page_files++].size = size;
+  }
+}
+
+static int page_find_file (const char *name) {
+  int i = 0;
+  name += *name == '/';
+  while (i < page_files && strcmp (page_file[i].name, name) != 0) i++;
+  return i;
+}
+
+FILE *pw_open_input (const char *path, const char **why) {
+  int i = page_find_file (path);
+  *why = "it is not part of this page";
+  return i < page_files ? fmemopen ((void *)page_file[i].bytes, page_file[i].size, "r") : NULL;
+}
+
+char *realpath (const char *path, char *resolved) {
+  return resolved ? strcpy (resolved, path) : strdup (path);
+}
+
+int pw_yaml_read_tree (pw_yaml *y, pw_error *error) {
+  int i = page_find_file ("tree");
+  return pw_yaml_load_tree (y, page_file[i].bytes, page_file[i].size, error);
+}
+
+/* ---- The model ---- */
+
+extern const pw_plugin_table pw_plugin __attribute__ ((weak)); /* of a model in C */
+
+static pw_error page_error;
+static const pw_plugin_table *page_table;
+static const char *page_name;
+static double *page_parameter; /* values, in the order of the table */
+static pw_initial_value *page_initial;
+static int page_initials;
+
+PAGE_EXPORT (error) const char *page_error_text (void) {
+  return page_error.text;
+}
+
+/* Opens the model of this name; 0 if that succeeds. */
+PAGE_EXPORT (open) int page_open (const char *name) {
+  page_name = name;
+  page_table = &pw_plugin;
+  if (page_table == NULL) {
+    pw_yaml *y = pw_yaml_open ("/model", name, PW_FILE_DEFAULT_BYTES, &page_error);
+    page_table = y ? pw_yaml_table (y) : NULL;
+  }
+  return page_error.status;
+}
+
+/* Arrays that the page fills before a run: `count` values of parameters; `count` pairs of a state and its value. */
+PAGE_EXPORT (parameters) double *page_parameters (size_t count) {
+  free (page_parameter);
+  return page_parameter = calloc (count + 1, sizeof (double));
+}
+
+PAGE_EXPORT (initial) pw_initial_value *page_initial_values (int count) {
+  free (page_initial);
+  page_initials = count;
+  return page_initial = calloc ((size_t)count + 1, sizeof *page_initial);
+}
+
+/* ---- A run ---- */
+
+static pw_model *page_model;
+static pw_system *page_system;
+static pw_plots *page_plots;
+static struct {
+  double end; /* reached [s] */
+  double steps, rejected, evaluations, position, velocity, energy;
+} page_result;
+static double page_deadline; /* [ms] */
+
+static int page_late (void *context) {
+  (void)context;
+  return pw_page_now () > page_deadline;
+}
+
+static void page_close (void) {
+  pw_plots_close (page_plots);
+  pw_system_free (page_system);
+  pw_model_free (page_model);
+  page_plots = NULL;
+  page_system = NULL;
+  page_model = NULL;
+}
+
+static int page_compile (void) {
+  page_close ();
+  page_error = (pw_error){ 0 };
+  page_model = pw_model_new (page_name, page_table, &page_error);
+  for (int i = 0; page_model && page_table->parameters && page_table->parameters[i].name; i++)
+    pw_model_set (page_model, page_table->parameters[i].name, page_parameter[i], &page_error);
+  if (page_error.status == PW_OK) pw_model_build (page_model, &page_error);
+  if (page_error.status == PW_OK) page_system = pw_system_compile (page_model, &page_error);
+  return page_error.status;
+}
+
+static int page_take_samples (pw_run *r) {
+  int status = PW_OK;
+  pw_sample sample;
+  while (status == PW_OK && page_plots && pw_plots_next (page_plots) <= pw_run_time (r)) {
+    status = pw_run_sample (r, pw_plots_next (page_plots), &sample, &page_error);
+    if (status == PW_OK) pw_plots_add (page_plots, &sample);
+    page_result.energy = status == PW_OK ? pw_run_energy_defect (r, &sample) : NAN;
+  }
+  return status;
+}
+
+static int page_integrate (pw_run *r, double t_end) {
+  int status = page_take_samples (r);
+  while (status == PW_OK && pw_run_time (r) < t_end) {
+    status = pw_run_advance (r, t_end, &page_error);
+    if (status == PW_OK) status = page_take_samples (r);
+  }
+  const pw_statistics *s = pw_run_statistics (r);
+  page_result.end = pw_run_time (r);
+  page_result.steps = (double)s->steps;
+  page_result.rejected = (double)s->rejected;
+  page_result.evaluations = (double)s->rhs;
+  page_result.position = s->g;
+  page_result.velocity = s->jv;
+  return status;
+}
+
+/* Runs the model with the parameters and initial values given, for at most `limit` ms.  0, or a negative status with
+ * the error set; the samples so far are kept.  Without `samples` it only integrates, to measure its time. */
+PAGE_EXPORT (run)
+int page_run (const char *method, double step, double rtol, double t_end, double limit, int samples) {
+  memset (&page_result, 0, sizeof page_result);
+  if (page_compile () != PW_OK) return page_error.status;
+  page_deadline = pw_page_now () + limit;
+  const pw_settings settings = { .span = t_end,
+                                 .step = step,
+                                 .rtol = rtol,
+                                 .ledger = samples,
+                                 .stop = page_late,
+                                 .initial = page_initial,
+                                 .initials = page_initials };
+  if (samples) page_plots = pw_plots_open (NULL, 1, page_model, page_system, t_end, &page_error);
+  pw_run *r = page_error.status == PW_OK ? pw_run_open (page_system, method, &settings, &page_error) : NULL;
+  int status = r ? page_integrate (r, t_end) : page_error.status;
+  if (status == PW_STOPPED)
+    status = pw_fail (&page_error, PW_METHOD, "stopped at t = %.4g s, after %g s of computation", pw_run_time (r),
+                      limit / 1000);
+  pw_run_close (r);
+  return status;
+}
+
+/* ---- Results ---- */
+
+PAGE_EXPORT (samples) int page_samples (void) {
+  return page_plots ? page_plots->samples : 0;
+}
+PAGE_EXPORT (width) int page_width (void) {
+  return page_plots->width;
+}
+PAGE_EXPORT (data) const double *page_data (void) {
+  return page_plots->data;
+}
+PAGE_EXPORT (result) const double *page_results (void) {
+  return &page_result.end;
+}
+
+/* The scene's shapes as JSON; free it by `release`. */
+PAGE_EXPORT (scene) char *page_scene (void) {
+  char *text = NULL;
+  size_t size;
+  FILE *f = open_memstream (&text, &size);
+  if (f == NULL) return NULL;
+  pw_animation_scene (f, page_plots);
+  fclose (f);
+  return text;
+}
+PAGE_EXPORT (release) void page_release (void *p) {
+  free (p);
+}

@@ -1,0 +1,67 @@
+/* The two library functions that explicit methods call, for scenes of the size of a page: AMD's order and LAPACK's
+ * Cholesky solution. */
+#include <amd.h>
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { LIBRARIES_MOST = 4000 }; /* nodes: a byte for each pair */
+
+/* Connects the neighbours of a node that is eliminated. */
+static void eliminate (int n, unsigned char *edge, int node) {
+  unsigned char *of = edge + (size_t)node * (size_t)n;
+  for (int i = 0; i < n; i++)
+    if (of[i])
+      for (int j = 0; j < n; j++) edge[(size_t)i * (size_t)n + (size_t)j] |= of[j] && j != i;
+  for (int i = 0; i < n; i++) of[i] = edge[(size_t)i * (size_t)n + (size_t)node] = 0;
+}
+
+static int degree (int n, const unsigned char *edge, int node) {
+  int count = 0;
+  for (int i = 0; i < n; i++) count += edge[(size_t)node * (size_t)n + (size_t)i];
+  return count;
+}
+
+/* Minimum degree. */
+int amd_order (int n, const int Ap[], const int Ai[], int P[], double control[], double info[]) {
+  (void)control, (void)info;
+  unsigned char *edge = n <= LIBRARIES_MOST ? calloc ((size_t)n * (size_t)n + 1, 1) : NULL,
+                *done = calloc ((size_t)n + 1, 1);
+  for (int i = 0; edge && i < n; i++)
+    for (int k = Ap[i]; k < Ap[i + 1]; k++)
+      edge[(size_t)i * (size_t)n + (size_t)Ai[k]] = edge[(size_t)Ai[k] * (size_t)n + (size_t)i] = Ai[k] != i;
+  for (int k = 0; edge && done && k < n; k++) {
+    int best = -1, least = n + 1;
+    for (int i = 0; i < n; i++)
+      if (!done[i] && degree (n, edge, i) < least) least = degree (n, edge, best = i);
+    eliminate (n, edge, P[k] = best);
+    done[best] = 1;
+  }
+  int status = edge && done ? AMD_OK : AMD_OUT_OF_MEMORY;
+  free (edge);
+  free (done);
+  return status;
+}
+
+/* Upper triangle by columns; one right-hand side. */
+lapack_int LAPACKE_dposv_work (int layout, char part, lapack_int n, lapack_int sides, double *a, lapack_int lda,
+                               double *b, lapack_int ldb) {
+  (void)layout, (void)part, (void)sides, (void)ldb;
+  for (int j = 0; j < n; j++)
+    for (int i = 0; i <= j; i++) {
+      double sum = a[i + j * lda];
+      for (int k = 0; k < i; k++) sum -= a[k + i * lda] * a[k + j * lda];
+      if (i == j && !(sum > 0)) return j + 1;
+      a[i + j * lda] = i == j ? sqrt (sum) : sum / a[i + i * lda];
+    }
+  for (int i = 0; i < n; i++) {
+    for (int k = 0; k < i; k++) b[i] -= a[k + i * lda] * b[k];
+    b[i] /= a[i + i * lda];
+  }
+  for (int i = n - 1; i >= 0; i--) {
+    for (int k = i + 1; k < n; k++) b[i] -= a[i + k * lda] * b[k];
+    b[i] /= a[i + i * lda];
+  }
+  return 0;
+}

@@ -1,0 +1,370 @@
+
+/* ---- The engine: the model and the integrators, compiled to WebAssembly ---- */
+
+const bytesOf = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
+
+/* What the engine may import: the clock, and nothing else that works.  A library that it does not have stops the run. */
+function importsOf (module) {
+  const imports = {};
+  for (const { module: from, name } of WebAssembly.Module.imports(module)) {
+    imports[from] = imports[from] || {};
+    imports[from][name] = from === "wasi_snapshot_preview1" ? () => 52
+      : () => { throw new Error("this scene needs " + name.replace(/^LAPACKE_.*/, "LAPACK").replace(/^amd_.*/, "AMD") + ", which pages do not have"); };
+  }
+  imports.page = { now: () => performance.now() };
+  return imports;
+}
+
+class Engine {
+  static async open (page) {
+    const module = await WebAssembly.compile(bytesOf(page.files.engine)), engine = new Engine();
+    engine.module = module;
+    engine.page = page;
+    await engine.restart();
+    return engine;
+  }
+
+  /* A new instance: at first, and after a run that the engine could not end. */
+  async restart () {
+    this.wasm = (await WebAssembly.instantiate(this.module, importsOf(this.module))).exports;
+    this.wasm._initialize();
+    for (const [name, text] of Object.entries(this.page.files))
+      if (name !== "engine") {
+        const bytes = bytesOf(text);
+        this.wasm.file(this.text(name), this.copy(bytes), bytes.length);
+      }
+    if (this.wasm.open(this.text(this.page.name)) !== 0) throw new Error(this.error());
+  }
+
+  copy (bytes) {
+    const at = this.wasm.allocate(bytes.length + 1);
+    new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
+    return at;
+  }
+  text (text) { return this.copy(new TextEncoder().encode(text)); }
+  read (at) {
+    const bytes = new Uint8Array(this.wasm.memory.buffer);
+    return new TextDecoder().decode(bytes.subarray(at, bytes.indexOf(0, at)));
+  }
+  error () { return this.read(this.wasm.error()); }
+  numbers (at, count) { return new Float64Array(this.wasm.memory.buffer, at, count); }
+
+  /* Integrates with { method, step, rtol, end, parameters, initial: [[state, value]] }; returns the time [ms] and the
+   * reason of a failure. */
+  integrate (s, limit, samples) {
+    const w = this.wasm, method = this.text(s.method);
+    this.numbers(w.parameters(s.parameters.length), s.parameters.length).set(s.parameters);
+    const initial = new DataView(w.memory.buffer, w.initial(s.initial.length));
+    s.initial.forEach(([state, value], i) => { initial.setInt32(16 * i, state, true); initial.setFloat64(16 * i + 8, value, true); });
+    const before = performance.now(), status = w.run(method, s.step, s.rtol, s.end, limit, samples), ms = performance.now() - before;
+    w.release(method);
+    return { ms, reason: status === 0 ? "" : this.error() };
+  }
+
+  /* The least of three times, without samples [ms]. */
+  time (s) {
+    return Math.min(...[1, 2, 3].map(() => this.integrate(s, 8000, 0).ms));
+  }
+
+  /* A run for load(), with its cost. */
+  run (s, limit) {
+    const { ms, reason } = this.integrate(s, limit, 1), samples = this.wasm.samples();
+    if (samples < 2) throw new Error(reason || "the run has no samples");
+    const scene = this.scene();
+    return { ...scene, ...this.arrays(samples, scene), model: this.page.name, method: s.method, reason, cost: this.cost(ms) };
+  }
+
+  scene () {
+    const at = this.wasm.scene(), text = this.read(at);
+    this.wasm.release(at);
+    return JSON.parse("{" + text.replace(/,\s*$/, "") + "}");
+  }
+
+  /* The columns of the samples: t, energies; x, y, phi and velocities of bodies; contacts of wheels; forces of links. */
+  arrays (samples, scene) {
+    const width = this.wasm.width(), data = this.numbers(this.wasm.data(), samples * width);
+    let from = 7;
+    const columns = (first, count) => {
+      const part = new Float64Array(samples * count);
+      for (let i = 0; i < samples; i++) part.set(data.subarray(i * width + first, i * width + first + count), i * count);
+      return part;
+    };
+    const next = count => { from += count; return columns(from - count, count); };
+    return { t: columns(0, 1), energy: columns(1, 6), motion: next(6 * scene.bodies.length),
+      contact: next(3 * scene.wheels.length), force: next(2 * scene.links.length) };
+  }
+
+  cost (ms) {
+    const [end, steps, rejected, evaluations, g, jv, energy] = this.numbers(this.wasm.result(), 7);
+    return { ms, end, steps, rejected, evaluations, g, jv, energy };
+  }
+}
+
+/* ---- The panel ---- */
+
+let engine, page, settings, reference = null, runs = []; /* runs: { method, ms, error }, in the plot */
+
+const byName = name => page.methods.find(m => m.name === name);
+const clone = () => ({ method: page.method, accuracy: null, end: page.t_end,
+  parameters: page.parameters.map(p => p.value), initial: new Map() });
+
+/* Fixed steps: step size; adaptive: tolerance.  The slider is its decimal logarithm. */
+function accuracy (s) {
+  return s.accuracy ?? (byName(s.method).adaptive ? page.rtol : page.step);
+}
+function engineSettings (s) {
+  return { ...s, initial: [...s.initial], step: accuracy(s), rtol: accuracy(s) };
+}
+
+/* A label with a slider and a number; `change` gets the number. */
+function control (parent, name, unit, about, value, low, high, step, change) {
+  const label = document.createElement("label"), text = document.createElement("span");
+  const slider = document.createElement("input"), number = document.createElement("input");
+  text.textContent = name + (unit ? " [" + unit + "]" : "");
+  label.title = about;
+  slider.type = "range";
+  number.type = "number";
+  slider.setAttribute("aria-label", text.textContent + " " + about);
+  number.setAttribute("aria-label", text.textContent);
+  slider.min = low; slider.max = high; slider.step = step || (high - low) / 1000;
+  number.step = step || "any";
+  const short = x => Number(x.toPrecision(8));
+  slider.dataset.name = number.dataset.name = name;
+  const show = x => { slider.value = x; number.value = short(x); };
+  slider.addEventListener("input", () => { number.value = Number(Number(slider.value).toPrecision(4)); change(Number(number.value)); });
+  number.addEventListener("change", () => {
+    const x = Number(number.value);
+    if (number.value === "" || !isFinite(x)) return show(value);
+    slider.min = Math.min(slider.min, x); slider.max = Math.max(slider.max, x);
+    slider.value = x;
+    change(x);
+  });
+  show(value);
+  label.append(text, slider, number);
+  parent.append(label);
+}
+
+/* From a tenth to three times a positive default; around other values as far as they are from zero. */
+function rangeOf (value, domain) {
+  if (domain === "count") return [1, Math.max(10, 2 * value), 1];
+  if (domain === "fraction") return [0, 1, 0];
+  if (domain === "positive") return [value / 10, 3 * value, 0];
+  if (domain === "nonnegative") return [0, value > 0 ? 3 * value : 1, 0];
+  const size = Math.abs(value) || 1;
+  return [value - 2 * size, value + 2 * size, 0];
+}
+
+function fillPanel () {
+  $("page-method").replaceChildren(...page.methods.map(m => new Option(m.name)));
+  $("page-method").value = settings.method;
+  $("page-end").value = settings.end;
+  for (const id of ["parameters", "states"]) while ($(id).querySelector("label")) $(id).querySelector("label").remove();
+  page.parameters.forEach((p, i) => control($("parameters"), p.name, p.unit, p.about, settings.parameters[i], ...rangeOf(p.value, p.domain),
+    x => { settings.parameters[i] = x; later(); }));
+  page.states.forEach((state, i) => {
+    const value = settings.initial.get(i) ?? state.value;
+    control($("states"), state.name, state.unit, "initial value", value, ...rangeOf(value, "real"),
+      x => { settings.initial.set(i, x); later(); });
+  });
+  $("parameters").hidden = page.parameters.length === 0;
+  fillAccuracy();
+}
+
+function fillAccuracy () {
+  const adaptive = byName(settings.method).adaptive;
+  $("page-accuracy-name").textContent = adaptive ? "Tolerance" : "Step size [s]";
+  $("page-accuracy").min = adaptive ? -12 : -5;
+  $("page-accuracy").max = adaptive ? -2 : -1;
+  $("page-accuracy").step = adaptive ? 0.5 : 0.25;
+  $("page-accuracy").value = Math.log10(accuracy(settings));
+  $("page-accuracy-value").textContent = accuracy(settings).toPrecision(2);
+}
+
+/* ---- Runs ---- */
+
+let timer = 0;
+function later () {
+  clearTimeout(timer);
+  timer = setTimeout(simulate, 20);
+}
+
+/* The largest difference of the positions x and y at the end [m]; angles alone if nothing else moves. */
+function difference (a, b) {
+  let most = 0;
+  for (let k = 0; k < 6 * a.bodies.length; k++)
+    if (k % 6 < 3) most = Math.max(most, Math.abs(a.motion[a.motion.length - 6 * a.bodies.length + k] - b.motion[b.motion.length - 6 * b.bodies.length + k]));
+  return most;
+}
+
+/* Runs with the settings of the panel, shows the result, then repeats it more accurately to estimate its error. */
+function simulate () {
+  let result;
+  document.documentElement.dataset.simulated = "";
+  try {
+    result = engine.run(engineSettings(settings), 4000);
+  } catch (error) {
+    engine.restart();
+    $("reason").textContent = error.message;
+    document.documentElement.dataset.simulated = "error";
+    return;
+  }
+  const t = state.t;
+  if (run) { load(result); key(); seek(t); } else begin(result);
+  showCost(result, null);
+  showValues();
+  history.replaceState(null, "", "#" + link());
+  document.documentElement.dataset.simulated = "yes";
+  clearTimeout(reference);
+  if (!result.reason) reference = setTimeout(() => estimate(result), 300);
+}
+
+/* The reference: erk8+projection with a tolerance of 1e-13. */
+function estimate (result) {
+  try {
+    const exact = engine.run({ ...engineSettings(settings), method: "erk8+projection", rtol: 1e-13 }, 8000);
+    if (exact.reason) return;
+    const error = difference(result, exact);
+    result.cost.ms = Math.max(engine.time(engineSettings(settings)), 0.01);
+    runs.push({ method: result.method, ms: result.cost.ms, error: Math.max(error, 1e-16) });
+    showCost(result, error);
+    document.documentElement.dataset.estimated = error;
+  } catch (error) {
+    engine.restart();
+  }
+}
+
+function rows (id, list) {
+  $(id).replaceChildren(...list.map(([name, value]) => {
+    const row = document.createElement("tr");
+    for (const text of [name, value]) row.append(Object.assign(document.createElement("td"), { textContent: text }));
+    return row;
+  }));
+}
+const superscript = n => [...String(n)].map(c => c === "-" ? "\u207b" : "\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"[c]).join("");
+function scientific (x) {
+  const [digits, power] = x.toExponential(1).split("e");
+  return x === 0 ? "0" : digits + "\u00b710" + superscript(Number(power));
+}
+
+function showCost (result, error) {
+  const c = result.cost;
+  rows("page-results", [["error at the end [m, rad]", error === null ? "\u2026" : scientific(error)],
+    ["computing time", (c.ms < 10 ? c.ms.toFixed(2) : c.ms.toFixed(0)) + " ms"], ["steps, rejected", c.steps + ", " + c.rejected],
+    ["evaluations", String(c.evaluations)], ["largest |g|", scientific(c.g)], ["largest |J v|", scientific(c.jv)],
+    ["relative energy defect", scientific(c.energy)]]);
+  plotRuns();
+}
+
+/* Values of all bodies at the time shown, interpolated between samples. */
+function showValues () {
+  if (!$("values").open) return;
+  const at = place(state.t);
+  rows("page-values", run.bodies.flatMap((body, b) => placement(b, at).map((x, k) => [body.name + [".x", ".y", ".phi"][k], x.toPrecision(10)])));
+}
+
+/* Error over computing time, both logarithmic; the last run is filled. */
+function plotRuns () {
+  const s = size($("page-plot")), g = s.g, points = runs.slice(-60);
+  g.clearRect(0, 0, s.width, s.height);
+  if (points.length === 0) return;
+  const logs = pick => points.map(p => Math.log10(p[pick])), box = list => [Math.floor(Math.min(...list) - 0.2), Math.ceil(Math.max(...list) + 0.2)];
+  const [x0, x1] = box(logs("ms")), [y0, y1] = box(logs("error"));
+  const X = x => 38 + (s.width - 48) * (x - x0) / (x1 - x0), Y = y => s.height - 26 - (s.height - 36) * (y - y0) / (y1 - y0);
+  g.font = "11px system-ui, sans-serif";
+  g.strokeStyle = colours.grid;
+  g.fillStyle = colours.faint;
+  g.beginPath();
+  g.textAlign = "center";
+  const power = n => "10" + superscript(n);
+  for (let x = x0; x <= x1; x++) { g.moveTo(X(x), Y(y0)); g.lineTo(X(x), Y(y1)); g.fillText(power(x), X(x), s.height - 14); }
+  const stride = Math.ceil((y1 - y0) / 7);
+  g.textAlign = "right";
+  for (let y = y0; y <= y1; y += stride) { g.moveTo(X(x0), Y(y)); g.lineTo(X(x1), Y(y)); g.fillText(power(y), 34, Y(y) + 4); }
+  g.stroke();
+  g.textAlign = "center";
+  g.fillText("error over computing time [ms]", s.width / 2, s.height - 2);
+  const colour = method => palette[page.methods.findIndex(m => m.name === method) % palette.length];
+  g.textAlign = "right";
+  [...new Set(points.map(p => p.method))].forEach((method, i) => { g.fillStyle = colour(method); g.fillText(method, s.width - 12, 16 + 13 * i); });
+  points.forEach((p, i) => {
+    g.strokeStyle = g.fillStyle = colour(p.method);
+    g.beginPath();
+    g.arc(X(Math.log10(p.ms)), Y(Math.log10(p.error)), i === points.length - 1 ? 5 : 3.5, 0, 7);
+    i === points.length - 1 ? g.fill() : g.stroke();
+  });
+}
+
+/* ---- Links, files, controls ---- */
+
+/* What differs from the page's own settings, as in "method=rk4+projection&a=0.7&start.frame.x=1". */
+function link () {
+  const list = new URLSearchParams();
+  if (settings.method !== page.method) list.set("method", settings.method);
+  if (settings.accuracy !== null) list.set("accuracy", settings.accuracy);
+  if (settings.end !== page.t_end) list.set("t_end", settings.end);
+  page.parameters.forEach((p, i) => { if (settings.parameters[i] !== p.value) list.set(p.name, settings.parameters[i]); });
+  for (const [state, value] of settings.initial) list.set("start." + page.states[state].name, value);
+  return list.toString();
+}
+
+function readLink () {
+  const list = new URLSearchParams(location.hash.slice(1)), number = (key, otherwise) => {
+    const x = Number(list.get(key));
+    return list.has(key) && isFinite(x) ? x : otherwise;
+  };
+  settings = clone();
+  if (byName(list.get("method"))) settings.method = list.get("method");
+  settings.accuracy = number("accuracy", null);
+  settings.end = number("t_end", page.t_end);
+  page.parameters.forEach((p, i) => { settings.parameters[i] = number(p.name, p.value); });
+  page.states.forEach((state, i) => { const x = number("start." + state.name, null); if (x !== null) settings.initial.set(i, x); });
+}
+
+function save (name, blob) {
+  const a = document.createElement("a");
+  a.href = URL.createObjectURL(blob);
+  a.download = name;
+  a.click();
+  URL.revokeObjectURL(a.href);
+}
+
+function table () {
+  const names = run.bodies.flatMap(body => ["x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]"].map(n => body.name + "." + n));
+  const lines = [["t [s]", ...names].join(",")];
+  for (let i = 0; i < count; i++) lines.push([run.t[i], ...run.motion.subarray(6 * i * bodies, 6 * (i + 1) * bodies)].join(","));
+  return lines.join("\n") + "\n";
+}
+
+function connect () {
+  $("page-method").addEventListener("change", e => { settings.method = e.target.value; settings.accuracy = null; fillAccuracy(); later(); });
+  $("page-accuracy").addEventListener("input", e => {
+    settings.accuracy = Number(Math.pow(10, Number(e.target.value)).toPrecision(3));
+    $("page-accuracy-value").textContent = settings.accuracy.toPrecision(2);
+    later();
+  });
+  $("page-end").addEventListener("change", e => { if (Number(e.target.value) > 0) { settings.end = Number(e.target.value); later(); } });
+  $("page-reset").addEventListener("click", () => { settings = clone(); runs = []; fillPanel(); simulate(); });
+  $("page-csv").addEventListener("click", () => save(page.name + ".csv", new Blob([table()], { type: "text/csv" })));
+  $("page-link").addEventListener("click", () => navigator.clipboard.writeText(location.href));
+  $("values").addEventListener("toggle", showValues);
+  $("scrub").addEventListener("input", showValues);
+  window.addEventListener("resize", plotRuns);
+  window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== link()) { readLink(); fillPanel(); simulate(); } });
+}
+
+async function start_page (data) {
+  page = data;
+  readLink();
+  fillPanel();
+  connect();
+  if (typeof WebAssembly !== "object") {
+    $("reason").textContent = "This page simulates with WebAssembly, which this browser does not have or has switched off.";
+    return;
+  }
+  try {
+    engine = await Engine.open(page);
+    simulate();
+  } catch (error) {
+    $("reason").textContent = error.message;
+  }
+}

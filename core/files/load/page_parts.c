@@ -1,0 +1,110 @@
+/* The parts of an interactive page: the engine as WebAssembly, the text of a model, its tree, its tables. */
+#define _POSIX_C_SOURCE 200809L
+#include <stdlib.h>
+#include <string.h>
+#include "files.h"
+
+enum { PAGE_MAX_BYTES = 64 << 20 };
+
+/* Adds a file; the page owns the bytes. */
+static int page_add (pw_page *p, const char *name, char *bytes, size_t size, pw_error *error) {
+  pw_page_file *more = bytes ? realloc (p->file, (size_t)(p->files + 1) * sizeof *more) : NULL;
+  char *copy = more ? strdup (name) : NULL;
+  if (more) p->file = more;
+  if (copy == NULL) {
+    free (bytes);
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  }
+  p->file[p->files++] = (pw_page_file){ copy, bytes, size };
+  return PW_OK;
+}
+
+static int page_read (pw_page *p, const char *name, const char *path, pw_error *error) {
+  const char *why;
+  char *bytes = NULL;
+  size_t size;
+  FILE *f = pw_open_input (path, &why);
+  if (f == NULL) return pw_fail (error, PW_INPUT, "cannot read %s: %s", path, why);
+  int status = pw_read_rest (f, PAGE_MAX_BYTES, path, "the limit for a part of a page", &bytes, &size, error);
+  fclose (f);
+  if (status == PW_OK) return page_add (p, name, bytes, size, error);
+  free (bytes);
+  return status;
+}
+
+/* ---- The engine ---- */
+
+static int page_use_engine (void *context, const char *object, pw_error *error) {
+  return page_read (context, "engine", object, error);
+}
+
+/* Text models share one engine; a model in C is compiled into its own. */
+static int page_engine (pw_page *p, const char *source, pw_error *error) {
+  char *path;
+  int status = pw_search_page (source ? "libpinwheel-page.a" : "pinwheel.wasm", &path, error);
+  if (status == PW_OK && path == NULL)
+    status = pw_fail (error, PW_INPUT,
+                      "this Pinwheel was built without the engine of interactive pages: install %s and build it again",
+                      PW_PAGE_TOOLS);
+  if (status == PW_OK)
+    status = source ? pw_compile_file (source, path, page_use_engine, p, error) : page_read (p, "engine", path, error);
+  free (path);
+  return status;
+}
+
+/* ---- Text models ---- */
+
+static int page_tree (pw_page *p, const pw_yaml *y, pw_error *error) {
+  char *bytes = NULL;
+  size_t size = 0;
+  FILE *f = open_memstream (&bytes, &size);
+  if (f) pw_yaml_write_tree (y, f);
+  if (f == NULL || fclose (f) != 0) {
+    free (bytes);
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  }
+  return page_add (p, "tree", bytes, size, error);
+}
+
+typedef struct {
+  pw_page *p;
+  size_t folder; /* length of the model's folder, with its slash */
+  pw_error *error;
+} page_tables;
+
+static int page_table (void *context, const char *path) {
+  page_tables *x = context;
+  return page_read (x->p, path + x->folder, path, x->error);
+}
+
+static int page_text (pw_page *p, const pw_file *f, const pw_yaml *y, pw_error *error) {
+  size_t size;
+  const char *text = pw_yaml_text_of (y, &size), *path = pw_file_path (f);
+  char *copy = malloc (size + 1);
+  page_tables x = { p, (size_t)(strrchr (path, '/') - path) + 1, error };
+  if (copy) memcpy (copy, text, size);
+  int status = page_add (p, "model", copy, size, error);
+  if (status == PW_OK) status = page_tree (p, y, error);
+  return status == PW_OK ? pw_file_tables (f, page_table, &x) : status;
+}
+
+/* ---- The page ---- */
+
+int pw_page_open (pw_page *p, const pw_file *f, pw_error *error) {
+  const char *path = pw_file_path (f);
+  const pw_yaml *y = pw_file_yaml (f);
+  *p = (pw_page){ .files = 0 };
+  if (y == NULL && !pw_ends_with (path, ".c"))
+    return pw_fail (error, PW_INPUT, "%s: a page contains the model compiled for browsers: name its source, a .c file",
+                    path);
+  int status = page_engine (p, y ? NULL : path, error);
+  return status == PW_OK && y ? page_text (p, f, y, error) : status;
+}
+
+void pw_page_close (pw_page *p) {
+  for (int i = 0; i < p->files; i++) {
+    free (p->file[i].name);
+    free (p->file[i].bytes);
+  }
+  free (p->file);
+}

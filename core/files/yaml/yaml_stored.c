@@ -1,0 +1,62 @@
+/* Trees of text models as bytes, for programs without libfyaml: interactive pages.  A node is its type, whether it is
+ * quoted, its offset and its count or, of a scalar, its size; then its entries or its text. */
+#include <string.h>
+#include "yaml.h"
+
+enum { STORED_DEPTH = 40 };
+
+typedef struct {
+  unsigned char type, quoted;
+  unsigned at, count;
+} stored_head;
+
+/* ---- Writing ---- */
+
+static void stored_write (const pw_node *n, FILE *f) {
+  int scalar = n->type == PW_YAML_SCALAR;
+  stored_head h = { n->type, n->quoted, n->at, scalar ? (unsigned)strlen (n->text) : (unsigned)n->count };
+  fwrite (&h, sizeof h, 1, f);
+  if (scalar) fwrite (n->text, 1, h.count, f);
+  for (const pw_node *entry = scalar ? NULL : n->first; entry; entry = entry->next) stored_write (entry, f);
+}
+
+void pw_yaml_write_tree (const pw_yaml *y, FILE *f) {
+  if (y->root) stored_write (y->root, f);
+}
+
+/* ---- Reading ---- */
+
+typedef struct {
+  pw_yaml *y;
+  const char *at, *end;
+} stored_bytes;
+
+static pw_node *stored_read (stored_bytes *x, int depth) {
+  stored_head h;
+  if ((size_t)(x->end - x->at) < sizeof h || depth > STORED_DEPTH) return NULL;
+  memcpy (&h, x->at, sizeof h);
+  x->at += sizeof h;
+  pw_node *n = pw_arena_alloc (&x->y->arena, sizeof *n), **to;
+  if (n == NULL || h.count > (size_t)(x->end - x->at)) return NULL;
+  *n = (pw_node){ .at = h.at, .count = (int)h.count, .type = h.type, .quoted = h.quoted };
+  if (h.type == PW_YAML_SCALAR) {
+    char *text = pw_arena_alloc (&x->y->arena, (size_t)h.count + 1);
+    if (text == NULL) return NULL;
+    memcpy (text, x->at, h.count);
+    text[h.count] = 0;
+    n->text = text;
+    n->count = 0;
+    x->at += h.count;
+    return n;
+  }
+  to = &n->first;
+  for (unsigned i = 0; i < h.count * (h.type == PW_YAML_MAP ? 2 : 1); i++, to = &(*to)->next)
+    if ((*to = stored_read (x, depth + 1)) == NULL) return NULL;
+  return n;
+}
+
+int pw_yaml_load_tree (pw_yaml *y, const char *bytes, size_t size, pw_error *error) {
+  stored_bytes x = { y, bytes, bytes + size };
+  y->root = stored_read (&x, 0);
+  return y->root ? PW_OK : pw_fail (error, PW_INPUT, "%s: the stored tree is incomplete", y->path);
+}

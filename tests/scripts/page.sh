@@ -1,0 +1,81 @@
+#!/bin/sh
+# Interactive pages: in a browser without a screen, tests/scripts/page.js changes a parameter, the method and the
+# tolerance, and the values that the page displays at the end are those of the program.  Reads PINWHEEL, BROWSER.
+
+. "$(dirname "$0")/../support/report.sh"
+here=$(cd "$(dirname "$0")" && pwd)
+
+browser=$BROWSER
+for b in chromium chromium-browser google-chrome; do
+  [ -n "$browser" ] || ! command -v $b >/dev/null || browser=$b
+done
+
+if "$pinwheel" page snakeboard -o "$work/snakeboard.html" 2>"$work/log"; then :; else
+  grep -q 'built without the engine' "$work/log"
+  report 'without the engine, the tools to install are named' $?
+  echo '# skipped: there is no compiler for WebAssembly'
+  exit $bad
+fi
+
+# browse PAGE: the verdict of page.js in $work/verdict, messages in $work/console
+browse () {
+  { sed '$d' "$1" | sed '$d'; echo '<script>'; cat "$here/page.js"; echo '</script></body></html>'; } >"$work/use.html"
+  timeout 120 "$browser" --headless --no-sandbox --disable-gpu --user-data-dir="$work/profile" --window-size=1200,800 \
+    --virtual-time-budget=30000 --enable-logging=stderr --v=0 --dump-dom "file://$work/use.html" >"$work/dom" 2>"$work/messages"
+  grep ':CONSOLE' "$work/messages" >"$work/console"
+  sed -n '/<pre id="verdict">/,/<\/pre>/p' "$work/dom" | sed 's/<[^>]*>//g' >"$work/verdict"
+}
+
+# same NAME: the positions in $work/verdict are those of $work/run.json, to 9 of the 10 digits displayed
+same () {
+  awk -F'[ ",:]+' '
+    FNR == NR && /^    "/ && /{/ { body = $2 }
+    FNR == NR && /^      "(x|y|phi)":/ { value[body "." $2] = $3; next }
+    FNR == NR { next }
+    { split ($0, word, " "); n++
+      d = word[2] - value[word[1]]
+      if (!(word[1] in value) || d > 1e-9 * (1 + value[word[1]] ^ 2) || -d > 1e-9 * (1 + value[word[1]] ^ 2)) { print; wrong = 1 } }
+    END { exit wrong || n < 3 }' "$work/run.json" "$work/verdict" >"$work/log"
+  report "$1: displays the values of the program" $?
+}
+
+# try NAME MODEL PARAMETER VALUE T_END
+try () {
+  "$pinwheel" page "$2" --t-end "$5" -o "$work/page.html" 2>"$work/log"
+  report "$1: the page is written" $?
+  ! grep -Eq '(src|href)=|https?://|@import|\bNaN\b' "$work/page.html" && tail -n 1 "$work/page.html" | grep -q '</html>'
+  report "$1: it is complete and needs nothing else" $?
+  [ -n "$browser" ] || { echo "# skipped: no browser was found to show it"; return; }
+  sed -i "s|</head>|<script>const wanted = { name: \"$3\", value: $4 };</script></head>|" "$work/page.html"
+  browse "$work/page.html"
+  "$pinwheel" run "$2" --set "$3=$4" --t-end "$5" --method erk5+projection --rtol 1e-9 --json "$work/run.json" >/dev/null 2>&1
+  same "$1"
+  [ ! -s "$work/console" ]
+  report "$1: nothing on the console" $?
+  cat "$work/console"
+}
+
+try snakeboard snakeboard swing 0.55 10
+try 'a model in C' models/ezyroller.c a 0.7 10
+try 'redundant constraints' models/redundant-parallelogram.c length 1.25 3
+
+cat >"$work/table.yaml" <<'Y'
+pinwheel: 1
+parameters: [{name: k, value: 2}]
+bodies: [{name: sled, mass: 2, inertia: 0.5}]
+elements:
+  - {push: push, body: sled, fx: {table: {file: push.csv, columns: [t, fx]}}}
+Y
+printf 't,fx\n0,0\n1,3\n5,-1\n' >"$work/push.csv"
+
+"$pinwheel" page ezyroller -o "$work/x.html" 2>"$work/log"
+[ $? = 2 ] && grep -q 'name its source' "$work/log"
+report 'a compiled model without its source is refused' $?
+"$pinwheel" page snakeboard --method ida+ggl -o "$work/x.html" 2>"$work/log"
+[ $? = 2 ] && grep -q 'pages have rk4, erk5 and erk8' "$work/log" && [ ! -e "$work/x.html" ]
+report 'a method that pages do not have is refused' $?
+"$pinwheel" page snakeboard -o "$work/x.pdf" 2>"$work/log"
+[ $? = 2 ] && grep -q 'ends in .html' "$work/log"
+report 'another ending is refused' $?
+
+exit $bad
