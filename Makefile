@@ -72,9 +72,10 @@ TESTS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(QUICK)))
 SLOWS     := $(patsubst %.c,$(BUILD)/tests/%,$(notdir $(SLOW)))
 PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
-# The engine of interactive pages, if there are tools to compile it.
-WASM_CC   ?= clang
-PAGE      := $(if $(and $(shell command -v $(WASM_CC)),$(shell command -v wasm-ld),$(wildcard /usr/include/wasm32-wasi/stdio.h)),$(addprefix $(BUILD)/page/,libpinwheel-page.a pinwheel.wasm))
+# The engine of interactive pages, if there are tools to compile it; builds that check the code do not need another.
+WASM_CC   ?= $(if $(findstring ccache,$(CC)),ccache )clang
+WASI      := $(if $(findstring /variant/,$(BUILD)),,$(wildcard /usr/include/wasm32-wasi/stdio.h))
+PAGE      := $(if $(and $(WASI),$(shell command -v $(lastword $(WASM_CC))),$(shell command -v wasm-ld)),$(addprefix $(BUILD)/page/,libpinwheel-page.a pinwheel.wasm))
 
 # Targets of fuzzing; with replay.c they are programs that take files.
 FUZZ_SHARE := tests/fuzz/fuzz.c $(if $(FUZZING),,tests/fuzz/replay.c)
@@ -196,7 +197,7 @@ $(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp)
 WASM_FLAGS := --target=wasm32-wasi -std=c11 -O2 -ffp-contract=off -ffunction-sections -fdata-sections \
   -D_POSIX_C_SOURCE=200809L -D_WASI_EMULATED_SIGNAL -include core/cli/page/engine/wasi.h '-DPW_METHODS=PW_METHOD (rk4) PW_METHOD (erk5) PW_METHOD (erk8)' \
   $(call layer,$(CORE_LAYERS) core/kinds $(SOLVER_LAYERS) $(FILE_LAYERS) core/cli core/cli/plot $(BUILD)/obj/core/cli/plot) $(SYSTEM)
-WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/implicit/% solvers/sundials/%,$(CORE) $(SOLVERS)) \
+WASM       := $(filter-out solvers/jacobian/sparse.c solvers/analysis/% solvers/implicit/% solvers/sundials/% core/specialise/specialise_%,$(CORE) $(SOLVERS)) \
   $(filter-out core/files/yaml/yaml_tree.c,$(wildcard core/files/expression/*.c core/files/yaml/*.c)) \
   $(addprefix core/files/,number.c load/columns.c load/units.c load/read.c) $(addprefix core/cli/plot/,plot_samples.c plot_shapes.c plot_figures.c animate.c) \
   $(wildcard core/cli/page/engine/*.c)
