@@ -2,7 +2,7 @@
 # What the manual and the other pages show is what the program prints: each block that begins with "$ build/pinwheel" is run,
 # and its lines are found in the output, in their order.  Numbers agree to 1 %, or both are below 1e-6 in size, or the line is
 # about what is the machine's alone: times, and what a drifting method does at a singular configuration.
-# Run from the top folder; reads PINWHEEL.
+# A YAML block after "save as `NAME`:" becomes a file for the commands after it.  Run from the top folder; reads PINWHEEL.
 
 . "$(dirname "$0")/../support/report.sh"
 
@@ -11,6 +11,15 @@ blocks () {
   awk '/^    \$ build\/pinwheel / { shown = 1; print "# " substr ($0, 22); next }
        NF && !/^    / { shown = 0 }
        shown && NF { print substr ($0, 5) }' "$1"
+}
+
+# files FILE: writes the YAML blocks that a page names, in $work.
+files () {
+  awk -v work="$work" '
+    /[Ss]ave as `[^`]*`:$/ { name = $0; sub (/.*[Ss]ave as `/, "", name); sub (/`:$/, "", name) }
+    /^```$/ && writing { close (work "/" name); writing = 0; name = "" }
+    writing { print > (work "/" name) }
+    /^```yaml$/ && name != "" { writing = 1 }' "$1"
 }
 
 # The lines of standard input that are not in the file, from the first that is missing on.
@@ -38,6 +47,7 @@ missing () {
 for page in README.md docs/*.md; do
   [ -z "$(blocks "$page")" ] && continue
   blocks "$page" >"$work/page"
+  files "$page"
   grep -n '^# ' "$work/page" | while IFS=: read -r at command; do
     command=${command#\# }
     (cd "$work" && eval "\"$pinwheel\" $command" >out 2>&1 </dev/null)
