@@ -75,7 +75,7 @@ PROGRAM   := $(BUILD)/pinwheel
 # The engine of interactive pages, if there are tools to compile it; builds that check the code do not need another.
 WASM_CC   ?= $(if $(findstring ccache,$(CC)),ccache )clang
 WASI      := $(if $(findstring /variant/,$(BUILD)),,$(wildcard /usr/include/wasm32-wasi/stdio.h))
-PAGE      := $(if $(and $(WASI),$(shell command -v $(lastword $(WASM_CC))),$(shell command -v wasm-ld)),$(addprefix $(BUILD)/page/,libpinwheel-page.a pinwheel.wasm))
+PAGE      := $(if $(and $(WASI),$(shell command -v $(lastword $(WASM_CC))),$(shell command -v wasm-ld)),$(addprefix $(BUILD)/page/,pinwheel-page.objects pinwheel.wasm))
 
 # Targets of fuzzing; with replay.c they are programs that take files.
 FUZZ_SHARE := tests/fuzz/fuzz.c $(if $(FUZZING),,tests/fuzz/replay.c)
@@ -109,6 +109,7 @@ help:
 	@echo 'make cov              lines that the tests run, and those they do not'
 	@echo 'make tsan             runs in many threads with ThreadSanitizer; valgrind: some tests with memcheck'
 	@echo 'make format           clang-format on all sources; format-check: complain only'
+	@echo 'make deb              a Debian package, in $(BUILD)/deb/'
 	@echo 'make install          to PREFIX (/usr/local) below DESTDIR; uninstall'
 	@echo 'make clean            remove $(BUILD)/'
 	@echo
@@ -210,11 +211,11 @@ $(BUILD)/wasm/%.o: %.c $(BUILD)/obj/core/cli/plot/animate.inc $(BUILD)/obj/core/
 $(BUILD)/wasm/core/specialise/%.o: WASM_FLAGS += -iquote $(BUILD)/obj/core/specialise
 -include $(WASM_OBJ:.o=.d)
 
-$(BUILD)/page/libpinwheel-page.a: $(WASM_OBJ)
+$(BUILD)/page/pinwheel-page.objects: $(WASM_OBJ)
 	@mkdir -p $(@D)
 	@rm -f $@
 	$(Q)$(AR) rcs $@ $^
-$(BUILD)/page/pinwheel.wasm: $(BUILD)/page/libpinwheel-page.a
+$(BUILD)/page/pinwheel.wasm: $(BUILD)/page/pinwheel-page.objects
 	$(Q)$(WASM_CC) $(WASM_FLAGS) -mexec-model=reactor -Wl,--gc-sections,--allow-undefined,--strip-all,-z,stack-size=1048576,--whole-archive $< -Wl,--no-whole-archive -o $@
 
 # Texts of the sources that specialised scenes contain.
@@ -497,6 +498,16 @@ install: all
 	install -m 644 $(filter docs/%,$(DOCS)) "$(D)/$(share)/docs"
 	install -m 644 $(FIGURES) "$(D)/$(share)/docs/figures"
 	install -m 644 $(EXAMPLES) "$(D)/$(share)/examples"
+
+# A Debian package, in $(BUILD)/deb/.
+deb:
+	@rm -rf $(BUILD)/deb
+	@mkdir -p $(BUILD)/deb/pinwheel
+	@git ls-files | xargs cp --parents -t $(BUILD)/deb/pinwheel
+	@cp -r .ci/debian $(BUILD)/deb/pinwheel
+	@printf 'pinwheel (%s) unstable; urgency=medium\n\n  * Version %s.\n\n -- The Pinwheel authors <pinwheel@example.org>  %s\n' \
+	  $(VERSION) $(VERSION) "$$(date -R)" >$(BUILD)/deb/pinwheel/debian/changelog
+	@cd $(BUILD)/deb/pinwheel && dpkg-buildpackage -b -uc -us
 
 # Removes what install put there and the directories that only Pinwheel uses, if they are empty.
 uninstall:
