@@ -55,6 +55,48 @@ void pw_linear_free (pw_linear *l);
  * INFINITY if im = 0 and re >= 0. */
 double pw_rk4_limit (double re, double im);
 
+/* ---- Derivatives of a run (variation.c) ---- */
+
+/* What the motion is differentiated with respect to: a number p that changes the system, the initial state, or both.
+ *
+ * Its effect is computed by differences of four neighbouring runs, opened by the caller with the method and settings of
+ * the run, at p + k step with k = -2, -1, 1, 2 (one_sided: 0, 1, 2, 4, at the end of a domain).  Their systems have the
+ * bodies and elements of the run's.  They are only evaluated, never advanced, and must outlive the derivatives.
+ * Steps of 1e-5 of p leave an error of about 1e-10.
+ *
+ * `initial` (2 x coordinates) in their place is the derivative of the state (q, v) reached, consistent with the
+ * constraints. */
+typedef struct {
+  pw_run *neighbour[4]; /* NULL with `initial` */
+  double step;          /* in the unit of p; not 0 */
+  int one_sided;
+  const double *initial; /* copied; NULL with neighbours */
+} pw_direction;
+
+/* Derivatives of the motion of a run, integrated with it. */
+typedef struct pw_variation pw_variation;
+
+/* Begins at the state reached: with neighbours, a run that has not advanced.  The run, which is also advanced by
+ * pw_variation_advance alone from now on, must outlive the derivatives.  ledger: with derivatives of work and losses, at
+ * about twice the cost.  Errors: PW_INPUT if a system differs in its bodies or elements, or the run holds inputs;
+ * PW_METHOD if the state or a breakpoint is not differentiable; PW_RESOURCE. */
+pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error);
+
+/* Advances the run and the derivatives to time t <= t_end, which is then in the last step of the run.  Returns as
+ * pw_run_advance; also PW_METHOD where the motion is not differentiable. */
+int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error);
+
+/* The derivative along direction i of the sample at the time reached by pw_variation_advance: each number in it is that
+ * of the sample differentiated at constant time (residuals, projection, balance: 0; without `ledger`, work, loss and
+ * ledger: NaN).  error_of, unless NULL, receives its difference from the one with doubled `step`, divided by 3: a bound
+ * on the error of the differences.  Arrays are valid until the next call. */
+int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
+
+/* Evaluations of the linearised equations so far, each of about 6 evaluations of the accelerations. */
+long pw_variation_evaluations (const pw_variation *x);
+
+void pw_variation_close (pw_variation *x);
+
 PW_END
 
 #endif

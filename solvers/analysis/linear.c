@@ -42,7 +42,7 @@ static int linear_open (pw_linearisation *x, int all) {
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 
-static void linear_close (pw_linearisation *x) {
+void pw_linear_close (pw_linearisation *x) {
   pw_newton_close (&x->newton);
   pw_scatter_close (&x->scatter);
   free (x->colptr);
@@ -108,7 +108,7 @@ static int linear_run (pw_run *r, int most, int modes, pw_linear *l, pw_error *e
   l->unknowns = x.size;
   if (status == PW_OK) status = linear_open (&x, all);
   if (status == PW_OK && all) status = linear_compute (&x, l, error);
-  linear_close (&x);
+  pw_linear_close (&x);
   r->statistics = before;
   r->near = near;
   return status == PW_RESOURCE ? pw_fail_memory (r->s, error) : status;

@@ -49,6 +49,9 @@ typedef struct {
 /* Round-off of derivatives of moderate size, relative to them. */
 #define PW_LINEAR_SYMMETRIC 1e-9
 
+/* Frees its arrays. */
+void pw_linear_close (pw_linearisation *x);
+
 /* ---- linear_variation.c ---- */
 
 /* Records the scatter map of the derivatives.  PW_OK or PW_RESOURCE. */
@@ -57,7 +60,8 @@ int pw_linear_derivatives (pw_linearisation *x);
 double pw_linear_bases (pw_linearisation *x);
 /* Evaluates accelerations and derivatives at a state; kinematics are left there.  Returns as pw_run_accelerate. */
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v);
-/* Computes y and da from the variation x. */
+/* Computes y from the variation x; y and da. */
+void pw_linear_multiply (pw_linearisation *x);
 void pw_linear_vary (pw_linearisation *x);
 /* Sets x to the variation along minimal coordinate c. */
 void pw_linear_tangent (pw_linearisation *x, int c);

@@ -72,10 +72,14 @@ int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const do
   return PW_OK;
 }
 
-void pw_linear_vary (pw_linearisation *x) {
+void pw_linear_multiply (pw_linearisation *x) {
   memset (x->y, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->y);
   for (int j = 0; j < 2 * x->n; j++)
     for (int64_t i = x->colptr[j]; i < x->colptr[j + 1]; i++) x->y[x->rowind[i]] += x->value[i] * x->x[j];
+}
+
+void pw_linear_vary (pw_linearisation *x) {
+  pw_linear_multiply (x);
   for (int j = 0; j < x->n; j++) x->da[j] = -x->y[j];
   pw_saddle_solve (x->r->saddle, x->da, x->y + x->n, x->da, x->z);
 }

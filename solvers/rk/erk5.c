@@ -11,12 +11,12 @@ static const double erk5_A[] = {
 };
 static const double erk5_b[] = { 35. / 384, 0, 500. / 1113, 125. / 192, -2187. / 6784, 11. / 84 };
 static const double erk5_e[] = { 71. / 57600, 0, -71. / 16695, 71. / 1920, -17253. / 339200, 22. / 525, -1. / 40 };
-static const pw_tableau erk5_tableau = {
+const pw_tableau pw_erk5_tableau = {
   .stages = 6, .order = 5, .c = erk5_c, .A = erk5_A, .b = erk5_b, .e = erk5_e, .exponent = 1. / 5, .memory = 0.04
 };
 
 static int erk5_open (pw_run *r, pw_error *error) {
-  return pw_rk_open (r, &erk5_tableau, error);
+  return pw_rk_open (r, &pw_erk5_tableau, error);
 }
 
 const pw_method pw_method_erk5 = {

@@ -17,6 +17,8 @@ typedef struct {
   double memory;    /* of the previous error in the step size (Gustafsson 1991) */
 } pw_tableau;
 
+extern const pw_tableau pw_erk5_tableau;
+
 /* For the table of each method. */
 int pw_rk_open (pw_run *r, const pw_tableau *tableau, pw_error *error);
 int pw_rk_advance (pw_run *r, double t_end, pw_error *error);

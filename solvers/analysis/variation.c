@@ -1,0 +1,222 @@
+/* Derivatives of a motion: the variational equations, integrated with a run.
+ *
+ * With y = (q, v) and a number p, at constant time,
+ *
+ *     dq' = dv,   dv' = da,
+ *     [ M J^T ; J 0 ] (da, dlambda) = ( (f_q - (J^T lambda)_q) dq + f_v dv, (gamma_q - (J a)_q) dq + gamma_v dv )
+ *                                     + d/dp ( f - M a - J^T lambda, gamma - J a ),
+ *
+ * the first part by the exact blocks of the element types (linear_variation.c), the second by differences of the systems
+ * of neighbouring runs, at the state of this one (variation_effect.c).  Initial values of dq and dv are differences of
+ * the neighbours' consistent initial states.  Each quantity is computed with two steps of p; from both follow the
+ * result, extrapolated (Richardson), and its error.
+ *
+ * One method serves all runs: the explicit pair of order 5 (variation_step.c) along the states that the run has reached,
+ * with steps of its own, between which it ends at samples and breakpoints.  Steps of a run with a fixed step are usually
+ * much smaller; a linearisation costs about 6 evaluations of the accelerations.  The result is therefore the derivative
+ * of the motion that the run follows, to 1e-10 or the accuracy of its states, not that of its discretisation error.
+ *
+ * After each step dq and dv are projected onto the tangent of the constraints,
+ *
+ *     G dq + dg/dp = 0,   J dv + ((J v)_q - eta_q) dq + d (J v - eta)/dp = 0,
+ *
+ * in the metric of the mass matrix. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "util.h"
+#include "variation.h"
+
+/* ---- Opening ---- */
+
+static int variation_linear (pw_variation *x) {
+  pw_linearisation *l = &x->linear;
+  size_t n = (size_t)x->n, m = (size_t)x->m;
+  *l = (pw_linearisation){ .r = x->r, .n = x->n, .m = x->m };
+  const pw_array array[] = { { &l->a, n + 3 },  { &l->lambda, m }, { &l->x, 2 * n },    { &l->y, n + 2 * m },
+                             { &l->da, n + 3 }, { &l->c, m },      { &l->z, n + m + 3 } };
+  l->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  return l->memory ? pw_linear_derivatives (l) : PW_RESOURCE;
+}
+
+static int variation_arrays (pw_variation *x) {
+  size_t n = (size_t)x->n, m = (size_t)x->m, entries = (size_t)x->r->s->entries, size = (size_t)x->size;
+  size_t all = 3 * n + 4 * m + entries + 9, sample = 3 * n + m + entries;
+  const pw_array array[] = { { &x->q, n + 3 },         { &x->v, n + 3 },    { &x->scratch, all },
+                             { &x->values, 2 * all },  { &x->output, all }, { &x->sample[0], sample },
+                             { &x->sample[1], sample } };
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  for (int i = 0; x->memory && i < x->count; i++) {
+    pw_direction_copy *d = &x->direction[i];
+    pw_array own[8 + 2 * (3 + PW_VARIATION_RATES)], *a = own;
+    for (int c = 0; c < 2; c++) {
+      pw_variation_column *k = &d->column[c];
+      *k = (pw_variation_column){ .direction = d, .which = c };
+      *a++ = (pw_array){ &d->effect[c], n + m };
+      *a++ = (pw_array){ &d->row[c], 2 * m };
+      *a++ = (pw_array){ &k->Y, size };
+      *a++ = (pw_array){ &k->trial, size };
+      *a++ = (pw_array){ &k->lambda, m };
+      for (int j = 0; j < PW_VARIATION_RATES; j++) *a++ = (pw_array){ &k->K[j], size };
+    }
+    d->memory = pw_alloc_arrays (own, (size_t)(a - own));
+    if (d->memory == NULL) return PW_RESOURCE;
+  }
+  return x->memory ? PW_OK : PW_RESOURCE;
+}
+
+/* A neighbour has the same elements, whose constraint equations are the same ones. */
+static int variation_check (const pw_variation *x, const pw_direction *d, int i, pw_error *error) {
+  const pw_system *s = x->r->s;
+  if (d->initial) return PW_OK;
+  for (int k = 0; k < PW_VARIATION_NEAR; k++) {
+    const pw_system *other = d->neighbour[k] ? d->neighbour[k]->s : NULL;
+    if (other == NULL || d->step == 0 || !isfinite (d->step))
+      return pw_fail (error, PW_INPUT, "direction %d: expected neighbours and a step that is not 0, or `initial`",
+                      i + 1);
+    if (other->coords != s->coords || other->rows != s->rows || other->holonomic != s->holonomic ||
+        other->entries != s->entries || other->batches != s->batches || d->neighbour[k]->redundant != x->r->redundant)
+      return pw_fail (error, PW_INPUT, "direction %d: the number of bodies, elements or equations changes", i + 1);
+  }
+  return PW_OK;
+}
+
+/* Initial derivatives. */
+static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_direction *given, pw_error *error) {
+  int n = x->n;
+  d->given = *given;
+  d->columns = given->initial ? 1 : 2;
+  for (int c = 0; c < d->columns; c++) {
+    double *Y = d->column[c].trial;
+    if (given->initial) memcpy (Y, given->initial, 2 * (size_t)n * sizeof *Y);
+    for (int i = 0; i < PW_VARIATION_NEAR && given->initial == NULL; i++) {
+      const pw_run *r = given->neighbour[i];
+      double weight = pw_variation_weight (given, c, i);
+      for (int j = 0; j < n; j++) Y[j] += weight * (r->q[j] - x->r->q[j]), Y[n + j] += weight * (r->v[j] - x->r->v[j]);
+    }
+  }
+  for (int i = 0; i < PW_VARIATION_NEAR; i++) d->breakpoint[i] = x->t;
+  return pw_variation_look_ahead (x, d, x->r->breakpoint, error);
+}
+
+static int variation_open (pw_variation *x, const pw_direction *d, pw_error *error) {
+  pw_run *r = x->r;
+  if (pw_run_option (r, "inputs") != 0)
+    return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
+  for (int i = 0; i < x->count; i++)
+    if (variation_check (x, &d[i], i, error) != PW_OK) return PW_INPUT;
+  x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);
+  if (x->direction == NULL || variation_arrays (x) != PW_OK || variation_linear (x) != PW_OK)
+    return pw_fail_memory (r->s, error);
+  int status = pw_variation_record (x, x->t, error);
+  for (int i = 0; i < x->count && status == PW_OK; i++) status = variation_start (x, &x->direction[i], &d[i], error);
+  if (status != PW_OK) return status;
+  memcpy (x->q, r->q, (size_t)x->n * sizeof *x->q);
+  memcpy (x->v, r->v, (size_t)x->n * sizeof *x->v);
+  status = pw_variation_evaluate (x, x->t, error);
+  return status == PW_OK ? pw_variation_begin (x, error) : status;
+}
+
+pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, int ledger, pw_error *error) {
+  if (pw_require (r, "a run", error) != PW_OK || pw_require (d, "directions", error) != PW_OK) return NULL;
+  pw_variation *x = calloc (1, sizeof *x);
+  if (x == NULL) {
+    pw_fail_memory (r->s, error);
+    return NULL;
+  }
+  *x = (pw_variation){
+    .r = r, .n = r->s->coords, .m = r->s->rows, .entries = r->s->entries, .count = count, .ledger = ledger
+  };
+  x->size = 2 * x->n + (ledger ? x->entries : 0);
+  x->t = r->t;
+  x->passed = -INFINITY;
+  x->h = 1e-3 * r->w->scale.time;
+  if (variation_open (x, d, error) == PW_OK) return x;
+  pw_variation_close (x);
+  return NULL;
+}
+
+void pw_variation_close (pw_variation *x) {
+  if (x == NULL) return;
+  for (int i = 0; x->direction && i < x->count; i++) free (x->direction[i].memory);
+  for (int i = 0; i < x->room; i++) free (x->point[i].x);
+  pw_linear_close (&x->linear);
+  free (x->point);
+  free (x->direction);
+  free (x->memory);
+  free (x);
+}
+
+long pw_variation_evaluations (const pw_variation *x) {
+  return x->evaluations;
+}
+
+/* ---- Advancing ---- */
+
+/* Advances the run until its states cover the next step of the derivatives. */
+static int variation_lead (pw_variation *x, double t, double t_end, pw_error *error) {
+  pw_run *r = x->r;
+  double to = fmin (t, x->t + x->h);
+  int status = PW_OK;
+  while (status == PW_OK && r->t < to && x->points < PW_VARIATION_POINTS && (r->t < r->breakpoint || r->t == x->t)) {
+    double t0 = r->t;
+    status = pw_run_advance (r, t_end, error);
+    if (status == PW_OK && r->t > t0) status = pw_variation_record (x, t0, error);
+  }
+  return status;
+}
+
+int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error) {
+  pw_run *r = x->r;
+  int status = PW_OK;
+  while (status == PW_OK && x->t < fmin (t, t_end)) {
+    if (x->t == r->breakpoint && x->passed < x->t) {
+      status = pw_variation_pass (x, error);
+      if (status == PW_OK) status = pw_variation_begin (x, error);
+    }
+    if (status == PW_OK) status = variation_lead (x, t, t_end, error);
+    if (status == PW_OK && pw_run_asked (r)) return PW_STOPPED;
+    if (status == PW_OK) status = pw_variation_step (x, fmin (t, r->t), error);
+    pw_variation_forget (x);
+  }
+  return status;
+}
+
+/* ---- Samples ---- */
+
+static void variation_fill (const pw_variation *x, double *out, const double *output, const pw_variation_column *c,
+                            double weight) {
+  int n = x->n, length = 2 * n, entries = x->entries;
+  for (int j = 0; j < length; j++) out[j] += weight * c->Y[j];
+  for (int j = 0; j < n; j++) out[length + j] += weight * c->K[0][n + j];
+  for (int i = 0; i < x->m; i++) out[3 * n + i] += weight * output[2 + entries + i];
+  for (int i = 0; i < entries; i++) out[3 * n + x->m + i] += x->ledger ? weight * c->Y[length + i] : NAN;
+}
+
+/* One combination of the columns' samples. */
+static int variation_combine (pw_variation *x, const pw_direction_copy *d, const double *weight, double *out,
+                              pw_sample *sample) {
+  int n = x->n;
+  const double *ledger = out + 3 * n + x->m;
+  memset (out, 0, (size_t)(3 * n + x->m + x->entries) * sizeof *out);
+  *sample = (pw_sample){ .t = x->t, .q = out, .v = out + n, .a = out + 2 * n, .lambda = out + 3 * n, .ledger = ledger };
+  for (const pw_variation_column *c = d->column; c < d->column + d->columns; c++) {
+    if (pw_variation_outputs (x, c, c->Y, x->output) != PW_OK) return PW_METHOD;
+    variation_fill (x, out, x->output, c, weight[c->which]);
+    sample->kinetic += weight[c->which] * x->output[0];
+    sample->potential += weight[c->which] * x->output[1];
+  }
+  for (int i = 0; i < x->entries; i++)
+    *(x->r->s->entry[i].type == PW_WORK ? &sample->work : &sample->loss) += ledger[i];
+  return PW_OK;
+}
+
+int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error) {
+  static const double two[2][2] = { { 4. / 3, -1. / 3 }, { 1. / 3, -1. / 3 } }, one[2][2] = { { 1, 0 }, { 0, 0 } };
+  const pw_direction_copy *d = &x->direction[i];
+  const double (*weight)[2] = d->columns > 1 ? two : one;
+  int status = variation_combine (x, d, weight[0], x->sample[0], derivative);
+  if (status == PW_OK && error_of) status = variation_combine (x, d, weight[1], x->sample[1], error_of);
+  (void)pw_evaluate_J_at (x->r->w, x->at, x->q, x->v);
+  return status == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", x->t);
+}

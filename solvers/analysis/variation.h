@@ -1,0 +1,103 @@
+/* Derivatives of a run in progress; for variation*.c only.  Equations in variation.c.  n coordinates, m constraint
+ * equations. */
+#ifndef PW_VARIATION_H
+#define PW_VARIATION_H
+
+#include "linear.h"
+
+enum {
+  PW_VARIATION_NEAR = 4,    /* neighbouring runs of a direction */
+  PW_VARIATION_RATES = 7,   /* stages of a step, and the derivative at its end */
+  PW_VARIATION_POINTS = 256 /* most states of the run between the derivatives' time and its own */
+};
+
+/* One derivative: along a direction, with neighbours at `step` or at twice that. */
+typedef struct {
+  const struct pw_direction_copy *direction;
+  int which;                     /* 0, 1 */
+  double *Y;                     /* size: dq, dv, d ledger, the latter only with `ledger` */
+  double *K[PW_VARIATION_RATES]; /* size: time derivatives of Y at the stages */
+  double *lambda;                /* m: d lambda at the state last evaluated */
+  double *trial;                 /* size: Y at a stage, or at the end of a step */
+  double slope;                  /* derivative of the breakpoint being passed */
+  double largest;                /* norm of Y so far, in units of the scene */
+} pw_variation_column;
+
+typedef struct pw_direction_copy {
+  pw_direction given;
+  int columns; /* 2, or 1 with `initial` */
+  pw_variation_column column[2];
+  double breakpoint[PW_VARIATION_NEAR]; /* of the neighbours: the next one */
+  double first, last;                   /* times between which no neighbour has a breakpoint */
+  double *effect[2];                    /* n + m: derivatives of f - M a - J^T lambda, gamma - J a by the parameter */
+  double *row[2];                       /* 2 m: of g, J v - eta */
+  char *memory;
+} pw_direction_copy;
+
+/* A state of the run: t, q, v, a. */
+typedef struct {
+  double t, *x; /* 3 n */
+} pw_variation_point;
+
+struct pw_variation {
+  pw_run *r;
+  int n, m, entries, size, count; /* size: 2 n + entries; count: directions */
+  int ledger;
+  pw_direction_copy *direction; /* count */
+  pw_linearisation linear;      /* at the state last evaluated */
+  double t;                     /* of the derivatives */
+  double at;                    /* time of the state last evaluated */
+  double h;                     /* next step */
+  double *q, *v;                /* n: the state last evaluated */
+  double *scratch;              /* 4 (2 n + m + entries + 3) */
+  double *values, *output;      /* the same, 2 + m + entries: of pw_variation_outputs */
+  double *sample[2];            /* 3 n + m + entries: results */
+  int points, room;
+  pw_variation_point *point; /* room: states of the run from t on */
+  double passed;             /* the last breakpoint that the derivatives have passed */
+  long evaluations;
+  char *memory;
+};
+
+#define PW_EACH_COLUMN(c, x)                                                        \
+  for (pw_direction_copy *d = (x)->direction; d < (x)->direction + (x)->count; d++) \
+    for (pw_variation_column *c = d->column; c < d->column + d->columns; c++)
+
+/* ---- variation_path.c ---- */
+
+/* Appends the last step of the run, from time t0, to the states.  A status. */
+int pw_variation_record (pw_variation *x, double t0, pw_error *error);
+/* Forgets states before t. */
+void pw_variation_forget (pw_variation *x);
+/* The state at a time, by Hermite interpolation with q, v, a at both ends: 3 n numbers. */
+void pw_variation_state (const pw_variation *x, double t, double *out);
+
+/* ---- variation_effect.c ---- */
+
+/* Evaluates the linearised equations, and the effects of parameters, at (t, x->q, x->v).  A status. */
+int pw_variation_evaluate (pw_variation *x, double t, pw_error *error);
+/* The time derivative of every column's `trial` at the state evaluated, into K[k]. */
+int pw_variation_rates (pw_variation *x, int k);
+/* Projects every column's `trial` onto the linearised constraints at the state evaluated. */
+void pw_variation_project (pw_variation *x);
+/* Derivatives of kinetic and potential energy, the ledger's rates, least-norm multipliers along a column: 2 + entries + m
+ * numbers.  Non-zero if a signal fails. */
+int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out);
+
+/* ---- variation_step.c ---- */
+
+/* Makes every column's `trial`, projected, its derivatives at the state evaluated. */
+int pw_variation_begin (pw_variation *x, pw_error *error);
+/* A step that does not pass t1, up to which there are states. */
+int pw_variation_step (pw_variation *x, double t1, pw_error *error);
+
+/* ---- variation_breakpoint.c ---- */
+
+/* Weight of neighbour i in the derivative by differences with `step` (which = 0) or twice that (1). */
+double pw_variation_weight (const pw_direction *d, int which, int i);
+/* Finds the neighbours' breakpoints that correspond to the next one of the run. */
+int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error);
+/* Passes the breakpoint at which run and derivatives have arrived. */
+int pw_variation_pass (pw_variation *x, pw_error *error);
+
+#endif

@@ -1,0 +1,87 @@
+/* Breakpoints that move with a parameter.  At a breakpoint t_b the accelerations jump from a- to a+ and the states do not;
+ * the derivatives of the states at constant time therefore jump by
+ *
+ *     dv+ = dv- + (a- - a+) dt_b/dp
+ *
+ * (Rozenvasser 1967; Hairer, Norsett & Wanner 1993, section I.14, for smooth problems).  dt_b/dp comes from the breakpoints
+ * of the neighbouring runs. */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+#include "variation.h"
+
+/* Differences with two steps must agree to this, relative to the movement; curvature over a step is far smaller. */
+static const double BREAKPOINT_SMOOTH = 1e-3;
+
+double pw_variation_weight (const pw_direction *d, int which, int i) {
+  static const double central[2][PW_VARIATION_NEAR] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
+  static const double one_sided[2][PW_VARIATION_NEAR] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
+  return (d->one_sided ? one_sided : central)[which][i] / d->step;
+}
+
+static double breakpoint_derivative (const pw_direction_copy *d, int which) {
+  double sum = 0;
+  for (int i = 0; i < PW_VARIATION_NEAR; i++) sum += pw_variation_weight (&d->given, which, i) * d->breakpoint[i];
+  return sum;
+}
+
+/* 1 if the neighbours' breakpoints lie smoothly around the run's. */
+static int breakpoint_smooth (const pw_direction_copy *d, double next) {
+  double most = 0, mean = 0, step = fabs (d->given.step), round = 64 * DBL_EPSILON * (1 + fabs (next));
+  for (int i = 0; i < PW_VARIATION_NEAR; i++) {
+    most = fmax (most, fabs (d->breakpoint[i] - next));
+    mean += (d->breakpoint[i] - next) / PW_VARIATION_NEAR;
+  }
+  double allowed = BREAKPOINT_SMOOTH * most + round;
+  if (!d->given.one_sided && !(fabs (mean) <= allowed)) return 0;
+  return fabs (breakpoint_derivative (d, 0) - breakpoint_derivative (d, 1)) * step <= allowed;
+}
+
+int pw_variation_look_ahead (pw_variation *x, pw_direction_copy *d, double next, pw_error *error) {
+  int infinite = 0;
+  d->first = d->last = d->columns > 1 ? d->breakpoint[0] : -INFINITY;
+  for (int i = 0; i < PW_VARIATION_NEAR && d->columns > 1; i++) {
+    pw_run *r = d->given.neighbour[i];
+    d->first = fmax (d->first, d->breakpoint[i]);
+    d->breakpoint[i] = pw_next_breakpoint (r->w, r->method->order > 2, d->breakpoint[i]);
+    if (isnan (d->breakpoint[i])) return pw_fail (error, PW_METHOD, "a signal has no next breakpoint");
+    infinite += isinf (d->breakpoint[i]) != 0;
+  }
+  d->last = INFINITY;
+  for (int i = 0; i < PW_VARIATION_NEAR && d->columns > 1; i++) d->last = fmin (d->last, d->breakpoint[i]);
+  if (d->columns == 1 || (infinite == PW_VARIATION_NEAR && isinf (next))) return PW_OK;
+  if (infinite == 0 && isfinite (next) && breakpoint_smooth (d, next)) return PW_OK;
+  return pw_fail (error, PW_METHOD,
+                  "t = %.6g s: the order of breakpoints changes with the parameter of direction %d: the motion is not "
+                  "differentiable",
+                  x->t, (int)(d - x->direction) + 1);
+}
+
+/* The right-hand state's velocities must satisfy the constraints, or they jump. */
+static int breakpoint_check (pw_variation *x, pw_error *error) {
+  pw_residuals now;
+  pw_evaluate_velocity_residual (x->r->w, x->r->active, &now);
+  if (!(now.velocity > 1e-6)) return PW_OK;
+  return pw_fail (error, PW_METHOD, "t = %.6g s: prescribed velocities jump: the motion is not differentiable", x->t);
+}
+
+int pw_variation_pass (pw_variation *x, pw_error *error) {
+  int n = x->n, status = PW_OK;
+  double *before = x->values, next;
+  memcpy (before, x->linear.a, (size_t)n * sizeof *before);
+  next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
+  PW_EACH_COLUMN (c, x) c->slope = d->columns > 1 ? breakpoint_derivative (d, c->which) : 0;
+  for (int i = 0; i < x->count && status == PW_OK; i++) {
+    pw_direction_copy *d = &x->direction[i];
+    status = pw_variation_look_ahead (x, d, next, error);
+  }
+  if (status == PW_OK) status = pw_variation_evaluate (x, x->t, error);
+  if (status == PW_OK) status = breakpoint_check (x, error);
+  if (status != PW_OK) return status;
+  PW_EACH_COLUMN (c, x) {
+    memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
+    for (int j = 0; j < n; j++) c->trial[n + j] += (before[j] - x->linear.a[j]) * c->slope;
+  }
+  x->passed = x->t;
+  return PW_OK;
+}

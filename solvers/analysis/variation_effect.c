@@ -1,0 +1,159 @@
+/* The linearised equations at a state: effects of the state, exact, and of parameters, by differences of neighbours. */
+#include <math.h>
+#include <string.h>
+#include "util.h"
+#include "rank.h"
+#include "variation.h"
+
+/* ---- Effects of parameters ---- */
+
+static void effect_add (double *to, const double *from, double weight, int n) {
+  for (int i = 0; i < n; i++) to[i] += weight * from[i];
+}
+
+/* f - M a - J^T lambda, gamma - J a, g (0 for nonholonomic equations), J v - eta in a neighbour's system at the state
+ * of the run.  In the run itself all are 0. */
+static int effect_residuals (pw_variation *x, pw_run *r, double t, double *out) {
+  const pw_linearisation *l = &x->linear;
+  int n = x->n, m = x->m, status = pw_evaluate_J_at (r->w, t, x->q, x->v);
+  double *gamma = out + n, *g = gamma + m, *v = g + m, *f = l->z, *scratch = l->c;
+  if (status != PW_OK) return status;
+  pw_evaluate_force (r->w, f);
+  for (int i = 0; i < m; i++) scratch[i] = -l->lambda[i];
+  pw_add_JT (r->w, scratch, f);
+  for (int j = 0; j < n; j++) out[j] = f[j] - r->s->mass[j] * l->a[j];
+  pw_evaluate_gamma (r->w, gamma);
+  pw_mul_J (r->w, l->a, scratch);
+  effect_add (gamma, scratch, -1, m);
+  memset (g, 0, (size_t)m * sizeof *g);
+  pw_evaluate_g (r->w, g);
+  pw_mul_J (r->w, x->v, v);
+  pw_evaluate_eta (r->w, scratch);
+  effect_add (v, scratch, -1, m);
+  return PW_OK;
+}
+
+/* Between the breakpoints of the neighbours, of which one may be passed slightly before that of the run. */
+static double effect_time (const pw_direction_copy *d, double t) {
+  return fmax (d->first, fmin (t, nextafter (d->last, -INFINITY)));
+}
+
+static int effect_direction (pw_variation *x, pw_direction_copy *d, double t) {
+  int length = x->n + x->m, rows = 2 * x->m, status = PW_OK;
+  for (int c = 0; c < 2; c++) {
+    memset (d->effect[c], 0, (size_t)length * sizeof (double));
+    memset (d->row[c], 0, (size_t)rows * sizeof (double));
+  }
+  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->columns > 1; i++) {
+    status = effect_residuals (x, d->given.neighbour[i], effect_time (d, t), x->scratch);
+    for (int c = 0; c < 2 && status == PW_OK; c++) {
+      double weight = pw_variation_weight (&d->given, c, i);
+      effect_add (d->effect[c], x->scratch, weight, length);
+      effect_add (d->row[c], x->scratch + length, weight, rows);
+    }
+  }
+  return status;
+}
+
+int pw_variation_evaluate (pw_variation *x, double t, pw_error *error) {
+  pw_statistics before = x->r->statistics;
+  int near = x->r->near, status = pw_linear_evaluate (&x->linear, t, x->q, x->v);
+  x->evaluations++;
+  x->at = t;
+  for (int i = 0; i < x->count && status == PW_OK; i++) status = effect_direction (x, &x->direction[i], t);
+  x->r->statistics = before;
+  if (status > 0) status = pw_fail_singular (x->r, t, error);
+  x->r->near = near;
+  return status < 0 ? pw_fail (error, status, "t = %.6g s: a signal failed", t) : status;
+}
+
+/* ---- Derivatives of energies, powers, least-norm multipliers ---- */
+
+/* The values at a state of a run. */
+static int effect_values (pw_run *r, double t, const double *q, const double *v, const double *lambda, double *out) {
+  int status = pw_evaluate_J_at (r->w, t, q, v), entries = r->s->entries;
+  if (status != PW_OK) return status;
+  out[0] = pw_kinetic (r->s, v);
+  out[1] = pw_potential (r->w);
+  memcpy (out + 2 + entries, lambda, (size_t)r->s->rows * sizeof *lambda);
+  pw_ledger_rates (r, lambda, out + 2);
+  if (r->redundant && pw_saddle_factor (r->saddle) == PW_OK) pw_rank_least_norm (r, out + 2 + entries);
+  return PW_OK;
+}
+
+/* By the state: central differences over about 1e-5 of the scene, or twice that for column 1. */
+static int effect_by_state (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
+  int n = x->n, m = x->m, status = PW_OK;
+  double step = (1 + c->which) * 1e-5 / fmax (c->largest, 1e-300);
+  double *q = x->values + 2 + x->entries + m, *v = q + n + 3, *lambda = v + n + 3;
+  if (c->largest == 0) return PW_OK;
+  for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
+    for (int j = 0; j < n; j++) q[j] = x->q[j] + side * step * Y[j], v[j] = x->v[j] + side * step * Y[n + j];
+    for (int i = 0; i < m; i++) lambda[i] = x->linear.lambda[i] + side * step * c->lambda[i];
+    status = effect_values (x->r, x->at, q, v, lambda, x->values);
+    effect_add (out, x->values, side / (2 * step), 2 + x->entries + m);
+  }
+  return status;
+}
+
+int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
+  const pw_direction_copy *d = c->direction;
+  int length = 2 + x->entries + x->m, status = PW_OK;
+  memset (out, 0, (size_t)length * sizeof *out);
+  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->columns > 1; i++) {
+    double weight = pw_variation_weight (&d->given, c->which, i);
+    if (weight == 0) continue;
+    status = effect_values (d->given.neighbour[i], effect_time (d, x->at), x->q, x->v, x->linear.lambda, x->values);
+    effect_add (out, x->values, weight, length);
+  }
+  return status == PW_OK ? effect_by_state (x, c, Y, out) : status;
+}
+
+/* ---- Columns ---- */
+
+/* d a and d lambda of a column with the derivatives Y of the state. */
+static void effect_accelerations (pw_variation *x, const pw_variation_column *c, double *da) {
+  pw_linearisation *l = &x->linear;
+  const double *effect = c->direction->effect[c->which];
+  memcpy (l->x, c->trial, 2 * (size_t)x->n * sizeof *l->x);
+  pw_linear_multiply (l);
+  for (int j = 0; j < x->n; j++) l->da[j] = effect[j] - l->y[j];
+  for (int i = 0; i < x->m; i++) l->z[i] = effect[x->n + i] + l->y[x->n + i];
+  pw_saddle_solve (x->r->saddle, l->da, l->z, l->da, c->lambda);
+  memcpy (da, l->da, (size_t)x->n * sizeof *da);
+}
+
+int pw_variation_rates (pw_variation *x, int k) {
+  int n = x->n, status = PW_OK;
+  PW_EACH_COLUMN (c, x) {
+    memcpy (c->K[k], c->trial + n, (size_t)n * sizeof (double));
+    effect_accelerations (x, c, c->K[k] + n);
+  }
+  if (!x->ledger) return PW_OK;
+  PW_EACH_COLUMN (c, x) {
+    if (status == PW_OK) status = pw_variation_outputs (x, c, c->trial, x->output);
+    memcpy (c->K[k] + 2 * n, x->output + 2, (size_t)x->entries * sizeof (double));
+  }
+  /* J and its factors are again those of the state */
+  if (pw_evaluate_J_at (x->r->w, x->at, x->q, x->v) == PW_OK) pw_saddle_factor (x->r->saddle);
+  return status;
+}
+
+/* Positions first; the velocities' equations contain them. */
+void pw_variation_project (pw_variation *x) {
+  pw_linearisation *l = &x->linear;
+  int n = x->n, m = x->m, holonomic = x->r->s->holonomic;
+  PW_EACH_COLUMN (c, x) {
+    const double *row = c->direction->row[c->which];
+    pw_mul_J (x->r->w, c->trial, l->z);
+    for (int i = 0; i < m; i++) l->z[i] = i < holonomic ? -l->z[i] - row[i] : 0;
+    pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
+    effect_add (c->trial, l->da, 1, n);
+    memcpy (l->x, c->trial, 2 * (size_t)n * sizeof *l->x);
+    pw_linear_multiply (l);
+    pw_mul_J (x->r->w, c->trial + n, l->z);
+    for (int i = 0; i < m; i++) l->z[i] = -l->z[i] - l->y[n + m + i] - row[m + i];
+    pw_saddle_solve (x->r->saddle, NULL, l->z, l->da, l->z);
+    effect_add (c->trial + n, l->da, 1, n);
+  }
+}

@@ -1,0 +1,101 @@
+/* The states of a run that its derivatives still need. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "util.h"
+#include "variation.h"
+
+enum { PATH_DEPTH = 12 }; /* of bisection */
+
+/* Quintic Hermite interpolation between two points, t_0 + u h: q from q, v, a at both ends (error h^6 / 46080 times the
+ * sixth derivative at the middle), v and a its derivatives. */
+static void path_interpolate (const pw_variation *x, const pw_variation_point *p, double t, double *out) {
+  int n = x->n;
+  double h = p[1].t - p[0].t, u = (t - p[0].t) / h;
+  for (int j = 0; j < n; j++) {
+    const double *l = p[0].x + j, *r = p[1].x + j;
+    double v0 = h * l[n], a0 = h * h * l[2 * n] / 2, v1 = h * r[n], a1 = h * h * r[2 * n] / 2;
+    double d = r[0] - l[0] - v0 - a0, e = v1 - v0 - 2 * a0, f = a1 - a0;
+    double c3 = 10 * d - 4 * e + f, c4 = -15 * d + 7 * e - 2 * f, c5 = 6 * d - 3 * e + f;
+    out[j] = l[0] + u * (v0 + u * (a0 + u * (c3 + u * (c4 + u * c5))));
+    out[n + j] = (v0 + u * (2 * a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h;
+    out[2 * n + j] = (2 * a0 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))) / (h * h);
+  }
+}
+
+void pw_variation_state (const pw_variation *x, double t, double *out) {
+  int i = 0;
+  while (i + 2 < x->points && x->point[i + 1].t < t) i++;
+  if (x->points > 1 && t < x->point[i + 1].t)
+    path_interpolate (x, x->point + i, t, out);
+  else
+    memcpy (out, x->point[x->points > 1 ? i + 1 : 0].x, 3 * (size_t)x->n * sizeof *out);
+}
+
+void pw_variation_forget (pw_variation *x) {
+  int gone = 0;
+  while (gone + 1 < x->points && x->point[gone + 1].t <= x->t) gone++;
+  x->points -= gone;
+  for (int i = 0; i < x->points; i++) {
+    pw_variation_point kept = x->point[i];
+    x->point[i] = x->point[i + gone];
+    x->point[i + gone] = kept;
+  }
+}
+
+static int path_grow (pw_variation *x) {
+  int room = 2 * x->room + 16;
+  size_t length = 3 * (size_t)x->n;
+  pw_variation_point *more = realloc (x->point, (size_t)room * sizeof *more);
+  if (more == NULL) return PW_RESOURCE;
+  x->point = more;
+  for (; x->room < room; x->room++)
+    if ((more[x->room].x = malloc ((length + 1) * sizeof (double))) == NULL) return PW_RESOURCE;
+  return PW_OK;
+}
+
+static int path_append (pw_variation *x, double t, pw_error *error) {
+  pw_sample s;
+  size_t n = (size_t)x->n;
+  if (x->points == x->room && path_grow (x) != PW_OK) return pw_fail_memory (x->r->s, error);
+  int status = pw_run_sample (x->r, t, &s, error);
+  pw_variation_point *p = x->point + x->points;
+  if (status != PW_OK) return status;
+  p->t = t;
+  memcpy (p->x, s.q, n * sizeof (double));
+  memcpy (p->x + n, s.v, n * sizeof (double));
+  memcpy (p->x + 2 * n, s.a, n * sizeof (double));
+  x->points++;
+  return PW_OK;
+}
+
+/* 1 if interpolation between the last two points gives the state x to a tenth of the run's tolerance. */
+static int path_good (const pw_variation *x, const double *at, double t) {
+  double *guess = x->scratch;
+  path_interpolate (x, x->point + x->points - 2, t, guess);
+  for (int j = 0; j < x->n; j++)
+    if (fabs (guess[j] - at[j]) > 0.1 * pw_tolerance (x->r, j, at[j]) ||
+        fabs (guess[x->n + j] - at[x->n + j]) > 0.1 * pw_tolerance_velocity (x->r, j, at[x->n + j]))
+      return 0;
+  return 1;
+}
+
+/* Appends the states up to t1 after the last point, at t0 and known; between them until interpolation is good. */
+static int path_refine (pw_variation *x, double t1, int depth, pw_error *error) {
+  double t0 = x->point[x->points - 1].t, middle = t0 + (t1 - t0) / 2;
+  if (pw_fixed_steps (x->r) || depth == 0 || !(t0 < middle && middle < t1)) return path_append (x, t1, error);
+  int status = path_append (x, t1, error), first = x->points - 2;
+  if (status == PW_OK) status = path_append (x, middle, error);
+  if (status != PW_OK) return status;
+  pw_variation_point kept = x->point[first + 2];
+  x->points -= 1; /* the point at the middle is compared, and found again if it is needed */
+  if (path_good (x, kept.x, middle)) return PW_OK;
+  x->points -= 1;
+  status = path_refine (x, middle, depth - 1, error);
+  return status == PW_OK ? path_refine (x, t1, depth - 1, error) : status;
+}
+
+int pw_variation_record (pw_variation *x, double t0, pw_error *error) {
+  if (x->points == 0) return path_append (x, t0, error);
+  return path_refine (x, x->r->t, PATH_DEPTH, error);
+}

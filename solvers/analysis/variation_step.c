@@ -1,0 +1,116 @@
+/* Steps of the derivatives, by the method of order 5 of Dormand & Prince with the error control of its pair; the
+ * equations are in variation.c. */
+#include <math.h>
+#include <string.h>
+#include "rk.h"
+#include "variation.h"
+
+/* Error of a step relative to the largest derivative: below that of differences, and above round-off. */
+static const double STEP_TOLERANCE = 1e-10;
+
+/* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error. */
+static const double STEP_LEAST = 0.1;
+
+/* The smallest step, in units of the scene. */
+static const double STEP_SMALLEST = 1e-7;
+
+/* Largest entry in units of the scene. */
+static double step_norm (const pw_variation *x, const double *Y) {
+  const pw_system *s = x->r->s;
+  double most = 0;
+  for (int j = 0; j < x->n; j++)
+    most = pw_largest (most, pw_largest (fabs (Y[j]), fabs (Y[x->n + j]) * x->r->w->scale.time) / pw_unit (s, j));
+  return most;
+}
+
+static void step_combine (const pw_variation *x, const pw_variation_column *c, const double *weight, int count,
+                          double h, double *out) {
+  for (int k = 0; k < count; k++)
+    for (int j = 0; j < x->size; j++) out[j] += h * weight[k] * c->K[k][j];
+}
+
+/* The derivatives of every column at stage k, or with `b` at the end, into `trial`. */
+static void step_stage (pw_variation *x, const double *weight, int count, double h) {
+  PW_EACH_COLUMN (c, x) {
+    memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
+    step_combine (x, c, weight, count, h, c->trial);
+  }
+}
+
+/* Evaluates the equations at time t of the run's motion. */
+static int step_evaluate (pw_variation *x, double t, pw_error *error) {
+  double *state = x->scratch;
+  pw_variation_state (x, t, state);
+  memcpy (x->q, state, (size_t)x->n * sizeof *x->q);
+  memcpy (x->v, state + x->n, (size_t)x->n * sizeof *x->v);
+  return pw_variation_evaluate (x, pw_before_breakpoint (x->r, t), error);
+}
+
+static int step_rates (pw_variation *x, int k, pw_error *error) {
+  return pw_variation_rates (x, k) == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", x->at);
+}
+
+/* The largest error of all columns, accepted up to 1; their sizes are updated if it is. */
+static double step_error (pw_variation *x, double h) {
+  double most = 0;
+  PW_EACH_COLUMN (c, x) {
+    double *e = x->values, size = fmax (c->largest, step_norm (x, c->trial));
+    if (c->direction->columns > 1) size = fmax (size, STEP_LEAST * 1e-5 / fabs (c->direction->given.step));
+    memset (e, 0, (size_t)x->size * sizeof *e);
+    step_combine (x, c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, e);
+    if (size > 0) most = pw_largest (most, step_norm (x, e) / (STEP_TOLERANCE * size));
+  }
+  return most;
+}
+
+/* The stages and the new derivatives in `trial`. */
+static int step_stages (pw_variation *x, double h, double t1, pw_error *error) {
+  const pw_tableau *b = &pw_erk5_tableau;
+  const double *weight = b->A;
+  int status = PW_OK;
+  for (int k = 1; k < b->stages && status == PW_OK; weight += k++) {
+    step_stage (x, weight, k, h);
+    status = step_evaluate (x, k + 1 < b->stages ? x->t + b->c[k] * h : t1, error);
+    if (status == PW_OK) status = step_rates (x, k, error);
+  }
+  if (status != PW_OK) return status;
+  step_stage (x, b->b, b->stages, h); /* at the state of the last stage */
+  pw_variation_project (x);
+  return step_rates (x, b->stages, error);
+}
+
+static void step_accept (pw_variation *x) {
+  PW_EACH_COLUMN (c, x) {
+    double *first = c->K[0];
+    memcpy (c->Y, c->trial, (size_t)x->size * sizeof *c->Y);
+    c->K[0] = c->K[PW_VARIATION_RATES - 1];
+    c->K[PW_VARIATION_RATES - 1] = first;
+    c->largest = fmax (c->largest, step_norm (x, c->Y));
+  }
+}
+
+int pw_variation_begin (pw_variation *x, pw_error *error) {
+  pw_variation_project (x);
+  int status = step_rates (x, PW_VARIATION_RATES - 1, error);
+  if (status == PW_OK) step_accept (x);
+  return status;
+}
+
+int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
+  while (x->h > STEP_SMALLEST * x->r->w->scale.time) {
+    double rest = t1 - x->t, h = x->h < rest * (1 - 1e-9) ? x->h : rest, end = h < rest ? x->t + h : t1;
+    if (h < rest && 2 * h > rest) h = rest / 2, end = x->t + h;
+    int status = step_stages (x, h, end, error);
+    if (status != PW_OK) return status;
+    double off = step_error (x, h), factor = fmin (5, fmax (0.2, 0.9 * pow (off, -0.2)));
+    if (off <= 1) {
+      x->h = h < x->h ? fmax (x->h, h * factor) : h * factor;
+      x->t = end;
+      step_accept (x);
+      return PW_OK;
+    }
+    x->h = isfinite (off) ? h * factor : h / 10;
+  }
+  return pw_fail (error, PW_METHOD, "t = %.6g s: no step of the derivatives meets their tolerance, however small",
+                  x->t);
+}

@@ -1,0 +1,282 @@
+/* Derivatives of runs by the variational equations: closed forms; every model of the gallery against differences of runs. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "gallery.h"
+#include "pinwheel-analysis.h"
+#include "pinwheel-files.h"
+#include "runs.h"
+#include "scene.h"
+#include "trial.h"
+
+/* A model with one parameter changed: a run, its neighbours, the direction. */
+typedef struct {
+  pw_system *s, *near[4];
+  pw_run *r;
+  pw_direction d;
+} variation_case;
+
+typedef pw_system *variation_make (const void *context, double value);
+
+static variation_case variation_open (variation_make *make, const void *context, double value, double step,
+                                      const char *method, const pw_settings *settings) {
+  static const int offset[2][4] = { { -2, -1, 1, 2 }, { 0, 1, 2, 4 } };
+  variation_case c = { .s = make (context, value), .d = { .step = step, .one_sided = value == 0 } };
+  c.r = runs_open (c.s, method, settings);
+  for (int i = 0; i < 4; i++) {
+    c.near[i] = make (context, value + offset[c.d.one_sided][i] * step);
+    c.d.neighbour[i] = runs_open (c.near[i], method, settings);
+  }
+  return c;
+}
+
+static void variation_free (variation_case *c) {
+  for (int i = 0; i < 4; i++) {
+    pw_run_close (c->d.neighbour[i]);
+    pw_system_free (c->near[i]);
+  }
+  pw_run_close (c->r);
+  pw_system_free (c->s);
+}
+
+/* ---- Closed forms ---- */
+
+typedef struct {
+  const char *name; /* of the parameter that is changed */
+  double k, m, x0, height, start, width;
+} block;
+
+static void block_build (pw_model *m, const void *parameters) {
+  const block *b = parameters;
+  pw_add_body (m, &(pw_body){ .name = "block", .mass = b->m, .inertia = 1, .start = { 1 + b->x0 } });
+  if (b->k > 0)
+    pw_add_spring (m, &(pw_spring){ .name = "S", .body = { "ground", "block" }, .stiffness = b->k, .length = 1 });
+  pw_signal pulse = { .type = PW_PULSE, .pulse = { .height = b->height, .start = b->start, .width = b->width } };
+  pw_add_force (m, &(pw_force){ .name = "F", .body = "block", .fx = pulse });
+}
+
+static pw_system *block_make (const void *context, double value) {
+  static const pw_parameter parameters[] = { { PW_AT (block, k), 0, "", "", 0 },
+                                             { PW_AT (block, m), 1, "", "", 0 },
+                                             { PW_AT (block, x0), 0.1, "", "", 0 },
+                                             { PW_AT (block, height), 0, "", "", 0 },
+                                             { PW_AT (block, start), 1, "", "", 0 },
+                                             { PW_AT (block, width), 1, "", "", 0 },
+                                             { 0 } };
+  static const pw_plugin_table table = { .abi = PW_ABI,
+                                         .size = sizeof (pw_plugin_table),
+                                         .parameters = parameters,
+                                         .parameters_size = sizeof (block),
+                                         .build = block_build };
+  const block *b = context;
+  return scene_system (&table, "k", b->k, "m", b->m, "x0", b->x0, "height", b->height, "start", b->start, "width",
+                       b->width, b->name, value, NULL);
+}
+
+static double block_value (const block *b, const char *name) {
+  return strcmp (name, "k") == 0       ? b->k
+         : strcmp (name, "m") == 0     ? b->m
+         : strcmp (name, "x0") == 0    ? b->x0
+         : strcmp (name, "start") == 0 ? b->start
+                                       : b->width;
+}
+
+/* The derivatives of x and vx at time t. */
+static void block_derive (block b, const char *name, const char *method, double t, double out[2]) {
+  double value = block_value (&b, name);
+  pw_sample x, e;
+  pw_error error = { 0 };
+  b.name = name;
+  variation_case c = variation_open (block_make, &b, value, 1e-5 * value, method,
+                                     &(pw_settings){ .span = t, .rtol = 1e-10, .step = 1e-3 });
+  pw_variation *v = pw_variation_open (c.r, &c.d, 1, 1, &error);
+  check_ok (error.status, &error);
+  check_ok (pw_variation_advance (v, t, t, &error), &error);
+  check_ok (pw_variation_sample (v, 0, &x, &e, &error), &error);
+  out[0] = x.q[0];
+  out[1] = x.v[0];
+  check_below ("error", fmax (fabs (e.q[0]), fabs (e.v[0])), 1e-8 * (1 + fabs (x.q[0])), "differences of 1e-5");
+  pw_variation_close (v);
+  variation_free (&c);
+}
+
+/* x = x0 cos (w t), w^2 = k / m; by methods of every family. */
+static void test_oscillator (void **state) {
+  static const char *const methods[] = {
+    "rk4", "erk5", "erk8", "adams", "bdf", "radau", "ida+ggl", "galpha", "leapfrog"
+  };
+  const double t = 3, w = 2;
+  (void)state;
+  for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+    block b = { .k = 8, .m = 2, .x0 = 0.3, .start = 99, .width = 1 };
+    double d[2], bound = strcmp (methods[i], "galpha") && strcmp (methods[i], "leapfrog") ? 2e-8 : 1e-5;
+    const char *why = "the run's tolerance, or h^2 t w";
+    block_derive (b, "k", methods[i], t, d);
+    check_close ("dx/dk", d[0], -0.3 * t * sin (w * t) / (2 * sqrt (16.)), bound, why);
+    check_close ("dv/dk", d[1], -0.3 * (sin (w * t) + w * t * cos (w * t)) / (2 * sqrt (16.)), 2 * bound, why);
+    block_derive (b, "m", methods[i], t, d);
+    check_close ("dx/dm", d[0], 0.3 * t * sin (w * t) * w / 4, bound, why);
+    block_derive (b, "x0", methods[i], t, d);
+    check_close ("dx/dx0", d[0], cos (w * t), bound, why);
+  }
+}
+
+/* A free block pushed from `start` on for `width`: afterwards v = F width / m, x = v (t - start - width / 2). */
+static void test_breakpoints (void **state) {
+  block b = { .m = 2, .height = 3, .start = 0.5, .width = 0.7 };
+  double d[2];
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    const char *method = (const char *[]){ "rk4", "erk8", "bdf" }[i];
+    block_derive (b, "start", method, 2, d);
+    check_close ("dx/dstart", d[0], -3 * 0.7 / 2, 1e-9, "round-off of differences");
+    check_close ("dv/dstart", d[1], 0, 1e-9, "round-off of differences");
+    block_derive (b, "width", method, 2, d);
+    check_close ("dx/dwidth", d[0], 1.5 * (2 - 0.5 - 0.7), 1e-9, "round-off of differences");
+    check_close ("dv/dwidth", d[1], 1.5, 1e-9, "round-off of differences");
+  }
+}
+
+/* ---- The gallery ---- */
+
+typedef struct {
+  const char *model, *parameter;
+} gallery_name;
+
+static pw_system *gallery_make (const void *context, double value) {
+  const gallery_name *g = context;
+  return scene_named (g->model, g->parameter, value);
+}
+
+/* The state after a run with the parameter changed: 2 coordinates numbers. */
+static void gallery_run_to (const gallery_name *g, double value, const pw_settings *settings, const char *method,
+                            double t, double *out) {
+  pw_system *s = gallery_make (g, value);
+  runs_state (s, method, settings, t, out, out + pw_system_coordinates (s), NULL);
+  pw_system_free (s);
+}
+
+/* Derivatives by differences of runs, extrapolated, and the largest error of these. */
+static double gallery_difference (const gallery_name *g, double value, double step, const pw_settings *settings,
+                                  const char *method, double t, int states, double *out) {
+  double *x = calloc (4 * (size_t)states, sizeof *x), worst = 0;
+  static const int offset[2][4] = { { -2, -1, 1, 2 }, { 0, 1, 2, 4 } };
+  int side = value == 0;
+  for (int i = 0; i < 4; i++)
+    gallery_run_to (g, value + offset[side][i] * step, settings, method, t, x + (size_t)i * (size_t)states);
+  for (int j = 0; j < states; j++) {
+    const double *a = x + j, *b = a + states, *c = b + states, *d = c + states;
+    double one = side ? (-1.5 * *a + 2 * *b - 0.5 * *c) / step : (*c - *b) / (2 * step);
+    double two = side ? (-0.75 * *a + *c - 0.25 * *d) / step : (*d - *a) / (4 * step);
+    out[j] = (4 * one - two) / 3;
+    worst = fmax (worst, fabs (one - two));
+  }
+  free (x);
+  return worst;
+}
+
+static void gallery_check (const gallery_name *g, double value, const pw_settings *settings, const char *method,
+                           double t) {
+  double step = 1e-5 * (value != 0 ? fabs (value) : 1), most = 0;
+  pw_error error = { 0 };
+  pw_sample x;
+  char what[200];
+  variation_case c = variation_open (gallery_make, g, value, step, method, settings);
+  int n = pw_system_coordinates (c.s);
+  double *by_runs = calloc (2 * (size_t)n, sizeof *by_runs);
+  double off = gallery_difference (g, value, 30 * step, settings, method, t, 2 * n, by_runs);
+  pw_variation *v = pw_variation_open (c.r, &c.d, 1, 0, &error);
+  if (v) check_ok (pw_variation_advance (v, t, t, &error), &error);
+  check_ok (error.status, &error);
+  check_ok (pw_variation_sample (v, 0, &x, NULL, &error), &error);
+  for (int j = 0; j < 2 * n; j++) most = fmax (most, fabs (by_runs[j]));
+  for (int j = 0; j < 2 * n; j++) {
+    snprintf (what, sizeof what, "%s, state %d by %s", g->model, j, g->parameter);
+    check_close (what, j < n ? x.q[j] : x.v[j - n], by_runs[j], 10 * off + 1e-6 * most + 1e-8 / (1e5 * step),
+                 "error of the differences, and of a run with steps of 1 ms");
+  }
+  pw_variation_close (v);
+  variation_free (&c);
+  free (by_runs);
+}
+
+/* Not differentiable there. */
+static int gallery_excepted (const char *model, const char *parameter) {
+  static const gallery_name excepted[] = {
+    { "slider-crank", "g" }, /* without it there is no gravity element: another number of elements */
+  };
+  for (size_t i = 0; i < sizeof excepted / sizeof *excepted; i++)
+    if (strcmp (excepted[i].model, model) == 0 && strcmp (excepted[i].parameter, parameter) == 0) return 1;
+  return 0;
+}
+
+static int gallery_model (void *context, const char *name, const char *path) {
+  pw_error error = { 0 };
+  pw_file *f = pw_file_open (path, &error);
+  check_ok (error.status, &error);
+  const pw_plugin_table *table = pw_file_table (f);
+  pw_run_defaults d = table->run;
+  double t =
+      fmin (0.1 * (d.t_end > 0 ? d.t_end : 10), strcmp (name, "n-four-bar") == 0 ? 0.5 : 1); /* singular at 0.71 s */
+  pw_settings settings = { .step = d.step, .span = t };
+  int *count = context;
+  for (const pw_parameter *p = table->parameters; p && p->name; p++) {
+    if (p->domain == PW_COUNT || gallery_excepted (name, p->name)) continue;
+    gallery_check (&(gallery_name){ name, p->name }, p->value, &settings, d.method, t);
+    *count += 1;
+  }
+  pw_file_close (f);
+  return 0;
+}
+
+static void test_gallery (void **state) {
+  pw_error error = { 0 };
+  int count = 0;
+  (void)state;
+  check_ok (pw_file_list (gallery_model, &count, &error), &error);
+  assert_true (count > 100);
+}
+
+/* ---- Refusals, the run itself ---- */
+
+static void test_refusals (void **state) {
+  pw_error error = { 0 };
+  block b = { .name = "k", .k = 8, .m = 2, .x0 = 0.3, .start = 99, .width = 1 };
+  (void)state;
+  variation_case c = variation_open (block_make, &b, 8, 1e-4, "rk4:inputs=held", NULL);
+  assert_null (pw_variation_open (c.r, &c.d, 1, 0, &error));
+  check_error (&error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
+  variation_free (&c);
+}
+
+/* The run makes the same steps with derivatives and without. */
+static void test_run (void **state) {
+  static const char *const methods[] = { "rk4+projection", "erk8+projection", "bdf+projection", "ida", "radau" };
+  pw_error error = { 0 };
+  double q[12], v[12];
+  gallery_name g = { "ezyroller", "a" };
+  (void)state;
+  for (int i = 0; i < 5; i++) {
+    pw_settings settings = { .span = 2, .step = 1e-3 };
+    variation_case c = variation_open (gallery_make, &g, 0.5, 1e-5, methods[i], &settings);
+    pw_variation *x = pw_variation_open (c.r, &c.d, 1, 1, &error);
+    check_ok (error.status, &error);
+    check_ok (pw_variation_advance (x, 2, 2, &error), &error);
+    pw_sample s = runs_to (c.r, 2);
+    runs_state (c.s, methods[i], &settings, 2, q, v, NULL);
+    check_bits (methods[i], s.q, q, 6);
+    check_bits (methods[i], s.v, v, 6);
+    pw_variation_close (x);
+    variation_free (&c);
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_gallery),
+    cmocka_unit_test (test_refusals),   cmocka_unit_test (test_run),
+  };
+  return cmocka_run_group_tests (tests, NULL, NULL);
+}
