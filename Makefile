@@ -484,7 +484,7 @@ share := share/doc/pinwheel
 
 install: all
 	install -d "$(D)/bin" "$(D)/lib/pinwheel/models" "$(D)/lib/pkgconfig" "$(D)/include/pinwheel" "$(D)/share/man/man1" \
-	  "$(D)/share/man/man5" "$(D)/$(share)/docs/figures" "$(D)/$(share)/examples"
+	  "$(D)/share/man/man5" "$(D)/share/bash-completion/completions" "$(D)/share/zsh/site-functions" "$(D)/$(share)/docs/figures" "$(D)/$(share)/examples"
 	install $(PROGRAM) "$(D)/bin"
 	for l in libpinwheel libpinwheel-files; do \
 	  install $(BUILD)/$$l.so.$(ABI) "$(D)/lib" && ln -sf $$l.so.$(ABI) "$(D)/lib/$$l.so" && \
@@ -492,6 +492,9 @@ install: all
 	install -m 644 $(HEADERS) "$(D)/include/pinwheel"
 	install -m 644 $(PLUGINS) "$(D)/lib/pinwheel/models"
 	for f in $(PAGE); do install -Dm 644 $$f "$(D)/lib/pinwheel/page/$${f##*/}" || exit 1; done
+	install -m 644 core/cli/completion.bash "$(D)/share/bash-completion/completions/pinwheel"
+	printf '#compdef pinwheel\nautoload -U +X bashcompinit && bashcompinit\nsource %s\n' \
+	  "$(PREFIX)/share/bash-completion/completions/pinwheel" >"$(D)/share/zsh/site-functions/_pinwheel"
 	for m in $(MAN); do install -m 644 $$m "$(D)/share/man/man$${m##*.}" || exit 1; done
 	echo "$$PKGCONFIG" >"$(D)/lib/pkgconfig/pinwheel.pc"
 	install -m 644 README.md "$(D)/$(share)"
@@ -511,7 +514,8 @@ deb:
 
 # Removes what install put there and the directories that only Pinwheel uses, if they are empty.
 uninstall:
-	[ ! -d "$(D)" ] || { cd "$(D)" && rm -f bin/pinwheel lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc \
+	[ ! -d "$(D)" ] || { cd "$(D)" && rm -f bin/pinwheel share/bash-completion/completions/pinwheel share/zsh/site-functions/_pinwheel \
+	  lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc \
 	  $(addprefix include/pinwheel/,$(notdir $(HEADERS))) $(addprefix lib/pinwheel/models/,$(notdir $(PLUGINS))) $(addprefix lib/pinwheel/page/,$(notdir $(PAGE))) \
 	  $(foreach m,$(MAN),share/man/man$(subst .,,$(suffix $(m)))/$(notdir $(m))) \
 	  $(addprefix $(share)/,$(DOCS) $(FIGURES)) $(addprefix $(share)/examples/,$(notdir $(EXAMPLES))) && \

@@ -302,9 +302,12 @@ static void test_statistics (void **state) {
 static void test_list (void **state) {
   (void)state;
   cli_good ("pinwheel list");
-  static const char *const expected[] = { "ezyroller", "rk4", "ida",   "projection", "ggl",    "baumgarte",
-                                          "galpha",    "pin", "wheel", "torque",     "heading" };
+  static const char *const expected[] = { "ezyroller", "rk4", "ida",   "projection", "ggl",     "baumgarte",
+                                          "galpha",    "pin", "wheel", "torque",     "harmonic" };
+  int lines = 0;
   for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) assert_non_null (strstr (cli_out, expected[i]));
+  for (const char *c = cli_out; *c; c++) lines += *c == '\n';
+  assert_in_range (lines, 10, 24); /* one screen */
   cli_good ("pinwheel list models");
   assert_non_null (strstr (cli_out, "ezyroller"));
   assert_null (strstr (cli_out, "baumgarte"));

@@ -1,5 +1,6 @@
 /* pinwheel list: models, methods, element types and signals. */
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include "cli.h"
 #include "print_table.h"
@@ -213,6 +214,55 @@ static int list_signals (const char **name, pw_error *error) {
   return PW_OK;
 }
 
+/* ---- Without arguments: the names, on one screen ---- */
+
+static int list_model_name (void *context, const char *name, const char *path) {
+  (void)path;
+  fprintf (context, "%s ", name);
+  return 0;
+}
+
+static int list_model_names (FILE *f, pw_error *error) {
+  return pw_file_list (list_model_name, f, error);
+}
+
+static int list_kind_names (FILE *f, pw_error *error) {
+  (void)error;
+  for (const pw_kind *const *k = pw_kinds; *k; k++) fprintf (f, "%s ", (*k)->name);
+  return PW_OK;
+}
+
+static int list_signal_names (FILE *f, pw_error *error) {
+  (void)error;
+  for (const pw_signal_form *s = pw_signal_forms; s->name; s++) fprintf (f, "%s ", s->name);
+  return PW_OK;
+}
+
+static int list_words (const char *heading, int (*write) (FILE *f, pw_error *error), pw_error *error) {
+  char *words = NULL;
+  size_t size;
+  FILE *f = open_memstream (&words, &size);
+  int status = f ? write (f, error) : PW_RESOURCE;
+  if ((f == NULL || fclose (f) != 0) && error->status == PW_OK) status = pw_fail (error, PW_RESOURCE, "out of memory");
+  printf ("%-15s", heading);
+  if (status == PW_OK) pw_cli_wrap (words, 15, 100);
+  free (words);
+  return status;
+}
+
+static int list_overview (pw_error *error) {
+  if (list_words ("models", list_model_names, error) != PW_OK) return error->status;
+  for (const pw_method *const *m = pw_methods; *m; m++) {
+    printf ("%-15s%s", m == pw_methods ? "methods" : "", (*m)->name);
+    for (const pw_stabilisation *s = (*m)->stabilisations; s->name; s++) printf (" +%s", s->name);
+    putchar ('\n');
+  }
+  if (list_words ("kinds", list_kind_names, error) != PW_OK) return error->status;
+  if (list_words ("signals", list_signal_names, error) != PW_OK) return error->status;
+  puts ("`pinwheel list models`, `methods`, `kinds` (element types) or `signals` describes them.");
+  return PW_OK;
+}
+
 /* ---- The command ---- */
 
 static int list_command (void *options, pw_error *error) {
@@ -225,13 +275,11 @@ static int list_command (void *options, pw_error *error) {
                { "kinds", list_kinds, 1 },
                { "signals", list_signals, 0 } };
   const pw_cli_line *l = options;
-  const char *none = NULL, *const sought = l->arguments ? l->argument[0] : NULL;
-  pw_nearest near = { .sought = sought ? sought : "" };
+  if (l->arguments == 0) return list_overview (error);
+  const char *const sought = l->argument[0];
+  pw_nearest near = { .sought = sought };
   for (size_t i = 0; i < sizeof part / sizeof *part; i++) {
-    if (sought == NULL) {
-      if (i > 0) putchar ('\n');
-      if (part[i].list (&none, error) != PW_OK) return error->status;
-    } else if (strcmp (sought, part[i].name) == 0) {
+    if (strcmp (sought, part[i].name) == 0) {
       if (l->arguments > 1 && !part[i].named)
         return pw_fail (error, PW_INPUT, "unexpected argument \"%s\"; usage: pinwheel list %s", l->argument[1], sought);
       return part[i].list (l->argument + 1, error);
@@ -239,7 +287,6 @@ static int list_command (void *options, pw_error *error) {
     pw_nearest_try (&near, part[i].name);
   }
   char hint[100];
-  if (sought == NULL) return PW_OK;
   return pw_fail (error, PW_INPUT, "there is no list of \"%s\"%s", sought, pw_nearest_text (&near, hint, sizeof hint));
 }
 
@@ -247,8 +294,9 @@ const pw_command pw_cli_list = {
   .name = "list",
   .synopsis = "[models | methods [NAME...] | kinds [NAME...] | signals]",
   .summary = "list models, integration methods, element types and signals",
-  .help = "List the available models, integration methods, element types (kinds) and forms of signals. With a NAME or "
-          "\"all\", describe the options of a method or the fields of an element type.",
+  .help =
+      "List the names of models, integration methods, element types (kinds) and forms of signals, or describe "
+      "those of one sort. With a NAME or \"all\", describe the options of a method or the fields of an element type.",
   .size = sizeof (pw_cli_line),
   .function = list_command,
   .options = (const struct poptOption[]){ POPT_TABLEEND },
