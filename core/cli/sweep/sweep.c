@@ -3,14 +3,11 @@
  * Every run depends only on its row of the grid.  A journal keeps the rows in the order of completion; at the end they
  * are sorted into the order of the grid.  So the table does not depend on the number of threads or on interruptions of
  * the sweep. */
-#define _GNU_SOURCE /* sched_getaffinity */
-#include <errno.h>
-#include <limits.h>
+#define _POSIX_C_SOURCE 200809L
 #include <pthread.h>
-#include <sched.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
+#include "parallel.h"
 #include "progress.h"
 #include "sweep_journal.h"
 #include "sweep_row.h"
@@ -90,26 +87,6 @@ static int sweep_part (sweep *x, pw_error *error) {
                   x->part_text);
 }
 
-/* OMP_NUM_THREADS, or the processors that this process may use. */
-static long sweep_processors (void) {
-  const char *text = getenv ("OMP_NUM_THREADS");
-  long wanted = text ? strtol (text, NULL, 10) : 0;
-  if (wanted > 0) return wanted;
-#ifdef CPU_COUNT
-  cpu_set_t set;
-  if (sched_getaffinity (0, sizeof set, &set) == 0) return CPU_COUNT (&set);
-#endif
-  long n = sysconf (_SC_NPROCESSORS_ONLN);
-  return n > 0 ? n : 1;
-}
-
-static int sweep_jobs (sweep *x, pw_error *error) {
-  double jobs = (double)sweep_processors ();
-  int status = pw_cli_number ("--jobs", x->jobs_text, PW_COUNT, &jobs, error);
-  x->jobs = jobs < 10000 ? (int)jobs : 10000;
-  return status;
-}
-
 static int sweep_settings (sweep *x, pw_error *error) {
   pw_plan *p = &x->plan;
   pw_run_defaults d = pw_cli_defaults (pw_file_table (p->file));
@@ -122,7 +99,7 @@ static int sweep_settings (sweep *x, pw_error *error) {
   int status = pw_cli_settings (&x->line, &d, &p->t_end, &p->settings, &limit, error);
   p->limit = limit.most;
   if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &p->specialise, error);
-  if (status == PW_OK) status = sweep_jobs (x, error);
+  if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
   return status == PW_OK ? sweep_part (x, error) : status;
 }
 
@@ -242,8 +219,10 @@ static long sweep_take (sweep *x) {
   return -1;
 }
 
-static void *sweep_thread (void *context) {
+/* Computes rows until there are none. */
+static void sweep_thread (void *context, int i) {
   sweep *x = context;
+  (void)i;
   pw_text text = { .at = NULL };
   shared_system *s = NULL;
   pthread_mutex_lock (&x->lock);
@@ -263,30 +242,15 @@ static void *sweep_thread (void *context) {
   sweep_release (x, s);
   pthread_mutex_unlock (&x->lock);
   pw_text_free (&text);
-  return NULL;
 }
 
-/* The main thread is one of them. */
 static void sweep_all (sweep *x) {
-  long rows = x->journal.rows;
-  if (x->jobs > rows) x->jobs = (int)rows;
-  pthread_t *thread = calloc ((size_t)x->jobs, sizeof *thread);
-  int started = 1, why = thread ? 0 : ENOMEM;
+  if (x->jobs > x->journal.rows) x->jobs = (int)x->journal.rows;
   pthread_mutex_init (&x->lock, NULL);
   pthread_cond_init (&x->compiled, NULL);
-  pthread_mutex_lock (&x->lock);
-  while (why == 0 && started < x->jobs && (why = pthread_create (thread + started, NULL, sweep_thread, x)) == 0)
-    started++;
-  if (why)
-    pw_fail (x->error, PW_RESOURCE, "cannot start %d runs at a time, only %d: %s; try --jobs %d", x->jobs, started,
-             strerror (why), started);
-  if (why) x->next = x->plan.grid.rows;
-  pthread_mutex_unlock (&x->lock);
-  sweep_thread (x);
-  while (--started > 0) pthread_join (thread[started], NULL);
+  pw_parallel (x->jobs, x->jobs, sweep_thread, x, x->error);
   pthread_cond_destroy (&x->compiled);
   pthread_mutex_destroy (&x->lock);
-  free (thread);
 }
 
 static int sweep_run (sweep *x, pw_error *error) {

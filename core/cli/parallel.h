@@ -1,0 +1,15 @@
+/* Independent tasks on several processors. */
+#ifndef PW_PARALLEL_H
+#define PW_PARALLEL_H
+
+#include "cli.h"
+
+/* The number of concurrent tasks: the value of --jobs, or if it is NULL OMP_NUM_THREADS, or the processors that this
+ * process may use. */
+int pw_parallel_jobs (const char *text, int *jobs, pw_error *error);
+
+/* Calls task (context, i) for each i < count, by at most `jobs` threads, of which the caller is one, in any order.
+ * PW_RESOURCE if a thread cannot be started: no task has been called. */
+int pw_parallel (int jobs, int count, void (*task) (void *context, int i), void *context, pw_error *error);
+
+#endif
