@@ -24,8 +24,13 @@ double pw_cpu_clock (void) {
 void pw_progress_start (pw_progress *p, const char *what, double t_end, int on) {
   double now = pw_seconds (CLOCK_MONOTONIC);
   int lines = !isatty (STDERR_FILENO);
-  *p =
-      (pw_progress){ what, "s", 0, t_end, now, now + (lines ? PROGRESS_LINES : PROGRESS_FIRST), 0, on || lines, lines };
+  *p = (pw_progress){ .what = what,
+                      .unit = "s",
+                      .t_end = t_end,
+                      .start = now,
+                      .next = now + (lines ? PROGRESS_LINES : PROGRESS_FIRST),
+                      .on = on || lines,
+                      .lines = lines };
 }
 
 void pw_progress_count (pw_progress *p, const char *what, const char *unit, double from, double count) {
@@ -63,8 +68,9 @@ void pw_progress_at (pw_progress *p, double t) {
     fprintf (stderr, "pinwheel: %s: ", p->what);
   else
     fprintf (stderr, "\r%.16s [%s] ", p->what, bar);
-  fprintf (stderr, "%*.0f %%  %s%.*g of %.*g %s  %s to go%s", p->lines ? 0 : 3, floor (100 * part), timed ? "t = " : "",
-           timed ? 4 : 9, timed ? t : floor (t), timed ? 4 : 9, p->t_end, p->unit, left, p->lines ? "\n" : "\033[K");
+  fprintf (stderr, "%*.0f %%  %s%.*g of %.*g %s  %s to go%s%s%s", p->lines ? 0 : 3, floor (100 * part),
+           timed ? "t = " : "", timed ? 4 : 9, timed ? t : floor (t), timed ? 4 : 9, p->t_end, p->unit, left,
+           *p->note ? "  " : "", p->note, p->lines ? "\n" : "\033[K");
   fflush (stderr);
   p->shown = !p->lines;
 }

@@ -13,6 +13,7 @@ typedef struct {
   double next;      /* clock when it may be drawn or written again [s] */
   int shown;        /* 1: there is a bar to erase */
   int on;           /* 0: draws nothing */
+  char note[40];    /* shown at the end; "" at first */
   int lines;        /* 1: no terminal: lines in place of the bar */
 } pw_progress;
 

@@ -55,7 +55,7 @@ typedef struct {
   struct pw_node {
     double t, weight;
   } * node;                       /* in the order of time; integrals only with `record` */
-  double at[PW_FUNCTIONAL_TIMES]; /* private: the column in the last step */
+  double at[PW_FUNCTIONAL_TIMES]; /* private: the column in the last step; [0] at its beginning */
 } pw_functional;
 
 typedef struct {

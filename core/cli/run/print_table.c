@@ -36,7 +36,7 @@ int pw_cell_number (pw_table *t, int width, double value, int digits) {
 
 int pw_cell_unit (pw_table *t, int width, const char *name, const char *unit) {
   char text[350];
-  snprintf (text, sizeof text, "%s [%s]", name, unit);
+  snprintf (text, sizeof text, *unit ? "%s [%s]" : "%s", name, unit);
   return pw_cell (t, width, text);
 }
 

@@ -1,0 +1,280 @@
+/* pinwheel optimise: parameters and initial values for which an output is largest or smallest.
+ *
+ * Local searches without derivatives (NLopt) from several starts: the initial values, and Sobol points of the bounds,
+ * displaced by the seed.  Each start is a task of its own, so that results do not depend on the number of threads.  The
+ * best results continue with a tighter tolerance.  A run that fails gets a value that is worse than all before it. */
+#define _POSIX_C_SOURCE 200809L
+#include "optimise.h"
+#include <gsl/gsl_qrng.h>
+#include <gsl/gsl_rng.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "figure.h"
+#include "parallel.h"
+
+#define OPTIMISE_SAME 0.01 /* distance of results of the same optimum, relative to the scales of the unknowns */
+enum { OPTIMISE_POLISHED = 3, OPTIMISE_MOST = 40 }; /* results that continue; unknowns, the limit of Sobol's sequence */
+
+/* ---- Starts ---- */
+
+/* The initial values, then displaced Sobol points; without bounds within their scale of the initial values. */
+static int optimise_points (pw_optimise *x) {
+  const pw_unknowns *k = &x->unknowns;
+  double point[OPTIMISE_MOST], shift[OPTIMISE_MOST];
+  gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);
+  gsl_qrng *sobol = gsl_qrng_alloc (gsl_qrng_sobol, (unsigned)k->count);
+  for (int i = 0; random && sobol && i < x->starts; i++) {
+    if (i == 0) gsl_rng_set (random, (unsigned long)x->seed);
+    for (int j = 0; i == 0 && j < k->count; j++) shift[j] = gsl_rng_uniform (random);
+    for (int j = 0; i == 0 && j < k->count; j++) x->start[0].first[j] = k->at[j].value;
+    if (i > 0) gsl_qrng_get (sobol, point);
+    for (int j = 0; i > 0 && j < k->count; j++) {
+      const pw_unknown *u = k->at + j;
+      double part = fmod (point[j] + shift[j], 1);
+      x->start[i].first[j] =
+          u->given ? pw_search_unknown (u, part) : fmin (fmax (u->value + (2 * part - 1) * u->scale, u->low), u->high);
+    }
+  }
+  int status = random && sobol ? PW_OK : PW_RESOURCE;
+  if (random) gsl_rng_free (random);
+  if (sobol) gsl_qrng_free (sobol);
+  return status;
+}
+
+static int optimise_open_starts (pw_optimise *x, pw_error *error) {
+  int n = x->unknowns.count, all = x->starts + OPTIMISE_POLISHED, failed = 0;
+  x->start = calloc ((size_t)all, sizeof *x->start);
+  for (int i = 0; x->start && i < all; i++) {
+    pw_search_start *s = x->start + i;
+    s->first = calloc ((size_t)(2 * n + x->outputs), sizeof *s->first);
+    if (s->first) s->best = s->first + n, s->value = s->best + n;
+    failed |= s->first == NULL;
+  }
+  if (x->start == NULL || failed || optimise_points (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
+  return PW_OK;
+}
+
+int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_search_start *b) {
+  int same = a->found && b->found;
+  for (int j = 0; same && j < x->unknowns.count; j++)
+    same = fabs (a->best[j] - b->best[j]) <= OPTIMISE_SAME * x->unknowns.at[j].scale;
+  return same;
+}
+
+/* The best of the first `count` starts, which are not `used`; the first one of equal ones.  -1: there is none. */
+static int optimise_best (const pw_optimise *x, int count, const unsigned char *used) {
+  int best = -1;
+  for (int i = 0; i < count; i++)
+    if (x->start[i].found && !(used && used[i]) &&
+        (best < 0 || x->sign[0] * x->start[i].value[0] < x->sign[0] * x->start[best].value[0]))
+      best = i;
+  return best;
+}
+
+/* Different optima continue, the best ones first. */
+static int optimise_continue (pw_optimise *x, pw_error *error) {
+  unsigned char *used = calloc ((size_t)x->starts, 1);
+  if (used == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int best; x->polished < OPTIMISE_POLISHED && (best = optimise_best (x, x->starts, used)) >= 0;) {
+    pw_search_start *s = x->start + x->starts + x->polished++;
+    memcpy (s->first, x->start[best].best, (size_t)x->unknowns.count * sizeof *s->first);
+    for (int i = 0; i < x->starts; i++) used[i] |= (unsigned char)pw_optimise_same (x, x->start + i, x->start + best);
+  }
+  free (used);
+  return pw_parallel (x->jobs, x->polished, pw_search_fine, x, error);
+}
+
+static int optimise_search (pw_optimise *x, pw_error *error) {
+  pw_stop_catch ();
+  pthread_mutex_init (&x->lock, NULL);
+  pw_progress_count (&x->progress, pw_file_name (x->m.file), "starts", 0, x->starts + OPTIMISE_POLISHED);
+  int status = pw_parallel (x->jobs, x->starts, pw_search_rough, x, error);
+  if (status == PW_OK) status = optimise_continue (x, error);
+  pw_progress_end (&x->progress);
+  pthread_mutex_destroy (&x->lock);
+  pw_stop_release ();
+  x->best = optimise_best (x, x->starts + x->polished, NULL);
+  return x->error.status != PW_OK ? pw_fail (error, x->error.status, "%s", x->error.text) : status;
+}
+
+/* ---- Before the search ---- */
+
+/* "OUTPUT<=VALUE" or "OUTPUT>=VALUE", split in place. */
+static int optimise_constraint (pw_optimise *x, char *text, const char *given, pw_error *error) {
+  char *at = NULL;
+  for (char *c = text; *c; c++)
+    if ((*c == '<' || *c == '>') && c[1] == '=') at = c;
+  if (at == NULL || pw_read_expression (at + 2, &x->bound[x->outputs]) != PW_OK || !isfinite (x->bound[x->outputs]))
+    return pw_fail (error, PW_INPUT, "--subject-to %.200s: expected OUTPUT<=VALUE or OUTPUT>=VALUE", given);
+  x->sign[x->outputs] = *at == '<' ? 1 : -1;
+  *at = 0;
+  while (at > text && at[-1] == ' ') *--at = 0;
+  x->text[x->outputs++] = text;
+  return PW_OK;
+}
+
+/* Copies of the constraints' texts, which are split. */
+static int optimise_texts (pw_optimise *x, pw_error *error) {
+  size_t count = 1, size = 1, used = 0;
+  for (const char **c = x->subject; c && *c; c++) count++, size += strlen (*c) + 1;
+  x->texts = malloc (size);
+  x->text = calloc (count, sizeof *x->text);
+  x->bound = calloc (2 * count, sizeof *x->bound);
+  if (x->texts == NULL || x->text == NULL || x->bound == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->sign = x->bound + count;
+  x->text[0] = x->objective;
+  x->sign[0] = x->maximise ? -1 : 1;
+  x->outputs = 1;
+  int status = PW_OK;
+  for (const char **c = x->subject; c && *c && status == PW_OK; c++) {
+    status = optimise_constraint (x, strcpy (x->texts + used, *c), *c, error);
+    used += strlen (*c) + 1;
+  }
+  return status;
+}
+
+/* Reads outputs as every run will, with messages that name the options. */
+static int optimise_check (const pw_optimise *x, pw_error *error) {
+  pw_outcomes o;
+  int status = pw_outcomes_open (&o, x->m.system, x->maximise ? "--maximise" : "--minimise", x->text, 1, error);
+  pw_outcomes_close (&o);
+  if (status != PW_OK) return status;
+  status = pw_outcomes_open (&o, x->m.system, "--subject-to", x->text + 1, x->outputs - 1, error);
+  pw_outcomes_close (&o);
+  return status;
+}
+
+static int optimise_read (pw_optimise *x, pw_error *error) {
+  double starts = 10;
+  x->objective = x->maximise ? x->maximise : x->minimise;
+  x->best = -1;
+  x->leading = INFINITY;
+  x->seed = 1;
+  if (x->objective == NULL || (x->maximise && x->minimise))
+    return pw_fail (error, PW_INPUT, "expected one of --maximise OUTPUT and --minimise OUTPUT");
+  int status = pw_cli_number ("--starts", x->starts_text, PW_COUNT, &starts, error);
+  if (status == PW_OK) status = pw_cli_number ("--seed", x->seed_text, PW_COUNT, &x->seed, error);
+  if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
+  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  x->starts = (int)starts;
+  return status == PW_OK ? optimise_texts (x, error) : status;
+}
+
+static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_error *error) {
+  static const char *const figures[] = { "optimise.dat", "optimise.gp", "optimise.svg", "optimise.png", NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "-o", x->path, PW_WRITES, NULL },
+                   { "--json", x->json_path, PW_WRITES, NULL },
+                   { "--plots", x->plots_path, PW_WRITES_INTO, figures } };
+  int status = pw_cli_open (&x->m, &x->line, error);
+  if (status == PW_OK) status = optimise_check (x, error);
+  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, x->free, 20. * x->starts, error);
+  if (status == PW_OK && x->unknowns.count > OPTIMISE_MOST)
+    status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", OPTIMISE_MOST);
+  if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK && x->path && (file[0] = pw_output_open (x->path, error)) == NULL) status = error->status;
+  if (status == PW_OK && x->json_path && (file[1] = pw_output_open (x->json_path, error)) == NULL)
+    status = error->status;
+  if (status == PW_OK && x->plots_path && (*folder = pw_figure_folder (x->plots_path, error)) < 0)
+    status = error->status;
+  return status == PW_OK ? optimise_open_starts (x, error) : status;
+}
+
+/* ---- After the search ---- */
+
+int pw_optimise_at_bound (const pw_optimise *x, int i, double value) {
+  const pw_unknown *u = x->unknowns.at + i;
+  double near = 10 * PW_SEARCH_FINE * u->scale;
+  return value - u->low <= near ? -1 : u->high - value <= near;
+}
+
+/* No run satisfied the constraints: the first error, if there was one. */
+static int optimise_nothing (const pw_optimise *x, pw_error *error) {
+  long runs = 0, failed = 0;
+  const pw_error *why = NULL;
+  for (int i = 0; i < x->starts; i++) {
+    const pw_search_start *s = x->start + i;
+    runs += s->runs, failed += s->failed;
+    if (why == NULL && s->failed) why = &s->error;
+  }
+  if (failed == runs && why)
+    return pw_fail (error, why->status, "none of %ld runs succeeded, the first one: %s", runs, why->text);
+  return pw_fail (error, PW_METHOD, "none of %ld runs from %d starts satisfies --subject-to", runs, x->starts);
+}
+
+static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error) {
+  int interrupted = pw_stop != 0;
+  if (x->best < 0 && interrupted) fputs ("pinwheel: interrupted before the first run was done\n", stderr);
+  if (x->best < 0) return interrupted ? PW_INTERRUPTED : optimise_nothing (x, error);
+  pw_optimise_print (x);
+  if (file[0]) pw_optimise_yaml (x, pw_output_stream (file[0]));
+  if (file[1]) pw_optimise_json (x, interrupted ? "interrupted" : "ok", pw_output_stream (file[1]));
+  int status = pw_output_finish_all (file, 2, error);
+  file[0] = file[1] = NULL;
+  if (status == PW_OK && x->plots_path) status = pw_optimise_draw (x, error);
+  if (interrupted) pw_cli_say ("pinwheel: interrupted; this is the best result until then\n");
+  return status == PW_OK && interrupted ? PW_INTERRUPTED : status;
+}
+
+static void optimise_close (pw_optimise *x) {
+  for (int i = 0; x->start && i < x->starts + OPTIMISE_POLISHED; i++) {
+    free (x->start[i].first);
+    free (x->start[i].trial);
+  }
+  free (x->start);
+  free (x->texts);
+  free (x->text);
+  free (x->bound);
+  pw_unknowns_close (&x->unknowns);
+  pw_cli_close_model (&x->m);
+}
+
+static int optimise_command (void *options, pw_error *error) {
+  pw_optimise *x = options;
+  pw_output *file[2] = { NULL, NULL };
+  int folder = -1, status = optimise_read (x, error);
+  if (status == PW_OK) status = optimise_open (x, file, &folder, error);
+  if (status == PW_OK) status = optimise_search (x, error);
+  if (status == PW_OK) status = optimise_finish (x, file, error);
+  for (int i = 0; i < 2; i++)
+    if (file[i]) pw_output_discard (file[i]);
+  if (folder >= 0) close (folder);
+  optimise_close (x);
+  return status;
+}
+
+static const struct poptOption optimise_options[] = {
+  PW_OPTION_GROUP ("Optimisation"),
+  PW_TEXT_OPTION (
+      pw_optimise, maximise, "maximise", 0, "OUTPUT",
+      "Find the largest value of a column of the table of `run`, of max:COLUMN, min:, mean:, integral:, rms: or "
+      "final: (default), or of an expression of these, such as frame.x/work"),
+  PW_TEXT_OPTION (pw_optimise, minimise, "minimise", 0, "OUTPUT", "Find the smallest value"),
+  PW_LIST_OPTION (pw_optimise, free, "free", 0, "NAME[=LOW:HIGH]",
+                  "Vary a parameter or an initial value, such as frame.vx, between bounds; repeatable"),
+  PW_LIST_OPTION (pw_optimise, subject, "subject-to", 0, "OUTPUT<=VALUE", "Constraint, or OUTPUT>=VALUE; repeatable"),
+  PW_TEXT_OPTION (pw_optimise, starts_text, "starts", 0, "N", "Number of searches from different points (default 10)"),
+  PW_TEXT_OPTION (pw_optimise, seed_text, "seed", 0, "N", "Seed of these points (default 1)"),
+  PW_TEXT_OPTION (pw_optimise, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_TEXT_OPTION (pw_optimise, path, "output", 'o', "FILE.yaml", "Write the result to this file"),
+  PW_TEXT_OPTION (pw_optimise, json_path, "json", 0, "FILE.json", "Write a summary"),
+  PW_TEXT_OPTION (pw_optimise, plots_path, "plots", 0, "DIR", "Write figures of all runs into a folder"),
+  PW_METHOD_OPTIONS,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_optimise = {
+  .name = "optimise",
+  .synopsis = "MODEL --maximise|--minimise OUTPUT --free NAME[=LOW:HIGH]... [OPTION...]",
+  .summary = "find the parameters for which an output is largest or smallest",
+  .help = "Vary parameters and initial values of a model until an output of its runs is largest or smallest, by local "
+          "searches from several starts. Runs that fail count as infeasible.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (pw_optimise),
+  .function = optimise_command,
+  .options = optimise_options,
+};

@@ -1,0 +1,247 @@
+/* The reports of `pinwheel optimise`. */
+#include "optimise.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "figure.h"
+#include "print_table.h"
+
+enum { REPORT_DIGITS = 9, REPORT_PANELS = 6, REPORT_OPTIONS = 4000 };
+
+/* Starts whose results are at the best one. */
+static int report_same (const pw_optimise *x) {
+  int same = 0;
+  for (int i = 0; i < x->starts; i++) same += pw_optimise_same (x, x->start + i, x->start + x->best);
+  return same;
+}
+
+static long report_runs (const pw_optimise *x, long *failed, const pw_error **first) {
+  long runs = 0;
+  *failed = 0;
+  for (int i = 0; i < x->starts + x->polished; i++) {
+    const pw_search_start *s = x->start + i;
+    runs += s->runs;
+    if (*failed == 0 && s->failed) *first = &s->error;
+    *failed += s->failed;
+  }
+  return runs;
+}
+
+/* The output of the first run, with the initial values; NaN if it failed. */
+static double report_initial (const pw_optimise *x) {
+  return x->start[0].runs > 0 ? x->start[0].trial[x->unknowns.count] : NAN;
+}
+
+static const char *report_bound (const pw_optimise *x, int i) {
+  int side = pw_optimise_at_bound (x, i, x->start[x->best].best[i]);
+  return side < 0 ? "at its lower bound" : side > 0 ? "at its upper bound" : "";
+}
+
+static const char *report_unit (const pw_optimise *x, int output, char *buffer, size_t size) {
+  pw_outcomes o;
+  *buffer = 0;
+  if (pw_outcomes_open (&o, x->m.system, "", x->text, x->outputs, NULL) == PW_OK)
+    pw_outcome_unit (&o, output, buffer, size);
+  pw_outcomes_close (&o);
+  return buffer;
+}
+
+static void report_unknowns (const pw_optimise *x) {
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    static const char *const head[] = { "free", "initially", "best", "from", "to", NULL };
+    for (int i = 0; head[i]; i++) pw_cell (&t, i ? 12 : -12, head[i]);
+    pw_row_end (&t);
+    for (int i = 0; i < x->unknowns.count; i++) {
+      const pw_unknown *u = x->unknowns.at + i;
+      pw_cell_unit (&t, -12, u->name, u->unit);
+      pw_cell_number (&t, 12, u->value, REPORT_DIGITS);
+      pw_cell_number (&t, 12, x->start[x->best].best[i], REPORT_DIGITS);
+      pw_cell_number (&t, 12, isfinite (u->low) ? u->low : NAN, REPORT_DIGITS);
+      pw_cell_number (&t, 12, isfinite (u->high) ? u->high : NAN, REPORT_DIGITS);
+      pw_cell (&t, -1, report_bound (x, i));
+      pw_row_end (&t);
+    }
+  }
+}
+
+static void report_outputs (const pw_optimise *x) {
+  const pw_search_start *s = x->start + x->best;
+  char unit[80];
+  putchar ('\n');
+  for (pw_table t = { 0 }; pw_table_pass (&t);)
+    for (int i = 0; i < x->outputs; i++) {
+      char text[120], number[32];
+      snprintf (text, sizeof text,
+                i == 0           ? (x->maximise ? "largest" : "smallest")
+                : x->sign[i] > 0 ? "at most %s"
+                                 : "at least %s",
+                pw_format (number, x->bound[i], REPORT_DIGITS));
+      pw_cell_unit (&t, -12, x->text[i], report_unit (x, i, unit, sizeof unit));
+      pw_cell_number (&t, 12, s->value[i], REPORT_DIGITS);
+      pw_cell (&t, -1, text);
+      if (i == 0) snprintf (text, sizeof text, "(initially %s)", pw_format (number, report_initial (x), REPORT_DIGITS));
+      if (i == 0) pw_cell (&t, -1, text);
+      pw_row_end (&t);
+    }
+}
+
+void pw_optimise_print (const pw_optimise *x) {
+  char options[REPORT_OPTIONS];
+  const pw_error *first = NULL;
+  long failed, runs = report_runs (x, &failed, &first);
+  report_unknowns (x);
+  report_outputs (x);
+  printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", runs, x->starts, report_same (x));
+  if (failed)
+    pw_cli_print (stdout, "%ld runs failed and count as infeasible, the first of them: %s\n", failed, first->text);
+  if (pw_unknowns_options (&x->unknowns, x->start[x->best].best, options, sizeof options)) printf ("\n%s\n", options);
+}
+
+/* ---- JSON ---- */
+
+static void report_json_unknown (const pw_optimise *x, pw_json *j, int i) {
+  const pw_unknown *u = x->unknowns.at + i;
+  j->line = 1;
+  pw_json_open (j, NULL, '{');
+  pw_json_text (j, "name", u->name);
+  pw_json_text (j, "unit", u->unit);
+  pw_json_number (j, "initial", u->value);
+  pw_json_number (j, "value", x->start[x->best].best[i]);
+  pw_json_number (j, "low", u->low);
+  pw_json_number (j, "high", u->high);
+  pw_json_text (j, "bound",
+                (const char *[]){ "low", NULL, "high" }[1 + pw_optimise_at_bound (x, i, x->start[x->best].best[i])]);
+  pw_json_close (j, '}');
+}
+
+static void report_json_start (const pw_optimise *x, pw_json *j, const pw_search_start *s) {
+  j->line = 1;
+  pw_json_open (j, NULL, '{');
+  pw_json_number (j, "value", s->found ? s->value[0] : NAN);
+  pw_json_number (j, "runs", (double)s->runs);
+  pw_json_number (j, "failed", (double)s->failed);
+  pw_json_open (j, "from", '[');
+  for (int i = 0; i < x->unknowns.count; i++) pw_json_number (j, NULL, s->first[i]);
+  pw_json_close (j, ']');
+  pw_json_open (j, "to", '[');
+  for (int i = 0; s->found && i < x->unknowns.count; i++) pw_json_number (j, NULL, s->best[i]);
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
+}
+
+static void report_json_constraint (const pw_optimise *x, pw_json *j, int i) {
+  j->line = 1;
+  pw_json_open (j, NULL, '{');
+  pw_json_text (j, "output", x->text[i]);
+  pw_json_text (j, "type", x->sign[i] > 0 ? "<=" : ">=");
+  pw_json_number (j, "bound", x->bound[i]);
+  pw_json_number (j, "value", x->start[x->best].value[i]);
+  pw_json_close (j, '}');
+}
+
+void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f) {
+  pw_json json = { .f = f, .lines = 2 }, *j = &json;
+  char options[REPORT_OPTIONS];
+  const pw_error *first = NULL;
+  long failed, runs = report_runs (x, &failed, &first);
+  pw_json_open (j, NULL, '{');
+  pw_json_number (j, "schema", 1);
+  pw_json_text (j, "model", pw_file_name (x->m.file));
+  pw_json_text (j, "status", status);
+  pw_json_text (j, x->maximise ? "maximise" : "minimise", x->objective);
+  pw_json_number (j, "value", x->start[x->best].value[0]);
+  pw_json_number (j, "initial", report_initial (x));
+  pw_json_text (j, "options",
+                pw_unknowns_options (&x->unknowns, x->start[x->best].best, options, sizeof options) ? options : NULL);
+  pw_json_text (j, "method", x->unknowns.method);
+  pw_json_number (j, "t_end", x->unknowns.t_end);
+  pw_json_number (j, "seed", x->seed);
+  pw_json_number (j, "runs", (double)runs);
+  pw_json_number (j, "failed", (double)failed);
+  pw_json_text (j, "reason", first ? first->text : "");
+  pw_json_open (j, "unknowns", '[');
+  for (int i = 0; i < x->unknowns.count; i++) report_json_unknown (x, j, i);
+  pw_json_close (j, ']');
+  pw_json_open (j, "constraints", '[');
+  for (int i = 1; i < x->outputs; i++) report_json_constraint (x, j, i);
+  pw_json_close (j, ']');
+  pw_json_open (j, "starts", '[');
+  for (int i = 0; i < x->starts + x->polished; i++) report_json_start (x, j, x->start + i);
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
+}
+
+/* ---- YAML ---- */
+
+/* A text between single quotes. */
+static void report_quoted (FILE *f, const char *key, const char *text) {
+  fprintf (f, "%s: '", key);
+  for (; *text; text++) fprintf (f, *text == '\'' ? "''" : "%c", *text);
+  fputs ("'\n", f);
+}
+
+void pw_optimise_yaml (const pw_optimise *x, FILE *f) {
+  char number[32], options[REPORT_OPTIONS];
+  const pw_search_start *s = x->start + x->best;
+  if (pw_unknowns_options (&x->unknowns, s->best, options, sizeof options))
+    fprintf (f, "# pinwheel run %s %s\n", pw_file_name (x->m.file), options);
+  report_quoted (f, "model", pw_file_name (x->m.file));
+  report_quoted (f, x->maximise ? "maximise" : "minimise", x->objective);
+  fprintf (f, "value: %s\n", pw_format (number, s->value[0], 17));
+  for (int initial = 0; initial < 2; initial++)
+    for (int i = 0, first = 1; i < x->unknowns.count; i++) {
+      if ((x->unknowns.at[i].parameter == NULL) != initial) continue;
+      if (first) fputs (initial ? "start:\n" : "set:\n", f);
+      first = 0;
+      fprintf (f, "  %s: %s\n", x->unknowns.at[i].name, pw_format (number, s->best[i], 17));
+    }
+}
+
+/* ---- Figures ---- */
+
+/* A row per run: number of the start, unknowns, output, whether it satisfies the constraints. */
+static int report_data (const pw_optimise *x, pw_figures *figures, pw_error *error) {
+  int n = x->unknowns.count, width = n + x->outputs;
+  char number[32];
+  pw_output *o = pw_figure_data (figures, "optimise.dat", error);
+  if (o == NULL) return error->status;
+  FILE *f = pw_output_stream (o);
+  fputs ("# start", f);
+  for (int i = 0; i < n; i++) fprintf (f, ", %s [%s]", x->unknowns.at[i].name, x->unknowns.at[i].unit);
+  fprintf (f, ", %s, 1 if the constraints are satisfied\n", x->objective);
+  for (int i = 0; i < x->starts + x->polished; i++)
+    for (long k = 0; k < x->start[i].runs; k++) {
+      fprintf (f, "%d", i + 1);
+      const double *row = x->start[i].trial + k * width;
+      for (int c = 0; c <= n; c++) fprintf (f, " %s", pw_format (number, row[c], 12));
+      fprintf (f, " %d", pw_search_feasible (x, row + n));
+      fputc ('\n', f);
+    }
+  return pw_output_finish (o, error);
+}
+
+int pw_optimise_draw (const pw_optimise *x, pw_error *error) {
+  static const char *const names[] = { "optimise", NULL };
+  pw_figures figures = { x->plots_path, pw_file_name (x->m.file), "" };
+  char label[300], unit[80], number[32];
+  if (report_data (x, &figures, error) != PW_OK) return error->status;
+  pw_output *o = pw_figure_begin (&figures, names[0], error);
+  if (o == NULL) return error->status;
+  FILE *f = pw_output_stream (o);
+  int panels = x->unknowns.count < REPORT_PANELS ? x->unknowns.count : REPORT_PANELS;
+  fprintf (f, "constraints = %d\n", x->outputs - 1);
+  fprintf (f, "panels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", panels, x->unknowns.count, panels,
+           panels);
+  for (int i = 0; i < panels; i++) {
+    const pw_unknown *u = x->unknowns.at + i;
+    snprintf (label, sizeof label, "%s%s%s%s", u->name, *u->unit ? " [" : "", u->unit, *u->unit ? "]" : "");
+    pw_figure_element (f, "label", i + 1, label);
+    fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));
+  }
+  report_unit (x, 0, unit, sizeof unit);
+  snprintf (label, sizeof label, "%s%s%s%s", x->objective, *unit ? " [" : "", unit, *unit ? "]" : "");
+  pw_figure_text (f, "objective", label);
+  fprintf (f, "value = %s\n", pw_format (number, x->start[x->best].value[0], 12));
+  int status = pw_figure_end (o, "optimise", error);
+  return status == PW_OK ? pw_figure_draw (x->plots_path, names, error) : status;
+}

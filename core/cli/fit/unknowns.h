@@ -1,0 +1,46 @@
+/* Free parameters and initial values of a model, which `fit` and `optimise` determine. */
+#ifndef PW_UNKNOWNS_H
+#define PW_UNKNOWNS_H
+
+#include "cli.h"
+
+typedef struct {
+  char *name;
+  const char *unit;
+  const pw_parameter *parameter; /* NULL: the initial value of a state */
+  double value;                  /* at the beginning */
+  double low, high;              /* bounds; infinite without one */
+  double scale;                  /* size of typical changes: the distance of the bounds, else |value|, else 1 */
+  int given;                     /* 1: the bounds are the user's */
+} pw_unknown;
+
+typedef struct {
+  pw_unknown *at;
+  int count;
+  /* of all runs */
+  const pw_cli_line *line;
+  const pw_cli_model *m;
+  const char *method;
+  double t_end;
+  pw_settings settings; /* except stop, initial, specialised */
+  double limit;         /* of each run's processor time [s] */
+  pw_cli_engine engine;
+} pw_unknowns;
+
+/* Reads a list of "NAME" or "NAME=LOW:HIGH", ended by NULL, the settings of runs and --specialise; `runs` is the expected
+ * number of runs.  The line and the open model must outlive the unknowns.  PW_INPUT for an unknown name, a count, bounds
+ * without the initial value between them or outside the domain.  Close them in every case. */
+int pw_unknowns_open (pw_unknowns *u, const pw_cli_line *line, const pw_cli_model *m, const char **list, double runs,
+                      pw_error *error);
+void pw_unknowns_close (pw_unknowns *u);
+
+/* The model with values of the unknowns, compiled, and settings of its runs; limit: its stop context.  PW_INPUT if the model refuses
+ * the values; PW_RESOURCE.  Close the model by pw_cli_close_model in every case.  May be called by several threads at
+ * once. */
+int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, pw_settings *settings, pw_limit *limit,
+                        pw_error *error);
+
+/* Prints a row per unknown: name, value, its unit.  Options that set the values: "--set a=1 --start frame.vx=2". */
+int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size);
+
+#endif
