@@ -201,7 +201,7 @@ static int optimise_nothing (const pw_optimise *x, pw_error *error) {
   }
   if (failed == runs && why)
     return pw_fail (error, why->status, "none of %ld runs succeeded, the first one: %s", runs, why->text);
-  return pw_fail (error, PW_METHOD, "none of %ld runs from %d starts satisfies --subject-to", runs, x->starts);
+  return pw_fail (error, PW_METHOD, "no run from %d starts satisfies --subject-to", x->starts);
 }
 
 static int optimise_finish (pw_optimise *x, pw_output *file[2], pw_error *error) {

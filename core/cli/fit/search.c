@@ -36,13 +36,15 @@ static int search_run (const search *p, pw_error *error) {
   pw_cli_model m;
   pw_settings settings;
   pw_limit limit;
+  char number[32];
   int status = pw_unknowns_system (u, p->at, &m, &settings, &limit, error);
   if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "output", p->x->text, p->x->outputs, error);
   settings.ledger = o.ledger;
   if (status == PW_OK) status = pw_outcomes_run (&o, u->method, &settings, u->t_end, error);
   for (int i = 0; status == PW_OK && i < p->x->outputs; i++) {
     p->value[i] = pw_outcome_value (&o, i, NULL);
-    if (!isfinite (p->value[i])) status = pw_fail (error, PW_METHOD, "%s is %g", p->x->text[i], p->value[i]);
+    if (!isfinite (p->value[i]))
+      status = pw_fail (error, PW_METHOD, "%s is %s", p->x->text[i], pw_format (number, p->value[i], 9));
   }
   pw_outcomes_close (&o);
   pw_cli_close_model (&m);

@@ -25,7 +25,7 @@ do for [form in 'svg png'] {
     data = 'optimise.dat'
     output(sign) = 'using '.(1 + i).':($'.(3 + unknowns).' == '.sign.' ? $'.(2 + unknowns).' : NaN) with points '
     eval "plot data ".output(1)."pt 7 ps 0.4 lc rgb '#004488' title (i == 1 ? 'a run' : ''), ". \
-      (constraints > 0 ? "data ".output(0)."pt 7 ps 0.4 lc rgb '#bbbbbb' title (i == 1 ? 'constraints violated' : ''), " : ''). \
+      (constraints > 0 ? "data ".output(0)."pt 7 ps 0.4 lc rgb '#bbbbbb' title (i == 1 ? 'infeasible' : ''), " : ''). \
       "'+' using (best[i]):(value) every 100000 with points pt 6 ps 1.6 lw 2 lc rgb '#bb5566' title (i == 1 ? 'best' : '')"
   }
   unset multiplot

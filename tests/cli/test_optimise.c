@@ -1,0 +1,173 @@
+/* pinwheel optimise: optima with closed forms, against a dense sweep, at bounds and constraints, with failing runs. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+/* After 1 s a point is at (a, b). */
+static const char model[] =
+    "pinwheel: 1\n"
+    "about: a point with a constant velocity\n"
+    "run: {t_end: 1, step: 0.1}\n"
+    "parameters: [{name: a, value: -1}, {name: b, value: 0.5}, {name: n, value: 2, domain: count}]\n"
+    "bodies: [{name: p, mass: 1, inertia: 1, rate: {vx: a, vy: b}}]\n"
+    "elements: [{force: none, body: p, at: [0, 0]}]\n";
+
+static int optimise_setup (void **state) {
+  if (cli_setup (state) != 0) return 1;
+  cli_write ("point.yaml", model);
+  return 0;
+}
+
+/* The value of an unknown in the summary. */
+static double optimise_value (const char *json, const char *name) {
+  char key[100];
+  snprintf (key, sizeof key, "{\"name\": \"%s\"", name);
+  const char *at = strstr (json, key);
+  assert_non_null (at);
+  return strtod (strstr (at, "\"value\": ") + 9, NULL);
+}
+
+/* ---- Optima ---- */
+
+static void test_valley (void **state) {
+  (void)state;
+  cli_shell (
+      "pinwheel optimise @/point.yaml --minimise '100*(p.y - p.x^2)^2 + (1 - p.x)^2' --free a=-3:3 --free b=-3:3 "
+      "--json @/o.json");
+  const char *json = cli_file ("o.json");
+  check_close ("a", optimise_value (json, "a"), 1, 1e-5,
+               "last steps of 1e-7 of 6, in a valley with condition number 2500");
+  check_close ("b", optimise_value (json, "b"), 1, 2e-5, "b = a^2");
+  check_close ("value", cli_number (json, "value", NULL), 0, 1e-10, "square of the distance");
+}
+
+/* The highest point of a line over a disc; b has no bounds. */
+static void test_constraint (void **state) {
+  (void)state;
+  cli_shell ("pinwheel optimise @/point.yaml --maximise p.x+p.y --free a=-3:3 --free b --subject-to 'p.x^2+p.y^2 <= 2' "
+             "--subject-to 'max:p.x>=-5' --json @/o.json");
+  const char *json = cli_file ("o.json");
+  check_close ("a", optimise_value (json, "a"), 1, 2e-3, "square root of the allowance, 1e-6 of 2");
+  check_close ("value", cli_number (json, "value", NULL), 2, 2e-6, "the allowance");
+  assert_non_null (strstr (cli_out, "at most 2"));
+  assert_non_null (strstr (cli_out, "at least -5"));
+}
+
+static void test_bound (void **state) {
+  (void)state;
+  cli_shell (
+      "pinwheel optimise @/point.yaml --maximise p.x --free a=-2:0.5 --free p.vy=0:1 --json @/o.json -o @/o.yaml");
+  const char *json = cli_file ("o.json");
+  check_close ("a", optimise_value (json, "a"), 0.5, 0, "exactly the bound");
+  assert_non_null (strstr (json, "\"bound\": \"high\""));
+  assert_non_null (strstr (cli_out, "at its upper bound"));
+  assert_non_null (strstr (cli_out, "--set a=0.5 --start p.vy="));
+  const char *yaml = cli_file ("o.yaml");
+  assert_non_null (strstr (yaml, "set:\n  a: 0.5\nstart:\n  p.vy: "));
+}
+
+/* Beyond p.x = 0.3 every run fails. */
+static void test_failing (void **state) {
+  (void)state;
+  cli_shell ("pinwheel optimise @/point.yaml --maximise 'p.x + 0*sqrt(0.3 - p.x)' --free a=-2:2 --json @/o.json");
+  const char *json = cli_file ("o.json");
+  check_close ("a", optimise_value (json, "a"), 0.3, 1e-5, "last steps of 1e-7 of 4, one-sided");
+  assert_true (optimise_value (json, "a") <= 0.3 + 1e-12);
+  assert_true (cli_number (json, "failed", NULL) > 0);
+  assert_non_null (
+      strstr (cli_out, "runs failed and count as infeasible, the first of them: p.x + 0*sqrt(0.3 - p.x) is"));
+}
+
+/* No point of a sweep is better, and the nearest ones are worse by the curvature alone. */
+static void test_sweep (void **state) {
+  (void)state;
+  cli_shell ("pinwheel sweep ezyroller --vary omega=lin:2:6:161 --t-end 5 --step 5e-3 -o @/s.csv");
+  char *copy = strdup (cli_file ("s.csv")), *line = strchr (copy, '\n');
+  double best = -INFINITY, at = 0;
+  for (; line && line[1]; line = strchr (line + 1, '\n')) {
+    double omega, x;
+    assert_int_equal (sscanf (line + 1, "%lf,ok,%*f,%lf", &omega, &x), 2);
+    if (x > best) best = x, at = omega;
+  }
+  free (copy);
+  cli_shell ("pinwheel optimise ezyroller --maximise frame.x --free omega=2:6 --t-end 5 --step 5e-3 --json @/o.json");
+  const char *json = cli_file ("o.json");
+  check_close ("omega", optimise_value (json, "omega"), at, 0.025, "step of the sweep");
+  assert_true (cli_number (json, "value", NULL) >= best);
+  check_close ("value", cli_number (json, "value", NULL), best, 1e-2 * best, "curvature over a step");
+}
+
+static void test_jobs (void **state) {
+  (void)state;
+  char first[20000] = "";
+  for (int jobs = 1; jobs <= 3; jobs++) {
+    char command[300];
+    snprintf (command, sizeof command,
+              "pinwheel optimise ezyroller --maximise frame.x/max:work --free omega=2:6 --free M0=0.05:0.2 --t-end 1 "
+              "--step 0.01 --starts 5 --seed 3 --jobs %d --json @/o.json",
+              jobs);
+    cli_shell (command);
+    if (jobs == 1) snprintf (first, sizeof first, "%s", cli_file ("o.json"));
+    assert_string_equal (cli_file ("o.json"), first);
+  }
+}
+
+static void test_interrupt (void **state) {
+  (void)state;
+  char command[1000];
+  const char *program = getenv ("PINWHEEL");
+  snprintf (
+      command, sizeof command,
+      "timeout --preserve-status -s INT 2 '%s' optimise @/point.yaml --minimise 'p.x^2' --free a=-1:1 --starts 100000 "
+      "--json @/o.json",
+      program ? program : "build/pinwheel");
+  assert_int_equal (cli_run (command), 130);
+  assert_true (cli_says (cli_file ("o.json"), "status", "interrupted"));
+  assert_non_null (strstr (cli_err, "this is the best result until then"));
+}
+
+/* ---- Wrong input ---- */
+
+static void test_bad (void **state) {
+  (void)state;
+  static const cli_wrong bad[] = {
+    { "@/point.yaml --free a", "expected one of --maximise OUTPUT and --minimise OUTPUT" },
+    { "@/point.yaml --free a --maximise p.x --minimise p.x",
+      "expected one of --maximise OUTPUT and --minimise OUTPUT" },
+    { "@/point.yaml --maximise p.x", "nothing is free: add --free NAME or --free NAME=LOW:HIGH" },
+    { "@/point.yaml --free a --maximise p.z", "--maximise p.z: no column \"p.z\"; did you mean \"p.x\"?" },
+    { "@/point.yaml --free a --maximise p.x --subject-to 'p.q<=1'",
+      "--subject-to p.q: no column \"p.q\"; did you mean \"p.x\"?" },
+    { "@/point.yaml --free a --maximise p.x --subject-to 'p.x=1'",
+      "--subject-to p.x=1: expected OUTPUT<=VALUE or OUTPUT>=VALUE" },
+    { "@/point.yaml --free c --maximise p.x", "model point has no parameter \"c\"; valid are a, b, n" },
+    { "@/point.yaml --free n --maximise p.x", "--free n: it is a count, and only continuous parameters can be free" },
+    { "@/point.yaml --free p.vz --maximise p.x", "model point has no state \"p.vz\"; did you mean \"p.vx\"?" },
+    { "@/point.yaml --free a=1 --maximise p.x",
+      "--free a=...: expected bounds LOW:HIGH, two numbers, the first one smaller" },
+    { "@/point.yaml --free a=2:1 --maximise p.x",
+      "--free a=...: expected bounds LOW:HIGH, two numbers, the first one smaller" },
+    { "@/point.yaml --free a=1:2 --maximise p.x",
+      "--free a: its initial value -1 is not between 1 and 2; set it by --set" },
+    { "@/point.yaml --free a --free a --maximise p.x", "--free a is given twice" },
+    { "@/point.yaml --free a --maximise p.x --starts 0", "--starts 0: expected a whole number >= 1" },
+    { "@/point.yaml --free a --maximise p.x -o @/x.yaml --json @/x.yaml",
+      "-o and --json cannot both write to @/x.yaml" },
+  };
+  cli_bad_each ("optimise", bad, sizeof bad / sizeof *bad);
+  cli_bad ("pinwheel optimise @/point.yaml --free a=-2:-1 --maximise 'sqrt(p.x)' --starts 2", 4,
+           "none of 2 runs succeeded, the first one: sqrt(p.x) is nan");
+  cli_bad ("pinwheel optimise @/point.yaml --free a=-2:0 --maximise p.x --subject-to 'p.x>=1' --starts 2", 4,
+           "no run from 2 starts satisfies --subject-to");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),    cmocka_unit_test (test_constraint),
+                                      cmocka_unit_test (test_bound),     cmocka_unit_test (test_failing),
+                                      cmocka_unit_test (test_sweep),     cmocka_unit_test (test_jobs),
+                                      cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad) };
+  return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);
+}
