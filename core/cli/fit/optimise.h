@@ -39,7 +39,7 @@ typedef struct {
   pw_error error; /* that ends everything */
 } pw_optimise;
 
-/* ---- Searches (search.c) ---- */
+/* ---- Searches (local_search.c) ---- */
 
 #define PW_SEARCH_FINE 1e-7 /* last steps of the results that continue, relative to the scales of the unknowns */
 
