@@ -465,6 +465,9 @@ FIGURES  := $(wildcard docs/figures/*)
 EXAMPLES := $(EMBED) $(wildcard models/*.c) core/kinds/forces/torque.c \
             $(addprefix core/kinds/,batch.h contact.h holonomic/gear.c nonholonomic/rolling_wheel.c)
 
+# Where Python looks for packages below PREFIX: Debian's for /usr, otherwise that of its version.
+PYTHON_SITE = lib/$(if $(filter /usr,$(PREFIX)),python3/dist-packages,$(shell python3 -c 'import sys; print("python%d.%d" % sys.version_info[:2])')/site-packages)
+
 define PKGCONFIG
 prefix=$(PREFIX)
 includedir=$${prefix}/include/pinwheel
@@ -492,6 +495,8 @@ install: all
 	install -m 644 $(HEADERS) "$(D)/include/pinwheel"
 	install -m 644 $(PLUGINS) "$(D)/lib/pinwheel/models"
 	for f in $(PAGE); do install -Dm 644 $$f "$(D)/lib/pinwheel/page/$${f##*/}" || exit 1; done
+	if command -v python3 >/dev/null; then install -d "$(D)/$(PYTHON_SITE)/pinwheel" && \
+	  install -m 644 core/python/pinwheel/*.py core/python/pinwheel/py.typed "$(D)/$(PYTHON_SITE)/pinwheel"; fi
 	install -m 644 core/cli/completion.bash "$(D)/share/bash-completion/completions/pinwheel"
 	printf '#compdef pinwheel\nautoload -U +X bashcompinit && bashcompinit\nsource %s\n' \
 	  "$(PREFIX)/share/bash-completion/completions/pinwheel" >"$(D)/share/zsh/site-functions/_pinwheel"
@@ -514,7 +519,7 @@ deb:
 
 # Removes what install put there and the directories that only Pinwheel uses, if they are empty.
 uninstall:
-	[ ! -d "$(D)" ] || { cd "$(D)" && rm -f bin/pinwheel share/bash-completion/completions/pinwheel share/zsh/site-functions/_pinwheel \
+	[ ! -d "$(D)" ] || { cd "$(D)" && rm -rf $(PYTHON_SITE)/pinwheel && rm -f bin/pinwheel share/bash-completion/completions/pinwheel share/zsh/site-functions/_pinwheel \
 	  lib/libpinwheel.* lib/libpinwheel-files.* lib/pkgconfig/pinwheel.pc \
 	  $(addprefix include/pinwheel/,$(notdir $(HEADERS))) $(addprefix lib/pinwheel/models/,$(notdir $(PLUGINS))) $(addprefix lib/pinwheel/page/,$(notdir $(PAGE))) \
 	  $(foreach m,$(MAN),share/man/man$(subst .,,$(suffix $(m)))/$(notdir $(m))) \

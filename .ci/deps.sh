@@ -1,11 +1,11 @@
 #!/bin/sh
 # Checks what Pinwheel needs and installs only what is missing, with the system's package manager.
 #
-#   deps.sh [fresh] [style] [browser] [slurm] [reference] [page]
+#   deps.sh [fresh] [style] [browser] [slurm] [reference] [page] [python]
 #
 # fresh: do not trust the last result; style: clang and clang-format too; browser: one that can run without a screen, for
 # the tests of animations; slurm: for tests/scripts/slurm.sh; reference: Python's numpy and scipy, for tests/reference/reference.sh; page: a compiler for
-# WebAssembly, for interactive pages.
+# WebAssembly, for interactive pages; python: what the tests of the Python package use.
 #
 # Reads CC, CPPFLAGS, LDFLAGS, BUILD, NO_DEPS.  Only apt has been tried; dnf, pacman and brew are unverified.
 
@@ -20,6 +20,7 @@ for word; do
   browser) needs="$needs chromium" ;;
   slurm) needs="$needs slurmctld munged" ;;
   reference) needs="$needs python3-numpy python3-scipy" ;;
+  python) needs="$needs python3-numpy python3-pytest python3-matplotlib" ;;
   page) needs="$needs clang wasm-ld wasi-libc wasi-builtins" ;;
   *) echo "deps.sh: unknown word \"$word\"" >&2; exit 2 ;;
   esac

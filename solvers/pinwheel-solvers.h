@@ -171,6 +171,29 @@ int pw_initial_moved (const pw_system *s, const pw_initial_report *report, int s
 int pw_initial_specified (const pw_initial_report *report, int state);
 const pw_scale *pw_run_scale (const pw_run *r);
 
+/* ---- For programs in other languages (bindings.c) ---- */
+
+/* Advances to t_end and stores samples in rows of pw_run_record_width numbers, at most `count`: at the given times,
+ * increasing, from the time reached on; or after every accepted step (times: NULL).  Returns PW_OK with *recorded rows
+ * when t_end is reached, the rows are full, or after `steps` steps: call it again, with the rest of the times; otherwise
+ * as pw_run_advance. A row is t, scaled residuals of g = 0 and J v = eta, kinetic and potential energy, work, loss,
+ * energy added by projections, balance (PW_RECORD_STATES numbers), then q, v, a, reactions (-lambda) and, with
+ * pw_settings.ledger, the ledger's entries. */
+enum { PW_RECORD_STATES = 9 };
+int pw_run_record_width (const pw_run *r);
+int pw_run_record (pw_run *r, double t_end, const double *times, long count, long steps, double *rows, long *recorded,
+                   pw_error *error);
+
+/* pw_function.eval of a signal whose value is the double at `context`; after changing it call pw_run_restart. */
+int pw_input_signal (void *context, double t, const double *x, double value[3], double *gradient);
+
+/* Sizes of structures ("pw_error") and offsets and sizes of their members ("pw_error.text"); ends with a NULL name. */
+typedef struct {
+  const char *name;
+  size_t offset, size;
+} pw_member;
+extern const pw_member pw_members[];
+
 /* pw_system_source with the redundant constraint equations of the run. */
 char *pw_run_source (const pw_run *r, pw_error *error);
 

@@ -1,0 +1,89 @@
+"""The table of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+class Result:
+    """Samples of a run: a table whose columns have names and units.
+
+    Attributes
+    ----------
+    t : ndarray, shape (samples,)
+        Times [s].
+    rows : ndarray, shape (samples, columns)
+        All numbers; ``result[name]`` is a view of one column.
+    units : dict of str
+        Unit of each column.
+    states, reactions, ledger : list of str
+        Names of columns: coordinates and velocities; reactions; work and losses by element.
+    status : {"ok", "stopped", "failed"}
+    reason : str
+        Why the run ended early, or "".
+    statistics : dict
+        Steps, evaluations, largest constraint residuals.
+    """
+
+    def __init__(self, rows, groups, units, status="ok", reason="", statistics=None, model=None, settings=None):
+        self.rows = rows
+        self.units = units
+        self.status, self.reason, self.statistics = status, reason, statistics or {}
+        self.model, self.settings = model, settings or {}
+        self.states, self.reactions, self.ledger = groups["states"], groups["reactions"], groups["ledger"]
+        self._column = {name: i for i, name in enumerate(units)}
+        self.t = rows[:, 0]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """The column of this name, shape (samples,), without copying."""
+        try:
+            return self.rows[:, self._column[name]]
+        except KeyError:
+            raise KeyError(f"no column {name!r}{_nearest(name, self._column)}") from None
+
+    def __contains__(self, name):
+        return name in self._column
+
+    def __iter__(self):
+        return iter(self._column)
+
+    def __len__(self):
+        return len(self.rows)
+
+    def keys(self):
+        return self._column.keys()
+
+    @property
+    def final(self) -> dict:
+        """The last sample, by name."""
+        return dict(zip(self._column, self.rows[-1].tolist()))
+
+    def to_dataframe(self):
+        """A pandas DataFrame, indexed by time."""
+        import pandas
+        return pandas.DataFrame(self.rows[:, 1:], columns=list(self._column)[1:], index=pandas.Index(self.t, name="t"))
+
+    def to_xarray(self):
+        """An xarray Dataset over the time, with units as attributes."""
+        import xarray
+        return xarray.Dataset({n: ("t", self[n], {"units": self.units[n]}) for n in self._column if n != "t"},
+                              coords={"t": ("t", self.t, {"units": "s"})})
+
+    def __repr__(self):
+        end = f", {self.reason}" if self.reason else ""
+        return f"<{self.settings.get('method', 'run')}: {len(self)} samples to t = {self.t[-1]:.6g} s, {self.status}{end}>"
+
+    def _repr_html_(self):
+        """In notebooks: the animation."""
+        from html import escape
+        from .studies import animation
+        page = animation(self) if self.model is not None and self.model.source else None
+        if page is None:
+            return escape(repr(self))
+        return f'<iframe srcdoc="{escape(page)}" style="width: 100%; height: 32em; border: 0"></iframe>'
+
+
+def _nearest(name, names):
+    import difflib
+    near = difflib.get_close_matches(name, list(names), 1, 0.5)
+    return f"; did you mean {near[0]!r}?" if near else ""

@@ -1,0 +1,268 @@
+"""The Python package against the program and against closed forms."""
+
+import concurrent.futures
+import csv
+import ctypes
+import json
+import math
+import os
+import pathlib
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import pinwheel as pw
+from pinwheel import _library as lib
+
+TOP = pathlib.Path(__file__).resolve().parents[2]
+
+
+def program(*words):
+    return subprocess.run([lib.program(), *words], capture_output=True, text=True, check=True)
+
+
+def table(path):
+    rows = list(csv.reader(open(path, encoding="utf-8")))
+    return {name.split(" [")[0]: np.array(column, float) for name, column in zip(rows[0], zip(*rows[1:]))}
+
+
+# ---- Models ----
+
+def test_every_model_of_the_gallery_opens():
+    for name in pw.models():
+        assert pw.Model(name).about
+
+
+@pytest.mark.parametrize("make, kind, text", [
+    (lambda: pw.Model("snakebord"), pw.InputError, 'did you mean "snakeboard"?'),
+    (lambda: pw.Model("snakeboard", swin=1), pw.InputError, "did you mean 'swing'?"),
+    (lambda: pw.Model("pendulum", m=-1).run(), pw.InputError, "m = -1"),
+    (lambda: pw.Model("snakeboard").run("rk9"), pw.InputError, "rk9"),
+    (lambda: pw.Model("snakeboard").run(start={"bord.x": 1}), pw.InputError, 'did you mean "board.x"?'),
+    (lambda: pw.Model("snakeboard").run(times=np.zeros((2, 2))), pw.InputError, "found shape (2, 2)"),
+    (lambda: pw.Model("snakeboard").run(times=[1, 0.5]), pw.InputError, "increasing times"),
+    (lambda: pw.Model("snakeboard").run(every=-1), pw.InputError, "every = -1"),
+    (lambda: pw.Model("ezyroller", a=0, b=0, c=0, d=0).run(), pw.Error, "ezyroller"),
+    (lambda: pw.describe(bodies=[{"name": "a", "mas": 1}]).run(), pw.InputError, "mas"),
+    (lambda: pw.command("check", "snakebord"), pw.InputError, "snakebord"),
+])
+def test_refusals_have_the_text_of_the_library(make, kind, text):
+    with pytest.raises(kind) as raised:
+        make()
+    assert text in str(raised.value)
+
+
+def test_unknown_columns_name_the_nearest():
+    with pytest.raises(KeyError, match="board.y"):
+        pw.Model("snakeboard").run(t_end=0.1)["board.yy"]
+
+
+def test_description_in_python():
+    bodies = [{"name": "sleigh", "mass": 1, "inertia": 0.5, "rate": {"vx": 1, "vy": 0.2, "omega": 0.8}}]
+    elements = [{"wheel": "edge", "body": "sleigh", "at": ["-a", 0]}]
+    parameters = [{"name": "a", "value": 0.25, "unit": "m"}]
+    r = pw.describe("sleigh", bodies=bodies, elements=elements, parameters=parameters).run("erk8+projection", t_end=60, rtol=1e-12)
+    assert math.hypot(r["sleigh.vx"][-1], r["sleigh.vy"][-1]) == pytest.approx(math.sqrt(1 + 0.5625 * 0.64), rel=1e-11)
+
+
+def test_functions_as_signals():
+    bodies = [{"name": "disc", "mass": 1, "inertia": 2}]
+    element = {"torque": "motor", "body": ["disc", "ground"], "value": lambda t: math.cos(t)}
+    r = pw.describe(bodies=bodies, elements=[element]).run("erk8", t_end=3, rtol=1e-12)
+    assert r["disc.omega"][-1] == pytest.approx(math.sin(3) / 2, abs=1e-11)
+    assert r["disc.phi"][-1] == pytest.approx((1 - math.cos(3)) / 2, abs=1e-11)
+
+
+def test_a_failing_function_stops_the_run(capfd):
+    element = {"torque": "motor", "body": ["disc", "ground"], "value": lambda t: 1 / 0 if t > 1 else 0}
+    r = pw.describe(bodies=[{"name": "disc", "mass": 1, "inertia": 2}], elements=[element]).run(t_end=3)
+    assert r.status == "failed" and 0.9 < r.t[-1] <= 1.01 and "motor" in r.reason
+    assert "ZeroDivisionError" in capfd.readouterr().err
+
+
+# ---- Runs ----
+
+@pytest.mark.parametrize("model, method", [("snakeboard", "rk4+projection"), ("ezyroller", "ida+ggl"),
+                                           ("car-tyres", "erk8+projection"), ("redundant-parallelogram", "galpha"),
+                                           ("differential-drive", "bdf+projection")])
+def test_same_bits_as_the_program(model, method, tmp_path):
+    program("run", model, "--method", method, "--t-end", "2", "--every", "0.25", "--energy", "-o", str(tmp_path / "t.csv"))
+    expected = table(tmp_path / "t.csv")
+    r = pw.Model(model).run(method, t_end=2, every=0.25, energy=True)
+    compared = [name for name in expected if name in r]
+    assert len(compared) > 8
+    for name in compared:
+        assert np.array_equal(r[name], expected[name]), name
+
+
+def test_units_are_those_of_the_program(tmp_path):
+    program("run", "ezyroller", "--t-end", "0.1", "-o", str(tmp_path / "t.csv"))
+    header = next(csv.reader(open(tmp_path / "t.csv", encoding="utf-8")))
+    r = pw.Model("ezyroller").run(t_end=0.1)
+    for cell in header:
+        name, _, unit = cell.partition(" [")
+        if name in r:
+            assert r.units[name] == unit.rstrip("]"), name
+
+
+def test_columns_are_views():
+    r = pw.Model("pendulum").run(t_end=1, every=0.1)
+    assert r["bob.x"].base is r.rows or np.shares_memory(r["bob.x"], r.rows)
+    assert r.rows.shape == (11, len(r.units)) and r.t[-1] == 1
+
+
+def test_ctrl_c_keeps_the_samples():
+    timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    r = pw.Model("ezyroller").run(t_end=1e5)
+    assert r.status == "stopped" and 0 < r.t[-1] < 1e5 and "interrupted" in r.reason
+
+
+def test_failures_keep_the_samples():
+    r = pw.Model("ezyroller").run("erk8+projection", rtol=1e-12, max_steps=20)
+    assert r.status == "failed" and "max_steps" in r.reason.replace("-", "_") and len(r) > 2
+
+
+def test_controller():
+    """A torque that is set every 10 ms is the same as a pulse train: omega is the sum of impulses."""
+    bodies = [{"name": "disc", "mass": 1, "inertia": 2}]
+    model = pw.describe(bodies=bodies, elements=[{"torque": "motor", "body": ["disc", "ground"], "value": 0}])
+    total = 0.0
+    with model.open("rk4", inputs={"motor": 0.0}) as simulation:
+        for k in range(100):
+            simulation.inputs["motor"] = math.sin(k)
+            simulation.advance(0.01 * (k + 1))
+            total += 0.01 * math.sin(k) / 2
+        assert simulation.sample()["disc.omega"] == pytest.approx(total, abs=1e-13)
+        with pytest.raises(KeyError, match="motor"):
+            simulation.inputs["moter"] = 1
+        with pytest.raises(pw.InputError, match="has reached"):
+            simulation.advance(0.5)
+
+
+def test_threads_share_a_model():
+    model = pw.Model("snakeboard")
+    with concurrent.futures.ThreadPoolExecutor(4) as pool:
+        runs = list(pool.map(lambda _: model.run(t_end=2, every=0.5).rows, range(8)))
+    assert all(np.array_equal(rows, runs[0]) for rows in runs)
+
+
+def test_the_lock_is_released():
+    """While a run computes, another thread runs Python."""
+    count, done = 0, threading.Event()
+
+    def work():
+        pw.Model("ezyroller").run(t_end=300, every=300)
+        done.set()
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    while not done.is_set():
+        count += 1
+        time.sleep(0)
+    thread.join()
+    assert count > 50
+
+
+def test_tables():
+    pandas, xarray = pytest.importorskip("pandas"), pytest.importorskip("xarray")
+    r = pw.Model("pendulum").run(t_end=1, every=0.5)
+    assert isinstance(r.to_dataframe(), pandas.DataFrame) and r.to_dataframe()["bob.x"].iloc[-1] == r["bob.x"][-1]
+    data = r.to_xarray()
+    assert isinstance(data, xarray.Dataset) and data["bob.x"].attrs["units"] == "m"
+
+
+def test_notebook_shows_the_animation():
+    page = pw.Model("pendulum").run(t_end=1)._repr_html_()
+    assert page.startswith("<iframe srcdoc=") and "pendulum" in page
+
+
+# ---- Studies ----
+
+def test_sweep_has_the_values_of_the_program(tmp_path):
+    program("sweep", "snakeboard", "--vary", "swing=0.3,0.6", "--vary", "board.vx=0,0.1,0.2", "--t-end", "1", "--method",
+            "rk4+projection", "--step", "1e-3", "--specialise=never", "-o", str(tmp_path / "s.csv"))
+    expected = table_of_sweep(tmp_path / "s.csv")
+    data = pw.sweep("snakeboard", {"swing": [0.3, 0.6], "board.vx": [0, 0.1, 0.2]}, t_end=1, method="rk4+projection", step=1e-3)
+    for name in ("board.x", "board.phi", "rotor.omega"):
+        assert np.array_equal(np.asarray(data[name]).ravel(), expected[name]), name
+
+
+def table_of_sweep(path):
+    rows = list(csv.reader(line for line in open(path, encoding="utf-8") if not line.startswith("#")))
+    columns = {}
+    for name, column in zip(rows[0], zip(*rows[1:])):
+        try:
+            columns[name.split(" [")[0]] = np.array(column, float)
+        except ValueError:
+            pass
+    return columns
+
+
+@pytest.mark.parametrize("pool", ["process", "dask", "mpi"])
+def test_executors(pool):
+    vary = {"swing": [0.3, 0.6]}
+    expected = np.asarray(pw.sweep("snakeboard", vary, t_end=0.5)["board.x"])
+    if pool == "process":
+        import multiprocessing
+        executor = concurrent.futures.ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn"))
+    elif pool == "dask":
+        distributed = pytest.importorskip("distributed")
+        client = distributed.Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None)
+        executor = client.get_executor()
+    else:
+        if not os.environ.get("PINWHEEL_TEST_MPI"):
+            pytest.skip("mpi4py's executor starts processes: set PINWHEEL_TEST_MPI=1 under mpiexec")
+        executor = pytest.importorskip("mpi4py.futures").MPIPoolExecutor(1)
+    with executor:
+        assert np.array_equal(np.asarray(pw.sweep("snakeboard", vary, t_end=0.5, executor=executor)["board.x"]), expected)
+
+
+def test_failed_runs_of_a_sweep_are_named():
+    data = pw.sweep("ezyroller", {"a": [0.5, 0.6]}, t_end=50, method="erk8+projection", rtol=1e-12, max_steps=10)
+    assert np.isnan(np.asarray(data["frame.x"]) if "frame.x" in data else np.nan).all()
+    assert all("max" in why for why in np.asarray(data["failed"]))
+
+
+def test_models_are_pickled():
+    model = pickle.loads(pickle.dumps(pw.Model("snakeboard", swing=0.5, start={"board.vx": 0.1})))
+    assert model.parameters["swing"] == 0.5 and model.start == {"board.vx": 0.1}
+
+
+def test_linearise():
+    l = pw.Model("pendulum", theta=-math.pi / 2, l=2.0, g=8.0).linearise()
+    assert l.steady and sorted(l.eigenvalues.imag) == pytest.approx([-2, 2], abs=1e-12)
+    assert np.linalg.eigvals(l.A).imag.max() == pytest.approx(2, abs=1e-12)
+
+
+def test_commands():
+    report = pw.command("check", pw.Model("n-trailer"))
+    assert report["status"] == json.loads(program("check", "n-trailer", "--json", "-").stdout)["status"]
+    assert "frame" in pw.command("show", "ezyroller", matrices=True)
+
+
+def test_layouts_are_checked():
+    with pytest.raises(ImportError, match="pw_settings.step"):
+        lib._structure("pw_settings", step=ctypes.c_float)
+
+
+def test_missing_library_is_named():
+    done = subprocess.run([sys.executable, "-c", "import pinwheel"], capture_output=True, text=True, check=False,
+                          env={**os.environ, "PINWHEEL_LIBRARY": "/nowhere"})
+    assert done.returncode and "PINWHEEL_LIBRARY" in done.stderr
+
+
+# ---- Documentation ----
+
+def test_notebook():
+    cells = json.loads((TOP / "docs/pinwheel.ipynb").read_text(encoding="utf-8"))["cells"]
+    scope = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            exec("".join(cell["source"]), scope)  # noqa: S102: the notebook of this repository
