@@ -92,6 +92,10 @@ int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *err
  * on the error of the differences.  Arrays are valid until the next call. */
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error);
 
+/* The first breakpoint of the run after the time reached, or INFINITY; *slope: the derivative along direction i of that, or
+ * of the one just reached. */
+double pw_variation_breakpoint (const pw_variation *x, int i, double *slope);
+
 /* Evaluations of the linearised equations so far, each of about 6 evaluations of the accelerations. */
 long pw_variation_evaluations (const pw_variation *x);
 

@@ -21,6 +21,7 @@ typedef struct {
   double *trial;                 /* size: Y at a stage, or at the end of a step */
   double slope;                  /* derivative of the breakpoint being passed */
   double largest;                /* norm of Y so far, in units of the scene */
+  double energy;                 /* largest derivative of work and losses so far */
 } pw_variation_column;
 
 typedef struct pw_direction_copy {

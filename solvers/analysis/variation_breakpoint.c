@@ -85,3 +85,10 @@ int pw_variation_pass (pw_variation *x, pw_error *error) {
   x->passed = x->t;
   return PW_OK;
 }
+
+double pw_variation_breakpoint (const pw_variation *x, int i, double *slope) {
+  const pw_direction_copy *d = &x->direction[i];
+  double next = pw_next_breakpoint (x->r->w, x->r->method->order > 2, x->t);
+  *slope = d->columns > 1 && isfinite (d->breakpoint[0]) ? breakpoint_derivative (d, 0) : 0;
+  return next;
+}

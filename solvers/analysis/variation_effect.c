@@ -84,9 +84,8 @@ static int effect_values (pw_run *r, double t, const double *q, const double *v,
 /* By the state: central differences over about 1e-5 of the scene, or twice that for column 1. */
 static int effect_by_state (pw_variation *x, const pw_variation_column *c, const double *Y, double *out) {
   int n = x->n, m = x->m, status = PW_OK;
-  double step = (1 + c->which) * 1e-5 / fmax (c->largest, 1e-300);
+  double step = (1 + c->which) * 1e-5 / (c->largest > 0 ? c->largest : 1);
   double *q = x->values + 2 + x->entries + m, *v = q + n + 3, *lambda = v + n + 3;
-  if (c->largest == 0) return PW_OK;
   for (int side = -1; side <= 1 && status == PW_OK; side += 2) {
     for (int j = 0; j < n; j++) q[j] = x->q[j] + side * step * Y[j], v[j] = x->v[j] + side * step * Y[n + j];
     for (int i = 0; i < m; i++) lambda[i] = x->linear.lambda[i] + side * step * c->lambda[i];
@@ -106,7 +105,9 @@ int pw_variation_outputs (pw_variation *x, const pw_variation_column *c, const d
     status = effect_values (d->given.neighbour[i], effect_time (d, x->at), x->q, x->v, x->linear.lambda, x->values);
     effect_add (out, x->values, weight, length);
   }
-  return status == PW_OK ? effect_by_state (x, c, Y, out) : status;
+  if (status == PW_OK) status = effect_by_state (x, c, Y, out);
+  if (!x->r->redundant) memcpy (out + 2 + x->entries, c->lambda, (size_t)x->m * sizeof *out);
+  return status;
 }
 
 /* ---- Columns ---- */

@@ -23,6 +23,13 @@ static double step_norm (const pw_variation *x, const double *Y) {
   return most;
 }
 
+/* Largest derivative of work and losses. */
+static double step_energy (const pw_variation *x, const double *Y) {
+  double most = 0;
+  for (int i = 2 * x->n; i < x->size; i++) most = pw_largest (most, fabs (Y[i]));
+  return most;
+}
+
 static void step_combine (const pw_variation *x, const pw_variation_column *c, const double *weight, int count,
                           double h, double *out) {
   for (int k = 0; k < count; k++)
@@ -59,6 +66,9 @@ static double step_error (pw_variation *x, double h) {
     memset (e, 0, (size_t)x->size * sizeof *e);
     step_combine (x, c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, e);
     if (size > 0) most = pw_largest (most, step_norm (x, e) / (STEP_TOLERANCE * size));
+    double energy = fmax (c->energy, step_energy (x, c->trial));
+    energy = fmax (energy, STEP_LEAST * fmax (x->r->exchanged, x->r->energy_scene) * size);
+    if (energy > 0) most = pw_largest (most, step_energy (x, e) / (10 * STEP_TOLERANCE * energy));
   }
   return most;
 }
@@ -86,6 +96,7 @@ static void step_accept (pw_variation *x) {
     c->K[0] = c->K[PW_VARIATION_RATES - 1];
     c->K[PW_VARIATION_RATES - 1] = first;
     c->largest = fmax (c->largest, step_norm (x, c->Y));
+    c->energy = fmax (c->energy, step_energy (x, c->Y));
   }
 }
 

@@ -63,6 +63,7 @@ static const struct {
   { "work-precision", { figure_look, figure_methods, figure_work_precision } },
   { "optimise", { figure_look, figure_optimise } },
   { "drift", { figure_look, figure_methods, figure_drift } },
+  { "sensitivity", { figure_look, figure_sensitivity } },
 };
 
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error) {

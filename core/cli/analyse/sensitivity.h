@@ -1,0 +1,47 @@
+/* `pinwheel sensitivity` and its results. */
+#ifndef PW_SENSITIVITY_H
+#define PW_SENSITIVITY_H
+
+#include "outcome.h"
+#include "sensitivity_direction.h"
+
+typedef struct {
+  pw_cli_line line;
+  const char **of, **by; /* as given, ended by NULL */
+  const char *every, *folder;
+  pw_cli_model m;
+  const char *method;
+  pw_settings settings;
+  pw_limit limit;
+  pw_cli_engine engine;
+  double t_end, dt; /* time between rows [s] */
+  pw_unknown *unknown;
+  int unknowns;
+  pw_unknown_run base, *near; /* the run; 4 neighbours of each unknown */
+  pw_direction *direction;
+  pw_variation *variation;
+  pw_outcomes outcomes;     /* of the run */
+  pw_workspace **workspace; /* 5 of each unknown: of the run's system and of the neighbours', for contact points */
+  /* Of all functionals F of the outputs and unknowns P at the time last evaluated, and of the run. */
+  double *value;         /* F */
+  double *slope, *error; /* F x P: derivatives, and their errors */
+  double *end_slope, *end_error;
+  int rows, room; /* the table: t, then each output and its derivatives */
+  double *row;    /* rows x columns */
+  int columns;
+  double cpu;  /* [s] */
+  int stopped; /* 1: stopped before t_end */
+} pw_sensitivity;
+
+/* Runs and differentiates.  A status. */
+int pw_sensitivity_compute (pw_sensitivity *x, pw_error *error);
+/* 1 if an output is a function of columns at one time, so that it has columns in the table. */
+int pw_sensitivity_runs_along (const pw_sensitivity *x, int output);
+/* The derivative of an output by an unknown from those of the functionals, and its error. */
+double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unknown, const double *slope);
+
+void pw_sensitivity_print (const pw_sensitivity *x);
+/* Writes sensitivity.csv, sensitivity.json and the figure.  A status. */
+int pw_sensitivity_write (const pw_sensitivity *x, pw_error *error);
+
+#endif

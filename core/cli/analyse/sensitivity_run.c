@@ -1,0 +1,294 @@
+/* Derivatives of outputs along a run.
+ *
+ * An output is a function of functionals of columns.  At a time, the derivative of a column is that of the sample.  That
+ * of an extremum is the column's at its time, since inside a step the effect of a shift of time vanishes; that of an
+ * integral is the integral of the column's, by Gauss' formula with 5 nodes between rows of the table and breakpoints. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "progress.h"
+#include "sensitivity.h"
+
+enum { SENSITIVITY_NODES = 5 };
+/* Abramowitz and Stegun, table 25.4. */
+static const double sensitivity_x[] = { -0.90617984593866399, -0.53846931010568309, 0, 0.53846931010568309,
+                                        0.90617984593866399 },
+                    sensitivity_w[] = { 0.23692688505618909, 0.47862867049936647, 0.56888888888888889,
+                                        0.47862867049936647, 0.23692688505618909 };
+
+static int sensitivity_is_integral (const pw_functional *f) {
+  return f->type == PW_INTEGRAL || f->type == PW_MEAN || f->type == PW_RMS;
+}
+
+static int sensitivity_is_extremum (const pw_functional *f) {
+  return f->type == PW_MAX || f->type == PW_MIN;
+}
+
+int pw_sensitivity_runs_along (const pw_sensitivity *x, int output) {
+  const pw_outcome *o = &x->outcomes.outcome[output];
+  for (int i = 0; i < o->terms; i++)
+    if (x->outcomes.functional[o->term[i]].type != PW_FINAL) return 0;
+  return 1;
+}
+
+double pw_sensitivity_derivative (const pw_sensitivity *x, int output, int unknown, const double *slope) {
+  const pw_outcome *o = &x->outcomes.outcome[output];
+  double *gradient = x->value + x->outcomes.functionals, sum = 0;
+  pw_outcome_value (&x->outcomes, output, gradient);
+  for (int i = 0; i < o->terms; i++) sum += gradient[o->term[i]] * slope[o->term[i] * x->unknowns + unknown];
+  return sum;
+}
+
+/* ---- Columns at a time ---- */
+
+/* Coordinate `index` of all contact points in one of an unknown's systems. */
+static int sensitivity_contact (const pw_sensitivity *x, int unknown, int which, int index, const pw_sample *s,
+                                const double *dq, double by, double *value, pw_error *error) {
+  const pw_system *system = x->base.system;
+  int n = pw_system_coordinates (system), contacts = pw_system_contacts (system), status;
+  double *q = malloc ((size_t)n * sizeof *q), (*at)[3] = malloc (((size_t)contacts + 1) * sizeof *at);
+  for (int j = 0; q && j < n; j++) q[j] = s->q[j] + (dq ? by * dq[j] : 0);
+  status = q && at ? pw_workspace_contact_points (x->workspace[5 * unknown + which], s->t, q, s->v, at, error)
+                   : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) *value = at[index / 2][index % 2];
+  free (q);
+  free (at);
+  return status;
+}
+
+/* Contact points are functions of positions and parameters: differences in both. */
+static int sensitivity_contact_slope (const pw_sensitivity *x, int unknown, int index, const pw_sample *s,
+                                      const double *dq, double *slope, pw_error *error) {
+  static const double weight[2][4] = { { 0, -0.5, 0.5, 0 }, { -1.5, 2, -0.5, 0 } },
+                      offset[2][4] = { { -2, -1, 1, 2 }, { 0, 1, 2, 4 } };
+  const pw_direction *d = &x->direction[unknown];
+  int status = PW_OK;
+  *slope = 0;
+  for (int k = 0; k < 4 && status == PW_OK; k++) {
+    double value = 0;
+    if (weight[d->one_sided][k] == 0) continue;
+    status = sensitivity_contact (x, unknown, 1 + k, index, s, dq, offset[d->one_sided][k] * d->step, &value, error);
+    *slope += weight[d->one_sided][k] * value / d->step;
+  }
+  return status;
+}
+
+static int sensitivity_values (pw_sensitivity *x, const pw_sample *s, pw_error *error) {
+  int status = PW_OK;
+  for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
+    pw_column c = x->outcomes.functional[i].column;
+    if (c.type == PW_COLUMN_CONTACT)
+      status = sensitivity_contact (x, 0, 0, c.index, s, NULL, 0, &x->value[i], error);
+    else
+      x->value[i] = pw_column_value (x->base.system, c, s);
+  }
+  return status;
+}
+
+/* Advances to a time and evaluates all columns there. */
+static int sensitivity_at (pw_sensitivity *x, double t, pw_error *error) {
+  pw_sample s, d, e;
+  int status = pw_variation_advance (x->variation, t, x->t_end, error), P = x->unknowns;
+  if (status == PW_OK) status = pw_run_sample (x->base.run, t, &s, error);
+  if (status == PW_OK) status = sensitivity_values (x, &s, error);
+  for (int p = 0; p < P && status == PW_OK; p++) {
+    status = pw_variation_sample (x->variation, p, &d, &e, error);
+    for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++) {
+      pw_column c = x->outcomes.functional[i].column;
+      d.t = e.t = 0; /* the column t does not depend on anything */
+      x->slope[i * P + p] = pw_column_value (x->base.system, c, &d);
+      x->error[i * P + p] = pw_column_value (x->base.system, c, &e);
+      if (c.type == PW_COLUMN_CONTACT)
+        status = sensitivity_contact_slope (x, p, c.index, &s, d.q, &x->slope[i * P + p], error);
+    }
+  }
+  return status;
+}
+
+/* ---- Functionals ---- */
+
+/* Adds the current columns to the integrals, with a weight. */
+static void sensitivity_add (pw_sensitivity *x, double weight) {
+  for (int i = 0; i < x->outcomes.functionals; i++) {
+    const pw_functional *f = &x->outcomes.functional[i];
+    double factor = f->type == PW_INTEGRAL ? weight : weight / x->t_end;
+    if (!sensitivity_is_integral (f)) continue;
+    if (f->type == PW_RMS) factor *= f->value > 0 ? x->value[i] / f->value : 0;
+    for (int p = i * x->unknowns; p < (i + 1) * x->unknowns; p++) {
+      x->end_slope[p] += factor * x->slope[p];
+      x->end_error[p] += factor * x->error[p];
+    }
+  }
+}
+
+/* Keeps the current derivatives of functional i.  An extremum at a breakpoint moves with it. */
+static void sensitivity_keep (pw_sensitivity *x, int i, int moves) {
+  for (int p = 0; p < x->unknowns; p++) {
+    double slope = 0;
+    int at = i * x->unknowns + p;
+    if (moves) pw_variation_breakpoint (x->variation, p, &slope);
+    x->end_slope[at] = slope == 0 ? x->slope[at] : NAN;
+    x->end_error[at] = x->error[at];
+  }
+}
+
+/* Row of the table: time, then each output that has columns, with its derivatives. */
+static int sensitivity_row (pw_sensitivity *x, double t, pw_error *error) {
+  if (x->rows == x->room) {
+    int room = 2 * x->room + 64;
+    double *more = realloc (x->row, (size_t)room * (size_t)x->columns * sizeof *more);
+    if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+    x->row = more, x->room = room;
+  }
+  double *out = x->row + (size_t)x->rows++ * (size_t)x->columns;
+  *out++ = t;
+  for (int i = 0; i < x->outcomes.functionals; i++)
+    if (x->outcomes.functional[i].type == PW_FINAL) x->outcomes.functional[i].value = x->value[i];
+  for (int o = 0; o < x->outcomes.outcomes; o++) {
+    if (!pw_sensitivity_runs_along (x, o)) continue;
+    *out++ = pw_outcome_value (&x->outcomes, o, NULL);
+    for (int p = 0; p < x->unknowns; p++) *out++ = pw_sensitivity_derivative (x, o, p, x->slope);
+  }
+  return PW_OK;
+}
+
+/* ---- Along the run ---- */
+
+typedef struct {
+  double t, weight; /* of a node */
+  int extremum;     /* functional, or -1 */
+} sensitivity_event;
+
+static int sensitivity_earlier (const void *a, const void *b) {
+  double x = ((const sensitivity_event *)a)->t, y = ((const sensitivity_event *)b)->t;
+  return (x > y) - (x < y);
+}
+
+/* The nodes and extrema in (t0, t1]. */
+static int sensitivity_events (const pw_sensitivity *x, double t0, double t1, sensitivity_event *list) {
+  int count = 0, integrals = 0;
+  for (int i = 0; i < x->outcomes.functionals; i++) {
+    const pw_functional *f = &x->outcomes.functional[i];
+    integrals |= sensitivity_is_integral (f);
+    if (sensitivity_is_extremum (f) && f->t > t0 && f->t <= t1) list[count++] = (sensitivity_event){ f->t, 0, i };
+  }
+  for (int k = 0; k < SENSITIVITY_NODES && integrals; k++)
+    list[count++] =
+        (sensitivity_event){ (t0 + t1) / 2 + sensitivity_x[k] * (t1 - t0) / 2, sensitivity_w[k] * (t1 - t0) / 2, -1 };
+  qsort (list, (size_t)count, sizeof *list, sensitivity_earlier);
+  return count;
+}
+
+/* From t0, where the columns are evaluated, to t1. */
+static int sensitivity_interval (pw_sensitivity *x, double t0, double t1, sensitivity_event *list, pw_error *error) {
+  double slope, breakpoint = pw_variation_breakpoint (x->variation, 0, &slope);
+  int count = sensitivity_events (x, t0, t1, list), status = PW_OK;
+  for (int i = 0; i < count && status == PW_OK; i++) {
+    double t = list[i].t;
+    status = sensitivity_at (x, t, error);
+    if (status != PW_OK) break;
+    if (list[i].extremum < 0)
+      sensitivity_add (x, list[i].weight);
+    else
+      sensitivity_keep (x, list[i].extremum, fabs (t - breakpoint) < 1e-9 * (1 + fabs (t)));
+  }
+  return status == PW_OK ? sensitivity_at (x, t1, error) : status;
+}
+
+static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_progress *progress, pw_error *error) {
+  double t = 0, slope;
+  int status = sensitivity_at (x, 0, error);
+  if (status == PW_OK) status = sensitivity_row (x, 0, error);
+  for (int i = 0; i < x->outcomes.functionals && status == PW_OK; i++)
+    if (sensitivity_is_extremum (&x->outcomes.functional[i])) sensitivity_keep (x, i, 0);
+  for (long k = 1; t < x->t_end && status == PW_OK; k++) {
+    double to = (double)k * x->dt < x->t_end * (1 - 1e-12) ? (double)k * x->dt : x->t_end;
+    while (t < to && status == PW_OK) {
+      double next = fmin (to, pw_variation_breakpoint (x->variation, 0, &slope));
+      status = sensitivity_interval (x, t, next, list, error);
+      t = next;
+      pw_progress_at (progress, t);
+    }
+    if (status == PW_OK) status = sensitivity_row (x, t, error);
+  }
+  for (int i = 0; i < x->outcomes.functionals; i++)
+    if (x->outcomes.functional[i].type == PW_FINAL) sensitivity_keep (x, i, 0);
+  return status;
+}
+
+static int sensitivity_progress (pw_sensitivity *x, pw_error *error) {
+  pw_progress progress;
+  sensitivity_event *list = malloc (((size_t)x->outcomes.functionals + SENSITIVITY_NODES) * sizeof *list);
+  double begun = pw_cpu_clock ();
+  if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  pw_stop_catch ();
+  pw_progress_start (&progress, pw_file_name (x->m.file), x->t_end, 1);
+  int status = sensitivity_along (x, list, &progress, error);
+  pw_progress_end (&progress);
+  pw_stop_release ();
+  free (list);
+  x->cpu = pw_cpu_clock () - begun;
+  x->stopped = status == PW_STOPPED;
+  return x->stopped ? PW_OK : status;
+}
+
+/* ---- Opening ---- */
+
+static int sensitivity_workspaces (pw_sensitivity *x, pw_error *error) {
+  for (int i = 0; i < 5 * x->unknowns; i++) {
+    const pw_system *s = i % 5 ? x->near[4 * (i / 5) + i % 5 - 1].system : x->base.system;
+    x->workspace[i] = pw_workspace_new (s, error);
+    if (x->workspace[i] == NULL) return PW_RESOURCE;
+  }
+  return PW_OK;
+}
+
+static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
+  size_t F = (size_t)x->outcomes.functionals, P = (size_t)x->unknowns;
+  x->value = calloc (2 * F + 4 * F * P + 1, sizeof *x->value);
+  x->columns = 1;
+  for (int o = 0; o < x->outcomes.outcomes; o++)
+    if (pw_sensitivity_runs_along (x, o)) x->columns += 1 + x->unknowns;
+  if (x->value == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  x->slope = x->value + 2 * F, x->error = x->slope + F * P;
+  x->end_slope = x->error + F * P, x->end_error = x->end_slope + F * P;
+  return PW_OK;
+}
+
+/* Work and losses need a run with the ledger. */
+static int sensitivity_ledger (pw_sensitivity *x, pw_error *error) {
+  if (!x->outcomes.ledger) return PW_OK;
+  x->settings.ledger = 1;
+  pw_run_close (x->base.run);
+  x->base.run = pw_run_open (x->base.system, x->method, &x->settings, error);
+  return x->base.run ? PW_OK : error->status;
+}
+
+/* The values of extrema and integrals, and the times of extrema, from a run of its own. */
+static int sensitivity_functionals (pw_sensitivity *x, pw_error *error) {
+  for (int i = 0; i < x->outcomes.functionals; i++)
+    if (x->outcomes.functional[i].type != PW_FINAL)
+      return pw_outcomes_run (&x->outcomes, x->method, &x->settings, x->t_end, error);
+  return PW_OK;
+}
+
+int pw_sensitivity_compute (pw_sensitivity *x, pw_error *error) {
+  int count = 0;
+  while (x->of[count]) count++;
+  pw_settings plain = x->settings;
+  plain.specialised = NULL;
+  int status =
+      pw_unknown_open (&x->base, &x->line, x->m.file, x->unknown, x->unknowns, -1, 0, x->method, &x->settings, error);
+  if (status == PW_OK) status = pw_outcomes_open (&x->outcomes, x->base.system, "--of", x->of, count, error);
+  if (status == PW_OK) status = sensitivity_ledger (x, error);
+  if (status == PW_OK) status = sensitivity_arrays (x, error);
+  if (status == PW_OK)
+    status = pw_unknown_directions (x->direction, x->near, &x->line, x->m.file, x->unknown, x->unknowns, x->method,
+                                    &plain, error);
+  if (status == PW_OK) status = sensitivity_workspaces (x, error);
+  pw_limit_start (&x->limit);
+  if (status == PW_OK) status = sensitivity_functionals (x, error);
+  if (status != PW_OK) return status;
+  x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns, x->outcomes.ledger, error);
+  return x->variation ? sensitivity_progress (x, error) : error->status;
+}
