@@ -48,6 +48,7 @@ void pw_linear_close (pw_linearisation *x) {
   free (x->colptr);
   free (x->rowind);
   free (x->value);
+  free (x->entry);
   free (x->row);
   free (x->memory);
 }

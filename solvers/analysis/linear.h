@@ -15,6 +15,12 @@ typedef struct {
   double acceleration; /* the same in m/s^2, angles times L */
 } pw_linear_frame;
 
+/* An entry of the derivatives. */
+typedef struct {
+  int row, column;
+  double value;
+} pw_linear_entry;
+
 typedef struct {
   pw_run *r;
   int n, m;
@@ -39,6 +45,8 @@ typedef struct {
   pw_scatter_map scatter;
   int64_t *colptr, *rowind; /* the derivatives: columns q, v; rows as y */
   double *value;
+  pw_linear_entry *entry; /* entries: those that are not 0 */
+  int entries;
   char *memory;
   int modes; /* 1: with B, basis, shapes */
   double *left, *top,

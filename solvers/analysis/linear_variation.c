@@ -60,7 +60,16 @@ int pw_linear_derivatives (pw_linearisation *x) {
   int size = 2 * x->n > x->n + 2 * x->m ? 2 * x->n : x->n + 2 * x->m;
   if (pw_scatter_lay_out (&x->scatter, size, &x->colptr, &x->rowind) != PW_OK) return PW_RESOURCE;
   x->value = calloc ((size_t)x->colptr[size] + 1, sizeof *x->value);
-  return x->value ? PW_OK : PW_RESOURCE;
+  x->entry = calloc ((size_t)x->colptr[size] + 1, sizeof *x->entry);
+  return x->value && x->entry ? PW_OK : PW_RESOURCE;
+}
+
+/* Lists the entries that are not 0, often one in five. */
+static void linear_pack (pw_linearisation *x) {
+  x->entries = 0;
+  for (int j = 0; j < 2 * x->n; j++)
+    for (int64_t i = x->colptr[j]; i < x->colptr[j + 1]; i++)
+      if (x->value[i] != 0) x->entry[x->entries++] = (pw_linear_entry){ (int)x->rowind[i], j, x->value[i] };
 }
 
 int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const double *v) {
@@ -69,13 +78,13 @@ int pw_linear_evaluate (pw_linearisation *x, double t, const double *q, const do
   memset (x->value, 0, ((size_t)x->colptr[2 * x->n] + 1) * sizeof *x->value);
   pw_scatter_begin (&x->scatter, x->value);
   linear_put (x, v);
+  linear_pack (x);
   return PW_OK;
 }
 
 void pw_linear_multiply (pw_linearisation *x) {
   memset (x->y, 0, ((size_t)x->n + 2 * (size_t)x->m) * sizeof *x->y);
-  for (int j = 0; j < 2 * x->n; j++)
-    for (int64_t i = x->colptr[j]; i < x->colptr[j + 1]; i++) x->y[x->rowind[i]] += x->value[i] * x->x[j];
+  for (const pw_linear_entry *e = x->entry; e < x->entry + x->entries; e++) x->y[e->row] += e->value * x->x[e->column];
 }
 
 void pw_linear_vary (pw_linearisation *x) {

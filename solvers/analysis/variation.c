@@ -33,8 +33,8 @@ static int variation_linear (pw_variation *x) {
   pw_linearisation *l = &x->linear;
   size_t n = (size_t)x->n, m = (size_t)x->m;
   *l = (pw_linearisation){ .r = x->r, .n = x->n, .m = x->m };
-  const pw_array array[] = { { &l->a, n + 3 },  { &l->lambda, m }, { &l->x, 2 * n },    { &l->y, n + 2 * m },
-                             { &l->da, n + 3 }, { &l->c, m },      { &l->z, n + m + 3 } };
+  const pw_array array[] = { { &l->a, n + 3 },  { &l->lambda, m }, { &l->x, 2 * n },        { &l->y, n + 2 * m },
+                             { &l->da, n + 3 }, { &l->c, m },      { &l->z, n + 3 * m + 3 } };
   l->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return l->memory ? pw_linear_derivatives (l) : PW_RESOURCE;
 }
@@ -81,11 +81,46 @@ static int variation_check (const pw_variation *x, const pw_direction *d, int i,
   return PW_OK;
 }
 
+/* 1 if the signals of a batch may differ; those that point to tables or functions are not compared. */
+static int variation_signals (const pw_element_batch *a, const pw_element_batch *b) {
+  for (int i = 0; i < a->b.count * a->kind->signals; i++) {
+    const pw_signal *one = &a->source[i].signal, *other = &b->source[i].signal;
+    if (one->type == PW_FUNCTION || one->type == PW_TABLE || memcmp (one, other, sizeof *one) != 0) return 1;
+  }
+  return 0;
+}
+
+/* Finds what differs between the neighbours and the run.  PW_RESOURCE; PW_INPUT if that is other elements. */
+static int variation_changes (const pw_variation *x, pw_direction_copy *d) {
+  const pw_system *s = x->r->s;
+  size_t bytes = (size_t)s->coords * sizeof (double);
+  d->changes = calloc ((size_t)s->batches + 1, 1);
+  if (d->changes == NULL) return PW_RESOURCE;
+  for (int i = 0; i < PW_VARIATION_NEAR && d->given.initial == NULL; i++) {
+    const pw_system *other = d->given.neighbour[i]->s;
+    for (int k = 0; k < s->batches; k++) {
+      const pw_element_batch *a = &s->batch[k], *b = &other->batch[k];
+      if (a->kind != b->kind || a->b.count != b->b.count) return PW_INPUT;
+      int differs = memcmp (a->b.element, b->b.element, (size_t)a->b.count * a->kind->element) != 0;
+      differs |= variation_signals (a, b);
+      d->changes[k] |= differs != 0;
+      d->signals |= differs && a->kind->signals > 0;
+    }
+    d->changes[s->batches] |=
+        memcmp (s->mass, other->mass, bytes) != 0 || memcmp (s->constant, other->constant, bytes) != 0;
+  }
+  return PW_OK;
+}
+
 /* Initial derivatives. */
 static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_direction *given, pw_error *error) {
   int n = x->n;
   d->given = *given;
   d->columns = given->initial ? 1 : 2;
+  int status = variation_changes (x, d);
+  if (status == PW_INPUT)
+    return pw_fail (error, PW_INPUT, "direction %d: the elements change", (int)(d - x->direction) + 1);
+  if (status != PW_OK) return pw_fail_memory (x->r->s, error);
   for (int c = 0; c < d->columns; c++) {
     double *Y = d->column[c].trial;
     if (given->initial) memcpy (Y, given->initial, 2 * (size_t)n * sizeof *Y);
@@ -138,7 +173,10 @@ pw_variation *pw_variation_open (pw_run *r, const pw_direction *d, int count, in
 
 void pw_variation_close (pw_variation *x) {
   if (x == NULL) return;
-  for (int i = 0; x->direction && i < x->count; i++) free (x->direction[i].memory);
+  for (int i = 0; x->direction && i < x->count; i++) {
+    free (x->direction[i].memory);
+    free (x->direction[i].changes);
+  }
   for (int i = 0; i < x->room; i++) free (x->point[i].x);
   pw_linear_close (&x->linear);
   free (x->point);

@@ -32,6 +32,8 @@ typedef struct pw_direction_copy {
   double first, last;                   /* times between which no neighbour has a breakpoint */
   double *effect[2];                    /* n + m: derivatives of f - M a - J^T lambda, gamma - J a by the parameter */
   double *row[2];                       /* 2 m: of g, J v - eta */
+  int signals;                          /* 1: some of the batches that differ have signals */
+  unsigned char *changes; /* of batches: 1 if it differs in the neighbours; then 1 for masses and constant forces */
   char *memory;
 } pw_direction_copy;
 

@@ -11,26 +11,60 @@ static void effect_add (double *to, const double *from, double weight, int n) {
   for (int i = 0; i < n; i++) to[i] += weight * from[i];
 }
 
-/* f - M a - J^T lambda, gamma - J a, g (0 for nonholonomic equations), J v - eta in a neighbour's system at the state
- * of the run.  In the run itself all are 0. */
-static int effect_residuals (pw_variation *x, pw_run *r, double t, double *out) {
+/* The rows of a batch of a neighbour, weighted for both columns. */
+static void effect_rows (pw_variation *x, pw_direction_copy *d, pw_element_batch *k, const double weight[2]) {
   const pw_linearisation *l = &x->linear;
-  int n = x->n, m = x->m, status = pw_evaluate_J_at (r->w, t, x->q, x->v);
-  double *gamma = out + n, *g = gamma + m, *v = g + m, *f = l->z, *scratch = l->c;
-  if (status != PW_OK) return status;
-  pw_evaluate_force (r->w, f);
-  for (int i = 0; i < m; i++) scratch[i] = -l->lambda[i];
-  pw_add_JT (r->w, scratch, f);
-  for (int j = 0; j < n; j++) out[j] = f[j] - r->s->mass[j] * l->a[j];
-  pw_evaluate_gamma (r->w, gamma);
-  pw_mul_J (r->w, l->a, scratch);
-  effect_add (gamma, scratch, -1, m);
-  memset (g, 0, (size_t)m * sizeof *g);
-  pw_evaluate_g (r->w, g);
-  pw_mul_J (r->w, x->v, v);
-  pw_evaluate_eta (r->w, scratch);
-  effect_add (v, scratch, -1, m);
-  return PW_OK;
+  int rows = k->kind->rows, n = x->n, m = x->m;
+  double *gamma = l->z, *g = gamma + m, *eta = g + m;
+  memset (gamma, 0, 3 * (size_t)m * sizeof *gamma);
+  k->kind->J (&k->b, k->J);
+  if (k->kind->gamma) k->kind->gamma (&k->b, gamma);
+  if (k->kind->g) k->kind->g (&k->b, g);
+  if (k->kind->eta) k->kind->eta (&k->b, eta);
+  const double *J = k->J;
+  for (int r = 0; r < k->b.count * rows; r++) {
+    int i = k->row + r;
+    double acceleration = gamma[r], velocity = -eta[r];
+    for (int c = 0; c < k->b.cols; c++, J++) {
+      int j = pw_global (k, r / rows, c);
+      if (j >= n) continue;
+      acceleration -= *J * l->a[j];
+      velocity += *J * x->v[j];
+      for (int w = 0; w < 2; w++) d->effect[w][j] -= weight[w] * *J * l->lambda[i];
+    }
+    for (int w = 0; w < 2; w++) {
+      d->effect[w][n + i] += weight[w] * acceleration;
+      d->row[w][i] += weight[w] * g[r];
+      d->row[w][m + i] += weight[w] * velocity;
+    }
+  }
+}
+
+static void effect_force (pw_variation *x, pw_direction_copy *d, pw_element_batch *k, const double weight[2]) {
+  const double *f = k->block;
+  k->kind->force (&k->b, k->block);
+  for (int e = 0; e < k->b.count; e++)
+    for (int c = 0; c < k->b.cols; c++, f++) {
+      int j = pw_global (k, e, c);
+      for (int w = 0; w < 2 && j < x->n; w++) d->effect[w][j] += weight[w] * *f;
+    }
+}
+
+/* Adds f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run, without the
+ * elements that are the same in all neighbours. */
+static int effect_neighbour (pw_variation *x, pw_direction_copy *d, pw_workspace *w, double t, const double weight[2]) {
+  memcpy (w->configuration, x->r->w->configuration, (size_t)w->s->bodies * sizeof *w->configuration);
+  pw_point_to_internal (w, x->q, x->v);
+  int status = d->signals ? pw_update_signals (w, t, x->q, x->v) : PW_OK;
+  for (int i = 0; i < w->s->batches && status == PW_OK; i++) {
+    const pw_kind *kind = w->batch[i].kind;
+    if (!d->changes[i]) continue;
+    if (kind->rows > 0) effect_rows (x, d, &w->batch[i], weight);
+    if (kind->force && !kind->constant) effect_force (x, d, &w->batch[i], weight);
+  }
+  for (int j = 0; j < x->n && d->changes[w->s->batches]; j++)
+    for (int c = 0; c < 2; c++) d->effect[c][j] += weight[c] * (w->s->constant[j] - w->s->mass[j] * x->linear.a[j]);
+  return status;
 }
 
 /* Between the breakpoints of the neighbours, of which one may be passed slightly before that of the run. */
@@ -45,12 +79,8 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d, double t) {
     memset (d->row[c], 0, (size_t)rows * sizeof (double));
   }
   for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->columns > 1; i++) {
-    status = effect_residuals (x, d->given.neighbour[i], effect_time (d, t), x->scratch);
-    for (int c = 0; c < 2 && status == PW_OK; c++) {
-      double weight = pw_variation_weight (&d->given, c, i);
-      effect_add (d->effect[c], x->scratch, weight, length);
-      effect_add (d->row[c], x->scratch + length, weight, rows);
-    }
+    const double weight[2] = { pw_variation_weight (&d->given, 0, i), pw_variation_weight (&d->given, 1, i) };
+    status = effect_neighbour (x, d, d->given.neighbour[i]->w, effect_time (d, t), weight);
   }
   return status;
 }

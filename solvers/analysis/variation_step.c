@@ -5,8 +5,10 @@
 #include "rk.h"
 #include "variation.h"
 
-/* Error of a step relative to the largest derivative: below that of differences, and above round-off. */
-static const double STEP_TOLERANCE = 1e-10;
+/* Error of a step relative to the largest derivative; less accurate where it would need more than a linearisation per
+ * step of a run with fixed steps, which are then large for such fast motions, too. */
+static const double STEP_TOLERANCE = 1e-9, STEP_LOOSE = 1e-7;
+enum { STEP_RATIO = 5 }; /* linearisations per step of the derivatives */
 
 /* Derivatives by p below this part of the scene's unit per p are computed to the same absolute error. */
 static const double STEP_LEAST = 0.1;
@@ -57,7 +59,7 @@ static int step_rates (pw_variation *x, int k, pw_error *error) {
   return pw_variation_rates (x, k) == PW_OK ? PW_OK : pw_fail (error, PW_METHOD, "t = %.6g s: a signal failed", x->at);
 }
 
-/* The largest error of all columns, accepted up to 1; their sizes are updated if it is. */
+/* The largest relative error of all columns. */
 static double step_error (pw_variation *x, double h) {
   double most = 0;
   PW_EACH_COLUMN (c, x) {
@@ -65,10 +67,10 @@ static double step_error (pw_variation *x, double h) {
     if (c->direction->columns > 1) size = fmax (size, STEP_LEAST * 1e-5 / fabs (c->direction->given.step));
     memset (e, 0, (size_t)x->size * sizeof *e);
     step_combine (x, c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, e);
-    if (size > 0) most = pw_largest (most, step_norm (x, e) / (STEP_TOLERANCE * size));
+    if (size > 0) most = pw_largest (most, step_norm (x, e) / size);
     double energy = fmax (c->energy, step_energy (x, c->trial));
     energy = fmax (energy, STEP_LEAST * fmax (x->r->exchanged, x->r->energy_scene) * size);
-    if (energy > 0) most = pw_largest (most, step_energy (x, e) / (10 * STEP_TOLERANCE * energy));
+    if (energy > 0) most = pw_largest (most, step_energy (x, e) / (10 * energy));
   }
   return most;
 }
@@ -107,21 +109,33 @@ int pw_variation_begin (pw_variation *x, pw_error *error) {
   return status;
 }
 
+/* The next step by the error of one of size h: for the strict tolerance, or the loose one up to `fine`. */
+static double step_next (double h, double off, double fine) {
+  double strict = fmin (5, fmax (0.2, 0.9 * pow (off / STEP_TOLERANCE, -0.2)));
+  double loose = fmin (5, fmax (0.2, 0.9 * pow (off / STEP_LOOSE, -0.2)));
+  return isfinite (off) ? fmax (h * strict, fmin (h * loose, fine)) : h / 10;
+}
+
 int pw_variation_step (pw_variation *x, double t1, pw_error *error) {
+  double fine = pw_fixed_steps (x->r) ? STEP_RATIO * x->r->settings.step : 0;
   while (x->h > STEP_SMALLEST * x->r->w->scale.time) {
     double rest = t1 - x->t, h = x->h < rest * (1 - 1e-9) ? x->h : rest, end = h < rest ? x->t + h : t1;
     if (h < rest && 2 * h > rest) h = rest / 2, end = x->t + h;
     int status = step_stages (x, h, end, error);
     if (status != PW_OK) return status;
-    double off = step_error (x, h), factor = fmin (5, fmax (0.2, 0.9 * pow (off, -0.2)));
-    if (off <= 1) {
-      x->h = h < x->h ? fmax (x->h, h * factor) : h * factor;
+    double off = step_error (x, h), next = step_next (h, off, fine);
+    if (off <= (h <= fine ? STEP_LOOSE : STEP_TOLERANCE)) {
+      x->h = h < x->h ? fmax (x->h, next) : next;
       x->t = end;
       step_accept (x);
       return PW_OK;
     }
-    x->h = isfinite (off) ? h * factor : h / 10;
+    x->h = fmin (next, h / 2);
   }
-  return pw_fail (error, PW_METHOD, "t = %.6g s: no step of the derivatives meets their tolerance, however small",
-                  x->t);
+  if (pw_watchdog_near_state (x->r)) return pw_fail_singular (x->r, x->t, error);
+  return pw_fail (
+      error, PW_METHOD,
+      "t = %.6g s: no step of the derivatives meets their tolerance, however small: the motion is too stiff, "
+      "or not differentiable",
+      x->t);
 }
