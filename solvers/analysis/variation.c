@@ -134,16 +134,31 @@ static int variation_start (pw_variation *x, pw_direction_copy *d, const pw_dire
   return pw_variation_look_ahead (x, d, x->r->breakpoint, error);
 }
 
+/* A missing derivative of an element type would give wrong results. */
+static int variation_blocks (const pw_variation *x, pw_error *error) {
+  char block[200];
+  int found = pw_find_missing_block (x->r->w, x->r->t, x->r->q, x->r->v, block, sizeof block);
+  if (found == 0) return PW_OK;
+  if (found == PW_RESOURCE) return pw_fail_memory (x->r->s, error);
+  return pw_fail (
+      error, PW_INPUT,
+      "model %s: %s is left out, but it is not zero, and derivatives need it: add it, or PW_BY_DIFFERENCES in "
+      "its place",
+      x->r->s->model, block);
+}
+
 static int variation_open (pw_variation *x, const pw_direction *d, pw_error *error) {
   pw_run *r = x->r;
   if (pw_run_option (r, "inputs") != 0)
     return pw_fail (error, PW_INPUT, "derivatives need inputs=stage: held inputs depend on the steps");
   for (int i = 0; i < x->count; i++)
     if (variation_check (x, &d[i], i, error) != PW_OK) return PW_INPUT;
+  int status = variation_blocks (x, error);
+  if (status != PW_OK) return status;
   x->direction = calloc ((size_t)x->count + 1, sizeof *x->direction);
   if (x->direction == NULL || variation_arrays (x) != PW_OK || variation_linear (x) != PW_OK)
     return pw_fail_memory (r->s, error);
-  int status = pw_variation_record (x, x->t, error);
+  status = pw_variation_record (x, x->t, error);
   for (int i = 0; i < x->count && status == PW_OK; i++) status = variation_start (x, &x->direction[i], &d[i], error);
   if (status != PW_OK) return status;
   memcpy (x->q, r->q, (size_t)x->n * sizeof *x->q);

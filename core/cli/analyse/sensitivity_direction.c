@@ -84,6 +84,11 @@ static void unknown_domain (const pw_unknown *u, pw_direction *d) {
   d->step = -d->step;
 }
 
+static int unknown_same (const pw_system *a, const pw_system *b) {
+  return pw_system_elements (a) == pw_system_elements (b) && pw_system_coordinates (a) == pw_system_coordinates (b) &&
+         pw_system_rows (a) == pw_system_rows (b);
+}
+
 int pw_unknown_directions (pw_direction *d, pw_unknown_run *x, const pw_cli_line *l, const pw_file *file,
                            const pw_unknown *list, int count, const char *method, const pw_settings *settings,
                            pw_error *error) {
@@ -97,6 +102,9 @@ int pw_unknown_directions (pw_direction *d, pw_unknown_run *x, const pw_cli_line
     for (int k = 0; k < 4 && status == PW_OK; k++) {
       double by = offset[d[i].one_sided][k] * d[i].step;
       status = pw_unknown_open (&x[4 * i + k], l, file, list, count, i, by, method, settings, error);
+      if (status == PW_OK && !unknown_same (middle.system, x[4 * i + k].system))
+        status = pw_fail (error, PW_INPUT,
+                          "%s changes the number of bodies or elements: it cannot be differentiated by", list[i].name);
       d[i].neighbour[k] = x[4 * i + k].run;
     }
   }

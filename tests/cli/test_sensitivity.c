@@ -1,0 +1,157 @@
+/* `pinwheel sensitivity`: closed forms, outputs against differences of runs, files, bad input. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+enum { SENSITIVITY_MOST = 40 };
+
+/* The numbers in the last row of sensitivity.csv. */
+static int sensitivity_last (double *value) {
+  const char *text = cli_file ("sens/sensitivity.csv");
+  assert_non_null (text);
+  size_t n = strlen (text) - 1;
+  while (text[n - 1] != '\n') n--;
+  int count = 0;
+  for (const char *at = text + n; at && count < SENSITIVITY_MOST; at = strchr (at, ',')) {
+    if (*at == ',') at++;
+    value[count++] = strtod (at, NULL);
+  }
+  return count;
+}
+
+/* ---- Closed forms ---- */
+
+/* theta = (k/a) (gd (s t + c) - gd (c)), k^2 = I/m + a^2, A^2 = u0^2 + k^2 w0^2, s = a A/k^2, c = artanh (u0/A), at t = 20,
+ * differentiated with 30 digits. */
+static void test_sleigh (void **state) {
+  static const double expected[] = { -2.19064940477924161196941078323, 4.38129880955848322393882156646,
+                                     -23.1682436429820667965804011701, -3.52690525296758368801569681518,
+                                     -1.6156668371657765493636643037 };
+  double x[SENSITIVITY_MOST];
+  (void)state;
+  cli_good ("pinwheel sensitivity chaplygin-sleigh --of sleigh.phi --by m --by I --by a --by u0 --by w0 -o @/sens");
+  assert_int_equal (sensitivity_last (x), 7);
+  for (int i = 0; i < 5; i++)
+    check_close ("derivative", x[2 + i], expected[i], 1e-8 * fabs (expected[i]),
+                 "steps of 1e-9, about 20 of them matter");
+  assert_non_null (strstr (cli_out, "  a [m]                   0.25   -23.1682436  rad per m"));
+}
+
+/* The motion of a pendulum is a function of t sqrt (g/l): dphi/dl = -omega t / (2 l), dphi/dg = omega t / (2 g). */
+static void test_pendulum (void **state) {
+  double x[SENSITIVITY_MOST];
+  (void)state;
+  cli_good (
+      "pinwheel sensitivity pendulum --of bob.phi --of bob.omega --by l --by g -o @/sens --method erk8+projection "
+      "--rtol 1e-11");
+  assert_int_equal (sensitivity_last (x), 7);
+  check_close ("dphi/dl", x[2], -x[4] * 10 / 2, 2e-8 * fabs (x[2]), "steps of 1e-9, 10 s");
+  check_close ("dphi/dg", x[3], x[4] * 10 / (2 * 9.81), 2e-8 * fabs (x[3]), "steps of 1e-9, 10 s");
+}
+
+/* x = g sin (alpha) sin^2 (w t) / (2 w^2) on the incline: blade and gravity. */
+static void test_incline (void **state) {
+  double x[SENSITIVITY_MOST], s = sin (10), k = s * s / 2, y = (10 - sin (20) / 2) / 2;
+  (void)state;
+  cli_good ("pinwheel sensitivity knife-edge-incline --of skate.x --of skate.y --by g --by alpha --by w -o @/sens");
+  assert_int_equal (sensitivity_last (x), 9);
+  check_close ("dx/dg", x[2], 0.5 * k, 1e-8, "steps of 1e-9, 10 s");
+  check_close ("dx/dalpha", x[3], 9.81 * cos (PW_PI / 6) * k, 1e-8, "steps of 1e-9, 10 s");
+  check_close ("dx/dw", x[4], 9.81 / 2 * (10 * s * cos (10) - 2 * k), 1e-7, "steps of 1e-9, a derivative of 30");
+  check_close ("dy/dg", x[6], 0.5 * y, 1e-8, "steps of 1e-9, 10 s");
+}
+
+/* ---- Outputs of every type, against differences of runs ---- */
+
+static const char sensitivity_outputs[] = " --of frame.x --of rider.work --of A.N --of B.Fx --of A.x --of kinetic "
+                                          "--of max:frame.omega --of max:C.N --of min:frame.y --of mean:kinetic "
+                                          "--of rms:frame.vx --of integral:frame.x --of 'frame.x / max:rider.work' ";
+
+/* Numbers under a key of sensitivity.json, in order. */
+static int sensitivity_json (const char *key, double *value) {
+  int count = 0;
+  for (const char *at = cli_file ("sens/sensitivity.json");
+       (at = strstr (at, key)) != NULL && count < SENSITIVITY_MOST;)
+    value[count++] = strtod (at += strlen (key), NULL);
+  return count;
+}
+
+static void sensitivity_values (const char *name, double value, double *out) {
+  char command[800];
+  snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by b --%s=%.17g -o @/sens",
+            sensitivity_outputs, name, value);
+  double all[SENSITIVITY_MOST];
+  cli_good (command);
+  assert_int_equal (sensitivity_json ("\"value\": ", all), 26);
+  for (int i = 0; i < 13; i++) out[i] = all[2 * i]; /* each output's, then that of b */
+}
+
+static void sensitivity_compare (const char *by, const char *name, double value, double step) {
+  double derivative[SENSITIVITY_MOST], x[4][13];
+  char command[800];
+  snprintf (command, sizeof command, "pinwheel sensitivity ezyroller -t 3%s--by %s -o @/sens", sensitivity_outputs, by);
+  cli_good (command);
+  assert_int_equal (sensitivity_json ("\"derivative\": ", derivative), 13);
+  for (int k = 0; k < 4; k++) sensitivity_values (name, value + (k < 2 ? k - 2 : k - 1) * step, x[k]);
+  for (int i = 0; i < 13; i++) {
+    double one = (x[2][i] - x[1][i]) / (2 * step), two = (x[3][i] - x[0][i]) / (4 * step),
+           by_runs = (4 * one - two) / 3;
+    check_close (by, derivative[i], by_runs, fabs (one - two) / 10 + 1e-7 * fabs (by_runs) + 1e-8,
+                 "extrapolated differences of runs");
+  }
+}
+
+static void test_outputs (void **state) {
+  (void)state;
+  sensitivity_compare ("a", "set=a", 0.5, 1e-3);
+  sensitivity_compare ("M0", "set=M0", 0.1, 1e-4);
+  sensitivity_compare ("frame.phi", "start=frame.phi", 0, 1e-3);
+}
+
+/* ---- Files ---- */
+
+static void test_files (void **state) {
+  (void)state;
+  cli_good ("pinwheel sensitivity pendulum --of bob.x --of max:bob.x --by l -t 1 --every 0.25 -o @/sens");
+  const char *csv = cli_file ("sens/sensitivity.csv"), *head = "t [s],bob.x [m],d(bob.x)/d(l) [m per m]\n";
+  int lines = 0;
+  assert_int_equal (strncmp (csv, head, strlen (head)), 0);
+  for (; *csv; csv++) lines += *csv == '\n';
+  assert_int_equal (lines, 6); /* without columns for the maximum */
+  const char *json = cli_file ("sens/sensitivity.json");
+  assert_true (cli_says (json, "model", "pendulum"));
+  assert_true (cli_says (json, "output", "bob.x"));
+  assert_true (cli_says (json, "unit", "m"));
+  assert_non_null (strstr (json, "\"complete\": true"));
+  assert_non_null (cli_file ("sens/sensitivity.svg"));
+}
+
+/* ---- Bad input ---- */
+
+static void test_refusals (void **state) {
+  static const cli_wrong each[] = {
+    { "pendulum --by l", "--of is missing: expected an output, such as frame.x" },
+    { "pendulum --of bob.x", "--by is missing: expected a parameter or an initial value" },
+    { "pendulum --of bob.z --by l", "--of bob.z: no column \"bob.z\"; did you mean \"bob.x\"?" },
+    { "pendulum --of bob.x --by ll", "model pendulum has no parameter \"ll\"; did you mean \"l\"?" },
+    { "pendulum --of bob.x --by bob.z", "model pendulum has no state \"bob.z\"; valid are x, y, phi, vx, vy, omega" },
+    { "chain --of link1.x --by n", "n is a count (10): derivatives need a number that varies continuously" },
+    { "slider-crank --of crank.phi --by g",
+      "g changes the number of bodies or elements: it cannot be differentiated by" },
+    { "pendulum --of bob.x --by l --method rk4:inputs=held",
+      "derivatives need inputs=stage: held inputs depend on the steps" },
+  };
+  (void)state;
+  cli_bad_each ("sensitivity", each, sizeof each / sizeof *each);
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_sleigh),  cmocka_unit_test (test_pendulum), cmocka_unit_test (test_incline),
+    cmocka_unit_test (test_outputs), cmocka_unit_test (test_files),    cmocka_unit_test (test_refusals),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
