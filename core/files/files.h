@@ -82,12 +82,12 @@ const pw_yaml *pw_file_yaml (const pw_file *f);
 
 /* ---- Tables of numbers (columns.c) ---- */
 
-/* Reads two columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first
- * column must be increasing.  `unit` is the requested unit of each (NULL: any), to which it is converted if the header
+/* Reads `width` columns of a CSV file into arrays of the arena.  `column` names them, or numbers them from 1; the first
+ * column must be increasing; with `gaps`, empty cells and nan in others become NaN.  `unit` is the requested unit of each (NULL: any), to which it is converted if the header
  * names another.
  * PW_INPUT with "SHOWN:LINE: REASON", PW_RESOURCE. */
-int pw_columns_read (FILE *f, const char *shown, const char *const column[2], const char *const unit[2],
-                     pw_arena *arena, double *value[2], int *count, pw_error *error);
+int pw_columns_read (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
+                     int gaps, pw_arena *arena, double **value, int *count, pw_error *error);
 
 /* ---- Units (units.c) ---- */
 

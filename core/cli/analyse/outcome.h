@@ -88,6 +88,8 @@ void pw_outcomes_close (pw_outcomes *x);
 int pw_outcomes_start (pw_outcomes *x, pw_run *r, pw_error *error);
 int pw_outcomes_step (pw_outcomes *x, pw_run *r, pw_error *error);
 int pw_outcomes_end (pw_outcomes *x, pw_run *r, pw_error *error);
+/* The columns of all functionals at a time in the last step. */
+int pw_outcomes_sample (pw_outcomes *x, pw_run *r, double t, double *value, pw_error *error);
 /* All of it: a run to t_end.  A run that was stopped fails as pw_limit_fail says; settings.stop_context is a pw_limit. */
 int pw_outcomes_run (pw_outcomes *x, const char *method, const pw_settings *settings, double t_end, pw_error *error);
 

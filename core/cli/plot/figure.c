@@ -61,6 +61,7 @@ static const struct {
   { "energy", { figure_look, figure_energy } },
   { "mechanism", { figure_look, figure_plane, figure_mechanism } },
   { "work-precision", { figure_look, figure_methods, figure_work_precision } },
+  { "fit", { figure_look, figure_fit } },
   { "optimise", { figure_look, figure_optimise } },
   { "drift", { figure_look, figure_methods, figure_drift } },
   { "sensitivity", { figure_look, figure_sensitivity } },

@@ -1,4 +1,4 @@
-/* Reads two columns of numbers from a CSV file.
+/* Reads columns of numbers from a CSV file.
  *
  * The separator is the one of , ; and tab that the first line contains.  A first line without numbers names the
  * columns, "NAME" or "NAME [unit]"; a column in another unit than requested is converted.  Empty lines and lines that
@@ -16,6 +16,8 @@ typedef struct {
   char *rest;        /* text not yet read */
   int line;          /* number of the last line read */
   int cells;         /* per line */
+  int columns;       /* to read; the first one is the time */
+  int gaps;          /* 1: in others, empty cells and nan are NaN */
   char separator;
   pw_error *error;
 } columns;
@@ -109,9 +111,10 @@ static int columns_open (const columns *c, const char *first, int named, const c
 
 /* ---- Numbers ---- */
 
-static int columns_number (const columns *c, const char *line, int index, double factor, double *value) {
+static int columns_number (const columns *c, const char *line, int index, double factor, int gap, double *value) {
   char cell[100];
   columns_cell (c, line, index, cell, sizeof cell);
+  if (gap && (*cell == 0 || (pw_read_number (cell, value) == PW_OK && isnan (*value)))) return *value = NAN, PW_OK;
   if (pw_read_number (cell, value) != PW_OK || !isfinite (*value))
     return columns_fail (c, "column %d: expected a finite number, found \"%.40s\"", index + 1, cell);
   *value *= factor;
@@ -119,32 +122,32 @@ static int columns_number (const columns *c, const char *line, int index, double
   return columns_fail (c, "column %d: \"%.40s\" is too large in SI units", index + 1, cell);
 }
 
-static int columns_rows (columns *c, char *line, const int index[2], const double factor[2], double *value[2],
-                         int *count) {
+static int columns_rows (columns *c, char *line, const int *index, const double *factor, double **value, int *count) {
   for (int n = 0; line; line = columns_line (c), *count = ++n) {
     int cells = columns_count (c, line);
     if (cells != c->cells) return columns_fail (c, "expected %d cells as in the first line, found %d", c->cells, cells);
-    for (int k = 0; k < 2; k++)
-      if (columns_number (c, line, index[k], factor[k], &value[k][n]) != PW_OK) return PW_INPUT;
+    for (int k = 0; k < c->columns; k++)
+      if (columns_number (c, line, index[k], factor[k], k > 0 && c->gaps, &value[k][n]) != PW_OK) return PW_INPUT;
     if (n > 0 && !(value[0][n] > value[0][n - 1]))
       return columns_fail (c, "%.9g comes after %.9g: expected increasing times", value[0][n], value[0][n - 1]);
   }
   return PW_OK;
 }
 
-static int columns_all (columns *c, const char *const column[2], const char *const unit[2], pw_arena *arena,
-                        double *value[2], int *count) {
-  int index[2];
-  double factor[2];
+static int columns_all (columns *c, const char *const *column, const char *const *unit, pw_arena *arena, double **value,
+                        int *count) {
+  int *index = pw_arena_alloc (arena, (size_t)c->columns * sizeof *index);
+  double *factor = pw_arena_alloc (arena, (size_t)c->columns * sizeof *factor);
   size_t lines = 1;
   for (const char *p = c->rest; (p = strchr (p, '\n')) != NULL; p++) lines++;
   char *line = columns_line (c);
   if (line == NULL) return columns_fail (c, "the file is empty");
+  if (index == NULL || factor == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
   if (lines > COLUMNS_MAX_LINES) return columns_fail (c, "more than %d lines", COLUMNS_MAX_LINES);
   c->separator = strchr (line, ',') ? ',' : strchr (line, ';') ? ';' : '\t';
   c->cells = columns_count (c, line);
   int named = columns_names (c, line);
-  for (int k = 0; k < 2; k++) {
+  for (int k = 0; k < c->columns; k++) {
     if (columns_open (c, line, named, column[k], unit[k], &index[k], &factor[k]) != PW_OK) return PW_INPUT;
     value[k] = pw_arena_alloc (arena, lines * sizeof (double));
     if (value[k] == NULL) return pw_fail (c->error, PW_RESOURCE, "%s: out of memory", c->shown);
@@ -152,18 +155,37 @@ static int columns_all (columns *c, const char *const column[2], const char *con
   return columns_rows (c, named ? columns_line (c) : line, index, factor, value, count);
 }
 
-int pw_columns_read (FILE *f, const char *shown, const char *const column[2], const char *const unit[2],
-                     pw_arena *arena, double *value[2], int *count, pw_error *error) {
+int pw_columns_read (FILE *f, const char *shown, const char *const *column, const char *const *unit, int width,
+                     int gaps, pw_arena *arena, double **value, int *count, pw_error *error) {
   static const char mark[] = "\xEF\xBB\xBF"; /* byte order mark, which some programs write */
   char *text;
   size_t size;
   *count = 0;
   int status = pw_read_rest (f, COLUMNS_MAX_BYTES, shown, "the limit for a table", &text, &size, error);
-  columns c = { .shown = shown, .rest = text, .error = error };
+  columns c = { .shown = shown, .rest = text, .columns = width, .gaps = gaps, .error = error };
   if (status == PW_OK && strlen (text) != size)
     status = pw_fail (error, PW_INPUT, "%.80s: a table is text, and this has a byte 0", shown);
   if (status == PW_OK && strncmp (text, mark, 3) == 0) c.rest += 3;
   if (status == PW_OK) status = columns_all (&c, column, unit, arena, value, count);
   free (text);
   return status;
+}
+
+double *pw_read_columns (const char *path, const char *const *column, const char *const *unit, int width, int *rows,
+                         pw_error *error) {
+  const char *why;
+  FILE *f = pw_open_input (path, &why);
+  pw_arena arena = { NULL };
+  double **value = calloc ((size_t)width, sizeof *value), *all = NULL;
+  int status = PW_OK;
+  if (f == NULL) status = pw_fail (error, PW_INPUT, "%s: cannot be read: %s", path, why);
+  if (f && value) status = pw_columns_read (f, path, column, unit, width, 1, &arena, value, rows, error);
+  if (f) fclose (f);
+  if (status == PW_OK && value) all = malloc (((size_t)*rows * (size_t)width + 1) * sizeof *all);
+  if (status == PW_OK && all == NULL) pw_fail (error, PW_RESOURCE, "%s: out of memory", path);
+  for (int k = 0; all && k < width; k++)
+    memcpy (all + (size_t)k * (size_t)*rows, value[k], (size_t)*rows * sizeof *all);
+  pw_arena_free (&arena);
+  free (value);
+  return all;
 }

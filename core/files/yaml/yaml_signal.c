@@ -86,7 +86,7 @@ static int table_file (pw_reader *r, const char *what, const pw_node *node, cons
   FILE *f = table_open (r->y, name, &reason);
   if (f == NULL && errno == ENOMEM) return pw_yaml_no_memory (r);
   if (f == NULL) return pw_yaml_fail (r, node->at, "%s: cannot read \"%.60s\": %s", what, name, reason);
-  int status = pw_columns_read (f, name, column, unit, r->arena, value, &s->table.count, &cause);
+  int status = pw_columns_read (f, name, column, unit, 2, 0, r->arena, value, &s->table.count, &cause);
   fclose (f);
   s->table.t = value[0];
   s->table.value = value[1];

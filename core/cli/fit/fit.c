@@ -1,0 +1,264 @@
+/* pinwheel fit: parameters and initial values with which a model agrees best with measured data. */
+#define _POSIX_C_SOURCE 200809L
+#include "fit.h"
+#include <float.h>
+#include <gsl/gsl_cdf.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "figure.h"
+#include "parallel.h"
+
+/* ---- Runs ---- */
+
+/* Samples at the times of the data, after each other. */
+static int fit_sample (const pw_fit *x, pw_outcomes *o, pw_run *r, double *out, double *row, pw_error *error) {
+  int status = PW_OK;
+  for (int k = 0; k < x->rows && status == PW_OK; k++) {
+    status = pw_run_advance_to (r, x->t[k], x->unknowns.t_end, error);
+    if (status == PW_OK) status = pw_outcomes_sample (o, r, x->t[k], row, error);
+    for (int i = 0; i < x->columns && status == PW_OK; i++) out[i * x->rows + k] = row[i];
+  }
+  return status;
+}
+
+int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *error) {
+  pw_outcomes o = { .system = NULL };
+  pw_cli_model m;
+  pw_settings settings;
+  pw_limit limit;
+  double *row = calloc ((size_t)x->columns, sizeof *row);
+  int status = row ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status != PW_OK) return status;
+  status = pw_unknowns_system (&x->unknowns, unknowns, &m, &settings, &limit, error);
+  if (status == PW_OK) status = pw_outcomes_open (&o, m.system, "--columns", x->name, x->columns, error);
+  settings.ledger = o.ledger;
+  pw_run *r = status == PW_OK ? pw_run_open (m.system, x->unknowns.method, &settings, error) : NULL;
+  if (status == PW_OK) status = r ? fit_sample (x, &o, r, out, row, error) : error->status;
+  if (status == PW_STOPPED) status = pw_limit_fail (&limit, pw_run_time (r), error);
+  if (r) pw_run_close (r);
+  pw_outcomes_close (&o);
+  pw_cli_close_model (&m);
+  free (row);
+  return status;
+}
+
+/* ---- Derivatives ---- */
+
+/* Values of an adaptive method are smooth up to its tolerance, those of fixed steps up to round-off. */
+static double fit_smooth (const pw_fit *x) {
+  const pw_method *method;
+  int stabilisation;
+  if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
+      !pw_cli_adaptive (method, x->unknowns.method))
+    return DBL_EPSILON;
+  return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
+}
+
+double pw_fit_noise (const pw_fit *x) {
+  return pow (fit_smooth (x), 2. / 3);
+}
+
+/* Runs on both sides of each unknown. */
+typedef struct {
+  const pw_fit *x;
+  const double *at;
+  double *run, *step; /* 2 unknowns arrays; distances from `at` */
+  pw_error *error;    /* 2 unknowns */
+} fit_differences;
+
+/* The step balances the truncation error, of its square, and noise over the step. */
+static void fit_side (void *context, int task) {
+  fit_differences *d = context;
+  const pw_fit *x = d->x;
+  const pw_unknown *u = x->unknowns.at + task / 2;
+  int n = x->unknowns.count;
+  double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
+  if (at == NULL) {
+    pw_fail (d->error + task, PW_RESOURCE, "out of memory");
+    return;
+  }
+  memcpy (at, d->at, (size_t)n * sizeof *at);
+  at[task / 2] = fmin (fmax (at[task / 2] + (task % 2 ? 1 : -1) * size * cbrt (fit_smooth (x)), u->low), u->high);
+  d->step[task] = at[task / 2] - d->at[task / 2];
+  int status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, d->error + task);
+  d->error[task].status = status;
+  free (at);
+}
+
+/* One side is enough, if the other one fails. */
+static int fit_column (const fit_differences *d, int j, const double *model, double *out, pw_error *error) {
+  size_t cells = (size_t)d->x->columns * (size_t)d->x->rows;
+  const double *side[2];
+  double step[2];
+  for (int k = 0; k < 2; k++) {
+    int failed = d->error[2 * j + k].status != PW_OK;
+    if (failed && (d->error[2 * j + k].status == PW_RETRY || d->error[2 * j + k].status == PW_RESOURCE ||
+                   d->error[2 * j + !k].status != PW_OK))
+      return *error = d->error[2 * j + k], error->status;
+    side[k] = failed ? model : d->run + (size_t)(2 * j + k) * cells;
+    step[k] = failed ? 0 : d->step[2 * j + k];
+  }
+  for (size_t i = 0; i < cells; i++) out[i] = (side[1][i] - side[0][i]) / (step[1] - step[0]);
+  return PW_OK;
+}
+
+int pw_fit_jacobian (pw_fit *x, const double *at, const double *model, double *jacobian, pw_error *error) {
+  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
+  fit_differences d = { x, at, malloc ((2 * n * cells + 2 * n) * sizeof *d.run), NULL,
+                        calloc (2 * n, sizeof *d.error) };
+  int status = d.run && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) {
+    d.step = d.run + 2 * n * cells;
+    status = pw_parallel (x->jobs, (int)(2 * n), fit_side, &d, error);
+    x->runs += 2 * (long)n;
+  }
+  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++)
+    status = fit_column (&d, j, model, jacobian + (size_t)j * cells, error);
+  free (d.run);
+  free (d.error);
+  return status;
+}
+
+/* ---- Statistics ---- */
+
+int pw_fit_freedom (const pw_fit *x) {
+  return x->residuals - x->unknowns.count;
+}
+
+double pw_fit_quantile (const pw_fit *x) {
+  double tail = (1 - x->confidence) / 2;
+  return x->weighted ? gsl_cdf_gaussian_Qinv (tail, 1) : gsl_cdf_tdist_Qinv (tail, fmax (pw_fit_freedom (x), 1));
+}
+
+/* ---- The command ---- */
+
+enum { FIT_TABLE, FIT_SUMMARY, FIT_FILES };
+
+static int fit_options (pw_fit *x, pw_error *error) {
+  x->confidence = 0.95;
+  if (x->data_path == NULL) return pw_fail (error, PW_INPUT, "no data: add --data FILE.csv");
+  if (x->columns_text == NULL)
+    return pw_fail (error, PW_INPUT, "nothing to compare: add --columns NAME,..., columns of the data such as frame.x");
+  int status = pw_cli_number ("--confidence", x->confidence_text, PW_POSITIVE, &x->confidence, error);
+  if (status == PW_OK && !(x->confidence < 1))
+    status = pw_fail (error, PW_INPUT, "--confidence %s: expected a number between 0 and 1", x->confidence_text);
+  return status == PW_OK ? pw_parallel_jobs (x->jobs_text, &x->jobs, error) : status;
+}
+
+/* Runs end at the last datum. */
+static int fit_open_data (pw_fit *x, pw_error *error) {
+  int status = pw_fit_read (x, error);
+  if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, x->free, 50, error);
+  if (status != PW_OK) return status;
+  if (x->residuals < x->unknowns.count)
+    return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", x->data_path,
+                    x->residuals, x->unknowns.count);
+  x->unknowns.t_end = x->unknowns.settings.span = x->t[x->rows - 1];
+  return PW_OK;
+}
+
+static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_error *error) {
+  static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE,
+                   { "--data", x->data_path, PW_READS, NULL },
+                   { "-o", x->path, PW_WRITES, NULL },
+                   { "--json", x->json_path, PW_WRITES, NULL },
+                   { "--plots", x->plots_path, PW_WRITES_INTO, figures } };
+  int status = fit_options (x, error);
+  if (status == PW_OK) status = pw_cli_open (&x->m, &x->line, error);
+  if (status == PW_OK) status = fit_open_data (x, error);
+  if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
+  if (status == PW_OK && x->path && (file[FIT_TABLE] = pw_output_open (x->path, error)) == NULL) status = error->status;
+  if (status == PW_OK && x->json_path && (file[FIT_SUMMARY] = pw_output_open (x->json_path, error)) == NULL)
+    status = error->status;
+  if (status == PW_OK && x->plots_path && (*folder = pw_figure_folder (x->plots_path, error)) < 0)
+    status = error->status;
+  return status;
+}
+
+static int fit_search (pw_fit *x, pw_error *error) {
+  pw_stop_catch ();
+  pw_progress_count (&x->progress, pw_file_name (x->m.file), "iterations", 0, 20);
+  int status = pw_fit_solve (x, error);
+  pw_progress_end (&x->progress);
+  pw_stop_release ();
+  if (status == PW_RETRY) fputs ("pinwheel: interrupted before the fit was done\n", stderr);
+  return status == PW_RETRY ? PW_INTERRUPTED : status;
+}
+
+static int fit_finish (pw_fit *x, pw_output *file[FIT_FILES], pw_error *error) {
+  pw_fit_print (x);
+  int status = file[FIT_TABLE] ? pw_fit_table (x, pw_output_stream (file[FIT_TABLE]), error) : PW_OK;
+  if (file[FIT_SUMMARY]) pw_fit_json (x, x->converged ? "ok" : "method", pw_output_stream (file[FIT_SUMMARY]));
+  if (status == PW_OK) {
+    status = pw_output_finish_all (file, FIT_FILES, error);
+    for (int i = 0; i < FIT_FILES; i++) file[i] = NULL;
+  }
+  if (status == PW_OK && x->plots_path) status = pw_fit_draw (x, error);
+  if (status == PW_OK && !x->converged)
+    status = pw_fail (error, PW_METHOD,
+                      "no minimum was found in %d iterations; begin nearer to it, by --set or --start", x->iterations);
+  return status;
+}
+
+static int fit_command (void *options, pw_error *error) {
+  pw_fit *x = options;
+  pw_output *file[FIT_FILES] = { NULL };
+  int folder = -1, status = fit_open (x, file, &folder, error);
+  if (status == PW_OK) status = fit_search (x, error);
+  if (status == PW_OK) status = fit_finish (x, file, error);
+  for (int i = 0; i < FIT_FILES; i++)
+    if (file[i]) pw_output_discard (file[i]);
+  if (folder >= 0) close (folder);
+  free (x->names);
+  free (x->name);
+  free (x->table);
+  free (x->sigma);
+  free (x->x);
+  pw_unknowns_close (&x->unknowns);
+  pw_cli_close_model (&x->m);
+  return status;
+}
+
+static const struct poptOption fit_options_table[] = {
+  PW_OPTION_GROUP ("Fit"),
+  PW_TEXT_OPTION (pw_fit, data_path, "data", 0, "FILE.csv",
+                  "Measured data: a table with the columns t and those of `run`, in any order; empty cells are gaps"),
+  PW_TEXT_OPTION (pw_fit, columns_text, "columns", 0, "NAME,...", "Columns of the data to compare with the model"),
+  PW_LIST_OPTION (pw_fit, free, "free", 0, "NAME[=LOW:HIGH]",
+                  "Determine a parameter or an initial value, such as frame.vx, perhaps between bounds; repeatable"),
+  PW_LIST_OPTION (pw_fit, sigma_list, "sigma", 0, "COLUMN=VALUE",
+                  "Standard deviation of a column, a number or the name of a column of the data; repeatable"),
+  PW_TEXT_OPTION (pw_fit, confidence_text, "confidence", 0, "P", "Probability of confidence intervals (default 0.95)"),
+  PW_TEXT_OPTION (pw_fit, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
+  PW_TEXT_OPTION (pw_fit, path, "output", 'o', "FILE.csv", "Write data, model values and residuals to this file"),
+  PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),
+  PW_TEXT_OPTION (pw_fit, plots_path, "plots", 0, "DIR", "Write figures of data, model and residuals into a folder"),
+  PW_OPTION_GROUP ("Integration"),
+  PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",
+                  "Integrator and stabilisation, see `pinwheel list methods`"),
+  PW_TEXT_OPTION (pw_cli_line, step, "step", 0, "H", "Step size of fixed-step methods [s]"),
+  PW_TEXT_OPTION (pw_cli_line, rtol, "rtol", 0, "R", "Relative tolerance of adaptive methods"),
+  PW_TEXT_OPTION (pw_cli_line, atol, "atol", 0, "A", "Absolute tolerance of every state"),
+  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop a run after this much processor time"),
+  PW_ENGINE_OPTION,
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_fit = {
+  .name = "fit",
+  .synopsis = "MODEL --data FILE.csv --columns NAME,... --free NAME[=LOW:HIGH]... [OPTION...]",
+  .summary = "fit parameters and initial values to measured data",
+  .help = "Determine parameters and initial values of a model by least squares, so that it agrees with measured data. "
+          "Prints "
+          "estimates with standard errors, confidence intervals and correlations, and unknowns that the data do not "
+          "determine.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (pw_fit),
+  .function = fit_command,
+  .options = fit_options_table,
+};

@@ -1,0 +1,216 @@
+/* pinwheel fit: estimates, their errors and coverage, unknowns that the data do not determine, wrong data. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+/* phi = A exp (-c t / 2) cos (...): k is determined by the frequency, c by the decay, A by the amplitude. */
+static const char model[] =
+    "pinwheel: 1\n"
+    "about: a damped torsional oscillator\n"
+    "run: {step: 0.02, method: rk4}\n"
+    "parameters: [{name: k, value: 4, domain: positive}, {name: c, value: 0.3, domain: nonnegative},\n"
+    "             {name: s, value: 1}, {name: n, value: 2, domain: count}]\n"
+    "bodies: [{name: w, mass: 1, inertia: 1, start: {phi: 0.5}}]\n"
+    "elements:\n"
+    "  - {pin: P, body: [w, ground], at: [[0, 0], [0, 0]]}\n"
+    "  - {torque: T, body: [w, ground], value: {expression: -s*k*w.phi - c*w.omega}}\n";
+
+enum { FIT_ROWS = 80, FIT_DRAWS = 100 };
+static const double fit_k = 5, fit_c = 0.4, fit_sigma = 0.02;
+
+/* A number of mean 0 and variance 1: twelve uniform ones (the sum differs from a normal one beyond three deviations). */
+static double fit_noise (void) {
+  static unsigned long long x = 88172645463325252ULL; /* xorshift, Marsaglia 2003 */
+  double sum = -6;
+  for (int i = 0; i < 12; i++) {
+    x ^= x << 13, x ^= x >> 7, x ^= x << 17;
+    sum += (double)(x >> 11) / 9007199254740992.;
+  }
+  return sum;
+}
+
+static double fit_exact (double t) {
+  double w = sqrt (fit_k - fit_c * fit_c / 4);
+  return 0.5 * exp (-fit_c * t / 2) * (cos (w * t) + fit_c / (2 * w) * sin (w * t));
+}
+
+/* Angles in mrad, every seventh one missing; a column with standard deviations, which are twice as large for t > 2. */
+static void fit_write (double noise) {
+  char text[8000];
+  int n = snprintf (text, sizeof text, "t [ms],w.phi [mrad],error [mrad]\n");
+  for (int i = 1; i <= FIT_ROWS; i++) {
+    double t = 0.05 * i, sigma = fit_sigma * (t > 2 ? 2 : 1), value = fit_exact (t) + noise * sigma * fit_noise ();
+    n += i % 7 == 0
+             ? snprintf (text + n, sizeof text - (size_t)n, "%.0f,,\n", 1e3 * t)
+             : snprintf (text + n, sizeof text - (size_t)n, "%.0f,%.9g,%.9g\n", 1e3 * t, 1e3 * value, 1e3 * sigma);
+  }
+  cli_write ("data.csv", text);
+}
+
+static int fit_setup (void **state) {
+  if (cli_setup (state) != 0) return 1;
+  cli_write ("wheel.yaml", model);
+  fit_write (0);
+  return 0;
+}
+
+/* A number of an unknown in the summary. */
+static double fit_value (const char *json, const char *name, const char *key) {
+  char text[100];
+  snprintf (text, sizeof text, "{\"name\": \"%s\"", name);
+  const char *at = strstr (json, text);
+  assert_non_null (at);
+  snprintf (text, sizeof text, "\"%s\": ", key);
+  return strtod (strstr (at, text) + strlen (text), NULL);
+}
+
+#define FIT "pinwheel fit @/wheel.yaml --data @/data.csv --columns w.phi --json @/fit.json "
+
+/* ---- Estimates ---- */
+
+static void test_exact (void **state) {
+  (void)state;
+  static const char *const way[] = { "--free k --free c --free w.phi", "--free k=1:20 --free c=0:2 --free w.phi=0.1:1",
+                                     "--free k --free c --free w.phi --method erk8 --rtol 1e-10 --sigma w.phi=0.01" };
+  fit_write (0);
+  for (int i = 0; i < 3; i++) {
+    char command[400];
+    snprintf (command, sizeof command, FIT "%s", way[i]);
+    cli_shell (command);
+    const char *json = cli_file ("fit.json");
+    check_close ("k", fit_value (json, "k", "value"), fit_k, 1e-5, "(w h)^4, 4e-6");
+    check_close ("c", fit_value (json, "c", "value"), fit_c, 1e-5, "the same");
+    check_close ("initial angle", fit_value (json, "w.phi", "value"), 0.5, 1e-5, "the same");
+  }
+}
+
+/* Standard errors are those of the linearised problem, computed here from derivatives of the closed form. */
+static void test_errors (void **state) {
+  (void)state;
+  fit_write (1);
+  cli_shell (FIT "--free k --free c --sigma w.phi=error --confidence 0.9");
+  const char *json = cli_file ("fit.json");
+  double A[3] = { 0 };
+  for (int i = 1; i <= FIT_ROWS; i++) {
+    double t = 0.05 * i, sigma = fit_sigma * (t > 2 ? 2 : 1), w = sqrt (fit_k - fit_c * fit_c / 4),
+           e = exp (-fit_c * t / 2) / 2, r = fit_c / (2 * w),
+           f_w = e * (-t * sin (w * t) + r * t * cos (w * t) - r / w * sin (w * t)),
+           f_c = -t / 2 * fit_exact (t) + e * sin (w * t) / (2 * w) - f_w * fit_c / (4 * w), f_k = f_w / (2 * w);
+    if (i % 7 == 0) continue;
+    A[0] += f_k * f_k / (sigma * sigma), A[1] += f_k * f_c / (sigma * sigma), A[2] += f_c * f_c / (sigma * sigma);
+  }
+  double det = A[0] * A[2] - A[1] * A[1], k = sqrt (A[2] / det), c = sqrt (A[0] / det);
+  check_close ("error of k", fit_value (json, "k", "standard_error"), k, 0.1 * k,
+               "the Jacobian is that at the estimate");
+  check_close ("error of c", fit_value (json, "c", "standard_error"), c, 0.1 * c, "the same");
+  check_close ("interval", fit_value (json, "k", "to") - fit_value (json, "k", "value"),
+               1.6448536269514722 * fit_value (json, "k", "standard_error"), 1e-9,
+               "0.95 quantile of the normal distribution");
+  assert_true (cli_number (json, "freedom", NULL) == FIT_ROWS - FIT_ROWS / 7 - 2);
+}
+
+/* The true value lies in the 95 % interval in about 95 of 100 draws: with this probability, 88 or fewer have the binomial
+ * probability 0.004, all 100 have 0.006. */
+static void test_coverage (void **state) {
+  (void)state;
+  int covered[2] = { 0 };
+  for (int draw = 0; draw < FIT_DRAWS; draw++) {
+    fit_write (1);
+    cli_shell (FIT "--free k --free c --sigma w.phi=error");
+    const char *json = cli_file ("fit.json");
+    covered[0] += fit_value (json, "k", "from") <= fit_k && fit_k <= fit_value (json, "k", "to");
+    covered[1] += fit_value (json, "c", "from") <= fit_c && fit_c <= fit_value (json, "c", "to");
+  }
+  print_message ("covered: k in %d, c in %d of %d draws\n", covered[0], covered[1], FIT_DRAWS);
+  for (int i = 0; i < 2; i++) assert_in_range (covered[i], 89, FIT_DRAWS - 1);
+}
+
+/* Without standard deviations, they follow from the residuals. */
+static void test_unweighted (void **state) {
+  (void)state;
+  fit_write (1);
+  cli_shell (FIT "--free k --free c -o @/fit.csv");
+  const char *json = cli_file ("fit.json");
+  double rms = cli_number (json, "columns", "rms", NULL);
+  assert_in_range ((long)(1e4 * rms), 200, 450);
+  check_close ("k", fit_value (json, "k", "value"), fit_k, 4 * fit_value (json, "k", "standard_error"), "4 deviations");
+  assert_int_equal (strncmp (cli_file ("fit.csv"), "t [s],w.phi [rad],w.phi.model [rad],w.phi.residual [rad]", 56), 0);
+}
+
+/* Only s k has an effect, and n has none. */
+static void test_undetermined (void **state) {
+  (void)state;
+  fit_write (1);
+  cli_shell (FIT "--free k --free s --free c --free w.x");
+  const char *json = cli_file ("fit.json");
+  assert_true (cli_number (json, "rank", NULL) == 2);
+  assert_non_null (strstr (cli_out, "The data do not determine k, s: changes in the ratio "));
+  assert_non_null (strstr (cli_out, "The data do not determine w.x, which has no effect"));
+  check_close ("s k", fit_value (json, "k", "value") * fit_value (json, "s", "value"), fit_k, 0.3, "the noise");
+  assert_non_null (strstr (json, "\"name\": \"c\", \"unit\": \"\", \"initial\": 0.29999999999999999"));
+  assert_true (fit_value (json, "c", "standard_error") > 0);
+}
+
+static void test_bound (void **state) {
+  (void)state;
+  fit_write (0);
+  cli_shell (FIT "--free k --free c=0:0.35");
+  assert_non_null (strstr (cli_out, "at its upper bound"));
+  double c = fit_value (cli_file ("fit.json"), "c", "value");
+  assert_true (0.3495 <= c && c <= 0.35);
+}
+
+/* ---- Wrong input ---- */
+
+static void test_bad (void **state) {
+  (void)state;
+  static const cli_wrong bad[] = {
+    { "@/wheel.yaml --columns w.phi --free k", "no data: add --data FILE.csv" },
+    { "@/wheel.yaml --data @/data.csv --free k",
+      "nothing to compare: add --columns NAME,..., columns of the data such as frame.x" },
+    { "@/wheel.yaml --data @/data.csv --columns w.phi", "nothing is free: add --free NAME or --free NAME=LOW:HIGH" },
+    { "@/wheel.yaml --data @/data.csv --columns w.phj --free k",
+      "--columns: no column \"w.phj\"; did you mean \"w.phi\"?" },
+    { "@/wheel.yaml --data @/data.csv --columns w.omega --free k",
+      "@/data.csv:1: there is no column \"w.omega\"; valid are t, w.phi, error" },
+    { "@/wheel.yaml --data @/data.csv --columns w.phi,w.phi --free k", "--columns: w.phi is given twice" },
+    { "@/wheel.yaml --data @/none.csv --columns w.phi --free k",
+      "@/none.csv: cannot be read: No such file or directory" },
+    { "@/wheel.yaml --data @/data.csv --columns w.phi --free k --sigma w.phi=eror",
+      "@/data.csv:1: there is no column \"eror\"; did you mean \"error\"?" },
+    { "@/wheel.yaml --data @/data.csv --columns w.phi --free k --sigma w.phi=0",
+      "--sigma w.phi=0: expected a number > 0" },
+    { "@/wheel.yaml --data @/data.csv --columns w.phi --free k --sigma w.x=1",
+      "--sigma w.x: it is not among --columns" },
+    { "@/wheel.yaml --data @/data.csv --columns w.phi --free k --confidence 1",
+      "--confidence 1: expected a number between 0 and 1" },
+    { "@/wheel.yaml --data @/two.csv --columns w.phi --free k --free c --free s",
+      "--data @/two.csv has fewer data (2) than there are unknowns (3)" },
+    { "@/wheel.yaml --data @/mixed.csv --columns w.phi,w.omega --free k",
+      "w.phi [rad] and w.omega [rad/s] have different units: add --sigma COLUMN=VALUE for each column" },
+    { "@/wheel.yaml --data @/word.csv --columns w.phi --free k",
+      "@/word.csv:3: column 2: expected a finite number, found \"many\"" },
+  };
+  cli_write ("two.csv", "t,w.phi\n1,0\n2,0.1\n3,nan\n");
+  cli_write ("mixed.csv", "t,w.phi,w.omega\n1,0,0\n2,0.1,0\n");
+  cli_write ("word.csv", "t,w.phi\n1,0\n2,many\n");
+  for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+    char command[400], expected[400];
+    snprintf (command, sizeof command, "pinwheel fit %s", bad[i].arguments);
+    assert_int_equal (cli_run (command), 2);
+    cli_expand (bad[i].message, expected, sizeof expected);
+    if (strstr (cli_err, expected) == NULL) print_error ("%s\nsays %sinstead of %s\n", command, cli_err, expected);
+    assert_non_null (strstr (cli_err, expected));
+  }
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_exact),        cmocka_unit_test (test_errors),
+                                      cmocka_unit_test (test_coverage),     cmocka_unit_test (test_unweighted),
+                                      cmocka_unit_test (test_undetermined), cmocka_unit_test (test_bound),
+                                      cmocka_unit_test (test_bad) };
+  return cmocka_run_group_tests (tests, fit_setup, cli_teardown);
+}
