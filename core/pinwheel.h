@@ -558,6 +558,7 @@ typedef enum {
 struct pw_kind {
   const char *name;       /* "pin" */
   const char *about;      /* one line */
+  const char *symbol;     /* how figures draw it: see plot_symbols.c; NULL: not at all */
   size_t definition;      /* bytes of the definition structure, whose first member is `const char *name` */
   size_t element;         /* bytes of the prepared element */
   const pw_field *fields; /* ends with a NULL name; the member `name` is not listed */

@@ -56,7 +56,7 @@ typedef struct {
   int arguments;
   const char **sets, **starts; /* "NAME=VALUE"; ended by NULL */
   const char *max_file;
-  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise;
+  const char *method, *t_end, *step, *rtol, *atol, *max_steps, *limit, *specialise, *width;
   /* private */
   poptContext popt;
   struct poptOption *table; /* a copy of the command's options, bound to its structure */

@@ -24,6 +24,9 @@ static void plots_draw (const char *model) {
     assert_non_null (strstr (svg, "<svg"));
     snprintf (name, sizeof name, "drawn/%s.png", figures[i]);
     assert_true (plots_has (name));
+    snprintf (name, sizeof name, "drawn/%s.pdf", figures[i]);
+    const char *pdf = cli_file (name);
+    assert_true (pdf && memcmp (pdf, "%PDF", 4) == 0);
   }
 }
 
@@ -111,6 +114,61 @@ static void test_ground (void **state) {
   assert_null (cli_file ("squeezer/wheels.dat"));
 }
 
+/* The lines of symbols in a model's last snapshot. */
+static const char *plots_symbols (const char *elements) {
+  char text[1200];
+  snprintf (text, sizeof text,
+            "pinwheel: 1\nbodies:\n  - {name: a, mass: 1, inertia: 1, rate: {omega: 1}}\n"
+            "  - {name: b, mass: 1, inertia: 1, start: {x: 0.6}}\n  - {name: c, mass: 1, inertia: 1, start: {y: -1}, "
+            "rate: {vx: 2}}\nelements:\n%s",
+            elements);
+  cli_write ("symbols.yaml", text);
+  assert_int_equal (cli_run ("PATH=/none pinwheel run @/symbols.yaml -t 1 --plots @/symbols >/dev/null 2>&1"), 0);
+  const char *data = strstr (cli_file ("symbols/mechanism.dat"), "# symbols");
+  assert_non_null (data);
+  return data;
+}
+
+/* Pitch circles, a rail as long as the travel, a damper only where there is damping. */
+static void test_symbols (void **state) {
+  (void)state;
+  const char *gear = "  - {pin: A, body: [a, ground], at: [[0, 0], [0, 0]]}\n"
+                     "  - {pin: B, body: [b, ground], at: [[0, 0], [0.6, 0]]}\n"
+                     "  - {gear: g, body: [a, b, ground], ratio: -0.5}\n";
+  const char *data = plots_symbols (gear);
+  assert_true (strstr (data, "\n0.4 0 1 0\n") && strstr (data, "\n0.8 0 1 0\n"));
+  const char *rail = "  - {slider: s, body: [c, ground], at: [[0, 0], [0, -1]]}\n"
+                     "  - {spring: k, body: [a, b], at: [[0, 0], [0, 0]], stiffness: 1, damping: %d}\n";
+  char elements[400];
+  double x0, x1, y0, y1;
+  size_t length[2];
+  for (int damping = 0; damping < 2; damping++) {
+    snprintf (elements, sizeof elements, rail, damping);
+    data = plots_symbols (elements);
+    length[damping] = strlen (data);
+  }
+  assert_true (length[1] > length[0]);
+  int found = 0;
+  while ((data = strchr (data, '\n')) != NULL && !found) {
+    data++;
+    found = sscanf (data, "%lf %lf 1 0\n%lf %lf 1 0\n", &x0, &y0, &x1, &y1) == 4 && y0 == -1 && y1 == -1;
+  }
+  assert_true (found && x0 < 0 && x0 > -0.5 && x1 > 2 && x1 < 2.5);
+}
+
+static void test_style (void **state) {
+  (void)state;
+  assert_int_equal (
+      cli_run ("PATH=/none pinwheel run ezyroller -t 1 --plots @/style --width 8.5cm --colour time >/dev/null"), 0);
+  assert_non_null (strstr (cli_file ("style/paths.gp"), "\nwidth = 240.94\n"));
+  assert_non_null (strstr (cli_file ("style/mechanism.gp"), "\nby_time = 1\n"));
+  assert_non_null (strstr (cli_file ("style/paths.gp"), "about = 'Two-segment ride-on"));
+  cli_bad ("pinwheel run ezyroller --plots @/style --width 85", 2, "--width 85: expected a length such as 85mm");
+  cli_bad ("pinwheel run ezyroller --plots @/style --width 1mm", 2, "--width 1mm: expected 50mm to 500mm");
+  cli_bad ("pinwheel run ezyroller --plots @/style --colour red", 2, "--colour red: expected body or time");
+  cli_bad ("pinwheel compare ezyroller -o @/style --width xmm", 2, "--width");
+}
+
 static void test_refusals (void **state) {
   (void)state;
   cli_write ("file", "in the way");
@@ -123,7 +181,8 @@ int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_drawn),         cmocka_unit_test (test_written),  cmocka_unit_test (test_data),
     cmocka_unit_test (test_ground),        cmocka_unit_test (test_layouts),  cmocka_unit_test (test_outline),
-    cmocka_unit_test (test_gnuplot_fails), cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_gnuplot_fails), cmocka_unit_test (test_refusals), cmocka_unit_test (test_symbols),
+    cmocka_unit_test (test_style),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -163,7 +163,7 @@ static int optimise_read (pw_optimise *x, pw_error *error) {
 }
 
 static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_error *error) {
-  static const char *const figures[] = { "optimise.dat", "optimise.gp", "optimise.svg", "optimise.png", NULL };
+  static const char *const figures[] = { "optimise.dat", "optimise.gp", "optimise.svg", "optimise.png", "optimise.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "-o", x->path, PW_WRITES, NULL },
                    { "--json", x->json_path, PW_WRITES, NULL },
@@ -261,6 +261,7 @@ static const struct poptOption optimise_options[] = {
   PW_TEXT_OPTION (pw_optimise, path, "output", 'o', "FILE.yaml", "Write the result to this file"),
   PW_TEXT_OPTION (pw_optimise, json_path, "json", 0, "FILE.json", "Write a summary"),
   PW_TEXT_OPTION (pw_optimise, plots_path, "plots", 0, "DIR", "Write figures of all runs into a folder"),
+  PW_WIDTH_OPTION,
   PW_METHOD_OPTIONS,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND

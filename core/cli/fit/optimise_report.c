@@ -222,8 +222,9 @@ static int report_data (const pw_optimise *x, pw_figures *figures, pw_error *err
 
 int pw_optimise_draw (const pw_optimise *x, pw_error *error) {
   static const char *const names[] = { "optimise", NULL };
-  pw_figures figures = { x->plots_path, pw_file_name (x->m.file), "" };
+  pw_figures figures = { x->plots_path, pw_file_name (x->m.file), "", pw_file_table (x->m.file)->about, 0 };
   char label[300], unit[80], number[32];
+  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
   if (report_data (x, &figures, error) != PW_OK) return error->status;
   pw_output *o = pw_figure_begin (&figures, names[0], error);
   if (o == NULL) return error->status;

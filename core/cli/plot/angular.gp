@@ -15,22 +15,23 @@ do for [i = 1:curves] {
 }
 detail = turns < 30 ? 0 : turns*0.2 <= 12 ? 0.2 : turns*0.1 <= 12 ? 0.1 : turns*0.05 <= 12 ? 0.05 : 0.02
 title = 'angular velocities'.(detail > 0 ? ', and their last part in detail' : '')
-high = detail > 0 ? 235.0 : 340.0
-height = top + high + (detail > 0 ? 72 + high : 0) + bottom
-do for [form in 'svg png'] {
+high = detail > 0 ? 112.0 : narrow ? 130.0 : 170.0
+p = power(omega_min, omega_max)
+height = top + high + (detail > 0 ? 30 + high : 0) + bottom
+do for [form in forms] {
   eval page(form)
   eval legend(1)
   set xlabel 't [s]'
-  set ylabel 'ω [rad/s]'
+  set ylabel axis('ω', 'rad/s', p)
   set xrange [0:t_end]
   eval panel(left, width - right, top, top + high)
-  eval yrange(omega_min, omega_max)
-  eval draw(1, 7, 1)
+  eval yrange(omega_min, omega_max, p)
+  eval draw(1, 7, p, 1)
   if (detail > 0) {
     set xrange [t_end*(1 - detail):t_end]
     unset colorbox
-    eval panel(left, width - right, top + high + 72, top + 2*high + 72)
-    eval draw(1, 7, 0)
+    eval panel(left, width - right, top + high + 30, top + 2*high + 30)
+    eval draw(1, 7, p, 0)
   }
   unset multiplot
   unset output

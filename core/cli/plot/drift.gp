@@ -5,11 +5,9 @@ data = name.'.dat'
 logarithmic = name ne 'drift'
 title = name eq 'drift' ? 'drift of the constraints and the energy' : name eq 'drift-baumgarte' ? \
   "largest drift by Baumgarte's parameters" : 'largest drift by the interval between projections'
-label_of_x = name eq 'drift' ? 't [s]' : name eq 'drift-baumgarte' ? 'alpha [1/s]' : 'steps per projection (every)'
-left = 104.0
-columns = max(1, int((width - left - right + 8)/(80 + 8.0*max(longest, 15))))
-top = 46 + 22*((methods + columns - 1)/columns)
-height = top + words(quantities)*236 - 16 + bottom
+label_of_x = name eq 'drift' ? 't [s]' : name eq 'drift-baumgarte' ? 'α [1/s]' : 'steps per projection (every)'
+high = narrow ? 90.0 : 112.0
+height = top + words(quantities)*(high + 10) - 10 + bottom
 array label_of_y[3] = ['position residual', 'velocity residual', 'energy balance [J]']
 array least[3]
 array most[3]
@@ -29,11 +27,14 @@ if (logarithmic) {
 }
 unset offsets
 unset xzeroaxis
-do for [form in 'svg png'] {
+# Marks of a method: at most 12, between those of the others; few points all have one.
+stats data index 0 using 1 name 'first' nooutput
+step = logarithmic ? 1 : max(1, int(first_records/10))
+do for [form in forms] {
   eval page(form)
-  eval key(36.0, columns).' samplen 5'
+  eval key(above, per_row)
   set format x ''
-  set format y '1e%T'
+  set format y '10^{%T}'
   unset xlabel
   y = top
   do for [n = 1:words(quantities)] {
@@ -44,9 +45,11 @@ do for [form in 'svg png'] {
     }
     set ylabel label_of_y[k]
     set yrange [least[k]:most[k]]
-    eval panel(left, width - right, y, y + 220)
-    plot for [i = 1:methods] data index i - 1 using 1:k + 1 with linespoints ls i title y == top ? label[i] : ''
-    y = y + 236
+    eval panel(left, width - right, y, y + high)
+    plot for [i = 1:methods] data index i - 1 using 1:k + 1 with lines ls i notitle, \
+         for [i = 1:methods] data index i - 1 every step::int(step*(i - 1.0)/methods) using 1:k + 1 with points ls i notitle, \
+         for [i = 1:methods] NaN with linespoints ls i title y == top ? label[i] : ''
+    y = y + high + 10
   }
   unset multiplot
   unset output

@@ -8,36 +8,33 @@ stats 'energy.dat' using 4 name 'work' nooutput
 stats 'energy.dat' using 5 name 'loss' nooutput
 stats 'energy.dat' using 7 name 'balance' nooutput
 at_rest = kinetic_min == 0 && kinetic_max == 0 && potential_min == potential_max && work_min == work_max
-largest = max(abs(balance_min), abs(balance_max))
-exponent = largest > 0 ? floor(log10(largest)) : 0
-if (abs(exponent) <= 2) { exponent = 0 }
-raised(s) = strlen(s) == 0 ? '' : (s[1:1] eq '-' ? '⁻' : word('⁰ ¹ ² ³ ⁴ ⁵ ⁶ ⁷ ⁸ ⁹', s[1:1] + 1)).raised(s[2:*])
-curves = "plot 'energy.dat' using 1:2 with lines lw 5 dt 1 lc rgb '#ddaa33' title 'kinetic'"
-if (potential_min != 0 || potential_max != 0) {
-  curves = curves.", '' using 1:3 with lines lw 1.8 dt (14,4) lc rgb '#888888' title 'potential'"
-}
-if (loss_min != 0 || loss_max != 0) {
-  curves = curves.", '' using 1:5 with lines lw 1.8 dt (4,3) lc rgb '#bb5566' title 'dissipated'"
-}
-curves = curves.", '' using 1:4 with lines lw 1.5 dt 1 lc rgb '#004488' title 'work'"
-top = top + 22
-height = top + 2*235 + 16 + bottom
+p = power(balance_min, balance_max)
+q = power(min(min(kinetic_min, potential_min), min(work_min, loss_min)), max(max(kinetic_max, potential_max), max(work_max, loss_max)))
+curve(k, look) = sprintf("'energy.dat' using 1:($%d/10.0**q) with lines %s", k, look)
+curves = 'plot '.curve(2, "lw 2.6 dt 1 lc rgb '#ddaa33' title 'kinetic'")
+if (potential_min != 0 || potential_max != 0) { curves = curves.', '.curve(3, "lw 1.4 dt (10,6) lc rgb '#777777' title 'potential'") }
+if (loss_min != 0 || loss_max != 0) { curves = curves.', '.curve(5, "lw 1.2 dt (4,3) lc rgb '#cc6677' title 'dissipated'") }
+curves = curves.', '.curve(4, "lw 0.8 dt 1 lc rgb '#004488' title 'work'")
+above = top
+top = top + 11
+high = narrow ? 84.0 : 112.0
+height = top + 2*high + 10 + bottom
 set xrange [0:t_end]
-do for [form in 'svg png'] {
+do for [form in forms] {
   eval page(form)
-  eval key(34.0, 8).' samplen 3.5'
+  eval key(above, 8)
   set format x ''
   unset xlabel
-  set ylabel 'energy, work [J]'
+  set ylabel axis('energy, work', 'J', q)
   if (at_rest) { set yrange [-1:1] } else { set yrange [*:*] }
-  eval panel(left, width - right, top, top + 235.0)
+  eval panel(left, width - right, top, top + high)
   eval curves
   set format x
   set xlabel 't [s]'
-  set ylabel 'balance ['.(exponent ? '10'.raised(sprintf('%d', exponent)).' ' : '').'J]'
+  set ylabel axis('balance', 'J', p)
   if (balance_min == balance_max) { set yrange [-1:1] } else { set yrange [*:*] }
-  eval panel(left, width - right, top + 251.0, top + 486.0)
-  plot 'energy.dat' using 1:($7/10.0**exponent) with lines lt 1 lw 1 notitle
+  eval panel(left, width - right, top + high + 10, top + 2*high + 10)
+  plot 'energy.dat' using 1:($7/10.0**p) with lines lt 1 lw 0.7 notitle
   unset multiplot
   unset output
 }

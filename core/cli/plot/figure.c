@@ -10,6 +10,27 @@
 #include <unistd.h>
 #include "figure.h"
 
+const char *const pw_figure_endings[] = { ".dat", ".gp", ".svg", ".png", ".pdf", NULL };
+
+int pw_figure_width (const char *text, double *width, pw_error *error) {
+  static const struct {
+    const char *name;
+    double mm;
+  } unit[] = { { "mm", 1 }, { "cm", 10 }, { "in", 25.4 } };
+  char number[32] = "";
+  size_t n = text ? strlen (text) : 0, k = 0;
+  if (text == NULL) return PW_OK;
+  while (k < 3 && (n < 3 || strcmp (text + n - 2, unit[k].name) != 0)) k++;
+  if (k == 3 || n > sizeof number)
+    return pw_fail (error, PW_INPUT, "--width %.40s: expected a length such as 85mm", text);
+  memcpy (number, text, n - 2);
+  int status = pw_cli_number ("--width", number, PW_POSITIVE, width, error);
+  *width *= unit[k].mm;
+  if (status == PW_OK && !(*width >= 50 && *width <= 500))
+    return pw_fail (error, PW_INPUT, "--width %s: expected 50mm to 500mm", text);
+  return status;
+}
+
 /* ---- The folder ---- */
 
 static int figure_make_folder (const char *folder, pw_error *error) {
@@ -67,6 +88,19 @@ static const struct {
   { "sensitivity", { figure_look, figure_sensitivity } },
 };
 
+/* The title for gnuplot's enhanced text: a capital first, special characters escaped. */
+static void figure_title (FILE *f, const char *text) {
+  char title[800];
+  size_t n = 0;
+  for (; *text && n + 3 < sizeof title; text++) {
+    if (strchr ("\\_^{}@&~", *text)) title[n++] = '\\';
+    title[n++] = *text;
+  }
+  title[n] = 0;
+  if (*title >= 'a' && *title <= 'z') *title = (char)(*title - 'a' + 'A');
+  pw_figure_text (f, "about", title);
+}
+
 pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *error) {
   char script[40];
   snprintf (script, sizeof script, "%s.gp", name);
@@ -80,6 +114,8 @@ pw_output *pw_figure_begin (const pw_figures *f, const char *name, pw_error *err
   pw_figure_text (out, "name", name);
   pw_figure_text (out, "model", f->model);
   pw_figure_text (out, "incomplete", f->incomplete);
+  figure_title (out, f->about && *f->about ? f->about : f->model);
+  fprintf (out, "width = %.2f\n", (f->width > 0 ? f->width : FIGURE_WIDTH) / 25.4 * 72);
   return o;
 }
 
@@ -139,11 +175,10 @@ static int gnuplot_start (char *const *argv, pid_t *child) {
 
 /* Removes figures of an earlier run, and incomplete ones. */
 static void gnuplot_remove_figures (const char *folder, const char *const *names) {
-  static const char *const ending[] = { "svg", "png" };
   char path[2 * FIGURE_PATH];
   for (int i = 0; i < FIGURE_SCRIPTS && names[i]; i++)
-    for (size_t k = 0; k < sizeof ending / sizeof *ending; k++) {
-      snprintf (path, sizeof path, "%s/%s.%s", folder, names[i], ending[k]);
+    for (const char *const *ending = pw_figure_endings + 2; *ending; ending++) {
+      snprintf (path, sizeof path, "%s/%s%s", folder, names[i], *ending);
       remove (path);
     }
 }

@@ -7,13 +7,26 @@
 
 enum {
   FIGURE_SCRIPTS = 8, /* drawn at a time, at most */
+  FIGURE_WIDTH = 170, /* [mm]: both columns of a page */
   FIGURE_PATH = 4096  /* longest path of a file, its end included */
 };
 
 typedef struct {
   const char *folder, *model;
   char incomplete[80]; /* ", incomplete: up to t = 3.2 s of 10 s", or "" */
+  const char *about;   /* the title; NULL or "": the model's name */
+  double width;        /* [mm]; 0: FIGURE_WIDTH */
 } pw_figures;
+
+/* Endings of a folder's data files, scripts and pictures, ended by NULL. */
+extern const char *const pw_figure_endings[];
+
+/* The option of commands that draw figures, and its value [mm] of "85mm", "8.5cm" or "3.3in"; NULL leaves *width unchanged.
+ * PW_INPUT unless it is between 50 and 500 mm. */
+#define PW_WIDTH_OPTION                                    \
+  PW_TEXT_OPTION (pw_cli_line, width, "width", 0, "WIDTH", \
+                  "Width of figures, such as 85mm for one column (default 170mm)")
+int pw_figure_width (const char *text, double *width, pw_error *error);
 
 /* Makes a folder and those above it, and locks it until the descriptor that is returned is closed.  -1 and PW_INPUT or
  * PW_RESOURCE. */

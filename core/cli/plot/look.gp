@@ -1,38 +1,65 @@
 
-# ---- Look ----
+# ---- Look of all figures ----
+# Lengths are in points: `width` is set by --width, a template computes `height`, and page(form) opens one of svg png pdf
+# at that size.  panel(x0, x1, y0, y1) places a plot, measured from the upper left corner; key(y, columns) a legend, which
+# takes rows(n, columns) below `top`.  Text of the user (labels, names) is plain; our own is enhanced: 'v_x [m/s]',
+# '10^{%T}'.  Line type i: colour, dash and width distinguish it without colour, and wider ones stay visible below later
+# ones.  A new figure: a template NAME.gp, and a line in the list of figure.c.
 
 set encoding utf8
-set border lw 0.8 lc rgb '#404040'
-set tics nomirror out scale 0.6
-set grid lt 1 lw 0.6 lc rgb '#dddddd'
-set ylabel offset 0.7,0
+set minussign
+set border lw 0.5 lc rgb '#404040'
+set tics nomirror out scale 0.5
+set grid lt 1 lw 0.4 lc rgb '#dddddd'
 set offsets 0,0,graph 0.04,graph 0.04
-set xzeroaxis lt 1 lw 0.8 lc rgb '#999999'
-# Dark blue, red, yellow, grey: distinct for colour-blind readers and in greyscale; dashes help.
-do for [i = 0:11] {
-  eval sprintf('set linetype %d lw 1.8 dt %s lc rgb "%s"', i + 1, \
-               word('1 (14,4) (5,3) (16,4,4,4)', (i + i/4) % 4 + 1), \
-               word('#004488 #bb5566 #cc9911 #888888', i % 4 + 1))
-}
+set xzeroaxis lt 1 lw 0.5 lc rgb '#999999'
+# Distinct for colour-blind readers; neighbours differ in greyscale as well.
+colours = '#004488 #cc6677 #c49a00 #117755 #8844aa #777777 #44aadd #884411'
+dashes = '1 (10,4) (4,3) (14,3,3,3)'
+colour(i) = word(colours, (i - 1) % 8 + 1)
+min(a, b) = a < b ? a : b
+max(a, b) = a > b ? a : b
+thickness(i, n) = n < 2 ? 1.1 : 1.7 - 0.8*(i - 1)/(n - 1)
+lines(n) = 'do for [i = 1:'.sprintf('%d', n).'] { eval sprintf("set linetype %d lw %.2f dt %s lc rgb ''%s''", i, '. \
+  'thickness(i, '.sprintf('%d', n).'), word(dashes, (i - 1) % 4 + 1), colour(i)) }'
+eval lines(4)
 # From dark to light, in greyscale as in colour; the lightest end is still visible on paper.
 set palette defined (0 '#0d0887', 1 '#6a00a8', 2 '#b12a90', 3 '#e16462', 4 '#f6a13c')
 
-# ---- Page: sizes in pixels, panels measured from the upper left corner ----
+# ---- Page ----
 
-width = 900.0
-left = 96.0
-right = 28.0
-top = 42.0
-bottom = 66.0
+forms = 'svg png pdf'
+letter = 4.4 # width of a letter, about
+left = 44.0
+right = 12.0
+bottom = 32.0
+narrow = width < 300 # one column of a page with two
 
-min(a, b) = a < b ? a : b
-max(a, b) = a > b ? a : b
-page(form) = sprintf(form eq 'svg' ? \
-    "set terminal svg size %d,%d noenhanced font 'DejaVu Sans,Helvetica,sans-serif,13' background rgb 'white'" : \
-    "set terminal pngcairo size %d,%d noenhanced font 'Sans,10.5' background rgb 'white'", width, height). \
-  sprintf("; set output '%s.%s'; set multiplot title short(model).': '.title.incomplete font ',%d'", name, form, \
-          form eq 'svg' ? 16 : 13)
+# Breaks a text between words.
+space(s, n) = n < 2 || s[n:n] eq ' ' ? n : space(s, n - 1)
+wrap(s, n, between) = strlen(s) <= n || space(s, n) < 2 ? s : \
+  s[1:space(s, n) - 1].between.wrap(s[space(s, n) + 1:*], n, between)
+heading = wrap(about, int((width - 16)/5.2), "}\n{/=8.5 ")
+top = 30.0
+do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
+
+page(form) = sprintf(form eq 'svg' ? "set terminal svg size %.2f,%.2f enhanced ". \
+    "font 'DejaVu Sans,Helvetica,sans-serif,10' linewidth 1.3333 background rgb 'white'; set pointsize 0.6" : \
+  form eq 'png' ? "set terminal pngcairo size %.2f,%.2f enhanced font 'DejaVu Sans,7.5' ". \
+    "fontscale 1.5625 linewidth 2.0833 pointscale 2.0833 background rgb 'white'; set pointsize 0.5" : \
+    "set terminal pdfcairo size %.6f,%.6f enhanced font 'DejaVu Sans,7.5' fontscale 0.75 linewidth 2; set pointsize 0.25", \
+  width*scale(form), height*scale(form)).sprintf("; set output '%s.%s'; ", name, form). \
+  'caption = "{/=8.5 ".heading."}\n{/=7.5 ".title.incomplete."}"; set multiplot title caption'
+scale(form) = form eq 'svg' ? 96/72.0 : form eq 'png' ? 150/72.0 : 1/72.0 # units of a terminal in a point
 panel(x0, x1, y0, y1) = sprintf('set lmargin at screen %.6f; set rmargin at screen %.6f; ', x0/width, x1/width). \
   sprintf('set tmargin at screen %.6f; set bmargin at screen %.6f', 1 - y0/height, 1 - y1/height)
-key(y, columns) = sprintf('set key at screen 0.5,screen %.6f center top horizontal maxcols %d', 1 - y/height, columns)
+key(y, columns) = sprintf('set key noenhanced at screen 0.5,screen %.6f center top horizontal maxcols %d samplen 3 spacing 1', \
+                          1 - (y - 5)/height, columns)
+columns(longest) = max(1, int((width - left - right)/(28 + letter*longest)))
+rows(n, columns) = 3 + 9.6*((n + columns - 1)/columns)
 short(s) = strlen(s) > 24 ? s[1:24].'…' : s
+
+# A power of ten for the label of an axis, instead of long numbers at its ticks.
+power(lo, hi) = (largest = max(abs(lo), abs(hi)), exponent = largest > 0 ? int(floor(log10(largest))) : 0, \
+                 exponent > 3 || exponent < -2 ? exponent : 0)
+axis(label, unit, n) = label.' ['.(n ? sprintf('10^{%d} ', n) : '').unit.']'

@@ -2,21 +2,20 @@
 # ---- Output of every run against each unknown, the best one marked ----
 
 title = 'runs of the optimisation'
-columns = min(panels, 2)
-rows = (panels + columns - 1)/columns
-gap = 84.0
-wide = columns == 1 ? 560.0 : 420.0
-high = rows == 1 ? 380.0 : 280.0
-left = 96.0
-top = 66.0
-width = left + columns*(wide + gap) - gap + right
-height = top + rows*(high + gap) - gap + bottom
+across = narrow ? 1 : min(panels, 2)
+down = (panels + across - 1)/across
+gap = 40.0
+wide = (width - left - right + gap)/across - gap
+high = wide*(across == 1 ? 0.6 : 0.7)
+above = top
+top = top + 13
+height = top + down*(high + gap) - gap + bottom
 set style line 1 pt 7 ps 0.4 lc rgb '#004488'
 set style line 2 pt 7 ps 0.4 lc rgb '#bbbbbb'
-set style line 3 pt 6 ps 1.6 lw 2 lc rgb '#bb5566'
-do for [form in 'svg png'] {
+set style line 3 pt 6 ps 1.6 lw 1.2 lc rgb '#cc6677'
+do for [form in forms] {
   eval page(form)
-  eval key(36.0, 3)
+  eval key(above, 3)
   unset xlabel
   unset ylabel
   unset xzeroaxis
@@ -26,18 +25,18 @@ do for [form in 'svg png'] {
   unset grid
   set xrange [0:1]
   set yrange [0:1]
-  eval panel(left, width - right, 42.0, top - 2.0)
-  plot for [i = 1:3] NaN with points ls i title word('feasible infeasible best', i)
+  eval panel(left, width - right, above - 1, top - 1)
+  plot for [i = 1:3] keyentry with points ls i title word('feasible infeasible best', i)
   unset key
-  set tics scale 0.6
+  set tics scale 0.5
   set format '%g'
   set border 31
-  set grid back lt 1 lw 0.6 lc rgb '#dddddd'
-  set xzeroaxis lt 1 lw 0.8 lc rgb '#999999'
+  set grid back lt 1 lw 0.4 lc rgb '#dddddd'
+  set xzeroaxis lt 1 lw 0.5 lc rgb '#999999'
   set autoscale
   do for [i = 1:panels] {
-    place = (i - 1) % columns
-    row = (i - 1)/columns
+    place = (i - 1) % across
+    row = (i - 1)/across
     x = left + place*(wide + gap)
     y = top + row*(high + gap)
     eval panel(x, x + wide, y, y + high)

@@ -3,7 +3,7 @@
 
 title = 'paths of the '.(what eq 'body' ? 'centres of mass' : words(markers) == 0 ? 'wheels' : \
   words(markers) < curves ? 'wheels and markers' : 'markers')
-do for [form in 'svg png'] {
+do for [form in forms] {
   eval page(form)
   set xlabel 'x [m]'
   set ylabel 'y [m]'
@@ -11,7 +11,7 @@ do for [form in 'svg png'] {
   do for [i = 1:panels] {
     eval legend(i == panels)
     eval place(i)
-    eval draw(2, 3, i == 1)
+    eval draw(2, 3, 0, i == 1)
   }
   unset multiplot
   unset output

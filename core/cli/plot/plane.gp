@@ -2,7 +2,14 @@
 # ---- Panels with equal axes: the whole run and, if the mechanism goes far, its beginning ----
 # Panel i shows x0[i] to x1[i] and y0[i] to y1[i], at px0[i] to px1[i] and py0[i] to py1[i] of the page.
 
-if (name eq 'mechanism') { bottom = bottom + 94 } # room for a colour bar
+if (name eq 'mechanism' && by_time) { bottom = bottom + 40 } # room for a colour bar
+if (name eq 'mechanism' && !by_time && bodies) { # room for a legend
+  longest = 0
+  do for [i = 1:bodies] { longest = max(longest, strlen(short(body[i]))) }
+  above = top
+  per_row = columns(longest)
+  top = top + rows(bodies, per_row)
+}
 panels = t_detail > 0 ? 2 : 1
 array px0[2]
 array px1[2]
@@ -32,41 +39,39 @@ do for [i = 1:panels] {
   y1[i] = y1[i] + edge
 }
 aspect(i, least, most) = min(max((y1[i] - y0[i])/(x1[i] - x0[i]), least), most)
+tall = narrow ? 300.0 : 380.0 # highest panel
+full = width - left - right
+px0[1] = left
 if (panels == 1) {
-  wide = width - left - right
-  high = wide*aspect(1, 0.3, 2)
-  if (high > 680) {
-    wide = wide*680/high
-    high = 680.0
-    width = left + right + int(wide)
+  wide = full
+  high = wide*aspect(1, 0.25, 2)
+  if (high > tall) {
+    wide = max(0.6*full, wide*tall/high)
+    high = tall
   }
   py0[1] = top
   py1[1] = top + high
-  px1[1] = left + wide
-  height = top + int(high) + bottom
-} else { if (aspect(1, 0, 1) < 0.5) { # a long straight path above its beginning
-  wide = width - left - right
-  py0[1] = top + 30
-  py1[1] = py0[1] + wide*aspect(1, 0.15, 0.5)
-  px1[1] = left + wide
-  py0[2] = py1[1] + bottom + 30
-  py1[2] = py0[2] + wide*aspect(2, 0.25, 0.6)
+  px0[1] = left + 0.5*(full - wide)
+  px1[1] = px0[1] + wide
+} else { if (narrow || aspect(1, 0, 1) < 0.5) { # a long straight path above its beginning
+  py0[1] = top + 13
+  py1[1] = py0[1] + full*aspect(1, 0.15, 0.8)
+  px1[1] = left + full
+  py0[2] = py1[1] + bottom + 16
+  py1[2] = py0[2] + full*aspect(2, 0.25, 0.8)
   px0[2] = left
-  px1[2] = left + wide
-  height = int(py1[2]) + bottom
+  px1[2] = left + full
 } else { # side by side
-  width = 1000.0
-  wide = width - left - right - 76
+  wide = full - 40
   px1[1] = left + 0.4*wide
-  px0[2] = px1[1] + 76
-  px1[2] = left + wide + 76
-  py0[1] = top + 30
+  px0[2] = px1[1] + 40
+  px1[2] = left + full
+  py0[1] = top + 13
   py0[2] = py0[1]
-  py1[1] = py0[1] + max(0.4*wide*aspect(1, 0.5, 2), 0.6*wide*aspect(2, 0.5, 1.3))
+  py1[1] = py0[1] + max(0.4*wide*aspect(1, 0.5, 1.6), 0.6*wide*aspect(2, 0.5, 1.1))
   py1[2] = py1[1]
-  height = int(py1[1]) + bottom
 }}
-px0[1] = left
+height = py1[panels] + bottom
 do for [i = 1:panels] {
   ratio = (py1[i] - py0[i])/(px1[i] - px0[i])
   high = max(y1[i] - y0[i], (x1[i] - x0[i])*ratio)

@@ -1,7 +1,7 @@
 /* Figures and animations of a run: the samples kept for them; paths, velocities, energies and snapshots of the motion drawn
  * by gnuplot; a page for web browsers.
  *
- * The folder of figures gets data files (*.dat), gnuplot scripts (*.gp) and their output (*.svg, *.png).  A script can
+ * The folder of figures gets data files (*.dat), gnuplot scripts (*.gp) and their output (*.svg, *.png, *.pdf).  A script can
  * be edited and run again there: gnuplot FILE.gp. */
 #ifndef PW_PLOT_H
 #define PW_PLOT_H
@@ -11,15 +11,14 @@
 
 typedef struct pw_plots pw_plots;
 
-/* Endings of the names of the folder's data files, scripts and pictures. */
-extern const char *const pw_plot_names[];
-
 /* Prepares figures of a run from 0 to t_end in a folder, which is created if necessary; NULL: without figures.  With
  * `forces`, those of elements with points are kept as well.  System and texts must outlive them.  PW_RESOURCE if the
  * folder cannot be written or memory is exhausted. */
 pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, const pw_system *s, double t_end,
                          pw_error *error);
 void pw_plots_close (pw_plots *p);
+/* Reads the values of --width and --colour, NULL if not given; PW_INPUT. */
+int pw_plots_style (pw_plots *p, const char *width, const char *colour, pw_error *error);
 
 /* The time of the next sample [s]; INFINITY after the last one. */
 double pw_plots_next (const pw_plots *p);
@@ -53,6 +52,7 @@ enum {
   PLOT_FEW = 240,         /* fewest samples of a large scene */
   PLOT_NUMBERS = 8000000, /* numbers stored, unless that is less than PLOT_FEW samples */
   PLOT_SHOWN = 1000,      /* bodies and wheels drawn at most: more cannot be distinguished */
+  PLOT_VERTICES = 32,     /* of a line of a symbol, at most */
   PLOT_POINTS = 24,       /* attachment points drawn of one body, at most */
   PLOT_CURVES = 60        /* bodies or wheels with a curve, at most */
 };
@@ -73,31 +73,47 @@ typedef struct {
  * counter-clockwise; empty if they are collinear. */
 typedef struct {
   int count, corners;
+  int point; /* 1: a point mass, without inertia */
   double at[PLOT_POINTS][2];
   double corner[PLOT_POINTS + 1][2];
 } pw_plot_body;
 
-/* An element with points: the bodies it connects, and the end at which its force is drawn. */
+/* An element with points, or at the joint of its bodies: the bodies it connects, and the end at which its force is drawn. */
 typedef struct {
   int element; /* of the system */
+  const pw_kind *kind;
+  const void *definition;
+  int contact; /* its track among wheels; -1: none */
   int ends;    /* 1 or 2 */
   struct {
     int body;     /* among those drawn, -1: the ground */
     double at[2]; /* [m] */
   } end[2];
-  int force, column; /* end, and the first column of its body */
+  int force, column; /* end, and the first column of its body; -1: at a joint of other elements, without its force */
 } pw_plot_link;
 
+/* A line of a symbol: vertices a, x, y, b; the point p1 + a (p2 - p1) + b times that turned to the left + u (x e + y n). */
+typedef struct {
+  int count, closed;
+  double at[PLOT_VERTICES][4];
+} pw_plot_stroke;
+
+/* Receives a line in the inertial frame [m]. */
+typedef void pw_plot_line_function (void *context, double (*at)[2], int count, int closed);
+
 struct pw_plots {
-  const char *folder, *model;
-  int lock; /* of the folder; -1: none */
+  const char *folder, *model, *about;
+  double width; /* of figures [mm] */
+  int by_time;  /* 1: colours show the time, 0: the bodies */
+  int lock;     /* of the folder; -1: none */
   const pw_system *s;
   pw_workspace *workspace; /* for contact points and forces */
   double t_end;
   int samples, wanted; /* taken so far; planned */
-  int width;           /* numbers per sample */
+  int numbers;         /* per sample */
   pw_tracks bodies, wheels;
-  int links, grounds;   /* elements whose forces are kept; points of the ground */
+  int links, grounds;   /* elements with points; points of the ground */
+  int with_forces;      /* 1: the forces of links are kept */
   pw_plot_body *shape;  /* bodies */
   double (*ground)[2];  /* grounds [m] */
   double *data;         /* wanted x width */
@@ -109,7 +125,7 @@ struct pw_plots {
 
 /* Sample i, and the numbers of track k in it. */
 static inline double *pw_plot_sample (const pw_plots *p, int i) {
-  return p->data + (size_t)i * (size_t)p->width;
+  return p->data + (size_t)i * (size_t)p->numbers;
 }
 static inline double *pw_plot_track (const pw_plots *p, int i, const pw_tracks *t, int k) {
   return pw_plot_sample (p, i) + t->offset + t->numbers * k;
@@ -132,8 +148,20 @@ int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error);
 int pw_plot_inside (const pw_plot_body *shape, int k);
 /* The index of a body among those drawn; -1: the ground, -2: not drawn. */
 int pw_plot_shown (const pw_plots *p, int body);
-/* Finds elements with points on the bodies drawn, up to the available number. */
+/* Finds elements with points on the bodies drawn, and at joints of these, up to the available number. */
 void pw_plot_find_links (pw_plots *p, const pw_model *m);
+/* 1 if the last body has a line: a rail or slot. */
+int pw_plot_line (const pw_plot_link *link);
+/* The unit of symbols [m]. */
+double pw_plot_unit (const pw_plots *p);
+/* A point of a body in the inertial frame [m]; motion: x, y, phi. */
+void pw_plot_point (const double *motion, const double *at, double out[2]);
+
+/* The next stroke of a symbol, without vertices if its condition does not hold; 0 after the last one. */
+int pw_plot_symbol (const pw_plot_link *link, const char **text, pw_plot_stroke *s);
+/* Passes the lines of a symbol at sample i, rails as long as the travel during `samples`. */
+void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
+                          void *context);
 /* Forces of these elements [N], x and y each. */
 void pw_plot_forces (const pw_plots *p, const pw_sample *sample, double *out);
 

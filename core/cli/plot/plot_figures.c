@@ -1,12 +1,18 @@
 /* The figures of a run: data files, plain columns with a comment line of names and units at the top, and scripts. */
 #include <math.h>
+#include <string.h>
 #include "figure.h"
 #include "plot.h"
 
-enum { PLOT_NAMED = 12, PLOT_IMAGES = 60, PLOT_FEWEST = 8 }; /* curves with a name each; snapshots at most, and least */
+enum {
+  PLOT_NAMED = 12,
+  PLOT_COLOURS = 8,
+  PLOT_IMAGES = 60,
+  PLOT_FEWEST = 8
+}; /* curves with a name each; snapshots at most, and least */
 
 /* Blocks of the mechanism's data. */
-enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES };
+enum { PLOT_BODIES, PLOT_WHEELS, PLOT_CENTRES, PLOT_RODS, PLOT_BLOCKS };
 
 /* Numbers separated by spaces, then an end. */
 static void data_row (FILE *f, const double *value, int count, const char *end) {
@@ -22,8 +28,7 @@ typedef struct {
   double x0, x1, y0, y1;
 } box;
 
-/* A point of a body in the inertial frame. */
-static void data_point (const double *motion, const double *at, double out[2]) {
+void pw_plot_point (const double *motion, const double *at, double out[2]) {
   double c = cos (motion[2]), s = sin (motion[2]);
   out[0] = motion[0] + c * at[0] - s * at[1];
   out[1] = motion[1] + s * at[0] + c * at[1];
@@ -41,7 +46,7 @@ static void box_extend_sample (const pw_plots *p, int i, box *b) {
     box_extend (b, motion);
     for (int n = 0; n < p->shape[k].count; n++) {
       double point[2];
-      data_point (motion, p->shape[k].at[n], point);
+      pw_plot_point (motion, p->shape[k].at[n], point);
       box_extend (b, point);
     }
   }
@@ -68,13 +73,19 @@ double pw_plot_size (const pw_plots *p) {
   return size > 0 ? size : pw_system_length (p->s);
 }
 
-/* 1 if a block has any content. */
-static int data_has (const pw_plots *p, int block) {
-  int b = 0, w = 0;
-  while (w < p->wheels.shown && !pw_plot_rolls (p, w)) w++;
-  if (block == PLOT_WHEELS) return w < p->wheels.shown;
-  while (b < p->bodies.shown && (p->shape[b].count == 0) != (block == PLOT_CENTRES)) b++;
-  return b < p->bodies.shown;
+double pw_plot_unit (const pw_plots *p) {
+  double reach = 0, size = pw_plot_size (p);
+  for (int b = 0; b < p->bodies.shown; b++)
+    for (int k = 0; k < p->shape[b].count; k++)
+      reach = fmax (reach, hypot (p->shape[b].at[k][0], p->shape[b].at[k][1]));
+  return 0.035 * (reach > 0 ? fmin (size, 4 * reach) : size);
+}
+
+/* 1 if a body has attachment points, or there is a wheel or marker. */
+static int data_extended (const pw_plots *p) {
+  int b = 0;
+  while (b < p->bodies.shown && p->shape[b].count == 0) b++;
+  return b < p->bodies.shown || p->wheels.shown > 0;
 }
 
 /* Number of initial samples shown in a separate panel, if the mechanism travels so far that it is small in a figure of
@@ -82,7 +93,7 @@ static int data_has (const pw_plots *p, int block) {
 static int data_closeup (const pw_plots *p) {
   int all = p->samples, n = p->samples;
   double size = pw_plot_size (p);
-  if (p->wheels.shown == 0 && !data_has (p, PLOT_BODIES)) return 0;
+  if (!data_extended (p)) return 0;
   if (box_diagonal (p, &all, INFINITY) < 10 * size) return 0;
   box_diagonal (p, &n, 4 * size);
   return n < 12 ? 0 : n;
@@ -117,31 +128,31 @@ static int data_table (const pw_figures *f, const char *name, const char *headin
   return pw_output_finish (o, error);
 }
 
-/* ---- The mechanism: lines of "x y t", blank lines between polygons ---- */
+/* ---- The mechanism: lines of "x y t body", blank lines between polygons; bodies are numbered from 1 ---- */
 
-static void data_vertex (FILE *f, double x, double y, double t, const char *end) {
-  data_row (f, (const double[]){ x, y, t }, 3, end);
+static void data_vertex (FILE *f, const double *at, double t, int body, const char *end) {
+  data_row (f, (const double[]){ at[0], at[1], t, body + 1 }, 4, end);
 }
 
 /* A body: its outline, and lines from the centre of mass to the attachment points inside, which without an outline are all. */
-static void data_body (FILE *f, const pw_plot_body *shape, const double *motion, double t) {
+static void data_body (FILE *f, const pw_plot_body *shape, const double *motion, double t, int body) {
   double point[2];
   for (int k = 0; k <= shape->corners && shape->corners; k++) {
-    data_point (motion, shape->corner[k % shape->corners], point);
-    data_vertex (f, point[0], point[1], t, k < shape->corners ? "\n" : "\n\n");
+    pw_plot_point (motion, shape->corner[k % shape->corners], point);
+    data_vertex (f, point, t, body, k < shape->corners ? "\n" : "\n\n");
   }
   for (int k = 0; k < shape->count; k++) {
     if (!pw_plot_inside (shape, k)) continue;
-    data_point (motion, shape->at[k], point);
-    data_vertex (f, motion[0], motion[1], t, "\n");
-    data_vertex (f, point[0], point[1], t, "\n\n");
+    pw_plot_point (motion, shape->at[k], point);
+    data_vertex (f, motion, t, body, "\n");
+    data_vertex (f, point, t, body, "\n\n");
   }
 }
 
-static void data_wheel (FILE *f, const double *contact, double half, double t) {
+static void data_wheel (FILE *f, const double *contact, double half, double t, int body) {
   double c = half * cos (contact[2]), s = half * sin (contact[2]);
-  data_vertex (f, contact[0] - c, contact[1] - s, t, "\n");
-  data_vertex (f, contact[0] + c, contact[1] + s, t, "\n\n");
+  data_vertex (f, (const double[]){ contact[0] - c, contact[1] - s }, t, body, "\n");
+  data_vertex (f, (const double[]){ contact[0] + c, contact[1] + s }, t, body, "\n\n");
 }
 
 /* Samples from one snapshot to the next, of the first n: the body with the longest path moves by about a third of the
@@ -161,32 +172,66 @@ static int data_stride (const pw_plots *p, int n) {
   return stride < 1 ? 1 : stride;
 }
 
-static void data_block (FILE *f, const pw_plots *p, int i, int block, double half) {
-  double t = pw_plot_sample (p, i)[PLOT_T];
-  for (int w = 0; w < p->wheels.shown && block == PLOT_WHEELS; w++)
-    if (pw_plot_rolls (p, w)) data_wheel (f, pw_plot_track (p, i, &p->wheels, w), half, t);
-  for (int b = 0; b < p->bodies.shown && block != PLOT_WHEELS; b++) {
-    const double *motion = pw_plot_track (p, i, &p->bodies, b);
-    if (block == PLOT_BODIES)
-      data_body (f, &p->shape[b], motion, t);
-    else
-      data_vertex (f, motion[0], motion[1], t, "\n");
-  }
+/* A massless straight element such as a rod: its symbol begins at one end and ends at the other. */
+static int data_straight (const pw_plot_link *link) {
+  return link->ends == 2 && link->kind->symbol && link->kind->level == PW_HOLONOMIC &&
+         strncmp (link->kind->symbol, "0 0 0 1 0 0", 11) == 0;
 }
 
-/* A block each of bodies, wheels, and bodies without attachments: snapshots out of the first n samples.  gnuplot counts
- * blocks with data only, so an empty one gets a point that is not drawn. */
+static void data_block (FILE *f, const pw_plots *p, int i, int block) {
+  static const double origin[3] = { 0 };
+  double t = pw_plot_sample (p, i)[PLOT_T], point[2];
+  for (int w = 0; w < p->wheels.shown && block == PLOT_WHEELS; w++)
+    if (pw_plot_rolls (p, w))
+      data_wheel (f, pw_plot_track (p, i, &p->wheels, w), 1.6 * pw_plot_unit (p), t,
+                  pw_plot_shown (p, pw_system_element (p->s, p->wheels.index[w]).body[0]));
+  for (int b = 0; b < p->bodies.shown && block != PLOT_WHEELS && block != PLOT_RODS; b++) {
+    const double *motion = pw_plot_track (p, i, &p->bodies, b);
+    if (block == PLOT_BODIES)
+      data_body (f, &p->shape[b], motion, t, b);
+    else if (p->shape[b].count == 0 || p->shape[b].point)
+      data_vertex (f, motion, t, b, "\n");
+  }
+  for (const pw_plot_link *l = p->link; l < p->link + p->links && block == PLOT_RODS; l++)
+    for (int n = 0; n < 2 && data_straight (l); n++) {
+      pw_plot_point (l->end[n].body < 0 ? origin : pw_plot_track (p, i, &p->bodies, l->end[n].body), l->end[n].at,
+                     point);
+      data_vertex (f, point, t, -1, n ? "\n\n" : "\n");
+    }
+}
+
+typedef struct {
+  FILE *f;
+  double t;
+  int closed;
+} data_symbols;
+
+static void data_line (void *context, double (*at)[2], int count, int closed) {
+  const data_symbols *x = context;
+  for (int k = 0; k < count && closed == x->closed; k++)
+    data_vertex (x->f, at[k], x->t, -1, k < count - 1 ? "\n" : "\n\n");
+}
+
+/* Blocks: snapshots out of the first n samples; then the last of them, with symbols, open and closed lines.  gnuplot counts
+ * blocks with data only, so each begins with a point that is not drawn. */
 static int data_mechanism (const pw_plots *p, const pw_figures *f, const char *name, int n, pw_error *error) {
-  static const char *const title[] = { "bodies", "wheels", "bodies without attachments" };
+  static const char *const title[] = { "bodies", "wheels", "point masses", "rods" };
   pw_output *o = pw_figure_data (f, name, error);
   if (o == NULL) return PW_RESOURCE;
   FILE *out = pw_output_stream (o);
   int stride = data_stride (p, n);
-  double half_wheel = 0.06 * pw_plot_size (p);
-  for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++) {
-    fprintf (out, "%s# %s: x [m], y [m], t [s]\n", block == PLOT_BODIES ? "" : "\n\n", title[block]);
-    if (!data_has (p, block)) fputs ("nan nan nan\n", out);
-    for (int i = 0; i < n; i += stride) data_block (out, p, i, block, half_wheel);
+  for (int block = 0; block < 2 * PLOT_BLOCKS; block++) {
+    int last = block >= PLOT_BLOCKS;
+    fprintf (out, "%s# %s, %s: x [m], y [m], t [s], number of the body\nnan nan nan nan\n\n", block ? "\n\n" : "",
+             title[block % PLOT_BLOCKS], last ? "at the end" : "before");
+    for (int i = last ? n - 1 : (n - 1) % stride; i < n - !last; i += stride)
+      data_block (out, p, i, block % PLOT_BLOCKS);
+  }
+  for (int closed = 0; closed < 2; closed++) {
+    data_symbols x = { out, pw_plot_sample (p, n - 1)[PLOT_T], closed };
+    fprintf (out, "\n\n# symbols, %s\nnan nan nan nan\n\n", closed ? "closed" : "open");
+    for (int i = 0; i < p->links; i++)
+      if (p->link[i].kind->symbol) pw_plot_draw_symbol (p, n - 1, &p->link[i], n, data_line, &x);
   }
   return pw_output_finish (o, error);
 }
@@ -195,7 +240,8 @@ static int data_write (const pw_plots *p, const pw_figures *f, int closeup, pw_e
   static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
   int status = data_tracks (p, f, &p->bodies, error);
   if (status == PW_OK) status = data_tracks (p, f, &p->wheels, error);
-  if (status == PW_OK) status = data_table (f, "energy.dat", energy, p->data, p->width, PLOT_FIRST, p->samples, error);
+  if (status == PW_OK)
+    status = data_table (f, "energy.dat", energy, p->data, p->numbers, PLOT_FIRST, p->samples, error);
   if (status == PW_OK)
     status = data_table (f, "ground.dat", "points of the ground: x [m], y [m]", *p->ground, 2, 2, p->grounds, error);
   if (status == PW_OK) status = data_mechanism (p, f, "mechanism.dat", p->samples, error);
@@ -227,16 +273,26 @@ static int figures_write (const pw_plots *p, const pw_figures *figures, const ch
   fprintf (f, "t_end = %.9g\nt_detail = %.9g\n", pw_plot_sample (p, p->samples - 1)[PLOT_T],
            closeup > 0 ? pw_plot_sample (p, closeup - 1)[PLOT_T] : 0);
   figures_curves (f, p, paths && p->wheels.shown ? &p->wheels : &p->bodies);
-  fprintf (f, "ground = %d\nblocks = '", p->grounds > 0);
-  for (int block = PLOT_BODIES; block <= PLOT_CENTRES; block++)
-    if (data_has (p, block)) fprintf (f, "%d ", block);
-  fputs ("'\n", f);
+  fprintf (f, "ground = %d\nby_time = %d\n", p->grounds > 0, p->by_time);
+  if (*name == 'm') {
+    int named = p->bodies.shown <= PLOT_NAMED;
+    fprintf (f, "bodies = %d\narray body[%d]\n", named ? p->bodies.shown : 0, p->bodies.shown);
+    fputs ("areas = '", f); /* colours of bodies with an area */
+    for (int c = 0; c < PLOT_COLOURS; c++) {
+      int b = c;
+      while (b < p->bodies.shown && p->shape[b].corners == 0) b += PLOT_COLOURS;
+      if (b < p->bodies.shown) fprintf (f, "%d ", c + 1);
+    }
+    fputs ("'\n", f);
+    for (int b = 0; b < p->bodies.shown && named; b++)
+      pw_figure_element (f, "body", b + 1, pw_plot_name (p, &p->bodies, b));
+  }
   return pw_figure_end (o, name, error);
 }
 
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
-  pw_figures figures = { .folder = p->folder, .model = p->model };
+  pw_figures figures = { .folder = p->folder, .model = p->model, .about = p->about, .width = p->width };
   char t[32], end[32];
   if (p->folder == NULL) return PW_OK;
   if (p->samples < 2) {

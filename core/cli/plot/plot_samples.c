@@ -6,8 +6,6 @@
 #include <unistd.h>
 #include "figure.h"
 
-const char *const pw_plot_names[] = { ".dat", ".gp", ".svg", ".png", NULL };
-
 const char *pw_plot_name (const pw_plots *p, const pw_tracks *t, int k) {
   return t == &p->bodies ? pw_system_body_name (p->s, t->index[k]) : pw_system_element (p->s, t->index[k]).name;
 }
@@ -26,8 +24,8 @@ static int plot_tracks (pw_plots *p, pw_tracks *t, int all) {
   t->all = all;
   t->shown = plot_least (all, PLOT_SHOWN);
   t->curves = plot_least (t->shown, PLOT_CURVES);
-  t->offset = p->width;
-  p->width += t->numbers * t->shown;
+  t->offset = p->numbers;
+  p->numbers += t->numbers * t->shown;
   t->index = pw_arena_alloc (&p->arena, (size_t)t->shown * sizeof *t->index);
   return t->index != NULL;
 }
@@ -44,15 +42,15 @@ static int plot_allocate (pw_plots *p, int elements) {
   if (!plot_tracks (p, &p->bodies, pw_system_bodies (p->s)) || !plot_tracks (p, &p->wheels, pw_system_contacts (p->s)))
     return 0;
   p->links = (int)links;
-  p->width += 2 * p->links;
-  p->wanted = PLOT_NUMBERS / p->width;
+  p->numbers += p->with_forces ? 2 * p->links : 0;
+  p->wanted = PLOT_NUMBERS / p->numbers;
   p->wanted = 1 + (p->wanted < PLOT_FEW ? PLOT_FEW : plot_least (p->wanted, PLOT_SAMPLES)); /* both ends */
   p->shape = pw_arena_alloc (&p->arena, (size_t)p->bodies.shown * sizeof *p->shape);
   p->ground = pw_arena_alloc (&p->arena, PLOT_SHOWN * sizeof *p->ground);
-  p->data = pw_arena_alloc (&p->arena, (size_t)p->wanted * (size_t)p->width * sizeof *p->data);
+  p->data = pw_arena_alloc (&p->arena, (size_t)p->wanted * (size_t)p->numbers * sizeof *p->data);
   p->contact = pw_arena_alloc (&p->arena, (size_t)p->wheels.all * sizeof *p->contact);
   p->link = pw_arena_alloc (&p->arena, links * sizeof *p->link);
-  p->forces = pw_arena_alloc (&p->arena, links ? (size_t)pw_system_force_size (p->s) * sizeof *p->forces : 0);
+  p->forces = pw_arena_alloc (&p->arena, p->with_forces ? (size_t)pw_system_force_size (p->s) * sizeof *p->forces : 0);
   return p->shape && p->ground && p->data && p->contact && p->link && p->forces;
 }
 
@@ -78,11 +76,16 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, cons
   int elements;
   pw_plots *p = malloc (sizeof *p);
   if (p)
-    *p = (pw_plots){
-      .folder = folder, .lock = -1, .model = pw_system_name (s), .s = s, .t_end = t_end, .width = PLOT_FIRST
-    };
+    *p = (pw_plots){ .folder = folder,
+                     .lock = -1,
+                     .model = pw_system_name (s),
+                     .about = pw_model_table (m)->about,
+                     .s = s,
+                     .t_end = t_end,
+                     .numbers = PLOT_FIRST,
+                     .with_forces = forces };
   pw_model_elements (m, &elements);
-  if (p == NULL || (folder && plot_try_folder (p, error) != PW_OK) || !plot_allocate (p, forces ? elements : 0)) {
+  if (p == NULL || (folder && plot_try_folder (p, error) != PW_OK) || !plot_allocate (p, elements)) {
     if (p == NULL || error->status == PW_OK) pw_fail (error, PW_RESOURCE, "plots: out of memory");
     pw_plots_close (p);
     return NULL;
@@ -93,6 +96,13 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, cons
   if (p->workspace && pw_plot_find_shapes (p, m, error) == PW_OK) return p;
   pw_plots_close (p);
   return NULL;
+}
+
+int pw_plots_style (pw_plots *p, const char *width, const char *colour, pw_error *error) {
+  p->by_time = colour && strcmp (colour, "time") == 0;
+  if (colour && !p->by_time && strcmp (colour, "body") != 0)
+    return pw_fail (error, PW_INPUT, "--colour %.40s: expected body or time", colour);
+  return pw_figure_width (width, &p->width, error);
 }
 
 void pw_plots_close (pw_plots *p) {
@@ -128,7 +138,7 @@ void pw_plots_add (pw_plots *p, const pw_sample *x) {
     memcpy (motion + 3, x->v + 3 * p->bodies.index[b], 3 * sizeof *motion);
   }
   if (p->wheels.shown > 0) plot_contacts (p, x, pw_plot_track (p, i, &p->wheels, 0));
-  if (p->links > 0) pw_plot_forces (p, x, pw_plot_track (p, i, &p->wheels, p->wheels.shown));
+  if (p->with_forces && p->links > 0) pw_plot_forces (p, x, pw_plot_track (p, i, &p->wheels, p->wheels.shown));
 }
 
 void pw_plots_serialise (pw_plots *p, pw_archive *a) {
@@ -137,5 +147,5 @@ void pw_plots_serialise (pw_plots *p, pw_archive *a) {
   if (samples < 0 || samples > p->wanted) a->failed = 1;
   if (a->failed) return;
   p->samples = samples;
-  pw_archive_bytes (a, p->data, (size_t)samples * (size_t)p->width * sizeof *p->data);
+  pw_archive_bytes (a, p->data, (size_t)samples * (size_t)p->numbers * sizeof *p->data);
 }

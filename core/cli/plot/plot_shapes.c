@@ -64,7 +64,11 @@ int pw_plot_find_shapes (pw_plots *p, const pw_model *m, pw_error *error) {
       if (at && strcmp (body, "ground") == 0 && p->grounds < PLOT_SHOWN)
         memcpy (p->ground[p->grounds++], at, 2 * sizeof *at);
     }
-  for (int b = 0; b < p->bodies.shown; b++) shapes_outline (&p->shape[b]);
+  const double *mass = pw_system_mass (p->s);
+  for (int b = 0; b < p->bodies.shown; b++) {
+    p->shape[b].point = mass[3 * p->bodies.index[b]] > 0 && mass[3 * p->bodies.index[b] + 2] == 0;
+    shapes_outline (&p->shape[b]);
+  }
   pw_names_close (&shown);
   return PW_OK;
 }
@@ -79,10 +83,53 @@ int pw_plot_shown (const pw_plots *p, int body) {
   return -2;
 }
 
-/* Fills a link; 0 if the element has no point, or a body that is not shown. */
+int pw_plot_line (const pw_plot_link *link) {
+  return link->kind->symbol && strstr (link->kind->symbol, "inf");
+}
+
+/* The joint of two bodies: the end of an earlier link on the first one. */
+static int shapes_joint (const pw_plots *p, int one, int other, pw_plot_link *link) {
+  for (const pw_plot_link *l = p->link; l < p->link + p->links; l++)
+    for (int n = 0; n < 2 && l->ends == 2 && !pw_plot_line (l); n++)
+      if (l->end[n].body == one && l->end[1 - n].body == other) {
+        link->end[link->ends++] = l->end[n];
+        return 1;
+      }
+  return 0;
+}
+
+/* An element without points is at the joints of its bodies with the last one. */
+static int shapes_at_joints (const pw_plots *p, const pw_element *e, const int *bodies, pw_plot_link *link) {
+  int last = pw_plot_shown (p, bodies[e->kind->bodies - 1]);
+  for (int n = 0; n < e->kind->bodies - 1 && link->ends < 2; n++)
+    if (!shapes_joint (p, pw_plot_shown (p, bodies[n]), last, link)) return 0;
+  return e->kind->symbol && link->ends > 0;
+}
+
+/* 1 if two points that may be omitted are omitted. */
+static int shapes_omitted (const pw_element *e) {
+  const pw_field *f = e->kind->fields;
+  while (f->name && f->type != PW_POINT) f++;
+  const double *at =
+      f->name && !f->required && f->count == 2 ? pw_field_at (e->kind, e->definition, PW_POINT, 0) : NULL;
+  return at && at[0] == 0 && at[1] == 0 && at[2] == 0 && at[3] == 0;
+}
+
+static int shapes_contact (const pw_plots *p, int element) {
+  int w = 0;
+  while (w < p->wheels.shown && p->wheels.index[w] != element) w++;
+  return w < p->wheels.shown ? w : -1;
+}
+
+/* Fills a link; 0 if the element has no place, or a body that is not shown. */
 static int shapes_fill (const pw_plots *p, const pw_element *e, int element, pw_plot_link *link) {
   const int *bodies = pw_system_element (p->s, element).body;
-  *link = (pw_plot_link){ .element = element, .force = -1 };
+  *link = (pw_plot_link){ .element = element,
+                          .kind = e->kind,
+                          .definition = e->definition,
+                          .force = -1,
+                          .column = -1,
+                          .contact = shapes_contact (p, element) };
   for (int n = 0; n < e->kind->bodies && link->ends < 2; n++) {
     const double *at = pw_field_at (e->kind, e->definition, PW_POINT, n);
     int body = pw_plot_shown (p, bodies[n]);
@@ -91,6 +138,12 @@ static int shapes_fill (const pw_plots *p, const pw_element *e, int element, pw_
     if (link->force < 0 && body >= 0) link->force = link->ends, link->column = 3 * n;
     link->end[link->ends].body = body;
     memcpy (link->end[link->ends++].at, at, 2 * sizeof *at);
+  }
+  pw_plot_link joint = *link;
+  joint.ends = 0;
+  if ((link->ends == 0 || shapes_omitted (e)) && shapes_at_joints (p, e, bodies, &joint)) {
+    *link = joint;
+    return 1;
   }
   return link->force >= 0;
 }
@@ -114,5 +167,8 @@ void pw_plot_find_links (pw_plots *p, const pw_model *m) {
 void pw_plot_forces (const pw_plots *p, const pw_sample *x, double *out) {
   if (pw_workspace_forces (p->workspace, x->t, x->q, x->v, x->lambda, p->forces, NULL) != PW_OK) return;
   for (int i = 0; i < p->links; i++, out += 2)
-    memcpy (out, p->forces + pw_system_element (p->s, p->link[i].element).force + p->link[i].column, 2 * sizeof *out);
+    if (p->link[i].force < 0)
+      out[0] = out[1] = 0;
+    else
+      memcpy (out, p->forces + pw_system_element (p->s, p->link[i].element).force + p->link[i].column, 2 * sizeof *out);
 }

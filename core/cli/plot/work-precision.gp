@@ -6,37 +6,34 @@ angles = name eq 'work-precision-angles'
 title = 'work-precision diagram'.(angles ? ' of angles' : '')
 label_of_error = angles ? 'largest error of an angle [rad]' : 'largest error of a coordinate [m]'
 column_of_error = angles ? 5 : 4
-width = 1000.0
-left = 84.0
-columns = max(1, int((width - left)/(76 + 8.0*longest)))
-top = 46 + 22*((methods + columns - 1)/columns)
-height = top + 470 + bottom
-wide = 0.5*(width - left - 44 - right)
+wide = narrow ? width - left - right : 0.5*(width - left - 14 - right)
+high = narrow ? 0.85*wide : 1.05*wide
+height = top + high + (narrow ? high + 36 : 0) + bottom
 stats data using 2 name 'cpu' nooutput
 stats data using 3 name 'rhs' nooutput
 stats data using (column(column_of_error) > 0 ? column(column_of_error) : NaN) name 'error' nooutput
 largest = min(3*error_max, max(10*error_min, size_of_motion)) # larger errors mean nothing
 set logscale xy
-set format '1e%T'
+set format '10^{%T}'
 unset offsets
 unset xzeroaxis
-do for [form in 'svg png'] {
+do for [form in forms] {
   eval page(form)
-  # The key has a panel of its own, as wide as both others.
-  eval key(36.0, columns).' samplen 5'
+  # The legend has a panel of its own, as wide as both others.
+  eval key(above, per_row)
   set tics scale 0
   set format ''
   set border 0
   unset grid
   set xrange [1:10]
   set yrange [1:10]
-  eval panel(left, width - right, 42.0, top - 2.0)
+  eval panel(left, width - right, above - 1, top - 1)
   plot for [i = 1:methods] NaN with linespoints ls i title label[i]
-  set tics scale 0.6
+  set tics scale 0.5
   set border 31
-  set grid back lt 1 lw 0.6 lc rgb '#dddddd'
+  set grid back lt 1 lw 0.4 lc rgb '#dddddd'
   set ylabel label_of_error
-  set format '1e%T'
+  set format '10^{%T}'
   set yrange [error_min/4:largest]
   if (uncertainty > error_min/4) {
     set object 1 rectangle from graph 0,graph 0 to graph 1,first uncertainty behind fc rgb '#e8e8e8' fs noborder
@@ -44,17 +41,20 @@ do for [form in 'svg png'] {
   }
   set xlabel 'CPU time [s]'
   set xrange [cpu_min/1.6:cpu_max*1.6]
-  eval panel(left, left + wide, top, top + 470.0)
+  eval panel(left, left + wide, top, top + high)
   plot for [i = 1:methods] data index i - 1 using 2:column_of_error with linespoints ls i notitle
-  unset ylabel
-  set format y ''
+  if (!narrow) {
+    unset ylabel
+    set format y ''
+  }
   unset label 1
   set xlabel 'right-hand side evaluations'
   set xrange [rhs_min/1.6:rhs_max*1.6]
-  eval panel(left + wide + 44, width - right, top, top + 470.0)
+  if (narrow) { eval panel(left, left + wide, height - bottom - high, height - bottom) } \
+  else { eval panel(left + wide + 14, width - right, top, top + high) }
   plot for [i = 1:methods] data index i - 1 using 3:column_of_error with linespoints ls i notitle
-  set format y '1e%T'
   unset xlabel
+  unset ylabel
   unset object 1
   unset multiplot
   unset output

@@ -27,7 +27,7 @@ typedef struct {
   /* as given */
   pw_cli_line line;
   const char *every_text;
-  const char *csv_path, *json_path, *plots_path, *animate_path, *reference_path;
+  const char *csv_path, *json_path, *plots_path, *animate_path, *reference_path, *colour;
   int energy, profile;
   pw_checkpoints check;
   /* as understood */

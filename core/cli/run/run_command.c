@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "checkpoints.h"
+#include "figure.h"
 #include "profile.h"
 #include "report.h"
 
@@ -28,7 +29,7 @@ static int run_uses (run *x, pw_error *error) {
                    { "-o", x->csv_path, PW_WRITES, NULL },
                    { "--json", x->json_path, PW_WRITES, NULL },
                    { "--animate", x->animate_path, PW_WRITES, NULL },
-                   { "--plots", x->plots_path, PW_WRITES_INTO, pw_plot_names } };
+                   { "--plots", x->plots_path, PW_WRITES_INTO, pw_figure_endings } };
   return pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
 }
 
@@ -117,6 +118,7 @@ static int run_open (run *x, pw_error *error) {
       (x->plots = pw_plots_open (x->plots_path, x->animate_path != NULL, x->m.model, x->m.system, x->t_end, error)) ==
           NULL)
     return error->status;
+  if (x->plots && pw_plots_style (x->plots, x->line.width, x->colour, error) != PW_OK) return error->status;
   status = pw_comparison_open (&x->comparison, &x->m, x->reference_path, x->line.starts != NULL, x->t_end, error);
   if (status != PW_OK) return status;
   pw_limit_start (&x->limit);
@@ -344,6 +346,8 @@ static const struct poptOption run_options[] = {
   PW_TEXT_OPTION (run, every_text, "every", 0, "DT", "Time between rows of the table [s] (default: a row per step)"),
   PW_TEXT_OPTION (run, json_path, "json", 0, "FILE", "Write a summary as JSON; - is standard output"),
   PW_TEXT_OPTION (run, plots_path, "plots", 0, "DIR", "Draw figures into a folder"),
+  PW_WIDTH_OPTION,
+  PW_TEXT_OPTION (run, colour, "colour", 0, "WHAT", "What the colours of snapshots show: body (default) or time"),
   PW_TEXT_OPTION (run, animate_path, "animate", 0, "FILE.html", "Write an animation as a page for web browsers"),
   PW_FLAG_OPTION (run, energy, "energy", "Show energies, work and losses"),
   PW_TEXT_OPTION (run, reference_path, "reference", 0, "FILE.csv",

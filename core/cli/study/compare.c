@@ -400,6 +400,7 @@ static const struct poptOption compare_options[] = {
       "computed reference"),
   PW_ALIAS_OPTION (pw_study, reference_path, "truth"),
   PW_TEXT_OPTION (pw_study, folder, "output", 'o', "DIR", "Write tables and work-precision diagrams into a folder"),
+  PW_WIDTH_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND,
 };

@@ -319,6 +319,7 @@ static const struct poptOption drift_options[] = {
       "V1,V2,..., lin:FIRST:LAST:COUNT or log:FIRST:LAST:COUNT"),
   PW_FLAG_OPTION (pw_drift, only_methods, "only-methods", "Omit the dependence of drift on options"),
   PW_TEXT_OPTION (pw_study, folder, "output", 'o', "DIR", "Write tables and figures into a folder"),
+  PW_WIDTH_OPTION,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND,
 };

@@ -147,11 +147,12 @@ int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *
 
 static int study_open_folder (pw_study *x, pw_error *error) {
   const char *const *tables = x->type->tables;
-  const char *const names[] = { ".dat", ".gp", ".svg", ".png", tables[0], tables[1], NULL };
+  const char *const names[] = { ".dat", ".gp", ".svg", ".png", ".pdf", tables[0], tables[1], NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--reference", x->reference_path, PW_READS, NULL },
                    { "-o", x->folder, PW_WRITES_INTO, names } };
   if (x->folder == NULL) return PW_OK;
+  if (pw_figure_width (x->line.width, &x->width, error) != PW_OK) return error->status;
   if (pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error) != PW_OK) return error->status;
   x->lock = pw_figure_folder (x->folder, error);
   return x->lock < 0 ? error->status : pw_table_open (x, error);

@@ -86,6 +86,7 @@ struct pw_study {
   pw_limit limit; /* of settings.stop */
   double t_end;   /* [s] */
   double cpu_end; /* CPU time of a run after which it is stopped between steps [s] */
+  double width;   /* of figures [mm]; 0: default */
   /* progress */
   int lock;  /* of the folder; -1: none */
   int quiet; /* 1: rows are not printed */

@@ -89,6 +89,7 @@ static const pw_field motor_fields[] = {
 const pw_kind pw_kind_motor = {
   .name = "motor",
   .about = "a limited torque that drives the relative angle and angular velocity of two bodies to target values",
+  .symbol = "0 .9 -.5 0 1 0 0 .7 .7 0 0 1 0 -.7 .7 0 -.2 .8 0 -.7 .7 0 -.6 1.2",
   DEFINITION (pw_motor, motor_fields),
   ELEMENT (motor, motor_prepare),
   .bodies = 2,

@@ -71,6 +71,7 @@ static const pw_field twist_fields[] = {
 const pw_kind pw_kind_rotational_spring = {
   .name = "rotational-spring",
   .about = "a torsion spring and a parallel damper between two bodies",
+  .symbol = "0 .4 0 0 .3 .4 0 -.2 .5 0 -.6 0 0 -.3 -.7 0 .4 -.8 0 .9 0 0 .7 .8 0 0 1.1 0 -.8 .9",
   DEFINITION (pw_rotational_spring, twist_fields),
   ELEMENT (twist, twist_prepare),
   .bodies = 2,

@@ -117,6 +117,10 @@ static const pw_field spring_fields[] = {
 const pw_kind pw_kind_spring = {
   .name = "spring",
   .about = "a spring and a parallel damper between a point of one body and a point of another",
+  .symbol = "stiffness: 0 0 0 .2 0 0 .23 0 .7 .29 0 -.7 .35 0 .7 .41 0 -.7 .47 0 .7 .53 0 -.7 "
+            ".59 0 .7 .65 0 -.7 .71 0 .7 .77 0 -.7 .8 0 0 1 0 0; "
+            "damping: 0 0 0 .1 0 0 .1 0 -1.2 .35 0 -1.2 .35 0 -.7 .7 0 -.7 .35 0 -.7 .35 0 -1.7 .7 0 -1.7; "
+            "damping: .5 0 -.8 .5 0 -1.6 .5 0 -1.2 .9 0 -1.2 .9 0 0 1 0 0",
   DEFINITION (pw_spring, spring_fields),
   ELEMENT (spring, spring_prepare),
   .bodies = 2,

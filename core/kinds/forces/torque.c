@@ -29,6 +29,7 @@ static const pw_field torque_fields[] = {
 const pw_kind pw_kind_torque = {
   .name = "torque",
   .about = "a torque on one body and the opposite torque on another",
+  .symbol = "0 .9 -.5 0 1 0 0 .7 .7 0 0 1 0 -.7 .7 0 -.2 .8 0 -.7 .7 0 -.6 1.2",
   .definition = sizeof (pw_torque),
   .fields = torque_fields,
   .bodies = 2,

@@ -119,6 +119,7 @@ static const pw_field tyre_fields[] = {
 
 const pw_kind pw_kind_tyre = {
   .name = "tyre",
+  .symbol = "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5",
   .about = "a wheel with lateral slip; the lateral force increases with the slip",
   DEFINITION (pw_tyre, tyre_fields),
   ELEMENT (tyre, tyre_prepare),

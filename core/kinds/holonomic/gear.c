@@ -71,6 +71,7 @@ static const pw_quantity gear_reaction[] = { { "M", "N m", NULL, "moment on the 
 const pw_kind pw_kind_gear = {
   .name = "gear",
   .about = "the angles of two bodies relative to a third have a fixed ratio",
+  .symbol = "g1; g2",
   DEFINITION (pw_gear, gear_fields),
   ELEMENT (gear, gear_prepare),
   .bodies = 3,

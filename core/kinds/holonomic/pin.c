@@ -91,6 +91,7 @@ static const pw_quantity pin_reaction[] = {
 const pw_kind pw_kind_pin = {
   .name = "pin",
   .about = "a point of one body and a point of another coincide (revolute joint, hinge)",
+  .symbol = "o 0 0 0 .4",
   DEFINITION (pw_pin, pin_fields),
   ELEMENT (pin, pin_prepare),
   .bodies = 2,

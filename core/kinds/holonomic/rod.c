@@ -115,6 +115,7 @@ static const pw_quantity rod_reaction[] = {
 const pw_kind pw_kind_rod = {
   .name = "rod",
   .about = "a massless bar keeps a point of one body at a fixed distance from a point of another",
+  .symbol = "0 0 0 1 0 0; o 0 0 0 .3; o 1 0 0 .3",
   DEFINITION (pw_rod, rod_fields),
   ELEMENT (rod, rod_prepare),
   .bodies = 2,

@@ -42,6 +42,7 @@ static const pw_quantity slot_reaction[] = {
 const pw_kind pw_kind_slot = {
   .name = "slot",
   .about = "a point of one body stays on a line of another",
+  .symbol = "1 -inf .4 1 inf .4; 1 -inf -.4 1 inf -.4; o 0 0 0 .3",
   DEFINITION (pw_slot, slot_fields),
   ELEMENT (line, slot_prepare),
   .bodies = 2,

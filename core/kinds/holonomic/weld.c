@@ -101,6 +101,7 @@ static const pw_quantity weld_reaction[] = {
 const pw_kind pw_kind_weld = {
   .name = "weld",
   .about = "two bodies are fixed to each other",
+  .symbol = "0 -.4 -.4 0 .4 -.4 0 .4 .4 0 -.4 .4 0 -.4 -.4",
   DEFINITION (pw_weld, weld_fields),
   ELEMENT (weld, weld_prepare),
   .bodies = 2,

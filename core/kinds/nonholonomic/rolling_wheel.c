@@ -130,6 +130,7 @@ static const pw_quantity rolling_coordinate[] = {
 const pw_kind pw_kind_rolling_wheel = {
   .name = "rolling-wheel",
   .about = "a wheel that rolls without slip, free or driven by a torque about its axle",
+  .symbol = "0 -1.6 -.5 0 1.6 -.5 0 1.6 .5 0 -1.6 .5 0 -1.6 -.5",
   DEFINITION (pw_rolling_wheel, rolling_fields),
   ELEMENT (rolling, rolling_prepare),
   .bodies = 1,

@@ -35,6 +35,7 @@ static const pw_quantity speed_reaction[] = { { "F", "N", NULL, "force on the bo
 
 const pw_kind pw_kind_speed = {
   .name = "speed",
+  .symbol = "0 .6 0 0 2.2 0 0 1.7 .3 0 2.2 0 0 1.7 -.3",
   .about = "the velocity component of a point along a direction fixed in its body follows a signal of time",
   DEFINITION (pw_speed, speed_fields),
   ELEMENT (contact, speed_prepare),

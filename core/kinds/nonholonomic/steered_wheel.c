@@ -85,6 +85,7 @@ static const pw_quantity steered_reaction[] = {
 const pw_kind pw_kind_steered_wheel = {
   .name = "steered-wheel",
   .about = "a knife edge whose heading in the body follows a signal of time",
+  .symbol = "0 -1.6 -.2 0 1.6 -.2 0 1.6 .2 0 -1.6 .2 0 -1.6 -.2",
   DEFINITION (pw_steered_wheel, steered_fields),
   ELEMENT (steered, steered_prepare),
   .bodies = 1,

@@ -30,6 +30,7 @@ static const pw_quantity wheel_reaction[] = { { "N", "N", NULL,
 const pw_kind pw_kind_wheel = {
   .name = "wheel",
   .about = "a knife edge: a point of the body moves only along a heading fixed in the body",
+  .symbol = "0 -1.6 -.2 0 1.6 -.2 0 1.6 .2 0 -1.6 .2 0 -1.6 -.2",
   DEFINITION (pw_wheel, wheel_fields),
   ELEMENT (contact, wheel_prepare),
   .bodies = 1,

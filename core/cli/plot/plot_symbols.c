@@ -1,0 +1,176 @@
+/* Symbols of elements in figures, and the hatching of the ground.
+ *
+ * The text of a symbol (pw_kind.symbol) consists of strokes separated by semicolons.  A stroke is a list of vertices "a x y":
+ * the point p1 + a (p2 - p1) + u (x e + y n), where p1 and p2 are the points of the first and the last body, u the unit of
+ * symbols, e a direction and n its normal to the left.  e is the heading of a contact point, or that of the field `heading` in
+ * the last body; without them the direction from p1 to p2, or the x axis of the first body if they coincide.  x = inf and -inf
+ * extend to the ends of the travel along e.  "o a x y r" is a circle of radius u r, "g" the pitch circles of gears with axles
+ * p1 and p2 and the field `ratio`.  A stroke whose last vertex is its first encloses an area, which hides what is below.
+ * "NAME:" before a stroke: it is drawn if that field of the element is not zero; "NAME=2:": if it is 2. */
+#include <ctype.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "plot.h"
+
+enum { SYMBOL_CIRCLE = 24 }; /* vertices of a circle */
+
+/* The value of a number or a choice of an element; 0 if it has no such field. */
+static double symbol_field (const pw_plot_link *link, const char *name, size_t length) {
+  const pw_field *f = link->kind->fields;
+  while (f->name && (strncmp (f->name, name, length) != 0 || f->name[length])) f++;
+  if (f->name == NULL) return 0;
+  const void *at = (const char *)link->definition + f->offset;
+  return f->type == PW_NUMBER ? *(const double *)at : f->type == PW_CHOICE ? *(const int *)at : 0;
+}
+
+/* Reads a condition; 0 if it does not hold. */
+static int symbol_condition (const pw_plot_link *link, const char **text) {
+  const char *name = *text, *colon = name + strcspn (name, ":;");
+  size_t n = strcspn (name, "=:");
+  if (*colon != ':') return 1;
+  double value = symbol_field (link, name, n);
+  *text = colon + 1;
+  return name[n] == '=' ? value == strtod (name + n + 1, NULL) : value != 0;
+}
+
+/* A circle of radius u r + d |p2 - p1| around a vertex. */
+static void symbol_circle (pw_plot_stroke *s, const double *centre, double r, double d) {
+  const double step = 2 * acos (-1) / SYMBOL_CIRCLE;
+  for (int i = 0; i <= SYMBOL_CIRCLE; i++) {
+    double c = cos (step * (i % SYMBOL_CIRCLE)), n = sin (step * (i % SYMBOL_CIRCLE));
+    double vertex[] = { centre[0] + d * c, centre[1] + r * c, centre[2] + r * n, d * n };
+    memcpy (s->at[s->count++], vertex, sizeof vertex);
+  }
+}
+
+/* Radii R1 and R2 = |i| R1, with R1 + R2 = |p2 - p1|, or their difference if one is a ring (Willis 1870). */
+static void symbol_gear (const pw_plot_link *link, pw_plot_stroke *s, int second) {
+  double i = symbol_field (link, "ratio", 5), first = i == 1 ? 0.5 : 1 / fabs (1 - i);
+  symbol_circle (s, (const double[]){ second, 0, 0 }, 0, second ? first * fabs (i) : first);
+}
+
+/* Numbers, at most `most`. */
+static int symbol_numbers (const char **text, double *out, int most) {
+  char *end;
+  int n = 0;
+  for (; n < most; n++, *text = end) {
+    out[n] = strtod (*text, &end);
+    if (end == *text) break;
+  }
+  return n;
+}
+
+int pw_plot_symbol (const pw_plot_link *link, const char **text, pw_plot_stroke *s) {
+  double x[4];
+  s->count = 0;
+  while (isspace ((unsigned char)**text) || **text == ';') ++*text;
+  if (**text == 0) return 0;
+  int drawn = symbol_condition (link, text);
+  *text += strspn (*text, " ");
+  if (**text == 'g') {
+    symbol_gear (link, s, (*text)[1] == '2');
+  } else if (**text == 'o' && ++*text && symbol_numbers (text, x, 4) == 4) {
+    symbol_circle (s, x, x[3], 0);
+  } else {
+    while (s->count < PLOT_VERTICES && symbol_numbers (text, x, 3) == 3)
+      memcpy (s->at[s->count++], (const double[]){ x[0], x[1], x[2], 0 }, sizeof *s->at);
+  }
+  *text += strcspn (*text, ";");
+  s->closed = s->count > 2 && memcmp (s->at[0], s->at[s->count - 1], sizeof *s->at) == 0;
+  if (!drawn) s->count = 0;
+  return 1;
+}
+
+/* ---- In the inertial frame ---- */
+
+typedef struct {
+  double p[2], d[2], e[2], unit, low, high; /* p1, p2 - p1, direction, unit, ends of the travel from p2 */
+} symbol_frame;
+
+static void symbol_end (const pw_plots *p, int i, const pw_plot_link *link, int n, double out[2]) {
+  static const double ground[3] = { 0 };
+  int body = link->end[n].body;
+  pw_plot_point (body < 0 ? ground : pw_plot_track (p, i, &p->bodies, body), link->end[n].at, out);
+}
+
+static double symbol_angle (const pw_plots *p, int i, int body) {
+  return body < 0 ? 0 : pw_plot_track (p, i, &p->bodies, body)[2];
+}
+
+static symbol_frame symbol_place (const pw_plots *p, int i, const pw_plot_link *link) {
+  symbol_frame f = { .unit = pw_plot_unit (p) };
+  int last = link->ends - 1, line = pw_plot_line (link);
+  double p2[2], angle = symbol_angle (p, i, link->end[line ? last : 0].body);
+  symbol_end (p, i, link, 0, f.p);
+  symbol_end (p, i, link, last, p2);
+  f.d[0] = p2[0] - f.p[0], f.d[1] = p2[1] - f.p[1];
+  if (link->contact >= 0)
+    angle = pw_plot_track (p, i, &p->wheels, link->contact)[2];
+  else if (line)
+    angle += symbol_field (link, "heading", 7);
+  else if (hypot (f.d[0], f.d[1]) > 1e-9 * f.unit)
+    angle = atan2 (f.d[1], f.d[0]);
+  f.e[0] = cos (angle), f.e[1] = sin (angle);
+  return f;
+}
+
+/* The travel of p1 along the line, from p2. */
+static symbol_frame symbol_travel (const pw_plots *p, int sample, const pw_plot_link *link, int samples) {
+  symbol_frame f = symbol_place (p, sample, link);
+  for (int i = 0; i < samples && pw_plot_line (link); i++) {
+    symbol_frame g = symbol_place (p, i, link);
+    double s = -(g.d[0] * g.e[0] + g.d[1] * g.e[1]);
+    f.low = fmin (f.low, s), f.high = fmax (f.high, s);
+  }
+  f.low -= 2.5 * f.unit, f.high += 2.5 * f.unit;
+  return f;
+}
+
+static void symbol_vertex (const symbol_frame *f, const double *v, double out[2]) {
+  double x = isinf (v[1]) ? (v[1] > 0 ? f->high : f->low) : f->unit * v[1], y = f->unit * v[2];
+  out[0] = f->p[0] + v[0] * f->d[0] - v[3] * f->d[1] + x * f->e[0] - y * f->e[1];
+  out[1] = f->p[1] + v[0] * f->d[1] + v[3] * f->d[0] + x * f->e[1] + y * f->e[0];
+}
+
+static void symbol_stroke (const symbol_frame *f, const pw_plot_stroke *s, pw_plot_line_function *out, void *context) {
+  double at[PLOT_VERTICES][2];
+  for (int k = 0; k < s->count; k++) symbol_vertex (f, s->at[k], at[k]);
+  if (s->count) out (context, at, s->count, s->closed);
+}
+
+/* Hatching from x0 to x1 of a line below `at`. */
+static void symbol_hatch (symbol_frame f, double x0, double x1, double y, pw_plot_line_function *out, void *context) {
+  pw_plot_stroke s = { .count = 2 };
+  f.low = x0, f.high = x1;
+  int strokes = (int)fmin (60, ceil ((x1 - x0) / (0.6 * f.unit)));
+  for (int k = 0; k < strokes; k++) {
+    double x = (x0 + (x1 - x0) * (k + 0.5) / strokes) / f.unit;
+    memcpy (s.at[0], (const double[]){ 1, x + 0.25, y, 0 }, sizeof *s.at);
+    memcpy (s.at[1], (const double[]){ 1, x - 0.25, y - 0.5, 0 }, sizeof *s.at);
+    symbol_stroke (&f, &s, out, context);
+  }
+}
+
+/* A rail on the ground, or a support of a joint on the ground. */
+static void symbol_ground (symbol_frame f, const pw_plot_link *link, pw_plot_line_function *out, void *context) {
+  static const pw_plot_stroke support = {
+    6, 0, { { 1, 1.1, -1.5 }, { 1, .8, -1.5 }, { 1, 0, 0 }, { 1, -.8, -1.5 }, { 1, -1.1, -1.5 }, { 1, 1.1, -1.5 } }
+  };
+  if (pw_plot_line (link)) {
+    symbol_hatch (f, f.low, f.high, strstr (link->kind->symbol, "1 -inf -") ? -.4 : 0, out, context);
+    return;
+  }
+  if (link->end[0].body < 0) f.d[0] = f.d[1] = 0;
+  f.e[0] = 1, f.e[1] = 0;
+  symbol_stroke (&f, &support, out, context);
+  symbol_hatch (f, -1.1 * f.unit, 1.1 * f.unit, -1.5, out, context);
+}
+
+void pw_plot_draw_symbol (const pw_plots *p, int i, const pw_plot_link *link, int samples, pw_plot_line_function *out,
+                          void *context) {
+  const symbol_frame f = symbol_travel (p, i, link, samples);
+  pw_plot_stroke s;
+  if (link->end[link->ends - 1].body < 0 || link->end[0].body < 0) symbol_ground (f, link, out, context);
+  for (const char *text = link->kind->symbol; pw_plot_symbol (link, &text, &s);) symbol_stroke (&f, &s, out, context);
+}
