@@ -189,7 +189,7 @@ $(BUILD)/obj/core/cli/page/page.inc: core/cli/page/page.html core/cli/page/page.
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const $$(basename $$f | tr .- __)[] = {"; $(AS_STRINGS) $$f; echo 'NULL };'; done >$@
 
-$(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp)
+$(BUILD)/obj/core/cli/plot/templates.inc: $(wildcard core/cli/plot/*.gp core/cli/plot/templates/*.gp)
 	@mkdir -p $(@D)
 	@for f in $^; do echo "static const char *const figure_$$(basename $$f .gp | tr - _)[] = {"; \
 	  $(AS_STRINGS) $$f; echo 'NULL };'; done >$@

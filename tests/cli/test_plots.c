@@ -79,12 +79,12 @@ static void test_outline (void **state) {
                            "  - {marker: g, body: bar, at: [-2, -1]}\n  - {marker: h, body: bar, at: [1, 0.5]}\n");
   plots_write ("@/plate.yaml --t-end 1 --animate @/plate.html");
   const char *data = cli_file ("written/mechanism.dat");
-  const char *drawn = "-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n-1 -1 0\n\n0 0 0\n0.5 0.2 0\n\n"
-                      "9 0 0\n11 1 0\n\n9 0 0\n7 -1 0\n\n9 0 0\n10 0.5 0\n\n";
+  const char *drawn = "nan nan nan nan\n\n-1 -1 0 1\n1 -1 0 1\n1 1 0 1\n-1 1 0 1\n-1 -1 0 1\n\n0 0 0 1\n0.5 0.2 0 1\n\n"
+                      "9 0 0 2\n11 1 0 2\n\n9 0 0 2\n7 -1 0 2\n\n9 0 0 2\n10 0.5 0 2\n\n";
   assert_int_equal (strncmp (strchr (data, '\n') + 1, drawn, strlen (drawn)), 0);
   const char *page = cli_file ("plate.html");
-  assert_non_null (strstr (page, "spokes:[[0.5,0.2]],outline:[[-1,-1],[1,-1],[1,1],[-1,1]]}"));
-  assert_non_null (strstr (page, "outline:[]}"));
+  assert_non_null (strstr (page, "\"spokes\":[[0.5,0.2]],\"outline\":[[-1,-1],[1,-1],[1,1],[-1,1]]}"));
+  assert_non_null (strstr (page, "\"outline\":[]}"));
 }
 
 /* What gnuplot says when it fails is passed on. */
@@ -166,7 +166,7 @@ static void test_style (void **state) {
   cli_bad ("pinwheel run ezyroller --plots @/style --width 85", 2, "--width 85: expected a length such as 85mm");
   cli_bad ("pinwheel run ezyroller --plots @/style --width 1mm", 2, "--width 1mm: expected 50mm to 500mm");
   cli_bad ("pinwheel run ezyroller --plots @/style --colour red", 2, "--colour red: expected body or time");
-  cli_bad ("pinwheel compare ezyroller -o @/style --width xmm", 2, "--width");
+  cli_bad ("pinwheel compare ezyroller -o @/style --width xmm", 2, "--width: \"x\" is not a number");
 }
 
 static void test_refusals (void **state) {

@@ -163,7 +163,8 @@ static int optimise_read (pw_optimise *x, pw_error *error) {
 }
 
 static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_error *error) {
-  static const char *const figures[] = { "optimise.dat", "optimise.gp", "optimise.svg", "optimise.png", "optimise.pdf", NULL };
+  static const char *const figures[] = { "optimise.dat", "optimise.gp",  "optimise.svg",
+                                         "optimise.png", "optimise.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "-o", x->path, PW_WRITES, NULL },
                    { "--json", x->json_path, PW_WRITES, NULL },

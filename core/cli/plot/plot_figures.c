@@ -224,8 +224,7 @@ static int data_mechanism (const pw_plots *p, const pw_figures *f, const char *n
     int last = block >= PLOT_BLOCKS;
     fprintf (out, "%s# %s, %s: x [m], y [m], t [s], number of the body\nnan nan nan nan\n\n", block ? "\n\n" : "",
              title[block % PLOT_BLOCKS], last ? "at the end" : "before");
-    for (int i = last ? n - 1 : (n - 1) % stride; i < n - !last; i += stride)
-      data_block (out, p, i, block % PLOT_BLOCKS);
+    for (int i = last ? n - 1 : 0; i < n - !last; i += stride) data_block (out, p, i, block % PLOT_BLOCKS);
   }
   for (int closed = 0; closed < 2; closed++) {
     data_symbols x = { out, pw_plot_sample (p, n - 1)[PLOT_T], closed };
