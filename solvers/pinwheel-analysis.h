@@ -101,6 +101,79 @@ long pw_variation_evaluations (const pw_variation *x);
 
 void pw_variation_close (pw_variation *x);
 
+/* ---- Steady motions (steady.c) ---- */
+
+/* What can be held: a state, numbered as in pw_system_find_state; after these, of each body, the velocity of its centre
+ * of mass along its x axis (BODY.speed), the turning radius speed / omega (BODY.radius), positive to the left, and
+ * omega / speed (BODY.curvature).  Finds one by name; PW_INPUT and the error, with the nearest name. */
+int pw_system_find_held (const pw_system *s, const char *name, pw_error *error);
+/* Name, unit and value of one; the name as pw_system_state_name. */
+char *pw_system_held_name (const pw_system *s, int held, char *buffer, size_t size);
+const char *pw_system_held_unit (const pw_system *s, int held);
+double pw_system_held_value (const pw_system *s, int held, const double *q, const double *v);
+
+typedef struct {
+  const pw_initial_value *hold; /* what is held, numbered as in pw_system_find_held */
+  int holds;
+  double t;           /* time at which signals are evaluated [s] */
+  double span;        /* as in pw_settings */
+  double first, last; /* range of the parameter */
+  int vary;           /* the parameter is the value of this one of what is held; -1: it is that of `compile`, if any */
+  /* Compiles the system for a value of the parameter.  The search frees it.  NULL and the error: there is no
+   * system for this value.  May be NULL. */
+  pw_system *(*compile) (void *context, double value, pw_error *error);
+  void *context;
+  int points; /* in the range, at least; default 50 */
+} pw_steady_settings;
+
+/* What happens at a point of a branch. */
+typedef enum {
+  PW_STEADY_POINT,
+  PW_STEADY_FOLD,        /* the parameter has an extremum */
+  PW_STEADY_REAL,        /* a real eigenvalue changes its sign */
+  PW_STEADY_OSCILLATION, /* a conjugate pair crosses the imaginary axis (Hopf) */
+  PW_STEADY_END          /* the branch cannot be followed further */
+} pw_steady_event;
+
+/* A steady motion: velocities are those of a rigid displacement of the whole and of angles on which nothing depends, and
+ * accelerations vanish in the frame that moves with it.  Arrays are valid until the next call. */
+typedef struct {
+  double parameter;
+  const double *q, *v; /* pw_system_coordinates */
+  double residual;     /* the largest, in units of the scene: L, L/T, L/T^2 */
+  int iterations;
+  int family;   /* further quantities to hold to make it isolated, up to symmetries */
+  int unstable; /* growing modes */
+  pw_steady_event event;
+  const pw_linear *linear; /* NULL if it is not a solution */
+} pw_steady_motion;
+
+typedef struct pw_steady pw_steady;
+
+/* Opens a search.  The system must outlive it.  Errors: as pw_run_open.  Free it in every case. */
+pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error);
+void pw_steady_close (pw_steady *x);
+
+/* Newton's method at a value of the parameter, with corrections of least norm, from the initial state (attempt 0), a
+ * state to which forces lead from there (1), or a random one (2, 3, ...).  PW_RETRY, without an error, if it finds none: residual and state are where it ended.
+ * Errors: PW_INPUT if a parameter changes the number of coordinates; PW_RESOURCE; PW_METHOD. */
+int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error);
+/* Why the system could last not be evaluated during the search, or "". */
+const char *pw_steady_reason (const pw_steady *x);
+/* Number of symmetries: displacements of the whole, and angles on which nothing depends. */
+int pw_steady_symmetries (const pw_steady *x);
+/* Whether two states differ by symmetries only. */
+int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2);
+/* Quantities to hold so that the motion last returned becomes isolated, with their values there.  Returns their number,
+ * at most `most`, or a status; the motion stays in a family if they are not enough. */
+int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most);
+
+/* Follows the branch of a solution, initially towards the end of the range (direction 1) or its begin (-1); then returns
+ * its points, the first one included, and events in between, until PW_STEADY_END: at the end of the range, the start of
+ * a closed branch, or where Newton's method fails at the least step (then with the reason in the error). */
+int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction, pw_error *error);
+int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error);
+
 PW_END
 
 #endif

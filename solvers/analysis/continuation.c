@@ -8,10 +8,10 @@
 /* NEWTON_MOST: iterations of a solution, of a point of a branch.  BRANCH_TURN: cosine of the largest angle between the
  * tangents of successive points; BRANCH_APART: largest correction of a predictor, relative to the step. */
 enum { NEWTON_MOST = 60, BRANCH_MOST = 8, NEWTON_HALVINGS = 10, LOCATE_MOST = 60 };
-static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_GROW = 1.5;
+static const double BRANCH_TURN = 0.96, BRANCH_APART = 0.3, BRANCH_GROW = 1.5, NEWTON_DAMPING = 0.1;
 
 int pw_branch_open (pw_branch *b, const pw_branch_equations *of, pw_error *error) {
-  size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + 1, large = n > m ? n : m;
+  size_t n = (size_t)of->unknowns + 1, m = (size_t)of->equations + n, large = n > m ? n : m;
   *b = (pw_branch){ .of = *of, .room = (int)(8 * large + 200) };
   if (!(b->of.rank > 0)) b->of.rank = 1e-9;
   const pw_array array[] = {
@@ -55,14 +55,23 @@ static int branch_evaluate (pw_branch *b, const double *u, int derivatives, pw_e
   return b->of.evaluate (b->of.context, u, b->F, derivatives ? b->J : NULL, error);
 }
 
-/* du = the shortest least-squares solution of J du = right (equations) and c du = last, where c is a row over all n + 1
- * unknowns; without c, p is constant.  J is destroyed. */
-static int branch_linear (pw_branch *b, const double *right, const double *c, double last) {
-  int m = b->of.equations, n = b->of.unknowns + (c != NULL), rows = m + (c != NULL), large = rows > n ? rows : n;
-  for (int j = n - 1; c && j >= 0; j--) {
-    memmove (b->J + (size_t)j * (size_t)rows, b->J + (size_t)j * (size_t)m, (size_t)m * sizeof *b->J);
-    b->J[(size_t)j * (size_t)rows + (size_t)m] = c[j];
+/* Adds `extra` rows to J, 0 except for c in the first one or `diagonal` on the diagonal. */
+static void branch_extend (pw_branch *b, int n, int extra, const double *c, double diagonal) {
+  size_t m = (size_t)b->of.equations, rows = m + (size_t)extra;
+  for (size_t j = (size_t)n; j-- > 0;) {
+    double *column = b->J + j * rows;
+    memmove (column, b->J + j * m, m * sizeof *column);
+    memset (column + m, 0, (size_t)extra * sizeof *column);
+    column[m + (c ? 0 : j)] = c ? c[j] : diagonal;
   }
+}
+
+/* du = the shortest least-squares solution of J du = right (equations), and c du = last, where c is a row over all n + 1
+ * unknowns; without c, p is constant, and damping^2 |du|^2 is added to the squares.  J is destroyed. */
+static int branch_linear (pw_branch *b, const double *right, const double *c, double last, double damping) {
+  int m = b->of.equations, n = b->of.unknowns + (c != NULL), extra = c ? 1 : damping > 0 ? n : 0;
+  int rows = m + extra, large = rows > n ? rows : n;
+  if (extra) branch_extend (b, n, extra, c, damping);
   for (int i = 0; i < large; i++) b->du[i] = i < m ? right[i] : 0;
   if (c) b->du[m] = last;
   for (int i = 0; i < rows * n; i++)
@@ -90,8 +99,9 @@ static int branch_descend (pw_branch *b, double *u, pw_error *error) {
   return PW_RETRY;
 }
 
-/* Iterates at constant c u, or constant p.  Damped only without c: on a branch a short step is the better remedy. */
-static int branch_iterate (pw_branch *b, double *u, const double *c, pw_error *error) {
+/* Iterates at constant c u, or constant p, with steps shortened by `damping` in proportion to |F| (Levenberg &
+ * Marquardt), which leads to the nearest of solutions that are not isolated (Yamashita & Fukushima 2001).  Damped only without c: on a branch a short step is the better remedy. */
+static int branch_iterate (pw_branch *b, double *u, const double *c, double damping, pw_error *error) {
   int n = b->of.unknowns + 1, status;
   double before = INFINITY;
   for (b->iterations = 0;; b->iterations++) {
@@ -103,7 +113,7 @@ static int branch_iterate (pw_branch *b, double *u, const double *c, pw_error *e
     if (b->iterations >= (c ? BRANCH_MOST : NEWTON_MOST) || !isfinite (b->residual)) return PW_RETRY;
     before = b->residual;
     for (int i = 0; i < b->of.equations; i++) b->F[i] = -b->F[i];
-    status = branch_linear (b, b->F, c, 0);
+    status = branch_linear (b, b->F, c, 0, sqrt (damping * fmin (b->residual, 1)));
     if (status != PW_OK) return status;
     if (!c && b->residual > b->of.tolerance)
       status = branch_descend (b, u, error);
@@ -114,7 +124,12 @@ static int branch_iterate (pw_branch *b, double *u, const double *c, pw_error *e
 }
 
 int pw_branch_solve (pw_branch *b, double *u, pw_error *error) {
-  return branch_iterate (b, u, NULL, error);
+  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *u;
+  memcpy (b->next.u, u, bytes);
+  int status = branch_iterate (b, u, NULL, NEWTON_DAMPING, error);
+  if (status != PW_RETRY) return status;
+  memcpy (u, b->next.u, bytes);
+  return branch_iterate (b, u, NULL, 0, error);
 }
 
 /* ---- Branches ---- */
@@ -126,7 +141,7 @@ static int branch_tangent (pw_branch *b, const double *u, const double *c, doubl
   int status = branch_evaluate (b, u, 1, error);
   if (status != PW_OK) return status;
   memset (b->F, 0, (size_t)b->of.equations * sizeof *b->F);
-  status = branch_linear (b, b->F, c, 1);
+  status = branch_linear (b, b->F, c, 1, 0);
   if (status != PW_OK) return status;
   double norm = branch_norm (n, b->du);
   for (int j = 0; j < n; j++) tangent[j] = b->du[j] / norm, dot += b->du[j] * c[j];
@@ -148,7 +163,7 @@ static int branch_correct (pw_branch *b, const pw_branch_point *from, double h, 
   double away = 0;
   memcpy (b->condition, from->tangent, (size_t)n * sizeof *b->condition);
   for (int j = 0; j < n; j++) to->u[j] = from->u[j] + h * from->tangent[j];
-  int status = branch_iterate (b, to->u, b->condition, error);
+  int status = branch_iterate (b, to->u, b->condition, 0, error);
   if (status != PW_OK) return status;
   for (int j = 0; j < n; j++) away += pow (to->u[j] - from->u[j] - h * from->tangent[j], 2);
   if (sqrt (away) > BRANCH_APART * fabs (h)) return PW_RETRY;
@@ -189,28 +204,31 @@ int pw_branch_fold (void *context, const pw_branch_point *point, double *value, 
   return PW_OK;
 }
 
-/* The Illinois variant of regula falsi (Dowell & Jarratt 1971). */
+static void branch_copy (const pw_branch *b, const pw_branch_point *from, pw_branch_point *to) {
+  size_t bytes = ((size_t)b->of.unknowns + 1) * sizeof *from->u;
+  memcpy (to->u, from->u, bytes);
+  memcpy (to->tangent, from->tangent, bytes);
+}
+
+/* The Illinois variant of regula falsi (Dowell & Jarratt 1971), every fourth step a bisection. */
 int pw_branch_locate (pw_branch *b,
                       int (*test) (void *context, const pw_branch_point *point, double *value, pw_error *error),
                       void *context, double accuracy, pw_branch_point *point, pw_error *error) {
-  double s0 = 0, s1 = 1, f0, f1, f, s;
-  int status = test (context, &b->before, &f0, error), side = 0;
-  if (status == PW_OK) status = test (context, &b->at, &f1, error);
-  for (int i = 0; i < LOCATE_MOST && status == PW_OK && (i == 0 || fabs (s1 - s0) > accuracy); i++) {
-    s = f1 != f0 && isfinite (f1 - f0) ? s1 - f1 * (s1 - s0) / (f1 - f0) : (s0 + s1) / 2;
-    if (i % 4 == 3) s = (s0 + s1) / 2;
-    status = pw_branch_between (b, s, point, error);
-    if (status == PW_OK) status = test (context, point, &f, error);
-    if (status != PW_OK || f == 0) break;
-    if ((f > 0) == (f1 > 0)) {
-      s1 = s, f1 = f;
-      if (side == 1) f0 /= 2;
-      side = 1;
-    } else {
-      s0 = s, f0 = f;
-      if (side == -1) f1 /= 2;
-      side = -1;
-    }
+  double s[2] = { 0, 1 }, f[2], middle, value;
+  int status = test (context, &b->before, &f[0], error), last = -1;
+  if (status == PW_OK) status = test (context, &b->at, &f[1], error);
+  if (status != PW_OK) return status;
+  branch_copy (b, fabs (f[0]) < fabs (f[1]) ? &b->before : &b->at, point);
+  for (int i = 0; i < LOCATE_MOST && s[1] - s[0] > accuracy; i++) {
+    middle = f[1] != f[0] && i % 4 < 3 ? s[1] - f[1] * (s[1] - s[0]) / (f[1] - f[0]) : (s[0] + s[1]) / 2;
+    status = pw_branch_between (b, middle, &b->next, error);
+    if (status == PW_OK) status = test (context, &b->next, &value, error);
+    if (status != PW_OK) return status == PW_RETRY ? PW_OK : status;
+    branch_copy (b, &b->next, point);
+    if (value == 0) break;
+    int side = (value > 0) == (f[1] > 0);
+    if (side == last) f[!side] /= 2;
+    s[side] = middle, f[side] = value, last = side;
   }
-  return status;
+  return PW_OK;
 }

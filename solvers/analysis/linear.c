@@ -15,7 +15,7 @@ static void linear_unknown (pw_linearisation *x, int c) {
   pw_linear_coordinates (x, dv, x->da, x->size, x->A + c);
 }
 
-static int linear_open (pw_linearisation *x, int all) {
+static int linear_arrays (pw_linearisation *x) {
   size_t n = (size_t)x->n, m = (size_t)x->m, size = (size_t)x->size;
   const pw_array array[] = {
     { &x->a, n + 3 },
@@ -38,7 +38,7 @@ static int linear_open (pw_linearisation *x, int all) {
     { &x->left, x->modes ? size * size + size : 0 },
     { &x->top, 4 * size },
   };
-  x->memory = pw_alloc_arrays (array, all ? sizeof array / sizeof *array : 0);
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
   return x->memory ? PW_OK : PW_RESOURCE;
 }
 
@@ -78,10 +78,17 @@ static int linear_results (const pw_linearisation *x, pw_linear *l) {
   return PW_OK;
 }
 
+int pw_linear_open (pw_linearisation *x, pw_run *r, int modes, int most) {
+  *x = (pw_linearisation){ .r = r, .n = r->s->coords, .m = r->s->rows, .modes = modes };
+  int status = linear_rows (x);
+  if (status == PW_OK && x->n <= most) status = linear_arrays (x);
+  if (status == PW_OK && x->n <= most) status = pw_linear_derivatives (x);
+  return status;
+}
+
 /* The current state is evaluated last, so that the workspace is left there. */
 static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
   pw_run *r = x->r;
-  if (pw_linear_derivatives (x) != PW_OK) return PW_RESOURCE;
   int status = pw_linear_evaluate (x, r->t, r->q, r->v);
   if (status != PW_OK)
     return status > 0 ? pw_fail_singular (r, r->t, error) : pw_fail (error, PW_METHOD, "a signal failed");
@@ -99,16 +106,15 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
 }
 
 static int linear_run (pw_run *r, int most, int modes, pw_linear *l, pw_error *error) {
-  pw_linearisation x = { .r = r, .n = r->s->coords, .m = r->s->rows, .modes = modes };
+  pw_linearisation x;
   pw_statistics before = r->statistics;
-  int near = r->near, status = linear_rows (&x), all = x.n <= most;
+  int near = r->near, status = pw_linear_open (&x, r, modes, most);
   *l = (pw_linear){ .coordinates = x.n, .least = NAN };
   l->rank = x.rank;
   l->positions = x.positions;
   l->velocities = x.velocities;
   l->unknowns = x.size;
-  if (status == PW_OK) status = linear_open (&x, all);
-  if (status == PW_OK && all) status = linear_compute (&x, l, error);
+  if (status == PW_OK && x.n <= most) status = linear_compute (&x, l, error);
   pw_linear_close (&x);
   r->statistics = before;
   r->near = near;

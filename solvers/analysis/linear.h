@@ -57,7 +57,11 @@ typedef struct {
 /* Round-off of derivatives of moderate size, relative to them. */
 #define PW_LINEAR_SYMMETRIC 1e-9
 
-/* Frees its arrays. */
+/* ---- linear.c ---- */
+
+/* Opens a linearisation of the run's system; only counts if there are more than `most` coordinates.  PW_OK or PW_RESOURCE;
+ * close it in every case. */
+int pw_linear_open (pw_linearisation *x, pw_run *r, int modes, int most);
 void pw_linear_close (pw_linearisation *x);
 
 /* ---- linear_variation.c ---- */
@@ -96,6 +100,9 @@ int pw_linear_shapes (pw_linearisation *x, int k, pw_linear *l);
 
 /* Chooses the frame in which the accelerations of the evaluated state are smallest. */
 void pw_linear_choose_frame (pw_linearisation *x);
+/* The scaled residuals of G dq = 0 and J dv + B dq = 0 for the variation x: `holonomic` + `rank` numbers; y and J must be
+ * up to date.  Returns the end of the numbers. */
+double *pw_linear_violation (pw_linearisation *x, double *out);
 /* Number of rigid displacements of the whole (x, y, phi) under which the equations are invariant to first order; their
  * directions go to S. */
 int pw_linear_symmetries (pw_linearisation *x);

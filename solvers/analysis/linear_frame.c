@@ -77,8 +77,7 @@ static void linear_displace (pw_linearisation *x, int k) {
   if (k == 2) pw_linear_turn (x, 1, v, x->x + x->n);
 }
 
-/* The scaled residuals of G dq = 0 and J dv + B dq = 0 for the variation x; y and J must be up to date. */
-static double *linear_violation (pw_linearisation *x, double *out) {
+double *pw_linear_violation (pw_linearisation *x, double *out) {
   const pw_system *s = x->r->s;
   pw_mul_J (x->r->w, x->x, x->c);
   for (int k = 0; k < x->holonomic; k++) *out++ = x->c[x->row[k]] / x->norm[x->row[k]] / s->scale.length;
@@ -96,7 +95,7 @@ static void linear_change (pw_linearisation *x, int k, double *out) {
   linear_displace (x, k);
   pw_linear_vary (x);
   pw_linear_coordinates (x, dq, dv, 1, x->S + k * x->size);
-  out = linear_violation (x, out);
+  out = pw_linear_violation (x, out);
   if (k == 2) pw_linear_turn (x, -1, x->a, x->da);
   for (int j = 0; j < x->n; j++) out[j] = x->da[j] * pw_rank_unit (x->r->s, j) / linear_unit (x);
 }
@@ -178,7 +177,7 @@ static int linear_same (pw_linearisation *x, double time) {
   linear_rotate (x, angle, x->along, x->x);
   linear_rotate (x, angle, x->along + x->n, x->x + x->n);
   pw_linear_vary (x);
-  double *end = linear_violation (x, x->residual);
+  double *end = pw_linear_violation (x, x->residual);
   for (double *i = x->residual; i < end; i++)
     if (!(fabs (*i) <= LINEAR_STEADY)) return 0;
   linear_rotate (x, angle, x->response, expected);

@@ -114,6 +114,7 @@ static void test_drift (void **state) {
   (void)state;
   faults_most = 30;
   faults_from (":", "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods -o @/o");
+  faults_from (":", "steady n-trailer --starts 0 -o @/o");
 }
 
 static void test_reading (void **state) {

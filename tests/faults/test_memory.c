@@ -221,6 +221,7 @@ static void test_studies (void **state) {
   (void)state;
   memory_each (0, "sweep ezyroller --vary a=0.5,0.6 --t-end 0.01 --step 0.01 --jobs 1 -o @/o/a.csv");
   memory_each (0, "drift ezyroller --t-end 0.1 --methods rk4+none --only-methods -o @/o");
+  memory_each (0, "steady n-trailer --starts 0 -o @/o");
   memory_each (0, "compare pendulum --t-end 0.01 --methods rk4 --step-ladder 0.01:0.005 -o @/o");
 }
 

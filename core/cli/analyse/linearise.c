@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include "held.h"
 #include "linearise.h"
 #include "progress.h"
 #include "report.h"
@@ -66,6 +67,37 @@ static int linearise_advance (pw_linearise *x, pw_error *error) {
   return status == PW_STOPPED ? pw_limit_fail (&x->limit, pw_run_time (x->r), error) : status;
 }
 
+/* Finds the steady motion nearest to the initial state. */
+static int linearise_seek (pw_linearise *x, pw_steady *steady, pw_error *error) {
+  int n = pw_system_coordinates (x->m.system);
+  pw_steady_motion m;
+  int status = steady ? pw_steady_solve (steady, 0, 0, &m, error) : error->status;
+  if (status == PW_RETRY) status = pw_steady_solve (steady, 1, 0, &m, error);
+  if (status == PW_RETRY)
+    return pw_fail (error, PW_METHOD,
+                    "%s: no steady motion near the initial state: the residual ends at %.2g, in units of the scene; "
+                    "`pinwheel steady` also begins at random states",
+                    pw_file_name (x->m.file), m.residual);
+  if (status != PW_OK) return status;
+  x->initial = malloc (2 * (size_t)n * sizeof *x->initial);
+  if (x->initial == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (int i = 0; i < 2 * n; i++) x->initial[i] = (pw_initial_value){ i, i < n ? m.q[i] : m.v[i - n] };
+  return PW_OK;
+}
+
+static int linearise_steady (pw_linearise *x, double span, pw_error *error) {
+  pw_initial_value hold[PW_HOLDS];
+  pw_steady_settings set = { .hold = hold, .t = x->t, .span = span, .vary = -1 };
+  int status = PW_OK;
+  for (const char **text = x->hold_texts; status == PW_OK && text && *text; text++)
+    status = pw_hold_read (x->m.system, "--hold", *text, hold, &set.holds, error);
+  if (status != PW_OK) return status;
+  pw_steady *steady = pw_steady_open (x->m.system, &set, error);
+  status = linearise_seek (x, steady, error);
+  pw_steady_close (steady);
+  return status;
+}
+
 /* A run by the model's method to the time; its state there is made consistent. */
 static int linearise_run (pw_linearise *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
@@ -74,9 +106,15 @@ static int linearise_run (pw_linearise *x, pw_error *error) {
   if (pw_cli_settings (&x->line, &d, &t_end, &settings, &x->limit, error) != PW_OK) return error->status;
   settings.span = fmax (t_end, x->t);
   pw_limit_start (&x->limit);
+  if (x->steady) {
+    if (linearise_steady (x, t_end, error) != PW_OK) return error->status;
+    settings.t = x->t;
+    settings.initial = x->initial;
+    settings.initials = 2 * pw_system_coordinates (x->m.system);
+  }
   x->r = pw_run_open (x->m.system, d.method, &settings, error);
   if (x->r == NULL) return error->status;
-  if (x->t == 0) return PW_OK;
+  if (x->t == 0 || x->steady) return PW_OK;
   int status = linearise_advance (x, error);
   return status == PW_OK ? pw_run_restart (x->r, NULL, NULL, error) : status;
 }
@@ -129,6 +167,7 @@ static int linearise_write (const pw_linearise *x, pw_output **file, pw_error *e
 static void linearise_close (pw_linearise *x) {
   pw_linear_free (&x->linear);
   if (x->r) pw_run_close (x->r);
+  free (x->initial);
   free (x->input);
   free (x->output);
   pw_cli_close_model (&x->m);
@@ -138,6 +177,7 @@ static int linearise_command (void *options, pw_error *error) {
   pw_linearise *x = options;
   pw_output *file[LINEARISE_FILES] = { NULL };
   int status = pw_cli_number ("--at", x->at, PW_NONNEGATIVE, &x->t, error);
+  if (status == PW_OK && x->hold_texts && !x->steady) status = pw_fail (error, PW_INPUT, "--hold needs --steady");
   if (status == PW_OK) status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = linearise_select (x, error);
   if (status == PW_OK) status = linearise_open_files (x, file, error);
@@ -155,6 +195,9 @@ static int linearise_command (void *options, pw_error *error) {
 static const struct poptOption linearise_options[] = {
   PW_OPTION_GROUP ("Linearisation"),
   PW_TEXT_OPTION (pw_linearise, at, "at", 0, "T", "At time T [s] of a run with the model's default method (default 0)"),
+  PW_FLAG_OPTION (pw_linearise, steady, "steady",
+                  "At the steady motion nearest to the initial state; --at is the time of its signals"),
+  PW_HOLD_OPTION (pw_linearise, hold_texts),
   PW_LIST_OPTION (pw_linearise, input_names, "input", 0, "SIGNAL",
                   "Input u: the signal of a force, ELEMENT or ELEMENT.FIELD; repeatable (default all)"),
   PW_LIST_OPTION (pw_linearise, output_names, "output", 0, "STATE",

@@ -7,11 +7,14 @@
 
 typedef struct {
   pw_cli_line line;
-  const char *at, *name;                    /* NAME of the files, or NULL */
+  const char *at, *name;   /* NAME of the files, or NULL */
+  const char **hold_texts; /* of --steady */
+  int steady;
   const char **input_names, **output_names; /* as given, ended by NULL; or NULL: all */
   pw_cli_model m;
   pw_run *r;
   double t;
+  pw_initial_value *initial; /* 2 coordinates: the steady motion; NULL: the model's initial state */
   pw_limit limit;
   pw_linear linear;
   int *input, *output; /* signals, states */

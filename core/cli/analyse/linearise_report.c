@@ -119,8 +119,8 @@ static void linearise_shapes (const pw_linearise *x) {
 void pw_linearise_print (const pw_linearise *x) {
   const pw_linear *l = &x->linear;
   char t[32], w[32], a[32];
-  printf ("%s at t = %s s: %d minimal coordinates, %d of positions and %d of velocities\n", pw_file_name (x->m.file),
-          pw_format (t, x->t, 9), l->unknowns, l->positions, l->velocities);
+  printf ("%s%s at t = %s s: %d minimal coordinates, %d of positions and %d of velocities\n", pw_file_name (x->m.file),
+          x->steady ? ", steady motion" : "", pw_format (t, x->t, 9), l->unknowns, l->positions, l->velocities);
   if (l->twist[2] != 0) printf ("The frame turns at %s rad/s\n", pw_format (w, l->twist[2], LINEARISE_DIGITS));
   if (l->steady == PW_ACCELERATED)
     printf ("Not steady: accelerations of %s m/s^2 in the co-moving frame", pw_format (a, l->acceleration, 3));

@@ -86,6 +86,7 @@ static const struct {
   { "optimise", { figure_look, figure_optimise } },
   { "drift", { figure_look, figure_methods, figure_drift } },
   { "sensitivity", { figure_look, figure_sensitivity } },
+  { "steady", { figure_look, figure_steady } },
 };
 
 /* The title for gnuplot's enhanced text: a capital first, special characters escaped. */

@@ -1,0 +1,365 @@
+/* pinwheel steady: steady motions, and their branches over a parameter. */
+#include "steady_report.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "figure.h"
+#include "held.h"
+#include "progress.h"
+#include "report.h"
+#include "util.h"
+
+enum { STEADY_STARTS = 30 };
+
+/* ---- What is held and varied ---- */
+
+static const pw_parameter *steady_parameter (const pw_steady_cli *x) {
+  const pw_parameter *p = pw_model_table (x->m.model)->parameters;
+  while (p && p->name && strcmp (p->name, x->parameter) != 0) p++;
+  return p && p->name ? p : NULL;
+}
+
+/* The system at a value of the parameter of the model. */
+static pw_system *steady_compile (void *context, double value, pw_error *error) {
+  pw_steady_cli *x = context;
+  pw_model *m = pw_file_model (x->m.file, error);
+  pw_system *s = NULL;
+  if (m && pw_cli_apply (m, "--set", x->line.sets, pw_model_set, error) == PW_OK &&
+      pw_model_set (m, x->parameter, value, error) == PW_OK &&
+      pw_cli_apply (m, "--start", x->line.starts, pw_model_set_initial, error) == PW_OK &&
+      pw_model_build (m, error) == PW_OK)
+    s = pw_system_compile (m, error);
+  pw_model_free (m);
+  return s;
+}
+
+static int steady_check_parameter (pw_steady_cli *x, const pw_parameter *p, pw_error *error) {
+  const double end[] = { x->set.first, x->set.last };
+  if (p->domain == PW_COUNT)
+    return pw_fail (error, PW_INPUT,
+                    "--vary %s: %s counts something and cannot vary continuously; use `pinwheel sweep`", x->vary_text,
+                    p->name);
+  for (int i = 0; i < 2; i++)
+    if (*pw_domain_check (p->domain, end[i]))
+      return pw_fail (error, PW_INPUT, "--vary %s: expected %s", x->vary_text, pw_domain_check (p->domain, end[i]));
+  for (const char **set = x->line.sets; set && *set; set++)
+    if (strncmp (*set, p->name, strlen (p->name)) == 0 && (*set)[strlen (p->name)] == '=')
+      return pw_fail (error, PW_INPUT, "%s is given by --vary and by --set", p->name);
+  x->unit = p->unit;
+  x->set.compile = steady_compile;
+  x->set.context = x;
+  return PW_OK;
+}
+
+/* NAME=FIRST:LAST, a parameter of the model or something held. */
+static int steady_vary (pw_steady_cli *x, pw_error *error) {
+  const char *equals = strchr (x->vary_text, '='), *colon = equals ? strchr (equals, ':') : NULL;
+  char first[100], hold[400];
+  if (colon == NULL || equals == x->vary_text || (size_t)(equals - x->vary_text) >= sizeof x->parameter ||
+      (size_t)(colon - equals) > sizeof first)
+    return pw_fail (error, PW_INPUT, "--vary %s: expected NAME=FIRST:LAST", x->vary_text);
+  snprintf (x->parameter, sizeof x->parameter, "%.*s", (int)(equals - x->vary_text), x->vary_text);
+  snprintf (first, sizeof first, "%.*s", (int)(colon - equals - 1), equals + 1);
+  if (pw_read_expression (first, &x->set.first) != PW_OK || pw_read_expression (colon + 1, &x->set.last) != PW_OK ||
+      !isfinite (x->set.last - x->set.first) || x->set.first == x->set.last)
+    return pw_fail (error, PW_INPUT, "--vary %s: expected two different numbers FIRST:LAST", x->vary_text);
+  const pw_parameter *p = steady_parameter (x);
+  if (p) return steady_check_parameter (x, p, error);
+  if (strchr (x->parameter, '.') == NULL) return pw_model_set (x->m.model, x->parameter, x->set.first, error);
+  snprintf (hold, sizeof hold, "%s=%s", x->parameter, first);
+  x->set.vary = x->set.holds;
+  int status = pw_hold_read (x->m.system, "--vary", hold, x->hold, &x->set.holds, error);
+  if (status == PW_OK) x->unit = pw_system_held_unit (x->m.system, x->hold[x->set.vary].state);
+  return status;
+}
+
+static int steady_options (pw_steady_cli *x, pw_error *error) {
+  double starts = STEADY_STARTS;
+  int status = pw_cli_number ("--at", x->at_text, PW_NONNEGATIVE, &x->set.t, error);
+  x->limit.most = INFINITY;
+  x->set.span = pw_cli_defaults (pw_file_table (x->m.file)).t_end;
+  x->set.vary = -1;
+  x->set.hold = x->hold = calloc (PW_HOLDS + 1, sizeof *x->hold);
+  if (x->hold == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) status = pw_cli_number ("--limit", x->line.limit, PW_POSITIVE, &x->limit.most, error);
+  if (status == PW_OK && x->starts_text && strcmp (x->starts_text, "0") == 0)
+    starts = 0;
+  else if (status == PW_OK)
+    status = pw_cli_number ("--starts", x->starts_text, PW_COUNT, &starts, error);
+  for (const char **text = x->hold_texts; status == PW_OK && text && *text; text++)
+    status = pw_hold_read (x->m.system, "--hold", *text, x->hold, &x->set.holds, error);
+  if (status == PW_OK && x->vary_text) status = steady_vary (x, error);
+  x->attempts = (int)starts;
+  x->given = x->set.holds;
+  return status;
+}
+
+/* ---- Points ---- */
+
+static pw_steady_point *steady_add (pw_steady_cli *x, const pw_steady_motion *m, int attempt, pw_error *error) {
+  size_t states = 2 * (size_t)pw_system_coordinates (x->m.system), n = (size_t)m->linear->unknowns;
+  if (x->points == x->room) {
+    int room = 2 * x->room + 64;
+    pw_steady_point *more = realloc (x->point, (size_t)room * sizeof *more);
+    if (more == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
+    x->point = more, x->room = room;
+  }
+  pw_steady_point *p = x->point + x->points;
+  *p = (pw_steady_point){ .branch = x->branches,
+                          .attempt = attempt,
+                          .iterations = m->iterations,
+                          .family = m->family,
+                          .unstable = m->unstable,
+                          .event = m->event,
+                          .parameter = m->parameter,
+                          .residual = m->residual,
+                          .unknowns = m->linear->unknowns,
+                          .state = malloc ((states + 2 * n) * sizeof (double) + n) };
+  if (p->state == NULL) return pw_fail (error, PW_RESOURCE, "out of memory"), NULL;
+  p->re = p->state + states, p->im = p->re + n, p->rigid = (unsigned char *)(p->im + n);
+  memcpy (p->state, m->q, states / 2 * sizeof *m->q);
+  memcpy (p->state + states / 2, m->v, states / 2 * sizeof *m->v);
+  memcpy (p->re, m->linear->re, n * sizeof *p->re);
+  memcpy (p->im, m->linear->im, n * sizeof *p->im);
+  memcpy (p->rigid, m->linear->rigid, n);
+  memcpy (p->twist, m->linear->twist, sizeof p->twist);
+  x->points++;
+  return p;
+}
+
+/* What else to hold to select the motion last found within its family. */
+static int steady_advise (pw_steady_cli *x, pw_steady_point *p, pw_error *error) {
+  pw_initial_value hold[PW_HOLDS];
+  char name[300], value[32];
+  size_t used = 0;
+  int count = p->family > 0 ? pw_steady_suggest (x->steady, hold, PW_HOLDS) : 0;
+  for (int i = 0; i < count && used < sizeof p->advice; i++)
+    used += (size_t)snprintf (p->advice + used, sizeof p->advice - used, " --hold %s=%s",
+                              pw_system_held_name (x->m.system, hold[i].state, name, sizeof name),
+                              pw_format (value, hold[i].value, 9));
+  return count < 0 ? pw_fail (error, count, "%s: out of memory", pw_file_name (x->m.file)) : PW_OK;
+}
+
+static int steady_same (const pw_steady_cli *x, const pw_steady_point *p, const pw_steady_motion *m) {
+  int n = pw_system_coordinates (x->m.system);
+  return fabs (p->parameter - m->parameter) <= 1e-9 * fabs (m->parameter) &&
+         pw_steady_same (x->steady, p->state, p->state + n, m->q, m->v);
+}
+
+static int steady_stop (pw_steady_cli *x) {
+  return x->stopped |= pw_limit_over (&x->limit) != 0;
+}
+
+/* ---- The search ---- */
+
+/* Adds a solution that differs from those found; of each sort of families only one. */
+static int steady_found (pw_steady_cli *x, const pw_steady_motion *m, int attempt, pw_error *error) {
+  if (m->linear->steady == PW_CHANGING) return x->changing++, PW_OK;
+  for (int i = 0; i < x->points; i++) {
+    const pw_steady_point *p = x->point + i;
+    if (m->family > 0 && p->family == m->family && p->unstable == m->unstable) return PW_OK;
+    if (steady_same (x, p, m)) return PW_OK;
+  }
+  if (!pw_steady_varies (x)) x->branches++;
+  pw_steady_point *p = steady_add (x, m, attempt, error);
+  return p ? steady_advise (x, p, error) : PW_RESOURCE;
+}
+
+/* Solutions at a value of the parameter; that from the initial state is the first. */
+static int steady_search (pw_steady_cli *x, double parameter, pw_error *error) {
+  pw_progress progress;
+  pw_steady_motion m;
+  int status = PW_OK;
+  pw_progress_count (&progress, pw_file_name (x->m.file), "starts", 0, x->attempts + 2);
+  for (int k = 0; status == PW_OK && k <= x->attempts + 1 && !steady_stop (x); k++) {
+    status = pw_steady_solve (x->steady, k, parameter, &m, error);
+    if (status == PW_OK) status = steady_found (x, &m, k, error);
+    if (status == PW_RETRY || (status == PW_METHOD && k > 0)) {
+      x->nearest[k > 1] = fmin (x->nearest[k > 1], m.residual);
+      *error = (pw_error){ 0 };
+      status = PW_OK;
+    }
+    pw_progress_at (&progress, k + 1);
+  }
+  pw_progress_end (&progress);
+  return status;
+}
+
+static int steady_fail (pw_steady_cli *x, pw_error *error) {
+  char initial[60], random[100] = "", reason[300] = "";
+  if (x->changing)
+    return pw_fail (error, PW_INPUT,
+                    "%s: the equations change with time or along the motion: there is no steady motion",
+                    pw_file_name (x->m.file));
+  snprintf (initial, sizeof initial, "from the initial state the residual ends at %.2g", x->nearest[0]);
+  if (x->attempts)
+    snprintf (random, sizeof random, ", from %d random ones at %.2g at best", x->attempts, x->nearest[1]);
+  if (*pw_steady_reason (x->steady)) snprintf (reason, sizeof reason, "; %s", pw_steady_reason (x->steady));
+  return pw_fail (error, PW_METHOD,
+                  "%s: no steady motion found: %s%s, in units of the scene (L, L/T, L/T^2)%s; change what is held, or "
+                  "begin nearer to one (--start)",
+                  pw_file_name (x->m.file), initial, random, reason);
+}
+
+/* ---- Branches ---- */
+
+static int steady_branch (pw_steady_cli *x, const pw_steady_point *from, int direction, pw_error *error) {
+  int n = pw_system_coordinates (x->m.system), status;
+  double *state = malloc (2 * (size_t)n * sizeof *state);
+  pw_steady_end *more = realloc (x->end, ((size_t)x->branches + 1) * sizeof *more);
+  if (more) x->end = more;
+  if (state == NULL || more == NULL) return free (state), pw_fail (error, PW_RESOURCE, "out of memory");
+  pw_steady_motion m = { 0 };
+  int attempt = from->attempt;
+  memcpy (state, from->state, 2 * (size_t)n * sizeof *state);
+  *x->end[x->branches++].reason = 0;
+  status = pw_steady_follow (x->steady, state, state + n, from->parameter, direction, error);
+  while (status == PW_OK && !steady_stop (x)) {
+    status = pw_steady_next (x->steady, &m, error);
+    if (status != PW_OK || m.event == PW_STEADY_END) break;
+    if (steady_add (x, &m, attempt, error) == NULL) status = PW_RESOURCE;
+  }
+  free (state);
+  if (status == PW_METHOD) {
+    snprintf (x->end[x->branches - 1].reason, sizeof x->end->reason, "%.199s", error->text);
+    *error = (pw_error){ 0 };
+    return PW_OK;
+  }
+  snprintf (x->end[x->branches - 1].reason, sizeof x->end->reason, "%.199s", pw_steady_reason (x->steady));
+  return status;
+}
+
+/* Follows the solutions at one end of the range that are on no branch yet. */
+static int steady_from (pw_steady_cli *x, double parameter, int direction, pw_error *error) {
+  int known = x->points, status = steady_search (x, parameter, error), found = x->points - known;
+  if (status < 0 && status != PW_RESOURCE && x->branches > 0) {
+    pw_cli_say ("pinwheel: no branches sought from the other end: %s\n", error->text);
+    *error = (pw_error){ 0 };
+    return PW_OK;
+  }
+  pw_steady_point *start = malloc (((size_t)found + 1) * sizeof *start);
+  if (start == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
+  if (found) memcpy (start, x->point + known, (size_t)found * sizeof *start);
+  x->points = known;
+  for (int i = 0; i < found; i++) {
+    pw_steady_motion m = { .parameter = parameter, .q = start[i].state };
+    int seen = 0;
+    m.v = m.q + pw_system_coordinates (x->m.system);
+    for (int k = 0; k < x->points; k++) seen |= steady_same (x, x->point + k, &m);
+    if (status == PW_OK && !seen && !x->stopped) status = steady_branch (x, start + i, direction, error);
+    free (start[i].state);
+  }
+  free (start);
+  return status;
+}
+
+/* Without enough held, the branch has the values of the motion nearest to the initial state. */
+static int steady_complete (pw_steady_cli *x, pw_error *error) {
+  const pw_system *s = x->m.system;
+  pw_steady_motion m;
+  char name[300], value[32];
+  double parameter = x->set.first;
+  if (x->set.vary >= 0)
+    parameter = pw_system_held_value (s, x->hold[x->set.vary].state, pw_system_initial_q (s), pw_system_initial_v (s));
+  int status = pw_steady_solve (x->steady, 0, isfinite (parameter) ? parameter : x->set.first, &m, error);
+  if (status == PW_RETRY || (status == PW_OK && m.family == 0)) return PW_OK;
+  if (status != PW_OK) return status;
+  int more = pw_steady_suggest (x->steady, x->hold + x->set.holds, PW_HOLDS - x->set.holds);
+  if (more < 0) return pw_fail (error, more, "%s: out of memory", pw_file_name (x->m.file));
+  for (int i = x->set.holds; i < x->set.holds + more; i++)
+    pw_cli_say ("pinwheel: holding %s=%s, as in the motion nearest to the initial state\n",
+                pw_system_held_name (s, x->hold[i].state, name, sizeof name), pw_format (value, x->hold[i].value, 9));
+  x->set.holds += more;
+  pw_steady_close (x->steady);
+  x->steady = pw_steady_open (x->m.system, &x->set, error);
+  return x->steady ? PW_OK : error->status;
+}
+
+/* ---- The command ---- */
+
+static int steady_compute (pw_steady_cli *x, pw_error *error) {
+  x->nearest[0] = x->nearest[1] = INFINITY;
+  pw_limit_start (&x->limit);
+  x->steady = pw_steady_open (x->m.system, &x->set, error);
+  if (x->steady == NULL) return error->status;
+  pw_stop_catch ();
+  int status = PW_OK;
+  if (pw_steady_varies (x)) {
+    status = steady_complete (x, error);
+    if (status == PW_OK) status = steady_from (x, x->set.first, 1, error);
+    if (status == PW_OK && !x->stopped) status = steady_from (x, x->set.last, -1, error);
+  } else
+    status = steady_search (x, 0, error);
+  x->interrupted = pw_stop > 0;
+  pw_stop_release ();
+  if (status == PW_OK && x->points == 0 && !x->stopped) status = steady_fail (x, error);
+  return status;
+}
+
+static int steady_folder (const pw_steady_cli *x, int *lock, pw_error *error) {
+  static const char *const names[] = { "steady.csv", "steady.json", "steady.dat", "steady.gp",
+                                       "steady.svg", "steady.png",  NULL };
+  pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
+  if (x->folder == NULL) return PW_OK;
+  if (pw_cli_uses (&x->line, x->m.file, use, 2, error) != PW_OK) return error->status;
+  *lock = pw_figure_folder (x->folder, error);
+  return *lock < 0 ? error->status : PW_OK;
+}
+
+static void steady_close (pw_steady_cli *x, int lock) {
+  if (lock >= 0) close (lock);
+  for (int i = 0; i < x->points; i++) free (x->point[i].state);
+  free (x->point);
+  free (x->end);
+  free (x->hold);
+  pw_steady_close (x->steady);
+  pw_cli_close_model (&x->m);
+}
+
+static int steady_command (void *options, pw_error *error) {
+  pw_steady_cli *x = options;
+  int lock = -1, status = pw_cli_open (&x->m, &x->line, error);
+  if (status == PW_OK) status = steady_options (x, error);
+  if (status == PW_OK) status = steady_folder (x, &lock, error);
+  if (status == PW_OK) pw_report_model (x->m.model);
+  if (status == PW_OK) status = steady_compute (x, error);
+  if (status == PW_OK && x->points) pw_steady_print (x);
+  if (status == PW_OK && x->points && x->folder) status = pw_steady_write (x, error);
+  int stopped = x->stopped, interrupted = x->interrupted;
+  steady_close (x, lock);
+  if (status != PW_OK || !stopped) return status;
+  if (!interrupted) return pw_fail (error, PW_METHOD, "--limit %s: stopped; results are incomplete", x->line.limit);
+  pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
+  return PW_INTERRUPTED;
+}
+
+static const struct poptOption steady_options_table[] = {
+  PW_OPTION_GROUP ("Steady motions"),
+  PW_HOLD_OPTION (pw_steady_cli, hold_texts),
+  PW_TEXT_OPTION (pw_steady_cli, vary_text, "vary", 0, "NAME=FIRST:LAST",
+                  "Follow branches over a parameter of the model, or of a held value such as BODY.speed"),
+  PW_TEXT_OPTION (pw_steady_cli, starts_text, "starts", 0, "N",
+                  "Begin at the initial state and at N random ones (default 30)"),
+  PW_TEXT_OPTION (pw_steady_cli, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
+  PW_TEXT_OPTION (pw_steady_cli, folder, "output", 'o', "DIR",
+                  "Write steady.csv, steady.json and, with --vary, figures into a folder"),
+  PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop after this much processor time (default unlimited)"),
+  PW_MODEL_OPTIONS,
+  POPT_TABLEEND
+};
+
+const pw_command pw_cli_steady = {
+  .name = "steady",
+  .synopsis = "MODEL [OPTION...]",
+  .summary = "find steady motions, and follow them over a parameter",
+  .help =
+      "Find steady motions, in which every body moves with one frame at constant speed and angular velocity, and "
+      "equilibria; with --vary, follow them over a parameter, through folds, with eigenvalues and the values at which "
+      "stability changes.",
+  .least = 1,
+  .most = 1,
+  .size = sizeof (pw_steady_cli),
+  .function = steady_command,
+  .options = steady_options_table,
+};

@@ -1,0 +1,317 @@
+/* The reports of `pinwheel steady`. */
+#include "steady_report.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "figure.h"
+#include "print_table.h"
+#include "text.h"
+
+enum { STEADY_DIGITS = 6, STEADY_SHOWN = 12, STEADY_CONFIGURATIONS = 3, STEADY_BODIES = 20, STEADY_EVENTS = 40 };
+static const double STEADY_SMALL = 1e-12; /* shown as 0 */
+
+const char *const pw_steady_events[] = { "point", "fold", "zero eigenvalue", "Hopf" };
+
+/* ---- Text ---- */
+
+/* A number, 0 for round-off. */
+static void steady_number (pw_table *t, double value) {
+  pw_cell_number (t, 12, fabs (value) < STEADY_SMALL ? 0 : value, STEADY_DIGITS);
+}
+
+/* Real part and frequency of the rightmost eigenvalue, of events of that which crosses the imaginary axis. */
+static void steady_rightmost (pw_table *t, const pw_steady_point *p) {
+  int best = -1, crossing = p->event != PW_STEADY_POINT;
+  for (int i = 0; i < p->unknowns; i++) {
+    if (p->rigid[i] || (!crossing && p->re[i] == 0 && p->im[i] == 0)) continue;
+    if ((p->im[i] != 0) != (p->event == PW_STEADY_OSCILLATION) && crossing) continue;
+    if (best < 0 || (crossing && fabs (p->re[i]) < fabs (p->re[best]))) best = i;
+  }
+  double im = best < 0 ? NAN : fabs (p->im[best]);
+  steady_number (t, best < 0 ? NAN : crossing ? round (p->re[best] * 1e8) / 1e8 + 0 : p->re[best]);
+  steady_number (t, im > 0 ? im / (2 * PW_PI) : NAN);
+}
+
+static double steady_held (const pw_steady_cli *x, const pw_steady_point *p, const char *quantity) {
+  char name[300];
+  pw_error none = { 0 };
+  const pw_system *s = x->m.system;
+  snprintf (name, sizeof name, "%s.%s", pw_system_body_name (s, 0), quantity);
+  int held = pw_system_find_held (s, name, &none);
+  return held < 0 ? NAN : pw_system_held_value (s, held, p->state, p->state + pw_system_coordinates (s));
+}
+
+static void steady_cell_name (pw_table *t, const pw_steady_cli *x, const char *quantity, const char *unit) {
+  char name[300];
+  snprintf (name, sizeof name, "%s.%s", pw_system_body_name (x->m.system, 0), quantity);
+  pw_cell_unit (t, 12, name, unit);
+}
+
+/* A row for each motion. */
+static void steady_motions (const pw_steady_cli *x) {
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_cell (&t, 6, "motion");
+    steady_cell_name (&t, x, "speed", "m/s");
+    steady_cell_name (&t, x, "omega", "rad/s");
+    for (int k = 0; k < 5; k++)
+      pw_cell (&t, 7, (const char *[]){ "family", "growing", "rightmost [1/s]", "frequency [Hz]", "residual" }[k]);
+    pw_row_end (&t);
+    for (int i = 0; i < x->points && i < STEADY_SHOWN; i++) {
+      const pw_steady_point *p = x->point + i;
+      pw_cell_number (&t, 6, i + 1, 6);
+      steady_number (&t, steady_held (x, p, "speed"));
+      steady_number (&t, steady_held (x, p, "omega"));
+      pw_cell_number (&t, 7, p->family, 6);
+      pw_cell_number (&t, 7, p->unstable, 6);
+      steady_rightmost (&t, p);
+      pw_cell_number (&t, 8, p->residual, 2);
+      pw_row_end (&t);
+    }
+  }
+  if (x->points > STEADY_SHOWN) printf ("  and %d more, see -o DIR\n", x->points - STEADY_SHOWN);
+}
+
+static void steady_configuration (const pw_steady_cli *x, int i) {
+  const pw_system *s = x->m.system;
+  const double *state = x->point[i].state;
+  int bodies = pw_system_bodies (s), n = pw_system_coordinates (s);
+  printf ("\nMotion %d, found from %s\n", i + 1, x->point[i].attempt > 1 ? "a random state" : "the initial state");
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    static const char *const head[] = { "", "x [m]", "y [m]", "phi [rad]", "vx [m/s]", "vy [m/s]", "omega [rad/s]" };
+    for (int k = 0; k < 7; k++) pw_cell (&t, k ? 12 : -12, head[k]);
+    pw_row_end (&t);
+    for (int b = 0; b < bodies && b < STEADY_BODIES; b++) {
+      pw_cell (&t, -12, pw_system_body_name (s, b));
+      for (int k = 0; k < 6; k++) steady_number (&t, state[k / 3 * n + 3 * b + k % 3]);
+      pw_row_end (&t);
+    }
+  }
+  if (bodies > STEADY_BODIES) printf ("  and %d more bodies\n", bodies - STEADY_BODIES);
+}
+
+/* A row for the ends of each branch and each event, of which only the first ones are shown. */
+static void steady_branches (const pw_steady_cli *x) {
+  int events = 0;
+  for (pw_table t = { 0 }; pw_table_pass (&t);) {
+    pw_cell (&t, 6, "branch");
+    pw_cell (&t, -15, "event");
+    *x->unit ? pw_cell_unit (&t, 12, x->parameter, x->unit) : pw_cell (&t, 12, x->parameter);
+    events = 0;
+    for (int k = 0; k < 3; k++) pw_cell (&t, 7, (const char *[]){ "growing", "rightmost [1/s]", "frequency [Hz]" }[k]);
+    pw_row_end (&t);
+    for (const pw_steady_point *p = x->point; p < x->point + x->points; p++) {
+      int first = p == x->point || p[-1].branch != p->branch,
+          last = p == x->point + x->points - 1 || p[1].branch != p->branch;
+      if (!first && !last && (p->event == PW_STEADY_POINT || ++events > STEADY_EVENTS)) continue;
+      pw_cell_number (&t, 6, p->branch, 6);
+      pw_cell (&t, -15, first ? "begins" : p->event != PW_STEADY_POINT ? pw_steady_events[p->event] : "ends");
+      pw_cell_number (&t, 12, p->parameter, 9);
+      pw_cell_number (&t, 7, p->unstable, 6);
+      steady_rightmost (&t, p);
+      pw_row_end (&t);
+    }
+  }
+  if (events > STEADY_EVENTS) printf ("and %d more events, see -o DIR\n", events - STEADY_EVENTS);
+  for (int i = 0; i < x->branches; i++)
+    if (*x->end[i].reason) printf ("Branch %d ends: %s\n", i + 1, x->end[i].reason);
+}
+
+void pw_steady_print (const pw_steady_cli *x) {
+  char first[32], last[32];
+  const char *model = pw_file_name (x->m.file);
+  if (pw_steady_varies (x)) {
+    printf ("%s: %d %s of steady motions, %s from %s to %s, %d symmetries\n\n", model, x->branches,
+            x->branches == 1 ? "branch" : "branches", x->parameter, pw_format (first, x->set.first, 9),
+            pw_format (last, x->set.last, 9), pw_steady_symmetries (x->steady));
+    steady_branches (x);
+    return;
+  }
+  printf ("%s: %d steady %s, apart from %d symmetries, from the initial state and %d random ones\n\n", model, x->points,
+          x->points == 1 ? "motion" : "motions", pw_steady_symmetries (x->steady), x->attempts);
+  steady_motions (x);
+  for (int i = 0; i < x->points && i < STEADY_CONFIGURATIONS; i++) steady_configuration (x, i);
+  for (int i = 0; i < x->points && i < STEADY_SHOWN; i++)
+    if (*x->point[i].advice)
+      printf ("\nMotion %d is one of a family of dimension %d; to select one:%s\n", i + 1, x->point[i].family,
+              x->point[i].advice);
+}
+
+/* ---- JSON ---- */
+
+static void steady_eigenvalues_json (const pw_steady_point *p, pw_json *j) {
+  pw_json_open (j, "eigenvalues", '[');
+  for (int i = 0; i < p->unknowns; i++) {
+    pw_json_open (j, NULL, '{');
+    pw_json_number (j, "re", p->re[i]);
+    pw_json_number (j, "im", p->im[i]);
+    pw_json_number (j, "frequency_hz", fabs (p->im[i]) / (2 * PW_PI));
+    pw_json_flag (j, "rigid", p->rigid[i]);
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+}
+
+static void steady_point_json (const pw_steady_cli *x, const pw_steady_point *p, pw_json *j) {
+  const pw_system *s = x->m.system;
+  char name[300];
+  j->line = 1;
+  pw_json_open (j, NULL, '{');
+  pw_json_number (j, "branch", p->branch);
+  if (pw_steady_varies (x)) pw_json_text (j, "event", pw_steady_events[p->event]);
+  if (pw_steady_varies (x)) pw_json_number (j, "parameter", p->parameter);
+  pw_json_number (j, "attempt", p->attempt);
+  pw_json_number (j, "residual", p->residual);
+  if (!pw_steady_varies (x)) pw_json_number (j, "family", p->family);
+  pw_json_number (j, "growing", p->unstable);
+  pw_json_open (j, "twist", '[');
+  for (int i = 0; i < 3; i++) pw_json_number (j, NULL, p->twist[i]);
+  pw_json_close (j, ']');
+  pw_json_open (j, "state", '{');
+  for (int i = 0; i < 2 * pw_system_coordinates (s); i++)
+    pw_json_number (j, pw_system_state_name (s, i, name, sizeof name), p->state[i]);
+  pw_json_close (j, '}');
+  steady_eigenvalues_json (p, j);
+  pw_json_close (j, '}');
+}
+
+static void steady_json (const pw_steady_cli *x, pw_json *j) {
+  char name[300];
+  pw_json_open (j, NULL, '{');
+  pw_json_number (j, "schema", 1);
+  pw_json_text (j, "model", pw_file_name (x->m.file));
+  pw_json_text (j, "parameter", pw_steady_varies (x) ? x->parameter : NULL);
+  pw_json_text (j, "unit", x->unit);
+  pw_json_open (j, "held", '{');
+  for (int i = 0; i < x->set.holds; i++)
+    if (i != x->set.vary)
+      pw_json_number (j, pw_system_held_name (x->m.system, x->hold[i].state, name, sizeof name), x->hold[i].value);
+  pw_json_close (j, '}');
+  pw_json_number (j, "symmetries", pw_steady_symmetries (x->steady));
+  pw_json_number (j, "attempts", x->attempts + 2);
+  pw_json_flag (j, "complete", !x->stopped);
+  pw_json_open (j, "ends", '[');
+  for (int i = 0; pw_steady_varies (x) && i < x->branches; i++) pw_json_text (j, NULL, x->end[i].reason);
+  pw_json_close (j, ']');
+  j->line = 1;
+  pw_json_open (j, "motions", '[');
+  for (int i = 0; i < x->points; i++) steady_point_json (x, x->point + i, j);
+  pw_json_close (j, ']');
+  pw_json_close (j, '}');
+}
+
+/* ---- The table ---- */
+
+static int steady_csv (const pw_steady_cli *x, FILE *f, pw_error *error) {
+  const pw_system *s = x->m.system;
+  int states = 2 * pw_system_coordinates (s);
+  pw_text t = { .at = NULL };
+  char name[300];
+  pw_text_cell (&t, "branch,event");
+  pw_text_name (&t, pw_steady_varies (x) ? x->parameter : "parameter", x->unit);
+  pw_text_cell (&t, "growing,residual");
+  for (int i = 0; i < states; i++)
+    pw_text_name (&t, pw_system_state_name (s, i, name, sizeof name), pw_system_state_unit (s, i));
+  for (int i = 1; i <= x->point->unknowns; i++)
+    for (int k = 0; k < 2; k++)
+      snprintf (name, sizeof name, "%s%d", k ? "im" : "re", i), pw_text_name (&t, name, "1/s");
+  int status = pw_text_line (&t, f, x->folder, error);
+  for (const pw_steady_point *p = x->point; status == PW_OK && p < x->point + x->points; p++) {
+    pw_text_number (&t, p->branch);
+    pw_text_cell (&t, pw_steady_events[p->event]);
+    pw_text_number (&t, p->parameter);
+    pw_text_number (&t, p->unstable);
+    pw_text_number (&t, p->residual);
+    for (int i = 0; i < states; i++) pw_text_number (&t, p->state[i]);
+    for (int i = 0; i < p->unknowns; i++) pw_text_number (&t, p->re[i]), pw_text_number (&t, p->im[i]);
+    status = pw_text_line (&t, f, x->folder, error);
+  }
+  return status;
+}
+
+/* ---- The figure ---- */
+
+/* Whether the part of a branch from p to the next point is stable: events belong to both sides. */
+static int steady_stable (const pw_steady_point *p) {
+  return (p->event == PW_STEADY_POINT ? p : p + 1)->unstable == 0;
+}
+
+/* The real part, or modulus of the imaginary part, of a point that is number k in descending order, without rigid
+ * displacements; NaN if there are fewer. */
+static double steady_ranked (const pw_steady_point *p, int imaginary, int k) {
+  for (int i = 0; i < p->unknowns; i++) {
+    double value = imaginary ? fabs (p->im[i]) : p->re[i];
+    int above = 0;
+    for (int j = 0; j < p->unknowns; j++) {
+      double other = imaginary ? fabs (p->im[j]) : p->re[j];
+      above += !p->rigid[j] && (other > value || (other == value && j < i));
+    }
+    if (!p->rigid[i] && above == k) return value;
+  }
+  return NAN;
+}
+
+/* Lines of the k-th real part and frequency of a branch, with a blank line after each part of the given stability. */
+static void steady_line (FILE *f, const pw_steady_point *first, int count, int k, int stable) {
+  char text[3][32];
+  int drawing = 0;
+  for (const pw_steady_point *p = first; p < first + count; p++) {
+    int here = p + 1 < first + count && steady_stable (p) == stable;
+    if (here || drawing)
+      fprintf (f, "%s %s %s\n", pw_format (text[0], p->parameter, 10), pw_format (text[1], steady_ranked (p, 0, k), 10),
+               pw_format (text[2], steady_ranked (p, 1, k) / (2 * PW_PI), 10));
+    if (drawing && !here) fputs ("\n", f);
+    drawing = here;
+  }
+}
+
+static void steady_data (const pw_steady_cli *x, FILE *f) {
+  char text[3][32];
+  fprintf (f, "# %s, real part [1/s], frequency [Hz]: stable parts; unstable ones; events; eigenvalues [1/s]\n",
+           x->parameter);
+  for (int stable = 1; stable >= 0; stable--) {
+    for (int i = 0, count; i < x->points; i += count) {
+      for (count = 1; i + count < x->points && x->point[i + count].branch == x->point[i].branch;) count++;
+      for (int k = 0; k < x->point->unknowns; k++) steady_line (f, x->point + i, count, k, stable);
+    }
+    fputs ("nan nan nan\n\n\n", f);
+  }
+  for (const pw_steady_point *p = x->point; p < x->point + x->points; p++)
+    if (p->event != PW_STEADY_POINT) fprintf (f, "%s %d\n", pw_format (text[0], p->parameter, 10), p->event);
+  fputs ("nan nan\n\n\n", f);
+  for (const pw_steady_point *p = x->point; p < x->point + x->points; p++)
+    for (int i = 0; i < p->unknowns; i++)
+      if (!p->rigid[i])
+        fprintf (f, "%s %s %s\n", pw_format (text[0], p->parameter, 10), pw_format (text[1], p->re[i], 10),
+                 pw_format (text[2], p->im[i], 10));
+}
+
+static int steady_figure (const pw_steady_cli *x, pw_error *error) {
+  const pw_figures figures = { .folder = x->folder, .model = pw_file_name (x->m.file) };
+  char label[300];
+  pw_output *data = pw_figure_data (&figures, "steady.dat", error);
+  if (data == NULL) return PW_RESOURCE;
+  steady_data (x, pw_output_stream (data));
+  int status = pw_output_finish (data, error);
+  pw_output *o = status == PW_OK ? pw_figure_begin (&figures, "steady", error) : NULL;
+  if (o == NULL) return PW_RESOURCE;
+  snprintf (label, sizeof label, *x->unit ? "%s [%s]" : "%s", x->parameter, x->unit);
+  pw_figure_text (pw_output_stream (o), "label_of_x", label);
+  fprintf (pw_output_stream (o), "first = %.10g\nlast = %.10g\n", fmin (x->set.first, x->set.last),
+           fmax (x->set.first, x->set.last));
+  status = pw_figure_end (o, "steady", error);
+  return status == PW_OK ? pw_figure_draw (x->folder, (const char *[]){ "steady", NULL }, error) : status;
+}
+
+int pw_steady_write (const pw_steady_cli *x, pw_error *error) {
+  pw_output *json = pw_figure_open (x->folder, "steady.json", error), *csv = NULL;
+  if (json) csv = pw_figure_open (x->folder, "steady.csv", error);
+  int status = csv ? steady_csv (x, pw_output_stream (csv), error) : PW_RESOURCE;
+  if (status != PW_OK) {
+    if (json) pw_output_discard (json);
+    if (csv) pw_output_discard (csv);
+    return status;
+  }
+  steady_json (x, &(pw_json){ .f = pw_output_stream (json), .lines = 1 });
+  status = pw_output_finish_all ((pw_output *[]){ csv, json }, 2, error);
+  return status == PW_OK && pw_steady_varies (x) ? steady_figure (x, error) : status;
+}

@@ -1,0 +1,59 @@
+/* The result of `pinwheel steady`, and its reports. */
+#ifndef PW_STEADY_REPORT_H
+#define PW_STEADY_REPORT_H
+
+#include "cli.h"
+#include "pinwheel-analysis.h"
+
+/* A steady motion found, or a point of a branch. */
+typedef struct {
+  int branch;  /* from 1; without --vary its number */
+  int attempt; /* 0: the initial state, else a random one */
+  int iterations, family, unstable;
+  pw_steady_event event;
+  double parameter, residual, twist[3];
+  double *state;        /* 2 coordinates */
+  double *re, *im;      /* unknowns */
+  unsigned char *rigid; /* unknowns */
+  int unknowns;
+  char advice[200]; /* options that select it within its family, " --hold NAME=VALUE..." */
+} pw_steady_point;
+
+/* How a branch ended: "" at the end of the range. */
+typedef struct {
+  char reason[200];
+} pw_steady_end;
+
+typedef struct {
+  pw_cli_line line;
+  const char **hold_texts, *vary_text, *starts_text, *at_text, *folder;
+  pw_cli_model m;
+  pw_limit limit;
+  pw_steady_settings set;
+  pw_initial_value *hold; /* set.holds, with room */
+  int given;              /* of these, by the user; others follow */
+  char parameter[200];    /* name of what --vary varies */
+  const char *unit;
+  int attempts; /* random ones at each end */
+  pw_steady *steady;
+  pw_steady_point *point;
+  int points, room;
+  pw_steady_end *end; /* branches */
+  int branches;
+  double nearest[2];     /* smallest residual without solution: from the initial state, from random ones */
+  int changing, stopped; /* motions of equations that change; 1: by Ctrl-C or --limit */
+  int interrupted;
+} pw_steady_cli;
+
+static inline int pw_steady_varies (const pw_steady_cli *x) {
+  return x->vary_text != NULL;
+}
+
+/* "point", "fold", ... */
+extern const char *const pw_steady_events[];
+
+void pw_steady_print (const pw_steady_cli *x);
+/* Writes everything as JSON, as a table, and with --vary as a figure, into the folder.  A status. */
+int pw_steady_write (const pw_steady_cli *x, pw_error *error);
+
+#endif

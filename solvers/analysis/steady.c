@@ -1,0 +1,311 @@
+/* The search for steady motions; equations in steady_equations.c. */
+#include "steady.h"
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "util.h"
+
+/* STEADY_MOST: coordinates, since the cost is cubic.  STEADY_EXACT: residual of a solution, in units of the scene. */
+enum { STEADY_MOST = 400, STEADY_POINTS = 50, STEADY_TIMES = 7 };
+static const double STEADY_EXACT = 1e-9;
+
+/* ---- Systems ---- */
+
+static void steady_leave (pw_steady *x, int k) {
+  pw_linear_close (&x->at[k].x);
+  if (x->at[k].r) pw_run_close (x->at[k].r);
+  pw_system_free (x->at[k].own);
+  memset (&x->at[k], 0, sizeof x->at[k]);
+}
+
+static int steady_fits (const pw_steady *x, const pw_system *s) {
+  return s->coords == x->n && s->rows == x->m && s->holonomic == x->holonomic && s->bodies == x->s->bodies;
+}
+
+/* Opens a run at the last solution, of which it keeps what it can. */
+static int steady_open_run (pw_steady *x, int k, const pw_system *s) {
+  const pw_settings settings = {
+    .t = x->set.t, .span = x->set.span, .initial = x->known, .initials = x->solved ? 2 * x->n : 0
+  };
+  x->at[k].r = pw_run_open (s, "rk4+projection", &settings, &x->why);
+  if (x->at[k].r == NULL) return x->why.status;
+  if (pw_linear_open (&x->at[k].x, x->at[k].r, 0, STEADY_MOST) == PW_OK) return PW_OK;
+  return pw_fail_memory (s, &x->why);
+}
+
+int pw_steady_at (pw_steady *x, int k, double value) {
+  const pw_system *s = x->s;
+  int status;
+  if (x->at[k].r && (x->set.compile == NULL || x->at[k].value == value)) return PW_OK;
+  steady_leave (x, k);
+  x->why = (pw_error){ 0 };
+  x->at[k].value = value;
+  if (x->set.compile) s = x->at[k].own = x->set.compile (x->set.context, value, &x->why);
+  if (s == NULL)
+    status = x->why.status;
+  else if (!steady_fits (x, s))
+    return pw_fail (&x->why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations",
+                    s->model);
+  else
+    status = steady_open_run (x, k, s);
+  if (status != PW_OK) steady_leave (x, k);
+  return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
+}
+
+/* ---- Opening ---- */
+
+static int steady_arrays (pw_steady *x) {
+  size_t n = (size_t)x->n, m = (size_t)x->m, rates = (size_t)pw_steady_rates (x->s), most = n + rates;
+  size_t holds = (size_t)x->set.holds, equations = (size_t)x->holonomic + m + n + holds + rates;
+  const pw_array array[] = {
+    { &x->axis, rates * rates },
+    { &x->fixed, rates * rates },
+    { &x->norm, m },
+    { &x->start, 2 * n },
+    { &x->q, n + 3 },
+    { &x->v, n + 3 },
+    { &x->rates, rates },
+    { &x->sum, rates },
+    { &x->u, most + 1 },
+    { &x->first.u, most + 1 },
+    { &x->first.tangent, most + 1 },
+    { &x->F, equations + n * rates + 41 * most },
+    { &x->q0, n },
+    { &x->v0, n },
+    { &x->dq, n },
+    { &x->dv, n },
+    { &x->null, most * most },
+    { &x->queue[0].point.u, most + 1 },
+    { &x->queue[0].point.tangent, most + 1 },
+    { &x->queue[1].point.u, most + 1 },
+    { &x->queue[1].point.tangent, most + 1 },
+    { &x->queue[2].point.u, most + 1 },
+    { &x->queue[2].point.tangent, most + 1 },
+  };
+  x->memory = pw_alloc_arrays (array, sizeof array / sizeof *array);
+  x->cyclic = calloc (n + 1, 1);
+  x->known = calloc (2 * n + 1, sizeof *x->known);
+  x->hold = calloc (holds + 1, sizeof *x->hold);
+  if (!x->memory || !x->cyclic || !x->known || !x->hold) return PW_RESOURCE;
+  if (holds) memcpy (x->hold, x->set.hold, holds * sizeof *x->hold);
+  for (int j = 0; j < 2 * x->n; j++) x->known[j].state = j;
+  return PW_OK;
+}
+
+/* PW_INPUT with the first signal that changes with time, in the initial state, within the span. */
+static int steady_constant (pw_steady *x, pw_error *error) {
+  pw_run *r = x->at[0].r;
+  pw_workspace *w = r->w;
+  double *before = calloc (3 * (size_t)x->s->sources + 1, sizeof *before), from = x->set.t;
+  int changed = -1, status = before ? pw_update_kinematics (w, from, r->q, r->v) : PW_RESOURCE;
+  for (int i = 0; status == PW_OK && i < 3 * x->s->sources; i++) before[i] = w->u[i];
+  for (int k = 1; status == PW_OK && changed < 0 && k <= STEADY_TIMES; k++) {
+    status = pw_update_kinematics (w, from + x->set.span * pow (k / (double)STEADY_TIMES, 2), r->q, r->v);
+    for (int i = 0; status == PW_OK && changed < 0 && i < 3 * x->s->sources; i++)
+      if (!(fabs (w->u[i] - before[i]) <= 1e-9 * fabs (before[i]))) changed = i / 3;
+  }
+  free (before);
+  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
+  if (status != PW_OK) return pw_fail_signal (from, error);
+  char name[200];
+  if (changed < 0) return PW_OK;
+  return pw_fail (error, PW_INPUT, "model %s: signal %s changes with time, so that there are no steady motions",
+                  x->s->model, pw_system_signal_name (x->s, changed, name, sizeof name));
+}
+
+/* Scales and symmetries at the initial state. */
+static int steady_begin (pw_steady *x, pw_error *error) {
+  pw_run *r = x->at[0].r;
+  x->L = x->s->scale.length;
+  x->T = r->w->scale.time;
+  memcpy (x->start, r->q, (size_t)x->n * sizeof *r->q);
+  memcpy (x->start + x->n, r->v, (size_t)x->n * sizeof *r->v);
+  if (x->s->bodies) memcpy (x->origin, r->q, sizeof x->origin);
+  int status = steady_constant (x, error);
+  if (status != PW_OK) return status;
+  status = pw_steady_find_group (x);
+  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
+  if (status != PW_OK) return pw_fail_singular (r, x->set.t, error);
+  for (int i = 0; i < x->m; i++) x->norm[i] = x->at[0].x.norm[i] > 0 ? x->at[0].x.norm[i] : 1;
+  return PW_OK;
+}
+
+pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
+  pw_steady *x = calloc (1, sizeof *x);
+  if (x == NULL) return pw_fail_memory (s, error), NULL;
+  x->s = s, x->set = *settings;
+  x->n = s->coords, x->m = s->rows, x->holonomic = s->holonomic;
+  x->vary = settings->vary;
+  if (x->set.points <= 0) x->set.points = STEADY_POINTS;
+  int status = PW_OK;
+  if (x->n > STEADY_MOST)
+    status = pw_fail (error, PW_INPUT, "model %s has %d coordinates; steady motions are sought with at most %d",
+                      s->model, x->n, STEADY_MOST);
+  if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
+  if (status == PW_OK && pw_steady_at (x, 0, x->set.first) != PW_OK) *error = x->why, status = error->status;
+  if (status == PW_OK) status = steady_begin (x, error);
+  const pw_branch_equations of = { .unknowns = pw_steady_unknowns (x),
+                                   .equations = pw_steady_equations (x),
+                                   .tolerance = STEADY_EXACT,
+                                   .evaluate = pw_steady_evaluate,
+                                   .context = x };
+  if (status == PW_OK) status = pw_branch_open (&x->branch, &of, error);
+  if (status == PW_OK) return x;
+  pw_steady_close (x);
+  return NULL;
+}
+
+void pw_steady_close (pw_steady *x) {
+  if (x == NULL) return;
+  for (int k = 0; k < 2; k++) steady_leave (x, k);
+  pw_branch_close (&x->branch);
+  pw_linear_free (&x->linear);
+  free (x->cyclic);
+  free (x->known);
+  free (x->hold);
+  free (x->memory);
+  free (x);
+}
+
+const char *pw_steady_reason (const pw_steady *x) {
+  return x->why.text;
+}
+
+int pw_steady_symmetries (const pw_steady *x) {
+  return x->group;
+}
+
+/* ---- Solutions ---- */
+
+/* Remembers a solution, where later runs are opened. */
+static void steady_solved (pw_steady *x) {
+  x->solved = 1;
+  for (int j = 0; j < x->n; j++) x->known[j].value = x->q[j], x->known[x->n + j].value = x->v[j];
+}
+
+int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, pw_error *error) {
+  int status = pw_steady_at (x, 0, pw_steady_parameter (x, u));
+  if (status != PW_OK) return *error = x->why, error->status;
+  pw_run *r = x->at[0].r;
+  pw_steady_state (x, u);
+  steady_solved (x);
+  memcpy (r->q, x->q, (size_t)x->n * sizeof *r->q);
+  memcpy (r->v, x->v, (size_t)x->n * sizeof *r->v);
+  pw_linear_free (&x->linear);
+  status = pw_run_linearise (r, STEADY_MOST, &x->linear, error);
+  if (status != PW_OK) return status;
+  out->parameter = pw_steady_parameter (x, u);
+  out->q = x->q, out->v = x->v;
+  out->linear = &x->linear;
+  out->unstable = x->neutral = 0;
+  for (int i = 0; i < x->linear.unknowns; i++) {
+    out->unstable += x->linear.re[i] > 0 && !x->linear.rigid[i];
+    x->neutral += x->linear.re[i] == 0;
+  }
+  return PW_OK;
+}
+
+/* Fills x->null with the directions in which u can change without change of the equations, up to symmetries.  Returns their
+ * number, or a status. */
+static int steady_family (pw_steady *x) {
+  int unknowns = pw_steady_unknowns (x), equations = pw_steady_equations (x);
+  pw_error none = { 0 };
+  int status = pw_steady_find_gauge (x);
+  if (status != PW_OK) return status;
+  memset (x->branch.J, 0, (size_t)equations * ((size_t)unknowns + 1) * sizeof *x->branch.J);
+  status = pw_steady_evaluate (x, x->u, x->branch.F, x->branch.J, &none);
+  if (status != PW_OK) return PW_METHOD;
+  return pw_steady_null (equations, unknowns, x->branch.J, 1e-9, x->null);
+}
+
+int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
+  double range = x->set.last - x->set.first;
+  *out = (pw_steady_motion){ .parameter = parameter };
+  x->gauge = 0;
+  if (pw_steady_at (x, 0, parameter) != PW_OK) return *error = x->why, error->status;
+  int status = pw_steady_start (x, attempt, x->u);
+  if (status == PW_RESOURCE) return pw_fail_memory (x->s, error);
+  if (status != PW_OK) return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
+  x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->set.first) / range : 0;
+  status = pw_branch_solve (&x->branch, x->u, error);
+  out->iterations = x->branch.iterations;
+  out->residual = x->branch.residual;
+  pw_steady_state (x, x->u);
+  out->q = x->q, out->v = x->v;
+  if (status != PW_OK) return status;
+  out->family = steady_family (x);
+  if (out->family == PW_RESOURCE) return pw_fail_memory (x->s, error);
+  if (out->family < 0) return pw_fail (error, PW_METHOD, "the family of the steady motion cannot be determined");
+  pw_steady_home (x, x->q, x->v);
+  if (pw_steady_guess (x, x->q, x->v, x->u) != PW_OK)
+    return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
+  return pw_steady_motion_at (x, x->u, out, error);
+}
+
+/* ---- Suggestions ---- */
+
+/* Change of what is held along direction i of the family, angles relative to the first body if the whole can turn. */
+static double suggest_change (pw_steady *x, const pw_initial_value *hold, int relative, int i) {
+  const double *z = x->null + (size_t)i * (size_t)pw_steady_unknowns (x);
+  double *dq = x->dq, *dv = x->dv;
+  memset (x->sum, 0, (size_t)pw_steady_rates (x->s) * sizeof *x->sum);
+  for (int k = 0; k < x->group; k++)
+    for (int c = 0; c < pw_steady_rates (x->s); c++)
+      x->sum[c] += z[x->n + k] / x->T * x->axis[k * pw_steady_rates (x->s) + c];
+  pw_steady_field (x, x->sum, x->q, dv);
+  for (int j = 0; j < x->n; j++) dq[j] = z[j] * pw_unit (x->s, j);
+  pw_linear_turn (&x->at[0].x, x->rates[2], dq, dv);
+  return pw_hold_change (x->s, hold, x->q, x->v, dq, dv) / pw_hold_unit (x, hold) - (relative ? dq[2] : 0);
+}
+
+/* Whether holding it makes the family smaller: then directions along which it changes go.  `basis` has `count` orthonormal
+ * rows of length `family`, of what is held already. */
+static int suggest_helps (pw_steady *x, const pw_initial_value *hold, int relative, int family, double *basis,
+                          int count) {
+  double *row = basis + count * family, norm = 0, before = 0;
+  for (int i = 0; i < family; i++) row[i] = suggest_change (x, hold, relative, i), before += row[i] * row[i];
+  for (int k = 0; k < count; k++) {
+    double dot = 0;
+    for (int i = 0; i < family; i++) dot += row[i] * basis[k * family + i];
+    for (int i = 0; i < family; i++) row[i] -= dot * basis[k * family + i];
+  }
+  for (int i = 0; i < family; i++) norm += row[i] * row[i];
+  for (int i = 0; i < family; i++) row[i] /= sqrt (norm);
+  return norm > 1e-8 && norm > 1e-6 * before;
+}
+
+/* Candidate c: speed and angular velocity of the first body, angles, positions, then velocities of other bodies. */
+static int suggest_candidate (const pw_steady *x, int c) {
+  int n = x->n, bodies = x->s->bodies;
+  if (c < 2) return c == 0 ? 2 * n : n + 2;
+  if ((c -= 2) < bodies) return 3 * c + 2;
+  if ((c -= bodies) < n - 3 * bodies) return 3 * bodies + c;
+  if ((c -= n - 3 * bodies) < 2 * bodies) return c / 2 * 3 + c % 2;
+  c -= 2 * bodies;
+  return c % 2 ? n + c / 2 * 3 + 2 : 2 * n + c / 2 * 3;
+}
+
+int pw_steady_suggest (pw_steady *x, pw_initial_value *hold, int most) {
+  int family = steady_family (x), count = 0, held = 0, turns = 0, anchored = 0;
+  if (family < 0) return family;
+  double *basis = calloc ((size_t)family * ((size_t)family + 1) + 1, sizeof *basis);
+  if (basis == NULL) return PW_RESOURCE;
+  for (int k = 0; k < x->gauge; k++)
+    for (int i = 0; i < x->group; i++)
+      turns |= x->fixed[k * x->group + i] * x->axis[i * pw_steady_rates (x->s) + 2] != 0;
+  for (int c = 0; c < 2 + x->n + 2 * x->s->bodies && held < family && count < most; c++) {
+    pw_initial_value try = { .state = suggest_candidate (x, c) };
+    int angle = try.state < 3 * x->s->bodies && try.state % 3 == 2, relative = turns && angle;
+    if (turns && try.state < 3 * x->s->bodies && !angle) continue;
+    if (try.state < x->n && x->cyclic[try.state]) continue;
+    if (!suggest_helps (x, &try, relative, family, basis, held)) continue;
+    if (relative && !anchored && count < most)
+      hold[count++] = (pw_initial_value){ .state = 2, .value = x->q[2] }, anchored = 1;
+    if (count == most) break;
+    try.value = pw_system_held_value (x->s, try.state, x->q, x->v);
+    hold[count++] = try;
+    held++;
+  }
+  free (basis);
+  return count;
+}

@@ -1,0 +1,197 @@
+/* Branches of steady motions: points, folds and changes of stability. */
+#include <math.h>
+#include <string.h>
+#include "steady.h"
+
+/* BRANCH_LEAST: smallest step, relative to the range of the parameter.  BRANCH_ACCURACY: of events, relative to the step.
+ * BRANCH_LIMIT: points at most, as a multiple of those asked for. */
+static const double BRANCH_LEAST = 1e-7, BRANCH_ACCURACY = 1e-9;
+enum { BRANCH_LIMIT = 100 };
+
+/* Room for one more point, where `along` counts from 0 (the point before) to 1. */
+static void branch_queue (pw_steady *x, pw_branch_point point, pw_steady_event event, double along) {
+  size_t bytes = ((size_t)pw_steady_unknowns (x) + 1) * sizeof *point.u;
+  int i = x->queued++;
+  for (; i > 0 && x->queue[i - 1].along > along; i--) {
+    pw_branch_point other = x->queue[i].point;
+    x->queue[i] = x->queue[i - 1];
+    x->queue[i - 1].point = other;
+  }
+  x->queue[i].event = event;
+  x->queue[i].along = along;
+  if (point.u == x->queue[i].point.u) return;
+  memcpy (x->queue[i].point.u, point.u, bytes);
+  memcpy (x->queue[i].point.tangent, point.tangent, bytes);
+}
+
+int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction,
+                      pw_error *error) {
+  int unknowns = pw_steady_unknowns (x);
+  double range = x->set.last - x->set.first;
+  pw_steady_motion motion;
+  x->gauge = 0;
+  if (pw_steady_guess (x, q, v, x->u) != PW_OK) return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
+  x->u[unknowns] = (parameter - x->set.first) / range;
+  int status = pw_branch_solve (&x->branch, x->u, error);
+  if (status == PW_OK) status = pw_steady_motion_at (x, x->u, &motion, error);
+  if (status == PW_OK) status = pw_steady_find_gauge (x);
+  if (status == PW_OK) status = pw_branch_start (&x->branch, x->u, direction, error);
+  if (status != PW_OK)
+    return status < 0 && error->status ? status : pw_fail (error, PW_METHOD, "the branch cannot be followed from here");
+  memcpy (x->first.u, x->branch.at.u, ((size_t)unknowns + 1) * sizeof *x->u);
+  memcpy (x->first.tangent, x->branch.at.tangent, ((size_t)unknowns + 1) * sizeof *x->u);
+  x->unstable = motion.unstable;
+  x->branch.most = 1.0 / x->set.points;
+  x->branch.step = x->branch.most / 4;
+  x->branch.least = BRANCH_LEAST;
+  x->steps = x->ended = x->queued = x->returned = 0;
+  branch_queue (x, x->branch.at, PW_STEADY_POINT, 0);
+  return PW_OK;
+}
+
+/* ---- Events ---- */
+
+/* Real part of eigenvalue number `sought` of those that are not 0; its imaginary part goes to *im. */
+static double branch_eigenvalue (const pw_steady *x, int sought, double *im) {
+  const pw_linear *l = &x->linear;
+  for (int i = 0; i < l->unknowns; i++) {
+    if (l->re[i] == 0 || l->rigid[i]) continue;
+    if (sought-- == 0) return *im = l->im[i], l->re[i];
+  }
+  return *im = 0, -1;
+}
+
+/* For pw_branch_locate: the real part that changes its sign, or if those on the imaginary axis leave it, +-1 by the number
+ * of growing modes. */
+static int branch_test (void *steady, const pw_branch_point *point, double *value, pw_error *error) {
+  pw_steady *x = steady;
+  pw_steady_motion motion;
+  double im;
+  int status = pw_steady_motion_at (x, point->u, &motion, error);
+  if (status != PW_OK) return status;
+  *value = motion.unstable > x->sought ? 1 : -1;
+  if (x->compare == x->neutral) *value = branch_eigenvalue (x, x->sought, &im);
+  if (x->compare >= 0 && x->compare < x->neutral) *value = 0;
+  return PW_OK;
+}
+
+static double branch_along (const pw_steady *x, const pw_branch_point *point) {
+  const pw_branch *b = &x->branch;
+  double part = 0, whole = 0;
+  for (int j = 0; j <= b->of.unknowns; j++) {
+    part += (point->u[j] - b->before.u[j]) * b->before.tangent[j];
+    whole += (b->at.u[j] - b->before.u[j]) * b->before.tangent[j];
+  }
+  return part / whole;
+}
+
+/* Locates a change from `before` to `now` growing modes. */
+static int branch_change (pw_steady *x, int before, int now, pw_error *error) {
+  pw_branch_point *point = &x->queue[x->queued].point;
+  int more = before > now ? before : now, apart = before > now ? before - now : now - before;
+  double im;
+  x->sought = more - 1;
+  int status = pw_branch_locate (&x->branch, branch_test, x, BRANCH_ACCURACY, point, error);
+  if (status != PW_OK) return status;
+  branch_eigenvalue (x, x->sought, &im);
+  branch_queue (x, *point, im != 0 || apart == 2 ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, branch_along (x, point));
+  return PW_OK;
+}
+
+/* Queues the events between the last two points.  At a fold a real eigenvalue changes its sign. */
+static int branch_events (pw_steady *x, pw_error *error) {
+  pw_steady_motion motion;
+  int before = x->unstable, neutral = x->neutral, status = PW_OK;
+  if (x->branch.folded) {
+    pw_branch_point *point = &x->queue[x->queued].point;
+    status = pw_branch_locate (&x->branch, pw_branch_fold, &x->branch, BRANCH_ACCURACY, point, error);
+    if (status == PW_OK) branch_queue (x, *point, PW_STEADY_FOLD, branch_along (x, point));
+  }
+  if (status == PW_OK) status = pw_steady_motion_at (x, x->branch.at.u, &motion, error);
+  if (status != PW_OK) return status;
+  int apart = before > motion.unstable ? before - motion.unstable : motion.unstable - before;
+  x->compare = neutral == x->neutral ? neutral : -1;
+  neutral = x->neutral;
+  x->unstable = motion.unstable;
+  if (apart > x->branch.folded) status = branch_change (x, before, motion.unstable, error);
+  x->neutral = neutral;
+  return status;
+}
+
+/* ---- Ends ---- */
+
+typedef struct {
+  int parameter;
+  double limit;
+} branch_limit;
+
+static int branch_beyond (void *context, const pw_branch_point *point, double *value, pw_error *error) {
+  const branch_limit *limit = context;
+  (void)error;
+  *value = point->u[limit->parameter] - limit->limit;
+  return PW_OK;
+}
+
+/* Moves the point reached back to the end of the range, if it is beyond. */
+static int branch_at_end (pw_steady *x, pw_error *error) {
+  pw_branch *b = &x->branch;
+  int p = b->of.unknowns;
+  branch_limit limit = { p, b->at.u[p] > 1 };
+  if (b->at.u[p] <= 1 && b->at.u[p] >= 0) return PW_OK;
+  x->ended = 1;
+  int status = pw_branch_locate (b, branch_beyond, &limit, BRANCH_ACCURACY, &x->queue[0].point, error);
+  if (status != PW_OK) return status;
+  x->queue[0].point.u[p] = limit.limit;
+  status = pw_branch_solve (b, x->queue[0].point.u, error);
+  memcpy (b->at.u, x->queue[0].point.u, ((size_t)p + 1) * sizeof *b->at.u);
+  memcpy (b->at.tangent, x->queue[0].point.tangent, ((size_t)p + 1) * sizeof *b->at.u);
+  b->folded = b->before.tangent[p] * b->at.tangent[p] < 0;
+  return status;
+}
+
+/* 1 if the last step has passed the start, in the same direction. */
+static int branch_closed (const pw_steady *x) {
+  const pw_branch *b = &x->branch;
+  const double *u = x->first.u, *tangent = x->first.tangent;
+  double step = 0, off = 0, before = 0, now = 0;
+  for (int j = 0; j <= b->of.unknowns; j++) {
+    step += pow (b->at.u[j] - b->before.u[j], 2);
+    off += pow (b->at.u[j] - u[j], 2);
+    before += (b->before.u[j] - u[j]) * tangent[j];
+    now += (b->at.u[j] - u[j]) * tangent[j];
+  }
+  return x->steps > 2 && off < 1.2 * step && before < 0 && now >= 0;
+}
+
+static int branch_advance (pw_steady *x, pw_error *error) {
+  x->why = (pw_error){ 0 };
+  if (x->steps++ > BRANCH_LIMIT * x->set.points)
+    return pw_fail (&x->why, PW_METHOD, "the branch has more than %d points", BRANCH_LIMIT * x->set.points), PW_RETRY;
+  int status = pw_branch_step (&x->branch, error);
+  if (status == PW_RETRY && !*x->why.text) pw_fail (&x->why, PW_METHOD, "Newton's method fails at the smallest step");
+  if (status == PW_OK) x->why = (pw_error){ 0 };
+  if (status == PW_OK) status = branch_at_end (x, error);
+  if (status == PW_OK) status = branch_events (x, error);
+  if (status == PW_OK) branch_queue (x, x->branch.at, PW_STEADY_POINT, 1);
+  x->ended |= branch_closed (x);
+  return status;
+}
+
+int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
+  int status = PW_OK;
+  *out = (pw_steady_motion){ .event = PW_STEADY_END };
+  if (x->returned == x->queued) {
+    if (x->ended) return PW_OK;
+    x->queued = x->returned = 0;
+    status = branch_advance (x, error);
+    if (status == PW_RETRY) return x->ended = 1, PW_OK;
+    if (status != PW_OK) return status;
+  }
+  int i = x->returned++, neutral = x->neutral;
+  out->event = x->queue[i].event;
+  out->iterations = x->branch.iterations;
+  out->residual = x->branch.residual;
+  status = pw_steady_motion_at (x, x->queue[i].point.u, out, error);
+  x->neutral = neutral;
+  return status;
+}

@@ -1,0 +1,220 @@
+/* Symmetries of a system: displacements under which its equations are invariant, by a rank decision like that of
+ * linear_frame.c at a state in general position.  Besides displacements of the whole these are changes of angles on
+ * which nothing depends, such as that of a wheel that rolls. */
+#include <lapacke.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "rank.h"
+#include "steady.h"
+#include "util.h"
+
+/* GROUP_APART: distance of that state from the initial one, in units of the scene; GROUP_ROUND: round-off of derivatives. */
+static const double GROUP_APART = 0.02, GROUP_ROUND = 1e-12;
+
+void pw_steady_field (const pw_steady *x, const double *rates, const double *q, double *v) {
+  int bodies = 3 * x->s->bodies;
+  for (int j = 0; j < bodies; j += 3) {
+    v[j] = x->L * rates[0] - rates[2] * (q[j + 1] - x->origin[1]);
+    v[j + 1] = x->L * rates[1] + rates[2] * (q[j] - x->origin[0]);
+    v[j + 2] = rates[2] + rates[3 + j / 3];
+  }
+  for (int j = bodies; j < x->n; j++) v[j] = rates[3 + x->s->bodies + j - bodies];
+}
+
+/* The change of the equations by displacement c, in units of the scene: a column. */
+static void group_change (pw_steady *x, int c, double *rates, double *out) {
+  pw_linearisation *l = &x->at[0].x;
+  memset (rates, 0, (size_t)pw_steady_rates (x->s) * sizeof *rates);
+  rates[c] = 1;
+  memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
+  pw_steady_field (x, rates, x->q, l->x);
+  if (c == 2) pw_linear_turn (l, 1, x->v, l->x + x->n);
+  pw_linear_vary (l);
+  out = pw_linear_violation (l, out);
+  if (c == 2) pw_linear_turn (l, -1, l->a, l->da);
+  for (int j = 0; j < x->n; j++) out[j] = l->da[j] * pw_rank_unit (x->s, j) * x->T * x->T / x->L;
+}
+
+/* The largest change of an acceleration by a single coordinate. */
+static double group_size (pw_steady *x) {
+  pw_linearisation *l = &x->at[0].x;
+  double most = 0;
+  for (int c = 0; c < x->n; c++) {
+    memset (l->x, 0, 2 * (size_t)x->n * sizeof *l->x);
+    l->x[c] = pw_unit (x->s, c);
+    pw_linear_vary (l);
+    for (int j = 0; j < x->n; j++)
+      most = pw_largest (most, fabs (l->da[j]) * pw_rank_unit (x->s, j) * x->T * x->T / x->L);
+  }
+  return most;
+}
+
+/* Reduced row echelon form of `rows` independent rows of length n, with pivots first in the angles of single bodies, so
+ * that these stand alone. */
+static void group_reduce (int rows, int n, double *row) {
+  for (int i = 0, c = n - 1; i < rows && c >= 0; c--) {
+    int best = i;
+    for (int k = i; k < rows; k++)
+      if (fabs (row[k * n + c]) > fabs (row[best * n + c])) best = k;
+    double pivot = row[best * n + c];
+    if (fabs (pivot) < 1e-6) continue;
+    for (int j = 0; j < n; j++) {
+      double kept = row[best * n + j];
+      row[best * n + j] = row[i * n + j];
+      row[i * n + j] = kept / pivot;
+    }
+    for (int k = 0; k < rows; k++) {
+      double factor = row[k * n + c];
+      for (int j = 0; k != i && j < n; j++) row[k * n + j] -= factor * row[i * n + j];
+    }
+    i++;
+  }
+  for (int k = 0; k < rows * n; k++)
+    if (fabs (row[k]) < 1e-7) row[k] = 0;
+}
+
+int pw_steady_null (int rows, int n, double *M, double tolerance, double *out) {
+  double *work = malloc (((size_t)n * (size_t)n + 8 * (size_t)(rows + n)) * sizeof *work), *sigma = work,
+         *V = sigma + n;
+  int left = 0;
+  if (work == NULL) return PW_RESOURCE;
+  if (LAPACKE_dgesvd_work (LAPACK_COL_MAJOR, 'N', 'A', rows, n, M, rows, sigma, NULL, 1, V, n, V + n * n,
+                           8 * (rows + n) - n))
+    left = PW_METHOD;
+  tolerance = fmax (tolerance, GROUP_ROUND * sigma[0]);
+  while (left >= 0 && left < n && sigma[n - 1 - left] <= tolerance) {
+    for (int j = 0; j < n; j++) out[left * n + j] = V[j * n + n - 1 - left];
+    left++;
+  }
+  free (work);
+  return left;
+}
+
+/* A state near the initial one, in general position on the constraints: off them residuals rotate with the whole. */
+static int group_place (pw_steady *x, double apart) {
+  pw_run *r = x->at[0].r;
+  pw_projector p;
+  double worst;
+  int row;
+  for (int j = 0; j < x->n; j++) {
+    x->q[j] = r->q[j] + apart * pw_unit (x->s, j) * pw_sin (1.7 + 2.39996 * (j + 1));
+    x->v[j] = r->v[j] + apart * pw_unit (x->s, j) / x->T * pw_sin (2.9 + 2.39996 * (j + 1));
+  }
+  if (pw_projector_open (&p, r, x->s->metric, x->s->metric, &x->why) != PW_OK) return PW_RESOURCE;
+  int status = pw_project_positions (&p, r, x->set.t, x->q, x->v, &row, &worst);
+  if (status == PW_OK) status = pw_project_velocities (&p, r, x->v);
+  pw_projector_close (&p);
+  if (status == PW_OK) status = pw_linear_evaluate (&x->at[0].x, x->set.t, x->q, x->v);
+  if (status == PW_OK) pw_rank_rows (r->w, x->at[0].x.R, x->at[0].x.norm);
+  return status;
+}
+
+int pw_steady_find_group (pw_steady *x) {
+  pw_linearisation *l = &x->at[0].x;
+  int rates = pw_steady_rates (x->s), length = l->holonomic + l->rank + x->n, rows = length + 3;
+  int status = group_place (x, GROUP_APART);
+  if (status == PW_RETRY) status = group_place (x, GROUP_APART / 100);
+  if (status != PW_OK) return status;
+  double *M = calloc ((size_t)rows * (size_t)rates + (size_t)rates, sizeof *M), tolerance;
+  if (M == NULL) return PW_RESOURCE;
+  for (int c = 0; c < rates; c++) group_change (x, c, M + rows * rates, M + c * rows);
+  tolerance = PW_LINEAR_SYMMETRIC + 1e-4 * PW_LINEAR_SYMMETRIC * group_size (x);
+  x->group = x->s->bodies ? pw_steady_null (rows, rates, M, tolerance, x->axis) : 0;
+  free (M);
+  if (x->group < 0) return x->group;
+  group_reduce (x->group, rates, x->axis);
+  return PW_OK;
+}
+
+int pw_steady_find_gauge (pw_steady *x) {
+  int group = x->group, holds = x->set.holds, rows = holds > group ? holds : group;
+  double *M = calloc ((size_t)rows * (size_t)group + 1, sizeof *M);
+  if (M == NULL) return PW_RESOURCE;
+  for (int k = 0; k < group; k++) {
+    const double *axis = x->axis + k * pw_steady_rates (x->s);
+    pw_steady_field (x, axis, x->q, x->dq);
+    memset (x->dv, 0, (size_t)x->n * sizeof *x->dv);
+    pw_linear_turn (&x->at[0].x, axis[2], x->v, x->dv);
+    for (int i = 0; i < holds; i++)
+      M[k * rows + i] = pw_hold_change (x->s, x->hold + i, x->q, x->v, x->dq, x->dv) / pw_hold_unit (x, x->hold + i);
+  }
+  x->gauge = group ? pw_steady_null (rows, group, M, 1e-9, x->fixed) : 0;
+  free (M);
+  return x->gauge < 0 ? x->gauge : PW_OK;
+}
+
+/* ---- Comparison ---- */
+
+/* Rotates positions and velocities by an angle about a point. */
+static void group_rotate (const pw_steady *x, double angle, const double *about, double *q, double *v) {
+  double c = pw_cos (angle), s = pw_sin (angle), centre[2] = { about[0], about[1] };
+  for (int j = 0; j < 3 * x->s->bodies; j += 3) {
+    double dx = q[j] - centre[0], dy = q[j + 1] - centre[1], vx = v[j], vy = v[j + 1];
+    q[j] = centre[0] + c * dx - s * dy, q[j + 1] = centre[1] + s * dx + c * dy, q[j + 2] += angle;
+    v[j] = c * vx - s * vy, v[j + 1] = s * vx + c * vy;
+  }
+}
+
+/* The angle of the whole: that of the first body on whose angle something depends; if there is none, of the line from
+ * the centre to the last body. */
+static double group_angle (const pw_steady *x, const double centre[2], const double *q) {
+  int last = 3 * (x->s->bodies - 1);
+  for (int b = 0; b < x->s->bodies; b++)
+    if (!x->cyclic[3 * b + 2]) return q[3 * b + 2];
+  return atan2 (q[last + 1] - centre[1], q[last] - centre[0]);
+}
+
+/* Displaces a state by symmetries to one that equivalent states share; spins first. */
+static void group_canonical (const pw_steady *x, double *q, double *v) {
+  int rates = pw_steady_rates (x->s);
+  for (int k = 0; k < x->group; k++) {
+    const double *axis = x->axis + k * rates;
+    int c = rates - 1;
+    while (c > 2 && axis[c] == 0) c--;
+    if (c > 2 && axis[0] == 0 && axis[1] == 0 && axis[2] == 0) {
+      double by = -q[c < 3 + x->s->bodies ? 3 * (c - 3) + 2 : 2 * x->s->bodies + c - 3] / axis[c];
+      for (int b = 0; b < x->s->bodies; b++) q[3 * b + 2] += by * axis[3 + b];
+      for (int j = 3 * x->s->bodies; j < x->n; j++) q[j] += by * axis[3 - 2 * x->s->bodies + j];
+    }
+    if (axis[2] == 0) continue;
+    double centre[2] = { x->origin[0] - x->L * axis[1] / axis[2], x->origin[1] + x->L * axis[0] / axis[2] };
+    group_rotate (x, -group_angle (x, centre, q), centre, q, v);
+  }
+  for (int k = 0; k < x->group; k++) {
+    const double *axis = x->axis + k * rates;
+    double square = axis[0] * axis[0] + axis[1] * axis[1];
+    if (axis[2] != 0 || !(square > 0)) continue;
+    double by = (axis[0] * q[0] + axis[1] * q[1]) / square;
+    for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] -= by * axis[0], q[j + 1] -= by * axis[1];
+  }
+}
+
+void pw_steady_home (const pw_steady *x, double *q, double *v) {
+  int whole = 0;
+  for (int k = 0; k < x->group; k++) {
+    const double *axis = x->axis + k * pw_steady_rates (x->s);
+    whole += axis[0] != 0 || axis[1] != 0 || axis[2] != 0;
+  }
+  if (x->gauge < x->group || whole < 3) return;
+  double dx = x->start[0] - q[0], dy = x->start[1] - q[1];
+  group_rotate (x, x->start[2] - q[2], q, q, v);
+  for (int j = 0; j < 3 * x->s->bodies; j += 3) q[j] += dx, q[j + 1] += dy;
+}
+
+int pw_steady_same (pw_steady *x, const double *q1, const double *v1, const double *q2, const double *v2) {
+  const double tolerance = 1e-6;
+  size_t bytes = (size_t)x->n * sizeof *q1;
+  double *a = x->q0, *va = x->v0, *b = x->dq, *vb = x->dv;
+  memcpy (a, q1, bytes), memcpy (va, v1, bytes), memcpy (b, q2, bytes), memcpy (vb, v2, bytes);
+  group_canonical (x, a, va);
+  group_canonical (x, b, vb);
+  for (int j = 0; j < x->n; j++) {
+    double unit = pw_unit (x->s, j), off = (a[j] - b[j]) / unit, most = fmax (1, fabs (b[j] / unit));
+    if (j < 3 * x->s->bodies && j % 3 == 2) off = remainder (off, 2 * PW_PI), most = 1;
+    if (!(fabs (off) <= tolerance * most) && !x->cyclic[j]) return 0;
+    off = (va[j] - vb[j]) / unit * x->T;
+    if (!(fabs (off) <= tolerance * fmax (1, fabs (vb[j] / unit * x->T)))) return 0;
+  }
+  return 1;
+}

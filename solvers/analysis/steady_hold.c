@@ -1,0 +1,96 @@
+/* What is held in a steady motion: A (q, v) = value B (q, v), with the states themselves, or of a body
+ *
+ *     speed      A = vx cos phi + vy sin phi,  B = 1        radius      A = speed,  B = omega
+ *                                                           curvature   A = omega,  B = speed */
+#include <stdio.h>
+#include <string.h>
+#include "steady.h"
+#include "util.h"
+
+enum { HOLD_SPEED, HOLD_RADIUS, HOLD_CURVATURE, HOLD_OTHERS };
+static const struct {
+  const char *name, *unit;
+} hold_other[HOLD_OTHERS] = { { "speed", "m/s" }, { "radius", "m" }, { "curvature", "1/m" } };
+
+static int hold_fail (const pw_system *s, const char *name, pw_error *error) {
+  pw_nearest near = { .sought = name };
+  char known[300], best[300], hint[400];
+  for (int i = 0; i < 2 * s->coords + HOLD_OTHERS * s->bodies; i++) {
+    pw_nearest_try (&near, pw_system_held_name (s, i, known, sizeof known));
+    if (near.best == known) near.best = strcpy (best, known);
+  }
+  return pw_fail (error, PW_INPUT, "model %s has no state \"%s\"%s", s->model, name,
+                  pw_nearest_text (&near, hint, sizeof hint));
+}
+
+int pw_system_find_held (const pw_system *s, const char *name, pw_error *error) {
+  const char *dot = strrchr (name, '.');
+  char body[300];
+  pw_error none = { 0 };
+  for (int k = 0; dot && k < HOLD_OTHERS; k++) {
+    if (strcmp (dot + 1, hold_other[k].name) != 0) continue;
+    snprintf (body, sizeof body, "%.*s", (int)(dot - name), name);
+    int b = pw_system_find_body (s, body);
+    if (b >= 0) return 2 * s->coords + b * HOLD_OTHERS + k;
+  }
+  int state = pw_system_find_state (s, name, &none);
+  return state >= 0 ? state : hold_fail (s, name, error);
+}
+
+char *pw_system_held_name (const pw_system *s, int held, char *buffer, size_t size) {
+  int other = held - 2 * s->coords;
+  if (other < 0) return pw_system_state_name (s, held, buffer, size);
+  snprintf (buffer, size, "%s.%s", s->body_name[other / HOLD_OTHERS], hold_other[other % HOLD_OTHERS].name);
+  return buffer;
+}
+
+const char *pw_system_held_unit (const pw_system *s, int held) {
+  int other = held - 2 * s->coords;
+  return other < 0 ? pw_system_state_unit (s, held) : hold_other[other % HOLD_OTHERS].unit;
+}
+
+/* A and B, or with (dq, dv) their changes. */
+static void hold_terms (const pw_system *s, int held, const double *q, const double *v, const double *dq,
+                        const double *dv, double *A, double *B) {
+  int other = held - 2 * s->coords, b = 3 * (other / HOLD_OTHERS);
+  if (other < 0) {
+    const double *state = held < s->coords ? dq ? dq : q : dq ? dv : v;
+    *A = state[held % s->coords], *B = dq ? 0 : 1;
+    return;
+  }
+  double c = pw_cos (q[b + 2]), sine = pw_sin (q[b + 2]), speed = c * v[b] + sine * v[b + 1], omega = v[b + 2];
+  if (dq) speed = c * dv[b] + sine * dv[b + 1] + (c * v[b + 1] - sine * v[b]) * dq[b + 2], omega = dv[b + 2];
+  *A = other % HOLD_OTHERS == HOLD_CURVATURE ? omega : speed;
+  *B = other % HOLD_OTHERS == HOLD_SPEED ? dq ? 0 : 1 : other % HOLD_OTHERS == HOLD_RADIUS ? omega : speed;
+}
+
+double pw_system_held_value (const pw_system *s, int held, const double *q, const double *v) {
+  double A, B;
+  hold_terms (s, held, q, v, NULL, NULL, &A, &B);
+  return A / B;
+}
+
+double pw_hold_unit (const pw_steady *x, const pw_initial_value *hold) {
+  int other = hold->state - 2 * x->n;
+  if (other < 0) return hold->state < x->n ? pw_unit (x->s, hold->state) : pw_unit (x->s, hold->state - x->n) / x->T;
+  return (other % HOLD_OTHERS == HOLD_CURVATURE ? 1 : x->L) / x->T;
+}
+
+double pw_hold_residual (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v) {
+  double A, B;
+  hold_terms (s, hold->state, q, v, NULL, NULL, &A, &B);
+  return A - hold->value * B;
+}
+
+double pw_hold_change (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v,
+                       const double *dq, const double *dv) {
+  double A, B;
+  hold_terms (s, hold->state, q, v, dq, dv, &A, &B);
+  return A - hold->value * B;
+}
+
+double pw_hold_slope (const pw_system *s, const pw_initial_value *hold, const double *q, const double *v) {
+  double A, B;
+  hold_terms (s, hold->state, q, v, NULL, NULL, &A, &B);
+  return -B;
+}

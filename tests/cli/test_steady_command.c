@@ -1,0 +1,125 @@
+/* `pinwheel steady`, `pinwheel linearise --steady`: text, files, bad input. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "check.h"
+#include "cli.h"
+
+static void steady_shows (const char *text) {
+  if (strstr (cli_out, text) == NULL) fail_msg ("\"%s\" is not in\n%s", text, cli_out);
+}
+
+/* A turn of the n-trailer, and what to hold to select it. */
+static void test_motion (void **state) {
+  (void)state;
+  cli_good ("pinwheel steady n-trailer --starts 0 -o @/turn");
+  steady_shows ("n-trailer: 1 steady motion, apart from 3 symmetries, from the initial state and 0 random ones\n");
+  steady_shows (
+      "Motion 1 is one of a family of dimension 2; to select one: --hold tractor.speed=2 --hold tractor.omega=1\n");
+  const char *json = cli_file ("turn/steady.json");
+  assert_true (cli_says (json, "model", "n-trailer"));
+  assert_non_null (strstr (json, "\"parameter\": null"));
+  check_close ("family", cli_number (json, "motions", "family", NULL), 2, 0, "a count");
+  check_close ("omega", cli_number (json, "motions", "state", "trailer2.omega", NULL), 1, 1e-12, "Newton to round-off");
+  assert_null (cli_file ("turn/steady.dat"));
+  cli_good ("pinwheel steady n-trailer --starts 0 --hold tractor.speed=2*1.5 --hold tractor.curvature=1/4");
+  steady_shows ("     1                    3                   0.75        0        0");
+  assert_null (strstr (cli_out, "to select one"));
+}
+
+/* Number `column` (from 0) of a line of a table. */
+static double table_number (const char *line, int column) {
+  for (; column > 0; column--) line = strchr (line, ',') + 1;
+  return strtod (line, NULL);
+}
+
+/* The car of the manual: the row of the event, and one row for each point. */
+static void test_branch (void **state) {
+  int rows = 0, events = 0;
+  (void)state;
+  cli_good ("pinwheel steady car-tyres --set steer=0 --set a=1.4 --set b=1.2 --vary u=20:60 --starts 2 -o @/car");
+  steady_shows ("car-tyres: 1 branch of steady motions, u from 20 to 60, 3 symmetries\n");
+  steady_shows ("       1  zero eigenvalue    51.9999995        0                0                \n");
+  const char *csv = cli_file ("car/steady.csv");
+  assert_int_equal (strncmp (csv, "branch,event,u [m/s],growing,residual,car.x [m],", 48), 0);
+  for (const char *line = strchr (csv, '\n') + 1; *line; line = strchr (line, '\n') + 1, rows++) {
+    double u = table_number (line, 2);
+    check_close ("speed", table_number (line, 8), u, 1e-9, "the speed that is prescribed");
+    events += strncmp (line, "1,zero eigenvalue,", 18) == 0;
+    if (strncmp (line, "1,point,", 8) == 0) assert_int_equal ((int)table_number (line, 3), u > 52);
+  }
+  assert_true (rows > 50);
+  assert_int_equal (events, 1);
+  assert_non_null (cli_file ("car/steady.dat"));
+  assert_non_null (strstr (cli_file ("car/steady.gp"), "label_of_x = 'u [m/s]'"));
+  assert_true (cli_says (cli_file ("car/steady.json"), "parameter", "u"));
+}
+
+/* What is held is varied; the rest is held as in the initial motion, which is reported. */
+static void test_vary_held (void **state) {
+  (void)state;
+  assert_int_equal (cli_run ("pinwheel steady n-trailer --vary tractor.curvature=0.1:0.5 --starts 0 -o @/held"), 0);
+  assert_string_equal (cli_err, "pinwheel: holding tractor.speed=2, as in the motion nearest to the initial state\n");
+  const char *json = cli_file ("held/steady.json");
+  check_close ("speed", cli_number (json, "held", "tractor.speed", NULL), 2, 1e-12, "that of the initial state");
+  check_close ("omega", cli_number (json, "motions", "state", "tractor.omega", NULL), 0.2, 1e-9, "speed / radius");
+}
+
+/* Straight ahead the hinges decay at u / L; the motion of the model is a turn. */
+static void test_linearise (void **state) {
+  (void)state;
+  cli_good ("pinwheel linearise n-trailer --steady --hold tractor.speed=3 --hold tractor.omega=0");
+  steady_shows ("n-trailer, steady motion at t = 0 s: 7 minimal coordinates");
+  steady_shows ("     6         -3.75 ");
+  steady_shows ("     7            -5 ");
+  cli_good ("pinwheel linearise pendulum --steady");
+  steady_shows ("     1             0           3.1321 ");
+  cli_bad (
+      "pinwheel linearise theo-jansen --steady -o @/none", 4,
+      "theo-jansen: no steady motion near the initial state: the residual ends at 1, in units of the scene; `pinwheel "
+      "steady` also begins at random states");
+  assert_null (cli_file ("none.json"));
+}
+
+static void test_limit (void **state) {
+  (void)state;
+  cli_bad ("pinwheel steady n-trailer --limit 1e-9 -o @/limit", 4, "--limit 1e-9: stopped; results are incomplete");
+}
+
+static void test_bad (void **state) {
+  static const cli_wrong each[] = {
+    { "n-trailer --hold tractor.radus=1",
+      "model n-trailer has no state \"tractor.radus\"; did you mean \"tractor.radius\"?" },
+    { "n-trailer --hold tractor.speed", "--hold tractor.speed: expected STATE=VALUE" },
+    { "n-trailer --hold tractor.speed=fast", "--hold tractor.speed=fast: \"fast\" is not a number" },
+    { "n-trailer --hold tractor.x=1 --hold tractor.x=2", "--hold tractor.x=2: tractor.x is held already" },
+    { "n-trailer --vary m=1", "--vary m=1: expected NAME=FIRST:LAST" },
+    { "n-trailer --vary m=1:1", "--vary m=1:1: expected two different numbers FIRST:LAST" },
+    { "n-trailer --vary m=0:1", "--vary m=0:1: expected a number > 0" },
+    { "n-trailer --set m=1 --vary m=1:2", "m is given by --vary and by --set" },
+    { "n-trailer --vary n=1:3", "--vary n=1:3: n counts something and cannot vary continuously; use `pinwheel sweep`" },
+    { "n-trailer --vary mm=1:3", "model n-trailer has no parameter \"mm\"; did you mean \"m0\"?" },
+    { "n-trailer --starts -1", "--starts -1: expected a whole number >= 1" },
+    { "snakeboard", "model snakeboard: signal swing.value changes with time, so that there are no steady motions" },
+    { "chain --set n=200", "model chain has 600 coordinates; steady motions are sought with at most 400" },
+  };
+  (void)state;
+  cli_bad_each ("steady", each, sizeof each / sizeof *each);
+  cli_bad (
+      "pinwheel steady theo-jansen --starts 3", 4,
+      "theo-jansen: no steady motion found: from the initial state the residual ends at 1, from 3 random ones at 1 at "
+      "best, in units of the scene (L, L/T, L/T^2); change what is held, or begin nearer to one (--start)");
+  cli_bad ("pinwheel steady slider-crank --set theta=pi/2", 3,
+           "model slider-crank: the initial configuration is singular: 7 constraint equations are independent there, 8 "
+           "nearby; begin slightly off it");
+  cli_bad ("pinwheel linearise n-trailer --hold tractor.speed=1", 2, "--hold needs --steady");
+}
+
+int main (void) {
+  const struct CMUnitTest tests[] = {
+    cmocka_unit_test (test_motion),    cmocka_unit_test (test_branch), cmocka_unit_test (test_vary_held),
+    cmocka_unit_test (test_linearise), cmocka_unit_test (test_limit),  cmocka_unit_test (test_bad),
+  };
+  return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
+}
