@@ -83,7 +83,7 @@ FUZZ       := $(filter-out tests/fuzz/fuzz.c tests/fuzz/replay.c,$(wildcard test
 FUZZERS    := $(FUZZ:tests/fuzz/%.c=$(BUILD)/fuzz/%)
 
 .PHONY: all everything demo test test-all layers words san tsan valgrind fuzz fuzzers mutants cov clang gcc format format-check bench bench-quick bench-engine \
-        bench-effects hard basic deps install uninstall clean help
+        bench-effects hard basic figures deps install uninstall clean help
 .DELETE_ON_ERROR:
 .SECONDARY:
 
@@ -96,6 +96,7 @@ help:
 	@echo 'make deps             install the libraries that are missing'
 	@echo 'make demo             the EzyRoller by three methods: a table, figures in $(BUILD)/demo/'
 	@echo 'make gallery          pages that simulate the models in a browser, in $(BUILD)/site/'
+	@echo 'make figures          all figures of README and docs, into docs/figures/'
 	@echo 'make test             the tests; test-all: the slow ones too'
 	@echo 'make bench            everything that is measured, about seven minutes; goes on where it was stopped'
 	@echo 'make bench-quick      what a run costs on this machine'
@@ -347,6 +348,9 @@ demo: all $(BUILD)/benchmarks/demo
 	@$(PROGRAM) run ezyroller --energy --every 0.02 -o $(BUILD)/demo/ezyroller.csv --json $(BUILD)/demo/ezyroller.json \
 	  --plots $(BUILD)/demo
 	@echo 'figures and data: $(BUILD)/demo/'
+
+figures: all
+	@sh docs/figures.sh $(PROGRAM)
 
 gallery: all
 	@sh core/cli/page/gallery.sh $(PROGRAM) models $(BUILD)/site

@@ -1,12 +1,12 @@
 #!/bin/sh
 # Tables and figures of docs/benchmarks.md from the results of `make bench`, or of its parts.
 #
-#   report.sh MACHINE       reads benchmarks/results/*-MACHINE.csv
+#   report.sh MACHINE       reads benchmarks/results/*-MACHINE.csv; PAGE: instead of docs/benchmarks.md
 #
 # Replaces what stands between the lines <!-- PART --> and <!-- end --> of the page, for each part that has a result, and
 # draws the figures as SVG and PNG, if there is a gnuplot.
 set -eu
-machine=$1 results=benchmarks/results page=docs/benchmarks.md figures=docs/figures
+machine=$1 results=benchmarks/results page=${PAGE:-docs/benchmarks.md} figures=docs/figures
 export LC_ALL=C
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -25,25 +25,28 @@ section () {
   cp "$work/page" "$page"
 }
 
-# draw NAME WIDTH HEIGHT: a gnuplot script from standard input, as PNG.
+# draw NAME HEIGHT TITLE: a gnuplot script from standard input, as PNG with the look of the program's figures; the height is in
+# thousandths of the width.
 draw () {
   cat >"$work/script"
   command -v gnuplot >/dev/null || { echo 'report.sh: no gnuplot, no figures' >&2; return 0; }
-  { echo "set encoding utf8"; echo "set terminal pngcairo size $2,$3 noenhanced font 'Sans,9.5' background rgb 'white'"
-    echo "set output '$figures/$1.png'"; cat "$work/script"; } | LC_ALL= LC_CTYPE=C.UTF-8 LC_NUMERIC=C gnuplot
+  { echo "width = 481.89; height = 0.48189*$2; name = '$figures/$1'; about = '$3'; incomplete = ''"
+    cat core/cli/plot/templates/look.gp
+    echo "title = ''; unset xzeroaxis; unset offsets; eval page('png')"
+    cat "$work/script"; echo "unset multiplot"; } | LC_ALL= LC_CTYPE=C.UTF-8 LC_NUMERIC=C gnuplot
 }
 
 # Colour, mark and dash of a method's line: told apart in black and white too.
 style () {
   case $1 in
   rk4+*) echo "lc rgb '#004488' pt 7 dt 1" ;;
-  erk5+*) echo "lc rgb '#bb5566' pt 4 dt 1" ;;
-  erk8+*) echo "lc rgb '#997700' pt 9 dt 1" ;;
-  adams+*) echo "lc rgb '#228877' pt 6 dt (8,4)" ;;
-  bdf+*) echo "lc rgb '#228877' pt 13 dt (8,4)" ;;
-  ida+ggl) echo "lc rgb '#000000' pt 12 dt (14,5,3,5)" ;;
-  ida+*) echo "lc rgb '#000000' pt 5 dt (3,4)" ;;
-  *) echo "lc rgb '#774499' pt 2 dt (14,5)" ;;
+  erk5+*) echo "lc rgb '#cc6677' pt 4 dt 1" ;;
+  erk8+*) echo "lc rgb '#c49a00' pt 9 dt 1" ;;
+  adams+*) echo "lc rgb '#117755' pt 6 dt (8,4)" ;;
+  bdf+*) echo "lc rgb '#44aadd' pt 13 dt (8,4)" ;;
+  ida+ggl) echo "lc rgb '#000000' pt 12 dt (10,4,3,4)" ;;
+  ida+*) echo "lc rgb '#777777' pt 5 dt (3,3)" ;;
+  *) echo "lc rgb '#8844aa' pt 11 dt (10,4)" ;;
   esac
 }
 

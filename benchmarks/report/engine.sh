@@ -27,20 +27,19 @@ engine_figure () {
     split | awk -F '\t' -v what="$what, " 'index($1, what) == 1 && / bodies: ns per body/ {
       n = substr($1, length(what) + 1); sub(/ .*/, "", n); print n, $4 }' >"$work/$what"
   done
-  draw engine-growth 800 520 <<G
+  draw engine-growth 620 'Cost per body against the size of the scene' <<G
 set logscale xy
-set format x '1e%T'
+set format '10^{%T}'
 set xlabel 'bodies N'
 set ylabel 'time per body [ns]'
-set title 'Cost per body against the size of the scene'
-set key inside bottom right spacing 1.2
-set grid xtics ytics lc rgb '#dddddd' lt 1
+set key inside bottom right
+eval panel(left, width - right, 22, height - bottom)
 set xrange [7:150000]
-plot '$work/chain, evaluation' w lp lw 2 pt 7 lc rgb '#004488' t 'chain: one evaluation', \
-     '$work/chain, projection' w lp lw 2 pt 5 dt 2 lc rgb '#bb5566' t 'chain: one projection', \
-     '$work/chain, step of ida+ggl' w lp lw 2 pt 9 dt 4 lc rgb '#ddaa33' t 'chain: one step of ida+ggl', \
-     '$work/snake, evaluation' w lp lw 1 pt 6 dt 3 lc rgb '#228833' t 'wheeled snake: one evaluation', \
-     '$work/grid, evaluation' w lp lw 1 pt 4 dt 5 lc rgb '#666666' t 'grid of pinned bars: one evaluation'
+plot '$work/chain, evaluation' w lp lw 1.1 pt 7 lc rgb '#004488' t 'chain: one evaluation', \
+     '$work/chain, projection' w lp lw 1.1 pt 5 dt 2 lc rgb '#cc6677' t 'chain: one projection', \
+     '$work/chain, step of ida+ggl' w lp lw 1.1 pt 9 dt 4 lc rgb '#c49a00' t 'chain: one step of ida+ggl', \
+     '$work/snake, evaluation' w lp lw 0.7 pt 6 dt 3 lc rgb '#117755' t 'wheeled snake: one evaluation', \
+     '$work/grid, evaluation' w lp lw 0.7 pt 4 dt 5 lc rgb '#666666' t 'grid of pinned bars: one evaluation'
 G
 }
 

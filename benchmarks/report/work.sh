@@ -59,15 +59,13 @@ truth_table () {
 work_figure () {
   scenes=$(awk -F, 'NR > 1 && $1 != "original" && !($1 in seen) { seen[$1] = 1; print $1 }' "$csv")
   n=$(echo "$scenes" | wc -l) rows=$(((n + 2) / 3)) i=0
-  height=$((106 + 235 * rows))
+  height=$((140 + 240 * rows))
   {
-    echo "set multiplot"
-    echo "set border lw 0.8 lc rgb '#404040'; set tics nomirror out scale 0.5; set grid lt 1 lw 0.6 lc rgb '#dddddd'"
-    echo "set logscale xy; set format '1e%T'; unset key; set xtics 10; set ytics 100"
+    echo "set logscale xy; set format '10^{%T}'; unset key; set xtics 10; set ytics 100"
     for scene in $scenes; do
       column=$((i % 3)) row=$((i / 3)) i=$((i + 1)) last=$((n - i < 3))
-      echo "set lmargin at screen $(awk "BEGIN { print 0.07 + 0.318 * $column }"); set rmargin at screen $(awk "BEGIN { print 0.34 + 0.318 * $column }")"
-      echo "set tmargin at screen $(awk "BEGIN { print 1 - (92 + 235 * $row) / $height }"); set bmargin at screen $(awk "BEGIN { print 1 - (92 + 178 + 235 * $row) / $height }")"
+      echo "set lmargin at screen $(awk "BEGIN { print 0.085 + 0.318 * $column }"); set rmargin at screen $(awk "BEGIN { print 0.345 + 0.318 * $column }")"
+      echo "set tmargin at screen $(awk "BEGIN { print 1 - (112 + 240 * $row) / $height }"); set bmargin at screen $(awk "BEGIN { print 1 - (112 + 178 + 240 * $row) / $height }")"
       unit=$(awk -F, -v s="$scene" '$1 == s && $5 == "ok" { print $9 == "nan" ? " [rad]" : " [m]"; exit }' "$csv")
       echo "set title '$scene$unit' offset 0,-0.7"
       [ $column = 0 ] && echo "set ylabel 'largest error' offset 0.8,0" || echo 'unset ylabel'
@@ -75,20 +73,19 @@ work_figure () {
       plot=
       for m in $(present); do
         awk -F, -v s="$scene" -v m="$m" '{ e = $9 == "nan" ? $10 : $9 } $1 == s && $2 == m && $5 == "ok" && e > 0 && e < 10 { print $21, e }' "$csv" >"$work/$scene $m"
-        [ -s "$work/$scene $m" ] && plot="$plot${plot:+, }'$work/$scene $m' with linespoints lw 1.4 ps 0.6 $(style "$m")"
+        [ -s "$work/$scene $m" ] && plot="$plot${plot:+, }'$work/$scene $m' with linespoints lw 0.8 ps 0.4 $(style "$m")"
       done
       awk '{ if (!n++) { a = b = $1; c = d = $2 } if ($1 < a) a = $1; if ($1 > b) b = $1; if ($2 < c) c = $2; if ($2 > d) d = $2 }
         END { printf "set xrange [%g:%g]; set yrange [%g:%g]\n", a / 1.4, b * 1.4, c / 4, d * 4 }' "$work/$scene "*
       echo "plot $plot"
     done
-    echo "unset title; set label 'What accuracy costs, scene by scene' at screen 0.5,screen $(awk "BEGIN { print 1 - 16 / $height }") center font ',14'; unset xlabel; unset ylabel; set border 0; unset tics; unset grid"
-    echo "set lmargin at screen 0.05; set rmargin at screen 0.95; set tmargin at screen $(awk "BEGIN { print 1 - 30 / $height }"); set bmargin at screen $(awk "BEGIN { print 1 - 72 / $height }")"
+    echo "unset title; unset xlabel; unset ylabel; set border 0; unset tics; unset grid"
+    echo "set lmargin at screen 0.05; set rmargin at screen 0.95; set tmargin at screen $(awk "BEGIN { print 1 - 34 / $height }"); set bmargin at screen $(awk "BEGIN { print 1 - 82 / $height }")"
     echo "set key center center horizontal maxcols 4 samplen 4; set xrange [1:2]; set yrange [1:2]"
     plot=
-    for m in $(present); do plot="$plot${plot:+, }NaN with linespoints lw 1.4 ps 0.8 $(style "$m") title '$m'"; done
+    for m in $(present); do plot="$plot${plot:+, }NaN with linespoints lw 0.8 ps 0.5 $(style "$m") title '$m'"; done
     echo "plot $plot"
-    echo 'unset multiplot'
-  } | draw bench-work-precision 1000 "$height"
+  } | draw bench-work-precision "$height" 'What accuracy costs, scene by scene'
 }
 
 if [ -f "$csv" ]; then

@@ -46,13 +46,8 @@ static int sensitivity_unknowns (pw_sensitivity *x, pw_error *error) {
 }
 
 static int sensitivity_folder (const pw_sensitivity *x, int *lock, pw_error *error) {
-  static const char *const names[] = { "sensitivity.csv",
-                                       "sensitivity.json",
-                                       "sensitivity.dat",
-                                       "sensitivity.gp",
-                                       "sensitivity.svg",
-                                       "sensitivity.png",
-                                       NULL };
+  static const char *const names[] = { "sensitivity.csv", "sensitivity.json", "sensitivity.dat", "sensitivity.gp",
+                                       "sensitivity.svg", "sensitivity.png",  "sensitivity.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
   if (x->folder == NULL) return PW_OK;
   if (pw_cli_uses (&x->line, x->m.file, use, 2, error) != PW_OK) return error->status;

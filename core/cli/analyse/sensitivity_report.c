@@ -132,7 +132,10 @@ static void sensitivity_label (const pw_sensitivity *x, int o, int p, char *labe
 
 /* A block of data for each derivative, and its label. */
 static int sensitivity_figure (const pw_sensitivity *x, pw_error *error) {
-  pw_figures figures = { .folder = x->folder, .model = pw_file_name (x->m.file) };
+  pw_figures figures = { .folder = x->folder,
+                         .model = pw_file_name (x->m.file),
+                         .about = pw_file_table (x->m.file)->about };
+  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
   pw_output *o = pw_figure_data (&figures, "sensitivity.dat", error);
   if (o == NULL) return PW_RESOURCE;
   FILE *f = pw_output_stream (o);

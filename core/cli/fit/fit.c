@@ -160,7 +160,7 @@ static int fit_open_data (pw_fit *x, pw_error *error) {
 }
 
 static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_error *error) {
-  static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", NULL };
+  static const char *const figures[] = { "fit.dat", "fit.gp", "fit.svg", "fit.png", "fit.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE,
                    { "--data", x->data_path, PW_READS, NULL },
                    { "-o", x->path, PW_WRITES, NULL },
@@ -236,6 +236,7 @@ static const struct poptOption fit_options_table[] = {
   PW_TEXT_OPTION (pw_fit, path, "output", 'o', "FILE.csv", "Write data, model values and residuals to this file"),
   PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),
   PW_TEXT_OPTION (pw_fit, plots_path, "plots", 0, "DIR", "Write figures of data, model and residuals into a folder"),
+  PW_WIDTH_OPTION,
   PW_OPTION_GROUP ("Integration"),
   PW_TEXT_OPTION (pw_cli_line, method, "method", 'm', "METHOD",
                   "Integrator and stabilisation, see `pinwheel list methods`"),

@@ -273,8 +273,9 @@ static int report_data (const pw_fit *x, pw_figures *figures, pw_error *error) {
 
 int pw_fit_draw (const pw_fit *x, pw_error *error) {
   static const char *const names[] = { "fit", NULL };
-  pw_figures figures = { x->plots_path, pw_file_name (x->m.file), "" };
+  pw_figures figures = { x->plots_path, pw_file_name (x->m.file), "", pw_file_table (x->m.file)->about, 0 };
   char label[300];
+  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
   if (report_data (x, &figures, error) != PW_OK) return error->status;
   pw_output *o = pw_figure_begin (&figures, names[0], error);
   if (o == NULL) return error->status;

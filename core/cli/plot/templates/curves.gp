@@ -8,8 +8,10 @@ if (!numbered) {
   do for [i = 1:curves] { longest = max(longest, strlen(short(label[i]))) }
 }
 above = top # of the legend
-if (numbered) { right = 46 } else { top = top + rows(curves, columns(longest)) }
-legend(bar) = !numbered ? key(above, columns(longest)) : \
+items = numbered ? 0 : curves
+per_row = columns(longest)
+if (numbered) { right = 46 } else { top = top + rows(items, per_row) }
+legend(bar) = !numbered ? key(above, per_row) : \
   sprintf("unset key; set cbrange [1:%d]; set cblabel 'number of the %s'; ", numbers, what). \
   (bar ? 'set colorbox user origin graph 1.02,graph 0 size graph 0.02,graph 1' : 'unset colorbox')
 draw(x, y, n, titled) = numbered ? \

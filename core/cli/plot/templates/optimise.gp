@@ -26,7 +26,7 @@ do for [form in forms] {
   set xrange [0:1]
   set yrange [0:1]
   eval panel(left, width - right, above - 1, top - 1)
-  plot for [i = 1:3] keyentry with points ls i title word('feasible infeasible best', i)
+  plot for [i = 1:3] NaN with points ls i title word('feasible infeasible best', i)
   unset key
   set tics scale 0.5
   set format '%g'
@@ -40,8 +40,8 @@ do for [form in forms] {
     x = left + place*(wide + gap)
     y = top + row*(high + gap)
     eval panel(x, x + wide, y, y + high)
-    set xlabel label[i]
-    set ylabel (place == 0 ? short(objective) : '')
+    set xlabel label[i] noenhanced
+    set ylabel (place == 0 ? short(objective) : '') noenhanced
     plot 'optimise.dat' using 1 + i:(column(3 + unknowns) == 0 ? column(2 + unknowns) : NaN) with points ls 2 notitle, \
       '' using 1 + i:(column(3 + unknowns) == 1 ? column(2 + unknowns) : NaN) with points ls 1 notitle, \
       '+' using (best[i]):(value) every 100000 with points ls 3 notitle

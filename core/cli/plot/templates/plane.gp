@@ -3,12 +3,11 @@
 # Panel i shows x0[i] to x1[i] and y0[i] to y1[i], at px0[i] to px1[i] and py0[i] to py1[i] of the page.
 
 if (name eq 'mechanism' && by_time) { bottom = bottom + 40 } # room for a colour bar
-if (name eq 'mechanism' && !by_time && bodies) { # room for a legend
-  longest = 0
-  do for [i = 1:bodies] { longest = max(longest, strlen(short(body[i]))) }
+if (name eq 'mechanism') {
   above = top
-  per_row = columns(longest)
-  top = top + rows(bodies, per_row)
+  longest = 0
+  items = by_time ? 0 : bodies
+  do for [i = 1:items] { longest = max(longest, strlen(short(body[i]))) }
 }
 panels = t_detail > 0 ? 2 : 1
 array px0[2]
@@ -71,6 +70,13 @@ if (panels == 1) {
   py1[1] = py0[1] + max(0.4*wide*aspect(1, 0.5, 1.6), 0.6*wide*aspect(2, 0.5, 1.1))
   py1[2] = py1[1]
 }}
+# The legend is as wide as the first panel.
+per_row = max(1, int((px1[1] - px0[1])/(28 + letter*longest)))
+shift = items ? rows(items, per_row) - (top - above) : 0
+do for [i = 1:panels] {
+  py0[i] = py0[i] + shift
+  py1[i] = py1[i] + shift
+}
 height = py1[panels] + bottom
 do for [i = 1:panels] {
   ratio = (py1[i] - py0[i])/(px1[i] - px0[i])

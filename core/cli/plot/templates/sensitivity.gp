@@ -3,20 +3,23 @@
 
 data = name.'.dat'
 title = 'derivatives along the run'
-height = top + panels*(268 + 22*unknowns) + bottom - 24
+eval lines(unknowns)
+high = 112.0
+gap = 34.0
+above = rows(unknowns, 1)
+height = top + panels*(above + high + gap) - gap + bottom
 set xrange [0:t_end]
-do for [form in 'svg png'] {
+do for [form in forms] {
   eval page(form)
   y = top
   do for [k = 1:panels] {
-    y = y + 22*unknowns
-    eval key(y - 22*unknowns + 4, 1).' samplen 3.5'
+    eval key(y, 1)
     set xlabel (k == panels ? 't [s]' : '')
-    set ylabel short(output[k])
-    eval panel(left, width - right, y, y + 220)
+    set ylabel short(output[k]) noenhanced
+    eval panel(left, width - right, y + above, y + above + high)
     plot for [i = 1:unknowns] data index (k - 1)*unknowns + i - 1 using 1:2 with lines lt i \
       title label[(k - 1)*unknowns + i]
-    y = y + 268
+    y = y + above + high + gap
   }
   unset multiplot
   unset output
