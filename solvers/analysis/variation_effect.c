@@ -11,8 +11,8 @@ static void effect_add (double *to, const double *from, double weight, int n) {
   for (int i = 0; i < n; i++) to[i] += weight * from[i];
 }
 
-/* The rows of a batch of a neighbour, weighted for both columns. */
-static void effect_rows (pw_variation *x, pw_direction_copy *d, pw_element_batch *k, const double weight[2]) {
+/* The rows of a batch of a neighbour. */
+static void effect_rows (pw_variation *x, double *effect, double *row, pw_element_batch *k, double weight) {
   const pw_linearisation *l = &x->linear;
   int rows = k->kind->rows, n = x->n, m = x->m;
   double *gamma = l->z, *g = gamma + m, *eta = g + m;
@@ -30,40 +30,47 @@ static void effect_rows (pw_variation *x, pw_direction_copy *d, pw_element_batch
       if (j >= n) continue;
       acceleration -= *J * l->a[j];
       velocity += *J * x->v[j];
-      for (int w = 0; w < 2; w++) d->effect[w][j] -= weight[w] * *J * l->lambda[i];
+      effect[j] -= weight * *J * l->lambda[i];
     }
-    for (int w = 0; w < 2; w++) {
-      d->effect[w][n + i] += weight[w] * acceleration;
-      d->row[w][i] += weight[w] * g[r];
-      d->row[w][m + i] += weight[w] * velocity;
-    }
+    effect[n + i] += weight * acceleration;
+    row[i] += weight * g[r];
+    row[m + i] += weight * velocity;
   }
 }
 
-static void effect_force (pw_variation *x, pw_direction_copy *d, pw_element_batch *k, const double weight[2]) {
+static void effect_force (pw_variation *x, double *effect, pw_element_batch *k, double weight) {
   const double *f = k->block;
   k->kind->force (&k->b, k->block);
   for (int e = 0; e < k->b.count; e++)
     for (int c = 0; c < k->b.cols; c++, f++) {
       int j = pw_global (k, e, c);
-      for (int w = 0; w < 2 && j < x->n; w++) d->effect[w][j] += weight[w] * *f;
+      if (j < x->n) effect[j] += weight * *f;
     }
 }
 
-/* Adds f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run, without the
- * elements that are the same in all neighbours. */
-static int effect_neighbour (pw_variation *x, pw_direction_copy *d, pw_workspace *w, double t, const double weight[2]) {
+/* Adds f - M a - J^T lambda, gamma - J a; g and J v - eta of a neighbour's system at the state of the run to those of
+ * column c, without the elements that are the same in all neighbours. */
+static void effect_add_to (pw_variation *x, pw_direction_copy *d, pw_workspace *w, int c, double weight) {
+  const pw_system *s = w->s;
+  for (int i = 0; i < s->batches; i++) {
+    const pw_kind *kind = w->batch[i].kind;
+    if (!d->changes[i]) continue;
+    if (kind->rows > 0) effect_rows (x, d->effect[c], d->row[c], &w->batch[i], weight);
+    if (kind->force && !kind->constant) effect_force (x, d->effect[c], &w->batch[i], weight);
+  }
+  for (int j = 0; j < x->n && d->changes[s->batches]; j++)
+    d->effect[c][j] += weight * (s->constant[j] - s->mass[j] * x->linear.a[j]);
+}
+
+static int effect_neighbour (pw_variation *x, pw_direction_copy *d, int i, double t) {
+  pw_workspace *w = d->given.neighbour[i]->w;
   memcpy (w->configuration, x->r->w->configuration, (size_t)w->s->bodies * sizeof *w->configuration);
   pw_point_to_internal (w, x->q, x->v);
   int status = d->signals ? pw_update_signals (w, t, x->q, x->v) : PW_OK;
-  for (int i = 0; i < w->s->batches && status == PW_OK; i++) {
-    const pw_kind *kind = w->batch[i].kind;
-    if (!d->changes[i]) continue;
-    if (kind->rows > 0) effect_rows (x, d, &w->batch[i], weight);
-    if (kind->force && !kind->constant) effect_force (x, d, &w->batch[i], weight);
+  for (int c = 0; c < 2 && status == PW_OK; c++) {
+    double weight = pw_variation_weight (&d->given, c, i);
+    if (weight != 0) effect_add_to (x, d, w, c, weight);
   }
-  for (int j = 0; j < x->n && d->changes[w->s->batches]; j++)
-    for (int c = 0; c < 2; c++) d->effect[c][j] += weight[c] * (w->s->constant[j] - w->s->mass[j] * x->linear.a[j]);
   return status;
 }
 
@@ -78,10 +85,8 @@ static int effect_direction (pw_variation *x, pw_direction_copy *d, double t) {
     memset (d->effect[c], 0, (size_t)length * sizeof (double));
     memset (d->row[c], 0, (size_t)rows * sizeof (double));
   }
-  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->columns > 1; i++) {
-    const double weight[2] = { pw_variation_weight (&d->given, 0, i), pw_variation_weight (&d->given, 1, i) };
-    status = effect_neighbour (x, d, d->given.neighbour[i]->w, effect_time (d, t), weight);
-  }
+  for (int i = 0; i < PW_VARIATION_NEAR && status == PW_OK && d->columns > 1; i++)
+    status = effect_neighbour (x, d, i, effect_time (d, t));
   return status;
 }
 
