@@ -72,7 +72,7 @@ struct pw_variation {
 int pw_variation_record (pw_variation *x, double t0, pw_error *error);
 /* Forgets states before t. */
 void pw_variation_forget (pw_variation *x);
-/* The state at a time, by Hermite interpolation with q, v, a at both ends: 3 n numbers. */
+/* The state at a time, q and v, by Hermite interpolation. */
 void pw_variation_state (const pw_variation *x, double t, double *out);
 
 /* ---- variation_effect.c ---- */

@@ -5,21 +5,22 @@
 #include "util.h"
 #include "variation.h"
 
-enum { PATH_DEPTH = 12 }; /* of bisection */
+enum { PATH_DEPTH = 6 }; /* of bisection */
 
-/* Quintic Hermite interpolation between two points, t_0 + u h: q from q, v, a at both ends (error h^6 / 46080 times the
- * sixth derivative at the middle), v and a its derivatives. */
+/* Hermite interpolation between two points, t_0 + u h: q of degree 5 from q, v, a at both ends.  v is its derivative for a
+ * run with fixed steps.  Otherwise the errors of a run in q and v may differ, and v is of degree 3 from v and a; the points
+ * are dense enough. */
 static void path_interpolate (const pw_variation *x, const pw_variation_point *p, double t, double *out) {
-  int n = x->n;
-  double h = p[1].t - p[0].t, u = (t - p[0].t) / h;
+  int n = x->n, fixed = pw_fixed_steps (x->r);
+  double h = p[1].t - p[0].t, u = (t - p[0].t) / h, up = u * u * (3 - 2 * u), w = u * (1 - u);
   for (int j = 0; j < n; j++) {
     const double *l = p[0].x + j, *r = p[1].x + j;
     double v0 = h * l[n], a0 = h * h * l[2 * n] / 2, v1 = h * r[n], a1 = h * h * r[2 * n] / 2;
     double d = r[0] - l[0] - v0 - a0, e = v1 - v0 - 2 * a0, f = a1 - a0;
     double c3 = 10 * d - 4 * e + f, c4 = -15 * d + 7 * e - 2 * f, c5 = 6 * d - 3 * e + f;
     out[j] = l[0] + u * (v0 + u * (a0 + u * (c3 + u * (c4 + u * c5))));
-    out[n + j] = (v0 + u * (2 * a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h;
-    out[2 * n + j] = (2 * a0 + u * (6 * c3 + u * (12 * c4 + u * 20 * c5))) / (h * h);
+    out[n + j] = fixed ? (v0 + u * (2 * a0 + u * (3 * c3 + u * (4 * c4 + u * 5 * c5)))) / h
+                       : l[n] + up * (r[n] - l[n]) + h * w * ((1 - u) * l[2 * n] - u * r[2 * n]);
   }
 }
 
@@ -29,7 +30,7 @@ void pw_variation_state (const pw_variation *x, double t, double *out) {
   if (x->points > 1 && t < x->point[i + 1].t)
     path_interpolate (x, x->point + i, t, out);
   else
-    memcpy (out, x->point[x->points > 1 ? i + 1 : 0].x, 3 * (size_t)x->n * sizeof *out);
+    memcpy (out, x->point[x->points > 1 ? i + 1 : 0].x, 2 * (size_t)x->n * sizeof *out);
 }
 
 void pw_variation_forget (pw_variation *x) {

@@ -202,6 +202,40 @@ static void gallery_check (const gallery_name *g, double value, const pw_setting
   free (by_runs);
 }
 
+/* The derivatives of the state by a parameter. */
+static void gallery_derive (const gallery_name *g, double value, const char *method, const pw_settings *settings,
+                            double t, double *out) {
+  pw_error error = { 0 };
+  pw_sample x;
+  variation_case c = variation_open (gallery_make, g, value, 1e-5 * value, method, settings);
+  size_t bytes = (size_t)pw_system_coordinates (c.s) * sizeof (double);
+  pw_variation *v = pw_variation_open (c.r, &c.d, 1, 0, &error);
+  check_ok (error.status, &error);
+  check_ok (pw_variation_advance (v, t, t, &error), &error);
+  check_ok (pw_variation_sample (v, 0, &x, NULL, &error), &error);
+  memcpy (out, x.q, bytes);
+  memcpy (out + pw_system_coordinates (c.s), x.v, bytes);
+  pw_variation_close (v);
+  variation_free (&c);
+}
+
+/* Methods of every family agree on a vehicle. */
+static void test_methods (void **state) {
+  static const char *const methods[] = { "rk4+nullspace", "rk4+baumgarte",  "erk5+projection", "erk8+projection",
+                                         "adams",         "bdf+projection", "ida+ggl",         "radau+ggl",
+                                         "galpha+ggl",    "leapfrog+rattle" };
+  double expected[24], x[24];
+  const gallery_name g = { "snakeboard", "steer" };
+  pw_settings settings = { .step = 5e-4, .rtol = 1e-9, .span = 2 };
+  (void)state;
+  gallery_derive (&g, 0.4, "rk4+projection", &settings, 2, expected);
+  for (size_t i = 0; i < sizeof methods / sizeof *methods; i++) {
+    gallery_derive (&g, 0.4, methods[i], &settings, 2, x);
+    for (int j = 0; j < 24; j++)
+      check_close (methods[i], x[j], expected[j], i < 8 ? 2e-6 : 2e-5, "1000 rtol, or (2 h w)^2 with w = 4 / s");
+  }
+}
+
 /* Not differentiable there. */
 static int gallery_excepted (const char *model, const char *parameter) {
   static const gallery_name excepted[] = {
@@ -275,8 +309,8 @@ static void test_run (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_gallery),
-    cmocka_unit_test (test_refusals),   cmocka_unit_test (test_run),
+    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_methods),
+    cmocka_unit_test (test_gallery),    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_run),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -2,19 +2,28 @@
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 #include "figure.h"
 #include "report.h"
 #include "sensitivity.h"
 
-enum { SENSITIVITY_ROWS = 200 };
+enum { SENSITIVITY_ROWS = 200, SENSITIVITY_PARTS = 20 };
+
+/* Without integrals and a table, derivatives are evaluated at few times, for the progress. */
+static int sensitivity_integrates (const pw_sensitivity *x) {
+  int integrates = 0;
+  for (const char **of = x->of; of && *of; of++)
+    integrates |= strstr (*of, "integral:") || strstr (*of, "mean:") || strstr (*of, "rms:");
+  return integrates;
+}
 
 static int sensitivity_settings (pw_sensitivity *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   pw_specialise when;
   x->method = x->line.method ? x->line.method : d.method;
   int status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
-  x->dt = x->t_end / SENSITIVITY_ROWS;
+  x->dt = x->t_end / (x->folder || sensitivity_integrates (x) ? SENSITIVITY_ROWS : SENSITIVITY_PARTS);
   if (status == PW_OK) status = pw_cli_number ("--every", x->every, PW_POSITIVE, &x->dt, error);
   if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &when, error);
   if (status != PW_OK) return status;
