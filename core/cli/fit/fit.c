@@ -1,7 +1,6 @@
 /* pinwheel fit: parameters and initial values with which a model agrees best with measured data. */
 #define _POSIX_C_SOURCE 200809L
 #include "fit.h"
-#include <float.h>
 #include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>
@@ -41,83 +40,6 @@ int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *
   pw_outcomes_close (&o);
   pw_cli_close_model (&m);
   free (row);
-  return status;
-}
-
-/* ---- Derivatives ---- */
-
-/* Values of an adaptive method are smooth up to its tolerance, those of fixed steps up to round-off. */
-static double fit_smooth (const pw_fit *x) {
-  const pw_method *method;
-  int stabilisation;
-  if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
-      !pw_cli_adaptive (method, x->unknowns.method))
-    return DBL_EPSILON;
-  return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
-}
-
-double pw_fit_noise (const pw_fit *x) {
-  return pow (fit_smooth (x), 2. / 3);
-}
-
-/* Runs on both sides of each unknown. */
-typedef struct {
-  const pw_fit *x;
-  const double *at;
-  double *run, *step; /* 2 unknowns arrays; distances from `at` */
-  pw_error *error;    /* 2 unknowns */
-} fit_differences;
-
-/* The step balances the truncation error, of its square, and noise over the step. */
-static void fit_side (void *context, int task) {
-  fit_differences *d = context;
-  const pw_fit *x = d->x;
-  const pw_unknown *u = x->unknowns.at + task / 2;
-  int n = x->unknowns.count;
-  double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
-  if (at == NULL) {
-    pw_fail (d->error + task, PW_RESOURCE, "out of memory");
-    return;
-  }
-  memcpy (at, d->at, (size_t)n * sizeof *at);
-  at[task / 2] = fmin (fmax (at[task / 2] + (task % 2 ? 1 : -1) * size * cbrt (fit_smooth (x)), u->low), u->high);
-  d->step[task] = at[task / 2] - d->at[task / 2];
-  int status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, d->error + task);
-  d->error[task].status = status;
-  free (at);
-}
-
-/* One side is enough, if the other one fails. */
-static int fit_column (const fit_differences *d, int j, const double *model, double *out, pw_error *error) {
-  size_t cells = (size_t)d->x->columns * (size_t)d->x->rows;
-  const double *side[2];
-  double step[2];
-  for (int k = 0; k < 2; k++) {
-    int failed = d->error[2 * j + k].status != PW_OK;
-    if (failed && (d->error[2 * j + k].status == PW_RETRY || d->error[2 * j + k].status == PW_RESOURCE ||
-                   d->error[2 * j + !k].status != PW_OK))
-      return *error = d->error[2 * j + k], error->status;
-    side[k] = failed ? model : d->run + (size_t)(2 * j + k) * cells;
-    step[k] = failed ? 0 : d->step[2 * j + k];
-  }
-  for (size_t i = 0; i < cells; i++) out[i] = (side[1][i] - side[0][i]) / (step[1] - step[0]);
-  return PW_OK;
-}
-
-int pw_fit_jacobian (pw_fit *x, const double *at, const double *model, double *jacobian, pw_error *error) {
-  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
-  fit_differences d = { x, at, malloc ((2 * n * cells + 2 * n) * sizeof *d.run), NULL,
-                        calloc (2 * n, sizeof *d.error) };
-  int status = d.run && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
-  if (status == PW_OK) {
-    d.step = d.run + 2 * n * cells;
-    status = pw_parallel (x->jobs, (int)(2 * n), fit_side, &d, error);
-    x->runs += 2 * (long)n;
-  }
-  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++)
-    status = fit_column (&d, j, model, jacobian + (size_t)j * cells, error);
-  free (d.run);
-  free (d.error);
   return status;
 }
 

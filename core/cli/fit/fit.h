@@ -33,6 +33,7 @@ typedef struct {
   int rank;       /* singular values that differ from 0 */
   double chi2;    /* sum of squares of (model - data) / sigma */
   double initial_chi2;
+  int by_differences; /* 1: derivatives are those of runs, since the variational equations could not be used */
   int converged, iterations;
   long runs;
   pw_progress progress;
@@ -41,8 +42,8 @@ typedef struct {
 /* Runs the model with values of the unknowns; out: columns x rows.  A status; PW_RETRY after Ctrl-C. */
 int pw_fit_run (const pw_fit *x, const double *unknowns, double *out, pw_error *error);
 
-/* The derivatives of all model values by each unknown at x, unknowns arrays of columns x rows; at: model values there.
- * Central differences. */
+/* The derivatives of all model values by each unknown at x, unknowns arrays of columns x rows; model: values there.
+ * By the variational equations, or if a derivative does not exist by central differences of concurrent runs. */
 int pw_fit_jacobian (pw_fit *x, const double *at, const double *model, double *jacobian, pw_error *error);
 /* Relative error of these derivatives. */
 double pw_fit_noise (const pw_fit *x);

@@ -23,7 +23,7 @@ static double report_end (const pw_fit *x, int i, int side) {
 }
 
 static const char *report_bound (const pw_fit *x, int i) {
-  const pw_unknown *u = x->unknowns.at + i;
+  const pw_free_number *u = x->unknowns.at + i;
   double near = 1e-3 * u->scale;
   return x->x[i] - u->low < near ? "at its lower bound" : u->high - x->x[i] < near ? "at its upper bound" : "";
 }
@@ -147,14 +147,15 @@ void pw_fit_print (const pw_fit *x) {
             pw_format (initial, x->initial_chi2, 6));
   report_correlations (x);
   report_undetermined (x);
-  printf ("\n%ld runs, %d iterations\n", x->runs, x->iterations);
+  printf ("\n%ld runs, %d iterations, derivatives by %s\n", x->runs, x->iterations,
+          x->by_differences ? "differences of runs" : "the variational equations");
   if (pw_unknowns_options (&x->unknowns, x->x, options, sizeof options)) printf ("\n%s\n", options);
 }
 
 /* ---- Files ---- */
 
 static void report_json_unknown (const pw_fit *x, pw_json *j, int i) {
-  const pw_unknown *u = x->unknowns.at + i;
+  const pw_free_number *u = x->unknowns.at + i;
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "name", u->name);
@@ -218,6 +219,7 @@ void pw_fit_json (const pw_fit *x, const char *status, FILE *f) {
   pw_json_number (j, "rank", x->rank);
   pw_json_number (j, "runs", (double)x->runs);
   pw_json_number (j, "iterations", x->iterations);
+  pw_json_text (j, "derivatives", x->by_differences ? "differences" : "variational");
   pw_json_open (j, "unknowns", '[');
   for (int i = 0; i < x->unknowns.count; i++) report_json_unknown (x, j, i);
   pw_json_close (j, ']');

@@ -29,20 +29,20 @@ typedef struct {
 
 /* ---- Bounds ---- */
 
-static double solve_unknown (const pw_unknown *k, double u) {
+static double solve_unknown (const pw_free_number *k, double u) {
   if (isfinite (k->low) && isfinite (k->high)) return k->low + (k->high - k->low) * (1 + sin (u)) / 2;
   if (isfinite (k->low)) return k->low + k->scale * (sqrt (1 + u * u) - 1);
   return u * k->scale;
 }
 
-static double solve_slope (const pw_unknown *k, double u) {
+static double solve_slope (const pw_free_number *k, double u) {
   if (isfinite (k->low) && isfinite (k->high)) return (k->high - k->low) * cos (u) / 2;
   if (isfinite (k->low)) return k->scale * u / sqrt (1 + u * u);
   return k->scale;
 }
 
 /* The slope is not 0 there. */
-static double solve_start (const pw_unknown *k) {
+static double solve_start (const pw_free_number *k) {
   double part = isfinite (k->high) ? (k->value - k->low) / (k->high - k->low) : (k->value - k->low) / k->scale;
   part = fmax (part, SOLVE_INSIDE);
   if (isfinite (k->low) && isfinite (k->high)) return asin (2 * fmin (part, 1 - SOLVE_INSIDE) - 1);
@@ -164,7 +164,7 @@ static void solve_scale (pw_fit *x, gsl_matrix *J) {
 static int solve_converged (const pw_fit *x, const gsl_matrix *J) {
   double size = sqrt (x->chi2), worst = 0, noise = fmax (SOLVE_GRADIENT, pw_fit_noise (x));
   for (int j = 0; j < x->unknowns.count; j++) {
-    const pw_unknown *u = x->unknowns.at + j;
+    const pw_free_number *u = x->unknowns.at + j;
     double dot = 0, near = SOLVE_INSIDE * u->scale;
     if (x->x[j] - u->low < near || u->high - x->x[j] < near) continue;
     for (int i = 0, k = 0; i < x->columns * x->rows; i++)

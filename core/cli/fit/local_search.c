@@ -21,11 +21,11 @@ typedef struct {
   double least, most; /* objectives of the runs that succeeded */
 } search;
 
-double pw_search_unknown (const pw_unknown *k, double u) {
+double pw_search_unknown (const pw_free_number *k, double u) {
   return fmin (fmax (k->given ? k->low + u * k->scale : u * k->scale, k->low), k->high);
 }
 
-static double search_scaled (const pw_unknown *k, double x) {
+static double search_scaled (const pw_free_number *k, double x) {
   return k->given ? (x - k->low) / k->scale : x / k->scale;
 }
 

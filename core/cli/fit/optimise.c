@@ -31,7 +31,7 @@ static int optimise_points (pw_optimise *x) {
     for (int j = 0; i == 0 && j < k->count; j++) x->start[0].first[j] = k->at[j].value;
     if (i > 0) gsl_qrng_get (sobol, point);
     for (int j = 0; i > 0 && j < k->count; j++) {
-      const pw_unknown *u = k->at + j;
+      const pw_free_number *u = k->at + j;
       double part = fmod (point[j] + shift[j], 1);
       x->start[i].first[j] =
           u->given ? pw_search_unknown (u, part) : fmin (fmax (u->value + (2 * part - 1) * u->scale, u->low), u->high);
@@ -186,7 +186,7 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
 /* ---- After the search ---- */
 
 int pw_optimise_at_bound (const pw_optimise *x, int i, double value) {
-  const pw_unknown *u = x->unknowns.at + i;
+  const pw_free_number *u = x->unknowns.at + i;
   double near = 10 * PW_SEARCH_FINE * u->scale;
   return value - u->low <= near ? -1 : u->high - value <= near;
 }

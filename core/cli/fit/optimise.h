@@ -44,7 +44,7 @@ typedef struct {
 #define PW_SEARCH_FINE 1e-7 /* last steps of the results that continue, relative to the scales of the unknowns */
 
 /* The value of an unknown: u is from 0 to 1 between the user's bounds, otherwise in units of its scale. */
-double pw_search_unknown (const pw_unknown *k, double u);
+double pw_search_unknown (const pw_free_number *k, double u);
 
 /* 1 if outputs satisfy the constraints, with an allowance for the last digits of a solution on the boundary. */
 int pw_search_feasible (const pw_optimise *x, const double *value);

@@ -52,7 +52,7 @@ static void report_unknowns (const pw_optimise *x) {
     for (int i = 0; head[i]; i++) pw_cell (&t, i ? 12 : -12, head[i]);
     pw_row_end (&t);
     for (int i = 0; i < x->unknowns.count; i++) {
-      const pw_unknown *u = x->unknowns.at + i;
+      const pw_free_number *u = x->unknowns.at + i;
       pw_cell_unit (&t, -12, u->name, u->unit);
       pw_cell_number (&t, 12, u->value, REPORT_DIGITS);
       pw_cell_number (&t, 12, x->start[x->best].best[i], REPORT_DIGITS);
@@ -100,7 +100,7 @@ void pw_optimise_print (const pw_optimise *x) {
 /* ---- JSON ---- */
 
 static void report_json_unknown (const pw_optimise *x, pw_json *j, int i) {
-  const pw_unknown *u = x->unknowns.at + i;
+  const pw_free_number *u = x->unknowns.at + i;
   j->line = 1;
   pw_json_open (j, NULL, '{');
   pw_json_text (j, "name", u->name);
@@ -234,7 +234,7 @@ int pw_optimise_draw (const pw_optimise *x, pw_error *error) {
   fprintf (f, "panels = %d\nunknowns = %d\narray label[%d]\narray best[%d]\n", panels, x->unknowns.count, panels,
            panels);
   for (int i = 0; i < panels; i++) {
-    const pw_unknown *u = x->unknowns.at + i;
+    const pw_free_number *u = x->unknowns.at + i;
     snprintf (label, sizeof label, "%s%s%s%s", u->name, *u->unit ? " [" : "", u->unit, *u->unit ? "]" : "");
     pw_figure_element (f, "label", i + 1, label);
     fprintf (f, "best[%d] = %s\n", i + 1, pw_format (number, x->start[x->best].best[i], 12));

@@ -13,7 +13,7 @@ static const pw_parameter *unknowns_parameter (const pw_model *m, const char *na
 }
 
 /* An unknown name is reported as --set or --start would. */
-static int unknowns_find (pw_unknown *u, const pw_cli_model *m, pw_error *error) {
+static int unknowns_find (pw_free_number *u, const pw_cli_model *m, pw_error *error) {
   u->parameter = unknowns_parameter (m->model, u->name);
   if (u->parameter) {
     u->unit = u->parameter->unit;
@@ -38,7 +38,7 @@ static int unknowns_find (pw_unknown *u, const pw_cli_model *m, pw_error *error)
 }
 
 /* "LOW:HIGH" */
-static int unknowns_bounds (pw_unknown *u, char *text, pw_error *error) {
+static int unknowns_bounds (pw_free_number *u, char *text, pw_error *error) {
   char *colon = strchr (text, ':');
   double low, high;
   if (colon) *colon = 0;
@@ -66,7 +66,7 @@ static int unknowns_add (pw_unknowns *u, const char *text, pw_error *error) {
   if (equals) *equals = 0;
   for (int i = 0; i < u->count; i++)
     if (strcmp (u->at[i].name, copy) == 0) return pw_fail (error, PW_INPUT, "--free %s is given twice", copy);
-  pw_unknown *x = u->at + u->count;
+  pw_free_number *x = u->at + u->count;
   if ((x->name = strdup (copy)) == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   u->count++;
   int status = unknowns_find (x, u->m, error);

@@ -12,10 +12,10 @@ typedef struct {
   double low, high;              /* bounds; infinite without one */
   double scale;                  /* size of typical changes: the distance of the bounds, else |value|, else 1 */
   int given;                     /* 1: the bounds are the user's */
-} pw_unknown;
+} pw_free_number;
 
 typedef struct {
-  pw_unknown *at;
+  pw_free_number *at;
   int count;
   /* of all runs */
   const pw_cli_line *line;

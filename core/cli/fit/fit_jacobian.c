@@ -1,0 +1,180 @@
+/* Derivatives of the model values of a fit: by the variational equations, or if these cannot be used by differences. */
+#define _POSIX_C_SOURCE 200809L
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+#include "fit.h"
+#include "parallel.h"
+#include "sensitivity_direction.h"
+
+#define JACOBIAN_EXACT 1e-8 /* relative error of derivatives by the variational equations */
+
+/* ---- Differences ---- */
+
+/* Values of an adaptive method are smooth up to its tolerance, those of fixed steps up to round-off. */
+static double jacobian_smooth (const pw_fit *x) {
+  const pw_method *method;
+  int stabilisation;
+  if (pw_method_parse (x->unknowns.method, &method, &stabilisation, NULL) != PW_OK ||
+      !pw_cli_adaptive (method, x->unknowns.method))
+    return DBL_EPSILON;
+  return x->unknowns.settings.rtol > 0 ? x->unknowns.settings.rtol : 1e-6;
+}
+
+double pw_fit_noise (const pw_fit *x) {
+  double smooth = jacobian_smooth (x);
+  return x->by_differences ? pow (smooth, 2. / 3) : fmax (smooth, JACOBIAN_EXACT);
+}
+
+/* Runs on both sides of each unknown. */
+typedef struct {
+  const pw_fit *x;
+  const double *at;
+  double *run, *step; /* 2 unknowns arrays; distances from `at` */
+  pw_error *error;    /* 2 unknowns */
+} jacobian_differences;
+
+/* The step balances the truncation error, of its square, and noise over the step. */
+static void jacobian_side (void *context, int task) {
+  jacobian_differences *d = context;
+  const pw_fit *x = d->x;
+  const pw_free_number *u = x->unknowns.at + task / 2;
+  int n = x->unknowns.count;
+  double *at = malloc ((size_t)n * sizeof *at), size = fmax (fabs (d->at[task / 2]), 1e-2 * u->scale);
+  if (at == NULL) {
+    pw_fail (d->error + task, PW_RESOURCE, "out of memory");
+    return;
+  }
+  memcpy (at, d->at, (size_t)n * sizeof *at);
+  at[task / 2] = fmin (fmax (at[task / 2] + (task % 2 ? 1 : -1) * size * cbrt (jacobian_smooth (x)), u->low), u->high);
+  d->step[task] = at[task / 2] - d->at[task / 2];
+  int status = pw_fit_run (x, at, d->run + (size_t)task * (size_t)x->columns * (size_t)x->rows, d->error + task);
+  d->error[task].status = status;
+  free (at);
+}
+
+/* One side is enough, if the other one fails. */
+static int jacobian_column (const jacobian_differences *d, int j, const double *model, double *out, pw_error *error) {
+  size_t cells = (size_t)d->x->columns * (size_t)d->x->rows;
+  const double *side[2];
+  double step[2];
+  for (int k = 0; k < 2; k++) {
+    int failed = d->error[2 * j + k].status != PW_OK;
+    if (failed && (d->error[2 * j + k].status == PW_RETRY || d->error[2 * j + k].status == PW_RESOURCE ||
+                   d->error[2 * j + !k].status != PW_OK))
+      return *error = d->error[2 * j + k], error->status;
+    side[k] = failed ? model : d->run + (size_t)(2 * j + k) * cells;
+    step[k] = failed ? 0 : d->step[2 * j + k];
+  }
+  for (size_t i = 0; i < cells; i++) out[i] = (side[1][i] - side[0][i]) / (step[1] - step[0]);
+  return PW_OK;
+}
+
+static int jacobian_by_differences (pw_fit *x, const double *at, const double *model, double *jacobian,
+                                    pw_error *error) {
+  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
+  jacobian_differences d = { x, at, malloc ((2 * n * cells + 2 * n) * sizeof *d.run), NULL,
+                             calloc (2 * n, sizeof *d.error) };
+  int status = d.run && d.error ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
+  if (status == PW_OK) {
+    d.step = d.run + 2 * n * cells;
+    status = pw_parallel (x->jobs, (int)(2 * n), jacobian_side, &d, error);
+    x->runs += 2 * (long)n;
+  }
+  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++)
+    status = jacobian_column (&d, j, model, jacobian + (size_t)j * cells, error);
+  free (d.run);
+  free (d.error);
+  return status;
+}
+
+/* ---- Variational equations ---- */
+
+typedef struct {
+  pw_unknown *unknown;
+  pw_direction *direction;
+  pw_unknown_run base, *near; /* 4 of each unknown */
+  pw_outcomes columns;        /* of the model of the command line, whose structure is that of all */
+  pw_settings settings;
+  pw_limit limit;
+  pw_variation *variation;
+} jacobian_exact;
+
+static int jacobian_open (jacobian_exact *e, const pw_fit *x, const double *at, pw_error *error) {
+  const pw_unknowns *u = &x->unknowns;
+  size_t n = (size_t)u->count;
+  e->unknown = calloc (n, sizeof *e->unknown);
+  e->direction = calloc (n, sizeof *e->direction);
+  e->near = calloc (4 * n, sizeof *e->near);
+  if (e->unknown == NULL || e->direction == NULL || e->near == NULL)
+    return pw_fail (error, PW_RESOURCE, "out of memory");
+  for (size_t i = 0; i < n; i++) {
+    const pw_free_number *f = u->at + i;
+    e->unknown[i] = (pw_unknown){ .name = f->name, .parameter = f->parameter, .state = -1, .value = at[i] };
+    snprintf (e->unknown[i].unit, sizeof e->unknown[i].unit, "%s", f->unit);
+    if (f->parameter == NULL) e->unknown[i].state = pw_system_find_state (x->m.system, f->name, error);
+  }
+  int status = pw_outcomes_open (&e->columns, x->m.system, "--columns", x->name, x->columns, error);
+  e->settings = u->settings;
+  e->settings.ledger = e->columns.ledger;
+  e->limit = (pw_limit){ .most = u->limit };
+  e->settings.stop = pw_limit_over;
+  e->settings.stop_context = &e->limit;
+  pw_limit_start (&e->limit);
+  if (status == PW_OK)
+    status = pw_unknown_open (&e->base, u->line, u->m->file, e->unknown, (int)n, -1, 0, u->method, &e->settings, error);
+  if (status == PW_OK)
+    status = pw_unknown_directions (e->direction, e->near, u->line, u->m->file, e->unknown, (int)n, u->method,
+                                    &e->settings, error);
+  if (status == PW_OK) e->variation = pw_variation_open (e->base.run, e->direction, (int)n, e->columns.ledger, error);
+  return status == PW_OK && e->variation == NULL ? error->status : status;
+}
+
+static void jacobian_close (jacobian_exact *e, int n) {
+  if (e->variation) pw_variation_close (e->variation);
+  for (int i = 0; e->near && i < 4 * n; i++) pw_unknown_close (e->near + i);
+  pw_unknown_close (&e->base);
+  pw_outcomes_close (&e->columns);
+  free (e->unknown);
+  free (e->direction);
+  free (e->near);
+}
+
+/* Derivatives at the time of a row. */
+static int jacobian_row (jacobian_exact *e, const pw_fit *x, int row, double *jacobian, pw_error *error) {
+  size_t cells = (size_t)x->columns * (size_t)x->rows;
+  pw_sample d;
+  int status = pw_variation_advance (e->variation, x->t[row], x->unknowns.t_end, error);
+  for (int j = 0; j < x->unknowns.count && status == PW_OK; j++) {
+    status = pw_variation_sample (e->variation, j, &d, NULL, error);
+    d.t = 0;
+    for (int i = 0; i < x->columns && status == PW_OK; i++) {
+      double value = pw_column_value (e->base.system, e->columns.functional[i].column, &d);
+      if (!isfinite (value)) return pw_fail (error, PW_METHOD, "%s has no derivative", x->name[i]);
+      jacobian[(size_t)j * cells + (size_t)i * (size_t)x->rows + (size_t)row] = value;
+    }
+  }
+  return status;
+}
+
+static int jacobian_by_variation (const pw_fit *x, const double *at, double *jacobian, pw_error *error) {
+  jacobian_exact e = { .unknown = NULL };
+  int status = jacobian_open (&e, x, at, error);
+  for (int row = 0; row < x->rows && status == PW_OK; row++) status = jacobian_row (&e, x, row, jacobian, error);
+  if (status == PW_STOPPED) status = pw_limit_fail (&e.limit, pw_run_time (e.base.run), error);
+  jacobian_close (&e, x->unknowns.count);
+  return status;
+}
+
+/* Motions that are not differentiable, and contact points, have differences from then on. */
+int pw_fit_jacobian (pw_fit *x, const double *at, const double *model, double *jacobian, pw_error *error) {
+  pw_error own = { 0 };
+  int status = x->by_differences ? PW_METHOD : jacobian_by_variation (x, at, jacobian, &own);
+  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) {
+    if (status == PW_RESOURCE) *error = own;
+    return status;
+  }
+  x->by_differences = 1;
+  return jacobian_by_differences (x, at, model, jacobian, error);
+}
