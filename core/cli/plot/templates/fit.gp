@@ -2,18 +2,18 @@
 # ---- Data and model of each column, below them the residuals ----
 
 title = 'data and fitted model'
-left = 54
 across = narrow ? 1 : min(panels, 2)
 down = (panels + across - 1)/across
-gap = 58.0
+left = 58.0 # for the digits of residuals
+gap = 64.0
 wide = (width - left - right + gap)/across - gap
-high = across == 1 ? 130.0 : 112.0
-low = 70.0
+high = wide*(across == 1 ? 0.5 : 0.6)
+low = max(0.6*high, 66.0)
 block = high + 8 + low + 40
 above = top
 top = top + 13
 height = top + down*block - 40 + bottom
-set style line 1 pt 7 ps 0.5 lw 0.5 lc rgb '#888888'
+set style line 1 pt 7 ps 0.35 lw 0.6 lc rgb '#888888'
 set style line 2 lw 1.1 lc rgb '#004488'
 bars(i, y) = sprintf('plot "fit.dat" index %d using 1:(%s)%s ls 1 notitle', i - 1, y, \
   weighted ? ':3 with yerrorbars' : ' with points')
@@ -30,7 +30,7 @@ do for [form in forms] {
   set xrange [0:1]
   set yrange [0:1]
   eval panel(left, width - right, above - 1, top - 1)
-  plot NaN with points ls 1 title (weighted ? 'data, one standard deviation' : 'data'), NaN with lines ls 2 title 'model'
+  plot NaN with points ls 1 title (weighted ? 'data ± σ' : 'data'), NaN with lines ls 2 title 'model'
   unset key
   set tics scale 0.5
   set border 31
