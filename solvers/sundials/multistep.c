@@ -51,11 +51,11 @@ static int multistep_project (multistep_data *d, double t, double *q, double *v)
 }
 
 /* Leaves the part of the error tangential to the constraints (Eich 1993), in the metric of the projection, plus a small
- * part of the whole error as in rk_adapt.c: large displacements off the constraints have tangential effects that the
- * estimate misses. */
+ * part of the whole error, so that a displacement off the constraints is at most rtol^(3/4) as in rk_adapt.c.  It has
+ * tangential effects that the estimate misses: the accelerations of the step are those of the displaced state. */
 static void multistep_project_error (multistep_data *d, double *e) {
   pw_run *r = d->sun.run;
-  double *whole = d->error, little = sqrt (r->settings.rtol);
+  double *whole = d->error, little = sqrt (sqrt (r->settings.rtol));
   memcpy (whole, e, 2 * (size_t)d->n * sizeof *e);
   pw_project_error (r, d->projector.velocity, e, r->s->holonomic);
   pw_project_error (r, d->projector.velocity, e + d->n, r->s->rows);

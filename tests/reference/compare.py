@@ -109,9 +109,8 @@ def setting(integrator, refine):
 
 # A tolerance is one on the error of a step.  Over the span, tens to hundreds of steps add theirs, and the motion itself
 # magnifies them.  In 120 mechanisms errors were up to this many times the tolerance: erk5 430, erk8 169, adams 1240,
-# bdf 2990, ida 399, radau (60 of them) 141.  In 300 mechanisms bdf's ledger was off by 16,600 times the tolerance once
-# (seed 160), and converged.  What is above a bound has to be below it at a finer tolerance.
-FACTOR = {"erk5": 1e3, "erk8": 3e2, "adams": 3e3, "bdf": 2e4, "ida": 3e3, "radau": 1e3}
+# bdf 2990, ida 399, radau (60 of them) 141.  What is above a bound has to be below it at a finer tolerance.
+FACTOR = {"erk5": 1e3, "erk8": 3e2, "adams": 3e3, "bdf": 5e3, "ida": 3e3, "radau": 1e3}
 FLOOR = 1e-8  # of the reference, at rtol 1e-11
 
 
