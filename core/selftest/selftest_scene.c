@@ -111,8 +111,16 @@ static void scene_drift (scene *x, double *out) {
 
 /* ---- Comparing ---- */
 
+/* The largest of the terms of the element of entry k: its derivatives with respect to positions multiply round-off of these. */
+static double scene_largest_term (const scene *x, int k, int rows) {
+  double most = 0;
+  for (int i = k - k % rows; i < k - k % rows + rows; i++) most = fmax (most, x->terms[i]);
+  return most;
+}
+
 /* Updates the least error of each entry by differences with step h. */
-static void scene_differences (scene *x, scene_function *f, scene_move move, int n, double h) {
+static void scene_differences (scene *x, scene_function *f, scene_move move, int rows, double h) {
+  int n = x->k->b.count * rows;
   static const double weight[] = { 4. / 3, -1. / 3 }; /* extrapolated (Richardson) */
   scene_zero (x->derivative, n);
   for (int i = 0; i < 2; i++) {
@@ -124,7 +132,7 @@ static void scene_differences (scene *x, scene_function *f, scene_move move, int
     for (int k = 0; k < n; k++) x->derivative[k] += weight[i] * (x->plus[k] - x->minus[k]) / (2 * far);
   }
   for (int k = 0; k < n; k++) {
-    double noise = 256 * DBL_EPSILON * (fabs (x->plus[k]) + x->size[k]) / h;
+    double noise = 256 * DBL_EPSILON * ((fabs (x->plus[k]) + x->size[k]) / h + scene_largest_term (x, k, rows));
     double error =
         fmax (0, fabs (x->value[k] - x->derivative[k]) - noise) / (x->terms[k] + fabs (x->derivative[k]) + DBL_MIN);
     if (!(error >= x->error[k])) x->error[k] = error;
@@ -137,7 +145,7 @@ static void scene_compare (scene *x, const char *name, const char *about, int ro
   int n = x->k->b.count * rows, at = 0;
   char where[120] = "";
   for (int k = 0; k < n; k++) x->error[k] = INFINITY;
-  for (int power = -8; power >= -20; power -= 4) scene_differences (x, f, move, n, ldexp (1, power));
+  for (int power = -8; power >= -20; power -= 4) scene_differences (x, f, move, rows, ldexp (1, power));
   scene_update (x, SCENE_Q, 0);
   for (int k = 0; k < n; k++)
     if (!(x->error[k] <= x->error[at])) at = k;
