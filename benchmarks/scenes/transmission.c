@@ -1,12 +1,12 @@
 /* Continuously variable transmission, and the contact oscillator: a carriage sets the ratio of two discs.
  *
- * At the carriage's position x the discs have the radii a1 + b1 x and a2 + b2 x, and roll on a common belt, which may creep:
+ * At the carriage's position x the discs have the radii a1 + b1 x and a2 + b2 x and roll on a common belt:
  *
- *   (a1 + b1 x) y' - (a2 + b2 x) z' = creep                       y, z: angles of the discs
+ *   (a1 + b1 x) y' = (a2 + b2 x) z'                               y, z: angles of the discs
  *
- * With radii x and 1, the default, this is the contact oscillator z' = x y'; a1 = a2 = 1, b1 = 0.3, b2 = -0.3 is a
- * transmission with two cones.  Without creep and eccentricity the motion is integrable and reversible, which favours
- * symmetric methods; with both it is neither.
+ * With radii x and 1 (a1 = 0) this is the contact oscillator z' = x y'; a1 = a2 = 1, b1 = 0.3, b2 = -0.3 is a transmission
+ * with two cones.  With beta = 0 the motion is reversible, without eccentricity also integrable, which favours symmetric
+ * methods.  A gyroscopic coupling of the first disc and the carriage, beta, takes that away and keeps the energy.
  * (Modin & Verdier 2014, "Integrability of nonholonomically coupled oscillators"; Modin & Verdier 2020, Numer. Math. 145,
  * "What makes nonholonomic integrators work?", on perturbed problems.) */
 #include <math.h>
@@ -14,8 +14,8 @@
 
 /* ---- belt: disc 1 and disc 2 roll on a belt whose place is that of body 3 along x ----
  *
- *   r1 w1 - r2 w2 = u,  r1 = a1 + b1 x3,  r2 = a2 + b2 x3              (1 nonholonomic equation)
- *   gamma = u' - (b1 w1 - b2 w2) vx3
+ *   r1 w1 - r2 w2 = 0,  r1 = a1 + b1 x3,  r2 = a2 + b2 x3              (1 nonholonomic equation)
+ *   gamma = -(b1 w1 - b2 w2) vx3
  *
  * The belt's tension -lambda acts on the discs by the moments -lambda r1 and lambda r2. */
 
@@ -23,14 +23,12 @@ typedef struct {
   const char *name;
   const char *body[3];
   double a[2], b[2];
-  pw_signal creep;
 } belt;
 
 static const pw_field belt_fields[] = {
   { PW_AT (belt, body), PW_BODY, .count = 3, .required = 1, .about = "two discs and the carriage" },
   { PW_AT (belt, a), PW_NUMBER, .count = 2, .unit = "m", .about = "radii with the carriage at x = 0" },
   { PW_AT (belt, b), PW_NUMBER, .count = 2, .about = "their slopes" },
-  { PW_AT (belt, creep), PW_SIGNAL, .unit = "m/s", .about = "difference of the speeds of the rims" },
   { .name = NULL },
 };
 
@@ -49,7 +47,7 @@ static int belt_prepare (const void *definition, const pw_body *const *bodies, v
 }
 
 typedef struct {
-  const double *b, *u;
+  const double *b;
   double r1, r2, w1, w2, vx;
 } belt_state;
 
@@ -57,12 +55,7 @@ static belt_state belt_at (const pw_batch *b, int e) {
   const belt_element *k = (const belt_element *)b->element + e;
   const pw_configuration *A = &b->configuration[b->body[3 * e]], *B = &b->configuration[b->body[3 * e + 1]];
   const pw_configuration *C = &b->configuration[b->body[3 * e + 2]];
-  return (
-      belt_state){ k->b, b->u + 3 * e, k->a[0] + k->b[0] * C->x, k->a[1] + k->b[1] * C->x, A->omega, B->omega, C->vx };
-}
-
-static void belt_eta (const pw_batch *b, double *out) {
-  for (int e = 0; e < b->count; e++) out[e] = b->u[3 * e];
+  return (belt_state){ k->b, k->a[0] + k->b[0] * C->x, k->a[1] + k->b[1] * C->x, A->omega, B->omega, C->vx };
 }
 
 static void belt_J (const pw_batch *b, double *out) {
@@ -76,7 +69,7 @@ static void belt_J (const pw_batch *b, double *out) {
 static void belt_gamma (const pw_batch *b, double *out) {
   for (int e = 0; e < b->count; e++) {
     belt_state s = belt_at (b, e);
-    out[e] = s.u[1] - (s.b[0] * s.w1 - s.b[1] * s.w2) * s.vx;
+    out[e] = -(s.b[0] * s.w1 - s.b[1] * s.w2) * s.vx;
   }
 }
 
@@ -104,29 +97,78 @@ static const pw_kind belt_kind = {
   .fields = belt_fields,
   .bodies = 3,
   .rows = 1,
-  .signals = 1,
   .level = PW_NONHOLONOMIC,
   .reaction = belt_reaction,
   .prepare = belt_prepare,
-  .eta = belt_eta,
   .J = belt_J,
   .gamma = belt_gamma,
   .jw_q = belt_jw_q,
   .gamma_v = belt_gamma_v,
 };
 
+/* ---- gyro: force -beta w1 along x on body 2, moment beta vx2 on body 1, without power ---- */
+
+typedef struct {
+  const char *name;
+  const char *body[2];
+  double beta;
+} gyro;
+
+static const pw_field gyro_fields[] = {
+  { PW_AT (gyro, body), PW_BODY, .count = 2, .required = 1, .about = "the disc and the carriage" },
+  { PW_AT (gyro, beta), PW_NUMBER, .unit = "N s", .about = "gyroscopic coupling" },
+  { .name = NULL },
+};
+
+static int gyro_prepare (const void *definition, const pw_body *const *bodies, void *element, pw_internal *internal,
+                         pw_error *error) {
+  (void)bodies, (void)internal, (void)error;
+  *(double *)element = ((const gyro *)definition)->beta;
+  return PW_OK;
+}
+
+static void gyro_force (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 6) {
+    double beta = ((const double *)b->element)[e];
+    for (int i = 0; i < 6; i++) out[i] = 0;
+    out[2] = beta * b->configuration[b->body[2 * e + 1]].vx;
+    out[3] = -beta * b->configuration[b->body[2 * e]].omega;
+  }
+}
+
+static void gyro_force_v (const pw_batch *b, double *out) {
+  for (int e = 0; e < b->count; e++, out += 36) {
+    for (int i = 0; i < 36; i++) out[i] = 0;
+    out[6 * 2 + 3] = ((const double *)b->element)[e];
+    out[6 * 3 + 2] = -((const double *)b->element)[e];
+  }
+}
+
+static const pw_kind gyro_kind = {
+  .name = "gyro",
+  .about = "gyroscopic coupling of a disc and a carriage",
+  .definition = sizeof (gyro),
+  .element = sizeof (double),
+  .fields = gyro_fields,
+  .bodies = 2,
+  .level = PW_FORCE,
+  .prepare = gyro_prepare,
+  .force = gyro_force,
+  .force_v = gyro_force_v,
+};
+
 /* ---- The model ---- */
 
 typedef struct {
-  double a1, b1, a2, b2, creep, x, y, rate, k, k1, k2, rest, off, g;
+  double a1, b1, a2, b2, beta, x, y, rate, k, k1, k2, rest, off, g;
 } model;
 
 static const pw_parameter parameters[] = {
-  { PW_AT (model, a1), 0, "m", "radius of the first disc at x = 0", PW_REAL },
+  { PW_AT (model, a1), 0.2, "m", "radius of the first disc at x = 0", PW_REAL },
   { PW_AT (model, b1), 1, "", "its slope", PW_REAL },
   { PW_AT (model, a2), 1, "m", "radius of the second disc at x = 0", PW_REAL },
   { PW_AT (model, b2), 0, "", "its slope", PW_REAL },
-  { PW_AT (model, creep), 0.05, "m/s", "creep of the belt", PW_REAL },
+  { PW_AT (model, beta), 0.3, "N s", "gyroscopic coupling", PW_REAL },
   { PW_AT (model, x), 0.8, "m", "initial position of the carriage", PW_REAL },
   { PW_AT (model, y), 0.5, "rad", "initial angle of the first disc", PW_REAL },
   { PW_AT (model, rate), 0.6, "rad/s", "its initial angular velocity", PW_REAL },
@@ -153,16 +195,15 @@ static void build (pw_model *m, const void *parameter) {
                               .inertia = 1 - p->off * p->off,
                               .start = { p->off * c, p->off * s, p->y },
                               .rate = { -p->off * s * w, p->off * c * w, w } });
-  pw_add_body (m, &(pw_body){ .name = "second", .inertia = 1, .rate = { 0, 0, (r1 * w - p->creep) / r2 } });
+  pw_add_body (m, &(pw_body){ .name = "second", .inertia = 1, .rate = { 0, 0, r1 * w / r2 } });
   pw_add_slider (m, &(pw_slider){ .name = "rail", .body = { "carriage", "ground" } });
   pw_add_pin (m, &(pw_pin){ .name = "axle1", .body = { "first", "ground" }, .at = { { -p->off, 0 } } });
   pw_add_pin (m, &(pw_pin){ .name = "axle2", .body = { "second", "ground" } });
-  pw_add (m, &belt_kind,
-          &(belt){ .name = "belt",
-                   .body = { "first", "second", "carriage" },
-                   .a = { p->a1, p->a2 },
-                   .b = { p->b1, p->b2 },
-                   .creep.constant = p->creep });
+  pw_add (
+      m, &belt_kind,
+      &(belt){
+          .name = "belt", .body = { "first", "second", "carriage" }, .a = { p->a1, p->a2 }, .b = { p->b1, p->b2 } });
+  pw_add (m, &gyro_kind, &(gyro){ .name = "gyro", .body = { "first", "carriage" }, .beta = p->beta });
   pw_add_spring (m, &(pw_spring){ .name = "carriage-spring",
                                   .body = { "carriage", "ground" },
                                   .at = { { 0, 0 }, { -10, 0 } },
@@ -176,7 +217,6 @@ static void build (pw_model *m, const void *parameter) {
   pw_add_gravity (m, &(pw_gravity){ .name = "gravity", .acceleration = { 0, -p->g } });
 }
 
-PW_MODEL (.about =
-              "two discs on a belt that a carriage shifts: contact oscillator or variable transmission, with creep",
+PW_MODEL (.about = "two discs on a belt that a carriage shifts: contact oscillator or variable transmission",
           .parameters = parameters, .parameters_size = sizeof (model),
           .run = { .t_end = 10, .step = 1e-2, .method = "rk4+projection" }, .build = build);

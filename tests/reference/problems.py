@@ -129,44 +129,34 @@ def car_axis(t):
 
 
 def transmission(t, of, other=False):
-    """y' = r2 s + r1 q, z' = r1 s - r2 q with q = creep / (r1^2 + r2^2); other: with the multiplier as an unknown."""
-    (a1, b1, a2, b2), creep = of, d("0.05")
-    x0, k1, k2, rest, off, g = d("0.8"), d("1.7"), d("2.3"), d("0.3"), d("0.1"), d("9.81")
+    """y' = r2 s, z' = r1 s; other: with the multiplier as an unknown."""
+    (a1, b1, a2, b2), beta = of, d("0.3")
+    k1, k2, rest, off, g = d("1.7"), d("2.3"), d("0.3"), d("0.1"), d("9.81")
 
-    def radii(t):
-        x, v = x0 * mp.cos(t), -x0 * mp.sin(t)
-        return a1 + b1 * x, a2 + b2 * x, b1 * v, b2 * v
+    def torques(y, z, u):
+        return -k1 * (y - rest) - g * off * mp.cos(y) + beta * u, -k2 * z
 
-    def torques(y, z):
-        return -k1 * (y - rest) - g * off * mp.cos(y), -k2 * z
+    def by_speed(t, state):
+        x, y, z, u, s = state
+        r1, r2 = a1 + b1 * x, a2 + b2 * x
+        Q1, Q2 = torques(y, z, u)
+        ds = (r2 * Q1 + r1 * Q2 - (r2 * b2 + r1 * b1) * u * s) / (r1 * r1 + r2 * r2)
+        return [u, r2 * s, r1 * s, -x - beta * r2 * s, ds]
 
-    def by_speed(t, u):
-        y, z, s = u
-        r1, r2, d1, d2 = radii(t)
-        R, dR = r1 * r1 + r2 * r2, 2 * (r1 * d1 + r2 * d2)
-        q, dq = creep / R, -creep * dR / (R * R)
-        Q1, Q2 = torques(y, z)
-        # r2 y'' + r1 z'' = r2 Q1 + r1 Q2, with the derivatives of y' and z'
-        ds = (r2 * Q1 + r1 * Q2 - r2 * (d2 * s + d1 * q + r1 * dq) - r1 * (d1 * s - d2 * q - r2 * dq)) / R
-        return [r2 * s + r1 * q, r1 * s - r2 * q, ds]
-
-    def by_multiplier(t, u):
-        y, z, v, w = u
-        r1, r2, d1, d2 = radii(t)
-        Q1, Q2 = torques(y, z)
-        l = (r1 * Q1 - r2 * Q2 + d1 * v - d2 * w) / (r1 * r1 + r2 * r2)
-        return [v, w, Q1 - r1 * l, Q2 + r2 * l]
-    y, v = d("0.5"), d("0.6")
-    r1, r2, _, _ = radii(mp.mpf(0))
-    w = (r1 * v - creep) / r2
-    if other:
-        u = integrate(by_multiplier, [y, 0, v, w], t, 300)
-    else:
-        u = integrate(by_speed, [y, 0, (r2 * v + r1 * w) / (r1 * r1 + r2 * r2)], t, 300)
-    return {"carriage.x": x0 * mp.cos(t), "first.phi": u[0], "second.phi": u[1]}
+    def by_multiplier(t, state):
+        x, y, z, u, v, w = state
+        r1, r2 = a1 + b1 * x, a2 + b2 * x
+        Q1, Q2 = torques(y, z, u)
+        l = (r1 * Q1 - r2 * Q2 + (b1 * v - b2 * w) * u) / (r1 * r1 + r2 * r2)
+        return [u, v, w, -x - beta * v, Q1 - r1 * l, Q2 + r2 * l]
+    x, y, v = d("0.8"), d("0.5"), d("0.6")
+    r1, r2 = a1 + b1 * x, a2 + b2 * x
+    rates = [v, r1 * v / r2] if other else [v / r2]
+    x, y, z = integrate(by_multiplier if other else by_speed, [x, y, 0, 0] + rates, t, 300)[:3]
+    return {"carriage.x": x, "first.phi": y, "second.phi": z}
 
 
-CONTACT, CONES = (0, 1, 1, 0), (1, d("0.3"), 1, -d("0.3"))
+CONTACT, CONES = (d("0.2"), 1, 1, 0), (1, d("0.3"), 1, -d("0.3"))
 
 
 def slider_crank(t, other=False):
