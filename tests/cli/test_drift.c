@@ -178,11 +178,26 @@ static void test_bad (void **state) {
   assert_non_null (strstr (cli_err, "pinwheel: no method has reached the end; the last error: t = "));
 }
 
+/* Concurrent runs, the longest of which begins first, appear in their order with the same numbers. */
+static void test_jobs (void **state) {
+  (void)state;
+  cli_good (
+      "pinwheel drift pendulum --t-end 2 --methods ida+ggl,rk4+projection,erk5+none,bdf+projection --only-methods "
+      "--jobs 1 -o @/jobs1");
+  cli_good (
+      "pinwheel drift pendulum --t-end 2 --methods ida+ggl,rk4+projection,erk5+none,bdf+projection --only-methods "
+      "--jobs 3 -o @/jobs3");
+  char *one = strdup (cli_file ("jobs1/drift.csv"));
+  assert_string_equal (cli_file ("jobs3/drift.csv"), one);
+  free (one);
+  cli_bad ("pinwheel drift pendulum --jobs 0", 2, "--jobs 0: expected a whole number >= 1");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_growth),    cmocka_unit_test (test_row_is_run), cmocka_unit_test (test_all_of_one),
     cmocka_unit_test (test_options),   cmocka_unit_test (test_times),      cmocka_unit_test (test_failure),
-    cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad),        cmocka_unit_test (test_jobs),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

@@ -228,7 +228,7 @@ static int drift_measure (pw_study *x, pw_row *r, pw_error *error) {
   pw_error own = { 0 };
   drift_visitor v = { .base = { .visit = drift_visit, .study = x, .row = r } };
   for (int i = 0; i < DRIFT_QUANTITIES; i++) r->value[COLUMN_QUANTITY + 3 * i] = 0;
-  int status = pw_study_outcome (x, r, pw_study_run (x, r, &v.base, &own), &own, error);
+  int status = pw_study_outcome (x, r, pw_study_run (x, r, &x->settings, &v.base, &own), &own, error);
   for (int i = 0; i < DRIFT_QUANTITIES; i++) drift_finish (r, i, v.early[i]);
   return status;
 }
@@ -317,6 +317,7 @@ static const struct poptOption drift_options[] = {
       pw_drift, vary, "vary", 'v', "OPTION=RANGE",
       "Values of an option: alpha or beta [1/s] of baumgarte, every [steps] of projection; repeatable. RANGE: "
       "V1,V2,..., lin:FIRST:LAST:COUNT or log:FIRST:LAST:COUNT"),
+  PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
   PW_FLAG_OPTION (pw_drift, only_methods, "only-methods", "Omit the dependence of drift on options"),
   PW_TEXT_OPTION (pw_study, folder, "output", 'o', "DIR", "Write tables and figures into a folder"),
   PW_WIDTH_OPTION,

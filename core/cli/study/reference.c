@@ -35,11 +35,10 @@ static int sampler_visit (pw_study_visitor *v, pw_run *run, pw_error *error) {
 
 int pw_motion_run (pw_study *x, pw_row *r, pw_motion *motion, pw_error *error) {
   sampler v = { { .visit = sampler_visit, .study = x, .row = r }, motion, 0 };
-  x->settings =
-      (pw_settings){ .span = x->t_end, .ledger = motion != NULL, .stop = pw_limit_over, .stop_context = &x->limit };
-  *(r->adaptive ? &x->settings.rtol : &x->settings.step) = r->level;
+  pw_settings settings = { .span = x->t_end, .ledger = motion != NULL };
+  *(r->adaptive ? &settings.rtol : &settings.step) = r->level;
   if (motion) r->balance = 0;
-  return pw_study_run (x, r, motion ? &v.base : NULL, error);
+  return pw_study_run (x, r, &settings, motion ? &v.base : NULL, error);
 }
 
 /* ---- Uncertainty ---- */
@@ -70,12 +69,15 @@ typedef struct {
   pw_motion motion;
 } candidate;
 
-/* Runs a candidate; increases a tolerance or step that is too small.  PW_RETRY: interrupted. */
-static int reference_run (pw_study *x, candidate *c, pw_error *error) {
-  double limit = x->cpu_end, loosest = c->row.adaptive ? REFERENCE_LOOSEST : x->t_end / REFERENCE_FEWEST;
+/* Runs candidate i; increases a tolerance or step that is too small.  PW_RETRY: interrupted. */
+static int reference_run (pw_study *x, void *context, int i, pw_error *error) {
+  candidate *c = (candidate *)context + i;
+  double loosest = c->row.adaptive ? REFERENCE_LOOSEST : x->t_end / REFERENCE_FEWEST;
   pw_error own = { 0 };
-  int status = PW_RETRY;
-  x->cpu_end = fmax (x->cpu_end, REFERENCE_LIMIT);
+  int status = pw_motion_open (&c->motion, x->m.system, MOTION_SAMPLES, error);
+  if (status != PW_OK) return status;
+  pw_motion_times (&c->motion, x->t_end);
+  status = PW_RETRY;
   while (status != PW_OK && c->row.level <= loosest) {
     own = (pw_error){ 0 };
     status = pw_motion_run (x, &c->row, &c->motion, &own);
@@ -83,7 +85,6 @@ static int reference_run (pw_study *x, candidate *c, pw_error *error) {
       break;
     c->row.level *= 10;
   }
-  x->cpu_end = limit;
   c->good = status == PW_OK;
   return c->good ? PW_OK : pw_study_outcome (x, &c->row, status, &own, error);
 }
@@ -151,16 +152,10 @@ static int reference_compute (pw_reference *t, pw_study *x, double step, pw_erro
     { .row = { .method = "ida+ggl", .adaptive = 1, .level = 1e-13 } },
     { .row = { .method = "ida+baumgarte", .adaptive = 1, .level = 1e-13 } },
   };
-  int status = PW_OK;
-  pw_progress_count (&x->progress, "reference", "methods", 0, REFERENCE_CANDIDATES);
-  for (x->done = 0; status == PW_OK && x->done < REFERENCE_CANDIDATES; x->done++) {
-    status = pw_motion_open (&c[x->done].motion, x->m.system, MOTION_SAMPLES, error);
-    if (status != PW_OK) break;
-    pw_motion_times (&c[x->done].motion, x->t_end);
-    status = reference_run (x, &c[x->done], error);
-  }
-  pw_progress_end (&x->progress);
-  x->done = 0;
+  double limit = x->cpu_end;
+  x->cpu_end = fmax (limit, REFERENCE_LIMIT);
+  int status = pw_study_concurrently (x, "reference", "methods", REFERENCE_CANDIDATES, reference_run, c, error);
+  x->cpu_end = limit;
   if (status == PW_OK) reference_choose (t, x->m.system, c);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) pw_motion_close (&c[i].motion);
   return status;
@@ -181,4 +176,36 @@ int pw_reference_find (pw_reference *t, pw_study *x, double step, pw_error *erro
   t->known = 1;
   reference_floor (x->m.system, t);
   return PW_OK;
+}
+
+/* ---- Output ---- */
+
+void pw_reference_print (const pw_reference *t, int measured, int all) {
+  if (!t->known) {
+    puts ("no two methods reach the end, so errors are unknown; --reference FILE.csv provides a reference\n");
+    return;
+  }
+  pw_cli_print (stdout, "errors are measured against %s%s\n", t->about, measured ? ", as if it were exact" : "");
+  for (int i = 0; i < (all ? t->partners : t->partners > 0); i++)
+    printf ("  %s agrees with it to %.1e m, %.1e rad%s\n", t->partner[i].about,
+            t->partner[i].error[MOTION_MOST + MOTION_LENGTH], t->partner[i].error[MOTION_MOST + MOTION_ANGLE],
+            i == 0 ? ": the uncertainty of the reference" : "");
+  putchar ('\n');
+}
+
+int pw_reference_write (const pw_reference *r, const char *folder, const pw_study_column *of, pw_error *error) {
+  pw_output *o = pw_figure_open (folder, "truth.csv", error);
+  if (o == NULL) return error->status;
+  FILE *f = pw_output_stream (o);
+  pw_text t = { .at = NULL };
+  pw_text_cell (&t, "truth,against");
+  for (int k = 0; k < MOTION_ERRORS; k++) pw_text_name (&t, of[k].name, of[k].unit);
+  int status = pw_text_line (&t, f, folder, error);
+  for (int i = -1; status == PW_OK && r->known && i < r->partners; i++) {
+    pw_text_quoted (&t, r->about);
+    pw_text_quoted (&t, i < 0 ? "uncertainty" : r->partner[i].about);
+    for (int k = 0; k < MOTION_ERRORS; k++) pw_text_number (&t, i < 0 ? r->uncertainty[k] : r->partner[i].error[k]);
+    status = pw_text_line (&t, f, folder, error);
+  }
+  return pw_text_end (o, status, error);
 }

@@ -29,4 +29,9 @@ int pw_motion_run (pw_study *x, pw_row *r, pw_motion *motion, pw_error *error);
  * --t-end is given.  Close its motion in every case. */
 int pw_reference_find (pw_reference *t, pw_study *x, double step, pw_error *error);
 
+/* Prints the reference and its uncertainty; `measured`: it is a table; `all`: its distances from all other solutions. */
+void pw_reference_print (const pw_reference *t, int measured, int all);
+/* FOLDER/truth.csv: the uncertainty of the reference, and its distances from other solutions; `of`: columns of the errors. */
+int pw_reference_write (const pw_reference *r, const char *folder, const pw_study_column *of, pw_error *error);
+
 #endif

@@ -91,23 +91,30 @@ pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int 
   return r;
 }
 
+void pw_study_show (pw_study *x, double part) {
+  pthread_mutex_lock (&x->mutex);
+  pw_progress_at (&x->progress, x->finished + x->share * part);
+  pthread_mutex_unlock (&x->mutex);
+}
+
 /* Advances in batches of steps, so that clocks are read rarely. */
-static int study_steps (pw_study *x, pw_row *r, pw_run *run, pw_study_visitor *v, pw_error *error) {
+static int study_steps (pw_study *x, pw_row *r, pw_run *run, const pw_limit *limit, pw_study_visitor *v,
+                        pw_error *error) {
   int status = PW_OK;
   long batch = 8;
   while (status == PW_OK && pw_run_time (run) < x->t_end) {
-    double start = pw_cpu_clock ();
+    double start = pw_seconds (CLOCK_THREAD_CPUTIME_ID);
     long n = 0;
     do {
       status = pw_run_advance (run, x->t_end, error);
       if (status == PW_OK && v && pw_run_time (run) >= v->due) status = v->visit (v, run, error);
     } while (status == PW_OK && ++n < batch && pw_run_time (run) < x->t_end);
-    double used = pw_cpu_clock () - start;
+    double used = pw_seconds (CLOCK_THREAD_CPUTIME_ID) - start;
     r->cpu += used;
     if (used < STUDY_SHORT && n == batch && batch < 65536) batch *= 2;
     if (used > STUDY_LONG && batch > 1) batch /= 2;
-    pw_progress_at (&x->progress, x->done + x->share * fmin (pw_run_time (run) / x->t_end, 1));
-    if (status == PW_STOPPED) return pw_limit_fail (&x->limit, pw_run_time (run), error);
+    pw_study_show (x, fmin (pw_run_time (run) / x->t_end, 1));
+    if (status == PW_STOPPED) return pw_limit_fail (limit, pw_run_time (run), error);
     if (status == PW_OK && r->cpu > x->cpu_end && pw_run_time (run) < x->t_end) {
       r->state = ROW_STOPPED;
       return PW_RETRY;
@@ -116,17 +123,59 @@ static int study_steps (pw_study *x, pw_row *r, pw_run *run, pw_study_visitor *v
   return status;
 }
 
-int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error) {
+int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_visitor *v, pw_error *error) {
+  pw_settings own = *settings;
+  pw_limit limit = x->limit;
   r->cpu = 0;
-  pw_limit_start (&x->limit);
-  x->settings.specialised = pw_cli_engine_code (&x->engine);
-  pw_run *run = pw_run_open (x->m.system, r->method, &x->settings, error);
+  pw_limit_start (&limit);
+  own.stop = pw_limit_over;
+  own.stop_context = &limit;
+  own.specialised = pw_cli_engine_code (&x->engine);
+  pw_run *run = pw_run_open (x->m.system, r->method, &own, error);
   if (run == NULL) return error->status;
-  int status = study_steps (x, r, run, v, error);
+  int status = study_steps (x, r, run, &limit, v, error);
   r->t = pw_run_time (run);
   r->statistics = *pw_run_statistics (run);
   pw_run_close (run);
   return status;
+}
+
+/* ---- Several tasks at a time ---- */
+
+typedef struct {
+  pw_study *study;
+  int (*task) (pw_study *x, void *context, int i, pw_error *error);
+  void *context;
+  int status;
+  pw_error *error;
+} study_tasks;
+
+static void study_task (void *context, int i) {
+  study_tasks *k = context;
+  pw_study *x = k->study;
+  pw_error own = { 0 };
+  pthread_mutex_lock (&x->mutex);
+  int go = k->status == PW_OK;
+  pthread_mutex_unlock (&x->mutex);
+  int status = go ? k->task (x, k->context, i, &own) : PW_OK;
+  pthread_mutex_lock (&x->mutex);
+  x->finished++;
+  if (status != PW_OK && k->status == PW_OK) {
+    k->status = status;
+    *k->error = own;
+  }
+  pthread_mutex_unlock (&x->mutex);
+}
+
+int pw_study_concurrently (pw_study *x, const char *what, const char *unit, int count,
+                           int (*task) (pw_study *x, void *context, int i, pw_error *error), void *context,
+                           pw_error *error) {
+  study_tasks k = { .study = x, .task = task, .context = context, .error = error };
+  x->finished = 0;
+  pw_progress_count (&x->progress, what, unit, 0, count);
+  int status = pw_parallel (x->jobs, count, study_task, &k, error);
+  pw_progress_end (&x->progress);
+  return status == PW_OK ? k.status : status;
 }
 
 int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *run_error, pw_error *error) {
@@ -182,10 +231,25 @@ static int study_open (pw_study *x, pw_error *error) {
   x->lock = -1;
   x->share = 1;
   x->cpu_end = INFINITY;
+  pthread_mutex_init (&x->mutex, NULL);
   int status = pw_cli_open (&x->m, &x->line, error);
+  if (status == PW_OK) status = pw_parallel_jobs (x->jobs_text, &x->jobs, error);
   if (status == PW_OK) status = x->type->plan (x, error);
   if (status == PW_OK) status = study_engine (x, error);
   return status == PW_OK ? study_open_folder (x, error) : status;
+}
+
+/* Measures a row, then writes all rows that are done before the first one that is not: in their order. */
+static int study_row (pw_study *x, void *context, int i, pw_error *error) {
+  (void)context;
+  int status = x->type->measure (x, &x->row[i], error);
+  if (status != PW_OK) return status;
+  pthread_mutex_lock (&x->mutex);
+  x->row[i].measured = 1;
+  pw_progress_end (&x->progress);
+  for (; status == PW_OK && x->done < x->rows && x->row[x->done].measured; x->done++) status = pw_table_row (x, error);
+  pthread_mutex_unlock (&x->mutex);
+  return status;
 }
 
 static int study_rows (pw_study *x, pw_error *error) {
@@ -193,13 +257,9 @@ static int study_rows (pw_study *x, pw_error *error) {
   int status = x->type->begin (x, error);
   if (status == PW_OK && x->engine.code) puts ("all runs use code specialised for this scene where the method can\n");
   if (status == PW_OK && x->engine.code == NULL) printf ("all runs use the general engine: %s\n\n", x->engine.why);
-  if (status == PW_OK) pw_progress_count (&x->progress, pw_file_name (x->m.file), x->type->unit, 0, x->rows);
-  for (x->done = 0; status == PW_OK && x->done < x->rows; x->done++) {
-    status = x->type->measure (x, &x->row[x->done], error);
-    pw_progress_end (&x->progress);
-    if (status == PW_OK) status = pw_table_row (x, error);
-    if (status != PW_OK) break;
-  }
+  if (x->type->alone) x->jobs = 1;
+  if (status == PW_OK)
+    status = pw_study_concurrently (x, pw_file_name (x->m.file), x->type->unit, x->rows, study_row, NULL, error);
   if (status == PW_OK && x->type->conclude) x->type->conclude (x);
   pw_stop_release ();
   return status;
@@ -243,6 +303,7 @@ int pw_study_command (pw_study *x, const pw_study_type *type, pw_error *error) {
   for (int i = 0; i < x->rows; i++) free (x->row[i].point);
   free (x->row);
   free (x->method);
+  pthread_mutex_destroy (&x->mutex);
   pw_cli_engine_close (&x->engine);
   pw_cli_close_model (&x->m);
   return status == PW_INTERRUPTED ? status : error->status;

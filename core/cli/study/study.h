@@ -4,8 +4,10 @@
 #ifndef PW_STUDY_H
 #define PW_STUDY_H
 
+#include <pthread.h>
 #include "cli.h"
 #include "figure.h"
+#include "parallel.h"
 #include "progress.h"
 #include "text.h"
 
@@ -25,6 +27,7 @@ typedef struct {
   int adaptive;            /* 1: the step size follows a tolerance */
   double level;            /* of compare: tolerance, or step size [s] */
   pw_row_state state;
+  int measured;             /* 1: all is known */
   double t;                 /* reached [s] */
   double cpu;               /* of the last run [s] */
   double balance;           /* largest |energy balance| of the samples [J] */
@@ -64,6 +67,7 @@ typedef struct {
   int (*plan) (pw_study *x, pw_error *error);
   /* Before the first row, with signals caught: prints the text above the table. */
   int (*begin) (pw_study *x, pw_error *error);
+  int alone; /* 1: rows are measured one after the other, not concurrently */
   /* Measures a row by pw_study_run; pw_study_outcome records a failure of the method in the row. */
   int (*measure) (pw_study *x, pw_row *r, pw_error *error);
   /* After the last row: prints the conclusion; NULL: none. */
@@ -75,15 +79,16 @@ typedef struct {
 
 struct pw_study {
   pw_cli_line line;
-  const char *methods_text, *reference_path, *folder;
+  const char *methods_text, *reference_path, *folder, *jobs_text;
   /* read */
   const pw_study_type *type;
   pw_cli_engine engine; /* of all runs */
   pw_cli_model m;       /* the system is shared by all runs */
   char (*method)[STUDY_NAME];
   int methods;
+  int jobs; /* concurrent runs */
   pw_settings settings;
-  pw_limit limit; /* of settings.stop */
+  pw_limit limit; /* of a run */
   double t_end;   /* [s] */
   double cpu_end; /* CPU time of a run after which it is stopped between steps [s] */
   double width;   /* of figures [mm]; 0: default */
@@ -91,8 +96,10 @@ struct pw_study {
   int lock;  /* of the folder; -1: none */
   int quiet; /* 1: rows are not printed */
   pw_row *row;
-  int rows, done;
+  int rows, done; /* done: printed */
+  pthread_mutex_t mutex;
   pw_progress progress;
+  int finished;                          /* runs or rows in the progress */
   double share;                          /* part of a run in the progress of its row */
   pw_output *csv;                        /* NULL: none */
   const char *drawn[FIGURE_SCRIPTS + 1]; /* scripts */
@@ -118,9 +125,16 @@ typedef struct pw_study_visitor {
   pw_row *row;
 } pw_study_visitor;
 
-/* One run of a row with the study's settings to the end or a limit: fills t, statistics, cpu, and state if it is
- * stopped by cpu_end; the visitor may be NULL.  PW_RETRY: stopped, or interrupted. */
-int pw_study_run (pw_study *x, pw_row *r, pw_study_visitor *v, pw_error *error);
+/* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_end; the visitor may
+ * be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
+int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_visitor *v, pw_error *error);
+/* Calls task (context, i) for each i < count, several at a time, and shows `what` and the count of those that are done.  A task
+ * returns a status; after one other than PW_OK, which is returned, no further ones are called. */
+int pw_study_concurrently (pw_study *x, const char *what, const char *unit, int count,
+                           int (*task) (pw_study *x, void *context, int i, pw_error *error), void *context,
+                           pw_error *error);
+/* Shows the part of a task, or of a row, that is done. */
+void pw_study_show (pw_study *x, double part);
 /* Fills the time and the counts of the row, and a failure of pw_study_run.  Returns PW_OK, or the status that ends the study. */
 int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *run_error, pw_error *error);
 
