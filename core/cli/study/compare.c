@@ -1,5 +1,5 @@
 /* pinwheel compare: accuracy and cost of methods.  A row for each method and each tolerance or step: one run with samples
- * and ledger, methods concurrently, then timed runs without, one at a time. */
+ * and ledger, then timed runs without. */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,6 +24,7 @@ typedef struct {
   double finest_step; /* of the ladder [s] */
   double repeats;     /* timed runs of a row, at most */
   pw_reference reference;
+  pw_motion scratch; /* of the row being measured */
 } pw_compare;
 
 /* ---- Columns ---- */
@@ -162,11 +163,11 @@ static int compare_plan (pw_study *s, pw_error *error) {
 /* ---- A row ---- */
 
 /* Errors below the uncertainty of the reference are replaced by it, and marked. */
-static void compare_errors (const pw_compare *x, const pw_motion *motion, pw_row *r) {
+static void compare_errors (pw_compare *x, pw_row *r) {
   const pw_reference *reference = &x->reference;
   double *error = &r->value[COLUMN_ERROR];
   if (!reference->known) return;
-  pw_motion_distance (x->study.m.system, &reference->motion, motion, error);
+  pw_motion_distance (x->study.m.system, &reference->motion, &x->scratch, error);
   for (int i = 0; i < MOTION_ERRORS; i++) {
     if (reference->uncertainty[i] == 0) error[i] = NAN;
     if (!(error[i] <= reference->uncertainty[i])) continue;
@@ -207,7 +208,7 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
     int status = pw_motion_run (&x->study, r, NULL, error);
     if (status != PW_OK) return status;
     sum += cpu[n++] = r->cpu;
-    pw_study_show (&x->study, n);
+    pw_study_show (&x->study, n + 1);
   }
   qsort (cpu, (size_t)n, sizeof *cpu, compare_numbers);
   r->cpu = n % 2 ? cpu[n / 2] : (cpu[n / 2 - 1] + cpu[n / 2]) / 2;
@@ -229,61 +230,32 @@ static double compare_predict (const pw_row *r, int before) {
   return fmax (last->cpu / last[-1].cpu, 1) * last->cpu;
 }
 
-/* The levels of a row's method before it. */
-static int compare_before (const pw_study *s, const pw_row *r) {
-  int before = 0;
-  while (r - before > s->row && r[-before - 1].line == r->line) before++;
-  return before;
-}
-
-static int compare_outcome (const pw_study *s, pw_row *r, int status, const pw_error *own, pw_error *error) {
-  char limit[32], text[32];
-  if (r->state == ROW_STOPPED)
-    snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s",
-              pw_format (limit, s->cpu_end, 4), pw_format (text, r->t, 4));
-  return pw_study_outcome (s, r, status, own, error);
-}
-
-/* The run of a row with samples, unless it is expected to exceed the limit. */
-static int compare_sample (pw_study *s, pw_row *r, pw_motion *motion, pw_error *error) {
-  pw_error own = { 0 };
-  char limit[32], text[60] = "";
-  double predicted = compare_predict (r, compare_before (s, r));
-  r->balance = NAN;
-  if (predicted > s->cpu_end) {
-    r->state = ROW_SKIPPED;
-    if (isfinite (predicted)) snprintf (text, sizeof text, ", about %.2g s", predicted);
-    snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", text, pw_format (limit, s->cpu_end, 4));
-    return PW_OK;
-  }
-  int status = pw_motion_run (s, r, motion, &own);
-  if (status == PW_OK) compare_errors ((const pw_compare *)s, motion, r);
-  return compare_outcome (s, r, status, &own, error);
-}
-
-/* The runs with samples of all rows of method i, at the times of the reference. */
-static int compare_method (pw_study *s, void *context, int i, pw_error *error) {
-  const pw_motion *reference = context;
-  pw_motion motion;
-  int status = pw_motion_open (&motion, s->m.system, reference->t ? reference->samples : MOTION_SAMPLES, error);
-  if (status != PW_OK) return status;
-  pw_motion_times (&motion, s->t_end);
-  if (reference->t) memcpy (motion.t, reference->t, (size_t)motion.samples * sizeof *motion.t);
-  for (pw_row *r = s->row; status == PW_OK && r < s->row + s->rows; r++)
-    if (r->line == i) status = compare_sample (s, r, &motion, error);
-  pw_motion_close (&motion);
-  return status;
-}
-
-/* Times a row, with nothing else running. */
 static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
   pw_compare *x = (pw_compare *)s;
   pw_error own = { 0 };
-  int status = PW_OK;
-  if (r->state == ROW_SKIPPED) return PW_OK;
-  s->share = 1 / x->repeats;
-  if (r->state == ROW_DONE) status = compare_outcome (s, r, compare_times (x, r, &own), &own, error);
-  r->value[COLUMN_ORDER] = compare_order (x, r, compare_before (s, r));
+  char limit[32], text[60] = "";
+  int before = 0;
+  while (r - before > s->row && r[-before - 1].line == r->line) before++;
+  double predicted = compare_predict (r, before);
+  s->share = 1 / (x->repeats + 1);
+  pw_format (limit, s->cpu_end, 4);
+  if (predicted > s->cpu_end) {
+    r->state = ROW_SKIPPED;
+    if (isfinite (predicted)) snprintf (text, sizeof text, ", about %.2g s", predicted);
+    snprintf (r->reason, sizeof r->reason, "too slow%s; the limit is %s s", text, limit);
+    return PW_OK;
+  }
+  r->balance = NAN;
+  int status = pw_motion_run (s, r, &x->scratch, &own);
+  if (status == PW_OK) {
+    compare_errors (x, r);
+    status = compare_times (x, r, &own);
+  }
+  if (r->state == ROW_STOPPED)
+    snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
+              pw_format (text, r->t, 4));
+  status = pw_study_outcome (s, r, status, &own, error);
+  r->value[COLUMN_ORDER] = compare_order (x, r, before);
   r->value[COLUMN_POSITION] = r->statistics.position;
   r->value[COLUMN_VELOCITY] = r->statistics.velocity;
   r->value[COLUMN_BALANCE] = r->balance;
@@ -302,15 +274,17 @@ static int compare_begin (pw_study *s, pw_error *error) {
   int status = pw_reference_find (&x->reference, s, x->finest_step, error);
   if (status == PW_OK && s->folder)
     status = pw_reference_write (&x->reference, s->folder, compare_columns + COLUMN_ERROR, error);
+  const pw_motion *motion = &x->reference.motion;
+  int samples = x->reference.known ? motion->samples : MOTION_SAMPLES;
+  if (status == PW_OK) status = pw_motion_open (&x->scratch, s->m.system, samples, error);
   if (status != PW_OK) return status;
+  pw_motion_times (&x->scratch, s->t_end);
+  if (x->reference.known) memcpy (x->scratch.t, motion->t, (size_t)samples * sizeof *motion->t);
   const double *largest = x->reference.uncertainty + MOTION_MOST;
   x->concludes = x->reference.known && (largest[MOTION_LENGTH] > 0 || largest[MOTION_ANGLE] > 0);
   s->quiet = x->concludes && !x->table;
   pw_reference_print (&x->reference, s->reference_path != NULL, x->table);
-  fflush (stdout);
-  s->share = 0;
-  return pw_study_concurrently (s, pw_file_name (s->m.file), "methods", s->methods, compare_method,
-                                &x->reference.motion, error);
+  return PW_OK;
 }
 
 static void compare_conclude (const pw_study *s) {
@@ -338,7 +312,9 @@ static int compare_figures (pw_study *x, pw_error *error) {
 }
 
 static void compare_close (pw_study *s) {
-  pw_motion_close (&((pw_compare *)s)->reference.motion);
+  pw_compare *x = (pw_compare *)s;
+  pw_motion_close (&x->reference.motion);
+  pw_motion_close (&x->scratch);
 }
 
 static int compare_command (void *options, pw_error *error) {
@@ -381,9 +357,10 @@ static const struct poptOption compare_options[] = {
       pw_compare, repeats_text, "repeats", 0, "N",
       "Timed repetitions of each run, at most 99, of which the median is reported (default 9, or those that "
       "fit into half a second)"),
-  PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N",
-                  "Number of concurrent runs for errors and the reference (default: one per processor); timed runs are "
-                  "never concurrent"),
+  PW_TEXT_OPTION (
+      pw_study, jobs_text, "jobs", 'j', "N",
+      "Number of concurrent runs for the reference (default: one per processor); the others are made one at a "
+      "time, since they are timed"),
   PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
   PW_ENGINE_OPTION,
   PW_TEXT_OPTION (

@@ -247,9 +247,20 @@ static int study_row (pw_study *x, void *context, int i, pw_error *error) {
   pthread_mutex_lock (&x->mutex);
   x->row[i].measured = 1;
   pw_progress_end (&x->progress);
-  for (; status == PW_OK && x->done < x->rows && x->row[x->done].measured; x->done++) status = pw_table_row (x, error);
+  for (; status == PW_OK && x->done < x->rows && x->row[x->done].measured; x->done++)
+    status = pw_table_row (x, &x->row[x->done], error);
   pthread_mutex_unlock (&x->mutex);
   return status;
+}
+
+/* Writes the rows that are done after one that an interruption has stopped. */
+static int study_kept (pw_study *x, pw_error *error) {
+  for (const pw_row *r = x->row + x->done; r < x->row + x->rows; r++)
+    if (r->measured && pw_table_row (x, r, error) != PW_OK)
+      return error->status;
+    else
+      x->done += r->measured;
+  return PW_RETRY;
 }
 
 static int study_rows (pw_study *x, pw_error *error) {
@@ -260,6 +271,7 @@ static int study_rows (pw_study *x, pw_error *error) {
   if (x->type->alone) x->jobs = 1;
   if (status == PW_OK)
     status = pw_study_concurrently (x, pw_file_name (x->m.file), x->type->unit, x->rows, study_row, NULL, error);
+  if (status == PW_RETRY && pw_stop) status = study_kept (x, error);
   if (status == PW_OK && x->type->conclude) x->type->conclude (x);
   pw_stop_release ();
   return status;

@@ -87,9 +87,8 @@ static void table_print (const pw_study *x, const pw_row *r) {
   fflush (stdout);
 }
 
-int pw_table_row (pw_study *x, pw_error *error) {
-  const pw_row *r = &x->row[x->done];
-  if (!x->quiet && (x->done == 0 || r->group != r[-1].group)) table_heading (x, r->group);
+int pw_table_row (pw_study *x, const pw_row *r, pw_error *error) {
+  if (!x->quiet && (r == x->row || r->group != r[-1].group)) table_heading (x, r->group);
   if (!x->quiet) table_print (x, r);
   return x->csv ? table_write (x, r, error) : PW_OK;
 }
