@@ -69,6 +69,10 @@ if wanted fit-ezyroller; then
   "$pinwheel" run ezyroller --set omega=3 --set M0=0.12 --t-end 10 --every 0.1 -o "$work/run.csv" 2>/dev/null
   awk -F, 'NR == 1 { print $1 "," $2 "," $3 } NR > 1 { printf "%s,%.2f,%.2f\n", $1, $2, $3 }' "$work/run.csv" >"$work/measured.csv"
 fi
+if wanted steady-car-trailer; then
+  awk '/^```yaml/ { n++; next } /^```/ { if (n == 1) exit } n == 1' docs/analysis.md >"$work/car-trailer.yaml"
+fi
+draw steady-car-trailer steady steady "$work/car-trailer.yaml" --vary u=2:60 --starts 0 -o
 draw fit-ezyroller fit fit ezyroller --data "$work/measured.csv" --columns frame.x,frame.y --free omega --free M0 --plots
 
 # ---- Pages, benchmarks ----

@@ -31,16 +31,16 @@ if [ -f "$csvo" ] && [ -f "$csv" ]; then
   done
   awk -F, 'NR > 1 { g = $2 - $3; print $1, g < 0 ? -g : g }' "$csvo" >"$work/gap"
   awk -F, '$1 == "original" && $2 == "rk4+projection" && $5 == "ok" { print $4, $16 }' "$csv" >"$work/balance"
-  draw bench-original 430 'The original algorithm: error and energy gap against the step' <<G
-set logscale xy; set format '10^{%T}'; set xlabel 'step [s]'; set key bottom right
-eval panel(left, 0.5*width - 14, 24, height - bottom)
+  draw bench-original 480 'The original algorithm: error and energy gap against the step' <<G
+set logscale xy; set format '10^{%T}'; set xlabel 'step [s]'; set key at graph 0.5,screen (1 - 16/height) center top vertical samplen 3
+eval panel(left, 0.5*width - 14, 44, height - bottom)
 set ylabel 'largest error of a length over 100 s [m]'
 plot '$work/rk4+projection:metric=identity:inputs=held' using 1:2 with linespoints lw 1 pt 4 dt (10,4) lc rgb '#cc6677' title 'torque held over a step, as originally', \
-     '$work/rk4+projection' using 1:2 with linespoints lw 1 pt 7 lc rgb '#004488' title 'torque at stage times'
+     '$work/rk4+projection' using 1:2 with linespoints lw 1 pt 7 dt 1 lc rgb '#004488' title 'torque at stage times'
 set ylabel 'work against kinetic energy [J]'
-eval panel(0.5*width + left - 4, width - right, 24, height - bottom)
+eval panel(0.5*width + left - 4, width - right, 44, height - bottom)
 plot '$work/gap' with linespoints lw 1 pt 4 dt (10,4) lc rgb '#cc6677' title 'work by rectangles, as originally', \
-     '$work/balance' with linespoints lw 1 pt 7 lc rgb '#004488' title 'work as a state of the integration'
+     '$work/balance' with linespoints lw 1 pt 7 dt 1 lc rgb '#004488' title 'work as a state of the integration'
 G
 fi
 

@@ -61,6 +61,22 @@
       which.selectedIndex = i;
       which.dispatchEvent(new Event("change"));
     }
+    press("]");
+    expect("chooses curves by a key", which.selectedIndex === 0);
+    press("t");
+    expect("hides the traces by a key", document.getElementById("traces").getAttribute("aria-pressed") === "false");
+    press("t");
+    const said = document.getElementById("scene").getAttribute("aria-label");
+    expect("says what it shows", said.includes("t = ") && run.bodies.every((body, b) => b > 7 || said.includes(body.name)));
+    expect("says what the curves show", document.getElementById("curves").getAttribute("aria-label").includes(families[0].curves[0].name));
+    expect("shows what the model is", document.getElementById("about").textContent.length > 10);
+    expect("shows its parameters", document.getElementById("parameters").children.length === run.parameters.length);
+    press("i");
+    for (let i = 0; i < 100 && !root.image; i++) await wait(20);
+    expect("saves a picture", Number((root.image || "").split(" ").pop()) > 5000);
+    const labels = [[0.1, 0.1, "0.1"], [1234567.5, 0.5, "1.2345675\u00b710\u2076"], [1234568, 0.5, "1.234568\u00b710\u2076"],
+      [-3e-7, 1e-7, "\u22123\u00b710\u207b\u2077"], [0, 1e9, "0"], [2e6, 1e6, "2\u00b710\u2076"], [12345.6, 0.2, "12345.6"], [0.5, 1e-7, "0.5"]];
+    for (const [x, step, text] of labels) expect("labels " + text + " not " + number(x, step), number(x, step) === text);
     expect("has curves", which.options.length >= 6);
   } catch (e) { failures.push(String(e)); }
   const verdict = document.createElement("pre");

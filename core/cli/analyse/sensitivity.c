@@ -110,6 +110,7 @@ static const struct poptOption sensitivity_options[] = {
   PW_TEXT_OPTION (pw_sensitivity, folder, "output", 'o', "DIR",
                   "Write sensitivity.csv (outputs and derivatives along the run), sensitivity.json and a figure into a "
                   "folder"),
+  PW_WIDTH_OPTION,
   PW_METHOD_OPTIONS,
   PW_MODEL_OPTIONS,
   POPT_TABLEEND

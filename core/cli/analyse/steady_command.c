@@ -299,7 +299,7 @@ static int steady_compute (pw_steady_cli *x, pw_error *error) {
 
 static int steady_folder (const pw_steady_cli *x, int *lock, pw_error *error) {
   static const char *const names[] = { "steady.csv", "steady.json", "steady.dat", "steady.gp",
-                                       "steady.svg", "steady.png",  NULL };
+                                       "steady.svg", "steady.png",  "steady.pdf", NULL };
   pw_use use[] = { PW_CLI_MODEL_USE, { "-o", x->folder, PW_WRITES_INTO, names } };
   if (x->folder == NULL) return PW_OK;
   if (pw_cli_uses (&x->line, x->m.file, use, 2, error) != PW_OK) return error->status;
@@ -344,6 +344,7 @@ static const struct poptOption steady_options_table[] = {
   PW_TEXT_OPTION (pw_steady_cli, at_text, "at", 0, "T", "Evaluate signals at time T [s] (default 0)"),
   PW_TEXT_OPTION (pw_steady_cli, folder, "output", 'o', "DIR",
                   "Write steady.csv, steady.json and, with --vary, figures into a folder"),
+  PW_WIDTH_OPTION,
   PW_TEXT_OPTION (pw_cli_line, limit, "limit", 0, "SECONDS", "Stop after this much processor time (default unlimited)"),
   PW_MODEL_OPTIONS,
   POPT_TABLEEND

@@ -286,8 +286,11 @@ static void steady_data (const pw_steady_cli *x, FILE *f) {
 }
 
 static int steady_figure (const pw_steady_cli *x, pw_error *error) {
-  const pw_figures figures = { .folder = x->folder, .model = pw_file_name (x->m.file) };
+  pw_figures figures = { .folder = x->folder,
+                         .model = pw_file_name (x->m.file),
+                         .about = pw_file_table (x->m.file)->about };
   char label[300];
+  if (pw_figure_width (x->line.width, &figures.width, error) != PW_OK) return error->status;
   pw_output *data = pw_figure_data (&figures, "steady.dat", error);
   if (data == NULL) return PW_RESOURCE;
   steady_data (x, pw_output_stream (data));

@@ -104,9 +104,27 @@ void pw_animation_scene (FILE *f, const pw_plots *p) {
   page_links (f, p);
 }
 
+/* The parameters of a model with their values, units and meanings. */
+static void page_parameters (FILE *f, const pw_model *m) {
+  const pw_parameter *list = pw_model_table (m)->parameters;
+  fputs (",\nparameters:[", f);
+  for (const pw_parameter *p = list; p && p->name; p++) {
+    const double value = pw_model_parameter (m, p);
+    page_text (f, p == list ? "{name:" : ",\n{name:", p->name);
+    page_text (f, ",unit:", p->unit ? p->unit : "");
+    page_text (f, ",about:", p->about ? p->about : "");
+    fputs (",value:", f);
+    page_numbers (f, &value, 1, 12);
+    fputc ('}', f);
+  }
+  fputc (']', f);
+}
+
 static void page_data (FILE *f, const pw_plots *p, const char *method, const char *reason) {
   int wheels = 3 * p->wheels.shown;
   page_text (f, "{\nmodel:", p->model);
+  page_text (f, ",\nabout:", p->about ? p->about : "");
+  page_parameters (f, p->description);
   page_text (f, ",\nmethod:", method);
   page_text (f, ",\nreason:", reason);
   fputs (",\n", f);

@@ -103,14 +103,15 @@ typedef void pw_plot_line_function (void *context, double (*at)[2], int count, i
 
 struct pw_plots {
   const char *folder, *model, *about;
-  double width; /* of figures [mm] */
-  int by_time;  /* 1: colours show the time, 0: the bodies */
-  int lock;     /* of the folder; -1: none */
+  const pw_model *description;
+  double figure_width; /* [mm]; 0: the default */
+  int by_time;         /* 1: colours show the time, 0: the bodies */
+  int lock;            /* of the folder; -1: none */
   const pw_system *s;
   pw_workspace *workspace; /* for contact points and forces */
   double t_end;
   int samples, wanted; /* taken so far; planned */
-  int numbers;         /* per sample */
+  int width;           /* numbers per sample */
   pw_tracks bodies, wheels;
   int links, grounds;   /* elements with points; points of the ground */
   int with_forces;      /* 1: the forces of links are kept */
@@ -125,7 +126,7 @@ struct pw_plots {
 
 /* Sample i, and the numbers of track k in it. */
 static inline double *pw_plot_sample (const pw_plots *p, int i) {
-  return p->data + (size_t)i * (size_t)p->numbers;
+  return p->data + (size_t)i * (size_t)p->width;
 }
 static inline double *pw_plot_track (const pw_plots *p, int i, const pw_tracks *t, int k) {
   return pw_plot_sample (p, i) + t->offset + t->numbers * k;

@@ -239,8 +239,7 @@ static int data_write (const pw_plots *p, const pw_figures *f, int closeup, pw_e
   static const char energy[] = "t [s], kinetic [J], potential [J], work [J], loss [J], projection [J], balance [J]";
   int status = data_tracks (p, f, &p->bodies, error);
   if (status == PW_OK) status = data_tracks (p, f, &p->wheels, error);
-  if (status == PW_OK)
-    status = data_table (f, "energy.dat", energy, p->data, p->numbers, PLOT_FIRST, p->samples, error);
+  if (status == PW_OK) status = data_table (f, "energy.dat", energy, p->data, p->width, PLOT_FIRST, p->samples, error);
   if (status == PW_OK)
     status = data_table (f, "ground.dat", "points of the ground: x [m], y [m]", *p->ground, 2, 2, p->grounds, error);
   if (status == PW_OK) status = data_mechanism (p, f, "mechanism.dat", p->samples, error);
@@ -291,7 +290,7 @@ static int figures_write (const pw_plots *p, const pw_figures *figures, const ch
 
 int pw_plots_finish (pw_plots *p, int draw, pw_error *error) {
   static const char *const names[] = { "paths", "velocities", "angular", "energy", "mechanism", NULL };
-  pw_figures figures = { .folder = p->folder, .model = p->model, .about = p->about, .width = p->width };
+  pw_figures figures = { .folder = p->folder, .model = p->model, .about = p->about, .width = p->figure_width };
   char t[32], end[32];
   if (p->folder == NULL) return PW_OK;
   if (p->samples < 2) {

@@ -24,8 +24,8 @@ static int plot_tracks (pw_plots *p, pw_tracks *t, int all) {
   t->all = all;
   t->shown = plot_least (all, PLOT_SHOWN);
   t->curves = plot_least (t->shown, PLOT_CURVES);
-  t->offset = p->numbers;
-  p->numbers += t->numbers * t->shown;
+  t->offset = p->width;
+  p->width += t->numbers * t->shown;
   t->index = pw_arena_alloc (&p->arena, (size_t)t->shown * sizeof *t->index);
   return t->index != NULL;
 }
@@ -42,12 +42,12 @@ static int plot_allocate (pw_plots *p, int elements) {
   if (!plot_tracks (p, &p->bodies, pw_system_bodies (p->s)) || !plot_tracks (p, &p->wheels, pw_system_contacts (p->s)))
     return 0;
   p->links = (int)links;
-  p->numbers += p->with_forces ? 2 * p->links : 0;
-  p->wanted = PLOT_NUMBERS / p->numbers;
+  p->width += p->with_forces ? 2 * p->links : 0;
+  p->wanted = PLOT_NUMBERS / p->width;
   p->wanted = 1 + (p->wanted < PLOT_FEW ? PLOT_FEW : plot_least (p->wanted, PLOT_SAMPLES)); /* both ends */
   p->shape = pw_arena_alloc (&p->arena, (size_t)p->bodies.shown * sizeof *p->shape);
   p->ground = pw_arena_alloc (&p->arena, PLOT_SHOWN * sizeof *p->ground);
-  p->data = pw_arena_alloc (&p->arena, (size_t)p->wanted * (size_t)p->numbers * sizeof *p->data);
+  p->data = pw_arena_alloc (&p->arena, (size_t)p->wanted * (size_t)p->width * sizeof *p->data);
   p->contact = pw_arena_alloc (&p->arena, (size_t)p->wheels.all * sizeof *p->contact);
   p->link = pw_arena_alloc (&p->arena, links * sizeof *p->link);
   p->forces = pw_arena_alloc (&p->arena, p->with_forces ? (size_t)pw_system_force_size (p->s) * sizeof *p->forces : 0);
@@ -80,9 +80,10 @@ pw_plots *pw_plots_open (const char *folder, int forces, const pw_model *m, cons
                      .lock = -1,
                      .model = pw_system_name (s),
                      .about = pw_model_table (m)->about,
+                     .description = m,
                      .s = s,
                      .t_end = t_end,
-                     .numbers = PLOT_FIRST,
+                     .width = PLOT_FIRST,
                      .with_forces = forces };
   pw_model_elements (m, &elements);
   if (p == NULL || (folder && plot_try_folder (p, error) != PW_OK) || !plot_allocate (p, elements)) {
@@ -102,7 +103,7 @@ int pw_plots_style (pw_plots *p, const char *width, const char *colour, pw_error
   p->by_time = colour && strcmp (colour, "time") == 0;
   if (colour && !p->by_time && strcmp (colour, "body") != 0)
     return pw_fail (error, PW_INPUT, "--colour %.40s: expected body or time", colour);
-  return pw_figure_width (width, &p->width, error);
+  return pw_figure_width (width, &p->figure_width, error);
 }
 
 void pw_plots_close (pw_plots *p) {
@@ -147,5 +148,5 @@ void pw_plots_serialise (pw_plots *p, pw_archive *a) {
   if (samples < 0 || samples > p->wanted) a->failed = 1;
   if (a->failed) return;
   p->samples = samples;
-  pw_archive_bytes (a, p->data, (size_t)samples * (size_t)p->numbers * sizeof *p->data);
+  pw_archive_bytes (a, p->data, (size_t)samples * (size_t)p->width * sizeof *p->data);
 }

@@ -3,42 +3,45 @@
 
 data = name.'.dat'
 title = 'eigenvalues of steady motions'
-height = 1010.0
+above = top
+top = top + rows(4, narrow ? 2 : 4)
+part = narrow ? 92.0 : 118.0
+height = top + 3*part + 10 + bottom + 6 + bottom
 stats data index 3 using 2 name 'y' nooutput
 stats data index 3 using 3 name 'z' nooutput
 unset offsets
 margin(a, b) = 0.04*max(b - a, 1e-3)
-do for [form in 'svg png'] {
+do for [form in forms] {
   eval page(form)
-  set key at screen 0.5,screen 0.962 center top horizontal maxcols 4 samplen 4 width -4
+  eval key(above, 4)
   set xrange [first:last]
   set format x ''
   unset xlabel
   set ylabel 'real part [1/s]'
   set yrange [y_min - margin(y_min, y_max):y_max + margin(y_min, y_max)]
-  eval panel(left, width - right, 66, 316)
-  plot data index 0 using 1:2 with lines dt 1 lc rgb '#004488' title 'stable', \
-       data index 1 using 1:2 with lines dt (8,5) lc rgb '#bb5566' title 'unstable', \
+  eval panel(left, width - right, top, top + part)
+  plot data index 0 using 1:2 with lines lw 1.1 dt 1 lc rgb '#004488' title 'stable', \
+       data index 1 using 1:2 with lines lw 1.1 dt (8,5) lc rgb '#cc6677' title 'unstable', \
        data index 2 using 1:($2 > 1 ? y_min - margin(y_min, y_max) : NaN):(0):(y_max - y_min + 2*margin(y_min, y_max)) \
-         with vectors nohead dt (2,4) lw 1.2 lc rgb '#000000' title 'stability changes', \
+         with vectors nohead dt (2,4) lw 0.7 lc rgb '#000000' title 'stability changes', \
        data index 2 using 1:($2 == 1 ? y_min - margin(y_min, y_max) : NaN):(0):(y_max - y_min + 2*margin(y_min, y_max)) \
-         with vectors nohead dt (10,4,2,4) lw 1.2 lc rgb '#997700' title 'fold'
+         with vectors nohead dt (10,4,2,4) lw 0.7 lc rgb '#c49a00' title 'fold'
   set format x
   set xlabel label_of_x
   set ylabel 'frequency [Hz]'
   top_of_z = max(z_max, -z_min) > 1e-9*max(1, max(y_max, -y_min)) ? max(z_max, -z_min) : 0.1
   set yrange [0:1.08*top_of_z/(2*pi)]
-  eval panel(left, width - right, 332, 532)
-  plot data index 0 using 1:($3 > 1e-12 ? $3 : NaN) with lines dt 1 lc rgb '#004488' title '', \
-       data index 1 using 1:($3 > 1e-12 ? $3 : NaN) with lines dt (8,5) lc rgb '#bb5566' title ''
+  eval panel(left, width - right, top + part + 10, top + 2*part + 10)
+  plot data index 0 using 1:($3 > 1e-12 ? $3 : NaN) with lines lw 1.1 dt 1 lc rgb '#004488' title '', \
+       data index 1 using 1:($3 > 1e-12 ? $3 : NaN) with lines lw 1.1 dt (8,5) lc rgb '#cc6677' title ''
   set xlabel 'real part [1/s]'
   set ylabel 'imaginary part [1/s]'
   set xrange [y_min - margin(y_min, y_max):y_max + margin(y_min, y_max)]
   set yrange [-1.08*top_of_z:1.08*top_of_z]
-  set arrow 1 from 0,graph 0 to 0,graph 1 nohead lw 0.8 lc rgb '#999999'
+  set arrow 1 from 0,graph 0 to 0,graph 1 nohead lw 0.5 lc rgb '#999999'
   set cblabel label_of_x offset 1.5,0
   set cbrange [first:last]
-  eval panel(left, width - right - 100, 610, height - bottom)
+  eval panel(left, width - right - 42, height - bottom - part, height - bottom)
   plot data index 3 using 2:3:1 with points pt 7 ps 0.35 lc palette title ''
   unset arrow 1
   unset multiplot
