@@ -5,9 +5,10 @@
 #include <string.h>
 #include "util.h"
 
-/* STEADY_MOST: coordinates, since the cost is cubic.  STEADY_EXACT: residual of a solution, in units of the scene. */
+/* STEADY_MOST: coordinates, since the cost is cubic.  STEADY_EXACT: residual of a solution, in units of the scene;
+ * STEADY_SLOW: rates that may be round-off at a double root. */
 enum { STEADY_MOST = 400, STEADY_POINTS = 50, STEADY_TIMES = 7 };
-static const double STEADY_EXACT = 1e-9;
+static const double STEADY_EXACT = 1e-9, STEADY_SLOW = 1e-4;
 
 /* ---- Systems ---- */
 
@@ -74,7 +75,7 @@ static int steady_arrays (pw_steady *x) {
     { &x->v0, n },
     { &x->dq, n },
     { &x->dv, n },
-    { &x->null, most * most },
+    { &x->null, (most + 1) * (most + 1) },
     { &x->queue[0].point.u, most + 1 },
     { &x->queue[0].point.tangent, most + 1 },
     { &x->queue[1].point.u, most + 1 },
@@ -218,6 +219,18 @@ static int steady_family (pw_steady *x) {
   return pw_steady_null (equations, unknowns, x->branch.J, 1e-9, x->null);
 }
 
+/* Rest in place of velocities below the accuracy of a double root, if that is a solution, too. */
+static void steady_rest (pw_steady *x) {
+  pw_error none = { 0 };
+  double most = 0;
+  for (int k = x->n; k < pw_steady_unknowns (x); k++) most = fmax (most, fabs (x->u[k]));
+  if (most == 0 || most > STEADY_SLOW) return;
+  memcpy (x->null, x->u, ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u);
+  memset (x->u + x->n, 0, (size_t)x->group * sizeof *x->u);
+  if (pw_branch_solve (&x->branch, x->u, &none) != PW_OK)
+    memcpy (x->u, x->null, ((size_t)pw_steady_unknowns (x) + 1) * sizeof *x->u);
+}
+
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
   double range = x->set.last - x->set.first;
   *out = (pw_steady_motion){ .parameter = parameter };
@@ -228,6 +241,7 @@ int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_moti
   if (status != PW_OK) return pw_fail (error, PW_METHOD, "the symmetries cannot be separated");
   x->u[pw_steady_unknowns (x)] = range != 0 ? (parameter - x->set.first) / range : 0;
   status = pw_branch_solve (&x->branch, x->u, error);
+  if (status == PW_OK) steady_rest (x);
   out->iterations = x->branch.iterations;
   out->residual = x->branch.residual;
   pw_steady_state (x, x->u);
