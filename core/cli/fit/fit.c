@@ -106,8 +106,11 @@ static int fit_search (pw_fit *x, pw_error *error) {
   int status = pw_fit_solve (x, error);
   pw_progress_end (&x->progress);
   pw_stop_release ();
-  if (status == PW_RETRY) fputs ("pinwheel: interrupted before the fit was done\n", stderr);
-  return status == PW_RETRY ? PW_INTERRUPTED : status;
+  if (status != PW_RETRY) return status;
+  char options[4000] = "";
+  if (x->iterations > 0) pw_unknowns_options (&x->unknowns, x->x, options, sizeof options);
+  pw_cli_say ("pinwheel: interrupted after %d iterations%s%s\n", x->iterations, *options ? ": " : "", options);
+  return PW_INTERRUPTED;
 }
 
 static int fit_finish (pw_fit *x, pw_output *file[FIT_FILES], pw_error *error) {

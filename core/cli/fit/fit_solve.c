@@ -114,7 +114,11 @@ static void solve_progress (const size_t iteration, void *context, const gsl_mul
   solution *p = context;
   char number[32];
   double size = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
+  if (p->status != PW_OK) return;
   if (iteration == 0) p->x->initial_chi2 = size * size;
+  p->x->iterations = (int)iteration;
+  for (int i = 0; i < p->x->unknowns.count; i++)
+    p->x->x[i] = solve_unknown (p->x->unknowns.at + i, gsl_vector_get (gsl_multifit_nlinear_position (w), (size_t)i));
   snprintf (p->x->progress.note, sizeof p->x->progress.note, "residual %s", pw_format (number, size, 6));
   pw_progress_at (&p->x->progress, (double)iteration);
 }

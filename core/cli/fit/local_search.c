@@ -182,7 +182,8 @@ static int search_from (search *p, double first, double last) {
     for (size_t i = 0; i < n; i++) u[i] = search_scaled (k->at + i, p->s->first[i]);
     status = search_open (p, c, first, last);
     if (status == PW_OK) search_evaluate (p, u);
-    if (status == PW_OK && !p->failed && !pw_stop) nlopt_optimize (p->opt, u, &value);
+    if (status == PW_OK && !p->failed && !pw_stop && nlopt_optimize (p->opt, u, &value) == NLOPT_OUT_OF_MEMORY)
+      status = PW_RESOURCE;
   }
   nlopt_destroy (p->opt);
   free (memory);

@@ -5,6 +5,7 @@
  * best results continue with a tighter tolerance.  A run that fails gets a value that is worse than all before it. */
 #define _POSIX_C_SOURCE 200809L
 #include "optimise.h"
+#include <gsl/gsl_errno.h>
 #include <gsl/gsl_qrng.h>
 #include <gsl/gsl_rng.h>
 #include <math.h>
@@ -235,6 +236,7 @@ static void optimise_close (pw_optimise *x) {
 static int optimise_command (void *options, pw_error *error) {
   pw_optimise *x = options;
   pw_output *file[2] = { NULL, NULL };
+  gsl_set_error_handler_off (); /* the default handler ends the program */
   int folder = -1, status = optimise_read (x, error);
   if (status == PW_OK) status = optimise_open (x, file, &folder, error);
   if (status == PW_OK) status = optimise_search (x, error);
