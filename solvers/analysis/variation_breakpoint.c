@@ -82,6 +82,7 @@ int pw_variation_pass (pw_variation *x, pw_error *error) {
     memcpy (c->trial, c->Y, (size_t)x->size * sizeof *c->Y);
     for (int j = 0; j < n; j++) c->trial[n + j] += (before[j] - x->linear.a[j]) * c->slope;
   }
+  memcpy (x->point[0].x + 2 * n, x->linear.a, (size_t)n * sizeof *before);
   x->passed = x->t;
   return PW_OK;
 }

@@ -51,8 +51,19 @@ static int path_grow (pw_variation *x) {
   if (more == NULL) return PW_RESOURCE;
   x->point = more;
   for (; x->room < room; x->room++)
-    if ((more[x->room].x = malloc ((length + 1) * sizeof (double))) == NULL) return PW_RESOURCE;
+    if ((more[x->room].x = malloc ((length + 3) * sizeof (double))) == NULL) return PW_RESOURCE;
   return PW_OK;
+}
+
+/* Accelerations just before a breakpoint; those of the run may be those after it. */
+static int path_accelerations (pw_variation *x, const pw_sample *s, double *a, pw_error *error) {
+  pw_run *r = x->r;
+  pw_statistics before = r->statistics;
+  int near = r->near, status = pw_run_accelerate (r, pw_before_breakpoint (r, s->t), s->q, s->v, a, x->linear.z);
+  r->statistics = before;
+  if (status > 0) return pw_fail_singular (r, s->t, error);
+  r->near = near;
+  return status < 0 ? pw_fail_signal (s->t, error) : PW_OK;
 }
 
 static int path_append (pw_variation *x, double t, pw_error *error) {
@@ -67,7 +78,7 @@ static int path_append (pw_variation *x, double t, pw_error *error) {
   memcpy (p->x + n, s.v, n * sizeof (double));
   memcpy (p->x + 2 * n, s.a, n * sizeof (double));
   x->points++;
-  return PW_OK;
+  return t < x->r->breakpoint ? PW_OK : path_accelerations (x, &s, p->x + 2 * n, error);
 }
 
 /* 1 if interpolation between the last two points gives the state x to a tenth of the run's tolerance. */

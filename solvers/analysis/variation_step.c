@@ -72,8 +72,8 @@ static double step_error (pw_variation *x, double h) {
     step_combine (x, c, pw_erk5_tableau.e, PW_VARIATION_RATES, h, e);
     if (size > 0) most = pw_largest (most, step_norm (x, e) / size);
     double energy = fmax (c->energy, step_energy (x, c->trial));
-    energy = fmax (energy, STEP_LEAST * fmax (x->r->exchanged, x->r->energy_scene) * size);
-    if (energy > 0) most = pw_largest (most, step_energy (x, e) / (10 * energy));
+    energy = fmax (energy, 0.01 * STEP_LEAST * fmax (x->r->exchanged, x->r->energy_scene) * size);
+    if (energy > 0) most = pw_largest (most, step_energy (x, e) / energy);
   }
   return most;
 }

@@ -111,6 +111,24 @@ static void test_outputs (void **state) {
   sensitivity_compare ("frame.phi", "start=frame.phi", 0, 1e-3);
 }
 
+/* A breakpoint that moves: the accelerations before it and after it differ, whatever the times of rows. */
+static void test_pulse (void **state) {
+  double x[2][SENSITIVITY_MOST];
+  (void)state;
+  cli_write (
+      "pulse.yaml",
+      "pinwheel: 1\nparameters:\n  - {name: s, value: 0.5, unit: s}\n"
+      "bodies:\n  - {name: block, mass: 2, inertia: 0.1, start: {x: 0.8}}\nelements:\n"
+      "  - {force: F, body: block, at: [0, 0], fx: {pulse: {height: 2, start: s, width: 0.5}}}\n"
+      "  - {spring: K, body: [block, ground], at: [[0, 0], [0, 0]], stiffness: 60, damping: 2.4, length: 0.8}\n");
+  for (int i = 0; i < 2; i++) {
+    cli_good (i ? "pinwheel sensitivity @/pulse.yaml --of K.loss --by s -t 2 --every 0.05 -o @/sens"
+                : "pinwheel sensitivity @/pulse.yaml --of K.loss --by s -t 2 --every 0.001 -o @/sens");
+    assert_int_equal (sensitivity_last (x[i]), 3);
+    check_close ("loss", x[i][2], -0.0511971431, 1e-9, "extrapolated differences of runs, 9 digits");
+  }
+}
+
 /* ---- Files ---- */
 
 static void test_files (void **state) {
@@ -138,6 +156,7 @@ static void test_refusals (void **state) {
     { "pendulum --of bob.z --by l", "--of bob.z: no column \"bob.z\"; did you mean \"bob.x\"?" },
     { "pendulum --of bob.x --by ll", "model pendulum has no parameter \"ll\"; did you mean \"l\"?" },
     { "pendulum --of bob.x --by bob.z", "model pendulum has no state \"bob.z\"; valid are x, y, phi, vx, vy, omega" },
+    { "pendulum --of bob.x --by l --by l", "--by l is given twice" },
     { "chain --of link1.x --by n", "n is a count (10): derivatives need a number that varies continuously" },
     { "slider-crank --of crank.phi --by g",
       "g changes the number of bodies or elements: it cannot be differentiated by" },
@@ -150,8 +169,9 @@ static void test_refusals (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_sleigh),  cmocka_unit_test (test_pendulum), cmocka_unit_test (test_incline),
-    cmocka_unit_test (test_outputs), cmocka_unit_test (test_files),    cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_sleigh),   cmocka_unit_test (test_pendulum), cmocka_unit_test (test_incline),
+    cmocka_unit_test (test_outputs),  cmocka_unit_test (test_pulse),    cmocka_unit_test (test_files),
+    cmocka_unit_test (test_refusals),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

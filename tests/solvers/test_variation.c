@@ -219,6 +219,20 @@ static void gallery_derive (const gallery_name *g, double value, const char *met
   variation_free (&c);
 }
 
+/* x^2 + y^2 = l^2 and its time derivative, differentiated by l; the steps alone leave the constraints. */
+static void test_tangent (void **state) {
+  const gallery_name g = { "pendulum", "l" };
+  pw_settings settings = { .step = 1e-3, .span = 20 };
+  double d[6], q[3], v[3];
+  (void)state;
+  gallery_derive (&g, 1, "rk4+projection", &settings, 20, d);
+  pw_system *s = gallery_make (&g, 1);
+  runs_state (s, "rk4+projection", &settings, 20, q, v, NULL);
+  pw_system_free (s);
+  check_close ("position", q[0] * d[0] + q[1] * d[1], 1, 2e-10, "differences of 1e-5, round-off of 1e-16 by that");
+  check_close ("velocity", v[0] * d[0] + q[0] * d[3] + v[1] * d[1] + q[1] * d[4], 0, 2e-9, "the same, at 10 m/s");
+}
+
 /* Methods of every family agree on a vehicle. */
 static void test_methods (void **state) {
   static const char *const methods[] = { "rk4+nullspace", "rk4+baumgarte",  "erk5+projection", "erk8+projection",
@@ -309,8 +323,9 @@ static void test_run (void **state) {
 
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_methods),
-    cmocka_unit_test (test_gallery),    cmocka_unit_test (test_refusals),    cmocka_unit_test (test_run),
+    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_breakpoints), cmocka_unit_test (test_tangent),
+    cmocka_unit_test (test_methods),    cmocka_unit_test (test_gallery),     cmocka_unit_test (test_refusals),
+    cmocka_unit_test (test_run),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }

@@ -48,8 +48,11 @@ static int sensitivity_unknowns (pw_sensitivity *x, pw_error *error) {
   pw_run *r = pw_run_open (x->m.system, x->method, &x->settings, error);
   int status = r ? PW_OK : error->status;
   x->unknowns = count;
-  for (int i = 0; i < count && status == PW_OK; i++)
+  for (int i = 0; i < count && status == PW_OK; i++) {
     status = pw_unknown_find (&x->unknown[i], &x->m, r, x->by[i], error);
+    for (int k = 0; k < i && status == PW_OK; k++)
+      if (strcmp (x->by[k], x->by[i]) == 0) status = pw_fail (error, PW_INPUT, "--by %s is given twice", x->by[i]);
+  }
   if (r) pw_run_close (r);
   return status;
 }
