@@ -55,6 +55,32 @@ if [ -f "$csvd" ]; then
       printf "| `%s` | %.1e | %s | %.1e | %s | %.1e | %s |\n", $2, $8, power($10), $11, power($13), $14, power($16) }' "$csvd" | section drift
 fi
 
+# ---- Long runs ----
+
+# Energy of the contact oscillator over 10^5 periods; problem 1: reversible, 2: perturbed.
+csvl=$results/long-$machine.csv
+if [ -f "$csvl" ]; then
+  for problem in reversible perturbed; do
+    for m in leapfrog galpha+ggl rk4+projection radau; do
+      awk -F, -v p=$problem -v m=$m '$1 == p && $2 == m { print $3 / 6.283185307, $4 }' "$csvl" >"$work/$problem-$m"
+    done
+  done
+  lines () {
+    echo "plot '$work/$1-leapfrog' with lines lw 1.5 lc rgb '#117755' dt (8,4) title 'leapfrog', '$work/$1-galpha+ggl' with lines lw 1.5 lc rgb '#8844aa' dt (10,4,3,4) title 'galpha+ggl',\\"
+    echo " '$work/$1-rk4+projection' with lines lw 1.5 lc rgb '#004488' dt 1 title 'rk4+projection', '$work/$1-radau' with lines lw 1.5 lc rgb '#000000' dt (3,3) title 'radau'"
+  }
+  draw bench-long 430 'Contact oscillator: largest energy defect of a part of the run against time' <<G
+set logscale xy; set format '10^{%T}'; set xlabel 'time [periods of the carriage]'; set key top left
+set xrange [500:1e5]; set yrange [1e-3:30]
+eval panel(left, 0.5*width - 14, 24, height - bottom)
+set ylabel 'energy defect, reversible [J]'
+$(lines reversible)
+set ylabel 'energy defect, perturbed [J]'
+eval panel(0.5*width + left - 4, width - right, 24, height - bottom)
+$(lines perturbed)
+G
+fi
+
 # ---- Effects ----
 
 text=$results/effects-$machine.txt
