@@ -105,11 +105,13 @@ static void test_options (void **state) {
       "pinwheel drift pendulum --t-end 2 --step 0.01 --methods rk4+projection --vary alpha=0,5 --vary "
       "beta=log:1:100:3 --vary every=1,4,16 -o @/options && tail -n +2 @/options/drift.csv | cut -d, -f1 | uniq -c "
       "| tr -s ' ' && ls @/options");
-  assert_non_null (strstr (cli_out, " 1 methods\n 6 baumgarte\n 6 projection\n"
-                                    "drift-baumgarte.dat\ndrift-baumgarte.gp\ndrift-baumgarte.png\n"
-                                    "drift-baumgarte.svg\ndrift-projection.dat\ndrift-projection.gp\n"
-                                    "drift-projection.png\ndrift-projection.svg\ndrift-time.csv\ndrift.csv\ndrift.dat\n"
-                                    "drift.gp\ndrift.png\ndrift.svg\n"));
+  assert_non_null (
+      strstr (cli_out,
+              " 1 methods\n 6 baumgarte\n 6 projection\n"
+              "drift-baumgarte.dat\ndrift-baumgarte.gp\ndrift-baumgarte.pdf\ndrift-baumgarte.png\n"
+              "drift-baumgarte.svg\ndrift-projection.dat\ndrift-projection.gp\n"
+              "drift-projection.pdf\ndrift-projection.png\ndrift-projection.svg\ndrift-time.csv\ndrift.csv\ndrift.dat\n"
+              "drift.gp\ndrift.pdf\ndrift.png\ndrift.svg\n"));
   assert_null (strstr (cli_err, ".gp")); /* gnuplot has nothing to report, although 0 has no place on the axis */
   const char *f = "options/drift.csv";
   assert_true (drift_number (f, "rk4+baumgarte:alpha=5:beta=10", ALPHA) == 5);
