@@ -127,7 +127,7 @@ static int outcome_add (pw_outcomes *x, pw_functional_type type, pw_column c) {
 
 /* Adds [TYPE:]NAME to an output, followed by `next` in its text, and the name of its variable in the formula to a text. */
 static int outcome_term (pw_outcomes *x, pw_outcome *o, const char *what, const char *name, char next,
-                         char variable[16], pw_error *error) {
+                         char variable[20], pw_error *error) {
   pw_column c;
   pw_functional_type type = outcome_type (&name);
   pw_error own = { 0 };
@@ -140,7 +140,7 @@ static int outcome_term (pw_outcomes *x, pw_outcome *o, const char *what, const 
   while (i < o->terms && o->term[i] != f) i++;
   if (i == PW_FORMULA_NAMES) return pw_fail (error, PW_INPUT, "%s: more than %d columns", what, PW_FORMULA_NAMES);
   if (i == o->terms) o->term[o->terms++] = f;
-  snprintf (variable, 16, "column%d", i + 1);
+  snprintf (variable, 20, "column%d", i + 1);
   return PW_OK;
 }
 
@@ -186,7 +186,7 @@ static int outcome_formula (pw_outcomes *x, pw_outcome *o, const char *what, pw_
   char text[4000], name[300];
   size_t used = 0;
   for (const char *at = o->text; *at;) {
-    char variable[16];
+    char variable[20];
     size_t n = outcome_length (x->system, at), size = n ? 0 : outcome_copied (at);
     if (n >= sizeof name || used + size + sizeof variable > sizeof text)
       return pw_fail (error, PW_INPUT, "%s: the expression is too long", what);
