@@ -204,7 +204,7 @@ static int outcome_formula (pw_outcomes *x, pw_outcome *o, const char *what, pw_
 
 /* A single column may have any name. */
 static int outcome_read (pw_outcomes *x, pw_outcome *o, const char *option, pw_error *error) {
-  char what[300], variable[16];
+  char what[300], variable[20];
   snprintf (what, sizeof what, "%s %.200s", option, o->text);
   if (*o->text == 0) return pw_fail (error, PW_INPUT, "%s is empty: expected a column, such as frame.x", option);
   if (outcome_term (x, o, what, o->text, 0, variable, &(pw_error){ 0 }) == PW_OK) return PW_OK;
