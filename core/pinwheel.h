@@ -558,7 +558,6 @@ typedef enum {
 struct pw_kind {
   const char *name;       /* "pin" */
   const char *about;      /* one line */
-  const char *symbol;     /* how figures draw it: see plot_symbols.c; NULL: not at all */
   size_t definition;      /* bytes of the definition structure, whose first member is `const char *name` */
   size_t element;         /* bytes of the prepared element */
   const pw_field *fields; /* ends with a NULL name; the member `name` is not listed */
@@ -596,6 +595,7 @@ struct pw_kind {
   /* 2 cols, for forces that saturate, such as friction: the change of each coordinate, then of each velocity, over
    * which the force changes by its own magnitude.  Entries are INFINITY (no saturation) before the call. */
   pw_batch_function *saturation;
+  const char *symbol; /* how figures draw it: see plot_symbols.c; NULL: not at all */
 };
 
 /* The number of values of a field, and the bytes of one value; 0 bytes: invalid type. */

@@ -26,7 +26,7 @@ LAYOUT (pw_quantity, 32);
 LAYOUT (pw_internal, 32);
 LAYOUT (pw_configuration, 64);
 LAYOUT (pw_batch, 72);
-LAYOUT (pw_kind, 248);
+LAYOUT (pw_kind, 256);
 
 LAYOUT_AT (pw_error, text, 4);
 LAYOUT_AT (pw_signal, constant, 8);
@@ -116,6 +116,7 @@ LAYOUT_AT (pw_kind, power, 216);
 LAYOUT_AT (pw_kind, loss, 224);
 LAYOUT_AT (pw_kind, contact, 232);
 LAYOUT_AT (pw_kind, saturation, 240);
+LAYOUT_AT (pw_kind, symbol, 248);
 
 LAYOUT_VALUE (PW_CONSTANT, 0);
 LAYOUT_VALUE (PW_HARMONIC, 1);

@@ -35,7 +35,7 @@ do for [form in forms] {
   eval key(above, per_row)
   set format x ''
   set format y '10^{%T}'
-  unset xlabel
+  set xlabel ''
   y = top
   do for [n = 1:words(quantities)] {
     k = word(quantities, n) + 0

@@ -24,7 +24,7 @@ do for [form in forms] {
   eval page(form)
   eval key(above, 8)
   set format x ''
-  unset xlabel
+  set xlabel ''
   set ylabel axis('energy, work', 'J', q)
   if (at_rest) { set yrange [-1:1] } else { set yrange [*:*] }
   eval panel(left, width - right, top, top + high)

@@ -20,8 +20,8 @@ bars(i, y) = sprintf('plot "fit.dat" index %d using 1:(%s)%s ls 1 notitle', i - 
 do for [form in forms] {
   eval page(form)
   eval key(above, 2)
-  unset xlabel
-  unset ylabel
+  set xlabel ''
+  set ylabel ''
   unset xzeroaxis
   set tics scale 0
   set format ''
@@ -43,7 +43,7 @@ do for [form in forms] {
     eval panel(x, x + wide, y, y + high)
     set format x ''
     set format y '%g'
-    unset xlabel
+    set xlabel ''
     set ylabel label[i] noenhanced
     eval bars(i, 'column(2)').', "" index '.(i - 1).' using 1:4 with lines ls 2 notitle'
     eval panel(x, x + wide, y + high + 8, y + high + 8 + low)

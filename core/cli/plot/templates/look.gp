@@ -39,22 +39,22 @@ narrow = width < 300 # one column of a page with two
 space(s, n) = n < 2 || s[n:n] eq ' ' ? n : space(s, n - 1)
 wrap(s, n, between) = strlen(s) <= n || space(s, n) < 2 ? s : \
   s[1:space(s, n) - 1].between.wrap(s[space(s, n) + 1:*], n, between)
-heading = wrap(about, int((width - 16)/5.2), "}\n{/=8.5 ")
+heading = wrap(about, int((width - 16)/5.2), "}\n{/*1.13 ")
 top = 30.0
 do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
 
 page(form) = sprintf(form eq 'svg' ? "set terminal svg size %.2f,%.2f enhanced ". \
-    "font 'DejaVu Sans,Helvetica,sans-serif,10' linewidth 1.3333 background rgb 'white'; set pointsize 0.6" : \
+    "font 'DejaVu Sans,Helvetica,sans-serif,10' linewidth 1.3333 background rgb 'white'; set pointsize 0.6; lift = 2; pitch = 0.82; set xlabel offset 0,0.6; set ylabel offset 1.5,0" : \
   form eq 'png' ? "set terminal pngcairo size %.2f,%.2f enhanced font 'DejaVu Sans,7.5' ". \
-    "fontscale 1.5625 linewidth 2.0833 pointscale 2.0833 background rgb 'white'; set pointsize 0.5" : \
-    "set terminal pdfcairo size %.6f,%.6f enhanced font 'DejaVu Sans,7.5' fontscale 0.75 linewidth 2; set pointsize 0.25", \
+    "fontscale 1.5625 linewidth 2.0833 pointscale 2.0833 background rgb 'white'; set pointsize 0.5; lift = 5; pitch = 1; set xlabel offset 0,0; set ylabel offset 0,0" : \
+    "set terminal pdfcairo size %.6f,%.6f enhanced font 'DejaVu Sans,7.5' fontscale 0.75 linewidth 2; set pointsize 0.25; lift = 5; pitch = 1; set xlabel offset 0,0; set ylabel offset 0,0", \
   width*scale(form), height*scale(form)).sprintf("; set output '%s.%s'; ", name, form). \
-  'caption = "{/=8.5 ".heading."}\n{/=7.5 ".title.incomplete."}"; set multiplot title caption'
+  'caption = "{/*1.13 ".heading."}\n".title.incomplete; set multiplot title caption'
 scale(form) = form eq 'svg' ? 96/72.0 : form eq 'png' ? 150/72.0 : 1/72.0 # units of a terminal in a point
 panel(x0, x1, y0, y1) = sprintf('set lmargin at screen %.6f; set rmargin at screen %.6f; ', x0/width, x1/width). \
   sprintf('set tmargin at screen %.6f; set bmargin at screen %.6f', 1 - y0/height, 1 - y1/height)
-key(y, columns) = sprintf('set key noenhanced at screen 0.5,screen %.6f center top horizontal maxcols %d samplen 3 spacing 1', \
-                          1 - (y - 5)/height, columns)
+key(y, columns) = sprintf('set key noenhanced at screen 0.5,screen %.6f center top horizontal maxcols %d samplen 3 spacing %g', \
+                          1 - (y - lift)/height, columns, pitch)
 columns(longest) = max(1, int((width - left - right)/(28 + letter*longest)))
 rows(n, columns) = 3 + 9.6*((n + columns - 1)/columns)
 short(s) = strlen(s) > 24 ? s[1:24].'…' : s

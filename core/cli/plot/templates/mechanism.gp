@@ -7,7 +7,7 @@ do for [i = 1:8] { code[i] = int('0x'.colour(i)[2:7]) }
 part(c, unit, f) = int(255 - f*(255 - (c/unit) % 256))*unit
 # The colour of a body; the ground and elements are grey.
 shade(body, f) = (c = body > 0 ? code[(int(body) - 1) % 8 + 1] : 0x555555, part(c, 65536, f) + part(c, 256, f) + part(c, 1, f))
-fade(t, t_end) = 0.12 + 0.45*t/t_end
+fade(t, t_end) = 0.22 + 0.4*t/t_end
 array images[2] = ['', '']
 do for [i = 1:panels] {
   file = i == 1 ? "'mechanism.dat'" : "'mechanism-start.dat'"

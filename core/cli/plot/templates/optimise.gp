@@ -16,8 +16,8 @@ set style line 3 pt 6 ps 1.6 lw 1.2 lc rgb '#cc6677'
 do for [form in forms] {
   eval page(form)
   eval key(above, 3)
-  unset xlabel
-  unset ylabel
+  set xlabel ''
+  set ylabel ''
   unset xzeroaxis
   set tics scale 0
   set format ''

@@ -16,7 +16,7 @@ do for [form in forms] {
   eval key(above, 4)
   set xrange [first:last]
   set format x ''
-  unset xlabel
+  set xlabel ''
   set ylabel 'real part [1/s]'
   set yrange [y_min - margin(y_min, y_max):y_max + margin(y_min, y_max)]
   eval panel(left, width - right, top, top + part)
@@ -41,7 +41,7 @@ do for [form in forms] {
   set arrow 1 from 0,graph 0 to 0,graph 1 nohead lw 0.5 lc rgb '#999999'
   set cblabel label_of_x offset 1.5,0
   set cbrange [first:last]
-  eval panel(left, width - right - 42, height - bottom - part, height - bottom)
+  eval panel(left, width - right - 62, height - bottom - part, height - bottom)
   plot data index 3 using 2:3:1 with points pt 7 ps 0.35 lc palette title ''
   unset arrow 1
   unset multiplot

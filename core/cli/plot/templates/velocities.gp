@@ -13,7 +13,7 @@ do for [form in forms] {
   eval page(form)
   eval legend(1)
   set format x ''
-  unset xlabel
+  set xlabel ''
   set ylabel axis('v_x', 'm/s', px)
   eval panel(left, width - right, top, top + high)
   eval yrange(vx_min, vx_max, px)

@@ -44,7 +44,7 @@ do for [form in forms] {
   eval panel(left, left + wide, top, top + high)
   plot for [i = 1:methods] data index i - 1 using 2:column_of_error with linespoints ls i notitle
   if (!narrow) {
-    unset ylabel
+    set ylabel ''
     set format y ''
   }
   unset label 1
@@ -53,8 +53,8 @@ do for [form in forms] {
   if (narrow) { eval panel(left, left + wide, height - bottom - high, height - bottom) } \
   else { eval panel(left + wide + 14, width - right, top, top + high) }
   plot for [i = 1:methods] data index i - 1 using 3:column_of_error with linespoints ls i notitle
-  unset xlabel
-  unset ylabel
+  set xlabel ''
+  set ylabel ''
   unset object 1
   unset multiplot
   unset output
