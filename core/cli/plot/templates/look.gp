@@ -44,7 +44,7 @@ top = 30.0
 do for [i = 1:strlen(heading)] { if (heading[i:i] eq "\n") { top = top + 11 } }
 
 page(form) = sprintf(form eq 'svg' ? "set terminal svg size %.2f,%.2f enhanced ". \
-    "font 'DejaVu Sans,Helvetica,sans-serif,10' linewidth 1.3333 background rgb 'white'; set pointsize 0.6; lift = 2; pitch = 0.82; set xlabel offset 0,0.6; set ylabel offset 1.5,0" : \
+    "font 'DejaVu Sans,Helvetica,sans-serif,10' linewidth 1.3333 background rgb 'white'; set pointsize 0.6; lift = 2; pitch = 0.82; set xlabel offset 0,0.6; set ylabel offset 0.8,0" : \
   form eq 'png' ? "set terminal pngcairo size %.2f,%.2f enhanced font 'DejaVu Sans,7.5' ". \
     "fontscale 1.5625 linewidth 2.0833 pointscale 2.0833 background rgb 'white'; set pointsize 0.5; lift = 5; pitch = 1; set xlabel offset 0,0; set ylabel offset 0,0" : \
     "set terminal pdfcairo size %.6f,%.6f enhanced font 'DejaVu Sans,7.5' fontscale 0.75 linewidth 2; set pointsize 0.25; lift = 5; pitch = 1; set xlabel offset 0,0; set ylabel offset 0,0", \
