@@ -27,7 +27,7 @@ class _System:
 
 
 class _Handle:
-    """A C object that is freed with the last object that uses it."""
+    """A C object and the function that deletes it."""
 
     def __init__(self, pointer, free):
         self.pointer, self._free = pointer, free
