@@ -177,7 +177,7 @@ static void test_alone (void **state) {
   (void)state;
   cli_good ("mkdir @/bin && cp \"${PINWHEEL:-build/pinwheel}\" ${BUILD:-build}/libpinwheel*.so.* @/bin");
   cli_good ("PINWHEEL_MODELS= @/bin/pinwheel list");
-  reports_shows ("  none found; folders named in the environment variable PINWHEEL_MODELS are searched\n");
+  reports_shows ("none found; folders named in the environment variable PINWHEEL_MODELS are searched\n");
   assert_int_equal (cli_run ("PINWHEEL_MODELS= @/bin/pinwheel run pendulum"), 2);
   assert_non_null (strstr (cli_err, "pinwheel: there is no model \"pendulum\", nor any other in the folders of "));
   assert_int_equal (cli_run ("pinwheel new @/own.c >@/log && @/bin/pinwheel run @/own.c"), 2);

@@ -89,14 +89,15 @@ static int list_model (void *context, const char *name, const char *path) {
   return 0;
 }
 
+static const char list_none[] = "none found; folders named in the environment variable PINWHEEL_MODELS are searched";
+
 static int list_models (const char **name, pw_error *error) {
   int width = 0;
   (void)name;
   puts ("Models");
   int status = pw_file_list (list_width, &width, error);
   if (status == PW_OK) status = pw_file_list (list_model, &width, error);
-  if (status == PW_OK && width == 0)
-    puts ("  none found; folders named in the environment variable PINWHEEL_MODELS are searched");
+  if (status == PW_OK && width == 0) printf ("  %s\n", list_none);
   return status;
 }
 
@@ -223,7 +224,9 @@ static int list_model_name (void *context, const char *name, const char *path) {
 }
 
 static int list_model_names (FILE *f, pw_error *error) {
-  return pw_file_list (list_model_name, f, error);
+  int status = pw_file_list (list_model_name, f, error);
+  if (status == PW_OK && ftell (f) == 0) fputs (list_none, f);
+  return status;
 }
 
 static int list_kind_names (FILE *f, pw_error *error) {
