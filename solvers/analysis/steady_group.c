@@ -110,6 +110,33 @@ static int group_place (pw_steady *x, double apart) {
   return status;
 }
 
+/* Removes combinations that displace nothing, such as a rotation of the whole about the centre of a pinned disc less one of
+ * its angle: no symmetries.  x->q is in general position. */
+static int group_effective (pw_steady *x, int rates) {
+  int n = x->n + 3, group = x->group; /* at least as many rows as columns */
+  double *F = calloc ((size_t)(n + group + rates) * (size_t)group + 1, sizeof *F), *c = F + n * group,
+         *w = c + group * group;
+  if (F == NULL) return PW_RESOURCE;
+  for (int k = 0; k < group; k++) {
+    pw_steady_field (x, x->axis + k * rates, x->q, F + k * n);
+    for (int j = 0; j < x->n; j++) F[k * n + j] /= pw_unit (x->s, j);
+  }
+  int idle = group ? pw_steady_null (n, group, F, 1e-9, c) : 0;
+  for (int i = 0; i < idle * group; i++)
+    for (int j = 0; j < rates; j++) w[i / group * rates + j] += c[i] * x->axis[i % group * rates + j];
+  group_reduce (idle, rates, w);
+  for (int i = 0; i < idle; i++) {
+    int last = rates - 1;
+    while (last > 0 && w[i * rates + last] == 0) last--;
+    for (int k = 0; k < group; k++) {
+      double factor = x->axis[k * rates + last];
+      for (int j = 0; j < rates; j++) x->axis[k * rates + j] -= factor * w[i * rates + j];
+    }
+  }
+  free (F);
+  return idle;
+}
+
 int pw_steady_find_group (pw_steady *x) {
   pw_linearisation *l = &x->at[0].x;
   int rates = pw_steady_rates (x->s), length = l->holonomic + l->rank + x->n, rows = length + 3;
@@ -123,7 +150,10 @@ int pw_steady_find_group (pw_steady *x) {
   x->group = x->s->bodies ? pw_steady_null (rows, rates, M, tolerance, x->axis) : 0;
   free (M);
   if (x->group < 0) return x->group;
+  int idle = group_effective (x, rates);
+  if (idle < 0) return idle;
   group_reduce (x->group, rates, x->axis);
+  x->group -= idle;
   return PW_OK;
 }
 

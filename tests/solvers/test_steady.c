@@ -453,6 +453,53 @@ static void test_bodies (void **state) {
   steady_close (&t);
 }
 
+/* ---- Discs on a fixed axis ---- */
+
+typedef struct {
+  double count, pinned, k; /* k: stiffness of the spring between the first disc and the ground */
+} discs;
+
+static const pw_parameter discs_parameters[] = { { PW_AT (discs, count), 1, "", "", PW_COUNT },
+                                                 { PW_AT (discs, pinned), 1, "", "", PW_REAL },
+                                                 { PW_AT (discs, k), 0, "N m/rad", "", PW_REAL },
+                                                 { .name = NULL } };
+
+static void discs_build (pw_model *m, const void *parameters) {
+  static const char *const name[] = { "one", "two" };
+  const discs *p = parameters;
+  for (int i = 0; i < p->count; i++) {
+    pw_add_body (m, &(pw_body){ .name = name[i], .mass = 1, .inertia = 1 });
+    if (p->pinned != 0) pw_add_pin (m, &(pw_pin){ .name = i ? "pin2" : "pin1", .body = { name[i], "ground" } });
+  }
+  if (p->k > 0)
+    pw_add_rotational_spring (
+        m, &(pw_rotational_spring){ .name = "spring", .body = { "one", "ground" }, .stiffness = p->k });
+}
+
+static const pw_plugin_table discs_table = { .abi = PW_ABI,
+                                             .size = sizeof (pw_plugin_table),
+                                             .parameters = discs_parameters,
+                                             .parameters_size = sizeof (discs),
+                                             .build = discs_build };
+
+/* A rotation of the whole about the axis less those of the discs displaces nothing and is no symmetry.  Symmetries: the
+ * angle of each disc without a spring; x, y and the angle of a free disc. */
+static void test_concentric (void **state) {
+  static const struct {
+    double count, pinned, k;
+    int symmetries;
+  } scene[] = { { 1, 1, 3, 0 }, { 1, 1, 0, 1 }, { 2, 1, 3, 1 }, { 2, 1, 0, 2 }, { 1, 0, 0, 3 } };
+  (void)state;
+  for (size_t i = 0; i < sizeof scene / sizeof *scene; i++) {
+    steady t = { .s = scene_system (&discs_table, "count", scene[i].count, "pinned", scene[i].pinned, "k", scene[i].k,
+                                    NULL),
+                 .set.vary = -1 };
+    steady_open (&t);
+    assert_int_equal (pw_steady_symmetries (t.x), scene[i].symmetries);
+    steady_close (&t);
+  }
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_turn),           cmocka_unit_test (test_straight),
@@ -462,6 +509,7 @@ int main (void) {
     cmocka_unit_test (test_fold),           cmocka_unit_test (test_whirl_eigenvalues),
     cmocka_unit_test (test_shimmy),         cmocka_unit_test (test_shimmy_runs),
     cmocka_unit_test (test_refused),        cmocka_unit_test (test_bodies),
+    cmocka_unit_test (test_concentric),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
