@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "sources.h"
-#include "specialise.h"
+#include "specialise_parts.h"
 
 /* ---- Text ---- */
 

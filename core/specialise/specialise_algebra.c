@@ -1,7 +1,7 @@
 /* Specialised code: products with J, factorisations, solutions. */
 #define _POSIX_C_SOURCE 200809L
 #include <stdlib.h>
-#include "specialise.h"
+#include "specialise_parts.h"
 
 /* ---- Linear algebra ---- */
 

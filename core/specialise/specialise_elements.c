@@ -1,7 +1,7 @@
 /* Specialised code: functions of elements and signals. */
 #include <stddef.h>
 #include <string.h>
-#include "specialise.h"
+#include "specialise_parts.h"
 
 int pw_specialise_is_built_in (const pw_kind *kind) {
   for (const pw_kind *const *k = pw_kinds; *k; k++)

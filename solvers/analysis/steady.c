@@ -1,57 +1,14 @@
 /* The search for steady motions; equations in steady_equations.c. */
-#include "steady.h"
+#include "steady_parts.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
 
-/* STEADY_MOST: coordinates, since the cost is cubic.  STEADY_EXACT: residual of a solution, in units of the scene;
+/* STEADY_EXACT: residual of a solution, in units of the scene;
  * STEADY_SLOW: rates that may be round-off at a double root. */
-enum { STEADY_MOST = 400, STEADY_POINTS = 50, STEADY_TIMES = 7 };
+enum { STEADY_POINTS = 50, STEADY_TIMES = 7 };
 static const double STEADY_EXACT = 1e-9, STEADY_SLOW = 1e-4;
-
-/* ---- Systems ---- */
-
-static void steady_leave (pw_steady *x, int k) {
-  pw_linear_close (&x->at[k].x);
-  if (x->at[k].r) pw_run_close (x->at[k].r);
-  pw_system_free (x->at[k].own);
-  memset (&x->at[k], 0, sizeof x->at[k]);
-}
-
-static int steady_fits (const pw_steady *x, const pw_system *s) {
-  return s->coords == x->n && s->rows == x->m && s->holonomic == x->holonomic && s->bodies == x->s->bodies;
-}
-
-/* Opens a run at the last solution, of which it keeps what it can. */
-static int steady_open_run (pw_steady *x, int k, const pw_system *s) {
-  const pw_settings settings = {
-    .t = x->set.t, .span = x->set.span, .initial = x->known, .initials = x->solved ? 2 * x->n : 0
-  };
-  x->at[k].r = pw_run_open (s, "rk4+projection", &settings, &x->why);
-  if (x->at[k].r == NULL) return x->why.status;
-  if (pw_linear_open (&x->at[k].x, x->at[k].r, 0, STEADY_MOST) == PW_OK) return PW_OK;
-  return pw_fail_memory (s, &x->why);
-}
-
-int pw_steady_at (pw_steady *x, int k, double value) {
-  const pw_system *s = x->s;
-  int status;
-  if (x->at[k].r && (x->set.compile == NULL || x->at[k].value == value)) return PW_OK;
-  steady_leave (x, k);
-  x->why = (pw_error){ 0 };
-  x->at[k].value = value;
-  if (x->set.compile) s = x->at[k].own = x->set.compile (x->set.context, value, &x->why);
-  if (s == NULL)
-    status = x->why.status;
-  else if (!steady_fits (x, s))
-    return pw_fail (&x->why, PW_INPUT, "model %s: the parameter changes the number of bodies or constraint equations",
-                    s->model);
-  else
-    status = steady_open_run (x, k, s);
-  if (status != PW_OK) steady_leave (x, k);
-  return status == PW_OK || status == PW_RESOURCE ? status : PW_RETRY;
-}
 
 /* ---- Opening ---- */
 
@@ -139,9 +96,9 @@ pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *setting
   x->vary = settings->vary;
   if (x->set.points <= 0) x->set.points = STEADY_POINTS;
   int status = PW_OK;
-  if (x->n > STEADY_MOST)
+  if (x->n > PW_STEADY_MOST)
     status = pw_fail (error, PW_INPUT, "model %s has %d coordinates; steady motions are sought with at most %d",
-                      s->model, x->n, STEADY_MOST);
+                      s->model, x->n, PW_STEADY_MOST);
   if (status == PW_OK && steady_arrays (x) != PW_OK) status = pw_fail_memory (s, error);
   if (status == PW_OK && pw_steady_at (x, 0, x->set.first) != PW_OK) *error = x->why, status = error->status;
   if (status == PW_OK) status = steady_begin (x, error);
@@ -158,7 +115,7 @@ pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *setting
 
 void pw_steady_close (pw_steady *x) {
   if (x == NULL) return;
-  for (int k = 0; k < 2; k++) steady_leave (x, k);
+  for (int k = 0; k < 2; k++) pw_steady_leave (x, k);
   pw_branch_close (&x->branch);
   pw_linear_free (&x->linear);
   free (x->cyclic);
@@ -193,7 +150,7 @@ int pw_steady_motion_at (pw_steady *x, const double *u, pw_steady_motion *out, p
   memcpy (r->q, x->q, (size_t)x->n * sizeof *r->q);
   memcpy (r->v, x->v, (size_t)x->n * sizeof *r->v);
   pw_linear_free (&x->linear);
-  status = pw_run_linearise (r, STEADY_MOST, &x->linear, error);
+  status = pw_run_linearise (r, PW_STEADY_MOST, &x->linear, error);
   if (status != PW_OK) return status;
   out->parameter = pw_steady_parameter (x, u);
   out->q = x->q, out->v = x->v;

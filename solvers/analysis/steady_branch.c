@@ -1,7 +1,7 @@
 /* Branches of steady motions: points, folds and changes of stability. */
 #include <math.h>
 #include <string.h>
-#include "steady.h"
+#include "steady_parts.h"
 
 /* BRANCH_LEAST: smallest step, relative to the range of the parameter.  BRANCH_ACCURACY: of events, relative to the step.
  * BRANCH_LIMIT: points at most, as a multiple of those asked for. */

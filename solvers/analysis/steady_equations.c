@@ -16,7 +16,7 @@
 #include <math.h>
 #include <string.h>
 #include "rank.h"
-#include "steady.h"
+#include "steady_parts.h"
 
 /* STEADY_DIFFERENCE: half the distance of differences by a parameter of the model, relative to its range: round-off of
  * 1e-11, and an error of 1e-10 for an effect of that size in the third derivative. */

@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "rank.h"
-#include "steady.h"
+#include "steady_parts.h"
 #include "util.h"
 
 /* GROUP_APART: distance of that state from the initial one, in units of the scene; GROUP_ROUND: round-off of derivatives. */

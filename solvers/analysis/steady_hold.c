@@ -4,7 +4,7 @@
  *                                                           curvature   A = omega,  B = speed */
 #include <stdio.h>
 #include <string.h>
-#include "steady.h"
+#include "steady_parts.h"
 #include "util.h"
 
 enum { HOLD_SPEED, HOLD_RADIUS, HOLD_CURVATURE, HOLD_OTHERS };

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
-#include "steady.h"
+#include "steady_parts.h"
 
 /* START_FAR: longest first step of a relaxation, in units of the scene. */
 enum { START_RELAXATIONS = 300 };

@@ -25,7 +25,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
-#include "variation.h"
+#include "variation_parts.h"
 
 /* ---- Opening ---- */
 

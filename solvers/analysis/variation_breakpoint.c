@@ -8,16 +8,10 @@
 #include <float.h>
 #include <math.h>
 #include <string.h>
-#include "variation.h"
+#include "variation_parts.h"
 
 /* Differences with two steps must agree to this, relative to the movement; curvature over a step is far smaller. */
 static const double BREAKPOINT_SMOOTH = 1e-3;
-
-double pw_variation_weight (const pw_direction *d, int which, int i) {
-  static const double central[2][PW_VARIATION_NEAR] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
-  static const double one_sided[2][PW_VARIATION_NEAR] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
-  return (d->one_sided ? one_sided : central)[which][i] / d->step;
-}
 
 static double breakpoint_derivative (const pw_direction_copy *d, int which) {
   double sum = 0;

@@ -3,7 +3,13 @@
 #include <string.h>
 #include "util.h"
 #include "rank.h"
-#include "variation.h"
+#include "variation_parts.h"
+
+double pw_variation_weight (const pw_direction *d, int which, int i) {
+  static const double central[2][PW_VARIATION_NEAR] = { { 0, -0.5, 0.5, 0 }, { -0.25, 0, 0, 0.25 } };
+  static const double one_sided[2][PW_VARIATION_NEAR] = { { -1.5, 2, -0.5, 0 }, { -0.75, 0, 1, -0.25 } };
+  return (d->one_sided ? one_sided : central)[which][i] / d->step;
+}
 
 /* ---- Effects of parameters ---- */
 

@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include "util.h"
-#include "variation.h"
+#include "variation_parts.h"
 
 enum { PATH_DEPTH = 6 }; /* of bisection */
 

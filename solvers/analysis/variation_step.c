@@ -3,7 +3,7 @@
 #include <math.h>
 #include <string.h>
 #include "rk.h"
-#include "variation.h"
+#include "variation_parts.h"
 
 /* Error of a step relative to the largest derivative; less accurate where it would need more than a linearisation per
  * step of a run with fixed steps, which are then large for such fast motions, too. */

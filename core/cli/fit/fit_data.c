@@ -3,7 +3,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "fit.h"
+#include "fit_parts.h"
 
 /* Standard deviation of a column: a number, or the name of a column. */
 typedef struct {

@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "fit.h"
+#include "fit_parts.h"
 #include "parallel.h"
 #include "sensitivity_direction.h"
 

@@ -1,5 +1,5 @@
 /* The reports of `pinwheel fit`. */
-#include "fit.h"
+#include "fit_parts.h"
 #include <gsl/gsl_cdf.h>
 #include <math.h>
 #include <stdlib.h>

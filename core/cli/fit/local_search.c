@@ -4,7 +4,7 @@
 #include <nlopt.h>
 #include <stdlib.h>
 #include <string.h>
-#include "optimise.h"
+#include "optimise_parts.h"
 
 #define SEARCH_FIRST 0.1    /* first steps, relative to the scales of the unknowns */
 #define SEARCH_ROUGH 1e-3   /* last ones */

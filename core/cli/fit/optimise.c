@@ -4,7 +4,7 @@
  * displaced by the seed.  Each start is a task of its own, so that results do not depend on the number of threads.  The
  * best results continue with a tighter tolerance.  A run that fails gets a value that is worse than all before it. */
 #define _POSIX_C_SOURCE 200809L
-#include "optimise.h"
+#include "optimise_parts.h"
 #include <gsl/gsl_errno.h>
 #include <gsl/gsl_qrng.h>
 #include <gsl/gsl_rng.h>
@@ -15,7 +15,6 @@
 #include "figure.h"
 #include "parallel.h"
 
-#define OPTIMISE_SAME 0.01 /* distance of results of the same optimum, relative to the scales of the unknowns */
 enum { OPTIMISE_POLISHED = 3, OPTIMISE_MOST = 40 }; /* results that continue; unknowns, the limit of Sobol's sequence */
 
 /* ---- Starts ---- */
@@ -55,13 +54,6 @@ static int optimise_open_starts (pw_optimise *x, pw_error *error) {
   }
   if (x->start == NULL || failed || optimise_points (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
   return PW_OK;
-}
-
-int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_search_start *b) {
-  int same = a->found && b->found;
-  for (int j = 0; same && j < x->unknowns.count; j++)
-    same = fabs (a->best[j] - b->best[j]) <= OPTIMISE_SAME * x->unknowns.at[j].scale;
-  return same;
 }
 
 /* The best of the first `count` starts, which are not `used`; the first one of equal ones.  -1: there is none. */
@@ -185,12 +177,6 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
 }
 
 /* ---- After the search ---- */
-
-int pw_optimise_at_bound (const pw_optimise *x, int i, double value) {
-  const pw_free_number *u = x->unknowns.at + i;
-  double near = 10 * PW_SEARCH_FINE * u->scale;
-  return value - u->low <= near ? -1 : u->high - value <= near;
-}
 
 /* No run satisfied the constraints: the first error, if there was one. */
 static int optimise_nothing (const pw_optimise *x, pw_error *error) {

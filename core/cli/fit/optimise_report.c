@@ -1,10 +1,25 @@
 /* The reports of `pinwheel optimise`. */
-#include "optimise.h"
+#include "optimise_parts.h"
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 #include "figure.h"
 #include "print_table.h"
+
+#define OPTIMISE_SAME 0.01 /* distance of results of the same optimum, relative to the scales of the unknowns */
+
+int pw_optimise_same (const pw_optimise *x, const pw_search_start *a, const pw_search_start *b) {
+  int same = a->found && b->found;
+  for (int j = 0; same && j < x->unknowns.count; j++)
+    same = fabs (a->best[j] - b->best[j]) <= OPTIMISE_SAME * x->unknowns.at[j].scale;
+  return same;
+}
+
+int pw_optimise_at_bound (const pw_optimise *x, int i, double value) {
+  const pw_free_number *u = x->unknowns.at + i;
+  double near = 10 * PW_SEARCH_FINE * u->scale;
+  return value - u->low <= near ? -1 : u->high - value <= near;
+}
 
 enum { REPORT_DIGITS = 9, REPORT_PANELS = 6, REPORT_OPTIONS = 4000 };
 

@@ -153,6 +153,9 @@ int pw_plot_shown (const pw_plots *p, int body);
 void pw_plot_find_links (pw_plots *p, const pw_model *m);
 /* 1 if the last body has a line: a rail or slot. */
 int pw_plot_line (const pw_plot_link *link);
+/* The diagonal of the smallest rectangle around the first n samples and, unless `most` is given, the ground [m]; *n becomes
+ * the number of samples for which it is less than `most`. */
+double pw_plot_diagonal (const pw_plots *p, int *n, double most);
 /* The unit of symbols [m]. */
 double pw_plot_unit (const pw_plots *p);
 /* A point of a body in the inertial frame [m]; motion: x, y, phi. */

@@ -76,7 +76,7 @@ class Result:
     def _repr_html_(self):
         """In notebooks: the animation."""
         from html import escape
-        from .studies import animation
+        from ._program import animation
         page = animation(self) if self.model is not None and self.model.source else None
         if page is None:
             return escape(repr(self))

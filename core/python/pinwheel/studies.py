@@ -7,12 +7,12 @@ import itertools
 import json
 import os
 import pathlib
-import subprocess
 import tempfile
 
 import numpy as np
 
 from . import _library as lib
+from . import _program
 from .model import Model
 
 
@@ -74,24 +74,6 @@ def sweep(model, vary, *, method=None, t_end=None, executor=None, **settings):
 
 # ---- The program ----
 
-def _options(model):
-    given = [str(model.source)] if isinstance(model, Model) else [str(model)]
-    if isinstance(model, Model):
-        if model.signals:
-            raise lib.InputError("the program cannot evaluate functions in Python: describe the signal by an expression")
-        given += [f"--set={name}={value!r}" for name, value in model._given.items()]
-        given += [f"--start={name}={value!r}" for name, value in model.start.items()]
-    return given
-
-
-def _run(arguments):
-    done = subprocess.run([lib.program(), *arguments], capture_output=True, text=True, check=False)
-    if done.returncode not in (0, 130):
-        lines = done.stderr.strip().removeprefix("pinwheel: ")
-        raise lib._EXCEPTIONS.get(-done.returncode, lib.Error)(lines or f"pinwheel ended with status {done.returncode}")
-    return done
-
-
 def command(name, model, *arguments, **options):
     """Runs a command of the program and returns what it writes.
 
@@ -113,29 +95,14 @@ def command(name, model, *arguments, **options):
     >>> pw.command("check", "n-trailer")["..."]
     >>> print(pw.command("compare", "ezyroller", t_end=10, methods="rk4+projection,ida+ggl"))
     """
-    words = [name, *_options(model), *map(str, arguments)]
+    words = [name, *_program.options(model), *map(str, arguments)]
     for key, value in options.items():
         option = "--" + key.replace("_", "-")
         for item in value if isinstance(value, (list, tuple)) else [value]:
             words.append(option if item is True else f"{option}={item}")
-    if "--json" in _run([name, "--help"]).stdout:
+    if "--json" in _program.run([name, "--help"]).stdout:
         with tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "report.json"
-            _run([*words, f"--json={path}"])
+            _program.run([*words, f"--json={path}"])
             return json.loads(path.read_text(encoding="utf-8"))
-    return _run(words).stdout
-
-
-def animation(result) -> str | None:
-    """The animation of a result's model and settings, as a page."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = pathlib.Path(folder) / "animation.html"
-        options = {"step": "step", "rtol": "rtol", "atol": "atol"}
-        words = ["run", *_options(result.model), f"--animate={path}", f"--method={result.settings['method']}",
-                 f"--t-end={result.settings['t_end']!r}"]
-        words += [f"--{o}={result.settings[k]!r}" for k, o in options.items() if result.settings.get(k)]
-        try:
-            _run(words)
-            return path.read_text(encoding="utf-8")
-        except lib.Error:
-            return None
+    return _program.run(words).stdout

@@ -85,9 +85,15 @@ int pw_steady_evaluate (void *steady, const double *u, double *F, double *dF, pw
 void pw_steady_state (pw_steady *x, const double *u);
 /* The unknowns of the steady motion nearest to the velocities v at q. */
 int pw_steady_guess (pw_steady *x, const double *q, const double *v, double *u);
+double pw_steady_parameter (const pw_steady *x, const double *u);
+
+/* ---- steady_systems.c ---- */
+
+enum { PW_STEADY_MOST = 400 }; /* coordinates, since the cost is cubic */
+
 /* Opens at[k] for a parameter value.  A status; PW_RETRY with x->why. */
 int pw_steady_at (pw_steady *x, int k, double value);
-double pw_steady_parameter (const pw_steady *x, const double *u);
+void pw_steady_leave (pw_steady *x, int k); /* frees it */
 
 /* ---- steady_hold.c ---- */
 

@@ -1,0 +1,43 @@
+"""The program, which has what the library has not."""
+
+from __future__ import annotations
+
+import pathlib
+import subprocess
+import tempfile
+
+from . import _library as lib
+
+
+def options(model):
+    """A model, or its name, as arguments."""
+    given = [str(getattr(model, "source", model))]
+    if hasattr(model, "signals"):
+        if model.signals:
+            raise lib.InputError("the program cannot evaluate functions in Python: describe the signal by an expression")
+        given += [f"--set={name}={value!r}" for name, value in model._given.items()]
+        given += [f"--start={name}={value!r}" for name, value in model.start.items()]
+    return given
+
+
+def run(arguments):
+    done = subprocess.run([lib.program(), *arguments], capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 130):
+        lines = done.stderr.strip().removeprefix("pinwheel: ")
+        raise lib._EXCEPTIONS.get(-done.returncode, lib.Error)(lines or f"pinwheel ended with status {done.returncode}")
+    return done
+
+
+def animation(result) -> str | None:
+    """The animation of a result's model and settings, as a page."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / "animation.html"
+        given = {"step": "step", "rtol": "rtol", "atol": "atol"}
+        words = ["run", *options(result.model), f"--animate={path}", f"--method={result.settings['method']}",
+                 f"--t-end={result.settings['t_end']!r}"]
+        words += [f"--{o}={result.settings[k]!r}" for k, o in given.items() if result.settings.get(k)]
+        try:
+            run(words)
+            return path.read_text(encoding="utf-8")
+        except lib.Error:
+            return None
