@@ -207,8 +207,10 @@ static int outcome_read (pw_outcomes *x, pw_outcome *o, const char *option, pw_e
   char what[300], variable[20];
   snprintf (what, sizeof what, "%s %.200s", option, o->text);
   if (*o->text == 0) return pw_fail (error, PW_INPUT, "%s is empty: expected a column, such as frame.x", option);
-  if (outcome_term (x, o, what, o->text, 0, variable, &(pw_error){ 0 }) == PW_OK) return PW_OK;
-  return outcome_formula (x, o, what, error);
+  pw_error own = { 0 };
+  int status = outcome_term (x, o, what, o->text, 0, variable, &own);
+  if (status == PW_RESOURCE) *error = own;
+  return status == PW_OK || status == PW_RESOURCE ? status : outcome_formula (x, o, what, error);
 }
 
 int pw_outcomes_open (pw_outcomes *x, const pw_system *s, const char *option, const char *const *text, int count,
