@@ -74,7 +74,7 @@ PROGRAMS  := $(BENCH:%.c=$(BUILD)/%) $(EMBED:%.c=$(BUILD)/%)
 PROGRAM   := $(BUILD)/pinwheel
 # The engine of interactive pages, if there are tools to compile it; builds that check the code do not need another.
 WASM_CC   ?= $(if $(findstring ccache,$(CC)),ccache )clang
-WASI      := $(if $(findstring /variant/,$(BUILD)),,$(wildcard /usr/include/wasm32-wasi/stdio.h))
+WASI      := $(if $(findstring /variant/,$(BUILD)),,$(and $(wildcard /usr/include/wasm32-wasi/stdio.h),$(wildcard /usr/lib/llvm-*/lib/clang/*/lib/wasi/libclang_rt.builtins-wasm32.a)))
 PAGE      := $(if $(and $(WASI),$(shell command -v $(lastword $(WASM_CC))),$(shell command -v wasm-ld)),$(addprefix $(BUILD)/page/,pinwheel-page.objects pinwheel.wasm))
 
 # Targets of fuzzing; with replay.c they are programs that take files.
