@@ -64,16 +64,15 @@ draw bench-drift drift drift pendulum --t-end 100 --step 0.01 -o
 draw optimise-snakeboard optimise optimise snakeboard --maximise board.x --free omega=1:8 --free swing=0.1:1.5 --free steer=0.1:0.6 \
   --subject-to 'max:swing.F<=3' --subject-to 'min:swing.F>=-3' --t-end 10 --step 0.01 --plots
 
-draw sensitivity-ezyroller sensitivity sensitivity ezyroller --of frame.x --of rider.work --by omega --by M0 --by a --by c --t-end 20 -o
-if wanted fit-ezyroller; then
-  "$pinwheel" run ezyroller --set omega=3 --set M0=0.12 --t-end 10 --every 0.1 -o "$work/run.csv" 2>/dev/null
-  awk -F, 'NR == 1 { print $1 "," $2 "," $3 } NR > 1 { printf "%s,%.2f,%.2f\n", $1, $2, $3 }' "$work/run.csv" >"$work/measured.csv"
+car=$work/car-trailer.yaml
+awk '/^```yaml/ { n++; next } /^```/ { if (n == 1) exit } n == 1' docs/analysis.md >"$car"
+draw steady-car-trailer steady steady "$car" --vary u=2:60 --starts 0 -o
+draw sensitivity-car-trailer sensitivity sensitivity "$car" --start trailer.omega=0.2 --of rms:trailer.omega --of trailer.omega --by u --by ahead --by grip -o
+if wanted fit-car-trailer; then
+  "$pinwheel" run "$car" --set steer=0.02 --set ahead=0.15 --set grip=6e4 --every 0.05 -o "$work/run.csv" >/dev/null
+  awk -F, 'NR == 1 { print $1 "," $7 "," $19 } NR > 1 { printf "%s,%.3f,%.3f\n", $1, $7, $19 }' "$work/run.csv" >"$work/measured.csv"
 fi
-if wanted steady-car-trailer; then
-  awk '/^```yaml/ { n++; next } /^```/ { if (n == 1) exit } n == 1' docs/analysis.md >"$work/car-trailer.yaml"
-fi
-draw steady-car-trailer steady steady "$work/car-trailer.yaml" --vary u=2:60 --starts 0 -o
-draw fit-ezyroller fit fit ezyroller --data "$work/measured.csv" --columns frame.x,frame.y --free omega --free M0 --plots
+draw fit-car-trailer fit fit "$car" --set steer=0.02 --data "$work/measured.csv" --columns car.omega,trailer.omega --free ahead --free grip --plots
 
 # ---- Pages, benchmarks ----
 

@@ -59,7 +59,7 @@ int pw_system_jumps (const pw_system *s, double t) {
 }
 
 int pw_system_find_body (const pw_system *s, const char *name) {
-  for (int b = 0; name && b < s->bodies; b++)
+  for (int b = 0; s && name && b < s->bodies; b++)
     if (strcmp (s->body_name[b], name) == 0) return b;
   return -1;
 }
@@ -118,6 +118,7 @@ static int query_body_state (const pw_system *s, const char *name, pw_nearest *n
 
 int pw_system_find_state (const pw_system *s, const char *name, pw_error *error) {
   char best[120], text[120], hint[160];
+  if (pw_require (s, "a system", error) != PW_OK) return PW_INPUT;
   if (name == NULL) return pw_fail (error, PW_INPUT, "model %s: the name of a state is missing", s->model);
   pw_nearest near = { .sought = name };
   int state = query_body_state (s, name, &near, best, sizeof best);

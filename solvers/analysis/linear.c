@@ -107,9 +107,11 @@ static int linear_compute (pw_linearisation *x, pw_linear *l, pw_error *error) {
 
 static int linear_run (pw_run *r, int most, int modes, pw_linear *l, pw_error *error) {
   pw_linearisation x;
+  *l = (pw_linear){ .least = NAN };
+  if (pw_require (r, "a run", error) != PW_OK) return PW_INPUT;
   pw_statistics before = r->statistics;
   int near = r->near, status = pw_linear_open (&x, r, modes, most);
-  *l = (pw_linear){ .coordinates = x.n, .least = NAN };
+  l->coordinates = x.n;
   l->rank = x.rank;
   l->positions = x.positions;
   l->velocities = x.velocities;

@@ -89,6 +89,7 @@ static int steady_begin (pw_steady *x, pw_error *error) {
 }
 
 pw_steady *pw_steady_open (const pw_system *s, const pw_steady_settings *settings, pw_error *error) {
+  if (pw_require (s, "a system", error) != PW_OK || pw_require (settings, "settings", error) != PW_OK) return NULL;
   pw_steady *x = calloc (1, sizeof *x);
   if (x == NULL) return pw_fail_memory (s, error), NULL;
   x->s = s, x->set = *settings;
@@ -189,8 +190,9 @@ static void steady_rest (pw_steady *x) {
 }
 
 int pw_steady_solve (pw_steady *x, int attempt, double parameter, pw_steady_motion *out, pw_error *error) {
-  double range = x->set.last - x->set.first;
   *out = (pw_steady_motion){ .parameter = parameter };
+  if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
+  double range = x->set.last - x->set.first;
   x->gauge = 0;
   if (pw_steady_at (x, 0, parameter) != PW_OK) return *error = x->why, error->status;
   int status = pw_steady_start (x, attempt, x->u);

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <string.h>
 #include "steady_parts.h"
+#include "util.h"
 
 /* BRANCH_LEAST: smallest step, relative to the range of the parameter.  BRANCH_ACCURACY: of events, relative to the step.
  * BRANCH_LIMIT: points at most, as a multiple of those asked for. */
@@ -26,6 +27,7 @@ static void branch_queue (pw_steady *x, pw_branch_point point, pw_steady_event e
 
 int pw_steady_follow (pw_steady *x, const double *q, const double *v, double parameter, int direction,
                       pw_error *error) {
+  if (pw_require (x, "a search", error) != PW_OK) return PW_INPUT;
   int unknowns = pw_steady_unknowns (x);
   double range = x->set.last - x->set.first;
   pw_steady_motion motion;
@@ -178,8 +180,9 @@ static int branch_advance (pw_steady *x, pw_error *error) {
 }
 
 int pw_steady_next (pw_steady *x, pw_steady_motion *out, pw_error *error) {
-  int status = PW_OK;
+  int status = pw_require (x, "a search", error);
   *out = (pw_steady_motion){ .event = PW_STEADY_END };
+  if (status != PW_OK) return status;
   if (x->returned == x->queued) {
     if (x->ended) return PW_OK;
     x->queued = x->returned = 0;

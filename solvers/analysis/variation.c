@@ -220,6 +220,7 @@ static int variation_lead (pw_variation *x, double t, double t_end, pw_error *er
 }
 
 int pw_variation_advance (pw_variation *x, double t, double t_end, pw_error *error) {
+  if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
   pw_run *r = x->r;
   int status = PW_OK;
   while (status == PW_OK && x->t < fmin (t, t_end)) {
@@ -265,6 +266,7 @@ static int variation_combine (pw_variation *x, const pw_direction_copy *d, const
 }
 
 int pw_variation_sample (pw_variation *x, int i, pw_sample *derivative, pw_sample *error_of, pw_error *error) {
+  if (pw_require (x, "derivatives", error) != PW_OK) return PW_INPUT;
   static const double two[2][2] = { { 4. / 3, -1. / 3 }, { 1. / 3, -1. / 3 } }, one[2][2] = { { 1, 0 }, { 0, 0 } };
   const pw_direction_copy *d = &x->direction[i];
   const double (*weight)[2] = d->columns > 1 ? two : one;

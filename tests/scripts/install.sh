@@ -55,6 +55,13 @@ if command -v pkg-config >/dev/null; then
     -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./method) >"$work/log" 2>&1 &&
     awk '$NF == "nan" { next } { n++; bad += $NF < 2.9 || $NF > 3.1 } END { exit n != 6 || bad }' "$work/log"
   report 'a method of its own, of order 3 as it should be' $?
+  awk '/^```yaml/ { n++; next } /^```/ { if (n == 1) exit } n == 1' "$top/share/doc/pinwheel/docs/analysis.md" >"$work/car-trailer.yaml"
+  sed -n '/^    critical speed/,/^$/s/^    //p' "$top/share/doc/pinwheel/docs/analysis.md" >"$work/expected"
+  cp "$top/share/doc/pinwheel/examples/analyse.c" "$work"
+  (cd "$work" && eval "$cc -std=c11 analyse.c -o analyse $(pkg-config --cflags --libs pinwheel) -lm \
+    -Wl,-rpath,\"$(pkg-config --variable=libdir pinwheel)\"" && ./analyse ./car-trailer.yaml >analysis) >"$work/log" 2>&1 &&
+    [ -s "$work/expected" ] && diff "$work/expected" "$work/analysis" >"$work/log"
+  report 'a program that analyses, with the results in analysis.md' $?
   [ "$(pkg-config --modversion pinwheel)" = "$("$top/bin/pinwheel" --version | cut -d' ' -f2)" ] &&
     grep -q "^version: $(pkg-config --modversion pinwheel)\$" docs/CITATION.cff
   report 'one version everywhere' $?

@@ -500,6 +500,27 @@ static void test_concentric (void **state) {
   }
 }
 
+/* The result NULL of a failed call is refused by the next, and the first error stays. */
+static void test_missing (void **state) {
+  pw_error error = { 0 };
+  pw_steady_motion m;
+  pw_linear l;
+  pw_sample sample;
+  (void)state;
+  assert_null (pw_steady_open (NULL, &(pw_steady_settings){ .vary = -1 }, &error));
+  check_error (&error, PW_INPUT, "a system is missing");
+  assert_int_equal (pw_steady_solve (NULL, 0, 0, &m, &error), PW_INPUT);
+  assert_int_equal (pw_steady_follow (NULL, NULL, NULL, 0, 1, &error), PW_INPUT);
+  assert_int_equal (pw_steady_next (NULL, &m, &error), PW_INPUT);
+  assert_int_equal (pw_run_linearise (NULL, 100, &l, &error), PW_INPUT);
+  pw_linear_free (&l);
+  assert_null (pw_variation_open (NULL, NULL, 1, 0, &error));
+  assert_int_equal (pw_variation_advance (NULL, 1, 1, &error), PW_INPUT);
+  assert_int_equal (pw_variation_sample (NULL, 0, &sample, NULL, &error), PW_INPUT);
+  assert_int_equal (pw_system_find_state (NULL, "x", &error), PW_INPUT);
+  check_error (&error, PW_INPUT, "a system is missing");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
     cmocka_unit_test (test_turn),           cmocka_unit_test (test_straight),
@@ -509,7 +530,7 @@ int main (void) {
     cmocka_unit_test (test_fold),           cmocka_unit_test (test_whirl_eigenvalues),
     cmocka_unit_test (test_shimmy),         cmocka_unit_test (test_shimmy_runs),
     cmocka_unit_test (test_refused),        cmocka_unit_test (test_bodies),
-    cmocka_unit_test (test_concentric),
+    cmocka_unit_test (test_concentric),     cmocka_unit_test (test_missing),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
