@@ -1,8 +1,9 @@
 /* Independent tasks on several processors. */
-#define _GNU_SOURCE /* sched_getaffinity */
+#define _GNU_SOURCE /* sched_getaffinity, sched_setaffinity */
 #include <errno.h>
 #include <pthread.h>
 #include <sched.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -28,15 +29,23 @@ int pw_parallel_jobs (const char *text, int *jobs, pw_error *error) {
   return status;
 }
 
+/* ---- Threads ---- */
+
 typedef struct {
   pthread_mutex_t lock;
   int next, count;
   void (*task) (void *context, int i);
   void *context;
+  int threads, begun;
+  void (*bind) (const void *cores, int thread, int threads); /* called first in each thread; NULL: none */
+  const void *cores;
 } parallel;
 
 static void *parallel_thread (void *argument) {
   parallel *p = argument;
+  pthread_mutex_lock (&p->lock);
+  if (p->bind) p->bind (p->cores, p->begun++, p->threads);
+  pthread_mutex_unlock (&p->lock);
   for (;;) {
     pthread_mutex_lock (&p->lock);
     int i = p->next < p->count ? p->next++ : -1;
@@ -46,23 +55,84 @@ static void *parallel_thread (void *argument) {
   }
 }
 
-int pw_parallel (int jobs, int count, void (*task) (void *context, int i), void *context, pw_error *error) {
-  parallel p = { .count = count, .task = task, .context = context };
-  if (jobs > count) jobs = count;
-  pthread_t *thread = calloc ((size_t)jobs + 1, sizeof *thread);
+/* Starts all threads but one, which is the caller. */
+static int parallel_run (parallel *p, pw_error *error) {
+  if (p->threads > p->count) p->threads = p->count;
+  pthread_t *thread = calloc ((size_t)p->threads + 1, sizeof *thread);
   int started = 1, why = thread ? 0 : ENOMEM;
-  pthread_mutex_init (&p.lock, NULL);
-  pthread_mutex_lock (&p.lock);
-  while (why == 0 && started < jobs && (why = pthread_create (thread + started, NULL, parallel_thread, &p)) == 0)
+  pthread_mutex_init (&p->lock, NULL);
+  pthread_mutex_lock (&p->lock);
+  while (why == 0 && started < p->threads && (why = pthread_create (thread + started, NULL, parallel_thread, p)) == 0)
     started++;
-  if (why) p.next = count;
+  if (why) p->next = p->count;
   if (why)
-    pw_fail (error, PW_RESOURCE, "cannot start %d runs at a time, only %d: %s; try --jobs %d", jobs, started,
+    pw_fail (error, PW_RESOURCE, "cannot start %d runs at a time, only %d: %s; try --jobs %d", p->threads, started,
              strerror (why), started);
-  pthread_mutex_unlock (&p.lock);
-  parallel_thread (&p);
+  pthread_mutex_unlock (&p->lock);
+  parallel_thread (p);
   while (--started > 0) pthread_join (thread[started], NULL);
-  pthread_mutex_destroy (&p.lock);
+  pthread_mutex_destroy (&p->lock);
   free (thread);
   return why ? PW_RESOURCE : PW_OK;
 }
+
+int pw_parallel (int jobs, int count, void (*task) (void *context, int i), void *context, pw_error *error) {
+  parallel p = { .count = count, .task = task, .context = context, .threads = jobs };
+  return parallel_run (&p, error);
+}
+
+/* ---- Timed tasks ---- */
+
+#ifdef CPU_COUNT
+typedef struct {
+  cpu_set_t all;                /* processors that this process may use */
+  int core[CPU_SETSIZE], cores; /* one of them on each physical core */
+} parallel_cores;
+
+/* The lowest processor on the same physical core; the processor itself if that is unknown. */
+static int parallel_sibling (int processor) {
+  char name[80];
+  int first = processor;
+  snprintf (name, sizeof name, "/sys/devices/system/cpu/cpu%d/topology/thread_siblings_list", processor);
+  FILE *f = fopen (name, "r");
+  if (f == NULL) return processor;
+  if (fscanf (f, "%d", &first) != 1 || first < 0 || first >= CPU_SETSIZE) first = processor;
+  fclose (f);
+  return first;
+}
+
+static void parallel_find (parallel_cores *c) {
+  unsigned char known[CPU_SETSIZE] = { 0 };
+  c->cores = 0;
+  if (sched_getaffinity (0, sizeof c->all, &c->all) != 0) return;
+  for (int i = 0; i < CPU_SETSIZE; i++)
+    if (CPU_ISSET ((size_t)i, &c->all) && !known[parallel_sibling (i)]++) c->core[c->cores++] = i;
+}
+
+/* The cores of each thread are its own; there may be several, so that it can avoid other programs. */
+static void parallel_bind (const void *cores, int thread, int threads) {
+  const parallel_cores *c = cores;
+  cpu_set_t own;
+  CPU_ZERO (&own);
+  for (int i = thread; i < c->cores; i += threads) CPU_SET ((size_t)c->core[i], &own);
+  sched_setaffinity (0, sizeof own, &own);
+}
+
+int pw_parallel_timed (int jobs, int count, void (*task) (void *context, int i), void *context, pw_error *error) {
+  parallel_cores c;
+  parallel_find (&c);
+  parallel p = {
+    .count = count, .task = task, .context = context, .threads = jobs, .bind = parallel_bind, .cores = &c
+  };
+  if (jobs > c.cores) p.threads = c.cores;
+  if (p.threads < 2) return pw_parallel (1, count, task, context, error);
+  int status = parallel_run (&p, error);
+  sched_setaffinity (0, sizeof c.all, &c.all);
+  return status;
+}
+#else
+int pw_parallel_timed (int jobs, int count, void (*task) (void *context, int i), void *context, pw_error *error) {
+  (void)jobs;
+  return pw_parallel (1, count, task, context, error);
+}
+#endif

@@ -419,6 +419,37 @@ static void test_interrupt (void **state) {
   assert_string_equal (compare_cell ("i/compare.csv.part", 0, STATUS), "ok");
 }
 
+/* Concurrent methods give the same rows in the same order, but for the times. */
+static void test_jobs (void **state) {
+  (void)state;
+  cli_good ("for j in 1 2 5; do\n"
+            "  pinwheel compare pendulum --methods galpha+ggl,rk4,erk5,bdf,ida+none " SHORT
+            " --jobs $j -o @/j$j || exit 1\n"
+            "  cut -d, -f1-24 @/j$j/compare.csv >@/j$j.csv\n"
+            "done\n"
+            "cmp @/j1.csv @/j2.csv && cmp @/j1.csv @/j5.csv");
+  assert_non_null (strstr (cli_file ("j5.csv"), "\nida+none,rtol,9.9999999999999995e-08,ok,2,"));
+  cli_bad ("pinwheel compare pendulum --jobs 0.5", 2, "--jobs 0.5: expected a whole number >= 1");
+}
+
+/* Threads whose runs are timed never share a processor; on a machine with one core there is one of them. */
+static void test_cores (void **state) {
+  (void)state;
+  cli_good (
+      "\"${PINWHEEL:-build/pinwheel}\" compare ezyroller --specialise never --methods rk4,rk4+none,rk4+baumgarte" ONCE
+      "--step-ladder 1e-8 --jobs 3 --limit 60 >@/cores.txt 2>&1 &\n"
+      "lscpu -p=CORE,SOCKET | grep -v '#' | sort -u | wc -l >@/physical\n"
+      "sleep 0.5; cat /proc/$!/task/*/status | sed -n 's/^Cpus_allowed_list:.//p' >@/lists; kill $!; wait $!\n"
+      "test -s @/lists");
+  char *line = strdup (cli_file ("lists"));
+  long threads = 0, physical = strtol (cli_file ("physical"), NULL, 10);
+  cli_good ("tr ',' '\\n' <@/lists | sort | uniq -d | wc -l");
+  assert_string_equal (cli_out, "0\n");
+  for (const char *c = line; *c; c++) threads += *c == '\n';
+  assert_true (threads <= physical);
+  free (line);
+}
+
 static void test_bad (void **state) {
   (void)state;
   const cli_wrong bad[] = {
@@ -479,6 +510,8 @@ int main (void) {
     cmocka_unit_test (test_limit),
     cmocka_unit_test (test_failure),
     cmocka_unit_test (test_interrupt),
+    cmocka_unit_test (test_jobs),
+    cmocka_unit_test (test_cores),
     cmocka_unit_test (test_bad),
     cmocka_unit_test (test_alias),
     cmocka_unit_test (test_conclusion),

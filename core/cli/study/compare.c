@@ -24,7 +24,6 @@ typedef struct {
   double finest_step; /* of the ladder [s] */
   double repeats;     /* timed runs of a row, at most */
   pw_reference reference;
-  pw_motion scratch; /* of the row being measured */
 } pw_compare;
 
 /* ---- Columns ---- */
@@ -163,11 +162,11 @@ static int compare_plan (pw_study *s, pw_error *error) {
 /* ---- A row ---- */
 
 /* Errors below the uncertainty of the reference are replaced by it, and marked. */
-static void compare_errors (pw_compare *x, pw_row *r) {
+static void compare_errors (const pw_compare *x, const pw_motion *motion, pw_row *r) {
   const pw_reference *reference = &x->reference;
   double *error = &r->value[COLUMN_ERROR];
   if (!reference->known) return;
-  pw_motion_distance (x->study.m.system, &reference->motion, &x->scratch, error);
+  pw_motion_distance (x->study.m.system, &reference->motion, motion, error);
   for (int i = 0; i < MOTION_ERRORS; i++) {
     if (reference->uncertainty[i] == 0) error[i] = NAN;
     if (!(error[i] <= reference->uncertainty[i])) continue;
@@ -208,7 +207,6 @@ static int compare_times (pw_compare *x, pw_row *r, pw_error *error) {
     int status = pw_motion_run (&x->study, r, NULL, error);
     if (status != PW_OK) return status;
     sum += cpu[n++] = r->cpu;
-    pw_study_show (&x->study, n + 1);
   }
   qsort (cpu, (size_t)n, sizeof *cpu, compare_numbers);
   r->cpu = n % 2 ? cpu[n / 2] : (cpu[n / 2 - 1] + cpu[n / 2]) / 2;
@@ -230,6 +228,22 @@ static double compare_predict (const pw_row *r, int before) {
   return fmax (last->cpu / last[-1].cpu, 1) * last->cpu;
 }
 
+/* The run with samples at the times of the reference, and its errors. */
+static int compare_sample (pw_compare *x, pw_row *r, pw_error *error) {
+  pw_study *s = &x->study;
+  pw_motion motion;
+  const pw_motion *of = &x->reference.motion;
+  int known = x->reference.known;
+  int status = pw_motion_open (&motion, s->m.system, known ? of->samples : MOTION_SAMPLES, error);
+  if (status != PW_OK) return status;
+  pw_motion_times (&motion, s->t_end);
+  if (known) memcpy (motion.t, of->t, (size_t)of->samples * sizeof *of->t);
+  status = pw_motion_run (s, r, &motion, error);
+  if (status == PW_OK) compare_errors (x, &motion, r);
+  pw_motion_close (&motion);
+  return status;
+}
+
 static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
   pw_compare *x = (pw_compare *)s;
   pw_error own = { 0 };
@@ -237,7 +251,6 @@ static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
   int before = 0;
   while (r - before > s->row && r[-before - 1].line == r->line) before++;
   double predicted = compare_predict (r, before);
-  s->share = 1 / (x->repeats + 1);
   pw_format (limit, s->cpu_end, 4);
   if (predicted > s->cpu_end) {
     r->state = ROW_SKIPPED;
@@ -246,11 +259,8 @@ static int compare_measure (pw_study *s, pw_row *r, pw_error *error) {
     return PW_OK;
   }
   r->balance = NAN;
-  int status = pw_motion_run (s, r, &x->scratch, &own);
-  if (status == PW_OK) {
-    compare_errors (x, r);
-    status = compare_times (x, r, &own);
-  }
+  int status = compare_sample (x, r, &own);
+  if (status == PW_OK) status = compare_times (x, r, &own);
   if (r->state == ROW_STOPPED)
     snprintf (r->reason, sizeof r->reason, "too slow: the limit of %s s was reached at t = %s s", limit,
               pw_format (text, r->t, 4));
@@ -274,12 +284,8 @@ static int compare_begin (pw_study *s, pw_error *error) {
   int status = pw_reference_find (&x->reference, s, x->finest_step, error);
   if (status == PW_OK && s->folder)
     status = pw_reference_write (&x->reference, s->folder, compare_columns + COLUMN_ERROR, error);
-  const pw_motion *motion = &x->reference.motion;
-  int samples = x->reference.known ? motion->samples : MOTION_SAMPLES;
-  if (status == PW_OK) status = pw_motion_open (&x->scratch, s->m.system, samples, error);
   if (status != PW_OK) return status;
-  pw_motion_times (&x->scratch, s->t_end);
-  if (x->reference.known) memcpy (x->scratch.t, motion->t, (size_t)samples * sizeof *motion->t);
+  s->share = 1 / (x->repeats + 1);
   const double *largest = x->reference.uncertainty + MOTION_MOST;
   x->concludes = x->reference.known && (largest[MOTION_LENGTH] > 0 || largest[MOTION_ANGLE] > 0);
   s->quiet = x->concludes && !x->table;
@@ -312,9 +318,7 @@ static int compare_figures (pw_study *x, pw_error *error) {
 }
 
 static void compare_close (pw_study *s) {
-  pw_compare *x = (pw_compare *)s;
-  pw_motion_close (&x->reference.motion);
-  pw_motion_close (&x->scratch);
+  pw_motion_close (&((pw_compare *)s)->reference.motion);
 }
 
 static int compare_command (void *options, pw_error *error) {
@@ -327,7 +331,7 @@ static int compare_command (void *options, pw_error *error) {
              "                                  CPU time",
     .column = compare_columns,
     .runs = 9,
-    .alone = 1,
+    .timed = 1,
     .time = COLUMN_T,
     .steps = COLUMN_STEPS,
     .plan = compare_plan,
@@ -357,10 +361,8 @@ static const struct poptOption compare_options[] = {
       pw_compare, repeats_text, "repeats", 0, "N",
       "Timed repetitions of each run, at most 99, of which the median is reported (default 9, or those that "
       "fit into half a second)"),
-  PW_TEXT_OPTION (
-      pw_study, jobs_text, "jobs", 'j', "N",
-      "Number of concurrent runs for the reference (default: one per processor); the others are made one at a "
-      "time, since they are timed"),
+  PW_TEXT_OPTION (pw_study, jobs_text, "jobs", 'j', "N",
+                  "Number of methods that run at a time, each on a physical core of its own (default: all cores)"),
   PW_TEXT_OPTION (pw_cli_line, t_end, "t-end", 't', "T", "Final time [s]"),
   PW_ENGINE_OPTION,
   PW_TEXT_OPTION (

@@ -86,6 +86,7 @@ static int reference_run (pw_study *x, void *context, int i, pw_error *error) {
     c->row.level *= 10;
   }
   c->good = status == PW_OK;
+  pw_study_part (x, &c->row, 1);
   return c->good ? PW_OK : pw_study_outcome (x, &c->row, status, &own, error);
 }
 
@@ -154,7 +155,8 @@ static int reference_compute (pw_reference *t, pw_study *x, double step, pw_erro
   };
   double limit = x->cpu_end;
   x->cpu_end = fmax (limit, REFERENCE_LIMIT);
-  int status = pw_study_concurrently (x, "reference", "methods", REFERENCE_CANDIDATES, reference_run, c, error);
+  pw_study_show (x, "reference", "methods", REFERENCE_CANDIDATES);
+  int status = pw_study_concurrently (x, REFERENCE_CANDIDATES, reference_run, c, error);
   x->cpu_end = limit;
   if (status == PW_OK) reference_choose (t, x->m.system, c);
   for (int i = 0; i < REFERENCE_CANDIDATES; i++) pw_motion_close (&c[i].motion);

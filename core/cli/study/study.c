@@ -91,9 +91,16 @@ pw_row *pw_study_add (pw_study *x, int group, int line, const char *method, int 
   return r;
 }
 
-void pw_study_show (pw_study *x, double part) {
+void pw_study_show (pw_study *x, const char *what, const char *unit, int rows) {
+  x->finished = 0;
+  pw_progress_count (&x->progress, what, unit, 0, rows);
+}
+
+void pw_study_part (pw_study *x, pw_row *r, double part) {
   pthread_mutex_lock (&x->mutex);
-  pw_progress_at (&x->progress, x->finished + x->share * part);
+  x->finished += fmin (part, 1) - r->part;
+  r->part = fmin (part, 1);
+  pw_progress_at (&x->progress, x->finished);
   pthread_mutex_unlock (&x->mutex);
 }
 
@@ -113,7 +120,7 @@ static int study_steps (pw_study *x, pw_row *r, pw_run *run, const pw_limit *lim
     r->cpu += used;
     if (used < STUDY_SHORT && n == batch && batch < 65536) batch *= 2;
     if (used > STUDY_LONG && batch > 1) batch /= 2;
-    pw_study_show (x, fmin (pw_run_time (run) / x->t_end, 1));
+    pw_study_part (x, r, x->share * (r->runs + pw_run_time (run) / x->t_end));
     if (status == PW_STOPPED) return pw_limit_fail (limit, pw_run_time (run), error);
     if (status == PW_OK && r->cpu > x->cpu_end && pw_run_time (run) < x->t_end) {
       r->state = ROW_STOPPED;
@@ -136,6 +143,7 @@ int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_
   int status = study_steps (x, r, run, &limit, v, error);
   r->t = pw_run_time (run);
   r->statistics = *pw_run_statistics (run);
+  r->runs += status == PW_OK;
   pw_run_close (run);
   return status;
 }
@@ -159,7 +167,6 @@ static void study_task (void *context, int i) {
   pthread_mutex_unlock (&x->mutex);
   int status = go ? k->task (x, k->context, i, &own) : PW_OK;
   pthread_mutex_lock (&x->mutex);
-  x->finished++;
   if (status != PW_OK && k->status == PW_OK) {
     k->status = status;
     *k->error = own;
@@ -167,13 +174,10 @@ static void study_task (void *context, int i) {
   pthread_mutex_unlock (&x->mutex);
 }
 
-int pw_study_concurrently (pw_study *x, const char *what, const char *unit, int count,
-                           int (*task) (pw_study *x, void *context, int i, pw_error *error), void *context,
-                           pw_error *error) {
+int pw_study_concurrently (pw_study *x, int count, int (*task) (pw_study *x, void *context, int i, pw_error *error),
+                           void *context, pw_error *error) {
   study_tasks k = { .study = x, .task = task, .context = context, .error = error };
-  x->finished = 0;
-  pw_progress_count (&x->progress, what, unit, 0, count);
-  int status = pw_parallel (x->jobs, count, study_task, &k, error);
+  int status = (x->type->timed ? pw_parallel_timed : pw_parallel) (x->jobs, count, study_task, &k, error);
   pw_progress_end (&x->progress);
   return status == PW_OK ? k.status : status;
 }
@@ -244,12 +248,20 @@ static int study_row (pw_study *x, void *context, int i, pw_error *error) {
   (void)context;
   int status = x->type->measure (x, &x->row[i], error);
   if (status != PW_OK) return status;
+  pw_study_part (x, &x->row[i], 1);
   pthread_mutex_lock (&x->mutex);
   x->row[i].measured = 1;
   pw_progress_end (&x->progress);
   for (; status == PW_OK && x->done < x->rows && x->row[x->done].measured; x->done++)
     status = pw_table_row (x, &x->row[x->done], error);
   pthread_mutex_unlock (&x->mutex);
+  return status;
+}
+
+static int study_method (pw_study *x, void *context, int line, pw_error *error) {
+  int status = PW_OK;
+  for (int i = 0; status == PW_OK && i < x->rows; i++)
+    if (x->row[i].line == line) status = study_row (x, context, i, error);
   return status;
 }
 
@@ -268,9 +280,9 @@ static int study_rows (pw_study *x, pw_error *error) {
   int status = x->type->begin (x, error);
   if (status == PW_OK && x->engine.code) puts ("all runs use code specialised for this scene where the method can\n");
   if (status == PW_OK && x->engine.code == NULL) printf ("all runs use the general engine: %s\n\n", x->engine.why);
-  if (x->type->alone) x->jobs = 1;
-  if (status == PW_OK)
-    status = pw_study_concurrently (x, pw_file_name (x->m.file), x->type->unit, x->rows, study_row, NULL, error);
+  pw_study_show (x, pw_file_name (x->m.file), x->type->unit, x->rows);
+  if (status == PW_OK && x->type->timed) status = pw_study_concurrently (x, x->methods, study_method, NULL, error);
+  if (status == PW_OK && !x->type->timed) status = pw_study_concurrently (x, x->rows, study_row, NULL, error);
   if (status == PW_RETRY && pw_stop) status = study_kept (x, error);
   if (status == PW_OK && x->type->conclude) x->type->conclude (x);
   pw_stop_release ();

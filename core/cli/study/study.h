@@ -28,6 +28,8 @@ typedef struct {
   double level;            /* of compare: tolerance, or step size [s] */
   pw_row_state state;
   int measured;             /* 1: all is known */
+  int runs;                 /* finished */
+  double part;              /* that the progress counts */
   double t;                 /* reached [s] */
   double cpu;               /* of the last run [s] */
   double balance;           /* largest |energy balance| of the samples [J] */
@@ -67,7 +69,7 @@ typedef struct {
   int (*plan) (pw_study *x, pw_error *error);
   /* Before the first row, with signals caught: prints the text above the table. */
   int (*begin) (pw_study *x, pw_error *error);
-  int alone; /* 1: rows are measured one after the other, not concurrently */
+  int timed; /* 1: the rows of a method are measured one after the other, and methods on different cores */
   /* Measures a row by pw_study_run; pw_study_outcome records a failure of the method in the row. */
   int (*measure) (pw_study *x, pw_row *r, pw_error *error);
   /* After the last row: prints the conclusion; NULL: none. */
@@ -99,8 +101,8 @@ struct pw_study {
   int rows, done; /* done: printed */
   pthread_mutex_t mutex;
   pw_progress progress;
-  int finished;                          /* runs or rows in the progress */
-  double share;                          /* part of a run in the progress of its row */
+  double finished;                       /* sum of the parts of rows */
+  double share;                          /* of a run in its row */
   pw_output *csv;                        /* NULL: none */
   const char *drawn[FIGURE_SCRIPTS + 1]; /* scripts */
 };
@@ -128,13 +130,14 @@ typedef struct pw_study_visitor {
 /* One run of a row to the end or a limit: fills t, statistics, cpu, and state if it is stopped by cpu_end; the visitor may
  * be NULL.  Runs of different rows may be concurrent.  PW_RETRY: stopped, or interrupted. */
 int pw_study_run (pw_study *x, pw_row *r, const pw_settings *settings, pw_study_visitor *v, pw_error *error);
-/* Calls task (context, i) for each i < count, several at a time, and shows `what` and the count of those that are done.  A task
- * returns a status; after one other than PW_OK, which is returned, no further ones are called. */
-int pw_study_concurrently (pw_study *x, const char *what, const char *unit, int count,
-                           int (*task) (pw_study *x, void *context, int i, pw_error *error), void *context,
-                           pw_error *error);
-/* Shows the part of a task, or of a row, that is done. */
-void pw_study_show (pw_study *x, double part);
+/* Calls task (context, i) for each i < count, several at a time.  A task returns a status; after one other than PW_OK, which is
+ * returned, no further ones are called. */
+int pw_study_concurrently (pw_study *x, int count, int (*task) (pw_study *x, void *context, int i, pw_error *error),
+                           void *context, pw_error *error);
+/* Begins to show the progress of `rows` rows. */
+void pw_study_show (pw_study *x, const char *what, const char *unit, int rows);
+/* Shows that a part of a row is done, of 1. */
+void pw_study_part (pw_study *x, pw_row *r, double part);
 /* Fills the time and the counts of the row, and a failure of pw_study_run.  Returns PW_OK, or the status that ends the study. */
 int pw_study_outcome (const pw_study *x, pw_row *r, int status, const pw_error *run_error, pw_error *error);
 
