@@ -5,8 +5,9 @@
 #include "util.h"
 
 /* BRANCH_LEAST: smallest step, relative to the range of the parameter.  BRANCH_ACCURACY: of events, relative to the step.
+ * BRANCH_FOLD: largest distance of a fold from the change of an eigenvalue there, relative to the step.
  * BRANCH_LIMIT: points at most, as a multiple of those asked for. */
-static const double BRANCH_LEAST = 1e-7, BRANCH_ACCURACY = 1e-9;
+static const double BRANCH_LEAST = 1e-7, BRANCH_ACCURACY = 1e-9, BRANCH_FOLD = 1e-3;
 enum { BRANCH_LIMIT = 100 };
 
 /* Room for one more point, where `along` counts from 0 (the point before) to 1. */
@@ -87,16 +88,28 @@ static double branch_along (const pw_steady *x, const pw_branch_point *point) {
   return part / whole;
 }
 
-/* Locates a change from `before` to `now` growing modes. */
-static int branch_change (pw_steady *x, int before, int now, pw_error *error) {
-  pw_branch_point *point = &x->queue[x->queued].point;
-  int more = before > now ? before : now, apart = before > now ? before - now : now - before;
+/* Whether a pair changes its sign at the point located, of `apart` modes that do between the last two points. */
+static int branch_pair (const pw_steady *x, int apart) {
   double im;
-  x->sought = more - 1;
-  int status = pw_branch_locate (&x->branch, branch_test, x, BRANCH_ACCURACY, point, error);
-  if (status != PW_OK) return status;
   branch_eigenvalue (x, x->sought, &im);
-  branch_queue (x, *point, im != 0 || apart == 2 ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, branch_along (x, point));
+  if (x->compare < 0) return im != 0 || apart == 2;
+  return x->neutral > x->compare ? x->neutral - x->compare >= 2 : im != 0;
+}
+
+/* Locates each change from `before` to `now` growing modes: the k-th largest real part changes its sign.  At a fold, a
+ * real one is no event of its own. */
+static int branch_changes (pw_steady *x, int before, int now, pw_error *error) {
+  int least = before < now ? before : now, most = before < now ? now : before, pair = 0;
+  double fold = x->queued ? x->queue[0].along : -1;
+  for (x->sought = least; x->sought < most && x->queued < STEADY_QUEUE - 1; x->sought += 1 + pair) {
+    pw_branch_point *point = &x->queue[x->queued].point;
+    int status = pw_branch_locate (&x->branch, branch_test, x, BRANCH_ACCURACY, point, error);
+    if (status != PW_OK) return status;
+    double along = branch_along (x, point);
+    pair = branch_pair (x, most - least);
+    if (pair || fabs (along - fold) > BRANCH_FOLD)
+      branch_queue (x, *point, pair ? PW_STEADY_OSCILLATION : PW_STEADY_REAL, along);
+  }
   return PW_OK;
 }
 
@@ -115,7 +128,7 @@ static int branch_events (pw_steady *x, pw_error *error) {
   x->compare = neutral == x->neutral ? neutral : -1;
   neutral = x->neutral;
   x->unstable = motion.unstable;
-  if (apart > x->branch.folded) status = branch_change (x, before, motion.unstable, error);
+  if (apart > x->branch.folded) status = branch_changes (x, before, motion.unstable, error);
   x->neutral = neutral;
   return status;
 }

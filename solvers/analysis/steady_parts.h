@@ -6,7 +6,7 @@
 #include "continuation.h"
 #include "linear.h"
 
-enum { STEADY_QUEUE = 3 };
+enum { STEADY_QUEUE = 8 };
 
 struct pw_steady {
   const pw_system *s; /* as described */

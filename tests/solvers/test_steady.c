@@ -280,6 +280,37 @@ static void test_pitchfork (void **state) {
   steady_close (&t);
 }
 
+/* A second rod, with a stiffer spring. */
+static void twins_build (pw_model *m, const void *parameters) {
+  whirl_build (m, parameters);
+  pw_add_body (m, &(pw_body){ .name = "second", .mass = 2, .inertia = 0.1, .start = { -0.2, 0, 0 } });
+  pw_add_pin (m, &(pw_pin){ .name = "joint", .body = { "hub", "second" }, .at = { { -0.5, 0 }, { -0.3, 0 } } });
+  pw_add_rotational_spring (
+      m, &(pw_rotational_spring){ .name = "bend", .body = { "second", "hub" }, .stiffness = 3.2, .damping = 0.3 });
+}
+
+static pw_system *twins_at (void *context, double W, pw_error *error) {
+  pw_plugin_table table = whirl_table;
+  (void)context, (void)error;
+  table.build = twins_build;
+  return scene_system (&table, "W", W, "beta", 0., NULL);
+}
+
+/* Two changes between two points, of which there are few. */
+static void test_two_changes (void **state) {
+  (void)state;
+  steady t = { .s = twins_at (NULL, 2, NULL),
+               .set = { .vary = -1, .compile = twins_at, .first = 0.5, .last = 8, .points = 1 } };
+  steady_open (&t);
+  pw_steady_motion m = steady_solve (&t, 0, 0.5);
+  branch_events e = steady_follow (&t, &m, 1);
+  assert_int_equal (e.count[PW_STEADY_REAL], 2);
+  assert_int_equal (e.count[PW_STEADY_OSCILLATION], 0);
+  check_close ("first", e.at[PW_STEADY_REAL][0], sqrt (10), 1e-8, "located to 1e-9 of a step of 5 rad/s");
+  check_close ("second", e.at[PW_STEADY_REAL][1], sqrt (3.2 / 0.3), 1e-8, "located to 1e-9 of a step of 5 rad/s");
+  steady_close (&t);
+}
+
 /* With it: a branch that turns where tan theta = theta - beta.  AUTO-07p, on the equation above as two of first order, has
  * its limit point at W = 3.5200604503, theta = -0.631659. */
 static void test_fold (void **state) {
@@ -371,7 +402,7 @@ static void test_shimmy (void **state) {
   (void)state;
   caster_boundaries (exact);
   steady t = { .s = caster_at (NULL, 0.05, NULL),
-               .set = { .vary = -1, .compile = caster_at, .first = 0.05, .last = 30, .points = 100 } };
+               .set = { .vary = -1, .compile = caster_at, .first = 0.05, .last = 30, .points = 1 } };
   steady_open (&t);
   assert_int_equal (pw_steady_symmetries (t.x), 1);
   pw_steady_motion m = steady_solve (&t, 0, 0.05);
@@ -531,6 +562,7 @@ int main (void) {
     cmocka_unit_test (test_shimmy),         cmocka_unit_test (test_shimmy_runs),
     cmocka_unit_test (test_refused),        cmocka_unit_test (test_bodies),
     cmocka_unit_test (test_concentric),     cmocka_unit_test (test_missing),
+    cmocka_unit_test (test_two_changes),
   };
   return cmocka_run_group_tests (tests, NULL, NULL);
 }
