@@ -44,6 +44,26 @@ static void test_valley (void **state) {
   check_close ("value", cli_number (json, "value", NULL), 0, 1e-10, "square of the distance");
 }
 
+/* Three unknowns: smooth outputs have derivatives, unless the method has none; with an extremum they have not. */
+static void test_derivatives (void **state) {
+  static const char *const more[] = { "", " + 0*max:p.x", "' --method 'rk4:inputs=held" };
+  (void)state;
+  for (int i = 0; i < 3; i++) {
+    char command[500];
+    snprintf (
+        command, sizeof command,
+        "pinwheel optimise @/point.yaml --minimise '100*(p.y - p.x^2)^2 + (1 - p.x)^2 + 100*(p.phi - p.y^2)^2 + (1 - "
+        "p.y)^2%s' --free a=-3:3 --free b=-3:3 --free p.omega=-3:3 --json @/o.json",
+        more[i]);
+    cli_shell (command);
+    const char *json = cli_file ("o.json");
+    check_close ("a", optimise_value (json, "a"), 1, i == 0 ? 1e-9 : 1e-5,
+                 "quadratic convergence, or last steps of 1e-7");
+    check_close ("p.omega", optimise_value (json, "p.omega"), 1, i == 0 ? 1e-9 : 1e-4, "p.omega = b^2 = a^4");
+    assert_true ((cli_number (json, "derivatives", NULL) > 0) == (i == 0));
+  }
+}
+
 /* The highest point of a line over a disc; b has no bounds. */
 static void test_constraint (void **state) {
   (void)state;
@@ -165,9 +185,10 @@ static void test_bad (void **state) {
 }
 
 int main (void) {
-  const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),    cmocka_unit_test (test_constraint),
-                                      cmocka_unit_test (test_bound),     cmocka_unit_test (test_failing),
-                                      cmocka_unit_test (test_sweep),     cmocka_unit_test (test_jobs),
-                                      cmocka_unit_test (test_interrupt), cmocka_unit_test (test_bad) };
+  const struct CMUnitTest tests[] = { cmocka_unit_test (test_valley),     cmocka_unit_test (test_derivatives),
+                                      cmocka_unit_test (test_constraint), cmocka_unit_test (test_bound),
+                                      cmocka_unit_test (test_failing),    cmocka_unit_test (test_sweep),
+                                      cmocka_unit_test (test_jobs),       cmocka_unit_test (test_interrupt),
+                                      cmocka_unit_test (test_bad) };
   return cmocka_run_group_tests (tests, optimise_setup, cli_teardown);
 }

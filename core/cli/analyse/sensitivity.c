@@ -8,23 +8,11 @@
 #include "report.h"
 #include "sensitivity.h"
 
-enum { SENSITIVITY_ROWS = 200, SENSITIVITY_PARTS = 20 };
-
-/* Without integrals and a table, derivatives are evaluated at few times, for the progress. */
-static int sensitivity_integrates (const pw_sensitivity *x) {
-  int integrates = 0;
-  for (const char **of = x->of; of && *of; of++)
-    integrates |= strstr (*of, "integral:") || strstr (*of, "mean:") || strstr (*of, "rms:");
-  return integrates;
-}
-
 static int sensitivity_settings (pw_sensitivity *x, pw_error *error) {
   pw_run_defaults d = pw_cli_defaults (pw_file_table (x->m.file));
   pw_specialise when;
   x->method = x->line.method ? x->line.method : d.method;
   int status = pw_cli_settings (&x->line, &d, &x->t_end, &x->settings, &x->limit, error);
-  x->dt = x->t_end / (x->folder || sensitivity_integrates (x) ? SENSITIVITY_ROWS : SENSITIVITY_PARTS);
-  if (status == PW_OK) status = pw_cli_number ("--every", x->every, PW_POSITIVE, &x->dt, error);
   if (status == PW_OK) status = pw_cli_specialise (x->line.specialise, &when, error);
   if (status != PW_OK) return status;
   pw_cli_engine_open (&x->engine, x->m.system, when, pw_cli_steps (x->method, &x->settings, &d, x->t_end));
@@ -38,16 +26,11 @@ static int sensitivity_unknowns (pw_sensitivity *x, pw_error *error) {
   while (x->by && x->by[count]) count++;
   if (count == 0) return pw_fail (error, PW_INPUT, "--by is missing: expected a parameter or an initial value");
   if (x->of == NULL) return pw_fail (error, PW_INPUT, "--of is missing: expected an output, such as frame.x");
-  size_t P = (size_t)count;
-  x->unknown = calloc (P, sizeof *x->unknown);
-  x->near = calloc (4 * P, sizeof *x->near);
-  x->direction = calloc (P, sizeof *x->direction);
-  x->workspace = calloc (5 * P, sizeof *x->workspace);
-  if (x->unknown == NULL || x->near == NULL || x->direction == NULL || x->workspace == NULL)
-    return pw_fail (error, PW_RESOURCE, "out of memory");
+  int status = pw_sensitivity_open (x, count, x->folder != NULL, error);
+  if (status == PW_OK) status = pw_cli_number ("--every", x->every, PW_POSITIVE, &x->dt, error);
+  if (status != PW_OK) return status;
   pw_run *r = pw_run_open (x->m.system, x->method, &x->settings, error);
-  int status = r ? PW_OK : error->status;
-  x->unknowns = count;
+  status = r ? PW_OK : error->status;
   for (int i = 0; i < count && status == PW_OK; i++) {
     status = pw_unknown_find (&x->unknown[i], &x->m, r, x->by[i], error);
     for (int k = 0; k < i && status == PW_OK; k++)
@@ -67,21 +50,16 @@ static int sensitivity_folder (const pw_sensitivity *x, int *lock, pw_error *err
   return *lock < 0 ? error->status : PW_OK;
 }
 
-static void sensitivity_close (pw_sensitivity *x, int lock) {
-  if (lock >= 0) close (lock);
-  pw_variation_close (x->variation);
-  if (x->outcomes.system) pw_outcomes_close (&x->outcomes);
-  for (int i = 0; x->workspace && i < 5 * x->unknowns; i++) pw_workspace_free (x->workspace[i]);
-  for (int i = 0; x->near && i < 4 * x->unknowns; i++) pw_unknown_close (&x->near[i]);
-  pw_unknown_close (&x->base);
-  pw_cli_engine_close (&x->engine);
-  free (x->workspace);
-  free (x->near);
-  free (x->direction);
-  free (x->unknown);
-  free (x->value);
-  free (x->row);
-  pw_cli_close_model (&x->m);
+static int sensitivity_compute (pw_sensitivity *x, pw_error *error) {
+  pw_progress progress;
+  double begun = pw_cpu_clock ();
+  pw_stop_catch ();
+  pw_progress_start (&progress, pw_file_name (x->m.file), x->t_end, 1);
+  int status = pw_sensitivity_compute (x, &progress, error);
+  pw_progress_end (&progress);
+  pw_stop_release ();
+  x->cpu = pw_cpu_clock () - begun;
+  return status;
 }
 
 static int sensitivity_command (void *options, pw_error *error) {
@@ -91,12 +69,15 @@ static int sensitivity_command (void *options, pw_error *error) {
   if (status == PW_OK) status = sensitivity_unknowns (x, error);
   if (status == PW_OK) status = sensitivity_folder (x, &lock, error);
   if (status == PW_OK) pw_report_model (x->m.model);
-  if (status == PW_OK) status = pw_sensitivity_compute (x, error);
+  if (status == PW_OK) status = sensitivity_compute (x, error);
   if (status == PW_OK) pw_sensitivity_print (x);
   if (status == PW_OK && x->folder) status = pw_sensitivity_write (x, error);
   int stopped = status == PW_OK && x->stopped;
   if (stopped) status = pw_limit_fail (&x->limit, pw_run_time (x->base.run), error);
-  sensitivity_close (x, lock);
+  if (lock >= 0) close (lock);
+  pw_sensitivity_close (x);
+  pw_cli_engine_close (&x->engine);
+  pw_cli_close_model (&x->m);
   if (status == PW_RETRY) pw_cli_say ("pinwheel: interrupted; results are incomplete\n");
   return status == PW_RETRY ? PW_INTERRUPTED : status;
 }

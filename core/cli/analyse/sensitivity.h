@@ -3,6 +3,7 @@
 #define PW_SENSITIVITY_H
 
 #include "outcome.h"
+#include "progress.h"
 #include "sensitivity_direction.h"
 
 typedef struct {
@@ -33,8 +34,12 @@ typedef struct {
   int stopped; /* 1: stopped before t_end */
 } pw_sensitivity;
 
+/* Prepares derivatives by a number of unknowns, which the caller then sets; x has line, of, m, method, settings and t_end.
+ * table: with one.  Close it in every case. */
+int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *error);
 /* Runs and differentiates.  A status. */
-int pw_sensitivity_compute (pw_sensitivity *x, pw_error *error);
+int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *error);
+void pw_sensitivity_close (pw_sensitivity *x);
 /* 1 if an output is a function of columns at one time, so that it has columns in the table. */
 int pw_sensitivity_runs_along (const pw_sensitivity *x, int output);
 /* The derivative of an output by an unknown from those of the functionals, and its error. */

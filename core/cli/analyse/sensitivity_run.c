@@ -6,10 +6,10 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include "progress.h"
 #include "sensitivity.h"
 
-enum { SENSITIVITY_NODES = 5 };
+/* Rows of the table, between which integrals are computed; without both, times of the progress. */
+enum { SENSITIVITY_NODES = 5, SENSITIVITY_ROWS = 200, SENSITIVITY_PARTS = 20 };
 /* Abramowitz and Stegun, table 25.4. */
 static const double sensitivity_x[] = { -0.90617984593866399, -0.53846931010568309, 0, 0.53846931010568309,
                                         0.90617984593866399 },
@@ -216,18 +216,12 @@ static int sensitivity_along (pw_sensitivity *x, sensitivity_event *list, pw_pro
   return status;
 }
 
-static int sensitivity_progress (pw_sensitivity *x, pw_error *error) {
-  pw_progress progress;
+static int sensitivity_integrate (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
   sensitivity_event *list = malloc (((size_t)x->outcomes.functionals + SENSITIVITY_NODES) * sizeof *list);
-  double begun = pw_cpu_clock ();
   if (list == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
-  pw_stop_catch ();
-  pw_progress_start (&progress, pw_file_name (x->m.file), x->t_end, 1);
-  int status = sensitivity_along (x, list, &progress, error);
-  pw_progress_end (&progress);
-  pw_stop_release ();
+  x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns, x->outcomes.ledger, error);
+  int status = x->variation ? sensitivity_along (x, list, progress, error) : error->status;
   free (list);
-  x->cpu = pw_cpu_clock () - begun;
   x->stopped = status == PW_STOPPED;
   return x->stopped ? PW_OK : status;
 }
@@ -241,6 +235,20 @@ static int sensitivity_workspaces (pw_sensitivity *x, pw_error *error) {
     if (x->workspace[i] == NULL) return PW_RESOURCE;
   }
   return PW_OK;
+}
+
+int pw_sensitivity_open (pw_sensitivity *x, int unknowns, int table, pw_error *error) {
+  size_t P = (size_t)unknowns;
+  int integrates = 0;
+  for (const char **of = x->of; *of; of++)
+    integrates |= strstr (*of, "integral:") || strstr (*of, "mean:") || strstr (*of, "rms:");
+  x->dt = x->t_end / (table || integrates ? SENSITIVITY_ROWS : SENSITIVITY_PARTS);
+  x->unknown = calloc (P, sizeof *x->unknown);
+  x->near = calloc (4 * P, sizeof *x->near);
+  x->direction = calloc (P, sizeof *x->direction);
+  x->workspace = calloc (5 * P, sizeof *x->workspace);
+  x->unknowns = unknowns;
+  return x->unknown && x->near && x->direction && x->workspace ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 static int sensitivity_arrays (pw_sensitivity *x, pw_error *error) {
@@ -272,7 +280,7 @@ static int sensitivity_functionals (pw_sensitivity *x, pw_error *error) {
   return PW_OK;
 }
 
-int pw_sensitivity_compute (pw_sensitivity *x, pw_error *error) {
+int pw_sensitivity_compute (pw_sensitivity *x, pw_progress *progress, pw_error *error) {
   int count = 0;
   while (x->of[count]) count++;
   pw_settings plain = x->settings;
@@ -288,7 +296,19 @@ int pw_sensitivity_compute (pw_sensitivity *x, pw_error *error) {
   if (status == PW_OK) status = sensitivity_workspaces (x, error);
   pw_limit_start (&x->limit);
   if (status == PW_OK) status = sensitivity_functionals (x, error);
-  if (status != PW_OK) return status;
-  x->variation = pw_variation_open (x->base.run, x->direction, x->unknowns, x->outcomes.ledger, error);
-  return x->variation ? sensitivity_progress (x, error) : error->status;
+  return status == PW_OK ? sensitivity_integrate (x, progress, error) : status;
+}
+
+void pw_sensitivity_close (pw_sensitivity *x) {
+  pw_variation_close (x->variation);
+  if (x->outcomes.system) pw_outcomes_close (&x->outcomes);
+  for (int i = 0; x->workspace && i < 5 * x->unknowns; i++) pw_workspace_free (x->workspace[i]);
+  for (int i = 0; x->near && i < 4 * x->unknowns; i++) pw_unknown_close (&x->near[i]);
+  pw_unknown_close (&x->base);
+  free (x->workspace);
+  free (x->near);
+  free (x->direction);
+  free (x->unknown);
+  free (x->value);
+  free (x->row);
 }

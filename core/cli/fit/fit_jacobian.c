@@ -109,12 +109,7 @@ static int jacobian_open (jacobian_exact *e, const pw_fit *x, const double *at, 
   e->near = calloc (4 * n, sizeof *e->near);
   if (e->unknown == NULL || e->direction == NULL || e->near == NULL)
     return pw_fail (error, PW_RESOURCE, "out of memory");
-  for (size_t i = 0; i < n; i++) {
-    const pw_free_number *f = u->at + i;
-    e->unknown[i] = (pw_unknown){ .name = f->name, .parameter = f->parameter, .state = -1, .value = at[i] };
-    snprintf (e->unknown[i].unit, sizeof e->unknown[i].unit, "%s", f->unit);
-    if (f->parameter == NULL) e->unknown[i].state = pw_system_find_state (x->m.system, f->name, error);
-  }
+  pw_unknowns_at (u, at, e->unknown);
   int status = pw_outcomes_open (&e->columns, x->m.system, "--columns", x->name, x->columns, error);
   e->settings = u->settings;
   e->settings.ledger = e->columns.ledger;

@@ -1,14 +1,19 @@
-/* Local searches of `pinwheel optimise`, by NLopt without derivatives. */
+/* Local searches of `pinwheel optimise`, by NLopt, with derivatives of smooth outputs. */
 #define _POSIX_C_SOURCE 200809L
 #include <math.h>
 #include <nlopt.h>
 #include <stdlib.h>
 #include <string.h>
 #include "optimise_parts.h"
+#include "sensitivity.h"
 
 #define SEARCH_FIRST 0.1    /* first steps, relative to the scales of the unknowns */
 #define SEARCH_ROUGH 1e-3   /* last ones */
 #define SEARCH_ALLOWED 1e-6 /* violation of a constraint, relative to its bound */
+#define SEARCH_GAIN 1e-9    /* least improvement for another repetition, relative to the value */
+
+/* Fewest unknowns for derivatives, which cost as much as several runs; repetitions of a search. */
+enum { SEARCH_SLOPES = 3, SEARCH_REPEATS = 8 };
 
 /* ---- Runs ---- */
 
@@ -17,7 +22,9 @@ typedef struct {
   pw_search_start *s;
   nlopt_opt opt;
   double *u, *at, *value; /* the last run: scaled unknowns, unknowns, outputs */
-  int known, failed;
+  double *slope;          /* outputs x unknowns: derivatives by scaled unknowns; NULL: without */
+  int known, sloped, failed;
+  int refused;        /* 1: derivatives could not be computed */
   double least, most; /* objectives of the runs that succeeded */
 } search;
 
@@ -48,6 +55,34 @@ static int search_run (const search *p, pw_error *error) {
   }
   pw_outcomes_close (&o);
   pw_cli_close_model (&m);
+  return status;
+}
+
+/* The same with derivatives. */
+static int search_differentiate (search *p, pw_error *error) {
+  const pw_unknowns *u = &p->x->unknowns;
+  pw_progress silent = { 0 };
+  pw_sensitivity s = { .line = *u->line, .of = p->x->text, .m = *u->m, .method = u->method, .settings = u->settings };
+  s.t_end = u->t_end;
+  s.limit.most = u->limit;
+  s.settings.stop = pw_limit_over;
+  s.settings.stop_context = &s.limit;
+  int status = pw_sensitivity_open (&s, u->count, 0, error);
+  if (status == PW_OK) {
+    pw_unknowns_at (u, p->at, s.unknown);
+    status = pw_sensitivity_compute (&s, &silent, error);
+  }
+  if (status == PW_OK && s.stopped) status = pw_limit_fail (&s.limit, pw_run_time (s.base.run), error);
+  for (int i = 0; i < p->x->outputs && status == PW_OK; i++) {
+    p->value[i] = pw_outcome_value (&s.outcomes, i, NULL);
+    for (int j = 0; j < u->count && status == PW_OK; j++) {
+      double *slope = p->slope + i * u->count + j;
+      *slope = u->at[j].scale * pw_sensitivity_derivative (&s, i, j, s.end_slope);
+      if (!isfinite (p->value[i] + *slope)) status = pw_fail (error, PW_METHOD, "%s has no derivative", p->x->text[i]);
+    }
+  }
+  pw_sensitivity_close (&s);
+  p->s->derivatives += status == PW_OK;
   return status;
 }
 
@@ -95,20 +130,35 @@ static void search_keep (search *p) {
   pthread_mutex_unlock (&x->lock);
 }
 
-/* The run at scaled unknowns, unless it is the last one. */
-static void search_evaluate (search *p, const double *u) {
+/* Runs with the unknowns, or differentiates; a run without derivatives, which itself succeeds, ends the search. */
+static int search_try (search *p, int slopes, pw_error *error) {
+  pw_error own = { 0 };
+  int status = slopes ? search_differentiate (p, &own) : PW_METHOD;
+  if (status == PW_OK || status == PW_RETRY || status == PW_RESOURCE) {
+    if (status != PW_OK) *error = own;
+    return status;
+  }
+  status = search_run (p, error);
+  p->refused = slopes && status == PW_OK;
+  if (p->refused) nlopt_force_stop (p->opt);
+  return status;
+}
+
+/* The run at scaled unknowns, with slopes: with derivatives, unless it is the last one. */
+static void search_evaluate (search *p, const double *u, int slopes) {
   pw_optimise *x = p->x;
   int n = x->unknowns.count;
   pw_error own = { 0 };
-  if (p->known && memcmp (p->u, u, (size_t)n * sizeof *u) == 0) return;
+  if (p->known && (p->sloped || !slopes) && memcmp (p->u, u, (size_t)n * sizeof *u) == 0) return;
   memcpy (p->u, u, (size_t)n * sizeof *u);
   for (int i = 0; i < n; i++) p->at[i] = pw_search_unknown (x->unknowns.at + i, u[i]);
-  int status = search_run (p, &own);
+  int status = search_try (p, slopes, &own);
   if (status == PW_RETRY || pw_stop) {
     nlopt_force_stop (p->opt);
     return;
   }
   p->known = 1;
+  p->sloped = slopes;
   p->failed = status != PW_OK;
   if (p->failed && p->s->failed++ == 0) p->s->error = own;
   if (search_store (p) != PW_OK) status = pw_fail (&own, PW_RESOURCE, "out of memory");
@@ -121,10 +171,17 @@ static void search_evaluate (search *p, const double *u) {
   nlopt_force_stop (p->opt);
 }
 
+/* The derivatives of factor x output. */
+static void search_gradient (const search *p, int output, double factor, double *gradient) {
+  int n = p->x->unknowns.count;
+  for (int j = 0; gradient && j < n; j++) gradient[j] = p->failed || p->refused ? 0 : factor * p->slope[output * n + j];
+}
+
 static double search_objective (unsigned n, const double *u, double *gradient, void *context) {
   search *p = context;
-  (void)n, (void)gradient;
-  search_evaluate (p, u);
+  (void)n;
+  search_evaluate (p, u, gradient != NULL);
+  search_gradient (p, 0, p->x->sign[0], gradient);
   if (!p->failed) return p->x->sign[0] * p->value[0];
   return isfinite (p->most) ? p->most + fmax (p->most - p->least, 0.1 * fabs (p->most)) : 0;
 }
@@ -138,20 +195,26 @@ typedef struct {
 static double search_excess (unsigned n, const double *u, double *gradient, void *context) {
   const search_constraint *c = context;
   const pw_optimise *x = c->p->x;
-  double bound = x->bound[c->output];
-  (void)n, (void)gradient;
-  search_evaluate (c->p, u);
-  if (c->p->failed) return 1;
-  return x->sign[c->output] * (c->p->value[c->output] - bound) / (bound != 0 ? fabs (bound) : 1);
+  double bound = x->bound[c->output], factor = x->sign[c->output] / (bound != 0 ? fabs (bound) : 1);
+  (void)n;
+  search_evaluate (c->p, u, gradient != NULL);
+  search_gradient (c->p, c->output, factor, gradient);
+  return c->p->failed ? 1 : factor * (c->p->value[c->output] - bound);
 }
 
 /* ---- Searches ---- */
 
-/* Bounds and tolerances.  BOBYQA needs two unknowns and has no constraints. */
+/* BOBYQA needs two unknowns and has no constraints. */
+static nlopt_algorithm search_algorithm (const search *p) {
+  if (p->slope) return NLOPT_LD_SLSQP;
+  return p->x->outputs > 1 ? NLOPT_LN_COBYLA : p->x->unknowns.count == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA;
+}
+
+/* Bounds and tolerances. */
 static int search_open (search *p, search_constraint *c, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
   int n = k->count, status = 1;
-  p->opt = nlopt_create (p->x->outputs > 1 ? NLOPT_LN_COBYLA : n == 1 ? NLOPT_LN_SBPLX : NLOPT_LN_BOBYQA, (unsigned)n);
+  p->opt = nlopt_create (search_algorithm (p), (unsigned)n);
   if (p->opt == NULL) return PW_RESOURCE;
   nlopt_set_min_objective (p->opt, search_objective, p);
   for (int i = 0; i < n; i++) {
@@ -170,20 +233,36 @@ static int search_open (search *p, search_constraint *c, double first, double la
   return status ? PW_OK : PW_RESOURCE;
 }
 
-static int search_from (search *p, double first, double last) {
+static void search_point (const pw_unknowns *k, const double *x, double *u) {
+  for (int i = 0; i < k->count; i++) u[i] = search_scaled (k->at + i, x[i]);
+}
+
+/* Searches from u.  SLSQP may end early, where derivatives change much: it begins again at its result. */
+static int search_repeat (search *p, double *u) {
+  for (int left = p->slope ? SEARCH_REPEATS : 1; left > 0 && !p->failed && !p->refused && !pw_stop; left--) {
+    double before = p->s->found ? p->s->value[0] : NAN, value;
+    if (nlopt_optimize (p->opt, u, &value) == NLOPT_OUT_OF_MEMORY) return PW_RESOURCE;
+    if (!p->s->found || fabs (p->s->value[0] - before) <= SEARCH_GAIN * fabs (before)) break;
+    search_point (&p->x->unknowns, p->s->best, u);
+  }
+  return PW_OK;
+}
+
+static int search_from (search *p, int slopes, double first, double last) {
   const pw_unknowns *k = &p->x->unknowns;
   size_t n = (size_t)k->count, outputs = (size_t)p->x->outputs;
-  double *memory = calloc (3 * n + outputs, sizeof *memory), value;
+  double *memory = calloc (3 * n + outputs + n * outputs, sizeof *memory);
   search_constraint *c = calloc (outputs, sizeof *c);
   int status = memory && c ? PW_OK : PW_RESOURCE;
   if (status == PW_OK) {
     p->u = memory, p->at = memory + n, p->value = memory + 2 * n;
     double *u = p->value + outputs;
-    for (size_t i = 0; i < n; i++) u[i] = search_scaled (k->at + i, p->s->first[i]);
+    p->slope = slopes ? u + n : NULL;
+    p->known = p->refused = 0;
+    search_point (k, p->s->first, u);
     status = search_open (p, c, first, last);
-    if (status == PW_OK) search_evaluate (p, u);
-    if (status == PW_OK && !p->failed && !pw_stop && nlopt_optimize (p->opt, u, &value) == NLOPT_OUT_OF_MEMORY)
-      status = PW_RESOURCE;
+    if (status == PW_OK) search_evaluate (p, u, slopes);
+    if (status == PW_OK) status = search_repeat (p, u);
   }
   nlopt_destroy (p->opt);
   free (memory);
@@ -191,10 +270,11 @@ static int search_from (search *p, double first, double last) {
   return status;
 }
 
-static void search_task (pw_optimise *x, int i, double first, double last) {
+static void search_task (pw_optimise *x, int i, int slopes, double first, double last) {
   search p = { .x = x, .s = x->start + i, .least = INFINITY, .most = -INFINITY };
   if (pw_stop) return;
-  int status = search_from (&p, first, last);
+  int status = search_from (&p, slopes, first, last);
+  if (status == PW_OK && p.refused) status = search_from (&p, 0, first, last);
   pthread_mutex_lock (&x->lock);
   if (status != PW_OK) pw_fail (&x->error, status, "out of memory");
   pw_progress_at (&x->progress, ++x->done);
@@ -202,10 +282,11 @@ static void search_task (pw_optimise *x, int i, double first, double last) {
 }
 
 void pw_search_rough (void *context, int i) {
-  search_task (context, i, SEARCH_FIRST, SEARCH_ROUGH);
+  search_task (context, i, 0, SEARCH_FIRST, SEARCH_ROUGH);
 }
 
 void pw_search_fine (void *context, int i) {
   pw_optimise *x = context;
-  search_task (x, x->starts + i, SEARCH_ROUGH, PW_SEARCH_FINE);
+  int slopes = x->smooth && x->unknowns.count >= SEARCH_SLOPES;
+  search_task (x, x->starts + i, slopes, SEARCH_ROUGH, PW_SEARCH_FINE);
 }

@@ -1,6 +1,6 @@
 /* pinwheel optimise: parameters and initial values for which an output is largest or smallest.
  *
- * Local searches without derivatives (NLopt) from several starts: the initial values, and Sobol points of the bounds,
+ * Local searches (NLopt) from several starts: the initial values, and Sobol points of the bounds,
  * displaced by the seed.  Each start is a task of its own, so that results do not depend on the number of threads.  The
  * best results continue with a tighter tolerance.  A run that fails gets a value that is worse than all before it. */
 #define _POSIX_C_SOURCE 200809L
@@ -113,7 +113,7 @@ static int optimise_texts (pw_optimise *x, pw_error *error) {
   size_t count = 1, size = 1, used = 0;
   for (const char **c = x->subject; c && *c; c++) count++, size += strlen (*c) + 1;
   x->texts = malloc (size);
-  x->text = calloc (count, sizeof *x->text);
+  x->text = calloc (count + 1, sizeof *x->text);
   x->bound = calloc (2 * count, sizeof *x->bound);
   if (x->texts == NULL || x->text == NULL || x->bound == NULL) return pw_fail (error, PW_RESOURCE, "out of memory");
   x->sign = x->bound + count;
@@ -128,15 +128,21 @@ static int optimise_texts (pw_optimise *x, pw_error *error) {
   return status;
 }
 
-/* Reads outputs as every run will, with messages that name the options. */
-static int optimise_check (const pw_optimise *x, pw_error *error) {
+/* Reads outputs as every run will; extrema have kinks, contact points no derivatives. */
+static int optimise_outputs (pw_optimise *x, int from, int count, const char *option, pw_error *error) {
   pw_outcomes o;
-  int status = pw_outcomes_open (&o, x->m.system, x->maximise ? "--maximise" : "--minimise", x->text, 1, error);
-  pw_outcomes_close (&o);
-  if (status != PW_OK) return status;
-  status = pw_outcomes_open (&o, x->m.system, "--subject-to", x->text + 1, x->outputs - 1, error);
+  int status = pw_outcomes_open (&o, x->m.system, option, x->text + from, count, error);
+  for (int i = 0; i < o.functionals; i++)
+    x->smooth &= o.functional[i].type != PW_MAX && o.functional[i].type != PW_MIN &&
+                 o.functional[i].column.type != PW_COLUMN_CONTACT;
   pw_outcomes_close (&o);
   return status;
+}
+
+static int optimise_check (pw_optimise *x, pw_error *error) {
+  x->smooth = 1;
+  int status = optimise_outputs (x, 0, 1, x->maximise ? "--maximise" : "--minimise", error);
+  return status == PW_OK ? optimise_outputs (x, 1, x->outputs - 1, "--subject-to", error) : status;
 }
 
 static int optimise_read (pw_optimise *x, pw_error *error) {

@@ -12,7 +12,7 @@ typedef struct {
   double *first, *best; /* unknowns */
   double *value;        /* outputs at the best */
   int found;            /* 1: the best satisfies the constraints */
-  long runs, failed, room;
+  long runs, failed, derivatives, room;
   double *trial;  /* runs x (unknowns, outputs); outputs of failed runs are NaN */
   pw_error error; /* of the first failed run */
 } pw_search_start;
@@ -29,6 +29,7 @@ typedef struct {
   double *bound;     /* outputs: of the constraint */
   double *sign;      /* outputs: sign x (value - bound) <= 0; of the objective: sign x value is minimised */
   int outputs, starts, polished, jobs;
+  int smooth; /* 1: outputs have derivatives, except where a motion has none */
   double seed;
   pw_search_start *start; /* starts, then those that continue from the best of them */
   int best;               /* index of the start with the best result; -1: none */

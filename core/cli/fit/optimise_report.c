@@ -30,6 +30,12 @@ static int report_same (const pw_optimise *x) {
   return same;
 }
 
+static long report_derivatives (const pw_optimise *x) {
+  long derivatives = 0;
+  for (int i = 0; i < x->starts + x->polished; i++) derivatives += x->start[i].derivatives;
+  return derivatives;
+}
+
 static long report_runs (const pw_optimise *x, long *failed, const pw_error **first) {
   long runs = 0;
   *failed = 0;
@@ -107,6 +113,9 @@ void pw_optimise_print (const pw_optimise *x) {
   report_unknowns (x);
   report_outputs (x);
   printf ("\n%ld runs from %d starts, %d of which end at this optimum\n", runs, x->starts, report_same (x));
+  if (report_derivatives (x))
+    printf ("with derivatives at %ld points of the searches that continue (SLSQP), without in the others\n",
+            report_derivatives (x));
   if (failed)
     pw_cli_print (stdout, "%ld runs failed and count as infeasible, the first of them: %s\n", failed, first->text);
   if (pw_unknowns_options (&x->unknowns, x->start[x->best].best, options, sizeof options)) printf ("\n%s\n", options);
@@ -173,6 +182,7 @@ void pw_optimise_json (const pw_optimise *x, const char *status, FILE *f) {
   pw_json_number (j, "seed", x->seed);
   pw_json_number (j, "runs", (double)runs);
   pw_json_number (j, "failed", (double)failed);
+  pw_json_number (j, "derivatives", (double)report_derivatives (x));
   pw_json_text (j, "reason", first ? first->text : "");
   pw_json_open (j, "unknowns", '[');
   for (int i = 0; i < x->unknowns.count; i++) report_json_unknown (x, j, i);

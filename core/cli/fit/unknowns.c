@@ -125,6 +125,16 @@ int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, 
   return PW_OK;
 }
 
+void pw_unknowns_at (const pw_unknowns *u, const double *x, pw_unknown *list) {
+  pw_error none = { 0 };
+  for (int i = 0; i < u->count; i++) {
+    const pw_free_number *f = u->at + i;
+    list[i] = (pw_unknown){ .name = f->name, .parameter = f->parameter, .state = -1, .value = x[i] };
+    snprintf (list[i].unit, sizeof list[i].unit, "%s", f->unit);
+    if (f->parameter == NULL) list[i].state = pw_system_find_state (u->m->system, f->name, &none);
+  }
+}
+
 int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size) {
   size_t used = 0;
   char number[32];

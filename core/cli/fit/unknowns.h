@@ -2,7 +2,7 @@
 #ifndef PW_UNKNOWNS_H
 #define PW_UNKNOWNS_H
 
-#include "cli.h"
+#include "sensitivity_direction.h"
 
 typedef struct {
   char *name;
@@ -40,7 +40,10 @@ void pw_unknowns_close (pw_unknowns *u);
 int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, pw_settings *settings, pw_limit *limit,
                         pw_error *error);
 
-/* Prints a row per unknown: name, value, its unit.  Options that set the values: "--set a=1 --start frame.vx=2". */
+/* The same values, to differentiate by: `list` has room for all. */
+void pw_unknowns_at (const pw_unknowns *u, const double *x, pw_unknown *list);
+
+/* Options that set the values, "--set a=1 --start frame.vx=2".  0 if the text is too short. */
 int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size);
 
 #endif
