@@ -226,6 +226,19 @@ static void test_studies (void **state) {
   memory_each (0, "compare pendulum --t-end 0.01 --methods rk4 --step-ladder 0.01:0.005 -o @/o");
 }
 
+/* One job: threads would allocate in any order. */
+static void test_searches (void **state) {
+  (void)state;
+  cli_write ("d.csv", "t,bob.x,bob.y\n0,0.5,-0.8\n0.01,0.5,-0.79\n0.02,0.49,-0.8\n");
+  memory_each (1, "fit pendulum --data @/d.csv --columns bob.x,bob.y --free l=0.5:2 --jobs 1 "
+                  "-o @/o/a.csv --json @/o/a.json");
+  memory_each (0,
+               "optimise pendulum --minimise bob.x --free l=0.5:2 --free m=1:2 --free g=9:10 --starts 1 --t-end 0.01 "
+               "--jobs 1 -o @/o/a.yaml --json @/o/a.json");
+  memory_each (0, "optimise pendulum --maximise max:bob.x --free l=0.5:2 --subject-to bob.y<=0 --starts 1 --t-end 0.01 "
+                  "--jobs 1 -o @/o/a.yaml");
+}
+
 static int memory_setup (void **state) {
 #ifndef MEMORY_OF_OTHERS
   void *frame[4];
@@ -242,6 +255,7 @@ int main (void) {
     cmocka_unit_test (test_reading),
     cmocka_unit_test (test_run),
     cmocka_unit_test (test_studies),
+    cmocka_unit_test (test_searches),
   };
   return cmocka_run_group_tests (tests, memory_setup, cli_teardown);
 }

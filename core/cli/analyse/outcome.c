@@ -191,7 +191,8 @@ static int outcome_formula (pw_outcomes *x, pw_outcome *o, const char *what, pw_
     if (n >= sizeof name || used + size + sizeof variable > sizeof text)
       return pw_fail (error, PW_INPUT, "%s: the expression is too long", what);
     snprintf (name, sizeof name, "%.*s", (int)n, at);
-    if (n && outcome_term (x, o, what, name, at[n], variable, error) != PW_OK) return error->status;
+    int status = n ? outcome_term (x, o, what, name, at[n], variable, error) : PW_OK;
+    if (status != PW_OK) return status;
     memcpy (text + used, n ? variable : at, n ? strlen (variable) : size);
     used += n ? strlen (variable) : size;
     at += n + size;
@@ -209,8 +210,8 @@ static int outcome_read (pw_outcomes *x, pw_outcome *o, const char *option, pw_e
   if (*o->text == 0) return pw_fail (error, PW_INPUT, "%s is empty: expected a column, such as frame.x", option);
   pw_error own = { 0 };
   int status = outcome_term (x, o, what, o->text, 0, variable, &own);
-  if (status == PW_RESOURCE) *error = own;
-  return status == PW_OK || status == PW_RESOURCE ? status : outcome_formula (x, o, what, error);
+  if (status == PW_RESOURCE) return pw_fail (error, status, "%s", own.text);
+  return status == PW_OK ? PW_OK : outcome_formula (x, o, what, error);
 }
 
 int pw_outcomes_open (pw_outcomes *x, const pw_system *s, const char *option, const char *const *text, int count,
@@ -222,10 +223,10 @@ int pw_outcomes_open (pw_outcomes *x, const pw_system *s, const char *option, co
     return pw_fail (error, PW_RESOURCE, "out of memory");
   for (; x->outcomes < count; x->outcomes++) {
     x->outcome[x->outcomes].text = text[x->outcomes];
-    if (outcome_read (x, x->outcome + x->outcomes, option, error) != PW_OK) {
-      pw_formula_close (x->outcome[x->outcomes].formula);
-      return error->status;
-    }
+    int status = outcome_read (x, x->outcome + x->outcomes, option, error);
+    if (status == PW_OK) continue;
+    pw_formula_close (x->outcome[x->outcomes].formula);
+    return status;
   }
   return PW_OK;
 }
