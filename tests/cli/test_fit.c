@@ -224,10 +224,26 @@ static void test_bad (void **state) {
   }
 }
 
+/* A frequency has many minima: from k = 60 the search ends at another one than k = 5, of several searches some end there. */
+static void test_starts (void **state) {
+  (void)state;
+  fit_write (0);
+  cli_shell (FIT "--free k=1:100 --set k=60 --set c=0.4");
+  assert_true (fabs (fit_value (cli_file ("fit.json"), "k", "value") - fit_k) > 1);
+  cli_shell (FIT "--free k=1:100 --set k=60 --set c=0.4 --starts 12");
+  const char *json = cli_file ("fit.json");
+  check_close ("k", fit_value (json, "k", "value"), fit_k, 1e-5, "rk4 with steps of 0.02 s, and 9 digits of the data");
+  check_below ("chi2", cli_number (json, "chi2", NULL), 1e-9, "the same");
+  const char *said = strstr (cli_out, " of 12 searches end at this minimum; the next one is ");
+  assert_non_null (said);
+  assert_non_null (strstr (said, "--set k="));
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = { cmocka_unit_test (test_exact),      cmocka_unit_test (test_derivatives),
                                       cmocka_unit_test (test_errors),     cmocka_unit_test (test_coverage),
                                       cmocka_unit_test (test_unweighted), cmocka_unit_test (test_undetermined),
-                                      cmocka_unit_test (test_bound),      cmocka_unit_test (test_bad) };
+                                      cmocka_unit_test (test_bound),      cmocka_unit_test (test_bad),
+                                      cmocka_unit_test (test_starts) };
   return cmocka_run_group_tests (tests, fit_setup, cli_teardown);
 }

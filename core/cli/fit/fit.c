@@ -13,6 +13,7 @@
 enum { FIT_TABLE, FIT_SUMMARY, FIT_FILES };
 
 static int fit_options (pw_fit *x, pw_error *error) {
+  double starts = 1;
   x->confidence = 0.95;
   if (x->data_path == NULL) return pw_fail (error, PW_INPUT, "no data: add --data FILE.csv");
   if (x->columns_text == NULL)
@@ -20,6 +21,9 @@ static int fit_options (pw_fit *x, pw_error *error) {
   int status = pw_cli_number ("--confidence", x->confidence_text, PW_POSITIVE, &x->confidence, error);
   if (status == PW_OK && !(x->confidence < 1))
     status = pw_fail (error, PW_INPUT, "--confidence %s: expected a number between 0 and 1", x->confidence_text);
+  if (status == PW_OK) status = pw_cli_number ("--starts", x->starts_text, PW_COUNT, &starts, error);
+  if (status == PW_OK && starts > 1e5) status = pw_fail (error, PW_INPUT, "--starts: at most 100000");
+  x->starts = (int)starts;
   return status == PW_OK ? pw_parallel_jobs (x->jobs_text, &x->jobs, error) : status;
 }
 
@@ -31,6 +35,8 @@ static int fit_open_data (pw_fit *x, pw_error *error) {
   if (x->residuals < x->unknowns.count)
     return pw_fail (error, PW_INPUT, "--data %s has fewer data (%d) than there are unknowns (%d)", x->data_path,
                     x->residuals, x->unknowns.count);
+  if (x->starts > 1 && x->unknowns.count > PW_UNKNOWNS_STARTED)
+    return pw_fail (error, PW_INPUT, "--starts: at most %d unknowns", PW_UNKNOWNS_STARTED);
   x->unknowns.t_end = x->unknowns.settings.span = x->t[x->rows - 1];
   return PW_OK;
 }
@@ -56,7 +62,7 @@ static int fit_open (pw_fit *x, pw_output *file[FIT_FILES], int *folder, pw_erro
 
 static int fit_search (pw_fit *x, pw_error *error) {
   pw_stop_catch ();
-  pw_progress_count (&x->progress, pw_file_name (x->m.file), "iterations", 0, 20);
+  pw_progress_count (&x->progress, pw_file_name (x->m.file), "iterations", 0, 20. * x->starts);
   int status = pw_fit_solve (x, error);
   pw_progress_end (&x->progress);
   pw_stop_release ();
@@ -96,6 +102,7 @@ static int fit_command (void *options, pw_error *error) {
   free (x->table);
   free (x->sigma);
   free (x->x);
+  free (x->minimum);
   pw_unknowns_close (&x->unknowns);
   pw_cli_close_model (&x->m);
   return status;
@@ -111,6 +118,8 @@ static const struct poptOption fit_options_table[] = {
   PW_LIST_OPTION (pw_fit, sigma_list, "sigma", 0, "COLUMN=VALUE",
                   "Standard deviation of a column, a number or the name of a column of the data; repeatable"),
   PW_TEXT_OPTION (pw_fit, confidence_text, "confidence", 0, "P", "Probability of confidence intervals (default 0.95)"),
+  PW_TEXT_OPTION (pw_fit, starts_text, "starts", 0, "N",
+                  "Search from N points: the initial values, and others between the bounds (default 1)"),
   PW_TEXT_OPTION (pw_fit, jobs_text, "jobs", 'j', "N", "Number of concurrent runs (default: one per processor)"),
   PW_TEXT_OPTION (pw_fit, path, "output", 'o', "FILE.csv", "Write data, model values and residuals to this file"),
   PW_TEXT_OPTION (pw_fit, json_path, "json", 0, "FILE.json", "Write a summary"),

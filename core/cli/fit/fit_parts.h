@@ -8,12 +8,12 @@
 
 typedef struct {
   pw_cli_line line;
-  const char *data_path, *columns_text, *path, *json_path, *plots_path, *confidence_text, *jobs_text;
+  const char *data_path, *columns_text, *path, *json_path, *plots_path, *confidence_text, *starts_text, *jobs_text;
   const char **free, **sigma_list;
   pw_cli_model m;
   pw_unknowns unknowns;
   double confidence;
-  int jobs;
+  int jobs, starts;
   /* data: `columns` arrays of `rows` each, one after the other */
   char *names;       /* copies of the texts of --columns and --sigma */
   const char **name; /* columns */
@@ -24,6 +24,7 @@ typedef struct {
   int weighted;            /* 1: they are given; else 1 */
   int residuals;           /* data */
   /* results */
+  double *minimum;    /* starts x (1 + unknowns): sum of squares, INFINITY if a search failed, and values */
   double *x, *model;  /* unknowns; columns x rows */
   double *deviation;  /* unknowns: standard errors; INFINITY: not identifiable, NaN: no degrees of freedom */
   double *covariance; /* unknowns x unknowns */

@@ -133,6 +133,27 @@ static void report_undetermined (const pw_fit *x) {
   }
 }
 
+/* 1 if a search ended at the best minimum. */
+static int report_same (const pw_fit *x, const double *minimum) {
+  return *minimum <= x->chi2 + 1e-6 * x->chi2 + 1e-12 * x->initial_chi2;
+}
+
+/* Searches that ended at the best minimum, and the next best one. */
+static void report_minima (const pw_fit *x) {
+  char options[REPORT_OPTIONS], chi[32];
+  const double *next = NULL;
+  int same = 0;
+  for (int i = 0; i < x->starts; i++) {
+    const double *minimum = x->minimum + i * (1 + x->unknowns.count);
+    same += report_same (x, minimum);
+    if (!report_same (x, minimum) && isfinite (*minimum) && (next == NULL || *minimum < *next)) next = minimum;
+  }
+  if (x->starts > 1) printf ("%d of %d searches end at this minimum", same, x->starts);
+  if (next && pw_unknowns_options (&x->unknowns, next + 1, options, sizeof options))
+    printf ("; the next one is %s at %s", pw_format (chi, *next, 6), options);
+  if (x->starts > 1) putchar ('\n');
+}
+
 void pw_fit_print (const pw_fit *x) {
   char options[REPORT_OPTIONS], chi[32], initial[32];
   int freedom = pw_fit_freedom (x);
@@ -149,6 +170,7 @@ void pw_fit_print (const pw_fit *x) {
   report_undetermined (x);
   printf ("\n%ld runs, %d iterations, derivatives by %s\n", x->runs, x->iterations,
           x->by_differences ? "differences of runs" : "the variational equations");
+  report_minima (x);
   if (pw_unknowns_options (&x->unknowns, x->x, options, sizeof options)) printf ("\n%s\n", options);
 }
 
@@ -201,6 +223,22 @@ static void report_json_matrix (const pw_fit *x, pw_json *j, const char *key, in
   pw_json_close (j, ']');
 }
 
+/* Where each search ended. */
+static void report_json_minima (const pw_fit *x, pw_json *j) {
+  int n = x->unknowns.count;
+  pw_json_open (j, "searches", '[');
+  for (const double *minimum = x->minimum; minimum < x->minimum + x->starts * (1 + n); minimum += 1 + n) {
+    j->line = 1;
+    pw_json_open (j, NULL, '{');
+    pw_json_number (j, "chi2", *minimum);
+    pw_json_open (j, "values", '[');
+    for (int i = 0; i < n; i++) pw_json_number (j, NULL, minimum[1 + i]);
+    pw_json_close (j, ']');
+    pw_json_close (j, '}');
+  }
+  pw_json_close (j, ']');
+}
+
 void pw_fit_json (const pw_fit *x, const char *status, FILE *f) {
   pw_json json = { .f = f, .lines = 2 }, *j = &json;
   char options[REPORT_OPTIONS];
@@ -226,6 +264,7 @@ void pw_fit_json (const pw_fit *x, const char *status, FILE *f) {
   report_json_columns (x, j);
   report_json_matrix (x, j, "covariance", 0);
   report_json_matrix (x, j, "correlation", 1);
+  report_json_minima (x, j);
   pw_json_close (j, '}');
 }
 

@@ -24,6 +24,8 @@ typedef struct {
   double *at, *model, *jacobian; /* unknowns of the last run; its values; derivatives */
   int known, status;
   double worst; /* largest residual norm of a run that succeeded */
+  double least; /* sum of squares at the best minimum so far; its values are x->x and x->model */
+  int before;   /* iterations of earlier searches */
   pw_error *error;
 } solution;
 
@@ -42,11 +44,11 @@ static double solve_slope (const pw_free_number *k, double u) {
 }
 
 /* The slope is not 0 there. */
-static double solve_start (const pw_free_number *k) {
-  double part = isfinite (k->high) ? (k->value - k->low) / (k->high - k->low) : (k->value - k->low) / k->scale;
+static double solve_start (const pw_free_number *k, double value) {
+  double part = isfinite (k->high) ? (value - k->low) / (k->high - k->low) : (value - k->low) / k->scale;
   part = fmax (part, SOLVE_INSIDE);
   if (isfinite (k->low) && isfinite (k->high)) return asin (2 * fmin (part, 1 - SOLVE_INSIDE) - 1);
-  return isfinite (k->low) ? sqrt ((1 + part) * (1 + part) - 1) : k->value / k->scale;
+  return isfinite (k->low) ? sqrt ((1 + part) * (1 + part) - 1) : value / k->scale;
 }
 
 /* ---- Residuals ---- */
@@ -115,15 +117,30 @@ static void solve_progress (const size_t iteration, void *context, const gsl_mul
   char number[32];
   double size = gsl_blas_dnrm2 (gsl_multifit_nlinear_residual (w));
   if (p->status != PW_OK) return;
-  if (iteration == 0) p->x->initial_chi2 = size * size;
-  p->x->iterations = (int)iteration;
-  for (int i = 0; i < p->x->unknowns.count; i++)
+  if (iteration == 0 && p->before == 0) p->x->initial_chi2 = size * size;
+  p->x->iterations = p->before + (int)iteration;
+  for (int i = 0; i < p->x->unknowns.count && !isfinite (p->least); i++)
     p->x->x[i] = solve_unknown (p->x->unknowns.at + i, gsl_vector_get (gsl_multifit_nlinear_position (w), (size_t)i));
   snprintf (p->x->progress.note, sizeof p->x->progress.note, "residual %s", pw_format (number, size, 6));
-  pw_progress_at (&p->x->progress, (double)iteration);
+  pw_progress_at (&p->x->progress, p->x->iterations);
 }
 
-static int solve_minimum (solution *p, gsl_multifit_nlinear_workspace *w) {
+/* Stores the minimum that a search has reached. */
+static void solve_keep (solution *p, double *minimum) {
+  pw_fit *x = p->x;
+  size_t n = (size_t)x->unknowns.count, cells = (size_t)x->columns * (size_t)x->rows;
+  *minimum = 0;
+  for (size_t i = 0; i < cells; i++)
+    if (!isnan (x->value[i])) *minimum += pow ((p->model[i] - x->value[i]) / x->sigma[i], 2);
+  memcpy (minimum + 1, p->at, n * sizeof *p->at);
+  if (!(*minimum < p->least)) return;
+  x->chi2 = p->least = *minimum;
+  memcpy (x->x, p->at, n * sizeof *p->at);
+  memcpy (x->model, p->model, cells * sizeof *p->model);
+}
+
+/* A search; without a result, only that from the initial values fails. */
+static int solve_minimum (solution *p, gsl_multifit_nlinear_workspace *w, double *minimum) {
   pw_fit *x = p->x;
   size_t n = (size_t)x->unknowns.count;
   gsl_multifit_nlinear_fdf f = {
@@ -132,17 +149,38 @@ static int solve_minimum (solution *p, gsl_multifit_nlinear_workspace *w) {
   gsl_vector *u = gsl_vector_alloc (n);
   int info;
   if (u == NULL) return pw_fail (p->error, PW_RESOURCE, "out of memory");
-  for (size_t i = 0; i < n; i++) gsl_vector_set (u, i, solve_start (x->unknowns.at + i));
-  int status = gsl_multifit_nlinear_init (u, &f, w);
+  for (size_t i = 0; i < n; i++) gsl_vector_set (u, i, solve_start (x->unknowns.at + i, minimum[1 + i]));
+  *minimum = INFINITY;
+  p->worst = 0;
+  int first = x->runs == 0, status = solve_at (p, u) == PW_OK ? gsl_multifit_nlinear_init (u, &f, w) : GSL_EBADFUNC;
   if (status == GSL_SUCCESS)
     status = gsl_multifit_nlinear_driver (SOLVE_ITERATIONS, 1e-10, 1e-10, 0, solve_progress, p, &info, w);
   if (p->status == PW_OK && (status == GSL_SUCCESS || status == GSL_EMAXITER || status == GSL_ENOPROG)) {
     gsl_vector_memcpy (u, gsl_multifit_nlinear_position (w));
-    x->iterations = (int)gsl_multifit_nlinear_niter (w);
-    p->status = solve_at (p, u);
-  } else if (p->status == PW_OK)
+    x->iterations = p->before += (int)gsl_multifit_nlinear_niter (w);
+    if (solve_at (p, u) == PW_OK) solve_keep (p, minimum);
+  } else if (p->status == PW_OK && first)
     p->status = pw_fail (p->error, PW_METHOD, "least squares: %s", gsl_strerror (status));
   gsl_vector_free (u);
+  return p->status;
+}
+
+/* Searches from all starts. */
+static int solve_minima (solution *p, gsl_multifit_nlinear_workspace *w) {
+  pw_fit *x = p->x;
+  size_t n = (size_t)x->unknowns.count, starts = (size_t)x->starts;
+  double *point = pw_unknowns_starts (&x->unknowns, x->starts, 1);
+  x->minimum = malloc (starts * (1 + n) * sizeof *x->minimum);
+  if (point == NULL || x->minimum == NULL) p->status = pw_fail (p->error, PW_RESOURCE, "out of memory");
+  p->least = INFINITY;
+  for (size_t i = 0; i < starts && p->status == PW_OK; i++) {
+    memcpy (x->minimum + i * (1 + n) + 1, point + i * n, n * sizeof *point);
+    solve_minimum (p, w, x->minimum + i * (1 + n));
+  }
+  free (point);
+  if (p->status == PW_OK && !isfinite (p->least))
+    p->status =
+        pw_fail (p->error, PW_METHOD, "no search ended at a motion; begin nearer to the data, by --set or --start");
   return p->status;
 }
 
@@ -247,12 +285,10 @@ int pw_fit_solve (pw_fit *x, pw_error *error) {
                                                                         (size_t)x->residuals, (size_t)x->unknowns.count)
                                           : NULL;
   if (p.status == PW_OK && w == NULL) p.status = pw_fail (error, PW_RESOURCE, "out of memory");
-  if (p.status == PW_OK) solve_minimum (&p, w);
+  if (p.status == PW_OK) solve_minima (&p, w);
   if (p.status == PW_OK) {
-    memcpy (x->x, p.at, (size_t)x->unknowns.count * sizeof *x->x);
-    memcpy (x->model, p.model, (size_t)x->columns * (size_t)x->rows * sizeof *x->model);
-    for (int i = 0; i < x->columns * x->rows; i++)
-      if (!isnan (x->value[i])) x->chi2 += pow ((x->model[i] - x->value[i]) / x->sigma[i], 2);
+    memcpy (p.at, x->x, (size_t)x->unknowns.count * sizeof *x->x);
+    memcpy (p.model, x->model, (size_t)x->columns * (size_t)x->rows * sizeof *x->model);
     solve_errors (&p);
   }
   if (w) gsl_multifit_nlinear_free (w);

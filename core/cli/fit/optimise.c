@@ -6,8 +6,6 @@
 #define _POSIX_C_SOURCE 200809L
 #include "optimise_parts.h"
 #include <gsl/gsl_errno.h>
-#include <gsl/gsl_qrng.h>
-#include <gsl/gsl_rng.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,45 +13,23 @@
 #include "figure.h"
 #include "parallel.h"
 
-enum { OPTIMISE_POLISHED = 3, OPTIMISE_MOST = 40 }; /* results that continue; unknowns, the limit of Sobol's sequence */
+enum { OPTIMISE_POLISHED = 3 }; /* results that continue */
 
 /* ---- Starts ---- */
 
-/* The initial values, then displaced Sobol points; without bounds within their scale of the initial values. */
-static int optimise_points (pw_optimise *x) {
-  const pw_unknowns *k = &x->unknowns;
-  double point[OPTIMISE_MOST], shift[OPTIMISE_MOST];
-  gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);
-  gsl_qrng *sobol = gsl_qrng_alloc (gsl_qrng_sobol, (unsigned)k->count);
-  for (int i = 0; random && sobol && i < x->starts; i++) {
-    if (i == 0) gsl_rng_set (random, (unsigned long)x->seed);
-    for (int j = 0; i == 0 && j < k->count; j++) shift[j] = gsl_rng_uniform (random);
-    for (int j = 0; i == 0 && j < k->count; j++) x->start[0].first[j] = k->at[j].value;
-    if (i > 0) gsl_qrng_get (sobol, point);
-    for (int j = 0; i > 0 && j < k->count; j++) {
-      const pw_free_number *u = k->at + j;
-      double part = fmod (point[j] + shift[j], 1);
-      x->start[i].first[j] =
-          u->given ? pw_search_unknown (u, part) : fmin (fmax (u->value + (2 * part - 1) * u->scale, u->low), u->high);
-    }
-  }
-  int status = random && sobol ? PW_OK : PW_RESOURCE;
-  if (random) gsl_rng_free (random);
-  if (sobol) gsl_qrng_free (sobol);
-  return status;
-}
-
 static int optimise_open_starts (pw_optimise *x, pw_error *error) {
   int n = x->unknowns.count, all = x->starts + OPTIMISE_POLISHED, failed = 0;
+  double *point = pw_unknowns_starts (&x->unknowns, x->starts, x->seed);
   x->start = calloc ((size_t)all, sizeof *x->start);
   for (int i = 0; x->start && i < all; i++) {
     pw_search_start *s = x->start + i;
     s->first = calloc ((size_t)(2 * n + x->outputs), sizeof *s->first);
     if (s->first) s->best = s->first + n, s->value = s->best + n;
-    failed |= s->first == NULL;
+    failed |= s->first == NULL || point == NULL;
+    for (int j = 0; i < x->starts && j < n && !failed; j++) s->first[j] = point[i * n + j];
   }
-  if (x->start == NULL || failed || optimise_points (x) != PW_OK) return pw_fail (error, PW_RESOURCE, "out of memory");
-  return PW_OK;
+  free (point);
+  return x->start && !failed ? PW_OK : pw_fail (error, PW_RESOURCE, "out of memory");
 }
 
 /* The best of the first `count` starts, which are not `used`; the first one of equal ones.  -1: there is none. */
@@ -171,8 +147,8 @@ static int optimise_open (pw_optimise *x, pw_output *file[2], int *folder, pw_er
   int status = pw_cli_open (&x->m, &x->line, error);
   if (status == PW_OK) status = optimise_check (x, error);
   if (status == PW_OK) status = pw_unknowns_open (&x->unknowns, &x->line, &x->m, x->free, 20. * x->starts, error);
-  if (status == PW_OK && x->unknowns.count > OPTIMISE_MOST)
-    status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", OPTIMISE_MOST);
+  if (status == PW_OK && x->unknowns.count > PW_UNKNOWNS_STARTED)
+    status = pw_fail (error, PW_INPUT, "--free: at most %d unknowns", PW_UNKNOWNS_STARTED);
   if (status == PW_OK) status = pw_cli_uses (&x->line, x->m.file, use, sizeof use / sizeof *use, error);
   if (status == PW_OK && x->path && (file[0] = pw_output_open (x->path, error)) == NULL) status = error->status;
   if (status == PW_OK && x->json_path && (file[1] = pw_output_open (x->json_path, error)) == NULL)

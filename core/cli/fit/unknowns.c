@@ -1,6 +1,8 @@
 /* Free parameters and initial values. */
 #define _POSIX_C_SOURCE 200809L
 #include "unknowns.h"
+#include <gsl/gsl_qrng.h>
+#include <gsl/gsl_rng.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -133,6 +135,38 @@ void pw_unknowns_at (const pw_unknowns *u, const double *x, pw_unknown *list) {
     snprintf (list[i].unit, sizeof list[i].unit, "%s", f->unit);
     if (f->parameter == NULL) list[i].state = pw_system_find_state (u->m->system, f->name, &none);
   }
+}
+
+/* In a range of length 1. */
+static double unknowns_between (const pw_free_number *k, double part) {
+  double x = k->given ? k->low + part * k->scale : k->value + (2 * part - 1) * k->scale;
+  return fmin (fmax (x, k->low), k->high);
+}
+
+/* A row per start after the first one. */
+static int unknowns_sobol (const pw_unknowns *u, int count, double seed, double *out) {
+  double point[PW_UNKNOWNS_STARTED], shift[PW_UNKNOWNS_STARTED];
+  gsl_rng *random = gsl_rng_alloc (gsl_rng_mt19937);
+  gsl_qrng *sobol = gsl_qrng_alloc (gsl_qrng_sobol, (unsigned)u->count);
+  if (random) gsl_rng_set (random, (unsigned long)seed);
+  for (int j = 0; random && j < u->count; j++) shift[j] = gsl_rng_uniform (random);
+  for (int i = 1; random && sobol && i < count; i++) {
+    gsl_qrng_get (sobol, point);
+    for (int j = 0; j < u->count; j++) *out++ = unknowns_between (u->at + j, fmod (point[j] + shift[j], 1));
+  }
+  int status = random && sobol ? PW_OK : PW_RESOURCE;
+  if (random) gsl_rng_free (random);
+  if (sobol) gsl_qrng_free (sobol);
+  return status;
+}
+
+double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed) {
+  double *out = malloc ((size_t)count * (size_t)u->count * sizeof *out);
+  if (out == NULL) return NULL;
+  for (int j = 0; j < u->count; j++) out[j] = u->at[j].value;
+  if (count == 1 || unknowns_sobol (u, count, seed, out + u->count) == PW_OK) return out;
+  free (out);
+  return NULL;
 }
 
 int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size) {

@@ -43,6 +43,12 @@ int pw_unknowns_system (const pw_unknowns *u, const double *x, pw_cli_model *m, 
 /* The same values, to differentiate by: `list` has room for all. */
 void pw_unknowns_at (const pw_unknowns *u, const double *x, pw_unknown *list);
 
+/* Points where searches begin, `count` x unknowns: the values at the beginning, then Sobol's sequence between the user's
+ * bounds, otherwise within a scale of the values, displaced by the seed.  Several
+ * starts: at most PW_UNKNOWNS_STARTED unknowns, the limit of the sequence.  NULL if out of memory; free it. */
+enum { PW_UNKNOWNS_STARTED = 40 };
+double *pw_unknowns_starts (const pw_unknowns *u, int count, double seed);
+
 /* Options that set the values, "--set a=1 --start frame.vx=2".  0 if the text is too short. */
 int pw_unknowns_options (const pw_unknowns *u, const double *x, char *text, size_t size);
 
