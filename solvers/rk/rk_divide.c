@@ -95,16 +95,21 @@ int pw_rk_at (pw_run *r, double t, pw_error *error) {
 /* ---- Fixed steps ---- */
 
 /* If the end of the step to t1 lands on a singular configuration, a longer one, up to `stop`, is divided so that the
- * first part ends after t1.  Accepts the first part, which ends at *t. */
-static int fixed_step_around (pw_run *r, int status, double t1, double stop, int project, double *t) {
+ * first part ends after t1.  The error of the accelerations there, with which the next step would begin, is that of the
+ * state over the sine: `lands` 1: the step to t1 is used only if no longer one can be.  Accepts the first part, which ends at
+ * *t. */
+static int fixed_step_around (pw_run *r, int status, int lands, double t1, double stop, int project, double *t) {
   static const double beyond[] = { 0.62, 2.62, 7.62 };
   const divide_begin from = { r->t, r->q, r->ledger, r->rate, r->projected };
   const pw_watchdog *limit = &r->limits;
   double added = 0;
-  status = divide (r, &from, status, t1, project, r->t, limit->agree_best, limit->agree, t);
+  if (!lands) status = divide (r, &from, status, t1, project, r->t, limit->agree_best, limit->agree, t);
+  if (lands && status == PW_OK) status = PW_RETRY;
   for (size_t i = 0; i < sizeof beyond / sizeof *beyond && status == PW_RETRY && t1 < stop; i++)
     status = divide (r, &from, status, fmin (t1 + beyond[i] * r->settings.step, stop), project, t1, limit->agree_best,
                      limit->agree, t);
+  if (lands && status == PW_RETRY)
+    status = divide (r, &from, status, t1, project, r->t, limit->agree_best, limit->agree, t);
   if (status == PW_OK) status = pw_rk_step (r, *t - r->t, *t, project, &added);
   if (status == PW_OK) pw_rk_accept (r, *t - r->t, *t, r->settings.ledger ? added : 0);
   return status;
@@ -118,9 +123,10 @@ int pw_rk_advance_fixed (pw_run *r, double t_end, pw_error *error) {
   const int split = d->split;
   r->near = 0;
   int status = pw_rk_step (r, h, t1, project, r->settings.ledger ? &added : NULL);
+  int lands = r->near && r->geometry.sine < r->limits.lands * r->geometry.state_sine;
   d->split = r->near && !d->split;
   double stop = whole ? fmin (t_end, r->breakpoint) : t1, t = t1;
-  if (d->split) status = fixed_step_around (r, status, t1, stop, project, &t);
+  if (d->split) status = fixed_step_around (r, status, lands, t1, stop, project, &t);
   if (r->stopped) {
     d->split = split;
     return PW_STOPPED;

@@ -34,6 +34,7 @@ static const struct {
   { WATCHDOG_LIMIT (growth), 0, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-2, 2 },
   { WATCHDOG_LIMIT (agree_best), 1e5, WATCHDOG_FEWER, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 4 },
   { WATCHDOG_LIMIT (agree), 1e-6, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 1e-3, 4 },
+  { WATCHDOG_LIMIT (lands), 0, WATCHDOG_EARLIER, "n-four-bar", NULL, 0, "rk4+projection", 7.842e-4, 4 },
   { WATCHDOG_LIMIT (regular), 0, WATCHDOG_LATER, "n-four-bar", "N", 1, "erk8+none", 1e-5, 4 },
   { WATCHDOG_LIMIT (turn), 4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
   { WATCHDOG_LIMIT (least_turn), 1e4, WATCHDOG_LATER, "n-four-bar", "N", 1, "bdf+none", 1e-5, 4 },
