@@ -125,12 +125,38 @@ static void test_bad (void **state) {
   cli_bad ("pinwheel linearise @/block.yaml -o @/no/such", 1, "cannot write @/no/such.json: No such file or directory");
 }
 
+/* One run for each mode that moves, a pair once, of finite numbers; no file without such modes. */
+static void test_page (void **state) {
+  int runs = 0;
+  (void)state;
+  cli_write ("block.yaml", linearise_block);
+  cli_good ("pinwheel linearise @/block.yaml --animate @/modes.html");
+  const char *page = cli_file ("modes.html");
+  for (const char *at = page; (at = strstr (at, "method:\"mode ")) != NULL; at++) runs++;
+  assert_int_equal (runs, 1);
+  assert_non_null (strstr (page, "method:\"mode 1: -0.8 1/s, 0.9985 Hz, growth is not shown\""));
+  assert_non_null (strstr (page, "<select id=\"mode\">"));
+  assert_null (strstr (page, "NaN"));
+  const char *motion = strstr (page, "motion:[");
+  double first[6], second[6];
+  assert_int_equal (sscanf (motion, "motion:[ %lf,%lf,%lf,%lf,%lf,%lf, %lf,%lf,%lf,%lf,%lf,%lf", first, first + 1,
+                            first + 2, first + 3, first + 4, first + 5, second, second + 1, second + 2, second + 3,
+                            second + 4, second + 5),
+                    12);
+  double size = first[0] - 0.8, step = 3 * 2 * PW_PI / 180, rate = sqrt (40 - 0.64);
+  assert_true (size > 0.01 && size < 0.1);
+  check_close ("next x", second[0], 0.8 + size * cos (step), 1e-8, "9 digits");
+  check_close ("next vx", second[3], -size * rate * sin (step), 1e-8, "9 digits");
+  cli_bad ("pinwheel linearise car --animate @/none.html", 2, "--animate @/none.html: there is no mode with a shape");
+  assert_null (cli_file ("none.html"));
+  cli_bad ("pinwheel linearise @/block.yaml --animate @/none.gif", 2,
+           "--animate @/none.gif: expected a name that ends in .html");
+}
+
 int main (void) {
   const struct CMUnitTest tests[] = {
-    cmocka_unit_test (test_oscillator),
-    cmocka_unit_test (test_npz),
-    cmocka_unit_test (test_times),
-    cmocka_unit_test (test_bad),
+    cmocka_unit_test (test_oscillator), cmocka_unit_test (test_npz), cmocka_unit_test (test_page),
+    cmocka_unit_test (test_times),      cmocka_unit_test (test_bad),
   };
   return cmocka_run_group_tests (tests, cli_setup, cli_teardown);
 }

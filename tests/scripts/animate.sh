@@ -39,6 +39,16 @@ for model in ezyroller andrews-squeezer wheeled-snake pendulum car-tyres; do
   cat "$work/console"
 done
 
+"$pinwheel" linearise chain --steady --animate "$work/modes.html" >/dev/null 2>"$work/err"
+report 'a page of modes is written' $?
+if [ -n "$browser" ]; then
+  { sed '$d' "$work/modes.html" | sed '$d'; echo '<script>$("mode").selectedIndex = 2; $("mode").dispatchEvent(new Event("change")); play(true);'
+    echo '</script></body></html>'; } >"$work/use.html"
+  browse "$work/use.html"
+  grep -q 'id="method">mode 5: 0 1/s' "$work/dom" && [ ! -s "$work/console" ]
+  report 'another mode is chosen, nothing on the console' $?
+fi
+
 "$pinwheel" run ezyroller --animate "$work/x.mp4" >/dev/null 2>"$work/err"
 [ $? = 2 ] && grep -q 'expected a name that ends in .html' "$work/err"
 report 'another ending is refused' $?

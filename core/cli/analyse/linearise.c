@@ -4,6 +4,7 @@
 #include <string.h>
 #include "held.h"
 #include "linearise.h"
+#include "plot.h"
 #include "progress.h"
 #include "report.h"
 
@@ -134,30 +135,34 @@ static int linearise_compute (pw_linearise *x, pw_error *error) {
 
 /* ---- Files ---- */
 
-enum { LINEARISE_FILES = 3 };
+enum { LINEARISE_NAMED = 3, LINEARISE_FILES };
 
-/* Opens NAME.json, .csv, .npz before anything is computed. */
+/* Opens NAME.json, .csv, .npz, and the page, before anything is computed. */
 static int linearise_open_files (const pw_linearise *x, pw_output **file, pw_error *error) {
-  static const char *const ending[LINEARISE_FILES] = { "json", "csv", "npz" };
-  char path[LINEARISE_FILES][4096];
+  static const char *const ending[LINEARISE_NAMED] = { "json", "csv", "npz" };
+  char path[LINEARISE_NAMED][4096];
   pw_use use[1 + LINEARISE_FILES] = { PW_CLI_MODEL_USE };
-  if (x->name == NULL) return PW_OK;
-  for (int i = 0; i < LINEARISE_FILES; i++) {
+  for (int i = 0; i < LINEARISE_NAMED && x->name; i++) {
     if (snprintf (path[i], sizeof path[i], "%s.%s", x->name, ending[i]) >= (int)sizeof path[i])
       return pw_fail (error, PW_INPUT, "-o: the name is too long");
     use[1 + i] = (pw_use){ "-o", path[i], PW_WRITES, NULL };
   }
+  use[LINEARISE_FILES] = (pw_use){ "--animate", x->animate, PW_WRITES, NULL };
+  if (x->animate && pw_animation_check (x->animate, error) != PW_OK) return error->status;
   if (pw_cli_uses (&x->line, x->m.file, use, 1 + LINEARISE_FILES, error) != PW_OK) return error->status;
   for (int i = 0; i < LINEARISE_FILES; i++)
-    if ((file[i] = pw_output_open (path[i], error)) == NULL) return error->status;
+    if (use[1 + i].path && (file[i] = pw_output_open (use[1 + i].path, error)) == NULL) return error->status;
   return PW_OK;
 }
 
 static int linearise_write (const pw_linearise *x, pw_output **file, pw_error *error) {
-  if (x->name == NULL) return PW_OK;
-  pw_linearise_json (x, &(pw_json){ .f = pw_output_stream (file[0]), .lines = 1 });
-  int status = pw_linearise_csv (x, pw_output_stream (file[1]), error);
-  if (status == PW_OK) status = pw_linearise_npz (x, pw_output_stream (file[2]), error);
+  int status = PW_OK;
+  if (x->name) {
+    pw_linearise_json (x, &(pw_json){ .f = pw_output_stream (file[0]), .lines = 1 });
+    status = pw_linearise_csv (x, pw_output_stream (file[1]), error);
+    if (status == PW_OK) status = pw_linearise_npz (x, pw_output_stream (file[2]), error);
+  }
+  if (status == PW_OK && x->animate) status = pw_linearise_page (x, pw_output_stream (file[LINEARISE_NAMED]), error);
   if (status != PW_OK) return status;
   status = pw_output_finish_all (file, LINEARISE_FILES, error);
   for (int i = 0; i < LINEARISE_FILES; i++) file[i] = NULL;
@@ -204,6 +209,7 @@ static const struct poptOption linearise_options[] = {
                   "Output y: a state, BODY.x, .y, .phi, .vx, .vy or .omega; repeatable (default all)"),
   PW_TEXT_OPTION (pw_linearise, name, "name", 'o', "NAME",
                   "Write NAME.json (everything), NAME.csv (the matrix [A B; C D]) and NAME.npz for NumPy"),
+  PW_TEXT_OPTION (pw_linearise, animate, "animate", 0, "FILE.html", "Write a page in which the modes are animated"),
   PW_MODEL_OPTIONS,
   POPT_TABLEEND
 };

@@ -8,6 +8,7 @@
 typedef struct {
   pw_cli_line line;
   const char *at, *name;   /* NAME of the files, or NULL */
+  const char *animate;     /* name of the page of modes, or NULL */
   const char **hold_texts; /* of --steady */
   int steady;
   const char **input_names, **output_names; /* as given, ended by NULL; or NULL: all */
@@ -21,6 +22,10 @@ typedef struct {
   int inputs, outputs;
 } pw_linearise;
 
+/* 1 if mode i is shown: it moves, and of a conjugate pair it is the first. */
+int pw_linearise_shows (const pw_linear *l, int i);
+/* Writes an HTML page in which modes are animated.  A status. */
+int pw_linearise_page (const pw_linearise *x, FILE *f, pw_error *error);
 /* Prints eigenvalues and mode shapes. */
 void pw_linearise_print (const pw_linearise *x);
 /* Writes everything as JSON; [ A B ; C D ] as a table.  A status. */

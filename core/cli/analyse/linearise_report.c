@@ -59,6 +59,10 @@ static int linearise_has_shape (const pw_linear *l, int i) {
   return !l->rigid[i] && (l->re[i] != 0 || l->im[i] != 0);
 }
 
+int pw_linearise_shows (const pw_linear *l, int i) {
+  return linearise_has_shape (l, i) && l->im[i] >= 0;
+}
+
 /* The real and imaginary part of a state in mode i. */
 static const double *linearise_shape (const pw_linear *l, int i, int state) {
   return l->shape + 2 * ((size_t)i * 2 * (size_t)l->coordinates + (size_t)state);
@@ -106,7 +110,7 @@ static void linearise_shapes (const pw_linearise *x) {
   const pw_linear *l = &x->linear;
   int shown = 0, more = 0;
   for (int i = 0; i < l->unknowns; i++) {
-    if (!linearise_has_shape (l, i) || l->im[i] < 0) continue;
+    if (!pw_linearise_shows (l, i)) continue;
     if (shown == 0) puts ("\nMode shapes: displacements in the axes of the frame, the largest 1 m (angles times L)");
     if (shown++ < LINEARISE_MODES)
       linearise_mode (x, i);

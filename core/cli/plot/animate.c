@@ -120,7 +120,7 @@ static void page_parameters (FILE *f, const pw_model *m) {
   fputc (']', f);
 }
 
-static void page_data (FILE *f, const pw_plots *p, const char *method, const char *reason) {
+void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const char *reason) {
   int wheels = 3 * p->wheels.shown;
   page_text (f, "{\nmodel:", p->model);
   page_text (f, ",\nabout:", p->about ? p->about : "");
@@ -132,8 +132,8 @@ static void page_data (FILE *f, const pw_plots *p, const char *method, const cha
   page_array (f, p, "t", PLOT_T, 1, 10);
   page_array (f, p, "motion", p->bodies.offset, 6 * p->bodies.shown, 9);
   page_array (f, p, "contact", p->wheels.offset, wheels, 9);
-  page_array (f, p, "force", p->wheels.offset + wheels, 2 * p->links, 6);
-  page_array (f, p, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
+  if (p->with_forces) page_array (f, p, "force", p->wheels.offset + wheels, 2 * p->links, 6);
+  if (p->with_forces) page_array (f, p, "energy", PLOT_KINETIC, PLOT_FIRST - PLOT_KINETIC, 7);
   fputs ("}", f);
 }
 
@@ -159,7 +159,7 @@ static void page_insert (FILE *f, pw_page_part part, const void *context) {
   const pw_animation *x = context;
   if (part != PW_PAGE_BEGIN) return;
   fputs ("begin(", f);
-  page_data (f, x->p, x->method, x->reason);
+  pw_animation_run (f, x->p, x->method, x->reason);
   fputs (");\n", f);
 }
 

@@ -37,6 +37,8 @@ int pw_animation_check (const char *path, pw_error *error);
  * run did not reach its end, or "".  Returns 0 and reports it if the run is too short. */
 int pw_animate (const pw_plots *p, const char *path, pw_output *o, const char *method, const char *reason);
 
+/* Writes the samples as a JavaScript object for begin(); energies only with forces. */
+void pw_animation_run (FILE *f, const pw_plots *p, const char *method, const char *reason);
 /* Writes what does not change in time as members of a JavaScript object: shapes, names, links. */
 void pw_animation_scene (FILE *f, const pw_plots *p);
 /* Writes animate.html; `insert` writes the parts that differ between pages: the panel of controls, and the statements
